@@ -1,4 +1,4 @@
-"""Which adapter stands between the wires and the robot: the Python model, or the firmware's own core.
+"""Which adapter stands between the wires and the robot: the Python model, the firmware's own core, or the user's.
 
 The core is the C++ of adapter_fw: a shared library with a plain C interface
 (adapter_fw/capi/adapter_capi.h), built with the package where a C++17 compiler is
@@ -11,7 +11,7 @@ they are.
 
 import ctypes
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
@@ -29,6 +29,7 @@ from adapter_sim.settings import AdapterSettings, EncoderAtOpen, MotorCommand, M
 from p2os.gamepad import PadReport
 from p2os.robots.parameters import RobotParameters
 from robot_bench.scenario.scenario import Scenario
+from robot_bench.wires.line_ends import ENDS, AdapterPart
 from simbase.errors import MissingDependencyError, UsageError
 from simbase.timing import NS_PER_S, Nanos, Reached
 
@@ -320,15 +321,39 @@ class FirmwareAdapter:
 
 
 AnyAdapter: TypeAlias = Adapter | FirmwareAdapter
+_SHIPPED: Mapping[str, type[AnyAdapter]] = {"model": Adapter, "firmware": FirmwareAdapter}
 
 
-def make_adapter(scenario: Scenario, pins: PinBank, pinout: Pinout) -> AnyAdapter:
+def make_adapter(scenario: Scenario, pins: PinBank, pinout: Pinout) -> AdapterPart:
     """Return the adapter that a scenario wants.
 
     Raises:
+        UsageError: One of the user's is wanted, and cannot be made.
         MissingDependencyError: The firmware's core is wanted and was not built.
     """
-    kind: type[AnyAdapter] = {"model": Adapter, "firmware": FirmwareAdapter}[scenario.adapter_core]
+    if scenario.adapter_core in _SHIPPED:
+        return make_shipped_adapter(scenario, pins, pinout)
+    return cast(
+        "AdapterPart",
+        ENDS["adapter"].make(
+            scenario.adapter_core, pins=pins, pinout=pinout, parameters=scenario.parameters, settings=scenario.adapter
+        ),
+    )
+
+
+def make_shipped_adapter(scenario: Scenario, pins: PinBank, pinout: Pinout) -> AnyAdapter:
+    """Return the adapter that a scenario wants, for a real robot: its stops are tested, those of others are not.
+
+    Raises:
+        UsageError: The scenario wants one of the user's.
+        MissingDependencyError: The firmware's core is wanted and was not built.
+    """
+    kind = _SHIPPED.get(scenario.adapter_core)
+    if kind is None:
+        raise UsageError(
+            f"the adapter {scenario.adapter_core} drives no real robot: nobody has tested how it stops one",
+            hint=f"--adapter {' or '.join(_SHIPPED)}",
+        )
     return kind(pins=pins, pinout=pinout, parameters=scenario.parameters, settings=scenario.adapter)
 
 

@@ -42,7 +42,7 @@ from p2os.pioneer.body.factory import body_note, make_body, make_scene, resolve_
 from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import Pose, World
-from robot_bench.adapter import RUN_ANEW, AnyAdapter, make_adapter
+from robot_bench.adapter import RUN_ANEW, make_adapter
 from robot_bench.direct import DirectRobot, DistanceSensors, JointMotor, WheelEncoder
 from robot_bench.direct.differential.robot import DifferentialRobot
 from robot_bench.direct.senses import WorldSenses
@@ -75,6 +75,7 @@ from robot_bench.scenario.wired_robots import WiredPart
 from robot_bench.scenario.world_script import WorldScript, load_changes
 from robot_bench.wires.chip_pins import ChipPins
 from robot_bench.wires.endpoints import Endpoint
+from robot_bench.wires.line_ends import ENDS, AdapterPart, ControllerPart
 from robot_bench.wires.nets import Harness, Net, OwnedPins, Strength
 from robot_bench.wires.ports import Chip
 from robot_bench.wires.serial_line import SerialLine
@@ -100,7 +101,7 @@ Condition: TypeAlias = Union[str, Callable[["Bench"], bool]]  # noqa: UP007 - a 
 #: What decides a run besides its files; its end and its goals may be others after a restart.
 DECISIVE = (
     "mode", "seed", "parameters", "threshold_um", "usart_baud", "start", "direct", "adapter", "adapter_core",
-    "controller", "changes", "faults", "whens", "own_robot", "parts",
+    "controller", "controller_kind", "changes", "faults", "whens", "own_robot", "parts",
 )  # fmt: skip
 _VERSION = "version of p2os"
 
@@ -113,8 +114,14 @@ class BenchParts:
     harness: Harness
     body: RobotBody
     world: World
-    adapter: AnyAdapter | None = None
-    pioneer: Pioneer | None = None
+    adapter: AdapterPart | None = None
+    #: The robot's controller: the virtual Pioneer, or one of the user's.
+    controller: ControllerPart | None = None
+
+    @property
+    def pioneer(self) -> Pioneer | None:
+        """The controller, where it is the virtual Pioneer."""
+        return self.controller if isinstance(self.controller, Pioneer) else None
 
 
 class Bench(Stateful):
@@ -194,6 +201,7 @@ class Bench(Stateful):
             "world": hashlib.sha256(repr(world).encode()).hexdigest(),
             "body": resolve_body(scenario.body),
             **{name: getattr(scenario, name) for name in DECISIVE},
+            **scenario.own_classes,
         }
         self.script = WorldScript(
             scenario.changes, body, scenario.parameters,
@@ -858,8 +866,8 @@ class Bench(Stateful):
         if fault == LINK_DOWN:
             for line in self._lines:
                 line.is_cut = op == "fault"
-        elif self.parts.pioneer is not None:
-            self.parts.pioneer.do(words, at)
+        elif self.parts.controller is not None:
+            self.parts.controller.do(words, at)
 
     def _do_by_hand(self, deed: Deed) -> None:
         self.recorder.event("hand", deed.at, deed.do, deed.words)
@@ -891,8 +899,8 @@ class Bench(Stateful):
                 )
             self._robots.append(self._direct_robot(pinout, body, harness))
             return BenchParts(chip=chip, harness=harness, body=body, world=world)
-        adapter, pioneer = self._adapter_and_pioneer(pinout, body, harness)
-        return BenchParts(chip=chip, harness=harness, body=body, world=world, adapter=adapter, pioneer=pioneer)
+        adapter, controller = self._ends_of_line(pinout, body, harness)
+        return BenchParts(chip=chip, harness=harness, body=body, world=world, adapter=adapter, controller=controller)
 
     def _plug_in(self, chip: Chip) -> tuple[WorldSenses, ...]:
         """Attach the scenario's parts to the board, and have them sense the world."""
@@ -926,15 +934,20 @@ class Bench(Stateful):
         robot.on_event = self.recorder.listener("direct")
         return robot
 
-    def _adapter_and_pioneer(self, pinout: Pinout, body: RobotBody, harness: Harness) -> tuple[AnyAdapter, Pioneer]:
+    def _ends_of_line(self, pinout: Pinout, body: RobotBody, harness: Harness) -> tuple[AdapterPart, ControllerPart]:
         recorder, parameters = self.recorder, self.scenario.parameters
         to_robot, to_client = self._lines = SerialLine(), SerialLine()
         adapter = make_adapter(self.scenario, OwnedPins(harness, "adapter"), pinout)
         adapter.on_event = recorder.listener("adapter")
         settings = replace(self.scenario.controller, baud=to_client.baud, seed=self.scenario.seed)
-        pioneer = Pioneer(parameters=parameters, body=body, settings=settings)
-        pioneer.on_event = recorder.listener("pioneer")
-        ranges = self._ranges = SipRanges(parameters, pioneer.settings.profile, on_ranges=recorder.sonar)
+        kind = self.scenario.controller_kind
+        controller: ControllerPart
+        if kind in ENDS["controller"].ships:
+            controller = Pioneer(parameters=parameters, body=body, settings=settings)
+        else:
+            controller = ENDS["controller"].make(kind, parameters=parameters, body=body, settings=settings)
+        controller.on_event = recorder.listener("pioneer")
+        ranges = self._ranges = SipRanges(parameters, settings.profile, on_ranges=recorder.sonar)
 
         def arrives_at_client(data: bytes, at: Nanos) -> None:
             recorder.wire("r2c", data, at)
@@ -943,13 +956,13 @@ class Bench(Stateful):
         self._robots.append(Endpoint(adapter, incoming=to_client, outgoing=to_robot, on_arrival=arrives_at_client))
         self._robots.append(
             Endpoint(
-                pioneer,
+                controller,
                 incoming=to_robot,
                 outgoing=to_client,
                 on_arrival=lambda data, at: recorder.wire("c2r", data, at),
             )
         )
-        return adapter, pioneer
+        return adapter, controller
 
 
 def body_of(scenario: Scenario, world: World) -> RobotBody:

@@ -71,7 +71,9 @@ LOGGING = (
 
 #: The map of ARCHITECTURE.md, lowest first: a package imports none of its own row and none above it.
 LAYERS = {
-    "simbase": (("timing", "state", "installation", "wire", "lazy", "interrupts"), ("errors",), ("units",)),
+    "simbase": (
+        ("timing", "state", "installation", "wire", "lazy", "interrupts"), ("errors",), ("units", "user_classes"),
+    ),
     "p2os": (
         ("errors", "event_log"), ("toml_file",), ("robots", "gamepad"), ("protocol",), ("transport",),
         ("capture", "client", "pioneer"), ("cli",), ("__main__",),

@@ -9,24 +9,20 @@ Invariant: a `PartSpec` can be built again from itself alone, in another process
 """
 
 import importlib
-import importlib.util
 import inspect
-import sys
 import types
 import typing
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any, Protocol, cast
 
 from bluepill_sim.parts.attached import PartError, Use
 from simbase.errors import shown
+from simbase.user_classes import find_class, is_in_file, said
 
 #: The entry points of others.
 GROUP = "p2os.parts"
-#: What the modules' names of users' files begin with.
-OF_USERS = "p2os_part_"
 _HINT = "NAME,KEY=VALUE,... such as ssd1306,on=I2C1 or ./mine.py:Class,on=I2C1"
 _FLAGS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
 
@@ -139,7 +135,7 @@ def build(spec: PartSpec) -> Wiring:
     except OSError as error:
         raise PartError(f"{spec.kind}: {error.filename}: {error.strerror or error}") from error
     except Exception as error:  # whatever a class of the user's raises is one line here
-        raise PartError(f"{spec.kind}: {_said(error)}") from error
+        raise PartError(f"{spec.kind}: {said(error)}") from error
     return Wiring(part=part, name=name, on=_text(on), select=_text(select), pins=pins)
 
 
@@ -163,44 +159,9 @@ def part_class(kind: str, folder: Path = Path()) -> Callable[..., Any]:
     if row is not None:
         module, _, name = row.target.partition(":")
         return cast("Callable[..., Any]", getattr(importlib.import_module(module), name))
-    path, colon, name = kind.rpartition(":")
-    if colon and path.endswith(".py"):
-        return _class_in(folder / path, name)
-    for point in entry_points(group=GROUP):
-        if point.name == kind:
-            try:
-                return cast("Callable[..., Any]", point.load())
-            except Exception as error:  # of another's package
-                raise PartError(f"the part {kind} cannot be loaded: {_said(error)}") from error
-    raise PartError(f"there is no part {shown(kind)}", hint=f"known are {', '.join(PARTS)}, and FILE.py:CLASS")
-
-
-def _class_in(path: Path, name: str) -> Callable[..., Any]:
-    """Return a class of a Python file, which is loaded once."""
-    key = OF_USERS + path.stem
-    module = sys.modules.get(key)
-    if module is None or Path(module.__file__ or "") != path.absolute():
-        spec = importlib.util.spec_from_file_location(key, path.absolute())
-        if spec is None or spec.loader is None or not path.is_file():
-            raise PartError(f"there is no file {path}", hint=_HINT)
-        module = importlib.util.module_from_spec(spec)
-        sys.modules[key] = module
-        try:
-            spec.loader.exec_module(module)
-        except BaseException as error:
-            del sys.modules[key]
-            if not isinstance(error, Exception):
-                raise
-            raise PartError(f"{path}: {_said(error)}") from error
-    made = getattr(module, name, None)
-    if not isinstance(made, type):
-        classes = [
-            key
-            for key, value in vars(module).items()
-            if isinstance(value, type) and value.__module__ == module.__name__
-        ]
-        raise PartError(f"{path} has no class {shown(name)}", hint=f"it has {', '.join(classes) or 'none'}")
-    return made
+    if is_in_file(kind):
+        kind = str(folder / kind)
+    return find_class(kind, what="part", group=GROUP, known=list(PARTS), error=PartError)
 
 
 def _arguments_of(made: Callable[..., Any], kind: str) -> dict[str, Any]:
@@ -254,7 +215,3 @@ def _no_flag(value: object) -> object:
 
 def _text(value: object) -> str | None:
     return None if value is None else str(value)
-
-
-def _said(error: Exception) -> str:
-    return str(error) if isinstance(error, ValueError) else f"{type(error).__name__}: {error}"

@@ -7,6 +7,7 @@ Source: JSON Schema, draft 2020-12.
 """
 
 from collections.abc import Sequence
+from importlib.metadata import entry_points
 
 from robot_bench.events.codec import Json
 from robot_bench.scenario.goals.judging import COMMON
@@ -81,4 +82,8 @@ def _key(key: Key) -> Json:
         return {"oneOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]}
     found: Json = {"type": _TYPES[key.kind]}
     found |= {name: bound for name, bound in bounds.items() if bound is not None and key.kind in {"number", "whole"}}
-    return found | ({"enum": list(key.choices)} if key.choices else {})
+    choices: Json = {"enum": list(key.choices)} if key.choices else {}
+    if key.group:
+        installed = [point.name for point in entry_points(group=key.group)]
+        return found | {"anyOf": [{"enum": [*key.choices, *installed]}, {"pattern": r"\.py:[^:]+$"}]}
+    return found | choices

@@ -9,7 +9,7 @@ there, and every value is in range.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib.resources import files
 from pathlib import Path
@@ -20,7 +20,8 @@ from adapter_sim.pinout import load_pinout
 from adapter_sim.settings import AdapterSettings, MotorCommand
 from bluepill_sim.parts.registry import PartSpec
 from p2os.errors import ScenarioError
-from p2os.pioneer.body.factory import BEST, BODY_CHOICES
+from p2os.pioneer.body.factory import BEST, BODY_CHOICES, body_class
+from p2os.pioneer.body.factory import GROUP as BODY_GROUP
 from p2os.pioneer.controller import ControllerSettings, SonarPerSip
 from p2os.pioneer.controller.flash import load_flash
 from p2os.pioneer.sensor_errors import load_sensor_errors
@@ -42,12 +43,12 @@ from robot_bench.scenario.sweep import Axis, load_axes, load_seeds
 from robot_bench.scenario.when_script import When, load_whens
 from robot_bench.scenario.wired_robots import OwnRobot, find_own_robot, known_own_robots, load_own_robot
 from robot_bench.scenario.world_script import Change, load_changes, refuse_names
+from robot_bench.wires.line_ends import ENDS
 from simbase.errors import FileError, UsageError, shown, shown_name
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
+from simbase.user_classes import located, source_of
 
 MODES = ("direct", "adapter")
-#: What runs in the adapter's place: the Python model, or the firmware's C++ core.
-ADAPTER_CORES = ("model", "firmware")
 
 _TOP = (
     VERSION,
@@ -58,7 +59,7 @@ _TOP = (
     Key(name="robot", kind="text"),
     Key(name="pins", kind="table"),
     Key(name="mode", kind="text", choices=MODES),
-    Key(name="body", kind="text", choices=BODY_CHOICES),
+    Key(name="body", kind="text", choices=BODY_CHOICES, group=BODY_GROUP),
     Key(name="seed", kind="whole", least=0, most=2**63 - 1),
     Key(name="seeds", kind="text"),
     Key(name="sweep", kind="table"),
@@ -90,7 +91,7 @@ _DIRECT = (
     Key(name="bit_order", kind="text", choices=tuple(BitOrder)),
 )
 _ADAPTER = (
-    Key(name="core", kind="text", choices=ADAPTER_CORES),
+    Key(name="core", kind="text", choices=ENDS["adapter"].ships, group=ENDS["adapter"].group),
     Key(name="step_mm_s", kind="number", least=0.001, most=10_000),
     Key(name="motor_command", kind="text", choices=tuple(MotorCommand)),
     Key(name="bit_order", kind="text", choices=tuple(BitOrder)),
@@ -100,6 +101,7 @@ _ADAPTER = (
     Key(name="encoder_at_open", kind="text", choices=("zero", "continue")),
 )
 _CONTROLLER = (
+    Key(name="kind", kind="text", choices=ENDS["controller"].ships, group=ENDS["controller"].group),
     Key(name="name", kind="text"),
     Key(name="sonar_per_sip", kind="text", choices=tuple(member.value for member in SonarPerSip)),
     Key(name="errors", kind="text"),
@@ -135,9 +137,9 @@ class ScenarioOptions(TypedDict, total=False):
     firmware: str | Path | None
     #: `adapter` or `direct`.
     mode: str | None
-    #: `model` or `firmware`.
+    #: `model`, `firmware`, or one of the user's.
     adapter_core: str | None
-    #: `kinematic`, `bullet`, `mujoco` or `best`.
+    #: `kinematic`, `bullet`, `mujoco`, `best`, or one of the user's.
     body: str | None
     #: A shipped world's name or a file.
     world: str | None
@@ -192,6 +194,7 @@ class Scenario:
     adapter: AdapterSettings = field(default_factory=AdapterSettings)
     adapter_core: str = "model"
     controller: ControllerSettings = field(default_factory=ControllerSettings)
+    controller_kind: str = "pioneer"
     #: What is plugged into the board besides the robot.
     parts: tuple[PartSpec, ...] = ()
     changes: tuple[Change, ...] = ()
@@ -217,6 +220,12 @@ class Scenario:
         return self.threshold_um / 1e6
 
     @property
+    def own_classes(self) -> dict[str, str]:
+        """What stands in the place of a part that ships: its name, and the SHA-256 of the file of its class."""
+        named = (("body", self.body), ("adapter", self.adapter_core), ("controller", self.controller_kind))
+        return {name: source_of(_class_of_users(what, name)) for what, name in named if _is_of_users(what, name)}
+
+    @property
     def programmed(self) -> "tuple[Scenario, ...]":
         """The scenarios of those of several robots that have a program; none of one robot."""
         return tuple(robot.scenario for robot in self.robots if robot.scenario is not None)
@@ -228,8 +237,10 @@ class Scenario:
             UsageError: A value cannot be.
         """
         _refuse_unknown("mode", options.get("mode"), MODES)
-        _refuse_unknown("adapter", options.get("adapter_core"), ADAPTER_CORES)
-        _refuse_unknown("body", options.get("body"), BODY_CHOICES)
+        body, core = (
+            None if name is None else _known(what, name, Path())
+            for what, name in (("body", options.get("body")), ("adapter", options.get("adapter_core")))
+        )
         duration_s, world = options.get("duration_s"), options.get("world")
         seed, usart_baud = options.get("seed"), options.get("usart_baud")
         if duration_s is not None and not 0 < duration_s < math.inf:
@@ -246,8 +257,8 @@ class Scenario:
             moved,
             firmware=firmware,
             mode=options.get("mode") or moved.mode,
-            adapter_core=options.get("adapter_core") or moved.adapter_core,
-            body=options.get("body") or moved.body,
+            adapter_core=core or moved.adapter_core,
+            body=body or moved.body,
             usart_baud=moved.usart_baud if usart_baud is None else usart_baud,
             seed=moved.seed if seed is None else seed,
             duration_ns=moved.duration_ns if duration_s is None else round(duration_s * NS_PER_S),
@@ -384,7 +395,7 @@ def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | N
         robot=robot,
         own_robot=own_robot,
         mode=str(table.get("mode", "direct" if own_robot else "adapter")),
-        body=str(table.get("body", BEST)),
+        body=_named(table, "body", "body", BEST, path, where),
         seed=cast("int", table.get("seed", 0)),
         duration_ns=(planned_ns := round(cast("float", table["duration_s"]) * NS_PER_S)),
         planned_ns=planned_ns,
@@ -394,8 +405,11 @@ def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | N
         start_at=str(within(where, "start")),
         direct=_direct(cast("Table", table.get("direct", {})), where),
         adapter=_adapter(cast("Table", table.get("adapter", {})), round(threshold_m * 1e6), where),
-        adapter_core=str(cast("Table", table.get("adapter", {})).get("core", "model")),
+        adapter_core=_named(table.get("adapter", {}), "core", "adapter", "model", path, within(where, "adapter")),
         controller=_controller(cast("Table", table.get("controller", {})), path, where),
+        controller_kind=_named(
+            table.get("controller", {}), "kind", "controller", "pioneer", path, within(where, "controller")
+        ),
         parts=plugged_parts.load_parts(
             cast("list[Table]", table.get("part", [])), path.parent, _taken(own_robot), where
         ),
@@ -418,6 +432,13 @@ def _build_several(table: Table, text: str, path: Path, where: Place, firmware: 
         replace(_build(one.table, text, path, one.place, firmware), name=one.name) if one.has_firmware else None
         for one in tables
     ]
+    for one, scenario in zip(tables, found, strict=True):
+        if scenario is not None and _is_of_users("controller", scenario.controller_kind):
+            raise ScenarioError(
+                f"{within(one.place, 'controller')}: {scenario.controller_kind} steps its body by itself, and robots of"
+                " one world are stepped together",
+                hint="a controller of one's own has its world for itself",
+            )
     models = [
         _model(one.table, path, one.place) if scenario is None else scenario.parameters
         for one, scenario in zip(tables, found, strict=True)
@@ -575,6 +596,36 @@ def _settings(part: Table, path: Path) -> ControllerSettings:
     if "sonar_per_sip" in part:
         settings = replace(settings, sonar_per_sip=SonarPerSip(str(part["sonar_per_sip"])))
     return settings
+
+
+def _named(table: object, key: str, what: str, default: str, path: Path, where: Where) -> str:
+    """Return the body, adapter or controller that a key names, and refuse one that cannot be."""
+    name = str(cast("Table", table).get(key, default))
+    try:
+        return _known(what, name, path.parent)
+    except UsageError as error:
+        at = where.at(key) if isinstance(where, Place) else where
+        raise ScenarioError(f"{at}: {key}: {error}", hint=error.hint) from error
+
+
+def _known(what: str, name: str, folder: Path) -> str:
+    """Return the name of a body, adapter or controller with the path of its file, if it is of the user's.
+
+    Raises:
+        UsageError: There is none, or its class lacks a method.
+    """
+    name = located(name, folder)
+    if _is_of_users(what, name):
+        _class_of_users(what, name)
+    return name
+
+
+def _is_of_users(what: str, name: str) -> bool:
+    return name not in (BODY_CHOICES if what == "body" else ENDS[what].ships)
+
+
+def _class_of_users(what: str, name: str) -> Callable[..., object]:
+    return body_class(name) if what == "body" else ENDS[what].check(name)
 
 
 def _refuse_unknown(option: str, value: str | None, known: tuple[str, ...]) -> None:

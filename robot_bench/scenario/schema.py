@@ -52,7 +52,8 @@ _UNITS = {
 class Key:
     """One key that a table may have.
 
-    `least` and `most` are inclusive; `above` is not.
+    `least` and `most` are inclusive; `above` is not. `group` names the entry points that may stand there
+    beside the choices, as may FILE.py:CLASS; the loader looks for them.
     """
 
     name: str
@@ -62,6 +63,7 @@ class Key:
     above: float | None = None
     most: float | None = None
     choices: tuple[str, ...] = ()
+    group: str = ""
 
 
 class Source(Protocol):
@@ -151,7 +153,7 @@ def nearest(word: str, known: Mapping[str, object] | Sequence[str]) -> str:
 def _check_value(value: object, key: Key, where: str) -> None:
     if not _fits(value, key):
         raise ScenarioError(f"{where}: {key.name} = {_shown(value)} is not {_wanted(key)}", hint=_hint(value, key))
-    if key.choices and value not in key.choices:
+    if key.choices and not key.group and value not in key.choices:
         hint = nearest(str(value), key.choices)
         raise ScenarioError(f"{where}: {key.name} = {_shown(value)} is none of {', '.join(key.choices)}", hint=hint)
     if isinstance(value, (int, float)) and not isinstance(value, bool):
@@ -182,7 +184,7 @@ def _wanted(key: Key) -> str:
     if key.most is not None:
         meaning += f", at most {key.most:g}"
     if key.choices:
-        meaning = "one of " + ", ".join(key.choices)
+        meaning = "one of " + ", ".join(key.choices) + (", or FILE.py:CLASS" if key.group else "")
     return meaning
 
 

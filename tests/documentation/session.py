@@ -222,6 +222,9 @@ class Session:
                 self._type(line, shown)
 
     def _take_python(self, block: Block) -> None:
+        named = NAMED_FILE.match(block.text)
+        if named is not None and "/" not in named["name"]:  # one in a folder is of the checkout
+            self._keep(block)
         self._finish([sys.executable, "-c", self._placed(block.text)], f"line {block.line}", [])
 
     def _take_toml(self, block: Block) -> None:

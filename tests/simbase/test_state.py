@@ -23,8 +23,8 @@ import adapter_sim
 import bluepill_sim
 import p2os
 import robot_bench
-from bluepill_sim.parts.registry import OF_USERS
 from simbase.state import PartState, Rows, Stateful, state_names
+from simbase.user_classes import OF_USERS
 
 
 def reloaded(data: bytes) -> Any:

@@ -1,20 +1,27 @@
 """Make a body by its name, and know which is the best that is installed.
 
+A body of the user's is a `RobotScene` that is made as (world, models): an entry point of the group `p2os.bodies`, or
+`./mine.py:Class`.
+
 Invariant: an engine is imported only when it is asked for; whether one is installed is looked up, not tried.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib.util import find_spec
+from typing import cast
 
 from p2os.pioneer.body.contract import RobotBody, RobotScene
 from p2os.pioneer.world.model import World
 from p2os.robots.parameters import RobotParameters
 from simbase.errors import MissingDependencyError, UsageError
+from simbase.user_classes import find_class, make, refuse_lacking
 
 BODY_NAMES = ("kinematic", "bullet", "mujoco")
 #: The body of who names none: the first of `NEEDS` that is installed.
 BEST = "best"
 BODY_CHOICES = (BEST, *BODY_NAMES)
+#: The entry points of others.
+GROUP = "p2os.bodies"
 #: Body → the packages that it needs, the best body first; the last needs none.
 NEEDS: Mapping[str, tuple[str, ...]] = {
     "bullet": ("pybullet", "numpy"), "mujoco": ("mujoco", "numpy"), "kinematic": (),
@@ -25,12 +32,13 @@ def make_body(name: str, world: World, parameters: RobotParameters) -> RobotBody
     """Return a body that stands at the world's start, alone in a scene of its own.
 
     Args:
-        name: `kinematic` (exact, no dependency), `bullet` (PyBullet), `mujoco` (MuJoCo), or `best`.
+        name: `kinematic` (exact, no dependency), `bullet` (PyBullet), `mujoco` (MuJoCo), `best`, or one of the
+            user's.
         world: Where it is.
         parameters: What it is.
 
     Raises:
-        UsageError: There is no body of that name.
+        UsageError: There is no body of that name, or it is none.
         MissingDependencyError: The engine or NumPy is not installed.
         WorldError: The world has something that this body cannot take.
     """
@@ -46,7 +54,7 @@ def make_scene(name: str, world: World, models: Sequence[RobotParameters]) -> Ro
         models: One a robot, the first first.
 
     Raises:
-        UsageError: There is no body of that name.
+        UsageError: There is no body of that name, or it is none.
         MissingDependencyError: The engine or NumPy is not installed.
         WorldError: The world has something that this body cannot take.
     """
@@ -55,6 +63,8 @@ def make_scene(name: str, world: World, models: Sequence[RobotParameters]) -> Ro
         from p2os.pioneer.body.kinematic import KinematicScene
 
         return KinematicScene(world, models)
+    if name not in BODY_NAMES:
+        return _scene_of_users(name, world, models)
     try:
         if name == "bullet":
             from p2os.pioneer.body.bullet import BulletScene
@@ -71,11 +81,35 @@ def resolve_body(name: str) -> str:
     """Return the name of the body that `make_body` makes: `best` is the best that is installed.
 
     Raises:
-        UsageError: There is no body of that name.
+        UsageError: There is no body of that name, or its class lacks a method.
     """
     if name not in BODY_CHOICES:
-        raise UsageError(f"no body {name!r}", hint=f"bodies: {', '.join(BODY_CHOICES)}")
+        body_class(name)
     return next(body for body in NEEDS if not _missing(body)) if name == BEST else name
+
+
+def body_class(name: str) -> Callable[[World, Sequence[RobotParameters]], RobotScene]:
+    """Return the class of a body of the user's.
+
+    Args:
+        name: That of an entry point, or FILE.py:CLASS.
+
+    Raises:
+        UsageError: There is none, or it lacks a method of `RobotScene`.
+    """
+    found = find_class(name, what="body", group=GROUP, known=BODY_CHOICES)
+    refuse_lacking(found, RobotScene, name, "body")
+    return found
+
+
+def _scene_of_users(name: str, world: World, models: Sequence[RobotParameters]) -> RobotScene:
+    scene = cast("RobotScene", make(body_class(name), name, "body", world, models))
+    refuse_lacking(scene, RobotScene, name, "body")
+    if len(scene.bodies) != len(models):
+        raise UsageError(f"the body {name} has {len(scene.bodies)} robots in `bodies`, expected {len(models)}")
+    for body in scene.bodies:
+        refuse_lacking(body, RobotBody, f"{name}: {type(body).__name__}", "body")
+    return scene
 
 
 def body_note(name: str) -> str | None:

@@ -22,7 +22,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import cast
 
-from p2os.pioneer.body.factory import BEST, BODY_CHOICES
+from p2os.pioneer.body.factory import BEST, resolve_body
 from p2os.pioneer.controller.faults import read_fault
 from p2os.pioneer.controller.flash import load_flash
 from p2os.pioneer.controller.settings import ControllerSettings, SonarPerSip
@@ -36,8 +36,9 @@ from p2os.protocol.bauds import BAUDS, BAUDS_TEXT
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import load_parameters
 from p2os.toml_file import TomlPlaces, is_file, is_folder, read_toml, read_user_text
-from simbase.errors import FileError, P2osError, shown, shown_name
+from simbase.errors import FileError, P2osError, UsageError, shown, shown_name
 from simbase.timing import NS_PER_S, Nanos
+from simbase.user_classes import located
 
 
 class FleetError(FileError):
@@ -164,8 +165,11 @@ def parse_fleet(text: str, source: str, folder: Path) -> FleetOrder:
     world, body = str(top.get("world", "room")), str(top.get("body", BEST))
     if world not in known_worlds() and not is_file(Path(world)):
         raise top.error("world", f"no world {shown(world)}", f"shipped worlds: {', '.join(known_worlds())}, or a file")
-    if body not in BODY_CHOICES:
-        raise top.error("body", f"no body {shown(body)}", f"bodies: {', '.join(BODY_CHOICES)}")
+    body = located(body, folder)
+    try:
+        resolve_body(body)
+    except UsageError as error:
+        raise top.error("body", str(error), error.hint) from error
     seed, apart = cast("int", top.get("seed", 0)), bool(top.get("apart", False))
     cross_talk = bool(top.get("cross_talk", True))
     worlds = folder / str(top.get("worlds", "")) if "worlds" in table else None

@@ -122,7 +122,7 @@ def test_serve_refuses_a_port_that_is_taken(serving: Callable[..., Serving], cap
 @pytest.mark.parametrize(
     ("words", "code", "message"),
     [
-        (["--body", "jelly"], 2, "p2os: no body 'jelly'"),
+        (["--body", "jelly"], 2, "p2os: there is no body 'jelly'"),
         (["--world", "nowhere"], 2, "p2os: no world 'nowhere'"),
         (["--world", "nowhere.toml"], 2, "p2os: no world 'nowhere.toml': there is no such file"),
         (["--world", "."], 2, "p2os: no world '.': that is a folder"),

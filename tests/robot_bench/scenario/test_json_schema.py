@@ -2,6 +2,7 @@
 
 import copy
 import json
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -68,10 +69,14 @@ def fits_number(value: float, schema: dict[str, Any]) -> bool:
     return bool(above and schema.get("minimum", -1e99) <= value <= schema.get("maximum", 1e99))
 
 
+def fits_text(value: str, schema: dict[str, Any]) -> bool:
+    return value in schema.get("enum", [value]) and re.search(schema.get("pattern", ""), value) is not None
+
+
 RULES: dict[str, Any] = {
     "object": fits_object, "number": fits_number, "integer": fits_number,
     "array": lambda value, schema: "items" not in schema or all(fits(item, schema["items"]) for item in value),
-    "string": lambda value, schema: value in schema.get("enum", [value]),
+    "string": lambda value, schema: any(fits_text(value, one) for one in schema.get("anyOf", [schema])),
 }  # fmt: skip
 
 

@@ -161,7 +161,7 @@ BOX = '[[obstacle]]\nat_s = 1\nname = "a"\nx_m = 0\ny_m = 0\nlength_m = 1\nwidth
         (LEAST + "threshold_m = nan\n", "threshold_m = nan is out of range", "above 0"),
         (LEAST + "seed = 1.5\n", "seed = 1.5 is not a whole number", None),
         (LEAST + "seed = -1\n", "seed = -1 is out of range", "at least 0"),
-        (LEAST + 'body = "bulet"\n', 'body = "bulet" is none of best, kinematic, bullet, mujoco', "bullet"),
+        (LEAST + 'body = "bulet"\n', "mine.toml:4: body: there is no body 'bulet'", "bullet"),
         ('firmware = "dodge"\nworld = "room"\n', "key 'duration_s' is missing", "seconds above 0"),
         (LEAST.replace("room", "rom"), "world: there is no world 'rom'", "room"),
         (LEAST.replace("room", "my.toml"), "there is no world file", "worlds that ship"),

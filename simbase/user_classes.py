@@ -1,0 +1,148 @@
+"""A class of the user's by its name: `./mine.py:Class`, or an entry point of an installed package.
+
+What is wrong with it is told in one line: a file that is not there or cannot be loaded, a name that nothing has, and
+which methods of the protocol a class lacks.
+Invariant: nothing of a file or a package is loaded before its class is asked for.
+"""
+
+import hashlib
+import importlib.util
+import inspect
+import sys
+from collections.abc import Callable, Sequence
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any, cast
+
+from simbase.errors import P2osError, UsageError, shown
+
+#: What the modules' names of users' files begin with.
+OF_USERS = "p2os_part_"
+
+
+def is_in_file(name: str) -> bool:
+    """Tell whether a name is FILE.py:CLASS."""
+    path, colon, _ = name.rpartition(":")
+    return bool(colon) and path.endswith(".py")
+
+
+def located(name: str, folder: Path) -> str:
+    """Return FILE.py:CLASS with the file's whole path, as seen from a folder; another name as it is."""
+    if not is_in_file(name):
+        return name
+    path, _, kind = name.rpartition(":")
+    return f"{(folder / path).resolve()}:{kind}"
+
+
+def find_class(
+    name: str, *, what: str, group: str, known: Sequence[str], error: Callable[..., P2osError] = UsageError
+) -> Callable[..., Any]:
+    """Return a class, or what makes such a thing.
+
+    Args:
+        name: FILE.py:CLASS, or the name of an entry point.
+        what: What it is to be, for messages: `part`, `body`.
+        group: The entry points' group.
+        known: The names that ship, for the hint.
+        error: What is raised: (message, hint=…).
+
+    Raises:
+        P2osError: There is none, or it cannot be loaded; of the type that `error` makes.
+    """
+    if is_in_file(name):
+        path, _, kind = name.rpartition(":")
+        return _class_in(Path(path), kind, error)
+    points = {point.name: point for point in entry_points(group=group)}
+    if name in points:
+        try:
+            return cast("Callable[..., Any]", points[name].load())
+        except Exception as failure:  # of another's package
+            raise error(f"the {what} {name} cannot be loaded: {said(failure)}") from failure
+    all_known = ", ".join([*known, *(point for point in points if point not in known)])
+    raise error(f"there is no {what} {shown(name)}", hint=f"known are {all_known}, and FILE.py:CLASS")
+
+
+def refuse_lacking(made: object, protocol: type, name: str, what: str) -> None:
+    """Refuse a class that lacks a method of a protocol, or an object that lacks a method or an attribute of it.
+
+    Raises:
+        UsageError: It lacks some; the message names them all.
+    """
+    is_class = isinstance(made, type)
+    lacking = [
+        f"{member}()" if callable(value) else member
+        for member, value in _members(protocol).items()
+        if (callable(value) or not is_class) and not _has(made, member, must_call=callable(value))
+    ]
+    if lacking:
+        raise UsageError(f"the {what} {name} lacks {', '.join(lacking)}", hint=f"docs/bench.md lists what a {what} has")
+
+
+def make(made: Callable[..., Any], name: str, what: str, /, *arguments: object, **named: object) -> Any:
+    """Return what a user's class makes of these arguments.
+
+    Raises:
+        UsageError: Its constructor raised what is no `P2osError`; a `P2osError` goes on as it is.
+    """
+    try:
+        return made(*arguments, **named)
+    except P2osError:
+        raise
+    except Exception as error:  # whatever a class of the user's raises is one line here
+        raise UsageError(f"the {what} {name} cannot be made: {said(error)}") from error
+
+
+def source_of(made: Callable[..., Any]) -> str:
+    """Return the SHA-256 of the file that a class is in; of its name alone, where that cannot be read."""
+    try:
+        return hashlib.sha256(Path(inspect.getsourcefile(made) or "").read_bytes()).hexdigest()
+    except (OSError, TypeError):
+        return f"{made.__module__}.{getattr(made, '__qualname__', type(made).__name__)}"
+
+
+def said(error: Exception) -> str:
+    """Return an exception of the user's code as words: with its type, but for a `ValueError`."""
+    return str(error) if isinstance(error, ValueError) else f"{type(error).__name__}: {error}"
+
+
+def _members(protocol: type) -> dict[str, object]:
+    """Return the public members of a protocol and what stands there: a function, a property, or None."""
+    found: dict[str, object] = {}
+    for base in protocol.__mro__:
+        names = {**dict.fromkeys(inspect.get_annotations(base)), **vars(base)}
+        found = {name: value for name, value in names.items() if not name.startswith("_")} | found
+    return found
+
+
+def _has(made: object, member: str, *, must_call: bool) -> bool:
+    if isinstance(made, type) or must_call:
+        return callable(getattr(made, member, None))
+    return hasattr(made, member)
+
+
+def _class_in(path: Path, name: str, error: Callable[..., P2osError]) -> Callable[..., Any]:
+    """Return a class of a Python file, which is loaded once."""
+    key = OF_USERS + path.stem
+    module = sys.modules.get(key)
+    if module is None or Path(module.__file__ or "") != path.absolute():
+        spec = importlib.util.spec_from_file_location(key, path.absolute())
+        if spec is None or spec.loader is None or not path.is_file():
+            raise error(f"there is no file {path}", hint="FILE.py:CLASS names a class in a Python file")
+        module = importlib.util.module_from_spec(spec)
+        sys.modules[key] = module
+        try:
+            spec.loader.exec_module(module)
+        except BaseException as failure:
+            del sys.modules[key]
+            if not isinstance(failure, Exception):
+                raise
+            raise error(f"{path}: {said(failure)}") from failure
+    made = getattr(module, name, None)
+    if not isinstance(made, type):
+        classes = [
+            key
+            for key, value in vars(module).items()
+            if isinstance(value, type) and value.__module__ == module.__name__
+        ]
+        raise error(f"{path} has no class {shown(name)}", hint=f"it has {', '.join(classes) or 'none'}")
+    return made
