@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from bluepill_sim.board import BluePill, run_until
+from bluepill_sim.cli.can_socket import join_can
 from bluepill_sim.cli.console import PTY, connect, open_console
 from bluepill_sim.cli.driving import (
     OverBudgetError,
@@ -45,6 +46,8 @@ Examples:
   p2os mcu run mine.elf --attach ssd1306,on=I2C1 --parts shots      an OLED, and its picture at the end
   p2os mcu run mine.elf --attach ./mine.py:Sensor,on=I2C1,x=3       a part of your own
   p2os mcu run mine.elf --usb pty:               plug it in: its USB serial port is a terminal here
+  p2os mcu run mine.elf --can vcan0              its CAN on one of this machine; candump and cansend work
+  p2os mcu run mine.elf --can udp:127.0.0.1:29536     the same without SocketCAN: a frame is a datagram
 """
 
 #: chosen: how often typed input reaches a running program, and its time is held back to the clock.
@@ -86,6 +89,17 @@ def run(
             help="Plug USB in; where its serial port (CDC) goes: pty:, - (stdout), or a file.", metavar="WHERE"
         ),
     ] = None,
+    can: Annotated[
+        str | None,
+        typer.Option(
+            help="Join its CAN to one of this machine, at the clock's speed: vcan0, udp:127.0.0.1:PORT or unix:PATH.",
+            metavar="BUS",
+        ),
+    ] = None,
+    can_log: Annotated[
+        Path | None,
+        typer.Option("--can-log", help="Frames of --can with times, as candump -L has them.", metavar="FILE"),
+    ] = None,
     usart_baud: Annotated[
         int | None,
         option(BAUD, "--usart-baud", purpose="Speed of USART1's far end; unset follows the program.", above_zero=True),
@@ -123,7 +137,9 @@ def run(
         carriers.append(connect(consoles[1], board.usb_serial))
         board.usb.plug()
         print_status(f"USB is plugged in; its serial port goes to {consoles[1].description}")
-    is_paced = realtime or bool(PTY & {uart, usb})
+    buses = join_can(board, can, can_log)
+    carriers += [bus.carry for bus in buses]
+    is_paced = realtime or bool(buses) or bool(PTY & {uart, usb})
     advance = _paced(board, carriers) if is_paced else _bounded(board, budget_ns)
     schedule = Schedule(board, changes, advance)
     with showing_where_it_hangs(board):
@@ -133,14 +149,14 @@ def run(
             else:
                 run_until(board, until, end_ns, schedule.advance_to)
         finally:
-            for console in consoles:
-                console.close()
-            for trace in traces:
-                trace.close()
+            for opened in (*consoles, *traces, *buses):
+                opened.close()
             if uart == "-" and board.usart1.unread and not board.usart1.unread.endswith(b"\n"):
                 typer.echo("")
     show_parts(board, parts_folder)
     print_status(summary(board))
+    for bus in buses:
+        print_status(f"can: {bus.describe()}")
     if print_fault(board):
         raise typer.Exit(1)
 
