@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Protocol
 
 import typer
 
@@ -59,6 +59,10 @@ _STRIDES_NS: tuple[Nanos, Nanos] = NS_PER_MS // 10, 20 * NS_PER_MS
 _BUDGET_NS: Nanos = 600 * NS_PER_S
 #: Without an end: until Ctrl-C.
 _FOR_EVER_NS: Nanos = 365 * 24 * 3600 * NS_PER_S
+
+
+class _Opened(Protocol):
+    def close(self) -> None: ...
 
 
 def register(app: typer.Typer) -> None:
@@ -142,6 +146,7 @@ def run(
     is_paced = realtime or bool(buses) or bool(PTY & {uart, usb})
     advance = _paced(board, carriers) if is_paced else _bounded(board, budget_ns)
     schedule = Schedule(board, changes, advance)
+    opened: list[_Opened] = [*consoles, *traces, *buses]
     with showing_where_it_hangs(board):
         try:
             if until is None:
@@ -149,8 +154,8 @@ def run(
             else:
                 run_until(board, until, end_ns, schedule.advance_to)
         finally:
-            for opened in (*consoles, *traces, *buses):
-                opened.close()
+            for one in opened:
+                one.close()
             if uart == "-" and board.usart1.unread and not board.usart1.unread.endswith(b"\n"):
                 typer.echo("")
     show_parts(board, parts_folder)
