@@ -3,11 +3,12 @@
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Protocol
 
 import typer
 
 from bluepill_sim.board import BluePill, run_until
+from bluepill_sim.cli.can_socket import join_can
 from bluepill_sim.cli.console import PTY, connect, open_console
 from bluepill_sim.cli.driving import (
     OverBudgetError,
@@ -45,6 +46,8 @@ Examples:
   p2os mcu run mine.elf --attach ssd1306,on=I2C1 --parts shots      an OLED, and its picture at the end
   p2os mcu run mine.elf --attach ./mine.py:Sensor,on=I2C1,x=3       a part of your own
   p2os mcu run mine.elf --usb pty:               plug it in: its USB serial port is a terminal here
+  p2os mcu run mine.elf --can vcan0              its CAN on one of this machine; candump and cansend work
+  p2os mcu run mine.elf --can udp:127.0.0.1:29536     the same without SocketCAN: a frame is a datagram
 """
 
 #: chosen: how often typed input reaches a running program, and its time is held back to the clock.
@@ -56,6 +59,10 @@ _STRIDES_NS: tuple[Nanos, Nanos] = NS_PER_MS // 10, 20 * NS_PER_MS
 _BUDGET_NS: Nanos = 600 * NS_PER_S
 #: Without an end: until Ctrl-C.
 _FOR_EVER_NS: Nanos = 365 * 24 * 3600 * NS_PER_S
+
+
+class _Opened(Protocol):
+    def close(self) -> None: ...
 
 
 def register(app: typer.Typer) -> None:
@@ -85,6 +92,17 @@ def run(
         typer.Option(
             help="Plug USB in; where its serial port (CDC) goes: pty:, - (stdout), or a file.", metavar="WHERE"
         ),
+    ] = None,
+    can: Annotated[
+        str | None,
+        typer.Option(
+            help="Join its CAN to one of this machine, at the clock's speed: vcan0, udp:127.0.0.1:PORT or unix:PATH.",
+            metavar="BUS",
+        ),
+    ] = None,
+    can_log: Annotated[
+        Path | None,
+        typer.Option("--can-log", help="Frames of --can with times, as candump -L has them.", metavar="FILE"),
     ] = None,
     usart_baud: Annotated[
         int | None,
@@ -123,9 +141,12 @@ def run(
         carriers.append(connect(consoles[1], board.usb_serial))
         board.usb.plug()
         print_status(f"USB is plugged in; its serial port goes to {consoles[1].description}")
-    is_paced = realtime or bool(PTY & {uart, usb})
+    buses = join_can(board, can, can_log)
+    carriers += [bus.carry for bus in buses]
+    is_paced = realtime or bool(buses) or bool(PTY & {uart, usb})
     advance = _paced(board, carriers) if is_paced else _bounded(board, budget_ns)
     schedule = Schedule(board, changes, advance)
+    opened: list[_Opened] = [*consoles, *traces, *buses]
     with showing_where_it_hangs(board):
         try:
             if until is None:
@@ -133,14 +154,14 @@ def run(
             else:
                 run_until(board, until, end_ns, schedule.advance_to)
         finally:
-            for console in consoles:
-                console.close()
-            for trace in traces:
-                trace.close()
+            for one in opened:
+                one.close()
             if uart == "-" and board.usart1.unread and not board.usart1.unread.endswith(b"\n"):
                 typer.echo("")
     show_parts(board, parts_folder)
     print_status(summary(board))
+    for bus in buses:
+        print_status(f"can: {bus.describe()}")
     if print_fault(board):
         raise typer.Exit(1)
 

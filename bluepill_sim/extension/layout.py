@@ -227,7 +227,8 @@ SPI = Struct(
     (
         Field("base_ns", "u64", doc="start of the run of words,"),
         Field("ticks", "u64", doc="and ticks of `rate_hz` from there to the end of the present one"),
-        Field("word_ns", "u64", doc="when the present word began"),
+        Field("word_ns", "u64", doc="when the present word began,"),
+        Field("word_at_ticks", "u64", doc="and how many ticks from `base_ns` that was, for who looks at its bits"),
         Field("clock_hz", "u32", doc="PCLK"),
         Field("rate_hz", "u32", doc="PCLK, or the clock of a master outside"),
         Field("shift", "u32", doc="what is in the shift register; 0: nothing"),
@@ -247,6 +248,9 @@ SPI = Struct(
         Field("ahead_sent", "u32", doc="and while this is sent: above 0xFF whatever is"),
         Field("ahead", "u8", AHEAD_BYTES),
         Field("is_stopped", "u32", doc="its clock stands still"),
+        Field("halves", "u32", doc="half-bits of the word that is shown on the pins,"),
+        Field("half_ticks", "u32", doc="what each of them lasts,"),
+        Field("half", "u32", doc="and the next one; 0: nobody looks"),
     ),
 )
 I2C = Struct(

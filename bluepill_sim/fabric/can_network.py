@@ -238,6 +238,8 @@ class CanNode(Stateful):
             is_silent: whether it only listens, and acknowledges nothing.
         """
         self.on_frame, self.is_silent = on_frame, is_silent
+        #: Called with each frame of its own that has gone over, and the time of its end.
+        self.on_sent: Callable[[CanFrame, Nanos], None] | None = None
         self.network: CanNetwork | None = None
         #: Frames of others, with their ends.
         self.received: list[tuple[Nanos, CanFrame]] = []
@@ -256,6 +258,11 @@ class CanNode(Stateful):
         begin_ns = self.network.now_ns if at_ns is None else at_ns
         self._coming.append((begin_ns, frame))
         self.network.want(self, self._coming[0][0])
+
+    @property
+    def waiting(self) -> int:
+        """How many of its own frames have not gone over."""
+        return len(self._coming)
 
     @property
     def now_ns(self) -> Nanos | None:
@@ -299,6 +306,8 @@ class CanNode(Stateful):
         if end.is_own:
             if end.error is CanError.NONE:
                 self._coming.pop(0)
+                if self.on_sent is not None:
+                    self.on_sent(end.frame, end.end_ns)
             else:
                 self.errors += 1
             if self._coming and self.network is not None:

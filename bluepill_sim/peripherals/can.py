@@ -388,6 +388,7 @@ class Can(Peripheral):
             rate = self.bit_rate or Fraction(1)
             self._sync_ns = now_ns + int(_SYNC_BITS * NS_PER_S / rate)
         self.words[MSR] = status
+        self._connect()
         self._update()
         self.plan()
 
@@ -402,6 +403,7 @@ class Can(Peripheral):
             if self.words[ESR] & BOFF:
                 self._recover(now_ns)
         self.words[MSR] &= ~(INAK | SLAK)
+        self._connect()
         if not self._is_wired() and not self.words[BTR] & LBKM:
             self.chip.warn(
                 f"CAN: it is on no bus: {self._pin_names[1]} is no alternate-function output", once="CAN:pins"
@@ -659,7 +661,15 @@ class Can(Peripheral):
     def _route_changed(self) -> None:
         self.chip.pins[self._pin_names[1]].disconnect("CAN_TX")
         self._find_pins()
-        self.chip.pins[self._pin_names[1]].connect("CAN_TX", level=True)
+        self._connect()
+
+    def _connect(self) -> None:
+        """Offer the pin unless it sleeps, as it does from reset on: chosen; see the erratum in docs/peripherals.md."""
+        pin = self.chip.pins[self._pin_names[1]]
+        if self.words[MSR] & SLAK:
+            pin.disconnect("CAN_TX")
+        else:
+            pin.connect("CAN_TX", level=True)
 
     def _find_pins(self) -> None:
         self._pin_names = PINS.get(self.chip.pins.remaps.get("CAN", 0), PINS[0])

@@ -3,7 +3,8 @@
  * Theory of operation. DR hides two buffers. A write fills the one that sends (TXE falls); a free shift register takes it
  * over (TXE rises), and the word is exchanged with whoever is selected when its last bit ends: RXNE rises then, and the next
  * word begins without a gap. Parts outside are Python's (peripherals/spi.py); a wire from MOSI to MISO is here.
- * Source: RM0008 25.3, 25.5.
+ * Bits show on SCK and MOSI of a master while somebody is subscribed or listens to one of them, in steps of half a bit.
+ * Source: RM0008 25.3, 25.5, figure 240.
  * Invariant: a word ends floor(ticks * 10**9 / rate) ns after the point from which its run of words is counted.
  */
 #include "../fabric/fabric.h"
@@ -62,6 +63,13 @@ static bool carries(const struct device *device, uint32_t which)
     return port->alternate & port->bonded & ~port->held & 1u << at && (sources & -sources) >> (spi->source + which) & 1;
 }
 
+static bool is_watched(const struct device *device, uint32_t which)
+{
+    const struct spi *spi = device->state;
+    const uint32_t port = spi->pins[which] / PINS;
+    return (device->fabric->subscribed[port] | device->fabric->listened[port]) >> spi->pins[which] % PINS & 1;
+}
+
 static bool is_slave_selected(const struct device *device)
 {
     return device->words[CR1] & SSM ? !(device->words[CR1] & SSI) : !is_high(device, NSS);
@@ -90,11 +98,16 @@ static void put(struct device *device, uint32_t which, uint32_t level)
 
 static void connect(struct device *device)
 {
-    const struct spi *spi = device->state;
+    struct spi *spi = device->state;
     const uint32_t control = device->words[CR1];
     const bool is_on = control & SPE || spi->shift, masters = is_on && is_master(device);
-    put(device, SCK, !masters ? FLOATING : control & CPOL ? HIGH : LOW);
-    put(device, MOSI, masters && !only_receives(device) ? LOW : FLOATING);
+    spi->half = masters ? spi->half : 0;
+    if (!spi->half) {
+        put(device, SCK, !masters ? FLOATING : control & CPOL ? HIGH : LOW);
+    }
+    if (!spi->half || only_receives(device)) {
+        put(device, MOSI, masters && !only_receives(device) ? LOW : FLOATING);
+    }
     put(device, NSS, masters && !(control & SSM) && device->words[CR2] & SSOE ? LOW : FLOATING);
     put(device, MISO, is_on && !masters && !only_receives(device) && is_slave_selected(device) ? LOW : FLOATING);
 }
@@ -122,7 +135,7 @@ static void check_mode_fault(struct device *device)
         struct spi *spi = device->state;
         device->words[CR1] &= ~(uint32_t)(SPE | MSTR);
         device->words[SR] = (device->words[SR] | MODF) & ~(uint32_t)BSY;
-        spi->shift = 0;
+        spi->shift = spi->half = 0;
         schedule(device, NO_TIME);
         ask(device, MODE_FAULT, 0);
     }
@@ -170,7 +183,7 @@ static uint32_t exchange(struct device *device, uint32_t sent)
         ask(device, NO_MOSI, 0);
         sent = is_high(device, MOSI) ? mask : 0;
     }
-    uint32_t got = is_high(device, data) ? mask : 0;
+    uint32_t got = !only_sends(device) && is_high(device, data) ? mask : 0; /* its own bits may be on the wire */
     if (spi->is_looped) {
         got = sent;
     } else if (spi->selected) {
@@ -193,6 +206,46 @@ static uint64_t word_ticks(const struct device *device)
 static uint64_t end_ns(const struct spi *spi)
 {
     return spi->base_ns + (uint64_t)((__uint128_t)spi->ticks * NS_PER_S / spi->rate_hz);
+}
+
+static uint64_t half_ns(const struct spi *spi)
+{
+    const uint64_t ticks = spi->word_at_ticks + (uint64_t)spi->half * spi->half_ticks;
+    return spi->base_ns + (uint64_t)((__uint128_t)ticks * NS_PER_S / spi->rate_hz);
+}
+
+/* Waits for the end of the word, or for a half-bit before it that is shown. */
+static void wait(struct device *device)
+{
+    const struct spi *spi = device->state;
+    schedule(device, spi->half && spi->half < spi->halves ? half_ns(spi) : end_ns(spi));
+}
+
+/* Puts the next half of a bit on the pins: data change at the first, and are sampled at the second. */
+static void show_half(struct device *device)
+{
+    struct spi *spi = device->state;
+    const uint32_t control = device->words[CR1], n = spi->half++;
+    const bool is_active = (n & 1) != (control & CPHA);
+    if (!(n & 1) && !only_receives(device)) {
+        const uint32_t at = control & LSBFIRST ? n / 2 : spi->halves / 2 - 1 - n / 2;
+        put(device, MOSI, spi->shift >> at & 1 ? HIGH : LOW);
+    }
+    put(device, SCK, is_active != !!(control & CPOL) ? HIGH : LOW);
+}
+
+static void show_word(struct device *device)
+{
+    struct spi *spi = device->state;
+    const uint32_t was_shown = spi->half;
+    spi->half = 0;
+    if (is_master(device) && !spi->far && (is_watched(device, SCK) || is_watched(device, MOSI))) {
+        spi->halves = 2 * bits_of(device);
+        spi->half_ticks = 1u << (device->words[CR1] >> BR_AT & 7);
+        show_half(device);
+    } else if (was_shown) {
+        connect(device);
+    }
 }
 
 /* Chooses what goes out next: the buffer, the CRC, for a slave what stands in the shift register; false: nothing. */
@@ -224,11 +277,13 @@ static void begin(struct device *device, uint64_t ns)
 {
     struct spi *spi = device->state;
     spi->word_ns = ns;
+    spi->word_at_ticks = spi->ticks;
     spi->ticks += word_ticks(device);
     /* RM0008 25.3.7: not in the one-wire mode that receives */
     const bool is_shown = !(is_master(device) && device->words[CR1] & BIDIMODE && only_receives(device));
     device->words[SR] = is_shown && !(spi->shift & IS_DEAF) ? device->words[SR] | BSY : device->words[SR] & ~(uint32_t)BSY;
-    schedule(device, end_ns(spi));
+    show_word(device);
+    wait(device);
 }
 
 /* As a master: begins where there is something to send or to clock in. */
@@ -296,6 +351,7 @@ static void end_word(struct device *device, uint64_t ns)
         begin(device, ns);
     } else {
         words[SR] &= ~(uint32_t)BSY;
+        spi->half = 0;
         schedule(device, NO_TIME);
         connect(device);
     }
@@ -303,9 +359,15 @@ static void end_word(struct device *device, uint64_t ns)
 
 static void event(struct device *device, uint64_t until)
 {
+    const struct spi *spi = device->state;
     uint64_t ns;
     while ((ns = due_ns(device)) <= until) {
-        end_word(device, ns);
+        if (spi->half && spi->half < spi->halves) {
+            show_half(device);
+            wait(device);
+        } else {
+            end_word(device, ns);
+        }
     }
     update_outputs(device);
 }
@@ -395,7 +457,7 @@ static void clear(struct device *device)
     for (uint32_t n = 0; n < SPI_PINS; ++n) {
         put(device, n, FLOATING);
     }
-    spi->shift = spi->tdr = spi->rdr = spi->seen = spi->far = spi->is_stopped = 0;
+    spi->shift = spi->tdr = spi->rdr = spi->seen = spi->far = spi->is_stopped = spi->half = 0;
     schedule(device, NO_TIME);
     listen(device);
     update_outputs(device);
@@ -414,6 +476,8 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
             spi->base_ns = now + (uint64_t)((__uint128_t)(end_ns(spi) - now) * spi->clock_hz / one);
             spi->ticks = 0;
             spi->rate_hz = one;
+            spi->half = 0; /* the rest of the word is not shown */
+            connect(device);
             schedule(device, spi->base_ns);
         }
         spi->clock_hz = one;
@@ -428,7 +492,7 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
         spi->base_ns += (uint64_t)other << 32 | one;
         spi->word_ns += (uint64_t)other << 32 | one;
         if (spi->shift) {
-            schedule(device, end_ns(spi));
+            wait(device);
         }
         break;
     case MOVE:

@@ -411,7 +411,8 @@ _Static_assert(sizeof(struct tim) == 744, "tim");
 struct spi {
     uint64_t base_ns; /* start of the run of words, */
     uint64_t ticks; /* and ticks of `rate_hz` from there to the end of the present one */
-    uint64_t word_ns; /* when the present word began */
+    uint64_t word_ns; /* when the present word began, */
+    uint64_t word_at_ticks; /* and how many ticks from `base_ns` that was, for who looks at its bits */
     uint32_t clock_hz; /* PCLK */
     uint32_t rate_hz; /* PCLK, or the clock of a master outside */
     uint32_t shift; /* what is in the shift register; 0: nothing */
@@ -432,8 +433,11 @@ struct spi {
     uint32_t ahead_sent; /* and while this is sent: above 0xFF whatever is */
     uint8_t ahead[256];
     uint32_t is_stopped; /* its clock stands still */
+    uint32_t halves; /* half-bits of the word that is shown on the pins, */
+    uint32_t half_ticks; /* what each of them lasts, */
+    uint32_t half; /* and the next one; 0: nobody looks */
 };
-_Static_assert(sizeof(struct spi) == 400, "spi");
+_Static_assert(sizeof(struct spi) == 416, "spi");
 
 /* What an I2C holds beyond its registers. RM0008 26.3. */
 struct i2c {

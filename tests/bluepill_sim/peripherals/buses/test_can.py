@@ -573,3 +573,32 @@ def test_initialisation_may_be_asked_for_before_sleep_is_cleared(fake_chip: Any)
     assert fake_chip.read("CAN.MSR") & 3 == 1, "INAK without SLAK"
     fake_chip.write("CAN.MCR", INRQ)
     assert fake_chip.read("CAN.MSR") & 3 == 1
+
+
+def test_can_has_its_pin_while_it_is_awake_and_leaves_it_to_usart1_before(fake_chip: Any) -> None:
+    pin = fake_chip.pins["PA12"]
+    fake_chip.write("GPIOA.CRH", 0x444B_4444)
+    fake_chip.write("USART1.CR3", 1 << 8)  # RTSE
+    fake_chip.write("USART1.CR1", 1 << 13)
+    assert (pin.function, pin.level) == ("USART1_RTS", False)
+    set_up(fake_chip)
+    assert (pin.function, pin.level) == ("CAN_TX", True)
+    fake_chip.write("CAN.MCR", SLEEP)
+    assert (pin.function, pin.level) == ("USART1_RTS", False)
+    fake_chip.write("CAN.MCR", INRQ)
+    assert pin.function == "CAN_TX"
+    fake_chip.write("CAN.MCR", RESET)
+    assert pin.function == "USART1_RTS"
+
+
+def test_can_that_leaves_sleep_has_its_pin_after_eleven_bits(fake_chip: Any) -> None:
+    set_up(fake_chip)
+    fake_chip.write("CAN.MCR", SLEEP)
+    start_ns, pin = fake_chip.now_ns, fake_chip.pins["PA12"]
+    fake_chip.write("CAN.MCR", 0)
+    fake_chip.advance(start_ns + 11 * BIT_NS - 1)
+    assert pin.function != "CAN_TX"
+    fake_chip.advance(start_ns + 11 * BIT_NS)
+    assert pin.function == "CAN_TX"
+    send(fake_chip, 0x123)
+    assert fake_chip.parts.by_name["CAN"].is_on
