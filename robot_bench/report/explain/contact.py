@@ -185,19 +185,32 @@ class ContactInquest:
             )
         answered = [answers[net].answered for answers in self._asked for net in self.on]
         nets = self._nets(prober)
-        if len(self._asked) >= AGREEING and not any(answered) and self._effect.answered is None:
-            return Finding(
-                f"the program notices {nets} at {self._effect.by} and does nothing about it, here and at "
-                f"{len(self._asked)} other times: its outputs are the same with and without"
-            )
+        if len(self._asked) >= AGREEING and not any(answered):
+            after = self._answers_after()
+            if after is None and self._effect.answered is None:
+                return Finding(
+                    f"the program notices {nets} at {self._effect.by} and does nothing about it, here and at "
+                    f"{len(self._asked)} other times: its outputs are the same with and without"
+                )
+            answered = [after]
         least = min((one for one in answered if one is not None), default=0)
-        here = self._effect.answered is None or self._effect.answered - since >= least
+        answered_ns = None if self._effect.answered is None else self._effect.answered - since
+        here = answered_ns is None or answered_ns >= least * 9 // 10  # within a round of its loop
         if len(self._asked) >= AGREEING and here and least >= LATE_NS and least >= LATE_PART * left:
             return Finding(
                 f"the program is late: it notices {nets} at once, at {self._effect.by}, and answers after "
                 f"{least / NS_PER_S:.2f} s at the soonest, of {left / NS_PER_S:.2f} s that were left"
             )
         return None
+
+    def _answers_after(self) -> Nanos | None:
+        """Return how long a near sensor's pin has to be high before the program answers; None: longer than is tried."""
+        prober = self._prober
+        if prober is None:
+            return None
+        at = self._asked[len(self._asked) // 2][prober.sensors[0]].at
+        answers = prober.answers(at, BEFORE_NS)
+        return min((one for net in self.on if (one := answers[net].answered) is not None), default=None)
 
     def _is_away(self) -> Finding | None:
         prober = self._prober
@@ -240,10 +253,35 @@ class ContactInquest:
         if codes[0] != codes[1] or codes[0] <= 0 or held < STRAIGHT_S:
             return None
         nets = numbers([self._prober.replay.pin(net) for net in self.on])
+        lost = self._lost_reverse(self._prober)
+        if lost:
+            return Finding(f"the program never asks the {lost[0]} motor to go backwards, though it does the {lost[1]} "
+                           f"one: it drives straight on (motors {_codes(codes)}) where the mirrored answer would turn "
+                           f"it, for the last {held:.2f} s, with {nets} high")  # fmt: skip
+        if self._effect.after == codes:
+            return None  # it is not the sensors that make it drive so, and what else does is not known
         return Finding(
             f"the program drives straight on (motors {_codes(codes)}) for the last {held:.2f} s, with {nets} high all "
             f"the time; without them it would have set {_codes(self._effect.after)}"
         )
+
+    def _lost_reverse(self, prober: Prober) -> tuple[str, str] | None:
+        """Return the motor that is never reversed where, mirrored, the other one is; None where there is no such."""
+        times = sorted({t for net in prober.replay.outputs if net.startswith("motor")
+                        for t in self.scene.record.pins[net].times})  # fmt: skip
+        given = [prober.codes(t) for t in times if t <= prober.replay.end]
+        given += [answer.codes for answers in self._asked for answer in answers.values()]
+        nets = prober.sensors
+        for motor, names in ((0, ("left", "right")), (1, ("right", "left"))):
+            other = 1 - motor
+            if any(codes[motor] < 0 for codes in given) or not any(codes[other] < 0 for codes in given):
+                continue
+            for answers in self._asked:
+                for one, mirrored in zip(nets, reversed(nets), strict=True):
+                    turn, wanted = answers[one].codes, answers[mirrored].codes
+                    if wanted[other] < 0 < wanted[motor] == turn[other]:
+                        return names
+        return None
 
     def _unknown(self) -> Finding:
         if self._prober is None:

@@ -115,9 +115,9 @@ class Prober:
         soon = min(span, SOON_NS)
         return any(self.flipped(self.sensors, at, wait).noticed is not None for wait in dict.fromkeys((soon, span)))
 
-    def answers(self, at: Nanos) -> Mapping[str, Answer]:
+    def answers(self, at: Nanos, span: Nanos = ANSWER_NS) -> Mapping[str, Answer]:
         """Return what a program does at a time when one sensor alone sees something, and nothing did before."""
-        start, until = max(0, at - QUIET_NS), min(at + ANSWER_NS, self.replay.end)
+        start, until = max(0, at - QUIET_NS), min(at + span, self.replay.end)
         quiet = [Hold(wire=net, level=False, since=start, until=until) for net in self.sensors]
         base = self.replay.run(start, until, quiet, rows=True, memory_ns=_MEMORY_NS)
         codes = self.codes_with(base, start, until)
@@ -136,6 +136,15 @@ class Prober:
                 answered=None if effect.answered is None else effect.answered - at,
             )  # fmt: skip
         return found
+
+    def held(self, since: Nanos, until: Nanos, *, level: bool) -> list[Hold]:
+        """Return all sensors' pins at one level for a time."""
+        return [Hold(wire=net, level=level, since=since, until=until) for net in self.sensors]
+
+    def codes_all(self, at: Nanos, *, level: bool) -> Codes:
+        """Return the motors' codes when all sensors' pins have had one level for 2 s."""
+        until = min(at + QUIET_NS, self.replay.end)
+        return self.codes_with(self.replay.run(at, until, self.held(at, until, level=level)), at, until)
 
     def moments(self, until: Nanos, count: int = 5) -> list[Nanos]:
         """Return times at which a program drives, so that it may be asked; the last one a little before `until`."""

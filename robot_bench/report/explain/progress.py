@@ -4,6 +4,7 @@
     obeyed     its motor pins asked for way, and the wheels did not turn
     stuck      the program takes notice of nothing any more
     opposite   with no sensor seeing anything it drives its wheels opposite ways
+    stays so   it goes on with it when nothing is in sight, as it did not before
     itself     the program held the motors so while it looked at its inputs: why is not known
 
 Invariant: as of `robot_bench.report.explain.contact`.
@@ -11,13 +12,13 @@ Invariant: as of `robot_bench.report.explain.contact`.
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from robot_bench.events.kinds import Pose
 from robot_bench.report.explain.chain import Evidence, Step
 from robot_bench.report.explain.findings import Finding, ended, numbers, obeyed, steady_since
-from robot_bench.report.explain.probing import Prober
+from robot_bench.report.explain.probing import QUIET_NS, Answer, Codes, Prober
 from robot_bench.report.explain.replay import Reset
 from robot_bench.report.explain.scene import Scene
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
@@ -26,6 +27,8 @@ from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 STAYS_M, PART = 0.15, 0.25
 #: chosen: a program begins to drive within so long of its reset.
 BEGINS_NS: Nanos = 6 * NS_PER_S
+#: chosen: a program that knows nothing of its way still gives up what it does after so long (dodge_fsm.c: 12 s).
+LEAVES_NS: Nanos = 15 * NS_PER_S
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +79,7 @@ class ProgressInquest:
             self._not_begun(stay)
             or self._stuck(stay, middle)
             or self._opposite(stay.until)
+            or self._stays_so(stay, middle)
             or self._itself(stay, middle)
         )
 
@@ -142,14 +146,69 @@ class ProgressInquest:
             f"so at {len(asked)} times",
             Evidence.CHANGED,
         )
-        record = self.scene.record
-        times = sorted({t for net in record.pins if net.startswith("motor") for t in record.pins[net].times})
-        never = not any(min(prober.codes(t + NS_PER_MS)) > 0 for t in times)
+        why = self._why_opposite(prober, asked)
         return Finding(
             f"the program drives its wheels opposite ways with nothing in sight (left {left:+d}, right {right:+d}): "
-            "the robot turns on the spot where it should drive on"
-            + ("; never in the run are both asked to go forward, as with the sign of one motor wrong" if never else ""),
-            is_cause=never,
+            f"the robot turns on the spot where it should drive on{why and f'; {why}'}",
+            is_cause=bool(why),
+        )
+
+    def _why_opposite(self, prober: Prober, asked: Sequence[Mapping[str, Answer]]) -> str:
+        """Return what a program that turns with nothing in sight does with something in sight; empty: it tells nothing.
+
+        A wrong sign of one motor makes a straight way of each turn too, so it shows at several sensors.
+        """
+
+        def drives_on(codes: Codes) -> bool:
+            return min(codes) > 0
+
+        alike = [net for net in prober.sensors if all(abs(sum(a[net].codes)) == 2 * abs(a[net].codes[0]) != 0
+                                                      for a in asked)]  # fmt: skip
+        on = [net for net in prober.sensors if all(drives_on(answers[net].codes) for answers in asked)]
+        unseen = [net for net in prober.sensors if all(answers[net].noticed is None for answers in asked)]
+        if len(alike) >= 2 and len(on) < 2:
+            return (f"it drives them alike when {numbers([prober.replay.pin(net) for net in alike])}, each alone, "
+                    "goes high: as with the sign of one motor wrong")  # fmt: skip
+        if len(on) == 1 and on == alike:
+            return (f"it drives on when {prober.replay.pin(on[0])} alone goes high, so at {len(asked)} times: as with "
+                    f"{on[0]} inverted")  # fmt: skip
+        if alike or on:
+            return ""
+        if all(drives_on(prober.codes_all(answers[prober.sensors[0]].at, level=True)) for answers in asked):
+            return f"it drives on when all sensors' pins are high, so at {len(asked)} times: as with all inverted"
+        if len(unseen) == 1:
+            return (f"nothing in it depends on {prober.replay.pin(unseen[0])}: as with that one taken to be always "
+                    "high")  # fmt: skip
+        return ""
+
+    def _stays_so(self, stay: _Stay, middle: Nanos) -> Finding | None:
+        """Tell of a program that drove on with nothing in sight before, and does so no more."""
+        prober, record = self._prober, self.scene.record
+        codes, since = steady_since(record, middle)
+        until = min(middle + LEAVES_NS, stay.until, self._until)
+        if prober is None or until - middle < LEAVES_NS or middle - since < LEAVES_NS:
+            return None
+        held = prober.replay.run(middle, until, prober.held(middle, until, level=False))
+        if any(net.startswith("motor") for _, net, _ in held.edges):
+            return None
+        begin = next((pose.t for pose in self.scene.poses(0, since) if min(pose.left, pose.right) > 20_000), None)
+        if begin is None or begin + QUIET_NS > since:
+            return None
+        free = prober.codes_all(begin, level=False)
+        if min(free) <= 0:
+            return None
+        lasts = (until - middle) / NS_PER_S
+        self._step(middle, "firmware", f"keeps the motors at {codes[0]:+d}, {codes[1]:+d} also when all sensors' pins "
+                   f"are held low for {lasts:.0f} s", Evidence.CHANGED)  # fmt: skip
+        lines = prober.lines_run(middle, middle + 100 * NS_PER_MS)
+        was = prober.lines_run(max(0, since - 300 * NS_PER_MS), since)
+        gone = [line for line in was if line not in lines]
+        if gone:
+            self._step(since, "firmware", f"runs for the last time: {numbers(gone[:4])}", Evidence.REPLAYED)
+        return Finding(
+            f"the program never leaves what it does since {since / NS_PER_S:.3f} s (motors {codes[0]:+d}, "
+            f"{codes[1]:+d}): it does the same with all sensors' pins held low for {lasts:.0f} s, though at "
+            f"{begin / NS_PER_S:.1f} s, with nothing in sight, it drove on ({free[0]:+d}, {free[1]:+d})"
         )
 
     def _itself(self, stay: _Stay, middle: Nanos) -> Finding:
@@ -234,7 +293,8 @@ def fed(prober: Prober, cause: str, steps: list[Step]) -> str:
     if new:
         says = f"from then on it goes by {numbers(new[:4])}, where it had not been in the 0.1 s before"
         steps.append(Step(t=at, part="firmware", says=says, evidence=Evidence.REPLAYED))
-    return f"; it was fed last at {at / NS_PER_S:.3f} s, at {place}, which the program did not come by again"
+    before_ms = (resets[0].at - at) / NS_PER_MS
+    return f"; it was fed last at {at / NS_PER_S:.3f} s, {before_ms:.0f} ms before, at {place}, and not again till then"
 
 
 def _turned(poses: Sequence[Pose]) -> float:

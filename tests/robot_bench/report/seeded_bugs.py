@@ -208,6 +208,16 @@ OTHERS = (
         answers=("left and right exchanged",), thing=_POST, duration_s=30.0,
     ),
     Bug(
+        name="sensor-inverted",
+        edits=(("dodge.c", _READ, "dodge_tick(&dodge, pins_distances() ^ 0x08, "),),
+        answers=("DD4 inverted",), duration_s=20.0,
+    ),
+    Bug(
+        name="motor-never-reverses",
+        edits=(("motors_bits.c", "write_code(right_wires, right)", "write_code(right_wires, right & 3)"),),
+        answers=("never asks the right motor to go backwards",), duration_s=32.0,
+    ),
+    Bug(
         name="encoder-off-by-one",
         edits=(("odometer.c", "STEPS_PER_TURN / 2 + STEPS_PER_TURN)", "STEPS_PER_TURN / 2 + STEPS_PER_TURN - 1)"),),
         answers=("encoder",), fails=False, is_found=False,
@@ -216,5 +226,34 @@ OTHERS = (
         name="no-debounce",
         edits=(("dodge_fsm.c", "#define RELEASE_TICKS 25", "#define RELEASE_TICKS 1"),),
         answers=("chatter",), fails=False, is_found=False,
+    ),
+)  # fmt: skip
+
+#: Looked at for longer than the rest.
+LONGER = (
+    Bug(
+        name="motors-lack-a-bit",
+        edits=(("motors_bits.c", "i < 3; i++", "i < 2; i++"),),
+        answers=("comm3",), duration_s=32.0, is_found=False,
+    ),
+    Bug(
+        name="debounce-of-2-s",
+        edits=(
+            (
+                "dodge.c", "        struct dodge_command",
+                ("        static uint8_t high_ticks[8];\n        uint8_t sensors = 0, raw = pins_distances();\n"
+                "        for (int i = 0; i < 8; i++) {\n"
+                "            high_ticks[i] = raw >> i & 1 ? high_ticks[i] + (high_ticks[i] < 200) : 0;\n"
+                "            sensors |= (uint8_t)((high_ticks[i] >= 200) << i);\n"
+                "        }\n        struct dodge_command"),
+            ),
+            ("dodge.c", _READ, "dodge_tick(&dodge, sensors, "),
+        ),
+        answers=("late",), thing=_BOX, duration_s=20.0, is_found=False,
+    ),
+    Bug(
+        name="never-clear-again",
+        edits=(("dodge_fsm.c", "++dodge->unseen_ticks[i] >= RELEASE_TICKS", "++dodge->unseen_ticks[i] < 0"),),
+        answers=("never leaves what it does",), duration_s=60.0,
     ),
 )  # fmt: skip

@@ -25,7 +25,7 @@ from robot_bench.scenario.scenario import load_scenario
 from robot_bench.wires.edges import Edges
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S
-from tests.robot_bench.report.seeded_bugs import NAMED, OTHERS, UNFAIR, Bug, build, scenario_text
+from tests.robot_bench.report.seeded_bugs import LONGER, NAMED, OTHERS, UNFAIR, Bug, build, scenario_text
 
 DODGE = HERE / "dodge.elf"
 NETS = [f"DD{n}" for n in range(1, 9)]
@@ -216,8 +216,13 @@ needs_compiler = pytest.mark.skipif(compiler_version() is None, reason=f"{COMPIL
 
 
 @needs_compiler
-@pytest.mark.slow
-@pytest.mark.parametrize("bug", [*NAMED, *OTHERS], ids=lambda bug: bug.name)
+@pytest.mark.parametrize(
+    "bug",
+    [
+        *(pytest.param(bug, marks=pytest.mark.slow, id=bug.name) for bug in (*NAMED, *OTHERS)),
+        *(pytest.param(bug, marks=pytest.mark.soak, id=bug.name) for bug in LONGER),
+    ],
+)
 def test_a_seeded_bug_is_explained_or_said_to_be_unknown_and_never_wrong(bug: Bug, tmp_path: Path) -> None:
     firmware = build(bug, tmp_path)
     record = run_with(firmware, tmp_path, bug.thing, bug.duration_s, bug.placed_s)
