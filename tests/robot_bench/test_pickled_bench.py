@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from robot_bench.adapter import FirmwareAdapter, FirmwareState, is_available
+from robot_bench.adapter import FirmwareAdapter, is_available
 from robot_bench.bench import Bench
 from robot_bench.recording.trace import TraceWriter
 from robot_bench.scenario.fault_script import FaultChange
