@@ -104,7 +104,7 @@ class SecondBluePillBench(Bench):
 
     elf: Path
 
-    def _adapter_and_pioneer(self, pinout: Pinout, body: object, harness: object) -> tuple[object, Pioneer]:
+    def _ends_of_line(self, pinout: Pinout, body: object, harness: object) -> tuple[object, Pioneer]:
         recorder, parameters = self.recorder, self.scenario.parameters
         pioneer = Pioneer(parameters=parameters, body=body, settings=self.scenario.controller)
         pioneer.on_event = recorder.listener("pioneer")

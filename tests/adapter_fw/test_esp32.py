@@ -52,7 +52,7 @@ def test_plain_esp_idf_finds_the_sources_and_the_drivers_of_its_version(tmp_path
     assert (FIRMWARE / "esp32" / "main" / "CMakeLists.txt").exists()
     assert CHECK.components(tmp_path, tmp_path)[0] == "driver"
     (tmp_path / "components" / "esp_driver_uart").mkdir(parents=True)
-    assert CHECK.components(tmp_path, tmp_path)[:2] == ["esp_driver_gpio", "esp_driver_uart"]
+    assert CHECK.components(tmp_path, tmp_path)[:3] == ["esp_driver_gpio", "esp_driver_mcpwm", "esp_driver_uart"]
 
 
 def test_the_library_names_only_boards_with_a_cpp_library() -> None:

@@ -136,7 +136,8 @@ def test_an_edge_wakes_the_program_within_a_microsecond(session: Session, pin: s
     start_ns = session.board.now_ns
     session.board.pin(pin).drive(level)
     assert session.run(2 * MS) == text
-    (_, high, at_ns), (_, low, later_ns) = session.edges
+    # PA9 shows the bits of what is sent.
+    (_, high, at_ns), (_, low, later_ns) = [edge for edge in session.edges if edge[0] != "PA9"]
     assert (high, low) == ("high", "low")
     # 12 cycles of entry and a dozen instructions at 72 MHz.
     assert start_ns < at_ns < later_ns < start_ns + 1000

@@ -123,7 +123,7 @@ def test_no_page_of_help_is_wider_than_a_terminal(
     [
         ("p2os dri", ["drive"]),
         ("p2os drive --forw", ["--forward"]),
-        ("p2os run do", ["dodge"]),
+        ("p2os run do", ["dodge", "dodge-duty"]),
         ("p2os run dodge --world maz", ["maze"]),
         ("p2os run dodge --body kin", ["kinematic"]),
         ("p2os serve --robot p3dx-", ["p3dx-sh"]),
