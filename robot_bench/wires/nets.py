@@ -276,8 +276,9 @@ class Net(Stateful):
         for history in self._drives.values():
             passed = bisect_right(history.times, limit - COURSE_NS, lo=1) - 1
             del history.times[:passed], history.codes[:passed]
-            for at in history.waves.keys() - set(history.times):
-                del history.waves[at]
+            if history.waves:  # a wire may have many edges in `COURSE_NS`
+                for at in history.waves.keys() - set(history.times):
+                    del history.waves[at]
             later = later or history.times[-1] > limit
         self._may_wave = self._may_wave and any(history.waves for history in self._drives.values())
         return later
