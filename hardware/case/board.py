@@ -8,7 +8,8 @@ from functools import cache
 
 from hardware.pcb.circuit.design import build
 from hardware.pcb.layout.footprints import FOOTPRINTS
-from hardware.pcb.layout.placement import Place, place
+from hardware.pcb.layout.placement import place
+from hardware.pcb.layout.routing import placed_pads, turn
 from hardware.pcb.layout.shapes import PadKind
 
 VARIANT = "rev-b"
@@ -33,7 +34,7 @@ def bodies(variant: str = VARIANT) -> tuple[PlacedBox, ...]:
     for component in design.components:
         at = places[component.ref]
         for box in FOOTPRINTS[component.part.footprint].boxes:
-            (x, y), (width, height) = _turned(box.center_mm, at), box.size_mm
+            (x, y), (width, height) = turn(box.center_mm, at), box.size_mm
             if round(at.angle_deg / 90) % 2:
                 width, height = height, width
             found.append(PlacedBox(part=component.ref, x=(x - width / 2, x + width / 2),
@@ -55,31 +56,17 @@ def part_place(part: str, variant: str = VARIANT) -> tuple[float, float]:
 @cache
 def mounting_holes(variant: str = VARIANT) -> tuple[tuple[float, float], ...]:
     """Return the places of the holes that no pad is in."""
-    design = build(variant)
-    places = place(design)
     return tuple(
-        (places[component.ref].x_mm, places[component.ref].y_mm)
-        for component in design.components
-        if any(pad.kind is PadKind.HOLE and not pad.number for pad in FOOTPRINTS[component.part.footprint].pads)
+        placed.center_mm
+        for placed in placed_pads(build(variant))
+        if placed.pad.kind is PadKind.HOLE and not placed.pad.number
     )
 
 
-@cache
-def through_pads(variant: str = VARIANT) -> tuple[tuple[float, float, float], ...]:
+def through_pads(variant: str = VARIANT) -> list[tuple[float, float, float]]:
     """Return the pads that come out below the board: x, y and the radius that their solder takes."""
-    design = build(variant)
-    places = place(design)
-    return tuple(
-        (*_turned(pad.at_mm, places[component.ref]), max(pad.size_mm) / 2)
-        for component in design.components
-        for pad in FOOTPRINTS[component.part.footprint].pads
-        if pad.kind is PadKind.THROUGH
-    )
-
-
-def _turned(offset: tuple[float, float], at: Place) -> tuple[float, float]:
-    """Return a point of a footprint in board axes; KiCad turns against the clock, seen with y down."""
-    x, y = offset
-    for _ in range(round(at.angle_deg / 90) % 4):
-        x, y = y, -x
-    return at.x_mm + x, at.y_mm + y
+    return [
+        (*placed.center_mm, max(placed.pad.size_mm) / 2)
+        for placed in placed_pads(build(variant))
+        if placed.pad.kind is PadKind.THROUGH
+    ]
