@@ -4,18 +4,17 @@
  */
 #include "../fabric/fabric.h"
 
-/* What Python is told, and what it asks for: `fabric/registers.py`. */
-enum { HEARS_LINE, HEARS_PINS };
+/* What Python asks for, as `fabric/registers.py` has it. */
 enum { LISTEN = OWN_COMMANDS };
 
-static void line(struct device *device, uint32_t input, bool level) { ask(device, HEARS_LINE, input << 1 | level); }
+void hand_on_line(struct device *device, uint32_t input, bool level) { ask(device, HEARS_LINE, input << 1 | level); }
 
-static void pins(struct device *device, uint32_t port, uint32_t changed)
+void hand_on_pins(struct device *device, uint32_t port, uint32_t changed)
 {
     ask(device, HEARS_PINS, port << PINS | changed);
 }
 
-static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint32_t other)
+uint32_t obey_listen(struct device *device, uint32_t what, uint32_t one, uint32_t other)
 {
     if (what == LISTEN) { /* to the pins `other` of the port `one` */
         listen_to_pins(device, one, other);
@@ -23,4 +22,4 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
     return 0;
 }
 
-DEVICE_KIND(listener_kind) = {.name = "listener", .line = line, .pins = pins, .command = command};
+DEVICE_KIND(listener_kind) = {.name = "listener", .line = hand_on_line, .pins = hand_on_pins, .command = obey_listen};

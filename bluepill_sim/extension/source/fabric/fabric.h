@@ -289,6 +289,13 @@ void add_counter(struct fabric *fabric, uint32_t address, const struct ramp *ram
 void add_kind(struct device_kind *kind);
 void send_word(struct device *device, const struct sent *row);
 
+/* listener.c: what a device in Python hears of lines and pins, and how it asks for pins. */
+/* What Python is told, as `fabric/registers.py` has it; a kind's own come after these. */
+enum { HEARS_LINE, HEARS_PINS, OWN_ANSWERS };
+void hand_on_line(struct device *device, uint32_t input, bool level);
+void hand_on_pins(struct device *device, uint32_t port, uint32_t changed);
+uint32_t obey_listen(struct device *device, uint32_t what, uint32_t one, uint32_t other);
+
 /* pins.c */
 void offer(struct fabric *fabric, uint32_t pin, uint32_t source, uint32_t level);
 void put_row(struct fabric *fabric, struct subscriber *subscriber, const struct edge *row);
