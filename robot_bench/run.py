@@ -135,13 +135,7 @@ def run_scenario(
     with reserved(folder, force=force), _trace_of(scenario, folder, is_at_port=False) as trace:
         bench = Bench(scenario, trace=trace, slice_ns=slice_ns or (PACED_SLICE_NS if pacer else UNPACED_SLICE_NS))
 
-        def after_slice(now: Nanos) -> None:
-            if pacer is not None:
-                pacer.keep_pace(now)
-            if on_progress is not None:
-                on_progress(Progress(now=now, duration_ns=scenario.duration_ns, doing=lambda: doing(bench)))
-
-        bench.on_slice = after_slice
+        bench.on_slice = _after_slice(bench, pacer, on_progress)
         trace.meta(meta_of(scenario, bench.parts.world, bench.note, is_at_port=False))
         with _measured(bench.chip, coverage=coverage, profile=profile, fail_under=fail_under) as measurement:
             return _record(bench, trace, folder, pacer, clock, drive, measurement, is_kept, explained=explained)
@@ -178,11 +172,7 @@ def run_at_port(
         trace = stack.enter_context(_trace_of(scenario, folder, is_at_port=True))
         bench = RemoteBench(scenario, transport, pacer, trace=trace)
 
-        def after_slice(now: Nanos) -> None:
-            if on_progress is not None:
-                on_progress(Progress(now=now, duration_ns=scenario.duration_ns, doing=lambda: doing(bench)))
-
-        bench.on_slice = after_slice
+        bench.on_slice = _after_slice(bench, None, on_progress)  # it keeps pace by itself
         trace.meta(meta_of(scenario, None, bench.note, is_at_port=True))
         return _record(bench, trace, folder, pacer, clock, drive)
 
@@ -307,6 +297,20 @@ def doing(bench: Bench | RemoteBench) -> str:
     state, text = bench.recorder.last_state, bench.recorder.last_line
     wheels = "" if state is None else f"{state.left_speed_mps * 1000:+.0f} / {state.right_speed_mps * 1000:+.0f} mm/s"
     return f"{wheels}  {text}".strip()
+
+
+def _after_slice(
+    bench: Bench | RemoteBench, pacer: RealTimePacer | None, on_progress: ProgressListener | None
+) -> Callable[[Nanos], None]:
+    """Return what a run does after each slice, or step of all robots: it keeps pace, and tells how far it is."""
+
+    def after_slice(now: Nanos) -> None:
+        if pacer is not None:
+            pacer.keep_pace(now)
+        if on_progress is not None:
+            on_progress(Progress(now=now, duration_ns=bench.scenario.duration_ns, doing=lambda: doing(bench)))
+
+    return after_slice
 
 
 @dataclass(frozen=True, slots=True)
@@ -438,13 +442,7 @@ def run_together(
         benches = Bench.together(scenario, traces=traces, slice_ns=length)
         first = next(iter(benches.values()))
 
-        def after_step(now: Nanos) -> None:
-            if pacer is not None:
-                pacer.keep_pace(now)
-            if on_progress is not None:
-                on_progress(Progress(now=now, duration_ns=scenario.duration_ns, doing=lambda: doing(first)))
-
-        first.on_step_of_all(after_step)
+        first.on_step_of_all(_after_slice(first, pacer, on_progress))
         for name, bench in benches.items():
             traces[name].meta(meta_of(bench.scenario, bench.parts.world, bench.note, is_at_port=False))
         driven = _drive(first, pacer, clock, None)
