@@ -30,7 +30,7 @@ PROGRAMS = {
     "dodge_duty": (*DUTY_SOURCES, "dodge.c", "dodge_fsm.c", "odometer.c"),
     # Its pins are its own: of board.c only the clock is kept.
     "rover": ("startup.c", "memory.c", "board.c", "uart.c", "rover_board.c", "rover.c"),
-    "usb_echo": ("startup.c", "memory.c", "usb_echo.c"),
+    "usb_echo": ("startup.c", "memory.c", "board.c", "usb_echo.c"),
     # Brings pins, clock and line of its own.
     "board_test": ("startup.c", "memory.c", "board_test.c"),
 }

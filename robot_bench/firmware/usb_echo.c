@@ -3,6 +3,7 @@
  * Interrupts stay masked: WFI ends with one that is pending (RM0008 table 63, 20), and the loop looks at ISTR.
  * PB0 low as it starts pulls D+ (PA12) down for 20 ms first, so that a host enumerates anew after a reset.
  */
+#include "board.h"
 #include "f103.h"
 
 struct usb { volatile uint32_t EPR[8], gap[8], CNTR, ISTR, FNR, DADDR, BTABLE; };
@@ -206,21 +207,6 @@ static void echo(void)
     copy_out(TX2, bytes, count);
     PMA[4 * 2 + 1] = count;
     set(2, STAT_TX, TX_VALID);
-}
-
-static void clock_start(void)
-{
-    RCC->CR |= RCC_CR_HSEON;
-    while (!(RCC->CR & RCC_CR_HSERDY)) {
-    }
-    FLASH->ACR = FLASH_ACR_PRFTBE | FLASH_ACR_LATENCY_2;
-    RCC->CFGR = RCC_CFGR_PLLSRC_HSE | RCC_CFGR_PLLMUL9 | RCC_CFGR_PPRE1_DIV2;
-    RCC->CR |= RCC_CR_PLLON;
-    while (!(RCC->CR & RCC_CR_PLLRDY)) {
-    }
-    RCC->CFGR |= RCC_CFGR_SW_PLL;
-    while ((RCC->CFGR & RCC_CFGR_SWS_MASK) != RCC_CFGR_SWS_PLL) {
-    }
 }
 
 int main(void)
