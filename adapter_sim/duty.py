@@ -64,6 +64,10 @@ class PeriodicLevel(Protocol):
         """Return the ticks a second."""
         ...
 
+    def level(self, at_ns: Nanos, /) -> bool:
+        """Return the level at a time, which is at or after `ns`."""
+        ...
+
 
 #: What a wire does from one time on until before another: when, and the level or wave from then on. It is known for
 #: `COURSE_NS` before the present.
@@ -119,15 +123,14 @@ class DutyWire(Stateful):
     """A wire with a meter on it.
 
     Args:
-        level: Returns the level of the wire at an instant, an edge then included.
         course: What the wire does in a span.
         timeout_ns: A wire without an edge for this long has a level.
     """
 
     STATE = ("_meter", "_read_at")
 
-    def __init__(self, level: Callable[[Nanos], bool], course: Course, *, timeout_ns: Nanos = DUTY_TIMEOUT_NS) -> None:
-        self._level, self._course = level, course
+    def __init__(self, course: Course, *, timeout_ns: Nanos = DUTY_TIMEOUT_NS) -> None:
+        self._course = course
         self._meter = DutyMeter(timeout_ns)
         self._read_at: Nanos | None = None
 
@@ -135,7 +138,8 @@ class DutyWire(Stateful):
         """Return the share of a period at level 1 as known at `now`, 0 to `FULL`; `now` never goes back."""
         begin, self._read_at = self._read_at, now
         if begin is None or now - begin > COURSE_NS:
-            self._meter.restart(self._level(now))
+            ((_, shown),) = self._course(now, now + 1)
+            self._meter.restart(shown if isinstance(shown, bool) else shown.level(now))
         elif now > begin:
             course = self._course(begin, now + 1)
             for (at, shown), end in zip(course, [*(at for at, _ in course[1:]), now + 1], strict=True):
@@ -157,8 +161,7 @@ def _take_wave(meter: DutyMeter, wave: PeriodicLevel, begin: Nanos, end: Nanos) 
         return (wave.at + ((at - wave.ns + 1) * hz - 1) // NS_PER_S) // period
 
     first, last = turn_at(begin), turn_at(end - 1)
-    ticks = wave.at + ((begin - wave.ns + 1) * hz - 1) // NS_PER_S
-    meter.edge(ticks % period < high, begin)
+    meter.edge(wave.level(begin), begin)
     for turn in range(max(first, last - 2), last + 1):
         for edge, level in ((turn * period, True), (turn * period + high, False)):
             if begin < (at := time_of(edge)) < end:

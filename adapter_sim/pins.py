@@ -300,12 +300,7 @@ class MotorDuties(Stateful):
 def duty_wires(pins: PinBank, motors: Sequence[Value], settings: AdapterSettings) -> tuple[DutyWire, ...]:
     """Return what measures the magnitude of each motor value."""
     return tuple(
-        DutyWire(
-            partial(pins.read, motor.wires[0]),
-            partial(pins.course, motor.wires[0]),
-            timeout_ns=settings.duty_timeout_ns,
-        )
-        for motor in motors
+        DutyWire(partial(pins.course, motor.wires[0]), timeout_ns=settings.duty_timeout_ns) for motor in motors
     )
 
 

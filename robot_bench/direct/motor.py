@@ -50,7 +50,7 @@ class JointMotor(Stateful):
         self._step_um_per_s = step_um_per_s
         self._bit_order = bit_order
         #: What measures the magnitude, where that is a duty.
-        self._duties = tuple(DutyWire(net.level, net.course) for net in self._nets[:1] if command is MotorCommand.DUTY)
+        self._duties = tuple(DutyWire(net.course) for net in self._nets[:1] if command is MotorCommand.DUTY)
         self._change: int | None = None
         if ramp_um_per_s2 is not None:
             self._change, rest = divmod(ramp_um_per_s2 * dt_ns, NS_PER_S)

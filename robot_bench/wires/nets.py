@@ -130,7 +130,7 @@ class Net(Stateful):
 
     STATE = (
         "_drives", "last_edge", "_notified_until", "_notified_level", "_notified_contention",
-        "_contentions", "_notified_wave", "_waves", "_may_wave",
+        "_contentions", "_notified_wave", "_waves", "_may_wave", "_kept_ns",
     )  # fmt: skip
     #: Who listens is settled when a bench is built.
     DERIVED = ("_watchers", "_last_level")
@@ -153,6 +153,8 @@ class Net(Stateful):
         self._notified_wave: Wave | None = None
         self._waves: list[tuple[Nanos, Wave | None]] = []
         self._may_wave = False
+        #: For how long drives are kept after every part has passed them: `COURSE_NS` once somebody reads courses.
+        self._kept_ns: Nanos = 0
 
     def drive(self, owner: str, level: bool, strength: Strength, now: Nanos) -> None:
         """Hold the wire from `now` on; it replaces what the same owner did before.
@@ -207,7 +209,11 @@ class Net(Stateful):
         return None if isinstance(found, bool) else found
 
     def course(self, begin: Nanos, end: Nanos) -> list[tuple[Nanos, bool | Wave]]:
-        """Return what the wire does from `begin` on until before `end`: when, and the level or wave."""
+        """Return what the wire does from `begin` on until before `end`: when, and the level or wave.
+
+        From the first call on `begin` may lie `COURSE_NS` before the present.
+        """
+        self._kept_ns = COURSE_NS
         if self.last_edge <= begin and not self._may_wave:
             return [(begin, self._level_at_last())]
         cuts = {at for history in self._drives.values() for at in history.between(begin, end)}
@@ -268,15 +274,12 @@ class Net(Stateful):
         return found
 
     def forget_before(self, limit: Nanos) -> bool:
-        """Drop what no reader at or after `limit` can see; return True where later drives are still remembered.
-
-        A course may begin `COURSE_NS` before.
-        """
+        """Drop what no reader at or after `limit` can see; return True where later drives are still remembered."""
         later = False
         for history in self._drives.values():
-            passed = bisect_right(history.times, limit - COURSE_NS, lo=1) - 1
+            passed = bisect_right(history.times, limit - self._kept_ns, lo=1) - 1
             del history.times[:passed], history.codes[:passed]
-            if history.waves:  # a wire may have many edges in `COURSE_NS`
+            if history.waves:
                 for at in history.waves.keys() - set(history.times):
                     del history.waves[at]
             later = later or history.times[-1] > limit

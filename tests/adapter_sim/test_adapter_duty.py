@@ -128,7 +128,7 @@ def test_a_wave_and_its_edges_mean_the_same(wave: Wave, steps: list[int], before
                 *((at, shown) for at, shown in course if begin < at < end),
             ]
 
-        wire = DutyWire(lambda at: bool(between(at, at + 1)[0][1]), between, timeout_ns=TIMEOUT)
+        wire = DutyWire(between, timeout_ns=TIMEOUT)
         wire.duty(start)
         return [wire.duty(at) for at in times]
 
@@ -148,7 +148,7 @@ def test_a_wire_that_was_not_looked_at_is_measured_anew() -> None:
     def level_at(at: int) -> bool:
         return [level for when, level in edges if when <= at][-1]
 
-    wire = DutyWire(level_at, course, timeout_ns=TIMEOUT)
+    wire = DutyWire(course, timeout_ns=TIMEOUT)
     assert [wire.duty(at * MS) for at in (0, 2, 4)] == [FULL, 250, 250]
     assert wire.duty(4 * MS + COURSE_NS) == 250
     assert wire.duty(4 * MS + 2 * COURSE_NS + 1) == FULL
