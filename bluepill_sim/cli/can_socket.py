@@ -28,7 +28,7 @@ from simbase.timing import NS_PER_S, Nanos
 
 _FRAME = struct.Struct("=IB3x8s")
 _EXTENDED, _REMOTE, _ERROR = 1 << 31, 1 << 30, 1 << 29
-_STANDARD_MASK, _EXTENDED_MASK = (1 << 11) - 1, (1 << 29) - 1
+_IDENTIFIER = (1 << 29) - 1
 #: chosen: datagrams taken at a call, frames that wait for the network, and others that one program passes frames on to.
 _AT_ONCE, MOST_WAITING, MOST_PEERS = 256, 1024, 16
 #: One byte more than a frame, so that what is too long is seen to be.
@@ -68,7 +68,7 @@ def from_datagram(data: bytes) -> CanFrame:
     if word & _ERROR or length > len(body):
         raise ValueError(f"no frame of data: identifier {word:#010x}, length {length}")
     return CanFrame(
-        identifier=word & _EXTENDED_MASK,
+        identifier=word & _IDENTIFIER,
         data=b"" if is_remote else body[:length],
         is_extended=is_extended,
         is_remote=is_remote,

@@ -249,6 +249,19 @@ def test_a_reset_that_the_host_does_not_see_makes_the_device_deaf(boards: Boards
     assert echoes(board)
 
 
+def test_an_endpoint_that_has_halted_goes_on_when_it_is_cleared(boards: Boards) -> None:
+    board = boards()
+    board.usb.wait_configured()
+    board.usb.damage("to device", 3)
+    board.usb_serial.receive(b"lost\n")
+    board.run_for("20 ms")
+    assert board.usb.halted(0x02) == "does not answer"
+    board.usb.clear_halt(0x02)
+    assert board.usb.halted(0x02) == ""
+    board.usb_serial.receive(b"found\n")
+    assert board.usb_serial.expect(b"FOUND\n", within="100 ms")
+
+
 def test_a_suspended_bus_is_still_and_goes_on(boards: Boards) -> None:
     board = boards()
     board.usb.wait_configured()
