@@ -76,7 +76,7 @@ _FUNCTIONS = {
     "systick_read": "upul",
     "systick_write": "vpuul",
     "core_block_start": "up",
-    "core_set_page": "vpupupuppi",
+    "core_set_page": "vpupupuppu",
     "core_set_paged_region": "vpu",
     "core_join": "vpp",
     "core_next_event": "lp",

@@ -6,8 +6,8 @@
     duplicates                   it stores nothing that is read back: what a bus master's narrow write is duplicated to
                                  changes nothing that would be warned of
 
-An access goes to Python when its page has no clock, when an event is due
-before the block ends, and for everything else.
+An access goes to Python when its page has no clock, when a device in Python is
+due before the block ends, and for everything else.
 """
 
 import ctypes
@@ -60,11 +60,10 @@ def share_registers(engine: Engine, parts: Iterable[Peripheral], rcc: Rcc) -> No
         words, _ = part.words.buffer_info()
         engine.keep(behaviour, masks)
         first_page = part.base - PERIPHERAL_BASE >> _PAGE_SHIFT
-        slot = -1 if part.KIND is None else part.slot
         for first in range(0, count, _PAGE_WORDS):
             calls.core_set_page(
                 state, first_page + first // _PAGE_WORDS, words + 4 * first, min(count - first, _PAGE_WORDS), at, mask,
-                ctypes.byref(behaviour, 2 * first), ctypes.byref(masks, 16 * first), slot,
+                ctypes.byref(behaviour, 2 * first), ctypes.byref(masks, 16 * first), part.slot,
             )  # fmt: skip
 
 

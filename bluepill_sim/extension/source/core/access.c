@@ -245,17 +245,50 @@ static RARELY void ask_write(const struct region_user *region, uint32_t offset, 
     core->shared.in_access = 0;
 }
 
-/* The page of a register that may be answered here: it has a clock, and nothing is due before the block ends. */
-static struct page *open_page(const struct region_user *region, uint32_t offset)
+/* Whether a device may have to act before the running block ends. */
+static bool is_due(const struct core *core, const struct page *page)
+{
+    return core->fabric->slots[page->device->slot].cycle <= core->shared.cycle + core->block->costs[0];
+}
+
+/* Whether an access is made here: where a hook has ended the run it is not made, and where a request that may interrupt
+ * came before, or the core has to wait, Python ends the block.
+ */
+static bool may_access(struct core *core)
+{
+    const struct shared *s = &core->shared;
+    return !s->is_python && s->halt_kind == HALT_NONE && (s->stop_at || !(s->waits || is_interrupted(core)));
+}
+
+/* The page of a register that may be answered here: it has a clock, and Python need not act first. `is_late`: its
+ * device has to be brought to the time of the access. */
+static struct page *open_page(const struct region_user *region, uint32_t offset, bool *is_late)
 {
     struct core *core = region->core;
-    if (region->number != core->paged_region || core->shared.is_python || offset >> PAGE_SHIFT >= PAGES ||
-        is_over(core)) {
+    *is_late = false;
+    if (region->number != core->paged_region || core->shared.is_python || offset >> PAGE_SHIFT >= PAGES) {
         return NULL;
     }
     struct page *page = &core->pages[offset >> PAGE_SHIFT];
-    const bool is_there = (offset & IN_PAGE) >> 2 < page->count;
-    return is_there && has_clock(page) ? page : NULL;
+    if ((offset & IN_PAGE) >> 2 >= page->count || !has_clock(page)) {
+        return NULL;
+    }
+    if (UNLIKELY(is_over(core))) {
+        core->waiting.has_acted = 1;
+        *is_late = is_due(core, page);
+        return may_access(core) && (!*is_late || page->device->kind != NULL) ? page : NULL;
+    }
+    return page;
+}
+
+/* Finds the accessing instruction, and brings the device to its time; false: not now, the access comes again. */
+static bool catch_up(struct core *core, const struct page *page, uint32_t address, bool is_write, uint32_t size)
+{
+    if (!begin_access(core, address, is_write, size)) {
+        return false;
+    }
+    fabric_catch_up(core->fabric, page->device->slot, now_ns(core->fabric));
+    return true;
 }
 
 /* Whether no clock is missing there. */
@@ -266,53 +299,73 @@ static bool is_clocked(const struct region_user *region, uint32_t offset)
            has_clock(&core->pages[offset >> PAGE_SHIFT]);
 }
 
-/* Reads a register of a device in C; false: not now, the access comes again. */
-static bool read_device(struct core *core, struct device *device, uint32_t index, uint32_t address, uint32_t size,
-                        uint32_t *word)
+/* Whether an access has to know its time. */
+static bool read_needs_time(const struct page *page, uint32_t index)
 {
+    const struct device *device = page->device;
     const struct device_kind *kind = device->kind;
-    const bool needs_time = kind->needs_time == NULL || kind->needs_time(device, index, false) ||
-                            device->fabric->watches_lines;
-    if (!needs_time) {
-        *word = kind->read(device, index);
-        skip(core, address, false, size);
-        return true;
-    }
-    core->waiting.has_acted = 1;
-    if (!begin_access(core, address, false, size)) {
-        return false;
-    }
-    *word = kind->read(device, index);
-    core->shared.in_access = 0;
-    return true;
+    return page->behaviour[index] & READS_NATIVE &&
+           (kind->needs_time == NULL || kind->needs_time(device, index, false) || device->fabric->watches_lines);
 }
 
-static void write_device(struct core *core, struct page *page, uint32_t index, uint32_t address, uint32_t size,
-                         uint32_t written)
+static bool write_needs_time(const struct page *page, uint32_t index, uint32_t written)
 {
-    struct device *device = page->device;
+    const struct device *device = page->device;
     const struct device_kind *kind = device->kind;
-    const bool needs_time = (kind->store_needs_time != NULL ? kind->store_needs_time(device, index, written)
-                                                            : kind->needs_time == NULL || kind->needs_time(device, index, true)) ||
-                            device->fabric->watches_lines;
-    if (needs_time && !begin_access(core, address, true, size)) {
+    if (!(page->behaviour[index] & WRITES_NATIVE)) {
+        return false;
+    }
+    return (kind->store_needs_time != NULL ? kind->store_needs_time(device, index, written)
+                                           : kind->needs_time == NULL || kind->needs_time(device, index, true)) ||
+           device->fabric->watches_lines;
+}
+
+static uint32_t read_now(struct page *page, uint32_t index)
+{
+    if (page->behaviour[index] & READS_NATIVE) {
+        return page->device->kind->read(page->device, index);
+    }
+    const uint32_t latch = page->behaviour[index] >> LATCH_SHIFT, word = page->words[index];
+    if (latch) {
+        page->words[latch] = word;
+    }
+    return word;
+}
+
+/* Reads a register that only stores, or of a device in C; 0 where the access comes again. */
+static uint32_t read_page(struct core *core, struct page *page, uint32_t index, uint32_t address, uint32_t size, bool is_late)
+{
+    if (!is_late && !read_needs_time(page, index)) {
+        const uint32_t word = read_now(page, index);
+        skip(core, address, false, size);
+        return word;
+    }
+    core->waiting.has_acted = 1;
+    if (is_late ? !catch_up(core, page, address, false, size) : !begin_access(core, address, false, size)) {
+        return 0;
+    }
+    const uint32_t word = read_now(page, index);
+    core->shared.in_access = 0;
+    return word;
+}
+
+static void write_page(struct core *core, struct page *page, uint32_t index, uint32_t address, uint32_t size,
+                       uint32_t written, bool is_late)
+{
+    const bool needs_time = is_late || write_needs_time(page, index, written);
+    if (needs_time &&
+        (is_late ? !catch_up(core, page, address, true, size) : !begin_access(core, address, true, size))) {
         return;
     }
-    kind->write(device, index, written, store(page, index, written));
+    const uint32_t previous = store(page, index, written);
+    if (page->behaviour[index] & WRITES_NATIVE) {
+        page->device->kind->write(page->device, index, written, previous);
+    }
     if (needs_time) {
         core->shared.in_access = 0;
     } else {
         skip(core, address, true, size);
     }
-}
-
-/* Whether an access is made here: where a hook has ended the run it is not made, and where a request that may interrupt
- * came before, or the core has to wait, Python ends the block.
- */
-static bool may_access(struct core *core)
-{
-    const struct shared *s = &core->shared;
-    return !s->is_python && s->halt_kind == HALT_NONE && (s->stop_at || !(s->waits || is_interrupted(core)));
 }
 
 /* Which region is the system control space. */
@@ -422,22 +475,14 @@ uint64_t core_read_io(void *unicorn, uint64_t at, unsigned size, void *user)
     (void)unicorn;
     const struct region_user *region = user;
     const uint32_t offset = (uint32_t)at, index = (offset & IN_PAGE) >> 2;
-    const struct page *page = open_page(region, offset);
+    bool is_late;
+    struct page *page = open_page(region, offset, &is_late);
     uint32_t word = 0;
     if (UNLIKELY(region->core->is_stopping)) { /* the other half of an unaligned access */
         return 0;
     }
-    if (page != NULL && page->behaviour[index] & READS_PLAIN) {
-        const uint32_t latch = page->behaviour[index] >> LATCH_SHIFT;
-        word = page->words[index];
-        if (latch) {
-            page->words[latch] = word;
-        }
-        skip(region->core, region->base + offset, false, size);
-    } else if (page != NULL && page->behaviour[index] & READS_NATIVE) {
-        if (!read_device(region->core, page->device, index, region->base + offset, size, &word)) {
-            return 0;
-        }
+    if (page != NULL && page->behaviour[index] & (READS_PLAIN | READS_NATIVE)) {
+        word = read_page(region->core, page, index, region->base + offset, size, is_late);
     } else if (region->number == region->core->system_region &&
                read_system(region->core, region->base + offset, size, &word)) {
     } else if (is_clocked(region, offset) && is_zero(region->core, region->base + offset)) {
@@ -454,7 +499,8 @@ void core_write_io(void *unicorn, uint64_t at, unsigned size, uint64_t value, vo
     const uint32_t offset = (uint32_t)at, index = (offset & IN_PAGE) >> 2;
     uint32_t written = (uint32_t)value;
     const struct region_user *region = user;
-    struct page *page = open_page(region, offset);
+    bool is_late;
+    struct page *page = open_page(region, offset, &is_late);
     if (UNLIKELY(region->core->is_stopping)) {
         return;
     }
@@ -475,11 +521,8 @@ void core_write_io(void *unicorn, uint64_t at, unsigned size, uint64_t value, vo
     if (is_half) { /* the APB bridge puts it on both halves of the bus */
         written = (written & 0xFFFF) * 0x10001u;
     }
-    if (page->behaviour[index] & WRITES_PLAIN) {
-        store(page, index, written);
-        skip(region->core, region->base + offset, true, size);
-    } else if (page->behaviour[index] & WRITES_NATIVE) {
-        write_device(region->core, page, index, region->base + offset, size, written);
+    if (page->behaviour[index] & (WRITES_PLAIN | WRITES_NATIVE)) {
+        write_page(region->core, page, index, region->base + offset, size, written, is_late);
     } else {
         ask_write(region, offset, size, (uint32_t)value);
     }

@@ -107,7 +107,7 @@ struct page {
     uint32_t count;
     const uint16_t *behaviour; /* of each word: bits of enum behaviour */
     const uint32_t (*masks)[4]; /* of each word: kept, taken, cleared by 1, cleared by 0 */
-    struct device *device;      /* null: Python's */
+    struct device *device;      /* without a kind it is Python's */
 };
 
 /* Whether what is on a page has its clock, or needs none. */

@@ -53,7 +53,7 @@ static bool registers(void *user, struct bus_access *access)
     struct core *core = user;
     const uint32_t offset = access->address - PERIPHERALS, index = (offset & ((1u << PAGE_SHIFT) - 1)) >> 2;
     struct page *page = &core->pages[offset >> PAGE_SHIFT];
-    if (page->device == NULL || index >= page->count) {
+    if (index >= page->count || page->device->kind == NULL) {
         return false;
     }
     if (!has_clock(page)) {

@@ -64,13 +64,12 @@ void core_free(struct core *core)
     free(core);
 }
 
-/* `slot` is that of a device in C, -1 for one in Python. */
 void core_set_page(struct core *core, uint32_t number, uint32_t *words, uint32_t count, const uint32_t *gate,
-                   uint32_t gate_mask, const uint16_t *behaviour, const uint32_t (*masks)[4], int slot)
+                   uint32_t gate_mask, const uint16_t *behaviour, const uint32_t (*masks)[4], uint32_t slot)
 {
     core->pages[number] = (struct page){.words = words, .gate = gate, .gate_mask = gate_mask, .count = count,
                                         .behaviour = behaviour, .masks = masks,
-                                        .device = slot < 0 ? NULL : &core->fabric->devices[slot]};
+                                        .device = &core->fabric->devices[slot]};
 }
 
 static uint32_t kind_of_denied_fetch(uint32_t pc)

@@ -117,6 +117,7 @@ struct device {
     uint32_t slot;
     uint8_t outputs[OUTPUTS]; /* their lines, */
     uint8_t drivers[OUTPUTS]; /* and which of the outputs on the line each is */
+    uint64_t heard[SLOTS / 64]; /* the slots whose outputs lead to its inputs, a bit each */
     uint32_t ends_slice; /* somebody waits for each word */
     uint32_t word_count;
     struct sent *words_out; /* room for WORDS of them; null: it sends none */

@@ -3,6 +3,8 @@
  * Which outputs are on which line, and which inputs hang on it, is a table on the chip's page (`stm32f103.py`).
  * Invariant: a line is 1 exactly while one of its outputs is.
  */
+#include <string.h>
+
 #include "fabric.h"
 
 /* Subscribers see lines as pins behind the last one; what a pin drives is here whether the interrupt is enabled. */
@@ -61,30 +63,16 @@ bool is_heard(const struct device *device, uint32_t output)
     return is_heard;
 }
 
-static bool leads_to(const struct line *line, const struct device *device)
-{
-    for (uint32_t n = 0; n < line->sink_count; ++n) {
-        if (line->sinks[n].device == device) {
-            return true;
-        }
-    }
-    return false;
-}
-
 void hearing_changed(struct device *device)
 {
-    struct fabric *fabric = device->fabric;
-    for (uint32_t slot = 0; slot < fabric->slot_count; ++slot) {
-        struct device *source = &fabric->devices[slot];
-        for (uint32_t output = 0; output < OUTPUTS; ++output) {
-            const uint32_t number = source->outputs[output];
-            if (number < LINES && leads_to(&fabric->lines[number], device)) {
-                fabric_command(fabric, slot, HEARD, 0, 0);
-                break;
-            }
+    for (uint32_t word = 0; word < SLOTS / 64; ++word) {
+        for (uint64_t left = device->heard[word]; left; left &= left - 1) {
+            fabric_command(device->fabric, 64 * word + (uint32_t)__builtin_ctzll(left), HEARD, 0, 0);
         }
     }
 }
+
+static void note_heard(struct device *device, uint32_t slot) { device->heard[slot / 64] |= UINT64_C(1) << slot % 64; }
 
 void fabric_set_output(struct fabric *fabric, uint32_t slot, uint32_t output, bool level)
 {
@@ -109,6 +97,9 @@ bool fabric_put_output(struct fabric *fabric, uint32_t slot, uint32_t output, ui
     }
     fabric->devices[slot].outputs[output] = (uint8_t)number;
     fabric->devices[slot].drivers[output] = line->driver_count++;
+    for (uint32_t n = 0; n < line->sink_count; ++n) {
+        note_heard(line->sinks[n].device, slot);
+    }
     return true;
 }
 
@@ -120,5 +111,10 @@ bool fabric_wire(struct fabric *fabric, uint32_t number, uint32_t slot, uint32_t
         return false;
     }
     line->sinks[line->sink_count++] = (struct sink){fabric->slots[slot].device, input};
+    for (uint32_t n = 0; n < fabric->slot_count; ++n) {
+        if (memchr(fabric->devices[n].outputs, (int)number, OUTPUTS) != NULL) {
+            note_heard(fabric->slots[slot].device, n);
+        }
+    }
     return true;
 }
