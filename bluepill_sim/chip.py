@@ -670,7 +670,7 @@ class PeripheralBus(Stateful):
         self._chip = chip
         #: When each peripheral was first read without its clock since that was last on, in ns.
         self.read_unclocked_ns: dict[str, Nanos] = {}
-        rcc.gate_listeners.append(self._forget_clocked)
+        rcc.on_gates = self._forget_clocked
 
     def read(self, offset: int, size: int) -> int:
         """Return what the core reads."""
@@ -680,6 +680,7 @@ class PeripheralBus(Stateful):
             return 0
         if not self._rcc.is_clocked(part.name):
             now_ns = self._chip.now_ns
+            self._rcc.native.watches_gates = True
             if now_ns - self.read_unclocked_ns.setdefault(part.name, now_ns) >= UNCLOCKED_NS:
                 self._refuse(part, offset, "read of")
             return 0
@@ -729,6 +730,7 @@ class PeripheralBus(Stateful):
         clocked = [name for name in self.read_unclocked_ns if self._rcc.is_clocked(name)]
         for name in clocked:
             del self.read_unclocked_ns[name]
+        self._rcc.native.watches_gates = bool(self.read_unclocked_ns)
 
     def _refuse(self, part: Peripheral | None, offset: int, what: str) -> None:
         """Warn of an access to nothing: it reads 0, and a write is lost."""

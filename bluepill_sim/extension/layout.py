@@ -348,6 +348,7 @@ ADC = Struct(
     ),
 )
 GPIO = Struct("gpio", "Which port a GPIO is.", (Field("port", "u32"),))
+RCC = Struct("rcc", "What RCC tells Python of.", (Field("watches_gates", "u32", doc="each write of a clock gate"),))
 FILTER = Struct(
     "filter",
     "A digital filter of an input. RM0008 14.4.7, IC1F.",
@@ -451,7 +452,7 @@ SENT = Struct(
 
 #: All of them; one that holds another comes behind it.
 STRUCTS = (
-    RECORD, INSTRUCTION, RAMP, TICKS, STEP, LOOP, FAULT, SHARED, PORT, USART, EXTI, DMA, SIGNAL, ANALOG, ADC, GPIO,
+    RECORD, INSTRUCTION, RAMP, TICKS, STEP, LOOP, FAULT, SHARED, PORT, USART, EXTI, DMA, SIGNAL, ANALOG, ADC, GPIO, RCC,
     FILTER, SHAPE, TIM, SPI, I2C, WAVE, EDGE, INPUT_ROWS, SENT,
 )  # fmt: skip
 

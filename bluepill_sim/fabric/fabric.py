@@ -132,7 +132,9 @@ class Fabric(Stateful):
 
     STATE = ("ports", "waves", "lines", "inputs", "analog", "samples")
     #: What one of the callbacks has raised; and what is filled once, when a chip is made.
-    DERIVED = ("_failure", "electrical", "_kept", "_names", "_acts", "_answers", "_deliveries", "_samples")
+    DERIVED = (
+        "_failure", "electrical", "_kept", "_kept_words", "_names", "_acts", "_answers", "_deliveries", "_samples",
+    )  # fmt: skip
 
     def __init__(self, chip: FabricPorts) -> None:
         self._chip = chip
@@ -167,6 +169,8 @@ class Fabric(Stateful):
         #: `struct analog`: write it between two runs, behind a call of `inputs_change`.
         self.analog_struct: Any = AnalogStruct(vdda_uv=VDDA_UV, temperature_mc=TEMPERATURE_MC)
         self._samples: list[Any] = [None] * ANALOG_PINS
+        #: What C has pointers to.
+        self._kept_words: list[object] = []
         #: Called before volts on pins change: what was sampled by now, was sampled with those before.
         self.input_listeners: list[Callable[[], object]] = []
         calls.fabric_set_analog(self.handle, ctypes.addressof(self.analog_struct))
@@ -266,6 +270,31 @@ class Fabric(Stateful):
             raise ValueError(f"no kind of device is called {kind!r}")
         self._acts[slot], self._answers[slot], self._deliveries[slot] = act, answer, deliver
         return slot
+
+    def set_gate(self, slot: int, register: int, bit: int) -> None:
+        """Say which bit of RCC's enable and reset registers is a device's; 0 is the AHB's, 1 APB2's, 2 APB1's."""
+        self._calls_of_c.fabric_set_gate(self.handle, slot, register, bit)
+
+    def set_initial(self, slot: int, words: list[tuple[int, int]], *, is_whole: bool) -> None:
+        """Say what the registers of a device in C are after a reset: index and word.
+
+        Args:
+            slot: its own.
+            words: one for each register.
+            is_whole: whether these, and what its kind does, are all of a reset.
+        """
+        initial = (_U32 * (2 * len(words)))(*(part for pair in words for part in pair))
+        self._kept_words.append(initial)
+        self._calls_of_c.fabric_set_initial(self.handle, slot, ctypes.addressof(initial), len(words), is_whole)
+
+    def reset_device(self, slot: int) -> None:
+        """Put a device in C back to its state after a reset, but for what of it is Python's."""
+        self._calls_of_c.fabric_reset_device(self.handle, slot)
+        self.check()
+
+    def name_of(self, slot: int) -> str:
+        """Return the name of the device in a slot."""
+        return self._names[slot]
 
     def read(self, slot: int, index: int) -> int:
         """Return what a device in C answers to the read of a register."""

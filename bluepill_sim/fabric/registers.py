@@ -29,7 +29,7 @@ from functools import cache
 from typing import Any, ClassVar, cast
 
 from bluepill_sim.extension.layout import Struct, structure
-from bluepill_sim.fabric.fabric import CLOCK, OWN_COMMANDS, RESET, RESUMED, SETTLE, STOPPED
+from bluepill_sim.fabric.fabric import CLOCK, OWN_COMMANDS, RESUMED, SETTLE, STOPPED
 from bluepill_sim.fabric.ports import ChipPorts
 from simbase.state import Stateful
 
@@ -39,6 +39,8 @@ NATIVE = "native"
 LISTENER = "listener"
 #: What it is told first (the other is pins), and its command.
 _HEARS_LINE, _LISTEN = 0, OWN_COMMANDS
+#: The registers of RCC with a clock gate a bit, by their numbers in C.
+_GATES = ("AHBENR", "APB2ENR", "APB1ENR")
 #: Every bit of a 32-bit register.
 WORD = 0xFFFF_FFFF
 
@@ -267,6 +269,8 @@ class Peripheral(Stateful):
         self.native: Any = structure(self.HOLDS)() if self.HOLDS is not None else None
         #: Its place in the queue of events.
         self.slot = self._take_slot()
+        if place.clock is not None:
+            self.fabric.set_gate(self.slot, _GATES.index(place.clock.register), place.clock.bit)
 
     @property
     def due_ns(self) -> int | None:
@@ -405,11 +409,13 @@ class Peripheral(Stateful):
 
     def reset(self) -> None:
         """Go back to the state after a system reset."""
-        self.due_ns = None
-        for register in self.REGISTERS:
-            self.words[register.offset // 4] = register.reset
-        if self.KIND is not None:
-            self.command(RESET)
+        if self.KIND is None:
+            self.due_ns = None
+            for register in self.REGISTERS:
+                self.words[register.offset // 4] = register.reset
+        else:
+            self._due_ns = None
+            self.fabric.reset_device(self.slot)
         self.on_reset()
 
     def on_reset(self) -> None:
@@ -453,9 +459,14 @@ class Peripheral(Stateful):
             return self.fabric.add_slot(self.name, self.advance_to)
         words, _ = self.words.buffer_info()
         state = 0 if self.native is None else ctypes.addressof(self.native)
-        return self.fabric.add_device(
+        slot = self.fabric.add_device(
             self.name, self.KIND, words, state, act=self.advance_to, answer=self.answer, deliver=self.deliver
         )
+        mine = type(self)
+        is_whole = mine.reset is Peripheral.reset and mine.on_reset is Peripheral.on_reset
+        initial = [(register.offset // 4, register.reset) for register in self.REGISTERS]
+        self.fabric.set_initial(slot, initial, is_whole=is_whole)
+        return slot
 
     def _reader(self, name: str, index: int) -> Callable[[], int]:
         if name == NATIVE:

@@ -128,10 +128,6 @@ class Adc(Peripheral):
         """Take PCLK2 and its divider."""
         self.command(CLOCK, self.clock_hz(), self.chip.clocks.adc_divider)
 
-    def on_reset(self) -> None:
-        """Take the triggers that AFIO gives."""
-        self._route_changed()
-
     def answer(self, what: int, value: int) -> int:
         """Warn."""
         question, divider = Question(what), self.native.divider

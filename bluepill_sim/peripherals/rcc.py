@@ -18,11 +18,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 
+from bluepill_sim.extension.layout import RCC
 from bluepill_sim.fabric.clocks import HSI_HZ, LEAST_LSI_HZ, LSE_HZ, MOST_LSI_HZ, illegal_settings
 from bluepill_sim.fabric.ports import ChipPorts
-from bluepill_sim.fabric.registers import LISTENER, ClockBit, Peripheral, Place, Register, bits
+from bluepill_sim.fabric.registers import NATIVE, ClockBit, Peripheral, Place, Register, bits
 
 CR, CFGR, CIR, APB2RSTR, APB1RSTR, AHBENR, APB2ENR, APB1ENR, BDCR, CSR = range(10)
+#: What the device in C tells (rcc.c), beside a line that it hears.
+_RESETS, _GATES = 2, 3
 
 #: Bits of the enable registers that a medium-density F103 has.
 _AHB_GATES = bits(0, 2, 4, 6)
@@ -126,7 +129,7 @@ _CSR = "LPWRRSTF 31, WWDGRSTF 30, IWDGRSTF 29, SFTRSTF 28, PORRSTF 27, PINRSTF 2
 class Rcc(Peripheral):
     """Reset and clock control."""
 
-    KIND = LISTENER
+    KIND, HOLDS = "rcc", RCC
     HAS_BYTE_LANES = True
     STATE = ("_ready_at", "_illegal", "_nmi_ns", "_keeps_lsi", "crystal_works", "_shown")
     OUTPUTS = ("irq", "css")
@@ -162,7 +165,7 @@ class Rcc(Peripheral):
             offset=0x0C,
             readable=_APB2_GATES,
             writable=_APB2_GATES,
-            on_write="_write_apb2rstr",
+            on_write=NATIVE,
             fields=_APB2,
         ),
         Register(
@@ -170,7 +173,7 @@ class Rcc(Peripheral):
             offset=0x10,
             readable=_APB1_GATES,
             writable=_APB1_GATES,
-            on_write="_write_apb1rstr",
+            on_write=NATIVE,
             fields=_APB1,
         ),
         Register(
@@ -179,7 +182,7 @@ class Rcc(Peripheral):
             reset=0x14,
             readable=_AHB_GATES,
             writable=_AHB_GATES,
-            on_write="_write_enr",
+            on_write=NATIVE,
             fields=_AHB,
         ),
         Register(
@@ -187,7 +190,7 @@ class Rcc(Peripheral):
             offset=0x18,
             readable=_APB2_GATES,
             writable=_APB2_GATES,
-            on_write="_write_enr",
+            on_write=NATIVE,
             fields=_APB2,
         ),
         Register(
@@ -195,7 +198,7 @@ class Rcc(Peripheral):
             offset=0x1C,
             readable=_APB1_GATES,
             writable=_APB1_GATES,
-            on_write="_write_enr",
+            on_write=NATIVE,
             fields=_APB1,
         ),
         Register(
@@ -232,8 +235,8 @@ class Rcc(Peripheral):
         self.hse_hz = hse_hz
         register_index = {register.name: register.offset // 4 for register in self.REGISTERS}
         self._gates = {name: (register_index[gate.register], 1 << gate.bit) for name, gate in gates.items()}
-        #: Called after each write of an enable register.
-        self.gate_listeners: list[Callable[[], None]] = []
+        #: Called after each write of an enable register, while `native.watches_gates` says so.
+        self.on_gates: Callable[[], None] | None = None
         #: When each oscillator that is starting gets ready, in the order of `OSCILLATORS`.
         self._ready_at: tuple[int | None, ...] = (None,) * len(OSCILLATORS)
         #: Whether the crystal oscillates; `fail_crystal` breaks it.
@@ -294,6 +297,17 @@ class Rcc(Peripheral):
             self._set_ready_at(index, None)
             self._settle(at_ns)
             self._update_irq()
+
+    def answer(self, what: int, value: int) -> int:
+        """Reset a peripheral whose bit of APBxRSTR has just gone to 1, tell of the gates, or hear a line."""
+        if what == _RESETS:
+            self.chip.reset_peripheral(self.fabric.name_of(value))
+        elif what == _GATES:
+            if self.on_gates is not None:
+                self.on_gates()
+        else:
+            self.line_changed(self.INPUTS[value >> 1], bool(value & 1))
+        return 0
 
     def line_changed(self, name: str, level: bool) -> None:
         """Keep LSI on for IWDG."""
@@ -383,22 +397,12 @@ class Rcc(Peripheral):
             self.chip.warn("RCC_CFGR: SW = 3 is not a clock: ignored", once="RCC:sw")
         self._settle()
 
-    def _write_enr(self, _written: int, _previous: int) -> None:
-        for listener in self.gate_listeners:
-            listener()
-
     def _write_cir(self, written: int, _previous: int) -> None:
         self.words[CIR] &= ~((written >> 16) & bits(7, (4, 0)))
         if written & CSSC:
             self._nmi_ns = None
             self._schedule()
         self._update_irq()
-
-    def _write_apb2rstr(self, _written: int, previous: int) -> None:
-        self._reset_peripherals(APB2ENR, self.words[APB2RSTR] & ~previous)
-
-    def _write_apb1rstr(self, _written: int, previous: int) -> None:
-        self._reset_peripherals(APB1ENR, self.words[APB1RSTR] & ~previous)
 
     def _write_bdcr(self, written: int, previous: int) -> None:
         if not self.chip.power.is_backup_open:
@@ -419,12 +423,6 @@ class Rcc(Peripheral):
         if written & _RMVF:
             self.words[CSR] &= ~_CSR_FLAGS
         self._settle()
-
-    def _reset_peripherals(self, enable_register: int, mask: int) -> None:
-        """Reset every modelled peripheral whose bit of APBxRSTR has just gone to 1."""
-        for name, (register, gate) in self._gates.items():
-            if register == enable_register and gate & mask:
-                self.chip.reset_peripheral(name)
 
     def _update_irq(self) -> None:
         flags = self.words[CIR]

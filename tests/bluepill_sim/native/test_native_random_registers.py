@@ -54,6 +54,7 @@ VECTORS: dict[int, str | int] = dict.fromkeys(range(16 + 11, 16 + 19), "handler"
 REGISTERS = st.one_of(
     st.integers(0, 36).map(lambda n: DMA1 + 4 * n),
     st.tuples(st.sampled_from([ADC1, ADC1, ADC2]), st.integers(0, 19)).map(lambda pair: pair[0] + 4 * pair[1]),
+    st.integers(3, 7).map(lambda n: BASES["RCC"] + 4 * n),  # resets and clock gates
     st.tuples(st.sampled_from(["USART1", "USART2", "EXTI", "AFIO", "GPIOA"]), st.integers(0, 5)).map(
         lambda pair: BASES[pair[0]] + 4 * pair[1]
     ),

@@ -9,7 +9,7 @@ from bluepill_sim.native.engine import NativeEngine
 from bluepill_sim.stm32f103 import BASES, PERIPHERAL_BASE
 from tests.bluepill_sim.machine import Machine
 
-SPI1, RCC = BASES["SPI1"], BASES["RCC"]
+SPI1, RCC, ADC1, TIM2 = (BASES[name] for name in ("SPI1", "RCC", "ADC1", "TIM2"))
 #: `.half 0x4211` is tst r1, r2. SPI1 on, as the master, at PCLK2 / 4.
 #: Each word is sent once TXE is set, and taken by polling RXNE.
 POLLING = f"""mov32 r0, #{RCC}
@@ -29,6 +29,31 @@ movs r2, #1
 beq full
 ldr r1, [r0, #12]
 adds r6, #1
+b again"""
+
+
+#: ADC1 and TIM2 get their clocks and some words, and are reset; then their clocks are taken away. Again and again.
+GATES = f"""mov32 r0, #{RCC}
+mov32 r3, #{ADC1}
+mov32 r4, #{TIM2}
+again: mov32 r1, #0x200
+movs r2, #1
+str r1, [r0, #24]
+str r2, [r0, #28]
+movs r5, #17
+str r5, [r3, #44]
+str r5, [r4, #44]
+str r1, [r0, #12]
+str r2, [r0, #16]
+ldr r5, [r3, #44]
+adds r6, r6, r5
+ldr r5, [r4, #44]
+adds r7, #1
+movs r1, #0
+str r1, [r0, #12]
+str r1, [r0, #16]
+str r1, [r0, #24]
+str r1, [r0, #28]
 b again"""
 
 
@@ -64,3 +89,37 @@ def test_a_device_in_c_is_polled_up_to_its_event_without_python(watchdog: None) 
     board.run_for("1 ms")
     assert board.register("R6") > 150
     assert not found
+
+
+def test_clock_gates_and_resets_of_devices_in_c_are_not_pythons(watchdog: None) -> None:
+    board = Machine(GATES, {}).board
+    board.run_for("20 us")
+    found = asked(board)
+    board.run_for("1 ms")
+    assert board.register("R7") > 100
+    assert (board.register("R6"), board.register("R5")) in {(0, 0), (0, 17), (0, 0xFFFF)}
+    assert not found
+
+
+@pytest.mark.parametrize("core", ["native", "python"])
+def test_a_reset_by_rcc_leaves_a_device_as_that_of_the_chip_does(
+    core: str, monkeypatch: pytest.MonkeyPatch, watchdog: None
+) -> None:
+    monkeypatch.setenv("P2OS_CORE", core)
+    board = Machine("wait: b wait", {}).board
+    parts = board.chip.parts.by_name
+    rcc, tim, usart = parts["RCC"], parts["TIM2"], parts["USART2"]
+    fresh = [(bytes(part.words), part.held[64:], part.due_ns) for part in (tim, usart)]
+    rcc.write(0x1C, 4, 1 | 1 << 17)
+    for offset, word in ((0x2C, 100), (0x34, 50), (0x0C, 1), (0x00, 1)):
+        tim.write(offset, 4, word)
+    usart.write(0x0C, 4, 0x2008)
+    assert tim.due_ns is not None
+    rcc.write(0x10, 4, 1)
+    assert (bytes(tim.words), tim.due_ns) == (fresh[0][0], fresh[0][2])
+    assert usart.words[3] == 0x2008
+    rcc.write(0x10, 4, 1 | 1 << 17)
+    assert bytes(usart.words) == fresh[1][0]
+    tim.write(0x2C, 4, 7)
+    rcc.write(0x10, 4, 1 << 17)  # neither has risen
+    assert tim.words[11] == 7

@@ -71,6 +71,32 @@ bool fabric_add_device(struct fabric *fabric, uint32_t slot, const char *name, u
     return false;
 }
 
+/* Says which bit of RCC's enable and reset registers is a device's. */
+void fabric_set_gate(struct fabric *fabric, uint32_t slot, uint32_t number, uint32_t bit)
+{
+    fabric->gated[number][bit] = (uint8_t)slot;
+}
+
+/* Says what the registers of a device are after a reset: indices and words; and whether that is all, but for its RESET. */
+void fabric_set_initial(struct fabric *fabric, uint32_t slot, const uint32_t (*initial)[2], uint32_t count, bool resets_alone)
+{
+    struct device *device = &fabric->devices[slot];
+    device->initial = initial;
+    device->initial_count = count;
+    device->resets_alone = resets_alone;
+}
+
+void reset_device(struct device *device)
+{
+    schedule(device, NO_TIME);
+    for (uint32_t n = 0; n < device->initial_count; ++n) {
+        device->words[device->initial[n][0]] = device->initial[n][1];
+    }
+    fabric_command(device->fabric, device->slot, RESET, 0, 0);
+}
+
+void fabric_reset_device(struct fabric *fabric, uint32_t slot) { reset_device(&fabric->devices[slot]); }
+
 uint32_t fabric_read(struct fabric *fabric, uint32_t slot, uint32_t index)
 {
     struct device *device = &fabric->devices[slot];

@@ -20,6 +20,7 @@
 
 enum { SLOTS = 128, LINES = 192, SUBSCRIBERS = 16, LISTENERS = 32, OUTPUTS = 24, SINKS = 8, WORDS = 1024, MEMORIES = 4, MOST_ROWS = 32768, COUNTERS = 8, LINE_WORDS = LINES / 64 };
 /* The first lines are those of interrupts, by their numbers. */
+enum { GATE_REGISTERS = 3 }; /* AHB, APB2, APB1 */
 enum { IRQ_LINES_END = 64, NO_LINE = 255 };
 enum { LOW, HIGH, FLOATING };
 /* What is reached as registers. */
@@ -117,6 +118,9 @@ struct device {
     uint32_t slot;
     uint8_t outputs[OUTPUTS]; /* their lines, */
     uint8_t drivers[OUTPUTS]; /* and which of the outputs on the line each is */
+    uint32_t initial_count;     /* registers, */
+    const uint32_t (*initial)[2]; /* their indices, and their words after a reset: Python's */
+    uint32_t resets_alone;      /* nothing of it that a reset puts back is Python's */
     uint64_t heard[SLOTS / 64]; /* the slots whose outputs lead to its inputs, a bit each */
     uint32_t ends_slice; /* somebody waits for each word */
     uint32_t word_count;
@@ -206,6 +210,8 @@ struct fabric {
     uint32_t ordered;     /* how many slots have an event, */
     uint8_t order[SLOTS]; /* and which, in order of time, then of their numbers */
     struct line lines[LINES];
+    /* By register of RCC and bit: the slot of the device that the bit gives its clock, or resets; 0: none. */
+    uint8_t gated[GATE_REGISTERS][32];
     struct port *ports; /* Python's: PORTS of them */
     struct wave *waves; /* Python's: one a source */
     struct shown shown[PORTS * PINS];
@@ -289,6 +295,8 @@ static inline uint32_t ask(struct device *device, uint32_t what, uint32_t value)
 void add_counter(struct fabric *fabric, uint32_t address, const struct ramp *ramp, const struct ticks *ticks);
 void add_kind(struct device_kind *kind);
 void send_word(struct device *device, const struct sent *row);
+/* Puts a device back to its state after a reset, but for what of it is Python's. */
+void reset_device(struct device *device);
 
 /* listener.c: what a device in Python hears of lines and pins, and how it asks for pins. */
 /* What Python is told, as `fabric/registers.py` has it; a kind's own come after these. */

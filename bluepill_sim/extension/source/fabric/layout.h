@@ -336,6 +336,12 @@ struct gpio {
 };
 _Static_assert(sizeof(struct gpio) == 4, "gpio");
 
+/* What RCC tells Python of. */
+struct rcc {
+    uint32_t watches_gates; /* each write of a clock gate */
+};
+_Static_assert(sizeof(struct rcc) == 4, "rcc");
+
 /* A digital filter of an input. RM0008 14.4.7, IC1F. */
 struct filter {
     uint64_t sampled; /* the tick up to which samples were taken */
