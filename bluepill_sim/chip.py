@@ -586,7 +586,7 @@ class Chip(Stateful):
         engine.map_io(SRAM_ALIAS, SRAM_BYTES * _ALIAS_BYTES, bits.read_bit, bits.write_bit)
         engine.map_io(PPB_BASE, PPB_BYTES, self._read_system, self._write_system)
         share_registers(engine, self.parts.by_name.values(), self.parts.rcc)
-        self.pins.written_by = self._written_by
+        self.fabric.forced = self._forced
         engine.on_read_only_write = self._write_flash
         engine.on_read_only_written = self._repair_flash
 
@@ -607,16 +607,15 @@ class Chip(Stateful):
             return
         self.system.write(offset, size, value)
 
-    def _written_by(self, address: int) -> tuple[int, int]:
-        """Return which bits of the word at an address the running store means, and where it stands."""
+    def _forced(self, address: int) -> tuple[int, dict[int, int]]:
+        """Return which bits of the word at an address the running store means, and what that hangs on."""
         engine, memory = self.engine, self.memory
         pc = engine.access_pc
         start = pc if engine.block is NO_BLOCK else engine.block.start
         second = memory.read(pc, 2)
         is_wide = second is not None and second[1] >= _FIRST_WIDE_BYTE
         code = memory.read(start, pc - start + (4 if is_wide else 2)) or b""
-        registers = [engine.registers[register] for register in GENERAL[:15]]
-        return forced_bits(code, registers, address, memory.read), pc
+        return forced_bits(code, lambda number: engine.registers[GENERAL[number]], address, memory.read)
 
     def _write_flash(self, address: int, size: int, value: int) -> bool:
         """Take a write of the core to flash or option bytes: their controller decides; False: a bus error."""

@@ -14,11 +14,14 @@ Source: ARMv7-M Architecture Reference Manual A5.2, A5.3.
 Invariant: a bit is returned only if the value read cannot show in it.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
 _WORD = 0xFFFF_FFFF
+_PC = 15
+#: Where memory begins that a program changes without a word to anyone.
+_SRAM = 0x2000_0000
 _FIRST_WIDE = 0xE800
 #: chosen: how many blocks stay decoded; a program has a few stores to CRL and CRH, some of them in loops.
 _BLOCKS = 256
@@ -39,25 +42,32 @@ class Step:
     constant: int | None = None
 
 
-def forced_bits(code: bytes, registers: Sequence[int], address: int, read: ReadMemory) -> int:
-    """Return the bits that a store sets to what the program wants, whatever was there.
+def forced_bits(
+    code: bytes, registers: Callable[[int], int], address: int, read: ReadMemory
+) -> tuple[int, dict[int, int]]:
+    """Return the bits that a store sets to what the program wants, whatever was there, and what that hangs on.
+
+    That is, beside the code: values by the number of a register, or by the address of a word of SRAM.
 
     Args:
         code: the running block, up to and with the store.
-        registers: R0 to R14, before the store.
+        registers: returns R0 to R14, before the store.
         address: what the store writes.
         read: the memory.
     """
     steps = _steps_of(code)
     if not steps or steps[-1].name != "store":
-        return 0
-    return _Walk(steps, registers, read).forced(address)
+        return 0, {}
+    walk = _Walk(steps, registers, read)
+    return walk.forced(address), walk.seen
 
 
 class _Walk:
     """Goes back through a block."""
 
-    def __init__(self, steps: tuple[Step, ...], registers: Sequence[int], read: ReadMemory) -> None:
+    def __init__(self, steps: tuple[Step, ...], registers: Callable[[int], int], read: ReadMemory) -> None:
+        #: What it has looked at.
+        self.seen: dict[int, int] = {}
         self._steps = steps
         self._registers = registers
         self._read = read
@@ -109,8 +119,8 @@ class _Walk:
 
     def _value(self, register: int, before: int) -> int | None:
         """Return what a register holds before a step; None: not known."""
-        if register < len(self._registers) and all(s.target not in (register, None) for s in self._steps[before:-1]):
-            return self._registers[register]
+        if register < _PC and all(s.target not in (register, None) for s in self._steps[before:-1]):
+            return self.seen.setdefault(register, self._registers(register))
         at = self._writer(register, before)
         if at is None:
             return None
@@ -118,13 +128,19 @@ class _Walk:
         if step.name == "load":
             address = self._address(step.sources[0], at)
             data = None if address is None else self._read(address, 4)
-            return None if data is None else int.from_bytes(data, "little")
+            return None if data is None or address is None else self._loaded(address, data)
         values = [self._value(source, at) for source in step.sources]
         if step.constant is not None:
             values.append(step.constant)
         known = [value for value in values if value is not None]
         make = _MEANING.get(step.name)
         return None if make is None or len(known) != len(values) else make(known) & _WORD
+
+    def _loaded(self, address: int, data: bytes) -> int:
+        value = int.from_bytes(data, "little")
+        if address >= _SRAM:  # what is below is flash: code
+            self.seen[address] = value
+        return value
 
 
 _MEANING: dict[str, Callable[[list[int]], int]] = {
@@ -240,7 +256,6 @@ def _unknown(word: int) -> Step:
     return Step("unknown", word >> 8 & 15)
 
 
-_PC = 15
 #: 32-bit data processing by bits 24 to 21 of the pair; what is missing writes a register.
 _WIDE_PAIRS = {0: "and", 1: "clear", 2: "or", 3: "not", 8: "add", 13: "subtract"}
 #: As `_NARROW`, of both halfwords (A5.3).

@@ -347,7 +347,20 @@ ADC = Struct(
         Field("warned", "u32", 6, "by question: channels that were warned of"),
     ),
 )
-GPIO = Struct("gpio", "Which port a GPIO is.", (Field("port", "u32"),))
+GPIO = Struct(
+    "gpio",
+    "Which port a GPIO is, and what is known of its pins, a bit each. RM0008 9.2.",
+    (
+        Field("port", "u32"),
+        Field("base", "u32", doc="the address of its registers"),
+        Field("locked", "u32", doc="configuration frozen until reset"),
+        Field("intended", "u32", doc="made floating inputs on purpose, and where"),
+        Field("claimed", "u32", doc="configured while they belong to another, and where"),
+        *_fields("u32", "warned", "told"),
+        Field("intended_pc", "u32", PINS),
+        Field("claimed_pc", "u32", PINS),
+    ),
+)
 RCC = Struct("rcc", "What RCC tells Python of.", (Field("watches_gates", "u32", doc="each write of a clock gate"),))
 FILTER = Struct(
     "filter",

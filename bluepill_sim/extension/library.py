@@ -106,6 +106,7 @@ _FUNCTIONS = {
     "fabric_due": "lpu",
     "fabric_add_slot": "ip",
     "fabric_add_device": "bpuspp",
+    "fabric_configure_pin": "vpuub",
     "fabric_set_gate": "vpuuu",
     "fabric_set_initial": "vpupub",
     "fabric_reset_device": "vpu",

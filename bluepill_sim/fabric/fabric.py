@@ -55,6 +55,10 @@ _ASK = ctypes.CFUNCTYPE(_U32, _U32, _U32, _U32)
 _PAIR = ctypes.CFUNCTYPE(None, _U32, _U32)
 _ONE = ctypes.CFUNCTYPE(None, _U32)
 _BUS = ctypes.CFUNCTYPE(_U64, _U32, _U32, _U32, _U32)
+_FORCED = ctypes.CFUNCTYPE(_U32, _U32, _USER)
+#: `MOST_SEEN` and `SEEN_WORDS` of fabric.h.
+_MOST_SEEN = 8
+_SEEN_WORDS = 1 + 2 * _MOST_SEEN
 _Result = TypeVar("_Result")
 
 
@@ -73,6 +77,7 @@ class Host(ctypes.Structure):
         ("registers", ctypes.c_void_p),
         ("holds_code", ctypes.c_void_p),
         ("asleep_until", ctypes.c_void_p),
+        ("forced", ctypes.c_void_p),
     )
 
 
@@ -86,6 +91,7 @@ class _Calls(ctypes.Structure):
         ("deliver", _ONE),
         ("bus", _BUS),
         ("code_written", _PAIR),
+        ("forced", _FORCED),
     )
 
 
@@ -133,7 +139,8 @@ class Fabric(Stateful):
     STATE = ("ports", "waves", "lines", "inputs", "analog", "samples")
     #: What one of the callbacks has raised; and what is filled once, when a chip is made.
     DERIVED = (
-        "_failure", "electrical", "_kept", "_kept_words", "_names", "_acts", "_answers", "_deliveries", "_samples",
+        "_failure", "electrical", "forced", "_kept", "_kept_words", "_names", "_acts", "_answers", "_deliveries",
+        "_samples",
     )  # fmt: skip
 
     def __init__(self, chip: FabricPorts) -> None:
@@ -147,6 +154,9 @@ class Fabric(Stateful):
         self._kept: list[object] = []
         #: Called with (number of the pin, 0 for a fight with the outside and 1 for a short).
         self.electrical: Callable[[int, int], None] = lambda _pin, _what: None
+        #: Returns which bits of the register at an address the running store sets whatever was there, and what that
+        #: hangs on beside the code: values by the number of a register or the address of a word.
+        self.forced: Callable[[int], tuple[int, dict[int, int]]] = lambda _address: (0, {})
         self.port_structs: Any = (PortStruct * PORTS)()
         self._waves: Any = (WaveStruct * SOURCES)()
         self._callbacks = _Calls(
@@ -156,6 +166,7 @@ class Fabric(Stateful):
             _ONE(self._guarded(lambda slot: self._deliveries[slot](), None)),
             _BUS(self._guarded(self._reach_registers, NO_TIME)),
             _PAIR(self._guarded(self._code_written, None)),
+            _FORCED(self._guarded(self._find_forced, 0)),
         )
         #: `struct fabric`, for the native core.
         self.handle = ctypes.c_void_p(
@@ -464,6 +475,14 @@ class Fabric(Stateful):
     def _code_written(self, address: int, size: int) -> None:
         self._chip.code_written(address, size)
 
+    def _find_forced(self, address: int, seen_at: int) -> int:
+        """Answer what C asks, with what the answer hangs on."""
+        bits, seen = self.forced(address)
+        words = (_U32 * _SEEN_WORDS).from_address(seen_at)
+        pairs = [word for pair in seen.items() for word in pair][: _SEEN_WORDS - 1]
+        words[: 1 + len(pairs)] = [len(seen), *pairs]
+        return bits
+
     def _reach_registers(self, is_write: int, address: int, size: int, word: int) -> int:
         answer = self._chip.reach_registers(address, size, word if is_write else None)
         return NO_TIME if answer is None else answer
@@ -483,6 +502,11 @@ class Fabric(Stateful):
     def pins_changed(self, port: int) -> None:
         """Work out a port anew: something of it was written from Python."""
         self._calls_of_c.fabric_pins_changed(self.handle, port)
+        self.check()
+
+    def configure_pin(self, pin: int, mode: int, output_bit: bool) -> None:
+        """Give a pin a mode, by its index in `PinMode`, and a bit of ODR."""
+        self._calls_of_c.fabric_configure_pin(self.handle, pin, mode, output_bit)
         self.check()
 
     def offer(self, pin: int, source: int, level: int) -> None:
@@ -608,7 +632,7 @@ class Fabric(Stateful):
             _PLAIN(self._guarded(lambda _user: chip.signal("event"), None)),
         )
         at = [ctypes.cast(call, ctypes.c_void_p) for call in calls]
-        self.use_host(Host(None, at[0], None, *at[1:], None, None, None), *calls)
+        self.use_host(Host(None, at[0], None, *at[1:], None, None, None, None), *calls)
 
 
 def _masks(values: Iterable[int]) -> "ctypes.Array[ctypes.c_uint32]":

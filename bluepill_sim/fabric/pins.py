@@ -298,9 +298,8 @@ class Pin:
         return self._bank.holders.get(self.name)
 
     def configure(self, mode: PinMode, output_bit: bool) -> None:
-        """Set mode and ODR bit (called by GPIO)."""
-        self._struct.modes[self.number] = _MODES.index(mode)
-        self._change(odr=output_bit, **_BITS_OF_MODE[mode])
+        """Set mode and ODR bit, as GPIO does."""
+        self._bank.fabric.configure_pin(self.index, _MODES.index(mode), output_bit)
 
     def hold(self, owner: str, drive: PinDrive = PinDrive.NONE) -> None:
         """Take the pin from GPIO for a fixed function, such as the debug port."""
@@ -407,8 +406,6 @@ class PinBank(Stateful):
         self.remaps: dict[str, int] = {}
         #: Called with each pin that the outside lets go.
         self.release_listeners: list[Callable[[Pin], None]] = []
-        #: Returns which bits of a register's word the running store means, and where it stands.
-        self.written_by: Callable[[int], tuple[int, int]] = lambda _address: (0, 0)
         #: Whether a pin gets characters from a serial port, not levels.
         self.is_serial_input: Callable[[Pin], bool] = lambda _pin: False
         #: The port that feeds each EXTI line 0 to 15 (AFIO_EXTICR); the list stays the same for ever.
@@ -541,18 +538,6 @@ _LATER = tuple(
     [list(PinDrive).index(drive) for drive in pair]
     for pair in ((PinDrive.LOW, PinDrive.HIGH), (PinDrive.PULL_DOWN, PinDrive.PULL_UP))
 )
-_OUTPUTS = {PinMode.PUSH_PULL, PinMode.OPEN_DRAIN}
-#: The bits of a port's masks by mode.
-_BITS_OF_MODE = {
-    mode: {
-        "output": mode in _OUTPUTS,
-        "alternate": mode in ALTERNATE_MODES,
-        "open_drain": mode in {PinMode.OPEN_DRAIN, PinMode.ALTERNATE_OPEN_DRAIN},
-        "pulled": mode is PinMode.PULLED,
-        "analog": mode is PinMode.ANALOG,
-    }
-    for mode in PinMode
-}
 
 
 def _first(one: bool, then: PinDrive, other: bool, otherwise: PinDrive) -> PinDrive:

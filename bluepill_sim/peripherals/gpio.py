@@ -2,12 +2,12 @@
 
 Modelled: all modes of CRL/CRH, pulls by ODR, open drain, atomic set/reset,
 the key sequence of LCKR. Not modelled: output speed, the two APB2 clocks of
-the input synchroniser. What reading IDR and writing ODR, BSRR or BRR does is `extension/source/devices/gpio.c`.
+the input synchroniser. What its registers do, but for the lock, is `extension/source/devices/gpio.c`.
 
 A pin that the program configures as a floating input is checked a little
 later: it should be driven by then. What a program never configures floats
 unnoticed, as does what it configures by writing the reset value over a whole
-register: nothing shows whether that pin was intended.
+register: nothing shows whether that pin was intended (`core/forced_bits.py`).
 
 Source: RM0008 sections 9.1 and 9.2.
 Invariant: bit n of IDR reads as `pins[n].input`.
@@ -16,6 +16,7 @@ Invariant: bit n of IDR reads as `pins[n].input`.
 from collections.abc import Iterable
 
 from bluepill_sim.extension.layout import GPIO
+from bluepill_sim.fabric.fabric import OWN_COMMANDS
 from bluepill_sim.fabric.pins import Pin, PinMode, floating_inputs
 from bluepill_sim.fabric.ports import ChipPorts
 from bluepill_sim.fabric.registers import NATIVE, Peripheral, Place, Register, bits, numbered
@@ -26,19 +27,8 @@ _PORT = bits((15, 0))
 _LCKK = 1 << 16
 #: CNF = 01, MODE = 00 for each pin: floating input.
 _CR_RESET = 0x4444_4444
-#: CNF[1:0] MODE[1:0] of a pin after reset.
-_FLOATING_NIBBLE = 0x4
-
-#: chosen: how long after its configuration a wire may still come, and SWJ_CFG release a pin.
-SETTLING_NS = 1_000_000
-
-_INPUT_MODES = (PinMode.ANALOG, PinMode.FLOATING, PinMode.PULLED, PinMode.FLOATING)
-_OUTPUT_MODES = (PinMode.PUSH_PULL, PinMode.OPEN_DRAIN, PinMode.ALTERNATE_PUSH_PULL, PinMode.ALTERNATE_OPEN_DRAIN)
-#: Mode by CNF[1:0] MODE[1:0] (RM0008 table 20); CNF = 11, MODE = 00 is reserved and taken as floating.
-PIN_MODES = tuple((_OUTPUT_MODES if nibble & 3 else _INPUT_MODES)[nibble >> 2] for nibble in range(16))
-#: Modes that want nothing of a pin; a system that saves power makes every pin analog.
-_IDLE_MODES = (PinMode.ANALOG, PinMode.FLOATING)
-
+#: A command of the device in C: pins are looked at a little later (gpio.c).
+_CHECK = OWN_COMMANDS
 
 #: From the left.
 _DOWN = range(15, -1, -1)
@@ -55,10 +45,10 @@ class Gpio(Peripheral):
     """One general-purpose I/O port; the last letter of its name is the port's."""
 
     KIND, HOLDS = "gpio", GPIO
-    STATE = ("_lock_writes", "_locked", "_intended", "_claimed", "_warned", "_told")
+    STATE = ("_lock_writes",)
     REGISTERS = (
-        Register(name="CRL", offset=0x00, reset=_CR_RESET, on_write="_write_crl", fields=_modes(range(7, -1, -1))),
-        Register(name="CRH", offset=0x04, reset=_CR_RESET, on_write="_write_crh", fields=_modes(range(15, 7, -1))),
+        Register(name="CRL", offset=0x00, reset=_CR_RESET, on_write=NATIVE, fields=_modes(range(7, -1, -1))),
+        Register(name="CRH", offset=0x04, reset=_CR_RESET, on_write=NATIVE, fields=_modes(range(15, 7, -1))),
         Register(name="IDR", offset=0x08, readable=_PORT, writable=0, on_read=NATIVE, fields=numbered("IDRn", _DOWN)),
         Register(
             name="ODR", offset=0x0C, readable=_PORT, writable=_PORT, on_write=NATIVE, fields=numbered("ODRn", _DOWN)
@@ -81,91 +71,52 @@ class Gpio(Peripheral):
         self._pins = chip.pins.port(place.name[-1])
         #: The last three writes to LCKR.
         self._lock_writes: tuple[int, ...] = ()
-        #: Pins whose configuration is frozen until reset.
-        self._locked = 0
-        #: Pins that the program has made floating inputs on purpose, and where: (number, address of the store).
-        self._intended: tuple[tuple[int, int], ...] = ()
-        #: Pins that the program has configured while they belong to another, and where.
-        self._claimed: tuple[tuple[int, int], ...] = ()
-        #: Pins that were warned of as floating.
-        self._warned = 0
-        #: Pins that were warned of as another's.
-        self._told = 0
         chip.pins.release_listeners.append(self._released)
-        self.native.port = chip.pins.PORTS.index(place.name[-1])
+        self.native.port, self.native.base = chip.pins.PORTS.index(place.name[-1]), place.base
 
     def on_reset(self) -> None:
-        """Make every pin a floating input and undo the lock."""
+        """Undo the lock."""
         self._lock_writes = ()
-        self._locked = 0
-        self._intended = self._claimed = ()
-        for pin in self._pins:
-            pin.configure(PinMode.FLOATING, output_bit=False)
 
-    def _write_crl(self, _written: int, previous: int) -> None:
-        self._configure(CRL, 0, previous)
-
-    def _write_crh(self, _written: int, previous: int) -> None:
-        self._configure(CRH, 8, previous)
-
-    def _configure(self, register: int, first: int, previous: int) -> None:
-        """Bring the eight pins from `first` on into the modes that `register` now asks for."""
-        changed = self.words[register] ^ previous
-        forced, pc = self.chip.pins.written_by(self.base + 4 * register)
-        for position in range(8):
-            nibble_mask = 0xF << (4 * position)
-            number = first + position
-            nibble = self.words[register] >> (4 * position) & 0xF
-            if (changed | forced) & nibble_mask:
-                self._note_intent(number, pc, is_floating=nibble == _FLOATING_NIBBLE)
-            if not changed & nibble_mask:
-                continue
-            if self._locked >> number & 1:
-                self.words[register] ^= changed & nibble_mask
-                self.chip.warn(f"P{self.name[-1]}{number}: configured while locked: ignored", once=f"{self.name}:lock")
-                continue
-            pin = self._pins[number]
-            self._claimed = tuple(pair for pair in self._claimed if pair[0] != number)
-            if pin.holder is not None and PIN_MODES[nibble] not in _IDLE_MODES:
-                self._claimed = (*self._claimed, (number, pc))
-                self._check_later()
-            pin.configure(PIN_MODES[nibble], bool(self.words[ODR] >> number & 1))
-
-    def _note_intent(self, number: int, pc: int, *, is_floating: bool) -> None:
-        """Note whether a pin is intended as a floating input."""
-        others = tuple(pair for pair in self._intended if pair[0] != number)
-        if is_floating and not self._locked >> number & 1:
-            self._intended = (*others, (number, pc))
-            self._check_later()
-        else:
-            self._intended = others
+    def answer(self, what: int, value: int) -> int:
+        """Warn of a locked pin that was configured."""
+        del what  # it asks nothing else
+        self.chip.warn(f"P{self.name[-1]}{value}: configured while locked: ignored", once=f"{self.name}:lock")
+        return 0
 
     def _released(self, pin: Pin) -> None:
         """Check again an input that is no longer driven."""
-        if pin.port == self.name[-1] and any(number == pin.number for number, _ in self._intended):
-            self._check_later()
-
-    def _check_later(self) -> None:
-        self.due_ns = self.chip.now_ns + SETTLING_NS
+        if pin.port == self.name[-1] and self.native.intended >> pin.number & 1:
+            self.command(_CHECK)
 
     def advance_to(self, now_ns: int) -> None:
         """Warn of the pins that belong to another still, and of the intended inputs that float."""
         if self.due_ns is None or now_ns < self.due_ns:
             return
         self.due_ns = None
-        held = [(self._pins[n], pc) for n, pc in sorted(self._claimed) if not self._told >> n & 1]
-        held = [(pin, pc) for pin, pc in held if pin.holder is not None]
+        native = self.native
+        held = [
+            (pin, native.claimed_pc[pin.number])
+            for pin in self._of(native.claimed & ~native.told)
+            if pin.holder is not None
+        ]
         if held:
-            self._told |= sum(1 << pin.number for pin, _ in held)
+            native.told |= sum(1 << pin.number for pin, _ in held)
             names = [pin.name for pin, _ in held]
             self.chip.warn(_held_pins([pin for pin, _ in held]), once=f"{' '.join(names)}:held", pc=held[0][1])
-        self._claimed = ()
-        floating = [(self._pins[n], pc) for n, pc in sorted(self._intended) if not self._warned >> n & 1]
-        floating = [(p, pc) for p, pc in floating if _is_lost(p) and not self.chip.pins.is_serial_input(p)]
+        native.claimed = 0
+        floating = [
+            (pin, native.intended_pc[pin.number])
+            for pin in self._of(native.intended & ~native.warned)
+            if _is_lost(pin) and not self.chip.pins.is_serial_input(pin)
+        ]
         if floating:
-            self._warned |= sum(1 << pin.number for pin, _ in floating)
+            native.warned |= sum(1 << pin.number for pin, _ in floating)
             names = [pin.name for pin, _ in floating]
             self.chip.warn(floating_inputs(names), once=f"floating:{' '.join(names)}", pc=floating[0][1])
+
+    def _of(self, mask: int) -> list[Pin]:
+        return [pin for pin in self._pins if mask >> pin.number & 1]
 
     def _write_lckr(self, written: int, _previous: int) -> None:
         if not self.words[LCKR] & _LCKK:
@@ -178,7 +129,7 @@ class Gpio(Peripheral):
         pins = word & _PORT
         # The same pins three times, with LCKK = 1, 0, 1 (RM0008 9.2.7).
         if self._lock_writes == (_LCKK | pins, pins, _LCKK | pins) and not word & _LCKK:
-            self._locked = pins
+            self.native.locked = pins
             self.words[LCKR] |= _LCKK
         return word
 

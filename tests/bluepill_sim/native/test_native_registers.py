@@ -57,6 +57,26 @@ str r1, [r0, #28]
 b again"""
 
 
+#: PA0 and PA1 become outputs and analog inputs in turn: bics r2, r3; orrs r2, r4.
+MODES = f"""mov32 r0, #{RCC}
+movs r1, #4
+str r1, [r0, #24]
+mov32 r0, #{BASES["GPIOA"]}
+movs r3, #255
+again: movs r4, #0x22
+ldr r2, [r0, #0]
+.half 0x439A
+.half 0x4322
+str r2, [r0, #0]
+movs r4, #0
+ldr r2, [r0, #0]
+.half 0x439A
+.half 0x4322
+str r2, [r0, #0]
+adds r7, #1
+b again"""
+
+
 def asked(board: BluePill) -> "Counter[tuple[str, int]]":
     """Count from now on what the native core asks Python: ("read" or "write", address)."""
     found: Counter[tuple[str, int]] = Counter()
@@ -99,6 +119,22 @@ def test_clock_gates_and_resets_of_devices_in_c_are_not_pythons(watchdog: None) 
     assert board.register("R7") > 100
     assert (board.register("R6"), board.register("R5")) in {(0, 0), (0, 17), (0, 0xFFFF)}
     assert not found
+
+
+def test_pins_that_change_their_modes_ask_python_only_at_first(watchdog: None) -> None:
+    board = Machine(MODES, {}).board
+    board.run_for("20 us")
+    found = asked(board)
+    forced, count = board.chip.fabric.forced, [0]
+
+    def counted(address: int) -> tuple[int, dict[int, int]]:
+        count[0] += 1
+        return forced(address)
+
+    board.chip.fabric.forced = counted
+    board.run_for("1 ms")
+    assert board.register("R7") > 100
+    assert (found, count) == (Counter(), [0])
 
 
 @pytest.mark.parametrize("core", ["native", "python"])

@@ -5,7 +5,9 @@ from typing import Any
 import pytest
 
 from bluepill_sim.fabric.pins import PinDrive, PinMode
-from bluepill_sim.peripherals.gpio import SETTLING_NS
+
+#: So long after its configuration a wire may still come.
+SETTLING_NS = 1_000_000
 
 SWJ_NOJTAG, SWJ_OFF = 0b010 << 24, 0b100 << 24
 DEBUG_PINS = ("PA13", "PA14", "PA15", "PB3", "PB4")

@@ -107,6 +107,14 @@ WRITES = [
      ["PA6"]),  # bics r2, r3; orrs r2, r4
     ("mov32 r3, #0x0F000000\nldr r2, [r1, #0]\n.half 0x439A\nstr r2, [r1, #0]", []),  # to analog
     (TWICE + "\nmov32 r2, #0x44484444\nstr r2, [r1, #0]", []),  # floating for a moment
+    # One store for PA0 to PA2 again and again: lsls r3, r5; bics r2, r3; lsls r4, r5; orrs r2, r4
+    (("movs r6, #0\nagain: movs r5, #0\nnext: movs r3, #15\nmovs r4, #4\nldr r2, [r1, #0]\n.half 0x40AB\n"
+     ".half 0x439A\n.half 0x40AC\n.half 0x4322\nstr r2, [r1, #0]\nadds r5, #4\ncmp r5, #12\nbne next\n"
+     "adds r6, #1\ncmp r6, #4\nbne again"), ["PA0, PA1, PA2"]),
+    # The same of PA0 and PA3, with the place in a word of SRAM, which no register has at the end.
+    (("mov32 r7, #0x20000200\nmovs r5, #0\nnext: str r5, [r7, #0]\nb over\nover: ldr r0, [r7, #0]\nmovs r3, #15\n"
+     "movs r4, #4\nldr r2, [r1, #0]\n.half 0x4083\n.half 0x439A\n.half 0x4084\n.half 0x4322\nmovs r0, #0\n"
+     "movs r3, #0\nmovs r4, #0\nstr r2, [r1, #0]\nadds r5, #12\ncmp r5, #24\nbne next"), ["PA0, PA3"]),
 ]  # fmt: skip
 
 

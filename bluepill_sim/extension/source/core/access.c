@@ -46,7 +46,7 @@ void core_on_note(void *unicorn, uint64_t address, uint32_t size, void *user)
     ((struct core *)user)->noted = (uint32_t)address;
 }
 
-static int general(uint8_t number)
+int general(uint8_t number)
 {
     return number < 13 ? REG_R0 + number : number == 13 ? REG_SP : number == 14 ? REG_LR : REG_PC;
 }

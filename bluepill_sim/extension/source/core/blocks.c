@@ -261,6 +261,7 @@ void core_forget_rows(struct core *core)
 {
     memset(core->flash_rows, 0, sizeof core->flash_rows);
     memset(core->sram_rows, 0, sizeof core->sram_rows);
+    memset(core->forced, 0, sizeof core->forced);
     core->other_row = NULL;
     forget_order(core);
     struct row **end = &core->all;

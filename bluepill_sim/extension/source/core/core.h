@@ -167,6 +167,12 @@ struct waiting {
     uint8_t *memory; /* the SRAM as it was; null: it was not needed yet */
 };
 
+/* What a store forces in a register, as Python has found it: it holds while the words that it hangs on are the same. */
+enum { FORCED_SETS = 16, FORCED_WAYS = 8 };
+struct forced {
+    uint32_t pc, start, address, bits, seen[SEEN_WORDS];
+};
+
 /* Where in SRAM code was translated from, in places of some bytes; never fewer than there are. */
 enum { CODE_BYTES = 32, CODE_PLACES = 2 * SRAM_SLOTS / CODE_BYTES };
 
@@ -206,6 +212,8 @@ struct core {
     struct waiting waiting;
     uint64_t limit; /* of the run */
     uint8_t code_places[CODE_PLACES / 8];
+    struct forced forced[FORCED_SETS][FORCED_WAYS]; /* by the place of the store; `pc` is 0 of one that is free */
+    uint8_t forced_next[FORCED_SETS];
     struct fault_row faults[HALT_NONE]; /* by kind of halt */
 };
 
@@ -229,7 +237,10 @@ void look_later(struct core *core);
 bool looks_for_waiting(struct core *core, uint32_t address);
 void wait_on(struct core *core, const struct row *row, uint64_t rounds);
 uint64_t rounds_of_counter(struct core *core, const struct row *row);
+/* forced.c */
+uint32_t core_forced(void *user, uint32_t address);
 /* access.c */
+int general(uint8_t number);
 void go_on_at_access(struct core *core, uint32_t pc);
 bool is_privileged(struct core *core);
 bool resolve(struct core *core, uint32_t address, bool is_write, uint32_t bytes);

@@ -117,7 +117,7 @@ void core_join(struct core *core, struct fabric *fabric)
     fabric->host = (struct host){.user = core, .cycle = cycle, .boundary = &core->shared.cycle, .set_irq = set_irq,
                                  .end_slice = end_slice, .due = due, .pc = pc, .signal = signal,
                                  .registers = registers, .holds_code = holds_code,
-                                 .asleep_until = asleep_until};
+                                 .asleep_until = asleep_until, .forced = core_forced};
     add_counter(fabric, DWT_CYCCNT, &core->shared.cyccnt, NULL);
     add_counter(fabric, STK_VAL, &core->shared.tick, NULL);
 }

@@ -440,15 +440,20 @@ static bool is_led(const struct device *device, bool is_injected)
     return mode & (is_injected ? WITH_INJECTED | ALTERNATE : WITH_REGULAR | FAST | SLOW);
 }
 
+/* The inputs that a word of CR2 chooses and enables, one of each group at most. */
+static uint32_t chosen(uint32_t control)
+{
+    const uint32_t regular = control >> EXTSEL_AT & 7, injected = control >> JEXTSEL_AT & 7;
+    return (control & EXTTRIG && regular < TRIGGERS ? 1u << regular : 0) |
+           (control & JEXTTRIG && injected < TRIGGERS ? 1u << (TRIGGERS + injected) : 0);
+}
+
 /* Whether the trigger of an input is chosen and enabled. */
 static bool hears(const struct device *device, uint32_t input)
 {
     const struct adc *adc = device->state;
-    const bool is_injected = input >= TRIGGERS;
-    const uint32_t which = input % TRIGGERS, control = device->words[CR2];
-    const uint32_t selected = control >> (is_injected ? JEXTSEL_AT : EXTSEL_AT) & 7;
-    const bool is_other = which == BY_EXTI && adc->remapped >> is_injected & 1; /* TIM8's, which is not there */
-    return control & (is_injected ? JEXTTRIG : EXTTRIG) && selected == which && !is_other;
+    const bool is_other = input % TRIGGERS == BY_EXTI && adc->remapped >> (input / TRIGGERS) & 1; /* TIM8's, which is not there */
+    return chosen(device->words[CR2]) >> input & 1 && !is_other;
 }
 
 static void line(struct device *device, uint32_t input, bool level)
@@ -557,7 +562,7 @@ static void write(struct device *device, uint32_t index, uint32_t written, uint3
     }
     update_irq(device);
     reschedule(device);
-    if (index == CR2 && stored != previous) {
+    if (index == CR2 && chosen(stored) != chosen(previous)) {
         hearing_changed(device);
     }
 }

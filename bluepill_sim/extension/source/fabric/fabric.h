@@ -58,6 +58,8 @@ struct host {
     bool (*holds_code)(void *user, uint32_t address, uint32_t bytes);
     /* Up to which cycle the core looks at nothing, unless an event wakes it; null or 0: it is awake. */
     uint64_t (*asleep_until)(void *user);
+    /* What `fabric_calls.forced` returns, of which something may be known; null: ask that. */
+    uint32_t (*forced)(void *user, uint32_t address);
 };
 
 /* What Python is asked: each keeps an exception for later. */
@@ -74,7 +76,13 @@ struct fabric_calls {
     uint64_t (*bus)(uint32_t is_write, uint32_t address, uint32_t bytes, uint32_t word);
     /* A bus master has written where code may have been translated from. */
     void (*code_written)(uint32_t address, uint32_t bytes);
+    /* Which bits of the register at an address the running store sets whatever was there. `seen` gets what that hangs on
+     * beside the code: the count, and pairs of a register's number, or the address of a word of SRAM, and its value. */
+    uint32_t (*forced)(uint32_t address, uint32_t *seen);
 };
+
+/* Room for `seen`; a count above MOST_SEEN: that is not all. */
+enum { MOST_SEEN = 8, SEEN_WORDS = 1 + 2 * MOST_SEEN };
 
 /* A kind of device: what it does. A null is nothing. */
 struct device_kind {
@@ -285,6 +293,13 @@ bool is_heard(const struct device *device, uint32_t output);
 void hearing_changed(struct device *device);
 void output_set(struct device *device, uint32_t output, bool level);
 
+static inline uint32_t forced_bits(const struct fabric *fabric, uint32_t address)
+{
+    uint32_t seen[SEEN_WORDS];
+    return fabric->host.forced != NULL ? fabric->host.forced(fabric->host.user, address)
+                                       : fabric->calls.forced(address, seen);
+}
+
 static inline uint32_t ask(struct device *device, uint32_t what, uint32_t value)
 {
     return device->fabric->calls.ask(device->slot, what, value);
@@ -306,6 +321,10 @@ void hand_on_pins(struct device *device, uint32_t port, uint32_t changed);
 uint32_t obey_listen(struct device *device, uint32_t what, uint32_t one, uint32_t other);
 
 /* pins.c */
+/* Indices of `PinMode`. */
+enum pin_mode { PIN_ANALOG, PIN_FLOATING, PIN_PULLED, PIN_PUSH_PULL, PIN_OPEN_DRAIN, PIN_ALTERNATE, PIN_ALTERNATE_OPEN_DRAIN };
+/* Gives a pin what GPIO has configured: its mode, and its bit of ODR. */
+void configure_pin(struct fabric *fabric, uint32_t pin, uint32_t mode, bool is_high);
 void offer(struct fabric *fabric, uint32_t pin, uint32_t source, uint32_t level);
 void put_row(struct fabric *fabric, struct subscriber *subscriber, const struct edge *row);
 void pins_changed(struct fabric *fabric, uint32_t port);

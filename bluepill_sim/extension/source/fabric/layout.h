@@ -330,11 +330,19 @@ struct adc {
 };
 _Static_assert(sizeof(struct adc) == 136, "adc");
 
-/* Which port a GPIO is. */
+/* Which port a GPIO is, and what is known of its pins, a bit each. RM0008 9.2. */
 struct gpio {
     uint32_t port;
+    uint32_t base; /* the address of its registers */
+    uint32_t locked; /* configuration frozen until reset */
+    uint32_t intended; /* made floating inputs on purpose, and where */
+    uint32_t claimed; /* configured while they belong to another, and where */
+    uint32_t warned;
+    uint32_t told;
+    uint32_t intended_pc[16];
+    uint32_t claimed_pc[16];
 };
-_Static_assert(sizeof(struct gpio) == 4, "gpio");
+_Static_assert(sizeof(struct gpio) == 156, "gpio");
 
 /* What RCC tells Python of. */
 struct rcc {

@@ -148,6 +148,27 @@ void pins_changed(struct fabric *fabric, uint32_t number)
 
 void fabric_pins_changed(struct fabric *fabric, uint32_t number) { pins_changed(fabric, number); }
 
+static void put_bit(uint32_t *word, uint32_t bit, bool is_set) { *word = is_set ? *word | bit : *word & ~bit; }
+
+void configure_pin(struct fabric *fabric, uint32_t pin, uint32_t mode, bool is_high)
+{
+    struct port *port = &fabric->ports[pin / PINS];
+    const uint32_t bit = 1u << pin % PINS;
+    port->modes[pin % PINS] = (uint8_t)mode;
+    put_bit(&port->odr, bit, is_high);
+    put_bit(&port->output, bit, mode == PIN_PUSH_PULL || mode == PIN_OPEN_DRAIN);
+    put_bit(&port->alternate, bit, mode == PIN_ALTERNATE || mode == PIN_ALTERNATE_OPEN_DRAIN);
+    put_bit(&port->open_drain, bit, mode == PIN_OPEN_DRAIN || mode == PIN_ALTERNATE_OPEN_DRAIN);
+    put_bit(&port->pulled, bit, mode == PIN_PULLED);
+    put_bit(&port->analog, bit, mode == PIN_ANALOG);
+    pins_changed(fabric, pin / PINS);
+}
+
+void fabric_configure_pin(struct fabric *fabric, uint32_t pin, uint32_t mode, bool is_high)
+{
+    configure_pin(fabric, pin, mode, is_high);
+}
+
 void take_offer(struct fabric *fabric, uint32_t pin, uint32_t source, uint32_t level)
 {
     struct port *port = &fabric->ports[pin / PINS];
