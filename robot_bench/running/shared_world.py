@@ -16,7 +16,7 @@ Invariant: what happens depends on the order of the robots alone, not on how oft
 from collections.abc import Sequence
 from typing import Protocol
 
-from p2os.pioneer.body.contract import RobotBody, RobotScene, WheelAngles
+from p2os.pioneer.body.contract import RobotBody, RobotScene, Wheels
 from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.sonar.cross_talk import PingTable
 from robot_bench.running.loop import RunLoop
@@ -31,7 +31,7 @@ class Driven(Protocol):
         """Return the rim-speed set-points of the body's next step, m/s."""
         ...
 
-    def take_step(self, wheels: WheelAngles) -> None:
+    def take_step(self, wheels: Wheels) -> None:
         """Take the wheels' angles after a step that was made with `next_setpoints`."""
         ...
 
