@@ -93,31 +93,36 @@ def events_and_goals(folder: Path, body: str) -> None:
     row(f"events and goals of dodge, {body}", f"{statistics.median(shares):+.1f} %", f"goal 3 % at most; of {RUNS}")
 
 
+def booted(wanted: Scenario) -> Bench:
+    """Return a bench whose firmware has booted."""
+    bench = Bench(wanted)
+    bench.expect(BOOTED)
+    return bench
+
+
 def copies(body: str) -> None:
     """What it takes to fork a bench, to pickle it, and to begin anew from a snapshot of its boot."""
     wanted = scenario(body)
-    built, forked, saved, loaded, begun = [], [], [], [], []
-    Bench(wanted).expect(BOOTED)  # imports
+    booted(wanted)  # imports
+    data = b""
+    took: dict[str, list[float]] = {"booted": [], "fork": [], "pickle": [], "unpickle": [], "restarted": []}
     for _ in range(COPIES):
-        made: list[Bench] = []
-        built.append(cpu_s(lambda: made.append(Bench(wanted)) or made[0].expect(BOOTED)))  # noqa: B023 - called at once
-        bench = made[0]
+        took["booted"].append(cpu_s(lambda: booted(wanted)))
+        bench = booted(wanted)
         snapshot = bench.snapshot()
         bench.run_until("2 s")
-        forked.append(cpu_s(bench.fork))
-        data = [b""]
-        saved.append(cpu_s(lambda: data.append(pickle.dumps(bench))))  # noqa: B023 - called at once
-        loaded.append(cpu_s(lambda: pickle.loads(data[-1])))  # noqa: B023,S301 - called at once; our own
-        begun.append(cpu_s(lambda: bench.restart(snapshot)))  # noqa: B023 - called at once
-    times = {"fork": forked, "pickle": saved, "unpickle": loaded}
-    for name, found in times.items():
-        note = f"{len(data[-1]) / 1024:.0f} kB, its trace of 2 s in it" if name == "pickle" else ""
-        row(f"a bench of dodge after 2 s, {body}: {name}", f"{1e3 * statistics.median(found):.1f} ms", note)
-    boot, anew = statistics.median(built), statistics.median(begun)
-    row(f"dodge until it is booted, {body}: built and run", f"{1e3 * boot:.1f} ms")
-    row(
-        f"dodge until it is booted, {body}: from a snapshot", f"{1e3 * anew:.1f} ms", f"{boot / anew:.1f} times as fast"
-    )
+        data = pickle.dumps(bench)
+        took["fork"].append(cpu_s(bench.fork))
+        took["pickle"].append(cpu_s(lambda: pickle.dumps(bench)))  # noqa: B023 - called at once
+        took["unpickle"].append(cpu_s(lambda: pickle.loads(data)))  # noqa: B023,S301 - called at once; our own
+        took["restarted"].append(cpu_s(lambda: bench.restart(snapshot)))  # noqa: B023 - called at once
+    ms = {name: 1e3 * statistics.median(found) for name, found in took.items()}
+    for name in ("fork", "pickle", "unpickle"):
+        note = f"{len(data) / 1024:.0f} kB, its trace in it" if name == "pickle" else ""
+        row(f"dodge after 2 s, {body}: {name}", f"{ms[name]:.1f} ms", note)
+    row(f"dodge, {body}: built and run until it is booted", f"{ms['booted']:.1f} ms")
+    factor = f"{ms['booted'] / ms['restarted']:.1f} times as fast"
+    row(f"dodge, {body}: begun anew from a snapshot of that", f"{ms['restarted']:.1f} ms", factor)
 
 
 def long_run(folder: Path) -> None:
