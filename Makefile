@@ -60,6 +60,7 @@ bench: setup
 	$(BIN)/python tools/bench/pioneer.py
 	$(BIN)/python tools/bench/speed.py
 	$(BIN)/python tools/bench/shares.py
+	$(BIN)/python tools/bench/costs.py
 	$(BIN)/python tools/bench/devices.py
 
 soak: setup mutation-tools

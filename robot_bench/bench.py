@@ -445,15 +445,6 @@ class Bench(Stateful):
         if self.chip.has_died and not had_died:
             _LOG.error("chip: %s", self.chip.verdict)
 
-    def on_step_of_all(self, listener: Callable[[Nanos], None]) -> None:
-        """Have the time told after each step of all robots of its world; the listener may raise to end the run."""
-        if self._shared is not None:
-            self._shared.on_step = listener
-
-    def run_own_loop(self, end: Nanos) -> None:
-        """Run this robot alone, as `SharedWorld` asks for it."""
-        self.loop.run_until(end)
-
     def _limit(self, within: Span | None, since: Nanos) -> Nanos:
         return self.end if within is None else since + to_nanos(within)
 
@@ -960,6 +951,8 @@ class Bench(Stateful):
                 incoming=to_robot,
                 outgoing=to_client,
                 on_arrival=lambda data, at: recorder.wire("c2r", data, at),
+                # Among others it measures where all of them are then: none of its pings may come late.
+                next_due=controller.next_due if self._shared and isinstance(controller, Pioneer) else None,
             )
         )
         return adapter, controller

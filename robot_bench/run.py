@@ -441,8 +441,7 @@ def run_together(
         length = slice_ns or (PACED_SLICE_NS if pacer else UNPACED_SLICE_NS)
         benches = Bench.together(scenario, traces=traces, slice_ns=length)
         first = next(iter(benches.values()))
-
-        first.on_step_of_all(_after_slice(first, pacer, on_progress))
+        first.on_slice = _after_slice(first, pacer, on_progress)
         for name, bench in benches.items():
             traces[name].meta(meta_of(bench.scenario, bench.parts.world, bench.note, is_at_port=False))
         driven = _drive(first, pacer, clock, None)

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 from adapter_sim.codec import BitOrder
 from adapter_sim.settings import MotorCommand
-from p2os.pioneer.body.contract import BodyState, RobotBody, WheelAngles
+from p2os.pioneer.body.contract import RobotBody, Wheels
 from robot_bench.direct.distance import DistanceSensors
 from robot_bench.direct.encoder import WheelEncoder
 from robot_bench.direct.motor import JointMotor
@@ -60,7 +60,8 @@ class DirectRobot(Stateful):
     """A body whose motors and sensors hang on wires."""
 
     STATE = ("body", "sensors", "_left", "_right", "_next_encoder", "_steps", "_asked", "_stalled")
-    DERIVED = ("_next_change",)
+    #: The wheels are those of the body's state.
+    DERIVED = ("_next_change", "_wheels")
 
     def __init__(
         self,
@@ -85,6 +86,8 @@ class DirectRobot(Stateful):
         self._steps = 0
         self._asked = (0, 0)
         self._stalled = (False, False)
+        #: After the last step; the body's whole state is worked out only for who asks for it.
+        self._wheels: Wheels = body.state
         #: Takes a line of the state log: (ns, what, detail).
         self.on_event: Callable[[Nanos, str, str], None] | None = None
 
@@ -113,9 +116,9 @@ class DirectRobot(Stateful):
         most_radps = self.body.most_radps(fastest)
         if most_radps is None:
             return self._next_encoder
-        state = self.body.state
+        wheels = self._wheels
         turn_rad = min(
-            self._left_encoder.margin_rad(state.left_angle_rad), self._right_encoder.margin_rad(state.right_angle_rad)
+            self._left_encoder.margin_rad(wheels.left_angle_rad), self._right_encoder.margin_rad(wheels.right_angle_rad)
         )
         safe_until = self._steps * self.body.dt_ns + int(turn_rad / most_radps * NS_PER_S)
         missed = max(0, -((self._next_encoder - safe_until) // self._encoder_period_ns))
@@ -129,7 +132,9 @@ class DirectRobot(Stateful):
             alike = wanted - self._steps if left.is_steady and right.is_steady else 1
             stood = body.stand_still(alike) if speeds == (0.0, 0.0) else 0
             for _ in range(alike - stood):
-                body.step(*speeds)
+                self._wheels = body.step(*speeds)
+            if stood:
+                self._wheels = body.state
             self._steps += alike
 
     def next_setpoints(self) -> tuple[float, float]:
@@ -142,16 +147,17 @@ class DirectRobot(Stateful):
             self._tell(start, "command", f"motors {left.asked}, {right.asked}")
         return speeds
 
-    def take_step(self, wheels: WheelAngles) -> None:  # noqa: ARG002  # the state has them
-        """Count a step that was made with `next_setpoints`."""
+    def take_step(self, wheels: Wheels) -> None:
+        """Take the wheels after a step that was made with `next_setpoints`."""
         self._steps += 1
+        self._wheels = wheels
 
     def _show_encoders(self, now: Nanos) -> None:
-        state: BodyState = self.body.state
-        self._left_encoder.show(state.left_angle_rad, now)
-        self._right_encoder.show(state.right_angle_rad, now)
+        wheels = self._wheels
+        self._left_encoder.show(wheels.left_angle_rad, now)
+        self._right_encoder.show(wheels.right_angle_rad, now)
         self._next_encoder = now + self._encoder_period_ns
-        stalled = (state.stalled_left, state.stalled_right)
+        stalled = (wheels.stalled_left, wheels.stalled_right)
         if stalled != self._stalled:
             self._stalled = stalled
             self._tell(now, *STALLS[stalled])
@@ -160,6 +166,7 @@ class DirectRobot(Stateful):
         self._left_encoder.forget()
         self._right_encoder.forget()
         self._next_change = self._next_encoder
+        self._wheels = self.body.state
 
     def _tell(self, at: Nanos, what: str, detail: str) -> None:
         if self.on_event is not None:

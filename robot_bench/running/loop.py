@@ -79,7 +79,7 @@ class RunLoop(Stateful):
 
     STATE = ("now", "_edges", "_is_inside_block", "_rounds")
     #: Each `run_until` sets them anew.
-    DERIVED = ("_end", "_wanted_end", "_advance", "_deadlines", "_is_halted")
+    DERIVED = ("_end", "_wanted_end", "_advance", "_deadlines", "_is_halted", "_led", "_due")
 
     def __init__(
         self,
@@ -103,6 +103,9 @@ class RunLoop(Stateful):
         self.now: Nanos = 0
         self._end: Nanos = 0
         self._wanted_end: Nanos = 0
+        #: How far the leader has come in this run, and when somebody is due next.
+        self._led: Nanos = 0
+        self._due: Nanos = 0
         self._edges: list[Nanos] = []
         self._rounds = 0
         self._advance: Callable[[int], Reached] = leader.advance_to
@@ -136,26 +139,39 @@ class RunLoop(Stateful):
         Raises:
             StuckError: Two parts make each other due without end.
         """
+        self.begin(end, advance)
+        while (due := self.lead()) is not None:
+            self.follow(due)
+
+    def begin(self, end: Nanos, advance: Callable[[int], Reached] | None = None) -> None:
+        """Begin to run to `end`, as `run_until` does, in steps of the caller's: `lead` and `follow` in turn."""
         self._end = self._wanted_end = end
         self._advance = advance or self.leader.advance_to
         self._is_halted = False
-        led = self.leader.now_ns
+        self._led = self.leader.now_ns
         if self._is_inside_block:
             self._is_inside_block = False
-            led = self._advance(end).now
+            self._led = self._advance(end).now
         self._choose_watched(self.now)
-        due = self._next_due()
+        self._due = self._next_due()
+
+    def lead(self) -> Nanos | None:
+        """Let the leader run until followers are due; return when, or None at the end and at a halt."""
         while not self._is_halted:
-            if due <= led and due <= self._end:
-                self._follow(due)
-                self._choose_watched(self.now)
-                due = self._next_due()
-            elif led >= self._end:
-                return
-            else:
-                led = self._lead(led, min((self._end, *self._deadlines[: self._count])))
-                if self._edges:
-                    due = min(due, self._edges[0])
+            if self._due <= self._led and self._due <= self._end:
+                return self._due
+            if self._led >= self._end:
+                return None
+            self._led = self._lead(self._led, min((self._end, *self._deadlines[: self._count])))
+            if self._edges:
+                self._due = min(self._due, self._edges[0])
+        return None
+
+    def follow(self, due: Nanos) -> None:
+        """Bring those who are due to `due`, which `lead` has returned."""
+        self._follow(due)
+        self._choose_watched(self.now)
+        self._due = self._next_due()
 
     def finish(self, end: Nanos) -> None:
         """Bring the followers to `end` itself, so that their state is that of the end of the run."""

@@ -1,23 +1,25 @@
 """Several robots in one world, each with its own chip, wires and run loop, brought through time together.
 
-Theory of operation. The scene steps all bodies at once. It stands at the boundary T of a step when every loop has run
-to T, with all that is due until then; then each robot gives its set-points, the scene moves all of them to the next
-boundary, and the loops run on to that. So robots meet, push and sense each other where they are at that step. What a
-robot does between two boundaries it does with its body at the later one, as `p2os.pioneer.serve.multi_robot_world` has
-it. Sonar hear each other's pings: where one may fire between two boundaries, all loops stop at that instant, and the
-first robot is the first.
+Theory of operation. Robots meet in the scene alone, which steps all bodies at once. Nobody looks at it, and no
+set-point changes but by what a robot's own wires and ramps say, until a part of some robot is due. So every chip runs
+to the earliest deadline of its own robot in one go, however far the others have come. Then the earliest of all comes:
+the scene makes its steps until there, each with the set-points of its own time, and whoever is due acts; at one
+instant the first robot is the first. What a robot does between two boundaries of steps it does with its body at the
+later one, as `p2os.pioneer.serve.multi_robot_world` has it. Sonar hear each other's pings, so each is a deadline.
 
-A robot on own pins moves a step later than alone: its motors' wires are known over a step when the step is over.
+A robot on own pins is due at each step, and moves a step later than alone: its motors' wires are known over a step
+when the step is over.
 
 Invariant: what happens depends on the order of the robots alone, not on how often or how far `run_to` is called.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Protocol
 
-from p2os.pioneer.body.contract import RobotBody, RobotScene, WheelAngles
+from p2os.pioneer.body.contract import RobotBody, RobotScene, Wheels
 from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.sonar.cross_talk import PingTable
+from robot_bench.running.loop import RunLoop
 from simbase.state import Stateful
 from simbase.timing import Nanos
 
@@ -29,7 +31,7 @@ class Driven(Protocol):
         """Return the rim-speed set-points of the body's next step, m/s."""
         ...
 
-    def take_step(self, wheels: WheelAngles) -> None:
+    def take_step(self, wheels: Wheels) -> None:
         """Take the wheels' angles after a step that was made with `next_setpoints`."""
         ...
 
@@ -42,8 +44,9 @@ class Member(Protocol):
         """When its run ends."""
         ...
 
-    def run_own_loop(self, end: Nanos) -> None:
-        """Run its chip and all parts to a time, and no further than the scene stands."""
+    @property
+    def loop(self) -> RunLoop:
+        """Brings its chip and all its parts forward."""
         ...
 
     def own_snapshot(self) -> object:
@@ -80,7 +83,7 @@ class SharedWorld(Stateful):
 
     STATE = ("scene", "now", "_at", "_pings", "_own")
     #: Who they are is settled when they are built.
-    DERIVED = ("members", "on_step", "_driven", "_pioneers")
+    DERIVED = ("members", "_driven")
 
     def __init__(self, scene: RobotScene, names: Sequence[str]) -> None:
         self.scene = scene
@@ -90,11 +93,8 @@ class SharedWorld(Stateful):
         self.members: dict[str, Member] = {}
         self._own: tuple[_Own, ...] = ()
         self._driven: dict[int, Driven] = {}
-        self._pioneers: list[Pioneer] = []
         self._pings = PingTable(scene.bodies)
-        #: Called before each step of the scene with the time reached; may raise to end the run.
-        self.on_step: Callable[[Nanos], None] | None = None
-        #: The time that all loops have run to, and where the scene stands.
+        #: The time until which all has happened, and where the scene stands.
         self.now: Nanos = 0
         self._at: Nanos = 0
 
@@ -110,7 +110,6 @@ class SharedWorld(Stateful):
         self._driven[number] = driven
         if isinstance(driven, Pioneer):
             driven.hears = self._pings.ears_of(number)
-            self._pioneers.append(driven)
 
     @property
     def end(self) -> Nanos:
@@ -119,24 +118,25 @@ class SharedWorld(Stateful):
 
     def run_to(self, wanted: Nanos) -> None:
         """Bring all to a time, or to the end of the run."""
-        while True:
+        loops = [member.loop for member in self.members.values()]
+        end = min(wanted, self.end)
+        for loop in loops:
+            loop.begin(end)
+        while (at := min((due for loop in loops if (due := loop.lead()) is not None), default=None)) is not None:
+            self._bring_scene(at)
+            for loop in loops:
+                while loop.lead() == at:
+                    loop.follow(at)
             end = min(wanted, self.end)
-            self._run_loops(min(self._at, end))
-            if end <= self._at:
-                return
-            if self.on_step is not None:
-                self.on_step(self.now)
-            self._step()
+            for loop in loops:
+                loop.end_at(end)
+        self._bring_scene(end)
 
-    def _run_loops(self, limit: Nanos) -> None:
-        """Run all loops to a time, together at each instant at which a sonar may fire."""
-        stop: Nanos = -1
-        while stop < limit:
-            dues = (pioneer.next_due() for pioneer in self._pioneers)
-            stop = min((limit, *(due for due in dues if due is not None and due > self.now)))
-            for member in self.members.values():
-                member.run_own_loop(stop)
-            self.now = max(self.now, stop)
+    def _bring_scene(self, limit: Nanos) -> None:
+        """Step the scene to its first boundary at or after a time that nobody is due before."""
+        while self._at < limit:
+            self._step()
+        self.now = max(self.now, limit)
 
     def _step(self) -> None:
         still = (0.0, 0.0)

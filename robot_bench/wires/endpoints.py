@@ -35,6 +35,7 @@ class Endpoint(Stateful):
         incoming: The line whose arrivals it reads.
         outgoing: The line that it writes to.
         on_arrival: Called with each delivery, before the part takes it: (bytes, ns).
+        next_due: Returns when the part is to be brought forward; None asks its `next_deadline`.
     """
 
     STATE = ("part", "_incoming")
@@ -47,13 +48,15 @@ class Endpoint(Stateful):
         incoming: SerialLine,
         outgoing: SerialLine,
         on_arrival: Callable[[bytes, Nanos], None] | None = None,
+        next_due: Callable[[], Nanos | None] | None = None,
     ) -> None:
         self.part = part
+        self._next_due = next_due or part.next_deadline
         self._incoming = incoming
         self._outgoing = outgoing
         self._on_arrival = on_arrival
         #: The part's own deadline, which moves only when it acts or receives.
-        self._own_deadline = part.next_deadline()
+        self._own_deadline = self._next_due()
 
     def next_deadline(self) -> Nanos | None:
         """Return when the part wants to act, or when bytes will have arrived for it."""
@@ -75,8 +78,8 @@ class Endpoint(Stateful):
         part.advance_to(limit)
         for frame in part.take_output():
             self._outgoing.send(frame, limit)
-        self._own_deadline = part.next_deadline()
+        self._own_deadline = self._next_due()
         return Reached(limit)
 
     def _restored(self) -> None:
-        self._own_deadline = self.part.next_deadline()
+        self._own_deadline = self._next_due()

@@ -74,7 +74,7 @@ class Hit:
     y_m: float
 
 
-class WheelAngles(Protocol):
+class Wheels(Protocol):
     """What a step tells at once; a `BodyState` is one too."""
 
     @property
@@ -87,12 +87,24 @@ class WheelAngles(Protocol):
         """Rotation of the right wheel since the reset."""
         ...
 
+    @property
+    def stalled_left(self) -> bool:
+        """Whether the left motor cannot turn its wheel."""
+        ...
+
+    @property
+    def stalled_right(self) -> bool:
+        """Whether the right motor cannot turn its wheel."""
+        ...
+
 
 class Turned(NamedTuple):
-    """Wheel angles alone, for a body that reads the rest of its state only when asked."""
+    """The wheels alone, for a body that reads the rest of its state only when asked."""
 
     left_angle_rad: float
     right_angle_rad: float
+    stalled_left: bool = False
+    stalled_right: bool = False
 
 
 class RobotBody(Protocol):
@@ -166,7 +178,7 @@ class RobotBody(Protocol):
         """Return how far one of its sonar is from another's, metres; None where not each sees the other."""
         ...
 
-    def step(self, left_mps: float, right_mps: float) -> WheelAngles:
+    def step(self, left_mps: float, right_mps: float) -> Wheels:
         """Move on by `dt_ns` with these rim-speed set-points; `state` has the rest.
 
         Raises:
@@ -257,7 +269,7 @@ class RobotScene(Protocol):
         """Let every robot stand still at its pose, in the world as it was made."""
         ...
 
-    def step(self, setpoints: Sequence[tuple[float, float]]) -> Sequence[WheelAngles]:
+    def step(self, setpoints: Sequence[tuple[float, float]]) -> Sequence[Wheels]:
         """Move all on by `dt_ns` with these rim-speed set-points, left and right, m/s; return their wheels' angles."""
         ...
 

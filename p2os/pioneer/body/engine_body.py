@@ -117,6 +117,11 @@ class EngineBody(BodyInWorld):
         is_stalled = is_straining and abs(rate_radps) < self._slow_radps
         self._stalling[wheel] = min(STALL_STEPS, self._stalling[wheel] + 1) if is_stalled else 0
 
+    @property
+    def _stalled(self) -> tuple[bool, bool]:
+        left, right = self._stalling
+        return left >= STALL_STEPS, right >= STALL_STEPS
+
     def _motor(self, wheel: int, asked_mps: float) -> tuple[float, float]:
         """Return the rate that a wheel is driven to, rad/s, and the greatest torque for it, Nm.
 
@@ -176,6 +181,7 @@ class EngineBody(BodyInWorld):
         x, y, z = place
         (left, left_rate), (right, right_rate) = wheels
         heading = math.atan2(turn[3], turn[0])
+        stalled_left, stalled_right = self._stalled
         return BodyState(
             x_m=x,
             y_m=y,
@@ -188,8 +194,8 @@ class EngineBody(BodyInWorld):
             right_speed_mps=right_rate * self._radius_m,
             forward_mps=velocity[0] * math.cos(heading) + velocity[1] * math.sin(heading),
             turn_radps=turn_radps,
-            stalled_left=self._stalling[0] >= STALL_STEPS,
-            stalled_right=self._stalling[1] >= STALL_STEPS,
+            stalled_left=stalled_left,
+            stalled_right=stalled_right,
             collisions=self._contacts.collisions,
             in_contact=self._contacts.touching,
             contact_rad=self._contacts.bearing_rad(x, y, heading),

@@ -257,6 +257,8 @@ class KinematicBody(BodyInWorld):
             self._is_bumped, self._carried_m = False, 0.0
         self._left_angle += self._left * DT_S / self._radius_m
         self._right_angle += self._right * DT_S / self._radius_m
+        if self._stalled:
+            return Turned(self._left_angle, self._right_angle, self._asked[0] != 0.0, self._asked[1] != 0.0)
         return Turned(self._left_angle, self._right_angle)
 
     def _arc(self, left_mps: float, right_mps: float) -> tuple[float, float, float, float, float, float]:

@@ -16,7 +16,7 @@ Invariant: at time t the body has made every step that ended at or before t.
 import math
 from collections.abc import Callable, Sequence
 
-from p2os.pioneer.body.contract import RobotBody, WheelAngles
+from p2os.pioneer.body.contract import RobotBody, Wheels
 from robot_bench.direct.differential.analog import Cell, volts_at
 from robot_bench.direct.differential.bridge import HBridge, Shares
 from robot_bench.direct.differential.description import SIDES, Differential
@@ -110,7 +110,7 @@ class DifferentialRobot(Stateful):
         """Return the rim-speed set-points of the body's next step, m/s, for who steps it together with others."""
         return self._rims(*self._asked)
 
-    def take_step(self, wheels: WheelAngles) -> None:
+    def take_step(self, wheels: Wheels) -> None:
         """Take the wheels' angles after a step that was made with `next_setpoints`."""
         self._stepped = wheels.left_angle_rad, wheels.right_angle_rad
 

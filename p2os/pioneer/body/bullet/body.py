@@ -297,7 +297,7 @@ class BulletBody(EngineBody):
         self._watch_motor(LEFT, self._targets[LEFT], left[3], left[1])
         self._watch_motor(RIGHT, self._targets[RIGHT], right[3], right[1])
         zero = self._zero
-        return Turned(left[0] - zero[0], right[0] - zero[1])
+        return Turned(left[0] - zero[0], right[0] - zero[1], *self._stalled)
 
     def _look_around(self) -> None:
         """Find for how many steps nothing can touch the robot, so that contacts need not be asked for."""

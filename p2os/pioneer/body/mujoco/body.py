@@ -239,7 +239,8 @@ class MujocoBody(EngineBody):
         for wheel, effort_nm in enumerate(efforts_nm):
             self._watch_motor(wheel, self._asked[wheel], effort_nm, float(self._qvel[self._wheel_speeds[wheel]]))
         left, right = self._wheel_places
-        return Turned(float(self._qpos[left]) - self._zero[0], float(self._qpos[right]) - self._zero[1])
+        zero = self._zero
+        return Turned(float(self._qpos[left]) - zero[0], float(self._qpos[right]) - zero[1], *self._stalled)
 
     def _is_touching(self) -> bool:
         return self._touched() is not None
