@@ -278,6 +278,7 @@ I2C = Struct(
         Field("counter", "u32", doc="address of CNDTR of the DMA channel that it receives by"),
         Field("far_hz", "u32", doc="bits a second of a master outside"),
         Field("is_stopped", "u32", doc="1: its clock stands still; 2: that of the timeout does"),
+        Field("wants_words", "u32", doc="somebody has subscribed to what is on the bus"),
         Field("stopped_ns", "u64", doc="since when: times of what comes meanwhile are this one"),
     ),
 )

@@ -34,6 +34,8 @@ enum { SCL, SDA, SMBA, I2C_PINS };
 enum { ADDRESS, WRITE, READ, END, NEXT_STEP, NO_PINS, SEQUENCE };
 /* What a master outside does: `far` holds one of these times 2 * HELD, above a byte or, for FAR_READ, its acknowledge. */
 enum { FAR_NOTHING, FAR_START, FAR_WRITE, FAR_READ, FAR_STOP, FAR_AT = 9 };
+/* What a row for subscribers tells: one of these times 2 * HELD, a byte and its acknowledge below (`I2cStep` of i2c.py). */
+enum { TELL_START, TELL_BYTE, TELL_STOP, TELL_LOST, TELL_CUT, TELL_AT = 9 };
 /* Of `is_stopped`. */
 enum { CLOCK_STOPPED = 1, TIMEOUT_STOPPED = 2 };
 /* Commands of its own: move to pins; a master outside has something to do; arbitration is lost or the bus disturbed; listen
@@ -60,6 +62,15 @@ static void ask_for_byte(struct device *device)
 {
     const struct i2c *i2c = device->state;
     device->words[SR1] |= device->words[SR2] & TRA && !i2c->tdr ? TXE : 0;
+}
+
+static void tell(struct device *device, uint64_t ns, uint32_t what, uint32_t byte)
+{
+    const struct i2c *i2c = device->state;
+    if (UNLIKELY(i2c->wants_words)) {
+        const struct sent row = {.ns = ns, .word = what << TELL_AT | byte, .clock_hz = i2c->rate_hz};
+        send_word(device, &row);
+    }
 }
 
 /* Pins. */
@@ -308,10 +319,11 @@ static void go_on(struct device *device, uint64_t ns)
     }
 }
 
-static void end_start(struct device *device)
+static void end_start(struct device *device, uint64_t ns)
 {
     struct i2c *i2c = device->state;
     uint32_t *words = device->words;
+    tell(device, ns, TELL_START, 0);
     if (!(words[SR2] & MSL)) {
         set_pec(device, 0);
     }
@@ -321,9 +333,10 @@ static void end_start(struct device *device)
     i2c->was_refused = i2c->is_second = i2c->has_sent = i2c->tdr = 0;
 }
 
-static void lose_arbitration(struct device *device)
+static void lose_arbitration(struct device *device, uint64_t ns)
 {
     struct i2c *i2c = device->state;
+    tell(device, ns, TELL_LOST, 0);
     device->words[SR1] = (device->words[SR1] & ~(uint32_t)(TXE | BTF)) | ARLO;
     device->words[SR2] &= ~(uint32_t)(MSL | TRA);
     i2c->tdr = 0;
@@ -343,11 +356,12 @@ static void end_sent(struct device *device, uint64_t ns)
     const uint32_t byte = i2c->shift & 0xFF;
     const bool is_address = i2c->phase == ADDRESSING;
     if (i2c->is_lost || (is_low(device, SDA) && byte != 0)) {
-        lose_arbitration(device);
+        lose_arbitration(device, ns);
         return;
     }
     const bool can_be_heard = i2c->has_parts && carries(device, SCL) && carries(device, SDA);
     const bool is_ack = can_be_heard && ask(device, is_address ? ADDRESS : WRITE, byte) & HELD;
+    tell(device, ns, TELL_BYTE, (is_ack ? HELD : 0) | byte);
     add_to_pec(device, byte);
     i2c->was_refused = !is_ack;
     if (!is_ack) {
@@ -368,6 +382,7 @@ static void end_stop(struct device *device, uint64_t ns)
 {
     struct i2c *i2c = device->state;
     uint32_t *words = device->words;
+    tell(device, ns, TELL_STOP, 0);
     if (i2c->has_parts) {
         ask(device, END, 0);
     }
@@ -513,6 +528,14 @@ static void end_far(struct device *device, uint64_t ns)
                             : step == FAR_WRITE ? end_far_write(device, byte)
                             : step == FAR_READ  ? end_far_read(device, byte)
                                                 : end_far_stop(device);
+    if (step == FAR_START) {
+        tell(device, ns, TELL_START, 0);
+    }
+    if (step == FAR_STOP) {
+        tell(device, ns, TELL_STOP, 0);
+    } else {
+        tell(device, ns, TELL_BYTE, step == FAR_READ ? answer | (byte ? HELD : 0) : byte | (answer & HELD));
+    }
     i2c->far = ask(device, NEXT_STEP, answer);
     go_on_far(device, ns);
 }
@@ -524,15 +547,18 @@ static void end_phase(struct device *device, uint64_t ns)
     struct i2c *i2c = device->state;
     switch (i2c->phase) {
     case STARTING:
-        end_start(device);
+        end_start(device, ns);
         rest(device, HOLD);
         break;
     case ADDRESSING:
     case SENDING: end_sent(device, ns); break;
-    case RECEIVING:
-        i2c->was_refused = !receive(device, i2c->has_parts && carries(device, SDA) ? ask(device, READ, 0) & 0xFF : 0xFF);
+    case RECEIVING: {
+        const uint32_t byte = i2c->has_parts && carries(device, SDA) ? ask(device, READ, 0) & 0xFF : 0xFF;
+        i2c->was_refused = !receive(device, byte);
+        tell(device, ns, TELL_BYTE, (i2c->was_refused ? 0 : HELD) | byte);
         go_on(device, ns);
         break;
+    }
     case STOPPING: end_stop(device, ns); break;
     case OTHERS:
         device->words[SR2] &= ~(uint32_t)BUSY;
@@ -547,6 +573,7 @@ static void end_phase(struct device *device, uint64_t ns)
 static void time_out(struct device *device)
 {
     struct i2c *i2c = device->state;
+    tell(device, i2c->timeout_ns, TELL_CUT, 0);
     i2c->timeout_ns = NO_TIME;
     device->words[SR1] |= TIMEOUT;
     device->words[CR1] &= ~(uint32_t)(START | STOP);
@@ -680,6 +707,9 @@ static void clear(struct device *device, bool keeps_busy)
     device->words[SR1] = 0;
     device->words[SR2] = keeps_busy && i2c->phase == FREE ? device->words[SR2] & BUSY : 0;
     device->words[SEEN] = 0;
+    if (i2c->phase != FREE) {
+        tell(device, now_ns(device->fabric), TELL_CUT, 0);
+    }
     if (i2c->phase != FREE && i2c->has_parts) {
         ask(device, END, 0);
     }

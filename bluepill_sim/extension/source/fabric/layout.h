@@ -472,6 +472,7 @@ struct i2c {
     uint32_t counter; /* address of CNDTR of the DMA channel that it receives by */
     uint32_t far_hz; /* bits a second of a master outside */
     uint32_t is_stopped; /* 1: its clock stands still; 2: that of the timeout does */
+    uint32_t wants_words; /* somebody has subscribed to what is on the bus */
     uint64_t stopped_ns; /* since when: times of what comes meanwhile are this one */
 };
 _Static_assert(sizeof(struct i2c) == 168, "i2c");
