@@ -680,7 +680,7 @@ class Can(Peripheral):
         self._connect()
 
     def _connect(self) -> None:
-        """Offer the pin unless it sleeps, as it does from reset on: chosen; see the erratum in docs/peripherals.md."""
+        """Offer the pin unless it sleeps, as it does from reset on: chosen (docs/peripherals.md)."""
         pin = self.chip.pins[self._pin_names[1]]
         if self.words[MSR] & SLAK:
             pin.disconnect("CAN_TX")

@@ -176,7 +176,7 @@ class I2c(Peripheral):
         native.offered[:] = [2] * 3
         native.counter = _COUNTERS[place.name]
         native.clock_hz = native.rate_hz = native.far_hz = self.clock_hz()
-        native.due_ns = native.timeout_ns = NO_TIME
+        native.due_ns = native.timeout_ns = native.show_ns = NO_TIME
         self.reset()
         chip.pins.route_listeners.append(self._route_changed)
 
