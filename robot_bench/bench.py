@@ -50,13 +50,14 @@ from robot_bench.direct.wired import AnalogPin, RobotWire
 from robot_bench.events.codec import Blocks, events_of
 from robot_bench.events.expectation import ExpectationError
 from robot_bench.events.kinds import Event
-from robot_bench.events.selection import SELECTORS, Wires, select, wire_named
+from robot_bench.events.selection import SELECTORS, Wires, bus_of, select, wire_named
 from robot_bench.events.stream import EventStream
 from robot_bench.events.words import last_words
 from robot_bench.recording.client_view import SipRanges
 from robot_bench.recording.recorder import SAMPLE_NS, Recorder
 from robot_bench.recording.run_record import RunRecord, record_of
 from robot_bench.recording.trace import TraceWriter
+from robot_bench.recording.transfers import hear_bus
 from robot_bench.running.loop import RunLoop
 from robot_bench.running.pacer import FIRST_SLICE_NS, SliceLength
 from robot_bench.running.shared_world import Driven, SharedWorld
@@ -101,7 +102,7 @@ Condition: TypeAlias = Union[str, Callable[["Bench"], bool]]  # noqa: UP007 - a 
 #: What decides a run besides its files; its end and its goals may be others after a restart.
 DECISIVE = (
     "mode", "seed", "parameters", "threshold_um", "usart_baud", "start", "direct", "adapter", "adapter_core",
-    "controller", "controller_kind", "changes", "faults", "whens", "own_robot", "parts",
+    "controller", "controller_kind", "changes", "faults", "whens", "own_robot", "parts", "record",
 )  # fmt: skip
 _VERSION = "version of p2os"
 
@@ -236,6 +237,7 @@ class Bench(Stateful):
             self.parts.adapter.samples.waits_for_edges = True
         chip.usart1.far_baud = scenario.usart_baud
         hear_usarts(chip, self.recorder)
+        hear_buses(chip, self.recorder, scenario.record)
         chip.subscribe_warnings(lambda text: self.recorder.event("chip", chip.now_ns, "warning", text))
         self.recorder.start()
         self._join_others()
@@ -463,6 +465,8 @@ class Bench(Stateful):
     def _wait_for(self, words: str, within: Span | None) -> Event | None:
         """Run until an event happens, counted from the last one that was waited for where nothing was done since."""
         selector, since, last = select(words, self._wires), self._since, self._expected[1]
+        if (bus := bus_of(words)) and bus not in self.scenario.record:
+            raise UsageError(f"{bus} is not recorded", hint=f'record = ["{bus}"] in the scenario')
         limit, found = self._limit(within, since), list[Event]()
 
         def take(event: Event) -> None:
@@ -1029,6 +1033,23 @@ def hear_usarts(chip: Chip, recorder: Recorder) -> None:
     for port in ("usart2", "usart3"):
         if (other := getattr(chip, port, None)) is not None:
             other.subscribe(lambda sent, port=port: recorder.usart(sent, port))
+
+
+def hear_buses(chip: Chip, recorder: Recorder, buses: Sequence[str]) -> None:
+    """Have recorded what goes over buses of a chip; a host is plugged into its USB where that is one of them.
+
+    Raises:
+        UsageError: The chip is none that has buses.
+    """
+    if buses and not hasattr(chip, "usb_serial"):
+        raise UsageError(f"a {type(chip).__name__} has no buses to record", hint="an emulated BluePill does")
+    for bus in buses:
+        if bus == "usb":
+            board = cast("BluePill", chip)
+            board.usb.plug()
+            board.usb_serial.subscribe(lambda sent: recorder.usart(sent, "usb"))
+        else:
+            recorder.transfers[bus] = hear_bus(chip, bus, recorder.events.publish)
 
 
 def log_bench_event(who: str, at: Nanos, what: str, detail: str) -> None:

@@ -19,7 +19,7 @@ from p2os.protocol.frames import Decoder, Frame
 from p2os.protocol.sip import SIP_KINDS, StandardSip
 from p2os.transport import Transport
 from robot_bench.adapter import make_shipped_adapter
-from robot_bench.bench import boot, hear_usarts, log_bench_event, make_harness, plug_in
+from robot_bench.bench import boot, hear_buses, hear_usarts, log_bench_event, make_harness, plug_in
 from robot_bench.recording.client_view import OdometryPose, SipRanges
 from robot_bench.recording.recorder import Recorder
 from robot_bench.recording.trace import TraceWriter
@@ -98,6 +98,7 @@ class RemoteBench:
         if scenario.parts:
             plug_in(scenario.parts, chip, recorder)
         hear_usarts(chip, recorder)
+        hear_buses(chip, recorder, scenario.record)
         chip.subscribe_warnings(lambda text: recorder.event("chip", chip.now_ns, "warning", text))
         recorder.start()
 

@@ -175,6 +175,7 @@ PORT = Struct(
         Field("outside_high", "u32", doc="to 1,"),
         Field("outside_weak", "u32", doc="by a resistor"),
         *_fields("u32", "rail", "rail_high"),
+        Field("bus_low", "u32", doc="held low by a part on a bus, whose bits somebody looks at"),
         Field("odr", "u32", doc="what GPIO has configured: the data bits,"),
         Field("output", "u32", doc="general-purpose outputs,"),
         Field("alternate", "u32", doc="outputs of an alternate function,"),
@@ -278,7 +279,15 @@ I2C = Struct(
         Field("counter", "u32", doc="address of CNDTR of the DMA channel that it receives by"),
         Field("far_hz", "u32", doc="bits a second of a master outside"),
         Field("is_stopped", "u32", doc="1: its clock stands still; 2: that of the timeout does"),
+        Field("wants_words", "u32", doc="somebody has subscribed to what is on the bus"),
         Field("stopped_ns", "u64", doc="since when: times of what comes meanwhile are this one"),
+        Field(
+            "answer", "u32", doc="what the part made of the byte that is sent, before its acknowledge; 0: not asked yet"
+        ),
+        Field("incoming", "u32", doc="the byte that a part sends"),
+        Field("show", "u32", doc="1 + the next step of what is shown on the pins; 0: nobody looks"),
+        Field("show_ns", "u64", doc="when that is due"),
+        Field("shown_from", "u64", doc="ticks from `base_ns` to the begin of what is shown"),
     ),
 )
 EXTI = Struct("exti", "What EXTI holds beyond its registers.", (Field("levels", "u32"), Field("routes", "u8", PINS)))

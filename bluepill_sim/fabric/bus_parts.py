@@ -53,7 +53,7 @@ class AheadDevice(Protocol):
 
 
 class I2cDevice(Protocol):
-    """A part on an I2C: called at the end of each byte, before its acknowledge."""
+    """A part on an I2C: called behind the eight bits of what it is sent, before its acknowledge."""
 
     def start(self, address: int, is_read: bool, at_ns: Nanos) -> bool:
         """Take a START, or a repeated one, and its address; return whether it acknowledges.
@@ -67,7 +67,7 @@ class I2cDevice(Protocol):
         ...
 
     def read(self, at_ns: Nanos) -> int:
-        """Return the next byte."""
+        """Return the next byte, whose first bit begins."""
         ...
 
     def stop(self, at_ns: Nanos) -> None:

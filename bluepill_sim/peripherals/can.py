@@ -11,6 +11,7 @@ Invariant: FMP of each FIFO is the number of messages in `_fifos`, and its first
 """
 
 from collections import deque
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partialmethod
@@ -44,6 +45,8 @@ _CRC_ERROR = 6
 #: Pins (RX, TX) by the remap field (RM0008 table 42).
 PINS = {0: ("PA11", "PA12"), 2: ("PB8", "PB9"), 3: ("PD0", "PD1")}
 _FILTER_MODES = bits((13, 0))
+#: Takes frames at their ends, oldest first.
+Sink = Callable[[Sequence[CanEnd]], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +111,7 @@ class Can(Peripheral):
         "_alone", "_joined", "_mailboxes", "_order", "_fifos", "_ends", "_sync_ns", "_recover_ns", "_tec", "_rec",
         "_timer_ns", "_lost", "_is_stopped",
     )  # fmt: skip
-    DERIVED = ("_pin_names",)
+    DERIVED = ("_pin_names", "_sinks")
     REGISTERS = (
         Register(
             name="MCR",
@@ -199,6 +202,7 @@ class Can(Peripheral):
 
     def __init__(self, chip: ChipPorts, place: Place) -> None:
         super().__init__(chip, place)
+        self._sinks: list[Sink] = []
         self._alone = CanNetwork()
         self._alone.join(self)
         self._joined: CanNetwork | None = None
@@ -228,6 +232,15 @@ class Can(Peripheral):
         """Join a network."""
         self._joined = network
         network.join(self)
+
+    def subscribe(self, sink: Sink) -> Callable[[], None]:
+        """Have `sink` called with each frame at its end, its own and what it hears of others, whatever the filters.
+
+        Returns:
+            A function that ends it.
+        """
+        self._sinks.append(sink)
+        return lambda: self._sinks.remove(sink)
 
     def sends_at(self, pin: str) -> bool:
         """Whether something outside sends on a pin: a network does so on RX."""
@@ -511,6 +524,9 @@ class Can(Peripheral):
             self._take_end(self._ends.popleft())
 
     def _take_end(self, end: CanEnd) -> None:
+        if end.is_own or self.is_on:
+            for sink in list(self._sinks):
+                sink((end,))
         if end.is_own:
             self._take_own_end(end)
         elif self.is_on and end.error is CanError.NONE:
@@ -664,7 +680,7 @@ class Can(Peripheral):
         self._connect()
 
     def _connect(self) -> None:
-        """Offer the pin unless it sleeps, as it does from reset on: chosen; see the erratum in docs/peripherals.md."""
+        """Offer the pin unless it sleeps, as it does from reset on: chosen (docs/peripherals.md)."""
         pin = self.chip.pins[self._pin_names[1]]
         if self.words[MSR] & SLAK:
             pin.disconnect("CAN_TX")

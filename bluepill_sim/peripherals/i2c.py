@@ -9,17 +9,20 @@ Source: RM0008 26.3 to 26.6.
 Invariant: what a part is told is in the order of the bus, each call with the time at which its last bit ended.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import NamedTuple
 
 from bluepill_sim.extension.layout import I2C
 from bluepill_sim.extension.windows import NO_TIME
 from bluepill_sim.fabric.bus_parts import I2cDevice
 from bluepill_sim.fabric.fabric import OWN_COMMANDS
+from bluepill_sim.fabric.fabric import WORD as SENT
 from bluepill_sim.fabric.pins import ALTERNATE_FUNCTIONS, PinDrive
 from bluepill_sim.fabric.ports import ChipPorts
 from bluepill_sim.fabric.registers import NATIVE, WORD, Peripheral, Place, Register, bits
+from simbase.timing import Nanos
 
 CR1, CR2, OAR1, OAR2, DR, SR1, SR2, CCR, TRISE = range(9)
 _SEEN = 0x24
@@ -48,6 +51,33 @@ class Question(IntEnum):
     NEXT_STEP = 4
     NO_PINS = 5
     SEQUENCE = 6
+
+
+class I2cStep(IntEnum):
+    """What has happened on the bus (i2c.c)."""
+
+    START = 0
+    #: A byte with its acknowledge.
+    BYTE = 1
+    STOP = 2
+    #: The chip has lost the arbitration: the rest of the transfer is another master's.
+    LOST = 3
+    #: The chip was reset or switched off in the middle, or SCL was low for too long.
+    CUT = 4
+
+
+class I2cSymbol(NamedTuple):
+    """A condition or a byte, when its last bit ended."""
+
+    ended_ns: Nanos
+    step: I2cStep
+    byte: int
+    is_acknowledged: bool
+
+
+#: Takes symbols, oldest first.
+Sink = Callable[[Sequence[I2cSymbol]], None]
+_STEP_AT = 9
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +113,7 @@ class I2c(Peripheral):
     KIND, HOLDS = "i2c", I2C
     OUTPUTS = ("event_irq", "error_irq", "rx_dma", "tx_dma")
     STATE = ("_hung", "_addressed", "_high_bits", "_ten_bit", "_calls", "_step", "_is_stopping", "answered")
-    DERIVED = ("_pin_names",)
+    DERIVED = ("_pin_names", "_sinks")
     REGISTERS = (
         Register(
             name="CR1", offset=0x00, readable=_CR1, writable=_CR1, on_write=NATIVE,
@@ -125,6 +155,8 @@ class I2c(Peripheral):
 
     def __init__(self, chip: ChipPorts, place: Place) -> None:
         super().__init__(chip, place)
+        #: Get what is on the bus, in bulk, when the chip has run.
+        self._sinks: list[Sink] = []
         self._hung: list[I2cDevice] = []
         #: Which of them the last address has meant, by their places.
         self._addressed: tuple[int, ...] = ()
@@ -144,7 +176,7 @@ class I2c(Peripheral):
         native.offered[:] = [2] * 3
         native.counter = _COUNTERS[place.name]
         native.clock_hz = native.rate_hz = native.far_hz = self.clock_hz()
-        native.due_ns = native.timeout_ns = NO_TIME
+        native.due_ns = native.timeout_ns = native.show_ns = NO_TIME
         self.reset()
         chip.pins.route_listeners.append(self._route_changed)
 
@@ -160,6 +192,19 @@ class I2c(Peripheral):
         self._hung.append(device)
         self.native.has_parts = True
         self._pull_up()
+
+    def subscribe(self, sink: Sink) -> Callable[[], None]:
+        """Have `sink` called with what is on the bus from now on, in bulk; return a function that ends it."""
+        self.deliver()
+        self._sinks.append(sink)
+        self.native.wants_words = True
+
+        def end() -> None:
+            self.deliver()
+            self._sinks.remove(sink)
+            self.native.wants_words = bool(self._sinks)
+
+        return end
 
     def call(self, address: int, written: bytes = b"", read_bytes: int = 0, *, hz: int = 100_000) -> None:
         """Call the chip as a master outside, once the bus is free; what becomes of it is added to `answered`.
@@ -207,6 +252,16 @@ class I2c(Peripheral):
         self._addressed = ()
         self._high_bits = None
         self._route_changed()
+
+    def deliver(self) -> None:
+        """Hand what was on the bus to the sinks."""
+        if told := self.fabric.take_words(self.slot):
+            rows = [
+                I2cSymbol(at_ns, I2cStep(word >> _STEP_AT), word & 0xFF, bool(word & _ACK))
+                for at_ns, word, *_ in SENT.iter_unpack(told)
+            ]
+            for sink in list(self._sinks):
+                sink(rows)
 
     def answer(self, what: int, value: int) -> int:
         """Tell the parts what is on the bus, or the master outside what became of its step; or warn."""
@@ -309,4 +364,5 @@ class I2c(Peripheral):
 
     def _restored(self) -> None:
         self._find_pins()
+        self.native.wants_words = bool(self._sinks)
         self.command(_LISTEN)

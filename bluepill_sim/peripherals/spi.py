@@ -11,7 +11,7 @@ Invariant: `native.selected` is the number of parts that are selected.
 
 from collections.abc import Callable, Sequence
 from enum import IntEnum
-from typing import cast
+from typing import NamedTuple, cast
 
 from bluepill_sim.extension.layout import AHEAD_BYTES, SPI
 from bluepill_sim.fabric.bus_parts import AheadDevice, SpiDevice
@@ -20,7 +20,7 @@ from bluepill_sim.fabric.pins import ALTERNATE_FUNCTIONS, PinDrive
 from bluepill_sim.fabric.ports import ChipPorts
 from bluepill_sim.fabric.registers import NATIVE, Peripheral, Place, Register, bits
 from simbase.state import Stateful
-from simbase.timing import Nanos
+from simbase.timing import NS_PER_S, Nanos
 
 CR1, CR2, SR, DR = range(4)
 CPHA, CPOL, MSTR, SPE, LSBFIRST, DFF = (1 << n for n in (0, 1, 2, 6, 7, 11))
@@ -55,8 +55,20 @@ _WARNINGS = {
     Question.WORD_LOST: "_DR: written while TXE is 0: a word is lost",
     Question.MODE_FAULT: ": mode fault: a master whose NSS ({NSS}, or SSI) is low; it is switched off",
 }
-#: Takes words that have been exchanged: (ns at the end, sent by the master, sent by the slave).
-Sink = Callable[[Sequence[tuple[Nanos, int, int]]], None]
+
+
+class SpiWord(NamedTuple):
+    """A word that has been exchanged: when it ended, how many bits it has, and how long it took."""
+
+    ended_ns: Nanos
+    from_master: int
+    from_slave: int
+    bits: int
+    span_ns: Nanos
+
+
+#: Takes words, oldest first.
+Sink = Callable[[Sequence[SpiWord]], None]
 
 
 class Loopback(Stateful):
@@ -219,7 +231,10 @@ class Spi(Peripheral):
         """Hand what was exchanged to the sinks."""
         sent = self.fabric.take_words(self.slot)
         if sent:
-            rows = [(at_ns, word & 0xFFFF, word >> 16) for at_ns, word, *_ in WORD.iter_unpack(sent)]
+            rows = [
+                SpiWord(at_ns, word & 0xFFFF, word >> 16, 16 if control & DFF else 8, ticks * NS_PER_S // hz)
+                for at_ns, word, hz, ticks, control in WORD.iter_unpack(sent)
+            ]
             for sink in list(self._sinks):
                 sink(rows)
 

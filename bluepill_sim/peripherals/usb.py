@@ -76,7 +76,7 @@ class Usb(Peripheral):
     INPUTS = ("can",)
     STATE = (
         "_host", "_bus", "_since_ns", "_frame", "_quiet_ns", "_sof_ns", "_esof_ns", "_susp_ns", "_reset_ns",
-        "_can_is_on",
+        "_can_is_on", "_is_stopped",
     )  # fmt: skip
     REGISTERS = (
         *(
@@ -157,6 +157,8 @@ class Usb(Peripheral):
         self._esof_ns: Nanos | None = None
         self._susp_ns: Nanos | None = None
         self._reset_ns: Nanos | None = None
+        #: Its clock stands still: nothing is heard or counted, but a resume or a reset wakes.
+        self._is_stopped = False
 
     # For the host.
 
@@ -181,7 +183,7 @@ class Usb(Peripheral):
             self._quiet_ns = at_ns - (at_ns - self._since_ns) % FRAME_NS
         self._bus, self._since_ns = state, at_ns
         self._frame = frame if state is BusState.FRAMES else now_frame
-        self._reset_ns = at_ns + _RESET_NS if state is BusState.RESET else None
+        self._reset_ns = at_ns + _RESET_NS if state is BusState.RESET and not self._is_stopped else None
         if state in {BusState.RESET, BusState.RESUME} and self.words[CNTR] & FSUSP and not self._is_off:
             self._wake_up()
         if state is not BusState.IDLE:
@@ -275,6 +277,22 @@ class Usb(Peripheral):
             self._check_clock()
         self._tell_host()
 
+    def clock_stopped(self) -> None:
+        """Stand still in Stop; what wakes is asynchronous (RM0008 23.4.5)."""
+        self.advance_to(self.chip.now_ns)
+        self._is_stopped, self._reset_ns = True, None
+        self._look_for_frames(self.chip.now_ns)
+
+    def clock_resumed(self, stopped_ns: int) -> None:
+        """Go on: frames, silence and a reset of the bus are counted from now on."""
+        del stopped_ns
+        if not self._is_stopped:  # reset meanwhile
+            return
+        now_ns = self.chip.now_ns
+        self._is_stopped, self._quiet_ns = False, now_ns
+        self._reset_ns = now_ns + _RESET_NS if self._bus is BusState.RESET else None
+        self._look_for_frames(now_ns)
+
     def line_changed(self, name: str, level: bool) -> None:
         """Take that CAN is on or off."""
         del name
@@ -336,7 +354,7 @@ class Usb(Peripheral):
     def _is_listening(self) -> bool:
         """Whether packets reach the endpoints."""
         is_ready = not self._is_off and not self.words[ISTR] & RESET and self.words[DADDR] & EF
-        return bool(is_ready) and self.chip.clocks.usb_hz == CLOCK_HZ and not self.chip.power.is_stopped
+        return bool(is_ready) and self.chip.clocks.usb_hz == CLOCK_HZ and not self._is_stopped
 
     def _frame_at(self, now_ns: Nanos) -> int:
         """Return the number of the last frame that has begun."""
@@ -347,7 +365,9 @@ class Usb(Peripheral):
         """Work out the next SOF, or what says that there is none, of those whose flag is 0."""
         self._sof_ns = self._esof_ns = self._susp_ns = None
         flags = self.words[ISTR]
-        if not self._is_off and self._bus is BusState.FRAMES and not flags & SOF:
+        if self._is_stopped:
+            pass
+        elif not self._is_off and self._bus is BusState.FRAMES and not flags & SOF:
             self._sof_ns = _next(self._since_ns, FRAME_NS, now_ns)
         elif not self._is_off and self._bus is BusState.IDLE and not self.words[CNTR] & FSUSP:
             if not flags & ESOF:

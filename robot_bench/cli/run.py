@@ -137,6 +137,9 @@ def run(
         int | None,
         option(BAUD, "--usart-baud", purpose="Speed of USART1's far end; unset follows the firmware.", above_zero=True),
     ] = None,
+    record: Annotated[
+        str | None, typer.Option(help="Buses to record too: spi1 spi2 i2c1 i2c2 can usb.", metavar="BUS,BUS")
+    ] = None,
     realtime: Annotated[
         float | None,
         option(
@@ -192,6 +195,7 @@ def run(
         "seed": seed,
         "duration_s": None if duration_ns is None else duration_ns / NS_PER_S,
         "usart_baud": usart_baud,
+        "record": record,
     }
     wanted = wanted.with_options(**options)
     if is_sweep(wanted, seeds=seeds, seed=seed, port=port):

@@ -17,15 +17,18 @@ from functools import cache
 from typing import Any, TypeAlias, cast
 
 from robot_bench.events.kinds import (
+    CanTransfer,
     Clearance,
     Contact,
     Event,
     Fault,
+    I2cTransfer,
     Note,
     Packet,
     PinEdge,
     Pose,
     Ranges,
+    SpiTransfer,
     Text,
     Verdict,
     Wave,
@@ -186,6 +189,12 @@ def _wave(t: Nanos, entry: Json) -> Recorded:
     return Wave(t=t, wire=str(entry["net"]), at=at, period=period, high=high, ticks_hz=hz)
 
 
+def _can_entry(frame: CanTransfer) -> Mapping[str, object]:
+    flags = {"ext": frame.is_extended, "rtr": frame.is_remote, "own": frame.is_own}
+    told = {"bus": frame.bus, "from": frame.begun, "id": frame.identifier, "dlc": frame.dlc, "hex": frame.data.hex()}
+    return told | {key: int(value) for key, value in flags.items()} | {"error": frame.error}
+
+
 #: In the order of one instant.
 ROWS: Mapping[type, _Row] = {
     Levels: _Row("pins", _pins_entry, _pins),
@@ -211,6 +220,69 @@ ROWS: Mapping[type, _Row] = {
         _text_entry,
         lambda t, entry: Text(t=t, data=bytes.fromhex(str(entry["hex"])), port=str(entry.get("port", "usart1"))),
         frozenset({"hex", "port"}),
+    ),
+    SpiTransfer: _Row(
+        "spi",
+        lambda spi: {
+            "bus": spi.bus,
+            "from": spi.begun,
+            "to": spi.ended,
+            "mosi": spi.from_master.hex(),
+            "miso": spi.from_slave.hex(),
+            "bits": spi.bits,
+        },
+        lambda t, entry: SpiTransfer(
+            t=t,
+            bus=str(entry["bus"]),
+            begun=_integer(entry, "from"),
+            ended=_integer(entry, "to"),
+            from_master=bytes.fromhex(str(entry["mosi"])),
+            from_slave=bytes.fromhex(str(entry["miso"])),
+            bits=_integer(entry, "bits"),
+        ),
+        frozenset({"bus", "mosi", "miso"}),
+    ),
+    I2cTransfer: _Row(
+        "i2c",
+        lambda i2c: {
+            "bus": i2c.bus,
+            "from": i2c.begun,
+            "address": i2c.address,
+            "read": int(i2c.is_read),
+            "hex": i2c.data.hex(),
+            "answered": int(i2c.answered),
+            "acks": i2c.acknowledged,
+            "end": i2c.end,
+        },
+        lambda t, entry: I2cTransfer(
+            t=t,
+            bus=str(entry["bus"]),
+            begun=_integer(entry, "from"),
+            address=_integer(entry, "address"),
+            is_read=_level(_integer(entry, "read")),
+            data=bytes.fromhex(str(entry["hex"])),
+            answered=_level(_integer(entry, "answered")),
+            acknowledged=_integer(entry, "acks"),
+            end=str(entry["end"]),
+        ),
+        frozenset({"bus", "hex", "end"}),
+    ),
+    CanTransfer: _Row(
+        "can",
+        _can_entry,
+        lambda t, entry: CanTransfer(
+            t=t,
+            bus=str(entry["bus"]),
+            begun=_integer(entry, "from"),
+            identifier=_integer(entry, "id"),
+            is_extended=_level(_integer(entry, "ext")),
+            is_remote=_level(_integer(entry, "rtr")),
+            dlc=_integer(entry, "dlc"),
+            data=bytes.fromhex(str(entry["hex"])),
+            is_own=_level(_integer(entry, "own")),
+            error=str(entry["error"]),
+        ),
+        frozenset({"bus", "hex", "error"}),
     ),
     WorldChange: _Row("obstacle", lambda item: {"op": item.op, "name": item.name, **item.fields}, _world_change),
     Fault: _Row(

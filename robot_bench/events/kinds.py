@@ -70,6 +70,64 @@ class Text:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class SpiTransfer:
+    """Words that went over an SPI without a pause between: 4096 bytes, or a piece of more.
+
+    `t` is when that was known: a pause of 50 us and a word behind the last bit, or at it where 4096 bytes are full;
+    `begun` and `ended` are the first and the last bit. Words of 16 bits (`bits`) are two bytes, the upper first.
+    Which of them a part heard depends on its select pin.
+    """
+
+    t: Nanos
+    bus: str
+    begun: Nanos
+    ended: Nanos
+    from_master: bytes
+    from_slave: bytes
+    bits: int = 8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class I2cTransfer:
+    """What went over an I2C from a START to what ended it, or a piece of more than 4096 bytes; `t` is the end.
+
+    `address` has 10 bits above 0x7F. `answered` says whether somebody acknowledged it, `acknowledged` how many of the
+    bytes were; of what is read the last one is not. `end` is `stop`, `restart` (another START follows), `lost` (to
+    another master), `cut` (reset, or SCL low for too long), or `more` (a piece, or the end of the run).
+    """
+
+    t: Nanos
+    bus: str
+    begun: Nanos
+    address: int
+    is_read: bool
+    data: bytes
+    answered: bool
+    acknowledged: int
+    end: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CanTransfer:
+    """A frame that the chip has sent (`is_own`) or heard; `t` is its end.
+
+    A remote frame asks for `dlc` bytes and has none. `error` is empty, `acknowledge` (nobody did) or `damaged`; such a
+    frame is sent again.
+    """
+
+    t: Nanos
+    bus: str
+    begun: Nanos
+    identifier: int
+    is_extended: bool
+    is_remote: bool
+    dlc: int
+    data: bytes
+    is_own: bool
+    error: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Packet:
     """Bytes of the P2OS line that have arrived: `c2r` from client to robot, `r2c` back."""
 
@@ -206,6 +264,20 @@ class Verdict:
 
 #: Whatever happens in a run.
 Event: TypeAlias = (
-    PinEdge | Wave | Text | WorldChange | Fault | Packet | Note | Ranges | Pose | Clearance | Contact | Verdict
+    PinEdge
+    | Wave
+    | Text
+    | SpiTransfer
+    | I2cTransfer
+    | CanTransfer
+    | WorldChange
+    | Fault
+    | Packet
+    | Note
+    | Ranges
+    | Pose
+    | Clearance
+    | Contact
+    | Verdict
 )
 KINDS: tuple[type, ...] = get_args(Event)

@@ -3,6 +3,10 @@ r"""Which events are meant: one line of words, the same in goals, scenario files
     pin PB12 high                 a wire comes to a level (high, low, changes); a pin or a name of the pin-out
     usart1 sends dodge: CRUISE    a line that the firmware prints holds these words
     usart1 matches ^left=\d+      a line that it prints matches a regular expression
+    usb sends TEXT                likewise of a CDC device; USB and buses have to be recorded (`record`)
+    i2c1 writes 0x3c [HEX]        an I2C writes to, or `reads` from, an address; the bytes begin so; or `i2c1 fails`
+    spi1 sends 9f 00              bytes with these among them go out of an SPI's master, or `gets` them
+    can hears 0x123 [HEX]         a frame is heard, or `sends`; its bytes begin so; or `can fails`
     contact [NAME]                the hull comes to touch something, or this thing
     robot near X Y RADIUS         it comes within so many metres of a place
     robot within X Y X Y          it comes into a rectangle: its least x and y, its greatest
@@ -25,7 +29,20 @@ from functools import cache
 from typing import TypeAlias
 
 from adapter_sim.pinout import load_pinout
-from robot_bench.events.kinds import Contact, Event, Fault, Note, PinEdge, Pose, Ranges, Text, WorldChange
+from robot_bench.events.kinds import (
+    CanTransfer,
+    Contact,
+    Event,
+    Fault,
+    I2cTransfer,
+    Note,
+    PinEdge,
+    Pose,
+    Ranges,
+    SpiTransfer,
+    Text,
+    WorldChange,
+)
 from simbase.errors import UsageError, shown
 from simbase.state import Stateful
 from simbase.timing import NS_PER_S
@@ -33,6 +50,9 @@ from simbase.timing import NS_PER_S
 #: chosen: a robot that is no faster stands still; half of the slowest motor step would be 31 mm/s.
 STILL_MPS = 0.005
 
+
+#: What is recorded on request only.
+BUSES = ("spi1", "spi2", "i2c1", "i2c2", "can", "usb")
 
 #: Name or pin → the wire's name.
 Wires: TypeAlias = Mapping[str, str]
@@ -77,6 +97,12 @@ def select(words: str, wires: Wires | None = None) -> Selector:
         return make(words, told) if wires is None or make is not _Pin else _Pin(words, told, wires)
     except (ValueError, re.error) as error:
         raise UsageError(f"events {shown(words)} are not understood: {error}", hint=f"such as {usage}") from error
+
+
+def bus_of(words: str) -> str:
+    """Return the bus whose events a line of words means; empty where it means others: then they are there always."""
+    first = (words.split(maxsplit=1) or [""])[0]
+    return first if first in BUSES else ""
 
 
 @cache
@@ -161,6 +187,74 @@ class _Usart(Selector):
         # A long line comes in pieces, and is meant once.
         self._was_taken = (was_taken or found) and not event.data.endswith(b"\n")
         return found and not was_taken
+
+
+class _I2c(Selector):
+    kinds = (I2cTransfer,)
+
+    def __init__(self, words: str, rest: str) -> None:
+        super().__init__(words)
+        self._bus = words.split(maxsplit=1)[0]
+        self._verb, self._address, self._data = _transfer(rest, {"writes": 10, "reads": 10, "fails": 0})
+
+    def takes(self, event: Event) -> bool:
+        if not isinstance(event, I2cTransfer) or event.bus != self._bus:
+            return False
+        if self._verb == "fails":
+            is_refused = not event.is_read and event.acknowledged < len(event.data)
+            return not event.answered or is_refused or event.end in {"lost", "cut"}
+        is_meant = event.address == self._address and event.is_read is (self._verb == "reads")
+        return is_meant and event.answered and event.data.startswith(self._data)
+
+
+class _Spi(Selector):
+    kinds = (SpiTransfer,)
+
+    def __init__(self, words: str, rest: str) -> None:
+        super().__init__(words)
+        self._bus = words.split(maxsplit=1)[0]
+        self._verb, _, data = rest.partition(" ")
+        self._data = _hex(data)
+        if self._verb not in {"sends", "gets"} or not self._data:
+            raise ValueError("sends HEX, or gets HEX")
+
+    def takes(self, event: Event) -> bool:
+        if not isinstance(event, SpiTransfer) or event.bus != self._bus:
+            return False
+        return self._data in (event.from_master if self._verb == "sends" else event.from_slave)
+
+
+class _Can(Selector):
+    kinds = (CanTransfer,)
+
+    def __init__(self, words: str, rest: str) -> None:
+        super().__init__(words)
+        self._verb, self._identifier, self._data = _transfer(rest, {"sends": 29, "hears": 29, "fails": 0})
+
+    def takes(self, event: Event) -> bool:
+        if not isinstance(event, CanTransfer):
+            return False
+        if self._verb == "fails":
+            return bool(event.error)
+        is_meant = event.identifier == self._identifier and event.is_own is (self._verb == "sends")
+        return is_meant and not event.error and event.data.startswith(self._data)
+
+
+def _transfer(rest: str, verbs: Mapping[str, int]) -> tuple[str, int, bytes]:
+    """Return a verb of `verbs`, the number behind it, which has so many bits (0: none), and the bytes behind that."""
+    verb, *given = rest.split() or [""]
+    bits = verbs.get(verb)
+    number = int(given[0], 0) if given and bits else 0
+    if bits is None or bool(bits) is not bool(given) or not 0 <= number < 1 << bits:
+        raise ValueError(", ".join(f"{one} NUMBER [HEX]" if bits else one for one, bits in verbs.items()))
+    return verb, number, _hex(" ".join(given[1:]))
+
+
+def _hex(text: str) -> bytes:
+    try:
+        return bytes.fromhex(text)
+    except ValueError:
+        raise ValueError(f"{shown(text)} is no bytes in hex") from None
 
 
 class _Contact(Selector):
@@ -290,12 +384,19 @@ class _Thing(Selector):
 
 
 _USART = ("usart1 sends TEXT", _Usart)
+_I2C, _SPI = ("i2c1 writes 0x3c", _I2c), ("spi1 sends 9f 00", _Spi)
 #: First word → how it is written, and what picks the events.
 SELECTORS: Mapping[str, tuple[str, Callable[[str, str], Selector]]] = {
     "pin": ("pin PB12 high", _Pin),
     "usart1": _USART,
     "usart2": _USART,
     "usart3": _USART,
+    "usb": ("usb sends TEXT", _Usart),
+    "i2c1": _I2C,
+    "i2c2": _I2C,
+    "spi1": _SPI,
+    "spi2": _SPI,
+    "can": ("can hears 0x123", _Can),
     "contact": ("contact [NAME]", _Contact),
     "robot": ("robot near X Y RADIUS", _Robot),
     "time": ("time 5.0", _Time),

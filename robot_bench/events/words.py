@@ -4,15 +4,18 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from robot_bench.events.kinds import (
+    CanTransfer,
     Clearance,
     Contact,
     Event,
     Fault,
+    I2cTransfer,
     Note,
     Packet,
     PinEdge,
     Pose,
     Ranges,
+    SpiTransfer,
     Text,
     Verdict,
     Wave,
@@ -20,10 +23,41 @@ from robot_bench.events.kinds import (
 )
 from simbase.timing import NS_PER_S
 
+#: chosen: of a long transfer a line shows so many bytes.
+_SHOWN_BYTES = 16
+
+
+def _bytes(data: bytes) -> str:
+    return data[:_SHOWN_BYTES].hex(" ") + (f" … ({len(data)} bytes)" if len(data) > _SHOWN_BYTES else "")
+
+
+def _i2c(i2c: I2cTransfer) -> str:
+    verb = "reads" if i2c.is_read else "writes"
+    what = f"{i2c.bus} {verb} {i2c.address:#04x}: {_bytes(i2c.data) or 'nothing'}"
+    if not i2c.answered:
+        return f"{what}, nobody answers"
+    is_refused = not i2c.is_read and i2c.acknowledged < len(i2c.data)
+    end = {"stop": "", "restart": ", and begins again", "lost": ", loses the bus", "cut": ", cut off"}.get(
+        i2c.end, " …"
+    )
+    return what + (", the last refused" if is_refused else "") + end
+
+
+def _can(can: CanTransfer) -> str:
+    width = 8 if can.is_extended else 3
+    verb = "sends" if can.is_own else "hears"
+    what = f"asks for {can.dlc} bytes" if can.is_remote else _bytes(can.data) or "nothing"
+    error = {"": "", "acknowledge": ", nobody acknowledges"}.get(can.error, f", {can.error}")
+    return f"{can.bus} {verb} {can.identifier:0{width}x}: {what}{error}"
+
+
 _WORDS: Mapping[type, Callable[[Any], str]] = {
     PinEdge: lambda edge: f"{edge.wire} {'high' if edge.level else 'low'}",
     Wave: lambda wave: f"{wave.wire} at {wave.frequency_hz:g} Hz, {wave.duty:.1%}",
     Text: lambda text: f"{text.port} sends {text.data.decode('utf-8', 'replace').rstrip()!r}",
+    SpiTransfer: lambda spi: f"{spi.bus} sends {_bytes(spi.from_master)}, gets {_bytes(spi.from_slave)}",
+    I2cTransfer: _i2c,
+    CanTransfer: _can,
     Packet: lambda packet: f"{packet.direction} {packet.data.hex()}",
     Pose: lambda pose: f"robot at x {pose.x_m:.2f} m, y {pose.y_m:.2f} m, {pose.speed_mps:+.2f} m/s",
     Clearance: lambda clearance: f"{clearance.um / 1e6:.3f} m of clearance",
@@ -35,7 +69,7 @@ _WORDS: Mapping[type, Callable[[Any], str]] = {
     Verdict: lambda verdict: f"goal {'met' if verdict.met else 'missed'}: {verdict.goal}",
 }
 #: What there is so much of that it would hide the rest.
-_FREQUENT = (PinEdge, Packet, Pose, Clearance, Ranges)
+_FREQUENT = (PinEdge, Packet, Pose, Clearance, Ranges, SpiTransfer, I2cTransfer, CanTransfer)
 
 
 def words_of(event: Event) -> str:

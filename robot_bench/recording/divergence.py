@@ -1,7 +1,7 @@
 """Where two runs of one scenario part: the first difference of each signal, in order of time.
 
-A signal is what one can look at by itself: a wire, a port's text, the packets of one direction, the pose, a part's
-state log. Runs are compared event by event; verdicts, which follow from the rest, are left out.
+A signal is what one can look at by itself: a wire, a port's text, a bus, the packets of one direction, the pose, a
+part's state log. Runs are compared event by event; verdicts, which follow from the rest, are left out.
 
 Invariant: two runs with the same trace hash do not differ, and others do unless they differ in what no event tells.
 """
@@ -10,7 +10,18 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import zip_longest
 
-from robot_bench.events.kinds import Event, Note, Packet, PinEdge, Text, Verdict, Wave
+from robot_bench.events.kinds import (
+    CanTransfer,
+    Event,
+    I2cTransfer,
+    Note,
+    Packet,
+    PinEdge,
+    SpiTransfer,
+    Text,
+    Verdict,
+    Wave,
+)
 from simbase.timing import Nanos
 
 
@@ -30,6 +41,8 @@ def signal_of(event: Event) -> str:
         return event.wire
     if isinstance(event, Text):
         return f"{event.port} text"
+    if isinstance(event, SpiTransfer | I2cTransfer | CanTransfer):
+        return event.bus
     if isinstance(event, Packet):
         return f"packets {event.direction}"
     if isinstance(event, Note):

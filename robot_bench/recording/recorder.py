@@ -36,6 +36,7 @@ from robot_bench.events.kinds import (
 )
 from robot_bench.events.stream import EventStream
 from robot_bench.recording.trace import TraceWriter
+from robot_bench.recording.transfers import Transfers
 from robot_bench.wires.edges import Edges, pack
 from robot_bench.wires.nets import Harness, Net
 from simbase.state import Stateful
@@ -104,7 +105,7 @@ class Recorder(Stateful):
 
     STATE = (
         "trace", "events", "min_clearance_m", "distance_m", "last_state", "last_line", "_next_sample", "_changed",
-        "_has_levels", "_text", "_sonar_mm", "_clearance_um", "_other_places",
+        "_has_levels", "_text", "_sonar_mm", "_clearance_um", "_other_places", "transfers",
     )  # fmt: skip
     #: Who they are is settled when they are built.
     DERIVED = ("_others",)
@@ -140,6 +141,8 @@ class Recorder(Stateful):
         self._has_levels = False
         #: Port → what was sent of a line whose end has not come.
         self._text: dict[str, bytearray] = {}
+        #: What puts together what goes over the buses that are recorded.
+        self.transfers: dict[str, Transfers] = {}
         self._sonar_mm: tuple[int, ...] | None = None
         self._clearance_um: int | None = None
         #: Other robots of the world, and where each was told to be.
@@ -228,6 +231,8 @@ class Recorder(Stateful):
         for port, text in self._text.items():
             if text:
                 self._tell_text(port, end)
+        for transfers in self.transfers.values():
+            transfers.release(end, is_end=True)
         if self._next_sample - self._sample_ns < end:
             self._sample(end)
         self._pass(end)
@@ -295,6 +300,8 @@ class Recorder(Stateful):
         if not self._has_levels and limit >= 0:
             self._has_levels = True
             self._tell_levels()
+        for transfers in self.transfers.values():
+            transfers.release(limit)
         self.events.release(limit, self._tell_edges(limit) if self._changed else None)
 
     def _tell_levels(self) -> None:

@@ -26,15 +26,18 @@ from robot_bench.events.codec import (
     events_of,
 )
 from robot_bench.events.kinds import (
+    CanTransfer,
     Clearance,
     Contact,
     Event,
     Fault,
+    I2cTransfer,
     Note,
     Packet,
     PinEdge,
     Pose,
     Ranges,
+    SpiTransfer,
     Text,
     Verdict,
     Wave,
@@ -61,6 +64,8 @@ class RunRecord:
     nets: tuple[str, ...] = ()
     sonar: list[tuple[int, list[int]]] = field(default_factory=list)
     usart: list[tuple[int, bytes]] = field(default_factory=list)
+    #: What went over the buses that were recorded, by their ends.
+    transfers: list[SpiTransfer | I2cTransfer | CanTransfer] = field(default_factory=list)
     wire: list[Packet] = field(default_factory=list)
     #: The state log.
     events: list[Note] = field(default_factory=list)
@@ -180,6 +185,9 @@ _FILES: Mapping[type, Callable[[RunRecord, Any], None]] = {
     PinEdge: lambda record, edge: record.pins.setdefault(edge.wire, Edges()).append(edge.t, edge.level),
     Ranges: lambda record, ranges: record.sonar.append((ranges.t, list(ranges.mm))),
     Text: lambda record, text: record.usart.append((text.t, text.data)) if text.port == "usart1" else None,
+    SpiTransfer: lambda record, spi: record.transfers.append(spi),
+    I2cTransfer: lambda record, i2c: record.transfers.append(i2c),
+    CanTransfer: lambda record, can: record.transfers.append(can),
     Packet: lambda record, packet: record.wire.append(packet),
     Note: lambda record, note: record.events.append(note),
     WorldChange: lambda record, change: record.changes.append(change),

@@ -31,6 +31,7 @@ from p2os.pioneer.world.start_places import refuse_start, start_places
 from p2os.robots.parameters import RobotParameters, load_parameters
 from p2os.toml_file import is_file
 from robot_bench.direct.robot import DirectSettings
+from robot_bench.events.selection import BUSES, bus_of
 from robot_bench.scenario import fault_script, plugged_parts, when_script, world_script
 from robot_bench.scenario.fault_script import FaultChange, load_faults
 from robot_bench.scenario.goals.judging import Goal, load_goal
@@ -66,6 +67,7 @@ _TOP = (
     Key(name="duration_s", kind="number", required=True, above=0, most=LONGEST_S),
     Key(name="threshold_m", kind="number", above=0, most=100),
     Key(name="usart_baud", kind="whole", least=1, most=4_500_000),
+    Key(name="record", kind="texts"),
     Key(name="start", kind="table"),
     Key(name="direct", kind="table"),
     Key(name="adapter", kind="table"),
@@ -149,6 +151,8 @@ class ScenarioOptions(TypedDict, total=False):
     duration_s: float | None
     #: Speed of USART1's far end, bit/s.
     usart_baud: int | None
+    #: Buses of the chip that are recorded besides: names of `selection.BUSES`, or one text with commas.
+    record: str | Sequence[str] | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -186,6 +190,8 @@ class Scenario:
     threshold_um: int
     #: The speed of USART1's far end, bit/s; None follows the firmware.
     usart_baud: int | None = None
+    #: Buses of the chip that are recorded, of `selection.BUSES`.
+    record: tuple[str, ...] = ()
     #: None starts at the world's own place.
     start: Pose | None = None
     #: What a message calls the start: file, line and key.
@@ -255,6 +261,7 @@ class Scenario:
         moved = self if world is None else self._moved_to(world)
         return replace(
             moved,
+            record=_buses((*moved.record, *_listed(options.get("record"))), "--record", UsageError),
             firmware=firmware,
             mode=options.get("mode") or moved.mode,
             adapter_core=core or moved.adapter_core,
@@ -401,6 +408,7 @@ def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | N
         planned_ns=planned_ns,
         threshold_um=round(threshold_m * 1e6),
         usart_baud=cast("int | None", table.get("usart_baud")),
+        record=_buses(_listed(table.get("record")), where.at("record"), ScenarioError),
         start=_start(table, where),
         start_at=str(within(where, "start")),
         direct=_direct(cast("Table", table.get("direct", {})), where),
@@ -422,7 +430,39 @@ def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | N
         in_world=in_world,
         where=where,
     )
+    _refuse_unrecorded(scenario, table, where)
     return _apply_in_world(scenario, in_world.get(scenario.world, {}))
+
+
+def _listed(names: object) -> tuple[str, ...]:
+    """Return names that are given as a list, or as a text with commas."""
+    if isinstance(names, str):
+        return tuple(filter(None, (name.strip() for name in names.split(","))))
+    return tuple(map(str, cast("Sequence[object]", names or ())))
+
+
+def _buses(names: Sequence[str], where: str, error: type[ScenarioError | UsageError]) -> tuple[str, ...]:
+    """Return buses, each once, in the order of the table; the error names one that there is not."""
+    for name in names:
+        if name not in BUSES:
+            raise error(f"{where}: there is no bus {shown(name)}", hint=f"one of {', '.join(BUSES)}")
+    return tuple(bus for bus in BUSES if bus in names)
+
+
+def _refuse_unrecorded(scenario: Scenario, table: Table, where: Place) -> None:
+    """Refuse goals and `[[when]]` that wait for what a bus does that is not recorded."""
+    for kind, keys in _EVENT_KEYS.items():
+        for number, item in enumerate(cast("list[Table]", table.get(kind, []))):
+            for key in keys & item.keys():
+                words = item[key]
+                for one in words if isinstance(words, list) else [words]:
+                    if (bus := bus_of(str(one))) and bus not in scenario.record:
+                        at = within(where, kind, number)
+                        raise ScenarioError(f"{at}: {key}: {bus} is not recorded", hint=f'record = ["{bus}"]')
+
+
+#: Where goals and `[[when]]` have events in words.
+_EVENT_KEYS = {"goal": {"event", "events", "after", "from", "to"}, "when": {"event"}}
 
 
 def _build_several(table: Table, text: str, path: Path, where: Place, firmware: Path | None) -> Scenario:

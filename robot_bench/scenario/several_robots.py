@@ -25,7 +25,7 @@ from robot_bench.scenario.schema import Key, Place, Source, Table, check_table, 
 from simbase.errors import shown
 
 #: What a robot has for itself; those that a scenario of one robot has at its top, and where it stands.
-OWN = ("firmware", "mode", "threshold_m", "usart_baud", "pins", "direct", "adapter", "controller")
+OWN = ("firmware", "mode", "threshold_m", "usart_baud", "pins", "direct", "adapter", "controller", "record")
 _PLACE = ("x_m", "y_m", "heading_deg")
 #: chosen: more than a person can watch; each runs a chip.
 MOST_ROBOTS = 16

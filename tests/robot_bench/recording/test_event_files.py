@@ -24,7 +24,7 @@ def again(row: dict[str, object]) -> Event:
     kind = OF_NAME[str(row["kind"])]
     values = {field.name: row[field.name] for field in fields(kind)}
     for name, value in values.items():
-        if name == "data":
+        if name in {"data", "from_master", "from_slave"}:
             values[name] = bytes.fromhex(value) if isinstance(value, str) else value
         elif name == "mm":
             values[name] = tuple(value)  # type: ignore[arg-type] # a list

@@ -5,7 +5,10 @@
  * address, ADDR a read of both status registers, BTF a byte or room for one. `go_on` is the one place that decides.
  * Parts, and a master outside (FAR phases), are Python's (peripherals/i2c.py), asked once a byte; what happens between is
  * here since drivers poll these flags millions of times a second, and DMA serves them.
- * Source: RM0008 26.3, 26.6.
+ * While somebody looks at SCL or SDA, each bit is shown there (`show_step`): what the chip sends as its own, what a part
+ * or a master outside sends as a line that is held low from outside. Nothing follows from what is shown: who holds a line
+ * really, a finger or another board, is `is_low`.
+ * Source: RM0008 26.3, 26.6; UM10204 (I2C) 3.1.
  * Invariant: what is under way ends floor(ticks * 10**9 / rate) ns after the last time that SCL was let go.
  */
 #include "../fabric/fabric.h"
@@ -25,8 +28,8 @@ enum { EVENTS = SB | ADDR | BTF | ADD10 | STOPF, ERRORS = BERR | ARLO | AF | OVR
 enum { MSL = 1 << 0, BUSY = 1 << 1, TRA = 1 << 2, GENCALL = 1 << 4, DUALF = 1 << 7, PEC_AT = 8 };
 /* Of CCR. */
 enum { DUTY = 1 << 14, FS = 1 << 15, CCR_BITS = 0xFFF };
-/* Bits of a condition and of a byte; that a byte is held; SCL low for so long is a timeout (RM0008 26.3.8). */
-enum { CONDITION = 1, BYTE = 9, HELD = 1 << 8, TIMEOUT_NS = 25000000 };
+/* Bits of a condition, of data, and of a byte with its acknowledge; that a byte is held; SCL low for so long is a timeout (RM0008 26.3.8). */
+enum { CONDITION = 1, DATA = 8, ACKNOWLEDGE = 1, BYTE = 9, HELD = 1 << 8, TIMEOUT_NS = 25000000 };
 enum phase { FREE, STARTING, ADDRESSING, SENDING, RECEIVING, STOPPING, HOLD, OTHERS, FAR, FAR_HOLD };
 /* Its pins. */
 enum { SCL, SDA, SMBA, I2C_PINS };
@@ -34,6 +37,10 @@ enum { SCL, SDA, SMBA, I2C_PINS };
 enum { ADDRESS, WRITE, READ, END, NEXT_STEP, NO_PINS, SEQUENCE };
 /* What a master outside does: `far` holds one of these times 2 * HELD, above a byte or, for FAR_READ, its acknowledge. */
 enum { FAR_NOTHING, FAR_START, FAR_WRITE, FAR_READ, FAR_STOP, FAR_AT = 9 };
+/* What a row for subscribers tells: one of these times 2 * HELD, a byte and its acknowledge below (`I2cStep` of i2c.py). */
+enum { TELL_START, TELL_BYTE, TELL_STOP, TELL_LOST, TELL_CUT, TELL_AT = 9 };
+/* Of `answer`, beside HELD: they were asked; another master has won. */
+enum { ANSWERED = 1 << 9, HAS_LOST = 1 << 10 };
 /* Of `is_stopped`. */
 enum { CLOCK_STOPPED = 1, TIMEOUT_STOPPED = 2 };
 /* Commands of its own: move to pins; a master outside has something to do; arbitration is lost or the bus disturbed; listen
@@ -42,6 +49,8 @@ enum { MOVE = OWN_COMMANDS, CALL, DISTURB, LISTEN, HOLD_TIMEOUT, GO_ON_TIMEOUT }
 /* Its outputs. */
 enum { EVENT_IRQ, ERROR_IRQ, RX_DMA, TX_DMA };
 
+static void begin_to_show(struct device *device);
+static void show_rest(struct device *device, enum phase phase);
 static void go_on(struct device *device, uint64_t ns);
 static void go_on_far(struct device *device, uint64_t ns);
 
@@ -62,13 +71,31 @@ static void ask_for_byte(struct device *device)
     device->words[SR1] |= device->words[SR2] & TRA && !i2c->tdr ? TXE : 0;
 }
 
+static void tell(struct device *device, uint64_t ns, uint32_t what, uint32_t byte)
+{
+    const struct i2c *i2c = device->state;
+    if (UNLIKELY(i2c->wants_words)) {
+        const struct sent row = {.ns = ns, .word = what << TELL_AT | byte, .clock_hz = i2c->rate_hz};
+        send_word(device, &row);
+    }
+}
+
 /* Pins. */
 
 static bool is_low(const struct device *device, uint32_t which)
 {
     const struct i2c *i2c = device->state;
     const struct port *port = &device->fabric->ports[i2c->pins[which] / PINS];
-    return ~(port->level | port->floating) >> i2c->pins[which] % PINS & 1; /* chosen: a line without a pull is high */
+    const uint32_t bit = 1u << i2c->pins[which] % PINS;
+    if (i2c->show && (i2c->offered[which] == LOW || port->bus_low & bit)) { /* what is shown hides all but a hard driver */
+        return (port->rail & ~port->rail_high & bit) || (port->outside & ~port->outside_high & ~port->rail & bit);
+    }
+    return !((port->level | port->floating) & bit); /* chosen: a line without a pull is high */
+}
+
+static uint32_t low_lines(const struct device *device)
+{
+    return (uint32_t)is_low(device, SCL) | (uint32_t)is_low(device, SDA) << SDA | (uint32_t)is_low(device, SMBA) << SMBA;
 }
 
 static bool carries(const struct device *device, uint32_t which)
@@ -91,9 +118,11 @@ static void put(struct device *device, uint32_t which, uint32_t level)
 
 static void connect(struct device *device)
 {
+    const struct i2c *i2c = device->state;
     const uint32_t control = device->words[CR1];
-    put(device, SCL, control & PE ? HIGH : FLOATING);
-    put(device, SDA, control & PE ? HIGH : FLOATING);
+    for (uint32_t n = SCL; n <= SDA; ++n) {
+        put(device, n, !(control & PE) ? FLOATING : i2c->show && i2c->offered[n] == LOW ? LOW : HIGH);
+    }
     put(device, SMBA, (control & (PE | SMBUS)) != (PE | SMBUS) ? FLOATING : control & ALERT ? LOW : HIGH);
 }
 
@@ -115,7 +144,8 @@ static void listen(struct device *device)
 static void wait_for_events(struct device *device)
 {
     const struct i2c *i2c = device->state;
-    const uint64_t due = i2c->is_stopped & CLOCK_STOPPED ? NO_TIME : i2c->due_ns;
+    const uint64_t shown = i2c->show_ns < i2c->due_ns ? i2c->show_ns : i2c->due_ns;
+    const uint64_t due = i2c->is_stopped & CLOCK_STOPPED ? NO_TIME : shown;
     const uint64_t timeout = i2c->is_stopped ? NO_TIME : i2c->timeout_ns;
     schedule(device, due < timeout ? due : timeout);
 }
@@ -141,6 +171,7 @@ static void resume(struct device *device, uint64_t span)
     if (i2c->is_stopped & CLOCK_STOPPED) {
         i2c->base_ns += span;
         i2c->due_ns += i2c->due_ns == NO_TIME ? 0 : span;
+        i2c->show_ns += i2c->show_ns == NO_TIME ? 0 : span;
     }
     i2c->timeout_ns += i2c->timeout_ns == NO_TIME ? 0 : span;
     i2c->is_stopped = 0;
@@ -160,17 +191,27 @@ static uint64_t end_ns(const struct i2c *i2c)
     return i2c->base_ns + (uint64_t)((__uint128_t)i2c->ticks * NS_PER_S / i2c->rate_hz);
 }
 
+static void go_on_for(struct device *device, uint32_t bits)
+{
+    struct i2c *i2c = device->state;
+    i2c->ticks += bits * bit_ticks(device);
+    i2c->due_ns = end_ns(i2c);
+}
+
 static void begin(struct device *device, enum phase phase, uint32_t bits)
 {
     struct i2c *i2c = device->state;
     i2c->phase = phase;
-    i2c->ticks += bits * bit_ticks(device);
-    i2c->due_ns = end_ns(i2c);
+    i2c->shown_from = i2c->ticks;
+    i2c->answer = 0;
+    go_on_for(device, bits);
+    begin_to_show(device);
 }
 
 static void rest(struct device *device, enum phase phase)
 {
     struct i2c *i2c = device->state;
+    show_rest(device, phase);
     i2c->phase = phase;
     i2c->due_ns = NO_TIME;
     i2c->is_late = 0;
@@ -244,18 +285,27 @@ static bool is_last_of_dma(struct device *device)
     return left == (device->words[SR1] & RXNE ? 2 : 1);
 }
 
+static bool checks_pec(const struct device *device) { return (device->words[CR1] & (PEC | ENPEC)) == (PEC | ENPEC); }
+
+static bool will_acknowledge(struct device *device, uint32_t byte)
+{
+    const struct i2c *i2c = device->state;
+    const uint32_t *words = device->words;
+    if (checks_pec(device)) {
+        return !(words[SR2] & MSL) && byte == pec_of(device);
+    }
+    return (words[CR1] & POS ? i2c->next_ack : words[CR1] & ACK) && !is_last_of_dma(device);
+}
+
 /* Takes a received byte with its PEC; returns whether it is acknowledged. */
 static bool receive(struct device *device, uint32_t byte)
 {
     struct i2c *i2c = device->state;
     uint32_t *words = device->words;
-    bool is_ack = (words[CR1] & POS ? i2c->next_ack : words[CR1] & ACK) && !is_last_of_dma(device);
-    const bool is_pec = (words[CR1] & (PEC | ENPEC)) == (PEC | ENPEC);
-    if (is_pec) {
-        const bool is_wrong = byte != pec_of(device);
-        words[SR1] |= is_wrong ? PECERR : 0;
+    const bool is_ack = will_acknowledge(device, byte);
+    if (checks_pec(device)) {
+        words[SR1] |= byte != pec_of(device) ? PECERR : 0;
         words[CR1] &= ~(uint32_t)PEC;
-        is_ack = words[SR2] & MSL ? false : !is_wrong;
     }
     add_to_pec(device, byte);
     take(device, byte);
@@ -296,7 +346,7 @@ static void go_on(struct device *device, uint64_t ns)
         rest(device, HOLD);
     } else if (words[SR2] & TRA) {
         if (load(device)) {
-            begin(device, SENDING, BYTE);
+            begin(device, SENDING, DATA);
         } else {
             words[SR1] |= i2c->has_sent ? BTF | TXE : TXE;
             rest(device, HOLD);
@@ -304,14 +354,16 @@ static void go_on(struct device *device, uint64_t ns)
     } else if (i2c->received) {
         rest(device, HOLD);
     } else {
+        i2c->incoming = i2c->has_parts && carries(device, SDA) ? ask(device, READ, 0) & 0xFF : 0xFF;
         begin(device, RECEIVING, BYTE);
     }
 }
 
-static void end_start(struct device *device)
+static void end_start(struct device *device, uint64_t ns)
 {
     struct i2c *i2c = device->state;
     uint32_t *words = device->words;
+    tell(device, ns, TELL_START, 0);
     if (!(words[SR2] & MSL)) {
         set_pec(device, 0);
     }
@@ -321,9 +373,10 @@ static void end_start(struct device *device)
     i2c->was_refused = i2c->is_second = i2c->has_sent = i2c->tdr = 0;
 }
 
-static void lose_arbitration(struct device *device)
+static void lose_arbitration(struct device *device, uint64_t ns)
 {
     struct i2c *i2c = device->state;
+    tell(device, ns, TELL_LOST, 0);
     device->words[SR1] = (device->words[SR1] & ~(uint32_t)(TXE | BTF)) | ARLO;
     device->words[SR2] &= ~(uint32_t)(MSL | TRA);
     i2c->tdr = 0;
@@ -335,19 +388,33 @@ static void lose_arbitration(struct device *device)
     i2c->is_lost = 0;
 }
 
-/* An address or a byte has gone out. */
+/* The eight bits of an address or a byte have gone out: who is meant acknowledges them, or another master has won. */
+static void ask_parts(struct device *device)
+{
+    struct i2c *i2c = device->state;
+    const uint32_t byte = i2c->shift & 0xFF;
+    const bool can_be_heard = i2c->has_parts && carries(device, SCL) && carries(device, SDA);
+    i2c->answer = ANSWERED;
+    if (i2c->is_lost || (is_low(device, SDA) && byte != 0)) {
+        i2c->answer |= HAS_LOST;
+    } else if (can_be_heard) {
+        i2c->answer |= ask(device, i2c->phase == ADDRESSING ? ADDRESS : WRITE, byte) & HELD;
+    }
+    go_on_for(device, ACKNOWLEDGE);
+}
+
+/* An address or a byte has gone out, with its acknowledge. */
 static void end_sent(struct device *device, uint64_t ns)
 {
     struct i2c *i2c = device->state;
     uint32_t *words = device->words;
     const uint32_t byte = i2c->shift & 0xFF;
-    const bool is_address = i2c->phase == ADDRESSING;
-    if (i2c->is_lost || (is_low(device, SDA) && byte != 0)) {
-        lose_arbitration(device);
+    const bool is_address = i2c->phase == ADDRESSING, is_ack = i2c->answer & HELD;
+    if (i2c->answer & HAS_LOST) {
+        lose_arbitration(device, ns);
         return;
     }
-    const bool can_be_heard = i2c->has_parts && carries(device, SCL) && carries(device, SDA);
-    const bool is_ack = can_be_heard && ask(device, is_address ? ADDRESS : WRITE, byte) & HELD;
+    tell(device, ns, TELL_BYTE, (is_ack ? HELD : 0) | byte);
     add_to_pec(device, byte);
     i2c->was_refused = !is_ack;
     if (!is_ack) {
@@ -368,6 +435,7 @@ static void end_stop(struct device *device, uint64_t ns)
 {
     struct i2c *i2c = device->state;
     uint32_t *words = device->words;
+    tell(device, ns, TELL_STOP, 0);
     if (i2c->has_parts) {
         ask(device, END, 0);
     }
@@ -385,26 +453,30 @@ static void end_stop(struct device *device, uint64_t ns)
 
 /* A master outside. */
 
-static bool is_my_address(struct device *device, uint32_t byte)
+/* Whether an address is its own: 1, or the flag of SR2 that says which of them; 0: it is not. */
+static uint32_t which_address(const struct device *device, uint32_t byte)
 {
     const struct i2c *i2c = device->state;
-    uint32_t *words = device->words;
+    const uint32_t *words = device->words;
     const uint32_t own = words[OAR1], dual = words[OAR2];
     if (byte == 0 && words[CR1] & ENGC) {
-        words[SR2] |= GENCALL;
-        return true;
+        return GENCALL;
     }
     if (own >> 15 & 1) { /* ten bits: the header, to read the second time */
         return byte == (0xF1 | (own >> 7 & 6)) && i2c->header;
     }
     if (byte >> 1 == (own >> 1 & 0x7F)) {
-        return true;
+        return 1;
     }
-    if (dual & 1 && byte >> 1 == (dual >> 1 & 0x7F)) {
-        words[SR2] |= DUALF;
-        return true;
-    }
-    return false;
+    return dual & 1 && byte >> 1 == (dual >> 1 & 0x7F) ? DUALF : 0;
+}
+
+static bool listens(const struct device *device) { return (device->words[CR1] & (PE | ACK)) == (PE | ACK); }
+
+static bool is_my_header(const struct device *device, uint32_t byte)
+{
+    const uint32_t own = device->words[OAR1];
+    return own >> 15 && byte == (0xF0 | (own >> 7 & 6));
 }
 
 static uint32_t called(struct device *device, bool is_read)
@@ -422,7 +494,7 @@ static uint32_t end_far_start(struct device *device, uint32_t byte)
 {
     struct i2c *i2c = device->state;
     uint32_t *words = device->words;
-    const bool answers = (words[CR1] & (PE | ACK)) == (PE | ACK);
+    const uint32_t which = listens(device) ? which_address(device, byte) : 0;
     words[SR1] &= ~(uint32_t)(BTF | TXE);
     words[SR2] = (words[SR2] & ~(uint32_t)(TRA | GENCALL | DUALF)) | BUSY;
     if (!(i2c->is_own || i2c->header)) {
@@ -430,10 +502,11 @@ static uint32_t end_far_start(struct device *device, uint32_t byte)
     }
     i2c->is_own = i2c->tdr = i2c->was_refused = 0;
     add_to_pec(device, byte);
-    if (answers && is_my_address(device, byte)) {
+    if (which) {
+        words[SR2] |= which & (GENCALL | DUALF);
         return called(device, byte & 1);
     }
-    const bool is_header = answers && words[OAR1] >> 15 && byte == (0xF0 | (words[OAR1] >> 7 & 6));
+    const bool is_header = listens(device) && is_my_header(device, byte);
     i2c->header = is_header;
     i2c->is_second = is_header;
     return is_header ? HELD : 0;
@@ -513,8 +586,182 @@ static void end_far(struct device *device, uint64_t ns)
                             : step == FAR_WRITE ? end_far_write(device, byte)
                             : step == FAR_READ  ? end_far_read(device, byte)
                                                 : end_far_stop(device);
+    if (step == FAR_START) {
+        tell(device, ns, TELL_START, 0);
+    }
+    if (step == FAR_STOP) {
+        tell(device, ns, TELL_STOP, 0);
+    } else {
+        tell(device, ns, TELL_BYTE, step == FAR_READ ? answer | (byte ? HELD : 0) : byte | (answer & HELD));
+    }
     i2c->far = ask(device, NEXT_STEP, answer);
     go_on_far(device, ns);
+}
+
+/* What is shown on the pins. */
+
+static bool is_watched(const struct device *device, uint32_t which)
+{
+    const struct i2c *i2c = device->state;
+    const struct fabric *fabric = device->fabric;
+    const uint32_t port = i2c->pins[which] / PINS, bit = 1u << i2c->pins[which] % PINS;
+    bool is_listened = false;
+    for (uint32_t n = 0; n < fabric->listener_count; ++n) {
+        is_listened |= fabric->listeners[n].device != device && fabric->listeners[n].pins[port] & bit;
+    }
+    return is_listened || fabric->subscribed[port] & bit;
+}
+
+/* Has a line held low from outside, or let go. */
+static void hold(struct device *device, uint32_t which, bool is_held)
+{
+    const struct i2c *i2c = device->state;
+    struct port *port = &device->fabric->ports[i2c->pins[which] / PINS];
+    const uint32_t bit = 1u << i2c->pins[which] % PINS;
+    if (!(port->bus_low & bit) == is_held) {
+        port->bus_low ^= bit;
+        pins_changed(device->fabric, i2c->pins[which] / PINS);
+    }
+}
+
+/* Puts a level on a line for the chip, or for who is outside: the new driver begins before the old one lets go. */
+static void show(struct device *device, uint32_t which, bool is_high, bool is_outside)
+{
+    if (is_outside) {
+        hold(device, which, !is_high);
+        put(device, which, HIGH);
+    } else {
+        put(device, which, is_high ? HIGH : LOW);
+        hold(device, which, false);
+    }
+}
+
+static bool is_far(const struct i2c *i2c) { return i2c->phase >= FAR; }
+
+static bool is_stop(const struct i2c *i2c)
+{
+    return i2c->phase == STOPPING || (i2c->phase == FAR && i2c->far >> FAR_AT == FAR_STOP);
+}
+
+/* Steps of a condition, quarters of a bit, before the steps of a byte, two a bit. */
+static uint32_t condition_steps(const struct i2c *i2c)
+{
+    return i2c->phase == STARTING || is_stop(i2c) || (i2c->phase == FAR && i2c->far >> FAR_AT == FAR_START) ? 3 : 0;
+}
+
+static uint32_t all_steps(const struct i2c *i2c)
+{
+    return condition_steps(i2c) + (i2c->phase == STARTING || is_stop(i2c) ? 0 : 2 * BYTE);
+}
+
+static uint64_t step_ns(const struct device *device, uint32_t step)
+{
+    const struct i2c *i2c = device->state;
+    const uint32_t control = device->words[CCR], conditions = condition_steps(i2c), byte_step = step - conditions;
+    const uint64_t bit = bit_ticks(device), is_fast = !is_far(i2c) && control & FS;
+    const uint64_t low = !is_fast ? 1 : control & DUTY ? 16 : 2, both = !is_fast ? 2 : control & DUTY ? 25 : 3;
+    const bool is_condition = step < conditions;
+    const uint64_t parts = is_condition ? 4 : both;
+    const uint64_t at = is_condition ? bit * step : bit * (parts * ((conditions ? 1 : 0) + byte_step / 2) + (byte_step % 2 ? low : 0));
+    return i2c->base_ns + (uint64_t)((__uint128_t)(i2c->shown_from * parts + at) * NS_PER_S / (parts * i2c->rate_hz));
+}
+
+/* Whether the chip acknowledges a byte of a master outside that is under way. */
+static bool will_answer(struct device *device)
+{
+    const struct i2c *i2c = device->state;
+    const uint32_t byte = i2c->far & 0xFF;
+    if (i2c->far >> FAR_AT == FAR_START) {
+        return listens(device) && (which_address(device, byte) || is_my_header(device, byte));
+    }
+    if (i2c->is_second) {
+        return byte == (device->words[OAR1] & 0xFF);
+    }
+    return i2c->is_own && device->words[CR1] & PE && will_acknowledge(device, byte);
+}
+
+static void show_bit(struct device *device, uint32_t n)
+{
+    const struct i2c *i2c = device->state;
+    const bool is_read = i2c->phase == RECEIVING, is_ack = n == DATA;
+    const bool far_reads = i2c->phase == FAR && i2c->far >> FAR_AT == FAR_READ;
+    const uint32_t byte = is_read ? i2c->incoming : is_far(i2c) && !far_reads ? i2c->far : i2c->shift;
+    bool level = byte >> (DATA - 1 - n % DATA) & 1;
+    if (is_ack) {
+        level = is_read ? !will_acknowledge(device, i2c->incoming) : far_reads ? !(i2c->far & 1)
+              : is_far(i2c)                                        ? !will_answer(device)
+                                                                   : !(i2c->answer & HELD);
+    }
+    const bool sender_is_outside = is_read || (is_far(i2c) && !far_reads);
+    show(device, SDA, level, sender_is_outside != is_ack);
+}
+
+static void show_step(struct device *device)
+{
+    struct i2c *i2c = device->state;
+    const uint32_t step = i2c->show - 1, conditions = condition_steps(i2c);
+    const bool is_outside = is_far(i2c);
+    if (step >= conditions) {
+        const uint32_t half = step - conditions;
+        show(device, SCL, half % 2, is_outside);
+        if (half % 2 == 0) {
+            show_bit(device, half / 2);
+        }
+    } else if (step == 1) {
+        show(device, SCL, true, is_outside);
+    } else { /* START is a fall of SDA while SCL is high, STOP a rise */
+        show(device, SDA, is_stop(i2c) == (step == 2), is_outside);
+    }
+    ++i2c->show;
+    i2c->show_ns = i2c->show <= all_steps(i2c) ? step_ns(device, i2c->show - 1) : NO_TIME;
+}
+
+static void let_go(struct device *device)
+{
+    struct i2c *i2c = device->state;
+    for (uint32_t n = SCL; n <= SDA; ++n) {
+        if (i2c->show) {
+            show(device, n, true, false);
+        }
+    }
+    i2c->show = 0;
+    i2c->show_ns = NO_TIME;
+}
+
+static void begin_to_show(struct device *device)
+{
+    struct i2c *i2c = device->state;
+    if (i2c->phase == OTHERS || !(is_watched(device, SCL) || is_watched(device, SDA))) {
+        let_go(device);
+        return;
+    }
+    i2c->show = 1;
+    show_step(device);
+}
+
+/* What is under way ends: SCL is low behind all but a STOP. */
+static void show_end(struct device *device)
+{
+    struct i2c *i2c = device->state;
+    i2c->show_ns = NO_TIME;
+    if (i2c->show && !is_stop(i2c)) {
+        show(device, SCL, false, is_far(i2c));
+    }
+}
+
+/* Nobody sends until `phase` ends: the chip holds SCL, or the bus is free. */
+static void show_rest(struct device *device, enum phase phase)
+{
+    struct i2c *i2c = device->state;
+    i2c->show_ns = NO_TIME;
+    if (phase == FREE) {
+        let_go(device);
+    } else if (i2c->show) {
+        show(device, SCL, false, false);
+        if (i2c->phase != STARTING) {
+            show(device, SDA, true, false);
+        }
+    }
 }
 
 /* Events. */
@@ -522,15 +769,17 @@ static void end_far(struct device *device, uint64_t ns)
 static void end_phase(struct device *device, uint64_t ns)
 {
     struct i2c *i2c = device->state;
+    show_end(device);
     switch (i2c->phase) {
     case STARTING:
-        end_start(device);
+        end_start(device, ns);
         rest(device, HOLD);
         break;
     case ADDRESSING:
     case SENDING: end_sent(device, ns); break;
     case RECEIVING:
-        i2c->was_refused = !receive(device, i2c->has_parts && carries(device, SDA) ? ask(device, READ, 0) & 0xFF : 0xFF);
+        i2c->was_refused = !receive(device, i2c->incoming);
+        tell(device, ns, TELL_BYTE, (i2c->was_refused ? 0 : HELD) | i2c->incoming);
         go_on(device, ns);
         break;
     case STOPPING: end_stop(device, ns); break;
@@ -547,6 +796,7 @@ static void end_phase(struct device *device, uint64_t ns)
 static void time_out(struct device *device)
 {
     struct i2c *i2c = device->state;
+    tell(device, i2c->timeout_ns, TELL_CUT, 0);
     i2c->timeout_ns = NO_TIME;
     device->words[SR1] |= TIMEOUT;
     device->words[CR1] &= ~(uint32_t)(START | STOP);
@@ -562,14 +812,21 @@ static void event(struct device *device, uint64_t until)
 {
     struct i2c *i2c = device->state;
     const bool has_timeout = !i2c->is_stopped;
-    while (!(i2c->is_stopped & CLOCK_STOPPED) && (i2c->due_ns <= until || (has_timeout && i2c->timeout_ns <= until))) {
-        if (has_timeout && i2c->timeout_ns <= i2c->due_ns) {
+    while (!(i2c->is_stopped & CLOCK_STOPPED) &&
+           (i2c->due_ns <= until || i2c->show_ns <= until || (has_timeout && i2c->timeout_ns <= until))) {
+        if (i2c->show_ns < i2c->due_ns && !(has_timeout && i2c->timeout_ns <= i2c->show_ns)) {
+            show_step(device);
+        } else if (has_timeout && i2c->timeout_ns <= i2c->due_ns) {
             time_out(device);
-        } else if (i2c->lines & 1 << SCL) { /* somebody holds the clock: it ends when that lets go */
+        } else if ((i2c->phase == ADDRESSING || i2c->phase == SENDING) && !i2c->answer) {
+            ask_parts(device);
+        } else if (low_lines(device) & 1 << SCL) { /* somebody holds the clock: it ends when that lets go */
             i2c->is_late = 1;
             i2c->due_ns = NO_TIME;
         } else {
-            end_phase(device, i2c->due_ns);
+            const uint64_t ns = i2c->due_ns;
+            i2c->due_ns = NO_TIME; /* what it puts on the pins comes back by `pins` */
+            end_phase(device, ns);
         }
     }
     wait_for_events(device);
@@ -581,7 +838,7 @@ static void pins(struct device *device, uint32_t port, uint32_t changed)
     struct i2c *i2c = device->state;
     uint32_t *words = device->words;
     const uint64_t ns = counted_ns(device, CLOCK_STOPPED);
-    const uint32_t before = i2c->lines, low = (uint32_t)is_low(device, SCL) | (uint32_t)is_low(device, SDA) << SDA | (uint32_t)is_low(device, SMBA) << SMBA;
+    const uint32_t before = i2c->lines, low = low_lines(device);
     (void)port, (void)changed;
     i2c->lines = low;
     if (low & ~before & 1 << SMBA && (words[CR1] & (PE | SMBUS | SMBTYPE)) == (PE | SMBUS | SMBTYPE)) {
@@ -662,7 +919,7 @@ static void write_data(struct device *device, uint32_t byte)
         words[SR1] &= ~(uint32_t)(SB | ADD10);
         i2c->shift = HELD | byte;
         run_from(device, now_ns(device->fabric));
-        begin(device, ADDRESSING, BYTE);
+        begin(device, ADDRESSING, DATA);
         wait_for_events(device);
         return;
     }
@@ -680,10 +937,14 @@ static void clear(struct device *device, bool keeps_busy)
     device->words[SR1] = 0;
     device->words[SR2] = keeps_busy && i2c->phase == FREE ? device->words[SR2] & BUSY : 0;
     device->words[SEEN] = 0;
+    if (i2c->phase != FREE) {
+        tell(device, now_ns(device->fabric), TELL_CUT, 0);
+    }
     if (i2c->phase != FREE && i2c->has_parts) {
         ask(device, END, 0);
     }
     i2c->is_stopped = 0;
+    i2c->answer = 0;
     i2c->shift = i2c->tdr = i2c->rdr = i2c->received = i2c->far = i2c->is_own = i2c->header = i2c->is_lost = 0;
     i2c->next_ack = i2c->was_refused = i2c->has_sent = i2c->is_second = i2c->is_pec = i2c->lines = 0;
     i2c->timeout_ns = NO_TIME;
@@ -757,6 +1018,7 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
             i2c->ticks = 0;
             i2c->rate_hz = one;
             i2c->due_ns = i2c->base_ns;
+            i2c->show_ns = NO_TIME; /* the rest of the byte is not shown */
             wait_for_events(device);
         }
         i2c->clock_hz = one;
@@ -766,6 +1028,7 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
             const uint32_t pin = one >> 8 * n & 0xFF;
             if (pin != i2c->pins[n]) {
                 put(device, n, FLOATING);
+                hold(device, n, false);
                 i2c->pins[n] = pin;
             }
         }

@@ -328,7 +328,7 @@ static void end_word(struct device *device, uint64_t ns)
     const uint32_t ended = spi->shift, sent = ended & mask_of(device), far = spi->far;
     const uint32_t got = far ? far & mask_of(device) : exchange(device, sent);
     if (spi->wants_words) {
-        const struct sent row = {ns, far ? got | sent << 16 : sent | got << 16, spi->rate_hz, 0, words[CR1]};
+        const struct sent row = {ns, far ? got | sent << 16 : sent | got << 16, spi->rate_hz, (uint32_t)word_ticks(device), words[CR1]};
         send_word(device, &row);
     }
     if (!(ended & IS_DEAF)) {

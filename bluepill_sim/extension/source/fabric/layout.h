@@ -192,6 +192,7 @@ struct port {
     uint32_t outside_weak; /* by a resistor */
     uint32_t rail;
     uint32_t rail_high;
+    uint32_t bus_low; /* held low by a part on a bus, whose bits somebody looks at */
     uint32_t odr; /* what GPIO has configured: the data bits, */
     uint32_t output; /* general-purpose outputs, */
     uint32_t alternate; /* outputs of an alternate function, */
@@ -220,7 +221,7 @@ struct port {
     uint64_t sources[16]; /* the alternate functions that offer a level, a bit each; the lowest drives */
     uint64_t source_levels[16];
 };
-_Static_assert(sizeof(struct port) == 400, "port");
+_Static_assert(sizeof(struct port) == 408, "port");
 
 /* What a USART holds beyond its registers. RM0008 27.3. */
 struct usart {
@@ -486,9 +487,15 @@ struct i2c {
     uint32_t counter; /* address of CNDTR of the DMA channel that it receives by */
     uint32_t far_hz; /* bits a second of a master outside */
     uint32_t is_stopped; /* 1: its clock stands still; 2: that of the timeout does */
+    uint32_t wants_words; /* somebody has subscribed to what is on the bus */
     uint64_t stopped_ns; /* since when: times of what comes meanwhile are this one */
+    uint32_t answer; /* what the part made of the byte that is sent, before its acknowledge; 0: not asked yet */
+    uint32_t incoming; /* the byte that a part sends */
+    uint32_t show; /* 1 + the next step of what is shown on the pins; 0: nobody looks */
+    uint64_t show_ns; /* when that is due */
+    uint64_t shown_from; /* ticks from `base_ns` to the begin of what is shown */
 };
-_Static_assert(sizeof(struct i2c) == 168, "i2c");
+_Static_assert(sizeof(struct i2c) == 200, "i2c");
 
 /* A level that goes up every `period` ticks, and down `high` ticks later. */
 struct wave {

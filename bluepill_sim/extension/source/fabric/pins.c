@@ -101,8 +101,8 @@ void work_out(struct port *port)
     const uint32_t driven = port->high & (~hard | port->outside_high);
     const uint32_t undriven = (port->outside & port->outside_high) |
                               (~port->outside & (port->up | (~port->down & port->board_up)));
-    port->level = (port->rail & port->rail_high) | (~port->rail & ((strong & driven) | (~strong & undriven)));
-    port->floating = 0xFFFF & ~(strong | port->up | port->down | port->outside | port->rail | port->board_up | port->board_down);
+    port->level = ((port->rail & port->rail_high) | (~port->rail & ((strong & driven) | (~strong & undriven)))) & ~port->bus_low;
+    port->floating = 0xFFFF & ~(strong | port->up | port->down | port->outside | port->rail | port->board_up | port->board_down | port->bus_low);
     port->input = port->level & ((~port->analog & free) | port->hold_up | port->hold_down);
     port->fighting = ~port->rail & strong & hard & (port->high ^ port->outside_high);
     port->shorted = port->rail & strong & (port->high ^ port->rail_high);

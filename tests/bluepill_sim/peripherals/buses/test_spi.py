@@ -52,7 +52,7 @@ def set_up(chip: Any, control: int = MASTER, device: Any = None, name: str = "SP
     chip.write("GPIOB.CRH", 0xB4B4_4444)  # PB13, PB15 and PB14 of SPI2
     words: list[tuple[int, int, int]] = []
     part = chip.parts.by_name[name]
-    part.subscribe(words.extend)
+    part.subscribe(lambda rows: words.extend(row[:3] for row in rows))
     if device is not None:
         part.attach(device)
     chip.write(f"{name}.CR1", control)

@@ -225,10 +225,10 @@ def test_a_byte_of_the_i2c_takes_as_much_longer(fake_chip: Any) -> None:
     fake_chip.write("I2C1.DR", 0x55)
     test_i2c.wait(fake_chip, 40_000)
     stand_still(fake_chip, "I2C1")
-    fake_chip.advance(began_ns + test_i2c.BYTE_NS + STOP_NS - 1)
+    fake_chip.advance(began_ns + test_i2c.DATA_NS + STOP_NS - 1)
     assert 0x55 not in part.words
     fake_chip.advance(began_ns + test_i2c.BYTE_NS + STOP_NS)
-    assert part.log[-1] == ("write", 0x55, began_ns + test_i2c.BYTE_NS + STOP_NS)
+    assert part.log[-1] == ("write", 0x55, began_ns + test_i2c.DATA_NS + STOP_NS)
 
 
 def test_a_slave_in_stop_is_called_when_its_clock_is_back(fake_chip: Any) -> None:

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bluepill_sim.fabric.subscriptions import EDGE
+from bluepill_sim.fabric.subscriptions import EDGE, HIGH
 from bluepill_sim.peripherals.usart import Damage
 from tests.bluepill_sim.peripherals.usart.usart_line import (
     BRR,
@@ -180,7 +180,7 @@ def test_in_synchronous_mode_each_character_brings_one_in(fake_chip: Any) -> Non
 
 
 def seen(rows: bytes) -> list[tuple[int, bool]]:
-    return [(row[0], bool(row[2] & 1)) for row in EDGE.iter_unpack(rows)]
+    return [(row[0], row[3] == HIGH) for row in EDGE.iter_unpack(rows)]
 
 
 @settings(max_examples=25, deadline=None)
@@ -209,7 +209,7 @@ def test_bits_show_on_the_pin_while_somebody_looks(make_fake_chip: Any, data: li
         while not status(chip) & TXE:
             chip.advance(chip.now_ns + bits_ns(1))
     chip.advance(start_ns + bits_ns(len(line) + 1))
-    assert [at_ns for at_ns, _ in seen(b"".join(rows))] == [at_ns for at_ns, _ in levels]
+    assert seen(b"".join(rows)) == levels
     assert len(sent) == len(data)
     assert status(chip) & TC
     subscription.close()
@@ -230,5 +230,5 @@ def test_a_lin_break_is_thirteen_bits_on_the_pin(fake_chip: Any) -> None:
     start_ns = fake_chip.now_ns
     fake_chip.write("USART1.CR1", ON | SBK)
     fake_chip.advance(start_ns + bits_ns(14))
-    assert [at_ns - start_ns for at_ns, _ in seen(b"".join(rows))] == [0, bits_ns(13)]
+    assert [(at_ns - start_ns, level) for at_ns, level in seen(b"".join(rows))] == [(0, False), (bits_ns(13), True)]
     assert not fake_chip.read("USART1.CR1") & SBK

@@ -15,6 +15,7 @@ BULK, CONTROL, ISOCHRONOUS, INTERRUPT = range(4)
 CTR, PMAOVR, ERR, WKUP, SUSP, RESET, SOF, ESOF, DIR = (1 << n for n in (15, 14, 13, 12, 11, 10, 9, 8, 4))
 RESUME, FSUSP, LP_MODE, PDWN, FRES = (1 << n for n in (4, 3, 2, 1, 0))
 HP, LP, MS = 19, 20, 1_000_000
+RESET_NS = 2_500
 ACK, SAYS_NAK, SAYS_STALL = (Answer(one) for one in (Handshake.ACK, Handshake.NAK, Handshake.STALL))
 QUICK = settings(max_examples=25, deadline=None)
 Chips = Callable[[], Any]
@@ -326,6 +327,38 @@ def test_a_resume_wakes_a_suspended_device_and_exti_18(fake_chip: Any) -> None:
     assert fake_chip.read("USB.FNR") & 3 << 14 == 1 << 14
     assert (fake_chip.irqs[LP], fake_chip.irqs[42]) == (True, True)
     assert fake_chip.read("USB.CNTR") & (FSUSP | LP_MODE) == FSUSP
+
+
+@pytest.mark.parametrize("state", [BusState.RESUME, BusState.RESET])
+@pytest.mark.parametrize("is_suspended", [True, False])
+def test_a_stopped_clock_counts_no_frames_and_what_wakes_does(
+    fake_chip: Any, state: BusState, is_suspended: bool
+) -> None:
+    usb = set_up(fake_chip, WKUP)
+    fake_chip.write("EXTI.IMR", 1 << 18)
+    fake_chip.write("EXTI.RTSR", 1 << 18)
+    usb.bus_changed(BusState.FRAMES, fake_chip.now_ns)
+    fake_chip.write("USB.CNTR", WKUP | SUSP | ESOF | (FSUSP if is_suspended else 0))
+    fake_chip.write("USB.ISTR", 0)
+    usb.clock_stopped()
+    fake_chip.advance(fake_chip.now_ns + 5 * MS)
+    usb.bus_changed(BusState.IDLE, fake_chip.now_ns)
+    fake_chip.advance(fake_chip.now_ns + 5 * MS)
+    assert fake_chip.read("USB.ISTR") == 0, "neither SOF nor ESOF nor SUSP"
+    usb.bus_changed(state, fake_chip.now_ns)
+    fake_chip.advance(fake_chip.now_ns + MS)
+    assert fake_chip.read("USB.ISTR") == (WKUP if is_suspended else 0)
+    assert fake_chip.irqs[42] is is_suspended
+    usb.clock_resumed(11 * MS)
+    resumed_ns = fake_chip.now_ns
+    if state is BusState.RESET:
+        fake_chip.advance(resumed_ns + RESET_NS - 1)
+        assert not fake_chip.read("USB.ISTR") & RESET
+        fake_chip.advance(resumed_ns + RESET_NS)
+        assert fake_chip.read("USB.ISTR") & RESET
+    usb.bus_changed(BusState.FRAMES, fake_chip.now_ns)
+    fake_chip.advance(fake_chip.now_ns + MS)
+    assert fake_chip.read("USB.ISTR") & SOF
 
 
 def test_fres_is_a_reset_of_the_bus(fake_chip: Any) -> None:
