@@ -420,12 +420,13 @@ def _wire(parts: dict[str, Peripheral], fabric: Fabric) -> None:
     Raises:
         ValueError: The table has a name that there is not, or two lines that lead to one end.
     """
+    lines = _lines()
     for output, ends in WIRING.items():
         found = _find(output, parts, "output", lambda part: part.OUTPUTS)
         if found is not None:
-            fabric.put_output(*found, _lines()[ends])
+            fabric.put_output(*found, lines[ends])
     led: set[int | str] = set()
-    for ends, line in _lines().items():
+    for ends, line in lines.items():
         for end in ends:
             if end in led:
                 raise ValueError(f"WIRING: two lines lead to {end}")

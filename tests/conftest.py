@@ -29,7 +29,8 @@ def pytest_configure(config: pytest.Config) -> None:
     if folder is not None:
         from tests.tools.counted_lines import LineCounter
 
-        config.pluginmanager.register(LineCounter(config.rootpath / folder))
+        is_worker = hasattr(config, "workerinput")
+        config.pluginmanager.register(LineCounter(config.rootpath, config.rootpath / folder, is_worker=is_worker))
     path = config.getoption("--count-time")
     if path is not None:
         from tests.tools.spent_time import TimeCounter

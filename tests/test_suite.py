@@ -27,10 +27,10 @@ def test_way(first):
 
 
 @pytest.mark.parametrize("workers", [[], ["-n", "2"]], ids=["one process", "two workers"])
-@pytest.mark.parametrize(("ways", "missed"), [("[0, 1]", ([], [])), ("[0, 0]", ([4], [[3, 4]]))], ids=["both", "one"])
+@pytest.mark.parametrize(("ways", "missed"), [("[0, 1]", ([], [])), ("[0, 0]", ([4], [(3, 4)]))], ids=["both", "one"])
 def test_lines_and_branches_that_no_test_of_any_worker_reaches_are_counted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, workers: list[str], ways: str,
-    missed: tuple[list[int], list[list[int]]],
+    missed: tuple[list[int], list[tuple[int, int]]],
 ) -> None:  # fmt: skip
     for name in ("tests/conftest.py", "tests/tools/counted_lines.py", "pyproject.toml"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)

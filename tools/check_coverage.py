@@ -3,14 +3,11 @@
 Usage: python -m tools.check_coverage FOLDER, with what `pytest --count-lines FOLDER` has written.
 """
 
-import ast
 import json
 import sys
 from pathlib import Path
 
-from slipcover import Slipcover, branch, merge_coverage
-
-from tests.tools.counted_lines import PACKAGES, UNCOUNTED
+from tests.tools.counted_lines import Counter, modules
 
 #: Modules whose every branch is tested: a fault in them reaches every user.
 CORE = (
@@ -26,17 +23,14 @@ _Files = dict[str, dict[str, dict[str, float]]]
 
 
 def merged(folder: Path) -> _Files:
-    """Return what all processes of a run have seen, and the modules that none has imported."""
-    report = Slipcover(branch=True).get_coverage()
+    """Return what all processes of a run have seen, of all modules."""
+    counter = Counter(Path.cwd())
+    for path in modules(Path.cwd()):
+        counter.code_of(path)
     for path in sorted(folder.glob("*.json")):
-        merge_coverage(report, json.loads(path.read_text(encoding="utf-8")))
-    unseen = Slipcover(branch=True, exclude_also=list(UNCOUNTED))
-    for path in (path for package in PACKAGES for path in Path(package).rglob("*.py")):
-        if str(path) not in report["files"]:
-            tree = branch.preinstrument(ast.parse(path.read_bytes()))
-            unseen.instrument(compile(tree, str(path.resolve()), "exec"))
-    merge_coverage(report, unseen.get_coverage())
-    return report["files"]
+        for file, labels in json.loads(path.read_text(encoding="utf-8")).items():
+            counter.all_seen[file].update(tuple(each) if isinstance(each, list) else each for each in labels)
+    return counter.get_coverage()["files"]
 
 
 def percent(files: _Files, names: list[str]) -> float:

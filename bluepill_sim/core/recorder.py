@@ -18,7 +18,7 @@ the same run leaves the same rows, on both executors, recorded or not.
 """
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Protocol
 
 from bluepill_sim.extension import layout
@@ -68,6 +68,16 @@ class BlockRecorder:
             if len(rows) == self.capacity:
                 self.lost += 1
         rows.append((cycle, address, kind))
+
+    def put_all(self, rows: Iterable[BlockRow]) -> None:
+        """Add rows, as `put` does each."""
+        if self._on_full is not None:
+            for row in rows:
+                self.put(*row)
+            return
+        added = tuple(rows)
+        self.lost += max(0, len(self._rows) + len(added) - self.capacity)
+        self._rows.extend(added)
 
     def drain(self) -> list[BlockRow]:
         """Take all rows, oldest first."""

@@ -435,9 +435,7 @@ class NativeEngine(Engine):
     def _take_records(self, rows: int, count: int) -> None:
         try:
             if self.recorder is not None:
-                put = self.recorder.put
-                for cycle, address, kind in RECORD.iter_unpack(ctypes.string_at(rows, count * RECORD.size)):
-                    put(cycle, address, kind)
+                self.recorder.put_all(RECORD.iter_unpack(ctypes.string_at(rows, count * RECORD.size)))
         except BaseException as error:  # noqa: BLE001 - C stands between here and the caller
             self._fail(error)
 

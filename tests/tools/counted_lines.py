@@ -1,27 +1,46 @@
 """Which lines and branches of the packages run: `pytest --count-lines FOLDER`, for tools/check_coverage.py.
 
-Each process of a run writes a file of its own. slipcover puts probes into the bytecode of what is imported, which
-cost a tenth of what tracing does (coverage.py before Python 3.12), as long as those that were seen are taken out again.
-Its own command does so amid a test, in a pause which an exception from a signal leaves half done; here it is done
-between two tests.
+Each process of a run writes a file of its own. slipcover puts probes into the bytecode of what is imported: calls,
+each behind an instruction that does nothing, and that becomes a jump over the call once it was seen.
+
+slipcover itself makes new code for that jump and looks for all functions that have the old one; here it is written
+in place, between two tests. And slipcover makes a module's probes in every process, 20 s in each; here they are made
+once and kept by the hash of the source, as bytecode is. From Python 3.12 on the interpreter takes probes out.
 """
 
+import ast
+import ctypes
+import hashlib
 import json
+import marshal
 import os
 import sys
-import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dis import opmap
+from functools import partial
+from importlib.abc import MetaPathFinder
+from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from pathlib import Path
+from types import CodeType, ModuleType
 
+import slipcover.slipcover
 from _pytest.assertion.rewrite import AssertionRewritingHook
-from slipcover import FileMatcher, ImportManager, Slipcover
+from slipcover import Slipcover, branch
 
 PACKAGES = ("simbase", "p2os", "bluepill_sim", "adapter_sim", "robot_bench", "hardware")
 #: Beside `# pragma: no cover` and `if TYPE_CHECKING:`, which slipcover leaves out by itself.
 UNCOUNTED = (r"@overload", r"raise NotImplementedError", r"\.\.\.$")
-#: No probe is called so often that slipcover takes it out by itself.
-NEVER = 2**31 - 1
-#: chosen: seconds of processor time between two times, and at least so many times what one has taken.
-PAUSE_S, PAUSES = 1.0, 10
+#: Whether probes are calls within the code, and can be kept with it.
+IS_IN_CODE = sys.version_info < (3, 12)
+#: Where code is kept, in the project.
+KEPT = Path(".pytest_cache", "counted")
+#: Stands in kept code for what a probe calls.
+CALLED = "what a probe calls"
+#: Whatever else changes what is kept.
+MAKER = Path(__file__).read_bytes() + f"{sys.version} {slipcover.__version__}".encode()
+
+Label = int | tuple[int, int]  # a line, or a branch's two lines
 
 
 def is_ours(module: str) -> bool:
@@ -29,10 +48,151 @@ def is_ours(module: str) -> bool:
     return module.partition(".")[0] in PACKAGES
 
 
+def modules(root: Path) -> list[Path]:
+    """Return the files of all modules of the packages."""
+    return [path for package in PACKAGES for path in sorted((root / package).rglob("*.py"))]
+
+
+class Numbers:
+    """In place of slipcover's module of probes: a probe is its number in the file."""
+
+    signal = CALLED
+
+    def __init__(self) -> None:
+        self._made = 0
+
+    def new(self, _counter: Slipcover, _file: str, _label: Label, _threshold: int) -> int:
+        """Return the next number."""
+        self._made += 1
+        return self._made - 1
+
+
+def in_order_of_probes(code: CodeType) -> Iterator[CodeType]:
+    """Go through a module's code, what is within a function before the function."""
+    for each in code.co_consts:
+        if isinstance(each, CodeType):
+            yield from in_order_of_probes(each)
+    yield code
+
+
+def code_of(counter: Slipcover, path: Path) -> CodeType:
+    """Return a module's code with slipcover's probes."""
+    return counter.instrument(compile(branch.preinstrument(ast.parse(path.read_bytes())), str(path), "exec"))
+
+
+def code_to_keep(path: Path) -> bytes:
+    """Return a module's code, where its probes are, and which lines and branches there are, marshalled."""
+    counter = Slipcover(branch=True)
+    slipcovers, slipcover.slipcover.probe = slipcover.slipcover.probe, Numbers()
+    try:
+        code = code_of(counter, path)
+    finally:
+        slipcover.slipcover.probe = slipcovers
+    places = [counter.code2index[each] for each in in_order_of_probes(code)]
+    return marshal.dumps((code, places, counter.code_lines[str(path)], counter.code_branches[str(path)]))
+
+
+def keep(path: Path, root: Path) -> Path:
+    """Return the file where a module's code is kept, made where that is not done."""
+    made_of = (str(path).encode(), path.read_bytes(), MAKER)
+    file = root / KEPT / hashlib.sha256(b"\0".join(made_of)).hexdigest()
+    if not file.exists():
+        file.parent.mkdir(parents=True, exist_ok=True)
+        part = file.with_suffix(f".{os.getpid()}")
+        part.write_bytes(code_to_keep(path))
+        part.replace(file)
+    return file
+
+
+def keep_all(root: Path) -> None:
+    """Keep the code of all modules, on all cores, and of no others."""
+    with ProcessPoolExecutor() as pool:
+        kept = {*pool.map(partial(keep, root=root), modules(root), chunksize=8)}
+    for file in {*(root / KEPT).glob("*")} - kept:
+        file.unlink()
+
+
+class Counter(Slipcover):
+    """slipcover's counter, with code that is kept and probes that are taken out in place."""
+
+    def __init__(self, root: Path) -> None:
+        super().__init__(branch=True, exclude_also=list(UNCOUNTED))
+        self._root = root
+        self._counted: list[tuple[CodeType, set[int], list[tuple[int, Label]]]] = []  # of each: seen, where which are
+
+    def code_of(self, path: Path) -> CodeType:
+        """Return a module's code with probes, and count what they see from now on."""
+        if not IS_IN_CODE:
+            return code_of(self, path)
+        kept = marshal.loads(keep(path, self._root).read_bytes())  # noqa: S302 - of this tool's own making
+        code, places, self.code_lines[str(path)], self.code_branches[str(path)] = kept
+        seen = set[int]()
+        code = calling(code, seen)
+        probes = [
+            (id(each) + CodeType.__basicsize__ + offset, label)
+            for each, labels in zip(in_order_of_probes(code), places, strict=True) for offset, label in labels
+        ]  # fmt: skip
+        self._counted.append((code, seen, probes))  # the code, for what is freed may not be written to
+        return code
+
+    def take_out_seen(self) -> None:
+        """Note what was seen since the last time, and take its probes out."""
+        for code, seen, probes in self._counted:
+            while seen:
+                address, label = probes[seen.pop()]
+                self.all_seen[code.co_filename].add(label)
+                ctypes.c_ubyte.from_address(address).value = opmap["JUMP_FORWARD"]
+
+    def seen(self) -> dict[str, list[Label]]:
+        """Return all lines and branches that were seen, by file."""
+        self.take_out_seen()
+        for file, labels in self._get_newly_seen().items():  # those that the interpreter tells of
+            self.all_seen[file].update(labels)
+        return {file: sorted(labels, key=str) for file, labels in self.all_seen.items()}
+
+
+def calling(code: CodeType, seen: set[int]) -> CodeType:
+    """Return code whose probes add their numbers to a set."""
+    consts = (
+        calling(each, seen) if isinstance(each, CodeType) else seen.add if each == CALLED else each
+        for each in code.co_consts
+    )
+    return code.replace(co_consts=tuple(consts))
+
+
+class Loader(SourceFileLoader):
+    """Loads a module with probes."""
+
+    def __init__(self, name: str, path: str, counter: Counter) -> None:
+        super().__init__(name, path)
+        self._counter = counter
+
+    def get_code(self, fullname: str) -> CodeType:  # noqa: ARG002 - a loader has one module
+        """Return its code."""
+        return self._counter.code_of(Path(self.path))
+
+
+class Finder(MetaPathFinder):
+    """Finds the modules of the packages in the project, and has them loaded with probes."""
+
+    def __init__(self, root: Path, counter: Counter) -> None:
+        self._root, self._counter = root, counter
+
+    def find_spec(self, name: str, path: Sequence[str] | None, _target: ModuleType | None = None) -> ModuleSpec | None:
+        """Return what says of a module of the packages how it is loaded, and nothing of others."""
+        spec = PathFinder.find_spec(name, path) if is_ours(name) else None
+        if spec is None or spec.origin is None or type(spec.loader) is not SourceFileLoader:
+            return None
+        if not Path(spec.origin).is_relative_to(self._root):
+            return None
+        spec.loader = Loader(name, spec.origin, self._counter)
+        return spec
+
+
 class LineCounter:
     """A plugin of pytest, in place before any of the packages is imported."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, root: Path, folder: Path, *, is_worker: bool) -> None:
         # Where the project is installed its own plugin of pytest comes first. What that has imported is imported anew,
         # and not by pytest, which takes all modules of a plugin's distribution for ones with assertions to rewrite.
         for name in filter(is_ours, list(sys.modules)):
@@ -41,23 +201,18 @@ class LineCounter:
             if isinstance(finder, AssertionRewritingHook):
                 finder._must_rewrite.difference_update([*filter(is_ours, finder._must_rewrite)])
                 finder._marked_for_rewrite_cache.clear()
-        self._folder = folder
-        self._cover = Slipcover(branch=True, d_miss_threshold=NEVER, exclude_also=list(UNCOUNTED))
-        self._imports = ImportManager(self._cover, FileMatcher(sources=PACKAGES))
-        self._imports.__enter__()
-        self._due_s = time.process_time() + PAUSE_S
+        if IS_IN_CODE and not is_worker:
+            keep_all(root)
+        self._folder, self._counter = folder, Counter(root)
+        self._finder = Finder(root, self._counter)
+        sys.meta_path.insert(0, self._finder)
 
     def pytest_runtest_logfinish(self) -> None:
-        """Take out the probes of what was seen, now and then."""
-        began_s = time.process_time()
-        if began_s >= self._due_s:
-            self._cover.deinstrument_seen()
-            now_s = time.process_time()
-            self._due_s = now_s + max(PAUSE_S, PAUSES * (now_s - began_s))
+        """Take out the probes of what was seen."""
+        self._counter.take_out_seen()
 
     def pytest_unconfigure(self) -> None:
         """Write what was seen."""
-        self._imports.__exit__()
+        sys.meta_path.remove(self._finder)
         self._folder.mkdir(exist_ok=True)
-        text = json.dumps(self._cover.get_coverage())
-        (self._folder / f"{os.getpid()}.json").write_text(text, encoding="utf-8")
+        (self._folder / f"{os.getpid()}.json").write_text(json.dumps(self._counter.seen()), encoding="utf-8")

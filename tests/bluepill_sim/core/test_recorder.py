@@ -78,10 +78,11 @@ def test_recording_changes_nothing_and_can_begin_and_end_anywhere(boot) -> None:
     assert (plain.board.cycle, plain.board.pc) == (recorded.board.cycle, recorded.board.pc)
 
 
-def test_a_recorder_is_bounded(boot) -> None:
+@pytest.mark.parametrize("together", [1, 2, 4, 5])
+def test_a_recorder_is_bounded_however_many_rows_come_together(together: int) -> None:
     recorder = BlockRecorder(3)
-    for n in range(5):
-        recorder.put(n, 0, BLOCK)
+    for first in range(0, 5, together):
+        recorder.put_all((n, 0, BLOCK) for n in range(first, min(5, first + together)))
     assert [row[0] for row in recorder.last(2)] == [3, 4]
     assert recorder.last(0) == []
     assert [row[0] for row in recorder.drain()] == [2, 3, 4]

@@ -27,7 +27,7 @@ class Bug:
     name: str
     edits: tuple[tuple[str, str, str], ...]
     answers: tuple[str, ...]
-    duration_s: float = 120.0
+    duration_s: float = 45.0
     #: A thing that is placed when the robot drives, as keys of `[[obstacle]]`; empty for none.
     thing: str = ""
     placed_s: float = 5.0
@@ -135,7 +135,7 @@ NAMED = (
                 "            reconnects = 1;\n            pins_connect(0);\n        }\n        pins_motors(command"),
             ),
         ),
-        answers=("p2dx_con",),
+        answers=("p2dx_con",), duration_s=75.0,
     ),
     Bug(
         name="watchdog-not-fed-in-a-branch",
@@ -188,7 +188,7 @@ OTHERS = (
                 "    dodge->turns += dodge->turns > 1 ? other->turns : 1;"),
             ),
         ),
-        answers=("died",),
+        answers=("died",), duration_s=75.0,
     ),
     Bug(
         name="waits-for-ever",
@@ -198,7 +198,7 @@ OTHERS = (
                 "            while (dodge.turns == 2) {\n            }\n            print_transition(before, &dodge);",
             ),
         ),
-        answers=("stuck at dodge.c",),
+        answers=("stuck at dodge.c",), duration_s=75.0,
     ),
     Bug(
         name="sides-exchanged",
