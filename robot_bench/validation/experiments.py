@@ -105,7 +105,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {one.name: one for one in (
     Experiment(
         name="motors", at_port=True, scenario="motors",
         hypothesis="The robot does what the motor pins say: 0, +3, -4, 0.",
-        procedure="motors.elf holds each pair for three seconds in `room`.",
+        procedure="motors.elf holds each pair for three seconds in the room.",
         measure=lambda trial: motor_figures(trial.record, trial.nominal, MOTORS),
     ),
     Experiment(
@@ -129,13 +129,13 @@ EXPERIMENTS: Mapping[str, Experiment] = {one.name: one for one in (
     Experiment(
         name="only-while-seen", scenario="sensors",
         hypothesis="The robot moves only while a sensor sees something.",
-        procedure="sensors.elf drives at code +2 while any distance pin is high; the posts of `sensors`.",
+        procedure="sensors.elf drives at code +2 while any distance pin is high; the posts of sensors.",
         measure=lambda trial: only_while_seen_figures(trial.record, trial.nominal),
     ),
     Experiment(
         name="encoders", scenario="codes.toml",
         hypothesis="The encoder pins show the wheels' angles in both directions at every speed; a program misses none.",
-        procedure="The run of `codes`: every pose against the pins, every printed count against both.",
+        procedure="The run of codes: every pose against the pins, every printed count against both.",
         measure=lambda trial: [*encoder_figures(trial.record, trial.nominal), *count_figures(trial.record)],
     ),
     Experiment(

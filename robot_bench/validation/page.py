@@ -114,7 +114,7 @@ def _row(result: Result, finding: Finding) -> str:
     grade = "good" if finding.is_met else "bad"
     return (
         f'<td>{_safe(where)}</td><td class="n">{_safe(shown_value(finding.expected, finding.unit))}</td>'
-        f'<td class="n">{_safe(value)}{at}</td><td class="n {grade}">{finding.difference:+.3g}</td>'
+        f'<td class="n">{_safe(value)}{at}</td><td class="n {grade}">{round(finding.difference, 9) + 0.0:+.3g}</td>'
         f'<td>{_strip(finding)}</td><td class="formula">{_safe(finding.bound.formula)}</td>'
     )
 
@@ -124,7 +124,7 @@ def _strip(figure: Figure) -> str:
     unit = STRIP_WIDTH / 2 / STRIP_BOUNDS
     middle = STRIP_WIDTH / 2
     signed = figure.share if figure.difference >= 0 else -figure.share
-    place = middle + unit * max(-STRIP_BOUNDS + 0.06, min(STRIP_BOUNDS - 0.06, signed))
+    place = middle + unit * max(0.12 - STRIP_BOUNDS, min(STRIP_BOUNDS - 0.12, signed))
     colour = "var(--good)" if figure.is_met else "var(--bad)"
     band = 2 * unit if figure.bound.value else 2
     return (
