@@ -24,6 +24,7 @@ BOARD_SOURCES = tuple(source.replace("motors_duty", "motors_bits") for source in
 PROGRAMS = {
     "motors": (*BOARD_SOURCES, "motors.c"),
     "sensors": (*BOARD_SOURCES, "sensors.c"),
+    "codes": (*BOARD_SOURCES, "codes.c", "odometer.c"),
     "encoders": (*BOARD_SOURCES, "encoders.c", "odometer.c"),
     "analog": (*BOARD_SOURCES, "analog.c"),
     "dodge": (*BOARD_SOURCES, "dodge.c", "dodge_fsm.c", "odometer.c"),

@@ -122,6 +122,11 @@ def body_note(name: str) -> str | None:
     return f"body {best}: the best that is installed{f' ({lacking})' if lacking else ''}"
 
 
+def installed_bodies() -> tuple[str, ...]:
+    """Return the bodies that ship and can be made here, the simplest first."""
+    return tuple(body for body in BODY_NAMES if not _missing(body))
+
+
 def _missing(body: str) -> list[str]:
     return [package for package in NEEDS[body] if not _is_installed(package)]
 

@@ -1,0 +1,159 @@
+"""The experiments: what is claimed, what is run, what is measured. Source: the thesis's validations 5.4.1 to 5.4.4."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+
+from robot_bench.recording.run_record import RunRecord
+from robot_bench.scenario.goals.judging import Judgement
+from robot_bench.scenario.included_files import Setting
+from robot_bench.scenario.scenario import Scenario, known_scenarios, load_scenario
+from robot_bench.validation.encoders import count_figures, encoder_figures
+from robot_bench.validation.figures import Bound, Figure, Finding, Missing
+from robot_bench.validation.motors import Pair, motor_figures
+from robot_bench.validation.nominal import Nominal
+from robot_bench.validation.sensors import only_while_seen_figures, sensor_figures
+from simbase.timing import NS_PER_S
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trial:
+    """One run of a scenario in one variant of the bench, and what is expected of it."""
+
+    record: RunRecord
+    nominal: Nominal
+    scenario: Scenario
+    judgement: Judgement
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Experiment:
+    """One claim about the bench.
+
+    `scenario` is a shipped one's name or a file of this package, in several worlds where `worlds` names them; `at_port`
+    says whether a robot at a port can do it, where nothing is placed and nothing but its odometry is known.
+    """
+
+    name: str
+    hypothesis: str
+    procedure: str
+    scenario: str
+    measure: Callable[[Trial], Sequence[Finding]]
+    worlds: tuple[str, ...] = ()
+    seeds: tuple[int, ...] = (0,)
+    settings: tuple[Setting, ...] = ()
+    at_port: bool = False
+
+    def load(self, settings: Sequence[Setting] = ()) -> Scenario:
+        """Return its scenario, with what is set otherwise.
+
+        Raises:
+            ScenarioError, UsageError: A setting cannot be.
+        """
+        place = self.scenario if self.scenario in known_scenarios() else str(_FILES / self.scenario)
+        return load_scenario(place, settings=[*self.settings, *settings])
+
+
+_FILES = Path(str(files(__package__)))
+
+
+def _codes() -> list[tuple[Pair, float]]:
+    """Return what codes.elf shows: 64 pairs to and fro, a second each, then seven changes of three seconds."""
+    row, result = range(-4, 4), list[tuple[Pair, float]]()
+    for place, left in enumerate(row):
+        result += [((left, right), 1.0) for right in (row if place % 2 == 0 else reversed(row))]
+    changes = ((3, 3), (-4, -4), (3, 3), (0, 0), (3, -4), (-4, 3), (0, 0))
+    return result + [(pair, 3.0) for pair in changes]
+
+
+#: What motors.elf shows after standing still; a tick longer than three seconds each.
+MOTORS: Sequence[tuple[Pair, float]] = (((3, 3), 3.01), ((-4, -4), 3.01), ((0, 0), 3.01))
+CODES: Sequence[tuple[Pair, float]] = tuple(_codes())
+
+
+def drive_figures(trial: Trial) -> list[Finding]:
+    """Return how often the robot touched something, and how many of the scenario's goals were met."""
+    judgement, poses = trial.judgement, trial.record.poses
+    if not poses:
+        return [Missing(group="motion", what="collisions", why="no pose was recorded")]
+    where = "; ".join(str(hit) for hit in trial.record.contacts[:1])
+    goals = len(trial.scenario.goals)
+    return [
+        Figure(
+            group="motion", what="collisions", expected=0, measured=poses[-1].collisions, uncertainty=0, unit="",
+            bound=Bound(name="collisions", value=0, formula="none"), at=where,
+        ),
+        Figure(
+            group="motion", what="goals of the scenario", expected=goals, measured=len(judgement.met), uncertainty=0,
+            unit="", bound=Bound(name="goals", value=0, formula="all met"), at="; ".join(judgement.missed)[:200],
+        ),
+    ]  # fmt: skip
+
+
+def _long_drive(trial: Trial) -> list[Finding]:
+    found = [finding for finding in encoder_figures(trial.record, trial.nominal) if "codes reached" not in finding.what]
+    length_mm = trial.record.poses[-1].left_angle / 1e6 * trial.scenario.parameters.body.wheel_diameter_m * 500
+    needed_mm = 32768 * trial.scenario.parameters.distance_nm_per_count / 1e6
+    return [*found, Figure(
+        group="motion", what="turns of the position counter, whole ones", expected=1, measured=length_mm // needed_mm,
+        uncertainty=0, unit="", bound=Bound(name="wrap", value=0, formula=f"{needed_mm / 1000:.4g} m of way"),
+    )]  # fmt: skip
+
+
+EXPERIMENTS: Mapping[str, Experiment] = {one.name: one for one in (
+    Experiment(
+        name="motors", at_port=True, scenario="motors",
+        hypothesis="The robot does what the motor pins say: 0, +3, -4, 0.",
+        procedure="motors.elf holds each pair for three seconds in the room.",
+        measure=lambda trial: motor_figures(trial.record, trial.nominal, MOTORS),
+    ),
+    Experiment(
+        name="codes", at_port=True, scenario="codes.toml",
+        hypothesis="Every pair of motor codes comes to its speed, and every change keeps to its ramp.",
+        procedure="codes.elf holds all 64 pairs for a second, then changes from end to end, on an empty floor.",
+        measure=lambda trial: motor_figures(trial.record, trial.nominal, CODES),
+    ),
+    Experiment(
+        name="sensors", scenario="sensors",
+        hypothesis="Each distance pin rises for a thing before its own sonar, and for no other.",
+        procedure="A post stands 0.45 m before each of the eight sonar in turn, for a second.",
+        measure=lambda trial: sensor_figures(trial.record, trial.nominal, trial.scenario),
+    ),
+    Experiment(
+        name="sensors-all", scenario="sensors-all.toml",
+        hypothesis="All eight distance pins rise and fall for things that come and go at once.",
+        procedure="Posts stand before all eight sonar for three seconds, twice.",
+        measure=lambda trial: sensor_figures(trial.record, trial.nominal, trial.scenario),
+    ),
+    Experiment(
+        name="only-while-seen", scenario="sensors",
+        hypothesis="The robot moves only while a sensor sees something.",
+        procedure="sensors.elf drives at code +2 while any distance pin is high; the posts of sensors.",
+        measure=lambda trial: only_while_seen_figures(trial.record, trial.nominal),
+    ),
+    Experiment(
+        name="encoders", scenario="codes.toml",
+        hypothesis="The encoder pins show the wheels' angles in both directions at every speed; a program misses none.",
+        procedure="The run of codes: every pose against the pins, every printed count against both.",
+        measure=lambda trial: [*encoder_figures(trial.record, trial.nominal), *count_figures(trial.record)],
+    ),
+    Experiment(
+        name="long-drive", scenario="long-drive.toml",
+        hypothesis="The encoder pins stay right where the position in the packets wraps.",
+        procedure="Straight on for more than 27.5 m.",
+        measure=_long_drive,
+    ),
+    Experiment(
+        name="dodge", scenario="dodge", worlds=("room", "arena", "office"), seeds=(0, 1),
+        settings=(("controller.errors", "realistic"),),
+        hypothesis="A program that dodges by the distance pins touches nothing.",
+        procedure="dodge.elf roams for two minutes in each world, with realistic sensor errors, a run a seed.",
+        measure=drive_figures,
+    ),
+)}  # fmt: skip
+
+#: The scenario that a robot at a port runs: steps so small that every code is within the cautious limits.
+AT_PORT: tuple[Setting, ...] = (("adapter.step_mm_s", 40.0),)
+#: What a run at a port lasts beyond its program, seconds.
+PORT_SLACK_NS = 2 * NS_PER_S

@@ -1,0 +1,216 @@
+"""What the motors experiments measure: pins, commands on the line, rim speeds, ramps and delays."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+from p2os.protocol.commands import CommandNumber
+from robot_bench.events.kinds import Pose
+from robot_bench.recording.run_record import RunRecord
+from robot_bench.validation.figures import Bound, Figure, Finding, Missing, worst_or_missing
+from robot_bench.validation.nominal import JITTER_S, POSE_RESOLUTION_MM_S, POSE_S, Nominal
+from robot_bench.validation.signals import Course, at, motor_pairs, poses_between, rim_mm_s, sent
+from simbase.timing import NS_PER_S, Nanos
+
+Pair = tuple[int, int]
+#: Of a ramp the part that is fitted: its ends are rounded by a controller's steps.
+FITTED = 0.1, 0.9
+#: chosen: shares of a ramp's slope, and what they are for.
+SLOPE = 0.0015, "a controller's ramp goes in whole mm/s and steps of milliseconds"
+SLOPE_AT_PORT = 0.05, "speeds are whole mm/s, each 100 ms"
+#: chosen: poses on a ramp that a line can be laid through.
+LEAST_POSES = 6
+
+
+def motor_figures(record: RunRecord, nominal: Nominal, wanted: Sequence[tuple[Pair, float]]) -> list[Finding]:
+    """Return what a program did that shows these pairs one after the other, each for so many seconds.
+
+    The first pair is the stand still before; `wanted` begins with the first that moves.
+    """
+    course = motor_pairs(record)
+    shown = [pair for _, pair in course]
+    if not shown:
+        return [Missing(group="pins", what="motor pins", why="no motor pin was recorded")]
+    course = course[next((place for place, (_, pair) in enumerate(course) if pair != (0, 0)), len(course)) :]
+    if not course:
+        return [Missing(group="pins", what="pairs of codes in their order", why="the motor pins said nothing but 0")]
+    ends = [t for t, _ in course[1:]] + [record.last_ns]
+    held = [(pair, t, end) for (t, pair), end in zip(course, ends, strict=True)]
+    result: list[Finding] = [_order(held, wanted), _holds(held, wanted)]
+    spans = _spans(held)
+    if not nominal.is_direct and record.wire:
+        result += _commands(record, nominal, spans)
+    return result + _motion(record, nominal, spans)
+
+
+def _order(held: Sequence[tuple[Pair, Nanos, Nanos]], wanted: Sequence[tuple[Pair, float]]) -> Finding:
+    """Return how many of the pairs came in their order."""
+    right = 0
+    for (pair, _, _), (expected, _) in zip(held, wanted, strict=False):
+        if pair != expected:
+            break
+        right += 1
+    surplus = max(0, len(held) - len(wanted))
+    at_text = f"the pins said {held[right][0]}" if right < min(len(held), len(wanted)) else ""
+    return Figure(
+        group="pins", what="pairs of codes in their order", expected=len(wanted), measured=right - surplus,
+        uncertainty=0, unit="", bound=Bound(name="order of codes", value=0, formula="every one, and no other"),
+        count=len(wanted), at=at_text,
+    )  # fmt: skip
+
+
+def _holds(held: Sequence[tuple[Pair, Nanos, Nanos]], wanted: Sequence[tuple[Pair, float]]) -> Finding:
+    """Return the hold time that is furthest from what the program says; the last pair's end is not known."""
+    bound = Bound(name="hold time", value=JITTER_S, formula=f"jitter of a tick's program {JITTER_S * 1e6:g} us")
+    figures = [
+        Figure(
+            group="pins", what="time that a pair is held", expected=seconds, measured=(end - begin) / NS_PER_S,
+            uncertainty=1e-9, unit="s", bound=bound, at=str(pair),
+        )
+        for (pair, begin, end), (expected, seconds) in zip(held[:-1], wanted, strict=False) if pair == expected
+    ]  # fmt: skip
+    return worst_or_missing(figures, "pins", "time that a pair is held", "no pair of codes came as expected")
+
+
+def _spans(held: Sequence[tuple[Pair, Nanos, Nanos]]) -> list[tuple[Pair, Pair, Nanos, Nanos]]:
+    """Return (pair before, pair, begin, end) for each pair."""
+    first = ((0, 0), held[0][0], held[0][1], held[0][2]) if held else None
+    rest = [(before[0], pair, begin, end) for before, (pair, begin, end) in pairwise(held)]
+    return [first, *rest] if first else []
+
+
+def _commands(record: RunRecord, nominal: Nominal, spans: Sequence[tuple[Pair, Pair, Nanos, Nanos]]) -> list[Finding]:
+    """Return the rounding of the commands, and how long they take to the robot."""
+    rows = (
+        ("VEL", CommandNumber.VEL, nominal.forward_mm_s, "mm/s"),
+        ("RVEL", CommandNumber.RVEL, nominal.turn_deg_s, "deg/s"),
+    )
+    courses = {name: sent(record, number) for name, number, _, _ in rows}
+    result: list[Finding] = []
+    delay = nominal.to_command
+    for name, _, value_of, unit in rows:
+        bound = Bound(name=f"rounding of {name}", value=0.5, formula=f"{name} is a whole number of {unit}: half of it")
+        figures = []
+        for _, pair, begin, end in spans:
+            got = at(courses[name], begin + round((delay.seconds + 1e-6) * NS_PER_S))
+            if got is not None and begin + delay.seconds * NS_PER_S < end:
+                figures.append(Figure(
+                    group="wire", what=f"{name} for a pair of codes", expected=value_of(pair), measured=float(got),
+                    uncertainty=0, unit=unit, bound=bound, at=str(pair),
+                ))  # fmt: skip
+        result.append(worst_or_missing(figures, "wire", f"{name} for a pair of codes", f"no {name} came to the robot"))
+    late = [
+        Figure(
+            group="wire", what="change of the pins to the robot's last command", expected=0.0,
+            measured=(changed - begin) / NS_PER_S, uncertainty=1e-9, unit="s", bound=delay.bound("delay to the robot"),
+            at=f"{before} -> {pair}",
+        )
+        for before, pair, begin, end in spans
+        if (changed := _last_change(courses, begin, end)) is not None
+    ]  # fmt: skip
+    return [*result, worst_or_missing(late, "wire", "change of the pins to the robot's last command", "none came")]
+
+
+def _last_change(courses: dict[str, Course[int]], begin: Nanos, end: Nanos) -> Nanos | None:
+    """Return when the later of the two commands took its new value first; None where neither has changed."""
+    times = []
+    for course in courses.values():
+        before = at(course, begin)
+        times += [t for t, value in course if begin < t < end and value != before][:1]
+    return max(times, default=None)
+
+
+def _motion(record: RunRecord, nominal: Nominal, spans: Sequence[tuple[Pair, Pair, Nanos, Nanos]]) -> list[Finding]:
+    """Return steady speeds, slopes of the ramps and their delay."""
+    steady: list[Figure] = []
+    slopes: dict[str, list[Figure]] = {"both wheels alike": [], "turning on the spot": []}
+    delays: list[Figure] = []
+    for before, pair, begin, end in spans:
+        wait = max(_ramp_s(nominal, before, pair), 0.0) + nominal.to_motion.seconds + POSE_S
+        poses = poses_between(record, begin + round(wait * NS_PER_S), end)
+        if poses:
+            steady += [_steady(nominal, side, code, poses, pair) for side, code in zip(_SIDES, pair, strict=True)]
+        kind = _kind_of_change(before, pair)
+        if kind is None or not nominal.ramp_mm_s2:
+            continue
+        nominal_slope = nominal.ramp_mm_s2 if kind == "both wheels alike" else nominal.turn_ramp_mm_s2
+        fitted = _fit(record, begin, end)
+        if fitted is None:
+            continue
+        slope, began = fitted
+        what = f"{before} -> {pair}"
+        slopes[kind].append(_slope(nominal, nominal_slope, abs(slope), kind, what))
+        delays.append(Figure(
+            group="motion", what="change of the pins to the wheels' ramp", expected=0.0,
+            measured=began - begin / NS_PER_S, uncertainty=1e-3, unit="s",
+            bound=nominal.to_motion.bound("delay to the wheels" + nominal.suffix), at=what,
+        ))  # fmt: skip
+    result = [worst_or_missing(steady, "motion", "steady rim speed", "no wheel came to a steady speed")]
+    if nominal.ramp_mm_s2:
+        result += [
+            worst_or_missing(found, "motion", f"ramp, {kind}", "no such change was seen")
+            for kind, found in slopes.items() if found or kind == "both wheels alike"
+        ]  # fmt: skip
+        result.append(worst_or_missing(delays, "motion", "change of the pins to the wheels' ramp", "no ramp was seen"))
+    return result
+
+
+_SIDES = ("motor1", "motor2")
+
+
+def _steady(nominal: Nominal, side: str, code: int, poses: Sequence[Pose], pair: Pair) -> Figure:
+    measured = sum(rim_mm_s(pose, side) for pose in poses) / len(poses)
+    return Figure(
+        group="motion", what="steady rim speed", expected=code * nominal.step_mm_s, measured=measured,
+        uncertainty=POSE_RESOLUTION_MM_S, unit="mm/s", bound=nominal.speed_bound,
+        at=f"{'left' if side == 'motor1' else 'right'} of {pair}",
+    )  # fmt: skip
+
+
+def _ramp_s(nominal: Nominal, before: Pair, pair: Pair) -> float:
+    """Return how long a change of speed takes at most: straight and turning parts one after the other."""
+    if not nominal.ramp_mm_s2:
+        return 0.0
+    straight = abs(sum(pair) - sum(before)) / 2 * nominal.step_mm_s / nominal.ramp_mm_s2
+    turning = abs((pair[1] - pair[0]) - (before[1] - before[0])) / 2 * nominal.step_mm_s / nominal.turn_ramp_mm_s2
+    return straight + turning
+
+
+def _kind_of_change(before: Pair, pair: Pair) -> str | None:
+    """Return which ramp a change shows by itself; None: both together, or too short a one."""
+    left, right = pair[0] - before[0], pair[1] - before[1]
+    if min(abs(left), abs(right)) < 3:
+        return None
+    return {left: "both wheels alike", -left: "turning on the spot"}.get(right)
+
+
+def _fit(record: RunRecord, begin: Nanos, end: Nanos) -> tuple[float, float] | None:
+    """Return the slope of the right wheel's ramp, mm/s2, and when it began, seconds; None: too few poses."""
+    poses = poses_between(record, begin - NS_PER_S // 2, end)
+    if not poses:
+        return None
+    # From its own speed before to its own after: a speed that is wrong tells of itself.
+    low, high = rim_mm_s(poses[0], "motor2"), rim_mm_s(poses[-1], "motor2")
+    if abs(high - low) < 1.0:
+        return None
+    shares = [
+        (pose.t / NS_PER_S, rim_mm_s(pose, "motor2"), (rim_mm_s(pose, "motor2") - low) / (high - low))
+        for pose in poses if pose.t >= begin
+    ]  # fmt: skip
+    fitted = [(t, speed) for t, speed, share in shares if FITTED[0] <= share <= FITTED[1]]
+    if len(fitted) < LEAST_POSES:
+        return None
+    middle_t, middle_v = (sum(values) / len(fitted) for values in zip(*fitted, strict=True))
+    slope = sum((t - middle_t) * (v - middle_v) for t, v in fitted) / sum((t - middle_t) ** 2 for t, _ in fitted)
+    return slope, middle_t - (middle_v - low) / slope
+
+
+def _slope(nominal: Nominal, expected: float, measured: float, kind: str, what: str) -> Figure:
+    share, why = SLOPE_AT_PORT if nominal.at_port else SLOPE
+    return Figure(
+        group="motion", what=f"ramp, {kind}", expected=expected, measured=measured,
+        uncertainty=expected * 1e-4, unit="mm/s2", at=what,
+        bound=Bound(
+            name="slope of a ramp" + ", at a port" * nominal.at_port, value=share * expected,
+            formula=f"{share:.2%} of {expected:.4g} mm/s2: {why}",
+        ),
+    )  # fmt: skip

@@ -1,0 +1,172 @@
+"""What a bench should do by its settings: speeds, ramps and delays, each with the formula that it comes from.
+
+Everything here is worked out from the scenario as it stands, before anything is run and without looking at a part of
+the bench; what is set otherwise for a trial (`--set`) does not move what is expected of it.
+"""
+
+import math
+from dataclasses import dataclass
+
+from adapter_sim.pinout import load_pinout
+from p2os.protocol.times import CYCLE_NS
+from robot_bench.events.kinds import MICRO
+from robot_bench.recording.recorder import SAMPLE_NS
+from robot_bench.scenario.scenario import Scenario
+from robot_bench.validation.figures import Bound
+from robot_bench.validation.signals import ENCODER_STEPS
+from simbase.timing import NS_PER_MS, NS_PER_S
+
+#: Bits of a character on the line: 8N1.
+BITS = 10
+LINE_BAUD = 9600
+#: A pair of VEL and RVEL: two frames of nine bytes. Source: PROTOCOL.md.
+PAIR_BYTES = 18
+#: A standard packet with two sonar readings, as a Pioneer 2 sends it; each reading more is three bytes.
+SIP_BYTES = 36
+#: The body's step.
+BODY_STEP_S = 1e-3
+#: The recording's time between two poses, seconds.
+POSE_S = SAMPLE_NS / NS_PER_S
+#: A tick of the example programs, seconds.
+TICK_S = 0.01
+#: chosen: what a program may take from its tick to its pins, and to the end of a line of text, seconds.
+PROGRAM_S = 1e-3
+#: chosen: by how much that differs from tick to tick: 3,600 cycles at 72 MHz.
+JITTER_S = 50e-6
+#: The trace's resolution of a rim's speed, mm/s; the bodies hold what their motors want.
+BODY_MM_S = 1e-3
+#: Of a robot at a port only its packets are known: whole mm/s of a wheel, and a time that is that of a packet.
+PORT_MM_S = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Delay:
+    """A time in seconds and how it comes about."""
+
+    seconds: float
+    formula: str
+
+    def __add__(self, other: "Delay") -> "Delay":
+        return Delay(self.seconds + other.seconds, f"{self.formula} + {other.formula}")
+
+    def bound(self, name: str) -> Bound:
+        """Return it as a bound in seconds."""
+        return Bound(name=name, value=self.seconds, formula=f"{self.formula} = {self.seconds * 1000:.4g} ms")
+
+
+class Nominal:
+    """What is expected of a scenario's bench.
+
+    Args:
+        scenario: As it stands, with its mode.
+        at_port: Whether its robot stands at a port.
+    """
+
+    def __init__(self, scenario: Scenario, *, at_port: bool = False) -> None:
+        self.at_port = at_port
+        self.is_direct = scenario.mode == "direct"
+        robot, adapter = scenario.parameters, scenario.adapter
+        settings = scenario.direct if self.is_direct else adapter
+        self.step_mm_s = settings.step_um_per_s / 1000
+        self.track_mm = robot.track_mm
+        self.encoder_step_mm = math.pi * robot.body.wheel_diameter_m * 1000 / ENCODER_STEPS
+        self.threshold_m = scenario.threshold_m
+        self.steps = 1 << len(load_pinout().value("motor1").wires) - 1
+        ramp = scenario.direct.ramp_um_per_s2
+        #: Change of a rim's speed a second where both wheels do the same, and where they turn the robot; 0: jumps.
+        self.ramp_mm_s2 = (ramp or 0) / 1000 if self.is_direct else float(robot.motion.accel_mm_s2)
+        turning = math.radians(robot.motion.rot_accel_deg_s2) * robot.track_mm / 2
+        self.turn_ramp_mm_s2 = self.ramp_mm_s2 if self.is_direct else turning
+        self._distance_mm = robot.distance_nm_per_count / 1e6
+        self._heading_mm = math.pi * robot.track_mm / robot.angle_counts_per_turn
+        self._direct, self._adapter = scenario.direct, adapter
+        readings = scenario.controller.sonar_per_sip.pings_per_cycle or robot.sonar_fitted
+        self._rounds = math.ceil(robot.sonar_fitted / readings)
+
+    @property
+    def suffix(self) -> str:
+        """What the name of a delay ends with, whose size is another in each mode."""
+        return ", direct" if self.is_direct else ", at a port" if self.at_port else ""
+
+    def forward_mm_s(self, pair: tuple[int, int]) -> float:
+        """Return the robot's speed for a pair of motor values, mm/s."""
+        return (pair[0] + pair[1]) / 2 * self.step_mm_s
+
+    def turn_deg_s(self, pair: tuple[int, int]) -> float:
+        """Return its turn to the left, degrees a second."""
+        return math.degrees((pair[1] - pair[0]) * self.step_mm_s / self.track_mm)
+
+    @property
+    def speed_bound(self) -> Bound:
+        """How far a steady rim speed may be off, mm/s."""
+        seen, told = (PORT_MM_S, "of its packets") if self.at_port else (BODY_MM_S, "of the trace")
+        if self.is_direct:
+            return Bound(name="rim speed, direct", value=seen, formula=f"resolution {told} {seen:g} mm/s")
+        rim = math.radians(0.5) * self.track_mm / 2
+        return Bound(
+            name="rim speed" + ", at a port" * self.at_port, value=0.5 + rim + seen,
+            formula=f"0.5 mm/s (VEL is whole mm/s) + 0.5 deg/s x {self.track_mm / 2:g} mm (RVEL is whole deg/s)"
+            f" + resolution {told} {seen:g} mm/s = {0.5 + rim + seen:.3g} mm/s",
+        )  # fmt: skip
+
+    @property
+    def to_command(self) -> Delay:
+        """From a change of the motor pins to the last byte of the pair of commands at the robot, at most."""
+        adapter = self._adapter
+        votes = adapter.sample_count // 2 + 1
+        sampled = votes * adapter.sample_period_ns / NS_PER_S
+        line = PAIR_BYTES * BITS / LINE_BAUD
+        spacing = adapter.pair_spacing_ns / NS_PER_S
+        return Delay(
+            sampled + spacing + line,
+            f"{votes} samples of {adapter.sample_period_ns / NS_PER_MS:g} ms + spacing of pairs {spacing * 1000:g} ms"
+            f" + {PAIR_BYTES} characters {line * 1000:.4g} ms",
+        )
+
+    @property
+    def to_motion(self) -> Delay:
+        """From a change of the motor pins to the beginning of the wheels' ramp, at most."""
+        body = Delay(BODY_STEP_S, "a step of the body 1 ms")
+        if self.at_port:
+            body += Delay(CYCLE_NS / NS_PER_S + self.packet_s, f"a packet's age and its {SIP_BYTES} characters")
+        return body if self.is_direct else self.to_command + body
+
+    @property
+    def to_distance_pin(self) -> Delay:
+        """From a thing that appears or goes to the distance pin, at most."""
+        if self.is_direct:
+            seconds = self._direct.sensor_period_ns / NS_PER_S
+            return Delay(seconds, f"a period of the sensors {seconds * 1000:g} ms")
+        cycle = CYCLE_NS / NS_PER_S
+        return Delay(
+            (self._rounds + 1) * cycle + self.packet_s,
+            f"{self._rounds} packets for a round of all sonar x {cycle * 1000:g} ms"
+            f" + a reading waits for its packet {cycle * 1000:g} ms"
+            f" + {SIP_BYTES} characters {self.packet_s * 1000:.4g} ms",
+        )  # fmt: skip
+
+    @property
+    def packet_s(self) -> float:
+        """Time of a standard packet on the line, seconds."""
+        return SIP_BYTES * BITS / LINE_BAUD
+
+    def encoder_bound(self, rim_mm_s: float) -> Bound:
+        """How far the code on the pins may be from the wheel's angle, steps; the middle of a code is its angle."""
+        if self.is_direct:
+            delay, formula = self._direct.encoder_period_ns / NS_PER_S, "period of the encoders"
+            odometry, counts = 0.0, ""
+        else:
+            delay, formula = CYCLE_NS / NS_PER_S + self.packet_s + TICK_S, "packet cycle, its characters and a pass"
+            odometry = self._distance_mm + self._heading_mm
+            counts = f" + a count of odometry {odometry:.3g} mm"
+        moved = abs(rim_mm_s) * delay + odometry
+        value = 0.5 + moved / self.encoder_step_mm
+        return Bound(
+            name="encoder while it turns", value=value,
+            formula=f"half a step + ({abs(rim_mm_s):.4g} mm/s x {delay * 1000:.4g} ms ({formula}){counts})"
+            f" / {self.encoder_step_mm:.4g} mm = {value:.3g} steps",
+        )  # fmt: skip
+
+
+#: For the trace's own integers.
+POSE_RESOLUTION_MM_S = 1000 / MICRO

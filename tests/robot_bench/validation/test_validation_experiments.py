@@ -1,0 +1,186 @@
+"""The experiments of `p2os validate`: the bench passes them, and each planted error is told by the right figure."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import pytest
+
+from p2os.cli.main import run as p2os
+from robot_bench.events.codec import Json
+from robot_bench.scenario.included_files import Setting
+from robot_bench.validation.experiments import CODES, EXPERIMENTS
+from robot_bench.validation.figures import LOOSE_BECAUSE, Figure, loose
+from robot_bench.validation.trials import Result, Variant, run_trials, told, variants
+
+DIRECT, ADAPTER = Variant("direct", "", "kinematic"), Variant("adapter", "model", "kinematic")
+FIRMWARE = Variant("adapter", "firmware", "kinematic")
+
+
+def here(job: Callable[[int, Callable[[], None]], Json], count: int, on_done: Callable[[int, Json], None]) -> bool:
+    """Do all pieces in this process."""
+    for number in range(count):
+        on_done(number, job(number, lambda: None))
+    return True
+
+
+def results_of(
+    names: Sequence[str], chosen: Sequence[Variant], folder: Path, settings: Sequence[Setting] = ()
+) -> list[Result]:
+    return run_trials([EXPERIMENTS[name] for name in names], chosen, folder, settings=settings, in_processes=here)
+
+
+@pytest.fixture(scope="module")
+def passing(tmp_path_factory: pytest.TempPathFactory) -> list[Result]:
+    names = [name for name in EXPERIMENTS if name not in {"dodge", "long-drive"}]
+    return results_of(names, [DIRECT, ADAPTER], tmp_path_factory.mktemp("validation"))
+
+
+def test_every_experiment_holds_pins_straight_to_the_body_and_through_the_adapter(passing: list[Result]) -> None:
+    assert [line for result in passing for line in told(result)] == []
+    assert len(passing) == 2 * (len(EXPERIMENTS) - 2)
+    assert all(result.passed and not result.folder for result in passing)
+
+
+def test_each_bound_would_be_broken_at_half_its_size_or_says_why_not(passing: list[Result]) -> None:
+    found = loose(finding for result in passing for finding in result.findings)
+    assert set(found) <= set(LOOSE_BECAUSE)
+    assert not found.keys() & {"rim speed", "delay to a distance pin", "encoder while it turns", "rounding of VEL"}
+
+
+def test_figures_have_units_formulas_and_counts(passing: list[Result]) -> None:
+    figures = [one for result in passing for one in result.findings if isinstance(one, Figure)]
+    assert {figure.group for figure in figures} == {"pins", "wire", "motion"}
+    assert all(figure.bound.formula and figure.uncertainty >= 0 for figure in figures)
+    rim = next(one for one in figures if one.what == "steady rim speed" and one.count > 100)
+    assert rim.unit == "mm/s"
+    assert rim.count == 2 * len(CODES)
+
+
+def test_the_adapters_firmware_is_measured_as_its_model_is(passing: list[Result], tmp_path: Path) -> None:
+    twin = results_of(["sensors-all"], [FIRMWARE], tmp_path)[0]
+    model = next(one for one in passing if one.experiment == "sensors-all" and one.variant == ADAPTER)
+    assert twin.passed
+    assert twin.findings == model.findings
+
+
+#: Experiment, variant, what is set otherwise, and the figure that has to tell.
+PLANTED = [
+    ("motors", ADAPTER, ("adapter.step_mm_s", 63.5), "VEL for a pair of codes"),
+    ("motors", ADAPTER, ("adapter.bit_order", "comm1_msb"), "VEL for a pair of codes"),
+    ("motors", ADAPTER, ("adapter.motor_meaning", "linear_angular"), "RVEL for a pair of codes"),
+    ("motors", ADAPTER, ("adapter.max_velocity_mm_s", 249), "VEL for a pair of codes"),
+    ("motors", DIRECT, ("direct.step_mm_s", 62.6), "steady rim speed"),
+    ("motors", DIRECT, ("direct.ramp_mm_s2", 299.0), "ramp, both wheels alike"),
+    ("motors", DIRECT, ("direct.bit_order", "comm1_msb"), "steady rim speed"),
+    ("motors", DIRECT, ("firmware", "sensors.elf"), "pairs of codes in their order"),
+    ("sensors-all", ADAPTER, ("threshold_m", 0.4), "things seen by their own sensor, and by no other"),
+    ("sensors-all", DIRECT, ("direct.sensor_period_ms", 160), "thing appears to the distance pin"),
+    ("only-while-seen", DIRECT, ("firmware", "motors.elf"), "rim speed while nothing is seen"),
+    ("encoders", DIRECT, ("direct.encoder_period_ms", 40), "encoder code against the wheel's angle"),
+    ("encoders", ADAPTER, ("controller.errors", "realistic"), "encoder code against the wheel's angle"),
+]
+
+
+@pytest.mark.parametrize(
+    ("name", "variant", "setting", "what"), PLANTED, ids=[f"{row[0]}-{row[2][0]}-{row[2][1]}" for row in PLANTED]
+)
+def test_a_planted_error_is_told_by_the_right_figure(
+    name: str, variant: Variant, setting: Setting, what: str, tmp_path: Path
+) -> None:
+    (result,) = results_of([name], [variant], tmp_path, [setting])
+    assert what in {failure.what for failure in result.failures}
+    assert (Path(result.folder) / "trace.jsonl").is_file()
+
+
+@pytest.mark.slow
+def test_the_physical_body_holds_too(tmp_path: Path) -> None:
+    found = results_of(["motors", "sensors-all"], [Variant("adapter", "firmware", "bullet")], tmp_path)
+    assert [line for result in found for line in told(result)] == []
+
+
+@pytest.mark.soak
+def test_every_experiment_holds_in_every_variant(tmp_path: Path) -> None:
+    found = results_of(list(EXPERIMENTS), variants(), tmp_path)
+    assert [line for result in found for line in told(result)] == []
+
+
+def test_the_command_passes_and_writes_page_and_figures(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert p2os(["validate", "motors", "--body", "kinematic", "-j", "2", "--out", "v"]) == 0
+    out = capsys.readouterr().out
+    assert "motors      3 of 3" in out
+    assert out.splitlines()[-1] == "passed in 3 variants; report: v/validation.html"
+    page = Path("v/validation.html").read_text(encoding="utf-8")
+    assert page.count("0.5 mm/s (VEL is whole mm/s)") == 2
+    assert "adapter (firmware), kinematic" in page
+    figures = json.loads(Path("v/validation.json").read_text(encoding="utf-8"))
+    assert figures["passed"]
+    assert len(figures["results"]) == 3
+    assert not (Path("v") / "motors-direct-kinematic").exists()
+
+
+def test_a_planted_error_fails_the_command_and_leaves_its_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    words = ["validate", "motors", "--body", "kinematic", "--mode", "direct", "--set", "direct.step_mm_s=60"]
+    assert p2os([*words, "--json", "--out", "v"]) == 1
+    found = json.loads(capsys.readouterr().out)
+    assert found["results"][0]["failures"] == [
+        "motors: steady rim speed: -240 mm/s, expected -250 within 0.001 (left of (-4, -4))"
+    ]
+    assert Path("v/motors-direct-kinematic/report.html").is_file()
+    assert "direct.step_mm_s=60, which is not expected" in Path("v/validation.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["code"], "there is no experiment 'code'\nhint: did you mean 'codes'?"),
+        (["codes", "--mode", "x"], "there is no mode 'x'"),
+        (["codes", "--body", "x"], "there is no body 'x'"),
+        (["codes", "--set", "a.b=3"], "unknown key 'a'"),
+        (["dodge", "--world", "nowhere"], "nowhere"),
+        (["codes", "--yes"], "--yes goes with --port only"),
+        (["sensors", "--port", "tcp:127.0.0.1:1"], "a robot at a port can do none of these"),
+        (["codes", "--port", "tcp:127.0.0.1:1", "--body", "bullet"], "its own body and world"),
+    ],
+)
+def test_what_cannot_be_validated_is_refused_in_a_line_and_nothing_is_made(
+    words: list[str], says: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert p2os(["validate", *words]) == 2
+    assert says in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.slow
+def test_a_served_robot_is_validated_at_its_port(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    command = [sys.executable, "-c", "from p2os.cli.main import main; main()", "serve", "--port", "tcp:127.0.0.1:0"]
+    process = subprocess.Popen(
+        [*command, "--body", "kinematic", "--world", "arena", "--json"], stdout=subprocess.PIPE, text=True
+    )
+    try:
+        assert process.stdout is not None
+        url = str(json.loads(process.stdout.readline())["url"])
+        code = p2os(["validate", "motors", "--port", url, "--yes", "--out", "v"])
+    finally:
+        process.terminate()
+        process.communicate(timeout=30)
+    if "lagged" in Path("v/motors/summary.json").read_text(encoding="utf-8"):
+        pytest.skip("this machine is too busy for real time now")
+    assert code == 0
+    assert "motors      1 of 1" in capsys.readouterr().out
+    (result,) = json.loads(Path("v/validation.json").read_text(encoding="utf-8"))["results"]
+    figures = {figure["what"]: figure for figure in result["figures"]}
+    assert figures["steady rim speed"]["expected"] in {120.0, -160.0, 0.0}
+    assert figures["VEL for a pair of codes"]["bound"]["value"] == 0.5
