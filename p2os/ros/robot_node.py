@@ -9,7 +9,7 @@ Invariant: of the messages that came together only the newest speed counts, and 
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TypeAlias, cast
 
@@ -237,8 +237,3 @@ def _speed(linear: Message, angular: Message) -> Asked:
     if not (math.isfinite(forward) and math.isfinite(turn)):
         return Refused(f"cmd_vel of {forward} m/s and {turn} rad/s")
     return Speed(forward, turn)
-
-
-def topic_rows(keys: Sequence[str] = tuple(TOPICS)) -> list[tuple[str, str, str]]:
-    """Return name, type and meaning of topics, for a person."""
-    return [(TOPICS[key].name, TOPICS[key].type, TOPICS[key].says) for key in keys]
