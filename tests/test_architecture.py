@@ -40,6 +40,9 @@ ALLOWED = {
     "p2os.pioneer.world.formats": {"yaml", "PIL"},
     "p2os.pioneer.body.mujoco": {"mujoco", "numpy"},
     "p2os.cli.robots.pad_source": {"pygame"},
+    "p2os.ros.codec": {"cyclonedds"},
+    "p2os.ros.dds": {"cyclonedds"},
+    "p2os.ros.zenoh_node": {"zenoh"},
     "bluepill_sim": set(),
     "bluepill_sim.core.unicorn_core": {"unicorn"},
     "bluepill_sim.program.image": {"elftools", "intelhex"},
@@ -59,6 +62,7 @@ IO_LAYER = (
     "p2os.__main__", "p2os.transport", "p2os.cli", "p2os.pioneer.serve.host", "p2os.pioneer.serve.background_host",
     "p2os.pioneer.serve.fleet",
     "p2os.pioneer.serve.control_line", "p2os.client.robot_thread", "p2os.client.aio", "simbase.interrupts",
+    "p2os.ros.zenoh_node",
     "bluepill_sim.cli", "bluepill_sim.cli.console",
     "robot_bench.cli", "robot_bench.running.pacer", "robot_bench.live", "robot_bench.report",
     "robot_bench.firmware.build",
@@ -76,7 +80,7 @@ LAYERS = {
     ),
     "p2os": (
         ("errors", "event_log"), ("toml_file",), ("robots", "gamepad"), ("protocol",), ("transport",),
-        ("capture", "client", "pioneer"), ("cli",), ("__main__",),
+        ("capture", "client", "pioneer"), ("ros",), ("cli",), ("__main__",),
     ),
     "bluepill_sim": (
         ("errors",), ("spans", "extension"), ("fabric",), ("peripherals",), ("parts",), ("stm32f103",),

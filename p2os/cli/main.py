@@ -66,6 +66,8 @@ _EXTRAS = {
     "mujoco": "mujoco",
     "pyarrow": "export",
     "mcap": "export",
+    "cyclonedds": "ros",
+    "zenoh": "ros",
 }
 
 

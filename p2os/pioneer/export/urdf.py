@@ -15,8 +15,8 @@ NOWHERE = (0.0, 0.0, 0.0)
 JOINTS = {Motion.FIXED: "fixed", Motion.FREE: "floating", Motion.WHEEL: "continuous"}
 
 
-def write(scene: Scene, stem: str) -> dict[str, bytes]:
-    """Return the files by their names, the URDF first."""
+def write(scene: Scene, stem: str, joint_name: str = "{} joint") -> dict[str, bytes]:
+    """Return the files by their names, the URDF first; a joint is named after its child."""
     root = Tag("robot", {"name": scene.name} | DECLARATION)
     files = {f"{stem}.urdf": b""}
     has_world = scene.extent is not None
@@ -27,10 +27,11 @@ def write(scene: Scene, stem: str) -> dict[str, bytes]:
         _link(root, body, files, stem)
         parent = body.parent or (ROOT if has_world else None)
         if parent is not None:
-            _joint(root, body.name, parent, body.place, JOINTS[body.motion], body.torque_nm)
+            name = joint_name.format(body.name)
+            _joint(root, name, body.name, parent, body.place, JOINTS[body.motion], body.torque_nm)
         for mark in body.marks:
             _mass(root.add("link", name=mark.name), 0.0, NOWHERE, NOWHERE)
-            _joint(root, mark.name, body.name, mark.place, "fixed", 0.0)
+            _joint(root, joint_name.format(mark.name), mark.name, body.name, mark.place, "fixed", 0.0)
     files[f"{stem}.urdf"] = root.document()
     return files
 
@@ -79,10 +80,10 @@ def _origin(holder: Tag, place: Place) -> None:
     holder.add("origin", xyz=spaced(place.position), rpy=spaced(place.turns))
 
 
-def _joint(root: Tag, name: str, parent: str, place: Place, kind: str, torque_nm: float) -> None:
-    joint = root.add("joint", name=f"{name} joint", type=kind)
+def _joint(root: Tag, name: str, child: str, parent: str, place: Place, kind: str, torque_nm: float) -> None:
+    joint = root.add("joint", name=name, type=kind)
     joint.add("parent", link=parent)
-    joint.add("child", link=name)
+    joint.add("child", link=child)
     _origin(joint, place)
     if kind == "continuous":
         joint.add("axis", xyz="0 1 0")

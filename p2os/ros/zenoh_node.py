@@ -1,0 +1,218 @@
+"""A node over zenoh, as rmw_zenoh has it: key expressions with type hashes, liveliness tokens, attachments.
+
+    key      0/odom/nav_msgs::msg::dds_::Odometry_/RIHS01_3cc9…
+    token    @ros2_lv/0/<session>/0/<number>/MP/%/%/p2os/%odom/nav_msgs::msg::dds_::Odometry_/RIHS01_3cc9…/::,10:,:,:,,
+    attached sequence number and time (int64, little endian), 16, and the 16 bytes that name the publisher
+
+A node connects to a router, as all of rmw_zenoh do; where none runs, it can be the router itself.
+
+Source: ros2/rmw_zenoh, docs/design.md and liveliness_utils; tokens were compared with those of PyZeROS 0.1, and read by
+zenoh-ros2-sdk 0.1.8. A stock rmw_zenoh has not been tried.
+"""
+
+import json
+import os
+import queue
+import struct
+import time
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+from p2os.errors import MissingDependencyError, RemoteProtocolError, TransportError
+from p2os.ros.codec import Message, from_cdr, to_cdr
+from p2os.ros.message_table import MESSAGES
+from p2os.ros.transport import NodeOptions, Received, Topic
+
+if TYPE_CHECKING:
+    import zenoh
+
+#: Port of rmw_zenoh's router.
+PORT = 7447
+NODE, PUBLISHER, SUBSCRIBER = "NN", "MP", "MS"
+#: What stands for a slash within a part of a key, and for an empty one.
+SLASH = "%"
+GID_BYTES = 16
+ATTACHMENT = struct.Struct(f"<qqB{GID_BYTES}s")
+#: chosen: more than any burst; the oldest go first.
+MOST_WAITING = 1000
+#: chosen: a router of this machine answers at once.
+CONNECT_MS = 2000
+
+
+class ZenohNode:
+    """One session of zenoh, as a node of ROS.
+
+    Args:
+        options: Which node, and where its router is.
+        clock: Nanoseconds since 1970, for attachments.
+
+    Raises:
+        MissingDependencyError: eclipse-zenoh is not installed.
+        TransportError: No router answers, or its port is taken.
+    """
+
+    def __init__(self, options: NodeOptions, clock: Callable[[], int] = time.time_ns) -> None:
+        try:
+            import zenoh
+        except ImportError as error:
+            raise MissingDependencyError("zenoh needs eclipse-zenoh", extra="ros") from error
+        endpoint = f"tcp/{options.interface}:{PORT}" if ":" not in options.interface else f"tcp/{options.interface}"
+        try:
+            self._session = zenoh.open(configuration(endpoint, is_router=options.is_router))
+        except zenoh.ZError as error:
+            where = f"be the router on {endpoint}" if options.is_router else f"find a router on {endpoint}"
+            raise TransportError(
+                f"zenoh cannot {where}", hint="" if options.is_router else "--router, or run rmw_zenohd"
+            ) from error
+        self._options = options
+        self._clock = clock
+        self.damaged = 0
+        self._publishers: dict[Topic, _Publisher] = {}
+        self._subscribers: list[object] = []
+        self._arrived: queue.Queue[tuple[Topic, bytes] | None] = queue.Queue(MOST_WAITING)
+        self._numbers = 0
+        self._tokens = [self._session.liveliness().declare_token(self._token(NODE, None))]
+
+    def announce(self, topic: Topic) -> None:
+        """Let others know of a topic."""
+        if topic in self._publishers:
+            return
+        key = key_of(self._options.domain, topic)
+        publisher: zenoh.Publisher | zenoh.ext.AdvancedPublisher
+        if topic.is_latched:
+            from zenoh import ext
+
+            publisher = ext.declare_advanced_publisher(
+                self._session, key, cache=ext.CacheConfig(max_samples=topic.depth), publisher_detection=True
+            )
+        else:
+            publisher = self._session.declare_publisher(key)
+        self._publishers[topic] = _Publisher(publisher, self._clock)
+        self._tokens.append(self._session.liveliness().declare_token(self._token(PUBLISHER, topic)))
+
+    def publish(self, topic: Topic, message: Message) -> None:
+        """Hand a message to whoever subscribes."""
+        self.announce(topic)
+        self._publishers[topic].put(to_cdr(topic.type, message))
+
+    def subscribe(self, topic: Topic) -> None:
+        """Have messages of a topic returned by `take`."""
+
+        def arrived(sample: "zenoh.Sample") -> None:
+            self._put((topic, sample.payload.to_bytes()))
+
+        self._subscribers.append(self._session.declare_subscriber(key_of(self._options.domain, topic), arrived))
+        self._tokens.append(self._session.liveliness().declare_token(self._token(SUBSCRIBER, topic)))
+
+    def take(self, timeout_s: float) -> Sequence[Received]:
+        """Return what came; wait at most so long."""
+        found: list[Received] = []
+        try:
+            item = self._arrived.get(timeout=max(0.0, timeout_s))
+            while True:
+                if item is not None:
+                    self._decode(*item, found)
+                item = self._arrived.get_nowait()
+        except queue.Empty:
+            return found
+
+    def wake(self) -> None:
+        """Let `take` return at once."""
+        self._put(None)
+
+    def close(self) -> None:
+        """End the session."""
+        self._tokens.clear()
+        if not self._session.is_closed():
+            self._session.close()  # type: ignore[no-untyped-call]  # zenoh's own
+
+    def _decode(self, topic: Topic, data: bytes, found: list[Received]) -> None:
+        try:
+            found.append(Received(topic, from_cdr(topic.type, data)))
+        except RemoteProtocolError:
+            self.damaged += 1
+
+    def _put(self, item: tuple[Topic, bytes] | None) -> None:
+        while True:
+            try:
+                self._arrived.put_nowait(item)
+            except queue.Full:
+                if item is None:  # whoever takes has enough to wake for
+                    return
+                try:
+                    self._arrived.get_nowait()
+                except queue.Empty:
+                    continue
+            else:
+                return
+
+    def _token(self, kind: str, topic: Topic | None) -> str:
+        session = str(self._session.info.zid())
+        token = token_of(self._options, session, kind, self._numbers, topic)
+        self._numbers += 1
+        return token
+
+
+class _Publisher:
+    """One publisher, with the count that goes with its messages."""
+
+    def __init__(self, publisher: "zenoh.Publisher | zenoh.ext.AdvancedPublisher", clock: Callable[[], int]) -> None:
+        self._publisher = publisher
+        self._clock = clock
+        self._gid = os.urandom(GID_BYTES)
+        self._sequence = 0
+
+    def put(self, data: bytes) -> None:
+        self._sequence += 1
+        self._publisher.put(data, attachment=ATTACHMENT.pack(self._sequence, self._clock(), GID_BYTES, self._gid))
+
+
+def configuration(endpoint: str, *, is_router: bool) -> "zenoh.Config":
+    """Return the settings of a session: a router that listens, or a client that connects; nothing else is asked."""
+    import zenoh
+
+    config = zenoh.Config()
+    own, other = ("listen/endpoints", "connect/endpoints") if is_router else ("connect/endpoints", "listen/endpoints")
+    rows: dict[str, object] = {
+        "mode": "router" if is_router else "client", "scouting/multicast/enabled": False, own: [endpoint], other: [],
+        "connect/timeout_ms": CONNECT_MS, "connect/exit_on_failure": True,
+    }  # fmt: skip
+    for key, value in rows.items():
+        config.insert_json5(key, json.dumps(value))
+    return config
+
+
+def key_of(domain: int, topic: Topic) -> str:
+    """Return the key expression of a topic."""
+    row = MESSAGES[topic.type]
+    return f"{domain}/{topic.name.strip('/')}/{row.dds_name}/{row.hash}"
+
+
+def token_of(options: NodeOptions, session: str, kind: str, number: int, topic: Topic | None) -> str:
+    """Return the liveliness token of a node (`NN`), a publisher (`MP`) or a subscriber (`MS`).
+
+    Args:
+        options: The node.
+        session: The session's id.
+        kind: What it is.
+        number: Of this entity within the session; the node's own is 0.
+        topic: None for a node.
+    """
+    parts = [
+        "@ros2_lv", f"{options.domain}", session, "0", f"{number}", kind, SLASH, mangled(options.namespace),
+        options.name,
+    ]  # fmt: skip
+    if topic is not None:
+        row = MESSAGES[topic.type]
+        parts += [mangled(topic.name), row.dds_name, row.hash, qos_text(topic)]
+    return "/".join(parts)
+
+
+def qos_text(topic: Topic) -> str:
+    """Return reliability, durability, history and depth, deadline, lifespan, liveliness; a default is empty."""
+    return f":{'1' if topic.is_latched else ''}:,{topic.depth}:,:,:,,"
+
+
+def mangled(name: str) -> str:
+    """Return a name as one part of a key."""
+    return name.replace("/", SLASH) or SLASH
