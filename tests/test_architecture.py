@@ -54,6 +54,9 @@ ALLOWED = {
     "robot_bench.report": {"p2os", "matplotlib"},
     "robot_bench.report.explain": {"p2os", "bluepill_sim", "adapter_sim"},
     "robot_bench.recording.event_files": {"pyarrow"},
+    "robot_bench.experiments": {"p2os", "numpy", "scipy"},
+    "robot_bench.experiments.pictures": {"matplotlib"},
+    "robot_bench.experiments.sensitivity": {"numpy", "SALib"},
     "robot_bench.cli.pytest_plugin": {"p2os", "bluepill_sim", "pytest"},
 }
 
@@ -94,7 +97,7 @@ LAYERS = {
     "robot_bench": (
         ("running", "firmware", "scenarios"), ("wires",), ("events",), ("direct",), ("recording",),
         ("scenario", "report"),
-        ("adapter",), ("bench",), ("remote",), ("run", "project"), ("validation",), ("cli",),
+        ("adapter",), ("bench",), ("remote",), ("run", "project"), ("validation",), ("experiments",), ("cli",),
     ),
 }  # fmt: skip
 

@@ -1,0 +1,137 @@
+"""Where two drives part, and where it came from: sensor, firmware, wire or motion.
+
+Each signal of both is laid over the other; it parts where it differs by more than its bound for longer than its pause.
+What parted first is where it came from: a difference that comes later along the chain follows from it. Signals that
+part within `TOGETHER_S` of the first count as one, and of these the one that stands first in the chain is the cause.
+
+Not seen: what has no signal in both recordings, as the ground under the wheels.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from robot_bench.experiments.drives import Drive, Floats, Steps, Trajectory, wrapped
+
+#: chosen: a change goes through the whole chain within this, seconds: the adapter's period and two of the robot's.
+TOGETHER_S = 0.3
+#: chosen: seconds between the times at which signals are looked at.
+LOOK_S = 0.01
+CHAIN = ("sensor", "firmware", "wire", "motion")
+
+
+@dataclass(frozen=True, slots=True)
+class Bound:
+    """A signal may differ by so much, and by more for no longer than `pause_s`."""
+
+    stage: str
+    unit: str
+    most: float
+    pause_s: float
+
+
+#: chosen: sonar by its beam's grain and the 100 ms of a reading; pins and commands by the periods of who reads them;
+#: motion by what a person sees on a plan.
+BOUNDS = {
+    "sensor pin": Bound("sensor", "", 0.5, 0.25),
+    "sonar": Bound("sensor", "m", 0.15, 0.5),
+    "motor pins": Bound("firmware", "steps", 0.5, 0.25),
+    "command": Bound("wire", "", 0.5, 0.25),
+    "speed": Bound("motion", "m/s", 0.05, 0.25),
+    "turn rate": Bound("motion", "rad/s", 0.2, 0.25),
+    "position": Bound("motion", "m", 0.05, 0.0),
+    "heading": Bound("motion", "rad", 0.05, 0.0),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A signal that both drives have, and where it parts: None where it never does."""
+
+    signal: str
+    kind: str
+    #: In the bound's unit: the root of the mean square of the difference, the largest one, and when.
+    rms: float
+    largest: float
+    largest_s: float
+    parts_s: float | None
+    ours: float = 0.0
+    theirs: float = 0.0
+
+    @property
+    def bound(self) -> Bound:
+        """What it was judged by."""
+        return BOUNDS[self.kind]
+
+
+def parts(one: Drive, other: Drive, shift_s: float, ours: Trajectory, theirs: Trajectory) -> list[Part]:
+    """Return every signal that both have, the first to part first, then those that never do.
+
+    Args:
+        one: The reference.
+        other: The other one.
+        shift_s: By how much the other's times are later in the reference's.
+        ours: The reference's poses.
+        theirs: The other's at the same times and in the same place.
+    """
+    grid = np.arange(ours.t_s[0], ours.t_s[-1], LOOK_S)
+
+    def held(name: str, kind: str, a: Steps | None, b: Steps | None) -> Part | None:
+        if a is None or b is None or not len(a.t_s) or not len(b.t_s):
+            return None
+        return _part(name, kind, grid, a.at(grid), b.later(shift_s).at(grid))
+
+    found = [held(f"sensor {n}", "sensor pin", one.sensors[n], other.sensors.get(n)) for n in one.sensors]
+    found += [held(f"sonar {n + 1}", "sonar", one.sonar_m[n], other.sonar_m.get(n)) for n in sorted(one.sonar_m)]
+    found += [held(f"motor {n}", "motor pins", one.motors[n], other.motors.get(n)) for n in one.motors]
+    found += [
+        held(f"command {name}", "command", one.commands[name], other.commands.get(name))
+        for name in ("VEL", "RVEL", "VEL2") if name in one.commands
+    ]  # fmt: skip
+    at, speed, turn = ours.speeds()
+    _, their_speed, their_turn = theirs.speeds()
+    moved: list[tuple[str, Floats, Floats, Floats]] = [
+        ("speed", at, speed, their_speed), ("turn rate", at, turn, their_turn),
+        ("heading", ours.t_s, ours.heading_rad, theirs.heading_rad),
+    ]  # fmt: skip
+    found += [_part(name, name, times, a, b) for name, times, a, b in moved]
+    apart = np.hypot(theirs.x_m - ours.x_m, theirs.y_m - ours.y_m)
+    found.append(_part("position", "position", ours.t_s, np.zeros_like(apart), apart))
+    rows = [part for part in found if part is not None]
+    return sorted(rows, key=lambda part: np.inf if part.parts_s is None else part.parts_s)
+
+
+def origin(rows: list[Part]) -> Part | None:
+    """Return where the difference came from: of what parted first, what stands first in the chain."""
+    parted = [part for part in rows if part.parts_s is not None]
+    if not parted:
+        return None
+    first = parted[0].parts_s or 0.0
+    together = [part for part in parted if (part.parts_s or 0.0) <= first + TOGETHER_S]
+    return min(together, key=lambda part: (CHAIN.index(part.bound.stage), part.parts_s))
+
+
+def _part(name: str, kind: str, times: Floats, ours: Floats, theirs: Floats) -> Part | None:
+    known = ~(np.isnan(ours) | np.isnan(theirs))
+    if known.sum() < 2:
+        return None
+    times, ours, theirs = times[known], ours[known], theirs[known]
+    difference = np.abs(wrapped(ours - theirs) if kind == "heading" else ours - theirs)
+    bound, largest = BOUNDS[kind], int(np.argmax(difference))
+    place = _first_lasting(times, difference > bound.most, bound.pause_s)
+    rms = float(np.sqrt(np.mean(difference**2)))
+    if place is None:
+        return Part(name, kind, rms, float(difference[largest]), float(times[largest]), None)
+    return Part(
+        name, kind, rms, float(difference[largest]), float(times[largest]), float(times[place]), float(ours[place]),
+        float(theirs[place]),
+    )  # fmt: skip
+
+
+def _first_lasting(times: Floats, apart: "np.ndarray[tuple[int], np.dtype[np.bool_]]", pause_s: float) -> int | None:
+    """Return the first place from which it is so for longer than a pause."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], apart, [False])).astype(np.int8)))
+    for first, behind in zip(edges[::2], edges[1::2], strict=True):
+        if times[behind - 1] - times[first] >= pause_s:
+            return int(first)
+    return None

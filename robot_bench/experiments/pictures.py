@@ -1,0 +1,104 @@
+"""Pictures of experiments, drawn by Matplotlib's object interface: no display, no global state.
+
+Invariant: the same figures give the same bytes.
+"""
+
+import io
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from robot_bench.experiments.comparison import Comparison
+from simbase.errors import FileError, shown_name
+
+#: The colours of the report's plots.
+ONE, OTHER, MARK = "#1b6ca8", "#c8553d", "#4a5560"
+DOTS_PER_INCH = 110
+#: Matplotlib ships no types: its axes are what they are.
+Axes = Any
+
+
+def png(figure: Figure) -> bytes:
+    """Return a figure as a PNG file's bytes."""
+    FigureCanvasAgg(figure)
+    file = io.BytesIO()
+    figure.savefig(file, format="png", dpi=DOTS_PER_INCH, metadata={"Software": None})
+    return file.getvalue()
+
+
+def write_png(figure: Figure, path: Path) -> None:
+    """Write a figure as a PNG file.
+
+    Raises:
+        FileError: It cannot be written.
+    """
+    try:
+        path.write_bytes(png(figure))
+    except OSError as error:
+        raise FileError(f"cannot write {shown_name(path)}: {(error.strerror or str(error)).lower()}") from error
+
+
+def comparison_figure(found: Comparison) -> Figure:
+    """Draw both ways over one another, and speeds, distance and headings over time, with where they part."""
+    figure = Figure(figsize=(10.0, 6.4), layout="constrained")
+    grid = figure.add_gridspec(3, 2, width_ratios=(1.0, 1.15))
+    plan = figure.add_subplot(grid[:, 0])
+    ours, theirs = found.ours, found.theirs
+    names = _names(found)
+    plan.plot(ours.x_m, ours.y_m, color=ONE, linewidth=2.4, label=names[0])
+    plan.plot(theirs.x_m, theirs.y_m, color=OTHER, linewidth=1.4, linestyle=(0, (5, 3)), label=names[1])
+    plan.plot(ours.x_m[0], ours.y_m[0], "o", color=ONE)
+    plan.set_aspect("equal", adjustable="datalim")
+    plan.set(xlabel="x, m", ylabel="y, m")
+    plan.legend(loc="upper left", bbox_to_anchor=(0.0, 1.12), ncols=1, frameon=False)
+    rows: list[Axes] = []
+    for place in range(3):
+        rows.append(figure.add_subplot(grid[place, 1], sharex=rows[0] if rows else None))
+    (at, speed, _), (_, their_speed, _) = ours.speeds(), theirs.speeds()
+    rows[0].plot(at, speed, color=ONE, linewidth=1.8)
+    rows[0].plot(at, their_speed, color=OTHER, linewidth=1.1, linestyle=(0, (5, 3)))
+    rows[0].set_ylabel("speed, m/s")
+    apart = [math.hypot(a - b, c - d) for a, b, c, d in zip(theirs.x_m, ours.x_m, theirs.y_m, ours.y_m, strict=True)]
+    rows[1].plot(ours.t_s, apart, color=MARK)
+    rows[1].set_ylabel("apart, m")
+    rows[2].plot(ours.t_s, (theirs.heading_rad - ours.heading_rad) * 180 / math.pi, color=MARK)
+    rows[2].set(ylabel="heading differs, deg", xlabel=f"time of {names[0]}, s")
+    came = found.origin
+    for axes in rows:
+        axes.grid(visible=True, color="#e3e3e3")
+        axes.margins(x=0)
+        if came is not None and came.parts_s is not None:
+            axes.axvline(came.parts_s, color=OTHER, linewidth=1.0)
+    if came is not None and came.parts_s is not None:
+        rows[0].set_title(
+            f"parts first at {came.parts_s:.2f} s: {came.signal} ({came.bound.stage})", fontsize=10, color=OTHER
+        )
+    return figure
+
+
+def _names(found: Comparison) -> tuple[str, str]:
+    one, other = found.one.name, found.other.name
+    if one == other or found.how.poses[0] != found.how.poses[1]:
+        return f"{one} ({found.how.poses[0]})", f"{other} ({found.how.poses[1]})"
+    return one, other
+
+
+def bars_figure(title: str, rows: Sequence[tuple[str, float, float]], unit: str) -> Figure:
+    """Draw a bar and its spread for each row (name, value, half width), the first on top."""
+    figure = Figure(figsize=(8.0, 1.2 + 0.38 * len(rows)), layout="constrained")
+    axes = figure.add_subplot()
+    places = range(len(rows))
+    axes.barh(
+        [*places], [value for _, value, _ in rows], xerr=[spread for *_, spread in rows], color=ONE,
+        ecolor=MARK, capsize=3,
+    )  # fmt: skip
+    axes.set_yticks([*places], [name for name, *_ in rows])
+    axes.invert_yaxis()
+    axes.grid(visible=True, axis="x", color="#e3e3e3")
+    axes.set_axisbelow(True)
+    axes.set(xlabel=unit, title=title)
+    return figure
