@@ -90,7 +90,7 @@ LAYERS = {
     "robot_bench": (
         ("running", "firmware", "scenarios"), ("wires",), ("events",), ("direct",), ("recording",),
         ("scenario", "report"),
-        ("adapter",), ("bench",), ("remote",), ("run", "project"), ("cli",),
+        ("adapter",), ("bench",), ("remote",), ("run", "project"), ("campaign",), ("cli",),
     ),
 }  # fmt: skip
 

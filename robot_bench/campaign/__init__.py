@@ -1,1 +1,1 @@
-"""Many runs that are judged together."""
+"""Campaigns: many runs of a scenario in which something varies, in search of the worlds in which its firmware fails."""
