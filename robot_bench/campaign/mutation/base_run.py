@@ -58,7 +58,7 @@ def base_run(scenario: Scenario, clock: Clock, look: Callable[[], None] = lambda
         P2osError, BluePillError: As of `Bench`.
     """
     if scenario.robots:
-        raise UsageError(f"{scenario.name} has several robots: mutants run in a world of one", hint="leave out [[robot]]")
+        raise UsageError(f"{scenario.name} has several robots: mutants run alone", hint="leave out [[robot]]")
     if not scenario.goals:
         raise UsageError(f"{scenario.name} has no goals, so it can notice nothing", hint="add a [[goal]]")
     began = clock()
@@ -81,7 +81,8 @@ def base_run(scenario: Scenario, clock: Clock, look: Callable[[], None] = lambda
     failures = [*([board.verdict] if bench.chip.has_died else []), *judged.missed]
     if failures:
         raise UsageError(
-            f"{scenario.name} fails with the unchanged program: {failures[0]}", hint="p2os run shows it; mend that first"
+            f"{scenario.name} fails with the program itself: {failures[0]}",
+            hint="p2os run shows it; mend that first",
         )
     return BaseRun(
         bench=bench, trace_sha256=bench.trace.sha256, first_ns=first_ns, states=states, coverage=coverage,

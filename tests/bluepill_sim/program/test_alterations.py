@@ -23,8 +23,8 @@ SHAPES = (
     "cbz r3, .+4", "cbnz r7, .+130", "movs r1, #0", "movs r1, #255", "movs r2, #7", "cmp r0, #0", "cmp r7, #255",
     "adds r0, #1", "adds r3, #0", "subs r0, #200", "adds r1, r2, #7", "subs r1, r2, #3", "adds r1, r2, r3",
     "subs r4, r5, r6", "rsbs r1, r2, #0", "cmp.w r9, #1000", "cmp.w r0, #0", "cmp.w r0, #0xffffffff", "cmn.w r3, #4",
-    "cmp.w r1, #0x00ff00ff", "add.w r0, r1, #1000", "adds.w r8, r1, #4", "sub.w r8, r8, #0xff000000", "subs.w r1, r2, #5",
-    "addw r1, r2, #4095", "subw r1, r2, #0", "mov.w r9, #5", "movs.w r9, #0x400", "mvn.w r9, #4", "mov.w r9, #0",
+    "cmp.w r1, #0x00ff00ff", "add.w r0, r1, #1000", "adds.w r8, r1, #4", "sub.w r8, r8, #0xff000000",
+    "subs.w r1, r2, #5",    "addw r1, r2, #4095", "subw r1, r2, #0", "mov.w r9, #5", "movs.w r9, #0x400", "mvn.w r9, #4", "mov.w r9, #0",
     "mvn.w r0, #0", "movw r3, #1000", "movw r3, #0", "movw r3, #65535", "rsb.w r8, r1, #100", "rsbs.w r8, r1, #0",
     "add.w r8, r9, r10", "adds.w r8, r9, r1, lsl #2", "sub.w r8, r9, r10, asr #32", "subs.w r1, r2, r3, rrx",
 )  # fmt: skip
@@ -39,8 +39,8 @@ UNCHANGED = (
 def assembled(lines: list[str], tmp_path: Path) -> list[bytes]:
     """Return the bytes of each piece of assembly, put at an even place of its own."""
     source = ".syntax unified\n.cpu cortex-m3\n.thumb\n" + "".join(
-        f".section .text.n{n},\"ax\"\nbegin{n}:\n{line}\nend{n}:\n" for n, line in enumerate(lines)
-    ) + ".section .sizes,\"a\"\n" + "".join(f".word end{n}-begin{n}\n" for n in range(len(lines)))  # fmt: skip
+        f'.section .text.n{n},"ax"\nbegin{n}:\n{line}\nend{n}:\n' for n, line in enumerate(lines)
+    ) + '.section .sizes,"a"\n' + "".join(f".word end{n}-begin{n}\n" for n in range(len(lines)))  # fmt: skip
     text, out = tmp_path / "it.s", tmp_path / "it.o"
     text.write_text(source)
     subprocess.run([ASSEMBLER, "-o", out, text], check=True, timeout=60, capture_output=True)
