@@ -6,11 +6,11 @@ Each `Mutant` differs from the program in one instruction, at one address.
 Invariant: the same program and the same addresses give the same mutants, in the same order.
 """
 
-import io
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from bluepill_sim.program.alterations import Alteration, Site, alterations, it_count, size_at, word_of
+from bluepill_sim.program.elf_file import file_offset
 from bluepill_sim.program.image import Image
 from bluepill_sim.stm32f103 import FLASH_BASE, FLASH_BYTES_FITTED
 
@@ -72,14 +72,7 @@ def mutated_file(data: bytes, mutant: Mutant, image: Image) -> bytes:
         for start, content in image.segments:
             flash[start - FLASH_BASE : start - FLASH_BASE + len(content)] = content
         return mutant.patched(bytes(flash))
-    from elftools.elf.elffile import ELFFile
-
-    offset = mutant.flash_offset
-    for segment in ELFFile(io.BytesIO(data)).iter_segments():
-        at = offset - segment["p_paddr"] % FLASH_BASE
-        if segment["p_type"] == "PT_LOAD" and 0 <= at < segment["p_filesz"]:
-            return _put(data, segment["p_offset"] + at, mutant.alteration.code)
-    raise ValueError(f"no segment of {image.name} holds {mutant.address:#010x}")
+    return _put(data, file_offset(data, mutant.flash_offset), mutant.alteration.code)
 
 
 class _Reader:

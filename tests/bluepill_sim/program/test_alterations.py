@@ -24,7 +24,8 @@ SHAPES = (
     "adds r0, #1", "adds r3, #0", "subs r0, #200", "adds r1, r2, #7", "subs r1, r2, #3", "adds r1, r2, r3",
     "subs r4, r5, r6", "rsbs r1, r2, #0", "cmp.w r9, #1000", "cmp.w r0, #0", "cmp.w r0, #0xffffffff", "cmn.w r3, #4",
     "cmp.w r1, #0x00ff00ff", "add.w r0, r1, #1000", "adds.w r8, r1, #4", "sub.w r8, r8, #0xff000000",
-    "subs.w r1, r2, #5",    "addw r1, r2, #4095", "subw r1, r2, #0", "mov.w r9, #5", "movs.w r9, #0x400", "mvn.w r9, #4", "mov.w r9, #0",
+    "subs.w r1, r2, #5",
+    "addw r1, r2, #4095", "subw r1, r2, #0", "mov.w r9, #5", "movs.w r9, #0x400", "mvn.w r9, #4", "mov.w r9, #0",
     "mvn.w r0, #0", "movw r3, #1000", "movw r3, #0", "movw r3, #65535", "rsb.w r8, r1, #100", "rsbs.w r8, r1, #0",
     "add.w r8, r9, r10", "adds.w r8, r9, r1, lsl #2", "sub.w r8, r9, r10, asr #32", "subs.w r1, r2, r3, rrx",
 )  # fmt: skip

@@ -127,9 +127,8 @@ def test_a_mutant_that_costs_far_more_than_the_program_is_stopped_and_counts_as_
 
 
 def test_a_program_that_ends_in_a_fault_is_noticed_by_that() -> None:
-    guarded = (
-        "movs r1, #4\nsubs r1, #4\ncmp r1, #0\nbne wrong\nsleep: wfi\nb sleep\nwrong: mov32 r0, #0x60000001\nbx r0\n"
-    )
+    tail = "sleep: wfi\nb sleep\nwrong: mov32 r0, #0x60000001\nbx r0\n"
+    guarded = f"movs r1, #4\nsubs r1, #4\ncmp r1, #0\nbne wrong\n{tail}"
     firmware(PROGRAM.partition("sleep:")[0] + guarded)
     found = tried(base(), lambda mutant: mutant.alteration.before == "subs r1, #4")
     assert {one.fate for one in found.values()} == {Fate.CRASHED}
@@ -161,7 +160,7 @@ def test_a_sample_is_drawn_by_its_seed_and_json_junit_and_files_have_the_same(
     assert cli.run([*words, "--seed", "1"]) == 0
     assert json.loads(capsys.readouterr().out)["mutants"] != one["mutants"]
     fates = Counter(mutant["fate"] for mutant in one["mutants"])
-    suite = ET.parse("r.xml").getroot()
+    suite = ET.fromstring(Path("r.xml").read_text(encoding="utf-8"))  # noqa: S314 - our own file
     assert (one["tried"], suite.get("tests"), suite.get("failures")) == (8, "8", str(fates["survived"]))
     assert len(list(Path("wrong").iterdir())) == fates["survived"] > 0
     assert cli.run(["run", "mine.toml", "--firmware", str(next(Path("wrong").iterdir()))]) == 0
@@ -171,7 +170,7 @@ def test_a_sample_is_drawn_by_its_seed_and_json_junit_and_files_have_the_same(
     ("change", "says"),
     [
         (("[[goal]]", "#"), "no goals"),
-        (("PB12 high", "PB13 high"), "fails with the unchanged program"),
+        (("PB12 high", "PB13 high"), "fails with the program itself"),
         (('mode = "direct"', 'mode = "direct"\nstart = {x_m = 99.0, y_m = 0.0}'), "start"),
     ],
 )
