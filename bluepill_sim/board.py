@@ -418,6 +418,14 @@ class BluePill(Stateful):
         """What ran last, oldest first: up to the fault, if there was one, else up to now (rows of `BlockRecorder`)."""
         return self.chip.engine.log.rows() if self.fault is None else self.fault.last_rows
 
+    @property
+    def entered_blocks(self) -> frozenset[int]:
+        """The first address of every basic block that has run since the board was made; it costs the run nothing.
+
+        What was restored over is not forgotten. How often, and which ways of branches, `analysis.coverage` counts.
+        """
+        return self.chip.engine.entered_blocks
+
     def last_blocks(self) -> list[str]:
         """Return what ran last as lines for a person: the last 32 blocks and exceptions, with symbol and line.
 

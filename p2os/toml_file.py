@@ -1,4 +1,4 @@
-"""TOML files of users: read within bounds, with the line of each key, so that an error can name it.
+"""TOML files of users: read within bounds, with the line of each key, so that an error can name it; and written.
 
 `tomllib` gives values without places. `find_places` reads a text that `tomllib` has
 accepted, so it need not check anything: it only tells tables, keys and the ends
@@ -10,6 +10,7 @@ the line of what holds them.
 
 import re
 import tomllib
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,8 @@ from simbase.errors import FileError, shown_name
 
 _HEADER = re.compile(r"\s*(\[\[?)\s*([^\]]+?)\s*\]\]?\s*(?:#.*)?$")
 _KEY = re.compile(r"\s*([A-Za-z0-9_.\-\"']+)\s*=")
+#: A key that needs no quotes.
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
 #: What can begin or end inside a value: strings, comments, brackets.
 _TOKEN = re.compile(r'"""|\'\'\'|"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\'|#[^\n]*|[\[\]{}]')
 #: chosen: a world of 100 000 things is below it; more is no file that a person wrote.
@@ -153,6 +156,68 @@ def line_of_error(message: str, text: str) -> tuple[str, int]:
     if match is None:
         return message, 1
     return match["what"], int(match["line"]) if match["line"] else text.count("\n") + 1
+
+
+def toml_text(table: Mapping[str, object]) -> str:
+    """Return the text of a TOML file that is read back as an equal table.
+
+    Args:
+        table: Texts, numbers, flags, lists and tables; no None.
+
+    Raises:
+        TypeError: It holds something else.
+    """
+    return "".join(_tables(table, ""))
+
+
+def toml_value(value: object) -> str:
+    """Return a value as it stands behind `KEY =`, a table within braces; numbers with every digit.
+
+    Raises:
+        TypeError: TOML has no such value.
+    """
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return _quoted(value)
+    if isinstance(value, (int, float)):
+        return repr(value)
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(map(toml_value, value))}]"
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{_key(key)} = {toml_value(item)}" for key, item in value.items()) + "}"
+    raise TypeError(f"TOML has no {type(value).__name__}")
+
+
+def _tables(table: Mapping[str, object], above: str) -> Iterator[str]:
+    """Yield the lines of a table: what is no table first, since a header ends what stands before it."""
+    inner = {key: value for key, value in table.items() if isinstance(value, Mapping) or _is_tables(value)}
+    for key, value in table.items():
+        if key not in inner:
+            yield f"{_key(key)} = {toml_value(value)}\n"
+    for key, value in inner.items():
+        name = f"{above}.{_key(key)}".removeprefix(".")
+        if isinstance(value, Mapping):
+            yield f"\n[{name}]\n"
+            yield from _tables(value, name)
+        elif isinstance(value, (list, tuple)):
+            for item in value:
+                yield f"\n[[{name}]]\n"
+                yield from _tables(item, name)
+
+
+def _is_tables(value: object) -> bool:
+    return isinstance(value, (list, tuple)) and bool(value) and all(isinstance(item, Mapping) for item in value)
+
+
+def _key(key: str) -> str:
+    return key if _BARE.fullmatch(key) else _quoted(key)
+
+
+def _quoted(value: str) -> str:
+    """Return a text in quotes, with what TOML does not take as it is escaped."""
+    escaped = value.replace("\\", "\\\\").replace('"', '\\"')
+    return '"' + "".join(c if c >= " " and c != "\x7f" else f"\\u{ord(c):04x}" for c in escaped) + '"'
 
 
 def _after(text: str, depth: int, closing: str) -> tuple[int, str]:

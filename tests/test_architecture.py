@@ -97,7 +97,7 @@ LAYERS = {
     "robot_bench": (
         ("running", "firmware", "scenarios"), ("wires",), ("events",), ("direct",), ("recording",),
         ("scenario", "report"),
-        ("adapter",), ("bench",), ("remote",), ("run", "project"), ("validation",), ("experiments",), ("cli",),
+        ("adapter",), ("bench",), ("remote",), ("run", "project"), ("validation",), ("experiments",), ("campaign",), ("cli",),
     ),
 }  # fmt: skip
 

@@ -52,7 +52,7 @@ def coverage_page(coverage: Coverage, *, title: str, sources: Path | None = None
 
 
 def _listing(file: FileCoverage, sources: Path | None) -> Iterator[str]:
-    text = _source(file.name, sources)
+    text = source_lines(file.name, sources)
     what = "" if text else ": the source is not here"
     yield f"<details open><summary>{escape(file.name)}{what}</summary><table>"
     for number in range(1, len(text) + 1) if text else sorted(file.lines):
@@ -68,7 +68,7 @@ def _listing(file: FileCoverage, sources: Path | None) -> Iterator[str]:
     yield "</table></details>"
 
 
-def _source(name: str, sources: Path | None) -> list[str]:
+def source_lines(name: str, sources: Path | None) -> list[str]:
     """Return the lines of a source file: where it was built, or in the folder given, or nothing."""
     candidates = [Path(name)] if Path(name).is_absolute() else []
     if sources is not None:

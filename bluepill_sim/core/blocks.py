@@ -40,7 +40,7 @@ class BlockTable(Stateful):
     """Measured blocks."""
 
     STATE = ("uses_exclusive",)
-    DERIVED = ("plain", "_special", "_in_writable", "ran_writable")
+    DERIVED = ("plain", "_special", "_in_writable", "ran_writable", "entered")
 
     def __init__(self, measure: Measure) -> None:
         self._measure = measure
@@ -53,9 +53,12 @@ class BlockTable(Stateful):
         self.ran_writable = False
         #: Whether a block takes exclusive reservations.
         self.uses_exclusive = False
+        #: The first address of every block that this engine has ever entered; a snapshot takes none back.
+        self.entered: set[int] = set()
 
     def at(self, address: int, size: int) -> Block:
         """Return a block that is not in `plain`; measure it if it is new or its bytes have changed."""
+        self.entered.add(address)
         special = self._special.get(address)
         if special is not None:
             return special

@@ -208,6 +208,11 @@ class Engine(Stateful):
         self._core.drop_code(address, size)
         self.forget_costs()
 
+    @property
+    def entered_blocks(self) -> frozenset[int]:
+        """The first address of every block that was ever entered, whatever a snapshot has taken back."""
+        return frozenset(self._blocks.entered)
+
     def forget_costs(self) -> None:
         """Measure every block again when it is next entered."""
         self._blocks.forget()

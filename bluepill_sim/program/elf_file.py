@@ -81,6 +81,21 @@ def layout(image: Image) -> Layout:
     return Layout(sections, flash_bytes, sram)
 
 
+def file_offset(data: bytes, flash_offset: int) -> int:
+    """Return where in an ELF file a byte of the flash stands.
+
+    Raises:
+        ImageError: No piece that is loaded holds it.
+    """
+    from elftools.elf.elffile import ELFFile
+
+    for segment in ELFFile(io.BytesIO(data)).iter_segments():
+        at = flash_offset - segment["p_paddr"] % FLASH_BASE
+        if segment["p_type"] == "PT_LOAD" and 0 <= at < segment["p_filesz"]:
+            return int(segment["p_offset"]) + at
+    raise ImageError(f"nothing is loaded at {FLASH_BASE + flash_offset:#010x}", hint="give the ELF that was linked")
+
+
 def _sections(data: bytes) -> "list[Section]":
     from elftools.elf.elffile import ELFFile
 

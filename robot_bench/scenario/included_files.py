@@ -15,7 +15,7 @@ Invariant: of each key that a message may name, the file and line are those wher
 
 import os
 import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -35,7 +35,7 @@ _OWN = (*KEYS, VERSION)
 #: chosen: what a person keeps in his head is less, and files that include each other twice each come to it soon.
 MOST_FILES = 64
 #: Keys whose value may be a file, by the table that they stand in; `robot` of a `[[robot]]` too.
-_FILES: Mapping[str, tuple[str, ...]] = {
+FILES: Mapping[str, tuple[str, ...]] = {
     "": ("firmware", "world", "robot"), "controller": ("errors", "flash"), "robot": ("firmware", "model"),
 }  # fmt: skip
 #: Key and value, as of `--set`.
@@ -79,6 +79,11 @@ class MergedSource:
     parts: tuple[_Part, ...]
     #: (table, number, key) → what set it.
     settings: Mapping[tuple[str, int, str], str] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, source: TomlSource) -> "MergedSource":
+        """Return what names the places of tables that come from one file, or from none."""
+        return cls((_Part(source),))
 
     def at(self, table: str = "", key: str = "", number: int = 0) -> str:
         """Return `file:line` of a key, or of what holds it; or the option that set it."""
@@ -139,7 +144,7 @@ def read_tables(path: Path, settings: Sequence[Setting] = (), set_by: str = "--s
     found = _read(path, path.parent, (), [0])
     places: dict[tuple[str, int, str], str] = {}
     for key, value in settings:
-        _set(found.table, key, value, lambda *place, key=key: places.update({place: f"{set_by} {key}"}))
+        places[set_key(found.table, key, value)] = f"{set_by} {key}"
     texts = (
         [text.partition("\n")[2] for text in found.texts]
         if len(found.texts) == 1
@@ -181,6 +186,33 @@ def read_setting(text: str) -> Setting:
     return key.strip(), parsed(value.strip())
 
 
+def set_key(table: dict[str, object], key: str, value: object) -> tuple[str, int, str]:
+    """Set a key of a scenario's tables, as `--set` does; return which it is: (table, number, key).
+
+    Args:
+        table: Changed in place.
+        key: With dots: `start.x_m`, `goal.2.least_m`, `obstacle.post.x_m`.
+        value: What TOML can hold.
+
+    Raises:
+        UsageError: It names a table of a list that is not there, or goes through what is no table.
+    """
+    held, name, number = table, "", 0
+    *path, last = key.split(".")
+    while path:
+        word = path.pop(0)
+        inner = held.setdefault(word, {})
+        name, number = f"{name}.{word}".removeprefix("."), 0
+        if isinstance(inner, list) and path:
+            number = _number(inner, path.pop(0), key)
+            inner = inner[number]
+        if not isinstance(inner, dict):
+            raise UsageError(f"--set {key}: {shown(word)} is no table with keys", hint="docs/scenarios.md has the keys")
+        held = inner
+    held[last] = value
+    return name, number, last
+
+
 def _read(path: Path, folder: Path, above: tuple[Path, ...], count: list[int]) -> _Read:
     """Read a file and what it names; `above` are the files that led to it, `folder` that of the first."""
     count[0] += 1
@@ -193,7 +225,7 @@ def _read(path: Path, folder: Path, above: tuple[Path, ...], count: list[int]) -
     place = Place(TomlSource(name, places))
     check_table({key.name: table[key.name] for key in _OWN if key.name in table}, _OWN, place)
     extended, included = table.pop("extends", None), table.pop("include", [])
-    for own, keys in _FILES.items():
+    for own, keys in FILES.items():
         _look_beside(table, own, keys, path.parent, folder)
     found = _Read(table=table, parts=(_Part(TomlSource(name, places)),), texts=(f"{name}:\n{text}",))
     here = (*above, path)
@@ -270,24 +302,6 @@ def _joined(lower: Mapping[str, object], upper: Mapping[str, object]) -> dict[st
 
 def _is_list_of_tables(value: object) -> bool:
     return isinstance(value, list) and bool(value) and all(isinstance(item, dict) for item in value)
-
-
-def _set(table: dict[str, object], key: str, value: object, note: Callable[[str, int, str], None]) -> None:
-    """Set a key, and note which it is: (table, number, key)."""
-    held, name, number = table, "", 0
-    *path, last = key.split(".")
-    while path:
-        word = path.pop(0)
-        inner = held.setdefault(word, {})
-        name, number = f"{name}.{word}".removeprefix("."), 0
-        if isinstance(inner, list) and path:
-            number = _number(inner, path.pop(0), key)
-            inner = inner[number]
-        if not isinstance(inner, dict):
-            raise UsageError(f"--set {key}: {shown(word)} is no table with keys", hint="docs/scenarios.md has the keys")
-        held = inner
-    held[last] = value
-    note(name, number, last)
 
 
 def _number(tables: Sequence[object], which: str, key: str) -> int:

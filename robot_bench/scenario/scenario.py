@@ -37,7 +37,14 @@ from robot_bench.scenario.fault_script import FaultChange, load_faults
 from robot_bench.scenario.goals.judging import Goal, load_goal
 from robot_bench.scenario.goals.kinds import KINDS
 from robot_bench.scenario.included_files import KEYS as INCLUDING
-from robot_bench.scenario.included_files import VERSION, Setting, read_tables, shipped_file, shipped_scenarios
+from robot_bench.scenario.included_files import (
+    VERSION,
+    ScenarioTable,
+    Setting,
+    read_tables,
+    shipped_file,
+    shipped_scenarios,
+)
 from robot_bench.scenario.schema import LONGEST_S, Key, Place, Table, Where, check_table, in_range, nearest, within
 from robot_bench.scenario.several_robots import robot_keys, split
 from robot_bench.scenario.sweep import Axis, load_axes, load_seeds
@@ -334,6 +341,23 @@ def read_scenario(
         UsageError: A setting names what is not there.
     """
     found = read_tables(path, settings, set_by)
+    return build_scenario(found, path, firmware=firmware, settings=settings)
+
+
+def build_scenario(
+    found: ScenarioTable, path: Path, *, firmware: Path | None = None, settings: Sequence[Setting] = ()
+) -> Scenario:
+    """Check a scenario's tables and return the scenario.
+
+    Args:
+        found: The tables, and what messages call their places.
+        path: What is named in them is looked for beside it; it need not be there.
+        firmware: As of `load_scenario`.
+        settings: Those of the tables' keys that were set beside the file.
+
+    Raises:
+        ScenarioError: They break the schema.
+    """
     build = _build_several if isinstance(found.table.get("robot"), list) else _build
     scenario = build(found.table, found.text, path, Place(found.source), firmware)
     kept = tuple(axis for axis in scenario.axes if axis.key not in dict(settings))

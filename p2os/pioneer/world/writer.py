@@ -9,6 +9,7 @@ that was made by a program, never one that was read.
 import math
 
 from p2os.pioneer.world.model import Kind, Mark, Mesh, Obstacle, World
+from p2os.toml_file import toml_value
 
 #: How many neighbours of a number of degrees are tried.
 TRIES = 4
@@ -112,20 +113,4 @@ def _mark(item: Mark) -> Fields:
 
 
 def _lines(fields: Fields) -> str:
-    return "".join(f"{key} = {_value(value)}\n" for key, value in fields.items())
-
-
-def _value(value: object) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        return _text(value)
-    if isinstance(value, list):
-        return f"[{', '.join(_value(item) for item in value)}]"
-    return repr(value)
-
-
-def _text(value: str) -> str:
-    """Return a text in quotes, with what TOML does not take as it is escaped."""
-    escaped = value.replace("\\", "\\\\").replace('"', '\\"')
-    return '"' + "".join(c if c >= " " and c != "\x7f" else f"\\u{ord(c):04x}" for c in escaped) + '"'
+    return "".join(f"{key} = {toml_value(value)}\n" for key, value in fields.items())

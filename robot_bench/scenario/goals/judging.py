@@ -217,7 +217,7 @@ class GoalJudge(Stateful):
                 self._decide(place, outcome, limit)
         if self._last is not None and self._last[0] == limit:
             planned_ns = self._last[1]
-            for (goal, outcome, _), decided in zip(self._outcomes(limit), self._decided, strict=True):
+            for (goal, outcome, _), decided in zip(self.outcomes(limit), self._decided, strict=True):
                 if decided is None and (outcome.met or limit >= planned_ns):
                     self._publish(_verdict(goal, outcome, limit))
 
@@ -233,7 +233,7 @@ class GoalJudge(Stateful):
             planned_ns: How long the scenario plans it to be; 0 judges all.
         """
         found = Judgement([], [], [])
-        for goal, outcome, is_decided in self._outcomes(end):
+        for goal, outcome, is_decided in self.outcomes(end):
             if outcome.met:
                 found.met.append(goal.wanted)
             elif not is_decided and end < planned_ns:
@@ -242,7 +242,8 @@ class GoalJudge(Stateful):
                 found.missed.append(f"{goal.kind}: {outcome.says}")
         return found
 
-    def _outcomes(self, end: Nanos) -> list[tuple[Goal, Outcome, bool]]:
+    def outcomes(self, end: Nanos) -> list[tuple[Goal, Outcome, bool]]:
+        """Return each goal with what became of it in a run that ended at `end`, and whether that was decided before."""
         rows = zip(self.goals, self._watches, self._decided, strict=True)
         return [(goal, watch.finish(end), decided is not None) for goal, watch, decided in rows]
 

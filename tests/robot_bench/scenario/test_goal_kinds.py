@@ -35,7 +35,7 @@ def outcome(kind: str, run: Sequence[Event], end: int = 10 * S, **arguments: Any
                 fresh.restore(judge.snapshot())
                 judge = fresh
         judge.advance_to(end)
-        ((_, said, is_decided),) = judge._outcomes(end)
+        ((_, said, is_decided),) = judge.outcomes(end)
         assert is_decided in {True, False}
         found.append(said)
     assert found[0] == found[1]

@@ -1,0 +1,1 @@
+"""Mutation of a firmware: how many wrong programs the goals of some scenarios notice."""

@@ -1,0 +1,1 @@
+"""A failing run made as small and as round as it can be, and what it is kept as."""

@@ -1,0 +1,417 @@
+"""The unit of work of a campaign: one run as a value, and what came of it.
+
+A `Trial` is a scenario as data: its tables after all that was set, the bytes of each file that they name (firmware,
+world, robot, …), and its seed. It can be pickled and carried out anywhere, without a disk that is shared:
+`run_trial` runs it in this process, `processes` in others within limits. `write` makes a folder of it that
+`p2os run FOLDER/NAME.toml` runs, with the same hash.
+
+Invariant: what comes of a trial depends on nothing but itself and the version of p2os.
+"""
+
+import hashlib
+import os
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from copy import deepcopy
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from functools import lru_cache
+from pathlib import Path
+from typing import cast
+
+from bluepill_sim.board import BluePill
+from bluepill_sim.program.image import Image, load_image
+from p2os.pioneer.world import known_worlds, load_world
+from p2os.pioneer.world.writer import write_world
+from p2os.toml_file import TomlSource, is_file, toml_text
+from robot_bench.bench import Bench
+from robot_bench.events.kinds import Contact, Event, Pose, Text
+from robot_bench.scenario.included_files import (
+    MergedSource,
+    ScenarioTable,
+    Setting,
+    read_tables,
+    set_key,
+    shipped_file,
+)
+from robot_bench.scenario.scenario import Scenario, build_scenario, known_scenarios, load_scenario
+from robot_bench.scenario.schema import Table
+from simbase.errors import P2osError, UsageError
+from simbase.timing import NS_PER_MS, Nanos
+
+#: A way is kept as a place each so often.
+WAY_NS: Nanos = 500 * NS_PER_MS
+#: chosen: so many different lines that a firmware prints tell its states apart; one that prints numbers has no end.
+MOST_LINES = 200
+#: Keys of tables that are words, whatever file has their name.
+_WORDS = frozenset({"text", "texts", "description", "event", "events", "name", "kind", "fault", "from", "to", "after"})
+#: chosen: firmwares and worlds of a campaign that a worker keeps at hand.
+_KEPT_FOLDERS = 8
+
+
+class Verdict(Enum):
+    """What came of a trial."""
+
+    #: Each goal was met, or left open by a run that was asked to be shorter.
+    PASSED = "passed"
+    #: A goal was missed, or the firmware died.
+    FAILED = "failed"
+    #: There is no verdict: the scenario cannot be run so, a limit was exceeded, or the process ended.
+    ERROR = "error"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trial:
+    """One run as data."""
+
+    #: What its scenario file would be called, without the ending.
+    name: str
+    #: The tables of the scenario, nothing included or extended any more; without the seed.
+    table: Mapping[str, object]
+    #: Name as the tables have it → content.
+    files: Mapping[str, bytes]
+    #: Of everything random.
+    seed: int = 0
+
+    def set(self, *settings: Setting) -> "Trial":
+        """Return the trial with keys set as `--set` sets them: `("start.x_m", 1.5)`.
+
+        Raises:
+            UsageError: A key goes through what is no table, or names a table of a list that is not there.
+        """
+        table, seed = deepcopy(dict(self.table)), self.seed
+        for key, value in settings:
+            if key == "seed":
+                seed = cast("int", value)
+            else:
+                set_key(table, key, value)
+        return replace(self, table=table, seed=seed)
+
+    def with_lists(self, **lists: Sequence[Table]) -> "Trial":
+        """Return the trial with other lists of tables: `obstacle=[…]`; an empty one is left out."""
+        table = {key: value for key, value in self.table.items() if key not in lists}
+        return replace(self, table=table | {key: list(value) for key, value in lists.items() if value})
+
+    def with_firmware(self, content: bytes) -> "Trial":
+        """Return the trial with the bytes of another firmware (of the first robot's, where there are several)."""
+        return replace(self, files={**self.files, self.firmware_name: content})
+
+    @property
+    def firmware_name(self) -> str:
+        """The name of its firmware among the files."""
+        robots = self.table.get("robot")
+        tables = cast("list[Table]", robots) if isinstance(robots, list) else [self.table]
+        return str(next(table["firmware"] for table in tables if "firmware" in table))
+
+    @property
+    def text(self) -> str:
+        """The scenario file."""
+        return toml_text({**self.table, "seed": self.seed})
+
+    @property
+    def sha256(self) -> str:
+        """The hash of all that decides it: two trials with one hash have one outcome."""
+        found = hashlib.sha256(self.text.encode())
+        for name, content in sorted(self.files.items()):
+            found.update(f"\0{name}\0{len(content)}\0".encode() + content)
+        return found.hexdigest()
+
+    def write(self, folder: Path) -> Path:
+        """Write scenario and files into a folder; return the scenario's path, for `p2os run`.
+
+        Raises:
+            UsageError: The folder cannot be written.
+        """
+        path = folder / f"{self.name}.toml"
+        try:
+            _write_files(self.files, folder)
+            path.write_text(self.text, encoding="utf-8")
+        except OSError as error:
+            raise UsageError(f"cannot write {path}: {error.strerror}", hint="name another folder") from error
+        return path
+
+    def scenario(self, folder: Path) -> Scenario:
+        """Return the scenario, its files being in a folder.
+
+        Raises:
+            ScenarioError: The tables break the schema, or the world refuses them.
+        """
+        path = folder / f"{self.name}.toml"
+        source = MergedSource.of(TomlSource(path.name))
+        table = {**deepcopy(dict(self.table)), "seed": self.seed}
+        return build_scenario(ScenarioTable(table=table, source=source, text=self.text), path)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GoalResult:
+    """What became of one goal."""
+
+    #: As in the scenario: `no_collision`.
+    kind: str
+    #: As a sentence.
+    wanted: str
+    #: None: the run was too short to tell.
+    met: bool | None
+    says: str
+    #: By how much it was met, in `unit`, negative where it was missed; None where there is no measure.
+    robustness: float | None
+    unit: str
+    #: Of several, whose.
+    robot: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Hit:
+    """A contact of the hull."""
+
+    t: Nanos
+    what: str
+    #: Which part of the hull: `front left`.
+    part: str
+    x_m: float
+    y_m: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """What came of a trial."""
+
+    verdict: Verdict
+    #: What was missed, each a sentence; of an error why.
+    failures: tuple[str, ...] = ()
+    goals: tuple[GoalResult, ...] = ()
+    virtual_ns: Nanos = 0
+    #: Of the trace: the same run has the same.
+    sha256: str = ""
+    distance_m: float = 0.0
+    #: The least distance of the hull from anything, metres; None where nothing is known.
+    clearance_m: float | None = None
+    hits: tuple[Hit, ...] = ()
+    #: Where the (first) robot was each half second, millimetres.
+    way_mm: tuple[tuple[int, int], ...] = ()
+    #: How the firmware died; empty where it did not.
+    died: str = ""
+    #: The first address of each block of the firmware that ran.
+    blocks: frozenset[int] = field(default_factory=frozenset)
+    #: What it printed, figures as `#`: the states that it tells of.
+    lines: frozenset[str] = field(default_factory=frozenset)
+
+    @property
+    def failing_goals(self) -> tuple[GoalResult, ...]:
+        """The goals that were missed."""
+        return tuple(goal for goal in self.goals if goal.met is False)
+
+
+def trial_of(name_or_path: str, *, firmware: Path | None = None, settings: Sequence[Setting] = ()) -> Trial:
+    """Return the trial of a scenario that ships or of a file, with all files that it names.
+
+    Args:
+        name_or_path: As of `load_scenario`.
+        firmware: Takes the place of its own program.
+        settings: What is set beside the file.
+
+    Raises:
+        ScenarioError: There is no such scenario, or it breaks the schema.
+        UsageError: A setting names what is not there.
+    """
+    scenario = load_scenario(name_or_path, firmware=firmware, settings=settings)
+    path = shipped_file(name_or_path) if name_or_path in known_scenarios() else Path(name_or_path)
+    table = deepcopy(dict(read_tables(path, settings).table))
+    for key in ("seeds", "sweep"):
+        table.pop(key, None)
+    files: dict[str, bytes] = {}
+    _pack_firmware(table, scenario, files)
+    _pack_world(table, scenario, path.parent, files)
+    _pack_others(table, path.parent, files)
+    seed = cast("int", table.pop("seed", scenario.seed))
+    return Trial(name=scenario.name, table=table, files=files, seed=seed)
+
+
+def run_trial(trial: Trial, look: Callable[[], None] | None = None) -> Outcome:
+    """Carry a trial out in this process.
+
+    Args:
+        trial: What to run.
+        look: Called between slices of the run; what it raises ends it, a `P2osError` as an outcome.
+    """
+    with unpacked(trial.files) as folder:
+        try:
+            return _outcome(trial.scenario(folder), look)
+        except P2osError as error:
+            hint = f" ({error.hint})" if error.hint else ""
+            return Outcome(verdict=Verdict.ERROR, failures=(f"{error}{hint}",))
+
+
+@contextmanager
+def unpacked(files: Mapping[str, bytes]) -> Iterator[Path]:
+    """Have the files of a trial in a folder for a block; it is kept for the next trial that has the same."""
+    key = tuple(sorted(files.items()))
+    yield Path(_folder_of(key).name)
+
+
+def bench_of(scenario: Scenario) -> Bench:
+    """Return a bench at its beginning; its firmware's file is read once in a process."""
+    if scenario.robots:
+        return Bench.from_scenario(scenario)
+    stat = scenario.firmware.stat()
+    return Bench(scenario, chip=BluePill(_image_of(scenario.firmware, stat.st_mtime_ns, stat.st_size)))
+
+
+def outcome_of(bench: Bench, way: Sequence[tuple[int, int]], hits: Sequence[Hit], printed: Sequence[bytes]) -> Outcome:
+    """End a run and return what came of it."""
+    end = bench.finish()
+    goals: list[GoalResult] = []
+    failures: list[str] = []
+    hashes: list[str] = []
+    died, blocks = "", frozenset[int]()
+    for name, one in bench.robots.items():
+        robot = name if len(bench.robots) > 1 else ""
+        before = f"{robot}: " if robot else ""
+        if one.chip.has_died:
+            failures.append(before + one.chip.verdict)
+            died = died or failures[-1]
+        found = _goals(one, end, robot)
+        goals += found
+        failures += [f"{before}{goal.kind}: {goal.says}" for goal in found if goal.met is False]
+        hashes.append(one.trace.sha256)
+        if isinstance(one.chip, BluePill):
+            blocks |= one.chip.entered_blocks
+    clearances = [one.recorder.min_clearance_m for one in bench.robots.values()]
+    known = [clearance for clearance in clearances if clearance is not None]
+    return Outcome(
+        verdict=Verdict.FAILED if failures else Verdict.PASSED, failures=tuple(failures), goals=tuple(goals),
+        virtual_ns=end, sha256=hashes[0] if len(hashes) == 1 else hashlib.sha256("".join(hashes).encode()).hexdigest(),
+        distance_m=round(bench.recorder.distance_m, 6), clearance_m=round(min(known), 6) if known else None,
+        hits=tuple(hits), way_mm=tuple(way), died=died, blocks=blocks, lines=_states(printed),
+    )  # fmt: skip
+
+
+def _outcome(scenario: Scenario, look: Callable[[], None] | None) -> Outcome:
+    bench = bench_of(scenario)
+    way: list[tuple[int, int]] = []
+    hits: list[Hit] = []
+    printed: dict[bytes, None] = {}
+
+    def take(event: Event) -> None:
+        if isinstance(event, Pose):
+            if event.t % WAY_NS == 0:
+                way.append((event.x // 1000, event.y // 1000))
+        elif isinstance(event, Contact):
+            hits.append(Hit(t=event.t, what=event.what, part=event.part, x_m=event.x_m, y_m=event.y_m))
+        elif isinstance(event, Text) and len(printed) < MOST_LINES:
+            printed[event.data] = None
+
+    bench.events.subscribe(take, Pose, Contact, Text)
+    if look is not None:
+        for one in bench.robots.values():
+            one.on_slice = lambda _now: look()
+    bench.run_until(bench.end)
+    return outcome_of(bench, way, hits, list(printed))
+
+
+def _goals(bench: Bench, end: Nanos, robot: str) -> list[GoalResult]:
+    found = []
+    for goal, outcome, is_decided in bench.goals.outcomes(end):
+        is_open = not outcome.met and not is_decided and end < bench.scenario.planned_ns
+        by = outcome.robustness
+        found.append(GoalResult(
+            kind=goal.kind, wanted=goal.wanted, met=None if is_open else outcome.met, says=outcome.says,
+            robustness=None if by is None else round(by, 9), unit="" if by is None else outcome.unit, robot=robot,
+        ))  # fmt: skip
+    return found
+
+
+def _states(printed: Sequence[bytes]) -> frozenset[str]:
+    """Return printed lines with figures as `#`, so that a counter is one state."""
+    found = set()
+    for data in printed:
+        text = data.decode("ascii", "replace").strip()
+        found.add("".join("#" if c.isdigit() and not text[at - 1 : at].isdigit() else c for at, c in enumerate(text)))
+    return frozenset(sorted(found)[:MOST_LINES])
+
+
+def _pack_firmware(table: dict[str, object], scenario: Scenario, files: dict[str, bytes]) -> None:
+    """Put the bytes of each program among the files; two robots with one program share it."""
+    robots = table.get("robot")
+    if not isinstance(robots, list):
+        table["firmware"] = _packed(scenario.firmware, files)
+        return
+    found = {robot.name: robot.scenario.firmware for robot in scenario.robots if robot.scenario is not None}
+    for one in cast("list[dict[str, object]]", robots):
+        if one["name"] in found:
+            one["firmware"] = _packed(found[str(one["name"])], files)
+    table.pop("firmware", None)
+
+
+def _pack_world(table: dict[str, object], scenario: Scenario, folder: Path, files: dict[str, bytes]) -> None:
+    """Put a world's file among the files: as it is where it stands alone, else written as one that does."""
+    world = str(table["world"])
+    if world in known_worlds():
+        return
+    path = folder / world
+    content = path.read_bytes()
+    if path.suffix.lower() == ".toml" and b"[[import]]" not in content:
+        table["world"] = _named(path.name, content, files)
+        return
+    text = write_world(load_world(scenario.world, seed=scenario.seed))
+    table["world"] = _named(f"{path.stem}.toml", text.encode(), files)
+
+
+def _pack_others(table: dict[str, object], folder: Path, files: dict[str, bytes]) -> None:
+    """Put every other file that a value names among the files: robots, settings, classes of the user's, …."""
+    for key, value in table.items():
+        if isinstance(value, dict):
+            _pack_others(value, folder, files)
+        elif isinstance(value, list):
+            for item in value:
+                if isinstance(item, dict):
+                    _pack_others(item, folder, files)
+        elif isinstance(value, str) and key not in _WORDS and value not in files:
+            name, colon, kind = value.rpartition(":") if ".py:" in value else (value, "", "")
+            if "." in Path(name).name and is_file(folder / name):
+                table[key] = _packed(folder / name, files) + colon + kind
+
+
+def _packed(path: Path, files: dict[str, bytes]) -> str:
+    return _named(path.name, path.read_bytes(), files)
+
+
+def _named(name: str, content: bytes, files: dict[str, bytes]) -> str:
+    """Put a file among the files and return its name there: another one where that is taken by another content."""
+    stem, suffix, number = Path(name).stem, Path(name).suffix, 1
+    while files.get(name, content) != content:
+        number += 1
+        name = f"{stem}-{number}{suffix}"
+    files[name] = content
+    return name
+
+
+def _write_files(files: Mapping[str, bytes], folder: Path) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, content in files.items():
+        (folder / name).write_bytes(content)
+
+
+class _Folder:
+    """A folder that is removed with the object, by the process that made it."""
+
+    def __init__(self) -> None:
+        self.name, self._owner = tempfile.mkdtemp(prefix="p2os-trial-"), os.getpid()
+
+    def __del__(self) -> None:
+        if os.getpid() == self._owner:
+            shutil.rmtree(self.name, ignore_errors=True)
+
+
+@lru_cache(maxsize=_KEPT_FOLDERS)
+def _folder_of(files: tuple[tuple[str, bytes], ...]) -> _Folder:
+    folder = _Folder()
+    _write_files(dict(files), Path(folder.name))
+    return folder
+
+
+@lru_cache(maxsize=_KEPT_FOLDERS)
+def _image_of(path: Path, _changed_ns: int, _size: int) -> Image:
+    return load_image(path)

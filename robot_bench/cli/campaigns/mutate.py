@@ -1,0 +1,199 @@
+"""`p2os mutate`: how many wrong programs the goals of some scenarios notice."""
+
+import json
+import random
+import sys
+import time
+from collections.abc import Callable, Sequence
+from fnmatch import fnmatch
+from pathlib import Path
+from typing import Annotated, cast
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+from bluepill_sim.program.elf_file import read_bytes
+from bluepill_sim.program.line_table import read_lines
+from bluepill_sim.program.mutants import Mutant, mutants, mutated_file
+from p2os.cli.help_pages import BENCH
+from p2os.cli.main import EXIT_INTERRUPTED
+from p2os.cli.quantities import option
+from robot_bench.campaign.mutation.base_run import BaseRun, base_run
+from robot_bench.campaign.mutation.report import Mutation, as_json, report_lines, write_junit
+from robot_bench.campaign.mutation.trial import Found, try_mutant
+from robot_bench.cli.progress import RunDisplay
+from robot_bench.cli.sweep import refuse_junit
+from robot_bench.cli.workers import core_count, run_in_processes
+from robot_bench.events.codec import Json
+from robot_bench.recording.summary import INTERRUPTED
+from robot_bench.scenario.included_files import read_setting
+from robot_bench.scenario.scenario import load_scenario
+from simbase.errors import FileError, UsageError
+from simbase.units import COUNT, PERCENT, SEED
+
+HELP = """Judge the goals of scenarios by how many wrong programs they notice.
+
+Each instruction of FIRMWARE that the scenarios run is changed, one at a time: a
+branch inverted, gone always, gone never; a comparison moved by one or made strict;
+a number moved by one; a sign turned. Each such mutant runs the scenarios that
+execute it, from just before the change matters. A goal that is missed has noticed
+it, and so has a fault. Survivors are listed: what they get wrong, nobody looks at.
+
+Exit code: 0 done, 1 the score is below --fail-under, 2 wrong usage or file.
+
+\b
+Examples:
+  p2os mutate build/robot.elf patrol.toml        all mutants, and those that survived
+  p2os mutate build/robot.elf tests/*.toml       the score of all goals together
+  p2os mutate dodge.elf dodge --sample 100       a hundred of them, drawn by --seed
+  p2os mutate dodge.elf dodge --only dodge_fsm.c --mode direct --body kinematic
+  p2os mutate build/robot.elf patrol.toml --fail-under 80%    for CI
+"""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the verb."""
+    app.command("mutate", help=HELP, rich_help_panel=BENCH)(mutate)
+
+
+def mutate(
+    firmware: Annotated[Path, typer.Argument(help="ELF, HEX or BIN file.", metavar="FIRMWARE")],
+    scenarios: Annotated[list[str], typer.Argument(help="Names or TOML files, with goals.", metavar="SCENARIO...")],
+    sample: Annotated[
+        int | None, option(COUNT, "--sample", purpose="So many of the mutants, drawn; default all.", above_zero=True)
+    ] = None,
+    seed: Annotated[int, option(SEED, "--seed", purpose="Of the draw.", shown="0", least="0")] = 0,
+    only: Annotated[
+        list[str] | None,
+        typer.Option("--only", help="Source file or function; * stands for any; repeatable.", metavar="NAME"),
+    ] = None,
+    mode: Annotated[str | None, typer.Option(help="As of p2os run.", metavar="direct|adapter")] = None,
+    body: Annotated[str | None, typer.Option(help="As of p2os run; kinematic is quick.", metavar="BODY")] = None,
+    set_: Annotated[
+        list[str] | None, typer.Option("--set", help="A key of the scenarios; repeatable.", metavar="KEY=VALUE")
+    ] = None,
+    jobs: Annotated[
+        int | None,
+        option(COUNT, "--jobs", "-j", purpose="Runs at a time; default as many as processors.", above_zero=True),
+    ] = None,
+    fail_under: Annotated[
+        float, option(PERCENT, "--fail-under", purpose="Least score.", shown="0%", least="0%", most="100%")
+    ] = 0.0,
+    write: Annotated[
+        Path | None, typer.Option(help="Write the survivors there, as firmware files.", metavar="FOLDER")
+    ] = None,
+    junit: Annotated[Path | None, typer.Option(help="Write what CI reads.", metavar="FILE")] = None,
+    json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Judge goals."""
+    settings = [read_setting(text) for text in set_ or ()]
+    wanted = [
+        load_scenario(name, firmware=firmware, settings=settings).with_options(firmware=firmware, mode=mode, body=body)
+        for name in scenarios
+    ]
+    if junit is not None:
+        refuse_junit(junit)
+    with RunDisplay(is_shown=False) as display:
+        bases = [base_run(one, time.process_time_ns, display.raise_if_interrupted) for one in wanted]
+        possible = _chosen(bases, only or [])
+        tried = possible if sample is None or sample >= len(possible) else _drawn(possible, sample, seed)
+        found, broken, is_whole = _try_all(tried, bases, jobs or core_count(), display.raise_if_interrupted)
+    mutation = Mutation(
+        firmware=firmware, scenarios=[one.name for one in wanted],
+        instructions=len({address for base in bases for address in base.first_ns}), possible=len(possible),
+        seed=seed if len(tried) < len(possible) else None, tried=tried, found=found, coverage=bases[0].coverage,
+        lines=read_lines(bases[0].board.image),
+    )  # fmt: skip
+    if write is not None:
+        _write(mutation, bases[0], write)
+    if junit is not None:
+        write_junit(mutation, junit)
+    if json_output:
+        typer.echo(json.dumps(as_json(mutation), sort_keys=True))
+    else:
+        for line in report_lines(mutation):
+            typer.echo(line)
+    if not is_whole:
+        raise typer.Exit(EXIT_INTERRUPTED)
+    if broken:
+        typer.echo(f"{len(broken)} could not be run, first {broken[0]}", err=True)
+        raise typer.Exit(1)
+    if fail_under and (mutation.score is None or mutation.score < fail_under):
+        typer.echo(f"the score is below {fail_under:g} %", err=True)
+        raise typer.Exit(1)
+
+
+def _chosen(bases: Sequence[BaseRun], only: Sequence[str]) -> list[Mutant]:
+    """Return the mutants of all instructions that ran, of the files and functions asked for.
+
+    Raises:
+        UsageError: There is none.
+    """
+    coverage = bases[0].coverage
+
+    def is_wanted(address: int) -> bool:
+        names = coverage.place(address).partition(":")[0], coverage.function_name(address)
+        return not only or any(fnmatch(name, pattern) for name in names for pattern in only)
+
+    ran = {address for base in bases for address in base.first_ns if is_wanted(address)}
+    found = mutants(bases[0].board.image, ran)
+    if not found:
+        what = f"of {' and '.join(only)} " if only else ""
+        raise UsageError(f"nothing {what}that ran can be changed", hint="p2os run --coverage shows what runs")
+    return found
+
+
+def _drawn(possible: Sequence[Mutant], count: int, seed: int) -> list[Mutant]:
+    """Return so many mutants, in their order."""
+    chosen = sorted(random.Random(seed).sample(range(len(possible)), count))
+    return [possible[number] for number in chosen]
+
+
+def _try_all(
+    tried: Sequence[Mutant], bases: Sequence[BaseRun], jobs: int, raise_if_interrupted: Callable[[], None]
+) -> tuple[list[Found | None], list[str], bool]:
+    """Return what came of each mutant, which could not be run and why, and whether nothing interrupted them."""
+    found: list[Found | None] = [None] * len(tried)
+    broken: list[str] = []
+    bar = Progress(
+        TextColumn("mutants"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[survived]}"),
+        console=Console(stderr=True), transient=True, auto_refresh=False, disable=not sys.stderr.isatty(),
+    )  # fmt: skip
+
+    def job(number: int, look: Callable[[], None]) -> Json:
+        return try_mutant(tried[number], bases, time.process_time_ns, look).to_plain()
+
+    with bar:
+        task = bar.add_task("", total=len(tried), survived="")
+
+        def on_done(number: int, plain: Json) -> None:
+            if "fate" in plain:
+                found[number] = Found.from_plain(plain)
+            elif (why := cast("list[str]", plain["failures"])[0]) != INTERRUPTED:
+                broken.append(f"{tried[number].address:#010x}: {why}")
+            survived = sum(one is not None and not one.is_noticed for one in found)
+            bar.update(task, advance=1, survived=f"{survived} not noticed", refresh=True)
+
+        is_whole = run_in_processes(
+            job, len(tried), at_once=jobs, on_done=on_done, raise_if_interrupted=raise_if_interrupted
+        )
+    return found, broken, is_whole
+
+
+def _write(mutation: Mutation, base: BaseRun, folder: Path) -> None:
+    """Write each survivor as a firmware file.
+
+    Raises:
+        FileError: The folder cannot be written.
+    """
+    image = base.board.image
+    data = read_bytes(image)
+    suffix = ".elf" if data.startswith(b"\x7fELF") else ".bin"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for mutant in mutation.survivors:
+            name = f"{mutant.address:08x}-{mutant.alteration.code.hex()}{suffix}"
+            (folder / name).write_bytes(mutated_file(data, mutant, image))
+    except OSError as error:
+        raise FileError(f"cannot write into {folder}: {(error.strerror or str(error)).lower()}") from error
