@@ -94,7 +94,7 @@ LAYERS = {
     "robot_bench": (
         ("running", "firmware", "scenarios"), ("wires",), ("events",), ("direct",), ("recording",),
         ("scenario", "report"),
-        ("adapter",), ("bench",), ("remote",), ("run", "project"), ("cli",),
+        ("adapter",), ("bench",), ("remote",), ("run", "project"), ("ros",), ("cli",),
     ),
 }  # fmt: skip
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TypedDict, Unpack, cast
 
 from adapter_sim.codec import BitOrder
-from adapter_sim.pinout import load_pinout
+from adapter_sim.pinout import WireRole, load_pinout
 from adapter_sim.settings import AdapterSettings, MotorCommand
 from bluepill_sim.parts.registry import PartSpec
 from p2os.errors import ScenarioError
@@ -49,6 +49,8 @@ from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 from simbase.user_classes import located, source_of
 
 MODES = ("direct", "adapter")
+#: The kinds of wires that may be cut from the robot, for something outside to drive: those to the chip.
+OUTSIDE = (WireRole.DISTANCE.value, WireRole.ENCODER.value)
 
 _TOP = (
     VERSION,
@@ -66,6 +68,7 @@ _TOP = (
     Key(name="duration_s", kind="number", required=True, above=0, most=LONGEST_S),
     Key(name="threshold_m", kind="number", above=0, most=100),
     Key(name="usart_baud", kind="whole", least=1, most=4_500_000),
+    Key(name="outside", kind="text"),
     Key(name="start", kind="table"),
     Key(name="direct", kind="table"),
     Key(name="adapter", kind="table"),
@@ -186,6 +189,8 @@ class Scenario:
     threshold_um: int
     #: The speed of USART1's far end, bit/s; None follows the firmware.
     usart_baud: int | None = None
+    #: Kinds of wires that the robot does not drive, but somebody outside: of `OUTSIDE`, sorted.
+    outside: tuple[str, ...] = ()
     #: None starts at the world's own place.
     start: Pose | None = None
     #: What a message calls the start: file, line and key.
@@ -336,6 +341,19 @@ def read_scenario(
     return scenario
 
 
+def _outside(words: str, own_robot: OwnRobot | None, where: str) -> tuple[str, ...]:
+    """Return the kinds of wires that words name, such as "distance encoder"."""
+    found = tuple(sorted(set(words.replace(",", " ").split())))
+    unknown = [word for word in found if word not in OUTSIDE]
+    if unknown:
+        raise ScenarioError(
+            f"{where}: no wires are called {shown(unknown[0])}", hint=f'outside = "{" ".join(OUTSIDE)}"'
+        )
+    if found and own_robot is not None:
+        raise ScenarioError(f"{where}: only wires of the pin-out can be driven from outside", hint="leave out `robot`")
+    return found
+
+
 def resolve_world(
     world: str, folder: Path, where: str, *, error: type[ScenarioError | UsageError] = ScenarioError
 ) -> str:
@@ -401,6 +419,7 @@ def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | N
         planned_ns=planned_ns,
         threshold_um=round(threshold_m * 1e6),
         usart_baud=cast("int | None", table.get("usart_baud")),
+        outside=_outside(str(table.get("outside", "")), own_robot, where.at("outside")),
         start=_start(table, where),
         start_at=str(within(where, "start")),
         direct=_direct(cast("Table", table.get("direct", {})), where),
