@@ -77,7 +77,7 @@ from robot_bench.scenario.world_script import WorldScript, load_changes
 from robot_bench.wires.chip_pins import ChipPins
 from robot_bench.wires.endpoints import Endpoint
 from robot_bench.wires.line_ends import ENDS, AdapterPart, ControllerPart
-from robot_bench.wires.nets import Harness, Net, OwnedPins, Strength
+from robot_bench.wires.nets import Harness, Net, OwnedPins, Strength, Unconnected
 from robot_bench.wires.ports import Chip
 from robot_bench.wires.serial_line import SerialLine
 from simbase.errors import UsageError, shown
@@ -101,8 +101,8 @@ Condition: TypeAlias = Union[str, Callable[["Bench"], bool]]  # noqa: UP007 - a 
 
 #: What decides a run besides its files; its end and its goals may be others after a restart.
 DECISIVE = (
-    "mode", "seed", "parameters", "threshold_um", "usart_baud", "start", "direct", "adapter", "adapter_core",
-    "controller", "controller_kind", "changes", "faults", "whens", "own_robot", "parts", "record",
+    "mode", "seed", "parameters", "threshold_um", "usart_baud", "outside", "start", "direct", "adapter",
+    "adapter_core", "controller", "controller_kind", "changes", "faults", "whens", "own_robot", "parts", "record",
 )  # fmt: skip
 _VERSION = "version of p2os"
 
@@ -689,6 +689,18 @@ class Bench(Stateful):
                 "a fault acts on the robot's controller, and mode direct has none", hint='mode="adapter"'
             )
 
+    def take_inputs(self, deeds: Sequence[Deed]) -> None:
+        """Take what comes in from outside, to be done at its times, which are after now; the trace notes each.
+
+        `rewind` forgets what came in after the state that it goes back to.
+
+        Raises:
+            UsageError: The run has been judged, or finished.
+        """
+        self._refuse_the_ended()
+        self._expected = -1, None
+        self.hands.add(*deeds)
+
     def checkpoint(self) -> None:
         """Keep the present state, so that `rewind` to a later time is quick; some 100 kB."""
         for bench in self.robots.values():
@@ -865,7 +877,7 @@ class Bench(Stateful):
             self.parts.controller.do(words, at)
 
     def _do_by_hand(self, deed: Deed) -> None:
-        self.recorder.event("hand", deed.at, deed.do, deed.words)
+        self.recorder.event(deed.who, deed.at, deed.do, deed.words)
         if deed.do == "type":
             getattr(self.chip, deed.place).receive(deed.text)
         elif deed.do == "set_volts":
@@ -916,14 +928,22 @@ class Bench(Stateful):
             )  # fmt: skip
 
         wires = pinout.with_role(WireRole.DISTANCE)
+        cut = cut_wires(self.scenario, pinout)
+
+        def driven(names: Iterable[str]) -> list[Net | Unconnected]:
+            return [Unconnected() if name in cut else harness[name] for name in names]
+
+        def encoder(value: str) -> WheelEncoder:
+            return WheelEncoder(driven(pinout.value(value).wires))
+
         sensors = DistanceSensors(
-            [harness[wire.name] for wire in wires],
+            driven(wire.name for wire in wires),
             threshold_um=self.scenario.threshold_um, period_ns=settings.sensor_period_ns,
         )  # fmt: skip
         sensors.on_sample = self.recorder.sonar
         robot = DirectRobot(
             body, left=motor("motor1"), right=motor("motor2"),
-            encoders=(WheelEncoder(nets("encoder1")), WheelEncoder(nets("encoder2"))),
+            encoders=(encoder("encoder1"), encoder("encoder2")),
             sensors=sensors, sonar_numbers=range(len(wires)), encoder_period_ns=settings.encoder_period_ns,
         )  # fmt: skip
         robot.on_event = self.recorder.listener("direct")
@@ -932,7 +952,8 @@ class Bench(Stateful):
     def _ends_of_line(self, pinout: Pinout, body: RobotBody, harness: Harness) -> tuple[AdapterPart, ControllerPart]:
         recorder, parameters = self.recorder, self.scenario.parameters
         to_robot, to_client = self._lines = SerialLine(), SerialLine()
-        adapter = make_adapter(self.scenario, OwnedPins(harness, "adapter"), pinout)
+        pins = OwnedPins(harness, "adapter", cut_wires(self.scenario, pinout))
+        adapter = make_adapter(self.scenario, pins, pinout)
         adapter.on_event = recorder.listener("adapter")
         settings = replace(self.scenario.controller, baud=to_client.baud, seed=self.scenario.seed)
         kind = self.scenario.controller_kind
@@ -1073,6 +1094,11 @@ def pins_of(scenario: Scenario) -> dict[str, str]:
     if scenario.own_robot is None:
         return {wire.name: wire.bluepill for wire in load_pinout().wires}
     return {wire.name: wire.pin for wire in scenario.own_robot.robot.signals if not wire.is_analog}
+
+
+def cut_wires(scenario: Scenario, pinout: Pinout) -> frozenset[str]:
+    """Return the wires of a pin-out that a scenario's robot does not drive."""
+    return frozenset(wire.name for wire in pinout.wires if wire.role.value in scenario.outside)
 
 
 def make_own_harness(signals: Sequence[RobotWire]) -> Harness:

@@ -97,7 +97,8 @@ LAYERS = {
     "robot_bench": (
         ("running", "firmware", "scenarios"), ("wires",), ("events",), ("direct",), ("recording",),
         ("scenario", "report"),
-        ("adapter",), ("bench",), ("remote",), ("run", "project"), ("validation",), ("experiments",), ("campaign",), ("cli",),
+        ("adapter",), ("bench",), ("remote",), ("run", "project"),
+        ("validation",), ("experiments",), ("campaign",), ("ros",), ("cli",),
     ),
 }  # fmt: skip
 

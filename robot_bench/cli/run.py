@@ -1,7 +1,9 @@
 """`p2os run`: one firmware, one scenario, one run folder with its report."""
 
+import contextlib
 import json
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -13,6 +15,7 @@ from p2os.cli.main import EXIT_INTERRUPTED
 from p2os.cli.names import bodies, urls, worlds
 from p2os.cli.quantities import option
 from p2os.errors import RunFailedError
+from p2os.ros.transports import TRANSPORTS
 from p2os.transport import open_url
 from robot_bench.cli.progress import RunDisplay
 from robot_bench.cli.sweep import (
@@ -30,7 +33,7 @@ from robot_bench.cli.table import print_result
 from robot_bench.cli.workers import core_count
 from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.remote import CAUTIOUS_ROTATION_DEG_S, CAUTIOUS_VELOCITY_MM_S
-from robot_bench.run import RunResult, run_at_port, run_scenario
+from robot_bench.run import RunBench, RunResult, run_at_port, run_scenario
 from robot_bench.scenario import sweep
 from robot_bench.scenario.included_files import read_setting
 from robot_bench.scenario.scenario import Scenario, ScenarioOptions, known_scenarios, load_scenario
@@ -64,6 +67,7 @@ Examples:
   p2os run dodge --coverage --profile               lines, branches, cycles of the whole run
   p2os run dodge --coverage --fail-under 80         exit code 1 below 80 % of the lines
   p2os run dodge --gdb 3333                         under GDB; the robot stands still at a halt
+  p2os run dodge --ros                              its pins as topics of ROS 2 (docs/ros.md)
   p2os run dodge --port serial:/dev/ttyUSB0         drive a real Pioneer; asks first
 """
 
@@ -73,16 +77,18 @@ _FLAGS = {"adapter_core": "--adapter", "duration_s": "--duration", "usart_baud":
 
 
 class RealtimeCommand(VerbPage):
-    """Lets `--realtime` stand without its number, which then is 1."""
+    """Lets `--realtime` and `--ros` stand without what follows them, which then is 1, or DDS."""
 
     def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override]  # typer's own class
-        """Insert the number where it is missing."""
+        """Insert what is missing."""
         filled = []
         for place, word in enumerate(args):
             filled.append(word)
             following = args[place + 1] if place + 1 < len(args) else ""
             if word == "--realtime" and not _is_number(following):
                 filled.append("1")
+            if word == "--ros" and re.split("[:@]", following)[0] not in TRANSPORTS:
+                filled.append(next(iter(TRANSPORTS)))
         return super().parse_args(ctx, filled)
 
 
@@ -170,6 +176,13 @@ def run(
         int | None,
         option(PORT, "--gdb", purpose="Wait for GDB on this TCP port; 0 takes a free one.", least="0", most="65535"),
     ] = None,
+    ros: Annotated[
+        str | None,
+        typer.Option(help="Be a ROS 2 node, at real time: dds, dds:42, zenoh@HOST.", metavar="[WHERE]"),
+    ] = None,
+    inputs: Annotated[
+        Path | None, typer.Option(help="Do again what came in from ROS in that run.", metavar="RUN")
+    ] = None,
     yes: Annotated[bool, typer.Option("--yes", help="With --port: do not ask before the first motion.")] = False,
     max_speed: Annotated[
         float | None, option(SPEED, "--max-speed", purpose="With --port: cap of the forward speed.", least="1mm/s")
@@ -198,9 +211,16 @@ def run(
         "record": record,
     }
     wanted = wanted.with_options(**options)
+    refuse_ros_beside(ros, inputs, port=port, gdb=gdb, coverage=coverage or profile)
     if is_sweep(wanted, seeds=seeds, seed=seed, port=port):
         refuse_beside_sweep(
-            port=port, gdb=None if gdb is None else "gdb", realtime=realtime, coverage=coverage, profile=profile
+            port=port,
+            ros=ros,
+            inputs=inputs,
+            gdb=None if gdb is None else "gdb",
+            realtime=realtime,
+            coverage=coverage,
+            profile=profile,
         )
         rows = sweep_rows(scenario, wanted, options, seeds)
         run_many(rows, out, jobs=jobs or core_count(), kept=keep, junit=junit, json_output=json_output, force=force)
@@ -211,6 +231,14 @@ def run(
         end_with(result, json_output=json_output)
         return
     folder = out or make_next_folder(wanted.name)
+    if ros is not None or inputs is not None:
+        with RunDisplay() as display, driven_by_ros(wanted, ros, inputs) as driver:
+            pace = realtime or (None if ros is None else 1.0)
+            result = run_scenario(
+                wanted, folder, speed=pace, on_progress=display.update, force=force, drive=driver, explained=True
+            )
+        end_with(result, json_output=json_output)
+        return
     with RunDisplay() as display:
         if gdb is None:
             result = run_scenario(
@@ -223,6 +251,41 @@ def run(
             driver = debug_bench(gdb, is_paced=realtime is not None, on_wait=display.raise_if_interrupted)
             result = run_scenario(wanted, folder, on_progress=display.update, drive=driver, force=force)
     end_with(result, json_output=json_output)
+
+
+def refuse_ros_beside(
+    ros: str | None, inputs: Path | None, *, port: str | None, gdb: int | None, coverage: bool
+) -> None:
+    """Refuse what cannot stand beside `--ros` and `--inputs`.
+
+    Raises:
+        UsageError: Something does.
+    """
+    name = "--ros" if ros is not None else "--inputs"
+    given = (("--port", port), ("--gdb", gdb), ("--coverage", coverage or None), ("--inputs", inputs))
+    beside = {other: value is not None for other, value in given}
+    for other, is_given in beside.items():
+        if (ros is not None or inputs is not None) and is_given and other != name:
+            raise UsageError(f"{name} cannot stand beside {other}", hint="leave one of the two out")
+
+
+@contextlib.contextmanager
+def driven_by_ros(scenario: Scenario, ros: str | None, inputs: Path | None) -> Iterator[RunBench]:
+    """Yield what runs a bench as a node of ROS, or with what came in from it before.
+
+    Raises:
+        UsageError: The scenario has no pins of the pin-out, or `ros` is no place.
+        MissingDependencyError, TransportError, FileError: As `met` and `with_inputs`.
+    """
+    from robot_bench.ros.drive import RosPlace, met, refuse_without_pins, with_inputs
+
+    refuse_without_pins(scenario)
+    if ros is None:
+        if inputs is not None:
+            yield with_inputs(inputs)
+        return
+    with met(RosPlace.read(ros)) as driver:
+        yield driver
 
 
 def is_sweep(scenario: Scenario, *, seeds: str | None, seed: int | None, port: str | None) -> bool:

@@ -8,7 +8,7 @@ Not modelled: noise, crosstalk and the time that sound takes.
 from collections.abc import Callable, Sequence
 
 from adapter_sim.codec import is_near
-from robot_bench.wires.nets import Net, Strength
+from robot_bench.wires.nets import Net, Strength, Unconnected
 from simbase.state import Stateful
 from simbase.timing import Nanos
 
@@ -28,7 +28,7 @@ class DistanceSensors(Stateful):
 
     STATE = ("_next",)
 
-    def __init__(self, nets: Sequence[Net], *, threshold_um: int, period_ns: Nanos) -> None:
+    def __init__(self, nets: Sequence[Net | Unconnected], *, threshold_um: int, period_ns: Nanos) -> None:
         self._nets = tuple(nets)
         self._threshold_um = threshold_um
         self._period_ns = period_ns

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from adapter_sim.codec import encoder_code
 from robot_bench.direct.distance import OWNER
-from robot_bench.wires.nets import Net, Strength
+from robot_bench.wires.nets import Net, Strength, Unconnected
 from simbase.timing import Nanos
 
 #: One turn in units of a nanoradian: the sectors' boundaries are off by less than 1e-9 rad.
@@ -22,7 +22,7 @@ SAFETY_NRAD = 1_000
 class WheelEncoder:
     """One wheel's encoder; `nets` are its wires, least significant first."""
 
-    def __init__(self, nets: Sequence[Net]) -> None:
+    def __init__(self, nets: Sequence[Net | Unconnected]) -> None:
         self._nets = tuple(nets)
         #: What the wires show; None where that is not known.
         self._shown: int | None = None

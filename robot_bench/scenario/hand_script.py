@@ -49,6 +49,8 @@ class Deed:
     text: bytes = b""
     level: bool | None = None
     volts: float | None = None
+    #: Whose hand it is: what the trace calls it.
+    who: str = "hand"
 
     @property
     def words(self) -> str:

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TypedDict, Unpack, cast
 
 from adapter_sim.codec import BitOrder
-from adapter_sim.pinout import load_pinout
+from adapter_sim.pinout import WireRole, load_pinout
 from adapter_sim.settings import AdapterSettings, MotorCommand
 from bluepill_sim.parts.registry import PartSpec
 from p2os.errors import ScenarioError
@@ -57,6 +57,8 @@ from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 from simbase.user_classes import located, source_of
 
 MODES = ("direct", "adapter")
+#: The kinds of wires that may be cut from the robot, for something outside to drive: those to the chip.
+OUTSIDE = (WireRole.DISTANCE.value, WireRole.ENCODER.value)
 
 _TOP = (
     VERSION,
@@ -75,6 +77,7 @@ _TOP = (
     Key(name="threshold_m", kind="number", above=0, most=100),
     Key(name="usart_baud", kind="whole", least=1, most=4_500_000),
     Key(name="record", kind="texts"),
+    Key(name="outside", kind="text"),
     Key(name="start", kind="table"),
     Key(name="direct", kind="table"),
     Key(name="adapter", kind="table"),
@@ -199,6 +202,8 @@ class Scenario:
     usart_baud: int | None = None
     #: Buses of the chip that are recorded, of `selection.BUSES`.
     record: tuple[str, ...] = ()
+    #: Kinds of wires that the robot does not drive, but somebody outside: of `OUTSIDE`, sorted.
+    outside: tuple[str, ...] = ()
     #: None starts at the world's own place.
     start: Pose | None = None
     #: What a message calls the start: file, line and key.
@@ -367,6 +372,19 @@ def build_scenario(
     return scenario
 
 
+def _outside(words: str, own_robot: OwnRobot | None, where: str) -> tuple[str, ...]:
+    """Return the kinds of wires that words name, such as "distance encoder"."""
+    found = tuple(sorted(set(words.replace(",", " ").split())))
+    unknown = [word for word in found if word not in OUTSIDE]
+    if unknown:
+        raise ScenarioError(
+            f"{where}: no wires are called {shown(unknown[0])}", hint=f'outside = "{" ".join(OUTSIDE)}"'
+        )
+    if found and own_robot is not None:
+        raise ScenarioError(f"{where}: only wires of the pin-out can be driven from outside", hint="leave out `robot`")
+    return found
+
+
 def resolve_world(
     world: str, folder: Path, where: str, *, error: type[ScenarioError | UsageError] = ScenarioError
 ) -> str:
@@ -433,6 +451,7 @@ def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | N
         threshold_um=round(threshold_m * 1e6),
         usart_baud=cast("int | None", table.get("usart_baud")),
         record=_buses(_listed(table.get("record")), where.at("record"), ScenarioError),
+        outside=_outside(str(table.get("outside", "")), own_robot, where.at("outside")),
         start=_start(table, where),
         start_at=str(within(where, "start")),
         direct=_direct(cast("Table", table.get("direct", {})), where),

@@ -18,7 +18,7 @@ on the order in which different owners reported them.
 
 from array import array
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cache
@@ -407,12 +407,26 @@ class Harness(Stateful):
         return iter(self.nets.values())
 
 
-class OwnedPins:
-    """One owner's ends of the wires: what the adapter calls its pin bank."""
+class Unconnected:
+    """The end of a wire that is cut: what drives it drives nothing."""
 
-    def __init__(self, harness: Harness, owner: str) -> None:
+    def drive(self, owner: str, level: bool, strength: Strength, now: Nanos) -> None:
+        """Do nothing."""
+
+
+class OwnedPins:
+    """One owner's ends of the wires: what the adapter calls its pin bank.
+
+    Args:
+        harness: The wires.
+        owner: Under whose name they are driven.
+        cut: Wires whose ends here are cut: what is written to them drives nothing.
+    """
+
+    def __init__(self, harness: Harness, owner: str, cut: Collection[str] = ()) -> None:
         self._nets = harness.nets
         self._owner = owner
+        self._cut = frozenset(cut)
 
     def read(self, signal: str, at: Nanos) -> bool:
         """Return the level of a wire at the instant `at`."""
@@ -424,6 +438,8 @@ class OwnedPins:
 
     def write(self, signal: str, high: bool | None, now: Nanos) -> None:
         """Drive a wire hard from `now` on; None releases it to its pull."""
+        if signal in self._cut:
+            return
         if high is None:
             self._nets[signal].release(self._owner, now)
         else:

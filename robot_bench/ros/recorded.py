@@ -1,0 +1,46 @@
+"""What came in from ROS in an earlier run, out of its trace: the inputs of a run without ROS that is the same."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from robot_bench.events.codec import events_of
+from robot_bench.events.kinds import Note
+from robot_bench.recording.run_record import TRACE_NAME
+from robot_bench.ros.bench_node import SET_PIN, WHO
+from robot_bench.scenario.hand_script import LEVELS, Deed
+from simbase.errors import FileError, shown_name
+
+
+def read_inputs(path: Path) -> list[Deed]:
+    """Return what came in, of a run folder or a trace.
+
+    Raises:
+        FileError: There is none, or it has no inputs.
+        TraceError: It is damaged.
+    """
+    trace = path / TRACE_NAME if path.is_dir() else path
+    try:
+        with trace.open(encoding="utf-8") as lines:
+            found = inputs_of(lines, str(trace))
+    except (OSError, UnicodeDecodeError) as error:
+        raise FileError(f"{shown_name(trace)} is no trace that can be read: {error}", hint="a run folder") from error
+    if not found:
+        raise FileError(f"in {shown_name(trace)} nothing came in from ROS", hint="p2os run SCENARIO --ros makes one")
+    return found
+
+
+def inputs_of(lines: Iterable[str], where: str) -> list[Deed]:
+    """Return the inputs among the lines of a trace.
+
+    Raises:
+        TraceError: A line is damaged.
+        FileError: An input is none that ROS could have made.
+    """
+    return [_deed(event, where) for event in events_of(lines, where) if isinstance(event, Note) and event.who == WHO]
+
+
+def _deed(note: Note, where: str) -> Deed:
+    place, _, level = note.detail.partition(" ")
+    if note.what != SET_PIN or level not in LEVELS:
+        raise FileError(f"{where}: {note.what} {note.detail} at {note.t} ns is no input", hint="cut that line")
+    return Deed(at=note.t, do=SET_PIN, place=place, level=LEVELS[level], who=WHO)
