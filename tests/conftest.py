@@ -43,9 +43,14 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Leave what all tests share out of the search for garbage: some tests search after each of hundreds of steps."""
+    """Leave what all tests share out of the search for garbage, and search more seldom.
+
+    Some tests search after each of hundreds of steps; and Python's own 700 objects between two searches are few for
+    tests that build a chip each: 20,000 save 7 % of the time of a run.
+    """
     gc.collect()
     gc.freeze()
+    gc.set_threshold(20_000, 10, 10)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -66,6 +66,8 @@ class Interrupter:
 
 def interrupt_everywhere(story: Callable[[int], tuple[int, str, Recorder]], served: ServedRobot, step: int = 1) -> int:
     """Run a story with an interrupt at its first line, at its second and so on, until it has no more; count them."""
+    gc.collect()
+    gc.freeze()  # what other tests have left is not searched after each story
     place = step
     while True:
         lines, at, recorder = story(place)
