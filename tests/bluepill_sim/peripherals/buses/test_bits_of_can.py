@@ -19,6 +19,7 @@ from tests.bluepill_sim.peripherals.buses.test_can import (
     send,
     set_up,
     span_ns,
+    standard_bits,
 )
 
 QUICK = settings(max_examples=40, deadline=None)
@@ -162,6 +163,8 @@ def test_who_loses_the_arbitration_is_silent_from_the_bit_at_which_it_loses(
     dominant = [n for n, bit in enumerate(tx.bits(end_ns)) if bit == 0]
     bus, mine = rx.bits(end_ns), tx.bits(end_ns)
     lost = next(n for n, (one, all_) in enumerate(zip(mine, bus, strict=True)) if one != all_)
+    frames = zip(standard_bits(own), standard_bits(other), strict=False)
+    assert lost == next(n for n, (one, winner) in enumerate(frames) if one != winner)
     assert mine[:lost] == bus[:lost]
     assert [n for n in dominant if n >= lost] == [len(bus) - 9], "its acknowledge alone"
     chip.advance(end_ns + 3 * BIT_NS + span_ns(own) + BIT_NS)
