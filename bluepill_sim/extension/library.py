@@ -129,6 +129,7 @@ _FUNCTIONS = {
     "fabric_forget_output": "vp",
     "fabric_subscribe": "ipppppb",
     "fabric_stop_at": "vpup",
+    "fabric_is_watched": "bpu",
     "fabric_unsubscribe": "vpu",
     "fabric_row_count": "zpu",
     "fabric_take_rows": "ppu",

@@ -5,7 +5,9 @@ Who has won is worked out some bits later and told to every node with the time o
 reached yet: so chips that run one after the other, in steps shorter than that, agree whatever the order (`run`). The
 length of a frame is that of its bits with their CRC and stuff bits.
 
-Not modelled: single bits on pins, overload frames, errors but those that `damage`, other bit rates and missing
+Single bits are no business of the bus: a chip that somebody looks at works them out from `coming`.
+
+Not modelled: overload frames, errors but those that `damage`, other bit rates and missing
 acknowledges make, the resynchronisation of clocks that differ by less than `TOLERANCE`.
 Source: ISO 11898-1 (Bosch CAN 2.0, part B).
 Invariant: what is told to one node is told to all, in the order of the bus.
@@ -156,6 +158,24 @@ class CanNetwork(Stateful):
         """When the next frame begins, or began that is not decided; None: nobody wants to send."""
         return max(self._free_ns, min(self._wanted.values())) if self._wanted else None
 
+    def coming(self) -> "tuple[CanMember, CanFrame, CanError] | None":
+        """Return who will have won with which frame that begins at `start_ns`, and what will be wrong with it.
+
+        None: nobody sends, or it cannot be known yet, since several chips have clocks of their own.
+        """
+        start_ns = self.start_ns
+        if start_ns is None or sum(member.now_ns is not None for member in self._members) > 1:
+            return None
+        ready = {n: self._members[n].offer(start_ns) for n, at_ns in self._wanted.items() if at_ns <= start_ns}
+        offered = [(_arbitration_bits(frame), n, frame) for n, frame in ready.items() if frame is not None]
+        if not offered:
+            return None
+        _, n, frame = min(offered, key=lambda one: one[:2])
+        member = self._members[n]
+        others = [one for one in self._members if one is not member]
+        error = CanError.NONE if member.hears_itself else self._error_to_be(others, member.bit_rate or self._rate())
+        return member, frame, error
+
     def want(self, member: CanMember, at_ns: Nanos) -> None:
         """Take that a node wants to send from a time on."""
         self._wanted.setdefault(self._members.index(member), at_ns)
@@ -209,10 +229,14 @@ class CanNetwork(Stateful):
         self._replan()
 
     def _error_of(self, others: Sequence[CanMember], rate: Fraction) -> CanError:
+        error = self._error_to_be(others, rate)
+        self._damaged -= bool(self._damaged)
+        return error
+
+    def _error_to_be(self, others: Sequence[CanMember], rate: Fraction) -> CanError:
         active = [one for one in others if one.acknowledges]
         strange = [one for one in active if one.bit_rate is not None and abs(one.bit_rate / rate - 1) > TOLERANCE]
         if self._damaged or strange:
-            self._damaged -= bool(self._damaged)
             return CanError.BIT_DOMINANT
         return CanError.NONE if active else CanError.ACKNOWLEDGE
 
@@ -320,6 +344,11 @@ class CanNode(Stateful):
 
 def stuffed_bits(frame: CanFrame) -> int:
     """Return how many bits a frame has from its start to the end of its CRC, with stuff bits."""
+    return len(frame_bits(frame))
+
+
+def frame_bits(frame: CanFrame) -> list[int]:
+    """Return the bits of a frame from its start to the end of its CRC, with stuff bits; 0 is dominant."""
     bits = [0, *_arbitration_bits(frame)]
     if frame.is_extended:
         bits += [0, 0]
@@ -331,14 +360,16 @@ def stuffed_bits(frame: CanFrame) -> int:
     for bit in bits:
         crc = (crc << 1 ^ (_CRC_POLYNOMIAL if bit ^ crc >> 14 else 0)) & 0x7FFF
     bits += [crc >> n & 1 for n in range(14, -1, -1)]
-    stuffed, run, last = 0, 0, None
+    stuffed: list[int] = []
+    run, last = 0, None
     for bit in bits:
+        stuffed.append(bit)
         run = run + 1 if bit == last else 1
         last = bit
         if run == _STUFF_AFTER:
-            stuffed += 1
+            stuffed.append(1 - bit)
             run, last = 1, 1 - bit
-    return len(bits) + stuffed
+    return stuffed
 
 
 def _arbitration_bits(frame: CanFrame) -> tuple[int, ...]:

@@ -576,6 +576,11 @@ class Fabric(Stateful):
         wanted: bool = self._calls_of_c.fabric_take_stop(self.handle)
         return wanted
 
+    def is_watched(self, pin: int) -> bool:
+        """Return whether somebody is subscribed to a pin, by its number."""
+        is_watched: bool = self._calls_of_c.fabric_is_watched(self.handle, pin)
+        return is_watched
+
     @property
     def has_news(self) -> bool:
         """Whether rows or words wait for Python."""

@@ -341,6 +341,15 @@ class Pin:
         """Take the alternate function `source` off the pin, level or wave."""
         self._bank.fabric.offer(self.index, ALTERNATE_FUNCTIONS.index(source), NO_LEVEL)
 
+    def hold_low(self, is_held: bool) -> None:
+        """Have a part on a bus hold the wire low, or let it go: for the show, whoever else drives it."""
+        self._change(bus_low=is_held)
+
+    @property
+    def is_watched(self) -> bool:
+        """Whether somebody is subscribed to it."""
+        return self._bank.fabric.is_watched(self.index)
+
     def carries(self, source: str) -> bool:
         """Whether the wire shows the alternate function `source`."""
         sources = self._struct.sources[self.number]

@@ -6,18 +6,21 @@ loop-back mode too.
 
 Theory of operation. A mailbox is latched when TXRQ is set. The network asks for the best one (`offer`) when a frame
 begins, and tells its end in advance (`end`); what follows from it happens at that time.
+While somebody is subscribed to TX or RX, the bits of a frame are worked out when it begins (`_show_frame`); nothing
+follows from them.
 Source: RM0008 24.
 Invariant: FMP of each FIFO is the number of messages in `_fifos`, and its first stands in the registers.
 """
 
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partialmethod
 
 from bluepill_sim.fabric.bus_parts import CanFrame
-from bluepill_sim.fabric.can_network import CanEnd, CanError, CanNetwork
+from bluepill_sim.fabric.can_network import CanEnd, CanError, CanNetwork, frame_bits
+from bluepill_sim.fabric.pins import PinDrive
 from bluepill_sim.fabric.ports import ChipPorts
 from bluepill_sim.fabric.registers import Peripheral, Place, Register, bits, numbered
 from simbase.timing import NS_PER_S, Nanos
@@ -42,6 +45,8 @@ _WARNING, _PASSIVE, _OFF = 96, 128, 256
 _SYNC_BITS, _RECOVERY_BITS = 11, 128 * 11
 #: LEC of a receiver of a damaged frame.
 _CRC_ERROR = 6
+#: Dominant bits of an error flag.
+_FLAG_BITS = 6
 #: Pins (RX, TX) by the remap field (RM0008 table 42).
 PINS = {0: ("PA11", "PA12"), 2: ("PB8", "PB9"), 3: ("PD0", "PD1")}
 _FILTER_MODES = bits((13, 0))
@@ -109,7 +114,7 @@ class Can(Peripheral):
     OUTPUTS = ("tx_irq", "rx0_irq", "rx1_irq", "sce_irq", "packets")
     STATE = (
         "_alone", "_joined", "_mailboxes", "_order", "_fifos", "_ends", "_sync_ns", "_recover_ns", "_tec", "_rec",
-        "_timer_ns", "_lost", "_is_stopped",
+        "_timer_ns", "_lost", "_is_stopped", "_shown", "_shown_ns", "_tx",
     )  # fmt: skip
     DERIVED = ("_pin_names", "_sinks")
     REGISTERS = (
@@ -225,6 +230,10 @@ class Can(Peripheral):
         self._lost: tuple[int, ...] = ()
         #: Its clock stands still: nothing is heard, and what it has begun to send ends with the clock.
         self._is_stopped = False
+        #: What is still to be shown of a frame, as (ns, level of TX, level of RX), and when it began.
+        self._shown: deque[tuple[Nanos, int, int]] = deque()
+        self._shown_ns: Nanos = -1
+        self._tx = 1
 
     # From outside the chip.
 
@@ -232,6 +241,7 @@ class Can(Peripheral):
         """Join a network."""
         self._joined = network
         network.join(self)
+        self._pull_up()
 
     def subscribe(self, sink: Sink) -> Callable[[], None]:
         """Have `sink` called with each frame at its end, its own and what it hears of others, whatever the filters.
@@ -321,6 +331,10 @@ class Can(Peripheral):
         times = [self._sync_ns, self._recover_ns, self.network.next_ns if self._mailboxes or self._joined else None]
         if self._ends:
             times.append(self._ends[0].end_ns)
+        if self._shown:
+            times.append(self._shown[0][0])
+        elif self._is_watched and self.network.start_ns != self._shown_ns:
+            times.append(self.network.start_ns)
         if self._lost:
             times.append(self.chip.now_ns)
         known = [time for time in times if time is not None]
@@ -335,6 +349,7 @@ class Can(Peripheral):
             self.network.advance_to(now_ns)
             self.plan()
             return
+        self._show(now_ns)
         self._take_ends(now_ns)
         if self._sync_ns is not None and self._sync_ns <= now_ns:
             self._sync_ns = None
@@ -356,6 +371,8 @@ class Can(Peripheral):
         """Stand still in Stop, or by DBG_CAN_STOP: frames of others that have not ended are lost."""
         self.advance_to(self.chip.now_ns)
         self._is_stopped = True
+        self._show_level(1, 1)
+        self._shown.clear()
         self._ends = deque(end for end in self._ends if end.is_own)
         self.plan()
 
@@ -374,6 +391,7 @@ class Can(Peripheral):
 
     def on_reset(self) -> None:
         """Drop everything; it stays on its network."""
+        self._show_level(1, 1)
         self._clear()
         self._route_changed()
         self._update()
@@ -511,6 +529,9 @@ class Can(Peripheral):
     def _want(self) -> None:
         if self._mailboxes and self.is_on:
             self.network.want(self, self.chip.now_ns)
+            if self._shown_ns == self.chip.now_ns:  # it takes part in the arbitration that has just begun
+                self._shown.clear()
+                self._shown_ns = -1
 
     def _complete(self, n: int, flags: int) -> None:
         """End a mailbox's request."""
@@ -676,8 +697,17 @@ class Can(Peripheral):
 
     def _route_changed(self) -> None:
         self.chip.pins[self._pin_names[1]].disconnect("CAN_TX")
+        self.chip.pins[self._pin_names[0]].hold_low(False)
         self._find_pins()
+        if self._joined is not None:
+            self._pull_up()
         self._connect()
+
+    def _pull_up(self) -> None:
+        """Have RX high, as a transceiver has it while nobody sends."""
+        rx = self.chip.pins[self._pin_names[0]]
+        if rx.board_pull is PinDrive.NONE:
+            rx.board_pull = PinDrive.PULL_UP
 
     def _connect(self) -> None:
         """Offer the pin unless it sleeps, as it does from reset on: chosen (docs/peripherals.md)."""
@@ -685,10 +715,62 @@ class Can(Peripheral):
         if self.words[MSR] & SLAK:
             pin.disconnect("CAN_TX")
         else:
-            pin.connect("CAN_TX", level=True)
+            pin.connect("CAN_TX", level=bool(self._tx))
 
     def _find_pins(self) -> None:
         self._pin_names = PINS.get(self.chip.pins.remaps.get("CAN", 0), PINS[0])
+
+    @property
+    def _is_watched(self) -> bool:
+        return any(self.chip.pins[name].is_watched for name in self._pin_names)
+
+    def _show(self, now_ns: Nanos) -> None:
+        """Show the bits that are due, and those of a frame that begins."""
+        while self._shown and self._shown[0][0] <= now_ns:
+            _, tx, rx = self._shown.popleft()
+            self._show_level(tx, rx)
+        start_ns = self.network.start_ns
+        is_new = start_ns is not None and start_ns <= now_ns and start_ns != self._shown_ns
+        if start_ns is not None and is_new and not self._shown and self._is_watched:
+            self._shown_ns = start_ns
+            self._shown.extend(self._show_frame(start_ns))
+            self._show(now_ns)
+
+    def _show_frame(self, start_ns: Nanos) -> Iterator[tuple[Nanos, int, int]]:
+        """Yield when the levels of TX and RX change in the frame that begins."""
+        coming = self.network.coming()
+        if coming is None:
+            return
+        sender, frame, error = coming
+        rate = sender.bit_rate or self.bit_rate or Fraction(1)
+        own = self.offer(start_ns)
+        bits = frame_bits(frame)
+        sent = bits if sender is self else _until_lost(frame_bits(own), bits) if own is not None else []
+        acknowledges = sender is not self and error is CanError.NONE and self.acknowledges
+        # The delimiter of the CRC, the acknowledge, and of an error the flag behind it, unless its sender is passive.
+        flag = [1 if error is CanError.NONE or sender.is_passive else 0] * _FLAG_BITS
+        own_flag = flag if sender is self or self.acknowledges else [1] * _FLAG_BITS
+        bus = [*bits, 1, 0 if error is CanError.NONE else 1, *flag, 1]
+        tx = [*sent, *[1] * (len(bits) - len(sent)), 1, 0 if acknowledges else 1, *own_flag, 1]
+        if self.hears_itself:  # RX does not count then, and with SILM nothing goes out
+            bus = [1] * len(tx)
+            tx = bus if self.words[BTR] & SILM else [*bits, *[1] * (len(tx) - len(bits))]
+        before = (1, 1)
+        for n, now in enumerate(zip(tx, bus, strict=True)):
+            if now != before:
+                yield start_ns + int(n * NS_PER_S / rate), *now
+            before = now
+
+    def _show_level(self, tx: int, rx: int) -> None:
+        self._tx = tx
+        self._connect()
+        self.chip.pins[self._pin_names[0]].hold_low(not rx)
+
+
+def _until_lost(own: Sequence[int], bits: Sequence[int]) -> list[int]:
+    """Return the bits of a frame that has lost against another, up to where it is recessive and the other is not."""
+    place = next((n for n, (one, other) in enumerate(zip(own, bits, strict=False)) if one != other), len(own))
+    return [*own[:place], 1][: len(bits)]
 
 
 def _rank(frame: CanFrame) -> tuple[int, int, int, int]:

@@ -13,7 +13,8 @@ from typing import Any
 
 from bluepill_sim.fabric.signals import Oscillation, Shape
 from bluepill_sim.fabric.subscriptions import EDGE, Of
-from bluepill_sim.parts import CanFrame, CanNetwork, CanNode
+from bluepill_sim.parts import CanFrame, CanNetwork, CanNode, Eeprom24C02
+from bluepill_sim.peripherals.spi import Loopback
 from tests.bluepill_sim.machine import Machine
 
 STEPS = 1024
@@ -85,6 +86,13 @@ _PLACES = (
     0x4000_044C, 0x4001_2C4C, 0x0000_1000,
 )  # fmt: skip
 _KEYS = (0x5555, 0xCCCC, 0xAAAA, 0x4567_0123, 0xCDEF_89AB, 0xC5AC_CE55, 0x05FA_0000, 0x05FA_0300)
+#: What buses need before chance can make them work: stores that a story may begin with, and then what sends.
+_SET_UP = (
+    ((0x4001_0804, 0x444B_4444), (0x4000_6400, 1), (0x4000_641C, 0x0014_0001), (0x4000_6600, 1), (0x4000_660C, 1),
+     (0x4000_661C, 1), (0x4000_6600, 0), (0x4000_6400, 0), (0x4000_6584, 2), (0x4000_6580, 0x2460_0001)),
+    ((0x4001_0C00, 0xDD44_4444), (0x4000_5404, 8), (0x4000_541C, 40), (0x4000_5400, 1), (0x4000_5400, 0x501)),
+    ((0x4000_5C40, 1), (0x4000_5C40, 0), (0x4000_5C44, 0), (0x4000_5C4C, 0x80), (0x4000_5C00, 0x3220)),
+)  # fmt: skip
 _PINS = [f"P{port}{n}" for port in "AB" for n in range(16)]
 
 
@@ -96,7 +104,9 @@ class Story:
         rng = random.Random(seed)
         self.wants_core = names is None
         self._registers = self._found(rng)
-        self._rows = [self._row(rng) for _ in range(STEPS)]
+        begun = [(STORES[0], BUFFER, 0, 0)]  # the program begins with the second
+        begun += [(STORES[0], *row, 400) for one in _SET_UP if self.wants_core and rng.random() < 0.5 for row in one]
+        self._rows = [*begun, *(self._row(rng) for _ in range(STEPS - len(begun)))]
         self.end_ns = rng.randrange(1, most_ms) * MS
         self._world = sorted((rng.randrange(20 * US, self.end_ns), rng.getrandbits(64)) for _ in range(40))
         self.watched = rng.sample(_PINS, 3)
@@ -191,7 +201,8 @@ class Story:
             cuts: a seed of the slices in which it goes on; 0: from one thing of the world to the next.
             forks: of the times at which it goes on from a snapshot, on another board; 0: never.
         """
-        board, seen = self._listened(self.machine()), hashlib.sha256()
+        heard: list[tuple[Any, ...]] = []
+        board, seen = self._listened(self.machine(), heard), hashlib.sha256()
         cutter, forker = random.Random(cuts), random.Random(forks)
         edges: list[tuple[Any, ...]] = []
         pins = board.subscribe_pins(self.watched, lambda rows: edges.extend(EDGE.iter_unpack(rows)), of=Of.WIRE)
@@ -202,17 +213,27 @@ class Story:
             if forks and forker.random() < 0.1:
                 kept = pickle.dumps(board.snapshot())
                 pins.close()
-                board = self._listened(self.machine())
+                board = self._listened(self.machine(), heard)
                 board.restore(pickle.loads(kept))  # noqa: S301 - our own bytes
                 pins = board.subscribe_pins(self.watched, lambda rows: edges.extend(EDGE.iter_unpack(rows)), of=Of.WIRE)
             if what >= 0:
                 self.act(board, what)
-        seen.update(repr((board.cycle, board.pc, edges, board.snapshot())).encode())
+        heard.sort(key=lambda row: row[0])  # buses hand on in bulk, one after the other
+        seen.update(repr((board.cycle, board.pc, edges, heard, board.snapshot())).encode())
         return seen.hexdigest()
 
     @staticmethod
-    def _listened(machine: Machine) -> Any:
+    def _listened(machine: Machine, heard: list[tuple[Any, ...]]) -> Any:
+        """Return a board with parts on its buses, and have what goes over each written down."""
         board = machine.deafen().board
+        for name in ("SPI1", "SPI2", "I2C1", "I2C2", "CAN"):
+            part = board.chip.parts.by_name[name]
+            part.subscribe(lambda rows, name=name: heard.extend((name, repr(row)) for row in rows))
+        board.usb_serial.subscribe(lambda rows: heard.extend(("USB", *row) for row in rows))
+        board.usb.plug()
+        for name in ("I2C1", "I2C2"):
+            board.i2c(name, Eeprom24C02())
+        board.spi("SPI1", Loopback())
         network = CanNetwork()
         board.can(network)
         node = CanNode()

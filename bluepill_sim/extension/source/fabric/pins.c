@@ -265,6 +265,9 @@ int32_t fabric_subscribe(struct fabric *fabric, const uint32_t *drive, const uin
     return -1;
 }
 
+/* Whether somebody is subscribed to a pin. */
+bool fabric_is_watched(const struct fabric *fabric, uint32_t pin) { return fabric->subscribed[pin / PINS] >> pin % PINS & 1; }
+
 void fabric_stop_at(struct fabric *fabric, uint32_t number, const uint32_t *stop)
 {
     memcpy(fabric->subscribers[number].stop, stop, sizeof fabric->subscribers[number].stop);
