@@ -71,6 +71,7 @@ NEEDS = (
     Need(name="numpy", kind="package", feature="--body bullet, --body mujoco", extra="columns"),
     Need(name="pyarrow", kind="package", feature="export to Parquet and Arrow", extra="export"),
     Need(name="mcap", kind="package", feature="export to MCAP", extra="export"),
+    Need(name="foxglove-sdk", kind="package", feature="run --foxglove", extra="foxglove"),
     Need(name="pillow", kind="package", feature="worlds from ROS maps: pictures", extra="worlds"),
     Need(name="pyyaml", kind="package", feature="worlds from ROS maps", extra="worlds"),
     Need(name="pygame-ce", kind="package", feature="teleop --pad", extra="pad"),

@@ -68,6 +68,7 @@ _EXTRAS = {
     "mcap": "export",
     "cyclonedds": "ros",
     "zenoh": "ros",
+    "foxglove": "foxglove",
 }
 
 

@@ -8,13 +8,14 @@ import typer
 
 from p2os.cli.help_pages import BENCH
 from robot_bench.recording.event_files import write_events
-from robot_bench.recording.run_record import read_events
+from robot_bench.recording.run_record import read_events, read_meta
 from robot_bench.report.make import make_artefacts
 
 HELP = """Make the report of a run anew, and all else in its folder.
 
 All of it is made from trace.jsonl. With --events what happened is written into a
-file instead, an event a line (.jsonl) or row (.parquet).
+file instead: an event a line (.jsonl) or row (.parquet), or a scene with
+plots for Foxglove and Lichtblick (.mcap).
 
 A run that was killed has its trace up to the last virtual second: this makes
 the rest.
@@ -24,6 +25,7 @@ Examples:
   p2os report runs/dodge-001          report.html, plots, pins.vcd, pins.sr, summary.json
   p2os report runs/dodge-001 --json   print the summary as well
   p2os report runs/dodge-001 --events all.parquet    only what happened, as a table
+  p2os report runs/dodge-001 --events dodge.mcap     as a scene with plots
 """
 
 
@@ -36,12 +38,12 @@ def report(
     folder: Annotated[Path, typer.Argument(help="A run folder.", metavar="FOLDER")],
     json_output: Annotated[bool, typer.Option("--json", help="Print the summary as one JSON object.")] = False,
     events: Annotated[
-        Path | None, typer.Option(help="Write its events, .jsonl or .parquet, and no report.", metavar="FILE")
+        Path | None, typer.Option(help="Write its events, .jsonl, .parquet or .mcap, and no report.", metavar="FILE")
     ] = None,
 ) -> None:
     """Make a run's report."""
     if events is not None:
-        count = write_events(read_events(folder), events)
+        count = write_events(read_events(folder), events, read_meta(folder))
         typer.echo(f"{events}: {count} events")
         return
     made = make_artefacts(folder)

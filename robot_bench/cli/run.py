@@ -67,17 +67,20 @@ Examples:
   p2os run dodge --coverage --profile               lines, branches, cycles of the whole run
   p2os run dodge --coverage --fail-under 80         exit code 1 below 80 % of the lines
   p2os run dodge --gdb 3333                         under GDB; the robot stands still at a halt
+  p2os run dodge --foxglove                         live in Foxglove or Lichtblick
   p2os run dodge --ros                              its pins as topics of ROS 2 (docs/ros.md)
   p2os run dodge --port serial:/dev/ttyUSB0         drive a real Pioneer; asks first
 """
 
 
+#: Where Foxglove looks by itself.
+FOXGLOVE_PORT = "8765"
 #: Options of a scenario whose flag is not their name.
 _FLAGS = {"adapter_core": "--adapter", "duration_s": "--duration", "usart_baud": "--usart-baud"}
 
 
 class RealtimeCommand(VerbPage):
-    """Lets `--realtime` and `--ros` stand without what follows them, which then is 1, or DDS."""
+    """Lets `--realtime`, `--foxglove` and `--ros` stand without what follows them: 1, the usual port, or DDS."""
 
     def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override]  # typer's own class
         """Insert what is missing."""
@@ -87,6 +90,8 @@ class RealtimeCommand(VerbPage):
             following = args[place + 1] if place + 1 < len(args) else ""
             if word == "--realtime" and not _is_number(following):
                 filled.append("1")
+            if word == "--foxglove" and not following.rpartition(":")[2].isdecimal():
+                filled.append(FOXGLOVE_PORT)
             if word == "--ros" and re.split("[:@]", following)[0] not in TRANSPORTS:
                 filled.append(next(iter(TRANSPORTS)))
         return super().parse_args(ctx, filled)
@@ -183,6 +188,10 @@ def run(
     inputs: Annotated[
         Path | None, typer.Option(help="Do again what came in from ROS in that run.", metavar="RUN")
     ] = None,
+    foxglove: Annotated[
+        str | None,
+        typer.Option(help="Show it live to Foxglove or Lichtblick, at real time.", metavar="[PORT|HOST:PORT]"),
+    ] = None,
     yes: Annotated[bool, typer.Option("--yes", help="With --port: do not ask before the first motion.")] = False,
     max_speed: Annotated[
         float | None, option(SPEED, "--max-speed", purpose="With --port: cap of the forward speed.", least="1mm/s")
@@ -212,11 +221,13 @@ def run(
     }
     wanted = wanted.with_options(**options)
     refuse_ros_beside(ros, inputs, port=port, gdb=gdb, coverage=coverage or profile)
+    refuse_foxglove_beside(foxglove, port=port, gdb=gdb, ros=ros, inputs=inputs, robots=wanted.robots or None)
     if is_sweep(wanted, seeds=seeds, seed=seed, port=port):
         refuse_beside_sweep(
             port=port,
             ros=ros,
             inputs=inputs,
+            foxglove=foxglove,
             gdb=None if gdb is None else "gdb",
             realtime=realtime,
             coverage=coverage,
@@ -237,6 +248,19 @@ def run(
             result = run_scenario(
                 wanted, folder, speed=pace, on_progress=display.update, force=force, drive=driver, explained=True
             )
+        end_with(result, json_output=json_output)
+        return
+    if foxglove is not None:
+        from robot_bench.live import live_scene
+
+        with (
+            RunDisplay() as display,
+            live_scene(wanted, foxglove, tell_viewer) as scene,
+        ):
+            result = run_scenario(
+                wanted, folder, speed=realtime or 1.0, on_progress=display.update, force=force, drive=scene.drive,
+                explained=True,
+            )  # fmt: skip
         end_with(result, json_output=json_output)
         return
     with RunDisplay() as display:
@@ -267,6 +291,23 @@ def refuse_ros_beside(
     for other, is_given in beside.items():
         if (ros is not None or inputs is not None) and is_given and other != name:
             raise UsageError(f"{name} cannot stand beside {other}", hint="leave one of the two out")
+
+
+def tell_viewer(url: str) -> None:
+    """Say what a viewer opens."""
+    typer.echo(f"open {url} in Foxglove or Lichtblick", err=True)
+
+
+def refuse_foxglove_beside(foxglove: str | None, **options: object) -> None:
+    """Refuse what cannot stand beside `--foxglove`.
+
+    Raises:
+        UsageError: Something does.
+    """
+    for name, value in options.items():
+        if foxglove is not None and value is not None:
+            what = "several robots" if name == "robots" else f"--{name}"
+            raise UsageError(f"--foxglove cannot stand beside {what}", hint="leave one of the two out")
 
 
 @contextlib.contextmanager

@@ -1,7 +1,7 @@
-"""The events of a run as files for other programs: JSON lines, or a Parquet table (extra `export`).
+"""The events of a run as files for other programs: JSON lines, a Parquet table, or MCAP (extra `export`).
 
 A line of JSON is an object with `kind` and the fields of its event; bytes are hex. The table has a row an event, and
-a column for each field of any kind, null where a kind has it not.
+a column for each field of any kind, null where a kind has it not. The MCAP holds the messages of `scene_messages`.
 
 Invariant: the events are those of `robot_bench.events.codec.events_of`, in their order.
 """
@@ -13,15 +13,23 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from p2os.capture.formats.mcap_files import McapFile
+from robot_bench.events.codec import Json
 from robot_bench.events.kinds import KINDS, Event
+from robot_bench.recording.scene_messages import SceneMessages
 from simbase.errors import FileError, MissingDependencyError, UsageError
 
 #: chosen: rows of a group of a Parquet file.
 GROUP = 65_536
 
 
-def write_events(events: Iterable[Event], path: Path) -> int:
-    """Write events to a file whose suffix says how, `.jsonl` or `.parquet`; return how many.
+def write_events(events: Iterable[Event], path: Path, meta: Json | None = None) -> int:
+    """Write events to a file whose suffix says how, `.jsonl`, `.parquet` or `.mcap`; return how many.
+
+    Args:
+        events: In order of time.
+        path: Where.
+        meta: The first entry of the run's trace, for a scene; None: nothing is known of world and robot.
 
     Raises:
         UsageError: It has another suffix.
@@ -32,7 +40,7 @@ def write_events(events: Iterable[Event], path: Path) -> int:
     if write is None:
         raise UsageError(f"cannot write events as {path.suffix or path.name}", hint=" or ".join(WRITERS))
     try:
-        return write(events, path)
+        return write(events, path, meta or {})
     except OSError as error:
         raise FileError(f"cannot write {path}: {error.strerror or error}") from error
 
@@ -45,7 +53,7 @@ def _plain(event: Event) -> dict[str, object]:
     return values
 
 
-def _write_json(events: Iterable[Event], path: Path) -> int:
+def _write_json(events: Iterable[Event], path: Path, _meta: Json) -> int:
     count = 0
     with path.open("w", encoding="utf-8", newline="\n") as file:
         for event in events:
@@ -54,7 +62,7 @@ def _write_json(events: Iterable[Event], path: Path) -> int:
     return count
 
 
-def _write_parquet(events: Iterable[Event], path: Path) -> int:
+def _write_parquet(events: Iterable[Event], path: Path, _meta: Json) -> int:
     try:
         import pyarrow as pa
         from pyarrow import parquet
@@ -76,6 +84,18 @@ def _write_parquet(events: Iterable[Event], path: Path) -> int:
     return count
 
 
+def _write_mcap(events: Iterable[Event], path: Path, meta: Json) -> int:
+    messages, count = SceneMessages(meta), 0
+    with McapFile(path, instead="write .jsonl") as file:
+        for message in messages.anew(0):
+            file.write(message.topic, message.schema, message.data, message.t)
+        for event in events:
+            count += 1
+            for message in messages.of(event):
+                file.write(message.topic, message.schema, message.data, message.t)
+    return count
+
+
 def _type(types: Mapping[str, Any], hint: Any) -> Any:
     name = getattr(hint, "__name__", str(hint))
     return types[name.partition("[")[0].partition(" |")[0]]
@@ -90,4 +110,6 @@ def _row(event: Event) -> dict[str, object]:
 
 
 #: Suffix → what writes it.
-WRITERS: Mapping[str, Callable[[Iterable[Event], Path], int]] = {".jsonl": _write_json, ".parquet": _write_parquet}
+WRITERS: Mapping[str, Callable[[Iterable[Event], Path, Json], int]] = {
+    ".jsonl": _write_json, ".parquet": _write_parquet, ".mcap": _write_mcap,
+}  # fmt: skip

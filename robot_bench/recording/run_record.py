@@ -10,6 +10,7 @@ Invariant: reading never fails on a trace that ends early; it fails with
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 from typing import Any, cast
 
@@ -124,6 +125,17 @@ def read_events(folder: Path) -> Iterator[Event]:
     path = _trace_in(folder)
     with path.open(encoding="utf-8", errors="replace") as lines:
         yield from events_of(lines, str(path))
+
+
+def read_meta(folder: Path) -> Json:
+    """Return the first entry of a run folder's trace: what was run, where, with what robot; empty where it has none.
+
+    Raises:
+        TraceError: The folder or its trace is missing, or its first line is damaged.
+    """
+    path = _trace_in(folder)
+    with path.open(encoding="utf-8", errors="replace") as lines:
+        return record_of(islice(lines, 1), str(path)).meta
 
 
 def _trace_in(folder: Path) -> Path:
