@@ -62,7 +62,8 @@ IO_LAYER = (
     "p2os.pioneer.serve.fleet",
     "p2os.pioneer.serve.control_line", "p2os.client.robot_thread", "p2os.client.aio", "simbase.interrupts",
     "bluepill_sim.cli", "bluepill_sim.cli.console",
-    "robot_bench.cli", "robot_bench.campaign.processes", "robot_bench.campaign.dask_workers", "robot_bench.running.pacer", "robot_bench.live", "robot_bench.report",
+    "robot_bench.cli", "robot_bench.campaign.processes", "robot_bench.campaign.dask_workers",
+    "robot_bench.running.pacer", "robot_bench.live", "robot_bench.report",
     "robot_bench.firmware.build",
 )  # fmt: skip
 
