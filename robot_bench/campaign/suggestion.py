@@ -21,6 +21,7 @@ TEMPLATE = Template("""\
 # What is searched: worlds in which the firmware of $scenario fails.
 #   p2os campaign $file                 docs/campaigns.md has all keys
 scenario = $scenario_name
+gap_m = 0.75             # between things: a robot of 0.38 m passes
 search = "sobol"        # grid, random, latin-hypercube, sobol, tpe, cma-es, quality-diversity, coverage
 
 [budget]
@@ -48,11 +49,11 @@ start.heading_deg = { from = 0, to = 355, step = 5 }
 
 [[draw]]                # things that stand in the way, each with a place and measures of its own
 kind = "post"
-count = { from = 0, to = 3 }
+count = { from = 1, to = 5 }
 
 [[draw]]
 kind = "box"
-count = { from = 0, to = 2 }
+count = { from = 0, to = 3 }
 
 [[draw]]                # before the robot as it begins, open to it: many a turn begins here
 kind = "dead-end"

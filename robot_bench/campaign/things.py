@@ -25,9 +25,9 @@ HEIGHT_M = 0.5
 #: chosen: of walls of dead ends and gaps.
 WALL_M = 0.08
 #: chosen: so many places are tried; each next one is a golden angle on, and a little further off.
-TRIES = 24
+TRIES = 64
 _GOLDEN_RAD = math.pi * (3 - math.sqrt(5))
-_STEP_M = 0.25
+_STEP_M = 0.35
 #: Digits of what is written: millimetres and tenths of a degree.
 _M, _DEG = 3, 1
 
