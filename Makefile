@@ -8,6 +8,8 @@ endif
 VENV   := .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.set-up
+DEMO_STAMP := $(VENV)/.set-up-demo
+comma := ,
 # One more than two cores: many tests wait for a real clock.
 JOBS   ?= 3
 # What is built with the package: set up again when it has changed.
@@ -18,19 +20,29 @@ COMPILED := $(wildcard bluepill_sim/extension/source/*/*) robot_bench/wires/edge
 
 setup: $(STAMP)
 
-# PyBullet has no wheels beyond Python 3.11: elsewhere the extra installs NumPy
-# alone, and everything but the `bullet` body works.
-$(STAMP): pyproject.toml setup.py constraints.txt $(COMPILED)
+$(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	    { echo "make: Python 3.11 or newer is needed (hint: make PYTHON=/path/to/python3.11)"; exit 2; }
-	@command -v $${CC:-cc} gcc >/dev/null || \
-	    { echo "make: the emulator needs a C compiler (hint: apt-get install g++ libc6-dev)"; exit 2; }
-	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV) || \
+	@$(PYTHON) -m venv $(VENV) || \
 	    { rm -rf $(VENV); echo "make: cannot create a virtual environment (hint: apt-get install python3-venv)"; exit 2; }
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[all,dev]'
-	@touch $@
 
-demo: setup
+# PyBullet has no wheels beyond Python 3.11: elsewhere the extra installs NumPy
+# alone, and everything but the `bullet` body works.
+define install
+@command -v $${CC:-cc} gcc >/dev/null || \
+    { echo "make: the emulator needs a C compiler (hint: apt-get install g++ libc6-dev)"; exit 2; }
+$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[$(1)]'
+@touch $@
+endef
+
+$(STAMP): pyproject.toml setup.py constraints.txt $(COMPILED) | $(BIN)/python
+	$(call install,all$(comma)dev)
+
+# The demo needs little of it; what else a verb wants, it says.
+$(DEMO_STAMP): pyproject.toml setup.py constraints.txt $(COMPILED) | $(BIN)/python
+	$(call install,sim$(comma)bullet)
+
+demo: $(if $(wildcard $(STAMP)),$(STAMP),$(DEMO_STAMP))
 	@$(BIN)/p2os demo; status=$$?; \
 	    echo; echo "type next:  . $(BIN)/activate    (p2os is then on your PATH in this terminal)"; \
 	    echo "then:       p2os doctor"; exit $$status

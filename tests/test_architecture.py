@@ -58,6 +58,8 @@ ALLOWED = {
     "robot_bench.experiments.pictures": {"matplotlib"},
     "robot_bench.experiments.sensitivity": {"numpy", "SALib"},
     "robot_bench.cli.pytest_plugin": {"p2os", "bluepill_sim", "pytest"},
+    "robot_bench.campaign.results": {"pyarrow"},
+    "robot_bench.campaign.dask_workers": {"p2os", "distributed"},
 }
 
 #: The I/O layer: what may read a clock, open a port or start a thread.
@@ -67,7 +69,8 @@ IO_LAYER = (
     "p2os.pioneer.serve.control_line", "p2os.client.robot_thread", "p2os.client.aio", "simbase.interrupts",
     "p2os.ros.zenoh_node",
     "bluepill_sim.cli", "bluepill_sim.cli.console",
-    "robot_bench.cli", "robot_bench.running.pacer", "robot_bench.live", "robot_bench.report",
+    "robot_bench.cli", "robot_bench.campaign.processes", "robot_bench.campaign.dask_workers",
+    "robot_bench.running.pacer", "robot_bench.live", "robot_bench.report",
     "robot_bench.firmware.build",
 )  # fmt: skip
 

@@ -7,7 +7,7 @@ not judged there.
 Invariant: a verdict depends on the events of the run alone; played back from its trace they give the same.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import cast
 
@@ -224,6 +224,12 @@ class GoalJudge(Stateful):
     def end_at(self, end: Nanos, planned_ns: Nanos) -> None:
         """Take notice that the run ends at `end`, and was to last `planned_ns`."""
         self._last = end, planned_ns
+
+    @property
+    def missed(self) -> Mapping[int, str]:
+        """The goals that were decided to be missed, each by its place, and what was wrong."""
+        pairs = enumerate(zip(self.goals, self._decided, strict=True))
+        return {at: f"{goal.kind}: {one.says}" for at, (goal, one) in pairs if one is not None and not one.met}
 
     def finish(self, end: Nanos, *, planned_ns: Nanos = 0) -> Judgement:
         """Return what became of the goals in a run that ended at `end`.

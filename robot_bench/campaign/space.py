@@ -1,0 +1,187 @@
+"""The searched space: what a campaign file lets vary, as the unit cube, and the trial that stands at each point of it.
+
+A search proposes points with a coordinate from 0 up to 1 for each dimension; it knows nothing of scenarios. Drawn
+things have as many coordinates as the most of them need; those of things beyond the drawn count are without effect.
+
+Invariant: a point comes to the same trial on every machine.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import cast
+
+from p2os.pioneer.world import load_world
+from p2os.pioneer.world.model import Pose, World
+from robot_bench.campaign.campaign_file import Campaign, Disturbance, Drawn, Span
+from robot_bench.campaign.things import Room, Thing
+from robot_bench.campaign.trial import Trial, unpacked
+from robot_bench.scenario.included_files import Setting
+from robot_bench.scenario.schema import Table
+
+#: A coordinate for each dimension.
+Point = tuple[float, ...]
+#: Returns the value of a dimension, by its name, and notes that it has an effect.
+Value = Callable[[str, Span], object]
+_UNIT = Span(0.0, 1.0)
+#: What places a thing that is seen from the robot.
+_SEEN = ("ahead_m", "aside_m")
+
+
+@dataclass(frozen=True, slots=True)
+class Dimension:
+    """One coordinate: what it is called, and the values along it."""
+
+    name: str
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Proposal:
+    """A point of the space with what stands there."""
+
+    point: Point
+    #: Dimension → value; those without effect at this point are left out.
+    values: Mapping[str, object]
+    settings: tuple[Setting, ...]
+    obstacles: tuple[Table, ...]
+    faults: tuple[Table, ...]
+
+    def trial(self, base: Trial, stage: Sequence[Setting]) -> Trial:
+        """Return the trial of this point, with what a stage sets."""
+        found = base.set(*stage, *self.settings)
+        lists: dict[str, Sequence[Table]] = {}
+        for name, more in (("obstacle", self.obstacles), ("fault", self.faults)):
+            if more:
+                lists[name] = [*cast("list[Table]", base.table.get(name, [])), *more]
+        return found.with_lists(**lists)
+
+
+class Space:
+    """The space of a campaign.
+
+    Raises:
+        ScenarioError: The world cannot be read.
+    """
+
+    def __init__(self, campaign: Campaign) -> None:
+        self._campaign = campaign
+        self.dimensions = tuple(_dimensions(campaign))
+        #: The floor of the world where nothing varies: least x, least y, greatest x and y, metres.
+        self.extent = self._place(())[0].extent
+
+    def proposal(self, point: Point) -> Proposal:
+        """Return what stands at a point."""
+        at = dict(zip((one.name for one in self.dimensions), point, strict=True))
+        campaign, values = self._campaign, dict[str, object]()
+
+        def value(name: str, span: Span) -> object:
+            if span.count == 1:
+                return span.value(0.0)
+            values[name] = found = span.value(at[name])
+            return found
+
+        settings = tuple((key, value(key, span)) for key, span in campaign.vary.items())
+        obstacles: Sequence[Table] = ()
+        if campaign.draws:
+            world, starts = self._place(settings)
+            things = [thing for draw in campaign.draws for thing in _things(draw, world, starts[0], value)]
+            room = Room(world, starts, campaign.gap_m, campaign.free_m)
+            obstacles = room.tables(things)
+        faults = [
+            table for number, one in enumerate(campaign.disturbances, 1) for table in _faults(one, number, value, at)
+        ]
+        return Proposal(point, values, settings, tuple(obstacles), tuple(faults))
+
+    def _place(self, settings: Sequence[Setting]) -> tuple[World, Sequence[Pose]]:
+        """Return the world of a point, and where its robots begin in it, the first one first."""
+        deciding = tuple((key, value) for key, value in settings if key.partition(".")[0] in _DECIDING)
+        return _world_and_starts(self._campaign.trial, deciding)
+
+
+#: What decides where a robot begins.
+_DECIDING = frozenset({"world", "seed", "start", "robot"})
+
+
+def _world_and_starts(trial: Trial, settings: tuple[Setting, ...]) -> tuple[World, Sequence[Pose]]:
+    changed = trial.set(*settings)
+    with unpacked(trial.files) as folder:
+        name = str(changed.table["world"])
+        world = _world(str(folder / name) if name in trial.files else name, changed.seed)
+    robots = changed.table.get("robot")
+    tables = (
+        cast("list[Mapping[str, float]]", robots)
+        if isinstance(robots, list)
+        else [cast("Mapping[str, float]", changed.table.get("start", {}))]
+    )
+    return world, [_pose(table) if "x_m" in table else world.start for table in tables]
+
+
+def _pose(table: Mapping[str, float]) -> Pose:
+    return Pose(table["x_m"], table["y_m"], math.radians(table.get("heading_deg", 0.0)))
+
+
+@lru_cache(maxsize=64)
+def _world(name: str, seed: int) -> World:
+    return load_world(name, seed=seed)
+
+
+def _dimensions(campaign: Campaign) -> list[Dimension]:
+    found = [Dimension(key, span) for key, span in campaign.vary.items()]
+    for draw in campaign.draws:
+        found.append(Dimension(f"{draw.name}.count", draw.count))
+        most = round(draw.count.high) if not draw.count.choices else max(int(str(one)) for one in draw.count.choices)
+        for number in range(1, most + 1):
+            name = f"{draw.name}-{number}"
+            if draw.seen is None:
+                found += [Dimension(f"{name}.x", _UNIT), Dimension(f"{name}.y", _UNIT)]
+            else:
+                found += [Dimension(f"{name}.{key}", span) for key, span in zip(_SEEN, draw.seen, strict=True)]
+            found.append(Dimension(f"{name}.heading_deg", draw.heading_deg))
+            found += [Dimension(f"{name}.{key}", span) for key, span in draw.measures.items()]
+    for number, one in enumerate(campaign.disturbances, 1):
+        name = f"disturb-{number}"
+        if one.share < 1:
+            found.append(Dimension(f"{name}.happens", _UNIT))
+        found.append(Dimension(f"{name}.at_s", one.at_s))
+        if one.for_s is not None:
+            found.append(Dimension(f"{name}.for_s", one.for_s))
+        found += [Dimension(f"{name}.{key}", span) for key, span in one.values.items()]
+    return [one for one in found if one.span.count != 1]
+
+
+def _things(draw: Drawn, world: World, start: Pose, value: Value) -> list[Thing]:
+    count = cast("int", value(f"{draw.name}.count", draw.count))
+    found = []
+    for number in range(1, count + 1):
+        name = f"{draw.name}-{number}"
+        heading_deg = cast("float", value(f"{name}.heading_deg", draw.heading_deg))
+        if draw.seen is None:
+            x0, y0, x1, y1 = draw.area_m or world.extent
+            x, y = (cast("float", value(f"{name}.{key}", _UNIT)) for key in ("x", "y"))
+            x_m, y_m = x0 + x * (x1 - x0), y0 + y * (y1 - y0)
+        else:
+            ahead_m, aside_m = (
+                cast("float", value(f"{name}.{key}", span)) for key, span in zip(_SEEN, draw.seen, strict=True)
+            )
+            cosine, sine = math.cos(start.heading_rad), math.sin(start.heading_rad)
+            x_m, y_m = start.x_m + ahead_m * cosine - aside_m * sine, start.y_m + ahead_m * sine + aside_m * cosine
+            heading_deg += math.degrees(start.heading_rad) + 180
+        place = (round(x_m, 3), round(y_m, 3), round(heading_deg % 360, 1))
+        measures = {key: cast("float", value(f"{name}.{key}", span)) for key, span in draw.measures.items()}
+        found.append(Thing(name=name, kind=draw.kind, place=place, measures=measures))
+    return found
+
+
+def _faults(one: Disturbance, number: int, value: Value, at: Mapping[str, float]) -> list[Table]:
+    name = f"disturb-{number}"
+    if at.get(f"{name}.happens", 0.0) >= one.share:
+        return []
+    words = one.words
+    for key, span in one.values.items():
+        words = words.replace(f"{{{key}}}", str(value(f"{name}.{key}", span)))
+    table: dict[str, object] = {"at_s": value(f"{name}.at_s", one.at_s), "fault": words}
+    if one.for_s is not None:
+        table["for_s"] = value(f"{name}.for_s", one.for_s)
+    return [table]
