@@ -61,7 +61,7 @@ IO_LAYER = (
     "p2os.pioneer.serve.control_line", "p2os.client.robot_thread", "p2os.client.aio", "simbase.interrupts",
     "bluepill_sim.cli", "bluepill_sim.cli.console",
     "robot_bench.cli", "robot_bench.running.pacer", "robot_bench.live", "robot_bench.report",
-    "robot_bench.firmware.build",
+    "robot_bench.firmware.build", "robot_bench.campaign.shrinking.kept",
 )  # fmt: skip
 
 #: What may log beside the I/O layer: what joins models to lines, and the bench. A model tells its owner by a callback.
