@@ -52,6 +52,8 @@ ALLOWED = {
     "robot_bench.report.explain": {"p2os", "bluepill_sim", "adapter_sim"},
     "robot_bench.recording.event_files": {"pyarrow"},
     "robot_bench.cli.pytest_plugin": {"p2os", "bluepill_sim", "pytest"},
+    "robot_bench.campaign.results": {"pyarrow"},
+    "robot_bench.campaign.dask_workers": {"p2os", "distributed"},
 }
 
 #: The I/O layer: what may read a clock, open a port or start a thread.
@@ -60,8 +62,9 @@ IO_LAYER = (
     "p2os.pioneer.serve.fleet",
     "p2os.pioneer.serve.control_line", "p2os.client.robot_thread", "p2os.client.aio", "simbase.interrupts",
     "bluepill_sim.cli", "bluepill_sim.cli.console",
-    "robot_bench.cli", "robot_bench.running.pacer", "robot_bench.live", "robot_bench.report",
-    "robot_bench.firmware.build", "robot_bench.campaign.shrinking.kept",
+    "robot_bench.cli", "robot_bench.campaign.processes", "robot_bench.campaign.dask_workers",
+    "robot_bench.campaign.variants.shrinking.kept", "robot_bench.running.pacer", "robot_bench.live",
+    "robot_bench.report", "robot_bench.firmware.build",
 )  # fmt: skip
 
 #: What may log beside the I/O layer: what joins models to lines, and the bench. A model tells its owner by a callback.

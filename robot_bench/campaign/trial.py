@@ -244,6 +244,15 @@ def run_trial(trial: Trial, look: Callable[[], None] | None = None) -> Outcome:
             return Outcome(verdict=Verdict.ERROR, failures=(f"{error}{hint}",))
 
 
+def warm_up(trial: Trial) -> None:
+    """Load what every run of the trial's files needs, so that forks of this process have it."""
+    with unpacked(trial.files) as folder:
+        try:
+            bench_of(trial.scenario(folder))
+        except P2osError:
+            return  # each run tells it
+
+
 @contextmanager
 def unpacked(files: Mapping[str, bytes]) -> Iterator[Path]:
     """Have the files of a trial in a folder for a block; it is kept for the next trial that has the same."""

@@ -225,6 +225,12 @@ class GoalJudge(Stateful):
         """Take notice that the run ends at `end`, and was to last `planned_ns`."""
         self._last = end, planned_ns
 
+    @property
+    def missed(self) -> str | None:
+        """The first of the goals that was decided to be missed, and what was wrong; None where none is yet."""
+        pairs = zip(self.goals, self._decided, strict=True)
+        return next((f"{goal.kind}: {one.says}" for goal, one in pairs if one is not None and not one.met), None)
+
     def finish(self, end: Nanos, *, planned_ns: Nanos = 0) -> Judgement:
         """Return what became of the goals in a run that ended at `end`.
 

@@ -15,6 +15,7 @@ from robot_bench.scenario.goals.motion import (
     Energy,
     LeastClearance,
     MinDistance,
+    MovesOn,
     NoCollision,
     Reach,
     Smooth,
@@ -193,6 +194,14 @@ KINDS: Mapping[str, GoalKind] = {
         wanted=lambda table: f"stands still{_when(table)}"
         + (f" and {number(table, 'way_m'):g} m" if "way_m" in table else ""),
         watch=StopWithin,
+    ),
+    "moves_on": GoalKind(
+        keys=(
+            Key(name="way_m", kind="number", required=True, above=0, most=1e6),
+            Key(name="within_s", kind="number", required=True, above=0, most=LONGEST_S),
+            _FROM,
+        ),
+        wanted=lambda table: f"gets {number(table, 'way_m'):g} m away from each place{_when(table)}", watch=MovesOn,
     ),
     "smooth": GoalKind(
         keys=(Key(name="most_mps2", kind="number", required=True, above=0, most=1000),),

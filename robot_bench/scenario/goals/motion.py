@@ -282,6 +282,47 @@ class StopWithin(Watch):
         )  # fmt: skip
 
 
+class MovesOn(Watch):
+    """The robot gets so far away from each place in time: it neither stands, nor turns on the spot, nor is shut in.
+
+    The place is that of the first pose, then that where it was so far away from the one before.
+    """
+
+    STATE = ("_place", "_least", "_least_at", "_has_missed")
+    kinds = (Pose,)
+
+    def __init__(self, table: Table) -> None:
+        self._way_m = number(table, "way_m")
+        self._within, self._from = nanos(table, "within_s"), nanos(table, "from_s")
+        self._place: Pose | None = None
+        #: The least time that was left when it got away, and when.
+        self._least = self._within
+        self._least_at: Pose | None = None
+        self._has_missed = False
+
+    def feed(self, event: Event) -> Outcome | None:
+        if not isinstance(event, Pose) or event.t < self._from:
+            return None
+        if self._place is None:
+            self._place = event
+        left = self._within - (event.t - self._place.t)
+        if left < self._least:
+            self._least, self._least_at = left, self._place
+        if math.hypot(event.x - self._place.x, event.y - self._place.y) >= self._way_m * MICRO:
+            self._place = event
+        if left >= 0 or self._has_missed:
+            return None
+        self._has_missed = True
+        return self.finish(event.t)
+
+    def finish(self, end: Nanos) -> Outcome:
+        stuck, left_s = self._least_at, self._least / NS_PER_S
+        if left_s >= 0 or stuck is None:
+            return Outcome(met=True, robustness=left_s, unit="s")
+        says = f"it did not get {self._way_m:g} m away from {_place(stuck)} where it was at {seconds(stuck.t)}"
+        return Outcome(met=False, says=f"{says} within {self._within / NS_PER_S:g} s", robustness=left_s, unit="s")
+
+
 class Smooth(Watch):
     """No rim is accelerated harder than allowed, between two poses."""
 

@@ -161,6 +161,20 @@ def test_goal_hold_speed_within_its_window(t: int, met: bool) -> None:
     assert met or found.says.startswith(f"speed_mps was out of bounds by 0.4 m/s at {t / S:.3f} s")
 
 
+@pytest.mark.parametrize(("t", "met"), [(5 * S - 1, True), (5 * S, True), (5 * S + 1, False)])
+def test_goal_moves_on_counts_from_the_place_where_it_was_so_far_away_last(t: int, met: bool) -> None:
+    run = [at(0), at(2 * S, 0.29), at(3 * S, 0.3), at(3 * S + t, 0.3, 0.3), at(9 * S, 0.9, 0.3)]
+    found = outcome("moves_on", run, way_m=0.3, within_s=5)
+    assert (found.met, found.robustness) == (met, (5 * S - t) / S)
+    assert met or found.says == ("it did not get 0.3 m away from x 0.30 m, y 0.00 m where it was at 3.000 s within 5 s")
+
+
+def test_goal_moves_on_begins_where_it_is_told_to() -> None:
+    run = [at(0), at(6 * S), at(7 * S, 0.5), at(10 * S, 0.9)]
+    assert not outcome("moves_on", run, way_m=0.3, within_s=5).met
+    assert outcome("moves_on", run, way_m=0.3, within_s=5, from_s=6).met
+
+
 def test_goal_smooth() -> None:
     run = [at(0), at(50 * MS, left=0.02, right=-0.02), at(100 * MS, left=0.02, right=0.01)]
     assert outcome("smooth", run, most_mps2=0.6).met

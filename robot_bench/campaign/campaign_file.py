@@ -1,0 +1,401 @@
+"""A campaign file: which scenario, what varies, what must hold, how much may be spent, and who searches.
+
+    scenario = "dodge"                  # a name, or a file beside this one
+    search = "sobol"
+
+    [budget]
+    runs = 200
+
+    [vary]
+    start.heading_deg = { from = 0, to = 350, step = 10 }
+    threshold_m = [0.5, 0.6]
+
+    [[draw]]
+    kind = "post"
+    count = { from = 0, to = 4 }
+
+Every key that `--set` takes can vary. docs/campaigns.md has all keys.
+Invariant: a `Campaign` that exists can be begun: its scenario is there and can be run, and every range is one.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, cast
+
+from p2os.errors import ScenarioError
+from p2os.pioneer.world import load_world
+from p2os.toml_file import TomlSource, is_file, read_toml, read_user_text
+from robot_bench.campaign.search import SEARCHES
+from robot_bench.campaign.things import KINDS
+from robot_bench.campaign.trial import Trial, trial_of, unpacked
+from robot_bench.scenario.included_files import Setting
+from robot_bench.scenario.scenario import Scenario
+from robot_bench.scenario.schema import LONGEST_S, Key, Place, Table, Where, check_table, nearest, within
+from robot_bench.scenario.sweep import MOST_RUNS
+from simbase.errors import UsageError, shown
+
+TOP = (
+    Key(name="description", kind="text"),
+    Key(name="scenario", kind="text", required=True),
+    Key(name="firmware", kind="text"),
+    Key(name="search", kind="text", choices=tuple(SEARCHES)),
+    Key(name="seed", kind="whole", least=0, most=2**31 - 1),
+    Key(name="batch", kind="whole", least=1, most=1024),
+    Key(name="near_misses", kind="whole", least=0, most=1024),
+    Key(name="gap_m", kind="number", least=0, most=100),
+    Key(name="free_m", kind="number", least=0, most=100),
+    Key(name="budget", kind="table"),
+    Key(name="limits", kind="table"),
+    Key(name="cheap", kind="table"),
+    Key(name="full", kind="table"),
+    Key(name="vary", kind="table"),
+    Key(name="draw", kind="tables"),
+    Key(name="disturb", kind="tables"),
+    Key(name="goal", kind="tables"),
+)
+BUDGET = (
+    Key(name="runs", kind="whole", least=1, most=MOST_RUNS),
+    Key(name="confirmations", kind="whole", least=0, most=MOST_RUNS),
+    Key(name="minutes", kind="number", above=0, most=LONGEST_S),
+    Key(name="virtual_hours", kind="number", above=0, most=LONGEST_S),
+)
+LIMITS = (
+    Key(name="cpu_s", kind="number", least=1, most=LONGEST_S),
+    Key(name="memory_mb", kind="whole", least=64, most=1_000_000),
+)
+RANGE = (
+    Key(name="from", kind="number", required=True),
+    Key(name="to", kind="number", required=True),
+    Key(name="step", kind="number", above=0),
+)
+DRAW = (
+    Key(name="kind", kind="text", required=True, choices=tuple(KINDS)),
+    Key(name="name", kind="text"),
+    Key(name="count", kind="whole", least=0, most=64),
+    Key(name="area_m", kind="list"),
+    Key(name="heading_deg", kind="number", least=-36_000, most=36_000),
+    *(
+        Key(name=name, kind="number", above=0, most=1000)
+        for name in sorted({name for kind in KINDS.values() for name in kind.measures})
+    ),
+)
+DISTURB = (
+    Key(name="fault", kind="text", required=True),
+    Key(name="at_s", kind="number", least=0, most=LONGEST_S),
+    Key(name="for_s", kind="number", above=0, most=LONGEST_S),
+    Key(name="share", kind="number", above=0, most=1),
+)
+#: Every table of a campaign file and its keys.
+TABLES: Mapping[str, tuple[Key, ...]] = {
+    "": TOP, "[budget]": BUDGET, "[limits]": LIMITS, "[[draw]]": DRAW, "[[disturb]]": DISTURB,
+}  # fmt: skip
+#: What the runs that propose set, and those that confirm, where the file says nothing.
+CHEAP: Table = {"mode": "direct", "body": "kinematic"}
+FULL: Table = {"mode": "adapter"}
+#: chosen: of a drawn place, how far from the start's middle it is free: the hull turns within 0.32 m.
+FREE_M = 0.5
+#: chosen: a robot of 0.38 m passes with room on both sides.
+GAP_M = 0.9
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """What a parameter may be: a range of numbers, or some values; a range of one is a value."""
+
+    low: float = 0.0
+    high: float = 0.0
+    #: 0: any number between.
+    step: float = 0.0
+    is_whole: bool = False
+    #: In place of a range.
+    choices: tuple[object, ...] = ()
+
+    @property
+    def count(self) -> int:
+        """How many values there are; 0 where they are too many to count."""
+        if self.choices:
+            return len(self.choices)
+        if self.low == self.high:
+            return 1
+        return int((self.high - self.low) / self.step + 1e-9) + 1 if self.step else 0
+
+    def value(self, at: float) -> object:
+        """Return the value at a place of the unit interval, 0 up to but not 1."""
+        if self.choices:
+            return self.choices[min(int(at * len(self.choices)), len(self.choices) - 1)]
+        if self.step:
+            found = self.low + min(int(at * self.count), self.count - 1) * self.step
+        else:
+            found = self.low + at * (self.high - self.low)
+        return round(found) if self.is_whole else round(found, 4)
+
+    def place(self, share: float) -> float:
+        """Return a place of the unit interval that comes to the value at a share of the range, for grids."""
+        return min(max(share, 0.0), 1 - 1e-9)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drawn:
+    """A `[[draw]]` table: things of a kind, each with numbers of its own."""
+
+    name: str
+    kind: str
+    count: Span
+    #: Least x, least y, greatest x and y, metres; None: the floor of the world.
+    area_m: tuple[float, float, float, float] | None
+    heading_deg: Span
+    measures: Mapping[str, Span]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Disturbance:
+    """A `[[disturb]]` table: a fault whose words and times have numbers that are drawn."""
+
+    words: str
+    at_s: Span
+    for_s: Span | None
+    #: In so many of the runs it happens.
+    share: float
+    #: Name in braces in the words → its values.
+    values: Mapping[str, Span]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Budget:
+    """How much may be spent; None: without end."""
+
+    runs: int = 200
+    confirmations: int = 20
+    minutes: float | None = None
+    virtual_hours: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """What one run may take; more is an error of that run."""
+
+    cpu_s: float = 300.0
+    memory_mb: int = 2000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Campaign:
+    """Everything that a campaign needs to know."""
+
+    name: str
+    description: str
+    #: The file's own text.
+    text: str
+    #: The scenario, with the campaign's goals where it has any.
+    trial: Trial
+    search: str = "sobol"
+    seed: int = 0
+    #: chosen: so many are asked for before any is told of; the set of runs depends on it, not on the workers.
+    batch: int = 16
+    #: Of each batch so many that passed, those with the least margin, are run in full too.
+    near_misses: int = 1
+    gap_m: float = GAP_M
+    free_m: float = FREE_M
+    budget: Budget = field(default_factory=Budget)
+    limits: Limits = field(default_factory=Limits)
+    cheap: tuple[Setting, ...] = ()
+    full: tuple[Setting, ...] = ()
+    vary: Mapping[str, Span] = field(default_factory=dict)
+    draws: tuple[Drawn, ...] = ()
+    disturbances: tuple[Disturbance, ...] = ()
+
+
+def load_campaign(path: Path, *, firmware: Path | None = None) -> Campaign:
+    """Read and check a campaign file.
+
+    Args:
+        path: The file.
+        firmware: Takes the place of its program.
+
+    Raises:
+        ScenarioError: It cannot be read, breaks the schema, or its scenario does.
+    """
+    text = read_user_text(path, "a campaign", ScenarioError, hint="p2os campaign new SCENARIO writes one")
+    return parse_campaign(text, path, firmware=firmware)
+
+
+def parse_campaign(text: str, path: Path, *, firmware: Path | None = None) -> Campaign:
+    """Check the text of a campaign file; arguments and errors as of `load_campaign`."""
+    table, places = read_toml(text, path.name, "a campaign", ScenarioError)
+    where = Place(TomlSource(path.name, places))
+    check_table(table, TOP, where)
+    budget, limits = (
+        _checked(cast("Table", table.get(name, {})), keys, within(where, name))
+        for name, keys in (("budget", BUDGET), ("limits", LIMITS))
+    )
+    trial = _with_start(_trial(table, path, where, firmware), cast("Table", table.get("vary", {})), path)
+    draws = _draws(cast("list[Table]", table.get("draw", [])), where)
+    disturbances = tuple(
+        _disturbance(row, within(where, "disturb", number))
+        for number, row in enumerate(cast("list[Table]", table.get("disturb", [])))
+    )
+    vary = {key: _span(value, at) for key, value, at in _leaves(table.get("vary", {}), "", within(where, "vary"))}
+    cheap, full = (
+        tuple((key, value) for key, value, _ in _leaves({**defaults, **cast("Table", table.get(name, {}))}, "", where))
+        for name, defaults in (("cheap", CHEAP), ("full", FULL))
+    )
+    if disturbances and dict(cheap)["mode"] == "direct":
+        raise ScenarioError(
+            f"{within(where, 'disturb', 0)}: a fault acts on the robot's controller, and mode direct has none",
+            hint='[cheap] mode = "adapter"',
+        )
+    if not vary and not draws and not disturbances:
+        raise ScenarioError(f"{where}: nothing varies", hint="[vary], [[draw]] or [[disturb]]")
+    found = Campaign(
+        name=path.stem, description=str(table.get("description", "")), text=text, trial=trial,
+        search=str(table.get("search", "sobol")),
+        **{key: table[key] for key in ("seed", "batch", "near_misses", "gap_m", "free_m") if key in table},
+        budget=Budget(**budget), limits=Limits(**limits), cheap=cheap, full=full, vary=vary, draws=draws,
+        disturbances=disturbances,
+    )  # fmt: skip
+    _refuse_settings(found, path)
+    return found
+
+
+def _checked(table: Table, keys: Sequence[Key], where: Where) -> dict[str, Any]:
+    check_table(table, keys, where)
+    return dict(table)
+
+
+def _trial(table: Table, path: Path, where: Place, firmware: Path | None) -> Trial:
+    name = str(table["scenario"])
+    beside = path.parent / name
+    if firmware is None and "firmware" in table:
+        firmware = path.parent / str(table["firmware"])
+        if not is_file(firmware):
+            raise ScenarioError(f"{where.at('firmware')}: there is no file {shown(str(table['firmware']))} beside it")
+    try:
+        trial = trial_of(str(beside) if is_file(beside) else name, firmware=firmware)
+    except (ScenarioError, UsageError) as error:
+        raise ScenarioError(f"{where.at('scenario')}: {error}", hint=error.hint) from error
+    return trial.with_lists(goal=cast("list[Table]", table["goal"])) if "goal" in table else trial
+
+
+def _with_start(trial: Trial, vary: Table, path: Path) -> Trial:
+    """Return a trial of which a part of the start can vary: the rest is then the world's own."""
+    if "start" not in vary or "start" in trial.table or isinstance(trial.table.get("robot"), list):
+        return trial
+    scenario = _scenario(trial, path.name)
+    start = load_world(scenario.world, seed=scenario.seed).start
+    heading_deg = round(math.degrees(start.heading_rad), 4)
+    return trial.set(("start", {"x_m": start.x_m, "y_m": start.y_m, "heading_deg": heading_deg}))
+
+
+def _refuse_settings(campaign: Campaign, path: Path) -> None:
+    """Refuse goals, stages and varied keys that the scenario cannot have: it is built with the middle of each range.
+
+    Raises:
+        ScenarioError: So it is.
+    """
+    middle = [(key, span.value(0.5)) for key, span in campaign.vary.items()]
+    for stage, settings in (("cheap", campaign.cheap), ("full", campaign.full)):
+        where = f"{path.name}: [{stage}]"
+        try:
+            trial = campaign.trial.set(*settings, *middle)
+        except UsageError as error:
+            raise ScenarioError(f"{where} {error}".replace("--set ", ""), hint=error.hint) from error
+        _scenario(trial, where)
+
+
+def _scenario(trial: Trial, where: str) -> Scenario:
+    """Return the scenario of a trial; its files need not be there any more when it is used.
+
+    Raises:
+        ScenarioError: It cannot be; the message has `where` before it.
+    """
+    try:
+        with unpacked(trial.files) as folder:
+            return trial.scenario(folder)
+    except ScenarioError as error:
+        raise ScenarioError(f"{where}: {error}", hint=error.hint) from error
+
+
+def _leaves(table: object, above: str, where: Where) -> Iterator[tuple[str, object, str]]:
+    """Yield each key of nested tables with its value and its place; what has `from` is a value."""
+    for name, value in cast("Table", table).items():
+        key = f"{above}.{name}".removeprefix(".")
+        if isinstance(value, Mapping) and "from" not in value:
+            yield from _leaves(value, key, where)
+        else:
+            at = where if isinstance(where, str) else where.at(key)
+            yield key, value, f"{at}: {key}"
+
+
+def _draws(tables: Sequence[Table], where: Place) -> tuple[Drawn, ...]:
+    found: list[Drawn] = []
+    for number, table in enumerate(tables):
+        place = within(where, "draw", number)
+        plain = {key: _middle(value, f"{place}: {key}") if key in _SPANNED else value for key, value in table.items()}
+        check_table(plain, DRAW, place)
+        kind = str(table["kind"])
+        spans = {key: _span(value, f"{place}: {key}") for key, value in table.items() if key in _SPANNED}
+        known = KINDS[kind].measures
+        strange = next((key for key in spans if key not in known and key not in {"count", "heading_deg"}), None)
+        if strange is not None:
+            raise ScenarioError(f"{place}: a {kind} has no {strange}", hint=nearest(strange, list(known)))
+        name = str(table.get("name", kind))
+        if name in [one.name for one in found]:
+            raise ScenarioError(f"{place}: there is another {shown(name)}", hint='name = "…" tells them apart')
+        found.append(Drawn(
+            name=name, kind=kind, count=spans.pop("count", Span(1, 1, is_whole=True)),
+            area_m=_area(table.get("area_m"), place), heading_deg=spans.pop("heading_deg", Span(0.0, 360.0)),
+            measures={key: spans.get(key, Span(low, high)) for key, (low, high) in known.items()},
+        ))  # fmt: skip
+    return tuple(found)
+
+
+#: Keys of `[[draw]]` that take a range.
+_SPANNED = frozenset(key.name for key in DRAW if key.kind in {"number", "whole"})
+
+
+def _disturbance(table: Table, where: Where) -> Disturbance:
+    named = {key: value for key, value in table.items() if f"{{{key}}}" in str(table.get("fault", ""))}
+    plain = {
+        key: _middle(value, f"{where}: {key}") if key in {"at_s", "for_s"} else value
+        for key, value in table.items() if key not in named
+    }  # fmt: skip
+    check_table(plain, DISTURB, where)
+    return Disturbance(
+        words=str(table["fault"]), at_s=_span(table.get("at_s", 0.0), f"{where}: at_s"),
+        for_s=_span(table["for_s"], f"{where}: for_s") if "for_s" in table else None,
+        share=float(cast("float", table.get("share", 1.0))),
+        values={key: _span(value, f"{where}: {key}") for key, value in named.items()},
+    )  # fmt: skip
+
+
+def _area(value: object, where: Where) -> tuple[float, float, float, float] | None:
+    if value is None:
+        return None
+    numbers = [float(item) for item in cast("list[object]", value) if isinstance(item, (int, float))]
+    if len(numbers) != 4 or numbers[0] >= numbers[2] or numbers[1] >= numbers[3]:
+        raise ScenarioError(f"{where}: area_m must be [least x, least y, greatest x, greatest y]")
+    return numbers[0], numbers[1], numbers[2], numbers[3]
+
+
+def _middle(value: object, where: str) -> object:
+    """Return a value of a range for the check of its key."""
+    return _span(value, where).value(0.5)
+
+
+def _span(value: object, where: str) -> Span:
+    if isinstance(value, list):
+        if not value or any(isinstance(item, (dict, list)) for item in value):
+            raise ScenarioError(f"{where} = {shown(value)} is no list of values", hint="[0.4, 0.6]")
+        return Span(choices=tuple(value))
+    if isinstance(value, Mapping):
+        check_table(cast("Table", value), RANGE, where)
+        low, high = (cast("float", value[key]) for key in ("from", "to"))
+        if not low <= high:
+            raise ScenarioError(f"{where}: to is below from", hint="{ from = 0.1, to = 0.5 }")
+        is_whole = all(isinstance(item, int) for item in value.values())
+        return Span(low, high, float(cast("float", value.get("step", 1 if is_whole else 0))), is_whole)
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        return Span(value, value, is_whole=isinstance(value, int))
+    return Span(choices=(value,))

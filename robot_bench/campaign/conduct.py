@@ -1,0 +1,297 @@
+"""Carries a campaign out: asks the search, has the runs done, confirms what fails, and tells the search.
+
+Theory of operation. A batch of points is asked for. Their runs of the cheap stage are done, in any order, by any
+number of workers; then, in the order of the points, each one that failed is run in full, and so are the nearest
+misses, as far as the budget goes. A run in full that failed is done once more in another process, and counts as a
+failure only where its hash is the same. Then the search is told. Since every step is taken in the order of the points
+and depends on their outcomes alone, the same campaign comes to the same runs on any machine of the same version.
+
+A campaign that goes on begins anew and finds what was done in its journal, so a kill at any instant loses the runs
+that were under way and nothing else.
+
+Invariant: the rows, their order and all in them but the seconds depend on the campaign alone; a limit of minutes cuts
+them after a whole batch.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from pathlib import Path
+from typing import Protocol
+
+from robot_bench.campaign.campaign_file import Campaign
+from robot_bench.campaign.journal import Journal
+from robot_bench.campaign.margin import margin
+from robot_bench.campaign.search import SEARCHES, Answer, Problem
+from robot_bench.campaign.space import Proposal, Space
+from robot_bench.campaign.trial import Outcome, Trial, Verdict
+from simbase.timing import NS_PER_S, Nanos
+
+NS_PER_HOUR = 3600 * NS_PER_S
+#: What a search is told of a run without a verdict: nothing to go towards.
+NO_VERDICT = 1.0
+
+
+class Stage(Enum):
+    """What a run is for."""
+
+    #: Proposes: the cheap fidelity.
+    CHEAP = "cheap"
+    #: Confirms: the given body, through the adapter.
+    FULL = "full"
+    #: Proves: the same again in another process.
+    REPLAY = "replay"
+
+
+class Finding(Enum):
+    """What came of a point, both fidelities considered."""
+
+    PASSED = "passed"
+    #: Both failed.
+    CONFIRMED = "confirmed"
+    #: The run in full failed, and the cheap one passed.
+    FULL_ONLY = "full only"
+    #: The cheap run failed, and the one in full passed: no failure.
+    CHEAP_ONLY = "cheap only"
+    #: The cheap run failed, and the budget had no confirmation left.
+    UNCONFIRMED = "unconfirmed"
+    #: The run in full failed once, and not again with the same hash: a bug of the bench, never reported as a failure.
+    NOT_REPEATED = "not repeated"
+    #: There is no verdict.
+    ERROR = "error"
+
+
+#: What is reported as a failure.
+FAILURES = frozenset({Finding.CONFIRMED, Finding.FULL_ONLY})
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """A run that was done."""
+
+    stage: Stage
+    trial: Trial
+    outcome: Outcome
+    cpu_s: float
+
+    @property
+    def margin(self) -> float | None:
+        """As of `margin`."""
+        return margin(self.outcome)
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A point with all that was run of it."""
+
+    number: int
+    proposal: Proposal
+    cheap: Run
+    full: Run | None = None
+    replay: Run | None = None
+    #: How many blocks and states it reached that none before it had.
+    new: int = 0
+
+    @property
+    def runs(self) -> Sequence[Run]:
+        """Those that were done."""
+        return [run for run in (self.cheap, self.full, self.replay) if run is not None]
+
+    @property
+    def finding(self) -> Finding:
+        """What came of it."""
+        cheap = self.cheap.outcome.verdict
+        if self.full is None:
+            return {
+                Verdict.PASSED: Finding.PASSED, Verdict.FAILED: Finding.UNCONFIRMED, Verdict.ERROR: Finding.ERROR,
+            }[cheap]  # fmt: skip
+        if self.full.outcome.verdict is Verdict.ERROR:
+            return Finding.ERROR
+        if self.full.outcome.verdict is Verdict.PASSED:
+            return Finding.CHEAP_ONLY if cheap is Verdict.FAILED else Finding.PASSED
+        if self.replay is None or self.replay.outcome.sha256 != self.full.outcome.sha256:
+            return Finding.NOT_REPEATED
+        return Finding.CONFIRMED if cheap is Verdict.FAILED else Finding.FULL_ONLY
+
+    @property
+    def failing(self) -> Run | None:
+        """The run that is reported, where it is a failure."""
+        return self.full if self.finding in FAILURES else None
+
+
+class Workers(Protocol):
+    """Who carries trials out: `Processes`, `DaskWorkers`."""
+
+    def run(self, trials: Sequence[Trial], on_done: Callable[[int, tuple[Outcome, float]], None]) -> None:
+        """Run all; call `on_done` with the place of each and what came of it, in any order."""
+        ...
+
+    def close(self) -> None:
+        """End what was begun."""
+        ...
+
+
+@dataclass(slots=True)
+class Progress:
+    """Where a campaign stands."""
+
+    rows: list[Row] = field(default_factory=list)
+    runs: int = 0
+    #: Of these, how many were in the journal.
+    resumed: int = 0
+    virtual_ns: Nanos = 0
+    cpu_s: float = 0.0
+    blocks: set[int] = field(default_factory=set)
+    states: set[str] = field(default_factory=set)
+
+    @property
+    def failures(self) -> list[Row]:
+        """The points that failed."""
+        return [row for row in self.rows if row.finding in FAILURES]
+
+
+class Conduct:
+    """One campaign, from its beginning or from where its journal ends.
+
+    Args:
+        campaign: What to do.
+        folder: Where the journal is.
+        workers: Who does it.
+        clock: Wall clock, nanoseconds.
+        on_run: Called after each run.
+
+    Raises:
+        MissingDependencyError: The search's library is not installed.
+        FileError: The journal cannot be read or written.
+    """
+
+    def __init__(
+        self,
+        campaign: Campaign,
+        folder: Path,
+        workers: Workers,
+        *,
+        clock: Callable[[], Nanos],
+        on_run: Callable[[Progress], None] = lambda _: None,
+    ) -> None:
+        self.campaign, self._workers, self._clock, self._on_run = campaign, workers, clock, on_run
+        self.space = Space(campaign)
+        spans = [dimension.span for dimension in self.space.dimensions]
+        self._search = SEARCHES[campaign.search](Problem(
+            counts=tuple(span.count for span in spans), is_ordered=tuple(not span.choices for span in spans),
+            runs=campaign.budget.runs, batch=campaign.batch, seed=campaign.seed,
+        ))  # fmt: skip
+        self._journal = Journal(folder)
+        self.progress = Progress()
+        self._confirmed = 0
+
+    def run(self) -> Progress:
+        """Do all of it; arguments and errors as of `within_minutes`."""
+        for _ in self.within_minutes():
+            pass
+        return self.progress
+
+    def within_minutes(self) -> Iterator[Sequence[Row]]:
+        """Do one batch after the other, as long as the budget's minutes last; yield the rows of each.
+
+        Raises:
+            KeyboardInterrupt: A worker's `look` has; what was done is in the journal.
+            FileError: The disk is full.
+        """
+        began, minutes = self._clock(), self.campaign.budget.minutes
+        for rows in self.batches():
+            yield rows
+            if minutes is not None and self._clock() - began >= minutes * 60 * NS_PER_S:
+                return
+
+    def batches(self) -> Iterator[Sequence[Row]]:
+        """Do one batch after the other, whatever time it takes; yield the rows of each."""
+        budget, done = self.campaign.budget, self.progress
+        while len(done.rows) < budget.runs and not self._is_spent():
+            points = self._search.ask(min(self.campaign.batch, budget.runs - len(done.rows)))
+            if not points:
+                return
+            rows = self._rows(points)
+            self._search.tell([self._answer(row) for row in rows])
+            done.rows += rows
+            yield rows
+
+    def close(self) -> None:
+        """Close the journal."""
+        self._journal.close()
+
+    def _is_spent(self) -> bool:
+        hours = self.campaign.budget.virtual_hours
+        return hours is not None and self.progress.virtual_ns >= hours * NS_PER_HOUR
+
+    def _rows(self, points: Sequence[tuple[float, ...]]) -> list[Row]:
+        proposals = [self.space.proposal(point) for point in points]
+        first = len(self.progress.rows) + 1
+        cheap = self._do(Stage.CHEAP, [one.trial(self.campaign.trial, self.campaign.cheap) for one in proposals])
+        rows = [
+            Row(number, proposal, run, new=self._learn(run.outcome))
+            for number, (proposal, run) in enumerate(zip(proposals, cheap, strict=True), first)
+        ]
+        chosen = self._to_confirm(rows)
+        full = self._do(Stage.FULL, [rows[at].proposal.trial(self.campaign.trial, self.campaign.full) for at in chosen])
+        for at, run in zip(chosen, full, strict=True):
+            rows[at] = replace(rows[at], full=run)
+        failed = [at for at, run in zip(chosen, full, strict=True) if run.outcome.verdict is Verdict.FAILED]
+        again = self._do(Stage.REPLAY, [one.trial for at in failed if (one := rows[at].full) is not None])
+        for at, run in zip(failed, again, strict=True):
+            rows[at] = replace(rows[at], replay=run)
+        return rows
+
+    def _to_confirm(self, rows: Sequence[Row]) -> list[int]:
+        """Return the places of those that are run in full: what failed, and the nearest misses."""
+        left = self.campaign.budget.confirmations - self._confirmed
+        failed = [at for at, row in enumerate(rows) if row.cheap.outcome.verdict is Verdict.FAILED]
+        passed = [at for at, row in enumerate(rows) if row.cheap.outcome.verdict is Verdict.PASSED]
+        nearest = sorted(passed, key=lambda at: (rows[at].cheap.margin or 0.0, at))[: self.campaign.near_misses]
+        chosen = [*failed, *nearest][: max(left, 0)]
+        self._confirmed += len(chosen)
+        return sorted(chosen)
+
+    def _do(self, stage: Stage, trials: Sequence[Trial]) -> list[Run]:
+        """Return the runs of trials, in their order; those in the journal are not done again."""
+        keys = [f"{stage.value}:{trial.sha256}" for trial in trials]
+        places = {key: place for place, key in enumerate(keys) if self._journal.get(key) is None}
+        missing = list(places.values())
+        self.progress.resumed += len(set(keys)) - len(missing)
+
+        def on_done(number: int, done: tuple[Outcome, float]) -> None:
+            self._journal.add(keys[missing[number]], *done)
+            self._count(*done)
+
+        for key in set(keys) - places.keys():
+            self._count(*self._kept(key))
+        self._workers.run([trials[place] for place in missing], on_done)
+        return [Run(stage, trial, *self._kept(key)) for trial, key in zip(trials, keys, strict=True)]
+
+    def _kept(self, key: str) -> tuple[Outcome, float]:
+        found = self._journal.get(key)
+        if found is None:
+            raise RuntimeError(f"the workers have left out {key}")
+        return found
+
+    def _count(self, outcome: Outcome, cpu_s: float) -> None:
+        self.progress.runs += 1
+        self.progress.virtual_ns += outcome.virtual_ns
+        self.progress.cpu_s += cpu_s
+        self._on_run(self.progress)
+
+    def _learn(self, outcome: Outcome) -> int:
+        """Add what a run has reached; return how much of it is new."""
+        done = self.progress
+        new = len(outcome.blocks - done.blocks) + len(outcome.lines - done.states)
+        done.blocks |= outcome.blocks
+        done.states |= outcome.lines
+        return new
+
+    def _answer(self, row: Row) -> Answer:
+        outcome, found = row.cheap.outcome, row.cheap.margin
+        x0, y0, x1, y1 = self.space.extent
+        x_m, y_m = (at / 1000 for at in (outcome.way_mm or ((0, 0),))[-1])
+        ended = min(max((x_m - x0) / (x1 - x0), 0.0), 1.0), min(max((y_m - y0) / (y1 - y0), 0.0), 1.0)
+        reached: frozenset[object] = frozenset(outcome.blocks | outcome.lines)
+        return Answer(margin=NO_VERDICT if found is None else found, ended=ended, reached=reached)

@@ -1,0 +1,156 @@
+"""Workers of this machine: each trial in a process of its own, a fork of this one, within limits of time and memory.
+
+What every trial needs (the programs, the firmware's image, the world) is loaded once, here; a fork has it and begins
+at once. Nothing of a trial outlives its process, so a hundred thousand leave no more behind than one.
+
+A process that was killed from outside is done again; one that takes more than its limits is an outcome of its own,
+`ERROR`. A fork whose parent is gone ends at its next slice.
+
+Invariant: what comes of a trial depends on the trial alone, not on how many run at a time, nor on their order.
+"""
+
+import contextlib
+import gc
+import os
+import resource
+import signal
+import tempfile
+from collections.abc import Callable, Sequence
+from multiprocessing import get_context
+from multiprocessing.connection import Connection, wait
+from multiprocessing.context import ForkProcess
+from pathlib import Path
+
+from p2os.errors import RunFailedError
+from robot_bench.campaign.campaign_file import Limits
+from robot_bench.campaign.trial import Outcome, Trial, Verdict, run_trial, warm_up
+
+#: chosen: how long a signal may wait for this process to look, seconds.
+LOOK_S = 0.1
+#: chosen: so often a trial is begun whose process is killed from outside.
+MOST_TRIES = 4
+#: Between the soft and the hard limit of the processor's time, seconds.
+_GRACE_S = 5
+_MB = 1 << 20
+
+#: What came of a trial, with the seconds of a processor that it took.
+Done = tuple[Outcome, float]
+
+
+class Processes:
+    """Runs trials in processes of this machine.
+
+    Args:
+        at_once: How many run at a time.
+        limits: What one may take.
+        look: Called often; what it raises ends all.
+    """
+
+    def __init__(self, at_once: int, limits: Limits, look: Callable[[], None] = lambda: None) -> None:
+        self._at_once, self._limits, self._look = at_once, limits, look
+
+    def run(self, trials: Sequence[Trial], on_done: Callable[[int, Done], None]) -> None:
+        """Run all; call `on_done` with the place of each and what came of it, in the order in which they end.
+
+        Raises:
+            KeyboardInterrupt: `look` has; what was running is gone.
+        """
+        waiting = [(place, 1) for place in range(len(trials))][::-1]
+        running: dict[Connection, tuple[int, int, ForkProcess]] = {}
+        for trial in {id(trial.files): trial for trial in trials}.values():
+            warm_up(trial)
+        gc.freeze()
+        with tempfile.TemporaryDirectory(prefix="p2os-campaign-") as folder:
+            try:
+                while running or waiting:
+                    self._look()
+                    while waiting and len(running) < self._at_once:
+                        place, tries = waiting.pop()
+                        process, pipe = _begin(trials[place], self._limits, Path(folder))
+                        running[pipe] = place, tries, process
+                    ready = wait(list(running), timeout=LOOK_S)
+                    for pipe in [pipe for pipe in running if pipe in ready]:
+                        place, tries, process = running.pop(pipe)
+                        done = _result(process, pipe, self._limits)
+                        if done is None and tries < MOST_TRIES:
+                            waiting.append((place, tries + 1))
+                        else:
+                            on_done(place, done or (_error("its process was killed, again and again"), 0.0))
+            finally:
+                gc.unfreeze()
+                for _, _, process in running.values():
+                    process.kill()
+                    process.join()
+
+    def close(self) -> None:
+        """Nothing is kept between runs."""
+
+
+def _begin(trial: Trial, limits: Limits, folder: Path) -> tuple[ForkProcess, Connection]:
+    ours, theirs = get_context("fork").Pipe(duplex=False)
+    process = get_context("fork").Process(target=_work, args=(trial, limits, theirs, os.getpid(), folder), daemon=True)
+    process.start()
+    theirs.close()
+    return process, ours
+
+
+def _work(trial: Trial, limits: Limits, pipe: Connection, parent: int, folder: Path) -> None:
+    """Carry a trial out in this fork, and send what came of it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # of the terminal: the parent ends us
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    tempfile.tempdir = str(folder)
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    seconds = max(round(limits.cpu_s), 1)
+    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + _GRACE_S))
+    most = _mapped_bytes() + limits.memory_mb * _MB
+    resource.setrlimit(resource.RLIMIT_AS, (most, most))
+
+    def look() -> None:
+        if os.getppid() != parent:
+            raise RunFailedError("the program that began it has ended")
+
+    try:
+        found = run_trial(trial, look)
+    except MemoryError:
+        found = _error(f"it took more than {limits.memory_mb} MB")
+    except Exception as error:  # noqa: BLE001  # a bug there is an error of this trial, told by its name
+        found = _error(f"this is a bug: {type(error).__name__}: {error}")
+    with contextlib.suppress(OSError):  # nobody waits for it any more
+        pipe.send((found, round(_cpu_s(), 3)))
+    pipe.close()
+
+
+def _result(process: ForkProcess, pipe: Connection, limits: Limits) -> Done | None:
+    """Return what came of a process that has ended; None where it was killed from outside."""
+    done: Done | None = None
+    with contextlib.suppress(EOFError, ConnectionResetError):
+        done = pipe.recv()
+    pipe.close()
+    process.join()
+    if done is not None:
+        return done
+    code = process.exitcode or 0
+    if code in {-signal.SIGKILL, -signal.SIGTERM}:
+        return None
+    if code == -signal.SIGXCPU:
+        return _error(f"it took more than {limits.cpu_s:g} s of a processor"), limits.cpu_s
+    how = f"by {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
+    return _error(f"its process ended {how}"), 0.0
+
+
+def _error(why: str) -> Outcome:
+    return Outcome(verdict=Verdict.ERROR, failures=(why,))
+
+
+def _mapped_bytes() -> int:
+    """Return how much memory this process has mapped; 0 where the system does not tell."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+    except OSError:
+        return 0
+    return pages * resource.getpagesize()
+
+
+def _cpu_s() -> float:
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    return used.ru_utime + used.ru_stime

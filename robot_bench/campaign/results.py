@@ -1,0 +1,183 @@
+"""What a campaign leaves behind: a Parquet data set with a row a run, and a folder for each failure.
+
+    results/part-00001.parquet     the first batch: seed, parameters, outcome, margins, hashes, versions
+    failures/0007/dodge.toml       point 7 as a scenario with its files, for `p2os run`
+
+A part is written whole or not at all, and names the same rows whoever worked on them; the seconds of a processor and
+nothing else may differ.
+Invariant: what a failure's folder holds is what was run: its trace has the hash that the data set names.
+"""
+
+import hashlib
+import json
+import shlex
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from pathlib import Path
+
+from robot_bench.campaign.campaign_file import Campaign
+from robot_bench.campaign.conduct import Finding, Progress, Row, Run
+from robot_bench.campaign.last_moment import LastMoment
+from robot_bench.campaign.margin import goal_margin
+from robot_bench.campaign.space import Space
+from simbase.errors import FileError, MissingDependencyError
+
+RESULTS, FAILURES = "results", "failures"
+
+
+class Results:
+    """Writes what came of the batches.
+
+    Args:
+        folder: Of the campaign.
+        campaign: What is done.
+        space: What varies.
+
+    Raises:
+        MissingDependencyError: pyarrow is not installed.
+        FileError: The folder cannot be written.
+    """
+
+    def __init__(self, folder: Path, campaign: Campaign, space: Space) -> None:
+        try:
+            import pyarrow  # noqa: ICN001, F401 - whether it is there
+        except ImportError as error:
+            raise MissingDependencyError("results of campaigns need pyarrow", extra="campaign") from error
+        self.folder = folder
+        self._campaign = campaign
+        self._spans = {f"vary.{dimension.name}": dimension.span for dimension in space.dimensions}
+        self._parts = 0
+        try:
+            (folder / RESULTS).mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise FileError(f"cannot write {folder}: {error.strerror}", hint="--out another folder") from error
+
+    def add(self, rows: Sequence[Row]) -> None:
+        """Write a batch.
+
+        Raises:
+            FileError: The disk is full.
+        """
+        self._parts += 1
+        path = self.folder / RESULTS / f"part-{self._parts:05d}.parquet"
+        try:
+            self._write([self._entry(row, run) for row in rows for run in row.runs], path)
+            for row in rows:
+                if row.failing is not None:
+                    row.failing.trial.write(self.failure_folder(row))
+        except OSError as error:
+            raise FileError(f"cannot write {path}: {error.strerror}", hint="make room, then --resume") from error
+
+    def failure_folder(self, row: Row) -> Path:
+        """Return the folder of a point that failed."""
+        return self.folder / FAILURES / f"{row.number:04d}"
+
+    def replay(self, row: Row) -> str:
+        """Return the command that runs a failure again."""
+        name = row.proposal.trial(self._campaign.trial, ()).name
+        return shlex.join(["p2os", "run", str(self.failure_folder(row) / f"{name}.toml")])
+
+    def _entry(self, row: Row, run: Run) -> dict[str, object]:
+        outcome = run.outcome
+        firmware = run.trial.files[run.trial.firmware_name]
+        values: dict[str, object] = {
+            "number": row.number, "stage": run.stage.value, "finding": row.finding.value,
+            "verdict": outcome.verdict.value, "margin": run.margin, "seed": run.trial.seed,
+            "search": self._campaign.search, "campaign_seed": self._campaign.seed,
+            "trial_sha256": run.trial.sha256, "trace_sha256": outcome.sha256,
+            "firmware_sha256": hashlib.sha256(firmware).hexdigest(), "p2os": version("p2os"),
+            "virtual_s": outcome.virtual_ns / 1e9, "cpu_s": run.cpu_s, "distance_m": outcome.distance_m,
+            "clearance_m": outcome.clearance_m, "contacts": len(outcome.hits), "failures": list(outcome.failures),
+            "blocks": len(outcome.blocks), "states": len(outcome.lines), "new": row.new,
+            "obstacles": json.dumps(row.proposal.obstacles), "faults": json.dumps(row.proposal.faults),
+        }  # fmt: skip
+        for goal in outcome.goals:
+            key = f"margin.{goal.robot}.{goal.kind}" if goal.robot else f"margin.{goal.kind}"
+            found = goal_margin(goal, outcome)
+            values[key] = min(found, float(str(values[key]))) if key in values else found
+        return values | {name: row.proposal.values.get(name.removeprefix("vary.")) for name in self._spans}
+
+    def _write(self, entries: Sequence[dict[str, object]], path: Path) -> None:
+        """Write rows as one Parquet file, whole or not at all; every part has the same columns."""
+        import pyarrow as pa
+        from pyarrow import parquet
+
+        types = {"text": pa.string(), "number": pa.float64(), "whole": pa.int64(), "texts": pa.list_(pa.string())}
+        names = list(dict.fromkeys(name for entry in entries for name in entry))
+        schema = pa.schema([(name, types[self._type(name)]) for name in names])
+        rows = [{name: self._cast(name, entry.get(name)) for name in names} for entry in entries]
+        scratch = path.with_suffix(".part")
+        parquet.write_table(pa.Table.from_pylist(rows, schema=schema), scratch)
+        scratch.replace(path)
+
+    def _type(self, name: str) -> str:
+        """Return what a column holds."""
+        if name.startswith("margin."):
+            return "number"
+        if name not in self._spans:
+            return _TYPES.get(name, "text")
+        span = self._spans[name]
+        kinds = {type(value) for value in span.choices}
+        if kinds:
+            return "whole" if kinds == {int} else "number" if kinds <= {int, float} else "text"
+        return "whole" if span.is_whole else "number"
+
+    def _cast(self, name: str, value: object) -> object:
+        return value if value is None or self._type(name) != "text" else str(value)
+
+
+#: Columns that are no texts.
+_TYPES = {
+    **dict.fromkeys(("margin", "virtual_s", "cpu_s", "distance_m", "clearance_m"), "number"),
+    **dict.fromkeys(("number", "seed", "campaign_seed", "contacts", "blocks", "states", "new"), "whole"),
+    "failures": "texts",
+}  # fmt: skip
+
+
+@dataclass(slots=True, kw_only=True)
+class Whole:
+    """What came of a campaign."""
+
+    campaign: Campaign
+    space: Space
+    folder: Path
+    progress: Progress
+    results: Results
+    #: Number of a point → until when its failure was avoidable.
+    moments: dict[int, LastMoment] = field(default_factory=dict)
+    was_interrupted: bool = False
+
+    @property
+    def counts(self) -> Mapping[Finding, int]:
+        """How many points came to each finding."""
+        return Counter(row.finding for row in self.progress.rows)
+
+    @property
+    def failures(self) -> list[Row]:
+        """The points whose failure was proven."""
+        return self.progress.failures
+
+    def as_json(self) -> dict[str, object]:
+        """Return all that came of it; times of this machine left out."""
+        return {
+            "campaign": self.campaign.name,
+            "search": self.campaign.search,
+            "points": len(self.progress.rows),
+            "runs": self.progress.runs,
+            "virtual_s": self.progress.virtual_ns / 1e9,
+            "blocks": len(self.progress.blocks),
+            "states": len(self.progress.states),
+            "was_interrupted": self.was_interrupted,
+            "findings": {finding.value: self.counts.get(finding, 0) for finding in Finding},
+            "failures": [
+                {
+                    "number": row.number, "finding": row.finding.value, "failures": list(run.outcome.failures),
+                    "trace_sha256": run.outcome.sha256, "margin": run.margin, "parameters": dict(row.proposal.values),
+                    "avoidable": moment.words if (moment := self.moments.get(row.number)) else None,
+                    "replay": self.results.replay(row),
+                }
+                for row in self.failures if (run := row.failing) is not None
+            ],
+        }  # fmt: skip

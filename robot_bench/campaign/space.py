@@ -1,0 +1,166 @@
+"""The searched space: what a campaign file lets vary, as the unit cube, and the trial that stands at each point of it.
+
+A search proposes points with a coordinate from 0 up to 1 for each dimension; it knows nothing of scenarios. Drawn
+things have as many coordinates as the most of them need; those of things beyond the drawn count are without effect.
+
+Invariant: a point comes to the same trial on every machine.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import cast
+
+from p2os.pioneer.world import load_world
+from p2os.pioneer.world.model import Pose, World
+from robot_bench.campaign.campaign_file import Campaign, Disturbance, Drawn, Span
+from robot_bench.campaign.things import Room, Thing
+from robot_bench.campaign.trial import Trial, unpacked
+from robot_bench.scenario.included_files import Setting
+from robot_bench.scenario.schema import Table
+
+#: A coordinate for each dimension.
+Point = tuple[float, ...]
+#: Returns the value of a dimension, by its name, and notes that it has an effect.
+Value = Callable[[str, Span], object]
+_UNIT = Span(0.0, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Dimension:
+    """One coordinate: what it is called, and the values along it."""
+
+    name: str
+    span: Span
+
+
+@dataclass(frozen=True, slots=True)
+class Proposal:
+    """A point of the space with what stands there."""
+
+    point: Point
+    #: Dimension → value; those without effect at this point are left out.
+    values: Mapping[str, object]
+    settings: tuple[Setting, ...]
+    obstacles: tuple[Table, ...]
+    faults: tuple[Table, ...]
+
+    def trial(self, base: Trial, stage: Sequence[Setting]) -> Trial:
+        """Return the trial of this point, with what a stage sets."""
+        found = base.set(*stage, *self.settings)
+        lists: dict[str, Sequence[Table]] = {}
+        for name, more in (("obstacle", self.obstacles), ("fault", self.faults)):
+            if more:
+                lists[name] = [*cast("list[Table]", base.table.get(name, [])), *more]
+        return found.with_lists(**lists)
+
+
+class Space:
+    """The space of a campaign.
+
+    Raises:
+        ScenarioError: The world cannot be read.
+    """
+
+    def __init__(self, campaign: Campaign) -> None:
+        self._campaign = campaign
+        self.dimensions = tuple(_dimensions(campaign))
+        #: The floor of the world where nothing varies: least x, least y, greatest x and y, metres.
+        self.extent = self._place(())[0].extent
+
+    def proposal(self, point: Point) -> Proposal:
+        """Return what stands at a point."""
+        at = dict(zip((one.name for one in self.dimensions), point, strict=True))
+        campaign, values = self._campaign, dict[str, object]()
+
+        def value(name: str, span: Span) -> object:
+            if span.count == 1:
+                return span.value(0.0)
+            values[name] = found = span.value(at[name])
+            return found
+
+        settings = tuple((key, value(key, span)) for key, span in campaign.vary.items())
+        obstacles: Sequence[Table] = ()
+        if campaign.draws:
+            world, start = self._place(settings)
+            things = [thing for draw in campaign.draws for thing in _things(draw, world, value)]
+            room = Room(world, start, campaign.gap_m, campaign.free_m)
+            obstacles = room.tables(things)
+        faults = [
+            table for number, one in enumerate(campaign.disturbances, 1) for table in _faults(one, number, value, at)
+        ]
+        return Proposal(point, values, settings, tuple(obstacles), tuple(faults))
+
+    def _place(self, settings: Sequence[Setting]) -> tuple[World, Pose]:
+        """Return the world of a point, and where the robot begins in it."""
+        deciding = tuple((key, value) for key, value in settings if key in {"world", "seed"} or key.startswith("start"))
+        return _world_and_start(self._campaign.trial, deciding)
+
+
+def _world_and_start(trial: Trial, settings: tuple[Setting, ...]) -> tuple[World, Pose]:
+    changed = trial.set(*settings)
+    with unpacked(trial.files) as folder:
+        world = _world(
+            str(folder / name) if (name := str(changed.table["world"])) in trial.files else name, changed.seed
+        )
+    start = cast("Mapping[str, float]", changed.table.get("start", {}))
+    if not start:
+        return world, world.start
+    heading_rad = math.radians(start.get("heading_deg", 0.0))
+    return world, Pose(start.get("x_m", 0.0), start.get("y_m", 0.0), heading_rad)
+
+
+@lru_cache(maxsize=64)
+def _world(name: str, seed: int) -> World:
+    return load_world(name, seed=seed)
+
+
+def _dimensions(campaign: Campaign) -> list[Dimension]:
+    found = [Dimension(key, span) for key, span in campaign.vary.items()]
+    for draw in campaign.draws:
+        found.append(Dimension(f"{draw.name}.count", draw.count))
+        most = round(draw.count.high) if not draw.count.choices else max(int(str(one)) for one in draw.count.choices)
+        for number in range(1, most + 1):
+            name = f"{draw.name}-{number}"
+            found += [Dimension(f"{name}.x", _UNIT), Dimension(f"{name}.y", _UNIT)]
+            found.append(Dimension(f"{name}.heading_deg", draw.heading_deg))
+            found += [Dimension(f"{name}.{key}", span) for key, span in draw.measures.items()]
+    for number, one in enumerate(campaign.disturbances, 1):
+        name = f"disturb-{number}"
+        if one.share < 1:
+            found.append(Dimension(f"{name}.happens", _UNIT))
+        found.append(Dimension(f"{name}.at_s", one.at_s))
+        if one.for_s is not None:
+            found.append(Dimension(f"{name}.for_s", one.for_s))
+        found += [Dimension(f"{name}.{key}", span) for key, span in one.values.items()]
+    return [one for one in found if one.span.count != 1]
+
+
+def _things(draw: Drawn, world: World, value: Value) -> list[Thing]:
+    count = cast("int", value(f"{draw.name}.count", draw.count))
+    x0, y0, x1, y1 = draw.area_m or world.extent
+    found = []
+    for number in range(1, count + 1):
+        name = f"{draw.name}-{number}"
+        place = (
+            round(x0 + cast("float", value(f"{name}.x", _UNIT)) * (x1 - x0), 3),
+            round(y0 + cast("float", value(f"{name}.y", _UNIT)) * (y1 - y0), 3),
+            cast("float", value(f"{name}.heading_deg", draw.heading_deg)),
+        )
+        measures = {key: cast("float", value(f"{name}.{key}", span)) for key, span in draw.measures.items()}
+        found.append(Thing(name=name, kind=draw.kind, place=place, measures=measures))
+    return found
+
+
+def _faults(one: Disturbance, number: int, value: Value, at: Mapping[str, float]) -> list[Table]:
+    name = f"disturb-{number}"
+    if at.get(f"{name}.happens", 0.0) >= one.share:
+        return []
+    words = one.words
+    for key, span in one.values.items():
+        words = words.replace(f"{{{key}}}", str(value(f"{name}.{key}", span)))
+    table: dict[str, object] = {"at_s": value(f"{name}.at_s", one.at_s), "fault": words}
+    if one.for_s is not None:
+        table["for_s"] = value(f"{name}.for_s", one.for_s)
+    return [table]

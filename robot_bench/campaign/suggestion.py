@@ -1,0 +1,104 @@
+"""The campaign file that `p2os campaign new SCENARIO` writes: one that finds something with no editing.
+
+A robot that roams by itself meets things of every kind that a firmware may be blind to: thin posts, boxes, walls, dead
+ends and gaps, in the scenario's own world and from other starts. What it has to show is what any such robot has to:
+it touches nothing, keeps off things, and does not stay where a way is free.
+"""
+
+from string import Template
+
+from p2os.pioneer.world import load_world
+from p2os.toml_file import toml_value
+from robot_bench.scenario.scenario import Scenario
+from simbase.timing import NS_PER_S
+
+#: chosen: of a floor, what a robot may start in, as a share of each side.
+START_SHARE = 0.1
+#: chosen: seconds; a robot has turned at the first things by then, and a machine does a run in a second or two.
+LONGEST_S = 60.0
+
+TEMPLATE = Template("""\
+# What is searched: worlds in which the firmware of $scenario fails.
+#   p2os campaign $file                 docs/campaigns.md has all keys
+scenario = $scenario_name
+search = "sobol"        # grid, random, latin-hypercube, sobol, tpe, cma-es, quality-diversity, coverage
+
+[budget]
+runs = 200              # of the cheap kind
+confirmations = 40      # runs in full: of what failed, and of the nearest misses
+minutes = 10.0
+
+[limits]                # of one run
+cpu_s = 300.0
+memory_mb = 2000
+
+[cheap]                 # the runs that propose; any key of a scenario
+mode = $mode
+body = "kinematic"
+duration_s = $duration_s
+
+[full]                  # those that confirm
+mode = $mode
+body = $body
+duration_s = $duration_s
+
+[vary]                  # every key that --set takes: a range, with a step or without, or a list of values
+start.x_m = { from = $x0, to = $x1 }
+start.y_m = { from = $y0, to = $y1 }
+start.heading_deg = { from = 0, to = 355, step = 5 }
+
+[[draw]]                # things that stand in the way, each with a place and measures of its own
+kind = "post"
+count = { from = 0, to = 3 }
+
+[[draw]]
+kind = "box"
+count = { from = 0, to = 3 }
+
+[[draw]]
+kind = "wall"
+count = { from = 0, to = 2 }
+
+[[draw]]
+kind = "dead-end"
+count = { from = 0, to = 2 }
+
+[[goal]]                # what has to hold, in place of the scenario's own goals
+kind = "no_collision"
+ends_run = "missed"
+
+[[goal]]
+kind = "clearance"
+least_m = 0.1
+ends_run = "missed"
+
+[[goal]]                # it neither stands nor turns on the spot nor stays shut in
+kind = "moves_on"
+way_m = 0.5
+within_s = 20.0
+ends_run = "missed"
+""")
+
+
+def suggested(scenario: Scenario, scenario_name: str, file: str) -> str:
+    """Return the text of a campaign file for a scenario.
+
+    Args:
+        scenario: It can be run.
+        scenario_name: What the file is to call it: a name that ships, or its file as seen from the campaign's.
+        file: What the campaign's file will be called.
+
+    Raises:
+        WorldError: Its world cannot be read.
+    """
+    world = load_world(scenario.world, seed=scenario.seed)
+    start = scenario.start or world.start
+    x0, y0, x1, y1 = world.extent
+    dx, dy = (x1 - x0) * START_SHARE / 2, (y1 - y0) * START_SHARE / 2
+    return TEMPLATE.substitute(
+        scenario=scenario.name, scenario_name=toml_value(scenario_name), file=file,
+        duration_s=min(scenario.duration_ns / NS_PER_S, LONGEST_S), mode=toml_value(scenario.mode),
+        body=toml_value(scenario.body),
+        x0=round(start.x_m - dx, 2), x1=round(start.x_m + dx, 2),
+        y0=round(start.y_m - dy, 2), y1=round(start.y_m + dy, 2),
+    )  # fmt: skip

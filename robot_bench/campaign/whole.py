@@ -1,0 +1,125 @@
+"""A campaign from its file to its folder: begun, or gone on with after anything was killed.
+
+    dodge-001/dodge-campaign.toml   the campaign as it was begun, options of the command line included
+    dodge-001/scenario/             its scenario and all files that it names
+    dodge-001/journal.jsonl         every run that was done
+    dodge-001/results/              the data set; failures/ a folder each; report.html
+
+Invariant: the folder alone says what was done and is enough to go on, on another machine too.
+"""
+
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from p2os.errors import ScenarioError
+from p2os.toml_file import read_toml, read_user_text, toml_text
+from robot_bench.campaign.campaign_file import Campaign, load_campaign, parse_campaign
+from robot_bench.campaign.conduct import Conduct, Progress, Row, Workers
+from robot_bench.campaign.last_moment import LastMoment, last_moment
+from robot_bench.campaign.page import write_page
+from robot_bench.campaign.results import Results, Whole
+from simbase.errors import FileError, P2osError, UsageError
+from simbase.timing import Nanos
+
+SCENARIO = "scenario"
+SUMMARY = "summary.json"
+#: chosen: of so many failures it is found until when they were avoidable; each takes ten runs or so.
+MOST_MOMENTS = 3
+
+
+def begin(file: Path, folder: Path, *, firmware: Path | None, overrides: Mapping[str, object]) -> Campaign:
+    """Make a campaign's folder from its file.
+
+    Args:
+        file: The campaign file.
+        folder: New or empty.
+        firmware: Takes the place of the scenario's.
+        overrides: Keys of the file that are set otherwise; of a table, the keys in it.
+
+    Raises:
+        ScenarioError: The file breaks the schema.
+        UsageError: The folder is not empty, or cannot be written.
+    """
+    text = read_user_text(file, "a campaign", ScenarioError, hint="p2os campaign new SCENARIO writes one")
+    table = dict(read_toml(text, file.name, "a campaign", ScenarioError)[0])
+    for key, value in overrides.items():
+        held = table.get(key)
+        table[key] = {**held, **value} if isinstance(held, dict) and isinstance(value, dict) else value
+    found = parse_campaign(text if not overrides else toml_text(table), file, firmware=firmware)
+    if folder.is_dir() and any(folder.iterdir()):
+        raise UsageError(f"{folder} is not empty", hint=f"p2os campaign --resume {folder}, or another folder")
+    try:
+        scenario = found.trial.write(folder / SCENARIO)
+        kept = {key: value for key, value in table.items() if key not in {"firmware", "goal"}}
+        kept["scenario"] = f"{SCENARIO}/{scenario.name}"
+        (folder / f"{file.stem}.toml").write_text(toml_text(kept), encoding="utf-8")
+    except OSError as error:
+        raise UsageError(f"cannot write {folder}: {error.strerror}", hint="--out another folder") from error
+    return load_campaign(folder / f"{file.stem}.toml")
+
+
+def resume(folder: Path) -> Campaign:
+    """Return the campaign of a folder that was begun.
+
+    Raises:
+        FileError: It is none.
+    """
+    files = sorted(folder.glob("*.toml")) if folder.is_dir() else []
+    if len(files) != 1 or not (folder / SCENARIO).is_dir():
+        raise FileError(f"{folder} is no campaign's folder", hint="give the one that `p2os campaign FILE` made")
+    return load_campaign(files[0])
+
+
+def carry_out(
+    campaign: Campaign,
+    folder: Path,
+    workers: Workers,
+    *,
+    clock: Callable[[], Nanos],
+    on_run: Callable[[Progress], None] = lambda _: None,
+    look: Callable[[], None] = lambda: None,
+) -> Whole:
+    """Carry a campaign out in its folder; a KeyboardInterrupt ends it in good order.
+
+    Args:
+        campaign: As of `begin` or `resume`.
+        folder: Its folder.
+        workers: Who runs.
+        clock: Wall clock, nanoseconds.
+        on_run: Called after each run.
+        look: Called between slices of what this process runs itself.
+
+    Raises:
+        MissingDependencyError: A library is not installed.
+        FileError: The disk is full.
+    """
+    conduct = Conduct(campaign, folder, workers, clock=clock, on_run=on_run)
+    results = Results(folder, campaign, conduct.space)
+    whole = Whole(
+        campaign=campaign, space=conduct.space, folder=folder, progress=conduct.progress, results=results
+    )  # fmt: skip
+    try:
+        for rows in conduct.within_minutes():
+            results.add(rows)
+        for row in whole.failures[:MOST_MOMENTS]:
+            if row.failing is not None and (moment := _moment(row, look)) is not None:
+                whole.moments[row.number] = moment
+    except KeyboardInterrupt:
+        whole.was_interrupted = True
+    finally:
+        conduct.close()
+    write_page(whole.folder / "report.html", whole)
+    text = json.dumps(whole.as_json(), indent=2, sort_keys=True)
+    (folder / SUMMARY).write_text(f"{text}\n", encoding="utf-8")
+    return whole
+
+
+def _moment(row: Row, look: Callable[[], None]) -> LastMoment | None:
+    run = row.failing
+    if run is None:
+        return None
+    try:
+        return last_moment(run.trial, look)
+    except P2osError:  # several robots, or one on own pins
+        return None

@@ -1,0 +1,218 @@
+"""`p2os campaign`: searches for the worlds in which a firmware fails, and proves each that it finds."""
+
+import json
+import shlex
+import sys
+from pathlib import Path
+from typing import Annotated, Self
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
+from rich.progress import Progress as Bar
+
+from p2os.cli.help_pages import BENCH
+from p2os.cli.main import EXIT_INTERRUPTED
+from p2os.cli.quantities import option
+from p2os.transport.wall_clock import wall_clock
+from robot_bench.campaign.campaign_file import Campaign
+from robot_bench.campaign.conduct import Finding, Progress, Workers
+from robot_bench.campaign.processes import Processes
+from robot_bench.campaign.results import Whole
+from robot_bench.campaign.search import SEARCHES
+from robot_bench.campaign.suggestion import suggested
+from robot_bench.campaign.whole import begin, carry_out, resume
+from robot_bench.cli.progress import RunDisplay
+from robot_bench.cli.workers import core_count
+from robot_bench.recording.run_folder import make_next_folder
+from robot_bench.scenario.scenario import load_scenario
+from robot_bench.scenario.schema import nearest
+from simbase.errors import UsageError
+from simbase.units import COUNT
+
+HELP = """Search for worlds in which a firmware fails.
+
+A campaign file says what may vary, what has to hold, and how much may be
+spent. Cheap runs propose, runs in full confirm, and each failure was run again
+in another process with the same hash before it is told.
+
+Exit code: 0 nothing fails, 1 something does, 130 interrupted (--resume goes on).
+
+\b
+Examples:
+  p2os campaign new dodge                        write dodge-campaign.toml
+  p2os campaign dodge-campaign.toml -j 2         search
+  p2os campaign dodge-campaign.toml --firmware build/x.elf --runs 50
+  p2os campaign --resume campaigns/dodge-001     go on after anything was killed
+  p2os campaign big.toml --dask local -j 4       workers of Dask
+"""
+#: chosen: so many failures are told of one by one.
+MOST_TOLD = 12
+#: Where the folders of campaigns are made.
+CAMPAIGNS = Path("campaigns")
+
+
+def register(app: typer.Typer) -> None:
+    """Add the verb."""
+    app.command("campaign", help=HELP, rich_help_panel=BENCH)(campaign)
+
+
+def campaign(
+    words: Annotated[
+        list[str] | None, typer.Argument(help="A campaign file; or `new` and a scenario.", metavar="FILE|new SCENARIO")
+    ] = None,
+    jobs: Annotated[
+        int | None,
+        option(COUNT, "--jobs", "-j", purpose="Runs at a time; default as many as processors.", above_zero=True),
+    ] = None,
+    firmware: Annotated[
+        Path | None, typer.Option(help="ELF, HEX or BIN in place of the scenario's.", metavar="FILE")
+    ] = None,
+    search: Annotated[str | None, typer.Option(help="Who proposes.", metavar="SEARCH")] = None,
+    runs: Annotated[
+        int | None, option(COUNT, "--runs", purpose="Cheap runs, in place of the file's.", above_zero=True)
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Of the search.", metavar="SEED", min=0)] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder; default campaigns/NAME-NNN, or NAME-campaign.toml.", metavar="PATH")
+    ] = None,
+    go_on: Annotated[
+        Path | None, typer.Option("--resume", help="Go on with a campaign's folder.", metavar="FOLDER")
+    ] = None,
+    dask: Annotated[str | None, typer.Option(help="Workers of Dask on this machine.", metavar="local")] = None,
+    scheduler: Annotated[str | None, typer.Option(help="Dask's scheduler.", metavar="ADDRESS")] = None,
+    json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Conduct a campaign."""
+    asked = words or []
+    if asked[:1] == ["new"]:
+        write_new(asked[1:], out, firmware)
+        return
+    if dask not in {None, "local"}:
+        raise UsageError(f"there is no --dask {dask!r}", hint="--dask local, or --scheduler ADDRESS")
+    if dask and scheduler:
+        raise UsageError("--dask local and --scheduler cannot stand together", hint="leave one of the two out")
+    if search is not None and search not in SEARCHES:
+        raise UsageError(f"there is no search {search!r}", hint=nearest(search, list(SEARCHES)))
+    given: dict[str, object] = {"search": search, "seed": seed, "budget": None if runs is None else {"runs": runs}}
+    overrides = {key: value for key, value in given.items() if value is not None}
+    if go_on is not None:
+        if asked or overrides or firmware or out:
+            raise UsageError("--resume goes on with what was begun", hint="leave file and options out, but for -j")
+        folder, found = go_on, resume(go_on)
+    elif len(asked) == 1:
+        file = Path(asked[0])
+        folder = out or make_next_folder(file.stem, CAMPAIGNS)
+        found = begin(file, folder, firmware=firmware, overrides=overrides)
+    else:
+        raise UsageError("which campaign?", hint="p2os campaign FILE, or p2os campaign new SCENARIO")
+    with RunDisplay(is_shown=False) as display:
+        workers = _workers(found, jobs or core_count(), dask, scheduler, display)
+        try:
+            with Shown(found) as shown:
+                done = carry_out(
+                    found, folder, workers, clock=wall_clock, on_run=shown.update, look=display.raise_if_interrupted
+                )
+        finally:
+            workers.close()
+    tell(done, json_output=json_output)
+
+
+def write_new(words: list[str], out: Path | None, firmware: Path | None) -> None:
+    """Write a campaign file for a scenario.
+
+    Raises:
+        UsageError: No scenario is named, or the file is there.
+    """
+    if len(words) != 1:
+        raise UsageError("a campaign for which scenario?", hint="p2os campaign new dodge")
+    scenario = load_scenario(words[0], firmware=firmware)
+    path = out or Path(f"{scenario.name}-campaign.toml")
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(suggested(scenario, words[0], str(path)))
+    except FileExistsError as error:
+        raise UsageError(f"{path} is there already", hint="--out another file") from error
+    except OSError as error:
+        raise UsageError(f"cannot write {path}: {error.strerror}", hint="--out another file") from error
+    typer.echo(f"{path}: what may vary, what has to hold, how much may be spent")
+    again = "" if firmware is None else f" --firmware {shlex.quote(str(firmware))}"
+    typer.echo(f"next: p2os campaign {shlex.quote(str(path))}{again}")
+
+
+def _workers(found: Campaign, jobs: int, dask: str | None, scheduler: str | None, display: RunDisplay) -> Workers:
+    if dask or scheduler:
+        from robot_bench.campaign.dask_workers import DaskWorkers
+
+        workers = DaskWorkers(scheduler, jobs, found.limits, display.raise_if_interrupted)
+        typer.echo(f"Dask: {workers.where}", err=True)
+        return workers
+    return Processes(jobs, found.limits, display.raise_if_interrupted)
+
+
+class Shown:
+    """Tells on stderr how a campaign goes: a bar on a terminal, elsewhere a line each tenth."""
+
+    def __init__(self, found: Campaign) -> None:
+        self._whole, self._is_live = found.budget.runs, sys.stderr.isatty()
+        self._told = 0
+        self._bar = Bar(
+            TextColumn("points"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[said]}"),
+            console=Console(stderr=True), transient=True, auto_refresh=False, disable=not self._is_live,
+        )  # fmt: skip
+        self._task = self._bar.add_task("", total=self._whole, said="")
+
+    def __enter__(self) -> Self:
+        self._bar.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.stop()
+
+    def update(self, progress: Progress) -> None:
+        """Show where the campaign stands."""
+        points, failures = len(progress.rows), len(progress.failures)
+        said = f"{progress.runs} runs, {failures} failures, {len(progress.blocks)} blocks"
+        if self._is_live:
+            self._bar.update(self._task, completed=points, said=said, refresh=True)
+        elif points * 10 // self._whole > self._told:
+            self._told = points * 10 // self._whole
+            typer.echo(f"{points} of {self._whole} points: {said}", err=True)
+
+
+def tell(done: Whole, *, json_output: bool) -> None:
+    """Print what came of a campaign, and end the command with its exit code."""
+    if json_output:
+        typer.echo(json.dumps(done.as_json(), sort_keys=True))
+    else:
+        print_whole(done)
+    if done.was_interrupted:
+        raise typer.Exit(EXIT_INTERRUPTED)
+    if done.failures:
+        raise typer.Exit(1)
+
+
+def print_whole(done: Whole) -> None:
+    """Print the failures, each with the command that runs it again, what else was found, and the sum."""
+    for row in done.failures[:MOST_TOLD]:
+        run = row.failing
+        if run is None:
+            continue
+        typer.echo(f"failed  point {row.number}, {row.finding.value}: {next(iter(run.outcome.failures), '')}")
+        moment = done.moments.get(row.number)
+        if moment is not None:
+            typer.echo(f"        {moment.words}")
+        typer.echo(f"        {done.results.replay(row)}")
+    if len(done.failures) > MOST_TOLD:
+        typer.echo(f"and {len(done.failures) - MOST_TOLD} more; {done.folder / 'failures'} has all")
+    for row in [row for row in done.progress.rows if row.finding in {Finding.ERROR, Finding.NOT_REPEATED}][:MOST_TOLD]:
+        why = next((run.outcome.failures[0] for run in row.runs if run.outcome.failures), "")
+        typer.echo(f"{row.finding.value}  point {row.number}: {why}")
+    counts = [f"{done.counts[finding]} {finding.value}" for finding in Finding if done.counts.get(finding)]
+    progress = done.progress
+    typer.echo(f"report  {done.folder / 'report.html'}")
+    again = " (interrupted: --resume goes on)" if done.was_interrupted else ""
+    typer.echo(
+        f"{', '.join(counts) or 'nothing'} of {len(progress.rows)} points, {progress.runs} runs, "
+        f"{progress.virtual_ns / 3.6e12:.2f} h of virtual time, {progress.cpu_s:.0f} s of processors{again}"
+    )

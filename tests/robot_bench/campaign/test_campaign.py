@@ -1,0 +1,328 @@
+"""A campaign from its file to its folder, with runs of seconds: the same set whatever happens on the way."""
+
+import itertools
+import os
+import random
+import signal
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import pytest
+
+from p2os.errors import ScenarioError
+from robot_bench.campaign.campaign_file import Campaign, Limits, load_campaign
+from robot_bench.campaign.conduct import Conduct, Finding
+from robot_bench.campaign.processes import Processes
+from robot_bench.campaign.search import SEARCHES, Answer, Problem
+from robot_bench.campaign.trial import GoalResult, Outcome, Trial, Verdict, run_trial, trial_of
+from robot_bench.campaign.whole import Whole, begin, carry_out, resume
+from simbase.errors import FileError, UsageError
+
+FILE = """
+scenario = "dodge"
+search = "random"
+batch = 4
+[budget]
+runs = 12
+confirmations = 6
+[cheap]
+duration_s = 4
+[full]
+duration_s = 4
+body = "kinematic"
+[vary]
+start.heading_deg = { from = 0, to = 350, step = 10 }
+threshold_m = [0.4, 0.6]
+[[draw]]
+kind = "post"
+count = { from = 0, to = 2 }
+[[goal]]
+kind = "no_collision"
+"""
+
+Done = tuple[Outcome, float]
+
+
+def made_up(trial: Trial) -> Outcome:
+    """Return an outcome that depends on the trial alone: a quarter of them fails, in both fidelities."""
+    number = int(trial.sha256[:8], 16)
+    obstacles = len(trial.table.get("obstacle", ()))  # type: ignore[arg-type]  # a list
+    failed = obstacles == 2
+    goal = GoalResult(
+        kind="clearance", wanted="keeps off", met=not failed, says="", robustness=-0.1 if failed else 0.2, unit="m"
+    )
+    return Outcome(
+        verdict=Verdict.FAILED if failed else Verdict.PASSED, goals=(goal,), failures=("clearance: ",) * failed,
+        virtual_ns=10**9, sha256=f"{number:08x}", way_mm=((0, 0), (number % 1000, 0)),
+        blocks=frozenset(range(number % 7)),
+    )  # fmt: skip
+
+
+class Shuffled:
+    """Workers that end in any order; after so many runs they are interrupted."""
+
+    def __init__(self, seed: int, until: int = 10**6, judge: Callable[[Trial], Outcome] = made_up) -> None:
+        self._random, self._left, self._judge = random.Random(seed), until, judge
+        self.count = 0
+
+    def run(self, trials: Sequence[Trial], on_done: Callable[[int, Done], None]) -> None:
+        places = list(range(len(trials)))
+        self._random.shuffle(places)
+        for place in places:
+            if self.count == self._left:
+                raise KeyboardInterrupt
+            self.count += 1
+            on_done(place, (self._judge(trials[place]), 0.5))
+
+    def close(self) -> None:
+        """Nothing is to be ended."""
+
+
+def begun(folder: Path, text: str = FILE, **overrides: object) -> Campaign:
+    file = folder / "mine.toml"
+    file.write_text(text)
+    return begin(file, folder / "kept", firmware=None, overrides=overrides)
+
+
+def carried(campaign: Campaign, folder: Path, workers: Shuffled) -> Whole:
+    ticks = itertools.count()
+    return carry_out(campaign, folder, workers, clock=lambda: next(ticks))
+
+
+def set_of(whole: Whole) -> list[tuple[object, ...]]:
+    return [
+        (row.number, row.finding, row.proposal.point, *((run.stage, run.outcome.sha256) for run in row.runs))
+        for row in whole.progress.rows
+    ]
+
+
+#: Loading the library takes seconds; ribs compiles itself besides.
+SLOW = {"tpe", "cma-es", "quality-diversity"}
+
+
+@pytest.mark.parametrize(
+    "search", [pytest.param(name, marks=[pytest.mark.slow] if name in SLOW else []) for name in sorted(SEARCHES)]
+)
+def test_every_search_asks_the_same_for_the_same_seed_in_whatever_order_the_runs_end(
+    search: str, tmp_path: Path
+) -> None:
+    sets = []
+    for number in (1, 2):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        whole = carried(begun(folder, search=search), folder / "kept", Shuffled(number))
+        sets.append(set_of(whole))
+        assert whole.failures
+    assert sets[0] == sets[1]
+    assert len(sets[0]) in range(8, 13)
+    points = [row[2] for row in sets[0]]
+    assert all(0 <= at < 1 for point in points for at in point)  # type: ignore[attr-defined]  # a point
+
+
+@pytest.mark.parametrize("until", [0, 1, 4, 5, 9, 14])
+def test_a_campaign_that_was_interrupted_goes_on_to_the_same_set(until: int, tmp_path: Path) -> None:
+    for name in ("whole", "cut"):
+        (tmp_path / name).mkdir()
+    expected = carried(begun(tmp_path / "whole"), tmp_path / "whole/kept", Shuffled(1))
+    cut = carried(begun(tmp_path / "cut"), tmp_path / "cut/kept", Shuffled(1, until))
+    assert cut.was_interrupted
+    workers = Shuffled(3)
+    went_on = carried(resume(tmp_path / "cut/kept"), tmp_path / "cut/kept", workers)
+    assert set_of(went_on) == set_of(expected)
+    assert went_on.progress.resumed == until
+    assert workers.count == expected.progress.runs - until
+
+
+def test_a_line_of_the_journal_that_was_cut_is_done_again(tmp_path: Path) -> None:
+    expected = set_of(carried(begun(tmp_path), tmp_path / "kept", Shuffled(1)))
+    journal = tmp_path / "kept/journal.jsonl"
+    whole = journal.read_bytes()
+    lines = whole.count(b"\n")
+    for length in (1, len(whole) // 2, len(whole) - 1):
+        journal.write_bytes(whole[:length])
+        workers = Shuffled(2)
+        assert set_of(carried(resume(tmp_path / "kept"), tmp_path / "kept", workers)) == expected
+        assert workers.count == lines - whole[:length].count(b"\n")
+        assert journal.read_bytes().count(b"\n") == lines
+
+
+def test_a_failure_whose_replay_has_another_hash_is_not_reported(tmp_path: Path) -> None:
+    seen: dict[str, int] = {}
+
+    def fickle(trial: Trial) -> Outcome:
+        found, key = made_up(trial), trial.sha256
+        seen[key] = seen.get(key, 0) + 1
+        return found if seen[key] == 1 else Outcome(verdict=Verdict.FAILED, sha256="another")
+
+    whole = carried(begun(tmp_path), tmp_path / "kept", Shuffled(1, judge=fickle))
+    assert whole.failures == []
+    assert whole.counts[Finding.NOT_REPEATED] > 0
+    assert not (tmp_path / "kept/failures").exists()
+
+
+def test_what_the_cheap_run_alone_sees_is_no_failure(tmp_path: Path) -> None:
+    def optimist(trial: Trial) -> Outcome:
+        return Outcome(verdict=Verdict.PASSED, sha256="1") if trial.table["mode"] == "adapter" else made_up(trial)
+
+    whole = carried(begun(tmp_path), tmp_path / "kept", Shuffled(1, judge=optimist))
+    assert whole.failures == []
+    assert whole.counts[Finding.CHEAP_ONLY] > 0
+
+
+def test_confirmations_end_with_their_budget(tmp_path: Path) -> None:
+    whole = carried(begun(tmp_path, budget={"confirmations": 1}), tmp_path / "kept", Shuffled(1))
+    assert sum(row.full is not None for row in whole.progress.rows) == 1
+    assert whole.counts[Finding.UNCONFIRMED] > 0
+
+
+def test_each_failure_is_a_folder_that_runs_again_with_its_hash(tmp_path: Path) -> None:
+    whole = carried(begun(tmp_path), tmp_path / "kept", Shuffled(1))
+    row = whole.failures[0]
+    file = whole.results.failure_folder(row) / "dodge.toml"
+    assert whole.results.replay(row) == f"p2os run {file}"
+    assert row.failing is not None
+    assert trial_of(str(file)).sha256 == row.failing.trial.sha256
+
+
+def test_the_data_set_has_a_row_a_run_and_the_page_names_every_failure(tmp_path: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    whole = carried(begun(tmp_path), tmp_path / "kept", Shuffled(1))
+    table = parquet.read_table(tmp_path / "kept/results").to_pylist()
+    assert len(table) == sum(len(row.runs) for row in whole.progress.rows)
+    failed = {entry["number"] for entry in table if entry["finding"] in {"confirmed", "full only"}}
+    assert failed == {row.number for row in whole.failures}
+    assert {entry["stage"] for entry in table} == {"cheap", "full", "replay"}
+    assert all(entry["vary.threshold_m"] in {0.4, 0.6} for entry in table)
+    page = (tmp_path / "kept/report.html").read_text()
+    assert all(f"point {number}</b>" in page for number in failed)
+
+
+WRONG = {
+    'search = "random"': ('search = "genetic"', "genetic"),
+    "threshold_m = [0.4, 0.6]": ("treshold_m = [0.4, 0.6]", "did you mean 'threshold_m'?"),
+    'kind = "post"': ('kind = "pots"', "did you mean 'post'?"),
+    "[[draw]]": ("[[drow]]", "did you mean 'draw'?"),
+    "count = { from = 0, to = 2 }": ("count = { from = 2, to = 0 }", "to is below from"),
+    "runs = 12": ("runs = 0", "at least 1"),
+    'kind = "no_collision"': ('kind = "no_colision"', "did you mean 'no_collision'?"),
+    'scenario = "dodge"': ('scenario = "doge"', "did you mean 'dodge'?"),
+    'body = "kinematic"': ('bodies = "kinematic"', "bodies"),
+}
+
+
+@pytest.mark.parametrize("right", WRONG)
+def test_what_is_wrong_in_a_file_is_told_with_a_hint(right: str, tmp_path: Path) -> None:
+    wrong, words = WRONG[right]
+    file = tmp_path / "mine.toml"
+    file.write_text(FILE.replace(right, wrong, 1))
+    with pytest.raises(ScenarioError) as caught:
+        load_campaign(file)
+    assert words in f"{caught.value} ({caught.value.hint})"
+    assert "mine.toml" in str(caught.value)
+
+
+def test_a_folder_that_is_taken_and_one_that_is_none_are_refused(tmp_path: Path) -> None:
+    begun(tmp_path)
+    with pytest.raises(UsageError, match="is not empty"):
+        begun(tmp_path)
+    with pytest.raises(FileError, match="is no campaign's folder"):
+        resume(tmp_path)
+
+
+def test_a_grid_takes_every_step_of_what_has_steps_and_as_many_as_may_be_of_the_rest() -> None:
+    problem = Problem(counts=(3, 0), is_ordered=(True, True), runs=13, batch=4, seed=0)
+    points = SEARCHES["grid"](problem).ask(100)
+    assert len(points) == len(set(points)) == 12
+    assert {point[0] for point in points} == {0.5 / 3, 1.5 / 3, 2.5 / 3}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("search", ["cma-es", "tpe"])
+def test_a_search_that_learns_comes_nearer_than_chance(search: str) -> None:
+    problem = Problem(counts=(0,) * 5, is_ordered=(True,) * 5, runs=160, batch=16, seed=3)
+
+    def least(name: str) -> float:
+        asked, found = SEARCHES[name](problem), []
+        for _ in range(10):
+            margins = [sum((at - 0.8) ** 2 for at in point) for point in asked.ask(16)]
+            asked.tell([Answer(margin=one) for one in margins])
+            found += margins
+        return min(found)
+
+    assert least(search) < least("random") / 2
+
+
+def test_coverage_varies_what_reached_something_new() -> None:
+    problem = Problem(counts=(0,) * 8, is_ordered=(True,) * 8, runs=400, batch=8, seed=1)
+
+    def reached(name: str) -> int:
+        asked, seen = SEARCHES[name](problem), set[object]()
+        for _ in range(40):
+            points = asked.ask(8)
+            steps = [
+                frozenset(range(sum(at > 0.8 for at in itertools.takewhile(lambda x: x > 0.8, p)))) for p in points
+            ]
+            asked.tell([Answer(margin=1.0, reached=frozenset(step)) for step in steps])
+            seen |= frozenset().union(*steps)
+        return len(seen)
+
+    assert reached("coverage") > reached("random")
+
+
+# Processes of this machine.
+
+
+@pytest.fixture(scope="module")
+def trials() -> list[Trial]:
+    base = trial_of("dodge", settings=[("body", "kinematic"), ("mode", "direct"), ("duration_s", 1)])
+    return [base.set(("start.x_m", at / 10), ("start.y_m", 0.0)) for at in range(3)]
+
+
+def outcomes(workers: Processes, trials: Sequence[Trial]) -> dict[int, Outcome]:
+    found: dict[int, Outcome] = {}
+    workers.run(trials, lambda place, done: found.update({place: done[0]}))
+    return found
+
+
+def test_a_process_comes_to_what_this_one_comes_to(trials: list[Trial]) -> None:
+    found = outcomes(Processes(2, Limits()), trials)
+    assert [found[place].sha256 for place in range(3)] == [run_trial(trial).sha256 for trial in trials]
+
+
+def test_a_process_that_was_killed_is_begun_again(trials: list[Trial], tmp_path: Path, monkeypatch) -> None:  # type: ignore[no-untyped-def]
+    from robot_bench.campaign import processes
+
+    def dies_once(trial: Trial, look: Callable[[], None]) -> Outcome:
+        mark = tmp_path / trial.sha256
+        if not mark.exists():
+            mark.touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return run_trial(trial, look)
+
+    monkeypatch.setattr(processes, "run_trial", dies_once)
+    found = outcomes(Processes(2, Limits()), trials)
+    assert [found[place].verdict for place in range(3)] == [run_trial(trial).verdict for trial in trials]
+    assert len(list(tmp_path.iterdir())) == 3
+
+
+@pytest.mark.slow
+def test_a_run_that_takes_too_much_is_an_error_that_names_the_limit(trials: list[Trial], monkeypatch) -> None:  # type: ignore[no-untyped-def]
+    from robot_bench.campaign import processes
+
+    def greedy(trial: Trial, look: Callable[[], None]) -> Outcome:
+        return Outcome(verdict=Verdict.PASSED, sha256=str(len(bytearray(10**9))))
+
+    def endless(trial: Trial, look: Callable[[], None]) -> Outcome:
+        while True:
+            pass
+
+    for job, words in ((greedy, "it took more than 64 MB"), (endless, "it took more than 1 s of a processor")):
+        monkeypatch.setattr(processes, "run_trial", job)
+        found = outcomes(Processes(1, Limits(cpu_s=1, memory_mb=64)), trials[:1])
+        assert (found[0].verdict, found[0].failures) == (Verdict.ERROR, (words,))
+
+
+def test_conduct_ends_after_the_batch_in_which_its_virtual_hours_are_spent(tmp_path: Path) -> None:
+    campaign = begun(tmp_path, budget={"virtual_hours": 3 / 3600})
+    conduct = Conduct(campaign, tmp_path / "kept", Shuffled(1), clock=lambda: 0)
+    assert len(conduct.run().rows) == 4
