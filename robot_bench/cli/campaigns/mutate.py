@@ -19,9 +19,9 @@ from bluepill_sim.program.mutants import Mutant, mutants, mutated_file
 from p2os.cli.help_pages import BENCH
 from p2os.cli.main import EXIT_INTERRUPTED
 from p2os.cli.quantities import option
-from robot_bench.campaign.mutation.base_run import BaseRun, base_run
-from robot_bench.campaign.mutation.report import Mutation, as_json, report_lines, write_junit
-from robot_bench.campaign.mutation.trial import Found, try_mutant
+from robot_bench.campaign.variants.mutation.base_run import BaseRun, base_run
+from robot_bench.campaign.variants.mutation.report import Mutation, as_json, report_lines, write_junit
+from robot_bench.campaign.variants.mutation.trial import Found, try_mutant
 from robot_bench.cli.progress import RunDisplay
 from robot_bench.cli.sweep import refuse_junit
 from robot_bench.cli.workers import core_count, run_in_processes

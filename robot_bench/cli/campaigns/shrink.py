@@ -8,9 +8,9 @@ import typer
 
 from p2os.cli.help_pages import BENCH
 from p2os.cli.quantities import option
-from robot_bench.campaign.shrinking.kept import Kept, keep, trial_of_run
-from robot_bench.campaign.shrinking.shrink import BUDGET, Shrunk, shrink
 from robot_bench.campaign.trial import Trial, trial_of
+from robot_bench.campaign.variants.shrinking.kept import Kept, keep, trial_of_run
+from robot_bench.campaign.variants.shrinking.shrink import BUDGET, Shrunk, shrink
 from robot_bench.cli.progress import RunDisplay
 from robot_bench.recording.run_record import TRACE_NAME
 from robot_bench.scenario.included_files import Setting, read_setting

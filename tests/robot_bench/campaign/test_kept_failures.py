@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from p2os.cli import main as cli
-from robot_bench.campaign.shrinking.failure import Way
-from robot_bench.campaign.shrinking.kept import test_text as text_of_test
-from robot_bench.campaign.shrinking.kept import trial_of_run
 from robot_bench.campaign.trial import run_trial, trial_of
+from robot_bench.campaign.variants.shrinking.failure import Way
+from robot_bench.campaign.variants.shrinking.kept import test_text as text_of_test
+from robot_bench.campaign.variants.shrinking.kept import trial_of_run
 
 #: Half a metre before a wall, with sensors that see a hand's breadth: it touches the wall 6 s after its start.
 BLIND = """

@@ -14,8 +14,8 @@ from bluepill_sim.program.image import load_image
 from bluepill_sim.program.mutants import Mutant, mutants, mutated_file
 from p2os.cli import main as cli
 from robot_bench.bench import Bench
-from robot_bench.campaign.mutation.base_run import BaseRun, base_run
-from robot_bench.campaign.mutation.trial import Fate, Found, try_mutant
+from robot_bench.campaign.variants.mutation.base_run import BaseRun, base_run
+from robot_bench.campaign.variants.mutation.trial import Fate, Found, try_mutant
 from robot_bench.scenario.scenario import load_scenario
 from tests.bluepill_sim.machine import Assembler
 from tests.robot_bench.firmware import thumb

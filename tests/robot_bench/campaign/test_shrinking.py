@@ -7,10 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robot_bench.campaign.shrinking.failure import Failure, Way, failure_of
-from robot_bench.campaign.shrinking.reduction import ANGLE_STEPS, STEPS, fewest, rounded, rounder
-from robot_bench.campaign.shrinking.shrink import Judge, NoFailureError, shrink
-from robot_bench.campaign.shrinking.things import (
+from robot_bench.campaign.trial import Trial, run_trial, trial_of
+from robot_bench.campaign.variants.shrinking.failure import Failure, Way, failure_of
+from robot_bench.campaign.variants.shrinking.reduction import ANGLE_STEPS, STEPS, fewest, rounded, rounder
+from robot_bench.campaign.variants.shrinking.shrink import Judge, NoFailureError, shrink
+from robot_bench.campaign.variants.shrinking.things import (
     numbers,
     things,
     with_numbers,
@@ -18,7 +19,6 @@ from robot_bench.campaign.shrinking.things import (
     with_world,
     world_table,
 )
-from robot_bench.campaign.trial import Trial, run_trial, trial_of
 from simbase.timing import NS_PER_S, Nanos
 
 #: chosen: what no trial of these tests needs more of.

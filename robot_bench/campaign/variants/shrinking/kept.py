@@ -24,9 +24,9 @@ from typing import cast
 
 from p2os.pioneer.world import known_worlds, load_world
 from p2os.pioneer.world.writer import write_world
-from robot_bench.campaign.shrinking.failure import Way
-from robot_bench.campaign.shrinking.things import WORLD_NAME
 from robot_bench.campaign.trial import Outcome, Trial, Verdict, run_trial, trial_of
+from robot_bench.campaign.variants.shrinking.failure import Way
+from robot_bench.campaign.variants.shrinking.things import WORLD_NAME
 from robot_bench.recording.run_record import RunRecord, read_run
 from robot_bench.report.explain.explain import explain
 from robot_bench.scenario.schema import Table

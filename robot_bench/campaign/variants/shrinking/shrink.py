@@ -15,9 +15,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import cast
 
-from robot_bench.campaign.shrinking.failure import Failure, Way, failure_of
-from robot_bench.campaign.shrinking.reduction import ANGLE_STEPS, STEPS, fewest, rounded, rounder
-from robot_bench.campaign.shrinking.things import (
+from robot_bench.campaign.trial import Trial
+from robot_bench.campaign.variants.shrinking.failure import Failure, Way, failure_of
+from robot_bench.campaign.variants.shrinking.reduction import ANGLE_STEPS, STEPS, fewest, rounded, rounder
+from robot_bench.campaign.variants.shrinking.things import (
     Number,
     Thing,
     numbers,
@@ -26,7 +27,6 @@ from robot_bench.campaign.shrinking.things import (
     with_things,
     with_world,
 )
-from robot_bench.campaign.trial import Trial
 from robot_bench.scenario.included_files import Setting
 from robot_bench.scenario.schema import Table
 from simbase.errors import P2osError

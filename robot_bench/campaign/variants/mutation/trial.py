@@ -14,7 +14,7 @@ from typing import cast
 
 from bluepill_sim.program.mutants import Mutant
 from p2os.transport.wall_clock import Clock
-from robot_bench.campaign.mutation.base_run import BaseRun
+from robot_bench.campaign.variants.mutation.base_run import BaseRun
 from robot_bench.events.codec import Json
 from robot_bench.events.kinds import Event, Verdict
 from simbase.errors import P2osError
