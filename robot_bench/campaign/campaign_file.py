@@ -76,6 +76,8 @@ DRAW = (
     Key(name="count", kind="whole", least=0, most=64),
     Key(name="area_m", kind="list"),
     Key(name="heading_deg", kind="number", least=-36_000, most=36_000),
+    Key(name="ahead_m", kind="number", least=-1000, most=1000),
+    Key(name="aside_m", kind="number", least=-1000, most=1000),
     *(
         Key(name=name, kind="number", above=0, most=1000)
         for name in sorted({name for kind in KINDS.values() for name in kind.measures})
@@ -92,10 +94,10 @@ TABLES: Mapping[str, tuple[Key, ...]] = {
     "": TOP, "[budget]": BUDGET, "[limits]": LIMITS, "[[draw]]": DRAW, "[[disturb]]": DISTURB,
 }  # fmt: skip
 #: What the runs that propose set, and those that confirm, where the file says nothing.
-CHEAP: Table = {"mode": "direct", "body": "kinematic"}
-FULL: Table = {"mode": "adapter"}
+CHEAP: Table = {"body": "kinematic"}
+FULL: Table = {}
 #: chosen: of a drawn place, how far from the start's middle it is free: the hull turns within 0.32 m.
-FREE_M = 0.5
+FREE_M = 0.45
 #: chosen: a robot of 0.38 m passes with room on both sides.
 GAP_M = 0.9
 
@@ -145,6 +147,9 @@ class Drawn:
     count: Span
     #: Least x, least y, greatest x and y, metres; None: the floor of the world.
     area_m: tuple[float, float, float, float] | None
+    #: Of a thing that is placed as seen from the robot at its start: ahead of it and to its left; None: in the area.
+    seen: tuple[Span, Span] | None
+    #: In the world; of a thing seen from the robot 0 turns its opening, its length or its way towards the robot.
     heading_deg: Span
     measures: Mapping[str, Span]
 
@@ -241,7 +246,8 @@ def parse_campaign(text: str, path: Path, *, firmware: Path | None = None) -> Ca
         tuple((key, value) for key, value, _ in _leaves({**defaults, **cast("Table", table.get(name, {}))}, "", where))
         for name, defaults in (("cheap", CHEAP), ("full", FULL))
     )
-    if disturbances and dict(cheap)["mode"] == "direct":
+    mode = dict(cheap).get("mode", trial.table.get("mode"))
+    if disturbances and mode == "direct":
         raise ScenarioError(
             f"{within(where, 'disturb', 0)}: a fault acts on the robot's controller, and mode direct has none",
             hint='[cheap] mode = "adapter"',
@@ -332,33 +338,45 @@ def _draws(tables: Sequence[Table], where: Place) -> tuple[Drawn, ...]:
     found: list[Drawn] = []
     for number, table in enumerate(tables):
         place = within(where, "draw", number)
-        plain = {key: _middle(value, f"{place}: {key}") if key in _SPANNED else value for key, value in table.items()}
-        check_table(plain, DRAW, place)
+        for end in (0.0, 1.0):
+            plain = {
+                key: _span(value, f"{place}: {key}").value(end) if key in _SPANNED else value
+                for key, value in table.items()
+            }
+            check_table(plain, DRAW, place)
         kind = str(table["kind"])
         spans = {key: _span(value, f"{place}: {key}") for key, value in table.items() if key in _SPANNED}
         known = KINDS[kind].measures
-        strange = next((key for key in spans if key not in known and key not in {"count", "heading_deg"}), None)
+        strange = next((key for key in spans if key not in {*known, *_PLACING}), None)
         if strange is not None:
             raise ScenarioError(f"{place}: a {kind} has no {strange}", hint=nearest(strange, list(known)))
         name = str(table.get("name", kind))
         if name in [one.name for one in found]:
             raise ScenarioError(f"{place}: there is another {shown(name)}", hint='name = "…" tells them apart')
+        ahead, aside = spans.pop("ahead_m", None), spans.pop("aside_m", Span(0.0, 0.0))
+        if ahead is None and "aside_m" in table:
+            raise ScenarioError(f"{place}: aside_m without ahead_m", hint="ahead_m = { from = 0.8, to = 2.0 }")
+        if ahead is not None and "area_m" in table:
+            raise ScenarioError(f"{place}: area_m beside ahead_m", hint="leave one of the two out")
         found.append(Drawn(
+            seen=None if ahead is None else (ahead, aside),
             name=name, kind=kind, count=spans.pop("count", Span(1, 1, is_whole=True)),
-            area_m=_area(table.get("area_m"), place), heading_deg=spans.pop("heading_deg", Span(0.0, 360.0)),
+            area_m=_area(table.get("area_m"), place),
+            heading_deg=spans.pop("heading_deg", Span(0.0, 360.0) if ahead is None else Span(-30.0, 30.0)),
             measures={key: spans.get(key, Span(low, high)) for key, (low, high) in known.items()},
         ))  # fmt: skip
     return tuple(found)
 
 
 #: Keys of `[[draw]]` that take a range.
+_PLACING = frozenset({"count", "heading_deg", "ahead_m", "aside_m"})
 _SPANNED = frozenset(key.name for key in DRAW if key.kind in {"number", "whole"})
 
 
 def _disturbance(table: Table, where: Where) -> Disturbance:
     named = {key: value for key, value in table.items() if f"{{{key}}}" in str(table.get("fault", ""))}
     plain = {
-        key: _middle(value, f"{where}: {key}") if key in {"at_s", "for_s"} else value
+        key: _span(value, f"{where}: {key}").value(0.5) if key in {"at_s", "for_s"} else value
         for key, value in table.items() if key not in named
     }  # fmt: skip
     check_table(plain, DISTURB, where)
@@ -377,11 +395,6 @@ def _area(value: object, where: Where) -> tuple[float, float, float, float] | No
     if len(numbers) != 4 or numbers[0] >= numbers[2] or numbers[1] >= numbers[3]:
         raise ScenarioError(f"{where}: area_m must be [least x, least y, greatest x, greatest y]")
     return numbers[0], numbers[1], numbers[2], numbers[3]
-
-
-def _middle(value: object, where: str) -> object:
-    """Return a value of a range for the check of its key."""
-    return _span(value, where).value(0.5)
 
 
 def _span(value: object, where: str) -> Span:

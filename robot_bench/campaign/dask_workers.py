@@ -24,6 +24,8 @@ from simbase.errors import MissingDependencyError, UsageError
 LOOK_S = 0.1
 #: chosen: so long a scheduler may be away, and workers may be missing, seconds.
 PATIENCE_S = 120.0
+#: chosen: so long one waits for a scheduler at first, seconds.
+BEGIN_S = 10.0
 #: chosen: so often a trial is submitted whose workers die one after the other.
 MOST_TRIES = 4
 _MB = 1 << 20
@@ -61,7 +63,7 @@ class DaskWorkers:
                 memory_limit=limits.memory_mb * _MB, host="127.0.0.1",
             )  # fmt: skip
         self._address = address or self._cluster.scheduler_address
-        self._client = self._connected(patience_s=10.0)
+        self._client = self._connected(patience_s=BEGIN_S)
 
     @property
     def where(self) -> str:

@@ -25,6 +25,8 @@ Point = tuple[float, ...]
 #: Returns the value of a dimension, by its name, and notes that it has an effect.
 Value = Callable[[str, Span], object]
 _UNIT = Span(0.0, 1.0)
+#: What places a thing that is seen from the robot.
+_SEEN = ("ahead_m", "aside_m")
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +86,7 @@ class Space:
         obstacles: Sequence[Table] = ()
         if campaign.draws:
             world, start = self._place(settings)
-            things = [thing for draw in campaign.draws for thing in _things(draw, world, value)]
+            things = [thing for draw in campaign.draws for thing in _things(draw, world, start, value)]
             room = Room(world, start, campaign.gap_m, campaign.free_m)
             obstacles = room.tables(things)
         faults = [
@@ -123,7 +125,10 @@ def _dimensions(campaign: Campaign) -> list[Dimension]:
         most = round(draw.count.high) if not draw.count.choices else max(int(str(one)) for one in draw.count.choices)
         for number in range(1, most + 1):
             name = f"{draw.name}-{number}"
-            found += [Dimension(f"{name}.x", _UNIT), Dimension(f"{name}.y", _UNIT)]
+            if draw.seen is None:
+                found += [Dimension(f"{name}.x", _UNIT), Dimension(f"{name}.y", _UNIT)]
+            else:
+                found += [Dimension(f"{name}.{key}", span) for key, span in zip(_SEEN, draw.seen, strict=True)]
             found.append(Dimension(f"{name}.heading_deg", draw.heading_deg))
             found += [Dimension(f"{name}.{key}", span) for key, span in draw.measures.items()]
     for number, one in enumerate(campaign.disturbances, 1):
@@ -137,17 +142,24 @@ def _dimensions(campaign: Campaign) -> list[Dimension]:
     return [one for one in found if one.span.count != 1]
 
 
-def _things(draw: Drawn, world: World, value: Value) -> list[Thing]:
+def _things(draw: Drawn, world: World, start: Pose, value: Value) -> list[Thing]:
     count = cast("int", value(f"{draw.name}.count", draw.count))
-    x0, y0, x1, y1 = draw.area_m or world.extent
     found = []
     for number in range(1, count + 1):
         name = f"{draw.name}-{number}"
-        place = (
-            round(x0 + cast("float", value(f"{name}.x", _UNIT)) * (x1 - x0), 3),
-            round(y0 + cast("float", value(f"{name}.y", _UNIT)) * (y1 - y0), 3),
-            cast("float", value(f"{name}.heading_deg", draw.heading_deg)),
-        )
+        heading_deg = cast("float", value(f"{name}.heading_deg", draw.heading_deg))
+        if draw.seen is None:
+            x0, y0, x1, y1 = draw.area_m or world.extent
+            x, y = (cast("float", value(f"{name}.{key}", _UNIT)) for key in ("x", "y"))
+            x_m, y_m = x0 + x * (x1 - x0), y0 + y * (y1 - y0)
+        else:
+            ahead_m, aside_m = (
+                cast("float", value(f"{name}.{key}", span)) for key, span in zip(_SEEN, draw.seen, strict=True)
+            )
+            cosine, sine = math.cos(start.heading_rad), math.sin(start.heading_rad)
+            x_m, y_m = start.x_m + ahead_m * cosine - aside_m * sine, start.y_m + ahead_m * sine + aside_m * cosine
+            heading_deg += math.degrees(start.heading_rad) + 180
+        place = (round(x_m, 3), round(y_m, 3), round(heading_deg % 360, 1))
         measures = {key: cast("float", value(f"{name}.{key}", span)) for key, span in draw.measures.items()}
         found.append(Thing(name=name, kind=draw.kind, place=place, measures=measures))
     return found

@@ -32,8 +32,7 @@ minutes = 10.0
 cpu_s = 300.0
 memory_mb = 2000
 
-[cheap]                 # the runs that propose; any key of a scenario
-mode = $mode
+[cheap]                 # the runs that propose; any key of a scenario, such as mode = "direct"
 body = "kinematic"
 duration_s = $duration_s
 
@@ -53,15 +52,28 @@ count = { from = 0, to = 3 }
 
 [[draw]]
 kind = "box"
-count = { from = 0, to = 3 }
-
-[[draw]]
-kind = "wall"
 count = { from = 0, to = 2 }
 
-[[draw]]
+[[draw]]                # before the robot as it begins, open to it: many a turn begins here
 kind = "dead-end"
-count = { from = 0, to = 2 }
+count = { from = 0, to = 1 }
+ahead_m = { from = 1.0, to = 2.2 }
+aside_m = { from = -0.3, to = 0.3 }
+width_m = { from = 0.6, to = 1.4 }
+
+[[draw]]
+kind = "gap"
+count = { from = 0, to = 1 }
+ahead_m = { from = 0.8, to = 2.0 }
+aside_m = { from = -0.4, to = 0.4 }
+
+[[draw]]                # behind it or beside it
+kind = "wall"
+name = "wall behind"
+count = { from = 0, to = 1 }
+ahead_m = { from = -0.9, to = 0.3 }
+aside_m = { from = -0.9, to = 0.9 }
+heading_deg = { from = 0, to = 180 }
 
 [[goal]]                # what has to hold, in place of the scenario's own goals
 kind = "no_collision"

@@ -26,8 +26,10 @@ batch = 4
 runs = 12
 confirmations = 6
 [cheap]
+mode = "direct"
 duration_s = 4
 [full]
+mode = "adapter"
 duration_s = 4
 body = "kinematic"
 [vary]
