@@ -124,9 +124,10 @@ def _run(mutant: Mutant, base: BaseRun, clock: Clock, look: Callable[[], None]) 
     if board.has_died:
         return Found(Fate.CRASHED, name, board.verdict, bench.now)
     if not missed:
-        judged = bench.judge()
-        if judged.missed:
-            return Found(Fate.MISSED, name, judged.missed[0], bench.now)
+        end = bench.finish()
+        for goal, outcome, _ in bench.goals.outcomes(end):
+            if not outcome.met:
+                return Found(Fate.MISSED, name, f"{goal.wanted}: {outcome.says}", end)
         is_same = bench.trace.sha256 == base.trace_sha256
         return Found(Fate.SAME if is_same else Fate.SURVIVED, name)
     return Found(Fate.MISSED, name, f"{missed[0].goal}: {missed[0].says}", missed[0].t)
