@@ -52,6 +52,7 @@ ALLOWED = {
     "robot_bench.report.explain": {"p2os", "bluepill_sim", "adapter_sim"},
     "robot_bench.recording.event_files": {"pyarrow"},
     "robot_bench.cli.pytest_plugin": {"p2os", "bluepill_sim", "pytest"},
+    "robot_bench.campaign.variants.mutation.suite": {"bluepill_sim", "pytest"},
     "robot_bench.campaign.results": {"pyarrow"},
     "robot_bench.campaign.dask_workers": {"p2os", "distributed"},
 }
