@@ -1,14 +1,20 @@
 """`p2os shrink`: a failing run made small, and kept as a scenario and a test."""
 
+import contextlib
 import json
+import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Annotated, cast
 
 import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from p2os.cli.help_pages import BENCH
 from p2os.cli.quantities import option
 from robot_bench.campaign.trial import Trial, trial_of
+from robot_bench.campaign.variants.shrinking.failure import Failure, Way, failure_of
 from robot_bench.campaign.variants.shrinking.kept import Kept, keep, trial_of_run
 from robot_bench.campaign.variants.shrinking.shrink import BUDGET, Shrunk, shrink
 from robot_bench.cli.progress import RunDisplay
@@ -17,7 +23,7 @@ from robot_bench.scenario.included_files import Setting, read_setting
 from robot_bench.scenario.scenario import load_scenario
 from robot_bench.scenario.schema import Table
 from simbase.errors import UsageError
-from simbase.timing import NS_PER_S
+from simbase.timing import NS_PER_S, Nanos
 from simbase.units import COUNT, SEED
 
 #: What makes a trial cheap.
@@ -80,7 +86,13 @@ def shrink_run(
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise UsageError(f"{folder} is not empty", hint="--out names another folder")
     with RunDisplay(is_shown=False) as display:
-        small = shrink(trial, quick=QUICK if quick else (), budget=budget, look=display.raise_if_interrupted)
+        with _bar(budget) as advance:
+
+            def judge(candidate: Trial, way: Way | None, until_ns: Nanos | None) -> Failure | None:
+                advance()
+                return failure_of(candidate, way, until_ns, display.raise_if_interrupted)
+
+            small = shrink(trial, quick=QUICK if quick else (), budget=budget, judge=judge)
         kept = keep(small.trial, small.failure.way, folder)
     if json_output:
         typer.echo(json.dumps(as_json(small, kept), sort_keys=True))
@@ -89,6 +101,18 @@ def shrink_run(
     if not kept.is_confirmed:
         typer.echo("the run of another process was not the same", err=True)
         raise typer.Exit(1)
+
+
+@contextlib.contextmanager
+def _bar(budget: int) -> Iterator[Callable[[], None]]:
+    """Show on a terminal how many runs were made; yield what is called before each."""
+    bar = Progress(
+        TextColumn("runs"), BarColumn(), MofNCompleteColumn(), console=Console(stderr=True), transient=True,
+        auto_refresh=False, disable=not sys.stderr.isatty(),
+    )  # fmt: skip
+    with bar:
+        task = bar.add_task("", total=budget)
+        yield lambda: bar.update(task, advance=1, refresh=True)
 
 
 def _trial(run: str, firmware: Path | None, settings: list[Setting]) -> Trial:

@@ -182,7 +182,7 @@ def test_a_robot_that_sees_nothing_needs_one_obstacle_of_nine_to_fail_the_same_w
 
 
 def test_a_failure_is_told_with_its_time_and_part_and_one_of_another_way_is_not() -> None:
-    trial = trial_of("dodge", settings=BLIND)
+    trial = trial_of("dodge", settings=[*BLIND, ("start.x_m", 2.2), ("start.y_m", 0.0), ("duration_s", 9.0)])
     found = failure_of(trial)
     assert found is not None
     assert (found.way, found.is_early) == (Way(what="touches nothing", part="front"), True)
