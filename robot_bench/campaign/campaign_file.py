@@ -30,7 +30,9 @@ from p2os.toml_file import TomlSource, is_file, read_toml, read_user_text
 from robot_bench.campaign.search import SEARCHES
 from robot_bench.campaign.things import KINDS
 from robot_bench.campaign.trial import Trial, trial_of, unpacked
+from robot_bench.events.codec import Json
 from robot_bench.scenario.included_files import Setting
+from robot_bench.scenario.json_schema import DRAFT, goals_schema, table_schema
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.scenario.schema import LONGEST_S, Key, Place, Table, Where, check_table, nearest, within
 from robot_bench.scenario.sweep import MOST_RUNS
@@ -263,6 +265,26 @@ def parse_campaign(text: str, path: Path, *, firmware: Path | None = None) -> Ca
     )  # fmt: skip
     _refuse_settings(found, path)
     return found
+
+
+def campaign_schema() -> Json:
+    """Return the JSON schema of a campaign file, made of the keys that the loader checks by."""
+    top = table_schema(TOP)
+    spans: Json = {"oneOf": [{"type": ["number", "string", "boolean"]}, {"type": "array"}, table_schema(RANGE)]}
+    draw, disturb = table_schema(DRAW), table_schema(DISTURB)
+    keys: Json = dict(draw["properties"])  # type: ignore[call-overload] # table_schema has made it
+    draw["properties"] = keys | dict.fromkeys(_SPANNED, spans)
+    times: Json = dict(disturb["properties"])  # type: ignore[call-overload] # as above
+    disturb |= {"properties": times | {"at_s": spans, "for_s": spans}, "additionalProperties": spans}
+    properties: Json = dict(top["properties"])  # type: ignore[call-overload] # as above
+    properties |= {
+        "budget": table_schema(BUDGET),
+        "limits": table_schema(LIMITS),
+        "draw": {"type": "array", "items": draw},
+        "disturb": {"type": "array", "items": disturb},
+        "goal": goals_schema(),
+    }
+    return {"$schema": DRAFT, "title": "A campaign of p2os", **top, "properties": properties}
 
 
 def _checked(table: Table, keys: Sequence[Key], where: Where) -> dict[str, Any]:

@@ -79,6 +79,8 @@ class _Search:
         self._bench = bench
         self._saved: list[tuple[Nanos, object]] = []
         self._failed_ns: Nanos = 0
+        #: The place of the goal that was missed.
+        self._goal = 0
 
     def find(self) -> LastMoment | None:
         bench = self._bench
@@ -118,9 +120,9 @@ class _Search:
             target = bench.now // SAVED_EACH_NS * SAVED_EACH_NS + SAVED_EACH_NS
             while bench.now < min(target, bench.end):
                 bench.run_until(min(bench.now // STEP_NS * STEP_NS + STEP_NS, bench.end))
-                if (missed := bench.goals.missed) is not None:
+                for self._goal, words in bench.goals.missed.items():
                     self._failed_ns = bench.now
-                    return missed
+                    return words
         return None
 
     def _is_avoided(self, number: int, at: Nanos) -> bool:
@@ -132,7 +134,7 @@ class _Search:
             *(Deed(at=bench.now, do="set_pin", place=wire, level=False) for wire in _motor_wires()), now=bench.now
         )
         bench.run_until(min(self._failed_ns + WATCHED_NS, bench.end))
-        return bench.goals.missed is None
+        return self._goal not in bench.goals.missed
 
 
 def _motor_wires() -> list[str]:

@@ -129,7 +129,7 @@ def _cost(whole: Whole) -> Iterator[tuple[str, str]]:
     for stage, runs in by_stage.items():
         seconds, virtual_s = sum(run.cpu_s for run in runs), sum(run.outcome.virtual_ns for run in runs) / 1e9
         factor = f", {virtual_s / seconds:.0f} × real time" if seconds else ""
-        yield f"{stage} runs", f"{len(runs)}, {virtual_s:.0f} s virtual, {seconds:.1f} s of a processor{factor}"
+        yield f"{stage} runs", f"{len(runs)}: {virtual_s:.0f} s in {seconds:.0f} s of a processor{factor}"
     yield "of them in the journal already", str(progress.resumed)
 
 
@@ -170,6 +170,8 @@ def _plan(run: Run, moment: LastMoment | None) -> str:
         parts.append(
             f'<circle class="last" cx="{x}" cy="{y}" r="7"><title>{html.escape(moment.words)}</title></circle>'
         )
+    if way and not run.outcome.hits:
+        parts.append(f'<circle class="hit" cx="{way[-1][0]}" cy="{way[-1][1]}" r="4"><title>its end</title></circle>')
     for hit in run.outcome.hits[:1]:
         x, y = to(hit.x_m, hit.y_m)
         parts.append(f'<circle class="hit" cx="{x}" cy="{y}" r="5"><title>{html.escape(hit.what)}</title></circle>')
@@ -309,7 +311,7 @@ def _chart(
     if line:
         parts.append(_polyline([to(x, y) for x, y in line], name))
     for text, x, y, anchor in (
-        (f"{y1:.3g}", left - 4, top + 4, "end"), (f"{y0:.3g}", left - 4, top + high + 4, "end"),
+        (f"{y1:.2g}", left - 4, top + 4, "end"), (f"{y0:.2g}", left - 4, top + high + 4, "end"),
         (f"{x0:g}", left, _HEIGHT - 6, "start"), (f"{x1:g}", left + wide, _HEIGHT - 6, "end"),
         (title, left + wide / 2, _HEIGHT - 6, "middle"),
     ):  # fmt: skip

@@ -85,32 +85,41 @@ class Space:
         settings = tuple((key, value(key, span)) for key, span in campaign.vary.items())
         obstacles: Sequence[Table] = ()
         if campaign.draws:
-            world, start = self._place(settings)
-            things = [thing for draw in campaign.draws for thing in _things(draw, world, start, value)]
-            room = Room(world, start, campaign.gap_m, campaign.free_m)
+            world, starts = self._place(settings)
+            things = [thing for draw in campaign.draws for thing in _things(draw, world, starts[0], value)]
+            room = Room(world, starts, campaign.gap_m, campaign.free_m)
             obstacles = room.tables(things)
         faults = [
             table for number, one in enumerate(campaign.disturbances, 1) for table in _faults(one, number, value, at)
         ]
         return Proposal(point, values, settings, tuple(obstacles), tuple(faults))
 
-    def _place(self, settings: Sequence[Setting]) -> tuple[World, Pose]:
-        """Return the world of a point, and where the robot begins in it."""
-        deciding = tuple((key, value) for key, value in settings if key in {"world", "seed"} or key.startswith("start"))
-        return _world_and_start(self._campaign.trial, deciding)
+    def _place(self, settings: Sequence[Setting]) -> tuple[World, Sequence[Pose]]:
+        """Return the world of a point, and where its robots begin in it, the first one first."""
+        deciding = tuple((key, value) for key, value in settings if key.partition(".")[0] in _DECIDING)
+        return _world_and_starts(self._campaign.trial, deciding)
 
 
-def _world_and_start(trial: Trial, settings: tuple[Setting, ...]) -> tuple[World, Pose]:
+#: What decides where a robot begins.
+_DECIDING = frozenset({"world", "seed", "start", "robot"})
+
+
+def _world_and_starts(trial: Trial, settings: tuple[Setting, ...]) -> tuple[World, Sequence[Pose]]:
     changed = trial.set(*settings)
     with unpacked(trial.files) as folder:
-        world = _world(
-            str(folder / name) if (name := str(changed.table["world"])) in trial.files else name, changed.seed
-        )
-    start = cast("Mapping[str, float]", changed.table.get("start", {}))
-    if not start:
-        return world, world.start
-    heading_rad = math.radians(start.get("heading_deg", 0.0))
-    return world, Pose(start.get("x_m", 0.0), start.get("y_m", 0.0), heading_rad)
+        name = str(changed.table["world"])
+        world = _world(str(folder / name) if name in trial.files else name, changed.seed)
+    robots = changed.table.get("robot")
+    tables = (
+        cast("list[Mapping[str, float]]", robots)
+        if isinstance(robots, list)
+        else [cast("Mapping[str, float]", changed.table.get("start", {}))]
+    )
+    return world, [_pose(table) if "x_m" in table else world.start for table in tables]
+
+
+def _pose(table: Mapping[str, float]) -> Pose:
+    return Pose(table["x_m"], table["y_m"], math.radians(table.get("heading_deg", 0.0)))
 
 
 @lru_cache(maxsize=64)

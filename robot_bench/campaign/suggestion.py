@@ -21,6 +21,7 @@ TEMPLATE = Template("""\
 # What is searched: worlds in which the firmware of $scenario fails.
 #   p2os campaign $file                 docs/campaigns.md has all keys
 scenario = $scenario_name
+gap_m = 0.75             # between things: a robot of 0.38 m passes
 search = "sobol"        # grid, random, latin-hypercube, sobol, tpe, cma-es, quality-diversity, coverage
 
 [budget]
@@ -37,22 +38,21 @@ body = "kinematic"
 duration_s = $duration_s
 
 [full]                  # those that confirm
-mode = $mode
-body = $body
+${mode}body = $body
 duration_s = $duration_s
 
 [vary]                  # every key that --set takes: a range, with a step or without, or a list of values
-start.x_m = { from = $x0, to = $x1 }
-start.y_m = { from = $y0, to = $y1 }
-start.heading_deg = { from = 0, to = 355, step = 5 }
+$start.x_m = { from = $x0, to = $x1 }
+$start.y_m = { from = $y0, to = $y1 }
+$start.heading_deg = { from = 0, to = 355, step = 5 }
 
 [[draw]]                # things that stand in the way, each with a place and measures of its own
 kind = "post"
-count = { from = 0, to = 3 }
+count = { from = 1, to = 5 }
 
 [[draw]]
 kind = "box"
-count = { from = 0, to = 2 }
+count = { from = 0, to = 3 }
 
 [[draw]]                # before the robot as it begins, open to it: many a turn begins here
 kind = "dead-end"
@@ -104,12 +104,14 @@ def suggested(scenario: Scenario, scenario_name: str, file: str) -> str:
         WorldError: Its world cannot be read.
     """
     world = load_world(scenario.world, seed=scenario.seed)
-    start = scenario.start or world.start
+    start = scenario.robots[0].start if scenario.robots else scenario.start or world.start
     x0, y0, x1, y1 = world.extent
     dx, dy = (x1 - x0) * START_SHARE / 2, (y1 - y0) * START_SHARE / 2
     return TEMPLATE.substitute(
         scenario=scenario.name, scenario_name=toml_value(scenario_name), file=file,
-        duration_s=min(scenario.duration_ns / NS_PER_S, LONGEST_S), mode=toml_value(scenario.mode),
+        duration_s=min(scenario.duration_ns / NS_PER_S, LONGEST_S),
+        mode="" if scenario.robots else f"mode = {toml_value(scenario.mode)}\n",
+        start=f"robot.{scenario.robots[0].name}" if scenario.robots else "start",
         body=toml_value(scenario.body),
         x0=round(start.x_m - dx, 2), x1=round(start.x_m + dx, 2),
         y0=round(start.y_m - dy, 2), y1=round(start.y_m + dy, 2),

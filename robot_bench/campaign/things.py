@@ -25,9 +25,9 @@ HEIGHT_M = 0.5
 #: chosen: of walls of dead ends and gaps.
 WALL_M = 0.08
 #: chosen: so many places are tried; each next one is a golden angle on, and a little further off.
-TRIES = 24
+TRIES = 64
 _GOLDEN_RAD = math.pi * (3 - math.sqrt(5))
-_STEP_M = 0.25
+_STEP_M = 0.35
 #: Digits of what is written: millimetres and tenths of a degree.
 _M, _DEG = 3, 1
 
@@ -107,17 +107,17 @@ class Thing:
 
 @dataclass(slots=True)
 class Room:
-    """Where things may stand: apart from the world's own, from the robot's start and from each other.
+    """Where things may stand: apart from the world's own, from where robots begin and from each other.
 
     Args:
         world: Where they are placed; its floor ends at its extent.
-        start: Where the robot begins.
+        starts: Where robots begin.
         gap_m: How far things stand apart at least.
-        free_m: How far from the robot's centre at its start nothing stands.
+        free_m: How far from the middle of each robot at its start nothing stands.
     """
 
     world: World
-    start: Pose
+    starts: Sequence[Pose]
     gap_m: float
     free_m: float
 
@@ -142,9 +142,7 @@ class Room:
         left, low, right, high = one.bounds
         if left < x0 or low < y0 or right > x1 or high > y1:
             return False
-        if one.distance_to_point(self.start.x_m, self.start.y_m) < self.free_m or one.contains(
-            self.start.x_m, self.start.y_m
-        ):
+        if any(one.distance_to_point(start.x_m, start.y_m) < self.free_m for start in self.starts):
             return False
         return all(_apart_m(one, other) >= self.gap_m for other in others)
 

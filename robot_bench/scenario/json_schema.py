@@ -26,18 +26,14 @@ _TYPES = {
 
 def scenario_schema() -> Json:
     """Return the schema as a JSON object."""
-    top = _table(TABLES[""])
-    within = _table(TABLES["[in_world.NAME]"])
-    start = _table(TABLES["[start]"])
-    properties: Json = dict(top["properties"])  # type: ignore[call-overload] # _table has made it
+    top = table_schema(TABLES[""])
+    within = table_schema(TABLES["[in_world.NAME]"])
+    start = table_schema(TABLES["[start]"])
+    properties: Json = dict(top["properties"])  # type: ignore[call-overload] # table_schema has made it
     inner: Json = dict(within["properties"])  # type: ignore[call-overload] # as above
     within["properties"] = inner | {"start": start}
-    goals = [
-        _table((*(key for key in COMMON if key.name != "kind"), ROBOT, *kind.keys), kind=name)
-        for name, kind in KINDS.items()
-    ]
-    parts = {name: _table(TABLES[f"[{name}]"]) for name in ("direct", "adapter", "controller")}
-    robot = _table(TABLES["[[robot]]"])
+    parts = {name: table_schema(TABLES[f"[{name}]"]) for name in ("direct", "adapter", "controller")}
+    robot = table_schema(TABLES["[[robot]]"])
     own: Json = dict(robot["properties"])  # type: ignore[call-overload] # as above
     robot["properties"] = own | parts
     properties |= {
@@ -45,10 +41,13 @@ def scenario_schema() -> Json:
         **parts,
         "robot": {"oneOf": [{"type": "string"}, {"type": "array", "items": robot}]},
         "in_world": {"type": "object", "additionalProperties": within},
-        **{name: {"type": "array", "items": _table((*TABLES[f"[[{name}]]"], ROBOT))} for name in ("obstacle", "fault")},
-        "part": {"type": "array", "items": _table(TABLES["[[part]]"]) | {"additionalProperties": True}},
-        "when": {"type": "array", "items": _table((*WHEN_KEYS, ROBOT))},
-        "goal": {"type": "array", "items": {"oneOf": goals}},
+        **{
+            name: {"type": "array", "items": table_schema((*TABLES[f"[[{name}]]"], ROBOT))}
+            for name in ("obstacle", "fault")
+        },
+        "part": {"type": "array", "items": table_schema(TABLES["[[part]]"]) | {"additionalProperties": True}},
+        "when": {"type": "array", "items": table_schema((*WHEN_KEYS, ROBOT))},
+        "goal": goals_schema(),
         "sweep": _SWEEP,
     }
     # What a file extends or includes may say the rest.
@@ -56,6 +55,15 @@ def scenario_schema() -> Json:
     # Several robots have a program each.
     wanted.append({"required": ["robot", "world", "duration_s"], "properties": {"robot": {"type": "array"}}})
     return {"$schema": DRAFT, "title": "A scenario of p2os", **top, "properties": properties, "anyOf": wanted}
+
+
+def goals_schema() -> Json:
+    """Return the schema of the `[[goal]]` tables."""
+    goals = [
+        table_schema((*(key for key in COMMON if key.name != "kind"), ROBOT, *kind.keys), kind=name)
+        for name, kind in KINDS.items()
+    ]
+    return {"type": "array", "items": {"oneOf": goals}}
 
 
 #: Values of a parameter; or a range of them, or a table with parameters.
@@ -67,7 +75,8 @@ _SWEEP: Json = {
 }
 
 
-def _table(keys: Sequence[Key], *, kind: str = "") -> Json:
+def table_schema(keys: Sequence[Key], *, kind: str = "") -> Json:
+    """Return the schema of one table with these keys; with `kind` that key has this value."""
     properties: Json = {key.name: _key(key) for key in keys}
     required = [key.name for key in keys if key.required]
     if kind:

@@ -16,7 +16,7 @@ from p2os.cli.help_pages import BENCH
 from p2os.cli.main import EXIT_INTERRUPTED
 from p2os.cli.quantities import option
 from p2os.transport.wall_clock import wall_clock
-from robot_bench.campaign.campaign_file import Campaign
+from robot_bench.campaign.campaign_file import Campaign, campaign_schema
 from robot_bench.campaign.conduct import Finding, Progress, Workers
 from robot_bench.campaign.processes import Processes
 from robot_bench.campaign.results import Whole
@@ -89,9 +89,13 @@ def campaign(
     dask: Annotated[str | None, typer.Option(help="Workers of Dask on this machine.", metavar="local")] = None,
     scheduler: Annotated[str | None, typer.Option(help="Dask's scheduler.", metavar="ADDRESS")] = None,
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    schema: Annotated[bool, typer.Option("--schema", help="Print the JSON schema of campaigns.")] = False,
 ) -> None:
     """Conduct a campaign."""
     asked = words or []
+    if schema:
+        typer.echo(json.dumps(campaign_schema(), indent=2))
+        return
     if asked[:1] == ["new"]:
         write_new(asked[1:], out, firmware)
         return

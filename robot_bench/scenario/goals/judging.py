@@ -7,7 +7,7 @@ not judged there.
 Invariant: a verdict depends on the events of the run alone; played back from its trace they give the same.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import cast
 
@@ -226,10 +226,10 @@ class GoalJudge(Stateful):
         self._last = end, planned_ns
 
     @property
-    def missed(self) -> str | None:
-        """The first of the goals that was decided to be missed, and what was wrong; None where none is yet."""
-        pairs = zip(self.goals, self._decided, strict=True)
-        return next((f"{goal.kind}: {one.says}" for goal, one in pairs if one is not None and not one.met), None)
+    def missed(self) -> Mapping[int, str]:
+        """The goals that were decided to be missed, each by its place, and what was wrong."""
+        pairs = enumerate(zip(self.goals, self._decided, strict=True))
+        return {at: f"{goal.kind}: {one.says}" for at, (goal, one) in pairs if one is not None and not one.met}
 
     def finish(self, end: Nanos, *, planned_ns: Nanos = 0) -> Judgement:
         """Return what became of the goals in a run that ended at `end`.

@@ -1,16 +1,18 @@
 """A campaign from its file to its folder, with runs of seconds: the same set whatever happens on the way."""
 
 import itertools
+import json
 import os
 import random
 import signal
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from p2os.errors import ScenarioError
-from robot_bench.campaign.campaign_file import Campaign, Limits, load_campaign
+from robot_bench.campaign.campaign_file import DRAW, TOP, Campaign, Limits, campaign_schema, load_campaign
 from robot_bench.campaign.conduct import Conduct, Finding
 from robot_bench.campaign.processes import Processes
 from robot_bench.campaign.search import SEARCHES, Answer, Problem
@@ -221,6 +223,15 @@ def test_what_is_wrong_in_a_file_is_told_with_a_hint(right: str, tmp_path: Path)
         load_campaign(file)
     assert words in f"{caught.value} ({caught.value.hint})"
     assert "mine.toml" in str(caught.value)
+
+
+def test_the_schema_has_every_key_that_the_loader_takes() -> None:
+    schema = campaign_schema()
+    properties: dict[str, Any] = schema["properties"]  # type: ignore[assignment]  # an object
+    assert set(properties) == {key.name for key in TOP}
+    assert set(properties["draw"]["items"]["properties"]) == {key.name for key in DRAW}
+    assert schema["required"] == ["scenario"]
+    json.dumps(schema)
 
 
 def test_a_folder_that_is_taken_and_one_that_is_none_are_refused(tmp_path: Path) -> None:

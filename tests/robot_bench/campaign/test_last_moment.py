@@ -12,7 +12,10 @@ WALL = {
     "at_s": 0.0, "name": "wall", "shape": "box", "x_m": 0.7, "y_m": 0.0, "length_m": 0.1, "width_m": 2.0,
     "height_m": 0.5,
 }  # fmt: skip
-GOALS = [{"kind": "no_collision", "ends_run": "missed"}]
+GOALS = [
+    {"kind": "no_collision", "ends_run": "missed"},
+    {"kind": "moves_on", "way_m": 0.05, "within_s": 8.0, "ends_run": "missed"},  # who stands misses it
+]
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,101 @@
+"""`p2os campaign` as one types it: the file that it writes, exit codes, and what is wrong in a line."""
+
+import json
+from pathlib import Path
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from robot_bench.campaign.campaign_file import load_campaign
+from robot_bench.cli import campaign
+from simbase.errors import P2osError, UsageError
+
+FILE = """
+scenario = "dodge"
+search = "random"
+batch = 2
+[budget]
+runs = 2
+[cheap]
+mode = "direct"
+duration_s = 4
+[full]
+body = "kinematic"
+duration_s = 4
+[vary]
+start.heading_deg = { from = 0, to = 350, step = 10 }
+[[goal]]
+kind = "GOAL"
+"""
+
+
+@pytest.fixture
+def app() -> typer.Typer:
+    found = typer.Typer()
+    found.callback()(lambda: None)
+    campaign.register(found)
+    return found
+
+
+@pytest.fixture(autouse=True)
+def in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def run(app: typer.Typer, *words: str) -> tuple[int, str]:
+    result = CliRunner().invoke(app, ["campaign", *words])
+    if isinstance(result.exception, P2osError):
+        raise result.exception
+    return result.exit_code, result.stdout
+
+
+def written(goal: str) -> Path:
+    Path("mine.toml").write_text(FILE.replace("GOAL", goal))
+    return Path("mine.toml")
+
+
+@pytest.mark.parametrize("scenario", ["dodge", "rover", "two-dodge", "motors"])
+def test_the_file_that_new_writes_is_a_campaign_for_every_scenario(app: typer.Typer, scenario: str) -> None:
+    code, said = run(app, "new", scenario)
+    assert (code, said.splitlines()[-1]) == (0, f"next: p2os campaign {scenario}-campaign.toml")
+    assert load_campaign(Path(f"{scenario}-campaign.toml")).draws
+    with pytest.raises(UsageError, match="is there already"):
+        run(app, "new", scenario)
+
+
+def test_what_fails_ends_with_1_and_the_command_that_runs_it_again(app: typer.Typer) -> None:
+    code, said = run(app, str(written('usart_contains"\ntext = "never printed')), "-j", "1", "--out", "kept")
+    assert code == 1
+    assert "p2os run kept/failures/0001/dodge.toml" in said
+    assert said.splitlines()[-1].startswith("2 confirmed of 2 points, 6 runs, ")
+    code, again = run(app, "--resume", "kept", "--json")
+    assert (code, json.loads(again)["findings"]["confirmed"]) == (1, 2)
+
+
+def test_what_passes_ends_with_0(app: typer.Typer) -> None:
+    code, said = run(app, str(written("no_collision")), "--runs", "1")
+    assert (code, said.splitlines()[0]) == (0, "report  campaigns/mine-001/report.html")
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ([], "which campaign?"),
+        (["new"], "a campaign for which scenario?"),
+        (["mine.toml", "--search", "sobl"], "there is no search 'sobl'"),
+        (["mine.toml", "--dask", "cloud"], "there is no --dask 'cloud'"),
+        (["mine.toml", "--dask", "local", "--scheduler", "tcp://x"], "cannot stand together"),
+        (["mine.toml", "--resume", "kept"], "--resume goes on with what was begun"),
+        (["--resume", "nowhere"], "nowhere is no campaign's folder"),
+        (["nothing.toml"], "cannot read nothing.toml"),
+    ],
+)
+def test_a_line_that_is_wrong_is_refused(app: typer.Typer, words: list[str], says: str) -> None:
+    written("no_collision")
+    with pytest.raises(P2osError, match=says):
+        run(app, *words)
+
+
+def test_the_schema_is_json(app: typer.Typer) -> None:
+    assert json.loads(run(app, "--schema")[1])["title"] == "A campaign of p2os"
