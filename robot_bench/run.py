@@ -25,6 +25,7 @@ from bluepill_sim.parts.attached import AttachedParts
 from bluepill_sim.parts.serial_port import QUIET_NS
 from p2os.event_log import logger
 from p2os.pioneer.body.factory import resolve_body
+from p2os.pioneer.world import known_worlds
 from p2os.pioneer.world.model import Pose, World
 from p2os.transport import Transport
 from p2os.transport.wall_clock import Clock, wall_clock
@@ -215,6 +216,9 @@ def meta_of(scenario: Scenario, world: World | None, note: str | None, *, is_at_
         "scenario": scenario.name,
         "description": scenario.description,
         "text": scenario.text,
+        "scenario_path": None if scenario.path is None else str(scenario.path.absolute()),
+        "settings": [[key, value] for key, value in scenario.settings],
+        "world_path": str(scenario.world) if scenario.world in known_worlds() else str(Path(scenario.world).absolute()),
         "firmware": scenario.firmware.name,
         "firmware_path": str(scenario.firmware.absolute()),
         "firmware_sha256": _sha256_of(scenario.firmware),

@@ -58,6 +58,7 @@ ALLOWED = {
     "robot_bench.experiments.pictures": {"matplotlib"},
     "robot_bench.experiments.sensitivity": {"numpy", "SALib"},
     "robot_bench.cli.pytest_plugin": {"p2os", "bluepill_sim", "pytest"},
+    "robot_bench.campaign.variants.mutation.suite": {"bluepill_sim", "pytest"},
     "robot_bench.campaign.results": {"pyarrow"},
     "robot_bench.campaign.dask_workers": {"p2os", "distributed"},
 }
@@ -70,8 +71,8 @@ IO_LAYER = (
     "p2os.ros.zenoh_node",
     "bluepill_sim.cli", "bluepill_sim.cli.console",
     "robot_bench.cli", "robot_bench.campaign.processes", "robot_bench.campaign.dask_workers",
-    "robot_bench.running.pacer", "robot_bench.live", "robot_bench.report",
-    "robot_bench.firmware.build",
+    "robot_bench.campaign.variants.shrinking.kept", "robot_bench.running.pacer", "robot_bench.live",
+    "robot_bench.report", "robot_bench.firmware.build",
 )  # fmt: skip
 
 #: What may log beside the I/O layer: what joins models to lines, and the bench. A model tells its owner by a callback.

@@ -92,7 +92,7 @@ def file_offset(data: bytes, flash_offset: int) -> int:
     for segment in ELFFile(io.BytesIO(data)).iter_segments():
         at = flash_offset - segment["p_paddr"] % FLASH_BASE
         if segment["p_type"] == "PT_LOAD" and 0 <= at < segment["p_filesz"]:
-            return int(segment["p_offset"]) + at
+            return int(segment["p_offset"] + at)
     raise ImageError(f"nothing is loaded at {FLASH_BASE + flash_offset:#010x}", hint="give the ELF that was linked")
 
 

@@ -229,6 +229,8 @@ class Scenario:
     axes: tuple[Axis, ...] = ()
     #: What was set beside the file.
     settings: tuple[Setting, ...] = ()
+    #: The file; None: made by a program.
+    path: Path | None = field(default=None, compare=False, repr=False)
     #: The file's own place, for messages.
     where: Where = field(default="", compare=False, repr=False)
 
@@ -366,7 +368,7 @@ def build_scenario(
     build = _build_several if isinstance(found.table.get("robot"), list) else _build
     scenario = build(found.table, found.text, path, Place(found.source), firmware)
     kept = tuple(axis for axis in scenario.axes if axis.key not in dict(settings))
-    scenario = replace(scenario, settings=tuple(settings), axes=kept)
+    scenario = replace(scenario, settings=tuple(settings), axes=kept, path=path)
     for one in scenario.programmed or (scenario,):
         refuse_what_its_world_refuses(one, load_world(scenario.world, seed=scenario.seed))
     return scenario

@@ -1,1 +1,1 @@
-"""Verbs that judge by many runs: of wrong programs, and of ever smaller failures."""
+"""Verbs that judge by many runs: campaigns, mutants of a firmware, failures made small."""

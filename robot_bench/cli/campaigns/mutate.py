@@ -13,15 +13,20 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
+from bluepill_sim.analysis.coverage import Coverage
+from bluepill_sim.board import BluePill
 from bluepill_sim.program.elf_file import read_bytes
+from bluepill_sim.program.image import Image
 from bluepill_sim.program.line_table import read_lines
 from bluepill_sim.program.mutants import Mutant, mutants, mutated_file
+from bluepill_sim.program.static_code import StaticCode
 from p2os.cli.help_pages import BENCH
 from p2os.cli.main import EXIT_INTERRUPTED
 from p2os.cli.quantities import option
-from robot_bench.campaign.mutation.base_run import BaseRun, base_run
-from robot_bench.campaign.mutation.report import Mutation, as_json, report_lines, write_junit
-from robot_bench.campaign.mutation.trial import Found, try_mutant
+from robot_bench.campaign.variants.mutation.base_run import BaseRun, base_run
+from robot_bench.campaign.variants.mutation.report import Mutation, as_json, report_lines, write_junit
+from robot_bench.campaign.variants.mutation.suite import Suite, SuiteRun, run_suite
+from robot_bench.campaign.variants.mutation.trial import MOST_MORE_NS, MOST_TIMES, Fate, Found, try_mutant
 from robot_bench.cli.progress import RunDisplay
 from robot_bench.cli.sweep import refuse_junit
 from robot_bench.cli.workers import core_count, run_in_processes
@@ -30,6 +35,7 @@ from robot_bench.recording.summary import INTERRUPTED
 from robot_bench.scenario.included_files import read_setting
 from robot_bench.scenario.scenario import load_scenario
 from simbase.errors import FileError, UsageError
+from simbase.timing import NS_PER_S
 from simbase.units import COUNT, PERCENT, SEED
 
 HELP = """Judge the goals of scenarios by how many wrong programs they notice.
@@ -45,7 +51,7 @@ Exit code: 0 done, 1 the score is below --fail-under, 2 wrong usage or file.
 \b
 Examples:
   p2os mutate build/robot.elf patrol.toml        all mutants, and those that survived
-  p2os mutate build/robot.elf tests/*.toml       the score of all goals together
+  p2os mutate build/robot.elf tests              the score of your tests (pytest)
   p2os mutate dodge.elf dodge --sample 100       a hundred of them, drawn by --seed
   p2os mutate dodge.elf dodge --only dodge_fsm.c --mode direct --body kinematic
   p2os mutate build/robot.elf patrol.toml --fail-under 80%    for CI
@@ -59,7 +65,9 @@ def register(app: typer.Typer) -> None:
 
 def mutate(
     firmware: Annotated[Path, typer.Argument(help="ELF, HEX or BIN file.", metavar="FIRMWARE")],
-    scenarios: Annotated[list[str], typer.Argument(help="Names or TOML files, with goals.", metavar="SCENARIO...")],
+    scenarios: Annotated[
+        list[str], typer.Argument(help="Names or TOML files with goals; tests of pytest.", metavar="SCENARIO...")
+    ],
     sample: Annotated[
         int | None, option(COUNT, "--sample", purpose="So many of the mutants, drawn; default all.", above_zero=True)
     ] = None,
@@ -88,25 +96,29 @@ def mutate(
 ) -> None:
     """Judge goals."""
     settings = [read_setting(text) for text in set_ or ()]
+    paths = tuple(Path(name) for name in scenarios if name.endswith(".py") or Path(name).is_dir())
     wanted = [
         load_scenario(name, firmware=firmware, settings=settings).with_options(firmware=firmware, mode=mode, body=body)
-        for name in scenarios
-    ]
+        for name in scenarios if Path(name) not in paths
+    ]  # fmt: skip
     if junit is not None:
         refuse_junit(junit)
     with RunDisplay(is_shown=False) as display:
         bases = [base_run(one, time.process_time_ns, display.raise_if_interrupted) for one in wanted]
-        possible = _chosen(bases, only or [])
+        board = BluePill(firmware)
+        suite = _suite(paths, board, display.raise_if_interrupted) if paths else None
+        ran = {address for base in bases for address in base.first_ns} | (suite.base.addresses if suite else set())
+        names = Coverage(board.image, read_lines(board.image), StaticCode(board.chip.memory))
+        possible = _chosen(board.image, ran, names, only or [])
         tried = possible if sample is None or sample >= len(possible) else _drawn(possible, sample, seed)
-        found, broken, is_whole = _try_all(tried, bases, jobs or core_count(), display.raise_if_interrupted)
+        found, broken, is_whole = _try_all(tried, bases, suite, jobs or core_count(), display.raise_if_interrupted)
     mutation = Mutation(
-        firmware=firmware, scenarios=[one.name for one in wanted],
-        instructions=len({address for base in bases for address in base.first_ns}), possible=len(possible),
-        seed=seed if len(tried) < len(possible) else None, tried=tried, found=found, coverage=bases[0].coverage,
-        lines=read_lines(bases[0].board.image),
+        firmware=firmware, scenarios=[*(one.name for one in wanted), *map(str, paths)], instructions=len(ran),
+        possible=len(possible), seed=seed if len(tried) < len(possible) else None, tried=tried, found=found,
+        coverage=names, lines=read_lines(board.image),
     )  # fmt: skip
     if write is not None:
-        _write(mutation, bases[0], write)
+        _write(mutation, board.image, write)
     if junit is not None:
         write_junit(mutation, junit)
     if json_output:
@@ -124,20 +136,51 @@ def mutate(
         raise typer.Exit(1)
 
 
-def _chosen(bases: Sequence[BaseRun], only: Sequence[str]) -> list[Mutant]:
+def _suite(paths: tuple[Path, ...], board: BluePill, raise_if_interrupted: Callable[[], None]) -> Suite:
+    """Return tests that have passed with the program itself, in a process of their own.
+
+    Raises:
+        UsageError: They do not.
+    """
+    firmware, found = Path(board.image.name), SuiteRun()
+
+    def on_done(_number: int, plain: Json) -> None:
+        nonlocal found
+        found = SuiteRun.from_plain(plain) if "sha256" in plain else SuiteRun(broken=str(plain["failures"]))
+
+    def job(_number: int, _look: Callable[[], None]) -> Json:
+        began = time.process_time()
+        found = run_suite(paths, firmware)
+        found.cpu_s = time.process_time() - began
+        return found.to_plain()
+
+    run_in_processes(job, 1, at_once=1, on_done=on_done, raise_if_interrupted=raise_if_interrupted)
+    said = " ".join(map(str, paths))
+    if found.failed or found.broken:
+        why = found.broken or f"{found.failed} fails"
+        raise UsageError(f"the tests do not pass with the program itself: {why}", hint=f"pytest {said} shows it")
+    if not found.addresses:
+        raise UsageError(f"no test of {said} drives the fixture bench", hint="docs/bench.md, tests of a firmware")
+    return Suite(paths=paths, base=found, data=read_bytes(board.image), image=board.image)
+
+
+def _limit_s(suite: Suite) -> int:
+    """Return how many seconds of a processor the tests may take with a mutant."""
+    return round(MOST_TIMES * suite.base.cpu_s + MOST_MORE_NS / NS_PER_S)
+
+
+def _chosen(image: Image, ran: set[int], names: Coverage, only: Sequence[str]) -> list[Mutant]:
     """Return the mutants of all instructions that ran, of the files and functions asked for.
 
     Raises:
         UsageError: There is none.
     """
-    coverage = bases[0].coverage
 
     def is_wanted(address: int) -> bool:
-        names = coverage.place(address).partition(":")[0], coverage.function_name(address)
-        return not only or any(fnmatch(name, pattern) for name in names for pattern in only)
+        here = names.place(address).partition(":")[0], names.function_name(address)
+        return not only or any(fnmatch(name, pattern) for name in here for pattern in only)
 
-    ran = {address for base in bases for address in base.first_ns if is_wanted(address)}
-    found = mutants(bases[0].board.image, ran)
+    found = mutants(image, filter(is_wanted, ran))
     if not found:
         what = f"of {' and '.join(only)} " if only else ""
         raise UsageError(f"nothing {what}that ran can be changed", hint="p2os run --coverage shows what runs")
@@ -151,7 +194,11 @@ def _drawn(possible: Sequence[Mutant], count: int, seed: int) -> list[Mutant]:
 
 
 def _try_all(
-    tried: Sequence[Mutant], bases: Sequence[BaseRun], jobs: int, raise_if_interrupted: Callable[[], None]
+    tried: Sequence[Mutant],
+    bases: Sequence[BaseRun],
+    suite: Suite | None,
+    jobs: int,
+    raise_if_interrupted: Callable[[], None],
 ) -> tuple[list[Found | None], list[str], bool]:
     """Return what came of each mutant, which could not be run and why, and whether nothing interrupted them."""
     found: list[Found | None] = [None] * len(tried)
@@ -162,7 +209,12 @@ def _try_all(
     )  # fmt: skip
 
     def job(number: int, look: Callable[[], None]) -> Json:
-        return try_mutant(tried[number], bases, time.process_time_ns, look).to_plain()
+        mutant = tried[number]
+        found = try_mutant(mutant, bases, time.process_time_ns, look)
+        if suite is not None and not found.is_noticed and mutant.address in suite.base.addresses:
+            by_tests = suite.try_mutant(mutant, _limit_s(suite))
+            found = by_tests if found.fate is Fate.SAME or by_tests.is_noticed else found
+        return found.to_plain()
 
     with bar:
         task = bar.add_task("", total=len(tried), survived="")
@@ -170,6 +222,8 @@ def _try_all(
         def on_done(number: int, plain: Json) -> None:
             if "fate" in plain:
                 found[number] = Found.from_plain(plain)
+            elif f"{plain['failures']}".endswith("SIGXCPU']"):
+                found[number] = Found(Fate.STOPPED, "pytest", "they take too long")
             elif (why := cast("list[str]", plain["failures"])[0]) != INTERRUPTED:
                 broken.append(f"{tried[number].address:#010x}: {why}")
             survived = sum(one is not None and not one.is_noticed for one in found)
@@ -181,13 +235,12 @@ def _try_all(
     return found, broken, is_whole
 
 
-def _write(mutation: Mutation, base: BaseRun, folder: Path) -> None:
+def _write(mutation: Mutation, image: Image, folder: Path) -> None:
     """Write each survivor as a firmware file.
 
     Raises:
         FileError: The folder cannot be written.
     """
-    image = base.board.image
     data = read_bytes(image)
     suffix = ".elf" if data.startswith(b"\x7fELF") else ".bin"
     try:

@@ -14,8 +14,8 @@ from bluepill_sim.program.image import load_image
 from bluepill_sim.program.mutants import Mutant, mutants, mutated_file
 from p2os.cli import main as cli
 from robot_bench.bench import Bench
-from robot_bench.campaign.mutation.base_run import BaseRun, base_run
-from robot_bench.campaign.mutation.trial import Fate, Found, try_mutant
+from robot_bench.campaign.variants.mutation.base_run import BaseRun, base_run
+from robot_bench.campaign.variants.mutation.trial import Fate, Found, try_mutant
 from robot_bench.scenario.scenario import load_scenario
 from tests.bluepill_sim.machine import Assembler
 from tests.robot_bench.firmware import thumb
@@ -200,3 +200,50 @@ def test_an_elf_is_changed_where_the_chip_has_the_instruction(tmp_path: Path) ->
         file = tmp_path / "it.elf"
         file.write_bytes(mutated_file(data, mutant, image))
         assert load_image(file).segments == mutant.image(image).segments != image.segments
+
+
+SUITE = """
+import pytest
+
+@pytest.mark.scenario("mine.toml")
+def test_the_wire_rises(bench):
+    bench.expect("pin PB12 high", within="10 ms")
+
+@pytest.mark.scenario("mine.toml")
+def test_it_does_not_rise_at_once(bench):
+    bench.expect_no("pin PB12 high", during="20 us")
+"""
+
+
+@pytest.mark.slow
+def test_tests_of_pytest_judge_too_and_tell_which_of_them_noticed(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("tests").mkdir()
+    Path("tests/test_it.py").write_text(SUITE, encoding="utf-8")
+    Path("mine.toml").rename("tests/mine.toml")
+    Path("x.bin").rename("tests/x.bin")
+    assert cli.run(["mutate", "tests/x.bin", "tests", "-j", "2", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    fates = {f"{one['before'].split(' 0x')[0]} -> {one['after'].split(' 0x')[0]}": one for one in found["mutants"]}
+    assert fates["adds r2, #1 -> adds r2, #0"]["says"] == "test_it.py::test_the_wire_rises"
+    assert fates["bne -> nop"]["says"] == "test_it.py::test_it_does_not_rise_at_once"
+    assert {fates[words]["fate"] for words in ("cmp r2, #100 -> cmp r2, #99", "movs r2, #0 -> movs r2, #1")} == {
+        "survived"
+    }
+    assert fates["movs r1, #8 -> movs r1, #9"]["fate"] == "same"
+    assert sorted(path.name for path in Path("tests").iterdir() if path.name != "__pycache__") == [
+        "mine.toml", "test_it.py", "x.bin",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (SUITE.replace('PB12 high", within', 'PB13 high", within'), "test_it.py::test_the_wire_rises fails"),
+        ("def test_it():\n    pass\n", "no test of test_it.py drives the fixture bench"),
+        ("import nowhere_at_all\n", "pytest ended with exit code 2"),
+    ],
+)
+def test_tests_that_can_tell_nothing_are_refused(text: str, says: str, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("test_it.py").write_text(text, encoding="utf-8")
+    assert cli.run(["mutate", "x.bin", "test_it.py"]) == 2
+    assert says in capsys.readouterr().err

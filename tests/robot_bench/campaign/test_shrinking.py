@@ -7,10 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robot_bench.campaign.shrinking.failure import Failure, Way, failure_of
-from robot_bench.campaign.shrinking.reduction import ANGLE_STEPS, STEPS, fewest, rounded, rounder
-from robot_bench.campaign.shrinking.shrink import Judge, NoFailureError, shrink
-from robot_bench.campaign.shrinking.things import (
+from robot_bench.campaign.trial import Trial, run_trial, trial_of
+from robot_bench.campaign.variants.shrinking.failure import Failure, Way, failure_of
+from robot_bench.campaign.variants.shrinking.reduction import ANGLE_STEPS, STEPS, fewest, rounded, rounder
+from robot_bench.campaign.variants.shrinking.shrink import Judge, NoFailureError, shrink
+from robot_bench.campaign.variants.shrinking.things import (
     numbers,
     things,
     with_numbers,
@@ -18,7 +19,6 @@ from robot_bench.campaign.shrinking.things import (
     with_world,
     world_table,
 )
-from robot_bench.campaign.trial import Trial, run_trial, trial_of
 from simbase.timing import NS_PER_S, Nanos
 
 #: chosen: what no trial of these tests needs more of.
@@ -182,7 +182,7 @@ def test_a_robot_that_sees_nothing_needs_one_obstacle_of_nine_to_fail_the_same_w
 
 
 def test_a_failure_is_told_with_its_time_and_part_and_one_of_another_way_is_not() -> None:
-    trial = trial_of("dodge", settings=BLIND)
+    trial = trial_of("dodge", settings=[*BLIND, ("start.x_m", 2.2), ("start.y_m", 0.0), ("duration_s", 9.0)])
     found = failure_of(trial)
     assert found is not None
     assert (found.way, found.is_early) == (Way(what="touches nothing", part="front"), True)

@@ -15,9 +15,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import cast
 
-from robot_bench.campaign.shrinking.failure import Failure, Way, failure_of
-from robot_bench.campaign.shrinking.reduction import ANGLE_STEPS, STEPS, fewest, rounded, rounder
-from robot_bench.campaign.shrinking.things import (
+from robot_bench.campaign.trial import Trial
+from robot_bench.campaign.variants.shrinking.failure import Failure, Way, failure_of
+from robot_bench.campaign.variants.shrinking.reduction import ANGLE_STEPS, STEPS, fewest, rounded, rounder
+from robot_bench.campaign.variants.shrinking.things import (
     Number,
     Thing,
     numbers,
@@ -26,7 +27,6 @@ from robot_bench.campaign.shrinking.things import (
     with_things,
     with_world,
 )
-from robot_bench.campaign.trial import Trial
 from robot_bench.scenario.included_files import Setting
 from robot_bench.scenario.schema import Table
 from simbase.errors import P2osError
@@ -150,7 +150,7 @@ class _Shrinker:
 
 def shrink(
     trial: Trial, *, way: Way | None = None, quick: Sequence[Setting] = (), budget: int = BUDGET,
-    judge: Judge | None = None, look: Callable[[], None] = lambda: None,
+    judge: Judge = failure_of,
 ) -> Shrunk:  # fmt: skip
     """Return the smallest trial that is found which fails in the same way.
 
@@ -160,25 +160,23 @@ def shrink(
         quick: What makes a trial cheap (`("body", "kinematic")`). Where it fails in the same way so, that is shrunk,
             and the small trial has to fail as it was meant to run, too; else all is done at that cost.
         budget: Most trials, without the first one.
-        judge: Finds out how a trial fails; None runs it.
-        look: Called between slices of each run; may raise to end it.
+        judge: Finds out how a trial fails, by a run of it.
 
     Raises:
         NoFailureError: The trial does not fail, or not in that way.
     """
-    asked = judge or (lambda candidate, wanted, until_ns: failure_of(candidate, wanted, until_ns, look))
-    failure = asked(trial, way, None)
+    failure = judge(trial, way, None)
     if failure is None:
         raise NoFailureError(f"{trial.name} does not fail{f': {way}' if way else ''}", hint="p2os run shows it")
     way, spent = failure.way, 0
-    if quick and (cheap := asked(trial.set(*quick), way, None)) is not None:
-        small = _shrunk(trial.set(*quick), cheap, asked, budget)
+    if quick and (cheap := judge(trial.set(*quick), way, None)) is not None:
+        small = _shrunk(trial.set(*quick), cheap, judge, budget)
         spent = small.trials + 2
         meant = _as_meant(small.trial, trial, quick)
-        confirmed = asked(meant, way, None)
+        confirmed = judge(meant, way, None)
         if confirmed is not None:
             return replace(small, trial=meant, failure=confirmed, trials=spent)
-    small = _shrunk(trial, failure, asked, max(0, budget - spent))
+    small = _shrunk(trial, failure, judge, max(0, budget - spent))
     return replace(small, trials=small.trials + spent)
 
 

@@ -20,7 +20,7 @@ from bluepill_sim.analysis.coverage_page import source_lines
 from bluepill_sim.program.alterations import OPERATORS
 from bluepill_sim.program.line_table import LineTable
 from bluepill_sim.program.mutants import Mutant
-from robot_bench.campaign.mutation.trial import Fate, Found
+from robot_bench.campaign.variants.mutation.trial import Fate, Found
 from robot_bench.events.codec import Json
 from simbase.errors import FileError
 

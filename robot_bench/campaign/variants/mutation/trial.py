@@ -14,7 +14,7 @@ from typing import cast
 
 from bluepill_sim.program.mutants import Mutant
 from p2os.transport.wall_clock import Clock
-from robot_bench.campaign.mutation.base_run import BaseRun
+from robot_bench.campaign.variants.mutation.base_run import BaseRun
 from robot_bench.events.codec import Json
 from robot_bench.events.kinds import Event, Verdict
 from simbase.errors import P2osError
@@ -123,13 +123,19 @@ def _run(mutant: Mutant, base: BaseRun, clock: Clock, look: Callable[[], None]) 
         return Found(Fate.STOPPED, name, str(error), bench.now)
     if board.has_died:
         return Found(Fate.CRASHED, name, board.verdict, bench.now)
-    if not missed:
-        judged = bench.judge()
-        if judged.missed:
-            return Found(Fate.MISSED, name, judged.missed[0], bench.now)
-        is_same = bench.trace.sha256 == base.trace_sha256
-        return Found(Fate.SAME if is_same else Fate.SURVIVED, name)
-    return Found(Fate.MISSED, name, f"{missed[0].goal}: {missed[0].says}", missed[0].t)
+    if missed:
+        return Found(Fate.MISSED, name, f"{missed[0].goal}: {missed[0].says}", missed[0].t)
+    return _judged(base)
+
+
+def _judged(base: BaseRun) -> Found:
+    """Return what became of a mutant whose run came to its end."""
+    bench, name = base.bench, base.bench.scenario.name
+    end = bench.finish()
+    for goal, outcome, _ in bench.goals.outcomes(end):
+        if not outcome.met:
+            return Found(Fate.MISSED, name, f"{goal.wanted}: {outcome.says}", end)
+    return Found(Fate.SAME if bench.trace.sha256 == base.trace_sha256 else Fate.SURVIVED, name)
 
 
 class _TooDearError(P2osError):

@@ -3,8 +3,9 @@
 import json
 import shlex
 import sys
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated, Self, cast
 
 import typer
 from rich.console import Console
@@ -21,6 +22,8 @@ from robot_bench.campaign.processes import Processes
 from robot_bench.campaign.results import Whole
 from robot_bench.campaign.search import SEARCHES
 from robot_bench.campaign.suggestion import suggested
+from robot_bench.campaign.variants.against import Against, Other, first_apart, told
+from robot_bench.campaign.variants.diversity import clusters, diversity
 from robot_bench.campaign.whole import begin, carry_out, resume
 from robot_bench.cli.progress import RunDisplay
 from robot_bench.cli.workers import core_count
@@ -44,6 +47,7 @@ Examples:
   p2os campaign dodge-campaign.toml -j 2         search
   p2os campaign dodge-campaign.toml --firmware build/x.elf --runs 50
   p2os campaign --resume campaigns/dodge-001     go on after anything was killed
+  p2os campaign c.toml --firmware new.elf --against old.elf    where do they differ?
   p2os campaign big.toml --dask local -j 4       workers of Dask
 """
 #: chosen: so many failures are told of one by one.
@@ -67,6 +71,9 @@ def campaign(
     ] = None,
     firmware: Annotated[
         Path | None, typer.Option(help="ELF, HEX or BIN in place of the scenario's.", metavar="FILE")
+    ] = None,
+    against: Annotated[
+        Path | None, typer.Option(help="Another version: search for worlds where they differ.", metavar="FILE")
     ] = None,
     search: Annotated[str | None, typer.Option(help="Who proposes.", metavar="SEARCH")] = None,
     runs: Annotated[
@@ -101,7 +108,7 @@ def campaign(
     given: dict[str, object] = {"search": search, "seed": seed, "budget": None if runs is None else {"runs": runs}}
     overrides = {key: value for key, value in given.items() if value is not None}
     if go_on is not None:
-        if asked or overrides or firmware or out:
+        if asked or overrides or firmware or against or out:
             raise UsageError("--resume goes on with what was begun", hint="leave file and options out, but for -j")
         folder, found = go_on, resume(go_on)
     elif len(asked) == 1:
@@ -111,7 +118,10 @@ def campaign(
     else:
         raise UsageError("which campaign?", hint="p2os campaign FILE, or p2os campaign new SCENARIO")
     with RunDisplay(is_shown=False) as display:
+        other = Other.of(folder) if against is None else Other.kept(against, folder)
         workers = _workers(found, jobs or core_count(), dask, scheduler, display)
+        if other is not None:
+            workers = Against(workers, other)
         try:
             with Shown(found) as shown:
                 done = carry_out(
@@ -119,7 +129,7 @@ def campaign(
                 )
         finally:
             workers.close()
-    tell(done, json_output=json_output)
+    tell(done, other, json_output=json_output)
 
 
 def write_new(words: list[str], out: Path | None, firmware: Path | None) -> None:
@@ -184,19 +194,39 @@ class Shown:
             typer.echo(f"{points} of {self._whole} points: {said}", err=True)
 
 
-def tell(done: Whole, *, json_output: bool) -> None:
+def tell(done: Whole, other: Other | None, *, json_output: bool) -> None:
     """Print what came of a campaign, and end the command with its exit code."""
+    parts = {} if other is None or done.was_interrupted else parted(done, other)
     if json_output:
-        typer.echo(json.dumps(done.as_json(), sort_keys=True))
+        typer.echo(json.dumps(done.as_json() | as_set(done) | ({"parted": parts} if parts else {}), sort_keys=True))
     else:
-        print_whole(done)
+        print_whole(done, parts)
     if done.was_interrupted:
         raise typer.Exit(EXIT_INTERRUPTED)
     if done.failures:
         raise typer.Exit(1)
 
 
-def print_whole(done: Whole) -> None:
+def parted(done: Whole, other: Other) -> dict[int, str]:
+    """Return of the first points where two versions differ when and in what they part."""
+    found: dict[int, str] = {}
+    for row in done.failures[:MOST_TOLD]:
+        difference = None if row.failing is None else first_apart(row.failing.trial, other)
+        if difference is not None:
+            found[row.number] = told(difference)
+    return found
+
+
+def as_set(done: Whole) -> dict[str, object]:
+    """Return of the failures how many kinds they are, and how far they lie apart."""
+    runs = [run for row in done.failures if (run := row.failing) is not None]
+    apart = diversity([run.trial for run in runs], [run.outcome for run in runs])
+    numbers = [row.number for row in done.failures]
+    kinds = [[numbers[place] for place in cluster] for cluster in clusters([run.outcome for run in runs])]
+    return {"clusters": kinds, "diversity": {"obstacles": apart.obstacles, "ways": apart.ways}}
+
+
+def print_whole(done: Whole, parts: Mapping[int, str]) -> None:
     """Print the failures, each with the command that runs it again, what else was found, and the sum."""
     for row in done.failures[:MOST_TOLD]:
         run = row.failing
@@ -206,6 +236,8 @@ def print_whole(done: Whole) -> None:
         moment = done.moments.get(row.number)
         if moment is not None:
             typer.echo(f"        {moment.words}")
+        if row.number in parts:
+            typer.echo(f"        {parts[row.number]}")
         typer.echo(f"        {done.results.replay(row)}")
     if len(done.failures) > MOST_TOLD:
         typer.echo(f"and {len(done.failures) - MOST_TOLD} more; {done.folder / 'failures'} has all")
@@ -214,9 +246,21 @@ def print_whole(done: Whole) -> None:
         typer.echo(f"{row.finding.value}  point {row.number}: {why}")
     counts = [f"{done.counts[finding]} {finding.value}" for finding in Finding if done.counts.get(finding)]
     progress = done.progress
+    if done.failures:
+        _print_set(as_set(done))
     typer.echo(f"report  {done.folder / 'report.html'}")
     again = " (interrupted: --resume goes on)" if done.was_interrupted else ""
     typer.echo(
         f"{', '.join(counts) or 'nothing'} of {len(progress.rows)} points, {progress.runs} runs, "
         f"{progress.virtual_ns / 3.6e12:.2f} h of virtual time, {progress.cpu_s:.0f} s of processors{again}"
     )
+
+
+def _print_set(found: Mapping[str, object]) -> None:
+    kinds = cast("list[list[int]]", found["clusters"])
+    apart = cast("Mapping[str, float | None]", found["diversity"])
+    said = [f"{what} {value:.2f}" for what, value in apart.items() if value is not None]
+    points = [f"{', '.join(map(str, cluster))}" for cluster in kinds]
+    typer.echo(f"kinds   {len(kinds)}: points {' | '.join(points)}")
+    if said:
+        typer.echo(f"diversity of {', of '.join(said)} (0 all alike, 1 nothing in common)")

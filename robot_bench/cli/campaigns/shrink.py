@@ -1,0 +1,184 @@
+"""`p2os shrink`: a failing run made small, and kept as a scenario and a test."""
+
+import contextlib
+import json
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Annotated, cast
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+from p2os.cli.help_pages import BENCH
+from p2os.cli.quantities import option
+from robot_bench.campaign.trial import Trial, trial_of
+from robot_bench.campaign.variants.shrinking.failure import Failure, Way, failure_of
+from robot_bench.campaign.variants.shrinking.kept import Kept, keep, trial_of_run
+from robot_bench.campaign.variants.shrinking.shrink import BUDGET, Shrunk, shrink
+from robot_bench.cli.progress import RunDisplay
+from robot_bench.recording.run_record import TRACE_NAME
+from robot_bench.scenario.included_files import Setting, read_setting
+from robot_bench.scenario.scenario import load_scenario
+from robot_bench.scenario.schema import Table
+from simbase.errors import UsageError
+from simbase.timing import NS_PER_S, Nanos
+from simbase.units import COUNT, SEED
+
+#: What makes a trial cheap.
+QUICK: tuple[Setting, ...] = (("mode", "direct"), ("body", "kinematic"))
+HELP = """Make a failing run as small as it can be, and keep it as a test.
+
+What can be left out is: obstacles of the world and the scenario, events, faults,
+robots, goals that are met. Numbers are made round, the run as short as its failure.
+What is left fails in the same way: the same goal, and the same side of the hull
+where it touches something; a run of its files by another process proves it.
+
+RUN is a run folder; SCENARIO a name or a TOML file that fails. The folder that is
+written holds the scenario, a test for pytest that fails as it stands, a picture,
+what `p2os explain` says, and the run with its report.
+
+Exit code: 0 done, 1 nothing fails or the small run was not confirmed, 2 wrong usage.
+
+\b
+Examples:
+  p2os shrink runs/patrol-003                      what of that run mattered
+  p2os shrink patrol.toml --firmware build/bad.elf --out tests/found-1
+  p2os shrink patrol.toml --quick                  search on the plan view first
+  pytest tests/found-1 --firmware build/new.elf    is it mended?
+"""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the verb."""
+    app.command("shrink", help=HELP, rich_help_panel=BENCH)(shrink_run)
+
+
+def shrink_run(
+    run: Annotated[str, typer.Argument(help="A run folder, or a scenario.", metavar="RUN|SCENARIO")],
+    firmware: Annotated[
+        Path | None, typer.Option(help="ELF, HEX or BIN in place of the scenario's.", metavar="FILE")
+    ] = None,
+    mode: Annotated[str | None, typer.Option(help="As of p2os run.", metavar="direct|adapter")] = None,
+    body: Annotated[str | None, typer.Option(help="As of p2os run.", metavar="BODY")] = None,
+    seed: Annotated[int | None, option(SEED, "--seed", purpose="As of p2os run.", least="0")] = None,
+    set_: Annotated[
+        list[str] | None, typer.Option("--set", help="A key of the scenario; repeatable.", metavar="KEY=VALUE")
+    ] = None,
+    goal: Annotated[
+        str | None, typer.Option(help="The kind of the goal, where several are missed.", metavar="KIND")
+    ] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Search with pins straight to a plan view first.")] = False,
+    budget: Annotated[
+        int, option(COUNT, "--budget", purpose="Most runs.", shown=str(BUDGET), above_zero=True)
+    ] = BUDGET,
+    out: Annotated[Path | None, typer.Option(help="Folder; default shrunk/NAME-NNN.", metavar="FOLDER")] = None,
+    json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Shrink a failing run."""
+    options = {"mode": mode, "body": body, "seed": seed}
+    settings = [*map(read_setting, set_ or ()), *((key, value) for key, value in options.items() if value is not None)]
+    trial = _trial(run, firmware, settings)
+    if goal is not None:
+        trial = _with_goal(trial, goal)
+    folder = out or _next_folder(trial.name)
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise UsageError(f"{folder} is not empty", hint="--out names another folder")
+    with RunDisplay(is_shown=False) as display:
+        with _bar(budget) as advance:
+
+            def judge(candidate: Trial, way: Way | None, until_ns: Nanos | None) -> Failure | None:
+                advance()
+                return failure_of(candidate, way, until_ns, display.raise_if_interrupted)
+
+            small = shrink(trial, quick=QUICK if quick else (), budget=budget, judge=judge)
+        kept = keep(small.trial, small.failure.way, folder)
+    if json_output:
+        typer.echo(json.dumps(as_json(small, kept), sort_keys=True))
+    else:
+        _print(small, kept)
+    if not kept.is_confirmed:
+        typer.echo("the run of another process was not the same", err=True)
+        raise typer.Exit(1)
+
+
+@contextlib.contextmanager
+def _bar(budget: int) -> Iterator[Callable[[], None]]:
+    """Show on a terminal how many runs were made; yield what is called before each."""
+    bar = Progress(
+        TextColumn("runs"), BarColumn(), MofNCompleteColumn(), console=Console(stderr=True), transient=True,
+        auto_refresh=False, disable=not sys.stderr.isatty(),
+    )  # fmt: skip
+    with bar:
+        task = bar.add_task("", total=budget)
+        yield lambda: bar.update(task, advance=1, refresh=True)
+
+
+def _trial(run: str, firmware: Path | None, settings: list[Setting]) -> Trial:
+    """Return the trial of a run folder or a scenario.
+
+    Raises:
+        UsageError: A file is gone.
+        ScenarioError: There is no such scenario, or it breaks the schema.
+    """
+    if firmware is not None and not firmware.is_file():
+        raise UsageError(f"there is no firmware file {firmware}", hint="give an ELF, HEX or BIN file")
+    if (Path(run) / TRACE_NAME).is_file():
+        return trial_of_run(Path(run), firmware).set(*settings)
+    if Path(run).is_dir():
+        raise UsageError(f"{run} is no run folder: it has no {TRACE_NAME}", hint="p2os run makes one")
+    load_scenario(run, firmware=firmware, settings=settings)
+    return trial_of(run, firmware=firmware, settings=settings)
+
+
+def _with_goal(trial: Trial, kind: str) -> Trial:
+    """Return the trial with the goals of one kind alone.
+
+    Raises:
+        UsageError: It has none.
+    """
+    goals = [goal for goal in cast("list[Table]", trial.table.get("goal", [])) if goal["kind"] == kind]
+    if not goals:
+        raise UsageError(f"{trial.name} has no goal {kind!r}", hint="the kinds are those of its [[goal]] tables")
+    return trial.with_lists(goal=goals)
+
+
+def as_json(small: Shrunk, kept: Kept) -> dict[str, object]:
+    """Return what came of it as one JSON object."""
+    return {
+        "failure": str(small.failure.way),
+        "says": small.failure.says,
+        "at_s": small.failure.at_ns / NS_PER_S,
+        "things_before": small.things_before,
+        "things_after": small.things_after,
+        "trials": small.trials,
+        "is_complete": small.is_complete,
+        "is_confirmed": kept.is_confirmed,
+        "trace_sha256": kept.outcome.sha256,
+        "scenario": str(kept.scenario),
+        "test": str(kept.test),
+    }
+
+
+def _print(small: Shrunk, kept: Kept) -> None:
+    typer.echo(str(small.failure.way))
+    typer.echo(f"  {small.failure.says}")
+    things = f"{small.things_before} things that stand or happen, {small.things_after} needed"
+    typer.echo(f"  {things}; {small.trials} runs{'' if small.is_complete else ', and the budget was spent'}")
+    if kept.explained:
+        typer.echo("")
+        typer.echo(kept.explained)
+    typer.echo("")
+    typer.echo(f"again     p2os run {kept.scenario}")
+    typer.echo(f"test      pytest {kept.test}")
+    typer.echo(f"picture   {kept.scenario.parent / 'scene.png'}")
+    proof = "the same trace in another process" if kept.is_confirmed else "NOT the same in another process"
+    typer.echo(f"proof     {proof}: {kept.outcome.sha256[:16]}")
+
+
+def _next_folder(name: str) -> Path:
+    number = 1
+    while (found := Path("shrunk") / f"{name}-{number:03d}").exists():
+        number += 1
+    return found
