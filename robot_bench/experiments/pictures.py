@@ -87,6 +87,28 @@ def _names(found: Comparison) -> tuple[str, str]:
     return one, other
 
 
+def latency_figure(title: str, rows: Sequence[tuple[str, Sequence[float]]]) -> Figure:
+    """Draw the share of each step's times that are no longer than so many ms; the last row broader: it is the whole."""
+    figure = Figure(figsize=(8.0, 4.2), layout="constrained")
+    axes = figure.add_subplot()
+    for number, (name, seconds) in enumerate(rows):
+        times = sorted(1000 * value for value in seconds)
+        shares = [100 * place / len(times) for place in range(len(times) + 1)]
+        is_whole = number == len(rows) - 1
+        axes.step(
+            [times[0], *times], shares, where="post", label=f"{name}, {len(times)}",
+            linewidth=2.6 if is_whole else 1.6, color=MARK if is_whole else None,
+        )  # fmt: skip
+    axes.set_xscale("symlog", linthresh=1.0)
+    axes.set_xticks([0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000], ["0", "1", "2", "5", "10", "20", "50", "100", "200",
+                    "500", "1000"])  # fmt: skip
+    axes.set_xlim(left=0)
+    axes.set(xlabel="ms", ylabel="% no longer", title=title)
+    axes.grid(visible=True, color="#e3e3e3")
+    axes.legend(frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return figure
+
+
 def bars_figure(title: str, rows: Sequence[tuple[str, float, float]], unit: str) -> Figure:
     """Draw a bar and its spread for each row (name, value, half width), the first on top."""
     figure = Figure(figsize=(8.0, 1.2 + 0.38 * len(rows)), layout="constrained")
