@@ -242,6 +242,17 @@ class GoalJudge(Stateful):
                 found.missed.append(f"{goal.kind}: {outcome.says}")
         return found
 
+    def margins(self, end: Nanos) -> list[float | None]:
+        """Return by how much each goal was met in a run that ended at `end`, negative where it was missed.
+
+        Of a goal that was met at once and has no measure then, how far it got until the end; None where it has none.
+        """
+        rows = zip(self._decided, (watch.finish(end) for watch in self._watches), strict=True)
+        return [
+            last.robustness if decided is None or decided.robustness is None else decided.robustness
+            for decided, last in rows
+        ]
+
     def _outcomes(self, end: Nanos) -> list[tuple[Goal, Outcome, bool]]:
         rows = zip(self.goals, self._watches, self._decided, strict=True)
         return [(goal, watch.finish(end), decided is not None) for goal, watch, decided in rows]
