@@ -48,6 +48,7 @@ class OdometryErrors:
 
     left_wheel: float = 1.0
     right_wheel: float = 1.0
+    track: float = 1.0
     #: Standard deviation of the heading after 1 m of way, deg: it grows with the root of the way.
     drift_deg: float = 0.0
 
@@ -95,6 +96,7 @@ RANGES: Mapping[str, tuple[float, float]] = {
     "noise_m": (0, 10), "noise_part": (0, 10), "drift_deg": (0, 360), "compass_noise_deg": (0, 180),
     "gyro_noise_counts": (0, 512), "battery_resistance_ohm": (0, 10),
     "dropout": (0, 1), "crosstalk": (0, 1), "specular_deg": (0, 90), "left_wheel": (0.5, 2), "right_wheel": (0.5, 2),
+    "track": (0.5, 2),
     "compass_bias_deg": (-180, 180), "gyro_bias_counts": (-512, 512),
 }  # fmt: skip
 

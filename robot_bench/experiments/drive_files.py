@@ -36,6 +36,8 @@ SENSORS = 8
 #: What a run at a real robot's port says of its body.
 REMOTE = "remote"
 DEFAULT_ROBOT = "p2dx"
+#: One that comes later than this after the last follows one that was lost, seconds: the CONFIGpac has a byte for it.
+LONGEST_CYCLE_S = 0.255
 _TUM_COLUMNS = 8
 #: Longer is no number.
 _LONGEST_FIELD = 64
@@ -57,6 +59,7 @@ class _Told:
         parameters = self.parameters
         odometry, metres_per_count = Odometry(parameters), parameters.range_nm_per_count / 1e9
         first: tuple[int, int, int] | None = None
+        before = 0.0
         for row in rows_of(chunks, Reading(profile=profile, parameters=parameters)):
             at = row.at_ns / NS_PER_S
             if row.direction is Direction.TO_ROBOT:
@@ -73,9 +76,11 @@ class _Told:
             conv = parameters.velocity_conv / 1000
             self.left.append((at, sip.raw_left_velocity * conv))
             self.right.append((at, sip.raw_right_velocity * conv))
-            for reading in sip.sonar:
+            each_s = spread_s(len(sip.sonar), parameters.sonar_fitted, at - before)
+            before = at
+            for place, reading in enumerate(sip.sonar, 1 - len(sip.sonar)):
                 metres = min(reading.raw_range * metres_per_count, parameters.sonar_range_m)
-                self.sonar.setdefault(reading.number, []).append((at, metres))
+                self.sonar.setdefault(reading.number, []).append((at + place * each_s, metres))
         if first is not None:
             self._begin_at(first)
 
@@ -93,6 +98,17 @@ class _Told:
         drive.commands = {name: steps_of(pairs) for name, pairs in self.commands.items()}
         drive.sonar_m = {number: steps_of(pairs) for number, pairs in self.sonar.items()}
         return drive
+
+
+def spread_s(readings: int, fitted: int, since_s: float) -> float:
+    """Return how far apart the readings of a packet were taken, seconds: they fire in turn between two packets.
+
+    Args:
+        readings: How many the packet has; all at once where it has one of every sonar.
+        fitted: How many sonar there are.
+        since_s: Since the packet before.
+    """
+    return min(since_s, LONGEST_CYCLE_S) / readings if 1 < readings < fitted else 0.0
 
 
 #: Says how to read a capture, whose chunks it looks into.
@@ -123,11 +139,28 @@ def read_drive(path: Path, *, robot: str = "", how: HowToRead | None = None) -> 
         raise FileError(f"cannot read {shown_name(path)}: {getattr(error, 'strerror', None) or 'no text'}") from error
     chunks = open_file(path).chunks
     reading, chunks = how(chunks) if how else (Reading(profile=Profile.P2OS, parameters=_parameters(robot)), chunks)
-    told = _Told(reading.parameters)
-    told.take(chunks, reading.profile)
-    drive = told.into(Drive(name=path.name, parameters=told.parameters))
+    return drive_of_capture(path.name, chunks, reading.parameters, reading.profile)
+
+
+def drive_of_capture(
+    name: str, chunks: Iterable[Chunk], parameters: RobotParameters, profile: Profile = Profile.P2OS
+) -> Drive:
+    """Return what a recorded conversation tells of a drive.
+
+    Args:
+        name: What it is called.
+        chunks: What was said.
+        parameters: The robot's units.
+        profile: Its firmware family.
+
+    Raises:
+        FileError: It has no two standard packets.
+    """
+    told = _Told(parameters)
+    told.take(chunks, profile)
+    drive = told.into(Drive(name=name, parameters=parameters))
     if drive.odometry is None:
-        raise FileError(f"{shown_name(path)} holds no two standard packets of a robot", hint="p2os decode FILE")
+        raise FileError(f"{shown_name(name)} holds no two standard packets of a robot", hint="p2os decode FILE")
     drive.left_mps, drive.right_mps = drive.told_left_mps, drive.told_right_mps
     return drive
 

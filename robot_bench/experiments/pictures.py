@@ -5,7 +5,7 @@ Invariant: the same figures give the same bytes.
 
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from robot_bench.experiments.comparison import Comparison
+from robot_bench.experiments.sensitivity import Effect
 from simbase.errors import FileError, shown_name
 
 #: The colours of the report's plots.
@@ -87,18 +88,46 @@ def _names(found: Comparison) -> tuple[str, str]:
     return one, other
 
 
-def bars_figure(title: str, rows: Sequence[tuple[str, float, float]], unit: str) -> Figure:
-    """Draw a bar and its spread for each row (name, value, half width), the first on top."""
-    figure = Figure(figsize=(8.0, 1.2 + 0.38 * len(rows)), layout="constrained")
+def latency_figure(title: str, rows: Sequence[tuple[str, Sequence[float]]]) -> Figure:
+    """Draw the share of each step's times that are no longer than so many ms; the last row broader: it is the whole."""
+    figure = Figure(figsize=(8.0, 4.2), layout="constrained")
     axes = figure.add_subplot()
-    places = range(len(rows))
-    axes.barh(
-        [*places], [value for _, value, _ in rows], xerr=[spread for *_, spread in rows], color=ONE,
-        ecolor=MARK, capsize=3,
-    )  # fmt: skip
-    axes.set_yticks([*places], [name for name, *_ in rows])
-    axes.invert_yaxis()
-    axes.grid(visible=True, axis="x", color="#e3e3e3")
-    axes.set_axisbelow(True)
-    axes.set(xlabel=unit, title=title)
+    for number, (name, seconds) in enumerate(rows):
+        times = sorted(1000 * value for value in seconds)
+        shares = [100 * place / len(times) for place in range(len(times) + 1)]
+        is_whole = number == len(rows) - 1
+        axes.step(
+            [times[0], *times], shares, where="post", label=f"{name}, {len(times)}",
+            linewidth=2.6 if is_whole else 1.6, color=MARK if is_whole else None,
+        )  # fmt: skip
+    axes.set_xscale("symlog", linthresh=1.0)
+    axes.set_xticks([0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000], ["0", "1", "2", "5", "10", "20", "50", "100", "200",
+                    "500", "1000"])  # fmt: skip
+    axes.set_xlim(left=0)
+    axes.set(xlabel="ms", ylabel="% no longer", title=title)
+    axes.grid(visible=True, color="#e3e3e3")
+    axes.legend(frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return figure
+
+
+def effects_figure(title: str, effects: Mapping[str, Sequence[Effect]]) -> Figure:
+    """Draw, for each outcome, every parameter's mu* with its interval, and what it does alone as a dot."""
+    counts = [len(rows) for rows in effects.values()]
+    figure = Figure(figsize=(8.0, 1.0 + sum(0.9 + 0.36 * count for count in counts)), layout="constrained")
+    grid = figure.subplots(len(counts), 1, squeeze=False, gridspec_kw={"height_ratios": [1.0 + n for n in counts]})
+    for axes, (name, rows) in zip(grid[:, 0], effects.items(), strict=True):
+        places = [*range(len(rows))]
+        axes.barh(
+            places, [one.mu_star or 0.0 for one in rows], xerr=[one.mu_star_conf or 0.0 for one in rows],
+            color="#9dbdd6", ecolor=MARK, capsize=3, label="mu*, with its 95 % interval",
+        )  # fmt: skip
+        axes.plot([one.spread or 0.0 for one in rows], places, "o", color=OTHER, label="alone")
+        axes.set_yticks(places, [one.key for one in rows])
+        axes.invert_yaxis()
+        axes.set_xlim(left=0)
+        axes.set_title(name, loc="left", fontsize=10)
+        axes.grid(visible=True, axis="x", color="#e3e3e3")
+        axes.set_axisbelow(True)
+    grid[0, 0].legend(frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, fontsize=9)
+    figure.suptitle(title, fontsize=11)
     return figure

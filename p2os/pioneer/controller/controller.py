@@ -180,7 +180,7 @@ class Pioneer(Stateful):
             motion=Motion(_limits_of(parameters, flash), track_mm=parameters.track_mm, dt_ns=body.dt_ns),
             reckoning=DeadReckoning(
                 wheel_diameter_m=parameters.body.wheel_diameter_m, track_mm=parameters.track_mm,
-                left_wheel=odometry.left_wheel, right_wheel=odometry.right_wheel,
+                left_wheel=odometry.left_wheel, right_wheel=odometry.right_wheel, track=odometry.track,
             ),
             sonar=self._new_sonar(),
             vel2_divisor=parameters.vel2_divisor,

@@ -22,19 +22,21 @@ class DeadReckoning(Stateful):
     STATE = ("x_mm", "y_mm", "turned_rad", "travel_mm", "_zero_rad", "_left_rad", "_right_rad", "left_mm", "right_mm")
 
     def __init__(
-        self, *, wheel_diameter_m: float, track_mm: int, left_wheel: float = 1.0, right_wheel: float = 1.0
-    ) -> None:
+        self, *, wheel_diameter_m: float, track_mm: int, left_wheel: float = 1.0, right_wheel: float = 1.0,
+        track: float = 1.0,
+    ) -> None:  # fmt: skip
         """Start at the origin.
 
         Args:
             wheel_diameter_m: What the body's wheels measure.
-            track_mm: What the firmware assumes.
+            track_mm: The body's.
             left_wheel: True size of the left wheel over what the firmware assumes; the right one alike.
             right_wheel: The same.
+            track: True track over what the firmware assumes.
         """
         self._left_radius_mm = wheel_diameter_m * 500 / left_wheel
         self._right_radius_mm = wheel_diameter_m * 500 / right_wheel
-        self._track_mm = track_mm
+        self._track_mm = track_mm / track
         self._left_rad = 0.0
         self._right_rad = 0.0
         self._zero_rad = 0.0

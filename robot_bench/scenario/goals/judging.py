@@ -248,6 +248,17 @@ class GoalJudge(Stateful):
                 found.missed.append(f"{goal.kind}: {outcome.says}")
         return found
 
+    def margins(self, end: Nanos) -> list[float | None]:
+        """Return by how much each goal was met in a run that ended at `end`, negative where it was missed.
+
+        Of a goal that was met at once and has no measure then, how far it got until the end; None where it has none.
+        """
+        rows = zip(self._decided, (watch.finish(end) for watch in self._watches), strict=True)
+        return [
+            last.robustness if decided is None or decided.robustness is None else decided.robustness
+            for decided, last in rows
+        ]
+
     def outcomes(self, end: Nanos) -> list[tuple[Goal, Outcome, bool]]:
         """Return each goal with what became of it in a run that ended at `end`, and whether that was decided before."""
         rows = zip(self.goals, self._watches, self._decided, strict=True)

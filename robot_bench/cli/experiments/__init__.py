@@ -1,0 +1,1 @@
+"""The verbs that experiments are made with."""

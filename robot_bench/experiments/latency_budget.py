@@ -1,0 +1,135 @@
+"""How long a change takes on its way around the loop, part by part, out of a run's events.
+
+    ping → packet → sensor pin → motor pins → command → wheels
+
+A step ends where the next begins, so that the steps of one chain add up to its whole. Times are those at which bytes
+have arrived and levels have changed. When a sonar pinged is not recorded: it follows from its place among the readings
+of its packet, which fire in turn, and from the packet's time on the line. Wheels are seen each 50 ms, and their
+answer is followed back along the ramp (`onsets`).
+
+What answers what: a change of the motor pins answers the last change of a sensor pin in `LONGEST_S` before it, a
+command that sets another speed the last change of the motor pins. A program that acts by itself has motor changes
+without a sensor's, and those are in no chain.
+
+Invariant: no step is negative.
+"""
+
+from bisect import bisect_left, bisect_right
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from p2os.errors import LocalProtocolError, RemoteProtocolError
+from p2os.protocol.frames import Frame
+from p2os.protocol.line_time import LineTime
+from p2os.protocol.profiles import Profile
+from p2os.protocol.sip import SIP_KINDS, StandardSip
+from robot_bench.events.kinds import Packet
+from robot_bench.experiments.drive_files import spread_s
+from robot_bench.experiments.drives import Drive, Floats
+from robot_bench.experiments.onsets import SPEED_COMMANDS, answers, changes
+from simbase.timing import NS_PER_S
+
+#: chosen: later than this a change answers something else, seconds.
+LONGEST_S = 0.5
+#: chosen: edges of one value of the pins come within this, seconds.
+TOGETHER_S = 0.002
+#: Bits a second of the line between adapter and robot where nobody says otherwise.
+LINE_BAUD = 9600
+#: Steps of the loop, in order.
+STEPS = ("ping to packet", "packet to pin", "pin to motor", "motor to command", "command to wheel")
+WHOLE = "ping to wheel"
+
+
+@dataclass(slots=True)
+class Budget:
+    """Seconds of each step, as often as it was seen; of the whole, where a chain has all of them."""
+
+    steps: dict[str, list[float]] = field(default_factory=lambda: {name: [] for name in (*STEPS, WHOLE)})
+
+    def of(self, name: str) -> Floats:
+        """Return the times of a step, seconds."""
+        return np.array(self.steps[name], dtype=np.float64)
+
+
+@dataclass(frozen=True, slots=True)
+class _Reading:
+    """A packet that brought a sonar's reading: when the ping was, when it had arrived."""
+
+    ping_s: float
+    packet_s: float
+
+
+def latency_budget(drive: Drive) -> Budget:
+    """Return the budget of a run; a step that a recording does not show has no times."""
+    found = Budget()
+    readings = _readings(drive)
+    pins = sorted((at, number) for number, steps in drive.sensors.items() for at in steps.t_s[1:].tolist())
+    pin_times = [at for at, _ in pins]
+    motors = _motor_changes(drive)
+    commands = sorted(at for name in SPEED_COMMANDS if name in drive.commands for at in changes(drive.commands[name]))
+    onsets = {answer.command_s: answer.onset_s for answer in answers(drive)}
+    chains: dict[float, float] = {}
+    for at, number in pins:
+        brought = _last(readings.get(number - 1, ()), at)
+        if brought is not None:
+            found.steps[STEPS[0]].append(brought.packet_s - brought.ping_s)
+            found.steps[STEPS[1]].append(at - brought.packet_s)
+            chains[at] = brought.ping_s
+    for place, at in enumerate(motors):
+        cause = _before(pin_times, at)
+        # What the pins said before the last change of the motors was answered by that.
+        if cause is None or (place and motors[place - 1] >= cause):
+            cause = None
+        else:
+            found.steps[STEPS[2]].append(at - cause)
+        until = motors[place + 1] if place + 1 < len(motors) else np.inf
+        number = bisect_left(commands, at)
+        if number >= len(commands) or commands[number] >= min(until, at + LONGEST_S):
+            continue
+        found.steps[STEPS[3]].append(commands[number] - at)
+        if commands[number] in onsets and cause is not None and cause in chains:
+            found.steps[WHOLE].append(onsets[commands[number]] - chains[cause])
+    found.steps[STEPS[4]] += [onset - at for at, onset in onsets.items()]
+    return found
+
+
+def _readings(drive: Drive) -> Mapping[int, Sequence[_Reading]]:
+    """Return of each sonar, from 0, the packets that brought a reading, in order."""
+    found: dict[int, list[_Reading]] = {}
+    line, before = LineTime(LINE_BAUD), 0.0
+    for event in drive.events or ():
+        if not isinstance(event, Packet) or event.direction != "r2c":
+            continue
+        try:
+            frame = Frame.from_bytes(event.data)
+            if frame.kind not in SIP_KINDS:
+                continue
+            sip = StandardSip.from_frame(frame, Profile.P2OS)
+        except (LocalProtocolError, RemoteProtocolError):  # a noisy line: no sound frame
+            continue
+        at = event.t / NS_PER_S
+        made = at - line.time_of(len(event.data)) / NS_PER_S
+        each = spread_s(len(sip.sonar), drive.parameters.sonar_fitted, at - before)
+        before = at
+        for place, reading in enumerate(sip.sonar, 1 - len(sip.sonar)):
+            found.setdefault(reading.number, []).append(_Reading(made + place * each, at))
+    return found
+
+
+def _last(readings: Sequence[_Reading], at_s: float) -> _Reading | None:
+    place = bisect_right(readings, at_s, key=lambda reading: reading.packet_s)
+    found = readings[place - 1] if place else None
+    return found if found is not None and at_s - found.packet_s <= LONGEST_S else None
+
+
+def _before(times: Sequence[float], at_s: float) -> float | None:
+    place = bisect_right(times, at_s)
+    return times[place - 1] if place and at_s - times[place - 1] <= LONGEST_S else None
+
+
+def _motor_changes(drive: Drive) -> list[float]:
+    """Return when the motor pins took another value; edges of one write are one change, at the first of them."""
+    times = sorted(at for steps in drive.motors.values() for at in steps.t_s[1:].tolist())
+    return [at for place, at in enumerate(times) if not place or at - times[place - 1] > TOGETHER_S]

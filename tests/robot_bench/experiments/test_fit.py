@@ -1,0 +1,239 @@
+"""A robot's parameters out of drives: planted errors come back within intervals, and what is not seen is named."""
+
+import dataclasses
+import json
+import math
+import random
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from p2os.pioneer.sensor_errors import load_sensor_errors
+from p2os.pioneer.world import load_world
+from p2os.robots.parameters import load_parameters
+from robot_bench.experiments.drive_files import drive_of_capture, read_drive
+from robot_bench.experiments.drives import Drive, Steps, Trajectory
+from robot_bench.experiments.fitting.examples import Recorded, empty_world, planted, record, square, wandering, write
+from robot_bench.experiments.fitting.least_squares import Parameter, fit
+from robot_bench.experiments.fitting.ramps import fit_ramps, ramped
+from robot_bench.experiments.fitting.sonar import fit_sonar, nearest
+from robot_bench.experiments.fitting.umbmark import by_formulas, umbmark
+from robot_bench.experiments.fitting.wheels import fit_wheels
+from simbase.errors import FileError
+from tests.robot_bench.experiments.synthetic_robots import WALLS, Planted, drive, seen
+
+P2DX = load_parameters("p2dx")
+#: What a synthetic robot has besides what was planted by name.
+TRUE = {"sonar_offset_m": lambda _robot: 0.0, "sonar_delay_s": lambda robot: robot.packet_delay_s}
+
+
+def truth_of(robot: Planted, name: str) -> float:
+    return TRUE[name](robot) if name in TRUE else getattr(robot, name)
+
+
+def fits_of(seed: int):
+    source = random.Random(seed)
+    robot = Planted.drawn(source)
+    driven = drive(P2DX, robot, source)
+    return robot, [fit_wheels([driven]), fit_ramps([driven]), fit_sonar([driven], WALLS)]
+
+
+@pytest.mark.parametrize("seed", [1000, 1001])
+def test_planted_errors_come_back_near_to_their_intervals(seed: int) -> None:
+    robot, fits = fits_of(seed)
+    names = [name for found in fits for name in found.estimates]
+    assert len(names) == 16
+    for found in fits:
+        assert found.unseen == {}
+        for name, one in found.estimates.items():
+            assert abs(one.value - truth_of(robot, name)) < 2.5 * one.half_width, name
+
+
+@pytest.mark.slow
+def test_the_intervals_cover_the_truth_of_90_to_99_of_100_robots() -> None:
+    covered: dict[str, int] = {}
+    for seed in range(100):
+        robot, fits = fits_of(seed)
+        for found in fits:
+            for name, one in found.estimates.items():
+                covered[name] = covered.get(name, 0) + (one.low <= truth_of(robot, name) <= one.high)
+    assert len(covered) == 16
+    assert {name: count for name, count in covered.items() if not 90 <= count <= 99} == {}
+
+
+def test_a_drive_without_turns_shows_no_track_and_no_turning_ramps() -> None:
+    source = random.Random(5)
+    robot = Planted.drawn(source)
+    straight = drive(
+        P2DX, dataclasses.replace(robot, left_wheel=1.01, right_wheel=1.01), source, 30.0, 0.0, turns=False
+    )
+    wheels, ramps = fit_wheels([straight]), fit_ramps([straight])
+    assert "track_mm" in wheels.unseen
+    assert {"rot_accel_deg_s2", "rot_decel_deg_s2", "turn_gain"} <= ramps.unseen.keys()
+    assert "track_mm" not in wheels.estimates
+    for found, name in ((wheels, "left_wheel"), (ramps, "accel_mm_s2")):
+        expected = 1.01 if name == "left_wheel" else robot.accel_mm_s2
+        assert abs(found.estimates[name].value - expected) < 3 * found.estimates[name].half_width
+
+
+def test_parameters_that_only_their_sum_shows_are_both_named() -> None:
+    x = np.linspace(0, 1, 50)
+    noise = np.random.default_rng(1).normal(0, 0.01, 50)
+    two = [Parameter(name=name, start=0.0, scale=1.0, least=-9, most=9) for name in ("a", "b")]
+    alone = Parameter(name="c", start=0.0, scale=1.0, least=-9, most=9)
+    found = fit(
+        lambda v: (v[0] + v[1]) * x + v[2] - 3 * x - 1 + noise, [*two, alone], np.arange(50), floor=1e-6, why="more"
+    )
+    assert found.unseen.keys() == {"a", "b"}
+    assert "of a and b" in found.unseen["a"]
+
+
+def test_an_interval_of_a_line_is_that_of_the_textbook() -> None:
+    random_ = np.random.default_rng(2)
+    x = np.linspace(-1, 1, 400)
+    y = 2 * x + random_.normal(0, 0.1, 400)
+    found = fit(
+        lambda v: v[0] * x - y, [Parameter(name="a", start=0.0, scale=1.0, least=-9, most=9)], np.arange(400),
+        floor=1e-6, why="",
+    )  # fmt: skip
+    # sigma / sqrt(sum of x²), with 133.7 = sum of x², and Student's 1.966 for 399.
+    assert found.estimates["a"].half_width == pytest.approx(1.966 * 0.1 / math.sqrt(133.7), rel=0.15)
+    assert found.estimates["a"].low < 2 < found.estimates["a"].high
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_as_many_pieces_as_parameters_are_too_few(count: int) -> None:
+    parameters = [Parameter(name=name, start=0.0, scale=1.0, least=-9, most=9) for name in "ab"]
+    x = np.arange(float(count))
+
+    def found() -> object:
+        return fit(lambda v: v[0] * x + v[1] - x, parameters, np.arange(count), floor=1e-6, why="")
+
+    if count == 2:
+        with pytest.raises(FileError, match="2 pieces"):
+            found()
+    else:
+        found()
+
+
+@pytest.mark.parametrize(
+    ("at_s", "speed"), [(1.0, 0.0), (1.5, 100.0), (2.0, 200.0), (3.0, 200.0), (3.25, 125.0), (3.666667, 0.0),
+                        (4.166667, -100.0), (9.0, -200.0)]
+)  # fmt: skip
+def test_a_ramp_goes_through_0_at_its_deceleration_and_on_at_its_acceleration(at_s: float, speed: float) -> None:
+    commands = Steps(np.array([1.0, 3.0]), np.array([200.0, -200.0]))
+    assert ramped(commands, np.array([0.0, at_s]), 200.0, 300.0)[1] == pytest.approx(speed, abs=1e-3)
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.3, 0.8, 2.0, -2.5])
+@pytest.mark.parametrize("half_deg", [5.0, 15.0, 30.0])
+def test_rays_and_feet_of_walls_agree(heading: float, half_deg: float) -> None:
+    half = math.radians(half_deg)
+    fans = heading + half * np.linspace(-1, 1, 9)[None, :]
+    found = nearest(WALLS, np.array([0.4]), np.array([-0.7]), fans, 5.0)[0]
+    expected = seen(0.4, -0.7, heading, half)
+    # The foot of a wall lies between two rays at most an eighth of the cone apart.
+    assert expected - 1e-9 <= found <= expected / math.cos(half / 8) + 1e-9
+
+
+def test_the_formulas_give_back_small_errors_of_their_own_derivation() -> None:
+    side, track, alpha, beta = 4.0, 0.34, 0.01, 0.004
+    centres = tuple(
+        np.array([-2 * side * (alpha + sign * beta), sign * -2 * side * (alpha + sign * beta)]) for sign in (1, -1)
+    )
+    e_d, e_b = by_formulas((centres[0], centres[1]), side, track)
+    assert e_b == pytest.approx(90 / (90 - math.degrees(alpha)))
+    radius = side / 2 / math.sin(beta / 2)
+    assert e_d == pytest.approx((radius + track / 2) / (radius - track / 2))
+
+
+def squares(seed: int, runs: int, *, noise: bool) -> list[Drive]:
+    robot = planted(seed, noise=noise)
+    found = []
+    for clockwise in (True, False):
+        for number in range(runs):
+            recorded = record(robot, empty_world(), square(clockwise=clockwise), seed=number, camera=noise)
+            found.append(drive_of(recorded))
+    return found
+
+
+def drive_of(recorded: Recorded) -> Drive:
+    found = drive_of_capture("a square", recorded.capture, P2DX)
+    found.truth = Trajectory.of_rows(list(recorded.poses))
+    return found
+
+
+@pytest.fixture(scope="module")
+def two_squares() -> list[Drive]:
+    return squares(1, 1, noise=False)
+
+
+def test_without_noise_the_largest_return_error_falls_ten_times(two_squares: list[Drive]) -> None:
+    found = umbmark(two_squares)
+    assert found.before.largest_m > 0.05
+    # Formulas of the first order, where the largest error is a quarter of the square's side.
+    assert found.formulas.largest_m < found.before.largest_m / 5
+    assert found.least_squares.largest_m < found.before.largest_m / 10
+
+
+@pytest.mark.slow
+def test_the_return_errors_of_five_robots_fall_ten_times_without_noise_and_their_centres_five_times_with_it() -> None:
+    for seed in range(2, 7):
+        found = umbmark(squares(seed, 1, noise=False))
+        if found.before.largest_m > 0.05:
+            assert found.least_squares.largest_m < found.before.largest_m / 10, seed
+    with_noise = umbmark(squares(1, 5, noise=True))
+    assert with_noise.least_squares.e_max_m < with_noise.before.e_max_m / 5
+
+
+def test_squares_of_one_way_round_and_what_is_no_square_are_refused(two_squares: list[Drive]) -> None:
+    with pytest.raises(FileError, match="one way round"):
+        umbmark(two_squares[:1])
+    line = drive(P2DX, Planted.drawn(random.Random(1)), random.Random(1), 8.0, turns=False)
+    with pytest.raises(FileError, match="a square by 270 or 360"):
+        umbmark([*two_squares, line])
+
+
+def test_an_example_gives_back_what_was_planted_in_files_that_are_taken(p2os, capsys) -> None:
+    robot = planted(4)
+    write(record(robot, load_world("room"), wandering(1, 30.0), seed=1), Path("d0.jsonl"))
+    assert p2os("fit", "d0.jsonl", "--world", "room", "--out", "mine") == 0
+    out = capsys.readouterr().out
+    assert all(len(line) <= 80 for line in out.splitlines())
+    fitted, errors = load_parameters("mine.toml"), load_sensor_errors("mine-errors.toml")
+    assert fitted.track_mm == pytest.approx(robot.parameters.track_mm, abs=1)
+    assert fitted.motion.accel_mm_s2 == pytest.approx(robot.parameters.motion.accel_mm_s2, abs=3)
+    assert fitted.sonar_cone_deg == pytest.approx(robot.parameters.sonar_cone_deg, abs=0.5)
+    assert errors.odometry.left_wheel == pytest.approx(robot.errors.odometry.left_wheel, abs=0.004)
+    assert errors.odometry.track == pytest.approx(robot.errors.odometry.track, abs=0.004)
+    assert errors.sonar.noise_m == pytest.approx(0.008, abs=0.004)
+    assert p2os("fit", "d0.jsonl", "--json") == 0
+    assert "--world" not in json.loads(capsys.readouterr().out)["sonar"]["not_fitted"]
+
+
+def test_a_run_folder_is_fitted_without_any_other_file(runs: Path) -> None:
+    found = fit_wheels([read_drive(runs / "near")])
+    assert found.estimates["left_wheel"].low < 1.0 < found.estimates["left_wheel"].high
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ([], "which drives?"),
+        (["missing.jsonl"], "there is no missing.jsonl"),
+        (["w.jsonl", "--world", "roof"], "roof"),
+        (["w.jsonl", "--truth", "a", "--truth", "b"], "2 --truth for 1 drives"),
+        (["w.jsonl", "--robot", "p9"], "no robot model"),
+        (["--example", "full"], "holds something already"),
+        (["--umbmark", "w.jsonl"], "no measured poses"),
+    ],
+)
+def test_what_cannot_be_fitted_is_told_in_one_line(words: list[str], says: str, runs: Path, p2os, capsys) -> None:
+    Path("w.jsonl").write_bytes((runs / "near" / "wire.jsonl").read_bytes())
+    Path("full").mkdir()
+    Path("full/a").write_text("a", encoding="utf-8")
+    assert p2os("fit", *words) == 2
+    errors = capsys.readouterr().err
+    assert says in errors
+    assert "Traceback" not in errors
