@@ -175,7 +175,7 @@ def configuration(endpoint: str, *, is_router: bool) -> "zenoh.Config":
     own, other = ("listen/endpoints", "connect/endpoints") if is_router else ("connect/endpoints", "listen/endpoints")
     rows: dict[str, object] = {
         "mode": "router" if is_router else "client", "scouting/multicast/enabled": False, own: [endpoint], other: [],
-        "connect/timeout_ms": CONNECT_MS, "connect/exit_on_failure": True,
+        "connect/timeout_ms": CONNECT_MS, "connect/exit_on_failure": True, "scouting/delay": 0,
     }  # fmt: skip
     for key, value in rows.items():
         config.insert_json5(key, json.dumps(value))
