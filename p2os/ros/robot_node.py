@@ -130,12 +130,12 @@ class RobotNode:
     def take_state(self, state: RobotState, stamp: Nanos) -> list[Outgoing]:
         """Return what a state makes; `stamp` is when it came, as ROS counts time."""
         frames, motion = self.frames, self._travel.take(state)
-        found: list[Outgoing] = self._take_sonars(state, stamp)
         pose = (motion.x_m, motion.y_m, motion.heading_rad)
-        found += [
+        found: list[Outgoing] = [
             (self._topic("odom"), odometry(stamp, frames, motion)),
             (self._topic("tf"), {"transforms": frames.moving(stamp, pose, motion.wheels_rad)}),
             (self._topic("joint_states"), joint_state(stamp, frames, motion)),
+            *self._take_sonars(state, stamp),
             (self._topic("sonar"), sonar_points(stamp, frames, state.sonar)),
             (self._topic("battery_state"), battery(stamp, state)),
         ]

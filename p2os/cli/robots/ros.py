@@ -175,7 +175,7 @@ class NodeLoop:
         self._complained_at: Nanos = -COMPLAINT_NS
         self._link = Link.OPEN.value
         self._is_open = True
-        self.counts = {"speeds": 0, "refused": 0}
+        self.counts = {"commands": 0, "refused": 0}
 
     def run(self, is_over: Callable[[], bool]) -> None:
         """Go on until `is_over` says so; it is asked ten times a second or more often."""
@@ -198,6 +198,7 @@ class NodeLoop:
         due = self._node.next_deadline()
         wait_s = LOOK_S if due is None else min(LOOK_S, max(0, due - wall_clock()) / NS_PER_S)
         received = self._network.take(wait_s)
+        self.counts["commands"] += len(received)
         now = wall_clock()
         for asked in (*self._node.take_commands(received, now), *self._node.advance_to(now)):
             self._ask(asked)
@@ -234,7 +235,6 @@ class NodeLoop:
         try:
             match asked:
                 case Speed(forward_mps, turn_radps):
-                    self.counts["speeds"] += 1
                     self._client.set_velocity(forward_mps, turn_radps)
                 case Stop():
                     self._client.stop()
