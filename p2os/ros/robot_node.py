@@ -30,7 +30,7 @@ from p2os.ros.robot_messages import (
     sonar_range,
 )
 from p2os.ros.thesis_topics import FIRST, STEP_MPS, encoder_code, motor_speed, near
-from p2os.ros.topics import TOPICS
+from p2os.ros.topics import SERVICES, TOPICS
 from p2os.ros.transport import NodeOptions, Received, Topic
 from p2os.ros.urdf import urdf_text
 from simbase.timing import Nanos
@@ -109,6 +109,7 @@ class RobotNode:
         self._motors_on: bool | None = None
         self._codes = {"motor_left": 0.0, "motor_right": 0.0}
         self.commands: Mapping[Topic, str] = {self._topic(key): key for key in COMMANDS}
+        self.services: Mapping[Topic, str] = {row.topic(options): key for key, row in SERVICES.items()}
 
     def announced(self) -> Iterator[Topic]:
         """Yield what is published from the beginning."""
@@ -172,6 +173,10 @@ class RobotNode:
             return asked
         self._stops_at = now + self._deadman_ns
         return [*asked, speed]
+
+    def take_call(self, call: Received) -> Asked:
+        """Return what the call of a service asks for."""
+        return self._asked(self.services[call.topic], call.message)
 
     def next_deadline(self) -> Nanos | None:
         """Return when the deadman stops the robot."""

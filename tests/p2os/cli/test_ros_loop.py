@@ -22,7 +22,7 @@ from p2os.protocol.sip import StandardSip
 from p2os.robots.parameters import load_parameters
 from p2os.ros.codec import Message
 from p2os.ros.robot_node import RobotNode
-from p2os.ros.topics import TOPICS
+from p2os.ros.topics import SERVICES, TOPICS
 from p2os.ros.transport import NodeOptions, Received, Topic
 from p2os.transport.wall_clock import wall_clock
 from simbase.timing import NS_PER_MS, NS_PER_S
@@ -38,6 +38,7 @@ class Client:
 
     asked: list[object] = field(default_factory=list)
     error: Exception | None = None
+    enable_error: Exception | None = None
     tell: Callable[[Any], None] = lambda _news: None
 
     def on_state(self, callback: Callable[[Any], None]) -> Callable[[], None]:
@@ -55,6 +56,8 @@ class Client:
         self.asked.append("stop")
 
     def enable(self, on: bool) -> None:
+        if self.enable_error is not None:
+            raise self.enable_error
         self.asked.append(("enable", on))
 
     def set_pose(self) -> None:
@@ -68,12 +71,17 @@ class Network:
     incoming: list[list[Received]] = field(default_factory=list)
     published: list[tuple[Topic, Message]] = field(default_factory=list)
     waits_s: list[float] = field(default_factory=list)
+    served: list[Topic] = field(default_factory=list)
     damaged: int = 3
 
     def announce(self, topic: Topic) -> None:
         """Nobody is there."""
 
     subscribe = announce
+
+    def serve(self, service: Topic) -> bool:
+        self.served.append(service)
+        return True
 
     def publish(self, topic: Topic, message: Message) -> None:
         self.published.append((topic, message))
@@ -119,6 +127,24 @@ def test_the_loop_waits_no_longer_than_the_deadman_and_then_stops_once(capsys: p
     assert client.asked == [(0.2, 0.0), "stop"]
     assert network.waits_s[0] > 0
     assert "nobody asked for a speed any more" in capsys.readouterr().err
+
+
+def test_the_services_of_a_robot_are_offered_before_its_topics() -> None:
+    network = Network()
+    ran(Client(), network, turns=0)
+    assert {one.type for one in network.served} == {"std_srvs/srv/SetBool", "std_srvs/srv/Trigger"}
+
+
+def test_the_call_of_a_service_is_answered_with_what_became_of_it() -> None:
+    client, answers = Client(), list[Message]()
+    service = SERVICES["enable_motors"].topic(OPTIONS)
+    call = Received(service, {"data": True}, answers.append)
+    loop = ran(client, Network([[call]]), turns=1)
+    assert client.asked == [("enable", True)]
+    client.enable_error = LinkLostError("no robot is connected")
+    cast("Network", loop._network).incoming = [[call]]
+    loop.turn()
+    assert answers == [{"success": True, "message": ""}, {"success": False, "message": "no robot is connected"}]
 
 
 @pytest.mark.parametrize("error", [LinkLostError("the link was lost"), MotorsDisabledError("motors are disabled")])

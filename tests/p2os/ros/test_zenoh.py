@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from p2os.errors import TransportError
-from p2os.ros.topics import TOPICS
+from p2os.ros.topics import SERVICES, TOPICS
 from p2os.ros.transport import NodeOptions, Topic, Transport
 from p2os.ros.transports import open_transport
 
@@ -135,13 +135,32 @@ def test_who_comes_late_gets_what_is_latched(node: Transport, peer: Any) -> None
     subscriber.undeclare()
 
 
+def test_a_service_is_called_by_its_key_and_answered_with_the_number_of_the_call(node: Transport, peer: Any) -> None:
+    service = SERVICES["enable_motors"].topic(NAMES)
+    assert node.serve(service)
+    hash_ = "RIHS01_abe9e4bb6b41b40e6789712c00ec8871923e089af3f667a79992a428cff2da0a"
+    key = f"7/r1/enable_motors/std_srvs::srv::dds_::SetBool_/{hash_}"
+    assert wait_for(lambda: [parts for parts in tokens(peer) if parts[5] == "SS" and parts[9] == "%r1%enable_motors"])
+    answers: list[Any] = []
+    attached = struct.pack("<qqB16s", 41, time.time_ns(), 16, bytes(range(16)))
+    peer.get(key, answers.append, payload=b"\0\1\0\0\1", attachment=attached)
+    found: list[Any] = []
+    assert wait_for(lambda: found.extend(node.take(0.05)) or found)
+    assert found[0].message == {"data": True}
+    found[0].reply({"success": True, "message": "on"})
+    assert wait_for(lambda: answers)
+    assert answers[0].ok.payload.to_bytes() == b"\0\1\0\0" + b"\1\0\0\0" + b"\3\0\0\0on\0"
+    number, _, _, name = struct.unpack("<qqB16s", answers[0].ok.attachment.to_bytes())
+    assert (number, name) == (41, bytes(range(16)))
+
+
 def test_of_more_messages_than_wait_the_oldest_go(node: Transport) -> None:
     from p2os.ros.zenoh_node import MOST_WAITING, ZenohNode
 
     assert isinstance(node, ZenohNode)
     topic = Topic("/r1/x", "std_msgs/msg/Int32")
     for value in range(MOST_WAITING + 5):
-        node._put((topic, b"\0\1\0\0" + struct.pack("<i", value)))
+        node._put((topic, topic.type, b"\0\1\0\0" + struct.pack("<i", value), None))
     node.wake()
     values = [item.message["data"] for item in node.take(0.0)]
     assert values == list(range(5, MOST_WAITING + 5))
