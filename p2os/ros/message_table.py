@@ -36,7 +36,10 @@ class Field:
 
 @dataclass(frozen=True, slots=True)
 class MessageType:
-    """One type: `nav_msgs/msg/Odometry`, its RIHS01 hash and its fields in the order of the wire."""
+    """One type: `nav_msgs/msg/Odometry`, its RIHS01 hash and its fields in the order of the wire.
+
+    The hash is empty where none ever stands on the wire.
+    """
 
     name: str
     hash: str
@@ -44,13 +47,18 @@ class MessageType:
 
     @property
     def dds_name(self) -> str:
-        """What DDS and rmw_zenoh call it: `nav_msgs::msg::dds_::Odometry_`."""
-        package, group, name = self.name.split("/")
-        return f"{package}::{group}::dds_::{name}_"
+        """What DDS and rmw_zenoh call it."""
+        return dds_name(self.name)
+
+
+def dds_name(name: str) -> str:
+    """Return what DDS and rmw_zenoh call a type: `nav_msgs::msg::dds_::Odometry_`."""
+    package, group, last = name.split("/")
+    return f"{package}::{group}::dds_::{last}_"
 
 
 def _type(name: str, hash_: str, *fields: str) -> MessageType:
-    return MessageType(_full(name), f"RIHS01_{hash_}", tuple(_field(text) for text in fields))
+    return MessageType(_full(name), f"RIHS01_{hash_}" if hash_ else "", tuple(_field(text) for text in fields))
 
 
 def _full(name: str) -> str:
@@ -131,12 +139,26 @@ _ROWS = (
           "std/Header header", "diag/DiagnosticStatus[] status"),
     _type("rosgraph_msgs/msg/Clock", "692f7a66e93a3c83e71765d033b60349ba68023a8c689a79e48078bcb5c58564",
           "builtin/Time clock"),
-    _type("rmw/Gid", "a8e2f2bd4b156011c7ed7618c1db625ac341c2dc3ff09b8dd107f33f20dcec07", "char[16] data"),
-    _type("rmw/NodeEntitiesInfo", "8ecbfcad87fa92b9c1458f525b5faf5bf7cab9427a92524d72a394112992b5ab",
+    _type("rmw/Gid", "ab6f21cfbb0a6dbb837161e1110c2051a2850ed9f9c53944d7115d9bcebedf71", "char[16] data"),
+    _type("rmw/NodeEntitiesInfo", "8ffef65ee2d088c63b1e8fcd31e800ba9fc8dbe0ee15ca60d1676de5218087a7",
           "string node_namespace", "string node_name", "rmw/Gid[] reader_gid_seq", "rmw/Gid[] writer_gid_seq"),
-    _type("rmw/ParticipantEntitiesInfo", "e725f4a506958c79f95dd693b965722c57b19cd18e7eff984f49561b93dc985d",
+    _type("rmw/ParticipantEntitiesInfo", "91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e",
           "rmw/Gid gid", "rmw/NodeEntitiesInfo[] node_entities_info_seq"),
 )  # fmt: skip
 
+#: The halves of services; only a service as a whole has a hash on the wire.
+_HALVES = (
+    _type("std_srvs/srv/SetBool_Request", "", "bool data"),
+    _type("std_srvs/srv/SetBool_Response", "", "bool success", "string message"),
+    _type("std_srvs/srv/Trigger_Request", "", "uint8 structure_needs_at_least_one_member"),
+    _type("std_srvs/srv/Trigger_Response", "", "bool success", "string message"),
+)
+
+#: Service → its hash, as the generated code of Jazzy's std_srvs has it.
+SERVICES: Mapping[str, str] = {
+    "std_srvs/srv/SetBool": "RIHS01_abe9e4bb6b41b40e6789712c00ec8871923e089af3f667a79992a428cff2da0a",
+    "std_srvs/srv/Trigger": "RIHS01_eeff2cd6fa5ad9d27cdf4dec64818317839b62f212a91e6b5304b634b2062c5f",
+}
+
 #: Name → type.
-MESSAGES: Mapping[str, MessageType] = {row.name: row for row in _ROWS}
+MESSAGES: Mapping[str, MessageType] = {row.name: row for row in (*_ROWS, *_HALVES)}

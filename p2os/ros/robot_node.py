@@ -30,7 +30,7 @@ from p2os.ros.robot_messages import (
     sonar_range,
 )
 from p2os.ros.thesis_topics import FIRST, STEP_MPS, encoder_code, motor_speed, near
-from p2os.ros.topics import TOPICS
+from p2os.ros.topics import SERVICES, TOPICS
 from p2os.ros.transport import NodeOptions, Received, Topic
 from p2os.ros.urdf import urdf_text
 from simbase.timing import Nanos
@@ -109,6 +109,7 @@ class RobotNode:
         self._motors_on: bool | None = None
         self._codes = {"motor_left": 0.0, "motor_right": 0.0}
         self.commands: Mapping[Topic, str] = {self._topic(key): key for key in COMMANDS}
+        self.services: Mapping[Topic, str] = {row.topic(options): key for key, row in SERVICES.items()}
 
     def announced(self) -> Iterator[Topic]:
         """Yield what is published from the beginning."""
@@ -130,12 +131,12 @@ class RobotNode:
     def take_state(self, state: RobotState, stamp: Nanos) -> list[Outgoing]:
         """Return what a state makes; `stamp` is when it came, as ROS counts time."""
         frames, motion = self.frames, self._travel.take(state)
-        found: list[Outgoing] = self._take_sonars(state, stamp)
         pose = (motion.x_m, motion.y_m, motion.heading_rad)
-        found += [
+        found: list[Outgoing] = [
             (self._topic("odom"), odometry(stamp, frames, motion)),
             (self._topic("tf"), {"transforms": frames.moving(stamp, pose, motion.wheels_rad)}),
             (self._topic("joint_states"), joint_state(stamp, frames, motion)),
+            *self._take_sonars(state, stamp),
             (self._topic("sonar"), sonar_points(stamp, frames, state.sonar)),
             (self._topic("battery_state"), battery(stamp, state)),
         ]
@@ -172,6 +173,10 @@ class RobotNode:
             return asked
         self._stops_at = now + self._deadman_ns
         return [*asked, speed]
+
+    def take_call(self, call: Received) -> Asked:
+        """Return what the call of a service asks for."""
+        return self._asked(self.services[call.topic], call.message)
 
     def next_deadline(self) -> Nanos | None:
         """Return when the deadman stops the robot."""

@@ -27,6 +27,11 @@ class TopicRow:
 
 
 _COMMAND = {"is_command": True}
+#: Services of a robot's node, where the transport has services, and the command that each is.
+SERVICES: Mapping[str, TopicRow] = {
+    "enable_motors": TopicRow(name="enable_motors", type="std_srvs/srv/SetBool"),
+    "reset_odometry": TopicRow(name="reset_odometry", type="std_srvs/srv/Trigger"),
+}
 TOPICS: Mapping[str, TopicRow] = {
     "odom": TopicRow(name="odom", type="nav_msgs/msg/Odometry"),
     "tf": TopicRow(name="/tf", type="tf2_msgs/msg/TFMessage"),

@@ -5,7 +5,7 @@ best-effort subscribers.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -82,10 +82,11 @@ class NodeOptions:
 
 @dataclass(frozen=True, slots=True)
 class Received:
-    """A message that came, and on which topic."""
+    """A message that came, on which topic, and how it is answered where a service was called."""
 
     topic: Topic
     message: Message
+    reply: Callable[[Message], None] | None = None
 
 
 class Transport(Protocol):
@@ -101,6 +102,14 @@ class Transport(Protocol):
 
     def subscribe(self, topic: Topic) -> None:
         """Have messages of a topic returned by `take`."""
+        ...
+
+    def serve(self, service: Topic) -> bool:
+        """Have the calls of a service returned by `take`, each with its reply; tell whether there are services here.
+
+        Args:
+            service: Its name and type, such as std_srvs/srv/SetBool.
+        """
         ...
 
     def take(self, timeout_s: float) -> Sequence[Received]:

@@ -10,17 +10,18 @@ Source: ros2/rmw_zenoh, docs/design.md and liveliness_utils; tokens were compare
 zenoh-ros2-sdk 0.1.8. A stock rmw_zenoh has not been tried.
 """
 
+import contextlib
 import json
 import os
 import queue
 import struct
 import time
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from p2os.errors import MissingDependencyError, RemoteProtocolError, TransportError
 from p2os.ros.codec import Message, from_cdr, to_cdr
-from p2os.ros.message_table import MESSAGES
+from p2os.ros.message_table import MESSAGES, SERVICES, dds_name
 from p2os.ros.transport import NodeOptions, Received, Topic
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 
 #: Port of rmw_zenoh's router.
 PORT = 7447
-NODE, PUBLISHER, SUBSCRIBER = "NN", "MP", "MS"
+NODE, PUBLISHER, SUBSCRIBER, SERVICE = "NN", "MP", "MS", "SS"
 #: What stands for a slash within a part of a key, and for an empty one.
 SLASH = "%"
 GID_BYTES = 16
@@ -69,7 +70,7 @@ class ZenohNode:
         self.damaged = 0
         self._publishers: dict[Topic, _Publisher] = {}
         self._subscribers: list[object] = []
-        self._arrived: queue.Queue[tuple[Topic, bytes] | None] = queue.Queue(MOST_WAITING)
+        self._arrived: queue.Queue[_Arrived | None] = queue.Queue(MOST_WAITING)
         self._numbers = 0
         self._tokens = [self._session.liveliness().declare_token(self._token(NODE, None))]
 
@@ -99,10 +100,22 @@ class ZenohNode:
         """Have messages of a topic returned by `take`."""
 
         def arrived(sample: "zenoh.Sample") -> None:
-            self._put((topic, sample.payload.to_bytes()))
+            self._put((topic, topic.type, sample.payload.to_bytes(), None))
 
         self._subscribers.append(self._session.declare_subscriber(key_of(self._options.domain, topic), arrived))
         self._tokens.append(self._session.liveliness().declare_token(self._token(SUBSCRIBER, topic)))
+
+    def serve(self, service: Topic) -> bool:
+        """Have the calls of a service returned by `take`."""
+
+        def called(query: "zenoh.Query") -> None:
+            data = b"" if query.payload is None else query.payload.to_bytes()
+            self._put((service, f"{service.type}_Request", data, lambda message: self._reply(service, query, message)))
+
+        key = key_of(self._options.domain, service)
+        self._subscribers.append(self._session.declare_queryable(key, called, complete=True))
+        self._tokens.append(self._session.liveliness().declare_token(self._token(SERVICE, service)))
+        return True
 
     def take(self, timeout_s: float) -> Sequence[Received]:
         """Return what came; wait at most so long."""
@@ -126,13 +139,27 @@ class ZenohNode:
         if not self._session.is_closed():
             self._session.close()  # type: ignore[no-untyped-call]  # zenoh's own
 
-    def _decode(self, topic: Topic, data: bytes, found: list[Received]) -> None:
+    def _decode(self, topic: Topic, kind: str, data: bytes, reply: "_Reply", found: list[Received]) -> None:
         try:
-            found.append(Received(topic, from_cdr(topic.type, data)))
+            found.append(Received(topic, from_cdr(kind, data), reply))
         except RemoteProtocolError:
             self.damaged += 1
 
-    def _put(self, item: tuple[Topic, bytes] | None) -> None:
+    def _reply(self, service: Topic, query: "zenoh.Query", message: Message) -> None:
+        """Answer a call, with the number and the name that came with it."""
+        attached = b"" if query.attachment is None else query.attachment.to_bytes()
+        number, name = 0, bytes(GID_BYTES)
+        if len(attached) == ATTACHMENT.size:
+            number, _, _, name = ATTACHMENT.unpack(attached)
+        import zenoh
+
+        with contextlib.suppress(zenoh.ZError), query:  # who called may have gone
+            query.reply(
+                query.key_expr, to_cdr(f"{service.type}_Response", message),
+                attachment=ATTACHMENT.pack(number, self._clock(), GID_BYTES, name),
+            )  # fmt: skip
+
+    def _put(self, item: "_Arrived | None") -> None:
         while True:
             try:
                 self._arrived.put_nowait(item)
@@ -151,6 +178,11 @@ class ZenohNode:
         token = token_of(self._options, session, kind, self._numbers, topic)
         self._numbers += 1
         return token
+
+
+_Reply: TypeAlias = Callable[[Message], None] | None
+#: Topic, type, bytes, and how it is answered.
+_Arrived: TypeAlias = tuple[Topic, str, bytes, _Reply]
 
 
 class _Publisher:
@@ -175,7 +207,7 @@ def configuration(endpoint: str, *, is_router: bool) -> "zenoh.Config":
     own, other = ("listen/endpoints", "connect/endpoints") if is_router else ("connect/endpoints", "listen/endpoints")
     rows: dict[str, object] = {
         "mode": "router" if is_router else "client", "scouting/multicast/enabled": False, own: [endpoint], other: [],
-        "connect/timeout_ms": CONNECT_MS, "connect/exit_on_failure": True,
+        "connect/timeout_ms": CONNECT_MS, "connect/exit_on_failure": True, "scouting/delay": 0,
     }  # fmt: skip
     for key, value in rows.items():
         config.insert_json5(key, json.dumps(value))
@@ -183,13 +215,12 @@ def configuration(endpoint: str, *, is_router: bool) -> "zenoh.Config":
 
 
 def key_of(domain: int, topic: Topic) -> str:
-    """Return the key expression of a topic."""
-    row = MESSAGES[topic.type]
-    return f"{domain}/{topic.name.strip('/')}/{row.dds_name}/{row.hash}"
+    """Return the key expression of a topic, or of a service."""
+    return f"{domain}/{topic.name.strip('/')}/{'/'.join(_typed(topic))}"
 
 
 def token_of(options: NodeOptions, session: str, kind: str, number: int, topic: Topic | None) -> str:
-    """Return the liveliness token of a node (`NN`), a publisher (`MP`) or a subscriber (`MS`).
+    """Return the liveliness token of a node (`NN`), a publisher (`MP`), a subscriber (`MS`) or a service (`SS`).
 
     Args:
         options: The node.
@@ -203,9 +234,15 @@ def token_of(options: NodeOptions, session: str, kind: str, number: int, topic: 
         options.name,
     ]  # fmt: skip
     if topic is not None:
-        row = MESSAGES[topic.type]
-        parts += [mangled(topic.name), row.dds_name, row.hash, qos_text(topic)]
+        parts += [mangled(topic.name), *_typed(topic), qos_text(topic)]
     return "/".join(parts)
+
+
+def _typed(topic: Topic) -> tuple[str, str]:
+    """Return the name and the hash of a topic's or a service's type."""
+    if topic.type in SERVICES:
+        return dds_name(topic.type), SERVICES[topic.type]
+    return MESSAGES[topic.type].dds_name, MESSAGES[topic.type].hash
 
 
 def qos_text(topic: Topic) -> str:

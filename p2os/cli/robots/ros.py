@@ -175,12 +175,14 @@ class NodeLoop:
         self._complained_at: Nanos = -COMPLAINT_NS
         self._link = Link.OPEN.value
         self._is_open = True
-        self.counts = {"speeds": 0, "refused": 0}
+        self.counts = {"commands": 0, "refused": 0}
 
     def run(self, is_over: Callable[[], bool]) -> None:
         """Go on until `is_over` says so; it is asked ten times a second or more often."""
         for topic in self._node.commands:
             self._network.subscribe(topic)
+        for service in self._node.services:
+            self._network.serve(service)
         for topic in self._node.announced():
             self._network.announce(topic)
         for topic, message in self._node.first(stamp_of(wall_clock())):
@@ -198,9 +200,15 @@ class NodeLoop:
         due = self._node.next_deadline()
         wait_s = LOOK_S if due is None else min(LOOK_S, max(0, due - wall_clock()) / NS_PER_S)
         received = self._network.take(wait_s)
+        self.counts["commands"] += len(received)
         now = wall_clock()
-        for asked in (*self._node.take_commands(received, now), *self._node.advance_to(now)):
+        commands = [item for item in received if item.reply is None]
+        for asked in (*self._node.take_commands(commands, now), *self._node.advance_to(now)):
             self._ask(asked)
+        for call in received:
+            if call.reply is not None:
+                problem = self._ask(self._node.take_call(call))
+                call.reply({"success": not problem, "message": problem})
         while self._news:
             item = self._news.popleft()
             if isinstance(item, RobotState):
@@ -230,11 +238,11 @@ class NodeLoop:
         if isinstance(notice, TOLD):
             sys.stderr.write(f"{words_of(notice)}\n")
 
-    def _ask(self, asked: Asked) -> None:
+    def _ask(self, asked: Asked) -> str:
+        """Ask the robot; return why it cannot, or nothing."""
         try:
             match asked:
                 case Speed(forward_mps, turn_radps):
-                    self.counts["speeds"] += 1
                     self._client.set_velocity(forward_mps, turn_radps)
                 case Stop():
                     self._client.stop()
@@ -245,16 +253,18 @@ class NodeLoop:
                     self._client.set_pose()
                     self._node.forget_place()
                 case Refused(text):
-                    self._complain(text)
+                    return self._complain(text)
         except (LinkLostError, MotorsDisabledError) as error:
-            self._complain(str(error))
+            return self._complain(str(error))
+        return ""
 
-    def _complain(self, text: str) -> None:
+    def _complain(self, text: str) -> str:
         self.counts["refused"] += 1
         now = wall_clock()
         if now - self._complained_at >= COMPLAINT_NS:
             self._complained_at = now
             sys.stderr.write(f"refused: {text}\n")
+        return text
 
 
 def stamp_of(at_ns: Nanos) -> Nanos:

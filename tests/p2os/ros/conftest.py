@@ -4,8 +4,6 @@ import os
 
 import pytest
 
-pytest.importorskip("cyclonedds", reason="the extra ros is not installed")
-
 #: Domains whose ports lie below those that Linux gives to whoever asks for any.
 FIRST, DOMAINS = 10, 80
 

@@ -1,7 +1,10 @@
 """The table of messages and their bytes, against the definitions and the serialiser of rosbags."""
 
 import contextlib
+import hashlib
+import json
 import math
+from collections.abc import Iterable
 from typing import Any
 
 import pytest
@@ -10,10 +13,9 @@ from hypothesis import strategies as st
 
 from p2os.errors import RemoteProtocolError
 from p2os.ros.codec import from_cdr, to_cdr
-from p2os.ros.message_table import MESSAGES, Field
+from p2os.ros.message_table import MESSAGES, SERVICES, Field
 
-rosbags = pytest.importorskip("rosbags.typesys", reason="rosbags is not installed")
-STORE = rosbags.get_typestore(rosbags.Stores.ROS2_JAZZY)
+pytest.importorskip("cyclonedds", reason="the extra ros is not installed")
 NUMBERS = {
     "bool": st.booleans(), "byte": st.integers(0, 255), "char": st.integers(0, 255), "uint8": st.integers(0, 255),
     "int32": st.integers(-(1 << 31), (1 << 31) - 1), "uint32": st.integers(0, (1 << 32) - 1),
@@ -36,18 +38,89 @@ def messages(name: str) -> st.SearchStrategy[dict[str, Any]]:
     return st.fixed_dictionaries({field.name: values(field) for field in MESSAGES[name].fields})
 
 
-@pytest.mark.parametrize("name", MESSAGES)
-def test_a_type_has_the_hash_that_its_definition_gives(name: str) -> None:
-    assert MESSAGES[name].hash == STORE.hash_rihs01(name)
+#: A type whose strings are bounded to so many characters, of which the wire shows nothing.
+BOUNDED_STRINGS, MOST_CHARACTERS, STRING, BOUNDED_STRING = "rmw_dds_common/msg/NodeEntitiesInfo", 256, 17, 21
+#: Numbers of kinds in a type description (type_description_interfaces/msg/FieldType), and what an array adds.
+KINDS = {
+    "uint8": 3, "char": 3, "int32": 6, "uint32": 7, "int64": 8, "float32": 10, "float64": 11, "bool": 15, "byte": 16,
+    "string": STRING,
+}  # fmt: skip
+NESTED, ARRAY, BOUNDED, SEQUENCE = 1, 48, 96, 144
+
+
+def described(name: str, fields: Iterable[tuple[str, str, int | None]]) -> dict[str, Any]:
+    """Return a type's description by REP 2016; a count below 0 is a bound."""
+    rows = []
+    for label, kind, count in fields:
+        adds = 0 if count is None else SEQUENCE if count == 0 else ARRAY if count > 0 else BOUNDED
+        row = {
+            "type_id": KINDS.get(kind, NESTED) + adds, "capacity": abs(count or 0), "string_capacity": 0,
+            "nested_type_name": "" if kind in KINDS else kind,
+        }  # fmt: skip
+        if name == BOUNDED_STRINGS and kind == "string":
+            row |= {"type_id": BOUNDED_STRING, "string_capacity": MOST_CHARACTERS}
+        rows.append({"name": label, "type": row})
+    return {"type_name": name, "fields": rows}
+
+
+def hash_of(name: str, known: dict[str, dict[str, Any]]) -> str:
+    """Return the RIHS01 of a type."""
+    named: set[str] = set()
+    left = [name]
+    while left:
+        nested = {field["type"]["nested_type_name"] for field in known[left.pop()]["fields"]} - {""} - named
+        named |= nested
+        left += nested
+    whole = {"type_description": known[name], "referenced_type_descriptions": [known[one] for one in sorted(named)]}
+    return f"RIHS01_{hashlib.sha256(json.dumps(whole).encode()).hexdigest()}"
+
+
+DESCRIBED = {
+    name: described(name, ((field.name, field.kind, field.count) for field in row.fields))
+    for name, row in MESSAGES.items()
+}
+
+
+#: Types whose hash is on the wire.
+HASHED = sorted(name for name in MESSAGES if MESSAGES[name].hash)
+
+
+@pytest.mark.parametrize("name", HASHED)
+def test_a_type_has_the_hash_that_its_fields_give(name: str) -> None:
+    assert hash_of(name, DESCRIBED) == MESSAGES[name].hash
+
+
+@pytest.mark.parametrize("name", SERVICES)
+def test_a_service_has_the_hash_that_its_halves_give(name: str) -> None:
+    info = "service_msgs/msg/ServiceEventInfo"
+    whole = {
+        info: described(info, [("event_type", "uint8", None), ("stamp", "builtin_interfaces/msg/Time", None),
+                               ("client_gid", "char", 16), ("sequence_number", "int64", None)]),
+        f"{name}_Event": described(f"{name}_Event", [("info", info, None), ("request", f"{name}_Request", -1),
+                                                     ("response", f"{name}_Response", -1)]),
+        name: described(name, [("request_message", f"{name}_Request", None),
+                               ("response_message", f"{name}_Response", None),
+                               ("event_message", f"{name}_Event", None)]),
+    }  # fmt: skip
+    assert hash_of(name, DESCRIBED | whole) == SERVICES[name]
+
+
+@pytest.mark.parametrize("name", [name for name in HASHED if not name.startswith("rmw_dds_common")])
+def test_the_hash_is_that_of_the_definition_of_others(name: str) -> None:
+    # Not of rmw_dds_common: rosbags 0.11 takes `char` for a kind of its own there, which Jazzy's code does not.
+    rosbags = pytest.importorskip("rosbags.typesys", reason="rosbags is not installed")
+    assert rosbags.get_typestore(rosbags.Stores.ROS2_JAZZY).hash_rihs01(name) == MESSAGES[name].hash
 
 
 @settings(max_examples=60, deadline=None)
 @given(st.data())
 def test_a_message_is_written_as_an_independent_serialiser_writes_it_and_comes_back_whole(data: st.DataObject) -> None:
-    name = data.draw(st.sampled_from(sorted(MESSAGES)))
+    rosbags = pytest.importorskip("rosbags.typesys", reason="rosbags is not installed")
+    store = rosbags.get_typestore(rosbags.Stores.ROS2_JAZZY)
+    name = data.draw(st.sampled_from(sorted(name for name in MESSAGES if name in store.fielddefs)))
     message = data.draw(messages(name))
     written = to_cdr(name, message)
-    assert bytes(STORE.serialize_cdr(STORE.deserialize_cdr(written, name), name)) == written
+    assert bytes(store.serialize_cdr(store.deserialize_cdr(written, name), name)) == written
     assert from_cdr(name, written) == message
 
 

@@ -55,6 +55,9 @@ class Script:
     def subscribe(self, topic: Topic) -> None:
         self.subscribed.append(topic)
 
+    def serve(self, service: Topic) -> bool:
+        raise AssertionError(f"a bench serves no {service.name}")
+
     def take(self, timeout_s: float) -> Sequence[Received]:
         assert timeout_s == 0, "a bench waits for nobody"
         self.looks += 1

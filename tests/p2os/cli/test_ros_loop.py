@@ -1,0 +1,222 @@
+"""The loop of `p2os ros` between a robot and a network, both made by the test."""
+
+import math
+import os
+import select
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, cast
+
+import pytest
+
+from p2os.cli.robots.ros import HEALTH_NS, NodeLoop, stamp_of
+from p2os.client import LinkLostError, Robot
+from p2os.client.notices import DeadmanStopped, LinkLost, MotorsDisabledError
+from p2os.client.observer import Observer
+from p2os.pioneer.serve import served_pioneer
+from p2os.protocol.sip import StandardSip
+from p2os.robots.parameters import load_parameters
+from p2os.ros.codec import Message
+from p2os.ros.robot_node import RobotNode
+from p2os.ros.topics import SERVICES, TOPICS
+from p2os.ros.transport import NodeOptions, Received, Topic
+from p2os.transport.wall_clock import wall_clock
+from simbase.timing import NS_PER_MS, NS_PER_S
+
+P2DX = load_parameters("p2dx")
+OPTIONS = NodeOptions()
+PEER = Path(__file__).parents[1] / "ros" / "raw_peer.py"
+
+
+@dataclass
+class Client:
+    """A robot that notes what is asked of it."""
+
+    asked: list[object] = field(default_factory=list)
+    error: Exception | None = None
+    enable_error: Exception | None = None
+    tell: Callable[[Any], None] = lambda _news: None
+
+    def on_state(self, callback: Callable[[Any], None]) -> Callable[[], None]:
+        self.tell = callback
+        return lambda: None
+
+    on_event = on_state
+
+    def set_velocity(self, forward_mps: float, turn_radps: float) -> None:
+        if self.error is not None:
+            raise self.error
+        self.asked.append((forward_mps, turn_radps))
+
+    def stop(self) -> None:
+        self.asked.append("stop")
+
+    def enable(self, on: bool) -> None:
+        if self.enable_error is not None:
+            raise self.enable_error
+        self.asked.append(("enable", on))
+
+    def set_pose(self) -> None:
+        self.asked.append("pose")
+
+
+@dataclass
+class Network:
+    """A network that has these messages for each look."""
+
+    incoming: list[list[Received]] = field(default_factory=list)
+    published: list[tuple[Topic, Message]] = field(default_factory=list)
+    waits_s: list[float] = field(default_factory=list)
+    served: list[Topic] = field(default_factory=list)
+    damaged: int = 3
+
+    def announce(self, topic: Topic) -> None:
+        """Nobody is there."""
+
+    subscribe = announce
+
+    def serve(self, service: Topic) -> bool:
+        self.served.append(service)
+        return True
+
+    def publish(self, topic: Topic, message: Message) -> None:
+        self.published.append((topic, message))
+
+    def take(self, timeout_s: float) -> list[Received]:
+        self.waits_s.append(timeout_s)
+        return self.incoming.pop(0) if self.incoming else []
+
+    def wake(self) -> None:
+        """It never waits."""
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+    def newest(self, name: str) -> Any:
+        return [message for topic, message in self.published if topic.name == name][-1]
+
+
+def message(key: str, **fields: Any) -> Received:
+    return Received(TOPICS[key].topic(OPTIONS), fields)
+
+
+def twist(x: float) -> Received:
+    return message("cmd_vel", linear={"x": x}, angular={"z": 0.0})
+
+
+def ran(client: Client, network: Network, *, turns: int, deadman_ns: int = NS_PER_S) -> NodeLoop:
+    loop = NodeLoop(cast("Robot", client), network, RobotNode(P2DX, OPTIONS, deadman_ns=deadman_ns))
+    left = iter(range(turns))
+    loop.run(lambda: next(left, None) is None)
+    return loop
+
+
+def test_what_messages_ask_for_is_asked_of_the_robot() -> None:
+    client = Client()
+    ran(client, Network([[twist(0.2)], [message("enable_motors", data=False), message("reset_odometry")]]), turns=2)
+    assert client.asked == [(0.2, 0.0), ("enable", False), "pose"]
+
+
+def test_the_loop_waits_no_longer_than_the_deadman_and_then_stops_once(capsys: pytest.CaptureFixture[str]) -> None:
+    client, network = Client(), Network([[twist(0.2)]])
+    ran(client, network, turns=4, deadman_ns=1)
+    assert client.asked == [(0.2, 0.0), "stop"]
+    assert network.waits_s[0] > 0
+    assert "nobody asked for a speed any more" in capsys.readouterr().err
+
+
+def test_the_services_of_a_robot_are_offered_before_its_topics() -> None:
+    network = Network()
+    ran(Client(), network, turns=0)
+    assert {one.type for one in network.served} == {"std_srvs/srv/SetBool", "std_srvs/srv/Trigger"}
+
+
+def test_the_call_of_a_service_is_answered_with_what_became_of_it() -> None:
+    client, answers = Client(), list[Message]()
+    service = SERVICES["enable_motors"].topic(OPTIONS)
+    call = Received(service, {"data": True}, answers.append)
+    loop = ran(client, Network([[call]]), turns=1)
+    assert client.asked == [("enable", True)]
+    client.enable_error = LinkLostError("no robot is connected")
+    cast("Network", loop._network).incoming = [[call]]
+    loop.turn()
+    assert answers == [{"success": True, "message": ""}, {"success": False, "message": "no robot is connected"}]
+
+
+@pytest.mark.parametrize("error", [LinkLostError("the link was lost"), MotorsDisabledError("motors are disabled")])
+def test_a_robot_that_cannot_move_is_no_end_of_the_node(error: Exception, capsys: pytest.CaptureFixture[str]) -> None:
+    client = Client(error=error)
+    loop = ran(client, Network([[twist(0.2)], [twist(0.2)], [twist(math.nan)]]), turns=3)
+    assert loop.counts == {"commands": 3, "refused": 3}
+    assert capsys.readouterr().err.count("refused") == 1, "a message that comes 20 times a second is complained of once"
+
+
+def test_a_lost_link_is_an_error_of_the_diagnostics_until_packets_come_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    client, network = Client(), Network()
+    loop = NodeLoop(cast("Robot", client), network, RobotNode(P2DX, OPTIONS, deadman_ns=NS_PER_S))
+    loop.run(lambda: True)
+    clock = iter(range(0, 100 * HEALTH_NS, HEALTH_NS))
+    monkeypatch.setattr("p2os.cli.robots.ros.wall_clock", lambda: next(clock))
+    client.tell(LinkLost("silence"))
+    loop.turn()
+    status = network.newest("/diagnostics")["status"][0]
+    assert (status["level"], status["message"]) == (2, "link lost: silence")
+    assert {"key": "damaged", "value": "3"} in status["values"]
+    client.tell(Observer(P2DX).take(StandardSip(), 0))
+    loop.turn()
+    assert network.newest("/diagnostics")["status"][0]["level"] == 0
+
+
+def test_after_a_stop_of_the_client_a_motor_topic_starts_from_zero() -> None:
+    client = Client()
+    network = Network([[message("motor_left", data=3), message("motor_right", data=3)]])
+    loop = ran(client, network, turns=1)
+    client.tell(DeadmanStopped(NS_PER_S))
+    loop.turn()
+    network.incoming = [[message("motor_right", data=2)]]
+    loop.turn()
+    assert client.asked[-1] == (0.0625, pytest.approx(0.125 / 0.357))
+
+
+def test_a_stamp_is_the_time_since_1970_of_an_instant_of_the_wall_clock() -> None:
+    now = wall_clock()
+    assert abs(stamp_of(now) - stamp_of(now - 50 * NS_PER_MS) - 50 * NS_PER_MS) < 10 * NS_PER_MS
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_stops_the_robot_before_the_node_ends(number: int) -> None:
+    pytest.importorskip("cyclonedds", reason="the extra ros is not installed")
+    domain, namespace = str(10 + os.getpid() % 80), f"/s{os.getpid()}"
+    verb = "EntryPoint('ros', 'p2os.cli.robots.ros', 'p2os.verbs')"
+    words = ["ros", "URL", "--domain", domain, "--namespace", namespace, "--for", "20s"]
+    with served_pioneer(world="room", body="kinematic") as url:
+        words[1] = str(url)
+        code = (
+            "from importlib.metadata import EntryPoint; from p2os.cli import main; "
+            f"main.verbs = lambda: [{verb}]; main.main({words!r})"
+        )
+        with (
+            subprocess.Popen(
+                [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+            ) as node,
+            subprocess.Popen([sys.executable, str(PEER), domain, namespace], stdout=subprocess.PIPE) as peer,
+        ):
+            try:
+                heard = b""
+                while b'"mps": 0.2' not in heard:
+                    assert peer.stdout is not None
+                    assert select.select([peer.stdout], [], [], 15.0)[0], "the peer hears nothing"
+                    heard = peer.stdout.readline()
+                node.send_signal(number)
+                _, told = node.communicate(timeout=15)
+                assert node.returncode == 130
+                assert "the robot was stopped and let go" in told
+                assert "wheels 0.000 0.000" in " ".join(url.order("status"))
+            finally:
+                node.kill()
+                peer.kill()
