@@ -61,6 +61,8 @@ bench: setup
 	$(BIN)/python tools/bench/speed.py
 	$(BIN)/python tools/bench/shares.py
 	$(BIN)/python tools/bench/devices.py
+	$(BIN)/python tools/bench/shares.py --timers
+	$(BIN)/python tools/bench/devices.py --timers
 
 soak: setup mutation-tools
 	$(BIN)/pytest -n $(JOBS) -m 'soak'
