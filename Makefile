@@ -74,6 +74,8 @@ bench: setup
 	$(BIN)/python tools/bench/shares.py
 	$(BIN)/python tools/bench/costs.py
 	$(BIN)/python tools/bench/devices.py
+	$(BIN)/python tools/bench/shares.py --timers
+	$(BIN)/python tools/bench/devices.py --timers
 
 soak: setup mutation-tools
 	$(BIN)/pytest -n $(JOBS) -m 'soak'

@@ -29,7 +29,7 @@ ACCESS_PC = ctypes.CFUNCTYPE(ctypes.c_uint32)
 
 
 #: The functions of Unicorn that C calls, by their names in `core.unicorn_core.UnicornLibrary`.
-UNICORN_FUNCTIONS = ("start", "stop", "read_register", "read_registers", "write_registers")
+UNICORN_FUNCTIONS = ("start", "stop", "read_register", "read_registers", "write_registers", "write_register")
 
 
 class UnicornApi(ctypes.Structure):

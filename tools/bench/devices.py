@@ -1,7 +1,7 @@
-"""Print what devices cost: four channels of PWM at 20 kHz, a test device that moves a million words a second, the ADC.
+"""Print what devices cost: PWM at 20 kHz, a test device that moves a million words a second, the ADC, polling.
 
 Each figure is the median of paired runs by CPU time in this process; the library is built here, with `mover.c` in it.
-Usage: python tools/bench/devices.py [--quick]
+With `--timers` every timer runs all the while. Usage: python tools/bench/devices.py [--quick] [--timers]
 """
 
 import shutil
@@ -11,7 +11,8 @@ import tempfile
 from pathlib import Path
 
 from emulator import build
-from shares import RUNS, bench, cpu_s, row, run
+from shares import HAS_TIMERS, RUNS, bench, cpu_s, row, run
+from timers import start_timers
 
 from bluepill_sim import BluePill, stm32f103
 from bluepill_sim.analysis.probe import Probe
@@ -25,7 +26,12 @@ HERE = Path(__file__).parent
 SOURCES = sorted((HERE.parents[1] / "bluepill_sim" / "extension" / "source").rglob("*.c"))
 #: Where TIM6 would stand on a larger chip.
 PLACE = "TIM6"
-PWM_S, DMA_S, ADC_S = (1.0, 0.2, 0.2) if "--quick" in sys.argv else (20.0, 2.0, 5.0)
+PWM_S, DMA_S, ADC_S, POLLED_S = (1.0, 0.2, 0.2, 0.1) if "--quick" in sys.argv else (20.0, 2.0, 5.0, 2.0)
+#: Programs that poll: name, what they do, goal.
+POLLED = (
+    ("analogread", "ADC set up, calibrated, polled and reset for each reading", "2"),
+    ("spi_dma", "SPI at 18 MHz by DMA, whose flags are polled", "-"),
+)
 #: What the ADC converts by circular DMA, and with which options tools/bench/firmware/adc.c is built.
 CONVERSIONS = {
     "8 channels at 10 kHz": (80_000, "5", ("-DBENCH_EIGHT",)),
@@ -112,6 +118,8 @@ def moved(folder: Path, name: str) -> tuple[list[float], list[float]]:
         for is_on in (False, True):
             board = BluePill(program)
             board.advance_to(STARTED_NS)
+            if HAS_TIMERS:
+                start_timers(board)
             if is_on:
                 start_mover(board)
             took.append(cpu_s(lambda: board.advance_to(STARTED_NS + round(DMA_S * NS_PER_S))))  # noqa: B023
@@ -148,6 +156,24 @@ def conversions(folder: Path) -> None:
         row(f"ADC, {name} ({rate} conversions a second): times real", factors, goal)
 
 
+def polled(folder: Path) -> None:
+    """Programs that set devices up and poll them, over and over."""
+    for name, what, goal in POLLED:
+        program = build(name, folder)
+        factors = []
+        for _ in range(RUNS):
+            board = BluePill(program)
+            board.advance_to(STARTED_NS)
+            if HAS_TIMERS:
+                start_timers(board)
+            counter = board.image.symbols.address_of("bench_rounds") or 0
+            before = board.chip.memory.read_word(counter)
+            factors.append(POLLED_S / cpu_s(lambda: board.advance_to(STARTED_NS + round(POLLED_S * NS_PER_S))))  # noqa: B023
+            if board.warnings or board.chip.memory.read_word(counter) == before:
+                sys.exit(f"bench: {name} does not run: {board.warnings}")
+        row(f"{what}: times real", factors, goal)
+
+
 def build_library(folder: Path) -> Path:
     """Return the emulator's library with the device of this bench in it."""
     out = folder / "native.so"
@@ -170,6 +196,7 @@ def main() -> int:
         waves(folder)
         movers(folder)
         conversions(folder)
+        polled(folder)
     return 0
 
 

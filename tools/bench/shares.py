@@ -2,7 +2,8 @@
 
 Each figure is the median of the ratios of paired runs in this process, by CPU time; a run is that of `p2os run` up to
 the end of its trace and the judging of its goals. The chip alone runs the same program without a bench. The programs
-are those of tools/bench/firmware. Usage: python tools/bench/shares.py [--quick]
+are those of tools/bench/firmware. With `--timers` every timer runs all the while, in what is measured and in what it
+is compared to. Usage: python tools/bench/shares.py [--quick] [--timers]
 """
 
 import shutil
@@ -16,6 +17,7 @@ from pathlib import Path
 
 import bodies
 from emulator import SETTLED_NS, build
+from timers import start_timers
 
 from bluepill_sim import BluePill
 from robot_bench.bench import Bench
@@ -23,7 +25,7 @@ from robot_bench.recording.trace import TraceWriter
 from robot_bench.scenario.scenario import load_scenario
 from simbase.timing import NS_PER_S
 
-IS_QUICK = "--quick" in sys.argv
+IS_QUICK, HAS_TIMERS = "--quick" in sys.argv, "--timers" in sys.argv
 RUNS = 1 if IS_QUICK else 5
 #: Virtual seconds of a run.
 TOGGLE_S, BITBANG_S, PRINT_S, DODGE_S = (2.0, 0.05, 0.5, 5.0) if IS_QUICK else (20.0, 0.5, 5.0, 30.0)
@@ -48,7 +50,11 @@ def bench(folder: Path, program: Path | None, seconds: float, mode: str, body: s
     scenario = load_scenario("dodge").with_options(mode=mode, body=body, duration_s=seconds)
     if program is not None:
         scenario = replace(scenario, firmware=program)
-    return Bench(scenario, trace=TraceWriter(folder / "trace.jsonl"))
+    made = Bench(scenario, trace=TraceWriter(folder / "trace.jsonl"))
+    if HAS_TIMERS:
+        made.run_until(SETTLED_NS)
+        start_timers(made.chip)
+    return made
 
 
 def run(made: Bench) -> None:
@@ -61,6 +67,8 @@ def alone_s(program: Path, seconds: float) -> float:
     """Return the CPU seconds of the chip alone."""
     board = BluePill(program)
     board.advance_to(SETTLED_NS)
+    if HAS_TIMERS:
+        start_timers(board)
     return cpu_s(lambda: board.advance_to(round(seconds * NS_PER_S)))
 
 
@@ -120,6 +128,8 @@ def main() -> int:
     if shutil.which("arm-none-eabi-gcc") is None:
         print("bench: no arm-none-eabi-gcc (hint: sudo apt-get install gcc-arm-none-eabi)")
         return 1
+    if HAS_TIMERS:
+        print("with TIM1 to TIM4 running:")
     with tempfile.TemporaryDirectory() as folder:
         for part in (toggling, bitbanging, printing, dodging):
             part(Path(folder))

@@ -177,8 +177,11 @@ static __attribute__((noinline)) void enter_block(struct core *core, uint32_t ad
             core->resumed = NULL;
             return;
         }
-        if (!looks_for_waiting(core, address) && !goes_on(core, address)) {
+        const enum way way = looks_for_waiting(core, address) ? GOES_ON : goes_on(core, address);
+        if (way == ENDS) {
             stop_at_boundary(core, address);
+        }
+        if (way != GOES_ON) {
             return;
         }
     }

@@ -12,6 +12,7 @@
 #define NEVER (UINT64_C(1) << 62)
 /* ITSTATE in the CPSR, and the exception number of interrupt line 0. */
 #define IT_BITS 0x0600FC00u
+enum { ENTRY_CYCLES = 12, EXIT_CYCLES = 12, TAIL_CHAIN_CYCLES = 6 };
 #define FIRST_IRQ 16
 
 /* Why a run ended; the order is that of bluepill_sim/native/state.py. */
@@ -78,6 +79,7 @@ struct unicorn_api {
     int (*read_register)(void *, int, void *);
     int (*read_registers)(void *, const int *, void **, int);
     int (*write_registers)(void *, const int *, void *const *, int);
+    int (*write_register)(void *, int, const void *);
 };
 
 /* What Python is asked: each is void where Python keeps an exception for later. */
@@ -191,6 +193,7 @@ struct core {
     uint32_t skipped_count; /* accesses since that are not yet counted in it */
     struct skipped skipped[SKIPPED];
     struct located located;
+    uint32_t is_elsewhere; /* the run ended with an exception that was entered or left: `pc` and all that is known is right */
     uint32_t is_stopping; /* at an access that is not made: the run goes on from its instruction */
     struct row *resumed;  /* the block within which it goes on */
     uint64_t resumed_stop_at;
@@ -246,7 +249,9 @@ bool is_privileged(struct core *core);
 bool resolve(struct core *core, uint32_t address, bool is_write, uint32_t bytes);
 void skip(struct core *core, uint32_t address, bool is_write, uint32_t bytes);
 /* run.c */
-bool goes_on(struct core *core, uint32_t address);
+/* What becomes of the run at a boundary: it ends, goes on, or goes on elsewhere, or has ended there. */
+enum way { ENDS, GOES_ON, ELSEWHERE };
+enum way goes_on(struct core *core, uint32_t address);
 void *allocate(struct core *core, size_t bytes);
 uint32_t read_register(struct core *core, int number);
 /* exceptions.c */

@@ -72,6 +72,108 @@ void core_set_page(struct core *core, uint32_t number, uint32_t *words, uint32_t
                                         .device = &core->fabric->devices[slot]};
 }
 
+static uint32_t cycles_until(const struct row *row, uint32_t address)
+{
+    if (address == row->end) {
+        return row->costs[0];
+    }
+    const struct instruction *one = instruction_at(row, address);
+    return one == NULL ? row->costs[1] : one->cycle;
+}
+
+/* The core stands at a boundary. */
+static void settle_at(struct core *core, uint32_t pc)
+{
+    core->block = &core->none;
+    core->shared.pc = pc;
+    core->shared.is_thumb = read_register(core, REG_XPSR) >> 24 & 1;
+}
+
+/* Charges what of the running block has been run when the core stands at `pc`. */
+static void settle(struct core *core, uint32_t pc)
+{
+    const struct row *row = core->block;
+    if (row != &core->none) {
+        /* The refill of an exception return is part of the exception's exit. */
+        core->shared.cycle += pc >= FIRST_EXCEPTION_RETURN ? row->costs[0] : cycles_until(row, pc);
+    }
+    settle_at(core, pc);
+}
+
+/* The cycle at which SysTick or the fabric's queue next acts. */
+uint64_t core_next_event(const struct core *core)
+{
+    const uint64_t tick = core->shared.tick_next, other = core->fabric->next_cycle;
+    return tick < other ? tick : other;
+}
+
+/* Forgets what was known of the block and of the mode that were left. */
+static void start_anew(struct core *core)
+{
+    core->shared.run_from = core->shared.pc;
+    core->io_next = core->skipped_count = 0;
+    core->located.cycle = NO_TIME;
+    core->privilege = PRIVILEGE_UNKNOWN;
+}
+
+/* When the run has to end, or something is due. */
+static uint64_t stop_of(const struct core *core)
+{
+    const uint64_t event = core_next_event(core);
+    return event < core->limit ? event : core->limit;
+}
+
+/* Where an exception was entered or left within a hook: goes on at `pc`, without an end of Unicorn's run unless something
+ * else comes first. Unicorn goes to an address that a hook sets; in the hook of a block it does by the function for one
+ * register alone, whose mark would stay set in another hook.
+ */
+static void go_elsewhere(struct core *core, bool is_in_block)
+{
+    struct shared *s = &core->shared;
+    const uint64_t stop = stop_of(core);
+    if (s->attention || s->sleep || !s->is_thumb || s->it_state || s->pc >= FIRST_EXCEPTION_RETURN || s->cycle >= stop ||
+        is_interrupted(core)) {
+        core->is_elsewhere = 1;
+        end_run(core, HALT_BOUNDARY, s->pc);
+        return;
+    }
+    uint64_t high;
+    s->mask_stop = deliverable(s, &high) || high;
+    s->stop_at = stop;
+    look_later(core);
+    start_anew(core);
+    static const int number = REG_PC;
+    uint32_t pc = s->pc | 1;
+    void *const at = &pc;
+    if (is_in_block) {
+        core->api.write_register(core->unicorn, REG_PC, &pc);
+    } else {
+        core->api.write_registers(core->unicorn, &number, &at, 1);
+    }
+}
+
+/* Whether the run can go on elsewhere: what clears a reservation is a run of its own. */
+static bool may_turn(const struct core *core)
+{
+    const struct shared *s = &core->shared;
+    return !s->uses_exclusive && !s->attention && s->halt_kind == HALT_NONE && !core->is_scratch &&
+           !waits_for_python(core->fabric, s->cycle + ENTRY_CYCLES);
+}
+
+/* Takes an SVC, or the return from an exception, within the hook that tells of it; false: the run ends for it. */
+static bool turns(struct core *core, uint32_t kind, uint32_t pc)
+{
+    if (kind != HALT_EXCEPTION_RETURN && kind != HALT_SUPERVISOR_CALL) {
+        return false;
+    }
+    settle(core, pc);
+    if (!may_turn(core) || !(kind == HALT_EXCEPTION_RETURN ? leave(core, pc) : supervisor_call(core, pc))) {
+        return false;
+    }
+    go_elsewhere(core, false);
+    return true;
+}
+
 static uint32_t kind_of_denied_fetch(uint32_t pc)
 {
     return pc >= FIRST_EXCEPTION_RETURN ? HALT_EXCEPTION_RETURN : HALT_EXECUTE_NEVER;
@@ -93,7 +195,9 @@ void core_on_interrupt(void *unicorn, uint32_t number, void *user)
     case 17: kind = HALT_NO_COPROCESSOR; break;
     default: break;
     }
-    end_run(core, kind, pc);
+    if (!turns(core, kind, pc)) {
+        end_run(core, kind, pc);
+    }
 }
 
 /* Unicorn takes WFE and YIELD for undefined, with the PC already past them; the rest stands at the PC. */
@@ -158,28 +262,6 @@ void core_clear_exclusive(struct core *core)
     }
 }
 
-static uint32_t cycles_until(const struct row *row, uint32_t address)
-{
-    if (address == row->end) {
-        return row->costs[0];
-    }
-    const struct instruction *one = instruction_at(row, address);
-    return one == NULL ? row->costs[1] : one->cycle;
-}
-
-/* Charges what of the running block has been run when the core stands at `pc`. */
-static void settle(struct core *core, uint32_t pc)
-{
-    const struct row *row = core->block;
-    core->block = &core->none;
-    if (row != &core->none) {
-        /* The refill of an exception return is part of the exception's exit. */
-        core->shared.cycle += pc >= FIRST_EXCEPTION_RETURN ? row->costs[0] : cycles_until(row, pc);
-    }
-    core->shared.pc = pc;
-    core->shared.is_thumb = read_register(core, REG_XPSR) >> 24 & 1;
-}
-
 /* Runs to the first boundary at or after `stop_at`, or to what ends the run before; returns why. */
 static uint32_t run_slice(struct core *core)
 {
@@ -191,14 +273,16 @@ static uint32_t run_slice(struct core *core)
         s->halt_pc = s->pc;
         return s->halt_kind = HALT_EXECUTE_NEVER;
     }
-    core->io_next = core->skipped_count = 0;
-    core->located.cycle = NO_TIME;
-    core->privilege = PRIVILEGE_UNKNOWN;
+    start_anew(core);
     int error = core->api.start(core->unicorn, s->pc | s->is_thumb, NOWHERE, 0, 0);
     while (core->is_stopping) {
         const uint32_t pc = read_register(core, REG_PC);
         go_on_at_access(core, pc);
         error = core->api.start(core->unicorn, pc | 1, NOWHERE, 0, 0);
+    }
+    if (core->is_elsewhere) {
+        core->is_elsewhere = 0;
+        return s->halt_kind;
     }
     if (s->halt_kind == HALT_NONE) {
         const uint32_t pc = read_register(core, REG_PC);
@@ -227,33 +311,45 @@ static void fall_asleep(struct core *core, uint32_t what)
     s->sleep = what;
 }
 
-/* The cycle at which SysTick or the fabric's queue next acts. */
-uint64_t core_next_event(const struct core *core)
-{
-    const uint64_t tick = core->shared.tick_next, other = core->fabric->next_cycle;
-    return tick < other ? tick : other;
-}
-
-/* At a boundary within a run: acts on what is due in the fabric, and tells whether the run goes on: nothing is for
- * Python, no interrupt can be taken, and the time is not up. */
-bool goes_on(struct core *core, uint32_t address)
+/* At a boundary within a run: acts on what is due, takes the interrupt that comes of it, and tells whether the run goes on:
+ * nothing is for Python, and the time is not up. */
+enum way goes_on(struct core *core, uint32_t address)
 {
     struct shared *s = &core->shared;
     struct fabric *fabric = core->fabric;
-    if (!s->stop_at || s->attention || s->cycle >= core->limit || s->cycle >= s->tick_next ||
-        s->cycle < fabric->next_cycle || core->is_scratch || waits_for_python(fabric, s->cycle)) {
-        return false;
+    const bool is_tick = s->cycle >= s->tick_next;
+    if (!s->stop_at || s->attention || s->cycle >= core->limit || (!is_tick && s->cycle < fabric->next_cycle) ||
+        core->is_scratch || waits_for_python(fabric, s->cycle)) {
+        return ENDS;
     }
-    core->block = &core->none;
-    s->pc = address;
-    run_due(fabric, s->cycle);
-    const uint64_t event = core_next_event(core), stop = event < core->limit ? event : core->limit;
+    settle_at(core, address);
+    if (is_tick && systick_advance(s, s->cycle)) {
+        pend(core, SYSTICK);
+    }
+    if (s->cycle >= fabric->next_cycle) {
+        run_due(fabric, s->cycle);
+    }
+    uint64_t high;
+    const bool is_pending = deliverable(s, &high) || high;
+    if (is_pending) {
+        const int entered = may_turn(core) ? deliver(core) : -1;
+        if (entered > 0) {
+            go_elsewhere(core, true);
+            return ELSEWHERE;
+        }
+        if (entered < 0) {
+            return ENDS;
+        }
+        s->stop_at = NEVER; /* what is pending has to wait */
+    }
+    const uint64_t stop = stop_of(core);
     if (!s->stop_at || s->attention || s->halt_kind != HALT_NONE || s->cycle >= stop) {
-        return false;
+        return ENDS;
     }
+    s->mask_stop = is_pending;
     s->stop_at = stop;
     look_later(core);
-    return true;
+    return GOES_ON;
 }
 
 static uint32_t run(struct core *core, uint64_t limit)
@@ -272,8 +368,7 @@ static uint32_t run(struct core *core, uint64_t limit)
         if (s->attention || s->cycle >= limit) {
             return HALT_BOUNDARY;
         }
-        const uint64_t event = core_next_event(core);
-        const uint64_t stop = event < limit ? event : limit;
+        const uint64_t stop = stop_of(core);
         if (s->sleep && !wakes(core)) {
             if (s->cycle < stop) {
                 s->cycle = stop;

@@ -121,13 +121,6 @@ static void give_pulses(struct device *device)
     }
 }
 
-static void reschedule(struct device *device)
-{
-    const struct tim *tim = tim_of(device);
-    const uint64_t stop = tim->is_stopped ? NO_TIME : next_stop(device);
-    schedule(device, stop == NO_TIME ? NO_TIME : ns_of_tick(&tim->ticks, stop));
-}
-
 void refresh(struct device *device)
 {
     struct tim *tim = tim_of(device);
@@ -140,7 +133,8 @@ void refresh(struct device *device)
     update_irqs(device);
     give_pulses(device);
     tim->is_busy = 0;
-    reschedule(device);
+    const uint64_t stop = tim->is_stopped ? NO_TIME : next_stop(device);
+    schedule(device, stop == NO_TIME ? NO_TIME : ns_of_tick(&tim->ticks, stop));
 }
 
 static void event(struct device *device, uint64_t ns)
@@ -365,10 +359,6 @@ static void write(struct device *device, uint32_t index, uint32_t written, uint3
     synchronize(device, tick_now(device));
     previous = words[index];
     words[index] = (stored & ~kept) | (previous & kept);
-    if (index >= CCR1 && index <= CCR4 && !is_input(device, index - CCR1) && is_preloaded(device, index - CCR1)) {
-        reschedule(device); /* its update event is all that matters */
-        return;
-    }
     take(device, index, written, previous);
     if (index == CR2 || index == SMCR || index == CCMR1 || index == CCMR2 || index == CCER || index == BDTR) {
         listen(device, false);
