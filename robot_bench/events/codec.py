@@ -103,6 +103,8 @@ def _template(keys: tuple[str, ...], texts: frozenset[str]) -> str:
 
 def _integer(entry: Json, key: str) -> int:
     value = entry.get(key, 0)
+    if type(value) is int and -_MOST <= value <= _MOST:
+        return value
     return _whole(value) if isinstance(value, (int, float)) else 0
 
 
