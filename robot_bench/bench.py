@@ -232,7 +232,7 @@ class Bench(Stateful):
         self.goals.on_end = self._end_now
         self.goals.subscribe(self.events)
         pin_of = pins_of(scenario)
-        self._pins = ChipPins(chip, harness, pin_of, on_watched=self.loop.note_edge)
+        self._pins = ChipPins(chip, harness, pin_of, on_watched=self.loop.note_edge, now=lambda: self.loop.led)
         if isinstance(self.parts.adapter, Adapter):
             self.parts.adapter.samples.waits_for_edges = True
         chip.usart1.far_baud = scenario.usart_baud

@@ -46,8 +46,6 @@ from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 if TYPE_CHECKING:
     from robot_bench.recording.measurement import Measurement
 
-#: chosen: without pacing, control comes back often enough for progress and signals.
-UNPACED_SLICE_NS: Nanos = 10 * NS_PER_MS
 #: What is recorded as the world where nothing is known of it: 8 m of an empty plan.
 UNKNOWN_PLACE: Json = {"extent": [-4.0, -4.0, 4.0, 4.0], "obstacles": []}
 #: Exit code of errors that whoever types the command can mend.
@@ -109,7 +107,8 @@ def run_scenario(
     Args:
         scenario: What to run.
         folder: Where to; made where it is missing.
-        slice_ns: How often the loop gives control back; without effect on the result.
+        slice_ns: How often the loop gives control back; without effect on the result. None: as often as the wall clock
+            wants it.
         speed: Virtual seconds a wall second; None runs as fast as it can.
         on_progress: Called after each slice; a KeyboardInterrupt out of it ends the run in good order.
         clock: Wall clock in nanoseconds.
@@ -134,7 +133,7 @@ def run_scenario(
         )  # fmt: skip
     pacer = None if speed is None else RealTimePacer(speed=speed, clock=clock)
     with reserved(folder, force=force), _trace_of(scenario, folder, is_at_port=False) as trace:
-        bench = Bench(scenario, trace=trace, slice_ns=slice_ns or (PACED_SLICE_NS if pacer else UNPACED_SLICE_NS))
+        bench = Bench(scenario, trace=trace, slice_ns=slice_ns or (PACED_SLICE_NS if pacer else None))
 
         bench.on_slice = _after_slice(bench, pacer, on_progress)
         trace.meta(meta_of(scenario, bench.parts.world, bench.note, is_at_port=False))
@@ -306,7 +305,7 @@ def doing(bench: Bench | RemoteBench) -> str:
 def _after_slice(
     bench: Bench | RemoteBench, pacer: RealTimePacer | None, on_progress: ProgressListener | None
 ) -> Callable[[Nanos], None]:
-    """Return what a run does after each slice, or step of all robots: it keeps pace, and tells how far it is."""
+    """Return what a run does after each slice: it keeps pace, and tells how far it is."""
 
     def after_slice(now: Nanos) -> None:
         if pacer is not None:
@@ -442,7 +441,7 @@ def run_together(
         for own in scenario.programmed:
             stack.enter_context(reserved(folder / own.name, force=force))
             traces[own.name] = stack.enter_context(_trace_of(own, folder / own.name, is_at_port=False))
-        length = slice_ns or (PACED_SLICE_NS if pacer else UNPACED_SLICE_NS)
+        length = slice_ns or (PACED_SLICE_NS if pacer else None)
         benches = Bench.together(scenario, traces=traces, slice_ns=length)
         first = next(iter(benches.values()))
         first.on_slice = _after_slice(first, pacer, on_progress)

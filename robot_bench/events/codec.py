@@ -14,6 +14,8 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
+from json.encoder import encode_basestring_ascii
+from operator import attrgetter
 from typing import Any, TypeAlias, cast
 
 from robot_bench.events.kinds import (
@@ -50,8 +52,6 @@ _MOST = 2**63 - 1
 #: What a body noted of a collision before contacts were events: what, and where.
 _OLD_CONTACT = re.compile(r"(.*) at x (-?[\d.]+) m, y (-?[\d.]+) m$")
 
-#: The key of a kind, itself such a text.
-_KIND = frozenset("k")
 _encode = json.JSONEncoder(sort_keys=True, separators=(",", ":"), ensure_ascii=True).encode
 
 
@@ -90,21 +90,24 @@ class _Row:
     kind: str
     to_entry: Callable[[Any], Mapping[str, object]]
     from_entry: Callable[[Nanos, Json], Recorded | None]
-    #: Keys whose values are texts that JSON takes as they are, where all others are integers: such lines, nearly all of
-    #: a run, are spelled without an encoder. None: there are other values.
+    #: Keys whose values are texts that JSON takes as they are, where all others are integers, or spelled out
+    #: already: such lines, nearly all of a run, are spelled without an encoder. None: there are other values.
     plain_texts: frozenset[str] | None = None
 
 
 @cache
 def _template(keys: tuple[str, ...], texts: frozenset[str]) -> str:
-    """Return a format of what the encoder makes of an entry with these keys."""
+    """Return a format of what the encoder makes of an entry with these keys; its kind is such a text itself."""
+    texts |= {"k"}
     return (
-        "{" + ",".join(f'"{key}":"%({key})s"' if key in texts else f'"{key}":%({key})d' for key in sorted(keys)) + "}"
+        "{" + ",".join(f'"{key}":"%({key})s"' if key in texts else f'"{key}":%({key})s' for key in sorted(keys)) + "}"
     )
 
 
 def _integer(entry: Json, key: str) -> int:
     value = entry.get(key, 0)
+    if type(value) is int and -_MOST <= value <= _MOST:
+        return value
     return _whole(value) if isinstance(value, (int, float)) else 0
 
 
@@ -164,9 +167,14 @@ _POSE = {
 }  # fmt: skip
 
 
+_POSE_KEYS, _pose_values = tuple(_POSE), attrgetter(*_POSE.values())
+
+
 def _pose_entry(pose: Pose) -> Mapping[str, object]:
-    entry = {key: getattr(pose, name) for key, name in _POSE.items()}
-    return entry if pose.work is None else entry | {"w": pose.work}
+    entry = dict(zip(_POSE_KEYS, _pose_values(pose), strict=True))
+    if pose.work is not None:
+        entry["w"] = pose.work
+    return entry
 
 
 def _pose(t: Nanos, entry: Json) -> Recorded:
@@ -207,13 +215,14 @@ ROWS: Mapping[type, _Row] = {
     Wave: _Row(
         "wave",
         lambda wave: {
-            "net": wave.wire,
+            "net": encode_basestring_ascii(wave.wire),
             "at": wave.at,
             "period": wave.period,
             "high": wave.high,
             "hz": wave.ticks_hz,
         },
         _wave,
+        frozenset(),
     ),
     Text: _Row(
         "usart",
@@ -299,8 +308,9 @@ ROWS: Mapping[type, _Row] = {
     Note: _Row("event", lambda note: {"who": note.who, "what": note.what, "detail": note.detail}, _note),
     Ranges: _Row(
         "sonar",
-        lambda ranges: {"mm": ranges.mm},
+        lambda ranges: {"mm": f"[{','.join(map(str, ranges.mm))}]"},
         lambda t, entry: Ranges(t=t, mm=tuple(_whole(value) for value in cast("list[float]", entry["mm"]))),
+        frozenset(),
     ),
     Pose: _Row(
         "pose",
@@ -312,6 +322,7 @@ ROWS: Mapping[type, _Row] = {
         "clearance",
         lambda clearance: {"um": clearance.um},
         lambda t, entry: Clearance(t=t, um=_integer(entry, "um")),
+        frozenset(),
     ),
     Contact: _Row(
         "contact",
@@ -354,7 +365,7 @@ def line_of(event: Recorded) -> str:
     row = ROWS[type(event)]
     entry = {"k": row.kind, "t": event.t, **row.to_entry(event)}
     texts = row.plain_texts
-    return _encode(entry) if texts is None else _template(tuple(entry), texts | _KIND) % entry
+    return _encode(entry) if texts is None else _template(tuple(entry), texts) % entry
 
 
 def event_of(entry: Json) -> Recorded | None:

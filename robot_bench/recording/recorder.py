@@ -14,6 +14,7 @@ import contextlib
 import math
 from binascii import b2a_base64
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from operator import itemgetter
 from typing import Protocol
 
 from p2os.pioneer.body.contract import BodyState, Hit
@@ -52,6 +53,7 @@ CONSOLE = "usart1"
 #: Of a wire that has not changed.
 _NONE = Edges()
 _LINE_END = ord("\n")
+_PLACE = itemgetter(0)
 
 
 class Observed(Protocol):
@@ -133,6 +135,7 @@ class Recorder(Stateful):
         #: What the firmware printed last.
         self.last_line = ""
         self._harness = harness
+        self._nets = {net.name: (place, net) for place, net in enumerate(harness)}
         self._body = body
         self._sample_ns = sample_ns
         self._next_sample: Nanos = 0
@@ -328,13 +331,9 @@ class Recorder(Stateful):
     def _tell_edges(self, limit: Nanos) -> dict[str, tuple[int, Edges]]:
         """Publish the edges of all wires in blocks; return those that somebody wants one by one."""
         changed, self._changed = self._changed, {}
-        tracks, wanted = [], {}
-        for place, net in enumerate(self._harness):
-            if net.name not in changed:
-                tracks.append(_NONE)
-                continue
-            edges = net.edges_until(limit)
-            tracks.append(edges)
+        tracks, wanted = [_NONE] * len(self._nets), {}
+        for place, net in sorted([self._nets[name] for name in changed], key=_PLACE):
+            edges = tracks[place] = net.edges_until(limit)
             if edges and self.events.wants_edges(net.name):
                 wanted[net.name] = place, edges
             self._tell_waves(net)

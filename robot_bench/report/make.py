@@ -48,7 +48,10 @@ def make_report(folder: Path) -> ReportFiles:
     Raises:
         TraceError: The folder holds no readable trace.
     """
-    record = read_run(folder)
+    return _report_of(read_run(folder), folder)
+
+
+def _report_of(record: RunRecord, folder: Path) -> ReportFiles:
     page = folder / REPORT_NAME
     drawn = page_data(record)
     page.write_text(render_page(record, drawn), encoding="utf-8")
@@ -81,7 +84,7 @@ def make_artefacts(folder: Path) -> Artefacts:
         write_sigrok(record, folder / "pins.sr")
         write_wire(record, folder / "wire.jsonl")
         (folder / "usart.txt").write_bytes(b"".join(data for _, data in record.usart))
-        report = make_report(folder)
+        report = _report_of(record, folder)
     except OSError as error:
         raise FileError(f"cannot write into {folder}: {error.strerror or error}") from error
     return Artefacts(outcome=outcome, report=report.page)

@@ -79,7 +79,7 @@ class RunLoop(Stateful):
 
     STATE = ("now", "_edges", "_is_inside_block", "_rounds")
     #: Each `run_until` sets them anew.
-    DERIVED = ("_end", "_wanted_end", "_advance", "_deadlines", "_is_halted", "_led", "_due")
+    DERIVED = ("_end", "_wanted_end", "_advance", "_deadlines", "_is_halted", "led", "_due", "_limit")
 
     def __init__(
         self,
@@ -103,13 +103,15 @@ class RunLoop(Stateful):
         self.now: Nanos = 0
         self._end: Nanos = 0
         self._wanted_end: Nanos = 0
-        #: How far the leader has come in this run, and when somebody is due next.
-        self._led: Nanos = 0
+        #: Where the leader stands between two of its slices, which is asked for more often than it moves.
+        self.led: Nanos = leader.now_ns
+        #: When somebody is due next.
         self._due: Nanos = 0
         self._edges: list[Nanos] = []
         self._rounds = 0
         self._advance: Callable[[int], Reached] = leader.advance_to
         self._deadlines: list[Nanos] = []
+        self._limit: Nanos = NEVER
         #: Whether the leader has halted in this run, and whether it stands inside a block.
         self._is_halted = False
         self._is_inside_block = False
@@ -148,21 +150,21 @@ class RunLoop(Stateful):
         self._end = self._wanted_end = end
         self._advance = advance or self.leader.advance_to
         self._is_halted = False
-        self._led = self.leader.now_ns
+        self.led = self.leader.now_ns
         if self._is_inside_block:
             self._is_inside_block = False
-            self._led = self._advance(end).now
+            self.led = self._advance(end).now
         self._choose_watched(self.now)
         self._due = self._next_due()
 
     def lead(self) -> Nanos | None:
         """Let the leader run until followers are due; return when, or None at the end and at a halt."""
         while not self._is_halted:
-            if self._due <= self._led and self._due <= self._end:
+            if self._due <= self.led and self._due <= self._end:
                 return self._due
-            if self._led >= self._end:
+            if self.led >= self._end:
                 return None
-            self._led = self._lead(self._led, min((self._end, *self._deadlines[: self._count])))
+            self.led = self._lead(self.led, min(self._end, self._limit))
             if self._edges:
                 self._due = min(self._due, self._edges[0])
         return None
@@ -187,13 +189,15 @@ class RunLoop(Stateful):
                 on_slice(now)
         return now
 
+    def _restored(self) -> None:
+        self.led = self.leader.now_ns
+
     def _next_due(self) -> Nanos:
-        """Return the earliest deadline, and note those of all."""
-        due = self._edges[0] if self._edges else NEVER
-        noted = self._deadlines = [
-            NEVER if at is None else at for at in [part.next_deadline() for part in self.followers]
-        ]
-        return min((due, *noted))
+        """Return the earliest deadline, and note those of all, and the earliest of those that the leader stops for."""
+        noted = self._deadlines = [NEVER if (at := part.next_deadline()) is None else at for part in self.followers]
+        self._limit = min(noted[: self._count], default=NEVER)
+        due = min(noted, default=NEVER)
+        return min(due, self._edges[0]) if self._edges else due
 
     def _follow(self, due: Nanos) -> None:
         """Bring those who are due to `due`, as noted; at a watched edge all."""

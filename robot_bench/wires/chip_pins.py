@@ -79,6 +79,7 @@ class ChipPins:
         harness: The wires.
         pin_of: Net → pin of the chip.
         on_watched: Called with the time of each edge that the chip makes on a watched net, in order of time.
+        now: Returns where the chip stands, ns; None asks the chip itself.
     """
 
     def __init__(
@@ -88,8 +89,10 @@ class ChipPins:
         pin_of: Mapping[str, str],
         *,
         on_watched: Callable[[Nanos], None] | None = None,
+        now: Callable[[], Nanos] | None = None,
     ) -> None:
         self._chip = chip
+        self._now = now or (lambda: chip.now_ns)
         self._pin_of = dict(pin_of)
         self._nets = tuple(harness[net] for net in pin_of)
         places = {number_of(pin): place for place, pin in enumerate(pin_of.values())}
@@ -169,7 +172,7 @@ class ChipPins:
         if owner == OWNER:
             return
         times, codes = net.drives_from(owner, at)
-        if len(times) == 1 and at <= self._chip.now_ns:
+        if len(times) == 1 and at <= self._now():
             self._pass_on(net, at)
             return
         if net.is_alone(owner, OWNER) and not codes.strip(_HARD):

@@ -214,8 +214,8 @@ class Net(Stateful):
         From the first call on `begin` may lie `COURSE_NS` before the present.
         """
         self._kept_ns = COURSE_NS
-        if self.last_edge <= begin and not self._may_wave:
-            return [(begin, self._level_at_last())]
+        if self.last_edge <= begin:
+            return [(begin, self._shown(begin) if self._may_wave else self._level_at_last())]
         cuts = {at for history in self._drives.values() for at in history.between(begin, end)}
         return [(at, self._shown(at)) for at in (begin, *sorted(cuts))]
 
@@ -342,8 +342,7 @@ class Net(Stateful):
         if drive is None:
             level = _resolved(tuple(codes))
             return self.idle if level is None else level
-        low, high = (_resolved((*codes, code)) for code in drive.codes)
-        low, high = self.idle if low is None else low, self.idle if high is None else high
+        low, high = _phases((*codes, *drive.codes), self.idle)
         return low if low == high else drive.wave
 
     def _history(self, owner: str, now: Nanos) -> History:
@@ -457,6 +456,14 @@ def _levels_with(others: tuple[int, ...], idle: bool) -> bytes:
 def _held(codes: tuple[int, ...]) -> tuple[bool | None, bool]:
     """Return the level that drives make together, and whether one of them is hard."""
     return _resolved(codes), any(code in HARD for code in codes)
+
+
+@cache
+def _phases(codes: tuple[int, ...], idle: bool) -> tuple[bool, bool]:
+    """Return the levels in the low and the high phase of a wave, whose codes are the last two, among other drives."""
+    *others, low, high = codes
+    found = _resolved((*others, low)), _resolved((*others, high))
+    return idle if found[0] is None else found[0], idle if found[1] is None else found[1]
 
 
 @cache

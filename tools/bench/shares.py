@@ -29,6 +29,8 @@ IS_QUICK, HAS_TIMERS = "--quick" in sys.argv, "--timers" in sys.argv
 RUNS = 1 if IS_QUICK else 5
 #: Virtual seconds of a run.
 TOGGLE_S, BITBANG_S, PRINT_S, DODGE_S = (2.0, 0.05, 0.5, 5.0) if IS_QUICK else (20.0, 0.5, 5.0, 30.0)
+#: It stands still from 16 s on.
+ROVER_S = 4.0 if IS_QUICK else 14.0
 MODES = ("adapter", "direct")
 GOALS = {"kinematic": 0.45, "bullet": 0.8}
 
@@ -111,6 +113,7 @@ def dodging(folder: Path) -> None:
     """The whole chain, as a share of the body alone."""
     bodies.RUNS, bodies.LIVED_S = 1, round(DODGE_S)
     for body, goal in GOALS.items():
+        bodies.times_real(body)  # imports
         shares: dict[str, list[float]] = {mode: [] for mode in MODES}
         for _ in range(RUNS):
             alone = bodies.times_real(body)
@@ -123,6 +126,29 @@ def dodging(folder: Path) -> None:
         row(f"dodge in room, {body}: direct / adapter", pairs, "1")
 
 
+def rover(folder: Path) -> None:
+    """A robot on its own pins: speed control at 1 kHz by PWM, encoders and ADC, while it drives."""
+    factors = []
+    for _ in range(RUNS):
+        made = Bench(load_scenario("rover").with_options(duration_s=ROVER_S), trace=TraceWriter(folder / "trace.jsonl"))
+        factors.append(ROVER_S / cpu_s(lambda: run(made)))  # noqa: B023 - called at once
+    row("rover in arena, kinematic: times real time", factors, "5")
+
+
+def together(folder: Path) -> None:
+    """Robots that share a world, against as many of them each in its own."""
+    scenario = load_scenario("two-dodge").with_options(body="kinematic", duration_s=DODGE_S)
+    count = len(scenario.robots)
+    for mode in MODES:
+        ratios = []
+        for _ in range(RUNS):
+            traces = {robot.name: TraceWriter(folder / robot.name) for robot in scenario.robots}
+            both = next(iter(Bench.together(scenario.with_options(mode=mode), traces=traces).values()))
+            alone = bench(folder, None, DODGE_S, mode)
+            ratios.append(count * cpu_s(lambda: run(alone)) / cpu_s(lambda: run(both)))  # noqa: B023 - called at once
+        row(f"two-dodge, kinematic, {mode}: each alone / in one world", ratios, "0.5")
+
+
 def main() -> int:
     """Print the table; 1 without a compiler for it."""
     if shutil.which("arm-none-eabi-gcc") is None:
@@ -131,7 +157,7 @@ def main() -> int:
     if HAS_TIMERS:
         print("with TIM1 to TIM4 running:")
     with tempfile.TemporaryDirectory() as folder:
-        for part in (toggling, bitbanging, printing, dodging):
+        for part in (toggling, bitbanging, printing, dodging, rover, together):
             part(Path(folder))
     return 0
 

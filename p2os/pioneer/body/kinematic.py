@@ -41,6 +41,8 @@ STRAIGHT_RAD = 1e-9
 LOOK_AHEAD_M = 2.0
 #: Where the set-points lead into a thing, one wheel is tried at these shares of its own (chosen).
 SLIDING_SHARES = (0.75, 0.5, 0.25, 0.0)
+#: More than a bound on what is free has lost by rounding, m.
+ROUNDING_M = 1e-9
 #: What walks is moved each 10 ms (chosen: 8 mm at a walker's pace).
 WALK_STEPS = 10
 #: Robots whose circles are farther apart are not looked at until they have moved by as much, m. chosen: below the
@@ -200,8 +202,8 @@ class KinematicBody(BodyInWorld):
         self._asked = (0.0, 0.0)
         #: The rims' speeds by their own motors: without what another robot has pushed.
         self._driven = (0.0, 0.0)
-        #: The work of a step in which these do not change, joules.
-        self._steady_j = 0.0
+        #: The work of a step in which these do not change, joules; None: not worked out.
+        self._steady_j: float | None = None
         self._stalled = False
         #: Another robot has driven against this one since the last step, and has pushed it along its heading so far.
         self._is_bumped, self._carried_m = False, 0.0
@@ -234,8 +236,10 @@ class KinematicBody(BodyInWorld):
         if rims == asked:
             if asked != self._driven:
                 self._rim_work_j += self._load.work_j(self._driven, asked, DT_S)
-                self._steady_j = self._load.work_j(asked, asked, DT_S)
+                self._steady_j = None
             else:
+                if self._steady_j is None:
+                    self._steady_j = self._load.work_j(asked, asked, DT_S)
                 self._rim_work_j += self._steady_j
         self._left, self._right = self._driven = rims or (0.0, 0.0)
         return self._turn_wheels()
@@ -511,5 +515,8 @@ class KinematicBody(BodyInWorld):
 
     def clearance(self, *, no_more_than: float = math.inf) -> float:
         """Return the distance from the hull to the nearest thing that it could touch, metres, or `no_more_than`."""
-        free = self._plan.clearance(self._x, self._y, self._heading, no_more_than=no_more_than)
+        # Where nothing is as near, which its own steps know, nobody looks.
+        free = no_more_than
+        if self._free_m <= no_more_than + ROUNDING_M:
+            free = self._plan.clearance(self._x, self._y, self._heading, no_more_than=no_more_than)
         return self._nearest_robot(free)

@@ -141,6 +141,7 @@ class Motion(Stateful):
     """The motion commands of one robot, and the wheel speeds that they ask for."""
 
     STATE = ("limits", "mode", "is_held", "is_powered", "_first", "_second", "_wheels")
+    DERIVED = ("_changes_of", "_changes")
 
     def __init__(self, limits: MotionLimits, *, track_mm: int, dt_ns: Nanos) -> None:
         self.limits = limits
@@ -154,6 +155,9 @@ class Motion(Stateful):
         self._first = _Axis()
         self._second = _Axis()
         self._wheels = (0.0, 0.0)
+        #: The limits of the last step, and what follows from them.
+        self._changes_of: MotionLimits | None = None
+        self._changes = (0, 0, 0, 0)
 
     # Commands ---------------------------------------------------------------------
 
@@ -263,13 +267,14 @@ class Motion(Stateful):
         if self.is_steady:
             return self._wheels
         limits, first, second = self.limits, self._first, self._second
-        faster, slower = self._per_step(limits.accel_mm_s2), self._per_step(limits.decel_mm_s2)
+        if limits is not self._changes_of:
+            self._changes_of, self._changes = limits, self._changes_per_step(limits)
+        faster, slower, turn_faster, turn_slower = self._changes
         if self.mode is Mode.WHEELS:
             first.approach(0 if self.is_held else first.set_speed, faster, slower)
             second.approach(0 if self.is_held else second.set_speed, faster, slower)
             self._wheels = (first.speed / NM_PER_M, second.speed / NM_PER_M)
             return self._wheels
-        turn_faster, turn_slower = self._per_step(limits.rot_accel_deg_s2), self._per_step(limits.rot_decel_deg_s2)
         if first.goal is not None:
             left_nm = first.goal - travel_nm
             top = limits.max_velocity_mm_s * NM_PER_MM
@@ -289,8 +294,11 @@ class Motion(Stateful):
 
     # Helpers ----------------------------------------------------------------------
 
-    def _per_step(self, acceleration: int) -> int:
-        return acceleration * self._dt_ns // _STEP_DIVISOR
+    def _changes_per_step(self, limits: MotionLimits) -> tuple[int, int, int, int]:
+        """Return by how much a step changes speeds at most: either axis faster and slower, a rotation likewise."""
+        rates = limits.accel_mm_s2, limits.decel_mm_s2, limits.rot_accel_deg_s2, limits.rot_decel_deg_s2
+        faster, slower, turn_faster, turn_slower = (rate * self._dt_ns // _STEP_DIVISOR for rate in rates)
+        return faster, slower, turn_faster, turn_slower
 
     def _set_mode(self, mode: Mode) -> None:
         if mode is self.mode:

@@ -87,7 +87,8 @@ class HBridge(Stateful):
         span = end - begin
         self._known = Shares(times[0] / span, times[1] / span, times[2] / span)
         # What is known already of the time after the end was not looked at, nor how a dead time goes on.
-        self._changed = {place for place, net in enumerate(self._nets) if net.last_edge >= end - self._dead_ns}
+        alive = end - self._dead_ns
+        self._changed = {place for place in self._changed if self._nets[place].last_edge >= alive}
         # So it goes on, where nobody drives a pin anew and whole periods fit.
         self._is_steady = not changes and not self._changed and all(
             what is True or what is False or span * what.ticks_hz % (what.period * NS_PER_S) == 0 for what in now
