@@ -102,7 +102,7 @@ LAYERS = {
         ("running", "firmware", "scenarios"), ("wires",), ("events",), ("direct",), ("recording",),
         ("scenario", "report"),
         ("adapter",), ("bench",), ("remote",), ("run", "project"),
-        ("validation",), ("experiments",), ("campaign",), ("ros",), ("cli",),
+        ("experiments",), ("campaign",), ("ros",), ("cli",),
     ),
 }  # fmt: skip
 

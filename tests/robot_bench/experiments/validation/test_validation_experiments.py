@@ -10,10 +10,10 @@ import pytest
 
 from p2os.cli.main import run as p2os
 from robot_bench.events.codec import Json
+from robot_bench.experiments.validation.experiments import CODES, EXPERIMENTS
+from robot_bench.experiments.validation.figures import LOOSE_BECAUSE, Figure, loose
+from robot_bench.experiments.validation.trials import Result, Variant, run_trials, told, variants
 from robot_bench.scenario.included_files import Setting
-from robot_bench.validation.experiments import CODES, EXPERIMENTS
-from robot_bench.validation.figures import LOOSE_BECAUSE, Figure, loose
-from robot_bench.validation.trials import Result, Variant, run_trials, told, variants
 
 DIRECT, ADAPTER = Variant("direct", "", "kinematic"), Variant("adapter", "model", "kinematic")
 FIRMWARE = Variant("adapter", "firmware", "kinematic")

@@ -5,10 +5,10 @@ from itertools import pairwise
 
 from p2os.protocol.commands import CommandNumber
 from robot_bench.events.kinds import Pose
+from robot_bench.experiments.validation.figures import Bound, Figure, Finding, Missing, worst_or_missing
+from robot_bench.experiments.validation.nominal import JITTER_S, POSE_RESOLUTION_MM_S, POSE_S, Nominal
+from robot_bench.experiments.validation.signals import Course, at, motor_pairs, poses_between, rim_mm_s, sent
 from robot_bench.recording.run_record import RunRecord
-from robot_bench.validation.figures import Bound, Figure, Finding, Missing, worst_or_missing
-from robot_bench.validation.nominal import JITTER_S, POSE_RESOLUTION_MM_S, POSE_S, Nominal
-from robot_bench.validation.signals import Course, at, motor_pairs, poses_between, rim_mm_s, sent
 from simbase.timing import NS_PER_S, Nanos
 
 Pair = tuple[int, int]

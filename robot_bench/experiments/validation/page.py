@@ -7,9 +7,17 @@ import html
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
 
-from robot_bench.validation.experiments import Experiment
-from robot_bench.validation.figures import GROUPS, LOOSE_BECAUSE, Figure, Finding, Missing, loose, shown_value
-from robot_bench.validation.trials import Result
+from robot_bench.experiments.validation.experiments import Experiment
+from robot_bench.experiments.validation.figures import (
+    GROUPS,
+    LOOSE_BECAUSE,
+    Figure,
+    Finding,
+    Missing,
+    loose,
+    shown_value,
+)
+from robot_bench.experiments.validation.trials import Result
 
 #: Widths of the strip that shows a difference in bounds, pixels.
 STRIP_WIDTH, STRIP_HEIGHT = 120, 14

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from adapter_sim.pinout import load_pinout
 from p2os.protocol.times import CYCLE_NS
 from robot_bench.events.kinds import MICRO
+from robot_bench.experiments.validation.figures import Bound
+from robot_bench.experiments.validation.signals import ENCODER_STEPS
 from robot_bench.recording.recorder import SAMPLE_NS
 from robot_bench.scenario.scenario import Scenario
-from robot_bench.validation.figures import Bound
-from robot_bench.validation.signals import ENCODER_STEPS
 from simbase.timing import NS_PER_MS, NS_PER_S
 
 #: Bits of a character on the line: 8N1.

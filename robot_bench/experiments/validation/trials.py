@@ -11,14 +11,14 @@ from typing import cast
 from p2os.pioneer.body.factory import installed_bodies
 from robot_bench.bench import Bench
 from robot_bench.events.codec import Json
+from robot_bench.experiments.validation.experiments import AT_PORT, Experiment, Trial
+from robot_bench.experiments.validation.figures import Finding, Missing
+from robot_bench.experiments.validation.nominal import Nominal
 from robot_bench.recording.run_record import read_run
 from robot_bench.run import RunResult, write_run
 from robot_bench.scenario.goals.judging import Judgement
 from robot_bench.scenario.included_files import Setting
 from robot_bench.scenario.scenario import Scenario
-from robot_bench.validation.experiments import AT_PORT, Experiment, Trial
-from robot_bench.validation.figures import Finding, Missing
-from robot_bench.validation.nominal import Nominal
 from simbase.timing import NS_PER_S
 
 

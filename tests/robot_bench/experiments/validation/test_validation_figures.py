@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from adapter_sim.codec import motor_code
 from adapter_sim.pinout import load_pinout
 from robot_bench.events.kinds import Packet
+from robot_bench.experiments.validation.figures import Bound, Figure, Missing, loose, worst, worst_or_missing
+from robot_bench.experiments.validation.signals import at, encoder_steps, motor_pairs, seen_spans, sent
 from robot_bench.recording.run_record import RunRecord
-from robot_bench.validation.figures import Bound, Figure, Missing, loose, worst, worst_or_missing
-from robot_bench.validation.signals import at, encoder_steps, motor_pairs, seen_spans, sent
 from robot_bench.wires.edges import Edges
 
 MS = 1_000_000

@@ -5,15 +5,15 @@ from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 
+from robot_bench.experiments.validation.encoders import count_figures, encoder_figures
+from robot_bench.experiments.validation.figures import Bound, Figure, Finding, Missing
+from robot_bench.experiments.validation.motors import Pair, motor_figures
+from robot_bench.experiments.validation.nominal import Nominal
+from robot_bench.experiments.validation.sensors import only_while_seen_figures, sensor_figures
 from robot_bench.recording.run_record import RunRecord
 from robot_bench.scenario.goals.judging import Judgement
 from robot_bench.scenario.included_files import Setting
 from robot_bench.scenario.scenario import Scenario, known_scenarios, load_scenario
-from robot_bench.validation.encoders import count_figures, encoder_figures
-from robot_bench.validation.figures import Bound, Figure, Finding, Missing
-from robot_bench.validation.motors import Pair, motor_figures
-from robot_bench.validation.nominal import Nominal
-from robot_bench.validation.sensors import only_while_seen_figures, sensor_figures
 from simbase.timing import NS_PER_S
 
 

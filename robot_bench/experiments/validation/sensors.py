@@ -2,12 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 
+from robot_bench.experiments.validation.figures import Bound, Figure, Finding, Missing, worst_or_missing
+from robot_bench.experiments.validation.nominal import POSE_S, PROGRAM_S, TICK_S, Nominal
+from robot_bench.experiments.validation.signals import distance_wires, motor_pairs, poses_between, seen_spans
 from robot_bench.recording.run_record import RunRecord
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.scenario.world_script import Op
-from robot_bench.validation.figures import Bound, Figure, Finding, Missing, worst_or_missing
-from robot_bench.validation.nominal import POSE_S, PROGRAM_S, TICK_S, Nominal
-from robot_bench.validation.signals import distance_wires, motor_pairs, poses_between, seen_spans
 from simbase.timing import NS_PER_S, Nanos
 
 #: chosen: the program counts a change when so many samples in a row show it.

@@ -4,10 +4,17 @@ import re
 from itertools import pairwise
 
 from robot_bench.events.kinds import MICRO
+from robot_bench.experiments.validation.figures import Bound, Figure, Finding, Missing, worst_or_missing
+from robot_bench.experiments.validation.nominal import Nominal
+from robot_bench.experiments.validation.signals import (
+    ENCODER_STEPS,
+    at,
+    encoder_steps,
+    motor_pairs,
+    rim_mm_s,
+    wheel_steps,
+)
 from robot_bench.recording.run_record import RunRecord
-from robot_bench.validation.figures import Bound, Figure, Finding, Missing, worst_or_missing
-from robot_bench.validation.nominal import Nominal
-from robot_bench.validation.signals import ENCODER_STEPS, at, encoder_steps, motor_pairs, rim_mm_s, wheel_steps
 from simbase.timing import NS_PER_S, Nanos
 
 SIDES = ("encoder1", "encoder2")

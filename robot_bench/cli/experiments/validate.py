@@ -17,16 +17,25 @@ from robot_bench.cli.progress import RunDisplay
 from robot_bench.cli.run import ask, capped, drive_port
 from robot_bench.cli.workers import core_count, run_in_processes
 from robot_bench.events.codec import Json
+from robot_bench.experiments.validation.experiments import EXPERIMENTS, Experiment
+from robot_bench.experiments.validation.figures import LOOSE_BECAUSE, Figure, loose
+from robot_bench.experiments.validation.page import render
+from robot_bench.experiments.validation.trials import (
+    Result,
+    Variant,
+    longest_s,
+    refuse,
+    run_port,
+    run_trials,
+    told,
+    variants,
+)
 from robot_bench.recording.run_folder import RUNS, make_next_folder
 from robot_bench.run import RunResult
 from robot_bench.scenario.included_files import Setting, read_setting
 from robot_bench.scenario.scenario import MODES, Scenario
 from robot_bench.scenario.schema import nearest
 from robot_bench.scenario.sweep import read_seeds
-from robot_bench.validation.experiments import EXPERIMENTS, Experiment
-from robot_bench.validation.figures import LOOSE_BECAUSE, Figure, loose
-from robot_bench.validation.page import render
-from robot_bench.validation.trials import Result, Variant, longest_s, refuse, run_port, run_trials, told, variants
 from simbase.errors import FileError, UsageError
 from simbase.units import COUNT
 
