@@ -53,10 +53,12 @@ ALLOWED = {
     "robot_bench": {"p2os", "bluepill_sim", "adapter_sim", "typer", "rich", "click"},
     "robot_bench.report": {"p2os", "matplotlib"},
     "robot_bench.report.explain": {"p2os", "bluepill_sim", "adapter_sim"},
-    "robot_bench.recording.event_files": {"pyarrow"},
+    "robot_bench.recording.event_files": {"p2os", "pyarrow"},
+    "robot_bench.live": {"adapter_sim", "foxglove"},
     "robot_bench.experiments": {"p2os", "numpy", "scipy"},
     "robot_bench.experiments.pictures": {"matplotlib"},
-    "robot_bench.experiments.sensitivity": {"numpy", "SALib"},
+    "robot_bench.experiments.sensitivity": {"p2os", "numpy", "SALib"},
+    "robot_bench.experiments.validation": {"p2os", "adapter_sim"},
     "robot_bench.cli.pytest_plugin": {"p2os", "bluepill_sim", "pytest"},
     "robot_bench.campaign.variants.mutation.suite": {"bluepill_sim", "pytest"},
     "robot_bench.campaign.results": {"pyarrow"},
@@ -102,7 +104,7 @@ LAYERS = {
         ("running", "firmware", "scenarios"), ("wires",), ("events",), ("direct",), ("recording",),
         ("scenario", "report"),
         ("adapter",), ("bench",), ("remote",), ("run", "project"),
-        ("experiments",), ("campaign",), ("ros",), ("cli",),
+        ("experiments",), ("campaign",), ("ros", "live"), ("cli",),
     ),
 }  # fmt: skip
 
@@ -251,6 +253,7 @@ MOST_NAMES = 16
 LONG_FOLDERS = {
     ".": "the top folder",
     "p2os/robots": "one TOML file a robot, beside the loader that finds them",
+    "robot_bench": "one package or module a layer of the bench",
     "robot_bench/firmware": "the sources and programs of the examples, built by one command",
     "bluepill_sim/peripherals": "one peripheral a file",
     "docs": "one page a subject",

@@ -270,7 +270,7 @@ def run(
                 coverage=coverage, profile=profile, fail_under=fail_under, explained=True,
             )  # fmt: skip
         else:
-            from robot_bench.cli.gdb import debug_bench
+            from robot_bench.cli.debugging.gdb import debug_bench
 
             driver = debug_bench(gdb, is_paced=realtime is not None, on_wait=display.raise_if_interrupted)
             result = run_scenario(wanted, folder, on_progress=display.update, drive=driver, force=force)
@@ -446,7 +446,7 @@ def drive_port(
         RunFailedError: The person declined.
     """
     from p2os.cli.held_robot import hold_robot
-    from robot_bench.cli.gdb import debug_port
+    from robot_bench.cli.debugging.gdb import debug_port
 
     scenario = capped(scenario, max_speed_mps)
     transport = open_url(url)

@@ -101,7 +101,7 @@ def ros(
     domain: Domain = DOMAIN,
     interface: Interface = LOOPBACK,
     router: Router = False,
-    namespace: Annotated[str, typer.Option(help="What names of topics and frames begin with.", metavar="/NAME")] = "",
+    namespace: Annotated[str, typer.Option(help="What names of topics and frames begin with.", metavar="NAME")] = "",
     name: Annotated[str, typer.Option(help="Of the node.", metavar="NAME")] = "p2os",
     deadman_ns: Annotated[
         Nanos,

@@ -38,7 +38,7 @@ from simbase.errors import FileError, UsageError
 from simbase.timing import NS_PER_S
 from simbase.units import COUNT, PERCENT, SEED
 
-HELP = """Judge the goals of scenarios by how many wrong programs they notice.
+HELP = """Judge a scenario's goals by how many wrong programs they notice.
 
 Each instruction of FIRMWARE that the scenarios run is changed, one at a time: a
 branch inverted, gone always, gone never; a comparison moved by one or made strict;
@@ -53,7 +53,7 @@ Examples:
   p2os mutate build/robot.elf patrol.toml        all mutants, and those that survived
   p2os mutate build/robot.elf tests              the score of your tests (pytest)
   p2os mutate dodge.elf dodge --sample 100       a hundred of them, drawn by --seed
-  p2os mutate dodge.elf dodge --only dodge_fsm.c --mode direct --body kinematic
+  p2os mutate dodge.elf dodge --only dodge_fsm.c --body kinematic
   p2os mutate build/robot.elf patrol.toml --fail-under 80%    for CI
 """
 

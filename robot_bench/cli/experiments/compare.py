@@ -55,7 +55,7 @@ def compare(
     other: Annotated[Path, typer.Argument(help="What is compared with it.", metavar="B")],
     poses: Annotated[
         str, typer.Option(help="Whose poses, of both or A,B: truth, odometry, or truth where known.",
-                          metavar="auto|truth|odometry[,…]")
+                          metavar="auto|truth|odometry[,...]")
     ] = "auto",
     align: Annotated[str, typer.Option(help="How B is laid on A.", metavar="|".join(ALIGNMENTS))] = "first",
     at: Annotated[

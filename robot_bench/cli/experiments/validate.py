@@ -42,7 +42,7 @@ from simbase.units import COUNT
 REPORT, FIGURES = "validation.html", "validation.json"
 #: chosen: so many failures are told of one by one.
 MOST_TOLD = 20
-HELP = """Validate the bench: motors, sensors, encoders, whole drives, as experiments.
+HELP = """Validate the bench by experiments: motors, sensors, encoders.
 
 Each EXPERIMENT has a hypothesis, figures with units, and a bound for each, whose
 formula stands beside it in the report. Without names all are run: motors, codes,

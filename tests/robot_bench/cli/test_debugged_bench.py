@@ -15,8 +15,8 @@ from bluepill_sim.errors import BluePillError
 from p2os.cli.main import run
 from p2os.errors import RunFailedError
 from robot_bench.bench import Bench
-from robot_bench.cli.debugged_bench import BenchMachine, RemoteMachine, board_of
-from robot_bench.cli.gdb import debug_bench, debug_port
+from robot_bench.cli.debugging.debugged_bench import BenchMachine, RemoteMachine, board_of
+from robot_bench.cli.debugging.gdb import debug_bench, debug_port
 from robot_bench.run import run_at_port
 from robot_bench.scenario.scenario import Scenario, load_scenario
 from simbase.timing import NS_PER_S
@@ -137,7 +137,7 @@ def gdb(monkeypatch: pytest.MonkeyPatch) -> list[bytes]:
             Gdb(self.port, packets)
             return super().serve(once=once)
 
-    monkeypatch.setattr("robot_bench.cli.gdb.GdbServer", Called)
+    monkeypatch.setattr("robot_bench.cli.debugging.gdb.GdbServer", Called)
     return packets
 
 

@@ -44,7 +44,7 @@ def loaded(data: bytes) -> Any:
 
 GOES_ON = """
 import pickle, sys
-from tests.robot_bench.test_pickled_bench import finished
+from tests.robot_bench.run.test_pickled_bench import finished
 benches = pickle.load(sys.stdin.buffer)
 sys.stdout.buffer.write(pickle.dumps([finished(bench) for bench in benches]))
 """
