@@ -133,7 +133,7 @@ def test_a_verb_can_choose_its_exit_code(offer: Callable[[object], None]) -> Non
     ("words", "message", "hint"),
     [
         (["frob"], "p2os: No such command 'frob'", "hint: p2os --help"),
-        (["prots"], "p2os: No such command 'prots'. Did you mean 'ports'?", "hint: p2os --help"),
+        (["monitr"], "p2os: No such command 'monitr'. Did you mean 'monitor'?", "hint: p2os --help"),
         (
             ["drive", "tcp:x", "--forwrd", "1m"],
             "p2os: No such option: --forwrd. Did you mean --forward?",
