@@ -29,7 +29,7 @@ from simbase.timing import NS_PER_MS, NS_PER_S
 
 P2DX = load_parameters("p2dx")
 OPTIONS = NodeOptions()
-PEER = Path(__file__).parents[1] / "ros" / "raw_peer.py"
+PEER = Path(__file__).with_name("raw_peer.py")
 
 
 @dataclass
