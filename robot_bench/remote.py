@@ -19,7 +19,15 @@ from p2os.protocol.frames import Decoder, Frame
 from p2os.protocol.sip import SIP_KINDS, StandardSip
 from p2os.transport import Transport
 from robot_bench.adapter import make_shipped_adapter
-from robot_bench.bench import boot, hear_buses, hear_usarts, log_bench_event, make_harness, plug_in
+from robot_bench.bench import (
+    boot,
+    cut_wires,
+    hear_buses,
+    hear_usarts,
+    log_bench_event,
+    make_harness,
+    plug_in,
+)
 from robot_bench.recording.client_view import OdometryPose, SipRanges
 from robot_bench.recording.recorder import Recorder
 from robot_bench.recording.trace import TraceWriter
@@ -79,7 +87,9 @@ class RemoteBench:
         harness = make_harness(pinout)
         self.recorder = recorder = Recorder(self.trace, harness, body=None)
         recorder.on_event = log_bench_event
-        self.adapter = make_shipped_adapter(scenario, OwnedPins(harness, "adapter"), pinout)
+        self.adapter = make_shipped_adapter(
+            scenario, OwnedPins(harness, "adapter", cut_wires(scenario, pinout)), pinout
+        )
         self.adapter.on_event = recorder.listener("adapter")
         self._listener = _Listener(scenario, recorder)
         endpoint = PortEndpoint(

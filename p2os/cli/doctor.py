@@ -83,6 +83,8 @@ NEEDS = (
     Need(name="pillow", kind="package", feature="worlds from ROS maps: pictures", extra="worlds"),
     Need(name="pyyaml", kind="package", feature="worlds from ROS maps", extra="worlds"),
     Need(name="pygame-ce", kind="package", feature="teleop --pad", extra="pad"),
+    Need(name="cyclonedds", kind="package", feature="ros, run --ros", extra="ros"),
+    Need(name="eclipse-zenoh", kind="package", feature="ros --transport zenoh", extra="ros"),
     Need(name="tshark", kind="program", feature="captures on the command line", get="sudo apt-get install tshark"),
     Need(
         name="bluepill_sim._native", kind="built", feature="the emulated BluePill",

@@ -172,7 +172,8 @@ def battery(stamp: Nanos, state: RobotState) -> Message:
         "voltage": state.battery_v,
         "temperature": math.nan if state.temperature_c is None else state.temperature_c,
         **unknown,
-        "percentage": math.nan if state.state_of_charge is None else state.state_of_charge,
+        # ARCOS robots without a gauge send 0.
+        "percentage": state.state_of_charge or math.nan,
         "power_supply_status": DISCHARGING,
         "power_supply_health": UNKNOWN_STATUS,
         "power_supply_technology": UNKNOWN_STATUS,

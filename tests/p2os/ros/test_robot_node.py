@@ -1,6 +1,7 @@
 """What a robot's node publishes and takes, without a network."""
 
 import math
+from dataclasses import replace
 from typing import Any, cast
 
 import pytest
@@ -208,6 +209,23 @@ def test_bumpers_are_told_where_they_are_fitted(node: RobotNode) -> None:
     found = published(node, state)
     assert found["/r1/bumper_front"]["data"] == [1, 0, 1, 0, 0]
     assert "/r1/bumper_rear" not in found
+
+
+@pytest.mark.parametrize(("told", "share"), [(None, math.nan), (0.0, math.nan), (0.01, 0.01), (1.0, 1.0)])
+def test_a_charge_that_nothing_measures_is_not_a_number(node: RobotNode, told: float | None, share: float) -> None:
+    (state,) = states(StandardSip(raw_battery=126))
+    found = published(node, replace(state, state_of_charge=told, temperature_c=31.0))["/r1/battery_state"]
+    assert found["percentage"] == pytest.approx(share, nan_ok=True)
+    assert (found["voltage"], found["temperature"]) == (12.6, 31.0)
+    assert math.isnan(found["current"])
+
+
+def test_motors_are_told_when_they_change_where_the_robot_reports_them(node: RobotNode) -> None:
+    (state,) = states(StandardSip())
+    assert "/r1/motors_state" not in published(node, state)
+    assert published(node, replace(state, motors_enabled=True))["/r1/motors_state"] == {"data": True}
+    assert "/r1/motors_state" not in published(node, replace(state, motors_enabled=True))
+    assert published(node, replace(state, motors_enabled=False))["/r1/motors_state"] == {"data": False}
 
 
 def test_a_compass_that_points_east_is_a_heading_of_zero(node: RobotNode) -> None:

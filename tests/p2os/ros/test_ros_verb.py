@@ -49,8 +49,9 @@ def test_what_cannot_be_is_refused_with_a_hint_before_a_robot_is_looked_for(
     assert caught.value.hint
 
 
-def test_a_router_that_is_not_there_is_told_with_what_to_do(app: typer.Typer) -> None:
+def test_a_router_that_is_not_there_is_told_with_what_to_do(app: typer.Typer, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("zenoh", reason="the extra ros is not installed")
+    monkeypatch.setattr("p2os.ros.zenoh_node.CONNECT_MS", 50)
     with pytest.raises(TransportError, match=r"find a router on tcp/127\.0\.0\.1:9") as caught:
         run(app, "tcp:127.0.0.1:1", "--transport", "zenoh", "--interface", "127.0.0.1:9")
     assert "--router" in str(caught.value.hint)
