@@ -84,6 +84,12 @@ class BlockTable(Stateful):
         self._special.clear()
         self._in_writable.clear()
 
+    def forget_in(self, first: int, end: int) -> None:
+        """Measure again the blocks of which something stands from `first` up to before `end`."""
+        for table in (self.plain, self._special):
+            for start in [start for start, block in table.items() if start < end and block.end > first]:
+                del table[start]
+
     def writable_at(self, address: int) -> WritableMemory | None:
         """Return the writable memory that an address is in; None elsewhere."""
         return next((memory for memory in self.writable if memory[0] <= address < memory[1]), None)

@@ -206,7 +206,7 @@ class Engine(Stateful):
     def drop_code(self, address: int, size: int) -> None:
         """Forget what was translated and measured from bytes that have changed; not during a run."""
         self._core.drop_code(address, size)
-        self.forget_costs()
+        self._blocks.forget_in(address, address + size)
 
     @property
     def entered_blocks(self) -> frozenset[int]:

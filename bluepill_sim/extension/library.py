@@ -61,6 +61,7 @@ _FUNCTIONS = {
     "core_run": "upl",
     "core_add_row": "bpuuuuupup",
     "core_forget_rows": "vp",
+    "core_forget_range": "vpuu",
     "core_set_loop": "bpup",
     "core_set_fault": "vpuuuu",
     "core_set_system_region": "vpu",

@@ -175,6 +175,11 @@ class NativeEngine(Engine):
         """As of `Engine`; until a state is restored, whose warnings may be others."""
         library().core_declare_zero(self._state, address)
 
+    def drop_code(self, address: int, size: int) -> None:
+        """As of `Engine`."""
+        super().drop_code(address, size)
+        library().core_forget_range(self._state, address, address + size)
+
     def forget_costs(self) -> None:
         """As of `Engine`."""
         super().forget_costs()

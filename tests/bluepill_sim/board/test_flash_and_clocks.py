@@ -56,6 +56,33 @@ def test_code_in_flash_waits_until_the_flash_is_done(make: Any) -> None:
     assert machine.board.warnings == []
 
 
+@pytest.mark.parametrize(("offset", "seen"), [(-2, [1, 2, 3]), (0, [0, 2, 3]), (4, [1, 2, 0]), (6, [1, 2, 3])])
+def test_code_that_was_programmed_runs_as_it_is_now(make: Any, offset: int, seen: list[int]) -> None:
+    """0 may be programmed over anything, and moves R0 to itself; before and behind the block stand such words too."""
+    machine = make(
+        UNLOCK + store(CR, PG)
+        + "bl first\nmovs r4, #0\nmovs r5, #0\nmovs r6, #0\n"
+        + f"mov32 r1, #first\n{'adds' if offset >= 0 else 'subs'} r1, #{abs(offset)}\nmovs r2, #0\nstrh r2, [r1, #0]\n"
+        "bl first\nmov r0, r4\nlog r0\nmov r0, r5\nlog r0\nmov r0, r6\nlog r0\nb stop\n.half 0xBF00\n"
+        "first: movs r4, #1\nmovs r5, #2\nmovs r6, #3\nb behind\nbehind: bx lr\n.half 0xBF00"
+    ).run(300)  # fmt: skip
+    assert machine.log == seen
+
+
+@pytest.mark.parametrize(("offset", "saved"), [(-2, 0), (0, 1), (2, 0), (4, 1)])
+def test_code_that_was_programmed_costs_what_it_costs_now(make: Any, offset: int, saved: int) -> None:
+    """A load of two cycles, at the start or at the end of its block, becomes an instruction of one."""
+    call = "ldr r4, [r3, #4]\nbl first\nldr r5, [r3, #4]\nsubs r0, r5, r4\nlog r0\n"
+    program = (
+        f"mov32 r1, #first\n{'adds' if offset >= 0 else 'subs'} r1, #{abs(offset)}\nmovs r2, #0\nstrh r2, [r1, #0]\n"
+    )
+    before, after = make(
+        COUNTER + UNLOCK + store(CR, PG) + call + program + call + "b stop\n.half 0xBF00\n"
+        "first: ldr r6, [r3, #4]\nnop\nldr r6, [r3, #4]\nb behind\nbehind: bx lr\n"
+    ).run(300).log  # fmt: skip
+    assert before - after == saved
+
+
 def test_a_wait_inside_a_block_outlasts_systick_and_the_ends_of_slices(make: Any) -> None:
     text = store(0xE000_E014, 99) + store(0xE000_E010, 7) + UNLOCK + store(CR, 1)
     text += "mov32 r1, #0x0800F000\nmovs r2, #0\n" + "strh r2, [r1, #0]\nadds r1, #2\n" * 4

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bluepill_sim import BluePill
+from bluepill_sim.stm32f103 import BASES
 from tests.bluepill_sim.machine import COUNTER_ON, Machine
 from tests.bluepill_sim.native.test_native_core import state
 
@@ -161,3 +162,34 @@ def test_an_hour_of_waiting_for_a_pin_is_over_at_once(loop: str) -> None:
     board.pin("PA0").drive(1)
     board.advance_to(board.now_ns + 1_000_000)
     assert board.register("R5") > 100
+
+
+#: Computes for a while, in which no round is found that waits; then TIM2 counts a millisecond, and its flag is polled.
+LATE = f"""mov32 r0, #{BASES["RCC"]}
+movs r1, #1
+str r1, [r0, #28]
+mov32 r0, #{BASES["TIM2"]}
+mov32 r1, #7999
+str r1, [r0, #44]
+mov32 r5, #60000
+compute: subs r5, #1
+bne compute
+movs r1, #1
+str r1, [r0, #0]
+poll: ldr r2, [r0, #16]
+cmp r2, #0
+beq poll
+end: b end"""
+
+
+def test_a_register_that_is_polled_is_waited_for_at_once(monkeypatch: pytest.MonkeyPatch, watchdog: None) -> None:
+    monkeypatch.setenv("P2OS_CORE", "native")
+    machine = Machine(LATE, {})
+    board = machine.board
+    board.chip.engine.breakpoints.add(machine.label("poll"))
+    assert board.run_for("1 s").halt is not None
+    board.chip.engine.breakpoints.clear()
+    before = board.chip.engine.shared.logged
+    board.run_for("900 us")
+    assert board.register("R2") == 0
+    assert board.chip.engine.shared.logged - before < 150  # of 900 rounds

@@ -337,6 +337,12 @@ static uint32_t read_page(struct core *core, struct page *page, uint32_t index, 
 {
     if (!is_late && !read_needs_time(page, index)) {
         const uint32_t word = read_now(page, index);
+        struct waiting *waiting = &core->waiting;
+        waiting->polls = waiting->polled == address ? waiting->polls + 1 : 0;
+        waiting->polled = address;
+        if (UNLIKELY(waiting->polls == POLLS)) {
+            look_now(core);
+        }
         skip(core, address, false, size);
         return word;
     }
@@ -505,6 +511,7 @@ void core_write_io(void *unicorn, uint64_t at, unsigned size, uint64_t value, vo
         return;
     }
     region->core->waiting.has_acted = 1;
+    region->core->waiting.polled = 0;
     if (region->number == region->core->system_region &&
         write_system(region->core, region->base + offset, size, written)) {
         return;

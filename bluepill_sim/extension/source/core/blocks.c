@@ -259,22 +259,27 @@ bool core_set_loop(struct core *core, uint32_t start, const struct loop *loop)
     return row->loop != NULL;
 }
 
-/* Measure every block again when it is next entered; the one that runs keeps its costs. */
-void core_forget_rows(struct core *core)
+/* Measure blocks again when they are next entered of which something stands from `first` up to before `end`; the one that
+ * runs keeps its costs. */
+void core_forget_range(struct core *core, uint32_t first, uint32_t end)
 {
-    memset(core->flash_rows, 0, sizeof core->flash_rows);
-    memset(core->sram_rows, 0, sizeof core->sram_rows);
     memset(core->forced, 0, sizeof core->forced);
-    core->other_row = NULL;
     forget_order(core);
-    struct row **end = &core->all;
-    while (*end != NULL) {
-        end = &(*end)->next;
+    for (struct row **at = &core->all; *at != NULL;) {
+        struct row *row = *at;
+        if (row->start >= end || row->end <= first) {
+            at = &row->next;
+            continue;
+        }
+        struct row **place = slot(core, row->start);
+        *place = *place == row ? NULL : *place;
+        *at = row->next;
+        row->next = core->dropped;
+        core->dropped = row;
     }
-    *end = core->dropped;
-    core->dropped = core->all;
-    core->all = NULL;
 }
+
+void core_forget_rows(struct core *core) { core_forget_range(core, 0, UINT32_MAX); }
 
 void free_dropped(struct core *core)
 {

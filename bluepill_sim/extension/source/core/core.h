@@ -157,6 +157,8 @@ struct constants {
 
 /* Cycles between two looks for a loop that waits. Chosen: looking costs less than 1 % of the longest interval. */
 enum { LEAST_INTERVAL = 64, MOST_INTERVAL = 1 << 16 };
+/* Chosen: a register that is read so often in a row is polled. Comparing the SRAM takes as long as some more reads. */
+enum { POLLS = 12 };
 
 /* What is looked for: a round of blocks that leaves everything as it was (polling.c). */
 struct waiting {
@@ -164,6 +166,7 @@ struct waiting {
     uint32_t address, blocks; /* where the round began, and blocks since, that one among them */
     uint32_t has_acted;       /* an access since may have changed something, or depends on the time */
     uint64_t cycle;           /* at which the round began */
+    uint32_t polled, polls;   /* the register that was read last, and how often in a row */
     uint64_t next, interval;  /* when to look next, and how long after that if it is in vain */
     uint32_t registers[16];
     uint8_t *memory; /* the SRAM as it was; null: it was not needed yet */
@@ -237,6 +240,7 @@ void core_flush(struct core *core);
 void record_at(struct core *core, uint64_t cycle, uint32_t address, int32_t kind);
 /* polling.c */
 void look_later(struct core *core);
+void look_now(struct core *core);
 bool looks_for_waiting(struct core *core, uint32_t address);
 void wait_on(struct core *core, const struct row *row, uint64_t rounds);
 uint64_t rounds_of_counter(struct core *core, const struct row *row);

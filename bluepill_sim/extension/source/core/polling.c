@@ -5,8 +5,9 @@
  * the more rarely the longer it was in vain, a block's start is taken for that of such a round: twice it has to come
  * with the same registers, and the second time with the same SRAM. A round does not count where something was written
  * to a peripheral, where a value was read that may be a clock, or that Python has answered, and where priorities or
- * masks may have changed. Where a loop of one block reads a counter that is known to be a ramp of time, as
- * native/polling.py says, the round that leaves it is worked out.
+ * masks may have changed. A register that is read many times in a row has a round looked for at once. Where a loop of
+ * one block reads a counter that is known to be a ramp of time, as native/polling.py says, the round that leaves it is
+ * worked out.
  */
 #include <stdlib.h>
 #include <string.h>
@@ -50,6 +51,16 @@ void look_later(struct core *core)
     }
     if (core->records == NULL && waiting->next < s->stop_at) {
         s->stop_at = waiting->next;
+    }
+}
+
+/* Has the running block be the last before a look: it polls a register. */
+void look_now(struct core *core)
+{
+    struct waiting *waiting = &core->waiting;
+    struct shared *s = &core->shared;
+    if (waiting->phase == NOT_LOOKING && core->records == NULL && s->stop_at > s->cycle) {
+        waiting->next = s->stop_at = s->cycle;
     }
 }
 

@@ -139,8 +139,9 @@ void fabric_end_slice(struct fabric *fabric) { fabric->host.end_slice(fabric->ho
 bool fabric_has_news(struct fabric *fabric)
 {
     size_t count = 0;
+    const uint64_t settled = settled_ns(fabric);
     for (uint32_t n = 0; n < SUBSCRIBERS; ++n) {
-        expand_waves(fabric, &fabric->subscribers[n], settled_ns(fabric));
+        expand_waves(fabric, &fabric->subscribers[n], settled);
         count += fabric->subscribers[n].count;
     }
     for (uint32_t n = 0; n < fabric->slot_count; ++n) {
