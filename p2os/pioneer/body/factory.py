@@ -1,16 +1,18 @@
 """Make a body by its name, and know which is the best that is installed.
 
-A body of the user's is a `RobotScene` that is made as (world, models): an entry point of the group `p2os.bodies`, or
-`./mine.py:Class`.
+A body of the user's is a `RobotScene` that is made as (world, models): an entry point of the group `p2os.bodies`,
+`./mine.py:Class`, or another program at `tcp:HOST:PORT` or `unix:PATH`.
 
 Invariant: an engine is imported only when it is asked for; whether one is installed is looked up, not tried.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import cast
 
 from p2os.pioneer.body.contract import RobotBody, RobotScene
+from p2os.pioneer.body.outside.address import Address, is_address
 from p2os.pioneer.world.model import World
 from p2os.robots.parameters import RobotParameters
 from simbase.errors import MissingDependencyError, UsageError
@@ -92,14 +94,28 @@ def body_class(name: str) -> Callable[[World, Sequence[RobotParameters]], RobotS
     """Return the class of a body of the user's.
 
     Args:
-        name: That of an entry point, or FILE.py:CLASS.
+        name: That of an entry point, or FILE.py:CLASS, or where another program answers.
 
     Raises:
         UsageError: There is none, or it lacks a method of `RobotScene`.
     """
+    if is_address(name):
+        return _BodyAt(Address.of(name))
     found = find_class(name, what="body", group=GROUP, known=BODY_CHOICES)
     refuse_lacking(found, RobotScene, name, "body")
     return found
+
+
+@dataclass(frozen=True, slots=True)
+class _BodyAt:
+    """What makes the body of another program."""
+
+    address: Address
+
+    def __call__(self, world: World, models: Sequence[RobotParameters]) -> RobotScene:
+        from p2os.pioneer.body.outside.body import OutsideScene
+
+        return OutsideScene(self.address, world, models)
 
 
 def _scene_of_users(name: str, world: World, models: Sequence[RobotParameters]) -> RobotScene:

@@ -391,8 +391,8 @@ class Pioneer(Stateful):
         left, right = motion.wheels_mps  # steady until the next command
         if left == right == 0.0:
             steps -= body.stand_still(steps)
-        for _ in range(steps):
-            wheels = step(left, right)
+        # None is read before the last is asked for: a body in another program makes them all at once.
+        for wheels in [step(left, right) for _ in range(steps)]:
             advance(wheels.left_angle_rad, wheels.right_angle_rad)
 
     def next_setpoints(self) -> tuple[float, float]:

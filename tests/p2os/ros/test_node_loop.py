@@ -29,11 +29,7 @@ from simbase.timing import NS_PER_MS, NS_PER_S
 
 P2DX = load_parameters("p2dx")
 OPTIONS = NodeOptions()
-<<<<<<<< HEAD:tests/p2os/cli/ros/test_ros_loop.py
-PEER = Path(__file__).parents[2] / "ros" / "raw_peer.py"
-========
 PEER = Path(__file__).with_name("raw_peer.py")
->>>>>>>> ros:tests/p2os/ros/test_node_loop.py
 
 
 @dataclass

@@ -1,0 +1,127 @@
+"""A bench whose body is another program: the same trace each time, and a complete folder when that program is lost."""
+
+import json
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import pytest
+
+from p2os.cli.main import run as p2os
+from p2os.pioneer.body.outside.body import Ability
+from robot_bench import Bench
+from simbase.errors import UsageError
+from tests.p2os.pioneer.body.outside.served import Served, served, serving
+
+SOURCE = Path(__file__).parents[3] / "examples" / "outside_body"
+needs_compiler = pytest.mark.skipif(shutil.which("g++") is None, reason="g++ is not installed: apt-get install g++")
+
+
+@contextmanager
+def started(*command: str | Path) -> Iterator[str]:
+    """Run a program that is a body until the end of the block; yield where it says that it listens."""
+    with subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE, text=True) as program:
+        try:
+            assert program.stdout is not None
+            yield program.stdout.readline().removeprefix("listening on ").strip()
+        finally:
+            program.kill()
+
+
+@pytest.fixture(scope="module")
+def plan_view() -> Iterator[Path]:
+    with TemporaryDirectory(prefix="ob") as folder:
+        program = Path(folder, "plan_view")
+        flags = ("-std=c++17", "-O1", "-Wall", "-Wextra", "-Werror", "-fsanitize=undefined", "-fno-sanitize-recover")
+        subprocess.run(["g++", *flags, "-o", program, SOURCE / "plan_view.cpp"], check=True, timeout=100)
+        yield program
+
+
+def bench_with(body: str, mode: str = "adapter", seconds: float = 6) -> Bench:
+    return Bench.from_scenario("dodge", body=body, mode=mode, duration_s=seconds)
+
+
+def hash_of(bench: Bench, until: str = "6 s") -> str:
+    bench.run_until(until)
+    return bench.trace.sha256
+
+
+@needs_compiler
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["adapter", "direct"])
+def test_a_body_in_c_gives_the_same_trace_twice_and_from_a_fork(plan_view: Path, mode: str) -> None:
+    with started(plan_view, "tcp:127.0.0.1:0") as address:
+        first = bench_with(address, mode)
+        first.run_until("3 s")
+        fork = first.fork()
+        hashes = {hash_of(bench) for bench in (first, fork, bench_with(address, mode))}
+        first.rewind("4 s")
+        hashes.add(hash_of(first))
+        assert len(hashes) == 1
+        assert first.pose.x_m > 0.3
+
+
+@needs_compiler
+@pytest.mark.slow
+def test_a_body_in_c_has_walls_of_its_own(plan_view: Path) -> None:
+    with started(plan_view, "tcp:127.0.0.1:0", "--wall", "0.4,-1,0.4,1") as address:
+        bench = Bench.from_scenario("motors", body=address, duration_s=8)
+        bench.run_until("8 s")
+        assert bench.parts.body.state.collisions >= 1
+        assert bench.pose.x_m < 0.4
+        assert "own wall" in bench.trace.text
+
+
+@pytest.mark.parametrize("mode", ["adapter", "direct"])
+def test_a_bench_with_a_body_behind_the_protocol_sees_what_one_with_the_body_sees(mode: str) -> None:
+    with served() as (address, servers):
+        ours, theirs = (bench_with(body, mode, 2) for body in ("kinematic", address))
+        poses = []
+        for bench in (ours, theirs):
+            bench.run_until("2 s")
+            poses.append([line for line in bench.trace.text.splitlines()[1:] if '"k":"pose"' in line])
+        assert poses[0] == poses[1] != []
+        asked = servers[0].steps_asked
+        assert sum(asked) <= 2000
+        assert max(asked) > 1
+
+
+def dies(after: int) -> Callable[[], Callable[..., bytes | None]]:
+    def make() -> Callable[..., bytes | None]:
+        honest, left = Served("kinematic", Ability(7)), [after]
+
+        def answer(request: object) -> bytes | None:
+            left[0] -= 1
+            return honest(request) if left[0] > 0 else None
+
+        return answer
+
+    return make
+
+
+@pytest.mark.parametrize("after", [1, 3, 100])
+def test_a_run_whose_body_is_lost_ends_in_one_line_with_a_complete_folder(
+    after: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with serving(dies(after)) as address:
+        options = ["--mode", "direct", "--body", address, "--duration", "1s"]
+        assert p2os(["run", "motors", *options, "--out", str(tmp_path / "r")]) == 1
+    err = capsys.readouterr().err
+    assert err.count("is lost: it has closed the line") == 1
+    assert "Traceback" not in err
+    summary = json.loads((tmp_path / "r" / "summary.json").read_text(encoding="utf-8"))
+    assert "is lost" in summary["failures"][0]
+    assert (tmp_path / "r" / "report.html").is_file()
+
+
+def test_a_body_that_cannot_save_is_run_but_not_forked_or_wound_back() -> None:
+    with served(abilities=Ability.ROLLS) as (address, _):
+        bench = bench_with(address, "direct", 1)
+        bench.run_until("0.2 s")
+        for deed in (bench.fork, bench.snapshot, lambda: bench.rewind("0.1 s")):
+            with pytest.raises(UsageError, match="cannot save its state"):
+                deed()
+        bench.run_until("0.3 s")
