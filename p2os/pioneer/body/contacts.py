@@ -17,25 +17,26 @@ APART_STEPS = 200
 class ContactCounter(Stateful):
     """Turn a stream of touching/not touching into a count, and remember the collisions."""
 
-    __slots__ = ("_apart", "_hits", "collisions", "place", "touching")
-    STATE = ("_apart", "_hits", "collisions", "place", "touching")
+    __slots__ = ("_hits", "apart", "collisions", "place", "touching")
+    STATE = ("_hits", "apart", "collisions", "place", "touching")
 
     def __init__(self) -> None:
         self.collisions = 0
         self.touching = False
         #: Where the last collision was, metres.
         self.place: tuple[float, float] | None = None
-        self._apart = APART_STEPS
+        #: Steps since the last contact, at most `APART_STEPS`: from there on a step without contact changes nothing.
+        self.apart = APART_STEPS
         self._hits: deque[Hit] = deque(maxlen=MOST_HITS)
 
     def update(self, touching: bool, steps: int = 1) -> bool:
         """Take what was seen over the last `steps` steps; tell whether it is a new collision."""
-        is_new = touching and self._apart >= APART_STEPS
+        is_new = touching and self.apart >= APART_STEPS
         if touching:
             self.collisions += is_new
-            self._apart = 0
-        elif self._apart < APART_STEPS:
-            self._apart = min(APART_STEPS, self._apart + steps)
+            self.apart = 0
+        elif self.apart < APART_STEPS:
+            self.apart = min(APART_STEPS, self.apart + steps)
         self.touching = touching
         return is_new
 

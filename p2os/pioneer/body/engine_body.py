@@ -98,8 +98,8 @@ class EngineBody(BodyInWorld):
             effort_nm: What its motor and gear gave in the last step, positive forward.
             rate_radps: Its rate since.
         """
-        self._rim_work_j += abs(effort_nm) * mean_magnitude(self._rates[wheel], rate_radps) * DT_S
-        self._rates[wheel] = rate_radps
+        was, self._rates[wheel] = self._rates[wheel], rate_radps
+        self._rim_work_j += abs(effort_nm) * mean_magnitude(was, rate_radps) * DT_S
         if self._most_nm is not None:
             is_straining = self._most_nm[wheel] > 0.0 and abs(effort_nm) > STALL_TORQUE_SHARE * self._most_nm[wheel]
             is_stalled = asked_mps != 0.0 and is_straining and abs(rate_radps) < self._slow_radps

@@ -23,7 +23,7 @@ It serves as the oracle for the other bodies, and where PyBullet is not to be ha
 import math
 from collections.abc import Collection, Sequence
 
-from p2os.pioneer.body.contacts import ContactCounter
+from p2os.pioneer.body.contacts import APART_STEPS, ContactCounter
 from p2os.pioneer.body.contract import BodyState, Turned
 from p2os.pioneer.body.in_world import DT_S, BodyInWorld, Scene, StandingPose
 from p2os.pioneer.body.physical import BACK_DRIVE, GRAVITY_MPS2, UNPOWERED_SHARE, WHEEL_FRICTION
@@ -213,6 +213,10 @@ class KinematicBody(BodyInWorld):
         #: No thing is nearer to the hull than this; 0 only where the hull is inside one.
         self._free_m = 0.0
 
+    def step(self, left_mps: float, right_mps: float) -> Turned:
+        """As of `BodyInWorld`; a robot that is alone needs nothing of its scene for it."""
+        return super().step(left_mps, right_mps) if self.others else self.go(left_mps, right_mps)
+
     def go(self, left_mps: float, right_mps: float) -> Turned:
         """Move on by one step along the exact arc, or stall."""
         self._steps += 1
@@ -230,7 +234,8 @@ class KinematicBody(BodyInWorld):
             rims = self._slide(left_mps, right_mps)
             self._blocked_at = asked if rims is None and not self.near else None
         self._stalled = rims is None
-        if self._contacts.update(touching=is_touching):
+        contacts = self._contacts
+        if (is_touching or contacts.apart < APART_STEPS) and contacts.update(touching=is_touching):
             self._note_contact(*arc[:3])
         # What is in the way slows a rim down, not its motor.
         if rims == asked:

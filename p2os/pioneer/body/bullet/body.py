@@ -35,6 +35,7 @@ from p2os.pioneer.body.bullet.model import (
     park_obstacle,
 )
 from p2os.pioneer.body.bullet.rays import SonarRays
+from p2os.pioneer.body.contacts import APART_STEPS
 from p2os.pioneer.body.contract import FASTEST_MPS, BodyState, Turned
 from p2os.pioneer.body.engine_body import EngineBody
 from p2os.pioneer.body.in_world import DT_S, Scene
@@ -289,7 +290,8 @@ class BulletBody(EngineBody):
         left, right = self._joints = pybullet.getJointStates(self.robot, WHEELS, physicsClientId=self._client)
         if self._alone:
             self._alone -= 1
-            self._contacts.update(touching=False)
+            if self._contacts.apart < APART_STEPS:
+                self._contacts.update(touching=False)
         else:
             if self._contacts.update(touching=self._is_touching()):
                 self._note_contact()
@@ -297,7 +299,9 @@ class BulletBody(EngineBody):
         self._watch_motor(LEFT, self._targets[LEFT], left[3], left[1])
         self._watch_motor(RIGHT, self._targets[RIGHT], right[3], right[1])
         zero = self._zero
-        return Turned(left[0] - zero[0], right[0] - zero[1], *self._stalled)
+        if self._stalling[LEFT] or self._stalling[RIGHT]:
+            return Turned(left[0] - zero[0], right[0] - zero[1], *self._stalled)
+        return Turned(left[0] - zero[0], right[0] - zero[1])
 
     def _look_around(self) -> None:
         """Find for how many steps nothing can touch the robot, so that contacts need not be asked for."""
@@ -313,7 +317,8 @@ class BulletBody(EngineBody):
             self._look_in = 0
 
     def _wanted_motors(self) -> list[tuple[float, float]]:
-        return [self._motor(wheel, asked) for wheel, asked in zip(WHEELS, self._targets, strict=True)]
+        left_mps, right_mps = self._targets
+        return [self._motor(LEFT, left_mps), self._motor(RIGHT, right_mps)]
 
     def _command(self) -> None:
         """Give the motors their targets; the engine does not save them with its state."""
