@@ -59,13 +59,14 @@ kind = "dead-end"
 count = { from = 0, to = 1 }
 ahead_m = { from = 1.0, to = 2.2 }
 aside_m = { from = -0.3, to = 0.3 }
-width_m = { from = 0.6, to = 1.4 }
+width_m = { from = 0.7, to = 1.4 }
 
 [[draw]]
 kind = "gap"
 count = { from = 0, to = 1 }
 ahead_m = { from = 0.8, to = 2.0 }
 aside_m = { from = -0.4, to = 0.4 }
+width_m = { from = 0.7, to = 1.2 }
 
 [[draw]]                # behind it or beside it
 kind = "wall"
@@ -81,13 +82,13 @@ ends_run = "missed"
 
 [[goal]]
 kind = "clearance"
-least_m = 0.1
+least_m = 0.05
 ends_run = "missed"
 
 [[goal]]                # it neither stands nor turns on the spot nor stays shut in
 kind = "moves_on"
 way_m = 0.5
-within_s = 20.0
+within_s = 30.0
 ends_run = "missed"
 """)
 
