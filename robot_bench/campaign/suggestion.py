@@ -25,7 +25,7 @@ gap_m = 0.75             # between things: a robot of 0.38 m passes
 search = "sobol"        # grid, random, latin-hypercube, sobol, tpe, cma-es, quality-diversity, coverage
 
 [budget]
-runs = 200              # of the cheap kind
+runs = 600              # of the cheap kind; about a second of a processor each
 confirmations = 40      # runs in full: of what failed, and of the nearest misses
 minutes = 10.0
 
