@@ -12,6 +12,7 @@ import hashlib
 import os
 import shutil
 import tempfile
+import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import deepcopy
@@ -26,7 +27,7 @@ from bluepill_sim.program.image import Image, load_image
 from p2os.pioneer.world import known_worlds, load_world
 from p2os.pioneer.world.writer import write_world
 from p2os.toml_file import TomlSource, is_file, toml_text
-from robot_bench.bench import Bench
+from robot_bench.bench import Bench, boot
 from robot_bench.events.kinds import Contact, Event, Pose, Text
 from robot_bench.scenario.included_files import (
     MergedSource,
@@ -265,7 +266,7 @@ def bench_of(scenario: Scenario) -> Bench:
     if scenario.robots:
         return Bench.from_scenario(scenario)
     stat = scenario.firmware.stat()
-    return Bench(scenario, chip=BluePill(_image_of(scenario.firmware, stat.st_mtime_ns, stat.st_size)))
+    return Bench(scenario, chip=boot(scenario, _image_of(scenario.firmware, stat.st_mtime_ns, stat.st_size)))
 
 
 def outcome_of(bench: Bench, way: Sequence[tuple[int, int]], hits: Sequence[Hit], printed: Sequence[bytes]) -> Outcome:
@@ -404,14 +405,16 @@ def _write_files(files: Mapping[str, bytes], folder: Path) -> None:
 
 
 class _Folder:
-    """A folder that is removed with the object, by the process that made it."""
+    """A folder that is removed with the object, or at the end of the process that made it."""
 
     def __init__(self) -> None:
-        self.name, self._owner = tempfile.mkdtemp(prefix="p2os-trial-"), os.getpid()
+        self.name = tempfile.mkdtemp(prefix="p2os-trial-")
+        weakref.finalize(self, _remove, self.name, os.getpid())
 
-    def __del__(self) -> None:
-        if os.getpid() == self._owner:
-            shutil.rmtree(self.name, ignore_errors=True)
+
+def _remove(folder: str, owner: int) -> None:
+    if os.getpid() == owner:  # not a fork of it
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 @lru_cache(maxsize=_KEPT_FOLDERS)

@@ -59,6 +59,8 @@ from simbase.user_classes import located, source_of
 MODES = ("direct", "adapter")
 #: The kinds of wires that may be cut from the robot, for something outside to drive: those to the chip.
 OUTSIDE = (WireRole.DISTANCE.value, WireRole.ENCODER.value)
+#: The SRAM holds anything at power-on, as the seed says.
+RANDOM_SRAM = "random"
 
 _TOP = (
     VERSION,
@@ -78,6 +80,7 @@ _TOP = (
     Key(name="usart_baud", kind="whole", least=1, most=4_500_000),
     Key(name="record", kind="texts"),
     Key(name="outside", kind="text"),
+    Key(name="sram", kind="text", choices=("zeros", RANDOM_SRAM)),
     Key(name="start", kind="table"),
     Key(name="direct", kind="table"),
     Key(name="adapter", kind="table"),
@@ -204,6 +207,8 @@ class Scenario:
     record: tuple[str, ...] = ()
     #: Kinds of wires that the robot does not drive, but somebody outside: of `OUTSIDE`, sorted.
     outside: tuple[str, ...] = ()
+    #: What the chip's SRAM holds when power comes up: `zeros`, or `random` by the seed.
+    sram: str = "zeros"
     #: None starts at the world's own place.
     start: Pose | None = None
     #: What a message calls the start: file, line and key.
@@ -454,6 +459,7 @@ def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | N
         usart_baud=cast("int | None", table.get("usart_baud")),
         record=_buses(_listed(table.get("record")), where.at("record"), ScenarioError),
         outside=_outside(str(table.get("outside", "")), own_robot, where.at("outside")),
+        sram=str(table.get("sram", "zeros")),
         start=_start(table, where),
         start_at=str(within(where, "start")),
         direct=_direct(cast("Table", table.get("direct", {})), where),
