@@ -117,8 +117,9 @@ def compared(one: Outcome, other: Outcome, names: tuple[str, str]) -> Outcome:
     )
     both = hashlib.sha256(f"{one.sha256} {other.sha256}".encode()).hexdigest()
     is_others = one.verdict is Verdict.PASSED and other.verdict is Verdict.FAILED
+    seen = other if is_others else one
     return replace(
-        other if is_others else one, verdict=Verdict.FAILED if differs else Verdict.PASSED, goals=(goal,), sha256=both, died="",
+        seen, verdict=Verdict.FAILED if differs else Verdict.PASSED, goals=(goal,), sha256=both, died="",
         failures=(f"{KIND}: {says}",) if differs else (),
         blocks=one.blocks | other.blocks, lines=one.lines | other.lines,
     )  # fmt: skip
