@@ -17,6 +17,7 @@ Invariant: results do not depend on how the caller cuts time into slices; a wait
 leaves the board's watches and listeners as it found them.
 """
 
+import ctypes
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -49,7 +50,7 @@ from bluepill_sim.program.image import Image, load_image
 from bluepill_sim.program.last_blocks import TITLE, shortened
 from bluepill_sim.program.line_table import LineTable, read_lines
 from bluepill_sim.spans import Span, to_nanos
-from bluepill_sim.stm32f103 import FLASH_BASE, SRAM_BASE
+from bluepill_sim.stm32f103 import FLASH_BASE, SRAM_BASE, SRAM_BYTES
 from simbase.state import PartState, Stateful
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reason
 
@@ -136,6 +137,19 @@ class BluePill(Stateful):
         chip.pins["PC13"].board_pull = PinDrive.PULL_UP
         chip.pins["PB2"].board_pull = PinDrive.PULL_DOWN
         chip.pins["PA12"].board_pull = PinDrive.PULL_UP
+
+    def power_up_with(self, sram: bytes) -> None:
+        """Have the SRAM hold something else than zeros as power comes up, as that of a chip does; before anything runs.
+
+        Args:
+            sram: as many bytes as the SRAM has.
+
+        Raises:
+            ValueError: the board has run, or there are more or fewer bytes.
+        """
+        if self.cycle or len(sram) != SRAM_BYTES:
+            raise ValueError(f"SRAM takes {SRAM_BYTES} bytes, before the board runs: {len(sram)} at cycle {self.cycle}")
+        ctypes.memmove(self.chip.memory.sram, sram, SRAM_BYTES)
 
     # Time.
 

@@ -23,6 +23,7 @@ snapshot was taken of.
 import hashlib
 import math
 import pickle
+import random
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
@@ -64,6 +65,7 @@ from robot_bench.scenario.fault_script import LINK_DOWN, FaultChange, FaultScrip
 from robot_bench.scenario.goals.judging import GoalJudge, Judgement
 from robot_bench.scenario.hand_script import Deed, HandScript
 from robot_bench.scenario.scenario import (
+    RANDOM_SRAM,
     Scenario,
     ScenarioOptions,
     load_scenario,
@@ -85,6 +87,7 @@ from simbase.timing import NS_PER_S, Nanos, Reached
 
 if TYPE_CHECKING:
     from bluepill_sim.board import BluePill
+    from bluepill_sim.program.image import Image
 
 #: chosen: so long a run goes on after a fault of the firmware, to show what the robot does then.
 AFTER_FAULT_NS: Nanos = 1 * NS_PER_S
@@ -101,7 +104,7 @@ Condition: TypeAlias = Union[str, Callable[["Bench"], bool]]  # noqa: UP007 - a 
 #: What decides a run besides its files; its end and its goals may be others after a restart.
 DECISIVE = (
     "mode", "seed", "parameters", "threshold_um", "usart_baud", "start", "direct", "adapter", "adapter_core",
-    "controller", "controller_kind", "changes", "faults", "whens", "own_robot", "parts",
+    "controller", "controller_kind", "changes", "faults", "whens", "own_robot", "parts", "sram",
 )  # fmt: skip
 _VERSION = "version of p2os"
 
@@ -177,7 +180,7 @@ class Bench(Stateful):
         _refuse_several(scenario)
         body = body_of(scenario, world) if shared is None else shared.body_of(scenario.name)
         self._is_rebuildable = chip is None
-        chip = chip or boot(scenario.firmware)
+        chip = chip or boot(scenario)
         own = scenario.own_robot
         self._harness = harness = make_harness(pinout) if own is None else make_own_harness(own.robot.signals)
         self.recorder = Recorder(self.trace, harness, body=body)
@@ -1043,15 +1046,23 @@ def log_bench_event(who: str, at: Nanos, what: str, detail: str) -> None:
     log_event(_LOG, who, at, what, detail)
 
 
-def boot(firmware: Path) -> Chip:
-    """Return an emulated BluePill with a firmware, at its reset.
+def boot(scenario: Scenario, image: "Image | None" = None) -> Chip:
+    """Return an emulated BluePill with a scenario's firmware, at its reset.
+
+    Args:
+        scenario: What it runs.
+        image: Its firmware, where that was read before.
 
     Raises:
         MissingDependencyError: The emulator's engine is not installed.
     """
     from bluepill_sim.board import BluePill
+    from bluepill_sim.stm32f103 import SRAM_BYTES
 
-    return BluePill(firmware)
+    board = BluePill(image or scenario.firmware)
+    if scenario.sram == RANDOM_SRAM:
+        board.power_up_with(random.Random(scenario.seed).randbytes(SRAM_BYTES))
+    return board
 
 
 def pins_of(scenario: Scenario) -> dict[str, str]:

@@ -65,7 +65,7 @@ class RemoteBench:
     ) -> None:
         self.scenario = scenario
         self.trace = trace or TraceWriter()
-        self.chip = chip = chip or boot(scenario.firmware)
+        self.chip = chip = chip or boot(scenario)
         self.note: str | None = "the pose is the robot's own odometry; collisions and clearance cannot be told"
         if scenario.changes:
             self.note += "; the scenario's obstacles are not placed"

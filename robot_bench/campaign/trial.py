@@ -26,7 +26,7 @@ from bluepill_sim.program.image import Image, load_image
 from p2os.pioneer.world import known_worlds, load_world
 from p2os.pioneer.world.writer import write_world
 from p2os.toml_file import TomlSource, is_file, toml_text
-from robot_bench.bench import Bench
+from robot_bench.bench import Bench, boot
 from robot_bench.events.kinds import Contact, Event, Pose, Text
 from robot_bench.scenario.included_files import (
     MergedSource,
@@ -265,7 +265,7 @@ def bench_of(scenario: Scenario) -> Bench:
     if scenario.robots:
         return Bench.from_scenario(scenario)
     stat = scenario.firmware.stat()
-    return Bench(scenario, chip=BluePill(_image_of(scenario.firmware, stat.st_mtime_ns, stat.st_size)))
+    return Bench(scenario, chip=boot(scenario, _image_of(scenario.firmware, stat.st_mtime_ns, stat.st_size)))
 
 
 def outcome_of(bench: Bench, way: Sequence[tuple[int, int]], hits: Sequence[Hit], printed: Sequence[bytes]) -> Outcome:

@@ -56,6 +56,8 @@ from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 from simbase.user_classes import located, source_of
 
 MODES = ("direct", "adapter")
+#: The SRAM holds anything at power-on, as the seed says.
+RANDOM_SRAM = "random"
 
 _TOP = (
     VERSION,
@@ -73,6 +75,7 @@ _TOP = (
     Key(name="duration_s", kind="number", required=True, above=0, most=LONGEST_S),
     Key(name="threshold_m", kind="number", above=0, most=100),
     Key(name="usart_baud", kind="whole", least=1, most=4_500_000),
+    Key(name="sram", kind="text", choices=("zeros", RANDOM_SRAM)),
     Key(name="start", kind="table"),
     Key(name="direct", kind="table"),
     Key(name="adapter", kind="table"),
@@ -193,6 +196,8 @@ class Scenario:
     threshold_um: int
     #: The speed of USART1's far end, bit/s; None follows the firmware.
     usart_baud: int | None = None
+    #: What the chip's SRAM holds when power comes up: `zeros`, or `random` by the seed.
+    sram: str = "zeros"
     #: None starts at the world's own place.
     start: Pose | None = None
     #: What a message calls the start: file, line and key.
@@ -427,6 +432,7 @@ def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | N
         planned_ns=planned_ns,
         threshold_um=round(threshold_m * 1e6),
         usart_baud=cast("int | None", table.get("usart_baud")),
+        sram=str(table.get("sram", "zeros")),
         start=_start(table, where),
         start_at=str(within(where, "start")),
         direct=_direct(cast("Table", table.get("direct", {})), where),

@@ -259,3 +259,15 @@ def test_what_the_compiler_makes_computes_right(level: str, tmp_path: Path) -> N
     values = struct.unpack("<8I", board.read_memory(results, 32))
     wide = 0x123456789ABCDEF0 // 1000 & 0xFFFFFFFF
     assert values == (72, 55, wide, 0xFFFFFFF2, 0xFFFFFFFE, 49, 6765 * 1000003 >> 7, 0)
+
+
+def test_sram_takes_other_content_at_power_on_and_only_then() -> None:
+    board = BluePill(FOLDER / "dodge.elf")
+    content = bytes(range(256)) * 80
+    board.power_up_with(content)
+    assert board.chip.memory.sram.raw == content
+    with pytest.raises(ValueError, match="20480 bytes, before the board runs: 3 at cycle 0"):
+        board.power_up_with(b"abc")
+    board.run_for("1 ms")
+    with pytest.raises(ValueError, match="before the board runs"):
+        board.power_up_with(content)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from robot_bench.campaign.trial import Outcome, Trial, Verdict, run_trial, trial_of
+from robot_bench.campaign.trial import Outcome, Trial, Verdict, bench_of, run_trial, trial_of
 from robot_bench.run import run_scenario
 from robot_bench.scenario.scenario import load_scenario
 from simbase.errors import UsageError
@@ -121,3 +121,15 @@ def test_several_robots_bring_a_program_each() -> None:
     assert list(trial.files) == ["dodge.elf"]
     assert {goal.robot for goal in found.goals} == {"east", "west"}
     assert run_trial(trial).sha256 == found.sha256
+
+
+def test_what_sram_holds_at_power_on_is_the_seeds_and_a_program_that_sets_its_variables_does_not_care(
+    trial: Trial, outcome: Outcome, tmp_path: Path
+) -> None:
+    held = []
+    for seed in (1, 1, 2):
+        scenario = trial.set(("sram", "random"), ("seed", seed)).scenario(trial.write(tmp_path).parent)
+        held.append(bytes(bench_of(scenario).chip.chip.memory.sram))  # type: ignore[attr-defined]  # a BluePill
+    assert held[0] == held[1] != held[2]
+    assert set(bench_of(trial.scenario(tmp_path)).chip.chip.memory.sram.raw) == {0}  # type: ignore[attr-defined]  # as above
+    assert run_trial(trial.set(("sram", "random"))).sha256 == outcome.sha256
