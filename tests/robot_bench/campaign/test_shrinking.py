@@ -190,3 +190,14 @@ def test_a_failure_is_told_with_its_time_and_part_and_one_of_another_way_is_not(
     assert failure_of(trial, replace(found.way, part="rear")) is None
     assert failure_of(trial, found.way, found.at_ns - NS_PER_S) is None
     assert failure_of(trial.set(("start.x_m", 99.0))) is None, "what cannot be run does not fail"
+
+
+def test_what_was_left_out_is_not_asked_for_again_in_larger_pieces() -> None:
+    asked: list[int] = []
+
+    def holds(some: Sequence[int]) -> bool:
+        asked.append(len(some))
+        return {3, 9} <= set(some)
+
+    assert fewest(range(12), holds) == [3, 9]
+    assert len(asked) <= 29, "cutting anew in halves after each piece that was left out asks for more"
