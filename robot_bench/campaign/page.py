@@ -22,6 +22,7 @@ from robot_bench.campaign.conduct import FAILURES, Finding, Row, Run
 from robot_bench.campaign.last_moment import LastMoment
 from robot_bench.campaign.results import Whole
 from robot_bench.campaign.trial import unpacked
+from robot_bench.campaign.variants.diversity import FailureSet
 from robot_bench.scenario.schema import Table
 from simbase.errors import FileError, P2osError
 
@@ -116,6 +117,8 @@ def _figures(whole: Whole) -> Iterator[tuple[str, str]]:
     for finding, meaning in _MEANING.items():
         if whole.counts.get(finding) or finding in FAILURES:
             yield meaning, str(whole.counts.get(finding, 0))
+    if whole.failures:
+        yield from FailureSet.of(whole.progress.rows).words().items()
     yield "blocks of the firmware that ran", str(len(whole.progress.blocks))
     yield "states that it printed", str(len(whole.progress.states))
 

@@ -22,6 +22,7 @@ from robot_bench.campaign.conduct import Finding, Progress, Row, Run
 from robot_bench.campaign.last_moment import LastMoment
 from robot_bench.campaign.margin import goal_margin
 from robot_bench.campaign.space import Space
+from robot_bench.campaign.variants.diversity import FailureSet
 from simbase.errors import FileError, MissingDependencyError
 
 RESULTS, FAILURES = "results", "failures"
@@ -180,4 +181,5 @@ class Whole:
                 }
                 for row in self.failures if (run := row.failing) is not None
             ],
+            **FailureSet.of(self.progress.rows).to_plain(),
         }  # fmt: skip

@@ -98,7 +98,7 @@ def compared(one: Outcome, other: Outcome, names: tuple[str, str]) -> Outcome:
     """Return how two runs of one trial compare, as an outcome that fails where they differ.
 
     Args:
-        one: Of the program of the trial; way and contacts are those of its run.
+        one: Of the program of the trial; way and contacts are those of its run, or of the other where that alone fails.
         other: Of the other one.
         names: What the two are called.
     """
@@ -116,8 +116,10 @@ def compared(one: Outcome, other: Outcome, names: tuple[str, str]) -> Outcome:
         kind=KIND, wanted=f"does what {names[1]} does", met=not differs, says=says, robustness=round(by, 9), unit=""
     )
     both = hashlib.sha256(f"{one.sha256} {other.sha256}".encode()).hexdigest()
+    is_others = one.verdict is Verdict.PASSED and other.verdict is Verdict.FAILED
+    seen = other if is_others else one
     return replace(
-        one, verdict=Verdict.FAILED if differs else Verdict.PASSED, goals=(goal,), sha256=both, died="",
+        seen, verdict=Verdict.FAILED if differs else Verdict.PASSED, goals=(goal,), sha256=both, died="",
         failures=(f"{KIND}: {says}",) if differs else (),
         blocks=one.blocks | other.blocks, lines=one.lines | other.lines,
     )  # fmt: skip

@@ -21,13 +21,16 @@ from itertools import combinations, pairwise
 
 from p2os.pioneer.world import load_world
 from p2os.pioneer.world.geometry import Footprint
+from robot_bench.campaign.conduct import Row
 from robot_bench.campaign.trial import Outcome, Trial, unpacked
 from robot_bench.scenario.scenario import Scenario
 
 #: chosen: a robot's length in a room.
 CELLS = 16
-#: chosen: of two runs of `dodge` in one world from starts a centimetre apart the blocks differ by less.
-SAME_PATH = 0.05
+#: chosen: runs of `dodge` from starts a centimetre apart run the same blocks; another turn makes 4 % of them others.
+SAME_PATH = 0.02
+#: chosen: so many points of a kind are named.
+MOST_NAMED = 6
 _Cells = frozenset[Hashable]
 
 
@@ -37,6 +40,43 @@ class Diversity:
 
     obstacles: float | None
     ways: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class FailureSet:
+    """The failures of a campaign: how many kinds they are, and how different."""
+
+    #: The numbers of the points of each kind.
+    kinds: list[list[int]]
+    diversity: Diversity
+
+    @classmethod
+    def of(cls, rows: Sequence[Row]) -> "FailureSet":
+        """Return that of the points that failed."""
+        runs = [(row.number, run) for row in rows if (run := row.failing) is not None]
+        outcomes = [run.outcome for _, run in runs]
+        kinds = [[runs[place][0] for place in cluster] for cluster in clusters(outcomes)]
+        return cls(kinds, diversity([run.trial for _, run in runs], outcomes))
+
+    def words(self) -> dict[str, str]:
+        """Return it for a person: what → how much."""
+        found = {"kinds of failures": f"{len(self.kinds)}: points {' | '.join(_numbers(kind) for kind in self.kinds)}"}
+        apart = {"obstacles": self.diversity.obstacles, "ways": self.diversity.ways}
+        said = [f"of {what} {value:.2f}" for what, value in apart.items() if value is not None]
+        return found | ({"diversity": f"{', '.join(said)} (0 alike, 1 nothing in common)"} if said else {})
+
+    def to_plain(self) -> dict[str, object]:
+        """Return it as JSON has it."""
+        return {
+            "clusters": self.kinds,
+            "diversity": {"obstacles": self.diversity.obstacles, "ways": self.diversity.ways},
+        }
+
+
+def _numbers(kind: Sequence[int]) -> str:
+    """Return the numbers of points, the first few of many."""
+    more = f" and {len(kind) - MOST_NAMED} more" if len(kind) > MOST_NAMED else ""
+    return ", ".join(map(str, kind[:MOST_NAMED])) + more
 
 
 def diversity(trials: Sequence[Trial], outcomes: Sequence[Outcome]) -> Diversity:

@@ -5,7 +5,7 @@ import shlex
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Self, cast
+from typing import Annotated, Self
 
 import typer
 from rich.console import Console
@@ -23,7 +23,7 @@ from robot_bench.campaign.results import Whole
 from robot_bench.campaign.search import SEARCHES
 from robot_bench.campaign.suggestion import suggested
 from robot_bench.campaign.variants.against import Against, Other, first_apart, told
-from robot_bench.campaign.variants.diversity import clusters, diversity
+from robot_bench.campaign.variants.diversity import FailureSet
 from robot_bench.campaign.whole import begin, carry_out, resume
 from robot_bench.cli.progress import RunDisplay
 from robot_bench.cli.workers import core_count
@@ -198,7 +198,7 @@ def tell(done: Whole, other: Other | None, *, json_output: bool) -> None:
     """Print what came of a campaign, and end the command with its exit code."""
     parts = {} if other is None or done.was_interrupted else parted(done, other)
     if json_output:
-        typer.echo(json.dumps(done.as_json() | as_set(done) | ({"parted": parts} if parts else {}), sort_keys=True))
+        typer.echo(json.dumps(done.as_json() | ({"parted": parts} if parts else {}), sort_keys=True))
     else:
         print_whole(done, parts)
     if done.was_interrupted:
@@ -215,15 +215,6 @@ def parted(done: Whole, other: Other) -> dict[int, str]:
         if difference is not None:
             found[row.number] = told(difference)
     return found
-
-
-def as_set(done: Whole) -> dict[str, object]:
-    """Return of the failures how many kinds they are, and how far they lie apart."""
-    runs = [run for row in done.failures if (run := row.failing) is not None]
-    apart = diversity([run.trial for run in runs], [run.outcome for run in runs])
-    numbers = [row.number for row in done.failures]
-    kinds = [[numbers[place] for place in cluster] for cluster in clusters([run.outcome for run in runs])]
-    return {"clusters": kinds, "diversity": {"obstacles": apart.obstacles, "ways": apart.ways}}
 
 
 def print_whole(done: Whole, parts: Mapping[int, str]) -> None:
@@ -247,20 +238,11 @@ def print_whole(done: Whole, parts: Mapping[int, str]) -> None:
     counts = [f"{done.counts[finding]} {finding.value}" for finding in Finding if done.counts.get(finding)]
     progress = done.progress
     if done.failures:
-        _print_set(as_set(done))
+        for what, value in FailureSet.of(done.progress.rows).words().items():
+            typer.echo(f"{what}: {value}")
     typer.echo(f"report  {done.folder / 'report.html'}")
     again = " (interrupted: --resume goes on)" if done.was_interrupted else ""
     typer.echo(
         f"{', '.join(counts) or 'nothing'} of {len(progress.rows)} points, {progress.runs} runs, "
         f"{progress.virtual_ns / 3.6e12:.2f} h of virtual time, {progress.cpu_s:.0f} s of processors{again}"
     )
-
-
-def _print_set(found: Mapping[str, object]) -> None:
-    kinds = cast("list[list[int]]", found["clusters"])
-    apart = cast("Mapping[str, float | None]", found["diversity"])
-    said = [f"{what} {value:.2f}" for what, value in apart.items() if value is not None]
-    points = [f"{', '.join(map(str, cluster))}" for cluster in kinds]
-    typer.echo(f"kinds   {len(kinds)}: points {' | '.join(points)}")
-    if said:
-        typer.echo(f"diversity of {', of '.join(said)} (0 all alike, 1 nothing in common)")

@@ -164,3 +164,16 @@ def test_the_numbers_that_twelve_bits_mean_are_those_of_the_manual() -> None:
     assert expanded(0x100) is None
     assert expanded(8 << 7) == 0x8000_0000  # the first that is turned
     assert expanded(31 << 7 | 0x7F) == 0x1FE
+
+
+@pytest.mark.parametrize(
+    ("word", "afters"),
+    [
+        (0xF5B9_7F7A, ["cmp.w r9, #1004", "cmp.w r9, #996"]),  # a byte turned: each fourth number
+        (0xF1B0_0F00, ["cmp.w r0, #1"]),  # 0: there is none below
+        (0xF1B0_3FFF, ["cmp.w r0, #4278255360"]),  # the greatest, and 0xff00ff00
+    ],
+)
+def test_a_number_moves_to_the_next_that_the_encoding_has(word: int, afters: list[str]) -> None:
+    code = (word >> 16).to_bytes(2, "little") + (word & 0xFFFF).to_bytes(2, "little")
+    assert [one.after for one in changes(code)] == afters

@@ -94,6 +94,12 @@ def test_versions_differ_where_verdicts_or_goals_do_or_margins_part(
     assert (back.verdict, margin(back)) == (found.verdict, by)
 
 
+def test_what_is_seen_of_a_difference_is_the_run_that_fails() -> None:
+    good, bad = replace(outcome(0.5), way_mm=((0, 0),)), replace(outcome(-0.5), way_mm=((1, 1),))
+    assert [compared(*pair, NAMES).way_mm for pair in ((good, bad), (bad, good), (bad, bad))] == [((1, 1),)] * 3
+    assert compared(good, good, NAMES).way_mm == ((0, 0),)
+
+
 def test_the_search_is_told_how_near_they_are_to_a_difference() -> None:
     found = [margin(compared(outcome(0.5), outcome(0.5 - apart), NAMES)) for apart in (0.0, 0.1, 0.2)]
     assert found == [pytest.approx(MOST_APART - apart) for apart in (0.0, 0.1, 0.2)]

@@ -190,3 +190,27 @@ def test_a_failure_is_told_with_its_time_and_part_and_one_of_another_way_is_not(
     assert failure_of(trial, replace(found.way, part="rear")) is None
     assert failure_of(trial, found.way, found.at_ns - NS_PER_S) is None
     assert failure_of(trial.set(("start.x_m", 99.0))) is None, "what cannot be run does not fail"
+
+
+def test_what_was_left_out_is_not_asked_for_again_in_larger_pieces() -> None:
+    asked: list[int] = []
+
+    def holds(some: Sequence[int]) -> bool:
+        asked.append(len(some))
+        return {3, 9} <= set(some)
+
+    assert fewest(range(12), holds) == [3, 9]
+    assert len(asked) <= 29, "cutting anew in halves after each piece that was left out asks for more"
+
+
+def test_a_failure_in_which_the_robot_could_do_nothing_is_of_another_way() -> None:
+    near = {"x_m": 2.2, "y_m": 0.0, "heading_deg": 0.0}
+    trial = trial_of("dodge", settings=[*BLIND, ("duration_s", 9.0), ("start", near)])
+    post = {"name": "post", "shape": "cylinder", "radius_m": 0.1, "height_m": 0.5, "before_sonar": 4}
+    whole = failure_of(trial)
+    at_rest = failure_of(trial.with_lists(obstacle=[{**post, "at_s": 1.0, "distance_m": 0.01}]))
+    sudden = failure_of(trial.with_lists(obstacle=[{**post, "at_s": 4.0, "distance_m": 0.01}]))
+    fair = failure_of(trial.with_lists(obstacle=[{**post, "at_s": 4.0, "distance_m": 0.35}]))
+    assert [one is not None and one.way.is_sudden for one in (whole, at_rest, sudden, fair)] == [
+        False, True, True, False,
+    ]  # fmt: skip

@@ -114,7 +114,7 @@ def _tellers(mutation: Mutation) -> Iterator[str]:
     """Tell what noticed how many: a goal that notices none could be left out as far as these mutants go."""
     words = {Fate.CRASHED: "the program ended in a fault", Fate.STOPPED: "it cost far more than the program"}
     counts = Counter(
-        words.get(found.fate, f"{found.scenario}: {found.says.partition(':')[0]}")
+        words.get(found.fate, f"{found.scenario}: {found.says.partition(': ')[0]}")
         for _, found in mutation.pairs if found.is_noticed
     )  # fmt: skip
     if counts:

@@ -11,12 +11,16 @@ from dataclasses import dataclass
 from bluepill_sim.board import BluePill
 from robot_bench.bench import Bench
 from robot_bench.campaign.trial import Trial, bench_of, unpacked
-from robot_bench.events.kinds import Contact, Event, Verdict
+from robot_bench.events.kinds import Contact, Event, Pose, Verdict, WorldChange
 from simbase.errors import P2osError
 from simbase.timing import NS_PER_MS, Nanos
 
 #: chosen: how often a run looks whether it may end.
 _LOOK_NS: Nanos = 500 * NS_PER_MS
+#: chosen: what stands in the way for so short a time no program answers.
+SUDDEN_NS: Nanos = 200 * NS_PER_MS
+#: chosen: a robot that has come so far has moved, micrometres.
+_MOVED_UM = 1000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,6 +35,8 @@ class Way:
     part: str = ""
     #: The program ended in a fault.
     is_fault: bool = False
+    #: The robot could do nothing: it had not moved yet, or something had come `SUDDEN_NS` before at most.
+    is_sudden: bool = False
 
     def __str__(self) -> str:
         whose = f"{self.robot}: " if self.robot else ""
@@ -73,25 +79,10 @@ def failure_of(
 
 
 def _run(bench: Bench, way: Way | None, until_ns: Nanos | None, look: Callable[[], None]) -> Failure | None:
-    robots = bench.robots
-    verdicts: list[tuple[str, Verdict]] = []
-    contacts: dict[str, Contact] = {}
-
-    def listener(name: str) -> Callable[[Event], None]:
-        def take(event: Event) -> None:
-            if isinstance(event, Contact):
-                contacts.setdefault(name, event)
-            elif isinstance(event, Verdict) and not event.met:
-                verdicts.append((name, event))
-
-        return take
-
-    for name, one in robots.items():
-        one.events.subscribe(listener(name if len(robots) > 1 else ""), Verdict, Contact)
+    witnesses = [_Witness(name if len(bench.robots) > 1 else "", one) for name, one in bench.robots.items()]
 
     def found(end: Nanos | None) -> Failure | None:
-        failures = [_missed(name, verdict, contacts.get(name)) for name, verdict in verdicts]
-        failures += [_died(name if len(robots) > 1 else "", one) for name, one in robots.items() if one.chip.has_died]
+        failures = [failure for witness in witnesses for failure in witness.failures()]
         return next(
             (
                 Failure(way=one, at_ns=when, is_early=end is None or when < end, says=says, blocks=_blocks(bench))
@@ -112,18 +103,51 @@ def _run(bench: Bench, way: Way | None, until_ns: Nanos | None, look: Callable[[
     return found(bench.finish())
 
 
+class _Witness:
+    """Notes of one robot what it misses, what it touches, when it moved, and when something came."""
+
+    def __init__(self, robot: str, bench: Bench) -> None:
+        self._robot, self._bench = robot, bench
+        self._verdicts: list[Verdict] = []
+        self._contact: Contact | None = None
+        self._began: Pose | None = None
+        self._moved_ns: Nanos | None = None
+        self._came: list[Nanos] = []
+        bench.events.subscribe(self._take, Verdict, Contact, Pose, WorldChange)
+
+    def _take(self, event: Event) -> None:
+        if isinstance(event, Contact):
+            self._contact = self._contact or event
+        elif isinstance(event, Verdict):
+            self._verdicts += [] if event.met else [event]
+        elif isinstance(event, WorldChange):
+            self._came += [] if event.op == "remove" else [event.t]
+        elif isinstance(event, Pose) and self._moved_ns is None:
+            first = self._began = self._began or event
+            if abs(event.x - first.x) + abs(event.y - first.y) > _MOVED_UM or event.heading != first.heading:
+                self._moved_ns = event.t
+
+    def failures(self) -> list[tuple[Way, Nanos, str]]:
+        """Return what was missed so far, each with its time and in words."""
+        found = [self._missed(verdict) for verdict in self._verdicts]
+        return [*found, *([self._died()] if self._bench.chip.has_died else [])]
+
+    def _missed(self, verdict: Verdict) -> tuple[Way, Nanos, str]:
+        contact = self._contact
+        part = contact.part.partition(" ")[0] if contact is not None and contact.t == verdict.t else ""
+        is_sudden = self._is_sudden(verdict.t)
+        return Way(what=verdict.goal, robot=self._robot, part=part, is_sudden=is_sudden), verdict.t, verdict.says
+
+    def _is_sudden(self, at: Nanos) -> bool:
+        is_at_rest = self._moved_ns is None or self._moved_ns >= at
+        return is_at_rest or any(0 <= at - change <= SUDDEN_NS for change in self._came)
+
+    def _died(self) -> tuple[Way, Nanos, str]:
+        fault, verdict = self._bench.chip.fault, self._bench.chip.verdict
+        at = self._bench.now if fault is None else fault.at_ns
+        return Way(what=verdict.partition(" at ")[0], robot=self._robot, is_fault=True), at, verdict
+
+
 def _blocks(bench: Bench) -> frozenset[int]:
     chips = [one.chip for one in bench.robots.values()]
     return frozenset(block for chip in chips if isinstance(chip, BluePill) for block in chip.entered_blocks)
-
-
-def _missed(robot: str, verdict: Verdict, contact: Contact | None) -> tuple[Way, Nanos, str]:
-    is_of_contact = contact is not None and contact.t == verdict.t
-    part = contact.part.partition(" ")[0] if contact is not None and is_of_contact else ""
-    return Way(what=verdict.goal, robot=robot, part=part), verdict.t, verdict.says
-
-
-def _died(robot: str, bench: Bench) -> tuple[Way, Nanos, str]:
-    fault = bench.chip.fault
-    at = bench.now if fault is None else fault.at_ns
-    return Way(what=bench.chip.verdict.partition(" at ")[0], robot=robot, is_fault=True), at, bench.chip.verdict
