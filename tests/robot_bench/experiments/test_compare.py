@@ -2,11 +2,15 @@
 
 import json
 import math
+import tempfile
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from p2os.capture import read_file, write_pcap
 from p2os.robots.parameters import load_parameters
 from robot_bench.experiments.alignment import (
     first_pose,
@@ -216,10 +220,30 @@ def test_two_thresholds_part_at_the_sensor_that_sees_farther(runs: Path, p2os, c
 
 def test_a_run_its_recording_and_its_table_tell_of_one_drive(runs: Path, p2os, capsys) -> None:
     assert p2os("export", runs / "near", "near.csv") == 0
-    for other in (runs / "near" / "wire.jsonl", "near.csv"):
+    capture = read_file(runs / "near")
+    Path("near.pcap").write_bytes(write_pcap(capture))
+    for other in (runs / "near" / "wire.jsonl", "near.csv", runs / "near" / "trace.jsonl"):
         capsys.readouterr()
         assert p2os("compare", runs / "near", other, "--poses", "odometry", "--shift", "0s", "--json") == 0
         assert json.loads(capsys.readouterr().out)["ape_translation_m"]["max"] < 1e-6
+    assert p2os("compare", runs / "near", "near.pcap", "--poses", "odometry", "--json") == 0
+    found = json.loads(capsys.readouterr().out)
+    # Times of a pcap count from its first record.
+    assert found["shift_s"] == pytest.approx(capture.chunks[0].at_ns / 1e9, abs=1e-3)
+    assert found["ape_translation_m"]["max"] < 1e-3
+
+
+@given(st.lists(st.lists(st.sampled_from(["0", "1", "-2.5", "nan", "inf", "x", "", "1e999", "\x00", "é"]), max_size=9)))
+def test_any_table_is_a_trajectory_or_told_in_one_line(rows: list[list[str]]) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        for name, head, between in (("a.csv", "t_s,x_m,y_m,heading_rad\n", ","), ("a.tum", "", " ")):
+            path = Path(folder) / name
+            path.write_text(head + "\n".join(between.join(row) for row in rows), encoding="utf-8")
+            try:
+                way, says = read_drive(path).body, ""
+            except FileError as error:
+                way, says = None, str(error)
+            assert name in says if way is None else np.isfinite(way.x_m).all()
 
 
 @pytest.mark.parametrize(
