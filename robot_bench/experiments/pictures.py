@@ -72,12 +72,11 @@ def comparison_figure(found: Comparison) -> Figure:
     for axes in rows:
         axes.grid(visible=True, color="#e3e3e3")
         axes.margins(x=0)
-        if came is not None and came.parts_s is not None:
-            axes.axvline(came.parts_s, color=OTHER, linewidth=1.0)
-    if came is not None and came.parts_s is not None:
-        rows[0].set_title(
-            f"parts first at {came.parts_s:.2f} s: {came.signal} ({came.bound.stage})", fontsize=10, color=OTHER
-        )
+        if came is not None:
+            axes.axvline(came[1], color=OTHER, linewidth=1.0)
+    if came is not None:
+        part, begin = came
+        rows[0].set_title(f"parts at {begin:.2f} s: {part.signal} ({part.bound.stage})", fontsize=10, color=OTHER)
     return figure
 
 
