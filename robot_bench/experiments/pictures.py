@@ -13,6 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from robot_bench.experiments.comparison import Comparison
+from robot_bench.experiments.parting import motion_parts_s
 from robot_bench.experiments.sensitivity import Effect
 from simbase.errors import FileError, shown_name
 
@@ -76,7 +77,8 @@ def comparison_figure(found: Comparison) -> Figure:
             axes.axvline(came[1], color=OTHER, linewidth=1.0)
     if came is not None:
         part, begin = came
-        rows[0].set_title(f"parts at {begin:.2f} s: {part.signal} ({part.bound.stage})", fontsize=10, color=OTHER)
+        says = "parts" if motion_parts_s(found.parts) is not None else "the motion does not part; differs"
+        rows[0].set_title(f"{says} at {begin:.2f} s: {part.signal} ({part.bound.stage})", fontsize=10, color=OTHER)
     return figure
 
 
