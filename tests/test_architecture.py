@@ -53,7 +53,7 @@ ALLOWED = {
     "robot_bench.recording.event_files": {"pyarrow"},
     "robot_bench.experiments": {"p2os", "numpy", "scipy"},
     "robot_bench.experiments.pictures": {"matplotlib"},
-    "robot_bench.experiments.sensitivity": {"numpy", "SALib"},
+    "robot_bench.experiments.sensitivity": {"p2os", "numpy", "SALib"},
     "robot_bench.cli.pytest_plugin": {"p2os", "bluepill_sim", "pytest"},
 }
 
