@@ -19,7 +19,7 @@ from robot_bench.experiments.alignment import (
 )
 from robot_bench.experiments.drives import Drive, Floats, Trajectory
 from robot_bench.experiments.onsets import answers
-from robot_bench.experiments.parting import Part, origin, parts
+from robot_bench.experiments.parting import Part, motion_parts_s, origin, parts
 from robot_bench.experiments.trajectory_errors import Statistics, absolute_errors, relative_errors
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S
@@ -74,8 +74,8 @@ class Comparison:
     parts: list[Part]
 
     @property
-    def origin(self) -> Part | None:
-        """Where the difference came from; None where the drives do not part."""
+    def origin(self) -> tuple[Part, float] | None:
+        """Where the difference came from, and when; None where the drives do not part."""
         return origin(self.parts)
 
     @property
@@ -112,8 +112,9 @@ class Comparison:
                 }
                 for part in self.parts
             ],
-            "came_from": None if came is None else {"stage": came.bound.stage, "signal": came.signal,
-                                                    "at_s": came.parts_s},
+            "motion_parts_at_s": motion_parts_s(self.parts),
+            "came_from": None if came is None else {"stage": came[0].bound.stage, "signal": came[0].signal,
+                                                    "at_s": came[1]},
         }  # fmt: skip
 
 

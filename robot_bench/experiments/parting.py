@@ -1,8 +1,10 @@
 """Where two drives part, and where it came from: sensor, firmware, wire or motion.
 
 Each signal of both is laid over the other; it parts where it differs by more than its bound for longer than its pause.
-What parted first is where it came from: a difference that comes later along the chain follows from it. Signals that
-part within `TOGETHER_S` of the first count as one, and of these the one that stands first in the chain is the cause.
+Where the motion parts, it came from what differed when it did, or until `REACH_S` before: of that the first, for a
+difference that comes later along the chain follows from it. What differed before and agreed again, as pins before an
+adapter is connected, led to nothing. Signals that part within `TOGETHER_S` of the first count as one, and of these the
+one that stands first in the chain is the cause.
 
 Not seen: what has no signal in both recordings, as the ground under the wheels.
 """
@@ -15,6 +17,8 @@ from robot_bench.experiments.drives import Drive, Floats, Steps, Trajectory, wra
 
 #: chosen: a change goes through the whole chain within this, seconds: the adapter's period and two of the robot's.
 TOGETHER_S = 0.3
+#: chosen: a program answers a sensor within this, and a ramp becomes a difference of speed, seconds.
+REACH_S = 1.0
 #: chosen: seconds between the times at which signals are looked at.
 LOOK_S = 0.01
 CHAIN = ("sensor", "firmware", "wire", "motion")
@@ -57,6 +61,8 @@ class Part:
     parts_s: float | None
     ours: float = 0.0
     theirs: float = 0.0
+    #: From when until when it differed, every time that it lasted.
+    spans: tuple[tuple[float, float], ...] = ()
 
     @property
     def bound(self) -> Bound:
@@ -101,14 +107,24 @@ def parts(one: Drive, other: Drive, shift_s: float, ours: Trajectory, theirs: Tr
     return sorted(rows, key=lambda part: np.inf if part.parts_s is None else part.parts_s)
 
 
-def origin(rows: list[Part]) -> Part | None:
-    """Return where the difference came from: of what parted first, what stands first in the chain."""
-    parted = [part for part in rows if part.parts_s is not None]
-    if not parted:
+def motion_parts_s(rows: list[Part]) -> float | None:
+    """Return when the motion parts; None where it does not."""
+    return min((row.parts_s for row in rows if row.bound.stage == CHAIN[-1] and row.parts_s is not None), default=None)
+
+
+def origin(rows: list[Part]) -> tuple[Part, float] | None:
+    """Return where the difference came from and when: of the motion's where that parts, else of what parted first."""
+    at = motion_parts_s(rows)
+    found = [
+        (begin, row) for row in rows for begin, end in row.spans
+        if at is None or (begin <= at and end >= at - REACH_S)
+    ]  # fmt: skip
+    if not found:
         return None
-    first = parted[0].parts_s or 0.0
-    together = [part for part in parted if (part.parts_s or 0.0) <= first + TOGETHER_S]
-    return min(together, key=lambda part: (CHAIN.index(part.bound.stage), part.parts_s))
+    first = min(begin for begin, _ in found)
+    together = [pair for pair in found if pair[0] <= first + TOGETHER_S]
+    begin, row = min(together, key=lambda pair: (CHAIN.index(pair[1].bound.stage), pair[0]))
+    return row, begin
 
 
 def _part(name: str, kind: str, times: Floats, ours: Floats, theirs: Floats) -> Part | None:
@@ -118,20 +134,22 @@ def _part(name: str, kind: str, times: Floats, ours: Floats, theirs: Floats) -> 
     times, ours, theirs = times[known], ours[known], theirs[known]
     difference = np.abs(wrapped(ours - theirs) if kind == "heading" else ours - theirs)
     bound, largest = BOUNDS[kind], int(np.argmax(difference))
-    place = _first_lasting(times, difference > bound.most, bound.pause_s)
     rms = float(np.sqrt(np.mean(difference**2)))
-    if place is None:
-        return Part(name, kind, rms, float(difference[largest]), float(times[largest]), None)
+    spans = _lasting(times, difference > bound.most, bound.pause_s)
+    most = float(difference[largest]), float(times[largest])
+    if not spans:
+        return Part(name, kind, rms, *most, None)
+    place = spans[0][0]
     return Part(
-        name, kind, rms, float(difference[largest]), float(times[largest]), float(times[place]), float(ours[place]),
-        float(theirs[place]),
+        name, kind, rms, *most, float(times[place]), float(ours[place]), float(theirs[place]),
+        tuple((float(times[begin]), float(times[last])) for begin, last in spans),
     )  # fmt: skip
 
 
-def _first_lasting(times: Floats, apart: "np.ndarray[tuple[int], np.dtype[np.bool_]]", pause_s: float) -> int | None:
-    """Return the first place from which it is so for longer than a pause."""
+def _lasting(
+    times: Floats, apart: "np.ndarray[tuple[int], np.dtype[np.bool_]]", pause_s: float
+) -> list[tuple[int, int]]:
+    """Return the first and last place of each time for which it is so for longer than a pause."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], apart, [False])).astype(np.int8)))
-    for first, behind in zip(edges[::2], edges[1::2], strict=True):
-        if times[behind - 1] - times[first] >= pause_s:
-            return int(first)
-    return None
+    pairs = zip(edges[::2].tolist(), (edges[1::2] - 1).tolist(), strict=True)
+    return [(first, last) for first, last in pairs if times[last] - times[first] >= pause_s]

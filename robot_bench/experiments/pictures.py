@@ -13,6 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from robot_bench.experiments.comparison import Comparison
+from robot_bench.experiments.parting import motion_parts_s
 from robot_bench.experiments.sensitivity import Effect
 from simbase.errors import FileError, shown_name
 
@@ -72,12 +73,12 @@ def comparison_figure(found: Comparison) -> Figure:
     for axes in rows:
         axes.grid(visible=True, color="#e3e3e3")
         axes.margins(x=0)
-        if came is not None and came.parts_s is not None:
-            axes.axvline(came.parts_s, color=OTHER, linewidth=1.0)
-    if came is not None and came.parts_s is not None:
-        rows[0].set_title(
-            f"parts first at {came.parts_s:.2f} s: {came.signal} ({came.bound.stage})", fontsize=10, color=OTHER
-        )
+        if came is not None:
+            axes.axvline(came[1], color=OTHER, linewidth=1.0)
+    if came is not None:
+        part, begin = came
+        says = "parts" if motion_parts_s(found.parts) is not None else "the motion does not part; differs"
+        rows[0].set_title(f"{says} at {begin:.2f} s: {part.signal} ({part.bound.stage})", fontsize=10, color=OTHER)
     return figure
 
 

@@ -86,9 +86,8 @@ def compare(
 
     if align not in ALIGNMENTS:
         raise UsageError(f"--align {align!r} is none of {', '.join(ALIGNMENTS)}")
-    for path in (*(Path(f"{tum}-{side}.tum") for side in ("a", "b") if tum), page, picture):
-        if path is not None:
-            refuse_to_overwrite(path, force=force)
+    for side in ("a", "b") if tum else ():
+        refuse_to_overwrite(Path(f"{tum}-{side}.tum"), force=force)
     shift_s = None if shift is None else shift / NS_PER_S
     how = How(poses=_which(poses), align=align, at=at, shift_s=shift_s, step_s=delta / NS_PER_S)
     reader = partial(reading_of, robot=robot, profile=profile)
@@ -151,6 +150,14 @@ def lines_of(found: "Comparison") -> Iterator[str]:
         yield f"{name:30}" + "".join(f"{value * scale:9.4f}" for value in values)
     yield ""
     yield from _latency_lines(found)
+    sonar = [part for part in found.parts if part.kind == "sonar"]
+    if sonar:
+        worst = max(sonar, key=lambda part: part.largest)
+        rms = math.sqrt(sum(part.rms**2 for part in sonar) / len(sonar))
+        yield (
+            f"sonar differs by {rms:.3f} m (rms of {len(sonar)}), most {worst.largest:.3f} m: {worst.signal} at "
+            f"{worst.largest_s:.2f} s"
+        )
     yield from _parting_lines(found)
 
 
@@ -168,6 +175,8 @@ def _latency_lines(found: "Comparison") -> Iterator[str]:
 
 
 def _parting_lines(found: "Comparison") -> Iterator[str]:
+    from robot_bench.experiments.parting import motion_parts_s
+
     came = found.origin
     if came is None:
         yield f"they do not part: {len(found.parts)} signals stay within their bounds"
@@ -180,7 +189,13 @@ def _parting_lines(found: "Comparison") -> Iterator[str]:
     within = [part.signal for part in found.parts if part.parts_s is None]
     if within:
         yield f"within bounds: {len(within)} of {len(found.parts)} signals"
-    yield f"where they part first: {came.signal} ({came.bound.stage}) at {came.parts_s:.3f} s"
+    part, begin = came
+    where = f"{part.signal} ({part.bound.stage}) at {begin:.3f} s"
+    moved_s = motion_parts_s(found.parts)
+    if moved_s is None:
+        yield f"the motion does not part; what differs: {where}"
+    else:
+        yield f"the motion parts at {moved_s:.3f} s; it came from: {where}"
 
 
 def _page(found: "Comparison", picture: bytes) -> str:

@@ -33,9 +33,8 @@ them. The outcome is every goal's margin, or what --outcome names.
 
 \b
 Examples:
-  p2os sensitivity dodge --vary threshold_m=0.4..1.0 \\
-      --vary start.heading_deg=0..90 --outcome clearance_m --picture s.png
-  p2os sensitivity patrol.toml --vary goal.1.x_m=1..2 --trajectories 20 -j 4
+  p2os sensitivity dodge --vary threshold_m=0.4..1.0 --outcome clearance_m
+  p2os sensitivity patrol.toml --vary start.x_m=0.5..1.5 --picture s.png
 """
 OUTCOMES = "path_m, mean_mps, clearance_m, energy_j, …, or such as 'goal 2 clearance'"
 

@@ -2,11 +2,15 @@
 
 import json
 import math
+import tempfile
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from p2os.capture import read_file, write_pcap
 from p2os.robots.parameters import load_parameters
 from robot_bench.experiments.alignment import (
     first_pose,
@@ -18,7 +22,7 @@ from robot_bench.experiments.comparison import How, compare
 from robot_bench.experiments.drive_files import read_drive, read_tum, write_tum
 from robot_bench.experiments.drives import Drive, Steps, Trajectory
 from robot_bench.experiments.onsets import onset_after
-from robot_bench.experiments.parting import origin, parts
+from robot_bench.experiments.parting import motion_parts_s, origin, parts
 from robot_bench.experiments.trajectory_errors import Statistics, absolute_errors, relative_errors
 from simbase.errors import FileError, UsageError
 
@@ -172,9 +176,10 @@ def test_where_two_drives_part_is_where_the_first_difference_was_planted(stage: 
     assert other.truth is not None
     found = origin(parts(one, other, 0.0, one.truth, other.truth))
     assert found is not None
-    assert found.bound.stage == stage
+    part, begin = found
+    assert part.bound.stage == stage
     if stage != "motion":
-        assert (found.signal, found.parts_s) == (signal, pytest.approx(5.0 + 0.02 * order.index(stage), abs=0.011))
+        assert (part.signal, begin) == (signal, pytest.approx(5.0 + 0.02 * order.index(stage), abs=0.011))
 
 
 @pytest.mark.parametrize(("for_s", "parts_there"), [(0.24, False), (0.27, True)])
@@ -183,6 +188,21 @@ def test_a_level_that_differs_for_less_than_its_pause_is_no_parting(for_s: float
     short = Steps(np.array([0.0, 5.0, 5.0 + for_s]), np.array([0.0, 1.0, 0.0]))
     one, other = drive(way, motors={1: Steps(np.array([0.0]), np.array([0.0]))}), drive(way, motors={1: short})
     assert (origin(parts(one, other, 0.0, way, way)) is not None) is parts_there
+
+
+@pytest.mark.parametrize(("until_s", "stage"), [(4.0, "motion"), (5.3, "sensor")])
+def test_what_agreed_again_long_before_the_motion_parts_is_not_its_cause(until_s: float, stage: str) -> None:
+    way = wandering()
+    bent = Trajectory(way.t_s, way.x_m + 0.3 * np.clip(way.t_s - 6.0, 0, None), way.y_m, way.heading_rad)
+    early = Steps(np.array([0.0, 1.0, until_s]), np.array([0.0, 1.0, 0.0]))
+    one = drive(way, sensors={1: Steps(np.array([0.0]), np.array([0.0]))})
+    rows = parts(one, drive(bent, sensors={1: early}), 0.0, way, bent)
+    found = origin(rows)
+    assert found is not None
+    assert found[0].bound.stage == stage
+    alike = parts(one, drive(way, sensors={1: early}), 0.0, way, way)
+    assert motion_parts_s(alike) is None
+    assert origin(alike) == (alike[0], pytest.approx(1.0, abs=0.011))
 
 
 def test_a_run_compared_with_itself_does_not_part(runs: Path) -> None:
@@ -203,7 +223,7 @@ def test_two_thresholds_part_at_the_sensor_that_sees_farther(runs: Path, p2os, c
     assert p2os("compare", runs / "near", runs / "far", "--picture", "c.png", "--html", "c.html", "--tum", "c") == 0
     out = capsys.readouterr().out
     assert all(len(line) <= 80 for line in out.splitlines())
-    assert "where they part first: sensor 4 (sensor) at 13.9" in out
+    assert "it came from: sensor 4 (sensor) at 13.9" in out
     assert Path("c.png").read_bytes()[:4] == b"\x89PNG"
     assert "data:image/png" in Path("c.html").read_text(encoding="utf-8")
     first, second = read_tum(Path("c-a.tum")), read_tum(Path("c-b.tum"))
@@ -216,10 +236,30 @@ def test_two_thresholds_part_at_the_sensor_that_sees_farther(runs: Path, p2os, c
 
 def test_a_run_its_recording_and_its_table_tell_of_one_drive(runs: Path, p2os, capsys) -> None:
     assert p2os("export", runs / "near", "near.csv") == 0
-    for other in (runs / "near" / "wire.jsonl", "near.csv"):
+    capture = read_file(runs / "near")
+    Path("near.pcap").write_bytes(write_pcap(capture))
+    for other in (runs / "near" / "wire.jsonl", "near.csv", runs / "near" / "trace.jsonl"):
         capsys.readouterr()
         assert p2os("compare", runs / "near", other, "--poses", "odometry", "--shift", "0s", "--json") == 0
         assert json.loads(capsys.readouterr().out)["ape_translation_m"]["max"] < 1e-6
+    assert p2os("compare", runs / "near", "near.pcap", "--poses", "odometry", "--json") == 0
+    found = json.loads(capsys.readouterr().out)
+    # Times of a pcap count from its first record.
+    assert found["shift_s"] == pytest.approx(capture.chunks[0].at_ns / 1e9, abs=1e-3)
+    assert found["ape_translation_m"]["max"] < 1e-3
+
+
+@given(st.lists(st.lists(st.sampled_from(["0", "1", "-2.5", "nan", "inf", "x", "", "1e999", "\x00", "é"]), max_size=9)))
+def test_any_table_is_a_trajectory_or_told_in_one_line(rows: list[list[str]]) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        for name, head, between in (("a.csv", "t_s,x_m,y_m,heading_rad\n", ","), ("a.tum", "", " ")):
+            path = Path(folder) / name
+            path.write_text(head + "\n".join(between.join(row) for row in rows), encoding="utf-8")
+            try:
+                way, says = read_drive(path).body, ""
+            except FileError as error:
+                way, says = None, str(error)
+            assert name in says if way is None else np.isfinite(way.x_m).all()
 
 
 @pytest.mark.parametrize(

@@ -89,17 +89,35 @@ def test_parameters_that_only_their_sum_shows_are_both_named() -> None:
     assert "of a and b" in found.unseen["a"]
 
 
-def test_an_interval_of_a_line_is_that_of_the_textbook() -> None:
+@pytest.mark.parametrize("are_independent", [True, False])
+def test_an_interval_of_a_line_is_that_of_the_textbook(are_independent: bool) -> None:
     random_ = np.random.default_rng(2)
     x = np.linspace(-1, 1, 400)
     y = 2 * x + random_.normal(0, 0.1, 400)
     found = fit(
         lambda v: v[0] * x - y, [Parameter(name="a", start=0.0, scale=1.0, least=-9, most=9)], np.arange(400),
-        floor=1e-6, why="",
+        floor=1e-6, why="", are_independent=are_independent,
     )  # fmt: skip
     # sigma / sqrt(sum of x²), with 133.7 = sum of x², and Student's 1.966 for 399.
-    assert found.estimates["a"].half_width == pytest.approx(1.966 * 0.1 / math.sqrt(133.7), rel=0.15)
+    assert found.estimates["a"].half_width == pytest.approx(1.966 * 0.1 / math.sqrt(133.7), rel=0.2)
     assert found.estimates["a"].low < 2 < found.estimates["a"].high
+
+
+def test_neighbours_that_err_alike_make_an_interval_wider() -> None:
+    random_ = np.random.default_rng(3)
+    x = np.linspace(0, 1, 400)
+    alike = np.repeat(random_.normal(0, 0.1, 100), 4)
+    widths = []
+    for noise in (alike, random_.permutation(alike)):
+        y = 2 * x + noise
+        found = fit(
+            lambda v, y=y: v[0] * x - y, [Parameter(name="a", start=0.0, scale=1.0, least=-9, most=9)], np.arange(400),
+            floor=1e-6, why="", are_independent=False,
+        )  # fmt: skip
+        widths.append(found.estimates["a"].half_width)
+    # Four in a row that err alike are one: twice as wide; Bartlett's weights see 1 + 2 (0.75 · 0.75 + 0.5 · 0.5 +
+    # 0.25 · 0.25) = 2.75 of the 4.
+    assert widths[0] / widths[1] == pytest.approx(2.75**0.5, rel=0.25)
 
 
 @pytest.mark.parametrize("count", [2, 3])
