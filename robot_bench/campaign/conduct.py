@@ -137,7 +137,9 @@ class Progress:
 
     rows: list[Row] = field(default_factory=list)
     runs: int = 0
-    #: Of these, how many were in the journal.
+    #: Of these, how many were cheap ones: points that have an answer.
+    answered: int = 0
+    #: Of all runs, how many were in the journal.
     resumed: int = 0
     virtual_ns: Nanos = 0
     cpu_s: float = 0.0
@@ -261,10 +263,10 @@ class Conduct:
 
         def on_done(number: int, done: tuple[Outcome, float]) -> None:
             self._journal.add(keys[missing[number]], *done)
-            self._count(*done)
+            self._count(stage, *done)
 
         for key in set(keys) - places.keys():
-            self._count(*self._kept(key))
+            self._count(stage, *self._kept(key))
         self._workers.run([trials[place] for place in missing], on_done)
         return [Run(stage, trial, *self._kept(key)) for trial, key in zip(trials, keys, strict=True)]
 
@@ -274,8 +276,9 @@ class Conduct:
             raise RuntimeError(f"the workers have left out {key}")
         return found
 
-    def _count(self, outcome: Outcome, cpu_s: float) -> None:
+    def _count(self, stage: Stage, outcome: Outcome, cpu_s: float) -> None:
         self.progress.runs += 1
+        self.progress.answered += stage is Stage.CHEAP
         self.progress.virtual_ns += outcome.virtual_ns
         self.progress.cpu_s += cpu_s
         self._on_run(self.progress)

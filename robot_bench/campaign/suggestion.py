@@ -25,7 +25,7 @@ gap_m = 0.75             # between things: a robot of 0.38 m passes
 search = "sobol"        # grid, random, latin-hypercube, sobol, tpe, cma-es, quality-diversity, coverage
 
 [budget]
-runs = 200              # of the cheap kind
+runs = 600              # of the cheap kind; about a second of a processor each
 confirmations = 40      # runs in full: of what failed, and of the nearest misses
 minutes = 10.0
 
@@ -59,13 +59,14 @@ kind = "dead-end"
 count = { from = 0, to = 1 }
 ahead_m = { from = 1.0, to = 2.2 }
 aside_m = { from = -0.3, to = 0.3 }
-width_m = { from = 0.6, to = 1.4 }
+width_m = { from = 0.7, to = 1.4 }
 
 [[draw]]
 kind = "gap"
 count = { from = 0, to = 1 }
 ahead_m = { from = 0.8, to = 2.0 }
 aside_m = { from = -0.4, to = 0.4 }
+width_m = { from = 0.7, to = 1.2 }
 
 [[draw]]                # behind it or beside it
 kind = "wall"
@@ -81,13 +82,13 @@ ends_run = "missed"
 
 [[goal]]
 kind = "clearance"
-least_m = 0.1
+least_m = 0.05
 ends_run = "missed"
 
 [[goal]]                # it neither stands nor turns on the spot nor stays shut in
 kind = "moves_on"
 way_m = 0.5
-within_s = 20.0
+within_s = 30.0
 ends_run = "missed"
 """)
 

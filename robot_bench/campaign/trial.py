@@ -12,6 +12,7 @@ import hashlib
 import os
 import shutil
 import tempfile
+import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import deepcopy
@@ -404,14 +405,16 @@ def _write_files(files: Mapping[str, bytes], folder: Path) -> None:
 
 
 class _Folder:
-    """A folder that is removed with the object, by the process that made it."""
+    """A folder that is removed with the object, or at the end of the process that made it."""
 
     def __init__(self) -> None:
-        self.name, self._owner = tempfile.mkdtemp(prefix="p2os-trial-"), os.getpid()
+        self.name = tempfile.mkdtemp(prefix="p2os-trial-")
+        weakref.finalize(self, _remove, self.name, os.getpid())
 
-    def __del__(self) -> None:
-        if os.getpid() == self._owner:
-            shutil.rmtree(self.name, ignore_errors=True)
+
+def _remove(folder: str, owner: int) -> None:
+    if os.getpid() == owner:  # not a fork of it
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 @lru_cache(maxsize=_KEPT_FOLDERS)

@@ -185,7 +185,7 @@ class Shown:
 
     def update(self, progress: Progress) -> None:
         """Show where the campaign stands."""
-        points, failures = len(progress.rows), len(progress.failures)
+        points, failures = progress.answered, len(progress.failures)
         said = f"{progress.runs} runs, {failures} failures, {len(progress.blocks)} blocks"
         if self._is_live:
             self._bar.update(self._task, completed=points, said=said, refresh=True)

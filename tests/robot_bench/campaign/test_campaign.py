@@ -100,8 +100,8 @@ def set_of(whole: Whole) -> list[tuple[object, ...]]:
     ]
 
 
-#: Loading the library takes seconds; ribs compiles itself besides.
-SLOW = {"tpe", "cma-es", "quality-diversity"}
+#: Loading the library takes seconds, and ribs compiles itself; of those alike one is enough for the quick suite.
+SLOW = {"tpe", "cma-es", "quality-diversity", "latin-hypercube", "grid", "random"}
 
 
 @pytest.mark.parametrize(
@@ -123,7 +123,9 @@ def test_every_search_asks_the_same_for_the_same_seed_in_whatever_order_the_runs
     assert all(0 <= at < 1 for point in points for at in point)  # type: ignore[attr-defined]  # a point
 
 
-@pytest.mark.parametrize("until", [0, 1, 4, 5, 9, 14])
+@pytest.mark.parametrize(
+    "until", [5, pytest.param(0, marks=pytest.mark.slow), pytest.param(14, marks=pytest.mark.slow)]
+)
 def test_a_campaign_that_was_interrupted_goes_on_to_the_same_set(until: int, tmp_path: Path) -> None:
     for name in ("whole", "cut"):
         (tmp_path / name).mkdir()
@@ -137,6 +139,7 @@ def test_a_campaign_that_was_interrupted_goes_on_to_the_same_set(until: int, tmp
     assert workers.count == expected.progress.runs - until
 
 
+@pytest.mark.slow
 def test_a_line_of_the_journal_that_was_cut_is_done_again(tmp_path: Path) -> None:
     expected = set_of(carried(begun(tmp_path), tmp_path / "kept", Shuffled(1)))
     journal = tmp_path / "kept/journal.jsonl"

@@ -36,6 +36,7 @@ def stopped_at(trial: Trial, at_ns: int) -> Trial:
     return trial.with_lists(when=rows)
 
 
+@pytest.mark.slow
 def test_the_last_moment_is_the_latest_at_which_standing_still_avoids_the_contact(trial: Trial) -> None:
     failed = run_trial(trial)
     assert [hit.what for hit in failed.hits[:1]] == ["'wall'"]

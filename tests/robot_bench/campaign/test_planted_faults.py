@@ -16,10 +16,6 @@ from robot_bench.scenario.scenario import load_scenario
 
 #: What is wrong → what stands in dodge_fsm.c, and what takes its place.
 FAULTS = {
-    "sign: turns to the heavier side": (
-        "return left > right ? -1 : right > left ? +1", "return left > right ? +1 : right > left ? -1",
-    ),
-    "limit: every turn belongs to the one before": ("#define SOON_WAY 12 ", "#define SOON_WAY 1200 "),
     "missing reset: ground stays straight after a turn": (
         "if (dodge->state != DODGE_CRUISE) {\n        dodge->straight_ticks = 0;",
         "if (dodge->state != DODGE_CRUISE) {",
@@ -27,7 +23,6 @@ FAULTS = {
     "blind spot: the sensor at 30 degrees right": (
         "uint8_t sensors)\n{\n", "uint8_t sensors)\n{\n    sensors = (uint8_t)(sensors & ~RIGHT_30);\n",
     ),
-    "margin: the wide arc where something is close": ("inner = is_close ? 1 : 2;", "inner = is_close ? 2 : 2;"),
 }  # fmt: skip
 RUNS = 32
 
