@@ -85,6 +85,7 @@ ENDLESS = (
     Endless(verb="mcu debug", serves=True, may_end=True),
     Endless(verb="run", given="--gdb", serves=True),
     Endless(verb="p2os-adapter", serves=True),
+    Endless(verb="plan_view", serves=True, ready="listening"),
     Endless(verb="run", given="--port", keys=b"y\n", hold_s=4.0),
     Endless(verb="record", unless="--for"),
     Endless(verb="monitor", unless="--for", keys=b""),

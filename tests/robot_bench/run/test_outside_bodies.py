@@ -3,8 +3,10 @@
 import json
 import shutil
 import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -12,6 +14,7 @@ import pytest
 
 from p2os.cli.main import run as p2os
 from p2os.pioneer.body.outside.body import Ability
+from p2os.pioneer.world.model import Obstacle
 from robot_bench import Bench
 from simbase.errors import UsageError
 from tests.p2os.pioneer.body.outside.served import Served, served, serving
@@ -26,7 +29,7 @@ def started(*command: str | Path) -> Iterator[str]:
     with subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE, text=True) as program:
         try:
             assert program.stdout is not None
-            yield program.stdout.readline().removeprefix("listening on ").strip()
+            yield next(line for line in program.stdout if line.startswith("listening on ")).split()[-1]
         finally:
             program.kill()
 
@@ -73,6 +76,25 @@ def test_a_body_in_c_has_walls_of_its_own(plan_view: Path) -> None:
         assert bench.parts.body.state.collisions >= 1
         assert bench.pose.x_m < 0.4
         assert "own wall" in bench.trace.text
+
+
+@pytest.mark.slow
+@pytest.mark.bullet
+@pytest.mark.skipif(find_spec("pybullet") is None, reason="pybullet is not installed")
+def test_a_body_on_a_physics_engine_in_another_process_gives_the_same_trace_twice() -> None:
+    with started(sys.executable, SOURCE / "bullet_body.py", "tcp:127.0.0.1:0") as address:
+        first, other = bench_with(address), bench_with(address)
+        assert hash_of(first) == hash_of(other)
+        assert 0.3 < first.pose.x_m < 2.5
+        with pytest.raises(UsageError, match=r"the outside body PyBullet at tcp:.* cannot save its state"):
+            first.fork()
+        body = first.parts.body
+        body.place(Obstacle(name="cart", x_m=body.state.x_m + 0.5, y_m=0.0, length_m=0.2, width_m=0.6, mass_kg=1.0))
+        for _ in range(2500):
+            body.step(0.3, 0.3)
+        assert [hit.name for hit in body.take_hits()] == ["cart"]
+        assert [thing.name for thing in body.take_moved()] == ["cart"]
+        assert body.clearance() < 0.05
 
 
 @pytest.mark.parametrize("mode", ["adapter", "direct"])

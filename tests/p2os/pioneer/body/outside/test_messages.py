@@ -1,7 +1,10 @@
 """Every message of the protocol is the same after its bytes; a cut or changed one is refused, or is another message."""
 
 import math
+import re
 import struct
+from itertools import groupby
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -58,6 +61,36 @@ def test_every_message_has_its_fields_and_every_request_its_number() -> None:
     assert all(len(made._fields) == len(fields) for made, fields in FIELDS.items())
     numbers = [number for number, _ in REQUESTS.values()]
     assert sorted(numbers) == list(range(1, len(REQUESTS) + 1))
+
+
+def numbers(record: messages._Record) -> str:
+    text = record._struct.format.lstrip("<")
+    letters = "d" * int(text[:-1]) if text[:-1].isdigit() else text
+    names = {"d": "f64", "B": "u8", "H": "u16", "I": "u32", "Q": "u64"}
+    runs = [(names[letter], len(list(run))) for letter, run in groupby(letters)]
+    return ", ".join(name if count == 1 else f"{count} {name}" for name, count in runs)
+
+
+def written(field: object) -> str:
+    match field:
+        case messages._Record():
+            return numbers(field)
+        case messages._Table():
+            return f"{numbers(messages._Record(field._count.format[1:]))} × ({numbers(field._row)})"
+        case messages._List():
+            return f"u16 × ({', '.join(map(written, field._fields))})"
+    return "text" if isinstance(field, messages._Text) else "blob"
+
+
+def test_the_page_has_every_message_with_its_fields() -> None:
+    lines = Path(__file__).parents[5].joinpath("docs/outside-body.md").read_text(encoding="utf-8").splitlines()
+    rows = [tuple(cell.strip() for cell in line.split("|")[1:-1]) for line in lines if re.match(r"\| \d+ \|", line)]
+
+    def cells(made: type[Message]) -> tuple[str, str]:
+        return made.__name__, ", ".join(map(written, FIELDS[made]))
+
+    expected = [(str(number), *cells(request), *cells(answer)) for request, (number, answer) in REQUESTS.items()]
+    assert rows == expected
 
 
 @given(ANY)
