@@ -213,10 +213,6 @@ class KinematicBody(BodyInWorld):
         #: No thing is nearer to the hull than this; 0 only where the hull is inside one.
         self._free_m = 0.0
 
-    def step(self, left_mps: float, right_mps: float) -> Turned:
-        """As of `BodyInWorld`; a robot that is alone needs nothing of its scene for it."""
-        return super().step(left_mps, right_mps) if self.others else self.go(left_mps, right_mps)
-
     def go(self, left_mps: float, right_mps: float) -> Turned:
         """Move on by one step along the exact arc, or stall."""
         self._steps += 1

@@ -8,7 +8,7 @@ import typer
 from typer.testing import CliRunner
 
 from robot_bench.campaign.campaign_file import load_campaign
-from robot_bench.cli import campaign
+from robot_bench.cli.campaigns import campaign
 from simbase.errors import P2osError, UsageError
 
 FILE = """
