@@ -408,6 +408,7 @@ TIM = Struct(
             "edge_at", "u64", 3, "the tick at which OC1REF to OC3REF last changed before they were what they are now,"
         ),
         Field("shaped_at", "u64", 3, "since when they are that,"),
+        Field("written_at", "u64", doc="when a register was written last: the references of that tick came before"),
         Field("born", "u64", 3, "of a wave the tick of its last edge before, which there was not,"),
         Field("turns_at", "u64", 3, "and of the first that there is"),
         Field("filters", "filter", 5, "TI1 to TI4, ETR"),

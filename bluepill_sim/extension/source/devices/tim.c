@@ -357,6 +357,7 @@ static void write(struct device *device, uint32_t index, uint32_t written, uint3
     const uint32_t stored = words[index], kept = kept_bits(device, index);
     words[index] = previous;
     synchronize(device, tick_now(device));
+    note_references(device);
     previous = words[index];
     words[index] = (stored & ~kept) | (previous & kept);
     take(device, index, written, previous);

@@ -110,6 +110,7 @@ static inline uint64_t tick_after(const struct tim *tim, uint64_t counts)
 /* tim_outputs.c: OCxREF, dead time, idle states, pins. */
 /* OCxREF at the tick up to which all is worked out. */
 bool reference(const struct device *device, uint32_t channel);
+void note_references(struct device *device);
 void show_outputs(struct device *device);
 uint64_t next_output_stop(const struct device *device);
 /* Takes outputs to their idle states, or back. */

@@ -209,7 +209,8 @@ static void note_edge(struct device *device, uint32_t channel)
     if (is_same(&was, &shape)) {
         return;
     }
-    const uint64_t before = tim->shaped_at[channel] < tim->at ? tim->at - 1 : tim->at;
+    const bool is_noted = tim->shaped_at[channel] == tim->at || tim->written_at == tim->at;
+    const uint64_t before = is_noted ? tim->at : tim->at - 1;
     if (level_at(&was, before) != reference(device, channel)) {
         tim->edge_at[channel] = tim->at;
     } else if (was.kind == SHOWS_WAVE && last_edge(&was, before) > tim->shaped_at[channel]) {
@@ -219,6 +220,16 @@ static void note_edge(struct device *device, uint32_t channel)
     tim->turns_at[channel] = shape.kind == SHOWS_WAVE ? next_edge(&shape, tim->at) : 0;
     tim->shaped_at[channel] = tim->at;
     tim->references[channel] = shape;
+}
+
+/* What a register's write finds: OCxREF has come to its tick, and changes anew where the write makes it. */
+void note_references(struct device *device)
+{
+    struct tim *tim = tim_of(device);
+    for (uint32_t n = 0; n < PAIRS && tim->is_advanced; ++n) {
+        note_edge(device, n);
+    }
+    tim->written_at = tim->at;
 }
 
 void show_outputs(struct device *device)

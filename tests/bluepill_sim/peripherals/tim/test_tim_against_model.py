@@ -235,6 +235,12 @@ def test_the_dead_time_of_a_wave_s_first_edge_agrees(fake_chip: Any, start: dict
     play(Pair(fake_chip, "TIM1", 0x7F), [*start.items(), ("run", 30)])
 
 
+def test_the_dead_time_of_a_reference_that_a_write_turns_back_agrees(fake_chip: Any) -> None:
+    start = {"ARR": 2, "CCR1": 1, "CCR2": 1, "CCMR1": 0x6000, "BDTR": 0x8002, "EGR": 1, "CR1": 0x11, "CCER": 0x1111}
+    # At the 30th tick the count is 1: active counting down, and not any more counting up.
+    play(Pair(fake_chip, "TIM1", 0x7F), [*start.items(), ("run", 30), ("CR1", 1), ("CCER", 0x555), ("run", 30)])
+
+
 @pytest.mark.parametrize("name", ["TIM1", "TIM3"])
 @settings(max_examples=60, deadline=None)
 @given(start=START, steps=ABOUT_OUTPUTS)
