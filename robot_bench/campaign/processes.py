@@ -98,6 +98,7 @@ def _work(trial: Trial, limits: Limits, pipe: Connection, parent: int, folder: P
     """Carry a trial out in this fork, and send what came of it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # of the terminal: the parent ends us
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.signal(signal.SIGXCPU, signal.SIG_DFL)  # the command line's own handler would end it with a code
     tempfile.tempdir = str(folder)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     seconds = max(round(limits.cpu_s), 1)
