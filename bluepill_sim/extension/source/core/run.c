@@ -322,7 +322,8 @@ enum way goes_on(struct core *core, uint32_t address)
         core->is_scratch || waits_for_python(fabric, s->cycle)) {
         return ENDS;
     }
-    settle_at(core, address);
+    core->block = &core->none;
+    s->pc = address;
     if (is_tick && systick_advance(s, s->cycle)) {
         pend(core, SYSTICK);
     }
@@ -330,8 +331,9 @@ enum way goes_on(struct core *core, uint32_t address)
         run_due(fabric, s->cycle);
     }
     uint64_t high;
-    const bool is_pending = deliverable(s, &high) || high;
+    const bool is_pending = (s->pending[0] | s->pending[1]) && (deliverable(s, &high) || high);
     if (is_pending) {
+        settle_at(core, address); /* asks Unicorn: not at each deadline */
         const int entered = may_turn(core) ? deliver(core) : -1;
         if (entered > 0) {
             go_elsewhere(core, true);
