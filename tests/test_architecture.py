@@ -73,8 +73,8 @@ IO_LAYER = (
     "p2os.ros.zenoh_node",
     "bluepill_sim.cli", "bluepill_sim.cli.console",
     "robot_bench.cli", "robot_bench.campaign.processes", "robot_bench.campaign.dask_workers",
-    "robot_bench.campaign.variants.shrinking.kept", "robot_bench.running.pacer", "robot_bench.live",
-    "robot_bench.report", "robot_bench.firmware.build",
+    "robot_bench.campaign.variants.shrinking.kept", "robot_bench.running.forks", "robot_bench.running.pacer",
+    "robot_bench.live", "robot_bench.report", "robot_bench.firmware.build",
 )  # fmt: skip
 
 #: What may log beside the I/O layer: what joins models to lines, and the bench. A model tells its owner by a callback.

@@ -16,7 +16,6 @@ import resource
 import signal
 import tempfile
 from collections.abc import Callable, Sequence
-from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import ForkProcess
 from pathlib import Path
@@ -24,9 +23,8 @@ from pathlib import Path
 from p2os.errors import RunFailedError
 from robot_bench.campaign.campaign_file import Limits
 from robot_bench.campaign.trial import Outcome, Trial, Verdict, run_trial, warm_up
+from robot_bench.running.forks import LOOK_S, begin, how_it_ended, received
 
-#: chosen: how long a signal may wait for this process to look, seconds.
-LOOK_S = 0.1
 #: chosen: so often a trial is begun whose process is killed from outside.
 MOST_TRIES = 4
 #: Between the soft and the hard limit of the processor's time, seconds.
@@ -66,7 +64,7 @@ class Processes:
                     self._look()
                     while waiting and len(running) < self._at_once:
                         place, tries = waiting.pop()
-                        process, pipe = _begin(trials[place], self._limits, Path(folder))
+                        process, pipe = begin(_work, trials[place], self._limits, os.getpid(), Path(folder))
                         running[pipe] = place, tries, process
                     ready = wait(list(running), timeout=LOOK_S)
                     for pipe in [pipe for pipe in running if pipe in ready]:
@@ -86,15 +84,7 @@ class Processes:
         """Nothing is kept between runs."""
 
 
-def _begin(trial: Trial, limits: Limits, folder: Path) -> tuple[ForkProcess, Connection]:
-    ours, theirs = get_context("fork").Pipe(duplex=False)
-    process = get_context("fork").Process(target=_work, args=(trial, limits, theirs, os.getpid(), folder), daemon=True)
-    process.start()
-    theirs.close()
-    return process, ours
-
-
-def _work(trial: Trial, limits: Limits, pipe: Connection, parent: int, folder: Path) -> None:
+def _work(pipe: Connection, trial: Trial, limits: Limits, parent: int, folder: Path) -> None:
     """Carry a trial out in this fork, and send what came of it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # of the terminal: the parent ends us
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
@@ -123,11 +113,7 @@ def _work(trial: Trial, limits: Limits, pipe: Connection, parent: int, folder: P
 
 def _result(process: ForkProcess, pipe: Connection, limits: Limits) -> Done | None:
     """Return what came of a process that has ended; None where it was killed from outside."""
-    done: Done | None = None
-    with contextlib.suppress(EOFError, ConnectionResetError):
-        done = pipe.recv()
-    pipe.close()
-    process.join()
+    done: Done | None = received(process, pipe)
     if done is not None:
         return done
     code = process.exitcode or 0
@@ -135,8 +121,7 @@ def _result(process: ForkProcess, pipe: Connection, limits: Limits) -> Done | No
         return None
     if code == -signal.SIGXCPU:
         return _error(f"it took more than {limits.cpu_s:g} s of a processor"), limits.cpu_s
-    how = f"by {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
-    return _error(f"its process ended {how}"), 0.0
+    return _error(how_it_ended(process)), 0.0
 
 
 def _error(why: str) -> Outcome:

@@ -220,8 +220,10 @@ def run(
         "record": record,
     }
     wanted = wanted.with_options(**options)
-    refuse_ros_beside(ros, inputs, port=port, gdb=gdb, coverage=coverage or profile)
-    refuse_foxglove_beside(foxglove, port=port, gdb=gdb, ros=ros, inputs=inputs, robots=wanted.robots or None)
+    measured = coverage or profile or None
+    refuse_beside("--ros", ros, port=port, gdb=gdb, coverage=measured, inputs=inputs)
+    refuse_beside("--inputs", inputs, port=port, gdb=gdb, coverage=measured)
+    refuse_beside("--foxglove", foxglove, port=port, gdb=gdb, ros=ros, inputs=inputs, robots=wanted.robots or None)
     if is_sweep(wanted, seeds=seeds, seed=seed, port=port):
         refuse_beside_sweep(
             port=port,
@@ -242,33 +244,15 @@ def run(
         end_with(result, json_output=json_output)
         return
     folder = out or make_next_folder(wanted.name)
-    if ros is not None or inputs is not None:
-        with RunDisplay() as display, driven_by_ros(wanted, ros, inputs) as driver:
-            pace = realtime or (None if ros is None else 1.0)
-            result = run_scenario(
-                wanted, folder, speed=pace, on_progress=display.update, force=force, drive=driver, explained=True
-            )
-        end_with(result, json_output=json_output)
-        return
-    if foxglove is not None:
-        from robot_bench.live import live_scene
-
-        with (
-            RunDisplay() as display,
-            live_scene(wanted, foxglove, tell_viewer) as scene,
-        ):
-            result = run_scenario(
-                wanted, folder, speed=realtime or 1.0, on_progress=display.update, force=force, drive=scene.drive,
-                explained=True,
-            )  # fmt: skip
-        end_with(result, json_output=json_output)
-        return
+    # Who looks on from outside lives in real time.
+    pace = realtime or (None if ros is None and foxglove is None else 1.0)
     with RunDisplay() as display:
         if gdb is None:
-            result = run_scenario(
-                wanted, folder, speed=realtime, on_progress=display.update, force=force,
-                coverage=coverage, profile=profile, fail_under=fail_under, explained=True,
-            )  # fmt: skip
+            with driven(wanted, ros=ros, inputs=inputs, foxglove=foxglove) as driver:
+                result = run_scenario(
+                    wanted, folder, speed=pace, on_progress=display.update, force=force, drive=driver,
+                    coverage=coverage, profile=profile, fail_under=fail_under, explained=True,
+                )  # fmt: skip
         else:
             from robot_bench.cli.debugging.gdb import debug_bench
 
@@ -277,20 +261,16 @@ def run(
     end_with(result, json_output=json_output)
 
 
-def refuse_ros_beside(
-    ros: str | None, inputs: Path | None, *, port: str | None, gdb: int | None, coverage: bool
-) -> None:
-    """Refuse what cannot stand beside `--ros` and `--inputs`.
+def refuse_beside(name: str, given: object, **others: object) -> None:
+    """Refuse what cannot stand beside an option that is given: whatever of `others` is not None either.
 
     Raises:
-        UsageError: Something does.
+        UsageError: Something is.
     """
-    name = "--ros" if ros is not None else "--inputs"
-    given = (("--port", port), ("--gdb", gdb), ("--coverage", coverage or None), ("--inputs", inputs))
-    beside = {other: value is not None for other, value in given}
-    for other, is_given in beside.items():
-        if (ros is not None or inputs is not None) and is_given and other != name:
-            raise UsageError(f"{name} cannot stand beside {other}", hint="leave one of the two out")
+    for other, value in others.items():
+        if given is not None and value is not None:
+            what = "several robots" if other == "robots" else f"--{other}"
+            raise UsageError(f"{name} cannot stand beside {what}", hint="leave one of the two out")
 
 
 def tell_viewer(url: str) -> None:
@@ -298,34 +278,32 @@ def tell_viewer(url: str) -> None:
     typer.echo(f"open {url} in Foxglove or Lichtblick", err=True)
 
 
-def refuse_foxglove_beside(foxglove: str | None, **options: object) -> None:
-    """Refuse what cannot stand beside `--foxglove`.
-
-    Raises:
-        UsageError: Something does.
-    """
-    for name, value in options.items():
-        if foxglove is not None and value is not None:
-            what = "several robots" if name == "robots" else f"--{name}"
-            raise UsageError(f"--foxglove cannot stand beside {what}", hint="leave one of the two out")
-
-
 @contextlib.contextmanager
-def driven_by_ros(scenario: Scenario, ros: str | None, inputs: Path | None) -> Iterator[RunBench]:
-    """Yield what runs a bench as a node of ROS, or with what came in from it before.
+def driven(
+    scenario: Scenario, *, ros: str | None, inputs: Path | None, foxglove: str | None
+) -> Iterator[RunBench | None]:
+    """Yield what runs a bench as a node of ROS, with what came in from it before, or before a viewer; None: the run.
 
     Raises:
-        UsageError: The scenario has no pins of the pin-out, or `ros` is no place.
-        MissingDependencyError, TransportError, FileError: As `met` and `with_inputs`.
+        UsageError: The scenario has no pins of the pin-out, or a place is none.
+        MissingDependencyError, TransportError, FileError: As `met`, `with_inputs` and `live_scene`.
     """
+    if foxglove is not None:
+        from robot_bench.live import live_scene
+
+        with live_scene(scenario, foxglove, tell_viewer) as scene:
+            yield scene.drive
+        return
+    if ros is None and inputs is None:
+        yield None
+        return
     from robot_bench.ros.drive import RosPlace, met, refuse_without_pins, with_inputs
 
     refuse_without_pins(scenario)
-    if ros is None:
-        if inputs is not None:
-            yield with_inputs(inputs)
+    if inputs is not None:
+        yield with_inputs(inputs)
         return
-    with met(RosPlace.read(ros)) as driver:
+    with met(RosPlace.read(ros or "")) as driver:
         yield driver
 
 

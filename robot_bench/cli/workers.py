@@ -1,7 +1,6 @@
 """Work on several processes at once: each piece in a process of its own, which is a fork of this one.
 
-A fork has all that this process has loaded and read, so a piece of work begins at once; and what it does to itself (a
-crash of a library too) is seen by nobody else. What comes of a piece is a JSON object.
+What comes of a piece is a JSON object.
 
 A signal ends all of them in good order: each gets SIGINT, and is waited for. A second one, later than three seconds,
 kills what is left. A fork whose parent was killed ends at its next slice.
@@ -13,16 +12,14 @@ import contextlib
 import os
 import signal
 from collections.abc import Callable
-from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import ForkProcess
 
 from robot_bench.events.codec import Json
 from robot_bench.recording.summary import INTERRUPTED
+from robot_bench.running.forks import LOOK_S, begin, how_it_ended, received
 from simbase.errors import P2osError
 
-#: chosen: how long a signal may wait for this process to look, seconds.
-LOOK_S = 0.1
 #: Called in the fork: (number of the piece, look), where `look` is to be called between slices.
 Job = Callable[[int, Callable[[], None]], Json]
 
@@ -56,7 +53,7 @@ def run_in_processes(
         try:
             raise_if_interrupted()
             while waiting and len(running) < at_once and not is_interrupted:
-                running[waiting[-1]] = _begin(job, waiting[-1], raise_if_interrupted)
+                running[waiting[-1]] = begin(_work, job, waiting[-1], os.getpid(), raise_if_interrupted)
                 waiting.pop()
             ready = wait([pipe for _, pipe in running.values()], timeout=LOOK_S)
         except KeyboardInterrupt:
@@ -66,21 +63,12 @@ def run_in_processes(
             continue
         for number in [number for number, (_, pipe) in running.items() if pipe in ready]:
             process, pipe = running.pop(number)
-            on_done(number, _result(process, pipe))
+            found = received(process, pipe)
+            on_done(number, failure(how_it_ended(process)) if found is None else found)
     return not is_interrupted
 
 
-def _begin(job: Job, number: int, raise_if_interrupted: Callable[[], None]) -> tuple[ForkProcess, Connection]:
-    ours, theirs = get_context("fork").Pipe(duplex=False)
-    process = get_context("fork").Process(
-        target=_work, args=(job, number, theirs, os.getpid(), raise_if_interrupted), daemon=True
-    )
-    process.start()
-    theirs.close()
-    return process, ours
-
-
-def _work(job: Job, number: int, pipe: Connection, parent: int, raise_if_interrupted: Callable[[], None]) -> None:
+def _work(pipe: Connection, job: Job, number: int, parent: int, raise_if_interrupted: Callable[[], None]) -> None:
     """Do a piece of work in this fork, and send what came of it."""
 
     def look() -> None:
@@ -104,20 +92,6 @@ def _work(job: Job, number: int, pipe: Connection, parent: int, raise_if_interru
 def failure(why: str) -> Json:
     """Return what comes of a piece that did not come to its end."""
     return {"passed": False, "failures": [why]}
-
-
-def _result(process: ForkProcess, pipe: Connection) -> Json:
-    try:
-        found: Json = pipe.recv()
-    except EOFError:
-        process.join()
-        code = process.exitcode or 0
-        how = f"by {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
-        return failure(f"its process ended {how}")
-    finally:
-        pipe.close()
-    process.join()
-    return found
 
 
 def _send(process: ForkProcess, what: signal.Signals) -> None:

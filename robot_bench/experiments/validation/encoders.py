@@ -11,9 +11,11 @@ from robot_bench.experiments.validation.signals import (
     at,
     encoder_steps,
     motor_pairs,
+    poses_between,
     rim_mm_s,
     wheel_steps,
 )
+from robot_bench.recording.recorder import SAMPLE_NS
 from robot_bench.recording.run_record import RunRecord
 from simbase.timing import NS_PER_S, Nanos
 
@@ -52,8 +54,8 @@ def encoder_figures(record: RunRecord, nominal: Nominal) -> list[Finding]:
 
 
 def _fastest(record: RunRecord, t: Nanos, side: str) -> float:
-    """Return the fastest that a rim was within the time that its code may be old: this pose and the three before."""
-    near = record.poses[max(0, t // 50_000_000 - 4) : t // 50_000_000 + 1]
+    """Return the fastest that a rim was within the time that its code may be old: this pose and the four before."""
+    near = poses_between(record, t - 4 * SAMPLE_NS, t + 1)
     motor = "motor1" if side == "encoder1" else "motor2"
     return max((abs(rim_mm_s(pose, motor)) for pose in near), default=0.0)
 

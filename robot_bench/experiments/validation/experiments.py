@@ -14,7 +14,6 @@ from robot_bench.recording.run_record import RunRecord
 from robot_bench.scenario.goals.judging import Judgement
 from robot_bench.scenario.included_files import Setting
 from robot_bench.scenario.scenario import Scenario, known_scenarios, load_scenario
-from simbase.timing import NS_PER_S
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -155,5 +154,3 @@ EXPERIMENTS: Mapping[str, Experiment] = {one.name: one for one in (
 
 #: The scenario that a robot at a port runs: steps so small that every code is within the cautious limits.
 AT_PORT: tuple[Setting, ...] = (("adapter.step_mm_s", 40.0),)
-#: What a run at a port lasts beyond its program, seconds.
-PORT_SLACK_NS = 2 * NS_PER_S

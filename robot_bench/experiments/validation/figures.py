@@ -7,7 +7,7 @@ Invariant: a figure is met where the difference is within its bound, both ends i
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 from robot_bench.events.codec import Json
 
@@ -87,10 +87,7 @@ def worst(figures: Sequence[Figure]) -> Figure:
         ValueError: There is none.
     """
     found = max(figures, key=lambda figure: (figure.share, abs(figure.difference)))
-    return Figure(
-        group=found.group, what=found.what, expected=found.expected, measured=found.measured,
-        uncertainty=found.uncertainty, unit=found.unit, bound=found.bound, count=len(figures), at=found.at,
-    )  # fmt: skip
+    return replace(found, count=len(figures))
 
 
 def worst_or_missing(figures: Sequence[Figure], group: str, what: str, why: str) -> Finding:

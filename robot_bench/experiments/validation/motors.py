@@ -6,7 +6,7 @@ from itertools import pairwise
 from p2os.protocol.commands import CommandNumber
 from robot_bench.events.kinds import Pose
 from robot_bench.experiments.validation.figures import Bound, Figure, Finding, Missing, worst_or_missing
-from robot_bench.experiments.validation.nominal import JITTER_S, POSE_RESOLUTION_MM_S, POSE_S, Nominal
+from robot_bench.experiments.validation.nominal import BODY_MM_S, JITTER_S, POSE_S, Nominal
 from robot_bench.experiments.validation.signals import Course, at, motor_pairs, poses_between, rim_mm_s, sent
 from robot_bench.recording.run_record import RunRecord
 from simbase.timing import NS_PER_S, Nanos
@@ -161,7 +161,7 @@ def _steady(nominal: Nominal, side: str, code: int, poses: Sequence[Pose], pair:
     measured = sum(rim_mm_s(pose, side) for pose in poses) / len(poses)
     return Figure(
         group="motion", what="steady rim speed", expected=code * nominal.step_mm_s, measured=measured,
-        uncertainty=POSE_RESOLUTION_MM_S, unit="mm/s", bound=nominal.speed_bound,
+        uncertainty=BODY_MM_S, unit="mm/s", bound=nominal.speed_bound,
         at=f"{'left' if side == 'motor1' else 'right'} of {pair}",
     )  # fmt: skip
 

@@ -7,18 +7,17 @@ the bench; what is set otherwise for a trial (`--set`) does not move what is exp
 import math
 from dataclasses import dataclass
 
-from adapter_sim.pinout import load_pinout
+from p2os.protocol.bauds import DEFAULT_BAUD
+from p2os.protocol.line_time import LineTime
 from p2os.protocol.times import CYCLE_NS
-from robot_bench.events.kinds import MICRO
 from robot_bench.experiments.validation.figures import Bound
 from robot_bench.experiments.validation.signals import ENCODER_STEPS
 from robot_bench.recording.recorder import SAMPLE_NS
 from robot_bench.scenario.scenario import Scenario
 from simbase.timing import NS_PER_MS, NS_PER_S
 
-#: Bits of a character on the line: 8N1.
-BITS = 10
-LINE_BAUD = 9600
+#: The line at the speed that robots begin with.
+LINE = LineTime(DEFAULT_BAUD)
 #: A pair of VEL and RVEL: two frames of nine bytes. Source: PROTOCOL.md.
 PAIR_BYTES = 18
 #: A standard packet with two sonar readings, as a Pioneer 2 sends it; each reading more is three bytes.
@@ -70,8 +69,6 @@ class Nominal:
         self.step_mm_s = settings.step_um_per_s / 1000
         self.track_mm = robot.track_mm
         self.encoder_step_mm = math.pi * robot.body.wheel_diameter_m * 1000 / ENCODER_STEPS
-        self.threshold_m = scenario.threshold_m
-        self.steps = 1 << len(load_pinout().value("motor1").wires) - 1
         ramp = scenario.direct.ramp_um_per_s2
         #: Change of a rim's speed a second where both wheels do the same, and where they turn the robot; 0: jumps.
         self.ramp_mm_s2 = (ramp or 0) / 1000 if self.is_direct else float(robot.motion.accel_mm_s2)
@@ -115,7 +112,7 @@ class Nominal:
         adapter = self._adapter
         votes = adapter.sample_count // 2 + 1
         sampled = votes * adapter.sample_period_ns / NS_PER_S
-        line = PAIR_BYTES * BITS / LINE_BAUD
+        line = LINE.time_of(PAIR_BYTES) / NS_PER_S
         spacing = adapter.pair_spacing_ns / NS_PER_S
         return Delay(
             sampled + spacing + line,
@@ -148,7 +145,7 @@ class Nominal:
     @property
     def packet_s(self) -> float:
         """Time of a standard packet on the line, seconds."""
-        return SIP_BYTES * BITS / LINE_BAUD
+        return LINE.time_of(SIP_BYTES) / NS_PER_S
 
     def encoder_bound(self, rim_mm_s: float) -> Bound:
         """How far the code on the pins may be from the wheel's angle, steps; the middle of a code is its angle."""
@@ -166,7 +163,3 @@ class Nominal:
             formula=f"half a step + ({abs(rim_mm_s):.4g} mm/s x {delay * 1000:.4g} ms ({formula}){counts})"
             f" / {self.encoder_step_mm:.4g} mm = {value:.3g} steps",
         )  # fmt: skip
-
-
-#: For the trace's own integers.
-POSE_RESOLUTION_MM_S = 1000 / MICRO

@@ -9,6 +9,7 @@ import math
 from collections.abc import Sequence
 from functools import cache
 from itertools import pairwise
+from operator import attrgetter, itemgetter
 from typing import TypeAlias, TypeVar
 
 from adapter_sim.codec import motor_value
@@ -18,23 +19,22 @@ from p2os.protocol.commands import Command
 from p2os.protocol.frames import Frame
 from robot_bench.events.kinds import MICRO, Pose
 from robot_bench.recording.run_record import RunRecord
-from simbase.timing import NS_PER_MS, Nanos
+from robot_bench.scenario.goals.signals import SKEW_NS
+from robot_bench.wires.edges import Edges, codes
+from simbase.timing import Nanos
 
-#: chosen: wires of one value that change within this change together.
-SKEW_NS: Nanos = 1 * NS_PER_MS
 #: Steps of an encoder in a turn of its wheel.
 ENCODER_STEPS = 8
 _pinout = cache(load_pinout)
+_TIME = itemgetter(0)
 T = TypeVar("T")
 Course: TypeAlias = list[tuple[Nanos, T]]
 
 
 def value_course(record: RunRecord, wires: Sequence[str]) -> Course[int]:
     """Return the unsigned value of some wires, least significant first; empty where they were not recorded."""
-    changes = sorted((t, bit, level) for bit, wire in enumerate(wires) for t, level in record.pins.get(wire, ()))
-    code, course = 0, Course[int]()
-    for t, bit, level in changes:
-        code = code & ~(1 << bit) | int(level) << bit
+    course = Course[int]()
+    for t, code in codes([record.pins.get(wire, Edges()) for wire in wires]):
         if course and t - course[-1][0] < SKEW_NS:
             course[-1] = course[-1][0], code
         elif not course or course[-1][1] != code:
@@ -60,7 +60,7 @@ def encoder_steps(record: RunRecord, side: str, start: Nanos) -> Course[int]:
         start: Before it the pins show what they idle at.
     """
     course = value_course(record, _pinout().value(side).wires)
-    begin = max(0, bisect.bisect_right([t for t, _ in course], start) - 1)
+    begin = max(0, bisect.bisect_right(course, start, key=_TIME) - 1)
     steps = [(start, course[begin][1])] if course else []
     for (_, before), (t, code) in pairwise(course[begin:]):
         change = (code - before + ENCODER_STEPS // 2) % ENCODER_STEPS - ENCODER_STEPS // 2
@@ -104,14 +104,14 @@ def sent(record: RunRecord, number: int) -> Course[int]:
 
 def at(course: Course[T], t: Nanos) -> T | None:
     """Return a course's value at a time; None before its beginning."""
-    place = bisect.bisect_right([begin for begin, _ in course], t)
+    place = bisect.bisect_right(course, t, key=_TIME)
     return course[place - 1][1] if place else None
 
 
 def poses_between(record: RunRecord, begin: Nanos, end: Nanos) -> list[Pose]:
     """Return the poses in a span of time, its end left out."""
-    times = [pose.t for pose in record.poses]
-    return record.poses[bisect.bisect_left(times, begin) : bisect.bisect_left(times, end)]
+    first, last = (bisect.bisect_left(record.poses, t, key=attrgetter("t")) for t in (begin, end))
+    return record.poses[first:last]
 
 
 def wheel_steps(pose: Pose, side: str) -> float:
