@@ -24,7 +24,7 @@ from robot_bench.campaign.journal import Journal
 from robot_bench.campaign.margin import margin
 from robot_bench.campaign.search import SEARCHES, Answer, Problem
 from robot_bench.campaign.space import Proposal, Space
-from robot_bench.campaign.trial import Outcome, Trial, Verdict
+from robot_bench.campaign.trial import Done, Outcome, Trial, Verdict
 from simbase.timing import NS_PER_S, Nanos
 
 NS_PER_HOUR = 3600 * NS_PER_S
@@ -122,7 +122,7 @@ class Row:
 class Workers(Protocol):
     """Who carries trials out: `Processes`, `DaskWorkers`."""
 
-    def run(self, trials: Sequence[Trial], on_done: Callable[[int, tuple[Outcome, float]], None]) -> None:
+    def run(self, trials: Sequence[Trial], on_done: Callable[[int, Done], None]) -> None:
         """Run all; call `on_done` with the place of each and what came of it, in any order."""
         ...
 
@@ -261,7 +261,7 @@ class Conduct:
         missing = list(places.values())
         self.progress.resumed += len(set(keys)) - len(missing)
 
-        def on_done(number: int, done: tuple[Outcome, float]) -> None:
+        def on_done(number: int, done: Done) -> None:
             self._journal.add(keys[missing[number]], *done)
             self._count(stage, *done)
 
@@ -270,7 +270,7 @@ class Conduct:
         self._workers.run([trials[place] for place in missing], on_done)
         return [Run(stage, trial, *self._kept(key)) for trial, key in zip(trials, keys, strict=True)]
 
-    def _kept(self, key: str) -> tuple[Outcome, float]:
+    def _kept(self, key: str) -> Done:
         found = self._journal.get(key)
         if found is None:
             raise RuntimeError(f"the workers have left out {key}")

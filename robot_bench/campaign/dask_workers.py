@@ -17,20 +17,15 @@ from typing import Any
 
 from p2os.errors import RunFailedError
 from robot_bench.campaign.campaign_file import Limits
-from robot_bench.campaign.trial import Outcome, Trial, Verdict, run_trial
+from robot_bench.campaign.processes import MB, MOST_TRIES
+from robot_bench.campaign.trial import Done, Outcome, Trial, Verdict, run_trial
+from robot_bench.running.forks import LOOK_S
 from simbase.errors import MissingDependencyError, UsageError
 
-#: chosen: how often futures are looked at, seconds.
-LOOK_S = 0.1
 #: chosen: so long a scheduler may be away, and workers may be missing, seconds.
 PATIENCE_S = 120.0
 #: chosen: so long one waits for a scheduler at first, seconds.
 BEGIN_S = 10.0
-#: chosen: so often a trial is submitted whose workers die one after the other.
-MOST_TRIES = 4
-_MB = 1 << 20
-
-Done = tuple[Outcome, float]
 
 
 class DaskWorkers:
@@ -60,7 +55,7 @@ class DaskWorkers:
             make: Any = distributed.LocalCluster
             self._cluster = make(
                 n_workers=count, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0",
-                memory_limit=limits.memory_mb * _MB, host="127.0.0.1",
+                memory_limit=limits.memory_mb * MB, host="127.0.0.1",
             )  # fmt: skip
         self._address = address or self._cluster.scheduler_address
         self._client = self._connected(patience_s=BEGIN_S)

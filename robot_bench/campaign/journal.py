@@ -15,7 +15,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import IO, cast
 
-from robot_bench.campaign.trial import GoalResult, Hit, Outcome, Verdict
+from robot_bench.campaign.trial import Done, GoalResult, Hit, Outcome, Verdict
 from simbase.errors import FileError
 
 NAME = "journal.jsonl"
@@ -33,7 +33,7 @@ class Journal:
 
     def __init__(self, folder: Path) -> None:
         self._path = folder / NAME
-        self._done: dict[str, tuple[Outcome, float]] = {}
+        self._done: dict[str, Done] = {}
         try:
             self._file: IO[str] = self._path.open("a+", encoding="ascii", newline="\n")
             self._file.seek(0)
@@ -53,7 +53,7 @@ class Journal:
     def __len__(self) -> int:
         return len(self._done)
 
-    def get(self, key: str) -> tuple[Outcome, float] | None:
+    def get(self, key: str) -> Done | None:
         """Return what came of a run, and the seconds of a processor that it took; None where it is not done."""
         return self._done.get(key)
 

@@ -22,17 +22,14 @@ from pathlib import Path
 
 from p2os.errors import RunFailedError
 from robot_bench.campaign.campaign_file import Limits
-from robot_bench.campaign.trial import Outcome, Trial, Verdict, run_trial, warm_up
+from robot_bench.campaign.trial import Done, Outcome, Trial, Verdict, run_trial, warm_up
 from robot_bench.running.forks import LOOK_S, begin, how_it_ended, received
 
-#: chosen: so often a trial is begun whose process is killed from outside.
+#: chosen: so often a trial is begun whose process or worker is killed from outside.
 MOST_TRIES = 4
 #: Between the soft and the hard limit of the processor's time, seconds.
 _GRACE_S = 5
-_MB = 1 << 20
-
-#: What came of a trial, with the seconds of a processor that it took.
-Done = tuple[Outcome, float]
+MB = 1 << 20
 
 
 class Processes:
@@ -93,7 +90,7 @@ def _work(pipe: Connection, trial: Trial, limits: Limits, parent: int, folder: P
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     seconds = max(round(limits.cpu_s), 1)
     resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + _GRACE_S))
-    most = _mapped_bytes() + limits.memory_mb * _MB
+    most = _mapped_bytes() + limits.memory_mb * MB
     resource.setrlimit(resource.RLIMIT_AS, (most, most))
 
     def look() -> None:

@@ -205,6 +205,10 @@ class Outcome:
         return tuple(goal for goal in self.goals if goal.met is False)
 
 
+#: What came of a trial, with the seconds of a processor that it took.
+Done = tuple[Outcome, float]
+
+
 def trial_of(name_or_path: str, *, firmware: Path | None = None, settings: Sequence[Setting] = ()) -> Trial:
     """Return the trial of a scenario that ships or of a file, with all files that it names.
 
@@ -215,9 +219,9 @@ def trial_of(name_or_path: str, *, firmware: Path | None = None, settings: Seque
 
     Raises:
         ScenarioError: There is no such scenario, or it breaks the schema.
-        UsageError: A setting names what is not there.
+        UsageError: A setting names what is not there, or there is no such firmware.
     """
-    scenario = load_scenario(name_or_path, firmware=firmware, settings=settings)
+    scenario = load_scenario(name_or_path, firmware=firmware, settings=settings).with_options(firmware=firmware)
     path = shipped_file(name_or_path) if name_or_path in known_scenarios() else Path(name_or_path)
     table = deepcopy(dict(read_tables(path, settings).table))
     for key in ("seeds", "sweep"):

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from robot_bench.campaign.conduct import Workers
 from robot_bench.campaign.margin import margin
-from robot_bench.campaign.trial import GoalResult, Outcome, Trial, Verdict, bench_of, unpacked
+from robot_bench.campaign.trial import Done, GoalResult, Outcome, Trial, Verdict, bench_of, unpacked
 from robot_bench.events.codec import events_of
 from robot_bench.events.kinds import Event
 from robot_bench.recording.divergence import Difference, differences
@@ -27,7 +27,6 @@ FOLDER = "against"
 MOST_APART = 0.25
 #: The kind of the one goal that such a campaign judges.
 KIND = "against"
-Done = tuple[Outcome, float]
 
 
 @dataclass(frozen=True, slots=True)

@@ -133,3 +133,8 @@ def test_what_sram_holds_at_power_on_is_the_seeds_and_a_program_that_sets_its_va
     assert held[0] == held[1] != held[2]
     assert set(bench_of(trial.scenario(tmp_path)).chip.chip.memory.sram.raw) == {0}  # type: ignore[attr-defined]  # as above
     assert run_trial(trial.set(("sram", "random"))).sha256 == outcome.sha256
+
+
+def test_a_firmware_that_is_not_there_is_refused_in_a_line() -> None:
+    with pytest.raises(UsageError, match=r"there is no firmware file nowhere\.elf"):
+        trial_of("motors", firmware=Path("nowhere.elf"))
