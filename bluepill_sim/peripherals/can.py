@@ -360,6 +360,7 @@ class Can(Peripheral):
             self._count_errors(0)
             self._want()
         self.network.advance_to(now_ns)
+        self._show(now_ns)  # a frame that has begun meanwhile
         for mailbox in self._lost:
             self._complete(mailbox, ALST)
         self._lost = ()
@@ -395,6 +396,8 @@ class Can(Peripheral):
         self._clear()
         self._route_changed()
         self._update()
+        if self._joined is not None:
+            self.plan()  # the others go on
 
     def _restored(self) -> None:
         self._find_pins()

@@ -231,3 +231,34 @@ def test_what_a_frame_does_is_the_same_whether_or_not_somebody_looks(make_fake_c
         found.append(state)
     assert found[0] == found[1]
     assert found[0][0] & TXOK
+
+
+def test_a_chip_that_is_reset_goes_on_with_the_frames_of_others(fake_chip: Any) -> None:
+    node, other = CanNode(), CanNode()
+    network(fake_chip, node, other)
+    set_up(fake_chip)
+    rx, start_ns, frame = Line(fake_chip, RX), fake_chip.now_ns, CanFrame(identifier=0x2A5, data=b"\x0f")
+    node.send(frame, start_ns + 7 * BIT_NS)
+    fake_chip.parts.by_name["CAN"].reset()
+    end_ns = start_ns + 7 * BIT_NS + span_ns(frame)
+    fake_chip.advance(end_ns + BIT_NS)
+    assert [one for _, one in other.received] == [frame]
+    assert [level for _, level in rx.edges][::2] == [0] * (len(rx.edges) // 2)
+    assert rx.edges[0] == (start_ns + 7 * BIT_NS, 0)
+
+
+@QUICK
+@given(st.integers(0, 400))
+def test_a_chip_that_comes_late_is_never_due_when_it_has_just_acted(make_fake_chip: Any, late_bits: int) -> None:
+    chip = make_fake_chip()
+    node = CanNode(is_silent=True)
+    network(chip, node)
+    set_up(chip, SILENT)
+    Line(chip, RX)
+    can = chip.parts.by_name["CAN"]
+    node.send(CanFrame(identifier=0x101, data=b"\x01"), chip.now_ns)  # again and again, as nobody acknowledges
+    can.due_ns = None
+    chip.advance(chip.now_ns + late_bits * BIT_NS + 1)
+    can.advance_to(chip.now_ns)
+    assert can.due_ns is not None
+    assert can.due_ns > chip.now_ns
