@@ -34,7 +34,7 @@ from bluepill_sim.fabric.power import LEAST_SUPPLY_MV, MOST_SUPPLY_MV, Power
 from bluepill_sim.fabric.registers import WORD, Peripheral
 from bluepill_sim.memory import Memory
 from bluepill_sim.native.processor import make_core
-from bluepill_sim.native.registers import join_fabric, share_registers
+from bluepill_sim.native.registers import share_registers
 from bluepill_sim.peripherals.flash import OPTION_BYTES
 from bluepill_sim.peripherals.rcc import Rcc, ResetCause
 from bluepill_sim.stm32f103 import (
@@ -135,7 +135,7 @@ class Chip(Stateful):
         self.processor.on_entry = self._act_on_due
         self.pins = make_pins(self)
         self.fabric = self.pins.fabric
-        self.uses_native_core = join_fabric(self.engine, self.fabric)
+        self.uses_native_core = self.engine.join(self.fabric.handle)
         self._is_made = True
         self._time_changed()
         self.parts = make_parts(self)
