@@ -203,11 +203,11 @@ class Bench(Stateful):
             chip, followers, observers=(self.recorder,), slice_ns=slice_ns or FIRST_SLICE_NS,
             on_slice=self._after_slice, choose_watched=self._watch_wires,
         )  # fmt: skip
-        #: When a goal's verdict ended the run; None while none has.
+        #: When a goal's verdict or a `[[when]]` ends the run; None while none does.
         self._ends_at: Nanos | None = None
         self._has_told_death = False
         self.whens = WhenScript(
-            scenario.whens, on_end=self._end_now,
+            scenario.whens, on_end=self._end_at,
             on_change=lambda changes: self.script.add(*changes), on_fault=lambda faults: self.faults.add(*faults),
             on_deed=lambda deeds: self.hands.add(*deeds),
         )  # fmt: skip
@@ -812,9 +812,12 @@ class Bench(Stateful):
 
     def _end_now(self) -> None:
         """End the run where the loop stands: a goal is decided."""
-        if self._ends_at is None:
-            self._ends_at = self.loop.now
-            self.loop.end_at(self.end)
+        self._end_at(self.loop.now)
+
+    def _end_at(self, at: Nanos) -> None:
+        """End the run at a time, if nothing ends it before."""
+        self._ends_at = at if self._ends_at is None else min(at, self._ends_at)
+        self.loop.end_at(self.end)
 
     def _inject(self, words: str, at: Nanos) -> None:
         op, _, fault = words.partition(" ")
