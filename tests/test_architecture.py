@@ -79,7 +79,8 @@ IO_LAYER = (
 
 #: What may log beside the I/O layer: what joins models to lines, and the bench. A model tells its owner by a callback.
 LOGGING = (
-    "p2os.event_log", "p2os.client.line", "robot_bench.bench", "robot_bench.remote", "robot_bench.run",
+    "p2os.event_log", "p2os.client.line", "robot_bench.bench.bench", "robot_bench.bench.board", "robot_bench.remote",
+    "robot_bench.run",
 )  # fmt: skip
 
 #: The map of ARCHITECTURE.md, lowest first: a package imports none of its own row and none above it.

@@ -13,7 +13,8 @@ from p2os.errors import ScenarioError
 from p2os.ros.codec import Message
 from p2os.ros.topics import TOPICS
 from p2os.ros.transport import NodeOptions, Received, Topic
-from robot_bench.bench import Bench, make_harness
+from robot_bench.bench import Bench
+from robot_bench.bench.board import make_harness
 from robot_bench.ros.bench_node import BenchNode
 from robot_bench.ros.drive import RosPlace, refuse_without_pins, run_beside, with_inputs
 from robot_bench.ros.recorded import inputs_of, read_inputs
