@@ -46,7 +46,7 @@ HELP = """Validate the bench by experiments: motors, sensors, encoders.
 
 Each EXPERIMENT has a hypothesis, figures with units, and a bound for each, whose
 formula stands beside it in the report. Without names all are run: motors, codes,
-sensors, sensors-all, only-while-seen, encoders, long-drive, dodge. Each is run pins
+sensors, sensors-all, only-while-seen, encoders, sparse, slip, long-drive, dodge. Each is run pins
 straight to the body, through the adapter's model, and through its firmware, with
 every body that is installed.
 
