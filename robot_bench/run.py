@@ -448,7 +448,8 @@ def run_together(
         first = next(iter(benches.values()))
         first.on_slice = _after_slice(first, pacer, on_progress)
         for name, bench in benches.items():
-            traces[name].meta(meta_of(bench.scenario, bench.parts.world, bench.note, is_at_port=False))
+            meta = meta_of(bench.scenario, bench.parts.world, bench.note, is_at_port=False)
+            traces[name].meta(meta | {"robots": list(benches)})
         driven = _drive(first, pacer, clock, None)
         passed = [_conclude(bench, traces[name], folder / name, pacer, driven) for name, bench in benches.items()]
         if is_kept(all(passed)):

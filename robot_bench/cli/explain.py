@@ -98,17 +98,20 @@ def read_record(path: Path) -> RunRecord:
 
     Raises:
         TraceError: It cannot be read as one.
-        FileError: There is no such file.
+        FileError: There is no such file, or it is no trace.
     """
     if path.name == TRACE_NAME:
         return read_run(path.parent)
     try:
         with path.open(encoding="utf-8", errors="replace") as lines:
-            return record_of(lines, str(path))
+            record = record_of(lines, str(path))
     except OSError as error:
         raise FileError(
             f"cannot read {path}: {error.strerror or error}", hint="give a run folder, or a trace"
         ) from error
+    if not record.meta and not record.last_ns:
+        raise FileError(f"{path} is no trace", hint="give a run folder, or a trace")
+    return record
 
 
 def judged(record: RunRecord, path: Path, scenario: Scenario) -> RunRecord:

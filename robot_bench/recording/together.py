@@ -5,20 +5,23 @@ Invariant: events come in order of time, and at one instant in the order of the 
 
 import heapq
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import cast
 
 from robot_bench.events.kinds import Event
-from robot_bench.recording.run_record import TRACE_NAME, read_events
+from robot_bench.recording.run_record import TRACE_NAME, read_events, read_meta
 from robot_bench.recording.summary import SUMMARY_NAME
 from simbase.timing import Nanos
 
 
 def robots_in(folder: Path) -> list[str]:
-    """Return the robots of a run folder by name, sorted; none where it is the folder of one."""
+    """Return the robots of a run folder by name, in the scenario's order; none where it is not one of several."""
     if (folder / TRACE_NAME).is_file() or not folder.is_dir():
         return []
-    return sorted(one.name for one in folder.iterdir() if (one / TRACE_NAME).is_file())
+    there = sorted(one.name for one in folder.iterdir() if (one / TRACE_NAME).is_file())
+    told = cast("Sequence[str]", read_meta(folder / there[0]).get("robots") or ()) if there else ()
+    return [name for name in told if name in there]
 
 
 def scenario_of(folder: Path) -> str:

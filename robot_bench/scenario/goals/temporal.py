@@ -58,6 +58,8 @@ class OverTime(Watch):
         kinds = [kind, *([WorldChange] if self._thing else []), *self._events.kinds]
         self.kinds, self.wires = tuple(dict.fromkeys(kinds)), self._events.wires
         self._from, self._to = nanos(table, "from_s"), nanos(table, "to_s") if "to_s" in table else None
+        if self._to is not None and self._to < self._from:
+            raise UsageError("to_s lies before from_s: the goal would look at nothing")
         #: Where windows begin, and the best margin in each so far; of `always` the worst.
         self._windows: list[tuple[Nanos, float, Nanos]] = [] if self._after else [(0, self._nothing, 0)]
         self._worst = math.inf
@@ -97,7 +99,7 @@ class OverTime(Watch):
         kept = []
         for begin, best, at in self._windows:
             is_over = self._to is not None and now > begin + self._to
-            if (best < 0 and self._is_always) or (best < 0 and is_over):
+            if (best < 0 and (self._is_always or is_over)) or (is_over and self._was_never_told(best)):
                 self._fail(begin, best, at)
             if is_over:
                 self._worst = min(self._worst, best)
@@ -110,6 +112,10 @@ class OverTime(Watch):
             met = [best for _, best, _ in kept if best >= 0]
             return self.finish(now) if met else None
         return None
+
+    def _was_never_told(self, best: float) -> bool:
+        """Tell whether the thing that a distance is to was nowhere; of other signals no sample is no failure."""
+        return bool(self._thing) and not self._after and not math.isfinite(best)
 
     def _fail(self, begin: Nanos, best: float, at: Nanos) -> None:
         if self._failure:
@@ -127,17 +133,22 @@ class OverTime(Watch):
         robustness = by if math.isfinite(by) else None
         if not self._count:
             return Outcome(met=False, says=f"{self._after!r} did not happen")
-        if not self._failure and not self._is_always:
-            for begin, best, at in self._windows:
-                if best < 0:
-                    self._fail(begin, best, at)
+        for begin, best, at in self._windows:
+            if self._was_never_told(best) or (best < 0 and not self._is_always):
+                self._fail(begin, best, at)
         says = self._failure or (f"by {by:.3g} {self._unit} at the least" if robustness is not None else "")
         return Outcome(met=not self._failure, says=says, robustness=robustness, unit=self._unit)
 
 
 def bounds(table: Table) -> Margin:
-    """Return the margin to `least` and `most`."""
+    """Return the margin to `least` and `most`.
+
+    Raises:
+        UsageError: Any value would do, or none.
+    """
     least, most = number(table, "least", -math.inf), number(table, "most", math.inf)
+    if least > most or not (math.isfinite(least) or math.isfinite(most)):
+        raise UsageError("least is above most" if least > most else "neither least nor most: any value would do")
     return lambda value: min(value - least, most - value)
 
 

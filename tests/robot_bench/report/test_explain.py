@@ -24,7 +24,7 @@ from robot_bench.report.explain.scene import Scene
 from robot_bench.run import run_scenario
 from robot_bench.scenario.scenario import load_scenario
 from robot_bench.wires.edges import Edges
-from simbase.errors import UsageError
+from simbase.errors import FileError, UsageError
 from simbase.timing import NS_PER_S
 from tests.robot_bench.report.seeded_bugs import LONGER, NAMED, OTHERS, UNFAIR, Bug, build, scenario_text
 
@@ -158,6 +158,12 @@ def test_a_trace_that_the_chip_does_not_follow_is_not_trusted(unfair: Path) -> N
     late.times[1] += 1  # one nanosecond
     found = explain(record, DODGE)
     assert any("parts from the run" in limit for limit in found.limits)
+
+
+def test_a_file_that_is_no_trace_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text("duration_s = 1\n")
+    with pytest.raises(FileError, match=r"mine\.toml is no trace"):
+        verb.read_record(tmp_path / "mine.toml")
 
 
 def test_the_verb_prints_one_json_object_and_says_by_its_exit_code_that_the_cause_is_not_known(unfair: Path) -> None:

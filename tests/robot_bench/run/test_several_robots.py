@@ -12,7 +12,7 @@ from p2os.errors import ScenarioError
 from robot_bench import Bench, Scenario
 from robot_bench.events.kinds import Pose, Ranges, Text, WorldChange
 from robot_bench.recording.run_record import read_events
-from robot_bench.recording.together import named_events
+from robot_bench.recording.together import named_events, robots_in
 from robot_bench.scenario.scenario import read_scenario
 from simbase.errors import UsageError
 from tests.robot_bench.firmware import thumb
@@ -293,6 +293,8 @@ def test_the_events_of_all_are_one_stream_in_order_of_time_each_with_its_robot(
     assert "a scene is of one robot" in capsys.readouterr().err
     assert p2os(["run", "several.toml", "--out", "other", "--set", "robot.b.y_m=0.2"]) == 0
     assert p2os(["diff", "one", "one"]) == 0
+    assert robots_in(Path("one")) == ["a", "b"]
+    assert robots_in(Path()) == [], "a folder of runs is no run of several robots"
     capsys.readouterr()
     assert p2os(["diff", "one", "other"]) == 1
     assert "; a: worldchange differs first" in capsys.readouterr().out  # where b stands, as a has it
@@ -304,6 +306,9 @@ def test_a_goal_may_bound_how_far_another_robot_is(tmp_path: Path) -> None:
     bench.run_until("0.3 s")
     found = bench.judge()
     assert found.met == ["a: has always apart_m from b at least 1.5"]
+    nobody = Bench.from_scenario(two(tmp_path, duration=0.1, more=far.format(1.5).replace('"b"', '"c"')))
+    nobody.run_until("0.1 s")
+    assert nobody.judge().missed == ["a: always: apart_m was never told"]
     assert found.missed == ["a: always: apart_m was out of bounds by 0.157 m at 0.000 s"]
 
 
