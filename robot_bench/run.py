@@ -37,7 +37,8 @@ from robot_bench.recording.run_record import TRACE_NAME, read_run
 from robot_bench.recording.summary import INTERRUPTED, end_of_a_broken_run, outcome_of, outcome_of_all
 from robot_bench.recording.trace import TraceWriter
 from robot_bench.remote import RemoteBench
-from robot_bench.report.make import REPORT_NAME, Artefacts, make_artefacts, write_report_of_all
+from robot_bench.report.make import Artefacts, make_artefacts, make_artefacts_of_all
+from robot_bench.report.page_of_all import REPORT_NAME
 from robot_bench.running.pacer import PACED_SLICE_NS, RealTimePacer
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.wires.ports import Chip
@@ -447,19 +448,17 @@ def run_together(
         first = next(iter(benches.values()))
         first.on_slice = _after_slice(first, pacer, on_progress)
         for name, bench in benches.items():
-            traces[name].meta(meta_of(bench.scenario, bench.parts.world, bench.note, is_at_port=False))
+            meta = meta_of(bench.scenario, bench.parts.world, bench.note, is_at_port=False)
+            traces[name].meta(meta | {"robots": list(benches)})
         driven = _drive(first, pacer, clock, None)
         passed = [_conclude(bench, traces[name], folder / name, pacer, driven) for name, bench in benches.items()]
-        made = {
-            name: make_artefacts(folder / name) if is_kept(all(passed)) else _removed(folder / name) for name in benches
-        }
-    outcome = outcome_of_all(scenario.name, {name: one.outcome for name, one in made.items()})
-    report = folder / REPORT_NAME
-    if is_kept(all(passed)):
-        write_report_of_all(outcome, folder)
-    else:
-        remove_run(folder)
-    return RunResult(folder=folder, outcome=outcome, report=report, was_interrupted=driven.was_interrupted)
+        if is_kept(all(passed)):
+            made = make_artefacts_of_all(folder, list(benches), scenario.name)
+        else:
+            outcomes = {name: _removed(folder / name).outcome for name in benches}
+            made = Artefacts(outcome=outcome_of_all(scenario.name, outcomes), report=folder / REPORT_NAME)
+            remove_run(folder)
+    return RunResult(folder=folder, outcome=made.outcome, report=made.report, was_interrupted=driven.was_interrupted)
 
 
 def _removed(folder: Path) -> Artefacts:

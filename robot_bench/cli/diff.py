@@ -1,5 +1,6 @@
 """`p2os diff`: where two runs of one scenario part, by signal."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -9,12 +10,13 @@ from p2os.cli.help_pages import BENCH
 from robot_bench.events.kinds import Event
 from robot_bench.events.words import last_words, what_of
 from robot_bench.recording.divergence import differences
-from robot_bench.recording.run_record import read_events
+from robot_bench.recording.together import named_events
 from simbase.timing import NS_PER_S
 
 #: chosen: so many signals are listed, the first that part.
 MOST_SIGNALS = 8
-HELP = """Tell where two runs part: the first difference of each signal.
+HELP = """Tell where two runs part: the first difference of each signal; of several robots
+each with the robot's name.
 
 Exit code: 0 they are alike, 1 they differ.
 
@@ -34,14 +36,19 @@ def diff(
     other: Annotated[Path, typer.Argument(help="Another one.", metavar="RUN")],
 ) -> None:
     """Compare two runs."""
-    ours, theirs = list(read_events(one)), list(read_events(other))
-    found = differences(ours, theirs)
+    ours, theirs = list(named_events(one)), list(named_events(other))
+    found = sorted(
+        (replace(part, signal=f"{robot}: {part.signal}") if robot else part
+         for robot in {robot: None for robot, _ in (*ours, *theirs)}
+         for part in differences(*([event for name, event in run if name == robot] for run in (ours, theirs)))),
+        key=lambda part: (part.at, part.signal),
+    )  # fmt: skip
     if not found:
         typer.echo(f"alike: {len(ours)} events")
         return
     first = found[0]
     typer.echo(f"alike until {first.at / NS_PER_S:.6f} s; {first.signal} differs first")
-    for line in last_words((event for event in ours if event.t < first.at), 4):
+    for line in last_words((event for _, event in ours if event.t < first.at), 4):
         typer.echo(f"   {line}")
     for difference in found[:MOST_SIGNALS]:
         typer.echo(f"{difference.signal}:")

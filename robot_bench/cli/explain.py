@@ -12,6 +12,8 @@ import typer
 from p2os.cli.help_pages import BENCH
 from robot_bench.events.codec import events_of
 from robot_bench.recording.run_record import TRACE_NAME, RunRecord, read_run, record_of
+from robot_bench.recording.together import robots_in
+from robot_bench.report.explain.chain import Explanation, Standing
 from robot_bench.report.explain.explain import explain as explain_run
 from robot_bench.scenario.goals.judging import judge
 from robot_bench.scenario.scenario import Scenario, load_scenario
@@ -23,7 +25,7 @@ The chip is run again with the levels that its pins had, and once more with one 
 them changed: so each step is recorded or shown. Where nothing shows the cause it
 says so.
 
-RUN is a run folder or its trace. A trace without a verdict is judged by SCENARIO's
+RUN is a run folder or its trace; of several robots each is explained. A trace without a verdict is judged by SCENARIO's
 goals; GOAL is a part of the failure's text, where there are several.
 
 Exit code: 0 explained, or nothing failed; 1 the cause is not known; 2 wrong usage.
@@ -53,18 +55,42 @@ def explain(
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Explain a run."""
-    path = run / TRACE_NAME if run.is_dir() else run
-    record = read_record(path)
+    names = robots_in(run)
+    if names and (firmware is not None or against is not None):
+        option = "--firmware" if firmware is not None else "--against"
+        raise UsageError(f"{option} is for one robot", hint=f"p2os explain {run / names[0]} {option} FILE")
     plan = None if scenario is None else load_scenario(scenario, firmware=firmware)
-    if plan is not None:
-        record = judged(record, path, plan)
-    program = firmware or program_of(record, plan)
     if firmware is not None and not firmware.is_file():
         raise UsageError(f"there is no firmware file {firmware}", hint="give the ELF, HEX or BIN file that ran")
-    found = explain_run(record, program, failure=goal, reference=None if against is None else _reference(against))
-    typer.echo(json.dumps(found.to_plain(), sort_keys=True) if json_output else found.text(), nl=json_output)
-    if found.standing.value == "unknown":
+    reference = None if against is None else _reference(against)
+    found = {
+        name: _explained(run / name if name else run, _plan_of(plan, name), goal, firmware, reference)
+        for name in names or [""]
+    }
+    if json_output:
+        plain = {name: one.to_plain() for name, one in found.items()}
+        typer.echo(json.dumps({"robots": plain} if names else plain[""], sort_keys=True))
+    else:
+        typer.echo("\n".join((f"{name}\n" if name else "") + one.text() for name, one in found.items()), nl=False)
+    if any(one.standing is Standing.UNKNOWN for one in found.values()):
         raise typer.Exit(1)
+
+
+def _plan_of(plan: Scenario | None, robot: str) -> Scenario | None:
+    """Return the scenario of one of several robots, as its file has it."""
+    if plan is None or not robot:
+        return plan
+    return next((own for own in plan.programmed if own.name == robot), plan)
+
+
+def _explained(
+    run: Path, plan: Scenario | None, goal: str, firmware: Path | None, reference: Path | None
+) -> Explanation:
+    path = run / TRACE_NAME if run.is_dir() else run
+    record = read_record(path)
+    if plan is not None:
+        record = judged(record, path, plan)
+    return explain_run(record, firmware or program_of(record, plan), failure=goal, reference=reference)
 
 
 def read_record(path: Path) -> RunRecord:
@@ -72,17 +98,20 @@ def read_record(path: Path) -> RunRecord:
 
     Raises:
         TraceError: It cannot be read as one.
-        FileError: There is no such file.
+        FileError: There is no such file, or it is no trace.
     """
     if path.name == TRACE_NAME:
         return read_run(path.parent)
     try:
         with path.open(encoding="utf-8", errors="replace") as lines:
-            return record_of(lines, str(path))
+            record = record_of(lines, str(path))
     except OSError as error:
         raise FileError(
             f"cannot read {path}: {error.strerror or error}", hint="give a run folder, or a trace"
         ) from error
+    if not record.meta and not record.last_ns:
+        raise FileError(f"{path} is no trace", hint="give a run folder, or a trace")
+    return record
 
 
 def judged(record: RunRecord, path: Path, scenario: Scenario) -> RunRecord:

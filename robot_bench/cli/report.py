@@ -8,9 +8,10 @@ import typer
 
 from p2os.cli.help_pages import BENCH
 from p2os.ros.bags import STORAGES
-from robot_bench.recording.event_files import write_events
+from robot_bench.recording.event_files import write_named_events
 from robot_bench.recording.run_record import read_events, read_meta
-from robot_bench.report.make import make_artefacts
+from robot_bench.recording.together import named_events, robots_in, scenario_of
+from robot_bench.report.make import make_artefacts, make_artefacts_of_all
 from robot_bench.ros.run_bag import write_bag
 from simbase.errors import UsageError
 
@@ -19,6 +20,8 @@ HELP = """Make the report of a run anew, and all else in its folder.
 All of it is made from trace.jsonl. With --events what happened is written into a
 file instead: an event a line (.jsonl) or row (.parquet), or a scene with
 plots for Foxglove and Lichtblick (.mcap); with --ros2 as a rosbag2, in a folder.
+
+Of several robots it is the report of all, and their events in one order.
 
 A run that was killed has its trace up to the last virtual second: this makes
 the rest.
@@ -49,17 +52,20 @@ def report(
     ] = "",
 ) -> None:
     """Make a run's report."""
+    names = robots_in(folder)
     if ros2:
         if events is None:
             raise UsageError("--ros2 goes with --events FOLDER", hint="--events bag --ros2 mcap")
+        if names:
+            raise UsageError(f"{folder} is of several robots; a bag is of one", hint=f"p2os report {folder / names[0]}")
         count = write_bag(read_events(folder), events, read_meta(folder), ros2)
         typer.echo(f"{events}: {count} messages")
         return
     if events is not None:
-        count = write_events(read_events(folder), events, read_meta(folder))
+        count = write_named_events(named_events(folder), events, None if names else read_meta(folder))
         typer.echo(f"{events}: {count} events")
         return
-    made = make_artefacts(folder)
+    made = make_artefacts_of_all(folder, names, scenario_of(folder)) if names else make_artefacts(folder)
     if json_output:
         typer.echo(json.dumps(made.outcome, sort_keys=True))
         return

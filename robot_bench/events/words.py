@@ -72,6 +72,11 @@ _WORDS: Mapping[type, Callable[[Any], str]] = {
 _FREQUENT = (PinEdge, Packet, Pose, Clearance, Ranges, SpiTransfer, I2cTransfer, CanTransfer)
 
 
+def is_frequent(event: Event) -> bool:
+    """Tell whether there is so much of an event's kind that it would hide the rest."""
+    return isinstance(event, _FREQUENT)
+
+
 def words_of(event: Event) -> str:
     """Return an event with its time in one line."""
     return f"{event.t / NS_PER_S:10.6f} s  {what_of(event)}"
@@ -84,4 +89,4 @@ def what_of(event: Event) -> str:
 
 def last_words(events: Iterable[Event], count: int = 8) -> list[str]:
     """Return the last events in words, those aside that come again and again."""
-    return [words_of(event) for event in events if not isinstance(event, _FREQUENT)][-count:]
+    return [words_of(event) for event in events if not is_frequent(event)][-count:]

@@ -1,7 +1,8 @@
 """The events of a run as files for other programs: JSON lines, a Parquet table, or MCAP (extra `export`).
 
-A line of JSON is an object with `kind` and the fields of its event; bytes are hex. The table has a row an event, and
-a column for each field of any kind, null where a kind has it not. The MCAP holds the messages of `scene_messages`.
+A line of JSON is an object with `kind` and the fields of its event, and of several robots with `robot`; bytes are
+hex. The table has a row an event, and a column for each field of any kind, null where a kind has it not. The MCAP
+holds the messages of `scene_messages`, of one robot.
 
 Invariant: the events are those of `robot_bench.events.codec.events_of`, in their order.
 """
@@ -36,6 +37,15 @@ def write_events(events: Iterable[Event], path: Path, meta: Json | None = None) 
         MissingDependencyError: pyarrow is not installed.
         FileError: It cannot be written.
     """
+    return write_named_events((("", event) for event in events), path, meta)
+
+
+def write_named_events(events: Iterable[tuple[str, Event]], path: Path, meta: Json | None = None) -> int:
+    """Write events as `write_events` does, each with the robot that tells it; "" where there is one alone.
+
+    Raises:
+        UsageError, MissingDependencyError, FileError: As of `write_events`; a scene of several robots.
+    """
     write = WRITERS.get(path.suffix)
     if write is None:
         raise UsageError(f"cannot write events as {path.suffix or path.name}", hint=" or ".join(WRITERS))
@@ -45,24 +55,25 @@ def write_events(events: Iterable[Event], path: Path, meta: Json | None = None) 
         raise FileError(f"cannot write {path}: {error.strerror or error}") from error
 
 
-def _plain(event: Event) -> dict[str, object]:
-    values: dict[str, object] = {"kind": type(event).__name__}
+def _plain(robot: str, event: Event) -> dict[str, object]:
+    values: dict[str, object] = {"robot": robot} if robot else {}
+    values["kind"] = type(event).__name__
     for field in dataclasses.fields(event):
         value = getattr(event, field.name)
         values[field.name] = value.hex() if isinstance(value, bytes) else value
     return values
 
 
-def _write_json(events: Iterable[Event], path: Path, _meta: Json) -> int:
+def _write_json(events: Iterable[tuple[str, Event]], path: Path, _meta: Json) -> int:
     count = 0
     with path.open("w", encoding="utf-8", newline="\n") as file:
-        for event in events:
-            file.write(json.dumps(_plain(event), separators=(",", ":")) + "\n")
+        for robot, event in events:
+            file.write(json.dumps(_plain(robot, event), separators=(",", ":")) + "\n")
             count += 1
     return count
 
 
-def _write_parquet(events: Iterable[Event], path: Path, _meta: Json) -> int:
+def _write_parquet(events: Iterable[tuple[str, Event]], path: Path, _meta: Json) -> int:
     try:
         import pyarrow as pa
         from pyarrow import parquet
@@ -73,23 +84,25 @@ def _write_parquet(events: Iterable[Event], path: Path, _meta: Json) -> int:
         "Nanos": pa.int64(), "tuple": pa.list_(pa.int64()), "Mapping": pa.string(),
     }  # fmt: skip
     named = {field.name: field.type for kind in KINDS for field in dataclasses.fields(kind)}
-    columns = {"kind": pa.string()} | {name: _type(types, hint) for name, hint in named.items()}
+    columns = {"robot": pa.string(), "kind": pa.string()} | {name: _type(types, hint) for name, hint in named.items()}
     schema, count = pa.schema(list(columns.items())), 0
     with path.open("wb") as file, parquet.ParquetWriter(file, schema) as writer:
         every = iter(events)
         while group := list(islice(every, GROUP)):
-            rows = [_row(event) for event in group]
+            rows = [_row(robot, event) for robot, event in group]
             writer.write_table(pa.Table.from_pylist(rows, schema=schema))
             count += len(rows)
     return count
 
 
-def _write_mcap(events: Iterable[Event], path: Path, meta: Json) -> int:
+def _write_mcap(events: Iterable[tuple[str, Event]], path: Path, meta: Json) -> int:
     messages, count = SceneMessages(meta), 0
     with McapFile(path, instead="write .jsonl") as file:
         for message in messages.anew(0):
             file.write(message.topic, message.schema, message.data, message.t)
-        for event in events:
+        for robot, event in events:
+            if robot:
+                raise UsageError("a scene is of one robot", hint=f"p2os report FOLDER/{robot} --events {path.name}")
             count += 1
             for message in messages.of(event):
                 file.write(message.topic, message.schema, message.data, message.t)
@@ -101,8 +114,8 @@ def _type(types: Mapping[str, Any], hint: Any) -> Any:
     return types[name.partition("[")[0].partition(" |")[0]]
 
 
-def _row(event: Event) -> dict[str, object]:
-    row: dict[str, object] = {"kind": type(event).__name__}
+def _row(robot: str, event: Event) -> dict[str, object]:
+    row: dict[str, object] = {"robot": robot or None, "kind": type(event).__name__}
     for field in dataclasses.fields(event):
         value = getattr(event, field.name)
         row[field.name] = json.dumps(value, sort_keys=True) if isinstance(value, Mapping) else value
@@ -110,6 +123,6 @@ def _row(event: Event) -> dict[str, object]:
 
 
 #: Suffix → what writes it.
-WRITERS: Mapping[str, Callable[[Iterable[Event], Path, Json], int]] = {
+WRITERS: Mapping[str, Callable[[Iterable[tuple[str, Event]], Path, Json], int]] = {
     ".jsonl": _write_json, ".parquet": _write_parquet, ".mcap": _write_mcap,
 }  # fmt: skip

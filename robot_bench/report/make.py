@@ -15,20 +15,17 @@ Invariant: nothing but the trace is read; what is there already is written anew.
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
 from pathlib import Path
-from typing import cast
 
 from robot_bench.events.codec import Json
 from robot_bench.recording.run_record import RunRecord, read_run
-from robot_bench.recording.summary import SUMMARY_NAME, verdict_of, write_outcome
+from robot_bench.recording.summary import outcome_of_all, write_outcome
 from robot_bench.recording.waveforms import write_sigrok, write_vcd
 from robot_bench.report.page import page_data, render_page
+from robot_bench.report.page_of_all import REPORT_NAME, write_report_of_all
 from simbase.errors import FileError
-
-REPORT_NAME = "report.html"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,53 +87,15 @@ def make_artefacts(folder: Path) -> Artefacts:
     return Artefacts(outcome=outcome, report=report.page)
 
 
-_PAGE_OF_ALL = """\
-<!doctype html>
-<html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">
-<title>{title}</title>
-<style>body {{ font: 16px/1.5 system-ui, sans-serif; margin: 2rem auto; max-width: 60rem; padding: 0 1rem }}
-td, th {{ padding: .2rem 1rem .2rem 0; text-align: left; vertical-align: top }} img {{ max-width: 100% }}</style>
-<h1>{title}</h1>
-<p>{verdict}</p>
-<table><tr><th>robot<th>way<th>clear of<th>collisions<th>what came of it</tr>
-{rows}
-</table>
-{pictures}
-</html>
-"""
-
-
-def write_report_of_all(outcome: Json, folder: Path) -> None:
-    """Write what came of a run with several robots, and a page that leads to the report of each.
+def make_artefacts_of_all(folder: Path, names: Sequence[str], scenario: str) -> Artefacts:
+    """Write all that can be made from the traces of several robots: each one's, and the outcome and page of all.
 
     Raises:
-        FileError: The disk is full, or the folder cannot be written.
+        TraceError, FileError: As of `make_artefacts`.
     """
-    robots = cast("Mapping[str, Mapping[str, object]]", outcome["robots"])
-    rows, pictures = [], []
-    for name, one in robots.items():
-        failures = [*cast("Sequence[str]", one["failures"]), *cast("Sequence[str]", one["goals_not_judged"] or ())]
-        lines = "<br>".join(escape(line) for line in failures) or "passed"
-        rows.append(
-            f'<tr><td><a href="{name}/{REPORT_NAME}">{name}</a><td>{_metres(one["distance_m"])}'
-            f"<td>{_metres(one['min_clearance_m'])}<td>{one['collisions']}<td>{lines}</tr>"
-        )
-        if (folder / name / "path.png").is_file():
-            pictures.append(
-                f'<h2>{name}</h2><a href="{name}/{REPORT_NAME}"><img src="{name}/path.png" alt="{name}"></a>'
-            )
-    title = escape(f"{outcome['scenario']} in {outcome['world']}")
-    verdict = escape(f"{verdict_of(outcome)}; {outcome['virtual_s']} s, body {outcome['body']}, seed {outcome['seed']}")
-    page = _PAGE_OF_ALL.format(title=title, verdict=verdict, rows="\n".join(rows), pictures="\n".join(pictures))
-    try:
-        (folder / REPORT_NAME).write_text(page, encoding="utf-8")
-        (folder / SUMMARY_NAME).write_text(json.dumps(outcome, indent=2, sort_keys=True) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise FileError(f"cannot write into {folder}: {error.strerror or error}") from error
-
-
-def _metres(value: object) -> str:
-    return f"{value:.3f} m" if isinstance(value, (int, float)) else ""
+    outcome = outcome_of_all(scenario, {name: make_artefacts(folder / name).outcome for name in names})
+    write_report_of_all(outcome, folder)
+    return Artefacts(outcome=outcome, report=folder / REPORT_NAME)
 
 
 def write_wire(record: RunRecord, path: Path) -> None:

@@ -482,7 +482,20 @@ def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | N
         where=where,
     )
     _refuse_unrecorded(scenario, table, where)
-    return _apply_in_world(scenario, in_world.get(scenario.world, {}))
+    scenario = _apply_in_world(scenario, in_world.get(scenario.world, {}))
+    _refuse_goals_beyond_the_end(scenario, where)
+    return scenario
+
+
+def _refuse_goals_beyond_the_end(scenario: Scenario, where: Place) -> None:
+    """Refuse goals that would look at nothing, and so be met by any run."""
+    for number, goal in enumerate(scenario.goals):
+        begin = goal.arguments.get("from_s", 0)
+        if "after" not in goal.arguments and cast("float", begin) * NS_PER_S >= scenario.planned_ns:
+            raise ScenarioError(
+                f"{within(where, 'goal', number)}: from_s = {begin}: the run is over by then",
+                hint=f"duration_s is {scenario.planned_ns / NS_PER_S:g}",
+            )
 
 
 def _listed(names: object) -> tuple[str, ...]:

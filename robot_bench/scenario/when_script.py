@@ -94,7 +94,8 @@ def load_whens(
         ScenarioError: A table breaks the schema, its event or its fault is none, or it waits for one that is not there.
     """
     found = tuple(_load(table, parameters, within(where, "when", n), wires) for n, table in enumerate(tables))
-    names = [when.name for when in found if when.name]
+    names_of = [when.name for when in found]
+    names = list(filter(None, names_of))
     for number, when in enumerate(found):
         place = within(where, "when", number)
         if when.name and names.count(when.name) > 1:
@@ -102,6 +103,12 @@ def load_whens(
         if when.after and when.after not in names:
             raise ScenarioError(f"{place}: after: there is none with the id {shown(when.after)}",
                                 hint=nearest(when.after, names) if names else 'id = "..." names one')  # fmt: skip
+        before, seen = when.after, {when.name} - {""}
+        while before and before not in seen:
+            seen.add(before)
+            before = found[names_of.index(before)].after
+        if before:
+            raise ScenarioError(f"{place}: after: {shown(when.after)} waits for this one in turn: neither happens")
     return found
 
 

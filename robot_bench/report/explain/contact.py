@@ -23,7 +23,7 @@ from itertools import combinations
 
 from robot_bench.events.kinds import Contact
 from robot_bench.report.explain.chain import Evidence, Step
-from robot_bench.report.explain.findings import Finding, ended, numbers, obeyed, steady_since
+from robot_bench.report.explain.findings import Finding, ended, injected, numbers, obeyed, steady_since
 from robot_bench.report.explain.probing import Answer, Prober
 from robot_bench.report.explain.replay import Hold
 from robot_bench.report.explain.scene import Scene
@@ -99,6 +99,13 @@ class ContactInquest:
                 f"{hit.what} came to where it was touched only {(hit.t - since) / NS_PER_S:.2f} s before: no "
                 "sensor tells in that time"
             )
+        codes, began = steady_since(self.scene.record, hit.t - NS_PER_MS)
+        if sum(codes) < 0:
+            return Finding(
+                f"the robot was driven backwards (motors {_codes(codes)}) since {began / NS_PER_S:.3f} s, where no "
+                "sensor looks; whether that was right is not known",
+                is_cause=False,
+            )
         ahead = min((abs(math.remainder(self.bearing - sensor.heading_rad, math.tau)) for sensor in self.scene.sensors),
                     default=math.pi)  # fmt: skip
         return Finding(
@@ -111,22 +118,21 @@ class ContactInquest:
             return None
         first = min(self.expected.values())
         left_s = (self.hit.t - first) / NS_PER_S
-        faults = [fault for fault in self.scene.record.faults if fault.op == "inject" and fault.t <= self.hit.t]
         net = min(self.expected, key=lambda name: self.expected[name])
         if self.hit.t - first < TELLING_NS:
             return Finding(
                 f"it came into sight of {net} only {left_s:.2f} s before it was touched: no sensor tells in that time"
             )
-        if faults:
-            fault = faults[-1]
-            self._step(fault.t, "world", f"fault injected: {fault.words}", Evidence.RECORDED)
-        ranges = [mm for t, mm in self.scene.record.sonar if first <= t <= self.hit.t]
         number = int(net[2:]) - 1
+        fault = injected(self.scene.record, self.hit.t, "sonar", number + 1)
+        if fault is not None:
+            self._step(fault[0], "world", f"fault injected: {fault[1]}", Evidence.RECORDED)
+        ranges = [mm for t, mm in self.scene.record.sonar if first <= t <= self.hit.t]
         shortest = min((mm[number] for mm in ranges if number < len(mm)), default=None)
         measured = "" if shortest is None else f"; its sonar measured {shortest / 1000:.2f} m at the least"
         return Finding(
             f"the sensor did not tell: {net} stayed low for the {left_s:.2f} s in which it should have seen "
-            f"{self.hit.what}{measured}" + (f"; injected was {faults[-1].words!r}" if faults else ""),
+            f"{self.hit.what}{measured}" + (f"; injected was {fault[1]!r}" if fault is not None else ""),
         )
 
     def _is_noticed(self) -> Finding | None:
@@ -193,6 +199,14 @@ class ContactInquest:
                     f"{len(self._asked)} other times: its outputs are the same with and without"
                 )
             answered = [after]
+        near = [answers[net] for answers in self._asked for net in self.on]
+        same = self._effect.before == self._effect.after and all(one.codes == one.base for one in near)
+        if len(self._asked) >= AGREEING and same and left >= STRAIGHT_S * NS_PER_S:
+            return Finding(
+                f"the program notices {nets} at {self._effect.by} and sets its motors no otherwise for it (motors "
+                f"{_codes(self._effect.before)}), here for {left / NS_PER_S:.2f} s and at {len(self._asked)} other "
+                "times"
+            )
         least = min((one for one in answered if one is not None), default=0)
         answered_ns = None if self._effect.answered is None else self._effect.answered - since
         here = answered_ns is None or answered_ns >= least * 9 // 10  # within a round of its loop

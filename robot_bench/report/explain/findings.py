@@ -70,27 +70,72 @@ def obeyed(record: RunRecord, step_mps: float, at: Nanos, steps: list[Step]) -> 
                    + (f": {why}" if why else "; why is not known"))  # fmt: skip
 
 
-def _why_not_obeyed(record: RunRecord, at: Nanos, steps: list[Step]) -> str:
-    """Return what the trace says of it; empty where it says nothing."""
-    con = record.pins.get("p2dx_con")
-    if con is not None:
-        place = bisect_right(con.times, at) - 1
-        if place >= 0 and not con.levels[place]:
-            since = con.times[place]
-            steps.append(Step(t=since, part="wire", says="p2dx_con goes low: the program gives the robot back",
-                              evidence=Evidence.RECORDED))  # fmt: skip
-            return f"p2dx_con, which asks for the robot, is low since {since / NS_PER_S:.3f} s"
-    going: dict[str, Nanos] = {}
+#: Wires by which a program has its robot → the level at which it has not, and what that means.
+CONTROL: Mapping[str, tuple[bool, str]] = {
+    "rst": (True, "holds the adapter in reset"),
+    "p2dx_con": (False, "does not ask for the robot"),
+}
+#: chosen: so long after a control wire was let go the robot is connected again.
+_RECONNECTS_NS: Nanos = 5 * NS_PER_S
+#: What a fault acts on; a voltmeter that shows less acts on neither.
+_LINE = ("link-down", "loose-connector", "line-noise")
+_ANEW = ("brown-out", "reboot")
+_ACTS_ON: Mapping[str, tuple[str, ...]] = {
+    "wheels": (*_LINE, *_ANEW, "wheel-blocked", "stop-button", "bumper"),
+    "sonar": (*_LINE, *_ANEW, "sonar-stuck", "sonar-noisy", "sonar-dead"),
+}
+
+
+def injected(record: RunRecord, at: Nanos, acts_on: str, sonar: int = 0) -> tuple[Nanos, str] | None:
+    """Return the last fault that is in force at a time and acts on the wheels or on a sonar, and since when.
+
+    Args:
+        record: The run.
+        at: The time.
+        acts_on: "wheels" or "sonar".
+        sonar: Of a sonar which one, from 1 on.
+    """
+    found: dict[str, Nanos] = {}
     for fault in record.faults:
         if fault.t <= at and fault.op in {"inject", "clear"}:
-            going.pop(fault.words, None)
-            if fault.op == "inject":
-                going[fault.words] = fault.t
-    notes = [note for note in record.events if note.t <= at and note.what != "command" and note.who != "body"]
-    if going:
-        words, since = list(going.items())[-1]
+            found.pop(fault.words, None)
+            kind, *values = fault.words.split()
+            is_meant = not kind.startswith("sonar-") or values[:1] == [str(sonar)]
+            is_over = kind in _ANEW and at - fault.t > _RECONNECTS_NS
+            if fault.op == "inject" and kind in _ACTS_ON[acts_on] and is_meant and not is_over:
+                found[fault.words] = fault.t
+    return next(((since, words) for words, since in reversed(found.items())), None)
+
+
+def let_go(record: RunRecord, at: Nanos) -> tuple[str, Nanos, str] | None:
+    """Return the control wire by which the program had not its robot shortly before a time, since when, in words."""
+    for wire, (level, means) in CONTROL.items():
+        edges = record.pins.get(wire)
+        place = -1 if edges is None else bisect_right(edges.times, at) - 1
+        if edges is None or place < 0:
+            continue
+        words = f"{wire} {'high' if level else 'low'} {means}"
+        if edges.levels[place] == level:
+            return wire, edges.times[place], f"{words}, since {edges.times[place] / NS_PER_S:.3f} s"
+        if place > 0 and at - edges.times[place] < _RECONNECTS_NS:
+            since, until = edges.times[place - 1], edges.times[place]
+            return wire, since, f"{words}: it was so from {since / NS_PER_S:.3f} s to {until / NS_PER_S:.3f} s"
+    return None
+
+
+def _why_not_obeyed(record: RunRecord, at: Nanos, steps: list[Step]) -> str:
+    """Return what the trace says of it; empty where it says nothing."""
+    gone = let_go(record, at)
+    if gone is not None:
+        wire, since, says = gone
+        steps.append(Step(t=since, part="wire", says=f"{wire} {CONTROL[wire][1]}", evidence=Evidence.RECORDED))
+        return says
+    fault = injected(record, at, "wheels")
+    if fault is not None:
+        since, words = fault
         steps.append(Step(t=since, part="wire", says=f"fault injected: {words}", evidence=Evidence.RECORDED))
         return f"{words!r} was injected at {since / NS_PER_S:.3f} s"
+    notes = [note for note in record.events if note.t <= at and note.what != "command" and note.who != "body"]
     if notes:
         note = notes[-1]
         says = f"{note.who}: {note.what}{', ' if note.detail else ''}{note.detail}"
@@ -105,6 +150,10 @@ def ended(prober: Prober, silent: Nanos, failed: Nanos, steps: list[Step]) -> Fi
     since = prober.ended_noticing(silent)
     if since is None:
         return Finding("the program takes no notice of any sensor's pin, at any time before", is_cause=False)
+    gap = read_gap(prober, since)
+    if failed - since <= gap * 5 // 4:
+        return Finding(f"the program is late: it reads its input pins only each {gap / NS_PER_S:.2f} s, and takes no "
+                       f"notice of them from {since / NS_PER_S:.3f} s to {failed / NS_PER_S:.3f} s")  # fmt: skip
     says = f"the program takes no notice of any sensor's pin since {since / NS_PER_S:.3f} s"
     steps.append(Step(t=since, part="firmware", says="a change of the sensors' pins changes its way, variables or "
                       "outputs for the last time", evidence=Evidence.CHANGED))  # fmt: skip
@@ -133,6 +182,18 @@ def ended(prober: Prober, silent: Nanos, failed: Nanos, steps: list[Step]) -> Fi
 LOOP_LINES = 4
 #: chosen: so long after that time is looked for what ran no more.
 LOOKED_NS: Nanos = 5 * NS_PER_S
+
+
+def read_gap(prober: Prober, at: Nanos) -> Nanos:
+    """Return the longest time between two reads of input pins before a time; 0 where they are read often."""
+    for span in (NS_PER_S // 5, 12 * NS_PER_S):
+        reads = prober.replay.reads(max(0, at - span), at + NS_PER_MS)
+        gaps = [
+            after - before for before, after in itertools.pairwise(sorted(t for one in reads.values() for t in one))
+        ]
+        if sum(gaps) > NS_PER_S // 10:
+            return max(gaps) if max(gaps) > NS_PER_S // 10 else 0
+    return 0
 
 
 def ran_over(prober: Prober, around: Nanos) -> Mapping[Nanos, str]:

@@ -218,7 +218,7 @@ class Prober:
                 break
             if ours != theirs:
                 place = next(n for n, (a, b) in enumerate(zip(ours, theirs, strict=True)) if a != b)
-                noticed, by = t, f"variable {self.replay.variable_at(place) or hex(place)}"
+                noticed, by = t, self.replay.variable_at(place)
                 break
         answered = min(
             (

@@ -5,6 +5,7 @@
     stuck      the program takes notice of nothing any more
     opposite   with no sensor seeing anything it drives its wheels opposite ways
     stays so   it goes on with it when nothing is in sight, as it did not before
+    sees       a sonar that was made to err keeps a pin high, and without it the program drives on
     itself     the program held the motors so while it looked at its inputs: why is not known
 
 Invariant: as of `robot_bench.report.explain.contact`.
@@ -17,7 +18,7 @@ from dataclasses import dataclass
 
 from robot_bench.events.kinds import Pose
 from robot_bench.report.explain.chain import Evidence, Step
-from robot_bench.report.explain.findings import Finding, ended, numbers, obeyed, steady_since
+from robot_bench.report.explain.findings import CONTROL, Finding, ended, injected, let_go, numbers, obeyed, steady_since
 from robot_bench.report.explain.probing import QUIET_NS, Answer, Codes, Prober
 from robot_bench.report.explain.replay import Reset
 from robot_bench.report.explain.scene import Scene
@@ -73,13 +74,14 @@ class ProgressInquest:
         middle = (stay.since + stay.until) // 2
         found = obeyed(self.scene.record, self.scene.step_mps, middle, self.steps)
         if found is not None:
-            self._tell_con()
+            self._tell_who_let_go(middle)
             return found
         return (
             self._not_begun(stay)
             or self._stuck(stay, middle)
             or self._opposite(stay.until)
             or self._stays_so(stay, middle)
+            or self._sees_what_is_not(middle)
             or self._itself(stay, middle)
         )
 
@@ -112,11 +114,14 @@ class ProgressInquest:
         begins = min((t for t, level in edges if level and t > 0), default=None)
         if begins is not None and begins < (stay.since + stay.until) // 2:
             return None
+        where = ""
         if self._prober is not None:
             at = (stay.since + min(stay.until, begins or stay.until)) // 2
-            self._step(at, "firmware", f"is at {self._prober.last_place(at)}", Evidence.REPLAYED)
+            place = self._prober.last_place(at)
+            self._step(at, "firmware", f"is at {place}", Evidence.REPLAYED)
+            where = f"; at {at / NS_PER_S:.3f} s it is at {place}"
         when = "at no time" if begins is None else f"for the first time at {begins / NS_PER_S:.3f} s"
-        return Finding(f"the program asks its motors for something {when}: it had not begun to drive")
+        return Finding(f"the program asks its motors for something {when}: it had not begun to drive{where}")
 
     def _stuck(self, stay: _Stay, middle: Nanos) -> Finding | None:
         prober = self._prober
@@ -211,6 +216,26 @@ class ProgressInquest:
             f"{begin / NS_PER_S:.1f} s, with nothing in sight, it drove on ({free[0]:+d}, {free[1]:+d})"
         )
 
+    def _sees_what_is_not(self, middle: Nanos) -> Finding | None:
+        """Tell of a sensor's pin that a fault keeps high, and that alone keeps the program from driving on."""
+        prober = self._prober
+        if prober is None:
+            return None
+        for net in prober.sensors:
+            fault = injected(self.scene.record, middle, "sonar", int(net[2:]))
+            if fault is None or not fault[1].startswith("sonar-") or not prober.replay.level(net, middle):
+                continue
+            answer = prober.answers(middle)[net]
+            if min(answer.base) > 0 >= min(answer.codes):
+                self._step(fault[0], "world", f"fault injected: {fault[1]}", Evidence.RECORDED)
+                return Finding(
+                    f"{prober.replay.pin(net)} is high, where {fault[1]!r} was injected at "
+                    f"{fault[0] / NS_PER_S:.3f} s; with it low, and all others, the program drives on "
+                    f"({answer.base[0]:+d}, {answer.base[1]:+d}), "
+                    f"with it alone high it does not ({answer.codes[0]:+d}, {answer.codes[1]:+d})"
+                )
+        return None
+
     def _itself(self, stay: _Stay, middle: Nanos) -> Finding:
         codes, since = steady_since(self.scene.record, middle)
         prober = self._prober
@@ -228,17 +253,16 @@ class ProgressInquest:
             is_cause=False,
         )
 
-    def _tell_con(self) -> None:
-        """Say which line gave the robot back."""
-        prober = self._prober
-        con = self.scene.record.pins.get("p2dx_con")
-        if prober is None or con is None or not len(con) or con.levels[-1]:
+    def _tell_who_let_go(self, at: Nanos) -> None:
+        """Say which line of the program let go of the robot."""
+        prober, gone = self._prober, let_go(self.scene.record, at)
+        if prober is None or gone is None or not 0 < gone[1] <= prober.replay.exact_until:
             return
-        at = con.times[-1]
-        if 0 < at <= prober.replay.exact_until:
-            place = prober.replay.writer(at, prober.replay.wires["p2dx_con"].bluepill[1])
-            if place is not None:
-                self._step(at, "firmware", f"takes p2dx_con low at {place}", Evidence.REPLAYED)
+        wire, since, _ = gone
+        place = prober.replay.writer(since, prober.replay.wires[wire].bluepill[1])
+        if place is not None:
+            level = "high" if CONTROL[wire][0] else "low"
+            self._step(since, "firmware", f"takes {wire} {level} at {place}", Evidence.REPLAYED)
 
     def _idle_after(self, at: Nanos) -> Nanos:
         """Return how long the robot came nowhere after a time."""

@@ -24,7 +24,7 @@ from bluepill_sim.core.debug_unit import WatchKind, Watchpoint
 from bluepill_sim.core.nvic import exception_name
 from bluepill_sim.errors import ImageError
 from bluepill_sim.fabric.subscriptions import EDGE, HIGH, Of
-from bluepill_sim.program.functions import FunctionTable
+from bluepill_sim.program.functions import UNKNOWN, FunctionTable
 from bluepill_sim.program.line_table import LineTable, read_lines
 from bluepill_sim.program.static_code import StaticCode
 from bluepill_sim.stm32f103 import SRAM_BASE, SRAM_BYTES
@@ -158,7 +158,8 @@ class ChipReplay:
 
     def line(self, address: int) -> Place:
         """Return where an instruction stands in the source."""
-        return Place(self._lines.place(address), self._functions.name(address))
+        name = self._functions.name(address)
+        return Place(self._lines.place(address), f"0x{address:08x}" if name == UNKNOWN else name)
 
     def end_line(self, block: int) -> Place:
         """Return where the last instruction of a block stands, which decides what follows it."""
@@ -166,12 +167,12 @@ class ChipReplay:
         return self.line(found.addresses[-1] if found.addresses else block)
 
     def variable_at(self, offset: int) -> str:
-        """Return the name of the variable at an offset into the SRAM; empty where none is known."""
+        """Return the variable at an offset into the SRAM, in words; its address where no name is known."""
         address = SRAM_BASE + offset
         for symbol in self.board.image.symbols.symbols:
             if not symbol.is_function and symbol.address <= address < symbol.address + symbol.size:
-                return symbol.name
-        return ""
+                return f"variable {symbol.name}"
+        return f"what is at 0x{address:08x}"
 
     @property
     def variables(self) -> list[tuple[str, int, int]]:
@@ -350,7 +351,8 @@ class ChipReplay:
 
     @property
     def _variable_bytes(self) -> int:
-        return max((offset + size for _, offset, size in self.variables), default=4)
+        # Of a program without symbols all of the SRAM, its stack too: so it notices at least what it would with them.
+        return max((offset + size for _, offset, size in self.variables), default=SRAM_BYTES)
 
     def _feed(self, limit: Nanos) -> None:
         """Give the input pins what is recorded, or held, between now and `limit`."""

@@ -59,6 +59,7 @@ _REGION = (
     Key(name="area_m", kind="list"),
 )
 _SIGNAL = Key(name="signal", kind="text", required=True, choices=_POSE_SIGNALS)
+_THING = Key(name="thing", kind="text")
 
 
 def _texts(table: Table) -> list[str]:
@@ -105,7 +106,8 @@ def _when(table: Table) -> str:
 def _bounds(table: Table) -> str:
     least = f" at least {number(table, 'least'):g}" if "least" in table else ""
     most = f" at most {number(table, 'most'):g}" if "most" in table else ""
-    return f"{table['signal']}{least}{' and' if least and most else ''}{most}"
+    to = f" from {table['thing']}" if "thing" in table else ""
+    return f"{table['signal']}{to}{least}{' and' if least and most else ''}{most}"
 
 
 def _count(table: Table) -> str:
@@ -266,12 +268,12 @@ KINDS: Mapping[str, GoalKind] = {
         ),
     ),
     "always": GoalKind(
-        keys=(_SIGNAL, _LEAST, _MOST, _AFTER, _FROM, _TO),
+        keys=(_SIGNAL, _THING, _LEAST, _MOST, _AFTER, _FROM, _TO),
         wanted=lambda table: f"has always {_bounds(table)}{_when(table)}",
         watch=lambda table: _over_time(table, is_always=True),
     ),
     "eventually": GoalKind(
-        keys=(_SIGNAL, _LEAST, _MOST, _AFTER, _FROM, _TO),
+        keys=(_SIGNAL, _THING, _LEAST, _MOST, _AFTER, _FROM, _TO),
         wanted=lambda table: f"has at some time {_bounds(table)}{_when(table)}",
         watch=lambda table: _over_time(table, is_always=False),
     ),

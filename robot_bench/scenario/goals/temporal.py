@@ -1,17 +1,18 @@
 """Goals of signal temporal logic by their usual names: always, eventually, never, after, until when, how often.
 
-Signals are those of the pose (each 50 ms), the sonar and the clearance; events are words of
-`robot_bench.events.selection`. The robustness of `always` is the least margin of a sample in its window, that of
-`eventually` the greatest; after an event, that of the worst occurrence.
+Signals are those of the pose (each 50 ms), the sonar and the clearance, and how far a named thing is, another robot
+for one; events are words of `robot_bench.events.selection`. The robustness of `always` is the least margin of a sample
+in its window, that of `eventually` the greatest; after an event, that of the worst occurrence.
 """
 
 import math
 from collections.abc import Callable, Mapping
 from typing import Any, cast
 
-from robot_bench.events.kinds import MICRO, Clearance, Event, Pose, Ranges
+from robot_bench.events.kinds import MICRO, Clearance, Event, Pose, Ranges, WorldChange
 from robot_bench.scenario.goals.watch import Outcome, SelectorFeed, Watch, nanos, number, seconds, selected
 from robot_bench.scenario.schema import Table
+from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
 
 #: Signal → what tells it, its value there, its unit.
@@ -24,7 +25,10 @@ SIGNALS: Mapping[str, tuple[type, Callable[[Any], float], str]] = {
     "right_mps": (Pose, lambda pose: pose.right / MICRO, "m/s"),
     "sonar_m": (Ranges, lambda ranges: min(ranges.mm) / 1000, "m"),
     "clearance_m": (Clearance, lambda clearance: clearance.um / MICRO, "m"),
+    "apart_m": (Pose, lambda _: math.nan, "m"),  # `OverTime` knows where the thing is
 }
+#: The signal that is to a thing.
+APART = "apart_m"
 #: Of a value, metres, degrees or m/s within bounds; negative beyond them.
 Margin = Callable[[float], float]
 
@@ -32,21 +36,30 @@ Margin = Callable[[float], float]
 class OverTime(Watch):
     """A signal is in bounds at each sample of a window (`always`), or at one of them (`eventually`).
 
-    With `after`, each occurrence of the event opens a window.
+    With `after`, each occurrence of the event opens a window. Raises a UsageError where `thing` stands without
+    `apart_m`, or this without it.
     """
 
-    STATE = ("_events", "_windows", "_worst", "_failure", "_count")
+    STATE = ("_events", "_windows", "_worst", "_failure", "_count", "_there")
 
     def __init__(self, table: Table, signal: str, margin: Margin, *, is_always: bool) -> None:
         kind, self._value, self._unit = SIGNALS[signal]
         self._signal = signal
+        #: A thing of the world, and where it was told to be last.
+        self._thing = str(table.get("thing", ""))
+        self._there: tuple[float, float] | None = None
+        if bool(self._thing) is not (signal == APART):
+            raise UsageError(f"signal {APART} and thing belong together", hint='thing = "NAME" of a robot or a thing')
         self._margin = margin
         self._is_always = is_always
         self._after = str(table["after"]) if "after" in table else ""
         self._events = SelectorFeed(*([selected(table, self._after)] if self._after else []))
         self._kind = kind
-        self.kinds, self.wires = (*{kind: None, **dict.fromkeys(self._events.kinds)},), self._events.wires
+        kinds = [kind, *([WorldChange] if self._thing else []), *self._events.kinds]
+        self.kinds, self.wires = tuple(dict.fromkeys(kinds)), self._events.wires
         self._from, self._to = nanos(table, "from_s"), nanos(table, "to_s") if "to_s" in table else None
+        if self._to is not None and self._to < self._from:
+            raise UsageError("to_s lies before from_s: the goal would look at nothing")
         #: Where windows begin, and the best margin in each so far; of `always` the worst.
         self._windows: list[tuple[Nanos, float, Nanos]] = [] if self._after else [(0, self._nothing, 0)]
         self._worst = math.inf
@@ -58,8 +71,13 @@ class OverTime(Watch):
         return math.inf if self._is_always else -math.inf
 
     def feed(self, event: Event) -> Outcome | None:
-        if type(event) is self._kind:
+        if isinstance(event, WorldChange) and event.name == self._thing:
+            place = event.fields.get("x"), event.fields.get("y")
+            self._there = place if event.op != "remove" else None  # type: ignore[assignment] # numbers: the codec says so
+        elif type(event) is self._kind and not self._thing:
             self._sample(event.t, self._margin(self._value(event)))
+        elif isinstance(event, Pose) and self._there is not None:
+            self._sample(event.t, self._margin(math.dist((event.x_m, event.y_m), self._there)))
         if self._after and any(self._events.taken(event)):
             self._windows.append((event.t, self._nothing, event.t))
             self._count += 1
@@ -81,7 +99,7 @@ class OverTime(Watch):
         kept = []
         for begin, best, at in self._windows:
             is_over = self._to is not None and now > begin + self._to
-            if (best < 0 and self._is_always) or (best < 0 and is_over):
+            if (best < 0 and (self._is_always or is_over)) or (is_over and self._was_never_told(best)):
                 self._fail(begin, best, at)
             if is_over:
                 self._worst = min(self._worst, best)
@@ -94,6 +112,10 @@ class OverTime(Watch):
             met = [best for _, best, _ in kept if best >= 0]
             return self.finish(now) if met else None
         return None
+
+    def _was_never_told(self, best: float) -> bool:
+        """Tell whether the thing that a distance is to was nowhere; of other signals no sample is no failure."""
+        return bool(self._thing) and not self._after and not math.isfinite(best)
 
     def _fail(self, begin: Nanos, best: float, at: Nanos) -> None:
         if self._failure:
@@ -111,17 +133,22 @@ class OverTime(Watch):
         robustness = by if math.isfinite(by) else None
         if not self._count:
             return Outcome(met=False, says=f"{self._after!r} did not happen")
-        if not self._failure and not self._is_always:
-            for begin, best, at in self._windows:
-                if best < 0:
-                    self._fail(begin, best, at)
+        for begin, best, at in self._windows:
+            if self._was_never_told(best) or (best < 0 and not self._is_always):
+                self._fail(begin, best, at)
         says = self._failure or (f"by {by:.3g} {self._unit} at the least" if robustness is not None else "")
         return Outcome(met=not self._failure, says=says, robustness=robustness, unit=self._unit)
 
 
 def bounds(table: Table) -> Margin:
-    """Return the margin to `least` and `most`."""
+    """Return the margin to `least` and `most`.
+
+    Raises:
+        UsageError: Any value would do, or none.
+    """
     least, most = number(table, "least", -math.inf), number(table, "most", math.inf)
+    if least > most or not (math.isfinite(least) or math.isfinite(most)):
+        raise UsageError("least is above most" if least > most else "neither least nor most: any value would do")
     return lambda value: min(value - least, most - value)
 
 

@@ -218,6 +218,46 @@ OTHERS = (
         answers=("never asks the right motor to go backwards",), duration_s=32.0,
     ),
     Bug(
+        name="adapter-held-in-reset",
+        edits=(
+            ("pins.h", "#endif", "void pins_reset(int high);\n\n#endif"),
+            (
+                "pins.c", "uint8_t pins_distances(void) {",
+                ("void pins_reset(int high) { write_wire(control_wires[RST], high); }\n"
+                "uint8_t pins_distances(void) {"),
+            ),
+            (
+                "dodge.c", "        pins_motors(command",
+                "        if (dodge.turns == 2) {\n            pins_reset(1);\n        }\n        pins_motors(command",
+            ),
+        ),
+        answers=("rst high holds the adapter in reset",), duration_s=75.0,
+    ),
+    Bug(
+        name="inputs-read-each-1.5-s",
+        edits=(
+            (
+                "dodge.c", "        struct dodge_command",
+                ("        static uint8_t sensors;\n        if (due % 150 == 0) {\n"
+                "            sensors = pins_distances();\n        }\n        struct dodge_command"),
+            ),
+            ("dodge.c", _READ, "dodge_tick(&dodge, sensors, "),
+        ),
+        answers=("late",), thing=_BOX, duration_s=30.0,
+    ),
+    Bug(
+        name="motors-set-once",
+        edits=(
+            ("dodge.c", "        pins_motors(c", "        if (dodge.state_ticks == 1 && !dodge.turns) pins_motors(c"),
+        ),
+        answers=("sets its motors no otherwise",), thing=_AHEAD, duration_s=20.0,
+    ),
+    Bug(
+        name="speed-beyond-the-code",
+        edits=(("pins.h", "MOTOR_MAX 3", "MOTOR_MAX 7"), ("dodge_fsm.c", "#define FAST 3", "#define FAST 4")),
+        answers=("overflow",), duration_s=20.0, is_found=False,
+    ),
+    Bug(
         name="encoder-off-by-one",
         edits=(("odometer.c", "STEPS_PER_TURN / 2 + STEPS_PER_TURN)", "STEPS_PER_TURN / 2 + STEPS_PER_TURN - 1)"),),
         answers=("encoder",), fails=False, is_found=False,

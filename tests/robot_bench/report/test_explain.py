@@ -11,19 +11,20 @@ import typer
 from typer.testing import CliRunner
 
 from robot_bench.cli import explain as verb
-from robot_bench.events.kinds import Pose
+from robot_bench.events.kinds import Fault, Pose
 from robot_bench.firmware.build import COMPILER, HERE, compiler_version
 from robot_bench.recording.run_record import RunRecord, read_run
 from robot_bench.report.explain.chain import WIDTH, Evidence, Explanation, Standing, Step
 from robot_bench.report.explain.contact import exchanged
 from robot_bench.report.explain.explain import explain
+from robot_bench.report.explain.findings import injected, let_go
 from robot_bench.report.explain.probing import Answer
 from robot_bench.report.explain.replay import ChipReplay, Hold
 from robot_bench.report.explain.scene import Scene
 from robot_bench.run import run_scenario
 from robot_bench.scenario.scenario import load_scenario
 from robot_bench.wires.edges import Edges
-from simbase.errors import UsageError
+from simbase.errors import FileError, UsageError
 from simbase.timing import NS_PER_S
 from tests.robot_bench.report.seeded_bugs import LONGER, NAMED, OTHERS, UNFAIR, Bug, build, scenario_text
 
@@ -159,6 +160,12 @@ def test_a_trace_that_the_chip_does_not_follow_is_not_trusted(unfair: Path) -> N
     assert any("parts from the run" in limit for limit in found.limits)
 
 
+def test_a_file_that_is_no_trace_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text("duration_s = 1\n")
+    with pytest.raises(FileError, match=r"mine\.toml is no trace"):
+        verb.read_record(tmp_path / "mine.toml")
+
+
 def test_the_verb_prints_one_json_object_and_says_by_its_exit_code_that_the_cause_is_not_known(unfair: Path) -> None:
     app = typer.Typer()
     verb.register(app)
@@ -205,6 +212,43 @@ def test_against_a_run_means_against_its_program(unfair: Path, tmp_path: Path) -
     (tmp_path / "trace.jsonl").write_text(json.dumps(meta) + "\n" + "".join(lines[1:]))
     with pytest.raises(UsageError, match="is not here any more"):
         verb._reference(tmp_path)
+
+
+FAULTS = [
+    Fault(t=5, op="inject", words="low-battery 9.0"), Fault(t=10, op="inject", words="sonar-stuck 3 1.2"),
+    Fault(t=20, op="clear", words="sonar-stuck 3 1.2"), Fault(t=30, op="inject", words="stop-button"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("at", "on", "sonar", "found"),
+    [(9, "sonar", 3, None), (10, "sonar", 3, (10, "sonar-stuck 3 1.2")), (19, "sonar", 3, (10, "sonar-stuck 3 1.2")),
+     (20, "sonar", 3, None), (15, "sonar", 4, None), (15, "wheels", 0, None), (29, "wheels", 0, None),
+     (30, "wheels", 0, (30, "stop-button"))],
+)  # fmt: skip
+def test_a_fault_explains_only_what_it_acts_on_and_while_it_lasts(
+    at: int, on: str, sonar: int, found: tuple[int, str] | None
+) -> None:
+    assert injected(RunRecord(faults=FAULTS), at, on, sonar) == found
+
+
+@pytest.mark.parametrize(("after_ns", "is_over"), [(5 * NS_PER_S, False), (5 * NS_PER_S + 1, True)])
+def test_a_reboot_explains_wheels_that_stand_for_as_long_as_it_takes(after_ns: int, is_over: bool) -> None:
+    record = RunRecord(faults=[Fault(t=7, op="inject", words="reboot")])
+    assert injected(record, 7 + after_ns, "wheels") == (None if is_over else (7, "reboot"))
+
+
+@pytest.mark.parametrize(
+    ("at", "says"),
+    [(99, None), (100, "rst high holds the adapter in reset, since 0.000 s"),
+     (200, "rst high holds the adapter in reset: it was so from 0.000 s to 0.000 s"),
+     (200 + 5 * NS_PER_S - 1, "rst high holds the adapter in reset: it was so from 0.000 s to 0.000 s"),
+     (200 + 5 * NS_PER_S, None)],
+)  # fmt: skip
+def test_a_control_wire_that_let_the_robot_go_is_told_until_it_is_connected_again(at: int, says: str | None) -> None:
+    record = RunRecord(pins={"rst": Edges([(0, 0), (100, 1), (200, 0)]), "p2dx_con": Edges([(0, 1)])})
+    found = let_go(record, at)
+    assert (None if found is None else found[2]) == says
 
 
 def test_a_passed_run_has_nothing_to_explain(unfair: Path) -> None:

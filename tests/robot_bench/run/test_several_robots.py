@@ -11,6 +11,8 @@ from p2os.cli.main import run as p2os
 from p2os.errors import ScenarioError
 from robot_bench import Bench, Scenario
 from robot_bench.events.kinds import Pose, Ranges, Text, WorldChange
+from robot_bench.recording.run_record import read_events
+from robot_bench.recording.together import named_events, robots_in
 from robot_bench.scenario.scenario import read_scenario
 from simbase.errors import UsageError
 from tests.robot_bench.firmware import thumb
@@ -252,12 +254,68 @@ def test_a_run_has_a_folder_for_each_robot_and_says_of_whom_it_speaks(
     assert [outcome["robots"][name]["passed"] for name in "ab"] == [True, False]
     page = Path("there/report.html").read_text(encoding="utf-8")
     assert all(f'href="{name}/report.html"' in page and Path(f"there/{name}/report.html").is_file() for name in "ab")
+    assert page.count("<polyline ") == 2
+    assert page.count("<td>goal missed: drives at least 1 m</tr>") == 1
+    assert ">b<td>goal missed: drives at least 1 m</tr>" in page
+    summary = Path("there/summary.json").read_bytes()
+    Path("there/summary.json").unlink()
+    assert p2os(["report", "there"]) == 0
+    assert Path("there/summary.json").read_bytes() == summary.replace(b'"several"', b'"there"')  # the folder's name
+    capsys.readouterr()
+    assert p2os(["explain", "there", "--json"]) == 0
+    explained = json.loads(capsys.readouterr().out)["robots"]
+    assert [explained[name]["standing"] for name in "ab"] == ["nothing", "cause"]
+    assert p2os(["explain", "there", "--firmware", "x.bin"]) == 2
+    assert "p2os explain there/a --firmware FILE" in capsys.readouterr().err
     assert p2os(["run", "several.toml", "--out", "there"]) == 2, "it holds a run"
     assert "holds a run already" in capsys.readouterr().err
     assert p2os(["run", "several.toml", "--json", "--set", "robot.b.x_m=0.5", "--seeds", "0-1", "--keep", "none"]) == 1
     assert {run["trace_sha256"] for run in json.loads(capsys.readouterr().out)["runs"]} != {outcome["trace_sha256"]}
     assert p2os(["run", "several.toml", "--gdb", "0"]) == 2
     assert "for a robot alone" in capsys.readouterr().err
+
+
+def test_the_events_of_all_are_one_stream_in_order_of_time_each_with_its_robot(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    two(tmp_path, duration=0.7)
+    assert p2os(["run", "several.toml", "--out", "one"]) == 0
+    every = list(named_events(Path("one")))
+    for name in "ab":
+        assert [event for robot, event in every if robot == name] == list(read_events(Path("one", name)))
+    assert [event.t for _, event in every] == sorted(event.t for _, event in every)
+    assert [robot for robot, event in every if event.t == 0] == sorted(robot for robot, event in every if event.t == 0)
+    assert p2os(["report", "one", "--events", "all.jsonl"]) == 0
+    lines = Path("all.jsonl").read_text(encoding="utf-8").splitlines()
+    assert [json.loads(line)["robot"] for line in lines] == [robot for robot, _ in every]
+    assert p2os(["report", "one", "--events", "all.mcap"]) == 2
+    assert "a scene is of one robot" in capsys.readouterr().err
+    assert p2os(["run", "several.toml", "--out", "other", "--set", "robot.b.y_m=0.2"]) == 0
+    assert p2os(["diff", "one", "one"]) == 0
+    assert robots_in(Path("one")) == ["a", "b"]
+    assert robots_in(Path()) == [], "a folder of runs is no run of several robots"
+    capsys.readouterr()
+    assert p2os(["diff", "one", "other"]) == 1
+    assert "; a: worldchange differs first" in capsys.readouterr().out  # where b stands, as a has it
+
+
+def test_a_goal_may_bound_how_far_another_robot_is(tmp_path: Path) -> None:
+    far = '[[goal]]\nrobot = "a"\nkind = "always"\nsignal = "apart_m"\nthing = "b"\nleast = {}\n'
+    bench = Bench.from_scenario(two(tmp_path, duration=0.3, more=far.format(1.5) + far.format(1.8)))
+    bench.run_until("0.3 s")
+    found = bench.judge()
+    assert found.met == ["a: has always apart_m from b at least 1.5"]
+    nobody = Bench.from_scenario(two(tmp_path, duration=0.1, more=far.format(1.5).replace('"b"', '"c"')))
+    nobody.run_until("0.1 s")
+    assert nobody.judge().missed == ["a: always: apart_m was never told"]
+    assert found.missed == ["a: always: apart_m was out of bounds by 0.157 m at 0.000 s"]
+
+
+@pytest.mark.parametrize("keys", ['signal = "apart_m"', 'signal = "x_m"\nthing = "b"'])
+def test_a_distance_without_a_thing_and_a_thing_without_a_distance_are_refused(keys: str, tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match="apart_m and thing belong together"):
+        two(tmp_path, more=f'[[goal]]\nkind = "always"\n{keys}\nleast = 1\n')
 
 
 @pytest.mark.slow

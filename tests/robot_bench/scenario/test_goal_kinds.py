@@ -347,3 +347,14 @@ def test_a_goal_that_came_from_elsewhere_is_judged_like_any(monkeypatch: pytest.
     monkeypatch.setattr(Point, "load", staticmethod(lambda: 7))
     with pytest.raises(ScenarioError, match="mine:goal is no GoalKind"):
         load_goal({"kind": "untouched"}, "x")
+
+
+@pytest.mark.parametrize(
+    ("keys", "says"),
+    [({}, "neither least nor most: any value would do"), ({"least": 2, "most": 1}, "least is above most"),
+     ({"least": 1, "from_s": 2, "to_s": 1.999_999_999}, "to_s lies before from_s")],
+)  # fmt: skip
+def test_a_goal_that_any_run_or_none_would_meet_is_refused(keys: dict[str, Any], says: str) -> None:
+    with pytest.raises(ScenarioError, match=says):
+        load_goal({"kind": "always", "signal": "x_m", **keys}, "mine.toml: [[goal]] 1")
+    load_goal({"kind": "always", "signal": "x_m", "least": 1, "most": 1, "from_s": 2, "to_s": 2}, "at the bound")

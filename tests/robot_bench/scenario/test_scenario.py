@@ -323,3 +323,15 @@ def test_a_scenario_whose_own_program_is_not_built_runs_another(tmp_path: Path) 
         load_scenario(str(path))
     assert "--firmware" in str(refused.value.hint)
     assert load_scenario(str(path), firmware=other).firmware == other
+
+
+@pytest.mark.parametrize(("from_s", "is_refused"), [(9.999_999_999, False), (10, True), (11, True)])
+def test_a_goal_whose_window_begins_when_the_run_is_over_is_refused(
+    from_s: float, is_refused: bool, tmp_path: Path
+) -> None:
+    path = write(tmp_path, f'{LEAST}[[goal]]\nkind = "always"\nsignal = "x_m"\nleast = 0\nfrom_s = {from_s}\n')
+    if is_refused:
+        with pytest.raises(ScenarioError, match=r"mine.toml:4: \[\[goal\]\] 1: from_s = 1\d: the run is over by then"):
+            read_scenario(path)
+    else:
+        assert len(read_scenario(path).goals) == 1

@@ -111,6 +111,14 @@ def test_a_wrong_table_is_refused_with_its_place(table: dict[str, Any], says: st
     assert "x.toml: [[when]] 1" in str(refused.value)
 
 
+@pytest.mark.parametrize("chain", ["aa", "ab ba", "ab bc ca", "xa ab ba"])
+def test_whens_that_wait_for_each_other_are_refused(chain: str) -> None:
+    rows = [chain] if len(chain) == 2 else chain.split()
+    tables = [{"id": row[0], "after": row[1], "event": "time 1", "do": "end"} for row in rows]
+    with pytest.raises(ScenarioError, match="in turn: neither happens"):
+        load_whens(tables, P2DX, "x.toml")
+
+
 def test_mode_a_has_no_controller_to_break() -> None:
     with pytest.raises(ScenarioError, match="mode direct has none"):
         made({"event": "contact", "do": "inject", "fault": "reboot"}, mode="direct")

@@ -1,0 +1,49 @@
+"""The run folder of robots that share a world: one of its own for each, and all of their events as one stream.
+
+Invariant: events come in order of time, and at one instant in the order of the robots.
+"""
+
+import heapq
+import json
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import cast
+
+from robot_bench.events.kinds import Event
+from robot_bench.recording.run_record import TRACE_NAME, read_events, read_meta
+from robot_bench.recording.summary import SUMMARY_NAME
+from simbase.timing import Nanos
+
+
+def robots_in(folder: Path) -> list[str]:
+    """Return the robots of a run folder by name, in the scenario's order; none where it is not one of several."""
+    if (folder / TRACE_NAME).is_file() or not folder.is_dir():
+        return []
+    there = sorted(one.name for one in folder.iterdir() if (one / TRACE_NAME).is_file())
+    told = cast("Sequence[str]", read_meta(folder / there[0]).get("robots") or ()) if there else ()
+    return [name for name in told if name in there]
+
+
+def scenario_of(folder: Path) -> str:
+    """Return the name of the scenario that a folder of several robots was made with, as far as it tells."""
+    try:
+        return str(json.loads((folder / SUMMARY_NAME).read_text(encoding="utf-8"))["scenario"])
+    except (OSError, ValueError, KeyError, TypeError):  # a run that was cut has none
+        return folder.name
+
+
+def named_events(folder: Path) -> Iterator[tuple[str, Event]]:
+    """Play back the traces of a run folder: each event with the robot that tells it; with "" where there is one.
+
+    Raises:
+        TraceError: As of `read_events`.
+    """
+    names = robots_in(folder) or [""]
+    streams = [_placed(place, read_events(folder / name)) for place, name in enumerate(names)]
+    for _, place, event in heapq.merge(*streams, key=lambda row: row[:2]):
+        yield names[place], event
+
+
+def _placed(place: int, events: Iterable[Event]) -> Iterator[tuple[Nanos, int, Event]]:
+    for event in events:
+        yield event.t, place, event
