@@ -127,10 +127,11 @@ def main(seconds: float) -> int:
     )
     for name, types in sorted(peer.get_topic_names_and_types()):
         print(f"  {name:24} {', '.join(types)}")
-    before, start, described = counted(peer), peer.newest("odom"), peer.newest("robot_description")
+    before, start = counted(peer), peer.newest("odom")
     twist = Twist()
     twist.linear.x, twist.angular.z = 0.2, 0.3
     peer.spin(ALL_S)
+    described = peer.newest("robot_description")
     everything = {topic: len(found) for topic, found in sorted(peer.heard.items())}
     print("\nheard:", ", ".join(f"{topic} {count}" for topic, count in everything.items()))
     for topic in peer.hearing.keys() - NAVIGATION:
