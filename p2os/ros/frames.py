@@ -12,7 +12,7 @@ from p2os.robots.parameters import RobotParameters
 from p2os.ros.codec import Message
 from simbase.timing import NS_PER_S, Nanos
 
-ODOM, BASE, CASTER = "odom", "base_link", "caster"
+ODOM, BASE, CASTER, LASER = "odom", "base_link", "caster", "laser"
 WHEELS = ("left_wheel", "right_wheel")
 JOINTS = tuple(f"{wheel}_joint" for wheel in WHEELS)
 
@@ -24,15 +24,17 @@ class Frames:
     Args:
         parameters: Its measures.
         prefix: What the names begin with, such as "robot1/"; "" for none.
+        has_laser: Whether a simulated one is on it, where the parameters say.
     """
 
     parameters: RobotParameters
     prefix: str = ""
+    has_laser: bool = False
 
     @classmethod
-    def of(cls, parameters: RobotParameters, namespace: str) -> "Frames":
+    def of(cls, parameters: RobotParameters, namespace: str, *, has_laser: bool = False) -> "Frames":
         """Return the frames of a robot in a namespace of ROS."""
-        return cls(parameters, f"{namespace.strip('/')}/" if namespace else "")
+        return cls(parameters, f"{namespace.strip('/')}/" if namespace else "", has_laser)
 
     def name(self, frame: str) -> str:
         """Return a frame's whole name."""
@@ -43,7 +45,7 @@ class Frames:
         return self.name(f"sonar_{number}")
 
     def fixed(self, stamp: Nanos, sonars: Iterable[int]) -> list[Message]:
-        """Return what never moves on the robot: these sonar, and the caster."""
+        """Return what never moves on the robot: these sonar, the laser, and the caster."""
         parameters, base = self.parameters, self.name(BASE)
         found = []
         for number in sonars:
@@ -51,6 +53,10 @@ class Frames:
             at = (place.x_mm / 1000, place.y_mm / 1000, parameters.sonar_height_m)
             turned = about_z(math.radians(place.heading_deg))
             found.append(transform(stamp, base, self.sonar(number), at, turned))
+        if self.has_laser:
+            laser = parameters.equipment
+            at = (laser.laser_x_mm / 1000, laser.laser_y_mm / 1000, parameters.sonar_height_m)
+            found.append(transform(stamp, base, self.name(LASER), at, about_z(0.0)))
         body = parameters.body
         at = (body.caster_x_m, 0.0, body.caster_radius_m)
         return [*found, transform(stamp, base, self.name(CASTER), at, about_z(0.0))]

@@ -13,9 +13,11 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from p2os.client.robot_state import RobotState, SonarEcho
+from p2os.pioneer.devices.laser import LaserModel
+from p2os.protocol.packets import SimLaserPacket
 from p2os.robots.parameters import RobotParameters
 from p2os.ros.codec import Message
-from p2os.ros.frames import BASE, JOINTS, ODOM, Frames, about_z, header
+from p2os.ros.frames import BASE, JOINTS, LASER, ODOM, Frames, about_z, header
 from simbase.timing import Nanos
 
 #: metres a metre and radians a radian: the odometry's error of AMRISim's Pioneers.
@@ -162,6 +164,39 @@ def sonar_points(stamp: Nanos, frames: Frames, echoes: Iterable[SonarEcho]) -> M
         "data": b"".join(points),
         "is_dense": True,
     }
+
+
+class Scans:
+    """Puts the packets of a simulated laser together.
+
+    Args:
+        laser: Its field, step and range.
+        frames: The robot's.
+    """
+
+    def __init__(self, laser: LaserModel, frames: Frames) -> None:
+        self._laser, self._frames = laser, frames
+        self._ranges_m: list[float] = []
+
+    def take(self, packet: SimLaserPacket, stamp: Nanos) -> Message | None:
+        """Return a sensor_msgs/LaserScan with the last packet of a sweep; a sweep with a gap is left out."""
+        if packet.first == 0:
+            self._ranges_m = []
+        if packet.first != len(self._ranges_m):
+            return None
+        self._ranges_m += [mm / 1000 for mm in packet.ranges_mm]
+        if len(self._ranges_m) != packet.total or packet.total != self._laser.readings:
+            return None
+        laser, step_rad = self._laser, math.radians(self._laser.step_cdeg / 100)
+        first_rad = math.radians(laser.start_deg)
+        return {
+            "header": header(stamp, self._frames.name(LASER)),
+            "angle_min": first_rad,
+            "angle_max": first_rad + step_rad * (laser.readings - 1),
+            "angle_increment": step_rad,
+            "range_max": laser.range_m,
+            "ranges": [math.inf if one >= laser.range_m else one for one in self._ranges_m],
+        }
 
 
 def battery(stamp: Nanos, state: RobotState) -> Message:

@@ -14,10 +14,14 @@ from dataclasses import dataclass
 from typing import TypeAlias, cast
 
 from p2os.client.robot_state import RobotState
+from p2os.pioneer.devices.laser import LaserModel
+from p2os.protocol.commands import CommandNumber
+from p2os.protocol.packets import ServerPacket, SimLaserPacket
 from p2os.robots.parameters import RobotParameters
 from p2os.ros.codec import Message
 from p2os.ros.frames import Frames
 from p2os.ros.robot_messages import (
+    Scans,
     WheelTravel,
     battery,
     bumpers,
@@ -85,6 +89,7 @@ class RobotNode:
         deadman_ns: Nobody asked for a speed for so long: the robot is stopped.
         bumpers_fitted: Segments in front and at the rear.
         motor_step_mps: Rim speed of one step of `motor_left` and `motor_right`.
+        laser: The simulated one that the robot is asked for; None: none.
     """
 
     def __init__(
@@ -95,8 +100,11 @@ class RobotNode:
         deadman_ns: Nanos,
         bumpers_fitted: tuple[int, int] = (0, 0),
         motor_step_mps: float = STEP_MPS,
+        laser: LaserModel | None = None,
     ) -> None:
-        self.frames = Frames.of(parameters, options.namespace)
+        self.frames = Frames.of(parameters, options.namespace, has_laser=laser is not None)
+        self._laser = laser
+        self._scans = None if laser is None else Scans(laser, self.frames)
         self._options = options
         self._deadman_ns = deadman_ns
         #: When the robot is stopped; None while nothing moves it.
@@ -114,6 +122,8 @@ class RobotNode:
     def announced(self) -> Iterator[Topic]:
         """Yield what is published from the beginning."""
         yield from (self._topic(key) for key in ALWAYS)
+        if self._laser is not None:
+            yield self._topic("scan")
         for number in self._sonars:
             yield self._topic("range", number)
             yield self._topic("distance_sensor", number + FIRST)
@@ -152,6 +162,21 @@ class RobotNode:
             self._motors_on = state.motors_enabled
             found.append((self._topic("motors_state"), {"data": state.motors_enabled}))
         return found
+
+    def at_connection(self) -> Iterator[tuple[CommandNumber, int]]:
+        """Yield the commands and arguments that a session begins with: the laser's."""
+        if self._laser is not None:
+            yield CommandNumber.SIM_LRF_SET_FOV_START, self._laser.start_deg
+            yield CommandNumber.SIM_LRF_SET_FOV_END, self._laser.end_deg
+            yield CommandNumber.SIM_LRF_SET_RES, self._laser.step_cdeg
+            yield CommandNumber.SIM_LRF_ENABLE, 1
+
+    def take_packet(self, packet: ServerPacket, stamp: Nanos) -> list[Outgoing]:
+        """Return what a packet that is no state makes: a scan, where it ends one."""
+        if self._scans is None or not isinstance(packet, SimLaserPacket):
+            return []
+        scan = self._scans.take(packet, stamp)
+        return [] if scan is None else [(self._topic("scan"), scan)]
 
     def tell_health(
         self, state: RobotState | None, stamp: Nanos, link: str, *, is_open: bool, counts: Mapping[str, object]

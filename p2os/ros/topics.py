@@ -39,6 +39,7 @@ TOPICS: Mapping[str, TopicRow] = {
     "joint_states": TopicRow(name="joint_states", type="sensor_msgs/msg/JointState"),
     "range": TopicRow(name="sonar_{}", type="sensor_msgs/msg/Range"),
     "sonar": TopicRow(name="sonar", type="sensor_msgs/msg/PointCloud2"),
+    "scan": TopicRow(name="scan", type="sensor_msgs/msg/LaserScan"),
     "battery_state": TopicRow(name="battery_state", type="sensor_msgs/msg/BatteryState"),
     "diagnostics": TopicRow(name="/diagnostics", type="diagnostic_msgs/msg/DiagnosticArray"),
     "bumper_front": TopicRow(name="bumper_front", type="std_msgs/msg/UInt8MultiArray"),

@@ -5,7 +5,7 @@ Run it with a Python that has rclpy; it imports nothing of p2os:
     python3.11 -m venv rospeer
     rospeer/bin/pip install ros-jazzy-rclpy ros-jazzy-rmw-fastrtps-cpp ros-jazzy-sensor-msgs \
         ros-jazzy-nav-msgs ros-jazzy-diagnostic-msgs ros-jazzy-std-srvs ros-jazzy-rosgraph-msgs
-    p2os serve --all-sonar & p2os ros tcp:127.0.0.1:8101 --domain 42 &
+    p2os serve --all-sonar --laser lms2xx & p2os ros tcp:127.0.0.1:8101 --laser lms2xx --domain 42 &
     ROS_DOMAIN_ID=42 ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST rospeer/bin/python tools/bench/ros_stock_peer.py 10
 
 Those wheels are a third party's build of ROS; a ROS 2 of one's own does as well. It publishes cmd_vel at 20 Hz for so
@@ -26,13 +26,13 @@ from geometry_msgs.msg import Twist, TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from sensor_msgs.msg import BatteryState, JointState, PointCloud2, Range
+from sensor_msgs.msg import BatteryState, JointState, LaserScan, PointCloud2, Range
 from std_msgs.msg import Int32, String
 
 RATE_HZ = 20
 SETTLE_S, ALL_S = 2.0, 3.0
 #: What navigation hears; latency and loss are of this traffic: one rclpy process hears no 500 messages a second.
-NAVIGATION = {"odom", "sonar", "diagnostics"}
+NAVIGATION = {"odom", "sonar", "scan", "diagnostics"}
 
 
 class Peer(Node):
@@ -45,7 +45,7 @@ class Peer(Node):
         rows = [
             (Odometry, "odom"), (JointState, "joint_states"), (PointCloud2, "sonar"), (BatteryState, "battery_state"),
             (DiagnosticArray, "diagnostics"), (Int32, "encoder_left"), (Int32, "encoder_right"),
-            *((Range, f"sonar_{number}") for number in range(8)),
+            (LaserScan, "scan"), *((Range, f"sonar_{number}") for number in range(8)),
             *((Int32, f"distance_sensor_{number}") for number in range(1, 9)),
         ]  # fmt: skip
         for kind, topic in rows:
@@ -127,10 +127,11 @@ def main(seconds: float) -> int:
     )
     for name, types in sorted(peer.get_topic_names_and_types()):
         print(f"  {name:24} {', '.join(types)}")
-    before, start, described = counted(peer), peer.newest("odom"), peer.newest("robot_description")
+    before, start = counted(peer), peer.newest("odom")
     twist = Twist()
     twist.linear.x, twist.angular.z = 0.2, 0.3
     peer.spin(ALL_S)
+    described = peer.newest("robot_description")
     everything = {topic: len(found) for topic, found in sorted(peer.heard.items())}
     print("\nheard:", ", ".join(f"{topic} {count}" for topic, count in everything.items()))
     for topic in peer.hearing.keys() - NAVIGATION:
@@ -147,7 +148,7 @@ def main(seconds: float) -> int:
         if hasattr(found[0][1], "header") and len(found) > 20:
             delays = sorted(latencies_ms(found))
             row += f" {statistics.median(delays):10.2f} {delays[int(len(delays) * 0.99)]:8.2f}"
-            row += f" {lost(found)[0]:5d}" if topic == "odom" else ""
+            row += f" {lost(found)[0]:5d}" if topic in {"odom", "scan"} else ""
         print(row)
     print(f"cmd_vel: {sent} sent at {RATE_HZ} Hz, {taken} taken by the node")
     moved = 0.0

@@ -31,8 +31,10 @@ from p2os.client.notices import (
     LinkLost,
     MotorsDisabled,
     MotorsDisabledError,
+    PacketArrived,
     words_of,
 )
+from p2os.pioneer.devices.laser import read_laser
 from p2os.robots.parameters import load_parameters
 from p2os.ros.frames import Frames
 from p2os.ros.robot_node import Asked, Motors, Refused, ResetOdometry, RobotNode, Speed, Stop
@@ -60,6 +62,7 @@ Examples:
   p2os ros URL --interface 192.168.1.5         for other machines, too
   p2os ros URL --transport zenoh --router      for rmw_zenoh
   p2os ros URL --namespace /robot1             beside others
+  p2os ros URL --laser lms2xx                  with the laser of `p2os serve --laser`
   p2os ros urdf p2dx --out p2dx.urdf           what RViz draws
 """
 #: chosen: within it a loop of 10 Hz may lose four messages.
@@ -111,6 +114,10 @@ def ros(
         float,
         option(SPEED, "--motor-step", purpose="Of motor_left and _right.", above_zero=True, shown=f"{STEP_MPS:g}m/s"),
     ] = STEP_MPS,
+    laser: Annotated[
+        str | None,
+        typer.Option(help="Ask a simulator for its laser: topic scan.", metavar="MODEL|FIELD,STEP,RANGE"),
+    ] = None,
     robot: ReportedModel = "",
     lasts_ns: Annotated[Nanos | None, option(TIME, "--for", purpose="End after so long.", above_zero=True)] = None,
     out: Annotated[Path | None, typer.Option(help="With urdf: the file; else it is printed.", metavar="FILE")] = None,
@@ -125,14 +132,16 @@ def ros(
         return
     if model is not None or out is not None or force:
         raise UsageError("a model, --out and --force go with urdf", hint="--robot MODEL for the robot at a URL")
+    scanner = None if laser is None else read_laser(laser)
     with contextlib.closing(open_transport(transport, options)) as network:
         client = Robot(url, model=robot or None, deadman_s=2 * deadman_ns / NS_PER_S)  # the second one
         with held(client, moves=True):
             config = client.config
             fitted = (0, 0) if config is None else (config.frontbumps, config.rearbumps)
             robot_node = RobotNode(
-                client.parameters, options, deadman_ns=deadman_ns, bumpers_fitted=fitted, motor_step_mps=motor_step
-            )
+                client.parameters, options, deadman_ns=deadman_ns, bumpers_fitted=fitted, motor_step_mps=motor_step,
+                laser=scanner,
+            )  # fmt: skip
             where = f"domain {domain}, {interface}"
             typer.echo(f"/{name} on {transport}, {where}: {client.parameters.title} on {url}; Ctrl-C ends")
             sys.stdout.flush()
@@ -187,6 +196,7 @@ class NodeLoop:
             self._network.announce(topic)
         for topic, message in self._node.first(stamp_of(wall_clock())):
             self._network.publish(topic, message)
+        self._begin()
         endings = (self._client.on_state(self._tell), self._client.on_event(self._tell))
         try:
             while not is_over():
@@ -230,7 +240,18 @@ class NodeLoop:
         self._news.append(news)
         self._network.wake()
 
+    def _begin(self) -> None:
+        """Ask the robot for what a session begins with."""
+        for number, argument in self._node.at_connection():
+            with contextlib.suppress(LinkLostError):  # the next session asks again
+                self._client.send(number, argument)
+
     def _take_notice(self, notice: Notice) -> None:
+        if isinstance(notice, PacketArrived):
+            for topic, message in self._node.take_packet(notice.packet, stamp_of(wall_clock())):
+                self._network.publish(topic, message)
+        if isinstance(notice, Connected):
+            self._begin()
         if isinstance(notice, LinkLost | GaveUp):
             self._is_open, self._link = False, words_of(notice)
         if isinstance(notice, LinkLost | GapStopped | DeadmanStopped | MotorsDisabled):

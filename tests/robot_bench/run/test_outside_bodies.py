@@ -78,16 +78,18 @@ def test_a_body_in_c_has_walls_of_its_own(plan_view: Path) -> None:
         assert "own wall" in bench.trace.text
 
 
-@pytest.mark.slow
-@pytest.mark.bullet
-@pytest.mark.skipif(find_spec("pybullet") is None, reason="pybullet is not installed")
-def test_a_body_on_a_physics_engine_in_another_process_gives_the_same_trace_twice() -> None:
-    with started(sys.executable, SOURCE / "bullet_body.py", "tcp:127.0.0.1:0") as address:
+def same_trace_twice(name: str, *command: str | Path, saves: bool) -> None:
+    """Have a body on an engine drive two benches alike, one of them forked where it saves, and push a cart."""
+    with started(*command, "tcp:127.0.0.1:0") as address:
         first, other = bench_with(address), bench_with(address)
+        first.run_until("3 s")
+        if saves:
+            assert hash_of(first.fork()) == hash_of(other)
+        else:
+            with pytest.raises(UsageError, match=rf"the outside body {name} at tcp:.* cannot save its state"):
+                first.fork()
         assert hash_of(first) == hash_of(other)
         assert 0.3 < first.pose.x_m < 2.5
-        with pytest.raises(UsageError, match=r"the outside body PyBullet at tcp:.* cannot save its state"):
-            first.fork()
         body = first.parts.body
         body.place(Obstacle(name="cart", x_m=body.state.x_m + 0.5, y_m=0.0, length_m=0.2, width_m=0.6, mass_kg=1.0))
         for _ in range(2500):
@@ -95,6 +97,31 @@ def test_a_body_on_a_physics_engine_in_another_process_gives_the_same_trace_twic
         assert [hit.name for hit in body.take_hits()] == ["cart"]
         assert [thing.name for thing in body.take_moved()] == ["cart"]
         assert body.clearance() < 0.05
+
+
+@pytest.mark.slow
+@pytest.mark.bullet
+@pytest.mark.parametrize(
+    ("engine", "file", "name"), [("pybullet", "bullet_body.py", "PyBullet"), ("pydrake", "drake_body.py", "Drake")]
+)
+def test_a_body_on_a_physics_engine_in_another_process_gives_the_same_trace_twice(
+    engine: str, file: str, name: str
+) -> None:
+    if find_spec(engine) is None:
+        pytest.skip(f"{engine} is not installed")
+    same_trace_twice(name, sys.executable, SOURCE / file, saves=engine == "pydrake")
+
+
+@needs_compiler
+@pytest.mark.soak  # DART's headers take most of a minute
+def test_a_body_on_dart_in_c_gives_the_same_trace_twice_and_from_a_fork(tmp_path: Path) -> None:
+    found = subprocess.run(["pkg-config", "--cflags", "--libs", "dart"], capture_output=True, text=True, check=False)
+    if found.returncode != 0:
+        pytest.skip("DART is not installed: apt-get install libdart-dev")
+    source, program = SOURCE / "dart_body.cpp", tmp_path / "dart_body"
+    words = ["g++", "-O1", "-Wall", "-o", program, source, *found.stdout.split(), "-std=c++17"]
+    subprocess.run(words, check=True, timeout=300)
+    same_trace_twice("DART", program, saves=True)
 
 
 @pytest.mark.parametrize("mode", ["adapter", "direct"])
