@@ -28,7 +28,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 MODEL = tuple(
     f"adapter_sim/{name}.py"
-    for name in ("adapter", "codec", "distances", "driver", "encoders", "masters", "mixing", "pins", "session")
+    for name in ("adapter", "codec", "distances", "driver", "duty", "encoders", "masters", "mixing", "pins", "session")
 )
 FIRMWARE = tuple(
     f"adapter_fw/core/{name}.cpp"
@@ -275,18 +275,16 @@ def score(side: str, sample: int, seed: int) -> Score:
         for change in drawn:
             if judged == sample:
                 break
-            if (
-                (mutant := change()) is None
-                or not judge.is_other_program(mutant)
-                or (noticed := judge.is_noticed(mutant)) is None
-            ):
+            if (mutant := change()) is None or not judge.is_other_program(mutant):
+                continue
+            excused = (mutant.path, mutant.before, mutant.after) in equivalents()
+            if not excused and (noticed := judge.is_noticed(mutant)) is None:
                 continue
             judged += 1
             sys.stderr.write(f"\r{judged} of {sample}")
-            if noticed:
+            if not excused and noticed:
                 result.noticed += 1
                 continue
-            excused = (mutant.path, mutant.before, mutant.after) in equivalents()
             (result.excused if excused else result.unnoticed).append(mutant)
             sys.stderr.write(f"\r{judged}: {'excused' if excused else 'NOT NOTICED'} {mutant.name}\n")
     return result
