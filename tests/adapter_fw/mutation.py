@@ -44,6 +44,7 @@ LIVES, LIFE_LIMIT_S = 120, 20
 _BEHAVIOUR = "tests/adapter_sim/test_adapter_behaviour.py"
 #: Modules of which others than the adapter use a part: their own tests are asked too.
 OWN_TESTS = {
+    "adapter_sim.duty": "tests/adapter_sim/test_adapter_duty.py",
     "adapter_sim.codec": "tests/adapter_sim/test_adapter_codec.py",
     "adapter_sim.distances": f"{_BEHAVIOUR}::test_a_default_adapter_takes_half_the_sonar_range",
 }
