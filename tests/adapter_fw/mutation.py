@@ -41,13 +41,8 @@ FIRMWARE = tuple(
 SIDES = {"model": MODEL, "firmware": FIRMWARE}
 #: Lives until a change counts as unnoticed, and how long one may take: an endless loop is noticed by this.
 LIVES, LIFE_LIMIT_S = 120, 20
-_BEHAVIOUR = "tests/adapter_sim/test_adapter_behaviour.py"
-#: Modules of which others than the adapter use a part: their own tests are asked too.
-OWN_TESTS = {
-    "adapter_sim.duty": "tests/adapter_sim/test_adapter_duty.py",
-    "adapter_sim.codec": "tests/adapter_sim/test_adapter_codec.py",
-    "adapter_sim.distances": f"{_BEHAVIOUR}::test_a_default_adapter_takes_half_the_sonar_range",
-}
+#: What is asked where no life notices: waves, whole adapters, words.
+OWN_TESTS = "tests/adapter_sim"
 #: The same on the firmware's side: what no life exercises.
 UNITS = "adapter_fw/selftest/units.cpp"
 #: Operators of cosmic-ray that change no arithmetic or order: what they break is found by the type check.
@@ -239,8 +234,9 @@ def live(module: str | None, file: str | None, library: str | None) -> int:
         signal.alarm(LIFE_LIMIT_S)
         boundaries.Life(seed).live()
     signal.alarm(0)
-    own = OWN_TESTS.get(module or "")
-    return 0 if own is None else pytest.main(["-q", "-x", "-p", "no:cacheprovider", own])
+    if module is None:
+        return 0
+    return pytest.main(["-q", "-x", "-m", "not slow and not soak", "-p", "no:cacheprovider", OWN_TESTS])
 
 
 def _replace_module(name: str, file: str) -> None:

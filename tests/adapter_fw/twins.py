@@ -16,8 +16,8 @@ from tests.adapter_sim.conftest import FakePins
 
 PINOUT = load_pinout()
 MS = NS_PER_MS
-#: Events whose details are numbers; the words of the others are each side's own.
-EXACT = {"command", "stall", "connected"}
+#: Events whose details both say alike; the words of the others are each side's own.
+EXACT = {"command", "stall", "connected", "connecting"}
 #: Counters that both keep, of the line and of the session.
 WIRE_COUNTERS = ("frames", "noise_bytes", "bad_checksums", "bad_counts", "stalled", "rescued")
 CLIENT_COUNTERS = ("frames_received", "frames_ignored", "malformed", "sync_timeouts", "losses")
