@@ -84,10 +84,10 @@ soak: setup mutation-tools
 peers: setup
 	@$(BIN)/python -m tools.peers $(PEERS)
 
-# What changes the adapter's two sides in `make soak`. Without universalmutator's own wishes: one of them is a copy of
+# What changes the adapter's two sides in `make soak`, and an ESP32 that runs its core. Without universalmutator's own wishes: one of them is a copy of
 # `typing` that shadows Python's.
 mutation-tools: setup
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check 'cosmic-ray==8.7.0'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check 'cosmic-ray==8.7.0' 'labwired==0.25.0'
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps 'universalmutator==1.14.1'
 
 # Rebuilds the example firmware (needs gcc-arm-none-eabi); `make test` compares.

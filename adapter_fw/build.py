@@ -10,9 +10,10 @@
     cortex-m   the self-test on an STM32F103
     bluepill   the adapter itself on an STM32F103, its USART as the P2OS line (bluepill/)
     xtensa     the self-test on an ESP8266's core
+    esp32-core the same for an ESP32's memory, without its system: code in IRAM, what is read in bytes in DRAM
 
 Prints how much flash and RAM the core alone takes. The ESP32 itself cannot be
-built here: its compiler is not in Debian; the Xtensa target shares the
+built here: its compiler is not in Debian; the Xtensa targets share the
 instruction set but not the windowed calls.
 """
 
@@ -102,6 +103,21 @@ def _on_cortex_m(output: str, *sources: Path) -> Target:
     )
 
 
+def _on_xtensa(start: str, layout: str) -> Target:
+    folder = SELFTEST / "xtensa"
+    return Target(
+        output=f"selftest-{layout.removesuffix('.ld')}.elf",
+        compiler="xtensa-lx106-elf-g++",
+        package="gcc-xtensa-lx106",
+        flags=("-Os", "-g", "-ffreestanding", "-mlongcalls", "-mtext-section-literals",
+               "-isystem", str(folder / "include")),
+        sources=(*TRIAL, folder / "main.cpp", SELFTEST / "bare_memory.cpp", folder / start, folder / "arithmetic.c"),
+        link=("-nostdlib", "-Wl,--gc-sections", "-T", str(folder / layout)),
+        after=("-lgcc",),
+        is_small=True,
+    )  # fmt: skip
+
+
 TARGETS = {
     "host": _on_host("selftest-host", *TRIAL, SELFTEST / "host.cpp"),
     "program": _on_host("p2os-adapter", *sorted((HERE / "host").glob("*.cpp"))),
@@ -116,18 +132,8 @@ TARGETS = {
     "replay": _on_host("replay", *sorted((HERE / "fuzz").glob("*.cpp")), SELFTEST / "robot.cpp"),
     "cortex-m": _on_cortex_m("selftest-cortex-m.elf", *TRIAL, SELFTEST / "cortex_m.cpp"),
     "bluepill": _on_cortex_m("adapter-bluepill.elf", *sorted((HERE / "bluepill").glob("*.cpp"))),
-    "xtensa": Target(
-        output="selftest-xtensa.elf",
-        compiler="xtensa-lx106-elf-g++",
-        package="gcc-xtensa-lx106",
-        flags=("-Os", "-g", "-ffreestanding", "-mlongcalls", "-mtext-section-literals",
-               "-isystem", str(SELFTEST / "xtensa" / "include")),
-        sources=(*TRIAL, SELFTEST / "xtensa" / "main.cpp", SELFTEST / "bare_memory.cpp",
-                 SELFTEST / "xtensa" / "start.S", SELFTEST / "xtensa" / "arithmetic.c"),
-        link=("-nostdlib", "-Wl,--gc-sections", "-T", str(SELFTEST / "xtensa" / "sim.ld")),
-        after=("-lgcc",),
-        is_small=True,
-    ),
+    "xtensa": _on_xtensa("start.S", "sim.ld"),
+    "esp32-core": _on_xtensa("esp32.S", "esp32.ld"),
 }  # fmt: skip
 
 

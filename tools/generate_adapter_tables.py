@@ -34,6 +34,7 @@ TIMES = (
 SMALL = frozenset({"sync_attempts", "sample_count", "stop_repeats", "pad_trigger_dead", "pad_stick_dead"})
 AUXILIARIES = (
     "p2os_rx", "p2os_tx", "mode_jumper", "mode_button", "status_led", "shift_data", "shift_clock", "shift_latch",
+    "shift_enable",
 )  # fmt: skip
 
 

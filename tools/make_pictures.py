@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hardware.case.picture import draw
-from hardware.pcb.circuit.design import BOARD_VARIANTS, VARIANTS
+from hardware.pcb.circuit.design import VARIANTS
 from hardware.pcb.outputs import generated_files, pictures
 from hardware.pcb.spice.decks import decks
 
@@ -67,7 +67,7 @@ def groups() -> Iterator[Group]:
     yield Group(names=("demo.png",), files=files, make=make_demo)
     files = ("bluepill_sim/parts/*.py", "tests/bluepill_sim/firmware/parts.elf", "tools/part_pictures.py")
     yield Group(names=("parts.png",), files=files, make=make_parts)
-    for variant in BOARD_VARIANTS:
+    for variant in VARIANTS:
         sides = ("top", "bottom", "view", "bare") if variant == "rev-b" else ("top",)
         yield Group(names=tuple(f"board/{variant}-{side}.png" for side in sides),
                     files=(f"hardware/pcb/generated/{variant}/{variant}.kicad_pcb",

@@ -35,7 +35,8 @@ constexpr Field<WireNumbers> WIRES[] = {
 constexpr const char* STATUS[] = {
     "motor1", "motor2", "forward_mm_s", "turn_deg_s", "left_count", "right_count", "left_shown", "right_shown",
     "sips", "jumps", "driven", "levels", "baud", "master", "frames", "noise_bytes", "bad_checksums", "bad_counts",
-    "stalled", "rescued", "malformed", "losses", "overflows",
+    "stalled", "rescued", "frames_received", "frames_ignored", "malformed", "sync_timeouts",
+    "losses", "overflows",
 };
 
 template <typename Owner, std::size_t SIZE>
@@ -161,7 +162,8 @@ void adapter_status(const adapter_handle* handle, int64_t* values) {
       part.counts().right, part.counts_shown().left, part.counts_shown().right, part.sips(), part.jumps(),
       part.outputs().driven(), part.outputs().levels(), part.baud(), static_cast<std::int64_t>(part.master()),
       wire.frames, wire.noise_bytes, wire.bad_checksums, wire.bad_counts, wire.stalled, wire.rescued,
-      client.malformed, client.losses, client.overflows,
+      client.frames_received, client.frames_ignored, client.malformed, client.sync_timeouts, client.losses,
+      client.overflows,
   };
   static_assert(sizeof status / sizeof status[0] == sizeof STATUS / sizeof STATUS[0], "one value a name");
   std::memcpy(values, status, sizeof status);

@@ -126,6 +126,11 @@ void check_duties() {
   claim(meter.duty(25 * NS_PER_MS + 9'999) == 500, "a duty lasts for the time-out");
   claim(meter.duty(25 * NS_PER_MS + 10'000) == 1'000, "from then on it is a level");
 
+  meter.restart(false);
+  claim(meter.duty(50 * NS_PER_MS) == 0, "a wire that is low has no duty");
+  meter.restart(true);
+  claim(meter.duty(50 * NS_PER_MS) == 1'000, "one that is high has all of it");
+
   adapter::DutyMeter wraps(25 * NS_PER_MS);
   const std::uint32_t stamps[] = {0xFFFF'FF00U, 0xFFFF'FF80U, 0x100U};
   wraps.edge(true, 0, stamps[0]);
@@ -315,6 +320,8 @@ void check_client() {
     }
     return count;
   };
+  client.send(p2os::CommandFrame(p2os::CommandNumber::STOP), 0);
+  claim(taken() == 0, "nothing is sent while no session is open");
   client.connect(0);
   claim(client.state() == p2os::ClientState::SYNC0 && taken() > 0, "connect sends SYNC0");
   client.connect(1);

@@ -35,6 +35,8 @@ USB_PLUG_MM = (11.0, 8.5)
 STRAP_MM, STRAP_SLOT_MM, EAR_MM = 25.0, 4.0, 11.0
 TIE_SLOT_MM = (4.0, 2.2)
 LIGHT_MM = 3.2
+#: Rev C has one light more, and the others where every board has them.
+LIGHTS, LIGHTS_VARIANT = ("D6", "D7", "D8", "D9"), "rev-c"
 
 _INNER = (-PLAY_MM, BOARD_WIDTH_MM + PLAY_MM, -PLAY_MM, BOARD_HEIGHT_MM + PLAY_MM)
 _OUTER = (_INNER[0] - WALL_MM, _INNER[1] + WALL_MM, _INNER[2] - WALL_MM, _INNER[3] + WALL_MM)
@@ -77,9 +79,10 @@ def lid() -> Body:
         solids.append(Cylinder(at=at, radius_mm=BOSS_MM / 2, z=lip, is_cut=True, name="room for a spacer"))
         solids.append(Cylinder(at=at, radius_mm=SCREW_HOLE_MM / 2, z=top, is_cut=True, name="screw"))
     solids += [
-        Cylinder(at=part_place(part), radius_mm=LIGHT_MM / 2, z=top, is_cut=True, name=f"light of {part}")
-        for part in ("D6", "D7", "D8")
-    ]
+        Cylinder(at=part_place(part, LIGHTS_VARIANT), radius_mm=LIGHT_MM / 2, z=top, is_cut=True,
+                 name=f"light of {part}")
+        for part in LIGHTS
+    ]  # fmt: skip
     logic, regulator = body_of("J4", index=-1), body_of("U3")
     solids.append(_around(logic, 2.0, top, "LOGIC"))
     solids += [

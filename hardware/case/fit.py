@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from hardware.case import design
 from hardware.case.board import PlacedBox, bodies, body_of, mounting_holes, part_place, through_pads
 from hardware.case.solids import Block, Body
-from hardware.pcb.circuit.design import BOARD_VARIANTS
+from hardware.pcb.circuit.design import VARIANTS, build
 from hardware.pcb.layout.rules import BOARD_HEIGHT_MM, BOARD_THICKNESS_MM, BOARD_WIDTH_MM, CORNER_MM
 
 RASTER_MM = 1.0
@@ -27,7 +27,7 @@ def parts_touch_nothing() -> list[str]:
     """Return the parts of any variant, and boards, that stand in the case's material."""
     return [
         f"{variant}: {box.part} stands in the {body.name} at {_text(at)}"
-        for variant in BOARD_VARIANTS
+        for variant in VARIANTS
         for box in (*bodies(variant), _board())
         for body in _printed()
         if (at := _first_touch(body, box)) is not None
@@ -37,7 +37,7 @@ def parts_touch_nothing() -> list[str]:
 def solder_keeps_off_the_base() -> list[str]:
     """Return the pads whose solder and leads, `SOLDER_MM` below the board, stand in the base."""
     base, wrong = design.base(), []
-    for x, y, radius in through_pads():
+    for x, y, radius in sorted({pad for variant in VARIANTS for pad in through_pads(variant)}):
         space = PlacedBox(part="", x=(x - radius, x + radius), y=(y - radius, y + radius),
                           z=(-BOARD_THICKNESS_MM - SOLDER_MM, -BOARD_THICKNESS_MM - 0.01))  # fmt: skip
         if (at := _first_touch(base, space)) is not None:
@@ -49,7 +49,7 @@ def parts_keep_off_the_spacers() -> list[str]:
     """Return the parts that stand where a spacer is."""
     return [
         f"{variant}: {box.part} stands in the spacer at {_text((*hole, 0.0))}"
-        for variant in BOARD_VARIANTS
+        for variant in VARIANTS
         for box in bodies(variant)
         for hole in mounting_holes(variant)
         if box.z[1] > 0 and _distance(hole[0], box.x) ** 2 + _distance(hole[1], box.y) ** 2 < SPACER_RADIUS_MM**2
@@ -98,7 +98,12 @@ def plugs_reach_their_sockets() -> list[str]:
 def lights_are_seen() -> list[str]:
     """Return the LEDs above which the lid is closed."""
     lid = design.lid()
-    return [part for part in ("D6", "D7", "D8") if lid.holds(*part_place(part), design.SPACER_MM + 1)]
+    return [
+        f"{variant}: {component.ref}"
+        for variant in VARIANTS
+        for component in build(variant).components
+        if component.part.symbol == "LED" and lid.holds(*part_place(component.ref, variant), design.SPACER_MM + 1)
+    ]
 
 
 def a_small_printer_takes_it() -> list[str]:

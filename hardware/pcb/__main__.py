@@ -12,7 +12,7 @@ from pathlib import Path
 from hardware.pcb.checks import suite
 from hardware.pcb.checks.kicad_checks import stitches_of
 from hardware.pcb.checks.results import Verdict, table
-from hardware.pcb.circuit.design import BOARD_VARIANTS, VARIANTS
+from hardware.pcb.circuit.design import VARIANTS
 from hardware.pcb.circuit.design import build as design_of
 from hardware.pcb.circuit.netlist import DesignError
 from hardware.pcb.layout.routing import HERE, RoutingError, run_router
@@ -35,7 +35,7 @@ def main(arguments: list[str] | None = None) -> int:
         ("stitch", "choose the stitching vias anew (needs KiCad)"),
     ):
         one = verbs.add_parser(name, help=words)
-        one.add_argument("variant", nargs="*", help=f"one of {', '.join(BOARD_VARIANTS)}; none for all")
+        one.add_argument("variant", nargs="*", help=f"one of {', '.join(VARIANTS)}; none for all")
     verbs.add_parser("simulate", help="run every circuit simulation and renew the page of their figures")
     comparing = verbs.add_parser("diff", help="lay two boards over each other: old in red, new in green")
     for name in ("old", "new"):
@@ -65,24 +65,17 @@ def _build(_: argparse.Namespace) -> int:
         print("KiCad 9 is not installed: gerbers stay as they are (hint: tools/install_board_tools.sh)")
         return 0
     with tempfile.TemporaryDirectory() as folder:
-        for variant in BOARD_VARIANTS:
+        for variant in VARIANTS:
             board = generated_files.filled_project(variant, Path(folder))
             files = generated_files.fabrication_files(board, Path(folder) / f"{variant}-fabrication")
             target = generated_files.GENERATED / variant / f"{variant}-gerbers.zip"
             target.write_bytes(generated_files.archive(files))
             print(f"{target.name}: {len(files)} files, {target.stat().st_size} bytes")
             kicad_cli.step(board, target.with_name(f"{variant}.step"))
-            _write_reports(variant, board)
-    for variant in VARIANTS:
-        if variant not in BOARD_VARIANTS:
-            _write_reports(variant, None)
+            schematic = target.with_name(f"{variant}.kicad_sch")
+            for name, text in kicad_cli.reports(variant, schematic, board).items():
+                target.with_name(name).write_text(text, encoding="utf-8", newline="\n")
     return 0
-
-
-def _write_reports(variant: str, board: Path | None) -> None:
-    folder = generated_files.GENERATED / variant
-    for name, text in kicad_cli.reports(variant, folder / f"{variant}.kicad_sch", board).items():
-        (folder / name).write_text(text, encoding="utf-8", newline="\n")
 
 
 def _check(given: argparse.Namespace) -> int:
@@ -130,10 +123,10 @@ def _diff(given: argparse.Namespace) -> int:
 
 
 def _variants(names: list[str]) -> list[str]:
-    unknown = [name for name in names if name not in BOARD_VARIANTS]
+    unknown = [name for name in names if name not in VARIANTS]
     if unknown:
-        raise DesignError(f"variant {unknown[0]!r} has no board (one of {', '.join(BOARD_VARIANTS)})")
-    return names or list(BOARD_VARIANTS)
+        raise DesignError(f"variant {unknown[0]!r} is unknown (one of {', '.join(VARIANTS)})")
+    return names or list(VARIANTS)
 
 
 _VERBS = {"build": _build, "check": _check, "route": _route, "stitch": _stitch, "simulate": _simulate, "diff": _diff}

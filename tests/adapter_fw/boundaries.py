@@ -325,13 +325,17 @@ class Life:
             self.twins.pass_time(100 * MS)
 
     def _pad(self) -> None:
-        settings = self.twins.model.settings
-        triggers = [0, settings.pad_trigger_dead, 500, 1_023]
-        sticks = [0, settings.pad_stick_dead, -settings.pad_stick_dead, 300, 511, -511, -512]
-        forward, backward = (self.rng.choice(triggers) + self.rng.choice(BESIDE) for _ in range(2))
-        turn = self.rng.choice(sticks) + self.rng.choice(BESIDE)
         up, down = self.rng.random() < 0.4, self.rng.random() < 0.1
-        self.twins.pad(PadReport(up=up, down=down, forward=forward, backward=backward, turn=turn))
+        self.twins.pad(replace(self._deflected(), up=up, down=down))
+
+    def _deflected(self) -> PadReport:
+        """Return a report at or beside the dead zones and the ends, or anywhere."""
+        settings = self.twins.model.settings
+        triggers = [0, settings.pad_trigger_dead, 500, 1_023, self.rng.randrange(1_024)]
+        sticks = [0, settings.pad_stick_dead, -settings.pad_stick_dead, 300, 511, -511, -512]
+        sticks.append(self.rng.randrange(-512, 512))
+        forward, backward = (self.rng.choice(triggers) + self.rng.choice(BESIDE) for _ in range(2))
+        return PadReport(forward=forward, backward=backward, turn=self.rng.choice(sticks) + self.rng.choice(BESIDE))
 
     def _drive_by_pad(self) -> None:
         self.twins.master(Master.PAD)
@@ -339,7 +343,7 @@ class Life:
             if number < 2 or self.twins.model.state not in OPEN_STATES:
                 self.twins.pad(PadReport(up=number == 1))
             else:
-                self.twins.pad(PadReport(forward=self.rng.randrange(1_024), turn=self.rng.randrange(-512, 512)))
+                self.twins.pad(self._deflected())
             if self.twins.model.state in OPEN_STATES and number % 3 == 0:
                 self.twins.send_sip(raw_x=0, raw_y=0, raw_heading=0)
             self.twins.answer()

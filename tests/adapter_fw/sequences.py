@@ -18,7 +18,7 @@ class Sequence:
     def __init__(
         self, adapter_settings: AdapterSettings, *, has_four_bits: bool, robot: str = "p2dx", start: Nanos = 0
     ) -> None:
-        pinout = {"pinout": parse_pinout(four_bits())} if has_four_bits else {}
+        pinout = {"pinout": parse_pinout(four_bits().replace("safe = 1", "safe = 0", 1))} if has_four_bits else {}
         self.twins = Twins(adapter_settings, robot=robot, start=start, **pinout)
         self.width = 4 if has_four_bits else 3
         #: Of the robot when it is found to stand at its origin.

@@ -40,6 +40,8 @@ class Shell:
         #: The button's pin is pulled up by the chip, as are the pulls of the board.
         self.levels = 1 << (pad_of("mode_button", revision) or 0)
         self.esp32.put_levels(self.levels)
+        for name in ("shift_data", "shift_clock", "shift_latch"):
+            setattr(self.esp32.state, name, pad_of(name, revision) or 0)
 
     @property
     def now_ms(self) -> int:
@@ -69,15 +71,17 @@ class Shell:
         return self.run_ms(wait_ms)
 
     def driven(self) -> dict[str, bool]:
-        """Return the wires that the chip drives, with their levels; of a shift register its outputs."""
+        """Return the wires that the chip drives, with their levels; its shift register only while that is enabled."""
         state = self.esp32.state
+        enable = pad_of("shift_enable", self.revision) or 0
+        is_enabled = bool(state.driven >> enable & 1) and not state.out >> enable & 1
         result = {}
         for wire in PINOUT.wires:
             if wire.direction is Direction.TO_BLUEPILL and wire.role is not WireRole.RESET:
                 pad, pin = pad_of(wire.name, self.revision), wire.esp32_pin(self.revision) or ""
                 if pad is not None and state.driven >> pad & 1:
                     result[wire.name] = bool(state.out >> pad & 1)
-                elif pin.startswith("HC595.Q"):
+                elif is_enabled and pin.startswith("HC595.Q"):
                     result[wire.name] = bool(state.shifted >> ord(pin[-1]) - ord("A") & 1)
         return result
 

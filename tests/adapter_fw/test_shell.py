@@ -19,9 +19,14 @@ BOOT_MS = 300
 
 
 @pytest.fixture(scope="module", params=["esp32-rev_b", "esp32-rev_c"])
-def any_board(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Shell:
+def any_library(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     name: str = request.param
-    return Shell(built(name, tmp_path_factory.mktemp(name))[0], name.removeprefix("esp32-").replace("_", "-"))
+    return built(name, tmp_path_factory.mktemp(name))[0], name.removeprefix("esp32-").replace("_", "-")
+
+
+@pytest.fixture
+def any_board(any_library: tuple[Path, str]) -> Shell:
+    return Shell(*any_library)
 
 
 @pytest.fixture(scope="module")
@@ -48,10 +53,6 @@ def driving(library: Path) -> Shell:
 
 def test_each_wire_stands_on_its_pad_and_nothing_else_is_driven(any_board: Shell) -> None:
     shell = any_board
-    if shell.revision == "rev-c":
-        state = shell.esp32.state
-        for name in ("shift_data", "shift_clock", "shift_latch"):
-            setattr(state, name, pad_of(name, "rev-c"))
     shell.run_ms(BOOT_MS + 10)
     assert "test on" in shell.type("test on")
     outputs = [wire for wire in PINOUT.wires if wire.direction is Direction.TO_BLUEPILL]
@@ -72,9 +73,10 @@ def test_each_wire_stands_on_its_pad_and_nothing_else_is_driven(any_board: Shell
             shell.set(wire.name, False)
 
 
-def test_wires_follow_their_pulls_until_the_boot_is_over(shell: Shell) -> None:
+def test_wires_follow_their_pulls_until_the_boot_is_over(any_board: Shell) -> None:
+    shell = any_board
     said = shell.run_ms(BOOT_MS - 1)
-    assert said.startswith("P2OS adapter 0.2.0, board rev-b; type help\n")
+    assert said.startswith(f"P2OS adapter 0.2.0, board {shell.revision}; type help\n")
     assert shell.driven() == {}
     assert shell.esp32.state.inputs >> 36 & 1, "the motor wires are read"
     shell.run_ms(3)

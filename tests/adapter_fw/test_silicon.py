@@ -74,3 +74,18 @@ def test_an_xtensa_in_qemu_gives_the_same_run(host: Path, tmp_path: Path) -> Non
     assert is_as_documented(result["adapter_bytes"], documented(ADAPTER_BYTES).xtensa)
     assert is_as_documented(size["flash"], documented("core, flash").xtensa)
     assert size["ram"] <= RAM_BYTES
+
+
+@pytest.mark.soak
+def test_an_esp32_in_labwired_gives_the_same_run(host: Path, tmp_path: Path) -> None:
+    labwired = pytest.importorskip("labwired", reason="make mutation-tools")
+    program, _ = built("esp32-core", tmp_path)
+    text = ""
+    with labwired.Sim(program, chip="esp32") as chip:
+        for _ in range(60):
+            chip.run_for("20ms")
+            text += chip.read_uart()
+            if text.endswith("ok\n"):
+                break
+    result = numbers(text)
+    assert {name: result[name] for name in run_host(host, SPAN_S, SEED)} == run_host(host, SPAN_S, SEED)

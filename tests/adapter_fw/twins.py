@@ -16,10 +16,11 @@ from tests.adapter_sim.conftest import FakePins
 
 PINOUT = load_pinout()
 MS = NS_PER_MS
-#: Events whose details are numbers; the words of the others are each side's own.
-EXACT = {"command", "stall", "connected"}
-#: Counters that both keep, by the firmware's name and the model's.
+#: Events whose details both say alike; the words of the others are each side's own.
+EXACT = {"command", "stall", "connected", "connecting"}
+#: Counters that both keep, of the line and of the session.
 WIRE_COUNTERS = ("frames", "noise_bytes", "bad_checksums", "bad_counts", "stalled", "rescued")
+CLIENT_COUNTERS = ("frames_received", "frames_ignored", "malformed", "sync_timeouts", "losses")
 
 
 @dataclass
@@ -154,7 +155,7 @@ class Twins:
         assert (numbers["sips"], numbers["jumps"]) == (status.sips, status.odometry_jumps)
         stats = model.session.stats
         assert [numbers[name] for name in WIRE_COUNTERS] == [getattr(stats.wire, name) for name in WIRE_COUNTERS]
-        assert numbers["malformed"] == stats.malformed
+        assert [numbers[name] for name in CLIENT_COUNTERS] == [getattr(stats, name) for name in CLIENT_COUNTERS]
         assert numbers["overflows"] == 0
         for side in self.sides:
             del side.frames[:-1], side.pins.writes[:], side.events[:]

@@ -34,7 +34,7 @@ def test_every_sync0_has_the_stop_before_it_while_nobody_answers() -> None:
     sent = names(rig)[3:]
     assert sent.count("PULSE") >= 7
     assert sent == ["STOP", "VEL", "RVEL", "PULSE"] * sent.count("PULSE")
-    assert any(what == "no connection" for _, what, _ in rig.events)
+    assert any(what == "no connection" and why.endswith("tries again in 1.0 s") for _, what, why in rig.events)
     rig.to_robot.cut = False
     rig.ms(3_000)
     assert rig.adapter.state == "driving"

@@ -74,7 +74,7 @@ def test_route_and_stitch_write_their_data(capsys, monkeypatch, tmp_path) -> Non
     assert command.main(["stitch"]) == 0
     out = capsys.readouterr().out.splitlines()
     assert out == ["routes/rev-b.txt: 2 tracks, 1 vias", "stitches/rev-b.txt: 2 stitching vias",
-                   "stitches/lm317.txt: 2 stitching vias"]  # fmt: skip
+                   "stitches/lm317.txt: 2 stitching vias", "stitches/rev-c.txt: 2 stitching vias"]  # fmt: skip
     assert (tmp_path / "stitches" / "lm317.txt").read_text(encoding="utf-8") == "1,2\n3,4\n"
 
 
@@ -99,10 +99,10 @@ def test_simulate_without_ngspice_says_so(capsys, monkeypatch) -> None:
     assert "ngspice is not installed" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("words", [["route", "rev-c"], ["stitch", "nonsense"]])
-def test_a_variant_without_a_board_is_one_line(words: list[str], capsys) -> None:
+@pytest.mark.parametrize("words", [["route", "rev-z"], ["stitch", "nonsense"]])
+def test_a_variant_that_is_unknown_is_one_line(words: list[str], capsys) -> None:
     assert command.main(words) == 1
-    assert "has no board (one of rev-b, lm317)" in capsys.readouterr().err
+    assert "is unknown (one of rev-b, lm317, rev-c)" in capsys.readouterr().err
 
 
 def test_an_error_is_one_line_and_no_traceback(capsys, monkeypatch) -> None:

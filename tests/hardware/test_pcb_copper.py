@@ -6,7 +6,7 @@ import shutil
 import pytest
 
 from hardware.pcb.checks import copper
-from hardware.pcb.circuit.design import BOARD_VARIANTS
+from hardware.pcb.circuit.design import VARIANTS
 from hardware.pcb.circuit.design import build as design_of
 from hardware.pcb.circuit.netlist import DesignError, make
 from hardware.pcb.layout import rules
@@ -28,7 +28,7 @@ from hardware.pcb.outputs.pours import kept_stitches, load_stitches, stitch_at, 
 from hardware.pcb.outputs.sexp import node
 
 
-@pytest.mark.parametrize("variant", BOARD_VARIANTS)
+@pytest.mark.parametrize("variant", VARIANTS)
 def test_every_net_is_one_piece_of_copper_as_wide_as_its_class(variant: str) -> None:
     design = design_of(variant)
     assert copper.faults(design, *generated_files.copper_of(design)) == []

@@ -9,7 +9,7 @@ from hardware.pcb.checks.pin_checks import BOARDS, count_by_rule, findings
 from hardware.pcb.circuit.design import VARIANTS, build
 from hardware.pcb.circuit.electrical import Check, all_checks, bom_faults, netlist_faults
 from hardware.pcb.circuit.modules import BLUEPILL_PINS, ESP32_PINS
-from hardware.pcb.circuit.netlist import Design, DesignError, make
+from hardware.pcb.circuit.netlist import POWER_NETS, Design, DesignError, make
 from hardware.pcb.circuit.parts import PARTS, Part
 
 PINOUT = load_pinout()
@@ -73,6 +73,10 @@ def test_netlist_and_bill_of_materials_are_complete(variant: str) -> None:
     design = build(variant)
     assert netlist_faults(design) == []
     assert bom_faults(design) == []
+
+
+def test_every_power_net_is_one_of_some_board() -> None:
+    assert {net for variant in VARIANTS for net in build(variant).nets()} >= POWER_NETS
 
 
 @pytest.mark.parametrize("variant", VARIANTS)

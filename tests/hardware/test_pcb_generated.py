@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from hardware.pcb.checks import gerbers, suite
 from hardware.pcb.checks.results import Verdict, table
-from hardware.pcb.circuit.design import BOARD_VARIANTS
+from hardware.pcb.circuit.design import VARIANTS
 from hardware.pcb.circuit.design import build as design_of
 from hardware.pcb.layout.placement import place
 from hardware.pcb.outputs import generated_files, project
@@ -42,7 +42,7 @@ def test_missing_and_changed_files_are_written_and_others_left_alone(tmp_path, s
     assert generated_files.write_sources(tmp_path) == []
 
 
-@pytest.mark.parametrize("variant", BOARD_VARIANTS)
+@pytest.mark.parametrize("variant", VARIANTS)
 def test_the_board_file_has_every_part_its_net_names_and_no_filling(variant: str, sources: dict[str, str]) -> None:
     tree = parse(sources[f"{variant}/{variant}.kicad_pcb"])
     parts = children(tree, "footprint")
@@ -67,7 +67,7 @@ def test_every_pad_of_the_board_stands_in_the_net_of_the_design(sources: dict[st
     assert {net: members for net, members in found.items() if not net.startswith("unconnected-")} == wanted
 
 
-@pytest.mark.parametrize("variant", BOARD_VARIANTS)
+@pytest.mark.parametrize("variant", VARIANTS)
 def test_bill_of_materials_counts_each_bought_part_once(variant: str, sources: dict[str, str]) -> None:
     lines = list(csv.DictReader(io.StringIO(sources[f"{variant}/{variant}-bom.csv"])))
     design = design_of(variant)
@@ -94,7 +94,7 @@ def test_placement_file_is_the_surface_parts_from_the_lower_left_corner(sources:
     assert "TP1" not in lines
 
 
-@pytest.mark.parametrize("variant", BOARD_VARIANTS)
+@pytest.mark.parametrize("variant", VARIANTS)
 def test_the_assembly_drawing_is_xml_with_a_group_for_each_part(variant: str, sources: dict[str, str]) -> None:
     root = ET.fromstring(sources[f"{variant}/{variant}-assembly.svg"])  # noqa: S314 - our own file
     groups = {element.get("id") for element in root.iter() if element.get("class") == "part"}
@@ -108,7 +108,7 @@ def test_power_nets_have_wide_copper_and_severities_are_the_defaults() -> None:
     assert '"pattern": "+5V"' in text
 
 
-@pytest.mark.parametrize("variant", BOARD_VARIANTS)
+@pytest.mark.parametrize("variant", VARIANTS)
 def test_committed_gerbers_are_read_back_by_another_library(variant: str) -> None:
     if not gerbers.is_installed():
         pytest.skip("gerbonara is not installed: the gerbers are not re-read (hint: make board-tools)")
@@ -137,6 +137,7 @@ def test_a_hole_that_stands_elsewhere_in_the_gerbers_is_named() -> None:
 def test_a_board_without_gerbers_or_without_the_library_says_so(monkeypatch) -> None:
     monkeypatch.setattr(gerbers, "is_installed", lambda: False)
     assert suite.gerbers_reread("rev-b").verdict is Verdict.SKIPPED
+    monkeypatch.setattr(generated_files, "fabrication_archive", lambda _: {})
     assert suite.gerbers_reread("rev-c").detail == "1: there is no archive (hint: make board)"
 
 

@@ -36,6 +36,18 @@ static_assert(are_outputs_in_the_first_register(), "one write must set every out
 
 constexpr std::uint64_t bit_of(std::int8_t pin) { return pin >= 0 ? std::uint64_t{1} << pin : 0; }
 
+//: Low: the shift register drives its outputs.
+constexpr auto SHIFT_ENABLE = static_cast<std::uint32_t>(bit_of(board::SHIFT_ENABLE));
+
+//: Those outputs of a word that hang on the shift register.
+constexpr std::uint32_t shifted_outputs() {
+  std::uint32_t word = 0;
+  for (std::size_t place = 0; place < OUTPUTS; ++place) {
+    word |= board::OUTPUT_PLACES[place] >= 0 ? 1U << place : 0;
+  }
+  return word;
+}
+
 //: Those pins of the first register that carry the outputs of a word.
 std::uint32_t pins_of(std::uint32_t word) {
   std::uint64_t pins = 0;
@@ -131,7 +143,8 @@ void Wires::start() {
   }
   set_up(wires, GPIO_MODE_INPUT, GPIO_PULLDOWN_DISABLE, GPIO_PULLUP_DISABLE);
   if constexpr (HAS_SHIFT_REGISTER) {
-    set_up(bit_of(board::SHIFT_DATA) | bit_of(board::SHIFT_CLOCK) | bit_of(board::SHIFT_LATCH), GPIO_MODE_OUTPUT,
+    GPIO.out_w1ts = SHIFT_ENABLE;
+    set_up(SHIFT_ENABLE | bit_of(board::SHIFT_DATA) | bit_of(board::SHIFT_CLOCK) | bit_of(board::SHIFT_LATCH), GPIO_MODE_OUTPUT,
            GPIO_PULLDOWN_DISABLE, GPIO_PULLUP_DISABLE);
   }
   release(0);
@@ -155,12 +168,14 @@ void Wires::drive(std::uint32_t mask, std::uint32_t levels, p2os::Nanos) {
   GPIO.enable_w1ts = pins_of(mask);
   if constexpr (HAS_SHIFT_REGISTER) {
     shift((shown_ & ~mask) | (levels & mask));
+    GPIO.out_w1tc = (mask & shifted_outputs()) != 0 ? SHIFT_ENABLE : 0;
   }
 }
 
 void Wires::release(p2os::Nanos) {
   GPIO.enable_w1tc = pins_of(~0U);
   if constexpr (HAS_SHIFT_REGISTER) {
+    GPIO.out_w1ts = SHIFT_ENABLE;
     shift(board::WIRES.safe_levels);
   }
 }

@@ -24,7 +24,7 @@ class Wires final : public hal::PinsIn, public hal::PinsOut, public hal::OutputP
   std::uint32_t read(p2os::Nanos) override;
   std::int32_t duty(std::int32_t bit, p2os::Nanos now) override;
   void drive(std::uint32_t mask, std::uint32_t levels, p2os::Nanos) override;
-  // A shift register cannot let go: its outputs show the safe levels.
+  // A shift register lets all its outputs go; it is enabled again with the next of them that is driven.
   void release(p2os::Nanos) override;
   // A shift register's outputs cannot be read back: they are taken to be what was shifted in.
   std::uint32_t sense(p2os::Nanos) override;

@@ -1,9 +1,9 @@
-// The self-test on a bare Xtensa (QEMU's `sim` machine), results by simcall.
+// The self-test on a bare Xtensa: QEMU's `sim` machine (start.S, sim.ld), or an ESP32's memory (esp32.S, esp32.ld).
 
 #include "../../core/adapter/adapter.hpp"
 #include "../report.hpp"
 
-extern "C" void simcall_write(const char* text, unsigned size);
+extern "C" void write_text(const char* text, unsigned size);
 
 namespace {
 
@@ -14,7 +14,7 @@ void write(const char* text) {
   while (text[size] != '\0') {
     ++size;
   }
-  simcall_write(text, size);
+  write_text(text, size);
 }
 
 }  // namespace

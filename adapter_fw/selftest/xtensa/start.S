@@ -17,8 +17,8 @@ _start:
 0:  j 0b
 
     .align 4
-    .global simcall_write
-simcall_write:
+    .global write_text
+write_text:
     mov a5, a3
     mov a4, a2
     movi a3, 1

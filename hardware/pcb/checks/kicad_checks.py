@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 
 from hardware.pcb.checks.results import Result, judged, listed, skipped
-from hardware.pcb.circuit.design import BOARD_VARIANTS, VARIANTS
+from hardware.pcb.circuit.design import VARIANTS
 from hardware.pcb.circuit.design import build as design_of
 from hardware.pcb.layout.routing import load_routes
 from hardware.pcb.outputs import generated_files, kicad_cli
@@ -28,7 +28,7 @@ def with_kicad() -> list[Result]:
         found = [str(one) for one in kicad_cli.erc(schematic)]
         results.append(listed("ERC", variant, found, f"0 errors, 0 warnings (KiCad {version})"))
         results.append(listed("netlist equals design", variant, netlist_differences(variant), "same nets, same pins"))
-    for variant in BOARD_VARIANTS:
+    for variant in VARIANTS:
         results += board_checks(variant)
     return results
 

@@ -14,10 +14,8 @@ from hardware.pcb.circuit.netlist import Component, Design, DesignError, make
 VARIANTS = {
     "rev-b": ("rev-b", "BluePill to Pioneer adapter, rev B"),
     "lm317": ("rev-b", "BluePill to Pioneer adapter, rev B with LM317"),
-    "rev-c": ("rev-c", "BluePill to Pioneer adapter, rev C (proposal)"),
+    "rev-c": ("rev-c", "BluePill to Pioneer adapter, rev C"),
 }
-#: Variants with a board; rev-c is worked out as far as pin map and schematic.
-BOARD_VARIANTS = ("rev-b", "lm317")
 
 #: Series resistor between the modules: 1k2 keeps what an unpowered module takes below 5 mA a pin and 25 mA
 #: in all (STM32F103 data sheet, injected current), whatever its rail does.
@@ -186,7 +184,10 @@ def _test_points(pinout: Pinout, variant: str) -> list[Component]:
 
 
 def _shift_register(pinout: Pinout, variant: str) -> list[Component]:
-    """Build rev C's distance outputs: three pins instead of eight, and a status LED on the pin that is free now."""
+    """Build rev C's distance outputs and a status LED on a pin that is free now.
+
+    R74 holds the outputs released until the ESP32's program asks for them: in reset the pulls decide, as on rev B.
+    """
     if variant != "rev-c":
         return []
     outputs = {
@@ -194,7 +195,8 @@ def _shift_register(pinout: Pinout, variant: str) -> list[Component]:
     }  # fmt: skip
     names = ("QB", "QC", "QD", "QE", "QF", "QG", "QH", None, None, None, None, None, None, None, "QA", None)
     fixed: dict[int, str | None] = {
-        8: "GND", 9: None, 10: "+3V3", 11: "SHIFT_CLOCK", 12: "SHIFT_LATCH", 13: "GND", 14: "SHIFT_DATA", 16: "+3V3",
+        8: "GND", 9: None, 10: "+3V3", 11: "SHIFT_CLOCK", 12: "SHIFT_LATCH", 13: "SHIFT_ENABLE", 14: "SHIFT_DATA",
+        16: "+3V3",
     }  # fmt: skip
     pins = [
         outputs[f"HC595.{name}"] if name is not None else fixed[number] for number, name in enumerate(names, start=1)
@@ -202,8 +204,26 @@ def _shift_register(pinout: Pinout, variant: str) -> list[Component]:
     return [
         make("U6", "HC595", pins),
         make("C10", "C 100n", ["+3V3", "GND"]),
+        make("R74", "10k", ["+3V3", "SHIFT_ENABLE"]),
         make("R72", "2k2", ["STATUS", "LED_STATUS"]),
         make("D9", "LED red", {"K": "GND", "A": "LED_STATUS"}, "STATUS"),
+    ]
+
+
+def _old_header(pinout: Pinout, variant: str) -> list[Component]:
+    """Build rev C's header for a straight ribbon from an old Pioneer 2's JP8, pin for pin: RS-232 over three wires.
+
+    Its 12 V reach the board only while jumper JP3 is fitted: what JP8 can give is unknown. D10 keeps a battery at J1
+    from feeding the robot, D1 the robot from feeding the battery.
+    """
+    _ = pinout
+    if variant != "rev-c":
+        return []
+    return [
+        make("J6", "BOX10", ["GND", None, "RS_RX", "JP8_12V", "RS_TX", "GND", None, None, "GND", None], "JP8"),
+        make("F2", "PTC 0.5", ["JP8_12V", "JP8_FUSED"]),
+        make("JP3", "HEADER2", ["JP8_FUSED", "JP8_FEED"], "JP8 12V"),
+        make("D10", "SCHOTTKY", {"K": "+12V", "A": "JP8_FEED"}),
     ]
 
 
@@ -213,10 +233,11 @@ TEST_POINTS = ("GND", "+12V", "5V_REG", "+5V", "+3V3", "BP_5V", "ESP_5V", "ESP_E
 _AUXILIARY_NETS = {
     "p2os_rx": "ESP_RX", "p2os_tx": "ESP_TX", "status_led": "STATUS",
     "shift_data": "SHIFT_DATA", "shift_clock": "SHIFT_CLOCK", "shift_latch": "SHIFT_LATCH",
+    "shift_enable": "SHIFT_ENABLE",
 }  # fmt: skip
 
 _BLOCKS: tuple[Callable[[Pinout, str], list[Component]], ...] = (
-    _modules, _signals, _test_header, _supply, _serial, _reset_and_mode, _shift_register, _test_points,
+    _modules, _signals, _test_header, _supply, _serial, _reset_and_mode, _shift_register, _old_header, _test_points,
 )  # fmt: skip
 
 #: HOST plug as a DTE: pin 2 receives, 3 sends, 4 asserts DTR, 6 listens to DSR; pin 0 is the shell.

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from adapter_sim.pinout import Direction, load_pinout
 from hardware.pcb.circuit.design import PULL_OFFSET, adapter_net, bluepill_net, series_wires
 from hardware.pcb.circuit.modules import NOT_5V_TOLERANT
-from hardware.pcb.circuit.netlist import POWER_NETS, Design
+from hardware.pcb.circuit.netlist import Design
 from hardware.pcb.circuit.parts import PARTS
 
 
@@ -50,15 +50,13 @@ def ohms(design: Design, ref: str) -> float:
 
 
 def mode_divider(design: Design) -> list[Check]:
-    """Judge the mode jumper: with it fitted the pin reads high against both pull-downs, the board's and the ESP32's."""
-    if design.variant == "rev-c":
-        return []
+    """Judge the mode jumper: fitted, the pin reads high against the ESP32's pull-down and the board's, if any."""
     esp = PARTS["ESP32"].facts
-    index = [wire.name for wire in series_wires(load_pinout())].index("DD7") + 1
-    board, own = ohms(design, f"R{index + PULL_OFFSET}"), esp["pull_ohm"]
-    down = board * own / (board + own)
+    at_pin = dict(design.component("R60").pins)["2"]
+    pulls = [part for part in design.components if part.part.value == "20k" and ("1", at_pin) in part.pins]
+    down = 1 / (1 / esp["pull_ohm"] + sum(1 / part.part.facts["ohm"] for part in pulls))
     level = RAIL_V * down / (down + ohms(design, "R60"))
-    return [Check(name="mode jumper fitted, level at IO26", value=level, low=esp["vih_v"], high=RAIL_V, unit="V")]
+    return [Check(name="mode jumper fitted, level at the ESP32", value=level, low=esp["vih_v"], high=RAIL_V, unit="V")]
 
 
 def logic_levels(design: Design) -> list[Check]:
@@ -126,8 +124,12 @@ def power_budget(design: Design) -> list[Check]:
         checks.append(Check(name="greatest load of +5V", value=load_ma(design), low=0, high=0.8 * limit, unit="mA"))
         source_w, efficiency = load_ma(design) * 5e-3, PARTS["BUCK"].facts["efficiency"]
     worst_a = source_w / efficiency / BATTERY_MIN_V
-    hold = PARTS["PTC"].facts["hold_a"] * PTC_HOT
-    checks.append(Check(name="input current at the lowest battery", value=worst_a, low=0, high=hold, unit="A"))
+    fuses = [part for part in design.components if part.part.symbol == "FUSE"]
+    checks += [
+        Check(name=f"input current at the lowest battery through {fuse.ref}", value=worst_a, low=0,
+              high=fuse.part.facts["hold_a"] * PTC_HOT, unit="A")
+        for fuse in fuses
+    ]  # fmt: skip
     return checks
 
 
@@ -203,8 +205,6 @@ def netlist_faults(design: Design) -> list[str]:
         pin = dict(auxiliary.esp32).get(design.revision)
         if auxiliary.name in _BOARD_AUXILIARIES and pin is None:
             faults.append(f"{auxiliary.name} has no pin in {design.revision}")
-    used = {net for net in nets if net in POWER_NETS}
-    faults += [f"power net {net} is not used" for net in sorted(POWER_NETS - used)]
     return faults
 
 

@@ -11,6 +11,7 @@ from hardware.pcb.circuit.parts import PARTS, Part
 #: Nets that carry supply current: at least 0.8 mm of copper (rules.py).
 POWER_NETS = frozenset({
     "GND", "VIN", "VIN_FUSED", "+12V", "5V_REG", "5V_EXT", "5V_BANK", "+5V", "BP_5V", "ESP_5V", "+3V3",
+    "JP8_12V", "JP8_FUSED", "JP8_FEED",
 })  # fmt: skip
 
 

@@ -89,6 +89,12 @@ PARTS: Mapping[str, Part] = MappingProxyType({
             facts={"hold_a": 1.1, "trip_a": 2.2, "voltage_max_v": 24.0, "ohm_min": 0.06, "ohm_max": 0.2},
         ),
         Part(
+            key="PTC 0.5", value="0.5 A 30 V", symbol="FUSE", footprint="F_1812",
+            description="Resettable fuse, holds 0.5 A, trips at 1 A", manufacturer="Littelfuse",
+            mpn="1812L050/30PR", source="Littelfuse 1812L sheet, memory",
+            facts={"hold_a": 0.5, "trip_a": 1.0, "voltage_max_v": 30.0, "ohm_min": 0.15, "ohm_max": 1.0},
+        ),
+        Part(
             key="SCHOTTKY", value="B340A", symbol="SCHOTTKY", footprint="D_SMA",
             description="Schottky diode 40 V 3 A", manufacturer="Diodes Incorporated", mpn="B340A-13-F",
             source="Diodes B340A sheet, memory", facts={"reverse_v": 40.0, "forward_v": 0.5, "current_a": 3.0},
@@ -176,6 +182,9 @@ PARTS: Mapping[str, Part] = MappingProxyType({
              source="memory"),
         Part(key="HEADER24", value="2x12", symbol="CONN24", footprint="HEADER_2X12",
              description="Pin header 2x12 2.54 mm", manufacturer="Wuerth", mpn="61302421121", source="memory"),
+        Part(key="BOX10", value="2x5 box", symbol="CONN10", footprint="IDC_2X5",
+             description="Box header 2x5 2.54 mm, keyed", manufacturer="Wuerth", mpn="61201021621",
+             source="memory; pads and outline as KiCad's IDC-Header_2x05_P2.54mm_Vertical"),
         # --- copper only
         Part(key="TP", value="TP", symbol="TESTPOINT", footprint="TESTPOINT", description="Test point 1.5 mm",
              bought=False),

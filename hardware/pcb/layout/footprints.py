@@ -239,6 +239,25 @@ def _header(name: str, columns: int, rows: int) -> Footprint:
     )  # fmt: skip
 
 
+def _box_header() -> Footprint:
+    pads = tuple(
+        _hole(str(2 * row + column + 1), 2.54 * column, 2.54 * row, 1.7, 1.0,
+              PadShape.RECT if row == column == 0 else PadShape.CIRCLE)
+        for row in range(5) for column in range(2)
+    )  # fmt: skip
+    # The key is the gap in the wall at pin 1's side.
+    walls = [((-3.29, 3.03), (-3.29, -5.21)), ((-3.29, -5.21), (5.83, -5.21)), ((5.83, -5.21), (5.83, 15.37)),
+             ((5.83, 15.37), (-3.29, 15.37)), ((-3.29, 15.37), (-3.29, 7.13))]  # fmt: skip
+    return Footprint(
+        name="IDC_2X5", description="Box header 2 x 5, 2.54 mm, upright, keyed", pads=pads,
+        drawings=(*(Line(layer="F.SilkS", start_mm=start, end_mm=end) for start, end in walls),
+                  Circle(layer="F.SilkS", center_mm=(-3.9, 0), radius_mm=0.2, is_filled=True),
+                  *rectangle("F.Fab", -3.18, -5.1, 5.72, 15.26, 0.1), *courtyard(-3.68, -5.6, 6.22, 15.76)),
+        ref_at_mm=(1.27, -6.3),
+        boxes=(Box(center_mm=(1.27, 5.08), size_mm=(8.9, 20.36), z_mm=(0, 9.0), colour=BLACK),),
+    )  # fmt: skip
+
+
 def _terminal() -> Footprint:
     pads = (_hole("1", 0, 0, 2.6, 1.3, PadShape.RECT), _hole("2", 5.08, 0, 2.6, 1.3))
     return Footprint(
@@ -338,6 +357,7 @@ def _all() -> list[Footprint]:
         _sot23(), _sot223(), _soic16(), _terminal(), _jst_vh(), _buck(), _radial(), _de9(), _test_point(),
         _mounting_hole(),
         _header("HEADER_1X2", 1, 2), _header("HEADER_1X3", 1, 3), _header("HEADER_2X12", 2, 12),
+        _box_header(),
         bluepill(), esp32_d1_mini(),
     ]  # fmt: skip
 

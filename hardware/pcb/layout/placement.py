@@ -169,6 +169,17 @@ _FIXED = {
 
 _VARIANTS: dict[str, dict[str, Place]] = {
     "rev-b": {"U3": Place(x_mm=40.0, y_mm=82.5)},
+    "rev-c": {
+        "U3": Place(x_mm=40.0, y_mm=82.5),
+        "U6": Place(x_mm=66.5, y_mm=46.2, angle_deg=270, ref_mm=(-7.0, 0)),
+        "D5": Place(x_mm=66.5, y_mm=52.0, ref_mm=(-5.2, 0)),
+        "C10": Place(x_mm=74.5, y_mm=48.0),
+        "R74": Place(x_mm=74.5, y_mm=44.5),
+        "R72": Place(x_mm=91.0, y_mm=46.5), "D9": Place(x_mm=96.0, y_mm=46.5, angle_deg=180, ref_mm=(0, 1.7)),
+        "J6": Place(x_mm=35.5, y_mm=56.5, ref_mm=(7.6, -4.0)),
+        "F2": Place(x_mm=26.5, y_mm=64.5), "JP3": Place(x_mm=9.0, y_mm=64.0, angle_deg=90, ref_mm=(-3.4, 0)),
+        "D10": Place(x_mm=26.5, y_mm=70.5, ref_mm=(0, -2.3)), "TP2": Place(x_mm=43.0, y_mm=73.8),
+    },
     "lm317": {
         "U3": Place(x_mm=43.0, y_mm=80.5),
         "R68": Place(x_mm=38.0, y_mm=87.5, angle_deg=90, ref_mm=(0, -2.35)),
@@ -202,7 +213,12 @@ _TEXTS: list[Label] = [
 ]  # fmt: skip
 _TEXTS_OF: dict[str, list[Label]] = {
     "rev-b": [Label(layer="F.SilkS", text="REV B", at_mm=(50.0, 3.2), size_mm=1.6)],
-    "rev-c": [],
+    "rev-c": [
+        Label(layer="F.SilkS", text="REV C", at_mm=(50.0, 3.2), size_mm=1.6),
+        Label(layer="F.SilkS", text="STATUS", at_mm=(96.0, 44.4), size_mm=0.9),
+        Label(layer="F.SilkS", text="JP8 ribbon", at_mm=(37.0, 73.0), size_mm=0.8),
+        Label(layer="F.SilkS", text="JP8 12V", at_mm=(14.2, 64.0), size_mm=0.8, justify="left"),
+    ],
     "lm317": [
         Label(layer="F.SilkS", text="REV B LM317", at_mm=(50.0, 3.2), size_mm=1.2),
         Label(layer="F.SilkS", text="5V: 150mA, peaks 250mA", at_mm=(50.0, 5.4), size_mm=0.8),

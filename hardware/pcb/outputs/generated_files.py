@@ -10,7 +10,7 @@ import shutil
 import zipfile
 from pathlib import Path
 
-from hardware.pcb.circuit.design import BOARD_VARIANTS, VARIANTS, build
+from hardware.pcb.circuit.design import VARIANTS, build
 from hardware.pcb.circuit.netlist import Design
 from hardware.pcb.circuit.parts import PARTS
 from hardware.pcb.layout.footprints import FOOTPRINTS
@@ -55,11 +55,10 @@ def variant_sources(design: Design) -> dict[str, str]:
     files |= {f"{variant}-{page}.kicad_sch": page_text(design, page) for page in PAGES}
     files |= project.library_tables()
     files[f"{variant}-bom.csv"] = bom.csv_text(design)
-    if variant in BOARD_VARIANTS:
-        files[f"{variant}.kicad_pcb"] = board_text(design, *copper_of(design), {})
-        files[f"{variant}-placement.csv"] = bom.placement_csv(design)
-        files[f"{variant}-bom.html"] = bom.html_text(design)
-        files[f"{variant}-assembly.svg"] = assembly_svg(design)
+    files[f"{variant}.kicad_pcb"] = board_text(design, *copper_of(design), {})
+    files[f"{variant}-placement.csv"] = bom.placement_csv(design)
+    files[f"{variant}-bom.html"] = bom.html_text(design)
+    files[f"{variant}-assembly.svg"] = assembly_svg(design)
     return files
 
 

@@ -88,15 +88,13 @@ def drc(board: Path) -> list[Violation]:
     return [_violation(entry) for group in groups for entry in found[group]]
 
 
-def reports(variant: str, schematic: Path, board: Path | None) -> dict[str, str]:
-    """Return KiCad's own reports of both rule checks by file name, without their dates; no board, no second report."""
+def reports(variant: str, schematic: Path, board: Path) -> dict[str, str]:
+    """Return KiCad's own reports of both rule checks by file name, without their dates."""
     with tempfile.TemporaryDirectory() as folder:
         erc_file, drc_file = Path(folder) / f"{variant}-erc.rpt", Path(folder) / f"{variant}-drc.rpt"
         run("sch", "erc", "--severity-all", "-o", erc_file, schematic)
-        if board is not None:
-            run("pcb", "drc", "--severity-all", "--schematic-parity", "-o", drc_file, board)
-        files = (erc_file, drc_file) if board is not None else (erc_file,)
-        return {file.name: without_dates(file.read_text(encoding="utf-8")) for file in files}
+        run("pcb", "drc", "--severity-all", "--schematic-parity", "-o", drc_file, board)
+        return {file.name: without_dates(file.read_text(encoding="utf-8")) for file in (erc_file, drc_file)}
 
 
 def netlist(schematic: Path) -> dict[str, list[tuple[str, str]]]:

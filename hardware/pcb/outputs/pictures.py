@@ -94,7 +94,7 @@ def _write_names(file: Path, design: Design) -> None:
 
 def pages_shown(variant: str) -> tuple[str, ...]:
     """Return the pages of a schematic that are drawn."""
-    return {"rev-b": tuple(PAGES), "lm317": ("supply",), "rev-c": ("serial", "modules")}[variant]
+    return {"rev-b": tuple(PAGES), "lm317": ("supply",), "rev-c": ("serial", "modules", "supply")}[variant]
 
 
 def schematic_pictures(variant: str) -> list[Path]:

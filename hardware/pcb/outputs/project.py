@@ -50,7 +50,9 @@ def project_text(design: Design) -> str:
         "net_settings": {
             "classes": [_class(entry, index) for index, entry in enumerate(rules.NET_CLASSES)],
             "meta": {"version": 4},
-            "netclass_patterns": [{"netclass": rules.POWER.name, "pattern": net} for net in sorted(POWER_NETS)],
+            "netclass_patterns": [
+                {"netclass": rules.POWER.name, "pattern": net} for net in design.nets() if net in POWER_NETS
+            ],
         },
         "pcbnew": {"page_layout_descr_file": ""},
         "schematic": {"legacy_lib_dir": "", "legacy_lib_list": [], "page_layout_descr_file": ""},

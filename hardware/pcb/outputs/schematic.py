@@ -60,7 +60,8 @@ def place_of(component: Component) -> tuple[int, int]:
 def frames(design: Design, page: str) -> list[Frame]:
     """Return the groups of a page."""
     if page == "supply":
-        return [*_SUPPLY_FRAMES, *(_LINEAR_FRAMES if design.variant == "lm317" else _BUCK_FRAMES)]
+        own = {"rev-b": _BUCK_FRAMES, "lm317": _LINEAR_FRAMES, "rev-c": [*_BUCK_FRAMES, _JP8_FRAME]}
+        return [*_SUPPLY_FRAMES, *own[design.variant]]
     extra = _REV_C_FRAMES if design.variant == "rev-c" and page == "serial" else []
     return [*_FRAMES[page], *extra]
 
@@ -87,6 +88,7 @@ _SUPPLY = {
     # Buck and LM317 share the place: a variant has one of them.
     "U3": (138, 26), "C3": (178, 29),
     "R68": (154, 40), "R69": (172, 40), "C11": (196, 32),
+    "J6": (142, 108), "F2": (161, 106), "JP3": (182, 106), "D10": (206, 114),
     "U4": (38, 104), "R70": (56, 118), "R71": (74, 118), "C12": (80, 104), "C13": (96, 118),
 }  # fmt: skip
 _SERIAL = {
@@ -94,7 +96,7 @@ _SERIAL = {
     "C5": (18, 40), "C6": (30, 40), "C7": (96, 40), "C8": (110, 40), "C9": (124, 40), "J3": (156, 40),
     "R62": (46, 82), "R63": (46, 90), "R64": (46, 100), "D7": (60, 100), "R65": (46, 110), "D8": (60, 110),
     "R66": (136, 92), "R67": (136, 104), "Q1": (152, 92), "J5": (30, 136), "R60": (48, 137),
-    "U6": (198, 36), "C10": (208, 60), "R72": (194, 90), "D9": (208, 90),
+    "U6": (198, 36), "R74": (188, 60), "C10": (212, 60), "R72": (194, 90), "D9": (208, 90),
 }  # fmt: skip
 _TEST = {"J4": (44, 44), **_test_points(), **{f"H{n}": (20 + 20 * n, 118) for n in range(1, 5)}}
 _TABLES = {
@@ -124,8 +126,19 @@ _LINEAR_FRAMES = [
     Frame(title="12 V to 3.3 V, LM317: transceiver and LEDs only", left=10, top=92, right=112, bottom=132,
           note="3.34 V; the ESP32 keeps its own 3.3 V regulator."),
 ]  # fmt: skip
+_JP8_FRAME = Frame(
+    title="An old Pioneer 2's JP8: straight ribbon, instead of J3", left=116, top=92, right=224, bottom=128,
+    note="What JP8 can give is unknown: JP3 stays off unless it was measured. 5 V and port pins stay open.",
+)  # fmt: skip
 _REV_C_FRAMES = [
-    Frame(title="Distances by shift register", left=174, top=12, right=224, bottom=70),
+    Frame(
+        title="Distances by shift register",
+        left=174,
+        top=12,
+        right=224,
+        bottom=70,
+        note="Released until the program enables it.",
+    ),
     Frame(title="Status LED", left=174, top=74, right=224, bottom=118),
 ]
 _FRAMES = {

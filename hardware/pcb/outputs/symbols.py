@@ -177,6 +177,7 @@ def _all() -> list[Symbol]:
                                           ("polyline", ((-1.7, 0.8), (-1.27, 1.27), (1.27, 1.27), (1.7, 1.74)))]),
         _box("CONN2", "J", {"right": _numbered(2)}, 2.54),
         _box("CONN3", "JP", {"left": _numbered(3)}, 2.54),
+        _box("CONN10", "J", {"left": _numbered(10)[::2], "right": _numbered(10)[1::2]}, 5.08),
         _box("CONN24", "J", {"left": header[::2], "right": header[1::2]}, 5.08),
         _box("REGULATOR3", "U", {"left": [("1", "IN", "power_in")], "right": [("3", "OUT", "power_out")],
                                  "bottom": [("2", "GND", "power_in")]}, 7.62),

@@ -21,11 +21,9 @@ from hardware.pcb.layout.footprints import FOOTPRINTS
 from hardware.pcb.outputs.sexp import children, parse, word
 
 TABLE = Path(__file__).parent / "expected.toml"
-#: Boards that the table describes; rev-c is a proposal without a board.
-DESCRIBED = ("rev-b", "lm317")
 #: Symbols of the parts that the table gives no other one.
 _SYMBOLS = {"MAX3232": "MAX3232", "NPN": "BC817", "DE9": "DE9", "SCHOTTKY": "DIODE", "TVS": "DIODE", "LED": "DIODE",
-            "CP": "CP"}  # fmt: skip
+            "CP": "CP", "HC595": "HC595"}  # fmt: skip
 #: Symbols whose two ends are alike.
 _ALIKE = frozenset({"R", "C", "FUSE"})
 _RAILS = {"GND": "GND", "3V3": "3V3"}
@@ -60,13 +58,13 @@ def expected(variant: str) -> Expected:
     for node in (*table["node"], *own["node"]):
         nodes.setdefault(node["name"], Counter()).update(node["pins"])
     for name, bluepill, esp32, series, ohms, pull, pull_ohms, rail, tap, side in table["wires"]["rows"]:
-        near = nodes.setdefault(f"{name} at the BluePill", Counter([f"U1.{bluepill}", series]))
-        far = nodes.setdefault(f"{name} at the ESP32", Counter([f"U2.{esp32}", series, pull]))
+        near = nodes.setdefault(f"{name} at the BluePill", Counter())
+        near.update([f"U1.{bluepill}", series])
+        far = nodes.setdefault(f"{name} at the ESP32", Counter())
+        far.update([own.get("wires", {}).get(name, f"U2.{esp32}"), series, pull])
         (near if side == "BluePill" else far)[f"J4.{tap}"] += 1
         nodes[_RAILS[rail]][pull] += 1
         values |= {series: ohms, pull: pull_ohms}
-    for extra in table["at"]:
-        nodes[f"{extra['wire']} at the ESP32"].update(extra["pins"])
     partners: dict[str, frozenset[str]] = {}
     for members in nodes.values():
         for pin in members:

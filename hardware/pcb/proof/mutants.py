@@ -77,6 +77,49 @@ def draw(design: Design, seed: int = SEED) -> tuple[Mutant, ...]:
     return tuple(found)
 
 
+def draw_whole(design: Design, seed: int) -> tuple[Mutant, ...]:
+    """Return faults of whole parts: turned, mirrored, a pin further, exchanged with another, a net torn in two.
+
+    Written when all checks stood, so no check was made for them.
+    """
+    chance = random.Random(seed)
+    many = [part for part in design.components if len({net for _, net in part.pins}) > 2]
+    found = [
+        mutant
+        for part in many
+        for mutant in (
+            _permuted(part, "turned by half", lambda number, count: (number + count // 2) % count),
+            _permuted(part, "mirrored", lambda number, count: count - 1 - number),
+            _permuted(part, "a pin further", lambda number, count: (number + 1) % count),
+            _permuted(part, "with its rows exchanged", lambda number, count: min(number ^ 1, count - 1)),
+        )
+    ]
+    groups: dict[str, list[Component]] = {}
+    for part in design.components:
+        groups.setdefault(part.part.footprint, []).append(part)
+    for group in groups.values():
+        unlike = [(one, two) for one in group for two in group if one.ref < two.ref and one.part is not two.part]
+        for one, two in chance.sample(unlike, min(2, len(unlike))):
+            edits = (f"value {one.ref} {two.part.key}", f"value {two.ref} {one.part.key}")
+            found.append(Mutant(rule="whole", name=f"{one.ref} and {two.ref} exchanged", edits=edits))
+    for net, members in design.nets().items():
+        if len(members) > 3:
+            torn = chance.sample(members, len(members) // 2)
+            moves = tuple(f"net {_pin(member)} TORN" for member in torn)
+            found.append(Mutant(rule="whole", name=f"{net} torn in two", edits=moves))
+    chance.shuffle(found)
+    return tuple(found)
+
+
+def _permuted(part: Component, how: str, place: Callable[[int, int], int]) -> Mutant:
+    """Give each pin the net of another one, by its place."""
+    nets = [net for _, net in part.pins]
+    edits = tuple(
+        f"net {part.ref}.{pin} {nets[place(number, len(nets))] or OPEN}" for number, (pin, _) in enumerate(part.pins)
+    )
+    return Mutant(rule="whole", name=f"{part.ref} {how}", edits=edits)
+
+
 def _named(design: Design, chance: random.Random) -> list[Mutant]:
     """Return faults that a review found unnoticed."""
     _ = design, chance
@@ -139,13 +182,13 @@ def _values(design: Design, chance: random.Random) -> list[Mutant]:
 def _connectors(design: Design, chance: random.Random) -> list[Mutant]:
     found = []
     for part in design.components:
-        if part.part.symbol in {"CONN2", "CONN3", "CONN24", "DE9"}:
+        if part.part.symbol in {"CONN2", "CONN3", "CONN10", "CONN24", "DE9"}:
             found += [_crossed("connector", part, chance) for _ in range(3 if len(part.pins) > 3 else 1)]
     return found
 
 
 def _chips(design: Design, chance: random.Random) -> list[Mutant]:
-    counts = {"BLUEPILL": 6, "ESP32_D1_MINI": 6, "MAX3232": 8, "REGULATOR3": 2, "NPN": 3}
+    counts = {"BLUEPILL": 6, "ESP32_D1_MINI": 6, "MAX3232": 8, "REGULATOR3": 2, "NPN": 3, "HC595": 4}
     return [
         _crossed("chip", part, chance)
         for part in design.components
