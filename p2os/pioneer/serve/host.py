@@ -296,14 +296,21 @@ class Host:
             member.move_bytes(self.pioneer, self.now)
 
     def _accept_client(self) -> None:
-        """Accept a client, or refuse it when there is one."""
-        if self._client is not None and self.listener.fileno() is None:
-            return
+        """Accept a client, or refuse it when there is one.
+
+        One that has just left makes room for the one that comes, but may still hide behind what it has sent. As long as
+        more waits than a read takes, who comes waits too: until that is read, or the flood ends the client.
+        """
+        if self._client is not None:
+            listening = self.listener.fileno()
+            if listening is None or not wait_readable([listening], 0):
+                return
+            while self._read_client():
+                if self._behind_since is not None:
+                    return
         transport = self.listener.accept()
         if transport is None:
             return
-        while self._read_client():  # a client that has just left makes room for this one
-            pass
         if self._client is not None:
             first = self._client.description
             self._notify("client refused", f"{transport.description}: {first} is connected")
