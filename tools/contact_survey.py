@@ -200,40 +200,41 @@ def picture(contacts: Sequence[Contact]) -> str:
     bodies = list(dict.fromkeys(one.body for one in contacts))
     height = TOP_PX + len(models) * (TALL_PX + GAP_PX) + 12
     parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {LEFT_PX + PANEL_PX + 20} {height}"'
-        ' font-family="sans-serif" font-size="12"><rect width="100%" height="100%" fill="#fff"/>',
-        f'<text x="{LEFT_PX}" y="16">Seconds from the first touch to the first stall bit (filled) and to rest (ring),'
-        " by heading</text>",
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {LEFT_PX + PANEL_PX + 20} {height}" font-size="12">',
+        '<rect width="100%" height="100%" fill="#fff"/><g font-family="sans-serif">',
+        _text(
+            LEFT_PX, 16, "Seconds from the first touch to the first stall bit (filled) and to rest (ring), by heading"
+        ),
+        _text(LEFT_PX + 110 * len(bodies), 36, f"at the top edge: later than {SHOWN_S:g} s, or slides on"),
     ]
     for number, body in enumerate(bodies):
-        x = LEFT_PX + 110 * number
-        parts.append(
-            f'<circle cx="{x + 5}" cy="32" r="4" fill="{COLOURS[body]}"/><text x="{x + 14}" y="36">{body}</text>'
-        )
-    parts.append(
-        f'<text x="{LEFT_PX + 110 * len(bodies)}" y="36">at the top edge: slides on for {WATCHED_S:g} s</text>'
-    )
+        x = LEFT_PX + 110.0 * number
+        parts += [f'<circle cx="{x + 5}" cy="32" r="4" fill="{COLOURS[body]}"/>', _text(x + 14, 36, body)]
     for row, model in enumerate(models):
         top = TOP_PX + row * (TALL_PX + GAP_PX)
         parts.append(f'<rect x="{LEFT_PX}" y="{top}" width="{PANEL_PX}" height="{TALL_PX}" fill="none" stroke="#999"/>')
-        parts.append(f'<text x="{LEFT_PX + 4}" y="{top + TALL_PX - 5}">{model}</text>')
+        parts.append(_text(LEFT_PX + 4, top + 14, model))
         for second in range(int(SHOWN_S) + 1):
             y = top + TALL_PX * (1 - second / SHOWN_S)
-            parts.append(f'<path d="M{LEFT_PX} {y:.1f}h{PANEL_PX}" stroke="#ddd"/>')
-            parts.append(f'<text x="{LEFT_PX - 6}" y="{y + 4:.1f}" text-anchor="end">{second} s</text>')
+            parts += [
+                f'<path d="M{LEFT_PX} {y:.1f}h{PANEL_PX}" stroke="#ddd"/>',
+                _text(LEFT_PX - 32, y + 4, f"{second} s"),
+            ]
         for heading in range(0, 361, 90):
             x = LEFT_PX + PANEL_PX * heading / 360
-            parts.append(
-                f'<text x="{x:.1f}" y="{top + TALL_PX + 15}" text-anchor="middle">{heading}\N{DEGREE SIGN}</text>'
-            )
+            parts.append(_text(x - 8, top + TALL_PX + 15, f"{heading}\N{DEGREE SIGN}"))
         for one in (one for one in contacts if one.model == model):
+            colour = COLOURS[one.body]
             # Beside each other, where bodies agree.
             x = LEFT_PX + PANEL_PX * one.heading_deg / 360 + 5 * bodies.index(one.body) + 3
-            for seconds, look in ((one.rest_s, f'fill="none" stroke="{COLOURS[one.body]}"'),
-                                  (one.stall_s, f'fill="{COLOURS[one.body]}"')):  # fmt: skip
+            for seconds, look in ((one.rest_s, f'fill="none" stroke="{colour}"'), (one.stall_s, f'fill="{colour}"')):
                 y = top + TALL_PX * (1 - min(SHOWN_S if seconds is None else seconds, SHOWN_S) / SHOWN_S)
                 parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="2.6" {look}/>')
-    return "\n".join([*parts, "</svg>\n"])
+    return "\n".join([*parts, "</g></svg>\n"])
+
+
+def _text(x_px: float, y_px: float, words: str) -> str:
+    return f'<text x="{x_px:.1f}" y="{y_px:.1f}">{words}</text>'
 
 
 def main() -> int:
