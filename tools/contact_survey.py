@@ -2,6 +2,7 @@
 
     python tools/contact_survey.py                             # thirty headings, three bodies, three models
     python tools/contact_survey.py --body bullet --headings 6
+    python tools/contact_survey.py --picture docs/pictures/contact.svg
 
 A robot drives from the middle of the arena with both rims at 0.4 m/s, ramped as the firmware
 ramps, until it meets a thing; the same command goes on for some seconds, then both set-points
@@ -17,6 +18,7 @@ import math
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from p2os.pioneer.body.contract import BodyState, RobotBody
 from p2os.pioneer.body.factory import BODY_NAMES, make_body
@@ -186,6 +188,55 @@ def survey(bodies: Sequence[str], models: Sequence[str], headings: int, world: W
                     yield found
 
 
+#: Of the picture: colours of the bodies, size of a panel and what stands around it, pixels; seconds that it shows.
+COLOURS = {"kinematic": "#d55e00", "bullet": "#0072b2", "mujoco": "#009e73"}
+PANEL_PX, TALL_PX, LEFT_PX, TOP_PX, GAP_PX = 620, 130, 60, 56, 34
+SHOWN_S = 4.0
+
+
+def picture(contacts: Sequence[Contact]) -> str:
+    """Return an SVG of when each contact had its first stall bit (filled) and came to rest (ring), by heading."""
+    models = list(dict.fromkeys(one.model for one in contacts))
+    bodies = list(dict.fromkeys(one.body for one in contacts))
+    height = TOP_PX + len(models) * (TALL_PX + GAP_PX) + 12
+    parts = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {LEFT_PX + PANEL_PX + 20} {height}" font-size="12">',
+        '<rect width="100%" height="100%" fill="#fff"/><g font-family="sans-serif">',
+        _text(
+            LEFT_PX, 16, "Seconds from the first touch to the first stall bit (filled) and to rest (ring), by heading"
+        ),
+        _text(LEFT_PX + 110 * len(bodies), 36, f"at the top edge: later than {SHOWN_S:g} s, or slides on"),
+    ]
+    for number, body in enumerate(bodies):
+        x = LEFT_PX + 110.0 * number
+        parts += [f'<circle cx="{x + 5}" cy="32" r="4" fill="{COLOURS[body]}"/>', _text(x + 14, 36, body)]
+    for row, model in enumerate(models):
+        top = TOP_PX + row * (TALL_PX + GAP_PX)
+        parts.append(f'<rect x="{LEFT_PX}" y="{top}" width="{PANEL_PX}" height="{TALL_PX}" fill="none" stroke="#999"/>')
+        parts.append(_text(LEFT_PX + 4, top + 14, model))
+        for second in range(int(SHOWN_S) + 1):
+            y = top + TALL_PX * (1 - second / SHOWN_S)
+            parts += [
+                f'<path d="M{LEFT_PX} {y:.1f}h{PANEL_PX}" stroke="#ddd"/>',
+                _text(LEFT_PX - 32, y + 4, f"{second} s"),
+            ]
+        for heading in range(0, 361, 90):
+            x = LEFT_PX + PANEL_PX * heading / 360
+            parts.append(_text(x - 8, top + TALL_PX + 15, f"{heading}\N{DEGREE SIGN}"))
+        for one in (one for one in contacts if one.model == model):
+            colour = COLOURS[one.body]
+            # Beside each other, where bodies agree.
+            x = LEFT_PX + PANEL_PX * one.heading_deg / 360 + 5 * bodies.index(one.body) + 3
+            for seconds, look in ((one.rest_s, f'fill="none" stroke="{colour}"'), (one.stall_s, f'fill="{colour}"')):
+                y = top + TALL_PX * (1 - min(SHOWN_S if seconds is None else seconds, SHOWN_S) / SHOWN_S)
+                parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="2.6" {look}/>')
+    return "\n".join([*parts, "</g></svg>\n"])
+
+
+def _text(x_px: float, y_px: float, words: str) -> str:
+    return f'<text x="{x_px:.1f}" y="{y_px:.1f}">{words}</text>'
+
+
 def main() -> int:
     """Print what each contact was, and what of it breaks the contract."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
@@ -193,6 +244,7 @@ def main() -> int:
     parser.add_argument("--model", action="append", help=f"may be given more than once; default: {', '.join(MODELS)}")
     parser.add_argument("--headings", type=int, default=30, help="default: 30")
     parser.add_argument("--seed", type=int, default=1, help="of the arena; default: 1")
+    parser.add_argument("--picture", type=Path, metavar="FILE.svg", help="write the times as a picture, too")
     options = parser.parse_args()
     world = load_world("arena", options.seed)
     found = []
@@ -202,6 +254,8 @@ def main() -> int:
         stall, rest = (f"{'never':>7}" if s is None else f"{s:5.2f} s" for s in (one.stall_s, one.rest_s))
         print(f"{one.model:<10} {one.body:<10} {one.heading_deg:5.0f} \N{DEGREE SIGN} {stall} {rest}"
               f" {one.slide_share:6.0%} {one.sign_changes:6} {one.energy:7.2f}", *one.faults(), sep="  ")  # fmt: skip
+    if options.picture is not None:
+        options.picture.write_text(picture(found), encoding="utf-8")
     broken = sum(bool(one.faults()) for one in found)
     print(f"{len(found)} contacts, {broken} break the contract")
     return int(broken > 0)

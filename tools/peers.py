@@ -7,7 +7,7 @@
 
 A peer is a row of `PEERS`; what is not there is skipped aloud. Each has a robot of its own, on a free port of this
 machine. A row of --peer: NAME=COMMAND, in which {host}, {port}, {url}, {line} (a terminal) and {folder} stand for
-what they say; NAME alone is a name of the table or a new one.
+what they say; NAME alone is a name of the table. --robot MODEL (or all) lets every peer meet that model.
 
 Exit codes: 0 every peer that is there passed, 1 one did not, 2 wrong usage.
 """
@@ -24,14 +24,16 @@ import socket
 import subprocess
 import sys
 import tempfile
+import textwrap
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from p2os import Robot
 from p2os.errors import P2osError
+from p2os.robots.parameters import known_robots
 from p2os.transport import TcpUrl, parse_url
 from tools.measure_stops import Cable
 
@@ -45,8 +47,18 @@ STANDING_MPS = 0.002
 STATUS = "100ms"
 WHEELS = re.compile(r"wheels (-?[\d.]+) (-?[\d.]+) m/s")
 
-#: A brain of Soar that drives ahead.
-BRAIN = "def on_load():\n    pass\ndef on_step(step_duration):\n    robot.fv = 0.2\n"
+#: Soar's own windows aside, which alone let a brain meet a real robot: its robot, told what a brain would tell it.
+SOAR_MOVER = """import time
+from soar.robot.pioneer import PioneerRobot
+robot = PioneerRobot(serial_ports=["{line}"])
+robot.simulated = False
+robot.on_load()
+robot.on_start()
+while True:
+    robot.fv = 0.2
+    robot.on_step(0.1)
+    time.sleep(0.1)
+"""
 #: player's own configuration; without a pulse its driver is silent between two speeds.
 PLAYER = """driver (
   name "p2os" provides ["odometry:::position2d:0"]
@@ -75,6 +87,7 @@ class Peer:
         commands: What is started, one behind the other.
         killed: Which of them talks to the robot.
         serve: Options with which it expects the robot.
+        moves: Whether it drives by itself; of one that does not, an open session is all that is awaited.
         files: Written into its folder before: name and text.
     """
 
@@ -83,17 +96,35 @@ class Peer:
     commands: tuple[tuple[str, ...], ...]
     killed: int = 0
     serve: tuple[str, ...] = ()
+    moves: bool = True
     files: tuple[tuple[str, str], ...] = ()
 
     @property
     def has_terminal(self) -> bool:
         """Tell whether it opens a terminal and no TCP port."""
-        return any("{line}" in word for words in self.commands for word in words)
+        return any("{line}" in word for words in (*self.commands, *self.files) for word in words)
+
+
+#: AriaCoda's examples and tests: those that drive by themselves, and those that open a session and look or wait. Left
+#: out are those that open a serial port or TCP port 8101 whatever they are told, and those that end by themselves.
+ARIA_DRIVES = (
+    "simpleMotionCommands", "wander", "actionExample", "gotoActionExample", "wanderAndLogData", "vel2Test",
+    "moveCommandTest",
+)  # fmt: skip
+ARIA_TALKS = (
+    "simpleConnect", "demo", "teleopActionsExample", "actionGroupExample", "robotSyncTaskExample", "motionDebugInfo",
+    "dataLoggerExample", "customRangeSensorExample", "auxSerialExample", "gripperExample", "lasers",
+    "triangleDriveToActionExample", "encoderTest", "sonarTest", "testMobileSim", "connectionTest2",
+    "robotPacketHandlerTest", "logSIPs", "logSIPData", "logRobotJoystick", "simstat", "moveRobotInSim",
+)  # fmt: skip
 
 
 def _aria(program: str) -> Peer:
     words = (program, "-rh", "{host}", "-rrtp", "{port}")
-    return Peer(name=f"ARIA {program}", needs=(program,), commands=(words,), serve=("--for", "aria"))
+    return Peer(
+        name=f"ARIA {program}", needs=(program,), commands=(words,), serve=("--for", "aria"),
+        moves=program in ARIA_DRIVES,
+    )  # fmt: skip
 
 
 PEERS = (
@@ -101,7 +132,7 @@ PEERS = (
         name="p2os drive", needs=(sys.executable,),
         commands=((sys.executable, "-m", "p2os", "drive", "{url}", "--vel", "0.2m/s", "--for", "60s"),),
     ),
-    *map(_aria, ("simpleMotionCommands", "wander", "actionExample", "aria-demo")),
+    *map(_aria, (*ARIA_DRIVES, *ARIA_TALKS)),
     Peer(
         name="ROS 1 p2os", needs=("rosrun", "roscore", "rostopic"), killed=1,
         commands=(
@@ -116,10 +147,8 @@ PEERS = (
         commands=(("player", "{folder}/player.cfg"), (sys.executable, "-c", PLAYER_MOVER)),
     ),
     Peer(
-        name="Soar", needs=("soar",), serve=("--firmware", "ARCOS"), files=(("brain.py", BRAIN),),
-        commands=(
-            ("soar", "--headless", "-b", "{folder}/brain.py", "--options", '{"serial_ports": ["{line}"]}'),
-        ),
+        name="Soar", needs=("soar",), serve=("--firmware", "ARCOS"), files=(("mover.py", SOAR_MOVER),),
+        commands=(("{python}", "{folder}/mover.py"),),
     ),
     Peer(name="p2os-arduino", needs=("p2os-arduino",), commands=(("p2os-arduino", "{line}"),)),
 )  # fmt: skip
@@ -135,6 +164,8 @@ class Served:
             [sys.executable, "-m", "p2os", *words], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
             stderr=subprocess.PIPE, text=True,
         )  # fmt: skip
+        self._moves = peer.moves
+        self._is_open = False
         #: (seconds, line) of what it says; (seconds, m/s) of the faster wheel.
         self.said: list[tuple[float, str]] = []
         self.speeds: list[tuple[float, float]] = [(0.0, 0.0)]
@@ -154,6 +185,7 @@ class Served:
             now = time.monotonic()
             if (found := WHEELS.search(line)) is not None:
                 self.speeds.append((now, max(abs(float(found[1])), abs(float(found[2])))))
+                self._is_open = " s: open," in line
             else:
                 self.said.append((now, line.strip()))
 
@@ -169,6 +201,11 @@ class Served:
     def is_turning(self) -> bool:
         """Tell whether a wheel turned when it was asked last."""
         return self.speeds[-1][1] > 10 * STANDING_MPS
+
+    @property
+    def is_used(self) -> bool:
+        """Tell whether the peer does what is awaited of it."""
+        return self.is_turning if self._moves else self._is_open
 
     def close(self) -> None:
         """End it."""
@@ -212,9 +249,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--peer", action="append", default=[], metavar="NAME[=COMMAND]",
         help='only these: a name of the table, or "p2os-arduino=/home/me/drive {line}"; again for more',
     )  # fmt: skip
+    parser.add_argument(
+        "--robot", action="append", default=[], metavar="MODEL", help="against this model, or all; again for more",
+    )  # fmt: skip
     parser.add_argument("--json", action="store_true", help="print a JSON object a peer")
     chosen = parser.parse_args(arguments)
     peers = [_named(text, parser.error) for text in chosen.peer] or list(PEERS)
+    models = list(known_robots()) if "all" in chosen.robot else chosen.robot
+    if strange := set(models) - set(known_robots()):
+        parser.error(f"no robot {strange.pop()!r}; there are: all, {', '.join(known_robots())}")
+    if models:
+        peers = [
+            replace(peer, name=f"{peer.name}, {model}", serve=(*peer.serve, "--robot", model))
+            for peer in peers for model in models
+        ]  # fmt: skip
     rows = []
     for peer in peers:
         rows.append(row := measured(peer))
@@ -223,7 +271,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         else:
             print(f"{row.peer}: {row.problem or 'passed'}", file=sys.stderr, flush=True)
     if not chosen.json:
-        print(table(rows))
+        # A table of what ran; what is not there by name alone.
+        print(table([row for row in rows if not row.is_skipped]))
+        if missing := [row.peer for row in rows if row.is_skipped]:
+            print(textwrap.fill(f"not on PATH: {', '.join(missing)}", 80))
     return int(any(row.problem and not row.is_skipped for row in rows))
 
 
@@ -275,26 +326,28 @@ def measured(peer: Peer) -> Row:
 
 
 def _through(peer: Peer, served: Served, folder: Path, row: Row) -> None:
+    never = "never drove" if peer.moves else "never opened a session"
     started = time.monotonic()
     with _started(peer, served, folder) as processes:
-        _wait(lambda: served.is_turning, STARTING_S, "never drove", processes[peer.killed])
+        _wait(lambda: served.is_used, STARTING_S, never, processes[peer.killed])
         row.drives = f"{time.monotonic() - started:.1f} s"
         row.beside = _second_client(served)
-        _wait(lambda: served.is_turning, STARTING_S, "stopped for a second client", processes[peer.killed])
+        _wait(lambda: served.is_used, STARTING_S, "stopped for a second client", processes[peer.killed])
         at = time.monotonic()
         processes[peer.killed].send_signal(signal.SIGKILL)
         for other in processes:  # what feeds it must not start it again
             other.kill()
-        _wait(lambda: served.stood_at(at + 0.2) is not None, STANDING_S, "did not stand after SIGKILL")
-        if not served.has_said("watchdog expired", at):
-            raise PeerError("stood, but not by its watchdog")
-        row.stands = f"{(served.stood_at(at + 0.2) or at) - at:.1f} s"
+        if peer.moves:
+            _wait(lambda: served.stood_at(at + 0.2) is not None, STANDING_S, "did not stand after SIGKILL")
+            if not served.has_said("watchdog expired", at):
+                raise PeerError("stood, but not by its watchdog")
+            row.stands = f"{(served.stood_at(at + 0.2) or at) - at:.1f} s"
     row.next_client = _next_client(served)
     if served.is_turning:
         raise PeerError("turned again when the next client came")
     started = time.monotonic()
     with _started(peer, served, folder) as processes:
-        _wait(lambda: served.is_turning, STARTING_S, "did not drive again", processes[peer.killed])
+        _wait(lambda: served.is_used, STARTING_S, "did not do so again", processes[peer.killed])
         row.again = f"{time.monotonic() - started:.1f} s"
 
 
@@ -303,6 +356,8 @@ def _started(peer: Peer, served: Served, folder: Path) -> Iterator[list[subproce
     """Start a peer's programs, and kill what is left of them in the end."""
     parsed = parse_url(served.line_url)
     values = {"url": served.line_url, "folder": str(folder), "line": str(folder / "line")}
+    # Of a peer in Python, the interpreter that stands beside it.
+    values["python"] = str(Path(shutil.which(peer.needs[0]) or "").resolve().with_name("python"))
     if isinstance(parsed, TcpUrl):
         values |= {"host": parsed.host, "port": str(parsed.port)}
 

@@ -6,6 +6,7 @@ import sys
 
 import pytest
 
+from p2os.robots.parameters import known_robots
 from tools.peers import PEERS, main
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals and terminals are Unix's")
@@ -25,7 +26,7 @@ def test_a_peer_that_is_not_there_is_skipped_aloud(capsys: pytest.CaptureFixture
     assert main(["--peer", "mine=/no/such/program {host}"]) == 0
     told = capsys.readouterr()
     assert "mine: skipped: no /no/such/program" in told.err
-    assert told.out.splitlines()[-1].endswith("skipped: no /no/such/program")
+    assert told.out.splitlines()[-1] == "not on PATH: mine"
     assert [peer.name for peer in PEERS if not peer.commands] == []
 
 
@@ -48,3 +49,16 @@ def test_every_row_talks_to_the_robot_over_one_line() -> None:
         words = [word for command in peer.commands for word in command] + [text for _, text in peer.files]
         assert any("{line}" in word or "{url}" in word or "{port}" in word for word in words), peer.name
         assert 0 <= peer.killed < len(peer.commands)
+
+
+def test_a_robot_that_nobody_knows_is_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["--robot", "r2d2"])
+    assert ended.value.code == 2
+    assert "no robot 'r2d2'" in capsys.readouterr().err
+
+
+def test_each_peer_meets_each_robot_that_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--peer", "mine=/no/such/program {host}", "--robot", "all"]) == 0
+    told = capsys.readouterr().out.split("not on PATH:")[1]
+    assert all(f"mine, {model}" in " ".join(told.split()) for model in known_robots())

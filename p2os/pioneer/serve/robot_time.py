@@ -35,6 +35,11 @@ class RobotTime:
         self._clients = 0
         self._settled_at: Nanos = 0
 
+    @property
+    def stands(self) -> bool:
+        """Tell whether it does not go on: nobody is there, and all has come to rest."""
+        return not self._clients and self.now >= self._settled_at
+
     def client_came(self) -> None:
         """Note that a client is connected from now on."""
         self._clients += 1
@@ -52,7 +57,7 @@ class RobotTime:
         """Bring the time up to the clock's; return how long a pause of the clock was left out, 0 for none."""
         read = self.clock()
         passed, self._clock_read = read - self._clock_read, read
-        if not self._clients and self.now >= self._settled_at:
+        if self.stands:
             return 0
         counted = passed if self.speed == 1.0 else round(passed * self.speed)
         if passed > LONGEST_PAUSE_NS:

@@ -9,7 +9,7 @@ from p2os.pioneer.world import load_world, parse_world
 from p2os.pioneer.world.model import Pose
 from p2os.robots.parameters import load_parameters
 from tests.p2os.pioneer.body.bodies import drive, each_body
-from tools.contact_survey import MODELS, Contact, measure, survey
+from tools.contact_survey import MODELS, Contact, measure, picture, survey
 
 ARENA = load_world("arena", 1)
 WALL = parse_world(
@@ -41,6 +41,13 @@ def test_a_robot_that_meets_a_thing_beside_its_middle_slides_or_stalls_and_rests
     contact = measure(make_body(name, ARENA, model), model, heading_deg, 4.0)
     assert contact is not None
     assert not contact.faults(), told(contact)
+
+
+def test_the_picture_shows_the_stall_and_the_rest_of_each_contact() -> None:
+    contacts = list(survey(["kinematic"], ["p2dx"], 3, ARENA))
+    drawn = picture(contacts)
+    assert drawn.count('r="2.6"') == 2 * len(contacts) == 6
+    assert "p2dx" in drawn
 
 
 @pytest.mark.soak

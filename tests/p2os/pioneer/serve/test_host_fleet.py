@@ -15,13 +15,14 @@ import pytest
 from p2os.pioneer.serve.aux_endpoint import AuxEndpoint
 from p2os.pioneer.serve.control_line import ControlLine
 from p2os.pioneer.serve.fleet import Fleet
-from p2os.pioneer.serve.host import LONGEST_BEHIND_NS, MOST_WAITING, Host
+from p2os.pioneer.serve.host import LONGEST_BEHIND_NS, MOST_READS_LOST, MOST_WAITING, Host
 from p2os.pioneer.serve.orders import execute
 from p2os.protocol.commands import Command
 from p2os.protocol.commands import CommandNumber as C
 from p2os.protocol.frames import Decoder, Frame
 from p2os.protocol.sip import SIP_KINDS
 from p2os.transport import Listener, Loops, Transport, listen_url, open_url
+from p2os.transport.ports import READ_BYTES
 from simbase.timing import NS_PER_MS, NS_PER_S
 from tests.p2os.conftest import context_of
 
@@ -163,6 +164,38 @@ def test_who_floods_and_vanishes_is_not_obeyed_to_the_last_frame(make_robot: Cal
     made.line.close()
     made.run_unread(2)
     assert any("client gone" in event for event in made.events)
+    made.host.close()
+
+
+def test_a_client_that_floods_holds_up_neither_the_robot_nor_who_comes_next(
+    make_robot: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = Looped(make_robot())
+    made.open()
+    client, reads = made.host._client, 0
+
+    def flood(_: int = READ_BYTES) -> bytes:
+        nonlocal reads
+        reads += 1
+        assert reads < 2 * MOST_READS_LOST, "the host reads on and on"
+        return bytes(READ_BYTES)
+
+    monkeypatch.setattr(client, "read", flood)
+    first, made.line = made.line, made.reopen()
+
+    def came(milliseconds: int) -> int:
+        made.clock.now += milliseconds * NS_PER_MS
+        made.host.turn(0)
+        return sum(event.startswith("client connected") for event in made.events)
+
+    # The first turn finds that it is behind; 5 s later it is let go.
+    assert [came(100) for _ in range(50)] == [1] * 50
+    assert came(99) == 1
+    assert came(1) == 2
+    first.close()
+    assert any("sent more than can be read" in event for event in made.events)
+    made.open()
+    assert made.robot.pioneer.state.open
     made.host.close()
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from p2os.pioneer.controller.settings import ControllerSettings
 from p2os.pioneer.serve.fleet_order import FleetOrder, RobotOrder, make_fleet
-from p2os.pioneer.serve.host import Host
+from p2os.pioneer.serve.host import LEADING_WAIT_S, Host
 from p2os.pioneer.serve.orders import execute
 from p2os.pioneer.serve.robot_time import LONGEST_PAUSE_NS, SETTLE_NS, RobotTime
 from p2os.pioneer.world.model import Pose
@@ -161,4 +161,19 @@ def test_what_a_robot_sends_while_no_client_is_there_does_not_go_to_the_next() -
     hall.run(900)
     hall.lines.append(open_url("loop:1", loops=hall.loops))
     assert hall.run(100)[1] == b""
+    hall.close()
+
+
+def test_the_first_robot_steps_the_world_between_the_packets_while_anybody_is_there() -> None:
+    hall = Hall()
+    hall.run(2000)
+    assert hall.hosts[0].wait_s() > LEADING_WAIT_S, "nobody is there"
+    hall.call(1)
+    hall.run(10)
+    # The second one alone has a client; the work of all is the first one's.
+    assert hall.hosts[0].wait_s() == LEADING_WAIT_S
+    assert hall.hosts[1].wait_s() > LEADING_WAIT_S
+    hall.clock.now += 5 * NS_PER_MS
+    hall.hosts[0].turn(0)
+    assert hall.multi_robot_world._at == hall.time.now
     hall.close()
