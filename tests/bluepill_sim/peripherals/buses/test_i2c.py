@@ -472,6 +472,19 @@ def test_busy_sticks_after_a_disturbance_without_a_stop_until_swrst(fake_chip: A
     assert sr1(fake_chip) & SB
 
 
+def test_a_transfer_that_is_cut_off_ends_for_the_part_and_silence_is_none(fake_chip: Any) -> None:
+    part = set_up(fake_chip)
+    control(fake_chip, off=PE)
+    assert part.log == [], "nothing was under way"
+    control(fake_chip, on=PE)
+    start(fake_chip, 0xA0)
+    clear_addr(fake_chip)
+    fake_chip.write("I2C1.DR", 7)
+    wait(fake_chip, BIT_NS)
+    control(fake_chip, off=PE)
+    assert part.words == ["start", "stop"]
+
+
 def test_a_stop_condition_of_others_frees_the_bus(fake_chip: Any) -> None:
     set_up(fake_chip)
     fake_chip.pins["PB7"].drive(0)
