@@ -7,8 +7,9 @@ a part that is busy for a while keeps when it began, and answers by the time tha
 Invariant: what a part answers depends on its state and the arguments alone.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 from simbase.timing import Nanos
 
@@ -103,3 +104,40 @@ class CanFrame:
     def dlc(self) -> int:
         """The data length code."""
         return self.remote_bytes if self.is_remote else len(self.data)
+
+
+class WordsFlag(Protocol):
+    """The part of a bus's state in C that says whether its words are kept for anybody."""
+
+    wants_words: int
+
+
+class TellingBus(Protocol):
+    """A bus that keeps what is on it, for who has subscribed."""
+
+    @property
+    def native(self) -> WordsFlag:
+        """Its state in C."""
+
+    def deliver(self) -> None:
+        """Hand what was kept to the sinks."""
+
+
+Sink = TypeVar("Sink")
+
+
+def subscribe_words(bus: TellingBus, sinks: list[Sink], sink: Sink) -> Callable[[], None]:
+    """Add a sink to those of a bus, for what is on it from now on; return a function that takes it away."""
+
+    def keep() -> None:
+        bus.native.wants_words = bool(sinks)
+
+    def end() -> None:
+        bus.deliver()
+        sinks.remove(sink)
+        keep()
+
+    bus.deliver()
+    sinks.append(sink)
+    keep()
+    return end

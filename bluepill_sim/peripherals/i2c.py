@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from bluepill_sim.extension.layout import I2C
 from bluepill_sim.extension.windows import NO_TIME
-from bluepill_sim.fabric.bus_parts import I2cDevice
+from bluepill_sim.fabric.bus_parts import I2cDevice, subscribe_words
 from bluepill_sim.fabric.fabric import OWN_COMMANDS
 from bluepill_sim.fabric.fabric import WORD as SENT
 from bluepill_sim.fabric.pins import ALTERNATE_FUNCTIONS, PinDrive
@@ -195,16 +195,7 @@ class I2c(Peripheral):
 
     def subscribe(self, sink: Sink) -> Callable[[], None]:
         """Have `sink` called with what is on the bus from now on, in bulk; return a function that ends it."""
-        self.deliver()
-        self._sinks.append(sink)
-        self.native.wants_words = True
-
-        def end() -> None:
-            self.deliver()
-            self._sinks.remove(sink)
-            self.native.wants_words = bool(self._sinks)
-
-        return end
+        return subscribe_words(self, self._sinks, sink)
 
     def call(self, address: int, written: bytes = b"", read_bytes: int = 0, *, hz: int = 100_000) -> None:
         """Call the chip as a master outside, once the bus is free; what becomes of it is added to `answered`.

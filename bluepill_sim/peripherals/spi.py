@@ -14,7 +14,7 @@ from enum import IntEnum
 from typing import NamedTuple, cast
 
 from bluepill_sim.extension.layout import AHEAD_BYTES, SPI
-from bluepill_sim.fabric.bus_parts import AheadDevice, SpiDevice
+from bluepill_sim.fabric.bus_parts import AheadDevice, SpiDevice, subscribe_words
 from bluepill_sim.fabric.fabric import OWN_COMMANDS, WORD
 from bluepill_sim.fabric.pins import ALTERNATE_FUNCTIONS, PinDrive
 from bluepill_sim.fabric.ports import ChipPorts
@@ -188,15 +188,7 @@ class Spi(Peripheral):
 
     def subscribe(self, sink: Sink) -> Callable[[], None]:
         """Have `sink` called with the words that are exchanged from now on, in bulk; return a function that ends it."""
-        self._sinks.append(sink)
-        self.native.wants_words = True
-
-        def end() -> None:
-            self.deliver()
-            self._sinks.remove(sink)
-            self.native.wants_words = bool(self._sinks)
-
-        return end
+        return subscribe_words(self, self._sinks, sink)
 
     def clock_in(self, words: Sequence[int], hz: int) -> None:
         """Clock words into the chip as a master outside does, from now on; what comes back goes to `subscribe`.

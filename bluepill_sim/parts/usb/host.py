@@ -60,10 +60,15 @@ from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: The port: how long a pull-up must stay, a reset lasts, a device has to recover from it, and from its address.
 DEBOUNCE_NS, RESET_NS, RECOVERY_NS, ADDRESS_NS = 100 * NS_PER_MS, 50 * NS_PER_MS, 10 * NS_PER_MS, 10 * NS_PER_MS
+#: chosen: a host takes so long from the head of the device descriptor to its second reset; the device has to be done.
+HEAD_NS: Nanos = 1 * NS_PER_MS
 #: How long the host signals a resume.
 RESUME_NS: Nanos = 20 * NS_PER_MS
 #: chosen: an endpoint that said NAK is asked again so often.
 RETRY_NS: Nanos = 10_000
+#: chosen: a host's controller takes so long to come to the status stage. Firmware that polls its USB, as examples of
+#: libopencm3 do in a task, tells the end of the data and the status by their order, and relies on it.
+STATUS_NS: Nanos = 50_000
 #: 9.2.6: the longest that a request may take.
 REQUEST_NS: Nanos = 5 * NS_PER_S
 #: chosen: a host gives up after some two seconds, as Linux does; transactions in a row that nobody answers (8.6.2, 3).
@@ -641,7 +646,7 @@ class UsbHost(Stateful):
         elif self._request is not None:
             self._taken += data
             if len(data) < pipe.packet_bytes or len(self._taken) >= self._request.length:
-                self._stage, pipe.toggle = Stage.STATUS, 1
+                self._begin_status(pipe)
 
     def _sent(self, pipe: Pipe, transaction: Transaction) -> None:
         if pipe.address:
@@ -653,12 +658,17 @@ class UsbHost(Stateful):
         if self._stage is Stage.STATUS:
             self._end_request()
         elif self._stage is Stage.SETUP:
-            has_data = request.is_in or request.data
-            self._stage, pipe.toggle = (Stage.DATA if has_data else Stage.STATUS), 1
+            self._stage, pipe.toggle = Stage.DATA, 1
+            if not (request.is_in or request.data):
+                self._begin_status(pipe)
         else:
             self._taken += transaction.data
             if len(self._taken) >= len(request.data):
-                self._stage, pipe.toggle = Stage.STATUS, 1
+                self._begin_status(pipe)
+
+    def _begin_status(self, pipe: Pipe) -> None:
+        self._stage, pipe.toggle = Stage.STATUS, 1
+        pipe.not_before_ns = self._now_ns + STATUS_NS
 
     # Control transfers.
 
@@ -756,9 +766,13 @@ class UsbHost(Stateful):
         self._ask(DescriptorType.DEVICE, 0, _LOOK_BYTES, "head of the device descriptor")
 
     def _take_head(self, data: bytes) -> None:
-        size = packet_bytes_of(data)
+        self._pipes[0] = Pipe(0, EndpointKind.CONTROL, packet_bytes_of(data))
+        self._timer = self._now_ns + HEAD_NS, "reset again"
+
+    def _reset_to_address(self) -> None:
+        pipe = self._pipes[0]
         self._begin_reset("address")
-        self._pipes[0] = Pipe(0, EndpointKind.CONTROL, size)
+        self._pipes[0] = pipe
 
     def _give_address(self) -> None:
         self._todo.append(Request(_STANDARD_OUT, SET_ADDRESS, _ADDRESS, purpose="address"))
@@ -911,6 +925,7 @@ _TAKERS = {
 _MAY_FAIL = {"languages", *_STRINGS, "line coding", "line state"}
 _TIMERS = {
     "reset": "_reset_to_look",
+    "reset again": "_reset_to_address",
     "frames, then look": "_frames_to_look",
     "frames, then address": "_frames_to_address",
     "look": "_look",

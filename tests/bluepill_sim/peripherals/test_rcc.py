@@ -317,6 +317,12 @@ def test_a_reset_bit_resets_its_peripheral_once(fake_chip: Any) -> None:
     assert fake_chip.resets == ["GPIOA", "SPI1", "USART2"]
 
 
+def test_every_enable_of_a_ready_interrupt_is_read_back(fake_chip: Any) -> None:
+    for bit in range(8, 13):
+        fake_chip.write("RCC.CIR", 1 << bit)
+        assert fake_chip.read("RCC.CIR") == 1 << bit
+
+
 def test_a_ready_interrupt_is_raised_and_cleared(fake_chip: Any) -> None:
     fake_chip.write("RCC.CIR", 1 << 11)
     set_bits(fake_chip, "RCC.CR", HSEON)

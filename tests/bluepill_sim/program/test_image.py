@@ -102,7 +102,8 @@ BAD_FILES = [
     (bytes(range(256)) * 16, "the initial stack pointer 0x03020100 at 0x08000000 is not in the SRAM"),
     (b"\xff" * 1024, "no stack pointer and no reset vector at 0x08000000: 0xffffffff is erased flash"),
     (struct.pack("<II", 0x2000_5000, 0xFFFF_FFFF) * 8, "no reset vector at 0x08000000: 0xffffffff is erased flash"),
-    (struct.pack("<II", 0x2000_4FFE, 0x0800_0009) * 8, "stack pointer 0x20004ffe at 0x08000000 is no multiple of 4"),
+    (struct.pack("<II", 0x2000_0003, 0x0800_0009) * 8, "stack pointer 0x20000003 at 0x08000000 is not in the SRAM"),
+    (struct.pack("<II", 0x2000_5004, 0x0800_0009) * 8, "stack pointer 0x20005004 at 0x08000000 is not in the SRAM"),
     (b"\0" * 1024, "the initial stack pointer 0x00000000"),
     (struct.pack("<II", 0x2000_5000, 0x0800_0008) * 8, "the reset vector 0x08000008 is not a Thumb address"),
     (struct.pack("<II", 0x2000_5000, 0x2000_0001) * 8, "the reset vector 0x20000001 is not a Thumb address"),
@@ -142,6 +143,18 @@ def test_a_bad_file_is_one_line_with_a_hint(data: bytes, message: str, tmp_path:
     assert "\n" not in text
     assert error.value.exit_code == 2
     assert error.value.hint
+
+
+@pytest.mark.parametrize("core", ["native", "python"])
+@pytest.mark.parametrize(("word", "stack"), [(0x2000_4FFF, 0x2000_4FFC), (0x2000_0004, 0x2000_0004)])
+def test_the_core_drops_the_lowest_bits_of_the_first_stack_pointer(
+    word: int, stack: int, core: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As linker scripts of ST once had it: the last byte of the SRAM."""
+    monkeypatch.setenv("P2OS_CORE", core)
+    path = tmp_path / "firmware.bin"
+    path.write_bytes(struct.pack("<II", word, 0x0800_0009) + PROGRAM[8:])
+    assert BluePill(path).register("SP") == stack
 
 
 def test_a_missing_file_and_a_folder_are_one_line(tmp_path: Path) -> None:

@@ -336,6 +336,9 @@ static void go_on(struct device *device, uint64_t ns)
         run_from(device, ns);
     }
     const bool waits_for_address = words[SR1] & (SB | ADD10);
+    if (words[CR1] & (START | STOP) && words[SR2] & TRA && i2c->has_sent && words[SR1] & TXE) {
+        words[SR1] |= BTF; /* until the condition has gone out (RM0008 26.6.6): drivers look for it who ask for that early */
+    }
     if (words[SR1] & ADDR) {
         rest(device, HOLD);
     } else if (words[CR1] & STOP) {

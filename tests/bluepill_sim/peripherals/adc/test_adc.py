@@ -376,6 +376,22 @@ def test_parts_of_a_sequence_follow_their_triggers_without_rollover(fake_chip: A
     assert dones == [3, 3, 2, 3]
 
 
+def test_a_sequence_that_becomes_shorter_between_its_parts_begins_anew(fake_chip: Any) -> None:
+    switch_on(fake_chip, cr1=SCAN | DISCEN | 1 << 13)
+    fake_chip.write("ADC1.SQR3", 3 | 4 << 5 | 5 << 10 | 6 << 15)
+    fake_chip.write("ADC1.SQR1", 3 << 20)
+    part, converted = fake_chip.parts.by_name["ADC1"], []
+    for pin, volts in (("PA3", 1.0), ("PA4", 2.0)):
+        fake_chip.pins[pin].set_volts(volts)
+    for length in (4, 2):
+        fake_chip.write("ADC1.SQR1", length - 1 << 20)
+        start(fake_chip)
+        while part.due_ns is not None:
+            fake_chip.advance(part.due_ns)
+            converted.append(fake_chip.read("ADC1.DR"))
+    assert converted == [code(1.0), code(2.0)] * 2
+
+
 def test_in_parts_each_trigger_converts_one_injected_channel(fake_chip: Any) -> None:
     # RM0008 11.3.10: the third trigger ends the group of three, the fourth converts the first channel.
     switch_on(fake_chip, cr2=JSOFTWARE, cr1=SCAN | JDISCEN)

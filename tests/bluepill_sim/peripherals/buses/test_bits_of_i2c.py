@@ -147,6 +147,7 @@ def test_the_bits_on_scl_and_sda_are_the_conditions_bytes_and_acknowledges(
                 wait(chip, BIT_NS)
         chip.deliver() if hasattr(chip, "deliver") else None
         if lines is not None:
+            assert {(one.byte, one.is_acknowledged) for one in told if one.step is I2cStep.START} <= {(0, False)}
             assert decoded(lines.edges) == expected
             lines.subscription.close()
         assert as_told(told) == expected

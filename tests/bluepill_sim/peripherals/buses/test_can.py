@@ -356,6 +356,17 @@ def test_loop_back_needs_nobody_and_leaves_the_bus_alone(fake_chip: Any) -> None
     assert node.received == []
 
 
+def test_a_frame_has_one_stamp_where_it_is_sent_and_where_it_is_received(fake_chip: Any) -> None:
+    set_up(fake_chip, LOOP, TTCM)
+    fake_chip.advance(fake_chip.now_ns + 1_000_000)
+    frame = CanFrame(identifier=0x77, data=b"ab")
+    send(fake_chip, frame.identifier, frame.data)
+    fake_chip.advance(fake_chip.now_ns + span_ns(frame))
+    stamp = fake_chip.read("CAN.TDT0R") >> 16
+    assert stamp == fake_chip.read("CAN.RDT0R") >> 16 > 0
+    assert fake_chip.read("CAN.TDT0R") & 0xFFFF == len(frame.data)
+
+
 def test_a_silent_chip_hears_and_neither_acknowledges_nor_sends(fake_chip: Any) -> None:
     node, other = CanNode(), CanNode()
     one = network(fake_chip, node)

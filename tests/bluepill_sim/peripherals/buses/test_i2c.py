@@ -287,6 +287,35 @@ def test_a_repeated_start_turns_the_bus_round(fake_chip: Any) -> None:
     assert part.words == ["start", 7, "start"]
 
 
+@pytest.mark.parametrize(("condition", "after"), [(START, SB), (STOP, 0)])
+def test_a_condition_asked_for_while_the_last_byte_goes_out_leaves_btf_until_it_has_ended(
+    fake_chip: Any, condition: int, after: int
+) -> None:
+    set_up(fake_chip)
+    start(fake_chip, 0xA0)
+    clear_addr(fake_chip)
+    begun_ns = fake_chip.now_ns
+    fake_chip.write("I2C1.DR", 7)
+    control(fake_chip, on=condition)
+    seen = []
+    for at_ns in (BYTE_NS - 1, BYTE_NS, BYTE_NS + BIT_NS - 1, BYTE_NS + BIT_NS):
+        fake_chip.advance(begun_ns + at_ns)
+        seen.append(sr1(fake_chip))
+    assert seen == [TXE, TXE | BTF, TXE | BTF, after]
+
+
+def test_a_stop_with_a_byte_still_in_dr_sets_no_btf(fake_chip: Any) -> None:
+    set_up(fake_chip)
+    start(fake_chip, 0xA0)
+    clear_addr(fake_chip)
+    begun_ns = fake_chip.now_ns
+    fake_chip.write("I2C1.DR", 7)
+    fake_chip.write("I2C1.DR", 8)
+    control(fake_chip, on=STOP)
+    fake_chip.advance(begun_ns + BYTE_NS)
+    assert not sr1(fake_chip) & BTF
+
+
 def test_a_ten_bit_address_is_two_bytes_and_a_header_to_read(fake_chip: Any) -> None:
     part = set_up(fake_chip, ACK, Echo(0x2A5))
     start(fake_chip, 0xF4)
@@ -441,6 +470,19 @@ def test_busy_sticks_after_a_disturbance_without_a_stop_until_swrst(fake_chip: A
     fake_chip.write("I2C1.CR1", PE | START)
     wait(fake_chip, BIT_NS)
     assert sr1(fake_chip) & SB
+
+
+def test_a_transfer_that_is_cut_off_ends_for_the_part_and_silence_is_none(fake_chip: Any) -> None:
+    part = set_up(fake_chip)
+    control(fake_chip, off=PE)
+    assert part.log == [], "nothing was under way"
+    control(fake_chip, on=PE)
+    start(fake_chip, 0xA0)
+    clear_addr(fake_chip)
+    fake_chip.write("I2C1.DR", 7)
+    wait(fake_chip, BIT_NS)
+    control(fake_chip, off=PE)
+    assert part.words == ["start", "stop"]
 
 
 def test_a_stop_condition_of_others_frees_the_bus(fake_chip: Any) -> None:

@@ -63,6 +63,35 @@ def status(chip: Any, name: str = "SPI1") -> int:
     return int(chip.parts.by_name[name].words[2])
 
 
+def test_who_subscribes_hears_what_goes_over_the_wires_from_then_on(fake_chip: Any) -> None:
+    first = set_up(fake_chip)
+    fake_chip.write("SPI1.DR", 0x11)
+    fake_chip.advance(fake_chip.now_ns + 1_000_000)
+    second: list[int] = []
+    part = fake_chip.parts.by_name["SPI1"]
+    end = part.subscribe(lambda rows: second.extend(row[1] for row in rows))
+    fake_chip.write("SPI1.DR", 0x22)
+    fake_chip.advance(fake_chip.now_ns + 1_000_000)
+    end()
+    fake_chip.write("SPI1.DR", 0x33)
+    fake_chip.advance(fake_chip.now_ns + 1_000_000)
+    part.deliver()
+    assert ([row[1] for row in first], second) == ([0x11, 0x22, 0x33], [0x22])
+
+
+@pytest.mark.parametrize("only_receives", [False, True])
+def test_a_slave_drives_miso_while_it_is_selected_and_sends(fake_chip: Any, only_receives: bool) -> None:
+    fake_chip.write("GPIOA.CRL", 0x4B44_4444)  # PA6 MISO alternate, PA4 NSS floating
+    select, miso = fake_chip.pins["PA4"], fake_chip.pins["PA6"]
+    select.drive(1)
+    fake_chip.write("SPI1.CR1", SPE | (RXONLY if only_receives else 0))
+    assert miso.is_floating
+    select.drive(0)
+    assert miso.is_floating is only_receives
+    fake_chip.write("SPI1.CR1", 0)
+    assert miso.is_floating
+
+
 def test_a_word_is_over_when_its_last_bit_is(fake_chip: Any) -> None:
     part = Recorder(b"\x5a")
     set_up(fake_chip, device=part)

@@ -525,23 +525,27 @@ def test_outputs_follow_the_table_of_control_bits(
         assert shown is None or found.level is bool(shown ^ is_inverse), pin
 
 
+@pytest.mark.parametrize("channel", [0, 1, 2])
 @pytest.mark.parametrize("ossi", [0, 1])
 @pytest.mark.parametrize(("ois", "ois_n"), [(0, 0), (1, 0), (0, 1), (1, 1)])
-def test_a_break_takes_the_outputs_to_their_idle_states(tim1: Timer, ossi: int, ois: int, ois_n: int) -> None:
+def test_a_break_takes_the_outputs_to_their_idle_states(
+    tim1: Timer, ossi: int, ois: int, ois_n: int, channel: int
+) -> None:
     """RM0008 14.3.12: inactive at once, OISx after the dead time, and never both active."""
-    chip = tim1.chip
-    for pin in ("PA8", "PB13"):
+    chip, (one, other) = tim1.chip, (f"PA{8 + channel}", f"PB{13 + channel}")
+    idle = (ois << 8 | ois_n << 9) << 2 * channel
+    for pin in (one, other):
         tim1.output(pin)
     chip.pins["PB12"].drive(False)
-    tim1.set(CR2=ois << 8 | ois_n << 9, CCMR1=0x50, CCER=5, DIER=0x80, BDTR=0xB000 | ossi << 10 | 16)
-    assert (chip.pins["PA8"].level, chip.pins["PB13"].level) == (False, False)  # the dead time of the switching-on
+    tim1.set(CR2=idle, CCMR1=0x5050, CCMR2=0x50, CCER=5 << 4 * channel, DIER=0x80, BDTR=0xB000 | ossi << 10 | 16)
+    assert (chip.pins[one].level, chip.pins[other].level) == (False, False)  # the dead time of the switching-on
     tim1.at(100)
-    assert (chip.pins["PA8"].level, tim1.flags & BIF) == (True, 0)
+    assert (chip.pins[one].level, tim1.flags & BIF) == (True, 0)
     chip.pins["PB12"].drive(True)
     assert (tim1["BDTR"] & 0x8000, tim1.flags & BIF, chip.irqs[24]) == (0, BIF, True)
     for tick, is_idle in ((100, False), (115, False), (116, True)):
         tim1.at(tick)
-        for pin, wanted in (("PA8", ois), ("PB13", ois_n)):
+        for pin, wanted in ((one, ois), (other, ois_n)):
             assert chip.pins[pin].is_floating is not ossi, pin
             assert chip.pins[pin].level is bool(ossi and is_idle and wanted and not (ois and ois_n)), (pin, tick)
     tim1["SR"] = 0
@@ -711,6 +715,17 @@ def test_an_encoder_wraps_at_its_limit_with_an_update(tim3: Timer, is_forward: b
         assert bool(tim3["SR"] & UIF) is wrapped, step
         tim3["SR"] = 0
     assert found == counts
+
+
+@pytest.mark.parametrize("mode", [1, 2, 3])
+def test_an_encoder_does_not_count_edges_of_the_third_input(tim3: Timer, mode: int) -> None:
+    for pin in ("PA6", "PA7", "PB0"):
+        tim3.chip.pins[pin].drive(False)
+    tim3.set(CCMR2=1, CCER=1 << 8, SMCR=mode, ARR=99, CNT=50, CR1=CEN)
+    for tick in (10, 12, 14):
+        tim3.at(tick).chip.pins["PB0"].drive(tick != 12)
+        assert tim3["CNT"] == 50
+    assert tim3["CCR3"] == 50, "it captures"
 
 
 def test_jitter_on_one_input_comes_and_goes(tim3: Timer) -> None:

@@ -14,6 +14,7 @@ from tests.bluepill_sim.machine import Machine
 from tests.bluepill_sim.peripherals.usart.usart_line import CHARACTER_NS, IRQ, ORE, PCE, RXNE, set_up, status
 
 PE, FE, NE, PEIE = 1, 2, 4, 1 << 8
+EIE, DMAR = 1 << 0, 1 << 6
 TEXT = b"ready 1\nready 2\n"
 CORES = ["python", pytest.param("native", marks=pytest.mark.skipif(library_path() is None, reason="not built"))]
 
@@ -127,6 +128,22 @@ def test_a_character_that_is_lost_to_an_overrun_brings_no_fe(fake_chip: Any) -> 
     usart.receive(b"\0")
     fake_chip.advance(fake_chip.now_ns + CHARACTER_NS)
     assert status(fake_chip) & (FE | ORE | RXNE) == ORE | RXNE
+
+
+@pytest.mark.parametrize(("enables", "raises"), [(0, False), (EIE, False), (DMAR, False), (EIE | DMAR, True)])
+@pytest.mark.parametrize(("baud", "flag"), [(57971, FE), (0, ORE)])
+def test_errors_interrupt_by_eie_where_dma_takes_the_characters(
+    fake_chip: Any, enables: int, raises: bool, baud: int, flag: int
+) -> None:
+    set_up(fake_chip)
+    fake_chip.write("USART1.CR3", enables)
+    usart = fake_chip.parts.usart(1)
+    usart.far_baud = baud or None
+    for _ in range(1 if baud else 2):
+        usart.receive(b"\0")
+        fake_chip.advance(fake_chip.now_ns + 2 * CHARACTER_NS)
+    assert status(fake_chip) & (FE | ORE) == flag
+    assert fake_chip.irqs[IRQ] is raises
 
 
 @pytest.mark.parametrize("enable", [0, PEIE])

@@ -12,6 +12,7 @@ from bluepill_sim import BluePill
 from bluepill_sim.fabric.usb_bus import Answer, Handshake, Token, Transaction, transaction_ns
 from bluepill_sim.parts.usb import HostState, UsbRequestError
 from bluepill_sim.parts.usb.descriptors import DescriptorError, parse_configuration, parse_device, parse_string
+from bluepill_sim.parts.usb.host import HEAD_NS, RECOVERY_NS, RESET_NS, STATUS_NS
 from simbase.timing import NS_PER_MS
 
 Boards = Callable[[], BluePill]
@@ -63,6 +64,20 @@ def test_the_times_of_the_port_are_those_of_a_host(boards: Boards) -> None:
     first_ns = rows[0][0]
     assert first_ns - plugged_ns == 161 * NS_PER_MS + 3_250  # and the packet of SOF
     assert rows[2][0] - rows[0][0] < NS_PER_MS, "its stages follow in one frame"
+
+
+def test_a_device_that_polls_has_time_before_the_status_stage_and_before_the_second_reset(boards: Boards) -> None:
+    """Else it meets the end of the data together with the status, and the status together with the reset."""
+    board = boards()
+    board.usb.plug()
+    rows = watch(board)
+    board.usb.wait_configured()
+    (data_ns, data, answer), (status_ns, status, _) = rows[1:3]
+    assert (data.token, status.token) == (Token.IN, Token.OUT)
+    assert answer is not None
+    assert status_ns - data_ns == STATUS_NS + transaction_ns(len(answer.data))
+    done_ns = status_ns + transaction_ns(0)
+    assert HEAD_NS + RESET_NS + RECOVERY_NS < rows[3][0] - done_ns <= HEAD_NS + RESET_NS + RECOVERY_NS + 2 * NS_PER_MS
 
 
 @pytest.mark.parametrize("core", ["native", "python"])
