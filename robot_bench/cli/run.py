@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from p2os.cli.help_pages import BENCH, VerbPage
+from p2os.cli.keyboard import any_key_stops
 from p2os.cli.main import EXIT_INTERRUPTED
 from p2os.cli.names import bodies, urls, worlds
 from p2os.cli.quantities import option
@@ -33,7 +34,7 @@ from robot_bench.cli.table import print_result
 from robot_bench.cli.workers import core_count
 from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.remote import CAUTIOUS_ROTATION_DEG_S, CAUTIOUS_VELOCITY_MM_S
-from robot_bench.run import RunBench, RunResult, run_at_port, run_scenario
+from robot_bench.run import Progress, RunBench, RunResult, run_at_port, run_scenario
 from robot_bench.scenario import sweep
 from robot_bench.scenario.included_files import read_setting
 from robot_bench.scenario.scenario import Scenario, ScenarioOptions, known_scenarios, load_scenario
@@ -417,7 +418,7 @@ def drive_port(
     gdb: int | None = None,
     force: bool = False,
 ) -> RunResult:
-    """Drive the robot at a URL after asking a person.
+    """Drive the robot at a URL after asking a person, who stops it by any key.
 
     Raises:
         TransportError: The port cannot be opened.
@@ -432,10 +433,15 @@ def drive_port(
         if not yes:
             ask(scenario, url)
         hold_robot()
-        with RunDisplay() as display:
+        with RunDisplay() as display, any_key_stops() as raise_if_pressed:
             driver = None if gdb is None else debug_port(gdb, on_wait=display.raise_if_interrupted)
             folder = out or make_next_folder(scenario.name)
-            return run_at_port(scenario, folder, transport, on_progress=display.update, drive=driver, force=force)
+
+            def look(progress: Progress) -> None:
+                raise_if_pressed()
+                display.update(progress)
+
+            return run_at_port(scenario, folder, transport, on_progress=look, drive=driver, force=force)
     finally:
         transport.close()
 

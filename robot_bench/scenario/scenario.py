@@ -428,7 +428,7 @@ def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | N
     check_table(table, _TOP, where)
     robot = str(table.get("robot", "p2dx"))
     own_robot = _own_robot(robot, table, path, where)
-    parameters = own_robot.robot.parameters if own_robot else _parameters(robot, where)
+    parameters = own_robot.robot.parameters if own_robot else _parameters(robot, path, where)
     threshold_m = cast("float", table.get("threshold_m", parameters.sonar_range_m / 2))
     in_world = cast("Mapping[str, Table]", table.get("in_world", {}))
     for world, part in in_world.items():
@@ -564,7 +564,7 @@ def _model(table: Table, path: Path, where: Place) -> RobotParameters:
     """Return what a robot without a program is."""
     robot = str(table["robot"])
     own = _own_robot(robot, {key: value for key, value in table.items() if key == "pins"}, path, where)
-    return own.robot.parameters if own is not None else _parameters(robot, where)
+    return own.robot.parameters if own is not None else _parameters(robot, path, where)
 
 
 def _taken(own_robot: OwnRobot | None) -> dict[str, str]:
@@ -574,9 +574,11 @@ def _taken(own_robot: OwnRobot | None) -> dict[str, str]:
     return {wire.pin: wire.name for wire in own_robot.robot.signals}
 
 
-def _parameters(robot: str, where: Place) -> RobotParameters:
+def _parameters(robot: str, path: Path, where: Place) -> RobotParameters:
+    """Return a model's parameters; a file of them stands beside the scenario, as all that it names."""
+    beside = path.parent / robot
     try:
-        return load_parameters(robot)
+        return load_parameters(beside if beside.suffix in {".toml", ".p"} and is_file(beside) else robot)
     except FileError as error:
         hint = f"{error.hint or ''}; robots on pins of their own: {', '.join(known_own_robots())}".removeprefix("; ")
         raise ScenarioError(f"{where.at('robot')}: {error}", hint=hint) from error

@@ -27,6 +27,7 @@ import typer
 
 from p2os.cli.held_robot import held, hold_robot, say_what_is_beyond
 from p2os.cli.help_pages import ROBOTS
+from p2os.cli.keyboard import raw_keyboard
 from p2os.cli.names import ReportedModel, RobotUrl
 from p2os.cli.quantities import option
 from p2os.cli.robots.pad_source import SdlPad
@@ -35,7 +36,7 @@ from p2os.client.notices import DeadmanStopped, GapStopped, LinkLostError, Notic
 from p2os.gamepad import PAD_MPS, PAD_RADPS, STICK_FULL, TRIGGER_FULL, Gamepad, PadReport
 from p2os.transport.waiting import wait_readable
 from p2os.transport.wall_clock import Clock, GapWatch, wall_clock
-from simbase.errors import MissingDependencyError, UsageError
+from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 from simbase.units import SPEED, TURN_RATE
 
@@ -316,27 +317,6 @@ def read_keys(longest_ns: Nanos) -> list[str]:
     if data.endswith(b"\x1b") and wait_readable((descriptor,), ESCAPE_WAIT_S):
         data += os.read(descriptor, 256)
     return split_keys(data.decode("utf-8", "replace"))
-
-
-@contextlib.contextmanager
-def raw_keyboard() -> Iterator[None]:
-    """Read keys one by one without echo, and put the terminal back afterwards.
-
-    Raises:
-        MissingDependencyError: This system has no Unix terminals.
-    """
-    try:
-        import termios
-        import tty
-    except ImportError as error:  # pragma: no cover - Windows
-        raise MissingDependencyError("teleop needs a Unix terminal", hint="p2os drive") from error
-    descriptor = sys.stdin.fileno()
-    before = termios.tcgetattr(descriptor)
-    try:
-        tty.setcbreak(descriptor, termios.TCSANOW)  # the other ways wait for a terminal that is held
-        yield
-    finally:
-        termios.tcsetattr(descriptor, termios.TCSANOW, before)
 
 
 class Driven(Protocol):

@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from p2os.cli.help_pages import BENCH
+from p2os.cli.keyboard import has_keyboard
 from p2os.cli.main import EXIT_INTERRUPTED
 from p2os.cli.names import bodies, urls
 from p2os.cli.quantities import option
@@ -46,7 +47,7 @@ HELP = """Validate the bench by experiments: motors, sensors, encoders.
 
 Each EXPERIMENT has a hypothesis, figures with units, and a bound for each, whose
 formula stands beside it in the report. Without names all are run: motors, codes,
-sensors, sensors-all, only-while-seen, encoders, long-drive, dodge. Each is run pins
+sensors, sensors-all, only-while-seen, encoders, sparse, slip, long-drive, dodge. Each is run pins
 straight to the body, through the adapter's model, and through its firmware, with
 every body that is installed.
 
@@ -180,7 +181,10 @@ def _run_at_port(
     left_out = [one.name for one in chosen if not one.at_port]
     if left_out:
         typer.echo(f"not at a port, where nothing is placed: {', '.join(left_out)}", err=True)
-    typer.echo(f"about {longest_s(chosen):.0f} s of driving; Ctrl-C stops the robot", err=True)
+    typer.echo(
+        f"about {longest_s(chosen):.0f} s of driving; {'any key' if has_keyboard() else 'Ctrl-C'} stops the robot",
+        err=True,
+    )
     agreed = yes
 
     def drive(experiment: Experiment, scenario: Scenario, place: Path) -> RunResult:

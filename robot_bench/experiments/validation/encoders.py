@@ -1,5 +1,6 @@
 """What the encoder experiments measure: the pins against the wheels' true angles, and what a program counts."""
 
+import math
 import re
 from itertools import pairwise
 
@@ -20,6 +21,9 @@ from robot_bench.recording.run_record import RunRecord
 from simbase.timing import NS_PER_S, Nanos
 
 SIDES = ("encoder1", "encoder2")
+HALF_TURN = ENCODER_STEPS // 2
+#: The motor value of most speed, by its size.
+MOST_CODE = 4
 #: What the program prints: the pair, and the steps that it has counted on both encoders.
 COUNTED = re.compile(r"^codes: (-?\d+) (-?\d+) at (-?\d+) (-?\d+)$")
 #: chosen: what a line of text takes from the program's count to its last character, seconds.
@@ -27,7 +31,11 @@ LINE_S = 0.01
 
 
 def encoder_figures(record: RunRecord, nominal: Nominal) -> list[Finding]:
-    """Return how near the pins come to the truth, of both wheels, from the first motion on."""
+    """Return how near the pins come to the truth, of both wheels, from the first motion on.
+
+    Where a wheel turns more than half a turn between two samples of its angle, pins that show each sample as it is tell
+    where in its turn it is and no more: they are looked at when they are new, and whole turns are left out.
+    """
     start = next((t for t, pair in motor_pairs(record) if pair != (0, 0)), None)
     if start is None:
         return [Missing(group="pins", what="encoder pins", why="the motor pins never said anything but 0")]
@@ -38,26 +46,103 @@ def encoder_figures(record: RunRecord, nominal: Nominal) -> list[Finding]:
         if not steps:
             return [Missing(group="pins", what="encoder pins", why=f"no wire of {side} was recorded")]
         result.append(_changes(steps, side))
-        first = next((wheel_steps(pose, side) for pose in record.poses if pose.t >= start), 0.0)
-        # Angles and codes are counted from other beginnings, whole turns apart.
-        whole = round((first - steps[0][1] - 0.5) / ENCODER_STEPS) * ENCODER_STEPS
+        whole = _whole_turns(record, side, start, steps[0][1])
+        is_within_turn = nominal.is_direct and bool(_ambiguous(record, nominal, start))
         for pose in record.poses:
-            if pose.t < start:
+            if pose.t < start or (is_within_turn and pose.t % round(nominal.encoder_period_s * NS_PER_S)):
                 continue
-            shown = at(steps, pose.t)
+            truth = wheel_steps(pose, side)
+            off = (at(steps, pose.t) or 0) + whole + 0.5 - truth
             moving.append(Figure(
-                group="motion", what="encoder code against the wheel's angle", expected=wheel_steps(pose, side),
-                measured=(shown or 0) + whole + 0.5, uncertainty=ENCODER_STEPS / MICRO, unit="steps",
-                bound=nominal.encoder_bound(_fastest(record, pose.t, side)), at=f"{side} at {pose.t / NS_PER_S:.2f} s",
+                group="motion", what="encoder code against the wheel's angle", expected=truth,
+                measured=truth + (_within_turn(off) if is_within_turn else off), uncertainty=ENCODER_STEPS / MICRO,
+                unit="steps", at=f"{side} at {pose.t / NS_PER_S:.2f} s",
+                bound=nominal.encoder_bound(0.0 if is_within_turn else _fastest(record, nominal, pose.t, side)),
             ))  # fmt: skip
     return [*result, worst_or_missing(moving, "motion", "encoder code against the wheel's angle", "no pose")]
 
 
-def _fastest(record: RunRecord, t: Nanos, side: str) -> float:
-    """Return the fastest that a rim was within the time that its code may be old: this pose and the four before."""
-    near = poses_between(record, t - 4 * SAMPLE_NS, t + 1)
+def _whole_turns(record: RunRecord, side: str, start: Nanos, code: int) -> int:
+    """Return by how many steps a code is counted from another beginning than the wheel's angle: whole turns."""
+    first = next((wheel_steps(pose, side) for pose in record.poses if pose.t >= start), 0.0)
+    return round((first - code - 0.5) / ENCODER_STEPS) * ENCODER_STEPS
+
+
+def _within_turn(steps: float) -> float:
+    """Return a difference with its whole turns left out."""
+    return (steps + HALF_TURN) % ENCODER_STEPS - HALF_TURN
+
+
+def _ambiguous(record: RunRecord, nominal: Nominal, start: Nanos) -> set[tuple[str, bool]]:
+    """Return which wheels have turned more than half a turn between two samples, and whether forward."""
+    apart = round(nominal.encoder_period_s * NS_PER_S / SAMPLE_NS)
+    found = set()
+    for side in SIDES:
+        angles = [wheel_steps(pose, side) for pose in record.poses if pose.t >= start]
+        changes = [after - before for before, after in zip(angles, angles[apart:], strict=False)]
+        found |= {(side, change > 0) for change in changes if abs(change) > HALF_TURN}
+    return found
+
+
+def sparse_figures(record: RunRecord, nominal: Nominal) -> list[Finding]:
+    """Return what becomes of a wheel that turns more than half a turn between two samples of its angle.
+
+    The adapter counts ways and walks through each code, so that a program misses none. Pins that show samples let a
+    program lose turns, but whole ones only.
+    """
+    start = next((t for t, pair in motor_pairs(record) if pair != (0, 0)), 0)
+    seen = _ambiguous(record, nominal, start)
+    ends: list[Figure] = []
+    for _, line in record.usart_lines()[-2:]:
+        found = COUNTED.match(line)
+        for side, text in zip(SIDES, found.group(3, 4) if found else (), strict=False):
+            begin = next((count for _, count in encoder_steps(record, side, start)), 0)
+            truth = wheel_steps(record.poses[-1], side)
+            off = int(text) + begin + _whole_turns(record, side, start, begin) + 0.5 - truth
+            ends.append(Figure(
+                group="pins", what="count of the program at the end, against the wheel", expected=truth,
+                measured=truth + (_within_turn(off) if nominal.is_direct else off), uncertainty=ENCODER_STEPS / MICRO,
+                unit="steps", bound=nominal.encoder_bound(0.0), at=side,
+            ))  # fmt: skip
+    return [
+        Figure(
+            group="motion", what="wheels and ways round with more than half a turn between two samples", expected=4,
+            measured=len(seen), uncertainty=0, unit="",
+            bound=Bound(name="half a turn", value=0, formula="both wheels, both ways round"),
+        ),
+        *encoder_figures(record, nominal),
+        worst_or_missing(ends, "pins", "count of the program at the end, against the wheel", "it printed no counts"),
+    ]  # fmt: skip
+
+
+def slip_figures(record: RunRecord, nominal: Nominal, body: str) -> list[Finding]:
+    """Return the encoders' figures, and that the wheels did slip: in each direction by more than a step."""
+    slipped = dict.fromkeys((True, False), 0.0)
+    for before, pose in pairwise(record.poses):
+        turned = (wheel_steps(pose, SIDES[0]) - wheel_steps(before, SIDES[0])) * nominal.encoder_step_mm
+        slipped[turned > 0] += abs(turned) - math.hypot(pose.x - before.x, pose.y - before.y) / 1000
+    return [
+        Figure(
+            group="motion", what="directions in which the wheels slip", expected=0 if body == "kinematic" else 2,
+            measured=sum(way > nominal.encoder_step_mm for way in slipped.values()), uncertainty=0, unit="",
+            bound=Bound(
+                name="slip", value=0,
+                formula=f"against both walls, by more than {nominal.encoder_step_mm:.4g} mm; kinematic wheels stall",
+            ), at=f"{slipped[True]:.0f} mm ahead, {slipped[False]:.0f} mm back",
+        ),
+        *(one for one in encoder_figures(record, nominal) if "codes reached" not in one.what),
+    ]  # fmt: skip
+
+
+def _fastest(record: RunRecord, nominal: Nominal, t: Nanos, side: str) -> float:
+    """Return the fastest that a rim was within the time that its code may be old."""
+    lag_ns = round(nominal.encoder_lag(MOST_CODE * nominal.step_mm_s).seconds * NS_PER_S)
+    near = poses_between(record, t - lag_ns - SAMPLE_NS, t + 1)
     motor = "motor1" if side == "encoder1" else "motor2"
-    return max((abs(rim_mm_s(pose, motor)) for pose in near), default=0.0)
+    # A wheel that slips may have turned, though it stood at both poses.
+    turned = (abs(wheel_steps(after, side) - wheel_steps(before, side)) for before, after in pairwise(near))
+    means = [steps * nominal.encoder_step_mm * NS_PER_S / SAMPLE_NS for steps in turned]
+    return max([*means, *(abs(rim_mm_s(pose, motor)) for pose in near)], default=0.0)
 
 
 def _changes(steps: list[tuple[Nanos, int]], side: str) -> Figure:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 
-from robot_bench.experiments.validation.encoders import count_figures, encoder_figures
+from robot_bench.experiments.validation.encoders import count_figures, encoder_figures, slip_figures, sparse_figures
 from robot_bench.experiments.validation.figures import Bound, Figure, Finding, Missing
 from robot_bench.experiments.validation.motors import Pair, motor_figures
 from robot_bench.experiments.validation.nominal import Nominal
@@ -54,7 +54,7 @@ class Experiment:
         return load_scenario(place, settings=[*self.settings, *settings])
 
 
-_FILES = Path(str(files(__package__)))
+_FILES = Path(str(files(__package__))) / "scenarios"
 
 
 def _codes() -> list[tuple[Pair, float]]:
@@ -142,6 +142,19 @@ EXPERIMENTS: Mapping[str, Experiment] = {one.name: one for one in (
         hypothesis="The encoder pins stay right where the position in the packets wraps.",
         procedure="Straight on for more than 27.5 m.",
         measure=_long_drive,
+    ),
+    Experiment(
+        name="sparse", scenario="sparse.toml",
+        hypothesis="A wheel that turns more than half a turn between two samples is followed; what shows samples loses"
+        " whole turns and no part of one.",
+        procedure="codes.elf on an AmigoBot whose samples come each 250 ms, at up to 880 mm/s, on an empty floor.",
+        measure=lambda trial: sparse_figures(trial.record, trial.nominal),
+    ),
+    Experiment(
+        name="slip", scenario="slip.toml",
+        hypothesis="The encoder pins show what the wheels turn where they slip, and no more where they stall.",
+        procedure="motors.elf between two walls, against which the wheels of a strong robot spin, ahead and back.",
+        measure=lambda trial: slip_figures(trial.record, trial.nominal, trial.scenario.body),
     ),
     Experiment(
         name="dodge", scenario="dodge", worlds=("room", "arena", "office"), seeds=(0, 1),

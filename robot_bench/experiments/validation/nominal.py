@@ -77,6 +77,8 @@ class Nominal:
         self._distance_mm = robot.distance_nm_per_count / 1e6
         self._heading_mm = math.pi * robot.track_mm / robot.angle_counts_per_turn
         self._direct, self._adapter = scenario.direct, adapter
+        #: From packet to packet, seconds: as the robot's FLASH has it.
+        self.cycle_s = CYCLE_NS / NS_PER_S if at_port else scenario.controller.sip_period_ns / NS_PER_S
         readings = scenario.controller.sonar_per_sip.pings_per_cycle or robot.sonar_fitted
         self._rounds = math.ceil(robot.sonar_fitted / readings)
 
@@ -125,7 +127,7 @@ class Nominal:
         """From a change of the motor pins to the beginning of the wheels' ramp, at most."""
         body = Delay(BODY_STEP_S, "a step of the body 1 ms")
         if self.at_port:
-            body += Delay(CYCLE_NS / NS_PER_S + self.packet_s, f"a packet's age and its {SIP_BYTES} characters")
+            body += Delay(self.cycle_s + self.packet_s, f"a packet's age and its {SIP_BYTES} characters")
         return body if self.is_direct else self.to_command + body
 
     @property
@@ -134,7 +136,7 @@ class Nominal:
         if self.is_direct:
             seconds = self._direct.sensor_period_ns / NS_PER_S
             return Delay(seconds, f"a period of the sensors {seconds * 1000:g} ms")
-        cycle = CYCLE_NS / NS_PER_S
+        cycle = self.cycle_s
         return Delay(
             (self._rounds + 1) * cycle + self.packet_s,
             f"{self._rounds} packets for a round of all sonar x {cycle * 1000:g} ms"
@@ -147,19 +149,30 @@ class Nominal:
         """Time of a standard packet on the line, seconds."""
         return LINE.time_of(SIP_BYTES) / NS_PER_S
 
+    @property
+    def encoder_period_s(self) -> float:
+        """From one sample of a wheel's angle to the next."""
+        return self._direct.encoder_period_ns / NS_PER_S if self.is_direct else self.cycle_s
+
+    def encoder_lag(self, rim_mm_s: float) -> Delay:
+        """How old a code on the pins may be; of several codes that a packet tells one follows the other."""
+        if self.is_direct:
+            return Delay(self.encoder_period_s, "period of the encoders")
+        seconds, formula = self.cycle_s + self.packet_s + TICK_S, "packet cycle, its characters and a pass"
+        walked = math.floor(abs(rim_mm_s) * self.cycle_s / self.encoder_step_mm)
+        dwell_s = self._adapter.encoder_dwell_ns / NS_PER_S
+        more = f", {walked} codes more x {dwell_s * 1000:g} ms" if walked else ""
+        return Delay(seconds + walked * dwell_s, formula + more)
+
     def encoder_bound(self, rim_mm_s: float) -> Bound:
         """How far the code on the pins may be from the wheel's angle, steps; the middle of a code is its angle."""
-        if self.is_direct:
-            delay, formula = self._direct.encoder_period_ns / NS_PER_S, "period of the encoders"
-            odometry, counts = 0.0, ""
-        else:
-            delay, formula = CYCLE_NS / NS_PER_S + self.packet_s + TICK_S, "packet cycle, its characters and a pass"
-            odometry = self._distance_mm + self._heading_mm
-            counts = f" + a count of odometry {odometry:.3g} mm"
-        moved = abs(rim_mm_s) * delay + odometry
+        lag = self.encoder_lag(rim_mm_s)
+        odometry = 0.0 if self.is_direct else math.sqrt(2) * self._distance_mm + self._heading_mm
+        counts = f" + a count of x, of y and of heading {odometry:.3g} mm" if odometry else ""
+        moved = abs(rim_mm_s) * lag.seconds + odometry
         value = 0.5 + moved / self.encoder_step_mm
         return Bound(
             name="encoder while it turns", value=value,
-            formula=f"half a step + ({abs(rim_mm_s):.4g} mm/s x {delay * 1000:.4g} ms ({formula}){counts})"
+            formula=f"half a step + ({abs(rim_mm_s):.4g} mm/s x {lag.seconds * 1000:.4g} ms ({lag.formula}){counts})"
             f" / {self.encoder_step_mm:.4g} mm = {value:.3g} steps",
         )  # fmt: skip

@@ -9,6 +9,7 @@ import re
 import signal
 import subprocess
 import sys
+import termios
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -18,6 +19,7 @@ from typing import Any
 
 import pytest
 
+from p2os.cli.keyboard import any_key_stops
 from p2os.cli.main import run as p2os
 from p2os.errors import RunFailedError, TransportError
 from p2os.protocol.sip import StandardSip
@@ -216,10 +218,14 @@ def robot(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[tuple[str,
     process.communicate(timeout=20)
 
 
-def begun(command: list[str], folder: Path, stderr: int = subprocess.PIPE) -> subprocess.Popen[str]:
+def begun(
+    command: list[str], folder: Path, stderr: int = subprocess.PIPE, stdin: int | None = None
+) -> subprocess.Popen[str]:
     """Begin a run, until it has recorded what came from the robot; a busy machine takes long, and may give up."""
     for _attempt in range(3):
-        run = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=stderr, text=True)
+        run = subprocess.Popen(
+            [*command, "--force"], cwd=folder, stdin=stdin, stdout=subprocess.PIPE, stderr=stderr, text=True
+        )
         ends = time.monotonic() + 60
         while run.poll() is None:
             if any('"c2r"' in trace.read_text() for trace in (folder / "run").glob("trace.jsonl")):
@@ -290,6 +296,49 @@ def test_a_signal_stops_a_served_robot_and_ends_with_130(
     robot[1].send_signal(signal.SIGINT)
     told = robot[1].communicate(timeout=20)[1]
     assert re.search(r"closed", told), told
+
+
+def test_a_key_counts_once_it_is_pressed_and_the_terminal_is_put_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal, inside = pty.openpty()
+    with os.fdopen(inside, "r") as stdin:
+        monkeypatch.setattr("sys.stdin", stdin)
+        before = termios.tcgetattr(stdin)
+        with any_key_stops() as raise_if_pressed:
+            raise_if_pressed()
+            os.write(terminal, b" ")
+            with pytest.raises(KeyboardInterrupt, match="a key"):
+                raise_if_pressed()
+            raise_if_pressed()
+        assert termios.tcgetattr(stdin) == before
+    os.close(terminal)
+
+
+def test_without_a_terminal_no_key_is_looked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.stdin", io.StringIO("x"))
+    with any_key_stops() as raise_if_pressed:
+        raise_if_pressed()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", ["tcp", "pty"], indirect=True)
+def test_any_key_stops_a_served_robot_first_and_ends_with_130(
+    robot: tuple[str, subprocess.Popen[str]], tmp_path: Path
+) -> None:
+    terminal, inside = pty.openpty()
+    run = begun(
+        [*COMMAND, "run", "motors", "--port", robot[0], "--yes", "--out", "run", "--json"], tmp_path, stdin=inside
+    )
+    os.write(terminal, b"x")
+    out, err = run.communicate(timeout=60)
+    os.close(terminal)
+    os.close(inside)
+    if "lagged" in out:
+        pytest.skip("this machine is too busy for real time now")
+    assert run.returncode == 130, err
+    assert json.loads(out)["failures"][0] == "interrupted (a key)"
+    record = read_run(tmp_path / "run")
+    assert record.events[-1].what == "robot stopped"
+    assert record.last_ns < 15_000_000_000
 
 
 @pytest.mark.slow

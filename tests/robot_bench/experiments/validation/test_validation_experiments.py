@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from adapter_sim.encoders import CodeWalk
 from p2os.cli.main import run as p2os
 from robot_bench.events.codec import Json
 from robot_bench.experiments.validation.experiments import CODES, EXPERIMENTS
@@ -17,6 +18,9 @@ from robot_bench.scenario.included_files import Setting
 
 DIRECT, ADAPTER = Variant("direct", "", "kinematic"), Variant("adapter", "model", "kinematic")
 FIRMWARE = Variant("adapter", "firmware", "kinematic")
+PHYSICAL = Variant("direct", "", "bullet")
+#: Those that take many seconds.
+SLOW = {"dodge", "long-drive", "sparse"}
 
 
 def here(job: Callable[[int, Callable[[], None]], Json], count: int, on_done: Callable[[int, Json], None]) -> bool:
@@ -34,13 +38,13 @@ def results_of(
 
 @pytest.fixture(scope="module")
 def passing(tmp_path_factory: pytest.TempPathFactory) -> list[Result]:
-    names = [name for name in EXPERIMENTS if name not in {"dodge", "long-drive"}]
+    names = [name for name in EXPERIMENTS if name not in SLOW]
     return results_of(names, [DIRECT, ADAPTER], tmp_path_factory.mktemp("validation"))
 
 
 def test_every_experiment_holds_pins_straight_to_the_body_and_through_the_adapter(passing: list[Result]) -> None:
     assert [line for result in passing for line in told(result)] == []
-    assert len(passing) == 2 * (len(EXPERIMENTS) - 2)
+    assert len(passing) == 2 * (len(EXPERIMENTS) - len(SLOW))
     assert all(result.passed and not result.folder for result in passing)
 
 
@@ -81,6 +85,8 @@ PLANTED = [
     ("only-while-seen", DIRECT, ("firmware", "motors.elf"), "rim speed while nothing is seen"),
     ("encoders", DIRECT, ("direct.encoder_period_ms", 40), "encoder code against the wheel's angle"),
     ("encoders", ADAPTER, ("controller.errors", "realistic"), "encoder code against the wheel's angle"),
+    ("slip", PHYSICAL, ("robot", "p2dx"), "directions in which the wheels slip"),
+    ("slip", DIRECT, ("direct.encoder_period_ms", 40), "encoder code against the wheel's angle"),
 ]
 
 
@@ -96,8 +102,26 @@ def test_a_planted_error_is_told_by_the_right_figure(
 
 
 @pytest.mark.slow
+def test_more_than_half_a_turn_between_two_samples_is_followed_and_jumps_of_the_codes_are_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = results_of(["sparse"], [DIRECT, ADAPTER], tmp_path)
+    assert [line for result in found for line in told(result)] == []
+    assert loose(one for result in found for one in result.findings) == {}
+    late = results_of(["sparse"], [DIRECT], tmp_path, [("direct.encoder_period_ms", 300)])
+    assert "encoder code against the wheel's angle" in {failure.what for failure in late[0].failures}
+
+    def jump(walk: CodeWalk, target: int, now: int) -> None:
+        walk.shown = target if walk.due_at(target, now) == now else walk.shown
+
+    monkeypatch.setattr(CodeWalk, "step", jump)
+    (jumping,) = results_of(["sparse"], [ADAPTER], tmp_path)
+    assert "count of the program at the end, against the wheel" in {failure.what for failure in jumping.failures}
+
+
+@pytest.mark.slow
 def test_the_physical_body_holds_too(tmp_path: Path) -> None:
-    found = results_of(["motors", "sensors-all"], [Variant("adapter", "firmware", "bullet")], tmp_path)
+    found = results_of(["motors", "sensors-all", "slip"], [Variant("adapter", "firmware", "bullet")], tmp_path)
     assert [line for result in found for line in told(result)] == []
 
 

@@ -1,0 +1,1 @@
+"""Scenarios of experiments, with their worlds and robots."""
