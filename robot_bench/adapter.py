@@ -269,11 +269,15 @@ class FirmwareAdapter:
 
     def _read(self, _user: object, at: int) -> int:
         try:
-            read = self._pins.read
-            return sum(weight for name, weight in self._inputs if read(name, at))
+            read, word = self._pins.read, 0
+            for name, weight in self._inputs:
+                if read(name, at):
+                    word |= weight
         except BaseException as failure:  # noqa: BLE001 - raised again by _raise_failure
             self._failure = failure
             return 0
+        else:
+            return word
 
     def _duty(self, _user: object, bit: int, at: int) -> int:
         try:

@@ -4,6 +4,7 @@ A fork has all that this process has loaded and read, so it begins at once; and 
 library too) is seen by nobody else.
 """
 
+import gc
 import signal
 from collections.abc import Callable
 from multiprocessing import get_context
@@ -18,10 +19,16 @@ LOOK_S = 0.1
 def begin(work: Callable[..., None], *arguments: object) -> tuple[ForkProcess, Connection]:
     """Begin `work(pipe, *arguments)` in a fork, which sends what comes of it; return it, and the pipe's other end."""
     ours, theirs = get_context("fork").Pipe(duplex=False)
-    process = get_context("fork").Process(target=work, args=(theirs, *arguments), daemon=True)
+    process = get_context("fork").Process(target=_begun, args=(work, theirs, *arguments), daemon=True)
     process.start()
     theirs.close()
     return process, ours
+
+
+def _begun(work: Callable[..., None], *arguments: object) -> None:
+    """Do the work, without ever searching for garbage in what was there before the fork: that would copy it."""
+    gc.freeze()
+    work(*arguments)
 
 
 def received(process: ForkProcess, pipe: Connection) -> Any:  # whatever was sent

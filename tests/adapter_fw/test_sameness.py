@@ -90,9 +90,9 @@ QUIET = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.large_bas
 
 
 @pytest.mark.slow
-@settings(max_examples=115, deadline=None, suppress_health_check=QUIET)
+@settings(max_examples=50, deadline=None, suppress_health_check=QUIET)
 @SEQUENCES
-def test_firmware_and_model_do_the_same_over_five_thousand_steps(
+def test_firmware_and_model_do_the_same_over_two_thousand_steps(
     steps: list, adapter_settings: AdapterSettings, four: bool
 ) -> None:
     run_both(steps, adapter_settings, has_four_bits=four)

@@ -59,10 +59,12 @@ class FakePins:
 
     def read(self, signal: str, at: Nanos) -> bool:
         self.reads += 1
-        history = self.history.get(signal, [])
-        # Most reads are of the present.
-        if history and history[-1][0] <= at:
-            return history[-1][1]
+        if signal not in self.history:
+            return False
+        history = self.history[signal]
+        since, level = history[-1]
+        if since <= at:  # most reads are of the present
+            return level
         place = bisect_right(history, at, key=itemgetter(0))
         return history[place - 1][1] if place else False
 

@@ -85,6 +85,38 @@ def _toward(speed: float, target: float, faster: float, slower: float) -> float:
     return min(speed + step, target) if target > speed else max(speed - step, target)
 
 
+def ramp(targets: list[float], due: list[int], count: int, faster: float, slower: float) -> np.ndarray:
+    """Return the speed before each step, and behind the last: ramped towards the target whose step has come."""
+    speed, speeds = 0.0, np.zeros(count + 1)
+    for first, last, target in zip(due, [*due[1:], count], targets, strict=True):
+        step = min(first, count)
+        while step < min(last, count) and speed != target:
+            speed, step = _toward(speed, target, faster, slower), step + 1
+            speeds[step] = speed
+        speeds[step + 1 : min(last, count) + 1] = speed
+    return speeds
+
+
+def noises(count: int, source: random.Random) -> tuple[dict[int, list[float]], dict[int, list[float]], np.ndarray]:
+    """Return normal noise: three for each measured pose, three for each packet, by its step; one for each step."""
+    poses, packets, slips = {}, {}, []
+    for step in range(count):
+        if step % 50 == 0:
+            poses[step] = [source.gauss() for _ in range(3)]
+        if step % 100 == 0:
+            packets[step] = [source.gauss() for _ in range(3)]
+        slips.append(source.gauss())
+    return poses, packets, np.array(slips)
+
+
+def course(dl: np.ndarray, dr: np.ndarray, turns: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return x, y and heading before each step, and behind the last."""
+    heading = np.concatenate(([0.0], np.cumsum(turns)))
+    middle, ahead = heading[:-1] + turns / 2, (dl + dr) / 2
+    x, y = (np.concatenate(([0.0], np.cumsum(ahead * along(middle)))) for along in (np.cos, np.sin))
+    return x, y, heading
+
+
 def drive(
     parameters: RobotParameters,
     planted: Planted,
@@ -96,62 +128,44 @@ def drive(
     rows = script(seconds, source)
     if not turns:
         rows = [(at, vel, 0.0) for at, vel, _ in rows]
-    half_mm, b_true = parameters.track_mm / 2, planted.track_mm
-    v = w = vel = rvel = 0.0
-    x = y = h = ox = oy = oh = 0.0  # mm: true, and as counted
-    pending = list(rows)
-    truth, packets, speeds, sonar = [], [], ([], []), {}
-    fired = 0
-    for step in range(round(seconds * STEPS_A_SECOND)):
-        t = step / STEPS_A_SECOND
-        if step % 50 == 0:
-            truth.append(
-                (
-                    t,
-                    (x + source.gauss(0, 1)) / 1000,
-                    (y + source.gauss(0, 1)) / 1000,
-                    h + source.gauss(0, math.radians(0.1)),
-                )
+    half_mm, count = parameters.track_mm / 2, round(seconds * STEPS_A_SECOND)
+    due = [round((at + planted.command_delay_s - planted.packet_delay_s) * STEPS_A_SECOND) for at, _, _ in rows]
+    v = ramp([vel for _, vel, _ in rows], due, count, planted.accel_mm_s2, planted.decel_mm_s2)
+    w = ramp([rvel for _, _, rvel in rows], due, count, planted.rot_accel_deg_s2, planted.rot_decel_deg_s2)
+    pose_noise, packet_noise, slips = noises(count, source)
+    around = np.radians(w[1:]) * half_mm
+    dl, dr = (v[1:] - around) * STEP_S, (v[1:] + around) * STEP_S
+    ox, oy, oh = course(dl, dr, (dr - dl) / parameters.track_mm)  # mm, as counted
+    dl, dr = dl * planted.left_wheel, dr * planted.right_wheel
+    slips *= math.radians(slip_deg) * np.sqrt(np.abs(dl + dr) / 2000)
+    x, y, h = course(dl, dr, (dr - dl) / planted.track_mm + slips)  # mm, true
+    truth = [
+        (step / STEPS_A_SECOND, (x[step] + nx) / 1000, (y[step] + ny) / 1000, h[step] + nh * math.radians(0.1))
+        for step, (nx, ny, nh) in pose_noise.items()
+    ]
+    packets, speeds, sonar = [], ([], []), {}
+    unit = parameters.distance_conv_mm
+    for fired, (step, (*side_noise, range_noise)) in enumerate(packet_noise.items()):
+        at = step / STEPS_A_SECOND + planted.packet_delay_s
+        packets.append(
+            (
+                at,
+                round(ox[step] / unit) * unit / 1000,
+                round(oy[step] / unit) * unit / 1000,
+                round(oh[step] * 4096 / math.tau) * math.tau / 4096,
             )
-        if step % 100 == 0:
-            at = t + planted.packet_delay_s
-            unit = parameters.distance_conv_mm
-            packets.append(
-                (
-                    at,
-                    round(ox / unit) * unit / 1000,
-                    round(oy / unit) * unit / 1000,
-                    round(oh * 4096 / math.tau) * math.tau / 4096,
-                )
-            )
-            around = math.radians(w) * half_mm * planted.turn_gain
-            for side, sign in ((0, -1), (1, 1)):
-                told = planted.speed_gain * v + sign * around + source.gauss(0, 1)
-                speeds[side].append((at, round(told) / 1000))
-            number = fired % parameters.sonar_fitted
-            fired += 1
-            pose = parameters.sonar[number]
-            sx = x + math.cos(h) * pose.x_mm - math.sin(h) * pose.y_mm
-            sy = y + math.sin(h) * pose.x_mm + math.cos(h) * pose.y_mm
-            metres = seen(sx / 1000, sy / 1000, h + math.radians(pose.heading_deg), math.radians(planted.cone_deg) / 2)
-            metres += source.gauss(0, planted.noise_m + planted.noise_part * metres)
-            sonar.setdefault(number, []).append((at, round(metres * 1000) / 1000))
-        while pending and step >= round((pending[0][0] + planted.command_delay_s - planted.packet_delay_s) * 1000):
-            _, vel, rvel = pending.pop(0)
-        v = _toward(v, vel, planted.accel_mm_s2, planted.decel_mm_s2)
-        w = _toward(w, rvel, planted.rot_accel_deg_s2, planted.rot_decel_deg_s2)
-        left, right = (v + sign * math.radians(w) * half_mm for sign in (-1, 1))
-        dl, dr = left * STEP_S, right * STEP_S
-        turn = (dr - dl) / parameters.track_mm
-        ox += (dl + dr) / 2 * math.cos(oh + turn / 2)
-        oy += (dl + dr) / 2 * math.sin(oh + turn / 2)
-        oh += turn
-        dl, dr = dl * planted.left_wheel, dr * planted.right_wheel
-        slip = source.gauss(0, math.radians(slip_deg) * math.sqrt(abs(dl + dr) / 2000))
-        turn = (dr - dl) / b_true + slip
-        x += (dl + dr) / 2 * math.cos(h + turn / 2)
-        y += (dl + dr) / 2 * math.sin(h + turn / 2)
-        h += turn
+        )
+        turning = math.radians(w[step]) * half_mm * planted.turn_gain
+        for side, sign in ((0, -1), (1, 1)):
+            told = planted.speed_gain * v[step] + sign * turning + side_noise[side]
+            speeds[side].append((at, round(told) / 1000))
+        number = fired % parameters.sonar_fitted
+        pose, sin, cos = parameters.sonar[number], math.sin(h[step]), math.cos(h[step])
+        sx, sy = x[step] + cos * pose.x_mm - sin * pose.y_mm, y[step] + sin * pose.x_mm + cos * pose.y_mm
+        heading = h[step] + math.radians(pose.heading_deg)
+        metres = seen(sx / 1000, sy / 1000, heading, math.radians(planted.cone_deg) / 2)
+        metres += range_noise * (planted.noise_m + planted.noise_part * metres)
+        sonar.setdefault(number, []).append((at, round(metres * 1000) / 1000))
     return Drive(
         name="synthetic", parameters=parameters, truth=Trajectory.of_rows(truth), odometry=Trajectory.of_rows(packets),
         told_left_mps=steps_of(speeds[0]), told_right_mps=steps_of(speeds[1]),

@@ -18,7 +18,7 @@
 /* Kept out of its callers, which stay short enough to need no stack. */
 #define RARELY __attribute__((noinline, cold))
 
-enum { SLOTS = 128, LINES = 192, SUBSCRIBERS = 16, LISTENERS = 32, OUTPUTS = 24, SINKS = 8, WORDS = 1024, MEMORIES = 4, MOST_ROWS = 32768, COUNTERS = 8, LINE_WORDS = LINES / 64 };
+enum { SLOTS = 128, LINES = 192, SUBSCRIBERS = 16, OUTPUTS = 24, SINKS = 8, WORDS = 1024, MEMORIES = 4, MOST_ROWS = 32768, COUNTERS = 8, LINE_WORDS = LINES / 64 };
 /* The first lines are those of interrupts, by their numbers. */
 enum { GATE_REGISTERS = 3 }; /* AHB, APB2, APB1 */
 enum { IRQ_LINES_END = 64, NO_LINE = 255 };
@@ -231,7 +231,7 @@ struct fabric {
     uint32_t memory_count;
     uint32_t master; /* the slot of the device that makes an access; SLOTS for none */
     struct subscriber subscribers[SUBSCRIBERS];
-    struct pin_listener listeners[LISTENERS];
+    struct pin_listener listeners[SLOTS]; /* a device has a slot */
     struct device devices[SLOTS];
 };
 

@@ -210,9 +210,6 @@ void listen_to_pins(struct device *device, uint32_t port, uint32_t pins)
     if (n == fabric->listener_count && !pins) {
         return;
     }
-    if (n == LISTENERS) {
-        return; /* the chip has fewer devices */
-    }
     if (n == fabric->listener_count) {
         fabric->listeners[fabric->listener_count++].device = device;
     }

@@ -308,7 +308,7 @@ def life(
 
 
 @pytest.mark.slow
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=4, deadline=None)
 @given(orders=ORDERS, looks=st.lists(st.integers(50_000_000, 1_550_000_000), max_size=20))
 def test_the_same_bytes_however_often_and_in_whatever_order_robots_are_asked(
     orders: list[tuple[int, int, tuple[int, int | None]]], looks: list[int]
