@@ -105,6 +105,11 @@ _DIRECT = (
     Key(name="motor_command", kind="text", choices=tuple(MotorCommand)),
     Key(name="bit_order", kind="text", choices=tuple(BitOrder)),
 )
+#: Times of the adapter that a scenario may set, as in `AdapterSettings`, in ms.
+_ADAPTER_TIMES = (
+    "connect_after_ms", "disconnect_after_ms", "pair_spacing_ms", "refresh_ms", "pulse_ms", "liveness_ms", "retry_ms",
+    "plausibility_ms", "distance_stale_ms", "encoder_dwell_ms",
+)  # fmt: skip
 _ADAPTER = (
     Key(name="core", kind="text", choices=ENDS["adapter"].ships, group=ENDS["adapter"].group),
     Key(name="step_mm_s", kind="number", least=0.001, most=10_000),
@@ -114,6 +119,7 @@ _ADAPTER = (
     Key(name="max_velocity_mm_s", kind="whole", least=0, most=32_767),
     Key(name="max_rotation_deg_s", kind="whole", least=0, most=32_767),
     Key(name="encoder_at_open", kind="text", choices=("zero", "continue")),
+    *(Key(name=name, kind="whole", least=1, most=60_000) for name in _ADAPTER_TIMES),
 )
 _CONTROLLER = (
     Key(name="kind", kind="text", choices=ENDS["controller"].ships, group=ENDS["controller"].group),
@@ -661,10 +667,16 @@ def _direct(part: Table, where: Where) -> DirectSettings:
 
 def _adapter(part: Table, threshold_um: int, where: Where) -> AdapterSettings:
     check_table(part, _ADAPTER, within(where, "adapter"))
-    values = {name: value for name, value in part.items() if name not in {"step_mm_s", "core"}}
+    values = {name: value for name, value in part.items() if name not in {"step_mm_s", "core", *_ADAPTER_TIMES}}
+    for name in _ADAPTER_TIMES:
+        if name in part:
+            values[f"{name.removesuffix('_ms')}_ns"] = cast("int", part[name]) * NS_PER_MS
     if "step_mm_s" in part:
         values["step_um_per_s"] = round(cast("float", part["step_mm_s"]) * 1000)
-    return AdapterSettings(threshold_um=threshold_um, **values)  # type: ignore[arg-type] # check_table has seen to it
+    try:
+        return AdapterSettings(threshold_um=threshold_um, **values)  # type: ignore[arg-type] # check_table has seen to it
+    except UsageError as error:
+        raise ScenarioError(f"{within(where, 'adapter')}: {error}", hint=error.hint) from error
 
 
 def _controller(part: Table, path: Path, where: Where) -> ControllerSettings:

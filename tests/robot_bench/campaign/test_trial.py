@@ -138,3 +138,13 @@ def test_what_sram_holds_at_power_on_is_the_seeds_and_a_program_that_sets_its_va
 def test_a_firmware_that_is_not_there_is_refused_in_a_line() -> None:
     with pytest.raises(UsageError, match=r"there is no firmware file nowhere\.elf"):
         trial_of("motors", firmware=Path("nowhere.elf"))
+
+
+@pytest.mark.parametrize("core", ["model", "firmware"])
+@pytest.mark.parametrize(("stale_ms", "verdict"), [(399, Verdict.FAILED), (500, Verdict.PASSED)])
+def test_a_distance_that_is_stale_before_the_ring_is_round_holds_the_robot(
+    core: str, stale_ms: int, verdict: Verdict
+) -> None:
+    settings = [("body", "kinematic"), ("duration_s", 8), ("adapter", {"core": core, "distance_stale_ms": stale_ms})]
+    goal = {"kind": "moves_on", "way_m": 0.3, "within_s": 7.0}
+    assert run_trial(trial_of("dodge", settings=settings).with_lists(goal=[goal])).verdict is verdict
