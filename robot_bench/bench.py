@@ -106,7 +106,7 @@ Condition: TypeAlias = Union[str, Callable[["Bench"], bool]]  # noqa: UP007 - a 
 DECISIVE = (
     "mode", "seed", "parameters", "threshold_um", "usart_baud", "outside", "start", "direct", "adapter",
     "adapter_core", "controller", "controller_kind", "changes", "faults", "whens", "own_robot", "parts", "record",
-    "sram",
+    "sram", "crystal_ppm",
 )  # fmt: skip
 _VERSION = "version of p2os"
 
@@ -1093,9 +1093,11 @@ def boot(scenario: Scenario, image: "Image | None" = None) -> Chip:
         MissingDependencyError: The emulator's engine is not installed.
     """
     from bluepill_sim.board import BluePill
+    from bluepill_sim.fabric.clocks import CRYSTAL_HZ
     from bluepill_sim.stm32f103 import SRAM_BYTES
 
     board = BluePill(image or scenario.firmware)
+    board.chip.parts.rcc.hse_hz = CRYSTAL_HZ + CRYSTAL_HZ * scenario.crystal_ppm // 10**6
     if scenario.sram == RANDOM_SRAM:
         board.power_up_with(random.Random(scenario.seed).randbytes(SRAM_BYTES))
     return board

@@ -81,6 +81,7 @@ _TOP = (
     Key(name="record", kind="texts"),
     Key(name="outside", kind="text"),
     Key(name="sram", kind="text", choices=("zeros", RANDOM_SRAM)),
+    Key(name="crystal_ppm", kind="whole", least=-1000, most=1000),
     Key(name="start", kind="table"),
     Key(name="direct", kind="table"),
     Key(name="adapter", kind="table"),
@@ -215,6 +216,8 @@ class Scenario:
     outside: tuple[str, ...] = ()
     #: What the chip's SRAM holds when power comes up: `zeros`, or `random` by the seed.
     sram: str = "zeros"
+    #: By how many millionths the 8 MHz crystal of the chip is too fast.
+    crystal_ppm: int = 0
     #: None starts at the world's own place.
     start: Pose | None = None
     #: What a message calls the start: file, line and key.
@@ -466,6 +469,7 @@ def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | N
         record=_buses(_listed(table.get("record")), where.at("record"), ScenarioError),
         outside=_outside(str(table.get("outside", "")), own_robot, where.at("outside")),
         sram=str(table.get("sram", "zeros")),
+        crystal_ppm=cast("int", table.get("crystal_ppm", 0)),
         start=_start(table, where),
         start_at=str(within(where, "start")),
         direct=_direct(cast("Table", table.get("direct", {})), where),
