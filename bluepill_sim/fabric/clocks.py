@@ -16,6 +16,10 @@ MAX_SYSCLK_HZ = 72_000_000
 MAX_PCLK1_HZ = 36_000_000
 #: HSI after reset, in Hz (RM0008 7.2.2).
 HSI_HZ = 8_000_000
+#: The crystal of a BluePill on OSC_IN and OSC_OUT, as its can says.
+CRYSTAL_HZ = 8_000_000
+#: chosen: a crystal is off by a thousandth at most; the data sheet's limits are for what its can says.
+CRYSTAL_TOLERANCE = 1000
 #: The crystal on PC14 and PC15.
 LSE_HZ = 32_768
 #: LSI, typical, and its range, in Hz (DS5319 table 25).
@@ -56,15 +60,19 @@ class Clocks(Stateful):
 def illegal_settings(clocks: Clocks) -> list[tuple[str, str]]:
     """Return what the data sheet forbids in the present setting, as (key, sentence) pairs."""
     found = []
-    if clocks.sysclk_hz > MAX_SYSCLK_HZ:
+    if _is_above(clocks.sysclk_hz, MAX_SYSCLK_HZ):
         found.append(("clock:sysclk", f"SYSCLK is {clocks.sysclk_hz} Hz, above {MAX_SYSCLK_HZ} Hz"))
-    if clocks.pclk1_hz > MAX_PCLK1_HZ:
+    if _is_above(clocks.pclk1_hz, MAX_PCLK1_HZ):
         found.append(("clock:pclk1", f"PCLK1 is {clocks.pclk1_hz} Hz, above {MAX_PCLK1_HZ} Hz"))
     highest = MAX_SYSCLK_BY_WAIT_STATES[min(clocks.flash_wait_states, 2)]
-    if highest < clocks.sysclk_hz <= MAX_SYSCLK_HZ:
+    if _is_above(clocks.sysclk_hz, highest) and not _is_above(clocks.sysclk_hz, MAX_SYSCLK_HZ):
         states = clocks.flash_wait_states
         what = f"FLASH_ACR LATENCY is {states} at a SYSCLK of {clocks.sysclk_hz} Hz: good up to {highest} Hz"
         found.append(("clock:latency", what))
     if not clocks.flash_prefetch and clocks.hclk_hz != clocks.sysclk_hz:
         found.append(("clock:prefetch", "FLASH_ACR PRFTBE is off while the AHB prescaler is not 1"))
     return found
+
+
+def _is_above(hz: int, limit_hz: int) -> bool:
+    return hz > limit_hz + limit_hz // CRYSTAL_TOLERANCE

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from bluepill_sim.extension.layout import RCC
-from bluepill_sim.fabric.clocks import HSI_HZ, LEAST_LSI_HZ, LSE_HZ, MOST_LSI_HZ, illegal_settings
+from bluepill_sim.fabric.clocks import CRYSTAL_HZ, HSI_HZ, LEAST_LSI_HZ, LSE_HZ, MOST_LSI_HZ, illegal_settings
 from bluepill_sim.fabric.ports import ChipPorts
 from bluepill_sim.fabric.registers import NATIVE, ClockBit, Peripheral, Place, Register, bits
 
@@ -221,7 +221,7 @@ class Rcc(Peripheral):
     )
 
     def __init__(
-        self, chip: ChipPorts, place: Place, *, gates: Mapping[str, ClockBit], hse_hz: int | None = 8_000_000
+        self, chip: ChipPorts, place: Place, *, gates: Mapping[str, ClockBit], hse_hz: int | None = CRYSTAL_HZ
     ) -> None:
         """Make the RCC.
 

@@ -92,9 +92,11 @@ def boot(scenario: Scenario, image: "Image | None" = None) -> Chip:
         MissingDependencyError: The emulator's engine is not installed.
     """
     from bluepill_sim.board import BluePill
+    from bluepill_sim.fabric.clocks import CRYSTAL_HZ
     from bluepill_sim.stm32f103 import SRAM_BYTES
 
     board = BluePill(image or scenario.firmware)
+    board.chip.parts.rcc.hse_hz = CRYSTAL_HZ + CRYSTAL_HZ * scenario.crystal_ppm // 10**6
     if scenario.sram == RANDOM_SRAM:
         board.power_up_with(random.Random(scenario.seed).randbytes(SRAM_BYTES))
     return board

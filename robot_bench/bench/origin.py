@@ -19,7 +19,7 @@ VERSION = "version of p2os"
 DECISIVE = (
     "mode", "seed", "parameters", "threshold_um", "usart_baud", "outside", "start", "direct", "adapter",
     "adapter_core", "controller", "controller_kind", "changes", "faults", "whens", "own_robot", "parts", "record",
-    "sram",
+    "sram", "crystal_ppm",
 )  # fmt: skip
 
 

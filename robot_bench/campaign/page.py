@@ -300,7 +300,7 @@ def _chart(
         return ""
     x0, x1, y0, y1 = min(xs), max(xs), min(0.0, *ys), max(0.0, *ys)
     x1, y1 = x1 + float(x0 == x1), y1 + float(y0 == y1)
-    left, top, wide, high = 34, 12, _WIDTH - 46, _HEIGHT - 34
+    left, top, wide, high = 40, 12, _WIDTH - 52, _HEIGHT - 34
 
     def to(x: float, y: float) -> tuple[float, float]:
         return round(left + (x - x0) / (x1 - x0) * wide, 1), round(top + (y1 - y) / (y1 - y0) * high, 1)
@@ -314,12 +314,17 @@ def _chart(
     if line:
         parts.append(_polyline([to(x, y) for x, y in line], name))
     for text, x, y, anchor in (
-        (f"{y1:.2g}", left - 4, top + 4, "end"), (f"{y0:.2g}", left - 4, top + high + 4, "end"),
+        (_short(y1), left - 4, top + 4, "end"), (_short(y0), left - 4, top + high + 4, "end"),
         (f"{x0:g}", left, _HEIGHT - 6, "start"), (f"{x1:g}", left + wide, _HEIGHT - 6, "end"),
         (title, left + wide / 2, _HEIGHT - 6, "middle"),
     ):  # fmt: skip
         parts.append(f'<text x="{x}" y="{y}" text-anchor="{anchor}">{html.escape(text)}</text>')
     return f"<figure>{_svg(_WIDTH, _HEIGHT, parts)}</figure>"
+
+
+def _short(value: float) -> str:
+    """Return a number that fits beside an axis: two digits, or all those before the point."""
+    return f"{value:.2g}" if abs(value) < 10 else f"{value:.0f}"
 
 
 def _polyline(points: Sequence[tuple[float, float]], name: str) -> str:

@@ -81,6 +81,7 @@ _TOP = (
     Key(name="record", kind="texts"),
     Key(name="outside", kind="text"),
     Key(name="sram", kind="text", choices=("zeros", RANDOM_SRAM)),
+    Key(name="crystal_ppm", kind="whole", least=-1000, most=1000),
     Key(name="start", kind="table"),
     Key(name="direct", kind="table"),
     Key(name="adapter", kind="table"),
@@ -105,6 +106,11 @@ _DIRECT = (
     Key(name="motor_command", kind="text", choices=tuple(MotorCommand)),
     Key(name="bit_order", kind="text", choices=tuple(BitOrder)),
 )
+#: Times of the adapter that a scenario may set, as in `AdapterSettings`, in ms.
+_ADAPTER_TIMES = (
+    "connect_after_ms", "disconnect_after_ms", "pair_spacing_ms", "refresh_ms", "pulse_ms", "liveness_ms", "retry_ms",
+    "plausibility_ms", "distance_stale_ms", "encoder_dwell_ms",
+)  # fmt: skip
 _ADAPTER = (
     Key(name="core", kind="text", choices=ENDS["adapter"].ships, group=ENDS["adapter"].group),
     Key(name="step_mm_s", kind="number", least=0.001, most=10_000),
@@ -114,6 +120,7 @@ _ADAPTER = (
     Key(name="max_velocity_mm_s", kind="whole", least=0, most=32_767),
     Key(name="max_rotation_deg_s", kind="whole", least=0, most=32_767),
     Key(name="encoder_at_open", kind="text", choices=("zero", "continue")),
+    *(Key(name=name, kind="whole", least=1, most=60_000) for name in _ADAPTER_TIMES),
 )
 _CONTROLLER = (
     Key(name="kind", kind="text", choices=ENDS["controller"].ships, group=ENDS["controller"].group),
@@ -209,6 +216,8 @@ class Scenario:
     outside: tuple[str, ...] = ()
     #: What the chip's SRAM holds when power comes up: `zeros`, or `random` by the seed.
     sram: str = "zeros"
+    #: By how many millionths the 8 MHz crystal of the chip is too fast.
+    crystal_ppm: int = 0
     #: None starts at the world's own place.
     start: Pose | None = None
     #: What a message calls the start: file, line and key.
@@ -460,6 +469,7 @@ def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | N
         record=_buses(_listed(table.get("record")), where.at("record"), ScenarioError),
         outside=_outside(str(table.get("outside", "")), own_robot, where.at("outside")),
         sram=str(table.get("sram", "zeros")),
+        crystal_ppm=cast("int", table.get("crystal_ppm", 0)),
         start=_start(table, where),
         start_at=str(within(where, "start")),
         direct=_direct(cast("Table", table.get("direct", {})), where),
@@ -676,10 +686,16 @@ def _direct(part: Table, where: Where) -> DirectSettings:
 
 def _adapter(part: Table, threshold_um: int, where: Where) -> AdapterSettings:
     check_table(part, _ADAPTER, within(where, "adapter"))
-    values = {name: value for name, value in part.items() if name not in {"step_mm_s", "core"}}
+    values = {name: value for name, value in part.items() if name not in {"step_mm_s", "core", *_ADAPTER_TIMES}}
+    for name in _ADAPTER_TIMES:
+        if name in part:
+            values[f"{name.removesuffix('_ms')}_ns"] = cast("int", part[name]) * NS_PER_MS
     if "step_mm_s" in part:
         values["step_um_per_s"] = round(cast("float", part["step_mm_s"]) * 1000)
-    return AdapterSettings(threshold_um=threshold_um, **values)  # type: ignore[arg-type] # check_table has seen to it
+    try:
+        return AdapterSettings(threshold_um=threshold_um, **values)  # type: ignore[arg-type] # check_table has seen to it
+    except UsageError as error:
+        raise ScenarioError(f"{within(where, 'adapter')}: {error}", hint=error.hint) from error
 
 
 def _controller(part: Table, path: Path, where: Where) -> ControllerSettings:

@@ -280,9 +280,12 @@ def test_a_forbidden_setting_that_passes_at_once_is_none(fake_chip: Any) -> None
 
 
 @pytest.mark.parametrize(("hz", "states", "is_good"), [
-    (24_000_000, 0, True), (24_000_001, 0, False), (48_000_000, 1, True), (48_000_001, 1, False), (72_000_000, 2, True)
+    (24_024_000, 0, True), (24_024_001, 0, False), (48_048_000, 1, True), (48_048_001, 1, False), (72_072_000, 2, True),
+    (72_072_001, 2, False),
 ])  # fmt: skip
-def test_wait_states_have_their_limits_to_the_hertz(hz: int, states: int, is_good: bool) -> None:
+def test_wait_states_have_their_limits_to_the_hertz_and_a_crystal_its_tolerance(
+    hz: int, states: int, is_good: bool
+) -> None:
     clocks = Clocks(sysclk_hz=hz, hclk_hz=hz, flash_wait_states=states)
     assert (illegal_settings(clocks) == []) is is_good
 

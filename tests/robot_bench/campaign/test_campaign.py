@@ -14,6 +14,7 @@ import pytest
 from p2os.errors import ScenarioError
 from robot_bench.campaign.campaign_file import DRAW, TOP, Campaign, Limits, campaign_schema, load_campaign
 from robot_bench.campaign.conduct import Conduct, Finding
+from robot_bench.campaign.page import _short
 from robot_bench.campaign.processes import Processes
 from robot_bench.campaign.search import SEARCHES, Answer, Problem
 from robot_bench.campaign.trial import GoalResult, Outcome, Trial, Verdict, run_trial, trial_of
@@ -189,6 +190,13 @@ def test_each_failure_is_a_folder_that_runs_again_with_its_hash(tmp_path: Path) 
     assert whole.results.replay(row) == f"p2os run {file}"
     assert row.failing is not None
     assert trial_of(str(file)).sha256 == row.failing.trial.sha256
+
+
+@pytest.mark.parametrize(("value", "text"), [
+    (0.4, "0.4"), (-0.0123, "-0.012"), (9.99, "10"), (99.4, "99"), (99.6, "100"), (-331.0, "-331"), (12345, "12345"),
+])  # fmt: skip
+def test_a_number_beside_an_axis_is_short(value: float, text: str) -> None:
+    assert _short(value) == text
 
 
 def test_the_data_set_has_a_row_a_run_and_the_page_names_every_failure(tmp_path: Path) -> None:

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from robot_bench.campaign.trial import Outcome, Trial, Verdict, bench_of, run_trial, trial_of
+from robot_bench.campaign.trial import Outcome, Trial, Verdict, bench_of, run_trial, trial_of, unpacked
+from robot_bench.events.kinds import Note, Text
 from robot_bench.run import run_scenario
 from robot_bench.scenario.scenario import load_scenario
 from simbase.errors import UsageError
@@ -135,6 +136,35 @@ def test_what_sram_holds_at_power_on_is_the_seeds_and_a_program_that_sets_its_va
     assert run_trial(trial.set(("sram", "random"))).sha256 == outcome.sha256
 
 
+@pytest.mark.parametrize("ppm", [-1000, 1000])
+def test_a_crystal_that_is_too_fast_brings_forward_what_a_program_times(ppm: int, trial: Trial) -> None:
+    longer = trial.set(("duration_s", 3.1))
+    took = []
+    for one in (longer, longer.set(("crystal_ppm", ppm))):
+        times: list[int] = []
+        with unpacked(one.files) as folder:
+            bench = bench_of(one.scenario(folder))
+            bench.events.subscribe(lambda event, times=times: times.append(event.t), Text)
+            notes: list[str] = []
+            bench.events.subscribe(lambda event, notes=notes: notes.append(str(event)), Note)
+            bench.run_until(bench.end)
+            bench.finish()
+        assert run_trial(one).sha256 == bench.trace.sha256
+        assert not any("SYSCLK" in note for note in notes), "72.07 MHz is no forbidden clock"
+        took.append(times[1] - times[0])  # from the reset's greeting to the link, 3 s that it waits for by SysTick
+    assert took[1] / took[0] == pytest.approx(1 - ppm / 10**6, abs=2e-6)
+
+
 def test_a_firmware_that_is_not_there_is_refused_in_a_line() -> None:
     with pytest.raises(UsageError, match=r"there is no firmware file nowhere\.elf"):
         trial_of("motors", firmware=Path("nowhere.elf"))
+
+
+@pytest.mark.parametrize("core", ["model", "firmware"])
+@pytest.mark.parametrize(("stale_ms", "verdict"), [(399, Verdict.FAILED), (500, Verdict.PASSED)])
+def test_a_distance_that_is_stale_before_the_ring_is_round_holds_the_robot(
+    core: str, stale_ms: int, verdict: Verdict
+) -> None:
+    settings = [("body", "kinematic"), ("duration_s", 8), ("adapter", {"core": core, "distance_stale_ms": stale_ms})]
+    goal = {"kind": "moves_on", "way_m": 0.3, "within_s": 7.0}
+    assert run_trial(trial_of("dodge", settings=settings).with_lists(goal=[goal])).verdict is verdict

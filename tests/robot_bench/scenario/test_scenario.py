@@ -1,17 +1,19 @@
 """Scenario files: what ships is right, and what is wrong is one line that says where."""
 
 import importlib
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from adapter_sim.codec import BitOrder
+from adapter_sim.settings import AdapterSettings
 from p2os.errors import ScenarioError
 from p2os.pioneer.controller.settings import SonarPerSip
 from p2os.pioneer.world import load_world
 from robot_bench.bench import Bench
 from robot_bench.scenario.goals.kinds import KINDS
-from robot_bench.scenario.scenario import known_scenarios, load_scenario, read_scenario
+from robot_bench.scenario.scenario import _ADAPTER_TIMES, known_scenarios, load_scenario, read_scenario
 from robot_bench.scenario.schema import Key
 from robot_bench.scenario.world_script import Op
 from simbase.errors import P2osError, UsageError
@@ -48,6 +50,19 @@ def test_what_a_scenario_leaves_out_has_its_default(tmp_path: Path) -> None:
     assert (scenario.mode, scenario.body, scenario.seed, scenario.duration_ns) == ("adapter", "best", 0, 10**10)
     assert scenario.threshold_um == 2_500_000, "half of the robot file's sonar range of 5 m"
     assert scenario.start is None
+
+
+@pytest.mark.parametrize("name", _ADAPTER_TIMES)
+def test_a_time_of_the_adapter_is_one_of_its_settings(name: str, tmp_path: Path) -> None:
+    scenario = read_scenario(write(tmp_path, f"{LEAST}[adapter]\n{name} = 123\n"))
+    changed = replace(AdapterSettings(threshold_um=2_500_000), **{f"{name.removesuffix('_ms')}_ns": 123_000_000})
+    assert scenario.adapter == changed
+
+
+def test_times_of_the_adapter_that_fit_no_other_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match=r"adapter.*refresh_ns \(24000000\) is below pair_spacing_ns"):
+        read_scenario(write(tmp_path, f"{LEAST}[adapter]\nrefresh_ms = 24\n"))
+    assert read_scenario(write(tmp_path, f"{LEAST}[adapter]\nrefresh_ms = 25\n")).adapter.refresh_ns == 25_000_000
 
 
 def test_every_setting_arrives_where_it_belongs(tmp_path: Path) -> None:
