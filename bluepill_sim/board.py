@@ -37,7 +37,7 @@ from bluepill_sim.fabric.pins import Pin, PinDrive
 from bluepill_sim.fabric.registers import RegisterView
 from bluepill_sim.fabric.signals import UV_PER_V, to_uv
 from bluepill_sim.fabric.subscriptions import EdgeSink, Of, PinSubscription
-from bluepill_sim.memory import Memory
+from bluepill_sim.memory.arrays import Memory
 from bluepill_sim.parts.attached import AttachedParts
 from bluepill_sim.parts.serial_port import Activity, SerialPort
 from bluepill_sim.parts.usb import UsbHost, UsbSerial

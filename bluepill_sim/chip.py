@@ -1,6 +1,6 @@
 """The whole chip: core, memories, bus and peripherals, brought forward together.
 
-This is not the board: pins are handed out and images are loaded by `board.py`;
+This is not the board: pins are handed out and images are loaded by `board.py`; the bus is `memory/bus.py`;
 the tables of the chip are `stm32f103.py`.
 
 Theory of operation. At each block boundary: SysTick and the fabric's queue act on
@@ -10,12 +10,11 @@ that moves a deadline or an interrupt line inside an access brings the end of th
 core's slice forward, so that what happens never depends on where the caller's slices
 end. Subscribers get what has happened when the chip has run.
 
-Source: RM0008 sections 3.1, 3.3.2 (bit-band) and 7.3 (clock gates).
+Source: RM0008 section 3.1.
 Invariant: time never goes back; `now_ns` inside a peripheral's access is the
 time of the accessing instruction.
 """
 
-import ctypes
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -32,13 +31,20 @@ from bluepill_sim.fabric.cycle_clock import CycleClock
 from bluepill_sim.fabric.low_power import STOP_WAKE_NS, LowPower, Mode
 from bluepill_sim.fabric.power import LEAST_SUPPLY_MV, MOST_SUPPLY_MV, Power
 from bluepill_sim.fabric.registers import WORD, Peripheral
-from bluepill_sim.memory import Memory
+from bluepill_sim.memory.arrays import Memory
+from bluepill_sim.memory.bus import (
+    ALIAS_BYTES,
+    PERIPHERAL_ALIAS,
+    PERIPHERAL_BYTES,
+    SRAM_ALIAS,
+    PeripheralBus,
+    SramBitBand,
+)
 from bluepill_sim.native.processor import make_core
-from bluepill_sim.native.registers import join_fabric, share_registers
+from bluepill_sim.native.registers import share_registers
 from bluepill_sim.peripherals.flash import OPTION_BYTES
-from bluepill_sim.peripherals.rcc import Rcc, ResetCause
+from bluepill_sim.peripherals.rcc import ResetCause
 from bluepill_sim.stm32f103 import (
-    CLOCK_GATES,
     FLASH_BASE,
     FLASH_BYTES_FITTED,
     FREEZE_BITS,
@@ -50,23 +56,12 @@ from bluepill_sim.stm32f103 import (
     WAKING_IRQS,
     make_parts,
     make_pins,
-    name_at,
 )
 from simbase.state import Stateful
 from simbase.timing import Nanos, Reason
 
-#: What is mapped as peripherals: APB1, APB2 and AHB up to the end of CRC and reserved pages.
-PERIPHERAL_BYTES = 0x2_4000
-_PAGE_SHIFT = 10
-
-#: Bit-band alias regions (RM0008 3.3.2) and how many alias bytes there are for each byte.
-SRAM_ALIAS, PERIPHERAL_ALIAS = 0x2200_0000, 0x4200_0000
-_ALIAS_BYTES = 32
 #: The upper byte of the first halfword of a 32-bit instruction is this or more.
 _FIRST_WIDE_BYTE = 0xE8
-
-#: chosen: reading a peripheral without its clock for so long is no de-initialization that passes by.
-UNCLOCKED_NS: Nanos = 1_000_000
 
 #: Takes a message, its key, and the address of the instruction that caused it.
 WarningListener = Callable[[str, str, int], None]
@@ -135,7 +130,7 @@ class Chip(Stateful):
         self.processor.on_entry = self._act_on_due
         self.pins = make_pins(self)
         self.fabric = self.pins.fabric
-        self.uses_native_core = join_fabric(self.engine, self.fabric)
+        self.uses_native_core = self.engine.join(self.fabric.handle)
         self._is_made = True
         self._time_changed()
         self.parts = make_parts(self)
@@ -581,9 +576,9 @@ class Chip(Stateful):
                 self.fabric.add_memory(region.base, region.buffer, is_writable=region.is_writable)
         self._bus = bus = PeripheralBus(self.parts.by_name, self.parts.rcc, self)
         engine.map_io(PERIPHERAL_BASE, PERIPHERAL_BYTES, bus.read, bus.write)
-        engine.map_io(PERIPHERAL_ALIAS, PERIPHERAL_BYTES * _ALIAS_BYTES, bus.read_bit, bus.write_bit)
+        engine.map_io(PERIPHERAL_ALIAS, PERIPHERAL_BYTES * ALIAS_BYTES, bus.read_bit, bus.write_bit)
         bits = SramBitBand(self.memory.sram)
-        engine.map_io(SRAM_ALIAS, SRAM_BYTES * _ALIAS_BYTES, bits.read_bit, bits.write_bit)
+        engine.map_io(SRAM_ALIAS, SRAM_BYTES * ALIAS_BYTES, bits.read_bit, bits.write_bit)
         engine.map_io(PPB_BASE, PPB_BYTES, self._read_system, self._write_system)
         share_registers(engine, self.parts.by_name.values(), self.parts.rcc)
         self.fabric.forced = self._forced
@@ -648,122 +643,6 @@ class Chip(Stateful):
             self.engine.drop_code(FLASH_BASE + offset, len(data))
             self.engine.drop_code(offset, len(data))
         self._flash_repairs.clear()
-
-
-class PeripheralBus(Stateful):
-    """Reads and writes of the peripheral region; offsets count from PERIPHERAL_BASE.
-
-    A peripheral sees an access only while its clock is on. Accesses without one are warned of where they matter: a
-    write that sets what a reset would not leave, and reading on for a while; ST's de-initializations do neither.
-    """
-
-    STATE = ("read_unclocked_ns",)
-
-    def __init__(self, parts: dict[str, Peripheral], rcc: Rcc, chip: Chip) -> None:
-        self._pages = {
-            (part.base - PERIPHERAL_BASE >> _PAGE_SHIFT) + page: part
-            for part in parts.values()
-            for page in range(part.place.size >> _PAGE_SHIFT)
-        }
-        self._rcc = rcc
-        self._chip = chip
-        #: When each peripheral was first read without its clock since that was last on, in ns.
-        self.read_unclocked_ns: dict[str, Nanos] = {}
-        rcc.on_gates = self._forget_clocked
-
-    def read(self, offset: int, size: int) -> int:
-        """Return what the core reads."""
-        part = self._pages.get(offset >> _PAGE_SHIFT)
-        if part is None:
-            self._refuse(None, offset, "read of")
-            return 0
-        if not self._rcc.is_clocked(part.name):
-            now_ns = self._chip.now_ns
-            self._rcc.native.watches_gates = True
-            if now_ns - self.read_unclocked_ns.setdefault(part.name, now_ns) >= UNCLOCKED_NS:
-                self._refuse(part, offset, "read of")
-            return 0
-        at = PERIPHERAL_BASE + offset - part.base
-        word = part.read(at, size)
-        if not part.has_register(at) and type(part).write is Peripheral.write:  # else it judges each write itself
-            self._chip.engine.declare_zero(PERIPHERAL_BASE + offset)
-        return word
-
-    def write(self, offset: int, size: int, value: int) -> None:
-        """Take what the core writes."""
-        part = self._pages.get(offset >> _PAGE_SHIFT)
-        if part is None:
-            self._refuse(None, offset, f"write of {value:#x} to")
-            return
-        if not self._rcc.is_clocked(part.name):
-            if part.changes_reset_value(PERIPHERAL_BASE + offset - part.base, value):
-                self._refuse(part, offset, f"write of {value:#x} to")
-            return
-        part.write(PERIPHERAL_BASE + offset - part.base, size, value)
-
-    def reach(self, offset: int, size: int, written: int | None) -> int | None:
-        """Make an access of a bus master: the word that is read, 0 after a write, None where nothing answers."""
-        part = self._pages.get(offset >> _PAGE_SHIFT)
-        if part is None or not self._rcc.is_clocked(part.name):
-            return None
-        if written is None:
-            return part.read(PERIPHERAL_BASE + offset - part.base, size)
-        part.write(PERIPHERAL_BASE + offset - part.base, size, written)
-        return 0
-
-    def read_bit(self, offset: int, size: int) -> int:
-        """Return a bit through its alias; `offset` counts from the alias region."""
-        del size  # a narrow access reads the same bit
-        bit = offset >> 2 & 31
-        return self.read(offset >> 5 & ~3, 4) >> bit & 1
-
-    def write_bit(self, offset: int, size: int, value: int) -> None:
-        """Set a bit through its alias: the bus matrix reads the word, changes the bit, writes the word."""
-        del size
-        bit = 1 << (offset >> 2 & 31)
-        word = self.read(offset >> 5 & ~3, 4)
-        self.write(offset >> 5 & ~3, 4, word | bit if value & 1 else word & ~bit)
-
-    def _forget_clocked(self) -> None:
-        """Begin anew with what has its clock now: drivers look at a peripheral before they switch it on, each time."""
-        clocked = [name for name in self.read_unclocked_ns if self._rcc.is_clocked(name)]
-        for name in clocked:
-            del self.read_unclocked_ns[name]
-        self._rcc.native.watches_gates = bool(self.read_unclocked_ns)
-
-    def _refuse(self, part: Peripheral | None, offset: int, what: str) -> None:
-        """Warn of an access to nothing: it reads 0, and a write is lost."""
-        address = PERIPHERAL_BASE + offset
-        if part is None:
-            name = name_at(address)
-            text = f"{name} is not modelled" if name else "no peripheral is here"
-            self._chip.warn(f"{text} ({what} {address:#010x})", once=f"unmodelled:{name or address & ~0x3FF:}")
-            self._chip.engine.declare_zero(address)
-            return
-        gate = CLOCK_GATES[part.name]
-        self._chip.warn(
-            f"{part.name} has no clock: RCC_{gate.register} bit {gate.bit} is 0 ({what} {address:#010x})",
-            once=f"clock:{part.name}",
-        )
-
-
-class SramBitBand:
-    """The alias region of the SRAM's bits."""
-
-    def __init__(self, sram: "ctypes.Array[ctypes.c_char]") -> None:
-        self._bytes = (ctypes.c_ubyte * len(sram)).from_buffer(sram)
-
-    def read_bit(self, offset: int, size: int) -> int:
-        """Return a bit through its alias."""
-        del size
-        return self._bytes[offset >> 5] >> (offset >> 2 & 7) & 1
-
-    def write_bit(self, offset: int, size: int, value: int) -> None:
-        """Set a bit through its alias."""
-        del size
-        bit = 1 << (offset >> 2 & 7)
-        at = offset >> 5
-        self._bytes[at] = self._bytes[at] | bit if value & 1 else self._bytes[at] & ~bit
 
 
 class _FlashArray:

@@ -19,7 +19,7 @@ from p2os.protocol.frames import Decoder, Frame
 from p2os.protocol.sip import SIP_KINDS, StandardSip
 from p2os.transport import Transport
 from robot_bench.adapter import make_shipped_adapter
-from robot_bench.bench import (
+from robot_bench.bench.board import (
     boot,
     cut_wires,
     hear_buses,

@@ -29,7 +29,8 @@ from p2os.pioneer.world import known_worlds
 from p2os.pioneer.world.model import Pose, World
 from p2os.transport import Transport
 from p2os.transport.wall_clock import Clock, wall_clock
-from robot_bench.bench import Bench, pins_of
+from robot_bench.bench import Bench
+from robot_bench.bench.board import pins_of
 from robot_bench.events.codec import Json
 from robot_bench.recording.run_folder import remove_run, reserved
 from robot_bench.recording.run_record import TRACE_NAME, read_run

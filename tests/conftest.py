@@ -3,15 +3,28 @@
 import gc
 import os
 import sys
+from copy import copy
 from pathlib import Path
 
 import pytest
 
 
-def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the options of tests/tools/counted_lines.py and tests/tools/spent_time.py."""
+def pytest_addoption(parser: pytest.Parser, pluginmanager: pytest.PytestPluginManager) -> None:
+    """Add the options of tests/tools/counted_lines.py and tests/tools/spent_time.py, and begin to count lines.
+
+    That comes first of all: the conftest.py of a folder that the command line names is imported next, and what it
+    imports of the packages would else be there twice.
+    """
     parser.addoption("--count-lines", metavar="FOLDER", help="where to write which lines of the packages ran")
     parser.addoption("--count-time", metavar="FILE", help="where to write how long each file keeps a processor busy")
+    config = pluginmanager.get_plugin("pytestconfig")
+    assert isinstance(config, pytest.Config)
+    given = parser.parse_known_args(config.invocation_params.args, copy(config.option))
+    if given.count_lines is not None:
+        from tests.tools.counted_lines import LineCounter
+
+        is_worker = "PYTEST_XDIST_WORKER" in os.environ
+        pluginmanager.register(LineCounter(config.rootpath, config.rootpath / given.count_lines, is_worker=is_worker))
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -25,12 +38,6 @@ def pytest_configure(config: pytest.Config) -> None:
         sys.pycache_prefix = str(config.rootpath / ".pytest_cache" / "bytecode")
         os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
         del os.environ["PYTHONDONTWRITEBYTECODE"]
-    folder = config.getoption("--count-lines")
-    if folder is not None:
-        from tests.tools.counted_lines import LineCounter
-
-        is_worker = hasattr(config, "workerinput")
-        config.pluginmanager.register(LineCounter(config.rootpath, config.rootpath / folder, is_worker=is_worker))
     path = config.getoption("--count-time")
     if path is not None:
         from tests.tools.spent_time import TimeCounter

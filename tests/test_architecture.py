@@ -40,6 +40,7 @@ ALLOWED = {
     "p2os.pioneer.world.formats": {"yaml", "PIL"},
     "p2os.pioneer.body.mujoco": {"mujoco", "numpy"},
     "p2os.cli.robots.pad_source": {"pygame"},
+    "p2os.ros.bags": {"rosbags"},
     "p2os.ros.codec": {"cyclonedds"},
     "p2os.ros.dds": {"cyclonedds"},
     "p2os.ros.zenoh_node": {"zenoh"},
@@ -79,7 +80,8 @@ IO_LAYER = (
 
 #: What may log beside the I/O layer: what joins models to lines, and the bench. A model tells its owner by a callback.
 LOGGING = (
-    "p2os.event_log", "p2os.client.line", "robot_bench.bench", "robot_bench.remote", "robot_bench.run",
+    "p2os.event_log", "p2os.client.line", "robot_bench.bench.bench", "robot_bench.bench.board", "robot_bench.remote",
+    "robot_bench.run",
 )  # fmt: skip
 
 #: The map of ARCHITECTURE.md, lowest first: a package imports none of its own row and none above it.

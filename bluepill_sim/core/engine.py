@@ -224,6 +224,10 @@ class Engine(Stateful):
 
     # Running.
 
+    def join(self, _fabric: ctypes.c_void_p) -> bool:
+        """Take the fabric's events in the engine itself, where it does so; return whether it does."""
+        return False
+
     def run(self, stop_at: int) -> Halt:
         """Run from `pc` to the first block boundary at or after `stop_at` cycles, or to what ends the run before.
 

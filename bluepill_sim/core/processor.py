@@ -41,7 +41,7 @@ from bluepill_sim.core.recorder import EXCEPTION_RETURN
 from bluepill_sim.core.systick import SysTick
 from bluepill_sim.core.unicorn_core import Register
 from bluepill_sim.extension.windows import field, flag, time
-from bluepill_sim.memory import Memory
+from bluepill_sim.memory.arrays import Memory
 from simbase.state import Stateful
 
 #: TRM r1p1 5.7 and 5.9: cycles from the boundary to the first instruction of the handler, and back.

@@ -88,7 +88,7 @@ class NativeEngine(Engine):
 
     DERIVED = (
         # Shared with C, which has all of the state but what `Engine` declares.
-        "shared", "_state", "_calls", "_kept", "_regions", "_code",
+        "shared", "_state", "_calls", "_kept", "_regions", "_code", "_is_joined",
         # Hooks, and what is known of the program.
         "_native_hooks", "_pc_hooks", "_known", "_noted", "_held",
     )  # fmt: skip
@@ -111,6 +111,7 @@ class NativeEngine(Engine):
         self._native_hooks: tuple[int, ...] = ()
         self._pc_hooks: tuple[int, ...] = ()
         self._kept: list[object] = []
+        self._is_joined = False
         unicorn = self._core.library
         api = UnicornApi(*(ctypes.cast(getattr(unicorn, name), ctypes.c_void_p) for name in UNICORN_FUNCTIONS))
         #: Keeps the callbacks alive.
@@ -132,6 +133,17 @@ class NativeEngine(Engine):
     def state(self) -> ctypes.c_void_p:
         """The C core, for what else is shared with it (registers, USARTs)."""
         return self._state
+
+    def join(self, fabric: ctypes.c_void_p) -> bool:
+        """As of `Engine`: this one does, and runs nothing before."""
+        library().core_join(self._state, fabric)
+        self._is_joined = True
+        return True
+
+    def _demand_fabric(self) -> None:
+        """Raise RuntimeError where no fabric was joined: every run asks for its next event."""
+        if not self._is_joined:
+            raise RuntimeError("the native core runs on a fabric alone: join one first")
 
     def keep(self, *buffers: object) -> None:
         """Keep what C has pointers to."""
@@ -252,6 +264,7 @@ class NativeEngine(Engine):
 
     def use_python(self, wanted: bool) -> None:
         """Exchange the hooks, if they are not those that are wanted."""
+        self._demand_fabric()
         shared, core = self.shared, self._core
         if bool(shared.is_python) is wanted:
             return
@@ -312,6 +325,7 @@ class NativeEngine(Engine):
     @property
     def next_event(self) -> int:
         """The cycle at which SysTick or the fabric's queue next acts."""
+        self._demand_fabric()
         cycle: int = library().core_next_event(self._state)
         return cycle
 

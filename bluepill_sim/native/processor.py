@@ -15,7 +15,7 @@ from bluepill_sim.core.nvic import FIRST_IRQ, SYSTEM_EXCEPTIONS
 from bluepill_sim.core.processor import SEVONPEND, Processor, Sleep
 from bluepill_sim.core.recorder import RECORD
 from bluepill_sim.extension.library import is_native_wanted, library
-from bluepill_sim.memory import Memory
+from bluepill_sim.memory.arrays import Memory
 from bluepill_sim.native.state import HALT_KINDS, HALT_NUMBERS, ordered_rows
 
 _HALF = 64

@@ -16,7 +16,6 @@ from collections.abc import Iterable
 from bluepill_sim.core import Engine
 from bluepill_sim.core.system_control import PPB_BASE
 from bluepill_sim.extension.library import library
-from bluepill_sim.fabric.fabric import Fabric
 from bluepill_sim.fabric.registers import NATIVE, Peripheral, Register
 from bluepill_sim.native.engine import NativeEngine
 from bluepill_sim.peripherals.rcc import Rcc
@@ -28,14 +27,6 @@ _LATCH_SHIFT = 6
 _PAGE_SHIFT = 10
 _PAGE_WORDS = 1 << _PAGE_SHIFT - 2
 _HALFWORD = 0xFFFF
-
-
-def join_fabric(engine: Engine, fabric: Fabric) -> bool:
-    """Put a native core under the fabric, if this is one; return whether it is."""
-    if not isinstance(engine, NativeEngine):
-        return False
-    library().core_join(engine.state, fabric.handle)
-    return True
 
 
 def share_registers(engine: Engine, parts: Iterable[Peripheral], rcc: Rcc) -> None:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from bluepill_sim.core.thumb import Instruction, Kind, decode
-from bluepill_sim.memory import Memory
+from bluepill_sim.memory.arrays import Memory
 
 #: Instructions after which execution may go on elsewhere.
 _LEAVING = frozenset({

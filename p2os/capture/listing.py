@@ -15,7 +15,7 @@ another frame.
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol, cast
@@ -115,10 +115,23 @@ class ListingRow:
 
 
 class Passing(Protocol):
-    """What finds the sound frames that bytes begin with, and says which of them need no row."""
+    """What finds sound frames and says which of them need no row."""
 
-    def frames(self, data: bytes, direction: Direction | None) -> tuple[list[tuple[int, int, bool]], int]:
-        """Return where each payload begins and ends and whether it is passed over, and where the frames end."""
+    def found_in(self, data: bytes, direction: Direction | None) -> "Finder":
+        """Look at bytes; return what tells the sound frames that stand in them."""
+        ...
+
+
+class Finder(Protocol):
+    """The sound frames of some bytes."""
+
+    def frames(self, place: int) -> tuple[list[tuple[int, int, bool]], int]:
+        """Return the sound frames that stand one behind the other from a place on.
+
+        Returns:
+            Where the payload of each begins and ends, and whether it is passed over; of several such in a row only
+            the last. And where the frames end: the place itself where there is none.
+        """
         ...
 
 
@@ -141,28 +154,35 @@ class Lister:
         if chunk.direction not in self._streams:
             self._streams[chunk.direction] = _Stream(chunk.direction)
         yield from self.advance_to(chunk.at_ns)
-        stream, now = self._streams[chunk.direction], chunk.at_ns
-        rest = chunk.data
-        if rest and (waiting := stream.decoder.take_back()) is not None:
-            # Most bytes are sound frames, one behind the other: these need no second look.
-            data, place = waiting + rest, 0
-            if self._passing is not None:
-                frames, place = self._passing.frames(data, stream.direction)
-                for start, end, is_passed in frames:
+        if chunk.data:
+            yield from self._take(self._streams[chunk.direction], chunk.data, chunk.at_ns)
+
+    def _take(self, stream: "_Stream", data: bytes, now: Nanos) -> Iterator[ListingRow]:
+        # Most bytes are sound frames, one behind the other: these need no decoder. What it has to look at it gets up to
+        # the next header, before which it tells of noise anyway, so that rows are those of the whole given at once.
+        finder, place = None, 0
+        while place < len(data):
+            waiting = stream.decoder.take_back()
+            known = 0
+            if waiting is not None:
+                if finder is None:
+                    data, place = waiting + data[place:], len(waiting)
+                    look = LoopFinder if self._passing is None else self._passing.found_in
+                    finder = look(data, stream.direction)
+                start = place - len(waiting)
+                frames, end = finder.frames(start)
+                for first, last, is_passed in frames:
                     if is_passed:
-                        self._session.name_of(data[start:end], Direction.FROM_ROBOT, now)
+                        self._session.name_of(data[first:last], Direction.FROM_ROBOT, now)
                     else:
-                        whole = data[start - PREFIX_BYTES : end + CHECKSUM_BYTES]
-                        yield self._frame_row(stream.direction, data[start:end], whole, now)
-            else:
-                for payload in sound_frames(data):
-                    end = place + len(payload) + PREFIX_BYTES + CHECKSUM_BYTES
-                    yield self._frame_row(stream.direction, payload, data[place:end], now)
-                    place = end
-            stream.consume(place)
-            rest = data[place:]
-        stream.decoder.receive(rest, now)
-        yield from self._drain(stream, now)
+                        whole = data[first - PREFIX_BYTES : last + CHECKSUM_BYTES]
+                        yield self._frame_row(stream.direction, data[first:last], whole, now)
+                stream.consume(end - start)
+                known, place = max(0, place - end), end
+            cut = _next_header(data, place + known + 1)
+            stream.decoder.receive(data[place:cut], now)
+            place = cut
+            yield from self._drain(stream, now)
 
     def advance_to(self, now: Nanos) -> Iterator[ListingRow]:
         """Yield what has been given up by `now` nanoseconds: frames whose rest never came."""
@@ -213,6 +233,39 @@ class Lister:
         else:
             name, describe = name or command_name(kind), command_fields
         return ListingRow(at_ns=now, direction=direction, data=whole, kind=kind, name=name, describe=describe)
+
+
+class LoopFinder:
+    """Finds sound frames one by one; passes over none, or some kinds.
+
+    Args:
+        data: The bytes.
+        direction: Who sent them.
+        passed_kinds: Which of a robot's packets need no row.
+    """
+
+    def __init__(self, data: bytes, direction: Direction | None, passed_kinds: Collection[int] = ()) -> None:
+        self._data, self._direction, self._passed_kinds = data, direction, passed_kinds
+
+    def frames(self, place: int) -> tuple[list[tuple[int, int, bool]], int]:
+        """Return the sound frames from a place on, as a `Finder`."""
+        found: list[tuple[int, int, bool]] = []
+        for payload in sound_frames(self._data, place):
+            start = place + PREFIX_BYTES
+            end = start + len(payload)
+            place = end + CHECKSUM_BYTES
+            passed = payload[0] in self._passed_kinds and (self._direction is not None or is_sip(payload))
+            if passed and found and found[-1][2]:
+                found.pop()
+            found.append((start, end, passed))
+        return found, place
+
+
+def _next_header(data: bytes, place: int) -> int:
+    """Return where the next header begins, or the end; not one behind a first byte that is alone."""
+    while (place := data.find(HEADER, place)) > 0 and data[place - 1] == HEADER[0]:
+        place += 1
+    return len(data) if place < 0 else place
 
 
 def rows_of(chunks: Iterable[Chunk], reading: Reading, passing: Passing | None = None) -> Iterator[ListingRow]:

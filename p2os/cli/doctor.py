@@ -73,6 +73,7 @@ NEEDS = (
     Need(name="mcap", kind="package", feature="export to MCAP", extra="export"),
     Need(name="cyclonedds", kind="package", feature="ros, run --ros by DDS", extra="ros"),
     Need(name="eclipse-zenoh", kind="package", feature="ros, run --ros by zenoh", extra="ros"),
+    Need(name="rosbags", kind="package", feature="rosbag2, both ways", extra="ros"),
     Need(name="scipy", kind="package", feature="compare, fit, metrics; campaign", extra="experiments"),
     Need(name="SALib", kind="package", feature="sensitivity", extra="experiments"),
     Need(name="optuna", kind="package", feature="campaign: search by samplers", extra="campaign"),
@@ -83,8 +84,6 @@ NEEDS = (
     Need(name="pillow", kind="package", feature="worlds from ROS maps: pictures", extra="worlds"),
     Need(name="pyyaml", kind="package", feature="worlds from ROS maps", extra="worlds"),
     Need(name="pygame-ce", kind="package", feature="teleop --pad", extra="pad"),
-    Need(name="cyclonedds", kind="package", feature="ros, run --ros", extra="ros"),
-    Need(name="eclipse-zenoh", kind="package", feature="ros --transport zenoh", extra="ros"),
     Need(name="tshark", kind="program", feature="captures on the command line", get="sudo apt-get install tshark"),
     Need(
         name="bluepill_sim._native", kind="built", feature="the emulated BluePill",

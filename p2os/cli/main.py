@@ -68,6 +68,7 @@ _EXTRAS = {
     "mcap": "export",
     "cyclonedds": "ros",
     "zenoh": "ros",
+    "rosbags": "ros",
     "foxglove": "foxglove",
 }
 

@@ -109,9 +109,8 @@ def _pairs(count: int) -> struct.Struct:
     return struct.Struct(f">{count}H")
 
 
-def sound_frames(data: bytes) -> Iterator[bytes]:
-    """Yield the payload of each sound frame that bytes begin with; end where something else stands."""
-    place = 0
+def sound_frames(data: bytes, place: int = 0) -> Iterator[bytes]:
+    """Yield the payload of each sound frame that stands from a place on; end where something else stands."""
     while data[place : place + 2] == HEADER and place + PREFIX_BYTES < len(data):
         count = data[place + 2]
         end = place + PREFIX_BYTES + count

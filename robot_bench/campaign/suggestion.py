@@ -2,7 +2,7 @@
 
 A robot that roams by itself meets things of every kind that a firmware may be blind to: thin posts, boxes, walls, dead
 ends and gaps, in the scenario's own world and from other starts. What it has to show is what any such robot has to:
-it touches nothing, keeps off things, and does not stay where a way is free.
+it touches nothing, keeps off things, does not stay where a way is free, and turns, bends and goes back for a reason.
 """
 
 from string import Template
@@ -89,6 +89,31 @@ ends_run = "missed"
 kind = "moves_on"
 way_m = 0.5
 within_s = 30.0
+ends_run = "missed"
+
+[[goal]]                # turns go to the free side; one alone may go the other way
+kind = "turns_away"
+near_m = 0.55
+free_m = 0.8
+row = 1
+ends_run = "missed"
+
+[[goal]]                # and so do arcs
+kind = "steers_away"
+near_m = 0.5
+free_m = 0.8
+within_s = 1.0
+ends_run = "missed"
+
+[[goal]]                # a turn ends where everything is free
+kind = "no_idle_turn"
+free_m = 0.8
+within_s = 0.5
+ends_run = "missed"
+
+[[goal]]                # nothing sees what is behind
+kind = "backs_on_path"
+off_m = 0.1
 ends_run = "missed"
 """)
 

@@ -27,7 +27,8 @@ from bluepill_sim.program.image import Image, load_image
 from p2os.pioneer.world import known_worlds, load_world
 from p2os.pioneer.world.writer import write_world
 from p2os.toml_file import TomlSource, is_file, toml_text
-from robot_bench.bench import Bench, boot
+from robot_bench.bench import Bench
+from robot_bench.bench.board import boot
 from robot_bench.events.kinds import Contact, Event, Pose, Text
 from robot_bench.scenario.included_files import (
     MergedSource,

@@ -7,15 +7,18 @@ from typing import Annotated, cast
 import typer
 
 from p2os.cli.help_pages import BENCH
+from p2os.ros.bags import STORAGES
 from robot_bench.recording.event_files import write_events
 from robot_bench.recording.run_record import read_events, read_meta
 from robot_bench.report.make import make_artefacts
+from robot_bench.ros.run_bag import write_bag
+from simbase.errors import UsageError
 
 HELP = """Make the report of a run anew, and all else in its folder.
 
 All of it is made from trace.jsonl. With --events what happened is written into a
 file instead: an event a line (.jsonl) or row (.parquet), or a scene with
-plots for Foxglove and Lichtblick (.mcap).
+plots for Foxglove and Lichtblick (.mcap); with --ros2 as a rosbag2, in a folder.
 
 A run that was killed has its trace up to the last virtual second: this makes
 the rest.
@@ -26,6 +29,7 @@ Examples:
   p2os report runs/dodge-001 --json   print the summary as well
   p2os report runs/dodge-001 --events all.parquet    only what happened, as a table
   p2os report runs/dodge-001 --events dodge.mcap     as a scene with plots
+  p2os report runs/dodge-001 --events bag --ros2 mcap    as a rosbag2
 """
 
 
@@ -40,8 +44,17 @@ def report(
     events: Annotated[
         Path | None, typer.Option(help="Write its events, .jsonl, .parquet or .mcap, and no report.", metavar="FILE")
     ] = None,
+    ros2: Annotated[
+        str, typer.Option("--ros2", help="With --events: a rosbag2 of this storage.", metavar="|".join(STORAGES))
+    ] = "",
 ) -> None:
     """Make a run's report."""
+    if ros2:
+        if events is None:
+            raise UsageError("--ros2 goes with --events FOLDER", hint="--events bag --ros2 mcap")
+        count = write_bag(read_events(folder), events, read_meta(folder), ros2)
+        typer.echo(f"{events}: {count} messages")
+        return
     if events is not None:
         count = write_events(read_events(folder), events, read_meta(folder))
         typer.echo(f"{events}: {count} events")

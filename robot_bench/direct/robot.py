@@ -130,11 +130,7 @@ class DirectRobot(Stateful):
         while self._steps < wanted:
             speeds = self.next_setpoints()
             alike = wanted - self._steps if left.is_steady and right.is_steady else 1
-            stood = body.stand_still(alike) if speeds == (0.0, 0.0) else 0
-            for _ in range(alike - stood):
-                self._wheels = body.step(*speeds)
-            if stood:
-                self._wheels = body.state
+            self._wheels = body.hold(*speeds, alike)[-1]
             self._steps += alike
 
     def next_setpoints(self) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""Drives out of files: run folders, traces, recordings, pcap, CSV, TUM, ARIA's logs; and trajectories into TUM files.
+"""Drives out of files: runs, recordings, pcap, bags, CSV, TUM, ARIA's logs; and trajectories into TUM files.
 
 A CSV file has a line of names: `t_s`, `x_m`, `y_m`, `heading_rad` or `heading_deg`, and where it has them `left_mps`,
 `right_mps`, `sonar_m_0` and so on: what `p2os export` writes is such a file. A TUM file has lines of
@@ -22,8 +22,10 @@ from p2os.protocol.odometry import Odometry
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import StandardSip
 from p2os.robots.parameters import ParametersError, RobotParameters, load_parameters
+from p2os.ros.bags import is_bag
 from robot_bench.events.kinds import Pose
 from robot_bench.experiments.aria_logs import is_aria_log, read_aria_log
+from robot_bench.experiments.bag_drives import drive_of_bag
 from robot_bench.experiments.drives import Drive, Floats, Steps, Trajectory, steps_of
 from robot_bench.recording.run_record import TRACE_NAME, RunRecord, read_events, read_run
 from robot_bench.recording.signals import motor_steps
@@ -120,7 +122,7 @@ def read_drive(path: Path, *, robot: str = "", how: HowToRead | None = None) -> 
     """Read a drive of whatever kind a file or folder is.
 
     Args:
-        path: A run folder, a trace, a recording, a pcap, `.csv`, `.tum`, or a log of ARIA's.
+        path: A run folder, a trace, a recording, a pcap, a bag, `.csv`, `.tum`, or a log of ARIA's.
         robot: Model or file for units; empty: by the run, else p2dx.
         how: How to read a capture; None: as one of a P2OS robot.
 
@@ -128,7 +130,9 @@ def read_drive(path: Path, *, robot: str = "", how: HowToRead | None = None) -> 
         FileError: It is missing, broken, or tells of no poses.
     """
     if not path.exists():
-        raise FileError(f"there is no {shown_name(path)}", hint="give a run folder, a recording, pcap, .csv or .tum")
+        raise FileError(f"there is no {shown_name(path)}", hint="a run folder, a recording, pcap, bag, .csv or .tum")
+    if is_bag(path):
+        return drive_of_bag(path, _parameters(robot))
     if path.is_dir() or path.name == TRACE_NAME:
         return _of_run(path if path.is_dir() else path.parent, robot)
     try:

@@ -144,15 +144,13 @@ def effects_figure(title: str, effects: Mapping[str, Sequence[Effect]]) -> Figur
 
 
 def _draw_indices(axes: Axes, rows: Sequence[Effect]) -> None:
-    """Draw each parameter's shares of the variance: together with the others broad, by itself narrow in it."""
+    """Draw each parameter's shares of the variance: by itself, and below it together with the others."""
     places = [*range(len(rows))]
-    for height, colour, name, label in (
-        (0.8, "#dccfc4", "ST", "ST: with the others"),
-        (0.35, OTHER, "S1", "S1, alone"),
-    ):
+    for aside, colour, name, label in ((-0.2, OTHER, "S1", "S1, alone"), (0.2, "#dccfc4", "ST", "ST, with the others")):
         axes.barh(
-            places, [max(getattr(one, name) or 0.0, 0.0) for one in rows], height=height, color=colour, label=label,
-            xerr=[getattr(one, f"{name}_conf") or 0.0 for one in rows], ecolor=MARK, capsize=3,
+            [place + aside for place in places], [max(getattr(one, name) or 0.0, 0.0) for one in rows], height=0.36,
+            xerr=[getattr(one, f"{name}_conf") or 0.0 for one in rows], color=colour, ecolor=MARK, capsize=3,
+            label=label,
         )  # fmt: skip
     axes.set_yticks(places, [one.key for one in rows])
     axes.invert_yaxis()

@@ -9,7 +9,7 @@ Source: the thesis, chapter 5.1.2.2: motors are published each 100 ms, sensors p
 Invariant: what is published decides nothing; what is taken is in the trace, whole.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import cast
 
 from adapter_sim.codec import motor_value
@@ -24,7 +24,6 @@ from p2os.ros.transport import NodeOptions, Received, Topic
 from p2os.ros.urdf import urdf_text
 from robot_bench.events.kinds import MICRO, Pose, Ranges
 from robot_bench.scenario.hand_script import Deed
-from robot_bench.wires.nets import Harness
 from simbase.timing import NS_PER_MS, Nanos
 
 #: Who did it, in the trace.
@@ -43,7 +42,7 @@ class BenchNode:
     """What a bench publishes, and takes.
 
     Args:
-        harness: Its wires, those of the pin-out.
+        level_of: The level of a wire of the pin-out at a time.
         parameters: Of its robot.
         options: The node's names.
         outside: Kinds of wires that ROS drives, of a scenario's `outside`.
@@ -52,13 +51,13 @@ class BenchNode:
 
     def __init__(
         self,
-        harness: Harness,
+        level_of: Callable[[str, Nanos], bool],
         parameters: RobotParameters,
         options: NodeOptions,
         outside: Iterable[str] = (),
         pinout: Pinout | None = None,
     ) -> None:
-        self._harness, self._options = harness, options
+        self._level_of, self._options = level_of, options
         self._frames = Frames.of(parameters, options.namespace)
         pinout = pinout or load_pinout()
         #: Topic → its wires, the least significant first.
@@ -144,7 +143,7 @@ class BenchNode:
         return [Deed(at=at, do=SET_PIN, place=wire, level=level, who=WHO) for wire, level in changed.items()]
 
     def _value(self, topic: Topic, wires: tuple[str, ...], now: Nanos) -> int:
-        code = sum(self._harness[wire].level(now) << place for place, wire in enumerate(wires))
+        code = sum(self._level_of(wire, now) << place for place, wire in enumerate(wires))
         return motor_value(code, len(wires)) if topic in self._signed else code
 
     def _topic(self, key: str, number: int | None = None) -> Topic:

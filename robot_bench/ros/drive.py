@@ -86,7 +86,10 @@ def with_inputs(path: Path) -> RunBench:
 
 def run_beside(bench: Bench, network: Transport, options: NodeOptions) -> None:
     """Run a bench to its end as a node of a network."""
-    node = BenchNode(bench.parts.harness, bench.scenario.parameters, options, bench.scenario.outside)
+    harness = bench.parts.harness
+    node = BenchNode(
+        lambda wire, now: harness[wire].level(now), bench.scenario.parameters, options, bench.scenario.outside
+    )
     for topic in node.taken:
         network.subscribe(topic)
     for topic in node.announced():

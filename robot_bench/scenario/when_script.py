@@ -10,7 +10,8 @@
 
 With `after = "ID"` an event counts from when the table with `id = "ID"` has had its own.
 
-Events are told each 50 ms, at a pose; so it is done up to 50 ms after the event, or `after_s` later still.
+It is done `after_s` after the event, to the nanosecond. Events are told each 50 ms, at a pose: what is due before
+its event is told is done then, up to 50 ms late.
 
 Invariant: when it is done depends on the events of the run alone, not on the slices of the loop.
 """
@@ -147,7 +148,7 @@ class WhenScript(Stateful):
         on_change: Takes changes of the world, with their times.
         on_fault: Takes faults, with their times.
         on_deed: Takes what a hand does, with its times.
-        on_end: Ends the run.
+        on_end: Ends the run at a time.
     """
 
     STATE = ("_selectors", "_done", "_first", "_happened")
@@ -159,7 +160,7 @@ class WhenScript(Stateful):
         on_change: Callable[[Sequence[Change]], None],
         on_fault: Callable[[Sequence[FaultChange]], None],
         on_deed: Callable[[Sequence[Deed]], None],
-        on_end: Callable[[], None],
+        on_end: Callable[[Nanos], None],
     ) -> None:
         self._whens = tuple(whens)
         self._selectors = [select(when.event, when.wires) for when in self._whens]
@@ -171,8 +172,8 @@ class WhenScript(Stateful):
         self._done = [False] * len(self._whens)
         #: When each had its first event; -1: not yet.
         self._first: list[Nanos] = [-1] * len(self._whens)
-        #: Places whose event has happened in the batch that is handed on.
-        self._happened: list[int] = []
+        #: Places whose event has happened in the batch that is handed on, and when.
+        self._happened: list[tuple[int, Nanos]] = []
         self._on_change, self._on_fault, self._on_deed, self._on_end = on_change, on_fault, on_deed, on_end
 
     def subscribe(self, stream: EventStream) -> None:
@@ -190,16 +191,16 @@ class WhenScript(Stateful):
             if is_meant and (self._whens[place].every or not self._done[place]):
                 if not self._done[place]:
                     self._done[place], self._first[place] = True, event.t
-                self._happened.append(place)
+                self._happened.append((place, event.t))
 
         return watch
 
     def _act(self, limit: Nanos) -> None:
-        """Do what is due after all events up to `limit`: from the instant after it on."""
+        """Do what is due after all events up to `limit`: at its time, but not before the instant after `limit`."""
         happened, self._happened = self._happened, []
-        for place in happened:
+        for place, since in happened:
             when = self._whens[place]
-            at = limit + 1 + when.after_ns
+            at = max(limit + 1, since + when.after_ns)
             if when.changes:
                 self._on_change([replace(change, at=at + change.at) for change in when.changes])
             if when.faults:
@@ -207,4 +208,4 @@ class WhenScript(Stateful):
             if when.deeds:
                 self._on_deed([replace(deed, at=at + deed.at) for deed in when.deeds])
             if when.do == "end":
-                self._on_end()
+                self._on_end(at)

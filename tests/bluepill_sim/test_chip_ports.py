@@ -29,7 +29,7 @@ def make_fake(make_fake_chip: Callable[[], Any]) -> Ports:
 def make_real(_make_fake_chip: Callable[[], Any]) -> Ports:
     pytest.importorskip("unicorn")
     from bluepill_sim.chip import Chip
-    from bluepill_sim.memory import Memory
+    from bluepill_sim.memory.arrays import Memory
 
     memory, warned = Memory(), dict[str, str]()
     memory.load_flash(0, IDLE_PROGRAM)

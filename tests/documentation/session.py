@@ -46,14 +46,16 @@ TCP = re.compile(r"(?<=tcp:127\.0\.0\.1:)\d+|(?<=--gdb )\d+|(?<=remote :)\d+")
 PLACE = re.compile(r"(?:tcp:127\.0\.0\.1:\d+|(?:serial|pty):/[^?'\s]+)")
 #: Programs that a reader may lack; where one is not installed its lines are left out, and the test says so.
 OPTIONAL = {"arm-none-eabi-gcc", "gdb-multiarch", "tshark", "make", "g++"}
-#: What a reader's shell finds first. `make` in the checkout, and tests inside the tests, are looked at, not executed.
+#: What a reader's shell finds first. `make` in the checkout, and tests inside the tests, are looked at, not executed:
+#: of the latter that their options are options, and that their files are there.
 SHIMS = {
     "p2os": 'exec {python} -m p2os "$@"',
     "python": 'case "$1 $2" in "-m venv") exit 0;; esac; exec {python} "$@"',
     "python3": 'case "$1 $2" in "-m venv") exit 0;; esac; exec {python} "$@"',
     "pip": 'case "$*" in "install "*) exit 0;; esac; exit 2',  # the network; test_docs.py looks at the extras
-    "pytest": 'if [ -e pytest.ini ]; then exec {python} -m pytest -p no:cacheprovider "$@"; '
-    'else cd {root} && exec {python} -m pytest --collect-only -q -p no:cacheprovider "$@"; fi',
+    "pytest": 'if [ -e pytest.ini ]; then exec {python} -m pytest -p no:cacheprovider "$@"; fi; cd {root} && '
+    'for each; do case $each in tests/*) ls "$each" >&2 || exit 4;; esac; done; '
+    'exec {python} -m pytest --markers -p no:cacheprovider "$@"',
     "sudo": "exit 0",  # what a machine needs once
     "make": 'if [ -e Makefile ] || [ "$1" = -C ]; then exec {make} "$@"; else exec {make} -n -C {root} "$@"; fi',
 }

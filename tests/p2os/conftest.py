@@ -76,8 +76,8 @@ class PerfectBody(Stateful):
         )  # fmt: skip
         return self.state
 
-    def stand_still(self, steps: int) -> int:
-        return 0 * steps
+    def hold(self, left_mps: float, right_mps: float, steps: int) -> list[WheelAngles]:
+        return [self.step(left_mps, right_mps) for _ in range(steps)]
 
     def stall(self, *, left: bool, right: bool) -> None:
         self.state = replace(self.state, stalled_left=left, stalled_right=right)

@@ -1,5 +1,9 @@
 """Lines are counted by probes in code that is kept, and each probe reports once."""
 
+import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -70,3 +74,15 @@ def test_what_is_of_no_source_any_more_is_dropped(module: Path, tmp_path: Path) 
     keep_all(tmp_path)
     assert [*(tmp_path / KEPT).iterdir()] == [keep(module, tmp_path)]
     assert not old.exists()
+
+
+def test_a_folder_of_tests_that_is_named_counts_in_the_modules_that_its_conftest_imports(tmp_path: Path) -> None:
+    root = Path(__file__).parents[2]
+    named = (
+        "tests/bluepill_sim/core/test_block_log.py::test_a_branch_to_itself_is_kept_once_and_again_after_an_interrupt"
+    )
+    run = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "--count-lines", str(tmp_path / "seen"), named]
+    done = subprocess.run(run, cwd=root, env=os.environ, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stdout[-2000:]
+    (seen,) = (tmp_path / "seen").iterdir()
+    assert str(root / "bluepill_sim" / "chip.py") in json.loads(seen.read_text())

@@ -10,10 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from p2os.capture.chunks import Direction
-from p2os.capture.columns.framing import find_frames
-from p2os.protocol.frames import CHECKSUM_BYTES, PREFIX_BYTES, sound_frames
+from p2os.capture.columns.framing import Indexes, find_frames
+from p2os.capture.listing import Finder, LoopFinder
+from p2os.protocol.frames import CHECKSUM_BYTES, PREFIX_BYTES
 from p2os.protocol.packets import IDENTITY_KIND, RESET_KINDS, packet_name
-from p2os.protocol.sip import HEAD_BYTES, READING_BYTES, SIP_KINDS, is_sip
+from p2os.protocol.sip import HEAD_BYTES, READING_BYTES, SIP_KINDS
 
 #: chosen: below, a loop takes less time than NumPy's calls.
 LEAST_BYTES = 1 << 11
@@ -36,49 +37,42 @@ class Passing:
         #: Bytes without direction: only a SIP's shape tells for certain that a robot has sent it.
         self._undirected = self._kinds & frozenset(SIP_KINDS)
 
-    def frames(self, data: bytes, direction: Direction | None) -> tuple[list[tuple[int, int, bool]], int]:
-        """Return the sound frames that bytes begin with.
-
-        Returns:
-            Where the payload of each begins and ends, and whether it is passed over; of several such in a row only
-            the last. And where the frames end.
-        """
+    def found_in(self, data: bytes, direction: Direction | None) -> Finder:
+        """Look at bytes; return what tells the sound frames that stand in them."""
         kinds = self._undirected if direction is None else self._kinds
         if direction is Direction.TO_ROBOT:
             kinds = frozenset()
         if len(data) < LEAST_BYTES:
-            return self._by_loop(data, kinds, direction)
+            return LoopFinder(data, direction, kinds)
         array = np.frombuffer(data, np.uint8)
         starts, ends = find_frames(array)
-        behind = ends + CHECKSUM_BYTES
-        joined = starts == np.concatenate(([0], behind[:-1])) + PREFIX_BYTES
-        count = len(starts) if joined.all() else int(np.argmin(joined))
-        starts, ends = starts[:count], ends[:count]
-        if not count:
-            return [], 0
         passed: npt.NDArray[np.bool_] = np.isin(array[starts], list(kinds))
-        if direction is None:
+        if direction is None and len(starts):
             readings = array[np.minimum(starts + _COUNT_AT, ends - 1)].astype(np.int64)
             sizes = ends - starts
             passed &= (sizes >= HEAD_BYTES) & (sizes >= HEAD_BYTES + READING_BYTES * readings)
+        return _Found(starts, ends, passed)
+
+
+class _Found:
+    """Sound frames that were found together."""
+
+    def __init__(self, starts: Indexes, ends: Indexes, passed: npt.NDArray[np.bool_]) -> None:
+        self._starts, self._ends, self._passed = starts, ends, passed
+        #: Where a frame does not stand right behind the one before, and the end.
+        gaps = np.flatnonzero(starts[1:] - ends[:-1] != CHECKSUM_BYTES + PREFIX_BYTES)
+        self._breaks = np.append(gaps + 1, len(starts))
+
+    def frames(self, place: int) -> tuple[list[tuple[int, int, bool]], int]:
+        """Return the sound frames from a place on, as a `Finder`."""
+        first = int(np.searchsorted(self._starts, place + PREFIX_BYTES))
+        if first == len(self._starts) or self._starts[first] != place + PREFIX_BYTES:
+            return [], place
+        last = int(self._breaks[np.searchsorted(self._breaks, first, side="right")])
+        passed = self._passed[first:last]
         kept = ~passed
         kept[:-1] |= kept[1:]
         kept[-1] = True
-        chosen = zip(starts[kept].tolist(), ends[kept].tolist(), passed[kept].tolist(), strict=True)
-        return list(chosen), int(ends[-1]) + CHECKSUM_BYTES
-
-    @staticmethod
-    def _by_loop(
-        data: bytes, kinds: frozenset[int], direction: Direction | None
-    ) -> tuple[list[tuple[int, int, bool]], int]:
-        found: list[tuple[int, int, bool]] = []
-        place = 0
-        for payload in sound_frames(data):
-            start = place + PREFIX_BYTES
-            end = start + len(payload)
-            place = end + CHECKSUM_BYTES
-            passed = payload[0] in kinds and (direction is not None or is_sip(payload))
-            if passed and found and found[-1][2]:
-                found.pop()
-            found.append((start, end, passed))
-        return found, place
+        rows = np.flatnonzero(kept) + first
+        chosen = zip(self._starts[rows].tolist(), self._ends[rows].tolist(), self._passed[rows].tolist(), strict=True)
+        return list(chosen), int(self._ends[last - 1]) + CHECKSUM_BYTES

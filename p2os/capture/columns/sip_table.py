@@ -28,8 +28,8 @@ from p2os.protocol.packets import packet_name
 from p2os.protocol.sip import POSITION_MASK, TAIL, StandardSip
 from simbase.timing import NS_PER_S, Nanos
 
-#: chosen: some twenty thousand SIPs; larger ones are no faster.
-BLOCK_BYTES = 1 << 20
+#: chosen: some ten thousand SIPs; larger ones take more memory and hardly less time.
+BLOCK_BYTES = 1 << 19
 
 
 def sip_tables(

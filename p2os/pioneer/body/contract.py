@@ -186,8 +186,12 @@ class RobotBody(Protocol):
         """
         ...
 
-    def stand_still(self, steps: int) -> int:
-        """Make so many steps with set-points of 0 at once, if they turn no wheel; return how many were made, or 0."""
+    def hold(self, left_mps: float, right_mps: float, steps: int) -> Sequence[Wheels]:
+        """Make so many steps with set-points that stay; return the wheels after each.
+
+        Raises:
+            UsageError: There are other robots in its scene, which steps all of them together.
+        """
         ...
 
     def ranges(self, numbers: Sequence[int]) -> list[float]:

@@ -17,7 +17,7 @@ from typing import ClassVar, NamedTuple
 
 from p2os.errors import WorldError
 from p2os.pioneer.body.contacts import ContactCounter
-from p2os.pioneer.body.contract import STEP_NS, BodyState, Hit, Turned
+from p2os.pioneer.body.contract import STEP_NS, BodyState, Hit, Turned, Wheels
 from p2os.pioneer.body.ray_cast import Direction, Echo, cast, echoes, narrow_parts
 from p2os.pioneer.sonar.ring import Cone, cones
 from p2os.pioneer.world.geometry import Footprint, hull_polygon, placed
@@ -223,10 +223,14 @@ class BodyInWorld(Stateful):
         (turned,) = self.scene.step(((left_mps, right_mps),))
         return turned
 
-    def stand_still(self, steps: int) -> int:
-        """Make no step: an engine has to, for things may still move; see `Body`."""
-        del steps
-        return 0
+    def hold(self, left_mps: float, right_mps: float, steps: int) -> Sequence[Wheels]:
+        """Make so many steps with these set-points.
+
+        Raises:
+            UsageError: There are other robots in its scene, which steps all of them together.
+        """
+        # None is read before the last is asked for: a body in another program makes them all at once.
+        return [self.step(left_mps, right_mps) for _ in range(steps)]
 
     def reset(self, pose: Pose, seed: int) -> BodyState:
         """Stand still at a pose in the world as it was made; nothing here is random.

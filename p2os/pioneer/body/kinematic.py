@@ -222,13 +222,15 @@ class KinematicBody(BodyInWorld):
         if left_mps == 0.0 and right_mps == 0.0:
             return self._stand()
         arc = self._arc(left_mps, right_mps)
-        # What was blocked stays so: neither the pose nor the plan has changed since; other robots may have.
+        # What was blocked stays so until the pose or the plan changes; other robots may have moved.
         is_known = asked == self._blocked_at and not self.near
         rims = asked if not is_known and self._take(arc) else None
         is_touching = rims is None or self._is_bumped or self._free_m == 0.0
         if rims is None and not is_known:
             rims = self._slide(left_mps, right_mps)
             self._blocked_at = asked if rims is None and not self.near else None
+        elif rims is not None:
+            self._blocked_at = None
         self._stalled = rims is None
         contacts = self._contacts
         if (is_touching or contacts.apart < APART_STEPS) and contacts.update(touching=is_touching):
@@ -245,14 +247,58 @@ class KinematicBody(BodyInWorld):
         self._left, self._right = self._driven = rims or (0.0, 0.0)
         return self._turn_wheels()
 
-    def stand_still(self, steps: int) -> int:
-        """Stand for so many steps, where it is alone and nothing walks; see `Body`."""
-        if self.others or self._walking or self._is_bumped or steps <= 0:
-            return 0
-        self.go(0.0, 0.0)
-        self._steps += steps - 1
-        self._contacts.update(touching=self._free_m == 0.0, steps=steps - 1)
-        return steps
+    def hold(self, left_mps: float, right_mps: float, steps: int) -> Sequence[Turned]:
+        """Make so many steps with these set-points; see `RobotBody`."""
+        made: list[Turned] = []
+        while len(made) < steps:
+            made += self._go_on(left_mps, right_mps, steps - len(made)) or [self.step(left_mps, right_mps)]
+        return made
+
+    def _go_on(self, left_mps: float, right_mps: float, steps: int) -> list[Turned]:
+        """Make up to so many steps in which nothing changes but the pose and the wheels: what as many of `go` do."""
+        if self._walking:
+            steps = min(steps, WALK_STEPS - 1 - self._steps % WALK_STEPS)
+        asked = (left_mps, right_mps)
+        if self.others or self._is_bumped or asked != self._driven or steps <= 0:
+            return []
+        if left_mps == right_mps == 0.0:
+            turned = self.go(0.0, 0.0)
+            self._steps += steps - 1
+            self._contacts.update(touching=self._free_m == 0.0, steps=steps - 1)
+            return [turned] * steps
+        if self._contacts.apart < APART_STEPS:
+            return []
+        return self._roll(left_mps, right_mps, steps)
+
+    def _roll(self, left_mps: float, right_mps: float, steps: int) -> list[Turned]:
+        """Make the steps that surely lead nowhere near a thing."""
+        forward, turn = self._ways(left_mps, right_mps)
+        travel, is_straight = abs(forward) + abs(turn) * self.reach_m, abs(turn) < STRAIGHT_RAD
+        radius = 0.0 if is_straight else forward / turn
+        left_rad, right_rad = left_mps * DT_S / self._radius_m, right_mps * DT_S / self._radius_m
+        if self._steady_j is None:
+            self._steady_j = self._load.work_j(self._driven, self._driven, DT_S)
+        x, y, heading, c, s, free = self._x, self._y, self._heading, self._cos, self._sin, self._free_m
+        left_angle, right_angle, work_j, step_j = self._left_angle, self._right_angle, self._rim_work_j, self._steady_j
+        made: list[Turned] = []
+        while len(made) < steps and free > travel:
+            free -= travel
+            before, heading, old_c, old_s = heading, heading + turn, c, s
+            if heading != before:
+                c, s = math.cos(heading), math.sin(heading)
+            if is_straight:
+                x, y = x + forward * old_c, y + forward * old_s
+            else:
+                x, y = x + radius * (s - old_s), y - radius * (c - old_c)
+            work_j += step_j
+            left_angle, right_angle = left_angle + left_rad, right_angle + right_rad
+            made.append(Turned(left_angle, right_angle))
+        if made:
+            self._x, self._y, self._heading, self._cos, self._sin, self._free_m = x, y, heading, c, s, free
+            self._left_angle, self._right_angle, self._rim_work_j = left_angle, right_angle, work_j
+            self._left, self._right = self._asked = self._driven
+            self._steps += len(made)
+        return made
 
     def _turn_wheels(self) -> Turned:
         """Turn the wheels by this step, and by how far another robot has pushed them since the last."""
@@ -266,9 +312,13 @@ class KinematicBody(BodyInWorld):
             return Turned(self._left_angle, self._right_angle, self._asked[0] != 0.0, self._asked[1] != 0.0)
         return Turned(self._left_angle, self._right_angle)
 
+    def _ways(self, left_mps: float, right_mps: float) -> tuple[float, float]:
+        """Return how far a step leads along, metres, and around, rad."""
+        return (left_mps + right_mps) / 2 * DT_S, (right_mps - left_mps) / self._track_m * DT_S
+
     def _arc(self, left_mps: float, right_mps: float) -> tuple[float, float, float, float, float, float]:
         """Return where one step leads: x, y, heading, its cosine and sine, and the farthest way of a point, metres."""
-        forward, turn = (left_mps + right_mps) / 2 * DT_S, (right_mps - left_mps) / self._track_m * DT_S
+        forward, turn = self._ways(left_mps, right_mps)
         c, s = self._cos, self._sin
         heading = self._heading + turn
         if abs(turn) < STRAIGHT_RAD:

@@ -376,24 +376,14 @@ class Pioneer(Stateful):
         """Step the body to its first step boundary at or after `limit`."""
         if self._body_now >= limit:
             return
-        context, body = self._context, self.body
-        body.is_powered = context.motion.is_powered
-        motion, step, advance = context.motion, body.step, context.reckoning.advance
-        if context.faults.left_blocked or context.faults.right_blocked:
-            step = self._step_blocked
+        body, motion, reckoning = self.body, self._context.motion, self._context.reckoning
         steps = -((self._body_now - limit) // body.dt_ns)
         self._body_now += steps * body.dt_ns
         while steps and not motion.is_steady:
-            left, right = motion.step(context.travel_nm, context.heading_udeg) if motion.has_goal else motion.step(0, 0)
-            wheels = step(left, right)
-            advance(wheels.left_angle_rad, wheels.right_angle_rad)
+            reckoning.follow((body.step(*self.next_setpoints()),))
             steps -= 1
-        left, right = motion.wheels_mps  # steady until the next command
-        if left == right == 0.0:
-            steps -= body.stand_still(steps)
-        # None is read before the last is asked for: a body in another program makes them all at once.
-        for wheels in [step(left, right) for _ in range(steps)]:
-            advance(wheels.left_angle_rad, wheels.right_angle_rad)
+        if steps:  # steady until the next command
+            reckoning.follow(body.hold(*self.next_setpoints(), steps))
 
     def next_setpoints(self) -> tuple[float, float]:
         """Return the rim-speed set-points of the body's next step, m/s, for who steps it together with others."""
@@ -411,12 +401,7 @@ class Pioneer(Stateful):
     def take_step(self, wheels: WheelAngles) -> None:
         """Take the wheels' angles after a step that was made with `next_setpoints`."""
         self._body_now += self.body.dt_ns
-        self._context.reckoning.advance(wheels.left_angle_rad, wheels.right_angle_rad)
-
-    def _step_blocked(self, left_mps: float, right_mps: float) -> WheelAngles:
-        """Step the body with wheels that do not turn."""
-        faults = self._context.faults
-        return self.body.step(0.0 if faults.left_blocked else left_mps, 0.0 if faults.right_blocked else right_mps)
+        self._context.reckoning.follow((wheels,))
 
     # Parts that are made anew -----------------------------------------------------------
 

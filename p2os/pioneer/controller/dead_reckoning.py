@@ -8,7 +8,9 @@ Invariant: `turned_rad` and `travel_mm` never jump; SETO moves only the origin.
 """
 
 import math
+from collections.abc import Sequence
 
+from p2os.pioneer.controller.ports import WheelAngles
 from simbase.state import Stateful
 
 #: The packet carries 15 bits of position (Pioneer 2/3 manuals, standard SIP).
@@ -64,22 +66,28 @@ class DeadReckoning(Stateful):
         """Take these wheel angles as those from which to count."""
         self._left_rad, self._right_rad = left_rad, right_rad
 
-    def advance(self, left_rad: float, right_rad: float) -> None:
-        """Count on to these wheel angles."""
-        left_mm = (left_rad - self._left_rad) * self._left_radius_mm
-        right_mm = (right_rad - self._right_rad) * self._right_radius_mm
-        if not left_mm and not right_mm:
-            return
-        self._left_rad, self._right_rad = left_rad, right_rad
-        turn = (right_mm - left_mm) / self._track_mm
-        along = (left_mm + right_mm) / 2
-        middle = self.turned_rad - self._zero_rad + turn / 2  # exact for an arc to second order
-        self.x_mm += along * math.cos(middle)
-        self.y_mm += along * math.sin(middle)
-        self.turned_rad += turn
-        self.travel_mm += along
-        self.left_mm += left_mm
-        self.right_mm += right_mm
+    def follow(self, steps: Sequence[WheelAngles]) -> None:
+        """Count on to where the wheels are after each of some steps."""
+        left_was, right_was, left_all, right_all = self._left_rad, self._right_rad, self.left_mm, self.right_mm
+        x, y, turned, travel = self.x_mm, self.y_mm, self.turned_rad, self.travel_mm
+        for wheels in steps:
+            left_rad, right_rad = wheels.left_angle_rad, wheels.right_angle_rad
+            left_mm = (left_rad - left_was) * self._left_radius_mm
+            right_mm = (right_rad - right_was) * self._right_radius_mm
+            if not left_mm and not right_mm:
+                continue
+            left_was, right_was = left_rad, right_rad
+            turn = (right_mm - left_mm) / self._track_mm
+            along = (left_mm + right_mm) / 2
+            middle = turned - self._zero_rad + turn / 2  # exact for an arc to second order
+            x += along * math.cos(middle)
+            y += along * math.sin(middle)
+            turned += turn
+            travel += along
+            left_all += left_mm
+            right_all += right_mm
+        self._left_rad, self._right_rad, self.left_mm, self.right_mm = left_was, right_was, left_all, right_all
+        self.x_mm, self.y_mm, self.turned_rad, self.travel_mm = x, y, turned, travel
 
     def drift(self, turn_rad: float) -> None:
         """Turn the estimate by a little more than the wheels have turned."""

@@ -129,8 +129,8 @@ class Body(Protocol):
         """Make one step with these rim-speed set-points."""
         ...
 
-    def stand_still(self, steps: int) -> int:
-        """Make so many steps with set-points of 0 at once, if they turn no wheel; return how many were made, or 0."""
+    def hold(self, left_mps: float, right_mps: float, steps: int) -> Sequence[WheelAngles]:
+        """Make so many steps with set-points that stay; return the wheels after each."""
         ...
 
     def ranges(self, numbers: Sequence[int]) -> Sequence[float]:

@@ -16,6 +16,7 @@ from p2os.cli.names import worlds
 from p2os.cli.quantities import option
 from p2os.errors import WorldError
 from p2os.robots.parameters import known_robots
+from p2os.ros.bags import is_bag
 from robot_bench.experiments import require
 from simbase.errors import FileError, UsageError
 from simbase.units import SEED
@@ -134,7 +135,7 @@ def _drives(captures: Sequence[Path], truths: Sequence[Path], robot: str, how: "
     found = []
     for number, path in enumerate(captures):
         drive = read_drive(path, robot=robot, how=how)
-        beside = [path.with_suffix(suffix) for suffix in TRUTH_SUFFIXES if path.is_file()]
+        beside = [path.with_suffix(suffix) for suffix in TRUTH_SUFFIXES if path.is_file() or is_bag(path)]
         measured = truths[number] if number < len(truths) else next((one for one in beside if one.is_file()), None)
         if measured is not None:
             drive.truth = read_drive(measured).truth

@@ -190,6 +190,6 @@ def _lines(scenario: str, design: "Design", effects: "dict[str, list[Effect]]", 
 
 
 def _row(key: str, *figures: float | None) -> str:
-    cells = [f"{'' if value is None else f'{value:.4g}':>{width}}" for value, width in
+    cells = [f"{'' if value is None else f'{value:.3g}':>{width}}" for value, width in
              zip(figures, (10, 10, 9, 10), strict=True)]  # fmt: skip
     return f"  {key[:31]:32}{''.join(cells)}".rstrip()

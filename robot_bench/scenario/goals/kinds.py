@@ -23,6 +23,7 @@ from robot_bench.scenario.goals.motion import (
     StopWithin,
 )
 from robot_bench.scenario.goals.signals import MotorSequence, PinHolds, WaveWithin, shown_pairs
+from robot_bench.scenario.goals.steering import BacksOnPath, NoIdleTurn, SteersAway, TurnsAway
 from robot_bench.scenario.goals.temporal import (
     SIGNALS,
     Happens,
@@ -125,6 +126,16 @@ _HOLD_SPEED = (
     Key(name="tolerance_mps", kind="number", required=True, above=0, most=100),
 )
 
+_FREE = Key(name="free_m", kind="number", required=True, above=0, most=100)
+_ONE_SIDE = (
+    Key(name="near_m", kind="number", required=True, above=0, most=100),
+    _FREE,
+    Key(name="left", kind="list"),
+    Key(name="right", kind="list"),
+)
+_APART = Key(name="apart_m", kind="number", least=0, most=100)
+_NOT_LONGER = Key(name="within_s", kind="number", required=True, above=0, most=LONGEST_S)
+
 KINDS: Mapping[str, GoalKind] = {
     "no_collision": GoalKind(
         keys=(), wanted=lambda _: "touches nothing", watch=lambda _: NoCollision(), needs_world=True
@@ -202,6 +213,29 @@ KINDS: Mapping[str, GoalKind] = {
             _FROM,
         ),
         wanted=lambda table: f"gets {number(table, 'way_m'):g} m away from each place{_when(table)}", watch=MovesOn,
+    ),
+    "turns_away": GoalKind(
+        keys=(*_ONE_SIDE, Key(name="row", kind="whole", least=0, most=1000), _APART),
+        wanted=lambda table: "turns on the spot away from what stands on one side, but for "
+        f"{table.get('row', 0)} in a row",
+        watch=TurnsAway,
+    ),
+    "steers_away": GoalKind(
+        keys=(*_ONE_SIDE, _NOT_LONGER),
+        wanted=lambda table: "bends towards what stands on one side for no longer than "
+        f"{number(table, 'within_s'):g} s",
+        watch=SteersAway,
+    ),
+    "no_idle_turn": GoalKind(
+        keys=(_FREE, _NOT_LONGER),
+        wanted=lambda table: f"turns on the spot for no longer than {number(table, 'within_s'):g} s where "
+        f"{number(table, 'free_m'):g} m are free",
+        watch=NoIdleTurn,
+    ),
+    "backs_on_path": GoalKind(
+        keys=(Key(name="off_m", kind="number", required=True, above=0, most=100),),
+        wanted=lambda table: f"goes back only within {number(table, 'off_m'):g} m of the way that it came",
+        watch=BacksOnPath,
     ),
     "smooth": GoalKind(
         keys=(Key(name="most_mps2", kind="number", required=True, above=0, most=1000),),

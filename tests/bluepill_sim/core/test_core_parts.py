@@ -12,7 +12,7 @@ from bluepill_sim.core.systick import CLKSOURCE, COUNTFLAG, ENABLE, TICKINT, Sys
 from bluepill_sim.extension.layout import SHARED, structure
 from bluepill_sim.extension.library import library
 from bluepill_sim.fabric.cycle_clock import CycleClock
-from bluepill_sim.memory import Memory
+from bluepill_sim.memory.arrays import Memory
 
 FREQUENCIES = st.sampled_from([8_000_000, 72_000_000, 1_000_000, 56_000_000, 15_625, 36_000_001])
 

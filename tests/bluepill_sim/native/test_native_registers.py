@@ -5,6 +5,7 @@ from collections import Counter
 import pytest
 
 from bluepill_sim import BluePill
+from bluepill_sim.core.blocks import NO_BLOCK
 from bluepill_sim.native.engine import NativeEngine
 from bluepill_sim.stm32f103 import BASES, PERIPHERAL_BASE
 from tests.bluepill_sim.machine import Machine
@@ -159,3 +160,10 @@ def test_a_reset_by_rcc_leaves_a_device_as_that_of_the_chip_does(
     tim.write(0x2C, 4, 7)
     rcc.write(0x10, 4, 1 << 17)  # neither has risen
     assert tim.words[11] == 7
+
+
+def test_a_native_core_that_has_no_fabric_says_so_and_runs_nothing() -> None:
+    engine = NativeEngine(lambda _address, _size: NO_BLOCK)
+    for run in (engine.run, engine.step, engine.go_on, lambda _: engine.next_event):
+        with pytest.raises(RuntimeError, match="runs on a fabric alone"):
+            run(100)

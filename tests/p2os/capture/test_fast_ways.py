@@ -40,6 +40,7 @@ def both_ways(chunks: list[Chunk]) -> None:
     fast = shown(chunks)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Decoder, "take_back", lambda _: None)
+        patch.setattr("p2os.capture.listing._next_header", lambda data, _: len(data))
         assert fast == shown(chunks)
         patch.undo()
         for least, wanted in itertools.product((0, 1 << 11), ("vel", "sip", "encoder,sync0,pulse", "damaged")):

@@ -20,6 +20,10 @@ FAULTS = {
         "if (dodge->state != DODGE_CRUISE) {\n        dodge->straight_ticks = 0;",
         "if (dodge->state != DODGE_CRUISE) {",
     ),
+    "sign: turns go to the heavier side": (
+        "left > right ? -1 : right > left ? +1 :", "left > right ? +1 : right > left ? -1 :",
+    ),
+    "limit: every turn counts as one soon after another": ("#define SOON_WAY 12 ", "#define SOON_WAY 1200 "),
     "blind spot: the sensor at 30 degrees right": (
         "uint8_t sensors)\n{\n", "uint8_t sensors)\n{\n    sensors = (uint8_t)(sensors & ~RIGHT_30);\n",
     ),

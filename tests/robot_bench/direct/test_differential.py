@@ -12,7 +12,7 @@ from bluepill_sim.fabric.subscriptions import Wave
 from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import Obstacle, Pose
-from robot_bench.bench import make_own_harness
+from robot_bench.bench.board import make_own_harness
 from robot_bench.direct.differential.analog import GP2Y0A21, Cell, volts_at
 from robot_bench.direct.differential.description import Differential, Off
 from robot_bench.direct.differential.robot import DifferentialRobot

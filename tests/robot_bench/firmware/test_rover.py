@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from robot_bench.bench import Bench, pins_of
+from robot_bench.bench import Bench
+from robot_bench.bench.board import pins_of
 from robot_bench.firmware import build
 from robot_bench.recording.run_record import RunRecord
 from robot_bench.run import run_scenario

@@ -1,6 +1,6 @@
 """A bench as a node: what comes in reaches the program and the trace, and a run with it and without ROS is the same."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,14 +13,15 @@ from p2os.errors import ScenarioError
 from p2os.ros.codec import Message
 from p2os.ros.topics import TOPICS
 from p2os.ros.transport import NodeOptions, Received, Topic
-from robot_bench.bench import Bench, make_harness
+from robot_bench.bench import Bench
+from robot_bench.bench.board import make_harness
 from robot_bench.ros.bench_node import BenchNode
 from robot_bench.ros.drive import RosPlace, refuse_without_pins, run_beside, with_inputs
 from robot_bench.ros.recorded import inputs_of, read_inputs
 from robot_bench.scenario.scenario import Scenario, load_scenario
-from robot_bench.wires.nets import Strength
+from robot_bench.wires.nets import Harness, Strength
 from simbase.errors import FileError, UsageError
-from simbase.timing import NS_PER_MS, NS_PER_S
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 OPTIONS = NodeOptions(name="bench")
 INT = "std_msgs/msg/Int32"
@@ -76,6 +77,10 @@ class Script:
 def scenario(name: str = "sensors", *, mode: str = "direct", lasts_s: float = 0.6, **settings: object) -> Scenario:
     made = load_scenario(name, settings=tuple(settings.items()))  # type: ignore[arg-type]  # as --set gives them
     return made.with_options(mode=mode, body="kinematic", duration_s=lasts_s)
+
+
+def levels_of(harness: Harness) -> Callable[[str, Nanos], bool]:
+    return lambda wire, now: harness[wire].level(now)
 
 
 INCOMING = {
@@ -136,7 +141,7 @@ def test_the_robot_does_not_drive_wires_that_are_outside(core: str) -> None:
 
 def test_motor_topics_say_what_stands_on_the_motor_pins() -> None:
     harness = make_harness(load_pinout())
-    node = BenchNode(harness, P2DX, OPTIONS)
+    node = BenchNode(levels_of(harness), P2DX, OPTIONS)
     for value in range(-4, 4):
         at = (value + 5) * NS_PER_S
         for bit, wire in enumerate(load_pinout().value("motor1").wires):
@@ -146,7 +151,7 @@ def test_motor_topics_say_what_stands_on_the_motor_pins() -> None:
 
 def test_values_are_told_when_they_change_and_each_100_ms_and_the_clock_always() -> None:
     harness = make_harness(load_pinout())
-    node = BenchNode(harness, P2DX, OPTIONS)
+    node = BenchNode(levels_of(harness), P2DX, OPTIONS)
     clock, left = topic("clock"), topic("motor_left")
     assert left in dict(node.tell(0))
     assert dict(node.tell(100 * NS_PER_MS - 1)) == {clock: {"clock": {"sec": 0, "nanosec": 99_999_999}}}
@@ -158,7 +163,7 @@ def test_values_are_told_when_they_change_and_each_100_ms_and_the_clock_always()
 
 
 def test_pins_that_ros_drives_are_not_told_back() -> None:
-    node = BenchNode(make_harness(load_pinout()), P2DX, OPTIONS, outside=["distance"])
+    node = BenchNode(levels_of(make_harness(load_pinout())), P2DX, OPTIONS, outside=["distance"])
     assert {one.name for one in node.taken} == {f"/distance_sensor_{number}" for number in range(1, 9)}
     told = {one.name for one in node.announced()}
     assert not told & {one.name for one in node.taken}
@@ -166,7 +171,7 @@ def test_pins_that_ros_drives_are_not_told_back() -> None:
 
 
 def test_each_distance_topic_is_the_wire_of_its_number() -> None:
-    node = BenchNode(make_harness(load_pinout()), P2DX, OPTIONS, outside=["distance"])
+    node = BenchNode(levels_of(make_harness(load_pinout())), P2DX, OPTIONS, outside=["distance"])
     wires = [wire.name for wire in load_pinout().with_role(WireRole.DISTANCE)]
     assert [node.taken[topic("distance_sensor", number)] for number in range(1, 9)] == [(wire,) for wire in wires]
 

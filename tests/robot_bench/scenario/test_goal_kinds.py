@@ -58,9 +58,10 @@ def printed(*lines: tuple[int, str]) -> list[Event]:
 
 
 def test_every_kind_of_goal_is_tried() -> None:
-    from tests.robot_bench.scenario import test_goals
+    from tests.robot_bench.scenario import test_goals, test_goals_on_steering
 
-    names = " ".join(name for name in [*globals(), *vars(test_goals)] if name.startswith("test_goal_"))
+    tests = [*globals(), *vars(test_goals), *vars(test_goals_on_steering)]
+    names = " ".join(name for name in tests if name.startswith("test_goal_"))
     assert [kind for kind in KINDS if kind not in names] == []
 
 

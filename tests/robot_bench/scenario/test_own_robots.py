@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from p2os.errors import ScenarioError
-from robot_bench.bench import Bench, pins_of
+from robot_bench.bench import Bench
+from robot_bench.bench.board import pins_of
 from robot_bench.scenario.differential_file import MOST_EDGES_A_SECOND, TABLES
 from robot_bench.scenario.scenario import Scenario, read_scenario
 from robot_bench.scenario.wired_robots import KINDS, known_own_robots

@@ -12,7 +12,7 @@ from p2os.robots.parameters import load_parameters
 from robot_bench.bench import Bench
 from robot_bench.events.kinds import Fault, PinEdge, WorldChange
 from robot_bench.scenario.when_script import load_whens
-from tests.robot_bench.test_bench import MS, bench, scenario
+from tests.robot_bench.test_bench import MS, S, bench, scenario
 
 P2DX = load_parameters("p2dx")
 POST = {"name": "post", "shape": "cylinder", "radius_m": 0.05, "height_m": 0.5}
@@ -31,7 +31,7 @@ def told(one: Bench, kind: type) -> list[tuple[int, str]]:
     return found
 
 
-@pytest.mark.parametrize(("after_s", "at"), [(0, 1050 * MS), (0.25, 1300 * MS)])
+@pytest.mark.parametrize(("after_s", "at"), [(0, 1050 * MS), (0.25, 1250 * MS)])
 def test_a_thing_is_placed_and_held_after_an_edge(after_s: float, at: int) -> None:
     table = {"event": "pin PB7 high", "do": "place", "after_s": after_s, **POST, "before_sonar": 2, "distance_m": 0.4,
              "hold_s": 0.1}  # fmt: skip
@@ -62,6 +62,25 @@ def test_an_event_may_end_the_run_and_the_slices_change_nothing() -> None:
     assert len(traces) == 1
 
 
+# PB7 rises at 1 s, which is told with the pose at 1.05 s.
+@pytest.mark.parametrize(
+    ("after_ns", "at"),
+    [(0, 1050 * MS), (50 * MS - 1, 1050 * MS), (50 * MS, 1050 * MS), (50 * MS + 1, 1050 * MS + 1),
+     (123_456_789, S + 123_456_789)],
+)  # fmt: skip
+def test_what_is_due_after_its_event_is_told_is_done_to_the_nanosecond(after_ns: int, at: int) -> None:
+    tables = [{"event": "pin PB7 high", "do": "inject", "fault": "sonar-dead 1", "after_s": after_ns / S}]
+    assert told(made(*tables), Fault) == [(at, "inject")]
+
+
+@pytest.mark.parametrize(("after_ns", "at"), [(50 * MS, 1050 * MS), (50 * MS + 1, 1050 * MS + 1), (S, 2 * S)])
+def test_a_run_ends_so_long_after_the_event(after_ns: int, at: int) -> None:
+    one = made({"event": "pin PB7 high", "do": "end", "after_s": after_ns / S})
+    one.run_until("3 s")
+    assert one.end == at
+    assert 0 <= one.finish() - at < 1000  # a block of the program
+
+
 def test_a_bench_saved_between_event_and_deed_goes_on_alike() -> None:
     table = {"event": "usart1 sends hello", "do": "inject", "fault": "sonar-dead 2", "after_s": 0.5}
     whole, first, second = made(table), made(table), made(table)
@@ -71,7 +90,8 @@ def test_a_bench_saved_between_event_and_deed_goes_on_alike() -> None:
         one.run_until("3 s")
         one.finish()
     assert second.trace.text == whole.trace.text
-    assert [fault.t for fault in whole.record().faults] == [1050 * MS]
+    (text,) = [t for t, line in whole.record().usart if b"hello" in line]
+    assert [fault.t for fault in whole.record().faults] == [text + 500 * MS]
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from p2os.errors import WorldError
 from p2os.pioneer.body.contract import BodyState, RobotBody
 from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.world import load_world, parse_world
-from p2os.pioneer.world.model import Obstacle, Pose, Walk, World
+from p2os.pioneer.world.model import Obstacle, Pose, World
 from p2os.robots.parameters import load_parameters
 from simbase.errors import UsageError
 from tests.p2os.pioneer.body.bodies import Maker, drive, each_body, ramped
@@ -43,30 +43,16 @@ def test_the_same_calls_give_the_same_states(make: Maker) -> None:
     assert run(first) == run(first) == run(make(load_world("room")))
 
 
-@pytest.mark.parametrize("steps", [0, 1, 2, 199, 200, 201])
-@pytest.mark.parametrize("scene", ["free", "driven", "after a wall", "inside a thing", "beside a walker"])
-def test_to_stand_still_is_to_step_on_the_spot(make: Maker, scene: str, steps: int) -> None:
-    body = make()
-    if scene == "beside a walker":
-        walk = Walk(points_m=((1.0, 0.0), (-1.0, 0.0)), speed_mps=1.0)
-        body.place(Obstacle(name="walker", x_m=1.0, y_m=0.0, radius_m=0.2, height_m=1.0, walk=walk))
-    if scene == "after a wall":
-        body.place(Obstacle(name="wall", x_m=0.6, y_m=0.0, length_m=0.2, width_m=2.0, height_m=1.0))
-    if scene in {"driven", "after a wall"}:
-        drive(body, 0.3, 0.3, 1.5)
-    if scene == "inside a thing":
-        body.place(Obstacle(name="post", x_m=0.1, y_m=0.0, radius_m=0.1, height_m=0.6))
-    saved, before = body.snapshot(), body.state
-    made = body.stand_still(steps)
-    assert made == (steps if body.name == "kinematic" and scene != "beside a walker" else 0)
-    stood, state = body.snapshot(), body.state
-    if made == 0:
-        assert state == before
-        return
-    body.restore(saved)
-    for _ in range(made):
-        body.step(0.0, 0.0)
-    assert (pickle.dumps(body.snapshot()), body.state) == (pickle.dumps(stood), state)
+@pytest.mark.parametrize("steps", [0, 1, 25])
+@pytest.mark.parametrize("rims", [(0.0, 0.0), (0.1, 0.3)])
+def test_to_hold_a_speed_is_to_step_with_it(make: Maker, rims: tuple[float, float], steps: int) -> None:
+    held, stepped = make(), make()
+    for body in (held, stepped):
+        drive(body, 0.3, 0.3, 0.02)
+    ends = [(wheels.left_angle_rad, wheels.right_angle_rad) for wheels in held.hold(*rims, steps)]
+    made = [stepped.step(*rims) for _ in range(steps)]
+    assert ends == [(wheels.left_angle_rad, wheels.right_angle_rad) for wheels in made]
+    assert held.state == stepped.state
 
 
 def test_a_snapshot_is_all_that_decides_the_future(make: Maker) -> None:

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from p2os.pioneer.body.contract import Turned
 from p2os.pioneer.controller.dead_reckoning import POSITION_MODULUS, DeadReckoning, raw_angle
 from p2os.pioneer.sonar.schedule import LARGEST_COUNTS, NO_ECHO_COUNTS, SonarSchedule, raw_range
 from p2os.protocol.profiles import Profile
@@ -25,7 +26,7 @@ def reckoning() -> DeadReckoning:
 def test_driving_straight_counts_along_the_heading() -> None:
     odometer = reckoning()
     odometer.begin(5.0, -3.0)  # wherever the wheels stand
-    odometer.advance(5.84, -2.16)
+    odometer.follow([Turned(5.84, -2.16)])
     assert odometer.x_mm == pytest.approx(840)
     assert odometer.raw_position(NM_PER_COUNT) == (1000, 0)
     assert odometer.travel_mm == pytest.approx(840)
@@ -34,7 +35,7 @@ def test_driving_straight_counts_along_the_heading() -> None:
 def test_turning_on_the_spot_turns_by_the_track() -> None:
     odometer = reckoning()
     half_turn = math.pi * TRACK_MM / 2 / 1000
-    odometer.advance(-half_turn, half_turn)
+    odometer.follow([Turned(-half_turn, half_turn)])
     assert odometer.heading_rad == pytest.approx(math.pi)
     assert odometer.x_mm == 0
     assert odometer.y_mm == 0
@@ -43,7 +44,7 @@ def test_turning_on_the_spot_turns_by_the_track() -> None:
 def test_an_arc_in_small_steps_ends_on_its_circle() -> None:
     odometer = reckoning()
     for step in range(1, 1001):
-        odometer.advance(step * 0.8 * math.pi / 2 / 1000, step * 1.2 * math.pi / 2 / 1000)
+        odometer.follow([Turned(step * 0.8 * math.pi / 2 / 1000, step * 1.2 * math.pi / 2 / 1000)])
     # A quarter of a circle of 1 m radius, anticlockwise.
     assert odometer.heading_rad == pytest.approx(math.pi / 2)
     assert odometer.x_mm == pytest.approx(1000, abs=0.01)
@@ -52,19 +53,19 @@ def test_an_arc_in_small_steps_ends_on_its_circle() -> None:
 
 def test_a_new_origin_moves_the_pose_but_not_the_odometer() -> None:
     odometer = reckoning()
-    odometer.advance(0.1, 0.3)
+    odometer.follow([Turned(0.1, 0.3)])
     turned, travelled = odometer.turned_rad, odometer.travel_mm
     odometer.set_origin()
     assert (odometer.x_mm, odometer.y_mm, odometer.heading_rad) == (0, 0, 0)
     assert (odometer.turned_rad, odometer.travel_mm, odometer.zero_rad) == (turned, travelled, turned)
-    odometer.advance(1.1, 1.3)
+    odometer.follow([Turned(1.1, 1.3)])
     assert odometer.x_mm == pytest.approx(1000)
     assert odometer.y_mm == pytest.approx(0)
 
 
 def test_positions_are_counted_modulo_fifteen_bits() -> None:
     odometer = reckoning()
-    odometer.advance(-0.00084, -0.00084)
+    odometer.follow([Turned(-0.00084, -0.00084)])
     assert odometer.raw_position(NM_PER_COUNT) == (POSITION_MODULUS - 1, 0)
 
 
@@ -73,10 +74,10 @@ def test_positions_are_counted_modulo_fifteen_bits() -> None:
 def test_an_odometer_can_be_saved_and_restored(angles: list[tuple[float, float]]) -> None:
     odometer, twin = reckoning(), reckoning()
     for left, right in angles:
-        odometer.advance(left, right)
+        odometer.follow([Turned(left, right)])
     twin.restore(odometer.snapshot())
     for each in (odometer, twin):
-        each.advance(1.0, 2.0)
+        each.follow([Turned(1.0, 2.0)])
     assert twin.snapshot() == odometer.snapshot()
 
 

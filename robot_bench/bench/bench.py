@@ -20,45 +20,51 @@ Invariant: a bench that was restored from a snapshot goes on as the one that the
 snapshot was taken of.
 """
 
-import hashlib
 import math
 import pickle
-import random
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Self, TypeAlias, TypeVar, Union, Unpack, cast
+from typing import Self, TypeAlias, TypeVar, Union, Unpack, cast
 
 from adapter_sim import Adapter
-from adapter_sim.pinout import Pinout, Pull, WireRole, load_pinout
-from bluepill_sim.fabric.surroundings import Surroundings
-from bluepill_sim.parts.registry import PartSpec, attach
+from adapter_sim.pinout import load_pinout
 from bluepill_sim.spans import Span, to_nanos
 from p2os.errors import ScenarioError
-from p2os.event_log import log_event, logger
+from p2os.event_log import logger
 from p2os.pioneer.body.contract import RobotBody
-from p2os.pioneer.body.factory import body_note, make_body, make_scene, resolve_body
+from p2os.pioneer.body.factory import body_note, make_body, make_scene
 from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import Pose, World
-from robot_bench.adapter import RUN_ANEW, make_adapter
-from robot_bench.direct import DirectRobot, DistanceSensors, JointMotor, WheelEncoder
+from robot_bench.adapter import RUN_ANEW
+from robot_bench.bench.board import (
+    boot,
+    do_by_hand,
+    hear_buses,
+    hear_usarts,
+    log_bench_event,
+    make_harness,
+    make_own_harness,
+    pins_of,
+    plug_in,
+)
+from robot_bench.bench.far_end import make_far_end
+from robot_bench.bench.origin import VERSION, origin_of, refuse_others
+from robot_bench.bench.waiting import EventWait
 from robot_bench.direct.differential.robot import DifferentialRobot
 from robot_bench.direct.senses import WorldSenses
-from robot_bench.direct.wired import AnalogPin, RobotWire
-from robot_bench.events.codec import Blocks, events_of
+from robot_bench.events.codec import events_of
 from robot_bench.events.expectation import ExpectationError
 from robot_bench.events.kinds import Event
 from robot_bench.events.selection import SELECTORS, Wires, bus_of, select, wire_named
 from robot_bench.events.stream import EventStream
 from robot_bench.events.words import last_words
-from robot_bench.recording.client_view import SipRanges
 from robot_bench.recording.recorder import SAMPLE_NS, Recorder
 from robot_bench.recording.run_record import RunRecord, record_of
 from robot_bench.recording.trace import TraceWriter
-from robot_bench.recording.transfers import hear_bus
 from robot_bench.running.loop import RunLoop
 from robot_bench.running.pacer import FIRST_SLICE_NS, SliceLength
 from robot_bench.running.shared_world import Driven, SharedWorld
@@ -66,7 +72,6 @@ from robot_bench.scenario.fault_script import LINK_DOWN, FaultChange, FaultScrip
 from robot_bench.scenario.goals.judging import GoalJudge, Judgement
 from robot_bench.scenario.hand_script import Deed, HandScript
 from robot_bench.scenario.scenario import (
-    RANDOM_SRAM,
     Scenario,
     ScenarioOptions,
     load_scenario,
@@ -74,21 +79,14 @@ from robot_bench.scenario.scenario import (
 )
 from robot_bench.scenario.timeline import Timed, Timeline
 from robot_bench.scenario.when_script import WhenScript
-from robot_bench.scenario.wired_robots import WiredPart
 from robot_bench.scenario.world_script import WorldScript, load_changes
 from robot_bench.wires.chip_pins import ChipPins
-from robot_bench.wires.endpoints import Endpoint
-from robot_bench.wires.line_ends import ENDS, AdapterPart, ControllerPart
-from robot_bench.wires.nets import Harness, Net, OwnedPins, Strength, Unconnected
+from robot_bench.wires.line_ends import AdapterPart, ControllerPart
+from robot_bench.wires.nets import Harness
 from robot_bench.wires.ports import Chip
-from robot_bench.wires.serial_line import SerialLine
 from simbase.errors import UsageError, shown
 from simbase.state import PartState, Stateful
 from simbase.timing import NS_PER_S, Nanos, Reached
-
-if TYPE_CHECKING:
-    from bluepill_sim.board import BluePill
-    from bluepill_sim.program.image import Image
 
 #: chosen: so long a run goes on after a fault of the firmware, to show what the robot does then.
 AFTER_FAULT_NS: Nanos = 1 * NS_PER_S
@@ -100,15 +98,6 @@ _LOG = logger("bench")
 T = TypeVar("T", bound=Timed)
 #: What `run_until` waits for beside a time: an event in words, or a function of the bench.
 Condition: TypeAlias = Union[str, Callable[["Bench"], bool]]  # noqa: UP007 - a name in quotes, for pdoc
-
-
-#: What decides a run besides its files; its end and its goals may be others after a restart.
-DECISIVE = (
-    "mode", "seed", "parameters", "threshold_um", "usart_baud", "outside", "start", "direct", "adapter",
-    "adapter_core", "controller", "controller_kind", "changes", "faults", "whens", "own_robot", "parts", "record",
-    "sram",
-)  # fmt: skip
-_VERSION = "version of p2os"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -158,7 +147,7 @@ class Bench(Stateful):
         "loop", "_senses", "_ends_at", "_has_told_death",
     )  # fmt: skip
     #: What the caller asked of this object; the lines, which are parts of the loop.
-    DERIVED = ("_lines", "_checkpoints", "_expected", "_mark", "on_slice")
+    DERIVED = ("_lines", "_checkpoints", "_waits", "on_slice")
 
     def __init__(
         self,
@@ -187,27 +176,18 @@ class Bench(Stateful):
         self._harness = harness = make_harness(pinout) if own is None else make_own_harness(own.robot.signals)
         self.recorder = Recorder(self.trace, harness, body=body)
         self.recorder.on_event = log_bench_event
-        #: Both directions of the P2OS line; none in mode A.
-        self._lines: tuple[SerialLine, ...] = ()
         #: States that `rewind` may go back to, oldest first: times and snapshots.
         self._checkpoints: list[tuple[Nanos, object]] = []
-        #: What was waited for last, and when the bench stood still after it.
-        self._expected: tuple[Nanos, Event | None] = (-1, None)
-        #: Where in the trace the events since then are, and the wires' levels there; None: from its beginning.
-        self._mark: tuple[int, Blocks] | None = None
+        self._waits = EventWait(self.events, self.trace, harness)
+        far_end = make_far_end(scenario, pinout, body, chip, harness, self.recorder, is_among_others=shared is not None)
         #: What stands at the far end of the wires and owns the body.
-        self._robots: list[DirectRobot | Endpoint | WiredPart] = []
-        self._ranges: SipRanges | None = None
-        self.parts = self._build(pinout, world, body, chip, harness)
+        self._robots = far_end.robots
+        self._lines, self._ranges = far_end.lines, far_end.ranges
+        self.parts = BenchParts(
+            chip=chip, harness=harness, body=body, world=world, adapter=far_end.adapter, controller=far_end.controller
+        )
         #: What must be the same where a snapshot of this bench is restored.
-        self.made_of: dict[str, object] = {
-            _VERSION: version("p2os"),
-            "firmware": getattr(getattr(chip, "image", chip), "sha256", type(chip).__name__),
-            "world": hashlib.sha256(repr(world).encode()).hexdigest(),
-            "body": resolve_body(scenario.body),
-            **{name: getattr(scenario, name) for name in DECISIVE},
-            **scenario.own_classes,
-        }
+        self.made_of = origin_of(scenario, world, chip)
         self.script = WorldScript(
             scenario.changes, body, scenario.parameters,
             bring_to=self._bring_robot_to, on_change=self.recorder.obstacle,
@@ -223,11 +203,11 @@ class Bench(Stateful):
             chip, followers, observers=(self.recorder,), slice_ns=slice_ns or FIRST_SLICE_NS,
             on_slice=self._after_slice, choose_watched=self._watch_wires,
         )  # fmt: skip
-        #: When a goal's verdict ended the run; None while none has.
+        #: When a goal's verdict or a `[[when]]` ends the run; None while none does.
         self._ends_at: Nanos | None = None
         self._has_told_death = False
         self.whens = WhenScript(
-            scenario.whens, on_end=self._end_now,
+            scenario.whens, on_end=self._end_at,
             on_change=lambda changes: self.script.add(*changes), on_fault=lambda faults: self.faults.add(*faults),
             on_deed=lambda deeds: self.hands.add(*deeds),
         )  # fmt: skip
@@ -454,57 +434,22 @@ class Bench(Stateful):
     def _limit(self, within: Span | None, since: Nanos) -> Nanos:
         return self.end if within is None else since + to_nanos(within)
 
-    def _step_until(self, is_done: Callable[[], bool], limit: Nanos) -> bool:
+    def _step_until(
+        self, is_done: Callable[[], bool], limit: Nanos, before_step: Callable[[], None] = lambda: None
+    ) -> bool:
         """Run in steps of 50 ms until something is so, or to a time; tell whether it is so."""
         while not (so := is_done()) and self.now < min(limit, self.end):
+            before_step()
             self._run_to(min(limit, (self.now // SAMPLE_NS + 1) * SAMPLE_NS))
         return so
 
-    @property
-    def _since(self) -> Nanos:
-        """From when on the next event is waited for: from the last one, where nothing was done since."""
-        at, event = self._expected
-        return event.t if event is not None and at == self.now else self.now
-
     def _wait_for(self, words: str, within: Span | None) -> Event | None:
         """Run until an event happens, counted from the last one that was waited for where nothing was done since."""
-        selector, since, last = select(words, self._wires), self._since, self._expected[1]
+        selector = select(words, self._wires)
         if (bus := bus_of(words)) and bus not in self.scenario.record:
             raise UsageError(f"{bus} is not recorded", hint=f'record = ["{bus}"] in the scenario')
-        limit, found = self._limit(within, since), list[Event]()
-
-        def take(event: Event) -> None:
-            if selector.takes(event) and since <= event.t <= limit and (event.t > since or event != last):
-                found.append(event)
-
-        if since < self.now:
-            for event in self._told_since_mark():
-                if type(event) in selector.kinds:
-                    take(event)
-        if not found:
-            self._mark_here()
-        end = self.events.subscribe(take, *selector.kinds, wires=selector.wires)
-        try:
-            # What happened until the limit is told at the pose after it.
-            self._step_until(lambda: bool(found), -(-limit // SAMPLE_NS) * SAMPLE_NS)
-        finally:
-            end()
-        self._expected = (self.now, found[0]) if found else (-1, None)
-        return found[0] if found else None
-
-    def _mark_here(self) -> None:
-        """Note where the trace stands: what is found from now on is told in it from here on."""
-        told = self.events.released_until
-        nets = tuple(self.parts.harness)
-        levels = bytearray(not net.wave(told) and net.level(told) for net in nets) if told >= 0 else bytearray()
-        self._mark = (self.trace.length, Blocks(tuple(net.name for net in nets), levels)) if levels else None
-
-    def _told_since_mark(self) -> Iterable[Event]:
-        """Return the events since the last wait began, so that no wait reads the whole trace."""
-        if self._mark is None:
-            return events_of(self.trace.lines())
-        length, blocks = self._mark
-        return events_of(self.trace.lines(length), begun=replace(blocks, levels=bytearray(blocks.levels)))
+        limit = self._limit(within, self._waits.since(self.now))
+        return self._waits.wait(selector, limit, lambda: self.now, self._step_until)
 
     def expect(self, words: str, within: Span | None = None) -> Event:
         """Run until an event happens and return it.
@@ -518,7 +463,7 @@ class Bench(Stateful):
             ExpectationError: It did not happen; the message has the last events.
             UsageError: The words mean no events.
         """
-        since = self._since
+        since = self._waits.since(self.now)
         found = self._wait_for(words, within)
         if found is None:
             __tracebackhide__ = True
@@ -532,7 +477,7 @@ class Bench(Stateful):
             ExpectationError: It happened.
             UsageError: The words mean no events.
         """
-        since = self._since
+        since = self._waits.since(self.now)
         found = self._wait_for(words, during)
         if found is not None:
             __tracebackhide__ = True
@@ -679,7 +624,7 @@ class Bench(Stateful):
     def _intervene(self, script: Timeline[T], changes: Sequence[T]) -> None:
         """Add changes to what a scenario has; `rewind` will not go on through them, but begin after them."""
         self._refuse_the_ended()
-        self._expected = -1, None
+        self._waits.forget()
         script.add(*changes, now=self.now)
         self.checkpoint()
 
@@ -702,7 +647,7 @@ class Bench(Stateful):
             UsageError: The run has been judged, or finished.
         """
         self._refuse_the_ended()
-        self._expected = -1, None
+        self._waits.forget()
         self.hands.add(*deeds)
 
     def checkpoint(self) -> None:
@@ -819,7 +764,7 @@ class Bench(Stateful):
         for part, bench in zip(parts, self.robots.values(), strict=False):
             made_of = part.get("made_of") if isinstance(part, PartState) else None
             if isinstance(made_of, dict):
-                _refuse_others(made_of, bench.made_of)
+                refuse_others(made_of, bench.made_of)
         if self._shared is None:
             self.restore_own(snapshot)
         else:
@@ -829,7 +774,7 @@ class Bench(Stateful):
         """Put back what `own_snapshot` returned, as `restore` asks for it."""
         super().restore(snapshot)
         self._pins.chip_restored()
-        self._expected, self._mark = (-1, None), None
+        self._waits.forget()
         if self.goals.is_behind:
             self.goals.catch_up(events_of(self.trace.lines()), self.events.released_until)
 
@@ -867,9 +812,12 @@ class Bench(Stateful):
 
     def _end_now(self) -> None:
         """End the run where the loop stands: a goal is decided."""
-        if self._ends_at is None:
-            self._ends_at = self.loop.now
-            self.loop.end_at(self.end)
+        self._end_at(self.loop.now)
+
+    def _end_at(self, at: Nanos) -> None:
+        """End the run at a time, if nothing ends it before."""
+        self._ends_at = at if self._ends_at is None else min(at, self._ends_at)
+        self.loop.end_at(self.end)
 
     def _inject(self, words: str, at: Nanos) -> None:
         op, _, fault = words.partition(" ")
@@ -882,109 +830,13 @@ class Bench(Stateful):
 
     def _do_by_hand(self, deed: Deed) -> None:
         self.recorder.event(deed.who, deed.at, deed.do, deed.words)
-        if deed.do == "type":
-            getattr(self.chip, deed.place).receive(deed.text)
-        elif deed.do == "set_volts":
-            cast("AnalogPin", self.chip.pin(deed.place)).set_volts(deed.volts)
-        elif deed.place not in [net.name for net in self.parts.harness]:
-            self.chip.pin(deed.place).drive(deed.level)
-        elif deed.level is None:
-            self.parts.harness[deed.place].release(BY_HAND, deed.at)
-        else:
-            self.parts.harness[deed.place].drive(BY_HAND, deed.level, Strength.PUSH_PULL, deed.at)
-
-    def _build(self, pinout: Pinout, world: World, body: RobotBody, chip: Chip, harness: Harness) -> BenchParts:
-        if self.scenario.own_robot is not None:
-            pins = {wire.name: wire.pin for wire in self.scenario.own_robot.robot.signals}
-            robot = self.scenario.own_robot.build(
-                body, harness, lambda signal: cast("AnalogPin", chip.pin(pins[signal]))
-            )
-            robot.on_event, robot.on_ranges = self.recorder.listener("robot"), self.recorder.sonar
-            self._robots.append(robot)
-            return BenchParts(chip=chip, harness=harness, body=body, world=world)
-        if self.scenario.mode == "direct":
-            if self.scenario.faults or any(when.faults for when in self.scenario.whens):
-                raise ScenarioError(
-                    f"{self.scenario.name}: [[fault]] acts on the robot's controller, and mode direct has none",
-                    hint="--mode adapter",
-                )
-            self._robots.append(self._direct_robot(pinout, body, harness))
-            return BenchParts(chip=chip, harness=harness, body=body, world=world)
-        adapter, controller = self._ends_of_line(pinout, body, harness)
-        return BenchParts(chip=chip, harness=harness, body=body, world=world, adapter=adapter, controller=controller)
+        do_by_hand(deed, self.chip, self.parts.harness)
 
     def _plug_in(self, chip: Chip) -> tuple[WorldSenses, ...]:
         """Attach the scenario's parts to the board, and have them sense the world."""
         senses = WorldSenses(self.parts.body, self._bring_robot_to)
         plug_in(self.scenario.parts, chip, self.recorder, senses)
         return (senses,)
-
-    def _direct_robot(self, pinout: Pinout, body: RobotBody, harness: Harness) -> DirectRobot:
-        settings = self.scenario.direct
-
-        def nets(value: str) -> list[Net]:
-            return [harness[name] for name in pinout.value(value).wires]
-
-        def motor(value: str) -> JointMotor:
-            return JointMotor(
-                nets(value), step_um_per_s=settings.step_um_per_s, ramp_um_per_s2=settings.ramp_um_per_s2,
-                dt_ns=body.dt_ns, bit_order=settings.bit_order, command=settings.motor_command,
-            )  # fmt: skip
-
-        wires = pinout.with_role(WireRole.DISTANCE)
-        cut = cut_wires(self.scenario, pinout)
-
-        def driven(names: Iterable[str]) -> list[Net | Unconnected]:
-            return [Unconnected() if name in cut else harness[name] for name in names]
-
-        def encoder(value: str) -> WheelEncoder:
-            return WheelEncoder(driven(pinout.value(value).wires))
-
-        sensors = DistanceSensors(
-            driven(wire.name for wire in wires),
-            threshold_um=self.scenario.threshold_um, period_ns=settings.sensor_period_ns,
-        )  # fmt: skip
-        sensors.on_sample = self.recorder.sonar
-        robot = DirectRobot(
-            body, left=motor("motor1"), right=motor("motor2"),
-            encoders=(encoder("encoder1"), encoder("encoder2")),
-            sensors=sensors, sonar_numbers=range(len(wires)), encoder_period_ns=settings.encoder_period_ns,
-        )  # fmt: skip
-        robot.on_event = self.recorder.listener("direct")
-        return robot
-
-    def _ends_of_line(self, pinout: Pinout, body: RobotBody, harness: Harness) -> tuple[AdapterPart, ControllerPart]:
-        recorder, parameters = self.recorder, self.scenario.parameters
-        to_robot, to_client = self._lines = SerialLine(), SerialLine()
-        pins = OwnedPins(harness, "adapter", cut_wires(self.scenario, pinout))
-        adapter = make_adapter(self.scenario, pins, pinout)
-        adapter.on_event = recorder.listener("adapter")
-        settings = replace(self.scenario.controller, baud=to_client.baud, seed=self.scenario.seed)
-        kind = self.scenario.controller_kind
-        controller: ControllerPart
-        if kind in ENDS["controller"].ships:
-            controller = Pioneer(parameters=parameters, body=body, settings=settings)
-        else:
-            controller = ENDS["controller"].make(kind, parameters=parameters, body=body, settings=settings)
-        controller.on_event = recorder.listener("pioneer")
-        ranges = self._ranges = SipRanges(parameters, settings.profile, on_ranges=recorder.sonar)
-
-        def arrives_at_client(data: bytes, at: Nanos) -> None:
-            recorder.wire("r2c", data, at)
-            ranges.take(data, at)
-
-        self._robots.append(Endpoint(adapter, incoming=to_client, outgoing=to_robot, on_arrival=arrives_at_client))
-        self._robots.append(
-            Endpoint(
-                controller,
-                incoming=to_robot,
-                outgoing=to_client,
-                on_arrival=lambda data, at: recorder.wire("c2r", data, at),
-                # Among others it measures where all of them are then: none of its pings may come late.
-                next_due=controller.next_due if self._shared and isinstance(controller, Pioneer) else None,
-            )
-        )
-        return adapter, controller
 
 
 def body_of(scenario: Scenario, world: World) -> RobotBody:
@@ -1005,7 +857,7 @@ def _built_anew(saved_by: str, recipe: bytes) -> Bench:
     Raises:
         UsageError, FileError: As of `Bench.restore`.
     """
-    _refuse_others({_VERSION: saved_by}, {_VERSION: version("p2os")})
+    refuse_others({VERSION: saved_by}, {VERSION: version("p2os")})
     try:
         scenario, name, slice_ns, paths, snapshot = pickle.loads(recipe)  # noqa: S301 - within a pickle already
         traces = {one: TraceWriter(path, goes_on=path is not None) for one, path in paths.items()}
@@ -1023,109 +875,3 @@ def _recorder(snapshot: object) -> dict[str, object]:
     """Return the part of a bench's snapshot that says where its trace stands."""
     bench = cast("dict[str, dict[str, dict[str, object]]]", snapshot)
     return bench["recorder"]["trace"]
-
-
-def _refuse_others(saved: dict[str, object], here: dict[str, object]) -> None:
-    """Refuse what was saved where something that decides a run is different from here."""
-    for what, value in saved.items():
-        if here.get(what) != value:
-            values = f": {value} there, {here.get(what)} here" if isinstance(value, str | int) else ""
-            raise UsageError(f"the bench was saved with another {what}{values}", hint=RUN_ANEW)
-
-
-def plug_in(parts: Sequence[PartSpec], chip: Chip, recorder: Recorder, world: Surroundings | None = None) -> None:
-    """Attach parts to a board, have what they tell recorded, and have them sense a world, where there is one.
-
-    Raises:
-        TypeError: The chip is none that takes parts.
-        PartError: One cannot be attached.
-    """
-    board = cast("BluePill", chip)
-    if not hasattr(board, "attached"):
-        raise TypeError(f"a {type(chip).__name__} takes no parts: an emulated BluePill does")
-    if world is not None:
-        board.attached.surroundings = world
-    board.attached.note_sinks.append(
-        lambda at, part, what, detail: recorder.event("part", at, part, f"{what} {detail}".rstrip())
-    )
-    for spec in parts:
-        attach(board, spec)
-
-
-def hear_usarts(chip: Chip, recorder: Recorder) -> None:
-    """Have all that a chip sends on any of its ports recorded."""
-    chip.usart1.subscribe(recorder.usart)
-    for port in ("usart2", "usart3"):
-        if (other := getattr(chip, port, None)) is not None:
-            other.subscribe(lambda sent, port=port: recorder.usart(sent, port))
-
-
-def hear_buses(chip: Chip, recorder: Recorder, buses: Sequence[str]) -> None:
-    """Have recorded what goes over buses of a chip; a host is plugged into its USB where that is one of them.
-
-    Raises:
-        UsageError: The chip is none that has buses.
-    """
-    if buses and not hasattr(chip, "usb_serial"):
-        raise UsageError(f"a {type(chip).__name__} has no buses to record", hint="an emulated BluePill does")
-    for bus in buses:
-        if bus == "usb":
-            board = cast("BluePill", chip)
-            board.usb.plug()
-            board.usb_serial.subscribe(lambda sent: recorder.usart(sent, "usb"))
-        else:
-            recorder.transfers[bus] = hear_bus(chip, bus, recorder.events.publish)
-
-
-def log_bench_event(who: str, at: Nanos, what: str, detail: str) -> None:
-    """Log a line of a bench's state log."""
-    log_event(_LOG, who, at, what, detail)
-
-
-def boot(scenario: Scenario, image: "Image | None" = None) -> Chip:
-    """Return an emulated BluePill with a scenario's firmware, at its reset.
-
-    Args:
-        scenario: What it runs.
-        image: Its firmware, where that was read before.
-
-    Raises:
-        MissingDependencyError: The emulator's engine is not installed.
-    """
-    from bluepill_sim.board import BluePill
-    from bluepill_sim.stm32f103 import SRAM_BYTES
-
-    board = BluePill(image or scenario.firmware)
-    if scenario.sram == RANDOM_SRAM:
-        board.power_up_with(random.Random(scenario.seed).randbytes(SRAM_BYTES))
-    return board
-
-
-def pins_of(scenario: Scenario) -> dict[str, str]:
-    """Return the chip's pin of each wire of a scenario."""
-    if scenario.own_robot is None:
-        return {wire.name: wire.bluepill for wire in load_pinout().wires}
-    return {wire.name: wire.pin for wire in scenario.own_robot.robot.signals if not wire.is_analog}
-
-
-def cut_wires(scenario: Scenario, pinout: Pinout) -> frozenset[str]:
-    """Return the wires of a pin-out that a scenario's robot does not drive."""
-    return frozenset(wire.name for wire in pinout.wires if wire.role.value in scenario.outside)
-
-
-def make_own_harness(signals: Sequence[RobotWire]) -> Harness:
-    """Return the wires of a robot on own pins, with the resistors that hang on them."""
-    harness = Harness(Net(wire.name) for wire in signals if not wire.is_analog)
-    for wire in signals:
-        if wire.pull is not None:
-            harness[wire.name].drive(RESISTORS, wire.pull, Strength.PULL, 0)
-    return harness
-
-
-def make_harness(pinout: Pinout) -> Harness:
-    """Return the wires of a pin-out, with the resistors that hang on them."""
-    harness = Harness(Net(wire.name, idle=wire.idle) for wire in pinout.wires)
-    for wire in pinout.wires:
-        if wire.pull is not Pull.NONE:
-            harness[wire.name].drive(RESISTORS, wire.pull is Pull.UP, Strength.PULL, 0)
-    return harness

@@ -1,0 +1,167 @@
+"""Bags: recordings of ROS messages, written as rosbag2 and read as rosbag2, MCAP or ROS 1 (by rosbags, extra `ros`).
+
+A bag that is written is a folder of `metadata.yaml` and one file, sqlite3 or MCAP, whose types carry their definitions
+and hashes; the MCAP file is whole without the folder. The bytes of a message are those that a node sends (`codec`).
+A bag that is read brings its own definitions; one without is taken as of Jazzy.
+
+Source: rosbag2, docs/design; https://mcap.dev/spec/registry (profile ros2).
+
+Invariant: whatever a file holds, reading it yields messages or raises one `FileError`.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields, is_dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Literal, Self, cast
+
+from p2os.ros.codec import Message, to_cdr
+from p2os.ros.message_table import MESSAGES
+from p2os.ros.transport import Topic
+from simbase.errors import FileError, MissingDependencyError, UsageError, shown, shown_name
+from simbase.timing import Nanos
+
+if TYPE_CHECKING:
+    from rosbags.interfaces import Connection, Qos
+
+#: Storage of a bag → what rosbags calls it.
+STORAGES: Mapping[str, str] = {"sqlite3": "SQLITE3", "mcap": "MCAP"}
+#: What a rosbag2 has beside its files.
+METADATA = "metadata.yaml"
+#: Suffixes of bags that are one file.
+SUFFIXES = frozenset({".mcap", ".db3", ".bag"})
+#: chosen: the older of the two layouts that rosbags writes; Iron and all after it read it.
+VERSION: Literal[8] = 8
+#: A structure of C cannot be empty; a definition can.
+_FILLER = "structure_needs_at_least_one_member"
+_NO_LIBRARY = "bags need rosbags"
+
+
+class BagFile:
+    """A rosbag2 that is being written, a block's context; times are nanoseconds.
+
+    Args:
+        folder: Where; it must not be there.
+        storage: `sqlite3`, ROS 2's own until Humble, or `mcap`.
+
+    Raises:
+        MissingDependencyError: rosbags or cyclonedds is not installed.
+        UsageError: There is no such storage.
+        FileError: The folder is there, or cannot be made.
+    """
+
+    def __init__(self, folder: Path, storage: str) -> None:
+        if storage not in STORAGES:
+            raise UsageError(f"there is no storage {shown(storage)}", hint=" or ".join(STORAGES))
+        try:
+            from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
+        except ImportError as error:
+            raise MissingDependencyError(_NO_LIBRARY, extra="ros") from error
+        try:
+            self._writer = Writer(folder, version=VERSION, storage_plugin=StoragePlugin[STORAGES[storage]])
+            self._writer.open()
+        except WriterError as error:
+            raise FileError(f"{shown_name(folder)} is there already", hint="another name") from error
+        except OSError as error:
+            raise FileError(f"cannot write {shown_name(folder)}: {error.strerror or error}") from error
+        self._topics: dict[Topic, Connection] = {}
+        self.count = 0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._writer.close()
+
+    def write(self, topic: Topic, message: Message, at_ns: Nanos) -> None:
+        """Add a message."""
+        if topic not in self._topics:
+            self._topics[topic] = self._writer.add_connection(
+                topic.name, topic.type, msgdef=definition(topic.type), rihs01=MESSAGES[topic.type].hash,
+                offered_qos_profiles=[_qos(topic)],
+            )  # fmt: skip
+        self._writer.write(self._topics[topic], at_ns, to_cdr(topic.type, message))
+        self.count += 1
+
+
+def _qos(topic: Topic) -> "Qos":
+    """Return what the topic's publisher offers, so that a bag that is played is latched where the node is."""
+    from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
+
+    endless = QosTime(0x7FFFFFFF, 0xFFFFFFFF)
+    durability = QosDurability.TRANSIENT_LOCAL if topic.is_latched else QosDurability.VOLATILE
+    return Qos(
+        QosHistory.KEEP_LAST, topic.depth, QosReliability.RELIABLE, durability, endless, endless,
+        QosLiveliness.AUTOMATIC, endless, avoid_ros_namespace_conventions=False,
+    )  # fmt: skip
+
+
+def definition(name: str) -> str:
+    """Return the text of a type and of those that it holds, as a bag has it: a part each, the type itself first."""
+    parts, wanted = [], [name]
+    for one in wanted:  # grows meanwhile
+        lines = []
+        for field in MESSAGES[one].fields:
+            kind, count = field.kind, field.count
+            if kind in MESSAGES and kind not in wanted:
+                wanted.append(kind)
+            array = "" if count is None else f"[{count or ''}]"
+            lines += [] if field.name == _FILLER else [f"{kind.replace('/msg/', '/')}{array} {field.name}"]
+        parts.append("\n".join(lines))
+    heads = ["", *(f"{'=' * 80}\nMSG: {one.replace('/msg/', '/')}\n" for one in wanted[1:])]
+    return "\n".join(head + part for head, part in zip(heads, parts, strict=True)) + "\n"
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """A message of a bag: nested messages are mappings, arrays sequences, octets bytes or NumPy arrays."""
+
+    topic: str
+    type: str
+    at_ns: Nanos
+    message: Message
+
+
+def is_bag(path: Path) -> bool:
+    """Return whether a path looks like a bag: a folder with `metadata.yaml`, or a file with one of `SUFFIXES`."""
+    return (path / METADATA).is_file() if path.is_dir() else path.suffix.lower() in SUFFIXES
+
+
+def read_bag(path: Path, types: frozenset[str]) -> Iterator[Recorded]:
+    """Yield the messages of some types, in order of their recording.
+
+    Args:
+        path: The folder of a rosbag2, an `.mcap` or `.db3` of one, or the `.bag` of ROS 1.
+        types: Names such as `nav_msgs/msg/Odometry`.
+
+    Raises:
+        MissingDependencyError: rosbags is not installed.
+        FileError: It is none, or damaged.
+    """
+    try:
+        from rosbags.highlevel import AnyReader
+        from rosbags.typesys import Stores, get_typestore
+    except ImportError as error:
+        raise MissingDependencyError(_NO_LIBRARY, extra="ros") from error
+    try:
+        with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as bag:
+            chosen = [one for one in bag.connections if one.msgtype in types]
+            # Without any chosen, all would be yielded.
+            for connection, at_ns, data in bag.messages(chosen) if chosen else ():
+                message = cast("Message", _plain(bag.deserialize(data, connection.msgtype)))
+                yield Recorded(connection.topic, connection.msgtype, at_ns, message)
+    except (GeneratorExit, MemoryError):
+        raise
+    except Exception as error:  # whatever the library makes of hostile bytes
+        raise FileError(
+            f"{shown_name(path)} is no bag that can be read: {shown(str(error) or type(error).__name__)}",
+            hint="a rosbag2 folder, .mcap or .db3 of ROS 2 messages, or a .bag",
+        ) from error
+
+
+def _plain(value: object) -> object:
+    if is_dataclass(value):
+        return {field.name: _plain(getattr(value, field.name)) for field in fields(value)}
+    return [_plain(one) for one in value] if isinstance(value, list) else value

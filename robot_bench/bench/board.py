@@ -1,0 +1,144 @@
+"""Chip and wires of a scenario, what is heard on them and done to them; also where the robot is at a port.
+
+Invariant: what a scenario says of its chip and its wires becomes parts here alone.
+"""
+
+import random
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, cast
+
+from adapter_sim.pinout import Pinout, Pull, load_pinout
+from bluepill_sim.fabric.surroundings import Surroundings
+from bluepill_sim.parts.registry import PartSpec, attach
+from p2os.event_log import log_event, logger
+from robot_bench.direct.wired import AnalogPin, RobotWire
+from robot_bench.recording.recorder import Recorder
+from robot_bench.recording.transfers import hear_bus
+from robot_bench.scenario.hand_script import Deed
+from robot_bench.scenario.scenario import RANDOM_SRAM, Scenario
+from robot_bench.wires.nets import Harness, Net, Strength
+from robot_bench.wires.ports import Chip
+from simbase.errors import UsageError
+from simbase.timing import Nanos
+
+if TYPE_CHECKING:
+    from bluepill_sim.board import BluePill
+    from bluepill_sim.program.image import Image
+
+#: Owner of the resistors on the wires.
+RESISTORS = "board"
+#: Owner of the levels that are put on wires by hand.
+BY_HAND = "hand"
+_LOG = logger("bench")
+
+
+def plug_in(parts: Sequence[PartSpec], chip: Chip, recorder: Recorder, world: Surroundings | None = None) -> None:
+    """Attach parts to a board, have what they tell recorded, and have them sense a world, where there is one.
+
+    Raises:
+        TypeError: The chip is none that takes parts.
+        PartError: One cannot be attached.
+    """
+    board = cast("BluePill", chip)
+    if not hasattr(board, "attached"):
+        raise TypeError(f"a {type(chip).__name__} takes no parts: an emulated BluePill does")
+    if world is not None:
+        board.attached.surroundings = world
+    board.attached.note_sinks.append(
+        lambda at, part, what, detail: recorder.event("part", at, part, f"{what} {detail}".rstrip())
+    )
+    for spec in parts:
+        attach(board, spec)
+
+
+def hear_usarts(chip: Chip, recorder: Recorder) -> None:
+    """Have all that a chip sends on any of its ports recorded."""
+    chip.usart1.subscribe(recorder.usart)
+    for port in ("usart2", "usart3"):
+        if (other := getattr(chip, port, None)) is not None:
+            other.subscribe(lambda sent, port=port: recorder.usart(sent, port))
+
+
+def hear_buses(chip: Chip, recorder: Recorder, buses: Sequence[str]) -> None:
+    """Have recorded what goes over buses of a chip; a host is plugged into its USB where that is one of them.
+
+    Raises:
+        UsageError: The chip is none that has buses.
+    """
+    if buses and not hasattr(chip, "usb_serial"):
+        raise UsageError(f"a {type(chip).__name__} has no buses to record", hint="an emulated BluePill does")
+    for bus in buses:
+        if bus == "usb":
+            board = cast("BluePill", chip)
+            board.usb.plug()
+            board.usb_serial.subscribe(lambda sent: recorder.usart(sent, "usb"))
+        else:
+            recorder.transfers[bus] = hear_bus(chip, bus, recorder.events.publish)
+
+
+def log_bench_event(who: str, at: Nanos, what: str, detail: str) -> None:
+    """Log a line of a bench's state log."""
+    log_event(_LOG, who, at, what, detail)
+
+
+def boot(scenario: Scenario, image: "Image | None" = None) -> Chip:
+    """Return an emulated BluePill with a scenario's firmware, at its reset.
+
+    Args:
+        scenario: What it runs.
+        image: Its firmware, where that was read before.
+
+    Raises:
+        MissingDependencyError: The emulator's engine is not installed.
+    """
+    from bluepill_sim.board import BluePill
+    from bluepill_sim.stm32f103 import SRAM_BYTES
+
+    board = BluePill(image or scenario.firmware)
+    if scenario.sram == RANDOM_SRAM:
+        board.power_up_with(random.Random(scenario.seed).randbytes(SRAM_BYTES))
+    return board
+
+
+def pins_of(scenario: Scenario) -> dict[str, str]:
+    """Return the chip's pin of each wire of a scenario."""
+    if scenario.own_robot is None:
+        return {wire.name: wire.bluepill for wire in load_pinout().wires}
+    return {wire.name: wire.pin for wire in scenario.own_robot.robot.signals if not wire.is_analog}
+
+
+def cut_wires(scenario: Scenario, pinout: Pinout) -> frozenset[str]:
+    """Return the wires of a pin-out that a scenario's robot does not drive."""
+    return frozenset(wire.name for wire in pinout.wires if wire.role.value in scenario.outside)
+
+
+def make_own_harness(signals: Sequence[RobotWire]) -> Harness:
+    """Return the wires of a robot on own pins, with the resistors that hang on them."""
+    harness = Harness(Net(wire.name) for wire in signals if not wire.is_analog)
+    for wire in signals:
+        if wire.pull is not None:
+            harness[wire.name].drive(RESISTORS, wire.pull, Strength.PULL, 0)
+    return harness
+
+
+def make_harness(pinout: Pinout) -> Harness:
+    """Return the wires of a pin-out, with the resistors that hang on them."""
+    harness = Harness(Net(wire.name, idle=wire.idle) for wire in pinout.wires)
+    for wire in pinout.wires:
+        if wire.pull is not Pull.NONE:
+            harness[wire.name].drive(RESISTORS, wire.pull is Pull.UP, Strength.PULL, 0)
+    return harness
+
+
+def do_by_hand(deed: Deed, chip: Chip, harness: Harness) -> None:
+    """Have a hand do something at the board, now."""
+    if deed.do == "type":
+        getattr(chip, deed.place).receive(deed.text)
+    elif deed.do == "set_volts":
+        cast("AnalogPin", chip.pin(deed.place)).set_volts(deed.volts)
+    elif deed.place not in [net.name for net in harness]:
+        chip.pin(deed.place).drive(deed.level)
+    elif deed.level is None:
+        harness[deed.place].release(BY_HAND, deed.at)
+    else:
+        harness[deed.place].drive(BY_HAND, deed.level, Strength.PUSH_PULL, deed.at)
