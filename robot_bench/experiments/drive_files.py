@@ -1,4 +1,4 @@
-"""Drives out of files: run folders, traces, recordings, pcap, bags, CSV, TUM; and trajectories into TUM files.
+"""Drives out of files: runs, recordings, pcap, bags, CSV, TUM, ARIA's logs; and trajectories into TUM files.
 
 A CSV file has a line of names: `t_s`, `x_m`, `y_m`, `heading_rad` or `heading_deg`, and where it has them `left_mps`,
 `right_mps`, `sonar_m_0` and so on: what `p2os export` writes is such a file. A TUM file has lines of
@@ -24,6 +24,7 @@ from p2os.protocol.sip import StandardSip
 from p2os.robots.parameters import ParametersError, RobotParameters, load_parameters
 from p2os.ros.bags import is_bag
 from robot_bench.events.kinds import Pose
+from robot_bench.experiments.aria_logs import is_aria_log, read_aria_log
 from robot_bench.experiments.bag_drives import drive_of_bag
 from robot_bench.experiments.drives import Drive, Floats, Steps, Trajectory, steps_of
 from robot_bench.recording.run_record import TRACE_NAME, RunRecord, read_events, read_run
@@ -121,7 +122,7 @@ def read_drive(path: Path, *, robot: str = "", how: HowToRead | None = None) -> 
     """Read a drive of whatever kind a file or folder is.
 
     Args:
-        path: A run folder, a trace, a recording, a pcap, a bag, `.csv` or `.tum`.
+        path: A run folder, a trace, a recording, a pcap, a bag, `.csv`, `.tum`, or a log of ARIA's.
         robot: Model or file for units; empty: by the run, else p2dx.
         how: How to read a capture; None: as one of a P2OS robot.
 
@@ -135,6 +136,9 @@ def read_drive(path: Path, *, robot: str = "", how: HowToRead | None = None) -> 
     if path.is_dir() or path.name == TRACE_NAME:
         return _of_run(path if path.is_dir() else path.parent, robot)
     try:
+        if _is_aria_log(path):
+            with path.open(encoding="utf-8", errors="replace") as lines:
+                return read_aria_log(path.name, lines, _parameters(robot))
         if path.suffix.lower() == ".csv":
             return _of_csv(path, robot)
         if path.suffix.lower() == ".tum":
@@ -144,6 +148,11 @@ def read_drive(path: Path, *, robot: str = "", how: HowToRead | None = None) -> 
     chunks = open_file(path).chunks
     reading, chunks = how(chunks) if how else (Reading(profile=Profile.P2OS, parameters=_parameters(robot)), chunks)
     return drive_of_capture(path.name, chunks, reading.parameters, reading.profile)
+
+
+def _is_aria_log(path: Path) -> bool:
+    with path.open("rb") as file:
+        return is_aria_log(file.readline(_LONGEST_FIELD).decode("utf-8", "replace"))
 
 
 def drive_of_capture(

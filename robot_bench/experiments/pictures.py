@@ -112,10 +112,15 @@ def latency_figure(title: str, rows: Sequence[tuple[str, Sequence[float]]]) -> F
 
 
 def effects_figure(title: str, effects: Mapping[str, Sequence[Effect]]) -> Figure:
-    """Draw, for each outcome, every parameter's mu* with its interval, and what it does alone as a dot."""
+    """Draw, for each outcome, each parameter's mu* with its interval, what it does alone, and Sobol's indices."""
     counts = [len(rows) for rows in effects.values()]
-    figure = Figure(figsize=(8.0, 1.0 + sum(0.9 + 0.36 * count for count in counts)), layout="constrained")
-    grid = figure.subplots(len(counts), 1, squeeze=False, gridspec_kw={"height_ratios": [1.0 + n for n in counts]})
+    has_indices = any(one.ST is not None for rows in effects.values() for one in rows)
+    figure = Figure(
+        figsize=(12.0 if has_indices else 8.0, 1.0 + sum(0.9 + 0.36 * count for count in counts)), layout="constrained"
+    )
+    grid = figure.subplots(
+        len(counts), 1 + has_indices, squeeze=False, gridspec_kw={"height_ratios": [1.0 + n for n in counts]}
+    )
     for axes, (name, rows) in zip(grid[:, 0], effects.items(), strict=True):
         places = [*range(len(rows))]
         axes.barh(
@@ -130,5 +135,26 @@ def effects_figure(title: str, effects: Mapping[str, Sequence[Effect]]) -> Figur
         axes.grid(visible=True, axis="x", color="#e3e3e3")
         axes.set_axisbelow(True)
     grid[0, 0].legend(frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, fontsize=9)
+    if has_indices:
+        for axes, rows in zip(grid[:, 1], effects.values(), strict=True):
+            _draw_indices(axes, rows)
+        grid[0, 1].legend(frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, fontsize=9)
     figure.suptitle(title, fontsize=11)
     return figure
+
+
+def _draw_indices(axes: Axes, rows: Sequence[Effect]) -> None:
+    """Draw each parameter's shares of the variance: by itself, and below it together with the others."""
+    places = [*range(len(rows))]
+    for aside, colour, name, label in ((-0.2, OTHER, "S1", "S1, alone"), (0.2, "#dccfc4", "ST", "ST, with the others")):
+        axes.barh(
+            [place + aside for place in places], [max(getattr(one, name) or 0.0, 0.0) for one in rows], height=0.36,
+            xerr=[getattr(one, f"{name}_conf") or 0.0 for one in rows], color=colour, ecolor=MARK, capsize=3,
+            label=label,
+        )  # fmt: skip
+    axes.set_yticks(places, [one.key for one in rows])
+    axes.invert_yaxis()
+    axes.set_xlim(0.0, max(1.0, *(one.ST or 0.0 for one in rows)) * 1.02)
+    axes.set_title("share of the variance", loc="left", fontsize=10)
+    axes.grid(visible=True, axis="x", color="#e3e3e3")
+    axes.set_axisbelow(True)

@@ -1,10 +1,12 @@
-"""On which parameters a scenario's outcome depends: one at a time, and by Morris' elementary effects.
+"""On which parameters a scenario's outcome depends: one at a time, by Morris' effects, and by Sobol's indices.
 
 A parameter is a key of the scenario with the range that it may have. One at a time, each takes values over its range
 while the others stay in the middle of theirs: what is seen is exact there, and blind to what several do together.
 Morris' method (Technometrics 33, 1991) goes through the whole box in random trajectories that change one parameter a
 step: mu* is the mean size of the effect of a parameter over its whole range, sigma its spread: large where the effect
-is not linear, or depends on the others. The sample and the analysis are SALib's.
+is not linear, or depends on the others. Sobol's indices (Mathematics and Computers in Simulation 55, 2001) share out
+the outcome's variance over the whole box: S1 is a parameter's part by itself, ST its part together with the others.
+Samples and analyses are SALib's.
 
 An outcome is a goal's margin (its robustness: what was left, negative where it was missed) or a figure of the run.
 
@@ -39,6 +41,8 @@ FIGURES = (
     "contacts", "energy_j", "energy_j_per_m", "time_to_goal_s",
 )  # fmt: skip
 _RANGE = re.compile(r"(?P<key>[^=]+)=(?P<low>[^=]+?)\.\.(?P<high>[^=]+)")
+#: What SALib calls what it finds, and so are the fields of `Effect`.
+MORRIS, SOBOL = ("mu", "mu_star", "mu_star_conf", "sigma"), ("S1", "S1_conf", "ST", "ST_conf")
 #: One point of the box: a value for each parameter.
 Point = tuple[float, ...]
 
@@ -77,19 +81,28 @@ def read_range(text: str) -> Range:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Design:
-    """Which points are run: those of one at a time, and Morris' trajectories.
+    """Which points are run: those of one at a time, Morris' trajectories, Saltelli's sample for Sobol's indices.
 
     Args:
         ranges: Of each parameter.
         steps: Values of each, one at a time; 0: none.
         trajectories: Of Morris' method; 0: none.
-        seed: Of the trajectories.
+        seed: Of the trajectories and the sample.
+        samples: Base samples of Sobol's method, a power of two; parameters + 2 runs for each. 0: none.
+
+    Raises:
+        UsageError: `samples` is no power of two.
     """
 
     ranges: tuple[Range, ...]
     steps: int
     trajectories: int
     seed: int
+    samples: int = 0
+
+    def __post_init__(self) -> None:
+        if self.samples < 0 or self.samples & (self.samples - 1):
+            raise UsageError(f"{self.samples} samples are no power of two", hint="--samples 64; 0 for none")
 
     @property
     def single(self) -> list[list[Point]]:
@@ -119,13 +132,23 @@ class Design:
         shares = morris.sample(self._problem(), self.trajectories, num_levels=LEVELS, seed=self.seed)
         return np.asarray(shares, dtype=np.float64)
 
+    def sobol_shares(self) -> Floats:
+        """Return Saltelli's points as shares of the ranges, shape (n, parameters)."""
+        if not self.samples:
+            return np.zeros((0, len(self.ranges)))
+        from SALib.sample import sobol
+
+        shares = sobol.sample(self._problem(), self.samples, calc_second_order=False, seed=self.seed)
+        return np.asarray(shares, dtype=np.float64)
+
     def point(self, shares: Floats) -> Point:
         """Return the point at shares of the ranges."""
         return tuple(one.at(float(share)) for one, share in zip(self.ranges, shares, strict=True))
 
     def points(self) -> list[Point]:
         """Return every point that has to be run, each once."""
-        every = [point for row in self.single for point in row] + [self.point(row) for row in self.morris_shares()]
+        shares = [*self.morris_shares(), *self.sobol_shares()]
+        every = [point for row in self.single for point in row] + [self.point(row) for row in shares]
         return list(dict.fromkeys(every))
 
     def settings(self, point: Point) -> list[Setting]:
@@ -140,20 +163,31 @@ class Design:
         """
         alone = [[of(point) for point in row] for row in self.single]
         shares = self.morris_shares()
-        found: Mapping[str, Sequence[float]] = {}
+        found: dict[str, Sequence[float]] = {}
         if len(shares):
             from SALib.analyze import morris
 
             outcomes = np.array([of(self.point(row)) for row in shares])
-            found = morris.analyze(self._problem(), shares, outcomes, num_levels=LEVELS, seed=self.seed)
+            found |= morris.analyze(self._problem(), shares, outcomes, num_levels=LEVELS, seed=self.seed)
+        if self.samples:
+            found |= self._indices(np.array([of(self.point(row)) for row in self.sobol_shares()]))
         return [
             Effect(
-                key=one.key, alone=tuple(alone[number]) if alone else (),
-                **{name: float(found[name][number]) if found else None
-                   for name in ("mu", "mu_star", "mu_star_conf", "sigma")},
+                key=one.key,
+                alone=tuple(alone[number]) if alone else (),
+                **{name: float(found[name][number]) if name in found else None for name in (*MORRIS, *SOBOL)},
             )
             for number, one in enumerate(self.ranges)
-        ]  # fmt: skip
+        ]
+
+    def _indices(self, outcomes: Floats) -> dict[str, Sequence[float]]:
+        """Return Sobol's indices; all 0 where the outcome is always the same."""
+        from SALib.analyze import sobol
+
+        if float(np.ptp(outcomes)) == 0.0:
+            return dict.fromkeys(SOBOL, [0.0] * len(self.ranges))
+        found = sobol.analyze(self._problem(), outcomes, calc_second_order=False, seed=self.seed)
+        return {name: found[name] for name in SOBOL}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -168,6 +202,11 @@ class Effect:
     #: Half of the 95 % interval of mu*, by resampling the trajectories.
     mu_star_conf: float | None
     sigma: float | None
+    #: Shares of the outcome's variance, alone and with the others, and halves of their 95 % intervals.
+    S1: float | None = None
+    S1_conf: float | None = None
+    ST: float | None = None
+    ST_conf: float | None = None
 
     @property
     def spread(self) -> float | None:
@@ -176,14 +215,14 @@ class Effect:
 
     @property
     def size(self) -> float:
-        """What parameters are ordered by: mu*, else the spread."""
-        return self.mu_star if self.mu_star is not None else self.spread or 0.0
+        """What parameters are ordered by: mu*, else ST, else the spread."""
+        return next((value for value in (self.mu_star, self.ST, self.spread) if value is not None), 0.0)
 
     def as_plain(self) -> Json:
         """Return it for JSON."""
         return {
-            "parameter": self.key, "alone": list(self.alone), "spread": self.spread, "mu": self.mu,
-            "mu_star": self.mu_star, "mu_star_conf": self.mu_star_conf, "sigma": self.sigma,
+            "parameter": self.key, "alone": list(self.alone), "spread": self.spread,
+            **{name: getattr(self, name) for name in (*MORRIS, *SOBOL)},
         }  # fmt: skip
 
 

@@ -28,13 +28,15 @@ if TYPE_CHECKING:  # NumPy is loaded when the verb runs
 HELP = """Tell on which parameters a scenario's outcome depends.
 
 Each KEY, one that `p2os run --set` takes, is varied from LOW to HIGH: one at a
-time with the others in the middle, and in Morris' trajectories through all of
-them. The outcome is every goal's margin, or what --outcome names.
+time with the others in the middle, in Morris' trajectories through all of them,
+and with --samples for Sobol's indices. The outcome is every goal's margin, or
+what --outcome names.
 
 \b
 Examples:
   p2os sensitivity dodge --vary threshold_m=0.4..1.0 --outcome clearance_m
   p2os sensitivity patrol.toml --vary start.x_m=0.5..1.5 --picture s.png
+  p2os sensitivity patrol.toml --vary threshold_m=0.4..1 --steps 0 --samples 64
 """
 OUTCOMES = "path_m, mean_mps, clearance_m, energy_j, …, or such as 'goal 2 clearance'"
 
@@ -56,7 +58,10 @@ def sensitivity(
     trajectories: Annotated[
         int, option(COUNT, "--trajectories", purpose="Of Morris' method; 0: none.", shown="10")
     ] = 10,
-    seed: Annotated[int, option(SEED, "--seed", purpose="Of the trajectories.", least="0", shown="0")] = 0,
+    samples: Annotated[
+        int, option(COUNT, "--samples", purpose="Of Sobol's method, a power of two.", shown="0")
+    ] = 0,
+    seed: Annotated[int, option(SEED, "--seed", purpose="Of trajectories and samples.", least="0", shown="0")] = 0,
     seeds: Annotated[
         str, typer.Option("--seeds", help="Of each point's runs, whose mean counts: 0-4.", metavar="SEEDS")
     ] = "",
@@ -86,9 +91,9 @@ def sensitivity(
     ranges = tuple(read_range(text) for text in vary)
     if len({one.key for one in ranges}) < len(ranges):
         raise UsageError("a key is varied twice")
-    if steps < 2 and trajectories < 1:
-        raise UsageError("nothing is to be run", hint="--steps 5, or --trajectories 10")
-    design = Design(ranges=ranges, steps=steps, trajectories=trajectories, seed=seed)
+    if steps < 2 and trajectories < 1 and samples < 1:
+        raise UsageError("nothing is to be run", hint="--steps 5, --trajectories 10 or --samples 64")
+    design = Design(ranges=ranges, steps=steps, trajectories=trajectories, seed=seed, samples=samples)
     fixed = [read_setting(text) for text in setting or []]
 
     def made(settings: Sequence[Setting], own_seed: int | None) -> Scenario:
@@ -170,12 +175,21 @@ def _lines(scenario: str, design: "Design", effects: "dict[str, list[Effect]]", 
         yield ""
         yield f"{name:34}{'alone':>10}{'mu*':>10}{'+-':>9}{'sigma':>10}"
         for one in rows:
-            figures = (one.spread, one.mu_star, one.mu_star_conf, one.sigma)
-            cells = [f"{'' if value is None else f'{value:.4g}':>{width}}" for value, width in
-                     zip(figures, (10, 10, 9, 10), strict=True)]  # fmt: skip
-            yield f"  {one.key[:31]:32}{''.join(cells)}".rstrip()
+            yield _row(one.key, one.spread, one.mu_star, one.mu_star_conf, one.sigma)
+        if design.samples:
+            yield f"{'  of its variance':34}{'S1':>10}{'+-':>10}{'ST':>9}{'+-':>10}"
+            for one in rows:
+                yield _row(one.key, one.S1, one.S1_conf, one.ST, one.ST_conf)
     yield ""
     for varied in design.ranges:
         yield f"{varied.key} from {as_toml(varied.low)} to {as_toml(varied.high)}"
     yield "alone: greatest difference, the others in the middle; mu*: mean size over all"
     yield "trajectories with half of its 95 % interval; sigma: where it depends on others"
+    if design.samples:
+        yield "S1: share of the variance by itself; ST: with all that it does with others"
+
+
+def _row(key: str, *figures: float | None) -> str:
+    cells = [f"{'' if value is None else f'{value:.3g}':>{width}}" for value, width in
+             zip(figures, (10, 10, 9, 10), strict=True)]  # fmt: skip
+    return f"  {key[:31]:32}{''.join(cells)}".rstrip()

@@ -121,8 +121,8 @@ EXPERIMENTS: Mapping[str, Experiment] = {one.name: one for one in (
     ),
     Experiment(
         name="sensors-all", scenario="sensors-all.toml",
-        hypothesis="All eight distance pins rise and fall for things that come and go at once.",
-        procedure="Posts stand before all eight sonar for three seconds, twice.",
+        hypothesis="All eight distance pins rise and fall at once for what is nearer than the threshold alone.",
+        procedure="Posts stand before all eight sonar for three seconds, 1 cm within the threshold, then 1 cm beyond.",
         measure=lambda trial: sensor_figures(trial.record, trial.nominal, trial.scenario),
     ),
     Experiment(

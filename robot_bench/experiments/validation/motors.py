@@ -1,13 +1,22 @@
 """What the motors experiments measure: pins, commands on the line, rim speeds, ramps and delays."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 from p2os.protocol.commands import CommandNumber
 from robot_bench.events.kinds import Pose
 from robot_bench.experiments.validation.figures import Bound, Figure, Finding, Missing, worst_or_missing
-from robot_bench.experiments.validation.nominal import BODY_MM_S, JITTER_S, POSE_S, Nominal
-from robot_bench.experiments.validation.signals import Course, at, motor_pairs, poses_between, rim_mm_s, sent
+from robot_bench.experiments.validation.nominal import BODY_MM_S, JITTER_S, LINE, PAIR_BYTES, POSE_S, Nominal
+from robot_bench.experiments.validation.signals import (
+    Course,
+    at,
+    motor_pairs,
+    poses_between,
+    rim_mm_s,
+    sent,
+    wheel_steps,
+)
 from robot_bench.recording.run_record import RunRecord
 from simbase.timing import NS_PER_S, Nanos
 
@@ -98,16 +107,30 @@ def _commands(record: RunRecord, nominal: Nominal, spans: Sequence[tuple[Pair, P
                     uncertainty=0, unit=unit, bound=bound, at=str(pair),
                 ))  # fmt: skip
         result.append(worst_or_missing(figures, "wire", f"{name} for a pair of codes", f"no {name} came to the robot"))
-    late = [
-        Figure(
-            group="wire", what="change of the pins to the robot's last command", expected=0.0,
-            measured=(changed - begin) / NS_PER_S, uncertainty=1e-9, unit="s", bound=delay.bound("delay to the robot"),
-            at=f"{before} -> {pair}",
-        )
-        for before, pair, begin, end in spans
-        if (changed := _last_change(courses, begin, end)) is not None
-    ]  # fmt: skip
-    return [*result, worst_or_missing(late, "wire", "change of the pins to the robot's last command", "none came")]
+    late: dict[str, list[Figure]] = {"change of the pins to the robot's last command": []}
+    if not nominal.at_port:  # in real time a slice comes between
+        late["the same, where the line is free"] = []
+    for before, pair, begin, end in spans:
+        changed = _last_change(courses, begin, end)
+        if changed is None:
+            continue
+        bounds = [delay.bound("delay to the robot")]
+        if _is_line_free(courses, nominal, begin, changed):
+            is_second = any(t == changed for t, _ in courses["RVEL"])
+            needed = nominal.to_free_line(PAIR_BYTES if is_second else PAIR_BYTES // 2)
+            bounds.append(needed.bound("delay to the robot, line free"))
+        for (what, figures), bound in zip(late.items(), bounds, strict=False):
+            figures.append(Figure(
+                group="wire", what=what, expected=0.0, measured=(changed - begin) / NS_PER_S, uncertainty=1e-9,
+                unit="s", bound=bound, at=f"{before} -> {pair}",
+            ))  # fmt: skip
+    return [*result, *(worst_or_missing(figures, "wire", what, "none came") for what, figures in late.items())]
+
+
+def _is_line_free(courses: dict[str, Course[int]], nominal: Nominal, begin: Nanos, changed: Nanos) -> bool:
+    """Tell whether the pair that a change makes had to wait for none: of those that came since there are no others."""
+    gap_ns = round(nominal.spacing.seconds * NS_PER_S) - LINE.time_of(PAIR_BYTES)
+    return all(sum(begin - gap_ns < t <= changed for t, _ in course) <= 1 for course in courses.values())
 
 
 def _last_change(courses: dict[str, Course[int]], begin: Nanos, end: Nanos) -> Nanos | None:
@@ -122,6 +145,7 @@ def _last_change(courses: dict[str, Course[int]], begin: Nanos, end: Nanos) -> N
 def _motion(record: RunRecord, nominal: Nominal, spans: Sequence[tuple[Pair, Pair, Nanos, Nanos]]) -> list[Finding]:
     """Return steady speeds, slopes of the ramps and their delay."""
     steady: list[Figure] = []
+    turned: list[Figure] = []
     slopes: dict[str, list[Figure]] = {"both wheels alike": [], "turning on the spot": []}
     delays: list[Figure] = []
     for before, pair, begin, end in spans:
@@ -129,6 +153,8 @@ def _motion(record: RunRecord, nominal: Nominal, spans: Sequence[tuple[Pair, Pai
         poses = poses_between(record, begin + round(wait * NS_PER_S), end)
         if poses:
             steady += [_steady(nominal, side, code, poses, pair) for side, code in zip(_SIDES, pair, strict=True)]
+        if len(poses) > 1 and not nominal.at_port:  # packets tell of no angles
+            turned += [_turned(nominal, figure, side, poses) for figure, side in zip(steady[-2:], _SIDES, strict=True)]
         kind = _kind_of_change(before, pair)
         if kind is None or not nominal.ramp_mm_s2:
             continue
@@ -145,6 +171,9 @@ def _motion(record: RunRecord, nominal: Nominal, spans: Sequence[tuple[Pair, Pai
             bound=nominal.to_motion.bound("delay to the wheels" + nominal.suffix), at=what,
         ))  # fmt: skip
     result = [worst_or_missing(steady, "motion", "steady rim speed", "no wheel came to a steady speed")]
+    if not nominal.at_port:
+        what = "the same by the wheels' angles"
+        result.append(worst_or_missing(turned, "motion", what, "no wheel came to a steady speed"))
     if nominal.ramp_mm_s2:
         result += [
             worst_or_missing(found, "motion", f"ramp, {kind}", "no such change was seen")
@@ -164,6 +193,14 @@ def _steady(nominal: Nominal, side: str, code: int, poses: Sequence[Pose], pair:
         uncertainty=BODY_MM_S, unit="mm/s", bound=nominal.speed_bound,
         at=f"{'left' if side == 'motor1' else 'right'} of {pair}",
     )  # fmt: skip
+
+
+def _turned(nominal: Nominal, figure: Figure, side: str, poses: Sequence[Pose]) -> Figure:
+    """Return a steady speed as the wheel's angle tells it."""
+    encoder = "encoder1" if side == "motor1" else "encoder2"
+    steps = wheel_steps(poses[-1], encoder) - wheel_steps(poses[0], encoder)
+    speed = steps * nominal.encoder_step_mm / ((poses[-1].t - poses[0].t) / NS_PER_S)
+    return replace(figure, what="the same by the wheels' angles", measured=speed)
 
 
 def _ramp_s(nominal: Nominal, before: Pair, pair: Pair) -> float:

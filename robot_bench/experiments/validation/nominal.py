@@ -14,7 +14,7 @@ from robot_bench.experiments.validation.figures import Bound
 from robot_bench.experiments.validation.signals import ENCODER_STEPS
 from robot_bench.recording.recorder import SAMPLE_NS
 from robot_bench.scenario.scenario import Scenario
-from simbase.timing import NS_PER_MS, NS_PER_S
+from simbase.timing import NS_PER_S
 
 #: The line at the speed that robots begin with.
 LINE = LineTime(DEFAULT_BAUD)
@@ -108,19 +108,25 @@ class Nominal:
             f" + resolution {told} {seen:g} mm/s = {0.5 + rim + seen:.3g} mm/s",
         )  # fmt: skip
 
+    def to_free_line(self, characters: int = PAIR_BYTES) -> Delay:
+        """As `to_command`, where no pair went out just before; of a pair the first of two frames is VEL."""
+        votes, line = self._adapter.sample_count // 2 + 1, LINE.time_of(characters) / NS_PER_S
+        period = self._adapter.sample_period_ns / NS_PER_S
+        return Delay(
+            votes * period + line,
+            f"{votes} samples of {period * 1000:g} ms + {characters} characters {line * 1000:.4g} ms",
+        )
+
+    @property
+    def spacing(self) -> Delay:
+        """From the beginning of a pair of commands to that of the next, at least."""
+        seconds = self._adapter.pair_spacing_ns / NS_PER_S
+        return Delay(seconds, f"spacing of pairs {seconds * 1000:g} ms")
+
     @property
     def to_command(self) -> Delay:
         """From a change of the motor pins to the last byte of the pair of commands at the robot, at most."""
-        adapter = self._adapter
-        votes = adapter.sample_count // 2 + 1
-        sampled = votes * adapter.sample_period_ns / NS_PER_S
-        line = LINE.time_of(PAIR_BYTES) / NS_PER_S
-        spacing = adapter.pair_spacing_ns / NS_PER_S
-        return Delay(
-            sampled + spacing + line,
-            f"{votes} samples of {adapter.sample_period_ns / NS_PER_MS:g} ms + spacing of pairs {spacing * 1000:g} ms"
-            f" + {PAIR_BYTES} characters {line * 1000:.4g} ms",
-        )
+        return self.to_free_line() + self.spacing
 
     @property
     def to_motion(self) -> Delay:

@@ -60,11 +60,14 @@ def sensor_figures(record: RunRecord, nominal: Nominal, scenario: Scenario) -> l
 
 
 def things_before(scenario: Scenario) -> Mapping[int, list[tuple[Nanos, Nanos]]]:
-    """Return when something stands before each sonar, by the scenario's file: number → (from, to)."""
+    """Return when something stands nearer to each sonar than the threshold, by the file: number → (from, to)."""
     windows: dict[int, list[tuple[Nanos, Nanos]]] = {}
     gone = {change.name: change.at for change in scenario.changes if change.op is Op.REMOVE}
     for change in scenario.changes:
         if change.op is Op.PLACE and change.before is not None:
+            surface_m = change.before.distance_m - (change.obstacle.radius_m if change.obstacle else 0.0)
+            if round(surface_m * 1e6) >= scenario.threshold_um:
+                continue
             windows.setdefault(change.before.number, []).append(
                 (change.at, gone.get(change.name, scenario.duration_ns))
             )

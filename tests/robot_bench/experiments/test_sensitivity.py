@@ -76,6 +76,28 @@ def test_the_ishigami_functions_third_parameter_acts_only_with_the_first() -> No
     assert found["c"].sigma > abs(found["c"].mu)
 
 
+def test_the_ishigami_functions_indices_are_those_of_its_formula() -> None:
+    box = Design(
+        ranges=tuple(Range(name, -math.pi, math.pi, False) for name in "abc"), steps=0, trajectories=0, seed=3,
+        samples=1024,
+    )  # fmt: skip
+    found = box.effects(lambda p: math.sin(p[0]) + 7 * math.sin(p[1]) ** 2 + 0.1 * p[2] ** 4 * math.sin(p[0]))
+    # V = a²/8 + b π⁴/5 + b² π⁸/18 + 1/2 with a = 7, b = 0.1; S1 and ST by its terms.
+    first, second, both = (0.5 * (1 + 0.1 * math.pi**4 / 5) ** 2, 49 / 8, 0.01 * math.pi**8 * (1 / 18 - 1 / 50))
+    whole = first + second + both
+    wanted = [(first, first + both), (second, second), (0.0, both)]
+    for one, (alone, together) in zip(found, wanted, strict=True):
+        assert pytest.approx(alone / whole, abs=0.04) == one.S1
+        assert pytest.approx(together / whole, abs=0.04) == one.ST
+        assert one.mu_star is None
+    assert len(box.points()) == 1024 * 5
+
+
+def test_an_outcome_that_never_changes_has_no_variance_to_share() -> None:
+    box = Design(ranges=(Range("a", 0, 1, False), Range("b", 0, 1, False)), steps=0, trajectories=0, seed=0, samples=4)
+    assert [(one.S1, one.ST) for one in box.effects(lambda _point: 2.0)] == [(0.0, 0.0), (0.0, 0.0)]
+
+
 def test_without_a_name_the_outcomes_are_the_margins_that_all_runs_have() -> None:
     runs = [{"path_m": 1.0, "goal 1 reach": 0.1, "goal 2 clearance": 0.2}, {"path_m": 2.0, "goal 2 clearance": 0.1}]
     assert outcome_names(runs, []) == ["goal 2 clearance"]
@@ -112,7 +134,7 @@ def test_the_step_of_the_motors_decides_how_far_they_drive_whatever_the_number_o
     assert (first["parameter"], second["parameter"]) == ("direct.step_mm_s", "threshold_m")
     assert first["spread"] > 0.05
     assert second["spread"] == 0
-    few = ["--steps", "0", "--trajectories", "2"]
+    few = ["--steps", "0", "--trajectories", "2", "--samples", "2"]
     assert p2os(*words[:-2], *few, "--picture", "s.png", "--outcome", "path_m") == 0
     assert all(len(line) <= 80 for line in capsys.readouterr().out.splitlines())
     assert Path("s.png").read_bytes()[:4] == b"\x89PNG"
@@ -131,6 +153,7 @@ def test_the_step_of_the_motors_decides_how_far_they_drive_whatever_the_number_o
             ["mine.toml", "--vary", "threshold_m=0.4..0.8", "--steps", "1", "--trajectories", "0"],
             "nothing is to be run",
         ),
+        (["mine.toml", "--vary", "threshold_m=0.4..0.8", "--samples", "12"], "no power of two"),
         (["two-dodge", "--vary", "robot.east.threshold_m=0.4..0.8", "--steps", "2", "--trajectories", "0"], "several"),
     ],
 )

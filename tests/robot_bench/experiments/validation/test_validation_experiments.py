@@ -8,7 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from adapter_sim.codec import is_near
+from adapter_sim.distances import Distances
 from adapter_sim.encoders import CodeWalk
+from adapter_sim.pins import SampleClock
 from p2os.cli.main import run as p2os
 from robot_bench.events.codec import Json
 from robot_bench.experiments.validation.experiments import CODES, EXPERIMENTS
@@ -101,6 +104,32 @@ def test_a_planted_error_is_told_by_the_right_figure(
     assert (Path(result.folder) / "trace.jsonl").is_file()
 
 
+def far_third(pins: Distances) -> tuple[bool, ...]:
+    ranges = enumerate(pins.ranges_um)
+    return tuple(um is None or is_near(um, pins.threshold_um + 50_000 * (n == 2)) for n, um in ranges)
+
+
+def slow_clock(period_ns: int, *, may_suspend: bool) -> SampleClock:
+    return SampleClock(period_ns * 3 // 2, may_suspend=may_suspend)
+
+
+#: Experiment, what is replaced by what, and the figure that has to tell.
+PLANTED_PARTS = [
+    ("sensors-all", "adapter_sim.distances.Distances.levels", property(far_third),
+     "things seen by their own sensor, and by no other"),
+    ("motors", "adapter_sim.adapter.SampleClock", slow_clock, "the same, where the line is free"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "part", "wrong", "what"), PLANTED_PARTS, ids=["threshold", "sampler"])
+def test_a_part_of_the_adapter_that_is_a_little_off_is_told(
+    name: str, part: str, wrong: object, what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(part, wrong)
+    (result,) = results_of([name], [ADAPTER], tmp_path)
+    assert what in {failure.what for failure in result.failures}
+
+
 @pytest.mark.slow
 def test_more_than_half_a_turn_between_two_samples_is_followed_and_jumps_of_the_codes_are_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -140,7 +169,7 @@ def test_the_command_passes_and_writes_page_and_figures(
     assert "motors      3 of 3" in out
     assert out.splitlines()[-1] == "passed in 3 variants; report: v/validation.html"
     page = Path("v/validation.html").read_text(encoding="utf-8")
-    assert page.count("0.5 mm/s (VEL is whole mm/s)") == 2
+    assert page.count("0.5 mm/s (VEL is whole mm/s)") == 4  # rim speeds and angles, of the model and the firmware
     assert "adapter (firmware), kinematic" in page
     figures = json.loads(Path("v/validation.json").read_text(encoding="utf-8"))
     assert figures["passed"]
@@ -156,7 +185,8 @@ def test_a_planted_error_fails_the_command_and_leaves_its_run(
     assert p2os([*words, "--json", "--out", "v"]) == 1
     found = json.loads(capsys.readouterr().out)
     assert found["results"][0]["failures"] == [
-        "motors: steady rim speed: -240 mm/s, expected -250 within 0.001 (left of (-4, -4))"
+        f"motors: {what}: -240 mm/s, expected -250 within 0.001 (left of (-4, -4))"
+        for what in ("steady rim speed", "the same by the wheels' angles")
     ]
     assert Path("v/motors-direct-kinematic/report.html").is_file()
     assert "direct.step_mm_s=60, which is not expected" in Path("v/validation.html").read_text(encoding="utf-8")
