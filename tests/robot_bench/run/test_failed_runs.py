@@ -11,7 +11,8 @@ import pytest
 
 from bluepill_sim.errors import UnmodelledError
 from p2os.cli.main import run as p2os
-from robot_bench import bench, run
+from robot_bench import run
+from robot_bench.bench import bench
 from robot_bench.events.kinds import Pose
 from robot_bench.recording.run_record import read_run
 from robot_bench.recording.summary import outcome_of, verdict
