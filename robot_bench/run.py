@@ -44,6 +44,7 @@ from robot_bench.scenario.scenario import Scenario
 from robot_bench.wires.ports import Chip
 from simbase.errors import P2osError, UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
+from simbase.user_classes import unforeseen
 
 if TYPE_CHECKING:
     from robot_bench.recording.measurement import Measurement
@@ -294,7 +295,7 @@ def _reason(error: BaseException) -> str:
         return f"{INTERRUPTED} ({error})" if error.args else INTERRUPTED
     if isinstance(error, (P2osError, ModuleNotFoundError)):
         return str(error)
-    return f"this is a bug: {type(error).__name__}: {error}"
+    return unforeseen(error)
 
 
 def doing(bench: Bench | RemoteBench) -> str:

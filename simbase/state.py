@@ -207,7 +207,7 @@ def _fresh(saved: Any, path: str) -> object:
 def _rebuild_fields(value: Any, path: str, inner: _Inner) -> object:
     own: Any = type(value)
     if not hasattr(own, "__dataclass_fields__"):
-        raise TypeError(f"{path} holds {own.__name__}, which is no state")
+        raise TypeError(f"{path} holds {own.__name__}, which is no state: derive it from Stateful (simbase.state)")
     copy: Any = object.__new__(own)
     for name in _fields(own):
         setattr(copy, name, inner(getattr(value, name), f"{path}.{name}"))

@@ -105,6 +105,16 @@ def said(error: Exception) -> str:
     return str(error) if isinstance(error, ValueError) else f"{type(error).__name__}: {error}"
 
 
+def unforeseen(error: BaseException) -> str:
+    """Return an unforeseen exception as words: where in a file of the user it arose, or that it is a bug."""
+    place, step = "", error.__traceback__
+    while step is not None:
+        if str(step.tb_frame.f_globals.get("__name__", "")).startswith(OF_USERS):
+            place = f"{step.tb_frame.f_code.co_filename}:{step.tb_lineno}"
+        step = step.tb_next
+    return f"{place or 'this is a bug'}: {type(error).__name__}: {error}"
+
+
 def _members(protocol: type) -> dict[str, object]:
     """Return the public members of a protocol and what stands there: a function, a property, or None."""
     found: dict[str, object] = {}

@@ -25,6 +25,7 @@ from p2os.cli.printing import restored_output
 from p2os.cli.signals import end_on_signals, ignore_signals, restored_signals
 from simbase.errors import MissingDependencyError
 from simbase.installation import install_command
+from simbase.user_classes import unforeseen
 
 GROUP = "p2os.verbs"
 EXIT_FAILED = 1
@@ -108,8 +109,10 @@ def report(error: Exception, *, trace: bool = False) -> int:
         traceback.print_exception(error)
     code = getattr(error, "exit_code", None)
     if not isinstance(code, int):
-        _print_error(f"p2os: this is a bug: {type(error).__name__}: {_one_line(str(error))}")
-        _print_error("hint: run it again with --trace and report the output")
+        says = unforeseen(error)
+        _print_error(f"p2os: {_one_line(says)}")
+        is_bug = says.startswith("this is a bug")
+        _print_error(f"hint: run it again with --trace{' and report the output' if is_bug else ''}")
         return EXIT_FAILED
     format_message = getattr(error, "format_message", None)
     if callable(format_message):  # the option parser's

@@ -21,6 +21,7 @@ from robot_bench.campaign.processes import MB, MOST_TRIES
 from robot_bench.campaign.trial import Done, Outcome, Trial, Verdict, run_trial
 from robot_bench.running.forks import LOOK_S
 from simbase.errors import MissingDependencyError, UsageError
+from simbase.user_classes import unforeseen
 
 #: chosen: so long a scheduler may be away, and workers may be missing, seconds.
 PATIENCE_S = 120.0
@@ -161,7 +162,7 @@ def run_limited(trial: Trial, limits: Limits) -> tuple[Outcome, float, str]:
     try:
         outcome = run_trial(trial, look)
     except Exception as error:  # noqa: BLE001  # a bug there is an error of this trial, told by its name
-        outcome = Outcome(verdict=Verdict.ERROR, failures=(f"this is a bug: {type(error).__name__}: {error}",))
+        outcome = Outcome(verdict=Verdict.ERROR, failures=(unforeseen(error),))
     return outcome, round(time.thread_time() - began, 3), version("p2os")
 
 

@@ -24,6 +24,7 @@ from p2os.errors import RunFailedError
 from robot_bench.campaign.campaign_file import Limits
 from robot_bench.campaign.trial import Done, Outcome, Trial, Verdict, run_trial, warm_up
 from robot_bench.running.forks import LOOK_S, begin, how_it_ended, received
+from simbase.user_classes import unforeseen
 
 #: chosen: so often a trial is begun whose process or worker is killed from outside.
 MOST_TRIES = 4
@@ -102,7 +103,7 @@ def _work(pipe: Connection, trial: Trial, limits: Limits, parent: int, folder: P
     except MemoryError:
         found = _error(f"it took more than {limits.memory_mb} MB")
     except Exception as error:  # noqa: BLE001  # a bug there is an error of this trial, told by its name
-        found = _error(f"this is a bug: {type(error).__name__}: {error}")
+        found = _error(unforeseen(error))
     with contextlib.suppress(OSError):  # nobody waits for it any more
         pipe.send((found, round(_cpu_s(), 3)))
     pipe.close()

@@ -19,6 +19,7 @@ from robot_bench.events.codec import Json
 from robot_bench.recording.summary import INTERRUPTED
 from robot_bench.running.forks import LOOK_S, begin, how_it_ended, received
 from simbase.errors import P2osError
+from simbase.user_classes import unforeseen
 
 #: Called in the fork: (number of the piece, look), where `look` is to be called between slices.
 Job = Callable[[int, Callable[[], None]], Json]
@@ -83,7 +84,7 @@ def _work(pipe: Connection, job: Job, number: int, parent: int, raise_if_interru
     except P2osError as error:
         found = failure(str(error))
     except Exception as error:  # noqa: BLE001  # a bug there is a failure of this piece, told by its name
-        found = failure(f"this is a bug: {type(error).__name__}: {error}")
+        found = failure(unforeseen(error))
     with contextlib.suppress(OSError):  # nobody waits for it any more
         pipe.send(found)
     pipe.close()

@@ -22,7 +22,7 @@ from robot_bench.report.explain.contact import ContactInquest
 from robot_bench.report.explain.findings import Finding, ended, numbers, obeyed
 from robot_bench.report.explain.probing import NOTICE_NS, Prober
 from robot_bench.report.explain.progress import ProgressInquest, fed, words_of
-from robot_bench.report.explain.replay import ChipReplay
+from robot_bench.report.explain.replay import ChipReplay, Hold
 from robot_bench.report.explain.scene import Scene
 from simbase.errors import P2osError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
@@ -130,7 +130,24 @@ def _anything(record: RunRecord, scene: Scene, prober: Prober | None, at: Nanos)
         early = max(0, at - NOTICE_NS)
         if not prober.takes_notice(early):
             return ended(prober, early, at, steps), steps
-    return Finding("why the program did not do what was wanted is not known", is_cause=False), steps
+    return Finding(
+        f"why the program did not do what was wanted is not known{_ignored(prober, at)}", is_cause=False
+    ), steps
+
+
+def _ignored(prober: Prober | None, at: Nanos) -> str:
+    """Return which sensors' pins, high before a time, it took no notice of, though it did of others; else nothing."""
+    since = {} if prober is None else {net: t for net in prober.sensors if (t := prober.replay.high_since(net, at))}
+    if prober is None or not since:
+        return ""
+    quiet = [
+        net for net, t in since.items()
+        if prober.effect([Hold(wire=net, level=False, since=t, until=at)], at, t).noticed is None
+    ]  # fmt: skip
+    if not quiet or len(quiet) == len(prober.sensors):
+        return ""
+    pins = numbers([f"{prober.replay.pin(net)}, high since {since[net] / NS_PER_S:.3f} s" for net in quiet])
+    return f"; until then it took no notice of {pins}"
 
 
 def _contact(scene: Scene, prober: Prober | None, hit: Contact) -> tuple[Finding, list[Step]]:

@@ -104,11 +104,9 @@ class Prober:
         return self._compare(plain, self.replay.run(since, until, holds, rows=True, memory_ns=_MEMORY_NS), since, until)
 
     def flipped(self, nets: Sequence[str], at: Nanos, span: Nanos = NOTICE_NS) -> Effect:
-        """Return what changes when each of these inputs has the other level for a time."""
+        """Return what changes when each of these inputs has the other level for a time, whatever it has meanwhile."""
         until = min(at + span, self.replay.end)
-        return self.effect(
-            [Hold(wire=net, level=not self.replay.level(net, at), since=at, until=until) for net in nets], until, at
-        )
+        return self.effect([Hold(wire=net, level=None, since=at, until=until) for net in nets], until, at)
 
     def takes_notice(self, at: Nanos, span: Nanos = NOTICE_NS) -> bool:
         """Tell whether a program takes notice of any sensor that changes at a time, in the time after it."""

@@ -51,10 +51,10 @@ MOST_ROWS = 120_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hold:
-    """An input that is held at a level for a time, whatever the trace says."""
+    """An input that is held at a level for a time, whatever the trace says; None: at the other one, edge for edge."""
 
     wire: str
-    level: bool
+    level: bool | None
     since: Nanos
     until: Nanos
 
@@ -155,6 +155,12 @@ class ChipReplay:
         """Return the recorded level of a wire at a time."""
         edges = self.record.pins[net]
         return bool(edges.levels[max(0, bisect_right(edges.times, at) - 1)])
+
+    def high_since(self, net: str, at: Nanos) -> Nanos | None:
+        """Return since when a wire is high at a time; None where it is low, or was high from the beginning."""
+        edges = self.record.pins[net]
+        place = bisect_right(edges.times, at) - 1
+        return edges.times[place] if place > 0 and edges.levels[place] else None
 
     def line(self, address: int) -> Place:
         """Return where an instruction stands in the source."""
@@ -372,10 +378,15 @@ class ChipReplay:
             times, levels = self._held.get(hold.wire) or (edges.times, edges.levels)
             since = max(hold.since, now + 1)
             before, after = bisect_left(times, since), bisect_right(times, hold.until)
-            back = levels[max(0, after - 1)]
+            rows = [(since, int(bool(hold.level)))]
+            if hold.level is None:
+                inside = bisect_right(times, since)
+                rows = [(since, int(not levels[max(0, inside - 1)]))]
+                rows += [(times[place], int(not levels[place])) for place in range(inside, after)]
+            rows.append((hold.until, levels[max(0, after - 1)]))
             self._held[hold.wire] = (
-                [*times[:before], since, hold.until, *times[after:]],
-                [*levels[:before], int(hold.level), back, *levels[after:]],
+                [*times[:before], *(at for at, _ in rows), *times[after:]],
+                [*levels[:before], *(level for _, level in rows), *levels[after:]],
             )
 
     def _driven(self, rows: bytes) -> None:

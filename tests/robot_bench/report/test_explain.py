@@ -137,6 +137,27 @@ def test_the_replay_of_a_chip_is_the_run_and_a_held_pin_changes_it(unfair: Path)
     assert not replay.run(since, until).edges  # and looking left no trace
 
 
+def test_an_input_may_be_held_at_the_other_level_edge_for_edge(unfair: Path) -> None:
+    record = read_run(unfair)
+    at = next(t for t in record.pins["DD4"].times if t > 4 * NS_PER_S)
+    since, until = at - NS_PER_S // 2, at + NS_PER_S // 2
+    was = bool(record.pins["DD4"].levels[record.pins["DD4"].times.index(at) - 1])
+    replay = ChipReplay(DODGE, record)
+    inverted = replay.run(since, until, [Hold(wire="DD4", level=None, since=since, until=until)]).edges
+    pieces = [
+        Hold(wire="DD4", level=not was, since=since, until=at),
+        Hold(wire="DD4", level=was, since=at, until=until),
+    ]
+    assert inverted == replay.run(since, until, pieces).edges != replay.run(since, until).edges
+
+
+def test_a_program_that_waits_for_its_link_is_not_taken_to_be_stuck(unfair: Path) -> None:
+    record = read_run(unfair)
+    failures = {"failures": ["'usart1 sends something' did not happen, from 3.100 s to 3.600 s"]}
+    found = explain(replace(record, last_ns=3_600_000_000, end=failures), DODGE)
+    assert found.standing is Standing.UNKNOWN, found.text()
+
+
 def test_a_run_that_no_program_could_pass_is_not_explained(unfair: Path) -> None:
     found = explain(read_run(unfair), DODGE)
     assert found.standing is Standing.UNKNOWN

@@ -8,10 +8,12 @@ from types import SimpleNamespace
 
 import pytest
 
+from p2os.cli.main import run as p2os
 from p2os.pioneer.body.contract import RobotBody, RobotScene
 from p2os.pioneer.body.kinematic import KinematicScene
 from robot_bench import Bench
 from robot_bench.adapter import make_shipped_adapter
+from robot_bench.recording.run_record import read_run
 from robot_bench.scenario.json_schema import scenario_schema
 from robot_bench.scenario.scenario import load_scenario
 from robot_bench.wires.line_ends import AdapterPart, ControllerPart
@@ -122,6 +124,22 @@ def test_a_class_without_a_method_is_refused_by_the_methods_name(folder: Path, w
 def test_a_broken_class_is_one_line(folder: Path, old: str, new: str, message: str) -> None:
     changed(folder, "mine.py", old, new)
     assert message in str(refusal(folder))
+
+
+def test_what_an_own_class_raises_in_a_run_is_told_with_its_line_and_is_no_bug_here(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(folder)
+    (folder / "late.py").write_text(
+        "from p2os.pioneer.controller import Pioneer\n\n\nclass Late(Pioneer):\n    def advance_to(self, limit):\n"
+        "        return super().advance_to(limit) if limit < 10**8 else 1 / 0\n"
+    )
+    (folder / "late.toml").write_text(SHIPPED + '[controller]\nkind = "./late.py:Late"\n')
+    assert p2os(["run", "late.toml", "--out", "late"]) == 1
+    said = capsys.readouterr().err
+    assert f"p2os: {folder}/late.py:6: ZeroDivisionError: division by zero\n" in said
+    assert "bug" not in said
+    assert read_run(folder / "late").end["failures"] == [f"{folder}/late.py:6: ZeroDivisionError: division by zero"]
 
 
 @pytest.mark.parametrize(("key", "known"), [("body", "mujoco"), ("core", "model, firmware"), ("kind", "pioneer")])

@@ -7,6 +7,7 @@ import pickle
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -18,6 +19,7 @@ from robot_bench.direct.senses import motion_of
 from robot_bench.report.page import _parts
 from robot_bench.run import parts_of, run_scenario
 from robot_bench.scenario.scenario import load_scenario
+from simbase import user_classes
 
 PROBE = '''
 from bluepill_sim.parts import Picture
@@ -106,6 +108,29 @@ def test_it_senses_the_same_in_slices_and_from_a_pickle(folder: Path) -> None:
     other.run_until("0.3 s")
     assert probe_of(other).seen == probe_of(whole).seen
     assert other.trace.sha256 == whole.trace.sha256
+
+
+@pytest.mark.parametrize("kind", ["probe.py:Probe", "theirs"])
+def test_a_fork_and_a_rewound_bench_go_on_as_the_first_with_a_part_of_the_users(
+    kind: str, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if kind == "theirs":
+        made = user_classes.find_class(f"{folder}/probe.py:Probe", what="part", group="p2os.parts", known=())
+        point = SimpleNamespace(name="theirs", load=lambda: made)
+        monkeypatch.setattr(user_classes, "entry_points", lambda group: [point] if group == "p2os.parts" else [])
+    (folder / "mine.toml").write_text(SCENARIO.replace("probe.py:Probe", kind))
+    bench = Bench(load_scenario(str(folder / "mine.toml")))
+    bench.run_until("0.1 s")
+    forked = bench.fork()
+    found = []
+    for one in (bench, forked, bench):
+        if one is bench and found:
+            bench.rewind("0.05 s")
+        one.run_until("0.3 s")
+        one.finish()
+        found.append((one.trace.sha256, probe_of(one).seen))
+    assert found[0] == found[1] == found[2]
+    assert len(found[0][1]) == 42
 
 
 def test_the_report_shows_what_parts_came_to_and_their_pictures(folder: Path) -> None:
