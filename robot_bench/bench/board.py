@@ -3,7 +3,6 @@
 Invariant: what a scenario says of its chip and its wires becomes parts here alone.
 """
 
-import random
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, cast
 
@@ -15,9 +14,10 @@ from robot_bench.direct.wired import AnalogPin, RobotWire
 from robot_bench.recording.recorder import Recorder
 from robot_bench.recording.transfers import hear_bus
 from robot_bench.scenario.hand_script import Deed
-from robot_bench.scenario.scenario import RANDOM_SRAM, Scenario
+from robot_bench.scenario.scenario import Scenario
 from robot_bench.wires.nets import Harness, Net, Strength
 from robot_bench.wires.ports import Chip
+from robot_bench.wires.power_up import power_up
 from simbase.errors import UsageError
 from simbase.timing import Nanos
 
@@ -91,15 +91,9 @@ def boot(scenario: Scenario, image: "Image | None" = None) -> Chip:
     Raises:
         MissingDependencyError: The emulator's engine is not installed.
     """
-    from bluepill_sim.board import BluePill
-    from bluepill_sim.fabric.clocks import CRYSTAL_HZ
-    from bluepill_sim.stm32f103 import SRAM_BYTES
-
-    board = BluePill(image or scenario.firmware)
-    board.chip.parts.rcc.hse_hz = CRYSTAL_HZ + CRYSTAL_HZ * scenario.crystal_ppm // 10**6
-    if scenario.sram == RANDOM_SRAM:
-        board.power_up_with(random.Random(scenario.seed).randbytes(SRAM_BYTES))
-    return board
+    return power_up(
+        image or scenario.firmware, sram=scenario.sram, crystal_ppm=scenario.crystal_ppm, seed=scenario.seed
+    )
 
 
 def pins_of(scenario: Scenario) -> dict[str, str]:

@@ -52,6 +52,7 @@ from robot_bench.scenario.when_script import When, load_whens
 from robot_bench.scenario.wired_robots import OwnRobot, find_own_robot, known_own_robots, load_own_robot
 from robot_bench.scenario.world_script import Change, load_changes, refuse_names
 from robot_bench.wires.line_ends import ENDS
+from robot_bench.wires.power_up import RANDOM_SRAM, ZEROS
 from simbase.errors import FileError, UsageError, shown, shown_name
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 from simbase.user_classes import located, source_of
@@ -59,8 +60,6 @@ from simbase.user_classes import located, source_of
 MODES = ("direct", "adapter")
 #: The kinds of wires that may be cut from the robot, for something outside to drive: those to the chip.
 OUTSIDE = (WireRole.DISTANCE.value, WireRole.ENCODER.value)
-#: The SRAM holds anything at power-on, as the seed says.
-RANDOM_SRAM = "random"
 
 _TOP = (
     VERSION,
@@ -80,7 +79,7 @@ _TOP = (
     Key(name="usart_baud", kind="whole", least=1, most=4_500_000),
     Key(name="record", kind="texts"),
     Key(name="outside", kind="text"),
-    Key(name="sram", kind="text", choices=("zeros", RANDOM_SRAM)),
+    Key(name="sram", kind="text", choices=(ZEROS, RANDOM_SRAM)),
     Key(name="crystal_ppm", kind="whole", least=-1000, most=1000),
     Key(name="start", kind="table"),
     Key(name="direct", kind="table"),
@@ -215,7 +214,7 @@ class Scenario:
     #: Kinds of wires that the robot does not drive, but somebody outside: of `OUTSIDE`, sorted.
     outside: tuple[str, ...] = ()
     #: What the chip's SRAM holds when power comes up: `zeros`, or `random` by the seed.
-    sram: str = "zeros"
+    sram: str = ZEROS
     #: By how many millionths the 8 MHz crystal of the chip is too fast.
     crystal_ppm: int = 0
     #: None starts at the world's own place.
@@ -468,7 +467,7 @@ def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | N
         usart_baud=cast("int | None", table.get("usart_baud")),
         record=_buses(_listed(table.get("record")), where.at("record"), ScenarioError),
         outside=_outside(str(table.get("outside", "")), own_robot, where.at("outside")),
-        sram=str(table.get("sram", "zeros")),
+        sram=str(table.get("sram", ZEROS)),
         crystal_ppm=cast("int", table.get("crystal_ppm", 0)),
         start=_start(table, where),
         start_at=str(within(where, "start")),

@@ -16,9 +16,9 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import cast
 
 from adapter_sim.pinout import Direction, Pull, Wire, WireRole, load_pinout
-from bluepill_sim.board import BluePill
 from bluepill_sim.core import BLOCK, BlockRow
 from bluepill_sim.core.debug_unit import WatchKind, Watchpoint
 from bluepill_sim.core.nvic import exception_name
@@ -29,6 +29,7 @@ from bluepill_sim.program.line_table import LineTable, read_lines
 from bluepill_sim.program.static_code import StaticCode
 from bluepill_sim.stm32f103 import SRAM_BASE, SRAM_BYTES
 from robot_bench.recording.run_record import RunRecord
+from robot_bench.wires.power_up import ZEROS, power_up
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS, Nanos
 
@@ -115,7 +116,11 @@ class ChipReplay:
         if missing := [wire.name for wire in wires if wire.name not in record.pins]:
             raise UsageError(f"the trace has not the wires of the pin-out, such as {missing[0]}")
         self.record = record
-        self.board = BluePill(firmware)
+        told = record.meta
+        self.board = power_up(
+            firmware, sram=str(told.get("sram", ZEROS)), crystal_ppm=int(cast("int", told.get("crystal_ppm") or 0)),
+            seed=int(cast("int", told.get("seed") or 0)),
+        )  # fmt: skip
         self.wires: Mapping[str, Wire] = {wire.name: wire for wire in wires}
         self.inputs = [wire.name for wire in wires if wire.direction is Direction.TO_BLUEPILL]
         self.outputs = [wire.name for wire in wires if wire.direction is Direction.TO_ADAPTER]

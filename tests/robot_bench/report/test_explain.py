@@ -137,6 +137,17 @@ def test_the_replay_of_a_chip_is_the_run_and_a_held_pin_changes_it(unfair: Path)
     assert not replay.run(since, until).edges  # and looking left no trace
 
 
+def test_the_replay_has_the_memory_and_the_crystal_of_the_run(tmp_path: Path) -> None:
+    plan = tmp_path / "plan.toml"
+    plan.write_text('sram = "random"\ncrystal_ppm = 900\n' + scenario_text(UNFAIR, 4.0, 1.0))
+    run_scenario(load_scenario(str(plan), firmware=DODGE), tmp_path / "run", explained=False)
+    record = read_run(tmp_path / "run")
+    replay = ChipReplay(DODGE, record)
+    assert replay.exact_until == replay.end == record.last_ns
+    record.meta["crystal_ppm"] = 0
+    assert ChipReplay(DODGE, record).exact_until < record.last_ns
+
+
 def test_an_input_may_be_held_at_the_other_level_edge_for_edge(unfair: Path) -> None:
     record = read_run(unfair)
     at = next(t for t in record.pins["DD4"].times if t > 4 * NS_PER_S)
