@@ -19,7 +19,9 @@
 #include <gz/sim/Server.hh>
 #include <gz/sim/System.hh>
 #include <gz/sim/Util.hh>
+#include <gz/sim/components/AngularVelocityCmd.hh>
 #include <gz/sim/components/ContactSensorData.hh>
+#include <gz/sim/components/LinearVelocityCmd.hh>
 #include <gz/sim/components/Model.hh>
 #include <gz/sim/components/Name.hh>
 #include <gz/sim/components/Physics.hh>
@@ -207,6 +209,11 @@ private:
     // Stand still with the middle of the axle at a place.
     void stand(const Pose& p) {
         robot_.SetWorldPoseCmd(ecm(), Pose3d(p.x, p.y, p.z, 0, 0, p.heading));
+        hull_.SetLinearVelocity(ecm(), Vector3d::Zero), hull_.SetAngularVelocity(ecm(), Vector3d::Zero);
+        go(0, 0);
+        // As long as these are there, Gazebo holds the hull still.
+        ecm().RemoveComponent<sim::components::LinearVelocityCmd>(hull_.Entity());
+        ecm().RemoveComponent<sim::components::AngularVelocityCmd>(hull_.Entity());
         for (int n = 0; n < kSettleSteps; ++n) go(0, 0);
         touching_ = false;
     }
