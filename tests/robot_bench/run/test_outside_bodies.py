@@ -114,14 +114,19 @@ def test_a_body_on_a_physics_engine_in_another_process_gives_the_same_trace_twic
 
 @needs_compiler
 @pytest.mark.soak  # DART's headers take most of a minute
-def test_a_body_on_dart_in_c_gives_the_same_trace_twice_and_from_a_fork(tmp_path: Path) -> None:
-    found = subprocess.run(["pkg-config", "--cflags", "--libs", "dart"], capture_output=True, text=True, check=False)
+@pytest.mark.parametrize(
+    ("library", "file", "name"), [("dart", "dart_body", "DART"), ("gz-sim8", "gazebo_body", "Gazebo")]
+)
+def test_a_body_on_an_engine_in_c_gives_the_same_trace_twice(
+    library: str, file: str, name: str, tmp_path: Path
+) -> None:
+    found = subprocess.run(["pkg-config", "--cflags", "--libs", library], capture_output=True, text=True, check=False)
     if found.returncode != 0:
-        pytest.skip("DART is not installed: apt-get install libdart-dev")
-    source, program = SOURCE / "dart_body.cpp", tmp_path / "dart_body"
+        pytest.skip(f"pkg-config knows no {library}: apt-get install lib{library}-dev")
+    source, program = SOURCE / f"{file}.cpp", tmp_path / file
     words = ["g++", "-O1", "-Wall", "-o", program, source, *found.stdout.split(), "-std=c++17"]
     subprocess.run(words, check=True, timeout=300)
-    same_trace_twice("DART", program, saves=True)
+    same_trace_twice(name, program, saves=name == "DART")
 
 
 @pytest.mark.parametrize("mode", ["adapter", "direct"])
