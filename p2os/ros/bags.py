@@ -152,9 +152,9 @@ def read_bag(path: Path, types: frozenset[str]) -> Iterator[Recorded]:
             for connection, at_ns, data in bag.messages(chosen) if chosen else ():
                 message = cast("Message", _plain(bag.deserialize(data, connection.msgtype)))
                 yield Recorded(connection.topic, connection.msgtype, at_ns, message)
-    except (GeneratorExit, MemoryError):
+    except GeneratorExit:
         raise
-    except Exception as error:  # whatever the library makes of hostile bytes
+    except Exception as error:  # whatever the library makes of hostile bytes, such as a length of terabytes
         raise FileError(
             f"{shown_name(path)} is no bag that can be read: {shown(str(error) or type(error).__name__)}",
             hint="a rosbag2 folder, .mcap or .db3 of ROS 2 messages, or a .bag",

@@ -15,8 +15,9 @@ from simbase.timing import NS_PER_S
 
 #: chosen: so many signals are listed, the first that part.
 MOST_SIGNALS = 8
-HELP = """Tell where two runs part: the first difference of each signal; of several robots
-each with the robot's name.
+HELP = """Tell where two runs part: the first difference of each signal.
+
+Of several robots each is told with the robot's name.
 
 Exit code: 0 they are alike, 1 they differ.
 

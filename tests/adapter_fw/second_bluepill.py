@@ -9,17 +9,22 @@ each step, and what it drives carries the time of the instruction that did it.
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from unittest.mock import patch
 
 from adapter_sim.adapter import AdapterState
 from adapter_sim.pinout import Pinout, WireRole
 from bluepill_sim import BluePill
 from bluepill_sim.fabric.pins import PinDrive
 from bluepill_sim.fabric.subscriptions import EDGE
+from p2os.pioneer.body.contract import RobotBody
 from p2os.pioneer.controller import Pioneer
 from robot_bench.bench import Bench
+from robot_bench.bench.far_end import FarEnd
 from robot_bench.recording.client_view import SipRanges
+from robot_bench.recording.recorder import Recorder
+from robot_bench.scenario.scenario import Scenario
 from robot_bench.wires.chip_pins import number_of
-from robot_bench.wires.nets import OwnedPins
+from robot_bench.wires.nets import Harness, OwnedPins
 from simbase.timing import NS_PER_MS, Nanos, Reached
 
 #: A quarter of what the adapter samples with.
@@ -104,17 +109,22 @@ class SecondBluePillBench(Bench):
 
     elf: Path
 
-    def _ends_of_line(self, pinout: Pinout, body: object, harness: object) -> tuple[object, Pioneer]:
-        recorder, parameters = self.recorder, self.scenario.parameters
-        pioneer = Pioneer(parameters=parameters, body=body, settings=self.scenario.controller)
-        pioneer.on_event = recorder.listener("pioneer")
-        ranges = self._ranges = SipRanges(parameters, pioneer.settings.profile, on_ranges=recorder.sonar)
-        self.second = SecondBluePill(self.elf, OwnedPins(harness, "adapter"), pinout, pioneer)
+    def __init__(self, scenario: Scenario) -> None:
+        def far_end(
+            scenario: Scenario, pinout: Pinout, body: RobotBody, _chip: object, harness: Harness, recorder: Recorder,
+            **_: object,
+        ) -> FarEnd:  # fmt: skip
+            pioneer = Pioneer(parameters=scenario.parameters, body=body, settings=scenario.controller)
+            pioneer.on_event = recorder.listener("pioneer")
+            ranges = SipRanges(scenario.parameters, pioneer.settings.profile, on_ranges=recorder.sonar)
+            self.second = SecondBluePill(self.elf, OwnedPins(harness, "adapter"), pinout, pioneer)
 
-        def comes_back(frame: bytes, at: Nanos) -> None:
-            recorder.wire("r2c", frame, at)
-            ranges.take(frame, at)
+            def comes_back(frame: bytes, at: Nanos) -> None:
+                recorder.wire("r2c", frame, at)
+                ranges.take(frame, at)
 
-        self.second.on_packet = comes_back
-        self._robots.append(self.second)
-        return self.second, pioneer
+            self.second.on_packet = comes_back
+            return FarEnd(robots=(self.second,), adapter=self.second, controller=pioneer, ranges=ranges)
+
+        with patch("robot_bench.bench.bench.make_far_end", far_end):
+            super().__init__(scenario)

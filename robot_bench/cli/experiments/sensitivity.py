@@ -36,7 +36,7 @@ what --outcome names.
 Examples:
   p2os sensitivity dodge --vary threshold_m=0.4..1.0 --outcome clearance_m
   p2os sensitivity patrol.toml --vary start.x_m=0.5..1.5 --picture s.png
-  p2os sensitivity patrol.toml --vary threshold_m=0.4..1 --steps 0 --samples 64
+  p2os sensitivity dodge --vary threshold_m=0.4..1 --steps 0 --samples 64
 """
 OUTCOMES = "path_m, mean_mps, clearance_m, energy_j, …, or such as 'goal 2 clearance'"
 
