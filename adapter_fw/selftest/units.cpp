@@ -334,6 +334,16 @@ const Packet ANSWERS[] = {{0, 1}, {1, 1}, {2, 4}};
 constexpr std::uint8_t SIP_KIND = 0x32;
 constexpr std::size_t SIP_BYTES = 25;
 
+//: Opens a session; returns when it is open.
+Nanos open(p2os::Client& client) {
+  client.connect(0);
+  for (const Packet& answer : ANSWERS) {
+    client.receive(answer.bytes(), 1);
+  }
+  client.advance_to(1 + p2os::OPEN_DELAY_NS);
+  return 1 + p2os::OPEN_DELAY_NS;
+}
+
 void check_origin() {
   Connecting settling;
   for (const Packet& answer : ANSWERS) {
@@ -368,11 +378,7 @@ void check_client() {
   claim(client.state() == p2os::ClientState::SYNC0 && taken() > 0, "connect sends SYNC0");
   client.connect(1);
   claim(taken() == 0, "a second connect sends nothing");
-  for (const Packet& answer : ANSWERS) {
-    client.receive(answer.bytes(), 1);
-  }
-  const Nanos opened_at = 1 + p2os::OPEN_DELAY_NS;
-  client.advance_to(opened_at);
+  const Nanos opened_at = open(client);
   claim(client.is_open(), "the robot's three answers open a session");
   for (const Packet& packet : {Packet(SIP_KIND, SIP_BYTES), Packet(SIP_KIND, SIP_BYTES - 1), Packet(0x90, 4)}) {
     client.receive(packet.bytes(), opened_at);
@@ -380,6 +386,11 @@ void check_client() {
   claim(client.stats().frames_received == 6 && client.stats().malformed == 1, "packets are counted, heard or not");
   client.advance_to(opened_at + p2os::LIVENESS_NS);
   claim(client.state() == p2os::ClientState::LOST, "and silence ends it");
+  for (const std::uint8_t kind : {std::uint8_t{0xFD}, std::uint8_t{0xFE}, std::uint8_t{0xFF}}) {
+    p2os::Client other({});
+    other.receive(Packet(kind, 1).bytes(), open(other));
+    claim(other.is_open() == (kind == 0xFD), "two kinds say that the controller was reset");
+  }
 }
 
 }  // namespace
