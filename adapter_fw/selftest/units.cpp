@@ -1,4 +1,5 @@
-// Checks of what no run of the self-test exercises: the codes over a restart, the LED, the mode button, numbers as text, faults of settings, gaps.
+// Checks of what no run of the self-test exercises: the codes over a restart, the LED, the mode button, numbers as text, faults of settings, gaps,
+// the origin, a client to which nobody listens.
 //
 // Prints each broken claim; ends with `ok` and exit code 0, or with 1.
 
@@ -309,7 +310,58 @@ void check_codes() {
   claim(restored(memory, store) == Wheels{}, "but a negative one");
 }
 
-//: Of an Arduino sketch, not of the adapter: whoever asks again while a session is being opened begins nothing anew.
+//: A sound frame of the robot, whose payload is its kind and zeros, but for one byte that is 1.
+struct Packet {
+  Packet(std::uint8_t kind, std::size_t payload_bytes, std::size_t one_at = 0)
+      : size(p2os::PREFIX_BYTES + payload_bytes + p2os::CHECKSUM_BYTES) {
+    std::uint8_t* payload = frame + p2os::PREFIX_BYTES;
+    payload[one_at] = 1;
+    payload[0] = kind;
+    const std::uint16_t sum = p2os::checksum({payload, payload_bytes});
+    frame[2] = static_cast<std::uint8_t>(payload_bytes + p2os::CHECKSUM_BYTES);
+    payload[payload_bytes] = static_cast<std::uint8_t>(sum >> 8);
+    payload[payload_bytes + 1] = static_cast<std::uint8_t>(sum & 0xFF);
+  }
+  p2os::Bytes bytes() const { return {frame, size}; }
+
+  std::size_t size;
+  std::uint8_t frame[40] = {p2os::HEADER_0, p2os::HEADER_1};
+};
+
+//: What opens a session: the echoes of SYNC0 and SYNC1, and three empty names.
+const Packet ANSWERS[] = {{0, 1}, {1, 1}, {2, 4}};
+//: A SIP without sonar readings; x, y and heading are the six bytes behind its kind.
+constexpr std::uint8_t SIP_KIND = 0x32;
+constexpr std::size_t SIP_BYTES = 25;
+
+//: Opens a session; returns when it is open.
+Nanos open(p2os::Client& client) {
+  client.connect(0);
+  for (const Packet& answer : ANSWERS) {
+    client.receive(answer.bytes(), 1);
+  }
+  client.advance_to(1 + p2os::OPEN_DELAY_NS);
+  return 1 + p2os::OPEN_DELAY_NS;
+}
+
+void check_origin() {
+  Connecting settling;
+  for (const Packet& answer : ANSWERS) {
+    settling.part.receive(answer.bytes(), settling.clock.at);
+  }
+  while (settling.part.state() == State::CONNECTING) {
+    settling.turn();
+  }
+  for (std::size_t place = 1; place <= 6; ++place) {
+    settling.part.receive(Packet(SIP_KIND, SIP_BYTES, place).bytes(), settling.clock.at);
+    claim(settling.part.state() == State::SETTLING, "two zeros of x, y and heading are not the origin");
+  }
+  settling.part.receive(Packet(SIP_KIND, SIP_BYTES).bytes(), settling.clock.at);
+  claim(settling.part.state() == State::DRIVING, "three are");
+}
+
+//: Of an Arduino sketch, not of the adapter: whoever asks again while a session is being opened begins nothing anew, and
+//: nobody has to listen.
 void check_client() {
   p2os::Client client({});
   p2os::CommandFrame frame;
@@ -326,6 +378,19 @@ void check_client() {
   claim(client.state() == p2os::ClientState::SYNC0 && taken() > 0, "connect sends SYNC0");
   client.connect(1);
   claim(taken() == 0, "a second connect sends nothing");
+  const Nanos opened_at = open(client);
+  claim(client.is_open(), "the robot's three answers open a session");
+  for (const Packet& packet : {Packet(SIP_KIND, SIP_BYTES), Packet(SIP_KIND, SIP_BYTES - 1), Packet(0x90, 4)}) {
+    client.receive(packet.bytes(), opened_at);
+  }
+  claim(client.stats().frames_received == 6 && client.stats().malformed == 1, "packets are counted, heard or not");
+  client.advance_to(opened_at + p2os::LIVENESS_NS);
+  claim(client.state() == p2os::ClientState::LOST, "and silence ends it");
+  for (const std::uint8_t kind : {std::uint8_t{0xFD}, std::uint8_t{0xFE}, std::uint8_t{0xFF}}) {
+    p2os::Client other({});
+    other.receive(Packet(kind, 1).bytes(), open(other));
+    claim(other.is_open() == (kind == 0xFD), "two kinds say that the controller was reset");
+  }
 }
 
 }  // namespace
@@ -339,6 +404,7 @@ int main() {
   check_faults();
   check_duties();
   check_gaps();
+  check_origin();
   if (broken == 0) {
     std::puts("ok");
   }

@@ -89,10 +89,12 @@ SEQUENCES = given(st.lists(STEPS, min_size=30, max_size=60), SETTINGS, st.boolea
 QUIET = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.large_base_example]
 
 
+# Measured on a firmware that takes 0xFF for no reset notice, which none of the 12 lives below notices: of 12 seeds 50
+# examples notice it in 8, 115 in 10.
 @pytest.mark.slow
-@settings(max_examples=50, deadline=None, suppress_health_check=QUIET)
+@settings(max_examples=115, deadline=None, suppress_health_check=QUIET)
 @SEQUENCES
-def test_firmware_and_model_do_the_same_over_two_thousand_steps(
+def test_firmware_and_model_do_the_same_over_five_thousand_steps(
     steps: list, adapter_settings: AdapterSettings, four: bool
 ) -> None:
     run_both(steps, adapter_settings, has_four_bits=four)

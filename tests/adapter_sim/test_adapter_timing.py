@@ -211,6 +211,19 @@ def test_a_robot_knocked_off_its_speed_may_come_back_slowly() -> None:
     assert plausibility.ends_at == 2_800
 
 
+def test_a_check_that_begins_anew_expects_wheels_at_rest() -> None:
+    """A wheel runs on, and two packets come at once, before the first pair: progress is measured from the first."""
+    plausibility = doubt()
+    plausibility.begin(0)
+    for speed in (50, 100):
+        plausibility.take(speed, speed, stalled=False, now=0)
+    plausibility.expect(0, 0)
+    plausibility.take(46, 46, stalled=False, now=800)
+    assert plausibility.ends_at == 1_000
+    plausibility.take(45, 45, stalled=False, now=900)
+    assert plausibility.ends_at == 1_900
+
+
 def test_a_distance_is_an_obstacle_once_it_is_a_second_old(driving: Rig) -> None:
     driving.ms(150)
     assert driving.pins.distances() == "00000000"
