@@ -90,10 +90,6 @@ from simbase.timing import NS_PER_S, Nanos, Reached
 
 #: chosen: so long a run goes on after a fault of the firmware, to show what the robot does then.
 AFTER_FAULT_NS: Nanos = 1 * NS_PER_S
-#: Owner of the resistors on the wires.
-RESISTORS = "board"
-#: Owner of the levels that are put on wires by hand.
-BY_HAND = "hand"
 _LOG = logger("bench")
 T = TypeVar("T", bound=Timed)
 #: What `run_until` waits for beside a time: an event in words, or a function of the bench.
