@@ -74,7 +74,10 @@ def make_artefacts(folder: Path) -> Artefacts:
         TraceError: The folder holds no readable trace.
         FileError: The disk is full, or the folder cannot be written.
     """
-    record = read_run(folder)
+    return _artefacts_of(read_run(folder), folder)
+
+
+def _artefacts_of(record: RunRecord, folder: Path) -> Artefacts:
     try:
         outcome = write_outcome(record, folder)
         write_vcd(record, folder / "pins.vcd")
@@ -93,8 +96,10 @@ def make_artefacts_of_all(folder: Path, names: Sequence[str], scenario: str) -> 
     Raises:
         TraceError, FileError: As of `make_artefacts`.
     """
-    outcome = outcome_of_all(scenario, {name: make_artefacts(folder / name).outcome for name in names})
-    write_report_of_all(outcome, folder)
+    records = {name: read_run(folder / name) for name in names}
+    made = {name: _artefacts_of(record, folder / name) for name, record in records.items()}
+    outcome = outcome_of_all(scenario, {name: one.outcome for name, one in made.items()})
+    write_report_of_all(outcome, records, folder)
     return Artefacts(outcome=outcome, report=folder / REPORT_NAME)
 
 

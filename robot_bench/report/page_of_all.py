@@ -15,7 +15,7 @@ from typing import cast
 from robot_bench.events.codec import Json
 from robot_bench.events.kinds import Event, WorldChange
 from robot_bench.events.words import is_frequent, what_of
-from robot_bench.recording.run_record import RunRecord, read_run
+from robot_bench.recording.run_record import RunRecord
 from robot_bench.recording.summary import SUMMARY_NAME, verdict_of
 from robot_bench.recording.together import named_events
 from robot_bench.report.thinning import ends, extremes
@@ -50,15 +50,19 @@ td:not(:last-child) {{ white-space: nowrap }} .log {{ font-size: 14px }}
 """
 
 
-def write_report_of_all(outcome: Json, folder: Path) -> None:
+def write_report_of_all(outcome: Json, records: Mapping[str, RunRecord], folder: Path) -> None:
     """Write what came of a run with several robots, and the page of all.
+
+    Args:
+        outcome: What came of it.
+        records: Each robot's trace by its name, as read.
+        folder: The run's.
 
     Raises:
         FileError: The disk is full, or the folder cannot be written.
         TraceError: A robot's folder holds no readable trace.
     """
     robots = cast("Mapping[str, Mapping[str, object]]", outcome["robots"])
-    records = {name: read_run(folder / name) for name in robots}
     colours = {name: _COLOURS[place % len(_COLOURS)] for place, name in enumerate(robots)}
     page = _PAGE.format(
         title=escape(f"{outcome['scenario']} in {outcome['world']}"),
