@@ -12,11 +12,11 @@ Source: AriaCoda, src/ArDataLogger.cpp and src/ArLaserLogger.cpp, what they writ
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from p2os.robots.parameters import RobotParameters
-from robot_bench.experiments.drives import Drive, Trajectory, steps_of
-from simbase.errors import FileError, shown, shown_name
+from robot_bench.experiments.drives import Drive, Rows, Trajectory, number_of, steps_of
+from simbase.errors import FileError, shown_name
 
 TABLE, SCANS = ";time", "laserodometrylog"
 #: Column of a command → its name in the manual.
@@ -30,15 +30,11 @@ POSES = (("encx", "ency", "encth"), ("x", "y", "th"))
 _LONGEST = 32
 
 
-@dataclass(slots=True)
-class _Rows:
+@dataclass(slots=True, kw_only=True)
+class _Rows(Rows):
     """What the lines tell so far."""
 
     name: str
-    poses: list[tuple[float, float, float, float]] = field(default_factory=list)
-    left: list[tuple[float, float]] = field(default_factory=list)
-    right: list[tuple[float, float]] = field(default_factory=list)
-    commands: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
 
     def number(self, line: int, text: str) -> float:
         """Return a field's number.
@@ -46,14 +42,7 @@ class _Rows:
         Raises:
             FileError: It is none.
         """
-        cut = text.strip().removesuffix(":")[:_LONGEST]
-        try:
-            value = float(cut)
-        except ValueError:
-            value = math.nan
-        if not math.isfinite(value):
-            raise FileError(f"{shown_name(self.name)}:{line}: {shown(cut)} is no number")
-        return value
+        return number_of(text.strip().removesuffix(":")[:_LONGEST], self.name, line)
 
     def pose(self, t: float, x_mm: float, y_mm: float, degrees: float) -> None:
         """Take a pose."""
@@ -79,7 +68,7 @@ def read_aria_log(name: str, lines: Iterable[str], parameters: RobotParameters) 
     """
     numbered = enumerate(lines, 1)
     first = next(numbered, (1, ""))
-    rows = _Rows(name)
+    rows = _Rows(name=name)
     if first[1].replace(" ", "").lower().startswith(TABLE):
         _read_table(rows, first, numbered)
     else:

@@ -20,7 +20,7 @@ from typing import Any
 
 from p2os.robots.parameters import RobotParameters
 from p2os.ros.bags import Recorded, read_bag
-from robot_bench.experiments.drives import Drive, Trajectory, steps_of
+from robot_bench.experiments.drives import Drive, Trajectory, heading_of, steps_of
 from simbase.errors import FileError, shown_name
 from simbase.timing import NS_PER_S, Nanos
 
@@ -168,8 +168,7 @@ def _finite(pairs: Pairs) -> Pairs:
 
 
 def _heading(turned: Mapping[str, float]) -> float:
-    x, y, z, w = (turned[name] for name in "xyzw")
-    return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+    return heading_of(*(turned[name] for name in "xyzw"))
 
 
 def _time_of(one: Recorded) -> Nanos:

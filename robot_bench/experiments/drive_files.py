@@ -26,10 +26,10 @@ from p2os.ros.bags import is_bag
 from robot_bench.events.kinds import Pose
 from robot_bench.experiments.aria_logs import is_aria_log, read_aria_log
 from robot_bench.experiments.bag_drives import drive_of_bag
-from robot_bench.experiments.drives import Drive, Floats, Steps, Trajectory, steps_of
+from robot_bench.experiments.drives import Drive, Floats, Rows, Steps, Trajectory, heading_of, number_of, steps_of
 from robot_bench.recording.run_record import TRACE_NAME, RunRecord, read_events, read_run
 from robot_bench.recording.signals import motor_steps
-from simbase.errors import FileError, shown, shown_name
+from simbase.errors import FileError, shown_name
 from simbase.timing import NS_PER_S
 
 #: Commands whose argument is looked at.
@@ -46,15 +46,11 @@ _TUM_COLUMNS = 8
 _LONGEST_FIELD = 64
 
 
-@dataclass(slots=True)
-class _Told:
+@dataclass(slots=True, kw_only=True)
+class _Told(Rows):
     """What the packets of a line tell, row by row."""
 
     parameters: RobotParameters
-    poses: list[tuple[float, float, float, float]] = field(default_factory=list)
-    left: list[tuple[float, float]] = field(default_factory=list)
-    right: list[tuple[float, float]] = field(default_factory=list)
-    commands: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
     sonar: dict[int, list[tuple[float, float]]] = field(default_factory=dict)
 
     def take(self, chunks: Iterable[Chunk], profile: Profile) -> None:
@@ -169,7 +165,7 @@ def drive_of_capture(
     Raises:
         FileError: It has no two standard packets.
     """
-    told = _Told(parameters)
+    told = _Told(parameters=parameters)
     told.take(chunks, profile)
     drive = told.into(Drive(name=name, parameters=parameters))
     if drive.odometry is None:
@@ -191,7 +187,7 @@ def _of_run(folder: Path, robot: str) -> Drive:
         if robot:
             raise
         parameters = load_parameters(DEFAULT_ROBOT)  # a robot on own pins sends no packets
-    told = _Told(parameters)
+    told = _Told(parameters=parameters)
     told.take(_chunks_of(record), Profile.P2OS)
     drive = told.into(Drive(name=folder.name, parameters=parameters, meta=record.meta))
     drive.events = list(read_events(folder))
@@ -277,14 +273,7 @@ def _of_csv(path: Path, robot: str) -> Drive:
 
 
 def _number(path: Path, line: int, row: list[str], place: int) -> float:
-    text = row[place][:_LONGEST_FIELD]
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise FileError(f"{shown_name(path)}:{line}: {shown(text)} is no number")
-    return value
+    return number_of(row[place][:_LONGEST_FIELD], path, line)
 
 
 def read_tum(path: Path) -> Trajectory:
@@ -302,7 +291,7 @@ def read_tum(path: Path) -> Trajectory:
             if len(words) != _TUM_COLUMNS:
                 raise FileError(f"{shown_name(path)}:{number}: {len(words)} numbers, expected t x y z qx qy qz qw")
             t, x, y, _, qx, qy, qz, qw = (_number(path, number, words, place) for place in range(_TUM_COLUMNS))
-            rows.append((t, x, y, math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))))
+            rows.append((t, x, y, heading_of(qx, qy, qz, qw)))
     try:
         return Trajectory.of_rows(rows)
     except FileError as error:

@@ -6,6 +6,7 @@ of where the drive's frame says, headings counter-clockwise and never wrapped.
 Invariant: the times of every array rise strictly.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TypeAlias
@@ -15,7 +16,7 @@ import numpy.typing as npt
 
 from p2os.robots.parameters import RobotParameters
 from robot_bench.events.kinds import Event
-from simbase.errors import FileError
+from simbase.errors import FileError, shown, shown_name
 
 Floats: TypeAlias = npt.NDArray[np.float64]
 
@@ -110,6 +111,38 @@ class Steps:
     def later(self, shift_s: float) -> "Steps":
         """Return the same, each so much later."""
         return Steps(self.t_s + shift_s, self.values)
+
+
+@dataclass(slots=True, kw_only=True)
+class Rows:
+    """What a recording tells of a drive, row by row: seconds, metres, radians and m/s; commands in their own units."""
+
+    #: (t, x, y, heading).
+    poses: list[tuple[float, float, float, float]] = field(default_factory=list)
+    #: (t, speed) of the rims.
+    left: list[tuple[float, float]] = field(default_factory=list)
+    right: list[tuple[float, float]] = field(default_factory=list)
+    commands: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
+
+
+def number_of(text: str, file: object, line: int) -> float:
+    """Return the number that a field of a text file holds.
+
+    Raises:
+        FileError: It holds none, or one that is not finite; the message has the file and the line.
+    """
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise FileError(f"{shown_name(file)}:{line}: {shown(text)} is no number")
+    return value
+
+
+def heading_of(x: float, y: float, z: float, w: float) -> float:
+    """Return the heading of a unit quaternion, rad."""
+    return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
 
 def steps_of(pairs: "list[tuple[float, float]]") -> Steps:
