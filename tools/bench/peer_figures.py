@@ -13,6 +13,7 @@ Exit codes: 0 all robots were driven, 1 one could not be, 2 wrong usage.
 
 import argparse
 import contextlib
+import math
 import statistics
 import sys
 from collections.abc import Callable, Sequence
@@ -27,7 +28,7 @@ from p2os.protocol.events import Synchronised
 from p2os.protocol.odometry import Odometry
 from p2os.protocol.sip import StandardSip
 from p2os.protocol.times import CYCLE_NS
-from p2os.robots.parameters import load_parameters
+from p2os.robots.parameters import RobotParameters, load_parameters
 from p2os.robots.parameters import nearest_model as model_of
 from p2os.transport import Transport, open_url
 from p2os.transport.waiting import wait_readable
@@ -72,6 +73,7 @@ class Peer:
     #: Sends nothing, as a client that hangs.
     is_mute: bool = False
     odometry: Odometry | None = None
+    parameters: RobotParameters | None = None
     began: int = field(default_factory=wall_clock)
 
     def now_s(self) -> float:
@@ -123,21 +125,21 @@ class Peer:
         while (event := self.connection.next_event()) is not None:
             if isinstance(event, Synchronised):
                 self.model = event.identity.subclass
-                self.odometry = Odometry(load_parameters(model_of(self.model)))
+                self.parameters = load_parameters(model_of(self.model))
+                self.odometry = Odometry(self.parameters)
             if isinstance(event, SipReceived) and self.odometry is not None:
                 self._sample(event.sip, now)
 
     def _sample(self, sip: StandardSip, now: int) -> None:
-        parameters, odometry = load_parameters(model_of(self.model)), self.odometry
-        if odometry is None:
+        parameters, odometry = self.parameters, self.odometry
+        if parameters is None or odometry is None:
             return
         odometry.update(sip, now)
         left, right = (raw * parameters.velocity_conv for raw in (sip.raw_left_velocity, sip.raw_right_velocity))
-        degrees = 180 / 3.141592653589793
         self.samples.append(Sample(
             t=(now - self.began) / NS_PER_S, robot_s=len(self.samples) * CYCLE_S, forward=(left + right) / 2,
-            turn=(right - left) / parameters.track_mm * degrees, x=odometry.x_m * 1000, y=odometry.y_m * 1000,
-            heading=odometry.heading_rad * degrees, sip=sip,
+            turn=math.degrees((right - left) / parameters.track_mm), x=odometry.x_m * 1000, y=odometry.y_m * 1000,
+            heading=math.degrees(odometry.heading_rad), sip=sip,
         ))  # fmt: skip
 
     def since(self, t: float) -> list[Sample]:
@@ -296,8 +298,8 @@ def _stops(peer: Peer, found: Found) -> None:
     peer.send("VEL", 0)
     peer.send("SETO")
     peer.step(0.8)
-    conversion = load_parameters(model_of(peer.model)).distance_nm_per_count / 1e6
-    found["x after SETO"] = peer.samples[-1].sip.raw_x * conversion
+    if peer.parameters is not None:
+        found["x after SETO"] = peer.samples[-1].sip.raw_x * peer.parameters.distance_nm_per_count / 1e6
 
 
 def table(urls: Sequence[str], found: Sequence[Found]) -> str:
