@@ -20,7 +20,7 @@ using namespace dart::dynamics;
 
 namespace {
 
-constexpr double kCasterM = 0.03, kFloorM = 200, kBehindM = 0.02, kMovedM = 1e-4, kStallMps = 0.05, kShort = 0.05;
+constexpr double kCasterM = 0.03, kFloorM = 200, kBehindM = 0.02, kMovedM = 1e-4;
 constexpr int kSettleSteps = 300, kStar = 8;
 
 Eigen::Isometry3d at(double x, double y, double z, double heading = 0) {
@@ -178,37 +178,19 @@ private:
     }
 
     void step(Reader& in, Writer& out) {
-        const auto steps = in.take<std::uint32_t>();
-        Writer touched;
-        std::uint16_t touches = 0;
-        out.put(steps);
-        for (std::uint32_t n = 0; n < steps; ++n) {
-            double asked[2] = {in.take<double>(), in.take<double>()};
-            if (!in.take<std::uint8_t>()) asked[0] = asked[1] = 0;
-            go(asked[0], asked[1]);
-            std::uint8_t bits = 0;
-            for (int side = 0; side < 2; ++side) {
-                // A servo has its speed after one step, unless its torque does not suffice.
-                const double rim = wheels_[side]->getVelocity(0) * sizes_->radius;
-                if (std::fabs(rim) < kStallMps && std::fabs(asked[side] - rim) > kShort * std::fabs(asked[side]))
-                    bits |= side == 0 ? kStalledLeft : kStalledRight;
-            }
+        const auto one = [&](double left, double right, bool is_powered) {
+            if (!is_powered) left = right = 0;
+            go(left, right);
+            Stepped made{wheels_[0]->getPosition(0) - zero_[0], wheels_[1]->getPosition(0) - zero_[1]};
+            // A servo has its speed after one step, unless its torque does not suffice.
+            made.bits = stalled(kStalledLeft, left, wheels_[0]->getVelocity(0) * sizes_->radius) |
+                        stalled(kStalledRight, right, wheels_[1]->getVelocity(0) * sizes_->radius);
             Eigen::Vector3d where;
-            const BodyNode* other = touch(&where);
-            if (other != nullptr) {
-                bits |= kTouches;
-                if (touching_ == 0)
-                    touched.put(n).put(where.x()).put(where.y()).text(other->getSkeleton()->getName()), ++touches;
-            }
-            touching_ = other != nullptr;
-            out.put(wheels_[0]->getPosition(0) - zero_[0]).put(wheels_[1]->getPosition(0) - zero_[1]).put(bits);
-        }
-        report(out);
-        out.put(touches);
-        out.data.insert(out.data.end(), touched.data.begin(), touched.data.end());
-        const std::vector<Thing> pushed = moved();
-        out.put(static_cast<std::uint16_t>(pushed.size()));
-        for (const Thing& t : pushed) out.text(t.name).put(t.x).put(t.y).put(t.heading);
+            if (const BodyNode* other = touch(&where))
+                made.bits |= kTouches, made.where = {where.x(), where.y()}, made.what = other->getSkeleton()->getName();
+            return made;
+        };
+        touching_ = make_steps(in, out, touching_ != 0, one, [&](Writer& to) { report(to); }, [&] { return moved(); });
     }
 
     // What the hull touches, and where; nothing for the floor.

@@ -40,7 +40,7 @@ namespace sim = gz::sim;
 using gz::math::Pose3d;
 using gz::math::Vector3d;
 
-constexpr double kCasterM = 0.03, kBehindM = 0.02, kMovedM = 1e-4, kStallMps = 0.05, kShort = 0.05;
+constexpr double kCasterM = 0.03, kBehindM = 0.02, kMovedM = 1e-4;
 constexpr int kSettleSteps = 300;
 const char kFloorAlone[] =
     "<sdf version='1.9'><world name='p2os'><model name='ground'><static>1</static><link name='l'><collision name='c'>"
@@ -250,33 +250,17 @@ private:
     }
 
     void step(Reader& in, Writer& out) {
-        const auto steps = in.take<std::uint32_t>();
-        Writer touched;
-        std::uint16_t touches = 0;
-        out.put(steps);
-        for (std::uint32_t n = 0; n < steps; ++n) {
-            double asked[2] = {in.take<double>(), in.take<double>()};
-            if (!in.take<std::uint8_t>()) asked[0] = asked[1] = 0;
-            go(asked[0], asked[1]);
-            std::uint8_t bits = 0;
-            for (int side = 0; side < 2; ++side)
-                // A commanded joint has its speed after one step, unless its torque does not suffice.
-                if (std::fabs(rim(side)) < kStallMps && std::fabs(asked[side] - rim(side)) > kShort * std::fabs(asked[side]))
-                    bits |= side == 0 ? kStalledLeft : kStalledRight;
+        const auto one = [&](double left, double right, bool is_powered) {
+            if (!is_powered) left = right = 0;
+            go(left, right);
+            Stepped made{angle(0), angle(1)};
+            // A commanded joint has its speed after one step, unless its torque does not suffice.
+            made.bits = stalled(kStalledLeft, left, rim(0)) | stalled(kStalledRight, right, rim(1));
             Vector3d where;
-            std::string name;
-            const bool touches_now = touch(&where, &name);
-            if (touches_now) bits |= kTouches;
-            if (touches_now && !touching_) touched.put(n).put(where.X()).put(where.Y()).text(name), ++touches;
-            touching_ = touches_now;
-            out.put(angle(0)).put(angle(1)).put(bits);
-        }
-        report(out);
-        out.put(touches);
-        out.data.insert(out.data.end(), touched.data.begin(), touched.data.end());
-        const std::vector<Thing> pushed = moved();
-        out.put(static_cast<std::uint16_t>(pushed.size()));
-        for (const Thing& t : pushed) out.text(t.name).put(t.x).put(t.y).put(t.heading);
+            if (touch(&where, &made.what)) made.bits |= kTouches, made.where = {where.X(), where.Y()};
+            return made;
+        };
+        touching_ = make_steps(in, out, touching_, one, [&](Writer& to) { report(to); }, [&] { return moved(); });
     }
 
     // Whether the hull touches something but the floor, where, and what.

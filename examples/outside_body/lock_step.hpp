@@ -245,6 +245,46 @@ public:
     }
 };
 
+// The steps ---------------------------------------------------------------------------------
+
+// What a step has come to: angles of the wheels, rad, the bits, and with kTouches what the hull touches, and where.
+struct Stepped {
+    double left = 0, right = 0;
+    std::uint8_t bits = 0;
+    Point where{0, 0};
+    std::string what{};
+};
+
+// The bit of a wheel that hardly turns, m/s at its rim, and falls short of what it was asked for.
+inline std::uint8_t stalled(std::uint8_t bit, double asked, double rim) {
+    return std::fabs(rim) < 0.05 && std::fabs(asked - rim) > 0.05 * std::fabs(asked) ? bit : 0;
+}
+
+// Answer Step: make each by `step(left, right, is_powered)`, then tell `report(out)` and the things that have `moved()`.
+// A touch is told where it begins; return whether the last step touches.
+template <typename Step, typename Report, typename Moved>
+bool make_steps(Reader& in, Writer& out, bool touching, Step step, Report report, Moved moved) {
+    const auto steps = in.take<std::uint32_t>();
+    Writer touched;
+    std::uint16_t touches = 0;
+    out.put(steps);
+    for (std::uint32_t n = 0; n < steps; ++n) {
+        const double left = in.take<double>(), right = in.take<double>();
+        const Stepped made = step(left, right, in.take<std::uint8_t>() != 0);
+        if ((made.bits & kTouches) && !touching)
+            touched.put(n).put(made.where.x).put(made.where.y).text(made.what), ++touches;
+        touching = made.bits & kTouches;
+        out.put(made.left).put(made.right).put(made.bits);
+    }
+    report(out);
+    out.put(touches);
+    out.data.insert(out.data.end(), touched.data.begin(), touched.data.end());
+    const std::vector<Thing> pushed = moved();
+    out.put(static_cast<std::uint16_t>(pushed.size()));
+    for (const Thing& t : pushed) out.text(t.name).put(t.x).put(t.y).put(t.heading);
+    return touching;
+}
+
 template <typename Body> void serve(int line, Body& body) {
     for (std::uint32_t size; read_all(line, &size, sizeof size);) {
         std::uint8_t type;

@@ -111,29 +111,18 @@ private:
     }
 
     void step(Reader& in, Writer& out) {
-        const auto steps = in.take<std::uint32_t>();
-        Writer touched;
-        std::uint16_t touches = 0;
-        out.put(steps);
-        for (std::uint32_t n = 0; n < steps; ++n) {
-            const double left = in.take<double>(), right = in.take<double>();
-            in.take<std::uint8_t>();
-            const bool was_touching = motion_.bits & kTouches;
+        const auto one = [&](double left, double right, bool) {
             std::string name;
-            if (!go(left, right, &name) && !was_touching) {
-                touched.put(n).put(motion_.pose.x).put(motion_.pose.y).text(name);
-                ++touches;
-            }
-            out.put(motion_.left).put(motion_.right).put(static_cast<std::uint8_t>(motion_.bits));
-        }
-        report(out);
-        out.put(touches);
-        out.data.insert(out.data.end(), touched.data.begin(), touched.data.end());
-        out.put<std::uint16_t>(0);  // nothing is pushed
+            go(left, right, &name);
+            const Motion& m = motion_;
+            return Stepped{m.left, m.right, static_cast<std::uint8_t>(m.bits), {m.pose.x, m.pose.y}, name};
+        };
+        make_steps(in, out, motion_.bits & kTouches, one, [&](Writer& to) { report(to); },
+                   [] { return std::vector<Thing>(); });  // nothing is pushed
     }
 
     // Move on by one step along the exact arc, or stall where that leads into a thing.
-    bool go(double left, double right, std::string* name) {
+    void go(double left, double right, std::string* name) {
         Motion next = motion_;
         const double forward = (left + right) / 2 * sizes_->step_s, turn = (right - left) / sizes_->track * sizes_->step_s;
         Pose& p = next.pose;
@@ -148,18 +137,17 @@ private:
         if (left == 0 && right == 0) {
             motion_.left_mps = motion_.right_mps = 0;
             motion_.bits &= kTouches;
-            return true;
+            return;
         }
         std::string there;
         if (clearance(p, name) == 0 && clearance(motion_.pose, &there) > 0) {
             motion_.left_mps = motion_.right_mps = 0;
             motion_.bits = kTouches | (left != 0 ? kStalledLeft : 0) | (right != 0 ? kStalledRight : 0);
-            return false;
+            return;
         }
         next.left += left * sizes_->step_s / sizes_->radius, next.right += right * sizes_->step_s / sizes_->radius;
         next.left_mps = left, next.right_mps = right, next.bits = 0;
         motion_ = next;
-        return true;
     }
 
     Plan plan_;
