@@ -184,9 +184,7 @@ class Bridge:
         """Wait for bytes or a client, and pass on what came."""
         self._wait()
         self._woke_at = self._clock()
-        gap_ns = self._gaps.gap(self._woke_at)
-        if gap_ns and self._tap.closing_frames():
-            self._release(f"the bridge paused for {gap_ns / NS_PER_S:.1f} s")
+        self._release_after_pause(self._woke_at)
         if self._client is None:
             self._accept()
             return
@@ -236,7 +234,8 @@ class Bridge:
         except TransportError as error:
             self._release(str(error))
             return
-        if not data or target is None:
+        # What was read may have waited for this process, which can stand still between any two lines.
+        if not data or target is None or self._release_after_pause(self._clock()):
             return
         chunk, lost = self._tap.observe(direction, data, self.now), ""
         try:
@@ -246,6 +245,14 @@ class Bridge:
         self._on_chunk(chunk)
         if lost:
             self._release(lost)
+
+    def _release_after_pause(self, now: Nanos) -> bool:
+        """Release both sides where this process stood still while a session was open; tell whether it did."""
+        gap_ns = self._gaps.gap(now)
+        is_over = bool(gap_ns and self._tap.closing_frames())
+        if is_over:
+            self._release(f"the bridge paused for {gap_ns / NS_PER_S:.1f} s")
+        return is_over
 
     def _change_baud(self) -> None:
         if self._tap.new_baud is None or self._robot is None:

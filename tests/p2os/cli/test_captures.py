@@ -235,6 +235,24 @@ def test_after_a_pause_a_bridge_stops_the_robot_and_passes_nothing_on_that_has_w
         joined.client.read()
 
 
+@pytest.mark.parametrize(("pause_ns", "passes"), [(550_000_000, True), (550_000_001, False)])
+def test_a_pause_before_a_bridge_reads_is_one_too(pause_ns: int, passes: bool) -> None:
+    joined = Joined()
+    client = joined.bridge._client
+    read = client.read
+
+    def read_late() -> bytes:
+        joined.now += pause_ns  # stopped behind the look at the clock, while bytes pile up
+        return read()
+
+    client.read = read_late
+    joined.client.write(VEL_200)
+    joined.bridge.turn()
+    assert joined.robot.read() == (VEL_200 if passes else STOP_FIRST)
+    assert joined.told[1:] == ([] if passes else ["the session was open: sent STOP, VEL 0 and CLOSE",
+                                                  "client gone: the bridge paused for 0.4 s"])  # fmt: skip
+
+
 def test_a_pause_of_a_third_of_a_second_is_borne_and_one_without_a_session_harms_nobody() -> None:
     joined = Joined()
     joined.client.write(VEL_200)
