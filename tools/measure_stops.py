@@ -54,8 +54,8 @@ LONGEST_S = 9.0
 #: How long the wheels are watched after they stand.
 AFTERWARDS_S = 2.0
 STARTING_S = 30.0
-#: A run in real time gives up where the machine does not follow, before a motor's first step too.
-NEVER_DROVE, TRIES = "it never drove", 4
+#: A run in real time gives up where the machine does not follow, before a motor's first step too: measured anew.
+NEVER_DROVE, GAVE_UP, TRIES = "it never drove", "it gave up by itself", 4
 #: Wheels slower than this stand, m/s.
 STANDING_MPS = 0.002
 
@@ -367,10 +367,10 @@ class Row:
 
 
 def measure(way: Way, event: Happening, tools: "Tools") -> Row:
-    """Drive, let it happen, and look; where a busy machine ended the driver before the robot drove, anew."""
+    """Drive, let it happen, and look; where a busy machine ended the driver before the event, anew."""
     for _ in range(TRIES):
         row = measure_once(way, event, tools)
-        if not row.problem.startswith(NEVER_DROVE) or row.exit_code is None:
+        if not row.problem.startswith((NEVER_DROVE, GAVE_UP)) or row.exit_code is None:
             break
     return row
 
@@ -388,7 +388,15 @@ def measure_once(way: Way, event: Happening, tools: "Tools") -> Row:
             row.exit_code = driver.process.poll()
             row.problem = f"{NEVER_DROVE} (exit code {row.exit_code})"
             return row
+        drove = time.monotonic()
         time.sleep(0.7)
+        if driver.process.poll() is not None:
+            row.exit_code = driver.process.poll()
+            has_stopped = until(lambda: bool(stops(cable, drove)), LONGEST_S) and until(
+                lambda: not robot.is_moving, LONGEST_S
+            )
+            row.problem = f"{GAVE_UP} (exit code {row.exit_code})" if has_stopped else "it left the robot moving"
+            return row
         if event.lets_key_go:
             driver.is_held.clear()
         began = time.monotonic()
