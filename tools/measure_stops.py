@@ -390,13 +390,6 @@ def measure_once(way: Way, event: Happening, tools: "Tools") -> Row:
             return row
         drove = time.monotonic()
         time.sleep(0.7)
-        if driver.process.poll() is not None:
-            row.exit_code = driver.process.poll()
-            has_stopped = until(lambda: bool(stops(cable, drove)), LONGEST_S) and until(
-                lambda: not robot.is_moving, LONGEST_S
-            )
-            row.problem = f"{GAVE_UP} (exit code {row.exit_code})" if has_stopped else "it left the robot moving"
-            return row
         if event.lets_key_go:
             driver.is_held.clear()
         began = time.monotonic()
@@ -414,6 +407,9 @@ def measure_once(way: Way, event: Happening, tools: "Tools") -> Row:
             row.stop_ms = round((found[0] - at) * 1000)
         after = cable.since(at)
         row.first = after[0][1].name if after else ""
+        if any(when < began for when in stops(cable, drove)) and not robot.is_moving:
+            row.problem = f"{GAVE_UP} (exit code {row.exit_code})"
+            return row
     row.problem = fault(row, event)
     return row
 
