@@ -6,8 +6,6 @@
 
 enum { FOR_INTERRUPT = 1, FOR_EVENT = 2, SLEEPDEEP = 4, SYSTICK = 15 };
 #define FIRST_EXCEPTION_RETURN 0xFFFFFFE0u
-/* No instruction stands at an odd address, so a run never ends there; the page is that of `scratch`. */
-#define NOWHERE 0x9FFFFFFFu
 /* UC_ERR_EXCEPTION: the TLB denied a fetch. */
 #define DENIED 21
 
@@ -39,7 +37,6 @@ struct core *core_new(void *unicorn, const struct unicorn_api *api, const struct
         core->api = *api;
         core->calls = *calls;
         core->none.start = core->none.end = UINT32_MAX;
-        core->none.after[0] = core->none.after[1] = &core->none;
         core->block = &core->none;
         core->paged_region = core->system_region = UINT32_MAX;
         core->waiting.interval = LEAST_INTERVAL;
