@@ -139,6 +139,7 @@ struct slot {
     uint64_t ns, cycle;
     uint32_t is_acting;
     struct device *device; /* null: Python's */
+    void (*event)(struct device *, uint64_t); /* of its kind; null: Python acts */
 };
 
 struct sink {
