@@ -144,7 +144,7 @@ def stripped(program: Path, hook: int) -> Callable[[], float]:
     core = engine._core  # noqa: SLF001
     core.remove_hook(engine._native_hooks[0])  # type: ignore[attr-defined]  # noqa: SLF001 - of the native one
     if hook:
-        core.hook_native("block", hook, 0)
+        core.hook_native("block", ctypes.c_void_p(hook), 0)
     core.drop_all_code()
 
     def run() -> float:
