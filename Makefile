@@ -66,6 +66,7 @@ unit: setup
 
 bench: setup
 	$(BIN)/python tools/bench/emulator.py
+	$(BIN)/python tools/bench/loops.py
 	$(BIN)/python tools/bench/buses.py
 	$(BIN)/python tools/bench/columns.py
 	$(BIN)/python tools/bench/bodies.py

@@ -12,7 +12,10 @@ from simbase.timing import Nanos
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Characters(Sequence[tuple[int, Nanos]]):
-    """Characters of one speed, as many words as times; `bit_ns` is how long a bit of them takes, in ns."""
+    """Characters of one speed, as many words as times; `bit_ns` is how long a bit of them takes, in ns.
+
+    Where no word has a ninth bit the words are `bytes`.
+    """
 
     words: Sequence[int]
     times: Sequence[Nanos]
@@ -21,10 +24,7 @@ class Characters(Sequence[tuple[int, Nanos]]):
     @property
     def data(self) -> bytes:
         """The low eight bits of each."""
-        try:
-            return bytes(self.words)
-        except ValueError:  # nine bits
-            return bytes(word & 0xFF for word in self.words)
+        return self.words if isinstance(self.words, bytes) else bytes([word & 0xFF for word in self.words])
 
     def __len__(self) -> int:
         return len(self.words)

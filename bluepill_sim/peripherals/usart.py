@@ -26,8 +26,9 @@ Invariant: a character ends floor(frame half-bits * BRR * 10**9 / (2 * PCLK)) ns
 after the point from which its run of characters is counted, never later than `due_ns` says.
 """
 
+import contextlib
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from enum import IntEnum, IntFlag
 
 from bluepill_sim.extension.layout import USART
@@ -376,13 +377,17 @@ class Usart(Peripheral):
 def _runs(sent: bytes) -> Iterator[tuple[tuple[int, int, int], Characters]]:
     """Yield the characters of rows of `WORD`, as many in one go as were sent alike: PCLK, BRR and format, and they."""
     cells = memoryview(sent).cast("I")
-    words, times = cells[_WORD::_ROW_WORDS].tolist(), cells.cast("B").cast("Q")[:: _ROW_WORDS // 2].tolist()
-    how = [cells[place::_ROW_WORDS].tolist() for place in range(_HOW.start, _HOW.stop)]
+    times = cells.cast("B").cast("Q")[:: _ROW_WORDS // 2]
+    count = len(times)
+    words: Sequence[int] = cells[_WORD::_ROW_WORDS].tolist()
+    with contextlib.suppress(ValueError):  # nine bits
+        words = bytes(words)
+    how = [cells[place::_ROW_WORDS] for place in range(_HOW.start, _HOW.stop)]
     first = 0
-    while first < len(words):
+    while first < count:
         alike = how[0][first], how[1][first], how[2][first]
-        last = len(words)
-        if any(column.count(value) != len(words) for column, value in zip(how, alike, strict=True)):
+        last = count
+        if any(column.tobytes() != count * column[first : first + 1].tobytes() for column in how):
             rows = zip(*(column[first:] for column in how), strict=True)
             last = next((first + n for n, row in enumerate(rows) if row != alike), last)
         yield alike, Characters(words[first:last], times[first:last], alike[1] * 1_000_000_000 // alike[0])

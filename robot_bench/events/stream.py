@@ -4,7 +4,8 @@ Parts report in any order; so events wait until nobody can precede them, and `re
 sorted by time, then by kind, then by the order of telling. Edges come in bulk: they become events one by
 one only on wires that somebody has subscribed to. Where nobody has, nothing is spent on them.
 
-Invariant: what a subscriber gets depends neither on when `release` is called nor on who else subscribes.
+Invariants: what a subscriber gets depends neither on when `release` is called nor on who else subscribes; what waits
+is in order.
 """
 
 from bisect import bisect_right, insort
@@ -101,9 +102,17 @@ class EventStream(Stateful):
         self._sequence += 1
         item = event.t, RANKS[type(event)], self._sequence, event
         if self._batch is None:
-            self._pending.append(item)
+            self._keep(item)
         else:
             insort(self._batch, item, lo=self._place)  # behind what was handed on
+
+    def _keep(self, item: _Item) -> None:
+        """Put an event among those that wait: mostly behind them, but a part may be far ahead of the others."""
+        pending = self._pending
+        if not pending or pending[-1] < item:
+            pending.append(item)
+        else:
+            insort(pending, item)
 
     def wants_edges(self, wire: str) -> bool:
         """Whether somebody wants the edges of a wire as events."""
@@ -118,7 +127,6 @@ class EventStream(Stateful):
                 edges up to then that were not handed on before.
         """
         pending = self._pending
-        pending.sort()
         count = bisect_right(pending, limit, key=_TIME)
         batch = self._batch = pending[:count]
         self._place = 0
@@ -136,7 +144,8 @@ class EventStream(Stateful):
             self._batch = None
             self.released_until = max(self.released_until, limit)
             count = bisect_right(batch, limit, key=_TIME)
-            pending += batch[count:]
+            for item in batch[count:]:
+                self._keep(item)
             recorded = [event for _, rank, _, event in batch[:count] if rank != _EDGE_RANK]
             for recorder in self._recorders:
                 recorder(recorded, limit)
@@ -162,4 +171,4 @@ class EventStream(Stateful):
 
     def pending(self) -> list[Recorded]:
         """Return what was published and not handed on yet, in order."""
-        return [event for *_, event in sorted(self._pending)]
+        return [event for *_, event in self._pending]

@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from operator import itemgetter
 from typing import Protocol
 
+from bluepill_sim.fabric.characters import Characters
 from p2os.pioneer.body.contract import BodyState, Hit
 from p2os.pioneer.world.geometry import Footprint
 from p2os.pioneer.world.model import Obstacle
@@ -177,13 +178,14 @@ class Recorder(Stateful):
     def usart(self, sent: Sequence[tuple[int, Nanos]], port: str = CONSOLE) -> None:
         """Take what a port of the chip has sent: (word, ns at the end of its stop bit), oldest first."""
         text = self._text.setdefault(port, bytearray())
-        words = [word for word, _ in sent]
+        words = sent.words if isinstance(sent, Characters) else [word for word, _ in sent]
         first = 0
         while first < len(words):
             last = min(len(words), first + LONGEST_TEXT - len(text))
             with contextlib.suppress(ValueError):  # no end of a line
                 last = words.index(_LINE_END, first, last) + 1
-            text += bytes([word & 0xFF for word in words[first:last]])
+            portion = words[first:last]
+            text += portion if isinstance(portion, bytes) else bytes([word & 0xFF for word in portion])
             if words[last - 1] == _LINE_END or len(text) >= LONGEST_TEXT:
                 self._tell_text(port, sent[last - 1][1])
             first = last

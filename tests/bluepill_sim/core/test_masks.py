@@ -86,3 +86,14 @@ def test_a_step_over_msr_keeps_no_more(boot, core, monkeypatch) -> None:
     while not machine.is_done:
         machine.board.chip.step(machine.board.now_ns + 1000)
     assert machine.log == [0xF0]
+
+
+@pytest.mark.parametrize("core", ["python", "native"])
+def test_bits_that_do_not_exist_are_not_kept_by_an_msr_in_a_loop_either(run, core, monkeypatch) -> None:
+    """What follows the MSR is known from the second round on."""
+    monkeypatch.setenv("P2OS_CORE", core)
+    machine = run(
+        "movs r4, #4\nloop: mov32 r1, #0xFF\nmsr basepri, r1\nmrs r0, basepri\nb next\n"
+        "next: movs r1, #0\nmsr basepri, r1\nlog r0\nsubs r4, #1\nbne loop"
+    )
+    assert machine.log == [0xF0] * 4

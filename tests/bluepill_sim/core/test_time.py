@@ -263,3 +263,19 @@ def test_a_conditional_branch_to_itself_is_left_only_by_an_interrupt(boot) -> No
     ).run(500)  # fmt: skip
     assert machine.log[0] == 1
     assert machine.is_done
+
+
+def test_code_costs_the_same_at_both_aliases_of_the_flash(run, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each block ends where it does at its own alias: one that falls through is not taken for one that branches."""
+    source = COUNT_CYCLES + (
+        "movs r4, #3\nmov r5, pc\n.half 0x022D\n.half 0x0A2D\nadds r5, #7\nb loop\n"  # r5: f at 0x00000000 and up
+        "f: cmp r0, #200\nbeq g\ng: bx lr\n"
+        "loop: ldr r2, [r6, #0]\nbl f\nldr r3, [r6, #0]\nsubs r0, r3, r2\nlog r0\n"
+        "ldr r2, [r6, #0]\nblx r5\nldr r3, [r6, #0]\nsubs r0, r3, r2\nlog r0\nsubs r4, #1\nbne loop"
+    )
+    logs = []
+    for core in ("native", "python"):
+        monkeypatch.setenv("P2OS_CORE", core)
+        logs.append(run(source).log)
+    assert logs[0] == logs[1]
+    assert len(set(logs[0][::2])) == len(set(logs[0][1::2])) == 1

@@ -193,3 +193,13 @@ def test_a_register_that_is_polled_is_waited_for_at_once(monkeypatch: pytest.Mon
     board.run_for("900 us")
     assert board.register("R2") == 0
     assert board.chip.engine.shared.logged - before < 150  # of 900 rounds
+
+
+def test_the_rounds_of_a_loop_that_polls_a_counter_pass_at_once(watchdog: None) -> None:
+    source = program(["the cycle counter"]).replace("movs r1, #7", "movs r1, #0")
+    board = make(source.replace("bpl w0", "bpl w0\nmovs r3, #0\nstr r3, [r4, #0]"), "native")
+    board.advance_to(1_000_000)
+    before = board.chip.engine.shared.logged
+    board.advance_to(9_000_000)
+    assert board.register("R5") > 10
+    assert board.chip.engine.shared.logged - before < 3_000  # of 12,000 rounds

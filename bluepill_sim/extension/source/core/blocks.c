@@ -4,11 +4,13 @@
 
 #include "core.h"
 
+static uint32_t flash_slot(uint32_t address) { return address >> 1 & (FLASH_SLOTS - 1); }
+
 static struct row **slot(struct core *core, uint32_t address)
 {
     const struct shared *s = &core->shared;
     if (address - s->flash_base < s->flash_bytes || address < s->flash_bytes) {
-        return &core->flash_rows[(address & (2 * FLASH_SLOTS - 1)) >> 1];
+        return &core->flash_rows[flash_slot(address)];
     }
     if (address - s->sram_base < 2 * SRAM_SLOTS) {
         return &core->sram_rows[(address - s->sram_base) >> 1];
@@ -127,23 +129,24 @@ static void enter_special(struct core *core, uint32_t address, uint32_t size, st
     }
 }
 
-/* Lets nobody go on to a row without looking for it. */
-static void forget_order(struct core *core)
+/* Finds out whether a block may be entered without a closer look. */
+static void find_plain(const struct core *core, struct row *row)
 {
-    for (struct row *row = core->all; row != NULL; row = row->next) {
-        row->after[0] = row->after[1] = &core->none;
-    }
+    const bool is_plain = !(row->flags & ROW_ATTENTION) && row->loop == NULL && core->records == NULL;
+    row->plain_start = is_plain ? row->start : NOWHERE;
 }
 
 /* Records from now on, `room` rows before Python is called; 0: no more. Returns false without memory for it. */
 bool core_start_recording(struct core *core, uint32_t room)
 {
-    forget_order(core);
     free(core->records);
     core->records = room ? malloc(room * sizeof *core->records) : NULL;
     core->record_room = room;
     core->record_count = 0;
     core->shared.is_first = 1;
+    for (struct row *row = core->all; row != NULL; row = row->next) {
+        find_plain(core, row);
+    }
     return !room || core->records != NULL;
 }
 
@@ -166,7 +169,8 @@ static RARELY void trim_registers(struct core *core)
 /* Enters a block that may be the first, an unusual one, or too late. */
 static __attribute__((noinline)) void enter_block(struct core *core, uint32_t address, uint32_t size)
 {
-    struct row *before = core->block;
+    const struct row *before = core->block;
+    core->shared.cycle += before->costs[address != before->end];
     if (UNLIKELY(before->flags & ROW_CHANGES_MASKS)) {
         trim_registers(core);
     }
@@ -194,8 +198,6 @@ static __attribute__((noinline)) void enter_block(struct core *core, uint32_t ad
     record(core, address, 0);
     if (UNLIKELY(row == before) && row->loop != NULL && core->records == NULL) {
         wait_on(core, row, rounds_of_counter(core, row));
-    } else if (!(before->flags & ROW_CHANGES_MASKS) && before != &core->none && core->records == NULL) {
-        before->after[address != before->end] = row;
     }
 }
 
@@ -205,14 +207,13 @@ void core_on_block(void *unicorn, uint64_t at, uint32_t size, void *user)
     struct core *core = user;
     const struct row *before = core->block;
     const uint32_t address = (uint32_t)at;
-    const bool is_elsewhere = address != before->end;
-    struct row *row = before->after[is_elsewhere];
-    const uint64_t cycle = core->shared.cycle + before->costs[is_elsewhere];
-    core->shared.cycle = cycle;
-    if (UNLIKELY(row->start != address || cycle >= core->shared.stop_at)) {
+    struct row *row = core->flash_rows[flash_slot(address)];
+    const uint64_t cycle = core->shared.cycle + before->passed[address != before->end];
+    if (UNLIKELY(row == NULL || row->plain_start != address || cycle >= core->shared.stop_at)) {
         enter_block(core, address, size);
         return;
     }
+    core->shared.cycle = cycle;
     begin_block(core, row);
     core->shared.last[core->shared.logged++ % LAST_ROWS] = (struct record){cycle, address, 0};
 }
@@ -230,8 +231,11 @@ bool core_add_row(struct core *core, uint32_t start, uint32_t end, uint32_t stra
         free(code);
         return false;
     }
-    *row = (struct row){.start = start, .end = end, .costs = {straight, taken}, .after = {&core->none, &core->none},
+    const bool is_looked_after = flags & ROW_CHANGES_MASKS;
+    *row = (struct row){.start = start, .end = end, .costs = {straight, taken},
+                        .passed = {is_looked_after ? NEVER : straight, is_looked_after ? NEVER : taken},
                         .flags = flags, .count = count, .host = host, .code = code, .next = core->all};
+    find_plain(core, row);
     memcpy(row->instructions, instructions, list);
     if (host != NULL) {
         memcpy(code, host, end - start);
@@ -239,9 +243,6 @@ bool core_add_row(struct core *core, uint32_t start, uint32_t end, uint32_t stra
         for (uint32_t n = first; n <= last && n < CODE_PLACES; ++n) {
             core->code_places[n / 8] |= (uint8_t)(1 << n % 8);
         }
-    }
-    if (*at != NULL) {
-        forget_order(core);
     }
     core->all = row;
     *at = row;
@@ -255,6 +256,7 @@ bool core_set_loop(struct core *core, uint32_t start, const struct loop *loop)
     row->loop = malloc(sizeof *row->loop);
     if (row->loop != NULL) {
         *row->loop = *loop;
+        find_plain(core, row);
     }
     return row->loop != NULL;
 }
@@ -264,7 +266,6 @@ bool core_set_loop(struct core *core, uint32_t start, const struct loop *loop)
 void core_forget_range(struct core *core, uint32_t first, uint32_t end)
 {
     memset(core->forced, 0, sizeof core->forced);
-    forget_order(core);
     for (struct row **at = &core->all; *at != NULL;) {
         struct row *row = *at;
         if (row->start >= end || row->end <= first) {

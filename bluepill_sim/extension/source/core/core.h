@@ -10,6 +10,8 @@
 #include "system.h"
 
 #define NEVER (UINT64_C(1) << 62)
+/* No instruction stands at an odd address, so a run never ends there; the page is that of `scratch`. */
+#define NOWHERE 0x9FFFFFFFu
 /* ITSTATE in the CPSR, and the exception number of interrupt line 0. */
 #define IT_BITS 0x0600FC00u
 enum { ENTRY_CYCLES = 12, EXIT_CYCLES = 12, TAIL_CHAIN_CYCLES = 6 };
@@ -61,10 +63,10 @@ enum row_flag {
 struct row {
     uint32_t start, end;
     uint32_t costs[2]; /* in cycles, where it goes on at its end, and elsewhere */
-    /* The block that came after it last time, likewise, where nothing but its start and the time need be looked at;
-     * else the core's `none`. */
-    struct row *after[2];
+    /* Where nothing but the time need be looked at when it is entered: its start; else an address where no block is. */
+    uint32_t plain_start;
     uint32_t flags, count;
+    uint64_t passed[2]; /* its costs, or more than any time where what comes after it has to be looked at */
     const uint8_t *host; /* of code in writable memory: where it stands now */
     uint8_t *code;       /* and what it was when it was measured */
     struct row *next;    /* in the list of all rows, or of dropped ones */

@@ -238,15 +238,17 @@ bool leave(struct core *core, uint32_t exc_return)
     if (!number || !(to_thread || exc_return == TO_HANDLER) || to_thread != is_last) {
         return false;
     }
-    static const int numbers[5] = {REG_CONTROL, REG_CPSR, REG_PSP, REG_MSP, REG_FAULTMASK};
+    /* A handler's SP is MSP. */
+    static const int numbers[5] = {REG_CONTROL, REG_CPSR, REG_FAULTMASK, REG_SP, REG_PSP};
     uint32_t value[5];
     void *at[12] = {&value[0], &value[1], &value[2], &value[3], &value[4]};
-    core->api.read_registers(core->unicorn, numbers, at, 5);
-    const uint32_t control = value[0], cpsr = value[1], psp = value[2], msp = value[3];
-    uint32_t *frame = sram_at(core, exc_return == TO_THREAD_PSP ? psp : msp, FRAME_BYTES);
+    const bool uses_psp = exc_return == TO_THREAD_PSP;
+    core->api.read_registers(core->unicorn, numbers, at, uses_psp ? 5 : 4);
+    const uint32_t control = value[0], cpsr = value[1], msp = value[3], from = value[uses_psp ? 4 : 3];
+    uint32_t *frame = sram_at(core, from, FRAME_BYTES);
     const bool may_stop = to_thread && s->scr & SLEEPONEXIT && s->scr & SLEEPDEEP;
     const bool steps = number == DEBUG_MONITOR && s->demcr & MON_STEP;
-    if (frame == NULL || value[4] || may_stop || steps || !has_vectors(core)) {
+    if (frame == NULL || value[2] || may_stop || steps || !has_vectors(core)) {
         return false;
     }
     const uint32_t xpsr = frame[7];
@@ -268,8 +270,8 @@ bool leave(struct core *core, uint32_t exc_return)
         return true;
     }
     s->exception_number = xpsr & 0x1FF;
-    const uint32_t select = exc_return == TO_THREAD_PSP ? SPSEL : 0;
-    const uint32_t sp = (exc_return == TO_THREAD_PSP ? psp : msp) + FRAME_BYTES + (xpsr & ALIGN_BIT ? 4 : 0);
+    const uint32_t select = uses_psp ? SPSEL : 0;
+    const uint32_t sp = from + FRAME_BYTES + (xpsr & ALIGN_BIT ? 4 : 0);
     const uint32_t kept = FLAG_BITS | IT_BITS;
     /* CONTROL thrice: nPRIV would forbid the next writes, SPSEL is only taken in thread mode, nPRIV comes last. Each
      * costs as much as five others, and mostly it is what it was.

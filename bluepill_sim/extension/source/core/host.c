@@ -62,7 +62,10 @@ static bool registers(void *user, struct bus_access *access)
     }
     const struct device_kind *kind = page->device->kind;
     const uint32_t behaviour = page->behaviour[index];
-    fabric_catch_up(core->fabric, page->device->slot, now_ns(core->fabric));
+    const uint64_t now = now_ns(core->fabric);
+    if (core->fabric->slots[page->device->slot].ns <= now) {
+        fabric_catch_up(core->fabric, page->device->slot, now);
+    }
     if (access->is_write) {
         if (!(behaviour & (WRITES_PLAIN | WRITES_NATIVE))) {
             return false;

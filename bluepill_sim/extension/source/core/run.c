@@ -6,8 +6,6 @@
 
 enum { FOR_INTERRUPT = 1, FOR_EVENT = 2, SLEEPDEEP = 4, SYSTICK = 15 };
 #define FIRST_EXCEPTION_RETURN 0xFFFFFFE0u
-/* No instruction stands at an odd address, so a run never ends there; the page is that of `scratch`. */
-#define NOWHERE 0x9FFFFFFFu
 /* UC_ERR_EXCEPTION: the TLB denied a fetch. */
 #define DENIED 21
 
@@ -39,7 +37,6 @@ struct core *core_new(void *unicorn, const struct unicorn_api *api, const struct
         core->api = *api;
         core->calls = *calls;
         core->none.start = core->none.end = UINT32_MAX;
-        core->none.after[0] = core->none.after[1] = &core->none;
         core->block = &core->none;
         core->paged_region = core->system_region = UINT32_MAX;
         core->waiting.interval = LEAST_INTERVAL;
@@ -90,13 +87,20 @@ static void settle_at(struct core *core, uint32_t pc)
 }
 
 /* Charges what of the running block has been run when the core stands at `pc`. */
-static void settle(struct core *core, uint32_t pc)
+static void charge(struct core *core, uint32_t pc)
 {
     const struct row *row = core->block;
     if (row != &core->none) {
         /* The refill of an exception return is part of the exception's exit. */
         core->shared.cycle += pc >= FIRST_EXCEPTION_RETURN ? row->costs[0] : cycles_until(row, pc);
     }
+    core->block = &core->none;
+    core->shared.pc = pc;
+}
+
+static void settle(struct core *core, uint32_t pc)
+{
+    charge(core, pc);
     settle_at(core, pc);
 }
 
@@ -166,7 +170,8 @@ static bool turns(struct core *core, uint32_t kind, uint32_t pc)
     if (kind != HALT_EXCEPTION_RETURN && kind != HALT_SUPERVISOR_CALL) {
         return false;
     }
-    settle(core, pc);
+    charge(core, pc);
+    core->shared.is_thumb = 1; /* an instruction has been run */
     if (!may_turn(core) || !(kind == HALT_EXCEPTION_RETURN ? leave(core, pc) : supervisor_call(core, pc))) {
         return false;
     }

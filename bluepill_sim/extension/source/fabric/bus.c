@@ -31,7 +31,7 @@ bool is_memory(const struct fabric *fabric, uint32_t address, bool is_write)
 
 static bool reach_memory(struct fabric *fabric, struct bus_access *access)
 {
-    for (uint32_t n = 0; n < fabric->memory_count; ++n) {
+    for (uint32_t n = fabric->memory_count; n-- > 0;) { /* mostly it is SRAM, the last one */
         const struct memory *memory = &fabric->memories[n];
         const uint32_t at = access->address - memory->base;
         if (at >= memory->size || (access->is_write && !memory->is_writable)) {

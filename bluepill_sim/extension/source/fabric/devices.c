@@ -31,6 +31,7 @@ struct fabric *fabric_new(const struct fabric_calls *calls, struct port *ports, 
         }
         fabric->devices[0].kind = &waves_kind; /* the first slot is that of the pins */
         fabric->slots[0].device = &fabric->devices[0];
+        fabric->slots[0].event = waves_kind.event;
         fabric->slot_count = 1;
     }
     return fabric;
@@ -65,6 +66,7 @@ bool fabric_add_device(struct fabric *fabric, uint32_t slot, const char *name, u
             device->words = words;
             device->state = state;
             fabric->slots[slot].device = device;
+            fabric->slots[slot].event = kind->event;
             return true;
         }
     }

@@ -18,7 +18,7 @@
 /* Kept out of its callers, which stay short enough to need no stack. */
 #define RARELY __attribute__((noinline, cold))
 
-enum { SLOTS = 128, LINES = 192, SUBSCRIBERS = 16, OUTPUTS = 24, SINKS = 8, WORDS = 1024, MEMORIES = 4, MOST_ROWS = 32768, COUNTERS = 8, LINE_WORDS = LINES / 64 };
+enum { SLOTS = 128, LINES = 192, SUBSCRIBERS = 16, OUTPUTS = 24, SINKS = 8, WORDS = 8192, MEMORIES = 4, MOST_ROWS = 32768, COUNTERS = 8, LINE_WORDS = LINES / 64 };
 /* The first lines are those of interrupts, by their numbers. */
 enum { GATE_REGISTERS = 3 }; /* AHB, APB2, APB1 */
 enum { IRQ_LINES_END = 64, NO_LINE = 255 };
@@ -139,6 +139,7 @@ struct slot {
     uint64_t ns, cycle;
     uint32_t is_acting;
     struct device *device; /* null: Python's */
+    void (*event)(struct device *, uint64_t); /* of its kind; null: Python acts */
 };
 
 struct sink {

@@ -98,12 +98,10 @@ uint64_t quiet_ns(const struct device *device)
     return first;
 }
 
-static bool is_pythons(const struct slot *slot) { return slot->device == NULL || slot->device->kind->event == NULL; }
-
 bool waits_for_python(const struct fabric *fabric, uint64_t cycle)
 {
     for (uint32_t n = 0; n < fabric->ordered && fabric->slots[fabric->order[n]].cycle <= cycle; ++n) {
-        if (is_pythons(&fabric->slots[fabric->order[n]])) {
+        if (fabric->slots[fabric->order[n]].event == NULL) {
             return true;
         }
     }
@@ -112,12 +110,11 @@ bool waits_for_python(const struct fabric *fabric, uint64_t cycle)
 
 static void act(struct fabric *fabric, struct slot *slot)
 {
-    struct device *device = slot->device;
     slot->is_acting = 1;
-    if (is_pythons(slot)) {
+    if (slot->event == NULL) {
         fabric->calls.event((uint32_t)(slot - fabric->slots), slot->ns);
     } else {
-        device->kind->event(device, slot->ns);
+        slot->event(slot->device, slot->ns);
     }
     slot->is_acting = 0;
 }
