@@ -162,6 +162,8 @@ SHARED = Struct(
         Field("has_fault", "u32", doc="`fault` waits for Python"),
         Field("waits", "u32", doc="the block ends before its next access: the flash cannot give more code now"),
         Field("waits_end", "u32"),
+        Field("bus_error_cycle", "u64", doc="when the error of a buffered store comes; all ones: none is on its way"),
+        *_fields("u32", "bus_error_pc", "bus_error_address"),
         Field("fault", "fault"),
         Field("last", "record", LAST_ROWS),
     ),

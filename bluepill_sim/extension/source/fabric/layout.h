@@ -177,10 +177,13 @@ struct shared {
     uint32_t has_fault; /* `fault` waits for Python */
     uint32_t waits; /* the block ends before its next access: the flash cannot give more code now */
     uint32_t waits_end;
+    uint64_t bus_error_cycle; /* when the error of a buffered store comes; all ones: none is on its way */
+    uint32_t bus_error_pc;
+    uint32_t bus_error_address;
     struct fault fault;
     struct record last[32];
 };
-_Static_assert(sizeof(struct shared) == 1720, "shared");
+_Static_assert(sizeof(struct shared) == 1736, "shared");
 
 /* The pins of one port, a bit each. RM0008 9.1, table 20. */
 struct port {
