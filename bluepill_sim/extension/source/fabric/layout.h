@@ -253,9 +253,17 @@ struct usart {
     uint32_t rx_waits; /* the far end waits for nRTS */
     uint32_t bits; /* bits of a character to come on the TX pin, and a mark above them; 0: nobody looks */
     uint32_t rx_more; /* Python has more characters to come */
+    uint64_t ck_due_ns; /* the next edge of the clock on CK, */
+    uint64_t ck_half_bits; /* and half-bits up to it */
+    uint32_t ck_edges; /* edges to come; 0: nobody looks */
+    uint32_t ck_pin;
+    uint32_t ck; /* the level that CK was last given */
+    uint32_t ck_count; /* bits of RX that edges of a character have taken, */
+    uint32_t ck_word; /* and they */
+    uint32_t ck_end;
     uint32_t rx[256]; /* what DR will read, and above it the flags of SR */
 };
-_Static_assert(sizeof(struct usart) == 1160, "usart");
+_Static_assert(sizeof(struct usart) == 1200, "usart");
 
 /* What EXTI holds beyond its registers. */
 struct exti {
