@@ -84,6 +84,8 @@ _NEVER = 1 << 62
 _AN_EARLIER_PC = 0
 
 _T_BIT = 1 << 24
+#: Unicorn finds what is mapped here in a hook only after that.
+_LAST_PAGE = 0xFFFF_FC00
 #: ACTLR: stores are not buffered.
 DISDEFWBUF = 1 << 1
 
@@ -256,7 +258,7 @@ class Engine(Stateful):
         """
         halt = self._run(stop_at)
         while halt.kind is HaltKind.TAKEN_WRITE:
-            halt = self._step_over_write(stop_at)
+            halt = self._step_over_write(halt, stop_at)
             if halt.kind is HaltKind.STEP:
                 must_look = self.shared.waits or self.shared.bus_error_cycle != NO_TIME
                 halt = Halt(HaltKind.BOUNDARY, halt.pc) if must_look else self._run(stop_at)
@@ -266,7 +268,7 @@ class Engine(Stateful):
         """Run one instruction: a STEP, or whatever else ends it; what an IT block skips is stepped over."""
         halt = self._step(stop_at)
         if halt.kind is HaltKind.TAKEN_WRITE:
-            halt = self._step_over_write(stop_at)
+            halt = self._step_over_write(halt, stop_at)
         elif halt.kind is HaltKind.WATCHPOINT:
             halt = self._step_over_access(halt, stop_at)
         self._trim_registers()
@@ -381,9 +383,12 @@ class Engine(Stateful):
             return Halt(HaltKind.WATCHPOINT, after.pc, halt.address)
         return replace(after, watched=halt.address)
 
-    def _step_over_write(self, stop_at: int) -> Halt:
+    def _step_over_write(self, halt: Halt, stop_at: int) -> Halt:
         """Let the instruction write where it may not, and have put right at once what Unicorn stores there."""
         self._lets_writes_through = True
+        if halt.address is not None and halt.address >= _LAST_PAGE:
+            self._core.add_sink(halt.address)
+            self.on_bus_error(self.cycle, halt.pc, halt.address)
         try:
             return self._step(stop_at)
         finally:

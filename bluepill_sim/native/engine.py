@@ -258,7 +258,7 @@ class NativeEngine(Engine):
         halt = self._halt_of(kind)
         if halt is not None and halt.kind is HaltKind.TAKEN_WRITE:
             self.use_python(True)
-            halt = self._step_over_write(limit)
+            halt = self._step_over_write(halt, limit)
         return kind == DELIVER, None if halt is not None and halt.kind is HaltKind.STEP else halt
 
     def _halt_of(self, kind: int) -> Halt | None:
