@@ -20,7 +20,7 @@ from contextlib import contextmanager
 
 from bluepill_sim.core import GENERAL, BlockRecorder
 from bluepill_sim.core.block_cost import NO_BLOCK, Block, measure_block
-from bluepill_sim.core.comparators import cycles_to_match
+from bluepill_sim.core.debugging.comparators import cycles_to_match
 from bluepill_sim.core.forced_bits import forced_bits
 from bluepill_sim.core.halts import ChipReached, HaltKind
 from bluepill_sim.core.nvic import NMI

@@ -38,8 +38,8 @@ from bluepill_sim.core.blocks import (
     copy_of,
     it_state_of,
 )
-from bluepill_sim.core.debug_unit import DebugUnit, Watchpoint
-from bluepill_sim.core.flash_patch import PAGE_BYTES, VIEWS_BASE, VIEWS_BYTES, FlashPatch, View
+from bluepill_sim.core.debugging.debug_unit import DebugUnit, Watchpoint
+from bluepill_sim.core.debugging.flash_patch import PAGE_BYTES, VIEWS_BASE, VIEWS_BYTES, FlashPatch, View
 from bluepill_sim.core.halts import DEBUG_HALTS, Halt, HaltKind
 from bluepill_sim.core.recorder import BLOCK, BlockLog, BlockRecorder, KeptRows, LastRows
 from bluepill_sim.core.thumb import Kind

@@ -22,7 +22,7 @@ from enum import Enum
 from typing import Any
 
 from bluepill_sim.core.blocks import it_state_of
-from bluepill_sim.core.comparators import MATCHED, MON_EN, MON_STEP, DebugEvent, points_of
+from bluepill_sim.core.debugging.comparators import MATCHED, MON_EN, MON_STEP, DebugEvent, points_of
 from bluepill_sim.core.engine import FIRST_EXCEPTION_RETURN, Engine
 from bluepill_sim.core.faults import FAULT_OF_HALT, FAULT_ROWS, HFSR_FORCED, FaultKind, SeenFault
 from bluepill_sim.core.halts import DEBUG_HALTS, Halt, HaltKind

@@ -199,7 +199,19 @@ def test_a_store_under_it_is_made_or_not(make: Any, condition: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "address", [0x0800_8000, 0x8000, 0x1FFF_F000, 0x1FFF_F7E0, 0x9FFF_FC00, 0x4002_4000, 0xE010_0000, 0xFFFF_FBFC, 0xFFFF_FC00, 0xFFFF_FFFC]
+    "address",
+    [
+        0x0800_8000,
+        0x8000,
+        0x1FFF_F000,
+        0x1FFF_F7E0,
+        0x9FFF_FC00,
+        0x4002_4000,
+        0xE010_0000,
+        0xFFFF_FBFC,
+        0xFFFF_FC00,
+        0xFFFF_FFFC,
+    ],
 )
 def test_memory_that_is_read_only_keeps_what_it_holds(make: Any, address: int) -> None:
     """Flash takes a halfword alone; where its controller refuses one it says so by a flag, and this is a word."""

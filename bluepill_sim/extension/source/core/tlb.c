@@ -8,7 +8,7 @@
 
 enum { MAY_READ = 1, MAY_WRITE = 2, MAY_EXECUTE = 4, READ = 16, FETCH = 18, VIEW_PAGE = 0x400 };
 
-/* Where the copies of core/flash_patch.py are; the program finds nothing there, as below it. */
+/* Where the copies of core/debugging/flash_patch.py are; the program finds nothing there, as below it. */
 #define VIEWS_BASE 0x9FFF8000u
 #define VIEWS_BYTES 0x4000u
 

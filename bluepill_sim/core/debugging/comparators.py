@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from enum import IntFlag
 from typing import Any
 
-from bluepill_sim.core.debug_unit import WatchKind, Watchpoint
-from bluepill_sim.core.flash_patch import Remapped
+from bluepill_sim.core.debugging.debug_unit import WatchKind, Watchpoint
+from bluepill_sim.core.debugging.flash_patch import Remapped
 
 #: DEMCR.
 MON_EN, MON_STEP, TRCENA = 1 << 16, 1 << 18, 1 << 24
