@@ -8,9 +8,9 @@ rest of the architecture is done by hand, always at a block boundary:
     SVC, fault            -> enter at once, escalated to HardFault if it may not
     HardFault that faults -> lockup: only a reset helps
     WFI, WFE              -> asleep: time jumps to what wakes the core
+    buffered store that failed -> one instruction at a time until its error comes
 
-Not modelled: the MPU, late arrival, lazy stacking (no FPU), the privilege
-check of the system control space, DebugMonitor.
+Not modelled: the MPU, which the part lacks; lazy stacking (no FPU).
 
 Source: ARMv7-M Architecture Reference Manual B1.5; TRM r1p1 chapter 5 for cycles.
 Invariant: `exception_number` is what IPSR holds in the engine.
