@@ -50,8 +50,8 @@ ENTRY_CYCLES, EXIT_CYCLES, TAIL_CHAIN_CYCLES = 12, 12, 6
 
 #: chosen: a cycle of the store, and two of the bus, whose answer ERROR takes two (AMBA 3 AHB-Lite 5.1.3).
 _BUS_ERROR_CYCLES = 3
-#: DSB, DMB and ISB, which wait for the write buffer (TRM r2p0 3.5).
-_BARRIERS = {bytes((0xBF, 0xF3, option << 4 | 15, 0x8F)) for option in (4, 5, 6)}
+#: DSB and DMB, which wait for the write buffer (TRM r2p0 3.5); an ISB takes longer than it.
+_BARRIERS = {bytes((0xBF, 0xF3, option << 4 | 15, 0x8F)) for option in (4, 5)}
 
 #: SHCSR enable bits.
 MEMFAULTENA = 1 << 16

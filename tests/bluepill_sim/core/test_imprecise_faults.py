@@ -102,6 +102,12 @@ def test_a_disabled_bus_fault_is_a_hard_fault_whose_report_names_the_store(make:
     assert not machine.board.has_died
 
 
+def test_of_two_stores_that_fail_the_first_counts(make: Any) -> None:
+    machine = make(BAD + "str r2, [r3, #4]\nnop\nnop\nnop\nlog #1\nb stop").run(100)
+    assert machine.log == [9, 6, IMPRECISERR, 1]
+    assert (machine.board.fault.pc, machine.board.fault.address) == (machine.label("bad"), NOWHERE)
+
+
 @pytest.mark.parametrize(("before", "after"), [("cpsid i", "cpsie i"), ("cpsid f", "cpsie f")])
 def test_the_error_waits_behind_a_mask(make: Any, before: str, after: str) -> None:
     """A precise fault would be a HardFault, or a lockup."""
