@@ -540,8 +540,6 @@ class Processor(Stateful):
         """
         self.on_entry(self.engine.cycle)
         self._drain()
-        if number == HARD_FAULT:
-            return number
         first = self.nvic.first_pending()
         if first is None or not self._is_before(first, number):
             return number
