@@ -271,3 +271,14 @@ def test_both_cores_agree_in_slices_of_any_length_and_from_snapshots(lines: list
             machine.board.advance_to(40_000)
             ends.append((machine.log, state(machine.board)))
     assert all(end == ends[0] for end in ends)
+
+
+def test_a_reset_forgets_the_error_that_is_on_its_way(make: Any) -> None:
+    """At the boundary behind a branch that is not taken, a cycle before the error."""
+    machine = make(ENABLED + POINTED + "cmp r2, #7\nbad: str r2, [r3, #0]\nbne stop\nlog #1\nb stop")
+    core = machine.board.chip.processor
+    while core.bus_error_cycle is None:
+        machine.run(0.125)
+    assert core.bus_error_cycle == core.cycle + 1
+    machine.board.reset()
+    assert core.bus_error_cycle is None
