@@ -88,6 +88,8 @@ def _breakpoints(comparators: tuple[int, ...]) -> frozenset[int]:
 
 def _remapped(comparators: tuple[int, ...], table: int) -> Remapped:
     words = [(word & _ADDRESS, n) for n, word in enumerate(comparators) if word & _ENABLE and not word >> 30]
+    if not words:
+        return Remapped()
     return Remapped(
         table,
         tuple(row for row in words if row[1] < _CODE_COMPARATORS),

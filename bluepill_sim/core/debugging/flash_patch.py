@@ -38,10 +38,6 @@ class Remapped:
     instructions: tuple[tuple[int, int], ...] = ()
     literals: tuple[tuple[int, int], ...] = ()
 
-    def __bool__(self) -> bool:
-        """Whether any is."""
-        return bool(self.instructions or self.literals)
-
 
 @dataclass(frozen=True, slots=True)
 class View:
@@ -88,7 +84,6 @@ class FlashPatch:
         wanted = self._wanted
         self.table_at = _host(memories, wanted.table, _COMPARATORS * _WORD_BYTES) or 0
         self.table = ctypes.string_at(self.table_at, _COMPARATORS * _WORD_BYTES) if self.table_at else b""
-        # An address is a word or a copy of one: Unicorn reads a page of each kind that it needs.
         code = self._in_memory(wanted.instructions, memories)
         data = self._in_memory(wanted.literals, memories)
         self._words, self._loads = code, bool(data)
