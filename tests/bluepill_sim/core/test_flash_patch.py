@@ -126,10 +126,11 @@ def test_a_word_of_the_table_counts_from_the_next_block_on_and_so_does_a_compara
     assert machine.log == [2, 0x1111_1111, 3, 4, 1, 4, 1]
 
 
-def test_a_literal_follows_the_table(make: Any) -> None:
+@pytest.mark.parametrize("number", [6, 7])
+def test_a_literal_follows_the_table(make: Any, number: int) -> None:
     machine = aligned(
-        make, store(TABLE + 24, 5) + comparator(6, "literal") + ON,
-        store(TABLE + 24, 6) + "bl load\nlog r0\n" + store(FP_CTRL, 2) + "bl load\nlog r0\nb stop",
+        make, store(TABLE + 4 * number, 5) + comparator(number, "literal") + ON,
+        store(TABLE + 4 * number, 6) + "bl load\nlog r0\n" + store(FP_CTRL, 2) + "bl load\nlog r0\nb stop",
     ).run(400)  # fmt: skip
     assert machine.log == [1, 5, 6, 0x1111_1111]
 
@@ -171,6 +172,15 @@ def test_flash_that_is_programmed_shows_beside_a_patch(make: Any) -> None:
     before = store(TABLE, TWO) + f"mov32 r1, #{FP_COMP}\nmov32 r2, #0x08000FFD\nstr r2, [r1, #0]\n" + ON
     machine = aligned(make, before + unlock + program, call).run(2000)
     assert machine.log == [1, 0x1111_1111, 0x21]
+
+
+def test_a_store_to_a_patched_page_leaves_its_literal_patched(make: Any) -> None:
+    unlock = store(0x4002_2004, 0x4567_0123) + store(0x4002_2004, 0xCDEF_89AB) + store(0x4002_2010, 1)
+    program = "mov32 r1, #0x080000F0\nmov32 r2, #0x1234\nstrh r2, [r1, #0]\nldr r0, [r1, #0]\nlog r0\n"
+    before = unlock + store(TABLE + 24, 0x77) + comparator(6, "literal") + ON
+    machine = aligned(make, before, program + "bl load\nlog r0\nb stop").run(2000)
+    assert machine.label("literal") < 0x0800_0400
+    assert machine.log == [1, 0x77, 0xFFFF_1234, 0x77]
 
 
 def test_there_is_nothing_where_the_copies_are(make: Any) -> None:
