@@ -287,7 +287,7 @@ def test_a_reset_forgets_the_error_that_is_on_its_way(make: Any) -> None:
 def test_a_hard_fault_that_waited_for_nmi_is_reported(make: Any) -> None:
     machine = make(
         POINTED + f"mov32 r1, #{ICSR}\nmov32 r2, #0x80000000\nstr r2, [r1, #0]\nisb\nlog #1\nb stop\n"
-        "nmi: str r2, [r3, #0]\nnop\nnop\nnop\nnop\nlog #2\nbx lr\nhardly: log #9\nbad: b bad",
+        "nmi: str r2, [r3, #0]\nnop\nnop\nnop\nnop\nb on\nnop\non: log #2\nbx lr\nhardly: log #9\nbad: b bad",
         {2: "nmi", 3: "hardly"},
     ).run(100)  # fmt: skip
     assert machine.log == [2, 9]
