@@ -20,7 +20,7 @@ from contextlib import contextmanager
 
 from bluepill_sim.core import GENERAL, BlockRecorder
 from bluepill_sim.core.block_cost import NO_BLOCK, Block, measure_block
-from bluepill_sim.core.comparators import cycles_to_match
+from bluepill_sim.core.debugging.comparators import cycles_to_match
 from bluepill_sim.core.forced_bits import forced_bits
 from bluepill_sim.core.halts import ChipReached, HaltKind
 from bluepill_sim.core.nvic import NMI
@@ -563,10 +563,10 @@ class Chip(Stateful):
 
     def _measure(self, address: int, size: int) -> Block:
         """Return the costs of a block at the present flash settings."""
-        code = self.memory.read(address, size)
+        code = self.engine.flash_patch.fetched(address, self.memory.read(address, size) or b"")
         is_sram = SRAM_BASE <= address < SRAM_BASE + SRAM_BYTES
         wait_states, has_prefetch = (0, True) if is_sram else self._flash_access
-        return measure_block(code or b"", address, wait_states, has_prefetch=has_prefetch)
+        return measure_block(code, address, wait_states, has_prefetch=has_prefetch)
 
     def _map(self) -> None:
         """Give the engine its memories and its I/O regions."""
@@ -610,7 +610,7 @@ class Chip(Stateful):
         start = pc if engine.block is NO_BLOCK else engine.block.start
         second = memory.read(pc, 2)
         is_wide = second is not None and second[1] >= _FIRST_WIDE_BYTE
-        code = memory.read(start, pc - start + (4 if is_wide else 2)) or b""
+        code = engine.flash_patch.fetched(start, memory.read(start, pc - start + (4 if is_wide else 2)) or b"")
         return forced_bits(code, lambda number: engine.registers[GENERAL[number]], address, memory.read)
 
     def _write_flash(self, address: int, size: int, value: int) -> bool:

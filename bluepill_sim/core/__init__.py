@@ -20,7 +20,7 @@ that a run with halts is the same as one without.
 """
 
 from bluepill_sim.core.blocks import it_state_of
-from bluepill_sim.core.debug_unit import WatchKind, Watchpoint
+from bluepill_sim.core.debugging.debug_unit import WatchKind, Watchpoint
 from bluepill_sim.core.engine import Engine
 from bluepill_sim.core.halts import DEBUG_HALTS, Halt, HaltKind
 from bluepill_sim.core.recorder import BLOCK, EXCEPTION_RETURN, BlockRecorder, BlockRow

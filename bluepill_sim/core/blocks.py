@@ -30,7 +30,7 @@ from simbase.state import Stateful
 IT_BITS = 0x0600_FC00
 
 #: First address, address after, place in the host's memory.
-WritableMemory = tuple[int, int, int]
+HostMemory = tuple[int, int, int]
 
 #: Returns the costs of the block of `size` bytes at `address`.
 Measure = Callable[[int, int], Block]
@@ -44,11 +44,13 @@ class BlockTable(Stateful):
 
     def __init__(self, measure: Measure) -> None:
         self._measure = measure
+        #: Tells whether a block, by its address and size, is to be looked at each time that it is entered.
+        self.must_look: Callable[[int, int], bool] = lambda _address, _size: False
         #: Blocks that take no attention.
         self.plain: dict[int, Block] = {}
         self._special: dict[int, Block] = {}
         self._in_writable: dict[int, tuple[bytes, Block]] = {}
-        self.writable: list[WritableMemory] = []
+        self.writable: list[HostMemory] = []
         #: Whether code has run from writable memory.
         self.ran_writable = False
         #: Whether a block takes exclusive reservations.
@@ -72,7 +74,7 @@ class BlockTable(Stateful):
         if code is not None:
             self.ran_writable = True
             self._in_writable[address] = code, block
-        elif block.needs_attention:
+        elif block.needs_attention or self.must_look(address, size):
             self._special[address] = block
         else:
             self.plain[address] = block
@@ -90,7 +92,7 @@ class BlockTable(Stateful):
             for start in [start for start, block in table.items() if start < end and block.end > first]:
                 del table[start]
 
-    def writable_at(self, address: int) -> WritableMemory | None:
+    def writable_at(self, address: int) -> HostMemory | None:
         """Return the writable memory that an address is in; None elsewhere."""
         return next((memory for memory in self.writable if memory[0] <= address < memory[1]), None)
 
@@ -113,7 +115,7 @@ class Frozen:
     #: What each writable memory held.
     memories: tuple[bytes, ...]
 
-    def put_back(self, core: UnicornCore, writable: list[WritableMemory]) -> None:
+    def put_back(self, core: UnicornCore, writable: list[HostMemory]) -> None:
         """Undo what has run since: the core stands exactly before the instruction, ITSTATE included."""
         for (first, end, at), data in zip(writable, self.memories, strict=True):
             if ctypes.string_at(at, end - first) != data:
@@ -178,7 +180,7 @@ class RestOfBlock(Stateful):
         return rest, self._stop_at
 
 
-def copy_of(writable: list[WritableMemory]) -> tuple[bytes, ...]:
+def copy_of(writable: list[HostMemory]) -> tuple[bytes, ...]:
     """Return what each writable memory holds."""
     return tuple(ctypes.string_at(at, end - first) for first, end, at in writable)
 

@@ -32,19 +32,23 @@ from bluepill_sim.core.blocks import (
     IT_BITS,
     BlockTable,
     Frozen,
+    HostMemory,
     Measure,
     RestOfBlock,
     copy_of,
     it_state_of,
 )
-from bluepill_sim.core.debug_unit import DebugUnit, Watchpoint
+from bluepill_sim.core.debugging.debug_unit import DebugUnit, Watchpoint
+from bluepill_sim.core.debugging.flash_patch import PAGE_BYTES, VIEWS_BASE, VIEWS_BYTES, FlashPatch, View
 from bluepill_sim.core.halts import DEBUG_HALTS, Halt, HaltKind
 from bluepill_sim.core.recorder import BLOCK, BlockLog, BlockRecorder, KeptRows, LastRows
 from bluepill_sim.core.thumb import Kind
 from bluepill_sim.core.unicorn_core import (
+    FETCH_ACCESS,
     FETCH_PROTECTED,
     FETCH_UNMAPPED,
     GENERAL,
+    READ_ACCESS,
     SCRATCH_BASE,
     SCRATCH_END,
     WRITE_PROTECTED,
@@ -58,6 +62,7 @@ from bluepill_sim.core.unicorn_core import (
 )
 from bluepill_sim.extension.layout import SHARED, structure
 from bluepill_sim.extension.library import library
+from bluepill_sim.extension.windows import NO_TIME
 from simbase.state import Stateful
 
 #: Stops the engine before the instruction at an address: (kind, PC, address of the data).
@@ -79,6 +84,10 @@ _NEVER = 1 << 62
 _AN_EARLIER_PC = 0
 
 _T_BIT = 1 << 24
+#: Unicorn finds what is mapped here in a hook only after that.
+_LAST_PAGE = 0xFFFF_FC00
+#: ACTLR: stores are not buffered.
+DISDEFWBUF = 1 << 1
 
 #: UC_ERR_EXCEPTION, and the number of the interrupt that it stands for.
 _DENIED, _PREFETCH_ABORT = 21, 3
@@ -113,7 +122,9 @@ class Engine(Stateful):
         "shared",  # its fields are the processor's
         "it_state", "block", "stop_at", "_run_from", "_halt", "_failure", "_frozen", "_table",
         # What a run or a block has for itself alone.
-        "_is_stepping", "_lets_writes_through", "_raised_by",
+        "_is_stepping", "_lets_writes_through", "_raised_by", "_spoiled",
+        # Where things are.
+        "_read_only", "flash_patch", "_views", "_has_views", "_waits_for_views",
         # Whom it calls, and what it is made of.
         "_log_row", "_block_hook", "registers", "own_points",
     )  # fmt: skip
@@ -142,8 +153,18 @@ class Engine(Stateful):
         #: Called with writes to read-only memory, and after the instruction that made them.
         self.on_read_only_write: WriteToReadOnly | None = None
         self.on_read_only_written: Callable[[], None] | None = None
+        #: Called with a store whose bus error does not stop it: (cycle, PC, address).
+        self.on_bus_error: Callable[[int, int, int], None] = lambda _cycle, _pc, _address: None
         self._lets_writes_through = False
+        #: Read-only memory, and what such a store has changed there: its address, its place in the host, what it held.
+        self._read_only: list[HostMemory] = [self._core.scratch]
+        self._spoiled: list[tuple[int, int, bytes]] = []
+        #: What the FPB remaps.
+        self.flash_patch = FlashPatch()
+        self._views: tuple[View, ...] = ()
+        self._has_views = self._waits_for_views = False
         self._blocks = BlockTable(measure)
+        self._blocks.must_look = self.flash_patch.concerns
         self._table = self._blocks.plain
         self._halt: Halt | None = None
         #: Where the run started: its first block may start inside an IT block.
@@ -193,8 +214,8 @@ class Engine(Stateful):
     def map_memory(self, address: int, buffer: "ctypes.Array[ctypes.c_char]", *, is_writable: bool) -> None:
         """Map a buffer, which may be mapped more than once; writable memory is executable from its first fetch on."""
         self._core.map_memory(address, buffer, "rw" if is_writable else "rx")
-        if is_writable:
-            self._blocks.writable.append((address, address + len(buffer), ctypes.addressof(buffer)))
+        memories = self._blocks.writable if is_writable else self._read_only
+        memories.append((address, address + len(buffer), ctypes.addressof(buffer)))
 
     def map_io(self, address: int, size: int, read: ReadAccess, write: WriteAccess) -> None:
         """Map a region whose accesses are calls; their offsets count from `address`."""
@@ -205,6 +226,7 @@ class Engine(Stateful):
 
     def drop_code(self, address: int, size: int) -> None:
         """Forget what was translated and measured from bytes that have changed; not during a run."""
+        self.flash_patch.touch(address, size)
         self._core.drop_code(address, size)
         self._blocks.forget_in(address, address + size)
 
@@ -236,16 +258,17 @@ class Engine(Stateful):
         """
         halt = self._run(stop_at)
         while halt.kind is HaltKind.TAKEN_WRITE:
-            halt = self._step_over_write(stop_at)
+            halt = self._step_over_write(halt, stop_at)
             if halt.kind is HaltKind.STEP:
-                halt = Halt(HaltKind.BOUNDARY, halt.pc) if self.shared.waits else self._run(stop_at)
+                must_look = self.shared.waits or self.shared.bus_error_cycle != NO_TIME
+                halt = Halt(HaltKind.BOUNDARY, halt.pc) if must_look else self._run(stop_at)
         return halt if halt.kind is not HaltKind.WATCHPOINT else self._step_over_access(halt, stop_at)
 
     def step(self, stop_at: int) -> Halt:
         """Run one instruction: a STEP, or whatever else ends it; what an IT block skips is stepped over."""
         halt = self._step(stop_at)
         if halt.kind is HaltKind.TAKEN_WRITE:
-            halt = self._step_over_write(stop_at)
+            halt = self._step_over_write(halt, stop_at)
         elif halt.kind is HaltKind.WATCHPOINT:
             halt = self._step_over_access(halt, stop_at)
         self._trim_registers()
@@ -284,6 +307,8 @@ class Engine(Stateful):
         if traps.have_changed:
             traps.apply()
             self.forget_costs()
+        if self.flash_patch.has_changed:
+            self._apply_patch()
         if self._rest.block is not None:
             self._resume(stop_at)
         while True:
@@ -297,16 +322,46 @@ class Engine(Stateful):
                 self._settle(self.registers[Register.PC])
                 self.has_branched_to_return = self.pc >= FIRST_EXCEPTION_RETURN
                 raise failure
-            if not traps.stale:
+            if not traps.stale and not self._waits_for_views:
                 break
             self._settle(self.pc)
             traps.arm()
+            if self._waits_for_views:
+                self._apply_patch()
         if self._frozen is not None:
             return self._thaw(self._frozen)
         self.it_state = 0
         halt = self._halt or _halt_without_reason(error, self.block, self.registers[Register.PC])
         self._settle(halt.pc)
         return halt
+
+    def _apply_patch(self) -> None:
+        """Show fetches and loads what the FPB remaps, between runs."""
+        self._waits_for_views = False
+        self._views = self.flash_patch.apply([*self._read_only, *self._blocks.writable])
+        if self._views and not self._has_views:
+            self._has_views = True
+            self._core.map_memory(VIEWS_BASE, self.flash_patch.buffer, "rx")
+            self._show_pages()
+        self._core.drop_pages()
+        self._core.drop_all_code()
+        self.forget_costs()
+
+    def _show_pages(self) -> None:
+        """Have the library ask where each page is."""
+        self._core.on_page(self._find_page)
+
+    def _find_page(self, address: int, access: int) -> tuple[int, int] | None:
+        if access != FETCH_ACCESS:
+            self._leave_it_block()
+        for view in self._views:
+            if view.page == address & -PAGE_BYTES:
+                place = {FETCH_ACCESS: (view.code, 4), READ_ACCESS: (view.data, 1)}
+                return place.get(access, (address, 2))
+        if access == FETCH_ACCESS and (0x4000_0000 <= address < 0x6000_0000 or address >= 0xA000_0000):
+            return None
+        hides = VIEWS_BASE <= address < VIEWS_BASE + VIEWS_BYTES
+        return (address - VIEWS_BYTES if hides else address), 7
 
     def _step(self, stop_at: int) -> Halt:
         hook = self._debug.begin_step(self.pc)
@@ -328,13 +383,21 @@ class Engine(Stateful):
             return Halt(HaltKind.WATCHPOINT, after.pc, halt.address)
         return replace(after, watched=halt.address)
 
-    def _step_over_write(self, stop_at: int) -> Halt:
-        """Let the instruction write to read-only memory, and have put right at once what Unicorn stores there."""
+    def _step_over_write(self, halt: Halt, stop_at: int) -> Halt:
+        """Let the instruction write where it may not, and have put right at once what Unicorn stores there."""
         self._lets_writes_through = True
+        if halt.address is not None and halt.address >= _LAST_PAGE:
+            self._core.add_sink(halt.address)
+            self.on_bus_error(self.cycle, halt.pc, halt.address)
         try:
             return self._step(stop_at)
         finally:
             self._lets_writes_through = False
+            self._core.remove_sinks()
+            for address, at, data in reversed(self._spoiled):
+                ctypes.memmove(at, data, len(data))
+                self.drop_code(address, len(data))
+            self._spoiled.clear()
             if self.on_read_only_written is not None:
                 self.on_read_only_written()
 
@@ -416,7 +479,8 @@ class Engine(Stateful):
                 self.block = rest
                 return
         block = self._blocks.at(address, size)
-        if self._traps.needs_hooks(block):
+        self._waits_for_views = self.flash_patch.is_stale() and self.flash_patch.concerns(address, size)
+        if self._waits_for_views or self._traps.needs_hooks(block):
             self._stop_at_boundary(address)
             return
         if block.is_self_loop and block is self.block and not self._is_stepping:
@@ -475,17 +539,33 @@ class Engine(Stateful):
     def _bad_access(self, access: int, address: int, size: int, value: int) -> bool:
         if self._frozen is not None:
             return False
-        if access == WRITE_PROTECTED and self.on_read_only_write is not None:
+        may_be_taken = access == WRITE_PROTECTED and self.on_read_only_write is not None
+        is_buffered = access in {WRITE_PROTECTED, WRITE_UNMAPPED} and not self.shared.actlr & DISDEFWBUF
+        if may_be_taken or is_buffered:
             if not self._lets_writes_through:
                 self.stop_before(HaltKind.TAKEN_WRITE, self.registers[Register.PC], address)
                 return False
-            if self.on_read_only_write(address, size, value & (1 << 8 * size) - 1):
+            taken = self.on_read_only_write if may_be_taken else None
+            if taken is not None and taken(address, size, value & (1 << 8 * size) - 1):
+                return True
+            if is_buffered:
+                self._let_fail(access, address, size)
                 return True
         if access == FETCH_PROTECTED and (memory := self._blocks.writable_at(address)) is not None:
             self._core.allow_execution(memory[0], memory[1] - memory[0])
             return True
         self._halt = Halt(_kind_of_bad_access(access), self.registers[Register.PC], address)
         return False
+
+    def _let_fail(self, access: int, address: int, size: int) -> None:
+        """Let a store pass that changes nothing but is answered by a bus error, later."""
+        if access == WRITE_UNMAPPED:
+            self._core.add_sink(address)
+        else:
+            first, _, host = next(memory for memory in self._read_only if memory[0] <= address < memory[1])
+            at = host + address - first
+            self._spoiled.append((address, at, ctypes.string_at(at, size)))
+        self.on_bus_error(self.access_cycle, self.registers[Register.PC], address)
 
     def stop_before(self, kind: HaltKind, pc: int, address: int | None = None) -> None:
         """End the run before the instruction at `pc`, from a hook of it; what runs after that is undone."""

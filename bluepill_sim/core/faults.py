@@ -30,6 +30,7 @@ class FaultKind(Enum):
     FETCH_ERROR = "instruction fetch from nothing"
     READ_ERROR = "read of nothing"
     WRITE_ERROR = "write to nothing"
+    IMPRECISE_WRITE = "imprecise write to nothing"
     STACKING = "stack outside memory at exception entry"
     UNSTACKING = "stack outside memory at exception return"
     EXECUTE_NEVER = "instruction fetch from a region that must not be executed"
@@ -57,6 +58,7 @@ FAULT_ROWS = {
     FaultKind.FETCH_ERROR: FaultRow(BUS_FAULT, cfsr=1 << 8),
     FaultKind.READ_ERROR: FaultRow(BUS_FAULT, cfsr=1 << 9 | CFSR_BFARVALID),
     FaultKind.WRITE_ERROR: FaultRow(BUS_FAULT, cfsr=1 << 9 | CFSR_BFARVALID),
+    FaultKind.IMPRECISE_WRITE: FaultRow(BUS_FAULT, cfsr=1 << 10),
     FaultKind.UNSTACKING: FaultRow(BUS_FAULT, cfsr=1 << 11),
     FaultKind.STACKING: FaultRow(BUS_FAULT, cfsr=1 << 12),
     FaultKind.EXECUTE_NEVER: FaultRow(MEM_MANAGE, cfsr=1 << 0),
@@ -88,7 +90,7 @@ class FaultReport:
     kind: FaultKind
     #: The exception that the fault belongs to, before it was escalated to HardFault.
     exception: int
-    #: The failing instruction.
+    #: The failing instruction; of an imprecise write the store, which has long been left.
     pc: int
     #: Where that is: "symbol+0x12 (0x08000123)".
     where: str

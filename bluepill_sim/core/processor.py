@@ -8,9 +8,9 @@ rest of the architecture is done by hand, always at a block boundary:
     SVC, fault            -> enter at once, escalated to HardFault if it may not
     HardFault that faults -> lockup: only a reset helps
     WFI, WFE              -> asleep: time jumps to what wakes the core
+    buffered store that failed -> one instruction at a time until its error comes
 
-Not modelled: the MPU, late arrival, lazy stacking (no FPU), the privilege
-check of the system control space, DebugMonitor.
+Not modelled: the MPU, which the part lacks; lazy stacking (no FPU).
 
 Source: ARMv7-M Architecture Reference Manual B1.5; TRM r1p1 chapter 5 for cycles.
 Invariant: `exception_number` is what IPSR holds in the engine.
@@ -22,7 +22,7 @@ from enum import Enum
 from typing import Any
 
 from bluepill_sim.core.blocks import it_state_of
-from bluepill_sim.core.comparators import MATCHED, MON_EN, MON_STEP, DebugEvent, points_of
+from bluepill_sim.core.debugging.comparators import MATCHED, MON_EN, MON_STEP, DebugEvent, points_of
 from bluepill_sim.core.engine import FIRST_EXCEPTION_RETURN, Engine
 from bluepill_sim.core.faults import FAULT_OF_HALT, FAULT_ROWS, HFSR_FORCED, FaultKind, SeenFault
 from bluepill_sim.core.halts import DEBUG_HALTS, Halt, HaltKind
@@ -31,6 +31,7 @@ from bluepill_sim.core.nvic import (
     DEBUG_MONITOR,
     FIRST_IRQ,
     HARD_FAULT,
+    MEM_MANAGE,
     NMI,
     SVCALL,
     SYSTICK,
@@ -46,6 +47,11 @@ from simbase.state import Stateful
 
 #: TRM r1p1 5.7 and 5.9: cycles from the boundary to the first instruction of the handler, and back.
 ENTRY_CYCLES, EXIT_CYCLES, TAIL_CHAIN_CYCLES = 12, 12, 6
+
+#: chosen: a cycle of the store, and two of the bus, whose answer ERROR takes two (AMBA 3 AHB-Lite 5.1.3).
+_BUS_ERROR_CYCLES = 3
+#: DSB and DMB, which wait for the write buffer (TRM r2p0 3.5); an ISB takes longer than it.
+_BARRIERS = {bytes((0xBF, 0xF3, option << 4 | 15, 0x8F)) for option in (4, 5)}
 
 #: SHCSR enable bits.
 MEMFAULTENA = 1 << 16
@@ -101,6 +107,9 @@ class Processor(Stateful):
         "bfar",
         "mmfar",
         "is_stepping",
+        "bus_error_cycle",
+        "bus_error_pc",
+        "bus_error_address",
     )
     #: Taken by the chip at once; what follows from registers.
     DERIVED = ("halt", "_points")
@@ -116,6 +125,9 @@ class Processor(Stateful):
     hfsr: int = field("hfsr", "HFSR.")
     mmfar: int = field("mmfar", "MMFAR.")
     bfar: int = field("bfar", "BFAR.")
+    bus_error_cycle: int | None = time("bus_error_cycle", "When the error of a buffered store comes; None: none does.")
+    bus_error_pc: int = field("bus_error_pc", "The store of the last such error.")
+    bus_error_address: int = field("bus_error_address", "What it was to.")
     halts_on_bkpt: bool = flag("has_debugger", "Whether BKPT halts for a debugger; without one it is a fault.")
 
     def __init__(self, engine: Engine, memory: Memory) -> None:
@@ -141,6 +153,7 @@ class Processor(Stateful):
         self.on_unmodelled: Callable[[str], None] = lambda _what: None
         self._memory = memory
         engine.on_event = self.send_event
+        engine.on_bus_error = self._expect_bus_error
         engine.is_interrupted = lambda: bool(self.shared.waits) or self.is_interrupted()
         r = Register
         file = engine.registers
@@ -171,6 +184,7 @@ class Processor(Stateful):
         self.exception_number = 0
         self.sleep = Sleep.AWAKE
         self.event_register = self.is_locked_up = False
+        self.bus_error_cycle = None
         self.vector_table = vector_table
         self.scr = self.shcsr = self.cfsr = self.hfsr = self.bfar = self.mmfar = 0
         self.set_ccr(STKALIGN)
@@ -197,6 +211,8 @@ class Processor(Stateful):
         if self.sleep is not Sleep.AWAKE and not self._wakes():
             self.engine.cycle = max(self.engine.cycle, stop_at)
             return
+        if self._bus_error_comes() and self._deliver():
+            return
         is_inside = self.engine.is_inside_block
         if self.nvic.pending and not is_inside and self._deliver():
             return
@@ -207,6 +223,9 @@ class Processor(Stateful):
             return
         if self.is_stepping:
             self._step_for_monitor(stop_at)
+            return
+        if self.bus_error_cycle is not None:
+            self._step_towards_bus_error(stop_at)
             return
         halt = self.engine.run(stop_at)
         if halt.kind is not HaltKind.BOUNDARY:
@@ -220,13 +239,14 @@ class Processor(Stateful):
         if self.sleep is not Sleep.AWAKE and not self._wakes():
             self.engine.cycle = max(self.engine.cycle, stop_at)
             return
-        if self.nvic.pending and not self.engine.is_inside_block and self._deliver():
+        may_interrupt = self._bus_error_comes() or not self.engine.is_inside_block
+        if self.nvic.pending and may_interrupt and self._deliver():
             self.halt = Halt(HaltKind.STEP, self.engine.pc)
             return
         self.engine.stops_after_mask_change = self.nvic.deliverable() != 0
         if not self._stands_at_return():
             before = self.engine.pc, self.engine.cycle
-            self._act_on(self.engine.step(stop_at))
+            self._act_on(self._step(stop_at))
             if before == (self.engine.pc, self.engine.cycle) and not self.engine.is_inside_block and self._deliver():
                 self.halt = None  # the instruction waits for the exception, and that is the step
         if self.halt is None:
@@ -299,6 +319,7 @@ class Processor(Stateful):
         return self.sleep is Sleep.AWAKE
 
     def _fall_asleep(self, sleep: Sleep) -> None:
+        self._drain()
         self.last_sleep_cycle = self.cycle
         if sleep is Sleep.EVENT and self.event_register:
             self.event_register = False
@@ -332,6 +353,7 @@ class Processor(Stateful):
         number = self.nvic.first_pending()
         if number is None or not self.is_interrupted():
             return False
+        self._report_pending(number)
         self._enter(number, self.engine.pc)
         return True
 
@@ -344,6 +366,58 @@ class Processor(Stateful):
         self._fault(FaultKind.EXECUTE_NEVER, self.engine.pc)
         return True
 
+    # Buffered stores.
+
+    def _expect_bus_error(self, cycle: int, pc: int, address: int) -> None:
+        """Take that a store was let go that is answered by a bus error."""
+        if self.bus_error_cycle is None:
+            self.bus_error_cycle = cycle + _BUS_ERROR_CYCLES
+            self.bus_error_pc, self.bus_error_address = pc, address
+
+    def _bus_error_comes(self) -> bool:
+        """Take the error of a buffered store whose time has come; return whether it has."""
+        comes = self.bus_error_cycle is not None and self.cycle >= self.bus_error_cycle
+        if comes:
+            self._drain()
+        return comes
+
+    def _drain(self) -> None:
+        """Have the write buffer emptied: the error of a store that is in it comes now (PM0056 4.4.15)."""
+        if self.bus_error_cycle is None:
+            return
+        self.bus_error_cycle = None
+        row = FAULT_ROWS[FaultKind.IMPRECISE_WRITE]
+        self.cfsr |= row.cfsr
+        if self.shcsr & _enable_bit(row.exception):
+            self.nvic.pend(row.exception)
+        else:
+            self.hfsr |= HFSR_FORCED
+            self.nvic.pend(HARD_FAULT)
+
+    def _report_pending(self, number: int) -> None:
+        """Report a HardFault that was pending: nothing but the error of a buffered store makes it so."""
+        if number == HARD_FAULT:
+            self._report(FaultKind.IMPRECISE_WRITE, self.bus_error_pc, self.bus_error_address, is_lockup=False)
+
+    def _step(self, stop_at: int) -> Halt:
+        """Run one instruction; a barrier waits for the write buffer."""
+        if self.bus_error_cycle is None:
+            return self.engine.step(stop_at)
+        code = self._memory.read(self.engine.pc, 4) or b""
+        is_barrier = self.engine.flash_patch.fetched(self.engine.pc, code) in _BARRIERS
+        halt = self.engine.step(min(stop_at, self.cycle + 1))  # the error may come before the next block is entered
+        if is_barrier and halt.kind is HaltKind.STEP:
+            self._drain()
+        return halt
+
+    def _step_towards_bus_error(self, stop_at: int) -> None:
+        before = self.engine.pc, self.cycle
+        halt = self._step(stop_at)
+        if halt.kind is not HaltKind.STEP:
+            self._act_on(halt)
+        elif self.bus_error_cycle is None or before == (self.engine.pc, self.cycle):
+            self._deliver()
+
     # DebugMonitor.
 
     def look_out(self) -> None:
@@ -352,6 +426,7 @@ class Processor(Stateful):
         own = self.engine.own_points
         own.own_breakpoints = {*points.breakpoints, *points.instructions}
         own.own_watchpoints = set(points.accesses)
+        self.engine.flash_patch.choose(points.remapped)
         for what in points.unmodelled:
             self.on_unmodelled(what)
         self.stop_at_boundary()
@@ -464,12 +539,14 @@ class Processor(Stateful):
         One that comes late and has a higher priority is it, while the other stays pending (ARM B1.5.9).
         """
         self.on_entry(self.engine.cycle)
+        self._drain()
         first = self.nvic.first_pending()
         if first is None or not self._is_before(first, number):
             return number
         if not self._memory.read_word(self.vector_table + 4 * first):
             return number
         self.nvic.pend(number)
+        self._report_pending(first)
         return first
 
     def _is_before(self, first: int, number: int) -> bool:
@@ -481,7 +558,7 @@ class Processor(Stateful):
         if number in {NMI, HARD_FAULT}:
             self._lock_up(FaultKind.STACKING, pc, frame_at)
             return 0
-        if self.shcsr & MEMFAULTENA << 1 and self.nvic.can_preempt(BUS_FAULT, self.execution_priority()):
+        if self.shcsr & _enable_bit(BUS_FAULT) and self.nvic.can_preempt(BUS_FAULT, self.execution_priority()):
             return BUS_FAULT
         self.hfsr |= HFSR_FORCED
         self._report(FaultKind.STACKING, pc, frame_at, is_lockup=False)
@@ -511,6 +588,7 @@ class Processor(Stateful):
 
     def _leave(self, exc_return: int) -> None:
         """Return from the handler that runs: chain to the next one, or unstack."""
+        self._drain()
         number = self.exception_number
         if not number:
             self._fault(FaultKind.EXECUTE_NEVER, exc_return)
@@ -531,6 +609,7 @@ class Processor(Stateful):
         if following is not None and self.nvic.can_preempt(following, self.execution_priority()):
             self._record(exc_return | 1, EXCEPTION_RETURN)
             self._record(exc_return | 1, following)
+            self._report_pending(following)
             self._start_handler(following, msp, exc_return | 1, cpsr)
             self.engine.cycle += TAIL_CHAIN_CYCLES
             return
@@ -579,7 +658,7 @@ class Processor(Stateful):
             self.bfar = address
         number = row.exception
         priority = self.execution_priority()
-        is_enabled = number == HARD_FAULT or self.shcsr & MEMFAULTENA << (number - 4)
+        is_enabled = number == HARD_FAULT or self.shcsr & _enable_bit(number)
         if not is_enabled or not self.nvic.can_preempt(number, priority):
             self.hfsr |= HFSR_FORCED
             number = HARD_FAULT
@@ -602,3 +681,8 @@ class Processor(Stateful):
 
     def _restored(self) -> None:
         self.set_ccr(self.ccr)
+
+
+def _enable_bit(number: int) -> int:
+    """Return the bit of SHCSR that enables the exception of a fault."""
+    return MEMFAULTENA << number - MEM_MANAGE

@@ -71,6 +71,7 @@ GENERAL = (
 
 #: Kind of a good access that is not a write.
 READ_ACCESS = 16
+FETCH_ACCESS = 18
 #: Kinds of bad accesses.
 WRITE_UNMAPPED, FETCH_UNMAPPED, WRITE_PROTECTED, FETCH_PROTECTED = 20, 21, 22, 24
 
@@ -87,6 +88,8 @@ CoreContext = bytes
 
 #: The scratch page. chosen: where an STM32F103C has nothing, outside the regions that never execute.
 SCRATCH_BASE, _SCRATCH_BYTES = 0x9FFF_FC00, 0x400
+#: What the library maps at once.
+_PAGE_BYTES = 0x400
 #: CLREX, WFI.
 _SCRATCH_CODE = bytes.fromhex("bff32f8f 30bf")
 #: Address after it.
@@ -109,6 +112,7 @@ _CONTROL_EXITS = 4 | 1 << 26 | 1 << 30
 _CONTROL_MODEL = 7 | 1 << 26 | 1 << 30
 _CONTROL_DROP_CODE = 9 | 2 << 26 | 1 << 30
 _CONTROL_DROP_ALL_CODE = 10 | 1 << 30
+_CONTROL_DROP_PAGES = 11 | 1 << 30
 _CONTROL_TLB = 12 | 1 << 26 | 1 << 30
 _TLB_OF_HOOKS = 1
 #: No instruction stands at an odd address, so a run never ends there; the page is the scratch page, which executes.
@@ -140,6 +144,18 @@ WRITE_CALLBACK = ctypes.CFUNCTYPE(
     None, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint, ctypes.c_uint64, ctypes.c_void_p
 )
 
+
+class TlbEntry(ctypes.Structure):
+    """`uc_tlb_entry` of unicorn.h."""
+
+    _fields_ = (("address", ctypes.c_uint64), ("may", ctypes.c_int))
+
+
+#: bool (*)(uc, address, type, entry, user)
+PAGE_CALLBACK = ctypes.CFUNCTYPE(
+    ctypes.c_bool, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_int, ctypes.POINTER(TlbEntry), ctypes.c_void_p
+)
+
 #: What C functions take here.
 _Argument = ctypes.c_void_p | ctypes.c_int | ctypes.c_uint32 | ctypes.c_uint64 | ctypes.c_size_t
 _Result = TypeVar("_Result")
@@ -154,7 +170,7 @@ class UnicornCore(Stateful):
 
     STATE = ("context",)
     #: What the library has pointers to.
-    DERIVED = ("_keep", "_buffers")
+    DERIVED = ("_keep", "_buffers", "_sinks")
 
     def __init__(self, on_failure: Callable[[BaseException], None]) -> None:
         """Make a core without memory, but for the scratch page.
@@ -183,9 +199,13 @@ class UnicornCore(Stateful):
         self._keep: list[object] = []
         #: Apart from the callbacks, which refer back to this object: these must outlive the library's handle.
         self._buffers: list[object] = []
+        self._sinks: dict[int, object] = {}
         weakref.finalize(self, _close, library, self._handle, self._context, self._buffers)
         self.registers = RegisterFile(library, self._handle)
-        self.map_memory(SCRATCH_BASE, ctypes.create_string_buffer(_SCRATCH_CODE, _SCRATCH_BYTES), "x")
+        scratch = ctypes.create_string_buffer(_SCRATCH_CODE, _SCRATCH_BYTES)
+        #: Where the scratch page is: first address, address after, place in the host's memory.
+        self.scratch = SCRATCH_BASE, SCRATCH_BASE + _SCRATCH_BYTES, ctypes.addressof(scratch)
+        self.map_memory(SCRATCH_BASE, scratch, "x")
 
     # Running.
 
@@ -213,6 +233,20 @@ class UnicornCore(Stateful):
             f"map {address:#010x}",
         )
 
+    def add_sink(self, address: int) -> None:
+        """Have writes to the page of an address, where nothing is, go nowhere, until `remove_sinks`."""
+        page = address & ~(_PAGE_BYTES - 1)
+        buffer = ctypes.create_string_buffer(_PAGE_BYTES)
+        self._sinks[page] = buffer
+        bits, at = _PROTECTION_READ | _PROTECTION_WRITE, ctypes.addressof(buffer)
+        self._check(self._library.map_pointer(self._handle, page, _PAGE_BYTES, bits, at), f"map {page:#010x}")
+
+    def remove_sinks(self) -> None:
+        """Have nothing be where sinks were; not during a run."""
+        for page in self._sinks:
+            self._check(self._library.unmap(self._handle, page, _PAGE_BYTES), f"unmap {page:#010x}")
+        self._sinks.clear()
+
     def allow_execution(self, address: int, size: int) -> None:
         """Let code run from a region that is mapped without x: with it, each store looks for code to forget."""
         bits = _PROTECTION_READ | _PROTECTION_WRITE | _PROTECTION_EXECUTE
@@ -239,6 +273,10 @@ class UnicornCore(Stateful):
     def drop_all_code(self) -> None:
         """Forget every translation; not during a run."""
         self._control(_CONTROL_DROP_ALL_CODE)
+
+    def drop_pages(self) -> None:
+        """Forget which pages are where; not during a run."""
+        self._control(_CONTROL_DROP_PAGES)
 
     # Hooks.
 
@@ -352,6 +390,21 @@ class UnicornCore(Stateful):
         Or at a "bad access", as `on_bad_access`.
         """
         return self._hook(_NATIVE_HOOKS[kind], callback, first, last, user)
+
+    def on_page(self, call: Callable[[int, int], tuple[int, int] | None]) -> None:
+        """Call (address, kind of access) for a page, for (where it is, what may be done there); None: nothing executes.
+
+        What may be done: 1 read, 2 write, 4 execute.
+        """
+
+        def fill(address: int, access: int, entry: "ctypes._Pointer[TlbEntry]") -> bool:
+            found = call(address, access)
+            if found is not None:
+                entry.contents.address, entry.contents.may = found
+            return found is not None
+
+        self._control(_CONTROL_TLB, ctypes.c_int(_TLB_OF_HOOKS))
+        self._hook(_HOOK_TLB_FILL, self._pointer(PAGE_CALLBACK(self._for_c(fill, False))), 1, 0)
 
     def fill_tlb_native(self, callback: ctypes.c_void_p, user: int) -> None:
         """Have a C function say what may be done with each page, in place of the core's own memory map."""
@@ -480,6 +533,7 @@ class UnicornLibrary:
     write_registers: Callable[..., int]
     map_pointer: Callable[..., int]
     map_io: Callable[..., int]
+    unmap: Callable[..., int]
     protect: Callable[..., int]
     add_hook: Callable[..., int]
     delete_hook: Callable[..., int]
@@ -528,6 +582,7 @@ def load_library() -> UnicornLibrary:
         write_registers=function("uc_reg_write_batch", word, word, word, ctypes.c_int),
         map_pointer=function("uc_mem_map_ptr", word, ctypes.c_uint64, ctypes.c_size_t, ctypes.c_uint32, word),
         map_io=function("uc_mmio_map", word, ctypes.c_uint64, ctypes.c_size_t, word, word, word, word),
+        unmap=function("uc_mem_unmap", word, ctypes.c_uint64, ctypes.c_size_t),
         protect=function("uc_mem_protect", word, ctypes.c_uint64, ctypes.c_size_t, ctypes.c_uint32),
         add_hook=function("uc_hook_add", word, word, ctypes.c_int, word, word, ctypes.c_uint64, ctypes.c_uint64),
         delete_hook=function("uc_hook_del", word, ctypes.c_size_t),

@@ -176,6 +176,15 @@ class NativeEngine(Engine):
             core.hook_native("bad access", address_of("core_on_bad_access"), self._state.value or 0, first, last)
         core.fill_tlb_native(address_of("core_on_tlb_fill"), self._state.value or 0)
 
+    def _apply_patch(self) -> None:
+        """As of `Engine`."""
+        super()._apply_patch()
+        rows = (ctypes.c_uint32 * (3 * len(self._views)))(*(n for v in self._views for n in (v.page, v.code, v.data)))
+        library().core_set_views(self._state, ctypes.addressof(rows), len(self._views))
+
+    def _show_pages(self) -> None:
+        """As of `Engine`, which the native core does anyway."""
+
     def map_io(self, address: int, size: int, read: ReadAccess, write: WriteAccess) -> None:
         """As of `Engine`."""
         number = len(self._regions)
@@ -236,6 +245,8 @@ class NativeEngine(Engine):
         if traps.have_changed:
             traps.apply()
             self.forget_costs()
+        if self.flash_patch.has_changed or self._waits_for_views:
+            self._apply_patch()
         kind = library().core_run(self._state, min(limit, shared.cycle + _SLICE_CYCLES))
         if self._failure is not None:
             failure, self._failure = self._failure, None
@@ -247,7 +258,7 @@ class NativeEngine(Engine):
         halt = self._halt_of(kind)
         if halt is not None and halt.kind is HaltKind.TAKEN_WRITE:
             self.use_python(True)
-            halt = self._step_over_write(limit)
+            halt = self._step_over_write(halt, limit)
         return kind == DELIVER, None if halt is not None and halt.kind is HaltKind.STEP else halt
 
     def _halt_of(self, kind: int) -> Halt | None:
@@ -375,7 +386,8 @@ class NativeEngine(Engine):
         try:
             block = self._blocks.at(address, size)
             self.shared.uses_exclusive = self._blocks.uses_exclusive
-            if self._traps.needs_hooks(block):
+            self._waits_for_views = self.flash_patch.is_stale() and self.flash_patch.concerns(address, size)
+            if self._waits_for_views or self._traps.needs_hooks(block):
                 self.shared.halt_kind = STALE
             else:
                 self._add_row(block)
@@ -389,21 +401,27 @@ class NativeEngine(Engine):
         memory = self._blocks.writable_at(start)
         host = None if memory is None else memory[2] + start - memory[0]
         first, _, at = next(memory for memory in self._code if memory[0] <= start < memory[1])
-        code = ctypes.string_at(at + start - first, size)
+        code = self.flash_patch.fetched(start, ctypes.string_at(at + start - first, size))
+        looks = self.flash_patch.concerns(start, size)
         before = min(_IT_BLOCK_BYTES, start - first)
+        led = self.flash_patch.fetched(start - before, ctypes.string_at(at + start - first - before, before))
         accesses = {access.address: access for access in accesses_of(code, start)}
         flags = _ENDS.get(block.last, 0)
         flags |= (
             _CHANGES_MASKS * block.changes_masks | _SENDS_EVENT * block.sends_event | _SELF_LOOP * block.is_self_loop
         )
-        flags |= _WRITABLE * (host is not None)
+        # What is compared each time: the code itself, or the table of the FPB.
+        compared = (
+            (host, size)
+            if host is not None
+            else (self.flash_patch.table_at, len(self.flash_patch.table))
+            if looks
+            else (None, 0)
+        )
+        flags |= _WRITABLE * (compared[0] is not None)
         if not is_ambiguous(code, start):
             pass
-        elif (
-            size <= _WHOLE_BYTES
-            and not may_end_in_it(ctypes.string_at(at + start - first - before, before))
-            and not _has_like_access_under_it(block, accesses)
-        ):
+        elif size <= _WHOLE_BYTES and not may_end_in_it(led) and not _has_like_access_under_it(block, accesses):
             flags |= _AMBIGUOUS
         else:
             flags |= _NOTED
@@ -417,7 +435,15 @@ class NativeEngine(Engine):
             row.address, row.cycle = at, cycle
             _fill(row, accesses.get(at))
         added = library().core_add_row(
-            self._state, start, block.end, block.straight, block.taken, flags, ctypes.addressof(rows), len(rows), host
+            self._state,
+            start,
+            block.end,
+            block.straight,
+            block.taken,
+            flags,
+            ctypes.addressof(rows),
+            len(rows),
+            *compared,
         )
         if not added:
             raise RuntimeError(f"no room for the block at {start:#010x}")

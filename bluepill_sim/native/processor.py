@@ -60,7 +60,7 @@ class NativeProcessor(Processor):
 
     def run(self, stop_at: int) -> None:
         """As of `Processor`; the ticks of SysTick on the way are no reason to come back."""
-        if self._native.needs_python or self.is_stepping:
+        if self._native.needs_python or self.is_stepping or self.bus_error_cycle is not None:
             super().run(self._before_event(stop_at))
             return
         must_deliver, halt = self._native.go_on(stop_at)

@@ -18,7 +18,7 @@ characters too far off arrive damaged, both ways, and what comes in raises the
 FE, NE and PE that the samples of the line give (`fabric/line_speed.py`), at the
 times of our own frames, and so do characters that are sent damaged on purpose.
 Single bits show on the TX pin while somebody is subscribed or listens to it; else
-it stays high, and they cost nothing. Not modelled, and warned of: IrDA and
+it stays high, and they cost nothing; so does the clock on CK. Not modelled, and warned of: IrDA and
 smartcard modes.
 
 Source: RM0008 section 27.
@@ -68,9 +68,11 @@ _CONTROL_PINS = {
     "USART2": {0: ("PA0", "PA1"), 1: ("PD3", "PD4")},
     "USART3": {0: ("PB13", "PB14"), 3: ("PD11", "PD12")},
 }
+#: Pins of CK by the same.
+_CLOCK_PINS = {"USART1": {0: "PA8"}, "USART2": {0: "PA4", 1: "PD7"}, "USART3": {0: "PB12", 1: "PC12", 3: "PD10"}}
 #: Commands of its own (usart.c): move to pins; hear a word; tell whether words can be heard;
-#: listen to nCTS; move (nCTS, nRTS).
-_MOVE, _HEAR, _CAN_HEAR, _LISTEN, _CONTROL = range(OWN_COMMANDS, OWN_COMMANDS + 5)
+#: listen to nCTS; move (nCTS, nRTS); move CK.
+_MOVE, _HEAR, _CAN_HEAR, _LISTEN, _CONTROL, _MOVE_CK = range(OWN_COMMANDS, OWN_COMMANDS + 6)
 
 
 class Damage(IntFlag):
@@ -183,7 +185,8 @@ class Usart(Peripheral):
         self.sent_at: Counter[tuple[int, int]] = Counter()
         #: Characters from outside for which there is no room in C yet.
         self._coming: tuple[int, ...] = ()
-        #: In synchronous mode: the other end, given each word that goes out; None: the level of RX.
+        #: In synchronous mode: the other end, given each word that goes out; None: the level of RX, as each bit ends
+        #: where somebody looks at CK, else as the word does.
         self.exchange: Callable[[int, int], int] | None = None
         self._pins = PINS[place.name]
         self._tx_pin, self._rx_pin = self._routed_pins()
@@ -279,7 +282,8 @@ class Usart(Peripheral):
         """Return what comes in, in synchronous mode, while a word goes out."""
         if self.exchange is not None:
             return self.exchange(word, self.chip.now_ns)
-        return _WORD_BITS if self._rx_pin.level else 0
+        level = _WORD_BITS if self._rx_pin.level else 0
+        return int(self.native.ck_word | level << self.native.ck_count)
 
     def _warn(self, question: Question) -> None:
         if question is Question.TX_PIN:
@@ -363,6 +367,8 @@ class Usart(Peripheral):
         remap = self.chip.pins.remaps.get(self.name, 0)
         cts, rts = _CONTROL_PINS[self.name].get(remap, _CONTROL_PINS[self.name][0])
         self.command(_CONTROL, self.chip.pins[cts].index, self.chip.pins[rts].index)
+        clocks = _CLOCK_PINS[self.name]
+        self.command(_MOVE_CK, self.chip.pins[clocks.get(remap, clocks[0])].index)
         self.command(_MOVE, self._tx_pin.index, self._rx_pin.index)
 
     def _restored(self) -> None:

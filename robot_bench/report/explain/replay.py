@@ -20,7 +20,7 @@ from typing import cast
 
 from adapter_sim.pinout import Direction, Pull, Wire, WireRole, load_pinout
 from bluepill_sim.core import BLOCK, BlockRow
-from bluepill_sim.core.debug_unit import WatchKind, Watchpoint
+from bluepill_sim.core.debugging.debug_unit import WatchKind, Watchpoint
 from bluepill_sim.core.nvic import exception_name
 from bluepill_sim.errors import ImageError
 from bluepill_sim.fabric.subscriptions import EDGE, HIGH, Of

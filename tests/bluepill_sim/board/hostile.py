@@ -15,7 +15,7 @@ from bluepill_sim.fabric.signals import Oscillation, Shape
 from bluepill_sim.fabric.subscriptions import EDGE, Of
 from bluepill_sim.parts import CanFrame, CanNetwork, CanNode, Eeprom24C02
 from bluepill_sim.peripherals.spi import Loopback
-from tests.bluepill_sim.machine import Machine
+from tests.bluepill_sim.machine import CODE, Machine
 
 STEPS = 1024
 TABLE, INDEX, BUFFER = 0x0800_2000, 0x2000_0040, 0x2000_2000
@@ -92,7 +92,15 @@ _SET_UP = (
      (0x4000_661C, 1), (0x4000_6600, 0), (0x4000_6400, 0), (0x4000_6584, 2), (0x4000_6580, 0x2460_0001)),
     ((0x4001_0C00, 0xDD44_4444), (0x4000_5404, 8), (0x4000_541C, 40), (0x4000_5400, 1), (0x4000_5400, 0x501)),
     ((0x4000_5C40, 1), (0x4000_5C40, 0), (0x4000_5C44, 0), (0x4000_5C4C, 0x80), (0x4000_5C00, 0x3220)),
+    # A synchronous USART: PA8 and PA9, its clock, characters.
+    ((0x4001_0804, 0x4444_44BB), (0x4001_3808, 16), (0x4001_3810, 0x0F00), (0x4001_380C, 0x200C), (0x4001_3804, 0x35)),
+    # FPB: the first word of the program's table read as another, a word of it that nobody runs as code.
+    ((0xE000_2004, BUFFER - 0x2000_0000), (0xE000_2008 + 24, TABLE | 1), (0xE000_2008, 0x0800_3FF1), (0xE000_2000, 3)),
 )  # fmt: skip
+#: Where nothing is: a store there is an imprecise fault.
+_HOLES = (0x2200_0000, 0x4200_0000, 0x6000_0000, 0x1FFF_0000, 0xF000_0000, 0x2000_5000, 0x0800_0100, 0x1FFF_F800)
+#: What may stand in the FPB's table: `nop` twice, `movs r2, #0`, `bx lr`.
+_WORDS, PPB = (0xBF00_BF00, 0x2200_BF00, 0x4770_BF00, 0x4770_4770), 0xE000_0000
 _PINS = [f"P{port}{n}" for port in "AB" for n in range(16)]
 
 
@@ -109,7 +117,7 @@ class Story:
         self._rows = [*begun, *(self._row(rng) for _ in range(STEPS - len(begun)))]
         self.end_ns = rng.randrange(1, most_ms) * MS
         self._world = sorted((rng.randrange(20 * US, self.end_ns), rng.getrandbits(64)) for _ in range(40))
-        self.watched = rng.sample(_PINS, 3)
+        self.watched = [*rng.sample(_PINS, 3), *(["PA8"] if rng.random() < 0.3 else [])]
 
     def _found(self, rng: random.Random) -> list[int]:
         parts = Machine("nop", {}).board.chip.parts.by_name
@@ -151,7 +159,12 @@ class Story:
             if 0xE000_E180 <= address < 0xE000_E200 or address == 0xE000_E010:
                 value &= rng.getrandbits(32)
         elif self.wants_core and kind < 0.205:
-            address, value = rng.choice((0x2200_0000, 0x4200_0000, 0x6000_0000, 0x1FFF_0000, 0xF000_0000)), 1
+            address, value = rng.choice(_HOLES), 1
+        elif self.wants_core and kind < 0.215:  # comparators for words of the program, and what they lead to
+            address = rng.choice((*(0xE000_2008 + 4 * n for n in range(8)), *(BUFFER + 4 * n for n in range(8))))
+            value = (
+                rng.choice((CODE, TABLE, CODE + 4 * rng.randrange(90))) | 1 if address >= PPB else rng.choice(_WORDS)
+            )
         else:
             address, value = rng.choice(rng.choice(self._groups)), self._value(rng)
         if 0x4002_1014 <= address < 0x4002_1020 and rng.random() < 0.9:

@@ -161,3 +161,15 @@ def test_an_access_of_the_bus_happens_at_the_time_of_its_event(boot_on: Any) -> 
     act_at(machine, 33_333, lambda slot: bool(machine.board.chip.fabric.bus_write(slot, 0x4001_0810, 4, 2)))
     machine.run(100)
     assert edges[-1] == ("PA1", "high", 33_333)
+
+
+def test_a_wave_that_nobody_looked_at_is_part_of_a_snapshot_as_it_is(boot_on: Any) -> None:
+    """Else a state that was restored would differ from the one that went on, until the next edge."""
+    machine = boot_on(PINS_ON + "b stop")
+    machine.deafen().run(50)
+    offer(machine, 96, 40)
+    for _ in range(12):
+        machine.run(1.3)
+        other = boot_on(PINS_ON + "b stop").deafen()
+        other.board.restore(machine.board.snapshot())
+        assert other.board.snapshot() == machine.board.snapshot()

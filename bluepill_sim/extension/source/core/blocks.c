@@ -92,7 +92,7 @@ static void enter_special(struct core *core, uint32_t address, uint32_t size, st
     if (core->is_scratch) {
         return;
     }
-    if (row != NULL && row->flags & ROW_WRITABLE && memcmp(row->host, row->code, row->end - row->start) != 0) {
+    if (row != NULL && row->flags & ROW_WRITABLE && memcmp(row->host, row->code, row->compared) != 0) {
         row = NULL;
     }
     core->waiting.has_acted |= row == NULL || row->flags & (ROW_CHANGES_MASKS | ROW_SENDS_EVENT);
@@ -220,12 +220,12 @@ void core_on_block(void *unicorn, uint64_t at, uint32_t size, void *user)
 
 /* Returns false without memory for it. `instructions` has `count` rows, the costs are those of block_cost.py. */
 bool core_add_row(struct core *core, uint32_t start, uint32_t end, uint32_t straight, uint32_t taken, uint32_t flags,
-                  const struct instruction *instructions, uint32_t count, const uint8_t *host)
+                  const struct instruction *instructions, uint32_t count, const uint8_t *host, uint32_t compared)
 {
     struct row **at = slot(core, start);
     const size_t list = count * sizeof *instructions;
     struct row *row = malloc(sizeof *row + list);
-    uint8_t *code = host == NULL ? NULL : malloc(end - start);
+    uint8_t *code = host == NULL ? NULL : malloc(compared);
     if (row == NULL || (host != NULL && code == NULL)) {
         free(row);
         free(code);
@@ -234,11 +234,14 @@ bool core_add_row(struct core *core, uint32_t start, uint32_t end, uint32_t stra
     const bool is_looked_after = flags & ROW_CHANGES_MASKS;
     *row = (struct row){.start = start, .end = end, .costs = {straight, taken},
                         .passed = {is_looked_after ? NEVER : straight, is_looked_after ? NEVER : taken},
-                        .flags = flags, .count = count, .host = host, .code = code, .next = core->all};
+                        .flags = flags, .count = count, .host = host, .code = code, .compared = compared,
+                        .next = core->all};
     find_plain(core, row);
     memcpy(row->instructions, instructions, list);
     if (host != NULL) {
-        memcpy(code, host, end - start);
+        memcpy(code, host, compared);
+    }
+    if (start - core->shared.sram_base < core->shared.sram_bytes) {
         const uint32_t first = (start - core->shared.sram_base) / CODE_BYTES, last = (end - 1 - core->shared.sram_base) / CODE_BYTES;
         for (uint32_t n = first; n <= last && n < CODE_PLACES; ++n) {
             core->code_places[n / 8] |= (uint8_t)(1 << n % 8);

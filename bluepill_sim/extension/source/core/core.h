@@ -67,8 +67,9 @@ struct row {
     uint32_t plain_start;
     uint32_t flags, count;
     uint64_t passed[2]; /* its costs, or more than any time where what comes after it has to be looked at */
-    const uint8_t *host; /* of code in writable memory: where it stands now */
-    uint8_t *code;       /* and what it was when it was measured */
+    const uint8_t *host; /* of code that may change: where it, or the FPB's table, stands now, */
+    uint8_t *code;       /* what that was when it was measured, */
+    uint32_t compared;   /* and how many bytes of it */
     struct row *next;    /* in the list of all rows, or of dropped ones */
     struct loop *loop;   /* where it is one that may poll a counter */
     struct instruction instructions[];
@@ -188,6 +189,12 @@ struct fault_row {
     uint32_t exception, cfsr, hfsr;
 };
 
+/* A page that fetches and loads find elsewhere: what the FPB remaps. */
+struct view {
+    uint32_t page, code, data;
+};
+enum { VIEWS = 8 };
+
 struct core {
     struct shared shared;
     void *unicorn;
@@ -223,6 +230,8 @@ struct core {
     struct forced forced[FORCED_SETS][FORCED_WAYS]; /* by the place of the store; `pc` is 0 of one that is free */
     uint8_t forced_next[FORCED_SETS];
     struct fault_row faults[HALT_NONE]; /* by kind of halt */
+    struct view views[VIEWS];
+    uint32_t view_count;
 };
 
 static inline void begin_block(struct core *core, struct row *row)

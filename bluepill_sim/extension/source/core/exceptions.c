@@ -218,6 +218,9 @@ int deliver(struct core *core)
     if (!number || !can_preempt(core, number, false)) {
         return 0;
     }
+    if (number == HARD_FAULT) { /* of a buffered store: Python reports it */
+        return -1;
+    }
     return enter(core, number, core->shared.pc) ? 1 : -1;
 }
 
@@ -248,7 +251,8 @@ bool leave(struct core *core, uint32_t exc_return)
     uint32_t *frame = sram_at(core, from, FRAME_BYTES);
     const bool may_stop = to_thread && s->scr & SLEEPONEXIT && s->scr & SLEEPDEEP;
     const bool steps = number == DEBUG_MONITOR && s->demcr & MON_STEP;
-    if (frame == NULL || value[2] || may_stop || steps || !has_vectors(core)) {
+    const bool is_reported = s->pending[0] >> HARD_FAULT & 1;
+    if (frame == NULL || value[2] || may_stop || steps || is_reported || !has_vectors(core)) {
         return false;
     }
     const uint32_t xpsr = frame[7];

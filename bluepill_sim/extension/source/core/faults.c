@@ -8,7 +8,7 @@
 
 #include "core.h"
 
-enum { HARD_FAULT = 3 };
+enum { HARD_FAULT = 3, DISDEFWBUF = 2 };
 #define MEMFAULTENA (1u << 16)
 #define FORCED (1u << 30)
 #define MON_EN (1u << 16)
@@ -28,7 +28,8 @@ bool core_on_bad_access(void *unicorn, int kind, uint64_t address, int size, int
     (void)unicorn;
     struct core *core = user;
     struct shared *s = &core->shared;
-    if (s->is_python || kind == WRITE_PROTECTED || kind == FETCH_PROTECTED) {
+    const bool is_buffered = kind == WRITE_UNMAPPED && !(s->actlr & DISDEFWBUF);
+    if (s->is_python || is_buffered || kind == WRITE_PROTECTED || kind == FETCH_PROTECTED) {
         return core->calls.bad_access((uint32_t)kind, (uint32_t)address, (uint32_t)size, (uint64_t)value);
     }
     if (s->halt_kind != HALT_FROZEN) {

@@ -418,7 +418,7 @@ uint32_t system_write(struct shared *s, uint32_t address, uint32_t value, uint32
 
 void system_init(struct shared *s)
 {
-    s->last_sleep_cycle = s->tick_next = s->raised_cycle = NO_TIME;
+    s->last_sleep_cycle = s->tick_next = s->raised_cycle = s->bus_error_cycle = NO_TIME;
     s->tick = (struct ramp){.divider = 1, .falls = 1};
     s->cyccnt = (struct ramp){.divider = 1, .top = WORD};
     system_power_up(s);

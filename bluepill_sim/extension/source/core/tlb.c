@@ -6,7 +6,11 @@
  */
 #include "core.h"
 
-enum { MAY_READ = 1, MAY_WRITE = 2, MAY_EXECUTE = 4, FETCH = 18 };
+enum { MAY_READ = 1, MAY_WRITE = 2, MAY_EXECUTE = 4, READ = 16, FETCH = 18, VIEW_PAGE = 0x400 };
+
+/* Where the copies of core/debugging/flash_patch.py are; the program finds nothing there, as below it. */
+#define VIEWS_BASE 0x9FFF8000u
+#define VIEWS_BYTES 0x4000u
 
 /* `uc_tlb_entry` of unicorn.h. */
 struct tlb_entry {
@@ -31,13 +35,41 @@ static void clear_it_state(struct core *core)
     }
 }
 
+/* Says which pages fetches and loads find elsewhere: page, and where each does. */
+void core_set_views(struct core *core, const uint32_t (*rows)[3], uint32_t count)
+{
+    core->view_count = count;
+    for (uint32_t n = 0; n < count; ++n) {
+        core->views[n] = (struct view){rows[n][0], rows[n][1], rows[n][2]};
+    }
+}
+
+static const struct view *view_of(const struct core *core, uint32_t page)
+{
+    for (uint32_t n = 0; n < core->view_count; ++n) {
+        if (core->views[n].page == page) {
+            return &core->views[n];
+        }
+    }
+    return NULL;
+}
+
 /* False where nothing executes: the run ends with an exception of the library. */
 bool core_on_tlb_fill(void *unicorn, uint64_t address, int access, struct tlb_entry *entry, void *user)
 {
     (void)unicorn;
     struct core *core = user;
     const uint32_t page = (uint32_t)address;
-    entry->address = page;
+    const struct view *view = view_of(core, page & ~(VIEW_PAGE - 1u));
+    entry->address = page - VIEWS_BASE < VIEWS_BYTES ? page - VIEWS_BYTES : page;
+    if (view != NULL) {
+        if (access != FETCH) {
+            clear_it_state(core);
+        }
+        entry->address = access == FETCH ? view->code : access == READ ? view->data : page;
+        entry->may = access == FETCH ? MAY_EXECUTE : access == READ ? MAY_READ : MAY_WRITE;
+        return true;
+    }
     entry->may = MAY_READ | MAY_WRITE;
     if (access != FETCH) {
         clear_it_state(core);

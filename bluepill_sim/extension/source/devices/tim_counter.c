@@ -149,7 +149,13 @@ uint32_t count_on(struct device *device, uint64_t counts)
     struct tim *tim = tim_of(device);
     const struct lap lap = lap_of(&tim->ramp);
     const bool was_beyond = is_beyond(tim);
-    uint32_t happened = 0;
+    const uint64_t overflows =
+        was_beyond ? 0 : arrivals(&lap, 0, counts) + (tim->ramp.mirrors ? arrivals(&lap, tim->ramp.top, counts) : 0);
+    uint32_t happened = overflows && repeat(device, overflows) ? OVERFLOWED : 0;
+    /* What an update event loads is compared in its own tick, in place of what it replaces. Nobody leaps beyond that. */
+    const bool loads = happened && !(device->words[CR1] & UDIS);
+    const bool is_at_top = tim->ramp.mirrors ? (lap.phase + counts) % lap.period == tim->ramp.top : tim->ramp.falls;
+    const uint32_t left = is_at_top ? tim->ramp.top : 0, landed = is_at_top ? device->words[ARR] : 0;
     for (uint32_t n = 0; n < CHANNELS; ++n) {
         if (is_input(device, n)) {
             continue;
@@ -161,6 +167,11 @@ uint32_t count_on(struct device *device, uint64_t counts)
         for (uint32_t k = match_phases(device, tim->ccr[n], true, phases); k--;) {
             matches += arrivals(&lap, phases[k], counts);
         }
+        if (loads && (tim->ccr[n] != device->words[CCR1 + n] || left != landed)) {
+            const int more = (device->words[CCR1 + n] == landed) - (tim->ccr[n] == left);
+            flagged += (uint64_t)more;
+            matches += (uint64_t)more;
+        }
         happened |= flagged ? MATCHED << n : 0;
         const uint32_t mode = mode_of(device, n), bit = 1u << n;
         if (matches && mode == SET_ON_MATCH) {
@@ -170,11 +181,6 @@ uint32_t count_on(struct device *device, uint64_t counts)
         } else if (matches & 1 && mode == TOGGLE) {
             tim->latched ^= bit;
         }
-    }
-    if (!was_beyond) {
-        const uint64_t overflows = arrivals(&lap, 0, counts) +
-                                   (tim->ramp.mirrors ? arrivals(&lap, tim->ramp.top, counts) : 0);
-        happened |= overflows && repeat(device, overflows) ? OVERFLOWED : 0;
     }
     go_to_phase(&tim->ramp, (lap.phase + counts) % lap.period);
     if (was_beyond && tim->ramp.value <= tim->arr) {

@@ -18,17 +18,17 @@ enum { ASKING = TXE | TC | RXNE | IDLE, READ_SEQUENCE = 0x1F };
 enum { SBK = 1 << 0, RWU = 1 << 1, RE = 1 << 2, TE = 1 << 3, RXNEIE = 1 << 5, PEIE = 1 << 8, PS = 1 << 9, PCE = 1 << 10,
        WAKE = 1 << 11, M = 1 << 12, UE = 1 << 13 };
 /* Of CR2 and CR3. */
-enum { ADD = 0xF, LBDIE = 1 << 6, CLKEN = 1 << 11, LINEN = 1 << 14 };
+enum { ADD = 0xF, LBDIE = 1 << 6, LBCL = 1 << 8, CPHA = 1 << 9, CPOL = 1 << 10, CLKEN = 1 << 11, LINEN = 1 << 14 };
 enum { EIE = 1 << 0, HDSEL = 1 << 3, DMAR = 1 << 6, DMAT = 1 << 7, RTSE = 1 << 8, CTSE = 1 << 9, CTSIE = 1 << 10 };
-/* How far its alternate function RTS stands before TX; bits of a break in LIN mode. */
-enum { RTS_FROM_TX = 2, LIN_BREAK_BITS = 13 };
+/* How far its alternate functions RTS and CK stand before TX; bits of a break in LIN mode. */
+enum { RTS_FROM_TX = 2, CK_FROM_TX = 3, LIN_BREAK_BITS = 13 };
 /* A data word, what marks one in TDR and SHIFT, and what SHIFT holds besides. */
 enum { WORD = 0x1FF, HELD = 1 << 16, PREAMBLE = 1 << 17, BREAK = 1 << 18, FLAGS_AT = 16 };
 /* What Python is asked, as `Question` of usart.py: all but the last four are warnings. */
 enum { TX_PIN, TX_OFF, NO_RATE, CHARACTER_LOST, RX_OFF, CUT_OFF, CHECK_MODES, JUDGE_SPEED, GIVE_MORE, EXCHANGE };
 /* Commands of its own: move to the pins (TX, RX); hear a word, or learn that no more can be held; listen to nCTS,
- * move (nCTS, nRTS). */
-enum { MOVE = OWN_COMMANDS, HEAR, CAN_HEAR, LISTEN, CONTROL };
+ * move (nCTS, nRTS), move CK. */
+enum { MOVE = OWN_COMMANDS, HEAR, CAN_HEAR, LISTEN, CONTROL, MOVE_CK };
 /* Its outputs. */
 enum { IRQ, TX_DMA, RX_DMA };
 
@@ -105,7 +105,9 @@ static void find_deadlines(struct device *device)
     usart->tx_due_ns = device->words[SHIFT] ? usart->tx_base_ns + span_ns(device, usart->tx_half_bits) : NO_TIME;
     usart->rx_due_ns = usart->rx_count && !usart->rx_waits ? usart->rx_base_ns + span_ns(device, usart->rx_half_bits) : NO_TIME;
     usart->bit_due_ns = usart->bits ? usart->tx_base_ns + span_ns(device, usart->bit_half_bits) : NO_TIME;
+    usart->ck_due_ns = usart->ck_edges ? usart->tx_base_ns + span_ns(device, usart->ck_half_bits) : NO_TIME;
     uint64_t due = usart->tx_due_ns;
+    due = usart->ck_due_ns < due ? usart->ck_due_ns : due;
     due = usart->bit_due_ns < due ? usart->bit_due_ns : due;
     due = usart->rx_due_ns < due ? usart->rx_due_ns : due;
     due = usart->idle_due_ns < due ? usart->idle_due_ns : due;
@@ -159,6 +161,52 @@ static void show_next_bit(struct device *device)
     usart->bits = usart->bits > 1 ? usart->bits : 0;
 }
 
+static void set_ck(struct device *device, uint32_t level)
+{
+    struct usart *usart = device->state;
+    if (usart->ck != level) {
+        usart->ck = level;
+        offer(device->fabric, usart->ck_pin, usart->source - CK_FROM_TX, level);
+    }
+}
+
+/* Leaves CK at its idle level, or to others. */
+static void rest_clock(struct device *device)
+{
+    struct usart *usart = device->state;
+    const uint32_t control = device->words[CR2];
+    usart->ck_edges = 0;
+    set_ck(device, !(control & CLKEN && device->words[CR1] & UE) ? FLOATING : control & CPOL ? HIGH : LOW);
+}
+
+/* Has somebody who looks at CK see the clock of a character: a pulse each data bit, the last one's where LBCL says so, and
+ * none of its start and stop bits. The bit stands still at the first edge, with CPHA at the second (RM0008 27.3.9). */
+static void show_clock(struct device *device, uint32_t item, uint64_t before)
+{
+    struct usart *usart = device->state;
+    const struct fabric *fabric = device->fabric;
+    const uint32_t *words = device->words, port = usart->ck_pin / PINS;
+    const bool is_seen = (fabric->subscribed[port] | fabric->listened[port]) >> usart->ck_pin % PINS & 1;
+    usart->ck_count = usart->ck_word = 0;
+    if (is_seen && item & HELD && words[CR2] & CLKEN) {
+        usart->ck_edges = 2 * ((words[CR1] & M ? 9u : 8u) - (words[CR2] & LBCL ? 0 : 1));
+        usart->ck_half_bits = before + (words[CR2] & CPHA ? 2 : 3);
+    }
+}
+
+/* Makes an edge of CK; at the one at which the bit stands still RX is taken. */
+static void show_next_edge(struct device *device)
+{
+    struct usart *usart = device->state;
+    const bool is_second = usart->ck_edges-- & 1;
+    if (is_second == !!(device->words[CR2] & CPHA)) {
+        const uint32_t level = port_input(device->fabric, usart->rx_pin / PINS) >> usart->rx_pin % PINS & 1;
+        usart->ck_word |= level << usart->ck_count++;
+    }
+    ++usart->ck_half_bits;
+    set_ck(device, usart->ck == HIGH ? LOW : HIGH);
+}
+
 /* Puts an item into the shift register, `before` half-bits after `base_ns`. */
 static void load(struct device *device, uint32_t item, uint64_t base_ns, uint64_t before)
 {
@@ -167,6 +215,7 @@ static void load(struct device *device, uint32_t item, uint64_t base_ns, uint64_
     usart->tx_base_ns = base_ns;
     usart->tx_half_bits = before + (item == BREAK ? 2 * break_bits(device) + 2 : frame_half_bits(device));
     show_bits(device, item, before);
+    show_clock(device, item, before);
 }
 
 static void connect(struct device *device, bool is_on)
@@ -286,6 +335,8 @@ static void event(struct device *device, uint64_t until)
     while ((ns = due_ns(device)) <= until) {
         if (usart->bit_due_ns == ns) {
             show_next_bit(device);
+        } else if (usart->ck_due_ns == ns) {
+            show_next_edge(device);
         } else if (usart->tx_due_ns == ns) {
             end_transmission(device, ns);
         } else if (usart->rx_due_ns == ns) {
@@ -336,6 +387,7 @@ static void write_rate(struct device *device, uint64_t tx_end_ns, uint64_t rx_en
         usart->tx_half_bits = 0;
         usart->bits = 0; /* the rest of the character is not shown */
         connect(device, true);
+        rest_clock(device);
     }
     if (usart->rx_due_ns != NO_TIME) {
         usart->rx_base_ns = rx_end_ns;
@@ -385,6 +437,9 @@ static void write_control(struct device *device)
         }
         words[SHIFT] = words[TDR] = usart->bits = 0;
         words[SR] |= TXE | TC;
+    }
+    if (!(words[SHIFT] & HELD && usart->ck_edges)) {
+        rest_clock(device);
     }
     if (!is_on && !words[SHIFT]) {
         connect(device, false);
@@ -451,12 +506,14 @@ static void clear(struct device *device)
 {
     struct usart *usart = device->state;
     const struct usart fresh = {.tx_due_ns = NO_TIME, .rx_due_ns = NO_TIME, .idle_due_ns = NO_TIME,
-                                .bit_due_ns = NO_TIME, .rts = FLOATING, .rts_pin = usart->rts_pin, .cts_pin = usart->cts_pin,
+                                .bit_due_ns = NO_TIME, .ck_due_ns = NO_TIME, .rts = FLOATING, .ck = FLOATING,
+                                .ck_pin = usart->ck_pin, .rts_pin = usart->rts_pin, .cts_pin = usart->cts_pin,
                                 .clock_hz = usart->clock_hz, .source = usart->source, .tx_pin = usart->tx_pin,
                                 .rx_pin = usart->rx_pin, .judged_hz = usart->judged_hz,
                                 .judged_brr = usart->judged_brr};
     connect(device, false);
     offer(device->fabric, usart->rts_pin, usart->source - RTS_FROM_TX, FLOATING);
+    set_ck(device, FLOATING);
     *usart = fresh;
     listen(device);
     for (uint32_t n = SEEN; n <= RDR; ++n) {
@@ -523,6 +580,12 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
         usart->rts_pin = other;
         listen(device);
         update_outputs(device);
+        break;
+    case MOVE_CK:
+        set_ck(device, FLOATING);
+        usart->ck_pin = one;
+        rest_clock(device);
+        find_deadlines(device);
         break;
     case HEAR: return hear(device, one);
     case SETTLE: return device->words[RDR] & WORD; /* DR */

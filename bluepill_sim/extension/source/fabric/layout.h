@@ -177,10 +177,13 @@ struct shared {
     uint32_t has_fault; /* `fault` waits for Python */
     uint32_t waits; /* the block ends before its next access: the flash cannot give more code now */
     uint32_t waits_end;
+    uint64_t bus_error_cycle; /* when the error of a buffered store comes; all ones: none is on its way */
+    uint32_t bus_error_pc;
+    uint32_t bus_error_address;
     struct fault fault;
     struct record last[32];
 };
-_Static_assert(sizeof(struct shared) == 1720, "shared");
+_Static_assert(sizeof(struct shared) == 1736, "shared");
 
 /* The pins of one port, a bit each. RM0008 9.1, table 20. */
 struct port {
@@ -250,9 +253,17 @@ struct usart {
     uint32_t rx_waits; /* the far end waits for nRTS */
     uint32_t bits; /* bits of a character to come on the TX pin, and a mark above them; 0: nobody looks */
     uint32_t rx_more; /* Python has more characters to come */
+    uint64_t ck_due_ns; /* the next edge of the clock on CK, */
+    uint64_t ck_half_bits; /* and half-bits up to it */
+    uint32_t ck_edges; /* edges to come; 0: nobody looks */
+    uint32_t ck_pin;
+    uint32_t ck; /* the level that CK was last given */
+    uint32_t ck_count; /* bits of RX that edges of a character have taken, */
+    uint32_t ck_word; /* and they */
+    uint32_t ck_end;
     uint32_t rx[256]; /* what DR will read, and above it the flags of SR */
 };
-_Static_assert(sizeof(struct usart) == 1160, "usart");
+_Static_assert(sizeof(struct usart) == 1200, "usart");
 
 /* What EXTI holds beyond its registers. */
 struct exti {

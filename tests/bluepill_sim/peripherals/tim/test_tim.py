@@ -40,7 +40,7 @@ class Timer:
     def set(self, **registers: int) -> None:
         """Write registers in the order given."""
         for register, value in registers.items():
-            self[register] = value
+            self[register.rstrip("_")] = value
 
     def at(self, tick: int) -> "Timer":
         """Go on to a tick."""
@@ -207,6 +207,29 @@ def test_preloads_wait_for_the_update(tim3: Timer) -> None:
     assert (tim3["CNT"], tim3.flags & UIF) == (19, 0)
     tim3.at(51)
     assert (tim3["CNT"], tim3.flags & UIF) == (0, UIF)
+
+
+@pytest.mark.parametrize(
+    ("control", "limit", "old", "new", "matches"),
+    [
+        (0, 9, 0, 5, False), (0, 9, 5, 0, True), (0, 9, 0, 0, True), (0, 9, 5, 4, False), (ARPE, 5, 0, 1, False),
+        (DIR | ARPE, 5, 9, 5, True), (DIR | ARPE, 5, 9, 3, False), (DIR | ARPE, 5, 3, 5, True),
+        (DIR | ARPE, 5, 5, 5, True), (DIR | ARPE, 9, 9, 5, False), (0x60 | ARPE, 5, 9, 5, True),
+        (0x60 | ARPE, 5, 9, 3, False), (0x60 | ARPE, 5, 3, 5, True), (DIR | UDIS | ARPE, 5, 9, 5, None),
+    ],
+)  # fmt: skip
+def test_an_update_event_compares_what_it_loads(
+    tim3: Timer, control: int, limit: int, old: int, new: int, matches: bool | None
+) -> None:
+    """In its own tick, in place of what it replaces: a strip of LEDs by DMA at matches needs it."""
+    tim3.set(CR1=control & ~UDIS, ARR=9, CCMR1=0x68, CCR1=old, EGR=1, SR=0, CR1_=control | CEN)
+    tim3.set(ARR=limit, CCR1=new)
+    for tick in range(1, 12):
+        tim3["SR"] = 0
+        tim3.at(tick)
+        if tim3.flags & UIF:
+            break
+    assert (bool(tim3.flags & CC1IF) if tim3.flags & UIF else None) is matches
 
 
 def test_without_preload_a_period_is_another_at_once(tim3: Timer) -> None:

@@ -152,9 +152,10 @@ class Model:
             self.cnt = 0 if is_over else (before + 1) & 0xFFFF
         went_down = self.down
         self.turn()
+        loads = is_over and not self.repetitions and not self.r["CR1"] & 2
         for n in range(4):
             if not self.is_input(n):
-                self.compare(n, is_over, went_down, was_beyond)
+                self.compare(n, is_over, went_down, was_beyond, loads=loads)
         if is_over:
             if self.repetitions:
                 self.repetitions -= 1
@@ -162,14 +163,17 @@ class Model:
                 self.repetitions = self.r["RCR"]
                 self.update(by_counter=True)
 
-    def compare(self, n: int, is_over: bool, went_down: bool, was_beyond: bool) -> None:
+    def compare(self, n: int, is_over: bool, went_down: bool, was_beyond: bool, *, loads: bool) -> None:
         value, cms = self.ccr[n], self.field("CR1", 5, 3)
         meets = self.cnt == value
+        if loads:  # the update event of this tick has put a new value there, and a new limit
+            landed = self.r["ARR"] if self.down and self.cnt == self.arr else self.cnt
+            meets = landed == self.r[f"CCR{n + 1}"]
         flagged = meets
-        if self.is_centred and not was_beyond and 0 < value < self.arr:
+        if self.is_centred and not was_beyond and 0 < value < self.arr and not loads:
             flagged = meets and (cms == 3 or (cms == 1) == went_down)
         if value > self.arr and not was_beyond:
-            flagged = is_over and (not self.is_centred or self.cnt == self.arr)
+            flagged = (loads and meets) or (is_over and (not self.is_centred or self.cnt == self.arr))
         if meets:
             mode = self.modes[n]
             self.latched[n] = {1: True, 2: False, 3: not self.latched[n]}.get(mode, self.latched[n])

@@ -6,18 +6,19 @@ it does nothing. Where a debugger has the same point, it is the debugger's.
 
 Chosen: comparators count from the next block on; an access meets one if any byte of it does; events that
 DebugMonitor's priority does not allow wait, as those of the DWT do.
-Not modelled, and warned of: the FPB's remapping, the DWT's data values and the packets that it puts into the trace.
+What the FPB remaps is `flash_patch.py`'s.
+Not modelled, and warned of: the DWT's data values and the packets that it puts into the trace.
 
 Source: ARMv7-M Architecture Reference Manual C1.4 (DebugMonitor), C1.8 (DWT), C1.11 (FPB).
 Invariant: the points are those that the registers say, since `Processor.look_out` was called last.
 """
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import IntFlag
 from typing import Any
 
-from bluepill_sim.core.debug_unit import WatchKind, Watchpoint
+from bluepill_sim.core.debugging.debug_unit import WatchKind, Watchpoint
+from bluepill_sim.core.debugging.flash_patch import Remapped
 
 #: DEMCR.
 MON_EN, MON_STEP, TRCENA = 1 << 16, 1 << 18, 1 << 24
@@ -28,6 +29,8 @@ _CODE_COMPARATORS, _LOWER, _UPPER, _ADDRESS = 6, 1, 2, 0x1FFF_FFFC
 #: chosen: the largest range of instructions of a comparator of the DWT, by its mask; larger ones are cut to it.
 _MOST_MASK = 10
 _COUNTS = 1 << 32
+#: Where the FPB's table may be (ARM C1.11.4: bits 31 to 29 of FP_REMAP are 001).
+_SRAM = 0x2000_0000
 
 
 class DebugEvent(IntFlag):
@@ -47,6 +50,7 @@ class Points:
     breakpoints: frozenset[int]
     instructions: dict[int, int]
     accesses: dict[Watchpoint, int]
+    remapped: Remapped
     #: What of it is not modelled.
     unmodelled: tuple[str, ...] = ()
 
@@ -54,7 +58,7 @@ class Points:
 def points_of(shared: Any) -> Points:
     """Return what the registers in `struct shared` have the core look out for."""
     unmodelled: list[str] = []
-    breakpoints = _breakpoints(shared.fp_comp, unmodelled) if shared.fp_control & _ENABLE else set()
+    comparators = tuple(shared.fp_comp) if shared.fp_control & _ENABLE else ()
     instructions: dict[int, int] = {}
     accesses: dict[Watchpoint, int] = {}
     if shared.demcr & MON_EN and shared.demcr & TRCENA:
@@ -69,18 +73,28 @@ def points_of(shared: Any) -> Points:
                 instructions |= dict.fromkeys(range(at & ~1, at + max(size, 1), 2), n)
             elif kind:
                 accesses[Watchpoint(at, size, _WATCHES[kind])] = n
-    return Points(frozenset(breakpoints), instructions, accesses, tuple(unmodelled))
+    remapped = _remapped(comparators, _SRAM + shared.fp_remap)
+    return Points(_breakpoints(comparators), instructions, accesses, remapped, tuple(unmodelled))
 
 
-def _breakpoints(comparators: Iterable[int], unmodelled: list[str]) -> set[int]:
-    found: set[int] = set()
-    for n, word in enumerate(comparators):
-        replaces = word >> 30
-        if word & _ENABLE and (n >= _CODE_COMPARATORS or not replaces):
-            unmodelled.append("FP_COMP: remapping")
-        elif word & _ENABLE:
-            found |= {(word & _ADDRESS) + 2 * (half - 1) for half in (_LOWER, _UPPER) if replaces & half}
-    return found
+def _breakpoints(comparators: tuple[int, ...]) -> frozenset[int]:
+    return frozenset(
+        (word & _ADDRESS) + 2 * (half - 1)
+        for word in comparators[:_CODE_COMPARATORS]
+        for half in (_LOWER, _UPPER)
+        if word & _ENABLE and word >> 30 & half
+    )
+
+
+def _remapped(comparators: tuple[int, ...], table: int) -> Remapped:
+    words = [(word & _ADDRESS, n) for n, word in enumerate(comparators) if word & _ENABLE and not word >> 30]
+    if not words:
+        return Remapped()
+    return Remapped(
+        table,
+        tuple(row for row in words if row[1] < _CODE_COMPARATORS),
+        tuple(row for row in words if row[1] >= _CODE_COMPARATORS),
+    )
 
 
 def cycles_to_match(shared: Any, count: int) -> int | None:

@@ -1,0 +1,1 @@
+"""What the core has for debugging, and firmware as well: halts, FPB, DWT; a debugger itself is `bluepill_sim/debug`."""
