@@ -107,6 +107,11 @@ class Turned(NamedTuple):
     stalled_right: bool = False
 
 
+def free_wheels(left_angle_rad: float, right_angle_rad: float) -> Turned:
+    """Return wheels that no motor stalls at: `Turned` of two angles in half the time, for it is made at each step."""
+    return tuple.__new__(Turned, (left_angle_rad, right_angle_rad, False, False))
+
+
 class RobotBody(Protocol):
     """A robot as a physical thing in a world."""
 

@@ -24,7 +24,7 @@ import math
 from collections.abc import Collection, Sequence
 
 from p2os.pioneer.body.contacts import APART_STEPS, ContactCounter
-from p2os.pioneer.body.contract import BodyState, Turned
+from p2os.pioneer.body.contract import BodyState, Turned, free_wheels
 from p2os.pioneer.body.in_world import DT_S, BodyInWorld, Scene, StandingPose
 from p2os.pioneer.body.physical import BACK_DRIVE, GRAVITY_MPS2, UNPOWERED_SHARE, WHEEL_FRICTION
 from p2os.pioneer.body.ray_cast import Direction, Echo, cast, echoes, narrow_parts
@@ -292,7 +292,7 @@ class KinematicBody(BodyInWorld):
                 x, y = x + radius * (s - old_s), y - radius * (c - old_c)
             work_j += step_j
             left_angle, right_angle = left_angle + left_rad, right_angle + right_rad
-            made.append(Turned(left_angle, right_angle))
+            made.append(free_wheels(left_angle, right_angle))
         if made:
             self._x, self._y, self._heading, self._cos, self._sin, self._free_m = x, y, heading, c, s, free
             self._left_angle, self._right_angle, self._rim_work_j = left_angle, right_angle, work_j
@@ -310,7 +310,7 @@ class KinematicBody(BodyInWorld):
         self._right_angle += self._right * DT_S / self._radius_m
         if self._stalled:
             return Turned(self._left_angle, self._right_angle, self._asked[0] != 0.0, self._asked[1] != 0.0)
-        return Turned(self._left_angle, self._right_angle)
+        return free_wheels(self._left_angle, self._right_angle)
 
     def _ways(self, left_mps: float, right_mps: float) -> tuple[float, float]:
         """Return how far a step leads along, metres, and around, rad."""
