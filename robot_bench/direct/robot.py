@@ -7,8 +7,8 @@ start of each step, from the nets' history.
 Its state log has what the motors are told, and when a wheel stalls or is free again (looked
 at with the encoders); the body itself tells of collisions.
 
-Where a body's wheels turn no faster than they are told, the chip need not wait for instants of the
-encoders at which no wheel can have come to another sector.
+The chip need not wait for instants of the encoders at which no wheel can have come to another sector, which
+the body knows: it is asked anew each time, for a thing that was placed may push it.
 
 Invariant: at time t the body has made every step that ended at or before t.
 """
@@ -24,7 +24,7 @@ from robot_bench.direct.encoder import WheelEncoder
 from robot_bench.direct.motor import JointMotor
 from simbase.errors import UsageError
 from simbase.state import Stateful
-from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reached
+from simbase.timing import NS_PER_MS, Nanos, Reached
 
 UM_PER_M = 1_000_000
 #: (left, right wheel stalled) → what the state log says.
@@ -61,7 +61,7 @@ class DirectRobot(Stateful):
 
     STATE = ("body", "sensors", "_left", "_right", "_next_encoder", "_steps", "_asked", "_stalled")
     #: The wheels are those of the body's state.
-    DERIVED = ("_next_change", "_wheels")
+    DERIVED = ("_wheels",)
 
     def __init__(
         self,
@@ -81,8 +81,6 @@ class DirectRobot(Stateful):
         self._sonar_numbers = tuple(sonar_numbers)
         self._encoder_period_ns = encoder_period_ns
         self._next_encoder: Nanos = 0
-        #: The first instant of the encoders at which they may show something else.
-        self._next_change: Nanos = 0
         self._steps = 0
         self._asked = (0, 0)
         self._stalled = (False, False)
@@ -93,7 +91,7 @@ class DirectRobot(Stateful):
 
     def next_deadline(self) -> Nanos:
         """Return when a wire may change next."""
-        return min(self._next_change, self.sensors.next_deadline())
+        return min(self._encoders_change_at(), self.sensors.next_deadline())
 
     def advance_to(self, limit: Nanos) -> Reached:
         """Step the body and set the wires as they are due."""
@@ -107,20 +105,16 @@ class DirectRobot(Stateful):
             if self.sensors.next_deadline() <= due:
                 self.sensors.sample(self.body.ranges(self._sonar_numbers), due)
         self._step_to(limit)
-        self._next_change = self._encoders_change_at()
         return Reached(limit)
 
     def _encoders_change_at(self) -> Nanos:
         """Return the first instant of the encoders that a wheel may have come to another sector by."""
-        fastest = max(self._left.fastest_um_per_s, self._right.fastest_um_per_s) / UM_PER_M
-        most_radps = self.body.most_radps(fastest)
-        if most_radps is None:
-            return self._next_encoder
+        fastest_mps = max(self._left.fastest_um_per_s, self._right.fastest_um_per_s) / UM_PER_M
         wheels = self._wheels
         turn_rad = min(
             self._left_encoder.margin_rad(wheels.left_angle_rad), self._right_encoder.margin_rad(wheels.right_angle_rad)
         )
-        safe_until = self._steps * self.body.dt_ns + int(turn_rad / most_radps * NS_PER_S)
+        safe_until = (self._steps + self.body.steps_within(turn_rad, fastest_mps)) * self.body.dt_ns
         missed = max(0, -((self._next_encoder - safe_until) // self._encoder_period_ns))
         return self._next_encoder + missed * self._encoder_period_ns
 
@@ -161,7 +155,6 @@ class DirectRobot(Stateful):
     def _restored(self) -> None:
         self._left_encoder.forget()
         self._right_encoder.forget()
-        self._next_change = self._next_encoder
         self._wheels = self.body.state
 
     def _tell(self, at: Nanos, what: str, detail: str) -> None:

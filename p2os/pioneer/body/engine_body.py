@@ -65,9 +65,9 @@ class EngineBody(BodyInWorld):
             self._state = self._read()
         return self._state
 
-    def most_radps(self, rim_mps: float) -> float | None:  # noqa: ARG002  # the contract's
-        """Return None: what pushes the robot turns its wheels too."""
-        return None
+    def steps_within(self, turn_rad: float, rim_mps: float) -> int:  # noqa: ARG002  # the contract's
+        """Return 0: what pushes the robot turns its wheels too."""
+        return 0
 
     def clearance(self, *, no_more_than: float = math.inf) -> float:
         """Return the plan-view distance from the hull to the nearest thing that it could touch, metres, or that."""

@@ -560,9 +560,9 @@ class KinematicBody(BodyInWorld):
             things = self._plan.echoing_within(min(xs), min(ys), max(xs), max(ys))
         return [*things, *self._echoing_robots(x, y, rays, longest_m)] if self.others else things
 
-    def most_radps(self, rim_mps: float) -> float | None:
-        """Return how fast a wheel turns at most while it is told no more than `rim_mps`; None: a robot may push it."""
-        return None if self.others else rim_mps / self._radius_m
+    def steps_within(self, turn_rad: float, rim_mps: float) -> int:
+        """Return for how many steps no wheel turns farther while it is told no more; 0 where a robot may push it."""
+        return 0 if self.others else self._steps_to_roll(turn_rad, rim_mps)
 
     def clearance(self, *, no_more_than: float = math.inf) -> float:
         """Return the distance from the hull to the nearest thing that it could touch, metres, or `no_more_than`."""
