@@ -95,15 +95,9 @@ class DirectRobot(Stateful):
 
     def advance_to(self, limit: Nanos) -> Reached:
         """Step the body and set the wires as they are due."""
-        while True:
-            due = min(self._next_encoder, self.sensors.next_deadline())
-            if due > limit:
-                break
+        while (due := self.sensors.next_deadline()) <= limit:
             self._step_to(due)
-            if self._next_encoder <= due:
-                self._show_encoders(due)
-            if self.sensors.next_deadline() <= due:
-                self.sensors.sample(self.body.ranges(self._sonar_numbers), due)
+            self.sensors.sample(self.body.ranges(self._sonar_numbers), due)
         self._step_to(limit)
         return Reached(limit)
 
@@ -119,13 +113,20 @@ class DirectRobot(Stateful):
         return self._next_encoder + missed * self._encoder_period_ns
 
     def _step_to(self, limit: Nanos) -> None:
+        """Make every step that ends by then, and set the encoders' wires at each of their instants by then."""
         body, left, right = self.body, self._left, self._right
-        wanted = limit // body.dt_ns
+        dt_ns, wanted = body.dt_ns, limit // body.dt_ns
         while self._steps < wanted:
             speeds = self.next_setpoints()
             alike = wanted - self._steps if left.is_steady and right.is_steady else 1
-            self._wheels = body.hold(*speeds, alike)[-1]
+            made = body.hold(*speeds, alike)
+            while (at := self._next_encoder) <= (self._steps + alike) * dt_ns:
+                ended = at // dt_ns - self._steps
+                self._show_encoders(made[ended - 1] if ended else self._wheels, at)
+            self._wheels = made[-1]
             self._steps += alike
+        while self._next_encoder <= limit:
+            self._show_encoders(self._wheels, self._next_encoder)
 
     def next_setpoints(self) -> tuple[float, float]:
         """Return the rim-speed set-points of the body's next step, m/s; for who steps it together with others, too."""
@@ -142,8 +143,7 @@ class DirectRobot(Stateful):
         self._steps += 1
         self._wheels = wheels
 
-    def _show_encoders(self, now: Nanos) -> None:
-        wheels = self._wheels
+    def _show_encoders(self, wheels: Wheels, now: Nanos) -> None:
         self._left_encoder.show(wheels.left_angle_rad, now)
         self._right_encoder.show(wheels.right_angle_rad, now)
         self._next_encoder = now + self._encoder_period_ns
