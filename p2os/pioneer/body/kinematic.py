@@ -281,7 +281,9 @@ class KinematicBody(BodyInWorld):
         x, y, heading, c, s, free = self._x, self._y, self._heading, self._cos, self._sin, self._free_m
         left_angle, right_angle, work_j, step_j = self._left_angle, self._right_angle, self._rim_work_j, self._steady_j
         made: list[Turned] = []
-        while len(made) < steps and free > travel:
+        for _ in range(steps):
+            if free <= travel:
+                break
             free -= travel
             before, heading, old_c, old_s = heading, heading + turn, c, s
             if heading != before:

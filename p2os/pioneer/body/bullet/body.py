@@ -284,6 +284,12 @@ class BulletBody(EngineBody):
         super()._count_anew()
         self._joints = pybullet.getJointStates(self.robot, WHEELS, physicsClientId=self._client)
 
+    def step(self, left_mps: float, right_mps: float) -> Turned:
+        """Move on by one step with these rim-speed set-points; see `RobotBody`."""
+        if self.others or self._walking:
+            return super().step(left_mps, right_mps)
+        return self.hold(left_mps, right_mps, 1)[0]
+
     def hold(self, left_mps: float, right_mps: float, steps: int) -> Sequence[Turned]:
         """Make so many steps with these set-points; see `RobotBody`."""
         if self.others or self._walking:
