@@ -223,7 +223,7 @@ class RobotBody(Protocol):
         ...
 
     def steps_within(self, turn_rad: float, rim_mps: float) -> int:
-        """Return for how many steps from now on no wheel turns farther, either way, while it is told no more.
+        """Return for how many steps from now on no wheel turns farther, rounding aside, while it is told no more.
 
         Args:
             turn_rad: How far, above 0.

@@ -120,7 +120,8 @@ class EngineBody(BodyInWorld):
         else:
             is_pushed_back = asked_mps != 0.0 and rate_radps * forward * self._radius_m < -PUSHED_BACK_MPS
             holds = is_pushed_back and effort_nm * forward > self._straining_nm
-        is_held[wheel], self._is_grip_changed = holds, True
+        if holds is not is_held[wheel]:
+            is_held[wheel], self._is_grip_changed = holds, True
         is_straining = holds or abs(effort_nm) > self._straining_nm
         is_stalled = is_straining and abs(rate_radps) < self._slow_radps
         self._stalling[wheel] = min(STALL_STEPS, self._stalling[wheel] + 1) if is_stalled else 0

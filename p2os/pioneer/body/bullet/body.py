@@ -344,7 +344,7 @@ class BulletBody(EngineBody):
 
     def steps_within(self, turn_rad: float, rim_mps: float) -> int:
         """Return for how many steps no wheel turns farther while it is told no more; 0 where something may push it."""
-        if not self._alone or self.others:
+        if self.others:
             return 0
         fastest_mps = max(rim_mps, self._radius_m * max(map(abs, self._rates)))
         return min(self._alone, self._steps_to_roll(turn_rad, OVERSHOOT * fastest_mps))
