@@ -36,7 +36,7 @@ from p2os.pioneer.body.bullet.model import (
 )
 from p2os.pioneer.body.bullet.rays import SonarRays
 from p2os.pioneer.body.contacts import APART_STEPS
-from p2os.pioneer.body.contract import FASTEST_MPS, BodyState, Turned, free_wheels
+from p2os.pioneer.body.contract import FASTEST_MPS, BodyState, Turned, Wheels, free_wheels
 from p2os.pioneer.body.engine_body import EngineBody
 from p2os.pioneer.body.in_world import DT_S, Scene
 from p2os.pioneer.body.physical import (
@@ -288,12 +288,16 @@ class BulletBody(EngineBody):
         """Move on by one step with these rim-speed set-points; see `RobotBody`."""
         if self.others or self._walking:
             return super().step(left_mps, right_mps)
-        return self.hold(left_mps, right_mps, 1)[0]
+        return self._step_alone(left_mps, right_mps, 1)[0]
 
-    def hold(self, left_mps: float, right_mps: float, steps: int) -> Sequence[Turned]:
+    def hold(self, left_mps: float, right_mps: float, steps: int) -> Sequence[Wheels]:
         """Make so many steps with these set-points; see `RobotBody`."""
         if self.others or self._walking:
             return super().hold(left_mps, right_mps, steps)
+        return self._step_alone(left_mps, right_mps, steps)
+
+    def _step_alone(self, left_mps: float, right_mps: float, steps: int) -> list[Turned]:
+        """Make the steps that its scene would make, where nobody else moves in it."""
         step, take_step, client, made = pybullet.stepSimulation, self.take_step, self._client, list[Turned]()
         self._tell_motors(left_mps, right_mps)
         for _ in range(steps):
