@@ -351,8 +351,10 @@ class Connection(Stateful):
 
     def next_deadline(self) -> Nanos | None:
         """Return when a timeout, a PULSE or the watchdog is due."""
-        due = [at for at in (self._decoder.next_deadline(), self._side.next_deadline()) if at is not None]
-        return min(due) if due else None
+        given_up, own = self._decoder.next_deadline(), self._side.next_deadline()
+        if given_up is None or own is None:
+            return own if given_up is None else given_up
+        return min(given_up, own)
 
     def advance_to(self, limit: Nanos) -> Reached:
         """Act on every deadline up to `limit`, each at its own time."""

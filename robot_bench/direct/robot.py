@@ -7,8 +7,8 @@ start of each step, from the nets' history.
 Its state log has what the motors are told, and when a wheel stalls or is free again (looked
 at with the encoders); the body itself tells of collisions.
 
-Where a body's wheels turn no faster than they are told, the chip need not wait for instants of the
-encoders at which no wheel can have come to another sector.
+The chip need not wait for instants of the encoders at which no wheel can have come to another sector, which
+the body knows: it is asked anew each time, for a thing that was placed may push it.
 
 Invariant: at time t the body has made every step that ended at or before t.
 """
@@ -24,7 +24,7 @@ from robot_bench.direct.encoder import WheelEncoder
 from robot_bench.direct.motor import JointMotor
 from simbase.errors import UsageError
 from simbase.state import Stateful
-from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reached
+from simbase.timing import NS_PER_MS, Nanos, Reached
 
 UM_PER_M = 1_000_000
 #: (left, right wheel stalled) → what the state log says.
@@ -61,7 +61,7 @@ class DirectRobot(Stateful):
 
     STATE = ("body", "sensors", "_left", "_right", "_next_encoder", "_steps", "_asked", "_stalled")
     #: The wheels are those of the body's state.
-    DERIVED = ("_next_change", "_wheels")
+    DERIVED = ("_wheels",)
 
     def __init__(
         self,
@@ -81,8 +81,6 @@ class DirectRobot(Stateful):
         self._sonar_numbers = tuple(sonar_numbers)
         self._encoder_period_ns = encoder_period_ns
         self._next_encoder: Nanos = 0
-        #: The first instant of the encoders at which they may show something else.
-        self._next_change: Nanos = 0
         self._steps = 0
         self._asked = (0, 0)
         self._stalled = (False, False)
@@ -93,45 +91,42 @@ class DirectRobot(Stateful):
 
     def next_deadline(self) -> Nanos:
         """Return when a wire may change next."""
-        return min(self._next_change, self.sensors.next_deadline())
+        return min(self._encoders_change_at(), self.sensors.next_deadline())
 
     def advance_to(self, limit: Nanos) -> Reached:
         """Step the body and set the wires as they are due."""
-        while True:
-            due = min(self._next_encoder, self.sensors.next_deadline())
-            if due > limit:
-                break
+        while (due := self.sensors.next_deadline()) <= limit:
             self._step_to(due)
-            if self._next_encoder <= due:
-                self._show_encoders(due)
-            if self.sensors.next_deadline() <= due:
-                self.sensors.sample(self.body.ranges(self._sonar_numbers), due)
+            self.sensors.sample(self.body.ranges(self._sonar_numbers), due)
         self._step_to(limit)
-        self._next_change = self._encoders_change_at()
         return Reached(limit)
 
     def _encoders_change_at(self) -> Nanos:
         """Return the first instant of the encoders that a wheel may have come to another sector by."""
-        fastest = max(self._left.fastest_um_per_s, self._right.fastest_um_per_s) / UM_PER_M
-        most_radps = self.body.most_radps(fastest)
-        if most_radps is None:
-            return self._next_encoder
+        fastest_mps = max(self._left.fastest_um_per_s, self._right.fastest_um_per_s) / UM_PER_M
         wheels = self._wheels
         turn_rad = min(
             self._left_encoder.margin_rad(wheels.left_angle_rad), self._right_encoder.margin_rad(wheels.right_angle_rad)
         )
-        safe_until = self._steps * self.body.dt_ns + int(turn_rad / most_radps * NS_PER_S)
+        safe_until = (self._steps + self.body.steps_within(turn_rad, fastest_mps)) * self.body.dt_ns
         missed = max(0, -((self._next_encoder - safe_until) // self._encoder_period_ns))
         return self._next_encoder + missed * self._encoder_period_ns
 
     def _step_to(self, limit: Nanos) -> None:
+        """Make every step that ends by then, and set the encoders' wires at each of their instants by then."""
         body, left, right = self.body, self._left, self._right
-        wanted = limit // body.dt_ns
+        dt_ns, wanted = body.dt_ns, limit // body.dt_ns
         while self._steps < wanted:
             speeds = self.next_setpoints()
             alike = wanted - self._steps if left.is_steady and right.is_steady else 1
-            self._wheels = body.hold(*speeds, alike)[-1]
+            made = body.hold(*speeds, alike)
+            while (at := self._next_encoder) <= (self._steps + alike) * dt_ns:
+                ended = at // dt_ns - self._steps
+                self._show_encoders(made[ended - 1] if ended else self._wheels, at)
+            self._wheels = made[-1]
             self._steps += alike
+        while self._next_encoder <= limit:
+            self._show_encoders(self._wheels, self._next_encoder)
 
     def next_setpoints(self) -> tuple[float, float]:
         """Return the rim-speed set-points of the body's next step, m/s; for who steps it together with others, too."""
@@ -148,8 +143,7 @@ class DirectRobot(Stateful):
         self._steps += 1
         self._wheels = wheels
 
-    def _show_encoders(self, now: Nanos) -> None:
-        wheels = self._wheels
+    def _show_encoders(self, wheels: Wheels, now: Nanos) -> None:
         self._left_encoder.show(wheels.left_angle_rad, now)
         self._right_encoder.show(wheels.right_angle_rad, now)
         self._next_encoder = now + self._encoder_period_ns
@@ -161,7 +155,6 @@ class DirectRobot(Stateful):
     def _restored(self) -> None:
         self._left_encoder.forget()
         self._right_encoder.forget()
-        self._next_change = self._next_encoder
         self._wheels = self.body.state
 
     def _tell(self, at: Nanos, what: str, detail: str) -> None:

@@ -60,17 +60,18 @@ def test_the_slice_limit_changes_nothing(mode: str, body: str) -> None:
     assert len(hashes) == 1
 
 
+@pytest.mark.parametrize("body", each_body("mujoco"))
 def test_encoders_that_cannot_have_changed_are_not_waited_for_and_change_nothing(
-    monkeypatch: pytest.MonkeyPatch,
+    body: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def run() -> tuple[str, int]:
-        made, stops = bench(scenario("direct")), []
+        made, stops = bench(scenario("direct", body)), []
         made.loop.on_slice = stops.append
         made.loop.slice_ns = S
         return finished(made).trace.sha256, len(stops)
 
     ahead = run()
-    monkeypatch.setattr(type(bench(scenario("direct")).parts.body), "most_radps", lambda _body, _rim: None)
+    monkeypatch.setattr(type(bench(scenario("direct", body)).parts.body), "steps_within", lambda *_: 0)
     each = run()
     assert ahead[0] == each[0]
     assert each[1] == 3 * 200

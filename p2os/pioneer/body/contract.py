@@ -107,6 +107,11 @@ class Turned(NamedTuple):
     stalled_right: bool = False
 
 
+def free_wheels(left_angle_rad: float, right_angle_rad: float) -> Turned:
+    """Return wheels that no motor stalls at: `Turned` of two angles in half the time, for it is made at each step."""
+    return tuple.__new__(Turned, (left_angle_rad, right_angle_rad, False, False))
+
+
 class RobotBody(Protocol):
     """A robot as a physical thing in a world."""
 
@@ -217,8 +222,16 @@ class RobotBody(Protocol):
         """Return the collisions since this was asked last, the last 16 at the most."""
         ...
 
-    def most_radps(self, rim_mps: float) -> float | None:
-        """Return how fast a wheel turns at most while it is told no more than `rim_mps`; None: it may be pushed."""
+    def steps_within(self, turn_rad: float, rim_mps: float) -> int:
+        """Return for how many steps from now on no wheel turns farther, rounding aside, while it is told no more.
+
+        Args:
+            turn_rad: How far, above 0.
+            rim_mps: The greatest set-point, either way.
+
+        Returns:
+            Steps; 0 where nothing is known, for one as where it may be pushed.
+        """
         ...
 
     def clearance(self, *, no_more_than: float = math.inf) -> float:

@@ -30,7 +30,7 @@ class EngineBody(BodyInWorld):
     """A differential drive with mass, torque limits and friction."""
 
     STATE: ClassVar[tuple[str, ...]] = ("_zero", "_stalling", "_is_held", "_is_at_rest", "_most_nm", "_rates")
-    DERIVED: ClassVar[tuple[str, ...]] = ("_state",)
+    DERIVED: ClassVar[tuple[str, ...]] = ("_state", "_is_grip_changed")
 
     #: Angles of the wheels when it was reset.
     _zero: tuple[float, ...]
@@ -41,6 +41,8 @@ class EngineBody(BodyInWorld):
         self._straining_nm = STALL_TORQUE_SHARE * parameters.body.motor_torque_nm
         self._slow_radps = STALL_RIM_MPS / self._radius_m
         self._state: BodyState | None = None
+        #: Whether a wheel has come to rest or moves again, is held or free again, since its motor was told anything.
+        self._is_grip_changed = True
         self._torque_nm = parameters.body.motor_torque_nm
         self._stalling = [0, 0]
         #: The wheels' rates after the last step, rad/s.
@@ -63,9 +65,9 @@ class EngineBody(BodyInWorld):
             self._state = self._read()
         return self._state
 
-    def most_radps(self, rim_mps: float) -> float | None:  # noqa: ARG002  # the contract's
-        """Return None: what pushes the robot turns its wheels too."""
-        return None
+    def steps_within(self, turn_rad: float, rim_mps: float) -> int:  # noqa: ARG002  # the contract's
+        """Return 0: what pushes the robot turns its wheels too."""
+        return 0
 
     def clearance(self, *, no_more_than: float = math.inf) -> float:
         """Return the plan-view distance from the hull to the nearest thing that it could touch, metres, or that."""
@@ -81,7 +83,7 @@ class EngineBody(BodyInWorld):
     def _count_anew(self) -> None:
         """Begin to count contacts and stalls."""
         self._contacts = ContactCounter()
-        self._is_held, self._is_at_rest = [False, False], [False, False]
+        self._is_held, self._is_at_rest, self._is_grip_changed = [False, False], [False, False], True
         self._halt()
 
     def _halt(self) -> None:
@@ -98,22 +100,29 @@ class EngineBody(BodyInWorld):
             effort_nm: What its motor and gear gave in the last step, positive forward.
             rate_radps: Its rate since.
         """
-        was, self._rates[wheel] = self._rates[wheel], rate_radps
+        rates, is_at_rest, is_held = self._rates, self._is_at_rest, self._is_held
+        was, rates[wheel] = rates[wheel], rate_radps
         self._rim_work_j += abs(effort_nm) * mean_magnitude(was, rate_radps) * DT_S
         if self._most_nm is not None:
             is_straining = self._most_nm[wheel] > 0.0 and abs(effort_nm) > STALL_TORQUE_SHARE * self._most_nm[wheel]
             is_stalled = asked_mps != 0.0 and is_straining and abs(rate_radps) < self._slow_radps
             self._stalling[wheel] = min(STALL_STEPS, self._stalling[wheel] + 1) if is_stalled else 0
             return
+        is_resting = asked_mps == 0.0 and (is_at_rest[wheel] or abs(rate_radps) * self._radius_m < PUSHED_BACK_MPS)
+        if is_resting is not is_at_rest[wheel]:
+            is_at_rest[wheel], self._is_grip_changed = is_resting, True
+        if -self._straining_nm <= effort_nm <= self._straining_nm and not is_held[wheel]:
+            self._stalling[wheel] = 0
+            return
         forward = math.copysign(1.0, asked_mps)
-        if self._is_held[wheel]:
-            self._is_held[wheel] = asked_mps != 0.0 and effort_nm * forward > self._torque_nm
+        if is_held[wheel]:
+            holds = asked_mps != 0.0 and effort_nm * forward > self._torque_nm
         else:
             is_pushed_back = asked_mps != 0.0 and rate_radps * forward * self._radius_m < -PUSHED_BACK_MPS
-            self._is_held[wheel] = is_pushed_back and effort_nm * forward > self._straining_nm
-        is_slow = abs(rate_radps) * self._radius_m < PUSHED_BACK_MPS
-        self._is_at_rest[wheel] = asked_mps == 0.0 and (is_slow or self._is_at_rest[wheel])
-        is_straining = self._is_held[wheel] or abs(effort_nm) > self._straining_nm
+            holds = is_pushed_back and effort_nm * forward > self._straining_nm
+        if holds is not is_held[wheel]:
+            is_held[wheel], self._is_grip_changed = holds, True
+        is_straining = holds or abs(effort_nm) > self._straining_nm
         is_stalled = is_straining and abs(rate_radps) < self._slow_radps
         self._stalling[wheel] = min(STALL_STEPS, self._stalling[wheel] + 1) if is_stalled else 0
 

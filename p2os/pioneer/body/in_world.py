@@ -210,6 +210,10 @@ class BodyInWorld(Stateful):
         if not self.others:
             self.scene.restore(snapshot)
 
+    def _steps_to_roll(self, turn_rad: float, rim_mps: float) -> int:
+        """Return how many whole steps a wheel whose rim has a speed takes for a way, rad."""
+        return int(turn_rad * self._parameters.body.wheel_diameter_m / (2 * rim_mps * DT_S))
+
     # One of its scene ------------------------------------------------------------------------
 
     def step(self, left_mps: float, right_mps: float) -> Turned:

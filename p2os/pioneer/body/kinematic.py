@@ -24,7 +24,7 @@ import math
 from collections.abc import Collection, Sequence
 
 from p2os.pioneer.body.contacts import APART_STEPS, ContactCounter
-from p2os.pioneer.body.contract import BodyState, Turned
+from p2os.pioneer.body.contract import BodyState, Turned, free_wheels
 from p2os.pioneer.body.in_world import DT_S, BodyInWorld, Scene, StandingPose
 from p2os.pioneer.body.physical import BACK_DRIVE, GRAVITY_MPS2, UNPOWERED_SHARE, WHEEL_FRICTION
 from p2os.pioneer.body.ray_cast import Direction, Echo, cast, echoes, narrow_parts
@@ -281,7 +281,9 @@ class KinematicBody(BodyInWorld):
         x, y, heading, c, s, free = self._x, self._y, self._heading, self._cos, self._sin, self._free_m
         left_angle, right_angle, work_j, step_j = self._left_angle, self._right_angle, self._rim_work_j, self._steady_j
         made: list[Turned] = []
-        while len(made) < steps and free > travel:
+        for _ in range(steps):
+            if free <= travel:
+                break
             free -= travel
             before, heading, old_c, old_s = heading, heading + turn, c, s
             if heading != before:
@@ -292,7 +294,7 @@ class KinematicBody(BodyInWorld):
                 x, y = x + radius * (s - old_s), y - radius * (c - old_c)
             work_j += step_j
             left_angle, right_angle = left_angle + left_rad, right_angle + right_rad
-            made.append(Turned(left_angle, right_angle))
+            made.append(free_wheels(left_angle, right_angle))
         if made:
             self._x, self._y, self._heading, self._cos, self._sin, self._free_m = x, y, heading, c, s, free
             self._left_angle, self._right_angle, self._rim_work_j = left_angle, right_angle, work_j
@@ -310,7 +312,7 @@ class KinematicBody(BodyInWorld):
         self._right_angle += self._right * DT_S / self._radius_m
         if self._stalled:
             return Turned(self._left_angle, self._right_angle, self._asked[0] != 0.0, self._asked[1] != 0.0)
-        return Turned(self._left_angle, self._right_angle)
+        return free_wheels(self._left_angle, self._right_angle)
 
     def _ways(self, left_mps: float, right_mps: float) -> tuple[float, float]:
         """Return how far a step leads along, metres, and around, rad."""
@@ -560,9 +562,9 @@ class KinematicBody(BodyInWorld):
             things = self._plan.echoing_within(min(xs), min(ys), max(xs), max(ys))
         return [*things, *self._echoing_robots(x, y, rays, longest_m)] if self.others else things
 
-    def most_radps(self, rim_mps: float) -> float | None:
-        """Return how fast a wheel turns at most while it is told no more than `rim_mps`; None: a robot may push it."""
-        return None if self.others else rim_mps / self._radius_m
+    def steps_within(self, turn_rad: float, rim_mps: float) -> int:
+        """Return for how many steps no wheel turns farther while it is told no more; 0 where a robot may push it."""
+        return 0 if self.others else self._steps_to_roll(turn_rad, rim_mps)
 
     def clearance(self, *, no_more_than: float = math.inf) -> float:
         """Return the distance from the hull to the nearest thing that it could touch, metres, or `no_more_than`."""

@@ -321,9 +321,11 @@ class Pioneer(Stateful):
         """Return when bytes will come out or the watchdog will expire; None when neither ever will."""
         if self._boot_at is not None:
             return self._boot_at if self._boot_at >= 0 else None
-        sip = None if self._sip_due is None else self._sender.turn_after(self._sip_due)
-        due = [at for at in (sip, self._connection.next_deadline(), self._sender.next_deadline()) if at is not None]
-        return min(due, default=None)
+        due, answer = self._connection.next_deadline(), self._sender.next_deadline()
+        if self._sip_due is not None:
+            sip = self._sender.turn_after(self._sip_due)
+            due = sip if due is None else min(due, sip)
+        return answer if due is None else due if answer is None else min(due, answer)
 
     def advance_to(self, limit: Nanos) -> Reached:
         """Act on everything due up to and including `limit`, and bring the body there."""

@@ -57,6 +57,8 @@ class Requests:
 
     def wanted(self, profile: Profile) -> tuple[list[Extra], list[Extra]]:
         """Return what goes before the standard packet and what after it."""
+        if not self.continuous and not self.once:
+            return [], []
         asked = [extra for extra in Extra if extra in self.continuous or extra in self.once]
         before = [extra for extra in asked if profile is Profile.ARCOS and extra in FIRST_ON_ARCOS]
         return before, [extra for extra in asked if extra not in before]

@@ -128,6 +128,31 @@ def test_how_often_it_is_brought_forward_changes_nothing(cuts: list[int]) -> Non
     assert ends[0] == ends[1]
 
 
+@pytest.mark.parametrize("step_ns", [5 * MS - 1, 5 * MS, 5 * MS + 1, 17 * MS, 1_000 * MS])
+def test_an_encoder_shows_the_step_that_ended_at_its_instant_however_many_are_made_at_once(
+    step_ns: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shown: list[tuple[float, int]] = []
+    monkeypatch.setattr(WheelEncoder, "show", lambda _encoder, angle_rad, now: shown.append((angle_rad, now)))
+
+    def shows(every_ns: int) -> list[tuple[float, int]]:
+        made, left, right, _ = robot()
+        for wires in (left, right):
+            set_value(wires, 3, 0)
+        shown.clear()
+        for at in (*range(every_ns, 1_000 * MS, every_ns), 1_000 * MS):
+            made.advance_to(at)
+        return [*shown]
+
+    made, *_ = robot()
+    made.advance_to(0)
+    assert shown == [(0.0, 0)] * 2
+    each = shows(MS)
+    assert [at for _, at in each[::2]] == list(range(0, 1_001 * MS, 5 * MS))
+    assert each[-1][0] > each[-3][0] > each[-5][0] > 0.0
+    assert shows(step_ns) == each
+
+
 def test_a_step_reads_the_wires_at_its_start() -> None:
     for change_at, steps in ((10 * MS, 10), (10 * MS + 1, 11)):
         made, left, _, _ = robot()

@@ -24,20 +24,12 @@ class SonarRays:
         self.rays = len(cones[0].headings_rad) if cones else 0
         self.longest_m = longest_m
         self._cones = cones
-        self._starts = [np.array([[cone.x_m, cone.y_m, height_m]] * self.rays) for cone in cones]
-        self._ends = [
-            np.array([
-                [cone.x_m + longest_m * math.cos(heading), cone.y_m + longest_m * math.sin(heading), height_m]
-                for heading in cone.headings_rad
-            ])
-            for cone in cones
-        ]  # fmt: skip
-        self._kept: dict[tuple[int, ...], tuple[Points, Points]] = {}
+        self._height_m = height_m
+        #: The rays of some sonar: the coordinates of all starts and then of all ends, a column each.
+        self._kept: dict[tuple[int, ...], tuple[Points, Points, Points]] = {}
 
-    def points(
-        self, numbers: Sequence[int], origin: Sequence[float], matrix: Sequence[float]
-    ) -> tuple[list[list[float]], list[list[float]]]:
-        """Return the starts and the ends of some sonar's rays in the world.
+    def points(self, numbers: Sequence[int], origin: Sequence[float], matrix: Sequence[float]) -> tuple[Points, Points]:
+        """Return the starts and the ends of some sonar's rays in the world: shape (rays, 3), metres.
 
         Args:
             numbers: Which sonar.
@@ -46,12 +38,23 @@ class SonarRays:
         """
         key = tuple(numbers)
         if key not in self._kept:
-            self._kept[key] = (
-                np.concatenate([self._starts[number] for number in key]),
-                np.concatenate([self._ends[number] for number in key]),
-            )
-        starts, ends = self._kept[key]
-        return _placed(starts, origin, matrix), _placed(ends, origin, matrix)
+            self._kept[key] = self._columns(key)
+        x, y, z = self._kept[key]
+        turn = np.array(matrix).reshape(3, 3)
+        placed = origin + turn[:, 0] * x + turn[:, 1] * y + turn[:, 2] * z
+        middle = len(placed) // 2
+        return placed[:middle], placed[middle:]
+
+    def _columns(self, numbers: tuple[int, ...]) -> tuple[Points, Points, Points]:
+        cones, longest_m, z = [self._cones[number] for number in numbers], self.longest_m, self._height_m
+        starts = [(cone.x_m, cone.y_m, z) for cone in cones for _ in cone.headings_rad]
+        ends = [
+            (cone.x_m + longest_m * math.cos(heading), cone.y_m + longest_m * math.sin(heading), z)
+            for cone in cones
+            for heading in cone.headings_rad
+        ]
+        x, y, z_all = np.array([*starts, *ends]).T
+        return x[:, None].copy(), y[:, None].copy(), z_all[:, None].copy()
 
     def echoes(self, number: int, hits: Sequence[tuple[Any, ...]], matrix: Sequence[float]) -> list[Echo]:
         """Return the echoes of one sonar's rays from what the engine returns for each: fraction and normal."""
@@ -65,10 +68,3 @@ class SonarRays:
             cosine = abs(sum(part * normal for part, normal in zip(ray, hit[4], strict=True)))
             found.append(Echo(hit[2] * self.longest_m, min(1.0, cosine)))
         return found
-
-
-def _placed(points: Points, origin: Sequence[float], matrix: Sequence[float]) -> list[list[float]]:
-    x, y, z = points[:, 0], points[:, 1], points[:, 2]
-    rows = [origin[row] + matrix[3 * row] * x + matrix[3 * row + 1] * y + matrix[3 * row + 2] * z for row in range(3)]
-    result: list[list[float]] = np.stack(rows, axis=1).tolist()
-    return result

@@ -393,9 +393,11 @@ class OutsideBody(BodyInWorld):
         self.scene.flush()
         return super().take_hits()
 
-    def most_radps(self, rim_mps: float) -> float | None:
-        """Return how fast a wheel turns at most while it is told no more, where the other program promises that."""
-        return rim_mps / self._radius_m if Ability.ROLLS in self.scene.abilities else None
+    def steps_within(self, turn_rad: float, rim_mps: float) -> int:
+        """Return for how many steps no wheel turns farther while it is told no more, where the other program promises
+        that it turns no faster.
+        """  # noqa: D205  # one sentence of two lines
+        return self._steps_to_roll(turn_rad, rim_mps) if Ability.ROLLS in self.scene.abilities else 0
 
     def clearance(self, *, no_more_than: float = math.inf) -> float:
         """Return the free distance around the hull, metres: as the other program tells it, or in our plan."""

@@ -1,6 +1,7 @@
-"""The kinematic body makes many steps at once where nothing changes: each the very one that `step` would make."""
+"""A body makes many steps at once where nothing changes: each the very one that `step`, or its scene, would make."""
 
 import pickle
+from typing import TYPE_CHECKING, cast
 
 import pytest
 from hypothesis import example, given, settings
@@ -10,9 +11,13 @@ from p2os.pioneer.body.contacts import APART_STEPS
 from p2os.pioneer.body.contract import RobotBody
 from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.body.kinematic import WALK_STEPS
+from p2os.pioneer.body.physical import UNPOWERED_SHARE
 from p2os.pioneer.world import parse_world
 from p2os.pioneer.world.model import Obstacle, Walk
 from p2os.robots.parameters import load_parameters
+
+if TYPE_CHECKING:
+    from p2os.pioneer.body.bullet import BulletBody
 
 SPEEDS = st.sampled_from((0.0, 0.1, 0.3, -0.2, 0.30000001))
 COUNTS = st.sampled_from((0, 1, 2, WALK_STEPS - 1, WALK_STEPS, APART_STEPS - 1, APART_STEPS, APART_STEPS + 1, 900))
@@ -63,3 +68,55 @@ def test_a_robot_that_has_backed_off_a_wall_drives_on_with_the_speed_that_it_sta
     assert [wheels.stalled_left for wheels in ends].index(True) in range(399, 402)
     assert body.state.x_m == pytest.approx(before_m, abs=0.0004)
     assert body.state.collisions == 2
+
+
+@pytest.mark.bullet
+@pytest.mark.parametrize("scene", ["free", "before a wall", "beside a walker"])
+def test_a_robot_alone_on_bullet_makes_the_steps_that_its_scene_makes(scene: str) -> None:
+    pytest.importorskip("pybullet")
+    world = parse_world('name = "empty"\nextent_m = [-4, -4, 4, 4]', "empty")
+    alone, in_scene = (cast("BulletBody", make_body("bullet", world, load_parameters("p2dx"))) for _ in range(2))
+    for body in (alone, in_scene):
+        for thing in SCENES[scene]:
+            body.place(thing)
+    for left_mps, right_mps, is_powered, steps in (
+        (0.5, 0.5, True, 1200), (-0.2, -0.1, True, 1), (0, 0, True, 300), (0, 0, False, 60), (-0.3, 0.3, True, 7),
+    ):  # fmt: skip
+        alone.is_powered = in_scene.is_powered = is_powered
+        made = alone.hold(left_mps, right_mps, steps)
+        assert made == [in_scene.scene.step(((left_mps, right_mps),))[0] for _ in range(steps)]
+        assert alone.state == in_scene.state
+    alone.put_back()
+    in_scene.put_back()
+    assert alone.step(-0.3, 0.3) == in_scene.scene.step(((-0.3, 0.3),))[0]
+    assert alone.state == in_scene.state
+    saved = alone.snapshot()
+    went_on = alone.hold(0.4, 0.4, 30)
+    alone.restore(saved)
+    assert alone.hold(0.4, 0.4, 30) == went_on, "what the motors were told before is forgotten"
+
+
+@pytest.mark.bullet
+def test_bullets_motors_are_told_what_is_new_to_them_and_nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
+    pybullet = pytest.importorskip("pybullet")
+    world = parse_world('name = "empty"\nextent_m = [-4, -4, 4, 4]', "empty")
+    body, told = make_body("bullet", world, load_parameters("p2dx")), list[float]()
+    tell = pybullet.setJointMotorControlArray
+
+    def note(*words: object, forces: list[float], **more: object) -> None:
+        told.append(forces[0])
+        tell(*words, forces=forces, **more)
+
+    monkeypatch.setattr(pybullet, "setJointMotorControlArray", note)
+    body.hold(0.2, 0.2, 50)
+    assert len(told) == 1
+    body.hold(0.2, 0.2, 50)
+    assert len(told) == 1
+    body.hold(0.0, 0.0, 300)
+    assert len(told) == 3, "the set-point, and that it has come to rest"
+    body.is_powered = False
+    body.hold(0.0, 0.0, 10)
+    assert told[3:] == [pytest.approx(told[1] * UNPOWERED_SHARE)]
+    body.is_powered = True
+    body.hold(0.0, 0.0, 10)
+    assert told[4:] == [told[2]]

@@ -107,7 +107,7 @@ def test_what_it_cannot_is_said_in_one_line() -> None:
         for deed in (lambda: body.echoes([0]), lambda: body.scan(FAN, 1.0)):
             with pytest.raises(UsageError, match="casts no rays"):
                 deed()
-        assert body.most_radps(1.0) is None
+        assert body.steps_within(1.0, 1.0) == 0
         assert body.state == make_body("kinematic", ROOM, P2DX).state
         with pytest.raises(UsageError, match="one robot, not 2"):
             make_scene(address, ROOM, [P2DX] * 2)
@@ -246,7 +246,7 @@ def test_another_version_is_refused() -> None:
 
 def test_abilities_that_nobody_knows_change_nothing() -> None:
     with served(abilities=0x8000) as (address, _):
-        assert make_body(address, ROOM, P2DX).most_radps(1.0) is None
+        assert make_body(address, ROOM, P2DX).steps_within(1.0, 1.0) == 0
 
 
 def test_a_reset_begins_in_the_world_as_it_was_made() -> None:
