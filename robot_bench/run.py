@@ -15,6 +15,7 @@ import base64
 import contextlib
 import hashlib
 import math
+import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
@@ -151,6 +152,7 @@ def run_at_port(
     *,
     on_progress: ProgressListener | None = None,
     clock: Clock = wall_clock,
+    sleep: Callable[[float], None] = time.sleep,
     drive: RunRemoteBench | None = None,
     force: bool = False,
 ) -> RunResult:
@@ -168,7 +170,7 @@ def run_at_port(
     if scenario.robots:
         transport.close()
         raise UsageError("a real robot is driven by a scenario with one robot", hint="leave out [[robot]]")
-    pacer = RealTimePacer(clock=clock)
+    pacer = RealTimePacer(clock=clock, sleep=sleep)
     with contextlib.ExitStack() as stack:
         stack.callback(transport.close)
         stack.enter_context(reserved(folder, force=force))

@@ -4,14 +4,18 @@ import math
 import re
 from itertools import pairwise
 
+from p2os.protocol.odometry import POSITION_MODULUS
+from p2os.protocol.profiles import Profile
 from robot_bench.events.kinds import MICRO
 from robot_bench.experiments.validation.figures import Bound, Figure, Finding, Missing, worst_or_missing
 from robot_bench.experiments.validation.nominal import Nominal
 from robot_bench.experiments.validation.signals import (
     ENCODER_STEPS,
+    Course,
     at,
     encoder_steps,
     motor_pairs,
+    packets,
     poses_between,
     rim_mm_s,
     wheel_steps,
@@ -46,6 +50,9 @@ def encoder_figures(record: RunRecord, nominal: Nominal) -> list[Finding]:
         if not steps:
             return [Missing(group="pins", what="encoder pins", why=f"no wire of {side} was recorded")]
         result.append(_changes(steps, side))
+        if nominal.at_port:
+            moving += _after_packets(record, nominal, side, steps)
+            continue
         whole = _whole_turns(record, side, start, steps[0][1])
         is_within_turn = nominal.is_direct and bool(_ambiguous(record, nominal, start))
         for pose in record.poses:
@@ -53,13 +60,43 @@ def encoder_figures(record: RunRecord, nominal: Nominal) -> list[Finding]:
                 continue
             truth = wheel_steps(pose, side)
             off = (at(steps, pose.t) or 0) + whole + 0.5 - truth
-            moving.append(Figure(
-                group="motion", what="encoder code against the wheel's angle", expected=truth,
-                measured=truth + (_within_turn(off) if is_within_turn else off), uncertainty=ENCODER_STEPS / MICRO,
-                unit="steps", at=f"{side} at {pose.t / NS_PER_S:.2f} s",
-                bound=nominal.encoder_bound(0.0 if is_within_turn else _fastest(record, nominal, pose.t, side)),
+            moving.append(_against_angle(
+                truth, _within_turn(off) if is_within_turn else off, f"{side} at {pose.t / NS_PER_S:.2f} s",
+                nominal.encoder_bound(0.0 if is_within_turn else _fastest(record, nominal, pose.t, side)),
             ))  # fmt: skip
     return [*result, worst_or_missing(moving, "motion", "encoder code against the wheel's angle", "no pose")]
+
+
+def _against_angle(truth: float, off: float, where: str, bound: Bound) -> Figure:
+    return Figure(
+        group="motion", what="encoder code against the wheel's angle", expected=truth, measured=truth + off,
+        uncertainty=ENCODER_STEPS / MICRO, unit="steps", at=where, bound=bound,
+    )  # fmt: skip
+
+
+def _after_packets(record: RunRecord, nominal: Nominal, side: str, steps: Course[int]) -> list[Figure]:
+    """Return what an encoder shows when it has walked to what a packet tells, against what the packets tell.
+
+    Nothing else is known of a robot at a port, and both count from where the wheel stood when the drive began.
+    """
+    start = steps[0][0]
+    standing = [pose for pose in record.poses if pose.t <= start]
+    origin = (wheel_steps(standing[-1], side) if standing else 0.0) - steps[0][1]
+    figures = []
+    for pose, following in pairwise(record.poses[max(0, len(standing) - 1) :]):
+        shown = at(steps, following.t - 1)
+        if shown is None or following.t - pose.t < nominal.walk_ns(_turned_steps(record, pose.t, side)):
+            continue
+        truth = wheel_steps(pose, side) - origin
+        where = f"{side} at {pose.t / NS_PER_S:.2f} s"
+        figures.append(_against_angle(truth, shown + 0.5 - truth, where, nominal.encoder_port_bound))
+    return figures
+
+
+def _turned_steps(record: RunRecord, t: Nanos, side: str) -> float:
+    """Return how many steps a wheel has turned in the last few packets before a time."""
+    near = [wheel_steps(pose, side) for pose in poses_between(record, t - NS_PER_S // 2, t + 1)]
+    return max(near) - min(near) if near else 0.0
 
 
 def _whole_turns(record: RunRecord, side: str, start: Nanos, code: int) -> int:
@@ -113,6 +150,20 @@ def sparse_figures(record: RunRecord, nominal: Nominal) -> list[Finding]:
         *encoder_figures(record, nominal),
         worst_or_missing(ends, "pins", "count of the program at the end, against the wheel", "it printed no counts"),
     ]  # fmt: skip
+
+
+def wrap_figure(record: RunRecord, profile: Profile) -> Finding:
+    """Return whether the position in the packets wraps at all: it counts no negative numbers."""
+    told = [(sip.raw_x, sip.raw_y) for _, sip in packets(record, profile)]
+    wraps = sum(
+        abs(now - before) > POSITION_MODULUS // 2
+        for one, other in pairwise(told) for before, now in zip(one, other, strict=True)
+    )  # fmt: skip
+    return Figure(
+        group="wire", what="a wrap of the position counter, at least", expected=1, measured=min(wraps, 1),
+        uncertainty=0, unit="", at=f"{wraps} of them",
+        bound=Bound(name="wrap", value=0, formula="behind its origin x is below 0"),
+    )  # fmt: skip
 
 
 def slip_figures(record: RunRecord, nominal: Nominal, body: str) -> list[Finding]:

@@ -14,7 +14,7 @@ from robot_bench.experiments.validation.figures import Bound
 from robot_bench.experiments.validation.signals import ENCODER_STEPS
 from robot_bench.recording.recorder import SAMPLE_NS
 from robot_bench.scenario.scenario import Scenario
-from simbase.timing import NS_PER_S
+from simbase.timing import NS_PER_S, Nanos
 
 #: The line at the speed that robots begin with.
 LINE = LineTime(DEFAULT_BAUD)
@@ -32,6 +32,10 @@ TICK_S = 0.01
 PROGRAM_S = 1e-3
 #: chosen: by how much that differs from tick to tick: 3,600 cycles at 72 MHz.
 JITTER_S = 50e-6
+#: chosen: by how much one packet comes later than another, seconds.
+PACKET_JITTER_S = 0.05
+#: chosen: what the adapter's integers and a reader's floats may differ by over minutes, in steps of an encoder.
+ARITHMETIC_STEPS = 0.02
 #: The trace's resolution of a rim's speed, mm/s; the bodies hold what their motors want.
 BODY_MM_S = 1e-3
 #: Of a robot at a port only its packets are known: whole mm/s of a wheel, and a time that is that of a packet.
@@ -79,6 +83,8 @@ class Nominal:
         self._direct, self._adapter = scenario.direct, adapter
         #: From packet to packet, seconds: as the robot's FLASH has it.
         self.cycle_s = CYCLE_NS / NS_PER_S if at_port else scenario.controller.sip_period_ns / NS_PER_S
+        #: From pose to pose of a recording, seconds; at a port a packet tells one.
+        self.pose_s = self.cycle_s if at_port else POSE_S
         readings = scenario.controller.sonar_per_sip.pings_per_cycle or robot.sonar_fitted
         self._rounds = math.ceil(robot.sonar_fitted / readings)
 
@@ -106,6 +112,20 @@ class Nominal:
             name="rim speed" + ", at a port" * self.at_port, value=0.5 + rim + seen,
             formula=f"0.5 mm/s (VEL is whole mm/s) + 0.5 deg/s x {self.track_mm / 2:g} mm (RVEL is whole deg/s)"
             f" + resolution {told} {seen:g} mm/s = {0.5 + rim + seen:.3g} mm/s",
+        )  # fmt: skip
+
+    def way_bound(self, mm_s: float, span_s: float) -> Bound:
+        """How far a steady rim speed may be off by the way of so many seconds, mm/s."""
+        speed = self.speed_bound
+        if not self.at_port:
+            return speed
+        counts = 2 * (math.sqrt(2) * self._distance_mm + self._heading_mm)
+        more = (counts + abs(mm_s) * PACKET_JITTER_S) / span_s
+        return Bound(
+            name="way in a time, at a port", value=speed.value + more,
+            formula=f"{speed.formula.partition(' = ')[0]} + (a count of x, of y and of heading at both ends"
+            f" {counts:.3g} mm + {abs(mm_s):g} mm/s x {PACKET_JITTER_S * 1000:g} ms that a packet may come late)"
+            f" / {span_s:.2f} s = {speed.value + more:.3g} mm/s",
         )  # fmt: skip
 
     def to_free_line(self, characters: int = PAIR_BYTES) -> Delay:
@@ -169,6 +189,18 @@ class Nominal:
         dwell_s = self._adapter.encoder_dwell_ns / NS_PER_S
         more = f", {walked} codes more x {dwell_s * 1000:g} ms" if walked else ""
         return Delay(seconds + walked * dwell_s, formula + more)
+
+    def walk_ns(self, steps: float) -> Nanos:
+        """Return how long the pins walk through so many steps of an encoder after a packet, at most."""
+        return (math.ceil(steps) + 2) * self._adapter.encoder_dwell_ns
+
+    @property
+    def encoder_port_bound(self) -> Bound:
+        """How far a code may be from what the robot's packets tell of its wheel, steps, where it has been walked to."""
+        return Bound(
+            name="encoder after a packet, at a port", value=0.5 + ARITHMETIC_STEPS,
+            formula=f"half a step + {ARITHMETIC_STEPS:g} steps of integer arithmetic",
+        )  # fmt: skip
 
     def encoder_bound(self, rim_mm_s: float) -> Bound:
         """How far the code on the pins may be from the wheel's angle, steps; the middle of a code is its angle."""

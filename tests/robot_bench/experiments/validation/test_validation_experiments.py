@@ -201,7 +201,7 @@ def test_a_planted_error_fails_the_command_and_leaves_its_run(
         (["codes", "--set", "a.b=3"], "unknown key 'a'"),
         (["dodge", "--world", "nowhere"], "nowhere"),
         (["codes", "--yes"], "--yes goes with --port only"),
-        (["sensors", "--port", "tcp:127.0.0.1:1"], "a robot at a port can do none of these"),
+        (["slip", "--port", "tcp:127.0.0.1:1"], "a robot at a port can do none of these"),
         (["codes", "--port", "tcp:127.0.0.1:1", "--body", "bullet"], "its own body and world"),
     ],
 )
@@ -238,3 +238,4 @@ def test_a_served_robot_is_validated_at_its_port(
     figures = {figure["what"]: figure for figure in result["figures"]}
     assert figures["steady rim speed"]["expected"] in {120.0, -160.0, 0.0}
     assert figures["VEL for a pair of codes"]["bound"]["value"] == 0.5
+    assert abs(figures["the same by the packets' odometry"]["difference"]) < 10
