@@ -15,7 +15,6 @@ import base64
 import contextlib
 import hashlib
 import math
-import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
@@ -152,7 +151,7 @@ def run_at_port(
     *,
     on_progress: ProgressListener | None = None,
     clock: Clock = wall_clock,
-    sleep: Callable[[float], None] = time.sleep,
+    pacer: RealTimePacer | None = None,
     drive: RunRemoteBench | None = None,
     force: bool = False,
 ) -> RunResult:
@@ -170,7 +169,7 @@ def run_at_port(
     if scenario.robots:
         transport.close()
         raise UsageError("a real robot is driven by a scenario with one robot", hint="leave out [[robot]]")
-    pacer = RealTimePacer(clock=clock, sleep=sleep)
+    pacer = pacer or RealTimePacer(clock=clock)
     with contextlib.ExitStack() as stack:
         stack.callback(transport.close)
         stack.enter_context(reserved(folder, force=force))

@@ -22,8 +22,8 @@ from simbase.errors import FileError, UsageError
 from simbase.units import SEED
 
 if TYPE_CHECKING:  # NumPy is loaded when the verb runs
+    from robot_bench.drives.drive import Drive
     from robot_bench.experiments.drive_files import HowToRead
-    from robot_bench.experiments.drives import Drive
     from robot_bench.experiments.fitting.least_squares import Fit
     from robot_bench.experiments.fitting.umbmark import Correction, Umbmark
 

@@ -49,9 +49,9 @@ HELP = """Validate the bench by experiments: motors, sensors, encoders.
 
 Each EXPERIMENT has a hypothesis, figures with units, and a bound for each, whose
 formula stands beside it in the report. Without names all are run: motors, codes,
-sensors, sensors-all, only-while-seen, encoders, sparse, slip, long-drive, dodge. Each is run pins
-straight to the body, through the adapter's model, and through its firmware, with
-every body that is installed.
+capped, sensors, sensors-all, only-while-seen, encoders, sparse, slip, long-drive,
+dodge. Each is run pins straight to the body, through the adapter's model, and
+through its firmware, with every body that is installed.
 
 --set runs the bench otherwise than it is expected to be: a planted error.
 
@@ -106,7 +106,7 @@ def validate(
     yes: Annotated[bool, typer.Option("--yes", help="With --port: do not ask before the first motion.")] = False,
 ) -> None:
     """Validate the bench."""
-    chosen = [_experiment(name) for name in dict.fromkeys(names or EXPERIMENTS)]
+    chosen = _chosen(names or (), mode or ())
     settings = [read_setting(text) for text in set_ or ()]
     for one in mode or ():
         if one not in MODES:
@@ -139,6 +139,13 @@ def validate(
         _print(results, folder)
     if not all(result.passed for result in results):
         raise typer.Exit(1)
+
+
+def _chosen(names: Sequence[str], modes: Sequence[str]) -> list[Experiment]:
+    """Return the experiments of these names; without names all that show something in the modes."""
+    if names:
+        return [_experiment(name) for name in dict.fromkeys(names)]
+    return [one for one in EXPERIMENTS.values() if not one.modes or not modes or set(one.modes) & set(modes)]
 
 
 def _experiment(name: str) -> Experiment:

@@ -67,6 +67,8 @@ class Experiment:
     worlds: tuple[str, ...] = ()
     seeds: tuple[int, ...] = (0,)
     settings: tuple[Setting, ...] = ()
+    #: In these modes alone; empty: in all.
+    modes: tuple[str, ...] = ()
     at_port: AtPort | str
 
     def load(self, settings: Sequence[Setting] = ()) -> Scenario:
@@ -194,6 +196,14 @@ EXPERIMENTS: Mapping[str, Experiment] = {one.name: one for one in (
         measure=lambda trial: motor_figures(trial.record, trial.nominal, CODES),
     ),
     Experiment(
+        name="capped", scenario="codes.toml", modes=("adapter",),
+        at_port="the adapter is the same at every robot, and speeds there are far below a cap",
+        settings=(("adapter.max_velocity_mm_s", 150), ("adapter.max_rotation_deg_s", 30)),
+        hypothesis="Where a pair of codes asks for more than the adapter's caps, both its speeds shrink by one factor.",
+        procedure="The run of codes with caps of 150 mm/s and 30 deg/s.",
+        measure=lambda trial: motor_figures(trial.record, trial.nominal, CODES),
+    ),
+    Experiment(
         name="sensors", scenario="sensors",
         at_port=AtPort(
             room=_GATE, scenario="port-gate.toml", measure=lambda trial: reading_figures(trial.record, trial.scenario)
@@ -206,7 +216,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {one.name: one for one in (
         name="sensors-all", scenario="sensors-all.toml",
         at_port="eight things at once, to the centimetre and the second, are placed by no person",
         hypothesis="All eight distance pins rise and fall at once for what is nearer than the threshold alone.",
-        procedure="Posts stand before all eight sonar for three seconds, 1 cm within the threshold, then 1 cm beyond.",
+        procedure="Posts stand before all eight sonar for three seconds, 3 mm within the threshold, then 3 mm beyond.",
         measure=_sensors,
     ),
     Experiment(

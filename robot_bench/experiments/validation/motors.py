@@ -92,26 +92,19 @@ def _spans(held: Sequence[tuple[Pair, Nanos, Nanos]]) -> list[tuple[Pair, Pair, 
 
 def _commands(record: RunRecord, nominal: Nominal, spans: Sequence[tuple[Pair, Pair, Nanos, Nanos]]) -> list[Finding]:
     """Return the rounding of the commands, and how long they take to the robot."""
-    rows = (
-        ("VEL", CommandNumber.VEL, nominal.forward_mm_s, "mm/s"),
-        ("RVEL", CommandNumber.RVEL, nominal.turn_deg_s, "deg/s"),
-    )
-    courses = {name: sent(record, number) for name, number, _, _ in rows}
+    rows = (("VEL", CommandNumber.VEL, "mm/s"), ("RVEL", CommandNumber.RVEL, "deg/s"))
+    courses = {name: sent(record, number) for name, number, _ in rows}
     result: list[Finding] = []
     delay = nominal.to_command
-    for name, _, value_of, unit in rows:
-        bound = Bound(
-            name=f"rounding of {name}" + ", at a port" * nominal.at_port,
-            value=0.5,
-            formula=f"{name} is a whole number of {unit}: half of it",
-        )
+    for place, (name, _, unit) in enumerate(rows):
         figures = []
         for _, pair, begin, end in spans:
             got = at(courses[name], begin + round((delay.seconds + 1e-6) * NS_PER_S))
             if got is not None and begin + delay.seconds * NS_PER_S < end:
                 figures.append(Figure(
-                    group="wire", what=f"{name} for a pair of codes", expected=value_of(pair), measured=float(got),
-                    uncertainty=0, unit=unit, bound=bound, at=str(pair),
+                    group="wire", what=f"{name} for a pair of codes", expected=nominal.speeds(pair)[place],
+                    measured=float(got), uncertainty=0, unit=unit, bound=nominal.rounding_bounds(pair)[place],
+                    at=str(pair),
                 ))  # fmt: skip
         result.append(worst_or_missing(figures, "wire", f"{name} for a pair of codes", f"no {name} came to the robot"))
     late: dict[str, list[Figure]] = {"change of the pins to the robot's last command": []}
@@ -159,9 +152,10 @@ def _motion(record: RunRecord, nominal: Nominal, spans: Sequence[tuple[Pair, Pai
         wait = max(_ramp_s(nominal, before, pair), 0.0) + nominal.to_motion.seconds + POSE_S
         poses = poses_between(record, begin + round(wait * NS_PER_S), end)
         if poses:
-            steady += [_steady(nominal, side, code, poses, pair) for side, code in zip(_SIDES, pair, strict=True)]
+            steady += [_steady(nominal, side, poses, pair) for side in _SIDES]
         if len(poses) > 1 and poses[-1].t - poses[0].t >= LEAST_SPAN_NS:
-            turned += [_turned(nominal, figure, side, poses) for figure, side in zip(steady[-2:], _SIDES, strict=True)]
+            last = zip(steady[-2:], _SIDES, strict=True)
+            turned += [_turned(nominal, figure, side, poses, pair) for figure, side in last]
         kind = _kind_of_change(before, pair)
         if kind is None or not nominal.ramp_mm_s2:
             continue
@@ -198,23 +192,24 @@ def _motion(record: RunRecord, nominal: Nominal, spans: Sequence[tuple[Pair, Pai
 _SIDES = ("motor1", "motor2")
 
 
-def _steady(nominal: Nominal, side: str, code: int, poses: Sequence[Pose], pair: Pair) -> Figure:
+def _steady(nominal: Nominal, side: str, poses: Sequence[Pose], pair: Pair) -> Figure:
     measured = sum(rim_mm_s(pose, side) for pose in poses) / len(poses)
     return Figure(
-        group="motion", what="steady rim speed", expected=code * nominal.step_mm_s, measured=measured,
-        uncertainty=BODY_MM_S, unit="mm/s", bound=nominal.speed_bound,
+        group="motion", what="steady rim speed", expected=nominal.rims_mm_s(pair)[_SIDES.index(side)],
+        measured=measured,
+        uncertainty=BODY_MM_S, unit="mm/s", bound=nominal.speed_bound(pair),
         at=f"{'left' if side == 'motor1' else 'right'} of {pair}",
     )  # fmt: skip
 
 
-def _turned(nominal: Nominal, figure: Figure, side: str, poses: Sequence[Pose]) -> Figure:
+def _turned(nominal: Nominal, figure: Figure, side: str, poses: Sequence[Pose], pair: Pair) -> Figure:
     """Return a steady speed as the wheel's angle tells it."""
     encoder = "encoder1" if side == "motor1" else "encoder2"
     steps = wheel_steps(poses[-1], encoder) - wheel_steps(poses[0], encoder)
     span_s = (poses[-1].t - poses[0].t) / NS_PER_S
     return replace(
         figure, what=_by_angles(nominal), measured=steps * nominal.encoder_step_mm / span_s,
-        bound=nominal.way_bound(figure.expected, span_s),
+        bound=nominal.way_bound(pair, figure.expected, span_s),
     )  # fmt: skip
 
 

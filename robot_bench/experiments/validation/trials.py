@@ -20,6 +20,7 @@ from robot_bench.run import RunResult, write_run
 from robot_bench.scenario.goals.judging import Judgement
 from robot_bench.scenario.included_files import Setting
 from robot_bench.scenario.scenario import Scenario
+from simbase.errors import UsageError
 from simbase.timing import NS_PER_S
 
 
@@ -99,9 +100,12 @@ def refuse(
 
     Raises:
         ScenarioError: A setting or a file cannot be.
-        UsageError: There is no such body or world.
+        UsageError: There is no such body or world, or an experiment shows nothing in the modes.
     """
     for experiment in experiments:
+        if chosen and experiment.modes and not {variant.mode for variant in chosen} & set(experiment.modes):
+            hint = " or ".join(f"--mode {mode}" for mode in experiment.modes)
+            raise UsageError(f"{experiment.name} shows nothing in mode {chosen[0].mode}", hint=hint)
         scenario = experiment.load(settings)
         for variant in chosen:
             for world in worlds if experiment.worlds else ():
@@ -156,9 +160,9 @@ def _runs(
     """Return all runs, experiments of one scenario together."""
     groups: dict[object, list[Experiment]] = {}
     for one in experiments:
-        groups.setdefault((one.scenario, one.settings, one.worlds, one.seeds), []).append(one)
+        groups.setdefault((one.scenario, one.settings, one.worlds, one.seeds, one.modes), []).append(one)
     for group in groups.values():
-        for variant in chosen:
+        for variant in (one for one in chosen if not group[0].modes or one.mode in group[0].modes):
             for world in (worlds or group[0].worlds) if group[0].worlds else (None,):
                 for seed in group[0].seeds if seeds is None else seeds:
                     yield _Run(tuple(group), variant, world, seed)

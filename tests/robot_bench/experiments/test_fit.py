@@ -12,8 +12,9 @@ import pytest
 from p2os.pioneer.sensor_errors import load_sensor_errors
 from p2os.pioneer.world import load_world
 from p2os.robots.parameters import load_parameters
-from robot_bench.experiments.drive_files import drive_of_capture, read_drive
-from robot_bench.experiments.drives import Drive, Steps, Trajectory
+from robot_bench.drives.drive import Drive, Steps, Trajectory
+from robot_bench.drives.of_packets import drive_of_capture
+from robot_bench.experiments.drive_files import read_drive
 from robot_bench.experiments.fitting.examples import Recorded, empty_world, planted, record, square, wandering, write
 from robot_bench.experiments.fitting.least_squares import Parameter, fit
 from robot_bench.experiments.fitting.ramps import fit_ramps, ramped

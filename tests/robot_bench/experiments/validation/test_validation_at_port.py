@@ -77,7 +77,7 @@ def test_encoders_that_are_wrong_are_told_by_what_the_packets_tell(
     wrong: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(Encoders, "counts", property(wrong))  # type: ignore[arg-type]  # of this class
-    assert failing(at_port(["encoders"], tmp_path / "v", world=PLAIN)) == {"encoder code against the wheel's angle"}
+    assert failing(at_port(["encoders"], tmp_path / "v", world=PLAIN)) == {"encoder code against the packets' odometry"}
 
 
 def test_a_pin_that_comes_a_packet_late_is_told(gate: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,6 +13,7 @@ from p2os.robots.parameters import load_parameters
 from robot_bench.experiments.validation.experiments import EXPERIMENTS
 from robot_bench.experiments.validation.trials import PortRun, Result, port_runs, run_port
 from robot_bench.run import RunResult, run_at_port
+from robot_bench.running.pacer import RealTimePacer
 
 FILES = Path(__file__).parents[4] / "robot_bench/experiments/validation/scenarios"
 #: What `sensors` asks for at a port.
@@ -84,6 +85,7 @@ def at_port(
             parameters=parameters, body=make_body("kinematic", load_world(str(world)), parameters),
             settings=ControllerSettings(), faults=faults,
         )  # fmt: skip
-        return run_at_port(run.scenario, place, VirtualLine(robot, clock, lasts_s), clock=clock.read, sleep=clock.sleep)
+        pacer = RealTimePacer(clock=clock.read, sleep=clock.sleep)
+        return run_at_port(run.scenario, place, VirtualLine(robot, clock, lasts_s), clock=clock.read, pacer=pacer)
 
     return run_port(port_runs([EXPERIMENTS[name] for name in names]), drive, folder)
