@@ -49,8 +49,8 @@ HELP = """Validate the bench by experiments: motors, sensors, encoders.
 
 Each EXPERIMENT has a hypothesis, figures with units, and a bound for each, whose
 formula stands beside it in the report. Without names all are run: motors, codes,
-capped, sensors, sensors-all, only-while-seen, encoders, sparse, slip, long-drive,
-dodge. Each is run pins straight to the body, through the adapter's model, and
+capped, sensors, sensors-all, only-while-seen, encoders, sparse, slip, silence,
+long-drive, dodge. Each is run pins straight to the body, through the adapter's model, and
 through its firmware, with every body that is installed.
 
 --set runs the bench otherwise than it is expected to be: a planted error.

@@ -18,6 +18,7 @@ from robot_bench.experiments.validation.motors import Pair, motor_figures
 from robot_bench.experiments.validation.nominal import Nominal
 from robot_bench.experiments.validation.sensors import only_while_seen_figures, reading_figures, sensor_figures
 from robot_bench.experiments.validation.signals import packets
+from robot_bench.experiments.validation.silence import silence_figures
 from robot_bench.recording.run_record import RunRecord
 from robot_bench.scenario.goals.judging import Judgement
 from robot_bench.scenario.included_files import Setting
@@ -236,6 +237,14 @@ EXPERIMENTS: Mapping[str, Experiment] = {one.name: one for one in (
         hypothesis="The encoder pins show the wheels' angles in both directions at every speed; a program misses none.",
         procedure="The run of codes: every pose against the pins, every printed count against both.",
         measure=_encoders,
+    ),
+    Experiment(
+        name="silence", scenario="silence.toml", modes=("adapter",),
+        at_port="it drives on for two seconds with nobody to stop it",
+        hypothesis="Without packets the adapter shows obstacles, without commands the robot stops, and neither goes on"
+        " by itself.",
+        procedure="motors.elf drives ahead when the P2OS line goes down for four seconds.",
+        measure=lambda trial: silence_figures(trial.record, trial.nominal),
     ),
     Experiment(
         name="long-drive", scenario="long-drive.toml",

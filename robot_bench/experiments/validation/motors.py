@@ -160,7 +160,7 @@ def _motion(record: RunRecord, nominal: Nominal, spans: Sequence[tuple[Pair, Pai
         if kind is None or not nominal.ramp_mm_s2:
             continue
         nominal_slope = nominal.ramp_mm_s2 if kind == "both wheels alike" else nominal.turn_ramp_mm_s2
-        fitted = _fit(record, begin, end)
+        fitted = fitted_ramp(record, begin, end)
         if fitted is None:
             continue
         slope, began = fitted
@@ -234,7 +234,7 @@ def _kind_of_change(before: Pair, pair: Pair) -> str | None:
     return {left: "both wheels alike", -left: "turning on the spot"}.get(right)
 
 
-def _fit(record: RunRecord, begin: Nanos, end: Nanos) -> tuple[float, float] | None:
+def fitted_ramp(record: RunRecord, begin: Nanos, end: Nanos) -> tuple[float, float] | None:
     """Return the slope of the right wheel's ramp, mm/s2, and when it began, seconds; None: too few poses."""
     poses = poses_between(record, begin - NS_PER_S // 2, end)
     if not poses:

@@ -89,6 +89,8 @@ class Nominal:
         ]
         self._distance_mm = robot.distance_nm_per_count / 1e6
         self._heading_mm = math.pi * robot.track_mm / robot.angle_counts_per_turn
+        #: Without a packet for so long the adapter gives the robot up, seconds.
+        self.liveness_s = adapter.liveness_ns / NS_PER_S
         self._robot, self._profile = robot, scenario.controller.profile
         self._direct, self._adapter = scenario.direct, adapter
         #: From packet to packet, seconds: as the robot's FLASH has it.
