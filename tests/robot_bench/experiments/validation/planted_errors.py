@@ -78,8 +78,8 @@ PLANTED: Sequence[Planted] = (
     Planted("a cap that the turn does not follow", f"{_FW}mixing.cpp",
             "turn = scaled(turn, max_velocity_mm_s_, size_of_number(forward));", "", "capped",
             "RVEL for a pair of codes", FIRMWARE),
-    Planted("a lost robot is noticed 5 % late", f"{_FW}transitions.cpp", "received_at + settings_.liveness_ns",
-            "received_at + settings_.liveness_ns * 21 / 20", "silence",
+    Planted("a robot is given up 5 % early", f"{_FW}transitions.cpp", "received_at + settings_.liveness_ns",
+            "received_at + settings_.liveness_ns * 19 / 20", "silence",
             "the last packet to the distance pins that are safe", FIRMWARE),
     # the adapter's model, Python
     Planted("ranges 2 % long", f"{_MODEL}distances.py", "self._readings[number] = (range_um, now)",
