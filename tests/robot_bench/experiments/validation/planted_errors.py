@@ -92,7 +92,8 @@ PLANTED: Sequence[Planted] = (
     Planted("odometry: track 1 % wider", f"{_ROBOT}controller/dead_reckoning.py", "self._track_mm = track_mm / track",
             "self._track_mm = track_mm / track * 1.01", "encoders", ANGLE, MODEL),
     Planted("the watchdog 5 % slow", "p2os/protocol/connection.py", "self._last_frame_ns + self._watchdog_ns",
-            "self._last_frame_ns + self._watchdog_ns * 21 // 20", "silence", "the last command to the ramp of the stop", MODEL),
+            "self._last_frame_ns + self._watchdog_ns * 21 // 20", "silence",
+            "the last command to the ramp of the stop", MODEL),
     Planted("sonar 1 cm too far", f"{_ROBOT}sonar/errors.py", "range_m = min(true_m, longest)",
             "range_m = min(true_m + 0.011, longest)", "sensors-all", SEEN, MODEL),
     # the bench, mode direct
