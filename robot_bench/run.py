@@ -151,6 +151,7 @@ def run_at_port(
     *,
     on_progress: ProgressListener | None = None,
     clock: Clock = wall_clock,
+    pacer: RealTimePacer | None = None,
     drive: RunRemoteBench | None = None,
     force: bool = False,
 ) -> RunResult:
@@ -168,7 +169,7 @@ def run_at_port(
     if scenario.robots:
         transport.close()
         raise UsageError("a real robot is driven by a scenario with one robot", hint="leave out [[robot]]")
-    pacer = RealTimePacer(clock=clock)
+    pacer = pacer or RealTimePacer(clock=clock)
     with contextlib.ExitStack() as stack:
         stack.callback(transport.close)
         stack.enter_context(reserved(folder, force=force))

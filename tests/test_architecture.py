@@ -52,6 +52,7 @@ ALLOWED = {
     "bluepill_sim.cli": {"typer", "rich", "click"},
     "adapter_sim": {"p2os"},
     "robot_bench": {"p2os", "bluepill_sim", "adapter_sim", "typer", "rich", "click"},
+    "robot_bench.drives": {"p2os", "numpy"},
     "robot_bench.report": {"p2os", "matplotlib"},
     "robot_bench.report.explain": {"p2os", "bluepill_sim", "adapter_sim"},
     "robot_bench.recording.event_files": {"p2os", "pyarrow"},
@@ -104,7 +105,7 @@ LAYERS = {
     ),
     "robot_bench": (
         ("running", "firmware", "scenarios"), ("wires",), ("events",), ("direct",), ("recording",),
-        ("scenario", "report"),
+        ("drives",), ("scenario", "report"),
         ("adapter",), ("bench",), ("remote",), ("run", "project"),
         ("experiments",), ("campaign",), ("ros", "live"), ("cli",),
     ),

@@ -1,8 +1,8 @@
 """Experiments on recorded drives: compared, measured, fitted. Needs the extra `experiments` (NumPy, SciPy).
 
-`drives` and `drive_files` are what was driven; `alignment`, `trajectory_errors`, `parting` and `comparison` compare two
-of them; `metrics` and `latency_budget` measure one; `wheel_fit`, `ramp_fit`, `sonar_fit` and `umbmark` estimate a
-robot's parameters by `least_squares`; `sensitivity` varies those of a scenario.
+`drive_files` reads what was driven; `alignment`, `trajectory_errors`, `parting` and `comparison` compare two of
+them (`robot_bench.drives` measures one); `fitting` estimates a robot's parameters by least squares; `sensitivity`
+varies those of a scenario.
 """
 
 from simbase.errors import MissingDependencyError

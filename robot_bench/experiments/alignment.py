@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 from scipy.signal import correlate
 
-from robot_bench.experiments.drives import Floats, Trajectory
+from robot_bench.drives.drive import Floats, Trajectory
 from simbase.errors import UsageError
 
 #: chosen: seconds between the times at which speeds are correlated.

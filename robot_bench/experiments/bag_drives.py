@@ -20,7 +20,7 @@ from typing import Any
 
 from p2os.robots.parameters import RobotParameters
 from p2os.ros.bags import Recorded, read_bag
-from robot_bench.experiments.drives import Drive, Trajectory, heading_of, steps_of
+from robot_bench.drives.drive import Drive, Trajectory, heading_of, steps_of
 from simbase.errors import FileError, shown_name
 from simbase.timing import NS_PER_S, Nanos
 

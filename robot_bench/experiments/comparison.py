@@ -8,6 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from robot_bench.drives.drive import Drive, Floats, Trajectory
+from robot_bench.drives.latency_budget import quantiles
+from robot_bench.drives.onsets import answers
 from robot_bench.events.codec import Json
 from robot_bench.events.selection import select
 from robot_bench.experiments.alignment import (
@@ -17,8 +20,6 @@ from robot_bench.experiments.alignment import (
     on_common_times,
     shift_by_speeds,
 )
-from robot_bench.experiments.drives import Drive, Floats, Trajectory
-from robot_bench.experiments.onsets import answers
 from robot_bench.experiments.parting import Part, motion_parts_s, origin, parts
 from robot_bench.experiments.trajectory_errors import Statistics, absolute_errors, relative_errors
 from simbase.errors import UsageError
@@ -116,15 +117,6 @@ class Comparison:
             "came_from": None if came is None else {"stage": came[0].bound.stage, "signal": came[0].signal,
                                                     "at_s": came[1]},
         }  # fmt: skip
-
-
-def quantiles(values: Floats) -> Json:
-    """Return how values are distributed, for JSON; all None where there are none."""
-    names = ("median", "p90", "p99", "max")
-    if not len(values):
-        return {"count": 0, **dict.fromkeys(names)}
-    found = np.quantile(values, (0.5, 0.9, 0.99, 1.0))
-    return {"count": len(values), **{name: float(value) for name, value in zip(names, found, strict=True)}}
 
 
 def compare(one: Drive, other: Drive, how: How | None = None) -> Comparison:

@@ -10,104 +10,24 @@ Invariant: a file that is none of these is refused in one line that names it and
 import csv
 import math
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TypeAlias, cast
+from typing import TypeAlias
 
-import numpy as np
-
-from p2os.capture import Chunk, Direction, Reading, open_file, rows_of
-from p2os.protocol.frames import CHECKSUM_BYTES, PREFIX_BYTES, Frame
-from p2os.protocol.odometry import Odometry
+from p2os.capture import Chunk, Reading, open_file
 from p2os.protocol.profiles import Profile
-from p2os.protocol.sip import StandardSip
-from p2os.robots.parameters import ParametersError, RobotParameters, load_parameters
+from p2os.robots.parameters import RobotParameters, load_parameters
 from p2os.ros.bags import is_bag
-from robot_bench.events.kinds import Pose
+from robot_bench.drives.drive import Drive, Floats, Trajectory, heading_of, number_of, steps_of
+from robot_bench.drives.of_packets import drive_of_capture
+from robot_bench.drives.of_run import DEFAULT_ROBOT, drive_of_record
 from robot_bench.experiments.aria_logs import is_aria_log, read_aria_log
 from robot_bench.experiments.bag_drives import drive_of_bag
-from robot_bench.experiments.drives import Drive, Floats, Rows, Steps, Trajectory, heading_of, number_of, steps_of
-from robot_bench.recording.run_record import TRACE_NAME, RunRecord, read_events, read_run
-from robot_bench.recording.signals import motor_steps
+from robot_bench.recording.run_record import TRACE_NAME, read_events, read_run
 from simbase.errors import FileError, shown_name
-from simbase.timing import NS_PER_S
 
-#: Commands whose argument is looked at.
-MOTION_COMMANDS = ("VEL", "RVEL", "VEL2", "MOVE", "HEAD", "DHEAD", "ENABLE", "STOP", "E_STOP", "SETA", "SETRA")
-#: Sensors of the pin-out.
-SENSORS = 8
-#: What a run at a real robot's port says of its body.
-REMOTE = "remote"
-DEFAULT_ROBOT = "p2dx"
-#: One that comes later than this after the last follows one that was lost, seconds: the CONFIGpac has a byte for it.
-LONGEST_CYCLE_S = 0.255
 _TUM_COLUMNS = 8
 #: Longer is no number.
 _LONGEST_FIELD = 64
-
-
-@dataclass(slots=True, kw_only=True)
-class _Told(Rows):
-    """What the packets of a line tell, row by row."""
-
-    parameters: RobotParameters
-    sonar: dict[int, list[tuple[float, float]]] = field(default_factory=dict)
-
-    def take(self, chunks: Iterable[Chunk], profile: Profile) -> None:
-        """Take all packets; a packet that is no sound SIP inside is passed over."""
-        parameters = self.parameters
-        odometry, metres_per_count = Odometry(parameters), parameters.range_nm_per_count / 1e9
-        first: tuple[int, int, int] | None = None
-        before = 0.0
-        for row in rows_of(chunks, Reading(profile=profile, parameters=parameters)):
-            at = row.at_ns / NS_PER_S
-            if row.direction is Direction.TO_ROBOT:
-                argument = row.fields.get("argument") if row.name in MOTION_COMMANDS else None
-                if isinstance(argument, int):
-                    self.commands.setdefault(row.name, []).append((at, float(argument)))
-                continue
-            if not row.is_sip:
-                continue
-            sip = StandardSip.from_frame(Frame(row.data[PREFIX_BYTES:-CHECKSUM_BYTES]), profile)
-            odometry.update(sip, row.at_ns)
-            first = first or (sip.raw_x, sip.raw_y, sip.raw_heading)
-            self.poses.append((at, odometry.x_m, odometry.y_m, odometry.heading_rad))
-            conv = parameters.velocity_conv / 1000
-            self.left.append((at, sip.raw_left_velocity * conv))
-            self.right.append((at, sip.raw_right_velocity * conv))
-            each_s = spread_s(len(sip.sonar), parameters.sonar_fitted, at - before)
-            before = at
-            for place, reading in enumerate(sip.sonar, 1 - len(sip.sonar)):
-                metres = min(reading.raw_range * metres_per_count, parameters.sonar_range_m)
-                self.sonar.setdefault(reading.number, []).append((at + place * each_s, metres))
-        if first is not None:
-            self._begin_at(first)
-
-    def _begin_at(self, first: tuple[int, int, int]) -> None:
-        """Have the odometry begin where the first packet says; its counters there are 15 bits with a sign."""
-        parameters, half = self.parameters, 1 << 14
-        x, y = (((raw + half) % (2 * half) - half) * parameters.distance_nm_per_count / 1e9 for raw in first[:2])
-        turn = first[2] * parameters.angle_conv_rad
-        self.poses = [(t, x + a, y + b, turn + h) for t, a, b, h in self.poses]
-
-    def into(self, drive: Drive) -> Drive:
-        """Put it into a drive."""
-        drive.odometry = Trajectory.of_rows(self.poses) if len({row[0] for row in self.poses}) > 1 else None
-        drive.told_left_mps, drive.told_right_mps = steps_of(self.left), steps_of(self.right)
-        drive.commands = {name: steps_of(pairs) for name, pairs in self.commands.items()}
-        drive.sonar_m = {number: steps_of(pairs) for number, pairs in self.sonar.items()}
-        return drive
-
-
-def spread_s(readings: int, fitted: int, since_s: float) -> float:
-    """Return how far apart the readings of a packet were taken, seconds: they fire in turn between two packets.
-
-    Args:
-        readings: How many the packet has; all at once where it has one of every sonar.
-        fitted: How many sonar there are.
-        since_s: Since the packet before.
-    """
-    return min(since_s, LONGEST_CYCLE_S) / readings if 1 < readings < fitted else 0.0
 
 
 #: Says how to read a capture, whose chunks it looks into.
@@ -151,81 +71,14 @@ def _is_aria_log(path: Path) -> bool:
         return is_aria_log(file.readline(_LONGEST_FIELD).decode("utf-8", "replace"))
 
 
-def drive_of_capture(
-    name: str, chunks: Iterable[Chunk], parameters: RobotParameters, profile: Profile = Profile.P2OS
-) -> Drive:
-    """Return what a recorded conversation tells of a drive.
-
-    Args:
-        name: What it is called.
-        chunks: What was said.
-        parameters: The robot's units.
-        profile: Its firmware family.
-
-    Raises:
-        FileError: It has no two standard packets.
-    """
-    told = _Told(parameters=parameters)
-    told.take(chunks, profile)
-    drive = told.into(Drive(name=name, parameters=parameters))
-    if drive.odometry is None:
-        raise FileError(f"{shown_name(name)} holds no two standard packets of a robot", hint="p2os decode FILE")
-    drive.left_mps, drive.right_mps = drive.told_left_mps, drive.told_right_mps
-    return drive
-
-
 def _parameters(robot: str) -> RobotParameters:
     return load_parameters(robot or DEFAULT_ROBOT)
 
 
 def _of_run(folder: Path, robot: str) -> Drive:
-    record = read_run(folder)
-    name = str(cast("dict[str, object]", record.meta.get("robot") or {}).get("name") or "")
-    try:
-        parameters = load_parameters(robot or name or DEFAULT_ROBOT)
-    except ParametersError:
-        if robot:
-            raise
-        parameters = load_parameters(DEFAULT_ROBOT)  # a robot on own pins sends no packets
-    told = _Told(parameters=parameters)
-    told.take(_chunks_of(record), Profile.P2OS)
-    drive = told.into(Drive(name=folder.name, parameters=parameters, meta=record.meta))
+    drive = drive_of_record(folder.name, read_run(folder), robot)
     drive.events = list(read_events(folder))
-    drive.left_mps, drive.right_mps = drive.told_left_mps, drive.told_right_mps
-    if record.meta.get("body") != REMOTE and len(record.poses) > 1:
-        drive.truth = trajectory_of(record.poses)
-        times = np.array([pose.t / NS_PER_S for pose in record.poses])
-        drive.left_mps = Steps(times, np.array([pose.left / 1e6 for pose in record.poses]))
-        drive.right_mps = Steps(times, np.array([pose.right / 1e6 for pose in record.poses]))
-        drive.has_true_wheels = True
-    if not drive.sonar_m:
-        drive.sonar_m = _sonar_of(record)
-    drive.motors = {
-        motor: steps_of([(t / NS_PER_S, float(value)) for t, value in motor_steps(record.pins, motor)])
-        for motor in (1, 2) if f"motor{motor}_comm1" in record.pins
-    }  # fmt: skip
-    drive.sensors = {
-        number: steps_of([(t / NS_PER_S, float(level)) for t, level in record.pins[f"DD{number}"]])
-        for number in range(1, SENSORS + 1) if f"DD{number}" in record.pins
-    }  # fmt: skip
-    _ = drive.body
     return drive
-
-
-def trajectory_of(poses: Iterable[Pose]) -> Trajectory:
-    """Return the poses of a trace as a trajectory."""
-    return Trajectory.of_rows([(pose.t / NS_PER_S, pose.x_m, pose.y_m, pose.heading_rad) for pose in poses])
-
-
-def _chunks_of(record: RunRecord) -> Iterator[Chunk]:
-    for packet in record.wire:
-        yield Chunk(at_ns=packet.t, direction=Direction(packet.direction), data=packet.data)
-
-
-def _sonar_of(record: RunRecord) -> dict[int, Steps]:
-    """Return the ranges of a run without packets, from its events."""
-    count = len(record.sonar[0][1]) if record.sonar else 0
-    return {n: steps_of([(t / NS_PER_S, mm[n] / 1000) for t, mm in record.sonar]) for n in range(count)}
 
 
 def _of_csv(path: Path, robot: str) -> Drive:

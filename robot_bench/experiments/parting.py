@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robot_bench.experiments.drives import Drive, Floats, Steps, Trajectory, wrapped
+from robot_bench.drives.drive import Drive, Floats, Steps, Trajectory, wrapped
 
 #: chosen: a change goes through the whole chain within this, seconds: the adapter's period and two of the robot's.
 TOGETHER_S = 0.3

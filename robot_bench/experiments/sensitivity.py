@@ -23,11 +23,11 @@ import numpy as np
 
 from p2os.errors import ScenarioError
 from robot_bench.bench import Bench
+from robot_bench.drives.drive import Drive, Floats
+from robot_bench.drives.metrics import metrics
+from robot_bench.drives.of_run import trajectory_of
 from robot_bench.events.codec import Json
 from robot_bench.events.kinds import Pose, Verdict
-from robot_bench.experiments.drive_files import trajectory_of
-from robot_bench.experiments.drives import Drive, Floats
-from robot_bench.experiments.metrics import metrics
 from robot_bench.scenario.included_files import Setting
 from robot_bench.scenario.scenario import Scenario
 from simbase.errors import UsageError, shown

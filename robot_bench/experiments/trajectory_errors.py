@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from robot_bench.experiments.drives import Floats, Trajectory, wrapped
+from robot_bench.drives.drive import Floats, Trajectory, wrapped
 from simbase.errors import UsageError
 
 

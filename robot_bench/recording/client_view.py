@@ -2,8 +2,8 @@
 
 Not the truth: with a real robot nothing else is known. A Pioneer 2 sends two sonar
 readings a packet; the others keep their last value, and before the first reading the
-sonar's longest range. Wheel angles are not in a standard packet and stay 0; collisions
-are unknown.
+sonar's longest range. What the wheels have turned follows from position and heading;
+collisions are unknown.
 
 Invariant: poses are the trace's integers: micrometres, microradians, µm/s.
 """
@@ -65,14 +65,17 @@ class OdometryPose:
     def __init__(self, parameters: RobotParameters) -> None:
         self._parameters = parameters
         self._x, self._y = Unwrapper(POSITION_MASK + 1), Unwrapper(POSITION_MASK + 1)
+        self._heading = Unwrapper(parameters.angle_counts_per_turn)
+        self._forward_m = 0.0
         #: Path over ground, metres.
         self.distance_m = 0.0
 
     def take(self, sip: StandardSip, now: Nanos) -> Pose:
-        """Return the pose that a packet tells."""
+        """Return the pose that a packet tells; its wheel angles count from the first packet."""
         per_count_um = self._parameters.distance_nm_per_count / NM_PER_UM
-        step = math.hypot(self._x.update(sip.raw_x), self._y.update(sip.raw_y))
-        self.distance_m += step * per_count_um / 1e6
+        dx, dy = self._x.update(sip.raw_x), self._y.update(sip.raw_y)
+        self.distance_m += math.hypot(dx, dy) * per_count_um / 1e6
+        left_angle, right_angle = self._angles(dx * per_count_um / 1e6, dy * per_count_um / 1e6, sip.raw_heading)
         turn = sip.raw_heading / self._parameters.angle_counts_per_turn * 2 * math.pi
         speed_um = self._parameters.velocity_um_s_per_count
         return Pose(
@@ -84,7 +87,19 @@ class OdometryPose:
             pitch=0,
             left=sip.raw_left_velocity * speed_um,
             right=sip.raw_right_velocity * speed_um,
-            left_angle=0,
-            right_angle=0,
+            left_angle=round(left_angle * 1e6),
+            right_angle=round(right_angle * 1e6),
             collisions=0,
         )
+
+    def _angles(self, dx_m: float, dy_m: float, raw_heading: int) -> tuple[float, float]:
+        """Return what the wheels have turned, radians, after a step along an arc that ends with this heading."""
+        parameters = self._parameters
+        per_count = 2 * math.pi / parameters.angle_counts_per_turn
+        turned = self._heading.update(raw_heading) * per_count
+        middle = raw_heading * per_count - turned / 2
+        chord_m = dx_m * math.cos(middle) + dy_m * math.sin(middle)
+        self._forward_m += chord_m * (turned / 2 / math.sin(turned / 2) if turned else 1.0)
+        rim_m = self._heading.total * per_count * parameters.track_mm / 2000
+        radius_m = parameters.body.wheel_diameter_m / 2
+        return (self._forward_m - rim_m) / radius_m, (self._forward_m + rim_m) / radius_m

@@ -48,6 +48,7 @@ def render_page(record: RunRecord, drawn: Json) -> str:
         figures="".join(f"<tr><td>{html.escape(k)}</td><td>{html.escape(v)}</td></tr>" for k, v in figures(record)),
         goals=_goals(record.end),
         measured=_measured(record.end),
+        measures=_measures(record),
         parts=_parts(record.end),
         left_out=_left_out(cast("list[str]", drawn["left_out"])),
         footer=html.escape(_footer(record)),
@@ -280,6 +281,15 @@ def _parts(end: Json) -> str:
         png = f'<br><img alt="{name}" src="data:image/png;base64,{html.escape(row["png"])}">' if "png" in row else ""
         items.append(f"<tr><td>{name}</td><td>{html.escape(row['words'])}{png}</td></tr>")
     return f"<section><h2>Parts</h2><table>{''.join(items)}</table></section>"
+
+
+def _measures(record: RunRecord) -> str:
+    """Return the section of the run's figures; empty where NumPy is not installed."""
+    try:
+        from robot_bench.report.measures import measures_section
+    except ModuleNotFoundError:
+        return ""
+    return measures_section(record)
 
 
 def _left_out(lines: list[str]) -> str:

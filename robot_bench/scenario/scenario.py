@@ -119,6 +119,7 @@ _ADAPTER = (
     Key(name="max_velocity_mm_s", kind="whole", least=0, most=32_767),
     Key(name="max_rotation_deg_s", kind="whole", least=0, most=32_767),
     Key(name="encoder_at_open", kind="text", choices=("zero", "continue")),
+    Key(name="stop_unknown_robot", kind="flag"),
     *(Key(name=name, kind="whole", least=1, most=60_000) for name in _ADAPTER_TIMES),
 )
 _CONTROLLER = (

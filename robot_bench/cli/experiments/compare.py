@@ -162,7 +162,7 @@ def lines_of(found: "Comparison") -> Iterator[str]:
 
 
 def _latency_lines(found: "Comparison") -> Iterator[str]:
-    from robot_bench.experiments.comparison import quantiles
+    from robot_bench.drives.latency_budget import quantiles
 
     for drive, values in zip((found.one, found.other), found.latency_s, strict=True):
         row = quantiles(values)

@@ -22,8 +22,8 @@ from simbase.errors import FileError, UsageError
 from simbase.units import SEED
 
 if TYPE_CHECKING:  # NumPy is loaded when the verb runs
+    from robot_bench.drives.drive import Drive
     from robot_bench.experiments.drive_files import HowToRead
-    from robot_bench.experiments.drives import Drive
     from robot_bench.experiments.fitting.least_squares import Fit
     from robot_bench.experiments.fitting.umbmark import Correction, Umbmark
 
@@ -146,11 +146,13 @@ def _drives(captures: Sequence[Path], truths: Sequence[Path], robot: str, how: "
 def _fits(drives: "Sequence[Drive]", world: str) -> "dict[str, Fit | FileError]":
     """Return what each group of parameters came to; an error says why a group could not be looked at."""
     from p2os.pioneer.world import load_world
+    from robot_bench.experiments.fitting.clocks import on_one_clock, without_delays
     from robot_bench.experiments.fitting.ramps import fit_ramps
     from robot_bench.experiments.fitting.sonar import fit_sonar, walls_of
     from robot_bench.experiments.fitting.wheels import fit_wheels
 
     asked = load_world(world) if world else None
+    drives, clocks = on_one_clock(drives)
 
     def sonar() -> "Fit":
         place = asked or next((load_world(name) for drive in drives if (name := _world_of(drive))), None)
@@ -164,7 +166,7 @@ def _fits(drives: "Sequence[Drive]", world: str) -> "dict[str, Fit | FileError]"
     }  # fmt: skip
     for name, make in makes.items():
         try:
-            found[name] = make()
+            found[name] = without_delays(make(), clocks)
         except (FileError, UsageError, WorldError) as error:
             found[name] = FileError(str(error), hint=error.hint)
     errors = [one for one in found.values() if isinstance(one, FileError)]

@@ -15,7 +15,7 @@ from robot_bench.experiments import require
 from simbase.errors import UsageError
 
 if TYPE_CHECKING:  # NumPy is loaded when the verb runs
-    from robot_bench.experiments.metrics import Metrics
+    from robot_bench.drives.metrics import Metrics
 
 HELP = """Measure runs: way, smoothness, clearance, energy, goals, latencies.
 
@@ -28,23 +28,6 @@ Examples:
   p2os metrics runs/dodge-* --json
   p2os metrics runs/dodge-001 --picture latency.png
 """
-#: Figure → what it is, unit, decimals.
-SHOWN: dict[str, tuple[str, str, int]] = {
-    "span_s": ("time", "s", 1),
-    "path_m": ("way", "m", 2),
-    "turned_deg": ("turned", "deg", 0),
-    "mean_mps": ("mean speed", "m/s", 3),
-    "max_mps": ("top speed", "m/s", 3),
-    "standing_share": ("standing, of the time", "", 3),
-    "mean_square_jerk_m2_s6": ("mean square jerk", "m²/s⁶", 3),
-    "log_dimensionless_jerk": ("log dimensionless jerk", "", 2),
-    "max_rim_mps2": ("a rim's greatest acceleration", "m/s²", 2),
-    "clearance_m": ("least clearance", "m", 3),
-    "contacts": ("contacts", "", 0),
-    "energy_j": ("work at the rims", "J", 1),
-    "energy_j_per_m": ("work a metre", "J/m", 2),
-    "time_to_goal_s": ("all goals met at", "s", 2),
-}
 
 
 def register(app: typer.Typer) -> None:
@@ -63,8 +46,8 @@ def metrics(
 ) -> None:
     """Measure drives."""
     require(*(["matplotlib"] if picture else []))
+    from robot_bench.drives.metrics import metrics as measured
     from robot_bench.experiments.drive_files import read_drive
-    from robot_bench.experiments.metrics import metrics as measured
 
     if picture and len(runs) > 1:
         raise UsageError("a picture is of one run", hint="p2os metrics RUN --picture FILE")
@@ -80,7 +63,7 @@ def metrics(
 
 
 def _draw(found: "Metrics", picture: Path) -> None:
-    from robot_bench.experiments.latency_budget import STEPS, WHOLE
+    from robot_bench.drives.latency_budget import STEPS, WHOLE
     from robot_bench.experiments.pictures import latency_figure, write_png
 
     rows = [(name, found.latency.steps[name]) for name in (*STEPS, WHOLE) if found.latency.steps[name]]
@@ -91,8 +74,8 @@ def _draw(found: "Metrics", picture: Path) -> None:
 
 def lines_of(found: "Metrics") -> Iterator[str]:
     """Yield what a person reads, no line wider than 80 columns."""
-    from robot_bench.experiments.comparison import quantiles
-    from robot_bench.experiments.latency_budget import STEPS, WHOLE
+    from robot_bench.drives.latency_budget import STEPS, WHOLE, quantiles
+    from robot_bench.drives.metrics import SHOWN
 
     yield found.name
     for name, (words, unit, decimals) in SHOWN.items():

@@ -18,13 +18,15 @@ from robot_bench.cli.progress import RunDisplay
 from robot_bench.cli.run import ask, capped, drive_port
 from robot_bench.cli.workers import core_count, run_in_processes
 from robot_bench.events.codec import Json
-from robot_bench.experiments.validation.experiments import EXPERIMENTS, Experiment
+from robot_bench.experiments.validation.experiments import EXPERIMENTS, AtPort, Experiment
 from robot_bench.experiments.validation.figures import LOOSE_BECAUSE, Figure, loose
 from robot_bench.experiments.validation.page import render
 from robot_bench.experiments.validation.trials import (
+    PortRun,
     Result,
     Variant,
     longest_s,
+    port_runs,
     refuse,
     run_port,
     run_trials,
@@ -34,7 +36,7 @@ from robot_bench.experiments.validation.trials import (
 from robot_bench.recording.run_folder import RUNS, make_next_folder
 from robot_bench.run import RunResult
 from robot_bench.scenario.included_files import Setting, read_setting
-from robot_bench.scenario.scenario import MODES, Scenario
+from robot_bench.scenario.scenario import MODES
 from robot_bench.scenario.schema import nearest
 from robot_bench.scenario.sweep import read_seeds
 from simbase.errors import FileError, UsageError
@@ -47,9 +49,9 @@ HELP = """Validate the bench by experiments: motors, sensors, encoders.
 
 Each EXPERIMENT has a hypothesis, figures with units, and a bound for each, whose
 formula stands beside it in the report. Without names all are run: motors, codes,
-sensors, sensors-all, only-while-seen, encoders, sparse, slip, long-drive, dodge. Each is run pins
-straight to the body, through the adapter's model, and through its firmware, with
-every body that is installed.
+capped, sensors, sensors-all, only-while-seen, encoders, sparse, slip, silence,
+long-drive, dodge. Each is run pins straight to the body, through the adapter's model, and
+through its firmware, with every body that is installed.
 
 --set runs the bench otherwise than it is expected to be: a planted error.
 
@@ -104,7 +106,7 @@ def validate(
     yes: Annotated[bool, typer.Option("--yes", help="With --port: do not ask before the first motion.")] = False,
 ) -> None:
     """Validate the bench."""
-    chosen = [_experiment(name) for name in dict.fromkeys(names or EXPERIMENTS)]
+    chosen = _chosen(names or (), mode or ())
     settings = [read_setting(text) for text in set_ or ()]
     for one in mode or ():
         if one not in MODES:
@@ -113,8 +115,8 @@ def validate(
         raise UsageError("a robot at a port has its own body and world", hint="leave out --mode, --body and the like")
     if yes and port is None:
         raise UsageError("--yes goes with --port only")
-    if port is not None and not any(one.at_port for one in chosen):
-        able = ", ".join(one.name for one in EXPERIMENTS.values() if one.at_port)
+    if port is not None and all(isinstance(one.at_port, str) for one in chosen):
+        able = ", ".join(one.name for one in EXPERIMENTS.values() if isinstance(one.at_port, AtPort))
         raise UsageError("a robot at a port can do none of these", hint=f"it can do {able}")
     chosen_variants = variants(mode or (), body or ())
     refuse(chosen, chosen_variants if port is None else [], settings, world or ())
@@ -137,6 +139,13 @@ def validate(
         _print(results, folder)
     if not all(result.passed for result in results):
         raise typer.Exit(1)
+
+
+def _chosen(names: Sequence[str], modes: Sequence[str]) -> list[Experiment]:
+    """Return the experiments of these names; without names all that show something in the modes."""
+    if names:
+        return [_experiment(name) for name in dict.fromkeys(names)]
+    return [one for one in EXPERIMENTS.values() if not one.modes or not modes or set(one.modes) & set(modes)]
 
 
 def _experiment(name: str) -> Experiment:
@@ -178,24 +187,25 @@ def _run_all(
 def _run_at_port(
     chosen: Sequence[Experiment], folder: Path, settings: Sequence[Setting], port: str, *, yes: bool
 ) -> list[Result]:
-    left_out = [one.name for one in chosen if not one.at_port]
-    if left_out:
-        typer.echo(f"not at a port, where nothing is placed: {', '.join(left_out)}", err=True)
+    for one in chosen:
+        if isinstance(one.at_port, str):
+            typer.echo(f"not at a port: {one.name}: {one.at_port}", err=True)
+    runs = port_runs(chosen, settings)
     typer.echo(
-        f"about {longest_s(chosen):.0f} s of driving; {'any key' if has_keyboard() else 'Ctrl-C'} stops the robot",
+        f"about {longest_s(runs):.0f} s of driving; {'any key' if has_keyboard() else 'Ctrl-C'} stops the robot",
         err=True,
     )
-    agreed = yes
+    agreed: set[str] = set()
 
-    def drive(experiment: Experiment, scenario: Scenario, place: Path) -> RunResult:
-        nonlocal agreed
-        if not agreed:
-            ask(capped(scenario, None), port)
-            agreed = True
-        typer.echo(f"{experiment.name}: {experiment.procedure}", err=True)
-        return drive_port(scenario, place, port, yes=True, max_speed_mps=None)
+    def drive(run: PortRun, place: Path) -> RunResult:
+        names = ", ".join(one.name for one in run.experiments)
+        typer.echo(f"{names}: {run.scenario.description}\nthe robot needs {run.room}", err=True)
+        if not yes and run.room not in agreed:
+            ask(capped(run.scenario, None), port)
+            agreed.add(run.room)
+        return drive_port(run.scenario, place, port, yes=True, max_speed_mps=None)
 
-    return run_port(chosen, drive, folder, settings=settings)
+    return run_port(runs, drive, folder, settings=settings)
 
 
 def _write(folder: Path, results: Sequence[Result], set_: Sequence[str]) -> None:

@@ -23,8 +23,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy import optimize, stats
 
+from robot_bench.drives.drive import Floats
 from robot_bench.events.codec import Json
-from robot_bench.experiments.drives import Floats
 from simbase.errors import FileError
 
 #: chosen: a second of packets, where clusters are packets; three steps of a way.

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from robot_bench.experiments.drives import Drive, Floats, Steps
+from robot_bench.drives.drive import Drive, Floats, Steps
+from robot_bench.drives.onsets import changes
 from robot_bench.experiments.fitting.least_squares import Fit, Parameter, fit
-from robot_bench.experiments.onsets import changes
 from simbase.errors import FileError
 
 #: The grain of a speed on the wire: 1 mm/s, evenly spread.

@@ -16,7 +16,7 @@ from p2os.pioneer.sonar.ring import RAYS_PER_CONE
 from p2os.pioneer.world.model import World
 from p2os.pioneer.world.plan import Plan
 from p2os.robots.parameters import RobotParameters
-from robot_bench.experiments.drives import Drive, Floats, Trajectory
+from robot_bench.drives.drive import Drive, Floats, Trajectory
 from robot_bench.experiments.fitting.least_squares import Fit, Parameter, fit
 from simbase.errors import FileError
 

@@ -20,8 +20,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from robot_bench.drives.drive import Drive, Floats, Trajectory
 from robot_bench.events.codec import Json
-from robot_bench.experiments.drives import Drive, Floats, Trajectory
 from robot_bench.experiments.fitting.least_squares import Fit, Parameter, fit
 from robot_bench.experiments.fitting.wheels import Rims
 from simbase.errors import FileError

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from robot_bench.drives.drive import Drive, Floats, Trajectory, wrapped
 from robot_bench.experiments.alignment import shift_by_speeds
-from robot_bench.experiments.drives import Drive, Floats, Trajectory, wrapped
 from robot_bench.experiments.fitting.least_squares import Fit, Parameter, fit
 from simbase.errors import FileError
 

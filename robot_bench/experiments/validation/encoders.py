@@ -1,17 +1,24 @@
 """What the encoder experiments measure: the pins against the wheels' true angles, and what a program counts."""
 
+import bisect
 import math
 import re
+from collections.abc import Sequence
 from itertools import pairwise
+from operator import attrgetter
 
-from robot_bench.events.kinds import MICRO
+from p2os.protocol.odometry import POSITION_MODULUS
+from p2os.protocol.profiles import Profile
+from robot_bench.events.kinds import MICRO, Pose
 from robot_bench.experiments.validation.figures import Bound, Figure, Finding, Missing, worst_or_missing
 from robot_bench.experiments.validation.nominal import Nominal
 from robot_bench.experiments.validation.signals import (
     ENCODER_STEPS,
+    Course,
     at,
     encoder_steps,
     motor_pairs,
+    packets,
     poses_between,
     rim_mm_s,
     wheel_steps,
@@ -22,6 +29,8 @@ from simbase.timing import NS_PER_S, Nanos
 
 SIDES = ("encoder1", "encoder2")
 HALF_TURN = ENCODER_STEPS // 2
+#: Figures: the pins against the truth, and against what the adapter was told.
+BY_ANGLE, BY_PACKETS = "encoder code against the wheel's angle", "encoder code against the packets' odometry"
 #: The motor value of most speed, by its size.
 MOST_CODE = 4
 #: What the program prints: the pair, and the steps that it has counted on both encoders.
@@ -41,11 +50,17 @@ def encoder_figures(record: RunRecord, nominal: Nominal) -> list[Finding]:
         return [Missing(group="pins", what="encoder pins", why="the motor pins never said anything but 0")]
     result: list[Finding] = []
     moving: list[Figure] = []
+    told: list[Figure] = []
+    poses = nominal.packet_poses(record)
     for side in SIDES:
         steps = encoder_steps(record, side, start)
         if not steps:
             return [Missing(group="pins", what="encoder pins", why=f"no wire of {side} was recorded")]
         result.append(_changes(steps, side))
+        if not nominal.is_direct:
+            told += _after_packets(nominal, poses, side, steps)
+        if nominal.at_port:
+            continue
         whole = _whole_turns(record, side, start, steps[0][1])
         is_within_turn = nominal.is_direct and bool(_ambiguous(record, nominal, start))
         for pose in record.poses:
@@ -53,13 +68,48 @@ def encoder_figures(record: RunRecord, nominal: Nominal) -> list[Finding]:
                 continue
             truth = wheel_steps(pose, side)
             off = (at(steps, pose.t) or 0) + whole + 0.5 - truth
-            moving.append(Figure(
-                group="motion", what="encoder code against the wheel's angle", expected=truth,
-                measured=truth + (_within_turn(off) if is_within_turn else off), uncertainty=ENCODER_STEPS / MICRO,
-                unit="steps", at=f"{side} at {pose.t / NS_PER_S:.2f} s",
-                bound=nominal.encoder_bound(0.0 if is_within_turn else _fastest(record, nominal, pose.t, side)),
+            moving.append(_against(
+                BY_ANGLE, truth, _within_turn(off) if is_within_turn else off, f"{side} at {pose.t / NS_PER_S:.2f} s",
+                nominal.encoder_bound(0.0 if is_within_turn else _fastest(record, nominal, pose.t, side)),
             ))  # fmt: skip
-    return [*result, worst_or_missing(moving, "motion", "encoder code against the wheel's angle", "no pose")]
+    if not nominal.is_direct:
+        result.append(worst_or_missing(told, "pins", BY_PACKETS, "no packet came"))
+    if not nominal.at_port:
+        result.append(worst_or_missing(moving, "motion", BY_ANGLE, "no pose was recorded"))
+    return result
+
+
+def _against(what: str, truth: float, off: float, where: str, bound: Bound) -> Figure:
+    return Figure(
+        group="motion" if what == BY_ANGLE else "pins", what=what, expected=truth, measured=truth + off,
+        uncertainty=ENCODER_STEPS / MICRO, unit="steps", at=where, bound=bound,
+    )  # fmt: skip
+
+
+def _after_packets(nominal: Nominal, poses: Sequence[Pose], side: str, steps: Course[int]) -> list[Figure]:
+    """Return what an encoder shows when it has walked to what a packet tells, against what the packets tell.
+
+    Both count from where the wheel stood when the drive began: of a robot at a port nothing else is known.
+    """
+    start = steps[0][0]
+    standing = [pose for pose in poses if pose.t <= start]
+    origin = (wheel_steps(standing[-1], side) if standing else 0.0) - steps[0][1]
+    figures = []
+    for pose, following in pairwise(poses[max(0, len(standing) - 1) :]):
+        shown = at(steps, following.t - 1)
+        if shown is None or following.t - pose.t < nominal.walk_ns(_turned_steps(poses, pose.t, side)):
+            continue
+        truth = wheel_steps(pose, side) - origin
+        where = f"{side} at {pose.t / NS_PER_S:.2f} s"
+        figures.append(_against(BY_PACKETS, truth, shown + 0.5 - truth, where, nominal.encoder_packet_bound))
+    return figures
+
+
+def _turned_steps(poses: Sequence[Pose], t: Nanos, side: str) -> float:
+    """Return how many steps a wheel has turned in the last few packets before a time."""
+    first, last = (bisect.bisect_left(poses, when, key=attrgetter("t")) for when in (t - NS_PER_S // 2, t + 1))
+    near = [wheel_steps(pose, side) for pose in poses[first:last]]
+    return max(near) - min(near) if near else 0.0
 
 
 def _whole_turns(record: RunRecord, side: str, start: Nanos, code: int) -> int:
@@ -113,6 +163,20 @@ def sparse_figures(record: RunRecord, nominal: Nominal) -> list[Finding]:
         *encoder_figures(record, nominal),
         worst_or_missing(ends, "pins", "count of the program at the end, against the wheel", "it printed no counts"),
     ]  # fmt: skip
+
+
+def wrap_figure(record: RunRecord, profile: Profile) -> Finding:
+    """Return whether the position in the packets wraps at all: it counts no negative numbers."""
+    told = [(sip.raw_x, sip.raw_y) for _, sip in packets(record, profile)]
+    wraps = sum(
+        abs(now - before) > POSITION_MODULUS // 2
+        for one, other in pairwise(told) for before, now in zip(one, other, strict=True)
+    )  # fmt: skip
+    return Figure(
+        group="wire", what="a wrap of the position counter, at least", expected=1, measured=min(wraps, 1),
+        uncertainty=0, unit="", at=f"{wraps} of them",
+        bound=Bound(name="wrap", value=0, formula="behind its origin x is below 0"),
+    )  # fmt: skip
 
 
 def slip_figures(record: RunRecord, nominal: Nominal, body: str) -> list[Finding]:

@@ -26,8 +26,11 @@ FITTED = 0.1, 0.9
 #: chosen: shares of a ramp's slope, and what they are for.
 SLOPE = 0.0015, "a controller's ramp goes in whole mm/s and steps of milliseconds"
 SLOPE_AT_PORT = 0.05, "speeds are whole mm/s, each 100 ms"
+#: chosen: over less a way tells too little of a speed.
+LEAST_SPAN_NS: Nanos = NS_PER_S // 4
 #: chosen: poses on a ramp that a line can be laid through.
 LEAST_POSES = 6
+_NO_RAMP = f"no change of three codes took {LEAST_POSES} poses or more"
 
 
 def motor_figures(record: RunRecord, nominal: Nominal, wanted: Sequence[tuple[Pair, float]]) -> list[Finding]:
@@ -89,22 +92,19 @@ def _spans(held: Sequence[tuple[Pair, Nanos, Nanos]]) -> list[tuple[Pair, Pair, 
 
 def _commands(record: RunRecord, nominal: Nominal, spans: Sequence[tuple[Pair, Pair, Nanos, Nanos]]) -> list[Finding]:
     """Return the rounding of the commands, and how long they take to the robot."""
-    rows = (
-        ("VEL", CommandNumber.VEL, nominal.forward_mm_s, "mm/s"),
-        ("RVEL", CommandNumber.RVEL, nominal.turn_deg_s, "deg/s"),
-    )
-    courses = {name: sent(record, number) for name, number, _, _ in rows}
+    rows = (("VEL", CommandNumber.VEL, "mm/s"), ("RVEL", CommandNumber.RVEL, "deg/s"))
+    courses = {name: sent(record, number) for name, number, _ in rows}
     result: list[Finding] = []
     delay = nominal.to_command
-    for name, _, value_of, unit in rows:
-        bound = Bound(name=f"rounding of {name}", value=0.5, formula=f"{name} is a whole number of {unit}: half of it")
+    for place, (name, _, unit) in enumerate(rows):
         figures = []
         for _, pair, begin, end in spans:
             got = at(courses[name], begin + round((delay.seconds + 1e-6) * NS_PER_S))
             if got is not None and begin + delay.seconds * NS_PER_S < end:
                 figures.append(Figure(
-                    group="wire", what=f"{name} for a pair of codes", expected=value_of(pair), measured=float(got),
-                    uncertainty=0, unit=unit, bound=bound, at=str(pair),
+                    group="wire", what=f"{name} for a pair of codes", expected=nominal.speeds(pair)[place],
+                    measured=float(got), uncertainty=0, unit=unit, bound=nominal.rounding_bounds(pair)[place],
+                    at=str(pair),
                 ))  # fmt: skip
         result.append(worst_or_missing(figures, "wire", f"{name} for a pair of codes", f"no {name} came to the robot"))
     late: dict[str, list[Figure]] = {"change of the pins to the robot's last command": []}
@@ -114,7 +114,7 @@ def _commands(record: RunRecord, nominal: Nominal, spans: Sequence[tuple[Pair, P
         changed = _last_change(courses, begin, end)
         if changed is None:
             continue
-        bounds = [delay.bound("delay to the robot")]
+        bounds = [delay.bound("delay to the robot" + nominal.suffix)]
         if _is_line_free(courses, nominal, begin, changed):
             is_second = any(t == changed for t, _ in courses["RVEL"])
             needed = nominal.to_free_line(PAIR_BYTES if is_second else PAIR_BYTES // 2)
@@ -152,14 +152,15 @@ def _motion(record: RunRecord, nominal: Nominal, spans: Sequence[tuple[Pair, Pai
         wait = max(_ramp_s(nominal, before, pair), 0.0) + nominal.to_motion.seconds + POSE_S
         poses = poses_between(record, begin + round(wait * NS_PER_S), end)
         if poses:
-            steady += [_steady(nominal, side, code, poses, pair) for side, code in zip(_SIDES, pair, strict=True)]
-        if len(poses) > 1 and not nominal.at_port:  # packets tell of no angles
-            turned += [_turned(nominal, figure, side, poses) for figure, side in zip(steady[-2:], _SIDES, strict=True)]
+            steady += [_steady(nominal, side, poses, pair) for side in _SIDES]
+        if len(poses) > 1 and poses[-1].t - poses[0].t >= LEAST_SPAN_NS:
+            last = zip(steady[-2:], _SIDES, strict=True)
+            turned += [_turned(nominal, figure, side, poses, pair) for figure, side in last]
         kind = _kind_of_change(before, pair)
         if kind is None or not nominal.ramp_mm_s2:
             continue
         nominal_slope = nominal.ramp_mm_s2 if kind == "both wheels alike" else nominal.turn_ramp_mm_s2
-        fitted = _fit(record, begin, end)
+        fitted = fitted_ramp(record, begin, end)
         if fitted is None:
             continue
         slope, began = fitted
@@ -171,36 +172,49 @@ def _motion(record: RunRecord, nominal: Nominal, spans: Sequence[tuple[Pair, Pai
             bound=nominal.to_motion.bound("delay to the wheels" + nominal.suffix), at=what,
         ))  # fmt: skip
     result = [worst_or_missing(steady, "motion", "steady rim speed", "no wheel came to a steady speed")]
-    if not nominal.at_port:
-        what = "the same by the wheels' angles"
-        result.append(worst_or_missing(turned, "motion", what, "no wheel came to a steady speed"))
+    result.append(worst_or_missing(turned, "motion", _by_angles(nominal), "no wheel came to a steady speed"))
     if nominal.ramp_mm_s2:
         result += [
-            worst_or_missing(found, "motion", f"ramp, {kind}", "no such change was seen")
+            worst_or_missing(found, "motion", f"ramp, {kind}", _NO_RAMP)
             for kind, found in slopes.items() if found or kind == "both wheels alike"
         ]  # fmt: skip
-        result.append(worst_or_missing(delays, "motion", "change of the pins to the wheels' ramp", "no ramp was seen"))
+        result.append(
+            worst_or_missing(
+                delays,
+                "motion",
+                "change of the pins to the wheels' ramp",
+                _NO_RAMP,
+            )
+        )
     return result
 
 
 _SIDES = ("motor1", "motor2")
 
 
-def _steady(nominal: Nominal, side: str, code: int, poses: Sequence[Pose], pair: Pair) -> Figure:
+def _steady(nominal: Nominal, side: str, poses: Sequence[Pose], pair: Pair) -> Figure:
     measured = sum(rim_mm_s(pose, side) for pose in poses) / len(poses)
     return Figure(
-        group="motion", what="steady rim speed", expected=code * nominal.step_mm_s, measured=measured,
-        uncertainty=BODY_MM_S, unit="mm/s", bound=nominal.speed_bound,
+        group="motion", what="steady rim speed", expected=nominal.rims_mm_s(pair)[_SIDES.index(side)],
+        measured=measured,
+        uncertainty=BODY_MM_S, unit="mm/s", bound=nominal.speed_bound(pair),
         at=f"{'left' if side == 'motor1' else 'right'} of {pair}",
     )  # fmt: skip
 
 
-def _turned(nominal: Nominal, figure: Figure, side: str, poses: Sequence[Pose]) -> Figure:
+def _turned(nominal: Nominal, figure: Figure, side: str, poses: Sequence[Pose], pair: Pair) -> Figure:
     """Return a steady speed as the wheel's angle tells it."""
     encoder = "encoder1" if side == "motor1" else "encoder2"
     steps = wheel_steps(poses[-1], encoder) - wheel_steps(poses[0], encoder)
-    speed = steps * nominal.encoder_step_mm / ((poses[-1].t - poses[0].t) / NS_PER_S)
-    return replace(figure, what="the same by the wheels' angles", measured=speed)
+    span_s = (poses[-1].t - poses[0].t) / NS_PER_S
+    return replace(
+        figure, what=_by_angles(nominal), measured=steps * nominal.encoder_step_mm / span_s,
+        bound=nominal.way_bound(pair, figure.expected, span_s),
+    )  # fmt: skip
+
+
+def _by_angles(nominal: Nominal) -> str:
+    return "the same by the packets' odometry" if nominal.at_port else "the same by the wheels' angles"
 
 
 def _ramp_s(nominal: Nominal, before: Pair, pair: Pair) -> float:
@@ -220,7 +234,7 @@ def _kind_of_change(before: Pair, pair: Pair) -> str | None:
     return {left: "both wheels alike", -left: "turning on the spot"}.get(right)
 
 
-def _fit(record: RunRecord, begin: Nanos, end: Nanos) -> tuple[float, float] | None:
+def fitted_ramp(record: RunRecord, begin: Nanos, end: Nanos) -> tuple[float, float] | None:
     """Return the slope of the right wheel's ramp, mm/s2, and when it began, seconds; None: too few poses."""
     poses = poses_between(record, begin - NS_PER_S // 2, end)
     if not poses:

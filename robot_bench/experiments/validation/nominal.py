@@ -10,11 +10,14 @@ from dataclasses import dataclass
 from p2os.protocol.bauds import DEFAULT_BAUD
 from p2os.protocol.line_time import LineTime
 from p2os.protocol.times import CYCLE_NS
+from robot_bench.events.kinds import Pose
 from robot_bench.experiments.validation.figures import Bound
-from robot_bench.experiments.validation.signals import ENCODER_STEPS
+from robot_bench.experiments.validation.signals import ENCODER_STEPS, packets
+from robot_bench.recording.client_view import OdometryPose
 from robot_bench.recording.recorder import SAMPLE_NS
+from robot_bench.recording.run_record import RunRecord
 from robot_bench.scenario.scenario import Scenario
-from simbase.timing import NS_PER_S
+from simbase.timing import NS_PER_S, Nanos
 
 #: The line at the speed that robots begin with.
 LINE = LineTime(DEFAULT_BAUD)
@@ -32,6 +35,10 @@ TICK_S = 0.01
 PROGRAM_S = 1e-3
 #: chosen: by how much that differs from tick to tick: 3,600 cycles at 72 MHz.
 JITTER_S = 50e-6
+#: chosen: by how much one packet comes later than another, seconds.
+PACKET_JITTER_S = 0.05
+#: chosen: what the adapter's integers and a reader's floats may differ by over minutes, in steps of an encoder.
+ARITHMETIC_STEPS = 0.02
 #: The trace's resolution of a rim's speed, mm/s; the bodies hold what their motors want.
 BODY_MM_S = 1e-3
 #: Of a robot at a port only its packets are known: whole mm/s of a wheel, and a time that is that of a packet.
@@ -74,11 +81,22 @@ class Nominal:
         self.ramp_mm_s2 = (ramp or 0) / 1000 if self.is_direct else float(robot.motion.accel_mm_s2)
         turning = math.radians(robot.motion.rot_accel_deg_s2) * robot.track_mm / 2
         self.turn_ramp_mm_s2 = self.ramp_mm_s2 if self.is_direct else turning
+        motion = robot.max_velocity_mm_s, robot.max_rotation_deg_s
+        wanted = adapter.max_velocity_mm_s, adapter.max_rotation_deg_s
+        self._caps = [
+            math.inf if self.is_direct else float(ceiling if cap is None else min(cap, ceiling))
+            for cap, ceiling in zip(wanted, motion, strict=True)
+        ]
         self._distance_mm = robot.distance_nm_per_count / 1e6
         self._heading_mm = math.pi * robot.track_mm / robot.angle_counts_per_turn
+        #: Without a packet for so long the adapter gives the robot up, seconds.
+        self.liveness_s = adapter.liveness_ns / NS_PER_S
+        self._robot, self._profile = robot, scenario.controller.profile
         self._direct, self._adapter = scenario.direct, adapter
         #: From packet to packet, seconds: as the robot's FLASH has it.
         self.cycle_s = CYCLE_NS / NS_PER_S if at_port else scenario.controller.sip_period_ns / NS_PER_S
+        #: From pose to pose of a recording, seconds; at a port a packet tells one.
+        self.pose_s = self.cycle_s if at_port else POSE_S
         readings = scenario.controller.sonar_per_sip.pings_per_cycle or robot.sonar_fitted
         self._rounds = math.ceil(robot.sonar_fitted / readings)
 
@@ -87,25 +105,78 @@ class Nominal:
         """What the name of a delay ends with, whose size is another in each mode."""
         return ", direct" if self.is_direct else ", at a port" if self.at_port else ""
 
-    def forward_mm_s(self, pair: tuple[int, int]) -> float:
-        """Return the robot's speed for a pair of motor values, mm/s."""
-        return (pair[0] + pair[1]) / 2 * self.step_mm_s
+    def speeds(self, pair: tuple[int, int]) -> tuple[float, float]:
+        """Return mm/s forward and degrees/s to the left for a pair of motor values, both shrunk to the caps."""
+        forward, turn = self._asked(pair)
+        share = self._share(pair)
+        return forward * share, turn * share
 
-    def turn_deg_s(self, pair: tuple[int, int]) -> float:
-        """Return its turn to the left, degrees a second."""
-        return math.degrees((pair[1] - pair[0]) * self.step_mm_s / self.track_mm)
+    def rims_mm_s(self, pair: tuple[int, int]) -> tuple[float, float]:
+        """Return the speeds of both rims, left first."""
+        forward, turn = self.speeds(pair)
+        rim = math.radians(turn) * self.track_mm / 2
+        return forward - rim, forward + rim
 
-    @property
-    def speed_bound(self) -> Bound:
+    def _asked(self, pair: tuple[int, int]) -> tuple[float, float]:
+        left, right = pair
+        return (left + right) / 2 * self.step_mm_s, math.degrees((right - left) * self.step_mm_s / self.track_mm)
+
+    def _share(self, pair: tuple[int, int]) -> float:
+        """Return by which factor the caps of the adapter shrink both speeds: 1 within them, and in mode direct."""
+        asked = zip(self._asked(pair), self._caps, strict=True)
+        return min([1.0, *(cap / abs(value) for value, cap in asked if value)])
+
+    def rounding(self, pair: tuple[int, int]) -> tuple[tuple[float, str], tuple[float, str]]:
+        """Return by how much VEL and RVEL may be off, each with its formula; both are whole numbers.
+
+        Where a cap is reached, a whole number is shrunk by a ratio of whole numbers, and rounded towards zero.
+        """
+        if self._share(pair) == 1.0:
+            return (0.5, "VEL is whole mm/s: half of it"), (0.5, "RVEL is whole deg/s: half of it")
+        found = []
+        for value, other in zip(self.speeds(pair), reversed(self._asked(pair)), strict=True):
+            ratio = 0.5 * abs(value / other) if other else 0.0
+            found.append(
+                (1.5 + ratio, f"1 (towards zero) + 0.5 + 0.5 / {abs(other):.4g} x {abs(value):.4g} (the ratio)")
+            )
+        return found[0], found[1]
+
+    def speed_bound(self, pair: tuple[int, int]) -> Bound:
         """How far a steady rim speed may be off, mm/s."""
         seen, told = (PORT_MM_S, "of its packets") if self.at_port else (BODY_MM_S, "of the trace")
         if self.is_direct:
             return Bound(name="rim speed, direct", value=seen, formula=f"resolution {told} {seen:g} mm/s")
-        rim = math.radians(0.5) * self.track_mm / 2
+        (vel, _), (rvel, _) = self.rounding(pair)
+        rim = math.radians(rvel) * self.track_mm / 2
         return Bound(
-            name="rim speed" + ", at a port" * self.at_port, value=0.5 + rim + seen,
-            formula=f"0.5 mm/s (VEL is whole mm/s) + 0.5 deg/s x {self.track_mm / 2:g} mm (RVEL is whole deg/s)"
-            f" + resolution {told} {seen:g} mm/s = {0.5 + rim + seen:.3g} mm/s",
+            name="rim speed" + self._kind(pair), value=vel + rim + seen,
+            formula=f"{vel:.3g} mm/s (VEL is whole mm/s) + {rvel:.3g} deg/s x {self.track_mm / 2:g} mm (RVEL is whole"
+            f" deg/s) + resolution {told} {seen:g} mm/s = {vel + rim + seen:.3g} mm/s",
+        )  # fmt: skip
+
+    def rounding_bounds(self, pair: tuple[int, int]) -> tuple[Bound, Bound]:
+        """How far VEL and RVEL may be off."""
+        (vel, vel_formula), (rvel, rvel_formula) = self.rounding(pair)
+        return (
+            Bound(name="rounding of VEL" + self._kind(pair), value=vel, formula=vel_formula),
+            Bound(name="rounding of RVEL" + self._kind(pair), value=rvel, formula=rvel_formula),
+        )
+
+    def _kind(self, pair: tuple[int, int]) -> str:
+        return ", at a port" if self.at_port else ", at a cap" if self._share(pair) < 1.0 else ""
+
+    def way_bound(self, pair: tuple[int, int], mm_s: float, span_s: float) -> Bound:
+        """How far a steady rim speed may be off by the way of so many seconds, mm/s."""
+        speed = self.speed_bound(pair)
+        if not self.at_port:
+            return speed
+        counts = 2 * (math.sqrt(2) * self._distance_mm + self._heading_mm)
+        more = (counts + abs(mm_s) * PACKET_JITTER_S) / span_s
+        return Bound(
+            name="way in a time, at a port", value=speed.value + more,
+            formula=f"{speed.formula.partition(' = ')[0]} + (a count of x, of y and of heading at both ends"
+            f" {counts:.3g} mm + {abs(mm_s):g} mm/s x {PACKET_JITTER_S * 1000:g} ms that a packet may come late)"
+            f" / {span_s:.2f} s = {speed.value + more:.3g} mm/s",
         )  # fmt: skip
 
     def to_free_line(self, characters: int = PAIR_BYTES) -> Delay:
@@ -169,6 +240,23 @@ class Nominal:
         dwell_s = self._adapter.encoder_dwell_ns / NS_PER_S
         more = f", {walked} codes more x {dwell_s * 1000:g} ms" if walked else ""
         return Delay(seconds + walked * dwell_s, formula + more)
+
+    def packet_poses(self, record: RunRecord) -> list[Pose]:
+        """Return the poses that the robot's packets tell, each when its packet had arrived."""
+        odometry = OdometryPose(self._robot)
+        return [odometry.take(sip, t) for t, sip in packets(record, self._profile)]
+
+    def walk_ns(self, steps: float) -> Nanos:
+        """Return how long the pins walk through so many steps of an encoder after a packet, at most."""
+        return (math.ceil(steps) + 2) * self._adapter.encoder_dwell_ns
+
+    @property
+    def encoder_packet_bound(self) -> Bound:
+        """How far a code may be from what the robot's packets tell of its wheel, steps, where it has been walked to."""
+        return Bound(
+            name="encoder after a packet", value=0.5 + ARITHMETIC_STEPS,
+            formula=f"half a step + {ARITHMETIC_STEPS:g} steps of integer arithmetic",
+        )  # fmt: skip
 
     def encoder_bound(self, rim_mm_s: float) -> Bound:
         """How far the code on the pins may be from the wheel's angle, steps; the middle of a code is its angle."""

@@ -3,8 +3,17 @@
 from collections.abc import Mapping, Sequence
 
 from robot_bench.experiments.validation.figures import Bound, Figure, Finding, Missing, worst_or_missing
-from robot_bench.experiments.validation.nominal import POSE_S, PROGRAM_S, TICK_S, Nominal
-from robot_bench.experiments.validation.signals import distance_wires, motor_pairs, poses_between, seen_spans
+from robot_bench.experiments.validation.nominal import PORT_MM_S, PROGRAM_S, TICK_S, Nominal
+from robot_bench.experiments.validation.signals import (
+    at,
+    distance_wires,
+    driving_since,
+    motor_pairs,
+    packets,
+    poses_between,
+    seen_spans,
+    value_course,
+)
 from robot_bench.recording.run_record import RunRecord
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.scenario.world_script import Op
@@ -14,6 +23,8 @@ from simbase.timing import NS_PER_S, Nanos
 DEBOUNCE_TICKS = 2
 #: The code at which the sensors program drives.
 SPEED_CODE = 2
+#: chosen: so long after its beginning nothing is about, and the distances are told.
+SETTLED_NS = 3 * NS_PER_S
 #: chosen: a wheel slower than this stands, mm/s.
 STANDS_MM_S = 0.5
 
@@ -59,6 +70,59 @@ def sensor_figures(record: RunRecord, nominal: Nominal, scenario: Scenario) -> l
     ]  # fmt: skip
 
 
+def reading_figures(record: RunRecord, scenario: Scenario) -> list[Finding]:
+    """Return whether each distance pin says what the packets do: the last reading is nearer than the threshold, or not.
+
+    A reading stands on its pin in the instant in which its packet has arrived, and no pin changes at any other.
+    """
+    what = "readings in packets that stand on their pins"
+    begin = driving_since(record)
+    if begin is None:
+        return [Missing(group="pins", what=what, why="the adapter never drove the robot")]
+    courses = [value_course(record, (wire,)) for wire in distance_wires()]
+    brought: list[set[Nanos]] = [set() for _ in courses]
+    seen: list[set[bool]] = [set() for _ in courses]
+    right = total = 0
+    where = ""
+    for t, sip in packets(record, scenario.controller.profile):
+        for reading in sip.sonar if t >= begin else ():
+            if reading.number >= len(courses):
+                continue
+            is_near = reading.raw_range * scenario.parameters.range_um_per_count < scenario.threshold_um
+            brought[reading.number].add(t)
+            seen[reading.number].add(is_near)
+            total += 1
+            if at(courses[reading.number], t) == is_near:
+                right += 1
+            else:
+                where = where or f"sonar {reading.number + 1} at {t / NS_PER_S:.2f} s"
+    if not total:
+        return [Missing(group="pins", what=what, why="no packet brought a reading")]
+    alone = [
+        (t, number)
+        for number, (course, times) in enumerate(zip(courses, brought, strict=True), start=1)
+        for t, _ in course if t > begin and t not in times
+    ]  # fmt: skip
+    both = [number for number, levels in enumerate(seen, start=1) if len(levels) == 2]
+    found: list[Finding] = [
+        Figure(
+            group="pins", what=what, expected=total, measured=right, uncertainty=0, unit="", count=total, at=where,
+            bound=Bound(name="readings on pins", value=0, formula="each, when its packet has arrived"),
+        ),
+        Figure(
+            group="pins", what="changes of a distance pin without a reading", expected=0, measured=len(alone),
+            uncertainty=0, unit="", bound=Bound(name="changes of pins", value=0, formula="none"),
+            at=f"sonar {min(alone)[1]} at {min(alone)[0] / NS_PER_S:.2f} s" if alone else "",
+        ),
+    ]  # fmt: skip
+    return [*found, Figure(
+        group="pins", what="sonar that saw something within the threshold and beyond", expected=len(courses),
+        measured=len(both), uncertainty=0, unit="",
+        bound=Bound(name="sonar used", value=0, formula="all of them"),
+        at=", ".join(f"not {number + 1}" for number in range(len(courses)) if number + 1 not in both),
+    )]  # fmt: skip
+
+
 def things_before(scenario: Scenario) -> Mapping[int, list[tuple[Nanos, Nanos]]]:
     """Return when something stands nearer to each sonar than the threshold, by the file: number → (from, to)."""
     windows: dict[int, list[tuple[Nanos, Nanos]]] = {}
@@ -76,10 +140,10 @@ def things_before(scenario: Scenario) -> Mapping[int, list[tuple[Nanos, Nanos]]]
 
 def only_while_seen_figures(record: RunRecord, nominal: Nominal) -> list[Finding]:
     """Return how soon the program drives and stops after its pins, and that the robot moves at no other time."""
-    start = 3 * NS_PER_S
+    start = SETTLED_NS + ((driving_since(record) or 0) if nominal.at_port else 0)
     seen = seen_spans(record, distance_wires(), start)
     driven = [(t, pair != (0, 0)) for t, pair in motor_pairs(record) if t >= start]
-    edges = [(t, True) for t, _ in seen] + [(t, False) for _, t in seen if t < record.last_ns]
+    edges = [(t, True) for t, _ in seen if t > start] + [(t, False) for _, t in seen if t < record.last_ns]
     reaction = Bound(
         name="reaction of the program", value=DEBOUNCE_TICKS * TICK_S + PROGRAM_S,
         formula=f"{DEBOUNCE_TICKS} samples of {TICK_S * 1000:g} ms + {PROGRAM_S * 1000:g} ms of the program",
@@ -93,37 +157,43 @@ def only_while_seen_figures(record: RunRecord, nominal: Nominal) -> list[Finding
         for t, on in sorted(edges)
     ]  # fmt: skip
     what = "first sensor on, or last one off, to the motor pins"
-    return [worst_or_missing(figures, "pins", what, "no sensor saw anything"), *_standing(record, nominal, seen)]
+    return [worst_or_missing(figures, "pins", what, "no sensor saw anything"), *_standing(record, nominal, seen, start)]
 
 
-def _standing(record: RunRecord, nominal: Nominal, seen: Sequence[tuple[Nanos, Nanos]]) -> list[Finding]:
+def _standing(record: RunRecord, nominal: Nominal, seen: Sequence[tuple[Nanos, Nanos]], start: Nanos) -> list[Finding]:
     """Return how long the wheels turn after the last sensor went off, and how fast they are while nothing is seen."""
     delay = nominal.to_motion.seconds + DEBOUNCE_TICKS * TICK_S + PROGRAM_S
     ramp_s = SPEED_CODE * nominal.step_mm_s / nominal.ramp_mm_s2 if nominal.ramp_mm_s2 else 0.0
     stop = Bound(
-        name="time to stop" + nominal.suffix, value=delay + POSE_S,
-        formula=f"reaction and delay to the wheels {delay * 1000:.4g} ms + {POSE_S * 1000:g} ms between two poses",
+        name="time to stop" + nominal.suffix, value=delay + nominal.pose_s,
+        formula=f"reaction and delay to the wheels {delay * 1000:.4g} ms"
+        f" + {nominal.pose_s * 1000:g} ms between two poses",
     )  # fmt: skip
     stops: list[Figure] = []
     idle: list[Figure] = []
-    free_from = 3 * NS_PER_S
+    still = Bound(name="standing", value=0, formula="a wheel that is told to stand does not turn")
+    if nominal.at_port:
+        still = Bound(
+            name="standing, at a port", value=PORT_MM_S, formula=f"resolution of its packets {PORT_MM_S:g} mm/s"
+        )
+    free_from = start
     for begin, end in [*seen, (record.last_ns, record.last_ns)]:
         idle += [
             Figure(
                 group="motion", what="rim speed while nothing is seen", expected=0.0,
                 measured=max(abs(pose.left), abs(pose.right)) / 1000, uncertainty=1e-3, unit="mm/s",
-                bound=Bound(name="standing", value=0, formula="a wheel that is told to stand does not turn"),
+                bound=still,
                 at=f"{pose.t / NS_PER_S:.2f} s",
             )
             for pose in poses_between(record, free_from, begin)
         ]  # fmt: skip
-        free_from = end + round((ramp_s + delay + POSE_S) * NS_PER_S)
+        free_from = end + round((ramp_s + delay + nominal.pose_s) * NS_PER_S)
         after = poses_between(record, end, min(free_from + NS_PER_S, record.last_ns))
         moving = [pose.t for pose in after if max(abs(pose.left), abs(pose.right)) / 1000 > STANDS_MM_S]
         if end < record.last_ns and after:
             stops.append(Figure(
                 group="motion", what="last sensor off to standing", expected=ramp_s,
-                measured=(max(moving, default=end) - end) / NS_PER_S, uncertainty=POSE_S, unit="s", bound=stop,
+                measured=(max(moving, default=end) - end) / NS_PER_S, uncertainty=nominal.pose_s, unit="s", bound=stop,
                 at=f"{end / NS_PER_S:.3f} s",
             ))  # fmt: skip
     return [

@@ -14,9 +14,11 @@ from typing import TypeAlias, TypeVar
 
 from adapter_sim.codec import motor_value
 from adapter_sim.pinout import WireRole, load_pinout
-from p2os.errors import LocalProtocolError
+from p2os.errors import LocalProtocolError, RemoteProtocolError
 from p2os.protocol.commands import Command
 from p2os.protocol.frames import Frame
+from p2os.protocol.profiles import Profile
+from p2os.protocol.sip import SIP_KINDS, StandardSip
 from robot_bench.events.kinds import MICRO, Pose
 from robot_bench.recording.run_record import RunRecord
 from robot_bench.scenario.goals.signals import SKEW_NS
@@ -74,8 +76,10 @@ def distance_wires() -> tuple[str, ...]:
 
 
 def seen_spans(record: RunRecord, wires: Sequence[str], start: Nanos) -> list[tuple[Nanos, Nanos]]:
-    """Return when at least one of the wires was high, from `start` on: (from, to)."""
-    course = [(t, value) for t, value in value_course(record, wires) if t >= start]
+    """Return when at least one of the wires was high: (from, to); what was high at `start` is from then."""
+    whole = value_course(record, wires)
+    before = [(start, value) for value in [at(whole, start)] if value is not None]
+    course = [*before, *((t, value) for t, value in whole if t > start)]
     spans: list[tuple[Nanos, Nanos]] = []
     begin: Nanos | None = None
     for t, value in course:
@@ -100,6 +104,26 @@ def sent(record: RunRecord, number: int) -> Course[int]:
         if command.number == number and isinstance(command.argument, int):
             found.append((packet.t, command.argument))
     return found
+
+
+def packets(record: RunRecord, profile: Profile) -> Course[StandardSip]:
+    """Return the standard packets of the robot, each with the time at which it had arrived."""
+    found = Course[StandardSip]()
+    for packet in record.wire:
+        if packet.direction != "r2c":
+            continue
+        try:
+            frame = Frame.from_bytes(packet.data)
+            if frame.kind in SIP_KINDS:
+                found.append((packet.t, StandardSip.from_frame(frame, profile)))
+        except (LocalProtocolError, RemoteProtocolError):  # a noisy line
+            continue
+    return found
+
+
+def driving_since(record: RunRecord) -> Nanos | None:
+    """Return when the adapter began to drive the robot, by its state log; None: it never did, or there is none."""
+    return next((note.t for note in record.events if note.who == "adapter" and note.what == "driving"), None)
 
 
 def at(course: Course[T], t: Nanos) -> T | None:

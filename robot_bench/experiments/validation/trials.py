@@ -11,14 +11,16 @@ from typing import cast
 from p2os.pioneer.body.factory import installed_bodies
 from robot_bench.bench import Bench
 from robot_bench.events.codec import Json
-from robot_bench.experiments.validation.experiments import AT_PORT, Experiment, Trial
+from robot_bench.experiments.validation.experiments import AtPort, Experiment, Trial
 from robot_bench.experiments.validation.figures import Finding, Missing
 from robot_bench.experiments.validation.nominal import Nominal
-from robot_bench.recording.run_record import read_run
+from robot_bench.experiments.validation.signals import driving_since
+from robot_bench.recording.run_record import RunRecord, read_run
 from robot_bench.run import RunResult, write_run
 from robot_bench.scenario.goals.judging import Judgement
 from robot_bench.scenario.included_files import Setting
 from robot_bench.scenario.scenario import Scenario
+from simbase.errors import UsageError
 from simbase.timing import NS_PER_S
 
 
@@ -98,9 +100,12 @@ def refuse(
 
     Raises:
         ScenarioError: A setting or a file cannot be.
-        UsageError: There is no such body or world.
+        UsageError: There is no such body or world, or an experiment shows nothing in the modes.
     """
     for experiment in experiments:
+        if chosen and experiment.modes and not {variant.mode for variant in chosen} & set(experiment.modes):
+            hint = " or ".join(f"--mode {mode}" for mode in experiment.modes)
+            raise UsageError(f"{experiment.name} shows nothing in mode {chosen[0].mode}", hint=hint)
         scenario = experiment.load(settings)
         for variant in chosen:
             for world in worlds if experiment.worlds else ():
@@ -155,9 +160,9 @@ def _runs(
     """Return all runs, experiments of one scenario together."""
     groups: dict[object, list[Experiment]] = {}
     for one in experiments:
-        groups.setdefault((one.scenario, one.settings, one.worlds, one.seeds), []).append(one)
+        groups.setdefault((one.scenario, one.settings, one.worlds, one.seeds, one.modes), []).append(one)
     for group in groups.values():
-        for variant in chosen:
+        for variant in (one for one in chosen if not group[0].modes or one.mode in group[0].modes):
             for world in (worlds or group[0].worlds) if group[0].worlds else (None,):
                 for seed in group[0].seeds if seeds is None else seeds:
                     yield _Run(tuple(group), variant, world, seed)
@@ -228,44 +233,84 @@ def told(result: Result) -> list[str]:
     return lines
 
 
+@dataclass(frozen=True, slots=True)
+class PortRun:
+    """One run at a port, the experiments that look at it, and what a person sees to before it."""
+
+    experiments: tuple[Experiment, ...]
+    scenario: Scenario
+    room: str
+
+
+def port_runs(experiments: Sequence[Experiment], settings: Sequence[Setting] = ()) -> list[PortRun]:
+    """Return the runs that a robot at a port does; experiments of one scenario share one, others are left out.
+
+    Raises:
+        ScenarioError, UsageError: A setting cannot be.
+    """
+    groups: dict[str, list[Experiment]] = {}
+    for one in experiments:
+        if isinstance(one.at_port, AtPort):
+            groups.setdefault(one.at_port.scenario or one.scenario, []).append(one)
+    return [
+        PortRun(tuple(group), group[0].load_at_port(settings), cast("AtPort", group[0].at_port).room)
+        for group in groups.values()
+    ]
+
+
 def run_port(
-    experiments: Sequence[Experiment],
-    drive: Callable[[Experiment, Scenario, Path], RunResult],
+    runs: Sequence[PortRun],
+    drive: Callable[[PortRun, Path], RunResult],
     folder: Path,
     *,
     settings: Sequence[Setting] = (),
 ) -> list[Result]:
-    """Run the experiments that a robot at a port can do, in real time, one after the other.
+    """Run what a robot at a port can do, in real time, one after the other.
 
     Args:
-        experiments: Those that cannot be done there are passed over.
+        runs: As `port_runs` returns them.
         drive: Runs one into a folder, with the robot stopped when it returns.
         folder: Each run goes into a folder below it.
-        settings: Set otherwise in what is run.
+        settings: As of `port_runs`; of them the robot alone is expected.
 
     Raises:
         KeyboardInterrupt: A signal came.
         P2osError: The line cannot be opened, or a folder is not free.
     """
-    results = []
-    for experiment in experiments:
-        if not experiment.at_port:
-            continue
-        place = folder / experiment.name
-        ran = drive(experiment, experiment.load([*AT_PORT, *settings]).with_options(mode="adapter"), place)
+    results: list[Result] = []
+    robot = [setting for setting in settings if setting[0] == "robot"]
+    for run in runs:
+        place = folder / run.experiments[0].name
+        ran = drive(run, place)
         if ran.was_interrupted:
             raise KeyboardInterrupt
-        expected = experiment.load(AT_PORT).with_options(mode="adapter")
-        trial = Trial(
-            record=read_run(place), nominal=Nominal(expected, at_port=True), scenario=expected,
-            judgement=Judgement([], [], []),
+        record = read_run(place)
+        judgement = Judgement(
+            cast("list[str]", ran.outcome["goals_met"]), cast("list[str]", ran.outcome["failures"]),
+            cast("list[str]", ran.outcome.get("goals_not_judged") or []),
         )  # fmt: skip
-        found = tuple(experiment.measure(trial))
-        run = _Run((experiment,), PORT, None, 0)
-        results.append(replace(_result(experiment, run, found), folder=str(place)))
+        for experiment in run.experiments:
+            expected = experiment.load_at_port(robot)
+            trial = Trial(
+                record=record, nominal=Nominal(expected, at_port=True), scenario=expected, judgement=judgement
+            )
+            found = tuple(experiment.measure_at_port(trial))
+            if why := _cut_short(record, run, judgement):
+                found = (Missing(group="pins", what="the run", why=why),)
+            one = _Run((experiment,), PORT, None, 0)
+            results.append(replace(_result(experiment, one, found), folder=str(place)))
     return results
 
 
-def longest_s(experiments: Sequence[Experiment]) -> float:
-    """Return how long experiments take at a port, seconds."""
-    return sum(one.load(AT_PORT).duration_ns for one in experiments if one.at_port) / NS_PER_S
+def _cut_short(record: RunRecord, run: PortRun, judgement: Judgement) -> str:
+    """Return why a run at a port shows nothing; empty where it does."""
+    if record.last_ns < run.scenario.duration_ns - NS_PER_S:
+        return judgement.missed[0] if judgement.missed else "it was cut short"
+    if driving_since(record) is None:
+        return "the robot opened no session, or its odometry never came"
+    return ""
+
+
+def longest_s(runs: Sequence[PortRun]) -> float:
+    """Return how long runs at a port take, seconds."""
+    return sum(run.scenario.duration_ns for run in runs) / NS_PER_S

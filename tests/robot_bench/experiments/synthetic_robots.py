@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from p2os.robots.parameters import RobotParameters
-from robot_bench.experiments.drives import Drive, Trajectory, steps_of
+from robot_bench.drives.drive import Drive, Trajectory, steps_of
 
 STEP_S = 0.001
 STEPS_A_SECOND = 1000

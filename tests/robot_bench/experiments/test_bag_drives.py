@@ -16,8 +16,8 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from p2os.cli.main import run as p2os
 from p2os.robots.parameters import load_parameters
+from robot_bench.drives.drive import Drive
 from robot_bench.experiments.drive_files import read_drive
-from robot_bench.experiments.drives import Drive
 from simbase.errors import FileError
 
 P2DX = load_parameters("p2dx")

@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 
 from p2os.capture import read_file, write_pcap
 from p2os.robots.parameters import load_parameters
+from robot_bench.drives.drive import Drive, Steps, Trajectory
+from robot_bench.drives.onsets import onset_after
 from robot_bench.experiments.alignment import (
     first_pose,
     least_squares_pose,
@@ -20,8 +22,6 @@ from robot_bench.experiments.alignment import (
 )
 from robot_bench.experiments.comparison import How, compare
 from robot_bench.experiments.drive_files import read_drive, read_tum, write_tum
-from robot_bench.experiments.drives import Drive, Steps, Trajectory
-from robot_bench.experiments.onsets import onset_after
 from robot_bench.experiments.parting import motion_parts_s, origin, parts
 from robot_bench.experiments.trajectory_errors import Statistics, absolute_errors, relative_errors
 from simbase.errors import FileError, UsageError

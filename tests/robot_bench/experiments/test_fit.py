@@ -12,8 +12,10 @@ import pytest
 from p2os.pioneer.sensor_errors import load_sensor_errors
 from p2os.pioneer.world import load_world
 from p2os.robots.parameters import load_parameters
-from robot_bench.experiments.drive_files import drive_of_capture, read_drive
-from robot_bench.experiments.drives import Drive, Steps, Trajectory
+from robot_bench.drives.drive import Drive, Steps, Trajectory
+from robot_bench.drives.of_packets import drive_of_capture
+from robot_bench.experiments.drive_files import read_drive
+from robot_bench.experiments.fitting.clocks import on_one_clock, without_delays
 from robot_bench.experiments.fitting.examples import Recorded, empty_world, planted, record, square, wandering, write
 from robot_bench.experiments.fitting.least_squares import Parameter, fit
 from robot_bench.experiments.fitting.ramps import fit_ramps, ramped
@@ -48,6 +50,36 @@ def test_planted_errors_come_back_near_to_their_intervals(seed: int) -> None:
         assert found.unseen == {}
         for name, one in found.estimates.items():
             assert abs(one.value - truth_of(robot, name)) < 2.5 * one.half_width, name
+
+
+@pytest.mark.parametrize("seed", [1000])
+def test_poses_on_other_clocks_give_the_same_wheels_and_sonar_and_no_delays(seed: int) -> None:
+    source = random.Random(seed)
+    robot = Planted.drawn(source)
+    driven = [drive(P2DX, robot, source, 40.0) for _ in range(2)]
+    for one, shift_s in zip(driven, (-1000.0, 37.0), strict=True):
+        one.truth = one.truth.later(shift_s)
+    found, why = on_one_clock(driven)
+    assert "by 1000.0" in why
+    assert "by -3" in why
+    for fitted, lost in ((fit_wheels(found), "packet_delay_s"), (fit_sonar(found, WALLS), "sonar_delay_s")):
+        seen_now = without_delays(fitted, why)
+        assert seen_now.unseen == {lost: why}
+        assert len(seen_now.estimates) == len(fitted.estimates) - 1
+        for name, one in seen_now.estimates.items():
+            assert abs(one.value - truth_of(robot, name)) < 3 * one.half_width, name
+
+
+@pytest.mark.parametrize(("late_s", "is_moved"), [(-0.15, True), (-0.05, False), (0.45, False), (0.55, True)])
+def test_a_shift_that_packets_can_have_is_a_delay_and_no_other_clock(late_s: float, is_moved: bool) -> None:
+    source = random.Random(3)
+    robot = Planted.drawn(source)
+    driven = drive(P2DX, robot, source, 20.0)
+    driven.truth = driven.truth.later(robot.packet_delay_s - late_s)
+    (found,), why = on_one_clock([driven])
+    assert bool(why) is is_moved
+    assert (found.truth is not driven.truth) is is_moved
+    assert fit_wheels([driven]).estimates["packet_delay_s"].value == pytest.approx(late_s, abs=0.01)
 
 
 @pytest.mark.slow

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +13,16 @@ from p2os.protocol.line_time import LineTime
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import SonarReading, StandardSip
 from p2os.robots.parameters import load_parameters
+from robot_bench.drives.drive import Drive, Steps, Trajectory, steps_of
+from robot_bench.drives.latency_budget import STEPS, WHOLE, latency_budget
+from robot_bench.drives.metrics import metrics
+from robot_bench.drives.of_packets import spread_s
+from robot_bench.drives.of_run import trajectory_of
 from robot_bench.events.kinds import Clearance, Contact, Packet, Pose, Verdict
-from robot_bench.experiments.drive_files import read_drive, spread_s, trajectory_of
-from robot_bench.experiments.drives import Drive, Steps, Trajectory, steps_of
-from robot_bench.experiments.latency_budget import STEPS, WHOLE, latency_budget
-from robot_bench.experiments.metrics import metrics
+from robot_bench.experiments.drive_files import read_drive
+from robot_bench.recording.run_record import read_run
+from robot_bench.report.measures import BARS, HEIGHT
+from robot_bench.report.page import page_data, render_page
 
 P2DX = load_parameters("p2dx")
 
@@ -169,3 +175,34 @@ def test_what_cannot_be_measured_is_told_in_one_line(words: list[str], says: str
     errors = capsys.readouterr().err
     assert says in errors
     assert "Traceback" not in errors
+
+
+def test_the_page_of_a_run_has_the_figures_and_the_distributions_of_its_latencies(runs: Path) -> None:
+    record = read_run(runs / "near")
+    found = metrics(read_drive(runs / "near"))
+    page = render_page(record, page_data(record))
+    assert f"<td>way</td><td>{found.path_m:.2f} m</td>" in page
+    assert f"<td>work at the rims</td><td>{found.energy_j:.1f} J</td>" in page
+    section = page[page.index('class="latency"') : page.index("USART1")]
+    rows = [row for row in section.split("<tr>") if "<svg" in row]
+    assert [row.partition("<td>")[2].partition("</td>")[0] for row in rows] == [*STEPS, WHOLE]
+    for name, row in zip((*STEPS, WHOLE), rows, strict=True):
+        times = 1000 * found.latency.of(name)
+        assert f"<td>{len(times)}</td><td>{np.median(times):.2f}</td>" in row
+        heights = [float(text) for text in re.findall(r'<rect [^>]*height="([0-9.]+)"', row)]
+        assert max(heights) == HEIGHT
+        counts = np.histogram(np.minimum(times, 399.999), BARS, (0, _scale_ms(section)))[0]
+        assert heights == pytest.approx([HEIGHT * count / max(counts) for count in counts if count], abs=0.06)
+
+
+def _scale_ms(section: str) -> int:
+    return 50 * (int(max(float(text) for text in re.findall(r"greatest ([0-9.]+) ms", section))) // 50 + 1)
+
+
+def test_a_run_that_was_cut_before_it_had_two_poses_has_a_page_without_figures(runs: Path) -> None:
+    record = read_run(runs / "near")
+    record.poses = record.poses[:1]
+    record.wire = []
+    page = render_page(record, page_data(record))
+    assert "Latency of the loop" not in page
+    assert "State log" in page

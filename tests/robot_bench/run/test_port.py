@@ -3,6 +3,7 @@
 import contextlib
 import io
 import json
+import math
 import os
 import pty
 import re
@@ -202,6 +203,24 @@ def test_odometry_wraps_without_a_jump() -> None:
     assert (told.t, told.x) == (7, 11 * 840)
     assert (told.heading, told.left, told.right) == (-1_570_796, 100_000, -5_000)
     assert pose.distance_m == pytest.approx(0.00924)
+
+
+@pytest.mark.parametrize("turned", [0, 2048])
+def test_the_wheels_angles_follow_from_the_packets_over_wraps_and_arcs(turned: int) -> None:
+    """A metre back, straight or along a half circle whose rims differ by pi tracks."""
+    parameters = load_parameters("p2dx")
+    pose = OdometryPose(parameters)
+    steps, x_mm, y_mm, heading = 500, 0.0, 0.0, 0.0
+    for _ in range(steps + 1):
+        raw = [round(mm / 0.84) % 32768 for mm in (x_mm, y_mm)]
+        told = pose.take(StandardSip(raw_x=raw[0], raw_y=raw[1], raw_heading=round(heading) % 4096), 0)
+        middle = (heading + turned / steps / 2) / 4096 * 2 * math.pi
+        x_mm, y_mm = x_mm - 2 * math.cos(middle), y_mm - 2 * math.sin(middle)
+        heading += turned / steps
+    rim_m = math.pi * parameters.track_mm / 2000 if turned else 0.0
+    radius_m = parameters.body.wheel_diameter_m / 2
+    assert told.left_angle / 1e6 * radius_m == pytest.approx(-1.0 - rim_m, abs=0.004)
+    assert told.right_angle / 1e6 * radius_m == pytest.approx(-1.0 + rim_m, abs=0.004)
 
 
 @pytest.fixture(params=["tcp"])

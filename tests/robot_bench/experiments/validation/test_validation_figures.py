@@ -120,7 +120,7 @@ def test_a_span_lasts_while_any_of_the_wires_is_high() -> None:
         (40 * MS, {"DD2": 0}), (50 * MS, {"DD1": 1}),
     ])  # fmt: skip
     assert seen_spans(record, ("DD1", "DD2"), 0) == [(10 * MS, 40 * MS), (50 * MS, 50 * MS)]
-    assert seen_spans(record, ("DD1", "DD2"), 15 * MS) == [(20 * MS, 40 * MS), (50 * MS, 50 * MS)]
+    assert seen_spans(record, ("DD1", "DD2"), 15 * MS) == [(15 * MS, 40 * MS), (50 * MS, 50 * MS)]
 
 
 def test_commands_are_read_with_their_signs_and_noise_is_passed_over() -> None:

@@ -25,10 +25,11 @@ from p2os.protocol.frames import Frame
 from p2os.protocol.line_time import LineTime
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import SIP_KINDS, StandardSip
+from robot_bench.drives.drive import Drive, Floats
+from robot_bench.drives.of_packets import spread_s
+from robot_bench.drives.onsets import SPEED_COMMANDS, answers, changes
+from robot_bench.events.codec import Json
 from robot_bench.events.kinds import Packet
-from robot_bench.experiments.drive_files import spread_s
-from robot_bench.experiments.drives import Drive, Floats
-from robot_bench.experiments.onsets import SPEED_COMMANDS, answers, changes
 from simbase.timing import NS_PER_S
 
 #: chosen: later than this a change answers something else, seconds.
@@ -51,6 +52,15 @@ class Budget:
     def of(self, name: str) -> Floats:
         """Return the times of a step, seconds."""
         return np.array(self.steps[name], dtype=np.float64)
+
+
+def quantiles(values: Floats) -> Json:
+    """Return how values are distributed, for JSON; all None where there are none."""
+    names = ("median", "p90", "p99", "max")
+    if not len(values):
+        return {"count": 0, **dict.fromkeys(names)}
+    found = np.quantile(values, (0.5, 0.9, 0.99, 1.0))
+    return {"count": len(values), **{name: float(value) for name, value in zip(names, found, strict=True)}}
 
 
 @dataclass(frozen=True, slots=True)

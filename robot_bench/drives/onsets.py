@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robot_bench.experiments.drives import Drive, Floats, Steps
+from robot_bench.drives.drive import Drive, Floats, Steps
 
 #: chosen: a speed that differs by more has begun to change, m/s: above the wire's grain of 1 mm/s.
 CHANGED_MPS = 0.005

@@ -14,15 +14,31 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from robot_bench.drives.drive import Drive, Floats
+from robot_bench.drives.latency_budget import STEPS, WHOLE, Budget, latency_budget, quantiles
 from robot_bench.events.codec import Json
 from robot_bench.events.kinds import Clearance, Contact, Pose, Verdict
-from robot_bench.experiments.comparison import quantiles
-from robot_bench.experiments.drives import Drive, Floats
-from robot_bench.experiments.latency_budget import STEPS, WHOLE, Budget, latency_budget
 from simbase.timing import NS_PER_S
 
 #: chosen: slower is a stand, m/s; as the events `robot moves` and `robot stops` have it.
 STILL_MPS = 0.005
+#: Figure → what it is, unit, decimals.
+SHOWN: dict[str, tuple[str, str, int]] = {
+    "span_s": ("time", "s", 1),
+    "path_m": ("way", "m", 2),
+    "turned_deg": ("turned", "deg", 0),
+    "mean_mps": ("mean speed", "m/s", 3),
+    "max_mps": ("top speed", "m/s", 3),
+    "standing_share": ("standing, of the time", "", 3),
+    "mean_square_jerk_m2_s6": ("mean square jerk", "m²/s⁶", 3),
+    "log_dimensionless_jerk": ("log dimensionless jerk", "", 2),
+    "max_rim_mps2": ("a rim's greatest acceleration", "m/s²", 2),
+    "clearance_m": ("least clearance", "m", 3),
+    "contacts": ("contacts", "", 0),
+    "energy_j": ("work at the rims", "J", 1),
+    "energy_j_per_m": ("work a metre", "J/m", 2),
+    "time_to_goal_s": ("all goals met at", "s", 2),
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
