@@ -12,13 +12,23 @@ from typing import Any
 import pytest
 
 from p2os.errors import ScenarioError
-from robot_bench.campaign.campaign_file import DRAW, TOP, Campaign, Limits, campaign_schema, load_campaign
+from robot_bench.campaign.campaign_file import (
+    DRAW,
+    TOP,
+    Campaign,
+    Limits,
+    campaign_schema,
+    load_campaign,
+    parse_campaign,
+)
 from robot_bench.campaign.conduct import Conduct, Finding
 from robot_bench.campaign.page import _short
 from robot_bench.campaign.search import SEARCHES, Answer, Problem
+from robot_bench.campaign.suggestion import suggested
 from robot_bench.campaign.trial import GoalResult, Outcome, Trial, Verdict, run_trial, trial_of
 from robot_bench.campaign.whole import Whole, begin, carry_out, resume
 from robot_bench.campaign.workers.processes import Processes
+from robot_bench.scenario.scenario import known_scenarios, load_scenario
 from simbase.errors import FileError, UsageError
 
 FILE = """
@@ -248,6 +258,18 @@ def test_the_schema_has_every_key_that_the_loader_takes() -> None:
     assert set(properties["draw"]["items"]["properties"]) == {key.name for key in DRAW}
     assert schema["required"] == ["scenario"]
     json.dumps(schema)
+
+
+@pytest.mark.parametrize("name", known_scenarios())
+def test_what_new_writes_for_each_scenario_can_be_begun(name: str, tmp_path: Path) -> None:
+    """A program that carries out a list keeps its goals and its start; one that roams meets things."""
+    campaign = parse_campaign(suggested(load_scenario(name), name, "mine.toml"), tmp_path / "mine.toml")
+    is_list = name in {"encoders", "motors", "rover", "sensors"}
+    kinds = [goal["kind"] for goal in campaign.trial.table["goal"]]  # type: ignore[attr-defined]  # a list of tables
+    assert bool(campaign.draws) is not is_list
+    assert ("moves_on" in kinds) is not is_list
+    assert ("crystal_ppm" in campaign.vary) is is_list
+    assert ("controller.errors" in campaign.vary) is (is_list and name != "rover"), "a robot on own pins has none"
 
 
 def test_a_folder_that_is_taken_and_one_that_is_none_are_refused(tmp_path: Path) -> None:
