@@ -41,7 +41,7 @@ near_misses = 0
 free_m = 0.4
 [budget]
 runs = {runs}
-confirmations = {runs}
+confirmations = {confirmations}
 [cheap]
 mode = "direct"
 body = "kinematic"
@@ -134,15 +134,19 @@ speed_mps = { from = 0.1, to = 0.5 }
         + TOUCHES_NOTHING,
     ),
 }  # fmt: skip
+#: Runs in full that a search may spend until its first failure: of those that fail cheaply one in ten does not in full.
+CONFIRMED = 2
 CHOSEN = ("random", "cma-es", "quality-diversity")
 
 
-def conduct(case: Case, firmware: Path, search: str, seed: int, runs: int, folder: Path) -> Conduct:
+def conduct(
+    case: Case, firmware: Path, search: str, seed: int, *, runs: int, confirmations: int, folder: Path
+) -> Conduct:
     """Return the campaign of a case, about to begin."""
     (folder / "floor.toml").write_text(WORLD, encoding="utf-8")
     scenario = f'extends = "dodge"\nworld = "floor.toml"\nduration_s = {case.duration_s}\n'
     (folder / "floor-dodge.toml").write_text(scenario, encoding="utf-8")
-    text = f'search = "{search}"\nseed = {seed}\n{CAMPAIGN.format(runs=runs)}{case.tables}'
+    text = f'search = "{search}"\nseed = {seed}\n{CAMPAIGN.format(runs=runs, confirmations=confirmations)}{case.tables}'
     campaign = parse_campaign(text, folder / "case.toml", firmware=firmware)
     workers: Workers = Processes(1, Limits())
     if case.is_compared:
@@ -153,7 +157,8 @@ def conduct(case: Case, firmware: Path, search: str, seed: int, runs: int, folde
 def tried(case: Case, firmware: Path, search: str, seed: int, runs: int, *, to_the_end: bool) -> tuple[int | None, str]:
     """Return at which point a search found its first failure, None where it did not, and what is said of the rest."""
     with tempfile.TemporaryDirectory() as scratch:
-        work = conduct(case, firmware, search, seed, runs, Path(scratch))
+        confirmations = runs if to_the_end else CONFIRMED
+        work = conduct(case, firmware, search, seed, runs=runs, confirmations=confirmations, folder=Path(scratch))
         for _ in work.batches():
             if work.progress.failures and not to_the_end:
                 break

@@ -9,7 +9,7 @@ import pytest
 
 from robot_bench.campaign.campaign_file import Limits
 from robot_bench.campaign.trial import Outcome, Trial, Verdict, bench_of, run_trial, trial_of, unpacked
-from robot_bench.campaign.workers.beginnings import EACH_NS, LEAST_NS, MOST_KEPT, Beginnings, Saved, Task, Work
+from robot_bench.campaign.workers.beginnings import EACH_NS, LEAST_NS, MOST_KEPT, Beginnings, Saved, Task, Work, Worked
 from robot_bench.campaign.workers.processes import Processes
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S
@@ -37,7 +37,7 @@ class Counted:
     def __init__(self) -> None:
         self.works: list[Work] = []
 
-    def __call__(self, works: Sequence[Work], on_worked: Callable[[int, tuple[object, float]], None]) -> None:
+    def __call__(self, works: Sequence[Work], on_worked: Callable[[int, Worked], None]) -> None:
         self.works += works
         for place, work in enumerate(works):
             on_worked(place, (work(lambda: None), 1.0))

@@ -269,7 +269,6 @@ def test_what_new_writes_for_each_scenario_can_be_begun(name: str, tmp_path: Pat
     assert bool(campaign.draws) is not is_list
     assert ("moves_on" in kinds) is not is_list
     assert ("crystal_ppm" in campaign.vary) is is_list
-    assert ("controller.errors" in campaign.vary) is (is_list and name != "rover"), "a robot on own pins has none"
 
 
 def test_a_folder_that_is_taken_and_one_that_is_none_are_refused(tmp_path: Path) -> None:
