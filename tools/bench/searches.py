@@ -177,7 +177,7 @@ def main() -> None:
     parser.add_argument("--case", choices=list(CASES), action="append")
     parser.add_argument("--search", choices=list(SEARCHES), action="append")
     parser.add_argument("--repeat", type=int, default=5)
-    parser.add_argument("--runs", type=int, default=64)
+    parser.add_argument("--runs", type=int, default=40)
     parser.add_argument("--first", type=int, default=1)
     parser.add_argument("--all", action="store_true")
     given = parser.parse_args()
