@@ -134,8 +134,9 @@ speed_mps = { from = 0.1, to = 0.5 }
         + TOUCHES_NOTHING,
     ),
 }  # fmt: skip
-#: Runs in full that a search may spend until its first failure: of those that fail cheaply one in ten does not in full.
-CONFIRMED = 2
+#: chosen: runs in full that a search may spend until its first failure. A walker that is met cheaply may be missed in
+#: full, where the robot is half a second later.
+CONFIRMED = 8
 CHOSEN = ("random", "cma-es", "quality-diversity")
 
 
