@@ -64,7 +64,7 @@ ALLOWED = {
     "robot_bench.cli.pytest_plugin": {"p2os", "bluepill_sim", "pytest"},
     "robot_bench.campaign.variants.mutation.suite": {"bluepill_sim", "pytest"},
     "robot_bench.campaign.results": {"pyarrow"},
-    "robot_bench.campaign.dask_workers": {"p2os", "distributed"},
+    "robot_bench.campaign.workers.dask_workers": {"p2os", "distributed"},
 }
 
 #: The I/O layer: what may read a clock, open a port or start a thread.
@@ -74,7 +74,7 @@ IO_LAYER = (
     "p2os.pioneer.serve.control_line", "p2os.client.robot_thread", "p2os.client.aio", "simbase.interrupts",
     "p2os.ros.zenoh_node",
     "bluepill_sim.cli", "bluepill_sim.cli.console",
-    "robot_bench.cli", "robot_bench.campaign.processes", "robot_bench.campaign.dask_workers",
+    "robot_bench.cli", "robot_bench.campaign.workers",
     "robot_bench.campaign.variants.shrinking.kept", "robot_bench.running.forks", "robot_bench.running.pacer",
     "robot_bench.live", "robot_bench.report", "robot_bench.firmware.build",
 )  # fmt: skip

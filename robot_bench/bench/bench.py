@@ -52,7 +52,7 @@ from robot_bench.bench.board import (
     plug_in,
 )
 from robot_bench.bench.far_end import make_far_end
-from robot_bench.bench.origin import VERSION, origin_of, refuse_others
+from robot_bench.bench.origin import LATER, VERSION, origin_of, refuse_others
 from robot_bench.bench.waiting import EventWait
 from robot_bench.direct.differential.robot import DifferentialRobot
 from robot_bench.direct.senses import WorldSenses
@@ -765,6 +765,26 @@ class Bench(Stateful):
             self.restore_own(snapshot)
         else:
             self._shared.restore(snapshot)
+
+    def begin_as(self, snapshot: PartState, now: Nanos) -> None:
+        """Put back what the bench of another scenario saved, which is the same as this one but for what comes later.
+
+        Args:
+            snapshot: As of `snapshot`.
+            now: When it was taken. Things that come later, and faults, are this bench's own.
+
+        Raises:
+            UsageError: It has several robots; or up to that time the two are not the same.
+        """
+        if self._shared is not None:
+            raise UsageError("robots that share a world begin at the beginning", hint="run it anew")
+        made_of = cast("dict[str, object]", snapshot["made_of"])
+        refuse_others({what: value for what, value in made_of.items() if what not in LATER}, self.made_of)
+        script, faults = (
+            timeline.begun_as(cast("PartState", snapshot[name]), now)
+            for name, timeline in (("script", self.script), ("faults", self.faults))
+        )
+        self.restore(PartState(snapshot, made_of=self.made_of, script=script, faults=faults))
 
     def restore_own(self, snapshot: object) -> None:
         """Put back what `own_snapshot` returned, as `restore` asks for it."""

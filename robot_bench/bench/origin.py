@@ -21,6 +21,8 @@ DECISIVE = (
     "adapter_core", "controller", "controller_kind", "changes", "faults", "whens", "own_robot", "parts", "record",
     "sram", "crystal_ppm",
 )  # fmt: skip
+#: Of these, what happens at times of its own: a part of it may be still to come.
+LATER = ("changes", "faults")
 
 
 def origin_of(scenario: Scenario, world: World, chip: Chip) -> dict[str, object]:

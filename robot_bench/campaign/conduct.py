@@ -2,9 +2,10 @@
 
 Theory of operation. A batch of points is asked for. Their runs of the cheap stage are done, in any order, by any
 number of workers; then, in the order of the points, each one that failed is run in full, and so are the nearest
-misses, as far as the budget goes. A run in full that failed is done once more in another process, and counts as a
-failure only where its hash is the same. Then the search is told. Since every step is taken in the order of the points
-and depends on their outcomes alone, the same campaign comes to the same runs on any machine of the same version.
+misses, as far as the budget goes. A run in full that failed is done once more in another process, from its very
+beginning, and counts as a failure only where its hash is the same. Then the search is told. Since every step is taken
+in the order of the points and depends on their outcomes alone, the same campaign comes to the same runs on any machine
+of the same version.
 
 A campaign that goes on begins anew and finds what was done in its journal, so a kill at any instant loses the runs
 that were under way and nothing else.
@@ -122,8 +123,11 @@ class Row:
 class Workers(Protocol):
     """Who carries trials out: `Processes`, `DaskWorkers`."""
 
-    def run(self, trials: Sequence[Trial], on_done: Callable[[int, Done], None]) -> None:
-        """Run all; call `on_done` with the place of each and what came of it, in any order."""
+    def run(self, trials: Sequence[Trial], on_done: Callable[[int, Done], None], *, anew: bool = False) -> None:
+        """Run all; call `on_done` with the place of each and what came of it, in any order.
+
+        With `anew` each from its very beginning, even where several share it.
+        """
         ...
 
     def close(self) -> None:
@@ -267,7 +271,7 @@ class Conduct:
 
         for key in set(keys) - places.keys():
             self._count(stage, *self._kept(key))
-        self._workers.run([trials[place] for place in missing], on_done)
+        self._workers.run([trials[place] for place in missing], on_done, anew=stage is Stage.REPLAY)
         return [Run(stage, trial, *self._kept(key)) for trial, key in zip(trials, keys, strict=True)]
 
     def _kept(self, key: str) -> Done:

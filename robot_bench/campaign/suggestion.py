@@ -1,8 +1,10 @@
 """The campaign file that `p2os campaign new SCENARIO` writes: one that finds something with no editing.
 
-A robot that roams by itself meets things of every kind that a firmware may be blind to: thin posts, boxes, walls, dead
-ends and gaps, in the scenario's own world and from other starts. What it has to show is what any such robot has to:
-it touches nothing, keeps off things, does not stay where a way is free, and turns, bends and goes back for a reason.
+A program that carries out a list of its own (drive so far, turn, stop) has to do that whatever its clock and its SRAM
+at power-on are: these vary, and its scenario's own goals judge. A robot that roams by itself meets things of every
+kind that a firmware may be blind to: thin posts, boxes, walls, dead ends and gaps, in the scenario's own world and
+from other starts. What it has to show is what any such robot has to: it touches nothing, keeps off things, does not
+stay where a way is free, and turns, bends and goes back for a reason.
 """
 
 from string import Template
@@ -17,10 +19,48 @@ START_SHARE = 0.1
 #: chosen: seconds; a robot has turned at the first things by then, and a machine does a run in a second or two.
 LONGEST_S = 60.0
 
-TEMPLATE = Template("""\
-# What is searched: worlds in which the firmware of $scenario fails.
+#: Kinds of goals on what a program does in an order of its own: none meets these from any start, among any things.
+LISTED = frozenset({
+    "motor_sequence", "usart_in_order", "in_order", "encoder_counts_match", "sensor_named", "hold_speed",
+    "hold_heading", "reach",
+})  # fmt: skip
+HEAD = """\
+# What is searched: $searched.
 #   p2os campaign $file                 docs/campaigns.md has all keys
 scenario = $scenario_name
+"""
+LISTED_TEMPLATE = Template(
+    HEAD
+    + """\
+search = "sobol"        # grid, random, latin-hypercube, sobol, tpe, cma-es, quality-diversity, coverage
+
+[budget]
+runs = 64               # of the cheap kind
+confirmations = 20      # runs in full: of what failed, and of the nearest misses
+minutes = 10.0
+
+[limits]                # of one run
+cpu_s = 300.0
+memory_mb = 2000
+
+[cheap]                 # the runs that propose; any key of a scenario, such as mode = "direct"
+body = "kinematic"
+
+[full]                  # those that confirm
+${mode}body = $body
+
+[vary]                  # every key that --set takes: a range, with a step or without, or a list of values
+seed = { from = 0, to = 999 }
+crystal_ppm = { from = -100, to = 100 }
+sram = ["zeros", "random"]
+# controller.errors = ["ideal", "realistic"]    # mode adapter: with noise a goal on exact words may be missed rightly
+
+# The scenario's own goals have to hold: it carries out a list of its own. [[draw]] and [[goal]] say otherwise.
+"""
+)
+TEMPLATE = Template(
+    HEAD
+    + """\
 gap_m = 0.75             # between things: a robot of 0.38 m passes
 search = "sobol"        # grid, random, latin-hypercube, sobol, tpe, cma-es, quality-diversity, coverage
 
@@ -115,7 +155,8 @@ ends_run = "missed"
 kind = "backs_on_path"
 off_m = 0.1
 ends_run = "missed"
-""")
+"""
+)
 
 
 def suggested(scenario: Scenario, scenario_name: str, file: str) -> str:
@@ -129,16 +170,22 @@ def suggested(scenario: Scenario, scenario_name: str, file: str) -> str:
     Raises:
         WorldError: Its world cannot be read.
     """
+    parts = [robot.scenario for robot in scenario.robots if robot.scenario is not None] or [scenario]
+    common = {
+        "scenario_name": toml_value(scenario_name), "file": file, "body": toml_value(scenario.body),
+        "mode": "" if scenario.robots else f"mode = {toml_value(scenario.mode)}\n",
+    }  # fmt: skip
+    if any(goal.kind in LISTED for part in parts for goal in part.goals):
+        searched = f"clocks and SRAM with which the firmware of {scenario.name} fails"
+        return LISTED_TEMPLATE.substitute(common, searched=searched)
     world = load_world(scenario.world, seed=scenario.seed)
     start = scenario.robots[0].start if scenario.robots else scenario.start or world.start
     x0, y0, x1, y1 = world.extent
     dx, dy = (x1 - x0) * START_SHARE / 2, (y1 - y0) * START_SHARE / 2
     return TEMPLATE.substitute(
-        scenario=scenario.name, scenario_name=toml_value(scenario_name), file=file,
+        common, searched=f"worlds in which the firmware of {scenario.name} fails",
         duration_s=min(scenario.duration_ns / NS_PER_S, LONGEST_S),
-        mode="" if scenario.robots else f"mode = {toml_value(scenario.mode)}\n",
         start=f"robot.{scenario.robots[0].name}" if scenario.robots else "start",
-        body=toml_value(scenario.body),
         x0=round(start.x_m - dx, 2), x1=round(start.x_m + dx, 2),
         y0=round(start.y_m - dy, 2), y1=round(start.y_m + dy, 2),
     )  # fmt: skip

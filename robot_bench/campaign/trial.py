@@ -235,16 +235,53 @@ def trial_of(name_or_path: str, *, firmware: Path | None = None, settings: Seque
     return Trial(name=scenario.name, table=table, files=files, seed=seed)
 
 
-def run_trial(trial: Trial, look: Callable[[], None] | None = None) -> Outcome:
+@dataclass(slots=True)
+class Seen:
+    """What a run has shown so far, of what its outcome tells."""
+
+    way_mm: list[tuple[int, int]] = field(default_factory=list)
+    hits: list[Hit] = field(default_factory=list)
+    #: Each line once, in the order in which they came.
+    printed: dict[bytes, None] = field(default_factory=dict)
+    #: Of the firmware, those that this process has not run itself.
+    blocks: frozenset[int] = frozenset()
+
+    def subscribe(self, bench: Bench) -> None:
+        """Have a run's events taken."""
+        bench.events.subscribe(self._take, Pose, Contact, Text)
+
+    def _take(self, event: Event) -> None:
+        if isinstance(event, Pose):
+            if event.t % WAY_NS == 0:
+                self.way_mm.append((event.x // 1000, event.y // 1000))
+        elif isinstance(event, Contact):
+            self.hits.append(Hit(t=event.t, what=event.what, part=event.part, x_m=event.x_m, y_m=event.y_m))
+        elif isinstance(event, Text) and len(self.printed) < MOST_LINES:
+            self.printed[event.data] = None
+
+
+#: Puts a bench at its beginning where its run goes on, and returns what the run had shown until there.
+Start = Callable[[Bench], Seen]
+
+
+def run_trial(trial: Trial, look: Callable[[], None] | None = None, start: Start | None = None) -> Outcome:
     """Carry a trial out in this process.
 
     Args:
         trial: What to run.
         look: Called between slices of the run; what it raises ends it, a `P2osError` as an outcome.
+        start: Where it goes on, in place of its beginning.
     """
     with unpacked(trial.files) as folder:
         try:
-            return _outcome(trial.scenario(folder), look)
+            bench = bench_of(trial.scenario(folder))
+            seen = Seen() if start is None else start(bench)
+            seen.subscribe(bench)
+            if look is not None:
+                for one in bench.robots.values():
+                    one.on_slice = lambda _now: look()
+            bench.run_until(bench.end)
+            return outcome_of(bench, seen)
         except P2osError as error:
             hint = f" ({error.hint})" if error.hint else ""
             return Outcome(verdict=Verdict.ERROR, failures=(f"{error}{hint}",))
@@ -274,13 +311,13 @@ def bench_of(scenario: Scenario) -> Bench:
     return Bench(scenario, chip=boot(scenario, _image_of(scenario.firmware, stat.st_mtime_ns, stat.st_size)))
 
 
-def outcome_of(bench: Bench, way: Sequence[tuple[int, int]], hits: Sequence[Hit], printed: Sequence[bytes]) -> Outcome:
+def outcome_of(bench: Bench, seen: Seen) -> Outcome:
     """End a run and return what came of it."""
     end = bench.finish()
     goals: list[GoalResult] = []
     failures: list[str] = []
     hashes: list[str] = []
-    died, blocks = "", frozenset[int]()
+    died = ""
     for name, one in bench.robots.items():
         robot = name if len(bench.robots) > 1 else ""
         before = f"{robot}: " if robot else ""
@@ -291,39 +328,21 @@ def outcome_of(bench: Bench, way: Sequence[tuple[int, int]], hits: Sequence[Hit]
         goals += found
         failures += [f"{before}{goal.kind}: {goal.says}" for goal in found if goal.met is False]
         hashes.append(one.trace.sha256)
-        if isinstance(one.chip, BluePill):
-            blocks |= one.chip.entered_blocks
     clearances = [one.recorder.min_clearance_m for one in bench.robots.values()]
     known = [clearance for clearance in clearances if clearance is not None]
     return Outcome(
         verdict=Verdict.FAILED if failures else Verdict.PASSED, failures=tuple(failures), goals=tuple(goals),
         virtual_ns=end, sha256=hashes[0] if len(hashes) == 1 else hashlib.sha256("".join(hashes).encode()).hexdigest(),
         distance_m=round(bench.recorder.distance_m, 6), clearance_m=round(min(known), 6) if known else None,
-        hits=tuple(hits), way_mm=tuple(way), died=died, blocks=blocks, lines=_states(printed),
+        hits=tuple(seen.hits), way_mm=tuple(seen.way_mm), died=died, blocks=seen.blocks | blocks_of(bench),
+        lines=_states(list(seen.printed)),
     )  # fmt: skip
 
 
-def _outcome(scenario: Scenario, look: Callable[[], None] | None) -> Outcome:
-    bench = bench_of(scenario)
-    way: list[tuple[int, int]] = []
-    hits: list[Hit] = []
-    printed: dict[bytes, None] = {}
-
-    def take(event: Event) -> None:
-        if isinstance(event, Pose):
-            if event.t % WAY_NS == 0:
-                way.append((event.x // 1000, event.y // 1000))
-        elif isinstance(event, Contact):
-            hits.append(Hit(t=event.t, what=event.what, part=event.part, x_m=event.x_m, y_m=event.y_m))
-        elif isinstance(event, Text) and len(printed) < MOST_LINES:
-            printed[event.data] = None
-
-    bench.events.subscribe(take, Pose, Contact, Text)
-    if look is not None:
-        for one in bench.robots.values():
-            one.on_slice = lambda _now: look()
-    bench.run_until(bench.end)
-    return outcome_of(bench, way, hits, list(printed))
+def blocks_of(bench: Bench) -> frozenset[int]:
+    """Return the first address of each block of the firmware that this process has run of a bench, all its robots."""
+    chips = (one.chip for one in bench.robots.values())
+    return frozenset(block for chip in chips if isinstance(chip, BluePill) for block in chip.entered_blocks)
 
 
 def _goals(bench: Bench, end: Nanos, robot: str) -> list[GoalResult]:

@@ -11,6 +11,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
@@ -104,6 +105,30 @@ def build_programs(output_folder: Path) -> list[Path]:
         build_elf(sources, folder=HERE, linker_script="f103c8.ld", output=output)
         built.append(output)
     return built
+
+
+def build_altered(program: str, edits: Sequence[tuple[str, str]], output: Path) -> Path:
+    """Build an example program with lines of its sources changed, as a fault that searches have to find.
+
+    Args:
+        program: Of `PROGRAMS`.
+        edits: What stands once in all of its sources, and what takes its place.
+        output: The ELF.
+
+    Raises:
+        ValueError: A text stands there never, or more than once.
+    """
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch).resolve() / "sources"
+        shutil.copytree(HERE, folder)
+        for right, wrong in edits:
+            texts = {name: (folder / name).read_text(encoding="utf-8") for name in PROGRAMS[program]}
+            holding = [name for name, text in texts.items() if right in text]
+            if sum(text.count(right) for text in texts.values()) != 1:
+                raise ValueError(f"{right!r} does not stand once in the sources of {program}")
+            (folder / holding[0]).write_text(texts[holding[0]].replace(right, wrong), encoding="utf-8")
+        build_elf(PROGRAMS[program], folder=folder, linker_script="f103c8.ld", output=output.resolve())
+    return output
 
 
 def build_kit(output: Path) -> Path:

@@ -4,10 +4,11 @@ Invariant: each change is applied once, in order of time, and saving and restori
 """
 
 from collections.abc import Callable, Sequence
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, Protocol, TypeVar, cast
 
-from simbase.state import Stateful
-from simbase.timing import Nanos, Reached
+from simbase.errors import UsageError
+from simbase.state import PartState, Stateful
+from simbase.timing import NS_PER_S, Nanos, Reached
 
 
 class Timed(Protocol):
@@ -51,6 +52,18 @@ class Timeline(Stateful, Generic[T]):
         except BaseException:
             self._changes = kept
             raise
+
+    def begun_as(self, saved: PartState, now: Nanos) -> PartState:
+        """Return what another timeline saved at a time, with this one's changes to come in place of its own.
+
+        Raises:
+            UsageError: Until then the two do not make the same changes.
+        """
+        done = cast("int", saved["_done"])
+        made, own = cast("tuple[T, ...]", saved["_changes"])[:done], self._changes
+        if own[:done] != made or (done < len(own) and own[done].at <= now):
+            raise UsageError(f"until {now / NS_PER_S:g} s something else happens here", hint="run from the beginning")
+        return PartState(saved, _changes=own)
 
     def next_deadline(self) -> Nanos | None:
         """Return when the next change is due."""

@@ -73,7 +73,7 @@ class Against:
     def __init__(self, workers: Workers, other: Other) -> None:
         self._workers, self._other = workers, other
 
-    def run(self, trials: Sequence[Trial], on_done: Callable[[int, Done], None]) -> None:
+    def run(self, trials: Sequence[Trial], on_done: Callable[[int, Done], None], *, anew: bool = False) -> None:
         """Run all; call `on_done` with the place of each and how the two versions compare."""
         found: dict[int, Done] = {}
         both = [version for trial in trials for version in (trial, trial.with_firmware(self._other.content))]
@@ -86,7 +86,7 @@ class Against:
                 names = trials[place].firmware_name, self._other.name
                 on_done(place, (compared(one, other, names), one_s + other_s))
 
-        self._workers.run(both, on_one)
+        self._workers.run(both, on_one, anew=anew)
 
     def close(self) -> None:
         """End the workers."""

@@ -18,13 +18,13 @@ from p2os.cli.quantities import option
 from p2os.transport.wall_clock import wall_clock
 from robot_bench.campaign.campaign_file import Campaign, campaign_schema
 from robot_bench.campaign.conduct import Finding, Progress, Workers
-from robot_bench.campaign.processes import Processes
 from robot_bench.campaign.results import Whole
 from robot_bench.campaign.search import SEARCHES
 from robot_bench.campaign.suggestion import suggested
 from robot_bench.campaign.variants.against import Against, Other, first_apart, told
 from robot_bench.campaign.variants.diversity import FailureSet
 from robot_bench.campaign.whole import begin, carry_out, resume
+from robot_bench.campaign.workers.processes import Processes
 from robot_bench.cli.progress import RunDisplay
 from robot_bench.cli.workers import core_count
 from robot_bench.recording.run_folder import make_next_folder
@@ -156,7 +156,7 @@ def write_new(words: list[str], out: Path | None, firmware: Path | None) -> None
 
 def _workers(found: Campaign, jobs: int, dask: str | None, scheduler: str | None, display: RunDisplay) -> Workers:
     if dask or scheduler:
-        from robot_bench.campaign.dask_workers import DaskWorkers
+        from robot_bench.campaign.workers.dask_workers import DaskWorkers
 
         workers = DaskWorkers(scheduler, jobs, found.limits, display.raise_if_interrupted)
         typer.echo(f"Dask: {workers.where}", err=True)

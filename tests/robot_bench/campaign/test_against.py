@@ -19,6 +19,7 @@ from robot_bench.scenario.scenario import load_scenario
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S
 
+Done = tuple[Outcome, float]
 NAMES = ("new.elf", "old.elf")
 FILE = """
 scenario = "mine.toml"
@@ -114,7 +115,7 @@ def test_without_a_verdict_of_one_there_is_none_of_both() -> None:
 @pytest.mark.parametrize("seed", range(5))
 def test_each_trial_is_run_with_both_versions_in_whatever_order_they_end(seed: int) -> None:
     class Workers:
-        def run(self, trials: Sequence[Trial], on_done: Callable[[int, tuple[Outcome, float]], None]) -> None:
+        def run(self, trials: Sequence[Trial], on_done: Callable[[int, Done], None], **_: bool) -> None:
             places = list(range(len(trials)))
             random.Random(seed).shuffle(places)
             for place in places:

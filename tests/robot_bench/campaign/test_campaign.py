@@ -12,13 +12,23 @@ from typing import Any
 import pytest
 
 from p2os.errors import ScenarioError
-from robot_bench.campaign.campaign_file import DRAW, TOP, Campaign, Limits, campaign_schema, load_campaign
+from robot_bench.campaign.campaign_file import (
+    DRAW,
+    TOP,
+    Campaign,
+    Limits,
+    campaign_schema,
+    load_campaign,
+    parse_campaign,
+)
 from robot_bench.campaign.conduct import Conduct, Finding
 from robot_bench.campaign.page import _short
-from robot_bench.campaign.processes import Processes
 from robot_bench.campaign.search import SEARCHES, Answer, Problem
+from robot_bench.campaign.suggestion import suggested
 from robot_bench.campaign.trial import GoalResult, Outcome, Trial, Verdict, run_trial, trial_of
 from robot_bench.campaign.whole import Whole, begin, carry_out, resume
+from robot_bench.campaign.workers.processes import Processes
+from robot_bench.scenario.scenario import known_scenarios, load_scenario
 from simbase.errors import FileError, UsageError
 
 FILE = """
@@ -69,8 +79,11 @@ class Shuffled:
     def __init__(self, seed: int, until: int = 10**6, judge: Callable[[Trial], Outcome] = made_up) -> None:
         self._random, self._left, self._judge = random.Random(seed), until, judge
         self.count = 0
+        #: Of each run whether it was to begin at its very beginning.
+        self.anew: list[bool] = []
 
-    def run(self, trials: Sequence[Trial], on_done: Callable[[int, Done], None]) -> None:
+    def run(self, trials: Sequence[Trial], on_done: Callable[[int, Done], None], *, anew: bool = False) -> None:
+        self.anew += [anew] * len(trials)
         places = list(range(len(trials)))
         self._random.shuffle(places)
         for place in places:
@@ -184,7 +197,9 @@ def test_confirmations_end_with_their_budget(tmp_path: Path) -> None:
 
 
 def test_each_failure_is_a_folder_that_runs_again_with_its_hash(tmp_path: Path) -> None:
-    whole = carried(begun(tmp_path), tmp_path / "kept", Shuffled(1))
+    workers = Shuffled(1)
+    whole = carried(begun(tmp_path), tmp_path / "kept", workers)
+    assert sum(workers.anew) == len(whole.failures), "only what proves shares nothing"
     row = whole.failures[0]
     file = whole.results.failure_folder(row) / "dodge.toml"
     assert whole.results.replay(row) == f"p2os run {file}"
@@ -243,6 +258,17 @@ def test_the_schema_has_every_key_that_the_loader_takes() -> None:
     assert set(properties["draw"]["items"]["properties"]) == {key.name for key in DRAW}
     assert schema["required"] == ["scenario"]
     json.dumps(schema)
+
+
+@pytest.mark.parametrize("name", known_scenarios())
+def test_what_new_writes_for_each_scenario_can_be_begun(name: str, tmp_path: Path) -> None:
+    """A program that carries out a list keeps its goals and its start; one that roams meets things."""
+    campaign = parse_campaign(suggested(load_scenario(name), name, "mine.toml"), tmp_path / "mine.toml")
+    is_list = name in {"encoders", "motors", "rover", "sensors"}
+    kinds = [goal["kind"] for goal in campaign.trial.table["goal"]]  # type: ignore[attr-defined]  # a list of tables
+    assert bool(campaign.draws) is not is_list
+    assert ("moves_on" in kinds) is not is_list
+    assert ("crystal_ppm" in campaign.vary) is is_list
 
 
 def test_a_folder_that_is_taken_and_one_that_is_none_are_refused(tmp_path: Path) -> None:
@@ -314,16 +340,16 @@ def test_a_process_comes_to_what_this_one_comes_to(trials: list[Trial]) -> None:
 
 
 def test_a_process_that_was_killed_is_begun_again(trials: list[Trial], tmp_path: Path, monkeypatch) -> None:  # type: ignore[no-untyped-def]
-    from robot_bench.campaign import processes
+    from robot_bench.campaign.workers import beginnings
 
-    def dies_once(trial: Trial, look: Callable[[], None]) -> Outcome:
+    def dies_once(trial: Trial, look: Callable[[], None], start: object) -> Outcome:
         mark = tmp_path / trial.sha256
         if not mark.exists():
             mark.touch()
             os.kill(os.getpid(), signal.SIGKILL)
         return run_trial(trial, look)
 
-    monkeypatch.setattr(processes, "run_trial", dies_once)
+    monkeypatch.setattr(beginnings, "run_trial", dies_once)
     found = outcomes(Processes(2, Limits()), trials)
     assert [found[place].verdict for place in range(3)] == [run_trial(trial).verdict for trial in trials]
     assert len(list(tmp_path.iterdir())) == 3
@@ -331,17 +357,17 @@ def test_a_process_that_was_killed_is_begun_again(trials: list[Trial], tmp_path:
 
 @pytest.mark.slow
 def test_a_run_that_takes_too_much_is_an_error_that_names_the_limit(trials: list[Trial], monkeypatch) -> None:  # type: ignore[no-untyped-def]
-    from robot_bench.campaign import processes
+    from robot_bench.campaign.workers import beginnings
 
-    def greedy(trial: Trial, look: Callable[[], None]) -> Outcome:
+    def greedy(trial: Trial, look: Callable[[], None], start: object) -> Outcome:
         return Outcome(verdict=Verdict.PASSED, sha256=str(len(bytearray(10**9))))
 
-    def endless(trial: Trial, look: Callable[[], None]) -> Outcome:
+    def endless(trial: Trial, look: Callable[[], None], start: object) -> Outcome:
         while True:
             pass
 
     for job, words in ((greedy, "it took more than 64 MB"), (endless, "it took more than 1 s of a processor")):
-        monkeypatch.setattr(processes, "run_trial", job)
+        monkeypatch.setattr(beginnings, "run_trial", job)
         found = outcomes(Processes(1, Limits(cpu_s=1, memory_mb=64)), trials[:1])
         assert (found[0].verdict, found[0].failures) == (Verdict.ERROR, (words,))
 

@@ -11,13 +11,13 @@ from pathlib import Path
 
 import pytest
 
-from robot_bench.campaign import dask_workers
 from robot_bench.campaign.campaign_file import Limits
 from robot_bench.campaign.conduct import Progress
-from robot_bench.campaign.dask_workers import DaskWorkers
-from robot_bench.campaign.processes import Processes
 from robot_bench.campaign.trial import Outcome, run_trial, trial_of
 from robot_bench.campaign.whole import begin, carry_out
+from robot_bench.campaign.workers import dask_workers
+from robot_bench.campaign.workers.dask_workers import DaskWorkers
+from robot_bench.campaign.workers.processes import Processes
 from simbase.errors import UsageError
 
 pytest.importorskip("distributed")

@@ -10,8 +10,8 @@ import pytest
 
 from robot_bench.campaign.campaign_file import Limits
 from robot_bench.campaign.conduct import Finding
-from robot_bench.campaign.processes import Processes
 from robot_bench.campaign.whole import begin, carry_out
+from robot_bench.campaign.workers.processes import Processes
 
 #: `dodge` that sees a hand's breadth, and a post on its way: it fails nearly everywhere, each time in another place.
 FILE = """

@@ -9,8 +9,8 @@ import pytest
 
 from robot_bench.campaign.campaign_file import Budget, Limits, parse_campaign
 from robot_bench.campaign.conduct import Conduct
-from robot_bench.campaign.processes import Processes
 from robot_bench.campaign.suggestion import suggested
+from robot_bench.campaign.workers.processes import Processes
 from robot_bench.firmware import build
 from robot_bench.scenario.scenario import load_scenario
 
@@ -48,15 +48,7 @@ def failures(firmware: Path | None, folder: Path) -> int:
 def test_a_planted_fault_is_found(fault: str, tmp_path: Path) -> None:
     if shutil.which(build.COMPILER) is None:
         pytest.skip(f"no {build.COMPILER}")
-    sources = tmp_path / "sources"
-    shutil.copytree(build.HERE, sources)
-    right, wrong = FAULTS[fault]
-    file = sources / "dodge_fsm.c"
-    text = file.read_text(encoding="utf-8")
-    assert text.count(right) == 1
-    file.write_text(text.replace(right, wrong), encoding="utf-8")
-    firmware = tmp_path / "dodge.elf"
-    build.build_elf(build.PROGRAMS["dodge"], folder=sources, linker_script="f103c8.ld", output=firmware)
+    firmware = build.build_altered("dodge", [FAULTS[fault]], tmp_path / "dodge.elf")
     assert failures(firmware, tmp_path) > 0
 
 

@@ -8,9 +8,8 @@ Invariant: a failure depends on the trial alone.
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from bluepill_sim.board import BluePill
 from robot_bench.bench import Bench
-from robot_bench.campaign.trial import Trial, bench_of, unpacked
+from robot_bench.campaign.trial import Trial, bench_of, blocks_of, unpacked
 from robot_bench.events.kinds import Contact, Event, Pose, Verdict, WorldChange
 from simbase.errors import P2osError
 from simbase.timing import NS_PER_MS, Nanos
@@ -85,7 +84,7 @@ def _run(bench: Bench, way: Way | None, until_ns: Nanos | None, look: Callable[[
         failures = [failure for witness in witnesses for failure in witness.failures()]
         return next(
             (
-                Failure(way=one, at_ns=when, is_early=end is None or when < end, says=says, blocks=_blocks(bench))
+                Failure(way=one, at_ns=when, is_early=end is None or when < end, says=says, blocks=blocks_of(bench))
                 for one, when, says in sorted(failures, key=lambda row: row[1])
                 if way is None or one == way
             ),
@@ -146,8 +145,3 @@ class _Witness:
         fault, verdict = self._bench.chip.fault, self._bench.chip.verdict
         at = self._bench.now if fault is None else fault.at_ns
         return Way(what=verdict.partition(" at ")[0], robot=self._robot, is_fault=True), at, verdict
-
-
-def _blocks(bench: Bench) -> frozenset[int]:
-    chips = [one.chip for one in bench.robots.values()]
-    return frozenset(block for chip in chips if isinstance(chip, BluePill) for block in chip.entered_blocks)

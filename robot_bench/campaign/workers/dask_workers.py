@@ -1,6 +1,7 @@
 """Workers of Dask distributed: on this machine, or of a scheduler somewhere.
 
-The unit of work is one trial, which brings its firmware and world along; what comes back is its outcome. Nothing needs
+The unit of work is one trial, which brings its firmware and world along, and the state that it goes on from where it
+shares its beginning with others; what comes back is its outcome. Nothing needs
 a disk that is shared. A worker needs p2os of the same version, and one thread.
 
 Theory of operation. All trials of a batch are submitted, and looked at every `LOOK_S`. What a dead worker had is given
@@ -17,8 +18,9 @@ from typing import Any
 
 from p2os.errors import RunFailedError
 from robot_bench.campaign.campaign_file import Limits
-from robot_bench.campaign.processes import MB, MOST_TRIES
-from robot_bench.campaign.trial import Done, Outcome, Trial, Verdict, run_trial
+from robot_bench.campaign.trial import Done, Outcome, Trial, Verdict
+from robot_bench.campaign.workers.beginnings import Beginnings, Saved, Work, Worked
+from robot_bench.campaign.workers.processes import MB, MOST_TRIES
 from robot_bench.running.forks import LOOK_S
 from simbase.errors import MissingDependencyError, UsageError
 from simbase.user_classes import unforeseen
@@ -51,6 +53,7 @@ class DaskWorkers:
         except ImportError as error:
             raise MissingDependencyError("workers of Dask need distributed", extra="campaign") from error
         self._limits, self._look = limits, look
+        self._beginnings = Beginnings()
         self._cluster: Any = None
         if address is None:
             make: Any = distributed.LocalCluster
@@ -66,14 +69,23 @@ class DaskWorkers:
         """Where the scheduler is, and its dashboard."""
         return f"{self._address}, dashboard {self._client.dashboard_link or 'not there'}"
 
-    def run(self, trials: Sequence[Trial], on_done: Callable[[int, Done], None]) -> None:
+    def run(self, trials: Sequence[Trial], on_done: Callable[[int, Done], None], *, anew: bool = False) -> None:
         """Run all; call `on_done` with the place of each and what came of it, in the order in which they end.
+
+        Args:
+            trials: What to run.
+            on_done: As said.
+            anew: Each from its very beginning, whatever they share.
 
         Raises:
             KeyboardInterrupt: `look` has.
             UsageError: The scheduler, or its workers, stayed away, or have another version of p2os.
         """
-        tries = dict.fromkeys(range(len(trials)), 0)
+        self._beginnings.run(trials, on_done, self._do, anew=anew)
+
+    def _do(self, works: Sequence[Work], on_worked: Callable[[int, Worked], None]) -> None:
+        """Do all, each on some worker."""
+        tries = dict.fromkeys(range(len(works)), 0)
         running: dict[int, Any] = {}
         waits_since = time.monotonic()
         try:
@@ -85,13 +97,11 @@ class DaskWorkers:
                         self._client.close(timeout=1)
                     self._client = self._connected(patience_s=PATIENCE_S)
                 for place in [place for place in tries if place not in running]:
-                    running[place] = self._client.submit(
-                        run_limited, trials[place], self._limits, pure=False, retries=0
-                    )
+                    running[place] = self._client.submit(run_limited, works[place], self._limits, pure=False, retries=0)
                 found = self._ended(running, tries)
                 for place, done in found.items():
                     del tries[place]
-                    on_done(place, done)
+                    on_worked(place, done)
                 if found:
                     waits_since = time.monotonic()
                 elif time.monotonic() - waits_since > PATIENCE_S + self._limits.cpu_s:
@@ -108,9 +118,9 @@ class DaskWorkers:
         if self._cluster is not None:
             self._cluster.close(timeout=5)
 
-    def _ended(self, running: dict[int, Any], tries: dict[int, int]) -> dict[int, Done]:
+    def _ended(self, running: dict[int, Any], tries: dict[int, int]) -> dict[int, Worked]:
         """Return what has come, and forget what has to be submitted again."""
-        found: dict[int, Done] = {}
+        found: dict[int, Worked] = {}
         for place, future in list(running.items()):
             if future.status == "finished":
                 del running[place]
@@ -151,8 +161,8 @@ class DaskWorkers:
                 time.sleep(LOOK_S)
 
 
-def run_limited(trial: Trial, limits: Limits) -> tuple[Outcome, float, str]:
-    """Carry a trial out in a worker; return what came of it, the seconds of a processor, and the version of p2os."""
+def run_limited(work: Work, limits: Limits) -> tuple[Outcome | list[Saved], float, str]:
+    """Do a piece of work in a worker; return what came of it, the seconds of a processor, and the version of p2os."""
     began = time.thread_time()
 
     def look() -> None:
@@ -160,7 +170,7 @@ def run_limited(trial: Trial, limits: Limits) -> tuple[Outcome, float, str]:
             raise RunFailedError(f"it took more than {limits.cpu_s:g} s of a processor")
 
     try:
-        outcome = run_trial(trial, look)
+        outcome = work(look)
     except Exception as error:  # noqa: BLE001  # a bug there is an error of this trial, told by its name
         outcome = Outcome(verdict=Verdict.ERROR, failures=(unforeseen(error),))
     return outcome, round(time.thread_time() - began, 3), version("p2os")

@@ -1,7 +1,8 @@
 """Workers of this machine: each trial in a process of its own, a fork of this one, within limits of time and memory.
 
 What every trial needs (the programs, the firmware's image, the world) is loaded once, here; a fork has it and begins
-at once. Nothing of a trial outlives its process, so a hundred thousand leave no more behind than one.
+at once. Nothing of a trial outlives its process, so a hundred thousand leave no more behind than one, but for the
+states that others go on from (`beginnings`).
 
 A process that was killed from outside is done again; one that takes more than its limits is an outcome of its own,
 `ERROR`. A fork whose parent is gone ends at its next slice.
@@ -22,7 +23,8 @@ from pathlib import Path
 
 from p2os.errors import RunFailedError
 from robot_bench.campaign.campaign_file import Limits
-from robot_bench.campaign.trial import Done, Outcome, Trial, Verdict, run_trial, warm_up
+from robot_bench.campaign.trial import Done, Outcome, Trial, Verdict, warm_up
+from robot_bench.campaign.workers.beginnings import Beginnings, Work, Worked
 from robot_bench.running.forks import LOOK_S, begin, how_it_ended, received
 from simbase.user_classes import unforeseen
 
@@ -44,17 +46,27 @@ class Processes:
 
     def __init__(self, at_once: int, limits: Limits, look: Callable[[], None] = lambda: None) -> None:
         self._at_once, self._limits, self._look = at_once, limits, look
+        self._beginnings = Beginnings()
 
-    def run(self, trials: Sequence[Trial], on_done: Callable[[int, Done], None]) -> None:
+    def run(self, trials: Sequence[Trial], on_done: Callable[[int, Done], None], *, anew: bool = False) -> None:
         """Run all; call `on_done` with the place of each and what came of it, in the order in which they end.
+
+        Args:
+            trials: What to run.
+            on_done: As said.
+            anew: Each from its very beginning, whatever they share.
 
         Raises:
             KeyboardInterrupt: `look` has; what was running is gone.
         """
-        waiting = [(place, 1) for place in range(len(trials))][::-1]
-        running: dict[Connection, tuple[int, int, ForkProcess]] = {}
         for trial in {id(trial.files): trial for trial in trials}.values():
             warm_up(trial)
+        self._beginnings.run(trials, on_done, self._do, anew=anew)
+
+    def _do(self, works: Sequence[Work], on_worked: Callable[[int, Worked], None]) -> None:
+        """Do all, each in a process of its own."""
+        waiting = [(place, 1) for place in range(len(works))][::-1]
+        running: dict[Connection, tuple[int, int, ForkProcess]] = {}
         gc.freeze()
         with tempfile.TemporaryDirectory(prefix="p2os-campaign-") as folder:
             try:
@@ -62,16 +74,16 @@ class Processes:
                     self._look()
                     while waiting and len(running) < self._at_once:
                         place, tries = waiting.pop()
-                        process, pipe = begin(_work, trials[place], self._limits, os.getpid(), Path(folder))
+                        process, pipe = begin(_work, works[place], self._limits, os.getpid(), Path(folder))
                         running[pipe] = place, tries, process
                     ready = wait(list(running), timeout=LOOK_S)
                     for pipe in [pipe for pipe in running if pipe in ready]:
                         place, tries, process = running.pop(pipe)
-                        done = _result(process, pipe, self._limits)
-                        if done is None and tries < MOST_TRIES:
+                        worked = _result(process, pipe, self._limits)
+                        if worked is None and tries < MOST_TRIES:
                             waiting.append((place, tries + 1))
                         else:
-                            on_done(place, done or (_error("its process was killed, again and again"), 0.0))
+                            on_worked(place, worked or (_error("its process was killed, again and again"), 0.0))
             finally:
                 gc.unfreeze()
                 for _, _, process in running.values():
@@ -82,8 +94,8 @@ class Processes:
         """Nothing is kept between runs."""
 
 
-def _work(pipe: Connection, trial: Trial, limits: Limits, parent: int, folder: Path) -> None:
-    """Carry a trial out in this fork, and send what came of it."""
+def _work(pipe: Connection, work: Work, limits: Limits, parent: int, folder: Path) -> None:
+    """Do a piece of work in this fork, and send what came of it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # of the terminal: the parent ends us
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     signal.signal(signal.SIGXCPU, signal.SIG_DFL)  # the command line's own handler would end it with a code
@@ -99,7 +111,7 @@ def _work(pipe: Connection, trial: Trial, limits: Limits, parent: int, folder: P
             raise RunFailedError("the program that began it has ended")
 
     try:
-        found = run_trial(trial, look)
+        found = work(look)
     except MemoryError:
         found = _error(f"it took more than {limits.memory_mb} MB")
     except Exception as error:  # noqa: BLE001  # a bug there is an error of this trial, told by its name
@@ -109,9 +121,9 @@ def _work(pipe: Connection, trial: Trial, limits: Limits, parent: int, folder: P
     pipe.close()
 
 
-def _result(process: ForkProcess, pipe: Connection, limits: Limits) -> Done | None:
+def _result(process: ForkProcess, pipe: Connection, limits: Limits) -> Worked | None:
     """Return what came of a process that has ended; None where it was killed from outside."""
-    done: Done | None = received(process, pipe)
+    done: Worked | None = received(process, pipe)
     if done is not None:
         return done
     code = process.exitcode or 0
