@@ -17,6 +17,7 @@ from typing import TypeAlias, cast
 import numpy as np
 
 from p2os.capture import Chunk, Direction, Reading, open_file, rows_of
+from p2os.capture.chunks import Block, chunks_of
 from p2os.protocol.frames import CHECKSUM_BYTES, PREFIX_BYTES, Frame
 from p2os.protocol.odometry import Odometry
 from p2os.protocol.profiles import Profile
@@ -111,7 +112,7 @@ def spread_s(readings: int, fitted: int, since_s: float) -> float:
 
 
 #: Says how to read a capture, whose chunks it looks into.
-HowToRead: TypeAlias = Callable[[Iterable[Chunk]], tuple[Reading, Iterator[Chunk]]]
+HowToRead: TypeAlias = Callable[[Iterable[Block]], tuple[Reading, Iterator[Block]]]
 
 
 def read_drive(path: Path, *, robot: str = "", how: HowToRead | None = None) -> Drive:
@@ -141,9 +142,9 @@ def read_drive(path: Path, *, robot: str = "", how: HowToRead | None = None) -> 
             return Drive(name=path.name, parameters=_parameters(robot), truth=read_tum(path))
     except (OSError, UnicodeDecodeError) as error:
         raise FileError(f"cannot read {shown_name(path)}: {getattr(error, 'strerror', None) or 'no text'}") from error
-    chunks = open_file(path).chunks
-    reading, chunks = how(chunks) if how else (Reading(profile=Profile.P2OS, parameters=_parameters(robot)), chunks)
-    return drive_of_capture(path.name, chunks, reading.parameters, reading.profile)
+    blocks = open_file(path).blocks
+    reading, blocks = how(blocks) if how else (Reading(profile=Profile.P2OS, parameters=_parameters(robot)), blocks)
+    return drive_of_capture(path.name, chunks_of(blocks), reading.parameters, reading.profile)
 
 
 def _is_aria_log(path: Path) -> bool:

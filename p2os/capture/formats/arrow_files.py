@@ -90,10 +90,14 @@ def _array_kind(column: Sequence[Cell]) -> str | None:
 
 
 def _array(pa: Any, column: Sequence[Cell], kind: Any) -> Any:
-    if _array_kind(column) is not None:
-        codes, present, conversion = column.codes, column.present, column.conversion  # type: ignore[attr-defined]  # a column of NumPy's
-        cells = pa.array(codes, None if conversion else kind, mask=None if present is None else ~present)
-        return pa.array(conversion.values, kind).take(cells) if conversion else cells
+    if _array_kind(column) is None:
+        if kind == pa.string():
+            return pa.array([cell if cell is None or isinstance(cell, str) else str(cell) for cell in column], kind)
+        return pa.array(column, kind)
+    codes, present, conversion = column.codes, column.present, column.conversion  # type: ignore[attr-defined]  # a column of NumPy's
+    mask = None if present is None else ~present
+    if conversion is None:
+        return pa.array(codes, kind, mask=mask)
     if kind == pa.string():
-        return pa.array([cell if cell is None or isinstance(cell, str) else str(cell) for cell in column], kind)
-    return pa.array(column, kind)
+        return pa.array(conversion.values, kind).take(pa.array(codes, mask=mask))
+    return pa.array(conversion.values.take(codes), kind, mask=mask)
