@@ -65,14 +65,18 @@ PLAYER = """driver (
   use_tcp 1 tcp_remote_host "{host}" tcp_remote_port {port} pulse 1.0
 )
 """
-PLAYER_MOVER = """import playerc, time
-client = playerc.playerc_client(None, "127.0.0.1", 6665)
-client.connect()
-base = playerc.playerc_position2d(client, 0)
-base.subscribe(playerc.PLAYERC_OPEN_MODE)
-base.enable(1)
+#: Through player's library in C, which stands beside every player; its bindings for Python do not.
+PLAYER_MOVER = """import ctypes, time
+c = ctypes.CDLL("libplayerc.so")
+for create in c.playerc_client_create, c.playerc_position2d_create:
+    create.restype = ctypes.c_void_p
+client = ctypes.c_void_p(c.playerc_client_create(None, b"127.0.0.1", 6665))
+assert c.playerc_client_connect(client) == 0
+base = ctypes.c_void_p(c.playerc_position2d_create(client, 0))
+assert c.playerc_position2d_subscribe(base, 1) == 0
+c.playerc_position2d_enable(base, 1)
 while True:
-    base.set_cmd_vel(0.2, 0.0, 0.0, 1)
+    c.playerc_position2d_set_cmd_vel(base, *map(ctypes.c_double, (0.2, 0.0, 0.0)), 1)
     time.sleep(0.2)
 """
 
