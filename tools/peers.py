@@ -231,7 +231,12 @@ class Served:
     def is_used(self) -> bool:
         """Tell whether the peer does what is awaited of it."""
         is_used = self.is_turning if self._moves else self._is_open
-        return is_used and (not self._shows or re.search(self._shows, self._output.read_text(errors="replace")) is not None)
+        return is_used and (not self._shows or self._has_shown)
+
+    @property
+    def _has_shown(self) -> bool:
+        """Tell whether the peer has printed what shows that its device answers."""
+        return re.search(self._shows, self._output.read_text(errors="replace")) is not None
 
     def close(self) -> None:
         """End it."""

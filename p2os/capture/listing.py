@@ -163,7 +163,7 @@ class Lister:
         return any(stream.decoder.next_deadline() is not None for stream in self._streams.values())
 
     def pass_over(self, direction: Direction | None, now: Nanos) -> None:
-        """Take what `passing` allows to pass over, of several in a row the last; without direction it is the robot's."""
+        """Take the last in a row of what `passing` allows to pass over; without direction it is the robot's."""
         if direction is not Direction.TO_ROBOT:
             self._session.take_in_session(now)
 

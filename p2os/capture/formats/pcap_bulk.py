@@ -87,9 +87,7 @@ def _block(data: bytes, at_ns: _Numbers, senders: _Bytes, begins: _Numbers, ends
         )  # fmt: skip
 
 
-def _ours(
-    records: Records, said: Conversations, at_ns: _Numbers, begins: _Numbers, ends: _Numbers
-) -> Iterator[Block]:
+def _ours(records: Records, said: Conversations, at_ns: _Numbers, begins: _Numbers, ends: _Numbers) -> Iterator[Block]:
     codes = np.frombuffer(records.data + b"\xff", np.uint8)[begins]
     if (codes > 1).any() or (begins == ends).any():
         yield from blocks_of(said.parts(records))

@@ -6,7 +6,7 @@ Invariant: no more is held than what was read together and the record that it cu
 """
 
 import struct
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from dataclasses import dataclass
 
 from simbase.errors import FileError
@@ -19,6 +19,8 @@ RECORD_HEADER = "IIII"
 _BYTE_ORDER_MAGIC = 0x1A2B3C4D
 #: pcapng block types.
 _INTERFACE, _SIMPLE, _ENHANCED = 1, 3, 6
+#: What each of them has at the least.
+_LEAST_SIZES = {_INTERFACE: 16, _SIMPLE: 16, _ENHANCED: 32}
 #: pcapng option of an interface: the unit of its time stamps.
 _IF_TSRESOL = 9
 #: chosen: far more than any capture program's snap length; a longer record is a damaged one.
@@ -151,41 +153,44 @@ class _PcapNg:
         """Yield the records that are whole; return how many bytes they take."""
         starts: list[int] = []
         place, end, number = 0, len(data), -1
-        head = struct.Struct(self._order + "III").unpack_from
+        head: Callable[[bytes, int], tuple[int, ...]] = struct.Struct(self._order + "III").unpack_from
         while place + 12 <= end:
             if data[place : place + 4] == PCAPNG_MAGIC.to_bytes(4, "big"):
                 yield from self._enhanced(data, starts, number)
                 starts = []
-                mark = data[place + 8 : place + 12]
-                self._order = "<" if mark == _BYTE_ORDER_MAGIC.to_bytes(4, "little") else ">"
-                head = struct.Struct(self._order + "III").unpack_from
-                self._interfaces.clear()
+                head = self._section(data[place + 8 : place + 12])
             kind, size, third = head(data, place)
             if size < 12 or size > LARGEST_RECORD:
                 raise FileError(f"the capture file is cut off at byte {before + place}")
             if place + size > end:
                 break
+            if size < _LEAST_SIZES.get(kind, 0):
+                raise FileError(_CUT_IN_RECORD)
             if kind == _ENHANCED:
-                if size < 32:
-                    raise FileError(_CUT_IN_RECORD)
                 if third != number:
                     yield from self._enhanced(data, starts, number)
                     starts, number = [], third
                 starts.append(place)
             elif kind in {_INTERFACE, _SIMPLE}:
-                if size < 16:
-                    raise FileError(_CUT_IN_RECORD)
                 yield from self._enhanced(data, starts, number)
                 starts = []
                 if kind == _INTERFACE:
-                    body = data[place + 8 : place + size - 4]
-                    link = struct.unpack_from(self._order + "H", body)[0]
-                    self._interfaces.append((link, _ticks_per_s(body, self._order)))
+                    self._interface(data[place + 8 : place + size - 4])
                 else:
                     yield self._records(data, [place], 0, is_simple=True)
             place += size
         yield from self._enhanced(data, starts, number)
         return place
+
+    def _section(self, mark: bytes) -> Callable[[bytes, int], tuple[int, ...]]:
+        """Begin a section; return what reads the first numbers of its blocks."""
+        self._order = "<" if mark == _BYTE_ORDER_MAGIC.to_bytes(4, "little") else ">"
+        self._interfaces.clear()
+        return struct.Struct(self._order + "III").unpack_from
+
+    def _interface(self, body: bytes) -> None:
+        link = struct.unpack_from(self._order + "H", body)[0]
+        self._interfaces.append((link, _ticks_per_s(body, self._order)))
 
     def _enhanced(self, data: bytes, starts: list[int], interface: int) -> Iterator[Records]:
         if starts:

@@ -432,7 +432,7 @@ def _request(extra: Extra) -> Handler:
 def _laser_end_or_gripper() -> Handler:
     """Return a handler of the number that ARIA's laser shares with its gripper.
 
-    Behind the beginning of the laser's field it is the field's end. Else 0, 1 or 2 ask for GRIPPERpac, as without a laser.
+    Behind the beginning of the laser's field it is the field's end. Else 0, 1 or 2 ask for GRIPPERpac, as without one.
     """
     end, request = _laser(_laser_end, _request(Extra.GRIPPER)), _request(Extra.GRIPPER)
 

@@ -74,6 +74,14 @@ def test_rows_are_the_same_however_a_stream_is_cut_and_corrupted(wait_ns: int) -
         both_ways(chunks_of(STREAM[:place] + STREAM[place + 1 :], (len(SIP), place), wait_ns))
 
 
+@pytest.mark.parametrize("first", [b"\xfa\xfb\xc0", SIP])
+@pytest.mark.parametrize("wait_ns", [0, 250 * NS_PER_MS])
+def test_sound_packets_behind_a_frame_that_waits_are_not_passed_over(first: bytes, wait_ns: int) -> None:
+    parts = [first, SIP, SIP, SIP[:9], SIP[9:] + SIP, FRAMES[2], SIP]
+    both_ways([Chunk(at_ns=wait_ns * (number > 3), direction=Direction.FROM_ROBOT, data=data)
+               for number, data in enumerate(parts)])  # fmt: skip
+
+
 @given(st.lists(st.one_of(st.sampled_from(FRAMES), st.binary(max_size=4), st.just(b"\xfa\xfb\xc0"), st.just(b"\xfa")),
                 max_size=8),
        st.lists(st.integers(0, 300), max_size=4), st.sampled_from((0, 100 * NS_PER_MS, 250 * NS_PER_MS)),

@@ -73,7 +73,11 @@ waits = st.sampled_from((0, 1, 100 * NS_PER_MS, 249 * NS_PER_MS, 250 * NS_PER_MS
        st.sampled_from((1, 2, 4096)), st.sampled_from((1, 2, 3, 100)))  # fmt: skip
 @settings(deadline=None, max_examples=100)
 def test_a_capture_gives_the_same_cells_either_way(
-    parts: list[tuple[Nanos, bool, bytes]], direction: Direction | None, profile: Profile, block: int, first_rows: int,
+    parts: list[tuple[Nanos, bool, bytes]],
+    direction: Direction | None,
+    profile: Profile,
+    block: int,
+    first_rows: int,
     together: int,
 ) -> None:
     chunks, now = [Chunk(at_ns=0, direction=direction, data=sip_bytes())], 0
