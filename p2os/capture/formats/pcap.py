@@ -11,9 +11,10 @@ Invariant: `read_pcap(write_pcap(chunks))` has the same bytes in each direction.
 
 import contextlib
 import struct
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
-from p2os.capture.chunks import Block, Capture, Chunk, Direction, Part, blocks_of, chunks_of, in_order
+from p2os.capture.chunks import Block, Capture, Chunk, Direction, blocks_of, chunks_of, in_order
+from p2os.capture.formats.conversations import IN_DIRECTION, LEAST_RECORDS, LINKTYPE_USER0, Conversations
 from p2os.capture.formats.pcap_records import (
     FILE_HEADER,
     MAGIC_NS,
@@ -23,18 +24,11 @@ from p2os.capture.formats.pcap_records import (
     Records,
     read_records,
 )
-from p2os.capture.formats.tcp_streams import TcpStreams
 from simbase.errors import FileError
 from simbase.timing import NS_PER_S, Nanos
 
-LINKTYPE_USER0 = 147
 SNAP_BYTES = 65_535
-IN_DIRECTION = {0: Direction.TO_ROBOT, 1: Direction.FROM_ROBOT}
 _OF_DIRECTION = {direction: code for code, direction in IN_DIRECTION.items()}
-#: chosen: a year; a longer time is a damaged one.
-LONGEST_NS: Nanos = 366 * 86_400 * NS_PER_S
-#: chosen: of fewer records, a loop takes less time than NumPy's calls.
-LEAST_RECORDS = 64
 
 
 def is_pcap(data: bytes) -> bool:
@@ -85,11 +79,7 @@ def pcap_blocks(blocks: Iterable[bytes]) -> Iterator[Block]:
     """
     said = Conversations()
     for records in read_records(blocks):
-        in_bulk = None
-        if len(records.starts) >= LEAST_RECORDS:
-            with contextlib.suppress(ImportError):
-                from p2os.capture.formats.pcap_bulk import in_bulk
-        yield from in_bulk(records, said) if in_bulk else blocks_of(said.parts(records))
+        yield from _bulk(len(records.starts))(records, said)
     if said.is_empty and said.streams.unread_links:
         kinds = ", ".join(str(link) for link in sorted(said.streams.unread_links))
         raise FileError(
@@ -98,28 +88,11 @@ def pcap_blocks(blocks: Iterable[bytes]) -> Iterator[Block]:
         )
 
 
-class Conversations:
-    """What is said in captured packets."""
+def _bulk(count: int) -> Callable[[Records, Conversations], Iterator[Block]]:
+    """Return how so many records are read."""
+    if count >= LEAST_RECORDS:
+        with contextlib.suppress(ImportError):
+            from p2os.capture.formats.pcap_bulk import in_bulk
 
-    def __init__(self) -> None:
-        self.streams = TcpStreams()
-        self.is_empty = True
-        #: When the first record was captured, in nanoseconds since 1970.
-        self.start_ns: Nanos | None = None
-
-    def parts(self, records: Records, first: int = 0, last: int | None = None) -> Iterator[Part]:
-        """Yield what some records hold, one by one."""
-        for captured_ns, data in records.packets(first, len(records.starts) if last is None else last):
-            self.start_ns = captured_ns if self.start_ns is None else self.start_ns
-            at_ns = max(0, captured_ns - self.start_ns)
-            if at_ns > LONGEST_NS:
-                raise FileError(f"a record {at_ns / NS_PER_S:.3g} s after the first: its time is damaged")
-            if records.link == LINKTYPE_USER0:
-                if data[:1] not in (b"\0", b"\1"):
-                    raise FileError("a record of link type USER0 that is not ours: its first byte gives no direction")
-                self.is_empty = False
-                yield at_ns, IN_DIRECTION[data[0]], data[1:]
-            else:
-                for direction, sent in self.streams.take(records.link, data):
-                    self.is_empty = False
-                    yield at_ns, direction, sent
+            return in_bulk
+    return lambda records, said: blocks_of(said.parts(records))

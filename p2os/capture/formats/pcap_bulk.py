@@ -1,4 +1,4 @@
-"""Records of capture files many at a time: what `pcap.Conversations.parts` says of them, without a loop.
+"""Records of capture files many at a time: what `Conversations.parts` says of them, without a loop.
 
 Theory of operation. Records of ours all have one form. Of TCP, a segment is plain that stands in an IPv4 packet without
 options, was captured whole and is no SYN; a run of such is read at once as far as each goes on where the one before it
@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from p2os.capture.chunks import LETTERS, Block, Direction, blocks_of
-from p2os.capture.formats.pcap import IN_DIRECTION, LEAST_RECORDS, LINKTYPE_USER0, LONGEST_NS, Conversations
+from p2os.capture.formats.conversations import IN_DIRECTION, LEAST_RECORDS, LINKTYPE_USER0, LONGEST_NS, Conversations
 from p2os.capture.formats.pcap_records import Records
 from p2os.capture.formats.tcp_streams import IPV4, IPV6, LINKS, MOST_WAITING, SYN, TCP, End, Half
 from simbase.timing import NS_PER_S

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 pytest.importorskip("numpy")
 
 from p2os.capture.chunks import Chunk, Direction, blocks_of, chunks_of, in_order
-from p2os.capture.formats.pcap import Conversations, pcap_blocks, write_pcap
+from p2os.capture.formats.conversations import Conversations
+from p2os.capture.formats.pcap import pcap_blocks, write_pcap
 from p2os.capture.formats.pcap_records import PCAPNG_MAGIC, Records, read_records
 from p2os.capture.formats.tcp_streams import MOST_WAITING
 from simbase.errors import FileError

@@ -108,6 +108,13 @@ def test_a_frame_behind_a_false_header_has_the_time_when_that_was_given_up() -> 
     assert same(capture_of(chunks))["t_s"] == [0.3]
 
 
+def test_it_is_given_up_at_the_first_byte_of_anyone_once_the_line_was_quiet_for_so_long() -> None:
+    waits = (249 * NS_PER_MS, 250 * NS_PER_MS, 251 * NS_PER_MS, 400 * NS_PER_MS)
+    chunks = [(0, ROBOT, b"\xfa\xfb\xc0" + sip_bytes()), *((wait, CLIENT, b"\0") for wait in waits)]
+    for together in range(1, 6):
+        assert same(capture_of(chunks), together=together)["t_s"] == [0.25]
+
+
 def test_a_capture_without_sips_has_no_table() -> None:
     packet = packet_frame(EncoderPacket(left_counts=1, right_counts=2), Profile.P2OS).to_bytes()
     assert same(capture_of([(0, ROBOT, packet)])) == {}
