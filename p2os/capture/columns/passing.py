@@ -131,8 +131,9 @@ class _Chunks:
         self._is_closed_before = np.ones(len(block) + 1, np.bool_)
         self._is_closed_behind = np.ones(len(block) + 1, np.bool_)
         self._data = np.frombuffer(block.data, np.uint8)
-        self._at_ns = np.frombuffer(block.at_ns, np.int64)
-        self._sizes = np.diff(np.frombuffer(block.ends, np.int64), prepend=0)
+        self._at_ns: Indexes = np.frombuffer(block.at_ns, np.int64)
+        ends: Indexes = np.frombuffer(block.ends, np.int64)
+        self._sizes = ends - np.concatenate(([0], ends[:-1]))
         senders = np.frombuffer(block.senders, np.uint8)
         for direction, letter in LETTERS.items():
             if letter in block.senders:
@@ -151,8 +152,8 @@ class _Chunks:
         data, sizes = (self._data, self._sizes) if alone else (
             self._data[np.repeat(is_mine, self._sizes)], self._sizes[numbers]
         )  # fmt: skip
-        behind = np.cumsum(sizes)
-        before = behind - sizes
+        behind: Indexes = np.cumsum(sizes)
+        before: Indexes = behind - sizes
         pauses = before[1:][np.diff(self._at_ns[numbers]) >= GIVE_UP_NS]
         starts, ends, passed = self._passing.frames(data, direction, pauses)
         starts, ends = starts[passed] - PREFIX_BYTES, ends[passed] + CHECKSUM_BYTES

@@ -116,7 +116,8 @@ class _Held:
         before = np.searchsorted(self._at_ns, ticks, side="right") - 1
         late = (before >= 0) & (ticks >= self._at_ns[before] + GIVE_UP_NS)
         ticks, before = ticks[late], before[late]
-        return ticks[np.append(True, before[1:] != before[:-1])[: len(ticks)]]
+        first: Indexes = ticks[np.append(True, before[1:] != before[:-1])[: len(ticks)]]
+        return first
 
     def decoded(self, *, is_last: bool) -> tuple[RawTable, int, Indexes] | None:
         """Return the SIPs of what is decided, how many of them, and when each was known; None where there is none."""
