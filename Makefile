@@ -69,6 +69,7 @@ bench: setup
 	$(BIN)/python tools/bench/loops.py
 	$(BIN)/python tools/bench/buses.py
 	$(BIN)/python tools/bench/columns.py
+	$(BIN)/python tools/bench/captures.py
 	$(BIN)/python tools/bench/bodies.py
 	$(BIN)/python tools/bench/pioneer.py
 	$(BIN)/python tools/bench/speed.py

@@ -31,6 +31,8 @@ ALLOWED = {
     "simbase.installation": {"packaging"},
     "p2os.transport": {"construct", "serial"},
     "p2os.cli": {"construct", "typer", "rich", "click", "serial"},
+    "p2os.capture.formats.pcap_bulk": {"numpy"},
+    "p2os.capture.formats.recording_bulk": {"numpy"},
     "p2os.capture.formats.arrow_files": {"pyarrow"},
     "p2os.capture.formats.mcap_files": {"mcap"},
     "p2os.capture.columns": {"construct", "numpy"},

@@ -65,14 +65,18 @@ PLAYER = """driver (
   use_tcp 1 tcp_remote_host "{host}" tcp_remote_port {port} pulse 1.0
 )
 """
-PLAYER_MOVER = """import playerc, time
-client = playerc.playerc_client(None, "127.0.0.1", 6665)
-client.connect()
-base = playerc.playerc_position2d(client, 0)
-base.subscribe(playerc.PLAYERC_OPEN_MODE)
-base.enable(1)
+#: Through player's library in C, which stands beside every player; its bindings for Python do not.
+PLAYER_MOVER = """import ctypes, time
+c = ctypes.CDLL("libplayerc.so")
+for create in c.playerc_client_create, c.playerc_position2d_create:
+    create.restype = ctypes.c_void_p
+client = ctypes.c_void_p(c.playerc_client_create(None, b"127.0.0.1", 6665))
+assert c.playerc_client_connect(client) == 0
+base = ctypes.c_void_p(c.playerc_position2d_create(client, 0))
+assert c.playerc_position2d_subscribe(base, 1) == 0
+c.playerc_position2d_enable(base, 1)
 while True:
-    base.set_cmd_vel(0.2, 0.0, 0.0, 1)
+    c.playerc_position2d_set_cmd_vel(base, *map(ctypes.c_double, (0.2, 0.0, 0.0)), 1)
     time.sleep(0.2)
 """
 
@@ -87,8 +91,10 @@ class Peer:
         commands: What is started, one behind the other.
         killed: Which of them talks to the robot.
         serve: Options with which it expects the robot.
-        moves: Whether it drives by itself; of one that does not, an open session is all that is awaited.
+        moves: Whether it drives by itself; of one that does not, an open session is awaited.
+        shows: What it prints when what it is there for works, a regular expression; empty for what prints nothing.
         files: Written into its folder before: name and text.
+        flash: What is set in the robot's FLASH parameters, as TOML.
     """
 
     name: str
@@ -97,7 +103,9 @@ class Peer:
     killed: int = 0
     serve: tuple[str, ...] = ()
     moves: bool = True
+    shows: str = ""
     files: tuple[tuple[str, str], ...] = ()
+    flash: str = ""
 
     @property
     def has_terminal(self) -> bool:
@@ -115,15 +123,28 @@ ARIA_TALKS = (
     "simpleConnect", "demo", "teleopActionsExample", "actionGroupExample", "robotSyncTaskExample", "motionDebugInfo",
     "dataLoggerExample", "customRangeSensorExample", "auxSerialExample", "gripperExample", "lasers",
     "triangleDriveToActionExample", "encoderTest", "sonarTest", "testMobileSim", "connectionTest2",
-    "robotPacketHandlerTest", "logSIPs", "logSIPData", "logRobotJoystick", "simstat", "moveRobotInSim",
+    "robotPacketHandlerTest", "logSIPs", "logSIPData", "logRobotJoystick", "simstat", "moveRobotInSim", "laserConnect",
+    "lineFinderExample", "sickLogger", "ptzTest",
 )  # fmt: skip
+#: Those that need to be told to use a device, and what shows that it answers.
+ARIA_WORDS = {"lasers": ("-connectLaser",), "laserConnect": ("-connectLaser",), "lineFinderExample": ("-connectLaser",)}
+ARIA_SHOWS = {
+    "lasers": r"Have 181 'raw' readings",
+    "laserConnect": r"connected\. Have 181 'current' readings",
+    "lineFinderExample": r"Connected to laser",
+    "sickLogger": r"Taking readings from the 361 laser values",
+    "ptzTest": r"=> At pan -\d",
+    "gripperExample": r"Grip: +\w",
+    "logRobotJoystick": r"Got a joystick packet",
+}
 
 
 def _aria(program: str) -> Peer:
-    words = (program, "-rh", "{host}", "-rrtp", "{port}")
+    words = (program, "-rh", "{host}", "-rrtp", "{port}", *ARIA_WORDS.get(program, ()))
     return Peer(
         name=f"ARIA {program}", needs=(program,), commands=(words,), serve=("--for", "aria"),
-        moves=program in ARIA_DRIVES,
+        moves=program in ARIA_DRIVES, shows=ARIA_SHOWS.get(program, ""),
+        flash="[flash]\ngripper = 2\n" if "gripper" in program else "",
     )  # fmt: skip
 
 
@@ -159,12 +180,16 @@ class Served:
 
     def __init__(self, peer: Peer, folder: Path) -> None:
         port = f"pty:{folder / 'line'}" if peer.has_terminal else "tcp:127.0.0.1:0"
-        words = ("serve", "--port", port, "--body", "kinematic", "--json", "--status", STATUS, *peer.serve)
+        words = ["serve", "--port", port, "--body", "kinematic", "--json", "--status", STATUS, *peer.serve]
+        if peer.flash:
+            (folder / "flash.toml").write_text(peer.flash)
+            words += ["--flash", str(folder / "flash.toml")]
         self.process = subprocess.Popen(
             [sys.executable, "-m", "p2os", *words], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
             stderr=subprocess.PIPE, text=True,
         )  # fmt: skip
-        self._moves = peer.moves
+        self._moves, self._shows = peer.moves, peer.shows
+        self._output = folder / "output"
         self._is_open = False
         #: (seconds, line) of what it says; (seconds, m/s) of the faster wheel.
         self.said: list[tuple[float, str]] = []
@@ -205,7 +230,13 @@ class Served:
     @property
     def is_used(self) -> bool:
         """Tell whether the peer does what is awaited of it."""
-        return self.is_turning if self._moves else self._is_open
+        is_used = self.is_turning if self._moves else self._is_open
+        return is_used and (not self._shows or self._has_shown)
+
+    @property
+    def _has_shown(self) -> bool:
+        """Tell whether the peer has printed what shows that its device answers."""
+        return re.search(self._shows, self._output.read_text(errors="replace")) is not None
 
     def close(self) -> None:
         """End it."""
@@ -345,6 +376,7 @@ def _through(peer: Peer, served: Served, folder: Path, row: Row) -> None:
     row.next_client = _next_client(served)
     if served.is_turning:
         raise PeerError("turned again when the next client came")
+    _wait(lambda: not served.is_used, STARTING_S, "the next client did not leave")
     started = time.monotonic()
     with _started(peer, served, folder) as processes:
         _wait(lambda: served.is_used, STARTING_S, "did not do so again", processes[peer.killed])
@@ -368,15 +400,16 @@ def _started(peer: Peer, served: Served, folder: Path) -> Iterator[list[subproce
         (folder / name).write_text(filled(text))
     processes: list[subprocess.Popen[bytes]] = []
     try:
-        for words in peer.commands:
-            processes.append(
-                subprocess.Popen(
-                    [filled(word) for word in words], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-                    stderr=subprocess.DEVNULL, start_new_session=True,
-                )
-            )  # fmt: skip
-            if len(peer.commands) > 1:
-                time.sleep(2.0)  # a master has to be there before its nodes
+        with (folder / "output").open("wb") as output:
+            for words in peer.commands:
+                processes.append(
+                    subprocess.Popen(
+                        [filled(word) for word in words], stdin=subprocess.DEVNULL, stdout=output,
+                        stderr=subprocess.STDOUT, start_new_session=True, cwd=folder,
+                    )
+                )  # fmt: skip
+                if len(peer.commands) > 1:
+                    time.sleep(2.0)  # a master has to be there before its nodes
         yield processes
     finally:
         for process in processes:

@@ -4,12 +4,17 @@ A capture knows nothing of frames; `p2os.capture.listing` finds them. Where a
 source gives no direction (raw bytes, plain hex), a chunk has none and each
 frame's is guessed from its shape.
 
+A `Chunk` is an object; a `Block` holds as many as were read together without an object each, for captures of
+millions.
+
 Invariant: chunks are in the order in which they were read, and time never runs back.
 """
 
+from array import array
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from enum import Enum
+from itertools import accumulate, chain
 from typing import TypeAlias
 
 from p2os.errors import LocalProtocolError
@@ -86,17 +91,90 @@ class Capture:
 
 #: What a source gives: nanoseconds, who sent it if that is known, bytes.
 Part: TypeAlias = tuple[Nanos, Direction | None, bytes]
+#: Who sent a chunk of a block, a letter each.
+LETTERS = {Direction.TO_ROBOT: b"c", Direction.FROM_ROBOT: b"r", None: b"?"}
+_DIRECTIONS = {letter[0]: direction for direction, letter in LETTERS.items()}
 
 
-def in_order(parts: Iterable[Part]) -> Iterator[Chunk]:
-    """Yield parts as chunks; a time that steps back a little, as clocks of captures do, is moved up to the last."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Block:
+    """Chunks that were read together, none of them empty.
+
+    Args:
+        at_ns: When each came, 64-bit integers.
+        senders: `c` (client), `r` (robot) or `?` for each.
+        ends: Where the bytes of each end in `data`, 64-bit integers, rising.
+        data: All of their bytes.
+    """
+
+    at_ns: "array[int]"
+    senders: bytes
+    ends: "array[int]"
+    data: bytes
+
+    def __len__(self) -> int:
+        return len(self.senders)
+
+    def chunk(self, number: int) -> Chunk:
+        """Return one of them."""
+        start = self.ends[number - 1] if number else 0
+        data = self.data[start : self.ends[number]]
+        return Chunk(at_ns=self.at_ns[number], direction=_DIRECTIONS[self.senders[number]], data=data)
+
+    def __iter__(self) -> Iterator[Chunk]:
+        start = 0
+        for at_ns, sender, end in zip(self.at_ns, self.senders, self.ends, strict=True):
+            yield Chunk(at_ns=at_ns, direction=_DIRECTIONS[sender], data=self.data[start:end])
+            start = end
+
+
+def block_of(parts: Iterable[Part]) -> Block:
+    """Return parts as a block, those without bytes left out."""
+    kept = [part for part in parts if part[2]]
+    return Block(
+        at_ns=array("q", [at_ns for at_ns, _, _ in kept]),
+        senders=b"".join([LETTERS[direction] for _, direction, _ in kept]),
+        ends=array("q", accumulate(len(data) for _, _, data in kept)),
+        data=b"".join([data for _, _, data in kept]),
+    )
+
+
+def blocks_of(parts: Iterable[Part]) -> Iterator[Block]:
+    """Yield parts as one block; where reading them fails, what came before, and then the error."""
+    kept: list[Part] = []
+    try:
+        kept.extend(parts)
+    except Exception:
+        yield block_of(kept)
+        raise
+    yield block_of(kept)
+
+
+def block_of_chunks(chunks: Iterable[Chunk]) -> Block:
+    """Return chunks as a block."""
+    return block_of((chunk.at_ns, chunk.direction, chunk.data) for chunk in chunks)
+
+
+def chunks_of(blocks: Iterable[Block]) -> Iterator[Chunk]:
+    """Yield the chunks of blocks one by one."""
+    return chain.from_iterable(blocks)
+
+
+def in_order(blocks: Iterable[Block]) -> Iterator[Block]:
+    """Yield blocks that hold something; a time that steps back a little, as clocks of captures do, is moved up."""
     last_ns = 0
-    for at_ns, direction, data in parts:
-        last_ns = max(last_ns, at_ns)
-        if data:
-            yield Chunk(at_ns=last_ns, direction=direction, data=data)
+    for block in filter(len, blocks):
+        # Looking costs a quarter of what accumulating does.
+        if block.at_ns[0] >= last_ns and array("q", sorted(block.at_ns)) == block.at_ns:
+            last_ns = block.at_ns[-1]
+            yield block
+        else:
+            at_ns = array("q", accumulate(block.at_ns, max, initial=last_ns))[1:]
+            last_ns = at_ns[-1]
+            yield Block(at_ns=at_ns, senders=block.senders, ends=block.ends, data=block.data)
 
 
 def capture_of(parts: Iterable[Part], *, has_time: bool = True, note: str = "") -> Capture:
     """Return a capture of (nanoseconds, direction, bytes)."""
-    return Capture(chunks=tuple(in_order(parts)), has_time=has_time, note=note)
+    chunks = tuple(chunks_of(in_order([block_of(parts)])))
+    return Capture(chunks=chunks, has_time=has_time, note=note)

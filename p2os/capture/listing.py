@@ -157,6 +157,16 @@ class Lister:
         if chunk.data:
             yield from self._take(self._streams[chunk.direction], chunk.data, chunk.at_ns)
 
+    @property
+    def is_waiting(self) -> bool:
+        """Whether a frame has begun whose rest has not come, in any direction."""
+        return any(stream.decoder.next_deadline() is not None for stream in self._streams.values())
+
+    def pass_over(self, direction: Direction | None, now: Nanos) -> None:
+        """Take the last in a row of what `passing` allows to pass over; without direction it is the robot's."""
+        if direction is not Direction.TO_ROBOT:
+            self._session.take_in_session(now)
+
     def _take(self, stream: "_Stream", data: bytes, now: Nanos) -> Iterator[ListingRow]:
         # Most bytes are sound frames, one behind the other: these need no decoder. What it has to look at it gets up to
         # the next header, before which it tells of noise anyway, so that rows are those of the whole given at once.
@@ -173,7 +183,7 @@ class Lister:
                 frames, end = finder.frames(start)
                 for first, last, is_passed in frames:
                     if is_passed:
-                        self._session.name_of(data[first:last], Direction.FROM_ROBOT, now)
+                        self.pass_over(stream.direction, now)
                     else:
                         whole = data[first - PREFIX_BYTES : last + CHECKSUM_BYTES]
                         yield self._frame_row(stream.direction, data[first:last], whole, now)
@@ -241,7 +251,7 @@ class LoopFinder:
     Args:
         data: The bytes.
         direction: Who sent them.
-        passed_kinds: Which of a robot's packets need no row.
+        passed_kinds: Which numbers need no row.
     """
 
     def __init__(self, data: bytes, direction: Direction | None, passed_kinds: Collection[int] = ()) -> None:
@@ -377,10 +387,14 @@ class RecordedSession:
             self._state, self._closed_at = _State.CLOSED, now
         return COMMAND_NAMES[kind]
 
+    def take_in_session(self, now: Nanos) -> None:
+        """Take a robot's packet of a kind that it sends in a session only."""
+        if self._closed_at is None or now > self._closed_at + IN_FLIGHT_NS:
+            self._state, self._closed_at = _State.OPEN, None
+
     def _take_packet(self, kind: int, now: Nanos, *, has_data: bool) -> str:
         if kind > IDENTITY_KIND and kind not in RESET_KINDS:
-            if self._closed_at is None or now > self._closed_at + IN_FLIGHT_NS:
-                self._state, self._closed_at = _State.OPEN, None
+            self.take_in_session(now)
         elif kind == IDENTITY_KIND and has_data:
             self._state = _State.SYNCED
         elif kind in RESET_KINDS:

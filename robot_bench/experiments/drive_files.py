@@ -13,7 +13,8 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import TypeAlias
 
-from p2os.capture import Chunk, Reading, open_file
+from p2os.capture import Reading, open_file
+from p2os.capture.chunks import Block, chunks_of
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import RobotParameters, load_parameters
 from p2os.ros.bags import is_bag
@@ -31,7 +32,7 @@ _LONGEST_FIELD = 64
 
 
 #: Says how to read a capture, whose chunks it looks into.
-HowToRead: TypeAlias = Callable[[Iterable[Chunk]], tuple[Reading, Iterator[Chunk]]]
+HowToRead: TypeAlias = Callable[[Iterable[Block]], tuple[Reading, Iterator[Block]]]
 
 
 def read_drive(path: Path, *, robot: str = "", how: HowToRead | None = None) -> Drive:
@@ -61,9 +62,9 @@ def read_drive(path: Path, *, robot: str = "", how: HowToRead | None = None) -> 
             return Drive(name=path.name, parameters=_parameters(robot), truth=read_tum(path))
     except (OSError, UnicodeDecodeError) as error:
         raise FileError(f"cannot read {shown_name(path)}: {getattr(error, 'strerror', None) or 'no text'}") from error
-    chunks = open_file(path).chunks
-    reading, chunks = how(chunks) if how else (Reading(profile=Profile.P2OS, parameters=_parameters(robot)), chunks)
-    return drive_of_capture(path.name, chunks, reading.parameters, reading.profile)
+    blocks = open_file(path).blocks
+    reading, blocks = how(blocks) if how else (Reading(profile=Profile.P2OS, parameters=_parameters(robot)), blocks)
+    return drive_of_capture(path.name, chunks_of(blocks), reading.parameters, reading.profile)
 
 
 def _is_aria_log(path: Path) -> bool:

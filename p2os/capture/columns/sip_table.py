@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from p2os.capture.cells import Cell, cell_text
-from p2os.capture.chunks import Chunk, Direction
-from p2os.capture.columns.framing import LARGEST_FRAME, Indexes, stalls_of
+from p2os.capture.chunks import LETTERS, Block, Direction
+from p2os.capture.columns.framing import LARGEST_FRAME, Bytes, Indexes, stalls_of
 from p2os.capture.columns.table import Table as RawTable
 from p2os.capture.columns.tables import Columns, decode
 from p2os.capture.describe import RAW_OF, SipFields, sip_fields
@@ -33,18 +33,18 @@ BLOCK_BYTES = 1 << 19
 
 
 def sip_tables(
-    chunks: Iterable[Chunk], reading: Reading, *, first_rows: int = FIRST_ROWS, block: int = BLOCK_BYTES
+    blocks: Iterable[Block], reading: Reading, *, first_rows: int = FIRST_ROWS, block: int = BLOCK_BYTES
 ) -> Iterator[Table]:
     """Yield a robot's SIPs as tables in SI units.
 
     Args:
-        chunks: In order of time; all of the robot's have the same direction, or none has one.
+        blocks: In order of time; all of the robot's chunks have the same direction, or none has one.
         reading: How to read them.
         first_rows: How many rows decide which columns there are, and are in the first table.
         block: How many of the robot's bytes are decoded together; any number gives the same cells.
     """
     builder = _Builder(reading)
-    return uniform(_first_alone((builder.table(*part) for part in _blocks(chunks, reading, block)), first_rows))
+    return uniform(_first_alone((builder.table(*part) for part in _blocks(blocks, reading, block)), first_rows))
 
 
 def _first_alone(tables: Iterator[Table], first_rows: int) -> Iterator[Table]:
@@ -79,68 +79,85 @@ def _cut(table: Table, start: int, end: int) -> Table:
     return Table({name: column for name, column in columns.items() if has[name]})
 
 
-class _Blocks:
+class _Held:
     """What has come of the robot's bytes and is not decoded yet."""
 
     def __init__(self, reading: Reading) -> None:
         self._reading = reading
-        self._chunks: list[Chunk] = []
-        #: When anything came, of either side: the decoder notices then that a frame is given up.
-        self._ticks: list[Nanos] = []
+        self._data: list[bytes] = []
+        #: Of each of the robot's chunks: when it came, and how many bytes of it are held.
+        self._at_ns = np.zeros(0, np.int64)
+        self._sizes = np.zeros(0, np.int64)
+        #: When something of the client came first after the robot had been silent for so long that its decoder gives
+        #: up what has begun.
+        self._ticks = np.zeros(0, np.int64)
+        self._last_ns: Nanos = 0
         self.size = 0
 
-    def take(self, chunk: Chunk) -> None:
-        """Take a chunk of either side."""
-        if chunk.direction is not Direction.TO_ROBOT and chunk.data:
-            self._chunks.append(chunk)
-            self.size += len(chunk.data)
-        elif not self._chunks or self._ticks[-1] >= self._chunks[-1].at_ns + GIVE_UP_NS:
-            return  # nothing waits, or it was given up already
-        self._ticks.append(chunk.at_ns)
+    def take(self, block: Block) -> None:
+        """Take a block of both sides."""
+        at_ns, ends = np.frombuffer(block.at_ns, np.int64), np.frombuffer(block.ends, np.int64)
+        sizes, data = np.diff(ends, prepend=0), block.data
+        is_mine = np.frombuffer(block.senders, np.uint8) != LETTERS[Direction.TO_ROBOT][0]
+        self._last_ns = int(at_ns[-1])
+        others = np.zeros(0, np.int64)
+        if not is_mine.all():
+            data = np.frombuffer(data, np.uint8)[np.repeat(is_mine, sizes)].tobytes()
+            others, at_ns, sizes = at_ns[~is_mine], at_ns[is_mine], sizes[is_mine]
+        if data:
+            self._data.append(data)
+            self._at_ns = np.concatenate((self._at_ns, at_ns))
+            self._sizes = np.concatenate((self._sizes, sizes))
+            self.size += len(data)
+        if len(self._at_ns):
+            self._ticks = self._first_after_silence(np.concatenate((self._ticks, others)))
+
+    def _first_after_silence(self, ticks: Indexes) -> Indexes:
+        before = np.searchsorted(self._at_ns, ticks, side="right") - 1
+        late = (before >= 0) & (ticks >= self._at_ns[before] + GIVE_UP_NS)
+        ticks, before = ticks[late], before[late]
+        first: Indexes = ticks[np.append(True, before[1:] != before[:-1])[: len(ticks)]]
+        return first
 
     def decoded(self, *, is_last: bool) -> tuple[RawTable, int, Indexes] | None:
         """Return the SIPs of what is decided, how many of them, and when each was known; None where there is none."""
-        if not self._chunks:
+        if not self.size:
             return None
-        data = np.frombuffer(b"".join(chunk.data for chunk in self._chunks), np.uint8)
-        times = np.array([chunk.at_ns for chunk in self._chunks], np.int64)
-        places = np.concatenate(([0], np.cumsum([len(chunk.data) for chunk in self._chunks])))
+        data, times = np.frombuffer(b"".join(self._data), np.uint8), self._at_ns
+        places = np.concatenate(([0], np.cumsum(self._sizes)))
         columns = decode(data, self._reading.profile, pauses=places[1:-1][np.diff(times) >= GIVE_UP_NS])
         stalls = stalls_of(columns.data, columns.starts, columns.ends, columns.pauses)
-        known = _known(times, places, np.array(self._ticks, np.int64), columns, stalls)
+        # The decoder notices that a frame is given up when anything comes, of either side.
+        ticks = np.sort(np.concatenate((times, self._ticks, [self._last_ns])))
+        known = _known(times, places, ticks, columns, stalls)
         cut = len(data) if is_last else _cut_place(columns, stalls)
-        self._drop(cut)
+        self._drop(data, places, cut)
         raw = columns.tables.get("sip")
         if raw is None:
             return None
         count = int(np.searchsorted(columns.starts[raw.packets], cut))
         return (raw, count, known[raw.packets]) if count else None
 
-    def _drop(self, place: int) -> None:
-        number = 0
-        while number < len(self._chunks) and place >= len(self._chunks[number].data):
-            place -= len(self._chunks[number].data)
-            number += 1
-        del self._chunks[:number]
-        if place:
-            first = self._chunks[0]
-            self._chunks[0] = Chunk(at_ns=first.at_ns, direction=first.direction, data=first.data[place:])
-        since = self._chunks[0].at_ns if self._chunks else self._ticks[-1] + 1
-        self._ticks = [tick for tick in self._ticks if tick >= since]
-        self.size = sum(len(chunk.data) for chunk in self._chunks)
+    def _drop(self, data: Bytes, places: Indexes, place: int) -> None:
+        rest = data[place:].tobytes()
+        self._data, self.size = ([rest] if rest else []), len(rest)
+        number = int(np.searchsorted(places, place, side="right")) - 1
+        self._at_ns, self._sizes = self._at_ns[number:], np.diff(np.maximum(places[number:], place))
+        if len(self._at_ns):
+            self._ticks = self._ticks[self._ticks >= self._at_ns[0]]
 
 
-def _blocks(chunks: Iterable[Chunk], reading: Reading, block: int) -> Iterator[tuple[RawTable, int, Indexes]]:
-    blocks, least = _Blocks(reading), 0
-    for chunk in chunks:
-        blocks.take(chunk)
-        if blocks.size >= max(block, least):
-            found = blocks.decoded(is_last=False)
-            # What is not decided yet must not be looked at again with each chunk.
-            least = 2 * blocks.size
+def _blocks(blocks: Iterable[Block], reading: Reading, size: int) -> Iterator[tuple[RawTable, int, Indexes]]:
+    held, least = _Held(reading), 0
+    for block in blocks:
+        held.take(block)
+        if held.size >= max(size, least):
+            found = held.decoded(is_last=False)
+            # What is not decided yet must not be looked at again with each block.
+            least = 2 * held.size
             if found is not None:
                 yield found
-    found = blocks.decoded(is_last=True)
+    found = held.decoded(is_last=True)
     if found is not None:
         yield found
 

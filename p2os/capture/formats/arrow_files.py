@@ -1,9 +1,9 @@
 """Tables as Apache Parquet and Arrow (Feather) files, written one table at a time; needs the extra `export`."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from p2os.capture.cells import Cell
 from p2os.capture.table import Table
@@ -23,7 +23,12 @@ def write_parquet(tables: Iterable[Table], path: Path) -> int:
     _pyarrow(path)
     from pyarrow import parquet
 
-    return _write(tables, path, parquet.ParquetWriter)
+    def writer_of(file: IO[bytes], schema: Any, columns: Mapping[str, Sequence[Cell]]) -> Any:
+        # Times and positions hardly occur twice: looking for those that do takes longer and saves nothing.
+        few = [name for name, column in columns.items() if getattr(column, "conversion", True) is not None]
+        return parquet.ParquetWriter(file, schema, use_dictionary=few)
+
+    return _write(tables, path, writer_of)
 
 
 def write_arrow(tables: Iterable[Table], path: Path) -> int:
@@ -36,7 +41,7 @@ def write_arrow(tables: Iterable[Table], path: Path) -> int:
     _pyarrow(path)
     from pyarrow import ipc
 
-    return _write(tables, path, ipc.new_file)
+    return _write(tables, path, lambda file, schema, _: ipc.new_file(file, schema))
 
 
 def _pyarrow(path: Path) -> Any:
@@ -58,7 +63,7 @@ def _write(tables: Iterable[Table], path: Path, writer_of: Any) -> int:
     if first is None:
         return 0
     schema = pa.schema([(name, _type(pa, column)) for name, column in first.columns.items()])
-    with path.open("wb") as file, writer_of(file, schema) as writer:
+    with path.open("wb") as file, writer_of(file, schema, first.columns) as writer:
         group: list[Any] = []
         for table in chain([first], every):
             arrays = [
@@ -90,10 +95,14 @@ def _array_kind(column: Sequence[Cell]) -> str | None:
 
 
 def _array(pa: Any, column: Sequence[Cell], kind: Any) -> Any:
-    if _array_kind(column) is not None:
-        codes, present, conversion = column.codes, column.present, column.conversion  # type: ignore[attr-defined]  # a column of NumPy's
-        cells = pa.array(codes, None if conversion else kind, mask=None if present is None else ~present)
-        return pa.array(conversion.values, kind).take(cells) if conversion else cells
+    if _array_kind(column) is None:
+        if kind == pa.string():
+            return pa.array([cell if cell is None or isinstance(cell, str) else str(cell) for cell in column], kind)
+        return pa.array(column, kind)
+    codes, present, conversion = column.codes, column.present, column.conversion  # type: ignore[attr-defined]  # a column of NumPy's
+    mask = None if present is None else ~present
+    if conversion is None:
+        return pa.array(codes, kind, mask=mask)
     if kind == pa.string():
-        return pa.array([cell if cell is None or isinstance(cell, str) else str(cell) for cell in column], kind)
-    return pa.array(column, kind)
+        return pa.array(conversion.values, kind).take(pa.array(codes, mask=mask))
+    return pa.array(conversion.values.take(codes), kind, mask=mask)

@@ -4,16 +4,17 @@ Invariant: what is opened holds no more of its file than a block or a line.
 """
 
 import codecs
+import contextlib
 import io
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO, cast
 
-from p2os.capture.chunks import Capture, Chunk, Direction, Part, in_order
+from p2os.capture.chunks import Block, Capture, Chunk, Direction, Part, block_of, blocks_of, chunks_of, in_order
 from p2os.capture.formats.hex_text import hex_parts, is_hexdump, looks_like_hex
-from p2os.capture.formats.pcap import is_pcap, pcap_parts
-from p2os.capture.formats.recording import note_of, plain_parts, recorded_parts
+from p2os.capture.formats.pcap import is_pcap, pcap_blocks
+from p2os.capture.formats.recording import note_of, plain_block, recorded_parts
 from simbase.errors import FileError
 
 #: The P2OS bytes in the folder that `p2os run` makes.
@@ -22,25 +23,32 @@ RUN_WIRE = "wire.jsonl"
 LARGEST_BYTES = 2_000_000_000
 #: chosen: what is read at a time; the kind of a file is told by its first block.
 BLOCK_BYTES = 1 << 16
+#: chosen: what is read at a time behind the first block; larger ones take more memory and hardly less time.
+LARGE_BLOCK_BYTES = 1 << 19
 #: chosen: a line of a recording is one chunk; a longer one is no text.
 LONGEST_LINE = 16 << 20
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Source:
-    """A capture that is read while its chunks are taken.
+    """A capture that is read while its blocks are taken.
 
     Args:
-        chunks: In the order of time, once.
+        blocks: Its chunks in the order of time, once.
         has_time: Whether the source gives times; without, all are 0.
         note: Free text, such as which robot and program were recorded.
         has_one_origin: Whether all of the robot's chunks have a direction, or none has.
     """
 
-    chunks: Iterator[Chunk]
+    blocks: Iterator[Block]
     has_time: bool = True
     note: str = ""
     has_one_origin: bool = True
+
+    @property
+    def chunks(self) -> Iterator[Chunk]:
+        """What is left to be read, one by one."""
+        return chunks_of(self.blocks)
 
     def whole(self) -> Capture:
         """Read all of it.
@@ -55,7 +63,7 @@ def open_capture(file: BinaryIO, direction: Direction | None = None) -> Source:
     """Begin to read a capture of whatever kind its bytes are: pcap, pcapng, JSON lines, hex text, else raw bytes.
 
     Args:
-        file: Its content; taking chunks reads it, and raises `FileError` where it is broken.
+        file: Its content; taking blocks reads it, and raises `FileError` where it is broken.
         direction: Who sent raw or hex bytes whose source does not give it.
     """
     buffered = cast(
@@ -64,21 +72,21 @@ def open_capture(file: BinaryIO, direction: Direction | None = None) -> Source:
     )
     head = buffered.peek(BLOCK_BYTES)
     if is_pcap(head):
-        return Source(chunks=in_order(pcap_parts(cast("BinaryIO", buffered))))
+        return Source(blocks=in_order(pcap_blocks(_blocks_of_bytes(buffered))))
     text = _text(head)
     if text is not None and text.lstrip().startswith("{"):
-        return Source(chunks=in_order(_recorded(buffered)), note=note_of(text.lstrip().split("\n")[0]))
+        return Source(blocks=in_order(_recorded(buffered)), note=note_of(text.lstrip().split("\n")[0]))
     is_hex = bool(text and text.strip())
     parts = hex_parts(_lines(_blocks_of_lines(buffered)), is_dump=is_hexdump(text or "")) if is_hex else _raw(buffered)
     directed = ((at_ns, sent_by or direction, data) for at_ns, sent_by, data in parts)
-    return Source(chunks=in_order(directed), has_time=False, has_one_origin=not is_hex)
+    return Source(blocks=in_order(block_of([part]) for part in directed), has_time=False, has_one_origin=not is_hex)
 
 
 def open_file(path: Path, direction: Direction | None = None) -> Source:
     """Begin to read a capture from a file, or from the folder of a run.
 
     Raises:
-        FileError: The file cannot be read; taking chunks raises it where the file is broken.
+        FileError: The file cannot be read; taking blocks raises it where the file is broken.
     """
     place = path / RUN_WIRE if path.is_dir() else path
     try:
@@ -86,7 +94,7 @@ def open_file(path: Path, direction: Direction | None = None) -> Source:
         source = open_capture(file, direction)
     except OSError as error:
         raise _unreadable(place, error) from error
-    return replace(source, chunks=_named(source.chunks, file, place))
+    return replace(source, blocks=_named(source.blocks, file, place))
 
 
 def open_argument(words: list[str], direction: Direction | None = None) -> Source:
@@ -137,11 +145,11 @@ def read_argument(words: list[str], direction: Direction | None = None) -> Captu
     return open_argument(words, direction).whole()
 
 
-def _named(chunks: Iterator[Chunk], file: BinaryIO, place: Path) -> Iterator[Chunk]:
-    """Yield chunks; what is wrong names the file, which is closed at the end."""
+def _named(blocks: Iterator[Block], file: BinaryIO, place: Path) -> Iterator[Block]:
+    """Yield blocks; what is wrong names the file, which is closed at the end."""
     with file:
         try:
-            yield from chunks
+            yield from blocks
         except FileError as error:
             raise FileError(f"{place}: {error}", hint=error.hint) from error
         except OSError as error:
@@ -153,21 +161,24 @@ def _unreadable(place: Path, error: OSError) -> FileError:
 
 
 def _raw(file: io.BufferedReader) -> Iterator[Part]:
-    while data := file.read1(BLOCK_BYTES):
+    for data in _blocks_of_bytes(file):
         yield 0, None, data
 
 
-def _recorded(file: io.BufferedReader) -> Iterator[Part]:
-    before = 0
-    for block in _blocks_of_lines(file):
-        parts = plain_parts(block)
-        if parts is None:
-            lines = _Numbered(before)
-            yield from recorded_parts(_lines((block,), lines), before + 1)
-            before = lines.count
+def _recorded(file: io.BufferedReader) -> Iterator[Block]:
+    before, in_bulk = 0, plain_block
+    for lines in _blocks_of_lines(file):
+        block = in_bulk(lines)
+        if before:  # a small file is read before NumPy is loaded
+            with contextlib.suppress(ImportError):
+                from p2os.capture.formats.recording_bulk import plain_lines as in_bulk
+        if block is None:
+            counted = _Numbered(before)
+            yield from blocks_of(recorded_parts(_lines((lines,), counted), before + 1))
+            before = counted.count
         else:
-            yield from parts
-            before += len(parts)
+            yield block
+            before += len(block)
 
 
 @dataclass(slots=True)
@@ -193,11 +204,19 @@ def _lines(blocks: Iterable[bytes], lines: _Numbered | None = None) -> Iterator[
                 yield part
 
 
+def _blocks_of_bytes(file: io.BufferedReader) -> Iterator[bytes]:
+    """Yield what can be read at once, so that nothing waits for the rest of a block."""
+    size = BLOCK_BYTES
+    while data := file.read1(size):
+        yield data
+        size = LARGE_BLOCK_BYTES
+
+
 def _blocks_of_lines(file: io.BufferedReader) -> Iterator[bytes]:
     """Yield whole lines, as many as were read together; what is longer than any line may be is cut."""
     rest: list[bytes] = []
     size = 0
-    while data := file.read1(BLOCK_BYTES):
+    for data in _blocks_of_bytes(file):
         whole, newline, tail = data.rpartition(b"\n")
         if newline:
             yield b"".join((*rest, whole, newline))

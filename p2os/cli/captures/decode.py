@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from p2os.capture import Chunk, ListingRow, Reading, explain, open_argument, open_capture, rows_of
+from p2os.capture import ListingRow, Reading, explain, open_argument, open_capture, rows_of
+from p2os.capture.chunks import Block, chunks_of
 from p2os.capture.explain import lines_of
 from p2os.capture.listing import line_of, summary_of
 from p2os.cli.captures.reading import (
@@ -66,12 +67,12 @@ def decode(
     sent_by = direction_of(direction)
     is_live = source == ["-"]
     capture = open_capture(sys.stdin.buffer, sent_by) if is_live else open_argument(source, sent_by)
-    reading, chunks = reading_of(capture.chunks, robot=robot, profile=profile)
+    reading, blocks = reading_of(capture.blocks, robot=robot, profile=profile)
     wanted = wanted_names(only)
     shown = damaged = 0
     end = _End()
-    watched = end.watched(chunks)
-    for row in chosen_rows(watched, reading, wanted) if wanted else rows_of(watched, reading):
+    watched = end.watched(blocks)
+    for row in chosen_rows(watched, reading, wanted) if wanted else rows_of(chunks_of(watched), reading):
         for line in _lines(row, reading, has_time=capture.has_time, as_json=json_output, explained=explained):
             sys.stdout.write(f"{line}\n")
         if is_live or not shown:
@@ -84,16 +85,16 @@ def decode(
 
 
 class _End:
-    """When the last chunk came that was read."""
+    """When the last of what was read had come."""
 
     def __init__(self) -> None:
         self.at_ns: Nanos = 0
 
-    def watched(self, chunks: Iterator[Chunk]) -> Iterator[Chunk]:
-        """Yield the same chunks."""
-        for chunk in chunks:
-            self.at_ns = chunk.at_ns
-            yield chunk
+    def watched(self, blocks: Iterator[Block]) -> Iterator[Block]:
+        """Yield the same blocks."""
+        for block in blocks:
+            self.at_ns = block.at_ns[-1]
+            yield block
 
 
 def _lines(row: ListingRow, reading: Reading, *, has_time: bool, as_json: bool, explained: bool) -> Iterator[str]:

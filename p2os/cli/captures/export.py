@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from p2os.capture import Chunk, ListingRow, Reading, Source, open_file, rows_of
+from p2os.capture import ListingRow, Reading, Source, open_file, rows_of
+from p2os.capture.chunks import Block, chunks_of
 from p2os.capture.formats.arrow_files import write_arrow, write_parquet
 from p2os.capture.formats.mcap_files import write_mcap
 from p2os.capture.table import Table, from_robot, tables_of, write_csv
@@ -58,12 +59,12 @@ def export(
         raise UsageError(f"{target}: cannot tell the format from {ending or 'no ending'!r}", hint=f"use {known}")
     refuse_to_overwrite(target, force=force)
     capture = open_file(source)
-    reading, chunks = reading_of(capture.chunks, robot=robot, profile=profile)
+    reading, blocks = reading_of(capture.blocks, robot=robot, profile=profile)
     try:
         if ending == ".mcap":
-            count = write_mcap(_chosen(chunks, reading, only or "all"), target)
+            count = write_mcap(_chosen(blocks, reading, only or "all"), target)
         else:
-            count = _TABLES[ending](_tables(capture, chunks, reading, only), target)
+            count = _TABLES[ending](_tables(capture, blocks, reading, only), target)
     except OSError as error:
         raise FileError(f"cannot write {target}: {(error.strerror or str(error)).lower()}") from error
     if not count:
@@ -72,32 +73,34 @@ def export(
     sys.stderr.write(f"{count} packets\n")
 
 
-def _tables(capture: Source, chunks: Iterator[Chunk], reading: Reading, only: str) -> Iterator[Table]:
+def _tables(capture: Source, blocks: Iterator[Block], reading: Reading, only: str) -> Iterator[Table]:
     """Return what was chosen as tables; a large capture's SIPs the fast way, where NumPy is installed."""
-    seen: list[Chunk] = []
+    seen: list[Block] = []
     if not only and capture.has_one_origin:
         size = 0
-        for chunk in chunks:
-            seen.append(chunk)
-            size += len(chunk.data)
+        for block in blocks:
+            seen.append(block)
+            size += len(block.data)
             if size >= LARGE_BYTES:
                 break
-        chunks = chain(seen, chunks)
+        blocks = chain(seen, blocks)
         if size >= LARGE_BYTES:
             try:
                 from p2os.capture.columns.sip_table import sip_tables
             except ImportError:
                 pass
             else:
-                return sip_tables(chunks, reading)
-    return tables_of(_chosen(chunks, reading, only), reading)
+                return sip_tables(blocks, reading)
+    return tables_of(_chosen(blocks, reading, only), reading)
 
 
-def _chosen(chunks: Iterable[Chunk], reading: Reading, only: str) -> Iterable[ListingRow]:
+def _chosen(blocks: Iterable[Block], reading: Reading, only: str) -> Iterable[ListingRow]:
     wanted = wanted_names(only)
     if not wanted:
-        return from_robot(rows_of(chunks, reading))
-    return rows_of(chunks, reading) if "all" in wanted else chosen_rows(chunks, reading, wanted - {"damaged"})
+        return from_robot(rows_of(chunks_of(blocks), reading))
+    if "all" in wanted:
+        return rows_of(chunks_of(blocks), reading)
+    return chosen_rows(blocks, reading, wanted - {"damaged"})
 
 
 def _write_csv(tables: Iterator[Table], target: Path) -> int:

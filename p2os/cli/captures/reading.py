@@ -4,14 +4,14 @@ Left open, both are found in the capture itself: the robot gives its model in
 answer to SYNC2, and the model implies which firmware family it runs.
 """
 
-import contextlib
 from collections.abc import Iterable, Iterator
 from itertools import chain
 from typing import Annotated
 
 import typer
 
-from p2os.capture import Chunk, Direction, ListingRow, Reading, rows_of
+from p2os.capture import Direction, ListingRow, Reading, rows_of
+from p2os.capture.chunks import Block, chunks_of
 from p2os.capture.listing import FrameCutter
 from p2os.cli.names import robots
 from p2os.protocol.frames import Frame
@@ -53,9 +53,9 @@ def direction_of(text: str) -> Direction | None:
 
 
 def reading_of(
-    source: Iterable[Chunk], *, robot: str = "", profile: Profile | None = None
-) -> tuple[Reading, Iterator[Chunk]]:
-    """Return how to read a capture, and its chunks, of which no more than the beginning was read.
+    source: Iterable[Block], *, robot: str = "", profile: Profile | None = None
+) -> tuple[Reading, Iterator[Block]]:
+    """Return how to read a capture, and its blocks, of which no more than the beginning was read.
 
     Args:
         source: What is to be read.
@@ -65,10 +65,10 @@ def reading_of(
     Raises:
         ParametersError: There is no such model or file.
     """
-    chunks, seen = iter(source), list[Chunk]()
-    subclass, guessed = _look(chunks, seen) if not robot or profile is None else ("", Profile.P2OS)
+    blocks, seen = iter(source), list[Block]()
+    subclass, guessed = _look(blocks, seen) if not robot or profile is None else ("", Profile.P2OS)
     parameters = load_parameters(robot) if robot else _parameters(subclass)
-    return Reading(profile=profile or guessed, parameters=parameters), chain(seen, chunks)
+    return Reading(profile=profile or guessed, parameters=parameters), chain(seen, blocks)
 
 
 def wanted_names(only: str) -> set[str]:
@@ -76,15 +76,15 @@ def wanted_names(only: str) -> set[str]:
     return {name.strip().lower() for name in only.split(",") if name.strip()}
 
 
-def chosen_rows(chunks: Iterable[Chunk], reading: Reading, wanted: set[str]) -> Iterator[ListingRow]:
+def chosen_rows(blocks: Iterable[Block], reading: Reading, wanted: set[str]) -> Iterator[ListingRow]:
     """Yield the rows of these names (`damaged`: of what is no sound frame); the rest costs little with NumPy."""
-    passing = None
-    if wanted:
-        with contextlib.suppress(ImportError):
-            from p2os.capture.columns.passing import Passing
-
-            passing = Passing(wanted)
-    for row in rows_of(chunks, reading, passing):
+    try:
+        from p2os.capture.columns.passing import rows_passing
+    except ImportError:
+        rows = rows_of(chunks_of(blocks), reading)
+    else:
+        rows = rows_passing(blocks, reading, wanted)
+    for row in rows:
         if row.name.lower() in wanted or ("damaged" in wanted and not row.valid):
             yield row
 
@@ -96,7 +96,7 @@ def _parameters(subclass: str) -> RobotParameters:
         return load_parameters(DEFAULT_ROBOT)
 
 
-def _look(chunks: Iterator[Chunk], seen: list[Chunk]) -> tuple[str, Profile]:
+def _look(blocks: Iterator[Block], seen: list[Block]) -> tuple[str, Profile]:
     """Return the model and the firmware family that a capture's beginning shows, and put what was read into `seen`.
 
     A SIP longer than its sonar readings need has the tail that only ARCOS sends;
@@ -104,8 +104,7 @@ def _look(chunks: Iterator[Chunk], seen: list[Chunk]) -> tuple[str, Profile]:
     """
     subclass, profile, size = "", Profile.P2OS, 0
     cutter = FrameCutter()
-    for chunk in chunks:
-        seen.append(chunk)
+    for chunk in chunks_of(_noted(blocks, seen)):
         size += len(chunk.data)
         for piece in cutter.take(chunk):
             if piece.direction is Direction.TO_ROBOT or len(piece.data) < 6 or piece.data[:2] != b"\xfa\xfb":
@@ -121,3 +120,9 @@ def _look(chunks: Iterator[Chunk], seen: list[Chunk]) -> tuple[str, Profile]:
         if size > LOOKED_AT_BYTES:
             break
     return subclass, profile
+
+
+def _noted(blocks: Iterator[Block], seen: list[Block]) -> Iterator[Block]:
+    for block in blocks:
+        seen.append(block)
+        yield block

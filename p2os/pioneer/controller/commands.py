@@ -429,6 +429,20 @@ def _request(extra: Extra) -> Handler:
     return _number(lambda context, value: context.requests.set(extra, value))
 
 
+def _laser_end_or_gripper() -> Handler:
+    """Return a handler of the number that ARIA's laser shares with its gripper.
+
+    Behind the beginning of the laser's field it is the field's end. Else 0, 1 or 2 ask for GRIPPERpac, as without one.
+    """
+    end, request = _laser(_laser_end, _request(Extra.GRIPPER)), _request(Extra.GRIPPER)
+
+    def take(context: Context, command: Command, now: Nanos) -> bool:
+        is_request = not context.devices.laser.is_end_due and _signed16(command) in {0, 1, 2}
+        return (request if is_request else end)(context, command, now)
+
+    return take
+
+
 def _once(extra: Extra) -> Handler:
     return _plain(lambda context: context.requests.set(extra, 1))
 
@@ -473,7 +487,7 @@ HANDLERS: Mapping[int, Handler] = {
     _C.GRIPPERVAL: _laser(
         _laser_start, _number(lambda context, value: setattr(context.devices.gripper, "value", value))
     ),
-    _C.GRIPREQUEST: _laser(_laser_end, _request(Extra.GRIPPER)),
+    _C.GRIPREQUEST: _laser_end_or_gripper(),
     _C.IOREQUEST: _request(Extra.IO),
     _C.PTUPOS: _two_bytes(lambda context, width, port: context.devices.pins.set_servo(port, width)),
     _C.TTY2: _aux_send(1),

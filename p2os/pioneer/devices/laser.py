@@ -104,6 +104,8 @@ class Laser:
     start_deg: int = 0
     end_deg: int = 0
     step_cdeg: int = 1
+    #: A client has set where the field begins, and not yet where it ends.
+    is_end_due: bool = False
     #: The simulator has moved the robot since the last extended packet.
     has_jumped: bool = False
 
@@ -126,11 +128,11 @@ class Laser:
 
     def set_start(self, degrees: int) -> None:
         """Set where the field begins (SIM_LRF_SET_FOV_START), degrees from straight ahead."""
-        self.start_deg = _within_turn(degrees)
+        self.start_deg, self.is_end_due = _within_turn(degrees), True
 
     def set_end(self, degrees: int) -> None:
         """Set where the field ends (SIM_LRF_SET_FOV_END)."""
-        self.end_deg = _within_turn(degrees)
+        self.end_deg, self.is_end_due = _within_turn(degrees), False
 
     def set_step(self, hundredths: int) -> None:
         """Set the angle between readings (SIM_LRF_SET_RES), hundredths of a degree; below one it stays."""

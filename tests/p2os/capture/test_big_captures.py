@@ -8,7 +8,7 @@ from typing import BinaryIO, cast
 import pytest
 
 from p2os.capture import Chunk, Direction, Reading, open_capture, rows_of, write_pcap
-from p2os.capture.chunks import capture_of
+from p2os.capture.chunks import block_of_chunks, capture_of
 from p2os.capture.formats.sources import BLOCK_BYTES
 from p2os.capture.table import FIRST_ROWS, Table, from_robot, tables_of, write_csv
 from p2os.cli.captures.reading import LOOKED_AT_BYTES, reading_of
@@ -62,10 +62,10 @@ def test_the_first_row_of_a_file_without_end_comes_before_more_than_two_blocks_a
 
 def test_how_to_read_a_capture_is_told_by_its_beginning() -> None:
     file = Endless(SIP, SIP)
-    reading, chunks = reading_of(open_capture(cast("BinaryIO", file)).chunks)
+    reading, blocks = reading_of(open_capture(cast("BinaryIO", file)).blocks)
     assert reading.profile is Profile.P2OS
     assert file.read_bytes <= LOOKED_AT_BYTES + 3 * BLOCK_BYTES
-    assert next(chunks).data.startswith(SIP)
+    assert next(blocks).data.startswith(SIP)
 
 
 def chunks_of(count: int, taken: list[int]) -> Iterator[Chunk]:
@@ -81,7 +81,8 @@ def test_tables_come_while_chunks_are_read(by_columns: bool) -> None:
         pytest.importorskip("numpy")
         from p2os.capture.columns.sip_table import sip_tables
 
-        tables = sip_tables(chunks_of(count, taken), P2DX, block=FIRST_ROWS * len(SIP))
+        blocks = (block_of_chunks([chunk]) for chunk in chunks_of(count, taken))
+        tables = sip_tables(blocks, P2DX, block=FIRST_ROWS * len(SIP))
     else:
         tables = tables_of(from_robot(rows_of(chunks_of(count, taken), P2DX)), P2DX)
     seen = [(table.rows, taken[0]) for table in tables]

@@ -2,7 +2,7 @@
 
 import io
 import itertools
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import pytest
@@ -10,8 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from p2os.capture import ListingRow, Reading, open_capture, open_file, rows_of
-from p2os.capture.chunks import Chunk, Direction, Part, capture_of
-from p2os.capture.formats.recording import plain_parts, recorded_parts, write_recording
+from p2os.capture.chunks import Block, Chunk, Direction, Part, block_of_chunks, capture_of
+from p2os.capture.formats.recording import plain_block, recorded_parts, write_recording
+from p2os.capture.formats.recording_bulk import plain_lines
 from p2os.cli.captures.reading import chosen_rows, wanted_names
 from p2os.protocol.commands import rvel, vel
 from p2os.protocol.frames import Decoder, checksum, sound_frames
@@ -26,6 +27,9 @@ SIP = packet_frame(StandardSip(raw_x=5, sonar=(SonarReading(1, 1000),)), Profile
 FRAMES = (SIP, packet_frame(EncoderPacket(left_counts=1, right_counts=2), Profile.P2OS).to_bytes(),
           vel(200).to_frame().to_bytes(), rvel(-3).to_frame().to_bytes(), b"\xfa\xfb\x03\x00\x00\x00")  # fmt: skip
 STREAM = b"".join(FRAMES)
+#: From how many bytes on NumPy looks into a chunk; how many chunks a block holds.
+HOW = ((0, 1), (1 << 11, 100))
+WANTED = ("vel", "sip", "encoder,sync0,pulse", "damaged")
 
 
 def shown(chunks: list[Chunk]) -> list[tuple[object, ...]]:
@@ -43,17 +47,22 @@ def both_ways(chunks: list[Chunk]) -> None:
         patch.setattr("p2os.capture.listing._next_header", lambda data, _: len(data))
         assert fast == shown(chunks)
         patch.undo()
-        for least, wanted in itertools.product((0, 1 << 11), ("vel", "sip", "encoder,sync0,pulse", "damaged")):
+        for least, together, wanted in [(*how, wanted) for how in HOW for wanted in WANTED]:
             patch.setattr("p2os.capture.columns.passing.LEAST_BYTES", least)
             names = wanted_names(wanted)
-            passed = shown_of(chosen_rows(chunks, P2DX, names))
+            passed = shown_of(chosen_rows(blocks_of(chunks, together), P2DX, names))
             assert passed == [row for row in fast if str(row[4]).lower() in names or ("damaged" in names and row[5])]
+
+
+def blocks_of(chunks: list[Chunk], together: int) -> list[Block]:
+    blocks = [block_of_chunks(chunks[place : place + together]) for place in range(0, len(chunks), together)]
+    return [block for block in blocks if len(block)]
 
 
 def chunks_of(stream: bytes, cuts: tuple[int, ...], wait_ns: int, direction: Direction | None = None) -> list[Chunk]:
     places = sorted({0, *cuts, len(stream)})
     return [Chunk(at_ns=number * wait_ns, direction=direction, data=stream[start:end])
-            for number, (start, end) in enumerate(itertools.pairwise(places))]  # fmt: skip
+            for number, (start, end) in enumerate(itertools.pairwise(places)) if start < end]  # fmt: skip
 
 
 @pytest.mark.parametrize("wait_ns", [0, 249 * NS_PER_MS, 250 * NS_PER_MS])
@@ -63,6 +72,14 @@ def test_rows_are_the_same_however_a_stream_is_cut_and_corrupted(wait_ns: int) -
         hit = STREAM[:place] + bytes((STREAM[place] ^ 0x41,)) + STREAM[place + 1 :]
         both_ways(chunks_of(hit, (place, place + 3), wait_ns))
         both_ways(chunks_of(STREAM[:place] + STREAM[place + 1 :], (len(SIP), place), wait_ns))
+
+
+@pytest.mark.parametrize("first", [b"\xfa\xfb\xc0", SIP])
+@pytest.mark.parametrize("wait_ns", [0, 250 * NS_PER_MS])
+def test_sound_packets_behind_a_frame_that_waits_are_not_passed_over(first: bytes, wait_ns: int) -> None:
+    parts = [first, SIP, SIP, SIP[:9], SIP[9:] + SIP, FRAMES[2], SIP]
+    both_ways([Chunk(at_ns=wait_ns * (number > 3), direction=Direction.FROM_ROBOT, data=data)
+               for number, data in enumerate(parts)])  # fmt: skip
 
 
 @given(st.lists(st.one_of(st.sampled_from(FRAMES), st.binary(max_size=4), st.just(b"\xfa\xfb\xc0"), st.just(b"\xfa")),
@@ -92,17 +109,25 @@ PARTS: list[Part] = [(0, Direction.FROM_ROBOT, SIP), (999_999_999_999_999, Direc
 BLOCK = write_recording(capture_of(PARTS)).split("\n", 1)[1].encode()
 
 
-def test_lines_of_ours_are_read_at_once() -> None:
-    assert plain_parts(BLOCK) == PARTS
+def parts_of(block: Block) -> list[Part]:
+    return [(chunk.at_ns, chunk.direction, chunk.data) for chunk in block]
+
+
+@pytest.mark.parametrize("read", [plain_block, plain_lines])
+def test_lines_of_ours_are_read_at_once(read: Callable[[bytes], Block | None]) -> None:
+    block = read(BLOCK)
+    assert block is not None
+    assert parts_of(block) == PARTS
 
 
 @pytest.mark.parametrize("place", range(len(BLOCK)))
 def test_a_block_of_lines_damaged_anywhere_is_read_as_line_by_line_or_left_to_that(place: int) -> None:
     for hit in (b"", b"9", b"g", b'"', b" ", b"\n", b"\r", b"\xc3"):
         block = BLOCK[:place] + hit + BLOCK[place + 1 :]
-        parts = plain_parts(block)
-        if parts is not None:
-            assert parts == list(recorded_parts(block.decode().splitlines()))
+        found = plain_block(block)
+        assert plain_lines(block) == found
+        if found is not None:
+            assert parts_of(found) == list(recorded_parts(block.decode().splitlines()))
 
 
 def test_a_fault_behind_lines_of_ours_names_its_line() -> None:
@@ -134,4 +159,4 @@ def test_a_packet_that_is_passed_over_still_opens_the_session(least: int, monkey
     monkeypatch.setattr("p2os.capture.columns.passing.LEAST_BYTES", least)
     pulse = b"\xfa\xfb\x03\x00\x00\x00"
     chunks = chunks_of(SIP + SIP + pulse + SIP, (), 0)
-    assert [row.name for row in chosen_rows(chunks, P2DX, {"pulse", "sync0"})] == ["PULSE"]
+    assert [row.name for row in chosen_rows(blocks_of(chunks, 1), P2DX, {"pulse", "sync0"})] == ["PULSE"]

@@ -15,7 +15,7 @@ pytest.importorskip("numpy")
 
 from p2os.capture import Reading, read_file, rows_of
 from p2os.capture.cells import Cell
-from p2os.capture.chunks import Capture, Chunk, Direction, capture_of
+from p2os.capture.chunks import Capture, Chunk, Direction, block_of_chunks, capture_of
 from p2os.capture.columns.sip_table import sip_tables
 from p2os.capture.table import Table, from_robot, tables_of
 from p2os.cli.main import run
@@ -42,9 +42,12 @@ def joined(tables: Iterable[Table]) -> dict[str, list[Cell]]:
 
 
 def same(
-    capture: Capture, reading: Reading = P2DX, *, first_rows: int = 4096, block: int = 1 << 20
+    capture: Capture, reading: Reading = P2DX, *, first_rows: int = 4096, block: int = 1 << 20, together: int = 3
 ) -> dict[str, list[Cell]]:
-    ours = joined(sip_tables(capture, reading, first_rows=first_rows, block=block))
+    chunks = capture.chunks
+    blocks = [block_of_chunks(chunks[place : place + together]) for place in range(0, len(chunks), together)]
+    blocks = [block for block in blocks if len(block)]
+    ours = joined(sip_tables(blocks, reading, first_rows=first_rows, block=block))
     theirs = joined(tables_of(from_robot(rows_of(capture, reading)), reading, first_rows))
     assert list(ours) == list(theirs)
     assert ours == theirs
@@ -67,17 +70,22 @@ waits = st.sampled_from((0, 1, 100 * NS_PER_MS, 249 * NS_PER_MS, 250 * NS_PER_MS
 
 @given(st.lists(st.tuples(waits, st.sampled_from((True, True, True, False)), bytes_of_a_chunk), max_size=9),
        st.sampled_from((ROBOT, None)), st.sampled_from(Profile), st.sampled_from((1, 300, 1 << 20)),
-       st.sampled_from((1, 2, 4096)))  # fmt: skip
+       st.sampled_from((1, 2, 4096)), st.sampled_from((1, 2, 3, 100)))  # fmt: skip
 @settings(deadline=None, max_examples=100)
 def test_a_capture_gives_the_same_cells_either_way(
-    parts: list[tuple[Nanos, bool, bytes]], direction: Direction | None, profile: Profile, block: int, first_rows: int
+    parts: list[tuple[Nanos, bool, bytes]],
+    direction: Direction | None,
+    profile: Profile,
+    block: int,
+    first_rows: int,
+    together: int,
 ) -> None:
     chunks, now = [Chunk(at_ns=0, direction=direction, data=sip_bytes())], 0
     for wait, is_robot, data in parts:
         now += wait
         chunks.append(Chunk(at_ns=now, direction=direction if is_robot else CLIENT, data=data))
     reading = Reading(profile=profile, parameters=P2DX.parameters)
-    same(Capture(chunks=tuple(chunks)), reading, first_rows=first_rows, block=block)
+    same(Capture(chunks=tuple(chunks)), reading, first_rows=first_rows, block=block, together=together)
 
 
 @pytest.mark.parametrize("name", ["aria_p2de.jsonl", "player_p2de.jsonl"])
@@ -98,6 +106,13 @@ def test_positions_are_followed_over_the_wrap_and_sonar_has_a_column_a_number() 
 def test_a_frame_behind_a_false_header_has_the_time_when_that_was_given_up() -> None:
     chunks = [(0, ROBOT, b"\xfa\xfb\xc0" + sip_bytes()), (300 * NS_PER_MS, CLIENT, b"\0")]
     assert same(capture_of(chunks))["t_s"] == [0.3]
+
+
+def test_it_is_given_up_at_the_first_byte_of_anyone_once_the_line_was_quiet_for_so_long() -> None:
+    waits = (249 * NS_PER_MS, 250 * NS_PER_MS, 251 * NS_PER_MS, 400 * NS_PER_MS)
+    chunks = [(0, ROBOT, b"\xfa\xfb\xc0" + sip_bytes()), *((wait, CLIENT, b"\0") for wait in waits)]
+    for together in range(1, 6):
+        assert same(capture_of(chunks), together=together)["t_s"] == [0.25]
 
 
 def test_a_capture_without_sips_has_no_table() -> None:

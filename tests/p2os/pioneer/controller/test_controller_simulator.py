@@ -110,6 +110,31 @@ def test_a_sweep_of_181_readings_follows_each_packet(
     assert not robot.pioneer.state.ignored_commands
 
 
+@pytest.mark.parametrize(("value", "packets"), [(-1, 0), (0, 0), (1, 1), (2, 5), (3, 0)])
+def test_a_gripper_is_asked_beside_a_laser_but_where_its_field_ends(
+    make_robot: MakeRobot, value: int, packets: int
+) -> None:
+    robot = make_robot(laser=LMS).open()
+
+    def gripper_packets() -> int:
+        robot.frames()
+        robot.say(C.GRIPREQUEST, value)
+        robot.run(500)
+        return sum(frame.kind == 0xE0 for frame in robot.frames())
+
+    def field() -> tuple[int, int]:
+        laser = robot.pioneer._context.devices.laser
+        return laser.start_deg, laser.end_deg
+
+    assert gripper_packets() == packets
+    assert field() == (LMS.start_deg, LMS.end_deg if value in {0, 1, 2} else value)
+    robot.say(C.GRIPREQUEST, 0)
+    robot.say(C.GRIPPERVAL, -45)
+    assert gripper_packets() == 0
+    assert field() == (-45, value)
+    assert gripper_packets() == packets
+
+
 def test_plain_laser_packets_carry_the_odometers_pose(make_robot: MakeRobot) -> None:
     robot = make_robot(laser=LMS).open()
     robot.say(C.VEL, 200)
