@@ -21,7 +21,8 @@ from dataclasses import dataclass, replace
 from typing import cast
 
 from p2os.errors import ScenarioError
-from robot_bench.scenario.schema import Key, Place, Source, Table, check_table, in_range, nearest, within
+from p2os.pioneer.world.file import in_range
+from p2os.toml_schema import Key, Place, Source, Table, check_table, nearest, within
 from simbase.errors import shown
 
 #: What a robot has for itself; those that a scenario of one robot has at its top, and where it stands.

@@ -29,9 +29,10 @@ from typing import cast
 
 from p2os.errors import ScenarioError, WorldError
 from p2os.pioneer.body.contract import RobotBody
+from p2os.pioneer.world.file import in_range
 from p2os.pioneer.world.model import RANGES, Obstacle, Repeat, Walk, World
 from p2os.robots.parameters import RobotParameters
-from robot_bench.scenario.schema import LONGEST_S, Key, Table, Where, check_table, in_range, nearest, within
+from p2os.toml_schema import LONGEST_S, Key, Table, Where, check_table, nearest, within
 from robot_bench.scenario.timeline import Timeline
 from simbase.errors import shown
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos

@@ -6,13 +6,13 @@ is a bare number: `"60 cm"` is refused with the unit that is wanted.
 """
 
 import difflib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Literal, Protocol, runtime_checkable
+from typing import Any, Literal, Protocol, cast, overload, runtime_checkable
 
 from p2os.errors import ScenarioError
-from p2os.pioneer.world.model import RANGES
-from simbase.errors import shown
+from simbase.errors import FileError, MissingDependencyError, P2osError, shown
 
 #: chosen: eleven days; a larger number of seconds is a mistake of the unit.
 LONGEST_S = 1_000_000
@@ -20,12 +20,19 @@ LONGEST_S = 1_000_000
 #: A parsed TOML table.
 Table = Mapping[str, object]
 
-Kind = Literal["text", "texts", "number", "whole", "flag", "table", "tables", "list"]
+Kind = Literal[
+    "any", "text", "texts", "line", "ascii", "number", "numbers", "points", "whole", "flag", "table", "tables", "list"
+]  # fmt: skip
 
 _MEANING = {
+    "any": "a value",
     "text": "a text in quotes",
     "texts": "a text in quotes, or a list of them",
+    "line": "a line of printable characters in quotes",
+    "ascii": "a line of printable ASCII characters in quotes",
     "number": "a number",
+    "numbers": "a list of numbers",
+    "points": "a list of lists of numbers",
     "whole": "a whole number",
     "flag": "true or false",
     "table": "a table",
@@ -35,16 +42,19 @@ _MEANING = {
 
 _TYPES: Mapping[Kind, tuple[type, ...]] = {
     "text": (str,),
+    "line": (str,),
+    "ascii": (str,),
     "number": (int, float),
     "whole": (int,),
-    "flag": (bool,),
     "table": (dict,),
     "list": (list,),
+    "numbers": (list, tuple),
+    "points": (list, tuple),
 }
 
 _UNITS = {
     "_m": "metres", "_mm": "millimetres", "_mm_s": "mm/s", "_mm_s2": "mm/s²", "_deg": "degrees", "_deg_s": "deg/s",
-    "_s": "seconds", "_ms": "milliseconds",
+    "_s": "seconds", "_ms": "milliseconds", "_mps": "metres a second", "_kg": "kilograms",
 }  # fmt: skip
 
 
@@ -52,8 +62,10 @@ _UNITS = {
 class Key:
     """One key that a table may have.
 
-    `least` and `most` are inclusive; `above` is not. `group` names the entry points that may stand there
-    beside the choices, as may FILE.py:CLASS; the loader looks for them.
+    `least` and `most` are inclusive; `above` is not; of a line, `most` is how long it may be. `count` is how many
+    numbers stand in a list of them, each within the range. `default` is what `filled` puts where there is none.
+    `group` names the entry points that may stand there beside the choices, as may FILE.py:CLASS; the loader looks
+    for them.
     """
 
     name: str
@@ -62,8 +74,10 @@ class Key:
     least: float | None = None
     above: float | None = None
     most: float | None = None
+    count: int = 0
     choices: tuple[str, ...] = ()
     group: str = ""
+    default: object = None
 
 
 class Source(Protocol):
@@ -91,6 +105,8 @@ class Place:
     table: str = ""
     number: int = 0
     title: str = ""
+    #: What is raised.
+    error: type[FileError] = ScenarioError
 
     def at(self, key: str = "") -> str:
         """Return the place with the line of a key, or of the table's header."""
@@ -105,6 +121,10 @@ class Place:
 Where = str | Place
 
 
+@overload
+def within(where: Place, table: str, number: int | None = None) -> Place: ...
+@overload
+def within(where: Where, table: str, number: int | None = None) -> Where: ...
 def within(where: Where, table: str, number: int | None = None) -> Where:
     """Return the place of a table of a file: `[table]`, or the number-th `[[table]]`, counted from 0."""
     listed = number or 0
@@ -113,13 +133,7 @@ def within(where: Where, table: str, number: int | None = None) -> Where:
     title = f"[{table}]" if number is None else f"[[{table}]] {listed + 1}"
     if isinstance(where, str):
         return f"{where}: {title}"
-    return Place(where.source, table, number or 0, title)
-
-
-def in_range(name: str, *, required: bool = False) -> Key:
-    """Return the key for a number that has the same name and range in a world file."""
-    least, most = RANGES[name]
-    return Key(name=name, kind="number", required=required, least=least, most=most)
+    return Place(where.source, table, number or 0, title, where.error)
 
 
 def check_table(table: Table, keys: Sequence[Key], where: Where) -> None:
@@ -131,17 +145,43 @@ def check_table(table: Table, keys: Sequence[Key], where: Where) -> None:
         where: File and place, for the message.
 
     Raises:
-        ScenarioError: A key is unknown, missing or has a value of the wrong kind or range.
+        FileError: A key is unknown, missing or has a value of the wrong kind or range; of the kind that `where` has.
     """
-    known = {key.name: key for key in keys}
+    known, error = {key.name: key for key in keys}, ScenarioError if isinstance(where, str) else where.error
     for name in table:
         if name not in known:
-            raise ScenarioError(f"{_at(where, name)}: unknown key {shown(name)}", hint=nearest(name, known))
+            hint = nearest(name, known) if known else "the table has no keys"
+            raise error(f"{_at(where, name)}: unknown key {shown(name)}", hint=hint)
     for key in keys:
         if key.name in table:
-            _check_value(table[key.name], key, _at(where, key.name))
+            _check_value(table[key.name], key, _at(where, key.name), error)
         elif key.required:
-            raise ScenarioError(f"{where}: key {key.name!r} is missing", hint=_wanted(key))
+            raise error(f"{where}: key {key.name!r} is missing", hint=_wanted(key))
+
+
+def filled(table: Table, keys: Sequence[Key], where: Where) -> dict[str, Any]:
+    """Check a table, and return the value or the default of every key.
+
+    Raises:
+        FileError: As `check_table`.
+    """
+    check_table(table, keys, where)
+    return {key.name: table.get(key.name, key.default) for key in keys}
+
+
+@contextmanager
+def placed(where: Place, key: str = "") -> Iterator[None]:
+    """Put the place of a key, or of its table, before what is raised about its value.
+
+    Raises:
+        FileError: Instead of any error of ours but one of something that is not installed; of the kind of `where`.
+    """
+    try:
+        yield
+    except MissingDependencyError:
+        raise
+    except P2osError as error:
+        raise where.error(f"{where.at(key)}: {error}", hint=error.hint) from error
 
 
 def nearest(word: str, known: Mapping[str, object] | Sequence[str]) -> str:
@@ -150,39 +190,61 @@ def nearest(word: str, known: Mapping[str, object] | Sequence[str]) -> str:
     return f"did you mean {close[0]!r}?" if close else f"known are {', '.join(sorted(known))}"
 
 
-def _check_value(value: object, key: Key, where: str) -> None:
+def _check_value(value: object, key: Key, where: str, error: type[FileError]) -> None:
     if not _fits(value, key):
-        raise ScenarioError(f"{where}: {key.name} = {_shown(value)} is not {_wanted(key)}", hint=_hint(value, key))
+        raise error(f"{where}: {key.name} = {_shown(value)} is not {_wanted(key)}", hint=_hint(value, key))
     if key.choices and not key.group and value not in key.choices:
         hint = nearest(str(value), key.choices)
-        raise ScenarioError(f"{where}: {key.name} = {_shown(value)} is none of {', '.join(key.choices)}", hint=hint)
-    if isinstance(value, (int, float)) and not isinstance(value, bool):
-        low = (key.least is not None and value < key.least) or (key.above is not None and value <= key.above)
-        if low or (key.most is not None and value > key.most) or value != value:  # noqa: PLR0124 - not a number
-            raise ScenarioError(f"{where}: {key.name} = {_shown(value)} is out of range", hint=f"it is {_wanted(key)}")
+        raise error(f"{where}: {key.name} = {_shown(value)} is none of {', '.join(key.choices)}", hint=hint)
+    for number in _numbers(value):
+        low = (key.least is not None and number < key.least) or (key.above is not None and number <= key.above)
+        if low or (key.most is not None and number > key.most) or number != number:  # noqa: PLR0124 - not a number
+            raise error(f"{where}: {key.name} = {_shown(number)} is out of range", hint=f"it is {_wanted(key)}")
 
 
 def _fits(value: object, key: Key) -> bool:
-    if key.kind == "tables":
-        return isinstance(value, list) and all(isinstance(item, Mapping) for item in value)
+    if key.kind in {"any", "flag"}:
+        return key.kind == "any" or isinstance(value, bool)
+    if isinstance(value, bool) or not isinstance(value, _TYPES.get(key.kind, (object,))):
+        return False
+    if key.kind in {"line", "ascii"}:
+        text = str(value)
+        return text.isprintable() and len(text) <= cast("float", key.most) and (key.kind == "line" or text.isascii())
     if key.kind == "texts":
         return isinstance(value, str) or (isinstance(value, list) and all(isinstance(item, str) for item in value))
-    if isinstance(value, bool):
-        return key.kind == "flag"
-    return isinstance(value, _TYPES[key.kind])
+    if key.kind == "tables":
+        return isinstance(value, list) and all(isinstance(item, Mapping) for item in value)
+    rows = [value] if key.kind == "numbers" else value if key.kind == "points" else ()
+    return all(
+        isinstance(row, (list, tuple))
+        and len(row) == key.count
+        and all(isinstance(item, (int, float)) and not isinstance(item, bool) for item in row)
+        for row in cast("Sequence[object]", rows)
+    )
+
+
+def _numbers(value: object) -> Iterator[float]:
+    """Yield the numbers of a value that fits."""
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        yield value
+    elif isinstance(value, (list, tuple)):
+        for item in value:
+            yield from _numbers(item)
 
 
 def _wanted(key: Key) -> str:
     meaning = _MEANING[key.kind]
     unit = max((suffix for suffix in _UNITS if key.name.endswith(suffix)), key=len, default="")
-    if unit and key.kind in {"number", "whole"}:
+    if key.count:
+        meaning = meaning.replace("numbers", f"{key.count} numbers")
+    if unit and "number" in meaning:
         meaning += f" of {_UNITS[unit]}"
     if key.above is not None:
         meaning += f" above {key.above:g}"
     if key.least is not None:
         meaning += f", at least {key.least:g}"
     if key.most is not None:
-        meaning += f", at most {key.most:g}"
+        meaning += f", at most {key.most:g}" + (" of them" if key.kind in {"line", "ascii"} else "")
     if key.choices:
         meaning = "one of " + ", ".join(key.choices) + (", or FILE.py:CLASS" if key.group else "")
     return meaning
@@ -191,7 +253,7 @@ def _wanted(key: Key) -> str:
 def _hint(value: object, key: Key) -> str | None:
     if isinstance(value, str) and key.kind in {"number", "whole"}:
         return "the unit stands in the key; write the bare number"
-    return None
+    return f"it is written as [[{key.name}]]" if key.kind == "tables" else None
 
 
 def _shown(value: object) -> str:
