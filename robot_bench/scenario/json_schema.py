@@ -21,6 +21,8 @@ DRAFT = "https://json-schema.org/draft/2020-12/schema"
 _TYPES = {
     "text": "string", "number": "number", "whole": "integer", "flag": "boolean", "table": "object", "tables": "array",
     "list": "array",
+    "numbers": "array",
+    "points": "array",
 }  # fmt: skip
 
 
