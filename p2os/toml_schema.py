@@ -5,14 +5,13 @@ the nearest key that exists. Units stand in the key (`threshold_m`), so a value
 is a bare number: `"60 cm"` is refused with the unit that is wanted.
 """
 
-import difflib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol, cast, overload, runtime_checkable
 
 from p2os.errors import ScenarioError
-from simbase.errors import FileError, MissingDependencyError, P2osError, shown
+from simbase.errors import FileError, MissingDependencyError, P2osError, nearest, shown
 
 #: chosen: eleven days; a larger number of seconds is a mistake of the unit.
 LONGEST_S = 1_000_000
@@ -182,12 +181,6 @@ def placed(where: Place, key: str = "") -> Iterator[None]:
         raise
     except P2osError as error:
         raise where.error(f"{where.at(key)}: {error}", hint=error.hint) from error
-
-
-def nearest(word: str, known: Mapping[str, object] | Sequence[str]) -> str:
-    """Return a hint: the nearest of the known words, or all of them."""
-    close = difflib.get_close_matches(word, list(known), n=1, cutoff=0.5)
-    return f"did you mean {close[0]!r}?" if close else f"known are {', '.join(sorted(known))}"
 
 
 def _check_value(value: object, key: Key, where: str, error: type[FileError]) -> None:

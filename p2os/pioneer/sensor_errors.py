@@ -19,8 +19,8 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 from p2os.toml_file import TomlPlaces, TomlSource, is_file, read_toml, read_user_text
-from p2os.toml_schema import Key, Place, filled, nearest, within
-from simbase.errors import FileError, shown, shown_name
+from p2os.toml_schema import Key, Place, filled, within
+from simbase.errors import FileError, nearest, shown, shown_name
 
 
 class SensorErrorsError(FileError):

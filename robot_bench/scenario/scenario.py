@@ -31,7 +31,7 @@ from p2os.pioneer.world.model import World
 from p2os.pioneer.world.start_places import refuse_start, start_places
 from p2os.robots.parameters import RobotParameters, load_parameters
 from p2os.toml_file import is_file
-from p2os.toml_schema import LONGEST_S, Key, Place, Table, Where, check_table, nearest, within
+from p2os.toml_schema import LONGEST_S, Key, Place, Table, Where, check_table, within
 from robot_bench.direct.robot import DirectSettings
 from robot_bench.events.selection import BUSES, bus_of
 from robot_bench.scenario import fault_script, plugged_parts, when_script, world_script
@@ -54,7 +54,7 @@ from robot_bench.scenario.wired_robots import OwnRobot, find_own_robot, known_ow
 from robot_bench.scenario.world_script import Change, load_changes, refuse_names
 from robot_bench.wires.line_ends import ENDS
 from robot_bench.wires.power_up import RANDOM_SRAM, ZEROS
-from simbase.errors import FileError, UsageError, shown, shown_name
+from simbase.errors import FileError, UsageError, nearest, shown, shown_name
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 from simbase.user_classes import located, source_of
 

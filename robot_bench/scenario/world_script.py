@@ -32,9 +32,9 @@ from p2os.pioneer.body.contract import RobotBody
 from p2os.pioneer.world.file import in_range
 from p2os.pioneer.world.model import Obstacle, Repeat, Walk, World
 from p2os.robots.parameters import RobotParameters
-from p2os.toml_schema import LONGEST_S, Key, Table, Where, check_table, nearest, within
+from p2os.toml_schema import LONGEST_S, Key, Table, Where, check_table, within
 from robot_bench.scenario.timeline import Timeline
-from simbase.errors import shown
+from simbase.errors import nearest, shown
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: chosen: the robot moves 10 mm at most in between.

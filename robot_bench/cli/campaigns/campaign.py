@@ -15,7 +15,6 @@ from rich.progress import Progress as Bar
 from p2os.cli.help_pages import BENCH
 from p2os.cli.main import EXIT_INTERRUPTED
 from p2os.cli.quantities import option
-from p2os.toml_schema import nearest
 from p2os.transport.wall_clock import wall_clock
 from robot_bench.campaign.campaign_file import Campaign, campaign_schema
 from robot_bench.campaign.conduct import Finding, Progress, Workers
@@ -30,7 +29,7 @@ from robot_bench.cli.progress import RunDisplay
 from robot_bench.cli.workers import core_count
 from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.scenario.scenario import load_scenario
-from simbase.errors import UsageError
+from simbase.errors import UsageError, nearest
 from simbase.units import COUNT
 
 HELP = """Search for worlds in which a firmware fails.

@@ -14,7 +14,6 @@ from p2os.cli.keyboard import has_keyboard
 from p2os.cli.main import EXIT_INTERRUPTED
 from p2os.cli.names import bodies, urls
 from p2os.cli.quantities import option
-from p2os.toml_schema import nearest
 from robot_bench.cli.progress import RunDisplay
 from robot_bench.cli.run import ask, capped, drive_port
 from robot_bench.cli.workers import core_count, run_in_processes
@@ -37,7 +36,7 @@ from robot_bench.run import RunResult
 from robot_bench.scenario.included_files import Setting, read_setting
 from robot_bench.scenario.scenario import MODES, Scenario
 from robot_bench.scenario.sweep import read_seeds
-from simbase.errors import FileError, UsageError
+from simbase.errors import FileError, UsageError, nearest
 from simbase.units import COUNT
 
 REPORT, FIGURES = "validation.html", "validation.json"

@@ -9,7 +9,7 @@ from p2os.cli.main import run
 from p2os.pioneer.world import known_worlds, load_world
 
 COMMANDS_THAT_FAIL = [
-    (["world", "show", "rooom"], "p2os: no world 'rooom'\nhint: did you mean room?\n"),
+    (["world", "show", "rooom"], "p2os: no world 'rooom'\nhint: did you mean 'room'?\n"),
     (["world", "show", "room", "--out", "room.jpg"], "hint: --out FILE.svg\n"),
     (["world", "show", "room", "--out", "missing/room.svg"], "No such file or directory\n"),
     (["world", "new", "--kind", "swamp"], "hint: kinds: arena, doorway, maze, office, slalom\n"),

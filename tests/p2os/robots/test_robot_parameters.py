@@ -171,7 +171,7 @@ def test_a_file_of_ones_own_may_be_based_on_a_shipped_one(tmp_path: Path) -> Non
         load_parameters(path)
 
 
-@pytest.mark.parametrize(("name", "hint"), [("p2xd", "p2dx"), ("zzzzzz", "known models")])
+@pytest.mark.parametrize(("name", "hint"), [("p2xd", "p2dx"), ("zzzzzz", "known are amigo, ")])
 def test_an_unknown_robot_gets_a_hint(name: str, hint: str) -> None:
     with pytest.raises(ParametersError) as caught:
         load_parameters(name)
