@@ -49,7 +49,10 @@ def load_world(name_or_path: str | Path, seed: int = 0) -> World:
             raise WorldError(f"no world {shown(name)}: there is no such file", hint="p2os world list names what ships")
         if is_folder(path):
             raise WorldError(f"no world {shown(name)}: that is a folder", hint="name a file in it")
-        raise WorldError(f"no world {shown(name)}", hint=nearest(name, known_worlds()))
+        raise WorldError(
+            f"no world {shown(name)}",
+            hint=nearest(name, known_worlds(), f"shipped worlds: {', '.join(known_worlds())}"),
+        )
     if path.suffix.lower() != ".toml":
         from p2os.pioneer.world.formats import read_world
 
