@@ -9,8 +9,7 @@ from enum import StrEnum
 from adapter_sim.mixing import Mixer, Speeds
 from adapter_sim.pins import Inputs
 from adapter_sim.settings import AdapterSettings
-from p2os.gamepad import Gamepad as AnyGamepad
-from p2os.gamepad import PadReport
+from p2os.gamepad import Gamepad, PadReport
 from simbase.state import Stateful
 from simbase.timing import Nanos
 
@@ -20,15 +19,6 @@ class Master(StrEnum):
 
     BLUEPILL = "bluepill"
     PAD = "pad"
-
-
-class Gamepad(AnyGamepad):
-    """A game pad with the adapter's settings: what its newest report asks for."""
-
-    def __init__(self, settings: AdapterSettings) -> None:
-        super().__init__(
-            trigger_dead=settings.pad_trigger_dead, stick_dead=settings.pad_stick_dead, loss_ns=settings.pad_loss_ns
-        )
 
 
 class Masters(Stateful):
@@ -47,7 +37,9 @@ class Masters(Stateful):
         self.inputs = inputs
         self.master = master
         self._mixer = mixer
-        self._pad = Gamepad(settings)
+        self._pad = Gamepad(
+            trigger_dead=settings.pad_trigger_dead, stick_dead=settings.pad_stick_dead, loss_ns=settings.pad_loss_ns
+        )
 
     @property
     def wants_robot(self) -> bool:

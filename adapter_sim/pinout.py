@@ -12,14 +12,15 @@ a revision of the board can work is another question: `faults_of` answers it.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from importlib import resources
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, cast
 
-from p2os.toml_file import TomlPlaces, read_toml, read_user_text
+from p2os.toml_file import TomlSource, read_toml, read_user_text
+from p2os.toml_schema import Key, Kind, Place, Table, filled, within
 from simbase.errors import FileError, shown, shown_name
 
 
@@ -157,10 +158,6 @@ class Pinout:
         return tuple(wire for wire in self.wires if wire.role is role)
 
 
-#: Key → least and most; more wires than this no ESP32 has pins for.
-RANGES: Mapping[str, tuple[int, int]] = {
-    "schema": (0, 1000), "idle": (0, 1), "bit": (0, 31), "number": (1, 32), "width": (1, 32),
-}  # fmt: skip
 #: Version of the file format.
 SCHEMA = 1
 #: The chip has ports A to E; the BluePill brings out A to C.
@@ -181,6 +178,37 @@ _NEEDED_VALUES = {
     "motor1": (WireRole.MOTOR, "left"),
     "motor2": (WireRole.MOTOR, "right"),
 }
+
+
+def _key(name: str, kind: Kind = "text", choices: type[StrEnum] | None = None, *, required: bool = True) -> Key:
+    """Return a key; more wires than a number may be no ESP32 has pins for."""
+    least, most = _RANGES.get(name, (None, None))
+    return Key(name=name, kind=kind, required=required, least=least, most=most, choices=tuple(choices or ()))
+
+
+_RANGES = {"schema": (SCHEMA, SCHEMA), "idle": (0, 1), "bit": (0, 31), "number": (1, 32), "width": (1, 32)}
+OF_VALUE, OF_DISTANCE = (_key("value"), _key("bit", "whole")), (_key("number", "whole"),)
+#: What a wire has beside the keys of all, by its role.
+_OF_ROLE = {
+    WireRole.ENCODER: OF_VALUE, WireRole.MOTOR: OF_VALUE, WireRole.DISTANCE: OF_DISTANCE,
+    WireRole.CONNECT: (), WireRole.RESET: (),
+}  # fmt: skip
+KEYS: Mapping[str, tuple[Key, ...]] = {
+    "": (
+        _key("schema", "whole"), _key("default_revision"),
+        *(_key(name, "tables") for name in ("revision", "wire", "value")), _key("auxiliary", "tables", required=False),
+    ),
+    "revision": (_key("name"), _key("status", choices=Status), _key("note")),
+    "wire": (
+        _key("name"), _key("role", choices=WireRole), _key("direction", choices=Direction), _key("bluepill"),
+        _key("pull", choices=Pull), _key("idle", "whole"), _key("safe", "any"), _key("esp32", "table"),
+    ),
+    "value": (_key("name"), _key("role", choices=WireRole), _key("width", "whole"), _key("side")),
+    "auxiliary": (
+        _key("name"), Key(name="direction", kind="text", required=True, choices=("in", "out")),
+        _key("shares", required=False), _key("esp32", "table"),
+    ),
+}  # fmt: skip
 #: Pins of the module's own flash chip.
 FLASH_GPIO = frozenset(range(6, 12))
 #: Pins without an output driver.
@@ -214,16 +242,17 @@ def load_pinout(path: str | Path | None = None) -> Pinout:
 def parse_pinout(text: str, where: str = "pinout") -> Pinout:
     """Check the text of a pin-out file; `where` names it in messages."""
     table, places = read_toml(text, where, "a pin-out", PinoutError)
-    top = _Row(where, table, places)
-    if top.integer("schema") != SCHEMA:
-        raise top.fault("schema", table["schema"], str(SCHEMA))
-    default = top.text("default_revision")
-    revisions = tuple(_revision(row) for row in top.rows("revision"))
+    place = Place(TomlSource(where, places), error=PinoutError)
+    top = filled(table, KEYS[""], place)
+    default = top["default_revision"]
+    revisions = tuple(
+        Revision(name=row["name"], status=Status(row["status"]), note=row["note"])
+        for _, row in _rows(top, "revision", place)
+    )
     names = [revision.name for revision in revisions]
-    wires = tuple(_wire(row, names) for row in top.rows("wire"))
-    values = tuple(_value(row, wires) for row in top.rows("value"))
-    auxiliaries = tuple(_auxiliary(row, names, wires) for row in top.rows("auxiliary", optional=True))
-    top.finish()
+    wires = tuple(_wire(row, at, names) for at, row in _rows(top, "wire", place))
+    values = tuple(_value(row, at, wires) for at, row in _rows(top, "value", place))
+    auxiliaries = tuple(_auxiliary(row, at, names, wires) for at, row in _rows(top, "auxiliary", place))
     _refuse_duplicates(where, "revision", names)
     _refuse_duplicates(where, "wire", [wire.name for wire in wires])
     _refuse_duplicates(where, "BluePill pin", [wire.bluepill for wire in wires])
@@ -265,175 +294,71 @@ def faults_of(pinout: Pinout, revision: str) -> list[str]:
     return faults
 
 
-def require_usable(pinout: Pinout, revision: str) -> None:
-    """Refuse a revision that cannot work.
-
-    Raises:
-        PinoutError: It does not exist, or has faults; the message has the first, the hint the number.
-    """
-    known = {entry.name: entry for entry in pinout.revisions}
-    if revision not in known:
-        raise PinoutError(f"board revision {revision!r} is unknown", hint="one of " + ", ".join(known))
-    faults = faults_of(pinout, revision)
-    if not faults and known[revision].status is Status.FAULTY:
-        faults = [known[revision].note]
-    if faults:
-        raise PinoutError(
-            f"board revision {revision!r} cannot work: {faults[0]}",
-            hint=f"{len(faults)} such faults; {pinout.default_revision} has none",
-        )
+# Reading a file, table by table.
 
 
-# Reading a file: each table asks for its keys, and what is left over is refused.
-
-_Kind = TypeVar("_Kind", bound=StrEnum)
-
-
-class _Row:
-    """A table of the file, of which every key must be asked for."""
-
-    def __init__(
-        self, source: str, table: Mapping[str, object], places: TomlPlaces, name: str = "", number: int = 0
-    ) -> None:
-        self._source, self._places, self._name, self._number = source, places, name, number
-        self._table = table
-        self._asked: set[str] = set()
-
-    @property
-    def where(self) -> str:
-        """File and line of the table, and what it is."""
-        return self._at("")
-
-    def _at(self, key: str) -> str:
-        at = f"{self._source}:{self._places.line(self._name, self._number, key)}"
-        return f"{at}: {self._name} {shown(self._table.get('name', self._number))}" if self._name else at
-
-    def get(self, key: str) -> object:
-        self._asked.add(key)
-        return self._table.get(key)
-
-    def text(self, key: str) -> str:
-        value = self.get(key)
-        if not isinstance(value, str):
-            raise self.fault(key, value, "a text")
-        return value
-
-    def integer(self, key: str) -> int:
-        value = self.get(key)
-        least, most = RANGES[key]
-        if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
-            raise self.fault(key, value, f"an integer of {least} to {most}")
-        return value
-
-    def choice(self, key: str, kind: type[_Kind]) -> _Kind:
-        value = self.get(key)
-        try:
-            return kind(str(value))
-        except ValueError:
-            raise self.fault(key, value, "one of " + ", ".join(kind)) from None
-
-    def rows(self, key: str, *, optional: bool = False) -> list["_Row"]:
-        value = self.get(key)
-        if value is None and optional:
-            return []
-        if not isinstance(value, list) or not value or not all(isinstance(row, dict) for row in value):
-            raise self.fault(key, value, f"one [[{key}]] or more")
-        return [_Row(self._source, row, self._places, key, index) for index, row in enumerate(value)]
-
-    def pins(self, key: str, revisions: list[str]) -> dict[str, str]:
-        value = self.get(key)
-        if not isinstance(value, dict):
-            raise self.fault(key, value, "a table of revision = pin")
-        for revision, pin in value.items():
-            if revision not in revisions:
-                raise PinoutError(f"{self.where}: {key} names the unknown revision {shown(revision)}")
-            if not isinstance(pin, str) or not (pin == "NC" or _ESP32_PIN.fullmatch(pin)):
-                raise self.fault(f"{key}.{revision}", pin, "IO0..IO39, EN, HC595.QA..QH or NC")
-        return value
-
-    def fault(self, key: str, value: object, expected: str) -> PinoutError:
-        if value is None:
-            return PinoutError(f"{self.where}: key {key!r} is missing (expected {expected})")
-        return PinoutError(
-            f"{self._at(key.split('.', maxsplit=1)[0])}: {shown_name(key)} = {shown(value)}, expected {expected}"
-        )
-
-    def finish(self) -> None:
-        unknown = sorted(set(self._table) - self._asked)
-        if unknown:
-            raise PinoutError(
-                f"{self.where}: unknown key {shown(unknown[0])}", hint="known keys: " + ", ".join(sorted(self._asked))
-            )
+def _rows(top: Table, name: str, where: Place) -> Iterator[tuple[Place, dict[str, Any]]]:
+    """Yield the tables `[[name]]` with their places, checked."""
+    for number, row in enumerate(cast("Sequence[Table]", top[name] or ())):
+        at = within(where, name, number)
+        more = _OF_ROLE.get(row.get("role"), ()) if name == "wire" else ()  # type: ignore[call-overload]  # any value
+        yield at, filled(row, (*KEYS[name], *more), at)
 
 
-def _revision(row: _Row) -> Revision:
-    result = Revision(name=row.text("name"), status=row.choice("status", Status), note=row.text("note"))
-    row.finish()
-    return result
+def _fault(where: Place, key: str, value: object, expected: str) -> PinoutError:
+    return PinoutError(f"{where.at(key.partition('.')[0])}: {shown_name(key)} = {shown(value)}, expected {expected}")
 
 
-def _wire(row: _Row, revisions: list[str]) -> Wire:
-    name, role = row.text("name"), row.choice("role", WireRole)
-    pins = row.pins("esp32", revisions)
+def _pins(row: Table, where: Place, revisions: list[str]) -> dict[str, str]:
+    """Return the pin of each revision that the row names."""
+    pins = cast("dict[str, str]", row["esp32"])
+    for revision, pin in pins.items():
+        if revision not in revisions:
+            raise PinoutError(f"{where.at('esp32')}: esp32 names the unknown revision {shown(revision)}")
+        if not isinstance(pin, str) or not (pin == "NC" or _ESP32_PIN.fullmatch(pin)):
+            raise _fault(where, f"esp32.{revision}", pin, "IO0..IO39, EN, HC595.QA..QH or NC")
+    return pins
+
+
+def _wire(row: dict[str, Any], where: Place, revisions: list[str]) -> Wire:
+    role, pins = WireRole(row["role"]), _pins(row, where, revisions)
+    pull, idle, safe = row["pull"], row["idle"], row["safe"]
     missing = [revision for revision in revisions if revision not in pins]
     if missing:
-        raise PinoutError(f"{row.where}: esp32 has no pin for revision {shown(missing[0])}", hint='write "NC" for none')
-    bluepill = row.text("bluepill")
-    if not _BLUEPILL_PIN.fullmatch(bluepill):
-        raise row.fault("bluepill", bluepill, "PA0..PC15")
-    pull, idle = row.choice("pull", Pull), row.integer("idle")
-    if idle not in {0, 1} or (pull is not Pull.NONE and bool(idle) != (pull is Pull.UP)):
-        raise PinoutError(f"{row.where}: idle = {idle} contradicts pull = {pull.value!r}")
-    direction = row.choice("direction", Direction)
-    if direction is not _DRIVEN[role]:
-        raise PinoutError(f"{row.where}: direction = {direction.value!r}, but a {role.value} wire is {_DRIVEN[role]}")
-    safe = row.get("safe")
+        raise PinoutError(f"{where}: esp32 has no pin for revision {shown(missing[0])}", hint='write "NC" for none')
+    if not _BLUEPILL_PIN.fullmatch(row["bluepill"]):
+        raise _fault(where, "bluepill", row["bluepill"], "PA0..PC15")
+    if pull != Pull.NONE and bool(idle) != (pull == Pull.UP):
+        raise PinoutError(f"{where}: idle = {idle} contradicts pull = {pull!r}")
+    if row["direction"] != _DRIVEN[role]:
+        raise PinoutError(f"{where}: direction = {row['direction']!r}, but a {role.value} wire is {_DRIVEN[role]}")
     if safe not in (0, 1, "hold") or not isinstance(safe, (int, str)) or isinstance(safe, bool):
-        raise row.fault("safe", safe, '0, 1 or "hold"')
-    of_value = role in {WireRole.ENCODER, WireRole.MOTOR}
-    result = Wire(
-        name=name,
-        role=role,
-        direction=direction,
-        bluepill=bluepill,
-        pull=pull,
-        idle=bool(idle),
-        safe=Safe.HOLD if safe == "hold" else Safe.HIGH if safe else Safe.LOW,
+        raise _fault(where, "safe", safe, '0, 1 or "hold"')
+    return Wire(
+        name=row["name"], role=role, direction=Direction(row["direction"]), bluepill=row["bluepill"], pull=Pull(pull),
+        idle=bool(idle), safe=Safe.HOLD if safe == "hold" else Safe.HIGH if safe else Safe.LOW,
         esp32=tuple((revision, None if pins[revision] == "NC" else pins[revision]) for revision in revisions),
-        value=row.text("value") if of_value else None,
-        bit=row.integer("bit") if of_value else None,
-        number=row.integer("number") if role is WireRole.DISTANCE else None,
-    )
-    row.finish()
-    return result
+        value=row.get("value"), bit=row.get("bit"), number=row.get("number"),
+    )  # fmt: skip
 
 
-def _value(row: _Row, wires: tuple[Wire, ...]) -> Value:
-    name, role, width = row.text("name"), row.choice("role", WireRole), row.integer("width")
+def _value(row: dict[str, Any], where: Place, wires: tuple[Wire, ...]) -> Value:
+    name, role, width = row["name"], WireRole(row["role"]), row["width"]
     own = sorted((wire for wire in wires if wire.value == name), key=lambda wire: wire.bit or 0)
     bits = [wire.bit for wire in own]
-    if width < 1 or bits != list(range(width)):
-        raise PinoutError(f"{row.where}: width = {width}, but its wires have the bits {bits}")
+    if bits != list(range(width)):
+        raise PinoutError(f"{where}: width = {width}, but its wires have the bits {bits}")
     odd = [wire.name for wire in own if wire.role is not role]
     if odd:
-        raise PinoutError(f"{row.where}: role = {role.value!r}, but its wire {odd[0]} has another")
-    result = Value(name=name, role=role, side=row.text("side"), width=width, wires=tuple(wire.name for wire in own))
-    row.finish()
-    return result
+        raise PinoutError(f"{where}: role = {role.value!r}, but its wire {odd[0]} has another")
+    return Value(name=name, role=role, side=row["side"], width=width, wires=tuple(wire.name for wire in own))
 
 
-def _auxiliary(row: _Row, revisions: list[str], wires: tuple[Wire, ...]) -> Auxiliary:
-    name, direction = row.text("name"), row.text("direction")
-    if direction not in {"in", "out"}:
-        raise row.fault("direction", direction, "in or out")
-    shares = row.get("shares")
+def _auxiliary(row: dict[str, Any], where: Place, revisions: list[str], wires: tuple[Wire, ...]) -> Auxiliary:
+    shares, pins = row["shares"], _pins(row, where, revisions)
     if shares is not None and shares not in [wire.name for wire in wires]:
-        raise row.fault("shares", shares, "the name of a wire")
-    pins = row.pins("esp32", revisions)
-    row.finish()
-    return Auxiliary(
-        name=name, direction=direction, esp32=tuple(pins.items()), shares=None if shares is None else str(shares)
-    )
+        raise _fault(where, "shares", shares, "the name of a wire")
+    return Auxiliary(name=row["name"], direction=row["direction"], esp32=tuple(pins.items()), shares=shares)
 
 
 def _refuse_duplicates(where: str, what: str, names: list[str]) -> None:

@@ -8,6 +8,7 @@ from enum import StrEnum
 
 from adapter_sim.codec import BitOrder
 from adapter_sim.duty import DUTY_TIMEOUT_NS
+from p2os.gamepad import PAD_DEAD, PAD_LOSS_NS, PAD_MM_S, PAD_MRAD_S
 from p2os.protocol.bauds import DEFAULT_BAUD
 from p2os.protocol.times import LIVENESS_NS, PULSE_NS
 from simbase.errors import UsageError
@@ -45,6 +46,10 @@ class EncoderAtOpen(StrEnum):
 MAX_BAUDS = 8
 
 
+#: Rim speed of one step of a motor value (62.5 mm/s: four steps are 250 mm/s, and so is a full duty).
+STEP_UM_PER_S = 62_500
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AdapterSettings:
     """The adapter's settings; every one has a default that works.
@@ -58,8 +63,7 @@ class AdapterSettings:
     motor_command: MotorCommand = MotorCommand.BITS
     bit_order: BitOrder = BitOrder.COMM3_MSB
     motor_meaning: MotorMeaning = MotorMeaning.WHEELS
-    #: Rim speed of one step of a motor value (62.5 mm/s: four steps are 250 mm/s, and so is a full duty).
-    step_um_per_s: int = 62_500
+    step_um_per_s: int = STEP_UM_PER_S
     #: Turn rate of one step where motor2 is angular (the thesis: 1.7 rad/s at four steps).
     angular_step_urad_per_s: int = 425_000
     #: Caps of what is sent; None leaves the robot file's own limits, which hold in any case.
@@ -114,14 +118,12 @@ class AdapterSettings:
     #: Line speeds tried in turn while nobody answers, 1 to 8 of them.
     bauds: tuple[int, ...] = (DEFAULT_BAUD,)
 
-    #: A game pad's full deflections (the thesis: 0.4 m/s and 1.7 rad/s; its later repository 0.5 m/s).
-    pad_velocity_mm_s: int = 400
-    pad_rotation_mrad_s: int = 1_700
-    #: Triggers below this of 1023, and sticks nearer to the middle than this of 511, count as at rest.
-    pad_trigger_dead: int = 40
-    pad_stick_dead: int = 40
-    #: A pad that was silent so long is lost. # chosen: with a pair being sent and the STOP, less than 200 ms
-    pad_loss_ns: Nanos = 150 * NS_PER_MS
+    #: Of a game pad: speeds at full deflection, what counts as at rest, and the silence after which it is lost.
+    pad_velocity_mm_s: int = PAD_MM_S
+    pad_rotation_mrad_s: int = PAD_MRAD_S
+    pad_trigger_dead: int = PAD_DEAD
+    pad_stick_dead: int = PAD_DEAD
+    pad_loss_ns: Nanos = PAD_LOSS_NS
 
     def __post_init__(self) -> None:
         self._check_bauds()

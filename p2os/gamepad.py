@@ -17,8 +17,13 @@ from simbase.timing import NS_PER_MS, Nanos
 
 #: Full deflections: a trigger from 0, the stick from its middle.
 TRIGGER_FULL, STICK_FULL = 1023, 511
-#: Speeds at full deflection, m/s and rad/s (the thesis, listing 5.5; the later repository has 0.5 m/s).
-PAD_MPS, PAD_RADPS = 0.4, 1.7
+#: Speeds at full deflection, mm/s and mrad/s (the thesis, listing 5.5; the later repository has 0.5 m/s).
+PAD_MM_S, PAD_MRAD_S = 400, 1700
+PAD_MPS, PAD_RADPS = PAD_MM_S / 1000, PAD_MRAD_S / 1000
+#: chosen: triggers below this of 1023, and sticks nearer to the middle than this of 511, count as at rest.
+PAD_DEAD = 40
+#: chosen: a pad that was silent so long is lost: with a pair being sent and the STOP, less than 200 ms.
+PAD_LOSS_NS: Nanos = 150 * NS_PER_MS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,7 +50,9 @@ class Gamepad(Stateful):
 
     STATE = ("_reported_at", "forward", "turn", "_was_up", "wants_robot")
 
-    def __init__(self, *, trigger_dead: int = 40, stick_dead: int = 40, loss_ns: Nanos = 150 * NS_PER_MS) -> None:
+    def __init__(
+        self, *, trigger_dead: int = PAD_DEAD, stick_dead: int = PAD_DEAD, loss_ns: Nanos = PAD_LOSS_NS
+    ) -> None:
         """Make a pad that has not reported yet.
 
         Args:

@@ -4,6 +4,7 @@ Whatever is raised here reaches a person as one line and one hint.
 """
 
 import re
+from collections.abc import Iterable
 
 
 class P2osError(Exception):
@@ -84,3 +85,12 @@ def shown_name(name: object) -> str:
     if len(text) > 4 * LONGEST_SHOWN:
         text = f"{text[:LONGEST_SHOWN]}...{text[-LONGEST_SHOWN:]}"
     return text if text.isprintable() else ascii(text)[1:-1]
+
+
+def nearest(word: str, known: Iterable[str], otherwise: str | None = None) -> str:
+    """Return a hint: the nearest of the known words; where none is near, `otherwise`, or all of them."""
+    from difflib import get_close_matches  # takes longer to load than most commands to fail
+
+    words = list(known)
+    close = get_close_matches(word, words, n=1, cutoff=0.5)
+    return f"did you mean {close[0]!r}?" if close else otherwise or f"known are {', '.join(sorted(words))}"

@@ -93,7 +93,7 @@ LAYERS = {
         ("timing", "state", "installation", "wire", "lazy", "interrupts"), ("errors",), ("units", "user_classes"),
     ),
     "p2os": (
-        ("errors", "event_log"), ("toml_file",), ("robots", "gamepad"), ("protocol",), ("transport",),
+        ("errors", "event_log"), ("toml_file",), ("toml_schema",), ("robots", "gamepad"), ("protocol",), ("transport",),
         ("capture", "client", "pioneer"), ("ros",), ("cli",), ("__main__",),
     ),
     "bluepill_sim": (

@@ -1,8 +1,8 @@
-"""Write the tables of the adapter's firmware: the sine, the robots, the times, the settings, the pins.
+"""Write the tables of the adapter's firmware: the robots, the times, the settings, the pins.
 
 There is one copy of each fact: robots in p2os/robots, the client's times in
 p2os/protocol/connection.py, the adapter's settings in adapter_sim/settings.py, wires and
-pins in adapter_sim/pinout.toml, the sine in adapter_sim/encoders.py. This turns them into
+pins in adapter_sim/pinout.toml. This turns them into
 C++ headers; a test holds the committed headers to what comes out here.
 
 Usage: python tools/generate_adapter_tables.py [--check]
@@ -57,23 +57,6 @@ constexpr const RobotNumbers* find_robot(const char* subclass) {
   return nullptr;
 }
 """
-
-
-def sine_table() -> str:
-    """Return the quarter wave, 2^30 at its top, eight entries a line."""
-    quarter = encoders.HALF_COUNTS // 4
-    entries = [encoders.sine(place) for place in range(quarter + 1)]
-    lines = [
-        "    " + ", ".join(str(value) for value in entries[start : start + 8]) + ","
-        for start in range(0, len(entries), 8)
-    ]
-    return (
-        f"{NOTICE}//\n// sin(k / 8192 turn) x 2^30, k = 0 to a quarter turn, rounded.\n"
-        "#pragma once\n\n#include <cstdint>\n\n"
-        "namespace adapter {\n\nconstexpr std::int32_t SINE_TABLE[] = {\n"
-        + "\n".join(lines)
-        + "\n};\n\n}  // namespace adapter\n"
-    )
 
 
 def times_table() -> str:
@@ -186,7 +169,6 @@ def tables() -> dict[Path, str]:
     """Return every generated file with its text."""
     pinout = load_pinout()
     files = {
-        FIRMWARE / "core" / "adapter" / "sine_table.hpp": sine_table(),
         FIRMWARE / "core" / "adapter" / "setting_table.hpp": setting_table(),
         FIRMWARE / "core" / "p2os" / "times.hpp": times_table(),
         FIRMWARE / "generated" / "robots.hpp": robot_table(),

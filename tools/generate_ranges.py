@@ -18,8 +18,8 @@ from p2os.pioneer.export.scene import Property
 from p2os.pioneer.serve import fleet_file
 from p2os.pioneer.world import model as world
 from p2os.robots import model_file
+from p2os.toml_schema import Key
 from robot_bench.scenario import scenario
-from robot_bench.scenario.schema import Key
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = tuple(ROOT / "docs" / name for name in ("worlds.md", "scenarios.md", "pioneer.md", "adapter.md"))
@@ -90,11 +90,20 @@ def tables() -> dict[str, str]:
             {f"`{name}`" if name else "the file": of_keys(keys) for name, keys in scenario.TABLES.items()}, "table"
         ),
         "robot": lines(robots, "table"),
-        "fleet": _one({**fleet_file.RANGES, **at}),
+        "fleet": lines({"": {**of_keys((*fleet_file.TOP, *fleet_file.ROBOT)), **plain(at)}}, ""),
         "sensor errors": _one(sensor_errors.RANGES),
         "faults": _one({word: (0.0, most) for word, most in faults.MOST.items()}),
         "flash": _one(flash.RANGES),
-        "pinout": _one(pinout.RANGES),
+        "pinout": lines(
+            {
+                "": of_keys(
+                    dict.fromkeys(
+                        key for keys in pinout.KEYS.values() for key in (*keys, *pinout.OF_VALUE, *pinout.OF_DISTANCE)
+                    )
+                )
+            },
+            "",
+        ),
         "exports": exports(),
     }
 

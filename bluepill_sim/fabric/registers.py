@@ -24,7 +24,7 @@ Invariant: a stored word never holds a bit outside `readable`, so that
 import ctypes
 from array import array
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import InitVar, dataclass
 from functools import cache
 from typing import Any, ClassVar, cast
 
@@ -43,6 +43,7 @@ _HEARS_LINE, _LISTEN = 0, OWN_COMMANDS
 _GATES = ("AHBENR", "APB2ENR", "APB1ENR")
 #: Every bit of a 32-bit register.
 WORD = 0xFFFF_FFFF
+_AS_MASK = -1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,10 +56,12 @@ class Register:
     offset: int
     #: Value after reset, as it reads.
     reset: int = 0
+    #: Its bits, where the next two do not say otherwise.
+    mask: InitVar[int] = WORD
     #: Bits that read as stored; all others read 0.
-    readable: int = WORD
+    readable: int = _AS_MASK
     #: Bits that take the value written (r/w). Bits that are writable but not readable are seen by `on_write` only.
-    writable: int = WORD
+    writable: int = _AS_MASK
     #: Bits cleared by writing 1 and left alone by 0 (rc_w1).
     write_one_to_clear: int = 0
     #: Bits cleared by writing 0 and left alone by 1 (rc_w0).
@@ -74,18 +77,21 @@ class Register:
     #: One line for people.
     doc: str = ""
 
-    def __post_init__(self) -> None:
-        """Refuse a declaration that contradicts itself.
+    def __post_init__(self, mask: int) -> None:
+        """Fill in the mask, and refuse a declaration that contradicts itself.
 
         Raises:
             ValueError: A mask is wider than a word, two kinds of bits overlap,
                 or the reset value holds bits that do not read.
         """
+        for name in ("readable", "writable"):
+            if getattr(self, name) == _AS_MASK:
+                object.__setattr__(self, name, mask)
         if self.offset % 4:
             raise ValueError(f"{self.name}: offset {self.offset:#x} is not that of a word")
-        for mask in (self.reset, self.readable, self.writable, self.write_one_to_clear, self.write_zero_to_clear):
-            if mask & ~WORD:
-                raise ValueError(f"{self.name}: {mask:#x} is wider than a word")
+        for word in (self.reset, self.readable, self.writable, self.write_one_to_clear, self.write_zero_to_clear):
+            if word & ~WORD:
+                raise ValueError(f"{self.name}: {word:#x} is wider than a word")
         clears = self.write_one_to_clear | self.write_zero_to_clear
         if self.write_one_to_clear & self.write_zero_to_clear or clears & self.writable:
             raise ValueError(f"{self.name}: a bit is either writable, cleared by 1 or cleared by 0")

@@ -46,7 +46,7 @@ _STARTS = bits(22, 21)
 
 
 def _stored(name: str, offset: int, mask: int, fields: str, reset: int = 0) -> Register:
-    return Register(name=name, offset=offset, reset=reset, readable=mask, writable=mask, on_write=NATIVE, fields=fields)
+    return Register(name=name, offset=offset, reset=reset, mask=mask, on_write=NATIVE, fields=fields)
 
 
 def _registers(cr1: int, cr2: int) -> tuple[Register, ...]:

@@ -72,8 +72,7 @@ class Afio(Peripheral):
         Register(
             name="EVCR",
             offset=0x00,
-            readable=bits((7, 0)),
-            writable=bits((7, 0)),
+            mask=bits((7, 0)),
             on_write="_write_evcr",
             fields="EVOE 7, PORT 6:4, PIN 3:0",
         ),
@@ -89,8 +88,7 @@ class Afio(Peripheral):
             Register(
                 name=f"EXTICR{n + 1}",
                 offset=0x08 + 4 * n,
-                readable=bits((15, 0)),
-                writable=bits((15, 0)),
+                mask=bits((15, 0)),
                 on_write="_write_exticr",
                 fields=", ".join(f"EXTI{4 * n + k} {4 * k + 3}:{4 * k}" for k in range(3, -1, -1)),
             )

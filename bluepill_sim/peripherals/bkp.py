@@ -41,8 +41,7 @@ class Bkp(Peripheral):
             Register(
                 name=f"DR{n}",
                 offset=4 * n,
-                readable=_HALFWORD,
-                writable=_HALFWORD,
+                mask=_HALFWORD,
                 on_write="_write_data",
                 fields="D 15:0",
             )
@@ -51,16 +50,14 @@ class Bkp(Peripheral):
         Register(
             name="RTCCR",
             offset=4 * RTCCR,
-            readable=bits((9, 0)),
-            writable=bits((9, 0)),
+            mask=bits((9, 0)),
             on_write="_write_rtccr",
             fields="ASOS 9, ASOE 8, CCO 7, CAL 6:0",
         ),
         Register(
             name="CR",
             offset=4 * CR,
-            readable=TPE | TPAL,
-            writable=TPE | TPAL,
+            mask=TPE | TPAL,
             on_write="_write_cr",
             fields="TPAL 1, TPE 0",
         ),

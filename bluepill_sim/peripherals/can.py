@@ -161,8 +161,7 @@ class Can(Peripheral):
             fields="SLKIE 17, WKUIE 16, ERRIE 15, LECIE 11, BOFIE 10, EPVIE 9, EWGIE 8, "
             "FOVIE1 6, FFIE1 5, FMPIE1 4, FOVIE0 3, FFIE0 2, FMPIE0 1, TMEIE 0",
             offset=0x14,
-            readable=bits((17, 15), (11, 8), (6, 0)),
-            writable=bits((17, 15), (11, 8), (6, 0)),
+            mask=bits((17, 15), (11, 8), (6, 0)),
             on_write="_write_flags",
         ),
         Register(
@@ -178,8 +177,7 @@ class Can(Peripheral):
             fields="SILM 31, LBKM 30, SJW 25:24, TS2 22:20, TS1 19:16, BRP 9:0",
             offset=0x1C,
             reset=0x0123_0000,
-            readable=bits((31, 30), (25, 24), (22, 16), (9, 0)),
-            writable=bits((31, 30), (25, 24), (22, 16), (9, 0)),
+            mask=bits((31, 30), (25, 24), (22, 16), (9, 0)),
             on_write="_write_btr",
         ),
         *_mailbox_registers(),
@@ -188,8 +186,7 @@ class Can(Peripheral):
             Register(
                 name=name,
                 offset=offset,
-                readable=_FILTER_MODES,
-                writable=_FILTER_MODES,
+                mask=_FILTER_MODES,
                 on_write=f"_write_{name.lower()}",
                 fields=numbered(f"{bit}n", range(_BANKS - 1, -1, -1)),
             )
@@ -198,8 +195,7 @@ class Can(Peripheral):
         Register(
             name="FA1R",
             offset=0x21C,
-            readable=_FILTER_MODES,
-            writable=_FILTER_MODES,
+            mask=_FILTER_MODES,
             fields=numbered("FACTn", range(_BANKS - 1, -1, -1)),
         ),
         *(Register(name=f"F{n // 2}R{n % 2 + 1}", offset=0x240 + 4 * n, fields="FB 31:0") for n in range(2 * _BANKS)),

@@ -17,6 +17,6 @@ class Crc(Peripheral):
     KIND = "crc"
     REGISTERS = (
         Register(name="DR", offset=0x00, reset=WORD, on_write=NATIVE, fields="DR 31:0"),
-        Register(name="IDR", offset=0x04, readable=bits((7, 0)), writable=bits((7, 0)), fields="IDR 7:0"),
+        Register(name="IDR", offset=0x04, mask=bits((7, 0)), fields="IDR 7:0"),
         Register(name="CR", offset=0x08, readable=0, writable=bits(0), on_write=NATIVE, fields="RESET 0"),
     )

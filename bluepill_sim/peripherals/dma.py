@@ -55,16 +55,13 @@ class Dma(Peripheral):
         Register(
             name="IFCR",
             offset=0x04,
-            readable=0,
-            writable=0,
+            mask=0,
             write_one_to_clear=bits((27, 0)),
             on_write=NATIVE,
             fields=_flags("CTEIF CHTIF CTCIF CGIF"),
         ),
         *(
-            Register(
-                name=f"{name}{n}", offset=offset + 20 * n, readable=mask, writable=mask, on_write=NATIVE, fields=fields
-            )
+            Register(name=f"{name}{n}", offset=offset + 20 * n, mask=mask, on_write=NATIVE, fields=fields)
             for n in CHANNELS
             for name, offset, mask, fields in (
                 ("CCR", -0x0C, bits((14, 0)), _CONTROL),

@@ -116,21 +116,20 @@ class I2c(Peripheral):
     DERIVED = ("_pin_names", "_sinks")
     REGISTERS = (
         Register(
-            name="CR1", offset=0x00, readable=_CR1, writable=_CR1, on_write=NATIVE,
+            name="CR1", offset=0x00, mask=_CR1, on_write=NATIVE,
             fields="SWRST 15, ALERT 13, PEC 12, POS 11, ACK 10, STOP 9, "
             "START 8, NOSTRETCH 7, ENGC 6, ENPEC 5, ENARP 4, "
             "SMBTYPE 3, SMBUS 1, PE 0",
         ),
         Register(
-            name="CR2", offset=0x04, readable=_CR2, writable=_CR2, on_write=NATIVE,
+            name="CR2", offset=0x04, mask=_CR2, on_write=NATIVE,
             fields="LAST 12, DMAEN 11, ITBUFEN 10, ITEVTEN 9, ITERREN 8, FREQ 5:0",
         ),
         Register(
-            name="OAR1", offset=0x08, readable=bits(15, 14, (9, 0)), writable=bits(15, 14, (9, 0)),
-            fields="ADDMODE 15, one 14, ADD 9:0",
+            name="OAR1", offset=0x08, mask=bits(15, 14, (9, 0)), fields="ADDMODE 15, one 14, ADD 9:0",
         ),
         Register(
-            name="OAR2", offset=0x0C, readable=bits((7, 0)), writable=bits((7, 0)), fields="ADD2 7:1, ENDUAL 0"
+            name="OAR2", offset=0x0C, mask=bits((7, 0)), fields="ADD2 7:1, ENDUAL 0"
         ),
         Register(
             name="DR", offset=0x10, readable=0, writable=bits((7, 0)), on_read=NATIVE, on_write=NATIVE, fields="DR 7:0"
@@ -147,10 +146,10 @@ class I2c(Peripheral):
             fields="PEC 15:8, DUALF 7, SMBHOST 6, SMBDEFAULT 5, GENCALL 4, TRA 2, BUSY 1, MSL 0",
         ),
         Register(
-            name="CCR", offset=0x1C, readable=_CCR, writable=_CCR, on_write="_write_ccr",
+            name="CCR", offset=0x1C, mask=_CCR, on_write="_write_ccr",
             fields="FS 15, DUTY 14, CCR 11:0",
         ),
-        Register(name="TRISE", offset=0x20, reset=2, readable=bits((5, 0)), writable=bits((5, 0)), fields="TRISE 5:0"),
+        Register(name="TRISE", offset=0x20, reset=2, mask=bits((5, 0)), fields="TRISE 5:0"),
     )  # fmt: skip
 
     def __init__(self, chip: ChipPorts, place: Place) -> None:

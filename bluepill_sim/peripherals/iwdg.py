@@ -32,10 +32,10 @@ class Iwdg(Peripheral):
     REGISTERS = (
         Register(name="KR", offset=0x00, readable=0, on_write="_write_kr"),
         Register(
-            name="PR", offset=0x04, readable=bits((2, 0)), writable=bits((2, 0)), on_write="_write_pr", fields="PR 2:0"
+            name="PR", offset=0x04, mask=bits((2, 0)), on_write="_write_pr", fields="PR 2:0"
         ),
         Register(
-            name="RLR", offset=0x08, reset=_COUNTS, readable=_COUNTS, writable=_COUNTS, on_write="_write_rlr",
+            name="RLR", offset=0x08, reset=_COUNTS, mask=_COUNTS, on_write="_write_rlr",
             fields="RL 11:0",
         ),
         Register(name="SR", offset=0x0C, readable=_PVU | _RVU, writable=0, on_read="_read_sr", fields="RVU 1, PVU 0"),

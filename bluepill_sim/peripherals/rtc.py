@@ -54,8 +54,7 @@ class Rtc(Peripheral):
         Register(
             name="CRH",
             offset=0x00,
-            readable=_INTERRUPTS,
-            writable=_INTERRUPTS,
+            mask=_INTERRUPTS,
             on_write="_write_crh",
             fields="OWIE 2, ALRIE 1, SECIE 0",
         ),

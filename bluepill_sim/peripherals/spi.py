@@ -108,13 +108,13 @@ class Spi(Peripheral):
     DERIVED = ("_pin_names", "_sinks")
     REGISTERS = (
         Register(
-            name="CR1", offset=0x00, readable=bits((15, 0)), writable=bits((15, 0)), on_write=NATIVE,
+            name="CR1", offset=0x00, mask=bits((15, 0)), on_write=NATIVE,
             fields="BIDIMODE 15, BIDIOE 14, CRCEN 13, CRCNEXT 12, DFF 11, RXONLY 10, "
             "SSM 9, SSI 8, LSBFIRST 7, SPE 6, BR 5:3, "
             "MSTR 2, CPOL 1, CPHA 0",
         ),
         Register(
-            name="CR2", offset=0x04, readable=_CR2, writable=_CR2, on_write=NATIVE,
+            name="CR2", offset=0x04, mask=_CR2, on_write=NATIVE,
             fields="TXEIE 7, RXNEIE 6, ERRIE 5, SSOE 2, TXDMAEN 1, RXDMAEN 0",
         ),
         Register(
@@ -127,12 +127,12 @@ class Spi(Peripheral):
             fields="DR 15:0",
         ),
         Register(
-            name="CRCPR", offset=0x10, reset=7, readable=bits((15, 0)), writable=bits((15, 0)), fields="CRCPOLY 15:0"
+            name="CRCPR", offset=0x10, reset=7, mask=bits((15, 0)), fields="CRCPOLY 15:0"
         ),
         Register(name="RXCRCR", offset=0x14, readable=bits((15, 0)), writable=0, fields="RxCRC 15:0"),
         Register(name="TXCRCR", offset=0x18, readable=bits((15, 0)), writable=0, fields="TxCRC 15:0"),
         Register(name="I2SCFGR", offset=0x1C, readable=0, writable=bits(11), on_write="_write_i2s", doc="no I2S"),
-        Register(name="I2SPR", offset=0x20, readable=0, writable=0, doc="no I2S"),
+        Register(name="I2SPR", offset=0x20, mask=0, doc="no I2S"),
     )  # fmt: skip
 
     def __init__(self, chip: ChipPorts, place: Place) -> None:

@@ -96,8 +96,7 @@ class Usb(Peripheral):
             name="CNTR",
             offset=0x40,
             reset=PDWN | FRES,
-            readable=bits((15, 8), (4, 0)),
-            writable=bits((15, 8), (4, 0)),
+            mask=bits((15, 8), (4, 0)),
             on_write=NATIVE,
             fields=_INTERRUPTS.format("M") + ", RESUME 4, FSUSP 3, LP_MODE 2, PDWN 1, FRES 0",
         ),
@@ -121,18 +120,16 @@ class Usb(Peripheral):
         Register(
             name="DADDR",
             offset=0x4C,
-            readable=bits((7, 0)),
-            writable=bits((7, 0)),
+            mask=bits((7, 0)),
             on_write=NATIVE,
             fields="EF 7, ADD 6:0",
         ),
-        Register(name="BTABLE", offset=0x50, readable=bits((15, 3)), writable=bits((15, 3)), fields="BTABLE 15:3"),
+        Register(name="BTABLE", offset=0x50, mask=bits((15, 3)), fields="BTABLE 15:3"),
         *(
             Register(
                 name=f"PMA_{2 * n:03X}",
                 offset=MEMORY_OFFSET + 4 * n,
-                readable=bits((15, 0)),
-                writable=bits((15, 0)),
+                mask=bits((15, 0)),
                 fields="DATA 15:0",
             )
             for n in range(MEMORY_WORDS)

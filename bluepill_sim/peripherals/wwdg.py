@@ -29,11 +29,11 @@ class Wwdg(Peripheral):
     OUTPUTS = ("irq",)
     REGISTERS = (
         Register(
-            name="CR", offset=0x00, reset=_T, readable=bits((7, 0)), writable=bits((7, 0)), on_read="_read_cr",
+            name="CR", offset=0x00, reset=_T, mask=bits((7, 0)), on_read="_read_cr",
             on_write="_write_cr", fields="WDGA 7, T 6:0",
         ),
         Register(
-            name="CFR", offset=0x04, reset=_T, readable=bits((9, 0)), writable=bits((9, 0)), on_write="_write_cfr",
+            name="CFR", offset=0x04, reset=_T, mask=bits((9, 0)), on_write="_write_cfr",
             fields="EWI 9, WDGTB 8:7, W 6:0",
         ),
         Register(

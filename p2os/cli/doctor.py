@@ -89,7 +89,7 @@ NEEDS = (
         name="bluepill_sim._native", kind="built", feature="the emulated BluePill",
     ),
     Need(
-        name="robot_bench._edges", kind="built", feature="many edges at full speed",
+        name="robot_bench._edges", kind="built", feature="wires of a run",
     ),
     Need(
         name="robot_bench._esp32", kind="built", feature="board test --emulated",

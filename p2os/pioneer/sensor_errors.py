@@ -16,11 +16,11 @@ wheel angles, the devices on compass, gyro and battery.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from difflib import get_close_matches
 from pathlib import Path
 
-from p2os.toml_file import TomlPlaces, is_file, read_toml, read_user_text
-from simbase.errors import FileError, shown, shown_name
+from p2os.toml_file import TomlPlaces, TomlSource, is_file, read_toml, read_user_text
+from p2os.toml_schema import Key, Place, filled, within
+from simbase.errors import FileError, nearest, shown, shown_name
 
 
 class SensorErrorsError(FileError):
@@ -111,8 +111,7 @@ def load_sensor_errors(name_or_path: str) -> SensorErrors:
         return SETS[name_or_path]
     path = Path(name_or_path)
     if path.suffix != ".toml" and not is_file(path):
-        close = get_close_matches(name_or_path, SETS, n=1)
-        hint = f"did you mean {close[0]}?" if close else f"sets: {', '.join(SETS)}, or a TOML file"
+        hint = f"{nearest(name_or_path, SETS)}, or a TOML file"
         raise SensorErrorsError(f"no set of sensor errors {shown(name_or_path)}", hint=hint)
     text = read_user_text(path, "a set of sensor errors", SensorErrorsError, hint=f"sets: {', '.join(SETS)}")
     table, places = read_toml(text, shown_name(path), "a set of sensor errors", SensorErrorsError)
@@ -130,37 +129,23 @@ def parse_sensor_errors(table: Mapping[str, object], where: str, places: TomlPla
     Raises:
         SensorErrorsError: The table breaks the schema.
     """
-
-    def at(section: str = "", key: str = "") -> str:
-        return where if places is None else f"{where}:{places.line(section, 0, key)}"
-
-    base = table.get("based_on", "ideal")
-    if not isinstance(base, str) or base not in SETS:
-        raise SensorErrorsError(f"{at('', 'based_on')}: based_on = {shown(base)} is none of {', '.join(SETS)}")
-    found = SETS[str(base)]
-    sections = [part.name for part in fields(SensorErrors)]
-    for section, values in table.items():
-        if section == "based_on":
-            continue
-        if section not in sections or not isinstance(values, dict):
-            close = get_close_matches(section, sections, n=1)
-            raise SensorErrorsError(
-                f"{at(section)}: unknown table [{shown_name(section)}]",
-                hint=f"did you mean [{close[0]}]?" if close else None,
-            )
+    place = Place(TomlSource(where, places), error=SensorErrorsError)
+    given = filled(table, _TOP, place)
+    found = SETS[given.pop("based_on")]
+    for section, values in given.items():
         part = getattr(found, section)
-        checked = {key: _value(at(section, key), section, key, value, part) for key, value in values.items()}
+        keys = tuple(_key(item.name, getattr(part, item.name)) for item in fields(part))
+        checked = {key: float(value) for key, value in filled(values, keys, within(place, section)).items()}
         found = replace(found, **{section: replace(part, **checked)})
     return found
 
 
-def _value(where: str, section: str, key: str, value: object, part: object) -> float:
-    names = [item.name for item in fields(part)]  # type: ignore[arg-type]  # one of the dataclasses above
-    if key not in names:
-        close = get_close_matches(key, names, n=1)
-        hint = f"did you mean {close[0]}?" if close else f"[{section}] has {', '.join(names)}"
-        raise SensorErrorsError(f"{where}: unknown key {shown_name(f'{section}.{key}')}", hint=hint)
-    least, most = RANGES[key]
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not least <= value <= most:
-        raise SensorErrorsError(f"{where}: {section}.{key} = {shown(value)} is no number of {least:g} to {most:g}")
-    return float(value)
+_TOP = (
+    Key(name="based_on", kind="text", choices=tuple(SETS), default="ideal"),
+    *(Key(name=part.name, kind="table", default={}) for part in fields(SensorErrors)),
+)
+
+
+def _key(name: str, default: float) -> Key:
+    least, most = RANGES[name]
+    return Key(name=name, kind="number", least=least, most=most, default=default)

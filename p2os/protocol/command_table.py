@@ -12,12 +12,12 @@ Invariant: `ROWS` has one row for each `CommandNumber`.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 from enum import Enum, IntEnum
 
 from p2os.errors import LocalProtocolError
 from p2os.protocol.bauds import BAUDS
 from p2os.protocol.profiles import Profile
+from simbase.errors import nearest
 
 
 class CommandNumber(IntEnum):
@@ -524,5 +524,4 @@ def command_row(which: int | str) -> CommandRow:
     name = ALIASES.get(name, name)
     if name in BY_NAME:
         return BY_NAME[name]
-    close = get_close_matches(name, [*BY_NAME, *ALIASES], n=1)
-    raise LocalProtocolError(f"no command {which!r}", hint=f"did you mean {close[0]}?" if close else None)
+    raise LocalProtocolError(f"no command {which!r}", hint=nearest(name, [*BY_NAME, *ALIASES], "PROTOCOL.md has all"))

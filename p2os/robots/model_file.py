@@ -3,15 +3,14 @@
 `based_on` takes another model's numbers and overrides some.
 """
 
-from collections.abc import Callable, Mapping
-from dataclasses import fields
-from difflib import get_close_matches
+from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 from p2os.robots.model import BodyParameters, Equipment, MotionDefaults, ParametersError, RobotParameters, SonarPose
 from p2os.toml_file import TomlPlaces, TomlSource, find_places, read_toml
+from p2os.toml_schema import Key, Place, check_table, within
 from simbase.errors import shown, shown_name
 
 #: A TOML table.
@@ -31,8 +30,6 @@ FINE_KEYS: Mapping[str, str] = {
     "velocity_um_s_per_count": "velocity_nm_s_per_count",
     "range_um_per_count": "range_nm_per_count",
 }
-SONAR_KEYS = ("fitted", "range_m", "min_range_m", "cone_deg", "height_m", "poses")
-TOP_KEYS = ("based_on", "subclass", "robot_class", "title")
 #: Section → key → least and most. chosen: a tenth of the smallest robot that ships to ten times the largest, or what
 #: the field's own field on the wire holds.
 RANGES: Mapping[str, Mapping[str, tuple[float, float]]] = {
@@ -74,7 +71,32 @@ MOST_EYES = 8
 LONGEST_TEXT = 100
 #: A caster of this mass rolls under every robot (`p2os.pioneer.body`).
 CASTER_KG = 0.2
-_WORDS: Mapping[type, str] = {str: "text", bool: "true or false", int: "whole number", float: "number"}
+#: Keys of numbers that may have a fraction, beside those of the sonar and the body.
+_FRACTIONS = frozenset({*FINE_KEYS, "gyro_scaler"})
+
+
+def _keys(section: str) -> tuple[Key, ...]:
+    """Return the keys of a section that are numbers."""
+    return tuple(
+        Key(
+            name=name, kind="number" if name in _FRACTIONS or (section in {"sonar", "body"} and name != "fitted")
+            else "whole", least=least, most=most, required=section != "equipment",
+        )
+        for name, (least, most) in RANGES[section].items()
+    )  # fmt: skip
+
+
+SECTIONS: Mapping[str, tuple[Key, ...]] = {
+    **{section: _keys(section) for section in RANGES},
+    "equipment": (*_keys("equipment"), Key(name="has_move", kind="flag"), Key(name="sends_io_packets", kind="flag")),
+    "sonar": (*_keys("sonar"), Key(name="poses", kind="points", count=3, required=True)),
+    "infrared": (Key(name="points", kind="points", count=2, required=True),),
+}
+TOP = (
+    Key(name="based_on", kind="text"),
+    *(Key(name=name, kind="ascii", required=True, most=LONGEST_TEXT) for name in ("subclass", "robot_class", "title")),
+    *(Key(name=name, kind="table", required=name not in {"equipment", "infrared"}) for name in SECTIONS),
+)
 
 
 def known_robots() -> tuple[str, ...]:
@@ -153,148 +175,53 @@ def build_parameters(name: str, table: Table, places: TomlPlaces | None = None) 
     Raises:
         ParametersError: A key is missing, unknown, of another type, or out of range.
     """
-    source = TomlSource(name, places)
-    sections = {*FLAT_SECTIONS, "equipment", "motion", "sonar", "infrared", "body"}
-    _only(source, "", table, (*TOP_KEYS, *sections))
-    values: Table = {key: _value(source, "", table, key, str) for key in TOP_KEYS[1:]}
-    for section, keys in FLAT_SECTIONS.items():
-        part = _section(source, table, section, keys)
-        for key in keys:
-            if key in FINE_KEYS:
-                values[FINE_KEYS[key]] = round(_value(source, section, part, key, float) * 1000)
-            else:
-                values[key] = _value(source, section, part, key, int)
-    motion = _section(source, table, "motion", _keys(MotionDefaults))
-    body = _section(source, table, "body", _keys(BodyParameters))
-    sonar = _section(source, table, "sonar", SONAR_KEYS)
-    fitted, poses = _value(source, "sonar", sonar, "fitted", int), _poses(source, sonar.get("poses"))
-    if fitted > len(poses):
+    where = Place(TomlSource(name, places), error=ParametersError)
+    check_table(table, TOP, where)
+    parts = {"equipment": {}, "infrared": {"points": []}, **table}
+    for section, keys in SECTIONS.items():
+        check_table(parts[section], keys, within(where, section))
+    values: Table = {key: table[key] for key in ("subclass", "robot_class", "title")}
+    for section, names in FLAT_SECTIONS.items():
+        values |= {key: table[section][key] for key in names if key not in FINE_KEYS}
+    values |= {field: round(table["conversion"][key] * 1000) for key, field in FINE_KEYS.items()}
+    sonar, poses = table["sonar"], _placed(table["sonar"]["poses"], within(where, "sonar"), "poses")
+    if sonar["fitted"] > len(poses):
         raise ParametersError(
-            f"{source.at('sonar', 'fitted')}: sonar.fitted = {fitted}, but there are only {len(poses)} poses"
+            f"{within(where, 'sonar').at('fitted')}: fitted = {sonar['fitted']}, but there are only {len(poses)} poses"
         )
-    numbers = {f"sonar_{key}": _value(source, "sonar", sonar, key, float) for key in SONAR_KEYS[1:-1]}
-    _refuse_impossible(source, body)
+    values |= {f"sonar_{key}": float(sonar[key]) for key in ("range_m", "min_range_m", "cone_deg", "height_m")}
+    points = _placed(parts["infrared"]["points"], within(where, "infrared"), "points")
+    if len(points) > MOST_EYES:
+        raise ParametersError(f"{within(where, 'infrared').at('points')}: points: there are at most {MOST_EYES}")
+    _refuse_impossible(table["body"], within(where, "body"))
     return RobotParameters(
         **values,
-        **numbers,
-        equipment=_equipment(source, table.get("equipment", {})),
-        motion=MotionDefaults(**{key: _value(source, "motion", motion, key, int) for key in _keys(MotionDefaults)}),
-        body=BodyParameters(**{key: _value(source, "body", body, key, float) for key in _keys(BodyParameters)}),
-        sonar_fitted=fitted,
-        sonar=poses,
-        infrared=_infrared(source, table.get("infrared", {"points": []})),
+        equipment=Equipment(**parts["equipment"]),
+        motion=MotionDefaults(**table["motion"]),
+        body=BodyParameters(**{key: float(value) for key, value in table["body"].items()}),
+        sonar_fitted=sonar["fitted"],
+        sonar=tuple(SonarPose(x_mm=x, y_mm=y, heading_deg=heading) for x, y, heading in poses),
+        infrared=tuple((x, y) for x, y in points),
     )
 
 
-def _keys(kind: type) -> tuple[str, ...]:
-    return tuple(field.name for field in fields(kind))
+def _placed(rows: Sequence[Sequence[float]], where: Place, key: str) -> Sequence[Sequence[float]]:
+    """Return rows of [x mm, y mm, heading degrees], or of the first two, none of them far off."""
+    for row in rows:
+        if not all(least <= item <= most for item, (least, most) in zip(row, POSE_RANGES, strict=False)):
+            hint = "within 20 m of the robot's middle, and 360 degrees"
+            raise ParametersError(f"{where.at(key)}: {key}: {shown(row)} is out of range", hint=hint)
+    return rows
 
 
-def _equipment(source: TomlSource, part: object) -> Equipment:
-    """Return what a model has; every key may be left out."""
-    if not isinstance(part, dict):
-        raise ParametersError(f"{source.at('equipment')}: [equipment] is no section")
-    _only(source, "equipment.", part, _keys(Equipment))
-    kinds: Mapping[str, Callable[..., object]] = {field.name: type(field.default) for field in fields(Equipment)}
-    return Equipment(**{key: _value(source, "equipment", part, key, cast("type", kinds[key])) for key in part})
-
-
-def _section(source: TomlSource, table: Table, name: str, keys: tuple[str, ...]) -> Table:
-    part = table.get(name)
-    if not isinstance(part, dict):
-        raise ParametersError(f"{source.at(name)}: the section [{name}] is missing")
-    _only(source, f"{name}.", part, keys)
-    return part
-
-
-def _only(source: TomlSource, prefix: str, table: Table, keys: tuple[str, ...]) -> None:
-    """Refuse a key that nobody reads: it is a misspelt one."""
-    for key in table:
-        if key not in keys:
-            close = get_close_matches(key, keys, n=1)
-            raise ParametersError(
-                f"{source.at(prefix[:-1], key)}: unknown key {shown_name(prefix + key)}",
-                hint=f"did you mean {prefix}{close[0]}?" if close else None,
-            )
-
-
-def _value(source: TomlSource, section: str, table: Table, key: str, kind: type) -> Any:
-    """Return one value within its range; an integer serves as a float."""
-    name = f"{section}.{key}" if section else key
-    if key not in table:
-        raise ParametersError(f"{source.at(section)}: {name} is missing")
-    value, at = table[key], source.at(section, key)
-    if isinstance(value, bool) is not (kind is bool) or not isinstance(value, (int, float) if kind is float else kind):
-        raise ParametersError(f"{at}: {name} = {shown(value)} is no {_WORDS[kind]}")
-    if kind is bool:
-        return value
-    if kind is str:
-        text = str(value)
-        if not text.isprintable() or not text.isascii() or len(text) > LONGEST_TEXT:
-            raise ParametersError(
-                f"{at}: {name} = {shown(value)} is no line of at most {LONGEST_TEXT} ASCII characters"
-            )
-        return value
-    least, most = RANGES[section][key]
-    if not least <= cast("float", value) <= most:
-        raise ParametersError(f"{at}: {name} = {shown(value)} is out of range: {least:g} to {most:g}")
-    return kind(value)
-
-
-def _refuse_impossible(source: TomlSource, body: Table) -> None:
-    """Refuse a body whose parts do not go together."""
-    kinds: Mapping[str, float] = {key: _value(source, "body", body, key, float) for key in _keys(BodyParameters)}
-    wheels_kg = 2 * kinds["wheel_mass_kg"] + CASTER_KG
-    if kinds["mass_kg"] <= wheels_kg:
+def _refuse_impossible(body: Table, where: Place) -> None:
+    wheels_kg = 2 * body["wheel_mass_kg"] + CASTER_KG
+    if body["mass_kg"] <= wheels_kg:
         raise ParametersError(
-            f"{source.at('body', 'mass_kg')}: body.mass_kg = {kinds['mass_kg']:g}, but wheels and caster have"
-            f" {wheels_kg:g} kg"
+            f"{where.at('mass_kg')}: mass_kg = {body['mass_kg']:g}, but wheels and caster have {wheels_kg:g} kg"
         )
-    if kinds["hull_height_m"] <= kinds["ground_clearance_m"]:
+    if body["hull_height_m"] <= body["ground_clearance_m"]:
         raise ParametersError(
-            f"{source.at('body', 'hull_height_m')}: body.hull_height_m = {kinds['hull_height_m']:g} is not above"
-            f" ground_clearance_m = {kinds['ground_clearance_m']:g}"
+            f"{where.at('hull_height_m')}: hull_height_m = {body['hull_height_m']:g} is not above "
+            f"ground_clearance_m = {body['ground_clearance_m']:g}"
         )
-
-
-def _poses(source: TomlSource, rows: object) -> tuple[SonarPose, ...]:
-    good = isinstance(rows, list) and all(
-        isinstance(row, list)
-        and len(row) == 3
-        and all(_is_within(item, *limits) for item, limits in zip(row, POSE_RANGES, strict=True))
-        for row in rows
-    )
-    if not good:
-        raise ParametersError(
-            f"{source.at('sonar', 'poses')}: sonar.poses must be rows of [x mm, y mm, heading deg]",
-            hint="within 20 m of the robot's middle, and 360 degrees",
-        )
-    return tuple(SonarPose(x_mm=x, y_mm=y, heading_deg=h) for x, y, h in cast("list[list[float]]", rows))
-
-
-def _infrared(source: TomlSource, part: object) -> tuple[tuple[float, float], ...]:
-    """Return where the infra-red eyes see; the section may be left out."""
-    if not isinstance(part, dict):
-        raise ParametersError(f"{source.at('infrared')}: [infrared] is no section")
-    _only(source, "infrared.", part, ("points",))
-    rows = part.get("points")
-    good = (
-        isinstance(rows, list)
-        and len(rows) <= MOST_EYES
-        and all(
-            isinstance(row, list)
-            and len(row) == 2
-            and all(_is_within(item, *limits) for item, limits in zip(row, POSE_RANGES, strict=False))
-            for row in rows
-        )
-    )
-    if not good:
-        raise ParametersError(
-            f"{source.at('infrared', 'points')}: infrared.points must be up to {MOST_EYES} rows of [x mm, y mm]",
-            hint="within 20 m of the robot's middle",
-        )
-    return tuple((x, y) for x, y in cast("list[list[float]]", rows))
-
-
-def _is_within(item: object, least: float, most: float) -> bool:
-    return isinstance(item, (int, float)) and not isinstance(item, bool) and least <= item <= most

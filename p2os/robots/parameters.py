@@ -4,14 +4,13 @@ One TOML file a model in `p2os/robots/`, each number with its source; a user's
 own file is TOML too, or one of ARIA's (`.p`).
 """
 
-from difflib import get_close_matches
 from pathlib import Path
 
 from p2os.robots.aria_file import aria_table
 from p2os.robots.model import BodyParameters, Equipment, MotionDefaults, ParametersError, RobotParameters, SonarPose
 from p2os.robots.model_file import build_parameters, file_parameters, known_robots, shipped_table, text_of
 from p2os.toml_file import is_file
-from simbase.errors import shown, shown_name
+from simbase.errors import nearest, shown, shown_name
 
 __all__ = [
     "BodyParameters",
@@ -50,9 +49,7 @@ def load_parameters(name_or_path: str | Path) -> RobotParameters:
         return build_parameters(name, aria_table(name, text_of(path), nearest_model))
     if path.suffix in {".toml", ".p"}:
         raise ParametersError(f"no robot file {shown_name(name)}", hint=f"known models: {', '.join(known_robots())}")
-    close = get_close_matches(name.lower(), known_robots(), n=1)
-    hint = f"did you mean {close[0]}?" if close else f"known models: {', '.join(known_robots())}"
-    raise ParametersError(f"no robot model {shown(name)}", hint=hint)
+    raise ParametersError(f"no robot model {shown(name)}", hint=nearest(name.lower(), known_robots()))
 
 
 def nearest_model(subclass: str) -> str:

@@ -20,19 +20,16 @@ Invariant: a bench that was restored from a snapshot goes on as the one that the
 snapshot was taken of.
 """
 
-import math
 import pickle
-import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from importlib.metadata import version
 from pathlib import Path
-from typing import Self, TypeAlias, TypeVar, Union, Unpack, cast
+from typing import Self, Unpack, cast
 
 from adapter_sim import Adapter
 from adapter_sim.pinout import load_pinout
 from bluepill_sim.spans import Span, to_nanos
-from p2os.errors import ScenarioError
 from p2os.event_log import logger
 from p2os.pioneer.body.contract import RobotBody
 from p2os.pioneer.body.factory import body_note, make_body, make_scene
@@ -51,24 +48,22 @@ from robot_bench.bench.board import (
     pins_of,
     plug_in,
 )
+from robot_bench.bench.expectations import Expectations
 from robot_bench.bench.far_end import make_far_end
+from robot_bench.bench.interventions import Interventions
 from robot_bench.bench.origin import LATER, VERSION, origin_of, refuse_others
 from robot_bench.bench.waiting import EventWait
 from robot_bench.direct.differential.robot import DifferentialRobot
 from robot_bench.direct.senses import WorldSenses
 from robot_bench.events.codec import events_of
-from robot_bench.events.expectation import ExpectationError
-from robot_bench.events.kinds import Event
-from robot_bench.events.selection import SELECTORS, Wires, bus_of, select, wire_named
 from robot_bench.events.stream import EventStream
-from robot_bench.events.words import last_words
-from robot_bench.recording.recorder import SAMPLE_NS, Recorder
+from robot_bench.recording.recorder import Recorder
 from robot_bench.recording.run_record import RunRecord, record_of
 from robot_bench.recording.trace import TraceWriter
 from robot_bench.running.loop import RunLoop
 from robot_bench.running.pacer import FIRST_SLICE_NS, SliceLength
 from robot_bench.running.shared_world import Driven, SharedWorld
-from robot_bench.scenario.fault_script import LINK_DOWN, FaultChange, FaultScript, load_faults
+from robot_bench.scenario.fault_script import LINK_DOWN, FaultScript
 from robot_bench.scenario.goals.judging import GoalJudge, Judgement
 from robot_bench.scenario.hand_script import Deed, HandScript
 from robot_bench.scenario.scenario import (
@@ -77,23 +72,19 @@ from robot_bench.scenario.scenario import (
     load_scenario,
     refuse_what_its_world_refuses,
 )
-from robot_bench.scenario.timeline import Timed, Timeline
 from robot_bench.scenario.when_script import WhenScript
-from robot_bench.scenario.world_script import WorldScript, load_changes
+from robot_bench.scenario.world_script import WorldScript
 from robot_bench.wires.chip_pins import ChipPins
 from robot_bench.wires.line_ends import AdapterPart, ControllerPart
 from robot_bench.wires.nets import Harness
 from robot_bench.wires.ports import Chip
-from simbase.errors import UsageError, shown
+from simbase.errors import UsageError
 from simbase.state import PartState, Stateful
 from simbase.timing import NS_PER_S, Nanos, Reached
 
 #: chosen: so long a run goes on after a fault of the firmware, to show what the robot does then.
 AFTER_FAULT_NS: Nanos = 1 * NS_PER_S
 _LOG = logger("bench")
-T = TypeVar("T", bound=Timed)
-#: What `run_until` waits for beside a time: an event in words, or a function of the bench.
-Condition: TypeAlias = Union[str, Callable[["Bench"], bool]]  # noqa: UP007 - a name in quotes, for pdoc
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -114,7 +105,7 @@ class BenchParts:
         return self.controller if isinstance(self.controller, Pioneer) else None
 
 
-class Bench(Stateful):
+class Bench(Expectations, Interventions, Stateful):
     """A firmware, its robot and its world, run in virtual time; `from_scenario` makes one.
 
     >>> bench = Bench.from_scenario("motors", body="kinematic")  # doctest: +SKIP
@@ -343,23 +334,6 @@ class Bench(Stateful):
         pieces = [*(data for _, data in printed.usart), self.recorder.unfinished_text]
         return b"".join(pieces).decode("utf-8", "replace")
 
-    def level(self, wire: str) -> bool:
-        """Return the level on a wire now.
-
-        Args:
-            wire: Its name in the pin-out (`motor1_comm1`), or the BluePill's pin (`PB7`).
-
-        Raises:
-            UsageError: There is no such wire.
-        """
-        return self.parts.harness[wire_named(wire, self._wires)].level(self.now)
-
-    @property
-    def _wires(self) -> Wires | None:
-        """The wires of a robot on own pins; None: those of the pin-out."""
-        own = self.scenario.own_robot
-        return None if own is None else own.wires
-
     def record(self) -> RunRecord:
         """Return what was recorded so far: poses, edges, texts, packets and the state log, each with its time."""
         return record_of(self.recorder.lines())
@@ -381,38 +355,6 @@ class Bench(Stateful):
         """End the run here and judge the goals of this robot."""
         return self.goals.finish(self.finish(), planned_ns=self.scenario.planned_ns)
 
-    def run_until(
-        self,
-        end: "Span | Condition",
-        advance: Callable[[int], Reached] | None = None,
-        *,
-        within: Span | None = None,
-    ) -> Event | None:
-        """Run to a time or until something happens; no further than the run lasts, nor beyond a debugger's halt.
-
-        Args:
-            end: A time counted from the beginning: nanoseconds, or a text such as "2.5 s". Or an event in words, as
-                of `robot_bench.events.selection` ("pin PB12 high"). Or a function of the bench, asked each 50 ms.
-            advance: As of `RunLoop.run_until`; with a time only.
-            within: With a condition: how long to wait for it from now on; None waits to the end of the run.
-
-        Returns:
-            The event that was waited for; None where it did not come, and with a time or a function. The bench stands
-            up to 50 ms after it.
-
-        Raises:
-            UsageError: The run has been judged, or finished; the words mean no events.
-            BluePillError: `end` is no time.
-        """
-        if callable(end):
-            asked = end
-            self._step_until(lambda: asked(self), self._limit(within, self.now))
-            return None
-        if isinstance(end, str) and (end.split() or [""])[0] in SELECTORS:
-            return self._wait_for(end, within)
-        self._run_to(to_nanos(end), advance)
-        return None
-
     def _run_to(self, wanted: Nanos, advance: Callable[[int], Reached] | None = None) -> None:
         end_ns = min(wanted, self.end)
         if end_ns > self.now and self.events.released_until >= self.now:
@@ -426,225 +368,6 @@ class Bench(Stateful):
             self._shared.run_to(end_ns)
         if self.chip.has_died and not had_died:
             _LOG.error("chip: %s", self.chip.verdict)
-
-    def _limit(self, within: Span | None, since: Nanos) -> Nanos:
-        return self.end if within is None else since + to_nanos(within)
-
-    def _step_until(
-        self, is_done: Callable[[], bool], limit: Nanos, before_step: Callable[[], None] = lambda: None
-    ) -> bool:
-        """Run in steps of 50 ms until something is so, or to a time; tell whether it is so."""
-        while not (so := is_done()) and self.now < min(limit, self.end):
-            before_step()
-            self._run_to(min(limit, (self.now // SAMPLE_NS + 1) * SAMPLE_NS))
-        return so
-
-    def _wait_for(self, words: str, within: Span | None) -> Event | None:
-        """Run until an event happens, counted from the last one that was waited for where nothing was done since."""
-        selector = select(words, self._wires)
-        if (bus := bus_of(words)) and bus not in self.scenario.record:
-            raise UsageError(f"{bus} is not recorded", hint=f'record = ["{bus}"] in the scenario')
-        limit = self._limit(within, self._waits.since(self.now))
-        return self._waits.wait(selector, limit, lambda: self.now, self._step_until)
-
-    def expect(self, words: str, within: Span | None = None) -> Event:
-        """Run until an event happens and return it.
-
-        Args:
-            words: As of `robot_bench.events.selection`: "contact", "pin PB12 high", "robot stops".
-            within: How long to wait: from the event on that was expected last, where nothing was done since, else from
-                now on. So a second `expect` is an exact bound of a latency. None waits to the end of the run.
-
-        Raises:
-            ExpectationError: It did not happen; the message has the last events.
-            UsageError: The words mean no events.
-        """
-        since = self._waits.since(self.now)
-        found = self._wait_for(words, within)
-        if found is None:
-            __tracebackhide__ = True
-            raise self._unmet(f"{words!r} did not happen", since, self._limit(within, since))
-        return found
-
-    def expect_no(self, words: str, during: Span) -> None:
-        """Run for a time in which an event must not happen.
-
-        Raises:
-            ExpectationError: It happened.
-            UsageError: The words mean no events.
-        """
-        since = self._waits.since(self.now)
-        found = self._wait_for(words, during)
-        if found is not None:
-            __tracebackhide__ = True
-            raise self._unmet(f"{words!r} happened at {found.t / NS_PER_S:.3f} s", since)
-
-    def expect_text(self, text: str | re.Pattern[str], within: Span | None = None) -> Event:
-        """Run until the firmware prints a line that holds a text, or matches a pattern; return it.
-
-        Raises:
-            ExpectationError: It did not.
-        """
-        __tracebackhide__ = True
-        words = f"sends {text}" if isinstance(text, str) else f"matches {text.pattern}"
-        return self.expect(f"usart1 {words}", within)
-
-    def expect_pin(self, pin: str, level: str, within: Span | None = None) -> None:
-        """Run until a wire has a level, `high` or `low`; at once where it has it.
-
-        Raises:
-            ExpectationError: It had not.
-            UsageError: There is no such wire or level.
-        """
-        __tracebackhide__ = True
-        select(f"pin {pin} {level}", self._wires)
-        if self.level(pin) is not (level == "high"):
-            self.expect(f"pin {pin} {level}", within)
-
-    def expect_pose(
-        self,
-        *,
-        x_m: float | None = None,
-        y_m: float | None = None,
-        heading_deg: float | None = None,
-        tolerance_m: float = 0.05,
-        tolerance_deg: float = 5.0,
-        within: Span | None = None,
-    ) -> Pose:
-        """Run until the robot is at a place, or has a heading; what is None is not looked at.
-
-        Raises:
-            ExpectationError: It was not; the message says where it is.
-        """
-        since = self.now
-
-        def is_there() -> bool:
-            pose = self.pose
-            off_m = math.hypot(0 if x_m is None else pose.x_m - x_m, 0 if y_m is None else pose.y_m - y_m)
-            turn = 0.0 if heading_deg is None else pose.heading_rad - math.radians(heading_deg)
-            return off_m <= tolerance_m and abs(math.remainder(turn, math.tau)) <= math.radians(tolerance_deg)
-
-        if not self._step_until(is_there, self._limit(within, since)):
-            __tracebackhide__ = True
-            rows = (("x", x_m, " m"), ("y", y_m, " m"), ("heading", heading_deg, "°"))
-            wanted = ", ".join(f"{name} {value:g}{unit}" for name, value, unit in rows if value is not None)
-            pose = self.pose
-            here = f"x {pose.x_m:.3f} m, y {pose.y_m:.3f} m, heading {math.degrees(pose.heading_rad):.1f}°"
-            raise self._unmet(f"the robot was not at {wanted}; it is at {here}", since)
-        return self.pose
-
-    def _unmet(self, what: str, since: Nanos, limit: Nanos | None = None) -> ExpectationError:
-        until = self.now if limit is None else min(limit, self.now)
-        return ExpectationError(
-            f"{what}, from {since / NS_PER_S:.3f} s to {until / NS_PER_S:.3f} s", self.last_events()
-        )
-
-    def last_events(self, count: int = 8) -> list[str]:
-        """Return what happened last, a line each with its time; poses, edges, packets and ranges aside."""
-        return last_words(events_of(self.recorder.lines()), count)
-
-    def place(self, name: str, **keys: object) -> None:
-        """Place a thing now, as `[[obstacle]]` of a scenario does: `shape`, `x_m`, `before_sonar`, `hold_s`, ….
-
-        Raises:
-            ScenarioError: A key is unknown or missing, or a value is wrong.
-            WorldError: There is one of that name.
-        """
-        self._change_world({"name": name, **keys})
-
-    def move(self, name: str, **keys: object) -> None:
-        """Put a thing elsewhere now: `x_m`, `y_m`, `heading_deg`.
-
-        Raises:
-            ScenarioError: As of `place`.
-            WorldError: There is none of that name, or it cannot be moved.
-        """
-        self._change_world({"name": name, "op": "move", **keys})
-
-    def remove(self, name: str) -> None:
-        """Take a thing away now.
-
-        Raises:
-            WorldError: There is none of that name, or it cannot be taken away.
-        """
-        self._change_world({"name": name, "op": "remove"})
-
-    def inject(self, words: str, during: Span | None = None) -> None:
-        """Make something go wrong now: the words of a scenario's `[[fault]]`, such as "sonar-stuck 3 1.2".
-
-        Args:
-            words: The fault.
-            during: It is cleared after so long; None leaves it.
-
-        Raises:
-            ScenarioError: There is no such fault, or the bench is in mode direct.
-        """
-        self._refuse_faults_in_mode_a()
-        table: dict[str, object] = {"at_s": 0, "fault": words}
-        if during is not None:
-            table["for_s"] = to_nanos(during) / NS_PER_S
-        changes = load_faults([table], self.scenario.parameters, "inject")
-        self._intervene(self.faults, [replace(change, at=self.now + change.at) for change in changes])
-
-    def clear(self, words: str) -> None:
-        """Set right again what `inject` did.
-
-        Raises:
-            ScenarioError: The bench is in mode direct.
-        """
-        self._refuse_faults_in_mode_a()
-        self._intervene(self.faults, [FaultChange(self.now, f"clear {words}")])
-
-    def press(self, button: str, during: Span | None = None) -> None:
-        """Press a button of the robot now: "stop-button", or a bumper such as "bumper front 1".
-
-        Raises:
-            ScenarioError: There is no such button, or the bench is in mode direct.
-        """
-        if button.split()[:1] not in (["stop-button"], ["bumper"]):
-            raise ScenarioError(f"there is no button {shown(button)}", hint='"stop-button", or "bumper front 1"')
-        self.inject(button, during)
-
-    def drop_link(self, during: Span | None = None) -> None:
-        """Break the P2OS line now, both ways; it is joined again after so long, or by `clear("link-down")`.
-
-        Raises:
-            ScenarioError: The bench is in mode direct, which has no such line.
-        """
-        self.inject(LINK_DOWN, during)
-
-    def _change_world(self, table: dict[str, object]) -> None:
-        changes = load_changes([{"at_s": 0, **table}], self.scenario.parameters, str(table["name"]), are_later=True)
-        self._intervene(self.script, [replace(change, at=self.now + change.at) for change in changes])
-
-    def _intervene(self, script: Timeline[T], changes: Sequence[T]) -> None:
-        """Add changes to what a scenario has; `rewind` will not go on through them, but begin after them."""
-        self._refuse_the_ended()
-        self._waits.forget()
-        script.add(*changes, now=self.now)
-        self.checkpoint()
-
-    def _refuse_the_ended(self) -> None:
-        if self.events.released_until >= self.now:
-            raise UsageError(f"the run was ended at {self.now / NS_PER_S:g} s", hint="make another Bench")
-
-    def _refuse_faults_in_mode_a(self) -> None:
-        if self.scenario.mode == "direct":
-            raise ScenarioError(
-                "a fault acts on the robot's controller, and mode direct has none", hint='mode="adapter"'
-            )
-
-    def take_inputs(self, deeds: Sequence[Deed]) -> None:
-        """Take what comes in from outside, to be done at its times, which are after now; the trace notes each.
-
-        `rewind` forgets what came in after the state that it goes back to.
-
-        Raises:
-            UsageError: The run has been judged, or finished.
-        """
-        self._refuse_the_ended()
-        self._waits.forget()
-        self.hands.add(*deeds)
 
     def checkpoint(self) -> None:
         """Keep the present state, so that `rewind` to a later time is quick; some 100 kB."""

@@ -27,6 +27,7 @@ from typing import Any, cast
 from p2os.errors import ScenarioError
 from p2os.pioneer.world import load_world
 from p2os.toml_file import TomlSource, is_file, read_toml, read_user_text
+from p2os.toml_schema import LONGEST_S, Key, Place, Table, Where, check_table, within
 from robot_bench.campaign.search import SEARCHES
 from robot_bench.campaign.things import KINDS
 from robot_bench.campaign.trial import Trial, trial_of, unpacked
@@ -34,9 +35,8 @@ from robot_bench.events.codec import Json
 from robot_bench.scenario.included_files import Setting
 from robot_bench.scenario.json_schema import DRAFT, goals_schema, table_schema
 from robot_bench.scenario.scenario import Scenario
-from robot_bench.scenario.schema import LONGEST_S, Key, Place, Table, Where, check_table, nearest, within
 from robot_bench.scenario.sweep import MOST_RUNS
-from simbase.errors import UsageError, shown
+from simbase.errors import UsageError, nearest, shown
 
 TOP = (
     Key(name="description", kind="text"),

@@ -18,12 +18,12 @@ from typing import cast
 
 from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import World
+from p2os.toml_schema import Table
 from robot_bench.campaign.conduct import FAILURES, Finding, Row, Run
 from robot_bench.campaign.last_moment import LastMoment
 from robot_bench.campaign.results import Whole
 from robot_bench.campaign.trial import unpacked
 from robot_bench.campaign.variants.diversity import FailureSet
-from robot_bench.scenario.schema import Table
 from simbase.errors import FileError, P2osError
 
 #: chosen: what fits a page that one scrolls through.

@@ -14,11 +14,11 @@ from typing import cast
 
 from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import Pose, World
+from p2os.toml_schema import Table
 from robot_bench.campaign.campaign_file import Campaign, Disturbance, Drawn, Span
 from robot_bench.campaign.things import Room, Thing
 from robot_bench.campaign.trial import Trial, unpacked
 from robot_bench.scenario.included_files import Setting
-from robot_bench.scenario.schema import Table
 
 #: A coordinate for each dimension.
 Point = tuple[float, ...]

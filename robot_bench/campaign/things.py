@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 from p2os.pioneer.world.geometry import Footprint
 from p2os.pioneer.world.model import Obstacle, Pose, World
-from robot_bench.scenario.schema import Table
+from p2os.toml_schema import Table
 
 #: chosen: higher than every sonar.
 HEIGHT_M = 0.5

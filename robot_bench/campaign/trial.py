@@ -27,6 +27,7 @@ from bluepill_sim.program.image import Image, load_image
 from p2os.pioneer.world import known_worlds, load_world
 from p2os.pioneer.world.writer import write_world
 from p2os.toml_file import TomlSource, is_file, toml_text
+from p2os.toml_schema import Table
 from robot_bench.bench import Bench
 from robot_bench.bench.board import boot
 from robot_bench.events.kinds import Contact, Event, Pose, Text
@@ -39,7 +40,6 @@ from robot_bench.scenario.included_files import (
     shipped_file,
 )
 from robot_bench.scenario.scenario import Scenario, build_scenario, known_scenarios, load_scenario
-from robot_bench.scenario.schema import Table
 from simbase.errors import P2osError, UsageError
 from simbase.timing import NS_PER_MS, Nanos
 

@@ -17,7 +17,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from adapter_sim.codec import BitOrder
-from adapter_sim.settings import MotorCommand
+from adapter_sim.settings import STEP_UM_PER_S, MotorCommand
 from p2os.pioneer.body.contract import RobotBody, Wheels
 from robot_bench.direct.distance import DistanceSensors
 from robot_bench.direct.encoder import WheelEncoder
@@ -40,7 +40,7 @@ STALLS = {
 class DirectSettings:
     """What a scenario can set of the parts of mode A."""
 
-    step_um_per_s: int = 62_500
+    step_um_per_s: int = STEP_UM_PER_S
     #: None lets the wheels jump to their speed, as a velocity joint without a torque limit does.
     ramp_um_per_s2: int | None = 300_000
     #: chosen: a ranging module at 20 Hz.

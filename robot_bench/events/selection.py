@@ -21,7 +21,6 @@ r"""Which events are meant: one line of words, the same in goals, scenario files
 Invariant: what a selector says of an event depends on the events before it alone; it is saved with the bench.
 """
 
-import difflib
 import math
 import re
 from collections.abc import Callable, Mapping
@@ -43,7 +42,7 @@ from robot_bench.events.kinds import (
     Text,
     WorldChange,
 )
-from simbase.errors import UsageError, shown
+from simbase.errors import UsageError, nearest, shown
 from simbase.state import Stateful
 from simbase.timing import NS_PER_S
 
@@ -86,10 +85,7 @@ def select(words: str, wires: Wires | None = None) -> Selector:
     name, *rest = words.split(maxsplit=1) or [""]
     row = SELECTORS.get(name)
     if row is None:
-        near = difflib.get_close_matches(name, SELECTORS, n=1)
-        hint = (
-            f"did you mean {near[0]!r}?" if near else f"events: {'; '.join(usage for usage, _ in SELECTORS.values())}"
-        )
+        hint = nearest(name, SELECTORS, f"events: {'; '.join(usage for usage, _ in SELECTORS.values())}")
         raise UsageError(f"no events {shown(words)}", hint=hint)
     usage, make = row
     try:
@@ -119,9 +115,7 @@ def wire_named(name: str, wires: Wires | None = None) -> str:
     """
     wires = _wires() if wires is None else wires
     if name not in wires:
-        near = difflib.get_close_matches(name, wires, n=1, cutoff=0.5)
-        hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(sorted(wires))}"
-        raise UsageError(f"there is no wire {shown(name)}", hint=hint)
+        raise UsageError(f"there is no wire {shown(name)}", hint=nearest(name, wires))
     return wires[name]
 
 

@@ -85,11 +85,6 @@ class RunRecord:
             f"<RunRecord of {name}, {self.last_ns / NS_PER_S:g} s, {len(self.poses)} poses, {len(self.events)} notes>"
         )
 
-    @property
-    def usart_text(self) -> str:
-        """All that the firmware printed, undecodable bytes replaced."""
-        return b"".join(data for _, data in self.usart).decode("utf-8", "replace")
-
     def usart_lines(self) -> list[tuple[int, str]]:
         """Return (ns of its last character, text) for each printed line."""
         lines, pending = [], b""

@@ -52,8 +52,6 @@ MOST_PATH_POSES = 500
 #: chosen: metres; a trace does not hold them.
 HULL_HEIGHT_M, SONAR_HEIGHT_M = 0.22, 0.2
 WALL, BOX, HULL = (0.45, 0.49, 0.53, 1.0), (0.73, 0.65, 0.4, 1.0), (0.75, 0.15, 0.15, 0.9)
-#: The lists of an entity.
-PRIMITIVES = ("metadata", "arrows", "cubes", "spheres", "cylinders", "lines", "triangles", "texts", "models")
 #: Levels of a Log.
 DEBUG, INFO, WARNING, ERROR = 1, 2, 3, 4
 

@@ -10,6 +10,7 @@ from typing import cast
 
 from p2os.errors import ScenarioError
 from p2os.robots.parameters import BodyParameters
+from p2os.toml_schema import Key, Place, Table, check_table, within
 from robot_bench.direct.differential.analog import GP2Y0A21
 from robot_bench.direct.differential.description import (
     Battery,
@@ -23,7 +24,6 @@ from robot_bench.direct.differential.description import (
     Off,
 )
 from robot_bench.direct.differential.drive_train import box_inertia, no_load_radps
-from robot_bench.scenario.schema import Key, Place, Table, check_table, within
 from simbase.errors import shown
 
 #: chosen: a bench hands the chip no more edges of both encoders in a step of 1 ms than it has room for.

@@ -20,7 +20,7 @@ from typing import cast
 from p2os.errors import ScenarioError
 from p2os.pioneer.controller.faults import MOMENTARY, read_fault
 from p2os.robots.parameters import RobotParameters
-from robot_bench.scenario.schema import LONGEST_S, Key, Table, Where, check_table, within
+from p2os.toml_schema import LONGEST_S, Key, Table, Where, check_table, within
 from robot_bench.scenario.timeline import Timeline
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos

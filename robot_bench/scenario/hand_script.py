@@ -18,8 +18,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from p2os.errors import ScenarioError
+from p2os.toml_schema import LONGEST_S, Key, Table, Where
 from robot_bench.events.selection import Wires, wire_named
-from robot_bench.scenario.schema import LONGEST_S, Key, Table, Where
 from robot_bench.scenario.timeline import Timeline
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos

@@ -23,8 +23,8 @@ from typing import cast
 
 from p2os.errors import ScenarioError
 from p2os.toml_file import TomlSource, is_file, read_toml, read_user_text
-from robot_bench.scenario.schema import Key, Place, Table, check_table, nearest
-from simbase.errors import UsageError, shown, shown_name
+from p2os.toml_schema import Key, Place, Table, check_table
+from simbase.errors import UsageError, nearest, shown, shown_name
 
 #: Of the schema of scenario files.
 SCHEMA_VERSION = 1

@@ -9,11 +9,11 @@ Source: JSON Schema, draft 2020-12.
 from collections.abc import Sequence
 from importlib.metadata import entry_points
 
+from p2os.toml_schema import Key
 from robot_bench.events.codec import Json
 from robot_bench.scenario.goals.judging import COMMON
 from robot_bench.scenario.goals.kinds import KINDS
 from robot_bench.scenario.scenario import TABLES
-from robot_bench.scenario.schema import Key
 from robot_bench.scenario.several_robots import ROBOT
 from robot_bench.scenario.when_script import KEYS as WHEN_KEYS
 
@@ -21,6 +21,8 @@ DRAFT = "https://json-schema.org/draft/2020-12/schema"
 _TYPES = {
     "text": "string", "number": "number", "whole": "integer", "flag": "boolean", "table": "object", "tables": "array",
     "list": "array",
+    "numbers": "array",
+    "points": "array",
 }  # fmt: skip
 
 

@@ -10,7 +10,7 @@ from bluepill_sim.parts.attached import PartError
 from bluepill_sim.parts.registry import PartSpec, build
 from bluepill_sim.stm32f103 import BONDED_PINS
 from p2os.errors import ScenarioError
-from robot_bench.scenario.schema import Key, Table, Where, within
+from p2os.toml_schema import Key, Table, Where, within
 from simbase.errors import shown, shown_name
 
 #: The keys of every part; all others are its pins and settings.

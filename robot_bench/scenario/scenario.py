@@ -26,10 +26,12 @@ from p2os.pioneer.controller import ControllerSettings, SonarPerSip
 from p2os.pioneer.controller.flash import load_flash
 from p2os.pioneer.sensor_errors import load_sensor_errors
 from p2os.pioneer.world import Pose, known_worlds, load_world, world_suffixes
+from p2os.pioneer.world.file import in_range
 from p2os.pioneer.world.model import World
 from p2os.pioneer.world.start_places import refuse_start, start_places
 from p2os.robots.parameters import RobotParameters, load_parameters
 from p2os.toml_file import is_file
+from p2os.toml_schema import LONGEST_S, Key, Place, Table, Where, check_table, within
 from robot_bench.direct.robot import DirectSettings
 from robot_bench.events.selection import BUSES, bus_of
 from robot_bench.scenario import fault_script, plugged_parts, when_script, world_script
@@ -45,7 +47,6 @@ from robot_bench.scenario.included_files import (
     shipped_file,
     shipped_scenarios,
 )
-from robot_bench.scenario.schema import LONGEST_S, Key, Place, Table, Where, check_table, in_range, nearest, within
 from robot_bench.scenario.several_robots import robot_keys, split
 from robot_bench.scenario.sweep import Axis, load_axes, load_seeds
 from robot_bench.scenario.when_script import When, load_whens
@@ -53,7 +54,7 @@ from robot_bench.scenario.wired_robots import OwnRobot, find_own_robot, known_ow
 from robot_bench.scenario.world_script import Change, load_changes, refuse_names
 from robot_bench.wires.line_ends import ENDS
 from robot_bench.wires.power_up import RANDOM_SRAM, ZEROS
-from simbase.errors import FileError, UsageError, shown, shown_name
+from simbase.errors import FileError, UsageError, nearest, shown, shown_name
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 from simbase.user_classes import located, source_of
 

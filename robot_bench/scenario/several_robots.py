@@ -21,8 +21,9 @@ from dataclasses import dataclass, replace
 from typing import cast
 
 from p2os.errors import ScenarioError
-from robot_bench.scenario.schema import Key, Place, Source, Table, check_table, in_range, nearest, within
-from simbase.errors import shown
+from p2os.pioneer.world.file import in_range
+from p2os.toml_schema import Key, Place, Source, Table, check_table, within
+from simbase.errors import nearest, shown
 
 #: What a robot has for itself; those that a scenario of one robot has at its top, and where it stands.
 OWN = ("firmware", "mode", "threshold_m", "usart_baud", "pins", "direct", "adapter", "controller", "record")

@@ -22,8 +22,8 @@ from fractions import Fraction
 from typing import cast
 
 from p2os.errors import ScenarioError
+from p2os.toml_schema import Key, Table, Where, check_table, within
 from robot_bench.scenario.included_files import Setting
-from robot_bench.scenario.schema import Key, Table, Where, check_table, within
 from simbase.errors import UsageError, shown
 
 #: chosen: a night on one core with runs of a second; more is a mistake.

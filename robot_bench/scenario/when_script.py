@@ -22,15 +22,15 @@ from typing import cast
 
 from p2os.errors import ScenarioError
 from p2os.robots.parameters import RobotParameters
+from p2os.toml_schema import LONGEST_S, Key, Table, Where, check_table, within
 from robot_bench.events.kinds import Event
 from robot_bench.events.selection import Wires, select
 from robot_bench.events.stream import EventStream
 from robot_bench.scenario import world_script
 from robot_bench.scenario.fault_script import LINK_DOWN, FaultChange, load_faults
 from robot_bench.scenario.hand_script import DEEDS, Deed, load_deeds
-from robot_bench.scenario.schema import LONGEST_S, Key, Table, Where, check_table, nearest, within
 from robot_bench.scenario.world_script import Change, load_changes
-from simbase.errors import UsageError, shown
+from simbase.errors import UsageError, nearest, shown
 from simbase.state import Stateful
 from simbase.timing import NS_PER_S, Nanos
 

@@ -17,13 +17,13 @@ from p2os.errors import ScenarioError
 from p2os.pioneer.body.contract import RobotBody
 from p2os.robots.parameters import RobotParameters
 from p2os.toml_file import TomlSource, is_file, read_toml, read_user_text
+from p2os.toml_schema import Place, Table, Where, within
 from robot_bench.direct.differential.robot import DifferentialRobot
 from robot_bench.direct.wired import AnalogPin, RobotWire
 from robot_bench.events.selection import wire_named
 from robot_bench.scenario.differential_file import load_differential
-from robot_bench.scenario.schema import Place, Table, Where, nearest, within
 from robot_bench.wires.nets import Harness
-from simbase.errors import shown, shown_name
+from simbase.errors import nearest, shown, shown_name
 from simbase.timing import Nanos, Reached
 
 #: Pins that the ADC can measure on this package.

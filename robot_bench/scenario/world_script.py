@@ -29,11 +29,12 @@ from typing import cast
 
 from p2os.errors import ScenarioError, WorldError
 from p2os.pioneer.body.contract import RobotBody
-from p2os.pioneer.world.model import RANGES, Obstacle, Repeat, Walk, World
+from p2os.pioneer.world.file import in_range
+from p2os.pioneer.world.model import Obstacle, Repeat, Walk, World
 from p2os.robots.parameters import RobotParameters
-from robot_bench.scenario.schema import LONGEST_S, Key, Table, Where, check_table, in_range, nearest, within
+from p2os.toml_schema import LONGEST_S, Key, Table, Where, check_table, within
 from robot_bench.scenario.timeline import Timeline
-from simbase.errors import shown
+from simbase.errors import nearest, shown
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: chosen: the robot moves 10 mm at most in between.
@@ -96,7 +97,7 @@ KEYS = (
     Key(name="hold_s", kind="number", above=0, most=LONGEST_HOLD_S),
     in_range("mass_kg"),
     in_range("friction"),
-    Key(name="path_m", kind="list"),
+    in_range("path_m"),
     in_range("speed_mps"),
     Key(name="repeat", kind="text", choices=tuple(member.value for member in Repeat)),
 )
@@ -257,24 +258,13 @@ def _walk(table: Table, where: str) -> Walk | None:
     """Return the path that a thing walks from its placing on."""
     if "path_m" not in table:
         return None
-    rows = cast("list[object]", table["path_m"])
-    least, most = RANGES["path_m"]
-    points = [
-        row
-        for row in rows
-        if isinstance(row, list) and len(row) == 2 and all(_is_number(v) and least <= v <= most for v in row)
-    ]
-    if len(points) < len(rows) or "before_sonar" in table or str(table.get("op", "place")) != Op.PLACE.value:
-        raise ScenarioError(f"{where}: path_m must be a list of [x, y], for a thing that is placed in the world")
+    if "before_sonar" in table or str(table.get("op", "place")) != Op.PLACE.value:
+        raise ScenarioError(f"{where}: path_m is for a thing that is placed in the world")
     return Walk(
-        points_m=tuple((float(x), float(y)) for x, y in points),
+        points_m=tuple((float(x), float(y)) for x, y in cast("list[list[float]]", table["path_m"])),
         speed_mps=float(cast("float", table.get("speed_mps", DEFAULT_SPEED_MPS))),
         repeat=Repeat(str(table.get("repeat", Repeat.BACK_AND_FORTH.value))),
     )
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
 def refuse_names(changes: Sequence[Change], world: World) -> None:

@@ -1,14 +1,11 @@
 """Edges of wires in bulk: as arrays, in the trace's blocks, and as the chip gives them.
 
-What is long goes through functions that are there twice: in C (edges.c), and in Python for
-where no compiler was. `p2os doctor` says which are used.
+What is long goes through functions in C (edges.c), which are built with the package.
 
 A block holds the edges of several wires in order of time, those of one instant in the order of the
 wires. Each is one number, (ns since the edge before, 0 for the first) times the number of wires plus
 the wire's place, seven bits a byte, the lowest first, the eighth set where more follow. The level is
 not there: each edge of a wire toggles it.
-
-Invariant: both versions give the same results.
 """
 
 import ctypes
@@ -20,7 +17,8 @@ from itertools import pairwise
 from typing import Any, overload
 
 from bluepill_sim.fabric.subscriptions import EDGE
-from simbase.timing import NS_PER_S, Nanos
+from simbase.errors import MissingDependencyError
+from simbase.timing import Nanos
 
 #: Of a row of the chip: a pin that is on no wire.
 NO_WIRE = 255
@@ -28,7 +26,6 @@ NO_WIRE = 255
 _PIECE = 1 << 20
 #: More bytes than a number of a block has.
 _LONGEST = 9
-_LAST_NS = 2**63 - 1
 #: Result and arguments: v nothing, i 32 bits, l 64 bits, z size, p pointer, c one byte.
 _FUNCTIONS = {
     "edges_split": "vpzppzppp",
@@ -115,13 +112,10 @@ def split(rows: bytes, wire_of_pin: bytes, code_of_drive: bytes, wires: int) -> 
         code_of_drive: What each drive of the chip becomes; 256 bytes.
         wires: How many there are, below `NO_WIRE`.
     """
-    native = _library()
-    if native is None:
-        return split_in_python(rows, wire_of_pin, code_of_drive)
     count = len(rows) // EDGE.size
     times, codes = array("q", bytes(8 * count)), bytearray(count)
     starts = (ctypes.c_size_t * (wires + 1))()
-    native.edges_split(rows, count, wire_of_pin, code_of_drive, wires, _at(times), _in(codes), starts)
+    _library().edges_split(rows, count, wire_of_pin, code_of_drive, wires, _at(times), _in(codes), starts)
     return [
         (wire, times[first:last], bytes(codes[first:last]))
         for wire, (first, last) in enumerate(pairwise(starts))
@@ -129,37 +123,10 @@ def split(rows: bytes, wire_of_pin: bytes, code_of_drive: bytes, wires: int) -> 
     ]
 
 
-def split_in_python(rows: bytes, wire_of_pin: bytes, code_of_drive: bytes) -> list[Track]:
-    """Do as `split`."""
-    found: dict[int, tuple[array[int], bytearray]] = {}
-    for at, pin, drive, _wire, _fill, _zero in EDGE.iter_unpack(rows):
-        wire = wire_of_pin[pin]
-        if wire != NO_WIRE:
-            times, codes = found.setdefault(wire, (array("q"), bytearray()))
-            times.append(at)
-            codes.append(code_of_drive[drive])
-    return [(wire, times, bytes(codes)) for wire, (times, codes) in sorted(found.items())]
-
-
 def changes(levels: Edges, before: int) -> Edges:
     """Return, in place, the last level of each instant where it differs from the one before, at first `before`."""
-    native = _library()
-    if native is None:
-        return changes_in_python(levels, before)
-    kept = native.edges_changes(_at(levels.times), _in(levels.levels), len(levels), before)
+    kept = _library().edges_changes(_at(levels.times), _in(levels.levels), len(levels), before)
     del levels.times[kept:], levels.levels[kept:]
-    return levels
-
-
-def changes_in_python(levels: Edges, before: int) -> Edges:
-    """Do as `changes`."""
-    found = Edges()
-    last = len(levels) - 1
-    for place, (at, level) in enumerate(levels):
-        if level != before and (place == last or levels.times[place + 1] != at):
-            found.append(at, level)
-            before = level
-    levels.times, levels.levels = found.times, found.levels
     return levels
 
 
@@ -170,10 +137,6 @@ def pack(tracks: Sequence[Edges], most: int) -> Iterator[tuple[Nanos, int, bytes
         tracks: The changes of each wire.
         most: How many edges a block holds at most.
     """
-    native = _library()
-    if native is None:
-        yield from pack_in_python(tracks, most)
-        return
     wires, left = len(tracks), sum(map(len, tracks))
     times = (ctypes.c_void_p * wires)(*(_at(track.times) for track in tracks))
     counts = (ctypes.c_size_t * wires)(*map(len, tracks))
@@ -181,28 +144,11 @@ def pack(tracks: Sequence[Edges], most: int) -> Iterator[tuple[Nanos, int, bytes
     room = ctypes.create_string_buffer((_LONGEST + 1) * min(most, left))
     edges, first = ctypes.c_size_t(), ctypes.c_int64()
     while left:
-        size = native.edges_pack(
+        size = _library().edges_pack(
             wires, times, counts, places, most, room, ctypes.byref(edges), ctypes.byref(first)
         )  # fmt: skip
         left -= edges.value
         yield first.value, edges.value, ctypes.string_at(room, size)
-
-
-def pack_in_python(tracks: Sequence[Edges], most: int) -> Iterator[tuple[Nanos, int, bytes]]:
-    """Do as `pack`."""
-    merged = sorted((at, wire) for wire, track in enumerate(tracks) for at in track.times)
-    for begin in range(0, len(merged), most):
-        part = merged[begin : begin + most]
-        first = last = part[0][0]
-        block = bytearray()
-        for at, wire in part:
-            value = (at - last) * len(tracks) + wire
-            last = at
-            while value > 127:
-                block.append(value & 127 | 128)
-                value >>= 7
-            block.append(value)
-        yield first, len(part), bytes(block)
 
 
 def unpack(block: bytes, wires: int, first: Nanos) -> "list[tuple[int, array[int]]]":
@@ -213,33 +159,10 @@ def unpack(block: bytes, wires: int, first: Nanos) -> "list[tuple[int, array[int
     """
     if not 0 < wires < NO_WIRE or first < 0:
         raise ValueError("no such block of edges")
-    native = _library()
-    if native is None:
-        return unpack_in_python(block, wires, first)
     times, starts = array("q", bytes(8 * len(block))), (ctypes.c_size_t * (wires + 1))()
-    if not native.edges_unpack(block, len(block), wires, first, _at(times), starts):
+    if not _library().edges_unpack(block, len(block), wires, first, _at(times), starts):
         raise ValueError("a damaged block of edges")
     return [(wire, times[begin:end]) for wire, (begin, end) in enumerate(pairwise(starts)) if begin < end]
-
-
-def unpack_in_python(block: bytes, wires: int, first: Nanos) -> "list[tuple[int, array[int]]]":
-    """Do as `unpack`."""
-    found: dict[int, array[int]] = {}
-    value = length = 0
-    for byte in block:
-        value |= (byte & 127) << 7 * length
-        length += 1
-        if byte < 128:
-            first += value // wires
-            if first > _LAST_NS:
-                break
-            found.setdefault(value % wires, array("q")).append(first)
-            value = length = 0
-        elif length == _LONGEST:
-            break
-    if length or first > _LAST_NS:
-        raise ValueError("a damaged block of edges")
-    return sorted(found.items())
 
 
 def codes(tracks: Sequence[Edges]) -> Edges:
@@ -248,51 +171,21 @@ def codes(tracks: Sequence[Edges]) -> Edges:
     Args:
         tracks: At most eight wires.
     """
-    native = _library()
-    if native is None:
-        return codes_in_python(tracks)
     merged, count = _Merged(tracks), sum(map(len, tracks))
     found = Edges()
     found.extend(array("q", bytes(8 * count)), bytes(count))
-    kept = native.edges_codes(*merged.arguments, _at(found.times), _in(found.levels))
+    kept = _library().edges_codes(*merged.arguments, _at(found.times), _in(found.levels))
     del found.times[kept:], found.levels[kept:]
-    return found
-
-
-def codes_in_python(tracks: Sequence[Edges]) -> Edges:
-    """Do as `codes`."""
-    found, code = Edges(), 0
-    for at, bit, level in sorted((at, bit, level) for bit, track in enumerate(tracks) for at, level in track):
-        code = code | 1 << bit if level else code & ~(1 << bit)
-        if found.times and found.times[-1] == at:
-            found.times.pop()
-            found.levels.pop()
-        if not found.times or found.levels[-1] != code:
-            found.append(at, code)
     return found
 
 
 def dumped(tracks: Sequence[Edges], identifiers: Sequence[str]) -> Iterator[str]:
     """Yield the changes as a value change dump has them, in pieces of whole lines, from before time 0 on."""
-    native = _library()
-    if native is None:
-        yield from dumped_in_python(tracks, identifiers)
-        return
     merged, now = _Merged(tracks), ctypes.c_int64(-1)
     names = (ctypes.c_char_p * len(tracks))(*(name.encode() for name in identifiers))
     room = ctypes.create_string_buffer(_PIECE)
-    while size := native.edges_vcd(*merged.arguments, names, ctypes.byref(now), room, _PIECE):
+    while size := _library().edges_vcd(*merged.arguments, names, ctypes.byref(now), room, _PIECE):
         yield ctypes.string_at(room, size).decode("ascii")
-
-
-def dumped_in_python(tracks: Sequence[Edges], identifiers: Sequence[str]) -> Iterator[str]:
-    """Do as `dumped`."""
-    now = -1
-    for at, wire, level in sorted((at, wire, level) for wire, track in enumerate(tracks) for at, level in track):
-        if at != now:
-            now = at
-            yield f"#{at}\n"
-        yield f"{level}{identifiers[wire]}\n"
 
 
 def sampled(tracks: Sequence[Edges], rate_hz: int, count: int) -> Iterator[bytes]:
@@ -304,28 +197,12 @@ def sampled(tracks: Sequence[Edges], rate_hz: int, count: int) -> Iterator[bytes
         count: How many samples there are.
     """
     unit = max(1, (len(tracks) + 7) // 8)
-    native = _library()
-    if native is None:
-        yield from sampled_in_python(tracks, rate_hz, count)
-        return
     merged, bits = _Merged(tracks), ctypes.c_uint64()
     for first in range(0, count, _PIECE // unit):
         part = min(_PIECE // unit, count - first)
         room = ctypes.create_string_buffer(part * unit)
-        native.edges_samples(*merged.arguments, ctypes.byref(bits), first, part, rate_hz, unit, room)
+        _library().edges_samples(*merged.arguments, ctypes.byref(bits), first, part, rate_hz, unit, room)
         yield room.raw
-
-
-def sampled_in_python(tracks: Sequence[Edges], rate_hz: int, count: int) -> Iterator[bytes]:
-    """Do as `sampled`."""
-    unit, bits, begin = max(1, (len(tracks) + 7) // 8), 0, 0
-    for at, wire, level in sorted((at, wire, level) for wire, track in enumerate(tracks) for at, level in track):
-        sample = min(count, -(-at * rate_hz // NS_PER_S))
-        if sample > begin:
-            yield bits.to_bytes(unit, "little") * (sample - begin)
-            begin = sample
-        bits = bits | 1 << wire if level else bits & ~(1 << wire)
-    yield bits.to_bytes(unit, "little") * (count - begin)
 
 
 class _Merged:
@@ -346,10 +223,14 @@ class _Merged:
 
 @cache
 def _library() -> Any:
-    """Return the functions in C, or None where they were not built."""
+    """Return the functions in C.
+
+    Raises:
+        MissingDependencyError: They were not built.
+    """
     spec = find_spec("robot_bench._edges")
     if spec is None or spec.origin is None:
-        return None
+        raise MissingDependencyError("the library for edges of wires is not built", hint="p2os doctor says why")
     library = ctypes.CDLL(spec.origin)
     for name, kinds in _FUNCTIONS.items():
         function = getattr(library, name)

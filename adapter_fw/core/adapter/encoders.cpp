@@ -1,7 +1,6 @@
 #include "encoders.hpp"
 
 #include "numbers.hpp"
-#include "sine_table.hpp"
 
 namespace adapter {
 
@@ -21,7 +20,24 @@ constexpr std::int32_t MOST_TURN = HEADING_MODULUS / 4;
 //: pi in 1e-9.
 constexpr std::int64_t PI_E9 = 3'141'592'654;
 
-static_assert(sizeof(SINE_TABLE) / sizeof(SINE_TABLE[0]) == QUARTER + 1, "one entry a half count, both ends included");
+// sin(k / 8192 turn) x 2^30, k = 0 to a quarter turn, rounded; the compiler works it out, no entry is near a tie.
+struct Sines {
+  std::int32_t at[QUARTER + 1];
+
+  constexpr Sines() : at{} {
+    for (std::int32_t k = 0; k <= QUARTER; ++k) {
+      const double angle = 1.57079632679489661923 * k / QUARTER;
+      double term = angle;
+      double sum = 0;
+      for (int n = 1; n < 24; n += 2) {
+        sum += term;
+        term *= -angle * angle / ((n + 1) * (n + 2));
+      }
+      at[k] = static_cast<std::int32_t>(sum * (std::int32_t{1} << ONE_BITS) + 0.5);
+    }
+  }
+};
+constexpr Sines SINE_TABLE;
 
 std::int64_t floor_shift(std::int64_t value, int bits) { return divide_floor(value, std::int64_t{1} << bits); }
 
@@ -44,7 +60,7 @@ std::int32_t sine(std::int32_t half_counts) {
   const auto angle = static_cast<std::int32_t>(remainder_floor(half_counts, HALF_COUNTS));
   const std::int32_t quadrant = angle / QUARTER;
   const std::int32_t within = (quadrant & 1) != 0 ? QUARTER - angle % QUARTER : angle % QUARTER;
-  const std::int32_t value = SINE_TABLE[within];
+  const std::int32_t value = SINE_TABLE.at[within];
   return (quadrant & 2) != 0 ? -value : value;
 }
 

@@ -13,10 +13,9 @@ own, so that a run with faults repeats. What injecting one does to the robot is 
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 
 from p2os.pioneer.random_source import RandomSource
-from simbase.errors import UsageError
+from simbase.errors import UsageError, nearest
 
 #: chosen: a loose contact swallows 1 to so many bytes at a time.
 LONGEST_GAP_BYTES = 40
@@ -73,8 +72,7 @@ def read_fault(text: str, *, sonar: int, complete: bool = True) -> Fault:
     """
     name, *rest = text.split() or [""]
     if name not in FAULTS:
-        close = get_close_matches(name, FAULTS, n=1)
-        hint = f"did you mean {close[0]}?" if close else f"faults: {', '.join(FAULTS)}"
+        hint = nearest(name, FAULTS, f"faults: {', '.join(FAULTS)}")
         raise UsageError(f"no fault {name!r}" if name else "which fault?", hint=hint)
     words = FAULTS[name][0]
     usage = " ".join([name, *words])

@@ -14,7 +14,6 @@ Source: Pioneer 2/3 H8 manual and Pioneer 3 manual, CONFIGpac tables.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from difflib import get_close_matches
 from pathlib import Path
 
 from p2os.errors import LocalProtocolError
@@ -24,7 +23,7 @@ from p2os.protocol.profiles import Profile
 from p2os.protocol.times import CYCLE_NS, WATCHDOG_NS
 from p2os.robots.parameters import RobotParameters
 from p2os.toml_file import read_toml, read_user_text
-from simbase.errors import FileError, shown, shown_name
+from simbase.errors import FileError, nearest, shown, shown_name
 from simbase.timing import NS_PER_MS
 
 #: What the robot file sets; a FLASH file cannot make another robot of it.
@@ -152,8 +151,7 @@ class Flash:
         names = [name for name, _ in FIELDS if name not in FIXED]
         for name, value in values.items():
             if name not in names:
-                close = get_close_matches(name, names, n=1)
-                hint = f"did you mean {close[0]}?" if close else "the CONFIGpac's names, in docs/pioneer.md"
+                hint = nearest(name, names, "the CONFIGpac's names, in docs/pioneer.md")
                 raise FlashError(f"FLASH has no parameter {shown(name)}", hint=hint)
             if isinstance(value, bool) or not isinstance(value, (int, str)):
                 raise FlashError(f"FLASH: {name} = {shown(value)} is neither a whole number nor a text")

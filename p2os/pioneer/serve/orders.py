@@ -13,7 +13,6 @@ Where the lines come from is `control_line`'s matter.
 
 import math
 from collections.abc import Sequence
-from difflib import get_close_matches
 
 from p2os.errors import WorldError
 from p2os.pioneer.controller.faults import FAULTS
@@ -21,7 +20,7 @@ from p2os.pioneer.controller.live_inputs import INPUTS
 from p2os.pioneer.serve.host import Host
 from p2os.pioneer.serve.multi_robot_world import MultiRobotWorld
 from p2os.pioneer.serve.world_orders import WORLD_ORDERS, is_world_order
-from simbase.errors import UsageError
+from simbase.errors import UsageError, nearest
 
 #: A longer line is cut.
 LONGEST_LINE = 200
@@ -91,9 +90,7 @@ def _speed(speed_mps: float) -> str:
 def _check_first_word(words: str) -> None:
     first = words.split(maxsplit=1)[0] if words else ""
     if first not in FIRST_WORDS:
-        close = get_close_matches(first, FIRST_WORDS, n=1)
-        hint = f"did you mean {close[0]}?" if close else f"orders: {', '.join(FIRST_WORDS)}"
-        raise UsageError(f"no order {first!r}", hint=hint)
+        raise UsageError(f"no order {first!r}", hint=nearest(first, FIRST_WORDS, f"orders: {', '.join(FIRST_WORDS)}"))
 
 
 def _addressed(text: str, robots: int) -> tuple[range, str]:

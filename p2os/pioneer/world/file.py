@@ -5,78 +5,81 @@ writes what this reads.
 """
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from difflib import get_close_matches
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
 from p2os.errors import WorldError
 from p2os.pioneer.world.makers.arena import arena
 from p2os.pioneer.world.model import LONGEST_NAME, RANGES, Kind, Mark, Mesh, Obstacle, Pose, Repeat, Walk, World
-from p2os.toml_file import TomlPlaces, read_toml
-from simbase.errors import shown, shown_name
+from p2os.toml_file import TomlSource, read_toml
+from p2os.toml_schema import Key, Place, Table, check_table, filled, placed, within
+from p2os.toml_schema import Kind as KeyKind
 
-Table = dict[str, Any]
-TOP_KEYS = (
-    "name", "description", "extent_m", "start", "box", "cylinder", "wall", "floor", "ramp", "mesh", "mark",
-    "import", "arena",
-)  # fmt: skip
-START_KEYS = ("x_m", "y_m", "heading_deg", "z_m")
+#: A table with a value for every key.
+Values = dict[str, Any]
+#: What stands in a key that is no number, and of how many numbers a list is.
+_KINDS: Mapping[str, tuple[KeyKind, int]] = {
+    "name": ("line", 0), "file": ("text", 0), "kind": ("text", 0), "up": ("text", 0), "repeat": ("text", 0),
+    "fixed": ("flag", 0), "extent_m": ("numbers", 4), "from_m": ("numbers", 2), "to_m": ("numbers", 2),
+    "path_m": ("points", 2), "points_m": ("points", 2), "vertices_m": ("points", 3), "triangles": ("points", 3),
+}  # fmt: skip
+
+
+def in_range(name: str, *, required: bool = False, default: object = None) -> Key:
+    """Return the key of a world file that has this name; a default of an enumeration stands for its choices."""
+    choices = tuple(one.value for one in type(default)) if isinstance(default, Enum) else ()
+    default = default.value if isinstance(default, Enum) else default
+    kind, count = _KINDS.get(name, ("number", 0))
+    least, most = RANGES.get(name, (None, LONGEST_NAME if kind == "line" else None))
+    return Key(
+        name=name, kind=kind, count=count, required=required, default=default, choices=choices, least=least, most=most
+    )
+
+
+def _keys(defaults: Mapping[str, object]) -> tuple[Key, ...]:
+    """Return keys by their names and defaults; None where a value must be given."""
+    return tuple(in_range(name, required=default is None, default=default) for name, default in defaults.items())
+
+
+START_KEYS = _keys(dict.fromkeys(("x_m", "y_m", "heading_deg", "z_m"), 0.0))
 #: What a thing that can be pushed or walks has beside its shape.
 MOVING: Mapping[str, object] = {
     "fixed": False, "mass_kg": 0.0, "friction": 0.5,
-    "path_m": (), "speed_mps": 0.5, "start_s": 0.0, "repeat": Repeat.BACK_AND_FORTH.value,
+    "path_m": (), "speed_mps": 0.5, "start_s": 0.0, "repeat": Repeat.BACK_AND_FORTH,
 }  # fmt: skip
 #: Section → its keys with their defaults; None where a value must be given.
-SHAPES: Mapping[str, Mapping[str, object]] = {
-    "box": {
+SHAPES: Mapping[str, tuple[Key, ...]] = {
+    "box": _keys({
         "name": None, "x_m": None, "y_m": None, "length_m": None, "width_m": None, "height_m": 0.5,
-        "heading_deg": 0.0, "base_m": 0.0, "floor_m": 0.0, "kind": "obstacle", **MOVING,
-    },
-    "cylinder": {
+        "heading_deg": 0.0, "base_m": 0.0, "floor_m": 0.0, "kind": Kind.OBSTACLE, **MOVING,
+    }),
+    "cylinder": _keys({
         "name": None, "x_m": None, "y_m": None, "radius_m": None, "height_m": 0.5, "base_m": 0.0, "floor_m": 0.0,
         **MOVING,
-    },
-    "wall": {
-        "name": None, "from_m": None, "to_m": None, "thickness_m": 0.1, "height_m": 1.0, "kind": "wall",
+    }),
+    "wall": _keys({
+        "name": None, "from_m": None, "to_m": None, "thickness_m": 0.1, "height_m": 1.0, "kind": Kind.WALL,
         "fixed": False,
-    },
-    "floor": {"name": None, "x_m": None, "y_m": None, "length_m": None, "width_m": None, "top_m": None},
-    "ramp": {
+    }),
+    "floor": _keys({"name": None, "x_m": None, "y_m": None, "length_m": None, "width_m": None, "top_m": None}),
+    "ramp": _keys({
         "name": None, "x_m": None, "y_m": None, "length_m": None, "width_m": None, "rise_m": None,
         "heading_deg": 0.0, "base_m": 0.0,
-    },
+    }),
 }  # fmt: skip
-MARK_KEYS: Mapping[str, object] = {"name": "", "kind": "goal", "points_m": None}
-MESH_KEYS: Mapping[str, object] = {"name": None, "vertices_m": None, "triangles": None}
-IMPORT_KEYS: Mapping[str, object] = {
+MARK_KEYS = _keys({"name": "", "kind": "goal", "points_m": None})
+MESH_KEYS = _keys({"name": None, "vertices_m": None, "triangles": None})
+IMPORT_KEYS = _keys({
     "file": None, "x_m": 0.0, "y_m": 0.0, "z_m": 0.0, "heading_deg": 0.0, "scale": 1.0, "up": "auto",
-}  # fmt: skip
-#: End of a key → its unit.
-UNITS = {"_deg": "degrees", "_m": "metres", "_kg": "kilograms", "_mps": "metres a second", "_s": "seconds"}
-_TEXTS = frozenset({"name", "kind", "file", "up", "repeat"})
-#: Keys whose value is a list of lists of so many numbers.
-_LISTS = {"path_m": 2, "points_m": 2, "vertices_m": 3, "triangles": 3}
-
-
-@dataclass(frozen=True, slots=True)
-class Section:
-    """One table of the file, for its checks: where it stands and what it holds."""
-
-    source: str
-    places: TomlPlaces
-    name: str
-    number: int
-    row: Table
-
-    def at(self, key: str = "") -> str:
-        """Return `file:line` of a key of this table."""
-        return f"{self.source}:{self.places.line(self.name, self.number, key)}"
-
-    def label(self, key: str) -> str:
-        """Return the key with its table before it."""
-        return f"{self.name}.{key}" if self.name else key
+})  # fmt: skip
+TOP_KEYS = (
+    Key(name="name", kind="text", required=True), Key(name="description", kind="text", default=""),
+    in_range("extent_m", required=True), Key(name="start", kind="table", default={}), Key(name="arena", kind="table"),
+    *(Key(name=name, kind="tables", default=[]) for name in (*SHAPES, "mesh", "mark", "import")),
+)  # fmt: skip
 
 
 def parse_world(text: str, source: str, seed: int = 0, folder: Path | None = None) -> World:
@@ -93,105 +96,67 @@ def parse_world(text: str, source: str, seed: int = 0, folder: Path | None = Non
         MissingDependencyError: An imported file needs a reader that is not installed.
     """
     table, places = read_toml(text, source, "a world", WorldError)
-    top = Section(source, places, "", 0, table)
-    _only(top, TOP_KEYS)
-    begins = Section(source, places, "start", 0, _table(top, "start"))
-    start = _start(begins)
+    where = Place(TomlSource(source, places), error=WorldError)
+    top = filled(table, TOP_KEYS, where)
+    begins = within(where, "start")
+    at_start = _values(top["start"], START_KEYS, begins)
+    start = Pose(at_start["x_m"], at_start["y_m"], math.radians(at_start["heading_deg"]), at_start["z_m"])
     obstacles: list[Obstacle] = []
     named: dict[str, str] = {}
     for name, keys in SHAPES.items():
-        for section in _sections(top, name):
-            obstacles.append(_obstacle(section, keys))
+        for at, row in _rows(top[name], name, keys, where):
+            with placed(at):
+                obstacles.append(_SHAPERS[name](row))
             if obstacles[-1].name in named:
-                at, first = section.at("name"), named[obstacles[-1].name]
+                first = named[obstacles[-1].name]
                 raise WorldError(
-                    f"{at}: two obstacles are named {obstacles[-1].name!r}", hint=f"the first is at {first}"
+                    f"{at.at('name')}: two obstacles are named {obstacles[-1].name!r}", hint=f"the first is at {first}"
                 )
-            named[obstacles[-1].name] = section.at("name")
-    meshes = [_mesh(section) for section in _sections(top, "mesh")]
-    marks = [_mark(section) for section in _sections(top, "mark")]
-    if "arena" in table:
-        _only(Section(source, places, "arena", 0, _table(top, "arena")), ())
+            named[obstacles[-1].name] = at.source.at(name, "name", at.number)
+    meshes = [_mesh(row, at) for at, row in _rows(top["mesh"], "mesh", MESH_KEYS, where)]
+    marks = [_mark(row, at) for at, row in _rows(top["mark"], "mark", MARK_KEYS, where)]
+    if top["arena"] is not None:
+        check_table(top["arena"], (), within(where, "arena"))
         obstacles += arena(seed, start)
     skipped: list[str] = []
-    for section in _sections(top, "import"):
-        brought = _imported(section, folder or Path())
+    for at, row in _rows(top["import"], "import", IMPORT_KEYS, where):
+        brought = _imported(row, at, folder or Path())
         obstacles += brought.obstacles
         meshes += brought.meshes
         marks += brought.marks
         skipped += brought.skipped
-    extent = _numbers(top, "extent_m", table.get("extent_m"), 4)
-    if extent[0] >= extent[2] or extent[1] >= extent[3]:
-        raise WorldError(f"{top.at('extent_m')}: extent_m must be [x0, y0, x1, y1] with x0 < x1 and y0 < y1")
+    x0, y0, x1, y1 = map(float, top["extent_m"])
+    if x0 >= x1 or y0 >= y1:
+        raise WorldError(f"{where.at('extent_m')}: extent_m must be [x0, y0, x1, y1] with x0 < x1 and y0 < y1")
     return World(
-        name=_text(top, "name", table.get("name")),
-        source=source,
-        description=_text(top, "description", table.get("description", "")),
-        start=start,
-        extent=(extent[0], extent[1], extent[2], extent[3]),
-        obstacles=tuple(obstacles),
-        meshes=tuple(meshes),
-        marks=tuple(marks),
-        skipped=tuple(skipped),
-        start_at=f"{begins.at()}: [start]",
-    )
-
-
-def _sections(top: Section, name: str) -> list[Section]:
-    rows = top.row.get(name, [])
-    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
-        raise WorldError(f"{top.source}:{top.places.line(name)}: {name} must be written as [[{name}]]")
-    return [Section(top.source, top.places, name, number, row) for number, row in enumerate(rows)]
-
-
-def _table(top: Section, name: str) -> Table:
-    row = top.row.get(name, {})
-    if not isinstance(row, dict):
-        raise WorldError(f"{top.source}:{top.places.line(name)}: {name} must be a table [{name}]")
-    return row
-
-
-def _obstacle(section: Section, keys: Mapping[str, object]) -> Obstacle:
-    values = _values(section, keys)
-    try:
-        return _SHAPERS[section.name](values)
-    except WorldError as error:
-        raise WorldError(f"{section.at()}: {section.name}: {error}", hint=error.hint) from error
-
-
-def _values(section: Section, keys: Mapping[str, object]) -> Table:
-    """Return the row with every default filled in and every type checked."""
-    _only(section, tuple(keys))
-    values: Table = {}
-    for key, default in keys.items():
-        if key not in section.row and default is None:
-            raise WorldError(
-                f"{section.at()}: {section.label(key)} is missing",
-                hint=f"a [[{section.name}]] has {', '.join(keys)}",
-            )
-        value = section.row.get(key, default)
-        if key in _TEXTS:
-            values[key] = _text(section, key, value)
-        elif key == "fixed":
-            values[key] = _truth(section, key, value)
-        elif key in {"from_m", "to_m"}:
-            values[key] = _numbers(section, key, value, 2)
-        elif key in _LISTS:
-            values[key] = _lists(section, key, value, _LISTS[key])
-        else:
-            values[key] = _number(section, key, value)
-    return values
-
-
-def _box(v: Table) -> Obstacle:
-    return Obstacle(
-        name=v["name"], x_m=v["x_m"], y_m=v["y_m"], heading_rad=math.radians(v["heading_deg"]), length_m=v["length_m"],
-        width_m=v["width_m"], height_m=v["height_m"], base_m=v["base_m"], floor_m=v["floor_m"],
-        kind=_kind(v["kind"]), fixed=v["fixed"], mass_kg=v["mass_kg"], friction=v["friction"], walk=_walk(v),
+        name=top["name"], source=source, description=top["description"], start=start, extent=(x0, y0, x1, y1),
+        obstacles=tuple(obstacles), meshes=tuple(meshes), marks=tuple(marks), skipped=tuple(skipped),
+        start_at=str(begins),
     )  # fmt: skip
 
 
-def _cylinder(v: Table) -> Obstacle:
+def _rows(rows: list[Table], name: str, keys: tuple[Key, ...], where: Place) -> Iterator[tuple[Place, Values]]:
+    """Yield the tables `[[name]]` with their places, checked and with every default filled in."""
+    for number, row in enumerate(rows):
+        at = within(where, name, number)
+        yield at, _values(row, keys, at)
+
+
+def _values(row: Table, keys: tuple[Key, ...], where: Place) -> Values:
+    """Check a table, and return the value or the default of every key, whole numbers as floats too."""
+    found = filled(row, keys, where)
+    return {name: float(value) if type(value) is int else value for name, value in found.items()}
+
+
+def _box(v: Values) -> Obstacle:
+    return Obstacle(
+        name=v["name"], x_m=v["x_m"], y_m=v["y_m"], heading_rad=math.radians(v["heading_deg"]), length_m=v["length_m"],
+        width_m=v["width_m"], height_m=v["height_m"], base_m=v["base_m"], floor_m=v["floor_m"],
+        kind=Kind(v["kind"]), fixed=v["fixed"], mass_kg=v["mass_kg"], friction=v["friction"], walk=_walk(v),
+    )  # fmt: skip
+
+
+def _cylinder(v: Values) -> Obstacle:
     return Obstacle(
         name=v["name"], x_m=v["x_m"], y_m=v["y_m"], radius_m=v["radius_m"], height_m=v["height_m"],
         base_m=v["base_m"], floor_m=v["floor_m"],
@@ -199,23 +164,23 @@ def _cylinder(v: Table) -> Obstacle:
     )  # fmt: skip
 
 
-def _wall(v: Table) -> Obstacle:
+def _wall(v: Values) -> Obstacle:
     (x0, y0), (x1, y1) = v["from_m"], v["to_m"]
     return Obstacle(
         name=v["name"], x_m=(x0 + x1) / 2, y_m=(y0 + y1) / 2, heading_rad=math.atan2(y1 - y0, x1 - x0),
         length_m=math.hypot(x1 - x0, y1 - y0) + v["thickness_m"], width_m=v["thickness_m"], height_m=v["height_m"],
-        kind=_kind(v["kind"]), fixed=v["fixed"],
+        kind=Kind(v["kind"]), fixed=v["fixed"],
     )  # fmt: skip
 
 
-def _floor(v: Table) -> Obstacle:
+def _floor(v: Values) -> Obstacle:
     return Obstacle(
         name=v["name"], x_m=v["x_m"], y_m=v["y_m"], length_m=v["length_m"], width_m=v["width_m"], height_m=v["top_m"],
         kind=Kind.FLOOR,
     )  # fmt: skip
 
 
-def _ramp(v: Table) -> Obstacle:
+def _ramp(v: Values) -> Obstacle:
     return Obstacle(
         name=v["name"], x_m=v["x_m"], y_m=v["y_m"], heading_rad=math.radians(v["heading_deg"]), length_m=v["length_m"],
         width_m=v["width_m"], height_m=v["rise_m"], base_m=v["base_m"], kind=Kind.RAMP,
@@ -225,116 +190,43 @@ def _ramp(v: Table) -> Obstacle:
 _SHAPERS = {"box": _box, "cylinder": _cylinder, "wall": _wall, "floor": _floor, "ramp": _ramp}
 
 
-def _walk(v: Table) -> Walk | None:
+def _walk(v: Values) -> Walk | None:
     if not v["path_m"]:
         return None
-    if v["repeat"] not in {member.value for member in Repeat}:
-        raise WorldError(
-            f"repeat {shown(v['repeat'])} is unknown", hint=f"one of {', '.join(member.value for member in Repeat)}"
-        )
-    return Walk(points_m=v["path_m"], speed_mps=v["speed_mps"], start_s=v["start_s"], repeat=Repeat(v["repeat"]))
+    return Walk(
+        points_m=_points(v["path_m"]), speed_mps=v["speed_mps"], start_s=v["start_s"], repeat=Repeat(v["repeat"])
+    )
 
 
-def _mesh(section: Section) -> Mesh:
-    values = _values(section, MESH_KEYS)
-    triangles = tuple((int(a), int(b), int(c)) for a, b, c in values["triangles"])
-    try:
-        return Mesh(name=values["name"], vertices=values["vertices_m"], triangles=triangles)
-    except WorldError as error:
-        raise WorldError(f"{section.at()}: {error}") from error
+def _points(rows: Any) -> Any:
+    return tuple(tuple(map(float, row)) for row in rows)
 
 
-def _mark(section: Section) -> Mark:
-    values = _values(section, MARK_KEYS)
-    try:
-        return Mark(name=values["name"], kind=values["kind"], points_m=values["points_m"])
-    except WorldError as error:
-        raise WorldError(f"{section.at()}: mark: {error}", hint=error.hint) from error
+def _mesh(v: Values, at: Place) -> Mesh:
+    odd = [corner for row in v["triangles"] for corner in row if not isinstance(corner, int)]
+    if odd:
+        raise WorldError(f"{at.at('triangles')}: triangles: {odd[0]} is no whole number", hint="of a vertex, from 0")
+    with placed(at):
+        return Mesh(name=v["name"], vertices=_points(v["vertices_m"]), triangles=tuple(map(tuple, v["triangles"])))
 
 
-def _imported(section: Section, folder: Path) -> World:
-    """Return what another file holds, moved to where this one wants it."""
-    from p2os.pioneer.world.formats import Placing, read_placed
+def _mark(v: Values, at: Place) -> Mark:
+    with placed(at):
+        return Mark(name=v["name"], kind=v["kind"], points_m=_points(v["points_m"]))
 
-    v = _values(section, IMPORT_KEYS)
-    try:
+
+def _imported(v: Values, at: Place, folder: Path) -> World:
+    from p2os.pioneer.world.formats import Placing, read_placed  # they stand above the world file
+
+    with placed(at, "file"):
         placing = Placing(
-            x_m=v["x_m"], y_m=v["y_m"], z_m=v["z_m"], heading_rad=math.radians(v["heading_deg"]),
-            scale=v["scale"], up=v["up"],
+            x_m=v["x_m"], y_m=v["y_m"], z_m=v["z_m"], heading_rad=math.radians(v["heading_deg"]), scale=v["scale"],
+            up=v["up"],
         )  # fmt: skip
         world = read_placed(folder / v["file"], placing)
-    except WorldError as error:
-        raise WorldError(f"{section.at('file')}: import: {error}", hint=error.hint) from error
-    label = f"{Path(v['file']).stem} {section.number + 1}"
+    label = f"{Path(v['file']).stem} {at.number + 1}"
     return replace(
         world,
         obstacles=tuple(replace(item, name=f"{label}: {item.name}") for item in world.obstacles),
         meshes=tuple(replace(item, name=f"{label}: {item.name}") for item in world.meshes),
     )
-
-
-def _kind(text: str) -> Kind:
-    try:
-        return Kind(text)
-    except ValueError:
-        raise WorldError(f"kind {shown(text)} is unknown", hint=f"one of {', '.join(k.value for k in Kind)}") from None
-
-
-def _start(section: Section) -> Pose:
-    _only(section, START_KEYS)
-    x, y, heading, z = (_number(section, key, section.row.get(key, 0.0)) for key in START_KEYS)
-    return Pose(x, y, math.radians(heading), z)
-
-
-def _only(section: Section, keys: tuple[str, ...]) -> None:
-    for key in section.row:
-        if key not in keys:
-            close = get_close_matches(key, keys, n=1)
-            known = f"known keys: {', '.join(keys)}" if keys else f"[{section.name}] has no keys"
-            hint = f"did you mean {section.label(close[0])}?" if close else known
-            raise WorldError(f"{section.at(key)}: unknown key {shown_name(section.label(key))}", hint=hint)
-
-
-def _text(section: Section, key: str, value: object) -> str:
-    if not isinstance(value, str):
-        raise WorldError(f"{section.at(key)}: {section.label(key)} must be a text")
-    if key == "name" and section.name and (not value.isprintable() or len(value) > LONGEST_NAME):
-        raise WorldError(
-            f"{section.at(key)}: {section.label(key)} = {shown(value)} is no line of at most {LONGEST_NAME} characters"
-        )
-    return value
-
-
-def _truth(section: Section, key: str, value: object) -> bool:
-    if not isinstance(value, bool):
-        raise WorldError(f"{section.at(key)}: {section.label(key)} must be true or false")
-    return value
-
-
-def _number(section: Section, key: str, value: object) -> float:
-    at, label = section.at(key), section.label(key)
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or value != value:  # noqa: PLR0124 - not a number
-        unit = next((unit for end, unit in UNITS.items() if key.endswith(end)), "")
-        raise WorldError(
-            f"{at}: {label} = {shown(value)} must be a number", hint=f"in {unit}, without a unit" if unit else None
-        )
-    least, most = RANGES[key]
-    if not least <= value <= most:
-        raise WorldError(f"{at}: {label} = {shown(value)} is out of range: {least:g} to {most:g}")
-    if key == "triangles" and not isinstance(value, int):
-        raise WorldError(
-            f"{at}: {label} = {shown(value)} must be a whole number", hint="the number of a vertex, from 0"
-        )
-    return value if key == "triangles" else float(value)
-
-
-def _numbers(section: Section, key: str, value: object, count: int) -> tuple[float, ...]:
-    if not isinstance(value, list) or len(value) != count:
-        raise WorldError(f"{section.at(key)}: {section.label(key)} must be a list of {count} numbers")
-    return tuple(_number(section, key, item) for item in value)
-
-
-def _lists(section: Section, key: str, value: object, count: int) -> tuple[tuple[float, ...], ...]:
-    if not isinstance(value, (list, tuple)):
-        raise WorldError(f"{section.at(key)}: {section.label(key)} must be a list of lists of {count} numbers")
-    return tuple(_numbers(section, key, item, count) for item in value)

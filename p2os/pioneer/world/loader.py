@@ -4,7 +4,6 @@ Worlds that ship and our own files are TOML (`file`); all else is read by
 `formats`.
 """
 
-from difflib import get_close_matches
 from importlib.resources import files
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from p2os.pioneer.world.file import parse_world
 from p2os.pioneer.world.model import World
 from p2os.pioneer.world.text_file import read_text
 from p2os.toml_file import is_file, is_folder
-from simbase.errors import shown
+from simbase.errors import nearest, shown
 
 
 def known_worlds() -> tuple[str, ...]:
@@ -50,9 +49,10 @@ def load_world(name_or_path: str | Path, seed: int = 0) -> World:
             raise WorldError(f"no world {shown(name)}: there is no such file", hint="p2os world list names what ships")
         if is_folder(path):
             raise WorldError(f"no world {shown(name)}: that is a folder", hint="name a file in it")
-        close = get_close_matches(name, known_worlds(), n=1)
-        hint = f"did you mean {close[0]}?" if close else f"shipped worlds: {', '.join(known_worlds())}"
-        raise WorldError(f"no world {shown(name)}", hint=hint)
+        raise WorldError(
+            f"no world {shown(name)}",
+            hint=nearest(name, known_worlds(), f"shipped worlds: {', '.join(known_worlds())}"),
+        )
     if path.suffix.lower() != ".toml":
         from p2os.pioneer.world.formats import read_world
 

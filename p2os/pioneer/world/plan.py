@@ -15,7 +15,6 @@ Invariant: the order of what is found depends on the world alone.
 import math
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
-from difflib import get_close_matches
 from itertools import pairwise
 from operator import itemgetter
 
@@ -23,6 +22,7 @@ from p2os.errors import WorldError
 from p2os.pioneer.world.geometry import INFINITY, Footprint, hull_polygon, placed, wheel_polygons
 from p2os.pioneer.world.model import Mesh, Obstacle, Point, Polygon, World, cut, shadow
 from p2os.robots.parameters import RobotParameters
+from simbase.errors import nearest
 from simbase.state import Stateful
 
 #: The first ring of a search for the nearest wall beyond the hull; it is doubled until something is found, m.
@@ -130,10 +130,8 @@ class Plan(Stateful):
                 f"{name!r} is part of the building", hint="only what is not `fixed` and no mesh can change"
             )
         if name not in self._obstacles:
-            close = get_close_matches(name, self._obstacles, n=1)
             there = ", ".join(list(self._obstacles)[:NAMED]) or "nothing that can change"
-            hint = f"did you mean {close[0]!r}?" if close else f"there is {there}"
-            raise WorldError(f"no obstacle {name!r}", hint=hint)
+            raise WorldError(f"no obstacle {name!r}", hint=nearest(name, self._obstacles, f"there is {there}"))
         return self._obstacles[name]
 
     def clearance(self, x_m: float, y_m: float, heading_rad: float, *, no_more_than: float = INFINITY) -> float:

@@ -29,8 +29,7 @@ from robot_bench.cli.progress import RunDisplay
 from robot_bench.cli.workers import core_count
 from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.scenario.scenario import load_scenario
-from robot_bench.scenario.schema import nearest
-from simbase.errors import UsageError
+from simbase.errors import UsageError, nearest
 from simbase.units import COUNT
 
 HELP = """Search for worlds in which a firmware fails.

@@ -13,6 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from p2os.cli.help_pages import BENCH
 from p2os.cli.quantities import option
+from p2os.toml_schema import Table
 from robot_bench.campaign.trial import Trial, trial_of
 from robot_bench.campaign.variants.shrinking.failure import Failure, Way, failure_of
 from robot_bench.campaign.variants.shrinking.kept import Kept, keep, trial_of_run
@@ -21,7 +22,6 @@ from robot_bench.cli.progress import RunDisplay
 from robot_bench.recording.run_record import TRACE_NAME
 from robot_bench.scenario.included_files import Setting, read_setting
 from robot_bench.scenario.scenario import load_scenario
-from robot_bench.scenario.schema import Table
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
 from simbase.units import COUNT, SEED

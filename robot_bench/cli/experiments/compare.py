@@ -42,7 +42,6 @@ Examples:
 MOST_SIGNALS = 8
 POSES = ("auto", "truth", "odometry")
 ALIGNMENTS = ("first", "least-squares", "none")
-STATISTICS = ("rmse", "mean", "median", "std", "min", "max", "sse")
 
 
 def register(app: typer.Typer) -> None:

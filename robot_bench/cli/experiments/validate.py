@@ -37,9 +37,8 @@ from robot_bench.recording.run_folder import RUNS, make_next_folder
 from robot_bench.run import RunResult
 from robot_bench.scenario.included_files import Setting, read_setting
 from robot_bench.scenario.scenario import MODES
-from robot_bench.scenario.schema import nearest
 from robot_bench.scenario.sweep import read_seeds
-from simbase.errors import FileError, UsageError
+from simbase.errors import FileError, UsageError, nearest
 from simbase.units import COUNT
 
 REPORT, FIGURES = "validation.html", "validation.json"

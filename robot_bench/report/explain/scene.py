@@ -18,8 +18,8 @@ from robot_bench.events.kinds import Contact, Pose
 from robot_bench.recording.run_record import RunRecord
 from simbase.timing import Nanos
 
-#: chosen: a point so near to the border of a cone, or of the threshold, is neither surely inside nor outside.
-EDGE_RAD, EDGE_M = math.radians(3), 0.03
+#: chosen: metres; a point so near to the border of the threshold is neither surely inside nor outside.
+EDGE_M = 0.03
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from typing import cast
 
 from p2os.errors import ScenarioError
+from p2os.toml_schema import Key, Table, Where, check_table
 from robot_bench.events.kinds import Event, PinEdge, Verdict
 from robot_bench.events.selection import Wires
 from robot_bench.events.stream import EventStream
 from robot_bench.scenario.goals.kinds import kind_named, known_kinds
 from robot_bench.scenario.goals.watch import WIRES, GoalKind, Outcome, Watch
-from robot_bench.scenario.schema import Key, Table, Where, check_table, nearest
-from simbase.errors import UsageError, shown
+from simbase.errors import UsageError, nearest, shown
 from simbase.state import PartState, Stateful
 from simbase.timing import NS_PER_S, Nanos
 

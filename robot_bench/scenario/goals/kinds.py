@@ -10,6 +10,7 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import cast
 
 from p2os.errors import ScenarioError
+from p2os.toml_schema import LONGEST_S, Key, Table
 from robot_bench.scenario.goals.motion import (
     Cells,
     Energy,
@@ -35,7 +36,6 @@ from robot_bench.scenario.goals.temporal import (
 )
 from robot_bench.scenario.goals.text import EncoderCounts, InOrder, Lacks, SensorNamed
 from robot_bench.scenario.goals.watch import GoalKind, Watch, number
-from robot_bench.scenario.schema import LONGEST_S, Key, Table
 from simbase.errors import shown
 
 _POSE_SIGNALS = tuple(SIGNALS)

@@ -3,10 +3,10 @@
 import math
 from collections.abc import Callable
 
+from p2os.toml_schema import Table
 from robot_bench.events.kinds import MICRO, Clearance, Contact, Event, Pose
 from robot_bench.events.selection import moves
 from robot_bench.scenario.goals.watch import Outcome, SelectorFeed, Watch, nanos, number, seconds, selected
-from robot_bench.scenario.schema import Table
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
 

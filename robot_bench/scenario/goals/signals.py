@@ -5,10 +5,10 @@ from itertools import pairwise
 from typing import cast
 
 from adapter_sim.pinout import load_pinout
+from p2os.toml_schema import Table
 from robot_bench.events.kinds import Event, PinEdge, Wave
 from robot_bench.events.selection import wire_named
 from robot_bench.scenario.goals.watch import Outcome, Watch, nanos, number, seconds, wires_of
-from robot_bench.scenario.schema import Table
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: chosen: two motor values that follow each other within this are one change (two ports are written in turn).

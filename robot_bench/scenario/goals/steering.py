@@ -13,9 +13,9 @@ Invariant: where no range is known yet, nothing is missed.
 import math
 from collections.abc import Sequence
 
+from p2os.toml_schema import Table
 from robot_bench.events.kinds import MICRO, Event, Pose, Ranges
 from robot_bench.scenario.goals.watch import Outcome, Watch, number, seconds
-from robot_bench.scenario.schema import Table
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
 

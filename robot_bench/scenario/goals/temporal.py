@@ -9,9 +9,9 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, cast
 
+from p2os.toml_schema import Table
 from robot_bench.events.kinds import MICRO, Clearance, Event, Pose, Ranges, WorldChange
 from robot_bench.scenario.goals.watch import Outcome, SelectorFeed, Watch, nanos, number, seconds, selected
-from robot_bench.scenario.schema import Table
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
 

@@ -5,10 +5,10 @@ import re
 from typing import ClassVar, cast
 
 from adapter_sim.pinout import load_pinout
+from p2os.toml_schema import Table
 from robot_bench.events.kinds import Event, Pose, Text, WorldChange
 from robot_bench.events.selection import Lines
 from robot_bench.scenario.goals.watch import Outcome, Watch, number, seconds
-from robot_bench.scenario.schema import Table
 from simbase.timing import Nanos
 
 

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import cast
 
+from p2os.toml_schema import Key, Table
 from robot_bench.events.kinds import Event
 from robot_bench.events.selection import Selector, Wires, select
-from robot_bench.scenario.schema import Key, Table
 from simbase.state import Stateful
 from simbase.timing import NS_PER_S, Nanos
 

@@ -83,6 +83,23 @@ def test_a_declaration_that_contradicts_itself_is_refused(fields: dict[str, int]
         Register(**{"name": "R", "offset": 0, **fields})  # type: ignore[arg-type]  # deliberately wrong
 
 
+@pytest.mark.parametrize(
+    ("given", "readable", "writable"),
+    [
+        ({}, WORD, WORD),
+        ({"mask": 5}, 5, 5),
+        ({"mask": 0}, 0, 0),
+        ({"mask": 5, "writable": 0}, 5, 0),
+        ({"readable": 5}, 5, WORD),
+    ],
+)
+def test_a_mask_is_what_reads_and_what_is_written_unless_told_otherwise(
+    given: dict[str, int], readable: int, writable: int
+) -> None:
+    register = Register(**{"name": "R", "offset": 0, **given})  # type: ignore[arg-type]  # numbers alone
+    assert (register.readable, register.writable) == (readable, writable)
+
+
 def test_bits_reads_as_the_manual_prints() -> None:
     assert bits(0, (7, 4), 31) == 0x8000_00F1
 

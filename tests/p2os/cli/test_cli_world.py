@@ -9,7 +9,7 @@ from p2os.cli.main import run
 from p2os.pioneer.world import known_worlds, load_world
 
 COMMANDS_THAT_FAIL = [
-    (["world", "show", "rooom"], "p2os: no world 'rooom'\nhint: did you mean room?\n"),
+    (["world", "show", "rooom"], "p2os: no world 'rooom'\nhint: did you mean 'room'?\n"),
     (["world", "show", "room", "--out", "room.jpg"], "hint: --out FILE.svg\n"),
     (["world", "show", "room", "--out", "missing/room.svg"], "No such file or directory\n"),
     (["world", "new", "--kind", "swamp"], "hint: kinds: arena, doorway, maze, office, slalom\n"),
@@ -112,7 +112,7 @@ def test_a_broken_world_is_named_with_its_line(
     monkeypatch.chdir(tmp_path)
     Path("bad.toml").write_text('name = "x"\nextent_m = [0, 0, 1, 1]\n\n[start]\nx_mm = 3\n')
     assert run(["world", "check", "bad.toml"]) == 2
-    assert capsys.readouterr().err == "p2os: bad.toml:5: unknown key start.x_mm\nhint: did you mean start.x_m?\n"
+    assert capsys.readouterr().err == "p2os: bad.toml:5: [start]: unknown key 'x_mm'\nhint: did you mean 'x_m'?\n"
 
 
 def test_a_start_where_no_robot_can_stand_is_named_with_its_line(

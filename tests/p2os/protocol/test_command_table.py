@@ -85,13 +85,13 @@ def test_other_words_lead_to_the_same_command(alias: str, name: str) -> None:
     assert command_row(alias).name == name
 
 
-def test_a_misspelt_name_gets_a_hint_and_an_odd_one_does_not() -> None:
+def test_a_misspelt_name_gets_a_hint_and_an_odd_one_the_page() -> None:
     with pytest.raises(LocalProtocolError) as caught:
         command_row("GRIPER")
-    assert caught.value.hint == "did you mean GRIPPER?"
+    assert caught.value.hint == "did you mean 'GRIPPER'?"
     with pytest.raises(LocalProtocolError) as caught:
         command_row("qqqqqqqq")
-    assert caught.value.hint is None
+    assert caught.value.hint == "PROTOCOL.md has all"
 
 
 def test_the_table_tells_the_families_apart() -> None:

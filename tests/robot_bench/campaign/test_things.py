@@ -10,9 +10,9 @@ from p2os.pioneer.world import load_world
 from p2os.pioneer.world.geometry import Footprint
 from p2os.pioneer.world.model import Obstacle, Pose
 from p2os.robots.parameters import load_parameters
+from p2os.toml_schema import Table
 from robot_bench.campaign.campaign_file import Span
 from robot_bench.campaign.things import HEIGHT_M, KINDS, Room, Thing
-from robot_bench.scenario.schema import Table
 from robot_bench.scenario.world_script import load_changes
 
 WORLD = load_world("room")

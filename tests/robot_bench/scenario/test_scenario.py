@@ -11,10 +11,10 @@ from adapter_sim.settings import AdapterSettings
 from p2os.errors import ScenarioError
 from p2os.pioneer.controller.settings import SonarPerSip
 from p2os.pioneer.world import load_world
+from p2os.toml_schema import Key
 from robot_bench.bench import Bench
 from robot_bench.scenario.goals.kinds import KINDS
 from robot_bench.scenario.scenario import _ADAPTER_TIMES, known_scenarios, load_scenario, read_scenario
-from robot_bench.scenario.schema import Key
 from robot_bench.scenario.world_script import Op
 from simbase.errors import P2osError, UsageError
 

@@ -97,12 +97,12 @@ def test_a_placed_thing_walks_and_another_can_be_pushed() -> None:
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        ({"path_m": [[1, 0], [2]]}, "path_m must be"),
-        ({"path_m": [[1, 0], [True, 2]]}, "path_m must be"),
+        ({"path_m": [[1, 0], [2]]}, "is not a list of lists of 2 numbers"),
+        ({"path_m": [[1, 0], [True, 2]]}, "is not a list of lists of 2 numbers"),
         ({"path_m": [[1, 0]]}, "two points"),
         ({"path_m": [[1, 0], [2, 0]], "repeat": "never"}, "none of once"),
         ({"path_m": [[1, 0], [2, 0]], "mass_kg": 1}, "only one of"),
-        ({"path_m": [[1, 0], [2, 0]], "before_sonar": 3, "distance_m": 1}, "path_m must be"),
+        ({"path_m": [[1, 0], [2, 0]], "before_sonar": 3, "distance_m": 1}, "path_m is for a thing"),
     ],
 )
 def test_a_path_that_cannot_be_is_refused(more: dict[str, object], said: str) -> None:

@@ -1,7 +1,6 @@
-"""Edges in bulk come out as if each had been looked at by itself, in C as in Python."""
+"""Edges in bulk come out as if each had been looked at by itself."""
 
 from array import array
-from collections.abc import Callable
 
 import pytest
 from hypothesis import given
@@ -9,28 +8,8 @@ from hypothesis import strategies as st
 
 from bluepill_sim.fabric.subscriptions import EDGE
 from robot_bench.wires import edges as module
-from robot_bench.wires.edges import (
-    NO_WIRE,
-    Edges,
-    changes,
-    changes_in_python,
-    codes,
-    codes_in_python,
-    dumped,
-    dumped_in_python,
-    pack,
-    pack_in_python,
-    sampled,
-    sampled_in_python,
-    split,
-    split_in_python,
-    unpack,
-    unpack_in_python,
-)
+from robot_bench.wires.edges import NO_WIRE, Edges, changes, codes, dumped, pack, sampled, split, unpack
 
-native = pytest.mark.skipif(module._library() is None, reason="robot_bench._edges is not built")
-
-Reader = Callable[[bytes, int, int], list[tuple[int, "array[int]"]]]
 WIRES = 5
 WIRE_OF_PIN = bytes(pin if pin < WIRES else NO_WIRE for pin in range(256))
 CODES = bytes(range(10, 20)).ljust(256, b"\0")
@@ -43,19 +22,15 @@ def dense(levels: list[tuple[int, int]]) -> Edges:
     return Edges(sorted(levels, key=lambda row: row[0]))
 
 
-@native
 @given(rows)
-def test_rows_are_sorted_by_wire_in_both_languages(rows: list[tuple[int, int, int]]) -> None:
+def test_rows_are_sorted_by_wire(rows: list[tuple[int, int, int]]) -> None:
     data = b"".join(EDGE.pack(at, pin, drive, 0, 0, 0) for at, pin, drive in rows)
+    expected = {}
+    for at, pin, drive in rows:
+        if pin < WIRES:
+            expected.setdefault(pin, []).append((at, CODES[drive]))
     found = split(data, WIRE_OF_PIN, CODES, WIRES)
-    assert found == split_in_python(data, WIRE_OF_PIN, CODES)
-    assert [wire for wire, *_ in found] == sorted({pin for _, pin, _ in rows if pin < WIRES})
-
-
-@native
-@given(st.lists(st.tuples(st.integers(0, 9), st.integers(0, 1)), max_size=20), st.integers(0, 1))
-def test_changes_are_the_same_in_both_languages(levels: list[tuple[int, int]], before: int) -> None:
-    assert changes(dense(levels), before) == changes_in_python(dense(levels), before)
+    assert [(wire, list(zip(times, codes, strict=True))) for wire, times, codes in found] == sorted(expected.items())
 
 
 @given(st.lists(st.tuples(st.integers(0, 9), st.integers(0, 1)), max_size=20), st.integers(0, 1))
@@ -70,37 +45,33 @@ def test_changes_alternate_and_end_each_instant_with_its_last_level(levels: list
     assert found == at_instant
 
 
-@native
-@given(tracks, st.integers(1, 9))
-def test_blocks_are_the_same_in_both_languages(tracks: list[Edges], most: int) -> None:
-    assert list(pack(tracks, most)) == list(pack_in_python(tracks, most))
+def test_a_block_has_the_bytes_that_its_format_says() -> None:
+    tracks = [Edges([(1000, 1), (1100, 0)]), Edges([(1000, 1)])]
+    # (0 ns, wire 0), (0 ns, wire 1), (100 ns, wire 0) of two wires: 0, 1, 200 = 72 + 128 * 1; then the rest apart.
+    assert list(pack(tracks, 9)) == [(1000, 3, b"\x00\x01\xc8\x01")]
+    assert list(pack(tracks, 2)) == [(1000, 2, b"\x00\x01"), (1100, 1, b"\x00")]
 
 
-@pytest.mark.parametrize("reader", [pytest.param(unpack, marks=native), unpack_in_python])
 @given(tracks=tracks, most=st.integers(1, 9))
-def test_a_block_read_back_is_what_was_written(reader: Reader, tracks: list[Edges], most: int) -> None:
+def test_a_block_read_back_is_what_was_written(tracks: list[Edges], most: int) -> None:
     found: dict[int, list[int]] = {}
     for first, count, block in pack(tracks, most):
-        got = reader(block, len(tracks), first)
+        got = unpack(block, len(tracks), first)
         assert sum(len(of_wire) for _, of_wire in got) == count <= most
         for wire, of_wire in got:
             found.setdefault(wire, []).extend(of_wire)
     assert found == {wire: list(track.times) for wire, track in enumerate(tracks) if track}
 
 
-def outcome(reader: Reader, block: bytes, wires: int, first: int) -> object:
-    try:
-        return reader(block, wires, first)
-    except ValueError:
-        return "damaged"
-
-
-@native
 @given(st.binary(max_size=40), st.integers(-1, 256), st.integers(-1, 2**63 - 1))
-def test_any_bytes_are_read_or_refused_alike(block: bytes, wires: int, first: int) -> None:
-    assert outcome(unpack, block, wires, first) == outcome(
-        lambda *of: unpack_in_python(*of) if 0 < wires < NO_WIRE and first >= 0 else "damaged", block, wires, first
-    )
+def test_any_bytes_are_read_or_refused(block: bytes, wires: int, first: int) -> None:
+    try:
+        found = unpack(block, wires, first)
+    except ValueError:
+        return
+    assert sum(len(of_wire) for _, of_wire in found) == sum(byte < 128 for byte in block)
+    assert all(0 <= wire < wires and list(of_wire) == sorted(of_wire) for wire, of_wire in found)
+    assert all(first <= at for _, of_wire in found for at in of_wire)
 
 
 DAMAGED = [
@@ -110,10 +81,16 @@ DAMAGED = [
 ]
 
 
-@pytest.mark.parametrize("reader", [pytest.param(unpack, marks=native), unpack_in_python])
 @pytest.mark.parametrize(("block", "first"), DAMAGED)
-def test_a_damaged_block_is_refused(reader: Reader, block: bytes, first: int) -> None:
-    assert outcome(reader, block, 1, first) == "damaged"
+def test_a_damaged_block_is_refused(block: bytes, first: int) -> None:
+    with pytest.raises(ValueError, match="damaged"):
+        unpack(block, 1, first)
+
+
+@pytest.mark.parametrize(("wires", "first"), [(0, 0), (NO_WIRE, 0), (1, -1)])
+def test_a_block_of_no_wires_or_before_time_0_is_refused(wires: int, first: int) -> None:
+    with pytest.raises(ValueError, match="no such block"):
+        unpack(b"\0", wires, first)
 
 
 def test_edges_are_a_sequence_of_times_and_levels() -> None:
@@ -131,12 +108,6 @@ one_level_an_instant = st.dictionaries(st.integers(0, 40), st.integers(0, 1), ma
 levels = st.lists(one_level_an_instant.map(lambda levels: dense(list(levels.items()))), min_size=1, max_size=8)
 
 
-@native
-@given(levels)
-def test_codes_are_the_same_in_both_languages(tracks: list[Edges]) -> None:
-    assert codes(tracks) == codes_in_python(tracks)
-
-
 @given(levels)
 def test_a_code_is_what_its_wires_are_after_each_instant(tracks: list[Edges]) -> None:
     found, now = dict(codes(tracks)), 0
@@ -147,28 +118,29 @@ def test_a_code_is_what_its_wires_are_after_each_instant(tracks: list[Edges]) ->
             assert now == sum((level[-1] if level else 0) << bit for bit, level in enumerate(held))
 
 
-@native
 @given(tracks=levels, piece=st.integers(40, 200))
-def test_a_dump_is_the_same_in_both_languages(tracks: list[Edges], piece: int) -> None:
+def test_a_dump_has_each_instant_once_and_its_levels_in_the_order_of_wires(tracks: list[Edges], piece: int) -> None:
     identifiers = ["!", "a", "zz", "b", "c", "d", "e", "f"][: len(tracks)]
+    expected, now = "", -1
+    for at, wire, level in sorted((at, wire, level) for wire, track in enumerate(tracks) for at, level in track):
+        expected += ("" if at == now else f"#{at}\n") + f"{level}{identifiers[wire]}\n"
+        now = at
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "_PIECE", piece)
-        assert "".join(dumped(tracks, identifiers)) == "".join(dumped_in_python(tracks, identifiers))
+        assert "".join(dumped(tracks, identifiers)) == expected
 
 
-@native
 @given(
     tracks=levels, wires=st.integers(1, 17), rate_hz=st.sampled_from([10**9, 10**8]), count=st.integers(1, 60),
     piece=st.integers(3, 9),
 )  # fmt: skip
-def test_samples_are_the_same_in_both_languages(
+def test_a_sample_is_what_each_wire_is_then(
     tracks: list[Edges], wires: int, rate_hz: int, count: int, piece: int
 ) -> None:
     tracks = (tracks * wires)[:wires]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "_PIECE", piece)
         found = b"".join(sampled(tracks, rate_hz, count))
-    assert found == b"".join(sampled_in_python(tracks, rate_hz, count))
     unit = max(1, -(-len(tracks) // 8))
     assert len(found) == count * unit
     for number in range(count):

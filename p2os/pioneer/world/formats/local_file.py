@@ -3,10 +3,8 @@
 from pathlib import Path
 
 from p2os.errors import WorldError
+from p2os.toml_file import LARGEST_FILE_BYTES
 from simbase.errors import shown
-
-#: chosen: the same bound as for the file that names it.
-LARGEST_FILE_BYTES = 64 * 1024 * 1024
 
 
 def find_local(uri: str, beside: Path) -> Path:
@@ -32,13 +30,18 @@ def find_local(uri: str, beside: Path) -> Path:
             path = folder / text
             try:
                 if text and path.exists():
-                    return _sized(path)
+                    return sized(path)
             except (OSError, ValueError) as error:
                 raise WorldError(f"{beside}: {shown(uri)} is no path") from error
     raise WorldError(f"{beside}: it names {shown(uri)}, which is not there", hint=f"put it beside {beside.name}")
 
 
-def _sized(path: Path) -> Path:
+def sized(path: Path) -> Path:
+    """Return a path that may be read.
+
+    Raises:
+        WorldError: It is no file or folder, or a file that is too large.
+    """
     if not path.is_file() and not path.is_dir():
         raise WorldError(f"{path}: neither a file nor a folder", hint="a pipe or a device is not read")
     if path.is_file() and path.stat().st_size > LARGEST_FILE_BYTES:

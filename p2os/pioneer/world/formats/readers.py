@@ -7,12 +7,10 @@ from pathlib import Path
 from typing import Protocol, cast
 
 from p2os.errors import WorldError
+from p2os.pioneer.world.formats.local_file import sized
 from p2os.pioneer.world.formats.placing import Placing, placed_world
 from p2os.pioneer.world.model import World
 from simbase.errors import MissingDependencyError, shown_name
-
-#: chosen: a mesh of 200 000 triangles in text is below it.
-LARGEST_FILE_BYTES = 64 * 1024 * 1024
 
 #: Ending → module of this package that reads such files.
 FORMATS: Mapping[str, str] = {
@@ -69,13 +67,12 @@ def read_placed(path: Path, placing: Placing) -> World:
             f"{shown_name(path)}: no reader for {shown_name(path.suffix) or 'a file without an ending'}", hint=_known()
         )
     try:
-        size = path.stat().st_size
+        path.stat()
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
         raise WorldError(f"{shown_name(path)}: {getattr(error, 'strerror', None) or error}") from error
     if not path.is_file():
         raise WorldError(f"{path}: not a file")
-    if size > LARGEST_FILE_BYTES:
-        raise WorldError(f"{path}: larger than {LARGEST_FILE_BYTES >> 20} MiB", hint="make it simpler first")
+    sized(path)
     reader = cast("Reader", _load(module))
     try:
         world = reader.read(path, placing.up)

@@ -24,12 +24,12 @@ from typing import cast
 
 from p2os.pioneer.world import known_worlds, load_world
 from p2os.pioneer.world.writer import write_world
+from p2os.toml_schema import Table
 from robot_bench.campaign.trial import Outcome, Trial, Verdict, run_trial, trial_of
 from robot_bench.campaign.variants.shrinking.failure import Way
 from robot_bench.campaign.variants.shrinking.things import WORLD_NAME
 from robot_bench.recording.run_record import RunRecord, read_run
 from robot_bench.report.explain.explain import explain
-from robot_bench.scenario.schema import Table
 from simbase.errors import FileError, P2osError, UsageError
 
 #: The folder of the run within.

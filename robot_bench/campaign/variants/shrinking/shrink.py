@@ -15,6 +15,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import cast
 
+from p2os.toml_schema import Table
 from robot_bench.campaign.trial import Trial
 from robot_bench.campaign.variants.shrinking.failure import Failure, Way, failure_of
 from robot_bench.campaign.variants.shrinking.reduction import ANGLE_STEPS, STEPS, fewest, rounded, rounder
@@ -28,7 +29,6 @@ from robot_bench.campaign.variants.shrinking.things import (
     with_world,
 )
 from robot_bench.scenario.included_files import Setting
-from robot_bench.scenario.schema import Table
 from simbase.errors import P2osError
 from simbase.timing import NS_PER_S, Nanos
 

@@ -249,11 +249,11 @@ def test_a_file_of_errors_starts_from_a_set(tmp_path: Path) -> None:
     ("text", "message"),
     [
         ("based_on = 'x'", "based_on"),
-        ("[sonr]\n", r"unknown table \[sonr\]"),
-        ("[sonar]\nnoise = 1", "unknown key sonar.noise"),
-        ("[sonar]\ndropout = 2", "0 to 1"),
-        ("[sonar]\nnoise_m = -1", "0 to 10"),
-        ("[sonar]\nnoise_m = true", "is no number"),
+        ("[sonr]\n", "unknown key 'sonr'"),
+        ("[sonar]\nnoise = 1", r"\[sonar\]: unknown key 'noise'"),
+        ("[sonar]\ndropout = 2", "dropout = 2 is out of range"),
+        ("[sonar]\nnoise_m = -1", "noise_m = -1 is out of range"),
+        ("[sonar]\nnoise_m = true", "is not a number"),
         ("[sonar", "Expected"),
     ],
 )

@@ -119,10 +119,10 @@ def test_each_fault_is_injected_reported_and_cleared_live(name: str) -> None:
     ("words", "answer"),
     [
         ("fault", ["error: which fault?", "hint: faults: sonar-stuck"]),
-        ("fault sonar-stuk 3 1", ["error: no fault 'sonar-stuk'", "hint: did you mean sonar-stuck?"]),
+        ("fault sonar-stuk 3 1", ["error: no fault 'sonar-stuk'", "hint: did you mean 'sonar-stuck'?"]),
         ("fault sonar-stuck 3", ["error: 'sonar-stuck 3' is incomplete", "hint: usage: sonar-stuck NUMBER METRES"]),
         ("fault reboot now", ["error: 'reboot now' has too many words", "hint: usage: reboot"]),
-        ("faults", ["error: no order 'faults'", "hint: did you mean fault?"]),
+        ("faults", ["error: no order 'faults'", "hint: did you mean 'fault'?"]),
         ("quit", ["error: no order 'quit'", "hint: orders: status, fault"]),
         ("1:", ["error: no order ''", "hint: orders: "]),
     ],

@@ -241,7 +241,7 @@ def test_a_mesh_cut_at_any_place_is_refused_or_read(case: str, tmp_path: Path) -
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ('file = "none.stl"', "w.toml:4: import: "),
+        ('file = "none.stl"', "w.toml:4: [[import]] 1: "),
         ('file = "a.txt"', "no reader for .txt"),
         ('file = "a.stl"\nup = "q"', "up = 'q' is unknown"),
         ('file = "a.stl"\nscale = 0', "scale = 0 is out of range"),

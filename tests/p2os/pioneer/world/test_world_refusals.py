@@ -15,11 +15,11 @@ BOX = '[[box]]\nname = "b"\nx_m = 0\ny_m = 0\nlength_m = 1\nwidth_m = 1\n'
     ("text", "place"),
     [
         ("arena = 5\n", "arena"),
-        ("[arena]\ncount = 5\n", "arena.count"),
-        (BOX.replace("width_m = 1", "width_m = -1"), "box.width_m = -1"),
-        (BOX.replace("x_m = 0", "x_m = nan"), "box.x_m"),
-        (BOX + 'kind = "tree"\n', "'tree'"),
-        ('[[wall]]\nname = "w"\nfrom_m = [0, 0]\nto_m = [0, 0]\nthickness_m = 0\n', "wall.thickness_m = 0"),
+        ("[arena]\ncount = 5\n", "[arena]: unknown key 'count'"),
+        (BOX.replace("width_m = 1", "width_m = -1"), "[[box]] 1: width_m = -1"),
+        (BOX.replace("x_m = 0", "x_m = nan"), "[[box]] 1: x_m"),
+        (BOX + 'kind = "tree"\n', 'kind = "tree"'),
+        ('[[wall]]\nname = "w"\nfrom_m = [0, 0]\nto_m = [0, 0]\nthickness_m = 0\n', "[[wall]] 1: thickness_m = 0"),
         (BOX + BOX, "two obstacles"),
     ],
 )

@@ -122,17 +122,20 @@ HEAD = 'name = "a"\nextent_m = [0, 0, 1, 1]\n'
 @pytest.mark.parametrize(
     ("more", "message"),
     [
-        ("fixed = 1", "mine.toml:9: box.fixed must be true or false"),
-        ("mass_kg = -1", "mine.toml:9: box.mass_kg = -1 is out of range"),
+        ("fixed = 1", "mine.toml:9: [[box]] 1: fixed = 1 is not true or false"),
+        ("mass_kg = -1", "mine.toml:9: [[box]] 1: mass_kg = -1 is out of range"),
         ("mass_kg = 1\nfixed = true", "only one of"),
         ("path_m = [[0, 0]]", "two points"),
         ("path_m = [[0, 0], [0, 0]]", "same point twice"),
-        ("path_m = [[0, 0], [1]]", "mine.toml:9: box.path_m must be a list of 2 numbers"),
+        (
+            "path_m = [[0, 0], [1]]",
+            "mine.toml:9: [[box]] 1: path_m = [[0, 0], [1]] is not a list of lists",
+        ),
         ("path_m = 3", "list of lists"),
         ("path_m = [[0, 0], [1, 1]]\nspeed_mps = 0", "speed_mps = 0 is out of range"),
-        ('path_m = [[0, 0], [1, 1]]\nrepeat = "never"', "repeat 'never' is unknown"),
+        ('path_m = [[0, 0], [1, 1]]\nrepeat = "never"', 'repeat = "never" is none of'),
         ('path_m = [[0, 0], [1, 1], [0, 0]]\nrepeat = "loop"', "first point again"),
-        (f"x_mm = {'9' * 400}", "unknown key box.x_mm"),
+        (f"x_mm = {'9' * 400}", "unknown key 'x_mm'"),
         (f"base_m = {'9' * 400}", "out of range"),
     ],
 )
@@ -147,7 +150,7 @@ def test_what_moves_is_checked(more: str, message: str) -> None:
     [
         ("vertices_m = [[0, 0, 0]]\ntriangles = []", "no triangles"),
         ("vertices_m = [[0, 0, 0]]\ntriangles = [[0, 0, 1]]", "not there"),
-        ("vertices_m = [[0, 0]]\ntriangles = [[0, 0, 0]]", "list of 3 numbers"),
+        ("vertices_m = [[0, 0]]\ntriangles = [[0, 0, 0]]", "list of lists of 3 numbers"),
     ],
 )
 def test_a_mesh_is_checked(mesh: str, message: str) -> None:

@@ -19,9 +19,10 @@ from urllib.parse import unquote
 
 from p2os.errors import WorldError
 from p2os.pioneer.world.formats.collection import MOST_TRIANGLES, MOST_VERTICES
-from p2os.pioneer.world.formats.local_file import LARGEST_FILE_BYTES, find_local
+from p2os.pioneer.world.formats.local_file import find_local
 from p2os.pioneer.world.formats.transform import IDENTITY, Transform, after, apply, moved, scaled
 from p2os.pioneer.world.model import Triangle, Vertex
+from p2os.toml_file import LARGEST_FILE_BYTES
 from simbase.errors import shown
 
 MOST_NODES = 20_000
