@@ -29,16 +29,15 @@ def pytest_addoption(parser: pytest.Parser, pluginmanager: pytest.PytestPluginMa
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Keep compiled modules where PYTHONDONTWRITEBYTECODE forbids it beside the sources, and bound no example's time.
+    """Keep compiled modules beside the sources even where PYTHONDONTWRITEBYTECODE is set, and bound no example's time.
 
-    A child that compiles 200 modules of ours takes 1.0 s of processor time to start, and 0.25 s else.
-    How long an example takes depends on what else the machine does.
+    A child that compiles 200 modules of ours takes 1.0 s of processor time to start, and 0.25 s else; and Python looks
+    in one place only: where they are kept in a folder of their own, 3,500 modules of installed packages and its own
+    are compiled anew, too. How long an example takes depends on what else the machine does.
     """
     if sys.dont_write_bytecode:
         sys.dont_write_bytecode = False
-        sys.pycache_prefix = str(config.rootpath / ".pytest_cache" / "bytecode")
-        os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
-        del os.environ["PYTHONDONTWRITEBYTECODE"]
+        os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     path = config.getoption("--count-time")
     if path is not None:
         from tests.tools.spent_time import TimeCounter
