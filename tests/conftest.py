@@ -35,6 +35,7 @@ def pytest_configure(config: pytest.Config) -> None:
     in one place only: where they are kept in a folder of their own, 3,500 modules of installed packages and its own
     are compiled anew, too. How long an example takes depends on what else the machine does.
     """
+    gc.disable()  # until all is collected: what imports make stays, and looking through it again and again takes long
     if sys.dont_write_bytecode:
         sys.dont_write_bytecode = False
         os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
@@ -82,6 +83,7 @@ def pytest_collection_finish() -> None:
     """
     gc.collect()
     gc.freeze()
+    gc.enable()
     gc.set_threshold(20_000, 10, 10)
 
 
