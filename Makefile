@@ -122,3 +122,4 @@ docs: setup
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage .coverage.* runs
+	find . -name __pycache__ -prune -exec rm -rf {} +

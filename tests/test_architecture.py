@@ -8,6 +8,9 @@ import ast
 import re
 import subprocess
 import sys
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path, PurePosixPath
 
 import pytest
@@ -128,15 +131,37 @@ def sources() -> list[Path]:
     return sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
 
 
+@dataclass(frozen=True)
+class Parsed:
+    """What the judges look at in a source file."""
+
+    imports: tuple[ast.Import | ast.ImportFrom, ...]  # wherever in it
+    prints: bool
+    says_what_it_is: bool
+
+
+@cache
+def parsed(path: Path) -> Parsed:
+    """Parse a source file, once for all judges."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    nodes = list(ast.walk(tree))
+    called = [node.func for node in nodes if isinstance(node, ast.Call)]
+    return Parsed(
+        imports=tuple(node for node in nodes if isinstance(node, (ast.Import, ast.ImportFrom))),
+        prints=any(isinstance(each, ast.Name) and each.id == "print" for each in called),
+        says_what_it_is=not tree.body or bool(ast.get_docstring(tree)),
+    )
+
+
 def imports(path: Path) -> set[str]:
     """Return the dotted names that a file imports, wherever in it."""
-    return imports_of(module_name(path), path.read_text(encoding="utf-8"), is_package=path.name == "__init__.py")
+    return imports_of(module_name(path), parsed(path).imports, is_package=path.name == "__init__.py")
 
 
-def imports_of(name: str, text: str, *, is_package: bool = False) -> set[str]:
-    """Return the dotted names that a module's text imports."""
+def imports_of(name: str, nodes: Iterable[ast.AST], *, is_package: bool = False) -> set[str]:
+    """Return the dotted names that a module's nodes import."""
     found = set()
-    for node in ast.walk(ast.parse(text)):
+    for node in nodes:
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -196,24 +221,18 @@ def faults(name: str, targets: set[str]) -> list[str]:
     return result
 
 
-@pytest.mark.parametrize("path", sources(), ids=module_name)
-def test_a_module_imports_only_what_its_place_allows(path: Path) -> None:
-    assert faults(module_name(path), imports(path)) == []
+def test_a_module_imports_only_what_its_place_allows() -> None:
+    assert [fault for path in sources() for fault in faults(module_name(path), imports(path))] == []
 
 
-@pytest.mark.parametrize("path", sources(), ids=module_name)
-def test_a_file_is_one_idea_and_opens_with_what_it_is(path: Path) -> None:
-    text = path.read_text(encoding="utf-8")
-    assert not text.strip() or ast.get_docstring(ast.parse(text)), "a module opens with a docstring"
+def test_a_file_is_one_idea_and_opens_with_what_it_is() -> None:
+    silent = [module_name(path) for path in sources() if not parsed(path).says_what_it_is]
+    assert silent == [], "a module opens with a docstring"
 
 
-@pytest.mark.parametrize("path", sources(), ids=module_name)
-def test_models_print_nothing(path: Path) -> None:
-    if is_in_io_layer(module_name(path)):
-        return
-    calls = [node.func.id for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)]  # fmt: skip
-    assert "print" not in calls
+def test_models_print_nothing() -> None:
+    models = [path for path in sources() if not is_in_io_layer(module_name(path))]
+    assert [module_name(path) for path in models if parsed(path).prints] == []
 
 
 def test_nothing_has_a_name_that_says_nothing() -> None:
@@ -248,7 +267,7 @@ def test_one_peripheral_never_imports_another() -> None:
     ],
 )
 def test_the_judge_sees_a_broken_rule(name: str, text: str) -> None:
-    assert faults(name, imports_of(name, text)) != []
+    assert faults(name, imports_of(name, ast.walk(ast.parse(text)))) != []
 
 
 #: Most names that a folder shows.
@@ -292,13 +311,14 @@ def test_a_folder_shows_no_more_names_than_one_looks_through() -> None:
     assert [folder for folder in long if folder not in LONG_FOLDERS and not folder.startswith(may)] == []
 
 
+@cache
 def module_graph() -> dict[str, set[str]]:
     """Return every module of the packages with the modules that it imports, wherever in it."""
     modules = {module_name(path): path for path in sources()}
     graph: dict[str, set[str]] = {}
     for name, path in modules.items():
         found = set()
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in parsed(path).imports:
             if isinstance(node, ast.Import):
                 found |= {alias.name for alias in node.names}
             elif isinstance(node, ast.ImportFrom) and node.module:

@@ -181,7 +181,7 @@ def test_the_project_builds_without_a_warning_and_again_only_when_something_chan
 def test_a_student_gets_from_nothing_to_a_robot_that_drives() -> None:
     assert p2os(["new", "mine"]) == 0
     body = resolve_body(BEST)
-    command = f'{sys.executable} -c "from p2os.cli.main import main; main()"'
+    command = f"{sys.executable} -m p2os"
     done = make("run", f"P2OS={command}")
     assert done.returncode == 0, done.stderr
     assert "\nended well, no goals were set; report: runs/just-drive-001/report.html\n" in done.stdout

@@ -19,7 +19,7 @@ from robot_bench.recording.run_record import read_run
 from robot_bench.scenario.scenario import load_scenario
 from tests.robot_bench.firmware import thumb
 
-COMMAND = [sys.executable, "-c", "from p2os.cli.main import main; main()"]
+COMMAND = [sys.executable, "-m", "p2os"]
 QUICK = ["--mode", "direct", "--body", "kinematic", "--duration", "0.2s"]
 #: What `run --json` prints at the least.
 KEYS = {

@@ -20,7 +20,7 @@ from tests.robot_bench.firmware import thumb
 LEAST = 'firmware = "x.bin"\nworld = "room"\nduration_s = 0.2\nbody = "kinematic"\nmode = "direct"\n'
 #: Met from 0 s on where the robot begins right of the y axis.
 RIGHT = '[start]\nx_m = 0.5\ny_m = 0.0\n[[goal]]\nkind = "stay_within"\narea_m = [0.0, -5.0, 5.0, 5.0]\n'
-COMMAND = [sys.executable, "-c", "from p2os.cli.main import main; main()"]
+COMMAND = [sys.executable, "-m", "p2os"]
 
 
 @pytest.fixture(autouse=True)

@@ -75,7 +75,7 @@ def test_process_hash_seed_and_folder_change_nothing(mode: str, body: str, tmp_p
         folder.mkdir()
         words = ["run", "dodge", "--mode", mode, "--body", body, "--duration", "5s", "--out", "there", "--json"]
         done = subprocess.run(
-            [sys.executable, "-c", "from p2os.cli.main import main; main()", *words],
+            [sys.executable, "-m", "p2os", *words],
             cwd=folder, env={**os.environ, "PYTHONHASHSEED": seed}, capture_output=True, text=True, check=False,
             timeout=300,
         )  # fmt: skip

@@ -222,7 +222,7 @@ def test_a_served_robot_is_validated_at_its_port(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    command = [sys.executable, "-c", "from p2os.cli.main import main; main()", "serve", "--port", "tcp:127.0.0.1:0"]
+    command = [sys.executable, "-m", "p2os", "serve", "--port", "tcp:127.0.0.1:0"]
     process = subprocess.Popen(
         [*command, "--body", "kinematic", "--world", "arena", "--json"], stdout=subprocess.PIPE, text=True
     )
