@@ -1,10 +1,9 @@
 """Make the pages of the API from the docstrings, with pdoc: `make docs`.
 
-Usage: python tools/make_api_pages.py [FOLDER]
-
 Exit code 1 where pdoc warns or a public name has no docstring.
 """
 
+import argparse
 import sys
 import warnings
 from collections.abc import Iterator
@@ -54,7 +53,9 @@ def make(folder: Path, names: tuple[str, ...] = MODULES) -> list[str]:
 
 def main() -> int:
     """Make the pages, and tell what is wrong."""
-    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else FOLDER
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("folder", type=Path, nargs="?", default=FOLDER, help="where to (default: build/api)")
+    folder: Path = parser.parse_args().folder
     wrong = make(folder)
     print(*wrong, f"open {folder / 'index.html'}", sep="\n")
     return 1 if wrong else 0

@@ -17,9 +17,9 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TypeAlias, cast
 
+from p2os.toml_schema import Table
 from robot_bench.bench import Bench
 from robot_bench.campaign.trial import Done, Outcome, Seen, Trial, bench_of, blocks_of, run_trial, unpacked
-from robot_bench.scenario.schema import Table
 from simbase.errors import P2osError
 from simbase.timing import NS_PER_S, Nanos
 
