@@ -189,7 +189,7 @@ def _key(name: str, kind: Kind = "text", choices: type[StrEnum] | None = None, *
 _RANGES = {"schema": (SCHEMA, SCHEMA), "idle": (0, 1), "bit": (0, 31), "number": (1, 32), "width": (1, 32)}
 OF_VALUE, OF_DISTANCE = (_key("value"), _key("bit", "whole")), (_key("number", "whole"),)
 #: What a wire has beside the keys of all, by its role.
-_OF_ROLE = {
+_OF_ROLE: Mapping[str, tuple[Key, ...]] = {
     WireRole.ENCODER: OF_VALUE, WireRole.MOTOR: OF_VALUE, WireRole.DISTANCE: OF_DISTANCE,
     WireRole.CONNECT: (), WireRole.RESET: (),
 }  # fmt: skip
@@ -301,7 +301,7 @@ def _rows(top: Table, name: str, where: Place) -> Iterator[tuple[Place, dict[str
     """Yield the tables `[[name]]` with their places, checked."""
     for number, row in enumerate(cast("Sequence[Table]", top[name] or ())):
         at = within(where, name, number)
-        more = _OF_ROLE.get(row.get("role"), ()) if name == "wire" else ()  # type: ignore[call-overload]  # any value
+        more = _OF_ROLE.get(str(row.get("role")), ()) if name == "wire" else ()
         yield at, filled(row, (*KEYS[name], *more), at)
 
 

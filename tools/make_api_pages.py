@@ -16,7 +16,8 @@ ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / "build" / "api"
 #: The face of each package, then the modules that a program may import beside.
 MODULES = (
-    "robot_bench", "bluepill_sim", "p2os", "adapter_sim", "simbase",
+    "robot_bench", "robot_bench.bench.expectations", "robot_bench.bench.interventions",
+    "bluepill_sim", "p2os", "adapter_sim", "simbase",
     "p2os.client", "p2os.client.aio", "p2os.protocol.commands", "p2os.protocol.sip", "p2os.protocol.packets",
     "p2os.protocol.config_packet", "p2os.protocol.odometry", "p2os.protocol.frames", "p2os.protocol.connection",
     "p2os.robots.parameters", "p2os.capture.columns", "p2os.pioneer.serve", "p2os.gamepad", "p2os.errors",

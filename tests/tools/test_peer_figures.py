@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from p2os.protocol.sip import StandardSip
-from tools.bench.peer_figures import FIGURES, Sample, main, slope, table
+from tools.bench.peers.peer_figures import FIGURES, Sample, main, slope, table
 
 
 def sample(robot_s: float, forward: float) -> Sample:

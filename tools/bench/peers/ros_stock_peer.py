@@ -6,7 +6,7 @@ Run it with a Python that has rclpy; it imports nothing of p2os:
     rospeer/bin/pip install ros-jazzy-rclpy ros-jazzy-rmw-fastrtps-cpp ros-jazzy-sensor-msgs \
         ros-jazzy-nav-msgs ros-jazzy-diagnostic-msgs ros-jazzy-std-srvs ros-jazzy-rosgraph-msgs
     p2os serve --all-sonar --laser lms2xx & p2os ros tcp:127.0.0.1:8101 --laser lms2xx --domain 42 &
-    ROS_DOMAIN_ID=42 ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST rospeer/bin/python tools/bench/ros_stock_peer.py 10
+    ROS_DOMAIN_ID=42 ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST rospeer/bin/python tools/bench/peers/ros_stock_peer.py 10
 
 Those wheels are a third party's build of ROS; a ROS 2 of one's own does as well. It publishes cmd_vel at 20 Hz for so
 many seconds, then the thesis's motor topics for two, and ends with exit code 1 where something was not heard.

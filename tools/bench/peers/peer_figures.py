@@ -2,7 +2,7 @@
 
     python -m p2os serve --robot p3dx --body kinematic --port tcp:127.0.0.1:8101
     AMRISim --nomap --no-gui --no-error -R p3dx -p 8123
-    python -m tools.bench.peer_figures tcp:127.0.0.1:8101 tcp:127.0.0.1:8123 --record drives
+    python -m tools.bench.peers.peer_figures tcp:127.0.0.1:8101 tcp:127.0.0.1:8123 --record drives
 
 The script sets accelerations, drives, turns, moves, stops, falls silent and drives with its motors off; it needs two
 metres of free space on each side. A figure has what the manual says beside it; `--record` leaves the conversations for
@@ -314,7 +314,7 @@ def table(urls: Sequence[str], found: Sequence[Found]) -> str:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Drive each robot, print the table; return the exit code."""
     parser = argparse.ArgumentParser(
-        prog="python -m tools.bench.peer_figures", description=(__doc__ or "").split("\n", 1)[0]
+        prog="python -m tools.bench.peers.peer_figures", description=(__doc__ or "").split("\n", 1)[0]
     )
     parser.add_argument("url", nargs="+", metavar="[NAME=]URL", help="a robot, such as AMRISim=tcp:127.0.0.1:8101")
     parser.add_argument("--record", type=Path, metavar="FOLDER", help="write each conversation there, NAME.jsonl")
@@ -336,7 +336,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return 1
         if chosen.record:
             chosen.record.mkdir(parents=True, exist_ok=True)
-            capture = Capture(chunks=tuple(peer.chunks), has_time=True, note=f"tools.bench.peer_figures: {names[-1]}")
+            capture = Capture(
+                chunks=tuple(peer.chunks), has_time=True, note=f"tools.bench.peers.peer_figures: {names[-1]}"
+            )
             (chosen.record / f"{names[-1]}.jsonl").write_text(write_recording(capture), encoding="utf-8")
     print(table(names, results))
     return 0
