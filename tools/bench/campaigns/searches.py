@@ -5,7 +5,8 @@ plan view with the pins straight to the body. What fails is run in full (bullet,
 another process; counted are the points up to the first that failed in all of these. A walker may come upon a robot
 that can do nothing about it, so there a world counts only where the copy fails and `dodge` does not.
 
-Usage: python tools/bench/campaigns/searches.py [--case NAME] [--search NAME] [--repeat N] [--runs N] [--first SEED] [--all]
+Usage: python tools/bench/campaigns/searches.py [--case NAME] [--search NAME] [--repeat N] [--runs N]
+[--first SEED] [--all]
 Needs arm-none-eabi-gcc; a second of a processor for two or three points. With `--all` a search goes on to its last
 point, and how many fail and how different they are is printed.
 """

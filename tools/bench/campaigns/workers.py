@@ -5,7 +5,9 @@
     beginnings    seconds of a processor of runs that share a beginning, against each from its own
 
 All in seconds of a processor (user and system), which a busy machine changes least; the ratios are of runs of the same
-minute. Usage: python tools/bench/campaigns/workers.py [memory|throughput|beginnings ...] [--runs N] [--body kinematic|bullet]
+minute.
+
+Usage: python tools/bench/campaigns/workers.py [memory|throughput|beginnings ...] [--runs N] [--body kinematic|bullet]
 """
 
 import argparse
