@@ -1,7 +1,8 @@
 """`p2os validate`: the bench against what it claims, in every variant, as figures with bounds."""
 
+import contextlib
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -119,15 +120,15 @@ def validate(
         raise UsageError("a robot at a port can do none of these", hint=f"it can do {able}")
     chosen_variants = variants(mode or (), body or ())
     refuse(chosen, chosen_variants if port is None else [], settings, world or ())
-    folder = out or make_next_folder("validation", RUNS)
     try:
-        if port is None:
-            results = _run_all(
-                chosen, chosen_variants, folder, settings, worlds=world or (),
-                seeds=None if seeds is None else read_seeds(seeds), jobs=jobs or core_count(),
-            )  # fmt: skip
-        else:
-            results = _run_at_port(chosen, folder, settings, port, yes=yes)
+        with _report_folder(out) as folder:
+            if port is None:
+                results = _run_all(
+                    chosen, chosen_variants, folder, settings, worlds=world or (),
+                    seeds=None if seeds is None else read_seeds(seeds), jobs=jobs or core_count(),
+                )  # fmt: skip
+            else:
+                results = _run_at_port(chosen, folder, settings, port, yes=yes)
     except KeyboardInterrupt as stop:
         typer.echo("interrupted: no report was made", err=True)
         raise typer.Exit(EXIT_INTERRUPTED) from stop
@@ -138,6 +139,18 @@ def validate(
         _print(results, folder)
     if not all(result.passed for result in results):
         raise typer.Exit(1)
+
+
+@contextlib.contextmanager
+def _report_folder(out: Path | None) -> Iterator[Path]:
+    """Yield the folder that the report goes to; one that holds nothing where the block fails is taken away."""
+    folder = out or make_next_folder("validation", RUNS)
+    try:
+        yield folder
+    except BaseException:
+        with contextlib.suppress(OSError):
+            folder.rmdir()
+        raise
 
 
 def _chosen(names: Sequence[str], modes: Sequence[str]) -> list[Experiment]:

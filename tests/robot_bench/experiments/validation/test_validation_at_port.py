@@ -140,3 +140,4 @@ def test_what_is_not_done_at_a_port_and_what_room_is_needed_is_said_before_anyth
     assert "not at a port: slip: wheels that spin against a wall harm a robot" in err
     assert "the robot needs two boxes 0.3 m long" in err
     assert "nobody said yes" in err
+    assert list(tmp_path.glob("runs/*")) == []
