@@ -61,6 +61,13 @@ def test_a_robot_that_stands_half_of_the_time_is_said_to() -> None:
     assert found.max_mps == pytest.approx(0.3)
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(("times", "most"), [((0.0, 0.5, 0.5), 0.4), ((0.0, 0.5, 1.0), 0.6), ((0.5, 0.5), None)])
+def test_a_rim_changes_its_speed_between_samples_of_two_times(times: tuple[float, ...], most: float | None) -> None:
+    side = Steps(np.array(times), np.array((0.0, 0.2, 0.5)[: len(times)]))
+    assert metrics(drive(line(lambda _: 0.2), left_mps=side)).max_rim_mps2 == (most and pytest.approx(most))
+
+
 def pose(t_ms: int, x_mm: int, work: int | None) -> Pose:
     return Pose(t=t_ms * 1_000_000, x=x_mm * 1000, y=0, z=0, heading=0, pitch=0, left=0, right=0, left_angle=0,
                 right_angle=0, collisions=0, work=work)  # fmt: skip
