@@ -19,37 +19,39 @@ START_SHARE = 0.1
 #: chosen: seconds; a robot has turned at the first things by then, and a machine does a run in a second or two.
 LONGEST_S = 60.0
 
-#: Kinds of goals on what a program does in an order of its own: none meets these from any start, among any things.
-LISTED = frozenset({
-    "motor_sequence", "usart_in_order", "in_order", "encoder_counts_match", "sensor_named", "hold_speed",
-    "hold_heading", "reach",
-})  # fmt: skip
 HEAD = """\
 # What is searched: $searched.
 #   p2os campaign $file                 docs/campaigns.md has all keys
 scenario = $scenario_name
 """
-LISTED_TEMPLATE = Template(
-    HEAD
-    + """\
+SEARCH = """\
 search = "sobol"        # grid, random, latin-hypercube, sobol, tpe, cma-es, quality-diversity, coverage
 
 [budget]
-runs = 64               # of the cheap kind
-confirmations = 20      # runs in full: of what failed, and of the nearest misses
-minutes = 10.0
-
+"""
+RUN = """
 [limits]                # of one run
 cpu_s = 300.0
 memory_mb = 2000
 
 [cheap]                 # the runs that propose; any key of a scenario, such as mode = "direct"
 body = "kinematic"
-
+${duration}
 [full]                  # those that confirm
 ${mode}body = $body
-
+${duration}
 [vary]                  # every key that --set takes: a range, with a step or without, or a list of values
+"""
+SCRIPTED_TEMPLATE = Template(
+    HEAD
+    + SEARCH
+    + """\
+runs = 64               # of the cheap kind
+confirmations = 20      # runs in full: of what failed, and of the nearest misses
+minutes = 10.0
+"""
+    + RUN
+    + """\
 seed = { from = 0, to = 999 }
 crystal_ppm = { from = -100, to = 100 }
 sram = ["zeros", "random"]
@@ -62,26 +64,15 @@ TEMPLATE = Template(
     HEAD
     + """\
 gap_m = 0.75             # between things: a robot of 0.38 m passes
-search = "sobol"        # grid, random, latin-hypercube, sobol, tpe, cma-es, quality-diversity, coverage
-
-[budget]
+"""
+    + SEARCH
+    + """\
 runs = 600              # of the cheap kind; about a second of a processor each
 confirmations = 40      # runs in full: of what failed, and of the nearest misses
 minutes = 10.0
-
-[limits]                # of one run
-cpu_s = 300.0
-memory_mb = 2000
-
-[cheap]                 # the runs that propose; any key of a scenario, such as mode = "direct"
-body = "kinematic"
-duration_s = $duration_s
-
-[full]                  # those that confirm
-${mode}body = $body
-duration_s = $duration_s
-
-[vary]                  # every key that --set takes: a range, with a step or without, or a list of values
+"""
+    + RUN
+    + """\
 $start.x_m = { from = $x0, to = $x1 }
 $start.y_m = { from = $y0, to = $y1 }
 $start.heading_deg = { from = 0, to = 355, step = 5 }
@@ -175,16 +166,16 @@ def suggested(scenario: Scenario, scenario_name: str, file: str) -> str:
         "scenario_name": toml_value(scenario_name), "file": file, "body": toml_value(scenario.body),
         "mode": "" if scenario.robots else f"mode = {toml_value(scenario.mode)}\n",
     }  # fmt: skip
-    if any(goal.kind in LISTED for part in parts for goal in part.goals):
+    if any(goal.definition.is_scripted for part in parts for goal in part.goals):
         searched = f"clocks and SRAM with which the firmware of {scenario.name} fails"
-        return LISTED_TEMPLATE.substitute(common, searched=searched)
+        return SCRIPTED_TEMPLATE.substitute(common, searched=searched, duration="")
     world = load_world(scenario.world, seed=scenario.seed)
     start = scenario.robots[0].start if scenario.robots else scenario.start or world.start
     x0, y0, x1, y1 = world.extent
     dx, dy = (x1 - x0) * START_SHARE / 2, (y1 - y0) * START_SHARE / 2
     return TEMPLATE.substitute(
         common, searched=f"worlds in which the firmware of {scenario.name} fails",
-        duration_s=min(scenario.duration_ns / NS_PER_S, LONGEST_S),
+        duration=f"duration_s = {min(scenario.duration_ns / NS_PER_S, LONGEST_S)}\n",
         start=f"robot.{scenario.robots[0].name}" if scenario.robots else "start",
         x0=round(start.x_m - dx, 2), x1=round(start.x_m + dx, 2),
         y0=round(start.y_m - dy, 2), y1=round(start.y_m + dy, 2),

@@ -159,6 +159,7 @@ KINDS: Mapping[str, GoalKind] = {
             Key(name="held_s", kind="number", least=0, most=LONGEST_S),
         ),
         wanted=lambda table: f"sets the motors to {shown_pairs(table['values'])}", watch=MotorSequence,
+        is_scripted=True,
     ),
     "usart_contains": GoalKind(
         keys=(_TEXT,), wanted=lambda table: f"prints {table['text']!r}",
@@ -171,19 +172,20 @@ KINDS: Mapping[str, GoalKind] = {
     "usart_in_order": GoalKind(
         keys=(Key(name="texts", kind="list", required=True),),
         wanted=lambda table: f"prints in order {', '.join(map(repr, _texts(table)))}",
-        watch=lambda table: InOrder(_texts(table), "was not printed in its turn"),
+        watch=lambda table: InOrder(_texts(table), "was not printed in its turn"), is_scripted=True,
     ),
     "encoder_counts_match": GoalKind(
         keys=(Key(name="steps", kind="whole", least=0, most=1_000_000),),
         wanted=lambda table: f"counts the wheels' turns to {table.get('steps', 1)} step",
-        watch=EncoderCounts, needs_world=True,
+        watch=EncoderCounts, needs_world=True, is_scripted=True,
     ),
     "sensor_named": GoalKind(
         keys=(), wanted=lambda _: "names the sensor before which something stands, and no other",
-        watch=lambda _: SensorNamed(), needs_world=True,
+        watch=lambda _: SensorNamed(), needs_world=True, is_scripted=True,
     ),
     "reach": GoalKind(
         keys=(*_REGION, _WITHIN), wanted=lambda table: f"reaches {_place(table)}{_when(table)}", watch=Reach,
+        is_scripted=True,
     ),
     "avoid": GoalKind(
         keys=_REGION, wanted=lambda table: f"stays out of {_place(table)}",
@@ -258,6 +260,7 @@ KINDS: Mapping[str, GoalKind] = {
             table, "heading_deg",
             around(number(table, "heading_deg"), number(table, "tolerance_deg"), is_angle=True), is_always=True,
         ),
+        is_scripted=True,
     ),
     "hold_speed": GoalKind(
         keys=(*_HOLD_SPEED, _AFTER, _FROM, _TO),
@@ -266,6 +269,7 @@ KINDS: Mapping[str, GoalKind] = {
         watch=lambda table: OverTime(
             table, "speed_mps", around(number(table, "speed_mps"), number(table, "tolerance_mps")), is_always=True
         ),
+        is_scripted=True,
     ),
     "always": GoalKind(
         keys=(_SIGNAL, _THING, _LEAST, _MOST, _AFTER, _FROM, _TO),
@@ -288,7 +292,7 @@ KINDS: Mapping[str, GoalKind] = {
     "in_order": GoalKind(
         keys=(Key(name="events", kind="list", required=True),),
         wanted=lambda table: f"in order {', '.join(map(repr, cast('list[str]', table['events'])))}",
-        watch=InOrderOfEvents,
+        watch=InOrderOfEvents, is_scripted=True,
     ),
     "latency": GoalKind(
         keys=(

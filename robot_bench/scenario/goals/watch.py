@@ -56,12 +56,15 @@ class GoalKind:
         wanted: The goal as a sentence, of its table.
         watch: Makes what watches one run, of its table; a `UsageError` refuses the table.
         needs_world: A robot at a port cannot tell; there the goal is not judged.
+        is_scripted: It is on what a program does in an order of its own, which from another start, or with other things
+            in the way, it need not meet.
     """
 
     keys: tuple[Key, ...]
     wanted: Callable[[Table], str]
     watch: Callable[[Table], Watch]
     needs_world: bool = False
+    is_scripted: bool = False
 
 
 #: Where a goal's table has the wires of a robot on own pins; no key of a file can be called so.
