@@ -96,6 +96,8 @@ Work: TypeAlias = Callable[[Callable[[], None]], Outcome | list[Saved]]
 Worked: TypeAlias = tuple[Outcome | list[Saved], float]
 #: Does all, and hands on the place of each and what came of it.
 Do: TypeAlias = Callable[[Sequence[Work], Callable[[int, Worked], None]], None]
+#: Place of a trial → the hash of the beginning that it shares, and until when that lasts.
+Shared: TypeAlias = dict[int, tuple[str, Nanos]]
 
 
 class Beginnings:
@@ -114,8 +116,9 @@ class Beginnings:
             do: The workers.
             anew: Each from its very beginning.
         """
-        begun_s = 0.0 if anew else self._begin(trials, do)
-        starts = {} if anew else self._starts(trials)
+        shared = {} if anew else self._shared(trials)
+        begun_s = self._begin(trials, shared, do)
+        starts = self._starts(shared)
         share_s = begun_s / max(len(starts), 1)
 
         def on_worked(place: int, worked: Worked) -> None:
@@ -125,9 +128,9 @@ class Beginnings:
 
         do([partial(run_trial, trial, start=starts.get(place)) for place, trial in enumerate(trials)], on_worked)
 
-    def _begin(self, trials: Sequence[Trial], do: Do) -> float:
+    def _begin(self, trials: Sequence[Trial], shared: Shared, do: Do) -> float:
         """Have run what trials have in common; return the seconds of a processor that it took."""
-        tasks = self._missing(trials)
+        tasks = self._missing(trials, shared)
         spent_s = 0.0
 
         def on_worked(place: int, worked: Worked) -> None:
@@ -138,13 +141,14 @@ class Beginnings:
                 key = list(tasks)[place]
                 self._kept[key] = [*self._kept.get(key, []), *found]
 
-        do(list(tasks.values()), on_worked)
+        if tasks:
+            do(list(tasks.values()), on_worked)
         return spent_s
 
-    def _missing(self, trials: Sequence[Trial]) -> dict[str, Task]:
+    def _missing(self, trials: Sequence[Trial], shared: Shared) -> dict[str, Task]:
         """Return what is to be run before trials can go on from what they share: hash of a beginning → task."""
         found: dict[str, Task] = {}
-        for trial, (key, until) in self._shared(trials).items():
+        for trial, (key, until) in shared.items():
             states = self._kept.get(key, [])
             start = states[-1] if states else None
             known = found[key].until if key in found else start.at if start else 0
@@ -152,10 +156,10 @@ class Beginnings:
                 found[key] = Task(_before(trials[trial], until + 1), until, start)
         return found
 
-    def _starts(self, trials: Sequence[Trial]) -> Mapping[int, Saved]:
+    def _starts(self, shared: Shared) -> Mapping[int, Saved]:
         """Return where trials go on, by their places; those that are not in it begin at the beginning."""
         found: dict[int, Saved] = {}
-        for place, (key, until) in self._shared(trials).items():
+        for place, (key, until) in shared.items():
             kept = self._kept.pop(key, [])
             self._kept[key] = kept
             if states := [state for state in kept if state.at <= until]:
@@ -164,7 +168,7 @@ class Beginnings:
             del self._kept[key]
         return found
 
-    def _shared(self, trials: Sequence[Trial]) -> dict[int, tuple[str, Nanos]]:
+    def _shared(self, trials: Sequence[Trial]) -> Shared:
         """Return of each trial that has one the latest beginning that another one has too, and until when it lasts."""
         all_of = [[(_before(trial, at).sha256, at - 1) for at in _times(trial) if at > LEAST_NS] for trial in trials]
         counts = Counter(key for each in all_of for key, _ in each)
