@@ -6,37 +6,29 @@ latency exactly.
 
 import math
 import re
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable
 from typing import Self
 
 from bluepill_sim.spans import Span, to_nanos
 from p2os.pioneer.world.model import Pose
-from robot_bench.bench.waiting import EventWait
+from robot_bench.bench.waiting import AwaitedRun
 from robot_bench.events.codec import events_of
 from robot_bench.events.expectation import ExpectationError
 from robot_bench.events.kinds import Event
 from robot_bench.events.selection import SELECTORS, Wires, bus_of, select, wire_named
 from robot_bench.events.words import last_words
 from robot_bench.recording.recorder import SAMPLE_NS, Recorder
-from robot_bench.scenario.scenario import Scenario
 from robot_bench.wires.nets import Harness
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos, Reached
 
 
-class Expectations(ABC):
+class Expectations(AwaitedRun):
     """A run of which events, levels, texts and places can be expected."""
 
-    scenario: Scenario
     recorder: Recorder
     _harness: Harness
-    _waits: EventWait
-
-    @property
-    @abstractmethod
-    def now(self) -> Nanos:
-        """Return the time that the chip has come to."""
 
     @property
     @abstractmethod

@@ -3,39 +3,31 @@
 Each is what a scenario's table of the same name does, at the present time.
 """
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TypeVar
 
 from bluepill_sim.spans import Span, to_nanos
 from p2os.errors import ScenarioError
-from robot_bench.bench.waiting import EventWait
+from robot_bench.bench.waiting import AwaitedRun
 from robot_bench.events.stream import EventStream
 from robot_bench.scenario.fault_script import LINK_DOWN, FaultChange, FaultScript, load_faults
 from robot_bench.scenario.hand_script import Deed, HandScript
-from robot_bench.scenario.scenario import Scenario
 from robot_bench.scenario.timeline import Timed, Timeline
 from robot_bench.scenario.world_script import WorldScript, load_changes
 from simbase.errors import UsageError, shown
-from simbase.timing import NS_PER_S, Nanos
+from simbase.timing import NS_PER_S
 
 T = TypeVar("T", bound=Timed)
 
 
-class Interventions(ABC):
+class Interventions(AwaitedRun):
     """A run that can be changed from outside."""
 
-    scenario: Scenario
     script: WorldScript
     faults: FaultScript
     hands: HandScript
-    _waits: EventWait
-
-    @property
-    @abstractmethod
-    def now(self) -> Nanos:
-        """Return the time that the chip has come to."""
 
     @property
     @abstractmethod
