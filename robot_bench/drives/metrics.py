@@ -121,9 +121,8 @@ def _smoothness(times: Floats, speed: Floats) -> tuple[float | None, float | Non
 
 def _rims(drive: Drive) -> float | None:
     """Return how fast a rim changed its speed at most, from sample to sample, m/s²."""
-    found = []
-    for side in (drive.left_mps, drive.right_mps):
-        if side is not None:
-            apart = np.diff(side.t_s)  # nothing between two samples of one time, as where a run ends on one
-            found += (np.abs(np.diff(side.values)[apart > 0]) / apart[apart > 0]).tolist()
+    found = [
+        float(np.abs(np.diff(side.values) / np.diff(side.t_s)).max())
+        for side in (drive.left_mps, drive.right_mps) if side is not None and len(side.t_s) > 1
+    ]  # fmt: skip
     return max(found, default=None)

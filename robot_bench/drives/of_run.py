@@ -3,8 +3,6 @@
 from collections.abc import Iterable, Iterator
 from typing import cast
 
-import numpy as np
-
 from p2os.capture import Chunk, Direction
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import ParametersError, load_parameters
@@ -47,9 +45,8 @@ def drive_of_record(called: str, record: RunRecord, robot: str = "") -> Drive:
     drive.left_mps, drive.right_mps = drive.told_left_mps, drive.told_right_mps
     if record.meta.get("body") != REMOTE and len(record.poses) > 1:
         drive.truth = trajectory_of(record.poses)
-        times = np.array([pose.t / NS_PER_S for pose in record.poses])
-        drive.left_mps = Steps(times, np.array([pose.left / 1e6 for pose in record.poses]))
-        drive.right_mps = Steps(times, np.array([pose.right / 1e6 for pose in record.poses]))
+        drive.left_mps = steps_of([(pose.t / NS_PER_S, pose.left / 1e6) for pose in record.poses])
+        drive.right_mps = steps_of([(pose.t / NS_PER_S, pose.right / 1e6) for pose in record.poses])
         drive.has_true_wheels = True
     if not drive.sonar_m:
         drive.sonar_m = _sonar_of(record)

@@ -3,6 +3,7 @@
 import json
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,10 +18,10 @@ from robot_bench.drives.drive import Drive, Steps, Trajectory, steps_of
 from robot_bench.drives.latency_budget import STEPS, WHOLE, latency_budget
 from robot_bench.drives.metrics import metrics
 from robot_bench.drives.of_packets import spread_s
-from robot_bench.drives.of_run import trajectory_of
+from robot_bench.drives.of_run import drive_of_record, trajectory_of
 from robot_bench.events.kinds import Clearance, Contact, Packet, Pose, Verdict
 from robot_bench.experiments.drive_files import read_drive
-from robot_bench.recording.run_record import read_run
+from robot_bench.recording.run_record import RunRecord, read_run
 from robot_bench.report.measures import BARS, HEIGHT
 from robot_bench.report.page import page_data, render_page
 
@@ -61,16 +62,17 @@ def test_a_robot_that_stands_half_of_the_time_is_said_to() -> None:
     assert found.max_mps == pytest.approx(0.3)
 
 
-@pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize(("times", "most"), [((0.0, 0.5, 0.5), 0.4), ((0.0, 0.5, 1.0), 0.6), ((0.5, 0.5), None)])
-def test_a_rim_changes_its_speed_between_samples_of_two_times(times: tuple[float, ...], most: float | None) -> None:
-    side = Steps(np.array(times), np.array((0.0, 0.2, 0.5)[: len(times)]))
-    assert metrics(drive(line(lambda _: 0.2), left_mps=side)).max_rim_mps2 == (most and pytest.approx(most))
-
-
 def pose(t_ms: int, x_mm: int, work: int | None) -> Pose:
     return Pose(t=t_ms * 1_000_000, x=x_mm * 1000, y=0, z=0, heading=0, pitch=0, left=0, right=0, left_angle=0,
                 right_angle=0, collisions=0, work=work)  # fmt: skip
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(("last_ms", "most"), [(500, 0.4), (1000, 0.6)])
+def test_two_poses_at_the_last_time_of_a_run_are_one_sample_of_its_rims(last_ms: int, most: float) -> None:
+    rows = ((0, 0), (500, 200_000), (last_ms, 500_000 if last_ms > 500 else 200_000))
+    record = RunRecord(poses=[replace(pose(at, 0, None), left=left) for at, left in rows])
+    assert metrics(drive_of_record("a run", record)).max_rim_mps2 == pytest.approx(most)
 
 
 @pytest.mark.parametrize(("work", "energy"), [(None, None), (3_000_000, 3.0)])
