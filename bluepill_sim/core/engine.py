@@ -39,7 +39,7 @@ from bluepill_sim.core.blocks import (
     it_state_of,
 )
 from bluepill_sim.core.debugging.debug_unit import DebugUnit, Watchpoint
-from bluepill_sim.core.debugging.flash_patch import PAGE_BYTES, VIEWS_BASE, VIEWS_BYTES, FlashPatch, View
+from bluepill_sim.core.debugging.flash_patch import FlashPatch, View
 from bluepill_sim.core.halts import DEBUG_HALTS, Halt, HaltKind
 from bluepill_sim.core.recorder import BLOCK, BlockLog, BlockRecorder, KeptRows, LastRows
 from bluepill_sim.core.thumb import Kind
@@ -60,7 +60,7 @@ from bluepill_sim.core.unicorn_core import (
     WriteToReadOnly,
     io_callbacks,
 )
-from bluepill_sim.extension.layout import SHARED, structure
+from bluepill_sim.extension.layout import SHARED, VIEW_BYTES, VIEWS_BASE, VIEWS_BYTES, structure
 from bluepill_sim.extension.library import library
 from bluepill_sim.extension.windows import NO_TIME
 from simbase.state import Stateful
@@ -355,7 +355,7 @@ class Engine(Stateful):
         if access != FETCH_ACCESS:
             self._leave_it_block()
         for view in self._views:
-            if view.page == address & -PAGE_BYTES:
+            if view.page == address & -VIEW_BYTES:
                 place = {FETCH_ACCESS: (view.code, 4), READ_ACCESS: (view.data, 1)}
                 return place.get(access, (address, 2))
         if access == FETCH_ACCESS and (0x4000_0000 <= address < 0x6000_0000 or address >= 0xA000_0000):

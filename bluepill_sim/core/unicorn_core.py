@@ -27,6 +27,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import TypeVar, cast
 
+from bluepill_sim.extension.layout import NOWHERE
 from simbase.errors import MissingDependencyError
 from simbase.state import Stateful
 
@@ -115,8 +116,6 @@ _CONTROL_DROP_ALL_CODE = 10 | 1 << 30
 _CONTROL_DROP_PAGES = 11 | 1 << 30
 _CONTROL_TLB = 12 | 1 << 26 | 1 << 30
 _TLB_OF_HOOKS = 1
-#: No instruction stands at an odd address, so a run never ends there; the page is the scratch page, which executes.
-_NOWHERE = 0x9FFF_FFFF
 
 #: Size, mode, architecture, level, flag and two pointers come before the registers of a context (uc_priv.h).
 _CONTEXT_HEADER_BYTES = 24 + 2 * ctypes.sizeof(ctypes.c_void_p)
@@ -211,7 +210,7 @@ class UnicornCore(Stateful):
 
     def start(self, address: int) -> int:
         """Run from an address (bit 0: Thumb) until something stops it; return the library's error number."""
-        return self._library.start(self._handle, address, _NOWHERE, 0, 0)
+        return self._library.start(self._handle, address, NOWHERE, 0, 0)
 
     def stop(self) -> None:
         """End the run; only from a hook, never from an access to I/O, which would be run again."""

@@ -26,6 +26,12 @@ EXCEPTIONS = 76
 RECEIVED = 256
 #: Levels that the outside puts on pins later: more than a step of a robot brings.
 LATER_INPUTS = 1024
+#: No instruction stands at an odd address, so a run never ends there; the page is the scratch page, which executes.
+NOWHERE = 0x9FFF_FFFF
+#: A page of the library's TLB; where the copies of pages that the FPB remaps stand for the library: chosen, below the
+#: scratch page. The program finds nothing there.
+VIEW_BYTES, VIEWS_BASE = 0x400, 0x9FFF_8000
+VIEWS_BYTES = 16 * VIEW_BYTES
 
 
 @dataclass(frozen=True, slots=True)
@@ -527,6 +533,7 @@ def header() -> str:
         "#include <stdint.h>",
         "",
         *(f"#define {name} {value}" for name, value in _CONSTANTS.items()),
+        *(f"#define {name} {value:#x}u" for name, value in _ADDRESSES.items()),
     ]
     for struct in STRUCTS:
         lines += ["", f"/* {struct.doc} */", f"struct {struct.name} {{"]
@@ -545,4 +552,5 @@ def _size(struct: Struct) -> int:
 _CONSTANTS = {"PORTS": PORTS, "PINS": PINS, "SOURCES": SOURCES, "LAST_ROWS": LAST_ROWS, "RECEIVED": RECEIVED,
     "ANALOG_PINS": ANALOG_PINS, "LATER_INPUTS": LATER_INPUTS,
 }  # fmt: skip
+_ADDRESSES = {"NOWHERE": NOWHERE, "VIEW_BYTES": VIEW_BYTES, "VIEWS_BASE": VIEWS_BASE, "VIEWS_BYTES": VIEWS_BYTES}
 _C_KINDS = {"u8": "uint8_t", "u16": "uint16_t", "u32": "uint32_t", "u64": "uint64_t", "i32": "int32_t"}

@@ -20,11 +20,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from bluepill_sim.core.blocks import HostMemory
+from bluepill_sim.extension.layout import VIEW_BYTES, VIEWS_BASE, VIEWS_BYTES
 
-#: A page of the library's TLB.
-PAGE_BYTES = 0x400
-#: Where the copies stand for the library: chosen, below the scratch page. The program finds nothing there.
-VIEWS_BASE, VIEWS_BYTES = 0x9FFF_8000, 16 * PAGE_BYTES
 _COMPARATORS, _TABLE_ALIGNMENT = 8, 32
 _WORD_BYTES = 4
 
@@ -75,7 +72,7 @@ class FlashPatch:
         """Take note that bytes of memory have changed."""
         wanted = (*self._wanted.instructions, *self._wanted.literals)
         self.has_changed |= any(
-            word & -PAGE_BYTES < address + size and address < (word & -PAGE_BYTES) + PAGE_BYTES for word, _ in wanted
+            word & -VIEW_BYTES < address + size and address < (word & -VIEW_BYTES) + VIEW_BYTES for word, _ in wanted
         )
 
     def apply(self, memories: list[HostMemory]) -> tuple[View, ...]:
@@ -87,10 +84,10 @@ class FlashPatch:
         code = self._in_memory(wanted.instructions, memories)
         data = self._in_memory(wanted.literals, memories)
         self._words, self._loads = code, bool(data)
-        free = iter(range(0, VIEWS_BYTES, PAGE_BYTES))
+        free = iter(range(0, VIEWS_BYTES, VIEW_BYTES))
         return tuple(
             View(page, self._copy(page, code, memories, free), self._copy(page, data, memories, free))
-            for page in sorted({word & -PAGE_BYTES for word in (*code, *data)})
+            for page in sorted({word & -VIEW_BYTES for word in (*code, *data)})
         )
 
     def concerns(self, address: int, size: int) -> bool:
@@ -121,15 +118,15 @@ class FlashPatch:
 
     def _copy(self, page: int, words: dict[int, int], memories: list[HostMemory], free: Iterable[int]) -> int:
         """Return where a page is found that has these words: itself, where it has none."""
-        wanted = {word: number for word, number in words.items() if word & -PAGE_BYTES == page}
+        wanted = {word: number for word, number in words.items() if word & -VIEW_BYTES == page}
         if not wanted:
             return page
         at = next(iter(free))
-        host = _host(memories, page, PAGE_BYTES)
-        copy = bytearray(ctypes.string_at(host, PAGE_BYTES) if host is not None else bytes(PAGE_BYTES))
+        host = _host(memories, page, VIEW_BYTES)
+        copy = bytearray(ctypes.string_at(host, VIEW_BYTES) if host is not None else bytes(VIEW_BYTES))
         for word, number in wanted.items():
             copy[word - page : word - page + _WORD_BYTES] = self.table[_WORD_BYTES * number :][:_WORD_BYTES]
-        ctypes.memmove(ctypes.addressof(self.buffer) + at, bytes(copy), PAGE_BYTES)
+        ctypes.memmove(ctypes.addressof(self.buffer) + at, bytes(copy), VIEW_BYTES)
         return VIEWS_BASE + at
 
 

@@ -10,8 +10,6 @@
 #include "system.h"
 
 #define NEVER (UINT64_C(1) << 62)
-/* No instruction stands at an odd address, so a run never ends there; the page is that of `scratch`. */
-#define NOWHERE 0x9FFFFFFFu
 /* ITSTATE in the CPSR, and the exception number of interrupt line 0. */
 #define IT_BITS 0x0600FC00u
 enum { ENTRY_CYCLES = 12, EXIT_CYCLES = 12, TAIL_CHAIN_CYCLES = 6 };

@@ -6,11 +6,7 @@
  */
 #include "core.h"
 
-enum { MAY_READ = 1, MAY_WRITE = 2, MAY_EXECUTE = 4, READ = 16, FETCH = 18, VIEW_PAGE = 0x400 };
-
-/* Where the copies of core/debugging/flash_patch.py are; the program finds nothing there, as below it. */
-#define VIEWS_BASE 0x9FFF8000u
-#define VIEWS_BYTES 0x4000u
+enum { MAY_READ = 1, MAY_WRITE = 2, MAY_EXECUTE = 4, READ = 16, FETCH = 18 };
 
 /* `uc_tlb_entry` of unicorn.h. */
 struct tlb_entry {
@@ -60,7 +56,7 @@ bool core_on_tlb_fill(void *unicorn, uint64_t address, int access, struct tlb_en
     (void)unicorn;
     struct core *core = user;
     const uint32_t page = (uint32_t)address;
-    const struct view *view = view_of(core, page & ~(VIEW_PAGE - 1u));
+    const struct view *view = view_of(core, page & ~(VIEW_BYTES - 1));
     entry->address = page - VIEWS_BASE < VIEWS_BYTES ? page - VIEWS_BYTES : page;
     if (view != NULL) {
         if (access != FETCH) {

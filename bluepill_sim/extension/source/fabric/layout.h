@@ -11,6 +11,10 @@
 #define RECEIVED 256
 #define ANALOG_PINS 10
 #define LATER_INPUTS 1024
+#define NOWHERE 0x9fffffffu
+#define VIEW_BYTES 0x400u
+#define VIEWS_BASE 0x9fff8000u
+#define VIEWS_BYTES 0x4000u
 
 /* A block that began, an exception that was entered (its number) or left (-1). */
 struct record {
