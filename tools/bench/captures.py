@@ -19,6 +19,7 @@ from pathlib import Path
 
 from p2os.capture import Chunk, Direction, write_pcap, write_recording
 from p2os.capture.chunks import Capture
+from p2os.capture.formats.pcap_records import FILE_HEADER, MAGIC_NS, RECORD_HEADER
 from p2os.protocol.packets import SonarReading, StandardSip, packet_frame
 from p2os.protocol.profiles import Profile
 
@@ -65,7 +66,7 @@ def stream(count: int, rng: random.Random) -> list[bytes]:
 
 def segments(packets: list[bytes]) -> Iterator[bytes]:
     """Yield a capture file in which each packet is a TCP segment on Ethernet."""
-    yield struct.pack("<IHHiIII", 0xA1B23C4D, 2, 4, 0, 0, 65535, 1)
+    yield struct.pack("<" + FILE_HEADER, MAGIC_NS, 2, 4, 0, 0, 65535, 1)
     ends = b"\x7f\0\0\1" * 2 + struct.pack(">HH", 8101, 40000)
     sequence = 1
     for number, data in enumerate(packets):
@@ -73,7 +74,7 @@ def segments(packets: list[bytes]) -> Iterator[bytes]:
         head = struct.pack(">BBHHHBBH", 0x45, 0, 40 + len(data), 0, 0, 64, 6, 0)
         packet = bytes(12) + b"\x08\0" + head + ends + tcp + data
         seconds, nanoseconds = divmod(number * CYCLE_NS, 10**9)
-        yield struct.pack("<IIII", seconds, nanoseconds, len(packet), len(packet)) + packet
+        yield struct.pack("<" + RECORD_HEADER, seconds, nanoseconds, len(packet), len(packet)) + packet
         sequence += len(data)
 
 
