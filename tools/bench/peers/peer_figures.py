@@ -1,12 +1,13 @@
 """Drive robots of any maker through one script, and lay what they did side by side.
 
-    python -m p2os serve --robot p3dx --body kinematic --port tcp:127.0.0.1:8101
+    python -m p2os serve --robot p3dx --body kinematic --world WORLD --port tcp:127.0.0.1:8101
     AMRISim --nomap --no-gui --no-error -R p3dx -p 8123
     python -m tools.bench.peers.peer_figures tcp:127.0.0.1:8101 tcp:127.0.0.1:8123 --record drives
 
 The script sets accelerations, drives, turns, moves, stops, falls silent and drives with its motors off; it needs two
-metres of free space on each side. A figure has what the manual says beside it; `--record` leaves the conversations for
-`p2os compare` and `p2os decode`. Every robot is stopped in the end, whatever happens.
+metres of free space on each side: robot_bench/experiments/validation/scenarios/plain.toml is such a world. A figure
+has what the manual says beside it; `--record` leaves the conversations for `p2os compare` and `p2os decode`. Every
+robot is stopped in the end, whatever happens.
 
 Exit codes: 0 all robots were driven, 1 one could not be, 2 wrong usage.
 """

@@ -256,4 +256,5 @@ def test_outputs_agree_with_a_model_that_ticks(
 def test_inputs_agree_with_a_model_that_ticks(
     make_fake_chip: Callable[[], Any], name: str, start: list[tuple[Any, ...]], steps: list[tuple[Any, ...]]
 ) -> None:
-    play(Pair(make_fake_chip(), name, 0x74 if name == "TIM1" else 0x08), [*start, *steps])
+    # Not CH3: XORed with CH1 and CH2 (TI1S), an output there would be an input too, which the model does not know.
+    play(Pair(make_fake_chip(), name, 0x78 if name == "TIM1" else 0x08), [*start, *steps])
