@@ -44,9 +44,9 @@ NOT_COMPARED = ("PYTHONPATH",)
 IMPORTING = ("pytest",)
 #: What commands import at their work, beside the verbs and what those import.
 IMPORTED = (
-    "p2os.__main__", "typer._adapters", "typer._click.decorators", "p2os.pioneer.body.kinematic",
-    "robot_bench.scenarios", "robot_bench.report.measures", "robot_bench.report.plots", "unicorn", "elftools.elf.elffile",
-    "matplotlib.backends.backend_agg",
+    "p2os.__main__", "typer._adapters", "p2os.pioneer.body.kinematic", "robot_bench.scenarios",
+    "robot_bench.report.measures", "robot_bench.report.plots", "matplotlib.backends.backend_agg", "unicorn",
+    "elftools.elf.elffile",
 )  # fmt: skip
 
 
@@ -73,6 +73,11 @@ def forked_python() -> str:
         folder.cleanup()
 
     return str(program)
+
+
+def forked_p2os(*words: str) -> list[str]:
+    """Return the words that start `p2os` so, with what follows it."""
+    return [forked_python(), "-m", "p2os", *words]
 
 
 def spent_s() -> float:
@@ -139,8 +144,9 @@ class Server:
 
     def __init__(self, listener: socket.socket) -> None:
         self._listener = listener
-        self._lines: dict[int, socket.socket] = {}  # by process
+        self._lines: dict[int, socket.socket] = {}  # to clients, by their processes
         self._ended, self._wakes = socket.socketpair()
+        self._selector = selectors.DefaultSelector()
         for each in (self._listener, self._ended, self._wakes):
             each.setblocking(False)
 
@@ -148,65 +154,65 @@ class Server:
         """Serve until standard input ends, which is None; return in a forked process with what that has to do."""
         signal.set_wakeup_fd(self._wakes.fileno(), warn_on_full_buffer=False)
         signal.signal(signal.SIGCHLD, lambda *_: None)
-        with selectors.DefaultSelector() as selector:
-            for each in (self._listener, self._ended, sys.stdin.fileno()):
-                selector.register(each, selectors.EVENT_READ)
-            while True:
-                for key, _ in selector.select():
-                    if key.fileobj is self._listener:
-                        line, _ = self._listener.accept()
-                        command = self._take(line)
-                        if command is not None:
-                            return command
-                        if line.fileno() >= 0:
-                            selector.register(line, selectors.EVENT_READ)
-                    elif key.fileobj is self._ended:
-                        self._ended.recv(1000)
-                        self._tell_ended(selector)
-                    elif key.fileobj == sys.stdin.fileno():
-                        for process in self._lines:
-                            kill(process)
-                        return None
-                    else:
-                        selector.unregister(key.fileobj)
-                        for process, line in self._lines.items():
-                            if line is key.fileobj:  # the client has gone
-                                kill(process)
+        for each in (self._listener, self._ended, sys.stdin):
+            self._selector.register(each, selectors.EVENT_READ)
+        while True:
+            for key, _ in self._selector.select():
+                if key.fileobj is self._listener:
+                    command = self._fork()
+                    if command is not None:
+                        return command
+                elif key.fileobj is self._ended:
+                    self._tell_ended()
+                elif key.fileobj is sys.stdin:
+                    for process in self._lines:
+                        kill(process)
+                    return None
+                else:  # a client has gone
+                    self._selector.unregister(key.fileobj)
+                    kill(next(process for process, line in self._lines.items() if line is key.fileobj))
 
-    def _take(self, line: socket.socket) -> Command | None:
-        """Fork for a client; return in the forked process with what it has to do."""
+    def _fork(self) -> Command | None:
+        """Fork for the client that has come; return in the forked process with what it has to do."""
+        line, _ = self._listener.accept()
         line.setblocking(True)
         command = Command.received(line)
-        process = os.fork() if command.can_be_forked else 0
-        if command.can_be_forked and not process:
-            signal.set_wakeup_fd(-1)
-            signal.signal(signal.SIGCHLD, signal.SIG_DFL)
-            for each in (line, self._listener, self._ended, self._wakes, *self._lines.values()):
-                each.close()
-            return command
+        process = 0
+        if command.can_be_forked:
+            process = os.fork()
+            if not process:
+                self._forget(line)
+                return command
         for stream in command.streams:
             os.close(stream)
         line.sendall(process.to_bytes(LENGTH, "big"))
         if process:
             self._lines[process] = line
-        else:
+            self._selector.register(line, selectors.EVENT_READ)
+        else:  # it starts Python itself
             line.close()
         return None
 
-    def _tell_ended(self, selector: selectors.BaseSelector) -> None:
-        while True:
-            try:
-                process, status = os.waitpid(-1, os.WNOHANG)
-            except ChildProcessError:
-                return
-            if not process:
-                return
-            line = self._lines.pop(process)
-            with contextlib.suppress(KeyError):
-                selector.unregister(line)
-            with contextlib.suppress(OSError):
-                line.sendall(os.waitstatus_to_exitcode(status).to_bytes(LENGTH, "big", signed=True))
-            line.close()
+    def _forget(self, line: socket.socket) -> None:
+        """Leave what is the server's, in a forked process."""
+        signal.set_wakeup_fd(-1)
+        signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+        self._selector.close()
+        for each in (line, self._listener, self._ended, self._wakes, *self._lines.values()):
+            each.close()
+
+    def _tell_ended(self) -> None:
+        """Tell the clients of processes that have ended."""
+        self._ended.recv(1000)
+        with contextlib.suppress(ChildProcessError):
+            while (ended := os.waitpid(-1, os.WNOHANG)) != (0, 0):
+                process, status = ended
+                line = self._lines.pop(process)
+                with contextlib.suppress(KeyError):  # where it has gone
+                    self._selector.unregister(line)
+                with contextlib.suppress(OSError):
+                    line.sendall(os.waitstatus_to_exitcode(status).to_bytes(LENGTH, "big", signed=True))
+                line.close()
 
 
 def kill(process: int) -> None:
@@ -248,16 +254,18 @@ def end(words: Sequence[str]) -> NoReturn:
 
     To take those apart, one by one, is 0.08 s: all the memory that the server has made is written to.
     """
-    code, interrupted = 0, False
+    code, is_interrupted = 0, False
     try:
         run(words)
     except SystemExit as error:
-        code = error.code if isinstance(error.code, int) else int(error.code is not None)
-        if code and code is not error.code:
-            print(error.code, file=sys.stderr)
-    except BaseException as error:  # noqa: BLE001 - as Python tells it
+        if isinstance(error.code, int):
+            code = error.code
+        elif error.code is not None:
+            sys.stderr.write(f"{error.code}\n")
+            code = 1
+    except BaseException as error:  # noqa: BLE001 - Python tells any
         sys.excepthook(type(error), error, error.__traceback__)
-        code, interrupted = 1, isinstance(error, KeyboardInterrupt)
+        code, is_interrupted = 1, isinstance(error, KeyboardInterrupt)
     threading._shutdown()  # type: ignore[attr-defined]  # waits for threads
     atexit._run_exitfuncs()
     sys.modules["__main__"].__dict__.clear()
@@ -267,7 +275,7 @@ def end(words: Sequence[str]) -> NoReturn:
             stream.flush()
         except (OSError, ValueError):
             code = 120
-    if interrupted:
+    if is_interrupted:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
         os.kill(os.getpid(), signal.SIGINT)
     os._exit(code & 0xFF)
@@ -277,7 +285,7 @@ def stream_like(own: TextIO, descriptor: int) -> io.TextIOWrapper:
     """Return a standard stream with a descriptor, as Python makes it."""
     assert isinstance(own, io.TextIOWrapper)
     is_unbuffered = own.write_through
-    binary = open(descriptor, "wb" if descriptor else "rb", buffering=0 if is_unbuffered else -1, closefd=False)  # noqa: PTH123, SIM115
+    binary = open(descriptor, "wb" if descriptor else "rb", buffering=0 if is_unbuffered else -1, closefd=False)  # noqa: SIM115
     return io.TextIOWrapper(
         binary, encoding=own.encoding, errors=own.errors, newline="\n" if descriptor else None,
         line_buffering=descriptor == 2 or binary.isatty(), write_through=is_unbuffered,

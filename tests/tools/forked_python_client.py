@@ -33,6 +33,8 @@ def main(address: str, words: list[str]) -> int:
     line = _socket.socket(_socket.AF_UNIX, _socket.SOCK_STREAM)
     process = None
     try:
+        if line.fileno() < 3:  # noqa: PLR2004 - in place of a standard stream that is closed
+            raise OSError
         line.connect(address)
         message = marshal.dumps((words, posix.getcwdb(), posix.environ, ignored))
         streams = b"".join(stream.to_bytes(4, sys.byteorder) for stream in range(3))
@@ -40,7 +42,7 @@ def main(address: str, words: list[str]) -> int:
         line.sendmsg([head], [(_socket.SOL_SOCKET, _socket.SCM_RIGHTS, streams)])
         line.sendall(message)
         process = received(line)
-    except OSError:  # a standard stream is closed, or nobody serves any more
+    except OSError:  # or nobody serves any more
         pass
     if not process:
         posix.execv(sys.executable, [sys.executable, *words])
