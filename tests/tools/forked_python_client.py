@@ -27,23 +27,26 @@ def received(line: _socket.socket) -> int | None:
     return int.from_bytes(data, "big", signed=True)
 
 
+def handed_over(line: _socket.socket, address: str, words: list[str], ignored: list[int]) -> int | None:
+    """Have a process forked and return its number; 0 or None where it has to be started."""
+    if line.fileno() < 3:  # in place of a standard stream that is closed
+        return None
+    message = marshal.dumps((words, posix.getcwdb(), posix.environ, ignored))
+    streams = b"".join(stream.to_bytes(4, sys.byteorder) for stream in range(3))
+    try:
+        line.connect(address)
+        line.sendmsg([len(message).to_bytes(LENGTH, "big")], [(_socket.SOL_SOCKET, _socket.SCM_RIGHTS, streams)])
+        line.sendall(message)
+        return received(line)
+    except OSError:  # nobody serves any more
+        return None
+
+
 def main(address: str, words: list[str]) -> int:
-    """Have a process forked and return its exit code."""
+    """Have a process forked, or start it; return its exit code."""
     ignored = [number for number in NUMBERS if _signal.getsignal(number) == _signal.SIG_IGN]
     line = _socket.socket(_socket.AF_UNIX, _socket.SOCK_STREAM)
-    process = None
-    try:
-        if line.fileno() < 3:  # noqa: PLR2004 - in place of a standard stream that is closed
-            raise OSError
-        line.connect(address)
-        message = marshal.dumps((words, posix.getcwdb(), posix.environ, ignored))
-        streams = b"".join(stream.to_bytes(4, sys.byteorder) for stream in range(3))
-        head = len(message).to_bytes(LENGTH, "big")
-        line.sendmsg([head], [(_socket.SOL_SOCKET, _socket.SCM_RIGHTS, streams)])
-        line.sendall(message)
-        process = received(line)
-    except OSError:  # or nobody serves any more
-        pass
+    process = handed_over(line, address, words, ignored)
     if not process:
         posix.execv(sys.executable, [sys.executable, *words])
     for number in NUMBERS:
