@@ -20,7 +20,6 @@ import signal
 import socket
 import struct
 import subprocess
-import sys
 import tempfile
 import termios
 import threading
@@ -34,6 +33,7 @@ from typing import ClassVar, Self
 
 from p2os.pioneer.serve import served_pioneer
 from tests.documentation.page import ROOT, Block, Page
+from tests.tools.forked_python import forked_python
 
 LIMIT_S = 240.0
 READY_S = 60.0
@@ -182,7 +182,7 @@ class Session:
         bin_ = self._folder / ".venv" / "bin"
         (bin_ / "activate").touch()
         for name, script in SHIMS.items():
-            text = script.format(python=sys.executable, root=ROOT, make=shutil.which("make"))
+            text = script.format(python=forked_python(), root=ROOT, make=shutil.which("make"))
             (bin_ / name).write_text(f"#!/bin/sh\n{text}\n")
             (bin_ / name).chmod(0o755)
         return self
@@ -228,7 +228,7 @@ class Session:
         named = NAMED_FILE.match(block.text)
         if named is not None and "/" not in named["name"]:  # one in a folder is of the checkout
             self._keep(block)
-        self._finish([sys.executable, "-c", self._placed(block.text)], f"line {block.line}", [])
+        self._finish([forked_python(), "-c", self._placed(block.text)], f"line {block.line}", [])
 
     def _take_toml(self, block: Block) -> None:
         tomllib.loads(block.text)

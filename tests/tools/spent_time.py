@@ -11,11 +11,13 @@ from pathlib import Path
 
 import pytest
 
+from tests.tools import forked_python
+
 
 def spent_s() -> float:
-    """Return the processor time so far of this process and of those that it has waited for."""
+    """Return the processor time so far of this process, of those that it has waited for, and of forked_python's."""
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-    return sum(each.ru_utime + each.ru_stime for each in used)
+    return sum(each.ru_utime + each.ru_stime for each in used) + forked_python.spent_s()
 
 
 class TimeCounter:

@@ -175,6 +175,15 @@ class KinematicBody(BodyInWorld):
         """Where it stands."""
         return StandingPose(self._x, self._y, self._heading)
 
+    @property
+    def footprint(self) -> Footprint:
+        """The outline of its hull where it stands."""
+        if self._footprint is not None:  # robots that push each other ask little else
+            (x, y, heading, _), outline = self._footprint
+            if x == self._x and y == self._y and heading == self._heading:
+                return outline
+        return super().footprint
+
     def begin_at_start(self, pose: Pose) -> None:
         """Stand still at a pose in the world as it was made."""
         self.begin(pose)
@@ -402,7 +411,7 @@ class KinematicBody(BodyInWorld):
             return False
         for other in found:
             other.feel_push()
-        moves = self._pushed_robots(x, y, heading, (self,))
+        moves = self._pushed_robots(found, x, y, heading, (self,))
         if moves is None or sum(hold_n for _, _, _, hold_n in moves) >= self._push_n:
             return True
         for other, dx, dy, hold_n in moves:
@@ -417,27 +426,29 @@ class KinematicBody(BodyInWorld):
         reach, found = self.reach_m, []
         hull = None
         for other in self.near:
-            there = other.standing_pose
-            if math.hypot(there.x_m - x, there.y_m - y) <= reach + other.reach_m:
+            if math.hypot(other._x - x, other._y - y) <= reach + other.reach_m:
                 hull = hull or placed(self._hull, x, y, heading)
                 if other.footprint.overlaps(hull):
                     found.append(other)
         return found
 
     def _pushed_robots(
-        self, x: float, y: float, heading: float, pushing: "tuple[KinematicBody, ...]"
+        self, found: "list[KinematicBody]", x: float, y: float, heading: float, pushing: "tuple[KinematicBody, ...]"
     ) -> "list[tuple[KinematicBody, float, float, float]] | None":
         """Return how far each robot must be pushed out of the hull at a pose, and what holds it, N; None: no room.
 
         Args:
+            found: The robots that the hull overlaps there.
             x: Where the hull is to be.
             y: The same.
             heading: The same.
             pushing: This robot and those behind it, which cannot be pushed themselves.
         """
         moves: list[tuple[KinematicBody, float, float, float]] = []
+        if not found:
+            return moves
         hull = placed(self._hull, x, y, heading)
-        for other in self._overlapped(x, y, heading):
+        for other in found:
             if other in pushing:
                 return None
             dx, dy = other.footprint.way_out(hull)
@@ -460,7 +471,7 @@ class KinematicBody(BodyInWorld):
         x, y, way = self._x + dx, self._y + dy, math.hypot(dx, dy)
         if self._free_m <= way and self._plan.clearance(x, y, self._heading, no_more_than=LOOK_AHEAD_M) == 0.0:
             return None
-        return self._pushed_robots(x, y, self._heading, pushing)
+        return self._pushed_robots(self._overlapped(x, y, self._heading), x, y, self._heading, pushing)
 
     def hold_n(self, dx: float, dy: float) -> float:
         """Return the force that it takes to push this robot along a unit direction, N."""

@@ -143,9 +143,9 @@ class Footprint:
             if length == 0.0:
                 continue
             nx, ny = ax / length, ay / length
-            far = max(px * nx + py * ny for px, py in hull)
+            far = max([px * nx + py * ny for px, py in hull])
             if self.polygon:
-                near = min(px * nx + py * ny for px, py in self.polygon)
+                near = min([px * nx + py * ny for px, py in self.polygon])
             else:
                 near = self.x * nx + self.y * ny - self.radius
             if far - near < best:
@@ -189,7 +189,7 @@ def _rectangle(x: float, y: float, half_length: float, half_width: float) -> Pol
 def placed(polygon: Sequence[Point], x: float, y: float, heading: float) -> Polygon:
     """Return a polygon moved and turned."""
     c, s = math.cos(heading), math.sin(heading)
-    return tuple((x + px * c - py * s, y + px * s + py * c) for px, py in polygon)
+    return tuple([(x + px * c - py * s, y + px * s + py * c) for px, py in polygon])  # a generator takes twice as long
 
 
 def _ray_circle(px: float, py: float, dx: float, dy: float, radius: float) -> float:

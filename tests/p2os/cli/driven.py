@@ -14,6 +14,7 @@ from p2os.protocol.frames import Decoder, Frame
 from simbase.timing import Nanos
 from tests.p2os.client.served_robot import TIMEOUT_S, ServedRobot, until
 
+#: What a process is started with that is to be stopped, or whose own start matters; for others, `forked_p2os`.
 COMMAND = (sys.executable, "-m", "p2os")
 CLOSE, STOP, VEL = CommandNumber.CLOSE, CommandNumber.STOP, CommandNumber.VEL
 #: A bound on what is done at once: ten times what it takes, for a machine that does other things too.

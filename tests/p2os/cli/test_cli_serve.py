@@ -25,6 +25,7 @@ from p2os.pioneer.serve.control_line import Terminal
 from p2os.protocol.commands import Command
 from p2os.transport import HungUpError
 from simbase.errors import MissingDependencyError
+from tests.tools.forked_python import forked_p2os
 
 TIMEOUT_S = 30.0
 COMMAND = str(Path(sys.executable).parent / "p2os")
@@ -39,11 +40,12 @@ def _own_signals() -> Iterator[None]:
 
 
 class Serving:
-    """`p2os serve` as a process of its own."""
+    """`p2os serve` as a process of its own, forked or started as the script that users have."""
 
-    def __init__(self, *words: str, body: Sequence[str] = ("--body", "kinematic")) -> None:
+    def __init__(self, *words: str, body: Sequence[str] = ("--body", "kinematic"), is_forked: bool = True) -> None:
+        command = forked_p2os("serve") if is_forked else [COMMAND, "serve"]
         self.process = subprocess.Popen(
-            [COMMAND, "serve", *body, "--json", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+            [*command, *body, "--json", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
             text=True,
         )  # fmt: skip
         assert self.process.stdout is not None
@@ -76,7 +78,11 @@ def test_serve_says_where_it_is_serves_and_ends_cleanly(serving: Callable[..., S
     served = serving("--port", "tcp:127.0.0.1:0", "--world", "arena", "--seed", "7", "--firmware", "ARCOS")
     assert served.start["world"] == "arena"
     asked = subprocess.run(
-        [COMMAND, "info", served.start["url"], "--json"], capture_output=True, text=True, timeout=TIMEOUT_S, check=True
+        forked_p2os("info", served.start["url"], "--json"),
+        capture_output=True,
+        text=True,
+        timeout=TIMEOUT_S,
+        check=True,
     )
     assert json.loads(asked.stdout)["subclass"] == "p2dx"
     code, err = served.end(number)
@@ -92,7 +98,7 @@ def test_serve_on_a_terminal_removes_its_link(serving: Callable[..., Serving], t
     served = serving("--port", f"pty:{link}", "--all-sonar")
     assert link.is_symlink()
     asked = subprocess.run(
-        [COMMAND, "info", f"serial:{link}", "--json"], capture_output=True, text=True, timeout=TIMEOUT_S, check=True
+        forked_p2os("info", f"serial:{link}", "--json"), capture_output=True, text=True, timeout=TIMEOUT_S, check=True
     )
     assert len(json.loads(asked.stdout)["sip"]["sonar_m"]) == 8
     assert served.end()[0] == 130
@@ -100,7 +106,7 @@ def test_serve_on_a_terminal_removes_its_link(serving: Callable[..., Serving], t
 
 
 def test_serve_costs_next_to_nothing_while_it_waits(serving: Callable[..., Serving]) -> None:
-    served = serving("--port", "tcp:127.0.0.1:0")
+    served = serving("--port", "tcp:127.0.0.1:0", is_forked=False)
 
     def used_s() -> float:
         fields = Path(f"/proc/{served.process.pid}/stat").read_text().rpartition(")")[2].split()
@@ -165,7 +171,7 @@ def test_serve_puts_a_fleet_into_one_world(tmp_path: Path, serving: Callable[...
     served = serving("--fleet", str(tmp_path / "two.toml"), body=())
     assert served.start["at"] == [-1.0, 0.3, 0.0]
     scan = subprocess.run(
-        [COMMAND, "monitor", served.start["url"], "--for", "1s"], capture_output=True, text=True, timeout=TIMEOUT_S,
+        forked_p2os("monitor", served.start["url"], "--for", "1s"), capture_output=True, text=True, timeout=TIMEOUT_S,
         check=False,
     )  # fmt: skip
     assert scan.returncode == 0

@@ -24,7 +24,6 @@ from p2os.transport import HungUpError
 from simbase.timing import NS_PER_MS
 
 TIMEOUT_S = 30.0
-COMMAND = str(Path(sys.executable).parent / "p2os")
 Capture = pytest.CaptureFixture[str]
 
 # ports ----------------------------------------------------------------------------------

@@ -21,7 +21,8 @@ from p2os.cli.printing import MOST_CHARACTERS, QueuedStream, queue_output, resto
 from p2os.cli.robots.teleop import NEXT_HOLD_NS
 from simbase.errors import FileError
 from simbase.timing import NS_PER_S
-from tests.p2os.cli.driven import AT_ONCE_S, COMMAND, STOP, TIMEOUT_S, VEL, Driver, RecordingRobot, until
+from tests.p2os.cli.driven import AT_ONCE_S, STOP, TIMEOUT_S, VEL, Driver, RecordingRobot, until
+from tests.tools.forked_python import forked_p2os
 
 
 class Pipe:
@@ -166,9 +167,9 @@ def test_sniff_passes_on_what_nobody_wants_to_see(robot: RecordingRobot) -> None
     with contextlib.suppress(AttributeError, OSError):
         fcntl.fcntl(writer, fcntl.F_SETPIPE_SZ, 4096)
     fill(writer)
-    sniff = Driver([*COMMAND, "sniff", robot.url, "--listen", "tcp:127.0.0.1:0"], stdout=writer)
+    sniff = Driver(forked_p2os("sniff", robot.url, "--listen", "tcp:127.0.0.1:0"), stdout=writer)
     os.close(writer)
-    client = Driver([*COMMAND, "drive", sniff.listens_at(), "--vel", "100mm/s", "--for", "1min"])
+    client = Driver(forked_p2os("drive", sniff.listens_at(), "--vel", "100mm/s", "--for", "1min"))
     try:
         robot.wait_until_it_drives()
         sent = len([number for number in robot.numbers if number == VEL])
@@ -186,9 +187,9 @@ def test_sniff_passes_on_what_nobody_wants_to_see(robot: RecordingRobot) -> None
 
 
 def test_sniff_whose_reader_goes_sends_the_closing_frames(robot: RecordingRobot) -> None:
-    sniff = Driver([*COMMAND, "sniff", robot.url, "--listen", "tcp:127.0.0.1:0"])
+    sniff = Driver(forked_p2os("sniff", robot.url, "--listen", "tcp:127.0.0.1:0"))
     assert sniff.process.stdout is not None
-    client = Driver([*COMMAND, "drive", sniff.listens_at(), "--vel", "100mm/s", "--for", "1min"])
+    client = Driver(forked_p2os("drive", sniff.listens_at(), "--vel", "100mm/s", "--for", "1min"))
     try:
         robot.wait_until_it_drives()
         gone_at = time.monotonic()
@@ -204,7 +205,7 @@ def test_sniff_whose_reader_goes_sends_the_closing_frames(robot: RecordingRobot)
 def test_a_signal_while_the_last_words_wait_for_a_reader_ends_at_once(robot: RecordingRobot) -> None:
     reader, writer = os.pipe()
     fill(writer)
-    process = subprocess.Popen([*COMMAND, "info", robot.url], stdout=writer, stderr=writer)
+    process = subprocess.Popen(forked_p2os("info", robot.url), stdout=writer, stderr=writer)
     os.close(writer)
     try:
         began = time.monotonic()
@@ -224,7 +225,7 @@ def test_a_key_let_go_stops_the_robot_though_the_terminal_is_held(robot: Recordi
     keyboard, inside = pty.openpty()
     fill(inside)
     process = subprocess.Popen(
-        [*COMMAND, "teleop", robot.url], stdin=inside, stdout=inside, stderr=inside, start_new_session=True
+        forked_p2os("teleop", robot.url), stdin=inside, stdout=inside, stderr=inside, start_new_session=True
     )
     os.close(inside)
     try:

@@ -38,7 +38,8 @@ from p2os.protocol.commands import CommandNumber
 from p2os.transport import waiting
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S
-from tests.p2os.cli.driven import COMMAND, STOP, TIMEOUT_S, Driver, RecordingRobot, until
+from tests.p2os.cli.driven import STOP, TIMEOUT_S, Driver, RecordingRobot, until
+from tests.tools.forked_python import forked_p2os
 
 Run = Callable[..., int]
 Capture = pytest.CaptureFixture[str]
@@ -382,7 +383,7 @@ def test_a_speed_above_the_robots_own_is_said(served: object, run: Run, capsys: 
 
 def test_a_robot_on_its_way_shows_where_it_is_and_an_interruption_says_that_it_stopped() -> None:
     with contextlib.closing(RecordingRobot()) as robot:
-        driver = Driver((*COMMAND, "drive", robot.url, "--forward", "3m"), on_terminal=True)
+        driver = Driver(forked_p2os("drive", robot.url, "--forward", "3m"), on_terminal=True)
         robot.wait_until_it_drives()
         shown = seen_until(driver, "m/s")
         driver.process.send_signal(signal.SIGINT)

@@ -18,6 +18,7 @@ from p2os.cli.signals import ENDING_NS, FATAL, end_on_signals, end_on_suspension
 from p2os.protocol.commands import Command, CommandNumber
 from simbase.timing import NS_PER_S
 from tests.p2os.cli.driven import AT_ONCE_S, CLOSE, COMMAND, STOP, Driver, RecordingRobot, until
+from tests.tools.forked_python import forked_p2os, forked_python
 
 NUMBERS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1, signal.SIGTSTP]
 IDENTITY = bytes.fromhex("fafb18025669727475616c0050696f6e6565720070326478002a13")
@@ -37,6 +38,16 @@ class Pad:
 teleop.SdlPad = Pad
 main(["teleop", sys.argv[1], "--pad"])
 """
+
+
+#: Returns the words that start `p2os`.
+Start = Callable[..., list[str]]
+Begin = Callable[[str, Path, Start], list[Driver]]
+
+
+def started(*words: str) -> list[str]:
+    """Return those of a process that is itself stopped, or gets a burst of signals."""
+    return [*COMMAND, *words]
 
 
 @pytest.fixture
@@ -70,42 +81,42 @@ def recorded_drive(folder: Path) -> str:
     return str(path)
 
 
-def by_keys(url: str, _folder: Path) -> list[Driver]:
-    return [Driver([*COMMAND, "teleop", url], on_terminal=True)]
+def by_keys(url: str, _folder: Path, start: Start) -> list[Driver]:
+    return [Driver(start("teleop", url), on_terminal=True)]
 
 
-def by_pad(url: str, _folder: Path) -> list[Driver]:
-    return [Driver([sys.executable, "-c", PAD, url])]
+def by_pad(url: str, _folder: Path, _start: Start) -> list[Driver]:
+    return [Driver([forked_python(), "-c", PAD, url])]
 
 
-def by_drive(url: str, _folder: Path) -> list[Driver]:
-    return [Driver([*COMMAND, "drive", url, "--vel", "100mm/s", "--for", "1min"])]
+def by_drive(url: str, _folder: Path, start: Start) -> list[Driver]:
+    return [Driver(start("drive", url, "--vel", "100mm/s", "--for", "1min"))]
 
 
-def by_way(url: str, _folder: Path) -> list[Driver]:
-    return [Driver([*COMMAND, "drive", url, "--forward", "1m", "--vel", "50mm/s"])]
+def by_way(url: str, _folder: Path, start: Start) -> list[Driver]:
+    return [Driver(start("drive", url, "--forward", "1m", "--vel", "50mm/s"))]
 
 
-def by_replay(url: str, folder: Path) -> list[Driver]:
-    return [Driver([*COMMAND, "replay", recorded_drive(folder), url, "--as", "client"])]
+def by_replay(url: str, folder: Path, start: Start) -> list[Driver]:
+    return [Driver(start("replay", recorded_drive(folder), url, "--as", "client"))]
 
 
-def through_sniff(url: str, folder: Path) -> list[Driver]:
-    sniff = Driver([*COMMAND, "sniff", url, "--listen", "tcp:127.0.0.1:0", "--quiet"])
-    return [sniff, Driver([*COMMAND, "drive", sniff.listens_at(), "--vel", "100mm/s", "--for", "1min"])]
+def through_sniff(url: str, _folder: Path, start: Start) -> list[Driver]:
+    sniff = Driver(start("sniff", url, "--listen", "tcp:127.0.0.1:0", "--quiet"))
+    return [sniff, Driver(forked_p2os("drive", sniff.listens_at(), "--vel", "100mm/s", "--for", "1min"))]
 
 
 #: Each drives the robot; the first of its processes is the one that is interrupted.
-VERBS: list[Callable[[str, Path], list[Driver]]] = [by_drive, by_way, by_keys, by_pad, by_replay, through_sniff]
+VERBS: list[Begin] = [by_drive, by_way, by_keys, by_pad, by_replay, through_sniff]
 
 
 @pytest.mark.parametrize("number", NUMBERS)
 @pytest.mark.parametrize("begin", VERBS)
 def test_a_signal_stops_the_robot_first(
-    begin: Callable[[str, Path], list[Driver]], number: signal.Signals, robot: RecordingRobot, drivers: list[Driver],
+    begin: Begin, number: signal.Signals, robot: RecordingRobot, drivers: list[Driver],
     tmp_path: Path,
 ) -> None:  # fmt: skip
-    drivers += begin(robot.url, tmp_path)
+    drivers += begin(robot.url, tmp_path, forked_p2os)
     if begin is by_keys:
         until(lambda: CommandNumber.OPEN in robot.numbers, "a session")
         time.sleep(0.3)  # the terminal is made raw after the robot is connected
@@ -126,7 +137,7 @@ def test_a_signal_stops_the_robot_first(
 def test_a_command_that_was_sent_is_taken_back_by_a_signal(
     number: signal.Signals, robot: RecordingRobot, drivers: list[Driver]
 ) -> None:
-    drivers.append(Driver([*COMMAND, "send", robot.url, "VEL", "200", "--wait", "1min"]))
+    drivers.append(Driver(forked_p2os("send", robot.url, "VEL", "200", "--wait", "1min")))
     until(
         lambda: (CommandNumber.VEL, 200) in [(command.number, command.integer) for _, command in robot.received], "VEL"
     )
@@ -137,7 +148,7 @@ def test_a_command_that_was_sent_is_taken_back_by_a_signal(
 
 
 def test_many_signals_do_not_cut_the_stopping_short(robot: RecordingRobot, drivers: list[Driver]) -> None:
-    drivers.append(Driver([*COMMAND, "drive", robot.url, "--vel", "100mm/s", "--for", "1min"]))
+    drivers.append(Driver(started("drive", robot.url, "--vel", "100mm/s", "--for", "1min")))
     robot.wait_until_it_drives()
     for number in (signal.SIGTERM, signal.SIGHUP, signal.SIGINT, signal.SIGQUIT) * 5:
         drivers[0].process.send_signal(number)
@@ -149,10 +160,10 @@ def test_many_signals_do_not_cut_the_stopping_short(robot: RecordingRobot, drive
 
 @pytest.mark.parametrize(("begin", "code"), [(by_drive, 1), (by_replay, 1), (through_sniff, None)])
 def test_a_program_that_was_suspended_stops_the_robot_before_anything_else(
-    begin: Callable[[str, Path], list[Driver]], code: int | None, robot: RecordingRobot, drivers: list[Driver],
+    begin: Begin, code: int | None, robot: RecordingRobot, drivers: list[Driver],
     tmp_path: Path,
 ) -> None:  # fmt: skip
-    drivers += begin(robot.url, tmp_path)
+    drivers += begin(robot.url, tmp_path, started)
     robot.wait_until_it_drives()
     drivers[0].process.send_signal(signal.SIGSTOP)
     time.sleep(0.9)  # longer than a wait of 0.2 s and a gap of 0.35 s

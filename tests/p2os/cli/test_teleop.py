@@ -6,10 +6,8 @@ import re
 import select
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 
@@ -17,6 +15,7 @@ from p2os.cli.robots.teleop import FIRST_HOLD_NS, KEYS, NEXT_HOLD_NS, QUIT_KEYS,
 from p2os.client import DeadmanStopped, GapStopped, Link, LinkLost, Notice
 from simbase.timing import NS_PER_MS
 from tests.p2os.cli.driven import until
+from tests.tools.forked_python import forked_p2os
 
 TIMEOUT_S = 60.0
 
@@ -153,7 +152,7 @@ class Terminal:
 
     def __init__(self, url: str, vel: str = "200mm/s") -> None:
         self.keyboard, inside = pty.openpty()
-        command = [str(Path(sys.executable).parent / "p2os"), "teleop", url, "--vel", vel]
+        command = forked_p2os("teleop", url, "--vel", vel)
         self.process = subprocess.Popen(command, stdin=inside, stdout=inside, stderr=inside, start_new_session=True)
         os.close(inside)
         self.seen = self.drawn = ""

@@ -26,6 +26,7 @@ from p2os.transport import open_url
 from p2os.transport.ports import Transport
 from simbase.interrupts import held_back
 from tests.p2os.client.served_robot import CLOSING_COMMANDS, QUICK, Recorder, ServedRobot, until
+from tests.tools.forked_python import forked_python
 
 OURS = str(Path(p2os.__file__).parent)
 
@@ -286,7 +287,7 @@ asyncio.run(main())
 def test_a_signal_that_would_kill_a_program_stops_its_robot_first(
     served: ServedRobot, client: str, number: signal.Signals
 ) -> None:
-    program = subprocess.Popen([sys.executable, "-c", CLIENTS[client].format(url=served.url)], stdout=subprocess.PIPE)
+    program = subprocess.Popen([forked_python(), "-c", CLIENTS[client].format(url=served.url)], stdout=subprocess.PIPE)
     try:
         assert program.stdout is not None
         assert program.stdout.read(1)

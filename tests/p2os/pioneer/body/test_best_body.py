@@ -2,7 +2,6 @@
 
 import json
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -11,6 +10,7 @@ from p2os.pioneer.body.factory import BEST, body_note, make_body, resolve_body
 from p2os.pioneer.world import load_world
 from p2os.robots.parameters import load_parameters
 from simbase.errors import UsageError
+from tests.tools.forked_python import forked_python
 
 #: Runs the command line in a Python in which some packages are not installed.
 WITHOUT = """
@@ -40,7 +40,7 @@ LEFT = [
 def p2os(missing: list[str], words: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
     code = WITHOUT.format(missing=missing, words=words)
     return subprocess.run(
-        [sys.executable, "-c", code], cwd=folder, check=False, capture_output=True, text=True, timeout=60
+        [forked_python(), "-c", code], cwd=folder, check=False, capture_output=True, text=True, timeout=60
     )
 
 
@@ -70,7 +70,7 @@ def test_serve_demo_and_programs_take_the_same_body(missing: list[str], body: st
         "threading.Timer(3.0, os.kill, (os.getpid(), signal.SIGINT)).start()\n"
         "main(['serve', '--port', 'tcp:127.0.0.1:0', '--json'])\n"
     )
-    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60)
+    done = subprocess.run([forked_python(), "-c", code], check=False, capture_output=True, text=True, timeout=60)
     first, start = done.stdout.splitlines()
     assert (first, json.loads(start)["body"]) == (body, body)
     assert f"note: {note}" in done.stderr

@@ -1,0 +1,337 @@
+"""A Python that starts in a hundredth of a second: `forked_python()` is a program that takes what `python` takes.
+
+A process of `python -m p2os …` imports for 0.3 to 0.9 s of processor time before it does anything. Here a server, one
+to a worker of the tests, has imported the packages, and forks for each command: a client, itself the process that a
+test or a shell starts, hands over words, folder, environment and standard streams, passes signals on, and ends with
+the same exit code. What is asked for in another way than `-m MODULE`, `-c CODE` or `FILE`, or with settings of Python
+that the server was not started with, is started as ever.
+
+What this cannot show is the start itself, and what a program without some package does: tests of that start
+`sys.executable`; as do those that stop a process or look at it, for the client is another one.
+"""
+
+import atexit
+import contextlib
+import gc
+import importlib
+import importlib.util
+import io
+import marshal
+import os
+import selectors
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import entry_points
+from pathlib import Path
+from types import ModuleType
+from typing import NoReturn, TextIO
+
+ROOT = Path(__file__).resolve().parents[2]
+CLIENT = Path(__file__).with_name("forked_python_client.py")
+LENGTH = 4
+#: What Python reads when it starts, beside variables that begin with PYTHON.
+LOCALE = ("LANG", "LC_ALL", "LC_CTYPE")
+#: Each process has its own.
+NOT_COMPARED = ("PYTHONPATH",)
+#: Modules that act on what is imported after them.
+IMPORTING = ("pytest",)
+#: What commands import at their work, beside the verbs and what those import.
+IMPORTED = (
+    "p2os.__main__", "typer._adapters", "p2os.pioneer.body.kinematic", "robot_bench.scenarios",
+    "robot_bench.report.measures", "robot_bench.report.plots", "matplotlib.backends.backend_agg", "unicorn",
+    "elftools.elf.elffile",
+)  # fmt: skip
+
+
+@cache
+def forked_python() -> str:
+    """Return the path of the program; the server ends with this process."""
+    folder = tempfile.TemporaryDirectory(prefix="forked-")
+    address, program = f"{folder.name}/socket", Path(folder.name, "python")
+    program.write_text(f'#!/bin/sh\nexec "{sys.executable}" -I -S "{CLIENT}" "{address}" "$@"\n')
+    program.chmod(0o755)
+    listener = socket.socket(socket.AF_UNIX)
+    listener.bind(address)
+    listener.listen(100)  # who comes while the server still imports waits
+    server = subprocess.Popen(
+        [sys.executable, "-m", "tests.tools.forked_python", str(listener.fileno())], cwd=ROOT, env=_environment(),
+        stdin=subprocess.PIPE, pass_fds=[listener.fileno()], start_new_session=True,
+    )  # fmt: skip
+    listener.close()
+    _servers.append(server.pid)
+
+    @atexit.register
+    def end() -> None:
+        server.communicate()
+        folder.cleanup()
+
+    return str(program)
+
+
+def forked_p2os(*words: str) -> list[str]:
+    """Return the words that start `p2os` so, with what follows it."""
+    return [forked_python(), "-m", "p2os", *words]
+
+
+def spent_s() -> float:
+    """Return the processor time of this process's server and of what it has forked, in seconds."""
+    ticks = 0
+    for pid in _servers:
+        with contextlib.suppress(OSError):
+            fields = Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
+            ticks += sum(map(int, fields[11:15]))
+    return ticks / os.sysconf("SC_CLK_TCK")
+
+
+_servers: list[int] = []
+
+
+def _environment() -> dict[str, str]:
+    path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
+    return {**os.environ, "PYTHONPATH": path}
+
+
+# The server -------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """What a client wants to have run."""
+
+    words: list[str]
+    folder: bytes
+    environment: dict[str, str]
+    ignored: list[int]
+    streams: list[int]
+
+    @classmethod
+    def received(cls, line: socket.socket) -> "Command":
+        """Read one from a client that has just come."""
+        head, streams, _, _ = socket.recv_fds(line, LENGTH, 3)
+        message = b""
+        while len(message) < int.from_bytes(head, "big"):
+            message += line.recv(1 << 20)
+        words, folder, environment, ignored = marshal.loads(message)  # noqa: S302 - of our own client
+        decoded = {os.fsdecode(name): os.fsdecode(value) for name, value in environment.items()}
+        return cls(words, folder, decoded, ignored, list(streams))
+
+    @property
+    def can_be_forked(self) -> bool:
+        """Whether a fork of this process does what Python would."""
+        words = self.words
+        is_known = len(words) > 1 if words[:1] in (["-m"], ["-c"]) else bool(words) and words[0][:1] not in {"-", ""}
+        is_to_import = words[:1] == ["-m"] and words[1] in IMPORTING
+        return is_known and not is_to_import and settings(self.environment) == settings(os.environ)
+
+
+def settings(environment: Mapping[str, str]) -> dict[str, str]:
+    """Return what of an environment Python reads when it starts."""
+    return {
+        name: value for name, value in environment.items()
+        if (name.startswith("PYTHON") or name in LOCALE) and name not in NOT_COMPARED
+    }  # fmt: skip
+
+
+class Server:
+    """Forks a process for each client, and tells it how that has ended."""
+
+    def __init__(self, listener: socket.socket) -> None:
+        self._listener = listener
+        self._lines: dict[int, socket.socket] = {}  # to clients, by their processes
+        self._ended, self._wakes = socket.socketpair()
+        self._selector = selectors.DefaultSelector()
+        for each in (self._listener, self._ended, self._wakes):
+            each.setblocking(False)
+
+    def serve(self) -> Command | None:
+        """Serve until standard input ends, which is None; return in a forked process with what that has to do."""
+        signal.set_wakeup_fd(self._wakes.fileno(), warn_on_full_buffer=False)
+        signal.signal(signal.SIGCHLD, lambda *_: None)
+        for each in (self._listener, self._ended, sys.stdin):
+            self._selector.register(each, selectors.EVENT_READ)
+        while True:
+            for key, _ in self._selector.select():
+                if key.fileobj is self._listener:
+                    command = self._fork()
+                    if command is not None:
+                        return command
+                elif key.fileobj is self._ended:
+                    self._tell_ended()
+                elif key.fileobj is sys.stdin:
+                    for process in self._lines:
+                        kill(process)
+                    return None
+                else:  # a client has gone
+                    self._selector.unregister(key.fileobj)
+                    kill(next(process for process, line in self._lines.items() if line is key.fileobj))
+
+    def _fork(self) -> Command | None:
+        """Fork for the client that has come; return in the forked process with what it has to do."""
+        line, _ = self._listener.accept()
+        line.setblocking(True)
+        command = Command.received(line)
+        process = 0
+        if command.can_be_forked:
+            process = os.fork()
+            if not process:
+                self._forget(line)
+                return command
+        for stream in command.streams:
+            os.close(stream)
+        line.sendall(process.to_bytes(LENGTH, "big"))
+        if process:
+            self._lines[process] = line
+            self._selector.register(line, selectors.EVENT_READ)
+        else:  # it starts Python itself
+            line.close()
+        return None
+
+    def _forget(self, line: socket.socket) -> None:
+        """Leave what is the server's, in a forked process."""
+        signal.set_wakeup_fd(-1)
+        signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+        self._selector.close()
+        for each in (line, self._listener, self._ended, self._wakes, *self._lines.values()):
+            each.close()
+
+    def _tell_ended(self) -> None:
+        """Tell the clients of processes that have ended."""
+        self._ended.recv(1000)
+        with contextlib.suppress(ChildProcessError):
+            while (ended := os.waitpid(-1, os.WNOHANG)) != (0, 0):
+                process, status = ended
+                line = self._lines.pop(process)
+                with contextlib.suppress(KeyError):  # where it has gone
+                    self._selector.unregister(line)
+                with contextlib.suppress(OSError):
+                    line.sendall(os.waitstatus_to_exitcode(status).to_bytes(LENGTH, "big", signed=True))
+                line.close()
+
+
+def kill(process: int) -> None:
+    """Kill a forked process with all that it has started in its session."""
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process, signal.SIGKILL)
+
+
+# A forked process -------------------------------------------------------------------------
+
+
+def become(command: Command, path: list[str]) -> NoReturn:
+    """Do what a command wants, as `python` itself would.
+
+    Args:
+        command: Of a client.
+        path: Where modules lie beside what the command's PYTHONPATH and first word say.
+    """
+    os.setsid()
+    for place, stream in enumerate(command.streams):
+        os.dup2(stream, place)
+        os.close(stream)
+    os.chdir(command.folder)
+    os.environ.clear()
+    os.environ.update(command.environment)
+    for number in command.ignored:
+        signal.signal(number, signal.SIG_IGN)
+    for place, name in enumerate(("stdin", "stdout", "stderr")):
+        made = stream_like(getattr(sys, name), place)
+        setattr(sys, name, made)
+        setattr(sys, f"__{name}__", made)
+    given = [each for each in command.environment.get("PYTHONPATH", "").split(os.pathsep) if each]
+    sys.path[:] = ["", *given, *path]
+    end(command.words)
+
+
+def end(words: Sequence[str]) -> NoReturn:
+    """Run a program and end the process as Python does, but for the modules of the packages.
+
+    To take those apart, one by one, is 0.08 s: all the memory that the server has made is written to.
+    """
+    code, is_interrupted = 0, False
+    try:
+        run(words)
+    except SystemExit as error:
+        if isinstance(error.code, int):
+            code = error.code
+        elif error.code is not None:
+            sys.stderr.write(f"{error.code}\n")
+            code = 1
+    except BaseException as error:  # noqa: BLE001 - Python tells any
+        sys.excepthook(type(error), error, error.__traceback__)
+        code, is_interrupted = 1, isinstance(error, KeyboardInterrupt)
+    threading._shutdown()  # type: ignore[attr-defined]  # waits for threads
+    atexit._run_exitfuncs()
+    sys.modules["__main__"].__dict__.clear()
+    gc.collect()
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except (OSError, ValueError):
+            code = 120
+    if is_interrupted:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+        os.kill(os.getpid(), signal.SIGINT)
+    os._exit(code & 0xFF)
+
+
+def stream_like(own: TextIO, descriptor: int) -> io.TextIOWrapper:
+    """Return a standard stream with a descriptor, as Python makes it."""
+    assert isinstance(own, io.TextIOWrapper)
+    is_unbuffered = own.write_through
+    binary = open(descriptor, "wb" if descriptor else "rb", buffering=0 if is_unbuffered else -1, closefd=False)  # noqa: SIM115
+    return io.TextIOWrapper(
+        binary, encoding=own.encoding, errors=own.errors, newline="\n" if descriptor else None,
+        line_buffering=descriptor == 2 or binary.isatty(), write_through=is_unbuffered,
+    )  # fmt: skip
+
+
+def run(words: Sequence[str]) -> None:
+    """Run `-m MODULE`, `-c CODE` or `FILE` as the main module."""
+    main = sys.modules["__main__"] = ModuleType("__main__")
+    main.__dict__["__builtins__"] = __builtins__
+    first = words[0]
+    if first == "-c":
+        sys.argv = ["-c", *words[2:]]
+        code = compile(words[1], "<string>", "exec")
+    elif first == "-m":
+        sys.path[0] = str(Path.cwd())
+        spec = importlib.util.find_spec(words[1])
+        if spec is not None and spec.submodule_search_locations is not None:
+            spec = importlib.util.find_spec(f"{words[1]}.__main__")
+        if spec is None or spec.origin is None:
+            sys.exit(f"{sys.executable}: No module named {words[1]}")
+        main.__spec__, main.__file__, main.__loader__, main.__package__ = spec, spec.origin, spec.loader, spec.parent
+        sys.argv = [spec.origin, *words[2:]]
+        code = spec.loader.get_code(spec.name)  # type: ignore[union-attr]  # a module that runs has a loader with code
+    else:
+        sys.path[0] = str(Path(first).resolve().parent)
+        sys.argv = list(words)
+        main.__file__ = first
+        code = compile(Path(first).read_bytes(), first, "exec")
+    exec(code, main.__dict__)  # noqa: S102
+
+
+def import_all() -> None:
+    """Import what commands do."""
+    for name in (*IMPORTED, *(entry.module for entry in entry_points(group="p2os.verbs"))):
+        with contextlib.suppress(ImportError):
+            importlib.import_module(name)
+
+
+if __name__ == "__main__":
+    with socket.socket(fileno=int(sys.argv[1])) as listening:
+        base = sys.path[1 + len(os.environ["PYTHONPATH"].split(os.pathsep)) :]
+        gc.disable()
+        import_all()
+        gc.freeze()
+        gc.enable()
+        wanted = Server(listening).serve()
+    if wanted is not None:
+        become(wanted, base)

@@ -1,0 +1,65 @@
+"""The program that stands for Python where tests/tools/forked_python.py serves it: `client.py SOCKET WORDS…`.
+
+It hands its words, folder, environment and standard streams over, passes signals on, and ends as the forked process
+does. It is started with -I and -S and imports nothing that is not built in: 10 ms of processor time.
+"""
+
+import _signal
+import _socket
+import marshal
+import posix
+import sys
+
+#: Passed on. SIGKILL cannot be: a client that is gone has its process killed.
+PASSED_ON = ("SIGHUP", "SIGINT", "SIGQUIT", "SIGUSR1", "SIGUSR2", "SIGTERM", "SIGTSTP", "SIGCONT", "SIGALRM")
+NUMBERS = [getattr(_signal, name) for name in PASSED_ON]
+LENGTH = 4
+
+
+def received(line: _socket.socket) -> int | None:
+    """Return the next number that the server sends, None where it has none to send."""
+    data = b""
+    while len(data) < LENGTH:
+        more = line.recv(LENGTH - len(data))
+        if not more:
+            return None
+        data += more
+    return int.from_bytes(data, "big", signed=True)
+
+
+def handed_over(line: _socket.socket, address: str, words: list[str], ignored: list[int]) -> int | None:
+    """Have a process forked and return its number; 0 or None where it has to be started."""
+    if line.fileno() < 3:  # in place of a standard stream that is closed
+        return None
+    message = marshal.dumps((words, posix.getcwdb(), posix.environ, ignored))
+    streams = b"".join(stream.to_bytes(4, sys.byteorder) for stream in range(3))
+    try:
+        line.connect(address)
+        line.sendmsg([len(message).to_bytes(LENGTH, "big")], [(_socket.SOL_SOCKET, _socket.SCM_RIGHTS, streams)])
+        line.sendall(message)
+        return received(line)
+    except OSError:  # nobody serves any more
+        return None
+
+
+def main(address: str, words: list[str]) -> int:
+    """Have a process forked, or start it; return its exit code."""
+    ignored = [number for number in NUMBERS if _signal.getsignal(number) == _signal.SIG_IGN]
+    line = _socket.socket(_socket.AF_UNIX, _socket.SOCK_STREAM)
+    process = handed_over(line, address, words, ignored)
+    if not process:
+        posix.execv(sys.executable, [sys.executable, *words])
+    for number in NUMBERS:
+        if number not in ignored:
+            _signal.signal(number, lambda number, _frame: posix.kill(process, number))
+    code = received(line)
+    if code is None:
+        return 70
+    if code < 0:
+        if -code in NUMBERS:
+            _signal.signal(-code, _signal.SIG_DFL)
+        posix.kill(posix.getpid(), -code)
+    return code
+
+
+posix._exit(main(sys.argv[1], sys.argv[2:]))
