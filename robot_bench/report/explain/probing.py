@@ -70,7 +70,7 @@ class Prober:
         self.replay = replay
         self.sensors = replay.role(WireRole.DISTANCE)
         self._plain: dict[tuple[Nanos, Nanos], Seen] = {}
-        #: At a time, for a span: the chip with no sensor's pin high, what it goes on to do, and what one sensor changes.
+        #: At a time, for a span: the chip with no sensor's pin high, and what it does; what one sensor alone changes.
         self._quiet: dict[tuple[Nanos, Nanos], tuple[Branch, Seen]] = {}
         self._answers: dict[tuple[Nanos, Nanos, str], Answer] = {}
 
