@@ -277,35 +277,29 @@ class ChipReplay:
             if not seen.has_more_rows:
                 calls = self._calls(seen.rows)
                 break
-        hits = self._accesses(at - 20_000, at + 2, port, WatchKind.WRITE)
+        hits = self._watch(at - 20_000, at + 2, _of_port(port, WatchKind.WRITE))
         if not hits:
             return None
         place = self.line(hits[-1][1])
         return Place(place.line, place.function, tuple(call for call in calls if not call.startswith(place.line)))
 
-    def reads(self, since: Nanos, until: Nanos, ports: Sequence[str] = "ABC") -> dict[str, list[Nanos]]:
+    def reads(self, since: Nanos, until: Nanos) -> dict[str, list[Nanos]]:
         """Return by which source lines a program reads the levels of ports in a time, and when."""
         found: dict[str, list[Nanos]] = {}
-        for port in ports:
-            for at, pc in self._accesses(since, until, port, WatchKind.READ, first=8, size=4):
-                found.setdefault(str(self.line(pc)), []).append(at)
+        points = [_of_port(port, WatchKind.READ, first=8, size=4) for port in "ABC"]
+        for at, pc in self._watch(since, until, *points):
+            found.setdefault(str(self.line(pc)), []).append(at)
         return found
 
     def feeds(self, since: Nanos, until: Nanos) -> list[tuple[Nanos, Place]]:
         """Return when, and where, a program writes the key register of the independent watchdog."""
         return [(at, self.line(pc)) for at, pc in self._watch(since, until, Watchpoint(_IWDG_KR, 4, WatchKind.WRITE))]
 
-    def _accesses(
-        self, since: Nanos, until: Nanos, port: str, kind: WatchKind, *, first: int = 0, size: int = _GPIO_BYTES
-    ) -> list[tuple[Nanos, int]]:
-        """Return when, and by which instruction, a program accesses a port."""
-        base = _GPIO + _GPIO_STRIDE * (ord(port) - ord("A"))
-        return self._watch(since, until, Watchpoint(base + first, size, kind))
-
-    def _watch(self, since: Nanos, until: Nanos, point: Watchpoint) -> list[tuple[Nanos, int]]:
+    def _watch(self, since: Nanos, until: Nanos, *points: Watchpoint) -> list[tuple[Nanos, int]]:
+        """Return when, and by which instruction, a program makes an access that is watched for."""
         self._seek(max(0, since))
         engine, found = self.board.chip.engine, list[tuple[Nanos, int]]()
-        engine.watchpoints.add(point)
+        engine.watchpoints.update(points)
         try:
             limit = self.board.now_ns
             while self.board.now_ns < until:
@@ -316,7 +310,7 @@ class ChipReplay:
                 if reached.halt is not None:
                     found.append((reached.now, reached.halt.pc - 2))
         finally:
-            engine.watchpoints.discard(point)
+            engine.watchpoints.difference_update(points)
         return found
 
     def _calls(self, rows: Sequence[BlockRow]) -> list[str]:
@@ -474,6 +468,11 @@ def changes(level: bool, rows: Sequence[tuple[Nanos, bool]]) -> list[Nanos]:
             found.append(at)
         level = after
     return found
+
+
+def _of_port(port: str, kind: WatchKind, *, first: int = 0, size: int = _GPIO_BYTES) -> Watchpoint:
+    """Return what stops at an access to registers of a port ("A")."""
+    return Watchpoint(_GPIO + _GPIO_STRIDE * (ord(port) - ord("A")) + first, size, kind)
 
 
 def _number(pin: str) -> int:
