@@ -9,7 +9,7 @@ Invariant: a voltage depends on what is driven now and on the faults, on nothing
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import Enum
+from enum import Enum, StrEnum
 
 from adapter_sim.pinout import Pinout, Pull, Wire, WireRole
 
@@ -46,7 +46,7 @@ BLUEPILL_INPUT = InputLimits(1.164, 1.833)
 ESP32_INPUT = InputLimits(0.825, 2.475)
 
 
-class Side(str, Enum):
+class Side(StrEnum):
     """Where on a wire: the BluePill's pad, or the ESP32's (for rst the base of Q1)."""
 
     BLUEPILL = "bluepill"
