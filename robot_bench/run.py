@@ -182,7 +182,7 @@ def run_at_port(
 
 
 def write_run(bench: Bench, folder: Path, failure: str = "", *, explained: str = "") -> Path:
-    """Write what a bench with its trace in memory has recorded so far as a run folder; return its report's path.
+    """Write what a bench with its trace in memory has recorded so far as a run folder, with plots; return its report.
 
     Args:
         bench: It has run as far as it will.
@@ -206,7 +206,7 @@ def write_run(bench: Bench, folder: Path, failure: str = "", *, explained: str =
         trace.meta(meta)
         trace.copy(bench.recorder.lines())
         trace.end(end)
-        return make_artefacts(folder).report
+        return make_artefacts(folder, plots=True).report
 
 
 def meta_of(scenario: Scenario, world: World | None, note: str | None, *, is_at_port: bool) -> Json:

@@ -87,11 +87,13 @@ def groups() -> Iterator[Group]:
 def make_demo() -> None:
     """Run the demonstration and keep its path."""
     from p2os.cli.main import run
+    from robot_bench.report import make_report
 
     with tempfile.TemporaryDirectory() as folder, Path(os.devnull).open("w") as null, contextlib.redirect_stdout(null):
         target = Path(folder) / "demo"
         if run(["run", "dodge", "--out", str(target)]):
             raise SystemExit("make_pictures: the demonstration failed")
+        make_report(target)
         (PICTURES / "demo.png").write_bytes((target / "path.png").read_bytes())
 
 

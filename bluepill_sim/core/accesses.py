@@ -10,9 +10,12 @@ words after it, with the registers as they are before the instruction.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 _SP, _PC = 13, 15
 _FIRST_WIDE = 0xE800
+#: chosen: as many as block_cost.py knows.
+_BLOCKS = 4096
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +43,8 @@ _INDEXED = (
 )  # fmt: skip
 
 
-def accesses_of(code: bytes, start: int) -> list[Access]:
+@lru_cache(maxsize=_BLOCKS)
+def accesses_of(code: bytes, start: int) -> tuple[Access, ...]:
     """Return the accesses of a straight run of code that stands at `start`, in order."""
     found = []
     at = 0
@@ -54,7 +58,7 @@ def accesses_of(code: bytes, start: int) -> list[Access]:
             at += 4
         if access is not None and access.base not in (_SP, _PC):
             found.append(access)
-    return found
+    return tuple(found)
 
 
 def _narrow(word: int, address: int) -> Access | None:
@@ -140,6 +144,7 @@ def may_end_in_it(code: bytes) -> bool:
     return False
 
 
+@lru_cache(maxsize=_BLOCKS)
 def is_ambiguous(code: bytes, start: int) -> bool:
     """Tell whether two accesses look alike although the first one's base may change in between.
 

@@ -65,7 +65,10 @@ def report(
         count = write_named_events(named_events(folder), events, None if names else read_meta(folder))
         typer.echo(f"{events}: {count} events")
         return
-    made = make_artefacts_of_all(folder, names, scenario_of(folder)) if names else make_artefacts(folder)
+    if names:
+        made = make_artefacts_of_all(folder, names, scenario_of(folder), plots=True)
+    else:
+        made = make_artefacts(folder, plots=True)
     if json_output:
         typer.echo(json.dumps(made.outcome, sort_keys=True))
         return

@@ -6,7 +6,7 @@ pins.vcd       all wires, exact to the nanosecond
 pins.sr        all wires, sampled, for PulseView
 wire.jsonl     P2OS bytes, one message a line
 usart.txt      what the firmware printed
-report.html    the report, and PNG plots beside it
+report.html    the report; where they are wanted PNG plots beside it
 
 What `--coverage` and `--profile` leave is not made from the trace, but by `robot_bench.recording.measurement`
 while the run is there; the trace keeps their summary.
@@ -33,25 +33,27 @@ class ReportFiles:
     """Where the parts of a report were written."""
 
     page: Path
-    #: Empty where Matplotlib is not installed.
+    #: Empty where they were not wanted, or Matplotlib is not installed.
     plots: tuple[Path, ...]
 
 
 def make_report(folder: Path) -> ReportFiles:
-    """Make the report of a run from its trace; what is there already is written anew.
+    """Make the report of a run, with its plots, from its trace; what is there already is written anew.
 
     Without Matplotlib (the extra `sim`) the page is written and the plots are left out.
 
     Raises:
         TraceError: The folder holds no readable trace.
     """
-    return _report_of(read_run(folder), folder)
+    return _report_of(read_run(folder), folder, plots=True)
 
 
-def _report_of(record: RunRecord, folder: Path) -> ReportFiles:
+def _report_of(record: RunRecord, folder: Path, *, plots: bool) -> ReportFiles:
     page = folder / REPORT_NAME
     drawn = page_data(record)
     page.write_text(render_page(record, drawn), encoding="utf-8")
+    if not plots:
+        return ReportFiles(page=page, plots=())
     try:
         from robot_bench.report.plots import write_plots
     except ModuleNotFoundError:
@@ -67,37 +69,41 @@ class Artefacts:
     report: Path
 
 
-def make_artefacts(folder: Path) -> Artefacts:
+def make_artefacts(folder: Path, *, plots: bool = False) -> Artefacts:
     """Write all that can be made from a run folder's trace, anew where it is there already.
+
+    Args:
+        folder: The run's.
+        plots: The report's PNG plots, too, which take longer than all the rest.
 
     Raises:
         TraceError: The folder holds no readable trace.
         FileError: The disk is full, or the folder cannot be written.
     """
-    return _artefacts_of(read_run(folder), folder)
+    return _artefacts_of(read_run(folder), folder, plots=plots)
 
 
-def _artefacts_of(record: RunRecord, folder: Path) -> Artefacts:
+def _artefacts_of(record: RunRecord, folder: Path, *, plots: bool) -> Artefacts:
     try:
         outcome = write_outcome(record, folder)
         write_vcd(record, folder / "pins.vcd")
         write_sigrok(record, folder / "pins.sr")
         write_wire(record, folder / "wire.jsonl")
         (folder / "usart.txt").write_bytes(b"".join(data for _, data in record.usart))
-        report = _report_of(record, folder)
+        report = _report_of(record, folder, plots=plots)
     except OSError as error:
         raise FileError(f"cannot write into {folder}: {error.strerror or error}") from error
     return Artefacts(outcome=outcome, report=report.page)
 
 
-def make_artefacts_of_all(folder: Path, names: Sequence[str], scenario: str) -> Artefacts:
+def make_artefacts_of_all(folder: Path, names: Sequence[str], scenario: str, *, plots: bool = False) -> Artefacts:
     """Write all that can be made from the traces of several robots: each one's, and the outcome and page of all.
 
     Raises:
         TraceError, FileError: As of `make_artefacts`.
     """
     records = {name: read_run(folder / name) for name in names}
-    made = {name: _artefacts_of(record, folder / name) for name, record in records.items()}
+    made = {name: _artefacts_of(record, folder / name, plots=plots) for name, record in records.items()}
     outcome = outcome_of_all(scenario, {name: one.outcome for name, one in made.items()})
     write_report_of_all(outcome, records, folder)
     return Artefacts(outcome=outcome, report=folder / REPORT_NAME)

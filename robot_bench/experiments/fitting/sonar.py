@@ -64,14 +64,14 @@ def nearest(walls: Floats, x: Floats, y: Floats, headings: Floats, longest_m: fl
     """
     found = np.full(headings.shape, longest_m)
     c, s = np.cos(headings), np.sin(headings)
-    for ax, ay, bx, by in walls:
-        ex, ey = bx - ax, by - ay
-        fx, fy = (ax - x)[:, None], (ay - y)[:, None]
-        across = c * ey - s * ex
-        with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for ax, ay, bx, by in walls:
+            ex, ey = bx - ax, by - ay
+            fx, fy = (ax - x)[:, None], (ay - y)[:, None]
+            across = c * ey - s * ex
             along, place = (fx * ey - fy * ex) / across, (fx * s - fy * c) / across
-        hit = (np.abs(across) > 1e-12) & (along > 0) & (place >= 0) & (place <= 1)
-        np.minimum(found, np.where(hit, along, longest_m), out=found)
+            hit = (np.abs(across) > 1e-12) & (along > 0) & (place >= 0) & (place <= 1)
+            np.minimum(found, along, out=found, where=hit)
     return np.asarray(found.min(axis=1), dtype=np.float64)
 
 

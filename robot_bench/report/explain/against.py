@@ -30,7 +30,7 @@ def compare(prober: Prober, reference: Path, until: Nanos) -> list[Step]:
     for at in [*sorted({t for seen in (ours, theirs) for t, net, _ in seen.edges if net.startswith("motor")}), until]:
         if since is not None and at - since > _LASTS_NS:
             return [_told(prober, replay, reference, since)]
-        same = prober.codes_with(ours, 0, at) == prober.codes_with(theirs, 0, at)
+        same = prober.codes_with(ours, at) == prober.codes_with(theirs, at)
         since = None if same else at if since is None else since
     return [
         Step(
@@ -44,7 +44,7 @@ def compare(prober: Prober, reference: Path, until: Nanos) -> list[Step]:
 
 def _told(prober: Prober, replay: ChipReplay, reference: Path, since: Nanos) -> Step:
     at = since + _LASTS_NS
-    codes = [prober.codes_with(one.run(0, at), 0, at) for one in (prober.replay, replay)]
+    codes = [prober.codes_with(one.run(0, at), at) for one in (prober.replay, replay)]
     high = [net for net in prober.sensors if prober.replay.level(net, since)]
     seen = f"with {', '.join(high)} high" if high else "with no sensor's pin high"
     ours, theirs = (f"{left:+d}, {right:+d}" for left, right in codes)

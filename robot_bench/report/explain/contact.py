@@ -223,7 +223,7 @@ class ContactInquest:
         if prober is None:
             return None
         at = self._asked[len(self._asked) // 2][prober.sensors[0]].at
-        answers = prober.answers(at, BEFORE_NS)
+        answers = prober.answers(at, BEFORE_NS, list(self.on))
         return min((one for net in self.on if (one := answers[net].answered) is not None), default=None)
 
     def _is_away(self) -> Finding | None:

@@ -142,7 +142,7 @@ def _ignored(prober: Prober | None, at: Nanos) -> str:
         return ""
     quiet = [
         net for net, t in since.items()
-        if prober.effect([Hold(wire=net, level=False, since=t, until=at)], at, t).noticed is None
+        if prober.noticed([Hold(wire=net, level=False, since=t, until=at)], at, t) is None
     ]  # fmt: skip
     if not quiet or len(quiet) == len(prober.sensors):
         return ""
@@ -217,7 +217,7 @@ def _odd(prober: Prober | None) -> list[str]:
     moments = prober.moments(replay.end, 3)
     if moments and all(prober.takes_notice(at) for at in moments):
         inputs = [*prober.sensors, *replay.role(WireRole.ENCODER)]
-        unseen = [net for net in inputs if all(prober.flipped([net], at).noticed is None for at in moments)]
+        unseen = [net for net in inputs if all(prober.flip_noticed([net], at) is None for at in moments)]
         if unseen:
             found.append(f"nothing in the program depended on {numbers([replay.pin(net) for net in unseen])} at "
                          f"{len(moments)} times that were tried")  # fmt: skip

@@ -16,7 +16,7 @@ from itertools import zip_longest
 from adapter_sim.pinout import WireRole
 from bluepill_sim.core import BLOCK
 from robot_bench.recording.signals import motor_steps
-from robot_bench.report.explain.replay import ChipReplay, Hold, Place, Seen
+from robot_bench.report.explain.replay import Branch, ChipReplay, Hold, Place, Seen
 from robot_bench.wires.edges import Edges
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
@@ -70,6 +70,9 @@ class Prober:
         self.replay = replay
         self.sensors = replay.role(WireRole.DISTANCE)
         self._plain: dict[tuple[Nanos, Nanos], Seen] = {}
+        #: At a time, for a span: the chip with no sensor's pin high, and what it does; what one sensor alone changes.
+        self._quiet: dict[tuple[Nanos, Nanos], tuple[Branch, Seen]] = {}
+        self._answers: dict[tuple[Nanos, Nanos, str], Answer] = {}
 
     @cached_property
     def motors(self) -> tuple[Edges | object, ...]:
@@ -83,11 +86,9 @@ class Prober:
             int(steps.values[max(0, bisect_right(steps.times, at) - 1)]) for steps in (left, right)
         )
 
-    def codes_with(self, seen: Seen, since: Nanos, at: Nanos) -> Codes:
-        """Return the codes at a time in a replay that was told of from `since` on."""
-        levels = {net: self.replay.level(net, since) for net in self.replay.outputs}
-        levels |= {net: level for t, net, level in seen.edges if t <= at}
-        found = []
+    def codes_with(self, seen: Seen, at: Nanos) -> Codes:
+        """Return the codes at a time in a replay."""
+        levels, found = seen.levels_at(at), []
         for motor in (1, 2):
             nets = [net for net in self.replay.outputs if net.startswith(f"motor{motor}_")]
             code = sum(levels[net] << bit for bit, net in enumerate(nets))
@@ -103,37 +104,50 @@ class Prober:
             plain = self._plain[since, until] = self.replay.run(since, until, rows=True, memory_ns=_MEMORY_NS)
         return self._compare(plain, self.replay.run(since, until, holds, rows=True, memory_ns=_MEMORY_NS), since, until)
 
-    def flipped(self, nets: Sequence[str], at: Nanos, span: Nanos = NOTICE_NS) -> Effect:
-        """Return what changes when each of these inputs has the other level for a time, whatever it has meanwhile."""
+    def noticed(self, holds: Sequence[Hold], until: Nanos, since: Nanos) -> Nanos | None:
+        """Return when a program takes notice of inputs that are held otherwise, as `effect` does; None for never."""
+        for end in sorted({min(since + SOON_NS, until), until}):
+            if (at := self.effect(holds, end, since).noticed) is not None:
+                return at
+        return None
+
+    def flip_noticed(self, nets: Sequence[str], at: Nanos, span: Nanos = NOTICE_NS) -> Nanos | None:
+        """Return when a program takes notice that these inputs have the other level for a time; None for never."""
         until = min(at + span, self.replay.end)
-        return self.effect([Hold(wire=net, level=None, since=at, until=until) for net in nets], until, at)
+        return self.noticed([Hold(wire=net, level=None, since=at, until=until) for net in nets], until, at)
 
     def takes_notice(self, at: Nanos, span: Nanos = NOTICE_NS) -> bool:
         """Tell whether a program takes notice of any sensor that changes at a time, in the time after it."""
-        soon = min(span, SOON_NS)
-        return any(self.flipped(self.sensors, at, wait).noticed is not None for wait in dict.fromkeys((soon, span)))
+        return self.flip_noticed(self.sensors, at, span) is not None
 
-    def answers(self, at: Nanos, span: Nanos = ANSWER_NS) -> Mapping[str, Answer]:
-        """Return what a program does at a time when one sensor alone sees something, and nothing did before."""
-        start, until = max(0, at - QUIET_NS), min(at + span, self.replay.end)
-        quiet = [Hold(wire=net, level=False, since=start, until=until) for net in self.sensors]
-        base = self.replay.run(start, until, quiet, rows=True, memory_ns=_MEMORY_NS)
-        codes = self.codes_with(base, start, until)
-        found = {}
-        for net in self.sensors:
-            holds = [
-                Hold(wire=other, level=False, since=start, until=at if other == net else until)
-                for other in self.sensors
-            ]
-            holds.append(Hold(wire=net, level=True, since=at, until=until))
-            seen = self.replay.run(start, until, holds, rows=True, memory_ns=_MEMORY_NS)
-            effect = self._compare(base, seen, start, until)
-            found[net] = Answer(
-                at=at, base=codes, codes=self.codes_with(seen, start, until),
-                noticed=None if effect.noticed is None else effect.noticed - at,
-                answered=None if effect.answered is None else effect.answered - at,
-            )  # fmt: skip
-        return found
+    def answers(self, at: Nanos, span: Nanos = ANSWER_NS, nets: Sequence[str] = ()) -> Mapping[str, Answer]:
+        """Return what a program does at a time when one sensor alone sees something, and nothing did before.
+
+        Args:
+            at: The time.
+            span: For how long it does.
+            nets: Which sensors are wanted; none: all.
+        """
+        if (at, span) not in self._quiet:
+            start, until = max(0, at - QUIET_NS), min(at + span, self.replay.end)
+            quiet = self.replay.branch(start, at - 1, self.held(start, until, level=False))
+            self._quiet[at, span] = quiet, self.replay.run(at, until, rows=True, memory_ns=_MEMORY_NS, branch=quiet)
+        for net in nets or self.sensors:
+            if (at, span, net) not in self._answers:
+                self._answers[at, span, net] = self._answer(at, span, net)
+        return {net: self._answers[at, span, net] for net in nets or self.sensors}
+
+    def _answer(self, at: Nanos, span: Nanos, net: str) -> Answer:
+        until = min(at + span, self.replay.end)
+        quiet, base = self._quiet[at, span]
+        hold = Hold(wire=net, level=True, since=at, until=until)
+        seen = self.replay.run(at, until, [hold], rows=True, memory_ns=_MEMORY_NS, branch=quiet)
+        effect = self._compare(base, seen, at, until)
+        return Answer(
+            at=at, base=effect.before, codes=effect.after,
+            noticed=None if effect.noticed is None else effect.noticed - at,
+            answered=None if effect.answered is None else effect.answered - at,
+        )  # fmt: skip
 
     def held(self, since: Nanos, until: Nanos, *, level: bool) -> list[Hold]:
         """Return all sensors' pins at one level for a time."""
@@ -142,7 +156,7 @@ class Prober:
     def codes_all(self, at: Nanos, *, level: bool) -> Codes:
         """Return the motors' codes when all sensors' pins have had one level for 2 s."""
         until = min(at + QUIET_NS, self.replay.end)
-        return self.codes_with(self.replay.run(at, until, self.held(at, until, level=level)), at, until)
+        return self.codes_with(self.replay.run(at, until, self.held(at, until, level=level)), until)
 
     def moments(self, until: Nanos, count: int = 5) -> list[Nanos]:
         """Return times at which a program drives, so that it may be asked; the last one a little before `until`."""
@@ -175,7 +189,7 @@ class Prober:
     def _usual_wait(self, at: Nanos) -> Nanos:
         """Return a time in which a program surely notices a change, by how long it took some times up to `at`."""
         tried = [at - back * NS_PER_MS for back in (0, 370, 710, 1130) if at > back * NS_PER_MS]
-        found = [(effect.noticed - t) for t in tried if (effect := self.flipped(self.sensors, t)).noticed is not None]
+        found = [noticed - t for t in tried if (noticed := self.flip_noticed(self.sensors, t)) is not None]
         return min(NOTICE_NS, max(100 * NS_PER_MS, 4 * max(found, default=NOTICE_NS)))
 
     def lines_run(self, since: Nanos, until: Nanos) -> dict[str, int]:
@@ -228,7 +242,7 @@ class Prober:
         )
         return Effect(
             noticed=noticed, by=by, answered=answered,
-            before=self.codes_with(plain, since, until), after=self.codes_with(other, since, until),
+            before=self.codes_with(plain, until), after=self.codes_with(other, until),
         )  # fmt: skip
 
     def _time_of(self, cycle: int, since: Nanos) -> Nanos:

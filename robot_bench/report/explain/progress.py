@@ -225,7 +225,7 @@ class ProgressInquest:
             fault = injected(self.scene.record, middle, "sonar", int(net[2:]))
             if fault is None or not fault[1].startswith("sonar-") or not prober.replay.level(net, middle):
                 continue
-            answer = prober.answers(middle)[net]
+            answer = prober.answers(middle, nets=[net])[net]
             if min(answer.base) > 0 >= min(answer.codes):
                 self._step(fault[0], "world", f"fault injected: {fault[1]}", Evidence.RECORDED)
                 return Finding(

@@ -15,8 +15,11 @@ Invariant: looking at a time leaves the replay of all other times as it was.
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
+from operator import itemgetter
 from pathlib import Path
-from typing import cast
+from types import MappingProxyType
+from typing import TypeAlias, cast
 
 from adapter_sim.pinout import Direction, Pull, Wire, WireRole, load_pinout
 from bluepill_sim.core import BLOCK, BlockRow
@@ -35,6 +38,8 @@ from simbase.timing import NS_PER_MS, Nanos
 
 #: chosen: at most so much is handed to the chip at once; its queue holds 4096 levels of all pins.
 FEED_NS: Nanos = 50 * NS_PER_MS
+#: After all that is recorded.
+_NEVER: Nanos = 1 << 63
 #: chosen: how often is looked whether there are too many blocks.
 _RECORDED_NS: Nanos = 5 * NS_PER_MS
 #: chosen: between two saved states at first, and how many are kept; of more every other one is dropped.
@@ -73,10 +78,28 @@ class Place:
         return where + (f", called from {self.calls[0]}" if self.calls else "")
 
 
+#: When a wire changes, and to what.
+_Levels: TypeAlias = tuple[Sequence[Nanos], Sequence[int]]
+#: A time, until when inputs have been given, and the chip then.
+_State: TypeAlias = tuple[Nanos, Nanos, object]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Branch:
+    """Where the chip has come to with inputs that were held: others go on from it."""
+
+    state: _State
+    held: Mapping[str, _Levels]
+    #: The levels of the outputs.
+    levels: Mapping[str, bool]
+
+
 @dataclass(slots=True)
 class Seen:
     """What the chip did in a part of a replay."""
 
+    #: The levels of the outputs when it began.
+    levels: Mapping[str, bool] = field(default_factory=dict)
     #: (ns, wire, level).
     edges: list[tuple[Nanos, str, bool]] = field(default_factory=list)
     #: (ns of its stop bit, character) on USART1.
@@ -87,6 +110,10 @@ class Seen:
     has_more_rows: bool = False
     #: (ns, the program's variables), where they were asked for.
     memory: list[tuple[Nanos, bytes]] = field(default_factory=list)
+
+    def levels_at(self, at: Nanos) -> dict[str, bool]:
+        """Return the levels of the outputs at a time in it."""
+        return {**self.levels, **{net: level for t, net, level in self.edges if t <= at}}
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +159,10 @@ class ChipReplay:
         except ImageError:
             self._lines = LineTable()
         self._seen = Seen()
-        self._held: dict[str, tuple[Sequence[Nanos], Sequence[int]]] = {}
+        self._held: dict[str, _Levels] = {}
+        #: Until when the inputs have been given, and when the next one changes.
+        self._given: Nanos = 0
+        self._next_input: Nanos = 0
         self.resets: list[Reset] = []
         self.end: Nanos = record.last_ns
         self.board.subscribe_pins([self.wires[net].bluepill for net in self.outputs], self._driven, of=Of.WIRE)
@@ -143,7 +173,7 @@ class ChipReplay:
                 self.board.pin(wire.bluepill).drive(wire.pull is Pull.UP, is_weak=True)
         for net in self.inputs:
             self.board.pin(self.wires[net].bluepill).drive(bool(record.pins[net].levels[0]))
-        self._states: list[tuple[Nanos, object]] = [(0, self.board.snapshot())]
+        self._states = [self._state()]
         self.exact_until = self._run_once()
 
     # What the trace and the program say.
@@ -197,8 +227,9 @@ class ChipReplay:
     # Running.
 
     def run(
-        self, since: Nanos, until: Nanos, holds: Sequence[Hold] = (), *, rows: bool = False, memory_ns: Nanos = 0
-    ) -> Seen:
+        self, since: Nanos, until: Nanos, holds: Sequence[Hold] = (), *, rows: bool = False, memory_ns: Nanos = 0,
+        branch: Branch | None = None,
+    ) -> Seen:  # fmt: skip
         """Run a part again.
 
         Args:
@@ -207,10 +238,15 @@ class ChipReplay:
             holds: Inputs that are otherwise; from `since` on at the earliest.
             rows: Whether blocks and exceptions are wanted.
             memory_ns: How often the variables are wanted; 0 for never.
+            branch: Where it goes on from, at `since`, with what is held there; None: from the run as it was.
         """
-        self._seek(since)
+        if branch is None:
+            self._seek(since)
+        else:
+            self._restore(branch.state, branch.held)
         self._hold(holds)
-        self._seen = seen = Seen()
+        levels = branch.levels if branch is not None else {net: self.level(net, since) for net in self.outputs}
+        self._seen = seen = Seen(levels=levels)
         try:
             if rows:
                 self._go_on_recording(until, memory_ns)
@@ -218,6 +254,20 @@ class ChipReplay:
         finally:
             self._held = {}
         return seen
+
+    def branch(self, since: Nanos, until: Nanos, holds: Sequence[Hold]) -> Branch:
+        """Run a part with inputs that are otherwise and return where the chip has come to by then.
+
+        Args:
+            since: From when on.
+            until: To when.
+            holds: Inputs that are otherwise, in runs that go on from there, too.
+        """
+        self._seek(since)
+        self._hold(holds)
+        held, self._seen = self._held, Seen(levels={net: self.level(net, since) for net in self.outputs})
+        self._go_on(until)
+        return Branch(state=self._state(), held=held, levels=self._seen.levels_at(until))
 
     def writer(self, at: Nanos, port: str) -> Place | None:
         """Return which instruction drove a pin of a port ("A") at a time; None where no store to the port did."""
@@ -227,35 +277,29 @@ class ChipReplay:
             if not seen.has_more_rows:
                 calls = self._calls(seen.rows)
                 break
-        hits = self._accesses(at - 20_000, at + 2, port, WatchKind.WRITE)
+        hits = self._watch(at - 20_000, at + 2, _of_port(port, WatchKind.WRITE))
         if not hits:
             return None
         place = self.line(hits[-1][1])
         return Place(place.line, place.function, tuple(call for call in calls if not call.startswith(place.line)))
 
-    def reads(self, since: Nanos, until: Nanos, ports: Sequence[str] = "ABC") -> dict[str, list[Nanos]]:
+    def reads(self, since: Nanos, until: Nanos) -> dict[str, list[Nanos]]:
         """Return by which source lines a program reads the levels of ports in a time, and when."""
         found: dict[str, list[Nanos]] = {}
-        for port in ports:
-            for at, pc in self._accesses(since, until, port, WatchKind.READ, first=8, size=4):
-                found.setdefault(str(self.line(pc)), []).append(at)
+        points = [_of_port(port, WatchKind.READ, first=8, size=4) for port in "ABC"]
+        for at, pc in self._watch(since, until, *points):
+            found.setdefault(str(self.line(pc)), []).append(at)
         return found
 
     def feeds(self, since: Nanos, until: Nanos) -> list[tuple[Nanos, Place]]:
         """Return when, and where, a program writes the key register of the independent watchdog."""
         return [(at, self.line(pc)) for at, pc in self._watch(since, until, Watchpoint(_IWDG_KR, 4, WatchKind.WRITE))]
 
-    def _accesses(
-        self, since: Nanos, until: Nanos, port: str, kind: WatchKind, *, first: int = 0, size: int = _GPIO_BYTES
-    ) -> list[tuple[Nanos, int]]:
-        """Return when, and by which instruction, a program accesses a port."""
-        base = _GPIO + _GPIO_STRIDE * (ord(port) - ord("A"))
-        return self._watch(since, until, Watchpoint(base + first, size, kind))
-
-    def _watch(self, since: Nanos, until: Nanos, point: Watchpoint) -> list[tuple[Nanos, int]]:
+    def _watch(self, since: Nanos, until: Nanos, *points: Watchpoint) -> list[tuple[Nanos, int]]:
+        """Return when, and by which instruction, a program makes an access that is watched for."""
         self._seek(max(0, since))
         engine, found = self.board.chip.engine, list[tuple[Nanos, int]]()
-        engine.watchpoints.add(point)
+        engine.watchpoints.update(points)
         try:
             limit = self.board.now_ns
             while self.board.now_ns < until:
@@ -266,7 +310,7 @@ class ChipReplay:
                 if reached.halt is not None:
                     found.append((reached.now, reached.halt.pc - 2))
         finally:
-            engine.watchpoints.discard(point)
+            engine.watchpoints.difference_update(points)
         return found
 
     def _calls(self, rows: Sequence[BlockRow]) -> list[str]:
@@ -314,7 +358,7 @@ class ChipReplay:
                         at, pc = before.pop(0) if before else (board.now_ns, board.pc)
                         self.resets.append(Reset(at, cause.name, self.line(pc)))
                 causes = dict(board.resets)
-                self._states.append((board.now_ns, board.snapshot()))
+                self._states.append(self._state())
                 if len(self._states) > MOST_STATES:
                     self._states, stride = self._states[::2], stride * 2
         finally:
@@ -333,10 +377,17 @@ class ChipReplay:
         return max(0, same)
 
     def _seek(self, at: Nanos) -> None:
-        place = bisect_right([t for t, _ in self._states], at) - 1
-        self.board.restore(self._states[place][1])
-        self._held = {}
+        self._restore(self._states[bisect_right(self._states, at, key=itemgetter(0)) - 1])
         self._go_on(at)
+
+    def _state(self) -> _State:
+        return self.board.now_ns, self._given, self.board.snapshot()
+
+    def _restore(self, state: _State, held: Mapping[str, _Levels] = MappingProxyType({})) -> None:
+        _, self._given, chip = state
+        self.board.restore(chip)
+        self._held = dict(held)
+        self._next_input = 0
 
     def _go_on_recording(self, until: Nanos, memory_ns: Nanos) -> None:
         """Run on with the blocks recorded, until there are too many."""
@@ -353,31 +404,37 @@ class ChipReplay:
     def _go_on(self, until: Nanos, memory_ns: Nanos = 0) -> None:
         board, seen = self.board, self._seen
         step = min(memory_ns or FEED_NS, FEED_NS)
-        while board.now_ns < until:
-            limit = min(until, board.now_ns + step)
+        now = board.now_ns
+        while now < until:
+            limit = min(until, now + step)
             self._feed(limit)
-            board.advance_to(limit)
+            now = board.advance_to(limit).now
             if memory_ns:
-                seen.memory.append((board.now_ns, board.read_memory(SRAM_BASE, self._variable_bytes) or b""))
+                seen.memory.append((now, board.read_memory(SRAM_BASE, self._variable_bytes) or b""))
 
-    @property
+    @cached_property
     def _variable_bytes(self) -> int:
         # Of a program without symbols all of the SRAM, its stack too: so it notices at least what it would with them.
         return max((offset + size for _, offset, size in self.variables), default=SRAM_BYTES)
 
     def _feed(self, limit: Nanos) -> None:
-        """Give the input pins what is recorded, or held, between now and `limit`."""
-        now = self.board.now_ns
+        """Give the input pins what is recorded, or held, until `limit`."""
+        given, self._given = self._given, limit
+        if limit < self._next_input:
+            return
+        following = [_NEVER]
         for net in self.inputs:
             times, levels = self._held.get(net) or (self.record.pins[net].times, self.record.pins[net].levels)
-            first, end = bisect_right(times, now), bisect_right(times, limit)
+            first, end = bisect_right(times, given), bisect_right(times, limit)
+            following.extend(times[end : end + 1])
             if first < end:
                 rows = [(times[place], int(levels[place])) for place in range(first, end)]
                 self.board.pin(self.wires[net].bluepill).drive_later(rows)
+        self._next_input = min(following)
 
     def _hold(self, holds: Sequence[Hold]) -> None:
         """Make the levels of the inputs that are held; a hold acts from the next instant on."""
-        now = self.board.now_ns
+        now, self._next_input = self.board.now_ns, 0
         for hold in holds:
             edges = self.record.pins[hold.wire]
             times, levels = self._held.get(hold.wire) or (edges.times, edges.levels)
@@ -411,6 +468,11 @@ def changes(level: bool, rows: Sequence[tuple[Nanos, bool]]) -> list[Nanos]:
             found.append(at)
         level = after
     return found
+
+
+def _of_port(port: str, kind: WatchKind, *, first: int = 0, size: int = _GPIO_BYTES) -> Watchpoint:
+    """Return what stops at an access to registers of a port ("A")."""
+    return Watchpoint(_GPIO + _GPIO_STRIDE * (ord(port) - ord("A")) + first, size, kind)
 
 
 def _number(pin: str) -> int:

@@ -9,7 +9,7 @@ Invariant: a voltage depends on what is driven now and on the faults, on nothing
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import Enum
+from enum import Enum, StrEnum
 
 from adapter_sim.pinout import Pinout, Pull, Wire, WireRole
 
@@ -46,7 +46,7 @@ BLUEPILL_INPUT = InputLimits(1.164, 1.833)
 ESP32_INPUT = InputLimits(0.825, 2.475)
 
 
-class Side(Enum):
+class Side(StrEnum):
     """Where on a wire: the BluePill's pad, or the ESP32's (for rst the base of Q1)."""
 
     BLUEPILL = "bluepill"
@@ -123,8 +123,12 @@ class Circuit:
                 self._fixed.setdefault((fault.wire, fault.side), []).append(Source(volts, SHORT_OHM))
         for wire in pinout.wires:
             self._place(wire, ends[wire.name], is_open=wire.name in is_open)
-        self._known: dict[tuple[tuple[Node, Source], ...], dict[Node, float]] = {}
         self._groups = self._joined()
+        self._group_of = {node: number for number, group in enumerate(self._groups) for node in group}
+        #: What a group's nodes have by what drives them.
+        self._known: dict[tuple[int, tuple[tuple[Node, Source], ...]], dict[Node, float]] = {}
+        #: What they have while nothing drives any.
+        self._alone = {node: volts for group in self._groups for node, volts in self._solve_group(group, {}).items()}
 
     def _place(self, wire: Wire, end: str, *, is_open: bool) -> None:
         """Put a wire's resistors; it begins at the BluePill's pad of the wire `end`."""
@@ -163,12 +167,13 @@ class Circuit:
         return result
 
     def _solve(self, drives: Mapping[Node, list[Source]]) -> dict[Node, float]:
-        result: dict[Node, float] = {}
-        for group in self._groups:
-            key = tuple((node, source) for node in group for source in drives.get(node, ()))
-            key = (*key, (group[0], Source(0.0, 0.0)))
+        result, driven = dict(self._alone), dict[int, list[tuple[Node, Source]]]()
+        for node, sources in drives.items():
+            driven.setdefault(self._group_of[node], []).extend((node, source) for source in sources)
+        for number, pairs in driven.items():
+            key = number, tuple(pairs)
             if key not in self._known:
-                self._known[key] = self._solve_group(group, drives)
+                self._known[key] = self._solve_group(self._groups[number], drives)
             result |= self._known[key]
         return result
 

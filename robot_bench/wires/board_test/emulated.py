@@ -80,6 +80,10 @@ class EmulatedBoard:
         self._pins = {wire.name: self.bluepill.pin(wire.bluepill) for wire in self.pinout.wires}
         self._said = {CONSOLE: bytearray(), ROBOT: bytearray()}
         self._seen: object = None
+        #: What each pin of the BluePill was last given.
+        self._given: dict[str, bool] = {}
+        #: How often the BluePill has changed what it drives.
+        self._changes = 0
         self._volts: dict[Node, float] = {}
         self._drives = dict.fromkeys(self._pins, PinDrive.NONE)
         names = {wire.bluepill: wire.name for wire in self.pinout.wires}
@@ -121,7 +125,7 @@ class EmulatedBoard:
     def _settle(self) -> dict[Node, float]:
         """Put on every pad what the circuit makes of what both chips drive."""
         state = self.esp32.state
-        key = (tuple(self._drives.values()), len(self.esp32.starts), self.esp32.is_running, state.changes)
+        key = (self._changes, len(self.esp32.starts), self.esp32.is_running, state.changes)
         if key == self._seen:
             return self._volts
         self._seen = key
@@ -139,11 +143,15 @@ class EmulatedBoard:
             levels |= self._reads(self._volts[name, Side.ESP32], ESP32_INPUT) << pad
         self.esp32.put_levels(levels)
         for name, pin in self._pins.items():
-            # The circuit has the last word, against the chip's own output too.
-            pin.short("3V3" if self._reads(self._volts[name, Side.BLUEPILL], BLUEPILL_INPUT) else "GND")
+            is_high = self._reads(self._volts[name, Side.BLUEPILL], BLUEPILL_INPUT)
+            if self._given.get(name) is not is_high:
+                self._given[name] = is_high
+                # The circuit has the last word, against the chip's own output too.
+                pin.short("3V3" if is_high else "GND")
         return self._volts
 
     def _bluepill_drives(self, rows: bytes) -> None:
+        self._changes += 1
         for _, pin, drive, _, _, _ in EDGE.iter_unpack(rows):
             self._drives[self._wire_of_pin[pin]] = _PIN_DRIVES[drive]
 

@@ -19,6 +19,8 @@ from simbase.errors import MissingDependencyError
 PORTS = 3
 CONSOLE, ROBOT = 0, 2
 _CHUNK = 4096
+#: Where bytes that have left, and their times, are put, a chunk at a time.
+_BUFFERS = ctypes.create_string_buffer(_CHUNK), (ctypes.c_int64 * _CHUNK)()
 NS_PER_US = 1000
 
 
@@ -243,7 +245,7 @@ class Esp32:
     def _collect(self) -> None:
         if not self.is_running:
             return
-        calls, data, times = self._calls, ctypes.create_string_buffer(_CHUNK), (ctypes.c_int64 * _CHUNK)()
+        calls, (data, times) = self._calls, _BUFFERS
         for port in range(PORTS):
             while size := calls.machine_sent(port, data, times, _CHUNK):
                 self._sent[port] += data.raw[:size]

@@ -164,6 +164,19 @@ def test_an_hour_of_waiting_for_a_pin_is_over_at_once(loop: str) -> None:
     assert board.register("R5") > 100
 
 
+def test_a_restored_board_waits_no_longer_round_by_round_than_one_that_came_there() -> None:
+    board = make(program(["a pin"]).replace("movs r1, #7", "movs r1, #0"), "native")
+    board.pin("PA0").drive(0)
+    board.advance_to(1_000_000)
+    saved = board.snapshot()
+    board.advance_to(3600 * 10**9)
+    board.restore(saved)
+    before = board.chip.engine.shared.logged
+    board.advance_to(101_000_000)
+    assert board.register("R5") == 0
+    assert board.chip.engine.shared.logged - before < 1_000  # of 100,000 rounds
+
+
 #: Computes for a while, in which no round is found that waits; then TIM2 counts a millisecond, and its flag is polled.
 LATE = f"""mov32 r0, #{BASES["RCC"]}
 movs r1, #1

@@ -99,14 +99,12 @@ def ramp(targets: list[float], due: list[int], count: int, faster: float, slower
 
 def noises(count: int, source: random.Random) -> tuple[dict[int, list[float]], dict[int, list[float]], np.ndarray]:
     """Return normal noise: three for each measured pose, three for each packet, by its step; one for each step."""
-    poses, packets, slips = {}, {}, []
-    for step in range(count):
-        if step % 50 == 0:
-            poses[step] = [source.gauss() for _ in range(3)]
-        if step % 100 == 0:
-            packets[step] = [source.gauss() for _ in range(3)]
-        slips.append(source.gauss())
-    return poses, packets, np.array(slips)
+    normal = np.random.default_rng(source.getrandbits(64)).standard_normal
+    poses, packets = (
+        dict(zip(steps, normal((len(steps), 3)).tolist(), strict=True))
+        for steps in (range(0, count, 50), range(0, count, 100))
+    )
+    return poses, packets, normal(count)
 
 
 def course(dl: np.ndarray, dr: np.ndarray, turns: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

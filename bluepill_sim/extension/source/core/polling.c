@@ -46,7 +46,8 @@ void look_later(struct core *core)
     if (waiting->phase != NOT_LOOKING) {
         give_up(core); /* an event came first: where events come so often, there is no time to let pass */
     }
-    if (waiting->next < s->cycle + LEAST_INTERVAL) {
+    /* That it is far ahead means that a state of an earlier time was restored. */
+    if (waiting->next < s->cycle + LEAST_INTERVAL || waiting->next > s->cycle + MOST_INTERVAL) {
         waiting->next = s->cycle + LEAST_INTERVAL;
     }
     if (core->records == NULL && waiting->next < s->stop_at) {

@@ -28,7 +28,8 @@ from p2os.toml_schema import Table
 from robot_bench.campaign.trial import Outcome, Trial, Verdict, run_trial, trial_of
 from robot_bench.campaign.variants.shrinking.failure import Way
 from robot_bench.campaign.variants.shrinking.things import WORLD_NAME
-from robot_bench.recording.run_record import RunRecord, read_run
+from robot_bench.recording.run_record import TRACE_NAME, RunRecord, read_run
+from robot_bench.report import make_report
 from robot_bench.report.explain.explain import explain
 from simbase.errors import FileError, P2osError, UsageError
 
@@ -73,8 +74,10 @@ def keep(trial: Trial, way: Way, folder: Path) -> Kept:
             capture_output=True, text=True, timeout=_MOST_S, check=False,
         )  # fmt: skip
         there = json.loads(found.stdout) if found.stdout.startswith("{") else {}
-        if (picture := folder / RUN_NAME / "path.png").is_file():
-            shutil.copy(picture, folder / "scene.png")
+        if (folder / RUN_NAME / TRACE_NAME).is_file():  # several robots have one each
+            for plot in make_report(folder / RUN_NAME).plots:
+                if plot.name == "path.png":
+                    shutil.copy(plot, folder / "scene.png")
     except (OSError, ValueError) as error:
         raise FileError(f"cannot keep {scenario}: {error}") from error
     here = run_trial(trial)
