@@ -9,6 +9,7 @@ named stands in `BASES`, so that a warning can name what was touched.
 from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from itertools import count
 from typing import TypeAlias, cast
 
@@ -420,11 +421,28 @@ def _wire(parts: dict[str, Peripheral], fabric: Fabric) -> None:
     Raises:
         ValueError: The table has a name that there is not, or two lines that lead to one end.
     """
-    lines = _lines()
-    for output, ends in WIRING.items():
-        found = _find(output, parts, "output", lambda part: part.OUTPUTS)
+    outputs, inputs = _wires(tuple(WIRING.items()), tuple((name, type(part)) for name, part in parts.items()))
+    for device, number, line in outputs:
+        fabric.put_output(parts[device].slot, number, line)
+    for device, number, line in inputs:
+        fabric.wire(line, parts[device].slot, number)
+
+
+#: Name of a device, number of its output or input, and the line.
+_Wires: TypeAlias = list[tuple[str, int, int]]
+
+
+@cache
+def _wires(
+    wiring: tuple[tuple[str, tuple[int | str, ...]], ...], parts: tuple[tuple[str, type[Peripheral]], ...]
+) -> tuple[_Wires, _Wires]:
+    """Return the outputs that are on lines, and the inputs, of these devices by a table such as `WIRING`."""
+    lines, kinds = _lines(), dict(parts)
+    outputs, inputs = [], []
+    for output, ends in wiring:
+        found = _find(output, kinds, "output", lambda kind: kind.OUTPUTS)
         if found is not None:
-            fabric.put_output(*found, lines[ends])
+            outputs.append((*found, lines[ends]))
     led: set[int | str] = set()
     for ends, line in lines.items():
         for end in ends:
@@ -434,14 +452,15 @@ def _wire(parts: dict[str, Peripheral], fabric: Fabric) -> None:
             if isinstance(end, int):
                 if end != line or end >= IRQ_COUNT:
                     raise ValueError(f"WIRING: {end} is no interrupt that can be on line {line}")
-            elif (found := _find(end, parts, "input", lambda part: part.INPUTS)) is not None:
-                fabric.wire(line, *found)
+            elif (found := _find(end, kinds, "input", lambda kind: kind.INPUTS)) is not None:
+                inputs.append((*found, line))
+    return outputs, inputs
 
 
 def _find(
-    name: str, parts: dict[str, Peripheral], what: str, names_of: Callable[[Peripheral], tuple[str, ...]]
-) -> tuple[int, int] | None:
-    """Return slot and number of an output or input; None of a device that is not modelled."""
+    name: str, parts: dict[str, type[Peripheral]], what: str, names_of: Callable[[type[Peripheral]], tuple[str, ...]]
+) -> tuple[str, int] | None:
+    """Return device and number of an output or input; None of a device that is not modelled."""
     device, _, end = name.partition(".")
     if device not in BASES:
         raise ValueError(f"WIRING: {name}: the chip has no {device}")
@@ -450,7 +469,7 @@ def _find(
     names = names_of(parts[device])
     if end not in names:
         raise ValueError(f"WIRING: {name}: {device} has no {what} {end!r}; it has {', '.join(names) or 'none'}")
-    return parts[device].slot, names.index(end)
+    return device, names.index(end)
 
 
 def name_at(address: int) -> str | None:

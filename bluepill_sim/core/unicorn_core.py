@@ -25,6 +25,7 @@ import weakref
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
+from functools import cache
 from typing import TypeVar, cast
 
 from bluepill_sim.extension.layout import NOWHERE
@@ -192,9 +193,8 @@ class UnicornCore(Stateful):
         self._context_bytes = library.context_size(self._handle) - _CONTEXT_HEADER_BYTES
         #: The registers of a new core.
         self._new = self._read_context()
-        words = self._context_bytes // 4
         #: The bits that `context` has.
-        self._saved_bits = sum(_WORD << 32 * n for n in range(words) if n not in _UNSAVED_WORDS)
+        self._saved_bits = _saved_bits(self._context_bytes // 4)
         self._keep: list[object] = []
         #: Apart from the callbacks, which refer back to this object: these must outlive the library's handle.
         self._buffers: list[object] = []
@@ -436,6 +436,12 @@ class UnicornCore(Stateful):
             raise RuntimeError(f"Unicorn cannot {what}: error {error}")
 
 
+@cache
+def _saved_bits(words: int) -> int:
+    """Return the bits of a context of so many words that are saved."""
+    return sum(_WORD << 32 * n for n in range(words) if n not in _UNSAVED_WORDS)
+
+
 def _close(library: "UnicornLibrary", handle: int, context: int, buffers: list[object]) -> None:
     """Free what the library holds for a `UnicornCore` that is gone."""
     library.context_free(context)
@@ -546,6 +552,7 @@ class UnicornLibrary:
     version: str
 
 
+@cache
 def load_library() -> UnicornLibrary:
     """Load Unicorn.
 

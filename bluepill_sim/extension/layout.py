@@ -425,6 +425,7 @@ TIM = Struct(
         ),
         Field("shaped_at", "u64", 3, "since when they are that,"),
         Field("written_at", "u64", doc="when a register was written last: the references of that tick came before"),
+        Field("starts", "u64", doc="the first tick that its own clock may count: one after CEN"),
         Field("born", "u64", 3, "of a wave the tick of its last edge before, which there was not,"),
         Field("turns_at", "u64", 3, "and of the first that there is"),
         Field("filters", "filter", 5, "TI1 to TI4, ETR"),

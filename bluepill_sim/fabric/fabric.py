@@ -286,17 +286,17 @@ class Fabric(Stateful):
         """Say which bit of RCC's enable and reset registers is a device's; 0 is the AHB's, 1 APB2's, 2 APB1's."""
         self._calls_of_c.fabric_set_gate(self.handle, slot, register, bit)
 
-    def set_initial(self, slot: int, words: list[tuple[int, int]], *, is_whole: bool) -> None:
+    def set_initial(self, slot: int, words: "ctypes.Array[ctypes.c_uint32]", *, is_whole: bool) -> None:
         """Say what the registers of a device in C are after a reset: index and word.
 
         Args:
             slot: its own.
-            words: one for each register.
+            words: a pair for each register; C reads them at each reset.
             is_whole: whether these, and what its kind does, are all of a reset.
         """
-        initial = (_U32 * (2 * len(words)))(*(part for pair in words for part in pair))
-        self._kept_words.append(initial)
-        self._calls_of_c.fabric_set_initial(self.handle, slot, ctypes.addressof(initial), len(words), is_whole)
+        self._kept_words.append(words)
+        at = ctypes.addressof(words)
+        self._calls_of_c.fabric_set_initial(self.handle, slot, at, len(words) // 2, is_whole)
 
     def reset_device(self, slot: int) -> None:
         """Put a device in C back to its state after a reset, but for what of it is Python's."""

@@ -133,8 +133,6 @@ class Pin:
         self.is_bonded = is_bonded
         #: Whether it bears 5 V as an input without a pull (DS5319 table 5, "FT").
         self.is_five_volt_tolerant = is_five_volt_tolerant
-        self._struct.modes[number] = _MODES.index(PinMode.FLOATING)
-        self._set(bonded=is_bonded)
 
     # From outside the chip.
 
@@ -406,7 +404,11 @@ class PinBank(Stateful):
             port: tuple(self._make(port, n, bonded, five_volt_tolerant) for n in range(16)) for port in self.PORTS
         }
         self._by_name = {pin.name: pin for pins in self._pins.values() for pin in pins}
-        for port in range(len(self.PORTS)):
+        floating = _MODES.index(PinMode.FLOATING)
+        for port, pins in enumerate(self._pins.values()):
+            struct = self.fabric.port_structs[port]
+            struct.modes[:] = [floating] * len(pins)
+            struct.bonded = sum(1 << pin.number for pin in pins if pin.is_bonded)
             self.fabric.pins_changed(port)
         self._subscriptions: list[Subscription] = []
         #: Called when AFIO has changed `remaps` or `exti_ports`.

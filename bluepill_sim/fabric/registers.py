@@ -23,10 +23,10 @@ Invariant: a stored word never holds a bit outside `readable`, so that
 
 import ctypes
 from array import array
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import InitVar, dataclass
 from functools import cache
-from typing import Any, ClassVar, cast
+from typing import Any, ClassVar
 
 from bluepill_sim.extension.layout import Struct, structure
 from bluepill_sim.fabric.fabric import CLOCK, OWN_COMMANDS, RESUMED, SETTLE, STOPPED
@@ -103,6 +103,16 @@ class Register:
         """The bits whose 1 does something where no flag is up: those that take it, or all where only a method knows."""
         clears = self.write_one_to_clear | self.write_zero_to_clear
         return WORD if self.on_write and not self.writable | clears else self.writable
+
+    @property
+    def masks(self) -> tuple[int, int, int, int]:
+        """The bits that a write keeps, takes, clears by 1 and clears by 0: what `stored_after` is made of."""
+        return (
+            self.readable & ~self.writable,
+            self.readable & self.writable,
+            self.write_one_to_clear,
+            self.write_zero_to_clear,
+        )
 
     def widen(self, previous: int, value: int, lanes: int) -> int:
         """Return the whole-word write that does what a write of some byte lanes does.
@@ -222,6 +232,53 @@ class Place:
     size: int = 0x400
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Table:
+    """What follows from a class of peripherals alone, the same for every chip; by offset // 4."""
+
+    #: After a reset.
+    words: bytes
+    registers: tuple[Register | None, ...]
+    masks: tuple[tuple[int, int, int, int], ...]
+    #: Index of the hidden word that keeps what a read returned.
+    latches: tuple[int | None, ...]
+    #: Names of the methods that answer a read, and that follow a write; or `NATIVE`.
+    reads: tuple[str | None, ...]
+    writes: tuple[str | None, ...]
+    #: Index and word of each after a reset, for C.
+    initial: "ctypes.Array[ctypes.c_uint32]"
+    #: Makes what a device in C holds beside the words.
+    held: type[Any] | None
+
+
+@cache
+def _table_of(kind: type["Peripheral"], size: int) -> _Table:
+    """Return the table of a class whose block has `size` bytes."""
+    words = array("I", bytes(size))
+    found: list[Register | None] = [None] * len(words)
+    masks = [(0, 0, 0, 0)] * len(words)
+    latches: list[int | None] = [None] * len(words)
+    reads: list[str | None] = [None] * len(words)
+    writes: list[str | None] = [None] * len(words)
+    pairs: list[int] = []
+    for register in kind.REGISTERS:
+        index = register.offset // 4
+        words[index], found[index], masks[index] = register.reset, register, register.masks
+        latches[index] = None if register.latched_in is None else register.latched_in // 4
+        reads[index], writes[index] = register.on_read, register.on_write
+        pairs += index, register.reset
+    return _Table(
+        words=words.tobytes(),
+        registers=tuple(found),
+        masks=tuple(masks),
+        latches=tuple(latches),
+        reads=tuple(reads),
+        writes=tuple(writes),
+        initial=(ctypes.c_uint32 * len(pairs))(*pairs),
+        held=None if kind.HOLDS is None else structure(kind.HOLDS),
+    )
+
+
 class Peripheral(Stateful):
     """A block of registers at an address of the chip."""
 
@@ -244,37 +301,15 @@ class Peripheral(Stateful):
         self.name = place.name
         self.base = place.base
         self.fabric = chip.pins.fabric
+        table = _table_of(type(self), place.size)
         #: The stored words of the whole block, indexed by offset // 4; the object stays the same for ever.
-        self.words = array("I", bytes(place.size))
-        count = place.size // 4
-        self._registers: list[Register | None] = [None] * count
-        #: For each word what `Register.stored_after` is made of: kept, taken, cleared by 1, cleared by 0.
-        self._masks = [(0, 0, 0, 0)] * count
-        self._read_hooks: list[Callable[[], int] | None] = [None] * count
-        #: Index of the hidden word that keeps what a read returned.
-        self._latches: list[int | None] = [None] * count
-        self._write_hooks: list[Callable[[int, int], None] | None] = [None] * count
-        for register in self.REGISTERS:
-            index = register.offset // 4
-            self._registers[index] = register
-            self._masks[index] = (
-                register.readable & ~register.writable,
-                register.readable & register.writable,
-                register.write_one_to_clear,
-                register.write_zero_to_clear,
-            )
-            if register.latched_in is not None:
-                self._latches[index] = register.latched_in // 4
-            if register.on_read is not None:
-                self._read_hooks[index] = self._reader(register.on_read, index)
-            if register.on_write is not None:
-                self._write_hooks[index] = self._writer(register.on_write, index)
-            self.words[index] = register.reset
+        self.words = array("I", table.words)
+        self._table = table
         self._due_ns: int | None = None
         #: What a device in C holds beside the words: the struct `HOLDS`.
-        self.native: Any = structure(self.HOLDS)() if self.HOLDS is not None else None
+        self.native: Any = None if table.held is None else table.held()
         #: Its place in the queue of events.
-        self.slot = self._take_slot()
+        self.slot = self._take_slot(table)
         if place.clock is not None:
             self.fabric.set_gate(self.slot, _GATES.index(place.clock.register), place.clock.bit)
 
@@ -331,14 +366,14 @@ class Peripheral(Stateful):
 
     def has_register(self, offset: int) -> bool:
         """Tell whether there is a register; else the word reads 0, and is warned of once."""
-        return self._registers[offset >> 2] is not None
+        return self._table.registers[offset >> 2] is not None
 
     def changes_reset_value(self, offset: int, value: int) -> bool:
         """Tell whether a write would set a bit that is 0 after a reset: more than a de-initialization does.
 
         Flags that a 1 clears are down after a reset, and reserved bits take nothing: those change nothing.
         """
-        register = self._registers[offset >> 2]
+        register = self._table.registers[offset >> 2]
         return register is None or bool(value << 8 * (offset & 3) & register.setting & ~register.reset)
 
     def read(self, offset: int, size: int) -> int:
@@ -350,17 +385,18 @@ class Peripheral(Stateful):
         """
         self._catch_up()
         index = offset >> 2
-        hook = self._read_hooks[index]
+        table = self._table
+        hook = table.reads[index]
         if hook is None:
             word = self.words[index]
-            latch = self._latches[index]
+            latch = table.latches[index]
             if latch is not None:
                 self.words[latch] = word
-            elif self._registers[index] is None:
+            elif table.registers[index] is None:
                 self._warn_no_register(offset, "read")
                 return 0
         else:
-            word = hook()
+            word = self.fabric.read(self.slot, index) if hook == NATIVE else getattr(self, hook)()
         if size == 4:
             return word
         return (word >> ((offset & 3) * 8)) & ((1 << (size * 8)) - 1)
@@ -369,30 +405,33 @@ class Peripheral(Stateful):
         """Take what the bus writes; arguments as of `read`."""
         self._catch_up()
         index = offset >> 2
-        register = self._registers[index]
+        table = self._table
+        register = table.registers[index]
         if register is None:
             self._warn_no_register(offset, "write")
             return
         previous = self.words[index]
         written = value if size == 4 else self._narrow(register, offset, size, value)
-        kept, taken, one, zero = self._masks[index]
+        kept, taken, one, zero = table.masks[index]
         self.words[index] = previous & kept & ~(written & one) & (written | ~zero) | written & taken
-        hook = self._write_hooks[index]
-        if hook is not None:
-            hook(written, previous)
+        hook = table.writes[index]
+        if hook == NATIVE:
+            self.fabric.write(self.slot, index, written, previous)
+        elif hook is not None:
+            getattr(self, hook)(written, previous)
 
     def look(self, offset: int) -> int:
         """Return what a read would find at an offset now, with nothing of what a read causes; 0 without a register."""
         index = offset >> 2
-        register = self._registers[index]
-        hook = self._read_hooks[index]
-        if register is None or hook is None:
+        hook = self._table.reads[index]
+        if hook is None:
             return self.words[index]
-        if register.on_read == NATIVE:
+        if hook == NATIVE:
             return self.fabric.command(self.slot, SETTLE, index)
         state = self.snapshot()
         try:
-            return hook()
+            word: int = getattr(self, hook)()
+            return word
         finally:
             self.restore(state)
 
@@ -408,10 +447,6 @@ class Peripheral(Stateful):
     def fields_now(self, register: Register, _word: int) -> str:
         """Return the fields of a register whose word is that, where they depend on it."""
         return register.fields
-
-    def masks_of(self, index: int) -> tuple[int, int, int, int]:
-        """Return what the stored word `index` keeps, takes, and clears by 1 and by 0, as masks."""
-        return self._masks[index]
 
     def reset(self) -> None:
         """Go back to the state after a system reset."""
@@ -460,7 +495,7 @@ class Peripheral(Stateful):
         """Go on after `frozen_ns`, from where `freeze` was called."""
         self.clock_resumed(frozen_ns)
 
-    def _take_slot(self) -> int:
+    def _take_slot(self, table: "_Table") -> int:
         if self.KIND is None:
             return self.fabric.add_slot(self.name, self.advance_to)
         words, _ = self.words.buffer_info()
@@ -470,19 +505,8 @@ class Peripheral(Stateful):
         )
         mine = type(self)
         is_whole = mine.reset is Peripheral.reset and mine.on_reset is Peripheral.on_reset
-        initial = [(register.offset // 4, register.reset) for register in self.REGISTERS]
-        self.fabric.set_initial(slot, initial, is_whole=is_whole)
+        self.fabric.set_initial(slot, table.initial, is_whole=is_whole)
         return slot
-
-    def _reader(self, name: str, index: int) -> Callable[[], int]:
-        if name == NATIVE:
-            return lambda: self.fabric.read(self.slot, index)
-        return cast("Callable[[], int]", getattr(self, name))
-
-    def _writer(self, name: str, index: int) -> Callable[[int, int], None]:
-        if name == NATIVE:
-            return lambda written, previous: self.fabric.write(self.slot, index, written, previous)
-        return cast("Callable[[int, int], None]", getattr(self, name))
 
     def _catch_up(self) -> None:
         if self.KIND is not None:

@@ -12,6 +12,7 @@ due before the block ends, and for everything else.
 
 import ctypes
 from collections.abc import Iterable
+from functools import cache
 
 from bluepill_sim.core import Engine
 from bluepill_sim.core.system_control import PPB_BASE
@@ -37,25 +38,32 @@ def share_registers(engine: Engine, parts: Iterable[Peripheral], rcc: Rcc) -> No
     calls.core_set_paged_region(state, engine.region_at(PERIPHERAL_BASE))
     calls.core_set_system_region(state, engine.region_at(PPB_BASE))
     for part in parts:
-        count = len(part.REGISTERS) and max(register.offset for register in part.REGISTERS) // 4 + 1
-        behaviour = (ctypes.c_uint16 * count)()
-        # What looks at each write itself does so for registers that only store, too.
-        decided = 0 if type(part).write is Peripheral.write else _WRITES_PLAIN
-        masks = (ctypes.c_uint32 * (4 * count))()
-        for register in part.REGISTERS:
-            index = register.offset // 4
-            behaviour[index] = _behaviour(register, has_byte_lanes=part.HAS_BYTE_LANES) & ~decided
-            masks[4 * index : 4 * index + 4] = list(part.masks_of(index))
+        behaviour, masks = _table_of(type(part))
+        count = len(behaviour)
         gate = CLOCK_GATES.get(part.name)
         at, mask = rcc.gate_address(part.name) if gate is not None else (None, 0)
         words, _ = part.words.buffer_info()
-        engine.keep(behaviour, masks)
         first_page = part.base - PERIPHERAL_BASE >> _PAGE_SHIFT
         for first in range(0, count, _PAGE_WORDS):
             calls.core_set_page(
                 state, first_page + first // _PAGE_WORDS, words + 4 * first, min(count - first, _PAGE_WORDS), at, mask,
                 ctypes.byref(behaviour, 2 * first), ctypes.byref(masks, 16 * first), part.slot,
             )  # fmt: skip
+
+
+@cache
+def _table_of(kind: type[Peripheral]) -> tuple["ctypes.Array[ctypes.c_uint16]", "ctypes.Array[ctypes.c_uint32]"]:
+    """Return the behaviour and the masks of each word up to the last register, which the cores of all chips read."""
+    count = len(kind.REGISTERS) and max(register.offset for register in kind.REGISTERS) // 4 + 1
+    behaviour = (ctypes.c_uint16 * count)()
+    masks = (ctypes.c_uint32 * (4 * count))()
+    # What looks at each write itself does so for registers that only store, too.
+    decided = 0 if kind.write is Peripheral.write else _WRITES_PLAIN
+    for register in kind.REGISTERS:
+        index = register.offset // 4
+        behaviour[index] = _behaviour(register, has_byte_lanes=kind.HAS_BYTE_LANES) & ~decided
+        masks[4 * index : 4 * index + 4] = list(register.masks)
+    return behaviour, masks
 
 
 def _behaviour(register: Register, *, has_byte_lanes: bool) -> int:

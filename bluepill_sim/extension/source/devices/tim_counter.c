@@ -49,8 +49,9 @@ void set_running(struct device *device)
     struct ramp *ramp = &tim->ramp;
     const bool runs = is_enabled(device) && !has_own_clock(device);
     if (runs && !ramp->runs) { /* a clock after CEN (RM0008 15.3.1) */
-        ramp->base = tim->at + 1 - tim->psc_count;
-    } else if (!runs && ramp->runs && tim->at >= ramp->base) {
+        tim->starts = tim->at + 1;
+        ramp->base = tim->starts - tim->psc_count;
+    } else if (!runs && ramp->runs && tim->at >= tim->starts) {
         tim->psc_count = (uint32_t)((tim->at - ramp->base) % ramp->divider);
     }
     ramp->runs = runs;
@@ -259,8 +260,8 @@ void reinitialize(struct device *device)
 {
     struct tim *tim = tim_of(device);
     tim->psc_count = 0;
-    if (tim->ramp.runs && tim->ramp.base < tim->at) {
-        tim->ramp.base = tim->at;
+    if (tim->ramp.runs) {
+        tim->ramp.base = tim->at < tim->starts ? tim->starts : tim->at;
     }
     tim->repetitions = device->words[RCR];
     update_event(device, false);

@@ -398,6 +398,7 @@ struct tim {
     uint64_t edge_at[3]; /* the tick at which OC1REF to OC3REF last changed before they were what they are now, */
     uint64_t shaped_at[3]; /* since when they are that, */
     uint64_t written_at; /* when a register was written last: the references of that tick came before */
+    uint64_t starts; /* the first tick that its own clock may count: one after CEN */
     uint64_t born[3]; /* of a wave the tick of its last edge before, which there was not, */
     uint64_t turns_at[3]; /* and of the first that there is */
     struct filter filters[5]; /* TI1 to TI4, ETR */
@@ -436,7 +437,7 @@ struct tim {
     uint8_t pins[9]; /* CH1 to CH4, CH1N to CH3N, ETR, BKIN */
     uint8_t sources[7]; /* the alternate functions of the first seven */
 };
-_Static_assert(sizeof(struct tim) == 752, "tim");
+_Static_assert(sizeof(struct tim) == 760, "tim");
 
 /* What an SPI holds beyond its registers. RM0008 25.3. */
 struct spi {

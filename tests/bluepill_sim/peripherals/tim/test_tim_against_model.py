@@ -241,6 +241,17 @@ def test_the_dead_time_of_a_reference_that_a_write_turns_back_agrees(fake_chip: 
     play(Pair(fake_chip, "TIM1", 0x7F), [*start.items(), ("run", 30), ("CR1", 1), ("CCER", 0x555), ("run", 30)])
 
 
+#: What comes in the tick in which a counter starts again, whose prescaler stood within a count.
+IN_THE_TICK_OF_A_START = {"an update event": [("EGR", 1)], "a stop and a start": [("CR1", 0), ("CR1", 1)]}
+
+
+@pytest.mark.parametrize("then", IN_THE_TICK_OF_A_START.values(), ids=IN_THE_TICK_OF_A_START)
+@pytest.mark.parametrize("ticks", [30, 31, 32])
+def test_a_prescaler_that_starts_again_agrees(fake_chip: Any, ticks: int, then: list[tuple[str, int]]) -> None:
+    start = [("PSC", 2), ("ARR", 1), ("EGR", 1), ("CR1", 1), ("run", ticks)]
+    play(Pair(fake_chip, "TIM1", 0x7F), [*start, ("CR1", 0), ("run", 2), ("CR1", 1), *then])
+
+
 @pytest.mark.parametrize("name", ["TIM1", "TIM3"])
 @settings(max_examples=60, deadline=None)
 @given(start=START, steps=ABOUT_OUTPUTS)
