@@ -20,12 +20,12 @@ from p2os.capture.chunks import LETTERS, Block, Direction
 from p2os.capture.columns.framing import LARGEST_FRAME, Bytes, Indexes, stalls_of
 from p2os.capture.columns.table import Table as RawTable
 from p2os.capture.columns.tables import Columns, decode
-from p2os.capture.describe import RAW_OF, SipFields, sip_fields
+from p2os.capture.describe import RAW_OF, Memo, SipFields
 from p2os.capture.listing import Reading
 from p2os.capture.table import FIRST_ROWS, LEADING, Table, uniform
 from p2os.protocol.frames import CHECKSUM_BYTES, GIVE_UP_NS, PREFIX_BYTES
 from p2os.protocol.packets import packet_name
-from p2os.protocol.sip import POSITION_MASK, TAIL, StandardSip
+from p2os.protocol.sip import POSITION_MASK, TAIL
 from simbase.timing import NS_PER_S, Nanos
 
 #: chosen: some ten thousand SIPs; larger ones take more memory and hardly less time.
@@ -307,18 +307,14 @@ class _Builder:
 
     def __init__(self, reading: Reading) -> None:
         self._metres = reading.parameters.distance_conv_mm / 1000
-        fields = SipFields(reading.profile, reading.parameters)
-        one = sip_fields(StandardSip(), reading.profile, reading.parameters)
-        self._names = list(one)
-        self._fields = {
-            name: _Conversion(cast("Callable[[int], Cell]", fields.memo(name).__getitem__), type(one[name]))
-            for name in one if name not in {"sonar_m", "x_m", "y_m"}
-        }  # fmt: skip
+        memos = cast("dict[str, Memo[Cell]]", SipFields(reading.profile, reading.parameters).memos)
+        self._names = list(memos)
+        self._fields = {name: _Conversion(memo.__getitem__, type(memo[0])) for name, memo in memos.items()}
         self._names_of = {name: _Conversion(convert, kind) for name, convert, kind in (
             ("dir", lambda _: Direction.FROM_ROBOT.value, str), ("type", int, int), ("name", packet_name, str),
             ("valid", lambda _: True, bool),
         )}  # fmt: skip
-        self._range = _Conversion(fields.range_m, float)
+        self._range = self._fields["sonar_m"]
         self._tail = {name: _Conversion(int, int) for name, _, _ in TAIL}
         #: Counts and raw value of the last SIP, by coordinate.
         self._last: dict[str, tuple[int, int]] = {}
