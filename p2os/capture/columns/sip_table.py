@@ -258,18 +258,24 @@ class _Builder:
             return {}
         numbers, row_of = ragged.columns["number"][:items], ragged.rows[:items]
         codes = self._range.codes(ragged.columns["raw_range"][:items])
-        order, found, end = np.argsort(numbers, kind="stable"), {}, 0
-        for number, count in enumerate(np.bincount(numbers).tolist()):
-            if count:
-                those = order[end : end + count]
-                end += count
-                mine = row_of[those]
-                present, cells = np.zeros(rows, np.bool_), np.zeros(rows, np.uint16)
-                # Of two readings of one row the later counts.
-                present[mine], cells[mine] = True, codes[those]
-                behind = int(those[0] - ragged.offsets[mine[0]])
-                column = Column(cells, present, self._range)
-                found[float(mine[0]), place + behind / 256] = f"sonar_m_{number}", column
+        # A row of places each, for the numbers that occur.
+        those = np.flatnonzero(np.bincount(numbers))
+        place_of = np.zeros(256, np.int64)
+        place_of[those] = np.arange(len(those)) * rows
+        present, cells = np.zeros(len(those) * rows, np.bool_), np.zeros(len(those) * rows, np.uint16)
+        places = place_of[numbers] + row_of
+        # Of two readings of one row the later counts.
+        present[places], cells[places] = True, codes
+        firsts = np.zeros(256, np.int64)
+        firsts[numbers[::-1]] = np.arange(items)[::-1]
+        found = {}
+        for which, number in enumerate(those.tolist()):
+            mine = slice(which * rows, (which + 1) * rows)
+            first = int(firsts[number])
+            row = int(row_of[first])
+            behind = first - int(ragged.offsets[row])
+            column = Column(cells[mine], present[mine], self._range)
+            found[float(row), place + behind / 256] = f"sonar_m_{number}", column
         return found
 
 

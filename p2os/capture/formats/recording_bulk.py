@@ -56,7 +56,7 @@ def _heads(data: Bytes, starts: Indexes, ends: Indexes) -> tuple[Indexes, Bytes,
     while len(rest):
         # Lines whose times have as many digits as the first are alike up to their bytes.
         begin = int(starts[rest[0]]) + len(_BEFORE_TIME)
-        digits = int((data[begin : begin + MOST_DIGITS + 1] == _COMMA).argmax())
+        digits = max(0, data[begin : begin + MOST_DIGITS + 1].tobytes().find(_COMMA))
         alike = data[np.minimum(starts[rest] + (len(_BEFORE_TIME) + digits), len(data) - 1)] == _COMMA
         mine, rest = rest[alike], rest[~alike]
         head = _Head(digits)
