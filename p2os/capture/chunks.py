@@ -12,7 +12,7 @@ Invariant: chunks are in the order in which they were read, and time never runs 
 
 from array import array
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from itertools import accumulate, chain
 from typing import TypeAlias
@@ -105,12 +105,14 @@ class Block:
         senders: `c` (client), `r` (robot) or `?` for each.
         ends: Where the bytes of each end in `data`, 64-bit integers, rising.
         data: All of their bytes.
+        is_in_order: Whether it is known that no time steps back.
     """
 
     at_ns: "array[int]"
     senders: bytes
     ends: "array[int]"
     data: bytes
+    is_in_order: bool = field(default=False, compare=False)
 
     def __len__(self) -> int:
         return len(self.senders)
@@ -165,13 +167,12 @@ def in_order(blocks: Iterable[Block]) -> Iterator[Block]:
     last_ns = 0
     for block in filter(len, blocks):
         # Looking costs a quarter of what accumulating does.
-        if block.at_ns[0] >= last_ns and array("q", sorted(block.at_ns)) == block.at_ns:
-            last_ns = block.at_ns[-1]
-            yield block
-        else:
-            at_ns = array("q", accumulate(block.at_ns, max, initial=last_ns))[1:]
-            last_ns = at_ns[-1]
-            yield Block(at_ns=at_ns, senders=block.senders, ends=block.ends, data=block.data)
+        is_in_order = block.is_in_order or array("q", sorted(block.at_ns)) == block.at_ns
+        at_ns = block.at_ns
+        if not is_in_order or at_ns[0] < last_ns:
+            at_ns = array("q", accumulate(at_ns, max, initial=last_ns))[1:]
+        last_ns = at_ns[-1]
+        yield block if at_ns is block.at_ns else replace(block, at_ns=at_ns)
 
 
 def capture_of(parts: Iterable[Part], *, has_time: bool = True, note: str = "") -> Capture:

@@ -8,7 +8,9 @@ import math
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
 from enum import Enum
-from typing import Any, TypeAlias, TypeVar, cast
+from functools import partial
+from operator import getitem
+from typing import TypeAlias, TypeVar
 
 from p2os.protocol.commands import Command
 from p2os.protocol.config_packet import FIELDS, ConfigPacket
@@ -17,32 +19,20 @@ from p2os.protocol.packets import READERS, Identity, RawPacket, packet_name, rea
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import (
     HEAD_BYTES,
+    MOVING,
     POSITION_MASK,
     READING_BYTES,
     SIP_KINDS,
     TAIL,
-    SonarReading,
-    StandardSip,
     unpack_head,
     unpack_tail,
 )
-from p2os.protocol.units import in_units
+from p2os.protocol.units import battery_v, heading_rad, range_m, rim_mps
 from p2os.robots.parameters import RobotParameters
 
 Plain: TypeAlias = "bool | int | float | str | list[Plain] | dict[str, Plain] | None"
 
 Value = TypeVar("Value")
-
-#: A field of a SIP in SI units → the raw field that alone decides it.
-RAW_OF = {
-    "moving": "kind", "x_m": "raw_x", "y_m": "raw_y",
-    "heading_rad": "raw_heading", "left_mps": "raw_left_velocity", "right_mps": "raw_right_velocity",
-    "battery_v": "raw_battery", "stall_left": "stall_left", "stall_right": "stall_right",
-    "front_bumpers": "front_bumpers", "rear_bumpers": "rear_bumpers", "control_rad": "raw_control",
-    "flags": "raw_flags", "servo_pulse": "raw_flags", "compass_deg": "raw_compass",
-    "gripper_state": "gripper_state", "analog_port": "analog_port", "analog": "raw_analog",
-    "digital_in": "digital_in", "digital_out": "digital_out",
-}  # fmt: skip
 
 #: A micrometre or a microradian: what is finer is an artefact of floating point.
 _DECIMALS = 6
@@ -115,41 +105,59 @@ def _frame(data: bytes) -> Frame:
     return Frame(data[PREFIX_BYTES:-CHECKSUM_BYTES])
 
 
-def sip_fields(sip: StandardSip, profile: Profile, parameters: RobotParameters) -> dict[str, Plain]:
-    """Return a SIP in SI units: positions either side of 0, the profile's reading of word 16."""
-    sensed = in_units(sip, parameters)
-    mm = parameters.distance_conv_mm
-    found: dict[str, Plain] = {
-        "moving": sensed.is_moving,
-        "x_m": _round(_signed(sip.raw_x) * mm / 1000),
-        "y_m": _round(_signed(sip.raw_y) * mm / 1000),
-        "heading_rad": _round(sensed.heading_rad),
-        "left_mps": _round(sensed.left_mps),
-        "right_mps": _round(sensed.right_mps),
-        "battery_v": sensed.battery_v,
-        "stall_left": bool(sip.stall_left),
-        "stall_right": bool(sip.stall_right),
-        "front_bumpers": sip.front_bumpers,
-        "rear_bumpers": sip.rear_bumpers,
-        "control_rad": _round(sip.raw_control * parameters.angle_conv_rad),
-        "flags" if profile.has_flags else "servo_pulse": sip.raw_flags,
-        "compass_deg": sip.raw_compass * 2,
-        "sonar_m": {str(number): _round(range_m) for number, range_m in sensed.sonar_m},
-        "gripper_state": sip.gripper_state,
-        "analog_port": sip.analog_port,
-        "analog": sip.raw_analog,
-        "digital_in": sip.digital_in,
-        "digital_out": sip.digital_out,
-    }
-    for (field, _, _), value in zip(TAIL, sip.tail, strict=False):
-        found[field.removeprefix("raw_")] = value
-    if sip.rest:
-        found["rest"] = sip.rest.hex(" ")
-    return found
+def _round(value: float) -> float:
+    rounded = round(value, _DECIMALS)
+    return rounded or 0.0  # no -0.0
+
+
+def _position(robot: RobotParameters, raw: int) -> float:
+    """Return a position of 15 bits either side of the origin, metres."""
+    half = (POSITION_MASK + 1) // 2
+    return _round((((raw & POSITION_MASK) + half) % (2 * half) - half) * robot.distance_conv_mm / 1000)
+
+
+def _speed(robot: RobotParameters, raw: int) -> float:
+    return _round(rim_mps(raw, robot))
+
+
+def _as_it_is(robot: RobotParameters, raw: int) -> int:
+    del robot
+    return raw
+
+
+#: The fields of a SIP in SI units, in their order: name, the raw field that alone decides it, and how. Word 16 is read
+#: as the profile says; of the sonar readings each is a value of its own.
+_SIP_FIELDS: tuple[tuple[str, str, Callable[[RobotParameters, int], Plain]], ...] = (
+    ("moving", "kind", lambda _, raw: raw == MOVING),
+    ("x_m", "raw_x", _position),
+    ("y_m", "raw_y", _position),
+    ("heading_rad", "raw_heading", lambda robot, raw: _round(heading_rad(raw, robot))),
+    ("left_mps", "raw_left_velocity", _speed),
+    ("right_mps", "raw_right_velocity", _speed),
+    ("battery_v", "raw_battery", lambda _, raw: battery_v(raw)),
+    ("stall_left", "stall_left", lambda _, raw: bool(raw)),
+    ("stall_right", "stall_right", lambda _, raw: bool(raw)),
+    ("front_bumpers", "front_bumpers", _as_it_is),
+    ("rear_bumpers", "rear_bumpers", _as_it_is),
+    ("control_rad", "raw_control", lambda robot, raw: _round(raw * robot.angle_conv_rad)),
+    ("flags", "raw_flags", _as_it_is),
+    ("servo_pulse", "raw_flags", _as_it_is),
+    ("compass_deg", "raw_compass", lambda _, raw: raw * 2),
+    ("sonar_m", "raw_range", lambda robot, raw: _round(range_m(raw, robot))),
+    ("gripper_state", "gripper_state", _as_it_is),
+    ("analog_port", "analog_port", _as_it_is),
+    ("analog", "raw_analog", _as_it_is),
+    ("digital_in", "digital_in", _as_it_is),
+    ("digital_out", "digital_out", _as_it_is),
+)
+#: A field of a SIP in SI units → the raw field that alone decides it.
+RAW_OF = {name: raw for name, raw, _ in _SIP_FIELDS}
+#: What word 16 is not, by whether a profile has flags there.
+_NOT_WORD_16 = {True: "servo_pulse", False: "flags"}
 
 
 class SipFields:
-    """What `sip_fields` says, many times a second: each raw value that occurs is converted once.
+    """A SIP in SI units: positions either side of 0, the profile's reading of word 16; each raw value converted once.
 
     Args:
         profile: Layout of the last fields.
@@ -157,22 +165,14 @@ class SipFields:
     """
 
     def __init__(self, profile: Profile, parameters: RobotParameters) -> None:
-        self._profile, self._parameters = profile, parameters
-        #: Of each field, in their order; None stands for the sonar readings.
-        self.memos = {name: None if name == "sonar_m" else self.memo(name) for name in self._described(StandardSip())}
-        self.sonar: Memo[Plain] = Memo(self._range)
+        self._profile = profile
+        #: Of each field, in their order; of `sonar_m`, of each reading.
+        self.memos = {
+            name: Memo(partial(convert, parameters))
+            for name, _, convert in _SIP_FIELDS if name != _NOT_WORD_16[profile.has_flags]
+        }  # fmt: skip
         #: As a tail's fields are called here.
         self.tail = tuple(name.removeprefix("raw_") for name, _, _ in TAIL)
-
-    def memo(self, name: str) -> "Memo[Plain]":
-        """Return what a field says of the raw value that alone decides it."""
-        raw = RAW_OF[name]
-
-        def convert(value: int) -> Plain:
-            one: dict[str, Any] = {raw: value}
-            return self._described(StandardSip(**one))[name]
-
-        return Memo(convert)
 
     def of(self, payload: bytes) -> dict[str, Plain] | None:
         """Return a SIP's fields, or None where it is no sound SIP inside."""
@@ -183,15 +183,13 @@ class SipFields:
         behind = 12 + 2 * count
         first, second, analog, digital_in, digital_out = head[behind:]
         gripper, port = (first, second) if self._profile.has_gripper_first else (second, first)
-        numbers = map(str, head[12:behind:2])
-        ranges: Plain = dict(zip(numbers, map(self.sonar.__getitem__, head[13:behind:2]), strict=True))
-        raw = iter((
+        memos = self.memos
+        ranges = map(memos["sonar_m"].__getitem__, head[13:behind:2])
+        found: dict[str, Plain] = dict(zip(memos, map(getitem, memos.values(), (
             payload[0], x, y, heading, left_velocity, right_velocity, battery, left & 1, right & 1, right >> 1,
-            left >> 1, control, flags, compass, gripper, port, analog, digital_in, digital_out,
-        ))  # fmt: skip
-        found: dict[str, Plain] = {
-            name: ranges if memo is None else memo[next(raw)] for name, memo in self.memos.items()
-        }
+            left >> 1, control, flags, compass, 0, gripper, port, analog, digital_in, digital_out,
+        )), strict=True))  # fmt: skip
+        found["sonar_m"] = dict(zip(map(str, head[12:behind:2]), ranges, strict=True))
         size = HEAD_BYTES + READING_BYTES * count
         if size < len(payload):
             tail, place = unpack_tail(payload, size)
@@ -199,17 +197,6 @@ class SipFields:
             if place < len(payload):
                 found["rest"] = payload[place:].hex(" ")
         return found
-
-    def _described(self, sip: StandardSip) -> dict[str, Plain]:
-        return sip_fields(sip, self._profile, self._parameters)
-
-    def range_m(self, raw_range: int) -> float:
-        """Return a sonar reading in metres."""
-        return cast("float", self.sonar[raw_range])
-
-    def _range(self, raw_range: int) -> Plain:
-        sonar = self._described(StandardSip(sonar=(SonarReading(0, raw_range),)))["sonar_m"]
-        return cast("dict[str, Plain]", sonar)["0"]
 
 
 class Memo(dict[int, Value]):
@@ -252,14 +239,3 @@ def _plain_leaf(value: object) -> Plain:
 def printable(data: bytes) -> str:
     """Return bytes as text, `.` for what cannot be shown."""
     return "".join(chr(byte) if 32 <= byte < 127 else "." for byte in data)
-
-
-def _round(value: float) -> float:
-    rounded = round(value, _DECIMALS)
-    return rounded or 0.0  # no -0.0
-
-
-def _signed(raw: int) -> int:
-    """Return a position of 15 bits either side of the origin."""
-    half = (POSITION_MASK + 1) // 2
-    return ((raw & POSITION_MASK) + half) % (2 * half) - half

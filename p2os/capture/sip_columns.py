@@ -85,10 +85,9 @@ class SipColumns:
         self._fields = SipFields(profile, parameters)
         port, gripper = ("second", "first") if profile.has_gripper_first else ("first", "second")
         self._renamed = {"analog_port": port, "gripper_state": gripper}
-        self._conversions = {name: Conversion(memo) for name, memo in self._fields.memos.items() if memo is not None}
-        ranges = self._fields.sonar
-        ranges[_ABSENT] = None
-        self._range = Conversion(ranges)
+        self._conversions = {name: Conversion(memo) for name, memo in self._fields.memos.items()}
+        self._range = self._conversions["sonar_m"]
+        self._fields.memos["sonar_m"][_ABSENT] = None
 
     def of(self, rows: Sequence[ListingRow]) -> dict[str, Sequence[Cell]] | None:
         """Return the columns in the order in which the rows first have them; None if not all are sound SIPs."""

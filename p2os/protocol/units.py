@@ -34,22 +34,42 @@ class SipInUnits:
     sonar_m: tuple[tuple[int, float], ...]
 
 
+def heading_rad(raw_heading: int, parameters: RobotParameters) -> float:
+    """Return a heading in radians, within half a turn of 0."""
+    return math.remainder(raw_heading * parameters.angle_conv_rad, 2 * math.pi)
+
+
+def rim_mps(raw_velocity: int, parameters: RobotParameters) -> float:
+    """Return a wheel's speed in m/s."""
+    return raw_velocity * (parameters.velocity_conv / 1000)
+
+
+def range_m(raw_range: int, parameters: RobotParameters) -> float:
+    """Return a sonar reading in metres from the transducer."""
+    return raw_range * parameters.range_conv_mm / 1000
+
+
+def battery_v(raw_battery: int) -> float:
+    """Return the battery's voltage."""
+    return raw_battery / 10
+
+
 def in_units(sip: StandardSip, parameters: RobotParameters) -> SipInUnits:
     """Return a SIP in SI units by a robot's parameters."""
-    speed, distance = parameters.velocity_conv / 1000, parameters.distance_conv_mm / 1000
-    left, right = sip.raw_left_velocity * speed, sip.raw_right_velocity * speed
+    distance = parameters.distance_conv_mm / 1000
+    left, right = (rim_mps(raw, parameters) for raw in (sip.raw_left_velocity, sip.raw_right_velocity))
     return SipInUnits(
         is_moving=sip.moving,
         x_m=(sip.raw_x & POSITION_MASK) * distance,
         y_m=(sip.raw_y & POSITION_MASK) * distance,
-        heading_rad=math.remainder(sip.raw_heading * parameters.angle_conv_rad, 2 * math.pi),
+        heading_rad=heading_rad(sip.raw_heading, parameters),
         left_mps=left,
         right_mps=right,
         turn_radps=(right - left) / (parameters.track_mm / 1000),
-        battery_v=sip.raw_battery / 10,
+        battery_v=battery_v(sip.raw_battery),
         stall_left=sip.stall_left,
         stall_right=sip.stall_right,
         front_bumpers=sip.front_bumpers,
         rear_bumpers=sip.rear_bumpers,
-        sonar_m=tuple((echo.number, echo.raw_range * parameters.range_conv_mm / 1000) for echo in sip.sonar),
+        sonar_m=tuple((echo.number, range_m(echo.raw_range, parameters)) for echo in sip.sonar),
     )

@@ -26,7 +26,7 @@ Indexes: TypeAlias = npt.NDArray[np.int64]
 Halves: TypeAlias = npt.NDArray[np.uint16]
 
 #: chosen: a block's arrays stay in the processor's cache.
-BLOCK_BYTES = 1 << 18
+BLOCK_BYTES = 1 << 16
 LARGEST_FRAME = MAX_COUNT + PREFIX_BYTES
 
 

@@ -5,7 +5,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from construct import Construct, Struct
 
-from p2os.capture.columns.walker import Spans, Walk, gather
+from p2os.capture.columns.gathering import gather
+from p2os.capture.columns.walker import Spans, Walk
 from p2os.protocol.config_packet import FIELDS, ConfigPacket
 from p2os.protocol.packets import (
     ArmInfoPacket,

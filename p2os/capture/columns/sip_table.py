@@ -9,23 +9,24 @@ conversions are those of `p2os.capture.describe`, asked once for each raw value 
 bytes and its table is held.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Any, cast, overload
+from collections.abc import Iterable, Iterator, Sequence
+from typing import cast
 
 import numpy as np
 import numpy.typing as npt
 
-from p2os.capture.cells import Cell, cell_text
+from p2os.capture.cells import Cell
 from p2os.capture.chunks import LETTERS, Block, Direction
+from p2os.capture.columns.column import Column, Conversion
 from p2os.capture.columns.framing import LARGEST_FRAME, Bytes, Indexes, stalls_of
 from p2os.capture.columns.table import Table as RawTable
 from p2os.capture.columns.tables import Columns, decode
-from p2os.capture.describe import RAW_OF, SipFields, sip_fields
+from p2os.capture.describe import RAW_OF, Memo, SipFields
 from p2os.capture.listing import Reading
 from p2os.capture.table import FIRST_ROWS, LEADING, Table, uniform
 from p2os.protocol.frames import CHECKSUM_BYTES, GIVE_UP_NS, PREFIX_BYTES
 from p2os.protocol.packets import packet_name
-from p2os.protocol.sip import POSITION_MASK, TAIL, StandardSip
+from p2os.protocol.sip import POSITION_MASK, TAIL
 from simbase.timing import NS_PER_S, Nanos
 
 #: chosen: some ten thousand SIPs; larger ones take more memory and hardly less time.
@@ -195,131 +196,20 @@ def _known(
     return known
 
 
-class _Conversion:
-    """What a field says of each raw value of 16 bits or fewer, as arrays that are indexed by its bits.
-
-    Args:
-        convert: The field.
-        kind: Of its cells.
-    """
-
-    def __init__(self, convert: Callable[[int], Cell], kind: type) -> None:
-        self._convert, self._kind = convert, kind
-        self._known = np.zeros(0, np.bool_)
-        self.values: npt.NDArray[Any] = np.zeros(0)
-        self.texts: npt.NDArray[Any] = np.zeros(0)
-
-    def codes(self, raw: npt.NDArray[Any]) -> npt.NDArray[np.uint16]:
-        """Return the places of raw values in `values` and `texts`."""
-        size = raw.dtype.itemsize
-        codes: npt.NDArray[np.uint16] = raw.astype(f"u{size}").astype(np.uint16)
-        if not len(self._known):
-            self._known = np.zeros(1 << 8 * size, np.bool_)
-            self.values = np.full(len(self._known), self._kind(), object if self._kind is str else self._kind)
-            self.texts = np.full(len(self._known), "", object)
-        # Nearly always everything is known: asking costs less than listing what occurs.
-        unknown = codes[~np.take(self._known, codes)]
-        for code in np.unique(unknown).tolist():
-            cell = self._convert(code - (raw.dtype.kind == "i" and code >> (8 * size - 1) and 1 << 8 * size))
-            self._known[code], self.values[code], self.texts[code] = True, cell, cell_text(cell)
-        return codes
-
-    def column(self, raw: npt.NDArray[Any], present: npt.NDArray[np.bool_] | None = None) -> "Column":
-        """Return a raw column converted."""
-        return Column(self.codes(raw), present, self)
-
-
-class Column(Sequence[Cell]):
-    """A column of one kind of cell, as an array; a cell that is absent is None.
-
-    Args:
-        codes: The cells themselves, or their places in what a conversion knows.
-        present: Which cells there are; None for all.
-        conversion: What the places are of.
-    """
-
-    def __init__(
-        self, codes: npt.NDArray[Any], present: npt.NDArray[np.bool_] | None = None,
-        conversion: _Conversion | None = None,
-    ) -> None:  # fmt: skip
-        self.codes, self.present, self.conversion = codes, present, conversion
-
-    @classmethod
-    def joined(cls, first: Sequence[Cell], second: Sequence[Cell]) -> "Column":
-        """Return two of one kind one behind the other; what is no `Column` has only None."""
-        one = next(column for column in (first, second) if isinstance(column, cls))
-        parts = [
-            column if isinstance(column, cls)
-            else cls(np.zeros(len(column), one.codes.dtype), np.zeros(len(column), np.bool_))
-            for column in (first, second)
-        ]  # fmt: skip
-        present = [np.ones(len(part), np.bool_) if part.present is None else part.present for part in parts]
-        return cls(np.concatenate([part.codes for part in parts]), np.concatenate(present), one.conversion)
-
-    @property
-    def values(self) -> npt.NDArray[Any]:
-        """The cells; anything where one is absent."""
-        return self.codes if self.conversion is None else self.conversion.values[self.codes]
-
-    @property
-    def kind(self) -> str:
-        """NumPy's letter for the kind of the cells."""
-        return str((self.codes if self.conversion is None else self.conversion.values).dtype.kind)
-
-    def has_any(self) -> bool:
-        """Tell whether there is a cell."""
-        return self.present is None or bool(self.present.any())
-
-    def texts(self) -> Sequence[str]:
-        """Return each cell as it stands in CSV."""
-        if self.conversion is None:
-            return [cell_text(cell) for cell in self]
-        texts = self.conversion.texts[self.codes]
-        if self.present is not None:
-            texts[~self.present] = ""
-        return cast("list[str]", texts.tolist())
-
-    def tolist(self) -> list[Cell]:
-        """Return the cells."""
-        cells: list[Cell] = self.values.tolist()
-        if self.present is not None:
-            cells = [cell if there else None for cell, there in zip(cells, self.present.tolist(), strict=True)]
-        return cells
-
-    def __len__(self) -> int:
-        return len(self.codes)
-
-    def __iter__(self) -> Iterator[Cell]:
-        return iter(self.tolist())
-
-    @overload
-    def __getitem__(self, place: int) -> Cell: ...
-    @overload
-    def __getitem__(self, place: slice) -> "Column": ...
-    def __getitem__(self, place: int | slice) -> "Cell | Column":
-        if isinstance(place, slice):
-            return Column(self.codes[place], None if self.present is None else self.present[place], self.conversion)
-        return self.tolist()[place]
-
-
 class _Builder:
     """Turns raw SIPs into columns, block by block."""
 
     def __init__(self, reading: Reading) -> None:
         self._metres = reading.parameters.distance_conv_mm / 1000
-        fields = SipFields(reading.profile, reading.parameters)
-        one = sip_fields(StandardSip(), reading.profile, reading.parameters)
-        self._names = list(one)
-        self._fields = {
-            name: _Conversion(cast("Callable[[int], Cell]", fields.memo(name).__getitem__), type(one[name]))
-            for name in one if name not in {"sonar_m", "x_m", "y_m"}
-        }  # fmt: skip
-        self._names_of = {name: _Conversion(convert, kind) for name, convert, kind in (
+        memos = cast("dict[str, Memo[Cell]]", SipFields(reading.profile, reading.parameters).memos)
+        self._names = list(memos)
+        self._fields = {name: Conversion(memo.__getitem__, type(memo[0])) for name, memo in memos.items()}
+        self._names_of = {name: Conversion(convert, kind) for name, convert, kind in (
             ("dir", lambda _: Direction.FROM_ROBOT.value, str), ("type", int, int), ("name", packet_name, str),
             ("valid", lambda _: True, bool),
         )}  # fmt: skip
-        self._range = _Conversion(fields.range_m, float)
-        self._tail = {name: _Conversion(int, int) for name, _, _ in TAIL}
+        self._range = self._fields["sonar_m"]
+        self._tail = {name: Conversion(int, int) for name, _, _ in TAIL}
         #: Counts and raw value of the last SIP, by coordinate.
         self._last: dict[str, tuple[int, int]] = {}
 
@@ -368,18 +258,24 @@ class _Builder:
             return {}
         numbers, row_of = ragged.columns["number"][:items], ragged.rows[:items]
         codes = self._range.codes(ragged.columns["raw_range"][:items])
-        order, found, end = np.argsort(numbers, kind="stable"), {}, 0
-        for number, count in enumerate(np.bincount(numbers).tolist()):
-            if count:
-                those = order[end : end + count]
-                end += count
-                mine = row_of[those]
-                present, cells = np.zeros(rows, np.bool_), np.zeros(rows, np.uint16)
-                # Of two readings of one row the later counts.
-                present[mine], cells[mine] = True, codes[those]
-                behind = int(those[0] - ragged.offsets[mine[0]])
-                column = Column(cells, present, self._range)
-                found[float(mine[0]), place + behind / 256] = f"sonar_m_{number}", column
+        # A row of places each, for the numbers that occur.
+        those = np.flatnonzero(np.bincount(numbers))
+        place_of = np.zeros(256, np.int64)
+        place_of[those] = np.arange(len(those)) * rows
+        present, cells = np.zeros(len(those) * rows, np.bool_), np.zeros(len(those) * rows, np.uint16)
+        places = place_of[numbers] + row_of
+        # Of two readings of one row the later counts.
+        present[places], cells[places] = True, codes
+        firsts = np.zeros(256, np.int64)
+        firsts[numbers[::-1]] = np.arange(items)[::-1]
+        found = {}
+        for which, number in enumerate(those.tolist()):
+            mine = slice(which * rows, (which + 1) * rows)
+            first = int(firsts[number])
+            row = int(row_of[first])
+            behind = first - int(ragged.offsets[row])
+            column = Column(cells[mine], present[mine], self._range)
+            found[float(row), place + behind / 256] = f"sonar_m_{number}", column
         return found
 
 

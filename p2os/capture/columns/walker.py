@@ -15,6 +15,7 @@ import numpy.typing as npt
 from construct import Array, Construct, FormatField, NullTerminated, Renamed, Struct
 
 from p2os.capture.columns.framing import Indexes
+from p2os.capture.columns.gathering import gather, gather_items, indexes_of, offsets_of
 
 Column: TypeAlias = npt.NDArray[Any]
 
@@ -150,52 +151,6 @@ class Walk:
             texts[name] = Spans(starts, np.concatenate([walk.texts[name].ends for walk in walks])[order])
         taken_of = np.bincount(np.concatenate(rows), minlength=len(self.places))
         return Ragged(offsets_of(taken_of), columns, texts)
-
-
-def gather(
-    data: npt.NDArray[np.uint8], starts: Indexes, dtype: np.dtype[np.void], sound: npt.NDArray[np.bool_] | None
-) -> npt.NDArray[np.void]:
-    """Return one record a start; zeros where a packet is not sound."""
-    size = dtype.itemsize
-    if len(data) < size:
-        return np.zeros(len(starts), dtype)
-    # Every place of the data seen as the start of a block of bytes: taking blocks is one copy each.
-    blocks = np.ndarray((len(data) - size + 1,), f"V{size}", data, strides=(1,))
-    if sound is None or sound.all():
-        return blocks[starts].view(dtype)
-    records = np.zeros(len(starts), dtype)
-    records[sound] = blocks[starts[sound]].view(dtype)
-    return records
-
-
-def gather_items(
-    data: npt.NDArray[np.uint8], starts: Indexes, counts: Indexes, dtype: np.dtype[np.void]
-) -> tuple[npt.NDArray[np.void], Indexes]:
-    """Return so many records from each start on, and where those of each start begin."""
-    offsets, size = offsets_of(counts), dtype.itemsize
-    total = int(offsets[-1])
-    items = np.empty(total, dtype)
-    # Packets with as many records are copied together, the records of each in one piece.
-    for count in np.flatnonzero(np.bincount(counts, minlength=1)).tolist():
-        if count:
-            rows = np.flatnonzero(counts == count)
-            source = np.ndarray((len(data) - count * size + 1,), f"V{count * size}", data, strides=(1,))
-            target = np.ndarray((total - count + 1,), f"V{count * size}", items, strides=(size,))
-            target[offsets[rows]] = source[starts[rows]]
-    return items, offsets
-
-
-def offsets_of(counts: Indexes) -> Indexes:
-    """Return where the items of each row begin, and one past the last."""
-    offsets: Indexes = np.zeros(len(counts) + 1, np.int64)
-    np.cumsum(counts, out=offsets[1:])
-    return offsets
-
-
-def indexes_of(starts: Indexes, counts: Indexes) -> Indexes:
-    """Return the places `start`, `start + 1`, ... of each start, as many as its count says."""
-    offsets = offsets_of(counts)
-    return np.repeat(starts - offsets[:-1], counts) + np.arange(offsets[-1])
 
 
 def _bare(construct: Construct) -> Construct:

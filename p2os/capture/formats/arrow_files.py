@@ -46,6 +46,7 @@ def write_arrow(tables: Iterable[Table], path: Path) -> int:
 
 def _pyarrow(path: Path) -> Any:
     try:
+        import numpy as np  # noqa: F401  # what makes the arrays
         import pyarrow as pa
     except ImportError as error:
         raise MissingDependencyError(
@@ -57,18 +58,20 @@ def _pyarrow(path: Path) -> Any:
 def _write(tables: Iterable[Table], path: Path, writer_of: Any) -> int:
     """Write tables; without any there is no file."""
     pa = _pyarrow(path)
-    count, schema = 0, None
+    from p2os.capture.columns.arrow import cells_array, kind_of
+
+    count = 0
     every = iter(tables)
     first = next(every, None)
     if first is None:
         return 0
-    schema = pa.schema([(name, _type(pa, column)) for name, column in first.columns.items()])
+    kinds = [kind_of(column) for column in first.columns.values()]
+    types = {"b": pa.bool_(), "i": pa.int64(), "f": pa.float64(), "O": pa.string()}
+    schema = pa.schema([(name, types[kind]) for name, kind in zip(first.columns, kinds, strict=True)])
     with path.open("wb") as file, writer_of(file, schema, first.columns) as writer:
         group: list[Any] = []
         for table in chain([first], every):
-            arrays = [
-                _array(pa, column, field.type) for column, field in zip(table.columns.values(), schema, strict=True)
-            ]
+            arrays = [cells_array(*both) for both in zip(table.columns.values(), kinds, strict=True)]
             group.append(pa.Table.from_arrays(arrays, schema=schema))
             count += table.rows
             if sum(part.num_rows for part in group) >= GROUP_ROWS:
@@ -77,32 +80,3 @@ def _write(tables: Iterable[Table], path: Path, writer_of: Any) -> int:
         if group:
             writer.write_table(pa.concat_tables(group))
     return count
-
-
-def _type(pa: Any, column: Sequence[Cell]) -> Any:
-    """Return the type that holds every cell of a column: text where they are of several kinds."""
-    if (kind := _array_kind(column)) is not None:
-        return {"b": pa.bool_(), "i": pa.int64(), "f": pa.float64()}.get(kind, pa.string())
-    kinds = frozenset(map(type, column)) - {type(None)}
-    known = {bool: pa.bool_(), int: pa.int64(), float: pa.float64()}
-    only = next(iter(kinds)) if len(kinds) == 1 else float if kinds == {int, float} else str
-    return known.get(only, pa.string())
-
-
-def _array_kind(column: Sequence[Cell]) -> str | None:
-    kind: str | None = getattr(column, "kind", None)
-    return kind
-
-
-def _array(pa: Any, column: Sequence[Cell], kind: Any) -> Any:
-    if _array_kind(column) is None:
-        if kind == pa.string():
-            return pa.array([cell if cell is None or isinstance(cell, str) else str(cell) for cell in column], kind)
-        return pa.array(column, kind)
-    codes, present, conversion = column.codes, column.present, column.conversion  # type: ignore[attr-defined]  # a column of NumPy's
-    mask = None if present is None else ~present
-    if conversion is None:
-        return pa.array(codes, kind, mask=mask)
-    if kind == pa.string():
-        return pa.array(conversion.values, kind).take(pa.array(codes, mask=mask))
-    return pa.array(conversion.values.take(codes), kind, mask=mask)

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from p2os.capture.chunks import LETTERS, Block, Direction, blocks_of
+from p2os.capture.columns.gathering import gather, joined
 from p2os.capture.formats.conversations import IN_DIRECTION, LEAST_RECORDS, LINKTYPE_USER0, LONGEST_NS, Conversations
 from p2os.capture.formats.pcap_records import Records
 from p2os.capture.formats.tcp_streams import IPV4, IPV6, LINKS, MOST_WAITING, SYN, TCP, End, Half
@@ -54,9 +55,8 @@ def _times(records: Records, said: Conversations) -> tuple[_Numbers, _Numbers, _
     data = np.frombuffer(records.data, np.uint8)
 
     def number(at: int) -> _Numbers:
-        fields = np.lib.stride_tricks.sliding_window_view(data, 4)[starts + at]
-        numbers: _Numbers = fields.view(layout.order + "u4")[:, 0].astype(np.int64)
-        return numbers
+        numbers: _Numbers = gather(data, starts + at, np.dtype([("number", layout.order + "u4")]), None)["number"]
+        return numbers.astype(np.int64)
 
     high, unit_ns = number(layout.high_at), NS_PER_S // layout.ticks_per_s
     if (int(high.max()) + 1) * layout.radix * unit_ns >= 1 << 62:
@@ -80,10 +80,9 @@ def _block(data: bytes, at_ns: _Numbers, senders: _Bytes, begins: _Numbers, ends
         has = sizes > 0
         at_ns, senders, begins, ends, sizes = at_ns[has], senders[has], begins[has], ends[has], sizes[has]
     if len(sizes):
-        pieces = [data[begin:end] for begin, end in zip(begins.tolist(), ends.tolist(), strict=True)]
         yield Block(
             at_ns=array("q", at_ns.tobytes()), senders=senders.tobytes(), ends=array("q", np.cumsum(sizes).tobytes()),
-            data=b"".join(pieces),
+            data=joined(data, begins, sizes), is_in_order=bool((at_ns[1:] >= at_ns[:-1]).all()),
         )  # fmt: skip
 
 
@@ -113,7 +112,7 @@ class _Segments:
         self._records, self._said, self._at_ns = records, said, at_ns
         skip, type_at = LINKS[records.link]
         data = np.frombuffer(records.data + bytes(skip + _HEADERS), np.uint8)
-        looked_at = np.lib.stride_tricks.sliding_window_view(data, skip + _HEADERS)[begins]
+        looked_at = gather(data, begins, np.dtype([("bytes", "u1", (skip + _HEADERS,))]), None)["bytes"]
         ip = looked_at[:, skip:]
         held = ends - begins - skip
         is_ip = np.ones(len(begins), np.bool_)

@@ -217,12 +217,12 @@ def _blocks_of_lines(file: io.BufferedReader) -> Iterator[bytes]:
     rest: list[bytes] = []
     size = 0
     for data in _blocks_of_bytes(file):
-        whole, newline, tail = data.rpartition(b"\n")
-        if newline:
-            yield b"".join((*rest, whole, newline))
+        end = data.rfind(b"\n") + 1
+        if end:
+            yield b"".join((*rest, memoryview(data)[:end]))
             rest, size = [], 0
-        rest.append(tail)
-        size += len(tail)
+        rest.append(data[end:])
+        size += len(data) - end
         if size >= LONGEST_LINE:
             yield b"".join(rest)
             rest, size = [], 0

@@ -5,6 +5,7 @@ answer to SYNC2, and the model implies which firmware family it runs.
 """
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from itertools import chain
 from typing import Annotated
 
@@ -106,7 +107,7 @@ def _look(blocks: Iterator[Block], seen: list[Block]) -> tuple[str, Profile]:
     cutter = FrameCutter()
     for chunk in chunks_of(_noted(blocks, seen)):
         size += len(chunk.data)
-        for piece in cutter.take(chunk):
+        for piece in cutter.take(replace(chunk, data=chunk.data[:LOOKED_AT_BYTES])):
             if piece.direction is Direction.TO_ROBOT or len(piece.data) < 6 or piece.data[:2] != b"\xfa\xfb":
                 continue
             kind, data = piece.data[3], piece.data[4:-2]
