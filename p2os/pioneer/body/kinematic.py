@@ -263,7 +263,7 @@ class KinematicBody(BodyInWorld):
 
     def _ramp_on(self, setpoints: Sequence[tuple[float, float]]) -> list[Turned]:
         """Make those first steps that surely lead nowhere near a thing: what as many of `go` do."""
-        if self.others or self._is_bumped or self._contacts.apart < APART_STEPS:
+        if self._is_stepped_by_others or self._is_bumped or self._contacts.apart < APART_STEPS:
             return []
         if self._walking:
             setpoints = setpoints[: WALK_STEPS - 1 - self._steps % WALK_STEPS]
@@ -307,7 +307,7 @@ class KinematicBody(BodyInWorld):
         if self._walking:
             steps = min(steps, WALK_STEPS - 1 - self._steps % WALK_STEPS)
         asked = (left_mps, right_mps)
-        if self.others or self._is_bumped or asked != self._driven or steps <= 0:
+        if self._is_stepped_by_others or self._is_bumped or asked != self._driven or steps <= 0:
             return []
         if left_mps == right_mps == 0.0:
             turned = self.go(0.0, 0.0)
@@ -610,9 +610,14 @@ class KinematicBody(BodyInWorld):
             things = self._plan.echoing_within(min(xs), min(ys), max(xs), max(ys))
         return [*things, *self._echoing_robots(x, y, rays, longest_m)] if self.others else things
 
+    @property
+    def _is_stepped_by_others(self) -> bool:
+        """Whether its steps are not its own alone: other robots are there, or its scene has another `step`."""
+        return bool(self.others) or type(self.scene).step is not KinematicScene.step
+
     def steps_within(self, turn_rad: float, rim_mps: float) -> int:
         """Return for how many steps no wheel turns farther while it is told no more; 0 where a robot may push it."""
-        return 0 if self.others else self._steps_to_roll(turn_rad, rim_mps)
+        return 0 if self._is_stepped_by_others else self._steps_to_roll(turn_rad, rim_mps)
 
     def clearance(self, *, no_more_than: float = math.inf) -> float:
         """Return the distance from the hull to the nearest thing that it could touch, metres, or `no_more_than`."""
