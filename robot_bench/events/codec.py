@@ -13,9 +13,7 @@ from binascii import a2b_base64
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cache
-from json.encoder import encode_basestring_ascii
-from operator import attrgetter
+from json.encoder import encode_basestring_ascii as _quoted
 from typing import Any, TypeAlias, cast
 
 from robot_bench.events.kinds import (
@@ -88,20 +86,14 @@ def _um(metres: float) -> int:
 @dataclass(frozen=True, slots=True)
 class _Row:
     kind: str
-    to_entry: Callable[[Any], Mapping[str, object]]
+    #: Spells an event of this kind: sorted keys, no spaces, as `_encode` does; what comes often without an encoder.
+    line: Callable[[str, Any], str]
     from_entry: Callable[[Nanos, Json], Recorded | None]
-    #: Keys whose values are texts that JSON takes as they are, where all others are integers, or spelled out
-    #: already: such lines, nearly all of a run, are spelled without an encoder. None: there are other values.
-    plain_texts: frozenset[str] | None = None
 
 
-@cache
-def _template(keys: tuple[str, ...], texts: frozenset[str]) -> str:
-    """Return a format of what the encoder makes of an entry with these keys; its kind is such a text itself."""
-    texts |= {"k"}
-    return (
-        "{" + ",".join(f'"{key}":"%({key})s"' if key in texts else f'"{key}":%({key})s' for key in sorted(keys)) + "}"
-    )
+def _encoded(to_entry: Callable[[Any], Mapping[str, object]]) -> Callable[[str, Any], str]:
+    """Return how a kind is spelled by the encoder, from what it has beside its kind and its time."""
+    return lambda kind, event: _encode({"k": kind, "t": event.t, **to_entry(event)})
 
 
 def _integer(entry: Json, key: str) -> int:
@@ -117,10 +109,10 @@ def _whole(value: float) -> int:
     return int(value)
 
 
-def _pins_entry(pins: Levels | EdgeBlock) -> Mapping[str, object]:
-    if isinstance(pins, Levels):
-        return {"v": BLOCKS_VERSION, "nets": pins.nets, "levels": pins.levels}
-    return {"n": pins.count, "d": pins.data}
+def _pins_line(kind: str, pins: Levels | EdgeBlock) -> str:
+    if isinstance(pins, EdgeBlock):
+        return f'{{"d":"{pins.data}","k":"{kind}","n":{pins.count},"t":{pins.t}}}'
+    return _encode({"k": kind, "t": pins.t, "v": BLOCKS_VERSION, "nets": pins.nets, "levels": pins.levels})
 
 
 def _pins(t: Nanos, entry: Json) -> Recorded:
@@ -134,8 +126,14 @@ def _pins(t: Nanos, entry: Json) -> Recorded:
     return Levels(t=t, nets=nets, levels=levels)
 
 
-def _text_entry(text: Text) -> Mapping[str, object]:
-    return {"hex": text.data.hex()} | ({} if text.port == "usart1" else {"port": text.port})
+def _text_line(kind: str, text: Text) -> str:
+    port = "" if text.port == "usart1" else f'"port":{_quoted(text.port)},'
+    return f'{{"hex":"{text.data.hex()}","k":"{kind}",{port}"t":{text.t}}}'
+
+
+def _note_line(kind: str, note: Note) -> str:
+    said = f'"t":{note.t},"what":{_quoted(note.what)},"who":{_quoted(note.who)}'
+    return f'{{"detail":{_quoted(note.detail)},"k":"{kind}",{said}}}'
 
 
 def _note(t: Nanos, entry: Json) -> Recorded:
@@ -167,14 +165,14 @@ _POSE = {
 }  # fmt: skip
 
 
-_POSE_KEYS, _pose_values = tuple(_POSE), attrgetter(*_POSE.values())
-
-
-def _pose_entry(pose: Pose) -> Mapping[str, object]:
-    entry = dict(zip(_POSE_KEYS, _pose_values(pose), strict=True))
-    if pose.work is not None:
-        entry["w"] = pose.work
-    return entry
+def _pose_line(kind: str, pose: Pose) -> str:
+    """Return the line of a pose; its keys are those of `_POSE`, and `w`."""
+    work = "" if pose.work is None else f'"w":{pose.work},'
+    return (
+        f'{{"c":{pose.collisions},"h":{pose.heading},"k":"{kind}","l":{pose.left},"la":{pose.left_angle},'
+        f'"p":{pose.pitch},"r":{pose.right},"ra":{pose.right_angle},"t":{pose.t},{work}'
+        f'"x":{pose.x},"y":{pose.y},"z":{pose.z}}}'
+    )
 
 
 def _pose(t: Nanos, entry: Json) -> Recorded:
@@ -197,49 +195,53 @@ def _wave(t: Nanos, entry: Json) -> Recorded:
     return Wave(t=t, wire=str(entry["net"]), at=at, period=period, high=high, ticks_hz=hz)
 
 
-def _can_entry(frame: CanTransfer) -> Mapping[str, object]:
-    flags = {"ext": frame.is_extended, "rtr": frame.is_remote, "own": frame.is_own}
-    told = {"bus": frame.bus, "from": frame.begun, "id": frame.identifier, "dlc": frame.dlc, "hex": frame.data.hex()}
-    return told | {key: int(value) for key, value in flags.items()} | {"error": frame.error}
+def _spi_line(kind: str, spi: SpiTransfer) -> str:
+    words = f'"miso":"{spi.from_slave.hex()}","mosi":"{spi.from_master.hex()}"'
+    return (
+        f'{{"bits":{spi.bits},"bus":{_quoted(spi.bus)},"from":{spi.begun},"k":"{kind}",{words},"t":{spi.t},'
+        f'"to":{spi.ended}}}'
+    )
+
+
+def _i2c_line(kind: str, i2c: I2cTransfer) -> str:
+    return (
+        f'{{"acks":{i2c.acknowledged},"address":{i2c.address},"answered":{int(i2c.answered)},"bus":{_quoted(i2c.bus)},'
+        f'"end":{_quoted(i2c.end)},"from":{i2c.begun},"hex":"{i2c.data.hex()}","k":"{kind}","read":{int(i2c.is_read)},'
+        f'"t":{i2c.t}}}'
+    )
+
+
+def _can_line(kind: str, frame: CanTransfer) -> str:
+    flags = f'"own":{int(frame.is_own)},"rtr":{int(frame.is_remote)}'
+    return (
+        f'{{"bus":{_quoted(frame.bus)},"dlc":{frame.dlc},"error":{_quoted(frame.error)},"ext":{int(frame.is_extended)},'
+        f'"from":{frame.begun},"hex":"{frame.data.hex()}","id":{frame.identifier},"k":"{kind}",{flags},"t":{frame.t}}}'
+    )
+
+
+def _wave_line(kind: str, wave: Wave) -> str:
+    turns = f'"net":{_quoted(wave.wire)},"period":{wave.period}'
+    return f'{{"at":{wave.at},"high":{wave.high},"hz":{wave.ticks_hz},"k":"{kind}",{turns},"t":{wave.t}}}'
 
 
 #: In the order of one instant.
 ROWS: Mapping[type, _Row] = {
-    Levels: _Row("pins", _pins_entry, _pins),
-    EdgeBlock: _Row("pins", _pins_entry, _pins),
+    Levels: _Row("pins", _pins_line, _pins),
+    EdgeBlock: _Row("pins", _pins_line, _pins),
     PinEdge: _Row(
         "pin",
-        lambda edge: {"net": edge.wire, "v": int(edge.level)},
+        _encoded(lambda edge: {"net": edge.wire, "v": int(edge.level)}),
         lambda t, entry: PinEdge(t=t, wire=str(entry["net"]), level=_level(_integer(entry, "v"))),
     ),
-    Wave: _Row(
-        "wave",
-        lambda wave: {
-            "net": encode_basestring_ascii(wave.wire),
-            "at": wave.at,
-            "period": wave.period,
-            "high": wave.high,
-            "hz": wave.ticks_hz,
-        },
-        _wave,
-        frozenset(),
-    ),
+    Wave: _Row("wave", _wave_line, _wave),
     Text: _Row(
         "usart",
-        _text_entry,
+        _text_line,
         lambda t, entry: Text(t=t, data=bytes.fromhex(str(entry["hex"])), port=str(entry.get("port", "usart1"))),
-        frozenset({"hex", "port"}),
     ),
     SpiTransfer: _Row(
         "spi",
-        lambda spi: {
-            "bus": spi.bus,
-            "from": spi.begun,
-            "to": spi.ended,
-            "mosi": spi.from_master.hex(),
-            "miso": spi.from_slave.hex(),
-            "bits": spi.bits,
-        },
+        _spi_line,
         lambda t, entry: SpiTransfer(
             t=t,
             bus=str(entry["bus"]),
@@ -249,20 +251,10 @@ ROWS: Mapping[type, _Row] = {
             from_slave=bytes.fromhex(str(entry["miso"])),
             bits=_integer(entry, "bits"),
         ),
-        frozenset({"bus", "mosi", "miso"}),
     ),
     I2cTransfer: _Row(
         "i2c",
-        lambda i2c: {
-            "bus": i2c.bus,
-            "from": i2c.begun,
-            "address": i2c.address,
-            "read": int(i2c.is_read),
-            "hex": i2c.data.hex(),
-            "answered": int(i2c.answered),
-            "acks": i2c.acknowledged,
-            "end": i2c.end,
-        },
+        _i2c_line,
         lambda t, entry: I2cTransfer(
             t=t,
             bus=str(entry["bus"]),
@@ -274,11 +266,10 @@ ROWS: Mapping[type, _Row] = {
             acknowledged=_integer(entry, "acks"),
             end=str(entry["end"]),
         ),
-        frozenset({"bus", "hex", "end"}),
     ),
     CanTransfer: _Row(
         "can",
-        _can_entry,
+        _can_line,
         lambda t, entry: CanTransfer(
             t=t,
             bus=str(entry["bus"]),
@@ -291,42 +282,35 @@ ROWS: Mapping[type, _Row] = {
             is_own=_level(_integer(entry, "own")),
             error=str(entry["error"]),
         ),
-        frozenset({"bus", "hex", "error"}),
     ),
-    WorldChange: _Row("obstacle", lambda item: {"op": item.op, "name": item.name, **item.fields}, _world_change),
+    WorldChange: _Row(
+        "obstacle", _encoded(lambda item: {"op": item.op, "name": item.name, **item.fields}), _world_change
+    ),
     Fault: _Row(
         "fault",
-        lambda fault: {"op": fault.op, "words": fault.words},
+        _encoded(lambda fault: {"op": fault.op, "words": fault.words}),
         lambda t, entry: Fault(t=t, op=str(entry["op"]), words=str(entry["words"])),
     ),
     Packet: _Row(
         "wire",
-        lambda packet: {"dir": packet.direction, "hex": packet.data.hex()},
+        lambda kind, packet: f'{{"dir":"{packet.direction}","hex":"{packet.data.hex()}","k":"{kind}","t":{packet.t}}}',
         lambda t, entry: Packet(t=t, direction=str(entry["dir"]), data=bytes.fromhex(str(entry["hex"]))),
-        frozenset({"dir", "hex"}),
     ),
-    Note: _Row("event", lambda note: {"who": note.who, "what": note.what, "detail": note.detail}, _note),
+    Note: _Row("event", _note_line, _note),
     Ranges: _Row(
         "sonar",
-        lambda ranges: {"mm": f"[{','.join(map(str, ranges.mm))}]"},
+        lambda kind, ranges: f'{{"k":"{kind}","mm":[{",".join(map(str, ranges.mm))}],"t":{ranges.t}}}',
         lambda t, entry: Ranges(t=t, mm=tuple(_whole(value) for value in cast("list[float]", entry["mm"]))),
-        frozenset(),
     ),
-    Pose: _Row(
-        "pose",
-        _pose_entry,
-        _pose,
-        frozenset(),
-    ),
+    Pose: _Row("pose", _pose_line, _pose),
     Clearance: _Row(
         "clearance",
-        lambda clearance: {"um": clearance.um},
+        lambda kind, clearance: f'{{"k":"{kind}","t":{clearance.t},"um":{clearance.um}}}',
         lambda t, entry: Clearance(t=t, um=_integer(entry, "um")),
-        frozenset(),
     ),
     Contact: _Row(
         "contact",
-        lambda hit: {"what": hit.what, "x": _um(hit.x_m), "y": _um(hit.y_m), "part": hit.part},
+        _encoded(lambda hit: {"what": hit.what, "x": _um(hit.x_m), "y": _um(hit.y_m), "part": hit.part}),
         lambda t, entry: Contact(
             t=t,
             what=str(entry["what"]),
@@ -337,13 +321,15 @@ ROWS: Mapping[type, _Row] = {
     ),
     Verdict: _Row(
         "verdict",
-        lambda verdict: {
-            "goal": verdict.goal,
-            "met": verdict.met,
-            "says": verdict.says,
-            "robustness": verdict.robustness,
-            "unit": verdict.unit,
-        },
+        _encoded(
+            lambda verdict: {
+                "goal": verdict.goal,
+                "met": verdict.met,
+                "says": verdict.says,
+                "robustness": verdict.robustness,
+                "unit": verdict.unit,
+            }
+        ),
         _verdict,
     ),
 }
@@ -363,9 +349,7 @@ def _level(value: int) -> bool:
 def line_of(event: Recorded) -> str:
     """Return the one spelling of an event, without its line end: sorted keys, no spaces."""
     row = ROWS[type(event)]
-    entry = {"k": row.kind, "t": event.t, **row.to_entry(event)}
-    texts = row.plain_texts
-    return _encode(entry) if texts is None else _template(tuple(entry), texts) % entry
+    return row.line(row.kind, event)
 
 
 def event_of(entry: Json) -> Recorded | None:

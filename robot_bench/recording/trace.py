@@ -25,13 +25,15 @@ from p2os.errors import RunFailedError
 from robot_bench.events.codec import TRACE_VERSION, Recorded, line_of
 from robot_bench.events.kinds import Verdict
 from simbase.errors import FileError
-from simbase.state import Stateful
+from simbase.state import PartState, Stateful
 from simbase.timing import NS_PER_S, Nanos
 
 #: A line's content.
 Entry = Mapping[str, object]
 #: The hash of no line at all.
 EMPTY_HASH = bytes(32)
+#: chosen: so many events are kept at the most before their lines are made.
+MOST_UNSPELLED = 4096
 #: How a line begins that is not hashed; no other begins with its kind.
 _UNHASHED = '{"k": "'
 
@@ -60,13 +62,15 @@ class TraceWriter(Stateful):
     """
 
     STATE = ("_flushed_second", "_hash", "has_meta", "has_end", "written")
-    #: The disk's trouble is this process's own.
-    DERIVED = ("_failure", "_length")
+    #: The disk's trouble is this process's own; what is not spelled yet is so before the state is asked for.
+    DERIVED = ("_failure", "_length", "_unspelled")
 
     def __init__(self, path: Path | None = None, *, goes_on: bool = False) -> None:
         self.path = path
         self._file: IO[str] = io.StringIO()
         self._length = 0
+        #: Events taken whose lines were not made yet: many in one go cost less than a few at a time.
+        self._unspelled: list[Recorded] = []
         if path is not None:
             try:
                 self._file = path.open("r+" if goes_on else "w", encoding="ascii", newline="\n")
@@ -81,11 +85,13 @@ class TraceWriter(Stateful):
     @property
     def sha256(self) -> str:
         """Return the hash of all hashed lines written so far."""
+        self._spell()
         return self._hash.hex()
 
     @property
     def text(self) -> str:
         """Return what was written, where there is no file."""
+        self._spell()
         return self._file.getvalue() if isinstance(self._file, io.StringIO) else ""
 
     def meta(self, entry: Entry) -> None:
@@ -94,26 +100,35 @@ class TraceWriter(Stateful):
         Raises:
             RunFailedError: The disk is full or gone.
         """
+        self._spell()
         with self._writing() as file:
             self._write(json.dumps({"k": "meta", "trace": TRACE_VERSION, **entry}) + "\n")
             file.flush()
         self.has_meta = True
 
     def take(self, events: Sequence[Recorded], limit: Nanos) -> None:
-        """Write the events up to and including `limit`; flush at each virtual second.
+        """Take the events up to and including `limit`; write and flush at each virtual second.
 
         Raises:
             RunFailedError: The disk is full or gone; so it is from then on.
         """
-        with self._writing() as file:
-            if events:
-                lines = [_spelled(event) for event in events]
+        if self._failure is not None:
+            raise self._failure
+        self._unspelled += events
+        second = limit // NS_PER_S
+        if second != self._flushed_second:
+            self._flushed_second = second
+            self.flush()
+        elif len(self._unspelled) >= MOST_UNSPELLED:
+            self._spell()
+
+    def _spell(self) -> None:
+        """Write and hash the lines of what was taken."""
+        if self._unspelled:
+            lines, self._unspelled = [_spelled(event) for event in self._unspelled], []
+            with self._writing():
                 self._write("".join(lines))
-                self._hash = chained(self._hash, lines)
-            second = limit // NS_PER_S
-            if second != self._flushed_second:
-                self._flushed_second = second
-                file.flush()
+            self._hash = chained(self._hash, lines)
 
     def copy(self, lines: Iterable[str]) -> None:
         """Write the lines of another trace, its first and last one left out.
@@ -122,6 +137,7 @@ class TraceWriter(Stateful):
             RunFailedError: The disk is full or gone.
         """
         kept = [line for line in lines if not line.startswith((_UNHASHED + "meta", _UNHASHED + "end"))]
+        self._spell()
         with self._writing():
             self._write("".join(kept))
             self._hash = chained(self._hash, kept)
@@ -129,6 +145,7 @@ class TraceWriter(Stateful):
     @property
     def length(self) -> int:
         """How many characters were written: where the next line begins."""
+        self._spell()
         return self._length
 
     def lines(self, begin: int = 0) -> Iterator[str]:
@@ -157,6 +174,7 @@ class TraceWriter(Stateful):
         Raises:
             RunFailedError: The disk is full or gone.
         """
+        self._spell()
         with self._writing() as file:
             file.flush()
 
@@ -166,6 +184,7 @@ class TraceWriter(Stateful):
         Raises:
             RunFailedError: The disk is full or gone.
         """
+        self._spell()
         with self._writing() as file:
             self._write(json.dumps({"k": "end", **entry}) + "\n")
             file.flush()
@@ -175,8 +194,20 @@ class TraceWriter(Stateful):
     def close(self) -> None:
         """Close the file without a last line, as for a run that failed."""
         if not isinstance(self._file, io.StringIO):
+            with contextlib.suppress(RunFailedError):
+                self._spell()
             with contextlib.suppress(OSError):  # a full disk was reported when it was first met
                 self._file.close()
+
+    def snapshot(self) -> PartState:
+        """Return where the trace stands."""
+        self._spell()
+        return super().snapshot()
+
+    def restore(self, snapshot: object) -> None:
+        """Put back what `snapshot` returned; see `written`."""
+        self._spell()
+        super().restore(snapshot)
 
     @contextlib.contextmanager
     def _writing(self) -> Iterator[IO[str]]:
@@ -202,7 +233,7 @@ class TraceWriter(Stateful):
     @property
     def written(self) -> str | int:
         """What was written: the text where it is in memory, its length in bytes where it is in a file."""
-        return self._length if self.path is not None else self.text
+        return self.length if self.path is not None else self.text
 
     @written.setter
     def written(self, written: str | int) -> None:

@@ -79,6 +79,9 @@ class PerfectBody(Stateful):
     def hold(self, left_mps: float, right_mps: float, steps: int) -> list[WheelAngles]:
         return [self.step(left_mps, right_mps) for _ in range(steps)]
 
+    def ramp(self, setpoints: Sequence[tuple[float, float]]) -> list[WheelAngles]:
+        return [self.step(*asked) for asked in setpoints]
+
     def stall(self, *, left: bool, right: bool) -> None:
         self.state = replace(self.state, stalled_left=left, stalled_right=right)
 

@@ -199,6 +199,14 @@ class RobotBody(Protocol):
         """
         ...
 
+    def ramp(self, setpoints: Sequence[tuple[float, float]]) -> Sequence[Wheels]:
+        """Make a step with each of these set-points, left and right, m/s; return the wheels after each.
+
+        Raises:
+            UsageError: There are other robots in its scene, which steps all of them together.
+        """
+        ...
+
     def ranges(self, numbers: Sequence[int]) -> list[float]:
         """Return what these sonar read now, metres from each transducer; the robot file's range where no echo comes."""
         ...

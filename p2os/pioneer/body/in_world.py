@@ -236,6 +236,10 @@ class BodyInWorld(Stateful):
         # None is read before the last is asked for: a body in another program makes them all at once.
         return [self.step(left_mps, right_mps) for _ in range(steps)]
 
+    def ramp(self, setpoints: Sequence[tuple[float, float]]) -> Sequence[Wheels]:
+        """Make a step with each of these set-points; see `RobotBody`."""
+        return [self.step(*asked) for asked in setpoints]
+
     def reset(self, pose: Pose, seed: int) -> BodyState:
         """Stand still at a pose in the world as it was made; nothing here is random.
 

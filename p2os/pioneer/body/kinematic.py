@@ -263,12 +263,60 @@ class KinematicBody(BodyInWorld):
             made += self._go_on(left_mps, right_mps, steps - len(made)) or [self.step(left_mps, right_mps)]
         return made
 
+    def ramp(self, setpoints: Sequence[tuple[float, float]]) -> Sequence[Turned]:
+        """Make a step with each of these set-points; see `RobotBody`."""
+        made: list[Turned] = []
+        while len(made) < len(setpoints):
+            made += self._ramp_on(setpoints[len(made) :]) or [self.step(*setpoints[len(made)])]
+        return made
+
+    def _ramp_on(self, setpoints: Sequence[tuple[float, float]]) -> list[Turned]:
+        """Make those first steps that surely lead nowhere near a thing: what as many of `go` do."""
+        if self._is_stepped_by_others or self._is_bumped or self._contacts.apart < APART_STEPS:
+            return []
+        if self._walking:
+            setpoints = setpoints[: WALK_STEPS - 1 - self._steps % WALK_STEPS]
+        x, y, heading, c, s, free = self._x, self._y, self._heading, self._cos, self._sin, self._free_m
+        left_angle, right_angle, work_j, driven = self._left_angle, self._right_angle, self._rim_work_j, self._driven
+        track_m, radius_m, reach_m = self._track_m, self._radius_m, self.reach_m
+        steady_j, made = self._steady_j, list[Turned]()
+        for asked in setpoints:
+            left_mps, right_mps = asked
+            forward, turn = (left_mps + right_mps) / 2 * DT_S, (right_mps - left_mps) / track_m * DT_S
+            travel = abs(forward) + abs(turn) * reach_m
+            if free <= travel or (left_mps == 0.0 and right_mps == 0.0):
+                break
+            free -= travel
+            before, heading, old_c, old_s = heading, heading + turn, c, s
+            if heading != before:
+                c, s = math.cos(heading), math.sin(heading)
+            if abs(turn) < STRAIGHT_RAD:
+                x, y = x + forward * old_c, y + forward * old_s
+            else:
+                radius = forward / turn
+                x, y = x + radius * (s - old_s), y - radius * (c - old_c)
+            if asked != driven:
+                steady_j, step_j = None, self._load.work_j(driven, asked, DT_S)
+            else:
+                step_j = steady_j = self._load.work_j(asked, asked, DT_S) if steady_j is None else steady_j
+            work_j += step_j
+            driven = asked
+            left_angle, right_angle = left_angle + left_mps * DT_S / radius_m, right_angle + right_mps * DT_S / radius_m
+            made.append(free_wheels(left_angle, right_angle))
+        if made:
+            self._x, self._y, self._heading, self._cos, self._sin, self._free_m = x, y, heading, c, s, free
+            self._left_angle, self._right_angle, self._rim_work_j = left_angle, right_angle, work_j
+            self._asked = self._driven = self._left, self._right = driven
+            self._blocked_at, self._steady_j = None, steady_j
+            self._steps += len(made)
+        return made
+
     def _go_on(self, left_mps: float, right_mps: float, steps: int) -> list[Turned]:
         """Make up to so many steps in which nothing changes but the pose and the wheels: what as many of `go` do."""
         if self._walking:
             steps = min(steps, WALK_STEPS - 1 - self._steps % WALK_STEPS)
         asked = (left_mps, right_mps)
-        if self.others or self._is_bumped or asked != self._driven or steps <= 0:
+        if self._is_stepped_by_others or self._is_bumped or asked != self._driven or steps <= 0:
             return []
         if left_mps == right_mps == 0.0:
             turned = self.go(0.0, 0.0)
@@ -573,9 +621,14 @@ class KinematicBody(BodyInWorld):
             things = self._plan.echoing_within(min(xs), min(ys), max(xs), max(ys))
         return [*things, *self._echoing_robots(x, y, rays, longest_m)] if self.others else things
 
+    @property
+    def _is_stepped_by_others(self) -> bool:
+        """Whether its steps are not its own alone: other robots are there, or its scene has another `step`."""
+        return bool(self.others) or type(self.scene).step is not KinematicScene.step
+
     def steps_within(self, turn_rad: float, rim_mps: float) -> int:
         """Return for how many steps no wheel turns farther while it is told no more; 0 where a robot may push it."""
-        return 0 if self.others else self._steps_to_roll(turn_rad, rim_mps)
+        return 0 if self._is_stepped_by_others else self._steps_to_roll(turn_rad, rim_mps)
 
     def clearance(self, *, no_more_than: float = math.inf) -> float:
         """Return the distance from the hull to the nearest thing that it could touch, metres, or `no_more_than`."""

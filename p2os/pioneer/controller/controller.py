@@ -382,8 +382,12 @@ class Pioneer(Stateful):
         steps = -((self._body_now - limit) // body.dt_ns)
         self._body_now += steps * body.dt_ns
         while steps and not motion.is_steady:
-            reckoning.follow((body.step(*self.next_setpoints()),))
-            steps -= 1
+            if motion.has_goal:
+                made: Sequence[WheelAngles] = (body.step(*self.next_setpoints()),)
+            else:
+                made = body.ramp(self._next_ramp(steps))
+            reckoning.follow(made)
+            steps -= len(made)
         if steps:  # steady until the next command
             reckoning.follow(body.hold(*self.next_setpoints(), steps))
 
@@ -397,8 +401,19 @@ class Pioneer(Stateful):
             left, right = motion.step(context.travel_nm, context.heading_udeg)
         else:
             left, right = motion.step(0, 0)
-        faults = context.faults
-        return 0.0 if faults.left_blocked else left, 0.0 if faults.right_blocked else right
+        return self._turning(left, right)
+
+    def _next_ramp(self, steps: int) -> list[tuple[float, float]]:
+        """Return the set-points of the body's next steps, up to where they stay, at most so many."""
+        motion, faults = self._context.motion, self._context.faults
+        self.body.is_powered = motion.is_powered
+        made = motion.ramp(steps)
+        return [self._turning(*pair) for pair in made] if faults.left_blocked or faults.right_blocked else made
+
+    def _turning(self, left_mps: float, right_mps: float) -> tuple[float, float]:
+        """Return set-points without those of wheels that are blocked."""
+        faults = self._context.faults
+        return 0.0 if faults.left_blocked else left_mps, 0.0 if faults.right_blocked else right_mps
 
     def take_step(self, wheels: WheelAngles) -> None:
         """Take the wheels' angles after a step that was made with `next_setpoints`."""

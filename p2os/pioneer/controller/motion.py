@@ -264,8 +264,10 @@ class Motion(Stateful):
             travel_nm: the odometer along the path, forward positive; read only while there is a goal.
             heading_udeg: the heading by odometry, any number of turns; read only while there is a goal.
         """
-        if self.is_steady:
-            return self._wheels
+        return self._wheels if self.is_steady else self._change(travel_nm, heading_udeg)
+
+    def _change(self, travel_nm: int, heading_udeg: int) -> tuple[float, float]:
+        """Do as `step` where the robot is not steady."""
         limits, first, second = self.limits, self._first, self._second
         if limits is not self._changes_of:
             self._changes_of, self._changes = limits, self._changes_per_step(limits)
@@ -290,7 +292,15 @@ class Motion(Stateful):
         self._wheels = ((first.speed - rim) / NM_PER_M, (first.speed + rim) / NM_PER_M)
         return self._wheels
 
-    # Saving -----------------------------------------------------------------------
+    def ramp(self, steps: int) -> list[tuple[float, float]]:
+        """Return the set-points of the next steps, at most so many, up to where nothing changes any more.
+
+        They are those of as many `step`, where there is no goal.
+        """
+        made: list[tuple[float, float]] = []
+        while len(made) < steps and not self.is_steady:
+            made.append(self._change(0, 0))
+        return made
 
     # Helpers ----------------------------------------------------------------------
 

@@ -133,6 +133,10 @@ class Body(Protocol):
         """Make so many steps with set-points that stay; return the wheels after each."""
         ...
 
+    def ramp(self, setpoints: Sequence[tuple[float, float]]) -> Sequence[WheelAngles]:
+        """Make a step with each of these set-points; return the wheels after each."""
+        ...
+
     def ranges(self, numbers: Sequence[int]) -> Sequence[float]:
         """Return the range that each sonar measures now, in metres; the longest range where there is no echo."""
         ...

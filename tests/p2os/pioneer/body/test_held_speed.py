@@ -58,6 +58,26 @@ def test_many_steps_at_once_are_the_same_steps(scene: str, legs: list[tuple[floa
         assert pickle.dumps(held.snapshot()) == pickle.dumps(stepped.snapshot())
 
 
+RAMPS = st.lists(st.tuples(SPEEDS, SPEEDS, st.sampled_from((1, 2, 8, APART_STEPS))), min_size=1, max_size=6)
+
+
+@example("before a wall", [(0.3, 0.3, 900), (-0.2, -0.2, APART_STEPS + 3), (0.3, 0.3, 400), (0.3, 0.3, 2)])
+@example("before a wall", [(0.3, 0.3, 900), (0.0, 0.0, APART_STEPS), (-0.01, -0.01, 2)])
+@example("beside a walker", [(0.1, 0.3, 2 * WALK_STEPS), (0.0, 0.0, WALK_STEPS), (0.1, 0.1, 900)])
+@example("free", [(0.1, 0.1, 2), (0.1, 0.1 + 2e-7, 2), (0.3, 0.3, 1), (0.3, 0.3, 2)])
+@settings(max_examples=100, deadline=None)
+@given(st.sampled_from(sorted(SCENES)), RAMPS)
+def test_a_ramp_is_the_same_steps(scene: str, legs: list[tuple[float, float, int]]) -> None:
+    ramped, stepped = make_kinematic(), make_kinematic()
+    for body in (ramped, stepped):
+        for thing in SCENES[scene]:
+            body.place(thing)
+    setpoints = [(left_mps, right_mps) for left_mps, right_mps, steps in legs for _ in range(steps)]
+    assert ramped.ramp(setpoints) == [stepped.step(*asked) for asked in setpoints]
+    assert ramped.state == stepped.state
+    assert pickle.dumps(ramped.snapshot()) == pickle.dumps(stepped.snapshot())
+
+
 def test_a_robot_that_has_backed_off_a_wall_drives_on_with_the_speed_that_it_stalled_at() -> None:
     body = make_kinematic()
     body.place(SCENES["before a wall"][0])
