@@ -13,8 +13,8 @@ from functools import cache
 from itertools import count
 from typing import TypeAlias, cast
 
-from bluepill_sim.fabric.fabric import Fabric
-from bluepill_sim.fabric.pins import PinBank, PinPorts
+from bluepill_sim.fabric.fabric import Fabric, FabricPorts
+from bluepill_sim.fabric.pins import PinBank
 from bluepill_sim.fabric.ports import ChipPorts
 from bluepill_sim.fabric.registers import ClockBit, Peripheral, Place
 from bluepill_sim.peripherals.adc import Adc, Adc2
@@ -380,7 +380,7 @@ class ChipParts(Stateful):
         return self.rcc.fabric.next_ns
 
 
-def make_pins(chip: PinPorts) -> PinBank:
+def make_pins(chip: FabricPorts) -> PinBank:
     """Return the pins of the chip in its 48-pin package."""
     return PinBank(chip, BONDED_PINS, FIVE_VOLT_PINS)
 

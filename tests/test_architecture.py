@@ -93,7 +93,8 @@ LOGGING = (
 #: The map of ARCHITECTURE.md, lowest first: a package imports none of its own row and none above it.
 LAYERS = {
     "simbase": (
-        ("timing", "state", "installation", "wire", "lazy", "interrupts"), ("errors",), ("units", "user_classes"),
+        ("timing", "state", "installation", "wire", "lazy", "interrupts"), ("errors",),
+        ("files", "units", "user_classes"),
     ),
     "p2os": (
         ("errors", "event_log"), ("toml_file",), ("toml_schema",), ("robots", "gamepad"), ("protocol",), ("transport",),

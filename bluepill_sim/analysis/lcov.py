@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from bluepill_sim.analysis.coverage import FileCoverage
-from bluepill_sim.errors import BluePillError
+from simbase.files import write_text
 
 
 def write_lcov(files: Sequence[FileCoverage], path: Path, *, sources: Path | None = None) -> None:
@@ -20,12 +20,9 @@ def write_lcov(files: Sequence[FileCoverage], path: Path, *, sources: Path | Non
         sources: the folder that relative names of source files start from; None leaves them as the ELF has them.
 
     Raises:
-        BluePillError: the file cannot be written.
+        FileError: the file cannot be written.
     """
-    try:
-        path.write_text("\n".join(lcov_lines(files, sources=sources)) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise BluePillError(f"cannot write {path}: {error.strerror}", hint="give a file in a folder") from error
+    write_text(path, "\n".join(lcov_lines(files, sources=sources)) + "\n")
 
 
 def lcov_lines(files: Sequence[FileCoverage], *, sources: Path | None = None) -> Iterator[str]:

@@ -14,7 +14,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from bluepill_sim.analysis.probe import Probe, signals_in_order
-from bluepill_sim.errors import BluePillError
+from simbase.files import writing
 from simbase.timing import NS_PER_S, Nanos
 
 #: Sample rates in Hz and as the file names them, the finest first.
@@ -31,7 +31,7 @@ def write_sigrok(probe: Probe, path: Path) -> None:
     """Write the recording, sampled evenly at the finest rate that keeps it small.
 
     Raises:
-        BluePillError: the file cannot be written.
+        FileError: the file cannot be written.
     """
     names = signals_in_order(probe)
     start_ns, span_ns = probe.start_ns, probe.end_ns - probe.start_ns
@@ -39,10 +39,8 @@ def write_sigrok(probe: Probe, path: Path) -> None:
     by_name = probe.edges
     edges = sorted((at - start_ns, n, value) for n, name in enumerate(names) for at, value in by_name.get(name, ()))
     bits = sum((probe.initial[name] & 1) << n for n, name in enumerate(names))
-    try:
+    with writing(path):
         write_session(path, names, rate_hz, _samples(runs(edges, bits, span_ns, rate_hz), len(names)))
-    except OSError as error:
-        raise BluePillError(f"cannot write {path}: {error.strerror}", hint="give a file in a folder") from error
 
 
 def write_session(path: Path, names: Sequence[str], rate_hz: int, samples: Iterable[bytes]) -> None:

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from bluepill_sim.analysis.probe import Probe, signals_in_order, words_in_order
-from bluepill_sim.errors import BluePillError
+from simbase.files import writing
 
 _FIRST_CODE, _LAST_CODE = 33, 126
 _LETTERS = "01z"
@@ -20,17 +20,15 @@ def write_vcd(probe: Probe, path: Path) -> None:
     """Write the recording.
 
     Raises:
-        BluePillError: the file cannot be written.
+        FileError: the file cannot be written.
     """
     signals, words = signals_in_order(probe), words_in_order(probe)
     codes = {name: identifier(index) for index, name in enumerate([*signals, *words])}
-    try:
+    with writing(path):
         with path.open("w", encoding="ascii", newline="\n") as file:
             file.writelines(f"{line}\n" for line in _head(probe, codes, words))
         texts = [codes.get(name, "") for name in probe.names]
         probe.log.write(os.fsencode(path), texts, probe.first_word, (probe.start_ns, probe.end_ns))
-    except OSError as error:
-        raise BluePillError(f"cannot write {path}: {error.strerror}", hint="give a file in a folder") from error
 
 
 def identifier(index: int) -> str:

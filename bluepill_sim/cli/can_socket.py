@@ -24,6 +24,7 @@ from bluepill_sim.board import BluePill
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.fabric.bus_parts import CanFrame
 from bluepill_sim.fabric.can_network import CanNetwork, CanNode
+from simbase.files import writing
 from simbase.timing import NS_PER_S, Nanos
 
 _FRAME = struct.Struct("=IB3x8s")
@@ -309,7 +310,8 @@ def join_can(board: BluePill, where: str | None, log: Path | None) -> list[CanSo
     """Join a board's CAN, and the parts on it, to a bus of this machine, with a log; without `where` to none.
 
     Raises:
-        CanSocketError: It cannot be joined, or the log not written.
+        CanSocketError: It cannot be joined.
+        FileError: The log cannot be written.
     """
     if where is None:
         if log is not None:
@@ -319,12 +321,8 @@ def join_can(board: BluePill, where: str | None, log: Path | None) -> list[CanSo
     if network is None:
         network = CanNetwork()
         board.can(network)
-    try:
+    with writing(log):
         file = None if log is None else log.open("w", encoding="utf-8")
-    except OSError as error:
-        raise CanSocketError(
-            f"cannot write {log}: {error.strerror}", hint="give a file in a folder that exists"
-        ) from error
     name = _LOGGED_AS if ":" in where else where
 
     def keep(at_ns: Nanos, is_sent: bool, frame: CanFrame) -> None:

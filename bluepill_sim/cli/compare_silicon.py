@@ -8,7 +8,7 @@ import typer
 
 from bluepill_sim.analysis.silicon.comparison import Row, Verdict, ask_model, compare
 from bluepill_sim.analysis.silicon.log import KINDS, read_log
-from simbase.errors import FileError
+from simbase.files import reading
 
 HELP = """Lay what a real STM32F103C8 says of itself beside the model.
 
@@ -33,10 +33,8 @@ def compare_silicon(
     show_all: Annotated[bool, typer.Option("--all", help="Show what is the same too.")] = False,
 ) -> None:
     """Compare a log."""
-    try:
+    with reading(log):
         data = log.read_bytes()
-    except OSError as error:
-        raise FileError(f"cannot read {log}: {error.strerror or error}") from error
     chip = read_log(data, log.name)
     rows = compare(chip, ask_model())
     for row in rows:

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import BinaryIO, Protocol
 
 from bluepill_sim.errors import BluePillError
+from simbase.files import writing
 
 #: Most bytes taken from a pseudo-terminal at one poll. Chosen: more than anybody types.
 _READ_BYTES = 4096
@@ -144,12 +145,8 @@ def open_console(where: str) -> Console:
         return StreamConsole(sys.stdout.buffer, "standard output", is_owner=False)
     if where in PTY:
         return PtyConsole()
-    try:
+    with writing(where):
         return StreamConsole(Path(where).open("wb"), where)
-    except OSError as error:
-        raise BluePillError(
-            f"cannot write {where}: {error.strerror}", hint="give a file in a folder that exists"
-        ) from error
 
 
 def connect(console: Console, port: SerialPort) -> Callable[[], None]:

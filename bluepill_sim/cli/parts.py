@@ -12,7 +12,7 @@ from bluepill_sim.board import BluePill
 from bluepill_sim.cli.driving import print_status
 from bluepill_sim.parts.attached import words_of
 from bluepill_sim.parts.registry import PARTS, attach, parse_part, part_class
-from simbase.errors import FileError
+from simbase.files import writing
 
 HELP = """List the parts that can be attached, with their pins and settings.
 
@@ -78,13 +78,11 @@ def _write(folder: Path, name: str, part: Any) -> None:
     if hasattr(part, "picture"):
         picture = part.picture()
         files["png"] = picture.png(picture.scale())
-    try:
+    with writing(folder):
         for kind, data in files.items():
             folder.mkdir(parents=True, exist_ok=True)
             (folder / f"{name}.{kind}").write_bytes(data)
             print_status(f"{name}: {folder / f'{name}.{kind}'}")
-    except OSError as error:
-        raise FileError(f"cannot write into {folder}: {error.strerror or error}") from error
 
 
 def _written(value: object) -> str:

@@ -16,9 +16,9 @@ from bluepill_sim.board import BluePill
 from bluepill_sim.cli.driving import parse_changes, print_fault, print_status, run_driven, summary, warn_on_stderr
 from bluepill_sim.cli.quantities import time_option
 from bluepill_sim.core.nvic import exception_name
-from bluepill_sim.errors import BluePillError
 from bluepill_sim.program.functions import FunctionTable
 from bluepill_sim.program.static_code import StaticCode
+from simbase.files import write_text
 from simbase.timing import NS_PER_S, Nanos
 
 HELP = """Run a firmware for a while and show where its cycles go.
@@ -66,9 +66,9 @@ def profile(
     use = stack.measure()
     if flame is not None:
         title = f"{firmware.name}: {board.now_ns / 1e9:g} s"
-        _write(flame, flame_svg(costs.stacks, title=title, hz=board.hclk_hz))
+        write_text(flame, flame_svg(costs.stacks, title=title, hz=board.hclk_hz))
     if folded is not None:
-        _write(folded, "\n".join(costs.folded()) + "\n")
+        write_text(folded, "\n".join(costs.folded()) + "\n")
     if json_output:
         facts = {
             "cycles": costs.total_cycles,
@@ -87,13 +87,6 @@ def profile(
     print_status(summary(board))
     if print_fault(board):
         raise typer.Exit(1)
-
-
-def _write(path: Path, text: str) -> None:
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise BluePillError(f"cannot write {path}: {error.strerror}", hint="give a file in a folder") from error
 
 
 def _function_facts(cost: FunctionCost) -> dict[str, object]:

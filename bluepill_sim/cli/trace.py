@@ -12,10 +12,10 @@ from bluepill_sim.board import BluePill
 from bluepill_sim.cli.driving import parse_changes, print_fault, print_status, run_driven, summary, warn_on_stderr
 from bluepill_sim.cli.quantities import time_option
 from bluepill_sim.core import BlockRecorder
-from bluepill_sim.errors import BluePillError
 from bluepill_sim.program.functions import FunctionTable
 from bluepill_sim.program.last_blocks import lines_of
 from bluepill_sim.program.line_table import read_lines
+from simbase.files import writing
 from simbase.timing import NS_PER_MS, Nanos
 
 HELP = """Run a firmware and write what it executes.
@@ -85,7 +85,5 @@ def trace(
 
 
 def _open(path: Path) -> TextIO:
-    try:
+    with writing(path):
         return path.open("w", encoding="utf-8")
-    except OSError as error:
-        raise BluePillError(f"cannot write {path}: {error.strerror}", hint="give a file in a folder") from error

@@ -16,6 +16,7 @@ from bluepill_sim.core.nvic import SYSTICK
 from bluepill_sim.core.processor import Processor
 from bluepill_sim.extension.library import library
 from bluepill_sim.extension.windows import field, packed
+from bluepill_sim.fabric.fabric import FabricPorts
 from simbase.state import Stateful
 
 #: The whole region, as the engine maps it.
@@ -34,18 +35,8 @@ TRCENA, ITMENA, TSENA, ALL_PORTS = 1 << 24, 1, 2, 0xFFFF_FFFF
 StimulusSink = Callable[[int, int, int, bytes], None]
 
 
-class SystemControlPorts(Protocol):
+class SystemControlPorts(FabricPorts, Protocol):
     """What these registers need of the chip."""
-
-    @property
-    def access_cycle(self) -> int:
-        """The time of the accessing instruction, in cycles."""
-        ...
-
-    @property
-    def now_ns(self) -> int:
-        """The same, in ns."""
-        ...
 
     def plan_match(self) -> None:
         """Work out when CYCCNT next comes to what the DWT compares it with."""
@@ -53,10 +44,6 @@ class SystemControlPorts(Protocol):
 
     def request_reset(self) -> None:
         """Reset the chip at the next block boundary (SYSRESETREQ)."""
-        ...
-
-    def warn(self, message: str, *, once: str) -> None:
-        """Warn of what is not modelled."""
         ...
 
 

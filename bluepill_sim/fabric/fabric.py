@@ -96,7 +96,12 @@ class _Calls(ctypes.Structure):
 
 
 class FabricPorts(Protocol):
-    """What the fabric needs of the chip, where no native core stands under it."""
+    """What the fabric needs of the chip, where no native core stands under it, and what all else on it needs too."""
+
+    @property
+    def now_ns(self) -> Nanos:
+        """The exact time of the accessing instruction inside of an access, else the time reached."""
+        ...
 
     @property
     def access_cycle(self) -> int:
@@ -105,7 +110,7 @@ class FabricPorts(Protocol):
 
     @property
     def access_pc(self) -> int:
-        """The accessing instruction."""
+        """The accessing instruction inside of an access, else the next one."""
         ...
 
     def irq_changed(self, irq: int, level: bool) -> bool:
@@ -129,7 +134,22 @@ class FabricPorts(Protocol):
         ...
 
     def signal(self, name: str) -> None:
-        """Signal an event to the core by name."""
+        """Signal an event to the core by name.
+
+        "event" sets the event register that WFE waits for, "nmi" is a request, "wake" ends Standby, and after
+        "no clock" only a reset helps.
+        """
+        ...
+
+    def request_stop(self) -> None:
+        """End the CPU's slice at the boundary of the running block."""
+        ...
+
+    def warn(self, message: str, *, once: str, pc: int | None = None) -> None:
+        """Warn of what the firmware does wrong, or of what is not modelled; once for each key.
+
+        With `pc`: of what the instruction there did; else it is the one that runs.
+        """
         ...
 
 

@@ -21,6 +21,7 @@ Invariant: in RUN nothing here decides anything.
 from enum import Enum
 from typing import Protocol
 
+from bluepill_sim.fabric.fabric import FabricPorts
 from simbase.state import Stateful
 from simbase.timing import Nanos
 
@@ -43,13 +44,8 @@ class Mode(Enum):
     WAKING = "waking"
 
 
-class LowPowerPorts(Protocol):
+class LowPowerPorts(FabricPorts, Protocol):
     """What this needs of the chip."""
-
-    @property
-    def now_ns(self) -> Nanos:
-        """The time reached."""
-        ...
 
     @property
     def flash_is_busy(self) -> bool:

@@ -17,7 +17,7 @@ Invariant: `output` and `level` follow from the other attributes alone.
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from enum import Enum
 from operator import itemgetter
-from typing import Any, Protocol, Self, cast
+from typing import Any, Self
 
 from bluepill_sim.fabric.fabric import NO_LEVEL, Fabric, FabricPorts
 from bluepill_sim.fabric.signals import UV_PER_V, Signal, put_signal, to_uv
@@ -95,23 +95,6 @@ ALTERNATE_FUNCTIONS = tuple(
         + [f"USART{n}_{signal}" for n in (1, 2, 3) for signal in ("TX", "RX", "CK", "RTS")]
     )
 )
-
-
-class PinPorts(Protocol):
-    """What the pins need of the chip."""
-
-    def warn(self, message: str, *, once: str) -> None:
-        """Warn once for each key."""
-        ...
-
-    @property
-    def now_ns(self) -> int:
-        """The exact time of what is happening now."""
-        ...
-
-    def request_stop(self) -> None:
-        """End the CPU's slice at the boundary of the running block."""
-        ...
 
 
 class Pin:
@@ -385,7 +368,7 @@ class PinBank(Stateful):
     PORTS = "ABCDE"
 
     def __init__(
-        self, ports: PinPorts, bonded: frozenset[str], five_volt_tolerant: frozenset[str] = frozenset()
+        self, ports: FabricPorts, bonded: frozenset[str], five_volt_tolerant: frozenset[str] = frozenset()
     ) -> None:
         """Make the pins.
 
@@ -396,7 +379,7 @@ class PinBank(Stateful):
         """
         self._ports = ports
         #: Queue, lines and devices, which stand at the pins.
-        self.fabric = Fabric(cast("FabricPorts", ports))
+        self.fabric = Fabric(ports)
         self.fabric.electrical = self._warn_of
         #: What keeps GPIO off a pin, by the pin's name.
         self.holders: dict[str, str] = {}

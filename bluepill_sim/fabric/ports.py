@@ -8,22 +8,13 @@ the tests have a fake that passes the same contract test.
 from typing import Protocol
 
 from bluepill_sim.fabric.clocks import Clocks
+from bluepill_sim.fabric.fabric import FabricPorts
 from bluepill_sim.fabric.pins import PinBank
 from bluepill_sim.fabric.power import Power
 
 
-class ChipPorts(Protocol):
+class ChipPorts(FabricPorts, Protocol):
     """The chip, as one of its peripherals sees it."""
-
-    @property
-    def now_ns(self) -> int:
-        """The exact time of the accessing instruction inside `read`/`write`, else the time reached."""
-        ...
-
-    @property
-    def access_pc(self) -> int:
-        """The accessing instruction inside `read`/`write`, else the next one."""
-        ...
 
     @property
     def clocks(self) -> Clocks:
@@ -48,10 +39,6 @@ class ChipPorts(Protocol):
         """Have the core wait where it needs the flash, which is programmed or erased from now on."""
         ...
 
-    def request_stop(self) -> None:
-        """End the CPU's slice at the boundary of the running block."""
-        ...
-
     def reset_peripheral(self, name: str) -> None:
         """Call `reset` of the peripheral `name`, if it is modelled (RCC's APBxRSTR)."""
         ...
@@ -62,19 +49,4 @@ class ChipPorts(Protocol):
 
     def watchdog_expired(self, name: str) -> None:
         """Reset the chip at the boundary of the running block, because of the watchdog `name`: "IWDG" or "WWDG"."""
-        ...
-
-    def signal(self, name: str) -> None:
-        """Signal an event to the core by name.
-
-        "event" sets the event register that WFE waits for, "nmi" is a request, "wake" ends Standby, and after
-        "no clock" only a reset helps.
-        """
-        ...
-
-    def warn(self, message: str, *, once: str, pc: int | None = None) -> None:
-        """Warn of what the firmware does wrong, or of what is not modelled; once for each key.
-
-        With `pc`: of what the instruction there did; else it is the one that runs.
-        """
         ...

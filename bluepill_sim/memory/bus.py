@@ -10,6 +10,7 @@ Invariant: no access of the core ever raises; what nothing answers reads 0 and i
 import ctypes
 from typing import Protocol
 
+from bluepill_sim.fabric.fabric import FabricPorts
 from bluepill_sim.fabric.registers import Peripheral
 from bluepill_sim.peripherals.rcc import Rcc
 from bluepill_sim.stm32f103 import CLOCK_GATES, PERIPHERAL_BASE, name_at
@@ -35,19 +36,12 @@ class BusEngine(Protocol):
         """Let a word be read as 0 without asking."""
 
 
-class BusPorts(Protocol):
+class BusPorts(FabricPorts, Protocol):
     """The chip as its bus sees it."""
-
-    @property
-    def now_ns(self) -> Nanos:
-        """The time of the access."""
 
     @property
     def engine(self) -> BusEngine:
         """What runs the instructions."""
-
-    def warn(self, message: str, *, once: str) -> None:
-        """Tell the user, once for each key."""
 
 
 class PeripheralBus(Stateful):

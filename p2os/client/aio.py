@@ -17,19 +17,33 @@ import asyncio
 import contextlib
 import math
 import weakref
-from collections import deque
 from collections.abc import AsyncIterator, Callable
 from types import TracebackType
 from typing import Self
 
 from p2os.client.aux_ports import AsyncAux
-from p2os.client.calls import Result, RobotCalls
-from p2os.client.core import PacketType, RobotCore, request_for
+from p2os.client.calls import RobotCalls
+from p2os.client.core import PacketType, RobotCore
 from p2os.client.goals import Axis, DriveAxis, MotionResult, TurnAxis, as_number
-from p2os.client.line import Line, core_for, motion_result, no_answer, not_connected, not_found
+from p2os.client.line import (
+    TOUCH_S,
+    Line,
+    Listeners,
+    Result,
+    Waiting,
+    connecting,
+    core_for,
+    fetching,
+    newer_state,
+    next_notice,
+    next_state,
+    opening,
+    reaching,
+    sleeping,
+)
 from p2os.client.notices import Notice
-from p2os.client.robot_state import Link, RobotState
-from p2os.client.robot_thread import CLOSING_S, MOST_NOTICES, TOUCH_S, Opener
+from p2os.client.robot_state import RobotState
+from p2os.client.robot_thread import CLOSING_S, Opener
 from p2os.client.settings import DEADMAN_S, ClientSettings
 from p2os.errors import TransportError
 from p2os.robots.parameters import RobotParameters
@@ -79,9 +93,7 @@ class Robot(RobotCalls):
         self._robot_loop.start()
         try:
             self._run(lambda core, now: core.connect(now))
-            await self._wait_for(lambda core: core.is_ready or core.link in {Link.FAILED, Link.CLOSED}, None)
-            if not self._core.is_ready:
-                raise not_found(self._core)  # noqa: TRY301  # closing is the same for every way out
+            await self._robot_loop.do(connecting(self._core))
         except BaseException:
             await self.close()
             raise
@@ -105,7 +117,7 @@ class Robot(RobotCalls):
 
     async def sleep(self, duration_s: float) -> None:
         """Do nothing for so long, without tripping the deadman: held speeds go on."""
-        await self._wait_for(lambda _: False, as_number(duration_s, "sleep", "seconds"))
+        await self._robot_loop.do(sleeping(duration_s))
 
     async def next_state(self, timeout_s: float = 2.0) -> RobotState:
         """Wait for the next packet and return its state.
@@ -113,23 +125,11 @@ class Robot(RobotCalls):
         Raises:
             LinkLostError: none came in time.
         """
-        before = self._core.state
-        await self._wait_for(lambda core: core.state is not before, timeout_s)
-        state = self._core.state
-        if state is None or state is before:
-            raise not_connected(self._core)
-        return state
+        return await self._robot_loop.do(next_state(self._core, timeout_s))
 
     async def fetch(self, kind: type[PacketType], timeout_s: float = 1.0) -> PacketType:
         """Ask the robot for a packet of a type, and return it; otherwise as `p2os.Robot.fetch`."""
-        before = self._core.newest(kind)
-        self.send(request_for(kind))
-        if not await self._wait_for(lambda core: core.newest(kind) is not before, timeout_s):
-            raise no_answer(self._core, kind, timeout_s)
-        packet = self._core.newest(kind)
-        if packet is None:
-            raise not_connected(self._core)
-        return packet
+        return await self._robot_loop.do(fetching(self._core, kind, timeout_s, self.send))
 
     async def wait_open(self, timeout_s: float | None = None) -> None:
         """Wait until the session is open again after a loss.
@@ -137,9 +137,7 @@ class Robot(RobotCalls):
         Raises:
             LinkLostError: it is not, in time or for good.
         """
-        await self._wait_for(lambda core: core.link in {Link.OPEN, Link.FAILED, Link.CLOSED}, timeout_s)
-        if self._core.link is not Link.OPEN:
-            raise not_connected(self._core)
+        await self._robot_loop.do(opening(self._core, timeout_s))
 
     async def states(self, lasts_s: float | None = None) -> AsyncIterator[RobotState]:
         """Yield each new state as it comes, the newest where the program is slow.
@@ -150,40 +148,27 @@ class Robot(RobotCalls):
         ends = None if lasts_s is None else wall_clock() + round(lasts_s * NS_PER_S)
         while ends is None or wall_clock() < ends:
             left_s = None if ends is None else (ends - wall_clock()) / NS_PER_S
-            await self._wait_for(lambda core, seen=last: core.state is not seen or _is_over(core), left_s)  # type: ignore[misc]  # bound now
-            state = self._core.state
-            if state is None or state is last:
+            last = await self._robot_loop.do(newer_state(self._core, last, left_s))
+            if last is None:
                 return
-            last = state
-            yield state
+            yield last
 
     async def events(self) -> AsyncIterator[Notice]:
         """Yield what happens beside the states, from now on, in order; ends when the client does."""
-        queues, queue = self._robot_loop.queues, deque[Notice](maxlen=MOST_NOTICES)
-        queues.append(queue)
-        try:
-            while True:
-                await self._wait_for(lambda core: bool(queue) or _is_over(core), None)
-                if not queue:
-                    return
-                yield queue.popleft()
-        finally:
-            queues[:] = [other for other in queues if other is not queue]
+        with self._robot_loop.listeners.queue() as queue:
+            while (notice := await self._robot_loop.do(next_notice(queue))) is not None:
+                yield notice
 
     def on_state(self, callback: Callable[[RobotState], None]) -> Callable[[], None]:
         """Call `callback` with each state, in the loop; return what ends that.
 
         An exception in it stops the robot and is raised in the program's next call.
         """
-        callbacks = self._robot_loop.state_callbacks
-        callbacks.append(callback)
-        return lambda: _remove(callbacks, callback)
+        return self._robot_loop.listeners.on_state(callback)
 
     def on_event(self, callback: Callable[[Notice], None]) -> Callable[[], None]:
         """Call `callback` with what happens beside the states; otherwise as `on_state`."""
-        callbacks = self._robot_loop.event_callbacks
-        callbacks.append(callback)
-        return lambda: _remove(callbacks, callback)
+        return self._robot_loop.listeners.on_event(callback)
 
     # Motion that waits --------------------------------------------------------------------
 
@@ -210,26 +195,16 @@ class Robot(RobotCalls):
         return await self.turn(angle_rad, speed_radps=speed_radps, timeout_s=timeout_s)
 
     async def _reach(self, axis: Axis, speed: float | None, timeout_s: float | None) -> MotionResult:
-        limit_ns = None if timeout_s is None else round(as_number(timeout_s, "timeout_s", "seconds") * NS_PER_S)
-        goal = self._run(lambda core, now: core.begin_goal(axis, limit_ns, speed, now))
-        try:
-            await self._wait_for(lambda _: goal.ended is not None, None)
-        finally:
-            if goal.ended is None and self._robot_loop.failure is None:
-                self._run(lambda core, now: core.cancel_goal(goal, now))
-        return motion_result(goal, self._core)
+        return await self._robot_loop.do(reaching(self._core, axis, speed, timeout_s, self._run))
 
     # The robot's own serial ports ---------------------------------------------------------
 
     def aux(self, port: int = 1) -> AsyncAux:
         """Return one of the robot's own serial ports, as a file of bytes whose calls are awaited."""
-        return AsyncAux(port, send=self.send, subscribe=self.on_event, wait_for=self._wait_for)
+        return AsyncAux(port, send=self.send, subscribe=self.on_event, do=self._robot_loop.do)
 
     def _run(self, call: Callable[[RobotCore, Nanos], Result]) -> Result:
         return self._robot_loop.run(call)
-
-    async def _wait_for(self, is_so: Callable[[RobotCore], bool], timeout_s: float | None) -> bool:
-        return await self._robot_loop.wait_for(is_so, timeout_s)
 
 
 class RobotLoop:
@@ -246,9 +221,7 @@ class RobotLoop:
         self, core: RobotCore, baud: int | None, open_line: Callable[[], Transport], clock: Clock = wall_clock
     ) -> None:
         self.core = core
-        self.queues: list[deque[Notice]] = []
-        self.state_callbacks: list[Callable[[RobotState], None]] = []
-        self.event_callbacks: list[Callable[[Notice], None]] = []
+        self.listeners = Listeners()
         self.failure: BaseException | None = None
         #: Whether the failure was raised in the program.
         self.has_reported = False
@@ -283,18 +256,19 @@ class RobotLoop:
         self._turn()
         return result
 
-    async def wait_for(self, is_so: Callable[[RobotCore], bool], timeout_s: float | None) -> bool:
-        """Wait until something is so; the deadman does not trip meanwhile."""
-        ends = None if timeout_s is None else self._line.now() + round(timeout_s * NS_PER_S)
-        while not is_so(self.core):
-            self.check()
-            now = self._line.now()
-            self.core.touch(now)
-            if ends is not None and now >= ends:
-                return False
-            left = TOUCH_S if ends is None else min(TOUCH_S, (ends - now) / NS_PER_S)
-            await _changes(self._changed, left)
-        return True
+    async def do(self, waiting: Waiting[Result]) -> Result:
+        """Carry out a call that waits; it is left where waiting ends by an exception."""
+        with contextlib.closing(waiting):
+            try:
+                is_so, timeout_s = next(waiting)
+                while True:
+                    for left_s in self._line.waits(is_so, timeout_s):
+                        self.check()
+                        await _changes(self._changed, left_s)
+                    is_so, timeout_s = waiting.send(is_so(self.core))
+            except StopIteration as end:
+                result: Result = end.value
+                return result
 
     async def close(self) -> None:
         """Stop the robot, end the session, give the line back; whatever comes between, `finish` does the rest."""
@@ -389,15 +363,8 @@ class RobotLoop:
     def _notify(self) -> None:
         news = self._line.take_news()
         self._line.log(news)
-        for item in news:
-            if isinstance(item, RobotState):
-                for on_state in tuple(self.state_callbacks):
-                    on_state(item)
-                continue
-            for queue in self.queues:
-                queue.append(item)
-            for on_event in tuple(self.event_callbacks):
-                on_event(item)
+        self.listeners.keep(news)
+        self.listeners.call(news)
         changed, self._changed = self._changed, asyncio.Event()
         changed.set()
 
@@ -425,12 +392,3 @@ async def _changes(changed: asyncio.Event, longest_s: float) -> None:
     with contextlib.suppress(TimeoutError):
         async with asyncio.timeout(longest_s):
             await changed.wait()
-
-
-def _is_over(core: RobotCore) -> bool:
-    return core.link in {Link.CLOSED, Link.FAILED}
-
-
-def _remove(callbacks: list[Callable[..., None]], callback: Callable[..., None]) -> None:
-    with contextlib.suppress(ValueError):
-        callbacks.remove(callback)

@@ -12,7 +12,7 @@ import io
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 
-from p2os.client.core import RobotCore
+from p2os.client.line import Waiting
 from p2os.client.notices import Notice, PacketArrived
 from p2os.client.robot_thread import RobotThread
 from p2os.protocol.commands import Command, CommandNumber
@@ -80,6 +80,18 @@ class AuxBuffer:
         self._asked = 0
         return Command(self.numbers.ask, 0)
 
+    def filling(self, size: int, timeout_s: float | None, send: Callable[[Command], object]) -> Waiting[None]:
+        """Ask and wait until `size` bytes have come, at most so long without any; None: for ever."""
+        again = False
+        while len(self) < size and (timeout_s is None or timeout_s > 0):
+            command = self.asking(size, again=again)
+            if command is not None:
+                send(command)
+            before = len(self)
+            step_s = ASK_AGAIN_S if timeout_s is None else min(ASK_AGAIN_S, timeout_s)
+            again = not (yield lambda _, before=before: len(self) > before, step_s)  # type: ignore[misc]  # bound now
+            timeout_s = timeout_s if timeout_s is None or not again else timeout_s - step_s
+
     def notice(self, notice: Notice) -> None:
         """Take what belongs to this port of the client's notices."""
         packet = notice.packet if isinstance(notice, PacketArrived) else None
@@ -115,7 +127,7 @@ class AuxStream(io.RawIOBase):
         self.timeout_s = timeout_s
         self._thread = thread
         self._buffer = AuxBuffer(port)
-        self._unsubscribe = thread.on_event(self._take)
+        self._unsubscribe = thread.listeners.on_event(self._take)
 
     def readable(self) -> bool:
         """Return True."""
@@ -132,13 +144,13 @@ class AuxStream(io.RawIOBase):
             LinkLostError: no session is open.
         """
         for command in self._buffer.writing(bytes(data)):
-            self._thread.call(lambda core, now, command=command: core.send(command, now))  # type: ignore[misc]
+            self._send(command)
         return len(data)
 
     def read(self, size: int = -1) -> bytes:
         """Return `size` bytes, or those that came within `timeout_s`; -1: what has come."""
         if size >= 0:
-            self._wait(size)
+            self._thread.do(self._buffer.filling(size, self.timeout_s, self._send))
         with self._thread.changed:
             return self._buffer.read(len(self._buffer) if size < 0 else size)
 
@@ -150,25 +162,15 @@ class AuxStream(io.RawIOBase):
 
     def flush_input(self) -> None:
         """Discard what has come, here and in the robot (GETAUX 0)."""
-        command = self._buffer.flushing()
-        self._thread.call(lambda core, now: core.send(command, now))
+        self._send(self._buffer.flushing())
 
     def close(self) -> None:
         """Unsubscribe from the robot's packets."""
         self._unsubscribe()
         super().close()
 
-    def _wait(self, size: int) -> None:
-        left_s, again = self.timeout_s, False
-        with self._thread.changed:
-            while len(self._buffer) < size and (left_s is None or left_s > 0):
-                command = self._buffer.asking(size, again=again)
-                if command is not None:
-                    self._thread.call(lambda core, now, command=command: core.send(command, now))  # type: ignore[misc]
-                before = len(self._buffer)
-                step_s = ASK_AGAIN_S if left_s is None else min(ASK_AGAIN_S, left_s)
-                again = not self._thread.wait_for(lambda _, before=before: len(self._buffer) > before, step_s)  # type: ignore[misc]
-                left_s = left_s if left_s is None or not again else left_s - step_s
+    def _send(self, command: Command) -> None:
+        self._thread.call(lambda core, now: core.send(command, now))
 
     def _take(self, notice: Notice) -> None:
         with self._thread.changed:
@@ -183,7 +185,7 @@ class AsyncAux:
         port: 1, 2 or 3.
         send: Sends a command of the open session.
         subscribe: Has a callback called with each notice; returns what ends that.
-        wait_for: Waits until something is so of the client's core, at most so many seconds.
+        do: Carries out a call that waits.
         timeout_s: How long a read waits; None: for ever.
     """
 
@@ -193,12 +195,12 @@ class AsyncAux:
         *,
         send: Callable[[Command], None],
         subscribe: Callable[[Callable[[Notice], None]], Callable[[], None]],
-        wait_for: Callable[[Callable[[RobotCore], bool], float | None], Awaitable[bool]],
+        do: Callable[[Waiting[None]], Awaitable[None]],
         timeout_s: float | None = 1.0,
     ) -> None:
         self.timeout_s = timeout_s
         self._send = send
-        self._wait_for = wait_for
+        self._do = do
         self._buffer = AuxBuffer(port)
         self._unsubscribe = subscribe(self._buffer.notice)
 
@@ -216,15 +218,7 @@ class AsyncAux:
         """Return `size` bytes, or those that came within `timeout_s`; -1: what has come."""
         if size < 0:
             return self._buffer.read(len(self._buffer))
-        left_s, again = self.timeout_s, False
-        while len(self._buffer) < size and (left_s is None or left_s > 0):
-            command = self._buffer.asking(size, again=again)
-            if command is not None:
-                self._send(command)
-            before = len(self._buffer)
-            step_s = ASK_AGAIN_S if left_s is None else min(ASK_AGAIN_S, left_s)
-            again = not await self._wait_for(lambda _, before=before: len(self._buffer) > before, step_s)  # type: ignore[misc]  # bound now
-            left_s = left_s if left_s is None or not again else left_s - step_s
+        await self._do(self._buffer.filling(size, self.timeout_s, self._send))
         return self._buffer.read(size)
 
     async def flush_input(self) -> None:

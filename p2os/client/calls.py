@@ -11,10 +11,11 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from enum import IntEnum
-from typing import Protocol, TypeVar
+from typing import Protocol
 
 from p2os.client.core import PacketType, RobotCore
 from p2os.client.goals import as_number
+from p2os.client.line import Result
 from p2os.client.notices import LinkLostError
 from p2os.client.robot_state import Limits, Link, RobotPose, RobotState
 from p2os.protocol.commands import Command, CommandNumber, sonar
@@ -26,7 +27,6 @@ from p2os.robots.parameters import RobotParameters
 from simbase.errors import UsageError
 from simbase.timing import Nanos
 
-Result = TypeVar("Result")
 #: What the argument of a request means: one packet, or one a cycle.
 ONCE, ALWAYS = 1, 2
 #: SAY carries at most so many notes, each at most so long (Pioneer manuals, command 15).

@@ -1,7 +1,9 @@
-"""The client's core joined to a byte line and a clock, and the errors that both robots raise.
+"""The client's core joined to a byte line and a clock, who listens to it, and what a program waits for.
 
 `Line` is what both I/O layers do each time they wake; nothing is waited for here. The
-functions below it make a core for a URL and turn its outcomes into errors.
+functions below it make a core for a URL and turn its outcomes into errors. A call that
+waits is a generator: it yields what it waits for, and is sent whether that came; the
+blocking robot and that of asyncio differ in how they wait alone.
 
 Theory of operation. The core's time is the clock's without the gaps in which packets
 came: what waited in the system while the program or its machine paused was sent in
@@ -14,10 +16,12 @@ Invariant: `finish` returns, or is left by an exception, only after STOP has bee
 
 import contextlib
 import logging
-from collections.abc import Sequence
+from collections import deque
+from collections.abc import Callable, Generator, Iterator, Sequence
+from typing import TypeAlias, TypeVar
 
-from p2os.client.core import RobotCore
-from p2os.client.goals import Goal, MotionResult
+from p2os.client.core import PacketType, RobotCore, request_for
+from p2os.client.goals import Axis, Goal, MotionResult, as_number
 from p2os.client.notices import (
     BaudKept,
     ConnectError,
@@ -57,6 +61,17 @@ LONGEST_WAIT_NS: Nanos = NS_PER_S // 2
 
 #: chosen: how often a noisy line is told of at most.
 DROPS_LOG_NS: Nanos = NS_PER_S
+
+#: How many notices wait for a slow reader.
+MOST_NOTICES = 1000
+#: chosen: how often a waiting program counts as having made a call, for the deadman.
+TOUCH_S = 0.25
+
+Result = TypeVar("Result")
+#: Yields what is waited for and how many seconds at most, None for ever; is sent whether it came.
+Waiting: TypeAlias = Generator[tuple[Callable[[RobotCore], bool], float | None], bool, Result]
+#: Acts on the core at a time.
+Act = Callable[[RobotCore, Nanos], Result]
 
 _LOG = logger("client")
 #: Notices that are no plain news (INFO).
@@ -193,6 +208,16 @@ class Line:
         self._watch.expect(deadline)
         return max(deadline - self._clock(), 0) / NS_PER_S
 
+    def waits(self, is_so: Callable[[RobotCore], bool], timeout_s: float | None) -> Iterator[float]:
+        """Yield for how many seconds to wait next until something is so; the deadman does not trip meanwhile."""
+        ends = None if timeout_s is None else self.now() + round(timeout_s * NS_PER_S)
+        while not is_so(self.core):
+            now = self.now()
+            self.core.touch(now)
+            if ends is not None and now >= ends:
+                return
+            yield TOUCH_S if ends is None else min(TOUCH_S, (ends - now) / NS_PER_S)
+
     def finish(self) -> None:
         """Stop the robot, close its session and give the line back, all at once: nobody is left to space the frames.
 
@@ -259,6 +284,164 @@ class Line:
         if self._transport is not None:
             self._transport.close()
             self._transport = None
+
+
+class Listeners:
+    """Who gets what the client has to tell: queues of the program's, and its callbacks."""
+
+    def __init__(self) -> None:
+        self._queues: list[deque[Notice]] = []
+        self._on_state: list[Callable[[RobotState], None]] = []
+        self._on_event: list[Callable[[Notice], None]] = []
+
+    def on_state(self, callback: Callable[[RobotState], None]) -> Callable[[], None]:
+        """Call `callback` with each state; return what ends that."""
+        return _added(self._on_state, callback)
+
+    def on_event(self, callback: Callable[[Notice], None]) -> Callable[[], None]:
+        """Call `callback` with each notice; return what ends that."""
+        return _added(self._on_event, callback)
+
+    @contextlib.contextmanager
+    def queue(self) -> Iterator[deque[Notice]]:
+        """Give a queue that gets every notice meanwhile."""
+        queue: deque[Notice] = deque(maxlen=MOST_NOTICES)
+        self._queues.append(queue)
+        try:
+            yield queue
+        finally:
+            self._queues[:] = [other for other in self._queues if other is not queue]
+
+    def keep(self, news: Sequence[RobotState | Notice]) -> None:
+        """Put the notices into the queues."""
+        for queue in tuple(self._queues):
+            queue.extend(item for item in news if not isinstance(item, RobotState))
+
+    def call(self, news: Sequence[RobotState | Notice]) -> None:
+        """Call the callbacks, in order; hold no lock."""
+        for item in news:
+            if isinstance(item, RobotState):
+                for on_state in tuple(self._on_state):
+                    on_state(item)
+            else:
+                for on_event in tuple(self._on_event):
+                    on_event(item)
+
+
+Callback = TypeVar("Callback")
+
+
+def _added(callbacks: list[Callback], callback: Callback) -> Callable[[], None]:
+    callbacks.append(callback)
+
+    def end() -> None:
+        with contextlib.suppress(ValueError):
+            callbacks.remove(callback)
+
+    return end
+
+
+# What a program waits for ----------------------------------------------------------------
+
+
+def connecting(core: RobotCore) -> Waiting[None]:
+    """Wait until the session is open and the robot known.
+
+    Raises:
+        ConnectError: It is not.
+    """
+    yield lambda core: core.is_ready or is_over(core), None
+    if not core.is_ready:
+        raise not_found(core)
+
+
+def sleeping(duration_s: float) -> Waiting[None]:
+    """Wait for so long."""
+    yield lambda _: False, as_number(duration_s, "sleep", "seconds")
+
+
+def next_state(core: RobotCore, timeout_s: float) -> Waiting[RobotState]:
+    """Wait for the next packet.
+
+    Raises:
+        LinkLostError: None came in time.
+    """
+    before = core.state
+    yield lambda core: core.state is not before, timeout_s
+    if core.state is None or core.state is before:
+        raise not_connected(core)
+    return core.state
+
+
+def newer_state(core: RobotCore, last: RobotState | None, left_s: float | None) -> Waiting[RobotState | None]:
+    """Wait for a state that is not the last; None where the client or the time ends."""
+    yield lambda core: core.state is not last or is_over(core), left_s
+    return None if core.state is last else core.state
+
+
+def next_notice(queue: deque[Notice]) -> Waiting[Notice | None]:
+    """Wait for a notice; None where the client ends."""
+    yield lambda core: bool(queue) or is_over(core), None
+    return queue.popleft() if queue else None
+
+
+def fetching(
+    core: RobotCore, kind: type[PacketType], timeout_s: float, send: Callable[[Command], None]
+) -> Waiting[PacketType]:
+    """Ask for a packet and wait for it.
+
+    Raises:
+        NoAnswerError: None came in time.
+        LinkLostError: No session is open.
+        UsageError: Nothing asks for such a packet.
+    """
+    request, before = request_for(kind), core.newest(kind)
+    send(request)
+    if not (yield lambda core: core.newest(kind) is not before, timeout_s):
+        raise no_answer(core, kind, timeout_s)
+    packet = core.newest(kind)
+    if packet is None:
+        raise not_connected(core)
+    return packet
+
+
+def opening(core: RobotCore, timeout_s: float | None) -> Waiting[None]:
+    """Wait until the session is open again after a loss.
+
+    Raises:
+        LinkLostError: It is not, in time or for good.
+    """
+    yield lambda core: core.link is Link.OPEN or is_over(core), timeout_s
+    if core.link is not Link.OPEN:
+        raise not_connected(core)
+
+
+def reaching(
+    core: RobotCore, axis: Axis, speed: float | None, timeout_s: float | None, run: Callable[[Act[object]], object]
+) -> Waiting[MotionResult]:
+    """Begin a goal and wait for its end; who gives up waiting stops the robot.
+
+    Raises:
+        MotionError, LinkLostError, MotorsDisabledError: It did not arrive.
+    """
+    limit_ns = None if timeout_s is None else round(as_number(timeout_s, "timeout_s", "seconds") * NS_PER_S)
+    begun: list[Goal] = []
+    run(lambda core, now: begun.append(core.begin_goal(axis, limit_ns, speed, now)))
+    (goal,) = begun
+    try:
+        yield lambda _: goal.ended is not None, None
+    finally:
+        if goal.ended is None:
+            run(lambda core, now: core.cancel_goal(goal, now))
+    return motion_result(goal, core)
+
+
+def is_over(core: RobotCore) -> bool:
+    """Tell whether a client is closed or has given up."""
+    return core.link in {Link.CLOSED, Link.FAILED}
+
+
+# Making one, and what goes wrong ---------------------------------------------------------
 
 
 def core_for(

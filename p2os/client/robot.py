@@ -16,12 +16,23 @@ from types import TracebackType
 from typing import Self
 
 from p2os.client.aux_ports import AuxStream
-from p2os.client.calls import Result, RobotCalls
-from p2os.client.core import PacketType, RobotCore, request_for
+from p2os.client.calls import RobotCalls
+from p2os.client.core import PacketType, RobotCore
 from p2os.client.goals import Axis, DriveAxis, MotionResult, TurnAxis, as_number
-from p2os.client.line import core_for, motion_result, no_answer, not_connected, not_found
+from p2os.client.line import (
+    Result,
+    connecting,
+    core_for,
+    fetching,
+    newer_state,
+    next_notice,
+    next_state,
+    opening,
+    reaching,
+    sleeping,
+)
 from p2os.client.notices import Notice
-from p2os.client.robot_state import Link, RobotState
+from p2os.client.robot_state import RobotState
 from p2os.client.robot_thread import Opener, RobotThread
 from p2os.client.settings import DEADMAN_S, ClientSettings
 from p2os.robots.parameters import RobotParameters
@@ -82,9 +93,7 @@ class Robot(RobotCalls):
         try:
             with thread.changed:
                 thread.call(lambda core, now: core.connect(now))
-                thread.wait_for(lambda core: core.is_ready or core.link in {Link.FAILED, Link.CLOSED}, None)
-                if not thread.core.is_ready:
-                    raise not_found(thread.core)  # noqa: TRY301  # closing is the same for every way out
+                thread.do(connecting(thread.core))
         except BaseException:
             self.close()
             raise
@@ -109,8 +118,7 @@ class Robot(RobotCalls):
         Raises:
             P2osError: the client's thread failed meanwhile.
         """
-        with self._thread.changed:
-            self._thread.wait_for(lambda _: False, as_number(duration_s, "sleep", "seconds"))
+        self._thread.do(sleeping(duration_s))
 
     def next_state(self, timeout_s: float = 2.0) -> RobotState:
         """Wait for the next packet and return its state.
@@ -118,14 +126,7 @@ class Robot(RobotCalls):
         Raises:
             LinkLostError: none came in time.
         """
-        thread = self._thread
-        with thread.changed:
-            before = thread.core.state
-            thread.wait_for(lambda core: core.state is not before, timeout_s)
-            state = thread.core.state
-            if state is None or state is before:
-                raise not_connected(thread.core)
-            return state
+        return self._thread.do(next_state(self._thread.core, timeout_s))
 
     def fetch(self, kind: type[PacketType], timeout_s: float = 1.0) -> PacketType:
         """Ask the robot for a packet of a type, and return it.
@@ -139,16 +140,7 @@ class Robot(RobotCalls):
             LinkLostError: No session is open.
             UsageError: Nothing asks for such a packet.
         """
-        request, thread = request_for(kind), self._thread
-        with thread.changed:
-            before = thread.core.newest(kind)
-            self.send(request)
-            if not thread.wait_for(lambda core: core.newest(kind) is not before, timeout_s):
-                raise no_answer(thread.core, kind, timeout_s)
-            packet = thread.core.newest(kind)
-        if packet is None:
-            raise not_connected(thread.core)
-        return packet
+        return self._thread.do(fetching(self._thread.core, kind, timeout_s, self.send))
 
     def wait_open(self, timeout_s: float | None = None) -> None:
         """Wait until the session is open again after a loss.
@@ -156,54 +148,38 @@ class Robot(RobotCalls):
         Raises:
             LinkLostError: it is not, in time or for good.
         """
-        thread = self._thread
-        with thread.changed:
-            thread.wait_for(lambda core: core.link in {Link.OPEN, Link.FAILED, Link.CLOSED}, timeout_s)
-            if thread.core.link is not Link.OPEN:
-                raise not_connected(thread.core)
+        self._thread.do(opening(self._thread.core, timeout_s))
 
     def states(self, lasts_s: float | None = None) -> Iterator[RobotState]:
         """Yield each new state as it comes, the newest where the program is slow.
 
         Ends when the client does, and after `lasts_s` seconds, also while the robot is lost; None: never.
         """
-        thread, last = self._thread, None
+        last: RobotState | None = None
         ends = None if lasts_s is None else wall_clock() + round(lasts_s * NS_PER_S)
         while ends is None or wall_clock() < ends:
             left_s = None if ends is None else (ends - wall_clock()) / NS_PER_S
-            with thread.changed:
-                thread.wait_for(lambda core, seen=last: core.state is not seen or _is_over(core), left_s)  # type: ignore[misc]  # bound now
-                state = thread.core.state
-                if state is None or state is last:
-                    return
-            last = state
-            yield state
+            last = self._thread.do(newer_state(self._thread.core, last, left_s))
+            if last is None:
+                return
+            yield last
 
     def events(self) -> Iterator[Notice]:
         """Yield what happens beside the states, from now on, in order; ends when the client does."""
-        thread = self._thread
-        queue = thread.subscribe()
-        try:
-            while True:
-                with thread.changed:
-                    thread.wait_for(lambda core: bool(queue) or _is_over(core), None)
-                    if not queue:
-                        return
-                    notice = queue.popleft()
+        with self._thread.listeners.queue() as queue:
+            while (notice := self._thread.do(next_notice(queue))) is not None:
                 yield notice
-        finally:
-            thread.unsubscribe(queue)
 
     def on_state(self, callback: Callable[[RobotState], None]) -> Callable[[], None]:
         """Call `callback` with each state, from the client's thread; return what ends that.
 
         An exception in it stops the robot and is raised in the program's next call.
         """
-        return self._thread.on_state(callback)
+        return self._thread.listeners.on_state(callback)
 
     def on_event(self, callback: Callable[[Notice], None]) -> Callable[[], None]:
         """Call `callback` with what happens beside the states; otherwise as `on_state`."""
-        return self._thread.on_event(callback)
+        return self._thread.listeners.on_event(callback)
 
     # Motion that waits --------------------------------------------------------------------
 
@@ -254,20 +230,7 @@ class Robot(RobotCalls):
         return AuxStream(self._thread, port)
 
     def _reach(self, axis: Axis, speed: float | None, timeout_s: float | None) -> MotionResult:
-        thread = self._thread
-        limit_ns = None if timeout_s is None else round(as_number(timeout_s, "timeout_s", "seconds") * NS_PER_S)
-        with thread.changed:
-            goal = thread.call(lambda core, now: core.begin_goal(axis, limit_ns, speed, now))
-            try:
-                thread.wait_for(lambda _: goal.ended is not None, None)
-            finally:
-                if goal.ended is None:
-                    thread.call(lambda core, now: core.cancel_goal(goal, now))
-            return motion_result(goal, thread.core)
+        return self._thread.do(reaching(self._thread.core, axis, speed, timeout_s, self._run))
 
     def _run(self, call: Callable[[RobotCore, Nanos], Result]) -> Result:
         return self._thread.call(call)
-
-
-def _is_over(core: RobotCore) -> bool:
-    return core.link in {Link.CLOSED, Link.FAILED}

@@ -17,22 +17,17 @@ import contextlib
 import socket
 import threading
 import time
-from collections import deque
 from collections.abc import Callable, Iterator
-from typing import Any
 
-from p2os.client.calls import Result
 from p2os.client.core import RobotCore
-from p2os.client.line import Line
-from p2os.client.notices import Notice
-from p2os.client.robot_state import RobotState
+from p2os.client.line import Line, Listeners, Result, Waiting
 from p2os.errors import TransportError
 from p2os.transport.ports import Transport
 from p2os.transport.waiting import BLIND_POLL_S, wait_readable
 from p2os.transport.wall_clock import Clock, wall_clock
 from simbase.errors import P2osError
 from simbase.interrupts import held_back
-from simbase.timing import NS_PER_S, Nanos
+from simbase.timing import Nanos
 
 #: Opens the line that a URL names.
 Opener = Callable[[str], Transport]
@@ -46,10 +41,6 @@ LOOK_S = 0.002
 #: chosen: an ending that cannot have the lock in a second goes on without: a program that was interrupted inside of
 #: Python's own `threading` can leave it locked for ever. Several tries: one can run out while the process is stopped.
 LOCK_TRIES, LOCK_S = 5, 0.2
-#: How many notices wait for a slow reader.
-MOST_NOTICES = 1000
-#: chosen: how often a waiting program counts as having made a call, for the deadman.
-TOUCH_S = 0.25
 
 
 class RobotThread:
@@ -81,9 +72,7 @@ class RobotThread:
         self._is_ending = False
         self._is_closing = False
         self._has_ended = False
-        self._queues: list[deque[Notice]] = []
-        self._state_callbacks: list[Callable[[RobotState], None]] = []
-        self._event_callbacks: list[Callable[[Notice], None]] = []
+        self.listeners = Listeners()
 
     def start(self) -> None:
         """Begin to move bytes."""
@@ -106,16 +95,21 @@ class RobotThread:
 
     def wait_for(self, is_so: Callable[[RobotCore], bool], timeout_s: float | None) -> bool:
         """Wait, under `changed`, until something is so; the deadman does not trip meanwhile."""
-        ends = None if timeout_s is None else self._line.now() + round(timeout_s * NS_PER_S)
-        while not is_so(self.core):
+        for left_s in self._line.waits(is_so, timeout_s):
             self._check()
-            now = self._line.now()
-            self.core.touch(now)
-            if ends is not None and now >= ends:
-                return False
-            left = TOUCH_S if ends is None else min(TOUCH_S, (ends - now) / NS_PER_S)
-            self.changed.wait(left)
-        return True
+            self.changed.wait(left_s)
+        return is_so(self.core)
+
+    def do(self, waiting: Waiting[Result]) -> Result:
+        """Carry out a call that waits; it is left where waiting ends by an exception."""
+        with self.changed, contextlib.closing(waiting):
+            try:
+                wanted = next(waiting)
+                while True:
+                    wanted = waiting.send(self.wait_for(*wanted))
+            except StopIteration as end:
+                result: Result = end.value
+                return result
 
     def shut_down(self) -> None:
         """Stop the robot, close the session and the line, end the thread; a second call changes nothing.
@@ -131,38 +125,6 @@ class RobotThread:
         """Raise what the thread failed with, unless the program fails already or it was raised before."""
         if error is None and self._failure is not None and not self._has_reported:
             raise P2osError(f"the client's thread failed: {self._failure}") from self._failure
-
-    # Listeners ----------------------------------------------------------------------------
-
-    def subscribe(self) -> deque[Notice]:
-        """Return a queue that gets every notice from now on."""
-        queue: deque[Notice] = deque(maxlen=MOST_NOTICES)
-        with self._lock:
-            self._queues.append(queue)
-        return queue
-
-    def unsubscribe(self, queue: deque[Notice]) -> None:
-        """Put nothing more into a queue."""
-        with self._lock:
-            self._queues = [other for other in self._queues if other is not queue]
-
-    def on_state(self, callback: Callable[[RobotState], None]) -> Callable[[], None]:
-        """Call `callback` with each state."""
-        return self._subscribed(self._state_callbacks, callback)
-
-    def on_event(self, callback: Callable[[Notice], None]) -> Callable[[], None]:
-        """Call `callback` with each notice."""
-        return self._subscribed(self._event_callbacks, callback)
-
-    def _subscribed(self, callbacks: list[Any], callback: Callable[..., None]) -> Callable[[], None]:
-        with self._lock:
-            callbacks.append(callback)
-
-        def unsubscribe() -> None:
-            with self._lock, contextlib.suppress(ValueError):
-                callbacks.remove(callback)
-
-        return unsubscribe
 
     # Closing ------------------------------------------------------------------------------
 
@@ -223,8 +185,12 @@ class RobotThread:
                 self.core.close(self._line.now())
             self._line.turn()
             wants_line = self._line.is_wanted
-            news = self._take_news()
-        self._notify(news)
+            news = self._line.take_news()
+            self.listeners.keep(news)
+            if news:
+                self.changed.notify_all()
+        self._line.log(news)  # without the lock, as callbacks
+        self.listeners.call(news)
         if wants_line:
             self._open()
         return self._is_closing and self._line.is_over
@@ -239,27 +205,6 @@ class RobotThread:
             with self._locked():
                 self._line.opened(transport)
         self._wake_thread()
-
-    def _take_news(self) -> list[RobotState | Notice]:
-        news = self._line.take_news()
-        for item in news:
-            if not isinstance(item, RobotState):
-                for queue in self._queues:
-                    queue.append(item)
-        if news:
-            self.changed.notify_all()
-        return news
-
-    def _notify(self, news: list[RobotState | Notice]) -> None:
-        """Log, and call the callbacks, without the lock."""
-        self._line.log(news)
-        for item in news:
-            if isinstance(item, RobotState):
-                for on_state in tuple(self._state_callbacks):
-                    on_state(item)
-            else:
-                for on_event in tuple(self._event_callbacks):
-                    on_event(item)
 
     def _wait(self) -> None:
         """Sleep until bytes, a deadline or a call."""

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import IO, cast
 
 from robot_bench.campaign.trial import Done, GoalResult, Hit, Outcome, Verdict
-from simbase.errors import FileError
+from simbase.files import writing
 
 NAME = "journal.jsonl"
 
@@ -34,12 +34,10 @@ class Journal:
     def __init__(self, folder: Path) -> None:
         self._path = folder / NAME
         self._done: dict[str, Done] = {}
-        try:
+        with writing(self._path):
             self._file: IO[str] = self._path.open("a+", encoding="ascii", newline="\n")
             self._file.seek(0)
             text = self._file.read()
-        except OSError as error:
-            raise FileError(f"cannot write {self._path}: {error.strerror}") from error
         whole = text[: text.rfind("\n") + 1]
         if len(whole) < len(text):
             self._file.truncate(len(whole))
@@ -65,12 +63,10 @@ class Journal:
         """
         self._done[key] = outcome, cpu_s
         line = json.dumps({"key": key, "outcome": plain_of(outcome), "cpu_s": cpu_s}, separators=(",", ":"))
-        try:
+        with writing(self._path, hint="make room, then --resume"):
             self._file.write(f"{line}\n")
             self._file.flush()
             os.fsync(self._file.fileno())
-        except OSError as error:
-            raise FileError(f"cannot write {self._path}: {error.strerror}", hint="make room, then --resume") from error
 
     def close(self) -> None:
         """Close the file."""

@@ -24,7 +24,8 @@ from robot_bench.campaign.last_moment import LastMoment
 from robot_bench.campaign.results import Whole
 from robot_bench.campaign.trial import unpacked
 from robot_bench.campaign.variants.diversity import FailureSet
-from simbase.errors import FileError, P2osError
+from simbase.errors import P2osError
+from simbase.files import write_text
 
 #: chosen: what fits a page that one scrolls through.
 MOST_SHOWN, MOST_DIMENSIONS = 24, 8
@@ -84,10 +85,7 @@ def write_page(path: Path, whole: Whole) -> None:
     Raises:
         FileError: It cannot be written.
     """
-    try:
-        path.write_text(render(whole), encoding="utf-8")
-    except OSError as error:
-        raise FileError(f"cannot write {path}: {error.strerror}") from error
+    write_text(path, render(whole))
 
 
 def render(whole: Whole) -> str:

@@ -23,7 +23,8 @@ from robot_bench.campaign.last_moment import LastMoment
 from robot_bench.campaign.margin import goal_margin
 from robot_bench.campaign.space import Space
 from robot_bench.campaign.variants.diversity import FailureSet
-from simbase.errors import FileError, MissingDependencyError
+from simbase.errors import MissingDependencyError
+from simbase.files import writing
 
 RESULTS, FAILURES = "results", "failures"
 
@@ -50,10 +51,8 @@ class Results:
         self._campaign = campaign
         self._spans = {f"vary.{dimension.name}": dimension.span for dimension in space.dimensions}
         self._parts = 0
-        try:
+        with writing(folder, hint="--out another folder"):
             (folder / RESULTS).mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise FileError(f"cannot write {folder}: {error.strerror}", hint="--out another folder") from error
 
     def add(self, rows: Sequence[Row]) -> None:
         """Write a batch.
@@ -63,13 +62,11 @@ class Results:
         """
         self._parts += 1
         path = self.folder / RESULTS / f"part-{self._parts:05d}.parquet"
-        try:
+        with writing(path, hint="make room, then --resume"):
             self._write([self._entry(row, run) for row in rows for run in row.runs], path)
             for row in rows:
                 if row.failing is not None:
                     row.failing.trial.write(self.failure_folder(row))
-        except OSError as error:
-            raise FileError(f"cannot write {path}: {error.strerror}", hint="make room, then --resume") from error
 
     def failure_folder(self, row: Row) -> Path:
         """Return the folder of a point that failed."""

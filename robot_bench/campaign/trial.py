@@ -40,7 +40,8 @@ from robot_bench.scenario.included_files import (
     shipped_file,
 )
 from robot_bench.scenario.scenario import Scenario, build_scenario, known_scenarios, load_scenario
-from simbase.errors import P2osError, UsageError
+from simbase.errors import P2osError
+from simbase.files import writing
 from simbase.timing import NS_PER_MS, Nanos
 
 #: A way is kept as a place each so often.
@@ -124,14 +125,12 @@ class Trial:
         """Write scenario and files into a folder; return the scenario's path, for `p2os run`.
 
         Raises:
-            UsageError: The folder cannot be written.
+            FileError: The folder cannot be written.
         """
         path = folder / f"{self.name}.toml"
-        try:
+        with writing(path, hint="name another folder"):
             _write_files(self.files, folder)
             path.write_text(self.text, encoding="utf-8")
-        except OSError as error:
-            raise UsageError(f"cannot write {path}: {error.strerror}", hint="name another folder") from error
         return path
 
     def scenario(self, folder: Path) -> Scenario:

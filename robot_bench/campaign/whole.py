@@ -20,6 +20,7 @@ from robot_bench.campaign.last_moment import LastMoment, last_moment
 from robot_bench.campaign.page import write_page
 from robot_bench.campaign.results import Results, Whole
 from simbase.errors import FileError, P2osError, UsageError
+from simbase.files import writing
 from simbase.timing import Nanos
 
 SCENARIO = "scenario"
@@ -39,7 +40,8 @@ def begin(file: Path, folder: Path, *, firmware: Path | None, overrides: Mapping
 
     Raises:
         ScenarioError: The file breaks the schema.
-        UsageError: The folder is not empty, or cannot be written.
+        UsageError: The folder is not empty.
+        FileError: It cannot be written.
     """
     text = read_user_text(file, "a campaign", ScenarioError, hint="p2os campaign new SCENARIO writes one")
     table = dict(read_toml(text, file.name, "a campaign", ScenarioError)[0])
@@ -49,13 +51,11 @@ def begin(file: Path, folder: Path, *, firmware: Path | None, overrides: Mapping
     found = parse_campaign(text if not overrides else toml_text(table), file, firmware=firmware)
     if folder.is_dir() and any(folder.iterdir()):
         raise UsageError(f"{folder} is not empty", hint=f"p2os campaign --resume {folder}, or another folder")
-    try:
+    with writing(folder, hint="--out another folder"):
         scenario = found.trial.write(folder / SCENARIO)
         kept = {key: value for key, value in table.items() if key not in {"firmware", "goal"}}
         kept["scenario"] = f"{SCENARIO}/{scenario.name}"
         (folder / f"{file.stem}.toml").write_text(toml_text(kept), encoding="utf-8")
-    except OSError as error:
-        raise UsageError(f"cannot write {folder}: {error.strerror}", hint="--out another folder") from error
     return load_campaign(folder / f"{file.stem}.toml")
 
 

@@ -18,6 +18,7 @@ from robot_bench.report.explain.explain import explain as explain_run
 from robot_bench.scenario.goals.judging import judge
 from robot_bench.scenario.scenario import Scenario, load_scenario
 from simbase.errors import FileError, UsageError
+from simbase.files import reading
 
 HELP = """Say why a run failed: from the sensor to the wheel, with times.
 
@@ -102,15 +103,11 @@ def read_record(path: Path) -> RunRecord:
     """
     if path.name == TRACE_NAME:
         return read_run(path.parent)
-    try:
-        with path.open(encoding="utf-8", errors="replace") as lines:
-            record = record_of(lines, str(path))
-    except OSError as error:
-        raise FileError(
-            f"cannot read {path}: {error.strerror or error}", hint="give a run folder, or a trace"
-        ) from error
+    hint = "give a run folder, or a trace"
+    with reading(path, hint=hint), path.open(encoding="utf-8", errors="replace") as lines:
+        record = record_of(lines, str(path))
     if not record.meta and not record.last_ns:
-        raise FileError(f"{path} is no trace", hint="give a run folder, or a trace")
+        raise FileError(f"{path} is no trace", hint=hint)
     return record
 
 

@@ -27,7 +27,8 @@ from robot_bench.recording.summary import INTERRUPTED
 from robot_bench.run import run_scenario
 from robot_bench.scenario.included_files import Setting, as_toml
 from robot_bench.scenario.scenario import Scenario
-from simbase.errors import FileError, UsageError
+from simbase.errors import UsageError
+from simbase.files import writing
 
 #: Which run folders are kept.
 KEPT: Mapping[str, Callable[[bool], bool]] = {
@@ -139,12 +140,8 @@ def refuse_junit(path: Path) -> None:
     Raises:
         FileError: So it is.
     """
-    try:
+    with writing(path, hint="--junit takes a file"):
         path.open("a", encoding="utf-8").close()
-    except OSError as error:
-        raise FileError(
-            f"cannot write {path}: {(error.strerror or '').lower()}", hint="--junit takes a file"
-        ) from error
 
 
 def write_junit(done: Done, path: Path) -> None:
@@ -172,10 +169,8 @@ def write_junit(done: Done, path: Path) -> None:
             why = _UNWRITABLE.sub("?", "\n".join(failures))
             ET.SubElement(case, "failure", message=why.partition("\n")[0]).text = f"{why}\n{row.replay}"
         ET.SubElement(case, "system-out").text = row.replay
-    try:
+    with writing(path):
         ET.ElementTree(suite).write(path, encoding="utf-8", xml_declaration=True)
-    except OSError as error:
-        raise FileError(f"cannot write {path}: {(error.strerror or '').lower()}") from error
 
 
 def as_json(done: Done) -> Json:

@@ -25,6 +25,7 @@ from robot_bench.experiments.aria_logs import is_aria_log, read_aria_log
 from robot_bench.experiments.bag_drives import drive_of_bag
 from robot_bench.recording.run_record import TRACE_NAME, read_events, read_run
 from simbase.errors import FileError, shown_name
+from simbase.files import writing
 
 _TUM_COLUMNS = 8
 #: Longer is no number.
@@ -159,9 +160,6 @@ def write_tum(trajectory: Trajectory, path: Path) -> None:
         FileError: It cannot be written.
     """
     columns: list[Floats] = [trajectory.t_s, trajectory.x_m, trajectory.y_m, trajectory.heading_rad / 2]
-    try:
-        with path.open("w", encoding="utf-8", newline="\n") as file:
-            for t, x, y, half in zip(*(column.tolist() for column in columns), strict=True):
-                file.write(f"{t!r} {x!r} {y!r} 0 0 0 {math.sin(half)!r} {math.cos(half)!r}\n")
-    except OSError as error:
-        raise FileError(f"cannot write {shown_name(path)}: {error.strerror or error}") from error
+    with writing(path), path.open("w", encoding="utf-8", newline="\n") as file:
+        for t, x, y, half in zip(*(column.tolist() for column in columns), strict=True):
+            file.write(f"{t!r} {x!r} {y!r} 0 0 0 {math.sin(half)!r} {math.cos(half)!r}\n")

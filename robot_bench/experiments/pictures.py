@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from robot_bench.experiments.comparison import Comparison
 from robot_bench.experiments.parting import motion_parts_s
 from robot_bench.experiments.sensitivity import Effect
-from simbase.errors import FileError, shown_name
+from simbase.files import writing
 
 #: The colours of the report's plots.
 ONE, OTHER, MARK = "#1b6ca8", "#c8553d", "#4a5560"
@@ -38,10 +38,8 @@ def write_png(figure: Figure, path: Path) -> None:
     Raises:
         FileError: It cannot be written.
     """
-    try:
+    with writing(path):
         path.write_bytes(png(figure))
-    except OSError as error:
-        raise FileError(f"cannot write {shown_name(path)}: {(error.strerror or str(error)).lower()}") from error
 
 
 def comparison_figure(found: Comparison) -> Figure:

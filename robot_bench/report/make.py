@@ -25,7 +25,7 @@ from robot_bench.recording.summary import outcome_of_all, write_outcome
 from robot_bench.recording.waveforms import write_sigrok, write_vcd
 from robot_bench.report.page import page_data, render_page
 from robot_bench.report.page_of_all import REPORT_NAME, write_report_of_all
-from simbase.errors import FileError
+from simbase.files import writing
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,15 +84,13 @@ def make_artefacts(folder: Path, *, plots: bool = False) -> Artefacts:
 
 
 def _artefacts_of(record: RunRecord, folder: Path, *, plots: bool) -> Artefacts:
-    try:
+    with writing(folder):
         outcome = write_outcome(record, folder)
         write_vcd(record, folder / "pins.vcd")
         write_sigrok(record, folder / "pins.sr")
         write_wire(record, folder / "wire.jsonl")
         (folder / "usart.txt").write_bytes(b"".join(data for _, data in record.usart))
         report = _report_of(record, folder, plots=plots)
-    except OSError as error:
-        raise FileError(f"cannot write into {folder}: {error.strerror or error}") from error
     return Artefacts(outcome=outcome, report=report.page)
 
 

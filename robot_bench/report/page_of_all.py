@@ -19,7 +19,7 @@ from robot_bench.recording.run_record import RunRecord
 from robot_bench.recording.summary import SUMMARY_NAME, verdict_of
 from robot_bench.recording.together import named_events
 from robot_bench.report.thinning import ends, extremes
-from simbase.errors import FileError
+from simbase.files import writing
 from simbase.timing import NS_PER_S
 
 REPORT_NAME = "report.html"
@@ -73,11 +73,9 @@ def write_report_of_all(outcome: Json, records: Mapping[str, RunRecord], folder:
         plan=_plan(records, colours),
         log="\n".join(_log(named_events(folder), colours)),
     )
-    try:
+    with writing(folder):
         (folder / REPORT_NAME).write_text(page, encoding="utf-8")
         (folder / SUMMARY_NAME).write_text(json.dumps(outcome, indent=2, sort_keys=True) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise FileError(f"cannot write into {folder}: {error.strerror or error}") from error
 
 
 def _row(name: str, one: Mapping[str, object], colour: str) -> str:

@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib.resources import files
 from pathlib import Path
-from typing import TypedDict, Unpack, cast
+from typing import Any, TypedDict, Unpack, cast
 
 from adapter_sim.codec import BitOrder
 from adapter_sim.pinout import WireRole, load_pinout
@@ -668,21 +668,20 @@ def _start(table: Table, where: Where, key: str = "start") -> Pose | None:
 
 def _direct(part: Table, where: Where) -> DirectSettings:
     check_table(part, _DIRECT, within(where, "direct"))
-    settings = DirectSettings()
-    if "step_mm_s" in part:
-        settings = replace(settings, step_um_per_s=round(cast("float", part["step_mm_s"]) * 1000))
-    if "ramp_mm_s2" in part:
-        ramp = round(cast("float", part["ramp_mm_s2"]) * 1000)
-        settings = replace(settings, ramp_um_per_s2=ramp or None)
-    if "sensor_period_ms" in part:
-        settings = replace(settings, sensor_period_ns=cast("int", part["sensor_period_ms"]) * NS_PER_MS)
-    if "encoder_period_ms" in part:
-        settings = replace(settings, encoder_period_ns=cast("int", part["encoder_period_ms"]) * NS_PER_MS)
-    if "motor_command" in part:
-        settings = replace(settings, motor_command=MotorCommand(str(part["motor_command"])))
-    if "bit_order" in part:
-        settings = replace(settings, bit_order=BitOrder(str(part["bit_order"])))
-    return settings
+    return replace(DirectSettings(), **{
+        name: turn(value) for key, value in part.items() for name, turn in (_DIRECT_SETTINGS[key],)
+    })  # fmt: skip
+
+
+#: Key of [direct] → its setting, and how that is made of the value.
+_DIRECT_SETTINGS: Mapping[str, tuple[str, Callable[[Any], Any]]] = {
+    "step_mm_s": ("step_um_per_s", lambda value: round(value * 1000)),
+    "ramp_mm_s2": ("ramp_um_per_s2", lambda value: round(value * 1000) or None),
+    "sensor_period_ms": ("sensor_period_ns", lambda value: value * NS_PER_MS),
+    "encoder_period_ms": ("encoder_period_ns", lambda value: value * NS_PER_MS),
+    "motor_command": ("motor_command", MotorCommand),
+    "bit_order": ("bit_order", BitOrder),
+}
 
 
 def _adapter(part: Table, threshold_um: int, where: Where) -> AdapterSettings:

@@ -24,7 +24,7 @@ from robot_bench.events.selection import wire_named
 from robot_bench.scenario.differential_file import load_differential
 from robot_bench.wires.nets import Harness
 from simbase.errors import nearest, shown, shown_name
-from simbase.timing import Nanos, Reached
+from simbase.timing import Nanos, Timed
 
 #: Pins that the ADC can measure on this package.
 ANALOG_PINS = frozenset([*(f"PA{number}" for number in range(8)), "PB0", "PB1"])
@@ -44,27 +44,11 @@ class WiredRobot(Protocol):
         ...
 
 
-class WiredPart(Protocol):
+class WiredPart(Timed, Protocol):
     """A robot in the bench: it owns the body."""
 
     on_event: Callable[[Nanos, str, str], None] | None
     on_ranges: Callable[[Nanos, Sequence[float]], None] | None
-
-    def next_deadline(self) -> Nanos | None:
-        """Return when it wants to act."""
-        ...
-
-    def advance_to(self, limit: Nanos) -> Reached:
-        """Act on all that is due up to `limit`."""
-        ...
-
-    def snapshot(self) -> object:
-        """Return all that decides the future."""
-        ...
-
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)

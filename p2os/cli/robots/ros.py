@@ -43,7 +43,8 @@ from p2os.ros.transport import DOMAIN, LOOPBACK, MOST_DOMAIN, NodeOptions, Trans
 from p2os.ros.transports import TRANSPORTS, open_transport
 from p2os.ros.urdf import urdf_text
 from p2os.transport.wall_clock import wall_clock
-from simbase.errors import FileError, UsageError
+from simbase.errors import UsageError
+from simbase.files import write_text
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 from simbase.units import COUNT, SPEED, TIME
 
@@ -161,10 +162,7 @@ def write_urdf(model: str, out: Path | None, options: NodeOptions, *, force: boo
         sys.stdout.write(text)
         return
     refuse_to_overwrite(out, force=force)
-    try:
-        out.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise FileError(f"{out}: {error.strerror}") from error
+    write_text(out, text)
 
 
 class NodeLoop:

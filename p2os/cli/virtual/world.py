@@ -22,7 +22,8 @@ from p2os.pioneer.world.model import World
 from p2os.pioneer.world.start_places import refuse_start
 from p2os.pioneer.world.writer import write_world
 from p2os.robots.parameters import load_parameters
-from simbase.errors import FileError, UsageError
+from simbase.errors import UsageError
+from simbase.files import write_text, writing
 from simbase.units import SEED
 
 HELP = """List, draw, check, make and convert worlds.
@@ -113,10 +114,7 @@ def show(
         return
     if out.suffix.lower() != ".svg":
         raise UsageError(f"no picture can be written to {out}", hint="--out FILE.svg")
-    try:
-        out.write_text(svg(place), encoding="utf-8")
-    except OSError as error:
-        raise FileError(f"{out}: {error.strerror}") from error
+    write_text(out, svg(place))
     typer.echo(f"{out}: {_summary(place)}")
 
 
@@ -215,10 +213,8 @@ def _write_files(made: Export, folder: Path, *, force: bool) -> None:
     for name in made.files:
         refuse_to_overwrite(folder / name, force=force)
     for name, data in made.files.items():
-        try:
+        with writing(folder / name):
             (folder / name).write_bytes(data)
-        except OSError as error:
-            raise FileError(f"{folder / name}: {error.strerror}") from error
     for line in made.losses:
         sys.stderr.write(f"note: {line}\n")
 

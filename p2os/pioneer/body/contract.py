@@ -112,7 +112,31 @@ def free_wheels(left_angle_rad: float, right_angle_rad: float) -> Turned:
     return tuple.__new__(Turned, (left_angle_rad, right_angle_rad, False, False))
 
 
-class RobotBody(Protocol):
+class Changeable(Protocol):
+    """A world whose things change, and that can go on from where it was; that of a robot alone, or of all in it."""
+
+    def place(self, obstacle: Obstacle) -> None:
+        """Put an obstacle with a new name into the world."""
+        ...
+
+    def move(self, name: str, x_m: float, y_m: float, heading_rad: float) -> None:
+        """Put an obstacle somewhere else."""
+        ...
+
+    def remove(self, name: str) -> None:
+        """Take an obstacle out of the world."""
+        ...
+
+    def snapshot(self) -> object:
+        """Return all that decides the future, of every robot in it."""
+        ...
+
+    def restore(self, snapshot: object) -> None:
+        """Put back what `snapshot` returned."""
+        ...
+
+
+class RobotBody(Changeable, Protocol):
     """A robot as a physical thing in a world."""
 
     #: Whether its motors have power; without it a wheel that has come to rest is held by its gear alone.
@@ -249,28 +273,8 @@ class RobotBody(Protocol):
         """
         ...
 
-    def place(self, obstacle: Obstacle) -> None:
-        """Put an obstacle with a new name into the world."""
-        ...
 
-    def move(self, name: str, x_m: float, y_m: float, heading_rad: float) -> None:
-        """Put an obstacle somewhere else."""
-        ...
-
-    def remove(self, name: str) -> None:
-        """Take an obstacle out of the world."""
-        ...
-
-    def snapshot(self) -> object:
-        """Return all that decides the future."""
-        ...
-
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned."""
-        ...
-
-
-class RobotScene(Protocol):
+class RobotScene(Changeable, Protocol):
     """Robots in one world, stepped together: they meet, push and sense each other where they are at that step.
 
     The order of the robots is fixed and decides, with the set-points, everything.
@@ -296,24 +300,4 @@ class RobotScene(Protocol):
 
     def step(self, setpoints: Sequence[tuple[float, float]]) -> Sequence[Wheels]:
         """Move all on by `dt_ns` with these rim-speed set-points, left and right, m/s; return their wheels' angles."""
-        ...
-
-    def place(self, obstacle: Obstacle) -> None:
-        """Put an obstacle with a new name into the world."""
-        ...
-
-    def move(self, name: str, x_m: float, y_m: float, heading_rad: float) -> None:
-        """Put an obstacle somewhere else."""
-        ...
-
-    def remove(self, name: str) -> None:
-        """Take an obstacle out of the world."""
-        ...
-
-    def snapshot(self) -> object:
-        """Return all that decides the future of every robot in it."""
-        ...
-
-    def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned."""
         ...

@@ -36,6 +36,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from p2os.errors import WorldError
+from p2os.pioneer.body.contract import RobotBody, Wheels
 from p2os.pioneer.controller.bumper_watch import check_bumpers, is_watching
 from p2os.pioneer.controller.commands import IGNORED, Effect, apply
 from p2os.pioneer.controller.context import BumperWatch, Context
@@ -46,7 +47,6 @@ from p2os.pioneer.controller.flash import Flash
 from p2os.pioneer.controller.live_inputs import apply_input
 from p2os.pioneer.controller.motion import Motion, MotionLimits
 from p2os.pioneer.controller.packet_requests import Requests
-from p2os.pioneer.controller.ports import Body, WheelAngles
 from p2os.pioneer.controller.reporter import Reporter
 from p2os.pioneer.controller.sender import Sender
 from p2os.pioneer.controller.settings import ControllerSettings
@@ -148,7 +148,7 @@ class Pioneer(Stateful):
         self,
         *,
         parameters: RobotParameters,
-        body: Body,
+        body: RobotBody,
         settings: ControllerSettings | None = None,
         on_event: EventCallback | None = None,
         faults: Sequence[str] = (),
@@ -415,7 +415,7 @@ class Pioneer(Stateful):
         faults = self._context.faults
         return 0.0 if faults.left_blocked else left_mps, 0.0 if faults.right_blocked else right_mps
 
-    def take_step(self, wheels: WheelAngles) -> None:
+    def take_step(self, wheels: Wheels) -> None:
         """Take the wheels' angles after a step that was made with `next_setpoints`."""
         self._body_now += self.body.dt_ns
         self._context.reckoning.follow((wheels,))
@@ -596,7 +596,7 @@ class Pioneer(Stateful):
             self._context.notes.append(("world stays", f"its client wants {shown(name)}: {shown_name(error)}"))
             self._tell_of_map(MAP_NOT_LOADED, raw_name, now)
 
-    def enter_world(self, body: Body, raw_name: bytes, now: Nanos) -> None:
+    def enter_world(self, body: RobotBody, raw_name: bytes, now: Nanos) -> None:
         """Go on in another world with the body that it has there; the session and the odometry go on.
 
         A snapshot of before does not fit the robot after this.

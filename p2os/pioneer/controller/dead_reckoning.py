@@ -10,7 +10,7 @@ Invariant: `turned_rad` and `travel_mm` never jump; SETO moves only the origin.
 import math
 from collections.abc import Sequence
 
-from p2os.pioneer.controller.ports import WheelAngles
+from p2os.pioneer.body.contract import Wheels
 from simbase.state import Stateful
 
 #: The packet carries 15 bits of position (Pioneer 2/3 manuals, standard SIP).
@@ -66,7 +66,7 @@ class DeadReckoning(Stateful):
         """Take these wheel angles as those from which to count."""
         self._left_rad, self._right_rad = left_rad, right_rad
 
-    def follow(self, steps: Sequence[WheelAngles]) -> None:
+    def follow(self, steps: Sequence[Wheels]) -> None:
         """Count on to where the wheels are after each of some steps."""
         left_was, right_was, left_all, right_all = self._left_rad, self._right_rad, self.left_mm, self.right_mm
         x, y, turned, travel = self.x_mm, self.y_mm, self.turned_rad, self.travel_mm

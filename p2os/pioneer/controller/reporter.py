@@ -20,13 +20,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from p2os.pioneer.body.contract import BodyState, RobotBody
 from p2os.pioneer.controller.bumper_watch import pressed, stalls
 from p2os.pioneer.controller.context import Context
 from p2os.pioneer.controller.dead_reckoning import raw_angle
 from p2os.pioneer.controller.flash import Flash
 from p2os.pioneer.controller.motion import UDEG_PER_DEG
 from p2os.pioneer.controller.packet_requests import Extra
-from p2os.pioneer.controller.ports import Body, WheelState
 from p2os.pioneer.controller.sender import Sender
 from p2os.pioneer.controller.settings import ControllerSettings
 from p2os.pioneer.devices.laser import Laser
@@ -73,8 +73,8 @@ class Reporter:
     """Makes the packets of one robot."""
 
     def __init__(
-        self, context: Context, body: Body, sender: Sender, parameters: RobotParameters, settings: ControllerSettings,
-        notify: Callable[[Nanos, str, str], None],
+        self, context: Context, body: RobotBody, sender: Sender, parameters: RobotParameters,
+        settings: ControllerSettings, notify: Callable[[Nanos, str, str], None],
     ) -> None:  # fmt: skip
         self.context = context
         self.body = body
@@ -255,7 +255,7 @@ class Reporter:
 
 def _standard_packet(
     context: Context,
-    wheels: WheelState,
+    wheels: BodyState,
     parameters: RobotParameters,
     stalls: tuple[bool, bool],
     bumps: tuple[int, int],
@@ -324,7 +324,7 @@ def _raw_heading_setpoint(context: Context) -> int:
     return raw_angle(goal_udeg / UDEG_PER_DEG * RAD_PER_DEG - context.reckoning.zero_rad)
 
 
-def _arcos_tail(context: Context, wheels: WheelState, parameters: RobotParameters) -> tuple[int, ...]:
+def _arcos_tail(context: Context, wheels: BodyState, parameters: RobotParameters) -> tuple[int, ...]:
     """Return the tail up to the state of charge, as far as ARCOS itself sends it."""
     turn_rad_s = (wheels.right_speed_mps - wheels.left_speed_mps) * 1000 / parameters.track_mm
     battery = context.devices.battery
@@ -355,7 +355,7 @@ def _battery_packet(context: Context) -> BatteryPacket:
     return BatteryPacket(batteries=((0, 0, 0, charge, charge),))
 
 
-def _simstat_packet(body: Body) -> SimstatPacket:
+def _simstat_packet(body: RobotBody) -> SimstatPacket:
     """Return where the robot really is; the simulator's name is left out, as AMRISim leaves it out."""
     state, interval_ms = body.state, max(body.dt_ns // NS_PER_MS, 1)
     return SimstatPacket(

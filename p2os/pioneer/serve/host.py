@@ -18,11 +18,9 @@ share theirs; one that has no client is then carried along by the others.
 import contextlib
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import cast
 
 from p2os.errors import TransportError
 from p2os.event_log import EventCallback, logged, logger
-from p2os.pioneer.body.contract import RobotBody
 from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.serve.aux_endpoint import AuxEndpoint
 from p2os.pioneer.serve.multi_robot_world import MultiRobotWorld
@@ -238,7 +236,7 @@ class Host:
         if self.multi_robot_world is not None:
             return change_world(self.multi_robot_world.scene_at(self.now), words, self.multi_robot_world.names)
         self._bring(self.now)
-        return change_world(cast("RobotBody", self.pioneer.body), words)
+        return change_world(self.pioneer.body, words)
 
     def _advance_to(self, limit: Nanos) -> None:
         """Run the robot until `limit`, with what arrives by then on a line that takes its time."""

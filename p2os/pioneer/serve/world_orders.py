@@ -13,9 +13,9 @@ import math
 import shlex
 from collections.abc import Collection, Mapping
 from dataclasses import replace
-from typing import Protocol
 
 from p2os.errors import WorldError
+from p2os.pioneer.body.contract import Changeable
 from p2os.pioneer.world.model import Obstacle
 from simbase.errors import UsageError
 
@@ -33,22 +33,6 @@ FARTHEST_M = 1000.0
 #: chosen: of one shape; more slow every step.
 MOST_THINGS = 100
 SIZES = frozenset({"LENGTH", "WIDTH", "RADIUS"})
-
-
-class Changeable(Protocol):
-    """A world in which things can be placed, moved and removed."""
-
-    def place(self, obstacle: Obstacle) -> None:
-        """Put an obstacle with a new name into the world."""
-        ...
-
-    def move(self, name: str, x_m: float, y_m: float, heading_rad: float) -> None:
-        """Put an obstacle somewhere else."""
-        ...
-
-    def remove(self, name: str) -> None:
-        """Take an obstacle out of the world."""
-        ...
 
 
 def is_world_order(text: str) -> bool:

@@ -45,11 +45,12 @@ def _keys(defaults: Mapping[str, object]) -> tuple[Key, ...]:
 
 
 START_KEYS = _keys(dict.fromkeys(("x_m", "y_m", "heading_deg", "z_m"), 0.0))
-#: What a thing that can be pushed or walks has beside its shape.
-MOVING: Mapping[str, object] = {
-    "fixed": False, "mass_kg": 0.0, "friction": 0.5,
-    "path_m": (), "speed_mps": 0.5, "start_s": 0.0, "repeat": Repeat.BACK_AND_FORTH,
-}  # fmt: skip
+#: What a thing that walks has beside its shape, and what one that walks or can be pushed has.
+PATH_KEYS = {"path_m": (), "speed_mps": 0.5, "start_s": 0.0, "repeat": Repeat.BACK_AND_FORTH}
+MOVING: Mapping[str, object] = {"fixed": False, "mass_kg": 0.0, "friction": 0.5, **PATH_KEYS}
+#: Keys that an `Obstacle` calls otherwise, and the kind that a section gives.
+CALLED = {"heading_deg": "heading_rad", "top_m": "height_m", "rise_m": "height_m"}
+_KIND_OF = {"floor": Kind.FLOOR, "ramp": Kind.RAMP}
 #: Section → its keys with their defaults; None where a value must be given.
 SHAPES: Mapping[str, tuple[Key, ...]] = {
     "box": _keys({
@@ -106,7 +107,7 @@ def parse_world(text: str, source: str, seed: int = 0, folder: Path | None = Non
     for name, keys in SHAPES.items():
         for at, row in _rows(top[name], name, keys, where):
             with placed(at):
-                obstacles.append(_SHAPERS[name](row))
+                obstacles.append(_obstacle(name, row))
             if obstacles[-1].name in named:
                 first = named[obstacles[-1].name]
                 raise WorldError(
@@ -148,20 +149,13 @@ def _values(row: Table, keys: tuple[Key, ...], where: Place) -> Values:
     return {name: float(value) if type(value) is int else value for name, value in found.items()}
 
 
-def _box(v: Values) -> Obstacle:
-    return Obstacle(
-        name=v["name"], x_m=v["x_m"], y_m=v["y_m"], heading_rad=math.radians(v["heading_deg"]), length_m=v["length_m"],
-        width_m=v["width_m"], height_m=v["height_m"], base_m=v["base_m"], floor_m=v["floor_m"],
-        kind=Kind(v["kind"]), fixed=v["fixed"], mass_kg=v["mass_kg"], friction=v["friction"], walk=_walk(v),
-    )  # fmt: skip
-
-
-def _cylinder(v: Values) -> Obstacle:
-    return Obstacle(
-        name=v["name"], x_m=v["x_m"], y_m=v["y_m"], radius_m=v["radius_m"], height_m=v["height_m"],
-        base_m=v["base_m"], floor_m=v["floor_m"],
-        fixed=v["fixed"], mass_kg=v["mass_kg"], friction=v["friction"], walk=_walk(v),
-    )  # fmt: skip
+def _obstacle(section: str, v: Values) -> Obstacle:
+    if section == "wall":
+        return _wall(v)
+    fields = {CALLED.get(key, key): value for key, value in v.items() if key not in PATH_KEYS}
+    fields["heading_rad"] = math.radians(v.get("heading_deg", 0.0))
+    fields["kind"] = Kind(v.get("kind", _KIND_OF.get(section, Kind.OBSTACLE)))
+    return Obstacle(**fields, walk=_walk(v))
 
 
 def _wall(v: Values) -> Obstacle:
@@ -173,25 +167,8 @@ def _wall(v: Values) -> Obstacle:
     )  # fmt: skip
 
 
-def _floor(v: Values) -> Obstacle:
-    return Obstacle(
-        name=v["name"], x_m=v["x_m"], y_m=v["y_m"], length_m=v["length_m"], width_m=v["width_m"], height_m=v["top_m"],
-        kind=Kind.FLOOR,
-    )  # fmt: skip
-
-
-def _ramp(v: Values) -> Obstacle:
-    return Obstacle(
-        name=v["name"], x_m=v["x_m"], y_m=v["y_m"], heading_rad=math.radians(v["heading_deg"]), length_m=v["length_m"],
-        width_m=v["width_m"], height_m=v["rise_m"], base_m=v["base_m"], kind=Kind.RAMP,
-    )  # fmt: skip
-
-
-_SHAPERS = {"box": _box, "cylinder": _cylinder, "wall": _wall, "floor": _floor, "ramp": _ramp}
-
-
 def _walk(v: Values) -> Walk | None:
-    if not v["path_m"]:
+    if not v.get("path_m"):
         return None
     return Walk(
         points_m=_points(v["path_m"]), speed_mps=v["speed_mps"], start_s=v["start_s"], repeat=Repeat(v["repeat"])

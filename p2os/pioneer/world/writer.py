@@ -8,7 +8,8 @@ that was made by a program, never one that was read.
 
 import math
 
-from p2os.pioneer.world.model import Kind, Mark, Mesh, Obstacle, World
+from p2os.pioneer.world.file import CALLED, SHAPES
+from p2os.pioneer.world.model import Mark, Mesh, Obstacle, World
 from p2os.toml_file import toml_value
 
 #: How many neighbours of a number of degrees are tried.
@@ -26,7 +27,7 @@ def write_world(world: World) -> str:
         _lines({"name": world.name, "description": world.description, "extent_m": list(world.extent)}),
         f"[start]\n{_lines(start)}",
     ]
-    parts += [f"[[{item.section}]]\n{_lines(_FIELDS[item.section](item))}" for item in world.obstacles]
+    parts += [f"[[{item.section}]]\n{_lines(_fields(item))}" for item in world.obstacles]
     parts += [f"[[mesh]]\n{_lines(_mesh(item))}" for item in world.meshes]
     parts += [f"[[mark]]\n{_lines(_mark(item))}" for item in world.marks]
     return "\n".join(parts)
@@ -44,60 +45,15 @@ def degrees(radians: float) -> float:
     return next((value for value in candidates if math.radians(value) == radians), nearest)
 
 
-def _floor(item: Obstacle) -> Fields:
-    return {
-        "name": item.name, "x_m": item.x_m, "y_m": item.y_m, "length_m": item.length_m, "width_m": item.width_m,
-        "top_m": item.height_m,
-    }  # fmt: skip
-
-
-def _ramp(item: Obstacle) -> Fields:
-    return {
-        "name": item.name, "x_m": item.x_m, "y_m": item.y_m, "length_m": item.length_m, "width_m": item.width_m,
-        "rise_m": item.height_m, "heading_deg": degrees(item.heading_rad), "base_m": item.base_m,
-    }  # fmt: skip
-
-
-def _box(item: Obstacle) -> Fields:
-    fields: Fields = {
-        "name": item.name, "x_m": item.x_m, "y_m": item.y_m, "length_m": item.length_m, "width_m": item.width_m,
-        "height_m": item.height_m,
-    }  # fmt: skip
-    if item.heading_rad:
-        fields["heading_deg"] = degrees(item.heading_rad)
-    if item.kind is not Kind.OBSTACLE:
-        fields["kind"] = item.kind.value
-    return fields | _rest(item)
-
-
-def _cylinder(item: Obstacle) -> Fields:
-    return {
-        "name": item.name, "x_m": item.x_m, "y_m": item.y_m, "radius_m": item.radius_m, "height_m": item.height_m,
-    } | _rest(item)  # fmt: skip
-
-
-_FIELDS = {"box": _box, "cylinder": _cylinder, "floor": _floor, "ramp": _ramp}
-
-
-def _rest(item: Obstacle) -> Fields:
-    """Return what boxes and cylinders share, where it is not the default."""
-    fields: Fields = {}
-    if item.base_m:
-        fields["base_m"] = item.base_m
-    if item.floor_m:
-        fields["floor_m"] = item.floor_m
-    if item.fixed:
-        fields["fixed"] = True
-    if item.mass_kg:
-        fields["mass_kg"] = item.mass_kg
-    if item.friction != 0.5:
-        fields["friction"] = item.friction
-    if item.walk is not None:
-        fields["path_m"] = [list(point) for point in item.walk.points_m]
-        fields["speed_mps"] = item.walk.speed_mps
-        fields["start_s"] = item.walk.start_s
-        fields["repeat"] = item.walk.repeat.value
-    return fields
+def _fields(item: Obstacle) -> Fields:
+    """Return the keys of an obstacle that must be given, and those whose value is not the default."""
+    values: Fields = {"heading_deg": degrees(item.heading_rad), "kind": item.kind.value}
+    if (walk := item.walk) is not None:
+        values |= {"path_m": [list(point) for point in walk.points_m], "repeat": walk.repeat.value}
+        values |= {"speed_mps": walk.speed_mps, "start_s": walk.start_s}
+    for key in SHAPES[item.section]:
+        values.setdefault(key.name, getattr(item, CALLED.get(key.name, key.name), key.default))
+    return {key.name: values[key.name] for key in SHAPES[item.section] if values[key.name] != key.default}
 
 
 def _mesh(item: Mesh) -> Fields:

@@ -4,15 +4,16 @@ Source: Pioneer 2/3 H8 manual (GRIPPERpac table 11, SERAUXpac), AmigoBot manuals
 pages 32 and 52 (PLAYLISTpac), ARIA (JOYSTICKpac), player (ARMpac, ARMINFOpac).
 """
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from enum import IntFlag
 from typing import ClassVar
 
-from construct import Array, Bytes, Construct, GreedyBytes, Int8ul, Int16ul, Int32ul, NullTerminated, Struct, this
+from construct import Array, Bytes, Construct, Int8ul, Int16ul, Int32ul, Struct, this
 
 from p2os.errors import LocalProtocolError, RemoteProtocolError
 from p2os.protocol.frames import Frame
-from p2os.protocol.packets.layout import LaidOutPacket, build, parse
+from p2os.protocol.packets.layout import TEXT, LaidOutPacket, build, parse
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -177,7 +178,7 @@ class PlaylistPacket:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ArmPacket:
+class ArmPacket(LaidOutPacket):
     """ARMpac: the state of the Pioneer Arm.
 
     Args:
@@ -195,24 +196,6 @@ class ArmPacket:
     #: Bytes after the last field that this project knows.
     rest: bytes = b""
 
-    def to_frame(self) -> Frame:
-        """Return the frame.
-
-        Raises:
-            LocalProtocolError: A value does not fit its field, or there are not six joints.
-        """
-        return build(self.KIND, self.LAYOUT, asdict(self))
-
-    @classmethod
-    def from_frame(cls, frame: Frame) -> "ArmPacket":
-        """Read the packet.
-
-        Raises:
-            RemoteProtocolError: It is too short.
-        """
-        found = parse(cls.LAYOUT, frame)
-        return cls(**{**found, "positions": tuple(found["positions"])})
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ArmJoint:
@@ -228,15 +211,17 @@ class ArmJoint:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ArmInfoPacket:
+class ArmInfoPacket(LaidOutPacket):
     """ARMINFOpac: the arm's firmware and what each joint can do."""
 
     KIND: ClassVar[int] = 0xA1
+    COUNTS: ClassVar[Mapping[str, str]] = {"count": "joints"}
     LAYOUT: ClassVar[Construct] = Struct(
-        "raw_version" / NullTerminated(GreedyBytes),
+        "raw_version" / TEXT,
         "count" / Int8ul,
         "joints" / Array(this.count, Struct(*(name / Int8ul for name in ArmJoint.__dataclass_fields__))),
     )
+    ITEM: ClassVar[type] = ArmJoint
 
     raw_version: bytes = b""
     joints: tuple[ArmJoint, ...] = ()
@@ -248,31 +233,9 @@ class ArmInfoPacket:
         """The arm's firmware."""
         return self.raw_version.decode("latin-1")
 
-    def to_frame(self) -> Frame:
-        """Return the frame.
-
-        Raises:
-            LocalProtocolError: A value does not fit its field, or the version holds a NUL.
-        """
-        if b"\0" in self.raw_version:
-            raise LocalProtocolError("ARMINFOpac: the version holds a NUL")
-        return build(self.KIND, self.LAYOUT, {"count": len(self.joints), **asdict(self)})
-
-    @classmethod
-    def from_frame(cls, frame: Frame) -> "ArmInfoPacket":
-        """Read the packet.
-
-        Raises:
-            RemoteProtocolError: It is shorter than its count says, or its text has no end.
-        """
-        found = parse(cls.LAYOUT, frame)
-        names = ArmJoint.__dataclass_fields__
-        joints = (ArmJoint(**{name: joint[name] for name in names}) for joint in found["joints"])
-        return cls(raw_version=found["raw_version"], joints=tuple(joints), rest=found["rest"])
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BatteryPacket:
+class BatteryPacket(LaidOutPacket):
     """Battery packet 0xFA: a row of bytes for each battery.
 
     The bytes of a row are flags 1, flags 2, flags 3, relative and absolute state
@@ -280,8 +243,11 @@ class BatteryPacket:
     """
 
     KIND: ClassVar[int] = 0xFA
+    COUNTS: ClassVar[Mapping[str, str]] = {"count": "batteries"}
     LAYOUT: ClassVar[Construct] = Struct(
-        "count" / Int8ul, "row_bytes" / Int8ul, "batteries" / Array(this.count, Array(this.row_bytes, Int8ul))
+        "count" / Int8ul,
+        "row_bytes" / Int8ul,
+        "batteries" / Array(this.count, Array(this.row_bytes, Int8ul)),
     )
 
     batteries: tuple[tuple[int, ...], ...] = ()
@@ -294,25 +260,6 @@ class BatteryPacket:
         """Return a battery's charge in percent of what it holds now, or None where it is not sent."""
         row = self.batteries[battery]
         return row[3] if len(row) > 3 else None
-
-    def to_frame(self) -> Frame:
-        """Return the frame.
-
-        Raises:
-            LocalProtocolError: A value does not fit its field, or a row has another length than `row_bytes`.
-        """
-        return build(self.KIND, self.LAYOUT, {"count": len(self.batteries), **asdict(self)})
-
-    @classmethod
-    def from_frame(cls, frame: Frame) -> "BatteryPacket":
-        """Read the packet.
-
-        Raises:
-            RemoteProtocolError: It is shorter than its counts say.
-        """
-        found = parse(cls.LAYOUT, frame)
-        rows = tuple(tuple(row) for row in found["batteries"])
-        return cls(batteries=rows, row_bytes=found["row_bytes"], rest=found["rest"])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,14 +9,17 @@ frame of that kind that `parse` accepts.
 """
 
 import io
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
 from typing import Any, ClassVar, Self
 
-from construct import Construct, ConstructError
+from construct import Construct, ConstructError, ExprValidator, GreedyBytes, NullTerminated
 
 from p2os.errors import LocalProtocolError, RemoteProtocolError
 from p2os.protocol.frames import Frame
 
+#: Ends with a NUL, and holds none.
+TEXT = NullTerminated(ExprValidator(GreedyBytes, lambda text, _: b"\0" not in text))
 Fields = dict[str, Any]
 
 
@@ -56,6 +59,10 @@ class LaidOutPacket:
 
     KIND: ClassVar[int]
     LAYOUT: ClassVar[Construct]
+    #: Fields that say how many rows a list has, and the list.
+    COUNTS: ClassVar[Mapping[str, str]] = {}
+    #: What a row of a list with fields of its own becomes.
+    ITEM: ClassVar[type | None] = None
 
     def to_frame(self) -> Frame:
         """Return the frame.
@@ -63,7 +70,9 @@ class LaidOutPacket:
         Raises:
             LocalProtocolError: A value does not fit its field.
         """
-        return build(self.KIND, self.LAYOUT, asdict(self))
+        values = asdict(self)
+        counts = {count: len(values[name]) for count, name in self.COUNTS.items()}
+        return build(self.KIND, self.LAYOUT, values | counts)
 
     @classmethod
     def from_frame(cls, frame: Frame) -> Self:
@@ -72,4 +81,14 @@ class LaidOutPacket:
         Raises:
             RemoteProtocolError: It is too short.
         """
-        return cls(**parse(cls.LAYOUT, frame))
+        found = parse(cls.LAYOUT, frame)
+        return cls(**{field.name: _plain(found[field.name], cls.ITEM) for field in fields(cls)})
+
+
+def _plain(value: Any, item: type | None) -> Any:
+    """Return a list as a tuple, and a row of one with fields of its own as what it becomes."""
+    if isinstance(value, list):
+        return tuple(_plain(row, item) for row in value)
+    if isinstance(value, dict) and item is not None:
+        return item(**{name: entry for name, entry in value.items() if not name.startswith("_")})
+    return value

@@ -5,6 +5,7 @@ Source: Pioneer 2 / PeopleBot manual page 48 and Pioneer 3 manual page 46
 manual page 13 (compass). Values are those of the wire; properties are in units.
 """
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import ClassVar
 
@@ -57,37 +58,20 @@ class GyroReading:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class GyroPacket:
+class GyroPacket(LaidOutPacket):
     """GYROpac: the readings since the last packet, oldest first; ARCOS sends it just before the SIP."""
 
     KIND: ClassVar[int] = 0x98
+    COUNTS: ClassVar[Mapping[str, str]] = {"count": "readings"}
     LAYOUT: ClassVar[Construct] = Struct(
         "count" / Int8ul,
         "readings" / Array(this.count, Struct("raw_rate" / Int16ul, "raw_temperature" / Int8ul)),
     )
+    ITEM: ClassVar[type] = GyroReading
 
     readings: tuple[GyroReading, ...] = ()
     #: Bytes after the last field that this project knows.
     rest: bytes = b""
-
-    def to_frame(self) -> Frame:
-        """Return the frame.
-
-        Raises:
-            LocalProtocolError: A value does not fit its field, or there are too many readings.
-        """
-        return build(self.KIND, self.LAYOUT, {"count": len(self.readings), **asdict(self)})
-
-    @classmethod
-    def from_frame(cls, frame: Frame) -> "GyroPacket":
-        """Read the packet.
-
-        Raises:
-            RemoteProtocolError: It is shorter than its count says.
-        """
-        found = parse(cls.LAYOUT, frame)
-        readings = (GyroReading(raw_rate=r.raw_rate, raw_temperature=r.raw_temperature) for r in found["readings"])
-        return cls(readings=tuple(readings), rest=found["rest"])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -171,7 +155,7 @@ class CompassPacket:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class IoPacket:
+class IoPacket(LaidOutPacket):
     """IOpac: digital inputs and outputs and analog inputs.
 
     ARCOS sends four bytes of inputs (DIGIN, front bumpers, rear bumpers, infra-red;
@@ -180,6 +164,11 @@ class IoPacket:
     """
 
     KIND: ClassVar[int] = 0xF0
+    COUNTS: ClassVar[Mapping[str, str]] = {
+        "input_count": "digital_in",
+        "output_count": "digital_out",
+        "analog_count": "raw_analog",
+    }
     LAYOUT: ClassVar[Construct] = Struct(
         "input_count" / Int8ul,
         "digital_in" / Array(this.input_count, Int8ul),
@@ -200,31 +189,3 @@ class IoPacket:
     def analog_v(self) -> tuple[float, ...]:
         """The analog inputs, volts at the pin."""
         return tuple(raw * ANALOG_FULL_SCALE_V / ANALOG_FULL_SCALE for raw in self.raw_analog)
-
-    def to_frame(self) -> Frame:
-        """Return the frame.
-
-        Raises:
-            LocalProtocolError: A value does not fit its field, or there are too many.
-        """
-        counts = {
-            "input_count": len(self.digital_in),
-            "output_count": len(self.digital_out),
-            "analog_count": len(self.raw_analog),
-        }
-        return build(self.KIND, self.LAYOUT, {**counts, **asdict(self)})
-
-    @classmethod
-    def from_frame(cls, frame: Frame) -> "IoPacket":
-        """Read the packet.
-
-        Raises:
-            RemoteProtocolError: It is shorter than its counts say.
-        """
-        found = parse(cls.LAYOUT, frame)
-        return cls(
-            digital_in=tuple(found["digital_in"]),
-            digital_out=tuple(found["digital_out"]),
-            raw_analog=tuple(found["raw_analog"]),
-            rest=found["rest"],
-        )

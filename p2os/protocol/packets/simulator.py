@@ -4,29 +4,27 @@ Source: MobileSim's continuation AMRISim and ARIA, from what they write and read
 No robot sends these; a client that sees one talks to a simulator.
 """
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import ClassVar
 
 from construct import (
     Array,
     Construct,
-    GreedyBytes,
     Int8sl,
     Int8ul,
     Int16sl,
     Int16ul,
     Int32sl,
     Int32ul,
-    NullTerminated,
     Struct,
     this,
 )
 
 from p2os.errors import LocalProtocolError
 from p2os.protocol.frames import Frame
-from p2os.protocol.packets.layout import LaidOutPacket, build, parse
+from p2os.protocol.packets.layout import TEXT, LaidOutPacket, build, parse
 
-_TEXT = NullTerminated(GreedyBytes)
 #: Latitude, longitude and odometry errors travel as integers of this many a unit.
 TEN_MILLION = 10_000_000
 
@@ -42,7 +40,7 @@ class SimstatPacket(LaidOutPacket):
 
     KIND: ClassVar[int] = 0x62
     LAYOUT: ClassVar[Construct] = Struct(
-        "raw_name" / _TEXT, "raw_version" / _TEXT, "flags" / Int32ul,
+        "raw_name" / TEXT, "raw_version" / TEXT, "flags" / Int32ul,
         "wanted_interval_ms" / Int16ul, "real_interval_ms" / Int16ul, "last_interval_ms" / Int16ul,
         "x_mm" / Int32sl, "y_mm" / Int32sl, "z_mm" / Int32sl, "heading_deg" / Int32sl,
         "raw_latitude" / Int32sl, "raw_longitude" / Int32sl, "altitude_cm" / Int32sl, "raw_precision" / Int32sl,
@@ -72,15 +70,6 @@ class SimstatPacket(LaidOutPacket):
     #: Bytes after the last field that this project knows.
     rest: bytes = b""
 
-    def to_frame(self) -> Frame:
-        """Return the frame.
-
-        Raises:
-            LocalProtocolError: A value does not fit its field, or a text holds a NUL.
-        """
-        _without_nul(self.raw_name, self.raw_version)
-        return build(self.KIND, self.LAYOUT, asdict(self))
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimDevice:
@@ -93,7 +82,7 @@ class SimDevice:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SiminfoPacket:
+class SiminfoPacket(LaidOutPacket):
     """SIMINFO: which simulator it is and what the robot carries.
 
     Args:
@@ -102,15 +91,17 @@ class SiminfoPacket:
     """
 
     KIND: ClassVar[int] = 0x63
+    COUNTS: ClassVar[Mapping[str, str]] = {"count": "devices"}
     LAYOUT: ClassVar[Construct] = Struct(
-        "raw_name" / _TEXT,
-        "raw_version" / _TEXT,
+        "raw_name" / TEXT,
+        "raw_version" / TEXT,
         "flags" / Int32ul,
         "count" / Int32ul,
         "devices" / Array(
-            this.count, Struct("raw_name" / _TEXT, "raw_type" / _TEXT, "number" / Int8ul, "status" / Int32ul)
+            this.count, Struct("raw_name" / TEXT, "raw_type" / TEXT, "number" / Int8ul, "status" / Int32ul)
         ),
     )  # fmt: skip
+    ITEM: ClassVar[type] = SimDevice
 
     raw_name: bytes = b""
     raw_version: bytes = b""
@@ -118,33 +109,6 @@ class SiminfoPacket:
     devices: tuple[SimDevice, ...] = ()
     #: Bytes after the last field that this project knows.
     rest: bytes = b""
-
-    def to_frame(self) -> Frame:
-        """Return the frame.
-
-        Raises:
-            LocalProtocolError: A value does not fit its field, or a text holds a NUL.
-        """
-        _without_nul(self.raw_name, self.raw_version, *(t for d in self.devices for t in (d.raw_name, d.raw_type)))
-        return build(self.KIND, self.LAYOUT, {"count": len(self.devices), **asdict(self)})
-
-    @classmethod
-    def from_frame(cls, frame: Frame) -> "SiminfoPacket":
-        """Read the packet.
-
-        Raises:
-            RemoteProtocolError: It is shorter than its count says.
-        """
-        found = parse(cls.LAYOUT, frame)
-        names = SimDevice.__dataclass_fields__
-        devices = tuple(SimDevice(**{name: device[name] for name in names}) for device in found["devices"])
-        return cls(
-            raw_name=found["raw_name"],
-            raw_version=found["raw_version"],
-            flags=found["flags"],
-            devices=devices,
-            rest=found["rest"],
-        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -241,25 +205,10 @@ class MapChangedPacket(LaidOutPacket):
     """
 
     KIND: ClassVar[int] = 0x66
-    LAYOUT: ClassVar[Construct] = Struct("by_user" / Int8ul, "status" / Int8sl, "raw_name" / _TEXT)
+    LAYOUT: ClassVar[Construct] = Struct("by_user" / Int8ul, "status" / Int8sl, "raw_name" / TEXT)
 
     by_user: int = 0
     status: int = 0
     raw_name: bytes = b""
     #: Bytes after the last field that this project knows.
     rest: bytes = b""
-
-    def to_frame(self) -> Frame:
-        """Return the frame.
-
-        Raises:
-            LocalProtocolError: A value does not fit its field, or the name holds a NUL.
-        """
-        _without_nul(self.raw_name)
-        return build(self.KIND, self.LAYOUT, asdict(self))
-
-
-def _without_nul(*texts: bytes) -> None:
-    """Refuse a text that would end early on the wire."""
-    if any(b"\0" in text for text in texts):
-        raise LocalProtocolError("a text with a NUL inside does not fit a NUL-terminated field")

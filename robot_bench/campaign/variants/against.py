@@ -18,7 +18,8 @@ from robot_bench.campaign.trial import Done, GoalResult, Outcome, Trial, Verdict
 from robot_bench.events.codec import events_of
 from robot_bench.events.kinds import Event
 from robot_bench.recording.divergence import Difference, differences
-from simbase.errors import FileError, UsageError
+from simbase.errors import UsageError
+from simbase.files import writing
 from simbase.timing import NS_PER_S
 
 #: The other version, in the campaign's folder, with the name that it had.
@@ -48,11 +49,9 @@ class Other:
             found = cls(path.name, path.read_bytes())
         except OSError as error:
             raise UsageError(f"there is no firmware file {path}", hint="give an ELF, HEX or BIN file") from error
-        try:
+        with writing(folder, hint="--out another folder"):
             (folder / FOLDER).mkdir(parents=True, exist_ok=True)
             (folder / FOLDER / path.name).write_bytes(found.content)
-        except OSError as error:
-            raise FileError(f"cannot write {folder}: {error.strerror}", hint="--out another folder") from error
         return found
 
     @classmethod

@@ -34,7 +34,8 @@ from robot_bench.events.codec import Json
 from robot_bench.recording.summary import INTERRUPTED
 from robot_bench.scenario.included_files import read_setting
 from robot_bench.scenario.scenario import load_scenario
-from simbase.errors import FileError, UsageError
+from simbase.errors import UsageError
+from simbase.files import writing
 from simbase.timing import NS_PER_S
 from simbase.units import COUNT, PERCENT, SEED
 
@@ -243,10 +244,8 @@ def _write(mutation: Mutation, image: Image, folder: Path) -> None:
     """
     data = read_bytes(image)
     suffix = ".elf" if data.startswith(b"\x7fELF") else ".bin"
-    try:
+    with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
         for mutant in mutation.survivors:
             name = f"{mutant.address:08x}-{mutant.alteration.code.hex()}{suffix}"
             (folder / name).write_bytes(mutated_file(data, mutant, image))
-    except OSError as error:
-        raise FileError(f"cannot write into {folder}: {(error.strerror or str(error)).lower()}") from error

@@ -17,7 +17,8 @@ from p2os.cli.help_pages import BENCH
 from p2os.cli.kept_files import FORCE_HELP, refuse_to_overwrite
 from p2os.cli.quantities import option
 from robot_bench.experiments import require
-from simbase.errors import FileError, UsageError
+from simbase.errors import UsageError
+from simbase.files import write_text
 from simbase.timing import NS_PER_S, Nanos
 from simbase.units import TIME
 
@@ -101,7 +102,7 @@ def compare(
         if picture:
             write_png(figure, picture)
         if page:
-            _write(page, _page(found, png(figure)))
+            write_text(page, _page(found, png(figure)))
     if json_output:
         typer.echo(json.dumps(found.as_plain(), indent=2))
     else:
@@ -113,13 +114,6 @@ def _which(words: str) -> tuple[str, str]:
     if len(found) > 2 or any(word not in POSES for word in found):
         raise UsageError(f"--poses {words!r}: {', '.join(POSES)}, or two of them with a comma")
     return found[0], found[-1]
-
-
-def _write(path: Path, text: str) -> None:
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise FileError(f"cannot write {path}: {(error.strerror or str(error)).lower()}") from error
 
 
 def lines_of(found: "Comparison") -> Iterator[str]:

@@ -19,6 +19,7 @@ from p2os.robots.parameters import known_robots
 from p2os.ros.bags import is_bag
 from robot_bench.experiments import require
 from simbase.errors import FileError, UsageError
+from simbase.files import write_text
 from simbase.units import SEED
 
 if TYPE_CHECKING:  # NumPy is loaded when the verb runs
@@ -215,10 +216,7 @@ def _write(drives: "Sequence[Drive]", found: "dict[str, Fit | FileError]", targe
     }  # fmt: skip
     texts = robot_text(parameters.subclass, parameters, estimates), errors_text(parameters, estimates)
     for path, text in zip(targets, texts, strict=True):
-        try:
-            path.write_text(text, encoding="utf-8")
-        except OSError as error:
-            raise FileError(f"cannot write {path}: {(error.strerror or str(error)).lower()}") from error
+        write_text(path, text)
 
 
 def _umbmark(drives: "Sequence[Drive]", *, as_json: bool) -> None:

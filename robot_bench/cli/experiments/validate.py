@@ -39,7 +39,8 @@ from robot_bench.run import RunResult
 from robot_bench.scenario.included_files import Setting, read_setting
 from robot_bench.scenario.scenario import MODES
 from robot_bench.scenario.sweep import read_seeds
-from simbase.errors import FileError, UsageError, nearest
+from simbase.errors import UsageError, nearest
+from simbase.files import writing
 from simbase.units import COUNT
 
 REPORT, FIGURES = "validation.html", "validation.json"
@@ -222,14 +223,12 @@ def _run_at_port(
 
 def _write(folder: Path, results: Sequence[Result], set_: Sequence[str]) -> None:
     words = " ".join(["p2os validate", *dict.fromkeys(result.experiment for result in results)])
-    try:
+    with writing(folder / REPORT):
         folder.mkdir(parents=True, exist_ok=True)
         (folder / FIGURES).write_text(json.dumps(_plain(results), indent=1, sort_keys=True) + "\n", encoding="utf-8")
         (folder / REPORT).write_text(
             render(results, EXPERIMENTS, command=words, settings=set_), encoding="utf-8"
         )  # fmt: skip
-    except OSError as error:
-        raise FileError(f"cannot write {folder / REPORT}: {error.strerror}") from error
 
 
 def _plain(results: Sequence[Result]) -> Json:

@@ -27,7 +27,7 @@ from p2os.protocol.frames import Frame
 from p2os.protocol.line_time import LineTime
 from p2os.robots.parameters import RobotParameters, load_parameters
 from robot_bench.experiments.fitting.umbmark import RUNS
-from simbase.errors import FileError
+from simbase.files import writing
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: Commands, and for how many seconds they hold; None: until the robot stands.
@@ -252,7 +252,7 @@ def write_examples(folder: Path, world: World, seed: int) -> list[Path]:
     """
     robot = planted(seed)
     written = []
-    try:
+    with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in robot.texts.items():
             (folder / name).write_text(f"# seed {seed}\n{text}", encoding="utf-8")
@@ -264,8 +264,6 @@ def write_examples(folder: Path, world: World, seed: int) -> list[Path]:
                 written.append(folder / f"square-{word}-{number + 1}.jsonl")
                 stages = square(clockwise=word == "cw")
                 write(record(robot, empty_world(), stages, seed=seed + 100 + number), written[-1])
-    except OSError as error:
-        raise FileError(f"cannot write into {folder}: {(error.strerror or str(error)).lower()}") from error
     return written
 
 

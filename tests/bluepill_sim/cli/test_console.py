@@ -10,6 +10,7 @@ import pytest
 
 from bluepill_sim.cli.console import PtyConsole, StreamConsole, connect, open_console
 from bluepill_sim.errors import BluePillError
+from simbase.errors import FileError
 
 
 class Port:
@@ -62,7 +63,7 @@ def test_standard_output_is_a_dash(capfdbinary: pytest.CaptureFixture[bytes]) ->
 
 
 def test_a_file_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
-    with pytest.raises(BluePillError, match=r"cannot write .*: No such file or directory"):
+    with pytest.raises(FileError, match=r"cannot write .*: no such file or directory"):
         open_console(str(tmp_path / "missing" / "usart.txt"))
 
 

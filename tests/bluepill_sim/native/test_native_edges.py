@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from bluepill_sim.analysis.edge_log import EdgeLog
 from bluepill_sim.analysis.probe import Probe
 from bluepill_sim.analysis.vcd import write_vcd
-from bluepill_sim.errors import BluePillError
 from bluepill_sim.fabric.subscriptions import EDGE, Of
+from simbase.errors import FileError
 from tests.bluepill_sim.machine import Machine
 
 GPIOB = 0x4001_0C00
@@ -113,12 +113,12 @@ def test_late_rows_go_where_they_belong(rows: list[tuple[int, int, int]]) -> Non
 @pytest.mark.parametrize("core", ["native", "python"])
 def test_a_dump_that_cannot_be_written_is_one_line(core: str, tmp_path: Path) -> None:
     probe, _ = recording(program([(BSRR, 1, "r6")], 2), core)
-    with pytest.raises(BluePillError, match=r"cannot write .*: Is a directory"):
+    with pytest.raises(FileError, match=r"cannot write .*: is a directory"):
         write_vcd(probe, tmp_path)
 
 
 @pytest.mark.skipif(not os.access("/dev/full", os.W_OK), reason="no /dev/full here")
 def test_a_full_disk_is_reported_from_c_too() -> None:
     probe, _ = recording(program([(BSRR, 1, "r6"), (BRR, 1, "r6")], 200), "native")
-    with pytest.raises(BluePillError, match="No space left on device"):
+    with pytest.raises(FileError, match="no space left on device"):
         write_vcd(probe, Path("/dev/full"))

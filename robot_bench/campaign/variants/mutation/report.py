@@ -22,7 +22,7 @@ from bluepill_sim.program.line_table import LineTable
 from bluepill_sim.program.mutants import Mutant
 from robot_bench.campaign.variants.mutation.trial import Fate, Found
 from robot_bench.events.codec import Json
-from simbase.errors import FileError
+from simbase.files import writing
 
 #: What a terminal has.
 _WIDTH = 80
@@ -192,10 +192,8 @@ def write_junit(mutation: Mutation, path: Path) -> None:
             ET.SubElement(case, "failure", message="no goal noticed it").text = mutation.source(mutant)
         elif found.fate is Fate.SAME:
             ET.SubElement(case, "skipped", message="the same trace: no goal can notice it on these runs")
-    try:
+    with writing(path):
         ET.ElementTree(suite).write(path, encoding="utf-8", xml_declaration=True)
-    except OSError as error:
-        raise FileError(f"cannot write {path}: {(error.strerror or '').lower()}") from error
 
 
 def _percent(value: float | None) -> str:
