@@ -383,7 +383,7 @@ class Pioneer(Stateful):
         self._body_now += steps * body.dt_ns
         while steps and not motion.is_steady:
             if motion.has_goal:
-                made: Sequence[WheelAngles] = (body.step(*self.next_setpoints()),)
+                made: Sequence[Wheels] = (body.step(*self.next_setpoints()),)
             else:
                 made = body.ramp(self._next_ramp(steps))
             reckoning.follow(made)
