@@ -114,6 +114,13 @@ async def main():
         await robot.sleep(60)
 asyncio.run(main())
 """
+#: `p2os run` as on a machine without Matplotlib: to paint its report would keep a processor from the other rows.
+RUN = """
+import sys
+sys.modules["matplotlib"] = None
+from p2os.__main__ import main
+main()
+"""
 
 
 class ServedRobot:
@@ -253,7 +260,8 @@ WAYS = (
     Way("replay", (*P2OS, "replay", "{recording}", "{url}", "--as", "client", "--yes")),
     Way("sniff", (*P2OS, "sniff", "{url}", "--listen", "{listen}"),
         client=(*DRIVE, "{listen}", "--vel", "0.3m/s", "--for", "60s")),
-    Way("run --port", (*P2OS, "run", "motors", "--port", "{url}", "--yes", "--duration", "60s", "--out", "{folder}")),
+    Way("run --port", (sys.executable, "-c", RUN, "run", "motors", "--port", "{url}", "--yes", "--duration", "60s",
+                       "--out", "{folder}")),
     Way("p2os-adapter", ("{adapter}", "--line", "{url}", "--wires", "{wires}"), has_wires=True),
 )  # fmt: skip
 

@@ -55,7 +55,7 @@ SHIMS = {
     "pip": 'case "$*" in "install "*) exit 0;; esac; exit 2',  # the network; test_docs.py looks at the extras
     "pytest": 'if [ -e pytest.ini ]; then exec {python} -m pytest -p no:cacheprovider "$@"; fi; cd {root} && '
     'for each; do case $each in tests/*) ls "$each" >&2 || exit 4;; esac; done; '
-    'exec {python} -m pytest --markers -p no:cacheprovider "$@"',
+    'exec {python} -c "import sys, pytest; sys.exit(pytest.main(sys.argv[1:]))" --markers -p no:cacheprovider "$@"',
     "sudo": "exit 0",  # what a machine needs once
     "make": 'if [ -e Makefile ] || [ "$1" = -C ]; then exec {make} "$@"; else exec {make} -n -C {root} "$@"; fi',
 }
@@ -100,6 +100,7 @@ DEFAULTS = (
     ("mcu debug", "--port 3333", {"--port"}),
     ("scan", "serial:/dev/ttyUSB0 tcp:127.0.0.1:8101", set[str]()),
     ("bench", "--for 1s", {"--for"}),
+    ("python tools/bench/columns.py", "--quick", {"--quick"}),
 )
 #: Where a verb serves; all other URLs on its line are robots that it is a client of.
 SERVING = {"serve": {"--port", "--aux", "--control"}, "sniff": {"--listen"}, "run": set[str](), "replay": {"replay"}}
@@ -266,7 +267,7 @@ class Session:
         if program in OPTIONAL and shutil.which(program) is None:
             self.missing.append(line)
             return
-        verb = words[1:] if Path(program).name == "p2os" else [Path(program).name]
+        verb = words[1:] if Path(program).name == "p2os" else [Path(program).name, *words[1:]]
         typed = f"{line.partition('  #')[0]} {self._added(verb)}".strip()
         command = in_checkout(self._placed(typed), words)
         kind = next((each for each in ENDLESS if each.fits(verb)), None)

@@ -46,7 +46,7 @@ IMPORTING = ("pytest",)
 IMPORTED = (
     "p2os.__main__", "typer._adapters", "p2os.pioneer.body.kinematic", "robot_bench.scenarios",
     "robot_bench.report.measures", "robot_bench.report.plots", "matplotlib.backends.backend_agg", "unicorn",
-    "elftools.elf.elffile",
+    "elftools.elf.elffile", "pytest",
 )  # fmt: skip
 
 

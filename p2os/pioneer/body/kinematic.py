@@ -50,6 +50,10 @@ WALK_STEPS = 10
 SPARE_M = 0.1
 
 
+#: Of a robot: where it stands, what it is asked, and whether its motors have power.
+_Standing = tuple[float, float, float, tuple[float, float], bool]
+
+
 class KinematicScene(Scene):
     """Robots on one plan, one after the other in each step."""
 
@@ -121,7 +125,7 @@ class KinematicBody(BodyInWorld):
 
     STATE = ("_x", "_y", "_heading", "_left_angle", "_right_angle", "_left", "_right", "_asked", "_stalled",
              "_is_bumped", "_blocked_at", "_free_m", "_carried_m", "_driven", "_steady_j")  # fmt: skip
-    DERIVED = ("_cos", "_sin", "near")
+    DERIVED = ("_cos", "_sin", "near", "_held", "_felt")
 
     name = "kinematic"
     scene: KinematicScene
@@ -138,10 +142,15 @@ class KinematicBody(BodyInWorld):
         self._longest_m = parameters.sonar_range_m
         #: The robots that it could meet soon.
         self.near: tuple[KinematicBody, ...] = ()
+        #: How all stood when others last kept it where it is, and whom it drove against; None while not known twice.
+        self._held: tuple[list[_Standing], tuple[KinematicBody, ...] | None] | None = None
+        #: Whom it has driven against in this step.
+        self._felt: list[KinematicBody] = []
         self._x, self._y, self._heading, self._cos, self._sin = 0.0, 0.0, 0.0, 1.0, 0.0
 
     def _restored(self) -> None:
         super()._restored()
+        self._held = None
         self._take_pose(self._x, self._y, self._heading)
 
     @property
@@ -231,15 +240,15 @@ class KinematicBody(BodyInWorld):
         if left_mps == 0.0 and right_mps == 0.0:
             return self._stand()
         arc = self._arc(left_mps, right_mps)
-        # What was blocked stays so until the pose or the plan changes; other robots may have moved.
-        is_known = asked == self._blocked_at and not self.near
+        # What was blocked stays so until the pose or the plan changes, or a robot that could be met.
+        is_known = self._is_held() if self.near else asked == self._blocked_at
         rims = asked if not is_known and self._take(arc) else None
         is_touching = rims is None or self._is_bumped or self._free_m == 0.0
         if rims is None and not is_known:
             rims = self._slide(left_mps, right_mps)
-            self._blocked_at = asked if rims is None and not self.near else None
+            self._note_blocked(is_blocked=rims is None)
         elif rims is not None:
-            self._blocked_at = None
+            self._blocked_at = self._held = None
         self._stalled = rims is None
         contacts = self._contacts
         if (is_touching or contacts.apart < APART_STEPS) and contacts.update(touching=is_touching):
@@ -412,6 +421,40 @@ class KinematicBody(BodyInWorld):
                     return rims
         return None
 
+    def _is_held(self) -> bool:
+        """Tell whether other robots keep it where it is as they did before, and let them feel it again."""
+        self._felt.clear()
+        if self._held is None:
+            return False
+        before, felt = self._held
+        if before != self._all_standing():
+            self._held = None
+        elif felt is not None:
+            for other in felt:
+                other.feel_push()
+            return True
+        return False
+
+    def _note_blocked(self, *, is_blocked: bool) -> None:
+        """Remember what has kept it where it is, if anything has."""
+        self._blocked_at = self._asked if is_blocked and not self.near else None
+        if not is_blocked or not self.near:
+            self._held = None
+            return
+        # Once is not enough: what it tried on the way may have moved others.
+        standing = self._all_standing()
+        is_same = self._held is not None and self._held[0] == standing
+        self._held = standing, tuple(self._felt) if is_same else None
+
+    def _all_standing(self) -> list[_Standing]:
+        """Return all that decides whether others give way, but for the plan."""
+        return [self.standing, *[other.standing for other in self.others]]
+
+    @property
+    def standing(self) -> _Standing:
+        """What others depend on."""
+        return self._x, self._y, self._heading, self._asked, self.is_powered
+
     def _stand(self) -> Turned:
         """Stand for one step, and feel what has come to touch the hull."""
         self._left = self._right = 0.0
@@ -459,6 +502,7 @@ class KinematicBody(BodyInWorld):
             return False
         for other in found:
             other.feel_push()
+        self._felt += found
         moves = self._pushed_robots(found, x, y, heading, (self,))
         if moves is None or sum(hold_n for _, _, _, hold_n in moves) >= self._push_n:
             return True
@@ -474,7 +518,7 @@ class KinematicBody(BodyInWorld):
         reach, found = self.reach_m, []
         hull = None
         for other in self.near:
-            if math.hypot(other._x - x, other._y - y) <= reach + other.reach_m:
+            if math.hypot(other._x - x, other._y - y) <= reach + other.reach_m:  # noqa: SLF001 - of its own class
                 hull = hull or placed(self._hull, x, y, heading)
                 if other.footprint.overlaps(hull):
                     found.append(other)
@@ -582,7 +626,7 @@ class KinematicBody(BodyInWorld):
 
     def look_anew(self) -> None:
         """Prepare for a plan that is another one now."""
-        self._blocked_at = None
+        self._blocked_at = self._held = None
         self._free_m = self._plan.clearance(self._x, self._y, self._heading, no_more_than=LOOK_AHEAD_M)
 
     # Sensors ---------------------------------------------------------------------------------

@@ -1,8 +1,5 @@
 """A capture's SIPs by columns against the same by rows: names, order and every cell."""
 
-import json
-import os
-import subprocess
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -137,14 +134,3 @@ def test_export_of_a_large_capture_works_without_numpy(tmp_path: Path, monkeypat
     monkeypatch.setattr("p2os.cli.captures.export.LARGE_BYTES", 0)
     monkeypatch.setitem(sys.modules, "p2os.capture.columns.sip_table", None)
     assert exported(tmp_path / "rows.csv").count("\n") > 20
-
-
-@pytest.mark.slow
-def test_the_benchmark_compares_what_it_times() -> None:
-    tool = GOLDEN.parent.parent / "tools" / "bench" / "columns.py"
-    done = subprocess.run([sys.executable, str(tool), "--quick", "--json"], capture_output=True, text=True, check=False,
-                          timeout=300, env={**os.environ, "PYTHONPATH": str(tool.parent.parent)})  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    figures = json.loads(done.stdout)
-    assert len(figures) == 3
-    assert all(row["packets"] > 9_000 and row["columns_packets_a_second"] > 0 for row in figures.values())

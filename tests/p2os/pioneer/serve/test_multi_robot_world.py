@@ -218,6 +218,51 @@ def test_a_reset_or_a_reboot_of_one_leaves_the_others_and_its_own_body_standing(
     assert made.members[1].body.state.x_m < 0.25
 
 
+def its_power_goes(made: MultiRobotWorld) -> None:
+    made.members[1].body.is_powered = False
+
+
+def it_turns_away(made: MultiRobotWorld) -> None:
+    made.members[1].body.stand_at(2.0, 2.0, 0.0)
+
+
+def it_is_pushed_away(made: MultiRobotWorld) -> None:
+    made.members[1].body.give_way(0.0, 0.5)  # and is still near
+
+
+def the_post_goes(made: MultiRobotWorld) -> None:
+    made.members[1].body.remove("post")
+
+
+@pytest.mark.parametrize(
+    ("is_powered", "change"),
+    [
+        (True, its_power_goes),
+        (True, it_is_pushed_away),
+        (True, it_turns_away),
+        (False, it_turns_away),
+        (False, the_post_goes),
+    ],
+)
+def test_a_robot_that_another_holds_goes_on_when_that_changes(
+    is_powered: bool, change: Callable[[MultiRobotWorld], None]
+) -> None:
+    made = multi_robot_world(((-1.0, 0.0, 0.0), (0.0, 0.0, 180.0)))
+    pushing, held = (member.body for member in made.members)
+    held.is_powered = is_powered
+    if not is_powered:  # a post behind it holds it
+        made.scene.place(replace(CARTON.obstacles[0], name="post", x_m=P2DX.body.hull_rear_m + 0.16, mass_kg=0.0))
+    for _ in range(3000):
+        made.scene.step([(0.3, 0.3), (0.0, 0.0)])
+    stuck = pushing.state
+    assert stuck.stalled_left
+    assert held.state.in_contact, "it feels the push in each step"
+    change(made)
+    for _ in range(500):
+        made.scene.step([(0.3, 0.3), (0.0, 0.0)])
+    assert pushing.state.x_m > stuck.x_m + 0.1
+
+
 def test_what_one_pushes_the_other_sees_and_is_stopped_by(meet: Meet) -> None:
     made = meet(((-0.5, 0.0, 0.0), (1.0, 0.0, 180.0)), CARTON)
     before = made.members[1].body.ranges([3])[0]
