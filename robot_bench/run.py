@@ -181,14 +181,17 @@ def run_at_port(
         return _record(bench, trace, folder, pacer, clock, drive)
 
 
-def write_run(bench: Bench, folder: Path, failure: str = "", *, explained: str = "") -> Path:
-    """Write what a bench with its trace in memory has recorded so far as a run folder, with plots; return its report.
+def write_run(
+    bench: Bench, folder: Path, failure: str = "", *, explained: str = "", plots: bool = False
+) -> Path:  # fmt: skip
+    """Write what a bench with its trace in memory has recorded so far as a run folder; return its report's path.
 
     Args:
         bench: It has run as far as it will.
         folder: Made where it is missing; a run that is there is overwritten.
         failure: Why it failed; empty where it did not.
         explained: What `why_failed` says of it; empty where nobody asked.
+        plots: Whether the report's PNG plots are wanted, too.
 
     Raises:
         UsageError: The folder holds something that is no run, or is written by another run.
@@ -206,7 +209,7 @@ def write_run(bench: Bench, folder: Path, failure: str = "", *, explained: str =
         trace.meta(meta)
         trace.copy(bench.recorder.lines())
         trace.end(end)
-        return make_artefacts(folder, plots=True).report
+        return make_artefacts(folder, plots=plots).report
 
 
 def meta_of(scenario: Scenario, world: World | None, note: str | None, *, is_at_port: bool) -> Json:

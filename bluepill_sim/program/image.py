@@ -11,6 +11,7 @@ import hashlib
 import io
 from bisect import bisect_right
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 
 from bluepill_sim.errors import ImageError
@@ -27,6 +28,8 @@ VECTOR_ALIGNMENT = 0x200
 _SMALLEST_BYTES = 8
 _SHF_ALLOC = 2
 _ERASED_WORD = 0xFFFF_FFFF
+#: chosen: of so many files it is known what is in them; a campaign or a session of tests boots the same ones.
+_KEPT = 8
 _ELF_MAGIC = b"\x7fELF"
 #: Types of ELF files that are no programs.
 _NOT_LINKED = {
@@ -169,6 +172,7 @@ def load_image(path: str | Path) -> Image:
     return parse_image(data, name=str(path))
 
 
+@lru_cache(maxsize=_KEPT)
 def parse_image(data: bytes, name: str) -> Image:
     """Return the image in the bytes of a file; arguments and errors as of `load_image`."""
     if not data:

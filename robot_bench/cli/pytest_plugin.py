@@ -247,7 +247,7 @@ def _record(item: pytest.Item, used: "Bench", report: Any, failure: str) -> None
         if said:
             with contextlib.suppress(P2osError, BluePillError):
                 why = why_failed(used, [said])
-        page = write_run(used, folder, said, explained=why)
+        page = write_run(used, folder, said, explained=why, plots=True)
     except (P2osError, OSError) as error:  # a test's own outcome counts
         report.sections.append(("bench: no report", str(error)))
         return

@@ -22,15 +22,18 @@ from robot_bench.campaign.campaign_file import (
     parse_campaign,
 )
 from robot_bench.campaign.conduct import Conduct, Finding
+from robot_bench.campaign.last_moment import LastMoment
 from robot_bench.campaign.page import _short
 from robot_bench.campaign.search import SEARCHES, Answer, Problem
 from robot_bench.campaign.suggestion import suggested
 from robot_bench.campaign.trial import GoalResult, Outcome, Trial, Verdict, run_trial, trial_of
-from robot_bench.campaign.whole import Whole, begin, carry_out, resume
+from robot_bench.campaign.whole import MOST_MOMENTS, Whole, begin, carry_out, resume
 from robot_bench.campaign.workers.processes import Processes
 from robot_bench.scenario.scenario import known_scenarios, load_scenario
 from simbase.errors import FileError, UsageError
 
+#: numba, which ribs compiles its steps by: for 8 s what then runs for some milliseconds.
+os.environ["NUMBA_DISABLE_JIT"] = "1"
 FILE = """
 scenario = "dodge"
 search = "random"
@@ -102,9 +105,12 @@ def begun(folder: Path, text: str = FILE, **overrides: object) -> Campaign:
     return begin(file, folder / "kept", firmware=None, overrides=overrides)
 
 
-def carried(campaign: Campaign, folder: Path, workers: Shuffled) -> Whole:
+def carried(campaign: Campaign, folder: Path, workers: Shuffled, moment: LastMoment | None = None) -> Whole:
     ticks = itertools.count()
-    return carry_out(campaign, folder, workers, clock=lambda: next(ticks))
+    with pytest.MonkeyPatch.context() as patch:
+        # What is made up does not fail when it is run: there is no last moment, and it takes long to find none.
+        patch.setattr("robot_bench.campaign.whole.last_moment", lambda *_: moment)
+        return carry_out(campaign, folder, workers, clock=lambda: next(ticks))
 
 
 def set_of(whole: Whole) -> list[tuple[object, ...]]:
@@ -225,6 +231,15 @@ def test_the_data_set_has_a_row_a_run_and_the_page_names_every_failure(tmp_path:
     assert all(entry["vary.threshold_m"] in {0.4, 0.6} for entry in table)
     page = (tmp_path / "kept/report.html").read_text()
     assert all(f"point {number}</b>" in page for number in failed)
+
+
+def test_until_when_failures_were_avoidable_is_told_by_summary_and_page(tmp_path: Path) -> None:
+    moment = LastMoment(failure="x", failed_ns=2 * 10**9, avoidable_ns=10**9, place=(1.0, 2.0, 30.0), printed="")
+    whole = carried(begun(tmp_path), tmp_path / "kept", Shuffled(1), moment)
+    failures = json.loads((tmp_path / "kept/summary.json").read_text())["failures"]
+    assert {failure["avoidable"] for failure in failures[:MOST_MOMENTS]} == {moment.words}
+    page = (tmp_path / "kept/report.html").read_text(encoding="utf-8")
+    assert page.count("until 1.00 s, at x 1.00 m") == 2 * len(whole.moments) > 0  # below a plan, and in it
 
 
 WRONG = {
