@@ -15,6 +15,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any, cast
@@ -228,15 +229,19 @@ def load_pinout(path: str | Path | None = None) -> Pinout:
     Raises:
         PinoutError: The file is missing, is no TOML or contradicts itself.
     """
-    where = "pinout.toml" if path is None else str(path)
+    if path is None:
+        return _shipped()
     try:
-        if path is None:
-            text = resources.files("adapter_sim").joinpath("pinout.toml").read_text(encoding="utf-8")
-        else:
-            text = read_user_text(Path(path), "a pin-out", PinoutError)
+        text = read_user_text(Path(path), "a pin-out", PinoutError)
     except (OSError, UnicodeDecodeError) as error:
-        raise PinoutError(f"cannot read pin-out {where}: {error}") from error
-    return parse_pinout(text, where)
+        raise PinoutError(f"cannot read pin-out {path}: {error}") from error
+    return parse_pinout(text, str(path))
+
+
+@cache
+def _shipped() -> Pinout:
+    text = resources.files("adapter_sim").joinpath("pinout.toml").read_text(encoding="utf-8")
+    return parse_pinout(text, "pinout.toml")
 
 
 def parse_pinout(text: str, where: str = "pinout") -> Pinout:

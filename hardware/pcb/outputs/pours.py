@@ -9,6 +9,7 @@ KiCad. `make board` fills again and compares.
 import shutil
 import subprocess
 import tempfile
+from math import floor
 from pathlib import Path
 
 from hardware.pcb.layout import rules
@@ -69,7 +70,7 @@ def kept_stitches(vias: list[Via], pours: dict[str, list[Node]]) -> list[Via]:
         vias: Places that the router found free.
         pours: The pours as filled without any stitching via, so that no island hangs on one.
     """
-    shapes = {layer: [_points(polygon) for polygon in pours.get(f"GND:{layer}", [])] for layer in LAYERS}
+    shapes = {layer: [_rows_of(_points(polygon)) for polygon in pours.get(f"GND:{layer}", [])] for layer in LAYERS}
     kept = []
     for via in vias:
         x, y = _shift(via.at_mm)
@@ -112,11 +113,20 @@ def stitch_at(x_mm: float, y_mm: float) -> Via:
     return Via(net="GND", at_mm=(round(x_mm, 3), round(y_mm, 3)), size_mm=size, drill_mm=drill, is_stitch=True)
 
 
-def _is_inside(point: tuple[float, float], shape: list[tuple[float, float]]) -> bool:
+def _rows_of(shape: list[tuple[float, float]]) -> dict[int, list[tuple[float, ...]]]:
+    """Return a polygon's sides, x0 y0 x1 y1, by the millimetres of y that they touch."""
+    rows: dict[int, list[tuple[float, ...]]] = {}
+    for one, other in zip(shape, shape[1:] + shape[:1], strict=True):
+        for row in range(floor(min(one[1], other[1])), floor(max(one[1], other[1])) + 1):
+            rows.setdefault(row, []).append((*one, *other))
+    return rows
+
+
+def _is_inside(point: tuple[float, float], shape: dict[int, list[tuple[float, ...]]]) -> bool:
     """Tell whether a point lies in a polygon: an odd number of its sides pass to the right."""
     x, y = point
     inside = False
-    for (x0, y0), (x1, y1) in zip(shape, shape[1:] + shape[:1], strict=True):
+    for x0, y0, x1, y1 in shape.get(floor(y), ()):
         if (y0 > y) != (y1 > y) and x < (x1 - x0) * (y - y0) / (y1 - y0) + x0:
             inside = not inside
     return inside

@@ -41,6 +41,8 @@ class Expected:
     symbols: Mapping[str, str]
     #: The pins that each pin must meet.
     partners: Mapping[str, frozenset[str]]
+    #: The nodes that each pin is at, and how often.
+    homes: Mapping[str, Mapping[str, int]]
 
 
 @lru_cache(maxsize=1)
@@ -66,10 +68,14 @@ def expected(variant: str) -> Expected:
         nodes[_RAILS[rail]][pull] += 1
         values |= {series: ohms, pull: pull_ohms}
     partners: dict[str, frozenset[str]] = {}
-    for members in nodes.values():
-        for pin in members:
+    homes: dict[str, dict[str, int]] = {}
+    for name, members in nodes.items():
+        for pin, count in members.items():
             partners[pin] = partners.get(pin, frozenset()) | (frozenset(members) - {pin})
-    return Expected(nodes=nodes, values=values, partners=partners, open_pins=table["open"], symbols=own["symbols"])
+            homes.setdefault(pin, {})[name] = count
+    return Expected(
+        nodes=nodes, values=values, partners=partners, homes=homes, open_pins=table["open"], symbols=own["symbols"]
+    )
 
 
 def differences(design: Design) -> list[str]:
@@ -121,33 +127,35 @@ def _joints(design: Design, table: Expected) -> list[str]:
         for name, net in _named_pins(part, table):
             if net is not None:
                 nets.setdefault(net, Counter())[name] += 1
-            elif name in {pin for pins in table.nodes.values() for pin in pins}:
+            elif name in table.homes:
                 found.append(f"{name} is open, expected at {_node_of(table, name)!r}")
     matched = _matched(nets, table)
     for net, pins in sorted(nets.items()):
         node = table.nodes[matched[net]] if net in matched else Counter()
-        for pin in sorted((pins - node).elements()):
+        for pin in _beyond(pins, node):
             why = table.open_pins.get(pin)
             where = f"expected at {_node_of(table, pin)!r}" if why is None else f"must stay open ({why})"
             found.append(f"{pin} is on net {net} ({matched.get(net, 'no node')!r}), {where}")
     there = {name: net for net, name in matched.items()}
     for name, node in table.nodes.items():
         pins = nets[there[name]] if name in there else Counter()
-        found += [f"{pin} is not at {name!r}" for pin in sorted((node - pins).elements())]
+        found += [f"{pin} is not at {name!r}" for pin in _beyond(node, pins)]
     return found
+
+
+def _beyond(pins: Counter[str], others: Counter[str]) -> list[str]:
+    """Return the pins that are not among the others, in order."""
+    return [] if pins == others else sorted((pins - others).elements())
 
 
 def _matched(nets: Mapping[str, Counter[str]], table: Expected) -> dict[str, str]:
     """Return the node of each net that has one: the nets that share most pins choose first."""
-    homes: dict[str, set[str]] = {}
-    for name, node in table.nodes.items():
-        for pin in node:
-            homes.setdefault(pin, set()).add(name)
-    shared = sorted(
-        (-(pins & table.nodes[name]).total(), -table.nodes[name].total(), net, name)
-        for net, pins in nets.items()
-        for name in {name for pin in pins for name in homes.get(pin, ())}
-    )
+    common: Counter[tuple[str, str]] = Counter()
+    for net, pins in nets.items():
+        for pin, count in pins.items():
+            for name, wanted in table.homes.get(pin, {}).items():
+                common[net, name] += min(count, wanted)
+    shared = sorted((-pins, -table.nodes[name].total(), net, name) for (net, name), pins in common.items())
     matched: dict[str, str] = {}
     for _, _, net, name in shared:
         if net not in matched and name not in matched.values():
