@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from itertools import combinations
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from hardware.pcb.circuit.netlist import Component, Design
 from hardware.pcb.layout.footprints import FOOTPRINTS
@@ -27,6 +27,10 @@ _SYMBOLS = {"MAX3232": "MAX3232", "NPN": "BC817", "DE9": "DE9", "SCHOTTKY": "DIO
 #: Symbols whose two ends are alike.
 _ALIKE = frozenset({"R", "C", "FUSE"})
 _RAILS = {"GND": "GND", "3V3": "3V3"}
+
+
+#: The parts, each with name and net of its pins, by the table's names.
+_Parts: TypeAlias = list[tuple[Component, list[tuple[str, str | None]]]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,7 +89,8 @@ def differences(design: Design) -> list[str]:
         KeyError: The table does not describe the design's variant.
     """
     table = expected(design.variant)
-    return [*_parts(design, table), *_crossed(design, table), *_joints(design, table), *_values(design, table)]
+    pins = [(part, _named_pins(part, table)) for part in design.components]
+    return [*_parts(design, table), *_crossed(pins, table), *_joints(pins, table), *_values(design, table)]
 
 
 def _parts(design: Design, table: Expected) -> list[str]:
@@ -96,20 +101,20 @@ def _parts(design: Design, table: Expected) -> list[str]:
             *(f"{ref} is not expected" for ref in sorted(there - wanted))]  # fmt: skip
 
 
-def _crossed(design: Design, table: Expected) -> list[str]:
+def _crossed(parts: _Parts, table: Expected) -> list[str]:
     """Name parts two of whose pins each meet what the other should meet."""
     nets: dict[str | None, set[str]] = {}
-    for part in design.components:
-        for name, net in _named_pins(part, table):
+    for _, pins in parts:
+        for name, net in pins:
             nets.setdefault(net, set()).add(name)
     found = []
-    for part in design.components:
+    for part, pins in parts:
         if part.part.symbol in _ALIKE:
             continue
         # Pins that meet none of those that they should meet.
         lost = [
             (pin, net, table.partners[pin])
-            for pin, net in _named_pins(part, table)
+            for pin, net in pins
             if net is not None and pin in table.partners and not table.partners[pin] & nets[net]
         ]
         for (one, first, wanted), (two, second, other) in combinations(lost, 2):
@@ -119,12 +124,12 @@ def _crossed(design: Design, table: Expected) -> list[str]:
     return found
 
 
-def _joints(design: Design, table: Expected) -> list[str]:
+def _joints(parts: _Parts, table: Expected) -> list[str]:
     """Compare nets with nodes: each net belongs to the node with which it shares most pins, each node once."""
     nets: dict[str, Counter[str]] = {}
     found = []
-    for part in design.components:
-        for name, net in _named_pins(part, table):
+    for _, named in parts:
+        for name, net in named:
             if net is not None:
                 nets.setdefault(net, Counter())[name] += 1
             elif name in table.homes:
@@ -145,7 +150,7 @@ def _joints(design: Design, table: Expected) -> list[str]:
 
 def _beyond(pins: Counter[str], others: Counter[str]) -> list[str]:
     """Return the pins that are not among the others, in order."""
-    return [] if pins == others else sorted((pins - others).elements())
+    return [] if dict.__eq__(pins, others) else sorted((pins - others).elements())
 
 
 def _matched(nets: Mapping[str, Counter[str]], table: Expected) -> dict[str, str]:
@@ -157,9 +162,11 @@ def _matched(nets: Mapping[str, Counter[str]], table: Expected) -> dict[str, str
                 common[net, name] += min(count, wanted)
     shared = sorted((-pins, -table.nodes[name].total(), net, name) for (net, name), pins in common.items())
     matched: dict[str, str] = {}
+    taken: set[str] = set()
     for _, _, net, name in shared:
-        if net not in matched and name not in matched.values():
+        if net not in matched and name not in taken:
             matched[net] = name
+            taken.add(name)
     return matched
 
 
