@@ -240,10 +240,7 @@ def load_pinout(path: str | Path | None = None) -> Pinout:
 
 @cache
 def _shipped() -> Pinout:
-    try:
-        text = resources.files("adapter_sim").joinpath("pinout.toml").read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise PinoutError(f"cannot read pin-out pinout.toml: {error}") from error
+    text = resources.files("adapter_sim").joinpath("pinout.toml").read_text(encoding="utf-8")
     return parse_pinout(text, "pinout.toml")
 
 

@@ -16,6 +16,8 @@ from adapter_sim import Adapter, AdapterSettings
 from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.world import load_world
+from p2os.protocol.commands import Command
+from p2os.protocol.frames import Frame
 from tests.adapter_sim.conftest import MS, PARAMETERS, FakeRobot, Rig
 
 #: Four steps of 62.5 mm/s; (3 + 4) steps over 357 mm.
@@ -59,8 +61,9 @@ class WatchedRig(Rig):
             elif what == "connecting":
                 self.allowed = True
         self.checked_events = len(self.events)
-        for at, name, argument in self.sent()[self.checked :]:
-            self._check_frame(at, name, argument)
+        for at, data in self.to_robot.log[self.checked :]:
+            command = Command.from_frame(Frame.from_bytes(data))
+            self._check_frame(at, command.name, command.argument)
         self.checked = len(self.to_robot.log)
         if self.commanded != (0, 0) and self.adapter.state not in {"reset", "booting"}:
             assert self.now - self.last_sip <= 350 * MS

@@ -1,6 +1,7 @@
 """What KiCad says of the board (where it is installed), and how we read it (everywhere)."""
 
 import json
+import sys
 import zipfile
 
 import pytest
@@ -12,7 +13,7 @@ from hardware.pcb.circuit.design import build as design_of
 from hardware.pcb.layout.footprints import FOOTPRINTS
 from hardware.pcb.layout.routing import RoutingError
 from hardware.pcb.outputs import generated_files, kicad_cli, pictures, pours
-from hardware.pcb.outputs.pours import KicadMissingError, fill, kicad_python
+from hardware.pcb.outputs.pours import KicadMissingError, fill
 
 needs_kicad = pytest.mark.skipif(
     kicad_cli.version() is None,
@@ -138,9 +139,11 @@ def test_a_board_that_kicad_cannot_fill_and_a_python_without_kicad_are_errors(fa
     fake_kicad(error="yes")
     with pytest.raises(RoutingError, match="KiCad could not fill the pours"):
         fill("(kicad_pcb)")
-    monkeypatch.setattr(pours, "_PYTHONS", ("/nonexistent/python3", None))
-    with pytest.raises(KicadMissingError, match="Python module"):
-        kicad_python()
+    monkeypatch.delenv("PYTHONPATH")
+    for pythons in (("/nonexistent/python3", None), (sys.executable,)):
+        monkeypatch.setattr(pours, "_PYTHONS", pythons)
+        with pytest.raises(KicadMissingError, match="Python module"):
+            fill("(kicad_pcb)")
 
 
 def test_a_filled_project_is_a_copy_with_its_library(fake_kicad, tmp_path) -> None:

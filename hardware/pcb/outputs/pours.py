@@ -9,6 +9,7 @@ KiCad. `make board` fills again and compares.
 import shutil
 import subprocess
 import tempfile
+from math import floor
 from pathlib import Path
 
 from hardware.pcb.layout import rules
@@ -17,10 +18,18 @@ from hardware.pcb.outputs.board import ORIGIN_MM
 from hardware.pcb.outputs.sexp import Node, child, children, parse, word
 
 #: Runs in the system's Python: KiCad installs its module there and nowhere else.
-_SCRIPT = (
-    "import sys, pcbnew; board = pcbnew.LoadBoard(sys.argv[1]);"
-    "pcbnew.ZONE_FILLER(board).Fill(board.Zones()); board.Save(sys.argv[2])"
-)
+_SCRIPT = """
+import sys
+try:
+    import pcbnew
+except ImportError:
+    sys.exit(77)
+board = pcbnew.LoadBoard(sys.argv[1])
+pcbnew.ZONE_FILLER(board).Fill(board.Zones())
+board.Save(sys.argv[2])
+"""
+#: The exit code of a Python without the module.
+_LACKS_MODULE = 77
 _LIMIT_S = 300
 #: Where that Python stands: Debian's, else the first of the PATH.
 _PYTHONS = ("/usr/bin/python3", shutil.which("python3"))
@@ -31,35 +40,27 @@ class KicadMissingError(RuntimeError):
     """KiCad 9 is not installed."""
 
 
-def kicad_python() -> str:
-    """Return the Python that has KiCad's module.
-
-    Raises:
-        KicadMissingError: None has.
-    """
-    for python in _PYTHONS:
-        if python and Path(python).exists():
-            done = subprocess.run([python, "-c", "import pcbnew"], capture_output=True, check=False)
-            if done.returncode == 0:
-                return python
-    raise KicadMissingError("KiCad's Python module is not installed (hint: tools/install_board_tools.sh)")
-
-
 def fill(board_text: str) -> dict[str, list[Node]]:
     """Return the filled polygons of a board by area, computed by KiCad.
 
     Raises:
-        KicadMissingError: KiCad is not installed.
+        KicadMissingError: No Python has KiCad's module.
         RoutingError: KiCad could not read the board.
     """
     with tempfile.TemporaryDirectory() as folder:
         before, after = Path(folder) / "before.kicad_pcb", Path(folder) / "after.kicad_pcb"
         before.write_text(board_text, encoding="utf-8")
-        command = [kicad_python(), "-c", _SCRIPT, str(before), str(after)]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=_LIMIT_S, check=False)
-        if done.returncode != 0 or not after.exists():
-            raise RoutingError(f"KiCad could not fill the pours: {done.stderr.strip()[-300:]}")
-        return _polygons(after.read_text(encoding="utf-8"))
+        for python in _PYTHONS:
+            if not python or not Path(python).exists():
+                continue
+            command = [python, "-c", _SCRIPT, str(before), str(after)]
+            done = subprocess.run(command, capture_output=True, text=True, timeout=_LIMIT_S, check=False)
+            if done.returncode == _LACKS_MODULE:
+                continue
+            if done.returncode != 0 or not after.exists():
+                raise RoutingError(f"KiCad could not fill the pours: {done.stderr.strip()[-300:]}")
+            return _polygons(after.read_text(encoding="utf-8"))
+    raise KicadMissingError("KiCad's Python module is not installed (hint: tools/install_board_tools.sh)")
 
 
 def kept_stitches(vias: list[Via], pours: dict[str, list[Node]]) -> list[Via]:
@@ -69,7 +70,7 @@ def kept_stitches(vias: list[Via], pours: dict[str, list[Node]]) -> list[Via]:
         vias: Places that the router found free.
         pours: The pours as filled without any stitching via, so that no island hangs on one.
     """
-    shapes = {layer: [_points(polygon) for polygon in pours.get(f"GND:{layer}", [])] for layer in LAYERS}
+    shapes = {layer: [_rows_of(_points(polygon)) for polygon in pours.get(f"GND:{layer}", [])] for layer in LAYERS}
     kept = []
     for via in vias:
         x, y = _shift(via.at_mm)
@@ -112,11 +113,20 @@ def stitch_at(x_mm: float, y_mm: float) -> Via:
     return Via(net="GND", at_mm=(round(x_mm, 3), round(y_mm, 3)), size_mm=size, drill_mm=drill, is_stitch=True)
 
 
-def _is_inside(point: tuple[float, float], shape: list[tuple[float, float]]) -> bool:
+def _rows_of(shape: list[tuple[float, float]]) -> dict[int, list[tuple[float, ...]]]:
+    """Return a polygon's sides, x0 y0 x1 y1, by the millimetres of y that they touch."""
+    rows: dict[int, list[tuple[float, ...]]] = {}
+    for one, other in zip(shape, shape[1:] + shape[:1], strict=True):
+        for row in range(floor(min(one[1], other[1])), floor(max(one[1], other[1])) + 1):
+            rows.setdefault(row, []).append((*one, *other))
+    return rows
+
+
+def _is_inside(point: tuple[float, float], shape: dict[int, list[tuple[float, ...]]]) -> bool:
     """Tell whether a point lies in a polygon: an odd number of its sides pass to the right."""
     x, y = point
     inside = False
-    for (x0, y0), (x1, y1) in zip(shape, shape[1:] + shape[:1], strict=True):
+    for x0, y0, x1, y1 in shape.get(floor(y), ()):
         if (y0 > y) != (y1 > y) and x < (x1 - x0) * (y - y0) / (y1 - y0) + x0:
             inside = not inside
     return inside

@@ -7,8 +7,8 @@ Not here: what any list means. Invariant: `parse(render(tree)) == tree` for tree
 of lists, bare words (`str`) and quoted strings (`Text`).
 """
 
+import re
 import uuid
-from collections.abc import Iterator
 from typing import TypeAlias
 
 #: A list whose first element names it; elements are words, texts or lists.
@@ -18,6 +18,11 @@ Node: TypeAlias = "list[str | Node]"
 _LINE_LENGTH = 200
 #: chosen: any fixed UUID; another one would rename every object.
 _SPACE = uuid.UUID("6f2d6a53-77d5-5f0b-9a3c-0b5a5d1c9e11")
+
+
+#: A bracket, a word, or the inside of a text: a text that does not end goes to the end.
+_TOKEN = re.compile(r"""([()])|([^()"\s]+)|"((?:[^"\\]|\\.)*)"?""", re.DOTALL)
+_ESCAPED = re.compile(r"\\(.)", re.DOTALL)
 
 
 class Text(str):
@@ -60,20 +65,23 @@ def parse(text: str) -> Node:
     Raises:
         SexpError: The text does not begin with a list, or ends inside one.
     """
-    tokens = _tokens(text)
-    if next(tokens, None) != "(":
+    if not text.lstrip().startswith("("):
         raise SexpError("expected an opening bracket")
-    stack: list[Node] = [[]]
-    for piece in tokens:
-        if piece == "(" and not isinstance(piece, Text):
-            stack.append([])
-        elif piece == ")" and not isinstance(piece, Text):
-            done = stack.pop()
+    stack: list[Node] = []
+    items: Node = []
+    for bracket, bare, quoted in _TOKEN.findall(text):
+        if bare:
+            items.append(bare)
+        elif bracket == "(":
+            stack.append(items)
+            items = []
+        elif bracket:
+            done, items = items, stack.pop()
             if not stack:
                 return done
-            stack[-1].append(done)
+            items.append(done)
         else:
-            stack[-1].append(piece)
+            items.append(Text(_ESCAPED.sub(_unescaped, quoted) if "\\" in quoted else quoted))
     raise SexpError("the text ends inside a list")
 
 
@@ -127,29 +135,5 @@ def _word(item: str) -> str:
     return item
 
 
-def _tokens(text: str) -> Iterator[str]:
-    index, end = 0, len(text)
-    while index < end:
-        char = text[index]
-        if char in "()":
-            yield char
-            index += 1
-        elif char == '"':
-            out = []
-            index += 1
-            while index < end and text[index] != '"':
-                if text[index] == "\\" and index + 1 < end:
-                    index += 1
-                    out.append("\n" if text[index] == "n" else text[index])
-                else:
-                    out.append(text[index])
-                index += 1
-            index += 1
-            yield Text("".join(out))
-        elif char.isspace():
-            index += 1
-        else:
-            start = index
-            while index < end and text[index] not in '()"' and not text[index].isspace():
-                index += 1
-            yield text[start:index]
+def _unescaped(escaped: re.Match[str]) -> str:
+    return "\n" if escaped[1] == "n" else escaped[1]

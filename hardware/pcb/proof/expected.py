@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from itertools import combinations
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from hardware.pcb.circuit.netlist import Component, Design
 from hardware.pcb.layout.footprints import FOOTPRINTS
@@ -29,6 +29,10 @@ _ALIKE = frozenset({"R", "C", "FUSE"})
 _RAILS = {"GND": "GND", "3V3": "3V3"}
 
 
+#: The parts, each with name and net of its pins, by the table's names.
+_Parts: TypeAlias = list[tuple[Component, list[tuple[str, str | None]]]]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Expected:
     """The table for one board: nodes by name (pins, counted), values by reference."""
@@ -41,6 +45,8 @@ class Expected:
     symbols: Mapping[str, str]
     #: The pins that each pin must meet.
     partners: Mapping[str, frozenset[str]]
+    #: The nodes that each pin is at, and how often.
+    homes: Mapping[str, Mapping[str, int]]
 
 
 @lru_cache(maxsize=1)
@@ -66,10 +72,14 @@ def expected(variant: str) -> Expected:
         nodes[_RAILS[rail]][pull] += 1
         values |= {series: ohms, pull: pull_ohms}
     partners: dict[str, frozenset[str]] = {}
-    for members in nodes.values():
-        for pin in members:
+    homes: dict[str, dict[str, int]] = {}
+    for name, members in nodes.items():
+        for pin, count in members.items():
             partners[pin] = partners.get(pin, frozenset()) | (frozenset(members) - {pin})
-    return Expected(nodes=nodes, values=values, partners=partners, open_pins=table["open"], symbols=own["symbols"])
+            homes.setdefault(pin, {})[name] = count
+    return Expected(
+        nodes=nodes, values=values, partners=partners, homes=homes, open_pins=table["open"], symbols=own["symbols"]
+    )
 
 
 def differences(design: Design) -> list[str]:
@@ -79,7 +89,8 @@ def differences(design: Design) -> list[str]:
         KeyError: The table does not describe the design's variant.
     """
     table = expected(design.variant)
-    return [*_parts(design, table), *_crossed(design, table), *_joints(design, table), *_values(design, table)]
+    pins = [(part, _named_pins(part, table)) for part in design.components]
+    return [*_parts(design, table), *_crossed(pins, table), *_joints(pins, table), *_values(design, table)]
 
 
 def _parts(design: Design, table: Expected) -> list[str]:
@@ -90,20 +101,20 @@ def _parts(design: Design, table: Expected) -> list[str]:
             *(f"{ref} is not expected" for ref in sorted(there - wanted))]  # fmt: skip
 
 
-def _crossed(design: Design, table: Expected) -> list[str]:
+def _crossed(parts: _Parts, table: Expected) -> list[str]:
     """Name parts two of whose pins each meet what the other should meet."""
     nets: dict[str | None, set[str]] = {}
-    for part in design.components:
-        for name, net in _named_pins(part, table):
+    for _, pins in parts:
+        for name, net in pins:
             nets.setdefault(net, set()).add(name)
     found = []
-    for part in design.components:
+    for part, pins in parts:
         if part.part.symbol in _ALIKE:
             continue
         # Pins that meet none of those that they should meet.
         lost = [
             (pin, net, table.partners[pin])
-            for pin, net in _named_pins(part, table)
+            for pin, net in pins
             if net is not None and pin in table.partners and not table.partners[pin] & nets[net]
         ]
         for (one, first, wanted), (two, second, other) in combinations(lost, 2):
@@ -113,45 +124,49 @@ def _crossed(design: Design, table: Expected) -> list[str]:
     return found
 
 
-def _joints(design: Design, table: Expected) -> list[str]:
+def _joints(parts: _Parts, table: Expected) -> list[str]:
     """Compare nets with nodes: each net belongs to the node with which it shares most pins, each node once."""
     nets: dict[str, Counter[str]] = {}
     found = []
-    for part in design.components:
-        for name, net in _named_pins(part, table):
+    for _, named in parts:
+        for name, net in named:
             if net is not None:
                 nets.setdefault(net, Counter())[name] += 1
-            elif name in {pin for pins in table.nodes.values() for pin in pins}:
+            elif name in table.homes:
                 found.append(f"{name} is open, expected at {_node_of(table, name)!r}")
     matched = _matched(nets, table)
     for net, pins in sorted(nets.items()):
         node = table.nodes[matched[net]] if net in matched else Counter()
-        for pin in sorted((pins - node).elements()):
+        for pin in _beyond(pins, node):
             why = table.open_pins.get(pin)
             where = f"expected at {_node_of(table, pin)!r}" if why is None else f"must stay open ({why})"
             found.append(f"{pin} is on net {net} ({matched.get(net, 'no node')!r}), {where}")
     there = {name: net for net, name in matched.items()}
     for name, node in table.nodes.items():
         pins = nets[there[name]] if name in there else Counter()
-        found += [f"{pin} is not at {name!r}" for pin in sorted((node - pins).elements())]
+        found += [f"{pin} is not at {name!r}" for pin in _beyond(node, pins)]
     return found
+
+
+def _beyond(pins: Counter[str], others: Counter[str]) -> list[str]:
+    """Return the pins that are not among the others, in order."""
+    return [] if dict.__eq__(pins, others) else sorted((pins - others).elements())
 
 
 def _matched(nets: Mapping[str, Counter[str]], table: Expected) -> dict[str, str]:
     """Return the node of each net that has one: the nets that share most pins choose first."""
-    homes: dict[str, set[str]] = {}
-    for name, node in table.nodes.items():
-        for pin in node:
-            homes.setdefault(pin, set()).add(name)
-    shared = sorted(
-        (-(pins & table.nodes[name]).total(), -table.nodes[name].total(), net, name)
-        for net, pins in nets.items()
-        for name in {name for pin in pins for name in homes.get(pin, ())}
-    )
+    common: Counter[tuple[str, str]] = Counter()
+    for net, pins in nets.items():
+        for pin, count in pins.items():
+            for name, wanted in table.homes.get(pin, {}).items():
+                common[net, name] += min(count, wanted)
+    shared = sorted((-pins, -table.nodes[name].total(), net, name) for (net, name), pins in common.items())
     matched: dict[str, str] = {}
+    taken: set[str] = set()
     for _, _, net, name in shared:
-        if net not in matched and name not in matched.values():
+        if net not in matched and name not in taken:
             matched[net] = name
+            taken.add(name)
     return matched
 
 

@@ -251,13 +251,18 @@ def _changed(design: Design, parts: Iterable[Component]) -> Design:
 
 def _with_nets(design: Design, nets: Mapping[str, str | None]) -> Design:
     """Return the design with other nets at some pins, which are named REF.PIN."""
-    known = {f"{part.ref}.{pin}" for part in design.components for pin, _ in part.pins}
-    if not set(nets) <= known:
-        raise DesignError(f"no pin {min(set(nets) - known)}")
-    return _changed(design, (
-        dataclasses.replace(part, pins=tuple((pin, nets.get(f"{part.ref}.{pin}", net)) for pin, net in part.pins))
-        for part in design.components
-    ))  # fmt: skip
+    concerned = {name.split(".")[0] for name in nets}
+    unknown = set(nets)
+    parts = []
+    for part in design.components:
+        if part.ref in concerned:
+            names = [(f"{part.ref}.{pin}", pin, net) for pin, net in part.pins]
+            unknown -= {name for name, _, _ in names}
+            part = dataclasses.replace(part, pins=tuple((pin, nets.get(name, net)) for name, pin, net in names))  # noqa: PLW2901
+        parts.append(part)
+    if unknown:
+        raise DesignError(f"no pin {min(unknown)}")
+    return _changed(design, parts)
 
 
 def _move(design: Design, pin: str, net: str) -> Design:

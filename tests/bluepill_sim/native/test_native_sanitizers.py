@@ -53,7 +53,7 @@ def run(*command: str, **environment: str) -> str:
 def test_no_warning_and_no_finding(tmp_path: Path) -> None:
     library = tmp_path / "core.so"
     run(
-        "gcc", "-std=c11", "-O1", "-g", "-Wall", "-Wextra", "-Wconversion", "-Wno-sign-conversion", "-Werror", "-fPIC",
+        "gcc", "-std=c11", "-O1", "-g1", "-Wall", "-Wextra", "-Wconversion", "-Wno-sign-conversion", "-Werror", "-fPIC",
         "-shared", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-o", str(library), *map(str, SOURCES),
     )  # fmt: skip
     preload = run("gcc", "-print-file-name=libasan.so").strip()
