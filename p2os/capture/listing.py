@@ -189,7 +189,7 @@ class Lister:
                         yield self._frame_row(stream.direction, data[first:last], whole, now)
                 stream.consume(end - start)
                 known, place = max(0, place - end), end
-            cut = _next_header(data, place + known + 1)
+            cut = next_header(data, place + known + 1)
             stream.decoder.receive(data[place:cut], now)
             place = cut
             yield from self._drain(stream, now)
@@ -271,7 +271,7 @@ class LoopFinder:
         return found, place
 
 
-def _next_header(data: bytes, place: int) -> int:
+def next_header(data: bytes, place: int) -> int:
     """Return where the next header begins, or the end; not one behind a first byte that is alone."""
     while (place := data.find(HEADER, place)) > 0 and data[place - 1] == HEADER[0]:
         place += 1

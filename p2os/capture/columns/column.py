@@ -10,7 +10,7 @@ from typing import Any, cast, overload
 import numpy as np
 import numpy.typing as npt
 
-from p2os.capture.cells import Cell, cell_text
+from p2os.capture.cells import Cell, cell_text, texts_of
 from p2os.capture.columns.framing import Flags, Indexes
 
 #: NumPy's letter for a kind of cells → its type, and what stands where one is absent.
@@ -111,7 +111,7 @@ class Column(Sequence[Cell]):
     def texts(self) -> Sequence[str]:
         """Return each cell as it stands in CSV."""
         if self.conversion is None:
-            return [cell_text(cell) for cell in self]
+            return texts_of(self.tolist())
         texts = self.conversion.texts[self.codes]
         if self.present is not None:
             texts[~self.present] = ""

@@ -72,16 +72,16 @@ class Records:
     def packets(self, first: int, last: int) -> Iterator[tuple[Nanos, bytes]]:
         """Yield time, in nanoseconds since 1970, and bytes of some of them."""
         layout, data = self.layout, self.data
-        number = struct.Struct(layout.order + "I").unpack_from
+        numbers_of = struct.Struct(f"{layout.order}{layout.data_at // 4}I").unpack_from
+        high, low, length = layout.high_at // 4, layout.low_at // 4, layout.length_at // 4
         for start in self.starts[first:last]:
-            at_ns = 0
+            numbers, at_ns = numbers_of(data, start), 0
             if layout.ticks_per_s:
-                ticks = number(data, start + layout.high_at)[0] * layout.radix + number(data, start + layout.low_at)[0]
-                at_ns = ticks * NS_PER_S // layout.ticks_per_s
+                at_ns = (numbers[high] * layout.radix + numbers[low]) * NS_PER_S // layout.ticks_per_s
             begin = start + layout.data_at
-            end = begin + number(data, start + layout.length_at)[0]
+            end = begin + numbers[length]
             if layout.size_at is not None:
-                end = min(end, start + number(data, start + layout.size_at)[0] - 4)
+                end = min(end, start + numbers[layout.size_at // 4] - 4)
             yield at_ns, data[begin:end]
 
 
