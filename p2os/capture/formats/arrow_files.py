@@ -10,7 +10,7 @@ from p2os.capture.table import Table
 from simbase.errors import MissingDependencyError
 
 #: chosen: larger groups of rows are little faster and smaller in the file, and take more memory.
-GROUP_ROWS = 1 << 15
+GROUP_ROWS = 1 << 16
 
 
 def write_parquet(tables: Iterable[Table], path: Path) -> int:

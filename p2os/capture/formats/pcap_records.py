@@ -118,21 +118,21 @@ class _Pcap:
             order=order, high_at=0, low_at=4, radix=unit, ticks_per_s=unit, length_at=8, data_at=16
         )  # fmt: skip
         self._link, self._is_first = link & 0xFFFF, True
-        self._size = struct.Struct(order + "I").unpack_from
+        self._size = struct.Struct(order + "8xI").unpack_from
 
     def take(self, data: bytes, before: int) -> Generator[Records, None, int]:
         """Yield the records that are whole; return how many bytes they take."""
         starts: list[int] = []
-        place, end, size_of = (24 if self._is_first else 0), len(data), self._size
+        place, end, size_of, add = (24 if self._is_first else 0), len(data), self._size, starts.append
         self._is_first = False
         while place + 16 <= end:
-            size = size_of(data, place + 8)[0]
-            if place + 16 + size > end:
-                if size > LARGEST_RECORD:
+            following = place + 16 + size_of(data, place)[0]
+            if following > end:
+                if following - place - 16 > LARGEST_RECORD:
                     raise FileError(f"the capture file is cut off at byte {before + place + 16}")
                 break
-            starts.append(place)
-            place += 16 + size
+            add(place)
+            place = following
         if starts:
             yield Records(data=data, starts=starts, layout=self._layout, link=self._link)
         return place
