@@ -46,8 +46,9 @@ def write_arrow(tables: Iterable[Table], path: Path) -> int:
 
 def _pyarrow(path: Path) -> Any:
     try:
-        import numpy as np  # noqa: F401  # what makes the arrays
         import pyarrow as pa
+
+        import p2os.capture.columns.arrow  # noqa: F401  # with NumPy
     except ImportError as error:
         raise MissingDependencyError(
             f"{path.suffix} files need pyarrow", extra="export", hint="export to .csv"
