@@ -1,8 +1,12 @@
 """What stands in one cell of a table, and how it stands in CSV."""
 
+import re
+from collections.abc import Sequence
 from typing import TypeAlias
 
 Cell: TypeAlias = "bool | int | float | str | None"
+#: What a text holds that has to be quoted in CSV.
+_ODD = re.compile('[,"\r\n]').search
 
 
 def cell_text(cell: Cell) -> str:
@@ -10,8 +14,17 @@ def cell_text(cell: Cell) -> str:
     return "" if cell is None else quoted(cell) if isinstance(cell, str) else str(cell)
 
 
+def texts_of(cells: Sequence[Cell]) -> list[str]:
+    """Return the cells of a column as they stand in CSV."""
+    kinds = set(map(type, cells))
+    if len(kinds) == 1 and kinds <= {bool, int, float}:
+        return list(map(str, cells))
+    if kinds == {str}:
+        known = {cell: cell_text(cell) for cell in set(cells)}
+        return [known[cell] for cell in cells]
+    return [cell_text(cell) for cell in cells]
+
+
 def quoted(text: str) -> str:
     """Return a text as it stands in CSV."""
-    if any(character in text for character in ',"\r\n'):
-        return '"' + text.replace('"', '""') + '"'
-    return text
+    return '"' + text.replace('"', '""') + '"' if _ODD(text) else text

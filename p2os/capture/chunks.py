@@ -121,7 +121,11 @@ class Block:
         """Return one of them."""
         start = self.ends[number - 1] if number else 0
         data = self.data[start : self.ends[number]]
-        return Chunk(at_ns=self.at_ns[number], direction=_DIRECTIONS[self.senders[number]], data=data)
+        return Chunk(at_ns=self.at_ns[number], direction=self.direction(number), data=data)
+
+    def direction(self, number: int) -> Direction | None:
+        """Return who sent one of them."""
+        return _DIRECTIONS[self.senders[number]]
 
     def __iter__(self) -> Iterator[Chunk]:
         start = 0

@@ -189,7 +189,7 @@ class Lister:
                         yield self._frame_row(stream.direction, data[first:last], whole, now)
                 stream.consume(end - start)
                 known, place = max(0, place - end), end
-            cut = _next_header(data, place + known + 1)
+            cut = next_header(data, place + known + 1)
             stream.decoder.receive(data[place:cut], now)
             place = cut
             yield from self._drain(stream, now)
@@ -197,8 +197,9 @@ class Lister:
     def advance_to(self, now: Nanos) -> Iterator[ListingRow]:
         """Yield what has been given up by `now` nanoseconds: frames whose rest never came."""
         for stream in self._streams.values():
-            stream.decoder.advance_to(now)
-            yield from self._drain(stream, now)
+            if stream.decoder.next_deadline() is not None:
+                stream.decoder.advance_to(now)
+                yield from self._drain(stream, now)
 
     def finish(self, now: Nanos) -> Iterator[ListingRow]:
         """Yield what was left when the capture ended."""
@@ -271,7 +272,7 @@ class LoopFinder:
         return found, place
 
 
-def _next_header(data: bytes, place: int) -> int:
+def next_header(data: bytes, place: int) -> int:
     """Return where the next header begins, or the end; not one behind a first byte that is alone."""
     while (place := data.find(HEADER, place)) > 0 and data[place - 1] == HEADER[0]:
         place += 1
@@ -481,7 +482,7 @@ def _inside(row: ListingRow) -> str:
 
 
 def _sip(fields: dict[str, Plain]) -> str:
-    number = {name: value for name, value in fields.items() if isinstance(value, (int, float))}
+    number = cast("dict[str, float]", fields)
     text = (
         f"x {number['x_m']:.3f} m, y {number['y_m']:.3f} m, heading {math.degrees(number['heading_rad']):.1f} deg, "
         f"wheels {number['left_mps']:.3f} {number['right_mps']:.3f} m/s, {number['battery_v']:.1f} V"
@@ -491,7 +492,7 @@ def _sip(fields: dict[str, Plain]) -> str:
         text += f", stalled {' and '.join(stalls)}"
     sonar = cast("dict[str, float]", fields["sonar_m"])
     if sonar:
-        text += ", sonar " + " ".join(f"{place}:{range_m:.3f}" for place, range_m in sonar.items()) + " m"
+        text += ", sonar " + " ".join([f"{place}:{range_m:.3f}" for place, range_m in sonar.items()]) + " m"
     return text
 
 

@@ -3,21 +3,20 @@
 Invariant: cell by cell what `ListingRow.fields` says, positions left out: those are followed by who makes a table.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import cast, overload
 
 from p2os.capture.cells import Cell, cell_text
+from p2os.capture.chunks import Direction
 from p2os.capture.describe import RAW_OF, Memo, Plain, SipFields
-from p2os.capture.listing import ListingRow
-from p2os.protocol.frames import CHECKSUM_BYTES, PREFIX_BYTES
+from p2os.capture.sips import Sip
+from p2os.protocol.packets import packet_name
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import (
     BEFORE_SONAR,
     BEHIND_SONAR,
     HEAD_BYTES,
     READING_BYTES,
-    SIP_KINDS,
-    unpack_head,
     unpack_tail,
 )
 from p2os.robots.parameters import RobotParameters
@@ -26,6 +25,12 @@ from p2os.robots.parameters import RobotParameters
 _Place = tuple[int, float]
 
 
+#: Columns that every table begins with.
+LEADING = ("t_s", "dir", "type", "name", "valid")
+#: What those say of a SIP, whose type decides them but for the time.
+KIND_SAYS: Mapping[str, Callable[[int], Cell]] = {
+    "dir": lambda _: Direction.FROM_ROBOT.value, "type": int, "name": packet_name, "valid": lambda _: True,
+}  # fmt: skip
 #: Raw value of a cell that is not there.
 _ABSENT = -1
 
@@ -37,7 +42,7 @@ class Conversion:
         cells: The field.
     """
 
-    def __init__(self, cells: Memo[Plain]) -> None:
+    def __init__(self, cells: "Memo[Plain] | Memo[Cell]") -> None:
         self.cell_of = cast("Callable[[int], Cell]", cells.__getitem__)
         self.text_of: Callable[[int], str] = Memo(lambda raw: cell_text(self.cell_of(raw))).__getitem__
 
@@ -87,18 +92,19 @@ class SipColumns:
         self._renamed = {"analog_port": port, "gripper_state": gripper}
         self._conversions = {name: Conversion(memo) for name, memo in self._fields.memos.items()}
         self._range = self._conversions["sonar_m"]
+        self._leading = {name: Conversion(Memo(convert)) for name, convert in KIND_SAYS.items()}
         self._fields.memos["sonar_m"][_ABSENT] = None
 
-    def of(self, rows: Sequence[ListingRow]) -> dict[str, Sequence[Cell]] | None:
-        """Return the columns in the order in which the rows first have them; None if not all are sound SIPs."""
-        payloads = [row.data[PREFIX_BYTES:-CHECKSUM_BYTES] for row in rows if row.kind in SIP_KINDS]
-        heads = [head for head in map(unpack_head, payloads) if head is not None]
-        if not heads or len(heads) < len(rows):
-            return None
+    def of(self, sips: Sequence[Sip]) -> dict[str, Sequence[Cell]]:
+        """Return the columns but for the time, in the order in which SIPs first have them; there is one at the least.
+
+        Positions are those of each SIP alone.
+        """
+        payloads, heads = [sip.payload for sip in sips], [sip.head for sip in sips]
         before, behind = len(BEFORE_SONAR), len(BEHIND_SONAR)
         raw = dict(zip(BEFORE_SONAR, zip(*[head[:before] for head in heads], strict=True), strict=True))
         raw |= dict(zip(BEHIND_SONAR, zip(*[head[-behind:] for head in heads], strict=True), strict=True))
-        raw["kind"] = tuple([payload[0] for payload in payloads])
+        kinds = raw["kind"] = tuple([payload[0] for payload in payloads])
         for side, bumpers in (("left", "rear_bumpers"), ("right", "front_bumpers")):
             raw[f"stall_{side}"] = tuple([value & 1 for value in raw[side]])
             raw[bumpers] = tuple([value >> 1 for value in raw[side]])
@@ -111,7 +117,8 @@ class SipColumns:
                 column = raw[self._renamed.get(raw_name, raw_name)]
                 found[0, place] = name, RawColumn(column, self._conversions[name])
         found |= self._tail(payloads, raw["count"], len(self._fields.memos))
-        return dict(found[order] for order in sorted(found))
+        leading = {name: RawColumn(kinds, conversion) for name, conversion in self._leading.items()}
+        return {**leading, **dict(found[order] for order in sorted(found))}
 
     def _sonar(self, heads: list[tuple[int, ...]], place: int) -> dict[_Place, tuple[str, Sequence[Cell]]]:
         begin, end = len(BEFORE_SONAR), -len(BEHIND_SONAR)

@@ -13,28 +13,24 @@ Invariant: all tables of a capture have the same columns in the same order, and 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import chain, islice
+from itertools import accumulate, chain, islice, pairwise
 from typing import IO, Protocol, runtime_checkable
 
-from p2os.capture.cells import Cell, cell_text, quoted
-from p2os.capture.chunks import Direction
-from p2os.capture.describe import Plain
+from p2os.capture.cells import Cell, quoted, texts_of
+from p2os.capture.describe import RAW_OF, Plain
 from p2os.capture.listing import ListingRow, Reading
-from p2os.capture.sip_columns import SipColumns
-from p2os.protocol.sip import POSITION_MASK
+from p2os.capture.sip_columns import LEADING, SipColumns
+from p2os.capture.sips import Sip, from_rows
+from p2os.protocol.sip import BEFORE_SONAR, POSITION_MASK
 from p2os.robots.parameters import RobotParameters
 from simbase.timing import NS_PER_S
 
-#: Columns that every table begins with.
-LEADING = ("t_s", "dir", "type", "name", "valid")
 #: Cells whose column the beginning did not have.
 MORE = "more"
 #: chosen: seven minutes of SIPs; a table of them takes some MB.
 FIRST_ROWS = 4096
 #: Where XPOS and YPOS stand in a SIP's frame, header included.
 _X_AT, _Y_AT = 4, 6
-#: chosen: as many texts of one column are kept.
-_KEPT_TEXTS = 1 << 16
 
 
 @runtime_checkable
@@ -69,6 +65,13 @@ def tables_of(rows: Iterable[ListingRow], reading: Reading, first_rows: int = FI
     tables = _Tables(reading)
     every = iter(rows)
     yield from uniform(tables.table(block) for block in iter(lambda: list(islice(every, first_rows)), []))
+
+
+def tables_of_sips(sips: Iterable[Sip], reading: Reading, first_rows: int = FIRST_ROWS) -> Iterator[Table]:
+    """Yield a robot's SIPs as tables, as `tables_of` does rows."""
+    tables = _Tables(reading)
+    every = iter(sips)
+    yield from uniform(tables.sip_table(block) for block in iter(lambda: list(islice(every, first_rows)), []))
 
 
 def table_of(rows: Iterable[ListingRow], reading: Reading) -> Table:
@@ -114,49 +117,17 @@ def write_csv(tables: Iterable[Table], file: IO[str]) -> int:
     Returns:
         How many rows were written.
     """
-    texts: dict[str, _Texts] = {}
     count = 0
     for table in tables:
-        if not texts:
-            texts = {name: _Texts() for name in table.columns}
-            file.write(",".join(map(quoted, texts)) + "\n")
+        if not count:
+            file.write(",".join(map(quoted, table.columns)) + "\n")
         columns = [
-            column.texts() if isinstance(column, TextColumn) else texts[name].of(column)
-            for name, column in table.columns.items()
+            column.texts() if isinstance(column, TextColumn) else texts_of(column) for column in table.columns.values()
         ]
         file.write("\n".join(map(",".join, zip(*columns, strict=True))) + "\n")
         file.flush()
         count += table.rows
     return count
-
-
-def from_robot(rows: Iterable[ListingRow]) -> Iterator[ListingRow]:
-    """Yield the rows of a robot's standard SIPs."""
-    for row in rows:
-        if row.direction is not Direction.TO_ROBOT and row.is_sip:
-            yield row
-
-
-class _Texts:
-    """The texts of one column's cells."""
-
-    def __init__(self) -> None:
-        self._known: dict[Cell, str] = {}
-        self._kind: type = type(None)
-
-    def of(self, column: Sequence[Cell]) -> Sequence[str]:
-        """Return each cell as it stands in CSV."""
-        kinds = _kinds(column)
-        if len(kinds) > 1:  # True and 1 are one key
-            return [cell_text(cell) for cell in column]
-        (kind,) = kinds or {type(None)}
-        if kind not in {self._kind, type(None)} or len(self._known) > _KEPT_TEXTS:
-            self._known.clear()
-            self._kind = kind
-        known = self._known
-        for cell in set(column) - known.keys():
-            known[cell] = cell_text(cell)
-        return list(map(known.__getitem__, column))
 
 
 def _kinds(column: Sequence[Cell]) -> set[type]:
@@ -168,10 +139,13 @@ class _Tables:
 
     def __init__(self, reading: Reading) -> None:
         self._sips = SipColumns(reading.profile, reading.parameters)
-        self._x, self._y = (_Place(reading.parameters, place) for place in (_X_AT, _Y_AT))
+        self._x, self._y = (_Place(reading.parameters, name) for name in ("x_m", "y_m"))
 
     def table(self, rows: list[ListingRow]) -> Table:
         """Return the next rows as a table."""
+        sips = list(from_rows(rows))
+        if len(sips) == len(rows):
+            return self.sip_table(sips)
         leading = (
             [row.at_ns / NS_PER_S for row in rows],
             [None if row.direction is None else row.direction.value for row in rows],
@@ -180,11 +154,22 @@ class _Tables:
             [row.valid for row in rows],
         )
         columns: dict[str, Sequence[Cell]] = dict(zip(LEADING, leading, strict=True))
-        columns |= self._sips.of(rows) or _described(rows)
+        columns |= _described(rows)
         if "x_m" in columns:
             has = [cell is not None for cell in columns["x_m"]]
-            columns["x_m"], columns["y_m"] = self._x.follow(rows, has), self._y.follow(rows, has)
+            for place, at in ((self._x, _X_AT), (self._y, _Y_AT)):
+                raw = [row.data[at] | row.data[at + 1] << 8 if there else None
+                       for row, there in zip(rows, has, strict=True)]  # fmt: skip
+                columns[place.name] = place.follow(raw)
         return Table(columns)
+
+    def sip_table(self, sips: list[Sip]) -> Table:
+        """Return the next SIPs as a table."""
+        columns = self._sips.of(sips)
+        for place in (self._x, self._y):
+            columns[place.name] = place.follow([sip.head[place.number] for sip in sips])
+        times: list[Cell] = [sip.at_ns / NS_PER_S for sip in sips]
+        return Table({LEADING[0]: times, **columns})
 
 
 def _described(rows: list[ListingRow]) -> dict[str, Sequence[Cell]]:
@@ -211,24 +196,24 @@ def _flatten(fields: Mapping[str, Plain], cells: dict[str, Cell], before: str = 
 class _Place:
     """One coordinate of a robot's SIPs, followed over the wraps of its counter."""
 
-    def __init__(self, parameters: RobotParameters, offset: int) -> None:
+    def __init__(self, parameters: RobotParameters, name: str) -> None:
         self._metres = parameters.distance_conv_mm / 1000
-        self._offset = offset
+        self.name = name
+        #: Where it stands among the numbers of a SIP's head.
+        self.number = BEFORE_SONAR.index(RAW_OF[name])
         self._counts = 0
         self._last = 0
 
-    def follow(self, rows: Sequence[ListingRow], has: Sequence[bool]) -> list[Cell]:
-        """Return the coordinate in metres where rows have one; the first one lies within half a span of 0."""
-        metres, first, second = self._metres, self._offset, self._offset + 1
-        counts, last, half, found = self._counts, self._last, (POSITION_MASK + 1) // 2, list[Cell]()
-        for row, there in zip(rows, has, strict=True):
-            if not there:
-                found.append(None)
-                continue
-            raw = (row.data[first] | row.data[second] << 8) & POSITION_MASK
-            # The nearer way round; also from 0 to the first.
-            counts += (raw - last + half & POSITION_MASK) - half
-            last = raw
-            found.append(round(counts * metres, 6))
-        self._counts, self._last = counts, last
-        return found
+    def follow(self, raw: Sequence[int | None]) -> list[Cell]:
+        """Return the coordinate in metres where there is one; the first one lies within half a span of 0."""
+        metres, half = self._metres, (POSITION_MASK + 1) // 2
+        values = [self._last, *(value & POSITION_MASK for value in raw if value is not None)]
+        # The nearer way round; also from 0 to the first.
+        steps = [(after - before + half & POSITION_MASK) - half for before, after in pairwise(values)]
+        counts = list(accumulate(steps, initial=self._counts))
+        self._counts, self._last = counts[-1], values[-1]
+        found: list[Cell] = [round(count * metres, 6) for count in counts[1:]]
+        if len(found) == len(raw):
+            return found
+        every = iter(found)
+        return [None if value is None else next(every) for value in raw]

@@ -10,7 +10,7 @@ from typing import Any, cast, overload
 import numpy as np
 import numpy.typing as npt
 
-from p2os.capture.cells import Cell, cell_text
+from p2os.capture.cells import Cell, cell_text, texts_of
 from p2os.capture.columns.framing import Flags, Indexes
 
 #: NumPy's letter for a kind of cells → its type, and what stands where one is absent.
@@ -86,10 +86,14 @@ class Column(Sequence[Cell]):
             cells: None where one is absent.
             kind: NumPy's letter for their kind; what is of another becomes a text where it is `O`.
         """
-        present = np.fromiter((cell is not None for cell in cells), np.bool_, len(cells))
+        absent = cells.count(None)
+        present = np.zeros(len(cells), np.bool_)
+        if absent < len(cells):
+            present[:] = [cell is not None for cell in cells]
         if kind == "O":
             words = np.full(len(cells), "", object)
-            words[present] = [cell if isinstance(cell, str) else str(cell) for cell in cells if cell is not None]
+            if absent < len(cells):
+                words[present] = [cell if isinstance(cell, str) else str(cell) for cell in cells if cell is not None]
             return cls(words, present)
         dtype, zero = _KINDS[kind]
         return cls(np.array([zero if cell is None else cell for cell in cells], dtype), present)
@@ -111,7 +115,7 @@ class Column(Sequence[Cell]):
     def texts(self) -> Sequence[str]:
         """Return each cell as it stands in CSV."""
         if self.conversion is None:
-            return [cell_text(cell) for cell in self]
+            return texts_of(self.tolist())
         texts = self.conversion.texts[self.codes]
         if self.present is not None:
             texts[~self.present] = ""
@@ -120,8 +124,11 @@ class Column(Sequence[Cell]):
     def encoded(self) -> tuple[Indexes, bytes]:
         """Return how many bytes each text takes in UTF-8, and all of them joined; an absent one is empty."""
         if self.conversion is None:
-            words = [text.encode() for text in self.codes.tolist()]
-            return np.fromiter(map(len, words), np.int64, len(words)), b"".join(words)
+            there = np.ones(len(self.codes), np.bool_) if self.present is None else self.present
+            words = [text.encode() for text in self.codes[there].tolist()]
+            sizes = np.zeros(len(self.codes), np.int64)
+            sizes[there] = [len(word) for word in words]
+            return sizes, b"".join(words)
         # Few different ones: all are taken out of one table, which has as much room for each as the longest needs.
         kinds = np.flatnonzero(np.bincount(self.codes))
         rows = np.zeros(int(kinds.max(initial=0)) + 1, np.int64)

@@ -1,10 +1,10 @@
-"""A recorded conversation's SIPs as tables in SI units, by columns: the fast way of `p2os.capture.table.tables_of`.
+"""A conversation's SIPs as tables in SI units, with NumPy: many times as fast as `p2os.capture.table.tables_of_sips`.
 
 Theory of operation. A robot's bytes are decoded a block at a time. A block is cut where the decoder of
 `p2os.protocol.frames` holds nothing: at a place that no frame spans and that lies so far before the end of what has
 come that everything that begins before it is decided. What follows the cut is looked at again with the next block.
 
-Invariants: cell by cell what `tables_of(from_robot(rows_of(chunks, reading)), reading)` yields; the
+Invariants: cell by cell what `tables_of_sips(sips_of(blocks, reading), reading)` yields; the
 conversions are those of `p2os.capture.describe`, asked once for each raw value that occurs. No more than a block of
 bytes and its table is held.
 """
@@ -23,10 +23,10 @@ from p2os.capture.columns.table import Table as RawTable
 from p2os.capture.columns.tables import Columns, decode
 from p2os.capture.describe import RAW_OF, Memo, SipFields
 from p2os.capture.listing import Reading
-from p2os.capture.table import FIRST_ROWS, LEADING, Table, uniform
+from p2os.capture.sip_columns import KIND_SAYS, LEADING
+from p2os.capture.table import FIRST_ROWS, Table, uniform
 from p2os.protocol.frames import CHECKSUM_BYTES, GIVE_UP_NS, PREFIX_BYTES
-from p2os.protocol.packets import packet_name
-from p2os.protocol.sip import POSITION_MASK, TAIL
+from p2os.protocol.sip import POSITION_MASK, SIP_KINDS, TAIL
 from simbase.timing import NS_PER_S, Nanos
 
 #: chosen: some ten thousand SIPs; larger ones take more memory and hardly less time.
@@ -204,10 +204,8 @@ class _Builder:
         memos = cast("dict[str, Memo[Cell]]", SipFields(reading.profile, reading.parameters).memos)
         self._names = list(memos)
         self._fields = {name: Conversion(memo.__getitem__, type(memo[0])) for name, memo in memos.items()}
-        self._names_of = {name: Conversion(convert, kind) for name, convert, kind in (
-            ("dir", lambda _: Direction.FROM_ROBOT.value, str), ("type", int, int), ("name", packet_name, str),
-            ("valid", lambda _: True, bool),
-        )}  # fmt: skip
+        kind = SIP_KINDS[0]
+        self._names_of = {name: Conversion(convert, type(convert(kind))) for name, convert in KIND_SAYS.items()}
         self._range = self._fields["sonar_m"]
         self._tail = {name: Conversion(int, int) for name, _, _ in TAIL}
         #: Counts and raw value of the last SIP, by coordinate.

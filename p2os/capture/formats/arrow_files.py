@@ -10,7 +10,7 @@ from p2os.capture.table import Table
 from simbase.errors import MissingDependencyError
 
 #: chosen: larger groups of rows are little faster and smaller in the file, and take more memory.
-GROUP_ROWS = 1 << 15
+GROUP_ROWS = 1 << 16
 
 
 def write_parquet(tables: Iterable[Table], path: Path) -> int:
@@ -46,8 +46,9 @@ def write_arrow(tables: Iterable[Table], path: Path) -> int:
 
 def _pyarrow(path: Path) -> Any:
     try:
-        import numpy as np  # noqa: F401  # what makes the arrays
         import pyarrow as pa
+
+        import p2os.capture.columns.arrow  # noqa: F401  # with NumPy
     except ImportError as error:
         raise MissingDependencyError(
             f"{path.suffix} files need pyarrow", extra="export", hint="export to .csv"

@@ -72,16 +72,16 @@ class Records:
     def packets(self, first: int, last: int) -> Iterator[tuple[Nanos, bytes]]:
         """Yield time, in nanoseconds since 1970, and bytes of some of them."""
         layout, data = self.layout, self.data
-        number = struct.Struct(layout.order + "I").unpack_from
+        numbers_of = struct.Struct(f"{layout.order}{layout.data_at // 4}I").unpack_from
+        high, low, length = layout.high_at // 4, layout.low_at // 4, layout.length_at // 4
         for start in self.starts[first:last]:
-            at_ns = 0
+            numbers, at_ns = numbers_of(data, start), 0
             if layout.ticks_per_s:
-                ticks = number(data, start + layout.high_at)[0] * layout.radix + number(data, start + layout.low_at)[0]
-                at_ns = ticks * NS_PER_S // layout.ticks_per_s
+                at_ns = (numbers[high] * layout.radix + numbers[low]) * NS_PER_S // layout.ticks_per_s
             begin = start + layout.data_at
-            end = begin + number(data, start + layout.length_at)[0]
+            end = begin + numbers[length]
             if layout.size_at is not None:
-                end = min(end, start + number(data, start + layout.size_at)[0] - 4)
+                end = min(end, start + numbers[layout.size_at // 4] - 4)
             yield at_ns, data[begin:end]
 
 
@@ -118,21 +118,21 @@ class _Pcap:
             order=order, high_at=0, low_at=4, radix=unit, ticks_per_s=unit, length_at=8, data_at=16
         )  # fmt: skip
         self._link, self._is_first = link & 0xFFFF, True
-        self._size = struct.Struct(order + "I").unpack_from
+        self._size = struct.Struct(order + "8xI").unpack_from
 
     def take(self, data: bytes, before: int) -> Generator[Records, None, int]:
         """Yield the records that are whole; return how many bytes they take."""
         starts: list[int] = []
-        place, end, size_of = (24 if self._is_first else 0), len(data), self._size
+        place, end, size_of, add = (24 if self._is_first else 0), len(data), self._size, starts.append
         self._is_first = False
         while place + 16 <= end:
-            size = size_of(data, place + 8)[0]
-            if place + 16 + size > end:
-                if size > LARGEST_RECORD:
+            following = place + 16 + size_of(data, place)[0]
+            if following > end:
+                if following - place - 16 > LARGEST_RECORD:
                     raise FileError(f"the capture file is cut off at byte {before + place + 16}")
                 break
-            starts.append(place)
-            place += 16 + size
+            add(place)
+            place = following
         if starts:
             yield Records(data=data, starts=starts, layout=self._layout, link=self._link)
         return place

@@ -28,6 +28,13 @@ LINKS: dict[int, tuple[int, int | None]] = {
 #: chosen: more segments than this out of order, and the missing one was never captured.
 MOST_WAITING = 64
 
+#: Bytes of an IPv4 header without options, and its first byte.
+IPV4_BYTES, _NO_OPTIONS = 20, b"\x45"
+#: Of such a packet at the least, up to the TCP header's flags.
+_LEAST_BYTES = 34
+#: Its size, protocol and addresses, and of the TCP header behind it the ports, the sequence, the size and the flags.
+_PLAIN = struct.Struct(">2xH5xB2x4s4sHHI4xBB").unpack_from
+
 #: Address and port.
 End = tuple[bytes, int]
 
@@ -44,6 +51,10 @@ class Half:
         if is_syn or self.next_sequence is None:
             self.next_sequence = (sequence + is_syn) & 0xFFFFFFFF
             sequence = self.next_sequence
+        if not self.waiting and sequence == self.next_sequence:
+            # Nearly always: nothing is late, and nothing was sent again.
+            self.next_sequence = (sequence + len(data)) & 0xFFFFFFFF
+            return data
         if data:
             self.waiting[sequence] = data
         if len(self.waiting) > MOST_WAITING:
@@ -70,6 +81,8 @@ class TcpStreams:
     def __init__(self) -> None:
         self._halves: dict[tuple[End, End], Half] = {}
         self._robots: dict[frozenset[End], End] = {}
+        #: What follows from those, of the conversations that were asked for.
+        self._directions: dict[tuple[End, End], Direction] = {}
         #: Link types that are not read here.
         self.unread_links: set[int] = set()
 
@@ -82,15 +95,23 @@ class TcpStreams:
         if found is None:
             return
         source, target, sequence, flags, data = found
+        half = self._halves.get((source, target))
+        if half is None or flags & SYN:
+            half = self._begin(source, target, flags)
+        ready = half.take(sequence, data, is_syn=bool(flags & SYN))
+        if ready:
+            yield self.direction(source, target), ready
+
+    def _begin(self, source: End, target: End, flags: int) -> Half:
+        """Note whose side is the robot's, and return a direction of the conversation."""
         ends = frozenset((source, target))
         if flags & SYN:
             self._robots[ends] = source if flags & _ACK else target
         elif ends not in self._robots:
             self._robots[ends] = min((source, target), key=lambda end: (end[1] != ROBOT_PORT, end[1]))
-        half = self._halves.setdefault((source, target), Half())
-        ready = half.take(sequence, data, is_syn=bool(flags & SYN))
-        if ready:
-            yield self.direction(source, target), ready
+        # Its other direction too may have another robot now.
+        self._directions.clear()
+        return self._halves.setdefault((source, target), Half())
 
     def half(self, source: End, target: End) -> Half | None:
         """Return one direction of a conversation, if any of it was taken."""
@@ -98,8 +119,11 @@ class TcpStreams:
 
     def direction(self, source: End, target: End) -> Direction:
         """Tell which direction of its conversation that is; some of it was taken."""
-        is_robot = self._robots[frozenset((source, target))] == source
-        return Direction.FROM_ROBOT if is_robot else Direction.TO_ROBOT
+        found = self._directions.get((source, target))
+        if found is None:
+            is_robot = self._robots[frozenset((source, target))] == source
+            found = self._directions[source, target] = Direction.FROM_ROBOT if is_robot else Direction.TO_ROBOT
+        return found
 
 
 def _segment(link: int, packet: bytes) -> tuple[End, End, int, int, bytes] | None:
@@ -111,6 +135,11 @@ def _segment(link: int, packet: bytes) -> tuple[End, End, int, int, bytes] | Non
             return None
     ip = packet[skip:]
     try:
+        if ip[:1] == _NO_OPTIONS:
+            size, protocol, source, target, source_port, target_port, sequence, offset, flags = _PLAIN(ip)
+            data = ip[IPV4_BYTES + (offset >> 4) * 4 : size or None]
+            found = (source, source_port), (target, target_port), sequence, flags, data
+            return found if protocol == TCP and not 0 < size < _LEAST_BYTES else None
         if ip[:1] and ip[0] >> 4 == 4:
             header, size, protocol = (ip[0] & 15) * 4, int.from_bytes(ip[2:4], "big"), ip[9]
             source, target, tcp = ip[12:16], ip[16:20], ip[header : size or None]

@@ -12,7 +12,8 @@ from p2os.capture import ListingRow, Reading, Source, open_file, rows_of
 from p2os.capture.chunks import Block, chunks_of
 from p2os.capture.formats.arrow_files import write_arrow, write_parquet
 from p2os.capture.formats.mcap_files import write_mcap
-from p2os.capture.table import Table, from_robot, tables_of, write_csv
+from p2os.capture.sips import sips_of
+from p2os.capture.table import Table, tables_of, tables_of_sips, write_csv
 from p2os.cli.captures.reading import ProfileForLayouts, RobotForUnits, chosen_rows, reading_of, wanted_names
 from p2os.cli.help_pages import CAPTURES
 from p2os.cli.kept_files import FORCE_HELP, refuse_to_overwrite
@@ -91,13 +92,13 @@ def _tables(capture: Source, blocks: Iterator[Block], reading: Reading, only: st
                 pass
             else:
                 return sip_tables(blocks, reading)
+    if not wanted_names(only):
+        return tables_of_sips(sips_of(blocks, reading), reading)
     return tables_of(_chosen(blocks, reading, only), reading)
 
 
 def _chosen(blocks: Iterable[Block], reading: Reading, only: str) -> Iterable[ListingRow]:
     wanted = wanted_names(only)
-    if not wanted:
-        return from_robot(rows_of(chunks_of(blocks), reading))
     if "all" in wanted:
         return rows_of(chunks_of(blocks), reading)
     return chosen_rows(blocks, reading, wanted - {"damaged"})

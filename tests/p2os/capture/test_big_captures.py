@@ -10,7 +10,8 @@ import pytest
 from p2os.capture import Chunk, Direction, Reading, open_capture, rows_of, write_pcap
 from p2os.capture.chunks import block_of_chunks, capture_of
 from p2os.capture.formats.sources import BLOCK_BYTES
-from p2os.capture.table import FIRST_ROWS, Table, from_robot, tables_of, write_csv
+from p2os.capture.sips import sips_of
+from p2os.capture.table import FIRST_ROWS, Table, tables_of_sips, write_csv
 from p2os.cli.captures.reading import LOOKED_AT_BYTES, reading_of
 from p2os.cli.main import run
 from p2os.protocol.packets import SonarReading, StandardSip, packet_frame
@@ -84,7 +85,7 @@ def test_tables_come_while_chunks_are_read(by_columns: bool) -> None:
         blocks = (block_of_chunks([chunk]) for chunk in chunks_of(count, taken))
         tables = sip_tables(blocks, P2DX, block=FIRST_ROWS * len(SIP))
     else:
-        tables = tables_of(from_robot(rows_of(chunks_of(count, taken), P2DX)), P2DX)
+        tables = tables_of_sips(sips_of((block_of_chunks([chunk]) for chunk in chunks_of(count, taken)), P2DX), P2DX)
     seen = [(table.rows, taken[0]) for table in tables]
     # Never more than the table in hand, one behind it, and what is not decided yet.
     passed = 0
@@ -96,7 +97,7 @@ def test_tables_come_while_chunks_are_read(by_columns: bool) -> None:
 
 def late(first: bytes = SIP) -> list[Table]:
     chunks = capture_of([(0, Direction.FROM_ROBOT, data) for data in (first, SIP, LATE)])
-    return list(tables_of(from_robot(rows_of(chunks, P2DX)), P2DX, 2))
+    return list(tables_of_sips(sips_of([block_of_chunks(chunks)], P2DX), P2DX, 2))
 
 
 def test_a_cell_whose_column_the_beginning_did_not_have_stands_in_one_more() -> None:

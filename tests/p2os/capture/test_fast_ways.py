@@ -44,7 +44,7 @@ def both_ways(chunks: list[Chunk]) -> None:
     fast = shown(chunks)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Decoder, "take_back", lambda _: None)
-        patch.setattr("p2os.capture.listing._next_header", lambda data, _: len(data))
+        patch.setattr("p2os.capture.listing.next_header", lambda data, _: len(data))
         assert fast == shown(chunks)
         patch.undo()
         for least, together, wanted in [(*how, wanted) for how in HOW for wanted in WANTED]:

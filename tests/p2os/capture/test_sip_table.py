@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Iterable
 from pathlib import Path
+from typing import cast
 
 import pytest
 from hypothesis import given, settings
@@ -14,12 +15,13 @@ from p2os.capture import Reading, read_file, rows_of
 from p2os.capture.cells import Cell
 from p2os.capture.chunks import Capture, Chunk, Direction, block_of_chunks, capture_of
 from p2os.capture.columns.sip_table import sip_tables
-from p2os.capture.table import Table, from_robot, tables_of
+from p2os.capture.sips import sips_of
+from p2os.capture.table import LEADING, Table, tables_of, tables_of_sips
 from p2os.cli.main import run
 from p2os.protocol.packets import EncoderPacket, SonarReading, StandardSip, packet_frame
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import load_parameters
-from simbase.timing import NS_PER_MS, Nanos
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 from tests.p2os.protocol.packet_strategies import PACKETS, SIPS
 
 GOLDEN = Path(__file__).parents[2] / "golden"
@@ -45,7 +47,16 @@ def same(
     blocks = [block_of_chunks(chunks[place : place + together]) for place in range(0, len(chunks), together)]
     blocks = [block for block in blocks if len(block)]
     ours = joined(sip_tables(blocks, reading, first_rows=first_rows, block=block))
-    theirs = joined(tables_of(from_robot(rows_of(capture, reading)), reading, first_rows))
+    rows = [row for row in rows_of(capture, reading) if row.direction is not CLIENT and row.is_sip]
+    theirs = joined(tables_of(rows, reading, first_rows))
+    assert joined(tables_of_sips(sips_of(blocks, reading), reading, first_rows)) == theirs
+    for number, row in enumerate(rows if len(rows) <= first_rows else []):
+        plain = {**row.as_plain(), "t_s": row.at_ns / NS_PER_S, "dir": ROBOT.value}
+        assert [theirs[name][number] for name in LEADING] == [plain[name] for name in LEADING]
+        said = {name: value for name, value in row.fields.items() if name not in {"x_m", "y_m", "sonar_m"}}
+        said |= {f"sonar_m_{place}": value for place, value in cast("dict[str, float]", row.fields["sonar_m"]).items()}
+        cells = {name: column[number] for name, column in theirs.items() if name not in {*LEADING, "x_m", "y_m"}}
+        assert {name: cell for name, cell in cells.items() if cell is not None} == said
     assert list(ours) == list(theirs)
     assert ours == theirs
     assert [[type(cell) for cell in column] for column in ours.values()] == [
@@ -126,7 +137,7 @@ def exported(target: Path) -> str:
 def test_export_writes_the_same_file_by_columns_and_by_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     by_hand = exported(tmp_path / "rows.csv")
     monkeypatch.setattr("p2os.cli.captures.export.LARGE_BYTES", 0)
-    monkeypatch.setattr("p2os.cli.captures.export.tables_of", None)
+    monkeypatch.setattr("p2os.cli.captures.export.tables_of_sips", None)
     assert exported(tmp_path / "columns.csv") == by_hand
 
 
