@@ -126,6 +126,7 @@ class Outputs(Stateful):
     """Writes levels to the pins, each change once."""
 
     STATE = ("_shown",)
+    DERIVED = ("_counts",)
 
     def __init__(self, pins: PinBank, pinout: Pinout) -> None:
         self._pins = pins
@@ -135,9 +136,12 @@ class Outputs(Stateful):
         )
         self._shown: dict[str, bool | None] = {wire.name: None for wire in self._distances}
         self._shown.update((wire.name, None) for wires in self._encoders for wire in wires)
+        #: The counts whose codes the encoders' wires show; None: not known.
+        self._counts: tuple[int, int] | None = None
 
     def release(self, now: Nanos) -> None:
         """Let every output follow its pull."""
+        self._counts = None
         for name in self._shown:
             self._write(name, None, now)
 
@@ -154,6 +158,9 @@ class Outputs(Stateful):
 
     def show_encoders(self, counts: tuple[int, int], now: Nanos) -> None:
         """Drive both encoders' codes, left first."""
+        if counts == self._counts:
+            return
+        self._counts = counts
         for wires, count in zip(self._encoders, counts, strict=True):
             for bit, wire in enumerate(wires):
                 self._write(wire.name, bool(count >> bit & 1), now)
@@ -162,6 +169,9 @@ class Outputs(Stateful):
     def levels(self) -> dict[str, bool | None]:
         """Return what each output shows; None is released."""
         return dict(self._shown)
+
+    def _restored(self) -> None:
+        self._counts = None
 
     def _write(self, name: str, level: bool | None, now: Nanos) -> None:
         if self._shown[name] is not level:

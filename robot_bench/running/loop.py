@@ -93,6 +93,7 @@ class RunLoop(Stateful):
     ) -> None:
         self.leader = leader
         self.followers = (*followers, *observers)
+        self._asks = tuple(part.next_deadline for part in self.followers)
         self._count = len(followers)
         #: The longest that the leader runs without giving control back; whoever wants it may set it at any time.
         self.slice_ns = slice_ns
@@ -194,7 +195,7 @@ class RunLoop(Stateful):
 
     def _next_due(self) -> Nanos:
         """Return the earliest deadline, and note those of all, and the earliest of those that the leader stops for."""
-        noted = self._deadlines = [NEVER if (at := part.next_deadline()) is None else at for part in self.followers]
+        noted = self._deadlines = [NEVER if (at := ask()) is None else at for ask in self._asks]
         self._limit = min(noted[: self._count], default=NEVER)
         due = min(noted, default=NEVER)
         return min(due, self._edges[0]) if self._edges else due

@@ -177,7 +177,15 @@ def polled(folder: Path) -> None:
 def build_library(folder: Path) -> Path:
     """Return the emulator's library with the device of this bench in it."""
     out = folder / "native.so"
-    flags = ["-shared", "-fPIC", "-std=c11", "-O2", "-fno-semantic-interposition", f"-I{SOURCES[0].parent}"]
+    flags = [
+        "-shared",
+        "-fPIC",
+        "-std=c11",
+        "-O2",
+        "-fno-semantic-interposition",
+        "-flto=auto",
+        f"-I{SOURCES[0].parent}",
+    ]
     subprocess.run(["gcc", *flags, *map(str, SOURCES), str(HERE / "mover.c"), "-o", str(out)], check=True)
     return out
 

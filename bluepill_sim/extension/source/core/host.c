@@ -47,6 +47,39 @@ static uint32_t set_irq(void *user, uint32_t irq, uint32_t level)
     return s->enabled >> irq & 1;
 }
 
+static bool write_register_of(struct page *page, uint32_t index, struct bus_access *access)
+{
+    const uint32_t behaviour = page->behaviour[index];
+    if (!(behaviour & (WRITES_PLAIN | WRITES_NATIVE))) {
+        return false;
+    }
+    if (access->bytes != 4) { /* the APB bridge duplicates what is narrower: RM0008 13.3.4 */
+        if (!(behaviour & DUPLICATES)) {
+            return false;
+        }
+        access->word = (access->word & (access->bytes == 1 ? 0xFF : 0xFFFF)) * (access->bytes == 1 ? 0x01010101u : 0x10001u);
+    }
+    const uint32_t previous = store(page, index, access->word);
+    if (behaviour & WRITES_NATIVE) {
+        page->device->kind->write(page->device, index, access->word, previous);
+    }
+    return true;
+}
+
+static bool read_register_of(struct page *page, uint32_t index, struct bus_access *access)
+{
+    const uint32_t behaviour = page->behaviour[index];
+    if (!(behaviour & (READS_PLAIN | READS_NATIVE))) {
+        return false;
+    }
+    const uint32_t word = behaviour & READS_NATIVE ? page->device->kind->read(page->device, index) : page->words[index];
+    if (behaviour >> LATCH_SHIFT) {
+        page->words[behaviour >> LATCH_SHIFT] = word;
+    }
+    access->word = access->bytes == 4 ? word : word >> (access->address & 3) * 8 & ((1u << access->bytes * 8) - 1);
+    return true;
+}
+
 /* A register of a device in C, for a bus master; false where Python has to answer, as `open_page` of access.c. */
 static bool registers(void *user, struct bus_access *access)
 {
@@ -60,37 +93,11 @@ static bool registers(void *user, struct bus_access *access)
         access->is_error = true;
         return true;
     }
-    const struct device_kind *kind = page->device->kind;
-    const uint32_t behaviour = page->behaviour[index];
     const uint64_t now = now_ns(core->fabric);
-    if (core->fabric->slots[page->device->slot].ns <= now) {
+    if (UNLIKELY(core->fabric->slots[page->device->slot].ns <= now)) {
         fabric_catch_up(core->fabric, page->device->slot, now);
     }
-    if (access->is_write) {
-        if (!(behaviour & (WRITES_PLAIN | WRITES_NATIVE))) {
-            return false;
-        }
-        if (access->bytes != 4) { /* the APB bridge duplicates what is narrower: RM0008 13.3.4 */
-            if (!(behaviour & DUPLICATES)) {
-                return false;
-            }
-            access->word = (access->word & (access->bytes == 1 ? 0xFF : 0xFFFF)) * (access->bytes == 1 ? 0x01010101u : 0x10001u);
-        }
-        const uint32_t previous = store(page, index, access->word);
-        if (behaviour & WRITES_NATIVE) {
-            kind->write(page->device, index, access->word, previous);
-        }
-        return true;
-    }
-    if (!(behaviour & (READS_PLAIN | READS_NATIVE))) {
-        return false;
-    }
-    const uint32_t word = behaviour & READS_NATIVE ? kind->read(page->device, index) : page->words[index];
-    if (behaviour >> LATCH_SHIFT) {
-        page->words[behaviour >> LATCH_SHIFT] = word;
-    }
-    access->word = access->bytes == 4 ? word : word >> (offset & 3) * 8 & ((1u << access->bytes * 8) - 1);
-    return true;
+    return access->is_write ? write_register_of(page, index, access) : read_register_of(page, index, access);
 }
 
 static bool holds_code(void *user, uint32_t address, uint32_t bytes)

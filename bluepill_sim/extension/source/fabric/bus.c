@@ -29,6 +29,16 @@ bool is_memory(const struct fabric *fabric, uint32_t address, bool is_write)
     return false;
 }
 
+/* As memcpy of a word, or of less, without its call. */
+static inline void copy(void *to, const void *from, uint32_t bytes)
+{
+    if (bytes == 4) {
+        memcpy(to, from, 4);
+    } else {
+        memcpy(to, from, bytes);
+    }
+}
+
 static bool reach_memory(struct fabric *fabric, struct bus_access *access)
 {
     for (uint32_t n = fabric->memory_count; n-- > 0;) { /* mostly it is SRAM, the last one */
@@ -39,11 +49,11 @@ static bool reach_memory(struct fabric *fabric, struct bus_access *access)
         }
         if (!access->is_write) {
             access->word = 0;
-            memcpy(&access->word, memory->bytes + at, access->bytes);
+            copy(&access->word, memory->bytes + at, access->bytes);
             return true;
         }
         const struct host *host = &fabric->host;
-        memcpy(memory->bytes + at, &access->word, access->bytes);
+        copy(memory->bytes + at, &access->word, access->bytes);
         if (host->holds_code == NULL || host->holds_code(host->user, access->address, access->bytes)) {
             fabric->calls.code_written(access->address, access->bytes);
         }

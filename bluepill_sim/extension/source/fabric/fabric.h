@@ -187,6 +187,7 @@ struct time_base {
     uint64_t ns, cycle;
     uint32_t hz;
     uint64_t most_s; /* seconds whose cycles are a number */
+    uint64_t second_ns, second_cycle; /* the whole second since then that was worked out last */
 };
 
 /* A register that reads what a ramp of time is: a loop that polls it is worked out (`core/polling.c`). */

@@ -5,9 +5,18 @@
  */
 #include "fabric.h"
 
-static uint64_t cycle_at(const struct fabric *fabric, uint64_t ns)
+/* The first cycle that begins at or after a time within the second that was worked out last. */
+static uint64_t cycle_within(const struct time_base *time, uint64_t ns)
 {
-    const struct time_base *time = &fabric->time;
+    return time->second_cycle + ((ns - time->second_ns) * time->hz + NS_PER_S - 1) / NS_PER_S;
+}
+
+static uint64_t cycle_at(struct fabric *fabric, uint64_t ns)
+{
+    struct time_base *time = &fabric->time;
+    if (ns - time->second_ns < NS_PER_S) {
+        return cycle_within(time, ns);
+    }
     if (ns == NO_TIME) {
         return NO_TIME;
     }
@@ -15,11 +24,13 @@ static uint64_t cycle_at(const struct fabric *fabric, uint64_t ns)
         const __uint128_t back = (__uint128_t)(time->ns - ns) * time->hz / NS_PER_S;
         return back > time->cycle ? 0 : time->cycle - (uint64_t)back;
     }
-    const uint64_t span = ns - time->ns, seconds = span / NS_PER_S;
+    const uint64_t seconds = (ns - time->ns) / NS_PER_S;
     if (seconds > time->most_s) {
         return NO_TIME / 4;
     }
-    return time->cycle + seconds * time->hz + (span % NS_PER_S * time->hz + NS_PER_S - 1) / NS_PER_S;
+    time->second_ns = time->ns + seconds * NS_PER_S;
+    time->second_cycle = time->cycle + seconds * time->hz;
+    return cycle_within(time, ns);
 }
 
 static void find_first(struct fabric *fabric)
@@ -34,6 +45,10 @@ static void put_in_order(struct fabric *fabric, uint32_t number, uint64_t before
     uint8_t *order = fabric->order;
     const uint64_t ns = slots[number].ns;
     uint32_t at = 0;
+    if (fabric->ordered == 1 && order[0] == number && before != NO_TIME) {
+        fabric->ordered = ns != NO_TIME;
+        return;
+    }
     if (before != NO_TIME) {
         while (order[at] != number) {
             ++at;
@@ -198,7 +213,7 @@ void fabric_set_time(struct fabric *fabric, uint64_t ns, uint64_t cycle, uint32_
 {
     fabric->last_output_ns = fabric_last_output(fabric);
     fabric->last_output = NO_TIME;
-    fabric->time = (struct time_base){ns, cycle, hz, NO_TIME / 8 / hz};
+    fabric->time = (struct time_base){ns, cycle, hz, NO_TIME / 8 / hz, ns, cycle};
     for (uint32_t n = 0; n < fabric->ordered; ++n) {
         struct slot *slot = &fabric->slots[fabric->order[n]];
         slot->cycle = cycle_at(fabric, slot->ns);
