@@ -17,6 +17,7 @@ from bluepill_sim.fabric.fabric import Fabric, FabricPorts
 from bluepill_sim.fabric.pins import PinBank
 from bluepill_sim.fabric.ports import ChipPorts
 from bluepill_sim.fabric.registers import ClockBit, Peripheral, Place
+from bluepill_sim.peripherals import flash
 from bluepill_sim.peripherals.adc import Adc, Adc2
 from bluepill_sim.peripherals.afio import Afio
 from bluepill_sim.peripherals.bkp import Bkp
@@ -38,7 +39,7 @@ from bluepill_sim.peripherals.usb import Usb
 from bluepill_sim.peripherals.wwdg import Wwdg
 from simbase.state import Stateful
 
-FLASH_BASE = 0x0800_0000
+FLASH_BASE = flash.FLASH_BASE
 #: The C8 is sold with 64 KiB and carries 128 KiB; programs that use the upper half run on most boards.
 FLASH_BYTES = 64 * 1024
 FLASH_BYTES_FITTED = 128 * 1024

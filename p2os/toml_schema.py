@@ -169,7 +169,7 @@ def filled(table: Table, keys: Sequence[Key], where: Where) -> dict[str, Any]:
 
 
 @contextmanager
-def placed(where: Place, key: str = "") -> Iterator[None]:
+def placed(where: Where, key: str = "") -> Iterator[None]:
     """Put the place of a key, or of its table, before what is raised about its value.
 
     Raises:
@@ -180,7 +180,8 @@ def placed(where: Place, key: str = "") -> Iterator[None]:
     except MissingDependencyError:
         raise
     except P2osError as error:
-        raise where.error(f"{where.at(key)}: {error}", hint=error.hint) from error
+        made = ScenarioError if isinstance(where, str) else where.error
+        raise made(f"{_at(where, key)}: {error}", hint=error.hint) from error
 
 
 def _check_value(value: object, key: Key, where: str, error: type[FileError]) -> None:

@@ -554,7 +554,7 @@ class Engine(Stateful):
         if access == FETCH_PROTECTED and (memory := self._blocks.writable_at(address)) is not None:
             self._core.allow_execution(memory[0], memory[1] - memory[0])
             return True
-        self._halt = Halt(_kind_of_bad_access(access), self.registers[Register.PC], address)
+        self._halt = Halt(_BAD_ACCESSES.get(access, HaltKind.READ_ERROR), self.registers[Register.PC], address)
         return False
 
     def _let_fail(self, access: int, address: int, size: int) -> None:
@@ -647,11 +647,6 @@ def _kind_of_interrupt(number: int, pc: int) -> HaltKind:
     if kind is HaltKind.EXECUTE_NEVER and pc >= FIRST_EXCEPTION_RETURN:
         return HaltKind.EXCEPTION_RETURN
     return kind
-
-
-def _kind_of_bad_access(access: int) -> HaltKind:
-    """Return what an access to no memory, or against its protection, is."""
-    return _BAD_ACCESSES.get(access, HaltKind.READ_ERROR)
 
 
 def _kind_of_invalid(block: Block, pc: int, *, is_thumb: bool) -> HaltKind | None:

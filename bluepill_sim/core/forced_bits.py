@@ -18,10 +18,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
+from bluepill_sim.stm32f103 import SRAM_BASE
+
 _WORD = 0xFFFF_FFFF
 _PC = 15
-#: Where memory begins that a program changes without a word to anyone.
-_SRAM = 0x2000_0000
 _FIRST_WIDE = 0xE800
 #: chosen: how many blocks stay decoded; a program has a few stores to CRL and CRH, some of them in loops.
 _BLOCKS = 256
@@ -138,7 +138,7 @@ class _Walk:
 
     def _loaded(self, address: int, data: bytes) -> int:
         value = int.from_bytes(data, "little")
-        if address >= _SRAM:  # what is below is flash: code
+        if address >= SRAM_BASE:  # what a program changes without a word to anyone; below is flash: code
             self.seen[address] = value
         return value
 

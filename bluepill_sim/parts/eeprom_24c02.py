@@ -54,7 +54,6 @@ class Eeprom24C02(Stateful):
 
     def write(self, byte: int, at_ns: Nanos) -> bool:
         """Take the address in the memory, then what goes there."""
-        del at_ns
         if not self._has_word:
             self._at, self._has_word = byte, True
             return True
@@ -64,7 +63,6 @@ class Eeprom24C02(Stateful):
 
     def read(self, at_ns: Nanos) -> int:
         """Return the next byte."""
-        del at_ns
         byte = self.memory[self._at]
         self._at = (self._at + 1) % SIZE_BYTES
         return byte

@@ -175,7 +175,6 @@ class Mpu6050(Stateful):
 
     def start(self, address: int, is_read: bool, at_ns: Nanos) -> bool:
         """Acknowledge its address; a burst reads one sample."""
-        del at_ns
         self._has_pointer = is_read
         if is_read:
             self._shadow = self._sample

@@ -13,7 +13,10 @@ Invariant: blocks that nobody wrote are those of the image.
 
 """
 
+from binascii import crc_hqx
 from collections import deque
+from collections.abc import Callable, Mapping
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import ClassVar
@@ -43,36 +46,19 @@ _SCR = bytes((0x02, 0x25, 0x80, 0x00, 0, 0, 0, 0))
 _SD_STATUS = bytes(64)
 
 
-def _table(polynomial: int, bits: int) -> tuple[int, ...]:
-    """Return what a byte makes of a CRC, by the byte."""
-    top, mask, found = 1 << bits - 1, (1 << bits) - 1, []
-    for byte in range(256):
-        crc = byte << bits - 8
-        for _ in range(8):
-            crc = (crc << 1 ^ (polynomial if crc & top else 0)) & mask
-        found.append(crc)
-    return tuple(found)
-
-
-_CRC16 = _table(0x1021, 16)
-#: x^7 + x^3 + 1, one bit up, so that a byte goes through at once.
-_CRC7 = _table(0x09 << 1, 8)
-
-
 def crc7(data: bytes) -> int:
-    """Return the CRC of a command, with its end bit."""
+    """Return the CRC of a command, x^7 + x^3 + 1, with its end bit."""
     crc = 0
     for byte in data:
-        crc = _CRC7[crc ^ byte]
+        crc ^= byte
+        for _ in range(8):
+            crc = (crc << 1 ^ (0x12 if crc & 0x80 else 0)) & 0xFF
     return crc | 1
 
 
 def crc16(data: bytes) -> int:
     """Return the CRC of a block."""
-    crc = 0
-    for byte in data:
-        crc = (crc << 8 & 0xFF00) ^ _CRC16[crc >> 8 ^ byte]
-    return crc
+    return crc_hqx(data, 0)
 
 
 #: Commands that a card knows before its initialization has ended (section 7.3.1.3).
@@ -158,12 +144,10 @@ class SdCard(Stateful):
 
     def select(self, at_ns: Nanos) -> None:
         """Await a command."""
-        del at_ns
         self._command.clear()
 
     def deselect(self, at_ns: Nanos) -> None:
         """Drop an unfinished command; what is busy goes on."""
-        del at_ns
         self._command.clear()
 
     def exchange(self, byte: int, at_ns: Nanos) -> int:
@@ -276,11 +260,9 @@ class SdCard(Stateful):
         self._out.extend(more)
 
     def _send_if_cond(self, argument: int, at_ns: Nanos) -> None:
-        del at_ns
         self._reply(more=bytes((0, 0, argument >> 8 & 0x0F if argument >> 8 & 0x0F == 1 else 0, argument & 0xFF)))
 
     def _send_csd(self, argument: int, at_ns: Nanos) -> None:
-        del argument, at_ns
         size = self._blocks * BLOCK_BYTES // CAPACITY_BYTES - 1
         csd = bytes((0x40, 0x0E, 0, 0x32, 0x5B, 0x59, 0, size >> 16 & 0x3F, size >> 8 & 0xFF, size & 0xFF))
         csd += bytes((0x7F, 0x80, 0x0A, 0x40, 0x00))
@@ -288,24 +270,20 @@ class SdCard(Stateful):
         self._queue_data(csd + bytes((crc7(csd),)))
 
     def _send_cid(self, argument: int, at_ns: Nanos) -> None:
-        del argument, at_ns
         cid = b"\x00P2" + b"BENCH" + bytes((0x10, 0, 0, 0, 1, 0x01, 0xA1))
         self._reply()
         self._queue_data(cid + bytes((crc7(cid),)))
 
     def _stop(self, argument: int, at_ns: Nanos) -> None:
-        del argument
         self._due_ns = self._block = None
         self._out.append(0xFF)
         self._reply()
         self._busy_until_ns = at_ns
 
     def _send_status(self, argument: int, at_ns: Nanos) -> None:
-        del argument, at_ns
         self._reply(more=b"\0")
 
     def _set_length(self, argument: int, at_ns: Nanos) -> None:
-        del at_ns
         self._reply(0 if argument == BLOCK_BYTES else PARAMETER_ERROR)
 
     def _read(self, argument: int, at_ns: Nanos, *, is_multiple: bool = False) -> None:
@@ -315,11 +293,7 @@ class SdCard(Stateful):
         self._reply()
         self._block, self._is_multiple, self._due_ns = argument, is_multiple, at_ns + READ_NS
 
-    def _read_many(self, argument: int, at_ns: Nanos) -> None:
-        self._read(argument, at_ns, is_multiple=True)
-
     def _write(self, argument: int, at_ns: Nanos, *, is_multiple: bool = False) -> None:
-        del at_ns
         if argument >= self._blocks:
             self._reply(ADDRESS_ERROR)
             return
@@ -327,21 +301,15 @@ class SdCard(Stateful):
         self._block, self._is_multiple, self._well_written = argument, is_multiple, 0
         self._taken, self._wants_token = bytearray(), True
 
-    def _write_many(self, argument: int, at_ns: Nanos) -> None:
-        self._write(argument, at_ns, is_multiple=True)
-
     def _erase_from(self, argument: int, at_ns: Nanos) -> None:
-        del at_ns
         self._erase = (argument, self._erase[1])
         self._reply(0 if argument < self._blocks else ADDRESS_ERROR)
 
     def _erase_to(self, argument: int, at_ns: Nanos) -> None:
-        del at_ns
         self._erase = (self._erase[0], argument)
         self._reply(0 if argument < self._blocks else ADDRESS_ERROR)
 
     def _erase_now(self, argument: int, at_ns: Nanos) -> None:
-        del argument
         first, last = self._erase
         for number in range(first, min(last, self._blocks - 1) + 1):
             self.written[number] = bytes(BLOCK_BYTES)
@@ -349,17 +317,14 @@ class SdCard(Stateful):
         self._busy_until_ns = at_ns + WRITE_NS
 
     def _next_is_app(self, argument: int, at_ns: Nanos) -> None:
-        del argument, at_ns
         self._is_app = True
         self._reply()
 
     def _read_ocr(self, argument: int, at_ns: Nanos) -> None:
-        del argument, at_ns
         ocr = _OCR_VOLTS | (0 if self._is_idle else _OCR_READY | _OCR_HIGH)
         self._reply(more=ocr.to_bytes(4, "big"))
 
     def _set_crc(self, argument: int, at_ns: Nanos) -> None:
-        del at_ns
         self._checks_crc = bool(argument & 1)
         self._reply()
 
@@ -371,28 +336,25 @@ class SdCard(Stateful):
         self._reply()
 
     def _send_sd_status(self, argument: int, at_ns: Nanos) -> None:
-        del argument, at_ns
         self._reply(more=b"\0")
         self._queue_data(_SD_STATUS)
 
     def _send_scr(self, argument: int, at_ns: Nanos) -> None:
-        del argument, at_ns
         self._reply()
         self._queue_data(_SCR)
 
     def _count_written(self, argument: int, at_ns: Nanos) -> None:
-        del argument, at_ns
         self._reply()
         self._queue_data(self._well_written.to_bytes(4, "big"))
 
     def _acknowledge(self, argument: int, at_ns: Nanos) -> None:
-        del argument, at_ns
         self._reply()
 
     #: What a command does, by its number; of applications, behind CMD55.
-    _COMMANDS: ClassVar = {
+    _COMMANDS: ClassVar[Mapping[int, Callable[..., None]]] = {
         8: _send_if_cond, 9: _send_csd, 10: _send_cid, 12: _stop, 13: _send_status,
-        16: _set_length, 17: _read, 18: _read_many, 24: _write, 25: _write_many,
+        16: _set_length, 17: _read, 18: partial(_read, is_multiple=True),
+        24: _write, 25: partial(_write, is_multiple=True),
         32: _erase_from, 33: _erase_to, 38: _erase_now, 55: _next_is_app,
         58: _read_ocr, 59: _set_crc,
     }  # fmt: skip

@@ -80,7 +80,6 @@ class SpiFlash(Stateful):
 
     def select(self, at_ns: Nanos) -> None:
         """Begin a command."""
-        del at_ns
         self._head.clear()
         self._count = 0
         self._is_answering = False

@@ -107,13 +107,11 @@ class Ssd1306(Stateful):
 
     def start(self, address: int, is_read: bool, at_ns: Nanos) -> bool:
         """Acknowledge its address; a control byte is next."""
-        del is_read, at_ns
         self._control = None
         return address == self._address and not self._is_reset
 
     def write(self, byte: int, at_ns: Nanos) -> bool:
         """Take a control byte, or what follows it."""
-        del at_ns
         if self._control is None:
             self._control = byte
             return True
@@ -124,12 +122,10 @@ class Ssd1306(Stateful):
 
     def read(self, at_ns: Nanos) -> int:
         """Return the status."""
-        del at_ns
         return 0 if self.is_on else _OFF
 
     def stop(self, at_ns: Nanos) -> None:
         """End what a control byte began."""
-        del at_ns
         self._control = None
 
     # SPI.
@@ -142,7 +138,6 @@ class Ssd1306(Stateful):
 
     def exchange(self, byte: int, at_ns: Nanos) -> int:
         """Take a byte as what D/C# says at its last bit; nothing comes back."""
-        del at_ns
         if self._socket is not None and not self._is_reset:
             self._take(byte, is_data=self._socket.pin("dc").level)
         return 0xFF

@@ -181,11 +181,6 @@ class I2c(Peripheral):
 
     # From outside the chip.
 
-    @property
-    def pin_names(self) -> tuple[str, str, str]:
-        """SCL, SDA and SMBA."""
-        return self._pin_names
-
     def attach(self, device: I2cDevice) -> None:
         """Hang a part on the bus, with the pull-ups that a bus has."""
         self._hung.append(device)

@@ -152,11 +152,6 @@ class Spi(Peripheral):
     # From outside the chip.
 
     @property
-    def pin_names(self) -> tuple[str, str, str, str]:
-        """MISO, MOSI, NSS and SCK."""
-        return self._pin_names
-
-    @property
     def bit_hz(self) -> int:
         """Bits a second of the chip as the master."""
         hz: int = self.native.clock_hz >> (self.words[CR1] >> _BR_AT & 7) + 1

@@ -258,7 +258,7 @@ class Usart(Peripheral):
             if self.far_baud is not None and brr:
                 found = [(one, at) for word, at in rows for one in self._as_heard(word, clock_hz, brr, how)]
                 rows = Characters([one for one, _ in found], [at for _, at in found], rows.bit_ns)  # noqa: PLW2901
-            mask = _data_mask(how)
+            mask = int((1 << _data_bits(how) - bool(how & PCE)) - 1)
             if rows and max(rows.words) > mask:
                 rows = Characters([word & mask for word in rows.words], rows.times, rows.bit_ns)  # noqa: PLW2901
             for sink in self.sinks if rows else ():
@@ -403,11 +403,6 @@ def _runs(sent: bytes) -> Iterator[tuple[tuple[int, int, int], Characters]]:
 def _data_bits(control: int) -> int:
     """Return how many bits stand between start and stop, a parity among them, by CR1."""
     return 9 if control & M else 8
-
-
-def _data_mask(control: int) -> int:
-    """Return which bits of a character are data, by CR1."""
-    return int((1 << _data_bits(control) - bool(control & PCE)) - 1)
 
 
 def _with_parity(word: int, control: int) -> int:

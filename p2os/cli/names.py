@@ -34,8 +34,9 @@ def bodies(incomplete: str) -> list[str]:
 def urls(incomplete: str) -> list[str]:
     """Return the serial ports that are there, and what other URLs begin with."""
     from p2os.transport.serial_port import list_serial_ports
+    from p2os.transport.url import DEFAULT_URL
 
-    found = [*(port["url"] for port in list_serial_ports()), "tcp:127.0.0.1:8101", *SCHEMES]
+    found = [*(port["url"] for port in list_serial_ports()), DEFAULT_URL, *SCHEMES]
     return [url for url in found if url.startswith(incomplete)]
 
 

@@ -15,6 +15,8 @@ from simbase.errors import UsageError
 #: The port on which simulated Pioneers have always listened; ARIA tries it first.
 DEFAULT_TCP_PORT = 8101
 LOOPBACK = "127.0.0.1"
+#: Where the first served robot is found when nothing else is given.
+DEFAULT_URL = f"tcp:{LOOPBACK}:{DEFAULT_TCP_PORT}"
 
 #: "10.0.0.5:8101", "robot.local:8101"; a word alone may be anything.
 _HOST_AND_PORT = re.compile(r"[\w.-]+:\d{1,5}|\d{1,3}(?:\.\d{1,3}){3}|localhost")

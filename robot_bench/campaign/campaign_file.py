@@ -27,7 +27,7 @@ from typing import Any, cast
 from p2os.errors import ScenarioError
 from p2os.pioneer.world import load_world
 from p2os.toml_file import TomlSource, is_file, read_toml, read_user_text
-from p2os.toml_schema import LONGEST_S, Key, Place, Table, Where, check_table, within
+from p2os.toml_schema import LONGEST_S, Key, Place, Table, Where, check_table, placed, within
 from robot_bench.campaign.search import SEARCHES
 from robot_bench.campaign.things import KINDS
 from robot_bench.campaign.trial import Trial, trial_of, unpacked
@@ -299,10 +299,8 @@ def _trial(table: Table, path: Path, where: Place, firmware: Path | None) -> Tri
         firmware = path.parent / str(table["firmware"])
         if not is_file(firmware):
             raise ScenarioError(f"{where.at('firmware')}: there is no file {shown(str(table['firmware']))} beside it")
-    try:
+    with placed(where, "scenario"):
         trial = trial_of(str(beside) if is_file(beside) else name, firmware=firmware)
-    except (ScenarioError, UsageError) as error:
-        raise ScenarioError(f"{where.at('scenario')}: {error}", hint=error.hint) from error
     return trial.with_lists(goal=cast("list[Table]", table["goal"])) if "goal" in table else trial
 
 
@@ -338,11 +336,8 @@ def _scenario(trial: Trial, where: str) -> Scenario:
     Raises:
         ScenarioError: It cannot be; the message has `where` before it.
     """
-    try:
-        with unpacked(trial.files) as folder:
-            return trial.scenario(folder)
-    except ScenarioError as error:
-        raise ScenarioError(f"{where}: {error}", hint=error.hint) from error
+    with placed(where), unpacked(trial.files) as folder:
+        return trial.scenario(folder)
 
 
 def _leaves(table: object, above: str, where: Where) -> Iterator[tuple[str, object, str]]:

@@ -5,12 +5,14 @@ Elsewhere: nothing. A signal ends the run between two slices, so that the robot
 is stopped and the run folder complete.
 """
 
+import contextlib
 import sys
+from collections.abc import Callable, Iterator
 from types import TracebackType
 from typing import Self
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn
 from rich.text import Text
 
 from p2os.cli.signals import postponed
@@ -81,3 +83,23 @@ class RunDisplay:
             KeyboardInterrupt: One does; its argument is the signal's name.
         """
         self._signals.raise_due()
+
+
+@contextlib.contextmanager
+def runs_bar(count: int) -> Iterator[Callable[..., None]]:
+    """Show on a terminal how many runs have ended; yield what is told of each."""
+    bar = Progress(
+        TextColumn("runs"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[failed]}"),
+        console=Console(stderr=True), transient=True, auto_refresh=False, disable=not sys.stderr.isatty(),
+    )  # fmt: skip
+    failed = 0
+
+    def advance(*, passed: bool = True) -> None:
+        nonlocal failed
+        failed += not passed
+        bar.update(task, advance=1, failed=f"{failed} failed" if failed else "", refresh=True)
+
+    with bar:
+        task = bar.add_task("", total=count, failed="")
+        bar.refresh()
+        yield advance

@@ -84,7 +84,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
             axes.append([(option, value) for value in values])
     if axes:
         rows = [dict(row) for row in itertools.product(*axes)]
-        ids = ["-".join(_identifier(value) for value in row.values()) for row in rows]
+        ids = ["-".join(Path(str(value)).name.replace(" ", "_") for value in row.values()) for row in rows]
         metafunc.parametrize("bench", rows, indirect=True, ids=ids)
 
 
@@ -94,10 +94,6 @@ def _seeds(given: object) -> list[int]:
         first, _, last = given.partition("-")
         return list(range(int(first), int(last or first) + 1))
     return [int(str(given))]
-
-
-def _identifier(value: object) -> str:
-    return Path(str(value)).name.replace(" ", "_")
 
 
 class _Pool:

@@ -8,8 +8,7 @@ Invariant: table, JSON and hashes are the same however many run at a time.
 import contextlib
 import re
 import shlex
-import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
@@ -17,9 +16,9 @@ from typing import cast
 from xml.etree import ElementTree as ET
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from rich.table import Table
 
+from robot_bench.cli.progress import runs_bar
 from robot_bench.cli.workers import failure, run_in_processes
 from robot_bench.events.codec import Json
 from robot_bench.recording.run_folder import make_next_folder
@@ -120,11 +119,11 @@ def run_sweep(
         found: Json = {name: result.outcome.get(name) for name in FIGURES}
         return found | {"folder": str(result.folder) if result.folder.is_dir() else None}
 
-    with _bar(len(rows)) as advance:
+    with runs_bar(len(rows)) as advance:
 
         def on_done(number: int, found: Json) -> None:
             outcomes[number] = found
-            advance(bool(found["passed"]))
+            advance(passed=bool(found["passed"]))
 
         is_whole = run_in_processes(
             job, len(rows), at_once=jobs, on_done=on_done, raise_if_interrupted=raise_if_interrupted
@@ -279,26 +278,6 @@ def _places(rows: Sequence[Row]) -> list[str]:
     if len(set(names)) == len(names):
         return names
     return [f"{number:0{len(str(len(rows)))}d}-{name}" for number, name in enumerate(names, 1)]
-
-
-@contextlib.contextmanager
-def _bar(count: int) -> Iterator[Callable[[bool], None]]:
-    """Show on a terminal how many runs have ended; yield what is told of each."""
-    bar = Progress(
-        TextColumn("runs"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[failed]}"),
-        console=Console(stderr=True), transient=True, auto_refresh=False, disable=not sys.stderr.isatty(),
-    )  # fmt: skip
-    failed = 0
-
-    def advance(passed: bool) -> None:  # what came of a run is all that it is told
-        nonlocal failed
-        failed += not passed
-        bar.update(task, advance=1, failed=f"{failed} failed" if failed else "", refresh=True)
-
-    with bar:
-        task = bar.add_task("", total=count, failed="")
-        bar.refresh()
-        yield advance
 
 
 def refuse_beside_sweep(**options: object) -> None:

@@ -21,6 +21,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from p2os.errors import LocalProtocolError, RemoteProtocolError
+from p2os.protocol.bauds import DEFAULT_BAUD
 from p2os.protocol.frames import Frame
 from p2os.protocol.line_time import LineTime
 from p2os.protocol.profiles import Profile
@@ -36,8 +37,6 @@ from simbase.timing import NS_PER_S
 LONGEST_S = 0.5
 #: chosen: edges of one value of the pins come within this, seconds.
 TOGETHER_S = 0.002
-#: Bits a second of the line between adapter and robot where nobody says otherwise.
-LINE_BAUD = 9600
 #: Steps of the loop, in order.
 STEPS = ("ping to packet", "packet to pin", "pin to motor", "motor to command", "command to wheel")
 WHOLE = "ping to wheel"
@@ -108,7 +107,7 @@ def latency_budget(drive: Drive) -> Budget:
 def _readings(drive: Drive) -> Mapping[int, Sequence[_Reading]]:
     """Return of each sonar, from 0, the packets that brought a reading, in order."""
     found: dict[int, list[_Reading]] = {}
-    line, before = LineTime(LINE_BAUD), 0.0
+    line, before = LineTime(DEFAULT_BAUD), 0.0
     for event in drive.events or ():
         if not isinstance(event, Packet) or event.direction != "r2c":
             continue

@@ -20,9 +20,8 @@ from typing import cast
 from p2os.errors import ScenarioError
 from p2os.pioneer.controller.faults import MOMENTARY, read_fault
 from p2os.robots.parameters import RobotParameters
-from p2os.toml_schema import LONGEST_S, Key, Table, Where, check_table, within
+from p2os.toml_schema import LONGEST_S, Key, Table, Where, check_table, placed, within
 from robot_bench.scenario.timeline import Timeline
-from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
 
 #: The fault of the line itself.
@@ -55,10 +54,8 @@ def load_faults(tables: Sequence[Table], parameters: RobotParameters, where: Whe
         words = str(table["fault"])
         name = words
         if words != LINK_DOWN:
-            try:
+            with placed(place):
                 name = read_fault(words, sonar=parameters.sonar_fitted).name
-            except UsageError as error:
-                raise ScenarioError(f"{place}: {error}", hint=error.hint) from error
         at = _nanos(table, "at_s")
         found.append(FaultChange(at, f"fault {words}"))
         if "for_s" in table:

@@ -6,11 +6,10 @@ Invariant: a part that was read can be made, and stands on no wire of the robot'
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
-from bluepill_sim.parts.attached import PartError
 from bluepill_sim.parts.registry import PartSpec, build
 from bluepill_sim.stm32f103 import BONDED_PINS
 from p2os.errors import ScenarioError
-from p2os.toml_schema import Key, Table, Where, within
+from p2os.toml_schema import Key, Table, Where, placed, within
 from simbase.errors import shown, shown_name
 
 #: The keys of every part; all others are its pins and settings.
@@ -57,10 +56,8 @@ def _load(table: Table, folder: Path, taken: Mapping[str, str], at: Where) -> Pa
             raise ScenarioError(f"{at}: {name} = {shown(value)} is no number, text, flag or list of them")
     kept = tuple((key, tuple(value) if isinstance(value, list) else value) for key, value in settings.items())
     spec = PartSpec(kind=str(table["kind"]), settings=kept, folder=str(folder))
-    try:
+    with placed(at):
         wiring = build(spec)
-    except PartError as error:
-        raise ScenarioError(f"{at}: {error}", hint=error.hint) from error
     _refuse_taken([*wiring.pins.values(), *filter(None, [wiring.select])], taken, at)
     return spec
 

@@ -31,7 +31,7 @@ from p2os.pioneer.world.model import World
 from p2os.pioneer.world.start_places import refuse_start, start_places
 from p2os.robots.parameters import RobotParameters, load_parameters
 from p2os.toml_file import is_file
-from p2os.toml_schema import LONGEST_S, Key, Place, Table, Where, check_table, within
+from p2os.toml_schema import LONGEST_S, Key, Place, Table, Where, check_table, placed, within
 from robot_bench.direct.robot import DirectSettings
 from robot_bench.events.selection import BUSES, bus_of
 from robot_bench.scenario import fault_script, plugged_parts, when_script, world_script
@@ -567,10 +567,8 @@ def _build_several(table: Table, text: str, path: Path, where: Place, firmware: 
                 f"{one.place.at('name')}: world {shown(world.name)} has a thing called {shown(one.name)}"
             )
     given = [_start(one.table, one.place) for one in tables]
-    try:
+    with placed(where, "robot"):
         places = start_places(world, models, given)
-    except (UsageError, FileError) as error:
-        raise ScenarioError(f"{where.at('robot')}: {error}", hint=error.hint) from error
     robots = tuple(
         RobotPlace(
             name=one.name, parameters=model, start=start, scenario=scenario and replace(scenario, start=start),
@@ -692,18 +690,14 @@ def _adapter(part: Table, threshold_um: int, where: Where) -> AdapterSettings:
             values[f"{name.removesuffix('_ms')}_ns"] = cast("int", part[name]) * NS_PER_MS
     if "step_mm_s" in part:
         values["step_um_per_s"] = round(cast("float", part["step_mm_s"]) * 1000)
-    try:
+    with placed(within(where, "adapter")):
         return AdapterSettings(threshold_um=threshold_um, **values)  # type: ignore[arg-type] # check_table has seen to it
-    except UsageError as error:
-        raise ScenarioError(f"{within(where, 'adapter')}: {error}", hint=error.hint) from error
 
 
 def _controller(part: Table, path: Path, where: Where) -> ControllerSettings:
     check_table(part, _CONTROLLER, within(where, "controller"))
-    try:
+    with placed(within(where, "controller")):
         return _settings(part, path)
-    except FileError as error:
-        raise ScenarioError(f"{within(where, 'controller')}: {error}", hint=error.hint) from error
 
 
 def _settings(part: Table, path: Path) -> ControllerSettings:

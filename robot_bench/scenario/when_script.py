@@ -22,7 +22,7 @@ from typing import cast
 
 from p2os.errors import ScenarioError
 from p2os.robots.parameters import RobotParameters
-from p2os.toml_schema import LONGEST_S, Key, Table, Where, check_table, within
+from p2os.toml_schema import LONGEST_S, Key, Table, Where, check_table, placed, within
 from robot_bench.events.kinds import Event
 from robot_bench.events.selection import Wires, select
 from robot_bench.events.stream import EventStream
@@ -30,7 +30,7 @@ from robot_bench.scenario import world_script
 from robot_bench.scenario.fault_script import LINK_DOWN, FaultChange, load_faults
 from robot_bench.scenario.hand_script import DEEDS, Deed, load_deeds
 from robot_bench.scenario.world_script import Change, load_changes
-from simbase.errors import UsageError, nearest, shown
+from simbase.errors import nearest, shown
 from simbase.state import Stateful
 from simbase.timing import NS_PER_S, Nanos
 
@@ -119,10 +119,8 @@ def _load(table: Table, parameters: RobotParameters, place: Where, wires: Wires 
     do = str(mine["do"])
     as_fault, _ = _AS_FAULTS.get(do, ((), None))
     check_table(rest, _THING if do in _WORLD else _FAULT if do in _FAULTS else as_fault or DEEDS.get(do, ()), place)
-    try:
+    with placed(place):
         select(str(mine["event"]), wires)
-    except UsageError as error:
-        raise ScenarioError(f"{place}: {error}", hint=error.hint) from error
     changes: tuple[Change, ...] = ()
     faults: tuple[FaultChange, ...] = ()
     if do in _WORLD:

@@ -19,6 +19,7 @@ from typing import Any
 
 from bluepill_sim.core.debugging.debug_unit import WatchKind, Watchpoint
 from bluepill_sim.core.debugging.flash_patch import Remapped
+from bluepill_sim.stm32f103 import SRAM_BASE
 
 #: DEMCR.
 MON_EN, MON_STEP, TRCENA = 1 << 16, 1 << 18, 1 << 24
@@ -29,8 +30,6 @@ _CODE_COMPARATORS, _LOWER, _UPPER, _ADDRESS = 6, 1, 2, 0x1FFF_FFFC
 #: chosen: the largest range of instructions of a comparator of the DWT, by its mask; larger ones are cut to it.
 _MOST_MASK = 10
 _COUNTS = 1 << 32
-#: Where the FPB's table may be (ARM C1.11.4: bits 31 to 29 of FP_REMAP are 001).
-_SRAM = 0x2000_0000
 
 
 class DebugEvent(IntFlag):
@@ -73,7 +72,8 @@ def points_of(shared: Any) -> Points:
                 instructions |= dict.fromkeys(range(at & ~1, at + max(size, 1), 2), n)
             elif kind:
                 accesses[Watchpoint(at, size, _WATCHES[kind])] = n
-    remapped = _remapped(comparators, _SRAM + shared.fp_remap)
+    # The FPB's table is in SRAM (ARM C1.11.4: bits 31 to 29 of FP_REMAP are 001).
+    remapped = _remapped(comparators, SRAM_BASE + shared.fp_remap)
     return Points(_breakpoints(comparators), instructions, accesses, remapped, tuple(unmodelled))
 
 

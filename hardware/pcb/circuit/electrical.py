@@ -66,7 +66,7 @@ def logic_levels(design: Design) -> list[Check]:
     for index, wire in enumerate(series_wires(load_pinout()), start=1):
         series = ohms(design, f"R{index}")
         pull = f"R{index + PULL_OFFSET}"
-        down = ohms(design, pull) if pull in _refs(design) else float("inf")
+        down = ohms(design, pull) if pull in {component.ref for component in design.components} else float("inf")
         divide = 1.0 if wire.direction is Direction.TO_BLUEPILL else 1 / (1 + series / down)
         highs.append(DRIVER_HIGH_V * divide)
         if wire.bluepill == "PC13":
@@ -248,7 +248,3 @@ _NET_V = {
     "VIN": BATTERY_MAX_V, "VIN_FUSED": BATTERY_MAX_V, "+12V": BATTERY_MAX_V, "5V_REG": 5.0, "+5V": 5.0, "ADJ_5V": 3.75,
     "RS_VP": 5.5, "RS_VM": -5.5, "RS_C1P": 5.5, "RS_C1M": 3.3, "RS_C2P": 5.5, "RS_C2M": -5.5, "GND": 0.0,
 }  # fmt: skip
-
-
-def _refs(design: Design) -> set[str]:
-    return {component.ref for component in design.components}

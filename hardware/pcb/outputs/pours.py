@@ -73,7 +73,7 @@ def kept_stitches(vias: list[Via], pours: dict[str, list[Node]]) -> list[Via]:
     shapes = {layer: [_rows_of(_points(polygon)) for polygon in pours.get(f"GND:{layer}", [])] for layer in LAYERS}
     kept = []
     for via in vias:
-        x, y = _shift(via.at_mm)
+        x, y = (round(at + origin, 6) for at, origin in zip(via.at_mm, ORIGIN_MM, strict=True))
         ring = [(x + via.size_mm / 2 * dx, y + via.size_mm / 2 * dy) for dx, dy in _RING]
         if all(any(all(_is_inside(point, shape) for point in ring) for shape in shapes[layer]) for layer in LAYERS):
             kept.append(via)
@@ -134,10 +134,6 @@ def _is_inside(point: tuple[float, float], shape: dict[int, list[tuple[float, ..
 
 #: Eight points of a ring's rim, and its middle.
 _RING = ((0, 0), (1, 0), (0.7, 0.7), (0, 1), (-0.7, 0.7), (-1, 0), (-0.7, -0.7), (0, -1), (0.7, -0.7))
-
-
-def _shift(point: tuple[float, float]) -> tuple[float, float]:
-    return (round(point[0] + ORIGIN_MM[0], 6), round(point[1] + ORIGIN_MM[1], 6))
 
 
 def _polygons(text: str) -> dict[str, list[Node]]:

@@ -16,16 +16,14 @@ from p2os.client.settings import SEARCHED_BAUDS
 from p2os.errors import TransportError
 from p2os.robots.parameters import ParametersError, load_parameters
 from p2os.transport.serial_port import list_serial_ports
+from p2os.transport.url import DEFAULT_URL
 from simbase.errors import P2osError, UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S
 from simbase.units import BAUD
 
-#: Where simulated Pioneers listen.
-SIMULATOR = "tcp:127.0.0.1:8101"
-
 HELP = f"""Look for robots, and identify them.
 
-Without a URL it tries every serial port of this machine and {SIMULATOR}.
+Without a URL it tries every serial port of this machine and {DEFAULT_URL}.
 Each serial port is tried at its own speed and at {", ".join(map(str, SEARCHED_BAUDS))} bit/s, which
 takes up to ten seconds a port. A robot that is still streaming to an earlier
 program is stopped; motors stay off. Other devices on the ports get some bytes
@@ -74,7 +72,7 @@ def scan(
     json_output: Annotated[bool, typer.Option("--json", help="Print a JSON list.")] = False,
 ) -> None:
     """Look for robots."""
-    places = urls or [*(port["url"] for port in list_serial_ports()), SIMULATOR]
+    places = urls or [*(port["url"] for port in list_serial_ports()), DEFAULT_URL]
     hold_robot()
     found = []
     for place in places:

@@ -36,7 +36,6 @@ from p2os.pioneer.serve.control_line import ControlLine, write_stderr
 from p2os.pioneer.serve.fleet import Fleet
 from p2os.pioneer.serve.fleet_file import load_fleet
 from p2os.pioneer.serve.fleet_order import (
-    DEFAULT_PORT,
     MOST_ROBOTS,
     FleetOrder,
     MadeFleet,
@@ -51,6 +50,7 @@ from p2os.pioneer.serve.robot_time import RobotTime
 from p2os.pioneer.world.model import Pose
 from p2os.protocol.profiles import Profile
 from p2os.transport import listen_url
+from p2os.transport.url import DEFAULT_URL
 from p2os.transport.wall_clock import wall_clock
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
@@ -78,7 +78,7 @@ it runs to see the faults that can be injected, the inputs, and what can be aske
 
 \b
 Examples:
-  p2os serve                          a 2-DX in a room on {DEFAULT_PORT}
+  p2os serve                          a 2-DX in a room on {DEFAULT_URL}
   p2os serve --port tcp:0.0.0.0:8101  the same, for other machines too
   p2os serve --port pty:/tmp/robot    on a terminal that programs open as a serial port
   p2os serve --port serial:/dev/ttyUSB0?baud=9600
@@ -222,7 +222,7 @@ def serve(
         )  # fmt: skip
         if flash is not None:
             settings = settings.with_flash(load_flash(flash))
-        ports = following_ports(port or [DEFAULT_PORT], robots)
+        ports = following_ports(port or [DEFAULT_URL], robots)
         if aux and len(ports) > 1:
             raise UsageError("--aux is for one robot", hint="--fleet FILE gives each robot its own")
         places = [_place(text) for text in at or ()]

@@ -5,9 +5,9 @@ told of it here is worked out from poses and speeds that the engine gives.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from p2os.pioneer.body.contacts import ContactCounter
 from p2os.pioneer.body.contract import BodyState
@@ -22,6 +22,7 @@ from p2os.pioneer.body.physical import (
     UNPOWERED_SHARE,
 )
 from p2os.pioneer.body.rim_work import mean_magnitude
+from p2os.pioneer.sonar.ring import Cone, reading
 from p2os.pioneer.world.model import Obstacle
 from p2os.robots.parameters import RobotParameters
 
@@ -30,8 +31,10 @@ class EngineBody(BodyInWorld):
     """A differential drive with mass, torque limits and friction."""
 
     STATE: ClassVar[tuple[str, ...]] = ("_zero", "_stalling", "_is_held", "_is_at_rest", "_most_nm", "_rates")
-    DERIVED: ClassVar[tuple[str, ...]] = ("_state", "_is_grip_changed")
+    DERIVED: ClassVar[tuple[str, ...]] = ("_state", "_is_grip_changed", "_fan", "_fan_rays")
 
+    #: What prepares the rays of some cones: (cones, height of their plane, longest range), metres.
+    _rays_of: ClassVar[Callable[..., Any]]
     #: Angles of the wheels when it was reset.
     _zero: tuple[float, ...]
 
@@ -53,6 +56,8 @@ class EngineBody(BodyInWorld):
         self._is_held = [False, False]
         #: Wheels that have come to rest since their set-point is 0: they are held, as hard as the gear allows.
         self._is_at_rest = [False, False]
+        #: The fan of rays that was cast last, prepared.
+        self._fan: tuple[Cone, float] | None = None
 
     def _restored(self) -> None:
         super()._restored()
@@ -211,6 +216,24 @@ class EngineBody(BodyInWorld):
             rim_work_j=self._rim_work_j,
         )
 
+    def _readings(self, numbers: Sequence[int], found: Sequence[float]) -> list[float]:
+        """Return what some sonar read whose rays have met the world this near, other robots before it."""
+        if self.others:
+            longest = self._parameters.sonar_range_m
+            found = [
+                min(nearest, *self._robot_ranges(self._cones[number], longest))
+                for number, nearest in zip(numbers, found, strict=True)
+            ]
+        return [reading(nearest, self._parameters) for nearest in found]
+
+    def scan(self, fan: Cone, longest_m: float) -> list[float]:
+        """Return how far each ray of a fan goes, metres; the rays tilt with the body."""
+        if (fan, longest_m) != self._fan:
+            self._fan = (fan, longest_m)
+            self._fan_rays = self._rays_of((fan,), self._parameters.sonar_height_m, longest_m)
+        met = self._cast_fan(self._fan_rays)
+        return list(map(min, met, self._robot_ranges(fan, longest_m))) if self.others else met
+
     # What the engine tells -------------------------------------------------------------------
 
     def _read(self) -> BodyState:
@@ -219,4 +242,8 @@ class EngineBody(BodyInWorld):
 
     def _where_is(self, name: str) -> tuple[float, float, Sequence[float]]:
         """Return where a thing that can be pushed is: x, y, and its turn as nine numbers."""
+        raise NotImplementedError
+
+    def _cast_fan(self, rays: Any) -> list[float]:
+        """Return how far each of the rays that `_rays_of` has prepared goes, metres."""
         raise NotImplementedError

@@ -150,6 +150,11 @@ class BodyInWorld(Stateful):
         raise NotImplementedError
 
     @property
+    def things(self) -> tuple[Obstacle, ...]:
+        """All that is not part of the building."""
+        return self._plan.obstacles
+
+    @property
     def standing_pose(self) -> StandingPose:
         """Where it stands."""
         state = self.state

@@ -1,4 +1,4 @@
-"""What injecting and clearing a fault does: one small function each, and the two tables of them.
+"""What injecting and clearing a fault does: one small function a fault, and the table of them.
 
 `faults` reads the words and holds what is injected; a fault of a device (battery,
 bumper, stop button) is kept in the device's own state.
@@ -21,12 +21,12 @@ class FaultTarget:
     restart: Callable[[str], None]
 
 
-Act = Callable[[FaultTarget, Fault], None]
+Act = Callable[[FaultTarget, Fault, bool], None]
 
 
 def inject_now(target: FaultTarget, fault: Fault) -> None:
     """Inject a fault."""
-    _INJECT[fault.name](target, fault)
+    _ACTS[fault.name](target, fault, True)
 
 
 def clear_now(target: FaultTarget, fault: Fault) -> None:
@@ -37,7 +37,7 @@ def clear_now(target: FaultTarget, fault: Fault) -> None:
     """
     if fault.name in MOMENTARY:
         raise UsageError(f"there is nothing to clear after {fault.name}", hint="the controller boots by itself")
-    _CLEAR[fault.name](target, fault)
+    _ACTS[fault.name](target, fault, False)
 
 
 def injected_now(context: Context) -> tuple[str, ...]:
@@ -59,89 +59,58 @@ def injected_now(context: Context) -> tuple[str, ...]:
     return tuple(fault.text for fault in found)
 
 
-def _inject_sonar(target: FaultTarget, fault: Fault) -> None:
-    target.context.faults.sonar[fault.number - 1] = (fault.name.removeprefix("sonar-"), fault.value)
+def _sonar(target: FaultTarget, fault: Fault, is_on: bool) -> None:
+    sonar = target.context.faults.sonar
+    if is_on:
+        sonar[fault.number - 1] = (fault.name.removeprefix("sonar-"), fault.value)
+    else:
+        sonar.pop(fault.number - 1, None)
 
 
-def _clear_sonar(target: FaultTarget, fault: Fault) -> None:
-    target.context.faults.sonar.pop(fault.number - 1, None)
+def _wheel(target: FaultTarget, fault: Fault, is_on: bool) -> None:
+    setattr(target.context.faults, f"{fault.side}_blocked", is_on)
 
 
-def _block_wheel(*, blocked: bool) -> Act:
-    return lambda target, fault: setattr(target.context.faults, f"{fault.side}_blocked", blocked)
+def _connector(target: FaultTarget, _fault: Fault, is_on: bool) -> None:
+    target.context.faults.is_loose = is_on
+    target.context.faults.gap_in = target.context.faults.gap_out = 0
 
 
-def _loosen_connector(*, is_loose: bool) -> Act:
-    def act(target: FaultTarget, _fault: Fault) -> None:
-        target.context.faults.is_loose = is_loose
-        target.context.faults.gap_in = target.context.faults.gap_out = 0
-
-    return act
+def _noise(target: FaultTarget, fault: Fault, is_on: bool) -> None:
+    target.context.faults.bit_error_rate = fault.value if is_on else 0.0
 
 
-def _inject_noise(target: FaultTarget, fault: Fault) -> None:
-    target.context.faults.bit_error_rate = fault.value
-
-
-def _clear_noise(target: FaultTarget, _fault: Fault) -> None:
-    target.context.faults.bit_error_rate = 0.0
-
-
-def _pretend_voltage(target: FaultTarget, fault: Fault) -> None:
+def _voltage(target: FaultTarget, fault: Fault, is_on: bool) -> None:
     battery = target.context.devices.battery
-    battery.pretended_decivolts, battery.is_test = round(fault.value * 10), False
+    battery.pretended_decivolts = round(fault.value * 10) if is_on else None
+    if is_on:
+        battery.is_test = False
 
 
-def _clear_voltage(target: FaultTarget, _fault: Fault) -> None:
-    target.context.devices.battery.pretended_decivolts = None
+def _stop_button(target: FaultTarget, _fault: Fault, is_on: bool) -> None:
+    target.context.devices.switches.stop_button = is_on
+    if is_on:
+        target.context.motion.power(on=False)
 
 
-def _press_stop(target: FaultTarget, _fault: Fault) -> None:
-    target.context.devices.switches.stop_button = True
-    target.context.motion.power(on=False)
+def _bumper(target: FaultTarget, fault: Fault, is_on: bool) -> None:
+    pins, side, bit = target.context.devices.pins, f"{fault.side}_pressed", 1 << fault.number - 1
+    others = getattr(pins, side) & ~bit
+    setattr(pins, side, others | bit if is_on else others)
 
 
-def _release_stop(target: FaultTarget, _fault: Fault) -> None:
-    target.context.devices.switches.stop_button = False
+def _restart(target: FaultTarget, fault: Fault, is_on: bool) -> None:
+    del is_on  # there is nothing to clear
+    target.restart(fault.name)
 
 
-def _press_bumper(target: FaultTarget, fault: Fault) -> None:
-    pins, bit = target.context.devices.pins, 1 << fault.number - 1
-    if fault.side == "front":
-        pins.front_pressed |= bit
-    else:
-        pins.rear_pressed |= bit
-
-
-def _release_bumper(target: FaultTarget, fault: Fault) -> None:
-    pins, bit = target.context.devices.pins, 1 << fault.number - 1
-    if fault.side == "front":
-        pins.front_pressed &= ~bit
-    else:
-        pins.rear_pressed &= ~bit
-
-
-_INJECT: Mapping[str, Act] = {
-    "sonar-stuck": _inject_sonar,
-    "sonar-noisy": _inject_sonar,
-    "sonar-dead": _inject_sonar,
-    "wheel-blocked": _block_wheel(blocked=True),
-    "loose-connector": _loosen_connector(is_loose=True),
-    "line-noise": _inject_noise,
-    "low-battery": _pretend_voltage,
-    "brown-out": lambda target, _fault: target.restart("brown-out"),
-    "reboot": lambda target, _fault: target.restart("reboot"),
-    "stop-button": _press_stop,
-    "bumper": _press_bumper,
-}
-_CLEAR: Mapping[str, Act] = {
-    "sonar-stuck": _clear_sonar,
-    "sonar-noisy": _clear_sonar,
-    "sonar-dead": _clear_sonar,
-    "wheel-blocked": _block_wheel(blocked=False),
-    "loose-connector": _loosen_connector(is_loose=False),
-    "line-noise": _clear_noise,
-    "low-battery": _clear_voltage,
-    "stop-button": _release_stop,
-    "bumper": _release_bumper,
+_ACTS: Mapping[str, Act] = {
+    **dict.fromkeys(("sonar-stuck", "sonar-noisy", "sonar-dead"), _sonar),
+    **dict.fromkeys(MOMENTARY, _restart),
+    "wheel-blocked": _wheel,
+    "loose-connector": _connector,
+    "line-noise": _noise,
+    "low-battery": _voltage,
+    "stop-button": _stop_button,
+    "bumper": _bumper,
 }

@@ -96,15 +96,11 @@ def _shape(body: Body, asset: Tag) -> dict[str, str]:
 def _is_flat(mesh: TriangleMesh) -> bool:
     """Tell whether all corners are near one plane: of those MuJoCo makes no hull, and refuses the file."""
     origin = mesh.vertices[0]
-    rays = [_minus(corner, origin) for corner in mesh.vertices]
+    rays = [(corner[0] - origin[0], corner[1] - origin[1], corner[2] - origin[2]) for corner in mesh.vertices]
     longest = max(rays, key=_length)
     normal = max((_cross(longest, ray) for ray in rays), key=_length)
     off = max(abs(sum(a * b for a, b in zip(ray, normal, strict=True))) for ray in rays)
     return off <= FLAT * _length(longest) * _length(normal)
-
-
-def _minus(a: Vector, b: Vector) -> Vector:
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 def _cross(a: Vector, b: Vector) -> Vector:

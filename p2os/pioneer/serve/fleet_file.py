@@ -27,7 +27,7 @@ from p2os.pioneer.controller.flash import load_flash
 from p2os.pioneer.controller.settings import ControllerSettings, SonarPerSip
 from p2os.pioneer.devices.laser import read_laser
 from p2os.pioneer.sensor_errors import load_sensor_errors
-from p2os.pioneer.serve.fleet_order import DEFAULT_PORT, MOST_ROBOTS, FleetOrder, RobotOrder, following_ports, read_aux
+from p2os.pioneer.serve.fleet_order import MOST_ROBOTS, FleetOrder, RobotOrder, following_ports, read_aux
 from p2os.pioneer.world import known_worlds
 from p2os.pioneer.world.model import RANGES as WORLD_RANGES
 from p2os.pioneer.world.model import Pose
@@ -35,7 +35,8 @@ from p2os.protocol.bauds import BAUDS, BAUDS_TEXT
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import load_parameters
 from p2os.toml_file import TomlSource, is_file, is_folder, read_toml, read_user_text
-from p2os.toml_schema import Key, Place, filled, placed, within
+from p2os.toml_schema import LONGEST_S, Key, Place, filled, placed, within
+from p2os.transport.url import DEFAULT_URL
 from simbase.errors import FileError, shown, shown_name
 from simbase.timing import NS_PER_S
 from simbase.user_classes import located
@@ -66,7 +67,7 @@ ROBOT = (
     Key(name="errors", kind="text", default="ideal"),
     Key(name="baud", kind="whole", least=1, most=1_000_000),
     *(Key(name=name, kind="texts", default=[]) for name in ("aux", "faults")),
-    Key(name="sync_limit_s", kind="number", least=1e-3, most=1e9),
+    Key(name="sync_limit_s", kind="number", least=1e-3, most=LONGEST_S),
 )
 #: A place: metres, metres, degrees.
 PLACE_RANGES = (WORLD_RANGES["x_m"], WORLD_RANGES["y_m"], WORLD_RANGES["heading_deg"])
@@ -141,7 +142,7 @@ def _robots(row: Values, where: Place, before: list[RobotOrder]) -> list[RobotOr
         if port is None and before:
             ports = following_ports([before[-1].port], count + 1)[1:]
         else:
-            ports = following_ports([DEFAULT_PORT if port is None else port], count)
+            ports = following_ports([DEFAULT_URL if port is None else port], count)
     with placed(where, "model"):
         sonar = load_parameters(row["model"]).sonar_fitted
     with placed(where, "faults"):

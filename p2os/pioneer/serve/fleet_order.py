@@ -20,11 +20,10 @@ from p2os.protocol.bauds import BAUDS
 from p2os.robots.parameters import RobotParameters, load_parameters
 from p2os.toml_file import is_folder
 from p2os.transport import PtyUrl, SerialUrl, TcpUrl, parse_url
+from p2os.transport.url import DEFAULT_URL
 from simbase.errors import UsageError, shown_name
 from simbase.timing import Nanos
 
-#: Where the first robot is found when nothing else is given.
-DEFAULT_PORT = "tcp:127.0.0.1:8101"
 #: The AUX ports (H8 manual: AUX1 to AUX3).
 AUX_PORTS = (1, 2, 3)
 #: Robots of this class have batteries on a line of their own (ARIA's parameter file).
@@ -50,7 +49,7 @@ class RobotOrder:
         UsageError: An AUX port is none, or named twice; the limit is not positive.
     """
 
-    port: str = DEFAULT_PORT
+    port: str = DEFAULT_URL
     model: str = "p2dx"
     at: Pose | None = None
     settings: ControllerSettings = field(default_factory=ControllerSettings)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from enum import Enum
 from html import escape
 
-from p2os.pioneer.world.geometry import Footprint
+from p2os.pioneer.world.geometry import Footprint, point_segment
 from p2os.pioneer.world.model import CUT_M, Kind, Obstacle, Point, World, cut, shadow
 
 
@@ -263,7 +263,7 @@ def _covers(shape: Shape, x: float, y: float, slack_m: float) -> bool:
     if not shape.is_open and _is_inside(points, x, y):
         return True
     ends = points[1:] if shape.is_open else (*points[1:], points[0])
-    return any(_distance(x, y, a, b) <= slack_m for a, b in zip(points, ends, strict=False))
+    return any(point_segment(x, y, *a, *b) <= slack_m for a, b in zip(points, ends, strict=False))
 
 
 def _is_inside(points: tuple[Point, ...], x: float, y: float) -> bool:
@@ -272,10 +272,3 @@ def _is_inside(points: tuple[Point, ...], x: float, y: float) -> bool:
         (bx - ax) * (y - ay) - (by - ay) * (x - ax) >= 0
         for (ax, ay), (bx, by) in zip(points, (*points[1:], points[0]), strict=True)
     )
-
-
-def _distance(x: float, y: float, a: Point, b: Point) -> float:
-    ex, ey = b[0] - a[0], b[1] - a[1]
-    length = ex * ex + ey * ey
-    share = 0.0 if length == 0 else min(1.0, max(0.0, ((x - a[0]) * ex + (y - a[1]) * ey) / length))
-    return math.hypot(x - a[0] - share * ex, y - a[1] - share * ey)

@@ -96,7 +96,7 @@ class Footprint:
         if not self.edges:
             return (x - self.x) / self.radius, (y - self.y) / self.radius
         _, _, ex, ey = min(
-            self.edges, key=lambda edge: _point_segment(x, y, edge[0], edge[1], edge[0] + edge[2], edge[1] + edge[3])
+            self.edges, key=lambda edge: point_segment(x, y, edge[0], edge[1], edge[0] + edge[2], edge[1] + edge[3])
         )
         length = math.hypot(ex, ey)
         return ey / length, -ex / length
@@ -112,7 +112,7 @@ class Footprint:
             return math.hypot(max(0.0, along), max(0.0, across))
         if self.contains(x, y):
             return 0.0
-        return min(_point_segment(x, y, ax, ay, ax + ex, ay + ey) for ax, ay, ex, ey in self.edges)
+        return min(point_segment(x, y, ax, ay, ax + ex, ay + ey) for ax, ay, ex, ey in self.edges)
 
     def distance(self, hull: Polygon) -> float:
         """Return the distance to a convex polygon; 0 where they overlap."""
@@ -222,7 +222,7 @@ def _nearest(points: Polygon, polygon: Polygon) -> float:
     """Return the least distance from some points to a polygon's edges."""
     nearest, hypot = INFINITY, math.hypot
     for (ax, ay), (bx, by) in pairwise((*polygon, polygon[0])):
-        # `_point_segment` of each point, in place: a run measures its clearance twenty times a second.
+        # `point_segment` of each point, in place: a run measures its clearance twenty times a second.
         ex, ey = bx - ax, by - ay
         length = ex * ex + ey * ey
         for x, y in points:
@@ -239,10 +239,11 @@ def _point_polygon(x: float, y: float, polygon: Polygon) -> float:
     edges = tuple(pairwise((*polygon, polygon[0])))
     if all((x - ax) * (by - ay) - (y - ay) * (bx - ax) <= 0.0 for (ax, ay), (bx, by) in edges):
         return 0.0
-    return min(_point_segment(x, y, *a, *b) for a, b in edges)
+    return min(point_segment(x, y, *a, *b) for a, b in edges)
 
 
-def _point_segment(x: float, y: float, ax: float, ay: float, bx: float, by: float) -> float:
+def point_segment(x: float, y: float, ax: float, ay: float, bx: float, by: float) -> float:
+    """Return the distance from a point to a straight line between two others."""
     ex, ey = bx - ax, by - ay
     length = ex * ex + ey * ey
     share = ((x - ax) * ex + (y - ay) * ey) / length if length > 0.0 else 0.0

@@ -165,11 +165,6 @@ def _suite(paths: tuple[Path, ...], board: BluePill, raise_if_interrupted: Calla
     return Suite(paths=paths, base=found, data=read_bytes(board.image), image=board.image)
 
 
-def _limit_s(suite: Suite) -> int:
-    """Return how many seconds of a processor the tests may take with a mutant."""
-    return round(MOST_TIMES * suite.base.cpu_s + MOST_MORE_NS / NS_PER_S)
-
-
 def _chosen(image: Image, ran: set[int], names: Coverage, only: Sequence[str]) -> list[Mutant]:
     """Return the mutants of all instructions that ran, of the files and functions asked for.
 
@@ -213,7 +208,7 @@ def _try_all(
         mutant = tried[number]
         found = try_mutant(mutant, bases, time.process_time_ns, look)
         if suite is not None and not found.is_noticed and mutant.address in suite.base.addresses:
-            by_tests = suite.try_mutant(mutant, _limit_s(suite))
+            by_tests = suite.try_mutant(mutant, round(MOST_TIMES * suite.base.cpu_s + MOST_MORE_NS / NS_PER_S))
             found = by_tests if found.fate is Fate.SAME or by_tests.is_noticed else found
         return found.to_plain()
 

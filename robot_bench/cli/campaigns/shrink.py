@@ -1,15 +1,10 @@
 """`p2os shrink`: a failing run made small, and kept as a scenario and a test."""
 
-import contextlib
 import json
-import sys
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Annotated, cast
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from p2os.cli.help_pages import BENCH
 from p2os.cli.quantities import option
@@ -18,7 +13,7 @@ from robot_bench.campaign.trial import Trial, trial_of
 from robot_bench.campaign.variants.shrinking.failure import Failure, Way, failure_of
 from robot_bench.campaign.variants.shrinking.kept import Kept, keep, trial_of_run
 from robot_bench.campaign.variants.shrinking.shrink import BUDGET, Shrunk, shrink
-from robot_bench.cli.progress import RunDisplay
+from robot_bench.cli.progress import RunDisplay, runs_bar
 from robot_bench.recording.run_record import TRACE_NAME
 from robot_bench.scenario.included_files import Setting, read_setting
 from robot_bench.scenario.scenario import load_scenario
@@ -86,7 +81,7 @@ def shrink_run(
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise UsageError(f"{folder} is not empty", hint="--out names another folder")
     with RunDisplay(is_shown=False) as display:
-        with _bar(budget) as advance:
+        with runs_bar(budget) as advance:
 
             def judge(candidate: Trial, way: Way | None, until_ns: Nanos | None) -> Failure | None:
                 advance()
@@ -101,18 +96,6 @@ def shrink_run(
     if not kept.is_confirmed:
         typer.echo("the run of another process was not the same", err=True)
         raise typer.Exit(1)
-
-
-@contextlib.contextmanager
-def _bar(budget: int) -> Iterator[Callable[[], None]]:
-    """Show on a terminal how many runs were made; yield what is called before each."""
-    bar = Progress(
-        TextColumn("runs"), BarColumn(), MofNCompleteColumn(), console=Console(stderr=True), transient=True,
-        auto_refresh=False, disable=not sys.stderr.isatty(),
-    )  # fmt: skip
-    with bar:
-        task = bar.add_task("", total=budget)
-        yield lambda: bar.update(task, advance=1, refresh=True)
 
 
 def _trial(run: str, firmware: Path | None, settings: list[Setting]) -> Trial:

@@ -21,6 +21,7 @@ from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.controller import ControllerSettings, Pioneer
 from p2os.pioneer.sensor_errors import OdometryErrors, SensorErrors, SonarErrors
 from p2os.pioneer.world.model import Pose, World
+from p2os.protocol.bauds import DEFAULT_BAUD
 from p2os.protocol.commands import Command, CommandNumber, command, enable, pulse, rvel, vel
 from p2os.protocol.commands import sonar as sonar_on
 from p2os.protocol.frames import Frame
@@ -36,7 +37,6 @@ Stage: TypeAlias = tuple[Sequence[Command], float | None]
 #: chosen: how often bytes are moved and poses measured.
 LOOK_NS: Nanos = 5 * NS_PER_MS
 MEASURED_NS: Nanos = 50 * NS_PER_MS
-BAUD = 9600
 #: chosen: well within the watchdog's two seconds.
 ALIVE_NS: Nanos = 500 * NS_PER_MS
 #: chosen: a robot stands that has not moved for so long; and gives up to come to a stand.
@@ -153,12 +153,12 @@ class _Driver:
         body = make_body("kinematic", world, robot.parameters)
         if start is not None:
             body.stand_at(start.x_m, start.y_m, start.heading_rad)
-        settings = ControllerSettings(errors=robot.errors, seed=seed, baud=BAUD)
+        settings = ControllerSettings(errors=robot.errors, seed=seed, baud=DEFAULT_BAUD)
         self.now: Nanos = 0
         self.chunks: list[Chunk] = []
         self.poses: list[tuple[float, float, float, float]] = []
         self._pioneer = Pioneer(parameters=robot.parameters, body=body, settings=settings)
-        self._body, self._camera, self._line = body, camera, LineTime(BAUD)
+        self._body, self._camera, self._line = body, camera, LineTime(DEFAULT_BAUD)
         self._said_at: Nanos = 0
         self._moved_at: Nanos = 0
 

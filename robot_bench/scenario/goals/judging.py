@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from typing import cast
 
 from p2os.errors import ScenarioError
-from p2os.toml_schema import Key, Table, Where, check_table
+from p2os.toml_schema import Key, Table, Where, check_table, placed
 from robot_bench.events.kinds import Event, PinEdge, Verdict
 from robot_bench.events.selection import Wires
 from robot_bench.events.stream import EventStream
 from robot_bench.scenario.goals.kinds import kind_named, known_kinds
 from robot_bench.scenario.goals.watch import WIRES, GoalKind, Outcome, Watch
-from simbase.errors import UsageError, nearest, shown
+from simbase.errors import nearest, shown
 from simbase.state import PartState, Stateful
 from simbase.timing import NS_PER_S, Nanos
 
@@ -85,10 +85,8 @@ def load_goal(table: Table, where: Where, wires: Wires | None = None) -> Goal:
     _check(arguments, where)
     if wires is not None:
         arguments[WIRES] = wires
-    try:
+    with placed(where):
         kind.watch(arguments)
-    except UsageError as error:
-        raise ScenarioError(f"{where}: {error}", hint=error.hint) from error
     return Goal(kind=name, arguments=arguments, ends_run=str(table.get("ends_run", "")))
 
 

@@ -11,10 +11,10 @@ from p2os.pioneer.world import known_worlds, load_world
 COMMANDS_THAT_FAIL = [
     (["world", "show", "rooom"], "p2os: no world 'rooom'\nhint: did you mean 'room'?\n"),
     (["world", "show", "room", "--out", "room.jpg"], "hint: --out FILE.svg\n"),
-    (["world", "show", "room", "--out", "missing/room.svg"], "No such file or directory\n"),
+    (["world", "show", "room", "--out", "missing/room.svg"], "no such file or directory\n"),
     (["world", "new", "--kind", "swamp"], "hint: kinds: arena, doorway, maze, office, slalom\n"),
     (["world", "new", "--out", "a.txt"], "hint: --out FILE.toml\n"),
-    (["world", "new", "--out", "missing/a.toml"], "No such file or directory\n"),
+    (["world", "new", "--out", "missing/a.toml"], "no such file or directory\n"),
     (["world", "check", "."], "no world '.'"),
 ]
 

@@ -117,7 +117,7 @@ def test_a_class_without_a_method_is_refused_by_the_methods_name(folder: Path, w
         (
             "class Tiring(KinematicScene)",
             "class Tiring",
-            "mine.py:Tiring lacks name_robots(), place(), move(), remove(), ",
+            "mine.py:Tiring lacks place(), move(), remove(), ",
         ),
     ],
 )

@@ -46,7 +46,6 @@ from p2os.pioneer.body.physical import (
     group_for,
 )
 from p2os.pioneer.body.ray_cast import Echo
-from p2os.pioneer.sonar.ring import Cone, reading
 from p2os.pioneer.world.model import Obstacle, Pose, World
 from p2os.pioneer.world.plan import Bands
 from p2os.robots.parameters import RobotParameters
@@ -201,9 +200,10 @@ class BulletBody(EngineBody):
 
     STATE = ("_targets", "_start")
     #: What the scene's `engine_state` makes anew, what is read from the engine, and what spares a look for contacts.
-    DERIVED = ("robot", "_centre", "_joints", "_matrix", "_origin", "_alone", "_look_in", "_is_busy", "_fan",
-               "_fan_rays", "_motors", "_told")  # fmt: skip
+    DERIVED = ("robot", "_centre", "_joints", "_matrix", "_origin", "_alone", "_look_in", "_is_busy", "_motors",
+               "_told")  # fmt: skip
 
+    _rays_of = SonarRays
     name = "bullet"
     note: str | None = None
     scene: BulletScene
@@ -212,8 +212,6 @@ class BulletBody(EngineBody):
         super().__init__(scene, parameters, number)
         self._sonar_rays = SonarRays(self._cones, parameters.sonar_height_m, parameters.sonar_range_m)
         self._client = scene.client
-        #: The fan of rays that was cast last, prepared.
-        self._fan: tuple[Cone, float] | None = None
         #: Steps for which nothing can touch the robot, and steps until that is looked at again.
         self._alone, self._look_in = 0, 0
         self._targets = (0.0, 0.0)
@@ -221,11 +219,6 @@ class BulletBody(EngineBody):
         #: of the wheels.
         self._motors: list[tuple[float, float]] = []
         self._told: tuple[object, ...] = ()
-
-    @property
-    def things(self) -> tuple[Obstacle, ...]:
-        """All that is not part of the building."""
-        return self._plan.obstacles
 
     def make(self, pose: Pose) -> None:
         """Make the robot in the engine's empty world."""
@@ -422,12 +415,7 @@ class BulletBody(EngineBody):
         found = [
             longest * min(hit[2] for hit in hits[rays * place : rays * (place + 1)]) for place in range(len(numbers))
         ]
-        if self.others:
-            found = [
-                min(nearest, *self._robot_ranges(self._cones[number], longest))
-                for number, nearest in zip(numbers, found, strict=True)
-            ]
-        return [reading(nearest, self._parameters) for nearest in found]
+        return self._readings(numbers, found)
 
     def echoes(self, numbers: Sequence[int]) -> list[list[Echo]]:
         """Return what each ray of some sonar meets, with the angle at which it meets it."""
@@ -438,13 +426,8 @@ class BulletBody(EngineBody):
         ]
         return self._with_robots(numbers, met)
 
-    def scan(self, fan: Cone, longest_m: float) -> list[float]:
-        """Return how far each ray of a fan goes, metres; the rays tilt with the body."""
-        if (fan, longest_m) != self._fan:
-            self._fan = (fan, longest_m)
-            self._fan_rays = SonarRays((fan,), self._parameters.sonar_height_m, longest_m)
-        met = [longest_m * hit[2] for hit in self._cast((0,), self._fan_rays)]
-        return list(map(min, met, self._robot_ranges(fan, longest_m))) if self.others else met
+    def _cast_fan(self, rays: SonarRays) -> list[float]:
+        return [rays.longest_m * hit[2] for hit in self._cast((0,), rays)]
 
     def _cast(self, numbers: Sequence[int], rays: SonarRays | None = None) -> list[tuple[Any, ...]]:
         """Return what the engine returns for each ray of some sonar, or of other rays by their numbers."""

@@ -33,7 +33,6 @@ from p2os.pioneer.body.physical import (
     middle_and_slope,
 )
 from p2os.pioneer.body.ray_cast import Echo
-from p2os.pioneer.sonar.ring import Cone, reading
 from p2os.pioneer.world.model import Obstacle, Pose, World
 from p2os.robots.parameters import RobotParameters
 
@@ -148,8 +147,9 @@ class MujocoBody(EngineBody):
     STATE = ("_start",)
     #: Where in the engine's objects things are.
     DERIVED = ("_qpos", "_qvel", "_wheel_places", "_wheel_speeds", "_rotors", "_robot_place", "_robot_speed",
-               "_hull_number", "_wheel_numbers", "_asked", "_fan", "_fan_rays")  # fmt: skip
+               "_hull_number", "_wheel_numbers", "_asked")  # fmt: skip
 
+    _rays_of = SonarRays
     name = "mujoco"
     scene: MujocoScene
     others: "tuple[MujocoBody, ...]"
@@ -158,8 +158,6 @@ class MujocoBody(EngineBody):
         super().__init__(scene, parameters, number)
         self._names, self._number = RobotNames.of(number), number
         self._sonar_rays = SonarRays(self._cones, parameters.sonar_height_m, parameters.sonar_range_m)
-        #: The fan of rays that was cast last, prepared.
-        self._fan: tuple[Cone, float] | None = None
         self._asked = (0.0, 0.0)
 
     @property
@@ -168,11 +166,6 @@ class MujocoBody(EngineBody):
         if not self._world.meshes:
             return None
         return "the mujoco body touches a mesh as upright walls over its plan, at the height of the hull"
-
-    @property
-    def things(self) -> tuple[Obstacle, ...]:
-        """All that is not part of the building."""
-        return self._plan.obstacles
 
     def find_joints(self) -> None:
         """Find the robot in a model that was made anew."""
@@ -290,27 +283,17 @@ class MujocoBody(EngineBody):
 
     def ranges(self, numbers: Sequence[int]) -> list[float]:
         """Return the nearest echo of each cone, metres; the rays tilt with the body."""
-        frame, longest = self._look(), self._parameters.sonar_range_m
+        frame = self._look()
         found = [self._sonar_rays.nearest(number, *frame) for number in numbers]
-        if self.others:
-            found = [
-                min(nearest, *self._robot_ranges(self._cones[number], longest))
-                for number, nearest in zip(numbers, found, strict=True)
-            ]
-        return [reading(nearest, self._parameters) for nearest in found]
+        return self._readings(numbers, found)
 
     def echoes(self, numbers: Sequence[int]) -> list[list[Echo]]:
         """Return what each ray of some sonar meets, with the angle at which it meets it."""
         frame = self._look()
         return self._with_robots(numbers, [self._sonar_rays.echoes(number, *frame) for number in numbers])
 
-    def scan(self, fan: Cone, longest_m: float) -> list[float]:
-        """Return how far each ray of a fan goes, metres; the rays tilt with the body."""
-        if (fan, longest_m) != self._fan:
-            self._fan = (fan, longest_m)
-            self._fan_rays = SonarRays((fan,), self._parameters.sonar_height_m, longest_m)
-        met = self._fan_rays.ranges(0, *self._look())
-        return list(map(min, met, self._robot_ranges(fan, longest_m))) if self.others else met
+    def _cast_fan(self, rays: SonarRays) -> list[float]:
+        return rays.ranges(0, *self._look())
 
     def _look(self) -> tuple[mujoco.MjModel, mujoco.MjData, NDArray[np.float64], NDArray[np.float64]]:
         """Bring the engine's geometry to the end of the last step; return the engine, the robot's origin and turn."""

@@ -299,11 +299,6 @@ class OutsideBody(BodyInWorld):
         return f"the body is {self.scene.what}, another program{f': {self.scene.note}' if self.scene.note else ''}"
 
     @property
-    def things(self) -> tuple[Obstacle, ...]:
-        """All that is not part of the building."""
-        return self._plan.obstacles
-
-    @property
     def state(self) -> BodyState:
         """The state after the last step."""
         self.scene.flush()

@@ -16,7 +16,7 @@ from typing import TypedDict
 from p2os.errors import WorldError
 from p2os.pioneer.world.formats.annotation import Traits
 from p2os.pioneer.world.formats.transform import Transform, apply, upright_heading
-from p2os.pioneer.world.geometry import Footprint
+from p2os.pioneer.world.geometry import Footprint, point_segment
 from p2os.pioneer.world.model import (
     FARTHEST_M,
     LEAST_PUSHED_M,
@@ -327,13 +327,5 @@ def _drop_near(places: list[tuple[float, float]], a: tuple[float, float], b: tup
     last = bisect_right(places, (max(a[0], b[0]) + FREE_M, math.inf))
     for number in range(last - 1, first - 1, -1):
         x, y = places[number]
-        if low <= y <= high and _distance_to_segment(x, y, a, b) <= FREE_M:
+        if low <= y <= high and point_segment(x, y, *a, *b) <= FREE_M:
             del places[number]
-
-
-def _distance_to_segment(x: float, y: float, a: tuple[float, float], b: tuple[float, float]) -> float:
-    """Return the distance of a point from a segment."""
-    ex, ey = b[0] - a[0], b[1] - a[1]
-    length = ex * ex + ey * ey
-    share = 0.0 if length == 0 else min(1.0, max(0.0, ((x - a[0]) * ex + (y - a[1]) * ey) / length))
-    return math.hypot(x - a[0] - share * ex, y - a[1] - share * ey)

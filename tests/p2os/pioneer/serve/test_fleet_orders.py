@@ -92,6 +92,7 @@ def test_a_file_names_every_robot(tmp_path: Path) -> None:
         ('[[robot]]\naux = ["1=pty:", "1=pty:/tmp/x"]', "f:1: [[robot]] 1: AUX ports [1, 1]"),
         ("[[robot]]\nfaults = [1]", "f:2: [[robot]] 1: faults = [1] is not a text in quotes, or a list of them"),
         ("[[robot]]\nsync_limit_s = 0", "f:2: [[robot]] 1: sync_limit_s = 0 is out of range"),
+        ("[[robot]]\nsync_limit_s = 1000001", "f:2: [[robot]] 1: sync_limit_s = 1000001 is out of range"),
         ("[[robot]]\nsync_limit_s = nan", "f:2: [[robot]] 1: sync_limit_s = nan is out of range"),
         ("robot = []", "f:1: "),
         ("a = " + "[" * 5000, "f:1:"),

@@ -262,12 +262,12 @@ def test_the_start_in_a_large_uneven_field_is_found_at_once(tmp_path: Path, monk
     )
     distances: list[tuple[float, float]] = []
 
-    def counted(x: float, y: float, a: tuple[float, float], b: tuple[float, float]) -> float:
+    def counted(x: float, y: float, *line: float) -> float:
         distances.append((x, y))
-        return distance(x, y, a, b)
+        return distance(x, y, *line)
 
-    distance = collection._distance_to_segment
-    monkeypatch.setattr(collection, "_distance_to_segment", counted)
+    distance = collection.point_segment
+    monkeypatch.setattr(collection, "point_segment", counted)
     world = read(tmp_path / "a.obj", points + faces)
     # Less than one a triangle: each with each of 577 places would be 34 millions.
     assert 0 < len(distances) < 2 * (side - 1) ** 2
