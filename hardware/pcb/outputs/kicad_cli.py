@@ -14,15 +14,15 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from hardware.pcb.outputs.pours import KicadMissingError
 from hardware.pcb.outputs.sexp import children, parse, word
+from simbase.errors import MissingDependencyError, P2osError
 
 _LIMIT_S = 400
 NEEDED_MAJOR = 9
 GERBER_LAYERS = "F.Cu,B.Cu,F.Mask,B.Mask,F.Paste,F.SilkS,Edge.Cuts"
 
 
-class KicadFailedError(RuntimeError):
+class KicadFailedError(P2osError):
     """kicad-cli ended with an error."""
 
 
@@ -56,11 +56,11 @@ def run(*arguments: str | Path, good: tuple[int, ...] = (0,)) -> str:
     """Run kicad-cli and return what it printed.
 
     Raises:
-        KicadMissingError: There is no KiCad 9.
+        MissingDependencyError: There is no KiCad 9.
         KicadFailedError: It ended with another exit code than expected.
     """
     if version() is None:
-        raise KicadMissingError("KiCad 9 is not installed (hint: tools/install_board_tools.sh)")
+        raise MissingDependencyError("KiCad 9 is not installed", hint="tools/install_board_tools.sh")
     with tempfile.TemporaryDirectory() as home:
         done = subprocess.run(["kicad-cli", *map(str, arguments)], capture_output=True, text=True, timeout=_LIMIT_S,
                               check=False, env=_environment(home))  # fmt: skip

@@ -12,9 +12,10 @@ import tempfile
 from pathlib import Path
 
 from hardware.pcb.layout import rules
-from hardware.pcb.layout.routing import HERE, RoutingError, Via
+from hardware.pcb.layout.routing import HERE, RoutingError, Via, read_lines
 from hardware.pcb.outputs.board import ORIGIN_MM
 from hardware.pcb.outputs.sexp import Node, child, children, parse, word
+from simbase.errors import MissingDependencyError
 
 #: Runs in the system's Python: KiCad installs its module there and nowhere else.
 _SCRIPT = (
@@ -27,29 +28,25 @@ _PYTHONS = ("/usr/bin/python3", shutil.which("python3"))
 LAYERS = ("F.Cu", "B.Cu")
 
 
-class KicadMissingError(RuntimeError):
-    """KiCad 9 is not installed."""
-
-
 def kicad_python() -> str:
     """Return the Python that has KiCad's module.
 
     Raises:
-        KicadMissingError: None has.
+        MissingDependencyError: None has.
     """
     for python in _PYTHONS:
         if python and Path(python).exists():
             done = subprocess.run([python, "-c", "import pcbnew"], capture_output=True, check=False)
             if done.returncode == 0:
                 return python
-    raise KicadMissingError("KiCad's Python module is not installed (hint: tools/install_board_tools.sh)")
+    raise MissingDependencyError("KiCad's Python module is not installed", hint="tools/install_board_tools.sh")
 
 
 def fill(board_text: str) -> dict[str, list[Node]]:
     """Return the filled polygons of a board by area, computed by KiCad.
 
     Raises:
-        KicadMissingError: KiCad is not installed.
+        MissingDependencyError: KiCad is not installed.
         RoutingError: KiCad could not read the board.
     """
     with tempfile.TemporaryDirectory() as folder:
@@ -90,14 +87,8 @@ def load_stitches(variant: str, path: Path | None = None) -> list[Via]:
     Raises:
         RoutingError: The file is missing or broken.
     """
-    file = path or HERE / "stitches" / f"{variant}.txt"
-    try:
-        lines = file.read_text(encoding="utf-8").splitlines()
-    except OSError as error:
-        hint = "python -m hardware.pcb stitch"
-        raise RoutingError(f"cannot read {file.name}: {error.strerror} (hint: {hint})") from error
     stitches = []
-    for count, line in enumerate(lines, start=1):
+    for count, line in enumerate(read_lines(path or HERE / "stitches" / f"{variant}.txt", "stitch"), start=1):
         try:
             x, y = (int(word) for word in line.split(","))
         except ValueError as error:

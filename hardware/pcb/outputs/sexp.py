@@ -11,6 +11,8 @@ import uuid
 from collections.abc import Iterator
 from typing import TypeAlias
 
+from simbase.errors import P2osError
+
 #: A list whose first element names it; elements are words, texts or lists.
 Node: TypeAlias = "list[str | Node]"
 #: Longest list that stays on one line. chosen: a stroke, a track or a pad's properties fit, so that a change of one
@@ -26,7 +28,7 @@ class Text(str):
     __slots__ = ()
 
 
-class SexpError(ValueError):
+class SexpError(P2osError):
     """A text is no S-expression."""
 
 
