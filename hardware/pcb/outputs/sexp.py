@@ -7,6 +7,7 @@ Not here: what any list means. Invariant: `parse(render(tree)) == tree` for tree
 of lists, bare words (`str`) and quoted strings (`Text`).
 """
 
+import re
 import uuid
 from collections.abc import Iterator
 from typing import TypeAlias
@@ -18,6 +19,9 @@ Node: TypeAlias = "list[str | Node]"
 #: Longest list that stays on one line. chosen: a stroke, a track or a pad's properties fit, so that a change of one
 #: of them is a change of one line.
 _LINE_LENGTH = 200
+#: A bracket, what stands in quotes (the last may lack its end), or a bare word; and a character behind a backslash.
+_TOKEN = re.compile(r'[()]|"(?P<quoted>(?:[^"\\]|\\.)*\\?)"?|[^\s()"]+', re.DOTALL)
+_ESCAPED = re.compile(r"\\(.)", re.DOTALL)
 #: chosen: any fixed UUID; another one would rename every object.
 _SPACE = uuid.UUID("6f2d6a53-77d5-5f0b-9a3c-0b5a5d1c9e11")
 
@@ -130,28 +134,6 @@ def _word(item: str) -> str:
 
 
 def _tokens(text: str) -> Iterator[str]:
-    index, end = 0, len(text)
-    while index < end:
-        char = text[index]
-        if char in "()":
-            yield char
-            index += 1
-        elif char == '"':
-            out = []
-            index += 1
-            while index < end and text[index] != '"':
-                if text[index] == "\\" and index + 1 < end:
-                    index += 1
-                    out.append("\n" if text[index] == "n" else text[index])
-                else:
-                    out.append(text[index])
-                index += 1
-            index += 1
-            yield Text("".join(out))
-        elif char.isspace():
-            index += 1
-        else:
-            start = index
-            while index < end and text[index] not in '()"' and not text[index].isspace():
-                index += 1
-            yield text[start:index]
+    for found in _TOKEN.finditer(text):
+        quoted = found["quoted"]
+        yield found[0] if quoted is None else Text(_ESCAPED.sub(lambda one: {"n": "\n"}.get(one[1], one[1]), quoted))
