@@ -72,7 +72,8 @@ def draw(design: Design, seed: int) -> tuple[Mutant, ...]:
     """
     chance = random.Random(seed)
     nets, edits = design.nets(), list[str]()
-    joined = {net: {ref for ref, _ in members} for net, members in nets.items()}
+    joined: dict[str | None, set[str]] = {net: {ref for ref, _ in members} for net, members in nets.items()}
+    ends: list[tuple[str, str | None]]
     for net, members in nets.items():
         other = chance.choice([name for name in nets if name != net])
         edits.append(f"join {net} {other}")
