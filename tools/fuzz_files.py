@@ -58,6 +58,7 @@ from tests.p2os.pioneer.serve.test_fleet_orders import FULL
 from tests.p2os.pioneer.world import test_importers_gltf as gltf
 from tests.p2os.pioneer.world import test_importers_maps as maps
 from tests.p2os.pioneer.world import test_importers_meshes as meshes
+from tests.p2os.pioneer.world import test_importers_odd as odd
 from tests.p2os.pioneer.world import test_importers_xml as xml
 from tests.p2os.robots.test_robot_files import MINE
 
@@ -310,6 +311,7 @@ def _world() -> str:
     ends: dict[str, object] = {"from_m": [-5, -5], "to_m": [5, -5], "points_m": [[1, 1]], "path_m": [[-2, -2], [2, -2]]}
     corners: dict[str, object] = {"vertices_m": [[4, 4, 0], [4.5, 4, 0], [4, 4.5, 0], [4, 4, 1]]}
     ends |= corners | {"triangles": [[0, 1, 3], [1, 2, 3], [2, 0, 3]], "file": "part.obj", "rise_m": 0.1}
+    ends |= {"heading_deg": 30, "scale": 0.5, "up": "z"}
     tables = {**SHAPES, "mesh": MESH_KEYS, "mark": MARK_KEYS, "import": IMPORT_KEYS}
     shown = "".join(f"[[{name}]]\n" + _rows(keys, **{"name": name, **ends}) for name, keys in tables.items())
     return _rows(TOP_KEYS, name="all", extent_m=[-5, -5, 5, 5]) + "[start]\n" + _rows(START_KEYS) + shown
@@ -333,10 +335,15 @@ def _sensor_errors() -> str:
     return 'based_on = "realistic"\n' + "".join(f"[{name}]\n{row}" for (name, _), row in zip(tables, rows, strict=True))
 
 
-def _meshes(ending: str, kind: type[str] | type[bytes]) -> Callable[[], list[Seed]]:
+def _meshes(ending: str, kind: type[str] | type[bytes], *more: str) -> Callable[[], list[Seed]]:
     """Return the wedges of the importers' tests in one format, as text or as bytes."""
     found = [data for name, data, _ in meshes.CASES.values() if name.endswith(ending) and isinstance(data, kind)]
-    return _own(*(Seed(f"seed{ending}", data if isinstance(data, bytes) else data.encode()) for data in found))
+    return _own(*(Seed(f"seed{ending}", one if isinstance(one, bytes) else one.encode()) for one in (*found, *more)))
+
+
+#: A wall with a doorway as one polygon, and a mesh whose faces need no counts.
+DOORWAY = "".join(f"v {x} 0 {z}\n" for x, z in odd.DOORWAY) + "f 1 2 3 4 5 6 7 8\nl 1 2\n"
+TRIANGLES = meshes.dae(meshes.WEDGE_Y_UP).replace("polylist", "triangles").replace("<vcount>3 3 3 3</vcount>", "")
 
 
 def _gltf(uri: str | None) -> gltf.Document:
@@ -466,10 +473,10 @@ FORMATS: Mapping[str, FileFormat] = {
     "occupancy": FileFormat(_own(_occupancy()), "words", use_world),
     "sdf": FileFormat(_own(Seed("seed.sdf", xml.SDF.encode(), _SCENE_BESIDE)), "words", use_world),
     "urdf": FileFormat(_own(Seed("seed.urdf", xml.URDF.encode(), _SCENE_BESIDE)), "words", use_world),
-    "obj": FileFormat(_meshes(".obj", str), "words", use_world),
+    "obj": FileFormat(_meshes(".obj", str, DOORWAY), "words", use_world),
     "stl": FileFormat(_meshes(".stl", str), "words", use_world),
     "stl-binary": FileFormat(_meshes(".stl", bytes), "bytes", use_world),
-    "collada": FileFormat(_meshes(".dae", str), "words", use_world),
+    "collada": FileFormat(_meshes(".dae", str, TRIANGLES), "words", use_world),
     "gltf": FileFormat(_gltf_text, "json", use_world),
     "glb": FileFormat(_own(Seed("seed.glb", gltf.glb(_gltf(None)))), "bytes", use_world),
     "fleet": FileFormat(_own(_text("seed.toml", FULL, own_toml=_flash().encode())), "toml", use_fleet),

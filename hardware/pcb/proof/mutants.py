@@ -93,9 +93,9 @@ def draw(design: Design, seed: int) -> tuple[Mutant, ...]:
             ]
         else:
             ends = [(f"{part.ref}.{pin}", net) for pin, net in part.pins if part.part.symbol not in ALIKE]
-        for pin, net in part.pins:
+        for pin, own in part.pins:
             # Two pins that the same parts join are a capacitor's.
-            others = [name for name, its in ends if its != net and joined.get(its) != joined.get(net)]
+            others = [name for name, its in ends if its != own and joined.get(its) != joined.get(own)]
             edits += [f"swap {part.ref}.{pin} {chance.choice(others)}"] if others else []
         keys = [key for key, one in PARTS.items() if one.symbol == part.part.symbol and one is not part.part]
         edits += [f"value {part.ref} {chance.choice(keys)}"] if keys else []
