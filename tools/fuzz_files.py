@@ -343,7 +343,7 @@ def _meshes(ending: str, kind: type[str] | type[bytes], *more: str) -> Callable[
 
 #: A wall with a doorway as one polygon, and a mesh whose faces need no counts.
 DOORWAY = "".join(f"v {x} 0 {z}\n" for x, z in odd.DOORWAY) + "f 1 2 3 4 5 6 7 8\nl 1 2\n"
-TRIANGLES = meshes.dae(meshes.WEDGE_Y_UP).replace("polylist", "triangles").replace("<vcount>3 3 3 3</vcount>", "")
+TRIANGLES = str(meshes.CASES["a COLLADA with Z up"][1]).replace("polylist", "triangles").replace("vcount", "extra")
 
 
 def _gltf(uri: str | None) -> gltf.Document:
