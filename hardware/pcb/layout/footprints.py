@@ -197,8 +197,8 @@ def _packages() -> list[Footprint]:
     soic = [(number, 1.27 * index - 4.445, x) for index in range(8)
             for number, x in ((index + 1, -2.475), (16 - index, 2.475))]  # fmt: skip
     return [
-        _package("SOT23", "SOT-23 (TO-236)", [_smd(n, x, y, 1.475, 0.6) for n, x, y in sot23], (0.65, 1.45), (0.65, 1.65),
-                 (-1.3, -1.6, 0.12), (1.95, 1.8), -2.4, (0.1, 1.0)),
+        _package("SOT23", "SOT-23 (TO-236)", [_smd(n, x, y, 1.475, 0.6) for n, x, y in sot23], (0.65, 1.45),
+                 (0.65, 1.65), (-1.3, -1.6, 0.12), (1.95, 1.8), -2.4, (0.1, 1.0)),
         _package("SOT223", "SOT-223 (TO-261), tab on pin 2", [*sot223, _smd("2", 3.15, 0, 2.0, 3.8)], (1.75, 3.25),
                  (-1.9, 3.45), (-3.15, -3.5, 0.15), (4.4, 3.7), -4.3, (0.1, 1.7)),
         _package("SOIC16", "SOIC-16, 3.9 x 9.9 mm, pitch 1.27 mm (MS-012)",
