@@ -67,7 +67,6 @@ unit: setup
 bench: setup
 	$(BIN)/python tools/bench/emulator.py
 	$(BIN)/python tools/bench/loops.py
-	$(BIN)/python tools/bench/buses.py
 	$(BIN)/python tools/bench/columns.py
 	$(BIN)/python tools/bench/captures.py
 	$(BIN)/python tools/bench/bodies.py

@@ -1,7 +1,7 @@
 """Fuzzing of every file that users hand in: a hostile file is read, or refused in one line that names it.
 
-    python tools/fuzz_files.py                              a few hundred cases of every format
-    python tools/fuzz_files.py --format world --cases 10000 --seed 7
+    python -m tools.fuzz_files                            a few hundred cases of every format
+    python -m tools.fuzz_files --format world --cases 10000 --seed 7
 
 Each case takes a file that is right and damages it: a value becomes one of another type or an
 extreme number, a key is dropped, doubled or misspelt, a line is cut, bytes are turned. What is
@@ -11,7 +11,6 @@ Allowed are success and the project's own errors; anything else, a second line o
 """
 
 import argparse
-import base64
 import json
 import random
 import re
@@ -20,9 +19,9 @@ import struct
 import sys
 import tempfile
 import traceback
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from importlib.resources import files
 from pathlib import Path
 from types import FrameType
@@ -36,23 +35,32 @@ from p2os.capture.formats.recording import write_recording
 from p2os.capture.formats.sources import read_file
 from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.controller import ControllerSettings, Pioneer
-from p2os.pioneer.controller.flash import load_flash
-from p2os.pioneer.sensor_errors import load_sensor_errors
+from p2os.pioneer.controller.flash import DEFAULTS, load_flash
+from p2os.pioneer.sensor_errors import REALISTIC, load_sensor_errors
 from p2os.pioneer.serve.fleet_file import load_fleet
 from p2os.pioneer.serve.fleet_order import make_fleet
 from p2os.pioneer.world import load_world
+from p2os.pioneer.world.file import IMPORT_KEYS, MARK_KEYS, MESH_KEYS, SHAPES, START_KEYS, TOP_KEYS
 from p2os.pioneer.world.model import World
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import RobotParameters, load_parameters
+from p2os.toml_schema import Key
 from robot_bench.events.codec import events_of
 from robot_bench.recording.run_record import read_run
 from robot_bench.recording.summary import outcome_of
 from robot_bench.report.page import page_data, render_page
 from robot_bench.scenario.goals.judging import judge
-from robot_bench.scenario.scenario import Scenario, known_scenarios, read_scenario
+from robot_bench.scenario.scenario import TABLES, Scenario, known_scenarios, read_scenario
 from robot_bench.scenario.world_script import WorldScript
 from simbase.errors import P2osError
 from simbase.timing import NS_PER_MS
+from tests.p2os.pioneer.serve.test_fleet_orders import FULL
+from tests.p2os.pioneer.world import test_importers_gltf as gltf
+from tests.p2os.pioneer.world import test_importers_maps as maps
+from tests.p2os.pioneer.world import test_importers_meshes as meshes
+from tests.p2os.pioneer.world import test_importers_odd as odd
+from tests.p2os.pioneer.world import test_importers_xml as xml
+from tests.p2os.robots.test_robot_files import MINE
 
 ROOT = Path(__file__).resolve().parents[1]
 GOLDEN = ROOT / "tests" / "golden"
@@ -114,7 +122,7 @@ def _stand(world: World, parameters: RobotParameters, rng: random.Random) -> Non
 def use_fleet(path: Path, _rng: random.Random) -> None:
     """Read a fleet, and make it where it is small."""
     order = load_fleet(path)
-    if len(order.robots) <= 3:
+    if len(order.robots) <= 4:
         fleet = make_fleet(order)
         together = fleet.multi_robot_world
         for part in fleet.robots if together is None else [together]:
@@ -210,309 +218,8 @@ def _text(name: str, text: str, **beside: bytes) -> Seed:
     return Seed(name, text.encode(), {key.replace("_", "."): data for key, data in beside.items()})
 
 
-WORLD = """name = "all"
-description = "one of each"
-extent_m = [-5.0, -5.0, 5.0, 5.0]
-[start]
-x_m = 0.0
-y_m = 0.0
-heading_deg = 90
-z_m = 0.0
-[[box]]
-name = "crate"
-x_m = 2.0
-y_m = 1.0
-length_m = 0.5
-width_m = 0.4
-height_m = 0.5
-heading_deg = 30
-base_m = 0.0
-floor_m = 0.0
-mass_kg = 4.0
-friction = 0.4
-[[box]]
-name = "cat"
-x_m = -2.0
-y_m = -2.0
-length_m = 0.4
-width_m = 0.2
-path_m = [[-2.0, -2.0], [2.0, -2.0]]
-speed_mps = 0.3
-start_s = 1.0
-repeat = "loop"
-[[cylinder]]
-name = "post"
-x_m = 3.0
-y_m = 3.0
-radius_m = 0.1
-height_m = 1.0
-[[wall]]
-name = "wall"
-from_m = [-5, -5]
-to_m = [5, -5]
-thickness_m = 0.1
-height_m = 1.0
-fixed = true
-[[floor]]
-name = "stage"
-x_m = -3.0
-y_m = 3.0
-length_m = 2.0
-width_m = 2.0
-top_m = 0.1
-[[ramp]]
-name = "ramp"
-x_m = 3.0
-y_m = -3.0
-length_m = 1.0
-width_m = 1.0
-rise_m = 0.1
-heading_deg = 10
-base_m = 0.0
-[[mesh]]
-name = "rock"
-vertices_m = [[4, 4, 0], [4.5, 4, 0], [4, 4.5, 0], [4, 4, 1]]
-triangles = [[0, 1, 3], [1, 2, 3], [2, 0, 3]]
-[[mark]]
-name = "dock"
-kind = "dock"
-points_m = [[1.0, 1.0]]
-[[import]]
-file = "part.obj"
-x_m = -4.0
-y_m = 0.0
-z_m = 0.0
-heading_deg = 45
-scale = 0.5
-up = "z"
-"""
-OBJ = """# a tent, and a wall with a doorway as one polygon
-v 3 3 0
-v 4 3 0
-v 4 4 0
-v 3 4 0
-v 3.5 3.5 1
-f 1 2 5
-f 2/2 3/3 5/5
-f 3//3 4//4 5//5
-f -2 1 5
-f 4 3 2 1
-l 1 2
-"""
-ARIA_MAP = """2D-Map
-LineMinPos: -3000 -3000
-LineMaxPos: 3000 3000
-NumLines: 3
-MinPos: -3000 -3000
-MaxPos: 3000 3000
-NumPoints: 3
-Resolution: 20
-Cairn: RobotHome 0 0 90.000000 "" ICON "home"
-Cairn: Goal 1000 500 0.000000 "" ICON "there"
-Cairn: ForbiddenArea 0 0 10.0 "" ICON "out" 1000 1000 2000 2000
-Cairn: Odd 0 0 0 "" ICON ""
-LINES
--3000 -3000 3000 -3000
-3000 -3000 3000 3000
-3000 3000 -3000 3000
-DATA
--2000 1000
--2020 1000
--2040 1020
-"""
-SDF = """<?xml version="1.0"?>
-<sdf version="1.6"><world name="w">
-<include><uri>model://sun</uri></include>
-<model name="m"><static>true</static><pose>2 0 0.5 0 0 0.3</pose>
-<link name="l"><pose degrees="true">0 0 0 0 0 45</pose>
-<collision name="a"><geometry><box><size>1 0.5 1</size></box></geometry></collision>
-<collision name="b"><pose>0 1 0 0.2 0 0</pose><geometry>
-<cylinder><radius>0.2</radius><length>1</length></cylinder></geometry></collision>
-<collision name="c"><geometry><sphere><radius>0.3</radius></sphere></geometry></collision>
-<collision name="d"><geometry><mesh><uri>part.obj</uri><scale>0.2 0.2 0.2</scale></mesh></geometry></collision>
-<collision name="e"><geometry><plane><normal>0 0 1</normal></plane></geometry></collision>
-</link></model>
-<include><name>again</name><uri>other.sdf</uri><pose>-3 0 0 0 0 0</pose></include>
-</world></sdf>
-"""
-OTHER_SDF = """<sdf version="1.6"><model name="n"><link name="l"><collision name="c">
-<geometry><box><size>1 1 1</size></box></geometry></collision></link></model></sdf>
-"""
-URDF = """<?xml version="1.0"?>
-<robot name="r">
-<link name="base"><collision><origin xyz="2 0 0.5" rpy="0 0 0.3"/><geometry>
-<box size="1 0.5 1"/></geometry></collision></link>
-<link name="arm"><visual><geometry><cylinder radius="0.2" length="1.0"/></geometry></visual></link>
-<link name="tip"><collision><geometry><sphere radius="0.1"/></geometry></collision>
-<collision><geometry><mesh filename="package://part.obj" scale="0.2 0.2 0.2"/></geometry></collision></link>
-<joint name="j" type="revolute"><parent link="base"/><child link="arm"/><origin xyz="0 2 0.5" rpy="0 0.1 0"/></joint>
-<joint name="k" type="fixed"><parent link="arm"/><child link="tip"/><origin xyz="0 0 1"/></joint>
-</robot>
-"""
-DAE = """<?xml version="1.0"?>
-<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
-<asset><unit meter="0.01" name="cm"/><up_axis>Z_UP</up_axis></asset>
-<library_geometries><geometry id="g"><mesh>
-<source id="p"><float_array id="a" count="12">200 200 0 300 200 0 200 300 0 200 200 100</float_array>
-<technique_common><accessor source="#a" count="4" stride="3"/></technique_common></source>
-<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
-<triangles count="2"><input semantic="VERTEX" source="#v" offset="0"/><p>0 1 3 1 2 3</p></triangles>
-<polylist count="1"><input semantic="VERTEX" source="#v" offset="0"/><vcount>3</vcount><p>2 0 3</p></polylist>
-<polygons count="1"><input semantic="VERTEX" source="#v" offset="0"/><p>0 2 1</p></polygons>
-</mesh></geometry></library_geometries>
-<library_nodes><node id="n"><instance_geometry url="#g"/></node></library_nodes>
-<library_visual_scenes><visual_scene id="s"><node>
-<translate>0 0 0</translate><rotate>0 0 1 30</rotate><scale>1 1 1</scale>
-<matrix>1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1</matrix>
-<instance_geometry url="#g"/><instance_node url="#n"/></node></visual_scene></library_visual_scenes>
-<scene><instance_visual_scene url="#s"/></scene>
-</COLLADA>
-"""
-STL_TEXT = """solid tent
-facet normal 0 0 1
-outer loop
-vertex 3 3 0
-vertex 4 3 0
-vertex 3 3 1
-endloop
-endfacet
-facet normal 0 0 1
-outer loop
-vertex 3 4 0
-vertex 4 3 0
-vertex 3 3 1
-endloop
-endfacet
-endsolid tent
-"""
-OCCUPANCY = """image: map.pgm
-resolution: 0.1
-origin: [-2.0, -2.0, 0.1]
-negate: 0
-occupied_thresh: 0.65
-free_thresh: 0.196
-mode: trinary
-"""
-PGM = b"P5\n40 40\n255\n" + bytes(0 if x in {0, 39} or y in {0, 39} else 254 for y in range(40) for x in range(40))
-FLEET = """world = "office"
-body = "kinematic"
-seed = 3
-apart = false
-[[robot]]
-port = "tcp:127.0.0.1:8101"
-at = [0.0, 0.0, 90]
-model = "p2dx"
-firmware = "AROS"
-lenient = true
-all_sonar = true
-flash = "my.flash"
-errors = "my.errors"
-baud = 38400
-aux = ["1=pty:/tmp/aux1"]
-faults = ["sonar-stuck 3 1.2"]
-sync_limit_s = 30
-[[robot]]
-count = 2
-errors = "realistic"
-"""
-FLASH = """[flash]
-name = "Wilma"
-serial = "007"
-watchdog = 1000
-sipcycle = 50
-hostbaud = 2
-auxbaud = 1
-transvelmax = 500
-rotvelmax = 100
-transacc = 300
-rotacc = 100
-frontbumps = 5
-lowbattery = 110
-ticksmm = 76
-revcount = 17048
-sonarcycle = 40
-stallval = 100
-stallcount = 100
-joyvel = 300
-rotkp = 20
-"""
-SENSOR_ERRORS = """based_on = "realistic"
-[sonar]
-noise_m = 0.02
-noise_part = 0.01
-dropout = 0.01
-specular_deg = 30
-crosstalk = 0.01
-[odometry]
-left_wheel = 1.01
-right_wheel = 0.99
-drift_deg = 0.5
-[heading]
-compass_noise_deg = 2.0
-compass_bias_deg = -5.0
-gyro_noise_counts = 0.7
-gyro_bias_counts = -1.0
-[power]
-battery_resistance_ohm = 0.15
-"""
-ARIA_ROBOT = """;SECTION GENERAL
-Section General settings
-Class Pioneer
-Subclass p2dx
-RobotRadius 250
-RobotWidth 400
-RobotLength 500
-RobotLengthFront 0
-DiffConvFactor 0.0056
-DistConvFactor 0.84
-AngleConvFactor 0.00153
-VelConvFactor 1
-RangeConvFactor 0.268
-Vel2Divisor 20
-MaxVelocity 1600
-TransAccel 300
-HasMoveCommand true
-SwitchToBaudRate 38400
-GyroScaler 1.626
-SonarNum 2
-SonarUnit 0 69 136 90
-SonarUnit 1 114 119 50
-FrontBumpers true
-NumFrontBumpers 5
-"""
-SCENARIO = """description = "one of each"
-firmware = "dodge"
-world = "room"
-robot = "p2dx"
-mode = "adapter"
-body = "kinematic"
-seed = 4
-duration_s = 12.5
-threshold_m = 0.6
-start = { x_m = 0.5, y_m = -0.5, heading_deg = 45 }
-[direct]
-step_mm_s = 50
-ramp_mm_s2 = 300
-sensor_period_ms = 20
-encoder_period_ms = 10
-bit_order = "comm1_msb"
-[adapter]
-core = "model"
-step_mm_s = 40.5
-motor_meaning = "wheels"
-max_velocity_mm_s = 150
-max_rotation_deg_s = 60
-encoder_at_open = "zero"
-[controller]
-name = "Rosie"
-sonar_per_sip = "all"
-errors = "my.errors"
-flash = "my.flash"
-[in_world.ramp]
-threshold_m = 0.4
-duration_s = 20
-start = { x_m = 0.5, y_m = 0.1 }
-[[obstacle]]
+#: Of a scenario, what its settings are not: things that come and go, faults, goals.
+SCRIPT = """[[obstacle]]
 at_s = 1.0
 name = "held"
 shape = "cylinder"
@@ -587,51 +294,82 @@ def _own(*seeds: Seed) -> Callable[[], list[Seed]]:
     return lambda: list(seeds)
 
 
-def _stl() -> Seed:
-    corners = [(3, 3, 0), (4, 3, 0), (3, 3, 1), (3, 4, 0), (4, 3, 0), (3, 3, 1)]
-    rows = [struct.pack("<12fH", 0, 0, 1, *(v for c in corners[at : at + 3] for v in c), 0) for at in (0, 3)]
-    return Seed("seed.stl", bytes(80) + struct.pack("<I", len(rows)) + b"".join(rows))
+def _rows(keys: Iterable[Key], **given: object) -> str:
+    """Return a line for each key that is no table: what is given, its default, its first choice, or 1 and the like."""
+    plain: Mapping[str, object] = {"flag": False, "number": 1.0, "whole": 1}
+    found = {}
+    for key in keys:
+        if key.kind not in {"table", "tables"}:
+            first = key.choices[0] if key.choices else plain.get(key.kind)
+            found[key.name] = given.get(key.name, first if key.default in (None, "") else key.default)
+    # JSON's values are TOML's.
+    return "".join(f"{name} = {json.dumps(value)}\n" for name, value in found.items() if value is not None)
 
 
-def _gltf() -> dict[str, object]:
-    """Return a tent, shown twice, and a strip within a node; its bytes are `_gltf_bytes`."""
-    view = {"buffer": 0, "byteOffset": 0, "byteLength": 48, "byteStride": 12}
-    return {
-        "asset": {"version": "2.0", "generator": "by hand"}, "scene": 0, "scenes": [{"nodes": [0, 3]}],
-        "nodes": [
-            {"name": "base", "translation": [2, 0, -2], "rotation": [0, 0.7071068, 0, 0.7071068], "children": [1, 2]},
+def _world() -> str:
+    """Return a world with one of each, and every key of it."""
+    ends: dict[str, object] = {"from_m": [-5, -5], "to_m": [5, -5], "points_m": [[1, 1]], "path_m": [[-2, -2], [2, -2]]}
+    corners: dict[str, object] = {"vertices_m": [[4, 4, 0], [4.5, 4, 0], [4, 4.5, 0], [4, 4, 1]]}
+    ends |= corners | {"triangles": [[0, 1, 3], [1, 2, 3], [2, 0, 3]], "file": "part.obj", "rise_m": 0.1}
+    ends |= {"heading_deg": 30, "scale": 0.5, "up": "z"}
+    tables = {**SHAPES, "mesh": MESH_KEYS, "mark": MARK_KEYS, "import": IMPORT_KEYS}
+    shown = "".join(f"[[{name}]]\n" + _rows(keys, **{"name": name, **ends}) for name, keys in tables.items())
+    return _rows(TOP_KEYS, name="all", extent_m=[-5, -5, 5, 5]) + "[start]\n" + _rows(START_KEYS) + shown
+
+
+def _scenario() -> str:
+    """Return a scenario with every setting, and a script."""
+    top = {"firmware": "dodge", "world": "room", "robot": "p2dx", "duration_s": 12.5, "record": None}
+    tables = "".join(f"{name}\n" + _rows(TABLES[name], flash="my.flash", errors="my.errors")
+                     for name in ("[start]", "[direct]", "[adapter]", "[controller]"))  # fmt: skip
+    return f"{_rows(TABLES[''], **top)}{tables}[in_world.ramp]\n{_rows(TABLES['[in_world.NAME]'])}{SCRIPT}"
+
+
+def _flash() -> str:
+    return "[flash]\n" + "".join(f"{name} = {json.dumps(value)}\n" for name, value in DEFAULTS.items())
+
+
+def _sensor_errors() -> str:
+    tables = asdict(REALISTIC).items()
+    rows = ("".join(f"{key} = {value}\n" for key, value in row.items()) for _, row in tables)
+    return 'based_on = "realistic"\n' + "".join(f"[{name}]\n{row}" for (name, _), row in zip(tables, rows, strict=True))
+
+
+def _meshes(ending: str, kind: type[str] | type[bytes], *more: str) -> Callable[[], list[Seed]]:
+    """Return the wedges of the importers' tests in one format, as text or as bytes."""
+    found = [data for name, data, _ in meshes.CASES.values() if name.endswith(ending) and isinstance(data, kind)]
+    return _own(*(Seed(f"seed{ending}", one if isinstance(one, bytes) else one.encode()) for one in (*found, *more)))
+
+
+#: A wall with a doorway as one polygon, and a mesh whose faces need no counts.
+DOORWAY = "".join(f"v {x} 0 {z}\n" for x, z in odd.DOORWAY) + "f 1 2 3 4 5 6 7 8\nl 1 2\n"
+TRIANGLES = str(meshes.CASES["a COLLADA with Z up"][1]).replace("polylist", "triangles").replace("vcount", "extra")
+
+
+def _gltf(uri: str | None) -> gltf.Document:
+    """Return a wedge, shown twice, and a strip within a node; its bytes stand at a place."""
+    strip = [{"mode": mode, "attributes": {"POSITION": 0}} for mode in (5, 1)]
+    return gltf.document(
+        scenes=[{"nodes": [0, 3]}], meshes=[*gltf.document()["meshes"], {"primitives": strip}],
+        nodes=[
+            {"translation": [2, 0, -2], "rotation": [0, 0.7071068, 0, 0.7071068], "children": [1, 2]},
             {"mesh": 0, "scale": [2, 1, 1]}, {"mesh": 1, "camera": 0},
             {"mesh": 0, "matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -2, 0, 2, 1]},
         ],
-        "meshes": [
-            {"name": "tent", "primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "material": 0}]},
-            {"primitives": [{"mode": 5, "attributes": {"POSITION": 0}}, {"mode": 1, "attributes": {"POSITION": 0}}]},
-        ],
-        "materials": [{}], "cameras": [{"type": "orthographic"}],
-        "accessors": [
-            {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 1]},
-            {"bufferView": 1, "componentType": 5123, "count": 12, "type": "SCALAR"},
-        ],
-        "bufferViews": [view, {"buffer": 0, "byteOffset": 48, "byteLength": 24}],
-        "buffers": [{"byteLength": 72}],
-    }  # fmt: skip
-
-
-def _gltf_bytes() -> bytes:
-    return struct.pack("<12f12H", *(0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 1, 0), *(0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3))
+        buffers=[{"byteLength": 72} | ({"uri": uri} if uri else {})],
+    )  # fmt: skip
 
 
 def _gltf_text() -> list[Seed]:
-    uris = ("part.bin", "data:application/octet-stream;base64," + base64.b64encode(_gltf_bytes()).decode())
-    documents = [_gltf() | {"buffers": [{"byteLength": 72, "uri": uri}]} for uri in uris]
-    return [Seed("seed.gltf", json.dumps(one, indent=1).encode(), {"part.bin": _gltf_bytes()}) for one in documents]
+    documents = [_gltf("part.bin"), gltf.document()]
+    return [Seed("seed.gltf", json.dumps(one, indent=1).encode(), {"part.bin": gltf.BYTES}) for one in documents]
 
 
-def _glb() -> Seed:
-    text = json.dumps(_gltf()).encode()
-    chunks = [(b"JSON", text + b" " * (-len(text) % 4)), (b"BIN\0", _gltf_bytes())]
-    body = b"".join(struct.pack("<I", len(data)) + kind + data for kind, data in chunks)
-    return Seed("seed.glb", struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body)
+def _occupancy() -> Seed:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "map.pgm"
+        maps.pgm(path, maps.ROOM)
+        return _text("seed.yaml", maps.YAML + "mode: trinary\n", map_pgm=path.read_bytes())
 
 
 def _sessions() -> list[Seed]:
@@ -710,12 +448,13 @@ def _traces() -> list[Seed]:
     return [_text("trace.jsonl", single), _text("trace.jsonl", blocks)]
 
 
-_OBJ_BESIDE = {"part.obj": OBJ.encode(), "other.sdf": OTHER_SDF.encode()}
-_CONTROLLER_BESIDE = {"my.flash": FLASH.encode(), "my.errors": SENSOR_ERRORS.encode()}
+_SCENE_BESIDE = {"crate.sdf": xml.CRATE.format(turn=0.5).encode(), "wedge.stl": xml.WEDGE.encode()}
+_CONTROLLER_BESIDE = {"my.flash": _flash().encode(), "my.errors": _sensor_errors().encode()}
 
 
 def _worlds() -> list[Seed]:
-    return [*_shipped("p2os.pioneer.world.worlds", ".toml"), Seed("seed.toml", WORLD.encode(), _OBJ_BESIDE)]
+    own = _text("seed.toml", _world(), part_obj=_meshes(".obj", str)()[0].data)
+    return [*_shipped("p2os.pioneer.world.worlds", ".toml"), own]
 
 
 def _robots() -> list[Seed]:
@@ -725,26 +464,26 @@ def _robots() -> list[Seed]:
 
 def _scenarios() -> list[Seed]:
     shipped = [Seed("seed.toml", _shipped_scenario(name).read_bytes()) for name in known_scenarios()]
-    return [*shipped, *[Seed("seed.toml", SCENARIO.encode(), _CONTROLLER_BESIDE)] * 3]
+    return [*shipped, *[Seed("seed.toml", _scenario().encode(), _CONTROLLER_BESIDE)] * 3]
 
 
 FORMATS: Mapping[str, FileFormat] = {
     "world": FileFormat(_worlds, "toml", use_world),
-    "aria-map": FileFormat(_own(_text("seed.map", ARIA_MAP)), "words", use_world),
-    "occupancy": FileFormat(_own(_text("seed.yaml", OCCUPANCY, map_pgm=PGM)), "words", use_world),
-    "sdf": FileFormat(_own(Seed("seed.sdf", SDF.encode(), _OBJ_BESIDE)), "words", use_world),
-    "urdf": FileFormat(_own(Seed("seed.urdf", URDF.encode(), _OBJ_BESIDE)), "words", use_world),
-    "obj": FileFormat(_own(_text("seed.obj", OBJ)), "words", use_world),
-    "stl": FileFormat(_own(_text("seed.stl", STL_TEXT)), "words", use_world),
-    "stl-binary": FileFormat(_own(_stl()), "bytes", use_world),
-    "collada": FileFormat(_own(_text("seed.dae", DAE)), "words", use_world),
+    "aria-map": FileFormat(_own(_text("seed.map", maps.ARIA)), "words", use_world),
+    "occupancy": FileFormat(_own(_occupancy()), "words", use_world),
+    "sdf": FileFormat(_own(Seed("seed.sdf", xml.SDF.encode(), _SCENE_BESIDE)), "words", use_world),
+    "urdf": FileFormat(_own(Seed("seed.urdf", xml.URDF.encode(), _SCENE_BESIDE)), "words", use_world),
+    "obj": FileFormat(_meshes(".obj", str, DOORWAY), "words", use_world),
+    "stl": FileFormat(_meshes(".stl", str), "words", use_world),
+    "stl-binary": FileFormat(_meshes(".stl", bytes), "bytes", use_world),
+    "collada": FileFormat(_meshes(".dae", str, TRIANGLES), "words", use_world),
     "gltf": FileFormat(_gltf_text, "json", use_world),
-    "glb": FileFormat(_own(_glb()), "bytes", use_world),
-    "fleet": FileFormat(_own(Seed("seed.toml", FLEET.encode(), _CONTROLLER_BESIDE)), "toml", use_fleet),
-    "flash": FileFormat(_own(_text("seed.toml", FLASH)), "toml", use_flash),
-    "sensor-errors": FileFormat(_own(_text("seed.toml", SENSOR_ERRORS)), "toml", use_sensor_errors),
+    "glb": FileFormat(_own(Seed("seed.glb", gltf.glb(_gltf(None)))), "bytes", use_world),
+    "fleet": FileFormat(_own(_text("seed.toml", FULL, own_toml=_flash().encode())), "toml", use_fleet),
+    "flash": FileFormat(_own(_text("seed.toml", _flash())), "toml", use_flash),
+    "sensor-errors": FileFormat(_own(_text("seed.toml", _sensor_errors())), "toml", use_sensor_errors),
     "robot": FileFormat(_robots, "toml", use_robot),
-    "aria-robot": FileFormat(_own(_text("seed.p", ARIA_ROBOT)), "words", use_robot),
+    "aria-robot": FileFormat(_own(_text("seed.p", MINE)), "words", use_robot),
     "scenario": FileFormat(_scenarios, "toml", use_scenario),
     "pinout": FileFormat(lambda: _shipped("adapter_sim", ".toml"), "toml", use_pinout),
     "recording": FileFormat(_recordings, "json", use_capture),

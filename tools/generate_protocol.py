@@ -2,11 +2,10 @@
 
 What stands between `<!-- table: NAME -->` and `<!-- end -->` is generated; a test
 holds the committed page to what comes out here.
-Usage: python tools/generate_protocol.py [--check]
+Usage: python tools/generate_protocol.py
 """
 
 import re
-import sys
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
@@ -322,8 +321,4 @@ def page(text: str) -> str:
 
 
 if __name__ == "__main__":
-    before = PAGE.read_text(encoding="utf-8")
-    after = page(before)
-    if "--check" in sys.argv:
-        sys.exit(before != after)
-    PAGE.write_text(after, encoding="utf-8")
+    PAGE.write_text(page(PAGE.read_text(encoding="utf-8")), encoding="utf-8")

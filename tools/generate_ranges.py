@@ -2,11 +2,10 @@
 
 What stands between `<!-- ranges: NAME -->`, or `table: NAME`, and `<!-- end -->` is generated; a test holds the
 committed pages to what comes out here.
-Usage: python tools/generate_ranges.py [--check]
+Usage: python tools/generate_ranges.py
 """
 
 import re
-import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
@@ -115,9 +114,5 @@ def page(text: str) -> str:
 
 
 if __name__ == "__main__":
-    before = {path: path.read_text(encoding="utf-8") for path in PAGES}
-    after = {path: page(text) for path, text in before.items()}
-    if "--check" in sys.argv:
-        sys.exit(before != after)
-    for path, text in after.items():
-        path.write_text(text, encoding="utf-8")
+    for path in PAGES:
+        path.write_text(page(path.read_text(encoding="utf-8")), encoding="utf-8")

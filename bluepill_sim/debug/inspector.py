@@ -14,9 +14,9 @@ from bluepill_sim.core import Register
 from bluepill_sim.core.system_control import PPB_BASE, PPB_BYTES
 from bluepill_sim.debug.target_description import REGISTERS
 from bluepill_sim.errors import BluePillError
+from bluepill_sim.fabric.registers import Peripheral
 from bluepill_sim.stm32f103 import BASES, FLASH_BASE, FLASH_BYTES_FITTED, name_at
 
-_PERIPHERAL_BYTES = 0x400
 _HANDLER_IPSR = 3
 _T_BIT = 1 << 24
 _FLAGS = 0xF800_0000
@@ -150,20 +150,20 @@ class Inspector:
                 chip.system.restore(saved[0])
                 chip.processor.systick.restore(saved[1])
                 return value
-        name = name_at(address)
-        part = None if name is None else chip.parts.by_name.get(name)
-        if part is None or name is None:
+        part, offset = self._part_at(address)
+        if part is None:
             return None
-        return part.look(address - BASES[name]) if address - BASES[name] < part.place.size else 0
+        return part.look(offset) if offset < part.place.size else 0
+
+    def _part_at(self, address: int) -> tuple[Peripheral | None, int]:
+        """Return the peripheral at an address and how far in it that is."""
+        name = name_at(address)
+        return self._board.chip.parts.by_name.get(name or ""), address - BASES.get(name or "", 0)
 
     def _write_peripheral(self, address: int, data: bytes) -> bool:
-        chip = self._board.chip
-        if PPB_BASE <= address < PPB_BASE + PPB_BYTES and len(data) in {1, 2, 4}:
-            chip.system.write(address - PPB_BASE, len(data), int.from_bytes(data, "little"))
-            return True
-        name = name_at(address)
-        part = None if name is None else chip.parts.by_name.get(name)
-        if part is None or name is None or len(data) not in {1, 2, 4}:
+        is_core = PPB_BASE <= address < PPB_BASE + PPB_BYTES
+        part, offset = (self._board.chip.system, address - PPB_BASE) if is_core else self._part_at(address)
+        if part is None or len(data) not in {1, 2, 4}:
             return False
-        part.write(address - BASES[name], len(data), int.from_bytes(data, "little"))
+        part.write(offset, len(data), int.from_bytes(data, "little"))
         return True

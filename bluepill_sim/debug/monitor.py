@@ -3,9 +3,6 @@
 Invariant: any words give lines for a person, never an exception.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
-
 from bluepill_sim.debug.execution import Execution
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.spans import to_nanos
@@ -15,27 +12,20 @@ _LEVELS = {"0": False, "1": True, "low": False, "high": True, "z": None}
 _UNKNOWN = "not understood; monitor help lists the commands"
 
 
-@dataclass(frozen=True, slots=True)
-class Command:
-    """One row of the help."""
-
-    usage: str
-    help: str
-
-
+#: How a command is called, and what it does; the first word names its method.
 COMMANDS = {
-    "help": Command("help", "this list"),
-    "reset": Command("reset", "press the reset button (halt and init are taken as well); time goes on"),
-    "time": Command("time", "virtual time, cycles, clock"),
-    "wait": Command("wait 10ms", "let time pass with the core halted; DBGMCU_CR says which watchdogs stand still"),
-    "pins": Command("pins [all]", "pins in use: mode, level, who drives"),
-    "pin": Command("pin PA4 [1|0|z]", "one pin; with a level: drive it from outside, z lets go"),
-    "registers": Command("registers TIM3 [CR1]", "registers of a peripheral with their fields"),
-    "snapshot": Command("snapshot [NAME]", "keep the whole machine's state"),
-    "restore": Command("restore [NAME]", "go back to it"),
-    "fault": Command("fault", "the fault, if there was one, with what ran before it"),
-    "blocks": Command("blocks", "the last 32 blocks and exceptions (those before the fault, if there was one)"),
-    "warnings": Command("warnings", "what was touched that is not modelled, and electrical mistakes"),
+    "help": "this list",
+    "reset": "press the reset button (halt and init are taken as well); time goes on",
+    "time": "virtual time, cycles, clock",
+    "wait 10ms": "let time pass with the core halted; DBGMCU_CR says which watchdogs stand still",
+    "pins [all]": "pins in use: mode, level, who drives",
+    "pin PA4 [1|0|z]": "one pin; with a level: drive it from outside, z lets go",
+    "registers TIM3 [CR1]": "registers of a peripheral with their fields",
+    "snapshot [NAME]": "keep the whole machine's state",
+    "restore [NAME]": "go back to it",
+    "fault": "the fault, if there was one, with what ran before it",
+    "blocks": "the last 32 blocks and exceptions (those before the fault, if there was one)",
+    "warnings": "what was touched that is not modelled, and electrical mistakes",
 }
 
 
@@ -52,28 +42,12 @@ class Monitor:
 
     def run(self, line: str) -> str:
         """Return the output of a command."""
-        words = line.split()
-        if not words:
-            words = ["help"]
-        acts: dict[str, Callable[[list[str]], str]] = {
-            "help": self._help,
-            "reset": self._reset,
-            "time": self._time,
-            "wait": self._wait,
-            "pins": self._pins,
-            "pin": self._pin,
-            "registers": self._registers,
-            "snapshot": self._snapshot,
-            "restore": self._restore,
-            "fault": self._fault,
-            "blocks": self._blocks,
-            "warnings": self._warnings,
-        }
-        act = acts.get(words[0])
-        return (f"{line}: {_UNKNOWN}" if act is None else act(words[1:])) + "\n"
+        name, *words = line.split() or ["help"]
+        is_known = any(usage.split()[0] == name for usage in COMMANDS)
+        return (getattr(self, f"_{name}")(words) if is_known else f"{line}: {_UNKNOWN}") + "\n"
 
     def _help(self, _words: list[str]) -> str:
-        return "\n".join(f"{command.usage:<22} {command.help}" for command in COMMANDS.values())
+        return "\n".join(f"{usage:<22} {text}" for usage, text in COMMANDS.items())
 
     def _reset(self, _words: list[str]) -> str:
         board = self._execution.machine.board

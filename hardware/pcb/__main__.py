@@ -15,12 +15,12 @@ from hardware.pcb.checks.results import Verdict, table
 from hardware.pcb.circuit.design import VARIANTS
 from hardware.pcb.circuit.design import build as design_of
 from hardware.pcb.circuit.netlist import DesignError
-from hardware.pcb.layout.routing import HERE, RoutingError, run_router
+from hardware.pcb.layout.routing import HERE, run_router
 from hardware.pcb.outputs import difference, generated_files, kicad_cli
-from hardware.pcb.outputs.pours import KicadMissingError
 from hardware.pcb.spice.decks import decks
 from hardware.pcb.spice.page import page_text
-from hardware.pcb.spice.run import NgspiceMissingError, SimulationError, is_installed, simulate
+from hardware.pcb.spice.run import is_installed, simulate
+from simbase.errors import P2osError
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -46,15 +46,8 @@ def main(arguments: list[str] | None = None) -> int:
     given = parser.parse_args(arguments)
     try:
         return _VERBS[given.verb](given)
-    except (
-        DesignError,
-        RoutingError,
-        KicadMissingError,
-        kicad_cli.KicadFailedError,
-        NgspiceMissingError,
-        SimulationError,
-    ) as error:
-        sys.stderr.write(f"board: {error}\n")
+    except P2osError as error:
+        sys.stderr.write(f"board: {error}\n" + (f"hint: {error.hint}\n" if error.hint else ""))
         return 1
 
 

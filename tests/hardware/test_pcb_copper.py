@@ -85,7 +85,7 @@ def test_broken_lines_of_routes_and_stitches_are_refused(tmp_path) -> None:
     broken.write_text("1000000,2000000\n12\n", encoding="utf-8")
     with pytest.raises(RoutingError, match="stitches of rev-b, line 2"):
         load_stitches("rev-b", broken)
-    with pytest.raises(RoutingError, match=r"cannot read none.txt.*stitch"):
+    with pytest.raises(RoutingError, match=r"cannot read none.txt"):
         load_stitches("rev-b", tmp_path / "none.txt")
 
 

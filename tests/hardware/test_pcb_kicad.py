@@ -13,7 +13,8 @@ from hardware.pcb.circuit.design import build as design_of
 from hardware.pcb.layout.footprints import FOOTPRINTS
 from hardware.pcb.layout.routing import RoutingError
 from hardware.pcb.outputs import generated_files, kicad_cli, pictures, pours
-from hardware.pcb.outputs.pours import KicadMissingError, fill
+from hardware.pcb.outputs.pours import fill
+from simbase.errors import MissingDependencyError
 
 needs_kicad = pytest.mark.skipif(
     kicad_cli.version() is None,
@@ -119,7 +120,7 @@ def test_a_failing_kicad_is_quoted(fake_kicad, tmp_path) -> None:
 
 def test_an_older_kicad_and_none_are_missing(fake_kicad, monkeypatch, tmp_path) -> None:
     fake_kicad(version="6.0.11")
-    with pytest.raises(KicadMissingError, match="install_board_tools"):
+    with pytest.raises(MissingDependencyError, match="KiCad 9 is not installed"):
         kicad_cli.erc(tmp_path / "x.kicad_sch")
     kicad_cli.version.cache_clear()
     monkeypatch.setenv("PATH", str(tmp_path))
@@ -142,7 +143,7 @@ def test_a_board_that_kicad_cannot_fill_and_a_python_without_kicad_are_errors(fa
     monkeypatch.delenv("PYTHONPATH")
     for pythons in (("/nonexistent/python3", None), (sys.executable,)):
         monkeypatch.setattr(pours, "_PYTHONS", pythons)
-        with pytest.raises(KicadMissingError, match="Python module"):
+        with pytest.raises(MissingDependencyError, match="Python module"):
             fill("(kicad_pcb)")
 
 

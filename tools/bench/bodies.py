@@ -6,8 +6,8 @@ not installed is left out aloud. Usage: python tools/bench/bodies.py [--quick]
 
 import math
 import statistics
-import sys
-import time
+
+from measuring import IS_QUICK, cpu_s, several
 
 from p2os.pioneer.body.factory import BODY_NAMES, make_body
 from p2os.pioneer.controller import Pioneer
@@ -21,7 +21,7 @@ from simbase.timing import NS_PER_MS, NS_PER_S
 
 P2DX = load_parameters("p2dx")
 EMPTY = parse_world('name = "empty"\nextent_m = [-4, -4, 4, 4]', "empty")
-RUNS, LIVED_S = (1, 5) if "--quick" in sys.argv else (5, 20)
+LIVED_S = 5 if IS_QUICK else 20
 #: A robot lives at least so many times as fast as real time; and ends at most so many mm, degrees, mm from the ideal.
 FASTER_THAN = {"kinematic": 100.0, "bullet": 15.0}
 WITHIN = {"kinematic": (0.001, 0.001, 0.001), "bullet": (0.5, 0.05, 1.0), "mujoco": (0.5, 0.05, 1.0)}
@@ -53,19 +53,18 @@ def errors(name: str) -> tuple[float, float, float]:
     return line * 1e3, turn, square * 1e3
 
 
-def times_real(name: str) -> float:
+def times_real(name: str, lived_s: int = LIVED_S) -> float:
     """Return how many times as fast as real time one robot drives in `room`, its eight sonar sounding."""
-    factors = []
-    for _ in range(RUNS):
-        robot = Pioneer(parameters=P2DX, body=make_body(name, load_world("room"), P2DX))
-        for number, argument in ((0, None), (1, None), (2, None), (1, None), (C.ENABLE, 1), (C.VEL, 100), (C.RVEL, 20)):
-            robot.receive(Command(number, argument).to_frame().to_bytes(), 0)
-        begin = time.process_time()
-        for at in range(100 * NS_PER_MS, LIVED_S * NS_PER_S + 1, 100 * NS_PER_MS):
+    robot = Pioneer(parameters=P2DX, body=make_body(name, load_world("room"), P2DX))
+    for number, argument in ((0, None), (1, None), (2, None), (1, None), (C.ENABLE, 1), (C.VEL, 100), (C.RVEL, 20)):
+        robot.receive(Command(number, argument).to_frame().to_bytes(), 0)
+
+    def drive() -> None:
+        for at in range(100 * NS_PER_MS, lived_s * NS_PER_S + 1, 100 * NS_PER_MS):
             robot.receive(Command(C.PULSE, None).to_frame().to_bytes(), at)
             robot.take_output()
-        factors.append(LIVED_S / (time.process_time() - begin))
-    return statistics.median(factors)
+
+    return lived_s / cpu_s(drive)
 
 
 def main() -> None:
@@ -77,7 +76,7 @@ def main() -> None:
         except MissingDependencyError as error:
             print(f"{name:<10} left out: {error} ({error.hint})")
             continue
-        factor, least = times_real(name), FASTER_THAN.get(name, 0.0)
+        factor, least = statistics.median(several(times_real, name)), FASTER_THAN.get(name, 0.0)
         missed = any(is_ > most for is_, most in zip(found, WITHIN[name], strict=True)) or factor < least
         goals = "within {:g} mm, {:g} deg, {:g} mm".format(*WITHIN[name]) + (f", {least:g} x" if least else "")
         print(

@@ -13,10 +13,11 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Callable, Iterator
 from itertools import zip_longest
 from pathlib import Path
+
+from measuring import IS_QUICK, cpu_s
 
 from p2os.capture.columns import decode
 from p2os.capture.columns.objects import rows_by_objects
@@ -43,8 +44,7 @@ from p2os.protocol.profiles import Profile
 
 SEED = 20
 PROFILE = Profile.AROS
-RUNS = 3 if "--quick" in sys.argv else 9
-PACKETS = 20_000 if "--quick" in sys.argv else 400_000
+RUNS, PACKETS = (3, 20_000) if IS_QUICK else (9, 400_000)
 DAMAGED_SHARE = 0.01
 
 FRAMER = r"""
@@ -165,16 +165,6 @@ def packets_as_objects(data: bytes) -> Iterator[ServerPacket]:
             yield read_packet(item, PROFILE)
 
 
-def best_seconds(work: Callable[[], object]) -> float:
-    """Return the shortest processor time of several runs: what others on the machine disturb least."""
-    times = []
-    for _ in range(RUNS):
-        begin = time.process_time()
-        work()
-        times.append(time.process_time() - begin)
-    return min(times)
-
-
 def framer(data: bytes) -> tuple[int, float] | None:
     """Return how many frames the C++ framer finds and its seconds, or None without a compiler."""
     compiler = shutil.which("g++") or shutil.which("c++")
@@ -206,13 +196,15 @@ def sips(count: int, sonar: int, rng: random.Random) -> bytes:
 def measure(data: bytes) -> dict[str, float]:
     """Return the figures of one stream."""
     part = data[:200_000]
-    begin = time.process_time()
-    objects = sum(1 for _ in packets_as_objects(part)) / (time.process_time() - begin)
+    found: list[ServerPacket] = []
+    took_s = cpu_s(lambda: found.extend(packets_as_objects(part)))
+    objects = len(found) / took_s
     for number, (ours, theirs) in enumerate(zip_longest(decode(part, PROFILE).rows(), rows_by_objects(part, PROFILE))):
         if ours != theirs:
             sys.exit(f"packet {number}: the columns say {ours}, the objects {theirs}")
     count = len(decode(data, PROFILE))
-    columns = count / best_seconds(lambda: decode(data, PROFILE))
+    # What others on the machine disturb least.
+    columns = count / min(cpu_s(lambda: decode(data, PROFILE)) for _ in range(RUNS))
     figures = {"packets": count, "bytes_a_packet": round(len(data) / count, 1),
                "columns_packets_a_second": round(columns), "objects_packets_a_second": round(objects)}  # fmt: skip
     compiled = framer(data)

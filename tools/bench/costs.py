@@ -9,11 +9,11 @@ Usage: python tools/bench/costs.py [--quick | --hour]; --hour adds the size of a
 import pickle
 import statistics
 import sys
-import tempfile
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+
+from measuring import IS_QUICK, RUNS, cpu_s, print_tables, row
 
 from robot_bench.bench import Bench
 from robot_bench.events.codec import Recorded
@@ -23,8 +23,7 @@ from robot_bench.scenario.scenario import Scenario, load_scenario
 from robot_bench.wires.edges import Edges
 from simbase.timing import NS_PER_S, Nanos
 
-IS_QUICK = "--quick" in sys.argv
-RUNS, RUN_S = (1, 5) if IS_QUICK else (5, 30)
+RUN_S = 5 if IS_QUICK else 30
 COPIES = 3 if IS_QUICK else 15
 LONG_S = 3600.0 if "--hour" in sys.argv else 60.0
 BODIES = ("kinematic", "bullet")
@@ -59,18 +58,6 @@ class Lines:
         self.released_until = max(self.released_until, limit)
 
 
-def cpu_s(work: Callable[[], object]) -> float:
-    """Return the CPU seconds of a piece of work."""
-    begin = time.process_time()
-    work()
-    return time.process_time() - begin
-
-
-def row(name: str, figure: str, note: str = "") -> None:
-    """Print one line of the table."""
-    print(f"{name:<60} {figure:>14}  {note}", flush=True)
-
-
 def scenario(body: str, seconds: float = RUN_S) -> Scenario:
     """Return `dodge`."""
     return load_scenario("dodge").with_options(body=body, duration_s=seconds)
@@ -90,7 +77,7 @@ def events_and_goals(folder: Path, body: str) -> None:
                 took[place] += cpu_s(lambda: bench.loop.run_until(second * NS_PER_S))  # noqa: B023 - called at once
         took[0] += cpu_s(whole.judge)
         shares.append(100 * (took[0] / took[1] - 1))
-    row(f"events and goals of dodge, {body}", f"{statistics.median(shares):+.1f} %", f"goal 3 % at most; of {RUNS}")
+    row(f"events and goals of dodge, {body}", shares, "{:+.1f} %", "goal 3 % at most")
 
 
 def booted(wanted: Scenario) -> Bench:
@@ -119,33 +106,25 @@ def copies(body: str) -> None:
     ms = {name: 1e3 * statistics.median(found) for name, found in took.items()}
     for name in ("fork", "pickle", "unpickle"):
         note = f"{len(data) / 1024:.0f} kB, its trace in it" if name == "pickle" else ""
-        row(f"dodge after 2 s, {body}: {name}", f"{ms[name]:.1f} ms", note)
-    row(f"dodge, {body}: built and run until it is booted", f"{ms['booted']:.1f} ms")
+        row(f"dodge after 2 s, {body}: {name}", ms[name], "{:.1f} ms", note)
+    row(f"dodge, {body}: built and run until it is booted", ms["booted"], "{:.1f} ms")
     factor = f"{ms['booted'] / ms['restarted']:.1f} times as fast"
-    row(f"dodge, {body}: begun anew from a snapshot of that", f"{ms['restarted']:.1f} ms", factor)
+    row(f"dodge, {body}: begun anew from a snapshot of that", ms["restarted"], "{:.1f} ms", factor)
 
 
 def long_run(folder: Path) -> None:
     """The size of a long run and of its report."""
-    virtual = int(LONG_S * NS_PER_S)
-    took = [0.0]
     made = folder / "long"
-    took[0] = cpu_s(lambda: run_scenario(scenario("kinematic", LONG_S), made))
+    took_s = cpu_s(lambda: run_scenario(scenario("kinematic", LONG_S), made))
     for path in sorted(made.iterdir()):
         if path.is_file():
-            row(f"{virtual // NS_PER_S} s of dodge, kinematic: {path.name}", f"{path.stat().st_size / 1e6:.2f} MB")
-    row(f"{virtual // NS_PER_S} s of dodge, kinematic: CPU time", f"{took[0]:.1f} s", "with trace, waveforms, report")
-
-
-def main() -> None:
-    """Print a table."""
-    with tempfile.TemporaryDirectory() as folder:
-        for body in BODIES:
-            events_and_goals(Path(folder), body)
-        for body in BODIES:
-            copies(body)
-        long_run(Path(folder))
+            row(f"{LONG_S:g} s of dodge, kinematic: {path.name}", path.stat().st_size / 1e6, "{:.2f} MB")
+    row(f"{LONG_S:g} s of dodge, kinematic: CPU time", took_s, "{:.1f} s", "with trace, waveforms, report")
 
 
 if __name__ == "__main__":
-    main()
+    print_tables(
+        *(lambda folder, body=body: events_and_goals(folder, body) for body in BODIES),  # type: ignore[misc]  # mypy knows no defaults here
+        *(lambda _folder, body=body: copies(body) for body in BODIES),  # type: ignore[misc]
+        long_run,
+    )

@@ -2,23 +2,21 @@
 
 Each row runs one program of tools/bench/firmware, built here by
 arm-none-eabi-gcc, several times in turn with what it is compared to, and prints
-the median. Run it on an idle machine. Usage: python tools/bench/emulator.py [--quick]
+the median, by CPU time. Usage: python tools/bench/emulator.py [--quick]
 """
 
 import ctypes
 import os
 import shutil
-import statistics
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from firmware.build import COMPILER
 from firmware.build import build as build_program
+from measuring import CROSS_COMPILER, RUNS, TIMES_REAL, cpu_s, print_tables, row, several
 
 from bluepill_sim import BluePill
 from bluepill_sim.analysis.probe import Probe
@@ -27,7 +25,6 @@ from bluepill_sim.core.unicorn_core import Register
 from bluepill_sim.extension.library import CORE_VARIABLE, library_path
 
 HERE = Path(__file__).parent
-RUNS = 1 if "--quick" in sys.argv else 5
 #: Program, virtual seconds a run in C and in Python, goal of the native core in times real time.
 ROWS = (
     ("compute", 1.0, 0.02, 2.0),
@@ -45,7 +42,7 @@ QEMU += ("-serial", "none")
 
 def build(name: str, folder: Path, *options: str) -> Path:
     """Return a program of tools/bench/firmware, built."""
-    return build_program(HERE / "firmware" / f"{name}.c", folder / f"{name}{len(options)}.elf", *options)
+    return build_program(HERE / "firmware" / f"{name}.c", folder / f"{name}{''.join(options)}.elf", *options)
 
 
 @contextmanager
@@ -70,15 +67,13 @@ def board(program: Path, name: str) -> BluePill:
 
 
 def factor(made: BluePill, seconds: float) -> float:
-    """Return the virtual seconds that pass in a second of the wall clock."""
-    begin = time.perf_counter()
-    made.advance_to(made.now_ns + round(seconds * 1e9))
-    return seconds / (time.perf_counter() - begin)
+    """Return the virtual seconds that pass in a CPU second."""
+    return seconds / stretch(made, seconds)
 
 
-def median(measure: Callable[[], float]) -> float:
-    """Return the median of several measurements."""
-    return statistics.median(measure() for _ in range(RUNS))
+def stretch(made: BluePill, seconds: float) -> float:
+    """Return the CPU seconds of the next virtual seconds."""
+    return cpu_s(lambda: made.advance_to(made.now_ns + round(seconds * 1e9)))
 
 
 def counter_of(made: BluePill) -> int:
@@ -92,9 +87,12 @@ def rounds_of(made: BluePill) -> Callable[[], int]:
     return lambda: made.chip.memory.read_word(at) or 0
 
 
-def row(name: str, figure: str, note: str = "") -> None:
-    """Print one line of the table."""
-    print(f"{name:<52} {figure:>12}  {note}")
+def rate(
+    rounds: Callable[[], int], work: Callable[[], object], clock: Callable[[], float] = time.process_time
+) -> float:
+    """Return the rounds a CPU second of a piece of work."""
+    before, took = rounds(), cpu_s(work, clock)
+    return (rounds() - before) / took
 
 
 def speeds(folder: Path) -> None:
@@ -102,36 +100,28 @@ def speeds(folder: Path) -> None:
     for name, native_s, python_s, goal in ROWS:
         program = build(name, folder)
         if library_path() is not None:
-            made = board(program, "native")
             note = "" if goal is None else f"goal {goal:g}"
-            row(f"{name}, native", f"{median(lambda: factor(made, native_s)):.2f} x real", note)  # noqa: B023 - called at once
-        slow = board(program, "python")
+            row(f"{name}, native", several(factor, board(program, "native"), native_s), TIMES_REAL, note)
         wanted = f"goal {PYTHON_GOALS[name]:g}" if name in PYTHON_GOALS else ""
-        row(f"{name}, Python", f"{median(lambda: factor(slow, python_s)):.3f} x real", wanted)  # noqa: B023 - as above
+        row(f"{name}, Python", several(factor, board(program, "python"), python_s), "{:.3f} x real", wanted)
     if library_path() is not None:
-        program = build("bitbang", folder)
-        figure = median(lambda: recorded(program, folder / "pins.vcd"))
-        row("bitbang, native, every edge to a VCD file", f"{figure:.2f} x real", "goal 0.2, two edges a round")
+        found = several(recorded, build("bitbang", folder), folder / "pins.vcd")
+        row("bitbang, native, every edge to a VCD file", found, TIMES_REAL, "goal 0.2, two edges a round")
         made = board(build("gpio", folder), "native")
-        row("snapshot of the whole machine", f"{1e3 * median(lambda: snapshot_s(made)):.2f} ms", "goal 1")
+        row("snapshot of the whole machine", several(lambda: 1e3 * cpu_s(made.snapshot)), "{:.2f} ms", "goal 1")
 
 
 def recorded(program: Path, path: Path) -> float:
-    """Return the virtual seconds that a second of the wall clock runs, records and writes."""
+    """Return the virtual seconds that a CPU second runs, records and writes."""
     made = board(program, "native")
     probe = Probe(made)
-    begin = time.perf_counter()
-    made.advance_to(made.now_ns + 100_000_000)
-    probe.finish()
-    write_vcd(probe, path)
-    return 0.1 / (time.perf_counter() - begin)
 
+    def whole() -> None:
+        made.advance_to(made.now_ns + 100_000_000)
+        probe.finish()
+        write_vcd(probe, path)
 
-def snapshot_s(made: BluePill) -> float:
-    """Return the seconds that a snapshot takes."""
-    begin = time.perf_counter()
-    made.snapshot()
-    return time.perf_counter() - begin
+    return 0.1 / cpu_s(whole)
 
 
 def stripped(program: Path, hook: int) -> Callable[[], float]:
@@ -147,12 +137,10 @@ def stripped(program: Path, hook: int) -> Callable[[], float]:
         core.hook_native("block", ctypes.c_void_p(hook), 0)
     core.drop_all_code()
 
-    def run() -> float:
-        before, begin = rounds(), time.thread_time()  # the clock of Unicorn's time-out is a thread of its own
+    def work() -> None:
         core.library.start(core.handle, core.registers[Register.PC] | 1, 0xFFFF_FFFF, 500_000, 0)
-        return (rounds() - before) / (time.thread_time() - begin)
 
-    return run
+    return lambda: rate(rounds, work, time.thread_time)  # the clock of Unicorn's time-out is a thread of its own
 
 
 def against_unicorn(folder: Path) -> None:
@@ -167,17 +155,11 @@ def against_unicorn(folder: Path) -> None:
     runs = {name: stripped(program, hook) for name, (hook, _) in others.items()}
     shares: dict[str, list[float]] = {name: [] for name in others}
     for _ in range(RUNS):
-        before, begin = rounds(), time.thread_time()
-        made.advance_to(made.now_ns + 2_000_000_000)
-        ours = (rounds() - before) / (time.thread_time() - begin)
+        ours = rate(rounds, lambda: made.advance_to(made.now_ns + 2_000_000_000), time.thread_time)
         for name, run in runs.items():
             shares[name].append(ours / run())
     for name, (_, note) in others.items():
-        row(
-            f"compute, to Unicorn {name} at each block",
-            f"{statistics.median(shares[name]):.2f}",
-            f"{note}; rounds, paired",
-        )
+        row(f"compute, to Unicorn {name} at each block", shares[name], "{:.2f}", f"{note}; rounds, paired")
 
 
 def qemu_cpu_s(program: Path, seconds: float, commands: str, *options: str) -> tuple[float, str]:
@@ -203,27 +185,15 @@ def against_qemu(folder: Path) -> None:
     rounds = rounds_of(made)
 
     def pair() -> float:
-        before, begin = rounds(), time.process_time()
-        made.advance_to(made.now_ns + 40_000_000_000)
-        ours = (rounds() - before) / (time.process_time() - begin)
+        ours = rate(rounds, lambda: made.advance_to(made.now_ns + 40_000_000_000))
         start_s, _ = qemu_cpu_s(program, 0.1, "", "-S")
         took_s, told = qemu_cpu_s(program, 2.0, f"stop\nxp /1wx {at:#x}\n")
         word = next(line.split(":")[1] for line in told.splitlines() if line.startswith(f"{at:016x}:"))
         return int(word, 16) / (took_s - start_s) / ours
 
-    row("compute, QEMU -icount shift=0", f"{median(pair):.2f}", "of our rounds a CPU second, paired; goal 1.45 at most")
-
-
-def main() -> int:
-    """Print the table; 1 without a compiler for it."""
-    if shutil.which(COMPILER) is None:
-        print("bench: no arm-none-eabi-gcc (hint: sudo apt-get install gcc-arm-none-eabi)")
-        return 1
-    with tempfile.TemporaryDirectory() as folder:
-        for part in (speeds, against_unicorn, against_qemu):
-            part(Path(folder))
-    return 0
+    note = "of our rounds a CPU second, paired; goal 1.45 at most"
+    row("compute, QEMU -icount shift=0", several(pair), "{:.2f}", note)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(print_tables(speeds, against_unicorn, against_qemu, needs=(CROSS_COMPILER,)))

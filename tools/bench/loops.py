@@ -4,20 +4,17 @@ The chip runs alone; times are CPU time, medians of runs in turn with what they 
 of tools/bench/firmware. Usage: python tools/bench/loops.py [--quick]
 """
 
-import shutil
 import statistics
 import sys
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-from emulator import RUNS, SETTLED_NS, build, rounds_of, row
-from shares import cpu_s
+from emulator import SETTLED_NS, build, factor, rate, rounds_of, stretch
+from measuring import CROSS_COMPILER, IS_QUICK, RUNS, TIMES_REAL, print_tables, row, several
 
 from bluepill_sim import BluePill
 from simbase.timing import NS_PER_S
 
-IS_QUICK = "--quick" in sys.argv
 #: Virtual seconds of a run.
 LOOP_S, IDLE_S, COMPUTE_S = (0.05, 5.0, 0.2) if IS_QUICK else (0.5, 60.0, 2.0)
 #: What is polled: words for a person, and how loop.c is built for it.
@@ -35,14 +32,14 @@ def settled(program: Path) -> BluePill:
     return board
 
 
-def stretch(board: BluePill, seconds: float) -> float:
-    """Return the CPU seconds of the next virtual seconds."""
-    return cpu_s(lambda: board.advance_to(board.now_ns + round(seconds * NS_PER_S)))
-
-
 def in_turn(*measures: Callable[[], float]) -> list[list[float]]:
     """Return several measurements of each."""
     return list(map(list, zip(*([measure() for measure in measures] for _ in range(RUNS)), strict=True)))
+
+
+def ratios(ones: list[float], others: list[float]) -> list[float]:
+    """Return the ratios of measurements that were made in turn."""
+    return [one / other for one, other in zip(ones, others, strict=True)]
 
 
 def rounds_a_second(program: Path, seconds: float) -> Callable[[], float]:
@@ -50,75 +47,50 @@ def rounds_a_second(program: Path, seconds: float) -> Callable[[], float]:
     board = settled(program)
     rounds = rounds_of(board)
 
-    def run() -> float:
-        before = rounds()
-        took = stretch(board, seconds)
-        if rounds() == before:
-            sys.exit(f"bench: {program.stem} does not run")
-        return (rounds() - before) / took
-
-    return run
+    return lambda: rate(rounds, lambda: stretch(board, seconds)) or sys.exit(f"bench: {program.stem} does not run")
 
 
 def faults(folder: Path) -> None:
     """A handled fault against an SVC."""
     calls, handled = in_turn(
-        rounds_a_second(build("loop", folder / "svc", "-DBENCH_SVC"), LOOP_S),
-        rounds_a_second(build("loop", folder / "udf", "-DBENCH_UDF"), LOOP_S),
+        rounds_a_second(build("loop", folder, "-DBENCH_SVC"), LOOP_S),
+        rounds_a_second(build("loop", folder, "-DBENCH_UDF"), LOOP_S),
     )
-    row("an SVC and its return", f"{1e6 / statistics.median(calls):.2f} us", "CPU time of a round")
-    share = statistics.median(b / a for a, b in zip(calls, handled, strict=True))
-    row("a handled UDF: rounds to those of SVC", f"{share:.2f}", "goal 0.7")
+    row("an SVC and its return", [1e6 / rounds for rounds in calls], "{:.2f} us", "CPU time of a round")
+    row("a handled UDF: rounds to those of SVC", ratios(handled, calls), "{:.2f}", "goal 0.7")
 
 
 def polling(folder: Path) -> None:
     """Registers that are read or written over and over."""
     for name, option in POLLED.items():
-        board = settled(build("loop", folder / option.removeprefix("-D"), option))
-        times = [LOOP_S / stretch(board, LOOP_S) for _ in range(RUNS)]
-        row(f"polling {name}, 72 MHz", f"{statistics.median(times):.2f} x real", "goal 1")
+        board = settled(build("loop", folder, option))
+        row(f"polling {name}, 72 MHz", several(factor, board, LOOP_S), TIMES_REAL, "goal 1")
 
 
 def unoptimised(folder: Path) -> None:
     """The same source at -O0 and at -O2, and each restored from its snapshot."""
-    boards = {level: settled(build("compute", folder / level, f"-{level}")) for level in ("O2", "O0")}
-    restored = {}
-    for level, board in boards.items():
-        board.advance_to(board.now_ns + NS_PER_S // 10)
-        restored[level] = BluePill(folder / level / "compute1.elf")
-        restored[level].restore(board.snapshot())
-        stretch(restored[level], COMPUTE_S / 10)
-    everyone = [*boards.values(), *restored.values()]
+    boards, restored = [], []
+    for level in ("-O2", "-O0"):
+        program = build("compute", folder, level)
+        boards.append(settled(program))
+        boards[-1].advance_to(boards[-1].now_ns + NS_PER_S // 10)
+        restored.append(BluePill(program))
+        restored[-1].restore(boards[-1].snapshot())
+        stretch(restored[-1], COMPUTE_S / 10)
+    everyone = [*boards, *restored]
     fast, slow, again, slow_again = in_turn(*(lambda board=board: stretch(board, COMPUTE_S) for board in everyone))
     mega = [72 * COMPUTE_S / statistics.median(took) for took in (fast, slow)]
     row("compute, Mcycles a CPU second: -O2, -O0", f"{mega[0]:.0f}, {mega[1]:.0f}")
-    ratio = statistics.median(a / b for a, b in zip(fast, slow, strict=True))
-    row("compute, -O0 to -O2 in Mcycles a CPU second", f"{ratio:.2f}", "goal 0.7")
+    row("compute, -O0 to -O2 in Mcycles a CPU second", ratios(fast, slow), "{:.2f}", "goal 0.7")
     for name, own, other in (("-O2", fast, again), ("-O0", slow, slow_again)):
-        ratio = statistics.median(a / b for a, b in zip(own, other, strict=True))
-        row(f"compute {name}, restored on another board", f"{ratio:.2f}", "of itself; goal 0.9 to 1.1")
+        row(f"compute {name}, restored on another board", ratios(own, other), "{:.2f}", "of itself; goal 0.9 to 1.1")
 
 
 def idle(folder: Path) -> None:
     """Sleep between interrupts of 1 kHz."""
     board = settled(build("systick", folder))
-    times = [IDLE_S / stretch(board, IDLE_S) for _ in range(RUNS)]
-    row("asleep between SysTicks of 1 kHz", f"{statistics.median(times):.0f} x real", "goal 150")
-
-
-def main() -> int:
-    """Print the table; 1 without a compiler for it."""
-    if shutil.which("arm-none-eabi-gcc") is None:
-        print("bench: no arm-none-eabi-gcc (hint: sudo apt-get install gcc-arm-none-eabi)")
-        return 1
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        for level in ("svc", "udf", "O2", "O0", *(option.removeprefix("-D") for option in POLLED.values())):
-            (folder / level).mkdir()
-        for part in (faults, polling, unoptimised, idle):
-            part(folder)
-    return 0
+    row("asleep between SysTicks of 1 kHz", several(factor, board, IDLE_S), "{:.0f} x real", "goal 150")
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(print_tables(faults, polling, unoptimised, idle, needs=(CROSS_COMPILER,)))

@@ -5,6 +5,7 @@ the board: flash, straps and what pulls them, input-only pins, double use, JTAG 
 SWD, 5 V on pins that bear 3.3 V. The same rules judge the thesis's two maps.
 """
 
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -81,11 +82,12 @@ def findings(pinout: Pinout, board: Board) -> list[Finding]:
             found += _double(wire.name, pin, taken)
     for name, pin, direction in [*_auxiliaries(pinout, board.revision), *board.extra]:
         number = gpio(pin)
-        if number is not None and direction == "out" and number in INPUT_ONLY_GPIO:
-            found.append(Finding(rule="input-only", signal=name, text=f"{pin} cannot drive"))
-        if dict(board.volts).get(name, LOGIC_V) > ESP32_MAX_V:
-            volts = dict(board.volts)[name]
-            found.append(Finding(rule="5V", signal=name, text=f"{volts:g} V on {pin}, which bears {ESP32_MAX_V:g} V"))
+        volts = dict(board.volts).get(name, LOGIC_V)
+        found += _broken(
+            name,
+            ("input-only", direction == "out" and number in INPUT_ONLY_GPIO, f"{pin} cannot drive"),
+            ("5V", volts > ESP32_MAX_V, f"{volts:g} V on {pin}, which bears {ESP32_MAX_V:g} V"),
+        )
         shared = {auxiliary.shares for auxiliary in pinout.auxiliaries if auxiliary.name == name}
         if taken.get(pin) not in shared:
             found += _double(name, pin, taken)
@@ -94,10 +96,7 @@ def findings(pinout: Pinout, board: Board) -> list[Finding]:
 
 def count_by_rule(found: Iterable[Finding]) -> dict[str, int]:
     """Return how often each rule is broken, rules sorted."""
-    counts: dict[str, int] = {}
-    for finding in found:
-        counts[finding.rule] = counts.get(finding.rule, 0) + 1
-    return dict(sorted(counts.items()))
+    return dict(sorted(Counter(finding.rule for finding in found).items()))
 
 
 def gpio(pin: str | None) -> int | None:
@@ -117,56 +116,45 @@ def _auxiliaries(pinout: Pinout, revision: str) -> list[tuple[str, str, str]]:
 
 
 def _double(signal: str, pin: str, taken: dict[str, str]) -> list[Finding]:
-    if pin in taken:
-        return [Finding(rule="double", signal=signal, text=f"{pin} is {taken[pin]} already")]
-    taken[pin] = signal
-    return []
+    found = _broken(signal, ("double", pin in taken, f"{pin} is {taken.get(pin)} already"))
+    taken.setdefault(pin, signal)
+    return found
+
+
+def _broken(signal: str, *rows: tuple[str, bool, str]) -> list[Finding]:
+    """Return those of a signal's rules, each with whether it is broken, that are."""
+    return [Finding(rule=rule, signal=signal, text=text) for rule, is_broken, text in rows if is_broken]
 
 
 def _bluepill(wire: Wire, volts: float) -> list[Finding]:
-    found = []
-    if wire.bluepill not in BLUEPILL_PINS:
-        found.append(Finding(rule="no-pin", signal=wire.name, text=f"the BluePill has no pin {wire.bluepill}"))
-    if wire.bluepill in SWD:
-        found.append(Finding(rule="swd", signal=wire.name, text=f"{wire.bluepill} is the debug port"))
-    if wire.bluepill in JTAG_ONLY and wire.direction is Direction.TO_ADAPTER:
-        text = f"{wire.bluepill} is a JTAG output until the program sets AFIO SWJ_CFG"
-        found.append(Finding(rule="jtag", signal=wire.name, text=text))
-    if volts > LOGIC_V and wire.bluepill in NOT_5V_TOLERANT:
-        found.append(Finding(rule="5V", signal=wire.name, text=f"{volts:g} V on {wire.bluepill}, not 5 V tolerant"))
-    return found
+    pin = wire.bluepill
+    is_driven = pin in JTAG_ONLY and wire.direction is Direction.TO_ADAPTER
+    return _broken(
+        wire.name,
+        ("no-pin", pin not in BLUEPILL_PINS, f"the BluePill has no pin {pin}"),
+        ("swd", pin in SWD, f"{pin} is the debug port"),
+        ("jtag", is_driven, f"{pin} is a JTAG output until the program sets AFIO SWJ_CFG"),
+        ("5V", volts > LOGIC_V and pin in NOT_5V_TOLERANT, f"{volts:g} V on {pin}, not 5 V tolerant"),
+    )
 
 
 def _esp32(wire: Wire, pin: str | None, board: Board) -> list[Finding]:
-    if pin is None:
-        return [Finding(rule="no-pin", signal=wire.name, text="no pin of the ESP32")]
     number = gpio(pin)
-    if number is None:
-        return []
-    found = []
-    if pin not in ESP32_PINS:
-        found.append(Finding(rule="no-pin", signal=wire.name, text=f"the module does not bring out {pin}"))
-    if number in FLASH_GPIO:
-        found.append(Finding(rule="flash", signal=wire.name, text=f"{pin} carries the module's flash"))
-    if wire.direction is Direction.TO_BLUEPILL and number in INPUT_ONLY_GPIO:
-        found.append(Finding(rule="input-only", signal=wire.name, text=f"{pin} cannot drive"))
-    if wire.direction is Direction.TO_ADAPTER and number in STRAP_GPIO:
-        found.append(Finding(rule="strap", signal=wire.name, text=f"{pin} is a strap, but the BluePill drives it"))
-    if pin in STRAP_LEVEL:
-        found += _strap_pull(wire, pin, is_down=board.pulls_all_down or wire.pull is Pull.DOWN)
-    if dict(board.volts).get(wire.name, LOGIC_V) > ESP32_MAX_V:
-        found.append(Finding(rule="5V", signal=wire.name, text=f"5 V on {pin}, which bears {ESP32_MAX_V:g} V"))
-    if wire.bluepill in JTAG_ONLY and not board.has_series_resistors:
-        text = f"{wire.bluepill} is a JTAG pin after reset and meets {pin} without a resistor"
-        found.append(Finding(rule="jtag", signal=wire.name, text=text))
-    return found
-
-
-def _strap_pull(wire: Wire, pin: str, *, is_down: bool) -> list[Finding]:
-    """Judge the board's resistor at a strap: it must not say the opposite, and IO12 needs one."""
-    level = STRAP_LEVEL[pin]
-    if level and is_down:
-        return [Finding(rule="strap", signal=wire.name, text=f"{pin} must be high at reset, but is pulled down")]
-    if pin == "IO12" and not is_down:
-        return [Finding(rule="strap", signal=wire.name, text="IO12 needs a pull-down: high selects 1.8 V flash")]
-    return []
+    if pin is None or number is None:
+        return _broken(wire.name, ("no-pin", pin is None, "no pin of the ESP32"))
+    is_down = board.pulls_all_down or wire.pull is Pull.DOWN
+    is_driven = wire.direction is Direction.TO_ADAPTER
+    volts = dict(board.volts).get(wire.name, LOGIC_V)
+    has_jtag = wire.bluepill in JTAG_ONLY and not board.has_series_resistors
+    return _broken(
+        wire.name,
+        ("no-pin", pin not in ESP32_PINS, f"the module does not bring out {pin}"),
+        ("flash", number in FLASH_GPIO, f"{pin} carries the module's flash"),
+        ("input-only", not is_driven and number in INPUT_ONLY_GPIO, f"{pin} cannot drive"),
+        ("strap", is_driven and number in STRAP_GPIO, f"{pin} is a strap, but the BluePill drives it"),
+        # The board's resistor at a strap must not say the opposite, and IO12 needs one.
+        ("strap", is_down and STRAP_LEVEL.get(pin, False), f"{pin} must be high at reset, but is pulled down"),
+        ("strap", not is_down and pin == "IO12", "IO12 needs a pull-down: high selects 1.8 V flash"),
+        ("5V", volts > ESP32_MAX_V, f"5 V on {pin}, which bears {ESP32_MAX_V:g} V"),
+        ("jtag", has_jtag, f"{wire.bluepill} is a JTAG pin after reset and meets {pin} without a resistor"),
+    )

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from hardware.pcb.circuit.parts import PARTS, Part
+from simbase.errors import P2osError
 
 #: Nets that carry supply current: at least 0.8 mm of copper (rules.py).
 POWER_NETS = frozenset({
@@ -15,7 +16,7 @@ POWER_NETS = frozenset({
 })  # fmt: skip
 
 
-class DesignError(ValueError):
+class DesignError(P2osError):
     """The design contradicts itself."""
 
 

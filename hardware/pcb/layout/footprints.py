@@ -12,7 +12,7 @@ drills with KiCad's own library where that is installed.
 Invariant: a footprint's pads have the numbers of its symbol's pins.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 
 from hardware.pcb.circuit.modules import BLUEPILL_PINS, ESP32_PINS, ESP32_SILKSCREEN
@@ -167,51 +167,44 @@ def _chip(
     )
 
 
-def _sot23() -> Footprint:
-    pads = (
-        _smd("1", -0.9375, -0.95, 1.475, 0.6),
-        _smd("2", -0.9375, 0.95, 1.475, 0.6),
-        _smd("3", 0.9375, 0, 1.475, 0.6),
-    )
-    silk = [Line(layer="F.SilkS", start_mm=(0.65, y), end_mm=(-0.65, y)) for y in (-1.65, 1.65)]
+def _package(
+    name: str,
+    description: str,
+    pads: Iterable[Pad],
+    half: tuple[float, float],
+    silk: tuple[float, float],
+    dot: tuple[float, float, float],
+    yard: tuple[float, float],
+    ref_y_mm: float,
+    z_mm: tuple[float, float],
+) -> Footprint:
+    """Draw a small package: half its body, half of its two strokes, its dot with its radius, half its courtyard."""
+    x, y = half
+    strokes = [Line(layer="F.SilkS", start_mm=(silk[0], at), end_mm=(-silk[0], at)) for at in (-silk[1], silk[1])]
     return Footprint(
-        name="SOT23", description="SOT-23 (TO-236)", pads=pads,
-        drawings=(*rectangle("F.Fab", -0.65, -1.45, 0.65, 1.45, 0.1), *silk,
-                  Circle(layer="F.SilkS", center_mm=(-1.3, -1.6), radius_mm=0.12, is_filled=True),
-                  *courtyard(-1.95, -1.8, 1.95, 1.8)),
-        ref_at_mm=(0, -2.4),
-        boxes=(Box(center_mm=(0, 0), size_mm=(1.3, 2.9), z_mm=(0.1, 1.0), colour=BLACK),),
+        name=name, description=description, pads=tuple(pads),
+        drawings=(*rectangle("F.Fab", -x, -y, x, y, 0.1), *strokes,
+                  Circle(layer="F.SilkS", center_mm=dot[:2], radius_mm=dot[2], is_filled=True),
+                  *courtyard(-yard[0], -yard[1], *yard)),
+        ref_at_mm=(0, ref_y_mm),
+        boxes=(Box(center_mm=(0, 0), size_mm=(2 * x, 2 * y), z_mm=z_mm, colour=BLACK),),
     )  # fmt: skip
 
 
-def _sot223() -> Footprint:
-    pads = tuple(_smd(str(n), -3.15, y, 2.0, 1.5) for n, y in ((1, -2.3), (2, 0.0), (3, 2.3)))
-    silk = [Line(layer="F.SilkS", start_mm=(-1.9, y), end_mm=(1.9, y)) for y in (-3.45, 3.45)]
-    return Footprint(
-        name="SOT223", description="SOT-223 (TO-261), tab on pin 2",
-        pads=(*pads, _smd("2", 3.15, 0, 2.0, 3.8)),
-        drawings=(*rectangle("F.Fab", -1.75, -3.25, 1.75, 3.25, 0.1), *silk,
-                  Circle(layer="F.SilkS", center_mm=(-3.15, -3.5), radius_mm=0.15, is_filled=True),
-                  *courtyard(-4.4, -3.7, 4.4, 3.7)),
-        ref_at_mm=(0, -4.3),
-        boxes=(Box(center_mm=(0, 0), size_mm=(3.5, 6.5), z_mm=(0.1, 1.7), colour=BLACK),),
-    )  # fmt: skip
-
-
-def _soic16() -> Footprint:
-    pads = []
-    for index in range(8):
-        y = -4.445 + 1.27 * index
-        pads += [_smd(str(index + 1), -2.475, y, 1.95, 0.6), _smd(str(16 - index), 2.475, y, 1.95, 0.6)]
-    silk = [Line(layer="F.SilkS", start_mm=(-1.95, y), end_mm=(1.95, y)) for y in (-5.1, 5.1)]
-    return Footprint(
-        name="SOIC16", description="SOIC-16, 3.9 x 9.9 mm, pitch 1.27 mm (MS-012)", pads=tuple(pads),
-        drawings=(*rectangle("F.Fab", -1.95, -4.95, 1.95, 4.95, 0.1), *silk,
-                  Circle(layer="F.SilkS", center_mm=(-3.9, -4.445), radius_mm=0.2, is_filled=True),
-                  *courtyard(-3.7, -5.35, 3.7, 5.35)),
-        ref_at_mm=(0, -5.9),
-        boxes=(Box(center_mm=(0, 0), size_mm=(3.9, 9.9), z_mm=(0.15, 1.65), colour=BLACK),),
-    )  # fmt: skip
+def _packages() -> list[Footprint]:
+    sot23 = (("1", -0.9375, -0.95), ("2", -0.9375, 0.95), ("3", 0.9375, 0))
+    sot223 = [_smd(str(n), -3.15, y, 2.0, 1.5) for n, y in ((1, -2.3), (2, 0.0), (3, 2.3))]
+    soic = [(number, 1.27 * index - 4.445, x) for index in range(8)
+            for number, x in ((index + 1, -2.475), (16 - index, 2.475))]  # fmt: skip
+    return [
+        _package("SOT23", "SOT-23 (TO-236)", [_smd(n, x, y, 1.475, 0.6) for n, x, y in sot23], (0.65, 1.45),
+                 (0.65, 1.65), (-1.3, -1.6, 0.12), (1.95, 1.8), -2.4, (0.1, 1.0)),
+        _package("SOT223", "SOT-223 (TO-261), tab on pin 2", [*sot223, _smd("2", 3.15, 0, 2.0, 3.8)], (1.75, 3.25),
+                 (-1.9, 3.45), (-3.15, -3.5, 0.15), (4.4, 3.7), -4.3, (0.1, 1.7)),
+        _package("SOIC16", "SOIC-16, 3.9 x 9.9 mm, pitch 1.27 mm (MS-012)",
+                 [_smd(str(number), x, y, 1.95, 0.6) for number, y, x in soic], (1.95, 4.95), (-1.95, 5.1),
+                 (-3.9, -4.445, 0.2), (3.7, 5.35), -5.9, (0.15, 1.65)),
+    ]  # fmt: skip
 
 
 def _header(name: str, columns: int, rows: int) -> Footprint:
@@ -354,7 +347,7 @@ def _all() -> list[Footprint]:
         _chip("D_SMA", (2.0, 2.5, 1.8), (4.3, 2.6, 2.3), ("K", "A")),
         _chip("D_SMB", (2.15, 2.5, 2.3), (4.4, 3.6, 2.3), ("K", "A")),
         _chip("F_1812", (2.1375, 1.125, 3.4), (4.5, 3.2, 1.6), colour=GREEN),
-        _sot23(), _sot223(), _soic16(), _terminal(), _jst_vh(), _buck(), _radial(), _de9(), _test_point(),
+        *_packages(), _terminal(), _jst_vh(), _buck(), _radial(), _de9(), _test_point(),
         _mounting_hole(),
         _header("HEADER_1X2", 1, 2), _header("HEADER_1X3", 1, 3), _header("HEADER_2X12", 2, 12),
         _box_header(),

@@ -59,7 +59,7 @@ def row_order() -> list[str]:
 
 def silk_labels(design: Design) -> list[Label]:
     """Return the texts of the board that belong to no part."""
-    return [*_TEXTS, *_header_names(design), *_row_names(), *_TEXTS_OF[design.variant]]
+    return [*_TEXTS, *_header_names(design), *_TEXTS_OF[design.variant]]
 
 
 def short_name(wire: str) -> str:
@@ -86,10 +86,6 @@ def _rows(design: Design) -> dict[str, Place]:
         if pull in refs:
             places[pull] = Place(x_mm=PULL_X_MM, y_mm=y, ref_mm=(3.1, 0))
     return places
-
-
-def _row_names() -> list[Label]:
-    return []
 
 
 def _header_names(design: Design) -> list[Label]:

@@ -18,13 +18,14 @@ from hardware.pcb.layout import rules
 from hardware.pcb.layout.footprints import ANTENNA_AREA_MM, FOOTPRINTS
 from hardware.pcb.layout.placement import ESP32_AT_MM, Place, place
 from hardware.pcb.layout.shapes import Pad, PadKind
+from simbase.errors import P2osError
 
 HERE = Path(__file__).parents[1]
 #: A screw's head and its washer: no track below.
 SCREW_RADIUS_MM = 3.3
 
 
-class RoutingError(ValueError):
+class RoutingError(P2osError):
     """A routing result is missing, is stale or cannot be read."""
 
 
@@ -132,21 +133,12 @@ def run_router(design: Design) -> str:
     """
     compiler = shutil.which("g++") or shutil.which("clang++")
     if compiler is None:
-        raise RoutingError("no C++ compiler found (hint: apt-get install g++)")
+        raise RoutingError("no C++ compiler found", hint="apt-get install g++")
     with tempfile.TemporaryDirectory() as folder:
         program = Path(folder) / "router"
         source = HERE / "router" / "router.cpp"
-        command = [
-            compiler,
-            "-std=c++17",
-            "-O2",
-            "-ffp-contract=off",
-            "-Wall",
-            "-Wextra",
-            str(source),
-            "-o",
-            str(program),
-        ]
+        flags = ("-std=c++17", "-O2", "-ffp-contract=off", "-Wall", "-Wextra")
+        command = [compiler, *flags, str(source), "-o", str(program)]
         built = subprocess.run(command, capture_output=True, text=True, check=False)
         if built.returncode != 0:
             raise RoutingError(f"the router does not compile:\n{built.stderr}")
@@ -156,6 +148,19 @@ def run_router(design: Design) -> str:
     return f"# input {fingerprint(design)}\n{ran.stdout}"
 
 
+def read_lines(file: Path, verb: str) -> list[str]:
+    """Return the lines of a committed result of a verb of `python -m hardware.pcb`.
+
+    Raises:
+        RoutingError: It cannot be read.
+    """
+    try:
+        return file.read_text(encoding="utf-8").splitlines()
+    except OSError as error:
+        hint = f"python -m hardware.pcb {verb}"
+        raise RoutingError(f"cannot read {file.name}: {error.strerror}", hint=hint) from error
+
+
 def load_routes(design: Design, path: Path | None = None) -> tuple[list[Track], list[Via]]:
     """Read the committed routing of a variant.
 
@@ -163,12 +168,9 @@ def load_routes(design: Design, path: Path | None = None) -> tuple[list[Track], 
         RoutingError: It is missing, broken, or was made for another placement.
     """
     file = path or HERE / "routes" / f"{design.variant}.txt"
-    try:
-        lines = file.read_text(encoding="utf-8").splitlines()
-    except OSError as error:
-        raise RoutingError(f"cannot read {file.name}: {error.strerror} (hint: python -m hardware.pcb route)") from error
+    lines = read_lines(file, "route")
     if not lines or lines[0] != f"# input {fingerprint(design)}":
-        raise RoutingError(f"{file.name} was made for another placement (hint: python -m hardware.pcb route)")
+        raise RoutingError(f"{file.name} was made for another placement", hint="python -m hardware.pcb route")
     tracks, vias = [], []
     for number, line in enumerate(lines[1:], start=2):
         kind, net, *rest = line.split()

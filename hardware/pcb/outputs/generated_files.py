@@ -72,7 +72,7 @@ def filled_project(variant: str, folder: Path) -> Path:
     """Write a variant's project with filled pours below a folder; return its board.
 
     Raises:
-        KicadMissingError: KiCad is not installed.
+        MissingDependencyError: KiCad is not installed.
     """
     target = folder / variant
     shutil.copytree(GENERATED / variant, target, dirs_exist_ok=True)

@@ -14,15 +14,15 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from hardware.pcb.outputs.pours import KicadMissingError
 from hardware.pcb.outputs.sexp import children, parse, word
+from simbase.errors import MissingDependencyError, P2osError
 
 _LIMIT_S = 400
 NEEDED_MAJOR = 9
 GERBER_LAYERS = "F.Cu,B.Cu,F.Mask,B.Mask,F.Paste,F.SilkS,Edge.Cuts"
 
 
-class KicadFailedError(RuntimeError):
+class KicadFailedError(P2osError):
     """kicad-cli ended with an error."""
 
 
@@ -56,11 +56,11 @@ def run(*arguments: str | Path, good: tuple[int, ...] = (0,)) -> str:
     """Run kicad-cli and return what it printed.
 
     Raises:
-        KicadMissingError: There is no KiCad 9.
+        MissingDependencyError: There is no KiCad 9.
         KicadFailedError: It ended with another exit code than expected.
     """
     if version() is None:
-        raise KicadMissingError("KiCad 9 is not installed (hint: tools/install_board_tools.sh)")
+        raise MissingDependencyError("KiCad 9 is not installed", hint="tools/install_board_tools.sh")
     with tempfile.TemporaryDirectory() as home:
         done = subprocess.run(["kicad-cli", *map(str, arguments)], capture_output=True, text=True, timeout=_LIMIT_S,
                               check=False, env=_environment(home))  # fmt: skip
@@ -69,40 +69,47 @@ def run(*arguments: str | Path, good: tuple[int, ...] = (0,)) -> str:
     return done.stdout
 
 
+def written(*arguments: str | Path, source: Path) -> str:
+    """Run kicad-cli on a file and return what it wrote.
+
+    Raises:
+        MissingDependencyError: As `run`.
+        KicadFailedError: As `run`.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "written"
+        run(*arguments, "-o", file, source)
+        return file.read_text(encoding="utf-8")
+
+
+_ERC = ("sch", "erc", "--severity-all")
+_DRC = ("pcb", "drc", "--severity-all", "--schematic-parity")
+
+
 def erc(schematic: Path) -> list[Violation]:
     """Return every finding of the electrical rule check, warnings included."""
-    with tempfile.TemporaryDirectory() as folder:
-        report = Path(folder) / "erc.json"
-        run("sch", "erc", "--severity-all", "--format", "json", "-o", report, schematic)
-        sheets = json.loads(report.read_text(encoding="utf-8"))["sheets"]
+    sheets = json.loads(written(*_ERC, "--format", "json", source=schematic))["sheets"]
     return [_violation(entry) for sheet in sheets for entry in sheet["violations"]]
 
 
 def drc(board: Path) -> list[Violation]:
     """Return every finding of the design rule check, unconnected items and differences to the schematic included."""
-    with tempfile.TemporaryDirectory() as folder:
-        report = Path(folder) / "drc.json"
-        run("pcb", "drc", "--severity-all", "--schematic-parity", "--format", "json", "-o", report, board)
-        found = json.loads(report.read_text(encoding="utf-8"))
+    found = json.loads(written(*_DRC, "--format", "json", source=board))
     groups = ("violations", "unconnected_items", "schematic_parity")
     return [_violation(entry) for group in groups for entry in found[group]]
 
 
 def reports(variant: str, schematic: Path, board: Path) -> dict[str, str]:
     """Return KiCad's own reports of both rule checks by file name, without their dates."""
-    with tempfile.TemporaryDirectory() as folder:
-        erc_file, drc_file = Path(folder) / f"{variant}-erc.rpt", Path(folder) / f"{variant}-drc.rpt"
-        run("sch", "erc", "--severity-all", "-o", erc_file, schematic)
-        run("pcb", "drc", "--severity-all", "--schematic-parity", "-o", drc_file, board)
-        return {file.name: without_dates(file.read_text(encoding="utf-8")) for file in (erc_file, drc_file)}
+    calls = {"erc": (_ERC, schematic), "drc": (_DRC, board)}
+    return {
+        f"{variant}-{name}.rpt": without_dates(written(*words, source=file)) for name, (words, file) in calls.items()
+    }
 
 
 def netlist(schematic: Path) -> dict[str, list[tuple[str, str]]]:
     """Return the nets that KiCad reads from a schematic: name to sorted (reference, pin)."""
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "netlist.net"
-        run("sch", "export", "netlist", "--format", "kicadsexpr", "-o", file, schematic)
-        tree = parse(file.read_text(encoding="utf-8"))
+    tree = parse(written("sch", "export", "netlist", "--format", "kicadsexpr", source=schematic))
     nets = {}
     for net in children(children(tree, "nets")[0], "net"):
         members = [(word(children(pin, "ref")[0]), word(children(pin, "pin")[0])) for pin in children(net, "node")]

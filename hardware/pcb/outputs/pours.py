@@ -13,9 +13,10 @@ from math import floor
 from pathlib import Path
 
 from hardware.pcb.layout import rules
-from hardware.pcb.layout.routing import HERE, RoutingError, Via
+from hardware.pcb.layout.routing import HERE, RoutingError, Via, read_lines
 from hardware.pcb.outputs.board import ORIGIN_MM
 from hardware.pcb.outputs.sexp import Node, child, children, parse, word
+from simbase.errors import MissingDependencyError
 
 #: Runs in the system's Python: KiCad installs its module there and nowhere else.
 _SCRIPT = """
@@ -36,15 +37,11 @@ _PYTHONS = ("/usr/bin/python3", shutil.which("python3"))
 LAYERS = ("F.Cu", "B.Cu")
 
 
-class KicadMissingError(RuntimeError):
-    """KiCad 9 is not installed."""
-
-
 def fill(board_text: str) -> dict[str, list[Node]]:
     """Return the filled polygons of a board by area, computed by KiCad.
 
     Raises:
-        KicadMissingError: No Python has KiCad's module.
+        MissingDependencyError: No Python has KiCad's module.
         RoutingError: KiCad could not read the board.
     """
     with tempfile.TemporaryDirectory() as folder:
@@ -60,7 +57,7 @@ def fill(board_text: str) -> dict[str, list[Node]]:
             if done.returncode != 0 or not after.exists():
                 raise RoutingError(f"KiCad could not fill the pours: {done.stderr.strip()[-300:]}")
             return _polygons(after.read_text(encoding="utf-8"))
-    raise KicadMissingError("KiCad's Python module is not installed (hint: tools/install_board_tools.sh)")
+    raise MissingDependencyError("KiCad's Python module is not installed", hint="tools/install_board_tools.sh")
 
 
 def kept_stitches(vias: list[Via], pours: dict[str, list[Node]]) -> list[Via]:
@@ -91,14 +88,8 @@ def load_stitches(variant: str, path: Path | None = None) -> list[Via]:
     Raises:
         RoutingError: The file is missing or broken.
     """
-    file = path or HERE / "stitches" / f"{variant}.txt"
-    try:
-        lines = file.read_text(encoding="utf-8").splitlines()
-    except OSError as error:
-        hint = "python -m hardware.pcb stitch"
-        raise RoutingError(f"cannot read {file.name}: {error.strerror} (hint: {hint})") from error
     stitches = []
-    for count, line in enumerate(lines, start=1):
+    for count, line in enumerate(read_lines(path or HERE / "stitches" / f"{variant}.txt", "stitch"), start=1):
         try:
             x, y = (int(word) for word in line.split(","))
         except ValueError as error:

@@ -1,6 +1,6 @@
 """Files around schematic and board: design rules, net classes, library tables, and bodies for the 3D picture.
 
-Every severity that is not KiCad's default has its reason beside it. Bodies are boxes in
+No check has another severity than KiCad's own. Bodies are boxes in
 VRML, drawn from the footprints' own measures: no mechanical models to build a case by,
 for the heights are nominal.
 
@@ -13,9 +13,6 @@ from hardware.pcb.circuit.netlist import POWER_NETS, Design
 from hardware.pcb.layout import rules
 from hardware.pcb.layout.shapes import Box, Footprint
 
-#: Checks that cannot apply, with the reason.
-DRC_IGNORED: dict[str, str] = {}
-ERC_IGNORED: dict[str, str] = {}
 #: KiCad's VRML unit: a tenth of an inch.
 _UNIT_MM = 2.54
 
@@ -42,10 +39,10 @@ def project_text(design: Design) -> str:
                     "min_via_diameter": rules.SIGNAL.via_mm,
                     "solder_mask_to_copper_clearance": 0.0,
                 },
-                "rule_severities": dict.fromkeys(DRC_IGNORED, "ignore"),
+                "rule_severities": {},
             }
         },
-        "erc": {"rule_severities": dict.fromkeys(ERC_IGNORED, "ignore")},
+        "erc": {"rule_severities": {}},
         "meta": {"filename": f"{design.variant}.kicad_pro", "version": 3},
         "net_settings": {
             "classes": [_class(entry, index) for index, entry in enumerate(rules.NET_CLASSES)],

@@ -25,7 +25,7 @@ TABLE = Path(__file__).parent / "expected.toml"
 _SYMBOLS = {"MAX3232": "MAX3232", "NPN": "BC817", "DE9": "DE9", "SCHOTTKY": "DIODE", "TVS": "DIODE", "LED": "DIODE",
             "CP": "CP", "HC595": "HC595"}  # fmt: skip
 #: Symbols whose two ends are alike.
-_ALIKE = frozenset({"R", "C", "FUSE"})
+ALIKE = frozenset({"R", "C", "FUSE"})
 _RAILS = {"GND": "GND", "3V3": "3V3"}
 
 
@@ -109,7 +109,7 @@ def _crossed(parts: _Parts, table: Expected) -> list[str]:
             nets.setdefault(net, set()).add(name)
     found = []
     for part, pins in parts:
-        if part.part.symbol in _ALIKE:
+        if part.part.symbol in ALIKE:
             continue
         # Pins that meet none of those that they should meet.
         lost = [
@@ -176,7 +176,7 @@ def _node_of(table: Expected, pin: str) -> str:
 
 def _named_pins(part: Component, table: Expected) -> list[tuple[str, str | None]]:
     """Return (name, net) of each pin, by the table's names."""
-    if part.part.symbol in _ALIKE:
+    if part.part.symbol in ALIKE:
         return [(part.ref, net) for _, net in part.pins]
     names = _pin_names(part, table)
     return [(f"{part.ref}.{names.get(pin, pin)}", net) for pin, net in part.pins]

@@ -11,15 +11,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hardware.pcb.spice.deck import Deck, Limit
+from simbase.errors import MissingDependencyError, P2osError
 
 _LIMIT_S = 120
 
 
-class NgspiceMissingError(RuntimeError):
-    """ngspice is not installed."""
-
-
-class SimulationError(RuntimeError):
+class SimulationError(P2osError):
     """ngspice could not simulate a deck."""
 
 
@@ -49,11 +46,11 @@ def simulate(deck: Deck) -> Result:
     """Run a deck.
 
     Raises:
-        NgspiceMissingError: There is no ngspice.
+        MissingDependencyError: There is no ngspice.
         SimulationError: It failed, or a measure is missing; the message has its last words.
     """
     if not is_installed():
-        raise NgspiceMissingError("ngspice is not installed (hint: apt-get install ngspice)")
+        raise MissingDependencyError("ngspice is not installed", hint="apt-get install ngspice")
     with tempfile.TemporaryDirectory() as folder:
         file, data = Path(folder) / "deck.cir", Path(folder) / "traces.txt"
         file.write_text(deck_text(deck, data), encoding="utf-8")

@@ -12,12 +12,13 @@ point, and how many fail and how different they are is printed.
 """
 
 import argparse
-import resource
 import statistics
 import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
+
+from workers import used_s
 
 from robot_bench.campaign.campaign_file import Limits, parse_campaign
 from robot_bench.campaign.conduct import Conduct, Workers
@@ -192,7 +193,7 @@ def main() -> None:
 
 def tell(name: str, firmware: Path, search: str, given: argparse.Namespace) -> None:
     """Print what a search came to with each seed, and a row of a table."""
-    began = _cpu_s()
+    began = used_s()
     found = []
     for seed in range(given.first, given.first + given.repeat):
         number, said = tried(CASES[name], firmware, search, seed, given.runs, to_the_end=given.all)
@@ -201,12 +202,7 @@ def tell(name: str, firmware: Path, search: str, given: argparse.Namespace) -> N
     median = statistics.median_low(given.runs + 1 if one is None else one for one in found)
     words = ", ".join("none" if one is None else str(one) for one in found)
     middle = f"more than {given.runs}" if median > given.runs else str(median)
-    print(f"| {name} | {search} | {words} | {middle} | {_cpu_s() - began:.0f} |", flush=True)
-
-
-def _cpu_s() -> float:
-    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-    return sum(one.ru_utime + one.ru_stime for one in used)
+    print(f"| {name} | {search} | {words} | {middle} | {used_s() - began:.0f} |", flush=True)
 
 
 if __name__ == "__main__":

@@ -92,14 +92,16 @@ def _held_mb() -> float:
     return pages * resource.getpagesize() / MB
 
 
-def _spent(work: Callable[[], None]) -> float:
-    def used() -> float:
-        both = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-        return sum(one.ru_utime + one.ru_stime for one in both)
+def used_s() -> float:
+    """Return the CPU seconds of this process and of those that it has ended."""
+    both = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(one.ru_utime + one.ru_stime for one in both)
 
-    before = used()
+
+def _spent(work: Callable[[], None]) -> float:
+    before = used_s()
     work()
-    return used() - before
+    return used_s() - before
 
 
 #: Name → what measures, and how many runs it takes.
