@@ -44,22 +44,44 @@ def handed_over(line: _socket.socket, address: str, words: list[str], ignored: l
 
 def main(address: str, words: list[str]) -> int:
     """Have a process forked, or start it; return its exit code."""
+    process: int | None = None
+    early: list[int] = []  # signals that have come before there was a process
+
+    def pass_on(number: int, _frame: object) -> None:
+        if not process:
+            early.append(number)
+            return
+        try:
+            posix.kill(process, number)
+        except ProcessLookupError:  # it has ended
+            pass
+
     ignored = [number for number in NUMBERS if _signal.getsignal(number) == _signal.SIG_IGN]
-    line = _socket.socket(_socket.AF_UNIX, _socket.SOCK_STREAM)
-    process = handed_over(line, address, words, ignored)
-    if not process:
-        posix.execv(sys.executable, [sys.executable, *words])
     for number in NUMBERS:
         if number not in ignored:
-            _signal.signal(number, lambda number, _frame: posix.kill(process, number))
+            _signal.signal(number, pass_on)
+    line = _socket.socket(_socket.AF_UNIX, _socket.SOCK_STREAM)
+    process = handed_over(line, address, words, ignored)
+    for number in early:
+        if process:
+            pass_on(number, None)
+        else:
+            die_of(number)
+    if not process:
+        posix.execv(sys.executable, [sys.executable, *words])
     code = received(line)
     if code is None:
         return 70
     if code < 0:
-        if -code in NUMBERS:
-            _signal.signal(-code, _signal.SIG_DFL)
-        posix.kill(posix.getpid(), -code)
+        die_of(-code)
     return code
+
+
+def die_of(number: int) -> None:
+    """End as a process that does nothing about a signal."""
+    if number in NUMBERS:
+        _signal.signal(number, _signal.SIG_DFL)
+    posix.kill(posix.getpid(), number)
 
 
 posix._exit(main(sys.argv[1], sys.argv[2:]))
