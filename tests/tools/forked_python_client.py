@@ -51,7 +51,7 @@ def main(address: str, words: list[str]) -> int:
         if not process:
             early.append(number)
             return
-        try:
+        try:  # noqa: SIM105 - contextlib is to be imported
             posix.kill(process, number)
         except ProcessLookupError:  # it has ended
             pass
