@@ -36,6 +36,8 @@ from typing import NoReturn, TextIO
 ROOT = Path(__file__).resolve().parents[2]
 CLIENT = Path(__file__).with_name("forked_python_client.py")
 LENGTH = 4
+#: How long a client may take to say what it wants.
+CLIENT_S = 10.0
 #: What Python reads when it starts, beside variables that begin with PYTHON.
 LOCALE = ("LANG", "LC_ALL", "LC_CTYPE")
 #: Each process has its own.
@@ -113,11 +115,18 @@ class Command:
 
     @classmethod
     def received(cls, line: socket.socket) -> "Command":
-        """Read one from a client that has just come."""
+        """Read one from a client that has just come.
+
+        Raises:
+            OSError: It has gone already.
+        """
         head, streams, _, _ = socket.recv_fds(line, LENGTH, 3)
-        message = b""
-        while len(message) < int.from_bytes(head, "big"):
-            message += line.recv(1 << 20)
+        message, length = b"", int.from_bytes(head, "big")
+        while len(message) < length or not length:
+            more = line.recv(length - len(message))
+            if not more:
+                raise ConnectionResetError
+            message += more
         words, folder, environment, ignored = marshal.loads(message)  # noqa: S302 - of our own client
         decoded = {os.fsdecode(name): os.fsdecode(value) for name, value in environment.items()}
         return cls(words, folder, decoded, ignored, list(streams))
@@ -175,8 +184,12 @@ class Server:
     def _fork(self) -> Command | None:
         """Fork for the client that has come; return in the forked process with what it has to do."""
         line, _ = self._listener.accept()
-        line.setblocking(True)
-        command = Command.received(line)
+        line.settimeout(CLIENT_S)
+        try:
+            command = Command.received(line)
+        except OSError:
+            line.close()
+            return None
         process = 0
         if command.can_be_forked:
             process = os.fork()
@@ -185,7 +198,8 @@ class Server:
                 return command
         for stream in command.streams:
             os.close(stream)
-        line.sendall(process.to_bytes(LENGTH, "big"))
+        with contextlib.suppress(OSError):  # it has gone: that is noticed below
+            line.sendall(process.to_bytes(LENGTH, "big"))
         if process:
             self._lines[process] = line
             self._selector.register(line, selectors.EVENT_READ)

@@ -42,24 +42,57 @@ def handed_over(line: _socket.socket, address: str, words: list[str], ignored: l
         return None
 
 
+class Signals:
+    """Those that are passed on: to a process, or kept while there is none."""
+
+    def __init__(self) -> None:
+        self.ignored = [number for number in NUMBERS if _signal.getsignal(number) == _signal.SIG_IGN]
+        self._process: int | None = None
+        self._early: list[int] = []
+        for number in NUMBERS:
+            if number not in self.ignored:
+                _signal.signal(number, self._pass_on)
+
+    def pass_to(self, process: int | None) -> None:
+        """Pass them to this process; None or 0: to this one, which does nothing about them."""
+        self._process = process
+        for number in self._early:
+            if process:
+                self._pass_on(number, None)
+            else:
+                die_of(number)
+
+    def _pass_on(self, number: int, _frame: object) -> None:
+        if not self._process:
+            self._early.append(number)
+            return
+        try:  # noqa: SIM105 - contextlib would have to be imported
+            posix.kill(self._process, number)
+        except ProcessLookupError:  # it has ended
+            pass
+
+
 def main(address: str, words: list[str]) -> int:
     """Have a process forked, or start it; return its exit code."""
-    ignored = [number for number in NUMBERS if _signal.getsignal(number) == _signal.SIG_IGN]
+    signals = Signals()
     line = _socket.socket(_socket.AF_UNIX, _socket.SOCK_STREAM)
-    process = handed_over(line, address, words, ignored)
+    process = handed_over(line, address, words, signals.ignored)
+    signals.pass_to(process)
     if not process:
         posix.execv(sys.executable, [sys.executable, *words])
-    for number in NUMBERS:
-        if number not in ignored:
-            _signal.signal(number, lambda number, _frame: posix.kill(process, number))
     code = received(line)
     if code is None:
         return 70
     if code < 0:
-        if -code in NUMBERS:
-            _signal.signal(-code, _signal.SIG_DFL)
-        posix.kill(posix.getpid(), -code)
+        die_of(-code)
     return code
+
+
+def die_of(number: int) -> None:
+    """End as a process that does nothing about a signal."""
+    if number in NUMBERS:
+        _signal.signal(number, _signal.SIG_DFL)
+    posix.kill(posix.getpid(), number)
 
 
 posix._exit(main(sys.argv[1], sys.argv[2:]))

@@ -3,6 +3,7 @@
 import os
 import pty
 import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -114,6 +115,15 @@ def test_a_client_that_is_killed_takes_its_process_with_it() -> None:
         assert forked != process.pid
         process.kill()
         assert process.stdout.read() == b"", "nobody holds it any more"
+
+
+def test_a_client_that_goes_at_once_leaves_the_others_served(tmp_path: Path) -> None:
+    address = str(Path(forked_python()).with_name("socket"))
+    for data in (b"", b"\0", (100).to_bytes(4, "big") + b"half"):
+        with socket.socket(socket.AF_UNIX) as line:
+            line.connect(address)
+            line.sendall(data)
+    assert ran(forked_python(), ["-c", IS_FORKED], tmp_path)[1] == "True\n"
 
 
 def test_what_a_shell_has_ignored_stays_ignored() -> None:
