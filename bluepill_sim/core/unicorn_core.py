@@ -462,13 +462,13 @@ class RegisterFile:
 
     def __getitem__(self, register: Register) -> int:
         """Return one register."""
-        self._read(self._handle, register.value, self._at)
+        self._read(self._handle, register._value_, self._at)  # `value` is a property, which takes as long as the call
         return self._value.value
 
     def __setitem__(self, register: Register, value: int) -> None:
         """Set one register."""
         self._value.value = value
-        self._write(self._handle, register.value, self._at)
+        self._write(self._handle, register._value_, self._at)
 
     def batch(self, *registers: Register) -> "Batch":
         """Return a list of registers to be moved together."""

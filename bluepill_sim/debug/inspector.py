@@ -107,12 +107,12 @@ class Inspector:
         if whole is not None:
             return whole
         result = bytearray()
-        for at in range(address, address + size):
-            byte = self._read_byte(at)
-            if byte is None:
+        while len(result) < size:
+            data = self._read_up_to_word(address + len(result))
+            if data is None:
                 break
-            result.append(byte)
-        return bytes(result) or None
+            result += data
+        return bytes(result[:size]) or None
 
     def write_memory(self, address: int, data: bytes) -> bool:
         """Write bytes to SRAM, to flash as a programmer would, or to a peripheral; False where nothing is."""
@@ -133,12 +133,13 @@ class Inspector:
         for base in (0, FLASH_BASE):
             chip.engine.drop_code(base + offset, len(data))
 
-    def _read_byte(self, address: int) -> int | None:
+    def _read_up_to_word(self, address: int) -> bytes | None:
+        """Return a byte of a memory, or the rest of a register, of which a look at it may take long."""
         memory = self._board.read_memory(address, 1)
         if memory is not None:
-            return memory[0]
+            return memory
         word = self.peek_word(address & ~3)
-        return None if word is None else word >> 8 * (address & 3) & 0xFF
+        return None if word is None else word.to_bytes(4, "little")[address & 3 :]
 
     def peek_word(self, address: int) -> int | None:
         """Return a register of a peripheral or of the core without side effects; None where none is."""

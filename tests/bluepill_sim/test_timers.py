@@ -54,25 +54,21 @@ def run(elf: Path, slice_ns: int) -> tuple[str, BluePill]:
     return "".join(text), board
 
 
-@pytest.mark.parametrize("core", [pytest.param("python", marks=pytest.mark.slow), "native"])
-def test_the_program_sees_what_its_registers_promise(elf: Path, core: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("P2OS_CORE", core)
-    text, board = run(elf, END_NS)
-    assert text == EXPECTED
-    wave = board.pin("PA8").wave
-    assert wave is not None
-    assert (wave.frequency_hz, wave.duty) == (20_000, 0.25)
-    assert board.fault is None
-    assert not [warning for warning in board.warnings if "TIM" in warning]
-
-
 @pytest.mark.slow
-def test_both_cores_and_other_slices_end_in_the_same_state(elf: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_program_sees_what_its_registers_promise_on_both_cores_in_any_slices(
+    elf: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     ends = []
     for core, slice_ns in (("native", END_NS), ("native", 77_777), ("python", END_NS), ("python", 1_234_567)):
         monkeypatch.setenv("P2OS_CORE", core)
         text, board = run(elf, slice_ns)
-        ends.append((text, state(board)))
+        assert text == EXPECTED
+        wave = board.pin("PA8").wave
+        assert wave is not None
+        assert (wave.frequency_hz, wave.duty) == (20_000, 0.25)
+        assert board.fault is None
+        assert not [warning for warning in board.warnings if "TIM" in warning]
+        ends.append(state(board))
     assert all(end == ends[0] for end in ends)
 
 

@@ -361,6 +361,16 @@ def test_numbers_that_no_debugger_sends_are_answered(shape: str, debug) -> None:
     assert gdb("m20000000,4") != "E01"
 
 
+def test_any_bytes_of_registers_are_read(debug) -> None:
+    """GPIOA_CRL is written, and CRH is 0x44444444 after a reset."""
+    gdb = debug(LOOP)
+    gdb("M40010800,4:78563412")
+    whole = bytes.fromhex("78563412" + "44" * 4)
+    for first in range(5):
+        for size in range(1, 5):
+            assert gdb(f"m{0x4001_0800 + first:x},{size:x}") == whole[first : first + size].hex()
+
+
 def test_the_kinds_of_stops_are_all_reported() -> None:
     assert {kind.value for kind in StopKind} == {
         "breakpoint", "watchpoint", "step", "interrupt", "bkpt", "fault", "exit", "end", "begin",

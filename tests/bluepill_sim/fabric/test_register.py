@@ -203,7 +203,7 @@ def access_at_random(chip: Any, name: str, accesses: bytes) -> None:
         size, byte = 1 << lane % 3, lane // 3 % 4
         word = KEYS[what % 5] if what % 2 else value >> what % 32
         part.write(register.offset + byte // size * size, size, word & ((1 << 8 * size) - 1))
-        chip.advance(chip.now_ns + wait * 46)  # up to 3 ms
+        chip.advance(chip.now_ns + (wait * 46 >> 3 * (what >> 5)))  # up to 3 ms
         part.read(register.offset, 4)
 
 

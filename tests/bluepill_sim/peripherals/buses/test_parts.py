@@ -223,7 +223,7 @@ def test_what_was_said_ahead_holds_for_what_was_sent_and_ends_with_the_selection
     board, part = board_of("flash_over_spi"), Counter()
     rows: list[tuple[int, int, int]] = []
     board.spi("SPI1", part, select="PA4").subscribe(lambda words: rows.extend(word[:3] for word in words))
-    board.run_for("20 ms")
+    board.run_for("5 ms")
     heard = [(sent, got) for _, sent, got in rows]
     steps = [after - before & 0xFF for (_, before), (_, after) in pairwise(heard)]
     assert set(steps) == {1, 101}
