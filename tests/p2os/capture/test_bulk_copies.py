@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 np = pytest.importorskip("numpy")
 
 from p2os.capture.cells import Cell, cell_text, texts_of  # noqa: E402
-from p2os.capture.chunks import Direction, Part, capture_of  # noqa: E402
+from p2os.capture.chunks import Direction, Part, capture_of, chunks_of, in_order  # noqa: E402
 from p2os.capture.columns.column import Column, Conversion  # noqa: E402
 from p2os.capture.columns.gathering import joined  # noqa: E402
 from p2os.capture.formats.recording import plain_block, write_recording  # noqa: E402
@@ -37,6 +37,13 @@ def test_lines_whose_times_have_any_number_of_digits_are_read_at_once(
     place = data.draw(st.integers(0, len(lines)))
     hit = lines[:place] + data.draw(st.sampled_from((b"", b"7", b",", b"\n", b'"'))) + lines[place + 1 :]
     assert plain_lines(hit) == plain_block(hit)
+
+
+def test_a_time_that_steps_back_within_a_block_of_lines_is_moved_up() -> None:
+    line = '{"t": %d, "dir": "r2c", "hex": "fa"}\n'
+    block = plain_lines("".join(line % at_ns for at_ns in (5, 7, 6, 8)).encode())
+    assert block is not None
+    assert [chunk.at_ns for chunk in chunks_of(in_order([block]))] == [5, 7, 7, 8]
 
 
 @given(st.binary(max_size=60), st.lists(st.tuples(st.integers(0, 60), st.integers(0, 9)), max_size=40))
@@ -79,6 +86,7 @@ def test_texts_of_a_conversion_become_an_arrow_array(rows: list[tuple[int, bool]
         array = cells_array(column, column.kind)
         array.validate(full=True)
         assert array.to_pylist() == list(column) == cells
+        assert column.encoded()[0].tolist() == [len((cell or "").encode()) for cell in cells]
 
 
 @pytest.mark.parametrize(("size", "said"), [(33, []), (34, [b"no"]), (0, [b"nope"]), (99, [b"nope"])])
