@@ -15,8 +15,9 @@ from p2os.capture import Reading, read_file, rows_of
 from p2os.capture.cells import Cell
 from p2os.capture.chunks import Capture, Chunk, Direction, block_of_chunks, capture_of
 from p2os.capture.columns.sip_table import sip_tables
+from p2os.capture.sip_columns import LEADING
 from p2os.capture.sips import sips_of
-from p2os.capture.table import LEADING, Table, tables_of, tables_of_sips
+from p2os.capture.table import Table, tables_of, tables_of_sips
 from p2os.cli.main import run
 from p2os.protocol.packets import EncoderPacket, SonarReading, StandardSip, packet_frame
 from p2os.protocol.profiles import Profile
