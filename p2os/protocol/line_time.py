@@ -7,7 +7,7 @@ Invariant: `free_at` is computed from the start of a busy stretch and the number
 never by adding rounded times.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from simbase.timing import NS_PER_S, Nanos
 
@@ -25,10 +25,12 @@ class LineTime:
     #: Sent since the line became busy.
     characters: int = 0
 
-    @property
-    def free_at(self) -> Nanos:
-        """When the last character sent so far has gone, rounded up."""
-        return self.busy_since + self.time_of(self.characters)
+    #: When the last character sent so far has gone, rounded up; it is asked for more often than anything is sent.
+    free_at: Nanos = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        """Work out what follows from the others."""
+        object.__setattr__(self, "free_at", self.busy_since + self.time_of(self.characters))
 
     def sent(self, size: int, now: Nanos) -> "LineTime":
         """Return the line after so many more characters, behind what is still going out."""

@@ -70,18 +70,20 @@ class DeadReckoning(Stateful):
         """Count on to where the wheels are after each of some steps."""
         left_was, right_was, left_all, right_all = self._left_rad, self._right_rad, self.left_mm, self.right_mm
         x, y, turned, travel = self.x_mm, self.y_mm, self.turned_rad, self.travel_mm
+        left_radius_mm, right_radius_mm, track_mm = self._left_radius_mm, self._right_radius_mm, self._track_mm
+        zero, cos, sin = self._zero_rad, math.cos, math.sin
         for wheels in steps:
             left_rad, right_rad = wheels.left_angle_rad, wheels.right_angle_rad
-            left_mm = (left_rad - left_was) * self._left_radius_mm
-            right_mm = (right_rad - right_was) * self._right_radius_mm
+            left_mm = (left_rad - left_was) * left_radius_mm
+            right_mm = (right_rad - right_was) * right_radius_mm
             if not left_mm and not right_mm:
                 continue
             left_was, right_was = left_rad, right_rad
-            turn = (right_mm - left_mm) / self._track_mm
+            turn = (right_mm - left_mm) / track_mm
             along = (left_mm + right_mm) / 2
-            middle = turned - self._zero_rad + turn / 2  # exact for an arc to second order
-            x += along * math.cos(middle)
-            y += along * math.sin(middle)
+            middle = turned - zero + turn / 2  # exact for an arc to second order
+            x += along * cos(middle)
+            y += along * sin(middle)
             turned += turn
             travel += along
             left_all += left_mm

@@ -15,7 +15,7 @@ from p2os.errors import RunFailedError
 from robot_bench.events.codec import TraceError, events_of
 from robot_bench.events.kinds import Contact, Note, Verdict
 from robot_bench.recording.run_record import read_run, record_of
-from robot_bench.recording.trace import TraceWriter
+from robot_bench.recording.trace import MOST_UNSPELLED, TraceWriter
 from simbase.errors import FileError
 
 S = 10**9
@@ -45,6 +45,28 @@ def test_first_and_last_line_and_verdicts_are_not_hashed(tmp_path: Path) -> None
     assert digest == chain(lines[1] + lines[3])
     assert [type(event) for event in events_of(lines)] == [Note, Verdict, Note]
     trace.close()
+
+
+def test_lines_are_made_a_second_at_a_time_and_for_whoever_asks(tmp_path: Path) -> None:
+    whole, pieces = TraceWriter(tmp_path / "whole"), TraceWriter(tmp_path / "pieces")
+    events = [note(n * S // 1000) for n in range(MOST_UNSPELLED - 2)]
+    for trace in (whole, pieces):
+        trace.take([], 0)
+        trace.take(events, S - 1)
+    for number, ask in enumerate(("sha256", "length", "written")):
+        pieces.take([note(S - 1, ask)], S - 1)
+        told, text = getattr(pieces, ask), "".join(pieces.lines())
+        assert text.count("\n") == len(events) + number + 1
+        assert told == (chain(text) if ask == "sha256" else len(text))
+    assert (tmp_path / "whole").read_bytes() == b""
+    whole.take([note(S - 1), note(S - 1)], S - 1)  # so many are kept no longer
+    assert (tmp_path / "whole").read_text().count("\n") > len(events) // 2  # the rest is in the file's own buffer
+    whole.take([note(S, "last")], S)
+    assert (tmp_path / "whole").read_text().endswith('"t":1000000000,"what":"last","who":"adapter"}\n')
+    whole.take([note(S + 1, "left")], S + 1)
+    whole.close()  # as for a run that failed
+    assert "left" in (tmp_path / "whole").read_text()
+    pieces.close()
 
 
 def test_a_trace_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
@@ -123,7 +145,7 @@ KILLED = """
 import os, sys
 from pathlib import Path
 from robot_bench.events.kinds import Note
-from robot_bench.recording.trace import TraceWriter
+from robot_bench.recording.trace import MOST_UNSPELLED, TraceWriter
 trace = TraceWriter(Path(sys.argv[1]))
 trace.meta({})
 for ms in range(0, 2600, 100):
