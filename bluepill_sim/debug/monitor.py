@@ -55,21 +55,8 @@ class Monitor:
         words = line.split()
         if not words:
             words = ["help"]
-        acts: dict[str, Callable[[list[str]], str]] = {
-            "help": self._help,
-            "reset": self._reset,
-            "time": self._time,
-            "wait": self._wait,
-            "pins": self._pins,
-            "pin": self._pin,
-            "registers": self._registers,
-            "snapshot": self._snapshot,
-            "restore": self._restore,
-            "fault": self._fault,
-            "blocks": self._blocks,
-            "warnings": self._warnings,
-        }
-        act = acts.get(words[0])
+        # Each command is the method of its name.
+        act: Callable[[list[str]], str] | None = getattr(self, f"_{words[0]}") if words[0] in COMMANDS else None
         return (f"{line}: {_UNKNOWN}" if act is None else act(words[1:])) + "\n"
 
     def _help(self, _words: list[str]) -> str:
