@@ -9,7 +9,7 @@ Invariant: a whole number comes out exactly, for no binary fraction stands betwe
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any
@@ -157,3 +157,14 @@ PERCENT = Quantity(name="percentage", metavar="PERCENT", units={"": 1.0, "%": 1.
 COUNT = Quantity(name="whole number", metavar="N", units={"": 1}, example="3", is_whole=True)
 SEED = Quantity(name="whole number", metavar="SEED", units={"": 1}, example="7", is_whole=True)
 PORT = Quantity(name="number of a TCP port", metavar="PORT", units={"": 1}, example="3333", is_whole=True)
+
+
+def ranges_text(numbers: Iterable[int]) -> str:
+    """Return whole numbers as a person writes them, in order, neighbours as a range: "3-5, 9"."""
+    found: list[list[int]] = []
+    for number in sorted(numbers):
+        if found and number == found[-1][1] + 1:
+            found[-1][1] = number
+        else:
+            found.append([number, number])
+    return ", ".join(f"{first}" if first == last else f"{first}-{last}" for first, last in found)

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from bluepill_sim.analysis.columns import in_columns
 from bluepill_sim.analysis.coverage import Coverage, FileCoverage, FunctionCoverage
 from bluepill_sim.errors import BluePillError
+from simbase.units import ranges_text
 
 #: chosen: so many stretches of a program without symbols are listed.
 _SHOWN_PIECES = 40
@@ -109,7 +110,7 @@ def _by_address(pieces: Sequence[tuple[int, int]]) -> list[str]:
 
 
 def _missed_lines(files: Sequence[FileCoverage]) -> list[str]:
-    rows = [f"{_short(file.name)}: {_ranges(file.missed_lines)}" for file in files if file.missed_lines]
+    rows = [f"{_short(file.name)}: {ranges_text(file.missed_lines)}" for file in files if file.missed_lines]
     return ["", "lines that did not run:", *rows] if rows else []
 
 
@@ -123,14 +124,3 @@ def _hit(counts: Sequence[int]) -> int:
 
 def _short(name: str) -> str:
     return name.rsplit("/", 1)[-1]
-
-
-def _ranges(lines: Sequence[int]) -> str:
-    """Return "3-5, 9"."""
-    found: list[list[int]] = []
-    for line in lines:
-        if found and line == found[-1][1] + 1:
-            found[-1][1] = line
-        else:
-            found.append([line, line])
-    return ", ".join(str(a) if a == b else f"{a}-{b}" for a, b in found)

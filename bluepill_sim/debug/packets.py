@@ -6,6 +6,7 @@ Source: Debugging with GDB, appendix E.1 "Overview" of the remote protocol.
 Invariant: any bytes at all give events, never an exception, and never hold more than `MAX_BYTES`.
 """
 
+import re
 from dataclasses import dataclass
 from enum import Enum
 
@@ -13,7 +14,7 @@ from enum import Enum
 MAX_BYTES = 0x4000
 _START, _END, _ESCAPE = b"$#}"
 _INTERRUPT = 0x03
-_ESCAPED = frozenset(b"#$}*")
+_ESCAPED, _ESCAPE_AND_BYTE = re.compile(rb"[#$}*]"), re.compile(rb"\}(.?)", re.DOTALL)
 _ESCAPE_BIT = 0x20
 _HEX = b"0123456789abcdefABCDEF"
 
@@ -93,25 +94,10 @@ def checksum(payload: bytes) -> int:
 
 def frame(payload: bytes) -> bytes:
     """Return a packet ready to be sent."""
-    escaped = bytearray()
-    for byte in payload:
-        if byte in _ESCAPED:
-            escaped += bytes([_ESCAPE, byte ^ _ESCAPE_BIT])
-        else:
-            escaped.append(byte)
-    return b"$%b#%02x" % (bytes(escaped), checksum(bytes(escaped)))
+    escaped = _ESCAPED.sub(lambda found: bytes((_ESCAPE, found[0][0] ^ _ESCAPE_BIT)), payload)
+    return b"$%b#%02x" % (escaped, checksum(escaped))
 
 
 def unescape(payload: bytes) -> bytes:
     """Undo the escapes of a payload; one that ends inside an escape loses it."""
-    result = bytearray()
-    is_escaped = False
-    for byte in payload:
-        if is_escaped:
-            result.append(byte ^ _ESCAPE_BIT)
-            is_escaped = False
-        elif byte == _ESCAPE:
-            is_escaped = True
-        else:
-            result.append(byte)
-    return bytes(result)
+    return _ESCAPE_AND_BYTE.sub(lambda found: bytes(byte ^ _ESCAPE_BIT for byte in found[1]), payload)

@@ -10,6 +10,7 @@ Invariant: the page is made of the rows alone, and says the same however many wo
 import html
 import math
 import shlex
+import statistics
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
@@ -257,11 +258,10 @@ def _dimensions(rows: Sequence[Row]) -> list[str]:
 
 
 def _correlation(pairs: Sequence[tuple[float, float]]) -> float:
-    count = len(pairs)
-    mx, my = (sum(pair[axis] for pair in pairs) / count for axis in (0, 1))
-    across = sum((x - mx) * (y - my) for x, y in pairs)
-    spread = math.sqrt(sum((x - mx) ** 2 for x, _ in pairs) * sum((y - my) ** 2 for _, y in pairs))
-    return across / spread if spread else 0.0
+    try:
+        return statistics.correlation(*zip(*pairs, strict=True))
+    except statistics.StatisticsError:  # one of them does not change
+        return 0.0
 
 
 def _over(name: str, rows: Sequence[Row]) -> str:

@@ -28,6 +28,7 @@ from robot_bench.scenario.included_files import Setting, as_toml
 from robot_bench.scenario.scenario import Scenario
 from simbase.errors import UsageError
 from simbase.files import writing
+from simbase.units import ranges_text
 
 #: Which run folders are kept.
 KEPT: Mapping[str, Callable[[bool], bool]] = {
@@ -246,19 +247,8 @@ def _summed(done: Done) -> Table:
         runs = list(group)
         bad = [row.scenario.seed for row, found in runs if word_of(found) == _FAILED]
         good = sum(word_of(found) == _PASSED for _, found in runs)
-        table.add_row(*(as_toml(value) for _, value in settings), str(good), str(len(runs)), _spans(bad))
+        table.add_row(*(as_toml(value) for _, value in settings), str(good), str(len(runs)), ranges_text(bad))
     return table
-
-
-def _spans(seeds: Sequence[int]) -> str:
-    """Return seeds in order, neighbours as a range."""
-    found: list[list[int]] = []
-    for seed in sorted(seeds):
-        if found and seed == found[-1][1] + 1:
-            found[-1][1] = seed
-        else:
-            found.append([seed, seed])
-    return ", ".join(f"{first}" if first == last else f"{first}-{last}" for first, last in found)
 
 
 def _headings(keys: Sequence[str]) -> list[str]:

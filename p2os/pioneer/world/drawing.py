@@ -11,8 +11,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
 from html import escape
+from itertools import pairwise
 
-from p2os.pioneer.world.geometry import Footprint, point_segment
+from p2os.pioneer.world.geometry import Footprint, point_polygon, point_segment
 from p2os.pioneer.world.model import CUT_M, Kind, Obstacle, Point, World, cut, shadow
 
 
@@ -260,15 +261,6 @@ def _covers(shape: Shape, x: float, y: float, slack_m: float) -> bool:
     points = shape.points
     if shape.radius_m:
         return math.hypot(x - points[0][0], y - points[0][1]) <= max(shape.radius_m, slack_m)
-    if not shape.is_open and _is_inside(points, x, y):
-        return True
-    ends = points[1:] if shape.is_open else (*points[1:], points[0])
-    return any(point_segment(x, y, *a, *b) <= slack_m for a, b in zip(points, ends, strict=False))
-
-
-def _is_inside(points: tuple[Point, ...], x: float, y: float) -> bool:
-    """Tell whether a point is on the left of every edge of a convex counter-clockwise outline."""
-    return all(
-        (bx - ax) * (y - ay) - (by - ay) * (x - ax) >= 0
-        for (ax, ay), (bx, by) in zip(points, (*points[1:], points[0]), strict=True)
-    )
+    if not shape.is_open:
+        return point_polygon(x, y, points) <= slack_m
+    return any(point_segment(x, y, *a, *b) <= slack_m for a, b in pairwise(points))

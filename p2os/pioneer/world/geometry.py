@@ -117,7 +117,7 @@ class Footprint:
     def distance(self, hull: Polygon) -> float:
         """Return the distance to a convex polygon; 0 where they overlap."""
         if not self.polygon:
-            return max(0.0, _point_polygon(self.x, self.y, hull) - self.radius)
+            return max(0.0, point_polygon(self.x, self.y, hull) - self.radius)
         if self.overlaps(hull):
             return 0.0
         return min(_nearest(hull, self.polygon), _nearest(self.polygon, hull))
@@ -234,7 +234,7 @@ def _nearest(points: Polygon, polygon: Polygon) -> float:
     return nearest
 
 
-def _point_polygon(x: float, y: float, polygon: Polygon) -> float:
+def point_polygon(x: float, y: float, polygon: Polygon) -> float:
     """Return the distance from a point to a convex polygon (counter-clockwise); 0 inside."""
     edges = tuple(pairwise((*polygon, polygon[0])))
     if all((x - ax) * (by - ay) - (y - ay) * (bx - ax) <= 0.0 for (ax, ay), (bx, by) in edges):

@@ -8,10 +8,10 @@ rounded to whole millimetres.
 import math
 import random
 
-from p2os.pioneer.world.model import Kind, Obstacle, Pose
+from p2os.pioneer.world.makers.building import WALL_M, walls_around
+from p2os.pioneer.world.model import Obstacle, Pose
 
 SIDE_M = 8.0
-WALL_M = 0.1
 #: How many things stand in it.
 LEAST_OBSTACLES, MOST_OBSTACLES = 16, 18
 #: Widths of the things.
@@ -31,7 +31,8 @@ def arena(seed: int, start: Pose) -> list[Obstacle]:
     while True:
         things = _layout(random_source, start)
         if len(things) >= LEAST_OBSTACLES:
-            return _walls() + things
+            half = (SIDE_M + WALL_M) / 2
+            return [*walls_around(-half, -half, half, half), *things]
 
 
 def _layout(random_source: random.Random, start: Pose) -> list[Obstacle]:
@@ -71,20 +72,3 @@ def _fits(thing: Obstacle, others: list[Obstacle], start: Pose) -> bool:
     return all(
         math.hypot(thing.x_m - other.x_m, thing.y_m - other.y_m) >= GAP_M + reach + other.reach_m for other in others
     )
-
-
-def _walls() -> list[Obstacle]:
-    half, length = SIDE_M / 2 + WALL_M / 2, SIDE_M + 2 * WALL_M
-    places = {
-        "north": (0.0, half, 0.0),
-        "south": (0.0, -half, 0.0),
-        "east": (half, 0.0, math.pi / 2),
-        "west": (-half, 0.0, math.pi / 2),
-    }
-    return [
-        Obstacle(
-            name=f"{name} wall", x_m=x, y_m=y, heading_rad=heading, length_m=length, width_m=WALL_M, height_m=1.0,
-            kind=Kind.WALL,
-        )
-        for name, (x, y, heading) in places.items()
-    ]  # fmt: skip

@@ -9,9 +9,9 @@ The shipped world `walkway` is what `walkway(Measures())` gives.
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from p2os.pioneer.world.makers.building import WALL_M, finished, mm
+from p2os.pioneer.world.makers.building import finished, mm, wall
 from p2os.pioneer.world.model import Kind, Obstacle, Pose, World
 
 #: chosen: a rail beside an incline is made of level pieces of this length.
@@ -130,12 +130,8 @@ class _Builder:
 
     def _wall(self, name: str, a: tuple[float, float], b: tuple[float, float], base: float, top: float) -> Obstacle:
         """Return a wall from the ground up, a full thickness longer than its middle line."""
-        along_y = a[0] == b[0]
-        return Obstacle(
-            name=name, x_m=mm((a[0] + b[0]) / 2), y_m=mm((a[1] + b[1]) / 2),
-            heading_rad=math.radians(90.0) if along_y else 0.0, length_m=mm(math.dist(a, b) + WALL_M), width_m=WALL_M,
-            base_m=base, height_m=mm(top + self._m.wall_m), kind=Kind.WALL, fixed=True,
-        )  # fmt: skip
+        made = wall(name, *a, *b, height_m=mm(top + self._m.wall_m))
+        return replace(made, base_m=base, fixed=True)
 
     def _rails(
         self, name: str, a: float, b: float, side: float, first: float, last: float, *, across: bool = False

@@ -107,7 +107,7 @@ def test_meshes_are_files_beside_it_and_none_is_overwritten(tmp_path: Path, caps
         (["--robot", "p2dx", "--out", "a.toml"], "a robot cannot be written to a.toml"),
         (["room", "--out", "a.jpg"], "hint: --out FILE with .toml, .sdf, .urdf, .xml, .gltf, .glb"),
         (["room", "--robot", "p9", "--out", "a.sdf"], "no robot model 'p9'"),
-        (["room", "--out", "missing/a.sdf"], "No such file or directory"),
+        (["room", "--out", "missing/a.sdf"], "no such file or directory"),
     ],
 )
 def test_what_cannot_be_exported_is_one_line_and_a_hint(
