@@ -54,10 +54,6 @@ class History:
             self._points = self._points[::2]
             self._stride_ns *= 2
 
-    def next_ns(self) -> Nanos | None:
-        """Return when the next state is to be noted; None where none ever is."""
-        return self._points[-1].at_ns + self._stride_ns if self._points else None
-
     def before(self, cycle: int) -> list[Point]:
         """Return the states noted before a cycle, the latest first."""
         return [point for point in reversed(self._points) if point.cycle < cycle]

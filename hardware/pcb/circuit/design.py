@@ -4,8 +4,6 @@ What each block is for, and why it differs from the thesis's board, stands in
 docs/board.md. Invariant: `build` is a function of the variant's name alone.
 """
 
-from collections.abc import Callable
-
 from adapter_sim.pinout import Direction, Pinout, Pull, Wire, WireRole, load_pinout
 from hardware.pcb.circuit.modules import BLUEPILL_PINS, ESP32_PINS
 from hardware.pcb.circuit.netlist import Component, Design, DesignError, make
@@ -36,10 +34,11 @@ def build(variant: str = "rev-b") -> Design:
         raise DesignError(f"variant {variant!r} is unknown (one of {', '.join(VARIANTS)})")
     revision, title = VARIANTS[variant]
     pinout = load_pinout()
-    blocks: list[Component] = []
-    for block in _BLOCKS:
-        blocks += block(pinout, variant)
-    return Design(variant=variant, revision=revision, title=title, components=tuple(blocks))
+    components = (
+        *_modules(pinout, variant), *_signals(pinout), *_test_header(pinout), *_supply(variant), *_serial(),
+        *_reset_and_mode(pinout, variant), *_shift_register(pinout, variant), *_old_header(variant), *_test_points(),
+    )  # fmt: skip
+    return Design(variant=variant, revision=revision, title=title, components=components)
 
 
 def bluepill_net(wire: Wire) -> str:
@@ -79,8 +78,7 @@ def _modules(pinout: Pinout, variant: str) -> list[Component]:
     ]
 
 
-def _signals(pinout: Pinout, variant: str) -> list[Component]:
-    _ = variant
+def _signals(pinout: Pinout) -> list[Component]:
     parts = []
     for index, wire in enumerate(series_wires(pinout), start=1):
         near, far = bluepill_net(wire), adapter_net(wire)
@@ -91,9 +89,8 @@ def _signals(pinout: Pinout, variant: str) -> list[Component]:
     return parts
 
 
-def _test_header(pinout: Pinout, variant: str) -> list[Component]:
+def _test_header(pinout: Pinout) -> list[Component]:
     """Build the logic-analyser header: it taps each wire at its receiver, behind the series resistor."""
-    _ = variant
     taps: list[str | None] = [
         bluepill_net(wire)
         if wire.direction is Direction.TO_BLUEPILL or wire.role is WireRole.RESET
@@ -103,8 +100,7 @@ def _test_header(pinout: Pinout, variant: str) -> list[Component]:
     return [make("J4", "HEADER24", [*taps, "GND", "GND"], "LOGIC 3.3V")]
 
 
-def _supply(pinout: Pinout, variant: str) -> list[Component]:
-    _ = pinout
+def _supply(variant: str) -> list[Component]:
     common = [
         make("J1", "TERMINAL", ["VIN", "GND"], "12V IN"),
         make("F1", "PTC", ["VIN", "VIN_FUSED"]),
@@ -139,12 +135,11 @@ def _supply(pinout: Pinout, variant: str) -> list[Component]:
     ]
 
 
-def _serial(pinout: Pinout, variant: str) -> list[Component]:
+def _serial() -> list[Component]:
     """Build the RS-232 side: JP2 connects the spare driver as DTR, the spare receiver shows DSR on a test point.
 
     R73 holds the transmitter at mark while nothing drives IO17: during reset and boot.
     """
-    _, _ = pinout, variant
     return [
         make("U5", "MAX3232", [
             "RS_C1P", "RS_VP", "RS_C1M", "RS_C2P", "RS_C2M", "RS_VM", "DTR_ON", "RS_DSR",
@@ -178,8 +173,7 @@ def _reset_and_mode(pinout: Pinout, variant: str) -> list[Component]:
     ]
 
 
-def _test_points(pinout: Pinout, variant: str) -> list[Component]:
-    _, _ = pinout, variant
+def _test_points() -> list[Component]:
     return [make(f"TP{number}", "TP", [net], net) for number, net in enumerate(TEST_POINTS, start=1)]
 
 
@@ -210,13 +204,12 @@ def _shift_register(pinout: Pinout, variant: str) -> list[Component]:
     ]
 
 
-def _old_header(pinout: Pinout, variant: str) -> list[Component]:
+def _old_header(variant: str) -> list[Component]:
     """Build rev C's header for a straight ribbon from an old Pioneer 2's JP8, pin for pin: RS-232 over three wires.
 
     Its 12 V reach the board only while jumper JP3 is fitted: what JP8 can give is unknown. D10 keeps a battery at J1
     from feeding the robot, D1 the robot from feeding the battery.
     """
-    _ = pinout
     if variant != "rev-c":
         return []
     return [
@@ -235,10 +228,6 @@ _AUXILIARY_NETS = {
     "shift_data": "SHIFT_DATA", "shift_clock": "SHIFT_CLOCK", "shift_latch": "SHIFT_LATCH",
     "shift_enable": "SHIFT_ENABLE",
 }  # fmt: skip
-
-_BLOCKS: tuple[Callable[[Pinout, str], list[Component]], ...] = (
-    _modules, _signals, _test_header, _supply, _serial, _reset_and_mode, _shift_register, _old_header, _test_points,
-)  # fmt: skip
 
 #: HOST plug as a DTE: pin 2 receives, 3 sends, 4 asserts DTR, 6 listens to DSR; pin 0 is the shell.
 _DE9_PINS: dict[str, str | None] = {

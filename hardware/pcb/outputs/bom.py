@@ -8,6 +8,7 @@ import csv
 import html
 import io
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -51,29 +52,28 @@ def rows(design: Design) -> list[BomRow]:
 
 def csv_text(design: Design) -> str:
     """Return the list as CSV."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(
-        ["Quantity", "References", "Value", "Footprint", "Manufacturer", "Part number", "Distributor", "Description"]
-    )
-    for row in rows(design):
-        part = row.part
-        writer.writerow([row.quantity, " ".join(row.refs), part.value, part.footprint, part.manufacturer, part.mpn,
-                         part.distributor, part.description])  # fmt: skip
-    return out.getvalue()
+    head = ["Quantity", "References", "Value", "Footprint", "Manufacturer", "Part number", "Distributor", "Description"]
+    return _csv(head, (
+        [row.quantity, " ".join(row.refs), part.value, part.footprint, part.manufacturer, part.mpn, part.distributor,
+         part.description]
+        for row in rows(design) for part in [row.part]
+    ))  # fmt: skip
 
 
 def placement_csv(design: Design) -> str:
     """Return centres of the surface parts for a placing machine: from the lower left corner, y up, millimetres."""
     places = place(design)
+    return _csv(["Reference", "Value", "Footprint", "X mm", "Y mm", "Angle deg", "Side"], (
+        [part.ref, part.part.value, part.part.footprint, f"{at.x_mm:.3f}", f"{rules.BOARD_HEIGHT_MM - at.y_mm:.3f}",
+         f"{at.angle_deg:g}", "top"]
+        for part in sorted(design.components, key=lambda part: _natural(part.ref))
+        if part.part.bought and FOOTPRINTS[part.part.footprint].is_smd for at in [places[part.ref]]
+    ))  # fmt: skip
+
+
+def _csv(head: list[str], lines: Iterable[list[object]]) -> str:
     out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(["Reference", "Value", "Footprint", "X mm", "Y mm", "Angle deg", "Side"])
-    for component in sorted(design.components, key=lambda part: _natural(part.ref)):
-        if component.part.bought and FOOTPRINTS[component.part.footprint].is_smd:
-            at = places[component.ref]
-            writer.writerow([component.ref, component.part.value, component.part.footprint, f"{at.x_mm:.3f}",
-                             f"{rules.BOARD_HEIGHT_MM - at.y_mm:.3f}", f"{at.angle_deg:g}", "top"])  # fmt: skip
+    csv.writer(out, lineterminator="\n").writerows([head, *lines])
     return out.getvalue()
 
 

@@ -10,7 +10,7 @@ Invariant: a deck's figures are judged by its limits alone.
 from dataclasses import dataclass
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Limit:
     """A measured figure and the range that it must lie in."""
 
@@ -43,10 +43,7 @@ class Deck:
 
 def limits(*rows: tuple[str, float, float, str, str]) -> tuple[Limit, ...]:
     """Return limits from rows of measure, lowest, highest, unit and meaning."""
-    return tuple(
-        Limit(measure=measure, low=low, high=high, unit=unit, meaning=meaning)
-        for measure, low, high, unit, meaning in rows
-    )
+    return tuple(Limit(*row) for row in rows)
 
 
 #: BC817-40: Gummel-Poon figures in the middle of the data sheet's spread; only on/off levels are asked of it.

@@ -75,6 +75,7 @@ def test_memory_is_read_and_written_everywhere(debug) -> None:
     assert gdb("M20000300,4:01") == "E01"
     assert len(gdb("m20004ffe,8")) == 4  # as far as there is memory
     assert gdb("m40010800,4") == "44444444"  # GPIOA_CRL, its clock being off
+    assert gdb("m40022000,4") == "30000000"  # FLASH_ACR, and no neighbour of it
     assert gdb("me000ed00,4") == (0x411F_C231).to_bytes(4, "little").hex()
     assert gdb("X20000300,0:") == "OK"
     assert gdb("Me000e010,4:05000000") == "OK"
