@@ -301,7 +301,8 @@ class Peripheral(Stateful):
         self.name = place.name
         self.base = place.base
         self.fabric = chip.pins.fabric
-        table = _table_of(type(self), place.size)
+        kind: Any = type(self)  # a class is hashable, whatever its instances are
+        table = _table_of(kind, place.size)
         #: The stored words of the whole block, indexed by offset // 4; the object stays the same for ever.
         self.words = array("I", table.words)
         self._table = table

@@ -13,6 +13,7 @@ due before the block ends, and for everything else.
 import ctypes
 from collections.abc import Iterable
 from functools import cache
+from typing import Any
 
 from bluepill_sim.core import Engine
 from bluepill_sim.core.system_control import PPB_BASE
@@ -38,7 +39,8 @@ def share_registers(engine: Engine, parts: Iterable[Peripheral], rcc: Rcc) -> No
     calls.core_set_paged_region(state, engine.region_at(PERIPHERAL_BASE))
     calls.core_set_system_region(state, engine.region_at(PPB_BASE))
     for part in parts:
-        behaviour, masks = _table_of(type(part))
+        kind: Any = type(part)  # a class is hashable, whatever its instances are
+        behaviour, masks = _table_of(kind)
         count = len(behaviour)
         gate = CLOCK_GATES.get(part.name)
         at, mask = rcc.gate_address(part.name) if gate is not None else (None, 0)
