@@ -7,7 +7,7 @@
 // rules that must hold whatever happens are checked after each deed; a broken one
 // traps, as a sanitizer's finding does.
 //
-//     clang++ -fsanitize=fuzzer,address,undefined …   searches (tools/fuzz_adapter.py)
+//     clang++ -fsanitize=fuzzer,address,undefined …   searches (adapter_fw/fuzz/search.py)
 //     build.py replay                                 reads the kept corpus again, with g++
 
 #include <cstddef>
