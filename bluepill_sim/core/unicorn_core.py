@@ -552,7 +552,6 @@ class UnicornLibrary:
     version: str
 
 
-@cache
 def load_library() -> UnicornLibrary:
     """Load Unicorn.
 
@@ -564,9 +563,15 @@ def load_library() -> UnicornLibrary:
         from unicorn.unicorn_py3.unicorn import uclib
     except ImportError as error:
         raise MissingDependencyError(f"the BluePill needs the unicorn library: {error}", extra="sim") from error
+    path = uclib._name  # noqa: SLF001 - the only place where the binding keeps it
+    return _functions_of(path, str(getattr(unicorn, "__version__", "unknown")))
+
+
+@cache
+def _functions_of(path: str, version: str) -> UnicornLibrary:
     # PyDLL keeps the interpreter lock: the engine calls back into Python at each
     # block, and taking the lock there costs as much as the callback.
-    library = ctypes.PyDLL(uclib._name)  # noqa: SLF001 - the only place where the binding keeps the path
+    library = ctypes.PyDLL(path)
     word = ctypes.c_void_p
 
     def function(name: str, *arguments: type[_Argument]) -> Callable[..., int]:
@@ -598,5 +603,5 @@ def load_library() -> UnicornLibrary:
         context_alloc=function("uc_context_alloc", word, word),
         context_free=function("uc_context_free", word),
         no_operation=no_operation,
-        version=str(getattr(unicorn, "__version__", "unknown")),
+        version=version,
     )
