@@ -42,6 +42,8 @@ CLIENT_S = 10.0
 LOCALE = ("LANG", "LC_ALL", "LC_CTYPE")
 #: Each process has its own.
 NOT_COMPARED = ("PYTHONPATH",)
+#: Words of a command that looks at the shell it was started from.
+OF_THE_SHELL = ("--install-completion", "--show-completion")
 #: Modules that act on what is imported after them.
 IMPORTING = ("pytest",)
 #: What commands import at their work, beside the verbs and what those import.
@@ -137,7 +139,8 @@ class Command:
         words = self.words
         is_known = len(words) > 1 if words[:1] in (["-m"], ["-c"]) else bool(words) and words[0][:1] not in {"-", ""}
         is_to_import = words[:1] == ["-m"] and words[1] in IMPORTING
-        return is_known and not is_to_import and settings(self.environment) == settings(os.environ)
+        is_of_the_shell = not set(OF_THE_SHELL).isdisjoint(words)
+        return is_known and not (is_to_import or is_of_the_shell) and settings(self.environment) == settings(os.environ)
 
 
 def settings(environment: Mapping[str, str]) -> dict[str, str]:
