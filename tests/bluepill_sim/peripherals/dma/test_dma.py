@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bluepill_sim.stm32f103 import WIRING, line_of
+from bluepill_sim.stm32f103 import WIRING
 from tests.bluepill_sim.peripherals.dma.model import (
     CIRC,
     DIR,
@@ -32,19 +32,8 @@ from tests.bluepill_sim.peripherals.dma.model import (
 QUICK = settings(max_examples=200, deadline=None)
 #: A cycle of HCLK after a reset.
 CYCLE_NS = 125
-#: An output of a device that is not modelled, for each channel.
-LINES = [
-    line_of(name)
-    for name in (
-        "TIM2.cc3_dma",
-        "SPI1.rx_dma",
-        "SPI1.tx_dma",
-        "SPI2.rx_dma",
-        "SPI2.tx_dma",
-        "I2C1.tx_dma",
-        "I2C1.rx_dma",
-    )
-]  # fmt: skip
+#: A request of each channel, of a timer: it stands, and leaves its output alone, which a bus sets anew at a remap.
+REQUESTS = ("TIM2.cc3", "TIM2.up", "TIM3.up", "TIM4.cc2", "TIM2.cc1", "TIM3.cc1", "TIM2.cc2")
 BYTE, HALF, WORD = 0, 1, 2
 ADDRESSES = st.one_of(
     st.integers(SRAM, SRAM + 64), st.integers(SRAM, SRAM + 64),
@@ -88,10 +77,17 @@ def put(sram: Any, address: int, data: bytes) -> None:
     sram[address - SRAM : address - SRAM + len(data)] = data
 
 
+def request(chip: Any, n: int, level: bool) -> None:
+    """Set the request of channel `n` (1 to 7)."""
+    name, _, output = REQUESTS[n - 1].partition(".")
+    timer = chip.parts.by_name[name]
+    chip.pins.fabric.set_output(timer.slot, timer.OUTPUTS.index(f"{output}_dma"), level)
+
+
 def ask(chip: Any, n: int) -> None:
     """Pulse the request of channel `n`."""
-    chip.pins.fabric.set_line(LINES[n - 1], True)
-    chip.pins.fabric.set_line(LINES[n - 1], False)
+    request(chip, n, True)
+    request(chip, n, False)
 
 
 def same(chip: Any, model: DmaModel) -> None:
@@ -130,7 +126,7 @@ def apply(chip: Any, model: DmaModel, name: str, *values: Any) -> None:
         chip.parts.restore(chip.parts.snapshot())
     else:
         for level in [True, False] if name == "pulse" else [values[1]]:
-            chip.pins.fabric.set_line(LINES[values[0]], level)
+            request(chip, values[0] + 1, level)
             model.set_line(values[0], level)
 
 
@@ -207,11 +203,11 @@ def test_a_request_while_the_channel_is_off_is_lost_and_a_level_is_not(fake_chip
     fake_chip.advance(10_000)
     assert fake_chip.read("DMA1.CNDTR2") == 4
     fake_chip.write("DMA1.CCR2", 0)
-    fake_chip.pins.fabric.set_line(LINES[1], True)
+    request(fake_chip, 2, True)
     fake_chip.write("DMA1.CCR2", EN)
     fake_chip.advance(10_000 + 2 * 5 * CYCLE_NS)
     assert fake_chip.read("DMA1.CNDTR2") == 2
-    fake_chip.pins.fabric.set_line(LINES[1], False)  # one is under way
+    request(fake_chip, 2, False)  # one is under way
     fake_chip.advance(30_000)
     assert fake_chip.read("DMA1.CNDTR2") == 1
 
