@@ -14,13 +14,18 @@ import sys
 PASSED_ON = ("SIGHUP", "SIGINT", "SIGQUIT", "SIGUSR1", "SIGUSR2", "SIGTERM", "SIGTSTP", "SIGCONT", "SIGALRM")
 NUMBERS = [getattr(_signal, name) for name in PASSED_ON]
 LENGTH = 4
+#: A signal that comes just before a call that waits is looked at after it: no call waits longer.
+LOOK_S = 0.1
 
 
 def received(line: _socket.socket) -> int | None:
     """Return the next number that the server sends, None where it has none to send."""
     data = b""
     while len(data) < LENGTH:
-        more = line.recv(LENGTH - len(data))
+        try:
+            more = line.recv(LENGTH - len(data))
+        except TimeoutError:
+            continue
         if not more:
             return None
         data += more
@@ -37,6 +42,7 @@ def handed_over(line: _socket.socket, address: str, words: list[str], ignored: l
         line.connect(address)
         line.sendmsg([len(message).to_bytes(LENGTH, "big")], [(_socket.SOL_SOCKET, _socket.SCM_RIGHTS, streams)])
         line.sendall(message)
+        line.settimeout(LOOK_S)
         return received(line)
     except OSError:  # nobody serves any more
         return None

@@ -96,7 +96,9 @@ def test_a_module_that_is_not_there_is_told(tmp_path: Path) -> None:
 def test_a_signal_is_passed_on(name: str, is_handled: bool) -> None:
     number = signal.Signals[name]
     handler = f"signal.signal({number}, lambda number, _: sys.exit(number))" if is_handled else "None"
-    code = f"import signal, sys, time; {handler}; print('there', flush=True); time.sleep(1 if {number} == 18 else 60)"
+    # Many short sleeps: a signal just before one is looked at after it, in any Python.
+    sleeps = f"for _ in range({100 if number == signal.SIGCONT else 6000}): time.sleep(0.01)"
+    code = f"import signal, sys, time; {handler}; print('there', flush=True)\n{sleeps}"
     with subprocess.Popen([forked_python(), "-c", code], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
         assert process.stdout is not None
         process.stdout.readline()
