@@ -32,6 +32,9 @@ EXIT_FAILED = 1
 EXIT_USAGE = 2
 EXIT_INTERRUPTED = 130
 
+#: chosen: objects made between two searches for garbage; a capture's are tuples by the thousand, and none is garbage.
+COLLECTED_AFTER = 20_000
+
 #: What the scripts of `--install-completion` set, and why this program was called then.
 COMPLETE_VARIABLE = "_P2OS_COMPLETE"
 
@@ -184,6 +187,7 @@ def _run(words: list[str], *, trace: bool) -> int:
         command = typer.main.get_command(make_app(words))
         if not gc.isenabled():
             gc.freeze()
+            gc.set_threshold(COLLECTED_AFTER, 10, 10)
             gc.enable()
         result = command.main(words or ["--help"], prog_name="p2os", standalone_mode=False)
     except (KeyboardInterrupt, typer.Abort):

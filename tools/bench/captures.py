@@ -32,7 +32,7 @@ CYCLE_NS = 100_000_000
 #: How the program is started: as installed, and as without NumPy.
 STARTS = {
     "": (sys.executable, "-m", "p2os"),
-    "base": (sys.executable, "-c", "import sys; sys.modules['numpy'] = None; from p2os.cli.main import main; main()"),
+    "base": (sys.executable, "-c", "import sys; sys.modules['numpy'] = None; from p2os.__main__ import main; main()"),
 }
 #: What is done, with what is installed, and whether to all packets.
 WORK = {

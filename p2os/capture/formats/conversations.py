@@ -28,17 +28,19 @@ class Conversations:
 
     def parts(self, records: Records, first: int = 0, last: int | None = None) -> Iterator[Part]:
         """Yield what some records hold, one by one."""
+        link, taken = records.link, self.streams.take
         for captured_ns, data in records.packets(first, len(records.starts) if last is None else last):
             self.start_ns = captured_ns if self.start_ns is None else self.start_ns
             at_ns = max(0, captured_ns - self.start_ns)
             if at_ns > LONGEST_NS:
                 raise FileError(f"a record {at_ns / NS_PER_S:.3g} s after the first: its time is damaged")
-            if records.link == LINKTYPE_USER0:
+            if link == LINKTYPE_USER0:
                 if data[:1] not in (b"\0", b"\1"):
                     raise FileError("a record of link type USER0 that is not ours: its first byte gives no direction")
                 self.is_empty = False
                 yield at_ns, IN_DIRECTION[data[0]], data[1:]
             else:
-                for direction, sent in self.streams.take(records.link, data):
+                found = taken(link, data)
+                if found is not None:
                     self.is_empty = False
-                    yield at_ns, direction, sent
+                    yield at_ns, *found

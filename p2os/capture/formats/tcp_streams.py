@@ -7,7 +7,6 @@ Source: link types of tcpdump.org.
 """
 
 import struct
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from p2os.capture.chunks import Direction
@@ -86,21 +85,20 @@ class TcpStreams:
         #: Link types that are not read here.
         self.unread_links: set[int] = set()
 
-    def take(self, link: int, packet: bytes) -> Iterator[tuple[Direction, bytes]]:
-        """Take a captured packet; yield what it adds to a conversation."""
+    def take(self, link: int, packet: bytes) -> tuple[Direction, bytes] | None:
+        """Take a captured packet; return what it adds to a conversation, if anything."""
         if link not in LINKS:
             self.unread_links.add(link)
-            return
+            return None
         found = _segment(link, packet)
         if found is None:
-            return
+            return None
         source, target, sequence, flags, data = found
         half = self._halves.get((source, target))
         if half is None or flags & SYN:
             half = self._begin(source, target, flags)
         ready = half.take(sequence, data, is_syn=bool(flags & SYN))
-        if ready:
-            yield self.direction(source, target), ready
+        return (self.direction(source, target), ready) if ready else None
 
     def _begin(self, source: End, target: End, flags: int) -> Half:
         """Note whose side is the robot's, and return a direction of the conversation."""
@@ -133,13 +131,13 @@ def _segment(link: int, packet: bytes) -> tuple[End, End, int, int, bytes] | Non
         kind = int.from_bytes(packet[type_at : type_at + 2], "big")
         if kind not in {IPV4, IPV6}:
             return None
-    ip = packet[skip:]
     try:
-        if ip[:1] == _NO_OPTIONS:
-            size, protocol, source, target, source_port, target_port, sequence, offset, flags = _PLAIN(ip)
-            data = ip[IPV4_BYTES + (offset >> 4) * 4 : size or None]
+        if packet[skip : skip + 1] == _NO_OPTIONS:
+            size, protocol, source, target, source_port, target_port, sequence, offset, flags = _PLAIN(packet, skip)
+            data = packet[skip + IPV4_BYTES + (offset >> 4) * 4 : skip + size if size else None]
             found = (source, source_port), (target, target_port), sequence, flags, data
             return found if protocol == TCP and not 0 < size < _LEAST_BYTES else None
+        ip = packet[skip:]
         if ip[:1] and ip[0] >> 4 == 4:
             header, size, protocol = (ip[0] & 15) * 4, int.from_bytes(ip[2:4], "big"), ip[9]
             source, target, tcp = ip[12:16], ip[16:20], ip[header : size or None]

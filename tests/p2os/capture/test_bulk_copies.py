@@ -101,4 +101,5 @@ def test_a_segment_ends_where_its_packet_does_and_has_its_flags(size: int, said:
     packet = b"\x45\0" + size.to_bytes(2, "big") + bytes(5) + b"\x06" + bytes(2) + b"\x7f\0\0\1" * 2 + tcp
     packet = packet[:32] + b"\x30" + packet[33:]
     streams = TcpStreams()
-    assert [data for _, data in streams.take(101, packet)] == [piece.replace(b"n", b"0") for piece in said]
+    found = streams.take(101, packet)
+    assert ([] if found is None else [found[1]]) == [piece.replace(b"n", b"0") for piece in said]
