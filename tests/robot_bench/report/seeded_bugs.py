@@ -290,7 +290,7 @@ LONGER = (
             ("dodge.c", _READ, "dodge_tick(&dodge, sensors, "),
         ),
         # Not that it would act later: the line that debounces, and for how long nothing came of it.
-        answers=("late", "and sets its motors no otherwise for it"), thing=_BOX, duration_s=20.0, is_found=False,
+        answers=("late", "and sets its motors no otherwise for it"), thing=_BOX, duration_s=20.0,
     ),
     Bug(
         name="never-clear-again",
