@@ -8,7 +8,7 @@ import numpy as np
 from p2os.capture.cells import Cell
 from p2os.capture.columns.column import Column as CellColumn
 from p2os.capture.columns.framing import Bytes, Flags
-from p2os.capture.columns.gathering import indexes_of
+from p2os.capture.columns.gathering import indexes_of, offsets_of
 from p2os.capture.columns.table import Table
 from p2os.capture.columns.walker import Column, Ragged, Spans
 from simbase.errors import MissingDependencyError
@@ -62,9 +62,8 @@ def texts(sizes: Column, joined: bytes | Bytes, present: Flags | None = None, *,
     """
     import pyarrow as pa
 
-    offsets = np.zeros(len(sizes) + 1, np.int32)
-    np.cumsum(sizes, out=offsets[1:])
-    buffers = [_validity(present), pa.py_buffer(offsets), pa.py_buffer(joined)]
+    offsets = pa.py_buffer(offsets_of(sizes).astype(np.int32))
+    buffers = [_validity(present), offsets, pa.py_buffer(joined)]
     return pa.Array.from_buffers(pa.binary() if is_binary else pa.string(), len(sizes), buffers)
 
 
