@@ -104,6 +104,7 @@ def run_scenario(
     fail_under: float = 0.0,
     is_kept: Callable[[bool], bool] = lambda _passed: True,
     explained: bool = False,
+    plots: bool = False,
 ) -> RunResult:
     """Run a scenario in virtual time and make its run folder.
 
@@ -122,6 +123,7 @@ def run_scenario(
         fail_under: With `coverage`, the run fails where fewer percent of the lines ran; 0 asks for nothing.
         is_kept: Told whether the run passed; where it says no, nothing is made of the run and its folder is removed.
         explained: Whether the report says of a run that failed why (`p2os explain`), which takes some seconds.
+        plots: Whether the report's PNG plots are wanted, too.
 
     Raises:
         P2osError: The folder is not free, a file cannot be read or written, or a part is not installed.
@@ -132,7 +134,7 @@ def run_scenario(
             raise UsageError("a debugger, coverage and profile are for a robot alone", hint="a scenario with one robot")
         return run_together(
             scenario, folder, slice_ns=slice_ns, speed=speed, on_progress=on_progress, clock=clock, force=force,
-            is_kept=is_kept,
+            is_kept=is_kept, plots=plots,
         )  # fmt: skip
     pacer = None if speed is None else RealTimePacer(speed=speed, clock=clock)
     with reserved(folder, force=force), _trace_of(scenario, folder, is_at_port=False) as trace:
@@ -141,7 +143,9 @@ def run_scenario(
         bench.on_slice = _after_slice(bench, pacer, on_progress)
         trace.meta(meta_of(scenario, bench.parts.world, bench.note, is_at_port=False))
         with _measured(bench.chip, coverage=coverage, profile=profile, fail_under=fail_under) as measurement:
-            return _record(bench, trace, folder, pacer, clock, drive, measurement, is_kept, explained=explained)
+            return _record(
+                bench, trace, folder, pacer, clock, drive, measurement, is_kept, explained=explained, plots=plots
+            )
 
 
 def run_at_port(
@@ -346,11 +350,12 @@ def _record(
     is_kept: Callable[[bool], bool] = lambda _passed: True,
     *,
     explained: bool = False,
+    plots: bool = False,
 ) -> RunResult:
     """Run to the end, judge the goals, write the trace's last line, and make the rest of the folder."""
     driven = _drive(bench, pacer, clock, drive)
     passed = _conclude(bench, trace, folder, pacer, driven, measurement, explained=explained)
-    made = make_artefacts(folder) if is_kept(passed) else _removed(folder)
+    made = make_artefacts(folder, plots=plots) if is_kept(passed) else _removed(folder)
     _LOG.info("%s %s: %s", bench.scenario.name, "passed" if passed else "failed", made.report)
     return RunResult(folder=folder, outcome=made.outcome, report=made.report, was_interrupted=driven.was_interrupted)
 
@@ -439,6 +444,7 @@ def run_together(
     clock: Clock = wall_clock,
     force: bool = False,
     is_kept: Callable[[bool], bool] = lambda _passed: True,
+    plots: bool = False,
 ) -> RunResult:
     """Run a scenario with several robots: a run folder for each inside of `folder`, and there what came of all.
 
@@ -460,7 +466,7 @@ def run_together(
         driven = _drive(first, pacer, clock, None)
         passed = [_conclude(bench, traces[name], folder / name, pacer, driven) for name, bench in benches.items()]
         if is_kept(all(passed)):
-            made = make_artefacts_of_all(folder, list(benches), scenario.name)
+            made = make_artefacts_of_all(folder, list(benches), scenario.name, plots=plots)
         else:
             outcomes = {name: _removed(folder / name).outcome for name in benches}
             made = Artefacts(outcome=outcome_of_all(scenario.name, outcomes), report=folder / REPORT_NAME)

@@ -44,5 +44,5 @@ def demo(
     )  # fmt: skip
     folder = out or make_next_folder("demo")
     with RunDisplay() as display:
-        result = run_scenario(scenario, folder, on_progress=display.update, force=force)
+        result = run_scenario(scenario, folder, on_progress=display.update, force=force, plots=True)
     end_with(result, json_output=json_output)

@@ -284,6 +284,7 @@ def test_demo_runs_dodge_in_the_room(capsys: pytest.CaptureFixture[str]) -> None
     assert [goal.rpartition(": ")[2] for goal in outcome["goals_not_judged"]] == ["not judged before 120 s"] * 3
     assert (outcome["scenario"], outcome["mode"], outcome["world"]) == ("dodge", "adapter", "room")
     assert Path("runs/demo-001/report.html").is_file()
+    assert {path.name for path in Path("runs/demo-001").glob("*.png")} == {"path.png", "speeds.png", "pins.png"}
 
 
 def test_a_run_shorter_than_its_scenario_names_what_it_left_open(capsys: pytest.CaptureFixture[str]) -> None:
