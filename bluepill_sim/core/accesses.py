@@ -12,10 +12,10 @@ words after it, with the registers as they are before the instruction.
 from dataclasses import dataclass
 from functools import lru_cache
 
+from bluepill_sim.core.block_cost import KNOWN_BLOCKS
+
 _SP, _PC = 13, 15
 _FIRST_WIDE = 0xE800
-#: chosen: as many as block_cost.py knows.
-_BLOCKS = 4096
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ _INDEXED = (
 )  # fmt: skip
 
 
-@lru_cache(maxsize=_BLOCKS)
+@lru_cache(maxsize=KNOWN_BLOCKS)
 def accesses_of(code: bytes, start: int) -> tuple[Access, ...]:
     """Return the accesses of a straight run of code that stands at `start`, in order."""
     found = []
@@ -144,7 +144,7 @@ def may_end_in_it(code: bytes) -> bool:
     return False
 
 
-@lru_cache(maxsize=_BLOCKS)
+@lru_cache(maxsize=KNOWN_BLOCKS)
 def is_ambiguous(code: bytes, start: int) -> bool:
     """Tell whether two accesses look alike although the first one's base may change in between.
 

@@ -64,8 +64,8 @@ REFILL = {
     Kind.LOAD_MULTIPLE: 3,
 }
 
-#: chosen: of so many blocks it is known what they cost, several programs' all.
-_BLOCKS = 4096
+#: chosen: of so many blocks it is known what they cost and access, several programs' all.
+KNOWN_BLOCKS = 4096
 #: Bytes that one access to the flash delivers (RM0008 3.3.3: 64-bit lines).
 LINE_BYTES = 8
 
@@ -142,7 +142,7 @@ class Block:
 NO_BLOCK = Block(-1, -1, 0, 0, {})
 
 
-@lru_cache(maxsize=_BLOCKS)  # after each restored state a chip asks anew
+@lru_cache(maxsize=KNOWN_BLOCKS)  # after each restored state a chip asks anew
 def measure_block(code: bytes, start: int, wait_states: int, *, has_prefetch: bool) -> Block:
     """Return the costs of the block whose bytes are `code`.
 
