@@ -18,9 +18,6 @@ Node: TypeAlias = "list[str | Node]"
 #: Longest list that stays on one line. chosen: a stroke, a track or a pad's properties fit, so that a change of one
 #: of them is a change of one line.
 _LINE_LENGTH = 200
-#: A bracket, what stands in quotes (the last may lack its end), or a bare word; and a character behind a backslash.
-_TOKEN = re.compile(r'[()]|"(?P<quoted>(?:[^"\\]|\\.)*\\?)"?|[^\s()"]+', re.DOTALL)
-_ESCAPED = re.compile(r"\\(.)", re.DOTALL)
 #: chosen: any fixed UUID; another one would rename every object.
 _SPACE = uuid.UUID("6f2d6a53-77d5-5f0b-9a3c-0b5a5d1c9e11")
 
