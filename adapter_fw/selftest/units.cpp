@@ -13,6 +13,7 @@
 #include "../core/app/mode_button.hpp"
 #include "../core/app/runner.hpp"
 #include "../core/app/text.hpp"
+#include "robot.hpp"
 
 namespace {
 
@@ -202,6 +203,66 @@ struct Connecting {
   adapter::Adapter part{{}, {}, {}, 0};
   app::Runner runner{part, clock, uart, nullptr};
 };
+
+//: A line with a robot at its far end. The machine can be suspended once, just after a VEL has gone out.
+class Robotic final : public hal::Uart {
+ public:
+  explicit Robotic(StandingClock& clock) : clock_(clock) {}
+  std::size_t read(std::uint8_t* data, std::size_t size) override {
+    robot_.advance_to(clock_.at);
+    const p2os::Bytes output = robot_.output();
+    if (output.size == 0 || output.size > size) {
+      return 0;
+    }
+    std::memcpy(data, output.data, output.size);
+    robot_.forget_output();
+    return output.size;
+  }
+  void write(p2os::Bytes data) override {
+    robot_.receive(data, clock_.at);
+    if (is_suspended && count < sizeof kinds) {
+      kinds[count++] = data[3];
+    }
+    if (is_to_suspend && data[3] == 11) {
+      clock_.at += app::Runner::GAP_NS + 1;
+      is_to_suspend = false;
+      is_suspended = true;
+    }
+  }
+  void set_baud(std::int32_t) override {}
+  bool is_to_suspend = false;
+  bool is_suspended = false;
+  //: Command numbers of the frames since then.
+  std::uint8_t kinds[64] = {};
+  std::size_t count = 0;
+
+ private:
+  StandingClock& clock_;
+  selftest::Robot robot_;
+};
+
+void check_a_gap_between_two_frames() {
+  StandingClock clock;
+  Robotic uart(clock);
+  HeldPins pins;
+  adapter::Adapter part{{}, {}, {}, 0};
+  part.attach(&pins, nullptr, nullptr);
+  app::Runner runner{part, clock, uart, nullptr};
+  pins.word = 1U << 6 | 2U << 3 | 2U;
+  const auto run = [&](Nanos span) {
+    for (const Nanos end = clock.at + span; clock.at < end;) {
+      const Nanos due = runner.pass();
+      clock.at = due < clock.at + NS_PER_MS ? due : clock.at + NS_PER_MS;
+    }
+  };
+  run(20 * NS_PER_S);
+  claim(part.state() == State::DRIVING, "the robot drives");
+  uart.is_to_suspend = true;
+  run(NS_PER_S);
+  const std::uint8_t stops[] = {29, 11, 21, 2};
+  claim(uart.count >= sizeof stops && std::memcmp(uart.kinds, stops, sizeof stops) == 0,
+        "RVEL, queued with a VEL before the gap, does not go out after it");
+}
 
 void check_gaps() {
   Connecting late;
@@ -404,6 +465,7 @@ int main() {
   check_faults();
   check_duties();
   check_gaps();
+  check_a_gap_between_two_frames();
   check_origin();
   if (broken == 0) {
     std::puts("ok");

@@ -44,7 +44,7 @@ LIVES, LIFE_LIMIT_S = 120, 20
 #: What is asked where no life notices: waves, whole adapters, words.
 OWN_TESTS = "tests/adapter_sim"
 #: The same on the firmware's side: what no life exercises.
-UNITS = "adapter_fw/selftest/units.cpp"
+UNITS = ("adapter_fw/selftest/units.cpp", "adapter_fw/selftest/robot.cpp")
 #: Operators of cosmic-ray that change no arithmetic or order: what they break is found by the type check.
 LEFT_OUT = ("RemoveDecorator", "ExceptionReplacer", "VariableReplacer", "VariableInserter", "KeywordReplacer")
 COMPILE = ("g++", "-std=c++17", "-O1", "-fPIC", "-w", "-fno-exceptions", "-fno-rtti")
@@ -164,7 +164,7 @@ class Judge:
         """Tell whether the checks of single parts notice it: codes over a restart, gaps, a client without adapter."""
         program = self.folder / "units"
         sources = [str(path.relative_to(ROOT)) for path in (ROOT / "adapter_fw" / "core").rglob("*.cpp")]
-        others = [self._object(path) for path in (*sources, UNITS) if path != mutant.path]
+        others = [self._object(path) for path in (*sources, *UNITS) if path != mutant.path]
         subprocess.run(["g++", str(self.folder / "mutant.s"), *map(str, others), "-o", str(program)], check=True)
         try:
             done = subprocess.run([program], capture_output=True, check=False, timeout=LIFE_LIMIT_S)

@@ -16,7 +16,6 @@ p2os::Nanos Runner::pass() {
     adapter_.receive_pad(report, now);
   }
   adapter_.advance_to(now);
-  look_for_gap();  // a machine can be suspended in any line: what the one above queued must not go out then
   if (adapter_.baud() != baud_) {
     baud_ = adapter_.baud();
     uart_.set_baud(baud_);
@@ -36,7 +35,8 @@ p2os::Nanos Runner::look_for_gap() {
 
 void Runner::send() {
   p2os::CommandFrame frame;
-  while (adapter_.take_output(frame)) {
+  // A machine can be suspended in any line, also between two frames: what was queued before it must not go out then.
+  while (look_for_gap(), adapter_.take_output(frame)) {
     uart_.write(frame.bytes());
   }
 }
