@@ -1,7 +1,8 @@
 """A board without electronics: the emulated BluePill and the simulated ESP32, each with its program, in a circuit.
 
 Both modules run the bytes, or the sources, that a real board runs; the circuit between them may have faults.
-Time goes in steps of a millisecond; an edge that the BluePill makes is answered at once, as the circuit does.
+Time goes in steps as long as most answers take; an edge that the BluePill makes is answered at once, as the circuit
+does, and what the adapter changes at the end of a step: it changes nothing but what it is told to, or at a reset.
 
 Invariant: without faults it is the board of docs/board.md, as far as `Circuit` models it.
 """
@@ -30,14 +31,16 @@ from robot_bench.wires.board_test.circuit import (
     Source,
 )
 from robot_bench.wires.board_test.ends import AdapterEnd, BluePillEnd, Line
-from robot_bench.wires.board_test.esp32 import CONSOLE, NS_PER_US, ROBOT, Esp32
+from robot_bench.wires.board_test.esp32 import CONSOLE, ROBOT, Esp32
 from robot_bench.wires.chip_pins import number_of
-from simbase.timing import Reason
+from simbase.timing import NS_PER_MS, NS_PER_US, Reason
 
 REVISION = "rev-b"
 PROGRAM = Path(firmware.__file__).parent / "board_test.elf"
 #: chosen: what a person would wait for, and more than any answer takes.
 ANSWER_MS = 200
+#: chosen: the longest question and its answer take 7 ms, but for those of pad and line.
+STEP_MS = 8
 _PIN_DRIVES = tuple(PinDrive)
 #: The chip's own drives as sources; one that lets go has none.
 _SOURCES = {
@@ -55,7 +58,6 @@ class EmulatedBoard:
         faults: What is wrong with the board.
         has_loop_plug: Whether pins 2 and 3 of J3 are joined.
         between: What is read of a pad between the limits of low and high.
-        library: The ESP32's program; None takes the package's own.
     """
 
     def __init__(
@@ -64,14 +66,13 @@ class EmulatedBoard:
         *,
         has_loop_plug: bool = True,
         between: bool = False,
-        library: Path | None = None,
     ) -> None:
         self.pinout = load_pinout()
         self._circuit = Circuit(self.pinout, faults)
         self._has_loop_plug = has_loop_plug
         self._between = between
         self.bluepill = BluePill(PROGRAM)
-        self.esp32 = Esp32(library)
+        self.esp32 = Esp32()
         self._pads = {
             wire.name: int(pin.removeprefix("IO"))
             for wire in self.pinout.wires
@@ -106,8 +107,10 @@ class EmulatedBoard:
 
     def run_ms(self, span_ms: int) -> None:
         """Let time pass."""
-        for _ in range(span_ms):
-            until_ns = (self.esp32.now_us + 1000) * NS_PER_US
+        now_ns = self.esp32.now_us * NS_PER_US
+        end_ns = now_ns + span_ms * NS_PER_MS
+        while now_ns < end_ns:
+            now_ns = until_ns = min(now_ns + STEP_MS * NS_PER_MS, end_ns)
             while self.bluepill.advance_to(until_ns).reason is Reason.EDGE:
                 self._settle()
             self.esp32.run_until(until_ns // NS_PER_US)
@@ -170,8 +173,8 @@ class _EmulatedLine:
         self._read()
         self._send(f"{line}\n".encode())
         said = b""
-        for _ in range(ANSWER_MS):
-            self._board.run_ms(1)
+        for _ in range(0, ANSWER_MS, STEP_MS):
+            self._board.run_ms(STEP_MS)
             said += self._read()
             *lines, said = said.split(b"\n")
             for answer in lines:

@@ -21,7 +21,6 @@ CONSOLE, ROBOT = 0, 2
 _CHUNK = 4096
 #: Where bytes that have left, and their times, are put, a chunk at a time.
 _BUFFERS = ctypes.create_string_buffer(_CHUNK), (ctypes.c_int64 * _CHUNK)()
-NS_PER_US = 1000
 
 
 class ResetReason(IntEnum):

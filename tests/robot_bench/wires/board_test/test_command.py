@@ -2,19 +2,18 @@
 
 import json
 import os
+import select
 import threading
 import tty
 from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import pytest
 import typer
 from typer.testing import CliRunner
 
 from robot_bench.cli import board as verb
-from robot_bench.wires.board_test import esp32
 from robot_bench.wires.board_test.circuit import Fault, FaultKind, Side
-from robot_bench.wires.board_test.emulated import PROGRAM, EmulatedBoard
+from robot_bench.wires.board_test.emulated import PROGRAM, STEP_MS, EmulatedBoard
 from robot_bench.wires.board_test.esp32 import CONSOLE
 from simbase.errors import UsageError
 
@@ -23,8 +22,7 @@ RUNNER = CliRunner()
 
 
 @pytest.fixture
-def run(library: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
-    monkeypatch.setattr(esp32, "library_path", lambda: library)
+def run() -> Run:
     app = _app()
 
     def run(*words: str) -> tuple[int, str]:
@@ -104,9 +102,10 @@ class Ports:
         while not self._has_ended.is_set():
             board.esp32.receive(CONSOLE, self._typed(adapter))
             board.bluepill.usart1.receive(self._typed(bluepill))
-            board.run_ms(1)
-            os.write(adapter, board.esp32.sent(CONSOLE))
-            os.write(bluepill, board.bluepill.usart1.read())
+            board.run_ms(STEP_MS)
+            said = os.write(adapter, board.esp32.sent(CONSOLE)) + os.write(bluepill, board.bluepill.usart1.read())
+            if not said:  # an answer may take several steps: time goes on, but slower
+                select.select([adapter, bluepill], [], [], 0.001)
 
     @staticmethod
     def _typed(descriptor: int) -> bytes:
@@ -124,8 +123,8 @@ class Ports:
 
 
 @pytest.fixture
-def ports(library: Path) -> Iterator[Ports]:
-    served = Ports(EmulatedBoard((Fault(FaultKind.OPEN, "DD5"),), library=library))
+def ports() -> Iterator[Ports]:
+    served = Ports(EmulatedBoard((Fault(FaultKind.OPEN, "DD5"),)))
     yield served
     served.close()
 

@@ -1,10 +1,11 @@
 """Each wire with each fault, made from the pin-out: the self-test names the wire, the fault and who takes part."""
 
-from itertools import pairwise
+from collections.abc import Iterable, Sequence
+from itertools import pairwise, product
 
 import pytest
 
-from adapter_sim.pinout import Direction, load_pinout
+from adapter_sim.pinout import Direction, Pull, load_pinout
 from hardware.pcb.circuit.modules import BLUEPILL_PINS, ESP32_PINS
 from robot_bench.wires.board_test.circuit import Fault, FaultKind, Side
 from robot_bench.wires.board_test.verdicts import Finding, Verdict
@@ -13,6 +14,7 @@ from tests.robot_bench.wires.board_test.conftest import Tested
 PINOUT = load_pinout()
 WIRES = [wire.name for wire in PINOUT.wires]
 RESET = "rst"
+PULLED_UP = {wire.name for wire in PINOUT.wires if wire.pull is Pull.UP}
 #: Pads of each module, in the order in which they stand beside each other.
 ROWS = {
     Side.BLUEPILL: (BLUEPILL_PINS[:20], BLUEPILL_PINS[20:]),
@@ -40,6 +42,34 @@ FAULTS = [
     *(Fault(FaultKind.SWAPPED, *pair) for pair in neighbours(Side.BLUEPILL)),
     *(Fault(FaultKind.SWAPPED, *pair) for pair in neighbours(Side.ESP32)),
 ]  # fmt: skip
+#: Faults on one board at once in these tests. chosen: a report of a group is still read at a glance.
+MOST_AT_ONCE = 8
+
+
+def grouped(faults: Iterable[Fault]) -> list[list[Fault]]:
+    """Return the faults in groups that a board may have at once, each named as if it were alone.
+
+    Currents of one wire are no other's, so those on different wires are independent, but for what they have in common:
+    the reset, and the supply, which several pull-ups without their rail are taken for.
+    """
+    groups: list[list[Fault]] = []
+    for fault in faults:
+        fitting = (group for group in groups if len(group) < MOST_AT_ONCE and are_independent([*group, fault]))
+        group = next(fitting, None)
+        if group is None:
+            groups.append([fault])
+        else:
+            group.append(fault)
+    return groups
+
+
+def are_independent(faults: Sequence[Fault]) -> bool:
+    """Tell whether no two faults have a wire in common, and neither the reset nor the supply."""
+    wires = [wire for fault in faults for wire in (fault.wire, fault.other) if wire]
+    pulled_up = [wire for wire in wires if wire in PULLED_UP]
+    return len(set(wires)) == len(wires) and RESET not in wires and len(pulled_up) <= 1
+
+
 #: One of each kind, and what is easily forgotten: the pin with the LED, a pull-up, the wires of the reset.
 QUICK = [
     Fault(FaultKind.OPEN, "encoder2_s1"),
@@ -75,12 +105,24 @@ def expected(fault: Fault) -> list[Named]:
             return is_open
 
 
+def expected_of(faults: Sequence[Fault]) -> list[Named]:
+    """Return what may be named of a board with several."""
+    return [set().union(*each) for each in product(*(expected(fault) for fault in faults))]
+
+
 def named(findings: list[Finding]) -> Named:
     return {(row.name, row.verdict, row.others) for row in findings if row.is_fault}
 
 
 def words(fault: Fault) -> str:
     return f"{fault.kind.value}-{fault.wire}-{fault.other or fault.side.value}"
+
+
+def ids(faults: Sequence[Fault]) -> str:
+    return words(faults[0]) + (f"-and-{len(faults) - 1}" if faults[1:] else "")
+
+
+GROUPS = grouped(FAULTS)
 
 
 def test_a_sound_board_has_a_row_for_each_wire_and_no_fault(tested: Tested) -> None:
@@ -95,10 +137,18 @@ def test_one_fault_of_each_kind_is_named(tested: Tested, fault: Fault) -> None:
     assert named(tested(fault)) in expected(fault)
 
 
-@pytest.mark.slow
+@pytest.mark.parametrize("between", [False, True], ids=["reads-0", "reads-1"])
+@pytest.mark.parametrize("faults", GROUPS, ids=ids)
+def test_each_fault_of_each_wire_is_named_however_a_pad_between_the_limits_reads(
+    tested: Tested, faults: list[Fault], between: bool
+) -> None:
+    assert named(tested(*faults, between=between)) in expected_of(faults)
+
+
+@pytest.mark.soak
 @pytest.mark.parametrize("between", [False, True], ids=["reads-0", "reads-1"])
 @pytest.mark.parametrize("fault", FAULTS, ids=words)
-def test_each_fault_of_each_wire_is_named_however_a_pad_between_the_limits_reads(
+def test_a_fault_alone_is_named_however_a_pad_between_the_limits_reads(
     tested: Tested, fault: Fault, between: bool
 ) -> None:
     assert named(tested(fault, between=between)) in expected(fault)
