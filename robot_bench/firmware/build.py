@@ -7,11 +7,14 @@ Source: gcc-arm-none-eabi of Debian 12 (12.2.rel1) built the committed files.
 """
 
 import argparse
+import re
 import shutil
 import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
@@ -58,6 +61,7 @@ COMPILE_FLAGS = (
     "-fno-common",
     "-fno-tree-loop-distribute-patterns",  # memset is not to become a call of itself
 )
+_INCLUDED = re.compile(rb'^ *# *include *"([^"]+)"', re.MULTILINE)
 LINK_FLAGS = (
     *MACHINE_FLAGS,
     "-nostdlib",
@@ -90,9 +94,9 @@ def build_elf(
     with tempfile.TemporaryDirectory() as scratch:
         objects = []
         for source in sources:
-            target = str(Path(scratch) / source.replace("/", "_").replace(".c", ".o"))
-            _run([COMPILER, *COMPILE_FLAGS, *more_flags, *prefix_maps, "-c", source, "-o", target], folder)
-            objects.append(target)
+            target = Path(scratch) / source.replace("/", "_").replace(".c", ".o")
+            target.write_bytes(_compiled(_Unit(source, _texts(source, folder), more_flags, folder, prefix_maps)))
+            objects.append(str(target))
         _run([COMPILER, *LINK_FLAGS, "-T", linker_script, *objects, "-lgcc", "-o", str(output)], folder)
     output.chmod(0o644)
 
@@ -141,6 +145,40 @@ def build_kit(output: Path) -> Path:
             ("startup.c", "memory.c", KIT.name), folder=folder, linker_script="f103c8.ld", output=output.resolve()
         )  # fmt: skip
     return output
+
+
+@dataclass(frozen=True, slots=True)
+class _Unit:
+    """What is compiled; where it lies changes no byte of its object."""
+
+    source: str
+    #: Of it and of what it includes, in the order of the includes.
+    texts: tuple[bytes, ...]
+    more_flags: tuple[str, ...]
+    folder: Path = field(compare=False)
+    prefix_maps: tuple[str, ...] = field(compare=False)
+
+
+@cache
+def _compiled(unit: _Unit) -> bytes:
+    """Return the object of a source: programs share most of theirs, and copies of one with a change all but that."""
+    flags = (*COMPILE_FLAGS, *unit.more_flags, *unit.prefix_maps)
+    with tempfile.TemporaryDirectory() as scratch:
+        target = Path(scratch) / "object.o"
+        _run([COMPILER, *flags, "-c", unit.source, "-o", str(target)], unit.folder)
+        return target.read_bytes()
+
+
+def _texts(source: str, folder: Path) -> tuple[bytes, ...]:
+    """Return what a source and the files beside it that it includes say."""
+    found, waiting = dict[Path, bytes](), [folder / source]
+    while waiting:
+        path = waiting.pop()
+        if path not in found and path.is_file():
+            found[path] = path.read_bytes()
+            names = [name.decode() for name in _INCLUDED.findall(found[path])]
+            waiting += (place / name for name in names for place in (path.parent, folder))
+    return tuple(found.values())
 
 
 def _run(command: list[str], folder: Path) -> None:
