@@ -89,11 +89,19 @@ def ramp(targets: list[float], due: list[int], count: int, faster: float, slower
     """Return the speed before each step, and behind the last: ramped towards the target whose step has come."""
     speed, speeds = 0.0, np.zeros(count + 1)
     for first, last, target in zip(due, [*due[1:], count], targets, strict=True):
-        step = min(first, count)
-        while step < min(last, count) and speed != target:
-            speed, step = _toward(speed, target, faster, slower), step + 1
-            speeds[step] = speed
-        speeds[step + 1 : min(last, count) + 1] = speed
+        step, end = min(first, count), min(last, count)
+        while step < end and speed != target:
+            goal = 0.0 if speed * target < 0 else target
+            rate = faster if abs(goal) > abs(speed) else slower
+            alike = min(end - step, int(abs(goal - speed) / (rate * STEP_S)) - 1)
+            if alike > 0:  # steps that neither reach it nor stand
+                speeds[step : step + alike + 1] = np.cumsum([speed, *[math.copysign(rate * STEP_S, goal - speed)] * alike])
+                step += alike
+                speed = float(speeds[step])
+            else:
+                speed, step = _toward(speed, target, faster, slower), step + 1
+                speeds[step] = speed
+        speeds[step + 1 : end + 1] = speed
     return speeds
 
 

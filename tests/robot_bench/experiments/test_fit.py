@@ -228,12 +228,12 @@ def test_without_noise_the_largest_return_error_falls_ten_times(two_squares: lis
 
 
 @pytest.mark.slow
-def test_the_return_errors_of_five_robots_fall_ten_times_without_noise_and_their_centres_five_times_with_it() -> None:
-    for seed in range(2, 7):
+def test_the_return_errors_of_robots_fall_ten_times_without_noise_and_their_centres_five_times_with_it() -> None:
+    for seed in range(2, 5):
         found = umbmark(squares(seed, 1, noise=False))
-        if found.before.largest_m > 0.05:
-            assert found.least_squares.largest_m < found.before.largest_m / 10, seed
-    with_noise = umbmark(squares(1, 5, noise=True))
+        assert found.before.largest_m > 0.05
+        assert found.least_squares.largest_m < found.before.largest_m / 10, seed
+    with_noise = umbmark(squares(1, 2, noise=True))
     assert with_noise.least_squares.e_max_m < with_noise.before.e_max_m / 5
 
 
