@@ -30,16 +30,17 @@ def each_body(*left_out: str) -> list[ParameterSet]:
 
 
 def drive(body: RobotBody, left_mps: float, right_mps: float, seconds: float) -> BodyState:
-    """Drive with these rim speeds; return the state at the end."""
-    for _ in range(round(seconds * STEPS_PER_S)):
-        body.step(left_mps, right_mps)
+    """Drive with these rim speeds; return the state at the end.
+
+    As a robot's firmware does: many steps at once, which `test_held_speed.py` compares with single ones.
+    """
+    body.hold(left_mps, right_mps, round(seconds * STEPS_PER_S))
     return body.state
 
 
 def ramped(body: RobotBody, left_mps: float, right_mps: float, seconds: float) -> BodyState:
     """Drive with a trapezoid, 0.5 s up and 0.5 s down, and come to rest."""
     steps = round(seconds * STEPS_PER_S)
-    for step in range(steps):
-        share = min(1.0, (step + 0.5) / 500, (steps - step - 0.5) / 500)
-        body.step(left_mps * share, right_mps * share)
+    shares = [min(1.0, (step + 0.5) / 500, (steps - step - 0.5) / 500) for step in range(steps)]
+    body.ramp([(left_mps * share, right_mps * share) for share in shares])
     return drive(body, 0, 0, 0.3)

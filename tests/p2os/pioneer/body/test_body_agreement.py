@@ -49,9 +49,8 @@ def through(body: RobotBody, legs: Iterable[Leg]) -> BodyState:
     left = right = 0.0
     for to_left, to_right, held_s in (*legs, (0.0, 0.0, 0.3)):
         steps = math.ceil(max(abs(to_left - left), abs(to_right - right)) / RAMP_MPS2 * 1000)
-        for step in range(steps):
-            share = (step + 0.5) / steps
-            body.step(left + (to_left - left) * share, right + (to_right - right) * share)
+        shares = [(step + 0.5) / steps for step in range(steps)]
+        body.ramp([(left + (to_left - left) * share, right + (to_right - right) * share) for share in shares])
         drive(body, to_left, to_right, held_s)
         left, right = to_left, to_right
     return body.state

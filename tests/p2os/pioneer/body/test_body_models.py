@@ -8,21 +8,31 @@ import pytest
 from p2os.pioneer.body.factory import BODY_NAMES, make_body
 from p2os.pioneer.world.model import Obstacle, Pose, World
 from p2os.robots.parameters import RobotParameters, known_robots, load_parameters
-from tests.p2os.pioneer.body.bodies import Maker, drive, marks_of, ramped
+from tests.p2os.pioneer.body.bodies import Maker, drive, each_body, marks_of, ramped
 
-#: The quick ones: one of each build (two wheels and a caster, four wheels, small, large).
-QUICK = {"p2dx", "p3at", "amigo", "powerbot"}
 EMPTY = World(name="e", source="e", description="", start=Pose(0, 0, 0), extent=(-4, -4, 4, 4), obstacles=())
+
+
+def build_of(parameters: RobotParameters) -> tuple[object, ...]:
+    """Return what a body takes from a model."""
+    ring = (parameters.sonar, parameters.sonar_fitted, parameters.sonar_cone_deg, parameters.sonar_height_m,
+            parameters.sonar_range_m, parameters.sonar_min_range_m)  # fmt: skip
+    return parameters.body, parameters.track_mm, parameters.rotor_inertia_kg_m2, ring
+
+
+#: The models of each build, by the first of them.
+BUILDS: dict[str, list[str]] = {}
+for _model in known_robots():
+    _build = build_of(load_parameters(_model))
+    BUILDS.setdefault(next((name for name in BUILDS if build_of(load_parameters(name)) == _build), _model), []).append(
+        _model
+    )
 
 
 @pytest.fixture(
     params=[
-        pytest.param(
-            (engine, model),
-            id=f"{engine}-{model}",
-            marks=[*marks_of(engine), *([] if model in QUICK else [pytest.mark.slow])],
-        )
-        for model in known_robots()
+        pytest.param((engine, model), id=f"{engine}-{model}", marks=marks_of(engine))
+        for model in BUILDS
         for engine in BODY_NAMES
     ]
 )
@@ -30,6 +40,17 @@ def robot(request: pytest.FixtureRequest) -> tuple[RobotParameters, Maker]:
     engine, model = request.param
     parameters = load_parameters(model)
     return parameters, lambda world=EMPTY: make_body(engine, world, parameters)
+
+
+@pytest.mark.parametrize("engine", each_body())
+@pytest.mark.parametrize("models", [models for models in BUILDS.values() if len(models) > 1], ids="-".join)
+def test_models_of_one_build_are_one_body(models: list[str], engine: str) -> None:
+    def life(model: str) -> list[object]:
+        body = make_body(engine, EMPTY, load_parameters(model))
+        body.place(Obstacle(name="post", x_m=1.2, y_m=0.3, radius_m=0.1, height_m=0.6))
+        return [drive(body, 0.3, 0.2, 0.05), body.ranges(range(8)), body.clearance(), pickle.dumps(body.snapshot())]
+
+    assert [life(model) for model in models[1:]] == [life(models[0])] * (len(models) - 1)
 
 
 def test_it_stands_level_drives_straight_and_turns_as_its_wheels_say(robot: tuple[RobotParameters, Maker]) -> None:

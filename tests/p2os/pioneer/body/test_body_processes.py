@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from p2os.pioneer.body.contract import RobotBody
-from p2os.pioneer.body.factory import make_body
+from p2os.pioneer.body.factory import make_body, make_scene
 from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import Obstacle
 from p2os.robots.parameters import load_parameters
@@ -36,7 +36,7 @@ import sys
 sys.modules[sys.argv[1]] = None
 from simbase.errors import MissingDependencyError
 from p2os.robots.parameters import load_parameters
-from p2os.pioneer.body.factory import make_body
+from p2os.pioneer.body.factory import make_body, make_scene
 from p2os.pioneer.world import load_world
 try:
     make_body(sys.argv[2], load_world("room"), load_parameters("p2dx"))
@@ -48,7 +48,7 @@ except MissingDependencyError as error:
 SPEAKS = """
 import sys
 sys.stdout.write("before ")
-from p2os.pioneer.body.factory import make_body
+from p2os.pioneer.body.factory import make_body, make_scene
 from p2os.robots.parameters import load_parameters
 from p2os.pioneer.world import load_world
 make_body("bullet", load_world("room"), load_parameters("p2dx"))
@@ -135,3 +135,22 @@ def test_a_blocked_robot_goes_on_when_the_thing_is_taken_away() -> None:
     body.step(0.2, 0.2)
     assert body.state.x_m > stuck.x_m
     assert not body.state.stalled_left
+
+
+@pytest.mark.bullet
+def test_a_client_that_other_robots_had_is_as_good_as_a_new_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    engine = pytest.importorskip("p2os.pioneer.body.bullet.engine")
+    monkeypatch.setattr(engine, "_idle", [])
+    first = make_body("bullet", load_world("arena", 3), P2DX)
+    there = digest_of_the_rest(first)
+    client = first.scene.client
+    engine.give_back(client)
+    others = make_scene("bullet", load_world("office"), [P2DX, P2DX])
+    assert others.client == client
+    for _ in range(300):
+        others.step([(0.3, 0.3), (-0.2, 0.2)])
+    engine.give_back(client)
+    again = make_body("bullet", load_world("arena", 3), P2DX)
+    assert again.scene.client == client
+    assert digest_of_the_rest(again) == there
+    first.scene.client = others.client = -1  # one of them gives it back
