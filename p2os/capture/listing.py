@@ -272,11 +272,18 @@ class LoopFinder:
         return found, place
 
 
-def next_header(data: bytes, place: int) -> int:
-    """Return where the next header begins, or the end; not one behind a first byte that is alone."""
-    while (place := data.find(HEADER, place)) > 0 and data[place - 1] == HEADER[0]:
+def next_header(data: bytes, place: int, limit: int | None = None) -> int:
+    """Return where the next header begins, or the limit, which is the end; not one behind a first byte that is alone.
+
+    Args:
+        data: The bytes.
+        place: From where on.
+        limit: One past the last byte that is looked at; None for all.
+    """
+    limit = len(data) if limit is None else limit
+    while (place := data.find(HEADER, place, limit)) > 0 and data[place - 1] == HEADER[0]:
         place += 1
-    return len(data) if place < 0 else place
+    return limit if place < 0 else place
 
 
 def rows_of(chunks: Iterable[Chunk], reading: Reading, passing: Passing | None = None) -> Iterator[ListingRow]:

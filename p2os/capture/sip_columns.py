@@ -1,29 +1,26 @@
 """A robot's SIPs as columns, without NumPy: each raw column converted at once, instead of each packet described.
 
+What stands in CSV is looked up for each raw value; a column in which all are alike has one text for all.
+
 Invariant: cell by cell what `ListingRow.fields` says, positions left out: those are followed by who makes a table.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import cast, overload
+from functools import cached_property
+from operator import ne
+from typing import TypeVar, cast, overload
 
-from p2os.capture.cells import Cell, cell_text
+from p2os.capture.cells import Alike, Cell, cell_text
 from p2os.capture.chunks import Direction
 from p2os.capture.describe import RAW_OF, Memo, Plain, SipFields
-from p2os.capture.sips import Sip
 from p2os.protocol.packets import packet_name
 from p2os.protocol.profiles import Profile
-from p2os.protocol.sip import (
-    BEFORE_SONAR,
-    BEHIND_SONAR,
-    HEAD_BYTES,
-    READING_BYTES,
-    unpack_tail,
-)
+from p2os.protocol.sip import HEAD_BYTES, READING_BYTES, SONAR_AT, Heads, unpack_tail
 from p2os.robots.parameters import RobotParameters
 
 #: Where a column comes first: row, and place in that row.
 _Place = tuple[int, float]
-
+_Said = TypeVar("_Said")
 
 #: Columns that every table begins with.
 LEADING = ("t_s", "dir", "type", "name", "valid")
@@ -31,8 +28,6 @@ LEADING = ("t_s", "dir", "type", "name", "valid")
 KIND_SAYS: Mapping[str, Callable[[int], Cell]] = {
     "dir": lambda _: Direction.FROM_ROBOT.value, "type": int, "name": packet_name, "valid": lambda _: True,
 }  # fmt: skip
-#: Raw value of a cell that is not there.
-_ABSENT = -1
 
 
 class Conversion:
@@ -51,16 +46,17 @@ class RawColumn(Sequence[Cell]):
     """A column whose cells are converted when they are asked for.
 
     Args:
-        raw: The raw values.
+        raw: The raw values, one at the least.
         conversion: What they say.
     """
 
     def __init__(self, raw: Sequence[int], conversion: Conversion) -> None:
         self._raw, self._conversion = raw, conversion
 
-    def texts(self) -> Sequence[str]:
+    def texts(self) -> Sequence[str] | Alike:
         """Return each cell as it stands in CSV."""
-        return list(map(self._conversion.text_of, self._raw))
+        raw, text_of = self._raw, self._conversion.text_of
+        return Alike(text_of(raw[0])) if raw.count(raw[0]) == len(raw) else list(map(text_of, raw))
 
     def __len__(self) -> int:
         return len(self._raw)
@@ -78,6 +74,66 @@ class RawColumn(Sequence[Cell]):
         return self._conversion.cell_of(self._raw[place])
 
 
+class _Readings:
+    """The sonar readings of some SIPs.
+
+    Args:
+        heads: Theirs.
+        count: How many SIPs.
+        conversion: What a raw range says.
+    """
+
+    def __init__(self, heads: Heads, count: int, conversion: Conversion) -> None:
+        self._heads, self._count, self._conversion = heads, count, conversion
+
+    @cached_property
+    def cells(self) -> dict[int, list[Cell]]:
+        """The column of each sonar's number."""
+        return self._spread(self._conversion.cell_of, None)
+
+    @cached_property
+    def texts(self) -> dict[int, list[str]]:
+        """The same as it stands in CSV."""
+        return self._spread(self._conversion.text_of, cell_text(None))
+
+    def _spread(self, convert: Callable[[int], _Said], absent: _Said) -> dict[int, list[_Said]]:
+        numbers = self._heads.numbers
+        found = {number: [absent] * self._count for number in set(numbers)}
+        # Of two readings of one row the later counts.
+        for number, row, said in zip(numbers, self._heads.rows, map(convert, self._heads.ranges), strict=True):
+            found[number][row] = said
+        return found
+
+
+class _SonarColumn(Sequence[Cell]):
+    """The readings of one sonar.
+
+    Args:
+        readings: Of all.
+        number: Its number.
+    """
+
+    def __init__(self, readings: _Readings, number: int) -> None:
+        self._readings, self._number = readings, number
+
+    def texts(self) -> Sequence[str]:
+        """Return each cell as it stands in CSV."""
+        return self._readings.texts[self._number]
+
+    def __len__(self) -> int:
+        return len(self._readings.cells[self._number])
+
+    def __iter__(self) -> Iterator[Cell]:
+        return iter(self._readings.cells[self._number])
+
+    @overload
+    def __getitem__(self, place: int) -> Cell: ...
+    @overload
+    def __getitem__(self, place: slice) -> list[Cell]: ...
+    def __getitem__(self, place: int | slice) -> "Cell | list[Cell]":
+        return self._readings.cells[self._number][place]
+
+
 class SipColumns:
     """Makes columns of SIPs.
 
@@ -93,25 +149,25 @@ class SipColumns:
         self._conversions = {name: Conversion(memo) for name, memo in self._fields.memos.items()}
         self._range = self._conversions["sonar_m"]
         self._leading = {name: Conversion(Memo(convert)) for name, convert in KIND_SAYS.items()}
-        self._fields.memos["sonar_m"][_ABSENT] = None
 
-    def of(self, sips: Sequence[Sip]) -> dict[str, Sequence[Cell]]:
-        """Return the columns but for the time, in the order in which SIPs first have them; there is one at the least.
+    def of(self, payloads: Sequence[bytes], heads: Heads) -> dict[str, Sequence[Cell]]:
+        """Return the columns of SIPs but for the time, in the order in which SIPs first have them.
 
         Positions are those of each SIP alone.
+
+        Args:
+            payloads: Of the SIPs, one at the least.
+            heads: What `unpack_heads` says of them.
         """
-        payloads, heads = [sip.payload for sip in sips], [sip.head for sip in sips]
-        before, behind = len(BEFORE_SONAR), len(BEHIND_SONAR)
-        raw = dict(zip(BEFORE_SONAR, zip(*[head[:before] for head in heads], strict=True), strict=True))
-        raw |= dict(zip(BEHIND_SONAR, zip(*[head[-behind:] for head in heads], strict=True), strict=True))
-        kinds = raw["kind"] = tuple([payload[0] for payload in payloads])
+        raw = dict(heads.columns)
+        kinds = raw["kind"] = bytes([payload[0] for payload in payloads])
         for side, bumpers in (("left", "rear_bumpers"), ("right", "front_bumpers")):
-            raw[f"stall_{side}"] = tuple([value & 1 for value in raw[side]])
-            raw[bumpers] = tuple([value >> 1 for value in raw[side]])
+            raw[f"stall_{side}"] = bytes([value & 1 for value in raw[side]])
+            raw[bumpers] = bytes([value >> 1 for value in raw[side]])
         found: dict[_Place, tuple[str, Sequence[Cell]]] = {}
         for place, name in enumerate(self._fields.memos):
             if name == "sonar_m":
-                found |= self._sonar(heads, place)
+                found |= self._sonar(payloads, heads, place)
             else:
                 raw_name = RAW_OF[name]
                 column = raw[self._renamed.get(raw_name, raw_name)]
@@ -120,27 +176,24 @@ class SipColumns:
         leading = {name: RawColumn(kinds, conversion) for name, conversion in self._leading.items()}
         return {**leading, **dict(found[order] for order in sorted(found))}
 
-    def _sonar(self, heads: list[tuple[int, ...]], place: int) -> dict[_Place, tuple[str, Sequence[Cell]]]:
-        begin, end = len(BEFORE_SONAR), -len(BEHIND_SONAR)
-        columns: dict[int, list[int]] = {}
+    def _sonar(self, payloads: Sequence[bytes], heads: Heads, place: int) -> dict[_Place, tuple[str, Sequence[Cell]]]:
+        readings = _Readings(heads, len(payloads), self._range)
         found: dict[_Place, tuple[str, Sequence[Cell]]] = {}
-        for row, head in enumerate(heads):
-            numbers = head[begin:end:2]
-            for number, raw_range in zip(numbers, head[begin + 1 : end : 2], strict=True):
-                if number not in columns:
-                    columns[number] = [_ABSENT] * len(heads)
-                    column = RawColumn(columns[number], self._range)
-                    found[row, place + numbers.index(number) / 256] = f"sonar_m_{number}", column
-                columns[number][row] = raw_range
+        for number in set(heads.numbers):
+            row = heads.rows[heads.numbers.index(number)]
+            behind = payloads[row][SONAR_AT::READING_BYTES].index(number)
+            found[row, place + behind / 256] = f"sonar_m_{number}", _SonarColumn(readings, number)
         return found
 
     def _tail(
-        self, payloads: list[bytes], counts: tuple[int, ...], place: int
+        self, payloads: Sequence[bytes], counts: Sequence[int], place: int
     ) -> dict[_Place, tuple[str, Sequence[Cell]]]:
         columns: dict[str, list[Cell]] = {}
         found: dict[_Place, tuple[str, Sequence[Cell]]] = {}
-        for row, (payload, count) in enumerate(zip(payloads, counts, strict=True)):
-            size = HEAD_BYTES + READING_BYTES * count
+        sizes = [HEAD_BYTES + READING_BYTES * count for count in counts]
+        if not any(map(ne, sizes, map(len, payloads))):
+            return found
+        for row, (payload, size) in enumerate(zip(payloads, sizes, strict=True)):
             if size == len(payload):
                 continue
             values, end = unpack_tail(payload, size)

@@ -13,15 +13,15 @@ Invariant: all tables of a capture have the same columns in the same order, and 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import accumulate, chain, islice, pairwise
-from typing import IO, Protocol, runtime_checkable
+from itertools import accumulate, chain, groupby, islice, pairwise, repeat
+from typing import IO, Protocol, cast, runtime_checkable
 
-from p2os.capture.cells import Cell, quoted, texts_of
+from p2os.capture.cells import Alike, Cell, quoted, texts_of
 from p2os.capture.describe import RAW_OF, Plain
 from p2os.capture.listing import ListingRow, Reading
 from p2os.capture.sip_columns import LEADING, SipColumns
-from p2os.capture.sips import Sip, from_rows
-from p2os.protocol.sip import BEFORE_SONAR, POSITION_MASK
+from p2os.capture.sips import Sips, in_groups
+from p2os.protocol.sip import POSITION_MASK, unpack_heads
 from p2os.robots.parameters import RobotParameters
 from simbase.timing import NS_PER_S
 
@@ -37,7 +37,7 @@ _X_AT, _Y_AT = 4, 6
 class TextColumn(Protocol):
     """A column that has its texts ready."""
 
-    def texts(self) -> Sequence[str]:
+    def texts(self) -> Sequence[str] | Alike:
         """Return each cell as it stands in CSV."""
         ...
 
@@ -67,11 +67,9 @@ def tables_of(rows: Iterable[ListingRow], reading: Reading, first_rows: int = FI
     yield from uniform(tables.table(block) for block in iter(lambda: list(islice(every, first_rows)), []))
 
 
-def tables_of_sips(sips: Iterable[Sip], reading: Reading, first_rows: int = FIRST_ROWS) -> Iterator[Table]:
+def tables_of_sips(sips: Iterable[Sips], reading: Reading, first_rows: int = FIRST_ROWS) -> Iterator[Table]:
     """Yield a robot's SIPs as tables, as `tables_of` does rows."""
-    tables = _Tables(reading)
-    every = iter(sips)
-    yield from uniform(tables.sip_table(block) for block in iter(lambda: list(islice(every, first_rows)), []))
+    yield from uniform(map(_Tables(reading).sip_table, in_groups(sips, first_rows)))
 
 
 def table_of(rows: Iterable[ListingRow], reading: Reading) -> Table:
@@ -121,13 +119,22 @@ def write_csv(tables: Iterable[Table], file: IO[str]) -> int:
     for table in tables:
         if not count:
             file.write(",".join(map(quoted, table.columns)) + "\n")
-        columns = [
-            column.texts() if isinstance(column, TextColumn) else texts_of(column) for column in table.columns.values()
-        ]
-        file.write("\n".join(map(",".join, zip(*columns, strict=True))) + "\n")
+        file.write("\n".join(map(",".join, zip(*_texts(table), strict=True))) + "\n")
         file.flush()
         count += table.rows
     return count
+
+
+def _texts(table: Table) -> Iterator[Iterable[str]]:
+    """Yield what stands in each column, such as are alike and stand together as one."""
+    columns = (
+        column.texts() if isinstance(column, TextColumn) else texts_of(column) for column in table.columns.values()
+    )
+    for is_alike, together in groupby(columns, lambda texts: isinstance(texts, Alike)):
+        if is_alike:
+            yield repeat(",".join([alike.text for alike in cast("Iterable[Alike]", together)]), table.rows)
+        else:
+            yield from together
 
 
 def _kinds(column: Sequence[Cell]) -> set[type]:
@@ -143,7 +150,8 @@ class _Tables:
 
     def table(self, rows: list[ListingRow]) -> Table:
         """Return the next rows as a table."""
-        sips = list(from_rows(rows))
+        sips = Sips()
+        sips.add(rows)
         if len(sips) == len(rows):
             return self.sip_table(sips)
         leading = (
@@ -163,12 +171,13 @@ class _Tables:
                 columns[place.name] = place.follow(raw)
         return Table(columns)
 
-    def sip_table(self, sips: list[Sip]) -> Table:
+    def sip_table(self, sips: Sips) -> Table:
         """Return the next SIPs as a table."""
-        columns = self._sips.of(sips)
+        heads = unpack_heads(sips.payloads)
+        columns = self._sips.of(sips.payloads, heads)
         for place in (self._x, self._y):
-            columns[place.name] = place.follow([sip.head[place.number] for sip in sips])
-        times: list[Cell] = [sip.at_ns / NS_PER_S for sip in sips]
+            columns[place.name] = place.follow(heads.columns[RAW_OF[place.name]])
+        times: list[Cell] = [at_ns / NS_PER_S for at_ns in sips.at_ns]
         return Table({LEADING[0]: times, **columns})
 
 
@@ -199,8 +208,6 @@ class _Place:
     def __init__(self, parameters: RobotParameters, name: str) -> None:
         self._metres = parameters.distance_conv_mm / 1000
         self.name = name
-        #: Where it stands among the numbers of a SIP's head.
-        self.number = BEFORE_SONAR.index(RAW_OF[name])
         self._counts = 0
         self._last = 0
 

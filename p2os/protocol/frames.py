@@ -19,11 +19,10 @@ are inverses. The decoder's buffer never holds more than one frame (207 bytes)
 between calls.
 """
 
-import struct
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache
+from zlib import adler32
 
 from p2os.errors import LocalProtocolError
 from simbase.state import Stateful
@@ -99,22 +98,30 @@ def checksum(data: bytes) -> int:
 
     A 16-bit sum of big-endian pairs; an odd last byte is XORed into the low byte.
     Source: Pioneer manuals, "Packet checksum".
+
+    Args:
+        data: At most 256 bytes.
     """
-    total: int = sum(_pairs(len(data) >> 1).unpack_from(data)) & 0xFFFF
-    return total ^ data[-1] if len(data) & 1 else total
+    if len(data) & 1:
+        return checksum(data[:-1]) ^ data[-1]
+    # The lower half of an Adler-32 is 1 and the sum of the bytes, modulo 65521, which 256 bytes do not reach. Of a
+    # pair's two bytes the first counts 256 times: once among all bytes, 255 times among those at even places.
+    return (255 * adler32(data[::2]) + adler32(data) - 256) & 0xFFFF
 
 
-@cache
-def _pairs(count: int) -> struct.Struct:
-    return struct.Struct(f">{count}H")
+def sound_frames(data: bytes, place: int = 0, limit: int | None = None) -> Iterator[bytes]:
+    """Yield the payload of each sound frame that stands from a place on; end where something else stands.
 
-
-def sound_frames(data: bytes, place: int = 0) -> Iterator[bytes]:
-    """Yield the payload of each sound frame that stands from a place on; end where something else stands."""
-    while data[place : place + 2] == HEADER and place + PREFIX_BYTES < len(data):
+    Args:
+        data: The bytes.
+        place: Where the first is looked for.
+        limit: One past the last byte that is looked at; None for all.
+    """
+    limit = len(data) if limit is None else limit
+    while place + PREFIX_BYTES < limit and data[place : place + 2] == HEADER:
         count = data[place + 2]
         end = place + PREFIX_BYTES + count
-        if not MIN_COUNT <= count <= MAX_COUNT or end > len(data):
+        if not MIN_COUNT <= count <= MAX_COUNT or end > limit:
             return
         payload = data[place + PREFIX_BYTES : end - CHECKSUM_BYTES]
         if data[end - 2] << 8 | data[end - 1] != checksum(payload):

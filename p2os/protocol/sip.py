@@ -9,8 +9,10 @@ Invariant: `StandardSip.from_frame(sip.to_frame(profile), profile) == sip`.
 
 import struct
 from bisect import bisect_right
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
+from itertools import accumulate, chain, repeat
 
 from construct import Array, Int8ul, Int16sl, Int16ul, Struct, this
 
@@ -24,7 +26,9 @@ STANDING, MOVING = 0x32, 0x33
 #: Position counts are 15 bits wide; bit 15 is masked.
 POSITION_MASK = 0x7FFF
 
-#: From the byte after the type to the sonar readings.
+#: One sonar reading.
+READING = Struct("number" / Int8ul, "raw_range" / Int16ul)
+#: From the byte after the type to the end of the fields that every robot sends.
 HEAD = Struct(
     "raw_x" / Int16ul,
     "raw_y" / Int16ul,
@@ -38,7 +42,7 @@ HEAD = Struct(
     "raw_flags" / Int16ul,
     "raw_compass" / Int8ul,
     "count" / Int8ul,
-    "sonar" / Array(this.count, Struct("number" / Int8ul, "raw_range" / Int16ul)),
+    "sonar" / Array(this.count, READING),
     "first" / Int8ul,
     "second" / Int8ul,
     "raw_analog" / Int8ul,
@@ -48,10 +52,17 @@ HEAD = Struct(
 #: Bytes of the head without sonar, type byte included.
 HEAD_BYTES = 25
 READING_BYTES = 3
+#: Where the readings begin, type byte included.
+SONAR_AT = 20
 _NAMES = tuple(str(sub.name) for sub in HEAD.subcons)
 #: Fields before and behind the sonar readings.
 BEFORE_SONAR = _NAMES[: _NAMES.index("sonar")]
 BEHIND_SONAR = _NAMES[len(BEFORE_SONAR) + 1 :]
+_OF_READING = tuple(str(sub.name) for sub in READING.subcons)
+#: How the standard library's `struct` calls each number of the head.
+_LETTERS = {
+    str(sub.name): str(sub.subcon.fmtstr[1:]) for sub in (*HEAD.subcons, *READING.subcons) if sub.name != "sonar"
+}
 
 #: The ARCOS tail: (field, bytes, signed). Firmware only ever appends.
 TAIL = (
@@ -221,6 +232,49 @@ def unpack_head(payload: bytes) -> tuple[int, ...] | None:
     return _head_of(payload[19]).unpack_from(payload) if is_sip(payload) else None
 
 
+@dataclass(frozen=True, slots=True)
+class Heads:
+    """The numbers of many SIPs' heads, a column each.
+
+    Args:
+        columns: By field: those before and behind the sonar readings, one a SIP.
+        rows: To which SIP each sonar reading belongs, from 0, rising.
+        numbers: Of each reading.
+        ranges: Of each reading, raw.
+    """
+
+    columns: Mapping[str, Sequence[int]]
+    rows: Sequence[int]
+    numbers: Sequence[int]
+    ranges: Sequence[int]
+
+
+def unpack_heads(payloads: Sequence[bytes]) -> Heads:
+    """Return what `unpack_head` says of SIPs, all of them sound inside, without a tuple for each."""
+    columns = _columns(b"".join([payload[1:SONAR_AT] for payload in payloads]), BEFORE_SONAR)
+    ends = [SONAR_AT + READING_BYTES * count for count in columns["count"]]
+    size = HEAD_BYTES - SONAR_AT
+    behind = b"".join([payload[end : end + size] for payload, end in zip(payloads, ends, strict=True)])
+    sonar = b"".join([payload[SONAR_AT:end] for payload, end in zip(payloads, ends, strict=True)])
+    rows = list(chain.from_iterable(map(repeat, range(len(payloads)), columns["count"])))
+    return Heads({**columns, **_columns(behind, BEHIND_SONAR)}, rows, *_columns(sonar, _OF_READING).values())
+
+
+def _columns(data: bytes, names: Sequence[str]) -> dict[str, Sequence[int]]:
+    """Return the columns of rows of numbers that stand one behind the other."""
+    sizes = [struct.calcsize("<" + _LETTERS[name]) for name in names]
+    step = sum(sizes)
+    rows = len(data) // step
+    found: dict[str, Sequence[int]] = {}
+    for name, place, size in zip(names, accumulate(sizes, initial=0), sizes, strict=False):
+        raw = bytearray(size * rows)
+        for byte in range(size):
+            raw[byte::size] = data[place + byte :: step]
+        # Bytes are numbers already, without an object for each.
+        found[name] = bytes(raw) if _LETTERS[name] == "B" else struct.unpack(f"<{rows}{_LETTERS[name]}", raw)
+    return found
+
+
 def is_sip(payload: bytes) -> bool:
     """Tell whether a packet of one of the types is a SIP inside: as long as its own sonar count says, or longer."""
     return len(payload) >= HEAD_BYTES and len(payload) >= HEAD_BYTES + READING_BYTES * payload[19]
@@ -239,9 +293,12 @@ def _head_of(count: int) -> struct.Struct:
     """Return the head with so many sonar readings, behind a byte for the type, as declared, in the standard library's
     faster way.
     """  # noqa: D205  # one sentence of two lines
-    letters = {str(sub.name): sub.subcon.fmtstr[1:] for sub in HEAD.subcons if sub.name != "sonar"}
-    before, behind = ("".join(letters[name] for name in names) for names in (BEFORE_SONAR, BEHIND_SONAR))
-    return struct.Struct(f"<x{before}{'BH' * count}{behind}")
+    before, reading, behind = map(_letters, (BEFORE_SONAR, _OF_READING, BEHIND_SONAR))
+    return struct.Struct(f"<x{before}{reading * count}{behind}")
+
+
+def _letters(names: Iterable[str]) -> str:
+    return "".join(_LETTERS[name] for name in names)
 
 
 _TAIL_LETTERS = {(1, False): "B", (1, True): "b", (2, False): "H", (2, True): "h", (4, False): "I"}

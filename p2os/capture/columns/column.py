@@ -10,7 +10,7 @@ from typing import Any, cast, overload
 import numpy as np
 import numpy.typing as npt
 
-from p2os.capture.cells import Cell, cell_text, texts_of
+from p2os.capture.cells import Alike, Cell, cell_text, texts_of
 from p2os.capture.columns.framing import Flags, Indexes
 
 #: NumPy's letter for a kind of cells → its type, and what stands where one is absent.
@@ -112,7 +112,7 @@ class Column(Sequence[Cell]):
         """Tell whether there is a cell."""
         return self.present is None or bool(self.present.any())
 
-    def texts(self) -> Sequence[str]:
+    def texts(self) -> Sequence[str] | Alike:
         """Return each cell as it stands in CSV."""
         if self.conversion is None:
             return texts_of(self.tolist())

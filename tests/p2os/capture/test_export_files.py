@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from p2os.capture import Direction, Reading, capture_of, read_file, rows_of, write_recording
-from p2os.capture.sips import from_rows
+from p2os.capture.sips import Sips
 from p2os.capture.table import table_of, write_csv
 from p2os.cli.main import run
 from p2os.protocol.packets import packet_frame
@@ -51,7 +51,10 @@ def test_csv_has_a_line_of_names_and_empty_cells() -> None:
 
 def test_only_sips_are_chosen_unless_told() -> None:
     rows = list(rows_of(read_file(GOLDEN), P2OS))
-    assert [sip.at_ns for sip in from_rows(rows)] == [row.at_ns for row in rows if row.name == "SIP" and row.is_sip]
+    sips = Sips()
+    sips.add(rows)
+    assert sips.at_ns == [row.at_ns for row in rows if row.name == "SIP" and row.is_sip]
+    assert len(sips.payloads) == len(sips.at_ns)
 
 
 def test_parquet_arrow_and_csv_hold_the_same(tmp_path: Path, capsys: Capture) -> None:
