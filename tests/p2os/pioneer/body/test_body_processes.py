@@ -36,7 +36,7 @@ import sys
 sys.modules[sys.argv[1]] = None
 from simbase.errors import MissingDependencyError
 from p2os.robots.parameters import load_parameters
-from p2os.pioneer.body.factory import make_body, make_scene
+from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.world import load_world
 try:
     make_body(sys.argv[2], load_world("room"), load_parameters("p2dx"))
@@ -48,7 +48,7 @@ except MissingDependencyError as error:
 SPEAKS = """
 import sys
 sys.stdout.write("before ")
-from p2os.pioneer.body.factory import make_body, make_scene
+from p2os.pioneer.body.factory import make_body
 from p2os.robots.parameters import load_parameters
 from p2os.pioneer.world import load_world
 make_body("bullet", load_world("room"), load_parameters("p2dx"))
