@@ -16,7 +16,7 @@ EVENTS = ("SIGTERM", "SIGINT x 20", "SIGKILL", "suspend 1 s", "suspend 3 s", "li
 @pytest.mark.skipif(os.name != "posix", reason="signals are Unix's")
 @pytest.mark.parametrize("way", ["Robot", "asyncio Robot", "drive --vel", "run --port"])
 def test_a_robot_stands_whatever_happens_to_its_driver(way: str) -> None:
-    words = ["--way", way, "--jobs", str(len(EVENTS))]  # most of a row is waiting
+    words = ["--way", way]
     words += [word for event in EVENTS for word in ("--event", event)]
     done = subprocess.run(
         [sys.executable, "tools/measure_stops.py", "--json", *words],
