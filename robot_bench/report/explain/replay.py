@@ -298,20 +298,17 @@ class ChipReplay:
     def _watch(self, since: Nanos, until: Nanos, *points: Watchpoint) -> list[tuple[Nanos, int]]:
         """Return when, and by which instruction, a program makes an access that is watched for."""
         self._seek(max(0, since))
-        engine, found = self.board.chip.engine, list[tuple[Nanos, int]]()
-        engine.watchpoints.update(points)
+        board = self.board
+        now = board.now_ns
+        found = board.chip.record_accesses(points)
         try:
-            limit = self.board.now_ns
-            while self.board.now_ns < until:
-                if self.board.now_ns >= limit and not engine.is_inside_block:
-                    limit = min(until, self.board.now_ns + FEED_NS)
-                    self._feed(limit)
-                reached = self.board.advance_to(limit)
-                if reached.halt is not None:
-                    found.append((reached.now, reached.halt.pc - 2))
+            while now < until:
+                limit = min(until, now + FEED_NS)
+                self._feed(limit)
+                now = board.advance_to(limit).now
         finally:
-            engine.watchpoints.difference_update(points)
-        return found
+            board.chip.stop_recording()
+        return [(at, pc) for at, pc in found if at < until]
 
     def _calls(self, rows: Sequence[BlockRow]) -> list[str]:
         """Return the places that the last block was called from, innermost first, as far as the rows tell."""
