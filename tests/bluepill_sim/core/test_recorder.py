@@ -4,6 +4,7 @@ import pytest
 
 from bluepill_sim.core import BLOCK, EXCEPTION_RETURN, BlockRecorder
 from bluepill_sim.core.debugging.debug_unit import WatchKind, Watchpoint
+from bluepill_sim.core.recorder import RECORD
 
 SYSTICK = "mov32 r1, #0xE000E010\nmov32 r2, #799\nstr r2, [r1, #4]\nstr r2, [r1, #8]\nmovs r2, #7\nstr r2, [r1, #0]\n"
 CALLS = "movs r5, #3\nloop: bl work\nsubs r5, #1\nbne loop\nb stop\nwork: bx lr"
@@ -83,13 +84,29 @@ def test_recording_changes_nothing_and_can_begin_and_end_anywhere(boot) -> None:
 def test_a_recorder_is_bounded_however_many_rows_come_together(together: int) -> None:
     recorder = BlockRecorder(3)
     for first in range(0, 5, together):
-        recorder.put_all((n, 0, BLOCK) for n in range(first, min(5, first + together)))
+        recorder.put_packed(packed(*range(first, min(5, first + together))))
     assert [row[0] for row in recorder.last(2)] == [3, 4]
     assert recorder.last(0) == []
     assert [row[0] for row in recorder.drain()] == [2, 3, 4]
     assert recorder.lost == 2
     with pytest.raises(ValueError, match="not 0"):
         BlockRecorder(0)
+
+
+def packed(*cycles: int) -> bytes:
+    return b"".join(RECORD.pack(cycle, 0, BLOCK) for cycle in cycles)
+
+
+def test_rows_that_come_as_bytes_and_one_by_one_are_in_their_order() -> None:
+    recorder = BlockRecorder(5)
+    for _ in range(2):
+        recorder.put(1, 0, BLOCK)
+        recorder.put_packed(packed(2, 3))
+        assert [row[0] for row in recorder.last(2)] == [2, 3]
+        recorder.put(4, 0, BLOCK)
+        recorder.put_packed(packed(5, 6))
+        assert (len(recorder), recorder.drain_packed()) == (5, packed(2, 3, 4, 5, 6))
+    assert (len(recorder), recorder.lost, recorder.drain()) == (0, 2, [])
 
 
 def test_a_full_recorder_asks_to_be_drained(boot) -> None:
