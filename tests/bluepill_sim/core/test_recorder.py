@@ -181,3 +181,21 @@ def test_accesses_are_recorded_no_more_than_wanted_and_change_nothing(boot) -> N
     recorded.run(1000)
     assert len(rows) == count > 0
     assert (plain.board.cycle, plain.board.pc) == (recorded.board.cycle, recorded.board.pc)
+
+
+def test_each_round_of_a_loop_that_waits_is_recorded(boot, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = []
+    for core in ("native", "python"):
+        monkeypatch.setenv("P2OS_CORE", core)
+        machine = boot("mov32 r1, #0x40021018\nmovs r2, #12\nstr r2, [r1, #0]\n" + READS)  # the ports' clocks
+        found.append(machine.board.chip.record_accesses(PINS))
+        machine.run(5000)
+    assert found[0] == found[1]
+    assert len(found[0]) > 5000
+
+
+def test_an_access_in_two_parts_is_one(boot) -> None:
+    machine = boot("mov32 r1, #0x40010808\nldmia r1!, {r2, r3}\nspin: b spin")
+    rows = machine.board.chip.record_accesses([Watchpoint(0x4001_0808, 8, WatchKind.READ)])
+    machine.run(10)
+    assert len(rows) == 1
