@@ -15,12 +15,13 @@ Invariant: time never goes back; `now_ns` inside a peripheral's access is the
 time of the accessing instruction.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 
 from bluepill_sim.core import GENERAL, BlockRecorder
 from bluepill_sim.core.block_cost import NO_BLOCK, Block, measure_block
 from bluepill_sim.core.debugging.comparators import cycles_to_match
+from bluepill_sim.core.debugging.debug_unit import Watchpoint
 from bluepill_sim.core.forced_bits import forced_bits
 from bluepill_sim.core.halts import ChipReached, HaltKind
 from bluepill_sim.core.nvic import NMI
@@ -217,9 +218,26 @@ class Chip(Stateful):
         self.engine.recorder = recorder = BlockRecorder(capacity, on_full)
         return recorder
 
+    def record_accesses(self, points: Iterable[Watchpoint]) -> list[tuple[Nanos, int]]:
+        """Return a list that gets each access of the program that one of the points waits for: when, and by which PC.
+
+        Nothing halts. `stop_recording` ends it. Blocks that were recorded are not any more.
+        """
+        rows: list[tuple[Nanos, int]] = []
+
+        def add(cycle: int, pc: int) -> None:
+            row = self.ns_of(cycle), pc
+            if rows[-1:] != [row]:  # an access in parts, or one that is begun again
+                rows.append(row)
+
+        self.engine.recorder = BlockRecorder(1)  # so that each round of a loop is run
+        self.engine.record_accesses(points, add)
+        return rows
+
     def stop_recording(self) -> None:
         """Record no more."""
         self.engine.recorder = None
+        self.engine.record_accesses((), lambda _cycle, _pc: None)
 
     def _advance(self, limit_ns: Nanos, go_on: Callable[[int], None]) -> ChipReached:
         processor, engine, clock, fabric = self.processor, self.engine, self._clock, self.fabric

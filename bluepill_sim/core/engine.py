@@ -23,7 +23,7 @@ or of the instruction there where `is_inside_block`.
 """
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import ClassVar
 
@@ -294,6 +294,18 @@ class Engine(Stateful):
     @recorder.setter
     def recorder(self, recorder: BlockRecorder | None) -> None:
         self._set_recorder(recorder)
+
+    def record_accesses(self, points: Iterable[Watchpoint], add: Callable[[int, int], None]) -> None:
+        """Call with cycle and PC at each access that one of the points waits for, from now on; no points end it.
+
+        Nothing halts. Between runs; while no blocks are recorded, not all rounds of a loop that waits are run.
+        """
+
+        def at_access() -> None:
+            if self._frozen is None:
+                add(self.access_cycle, self.access_pc)
+
+        self._debug.record(points, at_access)
 
     def _set_recorder(self, recorder: BlockRecorder | None) -> None:
         self.log.recorder = recorder

@@ -18,7 +18,7 @@ the same run leaves the same rows, on both executors, recorded or not.
 """
 
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Protocol
 
 from bluepill_sim.extension import layout
@@ -54,13 +54,16 @@ class BlockRecorder:
         self.lost = 0
         self._on_full = on_full
         self._rows: deque[BlockRow] = deque(maxlen=capacity)
+        #: Rows after those, as bytes.
+        self._packed = bytearray()
 
     def __len__(self) -> int:
         """Return how many rows wait."""
-        return len(self._rows)
+        return len(self._rows) + len(self._packed) // RECORD.size
 
     def put(self, cycle: int, address: int, kind: int) -> None:
         """Add a row."""
+        self._unpack()
         rows = self._rows
         if len(rows) == self.capacity:
             if self._on_full is not None:
@@ -69,25 +72,42 @@ class BlockRecorder:
                 self.lost += 1
         rows.append((cycle, address, kind))
 
-    def put_all(self, rows: Iterable[BlockRow]) -> None:
-        """Add rows, as `put` does each."""
+    def put_packed(self, data: bytes) -> None:
+        """Add rows of `RECORD`, as `put` does each."""
         if self._on_full is not None:
-            for row in rows:
+            for row in RECORD.iter_unpack(data):
                 self.put(*row)
             return
-        added = tuple(rows)
-        self.lost += max(0, len(self._rows) + len(added) - self.capacity)
-        self._rows.extend(added)
+        self._packed += data
+        excess = max(0, len(self) - self.capacity)
+        self.lost += excess
+        while excess and self._rows:
+            self._rows.popleft()
+            excess -= 1
+        del self._packed[: excess * RECORD.size]
+
+    def _unpack(self) -> None:
+        if self._packed:
+            self._rows.extend(RECORD.iter_unpack(self._packed))
+            self._packed.clear()
 
     def drain(self) -> list[BlockRow]:
         """Take all rows, oldest first."""
+        self._unpack()
         rows = list(self._rows)
         self._rows.clear()
         return rows
 
+    def drain_packed(self) -> bytes:
+        """Take all rows, oldest first, as bytes of `RECORD` each: equal rows are equal bytes."""
+        data = b"".join(RECORD.pack(*row) for row in self._rows) + self._packed
+        self._rows.clear()
+        self._packed.clear()
+        return data
+
     def last(self, count: int) -> list[BlockRow]:
         """Return the last rows, oldest first, and leave them."""
-        return list(self._rows)[-count:] if count > 0 else []
+        return [*self._rows, *RECORD.iter_unpack(self._packed)][-count:] if count > 0 else []
 
 
 class BlockLog(Stateful):

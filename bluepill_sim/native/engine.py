@@ -480,7 +480,7 @@ class NativeEngine(Engine):
     def _take_records(self, rows: int, count: int) -> None:
         try:
             if self.recorder is not None:
-                self.recorder.put_all(RECORD.iter_unpack(ctypes.string_at(rows, count * RECORD.size)))
+                self.recorder.put_packed(ctypes.string_at(rows, count * RECORD.size))
         except BaseException as error:  # noqa: BLE001 - C stands between here and the caller
             self._fail(error)
 

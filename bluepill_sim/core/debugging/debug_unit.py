@@ -16,7 +16,8 @@ Invariant: between runs the hooks are those of all four sets
 as they were when the last run began.
 """
 
-from collections.abc import Callable
+import ctypes
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import Enum
 
@@ -81,6 +82,7 @@ class DebugUnit:
         self._on_step = core.instruction_callback(self._at_step)
         self._on_access = core.access_callback(self._at_access)
         self._step_from: int | None = None
+        self._record_hooks: list[int] = []
 
     @property
     def has_hooks(self) -> bool:
@@ -111,10 +113,29 @@ class DebugUnit:
         for old in self._watch_hooks.keys() - watchpoints:
             core.remove_hook(self._watch_hooks.pop(old))
         for new in watchpoints - self._watch_hooks.keys():
-            # An access that begins up to three bytes before may reach into it.
-            first = max(0, new.address - 3)
-            self._watch_hooks[new] = core.hook_accesses(self._on_access, first, new.address + new.size - 1)
+            self._watch_hooks[new] = self._hook(new, self._on_access)
         core.drop_all_code()
+
+    def record(self, points: Iterable[Watchpoint], add: Callable[[], None]) -> None:
+        """Call before each access that one of the points waits for, instead of before those so far; between runs."""
+        core, points = self._core, tuple(points)
+        if not self._record_hooks and not points:
+            return
+        while self._record_hooks:
+            core.remove_hook(self._record_hooks.pop())
+        for point in points:
+
+            def at_access(access: int, address: int, size: int, _value: int, point: Watchpoint = point) -> bool:
+                if point.sees(address, size, is_read=access == READ_ACCESS):
+                    add()
+                return True
+
+            self._record_hooks.append(self._hook(point, core.access_callback(at_access)))
+        core.drop_all_code()
+
+    def _hook(self, point: Watchpoint, callback: ctypes.c_void_p) -> int:
+        # An access that begins up to three bytes before may reach into it.
+        return self._core.hook_accesses(callback, max(0, point.address - 3), point.address + point.size - 1)
 
     def begin_step(self, pc: int) -> int:
         """Hook every instruction; return the hook for `end_step`."""

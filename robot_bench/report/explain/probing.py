@@ -15,6 +15,7 @@ from itertools import zip_longest
 
 from adapter_sim.pinout import WireRole
 from bluepill_sim.core import BLOCK
+from bluepill_sim.core.recorder import RECORD
 from robot_bench.recording.signals import motor_steps
 from robot_bench.report.explain.replay import Branch, ChipReplay, Hold, Place, Seen
 from robot_bench.wires.edges import Edges
@@ -217,14 +218,14 @@ class Prober:
         return self.replay.line(self.replay.board.pc)
 
     def _compare(self, plain: Seen, other: Seen, since: Nanos, until: Nanos) -> Effect:
-        pairs = (zip if plain.has_more_rows or other.has_more_rows else zip_longest)(plain.rows, other.rows)
-        flow = next((n for n, (a, b) in enumerate(pairs) if a != b), None)
+        flow = first_row(plain, other)
         noticed: Nanos | None = None
         by = ""
         if flow is not None and flow > 0:
             # What follows the last common row differs; when that was is read off the common row.
-            noticed = self._time_of(plain.rows[flow - 1][0], since)
-            by = str(self.replay.end_line(plain.rows[flow - 1][1]))
+            cycle, block, _ = plain.row(flow - 1)
+            noticed = self._time_of(cycle, since)
+            by = str(self.replay.end_line(block))
         for (t, ours), (_, theirs) in zip(plain.memory, other.memory, strict=False):
             if noticed is not None and t >= noticed:
                 break
@@ -247,6 +248,20 @@ class Prober:
 
     def _time_of(self, cycle: int, since: Nanos) -> Nanos:
         return max(since, self.replay.board.chip.ns_of(cycle))
+
+
+def first_row(plain: Seen, other: Seen) -> int | None:
+    """Return the place of the first row that differs, or that only one has; None for none."""
+    ours, theirs = plain.packed_rows, other.packed_rows
+    same, differ = 0, min(len(ours), len(theirs)) // RECORD.size
+    if ours[: differ * RECORD.size] == theirs[: differ * RECORD.size]:
+        is_whole = not (plain.has_more_rows or other.has_more_rows)
+        return differ if is_whole and len(ours) != len(theirs) else None
+    while differ - same > 1:  # rows before `same` do, some before `differ` do not
+        middle = (same + differ) // 2
+        first, end = same * RECORD.size, middle * RECORD.size
+        same, differ = (middle, differ) if ours[first:end] == theirs[first:end] else (same, middle)
+    return same
 
 
 def _first(

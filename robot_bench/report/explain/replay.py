@@ -13,7 +13,7 @@ Invariant: looking at a time leaves the replay of all other times as it was.
 """
 
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from operator import itemgetter
@@ -25,6 +25,7 @@ from adapter_sim.pinout import Direction, Pull, Wire, WireRole, load_pinout
 from bluepill_sim.core import BLOCK, BlockRow
 from bluepill_sim.core.debugging.debug_unit import WatchKind, Watchpoint
 from bluepill_sim.core.nvic import exception_name
+from bluepill_sim.core.recorder import RECORD
 from bluepill_sim.errors import ImageError
 from bluepill_sim.fabric.subscriptions import EDGE, HIGH, Of
 from bluepill_sim.program.functions import UNKNOWN, FunctionTable
@@ -104,12 +105,22 @@ class Seen:
     edges: list[tuple[Nanos, str, bool]] = field(default_factory=list)
     #: (ns of its stop bit, character) on USART1.
     text: list[tuple[Nanos, int]] = field(default_factory=list)
-    #: Blocks and exceptions, where they were asked for.
-    rows: list[BlockRow] = field(default_factory=list)
+    #: Blocks and exceptions, where they were asked for: bytes of `RECORD` each.
+    packed_rows: bytes = b""
     #: Whether there were more.
     has_more_rows: bool = False
     #: (ns, the program's variables), where they were asked for.
     memory: list[tuple[Nanos, bytes]] = field(default_factory=list)
+
+    @property
+    def rows(self) -> Iterator[BlockRow]:
+        """Blocks and exceptions, one after the other."""
+        return RECORD.iter_unpack(self.packed_rows)
+
+    def row(self, place: int) -> BlockRow:
+        """Return one of them."""
+        cycle, address, kind = RECORD.unpack_from(self.packed_rows, place * RECORD.size)
+        return cycle, address, kind
 
     def levels_at(self, at: Nanos) -> dict[str, bool]:
         """Return the levels of the outputs at a time in it."""
@@ -298,22 +309,19 @@ class ChipReplay:
     def _watch(self, since: Nanos, until: Nanos, *points: Watchpoint) -> list[tuple[Nanos, int]]:
         """Return when, and by which instruction, a program makes an access that is watched for."""
         self._seek(max(0, since))
-        engine, found = self.board.chip.engine, list[tuple[Nanos, int]]()
-        engine.watchpoints.update(points)
+        board = self.board
+        now = board.now_ns
+        found = board.chip.record_accesses(points)
         try:
-            limit = self.board.now_ns
-            while self.board.now_ns < until:
-                if self.board.now_ns >= limit and not engine.is_inside_block:
-                    limit = min(until, self.board.now_ns + FEED_NS)
-                    self._feed(limit)
-                reached = self.board.advance_to(limit)
-                if reached.halt is not None:
-                    found.append((reached.now, reached.halt.pc - 2))
+            while now < until:
+                limit = min(until, now + FEED_NS)
+                self._feed(limit)
+                now = board.advance_to(limit).now
         finally:
-            engine.watchpoints.difference_update(points)
-        return found
+            board.chip.stop_recording()
+        return [(at, pc) for at, pc in found if at < until]
 
-    def _calls(self, rows: Sequence[BlockRow]) -> list[str]:
+    def _calls(self, rows: Iterable[BlockRow]) -> list[str]:
         """Return the places that the last block was called from, innermost first, as far as the rows tell."""
         stack: list[tuple[str, str]] = []
         last: int | None = None
@@ -398,7 +406,7 @@ class ChipReplay:
                 self._go_on(min(until, board.now_ns + _RECORDED_NS), memory_ns)
         finally:
             seen.has_more_rows = board.now_ns < until or recorder.lost > 0
-            seen.rows = [] if recorder.lost else recorder.drain()
+            seen.packed_rows = b"" if recorder.lost else recorder.drain_packed()
             board.chip.stop_recording()
 
     def _go_on(self, until: Nanos, memory_ns: Nanos = 0) -> None:

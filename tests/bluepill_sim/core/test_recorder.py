@@ -3,6 +3,8 @@
 import pytest
 
 from bluepill_sim.core import BLOCK, EXCEPTION_RETURN, BlockRecorder
+from bluepill_sim.core.debugging.debug_unit import WatchKind, Watchpoint
+from bluepill_sim.core.recorder import RECORD
 
 SYSTICK = "mov32 r1, #0xE000E010\nmov32 r2, #799\nstr r2, [r1, #4]\nstr r2, [r1, #8]\nmovs r2, #7\nstr r2, [r1, #0]\n"
 CALLS = "movs r5, #3\nloop: bl work\nsubs r5, #1\nbne loop\nb stop\nwork: bx lr"
@@ -82,13 +84,29 @@ def test_recording_changes_nothing_and_can_begin_and_end_anywhere(boot) -> None:
 def test_a_recorder_is_bounded_however_many_rows_come_together(together: int) -> None:
     recorder = BlockRecorder(3)
     for first in range(0, 5, together):
-        recorder.put_all((n, 0, BLOCK) for n in range(first, min(5, first + together)))
+        recorder.put_packed(packed(*range(first, min(5, first + together))))
     assert [row[0] for row in recorder.last(2)] == [3, 4]
     assert recorder.last(0) == []
     assert [row[0] for row in recorder.drain()] == [2, 3, 4]
     assert recorder.lost == 2
     with pytest.raises(ValueError, match="not 0"):
         BlockRecorder(0)
+
+
+def packed(*cycles: int) -> bytes:
+    return b"".join(RECORD.pack(cycle, 0, BLOCK) for cycle in cycles)
+
+
+def test_rows_that_come_as_bytes_and_one_by_one_are_in_their_order() -> None:
+    recorder = BlockRecorder(5)
+    for _ in range(2):
+        recorder.put(1, 0, BLOCK)
+        recorder.put_packed(packed(2, 3))
+        assert [row[0] for row in recorder.last(2)] == [2, 3]
+        recorder.put(4, 0, BLOCK)
+        recorder.put_packed(packed(5, 6))
+        assert (len(recorder), recorder.drain_packed()) == (5, packed(2, 3, 4, 5, 6))
+    assert (len(recorder), recorder.lost, recorder.drain()) == (0, 2, [])
 
 
 def test_a_full_recorder_asks_to_be_drained(boot) -> None:
@@ -112,3 +130,72 @@ def test_an_error_of_whoever_drains_comes_out_of_the_run(boot) -> None:
     machine.board.chip.record_blocks(2, fail)
     with pytest.raises(OSError, match="disk full"):
         machine.run(100)
+
+
+#: A wait of 20 rounds for a level of port A, more reads of both ports, and accesses that are not told of.
+READS = """
+mov32 r1, #0x40010800
+movs r2, #20
+wait: ldr r3, [r1, #8]
+subs r2, #1
+bne wait
+ldrh r3, [r1, #8]
+str r3, [r1, #16]
+ldr r3, [r1, #12]
+mov32 r4, #0x40010C00
+ldr r3, [r4, #8]
+spin: ldr r3, [r1, #8]
+b spin
+"""
+PINS = [Watchpoint(0x4001_0808, 4, WatchKind.READ), Watchpoint(0x4001_0C08, 4, WatchKind.READ)]
+
+
+@pytest.mark.parametrize("core", ["native", "python"])
+def test_each_access_is_recorded_once_with_the_instruction_that_a_watchpoint_halts_at(
+    boot, core: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """After a halt the core stands behind the access: all of these are of 2 bytes, and of 1 or 2 cycles."""
+    monkeypatch.setenv("P2OS_CORE", core)
+    recorded, watched = boot(READS), boot(READS)
+    rows = recorded.board.chip.record_accesses(PINS)
+    recorded.run(40)
+    watched.board.chip.engine.watchpoints.update(PINS)
+    halts = []
+    while (reached := watched.board.advance_to(40_000)).halt is not None:
+        halts.append((reached.now, reached.halt.pc - 2))
+    assert len(rows) > 40
+    assert [pc for _, pc in rows] == [pc for _, pc in halts]
+    assert {after - at for (at, _), (after, _) in zip(rows, halts, strict=True)} == {125, 250}
+
+
+def test_accesses_are_recorded_no_more_than_wanted_and_change_nothing(boot) -> None:
+    plain, recorded = boot(READS).run(10), boot(READS).run(10)
+    rows = recorded.board.chip.record_accesses(PINS)
+    recorded.run(20)
+    recorded.board.chip.stop_recording()
+    count = len(rows)
+    assert rows[0][0] >= 10_000
+    assert rows[-1][0] <= 30_000
+    plain.run(20)
+    plain.run(1000)
+    recorded.run(1000)
+    assert len(rows) == count > 0
+    assert (plain.board.cycle, plain.board.pc) == (recorded.board.cycle, recorded.board.pc)
+
+
+def test_each_round_of_a_loop_that_waits_is_recorded(boot, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = []
+    for core in ("native", "python"):
+        monkeypatch.setenv("P2OS_CORE", core)
+        machine = boot("mov32 r1, #0x40021018\nmovs r2, #12\nstr r2, [r1, #0]\n" + READS)  # the ports' clocks
+        found.append(machine.board.chip.record_accesses(PINS))
+        machine.run(5000)
+    assert found[0] == found[1]
+    assert len(found[0]) > 5000
+
+
+def test_an_access_in_two_parts_is_one(boot) -> None:
+    machine = boot("mov32 r1, #0x40010808\nldmia r1!, {r2, r3}\nspin: b spin")
+    rows = machine.board.chip.record_accesses([Watchpoint(0x4001_0808, 8, WatchKind.READ)])
+    machine.run(10)
+    assert len(rows) == 1

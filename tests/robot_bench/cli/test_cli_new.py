@@ -5,7 +5,6 @@ import os
 import re
 import shutil
 import subprocess
-import sys
 from importlib.resources import files
 from pathlib import Path
 
@@ -19,6 +18,7 @@ from robot_bench import Bench
 from robot_bench.firmware.build import COMPILER
 from robot_bench.project import files as project
 from robot_bench.scenario.scenario import read_scenario
+from tests.tools.forked_python import PYTEST, forked_python
 
 NAMES = {
     "main.c", "Makefile", "README.md", ".gitignore", "just-drive.toml", "tests/test_robot.py", "pytest.ini",
@@ -181,8 +181,11 @@ def test_the_project_builds_without_a_warning_and_again_only_when_something_chan
 def test_a_student_gets_from_nothing_to_a_robot_that_drives() -> None:
     assert p2os(["new", "mine"]) == 0
     body = resolve_body(BEST)
-    command = f"{sys.executable} -m p2os"
-    done = make("run", f"P2OS={command}")
+    scenario = Path("mine/just-drive.toml")
+    text = scenario.read_text(encoding="utf-8")
+    assert "duration_s = 60.0" in text
+    scenario.write_text(text.replace("duration_s = 60.0", "duration_s = 40.0"), encoding="utf-8")
+    done = make("run", f"P2OS={forked()} -m p2os")
     assert done.returncode == 0, done.stderr
     assert "\nended well, no goals were set; report: runs/just-drive-001/report.html\n" in done.stdout
     folder = Path("mine/runs/just-drive-001")
@@ -195,14 +198,22 @@ def test_a_student_gets_from_nothing_to_a_robot_that_drives() -> None:
     assert set(printed) == {"waiting for the robot", "forward", "turning left", "turning right"}
 
 
-PYTEST = f"PYTEST={sys.executable} -m pytest -p no:cacheprovider -q"
+def forked() -> str:
+    """Return a Python that is forked, whose locale is not that of `make` above."""
+    return f"env -u LC_ALL {forked_python()}"
+
+
+def forked_pytest() -> str:
+    """Return the words, of a shell or of make, that start pytest in a process that has it imported."""
+    return f"{forked()} -c '{PYTEST}' -p no:cacheprovider"
 
 
 @needs_compiler
 @pytest.mark.slow
 def test_the_tests_of_a_new_project_pass_and_notice_what_was_broken() -> None:
     project.write_project(Path("mine"), project.project_files("kinematic"))
-    done = make("test", PYTEST)
+    pytest_here = f"PYTEST={forked_pytest()} -q"
+    done = make("test", pytest_here)
     assert "12 passed" in done.stdout, done.stdout
     main = Path("mine/main.c")
     text = main.read_text(encoding="utf-8")
@@ -218,7 +229,7 @@ def test_the_tests_of_a_new_project_pass_and_notice_what_was_broken() -> None:
     ):
         assert right in text
         main.write_text(text.replace(right, wrong), encoding="utf-8")
-        failed = make("test", f"{PYTEST} --bench-record none -k {noticed.partition('[')[0]}", "-s")
+        failed = make("test", f"{pytest_here} --bench-record none -k {noticed.partition('[')[0]}", "-s")
         assert failed.returncode != 0
         assert f"FAILED tests/test_robot.py::{noticed}" in failed.stdout, failed.stdout
 
@@ -311,8 +322,8 @@ def test_the_shell_lines_of_a_ci_file_pass_on_a_project_as_it_is_written(name: s
     # What a machine needs once, and the network, are left out; quick tests stand for all.
     shims = {
         "sudo": "exit 0", "apt-get": "exit 0", "pip": "exit 0",
-        "pytest": f'exec {sys.executable} -m pytest -p no:cacheprovider -k "says or ready or asks" "$@"',
-        "p2os": f'exec {sys.executable} -m p2os "$@" --duration 4s',
+        "pytest": f'exec {forked_pytest()} -k "says or ready or asks" "$@"',
+        "p2os": f'exec {forked()} -m p2os "$@" --duration 4s',
     }  # fmt: skip
     Path("bin").mkdir()
     for shim, text in shims.items():
@@ -333,11 +344,12 @@ def test_the_shell_lines_of_a_ci_file_pass_on_a_project_as_it_is_written(name: s
 @pytest.mark.slow
 def test_the_rovers_tests_pass_and_notice_what_was_broken() -> None:
     project.write_project(Path("mine"), project.project_files("kinematic", robot="rover"))
-    done = make("test", f"{PYTEST} -k 'not comes_back'")
+    pytest_here = f"PYTEST={forked_pytest()} -q"
+    done = make("test", f"{pytest_here} -k 'not comes_back'")
     assert "4 passed" in done.stdout, done.stdout
     main = Path("mine/main.c")
     text = main.read_text(encoding="utf-8")
     assert "#define NEAR_MV 1300u" in text
     main.write_text(text.replace("#define NEAR_MV 1300u", "#define NEAR_MV 3300u"), encoding="utf-8")
-    failed = make("test", f"{PYTEST} --bench-record none -k stops_before", "-s")
+    failed = make("test", f"{pytest_here} --bench-record none -k stops_before", "-s")
     assert "FAILED tests/test_robot.py::test_it_stops_before_what_its_front_sensor_sees" in failed.stdout

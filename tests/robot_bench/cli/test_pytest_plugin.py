@@ -6,6 +6,8 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
+from tests.tools.forked_python import PYTEST, forked_python
+
 pytest_plugins = ("pytester",)
 
 #: The plugin itself is found by its entry point.
@@ -16,7 +18,8 @@ SETTINGS = "[pytest]\nbench_scenario = motors\n"
 def run(pytester: pytest.Pytester, text: str, *options: str) -> pytest.RunResult:
     pytester.makeini(SETTINGS)
     pytester.makepyfile(test_mine=text)
-    return pytester.runpytest_subprocess(*PLUGIN, "--bench-body", "kinematic", "-v", *options)
+    words = (*PLUGIN, "--bench-body", "kinematic", "-v", "--basetemp", str(pytester.path / "temporary"), *options)
+    return pytester.run(forked_python(), "-c", PYTEST, *words)
 
 
 MARKED = """

@@ -27,6 +27,7 @@ class Bug:
     name: str
     edits: tuple[tuple[str, str, str], ...]
     answers: tuple[str, ...]
+    #: As long as the mistake takes to show, and some.
     duration_s: float = 45.0
     #: A thing that is placed when the robot drives, as keys of `[[obstacle]]`; empty for none.
     thing: str = ""
@@ -91,7 +92,7 @@ NAMED = (
             ("board.h", "X(DD3, A, 6)", "X(DD3, X, 0)"), ("board.h", "X(DD6, B, 1)", "X(DD6, A, 6)"),
             ("board.h", "X(DD3, X, 0)", "X(DD3, B, 1)"),
         ),
-        answers=("DD3 and DD6 exchanged",), thing=_POST, duration_s=30.0,
+        answers=("DD3 and DD6 exchanged",), thing=_POST, duration_s=14.0,
     ),
     Bug(
         name="stale-reading",
@@ -104,7 +105,7 @@ NAMED = (
             ),
             ("dodge.c", _READ, "dodge_tick(&dodge, sensors, "),
         ),
-        answers=("late",), thing=_BOX, duration_s=30.0,
+        answers=("late",), thing=_BOX, duration_s=14.0,
     ),
     Bug(
         name="overflow-after-65-s",
@@ -118,7 +119,7 @@ NAMED = (
             ),
             ("dodge.c", _READ, "dodge_tick(&dodge, sensors, "),
         ),
-        answers=("no notice of any", "now_ms"), thing=_BOX, placed_s=70.0, duration_s=80.0,
+        answers=("no notice of any", "now_ms"), thing=_BOX, placed_s=70.0, duration_s=75.0,
     ),
     Bug(
         name="con-not-raised-on-reconnect",
@@ -135,7 +136,7 @@ NAMED = (
                 "            reconnects = 1;\n            pins_connect(0);\n        }\n        pins_motors(command"),
             ),
         ),
-        answers=("p2dx_con",), duration_s=75.0,
+        answers=("p2dx_con",), duration_s=65.0,
     ),
     Bug(
         name="watchdog-not-fed-in-a-branch",
@@ -147,7 +148,7 @@ NAMED = (
                 "            IWDG[0] = 0xAAAA;\n        }\n        pins_motors(command"),
             ),
         ),
-        answers=("watchdog",),
+        answers=("watchdog",), duration_s=32.0,
     ),
 )  # fmt: skip
 
@@ -156,28 +157,28 @@ OTHERS = (
     Bug(
         name="motor-sign-wrong",
         edits=(("motors_bits.c", "write_code(right_wires, right)", "write_code(right_wires, -right)"),),
-        answers=("opposite ways",),
+        answers=("opposite ways",), duration_s=20.0,
     ),
     Bug(
         name="pin-masked",
         edits=(("dodge.c", _READ, "dodge_tick(&dodge, pins_distances() & 0xE7, "),),
-        answers=("ignores DD4",), thing=_AHEAD, duration_s=30.0,
+        answers=("ignores DD4",), thing=_AHEAD, duration_s=14.0,
     ),
     Bug(
         name="last-sensors-not-looped-over",
         edits=(("pins.c", "uint8_t pins_distances(void) { return read_value(distance_wires, COUNT(distance_wires)); }",
                 "uint8_t pins_distances(void) { return read_value(distance_wires, COUNT(distance_wires) - 4); }"),),
-        answers=("DD5", "DD6", "DD7", "DD8"),
+        answers=("DD5", "DD6", "DD7", "DD8"), duration_s=38.0,
     ),
     Bug(
         name="timer-ten-times-slow",
         edits=(("tick.c", "HCLK_HZ / TICKS_PER_S - 1u", "HCLK_HZ / TICKS_PER_S * 20u - 1u"),),
-        answers=("not begun to drive", "late"),
+        answers=("not begun to drive", "late"), duration_s=25.0,
     ),
     Bug(
         name="dead-branch",
         edits=(("dodge_fsm.c", "if (!(dodge->seen & FRONT) && ", "if (!(dodge->seen & FRONT & 0) && "),),
-        answers=("drives straight on",),
+        answers=("drives straight on",), duration_s=33.0,
     ),
     Bug(
         name="null-pointer-in-a-branch",
@@ -188,7 +189,7 @@ OTHERS = (
                 "    dodge->turns += dodge->turns > 1 ? other->turns : 1;"),
             ),
         ),
-        answers=("died",), duration_s=75.0,
+        answers=("died",), duration_s=50.0,
     ),
     Bug(
         name="waits-for-ever",
@@ -198,7 +199,7 @@ OTHERS = (
                 "            while (dodge.turns == 2) {\n            }\n            print_transition(before, &dodge);",
             ),
         ),
-        answers=("stuck at dodge.c",), duration_s=75.0,
+        answers=("stuck at dodge.c",), duration_s=65.0,
     ),
     Bug(
         name="sides-exchanged",
@@ -210,7 +211,7 @@ OTHERS = (
     Bug(
         name="sensor-inverted",
         edits=(("dodge.c", _READ, "dodge_tick(&dodge, pins_distances() ^ 0x08, "),),
-        answers=("DD4 inverted",), duration_s=20.0,
+        answers=("DD4 inverted",), duration_s=14.0,
     ),
     Bug(
         name="motor-never-reverses",
@@ -231,7 +232,7 @@ OTHERS = (
                 "        if (dodge.turns == 2) {\n            pins_reset(1);\n        }\n        pins_motors(command",
             ),
         ),
-        answers=("rst high holds the adapter in reset",), duration_s=75.0,
+        answers=("rst high holds the adapter in reset",), duration_s=65.0,
     ),
     Bug(
         name="inputs-read-each-1.5-s",
@@ -243,19 +244,19 @@ OTHERS = (
             ),
             ("dodge.c", _READ, "dodge_tick(&dodge, sensors, "),
         ),
-        answers=("late",), thing=_BOX, duration_s=30.0,
+        answers=("late",), thing=_BOX, duration_s=14.0,
     ),
     Bug(
         name="motors-set-once",
         edits=(
             ("dodge.c", "        pins_motors(c", "        if (dodge.state_ticks == 1 && !dodge.turns) pins_motors(c"),
         ),
-        answers=("sets its motors no otherwise",), thing=_AHEAD, duration_s=20.0,
+        answers=("sets its motors no otherwise",), thing=_AHEAD, duration_s=14.0,
     ),
     Bug(
         name="speed-beyond-the-code",
         edits=(("pins.h", "MOTOR_MAX 3", "MOTOR_MAX 7"), ("dodge_fsm.c", "#define FAST 3", "#define FAST 4")),
-        answers=("overflow",), duration_s=20.0, is_found=False,
+        answers=("overflow",), duration_s=12.0, is_found=False,
     ),
     Bug(
         name="encoder-off-by-one",

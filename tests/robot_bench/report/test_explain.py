@@ -4,12 +4,16 @@ import json
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import zip_longest
 from pathlib import Path
 
 import pytest
 import typer
+from hypothesis import given
+from hypothesis import strategies as st
 from typer.testing import CliRunner
 
+from bluepill_sim.core.recorder import RECORD
 from robot_bench.cli import explain as verb
 from robot_bench.events.kinds import Fault, Pose
 from robot_bench.firmware.build import COMPILER, HERE, compiler_version
@@ -18,8 +22,8 @@ from robot_bench.report.explain.chain import WIDTH, Evidence, Explanation, Stand
 from robot_bench.report.explain.contact import exchanged
 from robot_bench.report.explain.explain import explain
 from robot_bench.report.explain.findings import injected, let_go
-from robot_bench.report.explain.probing import Answer
-from robot_bench.report.explain.replay import ChipReplay, Hold
+from robot_bench.report.explain.probing import Answer, first_row
+from robot_bench.report.explain.replay import ChipReplay, Hold, Seen
 from robot_bench.report.explain.scene import Scene
 from robot_bench.run import run_scenario
 from robot_bench.scenario.scenario import load_scenario
@@ -82,6 +86,25 @@ def test_all_answers_mirrored_are_left_and_right_exchanged() -> None:
 def test_answers_that_change_from_time_to_time_count_neither_way() -> None:
     toward = AWAY | {4: (-2, 2), 5: (2, -2)}
     assert exchanged(NETS, [answers(AWAY), answers(toward), answers(AWAY)], side) == ""
+
+
+ROWS = st.lists(st.integers(0, 2), max_size=40)
+
+
+@given(common=ROWS, ours=ROWS, theirs=ROWS, has_more=st.booleans())
+def test_the_first_row_that_differs_is_found(
+    common: list[int], ours: list[int], theirs: list[int], has_more: bool
+) -> None:
+    """Where one has more rows than were recorded, the end of the other is no difference."""
+    ours, theirs = common + ours, common + theirs
+    one, other = (
+        Seen(packed_rows=b"".join(RECORD.pack(n, 0, row) for n, row in enumerate(rows)), has_more_rows=has_more)
+        for rows in (ours, theirs)
+    )
+    pairs = (zip if has_more else zip_longest)(ours, theirs)
+    assert first_row(one, other) == next((n for n, (a, b) in enumerate(pairs) if a != b), None)
+    assert [row[2] for row in one.rows] == ours
+    assert all(one.row(n) == (n, 0, row) for n, row in enumerate(ours))
 
 
 def pose(t: int, x_m: float) -> Pose:
