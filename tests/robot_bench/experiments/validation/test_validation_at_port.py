@@ -41,14 +41,14 @@ def test_motors_codes_and_encoders_hold_at_a_port(tmp_path: Path) -> None:
 def test_a_robot_drives_through_a_gate_and_stops_and_its_pins_say_what_its_packets_do(
     gate: Path, tmp_path: Path
 ) -> None:
-    found = at_port(["sensors", "only-while-seen"], tmp_path / "v", world=gate, duration_s=20.0)
+    found = at_port(["sensors", "only-while-seen"], tmp_path / "v", world=gate)
     assert [line for result in found for line in told(result)] == []
     assert set(loose(one for result in found for one in result.findings)) <= set(LOOSE_BECAUSE)
 
 
 @pytest.mark.slow
 def test_a_drive_without_a_stall_holds_and_with_one_does_not(tmp_path: Path) -> None:
-    assert told(at_port(["dodge"], tmp_path / "v", world="arena")[0]) == []
+    assert told(at_port(["dodge"], tmp_path / "v", world="arena", duration_s=30.0)[0]) == []
     blocked = at_port(["dodge"], tmp_path / "w", world="arena", faults=("wheel-blocked left",), duration_s=15.0)
     assert "packets with a stall" in failing(blocked)
 
