@@ -16,10 +16,8 @@ from p2os.pioneer.world.plan import Plan
 from p2os.robots.parameters import load_parameters
 
 P2DX = load_parameters("p2dx")
-ROOM, ARENA = (
-    files("p2os.pioneer.world.worlds").joinpath(f"{name}.toml").read_text(encoding="utf-8")
-    for name in ("room", "arena")
-)
+WORLDS = files("p2os.pioneer.world.worlds")
+ROOM, ARENA = (WORLDS.joinpath(f"{name}.toml").read_text(encoding="utf-8") for name in ("room", "arena"))
 
 
 @pytest.mark.parametrize("name", known_worlds())
