@@ -73,7 +73,9 @@ def cut_runs(of: Scenario, *cuts_ns: int) -> list[tuple[Bench, tuple[str, str]]]
     bench, cut = Bench(of), []
     for cut_ns in sorted(under_way | set(cuts_ns)):
         bench.run_until(cut_ns)
-        cut.append((loaded(pickle.dumps(bench)), whole))
+        again = loaded(pickle.dumps(bench))
+        assert again.now == bench.now, "it goes on there, and does not begin anew"
+        cut.append((again, whole))
     assert finished(bench) == whole, "pickling changes nothing"
     return cut
 
