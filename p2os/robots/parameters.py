@@ -4,6 +4,7 @@ One TOML file a model in `p2os/robots/`, each number with its source; a user's
 own file is TOML too, or one of ARIA's (`.p`).
 """
 
+from functools import cache
 from pathlib import Path
 
 from p2os.robots.aria_file import aria_table
@@ -41,7 +42,7 @@ def load_parameters(name_or_path: str | Path) -> RobotParameters:
     """
     name = str(name_or_path)
     if name.lower() in known_robots():
-        return build_parameters(f"{name.lower()}.toml", shipped_table(name.lower()))
+        return _shipped(name.lower())
     path = Path(name)
     if path.suffix == ".toml" and is_file(path):
         return file_parameters(path)
@@ -50,6 +51,12 @@ def load_parameters(name_or_path: str | Path) -> RobotParameters:
     if path.suffix in {".toml", ".p"}:
         raise ParametersError(f"no robot file {shown_name(name)}", hint=f"known models: {', '.join(known_robots())}")
     raise ParametersError(f"no robot model {shown(name)}", hint=nearest(name.lower(), known_robots()))
+
+
+@cache
+def _shipped(name: str) -> RobotParameters:
+    """Return a model that ships with the package, read once: a campaign asks for it in each of its runs."""
+    return build_parameters(f"{name}.toml", shipped_table(name))
 
 
 def nearest_model(subclass: str) -> str:

@@ -304,7 +304,8 @@ def stream_like(own: TextIO, descriptor: int) -> io.TextIOWrapper:
     """Return a standard stream with a descriptor, as Python makes it."""
     assert isinstance(own, io.TextIOWrapper)
     is_unbuffered = own.write_through
-    binary = open(descriptor, "wb" if descriptor else "rb", buffering=0 if is_unbuffered else -1, closefd=False)  # noqa: SIM115
+    buffering = 0 if is_unbuffered and descriptor else -1  # what is read is buffered in any case
+    binary = open(descriptor, "wb" if descriptor else "rb", buffering=buffering, closefd=False)  # noqa: SIM115
     return io.TextIOWrapper(
         binary, encoding=own.encoding, errors=own.errors, newline="\n" if descriptor else None,
         line_buffering=descriptor == 2 or binary.isatty(), write_through=is_unbuffered,

@@ -4,6 +4,7 @@ Worlds that ship and our own files are TOML (`file`); all else is read by
 `formats`.
 """
 
+from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
 
@@ -41,8 +42,7 @@ def load_world(name_or_path: str | Path, seed: int = 0) -> World:
     """
     name = str(name_or_path)
     if name in known_worlds():
-        text = files("p2os.pioneer.world.worlds").joinpath(f"{name}.toml").read_text(encoding="utf-8")
-        return parse_world(text, f"{name}.toml", seed)
+        return _shipped(name, seed)
     path = Path(name)
     if not is_file(path):
         if path.suffix.lower() in world_suffixes():
@@ -58,3 +58,14 @@ def load_world(name_or_path: str | Path, seed: int = 0) -> World:
 
         return read_world(path)
     return parse_world(read_text(path), name, seed, path.parent)
+
+
+#: Of so many a process keeps what it has read: each that ships, or one of them for as many seeds.
+_KEPT = 64
+
+
+@lru_cache(maxsize=_KEPT)
+def _shipped(name: str, seed: int) -> World:
+    """Return a world that ships with the package, read once: a campaign asks for it in each of its runs."""
+    text = files("p2os.pioneer.world.worlds").joinpath(f"{name}.toml").read_text(encoding="utf-8")
+    return parse_world(text, f"{name}.toml", seed)

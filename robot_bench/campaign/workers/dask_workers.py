@@ -29,6 +29,8 @@ from simbase.user_classes import unforeseen
 PATIENCE_S = 120.0
 #: chosen: so long one waits for a scheduler at first, seconds.
 BEGIN_S = 10.0
+#: chosen: how long one attempt to connect may take, seconds.
+ATTEMPT_S = 5.0
 
 
 class DaskWorkers:
@@ -151,7 +153,7 @@ class DaskWorkers:
         while True:
             self._look()
             try:
-                return connect(self._address, timeout=5, set_as_default=False)
+                return connect(self._address, timeout=ATTEMPT_S, set_as_default=False)
             except (OSError, ValueError) as error:
                 if time.monotonic() >= until:
                     raise UsageError(

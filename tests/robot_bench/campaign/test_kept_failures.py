@@ -2,7 +2,6 @@
 
 import json
 import subprocess
-import sys
 from importlib.metadata import EntryPoint
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from robot_bench.campaign.trial import run_trial, trial_of
 from robot_bench.campaign.variants.shrinking.failure import Way
 from robot_bench.campaign.variants.shrinking.kept import test_text as text_of_test
 from robot_bench.campaign.variants.shrinking.kept import trial_of_run
+from tests.tools.forked_python import forked_p2os, forked_python
 
 #: Half a metre before a wall, with sensors that see a hand's breadth: it touches the wall 6 s after its start.
 BLIND = """
@@ -36,6 +36,8 @@ kind = "no_collision"
 kind = "usart_contains"
 text = "never said"
 """
+#: `python -m pytest` itself is not forked: it may not come after what it rewrites.
+PYTEST = "import pytest, sys; sys.exit(pytest.main(sys.argv[1:]))"
 
 
 @pytest.fixture(autouse=True)
@@ -49,8 +51,9 @@ def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
 
 @pytest.mark.slow
 def test_a_run_folder_is_shrunk_to_a_folder_whose_scenario_and_test_fail_in_the_same_way(
-    capsys: pytest.CaptureFixture[str],
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("robot_bench.campaign.variants.shrinking.kept._COMMAND", forked_p2os())
     assert cli.run(["run", "blind.toml", "--out", "there", "--seed", "3"]) == 1
     capsys.readouterr()
     assert cli.run(["shrink", "there", "--out", "small", "--json"]) == 0
@@ -62,7 +65,7 @@ def test_a_run_folder_is_shrunk_to_a_folder_whose_scenario_and_test_fail_in_the_
     assert "east wall" in Path("small/explained.txt").read_text(encoding="utf-8")
     assert cli.run(["run", "small/blind.toml"]) == 1
     assert cli.run(["shrink", "small/blind.toml", "--out", "small"]) == 2, "nothing is written over"
-    pytest_here = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "small"]
+    pytest_here = [forked_python(), "-c", PYTEST, "-q", "-p", "no:cacheprovider", "small"]
     ran = subprocess.run(pytest_here, capture_output=True, text=True, timeout=120, check=False)
     assert ran.returncode == 1
     assert "test_blind_touches_nothing" in ran.stdout

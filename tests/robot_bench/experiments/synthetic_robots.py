@@ -95,9 +95,8 @@ def ramp(targets: list[float], due: list[int], count: int, faster: float, slower
             rate = faster if abs(goal) > abs(speed) else slower
             alike = min(end - step, int(abs(goal - speed) / (rate * STEP_S)) - 1)
             if alike > 0:  # steps that neither reach it nor stand
-                speeds[step : step + alike + 1] = np.cumsum(
-                    [speed, *[math.copysign(rate * STEP_S, goal - speed)] * alike]
-                )
+                change = math.copysign(rate * STEP_S, goal - speed)
+                speeds[step : step + alike + 1] = np.cumsum([speed, *[change] * alike])
                 step += alike
                 speed = float(speeds[step])
             else:

@@ -5,6 +5,7 @@ import os
 import pickle
 import subprocess
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,12 +19,17 @@ from robot_bench.scenario.fault_script import FaultChange
 from robot_bench.scenario.scenario import Scenario, load_scenario
 from simbase.errors import FileError, UsageError
 from tests.robot_bench.wires.fake_chip import FakeChip
+from tests.tools.forked_python import forked_python
 
 S = 10**9
 #: So long before a line of the trace its bytes are under way: half a character of 115200 bit/s, one of 9600 bit/s.
 UNDER_WAY_NS = {"usart": 43_000, "wire": 1_000_000}
 WAYS = [("direct", "model"), ("adapter", "model"), *([("adapter", "firmware")] if is_available() else [])]
-BODIES = ["kinematic", pytest.param("bullet", marks=pytest.mark.bullet)]
+#: Of each body, when it is cut: at its beginning, at rest, and while it drives; from 3 s on it does.
+CUTS = [
+    ("kinematic", (0, 1_300_000_007, 3_217_654_321, 5_000_000_001)),
+    pytest.param("bullet", (3_217_654_321,), marks=pytest.mark.bullet),
+]
 
 
 def scenario(way: tuple[str, str] = ("adapter", "model"), body: str = "kinematic", duration_s: float = 1.8) -> Scenario:
@@ -50,10 +56,10 @@ sys.stdout.buffer.write(pickle.dumps([finished(bench) for bench in benches]))
 """
 
 
-def in_another_process(data: bytes, folder: Path) -> Any:
+def in_another_process(data: bytes, folder: Path, **environment: str) -> Any:
     done = subprocess.run(
-        [sys.executable, "-c", GOES_ON], input=data, capture_output=True, cwd=folder, timeout=200, check=False,
-        env={**os.environ, "PYTHONHASHSEED": "7", "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)},
+        [forked_python(), "-c", GOES_ON], input=data, capture_output=True, cwd=folder, timeout=200, check=False,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path), **environment},
     )  # fmt: skip
     assert done.returncode == 0, done.stderr.decode()
     return loaded(done.stdout)
@@ -67,22 +73,19 @@ def cut_runs(of: Scenario, *cuts_ns: int) -> list[tuple[Bench, tuple[str, str]]]
     bench, cut = Bench(of), []
     for cut_ns in sorted(under_way | set(cuts_ns)):
         bench.run_until(cut_ns)
-        cut.append((loaded(pickle.dumps(bench)), whole))
+        again = loaded(pickle.dumps(bench))
+        assert again.now == bench.now, "it goes on there, and does not begin anew"
+        cut.append((again, whole))
     assert finished(bench) == whole, "pickling changes nothing"
     return cut
 
 
-def test_a_bench_goes_on_in_another_process(tmp_path: Path) -> None:
-    cut = [item for way in WAYS for item in cut_runs(scenario(way), 0, 1_300_000_007)]
-    assert in_another_process(pickle.dumps([bench for bench, _ in cut]), tmp_path) == [whole for _, whole in cut]
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("body", BODIES)
-def test_a_bench_that_drives_goes_on_in_another_process(body: str, tmp_path: Path) -> None:
-    cuts_ns = 3_217_654_321, 5_000_000_001, 6_543_210_987
-    cut = [item for way in WAYS for item in cut_runs(scenario(way, body, 7.2), *cuts_ns)]
-    assert in_another_process(pickle.dumps([bench for bench, _ in cut]), tmp_path) == [whole for _, whole in cut]
+@pytest.mark.parametrize(("body", "cuts_ns"), CUTS)
+def test_a_bench_goes_on_in_another_process(body: str, cuts_ns: Sequence[int], tmp_path: Path) -> None:
+    cut = [item for way in WAYS for item in cut_runs(scenario(way, body, 5.2), *cuts_ns)]
+    found = in_another_process(pickle.dumps([bench for bench, _ in cut]), tmp_path, PYTHONHASHSEED="7")
+    assert found == [whole for _, whole in cut]
 
 
 def test_a_bench_is_pickled_from_within_a_slice() -> None:

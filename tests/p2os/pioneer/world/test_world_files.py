@@ -16,7 +16,8 @@ from p2os.pioneer.world.plan import Plan
 from p2os.robots.parameters import load_parameters
 
 P2DX = load_parameters("p2dx")
-ROOM = files("p2os.pioneer.world.worlds").joinpath("room.toml").read_text(encoding="utf-8")
+WORLDS = files("p2os.pioneer.world.worlds")
+ROOM, ARENA = (WORLDS.joinpath(f"{name}.toml").read_text(encoding="utf-8") for name in ("room", "arena"))
 
 
 @pytest.mark.parametrize("name", known_worlds())
@@ -33,7 +34,8 @@ def test_a_shipped_world_leaves_its_start_free(name: str) -> None:
 @pytest.mark.parametrize("seed", range(25))
 def test_an_arena_keeps_its_gaps(seed: int) -> None:
     world = load_world("arena", seed)
-    assert world == load_world("arena", seed)
+    assert world == parse_world(ARENA, "arena.toml", seed)
+    assert world != load_world("arena", seed + 1)
     things = [item for item in world.obstacles if item.kind is Kind.OBSTACLE]
     assert len(things) >= 16
     for place, thing in enumerate(things):

@@ -22,6 +22,8 @@ from dataclasses import dataclass
 from importlib.machinery import ModuleSpec
 from pathlib import Path
 
+from tests.tools.forked_python import forked_python
+
 ROOT = Path(__file__).parents[4]
 PROGRAMS = "robot_bench/firmware/"
 COMPILE = ("g++", "-std=c++17", "-O0", "-fPIC", "-w", "-fno-exceptions", "-fno-rtti")
@@ -193,8 +195,10 @@ def _here(job: Callable[..., dict[str, object]], count: int, on_done: Callable[[
 def told_of(planted: Planted, experiments: Sequence[str]) -> dict[str, list[str]]:
     """Return which figures of which experiments tell of an error, found in a process of its own."""
     words = [planted.path, planted.old, planted.new, *planted.variant, *experiments]
+    # A module is replaced before it is imported; a forked Python has imported it.
+    python = sys.executable if planted.path.endswith(".py") else forked_python()
     done = subprocess.run(
-        [sys.executable, "-m", __spec__.name, "--one", json.dumps(words)], cwd=ROOT, capture_output=True, text=True,
+        [python, "-m", __spec__.name, "--one", json.dumps(words)], cwd=ROOT, capture_output=True, text=True,
         check=False,
     )  # fmt: skip
     if done.returncode != 0:

@@ -74,9 +74,11 @@ class VirtualLine:
 
 
 def at_port(
-    names: list[str], folder: Path, *, world: Path | str, faults: tuple[str, ...] = (), lasts_s: float = math.inf
-) -> list[Result]:
-    """Return what experiments find of a virtual robot at a port."""
+    names: list[str], folder: Path, *, world: Path | str, faults: tuple[str, ...] = (), lasts_s: float = math.inf,
+    duration_s: float | None = None,
+) -> list[Result]:  # fmt: skip
+    """Return what experiments find of a virtual robot at a port; `lasts_s` is when the line goes."""
+    settings = [] if duration_s is None else [("duration_s", duration_s)]
     parameters = load_parameters("p2dx")
 
     def drive(run: PortRun, place: Path) -> RunResult:
@@ -88,4 +90,4 @@ def at_port(
         pacer = RealTimePacer(clock=clock.read, sleep=clock.sleep)
         return run_at_port(run.scenario, place, VirtualLine(robot, clock, lasts_s), clock=clock.read, pacer=pacer)
 
-    return run_port(port_runs([EXPERIMENTS[name] for name in names]), drive, folder)
+    return run_port(port_runs([EXPERIMENTS[name] for name in names], settings), drive, folder)
