@@ -57,7 +57,7 @@ def python_of(folder: Path, *requirements: str) -> Path:
     options = ["--quiet", "--disable-pip-version-check", "--no-compile"]
     done = subprocess.run(
         [*command, *options, "-c", CONSTRAINTS, *requirements],
-        cwd=folder, capture_output=True, text=True, timeout=LIMIT_S, check=False,
+        cwd=folder, env=clean_environment(), capture_output=True, text=True, timeout=LIMIT_S, check=False,
     )  # fmt: skip
     if "No matching distribution found" in done.stderr or "connection" in done.stderr.lower():
         pytest.skip(f"no package index is reached: {done.stderr.splitlines()[-1]}")

@@ -293,7 +293,7 @@ def approach_slowly(patch: pytest.MonkeyPatch, seconds: int) -> None:
 
 
 @pytest.mark.parametrize("speed_mps", [0.05, 0.1, 0.2, 0.3, 0.75])
-@pytest.mark.parametrize("distance_m", [0.5, -1.0])
+@pytest.mark.parametrize("distance_m", [0.5, -0.5])
 def test_a_robot_that_approaches_ever_more_slowly_arrives_at_any_speed(
     speed_mps: float, distance_m: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
