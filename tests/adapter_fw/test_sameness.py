@@ -78,14 +78,16 @@ SETTINGS = st.builds(
 )
 
 
-def run_both(steps: list[tuple[object, ...]], adapter_settings: AdapterSettings, *, has_four_bits: bool) -> int:
-    sequence = Sequence(adapter_settings, has_four_bits=has_four_bits)
+def run_both(
+    steps: list[tuple[object, ...]], adapter_settings: AdapterSettings, *, has_four_bits: bool, waits: bool
+) -> int:
+    sequence = Sequence(adapter_settings, has_four_bits=has_four_bits, waits_for_edges=waits)
     for kind, *values in steps:
         sequence.step(str(kind), *values)
     return sequence.twins.steps
 
 
-SEQUENCES = given(st.lists(STEPS, min_size=30, max_size=60), SETTINGS, st.booleans())
+SEQUENCES = given(st.lists(STEPS, min_size=30, max_size=60), SETTINGS, st.booleans(), st.booleans())
 QUIET = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.large_base_example]
 
 
@@ -95,18 +97,34 @@ QUIET = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.large_bas
 @settings(max_examples=115, deadline=None, suppress_health_check=QUIET)
 @SEQUENCES
 def test_firmware_and_model_do_the_same_over_five_thousand_steps(
-    steps: list, adapter_settings: AdapterSettings, four: bool
+    steps: list, adapter_settings: AdapterSettings, four: bool, waits: bool
 ) -> None:
-    run_both(steps, adapter_settings, has_four_bits=four)
+    run_both(steps, adapter_settings, has_four_bits=four, waits=waits)
 
 
 @pytest.mark.soak
 @settings(max_examples=2_500, deadline=None, suppress_health_check=QUIET)
 @SEQUENCES
 def test_firmware_and_model_agree_in_thousands_of_sequences(
-    steps: list, adapter_settings: AdapterSettings, four: bool
+    steps: list, adapter_settings: AdapterSettings, four: bool, waits: bool
 ) -> None:
-    run_both(steps, adapter_settings, has_four_bits=four)
+    run_both(steps, adapter_settings, has_four_bits=four, waits=waits)
+
+
+def test_a_firmware_that_waits_for_edges_does_the_same_at_a_tenth_of_the_deadlines() -> None:
+    sequence = Sequence(AdapterSettings(), has_four_bits=False, waits_for_edges=True)
+    rest, reset = ("obey", 15), ("glitch", "rst", 14)
+    for step in (
+        ("connect", True), ("motors", 3, 2), rest, ("glitch", "motor1_comm2", 3), rest, ("motors", 0, 1), rest,
+        ("rare", "restore"), rest, reset, ("time", 1_100 * MS), ("connect", True), rest,
+    ):  # fmt: skip
+        sequence.step(str(step[0]), *step[1:])
+    sampled, waited = sequence.twins.deadlines
+    assert waited < sampled / 10
+    assert sequence.twins.firmware.wakes_on == sequence.twins.model.inputs.wires
+    sequence.twins.pin("motor1_comm1", True)
+    sequence.twins.pass_time(1)
+    assert sequence.twins.firmware.wakes_on == {"rst"}, "it samples until the wires are settled again"
 
 
 @pytest.mark.soak
