@@ -21,7 +21,7 @@ from robot_bench.adapter import is_available
 from tests.adapter_fw import mutation
 from tests.adapter_fw.boundaries import Life
 from tests.adapter_fw.sequences import Sequence
-from tests.adapter_fw.twins import MS
+from tests.adapter_fw.twins import MS, Twins
 
 pytestmark = pytest.mark.skipif(not is_available(), reason="the firmware core is not built: no C++17 compiler")
 
@@ -125,6 +125,22 @@ def test_a_firmware_that_waits_for_edges_does_the_same_at_a_tenth_of_the_deadlin
     sequence.twins.pin("motor1_comm1", True)
     sequence.twins.pass_time(1)
     assert sequence.twins.firmware.wakes_on == {"rst"}, "it samples until the wires are settled again"
+
+
+@pytest.mark.parametrize("waits", [False, True])
+def test_samples_that_are_taken_late_see_the_levels_of_their_instants(waits: bool) -> None:
+    twins = Twins(waits_for_edges=waits)
+    twins.pass_time(320 * MS)
+    for name, high, after in (
+        ("p2dx_con", True, 5 * MS),
+        ("p2dx_con", False, 700 * MS),
+        ("motor1_comm1", True, 3 * MS),
+    ):
+        twins.pin(name, high, after)
+    for side in twins.sides:
+        side.adapter.advance_to(twins.now + 5 * MS)
+        side.adapter.advance_to(twins.now + 1_500 * MS)
+    twins.compare()
 
 
 @pytest.mark.soak

@@ -37,6 +37,13 @@ class Side:
             (now, f"{what}: {detail}" if what in EXACT else what)
         )
 
+    def bring(self, at: Nanos) -> None:
+        """Bring it to its next deadline or to an edge: nothing may have happened before."""
+        events, writes = len(self.events), len(self.pins.writes)
+        self.adapter.advance_to(at)
+        late = [what for what in (*self.events[events:], *self.pins.writes[writes:]) if what[0] != at]
+        assert not late, f"only noticed at {at} ns: {late}"
+
     def collect(self) -> None:
         self.frames += self.adapter.take_output()
 
@@ -150,9 +157,9 @@ class Twins:
         for place, (side, stops) in enumerate(zip(self.sides, (resets, [at for at, _ in to_come]), strict=True)):
             for limit in (*stops, until):
                 while (due := side.adapter.next_deadline()) is not None and due <= limit:
-                    side.adapter.advance_to(due)
+                    side.bring(due)
                     self.deadlines[place] += 1
-                side.adapter.advance_to(limit)
+                side.bring(limit)
         self.now = until
         self.compare()
 
