@@ -127,6 +127,29 @@ def test_a_firmware_that_waits_for_edges_does_the_same_at_a_tenth_of_the_deadlin
     assert sequence.twins.firmware.wakes_on == {"rst"}, "it samples until the wires are settled again"
 
 
+def test_duties_are_sampled_on() -> None:
+    settings = AdapterSettings(motor_command=MotorCommand.DUTY)
+    twins = Twins(settings, waits_for_edges=True)
+    twins.pass_time(400 * MS)
+    assert twins.firmware.wakes_on == {"rst"}
+    assert twins.firmware.next_deadline() - twins.now <= settings.sample_period_ns
+
+
+def test_a_state_that_waits_for_edges_says_what_the_wires_showed() -> None:
+    sequence = Sequence(AdapterSettings(), has_four_bits=False, waits_for_edges=True)
+    for step in (("connect", True), ("obey", 5)):
+        sequence.step(str(step[0]), *step[1:])
+    other = Twins(waits_for_edges=True)
+    other.now = sequence.twins.now + 90 * MS
+    # These wires have no past.
+    other.sides[1].pins.set("p2dx_con", True, other.now)
+    other.firmware.restore(sequence.twins.firmware.snapshot())
+    assert other.firmware.wakes_on == sequence.twins.firmware.wakes_on
+    other.firmware.advance_to(other.now)
+    assert other.firmware.state == "driving"
+    assert [what for _, what in other.sides[1].events] == []
+
+
 @pytest.mark.parametrize("waits", [False, True])
 def test_samples_that_are_taken_late_see_the_levels_of_their_instants(waits: bool) -> None:
     twins = Twins(waits_for_edges=waits)

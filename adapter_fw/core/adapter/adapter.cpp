@@ -279,8 +279,7 @@ bool Adapter::is_settled(std::uint32_t word) const {
   const std::uint32_t connect_bit = 1U << (reset_bit_ - 1);
   const bool leaves_by_request = wants_robot() ? state_ == State::IDLE : state_ == State::LOST;
   return is_running() && !leaves_by_request && settings_.motor_command == MotorCommand::BITS &&
-         (word >> reset_bit_ & 1U) == 0 && connect_.is_settled((word & connect_bit) != 0) &&
-         majority_.is_settled(word & (connect_bit - 1));
+         connect_.level() == ((word & connect_bit) != 0) && majority_.word() == (word & (connect_bit - 1));
 }
 
 // Work. ------------------------------------------------------------------------------------------------------

@@ -22,14 +22,6 @@ bool Majority::take(std::uint32_t word) {
   return true;
 }
 
-bool Majority::is_settled(std::uint32_t word) const {
-  bool is_settled = word == word_;
-  for (std::int32_t place = 0; place < count_; ++place) {
-    is_settled = is_settled && window_[static_cast<std::size_t>(place)] == word;
-  }
-  return is_settled;
-}
-
 void Majority::reset() {
   window_.fill(0);
   next_ = 0;

@@ -28,8 +28,6 @@ class Majority {
   void reset();
 
   std::uint32_t word() const { return word_; }
-  // Tells whether the window holds nothing but `word`, and that is the one taken.
-  bool is_settled(std::uint32_t word) const;
 
  private:
   std::array<std::uint32_t, MAX_SAMPLE_COUNT> window_{};
@@ -90,8 +88,6 @@ class Debounce {
   void reset();
 
   bool level() const { return level_; }
-  // Tells whether the last sample was `raw`, and that is the level that counts.
-  bool is_settled(bool raw) const { return raw == raw_ && raw == level_; }
 
  private:
   Nanos high_after_ns_;
