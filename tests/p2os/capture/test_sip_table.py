@@ -152,6 +152,11 @@ def test_a_sip_that_is_cut_in_two_is_found_unless_its_rest_comes_too_late(wait_n
         assert same(capture_of(chunks))["t_s"] == found
 
 
+@pytest.mark.parametrize("batteries", [(100, 100, 101), (101, 100, 100), (100, 100, 100)])
+def test_a_column_whose_cells_are_nearly_alike_has_each_of_its_texts(batteries: tuple[int, ...]) -> None:
+    same(capture_of([(0, ROBOT, sip_bytes(raw_battery=battery)) for battery in batteries]))
+
+
 def test_a_capture_without_sips_has_no_table() -> None:
     packet = packet_frame(EncoderPacket(left_counts=1, right_counts=2), Profile.P2OS).to_bytes()
     assert same(capture_of([(0, ROBOT, packet)])) == {}
