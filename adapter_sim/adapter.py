@@ -275,6 +275,10 @@ class Adapter(Stateful):
         """Return the frames to send, one item each, oldest first, and forget them."""
         return self.session.take_output()
 
+    def wait_for_edges(self) -> None:
+        """Sample no settled wires from now on: whoever runs it brings it to every edge of the wires in `wakes_on`."""
+        self.samples.waits_for_edges = True
+
     @property
     def wakes_on(self) -> frozenset[str]:
         """Names of the wires whose edges it has to be brought to: rst, and all inputs while it does not sample them."""

@@ -34,7 +34,7 @@ from simbase.errors import MissingDependencyError, UsageError
 from simbase.timing import NS_PER_S, Nanos, Reached
 
 #: Of adapter_capi.h.
-VERSION = 2
+VERSION = 3
 _MAX_FRAME_BYTES = 9
 #: What helps when a state cannot be taken up.
 RUN_ANEW = "run the scenario anew, and save it again"
@@ -74,6 +74,8 @@ _FUNCTIONS = {
     "adapter_shutdown": "vpsl",
     "adapter_advance_to": "vpl",
     "adapter_next_deadline": "lp",
+    "adapter_wait_for_edges": "vp",
+    "adapter_is_suspended": "ip",
     "adapter_take_output": "zpp",
     "adapter_status": "vpp",
     "adapter_state": "sp",
@@ -140,12 +142,13 @@ class FirmwareAdapter:
         motors = [name for value in MOTOR_VALUES for name in pinout.value(value).wires]
         ends = [pinout.with_role(role)[0].name for role in (WireRole.CONNECT, WireRole.RESET)]
         self._inputs = [(name, 1 << bit) for bit, name in enumerate([*motors, *ends])]
-        #: Names of the wires whose edges it has to be brought to; it samples the others.
-        self.wakes_on = frozenset(ends[1:])
+        #: Names of rst, and of all input wires, by whether it waits for edges instead of sampling.
+        self._wakes_on = (frozenset(ends[1:]), frozenset((*motors, *ends)))
         self._outputs = [wire.name for wire in pinout.with_role(WireRole.DISTANCE)]
         self._outputs += [name for value in ("encoder1", "encoder2") for name in pinout.value(value).wires]
         self._status_names = _names(library.adapter_status_name)
         self._failure: BaseException | None = None
+        self._frame = ctypes.create_string_buffer(_MAX_FRAME_BYTES)
         values = [pinout.value(name) for name in MOTOR_VALUES]
         #: What measures the duties: the part of the hardware that the core does not have.
         self._duties = dict(zip((0, values[0].width), duty_wires(pins, values, settings), strict=True))
@@ -229,10 +232,19 @@ class FirmwareAdapter:
 
     def take_output(self) -> list[bytes]:
         """Return the frames to send, one item each, oldest first, and forget them."""
-        frame, frames = ctypes.create_string_buffer(_MAX_FRAME_BYTES), []
+        frame, frames = self._frame, []
         while size := self._library.adapter_take_output(self._handle, frame):
             frames.append(frame.raw[:size])
         return frames
+
+    def wait_for_edges(self) -> None:
+        """Sample no settled wires from now on: whoever runs it brings it to every edge of the wires in `wakes_on`."""
+        self._library.adapter_wait_for_edges(self._handle)
+
+    @property
+    def wakes_on(self) -> frozenset[str]:
+        """Names of the wires whose edges it has to be brought to: rst, and all inputs while it does not sample them."""
+        return self._wakes_on[self._library.adapter_is_suspended(self._handle)]
 
     def next_deadline(self) -> Nanos | None:
         """Return the next sample instant or deadline, in nanoseconds."""

@@ -53,10 +53,21 @@ Owner read(const Field<Owner> (&fields)[SIZE], const std::int64_t* values) {
   return owner;
 }
 
+//: The word of the input wires that was read last.
+struct Reading {
+  std::uint32_t word;
+  //: From when on it is known to stand there, and until before when.
+  std::int64_t from;
+  std::int64_t until;
+  //: Whether it stands there until somebody says that a wire changes.
+  bool is_suspended;
+};
+
 //: A saved state: the adapter's members and the text of its reason, which is no pointer that another process has.
 struct State {
   alignas(Adapter) unsigned char bytes[sizeof(Adapter)];
   char reason[96];
+  Reading reading;
 };
 
 }  // namespace
@@ -68,7 +79,22 @@ struct adapter_handle final : private hal::PinsIn, private hal::PinsOut, private
     part.attach(this, this, this);
   }
 
-  std::uint32_t read(p2os::Nanos at) override { return callbacks.read(callbacks.user, at); }
+  std::uint32_t read(p2os::Nanos at) override {
+    if (at < reading.from || at >= reading.until) {
+      reading.word = callbacks.read(callbacks.user, at);
+      reading.from = at;
+      reading.until = at + 1;
+    }
+    return reading.word;
+  }
+
+  // Begins what is done at `now`: the wires may have changed there, and before only where nobody waits for edges.
+  Adapter& at(std::int64_t now) {
+    reading.until = reading.is_suspended ? now : reading.from;
+    reading.is_suspended = false;
+    return part;
+  }
+
   std::int32_t duty(std::int32_t bit, p2os::Nanos at) override { return callbacks.duty(callbacks.user, bit, at); }
   void drive(std::uint32_t mask, std::uint32_t levels, p2os::Nanos now) override {
     callbacks.drive(callbacks.user, mask, levels, now);
@@ -81,6 +107,8 @@ struct adapter_handle final : private hal::PinsIn, private hal::PinsOut, private
 
   adapter_callbacks callbacks;
   Adapter part;
+  Reading reading{};
+  bool waits_for_edges = false;
   State scratch{};
 };
 
@@ -120,25 +148,34 @@ const char* adapter_robot_name(int32_t place) { return name_at(ROBOT, place); }
 const char* adapter_wire_name(int32_t place) { return name_at(WIRES, place); }
 
 void adapter_receive(adapter_handle* handle, const uint8_t* data, size_t size, int64_t now) {
-  handle->part.receive({data, size}, now);
+  handle->at(now).receive({data, size}, now);
 }
 
 void adapter_receive_pad(adapter_handle* handle, int32_t buttons, int32_t forward, int32_t backward, int32_t turn,
                          int64_t now) {
-  handle->part.receive_pad({(buttons & 1) != 0, (buttons & 2) != 0, forward, backward, turn}, now);
+  handle->at(now).receive_pad({(buttons & 1) != 0, (buttons & 2) != 0, forward, backward, turn}, now);
 }
 
 void adapter_set_master(adapter_handle* handle, int32_t master, int64_t now) {
-  handle->part.set_master(master == 0 ? adapter::Master::BLUEPILL : adapter::Master::PAD, now);
+  handle->at(now).set_master(master == 0 ? adapter::Master::BLUEPILL : adapter::Master::PAD, now);
 }
 
 void adapter_shutdown(adapter_handle* handle, const char* reason, int64_t now) {
   std::strncpy(handle->scratch.reason, reason, sizeof handle->scratch.reason - 1);
-  handle->part.shutdown(handle->scratch.reason, now);
+  handle->at(now).shutdown(handle->scratch.reason, now);
 }
 
-void adapter_advance_to(adapter_handle* handle, int64_t limit) { handle->part.advance_to(limit); }
-int64_t adapter_next_deadline(const adapter_handle* handle) { return handle->part.next_deadline(); }
+void adapter_advance_to(adapter_handle* handle, int64_t limit) {
+  handle->at(limit).advance_to(limit);
+  handle->reading.is_suspended = handle->waits_for_edges && handle->part.is_settled(handle->read(limit));
+}
+
+int64_t adapter_next_deadline(const adapter_handle* handle) {
+  return handle->reading.is_suspended ? handle->part.unsampled_deadline() : handle->part.next_deadline();
+}
+
+void adapter_wait_for_edges(adapter_handle* handle) { handle->waits_for_edges = true; }
+int32_t adapter_is_suspended(const adapter_handle* handle) { return handle->reading.is_suspended ? 1 : 0; }
 
 size_t adapter_take_output(adapter_handle* handle, uint8_t* frame) {
   p2os::CommandFrame next;
@@ -184,6 +221,7 @@ void adapter_save(const adapter_handle* handle, void* state) {
   std::memset(saved, 0, sizeof *saved);
   std::memcpy(saved->bytes, static_cast<const void*>(&handle->part), sizeof handle->part);
   std::strncpy(saved->reason, handle->part.reason(), sizeof saved->reason - 1);
+  saved->reading = handle->reading;
 }
 
 void adapter_restore(adapter_handle* handle, const void* state) {
@@ -191,4 +229,5 @@ void adapter_restore(adapter_handle* handle, const void* state) {
   // Member by member: what an object's own process put into it (its tables, its connections) is left out.
   handle->part = *reinterpret_cast<const Adapter*>(handle->scratch.bytes);
   handle->part.set_reason(handle->scratch.reason);
+  handle->reading = handle->scratch.reading;
 }

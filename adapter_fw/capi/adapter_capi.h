@@ -14,7 +14,7 @@ extern "C" {
 #endif
 
 /* Raised when the meaning or the order of anything below changes. */
-#define ADAPTER_CAPI_VERSION 2
+#define ADAPTER_CAPI_VERSION 3
 
 typedef struct adapter_handle adapter_handle;
 
@@ -53,7 +53,13 @@ void adapter_receive_pad(adapter_handle* handle, int32_t buttons, int32_t forwar
 void adapter_set_master(adapter_handle* handle, int32_t master, int64_t now);
 void adapter_shutdown(adapter_handle* handle, const char* reason, int64_t now);
 void adapter_advance_to(adapter_handle* handle, int64_t limit);
+/* Where nothing changes at the samples to come as long as no input wire does, that is the next deadline which is no
+ * sample, if adapter_wait_for_edges was called. */
 int64_t adapter_next_deadline(const adapter_handle* handle);
+/* From now on adapter_advance_to is called at each edge of the input wires while adapter_is_suspended. The samples that
+ * were left out are taken then, all of them with the word that was read last. */
+void adapter_wait_for_edges(adapter_handle* handle);
+int32_t adapter_is_suspended(const adapter_handle* handle);
 /* Copies the oldest frame that has to go out, at most 9 bytes; returns its size, 0 for none. */
 size_t adapter_take_output(adapter_handle* handle, uint8_t* frame);
 

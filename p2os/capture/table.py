@@ -13,8 +13,8 @@ Invariant: all tables of a capture have the same columns in the same order, and 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import accumulate, chain, groupby, islice, pairwise, repeat
-from typing import IO, Protocol, cast, runtime_checkable
+from itertools import accumulate, chain, islice, pairwise, repeat
+from typing import IO, Protocol, runtime_checkable
 
 from p2os.capture.cells import Alike, Cell, quoted, texts_of
 from p2os.capture.describe import RAW_OF, Plain
@@ -130,11 +130,17 @@ def _texts(table: Table) -> Iterator[Iterable[str]]:
     columns = (
         column.texts() if isinstance(column, TextColumn) else texts_of(column) for column in table.columns.values()
     )
-    for is_alike, together in groupby(columns, lambda texts: isinstance(texts, Alike)):
-        if is_alike:
-            yield repeat(",".join([alike.text for alike in cast("Iterable[Alike]", together)]), table.rows)
-        else:
-            yield from together
+    alike: list[str] = []
+    for texts in columns:
+        if isinstance(texts, Alike):
+            alike.append(texts.text)
+            continue
+        if alike:
+            yield repeat(",".join(alike), table.rows)
+            alike = []
+        yield texts
+    if alike:
+        yield repeat(",".join(alike), table.rows)
 
 
 def _kinds(column: Sequence[Cell]) -> set[type]:

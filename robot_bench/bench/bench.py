@@ -27,7 +27,6 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Self, Unpack, cast
 
-from adapter_sim import Adapter
 from adapter_sim.pinout import load_pinout
 from bluepill_sim.spans import Span, to_nanos
 from p2os.event_log import logger
@@ -36,7 +35,7 @@ from p2os.pioneer.body.factory import body_note, make_body, make_scene
 from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import Pose, World
-from robot_bench.adapter import RUN_ANEW
+from robot_bench.adapter import RUN_ANEW, AnyAdapter
 from robot_bench.bench.board import (
     boot,
     do_by_hand,
@@ -204,8 +203,8 @@ class Bench(Expectations, Interventions, Stateful):
         self.goals.subscribe(self.events)
         pin_of = pins_of(scenario)
         self._pins = ChipPins(chip, harness, pin_of, on_watched=self.loop.note_edge, now=lambda: self.loop.led)
-        if isinstance(self.parts.adapter, Adapter):
-            self.parts.adapter.samples.waits_for_edges = True
+        if isinstance(self.parts.adapter, AnyAdapter):
+            self.parts.adapter.wait_for_edges()
         chip.usart1.far_baud = scenario.usart_baud
         hear_usarts(chip, self.recorder)
         hear_buses(chip, self.recorder, scenario.record)

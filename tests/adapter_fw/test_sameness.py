@@ -21,7 +21,7 @@ from robot_bench.adapter import is_available
 from tests.adapter_fw import mutation
 from tests.adapter_fw.boundaries import Life
 from tests.adapter_fw.sequences import Sequence
-from tests.adapter_fw.twins import MS
+from tests.adapter_fw.twins import MS, Twins
 
 pytestmark = pytest.mark.skipif(not is_available(), reason="the firmware core is not built: no C++17 compiler")
 
@@ -78,14 +78,16 @@ SETTINGS = st.builds(
 )
 
 
-def run_both(steps: list[tuple[object, ...]], adapter_settings: AdapterSettings, *, has_four_bits: bool) -> int:
-    sequence = Sequence(adapter_settings, has_four_bits=has_four_bits)
+def run_both(
+    steps: list[tuple[object, ...]], adapter_settings: AdapterSettings, *, has_four_bits: bool, waits: bool
+) -> int:
+    sequence = Sequence(adapter_settings, has_four_bits=has_four_bits, waits_for_edges=waits)
     for kind, *values in steps:
         sequence.step(str(kind), *values)
     return sequence.twins.steps
 
 
-SEQUENCES = given(st.lists(STEPS, min_size=30, max_size=60), SETTINGS, st.booleans())
+SEQUENCES = given(st.lists(STEPS, min_size=30, max_size=60), SETTINGS, st.booleans(), st.booleans())
 QUIET = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.large_base_example]
 
 
@@ -95,18 +97,73 @@ QUIET = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.large_bas
 @settings(max_examples=115, deadline=None, suppress_health_check=QUIET)
 @SEQUENCES
 def test_firmware_and_model_do_the_same_over_five_thousand_steps(
-    steps: list, adapter_settings: AdapterSettings, four: bool
+    steps: list, adapter_settings: AdapterSettings, four: bool, waits: bool
 ) -> None:
-    run_both(steps, adapter_settings, has_four_bits=four)
+    run_both(steps, adapter_settings, has_four_bits=four, waits=waits)
 
 
 @pytest.mark.soak
 @settings(max_examples=2_500, deadline=None, suppress_health_check=QUIET)
 @SEQUENCES
 def test_firmware_and_model_agree_in_thousands_of_sequences(
-    steps: list, adapter_settings: AdapterSettings, four: bool
+    steps: list, adapter_settings: AdapterSettings, four: bool, waits: bool
 ) -> None:
-    run_both(steps, adapter_settings, has_four_bits=four)
+    run_both(steps, adapter_settings, has_four_bits=four, waits=waits)
+
+
+def test_a_firmware_that_waits_for_edges_does_the_same_at_a_tenth_of_the_deadlines() -> None:
+    sequence = Sequence(AdapterSettings(), has_four_bits=False, waits_for_edges=True)
+    rest, reset = ("obey", 15), ("glitch", "rst", 14)
+    for step in (
+        ("connect", True), ("motors", 3, 2), rest, ("glitch", "motor1_comm2", 3), rest, ("motors", 0, 1), rest,
+        ("rare", "restore"), rest, reset, ("time", 1_100 * MS), ("connect", True), rest,
+    ):  # fmt: skip
+        sequence.step(str(step[0]), *step[1:])
+    sampled, waited = sequence.twins.deadlines
+    assert waited < sampled / 10
+    assert sequence.twins.firmware.wakes_on == sequence.twins.model.inputs.wires
+    sequence.twins.pin("motor1_comm1", True)
+    sequence.twins.pass_time(1)
+    assert sequence.twins.firmware.wakes_on == {"rst"}, "it samples until the wires are settled again"
+
+
+def test_duties_are_sampled_on() -> None:
+    settings = AdapterSettings(motor_command=MotorCommand.DUTY)
+    twins = Twins(settings, waits_for_edges=True)
+    twins.pass_time(400 * MS)
+    assert twins.firmware.wakes_on == {"rst"}
+    assert twins.firmware.next_deadline() - twins.now <= settings.sample_period_ns
+
+
+def test_a_state_that_waits_for_edges_says_what_the_wires_showed() -> None:
+    sequence = Sequence(AdapterSettings(), has_four_bits=False, waits_for_edges=True)
+    for step in (("connect", True), ("obey", 5)):
+        sequence.step(str(step[0]), *step[1:])
+    other = Twins(waits_for_edges=True)
+    other.now = sequence.twins.now + 90 * MS
+    # These wires have no past.
+    other.sides[1].pins.set("p2dx_con", True, other.now)
+    other.firmware.restore(sequence.twins.firmware.snapshot())
+    assert other.firmware.wakes_on == sequence.twins.firmware.wakes_on
+    other.firmware.advance_to(other.now)
+    assert other.firmware.state == "driving"
+    assert [what for _, what in other.sides[1].events] == []
+
+
+@pytest.mark.parametrize("waits", [False, True])
+def test_samples_that_are_taken_late_see_the_levels_of_their_instants(waits: bool) -> None:
+    twins = Twins(waits_for_edges=waits)
+    twins.pass_time(320 * MS)
+    for name, high, after in (
+        ("p2dx_con", True, 5 * MS),
+        ("p2dx_con", False, 700 * MS),
+        ("motor1_comm1", True, 3 * MS),
+    ):
+        twins.pin(name, high, after)
+    for side in twins.sides:
+        side.adapter.advance_to(twins.now + 5 * MS)
+        side.adapter.advance_to(twins.now + 1_500 * MS)
+    twins.compare()
 
 
 @pytest.mark.soak

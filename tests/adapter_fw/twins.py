@@ -37,12 +37,23 @@ class Side:
             (now, f"{what}: {detail}" if what in EXACT else what)
         )
 
+    def bring(self, at: Nanos) -> None:
+        """Bring it to its next deadline or to an edge: nothing may have happened before."""
+        events, writes = len(self.events), len(self.pins.writes)
+        self.adapter.advance_to(at)
+        late = [what for what in (*self.events[events:], *self.pins.writes[writes:]) if what[0] != at]
+        assert not late, f"only noticed at {at} ns: {late}"
+
     def collect(self) -> None:
         self.frames += self.adapter.take_output()
 
 
 class Twins:
-    """Both, fed alike; a robot that is only a source of SIPs answers the model's frames."""
+    """Both, fed alike; a robot that is only a source of SIPs answers the model's frames.
+
+    Where the firmware waits for edges, each is brought to its own deadlines, both to those of rst, and the firmware to
+    the others too.
+    """
 
     def __init__(
         self,
@@ -51,6 +62,7 @@ class Twins:
         *,
         robot: str = "p2dx",
         start: Nanos = 0,
+        waits_for_edges: bool = False,
     ) -> None:
         self.now: Nanos = start
         parameters = load_parameters(robot)
@@ -61,6 +73,12 @@ class Twins:
             adapter = kind(pins=pins, pinout=pinout, parameters=parameters, settings=settings, now=start)
             self.sides.append(Side(pins, adapter))
             self.sides[-1].listen()
+        #: When which wire has an edge, if the firmware waits for it; None where it samples on.
+        self._edges: list[tuple[Nanos, str]] | None = [] if waits_for_edges else None
+        if waits_for_edges:
+            self.firmware.wait_for_edges()
+        #: How many deadlines each has had where it has its own.
+        self.deadlines = [0, 0]
         self.sip = StandardSip(sonar=(SonarReading(0, 5_000), SonarReading(3, 1_000)))
 
     @property
@@ -76,10 +94,12 @@ class Twins:
         return adapter
 
     def pin(self, name: str, high: bool, after: Nanos = 1) -> None:
+        self._note_edge(self.now + after, name)
         for side in self.sides:
             side.pins.set(name, high, self.now + after)
 
     def motors(self, left: int, right: int, width: int = 3) -> None:
+        self._note_edge(self.now + 1, "motors")
         for side in self.sides:
             side.pins.motors(left, right, self.now + 1, width)
 
@@ -114,6 +134,9 @@ class Twins:
     def pass_time(self, span: Nanos) -> None:
         """Advance both, each at its own deadlines, and compare."""
         until = self.now + span
+        if self._edges is not None:
+            self._pass_apart(until, self._edges)
+            return
         while True:
             due = self.model.next_deadline()
             assert due == self.firmware.next_deadline()
@@ -122,6 +145,22 @@ class Twins:
                 side.adapter.advance_to(self.now)
             if self.now >= until:
                 break
+        self.compare()
+
+    def _note_edge(self, at: Nanos, name: str) -> None:
+        if self._edges is not None:
+            self._edges.append((at, name))
+
+    def _pass_apart(self, until: Nanos, edges: list[tuple[Nanos, str]]) -> None:
+        to_come = sorted({edge for edge in edges if self.now < edge[0] < until})
+        resets = [at for at, name in to_come if name == "rst"]
+        for place, (side, stops) in enumerate(zip(self.sides, (resets, [at for at, _ in to_come]), strict=True)):
+            for limit in (*stops, until):
+                while (due := side.adapter.next_deadline()) is not None and due <= limit:
+                    side.bring(due)
+                    self.deadlines[place] += 1
+                side.bring(limit)
+        self.now = until
         self.compare()
 
     def answer(self) -> None:

@@ -248,7 +248,11 @@ void Adapter::replan() {
     deadline_ = earlier(agenda_.boot_at, next_sample_);
     return;
   }
-  Nanos due = earlier(next_sample_, client_.next_deadline());
+  deadline_ = earlier(next_sample_, unsampled_deadline());
+}
+
+Nanos Adapter::unsampled_deadline() const {
+  Nanos due = client_.next_deadline();
   if (is_open()) {
     const Wheels counts = encoders_.counts();
     due = earlier(due, earlier(agenda_.sip_deadline, agenda_.sonar_at));
@@ -268,7 +272,14 @@ void Adapter::replan() {
   if (master_ == Master::PAD) {
     due = earlier(due, pad_.lost_at());
   }
-  deadline_ = due;
+  return due;
+}
+
+bool Adapter::is_settled(std::uint32_t word) const {
+  const std::uint32_t connect_bit = 1U << (reset_bit_ - 1);
+  const bool leaves_by_request = wants_robot() ? state_ == State::IDLE : state_ == State::LOST;
+  return is_running() && !leaves_by_request && settings_.motor_command == MotorCommand::BITS &&
+         connect_.level() == ((word & connect_bit) != 0) && majority_.word() == (word & (connect_bit - 1));
 }
 
 // Work. ------------------------------------------------------------------------------------------------------

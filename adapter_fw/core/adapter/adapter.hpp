@@ -110,6 +110,11 @@ class Adapter final : private p2os::ClientListener {
   // Acts on everything due up to and including `limit`, then looks at rst.
   void advance_to(Nanos limit);
   Nanos next_deadline() const { return deadline_; }
+  // Tells whether the samples to come change nothing that others see as long as the input wires show `word`, as they
+  // do since the last `advance_to`: until `unsampled_deadline` nothing happens then. Duties change by their time-out too.
+  bool is_settled(std::uint32_t word) const;
+  // Returns the next deadline that is no sample; of a running adapter.
+  Nanos unsampled_deadline() const;
   [[nodiscard]] bool take_output(p2os::CommandFrame& frame) { return client_.take_output(frame); }
 
   State state() const { return state_; }

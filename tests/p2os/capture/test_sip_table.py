@@ -1,5 +1,6 @@
 """A capture's SIPs by columns against the same by rows: names, order and every cell."""
 
+import io
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -17,7 +18,7 @@ from p2os.capture.chunks import Capture, Chunk, Direction, block_of_chunks, capt
 from p2os.capture.columns.sip_table import sip_tables
 from p2os.capture.sip_columns import LEADING
 from p2os.capture.sips import sips_of
-from p2os.capture.table import Table, tables_of, tables_of_sips
+from p2os.capture.table import Table, tables_of, tables_of_sips, write_csv
 from p2os.cli.main import run
 from p2os.protocol.packets import EncoderPacket, SonarReading, StandardSip, packet_frame
 from p2os.protocol.profiles import Profile
@@ -41,6 +42,16 @@ def joined(tables: Iterable[Table]) -> dict[str, list[Cell]]:
     return cells
 
 
+def lines(table: Table) -> str:
+    file = io.StringIO()
+    write_csv([table], file)
+    return file.getvalue()
+
+
+def plain(table: Table) -> Table:
+    return Table({name: list(column) for name, column in table.columns.items()})
+
+
 def same(
     capture: Capture, reading: Reading = P2DX, *, first_rows: int = 4096, block: int = 1 << 20, together: int = 3
 ) -> dict[str, list[Cell]]:
@@ -50,10 +61,12 @@ def same(
     ours = joined(sip_tables(blocks, reading, first_rows=first_rows, block=block))
     rows = [row for row in rows_of(capture, reading) if row.direction is not CLIENT and row.is_sip]
     theirs = joined(tables_of(rows, reading, first_rows))
-    assert joined(tables_of_sips(sips_of(blocks, reading), reading, first_rows)) == theirs
+    tables = list(tables_of_sips(sips_of(blocks, reading), reading, first_rows))
+    assert joined(tables) == theirs
+    assert [lines(table) for table in tables] == [lines(plain(table)) for table in tables]
     for number, row in enumerate(rows if len(rows) <= first_rows else []):
-        plain = {**row.as_plain(), "t_s": row.at_ns / NS_PER_S, "dir": ROBOT.value}
-        assert [theirs[name][number] for name in LEADING] == [plain[name] for name in LEADING]
+        known = {**row.as_plain(), "t_s": row.at_ns / NS_PER_S, "dir": ROBOT.value}
+        assert [theirs[name][number] for name in LEADING] == [known[name] for name in LEADING]
         said = {name: value for name, value in row.fields.items() if name not in {"x_m", "y_m", "sonar_m"}}
         said |= {f"sonar_m_{place}": value for place, value in cast("dict[str, float]", row.fields["sonar_m"]).items()}
         cells = {name: column[number] for name, column in theirs.items() if name not in {*LEADING, "x_m", "y_m"}}
@@ -92,7 +105,8 @@ def test_a_capture_gives_the_same_cells_either_way(
     chunks, now = [Chunk(at_ns=0, direction=direction, data=sip_bytes())], 0
     for wait, is_robot, data in parts:
         now += wait
-        chunks.append(Chunk(at_ns=now, direction=direction if is_robot else CLIENT, data=data))
+        if data:  # no source gives a chunk without bytes, and a block holds none
+            chunks.append(Chunk(at_ns=now, direction=direction if is_robot else CLIENT, data=data))
     reading = Reading(profile=profile, parameters=P2DX.parameters)
     same(Capture(chunks=tuple(chunks)), reading, first_rows=first_rows, block=block, together=together)
 
@@ -122,6 +136,25 @@ def test_it_is_given_up_at_the_first_byte_of_anyone_once_the_line_was_quiet_for_
     chunks = [(0, ROBOT, b"\xfa\xfb\xc0" + sip_bytes()), *((wait, CLIENT, b"\0") for wait in waits)]
     for together in range(1, 6):
         assert same(capture_of(chunks), together=together)["t_s"] == [0.25]
+
+
+def test_the_silence_begins_with_the_last_chunk_of_a_run() -> None:
+    waits = (299 * NS_PER_MS, 349 * NS_PER_MS, 350 * NS_PER_MS)
+    chunks = [(0, ROBOT, b"\xfa\xfb\xc0" + sip_bytes()), (100 * NS_PER_MS, ROBOT, b"\1")]
+    assert same(capture_of([*chunks, *((wait, CLIENT, b"\0") for wait in waits)]))["t_s"] == [0.35]
+
+
+@pytest.mark.parametrize(("wait_ns", "found"), [(249 * NS_PER_MS, [0.249, 0.249]), (250 * NS_PER_MS, [0.25])])
+def test_a_sip_that_is_cut_in_two_is_found_unless_its_rest_comes_too_late(wait_ns: int, found: list[float]) -> None:
+    data = sip_bytes(raw_x=7, sonar=(SonarReading(2, 300),))
+    for place in range(1, len(data)):
+        chunks = [(0, ROBOT, data[:place]), (wait_ns, ROBOT, data[place:] + data)]
+        assert same(capture_of(chunks))["t_s"] == found
+
+
+@pytest.mark.parametrize("batteries", [(100, 100, 101), (101, 100, 100), (100, 100, 100)])
+def test_a_column_whose_cells_are_nearly_alike_has_each_of_its_texts(batteries: tuple[int, ...]) -> None:
+    same(capture_of([(0, ROBOT, sip_bytes(raw_battery=battery)) for battery in batteries]))
 
 
 def test_a_capture_without_sips_has_no_table() -> None:
