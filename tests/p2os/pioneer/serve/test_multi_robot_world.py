@@ -202,6 +202,38 @@ def test_a_sonar_takes_a_ping_of_another_robot_that_is_under_way_for_its_echo() 
         assert made.members[1].body.sees(3, made.members[0].body, 4) is None
 
 
+def test_a_ping_that_is_under_way_is_saved_with_the_world() -> None:
+    places = ((-2.0, 0.0, 0.0), (2.0, 0.0, 180.0))
+    made, other = multi_robot_world(places), multi_robot_world(places)
+    assert made.robots[0].hears is not None
+    made.robots[0].hears([4], 0)
+    other.restore(pickle.loads(pickle.dumps(made.snapshot())))  # noqa: S301  # our own bytes
+    heard = []
+    for world in (made, other):
+        ears = world.robots[1].hears
+        assert ears is not None
+        heard.append(ears([3], 3 * NS_PER_MS))
+    assert heard[0] == heard[1] != [None]
+
+
+def test_what_is_due_happens_in_the_order_of_the_times_and_of_the_robots() -> None:
+    made = multi_robot_world(FACING)
+    due = {0: [700, 900], 1: [300, 900, 1_001]}
+    told: list[tuple[int, int]] = []
+    for member in made.members:
+
+        def act(limit: int, number: int = member.number) -> None:
+            told.append((limit, number))
+            due[number].remove(limit)
+
+        member.advance_to = act
+        member.next_due = lambda number=member.number: min(due[number], default=None)  # type: ignore[misc]
+    made.advance_to(1_000)
+    assert told == [(300, 1), (700, 0), (900, 0), (900, 1)]
+    made.advance_to(1_001)
+    assert told[4:] == [(1_001, 1)]
+
+
 def test_a_reset_or_a_reboot_of_one_leaves_the_others_and_its_own_body_standing() -> None:
     made, alone = (multi_robot_world(FACING, cross_talk=False) for _ in range(2))
     for one in (made, alone):
