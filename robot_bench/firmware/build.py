@@ -13,8 +13,6 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from functools import cache
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
@@ -62,6 +60,9 @@ COMPILE_FLAGS = (
     "-fno-tree-loop-distribute-patterns",  # memset is not to become a call of itself
 )
 _INCLUDED = re.compile(rb'^ *# *include *"([^"]+)"', re.MULTILINE)
+#: Objects of this process by source, its text and what it includes, and flags; where it lies changes no byte. Programs
+#: share most of their sources, and a copy of one with a change all but that.
+_OBJECTS: dict[tuple[str, tuple[bytes, ...], tuple[str, ...]], bytes] = {}
 LINK_FLAGS = (
     *MACHINE_FLAGS,
     "-nostdlib",
@@ -95,7 +96,12 @@ def build_elf(
         objects = []
         for source in sources:
             target = Path(scratch) / source.replace("/", "_").replace(".c", ".o")
-            target.write_bytes(_compiled(_Unit(source, _texts(source, folder), more_flags, folder, prefix_maps)))
+            made_of = source, _texts(source, folder), more_flags
+            if made_of in _OBJECTS:
+                target.write_bytes(_OBJECTS[made_of])
+            else:
+                _run([COMPILER, *COMPILE_FLAGS, *more_flags, *prefix_maps, "-c", source, "-o", str(target)], folder)
+                _OBJECTS[made_of] = target.read_bytes()
             objects.append(str(target))
         _run([COMPILER, *LINK_FLAGS, "-T", linker_script, *objects, "-lgcc", "-o", str(output)], folder)
     output.chmod(0o644)
@@ -145,28 +151,6 @@ def build_kit(output: Path) -> Path:
             ("startup.c", "memory.c", KIT.name), folder=folder, linker_script="f103c8.ld", output=output.resolve()
         )  # fmt: skip
     return output
-
-
-@dataclass(frozen=True, slots=True)
-class _Unit:
-    """What is compiled; where it lies changes no byte of its object."""
-
-    source: str
-    #: Of it and of what it includes, in the order of the includes.
-    texts: tuple[bytes, ...]
-    more_flags: tuple[str, ...]
-    folder: Path = field(compare=False)
-    prefix_maps: tuple[str, ...] = field(compare=False)
-
-
-@cache
-def _compiled(unit: _Unit) -> bytes:
-    """Return the object of a source: programs share most of theirs, and copies of one with a change all but that."""
-    flags = (*COMPILE_FLAGS, *unit.more_flags, *unit.prefix_maps)
-    with tempfile.TemporaryDirectory() as scratch:
-        target = Path(scratch) / "object.o"
-        _run([COMPILER, *flags, "-c", unit.source, "-o", str(target)], unit.folder)
-        return target.read_bytes()
 
 
 def _texts(source: str, folder: Path) -> tuple[bytes, ...]:

@@ -12,7 +12,7 @@ from robot_bench.campaign.trial import run_trial, trial_of
 from robot_bench.campaign.variants.shrinking.failure import Way
 from robot_bench.campaign.variants.shrinking.kept import test_text as text_of_test
 from robot_bench.campaign.variants.shrinking.kept import trial_of_run
-from tests.tools.forked_python import forked_p2os, forked_python
+from tests.tools.forked_python import PYTEST, forked_p2os, forked_python
 
 #: Half a metre before a wall, with sensors that see a hand's breadth: it touches the wall 6 s after its start.
 BLIND = """
@@ -36,8 +36,6 @@ kind = "no_collision"
 kind = "usart_contains"
 text = "never said"
 """
-#: `python -m pytest` itself is not forked: it may not come after what it rewrites.
-PYTEST = "import pytest, sys; sys.exit(pytest.main(sys.argv[1:]))"
 
 
 @pytest.fixture(autouse=True)
