@@ -17,7 +17,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 
 from p2os.cli import printing
-from p2os.cli.printing import MOST_CHARACTERS, QueuedStream, queue_output, restored_output
+from p2os.cli.printing import MOST_BYTES, QueuedStream, queue_output, restored_output
 from p2os.cli.robots.teleop import NEXT_HOLD_NS
 from simbase.errors import FileError
 from simbase.timing import NS_PER_S
@@ -66,17 +66,56 @@ def test_what_is_written_arrives_in_order(pipe: Pipe) -> None:
         stream.write(b"bytes")  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("kind", ["pipe", "terminal"])
+def test_what_both_streams_write_to_one_place_arrives_in_order(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    reader, writer = os.pipe() if kind == "pipe" else pty.openpty()
+    below = [os.fdopen(each, "w", encoding="utf-8") for each in (writer, os.dup(writer))]
+    for name, stream in zip(("stdout", "stderr"), below, strict=True):
+        monkeypatch.setattr(sys, name, stream)
+    wanted = ""
+    with restored_output():
+        queue_output()
+        for number in range(300):
+            sys.stderr.write(f"{number}: ")
+            sys.stderr.write("tried\n")
+            sys.stdout.write(f"found {number}\n")
+            wanted += f"{number}: tried\nfound {number}\n"
+            if number % 7 == 0:
+                time.sleep(0)  # another thread's turn
+        came = b""
+        while len(came.replace(b"\r", b"")) < len(wanted):
+            assert select.select([reader], [], [], TIMEOUT_S)[0], came[-300:]
+            came += os.read(reader, 1 << 16)
+    assert came.decode().replace("\r\n", "\n") == wanted
+    for stream in below:
+        stream.close()
+    os.close(reader)
+
+
+def test_a_character_that_the_reader_cannot_be_given_is_refused_where_it_is_written() -> None:
+    reader, writer = os.pipe()
+    with os.fdopen(writer, "w", encoding="ascii") as below:
+        stream = QueuedStream(below, "standard output")
+        with pytest.raises(UnicodeEncodeError):
+            stream.write("90°\n")
+        stream.write("90 deg\n")
+        stream.queue.end()
+        assert os.read(reader, 100) == b"90 deg\n"
+    os.close(reader)
+
+
 @pytest.mark.usefixtures("impatient")
 def test_a_reader_that_does_not_read_misses_whole_lines_and_is_told_how_many(pipe: Pipe) -> None:
     stream = QueuedStream(pipe.below, "standard output")
     line = "x" * 999 + "\n"
-    most = MOST_CHARACTERS // 1000 + 500
+    most = MOST_BYTES // 1000 + 500
     began = time.monotonic()
     for _ in range(most):
         stream.write(line)
     for piece in ("half a ", "line\n", "\rstatus", "\rstatus", "\n"):
         stream.write(piece)
-    stream.finish()
+    stream.note_left_out()
+    stream.queue.end()
     assert time.monotonic() - began < TIMEOUT_S
     lines = pipe.read_until("read\n").splitlines(keepends=True)
     written = lines.count(line)
@@ -89,13 +128,13 @@ def test_lines_left_out_of_standard_output_are_told_of_on_standard_error(pipe: P
     notes = QueuedStream(errors.below, "standard error")
     stream = QueuedStream(pipe.below, "standard output", notes)
     line = "x" * 4095 + "\n"
-    for _ in range(MOST_CHARACTERS // 4096 + 100):
+    for _ in range(MOST_BYTES // 4096 + 100):
         stream.write(line)
     read = 0
-    while read < MOST_CHARACTERS:
+    while read < MOST_BYTES:
         assert select.select([pipe.reader], [], [], TIMEOUT_S)[0]
         read += len(os.read(pipe.reader, 1 << 16))
-    until(lambda: stream._characters < MOST_CHARACTERS // 2, "room")
+    until(lambda: stream.queue.waiting < MOST_BYTES // 2, "room")
     stream.write("{}\n")
     pipe.read_until("{}\n")
     told = errors.read_until("read\n")
@@ -107,11 +146,11 @@ def test_a_reader_that_goes_is_told_of_once(pipe: Pipe) -> None:
     stream = QueuedStream(pipe.below, "standard output")
     os.close(pipe.reader)
     stream.write("to nobody\n")
-    until(lambda: stream._error, "the error")
+    until(lambda: stream.queue.error, "the error")
     with pytest.raises(BrokenPipeError, match="nobody reads standard output"):
         stream.write("again\n")
     assert stream.write("and again\n") == 10
-    stream.finish()
+    stream.queue.end()
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no full disk at hand")
@@ -119,7 +158,7 @@ def test_a_disk_that_is_full_is_named() -> None:
     with open("/dev/full", "w", encoding="utf-8") as full:  # noqa: PTH123  # a device
         stream = QueuedStream(full, "standard output")
         stream.write("x\n")
-        until(lambda: stream._error, "the error")
+        until(lambda: stream.queue.error, "the error")
         with pytest.raises(FileError, match="cannot write to standard output: no space left on device"):
             stream.write("x\n")
 
