@@ -54,7 +54,7 @@ LONGEST_S = 9.0
 #: How long the wheels are watched after they stand.
 AFTERWARDS_S = 2.0
 STARTING_S = 30.0
-#: A run in real time gives up where the machine does not follow, before a motor's first step too: measured anew.
+#: Who drives in real time gives up where the machine does not follow, before the first motion too: measured anew.
 NEVER_DROVE, GAVE_UP, TRIES = "it never drove", "it gave up by itself", 4
 #: Wheels slower than this stand, m/s.
 STANDING_MPS = 0.002
@@ -378,7 +378,7 @@ def measure(way: Way, event: Happening, tools: "Tools") -> Row:
     """Drive, let it happen, and look; where a busy machine ended the driver before the event, anew."""
     for _ in range(TRIES):
         row = measure_once(way, event, tools)
-        if not row.problem.startswith((NEVER_DROVE, GAVE_UP)) or row.exit_code is None:
+        if not row.problem.startswith(GAVE_UP):
             break
     return row
 
@@ -392,9 +392,11 @@ def measure_once(way: Way, event: Happening, tools: "Tools") -> Row:
         stack.callback(robot.close)
         stack.callback(cable.close)
         driver = start(way, cable.url, Path(folder), tools, blocked=event.has_blocked_output, stack=stack)
-        if not until(lambda: robot.speeds[-1][1] > 0.15, STARTING_S):
+        until(lambda: drives(robot) or has_given_up(cable, driver), STARTING_S)
+        if not drives(robot):
+            problem = GAVE_UP if has_given_up(cable, driver) else NEVER_DROVE
             row.exit_code = driver.process.poll()
-            row.problem = f"{NEVER_DROVE} (exit code {row.exit_code})"
+            row.problem = f"{problem} (exit code {row.exit_code})"
             return row
         drove = time.monotonic()
         time.sleep(0.7)
@@ -420,6 +422,19 @@ def measure_once(way: Way, event: Happening, tools: "Tools") -> Row:
             return row
     row.problem = fault(row, event)
     return row
+
+
+def drives(robot: ServedRobot) -> bool:
+    """Tell whether the robot drives as fast as every way lets it."""
+    return robot.speeds[-1][1] > 0.15
+
+
+def has_given_up(cable: Cable, driver: Driver) -> bool:
+    """Tell whether the driver has ended, or has sent STOP after a speed: every way drives by VEL."""
+    told = [command for _, command in cable.since(0.0)]
+    speeds = [place for place, command in enumerate(told) if command.number == CommandNumber.VEL and command.integer]
+    is_stopped = any(command.number == CommandNumber.STOP for command in told[min(speeds, default=len(told)) :])
+    return is_stopped or driver.process.poll() is not None
 
 
 def stops(cable: Cable, at: float) -> list[float]:
