@@ -197,14 +197,15 @@ class Cable:
             from_robot = self.robot.read()
             try:
                 from_client = client.read() if client else b""
-                if client and not self.is_cut:
-                    client.write(from_robot)
             except TransportError:
                 client = None
                 continue
             if not self.is_cut and from_client:
                 self._hear(from_client)
                 self.robot.write(from_client)
+            if client and not self.is_cut:
+                with contextlib.suppress(TransportError):  # to read from it ends with the same
+                    client.write(from_robot)
 
     def _hear(self, data: bytes) -> None:
         self._decoder.receive(data, 0)
@@ -398,11 +399,10 @@ def measure_once(way: Way, event: Happening, tools: "Tools") -> Row:
             row.exit_code = driver.process.poll()
             row.problem = f"{problem} (exit code {row.exit_code})"
             return row
-        drove = time.monotonic()
         time.sleep(0.7)
         if event.lets_key_go:
             driver.is_held.clear()
-        began = time.monotonic()
+        began, gave_up = time.monotonic(), has_given_up(cable, driver)
         at = event.do(driver, cable)
         until(lambda: not robot.is_moving and bool(stops(cable, at) or driver.process.poll() is not None), LONGEST_S)
         until(lambda: not robot.is_moving, LONGEST_S)
@@ -417,7 +417,7 @@ def measure_once(way: Way, event: Happening, tools: "Tools") -> Row:
             row.stop_ms = round((found[0] - at) * 1000)
         after = cable.since(at)
         row.first = after[0][1].name if after else ""
-        if any(when < began for when in stops(cable, drove)) and not robot.is_moving:
+        if gave_up and not robot.is_moving:
             row.problem = f"{GAVE_UP} (exit code {row.exit_code})"
             return row
     row.problem = fault(row, event)
