@@ -17,6 +17,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from fractions import Fraction
+from functools import lru_cache
 from typing import Protocol
 
 from bluepill_sim.fabric.bus_parts import CanFrame
@@ -242,7 +243,7 @@ class CanNetwork(Stateful):
 
     @staticmethod
     def _span_ns(bits: int, rate: Fraction) -> Nanos:
-        return int(bits * NS_PER_S / rate)
+        return bits * NS_PER_S * rate.denominator // rate.numerator  # a tenth of the time that a Fraction takes
 
     def _replan(self) -> None:
         for member in self._members:
@@ -342,6 +343,7 @@ class CanNode(Stateful):
                 self.on_frame(end.frame, end.end_ns)
 
 
+@lru_cache(maxsize=256)  # a frame that nobody acknowledges is sent again and again
 def stuffed_bits(frame: CanFrame) -> int:
     """Return how many bits a frame has from its start to the end of its CRC, with stuff bits."""
     return len(frame_bits(frame))

@@ -16,7 +16,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import partialmethod
+from functools import cache, partialmethod
 
 from bluepill_sim.fabric.bus_parts import CanFrame
 from bluepill_sim.fabric.can_network import CanEnd, CanError, CanNetwork, frame_bits
@@ -272,9 +272,7 @@ class Can(Peripheral):
     @property
     def bit_rate(self) -> Fraction | None:
         """Bits a second."""
-        timing = self.words[BTR]
-        quanta = 1 + (timing >> 16 & 15) + 1 + (timing >> 20 & 7) + 1
-        return Fraction(self.chip.clocks.pclk1_hz, quanta * ((timing & 0x3FF) + 1))
+        return _bit_rate(self.chip.clocks.pclk1_hz, self.words[BTR])
 
     @property
     def is_on(self) -> bool:
@@ -764,6 +762,13 @@ class Can(Peripheral):
         self._tx = tx
         self._connect()
         self.chip.pins[self._pin_names[0]].hold_low(not rx)
+
+
+@cache  # asked for at each of hundreds of steps of a frame
+def _bit_rate(pclk1_hz: int, timing: int) -> Fraction:
+    """Return bits a second that a clock and a value of BTR make."""
+    quanta = 1 + (timing >> 16 & 15) + 1 + (timing >> 20 & 7) + 1
+    return Fraction(pclk1_hz, quanta * ((timing & 0x3FF) + 1))
 
 
 def _until_lost(own: Sequence[int], bits: Sequence[int]) -> list[int]:

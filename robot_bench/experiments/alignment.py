@@ -7,9 +7,11 @@ drive.
 Invariant: what is aligned is never stretched.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
+from scipy import fft
 from scipy.optimize import minimize_scalar
-from scipy.signal import correlate
 
 from robot_bench.drives.drive import Floats, Trajectory
 from simbase.errors import UsageError
@@ -38,8 +40,7 @@ def shift_by_speeds(reference: Trajectory, other: Trajectory) -> float:
         grid = np.arange(trajectory.t_s[0], trajectory.t_s[-1], GRID_S)
         grids.append((grid[0], np.interp(grid, t, speed), LEVER_M * np.interp(grid, t, turn)))
     (start, *ours), (other_start, *theirs) = grids
-    products = sum(correlate(a, b, mode="full", method="fft") for a, b in zip(ours, theirs, strict=True))
-    lag = int(np.argmax(products)) - (len(theirs[0]) - 1)
+    lag = _lag(ours, theirs)
     coarse = float(start - other_start + lag * GRID_S)
 
     def difference(shift: float) -> float:
@@ -51,6 +52,14 @@ def shift_by_speeds(reference: Trajectory, other: Trajectory) -> float:
         difference, bounds=(best - GRID_S, best + GRID_S), method="bounded", options={"xatol": 1e-6}
     )
     return float(found.x if found.fun < difference(best) else best)
+
+
+def _lag(ours: Sequence[Floats], theirs: Sequence[Floats]) -> int:
+    """Return by how many steps theirs have to be later for the sum of products to be largest, by Fourier transforms."""
+    length = len(ours[0]) + len(theirs[0]) - 1
+    size = fft.next_fast_len(length, real=True)
+    products = sum(fft.rfft(a, size) * fft.rfft(b[::-1], size) for a, b in zip(ours, theirs, strict=True))
+    return int(np.argmax(fft.irfft(products, size)[:length])) - (len(theirs[0]) - 1)
 
 
 def _difference(reference: Trajectory, other: Trajectory, shift: float) -> float:

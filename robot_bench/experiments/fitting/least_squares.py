@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import optimize, stats
+from scipy import optimize, special
 
 from robot_bench.drives.drive import Floats
 from robot_bench.events.codec import Json
@@ -175,7 +175,7 @@ def _result(
     if are_independent:
         plain = inverse * float(solution.fun @ solution.fun) / (len(solution.fun) - len(seen))
         variances = np.maximum(variances, np.diag(plain))
-    half = stats.t.ppf((1 + CONFIDENCE) / 2, count - len(seen)) * np.sqrt(variances)
+    half = special.stdtrit(count - len(seen), (1 + CONFIDENCE) / 2) * np.sqrt(variances)  # Student's quantile
     estimates = {
         one.name: Estimate(name=one.name, value=float(value), low=float(value - width), high=float(value + width))
         for one, value, width in zip(seen, solution.x, half, strict=True)

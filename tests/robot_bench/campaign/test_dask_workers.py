@@ -7,6 +7,7 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -20,7 +21,7 @@ from robot_bench.campaign.workers.dask_workers import DaskWorkers
 from robot_bench.campaign.workers.processes import Processes
 from simbase.errors import UsageError
 
-pytest.importorskip("distributed")
+pytestmark = pytest.mark.skipif(find_spec("distributed") is None, reason="the extra campaign is not installed")
 
 FILE = """
 scenario = "dodge"

@@ -2,6 +2,7 @@
 
 import json
 import math
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from robot_bench.experiments.sensitivity import Design, Range, outcome_names, read_range
 from simbase.errors import UsageError
 
-pytest.importorskip("SALib")
+pytestmark = pytest.mark.skipif(find_spec("SALib") is None, reason="the extra experiments is not installed")
 
 
 def design(*ranges: Range, steps: int = 5, trajectories: int = 20) -> Design:

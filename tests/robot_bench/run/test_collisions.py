@@ -1,6 +1,10 @@
 """A failed run says what was hit, where and when: on the command line, in summary, trace, state log, page and plan."""
 
+import contextlib
+import io
 import json
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -36,13 +40,32 @@ def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.chdir(tmp_path)
 
 
+def crashed(folder: Path, body: str, mode: str) -> str:
+    """Return what a run into a folder prints; it fails, for it hits the crate."""
+    scenario, out = folder.with_name("crash.toml"), io.StringIO()
+    scenario.write_text(SCENARIO.format(duration_s=8.9), encoding="utf-8")
+    with contextlib.redirect_stdout(out):
+        assert p2os(["run", str(scenario), "--body", body, "--mode", mode, "--out", str(folder)]) == 1
+    return out.getvalue()
+
+
+@pytest.fixture(scope="module")
+def crash(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, str], tuple[Path, str]]:
+    """Return a function that runs into the crate on a body, in a mode: the folder of that run and what it printed."""
+
+    @cache
+    def run(body: str, mode: str) -> tuple[Path, str]:
+        folder = tmp_path_factory.mktemp("crash") / "run"
+        return folder, crashed(folder, body, mode)
+
+    return run
+
+
 @pytest.mark.parametrize("mode", ["direct", "adapter"])
 @pytest.mark.parametrize("body", each_body())
-def test_what_was_hit_is_named_everywhere(body: str, mode: str, capsys: pytest.CaptureFixture[str]) -> None:
-    Path("crash.toml").write_text(SCENARIO.format(duration_s=8.9), encoding="utf-8")
-    assert p2os(["run", "crash.toml", "--body", body, "--mode", mode, "--out", "crash"]) == 1
-    out = capsys.readouterr().out
-    record = read_run(Path("crash"))
+def test_what_was_hit_is_named_everywhere(body: str, mode: str, crash: Callable[[str, str], tuple[Path, str]]) -> None:
+    folder, out = crash(body, mode)
+    record = read_run(folder)
     (hit, *_) = record.contacts
     assert hit.what == "'red box'"
     assert hit.x_m == pytest.approx(-1.0, abs=0.02)
@@ -50,7 +73,7 @@ def test_what_was_hit_is_named_everywhere(body: str, mode: str, capsys: pytest.C
     assert first - 50_000_000 <= hit.t <= first
     assert out.count(str(hit)) == 1, "the goal that it fails names it"
     assert f"failed  no_collision: {len(record.contacts)} collision(s): {hit}" in out
-    summary = json.loads(Path("crash/summary.json").read_text(encoding="utf-8"))
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     assert summary["hits"][0] == {
         "t_s": hit.t / 1e9, "what": "'red box'", "x_m": hit.x_m, "y_m": hit.y_m, "part": hit.part,
     }  # fmt: skip
@@ -71,16 +94,14 @@ def test_what_no_goal_forbids_is_named_all_the_same(capsys: pytest.CaptureFixtur
 
 
 def test_a_run_that_hits_something_has_the_same_hash_each_time_and_logs_commands_and_stalls_in_mode_direct(
-    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path, crash: Callable[[str, str], tuple[Path, str]], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    Path("crash.toml").write_text(SCENARIO.format(duration_s=8.9), encoding="utf-8")
-    for folder in ("one", "two"):
-        assert p2os(["run", "crash.toml", "--body", "kinematic", "--mode", "direct", "--out", folder]) == 1
-    one, two = (read_run(Path(folder)) for folder in ("one", "two"))
+    again = tmp_path / "again"
+    crashed(again, "kinematic", "direct")
+    one, two = (read_run(folder) for folder in (crash("kinematic", "direct")[0], again))
     assert one.end["trace_sha256"] == two.end["trace_sha256"]
     log = [(event.what, event.detail) for event in one.events if event.who == "direct"]
     assert ("command", "motors 3, 3") in log
     assert ("stalled", "both wheels") in log
-    capsys.readouterr()
-    assert p2os(["report", "one"]) == 0
+    assert p2os(["report", str(again)]) == 0
     assert "red box" in capsys.readouterr().out

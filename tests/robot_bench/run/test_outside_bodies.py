@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import pytest
 
@@ -18,6 +17,7 @@ from p2os.pioneer.world.model import Obstacle
 from robot_bench import Bench
 from simbase.errors import UsageError
 from tests.p2os.pioneer.body.outside.served import Served, served, serving
+from tests.tools.made_once import made_once
 
 SOURCE = Path(__file__).parents[3] / "examples" / "outside_body"
 needs_compiler = pytest.mark.skipif(shutil.which("g++") is None, reason="g++ is not installed: apt-get install g++")
@@ -35,12 +35,14 @@ def started(*command: str | Path) -> Iterator[str]:
 
 
 @pytest.fixture(scope="module")
-def plan_view() -> Iterator[Path]:
-    with TemporaryDirectory(prefix="ob") as folder:
-        program = Path(folder, "plan_view")
+def plan_view(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    def build(folder: Path) -> Path:
+        program = folder / "plan_view"
         flags = ("-std=c++17", "-O1", "-Wall", "-Wextra", "-Werror", "-fsanitize=undefined", "-fno-sanitize-recover")
         subprocess.run(["g++", *flags, "-o", program, SOURCE / "plan_view.cpp"], check=True, timeout=100)
-        yield program
+        return program
+
+    return made_once(tmp_path_factory, "plan-view", build)
 
 
 def bench_with(body: str, mode: str = "adapter", seconds: float = 6) -> Bench:

@@ -75,7 +75,7 @@ def test_process_hash_seed_and_folder_change_nothing(tmp_path: Path) -> None:
         folder = tmp_path / name
         folder.mkdir()
         done = subprocess.run(
-            [python, "-c", RUNS, " ".join(MODES), " ".join(bodies), "--duration", "5s"], cwd=folder,
+            [python, "-c", RUNS, " ".join(MODES), " ".join(bodies), "--duration", "3.5s"], cwd=folder,
             env={**os.environ, **environment}, capture_output=True, text=True, check=False, timeout=300,
         )  # fmt: skip
         assert done.returncode == 0, done.stderr
