@@ -63,7 +63,8 @@ def test_a_run_folder_is_shrunk_to_a_folder_whose_scenario_and_test_fail_in_the_
     assert names == {"blind.toml", "dodge.elf", "world.toml", "test_blind.py", "explained.txt", "scene.png", "run"}
     assert "east wall" in Path("small/explained.txt").read_text(encoding="utf-8")
     assert cli.run(["shrink", "small/blind.toml", "--out", "small"]) == 2, "nothing is written over"
-    pytest_here = [forked_python(), "-c", PYTEST, "-q", "-p", "no:cacheprovider", "small"]
+    options = ["-q", "-p", "no:cacheprovider", "--bench-record", "none"]
+    pytest_here = [forked_python(), "-c", PYTEST, *options, "small"]
     ran = subprocess.run(pytest_here, capture_output=True, text=True, timeout=120, check=False)
     assert ran.returncode == 1
     assert "test_blind_touches_nothing" in ran.stdout
