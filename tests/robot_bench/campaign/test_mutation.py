@@ -216,7 +216,7 @@ import pytest
 
 @pytest.mark.scenario("mine.toml")
 def test_the_wire_rises(bench, pytestconfig):
-    assert (pytestconfig.rootpath / "mine.toml").is_file(), "they are run from where they stand"
+    assert pytestconfig.rootpath == pytestconfig.invocation_params.dir, "they are run from where they stand"
     bench.expect("pin PB12 high", within="10 ms")
 
 @pytest.mark.scenario("mine.toml")
