@@ -17,7 +17,6 @@ import hashlib
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -43,6 +42,7 @@ from robot_bench.running.pacer import PACED_SLICE_NS, RealTimePacer
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.wires.ports import Chip
 from simbase.errors import P2osError, UsageError
+from simbase.installation import installed_version
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 from simbase.user_classes import unforeseen
 
@@ -222,7 +222,7 @@ def meta_of(scenario: Scenario, world: World | None, note: str | None, *, is_at_
     place = "the real one" if is_at_port else str(scenario.world)
     start = Pose(0.0, 0.0, 0.0) if world is None else scenario.start or world.start
     return {
-        "version": version("p2os"),
+        "version": installed_version(),
         "scenario": scenario.name,
         "description": scenario.description,
         "text": scenario.text,

@@ -9,10 +9,21 @@ import json
 import shlex
 import shutil
 import sys
-from importlib.metadata import PackageNotFoundError, distribution, requires
+from functools import cache
+from importlib.metadata import PackageNotFoundError, distribution, requires, version
 from pathlib import Path
 
 _DISTRIBUTION = "p2os"
+
+
+@cache
+def installed_version() -> str:
+    """Return the version of p2os, read from the installed metadata once.
+
+    Raises:
+        PackageNotFoundError: It is not installed.
+    """
+    return version(_DISTRIBUTION)
 
 
 def install_command(extra: str = "", *, python: str = "") -> str:

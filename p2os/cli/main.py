@@ -15,7 +15,7 @@ import os
 import sys
 import traceback
 from collections.abc import Iterable, Mapping, Sequence
-from importlib.metadata import EntryPoint, entry_points, version
+from importlib.metadata import EntryPoint, entry_points
 from typing import Annotated
 
 import typer
@@ -24,7 +24,7 @@ from p2os.cli.help_pages import VerbList, dress
 from p2os.cli.printing import restored_output
 from p2os.cli.signals import end_on_signals, ignore_signals, restored_signals
 from simbase.errors import MissingDependencyError
-from simbase.installation import install_command
+from simbase.installation import install_command, installed_version
 from simbase.user_classes import unforeseen
 
 GROUP = "p2os.verbs"
@@ -217,7 +217,7 @@ def _add_missing(app: typer.Typer, name: str, error: ImportError) -> None:
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        typer.echo(version("p2os"))
+        typer.echo(installed_version())
         raise typer.Exit
 
 

@@ -23,7 +23,6 @@ snapshot was taken of.
 import pickle
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
-from importlib.metadata import version
 from pathlib import Path
 from typing import Self, Unpack, cast
 
@@ -78,6 +77,7 @@ from robot_bench.wires.line_ends import AdapterPart, ControllerPart
 from robot_bench.wires.nets import Harness
 from robot_bench.wires.ports import Chip
 from simbase.errors import UsageError
+from simbase.installation import installed_version
 from simbase.state import PartState, Stateful
 from simbase.timing import NS_PER_S, Nanos, Reached
 
@@ -526,7 +526,7 @@ class Bench(Expectations, Interventions, Stateful):
             paths[name] = None if bench.trace.path is None else bench.trace.path.absolute()
         slice_ns = self.loop.slice_ns if self._slices is None else None
         recipe = pickle.dumps((self._whole, self.scenario.name, slice_ns, paths, self.snapshot()))
-        return _built_anew, (version("p2os"), recipe)
+        return _built_anew, (installed_version(), recipe)
 
     def _watch_wires(self, now: Nanos) -> None:
         """Let an edge end the chip's slice where a part may change an input before its own next deadline."""
@@ -595,7 +595,7 @@ def _built_anew(saved_by: str, recipe: bytes) -> Bench:
     Raises:
         UsageError, FileError: As of `Bench.restore`.
     """
-    refuse_others({VERSION: saved_by}, {VERSION: version("p2os")})
+    refuse_others({VERSION: saved_by}, {VERSION: installed_version()})
     try:
         scenario, name, slice_ns, paths, snapshot = pickle.loads(recipe)  # noqa: S301 - within a pickle already
         traces = {one: TraceWriter(path, goes_on=path is not None) for one, path in paths.items()}

@@ -5,7 +5,6 @@ Invariant: two benches of one origin that are in one state have one future.
 
 import hashlib
 from collections.abc import Mapping
-from importlib.metadata import version
 
 from p2os.pioneer.body.factory import resolve_body
 from p2os.pioneer.world.model import World
@@ -13,6 +12,7 @@ from robot_bench.adapter import RUN_ANEW
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.wires.ports import Chip
 from simbase.errors import UsageError
+from simbase.installation import installed_version
 
 VERSION = "version of p2os"
 #: What decides a run besides its files; its end and its goals may be others after a restart.
@@ -28,7 +28,7 @@ LATER = ("changes", "faults")
 def origin_of(scenario: Scenario, world: World, chip: Chip) -> dict[str, object]:
     """Return what a bench is made of, each under its name for a person."""
     return {
-        VERSION: version("p2os"),
+        VERSION: installed_version(),
         "firmware": getattr(getattr(chip, "image", chip), "sha256", type(chip).__name__),
         "world": hashlib.sha256(repr(world).encode()).hexdigest(),
         "body": resolve_body(scenario.body),

@@ -14,7 +14,6 @@ import shlex
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib.metadata import version
 from pathlib import Path
 
 from robot_bench.campaign.campaign_file import Campaign
@@ -25,6 +24,7 @@ from robot_bench.campaign.space import Space
 from robot_bench.campaign.variants.diversity import FailureSet
 from simbase.errors import MissingDependencyError
 from simbase.files import writing
+from simbase.installation import installed_version
 
 RESULTS, FAILURES = "results", "failures"
 
@@ -85,7 +85,7 @@ class Results:
             "verdict": outcome.verdict.value, "margin": run.margin, "seed": run.trial.seed,
             "search": self._campaign.search, "campaign_seed": self._campaign.seed,
             "trial_sha256": run.trial.sha256, "trace_sha256": outcome.sha256,
-            "firmware_sha256": hashlib.sha256(firmware).hexdigest(), "p2os": version("p2os"),
+            "firmware_sha256": hashlib.sha256(firmware).hexdigest(), "p2os": installed_version(),
             "virtual_s": outcome.virtual_ns / 1e9, "cpu_s": run.cpu_s, "distance_m": outcome.distance_m,
             "clearance_m": outcome.clearance_m, "contacts": len(outcome.hits), "failures": list(outcome.failures),
             "blocks": len(outcome.blocks), "states": len(outcome.lines), "new": row.new,

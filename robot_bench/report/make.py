@@ -48,6 +48,15 @@ def make_report(folder: Path) -> ReportFiles:
     return _report_of(read_run(folder), folder, plots=True)
 
 
+def make_scene(record: RunRecord, path: Path) -> None:
+    """Write a picture of a run's world and path; nothing is written where Matplotlib is not installed."""
+    try:
+        from robot_bench.report.plots import write_scene
+    except ModuleNotFoundError:
+        return
+    write_scene(page_data(record), path)
+
+
 def _report_of(record: RunRecord, folder: Path, *, plots: bool) -> ReportFiles:
     page = folder / REPORT_NAME
     drawn = page_data(record)

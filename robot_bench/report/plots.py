@@ -50,6 +50,11 @@ def write_plots(data: Json, folder: Path) -> tuple[Path, ...]:
     return tuple(written)
 
 
+def write_scene(data: Json, path: Path) -> None:
+    """Write `path.png` alone, under any name."""
+    _paint(_path_figure(data), path)
+
+
 def _paint(figure: Figure, path: Path) -> None:
     FigureCanvasAgg(figure)
     figure.savefig(path, dpi=DOTS_PER_INCH, metadata={"Software": None})

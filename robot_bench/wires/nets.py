@@ -205,7 +205,7 @@ class Net(Stateful):
 
     def wave(self, at: Nanos) -> Wave | None:
         """Return the wave that is on the wire at the instant `at`; None where it has a level."""
-        found = self._shown(at)
+        found = self._may_wave and self._shown(at)
         return None if isinstance(found, bool) else found
 
     def course(self, begin: Nanos, end: Nanos) -> list[tuple[Nanos, bool | Wave]]:

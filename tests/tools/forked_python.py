@@ -46,8 +46,9 @@ NOT_COMPARED = ("PYTHONPATH",)
 OF_THE_SHELL = ("--install-completion", "--show-completion")
 #: Modules that act on what is imported after them.
 IMPORTING = ("pytest",)
-#: For `-c`: pytest as it is imported here, its plugins too, with no assertion of theirs rewritten.
-PYTEST = "import pytest, sys; sys.exit(pytest.main(sys.argv[1:]))"
+#: For `-c`: pytest as it is imported here, its plugins too, with no assertion of theirs rewritten; without that of
+#: hypothesis, which imports all of it for 0.1 s to say at the end that it has nothing to say.
+PYTEST = 'import pytest, sys; sys.exit(pytest.main(["-p", "no:hypothesispytest", *sys.argv[1:]]))'
 #: What commands import at their work, beside the verbs and what those import.
 IMPORTED = (
     "p2os.__main__", "typer._adapters", "p2os.pioneer.body.kinematic", "robot_bench.scenarios",

@@ -13,7 +13,6 @@ Invariant: what comes of a trial depends on the trial alone; it is handed on exa
 import contextlib
 import time
 from collections.abc import Callable, Sequence
-from importlib.metadata import version
 from typing import Any
 
 from p2os.errors import RunFailedError
@@ -23,6 +22,7 @@ from robot_bench.campaign.workers.beginnings import Beginnings, Saved, Work, Wor
 from robot_bench.campaign.workers.processes import MB, MOST_TRIES
 from robot_bench.running.forks import LOOK_S
 from simbase.errors import MissingDependencyError, UsageError
+from simbase.installation import installed_version
 from simbase.user_classes import unforeseen
 
 #: chosen: so long a scheduler may be away, and workers may be missing, seconds.
@@ -175,9 +175,11 @@ def run_limited(work: Work, limits: Limits) -> tuple[Outcome | list[Saved], floa
         outcome = work(look)
     except Exception as error:  # noqa: BLE001  # a bug there is an error of this trial, told by its name
         outcome = Outcome(verdict=Verdict.ERROR, failures=(unforeseen(error),))
-    return outcome, round(time.thread_time() - began, 3), version("p2os")
+    return outcome, round(time.thread_time() - began, 3), installed_version()
 
 
 def _refuse_other(there: str) -> None:
-    if there != version("p2os"):
-        raise UsageError(f"a worker has p2os {there}, and this is {version('p2os')}", hint="install the same one there")
+    if there != installed_version():
+        raise UsageError(
+            f"a worker has p2os {there}, and this is {installed_version()}", hint="install the same one there"
+        )

@@ -46,6 +46,17 @@ def test_an_elf_brings_its_symbols() -> None:
     assert image.symbols.address_of("no such name") is None
 
 
+def test_what_a_file_holds_is_read_once_whatever_it_is_called() -> None:
+    one, other, again = (parse_image(FIRMWARE.read_bytes(), name) for name in ("a.elf", "b.elf", "a.elf"))
+    assert (one.name, other.name) == ("a.elf", "b.elf")
+    assert other.symbols is one.symbols
+    assert again == one
+    with pytest.raises(ImageError, match=r"^a\.bin: "):
+        parse_image(b"\xff" * 64, "a.bin")
+    with pytest.raises(ImageError, match=r"^b\.bin: "):
+        parse_image(b"\xff" * 64, "b.bin")
+
+
 def test_an_intel_hex_file_may_start_behind_a_boot_loader() -> None:
     program = struct.pack("<II", 0x2000_5000, 0x0800_2009) + b"\xfe\xe7" * 4
     image = parse_image(hex_file(0x0800_2000, program), "a.hex")

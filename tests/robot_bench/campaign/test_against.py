@@ -39,8 +39,8 @@ threshold_m = [0.6]
 SCENARIO = """
 extends = "dodge"
 body = "kinematic"
-duration_s = 9.0
-start = { x_m = 2.0, y_m = 0.0, heading_deg = 0.0 }
+duration_s = 6.0
+start = { x_m = 2.5, y_m = 0.0, heading_deg = 0.0 }
 [[goal]]
 kind = "no_collision"
 """

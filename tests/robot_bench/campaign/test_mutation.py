@@ -146,14 +146,22 @@ def test_the_command_prints_a_score_that_is_the_least_one_and_the_survivors_in_8
     assert "movs r1, #8 -> movs r1, #9" not in out
 
 
-def test_a_score_below_the_least_one_fails() -> None:
-    assert cli.run(["mutate", "x.bin", "mine.toml", "-j", "2", "--fail-under", "40.1%"]) == 1
+def test_a_score_below_the_least_one_fails(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """The command above has tried them: here two of each five are noticed."""
+
+    def try_all(tried: list[Mutant], *_: object) -> tuple[list[Found], list[str], bool]:
+        return [Found(Fate.MISSED if place % 5 < 2 else Fate.SURVIVED) for place in range(len(tried))], [], True
+
+    monkeypatch.setattr("robot_bench.cli.campaigns.mutate._try_all", try_all)
+    for least, code in (("40%", 0), ("40.1%", 1)):
+        assert cli.run(["mutate", "x.bin", "mine.toml", "--sample", "10", "--fail-under", least]) == code
+        assert "score 40.0 %" in capsys.readouterr().out
 
 
 def test_a_sample_is_drawn_by_its_seed_and_json_junit_and_files_have_the_same(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    words = ["mutate", "x.bin", "mine.toml", "--sample", "8", "--json"]
+    words = ["mutate", "x.bin", "mine.toml", "--sample", "5", "--json"]
     assert cli.run([*words, "-j", "1", "--junit", "r.xml", "--write", "wrong"]) == 0
     one = json.loads(capsys.readouterr().out)
     assert cli.run([*words, "-j", "2"]) == 0
@@ -162,7 +170,7 @@ def test_a_sample_is_drawn_by_its_seed_and_json_junit_and_files_have_the_same(
     assert json.loads(capsys.readouterr().out)["mutants"] != one["mutants"]
     fates = Counter(mutant["fate"] for mutant in one["mutants"])
     suite = ET.fromstring(Path("r.xml").read_text(encoding="utf-8"))  # noqa: S314 - our own file
-    assert (one["tried"], suite.get("tests"), suite.get("failures")) == (8, "8", str(fates["survived"]))
+    assert (one["tried"], suite.get("tests"), suite.get("failures")) == (5, "5", str(fates["survived"]))
     assert len(list(Path("wrong").iterdir())) == fates["survived"] > 0
     assert cli.run(["run", "mine.toml", "--firmware", str(next(Path("wrong").iterdir()))]) == 0
 
@@ -207,7 +215,8 @@ SUITE = """
 import pytest
 
 @pytest.mark.scenario("mine.toml")
-def test_the_wire_rises(bench):
+def test_the_wire_rises(bench, pytestconfig):
+    assert pytestconfig.rootpath == pytestconfig.invocation_params.dir, "they are run from where they stand"
     bench.expect("pin PB12 high", within="10 ms")
 
 @pytest.mark.scenario("mine.toml")

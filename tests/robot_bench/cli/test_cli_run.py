@@ -18,8 +18,8 @@ from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.recording.run_record import read_run
 from robot_bench.scenario.scenario import load_scenario
 from tests.robot_bench.firmware import thumb
+from tests.tools.forked_python import forked_p2os
 
-COMMAND = [sys.executable, "-m", "p2os"]
 QUICK = ["--mode", "direct", "--body", "kinematic", "--duration", "0.2s"]
 #: What `run --json` prints at the least.
 KEYS = {
@@ -218,8 +218,9 @@ def started(duration_s: float, *words: str) -> subprocess.Popen[str]:
     """A run in a process of its own that has begun to write."""
     scenario = make(thumb.SLEEP, LEAST.replace("0.2", str(duration_s)))
     process = subprocess.Popen(
-        [*COMMAND, "run", scenario, "--out", "there", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+        forked_p2os("run", scenario, "--out", "there", *words),
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
     deadline = time.monotonic() + 60
     while time.monotonic() < deadline:
         if Path("there/trace.jsonl").is_file() and Path("there/trace.jsonl").read_bytes().count(b"\n") > 60:

@@ -14,7 +14,10 @@ from xml.etree import ElementTree as ET
 import pytest
 
 from p2os.cli.main import run as p2os
+from robot_bench.cli.run import sweep_rows
+from robot_bench.cli.sweep import Done, print_sweep
 from robot_bench.cli.workers import run_in_processes
+from robot_bench.scenario.scenario import load_scenario
 from tests.robot_bench.firmware import thumb
 
 LEAST = 'firmware = "x.bin"\nworld = "room"\nduration_s = 0.2\nbody = "kinematic"\nmode = "direct"\n'
@@ -84,13 +87,31 @@ def test_seeds_that_make_no_difference_are_told_of(capsys: pytest.CaptureFixture
     assert "made no difference" not in capsys.readouterr().out
 
 
+def test_of_runs_of_which_none_is_kept_no_folder_is_left(capsys: pytest.CaptureFixture[str]) -> None:
+    name = make(LEAST.replace("0.2", "0.001") + RIGHT + "[sweep]\nstart.x_m = [-0.5, 0.5]\n")
+    assert p2os(["run", name, "--keep", "none", "-j", "2"]) == 1
+    assert capsys.readouterr().out.splitlines()[-1] == "1 passed, 1 failed of 2"
+    assert not any(Path("runs").iterdir())
+
+
+def printed(seeds: str, capsys: pytest.CaptureFixture[str]) -> list[str]:
+    """Return what is printed of a sweep whose runs have failed where they began left of the y axis."""
+    name = make(LEAST + RIGHT + "[sweep]\nstart.x_m = [-0.5, 0.5]\n")
+    rows = sweep_rows(name, load_scenario(name), {}, seeds)
+    passed = [dict(row.settings)["start.x_m"] == 0.5 for row in rows]
+    outcomes = [{"passed": one, "failures": [] if one else ["stay_within: it did not"]} for one in passed]
+    print_sweep(Done(rows, outcomes, was_interrupted=False, folder=Path("runs")))
+    return capsys.readouterr().out.splitlines()
+
+
 def test_of_many_runs_the_table_has_a_line_for_all_seeds_of_a_row(capsys: pytest.CaptureFixture[str]) -> None:
-    text = LEAST.replace("0.2", "0.001") + RIGHT + "[sweep]\nstart.x_m = [-0.5, 0.5]\n"
-    assert p2os(["run", make(text), "--seeds", "0-18,30,40", "--keep", "none", "-j", "2"]) == 1
-    out = capsys.readouterr().out.splitlines()
+    out = printed("0-18,30,40", capsys)
     assert [line.split() for line in out[1:3]] == [["-0.5", "0", "21", "0-18,", "30,", "40"], ["0.5", "21", "21"]]
     assert "and 9 more; --json and --junit have all" in out
-    assert not any(Path("runs").iterdir())
+    assert out[-1] == "21 passed, 21 failed of 42"
+    assert [line.split()[:3] for line in printed("0-19", capsys)[1:41:20]] == [
+        ["-0.5", "0", "failed"], ["0.5", "0", "passed"],
+    ], "forty have a line each"  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -180,8 +201,7 @@ def test_forks_end_by_themselves_when_their_parent_is_killed(tmp_path: Path) -> 
 
 
 def _children(pid: int) -> list[int]:
-    found = subprocess.run(["pgrep", "-P", str(pid)], capture_output=True, text=True, check=False).stdout
-    return [int(word) for word in found.split()]
+    return [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="ascii").split()]
 
 
 def _is_running(pid: int) -> bool:

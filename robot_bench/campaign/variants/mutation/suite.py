@@ -72,10 +72,11 @@ def run_suite(paths: Sequence[Path], firmware: Path) -> SuiteRun:
     import pytest
 
     watch = _Watch()
-    # Whether a test fails is all that is asked: pytest need not rewrite what it asserts to say why.
-    words = ["-x", "-q", "--assert=plain", "-p", "no:cacheprovider", "--bench-record", "none"]
+    # Whether a test fails is all that is asked: pytest need not rewrite what it asserts, nor read sources to say why.
+    # In one word with its option the program's path is none that pytest begins to collect at.
+    words = ["-x", "-q", "--assert=plain", "--tb=no", "-p", "no:cacheprovider", "--bench-record=none"]
     with _silent():
-        code = int(pytest.main([*words, "--firmware", str(firmware), *map(str, paths)], plugins=[watch]))
+        code = int(pytest.main([*words, f"--firmware={firmware}", *map(str, paths)], plugins=[watch]))
     watch.found.sha256 = watch.digest.hexdigest()
     if code == _FAILED:
         watch.found.failed = watch.found.failed or "a test"

@@ -14,7 +14,6 @@ Invariant: `is_confirmed` means that the other process left the trace of this on
 import hashlib
 import json
 import re
-import shutil
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -29,7 +28,7 @@ from robot_bench.campaign.trial import Outcome, Trial, Verdict, run_trial, trial
 from robot_bench.campaign.variants.shrinking.failure import Way
 from robot_bench.campaign.variants.shrinking.things import WORLD_NAME
 from robot_bench.recording.run_record import TRACE_NAME, RunRecord, read_run
-from robot_bench.report import make_report
+from robot_bench.report import make_scene
 from robot_bench.report.explain.explain import explain
 from simbase.errors import FileError, P2osError, UsageError
 
@@ -74,14 +73,14 @@ def keep(trial: Trial, way: Way, folder: Path) -> Kept:
             capture_output=True, text=True, timeout=_MOST_S, check=False,
         )  # fmt: skip
         there = json.loads(found.stdout) if found.stdout.startswith("{") else {}
+        record = None
         if (folder / RUN_NAME / TRACE_NAME).is_file():  # several robots have one each
-            for plot in make_report(folder / RUN_NAME).plots:
-                if plot.name == "path.png":
-                    shutil.copy(plot, folder / "scene.png")
+            record = read_run(folder / RUN_NAME)
+            make_scene(record, folder / "scene.png")
     except (OSError, ValueError) as error:
         raise FileError(f"cannot keep {scenario}: {error}") from error
     here = run_trial(trial)
-    explained = _explained(folder, trial)
+    explained = "" if record is None else _explained(record, folder / trial.firmware_name)
     if explained:
         (folder / "explained.txt").write_text(f"{explained}\n", encoding="utf-8")
     hashes = there.get("trace_sha256") or there.get("sha256")
@@ -159,11 +158,10 @@ def _refuse_another(record: RunRecord, trial: Trial, folder: Path, firmware: Pat
         raise UsageError(f"the program of {folder} was built anew since", hint="--firmware FILE takes another one")
 
 
-def _explained(folder: Path, trial: Trial) -> str:
+def _explained(record: RunRecord, firmware: Path) -> str:
     try:
-        record = read_run(folder / RUN_NAME)
-        return explain(record, folder / trial.firmware_name).text()
-    except P2osError:  # several robots have a run folder each
+        return explain(record, firmware).text()
+    except P2osError:  # a robot on pins of its own
         return ""
 
 
