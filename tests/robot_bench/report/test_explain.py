@@ -91,17 +91,18 @@ def test_answers_that_change_from_time_to_time_count_neither_way() -> None:
 ROWS = st.lists(st.integers(0, 2), max_size=40)
 
 
-@given(common=ROWS, ours=ROWS, theirs=ROWS, has_more=st.booleans())
+@given(common=ROWS, ours=ROWS, theirs=ROWS, has_more=st.tuples(st.booleans(), st.booleans()))
 def test_the_first_row_that_differs_is_found(
-    common: list[int], ours: list[int], theirs: list[int], has_more: bool
+    common: list[int], ours: list[int], theirs: list[int], has_more: tuple[bool, bool]
 ) -> None:
-    """Where one has more rows than were recorded, the end of the other is no difference."""
+    """Where the one that ends has more rows than were recorded, its end is no difference."""
     ours, theirs = common + ours, common + theirs
     one, other = (
-        Seen(packed_rows=b"".join(RECORD.pack(n, 0, row) for n, row in enumerate(rows)), has_more_rows=has_more)
-        for rows in (ours, theirs)
+        Seen(packed_rows=b"".join(RECORD.pack(n, 0, row) for n, row in enumerate(rows)), has_more_rows=more)
+        for rows, more in zip((ours, theirs), has_more, strict=True)
     )
-    pairs = (zip if has_more else zip_longest)(ours, theirs)
+    ends_with_more = has_more[0] if len(ours) < len(theirs) else has_more[1]
+    pairs = (zip if ends_with_more else zip_longest)(ours, theirs)
     assert first_row(one, other) == next((n for n, (a, b) in enumerate(pairs) if a != b), None)
     assert [row[2] for row in one.rows] == ours
     assert all(one.row(n) == (n, 0, row) for n, row in enumerate(ours))
