@@ -25,6 +25,7 @@ from robot_bench.report.explain.findings import injected, let_go
 from robot_bench.report.explain.probing import Answer, first_row
 from robot_bench.report.explain.replay import ChipReplay, Hold, Seen
 from robot_bench.report.explain.scene import Scene
+from robot_bench.report.make import Files
 from robot_bench.run import run_scenario
 from robot_bench.scenario.scenario import load_scenario
 from robot_bench.wires.edges import Edges
@@ -40,7 +41,7 @@ def run_with(firmware: Path, folder: Path, thing: str, duration_s: float, placed
     """Run a firmware in the scenario of the seeded bugs and return its record."""
     plan = folder / "plan.toml"
     plan.write_text(scenario_text(thing, duration_s, placed_s))
-    run_scenario(load_scenario(str(plan), firmware=firmware), folder / "run", explained=False)
+    run_scenario(load_scenario(str(plan), firmware=firmware), folder / "run", files=Files.SUMMARY)
     return read_run(folder / "run")
 
 
@@ -164,7 +165,7 @@ def test_the_replay_of_a_chip_is_the_run_and_a_held_pin_changes_it(unfair: Path)
 def test_the_replay_has_the_memory_and_the_crystal_of_the_run(tmp_path: Path) -> None:
     plan = tmp_path / "plan.toml"
     plan.write_text('sram = "random"\ncrystal_ppm = 900\n' + scenario_text(UNFAIR, 4.0, 1.0))
-    run_scenario(load_scenario(str(plan), firmware=DODGE), tmp_path / "run", explained=False)
+    run_scenario(load_scenario(str(plan), firmware=DODGE), tmp_path / "run", files=Files.SUMMARY)
     record = read_run(tmp_path / "run")
     replay = ChipReplay(DODGE, record)
     assert replay.exact_until == replay.end == record.last_ns

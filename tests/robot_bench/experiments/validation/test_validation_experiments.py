@@ -16,6 +16,7 @@ from robot_bench.events.codec import Json
 from robot_bench.experiments.validation.experiments import CODES, EXPERIMENTS
 from robot_bench.experiments.validation.figures import LOOSE_BECAUSE, Figure, loose
 from robot_bench.experiments.validation.trials import Result, Variant, run_trials, told, variants
+from robot_bench.report.make import Files
 from robot_bench.scenario.included_files import Setting
 from tests.tools.forked_python import forked_p2os
 
@@ -36,7 +37,9 @@ def here(job: Callable[[int, Callable[[], None]], Json], count: int, on_done: Ca
 def results_of(
     names: Sequence[str], chosen: Sequence[Variant], folder: Path, settings: Sequence[Setting] = ()
 ) -> list[Result]:
-    return run_trials([EXPERIMENTS[name] for name in names], chosen, folder, settings=settings, in_processes=here)
+    return run_trials(
+        [EXPERIMENTS[name] for name in names], chosen, folder, settings=settings, in_processes=here, files=Files.SUMMARY
+    )
 
 
 @pytest.fixture(scope="module")

@@ -12,6 +12,7 @@ from p2os.pioneer.world import load_world
 from p2os.robots.parameters import load_parameters
 from robot_bench.experiments.validation.experiments import EXPERIMENTS
 from robot_bench.experiments.validation.trials import PortRun, Result, port_runs, run_port
+from robot_bench.report.make import Files
 from robot_bench.run import RunResult, run_at_port
 from robot_bench.running.pacer import RealTimePacer
 
@@ -88,6 +89,8 @@ def at_port(
             settings=ControllerSettings(), faults=faults,
         )  # fmt: skip
         pacer = RealTimePacer(clock=clock.read, sleep=clock.sleep)
-        return run_at_port(run.scenario, place, VirtualLine(robot, clock, lasts_s), clock=clock.read, pacer=pacer)
+        return run_at_port(
+            run.scenario, place, VirtualLine(robot, clock, lasts_s), clock=clock.read, pacer=pacer, files=Files.SUMMARY
+        )
 
     return run_port(port_runs([EXPERIMENTS[name] for name in names], settings), drive, folder)
