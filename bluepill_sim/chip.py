@@ -319,10 +319,7 @@ class Chip(Stateful):
         self._time_changed()
         if self._is_complete:
             self.plan_match()
-        access = clocks.flash_wait_states, clocks.flash_prefetch
-        if access != self._flash_access:
-            self._flash_access = access
-            self.engine.forget_costs()
+        self._take_flash_access()
         if self._is_complete:
             self.parts.clock_changed()
         self.processor.stop_at_boundary()
@@ -419,13 +416,19 @@ class Chip(Stateful):
         self._on_warning(message, once, self.engine.access_pc if pc is None else pc)
 
     def _restored(self) -> None:
-        """Forget what was worked out before: due times, costs of blocks."""
-        self._flash_access = self.clocks.flash_wait_states, self.clocks.flash_prefetch
-        self.engine.forget_costs()
+        """Forget what was worked out before: due times, and costs of blocks at other wait states."""
+        self._take_flash_access()
         self._time_changed()
         self.fabric.resume()
 
     # Internals.
+
+    def _take_flash_access(self) -> None:
+        """Have blocks measured again where their costs depend on wait states that are others now."""
+        access = self.clocks.flash_wait_states, self.clocks.flash_prefetch
+        if access != self._flash_access:
+            self._flash_access = access
+            self.engine.forget_costs()
 
     def _time_changed(self) -> None:
         """Tell the fabric where cycles and nanoseconds are tied together."""

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from robot_bench.events.kinds import Event
     from robot_bench.recording.run_record import RunRecord, read_run
     from robot_bench.remote import RemoteBench
+    from robot_bench.report.make import Files
     from robot_bench.run import RunResult, run_at_port, run_scenario
     from robot_bench.scenario.goals.judging import Goal, Judgement
     from robot_bench.scenario.goals.watch import GoalKind, Outcome, Watch
@@ -31,6 +32,7 @@ __all__ = [
     "BenchParts",
     "Event",
     "ExpectationError",
+    "Files",
     "Goal",
     "GoalKind",
     "Judgement",
@@ -58,6 +60,7 @@ if not TYPE_CHECKING:
             "robot_bench.events.expectation": ("ExpectationError",),
             "robot_bench.recording.run_record": ("RunRecord", "read_run"),
             "robot_bench.remote": ("RemoteBench",),
+            "robot_bench.report.make": ("Files",),
             "robot_bench.run": ("RunResult", "run_at_port", "run_scenario"),
             "robot_bench.scenario.goals.judging": ("Goal", "Judgement"),
             "robot_bench.scenario.goals.watch": ("GoalKind", "Outcome", "Watch"),

@@ -36,7 +36,7 @@ from robot_bench.recording.run_record import TRACE_NAME, read_run
 from robot_bench.recording.summary import INTERRUPTED, end_of_a_broken_run, outcome_of, outcome_of_all
 from robot_bench.recording.trace import TraceWriter
 from robot_bench.remote import RemoteBench
-from robot_bench.report.make import Artefacts, make_artefacts, make_artefacts_of_all
+from robot_bench.report.make import Artefacts, Files, make_artefacts, make_artefacts_of_all
 from robot_bench.report.page_of_all import REPORT_NAME
 from robot_bench.running.pacer import PACED_SLICE_NS, RealTimePacer
 from robot_bench.scenario.scenario import Scenario
@@ -79,6 +79,7 @@ class RunResult:
 
     folder: Path
     outcome: Json
+    #: The page; the trace where no page was wanted.
     report: Path
     #: A signal ended it.
     was_interrupted: bool
@@ -104,7 +105,7 @@ def run_scenario(
     fail_under: float = 0.0,
     is_kept: Callable[[bool], bool] = lambda _passed: True,
     explained: bool = False,
-    plots: bool = False,
+    files: Files = Files.REPORT,
 ) -> RunResult:
     """Run a scenario in virtual time and make its run folder.
 
@@ -123,7 +124,7 @@ def run_scenario(
         fail_under: With `coverage`, the run fails where fewer percent of the lines ran; 0 asks for nothing.
         is_kept: Told whether the run passed; where it says no, nothing is made of the run and its folder is removed.
         explained: Whether the report says of a run that failed why (`p2os explain`), which takes some seconds.
-        plots: Whether the report's PNG plots are wanted, too.
+        files: How much is made of the run.
 
     Raises:
         P2osError: The folder is not free, a file cannot be read or written, or a part is not installed.
@@ -134,7 +135,7 @@ def run_scenario(
             raise UsageError("a debugger, coverage and profile are for a robot alone", hint="a scenario with one robot")
         return run_together(
             scenario, folder, slice_ns=slice_ns, speed=speed, on_progress=on_progress, clock=clock, force=force,
-            is_kept=is_kept, plots=plots,
+            is_kept=is_kept, files=files,
         )  # fmt: skip
     pacer = None if speed is None else RealTimePacer(speed=speed, clock=clock)
     with reserved(folder, force=force), _trace_of(scenario, folder, is_at_port=False) as trace:
@@ -144,7 +145,7 @@ def run_scenario(
         trace.meta(meta_of(scenario, bench.parts.world, bench.note, is_at_port=False))
         with _measured(bench.chip, coverage=coverage, profile=profile, fail_under=fail_under) as measurement:
             return _record(
-                bench, trace, folder, pacer, clock, drive, measurement, is_kept, explained=explained, plots=plots
+                bench, trace, folder, pacer, clock, drive, measurement, is_kept, explained=explained, files=files
             )
 
 
@@ -158,13 +159,14 @@ def run_at_port(
     pacer: RealTimePacer | None = None,
     drive: RunRemoteBench | None = None,
     force: bool = False,
+    files: Files = Files.REPORT,
 ) -> RunResult:
     """Drive the robot at a transport in real time (mode C), stop it, and make the run folder.
 
     The transport is closed in any case. A lost line, lag and a signal are failures of the run.
 
     With `drive`, a debugger runs the bench in place of its `run_until`; with `force`, the
-    run that the folder holds is overwritten.
+    run that the folder holds is overwritten; `files` says how much is made of the run.
 
     Raises:
         P2osError: The folder is not free, a file cannot be read or written, or a part is not installed.
@@ -182,11 +184,11 @@ def run_at_port(
 
         bench.on_slice = _after_slice(bench, None, on_progress)  # it keeps pace by itself
         trace.meta(meta_of(scenario, None, bench.note, is_at_port=True))
-        return _record(bench, trace, folder, pacer, clock, drive)
+        return _record(bench, trace, folder, pacer, clock, drive, files=files)
 
 
 def write_run(
-    bench: Bench, folder: Path, failure: str = "", *, explained: str = "", plots: bool = False
+    bench: Bench, folder: Path, failure: str = "", *, explained: str = "", files: Files = Files.REPORT
 ) -> Path:  # fmt: skip
     """Write what a bench with its trace in memory has recorded so far as a run folder; return its report's path.
 
@@ -195,7 +197,7 @@ def write_run(
         folder: Made where it is missing; a run that is there is overwritten.
         failure: Why it failed; empty where it did not.
         explained: What `why_failed` says of it; empty where nobody asked.
-        plots: Whether the report's PNG plots are wanted, too.
+        files: How much is made of the run.
 
     Raises:
         UsageError: The folder holds something that is no run, or is written by another run.
@@ -213,7 +215,7 @@ def write_run(
         trace.meta(meta)
         trace.copy(bench.recorder.lines())
         trace.end(end)
-        return make_artefacts(folder, plots=plots).report
+        return make_artefacts(folder, files).report
 
 
 def meta_of(scenario: Scenario, world: World | None, note: str | None, *, is_at_port: bool) -> Json:
@@ -350,12 +352,12 @@ def _record(
     is_kept: Callable[[bool], bool] = lambda _passed: True,
     *,
     explained: bool = False,
-    plots: bool = False,
+    files: Files = Files.REPORT,
 ) -> RunResult:
     """Run to the end, judge the goals, write the trace's last line, and make the rest of the folder."""
     driven = _drive(bench, pacer, clock, drive)
     passed = _conclude(bench, trace, folder, pacer, driven, measurement, explained=explained)
-    made = make_artefacts(folder, plots=plots) if is_kept(passed) else _removed(folder)
+    made = make_artefacts(folder, files) if is_kept(passed) else _removed(folder)
     _LOG.info("%s %s: %s", bench.scenario.name, "passed" if passed else "failed", made.report)
     return RunResult(folder=folder, outcome=made.outcome, report=made.report, was_interrupted=driven.was_interrupted)
 
@@ -444,7 +446,7 @@ def run_together(
     clock: Clock = wall_clock,
     force: bool = False,
     is_kept: Callable[[bool], bool] = lambda _passed: True,
-    plots: bool = False,
+    files: Files = Files.REPORT,
 ) -> RunResult:
     """Run a scenario with several robots: a run folder for each inside of `folder`, and there what came of all.
 
@@ -466,7 +468,7 @@ def run_together(
         driven = _drive(first, pacer, clock, None)
         passed = [_conclude(bench, traces[name], folder / name, pacer, driven) for name, bench in benches.items()]
         if is_kept(all(passed)):
-            made = make_artefacts_of_all(folder, list(benches), scenario.name, plots=plots)
+            made = make_artefacts_of_all(folder, list(benches), scenario.name, files)
         else:
             outcomes = {name: _removed(folder / name).outcome for name in benches}
             made = Artefacts(outcome=outcome_of_all(scenario.name, outcomes), report=folder / REPORT_NAME)

@@ -40,7 +40,7 @@ class BlockTable(Stateful):
     """Measured blocks."""
 
     STATE = ("uses_exclusive",)
-    DERIVED = ("plain", "_special", "_in_writable", "ran_writable", "entered")
+    DERIVED = ("plain", "_special", "_in_writable", "ran_writable", "holds_exclusive", "entered")
 
     def __init__(self, measure: Measure) -> None:
         self._measure = measure
@@ -53,8 +53,8 @@ class BlockTable(Stateful):
         self.writable: list[HostMemory] = []
         #: Whether code has run from writable memory.
         self.ran_writable = False
-        #: Whether a block takes exclusive reservations.
-        self.uses_exclusive = False
+        #: Whether a block takes exclusive reservations: one that has run, and one that is kept here.
+        self.uses_exclusive = self.holds_exclusive = False
         #: The first address of every block that this engine has ever entered; a snapshot takes none back.
         self.entered: set[int] = set()
 
@@ -70,7 +70,8 @@ class BlockTable(Stateful):
             if known is not None and known[0] == code:
                 return known[1]
         block = self._measure(address, size)
-        self.uses_exclusive |= block.has_exclusive
+        if block.has_exclusive:
+            self.uses_exclusive = self.holds_exclusive = True
         if code is not None:
             self.ran_writable = True
             self._in_writable[address] = code, block
@@ -85,6 +86,7 @@ class BlockTable(Stateful):
         self.plain.clear()
         self._special.clear()
         self._in_writable.clear()
+        self.holds_exclusive = False
 
     def forget_in(self, first: int, end: int) -> None:
         """Measure again the blocks of which something stands from `first` up to before `end`."""

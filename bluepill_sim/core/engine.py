@@ -451,7 +451,8 @@ class Engine(Stateful):
         self.block = NO_BLOCK
         if self._blocks.ran_writable:
             self._core.drop_all_code()
-            self._blocks.forget()
+        if self._blocks.ran_writable or self._blocks.holds_exclusive > self._blocks.uses_exclusive:
+            self.forget_costs()
 
     # Entering blocks.
 

@@ -11,6 +11,7 @@ from p2os.pioneer.body.factory import BEST
 from robot_bench.cli.progress import RunDisplay
 from robot_bench.cli.run import end_with
 from robot_bench.recording.run_folder import make_next_folder
+from robot_bench.report.make import Files
 from robot_bench.run import run_scenario
 from robot_bench.scenario.scenario import load_scenario
 from simbase.timing import NS_PER_S, Nanos
@@ -44,5 +45,5 @@ def demo(
     )  # fmt: skip
     folder = out or make_next_folder("demo")
     with RunDisplay() as display:
-        result = run_scenario(scenario, folder, on_progress=display.update, force=force, plots=True)
+        result = run_scenario(scenario, folder, on_progress=display.update, force=force, files=Files.PLOTS)
     end_with(result, json_output=json_output)

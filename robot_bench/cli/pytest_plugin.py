@@ -233,6 +233,7 @@ def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) ->
 def _record(item: pytest.Item, used: "Bench", report: Any, failure: str) -> None:
     """Write the run folder of a test, and tell where it is."""
     from bluepill_sim.errors import BluePillError
+    from robot_bench.report.make import Files
     from robot_bench.run import why_failed, write_run
     from simbase.errors import P2osError
 
@@ -243,7 +244,7 @@ def _record(item: pytest.Item, used: "Bench", report: Any, failure: str) -> None
         if said:
             with contextlib.suppress(P2osError, BluePillError):
                 why = why_failed(used, [said])
-        page = write_run(used, folder, said, explained=why, plots=True)
+        page = write_run(used, folder, said, explained=why, files=Files.PLOTS)
     except (P2osError, OSError) as error:  # a test's own outcome counts
         report.sections.append(("bench: no report", str(error)))
         return

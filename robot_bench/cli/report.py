@@ -11,7 +11,7 @@ from p2os.ros.bags import STORAGES
 from robot_bench.recording.event_files import write_named_events
 from robot_bench.recording.run_record import read_events, read_meta
 from robot_bench.recording.together import named_events, robots_in, scenario_of
-from robot_bench.report.make import make_artefacts, make_artefacts_of_all
+from robot_bench.report.make import Files, make_artefacts, make_artefacts_of_all
 from robot_bench.ros.run_bag import write_bag
 from simbase.errors import UsageError
 
@@ -66,9 +66,9 @@ def report(
         typer.echo(f"{events}: {count} events")
         return
     if names:
-        made = make_artefacts_of_all(folder, names, scenario_of(folder), plots=True)
+        made = make_artefacts_of_all(folder, names, scenario_of(folder), Files.PLOTS)
     else:
-        made = make_artefacts(folder, plots=True)
+        made = make_artefacts(folder, Files.PLOTS)
     if json_output:
         typer.echo(json.dumps(made.outcome, sort_keys=True))
         return

@@ -73,19 +73,15 @@ class _Reading:
 def latency_budget(drive: Drive) -> Budget:
     """Return the budget of a run; a step that a recording does not show has no times."""
     found = Budget()
-    readings = _readings(drive)
-    pins = sorted((at, number) for number, steps in drive.sensors.items() for at in steps.t_s[1:].tolist())
-    pin_times = [at for at, _ in pins]
+    pins = _pin_changes(drive)
+    pin_times = pins[0].tolist()
     motors = _motor_changes(drive)
     commands = sorted(at for name in SPEED_COMMANDS if name in drive.commands for at in changes(drive.commands[name]))
     onsets = {answer.command_s: answer.onset_s for answer in answers(drive)}
-    chains: dict[float, float] = {}
-    for at, number in pins:
-        brought = _last(readings.get(number - 1, ()), at)
-        if brought is not None:
-            found.steps[STEPS[0]].append(brought.packet_s - brought.ping_s)
-            found.steps[STEPS[1]].append(at - brought.packet_s)
-            chains[at] = brought.ping_s
+    at_s, ping_s, packet_s = pins[:, ~np.isnan(pins[1])]
+    found.steps[STEPS[0]] += (packet_s - ping_s).tolist()
+    found.steps[STEPS[1]] += (at_s - packet_s).tolist()
+    chains: dict[float, float] = dict(zip(at_s.tolist(), ping_s.tolist(), strict=True))
     for place, at in enumerate(motors):
         cause = _before(pin_times, at)
         # What the pins said before the last change of the motors was answered by that.
@@ -127,10 +123,21 @@ def _readings(drive: Drive) -> Mapping[int, Sequence[_Reading]]:
     return found
 
 
-def _last(readings: Sequence[_Reading], at_s: float) -> _Reading | None:
-    place = bisect_right(readings, at_s, key=lambda reading: reading.packet_s)
-    found = readings[place - 1] if place else None
-    return found if found is not None and at_s - found.packet_s <= LONGEST_S else None
+def _pin_changes(drive: Drive) -> Floats:
+    """Return when sensor pins changed, and when the ping and the packet were of the reading that each change answers.
+
+    Shape (3, n), seconds, in order of time, then of sensors; NaN where none had come in `LONGEST_S` before.
+    """
+    readings, found = _readings(drive), [np.empty((3, 0))]
+    for number in sorted(drive.sensors):
+        at_s = drive.sensors[number].t_s[1:]
+        rows = [(np.nan, -np.inf), *((one.ping_s, one.packet_s) for one in readings.get(number - 1, ()))]
+        ping_s, packet_s = np.array(rows, dtype=np.float64).T
+        place = np.searchsorted(packet_s, at_s, side="right") - 1
+        ping_s = np.where(at_s - packet_s[place] <= LONGEST_S, ping_s[place], np.nan)
+        found.append(np.array([at_s, ping_s, packet_s[place]]))
+    whole = np.concatenate(found, axis=1)
+    return np.asarray(whole[:, np.argsort(whole[0], kind="stable")], dtype=np.float64)
 
 
 def _before(times: Sequence[float], at_s: float) -> float | None:

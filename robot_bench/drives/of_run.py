@@ -3,6 +3,8 @@
 from collections.abc import Iterable, Iterator
 from typing import cast
 
+import numpy as np
+
 from p2os.capture import Chunk, Direction
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import ParametersError, load_parameters
@@ -11,6 +13,7 @@ from robot_bench.drives.of_packets import Told
 from robot_bench.events.kinds import Pose
 from robot_bench.recording.run_record import RunRecord
 from robot_bench.recording.signals import motor_steps
+from robot_bench.wires.edges import Edges
 from simbase.timing import NS_PER_S
 
 #: Sensors of the pin-out.
@@ -55,7 +58,7 @@ def drive_of_record(called: str, record: RunRecord, robot: str = "") -> Drive:
         for motor in (1, 2) if f"motor{motor}_comm1" in record.pins
     }  # fmt: skip
     drive.sensors = {
-        number: steps_of([(t / NS_PER_S, float(level)) for t, level in record.pins[f"DD{number}"]])
+        number: steps_of_edges(record.pins[f"DD{number}"])
         for number in range(1, SENSORS + 1) if f"DD{number}" in record.pins
     }  # fmt: skip
     _ = drive.body
@@ -65,6 +68,14 @@ def drive_of_record(called: str, record: RunRecord, robot: str = "") -> Drive:
 def trajectory_of(poses: Iterable[Pose]) -> Trajectory:
     """Return the poses of a trace as a trajectory."""
     return Trajectory.of_rows([(pose.t / NS_PER_S, pose.x_m, pose.y_m, pose.heading_rad) for pose in poses])
+
+
+def steps_of_edges(edges: Edges) -> Steps:
+    """Return the levels of a wire as steps; of several at one time the last counts."""
+    times = np.array(edges.times, dtype=np.int64)
+    is_last = np.append(times[1:] != times[:-1], np.ones(len(times[:1]), dtype=np.bool_))
+    levels = np.frombuffer(bytes(edges.levels), dtype=np.uint8)
+    return Steps(times[is_last] / NS_PER_S, levels[is_last].astype(np.float64))
 
 
 def _chunks_of(record: RunRecord) -> Iterator[Chunk]:

@@ -17,15 +17,27 @@ Invariant: nothing but the trace is read; what is there already is written anew.
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import IntEnum
 from pathlib import Path
 
 from robot_bench.events.codec import Json
-from robot_bench.recording.run_record import RunRecord, read_run
+from robot_bench.recording.run_record import TRACE_NAME, RunRecord, read_run
 from robot_bench.recording.summary import outcome_of_all, write_outcome
 from robot_bench.recording.waveforms import write_sigrok, write_vcd
 from robot_bench.report.page import page_data, render_page
 from robot_bench.report.page_of_all import REPORT_NAME, write_report_of_all
 from simbase.files import writing
+
+
+class Files(IntEnum):
+    """How much is made of a run; each holds what stands before it."""
+
+    #: summary.json beside the trace: for who reads runs by a program, or makes the rest of some by `p2os report`.
+    SUMMARY = 0
+    #: Waveforms, bytes, text, and the report.
+    REPORT = 1
+    #: The report's PNG plots, which take longer than all the rest.
+    PLOTS = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,7 +57,7 @@ def make_report(folder: Path) -> ReportFiles:
     Raises:
         TraceError: The folder holds no readable trace.
     """
-    return _report_of(read_run(folder), folder, plots=True)
+    return _report_of(read_run(folder), folder, Files.PLOTS)
 
 
 def make_scene(record: RunRecord, path: Path) -> None:
@@ -57,11 +69,11 @@ def make_scene(record: RunRecord, path: Path) -> None:
     write_scene(page_data(record), path)
 
 
-def _report_of(record: RunRecord, folder: Path, *, plots: bool) -> ReportFiles:
+def _report_of(record: RunRecord, folder: Path, files: Files) -> ReportFiles:
     page = folder / REPORT_NAME
     drawn = page_data(record)
     page.write_text(render_page(record, drawn), encoding="utf-8")
-    if not plots:
+    if files < Files.PLOTS:
         return ReportFiles(page=page, plots=())
     try:
         from robot_bench.report.plots import write_plots
@@ -75,42 +87,47 @@ class Artefacts:
     """What was made of a run."""
 
     outcome: Json
+    #: The page; the trace where no page was wanted.
     report: Path
 
 
-def make_artefacts(folder: Path, *, plots: bool = False) -> Artefacts:
-    """Write all that can be made from a run folder's trace, anew where it is there already.
+def make_artefacts(folder: Path, files: Files = Files.REPORT) -> Artefacts:
+    """Write what is made from a run folder's trace, anew where it is there already.
 
     Args:
         folder: The run's.
-        plots: The report's PNG plots, too, which take longer than all the rest.
+        files: How much.
 
     Raises:
         TraceError: The folder holds no readable trace.
         FileError: The disk is full, or the folder cannot be written.
     """
-    return _artefacts_of(read_run(folder), folder, plots=plots)
+    return _artefacts_of(read_run(folder), folder, files)
 
 
-def _artefacts_of(record: RunRecord, folder: Path, *, plots: bool) -> Artefacts:
+def _artefacts_of(record: RunRecord, folder: Path, files: Files) -> Artefacts:
     with writing(folder):
         outcome = write_outcome(record, folder)
+        if files < Files.REPORT:
+            return Artefacts(outcome=outcome, report=folder / TRACE_NAME)
         write_vcd(record, folder / "pins.vcd")
         write_sigrok(record, folder / "pins.sr")
         write_wire(record, folder / "wire.jsonl")
         (folder / "usart.txt").write_bytes(b"".join(data for _, data in record.usart))
-        report = _report_of(record, folder, plots=plots)
+        report = _report_of(record, folder, files)
     return Artefacts(outcome=outcome, report=report.page)
 
 
-def make_artefacts_of_all(folder: Path, names: Sequence[str], scenario: str, *, plots: bool = False) -> Artefacts:
-    """Write all that can be made from the traces of several robots: each one's, and the outcome and page of all.
+def make_artefacts_of_all(
+    folder: Path, names: Sequence[str], scenario: str, files: Files = Files.REPORT
+) -> Artefacts:  # fmt: skip
+    """Write what is made from the traces of several robots: so much of each one's, and the outcome and page of all.
 
     Raises:
         TraceError, FileError: As of `make_artefacts`.
     """
     records = {name: read_run(folder / name) for name in names}
-    made = {name: _artefacts_of(record, folder / name, plots=plots) for name, record in records.items()}
+    made = {name: _artefacts_of(record, folder / name, files) for name, record in records.items()}
     outcome = outcome_of_all(scenario, {name: one.outcome for name, one in made.items()})
     write_report_of_all(outcome, records, folder)
     return Artefacts(outcome=outcome, report=folder / REPORT_NAME)

@@ -16,6 +16,7 @@ from robot_bench.experiments.validation.figures import Finding, Missing
 from robot_bench.experiments.validation.nominal import Nominal
 from robot_bench.experiments.validation.signals import driving_since
 from robot_bench.recording.run_record import RunRecord, read_run
+from robot_bench.report.make import Files
 from robot_bench.run import RunResult, write_run
 from robot_bench.scenario.goals.judging import Judgement
 from robot_bench.scenario.included_files import Setting
@@ -123,6 +124,7 @@ def run_trials(
     worlds: Sequence[str] = (),
     in_processes: InProcesses,
     on_done: Callable[[int, int], None] = lambda _done, _all: None,
+    files: Files = Files.REPORT,
 ) -> list[Result]:
     """Run experiments in variants; runs that fail are kept as run folders.
 
@@ -135,6 +137,7 @@ def run_trials(
         worlds: In place of its own, where an experiment runs in several.
         in_processes: Does so many pieces of work, each in a process of its own; False where it was interrupted.
         on_done: Called with (runs done, runs in all).
+        files: How much is made of runs that fail.
 
     Raises:
         KeyboardInterrupt: A signal came.
@@ -147,7 +150,7 @@ def run_trials(
         on_done(len(found), len(runs))
 
     def job(number: int, look: Callable[[], None]) -> Json:
-        return {"results": _do(runs[number], settings, folder, look)}
+        return {"results": _do(runs[number], settings, folder, look, files)}
 
     if not in_processes(job, len(runs), done):
         raise KeyboardInterrupt
@@ -175,7 +178,9 @@ def _in_variant(experiment: Experiment, run: _Run, settings: Sequence[Setting]) 
     )
 
 
-def _do(run: _Run, settings: Sequence[Setting], folder: Path, look: Callable[[], None]) -> list[Result]:
+def _do(
+    run: _Run, settings: Sequence[Setting], folder: Path, look: Callable[[], None], files: Files
+) -> list[Result]:  # fmt: skip
     """Run once and measure for each experiment; what cannot be run has no findings but that."""
     scenario = _in_variant(run.experiments[0], run, settings)
     bench = Bench.from_scenario(scenario)
@@ -190,7 +195,7 @@ def _do(run: _Run, settings: Sequence[Setting], folder: Path, look: Callable[[],
     failures = [text for result in results for text in told(result)]
     if failures:
         place = folder / "-".join(_word(part) for part in (results[0].experiment, run.variant.name, *_where(run)))
-        write_run(bench, place, "; ".join(failures[:3]))
+        write_run(bench, place, "; ".join(failures[:3]), files=files)
         results = [replace(result, folder=str(place)) for result in results]
     return results
 

@@ -100,15 +100,29 @@ class Prober:
     def effect(self, holds: Sequence[Hold], until: Nanos, since: Nanos | None = None) -> Effect:
         """Return what changes when inputs are held otherwise, against the recorded run, up to a time."""
         since = min(hold.since for hold in holds) if since is None else since
-        plain = self._plain.get((since, until))
-        if plain is None:
-            plain = self._plain[since, until] = self.replay.run(since, until, rows=True, memory_ns=_MEMORY_NS)
-        return self._compare(plain, self.replay.run(since, until, holds, rows=True, memory_ns=_MEMORY_NS), since, until)
+        plain = self._as_recorded(since, until)
+        return self._compare(plain, self._beside(plain, holds, since, until), since, until)
+
+    def _as_recorded(self, since: Nanos, until: Nanos) -> Seen:
+        if (since, until) not in self._plain:
+            self._plain[since, until] = self.replay.run(since, until, rows=True, memory_ns=_MEMORY_NS)
+        return self._plain[since, until]
+
+    def _beside(
+        self, plain: Seen, holds: Sequence[Hold], since: Nanos, until: Nanos, *, branch: Branch | None = None,
+        ends_parted: bool = False,
+    ) -> Seen:  # fmt: skip
+        """Return a replay that is to be compared with another one of the same time."""
+        return self.replay.run(
+            since, until, holds, rows=True, memory_ns=_MEMORY_NS, branch=branch, beside=plain, ends_parted=ends_parted
+        )
 
     def noticed(self, holds: Sequence[Hold], until: Nanos, since: Nanos) -> Nanos | None:
         """Return when a program takes notice of inputs that are held otherwise, as `effect` does; None for never."""
         for end in sorted({min(since + SOON_NS, until), until}):
-            if (at := self.effect(holds, end, since).noticed) is not None:
+            plain = self._as_recorded(since, end)
+            at, _ = self._parting(plain, self._beside(plain, holds, since, end, ends_parted=True), since)
+            if at is not None:
                 return at
         return None
 
@@ -142,8 +156,7 @@ class Prober:
         until = min(at + span, self.replay.end)
         quiet, base = self._quiet[at, span]
         hold = Hold(wire=net, level=True, since=at, until=until)
-        seen = self.replay.run(at, until, [hold], rows=True, memory_ns=_MEMORY_NS, branch=quiet)
-        effect = self._compare(base, seen, at, until)
+        effect = self._compare(base, self._beside(base, [hold], at, until, branch=quiet), at, until)
         return Answer(
             at=at, base=effect.before, codes=effect.after,
             noticed=None if effect.noticed is None else effect.noticed - at,
@@ -217,7 +230,8 @@ class Prober:
         self.replay.run(at, at + 1)
         return self.replay.line(self.replay.board.pc)
 
-    def _compare(self, plain: Seen, other: Seen, since: Nanos, until: Nanos) -> Effect:
+    def _parting(self, plain: Seen, other: Seen, since: Nanos) -> tuple[Nanos | None, str]:
+        """Return when the way through the program, or its variables, first differ, and where; (None, "") for never."""
         flow = first_row(plain, other)
         noticed: Nanos | None = None
         by = ""
@@ -231,8 +245,11 @@ class Prober:
                 break
             if ours != theirs:
                 place = next(n for n, (a, b) in enumerate(zip(ours, theirs, strict=True)) if a != b)
-                noticed, by = t, self.replay.variable_at(place)
-                break
+                return t, self.replay.variable_at(place)
+        return noticed, by
+
+    def _compare(self, plain: Seen, other: Seen, since: Nanos, until: Nanos) -> Effect:
+        noticed, by = self._parting(plain, other, since)
         answered = min(
             (
                 min(a[0] for a in (one, two) if a is not None)
@@ -255,8 +272,8 @@ def first_row(plain: Seen, other: Seen) -> int | None:
     ours, theirs = plain.packed_rows, other.packed_rows
     same, differ = 0, min(len(ours), len(theirs)) // RECORD.size
     if ours[: differ * RECORD.size] == theirs[: differ * RECORD.size]:
-        is_whole = not (plain.has_more_rows or other.has_more_rows)
-        return differ if is_whole and len(ours) != len(theirs) else None
+        shorter = plain if len(ours) < len(theirs) else other
+        return None if len(ours) == len(theirs) or shorter.has_more_rows else differ
     while differ - same > 1:  # rows before `same` do, some before `differ` do not
         middle = (same + differ) // 2
         first, end = same * RECORD.size, middle * RECORD.size

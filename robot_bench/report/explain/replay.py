@@ -41,8 +41,9 @@ from simbase.timing import NS_PER_MS, Nanos
 FEED_NS: Nanos = 50 * NS_PER_MS
 #: After all that is recorded.
 _NEVER: Nanos = 1 << 63
-#: chosen: how often is looked whether there are too many blocks.
-_RECORDED_NS: Nanos = 5 * NS_PER_MS
+#: chosen: how often is looked whether there are too many blocks, or whether two replays have parted; after as long as
+#: that brought a small part of the blocks, twice as long, up to `FEED_NS`.
+_RECORDED_NS, _SMALL_PART = 5 * NS_PER_MS, 32
 #: chosen: between two saved states at first, and how many are kept; of more every other one is dropped.
 STRIDE_NS: Nanos = 250 * NS_PER_MS
 MOST_STATES = 128
@@ -54,6 +55,8 @@ _IWDG_KR = 0x4000_3000
 _CALLS_NS: Nanos = 40 * NS_PER_MS
 #: chosen: so many blocks are recorded of one part, some 10 ms of a program that never sleeps, seconds of one that does.
 MOST_ROWS = 120_000
+#: More than there can be in `FEED_NS`, at 72 MHz.
+_ROOM = 4_000_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -239,7 +242,7 @@ class ChipReplay:
 
     def run(
         self, since: Nanos, until: Nanos, holds: Sequence[Hold] = (), *, rows: bool = False, memory_ns: Nanos = 0,
-        branch: Branch | None = None,
+        branch: Branch | None = None, beside: Seen | None = None, ends_parted: bool = False,
     ) -> Seen:  # fmt: skip
         """Run a part again.
 
@@ -250,6 +253,9 @@ class ChipReplay:
             rows: Whether blocks and exceptions are wanted.
             memory_ns: How often the variables are wanted; 0 for never.
             branch: Where it goes on from, at `since`, with what is held there; None: from the run as it was.
+            beside: What it is compared with, of the same time, with `rows` and `memory_ns` alike: soon after the two
+                have parted, neither blocks nor variables are told any more.
+            ends_parted: Whether the replay ends there.
         """
         if branch is None:
             self._seek(since)
@@ -259,8 +265,8 @@ class ChipReplay:
         levels = branch.levels if branch is not None else {net: self.level(net, since) for net in self.outputs}
         self._seen = seen = Seen(levels=levels)
         try:
-            if rows:
-                self._go_on_recording(until, memory_ns)
+            if rows and self._go_on_recording(until, memory_ns, beside):
+                memory_ns, until = 0, self.board.now_ns if ends_parted else until
             self._go_on(until, memory_ns)
         finally:
             self._held = {}
@@ -397,17 +403,24 @@ class ChipReplay:
         self._held = dict(held)
         self._next_input = 0
 
-    def _go_on_recording(self, until: Nanos, memory_ns: Nanos) -> None:
-        """Run on with the blocks recorded, until there are too many."""
+    def _go_on_recording(self, until: Nanos, memory_ns: Nanos, beside: Seen | None) -> bool:
+        """Run on with the blocks recorded, until there are too many; return whether it has parted from another run."""
         board, seen = self.board, self._seen
-        recorder = board.chip.record_blocks(MOST_ROWS)
+        rows, slice_ns, has_parted = bytearray(), _RECORDED_NS, False
+        recorder = board.chip.record_blocks(_ROOM)
         try:
-            while board.now_ns < until and len(recorder) < MOST_ROWS // 2:
-                self._go_on(min(until, board.now_ns + _RECORDED_NS), memory_ns)
+            while board.now_ns < until and not has_parted and len(rows) < MOST_ROWS // 2 * RECORD.size:
+                self._go_on(min(until, board.now_ns + slice_ns), memory_ns)
+                new = recorder.drain_packed()
+                rows += new
+                has_parted = beside is not None and _have_parted(beside, rows, len(new), seen.memory)
+                is_slow = len(new) * _SMALL_PART < MOST_ROWS * RECORD.size
+                slice_ns = min(FEED_NS, 2 * slice_ns) if is_slow else _RECORDED_NS
         finally:
-            seen.has_more_rows = board.now_ns < until or recorder.lost > 0
-            seen.packed_rows = b"" if recorder.lost else recorder.drain_packed()
             board.chip.stop_recording()
+        seen.has_more_rows = board.now_ns < until or len(rows) > MOST_ROWS * RECORD.size
+        seen.packed_rows = bytes(rows[: MOST_ROWS * RECORD.size])
+        return has_parted
 
     def _go_on(self, until: Nanos, memory_ns: Nanos = 0) -> None:
         board, seen = self.board, self._seen
@@ -476,6 +489,15 @@ def changes(level: bool, rows: Sequence[tuple[Nanos, bool]]) -> list[Nanos]:
             found.append(at)
         level = after
     return found
+
+
+def _have_parted(beside: Seen, rows: bytearray, new: int, memory: Sequence[tuple[Nanos, bytes]]) -> bool:
+    """Tell whether a replay's last `new` bytes of rows, or its variables, differ from those of another one."""
+    since, theirs = len(rows) - new, beside.packed_rows
+    end = min(len(rows), len(theirs)) if beside.has_more_rows else len(rows)
+    return rows[since:end] != theirs[since:end] or any(
+        ours != others for (_, ours), (_, others) in zip(memory, beside.memory, strict=False)
+    )
 
 
 def _of_port(port: str, kind: WatchKind, *, first: int = 0, size: int = _GPIO_BYTES) -> Watchpoint:

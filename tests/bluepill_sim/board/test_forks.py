@@ -112,6 +112,48 @@ def test_a_fork_has_the_same_future(boot, seed: int) -> None:
     assert future(other, END_NS) == first
 
 
+#: A loop without exclusives, the same one with two wait states, then one with an exclusive pair that ticks come into.
+LATER_OTHERWISE = (
+    store(0xE000E014, 299) + store(0xE000E018, 0) + store(0xE000E010, 7)
+    + """
+        movs r7, #0
+        mov32 r4, #0x40022000
+        mov32 r5, #0x20000900
+again:  mov32 r3, #1000
+loop:   adds r2, #1
+        adds r2, r2, r7
+        subs r3, #1
+        bne loop
+        movs r1, #2
+        str r1, [r4, #0]
+        adds r7, #1
+        cmp r7, #2
+        bne again
+pair:   ldrex r0, [r5]
+        movs r3, #20
+wait:   subs r3, #1
+        bne wait
+        adds r0, #1
+        strex r1, r0, [r5]
+        adds r6, r6, r1
+        b pair
+tick:   bx lr"""
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("back_to_us", [300, 1_000])
+def test_what_was_worked_out_of_blocks_later_does_not_hold_after_a_restore(boot, back_to_us: int) -> None:
+    """Back at a moment with other wait states, and before the first exclusive, on the board that has run on."""
+    machine = boot(LATER_OTHERWISE, {15: "tick"}).run(back_to_us)
+    kept = machine.board.snapshot()
+    first = future(machine, END_NS)
+    assert machine.board.chip.clocks.flash_wait_states == 2
+    assert machine.board.register("r6") > 10  # stores that a tick has kept from being made
+    machine.board.restore(kept)
+    assert machine.board.chip.clocks.flash_wait_states == 2 * (back_to_us > 300)
+    assert future(machine, END_NS) == first
+
+
 def test_two_forks_with_different_inputs_part_and_do_not_touch_each_other(boot) -> None:
     machine, other = boot(EVERYTHING, VECTORS), boot(EVERYTHING, VECTORS)
     machine.board.advance_to(2_000_000)

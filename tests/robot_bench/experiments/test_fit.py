@@ -15,6 +15,7 @@ from p2os.robots.parameters import load_parameters
 from robot_bench.drives.drive import Drive, Steps, Trajectory
 from robot_bench.drives.of_packets import drive_of_capture
 from robot_bench.experiments.drive_files import read_drive
+from robot_bench.experiments.fitting import sonar
 from robot_bench.experiments.fitting.clocks import on_one_clock, without_delays
 from robot_bench.experiments.fitting.examples import Recorded, empty_world, planted, record, square, wandering, write
 from robot_bench.experiments.fitting.least_squares import Parameter, fit
@@ -185,6 +186,29 @@ def test_rays_and_feet_of_walls_agree(heading: float, half_deg: float) -> None:
     expected = seen(0.4, -0.7, heading, half)
     # The foot of a wall lies between two rays at most an eighth of the cone apart.
     assert expected - 1e-9 <= found <= expected / math.cos(half / 8) + 1e-9
+
+
+@pytest.mark.parametrize(
+    ("heading_deg", "is_met"),
+    [(0.0, True), (44.9, True), (45.1, False), (-44.9, True), (-45.1, False), (90.0, False), (180.0, False)],
+)
+def test_a_ray_meets_a_wall_between_its_ends_and_ahead(heading_deg: float, is_met: bool) -> None:
+    heading = math.radians(heading_deg)
+    for wall in ((1.0, -1.0, 1.0, 1.0), (1.0, 1.0, 1.0, -1.0)):
+        (found,) = nearest(np.array([wall]), np.zeros(1), np.zeros(1), np.array([[heading]]), 5.0)
+        assert found == pytest.approx(1 / math.cos(heading) if is_met else 5.0)
+
+
+@pytest.mark.parametrize("at_once", [1, 9 * 20, 9 * 20 * 7, 10**6])
+def test_the_nearest_of_walls_is_that_of_each_alone_however_many_are_crossed_at_once(
+    at_once: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    normal = np.random.default_rng(4).standard_normal
+    walls, x, y, fans = 3 * normal((50, 4)), normal(20), normal(20), normal((20, 9))
+    alone = np.min([nearest(walls[n : n + 1], x, y, fans, 5.0) for n in range(50)], axis=0)
+    monkeypatch.setattr(sonar, "MOST_AT_ONCE", at_once)
+    assert nearest(walls, x, y, fans, 5.0) == pytest.approx(alone)
+    assert len(set(alone)) > 10
 
 
 def test_the_formulas_give_back_small_errors_of_their_own_derivation() -> None:

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from p2os.protocol.frames import Frame
 from p2os.protocol.line_time import LineTime
@@ -18,12 +20,13 @@ from robot_bench.drives.drive import Drive, Steps, Trajectory, steps_of
 from robot_bench.drives.latency_budget import STEPS, WHOLE, latency_budget
 from robot_bench.drives.metrics import metrics
 from robot_bench.drives.of_packets import spread_s
-from robot_bench.drives.of_run import drive_of_record, trajectory_of
+from robot_bench.drives.of_run import drive_of_record, steps_of_edges, trajectory_of
 from robot_bench.events.kinds import Clearance, Contact, Packet, Pose, Verdict
 from robot_bench.experiments.drive_files import read_drive
 from robot_bench.recording.run_record import RunRecord, read_run
 from robot_bench.report.measures import BARS, HEIGHT
 from robot_bench.report.page import page_data, render_page
+from robot_bench.wires.edges import Edges
 
 P2DX = load_parameters("p2dx")
 
@@ -60,6 +63,14 @@ def test_a_robot_that_stands_half_of_the_time_is_said_to() -> None:
     assert found.path_m == pytest.approx(0.6, abs=1e-3)
     assert found.mean_mps == pytest.approx(0.15, abs=1e-3)
     assert found.max_mps == pytest.approx(0.3)
+
+
+@given(st.lists(st.tuples(st.integers(0, 5), st.integers(0, 255)), max_size=12))
+def test_the_steps_of_a_wire_are_its_levels_the_last_of_each_time(rows: list[tuple[int, int]]) -> None:
+    edges = sorted(rows, key=lambda row: row[0])
+    expected = steps_of([(at / 1e9, float(level)) for at, level in edges])
+    found = steps_of_edges(Edges(edges))
+    assert (found.t_s.tolist(), found.values.tolist()) == (expected.t_s.tolist(), expected.values.tolist())
 
 
 def pose(t_ms: int, x_mm: int, work: int | None) -> Pose:

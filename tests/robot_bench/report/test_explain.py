@@ -25,6 +25,7 @@ from robot_bench.report.explain.findings import injected, let_go
 from robot_bench.report.explain.probing import Answer, first_row
 from robot_bench.report.explain.replay import ChipReplay, Hold, Seen
 from robot_bench.report.explain.scene import Scene
+from robot_bench.report.make import Files
 from robot_bench.run import run_scenario
 from robot_bench.scenario.scenario import load_scenario
 from robot_bench.wires.edges import Edges
@@ -40,7 +41,7 @@ def run_with(firmware: Path, folder: Path, thing: str, duration_s: float, placed
     """Run a firmware in the scenario of the seeded bugs and return its record."""
     plan = folder / "plan.toml"
     plan.write_text(scenario_text(thing, duration_s, placed_s))
-    run_scenario(load_scenario(str(plan), firmware=firmware), folder / "run", explained=False)
+    run_scenario(load_scenario(str(plan), firmware=firmware), folder / "run", files=Files.SUMMARY)
     return read_run(folder / "run")
 
 
@@ -91,17 +92,18 @@ def test_answers_that_change_from_time_to_time_count_neither_way() -> None:
 ROWS = st.lists(st.integers(0, 2), max_size=40)
 
 
-@given(common=ROWS, ours=ROWS, theirs=ROWS, has_more=st.booleans())
+@given(common=ROWS, ours=ROWS, theirs=ROWS, has_more=st.tuples(st.booleans(), st.booleans()))
 def test_the_first_row_that_differs_is_found(
-    common: list[int], ours: list[int], theirs: list[int], has_more: bool
+    common: list[int], ours: list[int], theirs: list[int], has_more: tuple[bool, bool]
 ) -> None:
-    """Where one has more rows than were recorded, the end of the other is no difference."""
+    """Where the one that ends has more rows than were recorded, its end is no difference."""
     ours, theirs = common + ours, common + theirs
     one, other = (
-        Seen(packed_rows=b"".join(RECORD.pack(n, 0, row) for n, row in enumerate(rows)), has_more_rows=has_more)
-        for rows in (ours, theirs)
+        Seen(packed_rows=b"".join(RECORD.pack(n, 0, row) for n, row in enumerate(rows)), has_more_rows=more)
+        for rows, more in zip((ours, theirs), has_more, strict=True)
     )
-    pairs = (zip if has_more else zip_longest)(ours, theirs)
+    ends_with_more = has_more[0] if len(ours) < len(theirs) else has_more[1]
+    pairs = (zip if ends_with_more else zip_longest)(ours, theirs)
     assert first_row(one, other) == next((n for n, (a, b) in enumerate(pairs) if a != b), None)
     assert [row[2] for row in one.rows] == ours
     assert all(one.row(n) == (n, 0, row) for n, row in enumerate(ours))
@@ -163,7 +165,7 @@ def test_the_replay_of_a_chip_is_the_run_and_a_held_pin_changes_it(unfair: Path)
 def test_the_replay_has_the_memory_and_the_crystal_of_the_run(tmp_path: Path) -> None:
     plan = tmp_path / "plan.toml"
     plan.write_text('sram = "random"\ncrystal_ppm = 900\n' + scenario_text(UNFAIR, 4.0, 1.0))
-    run_scenario(load_scenario(str(plan), firmware=DODGE), tmp_path / "run", explained=False)
+    run_scenario(load_scenario(str(plan), firmware=DODGE), tmp_path / "run", files=Files.SUMMARY)
     record = read_run(tmp_path / "run")
     replay = ChipReplay(DODGE, record)
     assert replay.exact_until == replay.end == record.last_ns

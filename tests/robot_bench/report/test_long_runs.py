@@ -1,6 +1,7 @@
 """The page of an hour's run is of bounded size, keeps what stands out, and says what it leaves out."""
 
 import json
+from array import array
 from dataclasses import replace
 
 import pytest
@@ -27,7 +28,9 @@ def long_run(seconds: int) -> RunRecord:
     sonar = [(n * 100 * MS, [1500 + n % 700] * 16) for n in range(seconds * 10)]
     sonar[len(sonar) // 3] = (sonar[len(sonar) // 3][0], [1500] * 15 + [123])
     nets = [f"DD{n}" for n in range(1, 9)] + [f"motor{m}_comm{n}" for m in (1, 2) for n in (1, 2, 3)]
-    pins = {net: Edges((n * 20 * MS, n & 1) for n in range(seconds * 50)) for net in nets}
+    pins = {net: Edges() for net in nets}
+    for edges in pins.values():
+        edges.extend(array("q", range(0, seconds * S, 20 * MS)), b"\0\1" * (seconds * 25))
     return RunRecord(
         meta={"scenario": "long", "threshold_m": 0.6},
         poses=poses,

@@ -12,6 +12,7 @@ from robot_bench.recording.run_record import read_run
 from robot_bench.recording.signals import grouped, motor_steps
 from robot_bench.recording.summary import cells_entered, distance_m, figures, verdict
 from robot_bench.report import make_report
+from robot_bench.report.make import Files, make_artefacts
 from robot_bench.report.packets import describe
 from robot_bench.report.page import page_data
 
@@ -75,6 +76,19 @@ def test_a_whole_run_is_read_back(run: Path) -> None:
     assert cells_entered(record) == 2
     assert record.usart_lines() == [(50, "hello </script> world"), (50, "rest")]
     assert ("collisions", "1") in figures(record)
+
+
+def test_so_much_is_made_of_a_run_as_is_wanted_and_the_rest_later(run: Path) -> None:
+    names = set[str]()
+    for files, more in (
+        (Files.SUMMARY, {"trace.jsonl", "summary.json"}),
+        (Files.REPORT, {"report.html", "pins.vcd", "pins.sr", "wire.jsonl", "usart.txt"}),
+        (Files.PLOTS, {"path.png", "speeds.png", "pins.png"}),
+    ):
+        made = make_artefacts(run, files)
+        assert {path.name for path in run.iterdir()} == (names := names | more)
+        assert made.report == run / ("trace.jsonl" if files is Files.SUMMARY else "report.html")
+        assert made.outcome == json.loads((run / "summary.json").read_text(encoding="utf-8"))
 
 
 @pytest.mark.parametrize(

@@ -168,6 +168,7 @@ def run_planted(planted: Planted, experiments: Sequence[str], folder: Path) -> d
     from robot_bench import adapter
     from robot_bench.experiments.validation.experiments import EXPERIMENTS
     from robot_bench.experiments.validation.trials import Variant, run_trials
+    from robot_bench.report.make import Files
 
     if planted.path.startswith("adapter_fw/"):
         built = str(library(planted, folder))
@@ -181,7 +182,9 @@ def run_planted(planted: Planted, experiments: Sequence[str], folder: Path) -> d
             own.mkdir()
             settings = [("firmware", str(program(planted, experiment.load().firmware.stem, own)))]
         variant = Variant(*planted.variant, "kinematic")
-        results = run_trials([experiment], [variant], folder / "runs", settings=settings, in_processes=_here)
+        results = run_trials(
+            [experiment], [variant], folder / "runs", settings=settings, in_processes=_here, files=Files.SUMMARY
+        )
         found[name] = sorted({failure.what for result in results for failure in result.failures})
     return found
 

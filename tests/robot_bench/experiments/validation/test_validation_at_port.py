@@ -1,7 +1,10 @@
 """What a robot at a port shows, in virtual time; each figure is seen to tell a planted error."""
 
 import io
+import json
 import math
+import subprocess
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -10,10 +13,13 @@ from adapter_sim.codec import encoder_count
 from adapter_sim.distances import Distances
 from adapter_sim.encoders import Encoders
 from p2os.cli.main import run as p2os
+from robot_bench.cli import run as driving
 from robot_bench.experiments.validation.experiments import EXPERIMENTS, AtPort
 from robot_bench.experiments.validation.figures import LOOSE_BECAUSE, Missing, loose
 from robot_bench.experiments.validation.trials import Result, longest_s, port_runs, told
-from tests.robot_bench.experiments.validation.virtual_port import FILES, GATE, at_port
+from robot_bench.run import run_at_port
+from tests.robot_bench.experiments.validation.virtual_port import FILES, GATE, at_port, virtual_line
+from tests.tools.forked_python import forked_p2os
 
 PLAIN = FILES / "plain.toml"
 ROUND = ["motors", "codes", "encoders"]
@@ -148,3 +154,52 @@ def test_what_is_not_done_at_a_port_and_what_room_is_needed_is_said_before_anyth
     assert "the robot needs two boxes 0.3 m long" in err
     assert "nobody said yes" in err
     assert list(tmp_path.glob("runs/*")) == []
+
+
+def holds(out: str) -> None:
+    """See that the command has passed, and what it has written in `v`."""
+    assert "motors      1 of 1" in out
+    (result,) = json.loads(Path("v/validation.json").read_text(encoding="utf-8"))["results"]
+    figures = {figure["what"]: figure for figure in result["figures"]}
+    assert figures["steady rim speed"]["expected"] in {120.0, -160.0, 0.0}
+    assert figures["VEL for a pair of codes"]["bound"]["value"] == 0.5
+    assert abs(figures["the same by the packets' odometry"]["difference"]) < 10
+    assert Path("v/motors/report.html").is_file()
+
+
+#: So long as it holds its last pair for a second.
+AT_PORT = ["validate", "motors", "--yes", "--out", "v", "--set", "duration_s=13.0", "--port"]
+
+
+def test_a_robot_is_validated_at_its_port(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """By the command, on a line of virtual time; how it drives on one of real time is `run/test_port.py`'s."""
+    monkeypatch.chdir(tmp_path)
+    line, opened = virtual_line("arena"), list[str]()
+    monkeypatch.setattr(driving, "open_url", lambda url: opened.append(url) or line)
+    monkeypatch.setattr(driving, "run_at_port", partial(run_at_port, **line.time))
+    assert p2os([*AT_PORT, "tcp:127.0.0.1:8101"]) == 0
+    assert opened == ["tcp:127.0.0.1:8101"]
+    holds(capsys.readouterr().out)
+
+
+@pytest.mark.soak
+def test_a_served_robot_is_validated_at_its_port(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    served = forked_p2os("serve", "--port", "tcp:127.0.0.1:0", "--body", "kinematic", "--world", "arena", "--json")
+    process = subprocess.Popen(served, stdout=subprocess.PIPE, text=True)
+    try:
+        assert process.stdout is not None
+        url = str(json.loads(process.stdout.readline())["url"])
+        code = p2os([*AT_PORT, url])
+    finally:
+        process.terminate()
+        process.communicate(timeout=30)
+    failures = json.loads(Path("v/motors/summary.json").read_text(encoding="utf-8"))["failures"]
+    if any("lagged" in failure for failure in failures):
+        pytest.skip("this machine is too busy for real time now")
+    assert code == 0
+    holds(capsys.readouterr().out)

@@ -1,7 +1,6 @@
 """The experiments of `p2os validate`: the bench passes them, and each planted error is told by the right figure."""
 
 import json
-import subprocess
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -16,8 +15,8 @@ from robot_bench.events.codec import Json
 from robot_bench.experiments.validation.experiments import CODES, EXPERIMENTS
 from robot_bench.experiments.validation.figures import LOOSE_BECAUSE, Figure, loose
 from robot_bench.experiments.validation.trials import Result, Variant, run_trials, told, variants
+from robot_bench.report.make import Files
 from robot_bench.scenario.included_files import Setting
-from tests.tools.forked_python import forked_p2os
 
 DIRECT, ADAPTER = Variant("direct", "", "kinematic"), Variant("adapter", "model", "kinematic")
 FIRMWARE = Variant("adapter", "firmware", "kinematic")
@@ -36,7 +35,9 @@ def here(job: Callable[[int, Callable[[], None]], Json], count: int, on_done: Ca
 def results_of(
     names: Sequence[str], chosen: Sequence[Variant], folder: Path, settings: Sequence[Setting] = ()
 ) -> list[Result]:
-    return run_trials([EXPERIMENTS[name] for name in names], chosen, folder, settings=settings, in_processes=here)
+    return run_trials(
+        [EXPERIMENTS[name] for name in names], chosen, folder, settings=settings, in_processes=here, files=Files.SUMMARY
+    )
 
 
 @pytest.fixture(scope="module")
@@ -219,30 +220,3 @@ def test_what_cannot_be_validated_is_refused_in_a_line_and_nothing_is_made(
     assert p2os(["validate", *words]) == 2
     assert says in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.slow
-def test_a_served_robot_is_validated_at_its_port(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    served = forked_p2os("serve", "--port", "tcp:127.0.0.1:0", "--body", "kinematic", "--world", "arena", "--json")
-    process = subprocess.Popen(served, stdout=subprocess.PIPE, text=True)
-    try:
-        assert process.stdout is not None
-        url = str(json.loads(process.stdout.readline())["url"])
-        # So long as it holds its last pair for a second.
-        code = p2os(["validate", "motors", "--port", url, "--yes", "--out", "v", "--set", "duration_s=13.0"])
-    finally:
-        process.terminate()
-        process.communicate(timeout=30)
-    failures = json.loads(Path("v/motors/summary.json").read_text(encoding="utf-8"))["failures"]
-    if any("lagged" in failure for failure in failures):
-        pytest.skip("this machine is too busy for real time now")
-    assert code == 0
-    assert "motors      1 of 1" in capsys.readouterr().out
-    (result,) = json.loads(Path("v/validation.json").read_text(encoding="utf-8"))["results"]
-    figures = {figure["what"]: figure for figure in result["figures"]}
-    assert figures["steady rim speed"]["expected"] in {120.0, -160.0, 0.0}
-    assert figures["VEL for a pair of codes"]["bound"]["value"] == 0.5
-    assert abs(figures["the same by the packets' odometry"]["difference"]) < 10

@@ -1,8 +1,10 @@
 """A virtual robot at a port in virtual time: what a run at a port sees, at no clock and no machine's mercy."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypedDict
 
 from p2os.errors import TransportError
 from p2os.pioneer.body.factory import make_body
@@ -12,6 +14,7 @@ from p2os.pioneer.world import load_world
 from p2os.robots.parameters import load_parameters
 from robot_bench.experiments.validation.experiments import EXPERIMENTS
 from robot_bench.experiments.validation.trials import PortRun, Result, port_runs, run_port
+from robot_bench.report.make import Files
 from robot_bench.run import RunResult, run_at_port
 from robot_bench.running.pacer import RealTimePacer
 
@@ -27,6 +30,13 @@ heading_deg = 0.0
     f'[[box]]\nname = "{name}"\nx_m = 1.2\ny_m = {y_m}\nlength_m = 0.3\nwidth_m = 0.05\nheight_m = 0.5\n'
     for name, y_m in (("left", 0.4), ("right", -0.4))
 )
+
+
+class Time(TypedDict):
+    """Arguments of `run_at_port`."""
+
+    clock: Callable[[], int]
+    pacer: RealTimePacer
 
 
 @dataclass
@@ -55,6 +65,12 @@ class VirtualLine:
     def __post_init__(self) -> None:
         self.began = self.clock.now
 
+    @property
+    def time(self) -> Time:
+        """What `run_at_port` lives by: the clock of this line."""
+        clock = self.clock.read
+        return {"clock": clock, "pacer": RealTimePacer(clock=clock, sleep=self.clock.sleep)}
+
     def read(self) -> bytes:
         now = self.clock.now - self.began
         if now > self.lasts_s * 1e9:
@@ -73,21 +89,25 @@ class VirtualLine:
     def close(self) -> None: ...
 
 
+def virtual_line(world: Path | str, faults: tuple[str, ...] = (), lasts_s: float = math.inf) -> VirtualLine:
+    """Return a line to a robot in a world."""
+    parameters = load_parameters("p2dx")
+    robot = Pioneer(
+        parameters=parameters, body=make_body("kinematic", load_world(str(world)), parameters),
+        settings=ControllerSettings(), faults=faults,
+    )  # fmt: skip
+    return VirtualLine(robot, Clock(), lasts_s)
+
+
 def at_port(
     names: list[str], folder: Path, *, world: Path | str, faults: tuple[str, ...] = (), lasts_s: float = math.inf,
     duration_s: float | None = None,
 ) -> list[Result]:  # fmt: skip
     """Return what experiments find of a virtual robot at a port; `lasts_s` is when the line goes."""
     settings = [] if duration_s is None else [("duration_s", duration_s)]
-    parameters = load_parameters("p2dx")
 
     def drive(run: PortRun, place: Path) -> RunResult:
-        clock = Clock()
-        robot = Pioneer(
-            parameters=parameters, body=make_body("kinematic", load_world(str(world)), parameters),
-            settings=ControllerSettings(), faults=faults,
-        )  # fmt: skip
-        pacer = RealTimePacer(clock=clock.read, sleep=clock.sleep)
-        return run_at_port(run.scenario, place, VirtualLine(robot, clock, lasts_s), clock=clock.read, pacer=pacer)
+        line = virtual_line(world, faults, lasts_s)
+        return run_at_port(run.scenario, place, line, **line.time, files=Files.SUMMARY)
 
     return run_port(port_runs([EXPERIMENTS[name] for name in names], settings), drive, folder)
