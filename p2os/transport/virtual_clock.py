@@ -180,8 +180,7 @@ class VirtualClock:
         wait = _Wait(self._deadline(longest_s), wake, seen=self._work)
         with self._waiting(wait):
             self._go_on()
-            while not wait.is_over:
-                changed.wait(HEARTBEAT_S)
+            while not (wait.is_over or changed.wait(HEARTBEAT_S)):
                 self._go_on()
 
     # Time ------------------------------------------------------------------------------------

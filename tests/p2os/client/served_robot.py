@@ -44,7 +44,8 @@ class ServedRobot:
     ) -> None:  # fmt: skip
         self.pioneer = pioneer or new_pioneer()
         self.clock = clock
-        #: What the robot is to do between two turns of its host: called once, in the host's thread.
+        #: What the robot is to do between two turns of its host: called once, in the host's thread; what one of them
+        #: adds, after the next turn.
         self.requests: list[Callable[[Pioneer, Nanos], None]] = []
         self._loops = Loops()
         listener = listen_url(url, loops=self._loops)
@@ -68,8 +69,9 @@ class ServedRobot:
         try:
             while not self._end.is_set():
                 self._host.turn(0.02)
-                while self.requests:
-                    self.requests.pop(0)(self.pioneer, self._host.now)
+                for request in tuple(self.requests):
+                    request(self.pioneer, self._host.now)
+                    self.requests.remove(request)
         finally:
             self._host.close()
 
