@@ -19,7 +19,7 @@ from p2os.transport.ports import HungUpError
 from p2os.transport.virtual_clock import VirtualClock
 from p2os.transport.wall_clock import GAP_NS
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
-from tests.p2os.client.client_rig import new_pioneer
+from tests.p2os.client.client_rig import free_pioneer
 from tests.p2os.client.served_robot import QUICK, Recorder, ServedRobot
 
 
@@ -46,7 +46,7 @@ class Bench:
 
     def __init__(self) -> None:
         self.clock_ns: Nanos = 5 * NS_PER_S
-        self.pioneer = new_pioneer()
+        self.pioneer = free_pioneer()
         self.core = RobotCore(QUICK)
         self.sent: list[Command] = []
         self.notices: list[Notice] = []
