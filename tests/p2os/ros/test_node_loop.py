@@ -5,7 +5,6 @@ import os
 import select
 import signal
 import subprocess
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -26,6 +25,7 @@ from p2os.ros.topics import SERVICES, TOPICS
 from p2os.ros.transport import NodeOptions, Received, Topic
 from p2os.transport.wall_clock import wall_clock
 from simbase.timing import NS_PER_MS, NS_PER_S
+from tests.tools.forked_python import forked_python
 
 P2DX = load_parameters("p2dx")
 OPTIONS = NodeOptions()
@@ -202,9 +202,9 @@ def test_a_signal_stops_the_robot_before_the_node_ends(number: int) -> None:
         )
         with (
             subprocess.Popen(
-                [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+                [forked_python(), "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
             ) as node,
-            subprocess.Popen([sys.executable, str(PEER), domain, namespace], stdout=subprocess.PIPE) as peer,
+            subprocess.Popen([forked_python(), str(PEER), domain, namespace], stdout=subprocess.PIPE) as peer,
         ):
             try:
                 heard = b""
