@@ -11,6 +11,7 @@ import pytest
 from p2os import Robot, served_pioneer
 from p2os.client import aio
 from p2os.event_log import log_event, logger
+from p2os.transport.virtual_clock import VirtualClock
 from simbase.timing import NS_PER_S
 from tests.p2os.client.served_robot import QUICK, Recorder, ServedRobot, until
 
@@ -21,7 +22,8 @@ def lines(caplog: pytest.LogCaptureFixture, part: str) -> list[str]:
 
 def test_a_client_logs_its_session_and_a_host_its_client(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.DEBUG, "p2os")
-    with served_pioneer(body="kinematic") as url, Robot(url, settings=QUICK) as robot:
+    clock = VirtualClock()
+    with served_pioneer(body="kinematic", clock=clock) as url, Robot(url, settings=QUICK, clock=clock) as robot:
         robot.next_state()
         url.order("fault sonar-stuck 3 1.2")
         url.reset()
@@ -67,9 +69,10 @@ def test_a_lost_line_and_the_way_back_are_logged(caplog: pytest.LogCaptureFixtur
 
 def test_packets_that_a_noisy_line_spoils_are_logged_at_most_once_a_second(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.INFO, "p2os")
-    with served_pioneer(body="kinematic") as url, Robot(url, settings=QUICK) as robot:
+    clock = VirtualClock()
+    with served_pioneer(body="kinematic", clock=clock) as url, Robot(url, settings=QUICK, clock=clock) as robot:
         url.order("fault line-noise 0.001")
-        until(lambda: any("dropped" in line for line in lines(caplog, "client")), "a dropped packet")
+        clock.until(lambda: any("dropped" in line for line in lines(caplog, "client")))
         url.order("clear line-noise")
         robot.close()
     dropped = [line for line in lines(caplog, "client") if "dropped" in line]
