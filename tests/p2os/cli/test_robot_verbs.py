@@ -130,7 +130,9 @@ def test_motors_that_go_off_end_a_held_speed(clock: VirtualClock, run: Run, caps
         assert clock() < 30 * NS_PER_S
     finally:
         robot.close()
-    assert capsys.readouterr().err.startswith("p2os: hold 0.10 m/s, 0 deg/s: ")
+    error = capsys.readouterr().err
+    assert error.startswith("p2os: hold 0.10 m/s, 0 deg/s: for 1 s the wheels are at 0.00 and 0.00 m/s, commanded 0.10")
+    assert "are the motors disabled" in error
 
 
 @pytest.mark.parametrize(

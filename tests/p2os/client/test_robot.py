@@ -192,8 +192,9 @@ def test_the_deadman_waits_as_long_as_it_was_told_and_not_for_a_program_that_sle
         fast.until(lambda: not fast.is_moving)
         assert fast.clock() - asked_ns < (deadman_ms + 2000) * NS_PER_MS
         robot.set_velocity(0.2)
-        robot.sleep(deadman_ms / 1000 + 0.3)
-        assert fast.is_moving, "a program that waits in sleep() is known to live"
+        robot.sleep(deadman_ms / 1000 + 1.5)
+        assert fast.wheels_mps == (0.2, 0.2), "a program that waits in sleep() is known to live"
+        assert [type(notice) for notice in received] == [DeadmanStopped]
 
 
 def test_no_line_is_an_error_with_a_hint() -> None:
