@@ -174,10 +174,13 @@ class RobotThread:
             with self._locked():
                 self._is_closing = True
                 self._line.finish()
-                self._has_ended = True
-                with contextlib.suppress(RuntimeError):  # without the lock nobody can be notified; their waits time out
-                    self.changed.notify_all()
-            self._line.log_end()
+            try:
+                self._line.log_end()  # before the program goes on: whoever has closed finds it written
+            finally:
+                with self._locked():
+                    self._has_ended = True
+                    with contextlib.suppress(RuntimeError):  # without the lock nobody is notified; their waits time out
+                        self.changed.notify_all()
 
     def _turn(self) -> bool:
         """Do what is due; return whether all is over."""

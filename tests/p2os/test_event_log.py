@@ -5,6 +5,7 @@ import logging
 import re
 import subprocess
 import sys
+import time
 
 import pytest
 
@@ -35,6 +36,28 @@ def test_a_client_logs_its_session_and_a_host_its_client(caplog: pytest.LogCaptu
     assert any(line.endswith("s: fault: sonar-stuck 3 1.2") for line in serve)
     assert any("s: started over: " in line for line in serve)
     assert all(line.split()[1] == url for line in serve)
+
+
+def test_whoever_has_closed_a_client_finds_that_logged() -> None:
+    class Slow(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            if record.getMessage() == "closed":
+                time.sleep(0.1)
+                logged.append("closed")
+
+    logged: list[str] = []
+    handler, of_clients = Slow(), logging.getLogger("p2os.client")
+    level = of_clients.level
+    of_clients.addHandler(handler)
+    of_clients.setLevel(logging.INFO)
+    clock = VirtualClock()
+    try:
+        with served_pioneer(body="kinematic", clock=clock) as url, Robot(url, settings=QUICK, clock=clock) as robot:
+            robot.close()
+            assert logged == ["closed"]
+    finally:
+        of_clients.removeHandler(handler)
+        of_clients.setLevel(level)
 
 
 def test_an_asyncio_client_logs_the_same(caplog: pytest.LogCaptureFixture) -> None:
