@@ -13,6 +13,7 @@ import contextlib
 import queue
 import socket
 import threading
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from typing import Self
@@ -31,8 +32,10 @@ from simbase.timing import Nanos
 
 #: chosen: the host looks up at once; on a busy machine it may take longer.
 ENDING_S = 30.0
-#: chosen: how soon a thread that waits for an answer learns that there will be none.
-LOOK_S = 1.0
+#: chosen: how often a thread that waits for an answer looks whether it has come, if nobody tells it.
+PATIENCE_S = 1.0
+#: chosen: how often a program that ends serving looks whether that is done.
+LOOK_S = 0.002
 
 
 class ServedPioneer(str):
@@ -92,7 +95,7 @@ class _Orders:
         self._ring()
         with self._changed:
             while not (answer.done() or self._is_over or self._has_ended):
-                self._waits.wait_for_change(self._changed, LOOK_S)
+                self._waits.wait_for_change(self._changed, PATIENCE_S)
         if answer.done():
             return answer.result()
         raise P2osError("the virtual robot is served no more")
@@ -105,11 +108,9 @@ class _Orders:
         """
         self._is_over = True
         self._ring()
-        with self._changed:
-            looks = round(ENDING_S / LOOK_S)
-            while not self._has_ended and looks > 0:
-                self._waits.wait_for_change(self._changed, LOOK_S)
-                looks -= 1
+        ends_s = time.monotonic() + ENDING_S
+        while not self._has_ended and time.monotonic() < ends_s:
+            self._waits.look(LOOK_S)
         if not self._has_ended:
             raise P2osError("the virtual robot's thread does not end")
 
