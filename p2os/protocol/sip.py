@@ -54,6 +54,8 @@ HEAD_BYTES = 25
 READING_BYTES = 3
 #: Where the readings begin, type byte included.
 SONAR_AT = 20
+#: Where the number of readings stands: right before them.
+COUNT_AT = SONAR_AT - 1
 _NAMES = tuple(str(sub.name) for sub in HEAD.subcons)
 #: Fields before and behind the sonar readings.
 BEFORE_SONAR = _NAMES[: _NAMES.index("sonar")]
@@ -192,7 +194,7 @@ class StandardSip:
     def _read(cls, data: bytes, profile: Profile) -> "StandardSip":
         head = unpack_head(data)
         if head is None:
-            count = data[19] if len(data) > 19 else 0
+            count = data[COUNT_AT] if len(data) > COUNT_AT else 0
             size = HEAD_BYTES + READING_BYTES * count
             raise RemoteProtocolError(f"a SIP of {len(data)} bytes with {count} sonar readings: {size} expected")
         x, y, heading, left_velocity, right_velocity, battery, left, right, control, flags, compass, count = head[:12]
@@ -229,7 +231,7 @@ def unpack_head(payload: bytes) -> tuple[int, ...] | None:
     """Return the numbers of a SIP's head in the order of the wire: those before the sonar, number and range of each
     reading, those behind it; None where the packet is shorter than its own sonar count says.
     """  # noqa: D205  # one sentence of two lines
-    return _head_of(payload[19]).unpack_from(payload) if is_sip(payload) else None
+    return _head_of(payload[COUNT_AT]).unpack_from(payload) if is_sip(payload) else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -277,7 +279,7 @@ def _columns(data: bytes, names: Sequence[str]) -> dict[str, Sequence[int]]:
 
 def is_sip(payload: bytes) -> bool:
     """Tell whether a packet of one of the types is a SIP inside: as long as its own sonar count says, or longer."""
-    return len(payload) >= HEAD_BYTES and len(payload) >= HEAD_BYTES + READING_BYTES * payload[19]
+    return len(payload) >= HEAD_BYTES and len(payload) >= HEAD_BYTES + READING_BYTES * payload[COUNT_AT]
 
 
 def unpack_tail(payload: bytes, place: int) -> tuple[tuple[int, ...], int]:

@@ -17,6 +17,8 @@ from p2os.transport.url import TcpUrl
 CONNECT_TIMEOUT_S = 3.0
 #: chosen: a minute of SIPs; a client that is further behind will never catch up.
 BACKLOG_BYTES = 65_536
+#: chosen: unread bytes of a peer are discarded at the close up to 256 KB, more than a socket keeps by default.
+READS_AT_CLOSE = 64
 
 #: Option of a TCP socket → value, where the system has it.
 #: chosen: 4 s of silence and three probes 2 s apart are 10 s, which a network's hiccup does not last;
@@ -105,17 +107,27 @@ class SocketTransport:
             self._socket.shutdown(socket.SHUT_WR)
 
     def close(self) -> None:
-        """Close the socket."""
+        """Close the socket; what it took before still arrives.
+
+        To close one whose bytes are unread resets the connection, and a peer that meets the reset before it has read
+        may drop what it was sent: a STOP.
+        """
+        with contextlib.suppress(OSError):  # the peer has gone, or nothing more waits
+            self._socket.shutdown(socket.SHUT_WR)
+            for _ in range(READS_AT_CLOSE):
+                if not self._socket.recv(READ_BYTES):
+                    break
         self._socket.close()
 
     def _lost(self, error: OSError) -> HungUpError:
-        with contextlib.suppress(OSError):  # a reason may still wait
-            self._first += self._socket.recv(LONGEST_REASON + 1)
-        return HungUpError(f"{self.description} was lost: {_reason(error)}{self._reason()}", hint=HUNG_UP_HINT)
+        waits = b""
+        with contextlib.suppress(OSError):  # a reason may still wait; what waits can be read yet
+            waits = self._socket.recv(LONGEST_REASON + 1, socket.MSG_PEEK)
+        return HungUpError(f"{self.description} was lost: {_reason(error)}{self._reason(waits)}", hint=HUNG_UP_HINT)
 
-    def _reason(self) -> str:
+    def _reason(self, waits: bytes = b"") -> str:
         """Return what the far side sent if that was a line of text and nothing else, as the end of a message."""
-        text = self._first.decode("ascii", "replace")
+        text = (self._first + waits).decode("ascii", "replace")
         line = text.removesuffix("\r\n")
         is_line = line != text and len(text) <= LONGEST_REASON and line.isprintable() and "\ufffd" not in line
         return f": {line}" if is_line else ""

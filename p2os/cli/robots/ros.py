@@ -11,7 +11,7 @@ import contextlib
 import sys
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Annotated
 
@@ -22,6 +22,7 @@ from p2os.cli.help_pages import ROBOTS
 from p2os.cli.kept_files import FORCE_HELP, refuse_to_overwrite
 from p2os.cli.names import ReportedModel, urls
 from p2os.cli.quantities import option
+from p2os.cli.signals import postponed
 from p2os.client import Link, LinkLostError, Notice, Robot, RobotState
 from p2os.client.notices import (
     Connected,
@@ -36,10 +37,11 @@ from p2os.client.notices import (
 )
 from p2os.pioneer.devices.laser import read_laser
 from p2os.robots.parameters import load_parameters
+from p2os.ros.codec import Message
 from p2os.ros.frames import Frames
 from p2os.ros.robot_node import Asked, Motors, Refused, ResetOdometry, RobotNode, Speed, Stop
 from p2os.ros.thesis_topics import STEP_MPS
-from p2os.ros.transport import DOMAIN, LOOPBACK, MOST_DOMAIN, NodeOptions, Transport
+from p2os.ros.transport import DOMAIN, LOOPBACK, MOST_DOMAIN, NodeOptions, Topic, Transport
 from p2os.ros.transports import TRANSPORTS, open_transport
 from p2os.ros.urdf import urdf_text
 from p2os.transport.wall_clock import wall_clock
@@ -168,6 +170,8 @@ def write_urdf(model: str, out: Path | None, options: NodeOptions, *, force: boo
 class NodeLoop:
     """Moves messages between a robot and a network.
 
+    No signal interrupts a call of the network: its library is C, and an exception in what that calls ends the process.
+
     Args:
         client: A connected robot.
         network: The node's transport.
@@ -186,14 +190,14 @@ class NodeLoop:
 
     def run(self, is_over: Callable[[], bool]) -> None:
         """Go on until `is_over` says so; it is asked ten times a second or more often."""
-        for topic in self._node.commands:
-            self._network.subscribe(topic)
-        for service in self._node.services:
-            self._network.serve(service)
-        for topic in self._node.announced():
-            self._network.announce(topic)
-        for topic, message in self._node.first(stamp_of(wall_clock())):
-            self._network.publish(topic, message)
+        with postponed():
+            for topic in self._node.commands:
+                self._network.subscribe(topic)
+            for service in self._node.services:
+                self._network.serve(service)
+            for topic in self._node.announced():
+                self._network.announce(topic)
+        self._publish(self._node.first(stamp_of(wall_clock())))
         self._begin()
         endings = (self._client.on_state(self._tell), self._client.on_event(self._tell))
         try:
@@ -207,7 +211,8 @@ class NodeLoop:
         """Wait for what comes, and hand it on."""
         due = self._node.next_deadline()
         wait_s = LOOK_S if due is None else min(LOOK_S, max(0, due - wall_clock()) / NS_PER_S)
-        received = self._network.take(wait_s)
+        with postponed():
+            received = self._network.take(wait_s)
         self.counts["commands"] += len(received)
         now = wall_clock()
         commands = [item for item in received if item.reply is None]
@@ -216,13 +221,13 @@ class NodeLoop:
         for call in received:
             if call.reply is not None:
                 problem = self._ask(self._node.take_call(call))
-                call.reply({"success": not problem, "message": problem})
+                with postponed():
+                    call.reply({"success": not problem, "message": problem})
         while self._news:
             item = self._news.popleft()
             if isinstance(item, RobotState):
                 self._state, self._is_open, self._link = item, True, Link.OPEN.value
-                for topic, message in self._node.take_state(item, stamp_of(item.at_ns)):
-                    self._network.publish(topic, message)
+                self._publish(self._node.take_state(item, stamp_of(item.at_ns)))
             else:
                 self._take_notice(item)
         if now >= self._health_due:
@@ -231,7 +236,12 @@ class NodeLoop:
             health = self._node.tell_health(
                 self._state, stamp_of(now), self._link, is_open=self._is_open, counts=counts
             )
-            self._network.publish(*health)
+            self._publish([health])
+
+    def _publish(self, messages: Iterable[tuple[Topic, Message]]) -> None:
+        with postponed():
+            for topic, message in messages:
+                self._network.publish(topic, message)
 
     def _tell(self, news: RobotState | Notice) -> None:
         """Take what the client's thread tells."""
@@ -246,8 +256,7 @@ class NodeLoop:
 
     def _take_notice(self, notice: Notice) -> None:
         if isinstance(notice, PacketArrived):
-            for topic, message in self._node.take_packet(notice.packet, stamp_of(wall_clock())):
-                self._network.publish(topic, message)
+            self._publish(self._node.take_packet(notice.packet, stamp_of(wall_clock())))
         if isinstance(notice, Connected):
             self._begin()
         if isinstance(notice, LinkLost | GaveUp):

@@ -27,7 +27,7 @@ from p2os.pioneer.serve.multi_robot_world import MultiRobotWorld
 from p2os.pioneer.serve.paced_line import PacedLine
 from p2os.pioneer.serve.robot_time import SETTLE_NS, RobotTime
 from p2os.pioneer.serve.world_orders import change_world
-from p2os.transport.ports import READ_BYTES, Listener, Transport
+from p2os.transport.ports import READ_BYTES, HungUpError, Listener, Transport
 from p2os.transport.waiting import BLIND_POLL_S, ClosingLines, has_hung_up, wait_readable, waits_of
 from p2os.transport.wall_clock import wall_clock
 from simbase.timing import NS_PER_S, Nanos
@@ -263,6 +263,8 @@ class Host:
             return
         try:
             self._client.write(data)
+        except HungUpError:  # what it sent before may still wait, its STOP: reading it ends with the same
+            return
         except TransportError as error:
             self._drop_client(str(error))
 

@@ -5,6 +5,7 @@ import os
 import select
 import signal
 import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,6 +14,7 @@ from typing import Any, cast
 import pytest
 
 from p2os.cli.robots.ros import HEALTH_NS, LOOK_S, NodeLoop, stamp_of
+from p2os.cli.signals import end_on_signals, restored_signals
 from p2os.client import LinkLostError, Robot
 from p2os.client.notices import DeadmanStopped, LinkLost, MotorsDisabledError
 from p2os.client.observer import Observer
@@ -188,6 +190,25 @@ def test_a_stamp_is_the_time_since_1970_of_an_instant_of_the_wall_clock() -> Non
     assert abs(stamp_of(now) - stamp_of(now - 50 * NS_PER_MS) - 50 * NS_PER_MS) < 10 * NS_PER_MS
 
 
+@pytest.mark.parametrize("name", ["announce", "subscribe", "serve", "take", "publish"])
+def test_a_signal_waits_until_a_call_of_the_network_has_returned(name: str) -> None:
+    network, returned = Network(), []
+    called = getattr(network, name)
+
+    def interrupted(*words: object) -> object:
+        if not returned:
+            signal.raise_signal(signal.SIGTERM)
+        returned.append(called(*words))
+        return returned[-1]
+
+    setattr(network, name, interrupted)
+    with restored_signals():
+        end_on_signals()
+        with pytest.raises(KeyboardInterrupt, match="SIGTERM"):
+            ran(Client(), network, turns=2)
+    assert returned
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_signal_stops_the_robot_before_the_node_ends(number: int) -> None:
@@ -203,7 +224,10 @@ def test_a_signal_stops_the_robot_before_the_node_ends(number: int) -> None:
         )
         with (
             subprocess.Popen(
-                [forked_python(), "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+                [sys.executable, "-X", "faulthandler", "-c", code],
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                text=True,
             ) as node,
             subprocess.Popen([forked_python(), str(PEER), domain, namespace], stdout=subprocess.PIPE) as peer,
         ):
@@ -215,7 +239,7 @@ def test_a_signal_stops_the_robot_before_the_node_ends(number: int) -> None:
                     heard = peer.stdout.readline()
                 node.send_signal(number)
                 _, told = node.communicate(timeout=15)
-                assert node.returncode == 130
+                assert node.returncode == 130, told
                 assert "the robot was stopped and let go" in told
                 assert "motors off" in " ".join(url.order("status"))
                 until(lambda: "wheels 0.000 0.000" in " ".join(url.order("status")), "a stand")  # it brakes by its ramp

@@ -116,6 +116,18 @@ def test_a_far_end_that_closes_hangs_up_after_its_last_byte(line: Line) -> None:
     assert b"".join(received) == b"bye"
 
 
+@pytest.mark.parametrize("unread", [1, 100_000])
+def test_the_last_bytes_arrive_though_those_of_the_far_side_were_never_read(tmp_path: Path, unread: int) -> None:
+    line = make_line("tcp:127.0.0.1:0", tmp_path)
+    line.near.write(bytes(unread))
+    wait_for(lambda: select.select([line.far.fileno()], [], [], 0)[0])
+    line.far.write(b"stop")
+    line.far.close()
+    line.near.write(b"a packet that is due")  # by a reset, this would fail
+    assert read_all(line.near, 4) == b"stop"
+    line.close()
+
+
 def test_the_next_client_is_served_after_the_first_has_left(line: Line, tmp_path: Path) -> None:
     if line.listener.description.startswith("loop:"):
         pytest.skip("a loop is opened through its Loops")

@@ -121,7 +121,10 @@ class Gdb:
                 line.sendall(frame(packet))
                 received = b""
                 while len(received.partition(b"#")[2]) < 2:
-                    received += line.recv(1)
+                    byte = line.recv(1)
+                    if not byte:  # the server has gone
+                        return
+                    received += byte
                 self.answers.append(received.partition(b"$")[2].partition(b"#")[0])
 
 
@@ -134,8 +137,10 @@ def gdb(monkeypatch: pytest.MonkeyPatch) -> list[bytes]:
 
     class Called(GdbServer):
         def serve(self, *, once: bool = False) -> bool:
-            Gdb(self.port, packets)
-            return super().serve(once=once)
+            debugger = Gdb(self.port, packets)
+            is_over = super().serve(once=once)
+            debugger.thread.join(LIMIT_S)
+            return is_over
 
     monkeypatch.setattr("robot_bench.cli.debugging.gdb.GdbServer", Called)
     return packets

@@ -123,6 +123,31 @@ def test_a_client_that_vanishes_stops_the_robot_and_the_next_is_served(served: S
         assert (state.open, state.left_setpoint_mps) == (False, 0.0)
 
 
+def test_what_a_client_sent_before_it_reset_the_connection_is_read_though_a_packet_is_due(
+    make_robot: Callable[..., Any],
+) -> None:
+    robot, now, listener = make_robot(), [0], listen_url("tcp:127.0.0.1:0")
+    host = Host(robot.pioneer, listener, clock=lambda: now[0])
+    received, receive = bytearray(), robot.pioneer.receive
+    robot.pioneer.receive = lambda data, at: (received.extend(data), receive(data, at))
+    with socket.create_connection(("127.0.0.1", int(listener.description.rpartition(":")[2]))) as client:
+        client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        for number in (0, 1, 2, C.OPEN):
+            client.sendall(Command(number).to_frame().to_bytes())
+            for _ in range(3):
+                host.turn(0.01)
+                now[0] += 20 * NS_PER_MS
+        stop = Command(C.STOP).to_frame().to_bytes()
+        client.sendall(stop)
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")
+    now[0] += 110 * NS_PER_MS
+    for _ in range(3):
+        host.turn(0.01)
+    assert received.endswith(stop)
+    assert host.client is None
+    host.close()
+
+
 def test_packets_come_no_faster_than_the_clock_goes(served: Served) -> None:
     begun_ns = wall_clock()
     caller = Caller(served.url)
