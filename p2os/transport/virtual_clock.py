@@ -19,9 +19,9 @@ jump, as somebody may have changed it.
 Bytes must arrive as they are sent, as those of a socket of this machine do; a robot on
 a cable or in another process has a time of its own. What a thread waits for elsewhere
 (a lock, an event, `time.sleep`, a real port) stops the clock: `until` waits for such things.
-Times are repeatable, but for that of a close, which looks every 2 ms of either time; what
-comes first of several things that happen at one time is not. For runs that repeat byte
-for byte there is the bench.
+Which of several things that happen at one time comes first is left to the system, so a
+packet may come a cycle later in another run. For runs that repeat byte for byte there
+is the bench.
 
 Invariant: the clock moves only while each of its threads waits.
 """

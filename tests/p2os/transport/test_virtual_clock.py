@@ -186,11 +186,11 @@ def session() -> list[Nanos]:
     return times
 
 
-def test_a_session_takes_the_same_time_each_time_and_less_than_it_says() -> None:
+def test_a_session_takes_as_long_each_time_to_a_packet_and_less_than_it_says() -> None:
     began_s = os.times().elapsed
     first = session()
     took_s = os.times().elapsed - began_s
-    assert session() == first
+    assert session() == pytest.approx(first, abs=200 * NS_PER_MS)  # two of its steps wait for packets, one each 100 ms
     assert [first[2] - first[1], first[1] - first[0] > NS_PER_S] == [2 * NS_PER_S, True]
     assert took_s < first[-1] / NS_PER_S
 
