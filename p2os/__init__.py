@@ -6,7 +6,8 @@
         robot.drive(0.2)
 
 `Robot` is the blocking client (`p2os.client.aio` has the one for asyncio), `served_pioneer` a
-virtual robot in the background. Names are fetched on first use: importing the package loads no port.
+virtual robot in the background; on a `VirtualClock` both take no longer than their work does.
+Names are fetched on first use: importing the package loads no port.
 """
 
 from typing import TYPE_CHECKING
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     )
     from p2os.pioneer.serve import served_pioneer
     from p2os.robots.parameters import load_parameters
+    from p2os.transport.virtual_clock import VirtualClock
     from simbase.errors import P2osError
 
 __all__ = [
@@ -44,6 +46,7 @@ __all__ = [
     "Robot",
     "RobotPose",
     "RobotState",
+    "VirtualClock",
     "load_parameters",
     "served_pioneer",
 ]
@@ -67,6 +70,7 @@ if not TYPE_CHECKING:
             ),
             "p2os.pioneer.serve": ("served_pioneer",),
             "p2os.robots.parameters": ("load_parameters",),
+            "p2os.transport.virtual_clock": ("VirtualClock",),
             "simbase.errors": ("P2osError",),
         },
     )

@@ -77,6 +77,7 @@ class Robot(RobotCalls):
             url, model=model, auto_enable=auto_enable, reconnect=reconnect, deadman_s=deadman_s, settings=settings
         )
         self.url = url
+        self._clock = clock
         self._core = core
         self._robot_loop = RobotLoop(core, baud, lambda: opener(url), clock)
         self._finalizer = weakref.finalize(self, self._robot_loop.finish)
@@ -145,9 +146,9 @@ class Robot(RobotCalls):
         Ends when the client does, and after `lasts_s` seconds, also while the robot is lost; None: never.
         """
         last: RobotState | None = None
-        ends = None if lasts_s is None else wall_clock() + round(lasts_s * NS_PER_S)
-        while ends is None or wall_clock() < ends:
-            left_s = None if ends is None else (ends - wall_clock()) / NS_PER_S
+        ends = None if lasts_s is None else self._clock() + round(lasts_s * NS_PER_S)
+        while ends is None or self._clock() < ends:
+            left_s = None if ends is None else (ends - self._clock()) / NS_PER_S
             last = await self._robot_loop.do(newer_state(self._core, last, left_s))
             if last is None:
                 return

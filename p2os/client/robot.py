@@ -76,6 +76,7 @@ class Robot(RobotCalls):
             url, model=model, auto_enable=auto_enable, reconnect=reconnect, deadman_s=deadman_s, settings=settings
         )
         self.url = url
+        self._clock = clock
         self._thread = RobotThread(core, baud, lambda: opener(url), clock)
         self._finalizer = weakref.finalize(self, self._thread.shut_down)
 
@@ -156,9 +157,9 @@ class Robot(RobotCalls):
         Ends when the client does, and after `lasts_s` seconds, also while the robot is lost; None: never.
         """
         last: RobotState | None = None
-        ends = None if lasts_s is None else wall_clock() + round(lasts_s * NS_PER_S)
-        while ends is None or wall_clock() < ends:
-            left_s = None if ends is None else (ends - wall_clock()) / NS_PER_S
+        ends = None if lasts_s is None else self._clock() + round(lasts_s * NS_PER_S)
+        while ends is None or self._clock() < ends:
+            left_s = None if ends is None else (ends - self._clock()) / NS_PER_S
             last = self._thread.do(newer_state(self._thread.core, last, left_s))
             if last is None:
                 return

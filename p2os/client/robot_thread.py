@@ -23,7 +23,7 @@ from p2os.client.core import RobotCore
 from p2os.client.line import Line, Listeners, Result, Waiting
 from p2os.errors import TransportError
 from p2os.transport.ports import Transport
-from p2os.transport.waiting import BLIND_POLL_S, wait_readable
+from p2os.transport.waiting import BLIND_POLL_S, waits_of
 from p2os.transport.wall_clock import Clock, wall_clock
 from simbase.errors import P2osError
 from simbase.interrupts import held_back
@@ -60,6 +60,7 @@ class RobotThread:
         self._lock = threading.RLock()
         self.changed = threading.Condition(self._lock)
         self._line = Line(core, baud, clock)
+        self._waits = waits_of(clock)
         self._open_line = open_line
         self._thread: threading.Thread | None = None
         self._wake, self._wake_push = socket.socketpair()
@@ -82,6 +83,7 @@ class RobotThread:
             if self._thread is None:
                 self._thread = threading.Thread(target=self._run, name="p2os-robot", daemon=True)
                 self._thread.start()
+                self._waits.add(self._thread)
 
     def call(self, call: Callable[[RobotCore, Nanos], Result]) -> Result:
         """Act on the core, now; what it wants to send leaves at once."""
@@ -97,7 +99,7 @@ class RobotThread:
         """Wait, under `changed`, until something is so; the deadman does not trip meanwhile."""
         for left_s in self._line.waits(is_so, timeout_s):
             self._check()
-            self.changed.wait(left_s)
+            self._waits.wait_for_change(self.changed, left_s)
         return is_so(self.core)
 
     def do(self, waiting: Waiting[Result]) -> Result:
@@ -138,13 +140,13 @@ class RobotThread:
             return
         handover_s = min(time.monotonic() + HANDOVER_S, ends_s)
         while self._thread is not None and not self._is_closing and time.monotonic() < handover_s:
-            time.sleep(LOOK_S)
+            self._waits.look(LOOK_S)
         if not self._is_closing:
             with self._locked():
                 self._line.finish()
                 self._is_closing = True  # only now: who is interrupted before comes here again
         while self._thread is not None and not self._has_ended and time.monotonic() < ends_s:
-            time.sleep(LOOK_S)
+            self._waits.look(LOOK_S)
         if not self._has_ended:
             with self._locked():
                 self._line.finish()
@@ -172,10 +174,13 @@ class RobotThread:
             with self._locked():
                 self._is_closing = True
                 self._line.finish()
-                self._has_ended = True
-                with contextlib.suppress(RuntimeError):  # without the lock nobody can be notified; their waits time out
-                    self.changed.notify_all()
-            self._line.log_end()
+            try:
+                self._line.log_end()  # before the program goes on: whoever has closed finds it written
+            finally:
+                with self._locked():
+                    self._has_ended = True
+                    with contextlib.suppress(RuntimeError):  # without the lock nobody is notified; their waits time out
+                        self.changed.notify_all()
 
     def _turn(self) -> bool:
         """Do what is due; return whether all is over."""
@@ -216,7 +221,7 @@ class RobotThread:
                     waiting.append(transport.fileno())
                 except TransportError:
                     wait_s = min(wait_s, BLIND_POLL_S)
-        wait_readable(waiting, wait_s)
+        self._waits.wait_readable(waiting, wait_s)
         with contextlib.suppress(BlockingIOError):
             self._wake.recv(4096)
 

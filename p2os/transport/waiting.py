@@ -4,15 +4,18 @@
 `has_hung_up` asks whether the far side has gone, without reading what it has left behind.
 `ClosingLines` keeps the lines of peers that were refused until they have read why: to
 close a socket whose bytes are unread resets the connection, and the reset overtakes the
-reason. Opening and reading lines is the transports' (`p2os.transport.ports`).
+reason. Opening and reading lines is the transports' (`p2os.transport.ports`). `waits_of`
+gives how the threads of a client or host wait by their clock: really, or on a virtual one.
 
 Invariant: no wait lasts longer than it was asked to.
 """
 
 import contextlib
 import select
+import threading
 import time
 from collections.abc import Iterable
+from typing import Protocol, runtime_checkable
 
 from p2os.errors import TransportError
 from p2os.transport.ports import READ_BYTES, Transport
@@ -52,6 +55,51 @@ def wait_readable(descriptors: Iterable[int], longest_s: float) -> set[int]:
     for descriptor in found:
         poll.register(descriptor, select.POLLIN)
     return {descriptor for descriptor, _ in poll.poll(longest_s * 1000)}
+
+
+@runtime_checkable
+class Waits(Protocol):
+    """How the threads of a program wait for lines and for each other."""
+
+    def wait_readable(self, descriptors: Iterable[int], longest_s: float) -> set[int]:
+        """Wait for descriptors, as the function of this name."""
+        ...
+
+    def wait_for_change(self, changed: threading.Condition, longest_s: float) -> None:
+        """Wait under a condition, at most so long; who calls looks again whether it is what was waited for."""
+        ...
+
+    def look(self, longest_s: float) -> None:
+        """Let others work for so long at most, before this thread looks what they have done; takes no lock."""
+        ...
+
+    def add(self, thread: threading.Thread) -> None:
+        """Make a thread known that was started."""
+        ...
+
+
+class RealWaits:
+    """Waits in real time, where threads need not know of each other."""
+
+    def wait_readable(self, descriptors: Iterable[int], longest_s: float) -> set[int]:
+        """Wait for descriptors."""
+        return wait_readable(descriptors, longest_s)
+
+    def wait_for_change(self, changed: threading.Condition, longest_s: float) -> None:
+        """Wait until a condition is notified."""
+        changed.wait(longest_s)
+
+    def look(self, longest_s: float) -> None:
+        """Sleep."""
+        time.sleep(longest_s)
+
+    def add(self, thread: threading.Thread) -> None:
+        """Do nothing."""
+
+
+def waits_of(clock: Clock) -> Waits:
+    """Return how threads with this clock wait: its own way where it has one (`VirtualClock`), else in real time."""
+    return clock if isinstance(clock, Waits) else RealWaits()
 
 
 def wait_for_bytes(transport: Transport, longest_s: float) -> None:

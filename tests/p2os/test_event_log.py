@@ -5,12 +5,14 @@ import logging
 import re
 import subprocess
 import sys
+import time
 
 import pytest
 
 from p2os import Robot, served_pioneer
 from p2os.client import aio
 from p2os.event_log import log_event, logger
+from p2os.transport.virtual_clock import VirtualClock
 from simbase.timing import NS_PER_S
 from tests.p2os.client.served_robot import QUICK, Recorder, ServedRobot, until
 
@@ -21,7 +23,8 @@ def lines(caplog: pytest.LogCaptureFixture, part: str) -> list[str]:
 
 def test_a_client_logs_its_session_and_a_host_its_client(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.DEBUG, "p2os")
-    with served_pioneer(body="kinematic") as url, Robot(url, settings=QUICK) as robot:
+    clock = VirtualClock()
+    with served_pioneer(body="kinematic", clock=clock) as url, Robot(url, settings=QUICK, clock=clock) as robot:
         robot.next_state()
         url.order("fault sonar-stuck 3 1.2")
         url.reset()
@@ -33,6 +36,28 @@ def test_a_client_logs_its_session_and_a_host_its_client(caplog: pytest.LogCaptu
     assert any(line.endswith("s: fault: sonar-stuck 3 1.2") for line in serve)
     assert any("s: started over: " in line for line in serve)
     assert all(line.split()[1] == url for line in serve)
+
+
+def test_whoever_has_closed_a_client_finds_that_logged() -> None:
+    class Slow(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            if record.getMessage() == "closed":
+                time.sleep(0.1)
+                logged.append("closed")
+
+    logged: list[str] = []
+    handler, of_clients = Slow(), logging.getLogger("p2os.client")
+    level = of_clients.level
+    of_clients.addHandler(handler)
+    of_clients.setLevel(logging.INFO)
+    clock = VirtualClock()
+    try:
+        with served_pioneer(body="kinematic", clock=clock) as url, Robot(url, settings=QUICK, clock=clock) as robot:
+            robot.close()
+            assert logged == ["closed"]
+    finally:
+        of_clients.removeHandler(handler)
+        of_clients.setLevel(level)
 
 
 def test_an_asyncio_client_logs_the_same(caplog: pytest.LogCaptureFixture) -> None:
@@ -67,9 +92,10 @@ def test_a_lost_line_and_the_way_back_are_logged(caplog: pytest.LogCaptureFixtur
 
 def test_packets_that_a_noisy_line_spoils_are_logged_at_most_once_a_second(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.INFO, "p2os")
-    with served_pioneer(body="kinematic") as url, Robot(url, settings=QUICK) as robot:
+    clock = VirtualClock()
+    with served_pioneer(body="kinematic", clock=clock) as url, Robot(url, settings=QUICK, clock=clock) as robot:
         url.order("fault line-noise 0.001")
-        until(lambda: any("dropped" in line for line in lines(caplog, "client")), "a dropped packet")
+        clock.until(lambda: any("dropped" in line for line in lines(caplog, "client")))
         url.order("clear line-noise")
         robot.close()
     dropped = [line for line in lines(caplog, "client") if "dropped" in line]

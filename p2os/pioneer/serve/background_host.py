@@ -5,31 +5,37 @@
             robot.drive(0.5)
         served.reset()
 
-It is `p2os serve` in a thread: real time, one client at a time.
+It is `p2os serve` in a thread: real time, one client at a time; with a `VirtualClock` as
+fast as the machine is.
 """
 
 import contextlib
 import queue
+import socket
 import threading
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
-from concurrent.futures import TimeoutError as NotInTimeError
 from typing import Self
 
 from p2os.pioneer.body.factory import BEST, make_body
 from p2os.pioneer.controller import ControllerSettings, Pioneer
-from p2os.pioneer.serve.host import Host
+from p2os.pioneer.serve.host import IDLE_WAIT_S, Host
 from p2os.pioneer.serve.orders import carry_out
 from p2os.pioneer.world import load_world
 from p2os.robots.parameters import load_parameters
 from p2os.transport import listen_url
+from p2os.transport.waiting import Waits, waits_of
+from p2os.transport.wall_clock import Clock, wall_clock
 from simbase.errors import P2osError
 from simbase.timing import Nanos
 
-#: chosen: the host looks up twice a second; on a busy machine it may take longer.
+#: chosen: the host looks up at once; on a busy machine it may take longer.
 ENDING_S = 30.0
-#: chosen: how soon a thread that waits for an answer learns that there will be none.
-LOOK_S = 1.0
+#: chosen: how often a thread that waits for an answer looks whether it has come, if nobody tells it.
+PATIENCE_S = 1.0
+#: chosen: how often a program that ends serving looks whether that is done.
+LOOK_S = 0.002
 
 
 class ServedPioneer(str):
@@ -62,7 +68,7 @@ class ServedPioneer(str):
         self.order("reset")
 
     def order(self, words: str) -> list[str]:
-        """Execute an order of `p2os serve`'s operator within half a second, and return the answer's lines.
+        """Execute an order of `p2os serve`'s operator, and return the answer's lines.
 
         Raises:
             UsageError: The words mean nothing; `help` returns what there is.
@@ -73,34 +79,67 @@ class ServedPioneer(str):
 
 
 class _Orders:
-    """Orders on their way from a program's threads to the robot's."""
+    """Orders on their way from a program's threads to the robot's, which serves and carries them out."""
 
-    def __init__(self) -> None:
+    def __init__(self, host: Host, waits: Waits) -> None:
+        self._host, self._waits = host, waits
         self._waiting: queue.SimpleQueue[tuple[str, Future[list[str]]]] = queue.SimpleQueue()
-        self._is_over = threading.Event()
+        self._bell, self._push = socket.socketpair()
+        self._changed = threading.Condition()
+        self._is_over = self._has_ended = False
 
     def give(self, words: str) -> list[str]:
         """Wait until an order is carried out."""
         answer: Future[list[str]] = Future()
         self._waiting.put((words, answer))
-        while not self._is_over.is_set():
-            with contextlib.suppress(NotInTimeError):
-                return answer.result(LOOK_S)
+        self._ring()
+        with self._changed:
+            while not (answer.done() or self._is_over or self._has_ended):
+                self._waits.wait_for_change(self._changed, PATIENCE_S)
+        if answer.done():
+            return answer.result()
         raise P2osError("the virtual robot is served no more")
 
-    def carry_out(self, host: Host) -> bool:
-        """Carry out what was given, in the robot's thread; return whether serving is to end."""
+    def end(self) -> None:
+        """End serving.
+
+        Raises:
+            P2osError: The thread does not end.
+        """
+        self._is_over = True
+        self._ring()
+        ends_s = time.monotonic() + ENDING_S
+        while not self._has_ended and time.monotonic() < ends_s:
+            self._waits.look(LOOK_S)
+        if not self._has_ended:
+            raise P2osError("the virtual robot's thread does not end")
+
+    def serve(self) -> None:
+        """Serve the robot until that is to end: what its thread does."""
+        host = self._host
+        try:
+            while not self._is_over:
+                self._carry_out()
+                host.turn(IDLE_WAIT_S, woken_by=(self._bell.fileno(),))
+        finally:
+            host.close()
+            with self._changed:
+                self._has_ended = True
+                self._changed.notify_all()
+
+    def _carry_out(self) -> None:
         while not self._waiting.empty():
+            self._bell.recv(1)
             words, answer = self._waiting.get()
             try:
-                answer.set_result(carry_out([host], words))
+                answer.set_result(carry_out([self._host], words))
             except P2osError as error:
                 answer.set_exception(error)
-        return self._is_over.is_set()
+            with self._changed:
+                self._changed.notify_all()
 
-    def end(self) -> None:
-        """Let serving end."""
-        self._is_over.set()
+    def _ring(self) -> None:
+        self._push.send(b"\0")
 
 
 @contextlib.contextmanager
@@ -113,6 +152,7 @@ def served_pioneer(
     seed: int = 0,
     settings: ControllerSettings | None = None,
     on_event: Callable[[Nanos, str, str], None] | None = None,
+    clock: Clock = wall_clock,
 ) -> Iterator[ServedPioneer]:
     """Serve a virtual robot while the block runs, and give the URL that clients connect to.
 
@@ -124,6 +164,7 @@ def served_pioneer(
         seed: Of everything random.
         settings: How the robot's firmware behaves.
         on_event: Called with (nanoseconds, what, detail) from the robot's thread.
+        clock: Nanoseconds; never goes back. That of the client's too, where it is a `VirtualClock`.
 
     Raises:
         P2osError: There is no such robot, world or body, or the place is taken.
@@ -133,16 +174,13 @@ def served_pioneer(
     physical.reset(place.start, seed)
     pioneer = Pioneer(parameters=parameters, body=physical, settings=settings, on_event=on_event)
     listener = listen_url(url)
-    host = Host(pioneer, listener, on_event=on_event)
-    orders = _Orders()
-    thread = threading.Thread(
-        target=lambda: host.run(until=lambda: orders.carry_out(host)), name="p2os-pioneer", daemon=True
-    )
+    host = Host(pioneer, listener, on_event=on_event, clock=clock)
+    waits = waits_of(clock)
+    orders = _Orders(host, waits)
+    thread = threading.Thread(target=orders.serve, name="p2os-pioneer", daemon=True)
     thread.start()
+    waits.add(thread)
     try:
         yield ServedPioneer(listener.description, physical.name, orders)
     finally:
         orders.end()
-        thread.join(ENDING_S)
-        if thread.is_alive():
-            raise P2osError("the virtual robot's thread does not end")

@@ -28,7 +28,7 @@ from p2os.pioneer.serve.paced_line import PacedLine
 from p2os.pioneer.serve.robot_time import SETTLE_NS, RobotTime
 from p2os.pioneer.serve.world_orders import change_world
 from p2os.transport.ports import READ_BYTES, HungUpError, Listener, Transport
-from p2os.transport.waiting import BLIND_POLL_S, ClosingLines, has_hung_up, wait_readable
+from p2os.transport.waiting import BLIND_POLL_S, ClosingLines, has_hung_up, wait_readable, waits_of
 from p2os.transport.wall_clock import wall_clock
 from simbase.timing import NS_PER_S, Nanos
 
@@ -39,7 +39,7 @@ _LOG = logger("serve")
 LEADING_WAIT_S = 0.005
 #: chosen: well below the pause, and often enough for a robot that is connected but not open.
 ACTIVE_WAIT_S = 0.1
-#: chosen: how soon `run` notices that it should end.
+#: chosen: how soon a fleet notices that it should end.
 IDLE_WAIT_S = 0.5
 #: chosen: no P2OS client sends more than its line carries for so long; one that does, or has left as much, is dropped.
 LONGEST_BEHIND_NS: Nanos = 5 * NS_PER_S
@@ -99,6 +99,7 @@ class Host:
             self._bring = partial(multi_robot_world.bring, number)
         self._client: Transport | None = None
         self._closing_lines = ClosingLines(self._time.clock)
+        self._waits = waits_of(self._time.clock)
         self._sync_limit_ns = sync_limit_ns
         #: When the client came, and when it had an open session last.
         self._came_at: Nanos = 0
@@ -124,21 +125,13 @@ class Host:
         """Return who is connected, or None."""
         return None if self._client is None else self._client.description
 
-    def run(self, *, until: Callable[[], bool] = lambda: False) -> None:
-        """Serve until `until` is true or an exception (Ctrl-C) ends it; then close the client's line.
+    def turn(self, longest_wait_s: float, woken_by: Sequence[int] = ()) -> None:
+        """Do what is due, then wait for the next deadline, bytes or client, at most so long.
 
-        `until` is asked after every round: at least twice a second.
+        What makes one of the descriptors `woken_by` readable ends the wait, too.
         """
-        try:
-            while not until():
-                self.turn(IDLE_WAIT_S)
-        finally:
-            self.close()
-
-    def turn(self, longest_wait_s: float) -> None:
-        """Do what is due, then wait for the next deadline, bytes or client, at most so long."""
         self.run_due()
-        wait_readable(self.descriptors(), min(self.wait_s(), longest_wait_s))
+        self._waits.wait_readable((*self.descriptors(), *woken_by), min(self.wait_s(), longest_wait_s))
         self.read_lines()
 
     def run_due(self) -> None:

@@ -1,5 +1,6 @@
 """A virtual Pioneer served over TCP in the background, for the verbs that talk to a robot."""
 
+import contextlib
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -7,8 +8,12 @@ from pathlib import Path
 
 import pytest
 
+from p2os import Robot
 from p2os.cli import main as cli
+from p2os.cli.held_robot import RobotWatch
 from p2os.pioneer.serve import served_pioneer
+from p2os.transport.virtual_clock import VirtualClock
+from p2os.transport.wall_clock import Clock, wall_clock
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "client"))  # `ServedRobot`, whose wheels can be looked at
 
@@ -25,15 +30,37 @@ class Served:
         return "\n".join(self.events)
 
 
-@pytest.fixture
-def served() -> Iterator[Served]:
-    """A 2-DX in a room on a free TCP port."""
+@contextlib.contextmanager
+def serving(clock: Clock = wall_clock) -> Iterator[Served]:
     served = Served("")
 
     def tell(_now: int, what: str, detail: str) -> None:
         served.events.append(f"{what}: {detail}")
 
-    with served_pioneer(body="kinematic", on_event=tell) as served.url:
+    with served_pioneer(body="kinematic", on_event=tell, clock=clock) as served.url:
+        yield served
+
+
+@pytest.fixture
+def served() -> Iterator[Served]:
+    """A 2-DX in a room on a free TCP port."""
+    with serving() as served:
+        yield served
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> VirtualClock:
+    """A virtual clock, in place of the real one of the verbs in this process that hold a `Robot`."""
+    clock = VirtualClock()
+    for made in (Robot, RobotWatch):
+        monkeypatch.setitem(made.__init__.__kwdefaults__, "clock", clock)  # type: ignore[misc]
+    return clock
+
+
+@pytest.fixture
+def fast(clock: VirtualClock) -> Iterator[Served]:
+    """A 2-DX in a room, on a clock that jumps where all wait."""
+    with serving(clock) as served:
         yield served
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from p2os.protocol.commands import Command, CommandNumber
 from p2os.protocol.frames import Decoder, Frame
+from p2os.transport.wall_clock import Clock, wall_clock
 from simbase.timing import Nanos
 from tests.p2os.client.served_robot import TIMEOUT_S, ServedRobot, until
 
@@ -24,10 +25,10 @@ AT_ONCE_S = 5.0
 class RecordingRobot(ServedRobot):
     """A served robot that keeps what it received."""
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Clock = wall_clock) -> None:
         self.received: list[tuple[float, Command]] = []
         decoder = Decoder()
-        super().__init__()
+        super().__init__(clock=clock)
         receive = self.pioneer.receive
 
         def hear(data: bytes, now: Nanos) -> object:
@@ -49,11 +50,11 @@ class RecordingRobot(ServedRobot):
         def found() -> float:
             return next((at for at, command in list(self.received) if at >= since and command.number == number), 0.0)
 
-        until(found, f"command {number}")
+        self.until(found, f"command {number}")
         return found()
 
     def wait_until_it_drives(self) -> None:
-        until(lambda: self.is_moving and self.pioneer.state.left_setpoint_mps > 0.02, "motion")
+        self.until(lambda: self.is_moving and self.pioneer.state.left_setpoint_mps > 0.02, "motion")
 
 
 class Driver:

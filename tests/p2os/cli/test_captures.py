@@ -17,10 +17,12 @@ from p2os.cli.captures.record import record_session
 from p2os.cli.captures.replay import motions_of, play
 from p2os.cli.captures.sniff import Bridge
 from p2os.errors import RemoteProtocolError, RunFailedError, TransportError
+from p2os.pioneer.controller import ControllerSettings
+from p2os.pioneer.serve import served_pioneer
 from p2os.protocol.commands import Command, CommandNumber
 from p2os.transport import HungUpError, Loops, listen_url, open_url, waiting
 from simbase.errors import FileError
-from simbase.timing import NS_PER_S
+from simbase.timing import NS_PER_MS, NS_PER_S
 
 TO, FROM = Direction.TO_ROBOT, Direction.FROM_ROBOT
 TIMEOUT_S = 60.0
@@ -353,13 +355,19 @@ main(sys.argv[1:])
 
 @pytest.mark.parametrize(("verb", "option"), [("record", "--pcap"), ("sniff", "--out")])
 def test_a_disk_that_fills_up_is_one_line_and_what_was_written_can_be_read(
-    verb: str, option: str, served: object, tmp_path: Path
+    verb: str, option: str, tmp_path: Path
 ) -> None:
+    often = ControllerSettings(sip_period_ns=20 * NS_PER_MS)  # the disk is full of twenty packets
+    with served_pioneer(body="kinematic", settings=often) as url:
+        fill_a_disk(verb, option, url, tmp_path)
+
+
+def fill_a_disk(verb: str, option: str, url: str, tmp_path: Path) -> None:
     full = tmp_path / ("floor.jsonl" if option == "--out" else "floor.pcap")
     other = ["--out", "/dev/null"] if (verb, option) == ("record", "--pcap") else []
     more = ["--listen", "tcp:127.0.0.1:0", "--quiet"] if verb == "sniff" else ["--for", "20s"]
     with subprocess.Popen(
-        [sys.executable, "-c", LIMITED, verb, served.url, *more, *other, option, str(full)],
+        [sys.executable, "-c", LIMITED, verb, url, *more, *other, option, str(full)],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path,
     ) as process:  # fmt: skip
         try:

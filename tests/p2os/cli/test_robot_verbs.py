@@ -33,11 +33,13 @@ from p2os.client import (
 )
 from p2os.client.notices import words_of
 from p2os.errors import RemoteProtocolError, TransportError
+from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.serve import served_pioneer
 from p2os.protocol.commands import CommandNumber
 from p2os.transport import waiting
+from p2os.transport.virtual_clock import VirtualClock
 from simbase.errors import UsageError
-from simbase.timing import NS_PER_MS, NS_PER_S
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 from tests.p2os.cli.driven import STOP, TIMEOUT_S, Driver, RecordingRobot, until
 from tests.tools.forked_python import forked_p2os
 
@@ -45,8 +47,8 @@ Run = Callable[..., int]
 Capture = pytest.CaptureFixture[str]
 
 
-def test_a_robot_drives_a_way_then_an_angle_and_stands(served: object, run: Run, capsys: Capture) -> None:
-    assert run("drive", served.url, "--forward", "10cm", "--turn", "-20deg", "--json") == 0
+def test_a_robot_drives_a_way_then_an_angle_and_stands(fast: object, run: Run, capsys: Capture) -> None:
+    assert run("drive", fast.url, "--forward", "10cm", "--turn", "-20deg", "--json") == 0
     captured = capsys.readouterr()
     done = json.loads(captured.out)
     assert [step["what"] for step in done["steps"]] == ["drive", "turn"]
@@ -54,18 +56,18 @@ def test_a_robot_drives_a_way_then_an_angle_and_stands(served: object, run: Run,
     assert done["pose"]["x_m"] == pytest.approx(0.1, abs=0.03)
     assert math.degrees(done["pose"]["heading_rad"]) == pytest.approx(-20, abs=4)
     assert captured.err.startswith("drove 0.")
-    assert "motors: on" in served.text
+    assert "motors: on" in fast.text
 
 
-def test_a_speed_is_held_for_a_time(served: object, run: Run, capsys: Capture) -> None:
-    assert run("drive", served.url, "--vel", "-100mm/s", "--for", "300ms") == 0
+def test_a_speed_is_held_for_a_time(fast: object, run: Run, capsys: Capture) -> None:
+    assert run("drive", fast.url, "--vel", "-100mm/s", "--for", "300ms") == 0
     out = capsys.readouterr().out
     assert out.startswith("at x -0.")
     assert out.endswith("heading 0.0 deg\n")
 
 
-def test_a_wall_ends_a_held_speed_with_its_reason(run: Run, capsys: Capture) -> None:
-    robot = RecordingRobot()
+def test_a_wall_ends_a_held_speed_with_its_reason(clock: VirtualClock, run: Run, capsys: Capture) -> None:
+    robot = RecordingRobot(clock)
     try:
         began = time.monotonic()
         assert run("drive", robot.url, "--vel", "-1.5m/s", "--for", "30s") == 1
@@ -113,21 +115,24 @@ def test_a_way_that_ends_with_the_link_does_not_claim_that_the_robot_was_told(ru
     assert "hint: its watchdog stops the robot" in error
 
 
-def test_motors_that_go_off_end_a_held_speed(run: Run, capsys: Capture) -> None:
-    robot = RecordingRobot()
+def test_motors_that_go_off_end_a_held_speed(clock: VirtualClock, run: Run, capsys: Capture) -> None:
+    robot = RecordingRobot(clock)
 
-    def press() -> None:
-        robot.wait_until_it_drives()
-        robot.do_in_thread(lambda pioneer, now: pioneer.do("fault stop-button", now))
+    def press(pioneer: Pioneer, now: Nanos) -> None:
+        if robot.is_moving:
+            pioneer.do("fault stop-button", now)
+        else:
+            robot.requests.append(press)
 
-    thread = threading.Thread(target=press)
-    thread.start()
+    robot.requests.append(press)
     try:
         assert run("drive", robot.url, "--vel", "100mm/s", "--for", "30s") == 1
+        assert clock() < 30 * NS_PER_S
     finally:
-        thread.join(TIMEOUT_S)
         robot.close()
-    assert capsys.readouterr().err.startswith("p2os: hold 0.10 m/s, 0 deg/s: ")
+    error = capsys.readouterr().err
+    assert error.startswith("p2os: hold 0.10 m/s, 0 deg/s: for 1 s the wheels are at 0.00 and 0.00 m/s, commanded 0.10")
+    assert "are the motors disabled" in error
 
 
 @pytest.mark.parametrize(
@@ -144,9 +149,9 @@ def test_what_ends_a_watched_wait(notice: Notice, moves: bool, problem: str | No
     assert problem_of(notice, moves=moves) == problem
 
 
-def test_a_pause_ends_a_watched_wait_and_stops_the_robot(served: object) -> None:
+def test_a_pause_ends_a_watched_wait_and_stops_the_robot(fast: object) -> None:
     times = iter([0, 450 * NS_PER_MS])
-    with Robot(served.url) as robot:
+    with Robot(fast.url) as robot:
         robot.set_velocity(0.1)
         with pytest.raises(MotionError, match=r"hold: this program paused for 0\.4 s, after 0\.5 s"):
             RobotWatch(robot, "hold", moves=True, clock=lambda: next(times)).wait(NS_PER_S)
@@ -154,10 +159,10 @@ def test_a_pause_ends_a_watched_wait_and_stops_the_robot(served: object) -> None
         assert robot.state.forward_mps == pytest.approx(0, abs=0.02)
 
 
-def test_a_command_is_sent_and_its_answer_shown(served: object, run: Run, capsys: Capture) -> None:
-    assert run("send", served.url, "sonar", "0", "--wait", "50ms") == 0
+def test_a_command_is_sent_and_its_answer_shown(fast: object, run: Run, capsys: Capture) -> None:
+    assert run("send", fast.url, "sonar", "0", "--wait", "50ms") == 0
     assert capsys.readouterr().out == "sent SONAR: fa fb 06 1c 3b 00 00 1c 3b\n"
-    assert run("send", served.url, "DHEAD", "-5", "--wait", "50ms", "--json") == 0
+    assert run("send", fast.url, "DHEAD", "-5", "--wait", "50ms", "--json") == 0
     assert json.loads(capsys.readouterr().out)["sent"] == {
         "command": "DHEAD", "number": 13, "hex": "fafb060d1b0500121b",
     }  # fmt: skip
@@ -202,28 +207,34 @@ def test_a_robot_is_found_and_identified(served: object, run: Run, capsys: Captu
     assert "motors: on" not in served.text
 
 
-def test_states_are_printed_where_there_is_no_terminal(served: object, run: Run, capsys: Capture) -> None:
-    assert run("monitor", served.url, "--for", "150ms", "--json") == 0
+def test_states_are_printed_where_there_is_no_terminal(fast: object, run: Run, capsys: Capture) -> None:
+    assert run("monitor", fast.url, "--for", "150ms", "--json") == 0
     rows = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert rows[0]["x_m"] == 0
     assert rows[0]["sonar_m"]
-    assert run("monitor", served.url, "--for", "50ms") == 0
+    assert run("monitor", fast.url, "--for", "50ms") == 0
     captured = capsys.readouterr()
     assert captured.out.startswith("x 0.000 m, y 0.000 m, heading 0.0 deg, 0.000 m/s, 0.0 deg/s, 12.6 V, nearest ")
     assert captured.err.endswith(" packets\n")
 
 
 def test_a_robot_that_goes_away_is_told_and_does_not_hold_the_monitor_beyond_its_time(
-    run: Run, capsys: Capture
+    clock: VirtualClock, run: Run, capsys: Capture
 ) -> None:
     with contextlib.ExitStack() as stack:
-        url = stack.enter_context(served_pioneer(body="kinematic"))
-        leaving = threading.Timer(0.6, stack.close)
-        leaving.start()
-        began = time.monotonic()
+        url = stack.enter_context(served_pioneer(body="kinematic", clock=clock))
+
+        def leave() -> None:
+            clock.sleep(0.6)
+            stack.close()
+
+        with clock.standing():
+            leaving = threading.Thread(target=leave)
+            leaving.start()
+            clock.add(leaving)
         assert run("monitor", url, "--for", "2s", "--json") == 1
-        assert time.monotonic() - began < TIMEOUT_S / 2
-        leaving.join()
+        assert clock() < 5 * NS_PER_S
+        clock.until(lambda: not leaving.is_alive())
     captured = capsys.readouterr()
     assert json.loads(captured.out.splitlines()[0])["x_m"] == 0
     assert captured.err.startswith("link lost: ")
@@ -355,8 +366,8 @@ def test_a_slow_latency_timer_is_told(timer: str, is_reported: bool, tmp_path: o
     assert ("latency timer of 16 ms" in guess(port, tmp_path)) is is_reported
 
 
-def test_time_counts_from_the_first_packet(served: object, run: Run, capsys: Capture) -> None:
-    assert run("monitor", served.url, "--for", "250ms", "--json") == 0
+def test_time_counts_from_the_first_packet(fast: object, run: Run, capsys: Capture) -> None:
+    assert run("monitor", fast.url, "--for", "250ms", "--json") == 0
     times = [json.loads(line)["t"] for line in capsys.readouterr().out.splitlines()]
     assert times[0] == 0
     assert 0 < times[-1] < 2
@@ -366,15 +377,15 @@ def test_time_counts_from_the_first_packet(served: object, run: Run, capsys: Cap
     ("arguments", "is_said"), [(["1"], True), (["1", "0"], True), (["0", "1"], False), (["0x09", "0x19"], False)]
 )
 def test_a_digital_output_without_a_mask_says_that_nothing_changes(
-    served: object, run: Run, capsys: Capture, arguments: list[str], is_said: bool
+    fast: object, run: Run, capsys: Capture, arguments: list[str], is_said: bool
 ) -> None:
-    assert run("send", served.url, "DIGOUT", *arguments, "--wait", "50ms") == 0
+    assert run("send", fast.url, "DIGOUT", *arguments, "--wait", "50ms") == 0
     assert ("DIGOUT with mask 0 changes no output" in capsys.readouterr().err) is is_said
 
 
-def test_a_speed_above_the_robots_own_is_said(served: object, run: Run, capsys: Capture) -> None:
+def test_a_speed_above_the_robots_own_is_said(fast: object, run: Run, capsys: Capture) -> None:
     words = ("--vel", "9m/s", "--turn-rate", "2000deg/s", "--for", "50ms")
-    assert run("drive", served.url, *words) == 0
+    assert run("drive", fast.url, *words) == 0
     err = capsys.readouterr().err
     assert "note: --vel 9.00 m/s is above this robot's limit, " in err
     assert "note: --turn-rate 2000 deg/s is above this robot's limit, " in err

@@ -23,6 +23,7 @@ from p2os.protocol.commands import Command
 from p2os.protocol.frames import Frame
 from p2os.robots.parameters import RobotParameters, load_parameters
 from simbase.timing import NS_PER_MS, NS_PER_S
+from tests.p2os.perfect_body import PerfectBody
 
 MS, S = NS_PER_MS, NS_PER_S
 #: bytes and random source → pieces that arrive, each with its delay.
@@ -49,9 +50,16 @@ def parameters(model: str = "p2dx") -> RobotParameters:
 
 
 def new_pioneer(model: str = "p2dx", **settings: object) -> Pioneer:
+    """Return a robot in a room, with walls."""
     world = load_world("arena", seed=0) if settings.pop("crowded", False) else load_world("room")
     body = make_body("kinematic", world, parameters(model))
     body.reset(world.start, 0)
+    return Pioneer(parameters=parameters(model), body=body, settings=ControllerSettings(**settings))  # type: ignore[arg-type]
+
+
+def free_pioneer(model: str = "p2dx", **settings: object) -> Pioneer:
+    """Return a robot with nothing in its way; its controller moves it in steps of a twentieth of a packet's cycle."""
+    body = PerfectBody(dt_ns=5 * MS)
     return Pioneer(parameters=parameters(model), body=body, settings=ControllerSettings(**settings))  # type: ignore[arg-type]
 
 
@@ -65,7 +73,7 @@ class Rig:
     #: None: TCP. Else the rate of the client's port at opening.
     baud: int | None = None
     robot_baud: int = 9600
-    pioneer: Pioneer = field(default_factory=new_pioneer)
+    pioneer: Pioneer = field(default_factory=free_pioneer)
     now: int = 0
 
     def __post_init__(self) -> None:
@@ -220,4 +228,4 @@ class Rig:
             heapq.heappush(self._on_the_way, (at, self._count, to_robot, piece))
 
 
-__all__ = ["MS", "WIRES", "Link", "Rig", "S", "new_pioneer"]
+__all__ = ["MS", "WIRES", "Link", "Rig", "S", "free_pioneer", "new_pioneer"]

@@ -1,4 +1,7 @@
-"""A virtual robot served on a real line in a thread, for tests of the client's I/O layers; every wait is bounded."""
+"""A virtual robot served on a real line in a thread, for tests of the client's I/O layers; every wait is bounded.
+
+In real time, or on a `VirtualClock` that its client has too: then `ServedRobot.until` waits.
+"""
 
 import threading
 import time
@@ -9,8 +12,10 @@ from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.serve.host import Host
 from p2os.protocol.commands import Command, CommandNumber, enable, stop, vel
 from p2os.protocol.frames import Decoder, Frame
-from p2os.transport import listen_url, open_url
+from p2os.transport import Loops, listen_url, open_url
 from p2os.transport.ports import HungUpError, Transport
+from p2os.transport.virtual_clock import VirtualClock
+from p2os.transport.wall_clock import Clock, wall_clock
 from simbase.timing import NS_PER_MS, Nanos
 from tests.p2os.client.client_rig import new_pioneer
 
@@ -33,28 +38,48 @@ def until(is_so: Callable[[], object], what: str = "it") -> None:
 class ServedRobot:
     """A host in a thread."""
 
-    def __init__(self, url: str = "tcp:127.0.0.1:0", pioneer: Pioneer | None = None, *, speed: float = 1.0) -> None:
+    def __init__(
+        self, url: str = "tcp:127.0.0.1:0", pioneer: Pioneer | None = None, *,
+        speed: float = 1.0, clock: Clock = wall_clock,
+    ) -> None:  # fmt: skip
         self.pioneer = pioneer or new_pioneer()
-        #: What the robot is to do between two turns of its host: called once, in the host's thread.
+        self.clock = clock
+        #: What the robot is to do between two turns of its host: called once, in the host's thread; what one of them
+        #: adds, after the next turn.
         self.requests: list[Callable[[Pioneer, Nanos], None]] = []
-        listener = listen_url(url)
+        self._loops = Loops()
+        listener = listen_url(url, loops=self._loops)
         self.url = listener.description
         self.told: list[str] = []
         self._host = Host(
-            self.pioneer, listener, on_event=lambda _now, what, _detail: self.told.append(what), speed=speed
-        )
+            self.pioneer, listener, on_event=lambda _now, what, _detail: self.told.append(what),
+            speed=speed, clock=clock,
+        )  # fmt: skip
         self._end = threading.Event()
         self._thread = threading.Thread(target=self._serve, daemon=True)
         self._thread.start()
+        if isinstance(clock, VirtualClock):
+            clock.add(self._thread)
+
+    def open(self, url: str) -> Transport:
+        """Open the line to it, also one inside of this process."""
+        return open_url(url, loops=self._loops)
 
     def _serve(self) -> None:
         try:
             while not self._end.is_set():
                 self._host.turn(0.02)
-                while self.requests:
-                    self.requests.pop(0)(self.pioneer, self._host.now)
+                for request in tuple(self.requests):
+                    request(self.pioneer, self._host.now)
+                    self.requests.remove(request)
         finally:
             self._host.close()
+
+    @property
+    def virtual(self) -> VirtualClock:
+        """Its clock, where that is a virtual one."""
+        assert isinstance(self.clock, VirtualClock)
+        return self.clock
 
     @property
     def wheels_mps(self) -> tuple[float, float]:
@@ -68,22 +93,29 @@ class ServedRobot:
     def do_in_thread(self, call: Callable[[Pioneer, Nanos], None]) -> None:
         """Have something done to the robot, and wait until it is."""
         self.requests.append(call)
-        until(lambda: not self.requests)
+        self.until(lambda: not self.requests)
+
+    def until(self, is_so: Callable[[], object], what: str = "it") -> None:
+        """Wait until something is so, on the robot's clock."""
+        if isinstance(self.clock, VirtualClock):
+            self.clock.until(is_so)
+        else:
+            until(is_so, what)
 
     def close(self) -> None:
         self._end.set()
-        self._thread.join(TIMEOUT_S)
-        assert not self._thread.is_alive()
+        self.until(lambda: not self._thread.is_alive(), "the end of the host's thread")
 
 
 class Recorder:
     """Opens lines and keeps what is written to them."""
 
-    def __init__(self) -> None:
+    def __init__(self, opener: Callable[[str], Transport] = open_url) -> None:
+        self._open = opener
         self.lines: list[RecordedLine] = []
 
     def __call__(self, url: str) -> Transport:
-        self.lines.append(RecordedLine(open_url(url)))
+        self.lines.append(RecordedLine(self._open(url)))
         return self.lines[-1]
 
     @property

@@ -17,16 +17,17 @@ from tests.p2os.client.served_robot import CLOSING_COMMANDS, QUICK, TIMEOUT_S, R
 
 
 def robot_on(served: ServedRobot, recorder: Recorder | None = None, settings: ClientSettings = QUICK) -> Robot:
-    return Robot(served.url, settings=settings, opener=recorder or Recorder())
+    return Robot(served.url, settings=settings, opener=recorder or Recorder(served.open), clock=served.clock)
 
 
-def run(story: Coroutine[Any, Any, None]) -> None:
-    """Run a test's story, bounded."""
+def run(story: Coroutine[Any, Any, None], fast: ServedRobot | None = None) -> None:
+    """Run a test's story, bounded, on the clock of a robot where it has a virtual one."""
 
     async def bounded() -> None:
         await asyncio.wait_for(story, TIMEOUT_S)
 
-    asyncio.run(bounded())
+    with asyncio.Runner(loop_factory=None if fast is None else fast.virtual.event_loop) as runner:
+        runner.run(bounded())
 
 
 async def next_states(robot: Robot) -> None:
@@ -39,11 +40,11 @@ async def moving(served: ServedRobot) -> None:
         await asyncio.sleep(0.005)
 
 
-def test_a_block_opens_a_session_moves_and_ends_it(served: ServedRobot) -> None:
-    recorder = Recorder()
+def test_a_block_opens_a_session_moves_and_ends_it(fast: ServedRobot) -> None:
+    recorder = Recorder(fast.open)
 
     async def story() -> None:
-        async with robot_on(served, recorder) as robot:
+        async with robot_on(fast, recorder) as robot:
             assert robot.identity.subclass == "p2dx"
             first = await robot.next_state()
             assert (await robot.next_state()).number > first.number
@@ -56,16 +57,16 @@ def test_a_block_opens_a_session_moves_and_ends_it(served: ServedRobot) -> None:
         await robot.close()
         assert robot.link is Link.CLOSED
 
-    run(story())
+    run(story(), fast)
     assert recorder.sent[-4:] == CLOSING_COMMANDS
-    until(lambda: not served.pioneer.state.open)
+    fast.until(lambda: not fast.pioneer.state.open)
 
 
-def test_states_and_events_come_by_iteration_and_by_callback(served: ServedRobot) -> None:
+def test_states_and_events_come_by_iteration_and_by_callback(fast: ServedRobot) -> None:
     async def story() -> None:
         received: list[RobotState] = []
         notices: list[Notice] = []
-        async with robot_on(served) as robot:
+        async with robot_on(fast) as robot:
             end_states, end_events = robot.on_state(received.append), robot.on_event(notices.append)
             numbers = []
             async for state in robot.states():
@@ -89,7 +90,7 @@ def test_states_and_events_come_by_iteration_and_by_callback(served: ServedRobot
             assert [state async for state in states] == []
             assert [event async for event in robot.events()] == []
 
-    run(story())
+    run(story(), fast)
 
 
 @pytest.mark.parametrize("error", [ZeroDivisionError, KeyboardInterrupt, SystemExit])
@@ -108,27 +109,27 @@ def test_the_robot_is_stopped_whatever_ends_the_block(served: ServedRobot, error
     until(lambda: not served.is_moving and not served.pioneer.state.motors_enabled)
 
 
-def test_a_task_that_is_cancelled_in_a_drive_stops_the_robot_and_the_block_goes_on(served: ServedRobot) -> None:
-    recorder = Recorder()
+def test_a_task_that_is_cancelled_in_a_drive_stops_the_robot_and_the_block_goes_on(fast: ServedRobot) -> None:
+    recorder = Recorder(fast.open)
 
     async def story() -> None:
-        async with robot_on(served, recorder) as robot:
+        async with robot_on(fast, recorder) as robot:
             driving = asyncio.ensure_future(robot.drive(5.0))
-            await moving(served)
+            await moving(fast)
             driving.cancel()
             with pytest.raises(asyncio.CancelledError):
                 await driving
-            while served.is_moving:  # it stops in another thread
+            while fast.is_moving:  # it stops in another thread
                 await robot.sleep(0.01)
             assert stop() in recorder.sent
             assert robot.link is Link.OPEN
 
-    run(story())
+    run(story(), fast)
 
 
-def test_a_cancellation_that_comes_together_with_a_packet_is_not_lost(served: ServedRobot) -> None:
+def test_a_cancellation_that_comes_together_with_a_packet_is_not_lost(fast: ServedRobot) -> None:
     async def story() -> None:
-        async with robot_on(served) as robot:
+        async with robot_on(fast) as robot:
             driving = asyncio.ensure_future(robot.drive(5.0))
             await robot.next_state()
             loop = asyncio.get_running_loop()
@@ -137,7 +138,7 @@ def test_a_cancellation_that_comes_together_with_a_packet_is_not_lost(served: Se
                 await driving
             assert robot.link is Link.OPEN
 
-    run(story())
+    run(story(), fast)
 
 
 @pytest.mark.parametrize("times", [1, 2], ids=["once", "again while it closes"])
@@ -163,22 +164,22 @@ def test_a_program_that_is_cancelled_stops_the_robot_and_says_close(served: Serv
     until(lambda: not served.is_moving)
 
 
-def test_an_error_in_a_callback_stops_the_robot_and_reaches_the_program(served: ServedRobot) -> None:
-    recorder = Recorder()
+def test_an_error_in_a_callback_stops_the_robot_and_reaches_the_program(fast: ServedRobot) -> None:
+    recorder = Recorder(fast.open)
 
     async def story() -> None:
-        async with robot_on(served, recorder) as robot:
+        async with robot_on(fast, recorder) as robot:
             robot.set_velocity(0.3)
-            await moving(served)
+            await moving(fast)
             robot.on_state(lambda _: 1 // 0)  # type: ignore[arg-type,return-value]
             with pytest.raises(P2osError, match=r"the client failed: .*division"):
                 await robot.sleep(60)
             with pytest.raises(P2osError, match="the client failed"):
                 robot.set_velocity(0.3)
 
-    run(story())
+    run(story(), fast)
     assert recorder.sent[-4:] == CLOSING_COMMANDS
-    until(lambda: not served.is_moving)
+    fast.until(lambda: not fast.is_moving)
 
 
 def test_no_line_and_no_robot_are_errors_with_hints() -> None:
@@ -191,11 +192,11 @@ def test_no_line_and_no_robot_are_errors_with_hints() -> None:
     run(story())
 
 
-def test_a_loss_ends_a_drive_and_the_robot_is_there_again(served: ServedRobot) -> None:
-    recorder = Recorder()
+def test_a_loss_ends_a_drive_and_the_robot_is_there_again(fast: ServedRobot) -> None:
+    recorder = Recorder(fast.open)
 
     async def story() -> None:
-        async with robot_on(served, recorder) as robot:
+        async with robot_on(fast, recorder) as robot:
             asyncio.get_running_loop().call_later(0.5, lambda: setattr(recorder.lines[0], "is_mute", True))
             with pytest.raises(LinkLostError, match="the link was lost"):
                 await robot.drive(5.0)
@@ -205,39 +206,39 @@ def test_a_loss_ends_a_drive_and_the_robot_is_there_again(served: ServedRobot) -
             assert recorder.lines[1].written.startswith(stop().to_frame().to_bytes() + vel(0).to_frame().to_bytes())
             with pytest.raises(LinkLostError, match="the link was lost and is back"):
                 robot.set_velocity(0.3)
-            assert not served.is_moving
+            assert not fast.is_moving
 
-    run(story())
+    run(story(), fast)
 
 
-def test_without_reconnect_waiting_for_the_session_ends(served: ServedRobot) -> None:
-    recorder = Recorder()
+def test_without_reconnect_waiting_for_the_session_ends(fast: ServedRobot) -> None:
+    recorder = Recorder(fast.open)
 
     async def story() -> None:
-        async with robot_on(served, recorder, ClientSettings(listen_ns=NS_PER_MS, reconnect=False)) as robot:
+        async with robot_on(fast, recorder, ClientSettings(listen_ns=NS_PER_MS, reconnect=False)) as robot:
             recorder.lines[0].is_mute = True
             with pytest.raises(LinkLostError):
                 await next_states(robot)
             with pytest.raises(LinkLostError):
                 await robot.wait_open()
 
-    run(story())
+    run(story(), fast)
 
 
-def test_packets_are_fetched_and_the_robots_own_port_is_a_file(served: ServedRobot) -> None:
-    recorder = Recorder()
+def test_packets_are_fetched_and_the_robots_own_port_is_a_file(fast: ServedRobot) -> None:
+    recorder = Recorder(fast.open)
 
     async def story() -> None:
-        async with robot_on(served, recorder) as robot:
+        async with robot_on(fast, recorder) as robot:
             asking = asyncio.ensure_future(robot.fetch(EncoderPacket, timeout_s=TIMEOUT_S))
             await asyncio.sleep(0.01)
-            served.do_in_thread(
+            fast.do_in_thread(
                 lambda pioneer, now: pioneer._connection.send(EncoderPacket(left_counts=1, right_counts=2), now)
             )
             assert isinstance(await asking, EncoderPacket)
             port = robot.aux()
             assert await port.write(b"x" * 200) == 200
-            served.do_in_thread(lambda pioneer, now: pioneer._connection.send(SerauxPacket(data=b"hello world"), now))
+            fast.do_in_thread(lambda pioneer, now: pioneer._connection.send(SerauxPacket(data=b"hello world"), now))
             port.timeout_s = None
             assert await port.read(8) == b"hello wo"
             assert await port.read(3) == b"rld"
@@ -252,7 +253,7 @@ def test_packets_are_fetched_and_the_robots_own_port_is_a_file(served: ServedRob
         assert [command.number for command in recorder.sent].count(CommandNumber.TTY2) == 2
         assert Command(CommandNumber.GETAUX, 0) in recorder.sent
 
-    run(story())
+    run(story(), fast)
 
 
 def test_a_robot_that_is_closed_while_its_line_is_being_opened_gives_the_line_back(served: ServedRobot) -> None:

@@ -3,6 +3,7 @@
 import asyncio
 import threading
 import time
+from collections.abc import Callable
 
 import pytest
 
@@ -15,20 +16,24 @@ from p2os.client.line import Line
 from p2os.protocol.commands import Command, CommandNumber, stop, vel
 from p2os.protocol.frames import Decoder, Frame
 from p2os.transport.ports import HungUpError
-from p2os.transport.wall_clock import GAP_NS, wall_clock
+from p2os.transport.virtual_clock import VirtualClock
+from p2os.transport.wall_clock import GAP_NS
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
-from tests.p2os.client.client_rig import new_pioneer
-from tests.p2os.client.served_robot import QUICK, Recorder, ServedRobot, until
+from tests.p2os.client.client_rig import free_pioneer
+from tests.p2os.client.served_robot import QUICK, Recorder, ServedRobot
 
 
 class SuspendingClock:
-    """The clock of this machine, and of a machine that slept."""
+    """The clock of a client whose machine sleeps now and then, while its robot's goes on."""
 
-    def __init__(self) -> None:
+    def __init__(self, clock: VirtualClock) -> None:
+        self._clock = clock
         self._slept: Nanos = 0
+        self.wait_readable, self.wait_for_change = clock.wait_readable, clock.wait_for_change
+        self.look, self.add = clock.look, clock.add
 
     def __call__(self) -> Nanos:
-        return wall_clock() + self._slept
+        return self._clock() + self._slept
 
     def suspend(self, seconds: float) -> None:
         self._slept += round(seconds * NS_PER_S)
@@ -41,7 +46,7 @@ class Bench:
 
     def __init__(self) -> None:
         self.clock_ns: Nanos = 5 * NS_PER_S
-        self.pioneer = new_pioneer()
+        self.pioneer = free_pioneer()
         self.core = RobotCore(QUICK)
         self.sent: list[Command] = []
         self.notices: list[Notice] = []
@@ -273,105 +278,106 @@ def test_a_gap_while_the_robot_is_looked_for_does_not_use_the_search_up() -> Non
     assert core.link is Link.SEARCHING
 
 
-# On real lines, with the injected clock under every wait --------------------------------------
-
-
-def robot_with(clock: SuspendingClock, served: ServedRobot, recorder: Recorder) -> Robot:
-    return Robot(served.url, settings=QUICK, opener=recorder, clock=clock)
+# Robots that are served, with the injected clock under every wait ------------------------------
 
 
 @pytest.mark.parametrize("what", ["hold", "drive"])
-def test_a_blocking_robot_whose_machine_slept_stops_first_and_never_drives_on(served: ServedRobot, what: str) -> None:
-    clock, recorder, told = SuspendingClock(), Recorder(), list[Notice]()
-    with robot_with(clock, served, recorder) as robot:
+def test_a_blocking_robot_whose_machine_slept_stops_first_and_never_drives_on(fast: ServedRobot, what: str) -> None:
+    clock, recorder, told = SuspendingClock(fast.virtual), Recorder(fast.open), list[Notice]()
+    with Robot(fast.url, settings=QUICK, opener=recorder, clock=clock) as robot:
         robot.on_event(told.append)
         sent: list[int] = []
 
-        def fall_asleep() -> None:
-            until(lambda: served.is_moving)
-            time.sleep(0.2)
-            _suspend_in_callback(robot, clock, recorder, sent)
+        def fall_asleep(_: object) -> None:
+            """Let the machine sleep in the thread that turns the line: nothing is written meanwhile."""
+            if fast.pioneer.state.left_setpoint_mps > 0.1 and not sent:
+                sent.append(len(recorder.sent))
+                clock.suspend(5.0)
 
-        threading.Thread(target=fall_asleep, daemon=True).start()
+        robot.on_state(fall_asleep)
         if what == "hold":
             robot.set_velocity(0.3)
             robot.sleep(2.0)
         else:
             with pytest.raises((MotionError, LinkLostError), match="paused for"):
                 robot.drive(5.0)
-        until(lambda: sent)
         assert recorder.sent[sent[0]] == stop()
         assert vel(300) not in recorder.sent[sent[0] :]
-        until(lambda: not served.is_moving)
+        fast.until(lambda: not fast.is_moving)
         assert any(isinstance(notice, GapStopped) for notice in told)
 
 
-def _suspend_in_callback(robot: Robot, clock: SuspendingClock, recorder: Recorder, sent: list[int]) -> None:
-    """Let the machine sleep in the thread that turns the line: nothing is written meanwhile."""
-
-    def once(_: object) -> None:
-        if not sent:
-            sent.append(len(recorder.sent))
-            clock.suspend(5.0)
-
-    robot.on_state(once)
-
-
-def test_an_asyncio_robot_whose_machine_slept_stops_first_and_never_drives_on(served: ServedRobot) -> None:
-    clock, recorder, told = SuspendingClock(), Recorder(), list[Notice]()
+def test_an_asyncio_robot_whose_machine_slept_stops_first_and_never_drives_on(fast: ServedRobot) -> None:
+    clock, recorder, told = SuspendingClock(fast.virtual), Recorder(fast.open), list[Notice]()
 
     async def story() -> None:
-        async with AsyncRobot(served.url, settings=QUICK, opener=recorder, clock=clock) as robot:
+        async with AsyncRobot(fast.url, settings=QUICK, opener=recorder, clock=clock) as robot:
             robot.on_event(told.append)
             robot.set_velocity(0.3)
-            while not served.is_moving:  # noqa: ASYNC110  # it moves in another thread
+            while not fast.is_moving:  # noqa: ASYNC110  # it moves in another thread
                 await asyncio.sleep(0.005)
             sent = len(recorder.sent)
             clock.suspend(5.0)
             await asyncio.sleep(0.5)
             assert recorder.sent[sent] == stop()
             assert vel(300) not in recorder.sent[sent:]
-            until(lambda: not served.is_moving)
+            while fast.is_moving:  # noqa: ASYNC110  # it stops in another thread
+                await asyncio.sleep(0.005)
 
-    asyncio.run(story())
+    with asyncio.Runner(loop_factory=fast.virtual.event_loop) as runner:
+        runner.run(story())
     assert isinstance(told[0], GapStopped)
 
 
-@pytest.mark.parametrize("pause_s", [1.2, 2.5])
-def test_an_asyncio_program_that_blocks_its_loop_keeps_a_sound_link_and_stops(
-    served: ServedRobot, pause_s: float
-) -> None:
-    recorder, told = Recorder(), list[Notice]()
-
-    async def story() -> None:
-        async with AsyncRobot(served.url, settings=QUICK, opener=recorder) as robot:
-            robot.on_event(told.append)
-            robot.set_velocity(0.3)
-            await asyncio.sleep(0.3)
-            sent = len(recorder.sent)
-            time.sleep(pause_s)  # noqa: ASYNC251  # this is what is tried
-            await asyncio.sleep(0.3)
-            assert robot.link is Link.OPEN
-            assert recorder.sent[sent] == stop()
-            until(lambda: not served.is_moving)
-
-    asyncio.run(story())
+async def block_the_loop(robot: ServedRobot, block: Callable[[float], None], pause_s: float) -> None:
+    """Drive a robot by a program that does nothing for its loop for so long."""
+    recorder, told = Recorder(robot.open), list[Notice]()
+    async with AsyncRobot(robot.url, settings=QUICK, opener=recorder, clock=robot.clock) as client:
+        client.on_event(told.append)
+        client.set_velocity(0.3)
+        await asyncio.sleep(0.3)
+        sent = len(recorder.sent)
+        block(pause_s)
+        await asyncio.sleep(0.3)
+        assert client.link is Link.OPEN
+        assert recorder.sent[sent] == stop()
+        robot.until(lambda: not robot.is_moving)
     assert [type(notice) for notice in told] == [GapStopped]
 
 
-def test_a_callback_that_blocks_keeps_a_sound_link_and_stops(served: ServedRobot) -> None:
-    recorder, told, blocked = Recorder(), list[Notice](), threading.Event()
+def test_an_asyncio_program_that_blocks_its_loop_keeps_a_sound_link_and_stops(served: ServedRobot) -> None:
+    asyncio.run(block_the_loop(served, time.sleep, 1.2))
+
+
+@pytest.mark.parametrize("pause_s", [0.7, 1.2, 2.5, 20.0])
+def test_however_long_an_asyncio_program_blocks_its_loop_the_link_is_sound(fast: ServedRobot, pause_s: float) -> None:
+    with asyncio.Runner(loop_factory=fast.virtual.event_loop) as runner:
+        runner.run(block_the_loop(fast, fast.virtual.sleep, pause_s))
+
+
+def block_a_callback(robot: ServedRobot, block: Callable[[float], None], pause_s: float) -> None:
+    """Drive a robot by a program whose callback takes so long."""
+    told, blocked = list[Notice](), threading.Event()
 
     def block_once(_: object) -> None:
         if not blocked.is_set():
             blocked.set()
-            time.sleep(1.3)
+            block(pause_s)
 
-    with Robot(served.url, settings=QUICK, opener=recorder) as robot:
-        robot.on_event(told.append)
-        robot.set_velocity(0.3)
-        until(lambda: served.is_moving)
-        robot.on_state(block_once)
-        until(lambda: any(isinstance(notice, GapStopped) for notice in told))
-        assert robot.link is Link.OPEN
-        until(lambda: not served.is_moving)
+    with Robot(robot.url, settings=QUICK, opener=Recorder(robot.open), clock=robot.clock) as client:
+        client.on_event(told.append)
+        client.set_velocity(0.3)
+        robot.until(lambda: robot.is_moving)
+        client.on_state(block_once)
+        robot.until(lambda: any(isinstance(notice, GapStopped) for notice in told))
+        assert client.link is Link.OPEN
+        robot.until(lambda: not robot.is_moving)
+
+
+def test_a_callback_that_blocks_keeps_a_sound_link_and_stops(served: ServedRobot) -> None:
+    block_a_callback(served, time.sleep, 1.1)
+
+
+@pytest.mark.parametrize("pause_s", [0.7, 1.3, 20.0])
+def test_however_long_a_callback_blocks_the_link_is_sound(fast: ServedRobot, pause_s: float) -> None:
+    block_a_callback(fast, fast.virtual.sleep, pause_s)

@@ -196,7 +196,7 @@ def test_a_ramp_is_no_disobedience() -> None:
 
 
 def test_a_robot_against_a_wall_says_that_it_stalls_and_is_believed() -> None:
-    rig = Rig().connect()
+    rig = Rig(pioneer=new_pioneer()).connect()
     rig.core.set_velocity(0.5, 0.0, rig.now)
     rig.living(15)
     assert rig.core.state is not None
@@ -259,7 +259,7 @@ def test_a_goal_of_its_own_speed_puts_the_usual_one_back() -> None:
 
 
 def test_a_wall_in_the_way_ends_the_goal_with_its_reason_and_a_stop() -> None:
-    rig = Rig().connect()
+    rig = Rig(pioneer=new_pioneer()).connect()
     goal = rig.core.begin_goal(DriveAxis(5.0), None, None, rig.now)
     rig.until(lambda: goal.ended is not None, within_s=30)
     assert goal.ended is not None

@@ -3,6 +3,7 @@
 import _thread
 import math
 import threading
+import time
 
 import pytest
 
@@ -29,12 +30,12 @@ from tests.p2os.client.served_robot import CLOSING_COMMANDS, QUICK, Recorder, Se
 
 
 def robot_on(served: ServedRobot, recorder: Recorder | None = None, settings: ClientSettings = QUICK) -> Robot:
-    return Robot(served.url, settings=settings, opener=recorder or Recorder())
+    return Robot(served.url, settings=settings, opener=recorder or Recorder(served.open), clock=served.clock)
 
 
-def test_a_block_opens_a_session_and_ends_it(served: ServedRobot) -> None:
-    recorder = Recorder()
-    with robot_on(served, recorder) as robot:
+def test_a_block_opens_a_session_and_ends_it(fast: ServedRobot) -> None:
+    recorder = Recorder(fast.open)
+    with robot_on(fast, recorder) as robot:
         assert robot.identity.subclass == "p2dx"
         assert robot.config is not None
         assert robot.link is Link.OPEN
@@ -46,14 +47,14 @@ def test_a_block_opens_a_session_and_ends_it(served: ServedRobot) -> None:
         assert robot.stats.frames_received > 3
         assert robot.limits.forward_mps == pytest.approx(0.75)
     assert recorder.sent[-4:] == CLOSING_COMMANDS
-    until(lambda: not served.pioneer.state.open)
+    fast.until(lambda: not fast.pioneer.state.open)
     robot.close()
     with pytest.raises(P2osError, match="this robot was closed"):
         robot.connect()
 
 
-def test_states_and_events_can_be_iterated_and_listened_to(served: ServedRobot) -> None:
-    with robot_on(served) as robot:
+def test_states_and_events_can_be_iterated_and_listened_to(fast: ServedRobot) -> None:
+    with robot_on(fast) as robot:
         received: list[RobotState] = []
         end = robot.on_state(received.append)
         numbers = [state.number for state, _ in zip(robot.states(), range(3), strict=False)]
@@ -68,10 +69,15 @@ def test_states_and_events_can_be_iterated_and_listened_to(served: ServedRobot) 
         notices: list[Notice] = []
         robot.on_event(notices.append)
         events = robot.events()
-        threading.Timer(0.05, lambda: robot.drive(0.0)).start()
+
+        def drive_when_heard() -> None:
+            until(lambda: robot._thread.listeners._queues)
+            robot.drive(0.0)
+
+        threading.Thread(target=drive_when_heard, daemon=True).start()
         assert isinstance(next(events), MotionEnded)
         events.close()  # type: ignore[attr-defined]  # a generator
-        until(lambda: notices, "the listener's notice")
+        fast.until(lambda: notices, "the listener's notice")
         waiting = robot.states()
         next(waiting)
         robot.close()
@@ -79,8 +85,8 @@ def test_states_and_events_can_be_iterated_and_listened_to(served: ServedRobot) 
         assert list(robot.events()) == []
 
 
-def test_a_drive_and_a_turn_arrive(served: ServedRobot) -> None:
-    with robot_on(served) as robot:
+def test_a_drive_and_a_turn_arrive(fast: ServedRobot) -> None:
+    with robot_on(fast) as robot:
         result = robot.drive(0.1)
         assert result.reached == pytest.approx(0.1, abs=0.016)
         robot.set_pose(1.0, 2.0, math.pi / 2)
@@ -111,7 +117,7 @@ def test_ctrl_c_ends_any_wait_and_stops_the_robot(served: ServedRobot, what: str
     settings = ClientSettings(listen_ns=10**12) if what == "connect" else QUICK
     robot = robot_on(served, recorder, settings)
     with pytest.raises(KeyboardInterrupt):  # noqa: PT012  # the whole block is what is interrupted
-        threading.Timer(0.0 if what == "connect" else 1.0, _interrupt_when_waiting, (robot, what)).start()
+        threading.Thread(target=_interrupt_when_waiting, args=(robot, served, what)).start()
         with robot:
             robot.set_velocity(0.2)
             robot.drive(5.0) if what == "drive" else robot.sleep(60)
@@ -121,9 +127,12 @@ def test_ctrl_c_ends_any_wait_and_stops_the_robot(served: ServedRobot, what: str
     until(lambda: not served.is_moving and not served.pioneer.state.open)
 
 
-def _interrupt_when_waiting(robot: Robot, what: str) -> None:
-    wanted = Link.SEARCHING if what == "connect" else Link.OPEN
-    until(lambda: robot._thread.core.link is wanted)
+def _interrupt_when_waiting(robot: Robot, served: ServedRobot, what: str) -> None:
+    if what == "connect":
+        until(lambda: robot._thread.core.link is Link.SEARCHING)
+    else:
+        until(lambda: served.is_moving)  # by 0.2 m/s that it was asked for, just before the wait began
+        time.sleep(0.1)
     _thread.interrupt_main()
 
 
@@ -135,25 +144,25 @@ def test_a_program_that_forgets_the_robot_leaves_it_standing(served: ServedRobot
     until(lambda: not served.is_moving and not served.pioneer.state.open)
 
 
-def test_an_error_in_a_callback_stops_the_robot_and_reaches_the_program(served: ServedRobot) -> None:
-    recorder = Recorder()
-    with robot_on(served, recorder) as robot:
+def test_an_error_in_a_callback_stops_the_robot_and_reaches_the_program(fast: ServedRobot) -> None:
+    recorder = Recorder(fast.open)
+    with robot_on(fast, recorder) as robot:
         robot.set_velocity(0.3)
-        until(lambda: served.is_moving)
+        fast.until(lambda: fast.is_moving)
         robot.on_state(lambda _: 1 // 0)  # type: ignore[arg-type,return-value]
         with pytest.raises(P2osError, match=r"the client's thread failed: .*division"):
             robot.sleep(60)
         assert stop() in recorder.sent
-        until(lambda: not served.is_moving)
+        fast.until(lambda: not fast.is_moving)
         with pytest.raises(P2osError, match="thread failed"):
             robot.set_velocity(0.3)
-    with pytest.raises(P2osError, match="thread failed"), robot_on(served) as robot:  # noqa: PT012  # its end raises
+    with pytest.raises(P2osError, match="thread failed"), robot_on(fast) as robot:  # noqa: PT012  # its end raises
         robot.on_state(lambda _: 1 // 0)  # type: ignore[arg-type,return-value]
-        until(lambda: robot._thread._failure is not None)
+        fast.until(lambda: robot._thread._failure is not None)
 
 
 def test_a_program_that_hangs_is_stopped_by_the_deadman(served: ServedRobot) -> None:
-    settings = ClientSettings(listen_ns=NS_PER_MS, deadman_ns=1000 * NS_PER_MS)
+    settings = ClientSettings(listen_ns=NS_PER_MS, deadman_ns=300 * NS_PER_MS)
     with robot_on(served, settings=settings) as robot:
         received: list[Notice] = []
         robot.on_event(received.append)
@@ -161,9 +170,31 @@ def test_a_program_that_hangs_is_stopped_by_the_deadman(served: ServedRobot) -> 
         until(lambda: served.is_moving)
         until(lambda: not served.is_moving)
         assert [type(notice) for notice in received] == [DeadmanStopped]
+
+
+@pytest.mark.parametrize("deadman_ms", [1000, 2000])
+def test_the_deadman_waits_as_long_as_it_was_told_and_not_for_a_program_that_sleeps(
+    fast: ServedRobot, deadman_ms: int
+) -> None:
+    settings = ClientSettings(listen_ns=NS_PER_MS, deadman_ns=deadman_ms * NS_PER_MS)
+    recorder = Recorder(fast.open)
+    with robot_on(fast, recorder, settings) as robot:
+        received: list[Notice] = []
+        robot.on_event(received.append)
+        asked_ns = fast.clock()
+        robot.set_velocity(0.3)
+        fast.virtual.sleep(deadman_ms / 1000 - 0.001)
+        assert received == []
+        assert stop() not in recorder.sent
+        fast.virtual.sleep(0.002)
+        assert [type(notice) for notice in received] == [DeadmanStopped]
+        assert recorder.sent[-1] == stop()
+        fast.until(lambda: not fast.is_moving)
+        assert fast.clock() - asked_ns < (deadman_ms + 2000) * NS_PER_MS
         robot.set_velocity(0.2)
-        robot.sleep(1.3)
-        assert served.is_moving, "a program that waits in sleep() is known to live"
+        robot.sleep(deadman_ms / 1000 + 1.5)
+        assert fast.wheels_mps == (0.2, 0.2), "a program that waits in sleep() is known to live"
+        assert [type(notice) for notice in received] == [DeadmanStopped]
 
 
 def test_no_line_is_an_error_with_a_hint() -> None:
@@ -179,8 +210,8 @@ def test_no_line_is_an_error_with_a_hint() -> None:
         Robot("nonsense:")
 
 
-def test_before_the_first_packet_nothing_is_known(served: ServedRobot) -> None:
-    robot = robot_on(served)
+def test_before_the_first_packet_nothing_is_known(fast: ServedRobot) -> None:
+    robot = robot_on(fast)
     with pytest.raises(LinkLostError, match="has not sent a packet yet"):
         _ = robot.state
     with pytest.raises(LinkLostError, match="has not sent its identity yet"):
@@ -191,10 +222,10 @@ def test_before_the_first_packet_nothing_is_known(served: ServedRobot) -> None:
     robot.close()
 
 
-def test_a_loss_ends_a_drive_and_the_robot_is_there_again(served: ServedRobot) -> None:
-    recorder = Recorder()
-    with robot_on(served, recorder) as robot:
-        threading.Timer(0.6, setattr, (recorder.lines[0], "is_broken", True)).start()
+def test_a_loss_ends_a_drive_and_the_robot_is_there_again(fast: ServedRobot) -> None:
+    recorder = Recorder(fast.open)
+    with robot_on(fast, recorder) as robot:
+        robot.on_state(lambda _: setattr(recorder.lines[0], "is_broken", fast.is_moving))
         with pytest.raises(LinkLostError, match="the link was lost"):
             robot.drive(5.0)
         with pytest.raises(LinkLostError, match="no packet comes"):
@@ -203,9 +234,9 @@ def test_a_loss_ends_a_drive_and_the_robot_is_there_again(served: ServedRobot) -
         assert recorder.lines[1].written.startswith(stop().to_frame().to_bytes() + vel(0).to_frame().to_bytes())
         with pytest.raises(LinkLostError, match="the link was lost and is back"):
             robot.set_velocity(0.3)
-        assert not served.is_moving
+        assert not fast.is_moving
         robot.set_velocity(0.3)
-        until(lambda: served.is_moving)
+        fast.until(lambda: fast.is_moving)
 
 
 def test_a_half_open_peer_is_noticed_by_its_silence(served: ServedRobot) -> None:
@@ -219,10 +250,10 @@ def test_a_half_open_peer_is_noticed_by_its_silence(served: ServedRobot) -> None
         assert len(recorder.lines) == 2
 
 
-def test_without_reconnect_waiting_for_the_session_ends(served: ServedRobot) -> None:
-    recorder = Recorder()
+def test_without_reconnect_waiting_for_the_session_ends(fast: ServedRobot) -> None:
+    recorder = Recorder(fast.open)
     settings = ClientSettings(listen_ns=NS_PER_MS, reconnect=False)
-    with robot_on(served, recorder, settings) as robot:
+    with robot_on(fast, recorder, settings) as robot:
         recorder.lines[0].is_broken = True
         with pytest.raises(LinkLostError):
             _next_states(robot)
@@ -235,8 +266,8 @@ def _next_states(robot: Robot) -> None:
         robot.next_state()
 
 
-def test_packets_are_fetched_by_their_type(served: ServedRobot) -> None:
-    with robot_on(served) as robot:
+def test_packets_are_fetched_by_their_type(fast: ServedRobot) -> None:
+    with robot_on(fast) as robot:
         assert robot.newest(RawPacket) is None
         with pytest.raises(UsageError, match="nothing asks for a StandardSip"):
             robot.fetch(StandardSip)
@@ -244,25 +275,25 @@ def test_packets_are_fetched_by_their_type(served: ServedRobot) -> None:
         assert robot.newest(EncoderPacket) is not None
 
 
-def test_a_request_that_nothing_answers_says_so(served: ServedRobot) -> None:
-    recorder = Recorder()
-    with robot_on(served, recorder) as robot:
+def test_a_request_that_nothing_answers_says_so(fast: ServedRobot) -> None:
+    recorder = Recorder(fast.open)
+    with robot_on(fast, recorder) as robot:
         recorder.lines[0].is_mute = True
         with pytest.raises(P2osError, match=r"no IoPacket within 0\.1 s"):
             robot.fetch(IoPacket, timeout_s=0.1)
 
 
-def test_the_robots_own_serial_port_is_a_file(served: ServedRobot) -> None:
-    recorder = Recorder()
-    with robot_on(served, recorder) as robot, robot.aux() as port:
+def test_the_robots_own_serial_port_is_a_file(fast: ServedRobot) -> None:
+    recorder = Recorder(fast.open)
+    with robot_on(fast, recorder) as robot, robot.aux() as port:
         assert port.readable()
         assert port.writable()
         assert port.write(b"x" * 200) == 200
-        until(lambda: [c.number for c in recorder.sent].count(CommandNumber.TTY2) == 2)
-        served.do_in_thread(lambda pioneer, now: pioneer._connection.send(SerauxPacket(data=b"hello "), now))
+        fast.until(lambda: [c.number for c in recorder.sent].count(CommandNumber.TTY2) == 2)
+        fast.do_in_thread(lambda pioneer, now: pioneer._connection.send(SerauxPacket(data=b"hello "), now))
         threading.Timer(
             0.1,
-            served.do_in_thread,
+            fast.do_in_thread,
             (lambda pioneer, now: pioneer._connection.send(SerauxPacket(data=b"world"), now),),
         ).start()
         port.timeout_s = None
@@ -274,6 +305,6 @@ def test_the_robots_own_serial_port_is_a_file(served: ServedRobot) -> None:
         assert port.read() == b"d"
         port.timeout_s = 0.05
         port.flush_input()
-        until(lambda: Command(CommandNumber.GETAUX, 0) in recorder.sent)
+        fast.until(lambda: Command(CommandNumber.GETAUX, 0) in recorder.sent)
     with pytest.raises(UsageError, match="no AUX port 4"):
         robot.aux(4)

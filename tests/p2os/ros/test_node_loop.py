@@ -27,6 +27,8 @@ from p2os.ros.topics import SERVICES, TOPICS
 from p2os.ros.transport import NodeOptions, Received, Topic
 from p2os.transport.wall_clock import wall_clock
 from simbase.timing import NS_PER_MS, NS_PER_S
+from tests.p2os.client.served_robot import until
+from tests.tools.forked_python import forked_python
 
 P2DX = load_parameters("p2dx")
 OPTIONS = NodeOptions()
@@ -227,7 +229,7 @@ def test_a_signal_stops_the_robot_before_the_node_ends(number: int) -> None:
                 stderr=subprocess.PIPE,
                 text=True,
             ) as node,
-            subprocess.Popen([sys.executable, str(PEER), domain, namespace], stdout=subprocess.PIPE) as peer,
+            subprocess.Popen([forked_python(), str(PEER), domain, namespace], stdout=subprocess.PIPE) as peer,
         ):
             try:
                 heard = b""
@@ -239,7 +241,8 @@ def test_a_signal_stops_the_robot_before_the_node_ends(number: int) -> None:
                 _, told = node.communicate(timeout=15)
                 assert node.returncode == 130, told
                 assert "the robot was stopped and let go" in told
-                assert "wheels 0.000 0.000" in " ".join(url.order("status"))
+                assert "motors off" in " ".join(url.order("status"))
+                until(lambda: "wheels 0.000 0.000" in " ".join(url.order("status")), "a stand")  # it brakes by its ramp
             finally:
                 node.kill()
                 peer.kill()

@@ -1,7 +1,6 @@
 """The simulated laser as LaserScan: whole sweeps only, seen from its own frame."""
 
 import math
-import time
 from typing import Any
 
 import pytest
@@ -19,7 +18,7 @@ from p2os.ros.frames import Frames
 from p2os.ros.robot_messages import Scans
 from p2os.ros.robot_node import RobotNode
 from p2os.ros.transport import Received
-from p2os.transport.wall_clock import wall_clock
+from p2os.transport.virtual_clock import VirtualClock
 from simbase.timing import NS_PER_S
 from tests.p2os.ros.test_node_loop import OPTIONS, Network
 
@@ -78,18 +77,24 @@ def test_the_lasers_of_aria_span_their_fields() -> None:
 class Waiting(Network):
     """Nothing comes in, in a while."""
 
+    clock: VirtualClock
+
     def take(self, timeout_s: float) -> list[Received]:
-        time.sleep(timeout_s)
+        self.clock.sleep(timeout_s)
         return []
 
 
 def served(settings: ControllerSettings, until: set[str]) -> Network:
     """Run a node that asks for the laser against a served robot until it has published these, or to the limit."""
-    network, ends = Waiting(), wall_clock() + LIMIT_NS
-    with served_pioneer(world="room", body="kinematic", settings=settings) as url, Robot(url) as robot:
+    network, clock = Waiting(), VirtualClock()
+    network.clock = clock
+    with (
+        served_pioneer(world="room", body="kinematic", settings=settings, clock=clock) as url,
+        Robot(url, clock=clock) as robot,
+    ):
         node = RobotNode(robot.parameters, OPTIONS, deadman_ns=NS_PER_S, laser=LASER)
         NodeLoop(robot, network, node).run(
-            lambda: until <= {topic.name for topic, _ in network.published} or wall_clock() >= ends
+            lambda: until <= {topic.name for topic, _ in network.published} or clock() >= LIMIT_NS
         )
     return network
 

@@ -70,9 +70,19 @@ class Looped:
 
     def run_unread(self, milliseconds: int) -> None:
         """Run the host while no client reads."""
-        for _ in range(milliseconds):
-            self.clock.now += NS_PER_MS
+        for _ in self.turns(milliseconds):
+            pass
+
+    def turns(self, milliseconds: int) -> Iterator[None]:
+        """Turn the host a millisecond from now, for bytes may wait, and then when it would wake, to the millisecond."""
+        step = 1
+        while milliseconds > 0:
+            step = min(step, milliseconds)
+            milliseconds -= step
+            self.clock.now += step * NS_PER_MS
             self.host.turn(0)
+            yield
+            step = max(int(self.host.wait_s() * 1000 + 1e-6), 1)
 
     def reopen(self) -> Transport:
         """Come as a new client; a terminal is opened as the serial port that it looks like."""
@@ -80,9 +90,7 @@ class Looped:
 
     def run(self, milliseconds: int) -> list[tuple[int, Frame]]:
         found = []
-        for _ in range(milliseconds):
-            self.clock.now += NS_PER_MS
-            self.host.turn(0)
+        for _ in self.turns(milliseconds):
             found += [(self.clock.now // NS_PER_MS, frame) for frame in frames(self.line, self.decoder)]
         return found
 

@@ -39,8 +39,13 @@ class Served:
             robot.pioneer, self.listener, on_event=lambda _now, what, detail: self.events.append(f"{what}: {detail}")
         )
         self._end = threading.Event()
-        self._thread = threading.Thread(target=self.host.run, kwargs={"until": self._end.is_set}, daemon=True)
+        self._thread = threading.Thread(target=self._serve, daemon=True)
         self._thread.start()
+
+    def _serve(self) -> None:
+        while not self._end.is_set():
+            self.host.turn(0.02)
+        self.host.close()
 
     def wait_for(self, text: str, count: int = 1) -> None:
         end = time.monotonic() + PATIENCE_S
@@ -147,22 +152,22 @@ def test_packets_come_no_faster_than_the_clock_goes(served: Served) -> None:
     begun_ns = wall_clock()
     caller = Caller(served.url)
     caller.open()
-    for _ in range(10):
+    for _ in range(5):
         caller.receive(lambda frame: frame.kind in SIP_KINDS)
-    assert wall_clock() - begun_ns >= 10 * 100 * NS_PER_MS  # a loaded machine lags; the bound above is PATIENCE_S
+    assert wall_clock() - begun_ns >= 5 * 100 * NS_PER_MS  # a loaded machine lags; the bound above is PATIENCE_S
     caller.close()
 
 
 @pytest.mark.parametrize("name", ["aria", "player"])
 def test_a_captured_client_is_served(served: Served, name: str, request: pytest.FixtureRequest) -> None:
-    """The captured bytes, twenty times faster than they were recorded."""
+    """The captured bytes, sixty times faster than they were recorded."""
     caller = Caller(served.url)
     for number in (0, 1, 2):  # the handshake waits for its answers
         caller.say(number)
         caller.receive(lambda frame, number=number: frame.kind == number)
     last = 0.0
     for at, data in request.getfixturevalue(name)[3:-1]:
-        time.sleep((at - last) / 20 if last else 0)
+        time.sleep((at - last) / 60 if last else 0)
         last = at
         caller.line.write(data)
     caller.receive(lambda frame: frame.kind == 0x33)

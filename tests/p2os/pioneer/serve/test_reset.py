@@ -21,6 +21,7 @@ from p2os.protocol.commands import CommandNumber as C
 from p2os.protocol.packets import ResetNotice
 from p2os.robots.parameters import load_parameters
 from p2os.transport import Loops, open_url
+from p2os.transport.virtual_clock import VirtualClock
 from simbase.errors import P2osError, UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S
 from tests.p2os.pioneer.body.bodies import Maker, drive, each_body
@@ -235,16 +236,19 @@ def test_words_after_reset_are_refused() -> None:
 
 
 def test_a_program_puts_its_served_robot_back_and_its_client_finds_it_again() -> None:
-    with served_pioneer(body="kinematic") as served:
+    clock = VirtualClock()
+    with served_pioneer(body="kinematic", clock=clock) as served:
         assert served.startswith("tcp:")
-        with Robot(served) as robot:
+        with Robot(served, clock=clock) as robot:
             robot.drive(0.05)
             assert robot.state.pose.x_m > 0.03
             served.reset()
-        with Robot(served) as robot:
+        with Robot(served, clock=clock) as robot:
             assert robot.state.pose.x_m == pytest.approx(0, abs=0.001)
         with pytest.raises(UsageError, match="no order 'rest'"):
             served.order("rest")
+        asked_at = clock()
         assert served.order("status")[0].startswith("robot 1 at")
+        assert clock() == asked_at, "its host is woken"
     with pytest.raises(P2osError, match="served no more"):
         served.reset()

@@ -1,0 +1,79 @@
+"""A body without physics: its wheels do what they are told, and nothing is in its way."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+from p2os.pioneer.sonar.ring import Cone
+from simbase.state import Stateful
+from simbase.timing import NS_PER_MS
+
+
+@dataclass(frozen=True)
+class WheelAngles:
+    left_angle_rad: float = 0.0
+    right_angle_rad: float = 0.0
+    left_speed_mps: float = 0.0
+    right_speed_mps: float = 0.0
+    stalled_left: bool = False
+    stalled_right: bool = False
+    heading_rad: float = 0.0
+    pitch_rad: float = 0.0
+    turn_radps: float = 0.0
+    in_contact: bool = False
+    contact_rad: float | None = None
+    x_m: float = 0.0
+    y_m: float = 0.0
+    z_m: float = 0.0
+
+
+@dataclass
+class PerfectBody(Stateful):
+    """Wheels that do what they are told, and sonar that read what the test says."""
+
+    STATE = ("state", "range_m", "steps", "blocked")
+
+    dt_ns: int = NS_PER_MS
+    radius_m: float = 0.0825
+    state: WheelAngles = field(default_factory=WheelAngles)
+    range_m: dict[int, float] = field(default_factory=dict)
+    steps: int = 0
+    #: Something holds both wheels.
+    blocked: bool = False
+    asked: list[tuple[int, ...]] = field(default_factory=list)
+
+    def put_back(self) -> None:
+        self.state = WheelAngles()
+
+    def who_stands_at_start(self) -> str | None:
+        return None
+
+    def stand_at(self, x_m: float, y_m: float, heading_rad: float) -> None:
+        self.state = replace(self.state, x_m=x_m, y_m=y_m, heading_rad=heading_rad)
+
+    def scan(self, fan: Cone, longest_m: float) -> list[float]:
+        return [min(1.0 + ray / 1000, longest_m) for ray in range(len(fan.headings_rad))]
+
+    def step(self, left_mps: float, right_mps: float) -> WheelAngles:
+        self.steps += 1
+        if self.blocked:
+            left_mps = right_mps = 0.0
+        turn = self.dt_ns / 1e9 / self.radius_m
+        self.state = replace(
+            self.state, left_angle_rad=self.state.left_angle_rad + left_mps * turn,
+            right_angle_rad=self.state.right_angle_rad + right_mps * turn,
+            left_speed_mps=left_mps, right_speed_mps=right_mps,
+        )  # fmt: skip
+        return self.state
+
+    def hold(self, left_mps: float, right_mps: float, steps: int) -> list[WheelAngles]:
+        return [self.step(left_mps, right_mps) for _ in range(steps)]
+
+    def ramp(self, setpoints: Sequence[tuple[float, float]]) -> list[WheelAngles]:
+        return [self.step(*asked) for asked in setpoints]
+
+    def stall(self, *, left: bool, right: bool) -> None:
+        self.state = replace(self.state, stalled_left=left, stalled_right=right)
+
+    def ranges(self, numbers: Sequence[int]) -> list[float]:
+        self.asked.append(tuple(numbers))
+        return [self.range_m.get(number, 5.0) for number in numbers]
