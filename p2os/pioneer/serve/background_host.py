@@ -113,6 +113,8 @@ class _Orders:
             self._waits.look(LOOK_S)
         if not self._has_ended:
             raise P2osError("the virtual robot's thread does not end")
+        self._bell.close()
+        self._push.close()
 
     def serve(self) -> None:
         """Serve the robot until that is to end: what its thread does."""
@@ -139,7 +141,8 @@ class _Orders:
                 self._changed.notify_all()
 
     def _ring(self) -> None:
-        self._push.send(b"\0")
+        with contextlib.suppress(OSError):  # it has ended
+            self._push.send(b"\0")
 
 
 @contextlib.contextmanager
