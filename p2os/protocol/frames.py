@@ -102,11 +102,10 @@ def checksum(data: bytes) -> int:
     Args:
         data: At most 256 bytes.
     """
-    if len(data) & 1:
-        return checksum(data[:-1]) ^ data[-1]
+    pairs, odd = (data[:-1], data[-1]) if len(data) & 1 else (data, 0)
     # The lower half of an Adler-32 is 1 and the sum of the bytes, modulo 65521, which 256 bytes do not reach. Of a
     # pair's two bytes the first counts 256 times: once among all bytes, 255 times among those at even places.
-    return (255 * adler32(data[::2]) + adler32(data) - 256) & 0xFFFF
+    return (255 * adler32(pairs[::2]) + adler32(pairs) - 256) & 0xFFFF ^ odd
 
 
 def sound_frames(data: bytes, place: int = 0, limit: int | None = None) -> Iterator[bytes]:
@@ -239,8 +238,7 @@ class Decoder(Stateful):
         """Find everything that the buffer holds."""
         buffer = self._buffer
         while buffer:
-            start = self._header()
-            if start:
+            if not buffer.startswith(HEADER) and (start := self._header()):
                 self._drop_noise(start)
                 continue
             if len(buffer) < PREFIX_BYTES:
@@ -270,12 +268,16 @@ class Decoder(Stateful):
         """Check a whole frame's bytes by their checksum: take the frame, or reject them."""
         payload = data[PREFIX_BYTES:-CHECKSUM_BYTES]
         got, expected = int.from_bytes(data[-CHECKSUM_BYTES:], "big"), checksum(payload)
-        self._flush_noise()
+        if self._noise:
+            self._flush_noise()
         if got == expected:
             self.stats.frames += 1
-            self.stats.rescued += self._rescanned > 0
             self._items.append(Frame(payload))
-            self._consume(len(data))
+            if self._rescanned:
+                self.stats.rescued += 1
+                self._consume(len(data))
+            else:
+                del self._buffer[: len(data)]
             return
         self.stats.bad_checksums += 1
         self.stats.last_bad_checksum = data[:KEPT_BYTES]

@@ -25,6 +25,10 @@ from p2os.protocol.sip import HEAD_BYTES, READING_BYTES, SIP_KINDS
 #: chosen: below, a loop takes less time than NumPy's calls.
 LEAST_BYTES = 1 << 11
 _COUNT_AT = 19
+#: Packet types and commands that a filter by names may leave out, with their names in lower case. A reset ends a
+#: session; PULSE and SYNC0 are one number, which changes none, and OPEN and CLOSE change it.
+_PACKETS = tuple((kind, packet_name(kind).lower()) for kind in range(IDENTITY_KIND + 1, 256) if kind not in RESET_KINDS)
+_COMMANDS = tuple((kind, command_name(kind).lower()) for kind in range(CommandNumber.CLOSE + 1, 256))
 _Flags = npt.NDArray[np.bool_]
 
 
@@ -58,12 +62,8 @@ class Passing:
 
     def __init__(self, wanted: Iterable[str]) -> None:
         names = frozenset(wanted)
-        robots = frozenset(
-            kind for kind in range(IDENTITY_KIND + 1, 256)
-            if kind not in RESET_KINDS and packet_name(kind).lower() not in names
-        )  # fmt: skip
-        # PULSE and SYNC0 are one number, which changes no session; OPEN and CLOSE change it.
-        clients = {kind for kind in range(CommandNumber.CLOSE + 1, 256) if command_name(kind).lower() not in names}
+        robots = frozenset([kind for kind, name in _PACKETS if name not in names])
+        clients = {kind for kind, name in _COMMANDS if name not in names}
         if names.isdisjoint({SYNC_NAMES[0].lower(), COMMAND_NAMES[0].lower()}):
             clients.add(0)
         #: Without direction only a SIP's shape tells for certain that a robot has sent it.

@@ -6,7 +6,6 @@ told of it here is worked out from poses and speeds that the engine gives.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any, ClassVar
 
 from p2os.pioneer.body.contacts import ContactCounter
@@ -157,8 +156,8 @@ class EngineBody(BodyInWorld):
     def walk(self) -> list[Obstacle]:
         """Return everything that walks where it is by now; the plan learns of it when it is asked."""
         found = []
-        for name, (x, y, heading) in self._walked():
-            found.append(replace(self._plan.find(name), x_m=x, y_m=y, heading_rad=heading))
+        for name, pose in self._walked():
+            found.append(self._plan.find(name).standing_at(*pose))
             self.note_moved(name)
         return found
 

@@ -12,7 +12,6 @@ Invariant: a thing that walks is where its path leads at the step to which the s
 
 import math
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import replace
 from typing import ClassVar, NamedTuple
 
 from p2os.errors import WorldError
@@ -409,8 +408,7 @@ class BodyInWorld(Stateful):
         """Put an obstacle into the plan; return it where it stands now."""
         if obstacle.walk is not None:
             walker = Walker(obstacle.walk)
-            x, y, heading = walker.pose_at(0.0)
-            obstacle = replace(obstacle, x_m=x, y_m=y, heading_rad=heading)
+            obstacle = obstacle.standing_at(*walker.pose_at(0.0))
         self._plan.place(obstacle)
         if obstacle.walk is not None:
             self._walking[obstacle.name], self._walkers[obstacle.name] = self._steps, walker

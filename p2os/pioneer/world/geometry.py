@@ -132,25 +132,31 @@ class Footprint:
         The separating axes are the normals of both outlines, and for a circle
         the line from its middle to the nearest corner.
         """
-        axes = [(by - ay, ax - bx) for (ax, ay), (bx, by) in pairwise((*hull, hull[0]))]
-        axes += [(-ey, ex) for _, _, ex, ey in self.edges]
-        if not self.polygon:
-            corner = min(hull, key=lambda point: math.dist(point, (self.x, self.y)))
-            axes.append((self.x - corner[0], self.y - corner[1]))
         best, move = INFINITY, (0.0, 0.0)
-        for ax, ay in axes:
-            length = math.hypot(ax, ay)
-            if length == 0.0:
-                continue
-            nx, ny = ax / length, ay / length
-            far = max([px * nx + py * ny for px, py in hull])
-            if self.polygon:
-                near = min([px * nx + py * ny for px, py in self.polygon])
-            else:
-                near = self.x * nx + self.y * ny - self.radius
-            if far - near < best:
-                best, move = far - near, ((far - near) * nx, (far - near) * ny)
+        own = self.polygon
+        # Along the normal of an edge, nothing of its outline lies farther out than the edge itself.
+        for (ax, ay), (bx, by) in pairwise((*hull, hull[0])):
+            nx, ny = by - ay, ax - bx
+            if length := math.hypot(nx, ny):
+                nx, ny = nx / length, ny / length
+                near = min([px * nx + py * ny for px, py in own]) if own else self.x * nx + self.y * ny - self.radius
+                way = ax * nx + ay * ny - near
+                if way < best:
+                    best, move = way, (way * nx, way * ny)
+        for ax, ay, ex, ey in self.edges or (self._from_corner(hull),):
+            if length := math.hypot(ex, ey):
+                nx, ny = -ey / length, ex / length
+                way = max([px * nx + py * ny for px, py in hull]) - (ax * nx + ay * ny)
+                if way < best:
+                    best, move = way, (way * nx, way * ny)
         return move
+
+    def _from_corner(self, hull: Polygon) -> tuple[float, float, float, float]:
+        """Return the point of a circle nearest to the nearest corner of a polygon, and the tangent there."""
+        x, y = min(hull, key=lambda point: math.dist(point, (self.x, self.y)))
+        dx, dy = self.x - x, self.y - y
+        share = self.radius / (math.hypot(dx, dy) or math.inf)
+        return self.x - dx * share, self.y - dy * share, dy, -dx
 
 
 def hull_polygon(body: BodyParameters) -> Polygon:

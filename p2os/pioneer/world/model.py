@@ -18,9 +18,10 @@ Invariant: an invalid world cannot exist; every constructor refuses by a `WorldE
 import math
 from bisect import bisect_right
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from enum import Enum
 from itertools import accumulate, pairwise
+from operator import attrgetter
 
 from p2os.errors import WorldError
 from simbase.errors import shown
@@ -262,6 +263,24 @@ class Obstacle:
         """Radius of the circle around the footprint."""
         return self.radius_m or math.hypot(self.length_m, self.width_m) / 2
 
+    def standing_at(self, x_m: float, y_m: float, heading_rad: float) -> "Obstacle":
+        """Return it with another place; the rest of it, which was checked when it was made, is kept.
+
+        Raises:
+            WorldError: The place is not finite, or too far out.
+        """
+        if not math.isfinite(heading_rad):
+            raise WorldError(f"obstacle {shown(self.name)}: its place must be finite")
+        _refuse_outside(f"obstacle {shown(self.name)}", "x_m", x_m)
+        _refuse_outside(f"obstacle {shown(self.name)}", "y_m", y_m)
+        moved, put = object.__new__(Obstacle), object.__setattr__  # `replace` takes five times as long
+        for name, value in zip(_KEPT, _kept_of(self), strict=True):
+            put(moved, name, value)
+        put(moved, "x_m", x_m)
+        put(moved, "y_m", y_m)
+        put(moved, "heading_rad", heading_rad)
+        return moved
+
     def stands_in(self, low_m: float, high_m: float) -> bool:
         """Tell whether it stands in a band of heights above the floor around it."""
         if self.kind.is_driven_on:
@@ -283,6 +302,11 @@ class Obstacle:
         if self.is_cylinder:
             return plain | {"radius": self.radius_m}
         return plain | {"length": self.length_m, "width": self.width_m}
+
+
+#: What of an obstacle stays while it moves.
+_KEPT = tuple(part.name for part in fields(Obstacle) if part.name not in {"x_m", "y_m", "heading_rad"})
+_kept_of = attrgetter(*_KEPT)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

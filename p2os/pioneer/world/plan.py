@@ -14,7 +14,6 @@ Invariant: the order of what is found depends on the world alone.
 
 import math
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import replace
 from itertools import pairwise
 from operator import itemgetter
 
@@ -105,8 +104,8 @@ class Plan(Stateful):
         Raises:
             WorldError: There is none of that name, or it is part of the building.
         """
-        moved = replace(self.find(name), x_m=x_m, y_m=y_m, heading_rad=heading_rad)
-        self._keep(moved)
+        moved = self.find(name).standing_at(x_m, y_m, heading_rad)
+        self._keep_moved(moved, Footprint(moved))
         return moved
 
     def remove(self, name: str) -> None:
@@ -228,13 +227,14 @@ class Plan(Stateful):
         if length == 0.0:
             return True
         share = 1 + APART_M / length
-        moved = replace(self._obstacles[name], x_m=thing.x + dx * share, y_m=thing.y + dy * share)
+        there = self._obstacles[name]
+        moved = there.standing_at(thing.x + dx * share, thing.y + dy * share, there.heading_rad)
         shape = Footprint(moved)
         x0, y0, x1, y1 = shape.bounds
         others = [other for other in self._touchable.values() if other.name != name]
         if any(_overlap(shape, other) for other in (*others, *robots, *self._static.touched.near(x0, y0, x1, y1))):
             return False
-        self._keep(moved)
+        self._keep_moved(moved, shape)
         return True
 
     def _nearest(self, things: Iterable[Footprint], hull: Polygon, x_m: float, y_m: float, nearest: float) -> float:
@@ -257,6 +257,13 @@ class Plan(Stateful):
             for table, belongs in ((self._touchable, touched), (self._echoing, echoing), (self._low, low)):
                 if belongs:
                     table[name] = shape
+
+    def _keep_moved(self, obstacle: Obstacle, shape: Footprint) -> None:
+        """Keep what only stands elsewhere: who meets it depends on its heights."""
+        self._obstacles[obstacle.name] = obstacle
+        for table in (self._touchable, self._echoing, self._low):
+            if obstacle.name in table:
+                table[obstacle.name] = shape
 
 
 def _along(outline: Polygon) -> Iterator[Point]:

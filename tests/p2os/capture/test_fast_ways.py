@@ -14,9 +14,9 @@ from p2os.capture.chunks import Block, Chunk, Direction, Part, block_of_chunks, 
 from p2os.capture.formats.recording import plain_block, recorded_parts, write_recording
 from p2os.capture.formats.recording_bulk import plain_lines
 from p2os.cli.captures.reading import chosen_rows, wanted_names
-from p2os.protocol.commands import rvel, vel
-from p2os.protocol.frames import Decoder, checksum, sound_frames
-from p2os.protocol.packets import EncoderPacket, SonarReading, StandardSip, packet_frame
+from p2os.protocol.commands import Command, CommandNumber, rvel, vel
+from p2os.protocol.frames import Decoder, Frame, checksum, sound_frames
+from p2os.protocol.packets import EncoderPacket, ResetNotice, SonarReading, StandardSip, packet_frame
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import load_parameters
 from simbase.errors import FileError
@@ -47,11 +47,14 @@ def both_ways(chunks: list[Chunk]) -> None:
         patch.setattr("p2os.capture.listing.next_header", lambda data, _: len(data))
         assert fast == shown(chunks)
         patch.undo()
-        for least, together, wanted in [(*how, wanted) for how in HOW for wanted in WANTED]:
+        for least, together in HOW:
             patch.setattr("p2os.capture.columns.passing.LEAST_BYTES", least)
-            names = wanted_names(wanted)
-            passed = shown_of(chosen_rows(blocks_of(chunks, together), P2DX, names))
-            assert passed == [row for row in fast if str(row[4]).lower() in names or ("damaged" in names and row[5])]
+            blocks = blocks_of(chunks, together)
+            for names in map(wanted_names, WANTED):
+                passed = shown_of(chosen_rows(blocks, P2DX, names))
+                assert passed == [
+                    row for row in fast if str(row[4]).lower() in names or ("damaged" in names and row[5])
+                ]
 
 
 def blocks_of(chunks: list[Chunk], together: int) -> list[Block]:
@@ -80,6 +83,21 @@ def test_sound_packets_behind_a_frame_that_waits_are_not_passed_over(first: byte
     parts = [first, SIP, SIP, SIP[:9], SIP[9:] + SIP, FRAMES[2], SIP]
     both_ways([Chunk(at_ns=wait_ns * (number > 3), direction=Direction.FROM_ROBOT, data=data)
                for number, data in enumerate(parts)])  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "end",
+    [
+        (Direction.TO_ROBOT, Command(CommandNumber.CLOSE).to_frame()),
+        (Direction.FROM_ROBOT, packet_frame(ResetNotice(kind=0xFE), Profile.P2OS)),
+    ],
+)
+def test_what_ends_a_session_is_not_passed_over(end: tuple[Direction, Frame]) -> None:
+    pulse = (Direction.TO_ROBOT, Command(CommandNumber.PULSE).to_frame())
+    parts = [(Direction.FROM_ROBOT, Frame.from_bytes(SIP)), pulse, end, pulse]
+    chunks = [Chunk(at_ns=0, direction=direction, data=frame.to_bytes()) for direction, frame in parts]
+    assert [shown(chunks)[place][4] for place in (1, 3)] == ["PULSE", "SYNC0"]
+    both_ways(chunks)
 
 
 @given(st.lists(st.one_of(st.sampled_from(FRAMES), st.binary(max_size=4), st.just(b"\xfa\xfb\xc0"), st.just(b"\xfa")),

@@ -143,9 +143,9 @@ def test_a_session_cut_and_corrupted_at_every_byte_loses_only_what_was_hit(sessi
         assert isinstance(item, Frame), "the captures are clean"
         places.append((at, at + len(item.to_bytes()), item))
         at += len(item.to_bytes())
-    # Only the frame that is hit and its two neighbours on either side can be touched: the rest is not fed again.
+    # Only the frame that is hit and the two behind it can be touched: the rest is not fed again, but for one before it.
     for number, (start, end, hit) in enumerate(places):
-        first, last = max(0, number - 2), min(len(places), number + 3)
+        first, last = max(0, number - 1), min(len(places), number + 3)
         near = [frame for _, _, frame in places[first:last]]
         begin, stop = places[first][0], places[last - 1][1]
         for place in range(start, end):

@@ -9,7 +9,7 @@ Not modelled: tyre scrub and wheel-size errors, battery sag; floors of meshes
 (refused, see `model`). All robots of a scene are one model; their hulls meet each other.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import mujoco
 import numpy as np
@@ -99,10 +99,11 @@ class MujocoScene(Scene):
             for item in body.count_step(left_mps, right_mps):
                 if body is bodies[0]:
                     self._put(item)
-        mujoco.mj_step(self.model, self.data)
+        data = self.data
+        mujoco.mj_step(self.model, data)
         # The motors are the only frictions of joints, and the engine lists those first, in the robots' order.
-        efforts = self.data.efc_force[: 2 * len(bodies)].tolist()
-        turned = [body.take_step(efforts[2 * number : 2 * number + 2]) for number, body in enumerate(bodies)]
+        efforts, contacts = data.efc_force[: 2 * len(bodies)].tolist(), data.contact.geom.tolist()
+        turned = [body.take_step(efforts[2 * number : 2 * number + 2], contacts) for number, body in enumerate(bodies)]
         for body in bodies:
             body.read_anew()
         return turned
@@ -146,8 +147,8 @@ class MujocoBody(EngineBody):
 
     STATE = ("_start",)
     #: Where in the engine's objects things are.
-    DERIVED = ("_qpos", "_qvel", "_wheel_places", "_wheel_speeds", "_rotors", "_robot_place", "_robot_speed",
-               "_hull_number", "_wheel_numbers", "_asked")  # fmt: skip
+    DERIVED = ("_qpos", "_qvel", "_most_torques", "_wheel_places", "_wheel_speeds", "_rotors", "_robot_place",
+               "_robot_speed", "_hull_number", "_wheel_numbers", "_asked")  # fmt: skip
 
     _rays_of = SonarRays
     name = "mujoco"
@@ -170,7 +171,7 @@ class MujocoBody(EngineBody):
     def find_joints(self) -> None:
         """Find the robot in a model that was made anew."""
         model, data, names = self.scene.model, self.scene.data, self._names
-        self._qpos, self._qvel = data.qpos, data.qvel
+        self._qpos, self._qvel, self._most_torques = data.qpos, data.qvel, model.tendon_frictionloss
         joints = [model.joint(name) for name in names.wheels]
         self._wheel_places = [int(joint.qposadr[0]) for joint in joints]
         self._wheel_speeds = [int(joint.dofadr[0]) for joint in joints]
@@ -216,48 +217,44 @@ class MujocoBody(EngineBody):
         self._state = None
         self._steps += 1
         self._asked = left_mps, right_mps
-        for wheel, rotor in enumerate(self._rotors):
-            self._qvel[rotor], torque_nm = self._motor(wheel, self._asked[wheel])
-            self.scene.model.tendon_frictionloss[2 * self._number + wheel] = torque_nm
+        first, qvel, most_torques = 2 * self._number, self._qvel, self._most_torques
+        left, right = self._rotors
+        qvel[left], most_torques[first] = self._motor(0, left_mps)
+        qvel[right], most_torques[first + 1] = self._motor(1, right_mps)
         return self.walk() if self._walking else ()
 
-    def take_step(self, efforts_nm: Sequence[float]) -> Turned:
+    def take_step(self, efforts_nm: Sequence[float], contacts: Iterable[Sequence[int]]) -> Turned:
         """Take what the engine's step has made of the robot.
 
         Args:
             efforts_nm: What motor and gear of each wheel gave.
+            contacts: The two geometries of each contact in the scene.
         """
-        if self._contacts.update(touching=self._is_touching()):
-            self._note_contact()
+        touched = self._touched(contacts)
+        if self._contacts.update(touching=touched is not None) and touched is not None:
+            self._note_contact(*touched)
         for wheel, effort_nm in enumerate(efforts_nm):
             self._watch_motor(wheel, self._asked[wheel], effort_nm, float(self._qvel[self._wheel_speeds[wheel]]))
         left, right = self._wheel_places
         zero = self._zero
         return Turned(float(self._qpos[left]) - zero[0], float(self._qpos[right]) - zero[1], *self._stalled)
 
-    def _is_touching(self) -> bool:
-        return self._touched() is not None
-
-    def _touched(self) -> tuple[int, int] | None:
+    def _touched(self, contacts: Iterable[Sequence[int]]) -> tuple[int, int] | None:
         """Return the first contact of the hull with anything but a floor, or of the wheels with a low thing.
 
         As its number and that of the geometry that is touched; None where there is none.
         """
         floors, low, hull, wheels = self.scene.floors, self.scene.low, self._hull_number, self._wheel_numbers
-        for number, (one, other) in enumerate(self.scene.data.contact.geom.tolist()):
-            if hull in {one, other}:
+        for number, (one, other) in enumerate(contacts):
+            if one == hull or other == hull:  # noqa: PLR1714 - a set of two takes as long as all else
                 if one not in floors and other not in floors:
                     return number, other if one == hull else one
-            elif (one in low and other in wheels) or (other in low and one in wheels):
+            elif low and ((one in low and other in wheels) or (other in low and one in wheels)):
                 return number, one if one in low else other
         return None
 
-    def _note_contact(self) -> None:
+    def _note_contact(self, number: int, geometry: int) -> None:
         """Remember a collision; the building has no names in the engine and is found by its place."""
-        touched = self._touched()
-        if touched is None:
-            return
-        number, geometry = touched
         model = self.scene.model
         x, y, _ = self.scene.data.contact.pos[number].tolist()
         name = model.body(int(model.geom_bodyid[geometry])).name

@@ -1,6 +1,7 @@
 """The body of who names none: the best that is installed, decided in one place."""
 
 import json
+import signal
 import subprocess
 from pathlib import Path
 
@@ -64,16 +65,19 @@ def test_serve_demo_and_programs_take_the_same_body(missing: list[str], body: st
     outcome = json.loads(demo.stdout)
     assert (outcome["body"], note in outcome["notes"]) == (body, True)
     code = WITHOUT.format(missing=missing, words=[]).replace("main([])", "") + (
-        "import threading, signal, os\n"
         "from p2os.pioneer.serve import served_pioneer\n"
         "with served_pioneer() as robot: print(robot.body, flush=True)\n"
-        "threading.Timer(3.0, os.kill, (os.getpid(), signal.SIGINT)).start()\n"
         "main(['serve', '--port', 'tcp:127.0.0.1:0', '--json'])\n"
     )
-    done = subprocess.run([forked_python(), "-c", code], check=False, capture_output=True, text=True, timeout=60)
-    first, start = done.stdout.splitlines()
-    assert (first, json.loads(start)["body"]) == (body, body)
-    assert f"note: {note}" in done.stderr
+    with subprocess.Popen(
+        [forked_python(), "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as served:
+        assert served.stdout is not None
+        first, start = served.stdout.readline(), served.stdout.readline()
+        served.send_signal(signal.SIGINT)
+        said, errors = served.communicate(timeout=60)
+    assert (first, json.loads(start)["body"], said) == (f"{body}\n", body, "")
+    assert f"note: {note}" in errors
 
 
 def test_a_body_that_is_named_and_not_installed_is_refused_with_what_to_do(tmp_path: Path) -> None:

@@ -71,7 +71,7 @@ def test_a_snapshot_is_all_that_decides_the_future(make: Maker) -> None:
         assert ([drive(other, 0.1, 0.2, 0.1) for _ in range(10)], other.ranges(range(8))) == here
 
 
-def test_a_metre_a_turn_and_a_square_come_out(make: Maker) -> None:
+def test_a_metre_and_a_turn_come_out(make: Maker) -> None:
     body = make()
     # 0.4 m/s for 3 s with ramps of 0.5 s each covers 1 m.
     line = ramped(body, 0.4, 0.4, 3.0)
@@ -81,11 +81,6 @@ def test_a_metre_a_turn_and_a_square_come_out(make: Maker) -> None:
     for _ in range(2):
         turned = ramped(body, -rim, rim, 3.0)
     assert abs(math.remainder(turned.heading_rad, 2 * math.pi)) < math.radians(0.05)
-    body.reset(Pose(0, 0, 0), 0)
-    for _ in range(4):
-        ramped(body, 0.4, 0.4, 3.0)
-        square = ramped(body, -rim / 2, rim / 2, 3.0)
-    assert math.hypot(square.x_m, square.y_m) < 0.001
 
 
 def test_the_wheels_tell_the_way(make: Maker) -> None:
@@ -99,7 +94,7 @@ def test_the_wheels_tell_the_way(make: Maker) -> None:
 def test_a_wall_stops_it_once_stalls_the_wheels_and_lets_it_go(make: Maker) -> None:
     body = make(load_world("room"))
     body.reset(Pose(2.4, 0, 0), 0)
-    stuck = drive(body, 0.15, 0.15, 5.0)
+    stuck = drive(body, 0.15, 0.15, 3.5)
     assert stuck.x_m == pytest.approx(3.0 - P2DX.body.hull_front_m, abs=0.002)
     assert (stuck.collisions, stuck.in_contact) == (1, True)
     assert stuck.stalled_left
@@ -109,7 +104,7 @@ def test_a_wall_stops_it_once_stalls_the_wheels_and_lets_it_go(make: Maker) -> N
     assert not free.stalled_left
     assert not free.in_contact
     assert body.clearance() > 0.2
-    again = drive(body, 0.15, 0.15, 4.0)
+    again = drive(body, 0.15, 0.15, 2.5)
     assert again.collisions == 2
 
 

@@ -43,10 +43,10 @@ def box(name: str = "box", x: float = 1.0, **fields: float | bool) -> Obstacle:
 
 
 def test_a_light_thing_is_pushed_and_reports_where_it_is(make: Maker) -> None:
-    body = make(world_of(box(mass_kg=1.0, friction=0.3)))
+    body = make(world_of(box(x=0.5, mass_kg=1.0, friction=0.3)))
     assert body.take_moved() == []
-    state = drive(body, 0.2, 0.2, 6.0)
-    assert state.x_m == pytest.approx(1.2, abs=0.02)
+    state = drive(body, 0.2, 0.2, 3.5)
+    assert state.x_m == pytest.approx(0.7, abs=0.02)
     (moved,) = body.take_moved()
     assert moved.x_m == pytest.approx(state.x_m + FRONT_M + 0.15, abs=0.05)
     assert body.take_moved() == []
@@ -56,17 +56,17 @@ def test_a_light_thing_is_pushed_and_reports_where_it_is(make: Maker) -> None:
 
 
 def test_a_heavy_thing_stops_the_robot(make: Maker) -> None:
-    body = make(world_of(box(mass_kg=200.0, friction=0.8)))
-    state = drive(body, 0.2, 0.2, 6.0)
-    assert state.x_m == pytest.approx(0.85 - FRONT_M, abs=0.01)
+    body = make(world_of(box(x=0.6, mass_kg=200.0, friction=0.8)))
+    state = drive(body, 0.2, 0.2, 3.0)
+    assert state.x_m == pytest.approx(0.45 - FRONT_M, abs=0.01)
     assert state.stalled_left
     assert state.in_contact
 
 
 def test_a_pushed_thing_stops_at_a_wall(make: Maker) -> None:
-    body = make(world_of(box(mass_kg=1.0, friction=0.3), box("wall", 2.0, fixed=True)))
-    state = drive(body, 0.2, 0.2, 8.0)
-    assert state.x_m == pytest.approx(1.85 - 0.3 - FRONT_M, abs=0.02)
+    body = make(world_of(box(x=0.5, mass_kg=1.0, friction=0.3), box("wall", 1.3, fixed=True)))
+    state = drive(body, 0.2, 0.2, 4.5)
+    assert state.x_m == pytest.approx(1.15 - 0.3 - FRONT_M, abs=0.02)
     assert state.stalled_left
 
 
@@ -106,14 +106,14 @@ def test_what_walks_into_the_robot_is_a_collision(make: Maker) -> None:
 
 @pytest.mark.parametrize(("height", "passes"), [(0.012, True), (0.04, False)])
 def test_a_sill_is_driven_over_and_a_low_thing_stops_the_wheels(make: Maker, height: float, passes: bool) -> None:
-    sill = Obstacle(name="sill", x_m=1.0, y_m=0.0, length_m=0.06, width_m=2.0, height_m=height)
+    sill = Obstacle(name="sill", x_m=0.5, y_m=0.0, length_m=0.06, width_m=2.0, height_m=height)
     body = make(world_of(sill))
-    state = drive(body, 0.3, 0.3, 6.0)
-    assert (state.x_m > 1.6) is passes
+    state = drive(body, 0.3, 0.3, 4.0)
+    assert (state.x_m > 1.1) is passes
     assert (state.collisions == 0) is passes
     if not passes:
         # A wheel of 82.5 mm radius meets an edge of 40 mm 71 mm ahead of its axle.
-        assert state.x_m == pytest.approx(0.97 - 0.075, abs=0.01)
+        assert state.x_m == pytest.approx(0.47 - 0.075, abs=0.01)
         assert state.stalled_left
 
 
@@ -127,7 +127,7 @@ def test_a_mesh_is_met_and_echoes_and_its_floor_does_not(make: Maker) -> None:
     assert body.clearance() == pytest.approx(2.0 - 0.26, abs=0.002)
     # The ray nearest to the axis of sonar 0 (90 degrees) meets the wall squarely.
     assert body.ranges([0])[0] == pytest.approx(2.0 - 0.136, abs=0.003)
-    state = drive(body, 0.4, 0.4, 6.0)
+    state = drive(body, 0.4, 0.4, 5.0)
     assert state.x_m == pytest.approx(2.0 - FRONT_M, abs=0.004)
     assert state.collisions == 1
     assert abs(state.z_m) < 0.002
@@ -157,7 +157,7 @@ def test_many_fixed_boxes_are_met_and_echo_as_single_ones_are(make: Maker) -> No
     assert other.ranges(range(8)) == pytest.approx(one.ranges(range(8)), abs=1e-4)
     assert other.clearance() == pytest.approx(one.clearance(), abs=1e-6)
     for body in (one, other):
-        drive(body, 0.3, 0.3, 5.0)
+        drive(body, 0.4, 0.4, 3.5)
     assert other.state.x_m == pytest.approx(one.state.x_m, abs=0.003)
     assert other.state.collisions == one.state.collisions == 1
 
@@ -175,7 +175,7 @@ def test_a_snapshot_holds_walkers_and_pushed_things(make: Maker) -> None:
 
     def rest(other: RobotBody) -> list[object]:
         seen: list[object] = []
-        for _ in range(12):
+        for _ in range(8):
             seen += [drive(other, 0.25, 0.3, 0.1), other.ranges(range(8)), other.clearance(), other.take_moved()]
         return seen
 
@@ -186,11 +186,12 @@ def test_a_snapshot_holds_walkers_and_pushed_things(make: Maker) -> None:
 
 
 def test_a_reset_puts_walkers_and_pushed_things_back(make: Maker) -> None:
-    body = make(world_of(box(mass_kg=1.0, friction=0.3), box("other", 3.0)))
-    drive(body, 0.2, 0.2, 5.0)
+    body = make(world_of(box(x=0.6, mass_kg=1.0, friction=0.3), box("other", 3.0)))
+    drive(body, 0.2, 0.2, 2.5)
+    assert body.take_moved()
     body.reset(Pose(0, 0, 0), 0)
     assert body.take_moved() == []
-    assert body.clearance() == pytest.approx(0.85 - FRONT_M, abs=0.002)
+    assert body.clearance() == pytest.approx(0.45 - FRONT_M, abs=0.002)
 
 
 def test_an_echo_has_how_squarely_it_was_met(make: Maker) -> None:

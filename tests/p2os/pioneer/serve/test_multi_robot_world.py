@@ -114,7 +114,7 @@ def test_a_robot_that_drives_is_seen_where_it_is(meet: Meet) -> None:
 def test_two_that_push_each_other_head_on_both_stall_and_part_again(meet: Meet) -> None:
     made = meet(((-0.6, 0.0, 0.0), (0.6, 0.0, 180.0)))
     drive(made, 300, 300)
-    now = live(made, 3.5)
+    now = live(made, 2.7)
     states = [member.body.state for member in made.members]
     assert gap(made) == pytest.approx(0.0, abs=0.002)
     assert [state.stalled_left and state.stalled_right for state in states] == [True, True]
@@ -158,9 +158,9 @@ def test_a_robot_without_power_gives_way_and_its_odometry_counts_what_its_wheels
 def test_three_in_a_row_are_pushed_and_no_hull_enters_another(meet: Meet) -> None:
     made = meet(((-0.4, 0.0, 0.0), (0.2, 0.0, 0.0), (1.0, 0.0, 180.0)))
     drive(made, 300)
-    live(made, 6.0)
+    live(made, 4.5)
     x = [member.body.state.x_m for member in made.members]
-    assert x[2] > 1.5
+    assert x[2] > 1.1
     assert x[1] - x[0] == pytest.approx(P2DX.body.hull_front_m + P2DX.body.hull_rear_m, abs=0.003)
     assert x[2] - x[1] == pytest.approx(2 * FRONT_M, abs=0.003)
 

@@ -1,0 +1,57 @@
+"""Plan-view geometry: the way out of a hull, and things that stand elsewhere."""
+
+import math
+
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from p2os.errors import WorldError
+from p2os.pioneer.world.geometry import Footprint, hull_polygon, placed
+from p2os.pioneer.world.model import FARTHEST_M, Obstacle
+from p2os.robots.parameters import load_parameters
+
+HULL = hull_polygon(load_parameters("p2dx").body)
+near, angles = st.floats(-0.2, 0.2), st.floats(-math.pi, math.pi)
+CARTON = Obstacle(name="carton", x_m=0.0, y_m=0.0, length_m=0.3, width_m=0.4, mass_kg=1.5, friction=0.3, height_m=0.2)
+
+
+@settings(max_examples=40)
+@given(st.one_of(near.map(lambda size: {"radius_m": 0.21 + size}), st.just({"length_m": 0.3, "width_m": 0.4})),
+       near, near, angles, angles)  # fmt: skip
+def test_no_shorter_way_leads_out_of_a_hull(
+    size: dict[str, float], x: float, y: float, heading: float, turn: float
+) -> None:
+    hull = placed(HULL, 0.0, 0.0, turn)
+    thing = Footprint(Obstacle(name="thing", x_m=x, y_m=y, heading_rad=heading, **size))
+    dx, dy = thing.way_out(hull)
+    assume(thing.distance(hull) == 0.0 and math.hypot(dx, dy) > 1e-3)
+    for share, is_out in ((1 + 1e-6, True), (1 - 1e-6, False)):
+        moved = Obstacle(name="thing", x_m=x + share * dx, y_m=y + share * dy, heading_rad=heading, **size)
+        assert (Footprint(moved).distance(hull) > 0.0) is is_out
+    length = math.hypot(dx, dy) - 1e-6
+    for number in range(12):
+        way = math.tau * number / 12
+        moved = Obstacle(name="thing", x_m=x + length * math.cos(way), y_m=y + length * math.sin(way),
+                         heading_rad=heading, **size)  # fmt: skip
+        assert Footprint(moved).distance(hull) == 0.0
+
+
+def test_what_stands_elsewhere_is_else_the_same() -> None:
+    there = CARTON.standing_at(1.0, -FARTHEST_M, 0.5)
+    assert (there.x_m, there.y_m, there.heading_rad) == (1.0, -FARTHEST_M, 0.5)
+    assert there.standing_at(0.0, 0.0, 0.0) == CARTON
+
+
+@pytest.mark.parametrize(
+    ("place", "value"),
+    [
+        *[(place, value) for place in range(3) for value in (math.nan, math.inf)],
+        *[(place, math.nextafter(FARTHEST_M, math.inf)) for place in range(2)],
+    ],
+)
+def test_nothing_stands_where_no_place_is(place: int, value: float) -> None:
+    pose = [0.0, 0.0, 0.0]
+    pose[place] = value
+    with pytest.raises(WorldError, match="carton"):
+        CARTON.standing_at(*pose)
