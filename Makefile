@@ -79,7 +79,7 @@ bench: setup
 	$(BIN)/python tools/bench/devices.py --timers
 
 soak: setup mutation-tools
-	$(BIN)/pytest -n $(JOBS) -m 'soak'
+	$(BIN)/pytest -n $(JOBS) -m '(soak or hypothesis) and not hardware' --hypothesis-profile drawn
 
 # The programs of others that are on PATH, or PEERS='--peer "p2os-arduino=/home/me/drive {line}"', against p2os serve.
 peers: setup

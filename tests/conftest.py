@@ -28,12 +28,15 @@ def pytest_addoption(parser: pytest.Parser, pluginmanager: pytest.PytestPluginMa
         pluginmanager.register(LineCounter(config.rootpath, config.rootpath / given.count_lines, is_worker=is_worker))
 
 
+@pytest.hookimpl(tryfirst=True)  # Hypothesis loads the profile that a command line names
 def pytest_configure(config: pytest.Config) -> None:
     """Keep compiled modules beside the sources even where PYTHONDONTWRITEBYTECODE is set, and bound no example's time.
 
     A child that compiles 200 modules of ours takes 1.0 s of processor time to start, and 0.25 s else; and Python looks
     in one place only: where they are kept in a folder of their own, 3,500 modules of installed packages and its own
     are compiled anew, too. How long an example takes depends on what else the machine does.
+
+    Examples are the same in each run, so that a commit that passes does so again; `make soak` draws others.
     """
     gc.disable()  # until all is collected: what imports make stays, and looking through it again and again takes long
     if sys.dont_write_bytecode:
@@ -47,8 +50,9 @@ def pytest_configure(config: pytest.Config) -> None:
     config.pluginmanager.register(TurnedFolders())
     from hypothesis import HealthCheck, settings  # whose modules pytest rewrites: after it is known where they are kept
 
-    settings.register_profile("tests", deadline=None, suppress_health_check=[HealthCheck.too_slow])
-    settings.load_profile("tests")
+    settings.register_profile("drawn", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+    settings.register_profile("repeated", settings.get_profile("drawn"), derandomize=True, database=None)
+    settings.load_profile("repeated")
 
 
 class TurnedFolder(pytest.Dir):

@@ -110,7 +110,11 @@ def _tcp(text: str, rest: str) -> TcpUrl:
     host, colon, port = rest.rpartition(":") if not rest.endswith("]") else (rest, "", "")
     if not colon:
         host, port = rest, ""
-    host = host.removeprefix("[").removesuffix("]") or LOOPBACK
+    if host.startswith("[") and host.endswith("]"):
+        host = host[1:-1]
+    if "[" in host or "]" in host:
+        raise UsageError(f"{text!r}: {host!r} is no host", hint="tcp:[::1]:8101")
+    host = host or LOOPBACK
     if not port:
         return TcpUrl(host=host)
     return TcpUrl(host=host, port=_number(text, "port", port, 0, 65_535))

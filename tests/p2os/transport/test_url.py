@@ -25,6 +25,7 @@ from simbase.errors import P2osError, UsageError
         ("tcp:10.0.0.1:0", TcpUrl(host="10.0.0.1", port=0)),
         ("tcp:[::1]:8102", TcpUrl(host="::1", port=8102)),
         ("tcp:[::1]", TcpUrl(host="::1", port=8101)),
+        ("tcp:[]:9000", TcpUrl(host="127.0.0.1", port=9000)),
         ("pty:", PtyUrl()),
         ("pty:/run/robot", PtyUrl(path="/run/robot")),
         ("loop:robot", LoopUrl(name="robot")),
@@ -50,6 +51,9 @@ def test_a_url_is_read_and_written_back(text: str, url: object) -> None:
         ("tcp:localhost:http", "port 'http' is not a whole number", "tcp:"),
         ("tcp:localhost:70000", "from 0 to 65535", "tcp:"),
         ("tcp:localhost:٣", "port '٣' is not a whole number", "tcp:"),
+        ("tcp:[[", "no host", "tcp:[::1]:8101"),
+        ("tcp:[", "no host", "tcp:[::1]:8101"),
+        ("tcp:[::1:8101", "no host", "tcp:[::1]:8101"),
         ("loop:", "has no name", "loop:robot"),
     ],
 )
