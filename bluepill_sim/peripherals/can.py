@@ -16,7 +16,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cache, partialmethod
+from functools import lru_cache, partialmethod
 
 from bluepill_sim.fabric.bus_parts import CanFrame
 from bluepill_sim.fabric.can_network import CanEnd, CanError, CanNetwork, frame_bits
@@ -764,7 +764,7 @@ class Can(Peripheral):
         self.chip.pins[self._pin_names[0]].hold_low(not rx)
 
 
-@cache  # asked for at each of hundreds of steps of a frame
+@lru_cache(maxsize=64)  # asked for at each of hundreds of steps of a frame
 def _bit_rate(pclk1_hz: int, timing: int) -> Fraction:
     """Return bits a second that a clock and a value of BTR make."""
     quanta = 1 + (timing >> 16 & 15) + 1 + (timing >> 20 & 7) + 1
