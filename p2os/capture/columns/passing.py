@@ -20,11 +20,10 @@ from p2os.capture.listing import COMMAND_NAMES, SYNC_NAMES, Finder, Lister, List
 from p2os.protocol.commands import CommandNumber
 from p2os.protocol.frames import CHECKSUM_BYTES, GIVE_UP_NS, PREFIX_BYTES
 from p2os.protocol.packets import IDENTITY_KIND, RESET_KINDS, packet_name
-from p2os.protocol.sip import HEAD_BYTES, READING_BYTES, SIP_KINDS
+from p2os.protocol.sip import COUNT_AT, HEAD_BYTES, READING_BYTES, SIP_KINDS
 
 #: chosen: below, a loop takes less time than NumPy's calls.
 LEAST_BYTES = 1 << 11
-_COUNT_AT = 19
 #: Packet types and commands that a filter by names may leave out, with their names in lower case. A reset ends a
 #: session; PULSE and SYNC0 are one number, which changes none, and OPEN and CLOSE change it.
 _PACKETS = tuple((kind, packet_name(kind).lower()) for kind in range(IDENTITY_KIND + 1, 256) if kind not in RESET_KINDS)
@@ -86,7 +85,7 @@ class Passing:
         is_passed[list(self._kinds[direction])] = True
         passed: _Flags = is_passed[data[starts]] if len(starts) else np.zeros(0, np.bool_)
         if direction is None and len(starts):
-            readings = data[np.minimum(starts + _COUNT_AT, ends - 1)].astype(np.int64)
+            readings = data[np.minimum(starts + COUNT_AT, ends - 1)].astype(np.int64)
             sizes = ends - starts
             passed &= (sizes >= HEAD_BYTES) & (sizes >= HEAD_BYTES + READING_BYTES * readings)
         return starts, ends, passed
