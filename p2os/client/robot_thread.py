@@ -14,7 +14,6 @@ thread is in and however often it is interrupted.
 """
 
 import contextlib
-import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -23,7 +22,7 @@ from p2os.client.core import RobotCore
 from p2os.client.line import Line, Listeners, Result, Waiting
 from p2os.errors import TransportError
 from p2os.transport.ports import Transport
-from p2os.transport.waiting import BLIND_POLL_S, waits_of
+from p2os.transport.waiting import BLIND_POLL_S, WakeUp, waits_of
 from p2os.transport.wall_clock import Clock, wall_clock
 from simbase.errors import P2osError
 from simbase.interrupts import held_back
@@ -63,9 +62,7 @@ class RobotThread:
         self._waits = waits_of(clock)
         self._open_line = open_line
         self._thread: threading.Thread | None = None
-        self._wake, self._wake_push = socket.socketpair()
-        self._wake.setblocking(False)
-        self._wake_push.setblocking(False)
+        self._wake_up = WakeUp()
         self._failure: BaseException | None = None
         #: Whether the failure was raised in the program.
         self._has_reported = False
@@ -92,7 +89,7 @@ class RobotThread:
             now = self._line.now()
             self.core.touch(now)
             result = call(self.core, now)
-        self._wake_thread()
+        self._wake_up.ring()
         return result
 
     def wait_for(self, is_so: Callable[[RobotCore], bool], timeout_s: float | None) -> bool:
@@ -135,7 +132,7 @@ class RobotThread:
 
         It looks at flags and sleeps: an interrupt inside of Python's own events and joins leaves their locks taken.
         """
-        self._wake_thread()
+        self._wake_up.ring()
         if self._thread is threading.current_thread():
             return
         handover_s = min(time.monotonic() + HANDOVER_S, ends_s)
@@ -209,27 +206,22 @@ class RobotThread:
         else:
             with self._locked():
                 self._line.opened(transport)
-        self._wake_thread()
+        self._wake_up.ring()
 
     def _wait(self) -> None:
         """Sleep until bytes, a deadline or a call."""
         with self._locked():
             wait_s, transport = self._line.wait_s(), self._line.transport
-            waiting: list[int] = [self._wake.fileno()]
+            waiting: list[int] = [self._wake_up.fileno()]
             if transport is not None:
                 try:
                     waiting.append(transport.fileno())
                 except TransportError:
                     wait_s = min(wait_s, BLIND_POLL_S)
         self._waits.wait_readable(waiting, wait_s)
-        with contextlib.suppress(BlockingIOError):
-            self._wake.recv(4096)
+        self._wake_up.clear()
 
     def _check(self) -> None:
         if self._failure is not None:
             self._has_reported = True
             raise P2osError(f"the client's thread failed: {self._failure}") from self._failure
-
-    def _wake_thread(self) -> None:
-        with contextlib.suppress(OSError):  # full: it wakes anyway
-            self._wake_push.send(b"\0")

@@ -30,7 +30,6 @@ import asyncio
 import contextlib
 import math
 import selectors
-import socket
 import threading
 import time
 import weakref
@@ -39,7 +38,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from typing import Any
 
-from p2os.transport.waiting import wait_readable
+from p2os.transport.waiting import WakeUp, wait_readable
 from simbase.timing import NS_PER_S, Nanos
 
 #: chosen: how soon, in real time, the end of a thread is noticed, or an interrupt of one that waits.
@@ -65,8 +64,7 @@ class _Wait:
 class _Member:
     """A thread of the clock, what wakes it from a wait for descriptors, and its wait."""
 
-    bell: socket.socket
-    push: socket.socket
+    wake_up: WakeUp
     wait: _Wait | None = None
 
 
@@ -78,28 +76,20 @@ class _Members:
 
     def of(self, thread: threading.Thread) -> _Member:
         if (member := self.by_thread.get(thread)) is None:
-            bell, push = socket.socketpair()
-            bell.setblocking(False)
-            push.setblocking(False)
-            member = self.by_thread[thread] = _Member(bell, push)
+            member = self.by_thread[thread] = _Member(WakeUp())
         return member
 
     def waits(self) -> list[_Wait] | None:
         """Return what they wait for; None while one of them works. Those that have ended are left out for good."""
         for thread in [thread for thread in self.by_thread if not thread.is_alive()]:
-            _close(self.by_thread.pop(thread))
+            self.by_thread.pop(thread).wake_up.close()
         found = [member.wait for member in self.by_thread.values()]
         waits = [wait for wait in found if wait is not None and not wait.is_over]
         return waits if len(waits) == len(found) else None
 
     def close(self) -> None:
         for member in self.by_thread.values():
-            _close(member)
-
-
-def _close(member: _Member) -> None:
-    member.bell.close()
-    member.push.close()
+            member.wake_up.close()
 
 
 class VirtualClock:
@@ -189,15 +179,15 @@ class VirtualClock:
     def _wait(self, descriptors: tuple[int, ...], longest_s: float | None, really_s: float) -> set[int]:
         with self._lock:
             member = self._members.of(threading.current_thread())
-        bell = member.bell.fileno()
-        wait = _Wait(self._deadline(longest_s), lambda: _ring(member), descriptors)
+        wake_up = member.wake_up
+        bell = wake_up.fileno()
+        wait = _Wait(self._deadline(longest_s), wake_up.ring, descriptors)
         ends_s = time.monotonic() + really_s
         with self._waiting(wait):
             self._go_on()
             while True:
                 ready = wait_readable((*descriptors, bell), min(HEARTBEAT_S, ends_s - time.monotonic()))
-                with contextlib.suppress(BlockingIOError):
-                    member.bell.recv(4096)
+                wake_up.clear()
                 ready -= {bell}
                 if ready or wait.is_over or time.monotonic() >= ends_s:
                     return ready
@@ -248,11 +238,6 @@ class VirtualClock:
         deadline, place = min(timed)
         self._now = max(self._now, deadline)
         return waits[place]
-
-
-def _ring(member: _Member) -> None:
-    with contextlib.suppress(OSError):  # full: it wakes anyway
-        member.push.send(b"\0")
 
 
 class _Selector(selectors.DefaultSelector):

@@ -12,6 +12,7 @@ Invariant: no wait lasts longer than it was asked to.
 
 import contextlib
 import select
+import socket
 import threading
 import time
 from collections.abc import Iterable
@@ -55,6 +56,34 @@ def wait_readable(descriptors: Iterable[int], longest_s: float) -> set[int]:
     for descriptor in found:
         poll.register(descriptor, select.POLLIN)
     return {descriptor for descriptor, _ in poll.poll(longest_s * 1000)}
+
+
+class WakeUp:
+    """Ends another thread's wait for descriptors: readable from `ring` on until it is cleared; no call of it waits."""
+
+    def __init__(self) -> None:
+        self._read, self._write = socket.socketpair()
+        self._read.setblocking(False)
+        self._write.setblocking(False)
+
+    def fileno(self) -> int:
+        """Return the descriptor to wait for."""
+        return self._read.fileno()
+
+    def ring(self) -> None:
+        """Become readable; nothing where it is closed."""
+        with contextlib.suppress(OSError):  # full: it is readable anyway
+            self._write.send(b"\0")
+
+    def clear(self) -> None:
+        """Be no longer readable; before looking what there is to do."""
+        with contextlib.suppress(BlockingIOError):
+            self._read.recv(4096)
+
+    def close(self) -> None:
+        """Give the descriptors back."""
+        self._read.close()
+        self._write.close()
 
 
 @runtime_checkable

@@ -3,27 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
+from p2os.pioneer.body.contract import BodyState
 from p2os.pioneer.sonar.ring import Cone
 from simbase.state import Stateful
 from simbase.timing import NS_PER_MS
-
-
-@dataclass(frozen=True)
-class WheelAngles:
-    left_angle_rad: float = 0.0
-    right_angle_rad: float = 0.0
-    left_speed_mps: float = 0.0
-    right_speed_mps: float = 0.0
-    stalled_left: bool = False
-    stalled_right: bool = False
-    heading_rad: float = 0.0
-    pitch_rad: float = 0.0
-    turn_radps: float = 0.0
-    in_contact: bool = False
-    contact_rad: float | None = None
-    x_m: float = 0.0
-    y_m: float = 0.0
-    z_m: float = 0.0
 
 
 @dataclass
@@ -34,7 +17,7 @@ class PerfectBody(Stateful):
 
     dt_ns: int = NS_PER_MS
     radius_m: float = 0.0825
-    state: WheelAngles = field(default_factory=WheelAngles)
+    state: BodyState = field(default_factory=BodyState)
     range_m: dict[int, float] = field(default_factory=dict)
     steps: int = 0
     #: Something holds both wheels.
@@ -42,7 +25,7 @@ class PerfectBody(Stateful):
     asked: list[tuple[int, ...]] = field(default_factory=list)
 
     def put_back(self) -> None:
-        self.state = WheelAngles()
+        self.state = BodyState()
 
     def who_stands_at_start(self) -> str | None:
         return None
@@ -53,7 +36,7 @@ class PerfectBody(Stateful):
     def scan(self, fan: Cone, longest_m: float) -> list[float]:
         return [min(1.0 + ray / 1000, longest_m) for ray in range(len(fan.headings_rad))]
 
-    def step(self, left_mps: float, right_mps: float) -> WheelAngles:
+    def step(self, left_mps: float, right_mps: float) -> BodyState:
         self.steps += 1
         if self.blocked:
             left_mps = right_mps = 0.0
@@ -65,10 +48,10 @@ class PerfectBody(Stateful):
         )  # fmt: skip
         return self.state
 
-    def hold(self, left_mps: float, right_mps: float, steps: int) -> list[WheelAngles]:
+    def hold(self, left_mps: float, right_mps: float, steps: int) -> list[BodyState]:
         return [self.step(left_mps, right_mps) for _ in range(steps)]
 
-    def ramp(self, setpoints: Sequence[tuple[float, float]]) -> list[WheelAngles]:
+    def ramp(self, setpoints: Sequence[tuple[float, float]]) -> list[BodyState]:
         return [self.step(*asked) for asked in setpoints]
 
     def stall(self, *, left: bool, right: bool) -> None:

@@ -11,7 +11,6 @@ fast as the machine is.
 
 import contextlib
 import queue
-import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -25,7 +24,7 @@ from p2os.pioneer.serve.orders import carry_out
 from p2os.pioneer.world import load_world
 from p2os.robots.parameters import load_parameters
 from p2os.transport import listen_url
-from p2os.transport.waiting import Waits, waits_of
+from p2os.transport.waiting import Waits, WakeUp, waits_of
 from p2os.transport.wall_clock import Clock, wall_clock
 from simbase.errors import P2osError
 from simbase.timing import Nanos
@@ -84,7 +83,7 @@ class _Orders:
     def __init__(self, host: Host, waits: Waits) -> None:
         self._host, self._waits = host, waits
         self._waiting: queue.SimpleQueue[tuple[str, Future[list[str]]]] = queue.SimpleQueue()
-        self._bell, self._push = socket.socketpair()
+        self._wake_up = WakeUp()
         self._changed = threading.Condition()
         self._is_over = self._has_ended = False
 
@@ -92,7 +91,7 @@ class _Orders:
         """Wait until an order is carried out."""
         answer: Future[list[str]] = Future()
         self._waiting.put((words, answer))
-        self._ring()
+        self._wake_up.ring()
         with self._changed:
             while not (answer.done() or self._is_over or self._has_ended):
                 self._waits.wait_for_change(self._changed, PATIENCE_S)
@@ -107,14 +106,13 @@ class _Orders:
             P2osError: The thread does not end.
         """
         self._is_over = True
-        self._ring()
+        self._wake_up.ring()
         ends_s = time.monotonic() + ENDING_S
         while not self._has_ended and time.monotonic() < ends_s:
             self._waits.look(LOOK_S)
         if not self._has_ended:
             raise P2osError("the virtual robot's thread does not end")
-        self._bell.close()
-        self._push.close()
+        self._wake_up.close()
 
     def serve(self) -> None:
         """Serve the robot until that is to end: what its thread does."""
@@ -122,7 +120,8 @@ class _Orders:
         try:
             while not self._is_over:
                 self._carry_out()
-                host.turn(IDLE_WAIT_S, woken_by=(self._bell.fileno(),))
+                host.turn(IDLE_WAIT_S, woken_by=(self._wake_up.fileno(),))
+                self._wake_up.clear()
         finally:
             host.close()
             with self._changed:
@@ -131,7 +130,6 @@ class _Orders:
 
     def _carry_out(self) -> None:
         while not self._waiting.empty():
-            self._bell.recv(1)
             words, answer = self._waiting.get()
             try:
                 answer.set_result(carry_out([self._host], words))
@@ -139,10 +137,6 @@ class _Orders:
                 answer.set_exception(error)
             with self._changed:
                 self._changed.notify_all()
-
-    def _ring(self) -> None:
-        with contextlib.suppress(OSError):  # it has ended
-            self._push.send(b"\0")
 
 
 @contextlib.contextmanager
