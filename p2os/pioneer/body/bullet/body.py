@@ -21,7 +21,7 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any, cast
 
-from p2os.pioneer.body.bullet.engine import give_back, pybullet, start_anew, take_client
+from p2os.pioneer.body.bullet.engine import clients, pybullet, start_anew
 from p2os.pioneer.body.bullet.model import (
     ECHOING,
     LEFT,
@@ -77,14 +77,14 @@ class BulletScene(Scene):
         super().__init__(world, len(models))
         self._bands = [Bands(model) for model in models]
         #: The engine takes its client as a keyword of every call.
-        self.client = take_client()
+        self.client = clients.take()
         self._take(BulletBody(self, model, number) for number, model in enumerate(models))
         self.reset([world.start] * len(models), 0)
 
     def __del__(self) -> None:
         client = getattr(self, "client", -1)
         if client >= 0 and pybullet.isConnected(client):
-            give_back(client)
+            clients.give_back(client)
 
     def reset(self, poses: Sequence[Pose], seed: int) -> None:
         """Let every robot stand still at its pose in the world as it was made; nothing here is random."""

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from importlib.util import find_spec
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -143,17 +144,44 @@ def test_a_blocked_robot_goes_on_when_the_thing_is_taken_away() -> None:
 def test_a_client_that_other_robots_had_is_as_good_as_a_new_one(monkeypatch: pytest.MonkeyPatch) -> None:
     engine = pytest.importorskip("p2os.pioneer.body.bullet.engine")
     gc.collect()  # no scene that is left over gives its client back meanwhile
-    monkeypatch.setattr(engine, "_idle", [])
+    clients = engine.Clients()
+    monkeypatch.setattr("p2os.pioneer.body.bullet.body.clients", clients)
     first = make_body("bullet", load_world("arena", 3), P2DX)
     there = digest_of_the_rest(first)
     client = first.scene.client
-    engine.give_back(client)
+    clients.give_back(client)
     others = make_scene("bullet", load_world("office"), [P2DX, P2DX])
     assert others.client == client
     for _ in range(300):
         others.step([(0.3, 0.3), (-0.2, 0.2)])
-    engine.give_back(client)
+    clients.give_back(client)
     again = make_body("bullet", load_world("arena", 3), P2DX)
     assert again.scene.client == client
     assert digest_of_the_rest(again) == there
     first.scene.client = others.client = -1  # one of them gives it back
+
+
+@pytest.mark.bullet
+def test_scenes_that_nobody_uses_any_more_leave_their_clients_to_new_ones(monkeypatch: pytest.MonkeyPatch) -> None:
+    engine = pytest.importorskip("p2os.pioneer.body.bullet.engine")
+    gc.collect()  # as above
+    monkeypatch.setattr("p2os.pioneer.body.bullet.body.clients", engine.Clients())
+    opened, connect = list[int](), engine.pybullet.connect
+
+    def open_one(how: int) -> int:
+        opened.append(connect(how))
+        return opened[-1]
+
+    monkeypatch.setattr(engine.pybullet, "connect", open_one)
+    room = load_world("room")
+    for _ in range(6):
+        make_body("bullet", room, P2DX)
+    assert len(opened) == engine.MOST_IDLE
+    held = [make_body("bullet", room, P2DX) for _ in range(5)]
+    assert len(opened) == len({body.scene.client for body in held}) == 5  # type: ignore[attr-defined]  # a BulletBody
+    looked = list[int]()
+    monkeypatch.setattr(engine, "gc", SimpleNamespace(collect=lambda: looked.append(len(opened))))
+    held += [make_body("bullet", room, P2DX) for _ in range(4)]
+    assert looked == [8], "where all are in use, that is seen to again when there are twice as many"
+    held.clear()
+    gc.collect()  # they go back to where they were taken from
