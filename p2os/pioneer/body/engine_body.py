@@ -5,11 +5,12 @@ told of it here is worked out from poses and speeds that the engine gives.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from itertools import repeat
 from typing import Any, ClassVar
 
 from p2os.pioneer.body.contacts import ContactCounter
-from p2os.pioneer.body.contract import BodyState
+from p2os.pioneer.body.contract import FASTEST_MPS, BodyState, Turned, Wheels
 from p2os.pioneer.body.in_world import DT_S, BodyInWorld, Scene
 from p2os.pioneer.body.physical import (
     BACK_DRIVE,
@@ -25,24 +26,44 @@ from p2os.pioneer.sonar.ring import Cone, reading
 from p2os.pioneer.world.model import Obstacle
 from p2os.robots.parameters import RobotParameters
 
+#: Farther than this from everything, contacts need not be looked for; looked again after so many steps otherwise.
+FAR_M, LOOK_STEPS = 0.1, 50
+#: No point of a hull that touches nothing gains speed faster, m/s². The tyres' friction gives the middle of the robot
+#: at most 8, and the ends of the longest hull 15 more where it turns the robot (chosen: about twice the sum).
+MOST_MPS2 = 50.0
+
+
+class EngineScene(Scene):
+    """Robots and things in one world of an engine."""
+
+    #: Whether something is driven on beside the level floor.
+    is_uneven: bool
+
 
 class EngineBody(BodyInWorld):
     """A differential drive with mass, torque limits and friction."""
 
     STATE: ClassVar[tuple[str, ...]] = ("_zero", "_stalling", "_is_held", "_is_at_rest", "_most_nm", "_rates")
-    DERIVED: ClassVar[tuple[str, ...]] = ("_state", "_is_grip_changed", "_fan", "_fan_rays")
+    #: What is read from the engine, and what spares a look for contacts.
+    DERIVED: ClassVar[tuple[str, ...]] = ("_state", "_is_grip_changed", "_fan", "_fan_rays", "_alone", "_look_in",
+                                          "_is_busy")  # fmt: skip
 
     #: What prepares the rays of some cones: (cones, height of their plane, longest range), metres.
     _rays_of: ClassVar[Callable[..., Any]]
     #: Angles of the wheels when it was reset.
     _zero: tuple[float, ...]
+    scene: "EngineScene"
 
-    def __init__(self, scene: Scene, parameters: RobotParameters, number: int) -> None:
+    def __init__(self, scene: EngineScene, parameters: RobotParameters, number: int) -> None:
         super().__init__(scene, parameters, number)
         self._radius_m = parameters.body.wheel_diameter_m / 2
         self._straining_nm = STALL_TORQUE_SHARE * parameters.body.motor_torque_nm
         self._slow_radps = STALL_RIM_MPS / self._radius_m
         self._state: BodyState | None = None
+        #: Steps for which nothing can touch the robot, and steps until that is looked at again.
+        self._alone, self._look_in = 0, 0
+        #: Whether things around it move, or floors rise, so that nothing is known of the next steps.
+        self._is_busy = True
         #: Whether a wheel has come to rest or moves again, is held or free again, since its motor was told anything.
         self._is_grip_changed = True
         self._torque_nm = parameters.body.motor_torque_nm
@@ -60,7 +81,7 @@ class EngineBody(BodyInWorld):
 
     def _restored(self) -> None:
         super()._restored()
-        self._state = None
+        self._state, self._is_grip_changed = None, True
 
     @property
     def state(self) -> BodyState:
@@ -72,6 +93,24 @@ class EngineBody(BodyInWorld):
     def steps_within(self, turn_rad: float, rim_mps: float) -> int:  # noqa: ARG002  # the contract's
         """Return 0: what pushes the robot turns its wheels too."""
         return 0
+
+    def step(self, left_mps: float, right_mps: float) -> Turned:
+        """Move on by one step with these rim-speed set-points; see `RobotBody`."""
+        if self.others or self._walking:
+            return super().step(left_mps, right_mps)
+        return self._step_alone(((left_mps, right_mps),))[0]
+
+    def hold(self, left_mps: float, right_mps: float, steps: int) -> Sequence[Wheels]:
+        """Make so many steps with these set-points; see `RobotBody`."""
+        if self.others or self._walking:
+            return super().hold(left_mps, right_mps, steps)
+        return self._step_alone(repeat((left_mps, right_mps), steps))
+
+    def ramp(self, setpoints: Sequence[tuple[float, float]]) -> Sequence[Wheels]:
+        """Make a step with each of these set-points; see `RobotBody`."""
+        if self.others or self._walking:
+            return super().ramp(setpoints)
+        return self._step_alone(setpoints)
 
     def clearance(self, *, no_more_than: float = math.inf) -> float:
         """Return the plan-view distance from the hull to the nearest thing that it could touch, metres, or that."""
@@ -148,6 +187,33 @@ class EngineBody(BodyInWorld):
         if self._is_held[wheel] and asked_mps != 0.0:
             return 0.0, self._torque_nm * BACK_DRIVE
         return asked_mps / self._radius_m, self._torque_nm
+
+    def _look_around(self) -> None:
+        """Find for how many steps nothing can touch the robot, so that contacts need not be asked for."""
+        self._look_in -= 1
+        if self._look_in > 0 or self._contacts.touching or self._is_busy:
+            return
+        self._look_in = LOOK_STEPS
+        state = self.state
+        free = self._nearest_robot(self._plan.clearance(state.x_m, state.y_m, state.heading_rad, no_more_than=2.0))
+        if free > FAR_M:
+            way_m = free - FAR_M / 2
+            if self.others:
+                self._alone = int(way_m / (2 * FASTEST_MPS * DT_S))
+            else:
+                now_mps = abs(state.forward_mps) + abs(state.turn_radps) * self.reach_m
+                gaining_s = (math.sqrt(now_mps**2 + 2 * MOST_MPS2 * way_m) - now_mps) / MOST_MPS2
+                self._alone = int(max(gaining_s, way_m / FASTEST_MPS) / DT_S)
+            self._look_in = 0
+
+    def look_anew(self) -> None:
+        """Look for contacts anew: something else is around the robot now."""
+        self._alone, self._look_in = 0, 0
+        self._is_busy = (
+            self.scene.is_uneven
+            or bool(self._walking)
+            or any(item.mass_kg > 0 or item.kind.is_driven_on for item in self._plan.obstacles)
+        )
 
     def read_anew(self) -> None:
         """Forget the state that was read while robots of the scene took their step one after the other."""
@@ -234,6 +300,10 @@ class EngineBody(BodyInWorld):
         return list(map(min, met, self._robot_ranges(fan, longest_m))) if self.others else met
 
     # What the engine tells -------------------------------------------------------------------
+
+    def _step_alone(self, setpoints: Iterable[tuple[float, float]]) -> list[Turned]:
+        """Make the steps that its scene would make, where nobody else moves in it."""
+        raise NotImplementedError
 
     def _read(self) -> BodyState:
         """Return the state as the engine has it now."""

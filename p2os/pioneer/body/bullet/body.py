@@ -16,7 +16,7 @@ Not modelled: tyre scrub and wheel-size errors, battery sag.
 
 import math
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from operator import itemgetter
 from pathlib import Path
 from typing import Any, cast
@@ -36,9 +36,8 @@ from p2os.pioneer.body.bullet.model import (
 )
 from p2os.pioneer.body.bullet.rays import SonarRays
 from p2os.pioneer.body.contacts import APART_STEPS
-from p2os.pioneer.body.contract import FASTEST_MPS, BodyState, Turned, Wheels, free_wheels
-from p2os.pioneer.body.engine_body import EngineBody
-from p2os.pioneer.body.in_world import DT_S, Scene
+from p2os.pioneer.body.contract import BodyState, Turned, free_wheels
+from p2os.pioneer.body.engine_body import EngineBody, EngineScene
 from p2os.pioneer.body.physical import (
     FLOOR_GROUP,
     LOW_GROUP,
@@ -52,18 +51,13 @@ from p2os.robots.parameters import RobotParameters
 
 #: Bullet keeps contact points a little apart; touching is no farther than this, m.
 TOUCH_M = 1e-4
-#: Farther than this from everything, contacts need not be looked for; looked again after so many steps otherwise.
-FAR_M, LOOK_STEPS = 0.1, 50
-#: No point of a hull that touches nothing gains speed faster, m/s². The tyres' friction gives the middle of the robot
-#: at most 8, and the ends of the longest hull 15 more where it turns the robot (chosen: about twice the sum).
-MOST_MPS2 = 50.0
 #: So much faster than its set-point and than it was turns no wheel of a robot that touches nothing but the floor
 #: (measured with set-points that jump, of five models from 0.05 to 2 m/s: 1.38; the rest is chosen).
 OVERSHOOT = 2.0
 WHEELS = (LEFT, RIGHT)
 
 
-class BulletScene(Scene):
+class BulletScene(EngineScene):
     """Robots and things in one client of the engine."""
 
     STATE = ("_made", "engine_state")
@@ -120,7 +114,6 @@ class BulletScene(Scene):
                 self._add(item)
         #: Every obstacle ever made, by the engine's number, and whether it stands in the world.
         self._made: dict[int, tuple[Obstacle, bool]] = {}
-        #: Whether something is driven on beside the level floor.
         self.is_uneven = bool(driven_on) or any(item.kind.is_driven_on for item in static)
         #: Those that stand in the world, by name.
         self._numbers: dict[str, int] = {}
@@ -199,9 +192,8 @@ class BulletBody(EngineBody):
     """A differential drive with mass, torque limits and friction."""
 
     STATE = ("_targets", "_start")
-    #: What the scene's `engine_state` makes anew, what is read from the engine, and what spares a look for contacts.
-    DERIVED = ("robot", "_centre", "_joints", "_matrix", "_origin", "_alone", "_look_in", "_is_busy", "_motors",
-               "_told")  # fmt: skip
+    #: What the scene's `engine_state` makes anew, and what is read from the engine.
+    DERIVED = ("robot", "_centre", "_joints", "_matrix", "_origin", "_motors", "_told")
 
     _rays_of = SonarRays
     name = "bullet"
@@ -212,8 +204,6 @@ class BulletBody(EngineBody):
         super().__init__(scene, parameters, number)
         self._sonar_rays = SonarRays(self._cones, parameters.sonar_height_m, parameters.sonar_range_m)
         self._client = scene.client
-        #: Steps for which nothing can touch the robot, and steps until that is looked at again.
-        self._alone, self._look_in = 0, 0
         self._targets = (0.0, 0.0)
         #: What the motors were told last, a rate and a torque each, and what that was worked out from beside the grip
         #: of the wheels.
@@ -277,25 +267,13 @@ class BulletBody(EngineBody):
         super()._count_anew()
         self._joints = pybullet.getJointStates(self.robot, WHEELS, physicsClientId=self._client)
 
-    def step(self, left_mps: float, right_mps: float) -> Turned:
-        """Move on by one step with these rim-speed set-points; see `RobotBody`."""
-        if self.others or self._walking:
-            return super().step(left_mps, right_mps)
-        return self._step_alone(left_mps, right_mps, 1)[0]
-
-    def hold(self, left_mps: float, right_mps: float, steps: int) -> Sequence[Wheels]:
-        """Make so many steps with these set-points; see `RobotBody`."""
-        if self.others or self._walking:
-            return super().hold(left_mps, right_mps, steps)
-        return self._step_alone(left_mps, right_mps, steps)
-
-    def _step_alone(self, left_mps: float, right_mps: float, steps: int) -> list[Turned]:
-        """Make the steps that its scene would make, where nobody else moves in it."""
+    def _step_alone(self, setpoints: Iterable[tuple[float, float]]) -> list[Turned]:
         step, take_step, client, made = pybullet.stepSimulation, self.take_step, self._client, list[Turned]()
-        self._tell_motors(left_mps, right_mps)
-        for _ in range(steps):
-            if self._is_grip_changed:
-                self._tell_motors(left_mps, right_mps)
+        told: object = None
+        for asked in setpoints:
+            if self._is_grip_changed or asked is not told:
+                self._tell_motors(*asked)
+                told = asked
             self._state = None
             self._steps += 1
             step(client)
@@ -345,24 +323,6 @@ class BulletBody(EngineBody):
             return 0
         fastest_mps = max(rim_mps, self._radius_m * max(map(abs, self._rates)))
         return min(self._alone, self._steps_to_roll(turn_rad, OVERSHOOT * fastest_mps))
-
-    def _look_around(self) -> None:
-        """Find for how many steps nothing can touch the robot, so that contacts need not be asked for."""
-        self._look_in -= 1
-        if self._look_in > 0 or self._contacts.touching or self._is_busy:
-            return
-        self._look_in = LOOK_STEPS
-        state = self.state
-        free = self._nearest_robot(self._plan.clearance(state.x_m, state.y_m, state.heading_rad, no_more_than=2.0))
-        if free > FAR_M:
-            way_m = free - FAR_M / 2
-            if self.others:
-                self._alone = int(way_m / (2 * FASTEST_MPS * DT_S))
-            else:
-                now_mps = abs(state.forward_mps) + abs(state.turn_radps) * self.reach_m
-                gaining_s = (math.sqrt(now_mps**2 + 2 * MOST_MPS2 * way_m) - now_mps) / MOST_MPS2
-                self._alone = int(max(gaining_s, way_m / FASTEST_MPS) / DT_S)
-            self._look_in = 0
 
     def _wanted_motors(self) -> list[tuple[float, float]]:
         left_mps, right_mps = self._targets
@@ -440,12 +400,3 @@ class BulletBody(EngineBody):
 
     def _where_is(self, name: str) -> tuple[float, float, Sequence[float]]:
         return self.scene.where_is(name)
-
-    def look_anew(self) -> None:
-        """Look for contacts anew: something else is around the robot now."""
-        self._alone, self._look_in = 0, 0
-        self._is_busy = (
-            self.scene.is_uneven
-            or bool(self._walking)
-            or any(item.mass_kg > 0 or item.kind.is_driven_on for item in self._plan.obstacles)
-        )

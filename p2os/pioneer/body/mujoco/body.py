@@ -15,9 +15,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from p2os.pioneer.body.contract import BodyState, Turned
-from p2os.pioneer.body.engine_body import EngineBody
-from p2os.pioneer.body.in_world import Scene
+from p2os.pioneer.body.contacts import APART_STEPS
+from p2os.pioneer.body.contract import BodyState, Turned, free_wheels
+from p2os.pioneer.body.engine_body import EngineBody, EngineScene
 from p2os.pioneer.body.mujoco.model import (
     THING,
     RobotNames,
@@ -40,7 +40,7 @@ from p2os.robots.parameters import RobotParameters
 _STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 
 
-class MujocoScene(Scene):
+class MujocoScene(EngineScene):
     """Robots and things in one model of the engine."""
 
     STATE = ("engine_state",)
@@ -53,6 +53,7 @@ class MujocoScene(Scene):
     def __init__(self, world: World, models: Sequence[RobotParameters]) -> None:
         super().__init__(world, len(models))
         self._models = tuple(models)
+        self.is_uneven = any(item.kind.is_driven_on for item in world.obstacles if item.fixed)
         self._take(MujocoBody(self, model, number) for number, model in enumerate(models))
         self.reset([world.start] * len(models), 0)
 
@@ -79,6 +80,7 @@ class MujocoScene(Scene):
             body.find_joints()
         for item in things:
             self._put(item)
+        self.changed()
 
     def _rebuild(self) -> None:
         """Make the model anew and go on where everything was."""
@@ -101,12 +103,24 @@ class MujocoScene(Scene):
                     self._put(item)
         data = self.data
         mujoco.mj_step(self.model, data)
-        # The motors are the only frictions of joints, and the engine lists those first, in the robots' order.
-        efforts, contacts = data.efc_force[: 2 * len(bodies)].tolist(), data.contact.geom.tolist()
+        efforts, contacts = self.efforts_nm, self.contacts
         turned = [body.take_step(efforts[2 * number : 2 * number + 2], contacts) for number, body in enumerate(bodies)]
         for body in bodies:
             body.read_anew()
         return turned
+
+    @property
+    def efforts_nm(self) -> list[float]:
+        """What motor and gear of each wheel gave in the last step, the robots' one after the other."""
+        # The motors are the only frictions of joints, and the engine lists those first.
+        efforts: list[float] = self.data.efc_force[: 2 * len(self.bodies)].tolist()
+        return efforts
+
+    @property
+    def contacts(self) -> list[list[int]]:
+        """The two geometries of each contact."""
+        found: list[list[int]] = self.data.contact.geom.tolist()
+        return found
 
     def _placed(self, item: Obstacle) -> None:
         del item
@@ -148,7 +162,7 @@ class MujocoBody(EngineBody):
     STATE = ("_start",)
     #: Where in the engine's objects things are.
     DERIVED = ("_qpos", "_qvel", "_most_torques", "_wheel_places", "_wheel_speeds", "_rotors", "_robot_place",
-               "_robot_speed", "_hull_number", "_wheel_numbers", "_asked")  # fmt: skip
+               "_robot_speed", "_hull_number", "_wheel_numbers", "_asked", "_told", "_rotor_rates")  # fmt: skip
 
     _rays_of = SonarRays
     name = "mujoco"
@@ -159,7 +173,8 @@ class MujocoBody(EngineBody):
         super().__init__(scene, parameters, number)
         self._names, self._number = RobotNames.of(number), number
         self._sonar_rays = SonarRays(self._cones, parameters.sonar_height_m, parameters.sonar_range_m)
-        self._asked = (0.0, 0.0)
+        #: What the motors were told last, that and what it was worked out from, and the rates of the rotors, rad/s.
+        self._asked, self._told, self._rotor_rates = (0.0, 0.0), tuple[object, ...](), (0.0, 0.0)
 
     @property
     def note(self) -> str | None:
@@ -172,6 +187,7 @@ class MujocoBody(EngineBody):
         """Find the robot in a model that was made anew."""
         model, data, names = self.scene.model, self.scene.data, self._names
         self._qpos, self._qvel, self._most_torques = data.qpos, data.qvel, model.tendon_frictionloss
+        self._told = ()
         joints = [model.joint(name) for name in names.wheels]
         self._wheel_places = [int(joint.qposadr[0]) for joint in joints]
         self._wheel_speeds = [int(joint.dofadr[0]) for joint in joints]
@@ -216,12 +232,32 @@ class MujocoBody(EngineBody):
         """Begin a step with these rim-speed set-points; return what walks, where it is by then."""
         self._state = None
         self._steps += 1
-        self._asked = left_mps, right_mps
-        first, qvel, most_torques = 2 * self._number, self._qvel, self._most_torques
-        left, right = self._rotors
-        qvel[left], most_torques[first] = self._motor(0, left_mps)
-        qvel[right], most_torques[first + 1] = self._motor(1, right_mps)
+        self._turn_rotors(left_mps, right_mps)
         return self.walk() if self._walking else ()
+
+    def _step_alone(self, setpoints: Iterable[tuple[float, float]]) -> list[Turned]:
+        step, scene, take_step, made = mujoco.mj_step, self.scene, self.take_step, list[Turned]()
+        model, data = scene.model, scene.data
+        for left_mps, right_mps in setpoints:
+            self._state = None
+            self._steps += 1
+            self._turn_rotors(left_mps, right_mps)
+            step(model, data)
+            made.append(take_step(scene.efforts_nm, () if self._alone else scene.contacts))
+        self._state = None
+        return made
+
+    def _turn_rotors(self, left_mps: float, right_mps: float) -> None:
+        """Turn the rotors that drive the wheels at what is asked for; each pulls its wheel along with its torque."""
+        told = (left_mps, right_mps, self.is_powered, self._most_nm)
+        if self._is_grip_changed or told != self._told:
+            self._told, self._is_grip_changed = told, False
+            left, right = self._motor(0, left_mps), self._motor(1, right_mps)
+            self._asked, self._rotor_rates = (left_mps, right_mps), (left[0], right[0])
+            first, most_torques = 2 * self._number, self._most_torques
+            most_torques[first], most_torques[first + 1] = left[1], right[1]
+        (left, right), qvel = self._rotors, self._qvel
+        qvel[left], qvel[right] = self._rotor_rates
 
     def take_step(self, efforts_nm: Sequence[float], contacts: Iterable[Sequence[int]]) -> Turned:
         """Take what the engine's step has made of the robot.
@@ -230,14 +266,23 @@ class MujocoBody(EngineBody):
             efforts_nm: What motor and gear of each wheel gave.
             contacts: The two geometries of each contact in the scene.
         """
-        touched = self._touched(contacts)
-        if self._contacts.update(touching=touched is not None) and touched is not None:
-            self._note_contact(*touched)
-        for wheel, effort_nm in enumerate(efforts_nm):
-            self._watch_motor(wheel, self._asked[wheel], effort_nm, float(self._qvel[self._wheel_speeds[wheel]]))
-        left, right = self._wheel_places
-        zero = self._zero
-        return Turned(float(self._qpos[left]) - zero[0], float(self._qpos[right]) - zero[1], *self._stalled)
+        if self._alone:
+            self._alone -= 1
+            if self._contacts.apart < APART_STEPS:
+                self._contacts.update(touching=False)
+        else:
+            touched = self._touched(contacts)
+            if self._contacts.update(touching=touched is not None) and touched is not None:
+                self._note_contact(*touched)
+            self._look_around()
+        (left, right), (left_rate, right_rate) = self._wheel_places, self._wheel_speeds
+        (asked_left, asked_right), qpos, qvel = self._asked, self._qpos, self._qvel
+        self._watch_motor(0, asked_left, efforts_nm[0], qvel.item(left_rate))
+        self._watch_motor(1, asked_right, efforts_nm[1], qvel.item(right_rate))
+        zero_left, zero_right = self._zero
+        if self._stalling[0] or self._stalling[1]:
+            return Turned(qpos.item(left) - zero_left, qpos.item(right) - zero_right, *self._stalled)
+        return free_wheels(qpos.item(left) - zero_left, qpos.item(right) - zero_right)
 
     def _touched(self, contacts: Iterable[Sequence[int]]) -> tuple[int, int] | None:
         """Return the first contact of the hull with anything but a floor, or of the wheels with a low thing.
