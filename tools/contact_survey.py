@@ -110,8 +110,7 @@ def measure(
 
 def _watch(body: RobotBody, speed_mps: float, seconds: float) -> Iterator[BodyState]:
     for _ in range(round(seconds * 1000 / LOOK_STEPS)):
-        for _ in range(LOOK_STEPS):
-            body.step(speed_mps, speed_mps)
+        body.hold(speed_mps, speed_mps, LOOK_STEPS)
         yield body.state
 
 

@@ -38,7 +38,7 @@ def told(contact: Contact) -> str:
 @pytest.mark.parametrize("name", each_body())
 def test_a_robot_that_meets_a_thing_beside_its_middle_slides_or_stalls_and_rests(name: str, heading_deg: int) -> None:
     model = load_parameters("p2dx")
-    contact = measure(make_body(name, ARENA, model), model, heading_deg, 4.0)
+    contact = measure(make_body(name, ARENA, model), model, heading_deg, 3.0)
     assert contact is not None
     assert not contact.faults(), told(contact)
 
@@ -62,12 +62,14 @@ def test_every_contact_of_thirty_headings_is_within_the_contract(name: str, mode
 @pytest.mark.parametrize("model", ["p2dx", "powerbot"])
 @pytest.mark.parametrize("name", each_body())
 def test_a_robot_that_meets_a_wall_at_a_small_angle_goes_along_it(name: str, model: str) -> None:
-    body = make_body(name, WALL, load_parameters(model))
-    body.reset(Pose(-4.0, 0.4, math.radians(20)), 0)
-    met = drive(body, 0.3, 0.3, 4.0)
+    parameters = load_parameters(model)
+    hull, body = parameters.body, make_body(name, WALL, parameters)
+    # A corner of its front is some 5 cm from the wall.
+    body.reset(Pose(-4.0, 0.95 - hull.hull_width_m / 2 - 0.35 * hull.hull_front_m, math.radians(20)), 0)
+    met = drive(body, 0.3, 0.3, 2.0)
     assert met.collisions
-    along = drive(body, 0.3, 0.3, 3.0)
-    assert along.x_m - met.x_m > 0.5 * 0.3 * 3
+    along = drive(body, 0.3, 0.3, 2.2)
+    assert along.x_m - met.x_m > 0.5 * 0.3 * 2.2
     assert abs(along.heading_rad) < math.radians(3)
     assert not along.stalled_left
     assert not along.stalled_right
@@ -76,8 +78,8 @@ def test_a_robot_that_meets_a_wall_at_a_small_angle_goes_along_it(name: str, mod
 @pytest.mark.parametrize("name", each_body())
 def test_a_robot_that_meets_a_wall_at_a_large_angle_stalls(name: str) -> None:
     body = make_body(name, WALL, load_parameters("p2dx"))
-    body.reset(Pose(-4.0, 0.6, math.radians(75)), 0)
-    stuck = drive(body, 0.3, 0.3, 3.0)
+    body.reset(Pose(-4.0, 0.7, math.radians(75)), 0)
+    stuck = drive(body, 0.3, 0.3, 2.0)
     assert stuck.stalled_left
     assert stuck.stalled_right
     assert drive(body, 0.0, 0.0, 0.05).left_speed_mps == pytest.approx(0.0, abs=0.005)

@@ -105,48 +105,48 @@ def test_two_robots_that_face_each_other_read_the_gap_between_them(meet: Meet) -
 def test_a_robot_that_drives_is_seen_where_it_is(meet: Meet) -> None:
     made = meet()
     drive(made, 400, 0)
-    live(made, 2.0)
+    live(made, 1.2)
     behind = FRONT_M - P2DX.sonar[3].x_mm / 1000
     # It stands at the last boundary: 10 ms at 0.4 m/s are 4 mm.
     assert made.members[1].body.ranges([3])[0] == pytest.approx(gap(made) + behind, abs=0.01)
 
 
 def test_two_that_push_each_other_head_on_both_stall_and_part_again(meet: Meet) -> None:
-    made = meet(((-0.6, 0.0, 0.0), (0.6, 0.0, 180.0)))
+    made = meet(((-0.35, 0.0, 0.0), (0.35, 0.0, 180.0)))
     drive(made, 300, 300)
-    now = live(made, 2.7)
+    now = live(made, 1.8)
     states = [member.body.state for member in made.members]
     assert gap(made) == pytest.approx(0.0, abs=0.002)
     assert [state.stalled_left and state.stalled_right for state in states] == [True, True]
     assert [(state.collisions, state.in_contact) for state in states] == [(1, True)] * 2
     for index in (0, 1):
         say(made, index, C.VEL, -300, at=round(now * 1e9))
-    live(made, 2.0, since=now)
+    live(made, 1.5, since=now)
     assert gap(made) > 0.5
     assert not any(member.body.state.in_contact for member in made.members)
 
 
 def test_a_robot_that_stands_under_power_holds_out_and_feels_the_push(meet: Meet) -> None:
-    made = meet(((0.0, 0.0, 0.0), (1.0, 0.0, 180.0)))
+    made = meet(((0.5, 0.0, 0.0), (1.0, 0.0, 180.0)))
     drive(made, 300, 0)
-    now = live(made, 4.0)
+    now = live(made, 2.2)
     pushing, standing = (member.body.state for member in made.members)
     assert pushing.stalled_left
     # The blow itself moves a robot with a mass by 9 kg x 0.3 m/s over what both motors hold.
     assert standing.x_m == pytest.approx(1.0, abs=0.02)
     assert (standing.collisions, standing.in_contact) == (1, True)
     assert [hit.name for hit in made.members[1].body.take_hits()] == ["robot 1"]
-    live(made, 2.0, since=now)
-    assert made.members[1].body.state.x_m == pytest.approx(standing.x_m, abs=1e-4), "it does not creep"
+    live(made, 1.0, since=now)
+    assert made.members[1].body.state.x_m == pytest.approx(standing.x_m, abs=5e-5), "it does not creep"
 
 
 def test_a_robot_without_power_gives_way_and_its_odometry_counts_what_its_wheels_roll(meet: Meet) -> None:
     made = meet(((-0.4, 0.0, 0.0), (0.2, 0.0, 180.0)))
     drive(made, 300)
-    live(made, 5.0)
+    live(made, 3.0)
     pushing, pushed = (member.body.state for member in made.members)
     way = pushed.x_m - 0.2
-    assert way > 0.9
+    assert way > 0.3
     assert pushing.forward_mps == pytest.approx(0.3, abs=0.01)
     assert not pushing.stalled_left
     assert pushed.left_speed_mps == pytest.approx(-0.3, abs=0.01)
@@ -156,19 +156,19 @@ def test_a_robot_without_power_gives_way_and_its_odometry_counts_what_its_wheels
 
 
 def test_three_in_a_row_are_pushed_and_no_hull_enters_another(meet: Meet) -> None:
-    made = meet(((-0.4, 0.0, 0.0), (0.2, 0.0, 0.0), (1.0, 0.0, 180.0)))
+    made = meet(((-0.3, 0.0, 0.0), (0.2, 0.0, 0.0), (0.7, 0.0, 180.0)))
     drive(made, 300)
-    live(made, 4.5)
+    live(made, 2.5)
     x = [member.body.state.x_m for member in made.members]
-    assert x[2] > 1.1
+    assert x[2] > 0.8
     assert x[1] - x[0] == pytest.approx(P2DX.body.hull_front_m + P2DX.body.hull_rear_m, abs=0.003)
     assert x[2] - x[1] == pytest.approx(2 * FRONT_M, abs=0.003)
 
 
 def test_a_robot_that_is_pushed_across_its_wheels_holds_out_against_one_of_its_own_model(meet: Meet) -> None:
-    made = meet(((-0.4, 0.0, 0.0), (0.2, 0.04, 90.0)))
+    made = meet(((-0.3, 0.0, 0.0), (0.2, 0.04, 90.0)))
     drive(made, 300)
-    live(made, 4.0)
+    live(made, 2.5)
     pushed = made.members[1].body.state
     assert pushed.x_m == pytest.approx(0.2, abs=0.02)
     assert made.members[0].body.state.stalled_left
@@ -279,12 +279,12 @@ def the_post_goes(made: MultiRobotWorld) -> None:
 def test_a_robot_that_another_holds_goes_on_when_that_changes(
     is_powered: bool, change: Callable[[MultiRobotWorld], None]
 ) -> None:
-    made = multi_robot_world(((-1.0, 0.0, 0.0), (0.0, 0.0, 180.0)))
+    made = multi_robot_world(((-0.5, 0.0, 0.0), (0.0, 0.0, 180.0)))
     pushing, held = (member.body for member in made.members)
     held.is_powered = is_powered
     if not is_powered:  # a post behind it holds it
         made.scene.place(replace(CARTON.obstacles[0], name="post", x_m=P2DX.body.hull_rear_m + 0.16, mass_kg=0.0))
-    for _ in range(3000):
+    for _ in range(1000):
         made.scene.step([(0.3, 0.3), (0.0, 0.0)])
     stuck = pushing.state
     assert stuck.stalled_left
@@ -296,12 +296,12 @@ def test_a_robot_that_another_holds_goes_on_when_that_changes(
 
 
 def test_what_one_pushes_the_other_sees_and_is_stopped_by(meet: Meet) -> None:
-    made = meet(((-0.5, 0.0, 0.0), (1.0, 0.0, 180.0)), CARTON)
+    made = meet(((-0.4, 0.0, 0.0), (0.7, 0.0, 180.0)), CARTON)
     before = made.members[1].body.ranges([3])[0]
     drive(made, 300, 0)
-    now = live(made, 1.8)
+    now = live(made, 1.4)
     assert made.members[1].body.ranges([3])[0] < before - 0.15
-    live(made, 2.7, since=now)
+    live(made, 1.4, since=now)
     # The carton is between them now: 0.3 m, and both hulls.
     assert gap(made) == pytest.approx(0.3, abs=0.02)
     assert made.members[0].body.state.stalled_left
@@ -313,7 +313,7 @@ def test_hulls_never_overlap() -> None:
     for index, turn in enumerate((10, -15, 20, -5)):
         say(made, index, C.RVEL, turn)
     now = 0.0
-    for _ in range(40):
+    for _ in range(25):
         now = live(made, 0.1, since=now)
         for member in made.members:
             hull = member.body.footprint.polygon
@@ -336,10 +336,10 @@ def test_a_thing_of_the_world_may_have_a_robots_name() -> None:
 
 
 def test_a_thing_that_was_pushed_is_seen_from_afar(meet: Meet) -> None:
-    made = meet(((-0.5, 0.0, 0.0), (3.4, 0.0, 180.0)), CARTON)
+    made = meet(((-0.4, 0.0, 0.0), (3.4, 0.0, 180.0)), CARTON)
     before = made.members[1].body.ranges([3])[0]
     drive(made, 300, 0)
-    live(made, 1.8)
+    live(made, 1.4)
     assert made.members[1].body.ranges([3])[0] < before - 0.15
 
 
@@ -350,9 +350,9 @@ CROWD = ((-0.38, 0.0, 0.0), (0.38, 0.05, 180.0), (0.0, -0.42, 90.0), (-2.6, 2.6,
 #: So that pings and packets of each fall between the steps and the boundaries.
 UNEVEN_NS = 17_300_007
 #: Looks that fall between any two of them.
-DENSE = range(560_000_000, 760_000_000, 370_000)
+DENSE = range(560_000_000, 690_000_000, 370_000)
 #: They touch from 0.58 s on.
-END_NS = 850_000_000
+END_NS = 730_000_000
 TIMES = st.integers(50_000_000, END_NS - 50_000_000)
 ORDERS = st.lists(
     st.tuples(
@@ -416,7 +416,7 @@ def test_a_multi_robot_world_that_was_saved_goes_on_as_it_would_have(
     ends = []
     for other in (made, made, multi_robot_world(CROWD, CARTON)):
         other.restore(saved)
-        other.advance_to(half + 150 * NS_PER_MS)
+        other.advance_to(half + 100 * NS_PER_MS)
         ends.append(([robot.take_output() for robot in other.robots], [member.body.state for member in other.members]))
     assert ends[0] == ends[1] == ends[2]
 
@@ -424,11 +424,11 @@ def test_a_multi_robot_world_that_was_saved_goes_on_as_it_would_have(
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", each_body("kinematic"))
 def test_physical_robots_repeat_and_go_on_after_a_restore(engine: str) -> None:
-    orders = [(600_000_123, 0, (C.RVEL, 30)), (700_000_000, 1, (C.VEL, -100)), (700_000_000, 2, (C.RVEL, 40))]
+    orders = [(600_000_123, 0, (C.RVEL, 30)), (640_000_000, 1, (C.VEL, -100)), (640_000_000, 2, (C.RVEL, 40))]
     first = life(multi_robot_world(CROWD, CARTON, engine), orders, [], backwards=False)
     assert life(multi_robot_world(CROWD, CARTON, engine), orders, DENSE, backwards=True) == first
     made = multi_robot_world(CROWD, CARTON, engine)
-    life_until(made, orders, 701_000_000)
+    life_until(made, orders, 641_000_000)
     saved = pickle.loads(pickle.dumps(made.snapshot()))  # noqa: S301  # our own bytes
     ends = []
     for other in (made, multi_robot_world(CROWD, CARTON, engine)):

@@ -19,7 +19,7 @@ TRACK_M = P2DX.track_mm / 1000
 
 
 def line(body: RobotBody, length_m: float) -> BodyState:
-    return ramped(body, 0.6, 0.6, length_m / 0.6 + 0.5)
+    return ramped(body, 1.0, 1.0, length_m / 1.0 + 0.5)
 
 
 def left_turn(body: RobotBody) -> BodyState:
@@ -64,6 +64,6 @@ def test_the_rails_keep_a_robot_out_of_the_void_and_its_sonar_sees_them(name: st
     body.reset(replace(world.start, heading_rad=math.pi / 2), 1)
     # The two front sonars stand 0.166 m ahead of the axle; the rail's near face is at 1.2 - 0.02 m.
     assert min(body.ranges([3, 4])) == pytest.approx(1.18 - 0.166, abs=0.03)
-    end = drive(body, 0.4, 0.4, 4.0)
+    end = drive(body, 0.4, 0.4, 3.0)
     assert end.y_m + P2DX.body.hull_front_m < 1.2
     assert [hit.name for hit in body.take_hits()] == ["rail of the long leg, lower 1"]
