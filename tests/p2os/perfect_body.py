@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from p2os.pioneer.body.contract import BodyState
+from p2os.pioneer.body.contract import BodyState, Turned
 from p2os.pioneer.sonar.ring import Cone
 from simbase.state import Stateful
 from simbase.timing import NS_PER_MS
@@ -37,22 +37,29 @@ class PerfectBody(Stateful):
         return [min(1.0 + ray / 1000, longest_m) for ray in range(len(fan.headings_rad))]
 
     def step(self, left_mps: float, right_mps: float) -> BodyState:
-        self.steps += 1
-        if self.blocked:
-            left_mps = right_mps = 0.0
-        turn = self.dt_ns / 1e9 / self.radius_m
-        self.state = replace(
-            self.state, left_angle_rad=self.state.left_angle_rad + left_mps * turn,
-            right_angle_rad=self.state.right_angle_rad + right_mps * turn,
-            left_speed_mps=left_mps, right_speed_mps=right_mps,
-        )  # fmt: skip
+        self.ramp([(left_mps, right_mps)])
         return self.state
 
-    def hold(self, left_mps: float, right_mps: float, steps: int) -> list[BodyState]:
-        return [self.step(left_mps, right_mps) for _ in range(steps)]
+    def hold(self, left_mps: float, right_mps: float, steps: int) -> list[Turned]:
+        return self.ramp([(left_mps, right_mps)] * steps)
 
-    def ramp(self, setpoints: Sequence[tuple[float, float]]) -> list[BodyState]:
-        return [self.step(*asked) for asked in setpoints]
+    def ramp(self, setpoints: Sequence[tuple[float, float]]) -> list[Turned]:
+        self.steps += len(setpoints)
+        if self.blocked:
+            setpoints = [(0.0, 0.0)] * len(setpoints)
+        state, turn, made = self.state, self.dt_ns / 1e9 / self.radius_m, []
+        left_rad, right_rad = state.left_angle_rad, state.right_angle_rad
+        for left_mps, right_mps in setpoints:
+            left_rad += left_mps * turn
+            right_rad += right_mps * turn
+            made.append(Turned(left_rad, right_rad, state.stalled_left, state.stalled_right))
+        if setpoints:
+            left_mps, right_mps = setpoints[-1]
+            self.state = replace(
+                state, left_angle_rad=left_rad, right_angle_rad=right_rad, left_speed_mps=left_mps,
+                right_speed_mps=right_mps,
+            )  # fmt: skip
+        return made
 
     def stall(self, *, left: bool, right: bool) -> None:
         self.state = replace(self.state, stalled_left=left, stalled_right=right)
