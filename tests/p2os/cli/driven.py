@@ -5,6 +5,7 @@ import pty
 import re
 import subprocess
 import sys
+import termios
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -20,6 +21,11 @@ COMMAND = (sys.executable, "-m", "p2os")
 CLOSE, STOP, VEL = CommandNumber.CLOSE, CommandNumber.STOP, CommandNumber.VEL
 #: A bound on what is done at once: ten times what it takes, for a machine that does other things too.
 AT_ONCE_S = 5.0
+
+
+def is_raw(keyboard: int) -> bool:
+    """Tell whether a terminal, by the end where its keys are pressed, hands each key over at once."""
+    return not termios.tcgetattr(keyboard)[3] & termios.ICANON
 
 
 class RecordingRobot(ServedRobot):
@@ -104,4 +110,4 @@ class Driver:
             self.keyboard = -1
 
 
-__all__ = ["AT_ONCE_S", "CLOSE", "COMMAND", "STOP", "TIMEOUT_S", "VEL", "Driver", "RecordingRobot", "until"]
+__all__ = ["AT_ONCE_S", "CLOSE", "COMMAND", "STOP", "TIMEOUT_S", "VEL", "Driver", "RecordingRobot", "is_raw", "until"]

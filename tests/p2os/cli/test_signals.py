@@ -17,7 +17,7 @@ from p2os.cli.main import run
 from p2os.cli.signals import ENDING_NS, FATAL, end_on_signals, end_on_suspension, postponed, restored_signals
 from p2os.protocol.commands import Command, CommandNumber
 from simbase.timing import NS_PER_S
-from tests.p2os.cli.driven import AT_ONCE_S, CLOSE, COMMAND, STOP, Driver, RecordingRobot, until
+from tests.p2os.cli.driven import AT_ONCE_S, CLOSE, COMMAND, STOP, Driver, RecordingRobot, is_raw, until
 from tests.tools.forked_python import forked_p2os, forked_python
 
 NUMBERS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1, signal.SIGTSTP]
@@ -119,7 +119,7 @@ def test_a_signal_stops_the_robot_first(
     drivers += begin(robot.url, tmp_path, forked_p2os)
     if begin is by_keys:
         until(lambda: CommandNumber.OPEN in robot.numbers, "a session")
-        time.sleep(0.3)  # the terminal is made raw after the robot is connected
+        until(lambda: is_raw(drivers[0].keyboard), "a raw terminal")
         drivers[0].press("w")
     robot.wait_until_it_drives()
     sent_at = time.monotonic()

@@ -261,6 +261,10 @@ def raw(draw: Draw) -> RawPacket:
     return RawPacket(draw.one_of(0x00, 0x01, 0x77, 0x7B, 0x95, 0xD5), draw.data(12))
 
 
+#: All kinds, those without a type of their own among them.
+ALL: tuple[Callable[[Draw], ServerPacket], ...] = (any_sip, identity, config, raw, *KINDS.values())
+
+
 def any_packet(draw: Draw) -> ServerPacket:
     """Return any packet of a session."""
-    return draw.one_of(any_sip, identity, config, raw, *KINDS.values())(draw)
+    return draw.one_of(*ALL)(draw)
