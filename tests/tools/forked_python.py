@@ -34,7 +34,6 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import entry_points
 from pathlib import Path
 from types import ModuleType
 from typing import NoReturn, TextIO
@@ -119,7 +118,7 @@ def forked_p2os(*words: str) -> list[str]:
 
 def spent_s() -> float:
     """Return the seconds of processor time of what was forked for this worker, and of the server if it started that."""
-    with contextlib.suppress(OSError, ValueError):
+    with contextlib.suppress(OSError):
         return float(_spent_file(_folder(), os.environ).read_text(encoding="ascii"))
     return 0.0
 
@@ -233,8 +232,9 @@ class Server:
 
     def _spend(self, file: Path, spent_s: float) -> None:
         self._spent_s[file] = self._spent_s.get(file, 0.0) + spent_s
-        with contextlib.suppress(OSError):
-            file.write_text(f"{self._spent_s[file]}", encoding="ascii")
+        new = file.with_suffix(".new")  # a file that is read is whole
+        new.write_text(f"{self._spent_s[file]}", encoding="ascii")
+        new.replace(file)
 
     def _fork(self) -> Command | None:
         """Fork for the client that has come; return in the forked process with what it has to do."""
@@ -394,7 +394,9 @@ def run(words: Sequence[str]) -> None:
 
 def import_all() -> None:
     """Import what commands do."""
-    for name in (*IMPORTED, *(entry.module for entry in entry_points(group="p2os.verbs"))):
+    from p2os.cli.main import verbs  # not in who starts the server
+
+    for name in (*IMPORTED, *(entry.module for entry in verbs())):
         with contextlib.suppress(ImportError):
             importlib.import_module(name)
 

@@ -71,6 +71,7 @@ class Driver:
         stdout: int = subprocess.PIPE,
     ) -> None:  # fmt: skip
         self.keyboard = -1
+        self._heard = ""
         if on_terminal:
             self.keyboard, inside = pty.openpty()
             self.process = subprocess.Popen(words, stdin=inside, stdout=inside, stderr=inside, start_new_session=True)
@@ -82,11 +83,16 @@ class Driver:
 
     def listens_at(self) -> str:
         """Return the URL that `p2os sniff` says it listens at, of a port that the system chose."""
+        return self.hear(r"^listening on (\S+) ")[1]
+
+    def hear(self, pattern: str) -> re.Match[str]:
+        """Wait until it has said a line on standard error."""
         assert self.process.stderr is not None
-        said = self.process.stderr.readline().decode()
-        found = re.match(r"listening on (\S+) ", said)
-        assert found, said
-        return found[1]
+        while not (found := re.search(pattern, self._heard, re.MULTILINE)):
+            line = self.process.stderr.readline().decode()
+            assert line, self._heard
+            self._heard += line
+        return found
 
     def press(self, keys: str) -> None:
         os.write(self.keyboard, keys.encode())
@@ -96,7 +102,7 @@ class Driver:
         try:
             if self.keyboard < 0:
                 out, err = self.process.communicate(timeout=TIMEOUT_S)
-                return self.process.returncode, ((out or b"") + err).decode()
+                return self.process.returncode, ((out or b"") + self._heard.encode() + err).decode()
             return self.process.wait(TIMEOUT_S), ""
         finally:
             self.close()
