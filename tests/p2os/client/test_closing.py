@@ -293,25 +293,30 @@ asyncio.run(main())
 }
 
 
+SIGNALS = (signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1, signal.SIGALRM)
+
+
 @pytest.mark.skipif(os.name != "posix", reason="signals are Unix's")
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1, signal.SIGALRM])
 @pytest.mark.parametrize("client", CLIENTS)
-def test_a_signal_that_would_kill_a_program_stops_its_robot_first(
-    served: ServedRobot, client: str, number: signal.Signals
-) -> None:
-    program = subprocess.Popen([forked_python(), "-c", CLIENTS[client].format(url=served.url)], stdout=subprocess.PIPE)
-    try:
-        assert program.stdout is not None
-        assert program.stdout.read(1)
-        until(lambda: served.is_moving)
-        program.send_signal(number)
-        program.send_signal(number)
-        assert program.wait(60) == 128 + number
-    finally:
-        program.kill()
-        program.wait()
-        program.stdout.close()  # type: ignore[union-attr]  # a pipe was asked for
-    until(lambda: not served.is_moving and not served.pioneer.state.motors_enabled)
+def test_a_signal_that_would_kill_a_program_stops_its_robot_first(client: str) -> None:
+    with contextlib.ExitStack() as left:
+        rows: list[tuple[signal.Signals, ServedRobot, subprocess.Popen[bytes]]] = []
+        for number in SIGNALS:  # each has a robot, and all wait for theirs at the same time
+            robot = ServedRobot()
+            left.callback(robot.close)
+            words = [forked_python(), "-c", CLIENTS[client].format(url=robot.url)]
+            program = left.enter_context(subprocess.Popen(words, stdout=subprocess.PIPE))
+            left.callback(program.kill)
+            rows.append((number, robot, program))
+        for number, robot, program in rows:
+            assert program.stdout is not None
+            assert program.stdout.read(1)
+            until(lambda: robot.is_moving)  # noqa: B023  # it is called now
+            program.send_signal(number)
+            program.send_signal(number)
+        for number, robot, program in rows:
+            assert program.wait(60) == 128 + number, number
+            until(lambda: not robot.is_moving and not robot.pioneer.state.motors_enabled)  # noqa: B023
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals are Unix's")
