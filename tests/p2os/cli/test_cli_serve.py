@@ -171,8 +171,8 @@ def test_serve_puts_a_fleet_into_one_world(tmp_path: Path, serving: Callable[...
     served = serving("--fleet", str(tmp_path / "two.toml"), body=())
     assert served.start["at"] == [-1.0, 0.3, 0.0]
     scan = subprocess.run(
-        forked_p2os("monitor", served.start["url"], "--for", "1s"), capture_output=True, text=True, timeout=TIMEOUT_S,
-        check=False,
+        forked_p2os("monitor", served.start["url"], "--for", "300ms"), capture_output=True, text=True,
+        timeout=TIMEOUT_S, check=False,
     )  # fmt: skip
     assert scan.returncode == 0
     code, err = served.end()

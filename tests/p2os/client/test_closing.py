@@ -11,6 +11,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import FrameType
 from typing import Any, Self
@@ -25,6 +26,7 @@ from p2os.protocol.commands import vel
 from p2os.transport import open_url, virtual_clock
 from p2os.transport.ports import Transport
 from simbase.interrupts import held_back
+from simbase.timing import NS_PER_MS
 from tests.p2os.client.served_robot import CLOSING_COMMANDS, QUICK, Recorder, ServedRobot, until
 from tests.tools.forked_python import forked_python
 
@@ -82,6 +84,10 @@ def interrupt_everywhere(story: Callable[[int], tuple[int, str, Recorder]], serv
         place += step
 
 
+#: For many sessions with a robot of tests, whose commands may come as near as they like.
+HASTY = replace(QUICK, open_delay_ns=NS_PER_MS, command_spacing_ns=NS_PER_MS)
+
+
 @pytest.fixture
 def hasty() -> Iterator[ServedRobot]:
     """A robot whose time runs eight times as fast, so that sessions open quickly."""
@@ -97,7 +103,7 @@ def test_a_second_ctrl_c_at_any_line_of_closing_leaves_the_robot_told(hasty: Ser
     def story(place: int) -> tuple[int, str, Recorder]:
         recorder = Recorder()
         interrupter = Interrupter(place, files)
-        robot = Robot(hasty.url, settings=QUICK, opener=recorder).connect()
+        robot = Robot(hasty.url, settings=HASTY, opener=recorder).connect()
         robot.set_velocity(0.3)
         until(lambda: vel(300) in recorder.sent)
         with contextlib.suppress(KeyboardInterrupt), interrupter:
@@ -124,7 +130,7 @@ def interrupt_an_asyncio_closing(served: ServedRobot, step: int) -> int:
         interrupter = Interrupter(place, (OURS,))
 
         async def main() -> None:
-            robot = AsyncRobot(served.url, settings=QUICK, opener=recorder, clock=served.clock)
+            robot = AsyncRobot(served.url, settings=HASTY, opener=recorder, clock=served.clock)
             await robot.connect()
             robot.set_velocity(0.3)
             with interrupter:
