@@ -15,6 +15,7 @@ import os
 import sys
 import traceback
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from typing import Annotated
 
@@ -130,8 +131,13 @@ def report(error: Exception, *, trace: bool = False) -> int:
 
 
 def verbs() -> list[EntryPoint]:
-    """Return every verb that an installed package offers, by name."""
-    return sorted(entry_points(group=GROUP), key=lambda entry: entry.name)
+    """Return every verb that an installed package offers, by name; what is installed is looked up once a process."""
+    return list(_installed_verbs())
+
+
+@cache
+def _installed_verbs() -> tuple[EntryPoint, ...]:
+    return tuple(sorted(entry_points(group=GROUP), key=lambda entry: entry.name))
 
 
 def make_app(words: Sequence[str] = ()) -> typer.Typer:

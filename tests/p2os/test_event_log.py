@@ -14,7 +14,7 @@ from p2os.client import aio
 from p2os.event_log import log_event, logger
 from p2os.transport.virtual_clock import VirtualClock
 from simbase.timing import NS_PER_S
-from tests.p2os.client.served_robot import QUICK, Recorder, ServedRobot, until
+from tests.p2os.client.served_robot import QUICK, Recorder, ServedRobot
 
 
 def lines(caplog: pytest.LogCaptureFixture, part: str) -> list[str]:
@@ -76,11 +76,12 @@ def test_an_asyncio_client_logs_the_same(caplog: pytest.LogCaptureFixture) -> No
 
 def test_a_lost_line_and_the_way_back_are_logged(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.INFO, "p2os")
-    served, recorder = ServedRobot(), Recorder()
+    served = ServedRobot("loop:robot", clock=VirtualClock())
+    recorder = Recorder(served.open)
     try:
-        with Robot(served.url, settings=QUICK, opener=recorder) as robot:
+        with Robot(served.url, settings=QUICK, opener=recorder, clock=served.clock) as robot:
             recorder.lines[-1].is_broken = True
-            until(lambda: any("link lost" in line for line in lines(caplog, "client")))
+            served.until(lambda: any("link lost" in line for line in lines(caplog, "client")))
             robot.wait_open(30)
     finally:
         served.close()

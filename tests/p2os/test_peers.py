@@ -3,16 +3,33 @@
 import json
 import os
 import sys
+from dataclasses import replace
 
 import pytest
 
 from p2os.robots.parameters import known_robots
-from tools.peers import PEERS, main
+from tests.tools.forked_python import forked_python
+from tools import peers
+from tools.peers import PEERS, Peer, main
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals and terminals are Unix's")
 
 
+@pytest.fixture
+def _forked(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fork what the table starts by Python's own name."""
+    ours, forked = sys.executable, forked_python()
+
+    def of_forked(peer: Peer) -> Peer:
+        commands = [[forked if word == ours else word for word in words] for words in peer.commands]
+        return replace(peer, commands=tuple(map(tuple, commands)))
+
+    monkeypatch.setattr(peers, "PEERS", tuple(map(of_forked, PEERS)))
+    monkeypatch.setattr(sys, "executable", forked)
+
+
 @pytest.mark.slow
+@pytest.mark.usefixtures("_forked")
 def test_our_own_client_drives_is_killed_and_drives_again(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--json", "--peer", "p2os drive"]) == 0
     (row,) = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
@@ -31,6 +48,7 @@ def test_a_peer_that_is_not_there_is_skipped_aloud(capsys: pytest.CaptureFixture
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("_forked")
 def test_a_peer_that_never_drives_fails(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--peer", f"idle={sys.executable} -c pass"]) == 1
     assert "never drove: it ended with code 0" in capsys.readouterr().out

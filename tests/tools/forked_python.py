@@ -1,10 +1,12 @@
 """A Python that starts in a hundredth of a second: `forked_python()` is a program that takes what `python` takes.
 
 A process of `python -m p2os …` imports for 0.3 to 0.9 s of processor time before it does anything. Here a server, one
-to a worker of the tests, has imported the packages, and forks for each command: a client, itself the process that a
+for all workers of a run, has imported the packages, and forks for each command: a client, itself the process that a
 test or a shell starts, hands over words, folder, environment and standard streams, passes signals on, and ends with
 the same exit code. What is asked for in another way than `-m MODULE`, `-c CODE` or `FILE`, or with settings of Python
 that the server was not started with, is started as ever.
+
+The server ends when no worker holds its fifo open any more.
 
 What this cannot show is the start itself, and what a program without some package does: tests of that start
 `sys.executable`; as do those that stop a process or look at it, for the client is another one.
@@ -12,23 +14,26 @@ What this cannot show is the start itself, and what a program without some packa
 
 import atexit
 import contextlib
+import fcntl
 import gc
 import importlib
 import importlib.util
 import io
 import marshal
 import os
+import select
 import selectors
+import shutil
 import signal
 import socket
 import subprocess
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import entry_points
 from pathlib import Path
 from types import ModuleType
 from typing import NoReturn, TextIO
@@ -59,27 +64,51 @@ IMPORTED = (
 
 @cache
 def forked_python() -> str:
-    """Return the path of the program; the server ends with this process."""
-    folder = tempfile.TemporaryDirectory(prefix="forked-")
-    address, program = f"{folder.name}/socket", Path(folder.name, "python")
-    program.write_text(f'#!/bin/sh\nexec "{sys.executable}" -I -S "{CLIENT}" "{address}" "$@"\n')
-    program.chmod(0o755)
+    """Return the path of the program; the server, which the first worker that asks starts, ends with the last."""
+    folder = _folder()
+    with _locked(folder):
+        if not (folder / "python").exists():
+            _start(folder)
+        _held.append(os.open(folder / "held", os.O_WRONLY))
+    return str(folder / "python")
+
+
+#: What keeps the server; a worker's end closes it.
+_held: list[int] = []
+
+
+def _folder() -> Path:
+    """Return the folder of this run's server."""
+    return Path(tempfile.gettempdir(), f"forked-{os.environ.get('PYTEST_XDIST_TESTRUNUID') or os.getpid()}")
+
+
+def _locked(folder: Path) -> TextIO:
+    """Return a file that locks a folder until it is closed; the folder is made if need be, and nobody removes it."""
+    while True:
+        folder.mkdir(mode=0o700, exist_ok=True)
+        with contextlib.suppress(FileNotFoundError):
+            lock = (folder / "lock").open("w")
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if os.path.samestat(os.fstat(lock.fileno()), (folder / "lock").stat()):
+                return lock
+            lock.close()  # it was removed, and made anew
+
+
+def _start(folder: Path) -> None:
+    program, held = folder / "python", folder / "held"
+    os.mkfifo(held)
+    read_end = os.open(held, os.O_RDONLY | os.O_NONBLOCK)
     listener = socket.socket(socket.AF_UNIX)
-    listener.bind(address)
+    listener.bind(str(folder / "socket"))
     listener.listen(100)  # who comes while the server still imports waits
-    server = subprocess.Popen(
-        [sys.executable, "-m", "tests.tools.forked_python", str(listener.fileno())], cwd=ROOT, env=_environment(),
-        stdin=subprocess.PIPE, pass_fds=[listener.fileno()], start_new_session=True,
-    )  # fmt: skip
+    _servers.append(subprocess.Popen(
+        [sys.executable, "-m", "tests.tools.forked_python", str(listener.fileno()), str(folder)], cwd=ROOT,
+        env=_environment(), stdin=read_end, pass_fds=[listener.fileno()], start_new_session=True,
+    ))  # fmt: skip
     listener.close()
-    _servers.append(server.pid)
-
-    @atexit.register
-    def end() -> None:
-        server.communicate()
-        folder.cleanup()
-
-    return str(program)
+    os.close(read_end)
+    program.write_text(f'#!/bin/sh\nexec "{sys.executable}" -I -S "{CLIENT}" "{folder / "socket"}" "$@"\n')
+    program.chmod(0o755)
 
 
 def forked_p2os(*words: str) -> list[str]:
@@ -88,16 +117,18 @@ def forked_p2os(*words: str) -> list[str]:
 
 
 def spent_s() -> float:
-    """Return the processor time of this process's server and of what it has forked, in seconds."""
-    ticks = 0
-    for pid in _servers:
-        with contextlib.suppress(OSError):
-            fields = Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
-            ticks += sum(map(int, fields[11:15]))
-    return ticks / os.sysconf("SC_CLK_TCK")
+    """Return the seconds of processor time of what was forked for this worker, and of the server if it started that."""
+    with contextlib.suppress(OSError):
+        return float(_spent_file(_folder(), os.environ).read_text(encoding="ascii"))
+    return 0.0
 
 
-_servers: list[int] = []
+def _spent_file(folder: Path, environment: Mapping[str, str]) -> Path:
+    return folder / f"spent-{environment.get('PYTEST_XDIST_WORKER', '')}"
+
+
+#: Held, for a process that is forgotten while it runs warns of that.
+_servers: list[subprocess.Popen[bytes]] = []
 
 
 def _environment() -> dict[str, str]:
@@ -157,9 +188,11 @@ def settings(environment: Mapping[str, str]) -> dict[str, str]:
 class Server:
     """Forks a process for each client, and tells it how that has ended."""
 
-    def __init__(self, listener: socket.socket) -> None:
-        self._listener = listener
+    def __init__(self, listener: socket.socket, folder: Path) -> None:
+        self._listener, self._folder = listener, folder
         self._lines: dict[int, socket.socket] = {}  # to clients, by their processes
+        self._spent_s: dict[Path, float] = {}
+        self._spent_files: dict[int, Path] = {}  # by process
         self._ended, self._wakes = socket.socketpair()
         self._selector = selectors.DefaultSelector()
         for each in (self._listener, self._ended, self._wakes):
@@ -171,6 +204,7 @@ class Server:
         signal.signal(signal.SIGCHLD, lambda *_: None)
         for each in (self._listener, self._ended, sys.stdin):
             self._selector.register(each, selectors.EVENT_READ)
+        self._spend(_spent_file(self._folder, os.environ), time.process_time())
         while True:
             for key, _ in self._selector.select():
                 if key.fileobj is self._listener:
@@ -180,12 +214,27 @@ class Server:
                 elif key.fileobj is self._ended:
                     self._tell_ended()
                 elif key.fileobj is sys.stdin:
-                    for process in self._lines:
-                        kill(process)
-                    return None
+                    if self._is_left():
+                        return None
                 else:  # a client has gone
                     self._selector.unregister(key.fileobj)
                     kill(next(process for process, line in self._lines.items() if line is key.fileobj))
+
+    def _is_left(self) -> bool:
+        """End what was forked and remove the folder, unless another worker has come."""
+        with _locked(self._folder):
+            if not select.select([sys.stdin], [], [], 0)[0]:
+                return False
+            for process in self._lines:
+                kill(process)
+            shutil.rmtree(self._folder)
+            return True
+
+    def _spend(self, file: Path, spent_s: float) -> None:
+        self._spent_s[file] = self._spent_s.get(file, 0.0) + spent_s
+        new = file.with_suffix(".new")  # a file that is read is whole
+        new.write_text(f"{self._spent_s[file]}", encoding="ascii")
+        new.replace(file)
 
     def _fork(self) -> Command | None:
         """Fork for the client that has come; return in the forked process with what it has to do."""
@@ -208,6 +257,7 @@ class Server:
             line.sendall(process.to_bytes(LENGTH, "big"))
         if process:
             self._lines[process] = line
+            self._spent_files[process] = _spent_file(self._folder, command.environment)
             self._selector.register(line, selectors.EVENT_READ)
         else:  # it starts Python itself
             line.close()
@@ -225,8 +275,11 @@ class Server:
         """Tell the clients of processes that have ended."""
         self._ended.recv(1000)
         with contextlib.suppress(ChildProcessError):
-            while (ended := os.waitpid(-1, os.WNOHANG)) != (0, 0):
-                process, status = ended
+            while True:
+                process, status, used = os.wait4(-1, os.WNOHANG)
+                if not process:
+                    break
+                self._spend(self._spent_files.pop(process), used.ru_utime + used.ru_stime)
                 line = self._lines.pop(process)
                 with contextlib.suppress(KeyError):  # where it has gone
                     self._selector.unregister(line)
@@ -341,7 +394,9 @@ def run(words: Sequence[str]) -> None:
 
 def import_all() -> None:
     """Import what commands do."""
-    for name in (*IMPORTED, *(entry.module for entry in entry_points(group="p2os.verbs"))):
+    from p2os.cli.main import verbs  # not in who starts the server
+
+    for name in (*IMPORTED, *(entry.module for entry in verbs())):
         with contextlib.suppress(ImportError):
             importlib.import_module(name)
 
@@ -353,6 +408,6 @@ if __name__ == "__main__":
         import_all()
         gc.freeze()
         gc.enable()
-        wanted = Server(listening).serve()
+        wanted = Server(listening, Path(sys.argv[2])).serve()
     if wanted is not None:
         become(wanted, base)

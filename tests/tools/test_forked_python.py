@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.tools.forked_python import forked_python
+from tests.tools.forked_python import ROOT, forked_python
 
 TIMEOUT_S = 30.0
 PASSED_ON = ("SIGHUP", "SIGINT", "SIGQUIT", "SIGUSR1", "SIGUSR2", "SIGTERM", "SIGTSTP", "SIGCONT", "SIGALRM")
@@ -64,6 +64,14 @@ def test_it_does_what_a_started_one_does(way: str, code: str, tmp_path: Path) ->
 
 def test_what_is_imported_is_there_already(tmp_path: Path) -> None:
     assert ran(forked_python(), ["-c", IS_FORKED], tmp_path)[1] == "True\n"
+
+
+def test_another_worker_of_the_run_has_the_same_server_and_leaves_it(tmp_path: Path) -> None:
+    ours = forked_python()
+    worker = "from tests.tools.forked_python import forked_python; print(forked_python())"
+    run = os.environ.get("PYTEST_XDIST_TESTRUNUID") or str(os.getpid())
+    assert ran(sys.executable, ["-c", worker], ROOT, PYTEST_XDIST_TESTRUNUID=run) == (0, f"{ours}\n", "")
+    assert ran(ours, ["-c", IS_FORKED], tmp_path)[1] == "True\n"
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from itertools import zip_longest
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 np = pytest.importorskip("numpy")
@@ -15,7 +15,7 @@ np = pytest.importorskip("numpy")
 from p2os.capture.columns import Columns, Damage, decode, find_frames  # noqa: E402
 from p2os.capture.columns.arrow import to_arrow  # noqa: E402
 from p2os.capture.columns.objects import rows_by_objects  # noqa: E402
-from p2os.capture.columns.tables import KINDS  # noqa: E402
+from p2os.capture.columns.tables import KINDS as TABLES  # noqa: E402
 from p2os.protocol.frames import (  # noqa: E402
     Decoder,
     DecoderStats,
@@ -36,7 +36,7 @@ from p2os.protocol.profiles import Profile  # noqa: E402
 from p2os.protocol.sip import SIP_KINDS  # noqa: E402
 from simbase.errors import MissingDependencyError  # noqa: E402
 from simbase.timing import NS_PER_MS, Nanos  # noqa: E402
-from tests.p2os.protocol.packet_strategies import ANY, PACKETS  # noqa: E402
+from tests.p2os.protocol.drawn_packets import KINDS, SEEDS, Draw, any_packet  # noqa: E402
 
 GOLDEN = Path(__file__).parents[2] / "golden"
 GIVE_UP_NS = 250 * NS_PER_MS
@@ -79,32 +79,51 @@ def _hit(data: bytes, place: int, how: int) -> bytes:
     return data[:place] + bytes((data[place] ^ 1 << (how - 2),)) + data[place + 1 :]
 
 
-frames = st.builds(lambda packet, profile: packet_frame(packet, profile).to_bytes(), PACKETS, st.sampled_from(Profile))
-damaged = st.builds(_hit, frames, st.integers(0, 206), st.integers(0, 9))
-#: Frames whose inside no layout expects, frames inside damaged frames, and bytes that look like headers.
-odd = st.builds(lambda kind, data: Frame(bytes((kind,)) + data).to_bytes(), st.sampled_from([*READERS, *SIP_KINDS, 2]),
-                st.binary(max_size=40))  # fmt: skip
-nested = st.builds(lambda inner, flip: _hit(Frame(b"\x2a" + inner[:200]).to_bytes(), -1, 2 + flip), frames,
-                   st.integers(0, 7))  # fmt: skip
-headers = st.lists(st.sampled_from((0xFA, 0xFB, 3, 4, 6, 200, 204, 205, 255, 0)), max_size=9).map(bytes)
-streams = st.lists(st.one_of(frames, frames, damaged, odd, nested, headers, st.binary(max_size=9)), max_size=8).map(
-    b"".join
-)
+def frame_of(draw: Draw) -> bytes:
+    return packet_frame(any_packet(draw), draw.one_of(*Profile)).to_bytes()
+
+
+def damaged(draw: Draw) -> bytes:
+    return _hit(frame_of(draw), draw.integer(0, 206), draw.integer(0, 9))
+
+
+def odd(draw: Draw) -> bytes:
+    """Return a frame whose inside no layout expects."""
+    return Frame(bytes((draw.one_of(*READERS, *SIP_KINDS, 2),)) + draw.data(40)).to_bytes()
+
+
+def nested(draw: Draw) -> bytes:
+    """Return a damaged frame with a frame inside."""
+    return _hit(Frame(b"\x2a" + frame_of(draw)[:200]).to_bytes(), -1, draw.integer(2, 9))
+
+
+def headers(draw: Draw) -> bytes:
+    """Return bytes that look like headers."""
+    return bytes(draw.several(lambda: draw.one_of(0xFA, 0xFB, 3, 4, 6, 200, 204, 205, 255, 0), 9))
+
+
+def stream_of(seed: int) -> bytes:
+    draw = Draw(seed)
+    kinds = frame_of, frame_of, damaged, odd, nested, headers, lambda draw: draw.data(9)
+    return b"".join(draw.several(lambda: draw.one_of(*kinds)(draw), 8))
+
+
+streams = SEEDS.map(stream_of)
 
 
 @given(streams, st.sampled_from(Profile))
-@settings(suppress_health_check=[HealthCheck.too_slow], deadline=None)
 def test_any_stream_gives_the_rows_of_the_objects(data: bytes, profile: Profile) -> None:
     same(data, profile)
 
 
-@pytest.mark.parametrize("name", ANY)
-@given(data=st.data())
+@given(SEEDS)
 @settings(max_examples=15)
-def test_each_kind_gives_the_rows_of_its_objects(name: str, data: st.DataObject) -> None:
-    packets = data.draw(st.lists(ANY[name], min_size=1, max_size=3))
-    columns = same(b"".join(packet_frame(packet, Profile.P2OS).to_bytes() for packet in packets))
-    assert "raw" not in columns.tables
+def test_each_kind_gives_the_rows_of_its_objects(seed: int) -> None:
+    draw = Draw(seed)
+    for kind in KINDS.values():
+        packets = [kind(draw) for _ in range(draw.integer(1, 3))]
+        columns = same(b"".join(packet_frame(packet, Profile.P2OS).to_bytes() for packet in packets))
+        assert "raw" not in columns.tables
 
 
 @given(streams, st.integers(1, 40))
@@ -142,7 +161,7 @@ def test_of_frames_within_frames_only_the_outermost_counts() -> None:
 
 
 def test_every_packet_that_is_read_has_a_table() -> None:
-    assert {kind for kinds in KINDS.values() for kind in kinds} == {*READERS, *SIP_KINDS, IDENTITY_KIND}
+    assert {kind for kinds in TABLES.values() for kind in kinds} == {*READERS, *SIP_KINDS, IDENTITY_KIND}
 
 
 def test_nothing_decodes_to_nothing() -> None:
@@ -177,7 +196,6 @@ def test_numbers_come_as_arrays_and_texts_as_bytes() -> None:
 
 
 @given(streams)
-@settings(deadline=None)
 def test_arrow_tables_hold_the_same_rows(data: bytes) -> None:
     pytest.importorskip("pyarrow")
     for table in decode(data, Profile.P2OS).tables.values():

@@ -2,7 +2,7 @@
 
 import io
 import itertools
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 import pytest
@@ -30,6 +30,7 @@ STREAM = b"".join(FRAMES)
 #: From how many bytes on NumPy looks into a chunk; how many chunks a block holds.
 HOW = ((0, 1), (1 << 11, 100))
 WANTED = ("vel", "sip", "encoder,sync0,pulse", "damaged")
+WAYS = tuple(itertools.product(HOW, WANTED))
 
 
 def shown(chunks: list[Chunk]) -> list[tuple[object, ...]]:
@@ -40,21 +41,18 @@ def shown_of(rows: Iterable[ListingRow]) -> list[tuple[object, ...]]:
     return [(row.at_ns, row.direction, row.data, row.kind, row.name, row.problem) for row in rows]
 
 
-def both_ways(chunks: list[Chunk]) -> None:
+def both_ways(chunks: list[Chunk], ways: Iterable[tuple[tuple[int, int], str]] = WAYS) -> None:
     fast = shown(chunks)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Decoder, "take_back", lambda _: None)
         patch.setattr("p2os.capture.listing.next_header", lambda data, _: len(data))
         assert fast == shown(chunks)
         patch.undo()
-        for least, together in HOW:
+        for (least, together), listed in ways:
             patch.setattr("p2os.capture.columns.passing.LEAST_BYTES", least)
-            blocks = blocks_of(chunks, together)
-            for names in map(wanted_names, WANTED):
-                passed = shown_of(chosen_rows(blocks, P2DX, names))
-                assert passed == [
-                    row for row in fast if str(row[4]).lower() in names or ("damaged" in names and row[5])
-                ]
+            names = wanted_names(listed)
+            passed = shown_of(chosen_rows(blocks_of(chunks, together), P2DX, names))
+            assert passed == [row for row in fast if str(row[4]).lower() in names or ("damaged" in names and row[5])]
 
 
 def blocks_of(chunks: list[Chunk], together: int) -> list[Block]:
@@ -68,13 +66,32 @@ def chunks_of(stream: bytes, cuts: tuple[int, ...], wait_ns: int, direction: Dir
             for number, (start, end) in enumerate(itertools.pairwise(places)) if start < end]  # fmt: skip
 
 
-@pytest.mark.parametrize("wait_ns", [0, 249 * NS_PER_MS, 250 * NS_PER_MS])
-def test_rows_are_the_same_however_a_stream_is_cut_and_corrupted(wait_ns: int) -> None:
+#: Around the time after which the rest of a frame is given up.
+WAITS_NS = (0, 249 * NS_PER_MS, 250 * NS_PER_MS)
+
+
+def cut_and_corrupted() -> Iterator[list[Chunk]]:
+    """Yield the stream cut at each byte, hit at each byte, and without each byte, with each wait."""
     for place in range(len(STREAM)):
-        both_ways(chunks_of(STREAM, (place,), wait_ns))
         hit = STREAM[:place] + bytes((STREAM[place] ^ 0x41,)) + STREAM[place + 1 :]
-        both_ways(chunks_of(hit, (place, place + 3), wait_ns))
-        both_ways(chunks_of(STREAM[:place] + STREAM[place + 1 :], (len(SIP), place), wait_ns))
+        lost = STREAM[:place] + STREAM[place + 1 :]
+        for wait_ns in WAITS_NS:
+            yield chunks_of(STREAM, (place,), wait_ns)
+            yield chunks_of(hit, (place, place + 3), wait_ns)
+            yield chunks_of(lost, (len(SIP), place), wait_ns)
+
+
+def test_rows_are_the_same_however_a_stream_is_cut_and_corrupted() -> None:
+    # Of the ways to pass over rows each capture has one: eight ways, and nine captures of a byte, so that each damage
+    # with each wait comes to each way within eight bytes.
+    for chunks, way in zip(cut_and_corrupted(), itertools.cycle(WAYS), strict=False):
+        both_ways(chunks, [way])
+
+
+@pytest.mark.soak
+def test_rows_are_the_same_in_all_ways_however_a_stream_is_cut_and_corrupted() -> None:
+    for chunks in cut_and_corrupted():
+        both_ways(chunks)
 
 
 @pytest.mark.parametrize("first", [b"\xfa\xfb\xc0", SIP])
@@ -138,14 +155,14 @@ def test_lines_of_ours_are_read_at_once(read: Callable[[bytes], Block | None]) -
     assert parts_of(block) == PARTS
 
 
-@pytest.mark.parametrize("place", range(len(BLOCK)))
-def test_a_block_of_lines_damaged_anywhere_is_read_as_line_by_line_or_left_to_that(place: int) -> None:
-    for hit in (b"", b"9", b"g", b'"', b" ", b"\n", b"\r", b"\xc3"):
-        block = BLOCK[:place] + hit + BLOCK[place + 1 :]
-        found = plain_block(block)
-        assert plain_lines(block) == found
-        if found is not None:
-            assert parts_of(found) == list(recorded_parts(block.decode().splitlines()))
+def test_a_block_of_lines_damaged_anywhere_is_read_as_line_by_line_or_left_to_that() -> None:
+    for place in range(len(BLOCK)):
+        for hit in (b"", b"9", b"g", b'"', b" ", b"\n", b"\r", b"\xc3"):
+            block = BLOCK[:place] + hit + BLOCK[place + 1 :]
+            found = plain_block(block)
+            assert plain_lines(block) == found, block
+            if found is not None:
+                assert parts_of(found) == list(recorded_parts(block.decode().splitlines())), block
 
 
 def test_a_fault_behind_lines_of_ours_names_its_line() -> None:

@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import cast
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given
 
 pytest.importorskip("numpy")
 
@@ -23,8 +22,8 @@ from p2os.cli.main import run
 from p2os.protocol.packets import EncoderPacket, SonarReading, StandardSip, packet_frame
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import load_parameters
-from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
-from tests.p2os.protocol.packet_strategies import PACKETS, SIPS
+from simbase.timing import NS_PER_MS, NS_PER_S
+from tests.p2os.protocol.drawn_packets import SEEDS, Draw, any_packet, any_sip
 
 GOLDEN = Path(__file__).parents[2] / "golden"
 P2DX = Reading(profile=Profile.P2OS, parameters=load_parameters("p2dx"))
@@ -83,32 +82,34 @@ def sip_bytes(**fields: object) -> bytes:
     return packet_frame(StandardSip(**fields), Profile.P2OS).to_bytes()
 
 
-packets = st.one_of(SIPS, SIPS, PACKETS).map(lambda packet: packet_frame(packet, Profile.P2OS).to_bytes())
-cuts = st.tuples(st.integers(0, 206), st.integers(0, 206))
-bytes_of_a_chunk = st.one_of(packets, st.builds(lambda data, cut: data[cut[0] : max(cut)], packets, cuts),
-                             st.binary(max_size=6), st.just(b"\xfa\xfb\xc0"))  # fmt: skip
-waits = st.sampled_from((0, 1, 100 * NS_PER_MS, 249 * NS_PER_MS, 250 * NS_PER_MS, 400 * NS_PER_MS))
+WAITS_NS = (0, 1, 100 * NS_PER_MS, 249 * NS_PER_MS, 250 * NS_PER_MS, 400 * NS_PER_MS)
 
 
-@given(st.lists(st.tuples(waits, st.sampled_from((True, True, True, False)), bytes_of_a_chunk), max_size=9),
-       st.sampled_from((ROBOT, None)), st.sampled_from(Profile), st.sampled_from((1, 300, 1 << 20)),
-       st.sampled_from((1, 2, 4096)), st.sampled_from((1, 2, 3, 100)))  # fmt: skip
-@settings(deadline=None, max_examples=100)
-def test_a_capture_gives_the_same_cells_either_way(
-    parts: list[tuple[Nanos, bool, bytes]],
-    direction: Direction | None,
-    profile: Profile,
-    block: int,
-    first_rows: int,
-    together: int,
-) -> None:
-    chunks, now = [Chunk(at_ns=0, direction=direction, data=sip_bytes())], 0
-    for wait, is_robot, data in parts:
-        now += wait
+def packet_of(draw: Draw) -> bytes:
+    return packet_frame(draw.one_of(any_sip, any_sip, any_packet)(draw), Profile.P2OS).to_bytes()
+
+
+def part_of(draw: Draw) -> bytes:
+    data, cut = packet_of(draw), draw.integer(0, 206)
+    return data[cut : max(cut, draw.integer(0, 206))]
+
+
+@given(SEEDS)
+def test_a_capture_gives_the_same_cells_either_way(seed: int) -> None:
+    draw = Draw(seed)
+    direction, now = draw.one_of(ROBOT, None), 0
+    chunks = [Chunk(at_ns=0, direction=direction, data=sip_bytes())]
+    for _ in range(draw.size(9)):
+        now += draw.one_of(*WAITS_NS)
+        data = draw.one_of(packet_of, part_of, lambda draw: draw.data(6), lambda _: b"\xfa\xfb\xc0")(draw)
+        sender = draw.one_of(direction, direction, direction, CLIENT)
         if data:  # no source gives a chunk without bytes, and a block holds none
-            chunks.append(Chunk(at_ns=now, direction=direction if is_robot else CLIENT, data=data))
-    reading = Reading(profile=profile, parameters=P2DX.parameters)
-    same(Capture(chunks=tuple(chunks)), reading, first_rows=first_rows, block=block, together=together)
+            chunks.append(Chunk(at_ns=now, direction=sender, data=data))
+    reading = Reading(profile=draw.one_of(*Profile), parameters=P2DX.parameters)
+    same(
+        Capture(chunks=tuple(chunks)), reading, first_rows=draw.one_of(1, 2, 4096), block=draw.one_of(1, 300, 1 << 20),
+        together=draw.one_of(1, 2, 3, 100),
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("name", ["aria_p2de.jsonl", "player_p2de.jsonl"])

@@ -5,6 +5,7 @@ import pty
 import re
 import subprocess
 import sys
+import termios
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -20,6 +21,11 @@ COMMAND = (sys.executable, "-m", "p2os")
 CLOSE, STOP, VEL = CommandNumber.CLOSE, CommandNumber.STOP, CommandNumber.VEL
 #: A bound on what is done at once: ten times what it takes, for a machine that does other things too.
 AT_ONCE_S = 5.0
+
+
+def is_raw(keyboard: int) -> bool:
+    """Tell whether a terminal, by the end where its keys are pressed, hands each key over at once."""
+    return not termios.tcgetattr(keyboard)[3] & termios.ICANON
 
 
 class RecordingRobot(ServedRobot):
@@ -65,6 +71,7 @@ class Driver:
         stdout: int = subprocess.PIPE,
     ) -> None:  # fmt: skip
         self.keyboard = -1
+        self._heard = ""
         if on_terminal:
             self.keyboard, inside = pty.openpty()
             self.process = subprocess.Popen(words, stdin=inside, stdout=inside, stderr=inside, start_new_session=True)
@@ -76,11 +83,16 @@ class Driver:
 
     def listens_at(self) -> str:
         """Return the URL that `p2os sniff` says it listens at, of a port that the system chose."""
+        return self.hear(r"^listening on (\S+) ")[1]
+
+    def hear(self, pattern: str) -> re.Match[str]:
+        """Wait until it has said a line on standard error."""
         assert self.process.stderr is not None
-        said = self.process.stderr.readline().decode()
-        found = re.match(r"listening on (\S+) ", said)
-        assert found, said
-        return found[1]
+        while not (found := re.search(pattern, self._heard, re.MULTILINE)):
+            line = self.process.stderr.readline().decode()
+            assert line, self._heard
+            self._heard += line
+        return found
 
     def press(self, keys: str) -> None:
         os.write(self.keyboard, keys.encode())
@@ -90,7 +102,7 @@ class Driver:
         try:
             if self.keyboard < 0:
                 out, err = self.process.communicate(timeout=TIMEOUT_S)
-                return self.process.returncode, ((out or b"") + err).decode()
+                return self.process.returncode, ((out or b"") + self._heard.encode() + err).decode()
             return self.process.wait(TIMEOUT_S), ""
         finally:
             self.close()
@@ -104,4 +116,4 @@ class Driver:
             self.keyboard = -1
 
 
-__all__ = ["AT_ONCE_S", "CLOSE", "COMMAND", "STOP", "TIMEOUT_S", "VEL", "Driver", "RecordingRobot", "until"]
+__all__ = ["AT_ONCE_S", "CLOSE", "COMMAND", "STOP", "TIMEOUT_S", "VEL", "Driver", "RecordingRobot", "is_raw", "until"]

@@ -3,7 +3,6 @@
 import contextlib
 import json
 import subprocess
-import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -23,6 +22,7 @@ from p2os.protocol.commands import Command, CommandNumber
 from p2os.transport import HungUpError, Loops, listen_url, open_url, waiting
 from simbase.errors import FileError
 from simbase.timing import NS_PER_MS, NS_PER_S
+from tests.tools.forked_python import forked_python
 
 TO, FROM = Direction.TO_ROBOT, Direction.FROM_ROBOT
 TIMEOUT_S = 60.0
@@ -367,7 +367,7 @@ def fill_a_disk(verb: str, option: str, url: str, tmp_path: Path) -> None:
     other = ["--out", "/dev/null"] if (verb, option) == ("record", "--pcap") else []
     more = ["--listen", "tcp:127.0.0.1:0", "--quiet"] if verb == "sniff" else ["--for", "20s"]
     with subprocess.Popen(
-        [sys.executable, "-c", LIMITED, verb, url, *more, *other, option, str(full)],
+        [forked_python(), "-c", LIMITED, verb, url, *more, *other, option, str(full)],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path,
     ) as process:  # fmt: skip
         try:

@@ -156,7 +156,7 @@ def test_only_the_verb_that_is_named_is_imported() -> None:
     code = """
 import sys
 from p2os.cli.main import run
-run(["doctor", "--json"])
+run(["ports", "--json"])
 sys.exit("p2os.cli.virtual.serve" in sys.modules)
 """
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, timeout=60)
@@ -212,7 +212,7 @@ def test_main_ends_the_process_and_understands_trace_anywhere(
 
 @pytest.mark.skipif(os.name != "posix", reason="pipes close differently elsewhere")
 def test_a_reader_that_leaves_early_gets_no_traceback() -> None:
-    command = [str(Path(sys.executable).parent / "p2os"), "doctor", "--json"]
+    command = [str(Path(sys.executable).parent / "p2os"), "ports", "--json"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         assert process.stdout is not None
         assert process.stderr is not None

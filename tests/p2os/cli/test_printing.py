@@ -21,7 +21,7 @@ from p2os.cli.printing import MOST_BYTES, QueuedStream, queue_output, restored_o
 from p2os.cli.robots.teleop import NEXT_HOLD_NS
 from simbase.errors import FileError
 from simbase.timing import NS_PER_S
-from tests.p2os.cli.driven import AT_ONCE_S, STOP, TIMEOUT_S, VEL, Driver, RecordingRobot, until
+from tests.p2os.cli.driven import AT_ONCE_S, STOP, TIMEOUT_S, VEL, Driver, RecordingRobot, is_raw, until
 from tests.tools.forked_python import forked_p2os
 
 
@@ -269,20 +269,22 @@ def test_a_key_let_go_stops_the_robot_though_the_terminal_is_held(robot: Recordi
     os.close(inside)
     try:
         until(lambda: 1 in robot.numbers, "a session")
-        time.sleep(0.5)  # the terminal is made raw after the robot is connected, and cannot be seen to be
+        until(lambda: is_raw(keyboard), "a raw terminal")
         os.write(keyboard, b"w")
         robot.wait_until_it_drives()
         for _ in range(5):
             time.sleep(0.05)
             let_go_at = time.monotonic()
             os.write(keyboard, b"w")
-        zero_at = 0.0
-        while not zero_at and time.monotonic() < let_go_at + TIMEOUT_S:
-            zero_at = next(
+
+        def zero_at() -> float:
+            return next(
                 (at for at, command in list(robot.received)
                  if at > let_go_at and command.number == VEL and command.integer == 0), 0.0,
             )  # fmt: skip
-        assert NEXT_HOLD_NS / NS_PER_S <= zero_at - let_go_at < AT_ONCE_S
+
+        until(zero_at, "a speed of zero")
+        assert NEXT_HOLD_NS / NS_PER_S <= zero_at() - let_go_at < AT_ONCE_S
         os.write(keyboard, b"q")
         assert process.wait(TIMEOUT_S) == 0
     finally:

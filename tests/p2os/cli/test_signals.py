@@ -17,7 +17,7 @@ from p2os.cli.main import run
 from p2os.cli.signals import ENDING_NS, FATAL, end_on_signals, end_on_suspension, postponed, restored_signals
 from p2os.protocol.commands import Command, CommandNumber
 from simbase.timing import NS_PER_S
-from tests.p2os.cli.driven import AT_ONCE_S, CLOSE, COMMAND, STOP, Driver, RecordingRobot, until
+from tests.p2os.cli.driven import AT_ONCE_S, CLOSE, COMMAND, STOP, Driver, RecordingRobot, is_raw, until
 from tests.tools.forked_python import forked_p2os, forked_python
 
 NUMBERS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1, signal.SIGTSTP]
@@ -43,6 +43,7 @@ main(["teleop", sys.argv[1], "--pad"])
 #: Returns the words that start `p2os`.
 Start = Callable[..., list[str]]
 Begin = Callable[[str, Path, Start], list[Driver]]
+Robots = Callable[[], RecordingRobot]
 
 
 def started(*words: str) -> list[str]:
@@ -51,10 +52,22 @@ def started(*words: str) -> list[str]:
 
 
 @pytest.fixture
-def robot() -> Iterator[RecordingRobot]:
-    robot = RecordingRobot()
-    yield robot
-    robot.close()
+def robots() -> Iterator[Robots]:
+    """Serve a robot more with each call."""
+    served: list[RecordingRobot] = []
+
+    def serve() -> RecordingRobot:
+        served.append(RecordingRobot())
+        return served[-1]
+
+    yield serve
+    for robot in served:
+        robot.close()
+
+
+@pytest.fixture
+def robot(robots: Robots) -> RecordingRobot:
+    return robots()
 
 
 @pytest.fixture
@@ -110,41 +123,48 @@ def through_sniff(url: str, _folder: Path, start: Start) -> list[Driver]:
 VERBS: list[Begin] = [by_drive, by_way, by_keys, by_pad, by_replay, through_sniff]
 
 
-@pytest.mark.parametrize("number", NUMBERS)
+# Each row of a verb has a robot of its own, and all of them wait for theirs at the same time.
+
+
 @pytest.mark.parametrize("begin", VERBS)
-def test_a_signal_stops_the_robot_first(
-    begin: Begin, number: signal.Signals, robot: RecordingRobot, drivers: list[Driver],
-    tmp_path: Path,
-) -> None:  # fmt: skip
-    drivers += begin(robot.url, tmp_path, forked_p2os)
-    if begin is by_keys:
-        until(lambda: CommandNumber.OPEN in robot.numbers, "a session")
-        time.sleep(0.3)  # the terminal is made raw after the robot is connected
-        drivers[0].press("w")
-    robot.wait_until_it_drives()
-    sent_at = time.monotonic()
-    drivers[0].process.send_signal(number)
-    stopped_at = robot.when_received(STOP, sent_at)
-    assert stopped_at - sent_at < AT_ONCE_S
-    assert robot.when_received(CLOSE, sent_at) >= stopped_at
-    code, said = drivers[0].end()
-    assert code == 130, said
-    assert "Traceback" not in said
-    until(lambda: not robot.is_moving, "rest")
+def test_each_signal_stops_the_robot_first(begin: Begin, robots: Robots, drivers: list[Driver], tmp_path: Path) -> None:
+    rows: list[tuple[signal.Signals, RecordingRobot, Driver]] = []
+    for number in NUMBERS:
+        robot, folder = robots(), tmp_path / number.name
+        folder.mkdir()
+        begun = begin(robot.url, folder, forked_p2os)
+        drivers += begun
+        rows.append((number, robot, begun[0]))
+    sent_at: list[float] = []
+    for number, robot, driver in rows:
+        if begin is by_keys:
+            until(lambda: is_raw(driver.keyboard), "a raw terminal")  # noqa: B023  # it is called now
+            driver.press("w")
+        robot.wait_until_it_drives()
+        sent_at.append(time.monotonic())
+        driver.process.send_signal(number)
+    for (number, robot, driver), at in zip(rows, sent_at, strict=True):
+        stopped_at = robot.when_received(STOP, at)
+        assert stopped_at - at < AT_ONCE_S, number
+        assert robot.when_received(CLOSE, at) >= stopped_at, number
+        code, said = driver.end()
+        assert code == 130, (number, said)
+        assert "Traceback" not in said
+        until(lambda: not robot.is_moving, "rest")  # noqa: B023  # it is called now
 
 
-@pytest.mark.parametrize("number", NUMBERS)
-def test_a_command_that_was_sent_is_taken_back_by_a_signal(
-    number: signal.Signals, robot: RecordingRobot, drivers: list[Driver]
-) -> None:
-    drivers.append(Driver(forked_p2os("send", robot.url, "VEL", "200", "--wait", "1min")))
-    until(
-        lambda: (CommandNumber.VEL, 200) in [(command.number, command.integer) for _, command in robot.received], "VEL"
-    )
-    sent_at = time.monotonic()
-    drivers[0].process.send_signal(number)
-    assert drivers[0].end()[0] == 130
-    assert robot.when_received(STOP, sent_at) <= robot.when_received(CLOSE, sent_at)
+def test_a_command_that_was_sent_is_taken_back_by_each_signal(robots: Robots, drivers: list[Driver]) -> None:
+    rows = [(number, robots()) for number in NUMBERS]
+    drivers += [Driver(forked_p2os("send", robot.url, "VEL", "200", "--wait", "1min")) for _, robot in rows]
+    sent_at: list[float] = []
+    for (number, robot), driver in zip(rows, drivers, strict=True):
+        robot.when_received(CommandNumber.VEL, 0.0)
+        assert [command.integer for _, command in robot.received if command.number == CommandNumber.VEL] == [200]
+        sent_at.append(time.monotonic())
+        driver.process.send_signal(number)
+    for (number, robot), driver, at in zip(rows, drivers, sent_at, strict=True):
+        assert driver.end()[0] == 130, number
+        assert robot.when_received(STOP, at) <= robot.when_received(CLOSE, at)
 
 
 def test_many_signals_do_not_cut_the_stopping_short(robot: RecordingRobot, drivers: list[Driver]) -> None:
@@ -158,28 +178,34 @@ def test_many_signals_do_not_cut_the_stopping_short(robot: RecordingRobot, drive
     assert STOP in robot.numbers
 
 
-@pytest.mark.parametrize(("begin", "code"), [(by_drive, 1), (by_replay, 1), (through_sniff, None)])
 def test_a_program_that_was_suspended_stops_the_robot_before_anything_else(
-    begin: Begin, code: int | None, robot: RecordingRobot, drivers: list[Driver],
-    tmp_path: Path,
-) -> None:  # fmt: skip
-    drivers += begin(robot.url, tmp_path, started)
-    robot.wait_until_it_drives()
-    drivers[0].process.send_signal(signal.SIGSTOP)
+    robots: Robots, drivers: list[Driver], tmp_path: Path
+) -> None:
+    rows: list[tuple[Begin, RecordingRobot, Driver]] = []
+    for begin in (by_drive, by_replay, through_sniff):
+        robot = robots()
+        begun = begin(robot.url, tmp_path, started)
+        drivers += begun
+        rows.append((begin, robot, begun[0]))
+    for _, robot, driver in rows:
+        robot.wait_until_it_drives()
+        driver.process.send_signal(signal.SIGSTOP)
     time.sleep(0.9)  # longer than a wait of 0.2 s and a gap of 0.35 s
-    received = len(robot.received)
-    woken_at = time.monotonic()
-    drivers[0].process.send_signal(signal.SIGCONT)
-    assert robot.when_received(STOP, woken_at) - woken_at < AT_ONCE_S
-    robot.when_received(CLOSE, woken_at)
-    if begin is not by_drive:  # whose own client stops it
-        assert robot.numbers[received:] == [STOP, CommandNumber.VEL, CLOSE]
-    if code is None:
-        time.sleep(1)  # it says why before the signal comes
-        drivers[0].process.send_signal(signal.SIGINT)
-    ended, said = drivers[0].end()
-    assert ended == (130 if code is None else code)
-    assert re.search(r"paused for \d+\.\d", said)
+    for begin, robot, driver in rows:
+        received = len(robot.received)
+        woken_at = time.monotonic()
+        driver.process.send_signal(signal.SIGCONT)
+        assert robot.when_received(STOP, woken_at) - woken_at < AT_ONCE_S
+        robot.when_received(CLOSE, woken_at)
+        if begin is not by_drive:  # whose own client stops it
+            assert robot.numbers[received:] == [STOP, CommandNumber.VEL, CLOSE]
+        paused = r"paused for \d+\.\d"
+        if begin is through_sniff:
+            driver.hear(paused)
+            driver.process.send_signal(signal.SIGINT)
+        code, said = driver.end()
+        assert code == (130 if begin is through_sniff else 1)
+        assert re.search(paused, said)
 
 
 # The handlers by themselves ---------------------------------------------------------------

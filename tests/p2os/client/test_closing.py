@@ -11,6 +11,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import FrameType
 from typing import Any, Self
@@ -25,6 +26,7 @@ from p2os.protocol.commands import vel
 from p2os.transport import open_url, virtual_clock
 from p2os.transport.ports import Transport
 from simbase.interrupts import held_back
+from simbase.timing import NS_PER_MS
 from tests.p2os.client.served_robot import CLOSING_COMMANDS, QUICK, Recorder, ServedRobot, until
 from tests.tools.forked_python import forked_python
 
@@ -82,6 +84,10 @@ def interrupt_everywhere(story: Callable[[int], tuple[int, str, Recorder]], serv
         place += step
 
 
+#: For many sessions with a robot of tests, whose commands may come as near as they like.
+HASTY = replace(QUICK, open_delay_ns=NS_PER_MS, command_spacing_ns=NS_PER_MS)
+
+
 @pytest.fixture
 def hasty() -> Iterator[ServedRobot]:
     """A robot whose time runs eight times as fast, so that sessions open quickly."""
@@ -97,7 +103,7 @@ def test_a_second_ctrl_c_at_any_line_of_closing_leaves_the_robot_told(hasty: Ser
     def story(place: int) -> tuple[int, str, Recorder]:
         recorder = Recorder()
         interrupter = Interrupter(place, files)
-        robot = Robot(hasty.url, settings=QUICK, opener=recorder).connect()
+        robot = Robot(hasty.url, settings=HASTY, opener=recorder).connect()
         robot.set_velocity(0.3)
         until(lambda: vel(300) in recorder.sent)
         with contextlib.suppress(KeyboardInterrupt), interrupter:
@@ -124,7 +130,7 @@ def interrupt_an_asyncio_closing(served: ServedRobot, step: int) -> int:
         interrupter = Interrupter(place, (OURS,))
 
         async def main() -> None:
-            robot = AsyncRobot(served.url, settings=QUICK, opener=recorder, clock=served.clock)
+            robot = AsyncRobot(served.url, settings=HASTY, opener=recorder, clock=served.clock)
             await robot.connect()
             robot.set_velocity(0.3)
             with interrupter:
@@ -293,25 +299,30 @@ asyncio.run(main())
 }
 
 
+SIGNALS = (signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1, signal.SIGALRM)
+
+
 @pytest.mark.skipif(os.name != "posix", reason="signals are Unix's")
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1, signal.SIGALRM])
 @pytest.mark.parametrize("client", CLIENTS)
-def test_a_signal_that_would_kill_a_program_stops_its_robot_first(
-    served: ServedRobot, client: str, number: signal.Signals
-) -> None:
-    program = subprocess.Popen([forked_python(), "-c", CLIENTS[client].format(url=served.url)], stdout=subprocess.PIPE)
-    try:
-        assert program.stdout is not None
-        assert program.stdout.read(1)
-        until(lambda: served.is_moving)
-        program.send_signal(number)
-        program.send_signal(number)
-        assert program.wait(60) == 128 + number
-    finally:
-        program.kill()
-        program.wait()
-        program.stdout.close()  # type: ignore[union-attr]  # a pipe was asked for
-    until(lambda: not served.is_moving and not served.pioneer.state.motors_enabled)
+def test_a_signal_that_would_kill_a_program_stops_its_robot_first(client: str) -> None:
+    with contextlib.ExitStack() as left:
+        rows: list[tuple[signal.Signals, ServedRobot, subprocess.Popen[bytes]]] = []
+        for number in SIGNALS:  # each has a robot, and all wait for theirs at the same time
+            robot = ServedRobot()
+            left.callback(robot.close)
+            words = [forked_python(), "-c", CLIENTS[client].format(url=robot.url)]
+            program = left.enter_context(subprocess.Popen(words, stdout=subprocess.PIPE))
+            left.callback(program.kill)
+            rows.append((number, robot, program))
+        for number, robot, program in rows:
+            assert program.stdout is not None
+            assert program.stdout.read(1)
+            until(lambda: robot.is_moving)  # noqa: B023  # it is called now
+            program.send_signal(number)
+            program.send_signal(number)
+        for number, robot, program in rows:
+            assert program.wait(60) == 128 + number, number
+            until(lambda: not robot.is_moving and not robot.pioneer.state.motors_enabled)  # noqa: B023
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals are Unix's")

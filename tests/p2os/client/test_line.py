@@ -4,6 +4,7 @@ import contextlib
 import os
 import socket
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -29,8 +30,9 @@ def test_a_serial_cable_is_pulled_and_put_back(tmp_path: Path) -> None:
     port = tmp_path / "ttyROBOT"
     served = ServedRobot(f"pty:{port}")
     recorder, received = Recorder(), list[Notice]()
+    settings = replace(QUICK, backoff_ns=50 * NS_PER_MS)
     try:
-        with Robot(f"serial:{port}", settings=QUICK, opener=recorder) as robot:
+        with Robot(f"serial:{port}", settings=settings, opener=recorder) as robot:
             robot.on_event(received.append)
             robot.set_velocity(0.3)
             until(lambda: served.is_moving)

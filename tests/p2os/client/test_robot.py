@@ -239,9 +239,9 @@ def test_a_loss_ends_a_drive_and_the_robot_is_there_again(fast: ServedRobot) -> 
         fast.until(lambda: fast.is_moving)
 
 
-def test_a_half_open_peer_is_noticed_by_its_silence(served: ServedRobot) -> None:
-    recorder = Recorder()
-    with robot_on(served, recorder) as robot:
+def test_a_half_open_peer_is_noticed_by_its_silence(fast: ServedRobot) -> None:
+    recorder = Recorder(fast.open)
+    with robot_on(fast, recorder) as robot:
         notices = robot.events()
         recorder.lines[0].is_mute = True
         lost = next(notice for notice in notices if isinstance(notice, LinkLost))

@@ -134,8 +134,21 @@ def test_ten_million_bytes_half_of_them_mutated_sessions_are_endured() -> None:
 
 @pytest.mark.parametrize("way", [0, 1], ids=["client", "robot"])
 @pytest.mark.parametrize("session", sessions(), ids=SESSIONS)
+def test_a_frame_cut_and_corrupted_at_every_byte_alone_is_lost(session: tuple, way: int) -> None:
+    # The frames of a session are of few kinds: each fifth, and the first of each kind and length.
+    assert lose_only_what_was_hit(b"".join(session[way]), every=5) > 50
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("way", [0, 1], ids=["client", "robot"])
+@pytest.mark.parametrize("session", sessions(), ids=SESSIONS)
 def test_a_session_cut_and_corrupted_at_every_byte_loses_only_what_was_hit(session: tuple, way: int) -> None:
     stream = b"".join(session[way])
+    assert lose_only_what_was_hit(stream, every=1) == len(stream)
+
+
+def lose_only_what_was_hit(stream: bytes, every: int) -> int:
+    """Hit every so many frames of a stream, and the first of each kind and length, at each byte; return how many."""
     whole = Decoder()
     whole.receive(stream, 0)
     places, at = [], 0
@@ -143,8 +156,13 @@ def test_a_session_cut_and_corrupted_at_every_byte_loses_only_what_was_hit(sessi
         assert isinstance(item, Frame), "the captures are clean"
         places.append((at, at + len(item.to_bytes()), item))
         at += len(item.to_bytes())
+    seen, count = set(), 0
     # Only the frame that is hit and the two behind it can be touched: the rest is not fed again, but for one before it.
     for number, (start, end, hit) in enumerate(places):
+        if number % every and (hit.kind, end - start) in seen:
+            continue
+        seen.add((hit.kind, end - start))
+        count += end - start
         first, last = max(0, number - 1), min(len(places), number + 3)
         near = [frame for _, _, frame in places[first:last]]
         begin, stop = places[first][0], places[last - 1][1]
@@ -156,6 +174,7 @@ def test_a_session_cut_and_corrupted_at_every_byte_loses_only_what_was_hit(sessi
                 others = near[: number - first] if damaged == stream[begin:place] else [f for f in near if f is not hit]
                 assert without(others, found) == [], f"byte {place}"
                 assert rejected <= len(damaged)
+    return count
 
 
 def frames_of(data: bytes) -> tuple[list[Frame], int]:

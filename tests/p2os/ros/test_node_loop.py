@@ -1,12 +1,12 @@
 """The loop of `p2os ros` between a robot and a network, both made by the test."""
 
+import contextlib
 import math
 import os
 import select
 import signal
 import subprocess
-import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
@@ -19,6 +19,7 @@ from p2os.client import LinkLostError, Robot
 from p2os.client.notices import DeadmanStopped, LinkLost, MotorsDisabledError
 from p2os.client.observer import Observer
 from p2os.pioneer.serve import served_pioneer
+from p2os.pioneer.serve.background_host import ServedPioneer
 from p2os.protocol.sip import StandardSip
 from p2os.robots.parameters import load_parameters
 from p2os.ros.codec import Message
@@ -209,40 +210,48 @@ def test_a_signal_waits_until_a_call_of_the_network_has_returned(name: str) -> N
     assert returned
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_a_signal_stops_the_robot_before_the_node_ends(number: int) -> None:
-    pytest.importorskip("cyclonedds", reason="the extra ros is not installed")
-    domain, namespace = str(10 + os.getpid() % 80), f"/s{os.getpid()}"
+Node = subprocess.Popen[str]
+
+
+@contextlib.contextmanager
+def node_and_peer(name: str) -> Iterator[tuple[ServedPioneer, Node, subprocess.Popen[bytes]]]:
+    """Serve a robot to a node in a process of its own, and drive it by a peer in another."""
+    domain, namespace = str(10 + os.getpid() % 80), f"/s{os.getpid()}{name}"
     verb = "EntryPoint('ros', 'p2os.cli.robots.ros', 'p2os.verbs')"
-    words = ["ros", "URL", "--domain", domain, "--namespace", namespace, "--for", "20s"]
     with served_pioneer(world="room", body="kinematic") as url:
-        words[1] = str(url)
+        words = ["ros", str(url), "--domain", domain, "--namespace", namespace, "--for", "20s"]
         code = (
             "from importlib.metadata import EntryPoint; from p2os.cli import main; "
-            f"main.verbs = lambda: [{verb}]; main.main({words!r})"
+            f"import faulthandler; faulthandler.enable(); main.verbs = lambda: [{verb}]; main.main({words!r})"
         )
         with (
             subprocess.Popen(
-                [sys.executable, "-X", "faulthandler", "-c", code],
-                stdout=subprocess.PIPE,
-                stderr=subprocess.PIPE,
-                text=True,
+                [forked_python(), "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
             ) as node,
             subprocess.Popen([forked_python(), str(PEER), domain, namespace], stdout=subprocess.PIPE) as peer,
         ):
             try:
-                heard = b""
-                while b'"mps": 0.2' not in heard:
-                    assert peer.stdout is not None
-                    assert select.select([peer.stdout], [], [], 15.0)[0], "the peer hears nothing"
-                    heard = peer.stdout.readline()
-                node.send_signal(number)
-                _, told = node.communicate(timeout=15)
-                assert node.returncode == 130, told
-                assert "the robot was stopped and let go" in told
-                assert "motors off" in " ".join(url.order("status"))
-                until(lambda: "wheels 0.000 0.000" in " ".join(url.order("status")), "a stand")  # it brakes by its ramp
+                yield url, node, peer
             finally:
                 node.kill()
                 peer.kill()
+
+
+@pytest.mark.slow
+def test_a_signal_stops_the_robot_before_the_node_ends() -> None:
+    pytest.importorskip("cyclonedds", reason="the extra ros is not installed")
+    numbers = (signal.SIGTERM, signal.SIGINT)
+    with contextlib.ExitStack() as left:  # both wait for their peers at the same time
+        rows = [left.enter_context(node_and_peer(number.name)) for number in numbers]
+        for number, (url, node, peer) in zip(numbers, rows, strict=True):
+            heard = b""
+            while b'"mps": 0.2' not in heard:
+                assert peer.stdout is not None
+                assert select.select([peer.stdout], [], [], 15.0)[0], "the peer hears nothing"
+                heard = peer.stdout.readline()
+            node.send_signal(number)
+            _, told = node.communicate(timeout=15)
+            assert node.returncode == 130, told
+            assert "the robot was stopped and let go" in told
+            assert "motors off" in " ".join(url.order("status"))
+            until(lambda: "wheels 0.000 0.000" in " ".join(url.order("status")), "a stand")  # noqa: B023  # by its ramp
