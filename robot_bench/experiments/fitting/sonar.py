@@ -27,6 +27,8 @@ SIDES = 64
 MOST_READINGS, START_READINGS = 1500, 150
 #: chosen: so many rays and walls are crossed in one step, of some 100 kB an array.
 MOST_AT_ONCE = 16_384
+#: As many answers of the model are kept as one look at all slopes asks for.
+MOST_KNOWN = 4
 #: chosen: where the search for the delay begins, seconds; and how often outliers are looked for.
 START_S, MOST_ROUNDS = 0.05, 4
 #: chosen: what differs by more than four deviations of the readings as far, and by 1 cm, is another echo.
@@ -108,6 +110,8 @@ class _Readings:
         self.kept = np.ones(len(self.metres), dtype=np.bool_)
         #: Of which readings and delay `_sonars` was asked last, and what it found.
         self._placed: tuple[tuple[bytes, float], Floats] = (b"", 0.0), np.empty((3, 0))
+        #: What the model said last, by readings, cone and delay: slopes are asked of one after the other.
+        self._known: dict[tuple[bytes, float, float], Floats] = {}
         self._some = np.arange(len(self.metres)) % (1 + len(self.metres) // START_READINGS) == 0
 
     def expected(self, cone_deg: float, delay_s: float) -> Floats:
@@ -116,11 +120,16 @@ class _Readings:
 
     def _expected(self, which: npt.NDArray[np.bool_], cone_deg: float, delay_s: float) -> Floats:
         key = which.tobytes(), delay_s
+        asked = (*key, cone_deg)
+        if (known := self._known.get(asked)) is not None:
+            return known
         if key != self._placed[0]:
             self._placed = key, self._sonars(which, delay_s)
         x, y, heading = self._placed[1]
         spread = np.radians(cone_deg) / 2 * np.linspace(-1, 1, RAYS_PER_CONE)
-        return nearest(self._walls, x, y, heading[:, None] + spread, self._longest_m)
+        found = nearest(self._walls, x, y, heading[:, None] + spread, self._longest_m)
+        self._known = dict([*self._known.items(), (asked, found)][-MOST_KNOWN:])
+        return found
 
     def _sonars(self, which: npt.NDArray[np.bool_], delay_s: float) -> Floats:
         """Return where some readings were taken: shape (3, n), metres and radians."""
@@ -135,10 +144,14 @@ class _Readings:
             found.append(np.array([x + c * px - s * py, y + s * px + c * py, heading + turn]))
         return np.concatenate(found, axis=1)
 
-    def off(self, cone_deg: float) -> float:
-        """Return by how much some readings are off with a cone, in the mean, metres."""
-        found = self._expected(self._some, cone_deg, START_S)
-        return float(np.minimum(np.abs(found - self.metres[self._some]), MOST_OFF_M).mean())
+    def best_of(self, cones_deg: Floats) -> float:
+        """Return the cone with which some readings are off least, in the mean."""
+        x, y, heading = np.tile(self._sonars(self._some, START_S), len(cones_deg))
+        spreads = np.radians(cones_deg)[:, None] / 2 * np.linspace(-1, 1, RAYS_PER_CONE)
+        fans = heading[:, None] + np.repeat(spreads, len(heading) // len(cones_deg), axis=0)
+        found = nearest(self._walls, x, y, fans, self._longest_m).reshape(len(cones_deg), -1)
+        off = np.minimum(np.abs(found - self.metres[self._some]), MOST_OFF_M).mean(axis=1)
+        return float(cones_deg[np.argmin(off)])
 
 
 def fit_sonar(drives: Sequence[Drive], walls: Floats) -> Fit:
@@ -154,10 +167,9 @@ def fit_sonar(drives: Sequence[Drive], walls: Floats) -> Fit:
     readings = _Readings(drives, walls)
     if len(readings.metres) < 20:
         raise FileError(f"{len(readings.metres)} sonar readings within range are too few", hint="nearer to walls")
-    coarse = min(CONES_DEG, key=readings.off)
-    start = min((coarse + near for near in NEAR_DEG), key=readings.off)
+    start = readings.best_of(readings.best_of(CONES_DEG) + NEAR_DEG)
     for _ in range(MOST_ROUNDS):
-        found, noise, off = _fit_kept(readings, float(start))
+        found, noise, off = _fit_kept(readings, start)
         far = off > _most(readings.metres[readings.kept], off)
         if not far.any():
             break

@@ -32,19 +32,24 @@ class Bug:
     #: A thing that is placed when the robot drives, as keys of `[[obstacle]]`; empty for none.
     thing: str = ""
     placed_s: float = 5.0
+    #: Where the robot begins, on the line along which it looks: a wall stands across it at 3.05.
+    x_m: float = -2.0
     #: Whether the run fails at all, and whether `explain` finds the mistake.
     fails: bool = True
     is_found: bool = True
 
 
 _POST = 'shape = "cylinder"\nradius_m = 0.1\nheight_m = 0.5\nbefore_sonar = 3\ndistance_m = 0.25'
+_POST_ON_THE_LEFT, _POST_ON_THE_RIGHT = (_POST.replace("before_sonar = 3", f"before_sonar = {n}") for n in (2, 6))
+#: A wall so near that the first turn comes 6 s after power-on, the second at 12 s.
+_NEAR = 1.7
 _BOX = 'shape = "box"\nlength_m = 0.1\nwidth_m = 0.8\nheight_m = 0.5\nbefore_sonar = 4\ndistance_m = 0.3'
 #: So near that no program can help it.
 UNFAIR = _BOX.replace("0.3", "0.2")
 _AHEAD = 'shape = "cylinder"\nradius_m = 0.05\nheight_m = 0.5\nx_m = -0.8\ny_m = 0.0'
 
 
-def scenario_text(thing: str, duration_s: float, placed_s: float = 5.0) -> str:
+def scenario_text(thing: str, duration_s: float, placed_s: float = 5.0, x_m: float = -2.0) -> str:
     """Return a scenario: the room, a start that looks along it, a thing on the way, and the goals of `dodge`."""
     placed = f'[[obstacle]]\nat_s = {placed_s}\nop = "place"\nname = "post"\n{thing}\n' if thing else ""
     return f"""firmware = "dodge.elf"
@@ -53,7 +58,7 @@ body = "kinematic"
 duration_s = {duration_s}
 threshold_m = 0.6
 [start]
-x_m = -2.0
+x_m = {x_m}
 y_m = 0.0
 heading_deg = 0.0
 {placed}[[goal]]
@@ -84,6 +89,25 @@ def build(bug: Bug, folder: Path) -> Path:
     return built
 
 
+def _overflow(after_s: int) -> Bug:
+    """Return a count of milliseconds in 16 bits that overflows after 65 s, or earlier: then it began with some."""
+    begun_ms = 65_000 - 1000 * after_s
+    return Bug(
+        name=f"overflow-after-{after_s}-s",
+        edits=(
+            (
+                "dodge.c", "        struct dodge_command",
+                ("        static uint8_t sensors;\n        static uint32_t next_ms;\n        static uint16_t now_ms;\n"
+                f"        now_ms = (uint16_t)(tick_now() * 10u + {begun_ms}u);\n"
+                "        if (next_ms == 0 || now_ms >= next_ms) {\n            next_ms = now_ms + 20u;\n"
+                "            sensors = pins_distances();\n        }\n        struct dodge_command"),
+            ),
+            ("dodge.c", _READ, "dodge_tick(&dodge, sensors, "),
+        ),
+        answers=("no notice of any", "now_ms"), thing=_BOX, placed_s=after_s + 5.0, duration_s=after_s + 10.0,
+    )  # fmt: skip
+
+
 #: Asked for by name.
 NAMED = (
     Bug(
@@ -92,7 +116,7 @@ NAMED = (
             ("board.h", "X(DD3, A, 6)", "X(DD3, X, 0)"), ("board.h", "X(DD6, B, 1)", "X(DD6, A, 6)"),
             ("board.h", "X(DD3, X, 0)", "X(DD3, B, 1)"),
         ),
-        answers=("DD3 and DD6 exchanged",), thing=_POST, duration_s=14.0,
+        answers=("DD3 and DD6 exchanged",), thing=_POST, duration_s=10.0,
     ),
     Bug(
         name="stale-reading",
@@ -105,22 +129,9 @@ NAMED = (
             ),
             ("dodge.c", _READ, "dodge_tick(&dodge, sensors, "),
         ),
-        answers=("late",), thing=_BOX, duration_s=14.0,
+        answers=("late",), thing=_BOX, duration_s=10.0,
     ),
-    Bug(
-        name="overflow-after-65-s",
-        edits=(
-            (
-                "dodge.c", "        struct dodge_command",
-                ("        static uint8_t sensors;\n        static uint32_t next_ms;\n        static uint16_t now_ms;\n"
-                "        now_ms = (uint16_t)(tick_now() * 10u);\n"
-                "        if (next_ms == 0 || now_ms >= next_ms) {\n            next_ms = now_ms + 20u;\n"
-                "            sensors = pins_distances();\n        }\n        struct dodge_command"),
-            ),
-            ("dodge.c", _READ, "dodge_tick(&dodge, sensors, "),
-        ),
-        answers=("no notice of any", "now_ms"), thing=_BOX, placed_s=70.0, duration_s=75.0,
-    ),
+    _overflow(after_s=15),
     Bug(
         name="con-not-raised-on-reconnect",
         edits=(
@@ -136,7 +147,7 @@ NAMED = (
                 "            reconnects = 1;\n            pins_connect(0);\n        }\n        pins_motors(command"),
             ),
         ),
-        answers=("p2dx_con",), duration_s=65.0,
+        answers=("p2dx_con",), x_m=_NEAR, duration_s=20.0,
     ),
     Bug(
         name="watchdog-not-fed-in-a-branch",
@@ -148,7 +159,7 @@ NAMED = (
                 "            IWDG[0] = 0xAAAA;\n        }\n        pins_motors(command"),
             ),
         ),
-        answers=("watchdog",), duration_s=32.0,
+        answers=("watchdog",), x_m=_NEAR, duration_s=12.0,
     ),
 )  # fmt: skip
 
@@ -157,28 +168,28 @@ OTHERS = (
     Bug(
         name="motor-sign-wrong",
         edits=(("motors_bits.c", "write_code(right_wires, right)", "write_code(right_wires, -right)"),),
-        answers=("opposite ways",), duration_s=20.0,
+        answers=("opposite ways",), duration_s=12.0,
     ),
     Bug(
         name="pin-masked",
         edits=(("dodge.c", _READ, "dodge_tick(&dodge, pins_distances() & 0xE7, "),),
-        answers=("ignores DD4",), thing=_AHEAD, duration_s=14.0,
+        answers=("ignores DD4",), thing=_AHEAD, duration_s=10.0,
     ),
     Bug(
         name="last-sensors-not-looped-over",
         edits=(("pins.c", "uint8_t pins_distances(void) { return read_value(distance_wires, COUNT(distance_wires)); }",
                 "uint8_t pins_distances(void) { return read_value(distance_wires, COUNT(distance_wires) - 4); }"),),
-        answers=("DD5", "DD6", "DD7", "DD8"), duration_s=38.0,
+        answers=("DD5", "DD6", "DD7", "DD8"), thing=_POST_ON_THE_RIGHT, duration_s=10.0,
     ),
     Bug(
         name="timer-ten-times-slow",
         edits=(("tick.c", "HCLK_HZ / TICKS_PER_S - 1u", "HCLK_HZ / TICKS_PER_S * 20u - 1u"),),
-        answers=("not begun to drive", "late"), duration_s=25.0,
+        answers=("not begun to drive", "late"), duration_s=12.0,
     ),
     Bug(
         name="dead-branch",
         edits=(("dodge_fsm.c", "if (!(dodge->seen & FRONT) && ", "if (!(dodge->seen & FRONT & 0) && "),),
-        answers=("drives straight on",), duration_s=33.0,
+        answers=("drives straight on",), x_m=_NEAR, duration_s=11.0,
     ),
     Bug(
         name="null-pointer-in-a-branch",
@@ -186,10 +197,10 @@ OTHERS = (
             (
                 "dodge_fsm.c", "    dodge->turns++;",
                 ("    static const struct dodge *other = (const struct dodge *)0x30000000;\n"
-                "    dodge->turns += dodge->turns > 1 ? other->turns : 1;"),
+                "    dodge->turns += dodge->turns > 0 ? other->turns : 1;"),
             ),
         ),
-        answers=("died",), duration_s=50.0,
+        answers=("died",), x_m=_NEAR, duration_s=14.0,
     ),
     Bug(
         name="waits-for-ever",
@@ -199,24 +210,24 @@ OTHERS = (
                 "            while (dodge.turns == 2) {\n            }\n            print_transition(before, &dodge);",
             ),
         ),
-        answers=("stuck at dodge.c",), duration_s=65.0,
+        answers=("stuck at dodge.c",), x_m=_NEAR, duration_s=20.0,
     ),
     Bug(
         name="sides-exchanged",
         edits=(("motors_bits.c",
                 "    write_code(left_wires, left);\n    write_code(right_wires, right);",
                 "    write_code(left_wires, right);\n    write_code(right_wires, left);"),),
-        answers=("left and right exchanged",), thing=_POST, duration_s=30.0,
+        answers=("left and right exchanged",), thing=_POST_ON_THE_LEFT, duration_s=14.0,
     ),
     Bug(
         name="sensor-inverted",
         edits=(("dodge.c", _READ, "dodge_tick(&dodge, pins_distances() ^ 0x08, "),),
-        answers=("DD4 inverted",), duration_s=14.0,
+        answers=("DD4 inverted",), duration_s=10.0,
     ),
     Bug(
         name="motor-never-reverses",
         edits=(("motors_bits.c", "write_code(right_wires, right)", "write_code(right_wires, right & 3)"),),
-        answers=("never asks the right motor to go backwards",), duration_s=32.0,
+        answers=("never asks the right motor to go backwards",), x_m=_NEAR, duration_s=11.0,
     ),
     Bug(
         name="adapter-held-in-reset",
@@ -232,7 +243,7 @@ OTHERS = (
                 "        if (dodge.turns == 2) {\n            pins_reset(1);\n        }\n        pins_motors(command",
             ),
         ),
-        answers=("rst high holds the adapter in reset",), duration_s=65.0,
+        answers=("rst high holds the adapter in reset",), x_m=_NEAR, duration_s=20.0,
     ),
     Bug(
         name="inputs-read-each-1.5-s",
@@ -244,14 +255,14 @@ OTHERS = (
             ),
             ("dodge.c", _READ, "dodge_tick(&dodge, sensors, "),
         ),
-        answers=("late",), thing=_BOX, duration_s=14.0,
+        answers=("late",), thing=_BOX, duration_s=10.0,
     ),
     Bug(
         name="motors-set-once",
         edits=(
             ("dodge.c", "        pins_motors(c", "        if (dodge.state_ticks == 1 && !dodge.turns) pins_motors(c"),
         ),
-        answers=("sets its motors no otherwise",), thing=_AHEAD, duration_s=14.0,
+        answers=("sets its motors no otherwise",), thing=_AHEAD, duration_s=10.0,
     ),
     Bug(
         name="speed-beyond-the-code",
@@ -261,21 +272,22 @@ OTHERS = (
     Bug(
         name="encoder-off-by-one",
         edits=(("odometer.c", "STEPS_PER_TURN / 2 + STEPS_PER_TURN)", "STEPS_PER_TURN / 2 + STEPS_PER_TURN - 1)"),),
-        answers=("encoder",), fails=False, is_found=False,
+        answers=("encoder",), x_m=_NEAR, duration_s=12.0, fails=False, is_found=False,
     ),
     Bug(
         name="no-debounce",
         edits=(("dodge_fsm.c", "#define RELEASE_TICKS 25", "#define RELEASE_TICKS 1"),),
-        answers=("chatter",), fails=False, is_found=False,
+        answers=("chatter",), x_m=_NEAR, duration_s=12.0, fails=False, is_found=False,
     ),
 )  # fmt: skip
 
 #: Looked at for longer than the rest.
 LONGER = (
+    _overflow(after_s=65),
     Bug(
         name="motors-lack-a-bit",
         edits=(("motors_bits.c", "i < 3; i++", "i < 2; i++"),),
-        answers=("comm3",), duration_s=32.0, is_found=False,
+        answers=("comm3",), x_m=_NEAR, duration_s=20.0, is_found=False,
     ),
     Bug(
         name="debounce-of-2-s",
@@ -296,6 +308,6 @@ LONGER = (
     Bug(
         name="never-clear-again",
         edits=(("dodge_fsm.c", "++dodge->unseen_ticks[i] >= RELEASE_TICKS", "++dodge->unseen_ticks[i] < 0"),),
-        answers=("never leaves what it does",), duration_s=60.0,
+        answers=("never leaves what it does",), x_m=_NEAR, duration_s=45.0,
     ),
 )  # fmt: skip

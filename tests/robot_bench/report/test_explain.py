@@ -37,10 +37,10 @@ DODGE = HERE / "dodge.elf"
 NETS = [f"DD{n}" for n in range(1, 9)]
 
 
-def run_with(firmware: Path, folder: Path, thing: str, duration_s: float, placed_s: float = 5.0) -> RunRecord:
-    """Run a firmware in the scenario of the seeded bugs and return its record."""
+def run_with(firmware: Path, folder: Path, text: str) -> RunRecord:
+    """Run a firmware in a scenario and return its record."""
     plan = folder / "plan.toml"
-    plan.write_text(scenario_text(thing, duration_s, placed_s))
+    plan.write_text(text)
     run_scenario(load_scenario(str(plan), firmware=firmware), folder / "run", files=Files.SUMMARY)
     return read_run(folder / "run")
 
@@ -49,7 +49,7 @@ def run_with(firmware: Path, folder: Path, thing: str, duration_s: float, placed
 def unfair(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run of the shipped `dodge` that no program could have passed, its folder."""
     folder = tmp_path_factory.mktemp("unfair")
-    run_with(DODGE, folder, UNFAIR, 8.0)
+    run_with(DODGE, folder, scenario_text(UNFAIR, 8.0))
     return folder / "run"
 
 
@@ -163,10 +163,7 @@ def test_the_replay_of_a_chip_is_the_run_and_a_held_pin_changes_it(unfair: Path)
 
 
 def test_the_replay_has_the_memory_and_the_crystal_of_the_run(tmp_path: Path) -> None:
-    plan = tmp_path / "plan.toml"
-    plan.write_text('sram = "random"\ncrystal_ppm = 900\n' + scenario_text(UNFAIR, 4.0, 1.0))
-    run_scenario(load_scenario(str(plan), firmware=DODGE), tmp_path / "run", files=Files.SUMMARY)
-    record = read_run(tmp_path / "run")
+    record = run_with(DODGE, tmp_path, 'sram = "random"\ncrystal_ppm = 900\n' + scenario_text(UNFAIR, 4.0, 1.0))
     replay = ChipReplay(DODGE, record)
     assert replay.exact_until == replay.end == record.last_ns
     record.meta["crystal_ppm"] = 0
@@ -326,7 +323,7 @@ needs_compiler = pytest.mark.skipif(compiler_version() is None, reason=f"{COMPIL
 )
 def test_a_seeded_bug_is_explained_or_said_to_be_unknown_and_never_wrong(bug: Bug, tmp_path: Path) -> None:
     firmware = build(bug, tmp_path)
-    record = run_with(firmware, tmp_path, bug.thing, bug.duration_s, bug.placed_s)
+    record = run_with(firmware, tmp_path, scenario_text(bug.thing, bug.duration_s, bug.placed_s, bug.x_m))
     found = explain(record, firmware)
     assert (not record.end["passed"]) is bug.fails
     is_right = any(answer in found.summary for answer in bug.answers)
