@@ -36,9 +36,7 @@ def scenario(mode: str, body: str = "kinematic", duration_s: float = 3.0) -> Sce
 
 def bench(of: Scenario, slice_ns: int = MS, *, block_ns: int = 700, drives_at: tuple[float, float] = (1, 2)) -> Bench:
     forward, turn = drives_at
-    chip = FakeChip(
-        drives((0, 0, 0), (forward, 3, 3), (turn, -4, 1)), [(S // 2, b"hello\nworld")], block_ns=block_ns
-    )
+    chip = FakeChip(drives((0, 0, 0), (forward, 3, 3), (turn, -4, 1)), [(S // 2, b"hello\nworld")], block_ns=block_ns)
     return Bench(of, chip=chip, slice_ns=slice_ns)
 
 
