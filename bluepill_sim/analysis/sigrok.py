@@ -25,6 +25,8 @@ MAX_SAMPLES = 16_000_000
 _ZIP_DATE = (1980, 1, 1, 0, 0, 0)
 #: Samples written at a time.
 _CHUNK = 1 << 20
+#: Of deflate. chosen: 3 MB a second of a run take 4 ms in place of 12 at the usual level, and 13 kB in place of 3.
+_LEVEL = 1
 
 
 def write_sigrok(probe: Probe, path: Path) -> None:
@@ -99,6 +101,7 @@ def runs(edges: Iterable[tuple[Nanos, int, int]], bits: int, end_ns: Nanos, rate
 def _entry(name: str) -> zipfile.ZipInfo:
     entry = zipfile.ZipInfo(name, _ZIP_DATE)
     entry.compress_type = zipfile.ZIP_DEFLATED
+    entry._compresslevel = _LEVEL  # type: ignore[attr-defined]  # noqa: SLF001 - public from Python 3.13 on
     return entry
 
 

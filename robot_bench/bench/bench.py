@@ -246,8 +246,9 @@ class Bench(Expectations, Interventions, Stateful):
             ScenarioError, ImageError, MissingDependencyError: As of the class.
         """
         world = load_world(scenario.world, seed=scenario.seed)
-        scene = make_scene(scenario.body, world, [robot.parameters for robot in scenario.robots])
-        scene.reset([robot.start for robot in scenario.robots], scenario.seed)
+        models = [robot.parameters for robot in scenario.robots]
+        starts = [robot.start for robot in scenario.robots]
+        scene = make_scene(scenario.body, world, models, starts, scenario.seed)
         for robot, body in zip(scenario.robots, scene.bodies, strict=True):
             body.is_powered = robot.scenario is not None
         shared = SharedWorld(scene, [robot.name for robot in scenario.robots])
@@ -579,9 +580,8 @@ class Bench(Expectations, Interventions, Stateful):
 
 def body_of(scenario: Scenario, world: World) -> RobotBody:
     """Return the body of a scenario's robot alone in a world, standing where it begins."""
-    body = make_body(scenario.body, world, scenario.parameters)
-    body.reset(scenario.start or world.start, scenario.seed)
-    return body
+    start = scenario.start or world.start
+    return make_body(scenario.body, world, scenario.parameters, start=start, seed=scenario.seed)
 
 
 def _refuse_several(scenario: Scenario) -> None:

@@ -13,7 +13,7 @@ from typing import cast
 
 from p2os.pioneer.body.contract import RobotBody, RobotScene
 from p2os.pioneer.body.outside.address import Address, is_address
-from p2os.pioneer.world.model import World
+from p2os.pioneer.world.model import Pose, World
 from p2os.robots.parameters import RobotParameters
 from simbase.errors import MissingDependencyError, UsageError
 from simbase.user_classes import find_class, make, refuse_lacking
@@ -30,30 +30,38 @@ NEEDS: Mapping[str, tuple[str, ...]] = {
 }  # fmt: skip
 
 
-def make_body(name: str, world: World, parameters: RobotParameters) -> RobotBody:
-    """Return a body that stands at the world's start, alone in a scene of its own.
+def make_body(
+    name: str, world: World, parameters: RobotParameters, *, start: Pose | None = None, seed: int = 0
+) -> RobotBody:  # fmt: skip
+    """Return a body alone in a scene of its own.
 
     Args:
         name: `kinematic` (exact, no dependency), `bullet` (PyBullet), `mujoco` (MuJoCo), `best`, or one of the
             user's.
         world: Where it is.
         parameters: What it is.
+        start: Where it stands; None is at the world's start.
+        seed: Of what is random in a body of the user's.
 
     Raises:
         UsageError: There is no body of that name, or it is none.
         MissingDependencyError: The engine or NumPy is not installed.
         WorldError: The world has something that this body cannot take.
     """
-    return make_scene(name, world, [parameters]).bodies[0]
+    return make_scene(name, world, [parameters], None if start is None else [start], seed).bodies[0]
 
 
-def make_scene(name: str, world: World, models: Sequence[RobotParameters]) -> RobotScene:
-    """Return a scene with a robot of each of these models; `reset` puts them where they begin.
+def make_scene(
+    name: str, world: World, models: Sequence[RobotParameters], starts: Sequence[Pose] | None = None, seed: int = 0
+) -> RobotScene:  # fmt: skip
+    """Return a scene with a robot of each of these models.
 
     Args:
         name: As for `make_body`.
         world: Where they are.
         models: One a robot, the first first.
+        starts: Where they stand; None: `reset` puts them where they begin, before they are asked for anything.
+        seed: Of what is random in a body of the user's.
 
     Raises:
         UsageError: There is no body of that name, or it is none.
@@ -64,17 +72,20 @@ def make_scene(name: str, world: World, models: Sequence[RobotParameters]) -> Ro
     if name == "kinematic":
         from p2os.pioneer.body.kinematic import KinematicScene
 
-        return KinematicScene(world, models)
+        return KinematicScene(world, models, starts)
     if name not in BODY_NAMES:
-        return _scene_of_users(name, world, models)
+        scene = _scene_of_users(name, world, models)
+        if starts is not None:
+            scene.reset(starts, seed)
+        return scene
     try:
         if name == "bullet":
             from p2os.pioneer.body.bullet import BulletScene
 
-            return BulletScene(world, models)
+            return BulletScene(world, models, starts)
         from p2os.pioneer.body.mujoco import MujocoScene
 
-        return MujocoScene(world, models)
+        return MujocoScene(world, models, starts)
     except ModuleNotFoundError as error:
         raise MissingDependencyError(f"the {name} body needs {error.name}", extra=name, hint="--body best") from error
 

@@ -62,12 +62,14 @@ class KinematicScene(Scene):
     name = "kinematic"
     bodies: "tuple[KinematicBody, ...]"
 
-    def __init__(self, world: World, models: Sequence[RobotParameters]) -> None:
+    def __init__(
+        self, world: World, models: Sequence[RobotParameters], starts: Sequence[Pose] | None = None
+    ) -> None:  # fmt: skip
         super().__init__(world, len(models))
         #: By so much two robots that are not near to each other can still close in.
         self._spare_m = 0.0
         self._take(KinematicBody(self, model, number) for number, model in enumerate(models))
-        self.reset([world.start] * len(models), 0)
+        self.reset(starts or [world.start] * len(models), 0)
 
     def _restored(self) -> None:
         self._spare_m = 0.0

@@ -167,8 +167,7 @@ def served_pioneer(
         P2osError: There is no such robot, world or body, or the place is taken.
     """
     parameters, place = load_parameters(robot), load_world(world, seed=seed)
-    physical = make_body(body, place, parameters)
-    physical.reset(place.start, seed)
+    physical = make_body(body, place, parameters, start=place.start, seed=seed)
     pioneer = Pioneer(parameters=parameters, body=physical, settings=settings, on_event=on_event)
     listener = listen_url(url)
     host = Host(pioneer, listener, on_event=on_event, clock=clock)

@@ -138,12 +138,10 @@ def make_fleet(order: FleetOrder) -> MadeFleet:
     starts = _starts(order, world, models)
     name = resolve_body(order.body)
     if order.apart:
-        scenes = [make_scene(name, world, [model]) for model in models]
-        for scene, start in zip(scenes, starts, strict=True):
-            scene.reset([start], order.seed)
+        each = zip(models, starts, strict=True)
+        scenes = [make_scene(name, world, [model], [start], order.seed) for model, start in each]
     else:
-        scenes = [make_scene(name, world, models)]
-        scenes[0].reset(starts, order.seed)
+        scenes = [make_scene(name, world, models, starts, order.seed)]
     bodies = [body for scene in scenes for body in scene.bodies]
     made: list[tuple[Pioneer, RobotBody]] = []
     for number, (robot, model, body) in enumerate(zip(order.robots, models, bodies, strict=True)):

@@ -58,8 +58,8 @@ class WorldLoader:
         """
         world = load_world(self._allowed(name), seed=self.seed)
         models = [robot.parameters for robot in self.robots]
-        scene = make_scene(self.body, world, models)
-        scene.reset(start_places(world, models, [None] * len(models)), self.seed)
+        starts = start_places(world, models, [None] * len(models))
+        scene = make_scene(self.body, world, models, starts, self.seed)
         raw_name = name.encode("utf-8", "surrogateescape")
         if self.multi_robot_world is not None:
             self.multi_robot_world.enter_world(scene, raw_name, now)

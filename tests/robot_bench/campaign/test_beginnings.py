@@ -63,12 +63,12 @@ def outcomes(trials: Sequence[Trial], kept: Beginnings, do: Counted, *, anew: bo
 @pytest.mark.slow
 @pytest.mark.parametrize("mode", ["direct", "adapter"])
 def test_what_goes_on_from_a_shared_beginning_comes_to_the_same_in_every_part(base: Trial, mode: str) -> None:
-    source, base = random.Random(mode), base.set(("mode", mode), ("duration_s", 7))
+    source, base = random.Random(mode), base.set(("mode", mode), ("duration_s", 5.6))
     trials = []
-    for number in range(6):
-        at_s = round(source.uniform(4.01, 6.9), 3)
+    for number in range(4):
+        at_s = round(source.uniform(4.01, 5.5), 3)
         if mode == "direct" or number % 2:
-            late = post(at_s, **{"hold_s": 0.7} if number > 2 else {})
+            late = post(at_s, **{"hold_s": 0.7} if number > 1 else {})
             trials.append(base.with_lists(obstacle=[late]))
         else:
             trials.append(base.with_lists(fault=[stuck(1.0), stuck(at_s, 5, 2.0)]))
@@ -81,7 +81,7 @@ def test_what_goes_on_from_a_shared_beginning_comes_to_the_same_in_every_part(ba
 
 @pytest.mark.slow
 def test_processes_share_what_trials_share_and_replays_share_nothing(base: Trial) -> None:
-    trials = [base.set(("duration_s", 7)).with_lists(fault=[stuck(at_s)]) for at_s in (5.9, 6.3, 6.7)]
+    trials = [base.set(("duration_s", 5)).with_lists(fault=[stuck(at_s)]) for at_s in (4.3, 4.5, 4.7)]
     found: list[dict[int, Done]] = [{}, {}]
     for anew, into in zip((False, True), found, strict=True):
         Processes(2, Limits()).run(trials, lambda place, done, into=into: into.update({place: done}), anew=anew)  # type: ignore[misc]

@@ -12,16 +12,19 @@ from robot_bench.campaign.trial import run_trial, trial_of
 from robot_bench.campaign.variants.shrinking.failure import Way
 from robot_bench.campaign.variants.shrinking.kept import test_text as text_of_test
 from robot_bench.campaign.variants.shrinking.kept import trial_of_run
+from robot_bench.report.make import Files
 from robot_bench.run import run_scenario
 from robot_bench.scenario.scenario import load_scenario
+from tests.robot_bench.firmware.hurried import hurried
 from tests.tools.forked_python import PYTEST, forked_p2os, forked_python
 
-#: A quarter of a metre before a wall, with sensors that see a hand's breadth: it touches it 5 s after its start.
+#: A quarter of a metre before a wall, with sensors that see a hand's breadth: it touches it 2 s after its start.
 BLIND = """
 extends = "dodge"
+firmware = "dodge.elf"
 mode = "direct"
 body = "kinematic"
-duration_s = 6.0
+duration_s = 3.0
 threshold_m = 0.05
 start = { x_m = 2.513, y_m = 0.117, heading_deg = 3.0 }
 [[obstacle]]
@@ -44,6 +47,7 @@ text = "never said"
 def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("blind.toml").write_text(BLIND, encoding="utf-8")
+    Path("dodge.elf").write_bytes(hurried("dodge").read_bytes())
     here = EntryPoint("shrink", "robot_bench.cli.campaigns.shrink", cli.GROUP)
     found = [entry for entry in cli.verbs() if entry.name != "shrink"]
     monkeypatch.setattr(cli, "verbs", lambda: [*found, here])
@@ -54,7 +58,8 @@ def test_a_run_folder_is_shrunk_to_a_folder_whose_scenario_and_test_fail_in_the_
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("robot_bench.campaign.variants.shrinking.kept._COMMAND", forked_p2os())
-    assert not run_scenario(load_scenario("blind.toml").with_options(seed=3), Path("there")).passed
+    scenario = load_scenario("blind.toml").with_options(seed=3)
+    assert not run_scenario(scenario, Path("there"), files=Files.SUMMARY).passed
     assert cli.run(["shrink", "there", "--out", "small", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert (found["things_before"], found["things_after"], found["is_confirmed"]) == (10, 1, True)

@@ -6,23 +6,23 @@ from p2os.errors import ScenarioError
 from robot_bench.campaign.last_moment import SAVED_EACH_NS, STEP_NS, last_moment
 from robot_bench.campaign.trial import Trial, run_trial, trial_of
 from simbase.timing import NS_PER_S
+from tests.robot_bench.firmware.hurried import hurried
 
-#: `motors` drives straight ahead from 1 s on, whatever stands there.
+#: `dodge` in a hurry, with sensors that see a hand's breadth, drives straight ahead at once, whatever stands there.
 WALL = {
     "at_s": 0.0, "name": "wall", "shape": "box", "x_m": 0.7, "y_m": 0.0, "length_m": 0.1, "width_m": 2.0,
     "height_m": 0.5,
 }  # fmt: skip
 GOALS = [
     {"kind": "no_collision", "ends_run": "missed"},
-    {"kind": "moves_on", "way_m": 0.05, "within_s": 8.0, "ends_run": "missed"},  # who stands misses it
+    {"kind": "moves_on", "way_m": 0.05, "within_s": 4.0, "ends_run": "missed"},  # who stands misses it
 ]
 
 
 @pytest.fixture(scope="module")
 def trial() -> Trial:
-    base = trial_of(
-        "motors", settings=[("body", "kinematic"), ("mode", "direct"), ("duration_s", 12), ("world", "arena")]
-    )
+    blind = [("body", "kinematic"), ("mode", "direct"), ("duration_s", 5), ("world", "arena"), ("threshold_m", 0.05)]
+    base = trial_of("dodge", settings=blind, firmware=hurried("dodge"))
     return base.with_lists(obstacle=[WALL], goal=GOALS)
 
 

@@ -14,6 +14,7 @@ from bluepill_sim.program.image import load_image
 from bluepill_sim.program.mutants import Mutant, mutants, mutated_file
 from p2os.cli import main as cli
 from robot_bench.bench import Bench
+from robot_bench.campaign.variants.mutation import base_run as runs
 from robot_bench.campaign.variants.mutation.base_run import BaseRun, base_run
 from robot_bench.campaign.variants.mutation.trial import Fate, Found, try_mutant
 from robot_bench.scenario.scenario import load_scenario
@@ -53,6 +54,7 @@ HERE = thumb.FLASH + 16 * 4 + 2
 @pytest.fixture(autouse=True)
 def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(runs, "STEPS", 8)  # the program is at its end in the first of as many
     firmware(PROGRAM)
     Path("mine.toml").write_text(SCENARIO, encoding="utf-8")
     here = EntryPoint("mutate", "robot_bench.cli.campaigns.mutate", cli.GROUP)
@@ -93,7 +95,10 @@ def test_the_goal_notices_what_keeps_the_wire_low_and_nothing_else() -> None:
     assert {words for words, fate in found.items() if fate is Fate.SAME} == {"movs r1, #8 -> movs r1, #9"}
 
 
-def test_a_mutant_that_branches_off_leaves_the_trace_of_its_file_run_from_the_reset() -> None:
+def test_a_mutant_that_branches_off_leaves_the_trace_of_its_file_run_from_the_reset(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(runs, "STEPS", 64)
     lowers = "movs r3, #9\nwait: subs r3, #1\ncmp r3, #0\nbne wait\nmov32 r1, #0x10000000\nstr r1, [r0, #0x10]\nsleep:"
     firmware(PROGRAM.replace("sleep:", lowers))
     Path("mine.toml").write_text(SCENARIO.replace("0.05", "0.002"), encoding="utf-8")

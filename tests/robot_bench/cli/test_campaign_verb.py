@@ -19,10 +19,10 @@ batch = 2
 runs = 2
 [cheap]
 mode = "direct"
-duration_s = 4
+duration_s = 1
 [full]
 body = "kinematic"
-duration_s = 4
+duration_s = 1
 [vary]
 start.heading_deg = { from = 0, to = 350, step = 10 }
 [[goal]]

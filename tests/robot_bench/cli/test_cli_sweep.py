@@ -19,6 +19,7 @@ from robot_bench.cli.sweep import Done, print_sweep
 from robot_bench.cli.workers import run_in_processes
 from robot_bench.scenario.scenario import load_scenario
 from tests.robot_bench.firmware import thumb
+from tests.robot_bench.firmware.hurried import hurried
 
 LEAST = 'firmware = "x.bin"\nworld = "room"\nduration_s = 0.2\nbody = "kinematic"\nmode = "direct"\n'
 #: Met from 0 s on where the robot begins right of the y axis.
@@ -69,7 +70,7 @@ def test_a_sweep_fails_with_1_and_says_which_row_and_how_to_see_it_again(capsys:
 
 
 def test_what_comes_of_a_sweep_does_not_depend_on_how_many_run_at_a_time(capsys: pytest.CaptureFixture[str]) -> None:
-    text = LEAST.replace("direct", "adapter").replace("x.bin", "dodge.elf").replace("0.2", "3")
+    text = LEAST.replace("direct", "adapter").replace("x.bin", str(hurried("dodge"))).replace("0.2", "1.2")
     name = make(f'{text}seeds = "3,0-1"\n[controller]\nerrors = "realistic"\n')
     found = []
     for jobs in ("1", "3"):

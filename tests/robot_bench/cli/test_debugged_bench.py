@@ -18,14 +18,16 @@ from robot_bench.bench import Bench
 from robot_bench.cli.debugging.debugged_bench import BenchMachine, RemoteMachine, board_of
 from robot_bench.cli.debugging.gdb import debug_bench, debug_port
 from robot_bench.run import run_at_port
-from robot_bench.scenario.scenario import Scenario, load_scenario
+from robot_bench.scenario.scenario import Scenario
 from simbase.timing import NS_PER_S
+from tests.robot_bench.firmware.hurried import hurried_scenario
 
 LIMIT_S = 60
 
 
-def scenario(mode: str = "adapter", duration_s: float = 8.0) -> Scenario:
-    return load_scenario("dodge").with_options(body="kinematic", mode=mode, duration_s=duration_s)
+def scenario(mode: str = "adapter", duration_s: float = 3.0) -> Scenario:
+    """Return that of a program that goes on after half a second; the robot moves from 0.7 s on."""
+    return hurried_scenario("dodge", 50, body="kinematic", mode=mode, duration_s=duration_s)
 
 
 def address(bench: Bench, name: str) -> int:
@@ -41,10 +43,10 @@ def place(bench: Bench) -> tuple[object, ...]:
 
 @pytest.mark.parametrize("mode", ["adapter", "direct"])
 def test_a_run_that_was_halted_leaves_the_same_trace(mode: str) -> None:
-    plain = Bench(scenario(mode, 4.0))
+    plain = Bench(scenario(mode, 1.5))
     plain.run_until(plain.end)
     plain.finish()
-    bench = Bench(scenario(mode, 4.0))
+    bench = Bench(scenario(mode, 1.5))
     execution = Execution(BenchMachine(bench), lambda _: None)
     breakpoints = board_of(bench).chip.engine.breakpoints
     breakpoints.add(address(bench, "pins_motors"))
@@ -62,7 +64,7 @@ def test_a_run_that_was_halted_leaves_the_same_trace(mode: str) -> None:
 def test_the_robot_goes_back_with_the_chip_while_it_moves() -> None:
     bench = Bench(scenario())
     execution = Execution(BenchMachine(bench), lambda _: None)
-    bench.run_until(6 * NS_PER_S)
+    bench.run_until(2 * NS_PER_S)
     assert abs(bench.parts.body.state.left_speed_mps) > 0.01
     execution.changed()
     board_of(bench).chip.engine.breakpoints.add(address(bench, "pins_motors"))
@@ -85,10 +87,10 @@ def test_the_robot_goes_back_with_the_chip_while_it_moves() -> None:
 def test_going_back_takes_the_trace_back_too(tmp_path: Path) -> None:
     from robot_bench.recording.trace import TraceWriter
 
-    whole = Bench(scenario(duration_s=4), trace=TraceWriter(tmp_path / "whole"))
+    whole = Bench(scenario(duration_s=1.5), trace=TraceWriter(tmp_path / "whole"))
     whole.run_until(whole.end)
     whole.finish()
-    bench = Bench(scenario(duration_s=4), trace=TraceWriter(tmp_path / "rewound"))
+    bench = Bench(scenario(duration_s=1.5), trace=TraceWriter(tmp_path / "rewound"))
     execution = Execution(BenchMachine(bench), lambda _: None)
     breakpoints = board_of(bench).chip.engine.breakpoints
     breakpoints.add(address(bench, "pins_motors"))
@@ -199,7 +201,7 @@ def test_a_real_robot_is_stopped_by_the_first_halt(gdb: list[bytes], tmp_path: P
     where = address(Bench(scenario()), "pins_motors")
     gdb += [b"Z0,%x,2" % where, b"c", b"bc", b"c", b"D"]
     line = Line()
-    wanted = replace(scenario("adapter", 5.0), changes=())
+    wanted = replace(scenario("adapter", 2.0), changes=())
     run_at_port(wanted, tmp_path / "run", line, drive=debug_port(0, on_wait=lambda: None))  # type: ignore[arg-type]
     # The run is over with the halt: nothing goes back, and going on ends it.
     assert Gdb.answers == [b"OK", b"T05thread:1;", b"E01", b"W00", b"OK"]

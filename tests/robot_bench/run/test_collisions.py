@@ -13,13 +13,14 @@ from p2os.cli.main import run as p2os
 from robot_bench.recording.run_record import read_run
 from robot_bench.report.page import page_data
 from tests.p2os.pioneer.body.bodies import each_body
+from tests.robot_bench.firmware.hurried import hurried
 
-#: A program that drives straight on, and a crate in its way.
+#: A program whose sensors see a hand's breadth, so that it drives straight on, and a crate in its way.
 SCENARIO = """
-firmware = "motors.elf"
+firmware = "{firmware}"
 world = "room"
-duration_s = {duration_s}
-threshold_m = 0.6
+duration_s = 3.4
+threshold_m = 0.05
 start = {{ x_m = -1.5, y_m = 0.0, heading_deg = 0.0 }}
 [[obstacle]]
 at_s = 0.5
@@ -43,7 +44,7 @@ def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
 def crashed(folder: Path, body: str, mode: str) -> str:
     """Return what a run into a folder prints; it fails, for it hits the crate."""
     scenario, out = folder.with_name("crash.toml"), io.StringIO()
-    scenario.write_text(SCENARIO.format(duration_s=8.9), encoding="utf-8")
+    scenario.write_text(SCENARIO.format(firmware=hurried("dodge")), encoding="utf-8")
     with contextlib.redirect_stdout(out):
         assert p2os(["run", str(scenario), "--body", body, "--mode", mode, "--out", str(folder)]) == 1
     return out.getvalue()
@@ -86,7 +87,7 @@ def test_what_was_hit_is_named_everywhere(body: str, mode: str, crash: Callable[
 
 
 def test_what_no_goal_forbids_is_named_all_the_same(capsys: pytest.CaptureFixture[str]) -> None:
-    without_goal = SCENARIO.format(duration_s=8.9).partition("[[goal]]")[0]
+    without_goal = SCENARIO.format(firmware=hurried("dodge")).partition("[[goal]]")[0]
     Path("crash.toml").write_text(without_goal, encoding="utf-8")
     assert p2os(["run", "crash.toml", "--body", "kinematic", "--mode", "direct", "--out", "crash"]) == 0
     (hit, *_) = read_run(Path("crash")).contacts

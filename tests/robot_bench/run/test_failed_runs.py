@@ -3,7 +3,6 @@
 import json
 import resource
 import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -19,6 +18,7 @@ from robot_bench.recording.summary import outcome_of, verdict
 from robot_bench.report.make import make_artefacts
 from robot_bench.scenario.scenario import Scenario, load_scenario
 from simbase.errors import MissingDependencyError, P2osError
+from tests.tools.forked_python import forked_python
 
 
 def wanted(duration_s: float = 0.5) -> Scenario:
@@ -111,7 +111,7 @@ import resource, sys
 sys.dont_write_bytecode = True  # Python would leave cut files in the cache
 resource.setrlimit(resource.RLIMIT_FSIZE, (30_000, 30_000))
 from p2os.cli.main import main
-main(["run", "dodge", "--mode", "adapter", "--body", "kinematic", "--duration", "20s", "--out", sys.argv[1]])
+main(["run", "dodge", "--mode", "adapter", "--body", "kinematic", "--duration", "9s", "--out", sys.argv[1]])
 """
 
 
@@ -119,7 +119,7 @@ main(["run", "dodge", "--mode", "adapter", "--body", "kinematic", "--duration", 
 def test_a_disk_that_is_full_in_the_midst_is_one_line_and_the_rest_can_be_reported_on(tmp_path: Path) -> None:
     folder = tmp_path / "run"
     done = subprocess.run(
-        [sys.executable, "-c", LIMITED, str(folder)], capture_output=True, text=True, timeout=60, check=False
+        [forked_python(), "-c", LIMITED, str(folder)], capture_output=True, text=True, timeout=60, check=False
     )
     assert done.returncode == 1, done.stderr
     lines = done.stderr.splitlines()

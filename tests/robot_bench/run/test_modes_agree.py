@@ -22,6 +22,7 @@ from pathlib import Path
 import pytest
 
 from adapter_sim.pinout import Direction, load_pinout
+from p2os.pioneer.world.model import Pose
 from p2os.robots.parameters import RobotParameters
 from robot_bench.bench import Bench
 from robot_bench.recording.run_record import RunRecord, read_run
@@ -29,12 +30,15 @@ from robot_bench.recording.signals import motor_steps
 from robot_bench.recording.trace import TraceWriter
 from robot_bench.scenario.goals.signals import SKEW_NS
 from robot_bench.scenario.scenario import Scenario, load_scenario
+from tests.robot_bench.firmware.hurried import hurried_scenario
 from tests.robot_bench.wires.fake_chip import FakeChip, PinDrive
 
 S, MS = 10**9, 10**6
 STEP_MM_S = 62.5
 RAMP_MM_S2 = 300.0
 WAIT_S = 3 * 0.002 + 0.025 + 0.01875 + 0.001
+#: A second: the adapter's link stands when a program goes on.
+LINKED_TICKS = 100
 #: PyBullet's wheels follow their set-point with a torque limit and a sphere's slip: measured below 6 mm/s in a ramp.
 BULLET_MM_S = 10.0
 BODIES = [("kinematic", 0.0), pytest.param(("bullet", BULLET_MM_S), marks=pytest.mark.bullet)]
@@ -123,20 +127,23 @@ def compare(direct: RunRecord, adapter: RunRecord, parameters: RobotParameters, 
 @pytest.mark.parametrize("body", BODIES)
 def test_motors_sets_the_same_pins_and_the_wheels_agree(body: tuple[str, float], tmp_path: Path) -> None:
     name, extra = body
-    scenario = load_scenario("motors").with_options(body=name)
+    scenario = hurried_scenario("motors", LINKED_TICKS, body=name, duration_s=9.5)
     direct = recorded(replace(scenario, mode="direct"), tmp_path / "a")
     adapter = recorded(replace(scenario, mode="adapter"), tmp_path / "b")
     assert chip_edges(direct) == chip_edges(adapter)
-    assert max(len(edges) for edges in chip_edges(direct).values()) >= 3
+    assert [values for _, values in motor_pairs(direct)] == [(0, 0), (3, 3), (-4, -4), (0, 0)]
+    assert direct.poses[-1].left == adapter.poses[-1].left == 0, "it stands again"
     largest = compare(direct, adapter, scenario.parameters, extra)
     # Only the forward speed changes here: 50.75 ms at 300 mm/s², and the rounding.
     assert largest <= WAIT_S * RAMP_MM_S2 + 2.4 + extra
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("program", "duration_s"), [("sensors", 20.0), ("encoders", 20.0), ("dodge", 40.0)])
+@pytest.mark.parametrize(("program", "duration_s"), [("sensors", 11.5), ("encoders", 12.0), ("dodge", 28.0)])
 def test_pins_of_mode_a_replayed_into_the_adapter_drive_alike(program: str, duration_s: float, tmp_path: Path) -> None:
-    scenario = load_scenario(program).with_options(body="kinematic", duration_s=duration_s)
+    scenario = hurried_scenario(program, LINKED_TICKS, body="kinematic", duration_s=duration_s)
+    if program == "dodge":  # nearer to what it turns away from
+        scenario = replace(scenario, start=Pose(1.5, 0.0, 0.0))
     direct = recorded(replace(scenario, mode="direct"), tmp_path / "a")
     pin_of = {wire.name: wire.bluepill for wire in load_pinout().wires}
     script = [
@@ -148,6 +155,7 @@ def test_pins_of_mode_a_replayed_into_the_adapter_drive_alike(program: str, dura
         replace(scenario, mode="adapter"), tmp_path / "b", FakeChip(sorted(script, key=lambda edge: edge[0]))
     )
     assert chip_edges(adapter) == chip_edges(direct)
+    assert len(motor_pairs(direct)) >= {"sensors": 5, "encoders": 5, "dodge": 16}[program]
     assert compare(direct, adapter, scenario.parameters, 0.0) > 0
 
 

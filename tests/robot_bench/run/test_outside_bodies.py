@@ -17,6 +17,7 @@ from p2os.pioneer.world.model import Obstacle
 from robot_bench import Bench
 from simbase.errors import UsageError
 from tests.p2os.pioneer.body.outside.served import Served, served, serving
+from tests.robot_bench.firmware.hurried import hurried, hurried_scenario
 from tests.tools.made_once import made_once
 
 SOURCE = Path(__file__).parents[3] / "examples" / "outside_body"
@@ -45,11 +46,11 @@ def plan_view(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made_once(tmp_path_factory, "plan-view", build)
 
 
-def bench_with(body: str, mode: str = "adapter", seconds: float = 6) -> Bench:
-    return Bench.from_scenario("dodge", body=body, mode=mode, duration_s=seconds)
+def bench_with(body: str, mode: str = "adapter", seconds: float = 3.4) -> Bench:
+    return Bench.from_scenario(hurried_scenario("dodge", body=body, mode=mode, duration_s=seconds))
 
 
-def hash_of(bench: Bench, until: str = "6 s") -> str:
+def hash_of(bench: Bench, until: str = "3.4 s") -> str:
     bench.run_until(until)
     return bench.trace.sha256
 
@@ -60,10 +61,10 @@ def hash_of(bench: Bench, until: str = "6 s") -> str:
 def test_a_body_in_c_gives_the_same_trace_twice_and_from_a_fork(plan_view: Path, mode: str) -> None:
     with started(plan_view, "tcp:127.0.0.1:0") as address:
         first = bench_with(address, mode)
-        first.run_until("3 s")
+        first.run_until("1 s")
         fork = first.fork()
         hashes = {hash_of(bench) for bench in (first, fork, bench_with(address, mode))}
-        first.rewind("4 s")
+        first.rewind("2 s")
         hashes.add(hash_of(first))
         assert len(hashes) == 1
         assert first.pose.x_m > 0.3
@@ -73,8 +74,8 @@ def test_a_body_in_c_gives_the_same_trace_twice_and_from_a_fork(plan_view: Path,
 @pytest.mark.slow
 def test_a_body_in_c_has_walls_of_its_own(plan_view: Path) -> None:
     with started(plan_view, "tcp:127.0.0.1:0", "--wall", "0.4,-1,0.4,1") as address:
-        bench = Bench.from_scenario("motors", body=address, duration_s=8)
-        bench.run_until("8 s")
+        bench = Bench.from_scenario("motors", body=address, firmware=hurried("motors"), duration_s=3.2)
+        bench.run_until("3.2 s")
         assert bench.parts.body.state.collisions >= 1
         assert bench.pose.x_m < 0.4
         assert "own wall" in bench.trace.text
@@ -84,7 +85,7 @@ def same_trace_twice(name: str, *command: str | Path, saves: bool) -> None:
     """Have a body on an engine drive two benches alike, one of them forked where it saves, and push a cart."""
     with started(*command, "tcp:127.0.0.1:0") as address:
         first, other = bench_with(address), bench_with(address)
-        first.run_until("3 s")
+        first.run_until("1 s")
         if saves:
             assert hash_of(first.fork()) == hash_of(other)
         else:

@@ -18,6 +18,7 @@ from robot_bench.recording.trace import TraceWriter
 from robot_bench.scenario.fault_script import FaultChange
 from robot_bench.scenario.scenario import Scenario, load_scenario
 from simbase.errors import FileError, UsageError
+from tests.robot_bench.firmware.hurried import hurried_scenario
 from tests.robot_bench.run.finished_bench import finished
 from tests.robot_bench.wires.fake_chip import FakeChip
 from tests.tools.forked_python import forked_python
@@ -26,13 +27,15 @@ S = 10**9
 #: So long before a line of the trace its bytes are under way: half a character of 115200 bit/s, one of 9600 bit/s.
 UNDER_WAY_NS = {"usart": 43_000, "wire": 1_000_000}
 WAYS = [("direct", "model"), ("adapter", "model"), *([("adapter", "firmware")] if is_available() else [])]
-#: Of each body, when it is cut: at its beginning, at rest, and while it drives; from 3 s on it does.
-CUTS = {"kinematic": (0, 1_300_000_007, 3_217_654_321, 3_600_000_001), "bullet": (3_217_654_321,)}
+#: Of each body, when it is cut: at its beginning, at rest, and while it drives; from 0.7 s on it does.
+CUTS = {"kinematic": (0, 300_000_007, 817_654_321, 1_200_000_001), "bullet": (817_654_321,)}
+#: Half a second: how long the program waits.
+TICKS = 50
 
 
-def scenario(way: tuple[str, str] = ("adapter", "model"), body: str = "kinematic", duration_s: float = 1.8) -> Scenario:
+def scenario(way: tuple[str, str] = ("adapter", "model"), body: str = "kinematic", duration_s: float = 1.3) -> Scenario:
     mode, core = way
-    return load_scenario("dodge").with_options(mode=mode, adapter_core=core, body=body, duration_s=duration_s)
+    return hurried_scenario("dodge", TICKS, mode=mode, adapter_core=core, body=body, duration_s=duration_s)
 
 
 def loaded(data: bytes) -> Any:
@@ -69,7 +72,7 @@ def cut_runs(of: Scenario, *cuts_ns: int) -> list[tuple[Bench, tuple[str, str]]]
 @pytest.mark.slow
 def test_a_bench_goes_on_in_another_process(tmp_path: Path) -> None:
     bodies = CUTS.keys() & installed_bodies()
-    cut = [each for body in bodies for way in WAYS for each in cut_runs(scenario(way, body, 3.8), *CUTS[body])]
+    cut = [each for body in bodies for way in WAYS for each in cut_runs(scenario(way, body), *CUTS[body])]
     found = in_another_process(pickle.dumps([bench for bench, _ in cut]), tmp_path, "7")
     assert found == [whole for _, whole in cut]
 
@@ -77,7 +80,8 @@ def test_a_bench_goes_on_in_another_process(tmp_path: Path) -> None:
 def test_a_bench_is_pickled_from_within_a_slice() -> None:
     taken: list[bytes] = []
     bench = Bench(scenario(), slice_ns=70_000)
-    bench.on_slice = lambda now: taken.append(pickle.dumps(bench)) if now // S > len(taken) - 1 else None
+    # In the midst of nothing, and while it drives.
+    bench.on_slice = lambda now: taken.append(pickle.dumps(bench)) if now // (S * 3 // 4) > len(taken) - 1 else None
     whole = finished(bench)
     assert len(taken) == 2
     assert [finished(loaded(data)) for data in taken] == [whole] * 2
@@ -88,7 +92,7 @@ def test_two_that_go_on_from_one_pickle_are_equal_and_share_nothing() -> None:
     bench.run_until(S)
     data = pickle.dumps(bench)
     one, other = loaded(data), loaded(data)
-    one.run_until(S + S // 2)
+    one.run_until(S + S // 4)
     assert other.now == bench.now < one.now
     assert finished(other) == finished(one) == finished(bench)
 

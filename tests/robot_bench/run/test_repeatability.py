@@ -11,7 +11,8 @@ import pytest
 
 from p2os.pioneer.body.factory import installed_bodies
 from robot_bench.bench import Bench
-from robot_bench.scenario.scenario import Scenario, load_scenario
+from robot_bench.scenario.scenario import Scenario
+from tests.robot_bench.firmware.hurried import hurried, hurried_scenario
 from tests.tools.forked_python import forked_python
 
 S, MS, US = 10**9, 10**6, 10**3
@@ -21,7 +22,7 @@ SLICES_NS = (1 * MS, 100 * US, 7 * US)
 
 
 def scenario(mode: str, body: str, duration_s: float) -> Scenario:
-    return load_scenario("dodge").with_options(mode=mode, body=body, duration_s=duration_s)
+    return hurried_scenario("dodge", mode=mode, body=body, duration_s=duration_s)
 
 
 def rest_of(of: Scenario, snapshot: bytes | None, slice_ns: int) -> str:
@@ -44,9 +45,9 @@ def test_the_slice_limit_changes_nothing_from_power_on(mode: str) -> None:
 @pytest.mark.parametrize("body", BODIES)
 @pytest.mark.parametrize("mode", MODES)
 def test_neither_the_slice_limit_nor_a_restart_half_way_changes_anything_while_driving(mode: str, body: str) -> None:
-    of = scenario(mode, body, 4.2)
+    of = scenario(mode, body, 1.2)
     first = Bench(of)
-    first.run_until(4 * S)
+    first.run_until(S)
     snapshot = pickle.dumps(first.snapshot())
     first.run_until(of.duration_ns)
     first.finish()
@@ -68,14 +69,15 @@ for mode in modes.split():
 
 @pytest.mark.slow
 def test_process_hash_seed_and_folder_change_nothing(tmp_path: Path) -> None:
-    hashes = []
+    hashes, program = [], hurried("dodge")
     bodies = [body for body in ("kinematic", "bullet") if body in installed_bodies()]
     other = {"PYTHONHASHSEED": "1"} if os.environ.get("PYTHONHASHSEED") != "1" else {"PYTHONHASHSEED": "2"}
     for name, python, environment in (("here", forked_python(), {}), ("there", sys.executable, other)):
         folder = tmp_path / name
         folder.mkdir()
         done = subprocess.run(
-            [python, "-c", RUNS, " ".join(MODES), " ".join(bodies), "--duration", "3.5s"], cwd=folder,
+            [python, "-c", RUNS, " ".join(MODES), " ".join(bodies), "--firmware", program, "--duration", "1.2s"],
+            cwd=folder,
             env={**os.environ, **environment}, capture_output=True, text=True, check=False, timeout=300,
         )  # fmt: skip
         assert done.returncode == 0, done.stderr

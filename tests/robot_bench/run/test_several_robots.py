@@ -16,7 +16,10 @@ from robot_bench.recording.together import named_events, robots_in
 from robot_bench.scenario.scenario import read_scenario
 from simbase.errors import UsageError
 from tests.robot_bench.firmware import thumb
+from tests.robot_bench.firmware.hurried import hurried
 
+#: Drives straight on at once.
+BLIND = f'firmware = "{hurried("dodge")}"\nthreshold_m = 0.05\nmode = "direct"'
 SHARED = 'world = "{world}"\nbody = "{body}"\nduration_s = {duration}\n'
 
 
@@ -93,19 +96,19 @@ def test_a_snapshot_of_other_robots_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("mode", ["adapter", "direct"])
 def test_a_robot_that_none_of_the_others_is_near_does_and_hears_the_same_as_alone(mode: str, tmp_path: Path) -> None:
-    rest = f'firmware = "dodge.elf"\nmode = "{mode}"\nthreshold_m = 0.3'
+    rest = f'firmware = "{hurried("dodge")}"\nmode = "{mode}"\nthreshold_m = 0.3'
     both = Bench.from_scenario(
-        scenario(tmp_path, robot("a", -0.5, -1, 0, rest), robot("b", -1.8, 0.6, 90, rest), duration=5)
+        scenario(tmp_path, robot("a", -0.5, -1, 0, rest), robot("b", -1.8, 0.6, 90, rest), duration=2.5)
     )
     path = tmp_path / "alone.toml"
-    shared = SHARED.format(world="room", body="kinematic", duration=5)
+    shared = SHARED.format(world="room", body="kinematic", duration=2.5)
     path.write_text(f"{shared}{rest}\n[start]\nx_m = -0.5\ny_m = -1\n", encoding="utf-8")
     alone = Bench.from_scenario(read_scenario(path))
     seen: dict[str, list[object]] = {"both": [], "alone": []}
     both.robots["a"].events.subscribe(seen["both"].append, Pose, Text, Ranges)
     alone.events.subscribe(seen["alone"].append, Pose, Text, Ranges)
     for bench in (both, alone):
-        bench.run_until("5 s")
+        bench.run_until("2.5 s")
         bench.finish()
     assert seen["both"] == seen["alone"]
     assert both.robots["a"].pose.x_m > -0.4, "it has moved"
@@ -114,12 +117,12 @@ def test_a_robot_that_none_of_the_others_is_near_does_and_hears_the_same_as_alon
 
 def test_a_robot_without_a_program_stands_in_the_way_and_is_named(tmp_path: Path) -> None:
     bench = Bench.from_scenario(scenario(
-        tmp_path, robot("driver", -1, 0, 0, 'firmware = "motors.elf"\nmode = "direct"'),
-        robot("still", -0.4, 0, 90, ""), more='[[goal]]\nkind = "no_collision"\n', duration=12,
+        tmp_path, robot("driver", -1, 0, 0, BLIND), robot("still", -0.4, 0, 90, ""),
+        more='[[goal]]\nkind = "no_collision"\n', duration=3,
     ))  # fmt: skip
     assert list(bench.robots) == ["driver"]
-    found = bench.expect("contact still", within="12 s")
-    assert found.t > 3_000_000_000
+    found = bench.expect("contact still", within="3 s")
+    assert found.t > 500_000_000
     missed = bench.judge().missed
     assert len(missed) == 1
     assert missed[0].startswith("driver: no_collision: 1 collision(s): 'still' at ")
@@ -129,12 +132,11 @@ def test_a_robot_without_a_program_stands_in_the_way_and_is_named(tmp_path: Path
 def test_robots_push_each_other_in_the_engine_itself(body: str, tmp_path: Path) -> None:
     pytest.importorskip("pybullet" if body == "bullet" else "mujoco")
     bench = Bench.from_scenario(scenario(
-        tmp_path, robot("driver", -1, 0, 0, 'firmware = "motors.elf"\nmode = "direct"'),
-        robot("still", -0.45, 0, 0, ""), duration=9, body=body,
+        tmp_path, robot("driver", -1, 0, 0, BLIND), robot("still", -0.45, 0, 0, ""), duration=3, body=body
     ))  # fmt: skip
     moved: list[WorldChange] = []
     bench.events.subscribe(moved.append, WorldChange)
-    bench.run_until("9 s")
+    bench.run_until("3 s")
     assert bench.record().contacts
     assert moved[-1].name == "still"
     assert float(str(moved[-1].fields["x"])) > float(str(moved[0].fields["x"])) + 0.002

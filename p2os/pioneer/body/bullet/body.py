@@ -67,13 +67,15 @@ class BulletScene(EngineScene):
     name = "bullet"
     bodies: "tuple[BulletBody, ...]"
 
-    def __init__(self, world: World, models: Sequence[RobotParameters]) -> None:
+    def __init__(
+        self, world: World, models: Sequence[RobotParameters], starts: Sequence[Pose] | None = None
+    ) -> None:  # fmt: skip
         super().__init__(world, len(models))
         self._bands = [Bands(model) for model in models]
         #: The engine takes its client as a keyword of every call.
         self.client = clients.take()
         self._take(BulletBody(self, model, number) for number, model in enumerate(models))
-        self.reset([world.start] * len(models), 0)
+        self.reset(starts or [world.start] * len(models), 0)
 
     def __del__(self) -> None:
         client = getattr(self, "client", -1)

@@ -50,12 +50,14 @@ class MujocoScene(EngineScene):
     name = "mujoco"
     bodies: "tuple[MujocoBody, ...]"
 
-    def __init__(self, world: World, models: Sequence[RobotParameters]) -> None:
+    def __init__(
+        self, world: World, models: Sequence[RobotParameters], starts: Sequence[Pose] | None = None
+    ) -> None:  # fmt: skip
         super().__init__(world, len(models))
         self._models = tuple(models)
         self.is_uneven = any(item.kind.is_driven_on for item in world.obstacles if item.fixed)
         self._take(MujocoBody(self, model, number) for number, model in enumerate(models))
-        self.reset([world.start] * len(models), 0)
+        self.reset(starts or [world.start] * len(models), 0)
 
     def reset(self, poses: Sequence[Pose], seed: int) -> None:
         """Let every robot stand still at its pose in the world as it was made; nothing here is random."""

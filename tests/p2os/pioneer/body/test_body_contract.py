@@ -21,12 +21,14 @@ TRACK_M = P2DX.track_mm / 1000
 
 @pytest.fixture(params=each_body())
 def make(request: pytest.FixtureRequest) -> Maker:
-    return lambda world=EMPTY: make_body(request.param, world, P2DX)
+    return lambda world=EMPTY, start=None: make_body(request.param, world, P2DX, start=start)
 
 
 def test_it_stands_where_it_was_put(make: Maker) -> None:
-    body = make()
+    body = make(start=Pose(1.0, -2.0, 0.5))
+    made = body.state
     state = body.reset(Pose(1.0, -2.0, 0.5), 3)
+    assert made == state
     assert (state.x_m, state.y_m, state.heading_rad) == pytest.approx((1.0, -2.0, 0.5), abs=1e-4)
     assert (state.left_angle_rad, state.collisions, state.in_contact) == (0, 0, False)
     still = drive(body, 0, 0, 1)
