@@ -1,6 +1,5 @@
 """`p2os info URL`: who the robot at a line is, how it is set, and what it senses now."""
 
-import contextlib
 import json
 import math
 from dataclasses import asdict, dataclass
@@ -8,33 +7,15 @@ from typing import Annotated
 
 import typer
 
-from p2os.cli.held_robot import hold_robot
+from p2os.cli.held_robot import ASKED, held
 from p2os.cli.help_pages import ROBOTS
 from p2os.cli.names import RobotUrl
-from p2os.cli.signals import postponed
-from p2os.errors import RemoteProtocolError, TransportError
-from p2os.protocol.commands import Command, CommandNumber
+from p2os.client import Robot
 from p2os.protocol.config_packet import FIELDS, ConfigPacket
-from p2os.protocol.connection import (
-    ConfigReceived,
-    ConnectFailed,
-    Connection,
-    ConnectionLost,
-    ConnectionRole,
-    ConnectionSettings,
-    SipReceived,
-    Synchronised,
-)
 from p2os.protocol.packets import Identity
 from p2os.protocol.sip import POSITION_MASK, StandardSip
-from p2os.protocol.times import WATCHDOG_NS
 from p2os.protocol.units import in_units
 from p2os.robots.parameters import ParametersError, RobotParameters, load_parameters
-from p2os.transport import Transport, open_url
-from p2os.transport.ports import HungUpError
-from p2os.transport.waiting import wait_for_line
-from p2os.transport.wall_clock import Clock, wall_clock
-from simbase.timing import NS_PER_S, Nanos
 
 HELP = """Print who a robot is, how it is set and what it senses.
 
@@ -44,17 +25,12 @@ motors stay off.
 \b
 Examples:
   p2os info tcp:127.0.0.1:8101               a robot served by `p2os serve`
-  p2os info serial:/dev/ttyUSB0              a real one at 9600 bit/s
-  p2os info serial:/dev/ttyUSB0?baud=38400   at another speed
+  p2os info serial:/dev/ttyUSB0              a real one, whatever its line's speed
   p2os info tcp:127.0.0.1:8101 --json        for programs
 
 Ends with exit code 1 when nobody answers.
 """
 
-#: chosen: a robot that knows CONFIG answers at once; older firmware never does.
-CONFIG_WAIT_NS: Nanos = 1 * NS_PER_S
-#: chosen: the session may take six SYNC0 of a second each, and a robot may need to be stopped first.
-LONGEST_NS: Nanos = 12 * NS_PER_S
 #: Positions have 15 bits.
 POSITION_SPAN = POSITION_MASK + 1
 #: Units of the fields of the CONFIGpac that have one (`ConfigPacket`).
@@ -79,63 +55,14 @@ class RobotInfo:
     config: ConfigPacket | None = None
 
 
-def ask(transport: Transport, *, clock: Clock = wall_clock) -> RobotInfo:
+def ask(url: str) -> RobotInfo:
     """Connect, listen until the robot has sent all, and leave it closed.
 
     Raises:
-        RemoteProtocolError: nobody answers, or not all of it.
-        TransportError: the line was lost.
+        P2osError: as `Robot.connect`.
     """
-    connection = Connection(ConnectionRole.CLIENT, settings=ConnectionSettings(liveness_ns=WATCHDOG_NS))
-    try:
-        return _collect(connection, transport, clock)
-    except HungUpError as error:
-        raise TransportError(str(error), hint="is another program connected to the robot?") from error
-    finally:
-        with postponed():
-            connection.disconnect(clock())
-            with contextlib.suppress(TransportError):  # the robot has gone: nothing to close
-                transport.write(b"".join(connection.take_output()))
-
-
-def _collect(connection: Connection, transport: Transport, clock: Clock) -> RobotInfo:
-    start = clock()
-    connection.connect(start)
-    identity: Identity | None = None
-    sip: StandardSip | None = None
-    config: ConfigPacket | None = None
-    asked_at: Nanos | None = None
-    while (now := clock()) < start + LONGEST_NS:
-        connection.receive(transport.read(), now)
-        while (event := connection.next_event()) is not None:
-            match event:
-                case Synchronised():
-                    identity = event.identity
-                case SipReceived():
-                    sip = sip if sip is not None and sip.sonar else event.sip
-                    if asked_at is None:
-                        connection.send(Command(CommandNumber.CONFIG), now)
-                        asked_at = now
-                case ConfigReceived():
-                    config = event.config
-                case ConnectFailed() | ConnectionLost():
-                    raise RemoteProtocolError(
-                        f"no robot on {transport.description}: {event.reason}", hint=_hint(transport)
-                    )
-                case _:
-                    pass
-        waited = asked_at is not None and now >= asked_at + CONFIG_WAIT_NS
-        if identity is not None and sip is not None and (config is not None or waited):
-            return RobotInfo(identity=identity, sip=sip, config=config)
-        transport.write(b"".join(connection.take_output()))
-        wait_for_line(transport, connection.next_deadline(), now)
-    raise RemoteProtocolError(f"the robot on {transport.description} answers, but sends no packets")
-
-
-def _hint(transport: Transport) -> str:
-    if transport.description.startswith("serial:"):
-        return "is the robot on? p2os scan tries every speed"
-    return "is there a robot behind it? (p2os serve)"
+    with held(Robot(url, settings=ASKED)) as robot:
+        return RobotInfo(identity=robot.identity, sip=robot.state.sip, config=robot.config)
 
 
 def register(app: typer.Typer) -> None:
@@ -148,9 +75,7 @@ def info(
     json_output: Annotated[bool, typer.Option("--json", help="Print a JSON object.")] = False,
 ) -> None:
     """Print what a robot reports of itself."""
-    hold_robot()
-    with contextlib.closing(open_url(url)) as transport:
-        found = ask(transport)
+    found = ask(url)
     parameters, is_known = _parameters(found.identity.subclass)
     if json_output:
         typer.echo(json.dumps(as_plain(found, parameters), indent=2))
