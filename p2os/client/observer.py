@@ -171,6 +171,7 @@ class PoseKeeper:
         self.odometry = RobotPose()
         #: Between the last two packets of this session.
         self.gap_ns: Nanos = 0
+        self._last_ns: Nanos = 0
         self._anchor: tuple[RobotPose, RobotPose] | None = None
         self._odometry: Odometry | None = None
 
@@ -187,24 +188,14 @@ class PoseKeeper:
     def take(self, sip: StandardSip, parameters: RobotParameters, now: Nanos) -> RobotPose:
         """Follow the robot to the place that a packet shows, and return it."""
         if self._odometry is None:
-            self._odometry = Odometry(parameters)
-            # Positions begin near zero; one of the upper half is a small step backwards.
-            turn = parameters.angle_counts_per_turn
-            self._first = (_signed(sip.raw_x, POSITION_MODULUS), _signed(sip.raw_y, POSITION_MODULUS),
-                           _signed(sip.raw_heading, turn))  # fmt: skip
-        self.gap_ns = self._odometry.update(sip, now).gap_ns
-        x, y, heading = (first + way for first, way in zip(self._first, self._odometry.counts, strict=True))
-        distance = parameters.distance_conv_mm / 1000
-        self.odometry = RobotPose(x * distance, y * distance, heading * parameters.angle_conv_rad)
+            self._odometry, self._last_ns = Odometry(parameters), now
+        self._odometry.update(sip)
+        self.gap_ns, self._last_ns = now - self._last_ns, now
+        self.odometry = RobotPose(self._odometry.x_m, self._odometry.y_m, self._odometry.heading_rad)
         if self._anchor is None:
             self._anchor = (self.pose, self.odometry)
         self.pose = _moved(*self._anchor, self.odometry)
         return self.pose
-
-
-def _signed(raw: int, modulus: int) -> int:
-    half = modulus // 2
-    return (raw + half) % modulus - half
 
 
 def _moved(start: RobotPose, then: RobotPose, now: RobotPose) -> RobotPose:

@@ -12,8 +12,9 @@ from p2os.cli.help_pages import ROBOTS
 from p2os.cli.names import RobotUrl
 from p2os.client import Robot
 from p2os.protocol.config_packet import FIELDS, ConfigPacket
+from p2os.protocol.odometry import Odometry
 from p2os.protocol.packets import Identity
-from p2os.protocol.sip import POSITION_MASK, StandardSip
+from p2os.protocol.sip import StandardSip
 from p2os.protocol.units import in_units
 from p2os.robots.parameters import ParametersError, RobotParameters, load_parameters
 
@@ -31,8 +32,6 @@ Examples:
 Ends with exit code 1 when nobody answers.
 """
 
-#: Positions have 15 bits.
-POSITION_SPAN = POSITION_MASK + 1
 #: Units of the fields of the CONFIGpac that have one (`ConfigPacket`).
 UNITS = {
     "rotveltop": "deg/s", "transveltop": "mm/s", "rotacctop": "deg/s2", "transacctop": "mm/s2", "sipcycle": "ms",
@@ -88,8 +87,8 @@ def as_plain(found: RobotInfo, parameters: RobotParameters) -> dict[str, object]
     """Return what a robot reports as plain values, speeds and lengths in SI units, for JSON."""
     identity, config = found.identity, found.config
     sensed = {name: _rounded(value) for name, value in asdict(in_units(found.sip, parameters)).items()}
-    sensed["x_m"] = _rounded(_signed(found.sip.raw_x, parameters))
-    sensed["y_m"] = _rounded(_signed(found.sip.raw_y, parameters))
+    place = _odometry(found.sip, parameters)
+    sensed["x_m"], sensed["y_m"] = _rounded(place.x_m), _rounded(place.y_m)
     sent = None if config is None else {name: getattr(config, name) for name, _ in FIELDS[: config.fields_sent]}
     return {
         "name": identity.name, "robot_class": identity.robot_class, "subclass": identity.subclass,
@@ -100,14 +99,14 @@ def as_plain(found: RobotInfo, parameters: RobotParameters) -> dict[str, object]
 def lines_of(found: RobotInfo, parameters: RobotParameters, *, is_known: bool) -> list[tuple[str, str]]:
     """Return what a robot reports as (name, text with units) for a person."""
     identity, sensed = found.identity, in_units(found.sip, parameters)
-    x_m, y_m = _signed(found.sip.raw_x, parameters), _signed(found.sip.raw_y, parameters)
+    place = _odometry(found.sip, parameters)
     stalls = [side for side, is_stalled in (("left", sensed.stall_left), ("right", sensed.stall_right)) if is_stalled]
     model = parameters.title if is_known else f"unknown model, units of a {parameters.title}"
     lines = [
         ("name", identity.name or "(none)"),
         ("class", identity.robot_class),
         ("model", f"{identity.subclass} ({model})"),
-        ("position", f"x {x_m:.3f} m, y {y_m:.3f} m, heading {math.degrees(sensed.heading_rad):.1f} deg"),
+        ("position", f"x {place.x_m:.3f} m, y {place.y_m:.3f} m, heading {math.degrees(sensed.heading_rad):.1f} deg"),
         ("wheels", f"left {sensed.left_mps:.3f} m/s, right {sensed.right_mps:.3f} m/s"),
         ("stalled", " and ".join(stalls) or "none"),
         ("battery", f"{sensed.battery_v:.1f} V"),
@@ -126,10 +125,11 @@ def _rounded(value: object) -> object:
     return round(value, 6) if isinstance(value, float) else value
 
 
-def _signed(raw: int, parameters: RobotParameters) -> float:
-    """Return a position of 15 bits as metres either side of the origin."""
-    counts = (raw + POSITION_SPAN // 2) % POSITION_SPAN - POSITION_SPAN // 2
-    return counts * parameters.distance_conv_mm / 1000
+def _odometry(sip: StandardSip, parameters: RobotParameters) -> Odometry:
+    """Return where a packet says that the robot is, on either side of the origin."""
+    odometry = Odometry(parameters)
+    odometry.update(sip)
+    return odometry
 
 
 def _parameters(subclass: str) -> tuple[RobotParameters, bool]:
