@@ -18,7 +18,7 @@ from p2os.protocol.config_packet import AROS_1_6_FIELDS, ConfigPacket
 from p2os.protocol.odometry import POSITION_MODULUS, Odometry
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import StandardSip
-from p2os.protocol.units import in_units
+from p2os.protocol.units import battery_v, range_m, rim_mps
 from p2os.robots.parameters import RobotParameters
 from simbase.timing import NS_PER_S, Nanos
 
@@ -84,9 +84,9 @@ class Observer:
         """Return the state that a packet makes."""
         self._number += 1
         parameters = self.parameters
-        units = in_units(sip, parameters)
-        for number, range_m in units.sonar_m:
-            self._take_echo(number, range_m, now)
+        for reading in sip.sonar:
+            self._take_echo(reading.number, range_m(reading.raw_range, parameters), now)
+        left_mps, right_mps = (rim_mps(raw, parameters) for raw in (sip.raw_left_velocity, sip.raw_right_velocity))
         has_flags = self.profile.has_flags
         charge, temperature = sip.tail_field("state_of_charge"), sip.tail_field("raw_temperature")
         self.state = RobotState(
@@ -94,15 +94,15 @@ class Observer:
             at_ns=now,
             pose=self._pose.take(sip, parameters, now),
             odometry=self._pose.odometry,
-            forward_mps=(units.left_mps + units.right_mps) / 2,
-            turn_radps=units.turn_radps,
-            left_mps=units.left_mps,
-            right_mps=units.right_mps,
-            is_moving=units.is_moving,
+            forward_mps=(left_mps + right_mps) / 2,
+            turn_radps=(right_mps - left_mps) / (parameters.track_mm / 1000),
+            left_mps=left_mps,
+            right_mps=right_mps,
+            is_moving=sip.moving,
             motors_enabled=bool(sip.raw_flags & MOTORS_FLAG) if has_flags else None,
-            battery_v=units.battery_v,
-            stall_left=units.stall_left,
-            stall_right=units.stall_right,
+            battery_v=battery_v(sip.raw_battery),
+            stall_left=sip.stall_left,
+            stall_right=sip.stall_right,
             front_bumpers=_pressed(sip.front_bumpers, self.bumpers.front),
             rear_bumpers=_pressed(sip.rear_bumpers, self.bumpers.rear),
             sonar=tuple(self._sonar[number] for number in sorted(self._sonar)),

@@ -2,7 +2,7 @@
 
 import json
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import typer
@@ -10,13 +10,11 @@ import typer
 from p2os.cli.held_robot import ASKED, held
 from p2os.cli.help_pages import ROBOTS
 from p2os.cli.names import RobotUrl
-from p2os.client import Robot
+from p2os.cli.robots.monitor import state_as_plain
+from p2os.client import Robot, RobotState
 from p2os.protocol.config_packet import FIELDS, ConfigPacket
-from p2os.protocol.odometry import Odometry
 from p2os.protocol.packets import Identity
-from p2os.protocol.sip import StandardSip
-from p2os.protocol.units import in_units
-from p2os.robots.parameters import ParametersError, RobotParameters, load_parameters
+from p2os.robots.parameters import RobotParameters
 
 HELP = """Print who a robot is, how it is set and what it senses.
 
@@ -40,8 +38,6 @@ UNITS = {
     "transdecel": "mm/s2", "sonarcycle": "ms", "shutdownvolts": "x 0.1 V", "kinematicsdelay": "ms",
     "latveltop": "mm/s", "latacctop": "mm/s2", "latvelmax": "mm/s", "latacc": "mm/s2", "latdecel": "mm/s2",
 }  # fmt: skip
-#: Used for a robot whose model is not known, as clients do.
-FALLBACK_MODEL = "p2dx"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,7 +45,9 @@ class RobotInfo:
     """What a robot reports of itself."""
 
     identity: Identity
-    sip: StandardSip
+    state: RobotState
+    #: Of its model; where that is not known, of another one.
+    parameters: RobotParameters
     #: None when its firmware does not know CONFIG.
     config: ConfigPacket | None = None
 
@@ -61,7 +59,7 @@ def ask(url: str) -> RobotInfo:
         P2osError: as `Robot.connect`.
     """
     with held(Robot(url, settings=ASKED)) as robot:
-        return RobotInfo(identity=robot.identity, sip=robot.state.sip, config=robot.config)
+        return RobotInfo(identity=robot.identity, state=robot.state, parameters=robot.parameters, config=robot.config)
 
 
 def register(app: typer.Typer) -> None:
@@ -75,66 +73,40 @@ def info(
 ) -> None:
     """Print what a robot reports of itself."""
     found = ask(url)
-    parameters, is_known = _parameters(found.identity.subclass)
     if json_output:
-        typer.echo(json.dumps(as_plain(found, parameters), indent=2))
+        typer.echo(json.dumps(as_plain(found), indent=2))
         return
-    for name, value in lines_of(found, parameters, is_known=is_known):
+    for name, value in lines_of(found):
         typer.echo(f"{name:<10}{value}".rstrip())
 
 
-def as_plain(found: RobotInfo, parameters: RobotParameters) -> dict[str, object]:
+def as_plain(found: RobotInfo) -> dict[str, object]:
     """Return what a robot reports as plain values, speeds and lengths in SI units, for JSON."""
     identity, config = found.identity, found.config
-    sensed = {name: _rounded(value) for name, value in asdict(in_units(found.sip, parameters)).items()}
-    place = _odometry(found.sip, parameters)
-    sensed["x_m"], sensed["y_m"] = _rounded(place.x_m), _rounded(place.y_m)
     sent = None if config is None else {name: getattr(config, name) for name, _ in FIELDS[: config.fields_sent]}
     return {
         "name": identity.name, "robot_class": identity.robot_class, "subclass": identity.subclass,
-        "sip": sensed, "config": sent,
+        "sip": state_as_plain(replace(found.state, pose=found.state.odometry), found.state.at_ns), "config": sent,
     }  # fmt: skip
 
 
-def lines_of(found: RobotInfo, parameters: RobotParameters, *, is_known: bool) -> list[tuple[str, str]]:
+def lines_of(found: RobotInfo) -> list[tuple[str, str]]:
     """Return what a robot reports as (name, text with units) for a person."""
-    identity, sensed = found.identity, in_units(found.sip, parameters)
-    place = _odometry(found.sip, parameters)
-    stalls = [side for side, is_stalled in (("left", sensed.stall_left), ("right", sensed.stall_right)) if is_stalled]
-    model = parameters.title if is_known else f"unknown model, units of a {parameters.title}"
+    identity, state, title = found.identity, found.state, found.parameters.title
+    stalls = [side for side, is_stalled in (("left", state.stall_left), ("right", state.stall_right)) if is_stalled]
+    is_known = identity.subclass.lower() == found.parameters.subclass.lower()
+    pose = state.odometry
     lines = [
         ("name", identity.name or "(none)"),
         ("class", identity.robot_class),
-        ("model", f"{identity.subclass} ({model})"),
-        ("position", f"x {place.x_m:.3f} m, y {place.y_m:.3f} m, heading {math.degrees(sensed.heading_rad):.1f} deg"),
-        ("wheels", f"left {sensed.left_mps:.3f} m/s, right {sensed.right_mps:.3f} m/s"),
+        ("model", f"{identity.subclass} ({title if is_known else f'unknown model, units of a {title}'})"),
+        ("position", f"x {pose.x_m:.3f} m, y {pose.y_m:.3f} m, heading {math.degrees(pose.heading_rad):.1f} deg"),
+        ("wheels", f"left {state.left_mps:.3f} m/s, right {state.right_mps:.3f} m/s"),
         ("stalled", " and ".join(stalls) or "none"),
-        ("battery", f"{sensed.battery_v:.1f} V"),
-        ("sonar", ", ".join(f"{number}: {range_m:.3f} m" for number, range_m in sensed.sonar_m) or "off"),
+        ("battery", f"{state.battery_v:.1f} V"),
+        ("sonar", ", ".join(f"{echo.number}: {echo.range_m:.3f} m" for echo in state.sonar) or "off"),
     ]
     if found.config is None:
         return [*lines, ("config", "the robot does not send it")]
     shown = [(name, getattr(found.config, name)) for name, _ in FIELDS[: found.config.fields_sent]]
     return [*lines, *(("config", f"{name:<18}{value} {UNITS.get(name, '')}".rstrip()) for name, value in shown)]
-
-
-def _rounded(value: object) -> object:
-    """Return floats to a micrometre or microradian, also those in lists."""
-    if isinstance(value, (tuple, list)):
-        return [_rounded(item) for item in value]
-    return round(value, 6) if isinstance(value, float) else value
-
-
-def _odometry(sip: StandardSip, parameters: RobotParameters) -> Odometry:
-    """Return where a packet says that the robot is, on either side of the origin."""
-    odometry = Odometry(parameters)
-    odometry.update(sip)
-    return odometry
-
-
-def _parameters(subclass: str) -> tuple[RobotParameters, bool]:
-    """Return a model's parameters and whether it is known."""
-    try:
-        return load_parameters(subclass), True
-    except ParametersError:
-        return load_parameters(FALLBACK_MODEL), False

@@ -13,13 +13,16 @@ from p2os.cli import doctor
 from p2os.cli.links import ports
 from p2os.cli.main import run
 from p2os.cli.robots import info
+from p2os.client.observer import Observer
 from p2os.pioneer.controller.commands import Effect
 from p2os.pioneer.serve import served_pioneer
 from p2os.protocol.config_packet import ConfigPacket
 from p2os.protocol.packets import Identity
 from p2os.protocol.sip import SonarReading, StandardSip
+from p2os.robots.parameters import load_parameters
 
 TIMEOUT_S = 30.0
+P2DX = load_parameters("p2dx")
 Capture = pytest.CaptureFixture[str]
 
 # ports ----------------------------------------------------------------------------------
@@ -165,8 +168,8 @@ def test_a_robot_tells_who_it_is_and_is_left_closed() -> None:
         found = info.ask(url)
     assert found.identity == Identity("Virtual", "Pioneer", "p2dx")
     assert found.config is not None
-    assert found.sip.raw_battery == 126
-    assert found.sip.sonar
+    assert found.state.battery_v == 12.6
+    assert found.state.sonar
     assert "motors" not in told
     assert told.index("opened") < told.index("closed")
 
@@ -182,7 +185,8 @@ def told(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     """Let `p2os info` find a robot that says this."""
 
     def tell(identity: Identity, sip: StandardSip, config: ConfigPacket | None) -> None:
-        monkeypatch.setattr(info, "ask", lambda _url: info.RobotInfo(identity=identity, sip=sip, config=config))
+        found = info.RobotInfo(identity=identity, state=Observer(P2DX).take(sip, 0), parameters=P2DX, config=config)
+        monkeypatch.setattr(info, "ask", lambda _url: found)
 
     return tell
 
@@ -227,7 +231,7 @@ def test_info_is_printed_for_programs(told: Callable[..., None], capsys: Capture
     plain = json.loads(capsys.readouterr().out)
     assert plain["name"] == "Wilma"
     assert plain["sip"]["x_m"] == -0.00084
-    assert plain["sip"]["sonar_m"] == [[3, 0.268]]
+    assert plain["sip"]["sonar_m"] == {"3": 0.268}
     assert plain["config"] == {"robot_class": "Pioneer", "subclass": "p2dx", "serial": ""}
     told(Identity("Wilma", "Pioneer", "p2dx"), SIP, None)
     assert run(["info", "tcp:x", "--json"]) == 0
