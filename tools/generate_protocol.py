@@ -22,7 +22,7 @@ from p2os.protocol.config_packet import (
     P2OS_FIELDS,
 )
 from p2os.protocol.frames import GIVE_UP_NS, HEADER, MAX_COUNT, MAX_PAYLOAD_BYTES, MIN_COUNT, Frame
-from p2os.protocol.odometry import PLAYER_POSITION_MODULUS, POSITION_MODULUS
+from p2os.protocol.odometry import POSITION_MODULUS
 from p2os.protocol.packets import (
     PACKET_NAMES,
     READERS,
@@ -260,7 +260,7 @@ def numbers() -> str:
         ("argument types", f"`{POSITIVE:02X}` integer, `{NEGATIVE:02X}` negative integer, `{STRING:02X}` string"),
         ("silence after which a frame is given up", f"{GIVE_UP_NS // NS_PER_MS} ms"),
         ("positions", f"modulo {POSITION_MODULUS} ({POSITION_MODULUS.bit_length() - 1} bits)"),
-        ("positions as player and ROS read them", f"modulo {PLAYER_POSITION_MODULUS}"),
+        ("positions as player and ROS read them", "modulo 4096"),
         ("packet types of a standard SIP", ", ".join(f"`{kind:02X}`" for kind in sip.SIP_KINDS)),
         ("of these", f"`{sip.STANDING:02X}` standing, `{sip.MOVING:02X}` moving"),
         ("packet types of AUX bytes", ", ".join(f"`{kind:02X}`" for kind in SerauxPacket.KINDS.values())),

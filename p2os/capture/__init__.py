@@ -6,14 +6,13 @@ Nothing here reads a clock or opens a port; `p2os decode`, `sniff`, `record`,
 
 from p2os.capture.chunks import Capture, Chunk, Direction, capture_of
 from p2os.capture.explain import Part, explain
-from p2os.capture.formats.pcap import read_pcap, write_pcap
-from p2os.capture.formats.recording import read_recording, write_recording
+from p2os.capture.formats.pcap import write_pcap
+from p2os.capture.formats.recording import write_recording
 from p2os.capture.formats.sources import (
     Source,
     open_argument,
     open_capture,
     open_file,
-    read_argument,
     read_capture,
     read_file,
 )
@@ -34,11 +33,8 @@ __all__ = [
     "open_argument",
     "open_capture",
     "open_file",
-    "read_argument",
     "read_capture",
     "read_file",
-    "read_pcap",
-    "read_recording",
     "rows_of",
     "write_pcap",
     "write_recording",

@@ -156,11 +156,6 @@ def blocks_of(parts: Iterable[Part]) -> Iterator[Block]:
     yield block_of(kept)
 
 
-def block_of_chunks(chunks: Iterable[Chunk]) -> Block:
-    """Return chunks as a block."""
-    return block_of((chunk.at_ns, chunk.direction, chunk.data) for chunk in chunks)
-
-
 def chunks_of(blocks: Iterable[Block]) -> Iterator[Chunk]:
     """Yield the chunks of blocks one by one."""
     return chain.from_iterable(blocks)

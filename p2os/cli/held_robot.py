@@ -18,6 +18,7 @@ from typing import TypeVar
 from p2os.cli.printing import queue_output
 from p2os.cli.signals import end_on_suspension, postponed
 from p2os.client import (
+    ClientSettings,
     DeadmanStopped,
     Disobeyed,
     GapStopped,
@@ -37,6 +38,8 @@ from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: chosen: how soon a notice is seen; packets come every 100 ms.
 LOOK_NS: Nanos = 50 * NS_PER_MS
+#: A robot that is asked who it is: motors off, the speed of its line as it is found.
+ASKED = ClientSettings(reconnect=False, auto_enable=False, raise_baud=None)
 
 Held = TypeVar("Held")
 

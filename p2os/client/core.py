@@ -175,11 +175,6 @@ class RobotCore:
         return self._mover.commanded
 
     @property
-    def goal_is_under_way(self) -> bool:
-        """Whether a `drive` or a `turn` is."""
-        return self._mover.has_goal
-
-    @property
     def is_quiet(self) -> bool:
         """Whether nothing waits to go out."""
         return self._supervisor.outbox.is_empty

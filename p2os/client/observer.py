@@ -18,7 +18,7 @@ from p2os.protocol.config_packet import AROS_1_6_FIELDS, ConfigPacket
 from p2os.protocol.odometry import POSITION_MODULUS, Odometry
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import StandardSip
-from p2os.protocol.units import in_units
+from p2os.protocol.units import battery_v, range_m, rim_mps
 from p2os.robots.parameters import RobotParameters
 from simbase.timing import NS_PER_S, Nanos
 
@@ -84,9 +84,9 @@ class Observer:
         """Return the state that a packet makes."""
         self._number += 1
         parameters = self.parameters
-        units = in_units(sip, parameters)
-        for number, range_m in units.sonar_m:
-            self._take_echo(number, range_m, now)
+        for reading in sip.sonar:
+            self._take_echo(reading.number, range_m(reading.raw_range, parameters), now)
+        left_mps, right_mps = (rim_mps(raw, parameters) for raw in (sip.raw_left_velocity, sip.raw_right_velocity))
         has_flags = self.profile.has_flags
         charge, temperature = sip.tail_field("state_of_charge"), sip.tail_field("raw_temperature")
         self.state = RobotState(
@@ -94,15 +94,15 @@ class Observer:
             at_ns=now,
             pose=self._pose.take(sip, parameters, now),
             odometry=self._pose.odometry,
-            forward_mps=(units.left_mps + units.right_mps) / 2,
-            turn_radps=units.turn_radps,
-            left_mps=units.left_mps,
-            right_mps=units.right_mps,
-            is_moving=units.is_moving,
+            forward_mps=(left_mps + right_mps) / 2,
+            turn_radps=(right_mps - left_mps) / (parameters.track_mm / 1000),
+            left_mps=left_mps,
+            right_mps=right_mps,
+            is_moving=sip.moving,
             motors_enabled=bool(sip.raw_flags & MOTORS_FLAG) if has_flags else None,
-            battery_v=units.battery_v,
-            stall_left=units.stall_left,
-            stall_right=units.stall_right,
+            battery_v=battery_v(sip.raw_battery),
+            stall_left=sip.stall_left,
+            stall_right=sip.stall_right,
             front_bumpers=_pressed(sip.front_bumpers, self.bumpers.front),
             rear_bumpers=_pressed(sip.rear_bumpers, self.bumpers.rear),
             sonar=tuple(self._sonar[number] for number in sorted(self._sonar)),
@@ -171,6 +171,7 @@ class PoseKeeper:
         self.odometry = RobotPose()
         #: Between the last two packets of this session.
         self.gap_ns: Nanos = 0
+        self._last_ns: Nanos = 0
         self._anchor: tuple[RobotPose, RobotPose] | None = None
         self._odometry: Odometry | None = None
 
@@ -187,24 +188,14 @@ class PoseKeeper:
     def take(self, sip: StandardSip, parameters: RobotParameters, now: Nanos) -> RobotPose:
         """Follow the robot to the place that a packet shows, and return it."""
         if self._odometry is None:
-            self._odometry = Odometry(parameters)
-            # Positions begin near zero; one of the upper half is a small step backwards.
-            turn = parameters.angle_counts_per_turn
-            self._first = (_signed(sip.raw_x, POSITION_MODULUS), _signed(sip.raw_y, POSITION_MODULUS),
-                           _signed(sip.raw_heading, turn))  # fmt: skip
-        self.gap_ns = self._odometry.update(sip, now).gap_ns
-        x, y, heading = (first + way for first, way in zip(self._first, self._odometry.counts, strict=True))
-        distance = parameters.distance_conv_mm / 1000
-        self.odometry = RobotPose(x * distance, y * distance, heading * parameters.angle_conv_rad)
+            self._odometry, self._last_ns = Odometry(parameters), now
+        self._odometry.update(sip)
+        self.gap_ns, self._last_ns = now - self._last_ns, now
+        self.odometry = RobotPose(self._odometry.x_m, self._odometry.y_m, self._odometry.heading_rad)
         if self._anchor is None:
             self._anchor = (self.pose, self.odometry)
         self.pose = _moved(*self._anchor, self.odometry)
         return self.pose
-
-
-def _signed(raw: int, modulus: int) -> int:
-    half = modulus // 2
-    return (raw + half) % modulus - half
 
 
 def _moved(start: RobotPose, then: RobotPose, now: RobotPose) -> RobotPose:

@@ -39,8 +39,6 @@ MAX_COUNT = 204
 MAX_PAYLOAD_BYTES = MAX_COUNT - CHECKSUM_BYTES
 #: chosen: two and a half SIP cycles; the longest frame takes 216 ms at 9600 baud, but its bytes never pause so long.
 GIVE_UP_NS: Nanos = 250 * NS_PER_MS
-#: How many of the bytes last rejected are kept for a person to look at.
-KEPT_BYTES = 32
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,13 +171,6 @@ class DecoderStats:
     stalled: int = 0
     #: Frames found among the bytes of a rejected one.
     rescued: int = 0
-    #: The bytes that were rejected last, at most 32, whatever the reason.
-    last_rejected: bytes = b""
-    #: The last offending bytes of each kind, at most 32.
-    last_noise: bytes = b""
-    last_bad_checksum: bytes = b""
-    last_bad_count: bytes = b""
-    last_stalled: bytes = b""
 
 
 class Decoder(Stateful):
@@ -228,7 +219,6 @@ class Decoder(Stateful):
         if self._buffer and limit >= self._last_byte_ns + GIVE_UP_NS:
             while self._buffer:
                 self.stats.stalled += 1
-                self.stats.last_stalled = bytes(self._buffer[:KEPT_BYTES])
                 self._items.append(Stalled(bytes(self._buffer)))
                 self._reject(len(self._buffer))
                 self._scan()
@@ -247,7 +237,6 @@ class Decoder(Stateful):
             if not MIN_COUNT <= count <= MAX_COUNT:
                 self._flush_noise()
                 self.stats.bad_counts += 1
-                self.stats.last_bad_count = bytes(buffer[:KEPT_BYTES])
                 self._items.append(BadCount(count))
                 self._reject(PREFIX_BYTES)
                 continue
@@ -280,13 +269,11 @@ class Decoder(Stateful):
                 del self._buffer[: len(data)]
             return
         self.stats.bad_checksums += 1
-        self.stats.last_bad_checksum = data[:KEPT_BYTES]
         self._items.append(BadChecksum(data, expected, got))
         self._reject(len(data))
 
     def _reject(self, size: int) -> None:
         """Drop the first byte of a rejected frame of `size` bytes; the rest is scanned again."""
-        self.stats.last_rejected = bytes(self._buffer[:KEPT_BYTES])
         self._rescanned = max(self._rescanned, size)
         self._drop_noise(1)
 
@@ -301,7 +288,5 @@ class Decoder(Stateful):
 
     def _flush_noise(self) -> None:
         if self._noise:
-            noise = bytes(self._noise)
-            self.stats.last_noise = noise[:KEPT_BYTES]
-            self._items.append(Noise(noise))
+            self._items.append(Noise(bytes(self._noise)))
             self._noise.clear()

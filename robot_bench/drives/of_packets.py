@@ -30,7 +30,6 @@ class Told(Rows):
         """Take all packets; a packet that is no sound SIP inside is passed over."""
         parameters = self.parameters
         odometry, metres_per_count = Odometry(parameters), parameters.range_nm_per_count / 1e9
-        first: tuple[int, int, int] | None = None
         before = 0.0
         for row in rows_of(chunks, Reading(profile=profile, parameters=parameters)):
             at = row.at_ns / NS_PER_S
@@ -42,8 +41,7 @@ class Told(Rows):
             if not row.is_sip:
                 continue
             sip = StandardSip.from_frame(Frame(row.data[PREFIX_BYTES:-CHECKSUM_BYTES]), profile)
-            odometry.update(sip, row.at_ns)
-            first = first or (sip.raw_x, sip.raw_y, sip.raw_heading)
+            odometry.update(sip)
             self.poses.append((at, odometry.x_m, odometry.y_m, odometry.heading_rad))
             conv = parameters.velocity_conv / 1000
             self.left.append((at, sip.raw_left_velocity * conv))
@@ -53,15 +51,6 @@ class Told(Rows):
             for place, reading in enumerate(sip.sonar, 1 - len(sip.sonar)):
                 metres = min(reading.raw_range * metres_per_count, parameters.sonar_range_m)
                 self.sonar.setdefault(reading.number, []).append((at + place * each_s, metres))
-        if first is not None:
-            self._begin_at(first)
-
-    def _begin_at(self, first: tuple[int, int, int]) -> None:
-        """Have the odometry begin where the first packet says; its counters there are 15 bits with a sign."""
-        parameters, half = self.parameters, 1 << 14
-        x, y = (((raw + half) % (2 * half) - half) * parameters.distance_nm_per_count / 1e9 for raw in first[:2])
-        turn = first[2] * parameters.angle_conv_rad
-        self.poses = [(t, x + a, y + b, turn + h) for t, a, b, h in self.poses]
 
     def into(self, drive: Drive) -> Drive:
         """Put it into a drive."""

@@ -13,9 +13,9 @@ from collections.abc import Callable, Sequence
 
 from p2os.errors import LocalProtocolError, RemoteProtocolError
 from p2os.protocol.frames import Frame
-from p2os.protocol.odometry import Unwrapper
+from p2os.protocol.odometry import POSITION_MODULUS, Unwrapper
 from p2os.protocol.profiles import Profile
-from p2os.protocol.sip import POSITION_MASK, SIP_KINDS, StandardSip
+from p2os.protocol.sip import SIP_KINDS, StandardSip
 from p2os.robots.parameters import RobotParameters
 from robot_bench.events.kinds import Pose
 from simbase.state import Stateful
@@ -64,7 +64,7 @@ class OdometryPose:
 
     def __init__(self, parameters: RobotParameters) -> None:
         self._parameters = parameters
-        self._x, self._y = Unwrapper(POSITION_MASK + 1), Unwrapper(POSITION_MASK + 1)
+        self._x, self._y = Unwrapper(POSITION_MODULUS), Unwrapper(POSITION_MODULUS)
         self._heading = Unwrapper(parameters.angle_counts_per_turn)
         self._forward_m = 0.0
         #: Path over ground, metres.

@@ -7,7 +7,7 @@ Lines without either belong to one stream whose direction is not given.
 import re
 from collections.abc import Iterable, Iterator
 
-from p2os.capture.chunks import Capture, Direction, Part, capture_of
+from p2os.capture.chunks import Capture, Direction, Part
 from simbase.errors import FileError
 
 #: `00000010: fafb 0300 0000 …  text` (xxd) and `00000010  fa fb 03 |text|` (hexdump -C).
@@ -23,15 +23,6 @@ def looks_like_hex(text: str) -> bool:
     """Tell whether a text may be meant as hex: nothing but digits and separators."""
     bare = _SEPARATORS.sub("", text)
     return bool(bare) and re.fullmatch(r"[0-9a-fA-F]+", bare) is not None
-
-
-def read_hex(text: str) -> Capture:
-    """Read bytes written as text.
-
-    Raises:
-        FileError: A line holds something else, or half a byte.
-    """
-    return capture_of(hex_parts(text.splitlines(), is_dump=is_hexdump(text)), has_time=False)
 
 
 def is_hexdump(text: str) -> bool:

@@ -6,14 +6,14 @@ What we read may also be TCP over Ethernet, loopback or the `any` device, so
 that a conversation recorded by tcpdump can be decoded: segments are put in order,
 repeated ones left out (`tcp_streams`).
 
-Invariant: `read_pcap(write_pcap(chunks))` has the same bytes in each direction.
+Invariant: what `write_pcap` has made is read so that it has the same bytes in each direction.
 """
 
 import contextlib
 import struct
 from collections.abc import Callable, Iterable, Iterator
 
-from p2os.capture.chunks import Block, Capture, Chunk, Direction, blocks_of, chunks_of, in_order
+from p2os.capture.chunks import Block, Chunk, Direction, blocks_of
 from p2os.capture.formats.conversations import IN_DIRECTION, LEAST_RECORDS, LINKTYPE_USER0, Conversations
 from p2os.capture.formats.pcap_records import (
     FILE_HEADER,
@@ -57,15 +57,6 @@ def record(chunk: Chunk, base_ns: Nanos = 0) -> bytes:
 def write_pcap(chunks: Iterable[Chunk], base_ns: Nanos = 0) -> bytes:
     """Return a pcap file; one record a chunk, so hand in one chunk a frame (`frame_chunks`)."""
     return file_header() + b"".join(record(chunk, base_ns) for chunk in chunks)
-
-
-def read_pcap(data: bytes) -> Capture:
-    """Read a pcap or pcapng file; times count from its first record.
-
-    Raises:
-        FileError: The file is cut or of a kind that is not read here.
-    """
-    return Capture(chunks=tuple(chunks_of(in_order(pcap_blocks([data])))))
 
 
 def pcap_blocks(blocks: Iterable[bytes]) -> Iterator[Block]:

@@ -8,12 +8,9 @@ Others: `t` seconds, `dir` `c2s`, `s2c` or `event`; events are left out.
 """
 
 import json
-from array import array
-from binascii import unhexlify
 from collections.abc import Iterable, Iterator, Mapping
-from itertools import accumulate
 
-from p2os.capture.chunks import Block, Capture, Chunk, Direction, Part, capture_of
+from p2os.capture.chunks import Capture, Chunk, Direction, Part
 from simbase.errors import FileError
 from simbase.timing import NS_PER_S, Nanos
 
@@ -29,21 +26,6 @@ _DIRECTIONS: Mapping[str, tuple[Direction | None, int]] = {
 }
 #: chosen: eleven days; a larger number of seconds is a mistake of the unit.
 LONGEST_NS: Nanos = 1_000_000 * NS_PER_S
-#: Between which quotes of such a line its time, direction and bytes stand.
-_TIME, _DIRECTION, _HEX = 2, 5, 9
-PLAIN_DIRECTIONS = frozenset(direction.value.encode("ascii") for direction in Direction)
-#: The longest time below `LONGEST_NS`.
-MOST_DIGITS = 15
-
-
-def read_recording(text: str) -> Capture:
-    """Read JSON lines of any of the three kinds.
-
-    Raises:
-        FileError: A line is no chunk; the message names it.
-    """
-    lines = text.splitlines()
-    return capture_of(recorded_parts(lines), note=note_of(lines[0] if lines else ""))
 
 
 def note_of(line: str) -> str:
@@ -53,39 +35,6 @@ def note_of(line: str) -> str:
     except (ValueError, RecursionError):
         return ""
     return str(entry.get("note", "")) if isinstance(entry, dict) and "format" in entry else ""
-
-
-def plain_block(lines: bytes) -> Block | None:
-    """Return what whole lines hold if each is spelled as `chunk_line` does, many times faster than `recorded_parts`."""
-    if lines[:1] != b"{" or lines[-1:] != b"\n":
-        return None
-    words = lines.replace(b"\r\n", b"\n").split(b'"')
-    # The last word of a line and the first of the next are one.
-    head, *between, end = b"".join(chunk_words()).split(b'"')
-    count = len(between) + 1
-    fixed = [(place, word) for place, word in enumerate(between, 1) if place not in {_TIME, _DIRECTION, _HEX}]
-    is_plain = (
-        len(words) % count == 1 and words[0] == head and words[-1] == end + b"\n"
-        and set(words[count:-1:count]) <= {end + b"\n" + head}
-        and all(set(words[place::count]) == {word} for place, word in fixed)
-        and set(words[_DIRECTION::count]) <= PLAIN_DIRECTIONS
-    )  # fmt: skip
-    if not is_plain:
-        return None
-    times = [word[2:-2] for word in words[_TIME::count]]
-    is_plain = b": " + b", : ".join(times) + b", " == b"".join(words[_TIME::count]) and b"".join(times).isdigit()
-    if not is_plain or max(map(len, times)) > MOST_DIGITS:
-        return None
-    texts = words[_HEX::count]
-    sizes = list(map(len, texts))
-    if not all(sizes) or any(size & 1 for size in sizes):
-        return None
-    try:
-        at_ns, data = array("q", map(int, times)), unhexlify(b"".join(texts))
-    except ValueError:  # an empty time, or what is no digit
-        return None
-    ends = array("q", accumulate(size >> 1 for size in sizes))
-    return Block(at_ns=at_ns, senders=b"".join(words[_DIRECTION::count])[::3], ends=ends, data=data)
 
 
 def chunk_words() -> tuple[bytes, bytes, bytes, bytes]:

@@ -4,7 +4,6 @@ Invariant: what is opened holds no more of its file than a block or a line.
 """
 
 import codecs
-import contextlib
 import io
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -14,7 +13,7 @@ from typing import BinaryIO, cast
 from p2os.capture.chunks import Block, Capture, Chunk, Direction, Part, block_of, blocks_of, chunks_of, in_order
 from p2os.capture.formats.hex_text import hex_parts, is_hexdump, looks_like_hex
 from p2os.capture.formats.pcap import is_pcap, pcap_blocks
-from p2os.capture.formats.recording import note_of, plain_block, recorded_parts
+from p2os.capture.formats.recording import note_of, recorded_parts
 from simbase.errors import FileError
 
 #: The P2OS bytes in the folder that `p2os run` makes.
@@ -136,15 +135,6 @@ def read_file(path: Path, direction: Direction | None = None) -> Capture:
     return open_file(path, direction).whole()
 
 
-def read_argument(words: list[str], direction: Direction | None = None) -> Capture:
-    """Read what a person named, whole, as `open_argument` does.
-
-    Raises:
-        FileError: It is neither a file nor hex text, or broken.
-    """
-    return open_argument(words, direction).whole()
-
-
 def _named(blocks: Iterator[Block], file: BinaryIO, place: Path) -> Iterator[Block]:
     """Yield blocks; what is wrong names the file, which is closed at the end."""
     with file:
@@ -166,12 +156,9 @@ def _raw(file: io.BufferedReader) -> Iterator[Part]:
 
 
 def _recorded(file: io.BufferedReader) -> Iterator[Block]:
-    before, in_bulk = 0, plain_block
+    before = 0
     for lines in _blocks_of_lines(file):
-        block = in_bulk(lines)
-        if before:  # a small file is read before NumPy is loaded
-            with contextlib.suppress(ImportError):
-                from p2os.capture.formats.recording_bulk import plain_lines as in_bulk
+        block = _in_bulk(lines) if before else None  # a small file is read before NumPy is loaded
         if block is None:
             counted = _Numbered(before)
             yield from blocks_of(recorded_parts(_lines((lines,), counted), before + 1))
@@ -179,6 +166,15 @@ def _recorded(file: io.BufferedReader) -> Iterator[Block]:
         else:
             yield block
             before += len(block)
+
+
+def _in_bulk(lines: bytes) -> Block | None:
+    """Return what lines of ours hold; None where one is spelled otherwise, and without NumPy."""
+    try:
+        from p2os.capture.formats.recording_bulk import plain_lines
+    except ImportError:
+        return None
+    return plain_lines(lines)
 
 
 @dataclass(slots=True)

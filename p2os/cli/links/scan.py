@@ -2,16 +2,16 @@
 
 import json
 import sys
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Annotated
 
 import typer
 
-from p2os.cli.held_robot import held, hold_robot
+from p2os.cli.held_robot import ASKED, held, hold_robot
 from p2os.cli.help_pages import LINKS
 from p2os.cli.names import urls
 from p2os.cli.quantities import option
-from p2os.client import ClientSettings, Connected, ConnectError, Robot
+from p2os.client import Connected, ConnectError, Robot
 from p2os.client.settings import SEARCHED_BAUDS
 from p2os.errors import TransportError
 from p2os.robots.parameters import ParametersError, load_parameters
@@ -110,7 +110,6 @@ def identify(url: str, bauds: tuple[int, ...] = SEARCHED_BAUDS) -> Found:
         UsageError: The URL is none.
         ConnectError, TransportError: Nobody answers, or there is no such port.
     """
-    settings = ClientSettings(reconnect=False, auto_enable=False, bauds=bauds, raise_baud=None)
     took_ns = 0
 
     def note(notice: object) -> None:
@@ -118,7 +117,7 @@ def identify(url: str, bauds: tuple[int, ...] = SEARCHED_BAUDS) -> Found:
         if isinstance(notice, Connected):
             took_ns = notice.took_ns
 
-    robot = Robot(_at_first(url, bauds), settings=settings)
+    robot = Robot(_at_first(url, bauds), settings=replace(ASKED, bauds=bauds))
     robot.on_event(note)
     with held(robot):
         identity, config = robot.identity, robot.config

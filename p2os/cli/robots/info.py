@@ -1,40 +1,20 @@
 """`p2os info URL`: who the robot at a line is, how it is set, and what it senses now."""
 
-import contextlib
 import json
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import typer
 
-from p2os.cli.held_robot import hold_robot
+from p2os.cli.held_robot import ASKED, held
 from p2os.cli.help_pages import ROBOTS
 from p2os.cli.names import RobotUrl
-from p2os.cli.signals import postponed
-from p2os.errors import RemoteProtocolError, TransportError
-from p2os.protocol.commands import Command, CommandNumber
+from p2os.cli.robots.monitor import state_as_plain
+from p2os.client import Robot, RobotState
 from p2os.protocol.config_packet import FIELDS, ConfigPacket
-from p2os.protocol.connection import (
-    ConfigReceived,
-    ConnectFailed,
-    Connection,
-    ConnectionLost,
-    ConnectionRole,
-    ConnectionSettings,
-    SipReceived,
-    Synchronised,
-)
 from p2os.protocol.packets import Identity
-from p2os.protocol.sip import POSITION_MASK, StandardSip
-from p2os.protocol.times import WATCHDOG_NS
-from p2os.protocol.units import in_units
-from p2os.robots.parameters import ParametersError, RobotParameters, load_parameters
-from p2os.transport import Transport, open_url
-from p2os.transport.ports import HungUpError
-from p2os.transport.waiting import wait_for_line
-from p2os.transport.wall_clock import Clock, wall_clock
-from simbase.timing import NS_PER_S, Nanos
+from p2os.robots.parameters import RobotParameters
 
 HELP = """Print who a robot is, how it is set and what it senses.
 
@@ -44,19 +24,12 @@ motors stay off.
 \b
 Examples:
   p2os info tcp:127.0.0.1:8101               a robot served by `p2os serve`
-  p2os info serial:/dev/ttyUSB0              a real one at 9600 bit/s
-  p2os info serial:/dev/ttyUSB0?baud=38400   at another speed
+  p2os info serial:/dev/ttyUSB0              a real one, whatever its line's speed
   p2os info tcp:127.0.0.1:8101 --json        for programs
 
 Ends with exit code 1 when nobody answers.
 """
 
-#: chosen: a robot that knows CONFIG answers at once; older firmware never does.
-CONFIG_WAIT_NS: Nanos = 1 * NS_PER_S
-#: chosen: the session may take six SYNC0 of a second each, and a robot may need to be stopped first.
-LONGEST_NS: Nanos = 12 * NS_PER_S
-#: Positions have 15 bits.
-POSITION_SPAN = POSITION_MASK + 1
 #: Units of the fields of the CONFIGpac that have one (`ConfigPacket`).
 UNITS = {
     "rotveltop": "deg/s", "transveltop": "mm/s", "rotacctop": "deg/s2", "transacctop": "mm/s2", "sipcycle": "ms",
@@ -65,8 +38,6 @@ UNITS = {
     "transdecel": "mm/s2", "sonarcycle": "ms", "shutdownvolts": "x 0.1 V", "kinematicsdelay": "ms",
     "latveltop": "mm/s", "latacctop": "mm/s2", "latvelmax": "mm/s", "latacc": "mm/s2", "latdecel": "mm/s2",
 }  # fmt: skip
-#: Used for a robot whose model is not known, as clients do.
-FALLBACK_MODEL = "p2dx"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,68 +45,21 @@ class RobotInfo:
     """What a robot reports of itself."""
 
     identity: Identity
-    sip: StandardSip
+    state: RobotState
+    #: Of its model; where that is not known, of another one.
+    parameters: RobotParameters
     #: None when its firmware does not know CONFIG.
     config: ConfigPacket | None = None
 
 
-def ask(transport: Transport, *, clock: Clock = wall_clock) -> RobotInfo:
+def ask(url: str) -> RobotInfo:
     """Connect, listen until the robot has sent all, and leave it closed.
 
     Raises:
-        RemoteProtocolError: nobody answers, or not all of it.
-        TransportError: the line was lost.
+        P2osError: as `Robot.connect`.
     """
-    connection = Connection(ConnectionRole.CLIENT, settings=ConnectionSettings(liveness_ns=WATCHDOG_NS))
-    try:
-        return _collect(connection, transport, clock)
-    except HungUpError as error:
-        raise TransportError(str(error), hint="is another program connected to the robot?") from error
-    finally:
-        with postponed():
-            connection.disconnect(clock())
-            with contextlib.suppress(TransportError):  # the robot has gone: nothing to close
-                transport.write(b"".join(connection.take_output()))
-
-
-def _collect(connection: Connection, transport: Transport, clock: Clock) -> RobotInfo:
-    start = clock()
-    connection.connect(start)
-    identity: Identity | None = None
-    sip: StandardSip | None = None
-    config: ConfigPacket | None = None
-    asked_at: Nanos | None = None
-    while (now := clock()) < start + LONGEST_NS:
-        connection.receive(transport.read(), now)
-        while (event := connection.next_event()) is not None:
-            match event:
-                case Synchronised():
-                    identity = event.identity
-                case SipReceived():
-                    sip = sip if sip is not None and sip.sonar else event.sip
-                    if asked_at is None:
-                        connection.send(Command(CommandNumber.CONFIG), now)
-                        asked_at = now
-                case ConfigReceived():
-                    config = event.config
-                case ConnectFailed() | ConnectionLost():
-                    raise RemoteProtocolError(
-                        f"no robot on {transport.description}: {event.reason}", hint=_hint(transport)
-                    )
-                case _:
-                    pass
-        waited = asked_at is not None and now >= asked_at + CONFIG_WAIT_NS
-        if identity is not None and sip is not None and (config is not None or waited):
-            return RobotInfo(identity=identity, sip=sip, config=config)
-        transport.write(b"".join(connection.take_output()))
-        wait_for_line(transport, connection.next_deadline(), now)
-    raise RemoteProtocolError(f"the robot on {transport.description} answers, but sends no packets")
-
-
-def _hint(transport: Transport) -> str:
-    if transport.description.startswith("serial:"):
-        return "is the robot on? p2os scan tries every speed"
-    return "is there a robot behind it? (p2os serve)"
+    with held(Robot(url, settings=ASKED)) as robot:
+        return RobotInfo(identity=robot.identity, state=robot.state, parameters=robot.parameters, config=robot.config)
 
 
 def register(app: typer.Typer) -> None:
@@ -148,68 +72,41 @@ def info(
     json_output: Annotated[bool, typer.Option("--json", help="Print a JSON object.")] = False,
 ) -> None:
     """Print what a robot reports of itself."""
-    hold_robot()
-    with contextlib.closing(open_url(url)) as transport:
-        found = ask(transport)
-    parameters, is_known = _parameters(found.identity.subclass)
+    found = ask(url)
     if json_output:
-        typer.echo(json.dumps(as_plain(found, parameters), indent=2))
+        typer.echo(json.dumps(as_plain(found), indent=2))
         return
-    for name, value in lines_of(found, parameters, is_known=is_known):
+    for name, value in lines_of(found):
         typer.echo(f"{name:<10}{value}".rstrip())
 
 
-def as_plain(found: RobotInfo, parameters: RobotParameters) -> dict[str, object]:
+def as_plain(found: RobotInfo) -> dict[str, object]:
     """Return what a robot reports as plain values, speeds and lengths in SI units, for JSON."""
     identity, config = found.identity, found.config
-    sensed = {name: _rounded(value) for name, value in asdict(in_units(found.sip, parameters)).items()}
-    sensed["x_m"] = _rounded(_signed(found.sip.raw_x, parameters))
-    sensed["y_m"] = _rounded(_signed(found.sip.raw_y, parameters))
     sent = None if config is None else {name: getattr(config, name) for name, _ in FIELDS[: config.fields_sent]}
     return {
         "name": identity.name, "robot_class": identity.robot_class, "subclass": identity.subclass,
-        "sip": sensed, "config": sent,
+        "sip": state_as_plain(replace(found.state, pose=found.state.odometry), found.state.at_ns), "config": sent,
     }  # fmt: skip
 
 
-def lines_of(found: RobotInfo, parameters: RobotParameters, *, is_known: bool) -> list[tuple[str, str]]:
+def lines_of(found: RobotInfo) -> list[tuple[str, str]]:
     """Return what a robot reports as (name, text with units) for a person."""
-    identity, sensed = found.identity, in_units(found.sip, parameters)
-    x_m, y_m = _signed(found.sip.raw_x, parameters), _signed(found.sip.raw_y, parameters)
-    stalls = [side for side, is_stalled in (("left", sensed.stall_left), ("right", sensed.stall_right)) if is_stalled]
-    model = parameters.title if is_known else f"unknown model, units of a {parameters.title}"
+    identity, state, title = found.identity, found.state, found.parameters.title
+    stalls = [side for side, is_stalled in (("left", state.stall_left), ("right", state.stall_right)) if is_stalled]
+    is_known = identity.subclass.lower() == found.parameters.subclass.lower()
+    pose = state.odometry
     lines = [
         ("name", identity.name or "(none)"),
         ("class", identity.robot_class),
-        ("model", f"{identity.subclass} ({model})"),
-        ("position", f"x {x_m:.3f} m, y {y_m:.3f} m, heading {math.degrees(sensed.heading_rad):.1f} deg"),
-        ("wheels", f"left {sensed.left_mps:.3f} m/s, right {sensed.right_mps:.3f} m/s"),
+        ("model", f"{identity.subclass} ({title if is_known else f'unknown model, units of a {title}'})"),
+        ("position", f"x {pose.x_m:.3f} m, y {pose.y_m:.3f} m, heading {math.degrees(pose.heading_rad):.1f} deg"),
+        ("wheels", f"left {state.left_mps:.3f} m/s, right {state.right_mps:.3f} m/s"),
         ("stalled", " and ".join(stalls) or "none"),
-        ("battery", f"{sensed.battery_v:.1f} V"),
-        ("sonar", ", ".join(f"{number}: {range_m:.3f} m" for number, range_m in sensed.sonar_m) or "off"),
+        ("battery", f"{state.battery_v:.1f} V"),
+        ("sonar", ", ".join(f"{echo.number}: {echo.range_m:.3f} m" for echo in state.sonar) or "off"),
     ]
     if found.config is None:
         return [*lines, ("config", "the robot does not send it")]
     shown = [(name, getattr(found.config, name)) for name, _ in FIELDS[: found.config.fields_sent]]
     return [*lines, *(("config", f"{name:<18}{value} {UNITS.get(name, '')}".rstrip()) for name, value in shown)]
-
-
-def _rounded(value: object) -> object:
-    """Return floats to a micrometre or microradian, also those in lists."""
-    if isinstance(value, (tuple, list)):
-        return [_rounded(item) for item in value]
-    return round(value, 6) if isinstance(value, float) else value
-
-
-def _signed(raw: int, parameters: RobotParameters) -> float:
-    """Return a position of 15 bits as metres either side of the origin."""
-    counts = (raw + POSITION_SPAN // 2) % POSITION_SPAN - POSITION_SPAN // 2
-    return counts * parameters.distance_conv_mm / 1000
-
-
-def _parameters(subclass: str) -> tuple[RobotParameters, bool]:
-    """Return a model's parameters and whether it is known."""
-    try:
-        return load_parameters(subclass), True
-    except ParametersError:
-        return load_parameters(FALLBACK_MODEL), False

@@ -13,7 +13,7 @@ from p2os.cli.quantities import option
 from p2os.client import ConfigurationKnown, Notice, PacketArrived, Robot
 from p2os.errors import LocalProtocolError
 from p2os.protocol.command_table import ROWS, Argument, CommandRow, command_row
-from p2os.protocol.commands import Command, CommandNumber, command
+from p2os.protocol.commands import Command, command
 from p2os.protocol.packets import ServerPacket, packet_frame
 from p2os.protocol.profiles import Profile
 from simbase.errors import UsageError
@@ -64,8 +64,6 @@ def send(
     if len(words) < 2:
         raise UsageError("name the robot's URL and a command", hint="p2os send tcp:127.0.0.1:8101 SONAR 0")
     wanted = make_command(words[1], words[2:])
-    if changes_nothing(wanted):
-        sys.stderr.write("note: DIGOUT with mask 0 changes no output: DIGOUT STATES MASK, as DIGOUT 0x01 0xff\n")
     answers: list[ServerPacket] = []
     with held(Robot(words[0], reconnect=False)) as robot:
         profile = robot.profile
@@ -122,13 +120,6 @@ def unknown_to(wanted: Command, profile: Profile) -> str:
     if wanted.row.is_known_to(profile) is False:
         return f"{wanted.name} is not in the manual of {profile.value} robots; it will probably be ignored"
     return ""
-
-
-def changes_nothing(wanted: Command) -> bool:
-    """Tell whether a command is a DIGOUT whose mask, the high byte, names no output."""
-    if wanted.number != CommandNumber.DIGOUT or isinstance(wanted.argument, bytes):
-        return False
-    return not (wanted.argument or 0) & 0xFF00
 
 
 def _by_number(number: int, arguments: list[str]) -> Command:

@@ -21,7 +21,8 @@ It serves as the oracle for the other bodies, and where PyBullet is not to be ha
 """
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
+from itertools import islice, repeat
 
 from p2os.pioneer.body.contacts import APART_STEPS, ContactCounter
 from p2os.pioneer.body.contract import BodyState, Turned, free_wheels
@@ -269,87 +270,36 @@ class KinematicBody(BodyInWorld):
 
     def hold(self, left_mps: float, right_mps: float, steps: int) -> Sequence[Turned]:
         """Make so many steps with these set-points; see `RobotBody`."""
+        asked = (left_mps, right_mps)
         made: list[Turned] = []
-        while len(made) < steps:
-            made += self._go_on(left_mps, right_mps, steps - len(made)) or [self.step(left_mps, right_mps)]
+        while (left := steps - len(made)) > 0:
+            on = self._stand_on(left) if asked == (0.0, 0.0) else self._roll_on(repeat(asked, left))
+            made += on or [self.step(left_mps, right_mps)]
         return made
 
     def ramp(self, setpoints: Sequence[tuple[float, float]]) -> Sequence[Turned]:
         """Make a step with each of these set-points; see `RobotBody`."""
         made: list[Turned] = []
         while len(made) < len(setpoints):
-            made += self._ramp_on(setpoints[len(made) :]) or [self.step(*setpoints[len(made)])]
+            made += self._roll_on(islice(setpoints, len(made), None)) or [self.step(*setpoints[len(made)])]
         return made
 
-    def _ramp_on(self, setpoints: Sequence[tuple[float, float]]) -> list[Turned]:
+    def _roll_on(self, setpoints: Iterable[tuple[float, float]]) -> list[Turned]:
         """Make those first steps that surely lead nowhere near a thing: what as many of `go` do."""
         if self._is_stepped_by_others or self._is_bumped or self._contacts.apart < APART_STEPS:
             return []
-        if self._walking:
-            setpoints = setpoints[: WALK_STEPS - 1 - self._steps % WALK_STEPS]
         x, y, heading, c, s, free = self._x, self._y, self._heading, self._cos, self._sin, self._free_m
         left_angle, right_angle, work_j, driven = self._left_angle, self._right_angle, self._rim_work_j, self._driven
-        track_m, radius_m, reach_m = self._track_m, self._radius_m, self.reach_m
-        steady_j, made = self._steady_j, list[Turned]()
-        for asked in setpoints:
-            left_mps, right_mps = asked
-            forward, turn = (left_mps + right_mps) / 2 * DT_S, (right_mps - left_mps) / track_m * DT_S
-            travel = abs(forward) + abs(turn) * reach_m
-            if free <= travel or (left_mps == 0.0 and right_mps == 0.0):
-                break
-            free -= travel
-            before, heading, old_c, old_s = heading, heading + turn, c, s
-            if heading != before:
-                c, s = math.cos(heading), math.sin(heading)
-            if abs(turn) < STRAIGHT_RAD:
-                x, y = x + forward * old_c, y + forward * old_s
-            else:
-                radius = forward / turn
-                x, y = x + radius * (s - old_s), y - radius * (c - old_c)
-            if asked != driven:
-                steady_j, step_j = None, self._load.work_j(driven, asked, DT_S)
-            else:
-                step_j = steady_j = self._load.work_j(asked, asked, DT_S) if steady_j is None else steady_j
-            work_j += step_j
-            driven = asked
-            left_angle, right_angle = left_angle + left_mps * DT_S / radius_m, right_angle + right_mps * DT_S / radius_m
-            made.append(free_wheels(left_angle, right_angle))
-        if made:
-            self._x, self._y, self._heading, self._cos, self._sin, self._free_m = x, y, heading, c, s, free
-            self._left_angle, self._right_angle, self._rim_work_j = left_angle, right_angle, work_j
-            self._asked = self._driven = self._left, self._right = driven
-            self._blocked_at, self._steady_j = None, steady_j
-            self._steps += len(made)
-        return made
-
-    def _go_on(self, left_mps: float, right_mps: float, steps: int) -> list[Turned]:
-        """Make up to so many steps in which nothing changes but the pose and the wheels: what as many of `go` do."""
-        if self._walking:
-            steps = min(steps, WALK_STEPS - 1 - self._steps % WALK_STEPS)
-        asked = (left_mps, right_mps)
-        if self._is_stepped_by_others or self._is_bumped or asked != self._driven or steps <= 0:
-            return []
-        if left_mps == right_mps == 0.0:
-            turned = self.go(0.0, 0.0)
-            self._steps += steps - 1
-            self._contacts.update(touching=self._free_m == 0.0, steps=steps - 1)
-            return [turned] * steps
-        if self._contacts.apart < APART_STEPS:
-            return []
-        return self._roll(left_mps, right_mps, steps)
-
-    def _roll(self, left_mps: float, right_mps: float, steps: int) -> list[Turned]:
-        """Make the steps that surely lead nowhere near a thing."""
-        forward, turn = self._ways(left_mps, right_mps)
-        travel, is_straight = abs(forward) + abs(turn) * self.reach_m, abs(turn) < STRAIGHT_RAD
-        radius = 0.0 if is_straight else forward / turn
-        left_rad, right_rad = left_mps * DT_S / self._radius_m, right_mps * DT_S / self._radius_m
-        if self._steady_j is None:
-            self._steady_j = self._load.work_j(self._driven, self._driven, DT_S)
-        x, y, heading, c, s, free = self._x, self._y, self._heading, self._cos, self._sin, self._free_m
-        left_angle, right_angle, work_j, step_j = self._left_angle, self._right_angle, self._rim_work_j, self._steady_j
-        made: list[Turned] = []
-        for _ in range(steps):
+        steady_j, last, made = self._steady_j, None, list[Turned]()
+        for asked in islice(setpoints, self._steps_until_walk):
+            if asked is not last:
+                if asked == (0.0, 0.0):
+                    break
+                left_mps, right_mps = last = asked
+                forward, turn = self._ways(left_mps, right_mps)
+                travel, is_straight = abs(forward) + abs(turn) * self.reach_m, abs(turn) < STRAIGHT_RAD
+                radius = 0.0 if is_straight else forward / turn
+                left_rad, right_rad = left_mps * DT_S / self._radius_m, right_mps * DT_S / self._radius_m
             if free <= travel:
                 break
             free -= travel
@@ -360,15 +310,37 @@ class KinematicBody(BodyInWorld):
                 x, y = x + forward * old_c, y + forward * old_s
             else:
                 x, y = x + radius * (s - old_s), y - radius * (c - old_c)
+            if asked is not driven and asked != driven:
+                steady_j, step_j = None, self._load.work_j(driven, asked, DT_S)
+            else:
+                step_j = steady_j = self._load.work_j(asked, asked, DT_S) if steady_j is None else steady_j
             work_j += step_j
+            driven = asked
             left_angle, right_angle = left_angle + left_rad, right_angle + right_rad
             made.append(free_wheels(left_angle, right_angle))
         if made:
             self._x, self._y, self._heading, self._cos, self._sin, self._free_m = x, y, heading, c, s, free
             self._left_angle, self._right_angle, self._rim_work_j = left_angle, right_angle, work_j
-            self._left, self._right = self._asked = self._driven
+            self._asked = self._driven = self._left, self._right = driven
+            self._blocked_at, self._steady_j = None, steady_j
             self._steps += len(made)
         return made
+
+    def _stand_on(self, steps: int) -> list[Turned]:
+        """Make up to so many steps in which the robot goes on standing: what as many of `go` do."""
+        until_walk = self._steps_until_walk
+        if self._is_stepped_by_others or self._is_bumped or self._driven != (0.0, 0.0) or until_walk == 0:
+            return []
+        steps = steps if until_walk is None else min(steps, until_walk)
+        turned = self.go(0.0, 0.0)
+        self._steps += steps - 1
+        self._contacts.update(touching=self._free_m == 0.0, steps=steps - 1)
+        return [turned] * steps
+
+    @property
+    def _steps_until_walk(self) -> int | None:
+        """How many steps are left until something that walks is moved; None: for ever."""
+        return WALK_STEPS - 1 - self._steps % WALK_STEPS if self._walking else None
 
     def _turn_wheels(self) -> Turned:
         """Turn the wheels by this step, and by how far another robot has pushed them since the last."""

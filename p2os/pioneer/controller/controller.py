@@ -300,16 +300,11 @@ class Pioneer(Stateful):
             self._notify(now, first, words)
         self._report_notes(now)
 
-    def reboot(self, now: Nanos, *, notice: str = "reboot") -> None:
-        """Start the controller anew, as after a dip of its supply: motors off, session gone, odometry at 0."""
-        self.advance_to(now)
-        self._restart(now, notice, boot_ns=BOOT_NS)
-
     def start_over(self, now: Nanos) -> None:
         """Put the robot back at its start: body, odometry, devices and random draws as when it was made.
 
         What could be pushed is back in its place. The session is gone and the controller is not there for its boot
-        time, as after `reboot`; faults are those of the start.
+        time, as after the fault `reboot`; faults are those of the start.
         """
         self.advance_to(now)
         self.body.put_back()

@@ -11,10 +11,9 @@ import math
 from collections.abc import Sequence
 
 from p2os.pioneer.body.contract import Wheels
+from p2os.protocol.odometry import POSITION_MODULUS
 from simbase.state import Stateful
 
-#: The packet carries 15 bits of position (Pioneer 2/3 manuals, standard SIP).
-POSITION_MODULUS = 1 << 15
 NM_PER_MM = 1_000_000
 
 

@@ -27,7 +27,7 @@ so a ramp is exact for every step that is a whole number of microseconds.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from enum import Enum
 
 from p2os.robots.parameters import RobotParameters
@@ -74,17 +74,8 @@ class MotionLimits:
     @classmethod
     def of(cls, parameters: RobotParameters) -> "MotionLimits":
         """Return the limits with which a robot starts."""
-        start = parameters.motion
-        return cls(
-            top_velocity_mm_s=parameters.max_velocity_mm_s,
-            top_rotation_deg_s=parameters.max_rotation_deg_s,
-            max_velocity_mm_s=start.max_velocity_mm_s,
-            max_rotation_deg_s=start.max_rotation_deg_s,
-            accel_mm_s2=start.accel_mm_s2,
-            decel_mm_s2=start.decel_mm_s2,
-            rot_accel_deg_s2=start.rot_accel_deg_s2,
-            rot_decel_deg_s2=start.rot_decel_deg_s2,
-        )
+        tops = {"top_velocity_mm_s": parameters.max_velocity_mm_s, "top_rotation_deg_s": parameters.max_rotation_deg_s}
+        return cls(**tops, **asdict(parameters.motion))
 
     def with_max_velocity(self, mm_s: int) -> "MotionLimits":
         """Return these limits after SETV, which cannot exceed the robot's top."""

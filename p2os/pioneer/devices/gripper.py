@@ -4,7 +4,7 @@ Source: Pioneer 2/3 H8 manual, command GRIPPER and table 11 (GRIPPERpac). How
 long the paddles and the lift take is chosen; nothing is ever dropped.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from p2os.protocol.packets import GripperPacket, GripperState
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
@@ -64,8 +64,8 @@ class Gripper:
 
     #: 0 none, 1 on the user I/O, 2 on the general I/O.
     kind: int = 0
-    paddles: tuple[Nanos, int, Nanos, Nanos | None] = (0, 0, 0, None)
-    lift: tuple[Nanos, int, Nanos, Nanos | None] = (0, 0, 0, None)
+    paddles: Travel = field(default_factory=lambda: Travel(PADDLES_NS))
+    lift: Travel = field(default_factory=lambda: Travel(LIFT_NS))
     #: The last GRIPPERVAL.
     value: int = 0
     #: Grasp pressure, 20 ms units.
@@ -79,27 +79,18 @@ class Gripper:
             self.pressure = self.value
         if number == CARRY:
             run_ns = abs(self.value) * TIME_UNIT_NS
-            self.lift = self._went(self.lift, LIFT_NS, 1 if self.value > 0 else -1, now, run_ns)
+            self.lift.go(1 if self.value > 0 else -1, now, run_ns)
         paddles, lift = MOVES.get(number, (None, None))
         if paddles is not None:
-            self.paddles = self._went(self.paddles, PADDLES_NS, paddles, now)
+            self.paddles.go(paddles, now)
         if lift is not None:
-            self.lift = self._went(self.lift, LIFT_NS, lift, now)
-
-    @staticmethod
-    def _went(
-        travel: tuple[Nanos, int, Nanos, Nanos | None], length: Nanos, direction: int, now: Nanos,
-        run_ns: Nanos | None = None,
-    ) -> tuple[Nanos, int, Nanos, Nanos | None]:  # fmt: skip
-        moved = Travel(length, *travel)
-        moved.go(direction, now, run_ns)
-        return moved.place_ns, moved.direction, moved.since, moved.until
+            self.lift.go(lift, now)
 
     def state(self, now: Nanos) -> GripperState:
         """Return the bits of this moment (H8 manual, table 11)."""
         if not self.kind:
             return GripperState(0)
-        paddles, lift = Travel(PADDLES_NS, *self.paddles), Travel(LIFT_NS, *self.lift)
+        paddles, lift = self.paddles, self.lift
         closed = paddles.at(now) == PADDLES_NS
         grasps = self.has_thing and paddles.at(now) >= PADDLES_NS // 2
         found = GripperState(0)

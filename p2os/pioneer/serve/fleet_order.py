@@ -10,7 +10,7 @@ from pathlib import Path
 from p2os.pioneer.body.contract import RobotBody
 from p2os.pioneer.body.factory import BEST, body_note, make_scene, resolve_body
 from p2os.pioneer.controller import Pioneer
-from p2os.pioneer.controller.settings import SIMULATOR_SERIAL, ControllerSettings
+from p2os.pioneer.controller.settings import ControllerSettings
 from p2os.pioneer.serve.multi_robot_world import MultiRobotWorld
 from p2os.pioneer.serve.world_loader import WorldLoader
 from p2os.pioneer.world import load_world
@@ -26,8 +26,6 @@ from simbase.timing import Nanos
 
 #: The AUX ports (H8 manual: AUX1 to AUX3).
 AUX_PORTS = (1, 2, 3)
-#: Robots of this class have batteries on a line of their own (ARIA's parameter file).
-MTX = "MTX"
 #: chosen: more than two cores carry; a larger number is a typing error.
 MOST_ROBOTS = 256
 
@@ -159,20 +157,8 @@ def make_fleet(order: FleetOrder) -> MadeFleet:
         )  # fmt: skip
         for pioneer in together:
             pioneer.loads_world = loader.load
-    notes = tuple(note for note in (body_note(order.body), made[0][1].note, _batteries_note(made)) if note)
+    notes = tuple(note for note in (body_note(order.body), made[0][1].note) if note)
     return MadeFleet(robots, starts, name, notes, multi_robot_world)
-
-
-def _batteries_note(made: Sequence[tuple[Pioneer, RobotBody]]) -> str | None:
-    """Return what ARIA needs for a model whose batteries it looks for on a serial port of its own."""
-    needing = [
-        pioneer for pioneer, _ in made
-        if pioneer.parameters.robot_class == MTX and pioneer.settings.serial != SIMULATOR_SERIAL
-    ]  # fmt: skip
-    if not needing:
-        return None
-    model = needing[0].parameters.subclass
-    return f"ARIA looks for the batteries of a {model} on a serial port: --for aria spares it that"
 
 
 def following_ports(given: Sequence[str], robots: int) -> list[str]:

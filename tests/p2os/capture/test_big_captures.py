@@ -8,7 +8,7 @@ from typing import BinaryIO, cast
 import pytest
 
 from p2os.capture import Chunk, Direction, Reading, open_capture, rows_of, write_pcap
-from p2os.capture.chunks import block_of_chunks, capture_of
+from p2os.capture.chunks import capture_of
 from p2os.capture.formats.sources import BLOCK_BYTES
 from p2os.capture.sips import sips_of
 from p2os.capture.table import FIRST_ROWS, Table, tables_of_sips, write_csv
@@ -17,6 +17,7 @@ from p2os.cli.main import run
 from p2os.protocol.packets import SonarReading, StandardSip, packet_frame
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import load_parameters
+from tests.p2os.capture.blocks import block_of_chunks
 
 P2DX = Reading(profile=Profile.P2OS, parameters=load_parameters("p2dx"))
 SIP = packet_frame(StandardSip(raw_x=5, sonar=(SonarReading(1, 1000),)), Profile.P2OS).to_bytes()

@@ -13,15 +13,13 @@ from p2os.capture import (
     Chunk,
     Direction,
     capture_of,
-    read_argument,
+    open_argument,
     read_capture,
     read_file,
-    read_pcap,
-    read_recording,
     write_pcap,
     write_recording,
 )
-from p2os.capture.formats.hex_text import read_hex, write_hex
+from p2os.capture.formats.hex_text import write_hex
 from p2os.capture.formats.pcap import PCAPNG_MAGIC
 from p2os.errors import LocalProtocolError
 from simbase.errors import FileError
@@ -40,19 +38,19 @@ chunks = st.lists(
 
 @given(chunks)
 def test_a_recording_is_read_as_it_was_written(capture: Capture) -> None:
-    assert read_recording(write_recording(capture)).chunks == capture.chunks
+    assert read_capture(write_recording(capture).encode()).chunks == capture.chunks
 
 
 @given(chunks)
 def test_a_pcap_is_read_as_it_was_written_with_times_from_its_first_record(capture: Capture) -> None:
     start = capture.chunks[0].at_ns if capture.chunks else 0
     moved = [(chunk.at_ns - start, chunk.direction, chunk.data) for chunk in capture.chunks]
-    assert read_pcap(write_pcap(capture.chunks, base_ns=1_700_000_000 * NS_PER_S)) == capture_of(moved)
+    assert read_capture(write_pcap(capture.chunks, base_ns=1_700_000_000 * NS_PER_S)) == capture_of(moved)
 
 
 @given(chunks)
 def test_hex_text_keeps_bytes_and_directions(capture: Capture) -> None:
-    again = read_hex(write_hex(capture))
+    again = read_capture(write_hex(capture).encode())
     assert [(chunk.direction, chunk.data) for chunk in again.chunks] == [
         (chunk.direction, chunk.data) for chunk in capture.chunks
     ]
@@ -60,7 +58,7 @@ def test_hex_text_keeps_bytes_and_directions(capture: Capture) -> None:
 
 def test_a_note_travels_with_a_recording() -> None:
     noted = Capture(chunks=TALK.chunks, note="kitchen floor")
-    assert read_recording(write_recording(noted)).note == "kitchen floor"
+    assert read_capture(write_recording(noted).encode()).note == "kitchen floor"
 
 
 @pytest.mark.parametrize("name", ["aria_p2de", "player_p2de"])
@@ -100,10 +98,10 @@ def test_arrows_tell_the_direction_and_an_option_tells_what_they_do_not() -> Non
 
 def test_an_argument_is_a_file_or_hex(tmp_path: Path) -> None:
     (tmp_path / "dump").write_bytes(VEL)
-    assert read_argument([str(tmp_path / "dump")]).bytes_of(None) == VEL
-    assert read_argument(["fa", "fb", "03000000"]).bytes_of(None) == SYNC0
+    assert open_argument([str(tmp_path / "dump")]).whole().bytes_of(None) == VEL
+    assert open_argument(["fa", "fb", "03000000"]).whole().bytes_of(None) == SYNC0
     with pytest.raises(FileError, match="no file and no hex"):
-        read_argument(["nowhere.jsonl"])
+        open_argument(["nowhere.jsonl"])
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ pytest.importorskip("numpy")
 
 from p2os.capture import Reading, read_file, rows_of
 from p2os.capture.cells import Cell
-from p2os.capture.chunks import Capture, Chunk, Direction, block_of_chunks, capture_of
+from p2os.capture.chunks import Capture, Chunk, Direction, capture_of
 from p2os.capture.columns.sip_table import sip_tables
 from p2os.capture.sip_columns import LEADING
 from p2os.capture.sips import sips_of
@@ -23,6 +23,7 @@ from p2os.protocol.packets import EncoderPacket, SonarReading, StandardSip, pack
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import load_parameters
 from simbase.timing import NS_PER_MS, NS_PER_S
+from tests.p2os.capture.blocks import block_of_chunks
 from tests.p2os.protocol.drawn_packets import SEEDS, Draw, any_packet, any_sip
 
 GOLDEN = Path(__file__).parents[2] / "golden"

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from p2os.capture import Chunk, Direction, capture_of, read_file, read_pcap, write_recording
+from p2os.capture import Chunk, Direction, capture_of, read_capture, read_file, write_recording
 from p2os.capture.replay import Replay
 from p2os.cli.captures.capture_files import RecordingFile, Sinks
 from p2os.cli.captures.record import record_session
@@ -58,7 +58,7 @@ def test_a_robot_is_recorded_and_left_closed(served: object, run: Run, tmp_path:
     assert capture.note == f"p2os record {served.url}"
     assert capture.bytes_of(TO).endswith(Command(CommandNumber.CLOSE).to_frame().to_bytes())
     for direction in (TO, FROM):
-        assert read_pcap(pcap.read_bytes()).bytes_of(direction) == capture.bytes_of(direction)
+        assert read_capture(pcap.read_bytes()).bytes_of(direction) == capture.bytes_of(direction)
 
 
 def test_a_recorded_session_is_sniffed_while_it_is_replayed(

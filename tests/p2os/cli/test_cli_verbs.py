@@ -1,12 +1,10 @@
 """The verbs ports, doctor and info."""
 
 import json
-import os
 import sys
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 from packaging.requirements import Requirement
@@ -15,15 +13,16 @@ from p2os.cli import doctor
 from p2os.cli.links import ports
 from p2os.cli.main import run
 from p2os.cli.robots import info
-from p2os.errors import RemoteProtocolError, TransportError
+from p2os.client.observer import Observer
 from p2os.pioneer.controller.commands import Effect
+from p2os.pioneer.serve import served_pioneer
 from p2os.protocol.config_packet import ConfigPacket
 from p2os.protocol.packets import Identity
 from p2os.protocol.sip import SonarReading, StandardSip
-from p2os.transport import HungUpError
-from simbase.timing import NS_PER_MS
+from p2os.robots.parameters import load_parameters
 
 TIMEOUT_S = 30.0
+P2DX = load_parameters("p2dx")
 Capture = pytest.CaptureFixture[str]
 
 # ports ----------------------------------------------------------------------------------
@@ -163,118 +162,31 @@ def test_a_package_that_is_not_there_has_no_version() -> None:
 # info -----------------------------------------------------------------------------------
 
 
-class ToRobot:
-    """A line straight into a virtual robot, with a clock that runs as fast as it is read."""
-
-    description = "loop:robot"
-
-    def __init__(self, robot: Any, *, deaf: bool = False) -> None:
-        self.robot, self.deaf = robot, deaf
-        self.now = robot.now
-        self.hangs_up_at: int | None = None
-        self._read, self._write = os.pipe()
-
-    def clock(self) -> int:
-        self.now += 5 * NS_PER_MS
-        return self.now
-
-    def read(self) -> bytes:
-        if self.hangs_up_at is not None and self.now >= self.hangs_up_at:
-            raise HungUpError("loop:robot closed the connection")
-        self.robot.pioneer.advance_to(self.now)
-        return b"".join(self.robot.pioneer.take_output())
-
-    def write(self, data: bytes) -> None:
-        if self.hangs_up_at is not None and self.now >= self.hangs_up_at:
-            raise HungUpError("loop:robot closed the connection")
-        if data and not self.deaf:
-            self.robot.now = self.now
-            self.robot.send(data)
-            os.write(self._write, b"x")  # readable at once: no wall-clock waiting in this test
-
-    def fileno(self) -> int:
-        os.write(self._write, b"x")
-        return self._read
-
-    def close(self) -> None:
-        os.close(self._read)
-        os.close(self._write)
-
-
-@pytest.fixture
-def line(robot: Any) -> Iterator[ToRobot]:
-    made = ToRobot(robot)
-    yield made
-    made.close()
-
-
-def test_a_robot_tells_who_it_is_and_is_left_closed(line: ToRobot) -> None:
-    found = info.ask(line, clock=line.clock)  # type: ignore[arg-type]
+def test_a_robot_tells_who_it_is_and_is_left_closed() -> None:
+    told: list[str] = []
+    with served_pioneer(body="kinematic", on_event=lambda _now, what, _detail: told.append(what)) as url:
+        found = info.ask(url)
     assert found.identity == Identity("Virtual", "Pioneer", "p2dx")
     assert found.config is not None
-    assert found.sip.raw_battery == 126
-    assert not line.robot.pioneer.state.open
-    assert "motors" not in line.robot.told()
+    assert found.state.battery_v == 12.6
+    assert found.state.sonar
+    assert "motors" not in told
+    assert told.index("opened") < told.index("closed")
 
 
-def test_a_robot_still_streaming_to_somebody_is_stopped_first(line: ToRobot) -> None:
-    line.robot.open()
-    line.robot.say(11, 300)
-    line.robot.run(500)
-    line.now = line.robot.now
-    assert info.ask(line, clock=line.clock).identity.subclass == "p2dx"  # type: ignore[arg-type]
-    assert line.robot.told().count("closed") == 2
-
-
-def test_a_robot_that_knows_no_config_still_answers(line: ToRobot, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_robot_that_knows_no_config_still_answers(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("p2os.pioneer.controller.controller.apply", lambda *_: Effect.UNKNOWN)
-    assert info.ask(line, clock=line.clock).config is None  # type: ignore[arg-type]
-
-
-def test_nobody_answering_is_an_error_with_a_hint(robot: Any) -> None:
-    line = ToRobot(robot, deaf=True)
-    with pytest.raises(RemoteProtocolError, match="no robot on loop:robot: no answer") as caught:
-        info.ask(line, clock=line.clock)  # type: ignore[arg-type]
-    assert "p2os serve" in str(caught.value.hint)
-    line.description = "serial:/dev/ttyUSB0?baud=9600"
-    with pytest.raises(RemoteProtocolError) as caught:
-        info.ask(line, clock=line.clock)  # type: ignore[arg-type]
-    assert "speed" in str(caught.value.hint)
-    line.close()
-
-
-def test_a_robot_that_synchronises_but_sends_nothing_is_an_error(
-    line: ToRobot, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(type(line.robot.pioneer), "next_due", lambda _self: None)
-    with pytest.raises(RemoteProtocolError, match="no robot on loop:robot: no packet"):
-        info.ask(line, clock=line.clock)  # type: ignore[arg-type]
-
-
-def test_a_robot_that_takes_for_ever_is_an_error(line: ToRobot, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(info, "LONGEST_NS", 50 * NS_PER_MS)
-    with pytest.raises(RemoteProtocolError, match="sends no packets"):
-        info.ask(line, clock=line.clock)  # type: ignore[arg-type]
-
-
-def test_a_line_that_hangs_up_is_an_error_with_a_hint(line: ToRobot) -> None:
-    line.hangs_up_at = 50 * NS_PER_MS
-    with pytest.raises(TransportError, match="closed the connection") as caught:
-        info.ask(line, clock=line.clock)  # type: ignore[arg-type]
-    assert "another program" in str(caught.value.hint)
+    with served_pioneer(body="kinematic") as url:
+        assert info.ask(url).config is None
 
 
 @pytest.fixture
 def told(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     """Let `p2os info` find a robot that says this."""
 
-    class Closing:
-        def close(self) -> None:
-            pass
-
     def tell(identity: Identity, sip: StandardSip, config: ConfigPacket | None) -> None:
-        monkeypatch.setattr(info, "open_url", lambda _url: Closing())
-        monkeypatch.setattr(info, "ask", lambda _transport: info.RobotInfo(identity=identity, sip=sip, config=config))
+        found = info.RobotInfo(identity=identity, state=Observer(P2DX).take(sip, 0), parameters=P2DX, config=config)
+        monkeypatch.setattr(info, "ask", lambda _url: found)
 
     return tell
 
@@ -319,7 +231,7 @@ def test_info_is_printed_for_programs(told: Callable[..., None], capsys: Capture
     plain = json.loads(capsys.readouterr().out)
     assert plain["name"] == "Wilma"
     assert plain["sip"]["x_m"] == -0.00084
-    assert plain["sip"]["sonar_m"] == [[3, 0.268]]
+    assert plain["sip"]["sonar_m"] == {"3": 0.268}
     assert plain["config"] == {"robot_class": "Pioneer", "subclass": "p2dx", "serial": ""}
     told(Identity("Wilma", "Pioneer", "p2dx"), SIP, None)
     assert run(["info", "tcp:x", "--json"]) == 0

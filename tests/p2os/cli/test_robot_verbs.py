@@ -373,16 +373,6 @@ def test_time_counts_from_the_first_packet(fast: object, run: Run, capsys: Captu
     assert 0 < times[-1] < 2
 
 
-@pytest.mark.parametrize(
-    ("arguments", "is_said"), [(["1"], True), (["1", "0"], True), (["0", "1"], False), (["0x09", "0x19"], False)]
-)
-def test_a_digital_output_without_a_mask_says_that_nothing_changes(
-    fast: object, run: Run, capsys: Capture, arguments: list[str], is_said: bool
-) -> None:
-    assert run("send", fast.url, "DIGOUT", *arguments, "--wait", "50ms") == 0
-    assert ("DIGOUT with mask 0 changes no output" in capsys.readouterr().err) is is_said
-
-
 def test_a_speed_above_the_robots_own_is_said(fast: object, run: Run, capsys: Capture) -> None:
     words = ("--vel", "9m/s", "--turn-rate", "2000deg/s", "--for", "50ms")
     assert run("drive", fast.url, *words) == 0

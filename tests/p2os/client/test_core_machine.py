@@ -72,7 +72,7 @@ class Story(RuleBasedStateMachine):
             call()
         except (LinkLostError, MotorsDisabledError):
             return
-        self.is_allowed |= self.rig.core.goal_is_under_way or not self.rig.core.commanded.are_zero
+        self.is_allowed |= self.rig.core._mover.has_goal or not self.rig.core.commanded.are_zero
 
     @rule()
     def program_stops(self) -> None:

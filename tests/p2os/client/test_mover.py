@@ -358,7 +358,7 @@ def test_a_goal_ends_when_something_else_takes_its_place(how: str) -> None:
     ways[how]()
     assert goal.ended is not None
     assert goal.ended.problem
-    assert rig.core.goal_is_under_way is (how == "goal")
+    assert rig.core._mover.has_goal is (how == "goal")
     rig.run(1)
     assert any(isinstance(notice, MotionEnded) for notice in rig.notices())
     rig.core.cancel_goal(goal, rig.now)

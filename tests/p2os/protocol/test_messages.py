@@ -1,7 +1,6 @@
 """Commands and packets: two-way for every row, tolerant of what clients really send."""
 
 import json
-import math
 from pathlib import Path
 
 import pytest
@@ -16,8 +15,6 @@ from p2os.protocol.frames import Frame
 from p2os.protocol.packets import Identity, RawPacket, packet_frame, read_packet
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import TAIL, SonarReading, StandardSip
-from p2os.protocol.units import in_units
-from p2os.robots.parameters import load_parameters
 from tests.p2os.protocol.drawn_packets import SEEDS, Draw, pairs_of_bytes, sip
 
 GOLDEN = Path(__file__).parents[2] / "golden"
@@ -152,20 +149,6 @@ def test_a_sip_cut_anywhere_is_raw_and_never_lost() -> None:
         assert read_packet(Frame(whole[:cut]), Profile.P2OS) == RawPacket(0x32, whole[1:cut])
         with pytest.raises(RemoteProtocolError):
             StandardSip.from_frame(Frame(whole[:cut]), Profile.P2OS)
-
-
-def test_units_are_si() -> None:
-    sip = StandardSip(
-        kind=0x33, raw_x=0x8000 | 1000, raw_heading=1024, raw_left_velocity=-100, raw_right_velocity=257,
-        raw_battery=125, sonar=(SonarReading(3, 1000),),
-    )  # fmt: skip
-    values = in_units(sip, load_parameters("p2dx"))
-    assert values.x_m == pytest.approx(0.84)
-    assert values.heading_rad == pytest.approx(math.pi / 2)
-    assert (values.left_mps, values.right_mps) == pytest.approx((-0.1, 0.257))
-    assert values.turn_radps == pytest.approx(1.0)
-    assert values.battery_v == pytest.approx(12.5)
-    assert values.sonar_m == ((3, pytest.approx(0.268)),)
 
 
 texts = st.text(st.characters(min_codepoint=1, max_codepoint=255), max_size=10)

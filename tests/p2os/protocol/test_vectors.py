@@ -26,7 +26,7 @@ from p2os.protocol.packets import (
 )
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import POSITION_MASK, TAIL
-from p2os.protocol.units import in_units
+from p2os.protocol.units import battery_v, range_m
 from p2os.robots.parameters import load_parameters
 
 VECTORS = [
@@ -37,7 +37,8 @@ VECTORS = [
 #: What says nothing of the frame's inside.
 PROSE = {"direction", "length", "note", "command_name"}
 ARGUMENT_TYPES = {None: None, "int": POSITIVE, "nint": NEGATIVE, "str": STRING}
-VEL2_DIVISOR = load_parameters("p2dx").vel2_divisor
+P2DX = load_parameters("p2dx")
+VEL2_DIVISOR = P2DX.vel2_divisor
 
 
 def sip_values(sip: StandardSip) -> dict[str, Any]:
@@ -45,16 +46,15 @@ def sip_values(sip: StandardSip) -> dict[str, Any]:
         value.to_bytes(size, "little", signed=signed)
         for value, (_, size, signed) in zip(sip.tail, TAIL, strict=False)
     )  # fmt: skip
-    in_metres = in_units(sip, load_parameters("p2dx"))
     return {
         "type": sip.kind, "moving": sip.moving, "x_raw": sip.raw_x, "y_raw": sip.raw_y, "th_raw": sip.raw_heading,
         "x_15bit": sip.raw_x & POSITION_MASK, "y_15bit": sip.raw_y & POSITION_MASK, "lvel": sip.raw_left_velocity,
-        "rvel": sip.raw_right_velocity, "battery_V": in_metres.battery_v, "control_raw": sip.raw_control,
+        "rvel": sip.raw_right_velocity, "battery_V": battery_v(sip.raw_battery), "control_raw": sip.raw_control,
         "stall_word": sip.rear_bumpers << 1 | sip.stall_left | (sip.front_bumpers << 1 | sip.stall_right) << 8,
         "stall_left": sip.stall_left, "stall_right": sip.stall_right, "rear_bumpers": sip.rear_bumpers,
         "front_bumpers": sip.front_bumpers, "flags": sip.raw_flags, "compass_raw": sip.raw_compass,
         "sonar": [[reading.number, reading.raw_range] for reading in sip.sonar],
-        "sonar_mm": [[number, round(metres * 1000)] for number, metres in in_metres.sonar_m],
+        "sonar_mm": [[one.number, round(range_m(one.raw_range, P2DX) * 1000)] for one in sip.sonar],
         "timer": sip.analog_port | sip.gripper_state << 8, "anport": sip.analog_port, "grip_state": sip.gripper_state,
         "analog": sip.raw_analog, "digin": sip.digital_in, "digout": sip.digital_out, "ext_hex": tail.hex(),
     }  # fmt: skip

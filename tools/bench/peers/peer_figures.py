@@ -135,7 +135,7 @@ class Peer:
         parameters, odometry = self.parameters, self.odometry
         if parameters is None or odometry is None:
             return
-        odometry.update(sip, now)
+        odometry.update(sip)
         left, right = (raw * parameters.velocity_conv for raw in (sip.raw_left_velocity, sip.raw_right_velocity))
         self.samples.append(Sample(
             t=(now - self.began) / NS_PER_S, robot_s=len(self.samples) * CYCLE_S, forward=(left + right) / 2,

@@ -69,7 +69,7 @@ class Controller(RuleBasedStateMachine):
 
     @rule()
     def reboot(self) -> None:
-        self.robot.pioneer.reboot(self.robot.now)
+        self.robot.pioneer.do("fault reboot", self.robot.now)
 
     @rule()
     def hang_up(self) -> None:

@@ -185,14 +185,6 @@ def test_a_fleet_stands_where_it_is_placed_in_one_world_or_apart() -> None:
         FleetOrder(robots=())
 
 
-def test_a_model_with_batteries_of_its_own_says_what_aria_needs() -> None:
-    def notes(chosen: ControllerSettings) -> tuple[str, ...]:
-        return make_fleet(FleetOrder(robots=(RobotOrder(model="pioneer-lx", settings=chosen),), body="kinematic")).notes
-
-    assert any("--for aria" in note for note in notes(ControllerSettings()))
-    assert not any("--for aria" in note for note in notes(ControllerSettings.for_client("aria")))
-
-
 def test_the_rear_ring_is_fitted_on_demand_and_measures_behind() -> None:
     fitted = {}
     for chosen in (ControllerSettings(), ControllerSettings(rear_sonar=True), ControllerSettings.for_client("aria")):

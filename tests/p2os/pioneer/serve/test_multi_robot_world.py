@@ -240,7 +240,7 @@ def test_a_reset_or_a_reboot_of_one_leaves_the_others_and_its_own_body_standing(
         drive(one, 0, 200)
         live(one, 1.0)
     made.bring(0, 10**9)
-    made.robots[0].reboot(10**9)
+    made.robots[0].do("fault reboot", 10**9)
     for one in (made, alone):
         one.robots[1].take_output()
         live(one, 4.0, since=1.0)
