@@ -29,6 +29,7 @@ from bluepill_sim.extension.layout import (
 from bluepill_sim.extension.library import library
 from bluepill_sim.extension.windows import NO_TIME
 from bluepill_sim.fabric.subscriptions import EDGE
+from simbase.c_library import guarded
 from simbase.state import Stateful
 from simbase.timing import Nanos
 
@@ -629,18 +630,7 @@ class Fabric(Stateful):
 
     def _guarded(self, call: Callable[..., _Result], default: _Result) -> Callable[..., _Result]:
         """Return a callback for C: what it raises is kept, and the slice ends."""
-        reference = weakref.ref(self)
-
-        def callback(*arguments: int) -> _Result:
-            try:
-                return call(*arguments)
-            except BaseException as error:  # noqa: BLE001 - C stands between here and the caller
-                fabric = reference()
-                if fabric is not None:
-                    fabric._fail(error)  # noqa: SLF001 - its own
-                return default
-
-        return callback
+        return guarded(call, default, self._fail)
 
     def _fail(self, error: BaseException) -> None:
         self._failure = error
