@@ -209,7 +209,8 @@ class UnicornCore(Stateful):
 
     def start(self, address: int) -> int:
         """Run from an address (bit 0: Thumb) until something stops it; return the library's error number."""
-        return self._library.uc_emu_start(self._handle, address, NOWHERE, 0, 0)
+        error: int = self._library.uc_emu_start(self._handle, address, NOWHERE, 0, 0)
+        return error
 
     def stop(self) -> None:
         """End the run; only from a hook, never from an access to I/O, which would be run again."""
