@@ -84,19 +84,15 @@ class UsbMaster(Protocol):
     @property
     def next_ns(self) -> Nanos | None:
         """When it acts next; None for never."""
-        ...
 
     def advance_to(self, now_ns: Nanos) -> None:
         """Act on what is due."""
-        ...
 
     def device_changed(self, now_ns: Nanos) -> None:
         """Take that the device answers otherwise, or that its pull-up has come or gone."""
-        ...
 
     def wake(self, now_ns: Nanos) -> None:
         """Take that a suspended device signals a resume."""
-        ...
 
 
 def span_ns(bits: int) -> Nanos:
