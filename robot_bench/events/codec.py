@@ -216,7 +216,7 @@ _READ: Mapping[object, Callable[[Json, str], object]] = {
 }
 
 
-def _plain(kind: str, made: type[Event], words: str) -> _Row:
+def _plain(kind: str, made: type[Any], words: str) -> _Row:
     """Return the row of a kind of which each attribute is a key, read by its type: "key:attribute", or one for both."""
     keys = {key: name or key for key, _, name in (word.partition(":") for word in words.split())}
     readers = [(name, key, _READ[get_type_hints(made)[name]]) for key, name in keys.items()]
@@ -226,7 +226,8 @@ def _plain(kind: str, made: type[Event], words: str) -> _Row:
         return {key: _SPELLED[type(value)](value) for key, value in values.items()}
 
     def from_entry(t: Nanos, entry: Json) -> Event:
-        return made(t=t, **{name: read(entry, key) for name, key, read in readers})
+        event: Event = made(t=t, **{name: read(entry, key) for name, key, read in readers})
+        return event
 
     return _Row(kind, _encoded(to_entry), from_entry)
 
