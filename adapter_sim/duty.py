@@ -42,31 +42,25 @@ class PeriodicLevel(Protocol):
     @property
     def ns(self) -> Nanos:
         """Return when tick `at` is."""
-        ...
 
     @property
     def at(self) -> int:
         """Return the ticks from a rising edge to `ns`."""
-        ...
 
     @property
     def period(self) -> int:
         """Return the ticks from a rising edge to the next."""
-        ...
 
     @property
     def high(self) -> int:
         """Return the ticks at level 1."""
-        ...
 
     @property
     def ticks_hz(self) -> int:
         """Return the ticks a second."""
-        ...
 
     def level(self, at_ns: Nanos, /) -> bool:
         """Return the level at a time, which is at or after `ns`."""
-        ...
 
 
 #: What a wire does from one time on until before another: when, and the level or wave from then on. It is known for

@@ -55,18 +55,15 @@ class PinBank(Protocol):
 
     def read(self, signal: str, at: Nanos) -> bool:
         """Return the level of a wire at the instant `at`, an edge at `at` included."""
-        ...
 
     def course(self, signal: str, begin: Nanos, end: Nanos) -> Sequence[tuple[Nanos, bool | PeriodicLevel]]:
         """Return what a wire does from `begin` on until before `end`: when, and the level or wave from then on.
 
         `begin` lies at most `COURSE_NS` before the present.
         """
-        ...
 
     def write(self, signal: str, high: bool | None, now: Nanos) -> None:
         """Drive a wire from `now` on; None releases it to its pull."""
-        ...
 
 
 class Inputs(Stateful):

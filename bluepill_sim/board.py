@@ -124,11 +124,10 @@ class BluePill(Stateful):
         self._usarts = tuple(SerialPort(chip.parts.usart(n), self._activity, self._wait_for_bytes) for n in (1, 2, 3))
         #: The parts that were attached by name, and the world that they sense.
         self.attached = AttachedParts(lambda text: chip.pins.warn(text, once=text), chip.request_stop)
-        self._usb = UsbHost(self._run_until)
-        self._usb_serial = UsbSerial(self._usb, self._run_until, chip.request_stop)
         usb = cast("Usb", chip.parts.by_name["USB"])
+        self._usb = UsbHost(usb, self._run_until)
+        self._usb_serial = UsbSerial(self._usb, self._run_until, chip.request_stop)
         usb.attach(self._usb)
-        self._usb.join(usb)
         #: How often it was reset since power came up, by cause.
         self.resets: Counter[ResetCause] = Counter()
         chip.on_reset = self._reset_begins

@@ -14,7 +14,6 @@ import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeAlias, cast
 
@@ -30,6 +29,7 @@ from p2os.gamepad import PadReport
 from p2os.robots.parameters import RobotParameters
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.wires.line_ends import ENDS, AdapterPart
+from simbase.c_library import built, guarded, loaded
 from simbase.errors import MissingDependencyError, UsageError
 from simbase.timing import NS_PER_S, Nanos, Reached
 
@@ -59,7 +59,7 @@ _CHOICES: dict[str, tuple[str, ...]] = {
     "encoder_at_open": tuple(EncoderAtOpen),
 }
 
-#: Result and arguments of each function: v nothing, s text, i 32 bits, l 64 bits, z size, p pointer.
+#: Result and arguments of each function, as `simbase.c_library` spells them.
 _FUNCTIONS = {
     "adapter_version": "i",
     "adapter_new": "ppppplp",
@@ -85,15 +85,11 @@ _FUNCTIONS = {
     "adapter_save": "vpp",
     "adapter_restore": "vpp",
 }
-_TYPES: dict[str, Any] = {
-    "v": None, "s": ctypes.c_char_p, "i": ctypes.c_int32, "l": ctypes.c_int64, "z": ctypes.c_size_t,
-    "p": ctypes.c_void_p,
-}  # fmt: skip
 
 
 def is_available() -> bool:
     """Tell whether the firmware's library was built with this package."""
-    return find_spec("robot_bench._adapter_firmware") is not None
+    return built("robot_bench._adapter_firmware") is not None
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +149,11 @@ class FirmwareAdapter:
         #: What measures the duties: the part of the hardware that the core does not have.
         self._duties = dict(zip((0, values[0].width), duty_wires(pins, values, settings), strict=True))
         self._callbacks = _Callbacks(
-            None, _Read(self._read), _Duty(self._duty), _Drive(self._drive), _Happened(self._happened)
+            None,
+            _Read(guarded(self._read, 0, self._fail)),
+            _Duty(guarded(self._duty, 0, self._fail)),
+            _Drive(guarded(self._drive, None, self._fail)),
+            _Happened(guarded(self._happened, None, self._fail)),
         )
         fault = ctypes.c_char_p()
         self._handle = library.adapter_new(
@@ -280,40 +280,28 @@ class FirmwareAdapter:
     # What the firmware calls. An exception must not cross the C code: it is kept, and raised behind it.
 
     def _read(self, _user: object, at: int) -> int:
-        try:
-            read, word = self._pins.read, 0
-            for name, weight in self._inputs:
-                if read(name, at):
-                    word |= weight
-        except BaseException as failure:  # noqa: BLE001 - raised again by _raise_failure
-            self._failure = failure
-            return 0
-        else:
-            return word
+        read, word = self._pins.read, 0
+        for name, weight in self._inputs:
+            if read(name, at):
+                word |= weight
+        return word
 
     def _duty(self, _user: object, bit: int, at: int) -> int:
-        try:
-            return self._duties[bit].duty(at)
-        except BaseException as failure:  # noqa: BLE001 - raised again by _raise_failure
-            self._failure = failure
-            return 0
+        return self._duties[bit].duty(at)
 
     def _drive(self, _user: object, mask: int, levels: int, now: int) -> None:
-        try:
-            for bit, name in enumerate(self._outputs):
-                if not mask:
-                    self._pins.write(name, None, now)
-                elif mask >> bit & 1:
-                    self._pins.write(name, bool(levels >> bit & 1), now)
-        except BaseException as failure:  # noqa: BLE001 - raised again by _raise_failure
-            self._failure = failure
+        for bit, name in enumerate(self._outputs):
+            if not mask:
+                self._pins.write(name, None, now)
+            elif mask >> bit & 1:
+                self._pins.write(name, bool(levels >> bit & 1), now)
 
     def _happened(self, _user: object, now: int, what: bytes, detail: bytes, first: int, second: int) -> None:
-        try:
-            if self.on_event is not None:
-                self.on_event(now, what.decode(), self._detail(what.decode(), detail.decode(), first, second))
-        except BaseException as failure:  # noqa: BLE001 - raised again by _raise_failure
-            self._failure = failure
+        if self.on_event is not None:
+            self.on_event(now, what.decode(), self._detail(what.decode(), detail.decode(), first, second))
+
+    def _fail(self, failure: BaseException) -> None:
+        self._failure = failure  # raised again by _raise_failure
 
     def _detail(self, what: str, detail: str, first: int, second: int) -> str:
         if what == "command":
@@ -424,17 +412,7 @@ def wire_numbers(pinout: Pinout) -> dict[str, int]:
 
 @cache
 def _library() -> Any:
-    spec = find_spec("robot_bench._adapter_firmware")
-    if spec is None or spec.origin is None:
-        raise MissingDependencyError(
-            "the adapter's firmware core is not built",
-            hint="p2os doctor says why",
-        )
-    library = ctypes.CDLL(spec.origin)
-    for name, kinds in _FUNCTIONS.items():
-        function = getattr(library, name)
-        function.restype = _TYPES[kinds[0]]
-        function.argtypes = [_TYPES[kind] for kind in kinds[1:]]
+    library = loaded(built("robot_bench._adapter_firmware"), _FUNCTIONS, "the adapter's firmware core")
     if library.adapter_version() != VERSION:
         raise MissingDependencyError(
             f"the adapter's firmware core has interface {library.adapter_version()}, expected {VERSION}",

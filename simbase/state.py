@@ -95,11 +95,9 @@ class Part(Protocol):
 
     def snapshot(self) -> object:
         """Return all that decides the future, as a value."""
-        ...
 
     def restore(self, snapshot: Any) -> None:
         """Put back what `snapshot` returned."""
-        ...
 
 
 class _Rebuilders(dict[type, Callable[[Any, str, _Inner], object] | None]):

@@ -44,16 +44,12 @@ class Timed(Protocol):
 
     def next_deadline(self) -> Nanos | None:
         """Return when this part next wants to act, or None for never."""
-        ...
 
     def advance_to(self, limit: Nanos) -> Reached:
         """Act on everything due up to and including `limit` nanoseconds."""
-        ...
 
     def snapshot(self) -> object:
         """Return all that decides this part's future, as a value that can be pickled."""
-        ...
 
     def restore(self, snapshot: object) -> None:
         """Put back what `snapshot` returned."""
-        ...

@@ -94,7 +94,7 @@ LOGGING = (
 LAYERS = {
     "simbase": (
         ("timing", "state", "installation", "wire", "lazy", "interrupts"), ("errors",),
-        ("files", "units", "user_classes"),
+        ("files", "units", "user_classes", "c_library"),
     ),
     "p2os": (
         ("errors", "event_log"), ("toml_file",), ("toml_schema",), ("robots", "gamepad"), ("protocol",), ("transport",),

@@ -71,19 +71,15 @@ class BlockListener(Protocol):
 
         `following` is `HANDLER_LEFT` where it has left a handler, and None where it is not known.
         """
-        ...
 
     def enter(self, number: int, cycle: int) -> None:
         """Take the entry of an exception."""
-        ...
 
     def leave(self, cycle: int) -> None:
         """Take the return from an exception."""
-        ...
 
     def reset(self, cycle: int) -> None:
         """Take a reset of the chip."""
-        ...
 
 
 class BlockWalk:

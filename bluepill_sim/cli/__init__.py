@@ -16,7 +16,8 @@ def register(app: typer.Typer) -> None:
     mcu = typer.Typer(help=HELP, rich_markup_mode=None, invoke_without_command=True)
     mcu.callback()(_without_command)
     for module in (run, parts, debug, info, pins, trace, coverage, profile, compare_silicon):
-        module.register(mcu)
+        name = module.__name__.rpartition(".")[2]
+        mcu.command(name.replace("_", "-"), help=module.HELP)(getattr(module, name))
     app.add_typer(mcu, name="mcu", rich_help_panel="BluePill")
 
 

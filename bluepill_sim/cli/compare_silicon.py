@@ -23,11 +23,6 @@ Examples:
 """
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command("compare-silicon", help=HELP)(compare_silicon)
-
-
 def compare_silicon(
     log: Annotated[Path, typer.Argument(help="What the kit has printed.", metavar="LOG")],
     show_all: Annotated[bool, typer.Option("--all", help="Show what is the same too.")] = False,

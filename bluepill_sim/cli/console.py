@@ -28,11 +28,9 @@ class SerialPort(Protocol):
 
     def subscribe(self, sink: Callable[[Sequence[tuple[int, int]]], None]) -> Callable[[], None]:
         """Have `sink` called with rows (word, ns) that go out from now on."""
-        ...
 
     def receive(self, data: bytes) -> None:
         """Take characters from outside."""
-        ...
 
 
 class Console(Protocol):
@@ -41,19 +39,15 @@ class Console(Protocol):
     @property
     def description(self) -> str:
         """Where it goes, for people."""
-        ...
 
     def write(self, data: bytes) -> None:
         """Take characters that the chip has sent."""
-        ...
 
     def poll(self) -> bytes:
         """Return what has come from the far end since the last call, without waiting."""
-        ...
 
     def close(self) -> None:
         """Let go of whatever it has opened."""
-        ...
 
 
 class StreamConsole:

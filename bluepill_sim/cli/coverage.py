@@ -12,10 +12,10 @@ from bluepill_sim.analysis.lcov import write_lcov
 from bluepill_sim.analysis.observation import Observation
 from bluepill_sim.board import BluePill
 from bluepill_sim.cli.driving import parse_changes, print_fault, print_status, run_driven, summary, warn_on_stderr
-from bluepill_sim.cli.quantities import option, time_option
+from bluepill_sim.cli.quantities import Drive, JsonOutput, Span, option
 from bluepill_sim.program.line_table import read_lines
 from bluepill_sim.program.static_code import StaticCode
-from simbase.timing import NS_PER_S, Nanos
+from simbase.timing import NS_PER_S
 from simbase.units import PERCENT
 
 HELP = """Show which lines and branches of a firmware run.
@@ -33,17 +33,10 @@ Examples:
 """
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command("coverage", help=HELP)(coverage)
-
-
 def coverage(
     firmware: Annotated[Path, typer.Argument(help="ELF with debug information.", metavar="FIRMWARE")],
-    span_ns: Annotated[Nanos, time_option("--for", purpose="How much virtual time.", shown="1s")] = NS_PER_S,
-    drive: Annotated[
-        list[str] | None, typer.Option(help="Put a level on a pin at a time; repeatable.", metavar="PIN=LEVEL@TIME")
-    ] = None,
+    span_ns: Span = NS_PER_S,
+    drive: Drive = None,
     lcov: Annotated[Path | None, typer.Option(help="Write an lcov tracefile.", metavar="FILE")] = None,
     sources: Annotated[
         Path | None, typer.Option(help="Where relative names of source files start from.", metavar="FOLDER")
@@ -54,7 +47,7 @@ def coverage(
     fail_under: Annotated[
         float, option(PERCENT, "--fail-under", purpose="Least share of lines.", shown="0%", least="0%", most="100%")
     ] = 0.0,
-    json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    json_output: JsonOutput = False,
 ) -> None:
     """Measure coverage."""
     board = BluePill(firmware)

@@ -1,6 +1,5 @@
 """`p2os mcu debug`: GDB at an emulated BluePill."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -9,7 +8,7 @@ from bluepill_sim.board import BluePill
 from bluepill_sim.cli.console import connect, open_console
 from bluepill_sim.cli.driving import print_status, summary, warn_on_stderr
 from bluepill_sim.cli.gdb_server import GdbServer
-from bluepill_sim.cli.quantities import option
+from bluepill_sim.cli.quantities import Firmware, option
 from bluepill_sim.debug.machine import LoneChip
 from simbase.units import PORT
 
@@ -30,13 +29,8 @@ Examples:
 DEFAULT_PORT = 3333
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command("debug", help=HELP)(debug)
-
-
 def debug(
-    firmware: Annotated[Path, typer.Argument(help="ELF, HEX or BIN.", metavar="FIRMWARE")],
+    firmware: Firmware,
     port: Annotated[
         int,
         option(

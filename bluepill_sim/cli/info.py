@@ -1,7 +1,6 @@
 """`p2os mcu info`: what a firmware is, and what it touches that is not modelled."""
 
 import json
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -9,7 +8,7 @@ import typer
 from bluepill_sim.analysis.columns import in_columns
 from bluepill_sim.board import BluePill
 from bluepill_sim.cli.driving import run_driven
-from bluepill_sim.cli.quantities import time_option
+from bluepill_sim.cli.quantities import Firmware, JsonOutput, time_option
 from bluepill_sim.program.elf_file import Layout, layout, stack_top, variables_end, vectors
 from bluepill_sim.program.image import Image
 from bluepill_sim.stm32f103 import FLASH_BYTES, SRAM_BYTES
@@ -30,17 +29,12 @@ Examples:
 _SHOWN_SYMBOLS = 12
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command("info", help=HELP)(info)
-
-
 def info(
-    firmware: Annotated[Path, typer.Argument(help="ELF, HEX or BIN.", metavar="FIRMWARE")],
+    firmware: Firmware,
     span_ns: Annotated[
         Nanos, time_option("--for", purpose="How long it is run; 0: not at all.", shown="500ms")
     ] = NS_PER_S // 2,
-    json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    json_output: JsonOutput = False,
 ) -> None:
     """Show what a firmware is."""
     board = BluePill(firmware)

@@ -25,11 +25,6 @@ Examples:
 _BUSES = {"exchange": "SPI", "start": "I2C", "sent": "USART", "join": "CAN"}
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command("parts", help=HELP)(parts)
-
-
 def parts(name: str | None = typer.Argument(None, help="One of them; all without it.", metavar="[PART]")) -> None:
     """List parts."""
     if name is None:

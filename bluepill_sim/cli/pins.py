@@ -12,8 +12,8 @@ from bluepill_sim.analysis.sigrok import write_sigrok
 from bluepill_sim.analysis.vcd import write_vcd
 from bluepill_sim.board import BluePill
 from bluepill_sim.cli.driving import parse_changes, print_fault, print_status, run_driven, summary, warn_on_stderr
-from bluepill_sim.cli.quantities import time_option
-from simbase.timing import NS_PER_S, Nanos
+from bluepill_sim.cli.quantities import Drive, Firmware, JsonOutput, Span
+from simbase.timing import NS_PER_S
 
 HELP = """Run a firmware for a while, then show what each pin is and did.
 
@@ -31,21 +31,14 @@ Examples:
 """
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command("pins", help=HELP)(pins)
-
-
 def pins(
-    firmware: Annotated[Path, typer.Argument(help="ELF, HEX or BIN.", metavar="FIRMWARE")],
-    span_ns: Annotated[Nanos, time_option("--for", purpose="How much virtual time.", shown="1s")] = NS_PER_S,
-    drive: Annotated[
-        list[str] | None, typer.Option(help="Put a level on a pin at a time; repeatable.", metavar="PIN=LEVEL@TIME")
-    ] = None,
+    firmware: Firmware,
+    span_ns: Span = NS_PER_S,
+    drive: Drive = None,
     vcd: Annotated[Path | None, typer.Option(help="Write a value change dump.", metavar="FILE")] = None,
     sr: Annotated[Path | None, typer.Option(help="Write a sigrok session.", metavar="FILE")] = None,
     every: Annotated[bool, typer.Option("--all", help="Untouched pins too.")] = False,
-    json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    json_output: JsonOutput = False,
 ) -> None:
     """Show the pins."""
     board = BluePill(firmware)

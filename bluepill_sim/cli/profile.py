@@ -14,12 +14,12 @@ from bluepill_sim.analysis.profile_text import exception_lines, function_lines
 from bluepill_sim.analysis.stack import StackGauge
 from bluepill_sim.board import BluePill
 from bluepill_sim.cli.driving import parse_changes, print_fault, print_status, run_driven, summary, warn_on_stderr
-from bluepill_sim.cli.quantities import time_option
+from bluepill_sim.cli.quantities import Drive, Firmware, JsonOutput, Span
 from bluepill_sim.core.nvic import exception_name
 from bluepill_sim.program.functions import FunctionTable
 from bluepill_sim.program.static_code import StaticCode
 from simbase.files import write_text
-from simbase.timing import NS_PER_S, Nanos
+from simbase.timing import NS_PER_S
 
 HELP = """Run a firmware for a while and show where its cycles go.
 
@@ -38,21 +38,14 @@ Examples:
 _SHOWN_FUNCTIONS = 20
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command("profile", help=HELP)(profile)
-
-
 def profile(
-    firmware: Annotated[Path, typer.Argument(help="ELF, HEX or BIN.", metavar="FIRMWARE")],
-    span_ns: Annotated[Nanos, time_option("--for", purpose="How much virtual time.", shown="1s")] = NS_PER_S,
-    drive: Annotated[
-        list[str] | None, typer.Option(help="Put a level on a pin at a time; repeatable.", metavar="PIN=LEVEL@TIME")
-    ] = None,
+    firmware: Firmware,
+    span_ns: Span = NS_PER_S,
+    drive: Drive = None,
     flame: Annotated[Path | None, typer.Option(help="Write a flame graph (.svg).", metavar="FILE")] = None,
     folded: Annotated[Path | None, typer.Option(help="Write folded stacks.", metavar="FILE")] = None,
     every: Annotated[bool, typer.Option("--all", help="Every function that ran.")] = False,
-    json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    json_output: JsonOutput = False,
 ) -> None:
     """Measure where the cycles go."""
     board = BluePill(firmware)

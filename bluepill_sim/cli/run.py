@@ -21,7 +21,7 @@ from bluepill_sim.cli.driving import (
     warn_on_stderr,
 )
 from bluepill_sim.cli.parts import attach_parts, show_parts
-from bluepill_sim.cli.quantities import option, time_option
+from bluepill_sim.cli.quantities import Firmware, option, time_option
 from bluepill_sim.cli.stimuli import open_traces
 from bluepill_sim.core.halts import ChipReached
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reason
@@ -65,13 +65,8 @@ class _Opened(Protocol):
     def close(self) -> None: ...
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command("run", help=HELP)(run)
-
-
 def run(
-    firmware: Annotated[Path, typer.Argument(help="ELF, HEX or BIN.", metavar="FIRMWARE")],
+    firmware: Firmware,
     span_ns: Annotated[
         Nanos | None, time_option("--for", purpose="How much virtual time.", shown="1s, with --realtime without end")
     ] = None,

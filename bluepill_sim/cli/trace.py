@@ -10,7 +10,7 @@ import typer
 
 from bluepill_sim.board import BluePill
 from bluepill_sim.cli.driving import parse_changes, print_fault, print_status, run_driven, summary, warn_on_stderr
-from bluepill_sim.cli.quantities import time_option
+from bluepill_sim.cli.quantities import Drive, Firmware, time_option
 from bluepill_sim.core import BlockRecorder
 from bluepill_sim.program.functions import FunctionTable
 from bluepill_sim.program.last_blocks import lines_of
@@ -34,18 +34,11 @@ Examples:
 _CAPACITY = 1 << 12
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command."""
-    app.command("trace", help=HELP)(trace)
-
-
 def trace(
-    firmware: Annotated[Path, typer.Argument(help="ELF, HEX or BIN.", metavar="FIRMWARE")],
+    firmware: Firmware,
     span_ns: Annotated[Nanos, time_option("--for", purpose="How long it is traced.", shown="1ms")] = NS_PER_MS,
     begin_ns: Annotated[Nanos, time_option("--from", purpose="When the trace begins.", shown="0s")] = 0,
-    drive: Annotated[
-        list[str] | None, typer.Option(help="Put a level on a pin at a time; repeatable.", metavar="PIN=LEVEL@TIME")
-    ] = None,
+    drive: Drive = None,
     out: Annotated[Path | None, typer.Option(help="Write to a file.", metavar="FILE")] = None,
     calls: Annotated[bool, typer.Option("--calls", help="Only where another function begins.")] = False,
     json_output: Annotated[bool, typer.Option("--json", help="A JSON object a line.")] = False,

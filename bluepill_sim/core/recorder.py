@@ -174,14 +174,12 @@ class KeptRows(Protocol):
 
     def append(self, row: BlockRow) -> None:
         """Add a row; the oldest goes when there are more than `LAST_ROWS`."""
-        ...
 
     #: They as bytes, `RECORD` by `RECORD`, oldest first.
     packed: bytes
 
     def ends_with_block(self, address: int) -> bool:
         """Tell whether the last row is of the block at an address."""
-        ...
 
 
 class LastRows(Stateful):

@@ -40,11 +40,9 @@ class SystemControlPorts(FabricPorts, Protocol):
 
     def plan_match(self) -> None:
         """Work out when CYCCNT next comes to what the DWT compares it with."""
-        ...
 
     def request_reset(self) -> None:
         """Reset the chip at the next block boundary (SYSRESETREQ)."""
-        ...
 
 
 #: What else `struct shared` holds of these registers.

@@ -23,12 +23,12 @@ import ctypes
 import sys
 import weakref
 from collections.abc import Callable
-from dataclasses import dataclass
 from enum import Enum
 from functools import cache
-from typing import TypeVar, cast
+from typing import Any, TypeVar
 
 from bluepill_sim.extension.layout import NOWHERE
+from simbase.c_library import guarded, loaded
 from simbase.errors import MissingDependencyError
 from simbase.state import Stateful
 
@@ -157,7 +157,6 @@ PAGE_CALLBACK = ctypes.CFUNCTYPE(
 )
 
 #: What C functions take here.
-_Argument = ctypes.c_void_p | ctypes.c_int | ctypes.c_uint32 | ctypes.c_uint64 | ctypes.c_size_t
 _Result = TypeVar("_Result")
 
 
@@ -181,16 +180,16 @@ class UnicornCore(Stateful):
         self._library = library = load_library()
         self._on_failure = on_failure
         handle = ctypes.c_void_p()
-        self._check(library.open(_ARCHITECTURE_ARM, _MODE_THUMB, ctypes.addressof(handle)), "open")
+        self._check(library.uc_open(_ARCHITECTURE_ARM, _MODE_THUMB, ctypes.addressof(handle)), "open")
         self._handle = handle.value or 0
         self._control(_CONTROL_MODEL, ctypes.c_int(_MODEL_CORTEX_M3))
         # A list of addresses that end a run, which stays empty: with a single one, what was translated there is looked
         # for after each run, which takes longer than a short run.
         self._control(_CONTROL_EXITS, ctypes.c_int(1))
         context = ctypes.c_void_p()
-        self._check(library.context_alloc(self._handle, ctypes.addressof(context)), "allocate a context")
+        self._check(library.uc_context_alloc(self._handle, ctypes.addressof(context)), "allocate a context")
         self._context = context.value or 0
-        self._context_bytes = library.context_size(self._handle) - _CONTEXT_HEADER_BYTES
+        self._context_bytes = library.uc_context_size(self._handle) - _CONTEXT_HEADER_BYTES
         #: The registers of a new core.
         self._new = self._read_context()
         #: The bits that `context` has.
@@ -210,11 +209,12 @@ class UnicornCore(Stateful):
 
     def start(self, address: int) -> int:
         """Run from an address (bit 0: Thumb) until something stops it; return the library's error number."""
-        return self._library.start(self._handle, address, NOWHERE, 0, 0)
+        error: int = self._library.uc_emu_start(self._handle, address, NOWHERE, 0, 0)
+        return error
 
     def stop(self) -> None:
         """End the run; only from a hook, never from an access to I/O, which would be run again."""
-        self._library.stop(self._handle)
+        self._library.uc_emu_stop(self._handle)
 
     def clear_exclusive(self) -> None:
         """Run CLREX on the scratch page, between runs; the block hook is called for it."""
@@ -228,7 +228,7 @@ class UnicornCore(Stateful):
         bits = sum(letters[letter] for letter in protection)
         self._buffers.append(buffer)
         self._check(
-            self._library.map_pointer(self._handle, address, len(buffer), bits, ctypes.addressof(buffer)),
+            self._library.uc_mem_map_ptr(self._handle, address, len(buffer), bits, ctypes.addressof(buffer)),
             f"map {address:#010x}",
         )
 
@@ -238,18 +238,18 @@ class UnicornCore(Stateful):
         buffer = ctypes.create_string_buffer(_PAGE_BYTES)
         self._sinks[page] = buffer
         bits, at = _PROTECTION_READ | _PROTECTION_WRITE, ctypes.addressof(buffer)
-        self._check(self._library.map_pointer(self._handle, page, _PAGE_BYTES, bits, at), f"map {page:#010x}")
+        self._check(self._library.uc_mem_map_ptr(self._handle, page, _PAGE_BYTES, bits, at), f"map {page:#010x}")
 
     def remove_sinks(self) -> None:
         """Have nothing be where sinks were; not during a run."""
         for page in self._sinks:
-            self._check(self._library.unmap(self._handle, page, _PAGE_BYTES), f"unmap {page:#010x}")
+            self._check(self._library.uc_mem_unmap(self._handle, page, _PAGE_BYTES), f"unmap {page:#010x}")
         self._sinks.clear()
 
     def allow_execution(self, address: int, size: int) -> None:
         """Let code run from a region that is mapped without x: with it, each store looks for code to forget."""
         bits = _PROTECTION_READ | _PROTECTION_WRITE | _PROTECTION_EXECUTE
-        self._check(self._library.protect(self._handle, address, size, bits), f"change {address:#010x}")
+        self._check(self._library.uc_mem_protect(self._handle, address, size, bits), f"change {address:#010x}")
 
     def map_io(self, address: int, size: int, read: RawRead, write: RawWrite) -> None:
         """Map a region whose accesses are calls, straight from C: they must not raise.
@@ -260,7 +260,7 @@ class UnicornCore(Stateful):
         reader = self._pointer(READ_CALLBACK(read))
         writer = self._pointer(WRITE_CALLBACK(write))
         self._check(
-            self._library.map_io(self._handle, address, size, reader, None, writer, None), f"map {address:#010x}"
+            self._library.uc_mmio_map(self._handle, address, size, reader, None, writer, None), f"map {address:#010x}"
         )
         # Only a memory hook makes Unicorn bring the PC up to date before an access; this one does nothing else.
         self.note_pc(address, size)
@@ -327,7 +327,7 @@ class UnicornCore(Stateful):
 
     def remove_hook(self, hook: int) -> None:
         """Take a hook away; not during a run."""
-        self._check(self._library.delete_hook(self._handle, hook), "remove a hook")
+        self._check(self._library.uc_hook_del(self._handle, hook), "remove a hook")
 
     # Contexts.
 
@@ -346,10 +346,10 @@ class UnicornCore(Stateful):
         words = int.from_bytes(context, sys.byteorder) ^ self._new
         data = words.to_bytes(self._context_bytes, sys.byteorder)
         ctypes.memmove(self._context + _CONTEXT_HEADER_BYTES, data, len(data))
-        self._check(self._library.context_restore(self._handle, self._context), "restore")
+        self._check(self._library.uc_context_restore(self._handle, self._context), "restore")
 
     def _read_context(self) -> int:
-        self._check(self._library.context_save(self._handle, self._context), "save")
+        self._check(self._library.uc_context_save(self._handle, self._context), "save")
         at = self._context + _CONTEXT_HEADER_BYTES
         return int.from_bytes(ctypes.string_at(at, self._context_bytes), sys.byteorder)
 
@@ -357,15 +357,7 @@ class UnicornCore(Stateful):
 
     def _for_c(self, call: Callable[..., _Result], default: _Result) -> Callable[..., _Result]:
         """Return a callback for C: it drops the handle before and the user pointer after the arguments."""
-
-        def callback(_uc: int, *arguments: int) -> _Result:
-            try:
-                return call(*arguments[:-1])
-            except BaseException as error:  # noqa: BLE001 - see the module's text
-                self._on_failure(error)
-                return default
-
-        return callback
+        return guarded(lambda _uc, *arguments: call(*arguments[:-1]), default, self._on_failure)
 
     def _pointer(self, callback: "ctypes._FuncPointer") -> ctypes.c_void_p:
         self._keep.append(callback)
@@ -379,7 +371,7 @@ class UnicornCore(Stateful):
         return self._handle
 
     @property
-    def library(self) -> "UnicornLibrary":
+    def library(self) -> Any:
         """The library itself."""
         return self._library
 
@@ -412,23 +404,24 @@ class UnicornCore(Stateful):
 
     def map_io_native(self, address: int, size: int, read: ctypes.c_void_p, write: ctypes.c_void_p, user: int) -> None:
         """Map a region whose accesses are C functions."""
-        error = self._library.map_io(self._handle, address, size, read, user, write, user)
+        error = self._library.uc_mmio_map(self._handle, address, size, read, user, write, user)
         self._check(error, f"map {address:#010x}")
 
     def note_pc(self, address: int, size: int) -> int:
         """Have the PC brought up to date before each access of a range, which is slow; return the hook."""
-        return self._hook(_HOOK_ACCESS, self._library.no_operation, address, address + size - 1)
+        nothing = ctypes.cast(self._library.uc_arch_supported, ctypes.c_void_p)  # looks at a number, returns a flag
+        return self._hook(_HOOK_ACCESS, nothing, address, address + size - 1)
 
     def _hook(self, kind: int, callback: ctypes.c_void_p, first: int, last: int, user: int | None = None) -> int:
         """Add a hook; first > last is everywhere."""
         hook = ctypes.c_size_t()
         at = ctypes.addressof(hook)
-        self._check(self._library.add_hook(self._handle, at, kind, callback, user, first, last), "hook")
+        self._check(self._library.uc_hook_add(self._handle, at, kind, callback, user, first, last), "hook")
         return hook.value
 
     def _control(self, item: int, *arguments: object) -> None:
         number = ctypes.c_int(item - (1 << 32) if item >> 31 else item)
-        self._check(self._library.control(ctypes.c_void_p(self._handle), number, *arguments), "control")
+        self._check(self._library.uc_ctl(ctypes.c_void_p(self._handle), number, *arguments), "control")
 
     @staticmethod
     def _check(error: int, what: str) -> None:
@@ -442,23 +435,23 @@ def _saved_bits(words: int) -> int:
     return sum(_WORD << 32 * n for n in range(words) if n not in _UNSAVED_WORDS)
 
 
-def _close(library: "UnicornLibrary", handle: int, context: int, buffers: list[object]) -> None:
+def _close(library: Any, handle: int, context: int, buffers: list[object]) -> None:
     """Free what the library holds for a `UnicornCore` that is gone."""
-    library.context_free(context)
-    library.close(handle)
+    library.uc_context_free(context)
+    library.uc_close(handle)
     buffers.clear()
 
 
 class RegisterFile:
     """All registers, one at a time."""
 
-    def __init__(self, library: "UnicornLibrary", handle: int) -> None:
+    def __init__(self, library: Any, handle: int) -> None:
         self._handle = handle
         self._library = library
         self._value = ctypes.c_uint32()
         self._at = ctypes.addressof(self._value)
-        self._read = library.read_register
-        self._write = library.write_register
+        self._read = library.uc_reg_read
+        self._write = library.uc_reg_write
 
     def __getitem__(self, register: Register) -> int:
         """Return one register."""
@@ -478,7 +471,7 @@ class RegisterFile:
 class Batch:
     """A fixed list of registers, moved together."""
 
-    def __init__(self, library: "UnicornLibrary", handle: int, registers: tuple[Register, ...]) -> None:
+    def __init__(self, library: Any, handle: int, registers: tuple[Register, ...]) -> None:
         count = len(registers)
         self.values = (ctypes.c_uint32 * count)()
         self._numbers = (ctypes.c_int * count)(*(r.value for r in registers))
@@ -486,8 +479,8 @@ class Batch:
         self._pointers = (ctypes.c_void_p * count)(*(base + 4 * n for n in range(count)))
         self._count = count
         self._handle = handle
-        self._read = library.read_registers
-        self._write = library.write_registers
+        self._read = library.uc_reg_read_batch
+        self._write = library.uc_reg_write_batch
         self._at = (ctypes.addressof(self._numbers), ctypes.addressof(self._pointers))
 
     def read(self) -> tuple[int, ...]:
@@ -523,85 +516,45 @@ def io_callbacks(
     return on_read, on_write
 
 
-@dataclass(frozen=True, slots=True)
-class UnicornLibrary:
-    """The library, loaded by ctypes: each attribute is one C function (unicorn.h of Unicorn 2.1)."""
-
-    open: Callable[..., int]
-    close: Callable[..., int]
-    control: Callable[..., int]
-    start: Callable[..., int]
-    stop: Callable[..., int]
-    read_register: Callable[..., int]
-    write_register: Callable[..., int]
-    read_registers: Callable[..., int]
-    write_registers: Callable[..., int]
-    map_pointer: Callable[..., int]
-    map_io: Callable[..., int]
-    unmap: Callable[..., int]
-    protect: Callable[..., int]
-    add_hook: Callable[..., int]
-    delete_hook: Callable[..., int]
-    context_size: Callable[..., int]
-    context_save: Callable[..., int]
-    context_restore: Callable[..., int]
-    context_alloc: Callable[..., int]
-    context_free: Callable[..., int]
-    #: A C function without effect, to be given as a callback that costs nothing.
-    no_operation: ctypes.c_void_p
-    version: str
+#: What is used of unicorn.h of Unicorn 2.1; result and arguments, as `simbase.c_library` spells them.
+_FUNCTIONS = {
+    "uc_open": "iiip",
+    "uc_close": "ip",
+    "uc_emu_start": "ipqqqz",
+    "uc_emu_stop": "ip",
+    "uc_reg_read": "ipip",
+    "uc_reg_write": "ipip",
+    "uc_reg_read_batch": "ipppi",
+    "uc_reg_write_batch": "ipppi",
+    "uc_mem_map_ptr": "ipqzup",
+    "uc_mmio_map": "ipqzpppp",
+    "uc_mem_unmap": "ipqz",
+    "uc_mem_protect": "ipqzu",
+    "uc_hook_add": "ippippqq",
+    "uc_hook_del": "ipz",
+    "uc_context_size": "ip",
+    "uc_context_save": "ipp",
+    "uc_context_restore": "ipp",
+    "uc_context_alloc": "ipp",
+    "uc_context_free": "ip",
+}
 
 
-def load_library() -> UnicornLibrary:
+def load_library() -> Any:
     """Load Unicorn.
 
     Raises:
         MissingDependencyError: it is not installed.
     """
     try:
-        import unicorn
         from unicorn.unicorn_py3.unicorn import uclib
     except ImportError as error:
         raise MissingDependencyError(f"the BluePill needs the unicorn library: {error}", extra="sim") from error
-    path = uclib._name  # noqa: SLF001 - the only place where the binding keeps it
-    return _functions_of(path, str(getattr(unicorn, "__version__", "unknown")))
+    return _loaded(uclib._name)  # noqa: SLF001 - the only place where the binding keeps it
 
 
 @cache
-def _functions_of(path: str, version: str) -> UnicornLibrary:
+def _loaded(path: str) -> Any:
     # PyDLL keeps the interpreter lock: the engine calls back into Python at each
     # block, and taking the lock there costs as much as the callback.
-    library = ctypes.PyDLL(path)
-    word = ctypes.c_void_p
-
-    def function(name: str, *arguments: type[_Argument]) -> Callable[..., int]:
-        result = library[name]
-        result.argtypes = arguments
-        result.restype = ctypes.c_int
-        return cast("Callable[..., int]", result)
-
-    no_operation = ctypes.cast(library["uc_arch_supported"], ctypes.c_void_p)  # looks at a number, returns a flag
-    return UnicornLibrary(
-        open=function("uc_open", ctypes.c_int, ctypes.c_int, word),
-        close=function("uc_close", word),
-        control=library["uc_ctl"],  # variadic: its arguments are wrapped at the call
-        start=function("uc_emu_start", word, ctypes.c_uint64, ctypes.c_uint64, ctypes.c_uint64, ctypes.c_size_t),
-        stop=function("uc_emu_stop", word),
-        read_register=function("uc_reg_read", word, ctypes.c_int, word),
-        write_register=function("uc_reg_write", word, ctypes.c_int, word),
-        read_registers=function("uc_reg_read_batch", word, word, word, ctypes.c_int),
-        write_registers=function("uc_reg_write_batch", word, word, word, ctypes.c_int),
-        map_pointer=function("uc_mem_map_ptr", word, ctypes.c_uint64, ctypes.c_size_t, ctypes.c_uint32, word),
-        map_io=function("uc_mmio_map", word, ctypes.c_uint64, ctypes.c_size_t, word, word, word, word),
-        unmap=function("uc_mem_unmap", word, ctypes.c_uint64, ctypes.c_size_t),
-        protect=function("uc_mem_protect", word, ctypes.c_uint64, ctypes.c_size_t, ctypes.c_uint32),
-        add_hook=function("uc_hook_add", word, word, ctypes.c_int, word, word, ctypes.c_uint64, ctypes.c_uint64),
-        delete_hook=function("uc_hook_del", word, ctypes.c_size_t),
-        context_size=function("uc_context_size", word),
-        context_save=function("uc_context_save", word, word),
-        context_restore=function("uc_context_restore", word, word),
-        context_alloc=function("uc_context_alloc", word, word),
-        context_free=function("uc_context_free", word),
-        no_operation=no_operation,
-        version=version,
-    )
+    return loaded(path, _FUNCTIONS, "Unicorn", ctypes.PyDLL)

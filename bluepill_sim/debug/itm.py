@@ -27,11 +27,9 @@ class StimulusWriter(Protocol):
 
     def write(self, at_ns: Nanos, cycle: int, port: int, data: bytes) -> None:
         """Take one word, at a time and a cycle of the core."""
-        ...
 
     def close(self) -> None:
         """Write what is still on its way; the file is closed."""
-        ...
 
 
 class TextWriter:

@@ -56,33 +56,26 @@ class Machine(Protocol):
     @property
     def board(self) -> BluePill:
         """The chip on its board."""
-        ...
 
     @property
     def end_ns(self) -> Nanos | None:
         """When the run is over; None for never."""
-        ...
 
     @property
     def can_rewind(self) -> bool:
         """Whether `restore` is possible: not with a real robot."""
-        ...
 
     def advance_to(self, limit_ns: Nanos, *, by_step: bool = False) -> ChipReached:
         """Bring everything to a time; less far where the chip halts, or by one instruction of the chip."""
-        ...
 
     def snapshot(self) -> object:
         """Return all that decides the future."""
-        ...
 
     def restore(self, snapshot: object) -> None:
         """Put back what `snapshot` returned; only where `can_rewind`."""
-        ...
 
     def halted(self) -> None:
         """Act on a halt of the chip: a real robot is stopped here."""
-        ...
 
 
 class LoneChip(Stateful):

@@ -8,11 +8,11 @@ environment chooses the Python executor for the core, `native`, the default, the
 import ctypes
 import os
 from functools import cache
-from importlib.util import find_spec
 from typing import Any
 
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.extension.layout import SHARED, structure
+from simbase.c_library import built, loaded
 from simbase.errors import MissingDependencyError
 
 #: The name of the environment variable, and what it may hold.
@@ -29,7 +29,9 @@ ACCESS_PC = ctypes.CFUNCTYPE(ctypes.c_uint32)
 
 
 #: The functions of Unicorn that C calls, by their names in `core.unicorn_core.UnicornLibrary`.
-UNICORN_FUNCTIONS = ("start", "stop", "read_register", "read_registers", "write_registers", "write_register")
+UNICORN_FUNCTIONS = (
+    "uc_emu_start", "uc_emu_stop", "uc_reg_read", "uc_reg_read_batch", "uc_reg_write_batch", "uc_reg_write",
+)  # fmt: skip
 
 
 class UnicornApi(ctypes.Structure):
@@ -53,12 +55,12 @@ class Callbacks(ctypes.Structure):
     )
 
 
-#: Result and arguments: v nothing, b flag, i signed, u 32 bits, l 64 bits, z size, p pointer, s text.
+#: Result and arguments, as `simbase.c_library` spells them.
 _FUNCTIONS = {
     "core_shared_bytes": "z",
     "core_new": "pppp",
     "core_free": "vp",
-    "core_run": "upl",
+    "core_run": "upq",
     "core_add_row": "bpuuuuupupu",
     "core_set_views": "vppu",
     "core_forget_rows": "vp",
@@ -72,16 +74,16 @@ _FUNCTIONS = {
     "system_reset": "vp",
     "system_power_up": "vp",
     "system_has": "bu",
-    "system_read": "upulp",
-    "system_write": "upuuul",
-    "systick_advance": "bpl",
-    "systick_read": "upul",
-    "systick_write": "vpuul",
+    "system_read": "upuqp",
+    "system_write": "upuuuq",
+    "systick_advance": "bpq",
+    "systick_read": "upuq",
+    "systick_write": "vpuuq",
     "core_block_start": "up",
     "core_set_page": "vpupupuppu",
     "core_set_paged_region": "vpu",
     "core_join": "vpp",
-    "core_next_event": "lp",
+    "core_next_event": "qp",
     "core_clear_exclusive": "vp",
     "core_leave_block": "vp",
     "core_region": "ppuu",
@@ -89,23 +91,23 @@ _FUNCTIONS = {
     "core_start_recording": "bpu",
     "fabric_new": "pppp",
     "fabric_add_memory": "bppuub",
-    "fabric_bus": "lpuuuuu",
+    "fabric_bus": "qpuuuuu",
     "fabric_master": "up",
     "fabric_set_analog": "vpp",
     "fabric_set_samples": "vpup",
-    "fabric_channel_uv": "lpul",
-    "fabric_set_wave": "vpuuulll",
+    "fabric_channel_uv": "qpuq",
+    "fabric_set_wave": "vpuuuqqq",
     "fabric_look": "vpup",
     "fabric_resume": "vp",
     "fabric_free": "vp",
     "fabric_set_host": "vpp",
-    "fabric_set_time": "vpllu",
-    "fabric_event_ns": "lp",
-    "fabric_next_ns": "lp",
-    "fabric_run_events": "vpl",
-    "fabric_catch_up": "vpul",
-    "fabric_schedule": "vpul",
-    "fabric_due": "lpu",
+    "fabric_set_time": "vpqqu",
+    "fabric_event_ns": "qp",
+    "fabric_next_ns": "qp",
+    "fabric_run_events": "vpq",
+    "fabric_catch_up": "vpuq",
+    "fabric_schedule": "vpuq",
+    "fabric_due": "qpu",
     "fabric_add_slot": "ip",
     "fabric_add_device": "bpuspp",
     "fabric_configure_pin": "vpuub",
@@ -127,7 +129,7 @@ _FUNCTIONS = {
     "fabric_pins_changed": "vpu",
     "fabric_offer": "vpuuu",
     "fabric_put_inputs": "bpupu",
-    "fabric_last_output": "lp",
+    "fabric_last_output": "qp",
     "fabric_forget_output": "vp",
     "fabric_subscribe": "ipppppb",
     "fabric_stop_at": "vpup",
@@ -140,17 +142,13 @@ _FUNCTIONS = {
     "fabric_has_news": "bp",
     "edge_log_new": "p",
     "edge_log_free": "vp",
-    "edge_log_put": "bpluu",
+    "edge_log_put": "bpquu",
     "edge_log_take": "bppzpp",
-    "edge_log_write": "ipppull",
+    "edge_log_write": "ipppuqq",
     "edge_log_rows": "pp",
     "edge_log_count": "zp",
     "edge_log_used": "vpp",
 }
-_TYPES: dict[str, Any] = {
-    "v": None, "b": ctypes.c_bool, "i": ctypes.c_int32, "u": ctypes.c_uint32, "l": ctypes.c_uint64,
-    "z": ctypes.c_size_t, "p": ctypes.c_void_p, "s": ctypes.c_char_p,
-}  # fmt: skip
 
 
 def is_native_wanted() -> bool:
@@ -171,28 +169,20 @@ def is_native_wanted() -> bool:
 @cache
 def library_path() -> str | None:
     """Return where the library is; None where it was not built."""
-    spec = find_spec("bluepill_sim._native")
-    return None if spec is None else spec.origin
+    return built("bluepill_sim._native")
 
 
 @cache
-def library() -> ctypes.PyDLL:
+def library() -> Any:
     """Return the loaded library.
 
     Raises:
         MissingDependencyError: it was not built, or is of another version of the package.
     """
-    where = library_path()
-    if where is None:
-        raise MissingDependencyError("the emulator's library is not built", hint="p2os doctor says why")
-    loaded = ctypes.PyDLL(where)  # keeps the interpreter's lock: callbacks come often
-    for name, signature in _FUNCTIONS.items():
-        function = getattr(loaded, name)
-        function.restype = _TYPES[signature[0]]
-        function.argtypes = [_TYPES[letter] for letter in signature[1:]]
-    if loaded.core_shared_bytes() != ctypes.sizeof(structure(SHARED)):
+    found = loaded(library_path(), _FUNCTIONS, "the emulator's library", ctypes.PyDLL)
+    if found.core_shared_bytes() != ctypes.sizeof(structure(SHARED)):
         raise MissingDependencyError("the emulator's library is of another version", hint="install the package again")
-    return loaded
+    return found
 
 
 def address_of(name: str) -> ctypes.c_void_p:

@@ -27,15 +27,12 @@ class SpiDevice(Protocol):
 
     def select(self, at_ns: Nanos) -> None:
         """Take that its select pin has gone low."""
-        ...
 
     def deselect(self, at_ns: Nanos) -> None:
         """Take that its select pin has gone high: the command ends."""
-        ...
 
     def exchange(self, byte: int, at_ns: Nanos) -> int:
         """Take a byte, and return the one that it sent meanwhile; called when its last bit has ended."""
-        ...
 
 
 class AheadDevice(Protocol):
@@ -46,11 +43,9 @@ class AheadDevice(Protocol):
 
         They go over while it alone is selected; another byte, another mode or the deselect ends that.
         """
-        ...
 
     def went(self, count: int) -> None:
         """Take that so many of them have gone over: as if `exchange` had been called for each."""
-        ...
 
 
 class I2cDevice(Protocol):
@@ -61,19 +56,15 @@ class I2cDevice(Protocol):
 
         An address above 0x7F has 10 bits; 0 is the general call.
         """
-        ...
 
     def write(self, byte: int, at_ns: Nanos) -> bool:
         """Take a byte; return whether it acknowledges."""
-        ...
 
     def read(self, at_ns: Nanos) -> int:
         """Return the next byte, whose first bit begins."""
-        ...
 
     def stop(self, at_ns: Nanos) -> None:
         """Take a STOP."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

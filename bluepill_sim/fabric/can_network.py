@@ -61,43 +61,34 @@ class CanMember(Protocol):
     @property
     def now_ns(self) -> Nanos | None:
         """The time that it has reached; None: it has no clock."""
-        ...
 
     @property
     def bit_rate(self) -> Fraction | None:
         """Bits a second; None: whatever the others have."""
-        ...
 
     @property
     def acknowledges(self) -> bool:
         """Whether it hears frames of others and drives the bus."""
-        ...
 
     @property
     def hears_itself(self) -> bool:
         """Whether its own frames need nobody else."""
-        ...
 
     @property
     def is_passive(self) -> bool:
         """Whether it waits longer behind a frame of its own."""
-        ...
 
     def offer(self, at_ns: Nanos) -> CanFrame | None:
         """Return what it wants to send at a time."""
-        ...
 
     def lose(self, at_ns: Nanos) -> bool:
         """Take that another has won; return whether it tries again."""
-        ...
 
     def end(self, end: CanEnd) -> None:
         """Take the end of a frame, which is still to come."""
-        ...
 
     def plan(self) -> None:
         """Take that `next_ns` of the network has changed."""
-        ...
 
 
 class Runner(Protocol):
@@ -106,11 +97,9 @@ class Runner(Protocol):
     @property
     def now_ns(self) -> Nanos:
         """The time reached."""
-        ...
 
     def advance_to(self, limit_ns: Nanos) -> object:
         """Run to a time."""
-        ...
 
 
 class CanNetwork(Stateful):

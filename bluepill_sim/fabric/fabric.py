@@ -29,6 +29,7 @@ from bluepill_sim.extension.layout import (
 from bluepill_sim.extension.library import library
 from bluepill_sim.extension.windows import NO_TIME
 from bluepill_sim.fabric.subscriptions import EDGE
+from simbase.c_library import guarded
 from simbase.state import Stateful
 from simbase.timing import Nanos
 
@@ -101,37 +102,29 @@ class FabricPorts(Protocol):
     @property
     def now_ns(self) -> Nanos:
         """The exact time of the accessing instruction inside of an access, else the time reached."""
-        ...
 
     @property
     def access_cycle(self) -> int:
         """The cycle of the accessing instruction, else the one reached."""
-        ...
 
     @property
     def access_pc(self) -> int:
         """The accessing instruction inside of an access, else the next one."""
-        ...
 
     def irq_changed(self, irq: int, level: bool) -> bool:
         """Take a new level of an interrupt line; return whether the interrupt is enabled."""
-        ...
 
     def end_slice(self) -> None:
         """End the slice at the boundary of the running block."""
-        ...
 
     def event_due(self, cycle: int) -> None:
         """End the slice at this cycle at the latest."""
-        ...
 
     def reach_registers(self, address: int, size: int, written: int | None) -> int | None:
         """Make an access of a bus master: the word that is read, 0 after a write, None for an error of the bus."""
-        ...
 
     def code_written(self, address: int, size: int) -> None:
         """Forget, before the next block, what was translated from bytes that a bus master has written."""
-        ...
 
     def signal(self, name: str) -> None:
         """Signal an event to the core by name.
@@ -139,18 +132,15 @@ class FabricPorts(Protocol):
         "event" sets the event register that WFE waits for, "nmi" is a request, "wake" ends Standby, and after
         "no clock" only a reset helps.
         """
-        ...
 
     def request_stop(self) -> None:
         """End the CPU's slice at the boundary of the running block."""
-        ...
 
     def warn(self, message: str, *, once: str, pc: int | None = None) -> None:
         """Warn of what the firmware does wrong, or of what is not modelled; once for each key.
 
         With `pc`: of what the instruction there did; else it is the one that runs.
         """
-        ...
 
 
 class Fabric(Stateful):
@@ -629,18 +619,7 @@ class Fabric(Stateful):
 
     def _guarded(self, call: Callable[..., _Result], default: _Result) -> Callable[..., _Result]:
         """Return a callback for C: what it raises is kept, and the slice ends."""
-        reference = weakref.ref(self)
-
-        def callback(*arguments: int) -> _Result:
-            try:
-                return call(*arguments)
-            except BaseException as error:  # noqa: BLE001 - C stands between here and the caller
-                fabric = reference()
-                if fabric is not None:
-                    fabric._fail(error)  # noqa: SLF001 - its own
-                return default
-
-        return callback
+        return guarded(call, default, self._fail)
 
     def _fail(self, error: BaseException) -> None:
         self._failure = error

@@ -50,54 +50,42 @@ class LowPowerPorts(FabricPorts, Protocol):
     @property
     def flash_is_busy(self) -> bool:
         """Whether the flash is programmed or erased."""
-        ...
 
     @property
     def wants_standby(self) -> bool:
         """Whether SLEEPDEEP means Standby."""
-        ...
 
     @property
     def stop_wake_ns(self) -> Nanos:
         """How long the end of Stop takes."""
-        ...
 
     @property
     def resets_instead(self) -> bool:
         """Whether the option bytes make a reset of the mode that SLEEPDEEP means."""
-        ...
 
     def refusal(self) -> str | None:
         """Return what forbids the mode that SLEEPDEEP means, in words; None for nothing."""
-        ...
 
     def is_woken_from_stop(self) -> bool:
         """Whether an interrupt or event that ends Stop is there."""
-        ...
 
     def enter_stop(self) -> None:
         """Have everything that Stop stops stand still."""
-        ...
 
     def leave_stop(self, stopped_ns: Nanos) -> None:
         """Have it go on, after so long."""
-        ...
 
     def reset_instead(self) -> None:
         """Reset the chip because of the option bytes."""
-        ...
 
     def enter_standby(self) -> None:
         """Forget all that Standby forgets."""
-        ...
 
     def leave_standby(self) -> None:
         """Reset the chip."""
-        ...
 
     def pass_over(self, why: str) -> None:
         """Go on behind the instruction, and warn."""
-        ...
 
 
 class LowPower(Stateful):

@@ -102,7 +102,6 @@ class PinSubscription(Protocol):
 
     def close(self) -> None:
         """Deliver what waits, and get nothing more."""
-        ...
 
 
 class PinSubscriptions(Protocol):
@@ -119,4 +118,3 @@ class PinSubscriptions(Protocol):
         Raises:
             KeyError: The chip has no such pin.
         """
-        ...

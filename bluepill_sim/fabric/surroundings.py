@@ -35,7 +35,6 @@ class Surroundings(Protocol):
 
     def motion(self) -> Motion:
         """Return how the board moves now."""
-        ...
 
     def range_m(self, x_m: float, y_m: float, heading_rad: float, cone_rad: float, longest_m: float) -> float:
         """Return how far away the nearest thing is that a cone meets; `longest_m` where it meets none.
@@ -47,7 +46,6 @@ class Surroundings(Protocol):
             cone_rad: From one side of the cone to the other.
             longest_m: How far it looks.
         """
-        ...
 
 
 class Nowhere:

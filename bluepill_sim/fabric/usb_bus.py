@@ -78,59 +78,21 @@ class Answer:
     data: bytes = b""
 
 
-class UsbFunction(Protocol):
-    """A device, as the host sees it."""
-
-    @property
-    def now_ns(self) -> Nanos:
-        """The time reached."""
-        ...
-
-    @property
-    def is_attached(self) -> bool:
-        """Whether D+ is pulled up."""
-        ...
-
-    def bus_changed(self, state: BusState, at_ns: Nanos, frame: int = 0) -> None:
-        """Take a state of the bus from a time on; FRAMES begin with the number `frame`."""
-        ...
-
-    def begin(self, transaction: Transaction) -> Answer | None:
-        """Return the answer to a transaction that begins now; None: none."""
-        ...
-
-    def end(self, transaction: Transaction) -> None:
-        """Take that a transaction has ended as it should."""
-        ...
-
-    def would_nak(self, endpoint: int, is_in: bool) -> bool:
-        """Whether the answer to IN, or OUT, would be NAK now."""
-        ...
-
-    def plan(self) -> None:
-        """Take that `next_ns` of the host has changed."""
-        ...
-
-
 class UsbMaster(Protocol):
     """A host, as the device sees it; a device has it in its snapshots."""
 
     @property
     def next_ns(self) -> Nanos | None:
         """When it acts next; None for never."""
-        ...
 
     def advance_to(self, now_ns: Nanos) -> None:
         """Act on what is due."""
-        ...
 
     def device_changed(self, now_ns: Nanos) -> None:
         """Take that the device answers otherwise, or that its pull-up has come or gone."""
-        ...
 
     def wake(self, now_ns: Nanos) -> None:
         """Take that a suspended device signals a resume."""
-        ...
 
 
 def span_ns(bits: int) -> Nanos:

@@ -64,6 +64,7 @@ from bluepill_sim.native.state import (
     NativeLastRows,
     Shared,
 )
+from simbase.c_library import guarded
 
 #: Flags of a row (`enum row_flag`).
 _CHANGES_MASKS, _SENDS_EVENT, _SELF_LOOP, _WRITABLE, _NOTED, _AMBIGUOUS = 1, 2, 4, 8, 128, 256
@@ -116,9 +117,10 @@ class NativeEngine(Engine):
         api = UnicornApi(*(ctypes.cast(getattr(unicorn, name), ctypes.c_void_p) for name in UNICORN_FUNCTIONS))
         #: Keeps the callbacks alive.
         self._calls = Callbacks(
-            UNKNOWN_BLOCK(self._measure_block), READ(self._read_io), WRITE(self._write_io), TRAPPED(self._trapped),
-            RECORDED(self._take_records), ACCESS_CYCLE(lambda: self.access_cycle), ACCESS_PC(lambda: self.access_pc),
-            BAD_ACCESS(self._guarded_bad_access),
+            UNKNOWN_BLOCK(self._measure_block), READ(self._read_io), WRITE(self._write_io),
+            TRAPPED(guarded(self._trapped, None, self._fail)), RECORDED(guarded(self._take_records, None, self._fail)),
+            ACCESS_CYCLE(lambda: self.access_cycle), ACCESS_PC(lambda: self.access_pc),
+            BAD_ACCESS(guarded(self._bad_access, True, self._fail)),
         )  # fmt: skip
         self._state = state = ctypes.c_void_p(
             library().core_new(self._core.handle, ctypes.addressof(api), ctypes.addressof(self._calls))
@@ -471,25 +473,12 @@ class NativeEngine(Engine):
         return self._frozen is not None or (not shared.stop_at and self._is_interrupted_here())
 
     def _trapped(self, kind: int, pc: int, value: int) -> None:
-        try:
-            halt = HALT_KINDS[kind]
-            self.stop_before(halt, pc, value if halt is HaltKind.UNALIGNED else None)
-        except BaseException as error:  # noqa: BLE001 - C stands between here and the caller
-            self._fail(error)
+        halt = HALT_KINDS[kind]
+        self.stop_before(halt, pc, value if halt is HaltKind.UNALIGNED else None)
 
     def _take_records(self, rows: int, count: int) -> None:
-        try:
-            if self.recorder is not None:
-                self.recorder.put_packed(ctypes.string_at(rows, count * RECORD.size))
-        except BaseException as error:  # noqa: BLE001 - C stands between here and the caller
-            self._fail(error)
-
-    def _guarded_bad_access(self, access: int, address: int, size: int, value: int) -> bool:
-        try:
-            return self._bad_access(access, address, size, value)
-        except BaseException as error:  # noqa: BLE001 - C stands between here and the caller
-            self._fail(error)
-            return True
+        if self.recorder is not None:
+            self.recorder.put_packed(ctypes.string_at(rows, count * RECORD.size))
 
     def _bad_access(self, access: int, address: int, size: int, value: int) -> bool:
         self._halt = None

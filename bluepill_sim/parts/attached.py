@@ -57,28 +57,22 @@ class ChipWithBuses(Protocol):
     @property
     def now_ns(self) -> Nanos:
         """The time reached."""
-        ...
 
     @property
     def serial_ports(self) -> Mapping[str, SerialPort]:
         """The USARTs by name."""
-        ...
 
     def spi(self, name: str, device: Any = None, *, select: str | None = None) -> Spi:
         """Return an SPI, with a device on it."""
-        ...
 
     def i2c(self, name: str, device: Any = None) -> I2c:
         """Return an I2C, with a device on it."""
-        ...
 
     def can(self, network: CanNetwork | None = None) -> Can:
         """Return the CAN, on a network."""
-        ...
 
     def pin(self, name: str) -> Pin:
         """Return a pin."""
-        ...
 
 
 class Socket:

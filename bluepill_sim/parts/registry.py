@@ -72,7 +72,6 @@ class Board(Protocol):
         self, part: object, *, on: str | None = None, select: str | None = None, name: str = "", **pins: str
     ) -> None:  # fmt: skip
         """Attach a part."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

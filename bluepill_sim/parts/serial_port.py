@@ -54,7 +54,6 @@ class WaitForBytes(Protocol):
         Raises:
             WaitError: it did not come in time.
         """
-        ...
 
 
 class SerialPort(Stateful):

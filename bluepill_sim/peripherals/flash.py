@@ -53,24 +53,19 @@ class FlashMemory(Protocol):
     @property
     def size(self) -> int:
         """Size of the array in bytes."""
-        ...
 
     def read(self, offset: int, size: int) -> bytes:
         """Return `size` bytes."""
-        ...
 
     def write(self, offset: int, data: bytes) -> None:
         """Replace bytes, and drop whatever was translated from them."""
-        ...
 
     @property
     def options(self) -> bytes:
         """The option bytes, with their complements."""
-        ...
 
     def write_options(self, options: bytes) -> None:
         """Replace the option bytes."""
-        ...
 
 
 class Flash(Peripheral):

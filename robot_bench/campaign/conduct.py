@@ -128,11 +128,9 @@ class Workers(Protocol):
 
         With `anew` each from its very beginning, even where several share it.
         """
-        ...
 
     def close(self) -> None:
         """End what was begun."""
-        ...
 
 
 @dataclass(slots=True)

@@ -48,11 +48,9 @@ class Search(Protocol):
 
     def ask(self, count: int) -> list[Point]:
         """Return at most so many points; none where it has no more."""
-        ...
 
     def tell(self, answers: Sequence[Answer]) -> None:
         """Take what came of the points that were asked for last, of all of them, in their order."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)

@@ -86,20 +86,27 @@ class RunDisplay:
 
 
 @contextlib.contextmanager
-def runs_bar(count: int) -> Iterator[Callable[..., None]]:
-    """Show on a terminal how many runs have ended; yield what is told of each."""
+def counting_bar(what: str, count: int) -> Iterator[Callable[[int, str], None]]:
+    """Show on a terminal how many of something are done, and a word on them; yield what is told of both."""
     bar = Progress(
-        TextColumn("runs"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[failed]}"),
+        TextColumn(what), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[said]}"),
         console=Console(stderr=True), transient=True, auto_refresh=False, disable=not sys.stderr.isatty(),
     )  # fmt: skip
-    failed = 0
+    with bar:
+        task = bar.add_task("", total=count, said="")
+        bar.refresh()
+        yield lambda done, said: bar.update(task, completed=done, said=said, refresh=True)
+
+
+@contextlib.contextmanager
+def runs_bar(count: int) -> Iterator[Callable[..., None]]:
+    """Show on a terminal how many runs have ended; yield what is told of each."""
+    done = failed = 0
 
     def advance(*, passed: bool = True) -> None:
-        nonlocal failed
-        failed += not passed
-        bar.update(task, advance=1, failed=f"{failed} failed" if failed else "", refresh=True)
+        nonlocal done, failed
+        done, failed = done + 1, failed + (not passed)
+        tell(done, f"{failed} failed" if failed else "")
 
-    with bar:
-        task = bar.add_task("", total=count, failed="")
-        bar.refresh()
+    with counting_bar("runs", count) as tell:
         yield advance

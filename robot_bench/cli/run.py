@@ -3,7 +3,7 @@
 import contextlib
 import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -25,13 +25,12 @@ from robot_bench.cli.sweep import (
     as_json,
     command,
     print_sweep,
-    refuse_beside_sweep,
     refuse_junit,
     run_sweep,
     write_junit,
 )
 from robot_bench.cli.table import print_result
-from robot_bench.cli.workers import core_count
+from robot_bench.cli.workers import Jobs, core_count
 from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.remote import CAUTIOUS_ROTATION_DEG_S, CAUTIOUS_VELOCITY_MM_S
 from robot_bench.run import Progress, RunBench, RunResult, run_at_port, run_scenario
@@ -41,7 +40,7 @@ from robot_bench.scenario.scenario import Scenario, ScenarioOptions, known_scena
 from robot_bench.scenario.sweep import MOST_RUNS, read_seeds
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
-from simbase.units import BAUD, COUNT, FACTOR, PERCENT, PORT, SEED, SPEED, TIME
+from simbase.units import BAUD, FACTOR, PERCENT, PORT, SEED, SPEED, TIME
 
 HELP = """Run a scenario: a BluePill program drives a robot.
 
@@ -134,10 +133,7 @@ def run(
     set_: Annotated[
         list[str] | None, typer.Option("--set", help="A key of the scenario; repeatable.", metavar="KEY=VALUE")
     ] = None,
-    jobs: Annotated[
-        int | None,
-        option(COUNT, "--jobs", "-j", purpose="Runs at a time; default as many as processors.", above_zero=True),
-    ] = None,
+    jobs: Jobs = None,
     junit: Annotated[Path | None, typer.Option(help="Write what CI reads.", metavar="FILE")] = None,
     keep: Annotated[
         str, typer.Option(help="Of many runs, which folders stay.", metavar="failures|all|none")
@@ -202,11 +198,25 @@ def run(
     settings = [read_setting(text) for text in set_ or ()]
     wanted = load_scenario(scenario, firmware=firmware, settings=settings)
     if coverage or profile:
-        refuse_to_measure(port=port, gdb=gdb)
+        refuse(
+            {"coverage and --profile": port},
+            "cannot stand beside --port: they cost more time than a real robot gives",
+            hint="run the same firmware without --port",
+        )
+        refuse(
+            {"coverage and --profile": gdb},
+            "cannot stand beside --gdb: what a debugger steps back over would count twice",
+            hint="leave one of the two out",
+        )
     if fail_under and not coverage:
         raise UsageError("--fail-under goes with --coverage only", hint="add --coverage")
     if port is not None:
-        refuse_beside_port(mode=mode, body=body, world=world, seed=seed, realtime=realtime)
+        theirs = {"mode": None if mode == "adapter" else mode, "body": body, "world": world, "seed": seed}
+        refuse(
+            {**theirs, "realtime": realtime},
+            "cannot stand beside --port: the robot at the port has its own",
+            hint="leave one of the two out",
+        )
     elif yes or max_speed is not None:
         raise UsageError(f"{'--yes' if yes else '--max-speed'} goes with --port only")
     options: ScenarioOptions = {
@@ -222,24 +232,21 @@ def run(
     }
     wanted = wanted.with_options(**options)
     measured = coverage or profile or None
-    refuse_beside("--ros", ros, port=port, gdb=gdb, coverage=measured, inputs=inputs)
-    refuse_beside("--inputs", inputs, port=port, gdb=gdb, coverage=measured)
-    refuse_beside("--foxglove", foxglove, port=port, gdb=gdb, ros=ros, inputs=inputs, robots=wanted.robots or None)
+    refuse_beside("ros", ros, port=port, gdb=gdb, coverage=measured, inputs=inputs)
+    refuse_beside("inputs", inputs, port=port, gdb=gdb, coverage=measured)
+    refuse_beside("foxglove", foxglove, port=port, gdb=gdb, ros=ros, inputs=inputs, robots=wanted.robots or None)
     if is_sweep(wanted, seeds=seeds, seed=seed, port=port):
-        refuse_beside_sweep(
-            port=port,
-            ros=ros,
-            inputs=inputs,
-            foxglove=foxglove,
-            gdb=None if gdb is None else "gdb",
-            realtime=realtime,
-            coverage=coverage,
-            profile=profile,
+        alone = {"port": port, "ros": ros, "inputs": inputs, "foxglove": foxglove, "gdb": gdb, "realtime": realtime}
+        refuse(
+            {**alone, "coverage": coverage or None, "profile": profile or None},
+            "cannot stand beside a sweep: it is for one run",
+            hint="--seed and --set take one run of it",
         )
         rows = sweep_rows(scenario, wanted, options, seeds)
         run_many(rows, out, jobs=jobs or core_count(), kept=keep, junit=junit, json_output=json_output, force=force)
         return
-    refuse_for_one(jobs=jobs, junit=junit)
+    many = "--seeds 0-9, or a scenario with [sweep]"
+    refuse({"jobs": jobs, "junit": junit}, "goes with many runs only", hint=many)
     if port is not None:
         result = drive_port(wanted, out, port, yes=yes, max_speed_mps=max_speed, gdb=gdb, force=force)
         end_with(result, json_output=json_output)
@@ -262,21 +269,27 @@ def run(
     end_with(result, json_output=json_output)
 
 
+def refuse(options: Mapping[str, object], why: str, *, hint: str) -> None:
+    """Refuse the first of some options, by their names, that is given.
+
+    Raises:
+        UsageError: It is not None.
+    """
+    for name, value in options.items():
+        if value is not None:
+            raise UsageError(f"--{name} {why}", hint=hint)
+
+
 def refuse_beside(name: str, given: object, **others: object) -> None:
     """Refuse what cannot stand beside an option that is given: whatever of `others` is not None either.
 
     Raises:
-        UsageError: Something is.
+        UsageError: Both are there.
     """
     for other, value in others.items():
-        if given is not None and value is not None:
-            what = "several robots" if other == "robots" else f"--{other}"
-            raise UsageError(f"{name} cannot stand beside {what}", hint="leave one of the two out")
-
-
-def tell_viewer(url: str) -> None:
-    """Say what a viewer opens."""
-    typer.echo(f"open {url} in Foxglove or Lichtblick", err=True)
+        what = "several robots" if other == "robots" else f"--{other}"
+        if value is not None:
+            refuse({name: given}, f"cannot stand beside {what}", hint="leave one of the two out")
 
 
 @contextlib.contextmanager
@@ -292,7 +305,8 @@ def driven(
     if foxglove is not None:
         from robot_bench.live import live_scene
 
-        with live_scene(scenario, foxglove, tell_viewer) as scene:
+        tell = "open {} in Foxglove or Lichtblick".format
+        with live_scene(scenario, foxglove, lambda url: typer.echo(tell(url), err=True)) as scene:
             yield scene.drive
         return
     if ros is None and inputs is None:
@@ -311,17 +325,6 @@ def driven(
 def is_sweep(scenario: Scenario, *, seeds: str | None, seed: int | None, port: str | None) -> bool:
     """Tell whether more than one run is asked for; at a port only where the command line says so."""
     return seeds is not None or (port is None and (bool(scenario.axes) or (bool(scenario.seeds) and seed is None)))
-
-
-def refuse_for_one(**options: object) -> None:
-    """Refuse what only many runs can do.
-
-    Raises:
-        UsageError: One of the options is given.
-    """
-    for name, value in options.items():
-        if value is not None:
-            raise UsageError(f"--{name} goes with many runs only", hint="--seeds 0-9, or a scenario with [sweep]")
 
 
 def sweep_rows(name: str, wanted: Scenario, options: ScenarioOptions, seeds: str | None) -> list[Row]:
@@ -484,40 +487,6 @@ def end_with(result: RunResult, *, json_output: bool) -> None:
         raise typer.Exit(EXIT_INTERRUPTED)
     if not result.passed:
         raise typer.Exit(1)
-
-
-def refuse_to_measure(*, port: str | None, gdb: int | None) -> None:
-    """Refuse to measure a run that has no virtual time, or may go back.
-
-    Raises:
-        UsageError: `port` or `gdb` is given.
-    """
-    if port is not None:
-        raise UsageError(
-            "--coverage and --profile cannot stand beside --port: they cost more time than a real robot gives",
-            hint="run the same firmware without --port",
-        )
-    if gdb is not None:
-        raise UsageError(
-            "--coverage and --profile cannot stand beside --gdb: what a debugger steps back over would count twice",
-            hint="leave one of the two out",
-        )
-
-
-def refuse_beside_port(**options: object) -> None:
-    """Refuse what has no meaning when the robot is real.
-
-    Raises:
-        UsageError: One of the options is given (`mode` only where it is not adapter).
-    """
-    if options.get("mode") == "adapter":
-        options.pop("mode")
-    for name, value in options.items():
-        if value is not None:
-            raise UsageError(
-                f"--{name} cannot stand beside --port: the robot at the port has its own",
-                hint="leave one of the two out",
-            )
 
 
 def _is_number(word: str) -> bool:

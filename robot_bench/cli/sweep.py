@@ -27,7 +27,7 @@ from robot_bench.recording.summary import INTERRUPTED
 from robot_bench.run import run_scenario
 from robot_bench.scenario.included_files import Setting, as_toml
 from robot_bench.scenario.scenario import Scenario
-from simbase.errors import P2osError, UsageError
+from simbase.errors import P2osError
 from simbase.files import writing
 from simbase.units import ranges_text
 
@@ -192,9 +192,9 @@ def as_json(done: Done) -> Json:
     }
 
 
-def print_sweep(done: Done, console: Console | None = None) -> None:
+def print_sweep(done: Done) -> None:
     """Print the table, what failed and how to see it again, and at the end the sum, on stdout."""
-    console = console or Console(highlight=False)
+    console = Console(highlight=False)
     console.print(_each(done) if len(done.rows) <= MOST_LINES else _summed(done))
     failed = done.failed
     for row, found in failed[:MOST_FAILURES]:
@@ -271,16 +271,3 @@ def _places(rows: Sequence[Row]) -> list[str]:
     if len(set(names)) == len(names):
         return names
     return [f"{number:0{len(str(len(rows)))}d}-{name}" for number, name in enumerate(names, 1)]
-
-
-def refuse_beside_sweep(**options: object) -> None:
-    """Refuse what one run alone can do.
-
-    Raises:
-        UsageError: One of the options is given.
-    """
-    for name, value in options.items():
-        if value:
-            raise UsageError(
-                f"--{name} cannot stand beside a sweep: it is for one run", hint="--seed and --set take one run of it"
-            )

@@ -23,9 +23,9 @@ LABELS = (
 )  # fmt: skip
 
 
-def print_result(result: RunResult, console: Console | None = None) -> None:
+def print_result(result: RunResult) -> None:
     """Print what a run came to, on stdout."""
-    console = console or Console(highlight=False)
+    console = Console(highlight=False)
     outcome = result.outcome
     table = Table(show_header=False, box=None, pad_edge=False)
     for name, value in rows(outcome):

@@ -14,15 +14,23 @@ import signal
 from collections.abc import Callable
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import ForkProcess
+from typing import Annotated
 
+from p2os.cli.quantities import option
 from robot_bench.events.codec import Json
 from robot_bench.recording.summary import INTERRUPTED
 from robot_bench.running.forks import LOOK_S, begin, how_it_ended, received
 from simbase.errors import P2osError
+from simbase.units import COUNT
 from simbase.user_classes import unforeseen
 
 #: Called in the fork: (number of the piece, look), where `look` is to be called between slices.
 Job = Callable[[int, Callable[[], None]], Json]
+#: How many of them, as an option.
+Jobs = Annotated[
+    int | None,
+    option(COUNT, "--jobs", "-j", purpose="Runs at a time; default as many as processors.", above_zero=True),
+]
 
 
 def core_count() -> int:

@@ -22,4 +22,3 @@ class AnalogPin(Protocol):
 
     def set_volts(self, volts: float | None) -> None:
         """Put volts on the wire from outside; None lets go."""
-        ...

@@ -14,7 +14,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from json.encoder import encode_basestring_ascii as _quoted
-from typing import Any, TypeAlias, cast
+from typing import Any, TypeAlias, cast, get_type_hints
 
 from robot_bench.events.kinds import (
     CanTransfer,
@@ -195,102 +195,69 @@ def _wave(t: Nanos, entry: Json) -> Recorded:
     return Wave(t=t, wire=str(entry["net"]), at=at, period=period, high=high, ticks_hz=hz)
 
 
-def _spi_line(kind: str, spi: SpiTransfer) -> str:
-    words = f'"miso":"{spi.from_slave.hex()}","mosi":"{spi.from_master.hex()}"'
-    return (
-        f'{{"bits":{spi.bits},"bus":{_quoted(spi.bus)},"from":{spi.begun},"k":"{kind}",{words},"t":{spi.t},'
-        f'"to":{spi.ended}}}'
-    )
-
-
-def _i2c_line(kind: str, i2c: I2cTransfer) -> str:
-    return (
-        f'{{"acks":{i2c.acknowledged},"address":{i2c.address},"answered":{int(i2c.answered)},"bus":{_quoted(i2c.bus)},'
-        f'"end":{_quoted(i2c.end)},"from":{i2c.begun},"hex":"{i2c.data.hex()}","k":"{kind}","read":{int(i2c.is_read)},'
-        f'"t":{i2c.t}}}'
-    )
-
-
-def _can_line(kind: str, frame: CanTransfer) -> str:
-    flags = f'"own":{int(frame.is_own)},"rtr":{int(frame.is_remote)}'
-    return (
-        f'{{"bus":{_quoted(frame.bus)},"dlc":{frame.dlc},"error":{_quoted(frame.error)},"ext":{int(frame.is_extended)},'
-        f'"from":{frame.begun},"hex":"{frame.data.hex()}","id":{frame.identifier},"k":"{kind}",{flags},"t":{frame.t}}}'
-    )
-
-
 def _wave_line(kind: str, wave: Wave) -> str:
     turns = f'"net":{_quoted(wave.wire)},"period":{wave.period}'
     return f'{{"at":{wave.at},"high":{wave.high},"hz":{wave.ticks_hz},"k":"{kind}",{turns},"t":{wave.t}}}'
+
+
+def _level(value: int) -> bool:
+    if value not in {0, 1}:
+        raise ValueError("no level")
+    return bool(value)
+
+
+#: How values of each type are spelled, and how they are read.
+_SPELLED: Mapping[type, Callable[[Any], object]] = {bool: int, bytes: bytes.hex, int: int, str: str}
+_READ: Mapping[object, Callable[[Json, str], object]] = {
+    int: _integer,
+    bool: lambda entry, key: _level(_integer(entry, key)),
+    bytes: lambda entry, key: bytes.fromhex(str(entry[key])),
+    str: lambda entry, key: str(entry[key]),
+}
+
+
+def _plain(kind: str, made: type[Any], words: str) -> _Row:
+    """Return the row of a kind of which each attribute is a key, read by its type: "key:attribute", or one for both."""
+    keys = {key: name or key for key, _, name in (word.partition(":") for word in words.split())}
+    readers = [(name, key, _READ[get_type_hints(made)[name]]) for key, name in keys.items()]
+
+    def to_entry(event: Event) -> Json:
+        values = {key: getattr(event, name) for key, name in keys.items()}
+        return {key: _SPELLED[type(value)](value) for key, value in values.items()}
+
+    def from_entry(t: Nanos, entry: Json) -> Event:
+        event: Event = made(t=t, **{name: read(entry, key) for name, key, read in readers})
+        return event
+
+    return _Row(kind, _encoded(to_entry), from_entry)
 
 
 #: In the order of one instant.
 ROWS: Mapping[type, _Row] = {
     Levels: _Row("pins", _pins_line, _pins),
     EdgeBlock: _Row("pins", _pins_line, _pins),
-    PinEdge: _Row(
-        "pin",
-        _encoded(lambda edge: {"net": edge.wire, "v": int(edge.level)}),
-        lambda t, entry: PinEdge(t=t, wire=str(entry["net"]), level=_level(_integer(entry, "v"))),
-    ),
+    PinEdge: _plain("pin", PinEdge, "net:wire v:level"),
     Wave: _Row("wave", _wave_line, _wave),
     Text: _Row(
         "usart",
         _text_line,
         lambda t, entry: Text(t=t, data=bytes.fromhex(str(entry["hex"])), port=str(entry.get("port", "usart1"))),
     ),
-    SpiTransfer: _Row(
-        "spi",
-        _spi_line,
-        lambda t, entry: SpiTransfer(
-            t=t,
-            bus=str(entry["bus"]),
-            begun=_integer(entry, "from"),
-            ended=_integer(entry, "to"),
-            from_master=bytes.fromhex(str(entry["mosi"])),
-            from_slave=bytes.fromhex(str(entry["miso"])),
-            bits=_integer(entry, "bits"),
-        ),
-    ),
-    I2cTransfer: _Row(
+    SpiTransfer: _plain("spi", SpiTransfer, "bits bus from:begun miso:from_slave mosi:from_master to:ended"),
+    I2cTransfer: _plain(
         "i2c",
-        _i2c_line,
-        lambda t, entry: I2cTransfer(
-            t=t,
-            bus=str(entry["bus"]),
-            begun=_integer(entry, "from"),
-            address=_integer(entry, "address"),
-            is_read=_level(_integer(entry, "read")),
-            data=bytes.fromhex(str(entry["hex"])),
-            answered=_level(_integer(entry, "answered")),
-            acknowledged=_integer(entry, "acks"),
-            end=str(entry["end"]),
-        ),
+        I2cTransfer,
+        "acks:acknowledged address answered bus end from:begun hex:data read:is_read",
     ),
-    CanTransfer: _Row(
+    CanTransfer: _plain(
         "can",
-        _can_line,
-        lambda t, entry: CanTransfer(
-            t=t,
-            bus=str(entry["bus"]),
-            begun=_integer(entry, "from"),
-            identifier=_integer(entry, "id"),
-            is_extended=_level(_integer(entry, "ext")),
-            is_remote=_level(_integer(entry, "rtr")),
-            dlc=_integer(entry, "dlc"),
-            data=bytes.fromhex(str(entry["hex"])),
-            is_own=_level(_integer(entry, "own")),
-            error=str(entry["error"]),
-        ),
+        CanTransfer,
+        "bus dlc error ext:is_extended from:begun hex:data id:identifier own:is_own rtr:is_remote",
     ),
     WorldChange: _Row(
         "obstacle", _encoded(lambda item: {"op": item.op, "name": item.name, **item.fields}), _world_change
     ),
-    Fault: _Row(
-        "fault",
-        _encoded(lambda fault: {"op": fault.op, "words": fault.words}),
-        lambda t, entry: Fault(t=t, op=str(entry["op"]), words=str(entry["words"])),
-    ),
+    Fault: _plain("fault", Fault, "op words"),
     Packet: _Row(
         "wire",
         lambda kind, packet: f'{{"dir":"{packet.direction}","hex":"{packet.data.hex()}","k":"{kind}","t":{packet.t}}}',
@@ -338,12 +305,6 @@ RANKS: Mapping[type, int] = {kind: rank for rank, kind in enumerate(ROWS)} | {Ed
 _BY_KIND: Mapping[object, Callable[[Nanos, Json], Recorded | None]] = {
     row.kind: row.from_entry for row in ROWS.values()
 }
-
-
-def _level(value: int) -> bool:
-    if value not in {0, 1}:
-        raise ValueError("no level")
-    return bool(value)
 
 
 def line_of(event: Recorded) -> str:

@@ -15,11 +15,9 @@ import math
 from binascii import b2a_base64
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from operator import itemgetter
-from typing import Protocol
 
 from bluepill_sim.fabric.characters import Characters
-from p2os.pioneer.body.contract import BodyState, Hit
-from p2os.pioneer.world.geometry import Footprint
+from p2os.pioneer.body.contract import BodyState, Hit, RobotBody
 from p2os.pioneer.world.model import Obstacle
 from robot_bench.events.codec import EdgeBlock, Levels, line_of
 from robot_bench.events.kinds import (
@@ -57,45 +55,6 @@ _LINE_END = ord("\n")
 _PLACE = itemgetter(0)
 
 
-class Observed(Protocol):
-    """What the recorder wants to know of a body."""
-
-    @property
-    def state(self) -> BodyState:
-        """Where it is and how it moves."""
-        ...
-
-    def clearance(self, *, no_more_than: float = math.inf) -> float:
-        """Return metres between the hull and the nearest thing in the plan view, or `no_more_than`."""
-        ...
-
-    def take_moved(self) -> Sequence[Obstacle]:
-        """Return what has walked or was pushed since this was asked last."""
-        ...
-
-    def take_hits(self) -> Sequence[Hit]:
-        """Return the collisions since this was asked last."""
-        ...
-
-
-class OtherRobot(Protocol):
-    """What the recorder wants to know of another robot's body."""
-
-    @property
-    def robot_name(self) -> str:
-        """What it is called among the things of the world."""
-        ...
-
-    @property
-    def state(self) -> BodyState:
-        """Where it is."""
-        ...
-
-    def footprint_at(self, x_m: float, y_m: float, heading_rad: float) -> Footprint:
-        """Return the outline of its hull at a pose."""
-        ...
-
-
 class Recorder(Stateful):
     """Watches the parts and publishes what they do.
 
@@ -118,7 +77,7 @@ class Recorder(Stateful):
         trace: TraceWriter,
         harness: Harness,
         *,
-        body: Observed | None,
+        body: RobotBody | None,
         sample_ns: Nanos = SAMPLE_NS,
     ) -> None:
         self.trace = trace
@@ -150,12 +109,12 @@ class Recorder(Stateful):
         self._sonar_mm: tuple[int, ...] | None = None
         self._clearance_um: int | None = None
         #: Other robots of the world, and where each was told to be.
-        self._others: list[OtherRobot] = []
+        self._others: list[RobotBody] = []
         self._other_places: list[tuple[float, float, float] | None] = []
         for net in harness:
             net.watch(self._note_change)
 
-    def watch_robot(self, robot: OtherRobot) -> None:
+    def watch_robot(self, robot: RobotBody) -> None:
         """Tell of another robot as of a thing of the world: placed at the first pose, moved with those that follow."""
         self._others.append(robot)
         self._other_places.append(None)
@@ -275,7 +234,7 @@ class Recorder(Stateful):
             self.events.publish(contact)
             self._log("body", contact.t, "collision", f"{contact.what} at x {hit.x_m:.3f} m, y {hit.y_m:.3f} m")
 
-    def _tell_other(self, number: int, robot: OtherRobot, at: Nanos) -> None:
+    def _tell_other(self, number: int, robot: RobotBody, at: Nanos) -> None:
         """Tell where another robot's hull is, as a box, where that is new."""
         state, hull = robot.state, robot.footprint_at(0.0, 0.0, 0.0).polygon
         front, rear = max(x for x, _ in hull), min(x for x, _ in hull)
@@ -292,7 +251,7 @@ class Recorder(Stateful):
         elif told != place:
             self.obstacle("move", robot.robot_name, at, fields)
 
-    def _measure_clearance(self, body: Observed, at: Nanos) -> None:
+    def _measure_clearance(self, body: RobotBody, at: Nanos) -> None:
         """Tell the clearance where it is less than ever."""
         least = self.min_clearance_m
         self.min_clearance_m = found = body.clearance(no_more_than=math.inf if least is None else least)

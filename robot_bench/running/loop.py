@@ -40,11 +40,9 @@ class Leader(Protocol):
     @property
     def now_ns(self) -> int:
         """The time reached."""
-        ...
 
     def advance_to(self, limit_ns: int) -> Reached:
         """Run to `limit_ns`, at most a basic block beyond; less far where a watched net changes."""
-        ...
 
 
 class Follower(Protocol):
@@ -52,11 +50,9 @@ class Follower(Protocol):
 
     def next_deadline(self) -> Nanos | None:
         """Return when this part next wants to act, or None for never."""
-        ...
 
     def advance_to(self, limit: Nanos) -> Reached:
         """Act on everything due up to and including `limit`."""
-        ...
 
 
 class StuckError(P2osError):

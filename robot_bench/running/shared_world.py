@@ -29,11 +29,9 @@ class Driven(Protocol):
 
     def next_setpoints(self) -> tuple[float, float]:
         """Return the rim-speed set-points of the body's next step, m/s."""
-        ...
 
     def take_step(self, wheels: Wheels) -> None:
         """Take the wheels' angles after a step that was made with `next_setpoints`."""
-        ...
 
 
 class Member(Protocol):
@@ -42,20 +40,16 @@ class Member(Protocol):
     @property
     def own_end(self) -> Nanos:
         """When its run ends."""
-        ...
 
     @property
     def loop(self) -> RunLoop:
         """Brings its chip and all its parts forward."""
-        ...
 
     def own_snapshot(self) -> object:
         """Return all that decides its future, but for the scene."""
-        ...
 
     def restore_own(self, snapshot: object) -> None:
         """Put back what `own_snapshot` returned."""
-        ...
 
 
 class _Own:

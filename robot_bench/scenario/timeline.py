@@ -17,7 +17,6 @@ class Timed(Protocol):
     @property
     def at(self) -> Nanos:
         """When."""
-        ...
 
 
 T = TypeVar("T", bound=Timed)

@@ -36,12 +36,10 @@ class WiredRobot(Protocol):
     @property
     def signals(self) -> tuple[RobotWire, ...]:
         """Its wires to the chip."""
-        ...
 
     @property
     def parameters(self) -> RobotParameters:
         """What bodies and worlds need."""
-        ...
 
 
 class WiredPart(Timed, Protocol):

@@ -51,11 +51,9 @@ class ChipPin(Protocol):
 
     def drive(self, level: bool | None, *, is_weak: bool = False) -> None:
         """Put a level on the wire from outside, by a resistor where `is_weak`; None lets go."""
-        ...
 
     def drive_later(self, levels: Iterable[tuple[Nanos, int]], *, is_weak: bool = False) -> None:
         """Put levels on the wire from outside at times to come."""
-        ...
 
 
 class ChipWithPins(PinSubscriptions, Protocol):
@@ -64,11 +62,9 @@ class ChipWithPins(PinSubscriptions, Protocol):
     @property
     def now_ns(self) -> int:
         """The time reached."""
-        ...
 
     def pin(self, name: str) -> ChipPin:
         """Return a pin by its name, such as "PA4"."""
-        ...
 
 
 class ChipPins:

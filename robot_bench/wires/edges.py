@@ -12,12 +12,11 @@ import ctypes
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
-from importlib.util import find_spec
 from itertools import pairwise
 from typing import Any, overload
 
 from bluepill_sim.fabric.subscriptions import EDGE
-from simbase.errors import MissingDependencyError
+from simbase.c_library import built, loaded
 from simbase.timing import Nanos
 
 #: Of a row of the chip: a pin that is on no wire.
@@ -26,7 +25,7 @@ NO_WIRE = 255
 _PIECE = 1 << 20
 #: More bytes than a number of a block has.
 _LONGEST = 9
-#: Result and arguments: v nothing, i 32 bits, l 64 bits, z size, p pointer, c one byte.
+#: Result and arguments, as `simbase.c_library` spells them.
 _FUNCTIONS = {
     "edges_split": "vpzppzppp",
     "edges_changes": "zppzc",
@@ -36,9 +35,6 @@ _FUNCTIONS = {
     "edges_vcd": "zzpppppppz",
     "edges_samples": "vzppppplzlzp",
 }
-_TYPES: dict[str, Any] = {
-    "v": None, "i": ctypes.c_int, "l": ctypes.c_int64, "z": ctypes.c_size_t, "p": ctypes.c_void_p, "c": ctypes.c_uint8,
-}  # fmt: skip
 
 
 class Edges(Sequence[tuple[Nanos, int]]):
@@ -228,15 +224,7 @@ def _library() -> Any:
     Raises:
         MissingDependencyError: They were not built.
     """
-    spec = find_spec("robot_bench._edges")
-    if spec is None or spec.origin is None:
-        raise MissingDependencyError("the library for edges of wires is not built", hint="p2os doctor says why")
-    library = ctypes.CDLL(spec.origin)
-    for name, kinds in _FUNCTIONS.items():
-        function = getattr(library, name)
-        function.restype = _TYPES[kinds[0]]
-        function.argtypes = [_TYPES[kind] for kind in kinds[1:]]
-    return library
+    return loaded(built("robot_bench._edges"), _FUNCTIONS, "the library for edges of wires")
 
 
 def _at(times: "array[int]") -> int:

@@ -20,11 +20,9 @@ class EndpointPart(Timed, Protocol):
 
     def receive(self, data: bytes, now: Nanos) -> None:
         """Take bytes that the line has delivered at `now`."""
-        ...
 
     def take_output(self) -> list[bytes]:
         """Return the frames to send, one item each, oldest first, and forget them."""
-        ...
 
 
 class Endpoint(Stateful):

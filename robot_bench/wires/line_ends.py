@@ -25,7 +25,6 @@ class AdapterPart(EndpointPart, Protocol):
     @property
     def wakes_on(self) -> frozenset[str]:
         """Names of the wires at whose edges it has to be brought there; it acts at its deadlines beside these."""
-        ...
 
 
 class ControllerPart(EndpointPart, Protocol):
@@ -43,7 +42,6 @@ class ControllerPart(EndpointPart, Protocol):
         Raises:
             UsageError: It has none such.
         """
-        ...
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,12 +19,10 @@ class Usart(Protocol):
 
     def subscribe(self, sink: Callable[[Sequence[tuple[int, int]]], None]) -> Callable[[], None]:
         """Have `sink` called with rows of what was sent, (word, ns when its stop bit ended); return what ends it."""
-        ...
 
     @property
     def measured_baud(self) -> int | None:
         """The speed at which most characters were sent, in bit/s; None before the first."""
-        ...
 
 
 class ChipActivity(Protocol):
@@ -41,7 +39,6 @@ class ChipFault(Protocol):
     @property
     def at_ns(self) -> int:
         """When."""
-        ...
 
 
 class Chip(PinSubscriptions, Protocol):
@@ -49,63 +46,49 @@ class Chip(PinSubscriptions, Protocol):
 
     def subscribe_warnings(self, sink: Callable[[str], None]) -> Callable[[], None]:
         """Have `sink` called with each new warning, at its time; return a function that ends it."""
-        ...
 
     @property
     def now_ns(self) -> int:
         """The time reached."""
-        ...
 
     @property
     def usart1(self) -> Usart:
         """The port that firmware prints on."""
-        ...
 
     @property
     def warnings(self) -> Sequence[str]:
         """Everything that was warned of, oldest first."""
-        ...
 
     @property
     def fault(self) -> ChipFault | None:
         """The fault that ended the firmware, or that it came back from; None while there is none."""
-        ...
 
     @property
     def has_died(self) -> bool:
         """Whether the fault ended the firmware."""
-        ...
 
     @property
     def verdict(self) -> str:
         """What became of the firmware: its fault, its resets; empty where it just ran."""
-        ...
 
     def last_blocks(self) -> Sequence[str]:
         """Return what it ran last, up to the fault if there was one, as lines for a person."""
-        ...
 
     @property
     def activity(self) -> ChipActivity:
         """When the firmware last showed activity."""
-        ...
 
     def pin(self, name: str) -> ChipPin:
         """Return a pin by its name, such as "PA4"."""
-        ...
 
     def advance_to(self, limit_ns: int) -> Reached:
         """Run to `limit_ns`, at most a basic block beyond; less far where a pin changes that ends its slice."""
-        ...
 
     def where(self) -> str:
         """Return where the program is: symbol, offset and address."""
-        ...
 
     def snapshot(self) -> object:
         """Return all that decides the chip's future."""
-        ...
 
     def restore(self, snapshot: object) -> None:
         """Put back what `snapshot` returned."""
-        ...

@@ -138,7 +138,7 @@ def stripped(program: Path, hook: int) -> Callable[[], float]:
     core.drop_all_code()
 
     def work() -> None:
-        core.library.start(core.handle, core.registers[Register.PC] | 1, 0xFFFF_FFFF, 500_000, 0)
+        core.library.uc_emu_start(core.handle, core.registers[Register.PC] | 1, 0xFFFF_FFFF, 500_000, 0)
 
     return lambda: rate(rounds, work, time.thread_time)  # the clock of Unicorn's time-out is a thread of its own
 

@@ -34,7 +34,6 @@ from bluepill_sim.fabric.usb_bus import (
     Handshake,
     Token,
     Transaction,
-    UsbFunction,
     span_ns,
     transaction_ns,
 )
@@ -54,6 +53,7 @@ from bluepill_sim.parts.usb.descriptors import (
     total_bytes_of,
 )
 from bluepill_sim.parts.usb.pipes import Packet, Pipe, Request, Stage
+from bluepill_sim.peripherals.usb import Usb
 from bluepill_sim.spans import Span
 from simbase.state import Stateful
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
@@ -139,14 +139,15 @@ class UsbHost(Stateful):
     )  # fmt: skip
     DERIVED = ("_packet_sinks", "_transaction_sinks", "_function")
 
-    def __init__(self, wait: Wait | None = None) -> None:
+    def __init__(self, function: Usb, wait: Wait) -> None:
         """Make one, whose cable is not plugged in.
 
         Args:
+            function: the device at the other end.
             wait: brings the board forward, for what waits.
         """
         self._wait = wait
-        self._function: UsbFunction | None = None
+        self._function = function
         self._packet_sinks: list[PacketSink] = []
         self._transaction_sinks: list[TransactionSink] = []
         self.state = HostState.UNPLUGGED
@@ -187,10 +188,6 @@ class UsbHost(Stateful):
         self._taken = b""
         self._deadline_ns: Nanos | None = None
         self._can_wake = self._is_set = False
-
-    def join(self, function: UsbFunction) -> None:
-        """Take the device at the other end."""
-        self._function = function
 
     # For users.
 
@@ -256,7 +253,7 @@ class UsbHost(Stateful):
         """
         self.plug()
         ends = {HostState.CONFIGURED, HostState.FAILED}
-        self._run_until(lambda: self.state in ends, within)
+        self._wait(lambda: self.state in ends, within)
         if self.state is not HostState.CONFIGURED or self.device is None:
             why = f": {self.reason}" if self.reason else ""
             raise UsbRequestError(f"the USB device is not configured, it is {self.state.value}{why}")
@@ -286,7 +283,7 @@ class UsbHost(Stateful):
         number = self._asked
         self._todo.append(Request(kind, request, value, index, data, length, number=number))
         self._changed()
-        self._run_until(lambda: number in self._answers, within)
+        self._wait(lambda: number in self._answers, within)
         answer = self._answers.pop(number, "no answer in time")
         if isinstance(answer, str):
             raise UsbRequestError(f"control transfer {kind:#04x} {request:#04x}: {answer}")
@@ -332,7 +329,7 @@ class UsbHost(Stateful):
             UsbRequestError: there is no such endpoint, or none came in time.
         """
         self.listen(endpoint)
-        self._run_until(lambda: any(address == endpoint for address, _ in self._packets), within)
+        self._wait(lambda: any(address == endpoint for address, _ in self._packets), within)
         for row in self._packets:
             if row[0] == endpoint:
                 self._packets.remove(row)
@@ -439,16 +436,14 @@ class UsbHost(Stateful):
 
     def _catch_up(self) -> None:
         """Come to the time that the board has reached: the user does something."""
-        if self._function is not None:
-            self._now_ns = max(self._now_ns, self._function.now_ns)
+        self._now_ns = max(self._now_ns, self._function.now_ns)
 
     def _changed(self) -> None:
         """Take that the user has done something."""
         self._catch_up()
-        if self._function is not None:
-            self._look_at_pull_up()
-            self._plan()
-            self._function.plan()
+        self._look_at_pull_up()
+        self._plan()
+        self._function.plan()
 
     def _plan(self) -> None:
         times = [self._timer and self._timer[0], self._deadline_ns]
@@ -473,7 +468,7 @@ class UsbHost(Stateful):
 
     def _choose(self) -> tuple[Nanos, Pipe] | None:
         """Return the next transaction and its time: what is periodic first, then control, then bulk in turn."""
-        if self._frames_ns is None or self._function is None:
+        if self._frames_ns is None:
             return None
         self._take_request()
         best: tuple[Nanos, int, Pipe] | None = None
@@ -491,11 +486,11 @@ class UsbHost(Stateful):
 
     def _earliest(self, pipe: Pipe) -> Nanos | None:
         """Return when a pipe may have its next transaction; None: not before the device changes."""
-        frames_ns, function = self._frames_ns, self._function
-        if frames_ns is None or function is None:
+        frames_ns = self._frames_ns
+        if frames_ns is None:
             return None
         if pipe.nak_ns is not None and not self._is_setup(pipe):
-            if function.would_nak(pipe.address & 0xF, self._is_in_now(pipe)):
+            if self._function.would_nak(pipe.address & 0xF, self._is_in_now(pipe)):
                 return None
             self._ask_again(pipe, pipe.nak_ns)
         at_ns = max(self._now_ns, self._free_ns, pipe.not_before_ns, frames_ns + pipe.next_frame * FRAME_NS)
@@ -523,13 +518,10 @@ class UsbHost(Stateful):
     # Transactions.
 
     def _begin(self, pipe: Pipe) -> None:
-        function = self._function
-        if function is None:
-            return
         now_ns = self._now_ns
         transaction = self._transaction(pipe)
         lost = self._next_damage()
-        answer = function.begin(replace(transaction, is_damaged=lost == "to device"))
+        answer = self._function.begin(replace(transaction, is_damaged=lost == "to device"))
         if answer is not None and answer.handshake is Handshake.NAK and lost != "to host":
             self._take_nak(pipe)
             return
@@ -607,7 +599,7 @@ class UsbHost(Stateful):
         """Take the end of a transaction that was answered."""
         self._running = None
         pipe, answer, transaction = self._pipes[running.address], running.answer, running.transaction
-        if self._function is not None and answer.handshake is not Handshake.STALL and not running.device_misses_it:
+        if answer.handshake is not Handshake.STALL and not running.device_misses_it:
             self._function.end(transaction)
         if running.host_misses_it:
             self._take_silence(pipe)
@@ -716,8 +708,7 @@ class UsbHost(Stateful):
     # The port.
 
     def _tell(self, state: BusState, frame: int = 0) -> None:
-        if self._function is not None:
-            self._function.bus_changed(state, self._now_ns, frame)
+        self._function.bus_changed(state, self._now_ns, frame)
 
     def _stop_frames(self, state: BusState) -> None:
         if self._frames_ns is not None:
@@ -732,7 +723,7 @@ class UsbHost(Stateful):
             pipe.next_frame, pipe.nak_ns, pipe.not_before_ns = 0, None, 0
 
     def _look_at_pull_up(self) -> None:
-        is_there = self._function is not None and self._function.is_attached
+        is_there = self._function.is_attached
         if self.state is HostState.WAITING and is_there:
             self.state = HostState.DEBOUNCING
             self._timer = self._now_ns + DEBOUNCE_NS, "reset"
@@ -899,11 +890,6 @@ class UsbHost(Stateful):
             there = ", ".join(f"{address:#04x}" for address in self._pipes if address) or "none"
             raise UsbRequestError(f"the USB device has no endpoint {endpoint:#04x}; it has {there}: {self.describe()}")
         return self._pipes[endpoint]
-
-    def _run_until(self, holds: Callable[[], bool], within: Span) -> None:
-        if self._wait is None:
-            raise UsbRequestError("this host has no board that it could run")
-        self._wait(holds, within)
 
 
 _STRINGS = ("maker", "product name", "serial number")

@@ -1,16 +1,14 @@
 """`p2os campaign`: searches for the worlds in which a firmware fails, and proves each that it finds."""
 
+import contextlib
 import json
 import shlex
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
-from rich.progress import Progress as Bar
 
 from p2os.cli.help_pages import BENCH
 from p2os.cli.main import EXIT_INTERRUPTED
@@ -25,8 +23,8 @@ from robot_bench.campaign.variants.against import Against, Other, first_apart, t
 from robot_bench.campaign.variants.diversity import FailureSet
 from robot_bench.campaign.whole import begin, carry_out, resume
 from robot_bench.campaign.workers.processes import Processes
-from robot_bench.cli.progress import RunDisplay
-from robot_bench.cli.workers import core_count
+from robot_bench.cli.progress import RunDisplay, counting_bar
+from robot_bench.cli.workers import Jobs, core_count
 from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.scenario.scenario import load_scenario
 from simbase.errors import UsageError, nearest
@@ -64,10 +62,7 @@ def campaign(
     words: Annotated[
         list[str] | None, typer.Argument(help="A campaign file; or `new` and a scenario.", metavar="FILE|new SCENARIO")
     ] = None,
-    jobs: Annotated[
-        int | None,
-        option(COUNT, "--jobs", "-j", purpose="Runs at a time; default as many as processors.", above_zero=True),
-    ] = None,
+    jobs: Jobs = None,
     firmware: Annotated[
         Path | None, typer.Option(help="ELF, HEX or BIN in place of the scenario's.", metavar="FILE")
     ] = None,
@@ -122,9 +117,9 @@ def campaign(
         if other is not None:
             workers = Against(workers, other)
         try:
-            with Shown(found) as shown:
+            with shown(found) as on_run:
                 done = carry_out(
-                    found, folder, workers, clock=wall_clock, on_run=shown.update, look=display.raise_if_interrupted
+                    found, folder, workers, clock=wall_clock, on_run=on_run, look=display.raise_if_interrupted
                 )
         finally:
             workers.close()
@@ -163,34 +158,22 @@ def _workers(found: Campaign, jobs: int, dask: str | None, scheduler: str | None
     return Processes(jobs, found.limits, display.raise_if_interrupted)
 
 
-class Shown:
-    """Tells on stderr how a campaign goes: a bar on a terminal, elsewhere a line each tenth."""
+@contextlib.contextmanager
+def shown(found: Campaign) -> Iterator[Callable[[Progress], None]]:
+    """Tell on stderr how a campaign goes: a bar on a terminal, elsewhere a line each tenth; yield what is told."""
+    whole, told = found.budget.runs, 0
 
-    def __init__(self, found: Campaign) -> None:
-        self._whole, self._is_live = found.budget.runs, sys.stderr.isatty()
-        self._told = 0
-        self._bar = Bar(
-            TextColumn("points"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[said]}"),
-            console=Console(stderr=True), transient=True, auto_refresh=False, disable=not self._is_live,
-        )  # fmt: skip
-        self._task = self._bar.add_task("", total=self._whole, said="")
+    def update(progress: Progress) -> None:
+        nonlocal told
+        points = progress.answered
+        said = f"{progress.runs} runs, {len(progress.failures)} failures, {len(progress.blocks)} blocks"
+        tell_bar(points, said)
+        if not sys.stderr.isatty() and points * 10 // whole > told:
+            told = points * 10 // whole
+            typer.echo(f"{points} of {whole} points: {said}", err=True)
 
-    def __enter__(self) -> Self:
-        self._bar.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._bar.stop()
-
-    def update(self, progress: Progress) -> None:
-        """Show where the campaign stands."""
-        points, failures = progress.answered, len(progress.failures)
-        said = f"{progress.runs} runs, {failures} failures, {len(progress.blocks)} blocks"
-        if self._is_live:
-            self._bar.update(self._task, completed=points, said=said, refresh=True)
-        elif points * 10 // self._whole > self._told:
-            self._told = points * 10 // self._whole
-            typer.echo(f"{points} of {self._whole} points: {said}", err=True)
+    with counting_bar("points", whole) as tell_bar:
+        yield update
 
 
 def tell(done: Whole, other: Other | None, *, json_output: bool) -> None:

@@ -2,7 +2,6 @@
 
 import json
 import random
-import sys
 import time
 from collections.abc import Callable, Sequence
 from fnmatch import fnmatch
@@ -10,8 +9,6 @@ from pathlib import Path
 from typing import Annotated, cast
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from bluepill_sim.analysis.coverage import Coverage
 from bluepill_sim.board import BluePill
@@ -27,9 +24,9 @@ from robot_bench.campaign.variants.mutation.base_run import BaseRun, base_run
 from robot_bench.campaign.variants.mutation.report import Mutation, as_json, report_lines, write_junit
 from robot_bench.campaign.variants.mutation.suite import Suite, SuiteRun, run_suite
 from robot_bench.campaign.variants.mutation.trial import MOST_MORE_NS, MOST_TIMES, Fate, Found, try_mutant
-from robot_bench.cli.progress import RunDisplay
+from robot_bench.cli.progress import RunDisplay, counting_bar
 from robot_bench.cli.sweep import refuse_junit
-from robot_bench.cli.workers import core_count, run_in_processes
+from robot_bench.cli.workers import Jobs, core_count, run_in_processes
 from robot_bench.events.codec import Json
 from robot_bench.recording.summary import INTERRUPTED
 from robot_bench.scenario.included_files import read_setting
@@ -82,10 +79,7 @@ def mutate(
     set_: Annotated[
         list[str] | None, typer.Option("--set", help="A key of the scenarios; repeatable.", metavar="KEY=VALUE")
     ] = None,
-    jobs: Annotated[
-        int | None,
-        option(COUNT, "--jobs", "-j", purpose="Runs at a time; default as many as processors.", above_zero=True),
-    ] = None,
+    jobs: Jobs = None,
     fail_under: Annotated[
         float, option(PERCENT, "--fail-under", purpose="Least score.", shown="0%", least="0%", most="100%")
     ] = 0.0,
@@ -199,10 +193,6 @@ def _try_all(
     """Return what came of each mutant, which could not be run and why, and whether nothing interrupted them."""
     found: list[Found | None] = [None] * len(tried)
     broken: list[str] = []
-    bar = Progress(
-        TextColumn("mutants"), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[survived]}"),
-        console=Console(stderr=True), transient=True, auto_refresh=False, disable=not sys.stderr.isatty(),
-    )  # fmt: skip
 
     def job(number: int, look: Callable[[], None]) -> Json:
         mutant = tried[number]
@@ -212,10 +202,11 @@ def _try_all(
             found = by_tests if found.fate is Fate.SAME or by_tests.is_noticed else found
         return found.to_plain()
 
-    with bar:
-        task = bar.add_task("", total=len(tried), survived="")
+    with counting_bar("mutants", len(tried)) as tell:
+        done = 0
 
         def on_done(number: int, plain: Json) -> None:
+            nonlocal done
             if "fate" in plain:
                 found[number] = Found.from_plain(plain)
             elif f"{plain['failures']}".endswith("SIGXCPU']"):
@@ -223,7 +214,8 @@ def _try_all(
             elif (why := cast("list[str]", plain["failures"])[0]) != INTERRUPTED:
                 broken.append(f"{tried[number].address:#010x}: {why}")
             survived = sum(one is not None and not one.is_noticed for one in found)
-            bar.update(task, advance=1, survived=f"{survived} not noticed", refresh=True)
+            done += 1
+            tell(done, f"{survived} not noticed")
 
         is_whole = run_in_processes(
             job, len(tried), at_once=jobs, on_done=on_done, raise_if_interrupted=raise_if_interrupted

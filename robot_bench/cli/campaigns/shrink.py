@@ -14,6 +14,7 @@ from robot_bench.campaign.variants.shrinking.failure import Failure, Way, failur
 from robot_bench.campaign.variants.shrinking.kept import Kept, keep, trial_of_run
 from robot_bench.campaign.variants.shrinking.shrink import BUDGET, Shrunk, shrink
 from robot_bench.cli.progress import RunDisplay, runs_bar
+from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.recording.run_record import TRACE_NAME
 from robot_bench.scenario.included_files import Setting, read_setting
 from robot_bench.scenario.scenario import load_scenario
@@ -77,9 +78,8 @@ def shrink_run(
     trial = _trial(run, firmware, settings)
     if goal is not None:
         trial = _with_goal(trial, goal)
-    folder = out or _next_folder(trial.name)
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise UsageError(f"{folder} is not empty", hint="--out names another folder")
+    if out is not None and out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise UsageError(f"{out} is not empty", hint="--out names another folder")
     with RunDisplay(is_shown=False) as display:
         with runs_bar(budget) as advance:
 
@@ -88,7 +88,7 @@ def shrink_run(
                 return failure_of(candidate, way, until_ns, display.raise_if_interrupted)
 
             small = shrink(trial, quick=QUICK if quick else (), budget=budget, judge=judge)
-        kept = keep(small.trial, small.failure.way, folder)
+        kept = keep(small.trial, small.failure.way, out or make_next_folder(trial.name, Path("shrunk")))
     if json_output:
         typer.echo(json.dumps(as_json(small, kept), sort_keys=True))
     else:
@@ -158,10 +158,3 @@ def _print(small: Shrunk, kept: Kept) -> None:
     typer.echo(f"picture   {kept.scenario.parent / 'scene.png'}")
     proof = "the same trace in another process" if kept.is_confirmed else "NOT the same in another process"
     typer.echo(f"proof     {proof}: {kept.outcome.sha256[:16]}")
-
-
-def _next_folder(name: str) -> Path:
-    number = 1
-    while (found := Path("shrunk") / f"{name}-{number:03d}").exists():
-        number += 1
-    return found

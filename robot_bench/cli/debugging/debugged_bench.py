@@ -9,6 +9,8 @@ Invariant: a run that a debugger has halted and let go on leaves the same trace
 as one that nobody debugged.
 """
 
+from collections.abc import Callable
+
 from bluepill_sim.board import BluePill
 from bluepill_sim.core.halts import ChipReached
 from bluepill_sim.errors import BluePillError
@@ -36,7 +38,6 @@ class BenchMachine:
     def __init__(self, bench: Bench) -> None:
         self.board = board_of(bench)
         self._bench = bench
-        self._halt: ChipReached | None = None
 
     @property
     def end_ns(self) -> Nanos | None:
@@ -45,21 +46,7 @@ class BenchMachine:
 
     def advance_to(self, limit_ns: Nanos, *, by_step: bool = False) -> ChipReached:
         """Bring the bench to a time; less far where the chip halts, or by one instruction of the chip."""
-        chip = self.board.chip
-        run = self.board.step if by_step else self.board.advance_to
-        self._halt = None
-
-        def advance(limit: Nanos) -> ChipReached:
-            reached = run(limit)
-            if reached.halt is not None:
-                self._halt = reached
-                self._bench.loop.note_halt(is_inside_block=chip.engine.is_inside_block)
-            return reached
-
-        self._bench.run_until(limit_ns, advance)
-        if self._halt is not None:
-            return self._halt
-        return ChipReached(self.board.now_ns, Reason.DEADLINE)
+        return _advanced(self._bench, self._bench.run_until, limit_ns, by_step=by_step)
 
     def snapshot(self) -> object:
         """Return all that decides the bench's future, and where its trace stands."""
@@ -90,22 +77,10 @@ class RemoteMachine:
 
     def advance_to(self, limit_ns: Nanos, *, by_step: bool = False) -> ChipReached:
         """Bring the bench to a time, at the speed of the clock; less far where the chip halts."""
-        chip = self.board.chip
-        run = self.board.step if by_step else self.board.advance_to
-        halt: list[ChipReached] = []
         if not self._has_begun:
             self._has_begun = True
             self._bench.start_clock()
-
-        def advance(limit: Nanos) -> ChipReached:
-            reached = run(limit)
-            if reached.halt is not None:
-                halt.append(reached)
-                self._bench.loop.note_halt(is_inside_block=chip.engine.is_inside_block)
-            return reached
-
-        self._bench.loop.run_until(limit_ns, advance)
-        return halt[0] if halt else ChipReached(self.board.now_ns, Reason.DEADLINE)
+        return _advanced(self._bench, self._bench.loop.run_until, limit_ns, by_step=by_step)
 
     def snapshot(self) -> object:
         """A real robot has no snapshot."""
@@ -119,3 +94,26 @@ class RemoteMachine:
         """Stop the robot and close its session: it would drive on by its last command."""
         self._is_over = True
         self._bench.close()
+
+
+def _advanced(
+    bench: Bench | RemoteBench,
+    run_until: Callable[[Nanos, Callable[[Nanos], ChipReached]], object],
+    limit_ns: Nanos,
+    *,
+    by_step: bool,
+) -> ChipReached:
+    """Bring a bench to a time, or to the first halt of its chip."""
+    board = board_of(bench)
+    run = board.step if by_step else board.advance_to
+    halts: list[ChipReached] = []
+
+    def advance(limit: Nanos) -> ChipReached:
+        reached = run(limit)
+        if reached.halt is not None:
+            halts.append(reached)
+            bench.loop.note_halt(is_inside_block=board.chip.engine.is_inside_block)
+        return reached
+
+    run_until(limit_ns, advance)
+    return halts[-1] if halts else ChipReached(board.now_ns, Reason.DEADLINE)

@@ -12,7 +12,7 @@ from p2os.cli.help_pages import BENCH
 from p2os.cli.names import bodies
 from p2os.cli.quantities import option
 from robot_bench.cli.progress import RunDisplay
-from robot_bench.cli.workers import core_count, run_in_processes
+from robot_bench.cli.workers import Jobs, core_count, run_in_processes
 from robot_bench.events.codec import Json
 from robot_bench.experiments import require
 from robot_bench.scenario.included_files import Setting, as_toml, read_setting
@@ -75,10 +75,7 @@ def sensitivity(
     duration: Annotated[
         Nanos | None, option(TIME, "--duration", purpose="How much virtual time.", above_zero=True)
     ] = None,
-    jobs: Annotated[
-        int | None, option(COUNT, "--jobs", "-j", purpose="Runs at a time; default as many as processors.",
-                           above_zero=True)
-    ] = None,
+    jobs: Jobs = None,
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
     picture: Annotated[Path | None, typer.Option("--picture", help="Draw the effects, PNG.", metavar="FILE")] = None,
 ) -> None:  # fmt: skip

@@ -4,6 +4,7 @@ import math
 from itertools import pairwise
 from typing import cast
 
+from adapter_sim.codec import motor_value
 from adapter_sim.pinout import load_pinout
 from p2os.toml_schema import Table
 from robot_bench.events.kinds import Event, PinEdge, Wave
@@ -41,7 +42,7 @@ class MotorSequence(Watch):
             at = event.t
             if self._seen and at - self._seen[-1][0] < SKEW_NS:
                 at = self._seen.pop()[0]  # the change began with the first of its edges
-            pair = tuple(_signed(bits, len(nets)) for bits, nets in zip(self._bits, self._nets, strict=True))
+            pair = tuple(motor_value(bits, len(nets)) for bits, nets in zip(self._bits, self._nets, strict=True))
             if not self._seen or self._seen[-1][1] != pair:
                 self._seen.append((at, pair))
         return None
@@ -70,11 +71,6 @@ class MotorSequence(Watch):
                 held_s = (end - begin) / NS_PER_S
                 return f"{pair} was held {held_s:.3f} s, {self._held_ns / NS_PER_S:g} s are wanted"
         return ""
-
-
-def _signed(bits: int, width: int) -> int:
-    sign = 1 << max(0, width - 1)
-    return (bits ^ sign) - sign
 
 
 def shown_pairs(pairs: object) -> str:

@@ -68,29 +68,6 @@ class InOrder(_Printed):
         return Outcome(met=False, says=f"{self._texts[self._place]!r} {self._missing}; {self.last}")
 
 
-class Lacks(_Printed):
-    """A text is on no line."""
-
-    STATE = ("_found",)
-
-    def __init__(self, text: str) -> None:
-        super().__init__()
-        self._text = text
-        self._found: Nanos | None = None
-
-    def feed(self, event: Event) -> Outcome | None:
-        line = self.read(event) if isinstance(event, Text) else None
-        if self._found is None and line is not None and self._text in line:
-            self._found = event.t
-            return self.finish(event.t)
-        return None
-
-    def finish(self, end: Nanos) -> Outcome:
-        if self._found is None:
-            return Outcome(met=True)
-        return Outcome(met=False, says=f"{self._text!r} was printed at {seconds(self._found)}")
-
-
 _COUNTS = re.compile(r"left=(-?\d+) right=(-?\d+)")
 
 

@@ -27,7 +27,6 @@ class Line(Protocol):
 
     def ask(self, line: str, prefix: str) -> str | None:
         """Send a line; return the first line after it that begins with `prefix`, None where none came in time."""
-        ...
 
 
 def wires_of(pinout: Pinout, direction: Direction) -> tuple[int, ...]:

@@ -10,10 +10,10 @@ Invariant: time goes forward in microseconds, and what the program does follows 
 import ctypes
 from enum import IntEnum
 from functools import cache
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from simbase.c_library import built, loaded
 from simbase.errors import MissingDependencyError
 
 PORTS = 3
@@ -47,6 +47,14 @@ class NvsFault(IntEnum):
 _REASONS = {1: ResetReason.RESTART, 2: ResetReason.PANIC, 3: ResetReason.WATCHDOG}
 
 
+#: Result and arguments of each function, as `simbase.c_library` spells them.
+_FUNCTIONS = {
+    "machine": "p", "machine_run": "il", "machine_sent": "zispz", "machine_receive": "visz",
+    "machine_pad": "iiiiii", "machine_stack_used": "z", "machine_nvs_count": "z",
+    "machine_nvs_put": "vssl", "machine_nvs_entry": "vzppp", "machine_ram": "vpp", "machine_rtc": "vpp",
+}  # fmt: skip
+
+
 class _State(ctypes.Structure):
     """machine_state of adapter_fw/esp32_sim/machine.h."""
 
@@ -73,18 +81,18 @@ def library_path() -> Path:
     Raises:
         MissingDependencyError: It was not built.
     """
-    spec = find_spec("robot_bench._esp32")
-    if spec is None or spec.origin is None:
+    path = built("robot_bench._esp32")
+    if path is None:
         raise MissingDependencyError("the simulated ESP32 is not built", hint="p2os doctor says why")
-    return Path(spec.origin)
+    return Path(path)
 
 
 class _Library:
     """A loaded program, and whose turn it is."""
 
     def __init__(self, path: Path) -> None:
-        self.calls: Any = ctypes.CDLL(str(path))
-        _declare(self.calls)
+        self.calls = loaded(str(path), _FUNCTIONS, "the simulated ESP32")
+        self.calls.machine.restype = ctypes.POINTER(_State)
         self.state: _State = self.calls.machine().contents
         self._ram = self._place(self.calls.machine_ram)
         self._rtc = self._place(self.calls.machine_rtc)
@@ -253,16 +261,3 @@ class Esp32:
 @cache
 def _library(path: Path) -> _Library:
     return _Library(path)
-
-
-def _declare(library: Any) -> None:
-    library.machine.restype = ctypes.POINTER(_State)
-    library.machine_run.argtypes = [ctypes.c_int64]
-    for name in ("machine_sent", "machine_nvs_count", "machine_stack_used"):
-        getattr(library, name).restype = ctypes.c_size_t
-    library.machine_sent.argtypes = [ctypes.c_int, ctypes.c_char_p, ctypes.c_void_p, ctypes.c_size_t]
-    library.machine_receive.argtypes = [ctypes.c_int, ctypes.c_char_p, ctypes.c_size_t]
-    library.machine_nvs_put.argtypes = [ctypes.c_char_p, ctypes.c_char_p, ctypes.c_int64]
-    library.machine_nvs_entry.argtypes = [ctypes.c_size_t, *[ctypes.c_void_p] * 3]
-    for name in ("machine_ram", "machine_rtc"):
-        getattr(library, name).argtypes = [ctypes.c_void_p] * 2

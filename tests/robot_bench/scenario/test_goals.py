@@ -67,7 +67,7 @@ def test_goal_usart_contains_and_usart_lacks() -> None:
     assert failure("usart_contains", run, text="TURN") is None
     assert failure("usart_contains", run, text="HELP") == "'HELP' was not printed; the last line is 'dodge: TURN_LEFT'"
     assert failure("usart_lacks", run, text="HELP") is None
-    assert failure("usart_lacks", run, text="TURN") == "'TURN' was printed at 2.000 s"
+    assert failure("usart_lacks", run, text="TURN") == "'usart1 sends TURN' happened 1 time(s), first at 2.000 s"
     assert failure("usart_contains", record(), text="x") == "'x' was not printed; nothing was printed"
 
 
@@ -121,7 +121,9 @@ def test_what_is_met_is_told_as_it_was_wanted() -> None:
     goals = (Goal(kind="no_collision", arguments={}), Goal(kind="usart_lacks", arguments={"text": "x"}))
     found = judged(run, *goals, end_ns=S, planned_ns=9 * S)
     assert found.met == ["touches nothing"]
-    assert found.missed == ["usart_lacks: 'x' was printed at 1.000 s"], "what forbids is judged from the start"
+    assert found.missed == ["usart_lacks: 'usart1 sends x' happened 1 time(s), first at 1.000 s"], (
+        "what forbids is judged from the start"
+    )
 
 
 @pytest.mark.parametrize(
