@@ -251,7 +251,8 @@ def _hint(value: object, key: Key) -> str | None:
 
 
 def _shown(value: object) -> str:
-    text = shown(value)
+    """Return a value as it stands in TOML."""
+    text = shown(value).lower() if isinstance(value, bool) else shown(value)
     return f'"{text[1:-1]}"' if isinstance(value, str) and text[-1] == "'" else text
 
 

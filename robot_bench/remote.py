@@ -108,7 +108,7 @@ class RemoteBench:
         ChipPins(chip, harness, pin_of, on_watched=self.loop.note_edge).watch(self.adapter.wakes_on, 0)
         chip.usart1.far_baud = scenario.usart_baud
         if scenario.parts:
-            plug_in(scenario.parts, chip, recorder)
+            plug_in(scenario, chip, recorder)
         hear_usarts(chip, recorder)
         hear_buses(chip, recorder, scenario.record)
         chip.subscribe_warnings(lambda text: recorder.event("chip", chip.now_ns, "warning", text))

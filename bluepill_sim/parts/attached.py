@@ -28,6 +28,8 @@ from bluepill_sim.peripherals.spi import Spi
 from simbase.state import Stateful
 from simbase.timing import Nanos
 
+#: By which method a part knows a bus.
+METHODS: Mapping[str, str] = {"SPI": "exchange", "I2C": "start", "USART": "sent", "CAN": "join"}
 #: A change of a pin: ns, the part's name for it, its level then.
 Change = tuple[Nanos, str, bool]
 #: Takes what a part does that is worth a line: (ns, part, what, detail).
@@ -164,6 +166,8 @@ class AttachedParts(Stateful):
         is_hung = on is not None and self._hang(board, part, name, on.upper(), select, socket)
         if on is None and select is not None:
             raise PartError(f"the {name} is selected on no bus", hint="on=SPI1")
+        if on is None:
+            self._refuse_unconnected(part, name, uses, pins)
         if hasattr(part, "plug"):
             try:
                 part.plug(socket)
@@ -200,7 +204,7 @@ class AttachedParts(Stateful):
     ) -> bool:  # fmt: skip
         """Hang a part on a bus; return whether the bus saves its state."""
         kind = on.rstrip("0123456789")
-        method = {"SPI": "exchange", "I2C": "start", "USART": "sent", "CAN": "join"}.get(kind)
+        method = METHODS.get(kind)
         if method is None:
             raise PartError(f"the {name} cannot hang on {on!r}", hint="SPI1, SPI2, I2C1, I2C2, USART1 to 3, or CAN")
         if not hasattr(part, method):
@@ -236,6 +240,15 @@ class AttachedParts(Stateful):
             part.changed([(ns, name_of[pin], wire == HIGH) for ns, pin, _, wire, _, _ in EDGE.iter_unpack(rows)])
 
         bank.subscribe_pins(heard, take, of=Of.WIRE, ends_slice=watched)
+
+    @staticmethod
+    def _refuse_unconnected(part: Any, name: str, uses: Mapping[str, Use], pins: Mapping[str, str]) -> None:
+        """Refuse a part that nothing could reach; of what knows a bus, a pin that it only holds serves that bus."""
+        buses = [bus for bus, method in METHODS.items() if hasattr(part, method)]
+        enough = [key for key, use in uses.items() if not buses or use is not Use.HELD]
+        if (buses or uses) and not any(key in pins for key in enough):
+            ways = [f"on={bus}{'' if bus == 'CAN' else 1}" for bus in buses] + [f"{key}=PA8" for key in enough[:1]]
+            raise PartError(f"the {name} is connected to nothing", hint=" or ".join(ways))
 
     @staticmethod
     def _refuse_no_leg(board: ChipWithBuses, pin: str) -> None:

@@ -130,8 +130,6 @@ class LedPanel(Stateful):
         for name in self.PINS:
             if socket.has(name):
                 self._lit_ns[name] = 0
-        if not self._lit_ns:
-            raise ValueError("it has no LED: led0=PA0, up to led7")
 
     def changed(self, rows: Sequence[Change]) -> None:
         """Switch LEDs."""

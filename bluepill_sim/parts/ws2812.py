@@ -74,13 +74,7 @@ class Ws2812(Stateful):
         self._socket: Socket | None = None
 
     def plug(self, socket: Socket) -> None:
-        """Listen to the pin, unless it hangs on an SPI.
-
-        Raises:
-            ValueError: It does neither.
-        """
-        if not socket.has("din") and socket.spi is None:
-            raise ValueError("it needs din=PA8, or on=SPI1")
+        """Listen to the pin, unless it hangs on an SPI."""
         self._socket = socket
 
     def changed(self, rows: Sequence[Change]) -> None:

@@ -3,8 +3,6 @@
 Nothing here knows of frames or robots, and nothing below the I/O layer imports it.
 """
 
-from pathlib import Path
-
 from p2os.transport.loops import Loops
 from p2os.transport.ports import HungUpError, Listener, Transport
 from p2os.transport.url import LoopUrl, PortUrl, PtyUrl, SerialUrl, TcpUrl, parse_url
@@ -47,7 +45,7 @@ def open_url(text: str, *, loops: Loops | None = None) -> Transport:
         return connect_tcp(url)
     if isinstance(url, LoopUrl):
         return _loops(loops, text).connect(url.name)
-    if isinstance(url, PtyUrl) and not (url.path and Path(url.path).exists()):
+    if isinstance(url, PtyUrl) and not url.path:
         from p2os.transport.pseudo_terminal import open_pty
 
         return open_pty(url)

@@ -30,14 +30,15 @@ class PtyMaster:
             import tty
         except ImportError as error:
             raise TransportError("this system has no pseudo-terminals", hint="use tcp:127.0.0.1:8101") from error
+        self._link = Path(url.path) if url.path else None
+        if self._link is not None:
+            _remove_left(self._link)  # before the system gives the number of its terminal to this one
         self.descriptor, slave = pty.openpty()
         tty.setraw(slave)
         self.path = os.ttyname(slave)
         os.close(slave)
         os.set_blocking(self.descriptor, False)
-        self._link: Path | None = None
-        if url.path:
-            self._link = Path(url.path)
+        if self._link is not None:
             self._make_link(self._link)
         self.description = f"pty:{self._link or self.path}"
 
@@ -61,13 +62,18 @@ class PtyMaster:
 
     def _make_link(self, link: Path) -> None:
         try:
-            if link.is_symlink() and not link.exists():
-                link.unlink()  # left by a program that was killed: its terminal is gone
             link.symlink_to(self.path)
         except OSError as error:
             os.close(self.descriptor)
             reason = "something is already there" if error.errno == errno.EEXIST else error.strerror
             raise TransportError(f"cannot make the link {link}: {reason}", hint="choose another path") from error
+
+
+def _remove_left(link: Path) -> None:
+    """Remove a link that a program left which was killed: its terminal is gone."""
+    with contextlib.suppress(OSError):  # it is told where the new one is made
+        if link.is_symlink() and not link.exists():
+            link.unlink()
 
 
 class PtyTransport:

@@ -574,7 +574,7 @@ class Bench(Expectations, Interventions, Stateful):
     def _plug_in(self, chip: Chip) -> tuple[WorldSenses, ...]:
         """Attach the scenario's parts to the board, and have them sense the world."""
         senses = WorldSenses(self.parts.body, self._bring_robot_to)
-        plug_in(self.scenario.parts, chip, self.recorder, senses)
+        plug_in(self.scenario, chip, self.recorder, senses)
         return (senses,)
 
 

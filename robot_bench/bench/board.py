@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, cast
 
 from adapter_sim.pinout import Pinout, Pull, load_pinout
 from bluepill_sim.fabric.surroundings import Surroundings
-from bluepill_sim.parts.registry import PartSpec, attach
+from bluepill_sim.parts.registry import attach
 from p2os.event_log import log_event, logger
+from p2os.toml_schema import placed, within
 from robot_bench.direct.wired import AnalogPin, RobotWire
 from robot_bench.recording.recorder import Recorder
 from robot_bench.recording.transfers import hear_bus
@@ -32,12 +33,12 @@ BY_HAND = "hand"
 _LOG = logger("bench")
 
 
-def plug_in(parts: Sequence[PartSpec], chip: Chip, recorder: Recorder, world: Surroundings | None = None) -> None:
-    """Attach parts to a board, have what they tell recorded, and have them sense a world, where there is one.
+def plug_in(scenario: Scenario, chip: Chip, recorder: Recorder, world: Surroundings | None = None) -> None:
+    """Attach a scenario's parts to a board, have what they tell recorded, and have them sense a world if there is one.
 
     Raises:
         TypeError: The chip is none that takes parts.
-        PartError: One cannot be attached.
+        ScenarioError: One cannot be attached.
     """
     board = cast("BluePill", chip)
     if not hasattr(board, "attached"):
@@ -47,8 +48,9 @@ def plug_in(parts: Sequence[PartSpec], chip: Chip, recorder: Recorder, world: Su
     board.attached.note_sinks.append(
         lambda at, part, what, detail: recorder.event("part", at, part, f"{what} {detail}".rstrip())
     )
-    for spec in parts:
-        attach(board, spec)
+    for number, spec in enumerate(scenario.parts):
+        with placed(within(scenario.name, "part", number)):
+            attach(board, spec)
 
 
 def hear_usarts(chip: Chip, recorder: Recorder) -> None:

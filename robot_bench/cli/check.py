@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from p2os.cli.help_pages import BENCH
+from robot_bench.bench import Bench
 from robot_bench.scenario.json_schema import scenario_schema
 from robot_bench.scenario.scenario import Scenario, load_scenario
 from robot_bench.scenario.sweep import rows
@@ -15,8 +16,8 @@ from simbase.timing import NS_PER_S
 
 HELP = """Check scenario files without running them.
 
-Keys, ranges, names, events in words, firmware and world are looked at, in all
-files that a scenario includes, with every value that it sweeps.
+Keys, ranges, names, events in words, firmware, world, parts and wires are looked
+at, in all files that a scenario includes, with every value that it sweeps.
 
 Exit code: 0 all can be run, 1 one cannot.
 
@@ -51,6 +52,7 @@ def check(
         try:
             found = load_scenario(name, firmware=firmware)
             runs = _check_rows(name, found, firmware)
+            Bench.from_scenario(found, body="kinematic")  # the cheapest: what is refused here, every body refuses
         except P2osError as error:
             wrong += 1
             typer.echo(f"wrong  {error}" + (f" (hint: {error.hint})" if error.hint else ""))
@@ -71,6 +73,6 @@ def _check_rows(name: str, scenario: Scenario, firmware: Path | None) -> int:
     """
     count = 0
     for settings in rows(scenario.axes) if scenario.axes else ():
-        load_scenario(name, firmware=firmware, settings=settings, set_by="[sweep]")
+        load_scenario(name, firmware=firmware, settings=settings, set_by=f"{name}: [sweep]")
         count += 1
     return max(count, 1) * max(len(scenario.seeds), 1)

@@ -251,6 +251,18 @@ def _hex(text: str) -> bytes:
         raise ValueError(f"{shown(text)} is no bytes in hex") from None
 
 
+def _finite(text: str) -> float:
+    if not math.isfinite(value := float(text)):
+        raise ValueError(f"{text} is no number of metres")
+    return value
+
+
+def _above_zero(text: str) -> float:
+    if (value := _finite(text)) <= 0:
+        raise ValueError(f"{text} m are never come to: above 0")
+    return value
+
+
 class _Contact(Selector):
     kinds = (Contact,)
 
@@ -273,13 +285,15 @@ class _Robot(Selector):
         self._way_m = 0.0
         self._is: Callable[[Pose], bool]
         if verb == "near" and len(numbers) == 3:
-            x_m, y_m, radius_m = map(float, numbers)
+            x_m, y_m, radius_m = *map(_finite, numbers[:2]), _above_zero(numbers[2])
             self._is = lambda pose: math.hypot(pose.x_m - x_m, pose.y_m - y_m) <= radius_m
         elif verb == "within" and len(numbers) == 4:
-            low_x, low_y, high_x, high_y = map(float, numbers)
+            low_x, low_y, high_x, high_y = map(_finite, numbers)
+            if low_x > high_x or low_y > high_y:
+                raise ValueError("least x and y, then the greatest")
             self._is = lambda pose: low_x <= pose.x_m <= high_x and low_y <= pose.y_m <= high_y
         elif verb == "drives" and len(numbers) == 1:
-            wanted_m = float(numbers[0])
+            wanted_m = _above_zero(numbers[0])
             self._is = lambda _: self._way_m >= wanted_m
         elif verb in {"moves", "stops"} and not numbers:
             self._is = lambda pose: moves(pose) is (verb == "moves")
@@ -328,7 +342,7 @@ class _Sonar(Selector):
         number, verb, metres = rest.split() if len(rest.split()) == 3 else ("", "", "")
         if verb != "below" or not number.isdecimal() or int(number) == 0:
             raise ValueError("a sonar from 1 on, below, and metres")
-        self._number, self._mm = int(number) - 1, float(metres) * 1000
+        self._number, self._mm = int(number) - 1, _above_zero(metres) * 1000
         self._was = False
 
     def takes(self, event: Event) -> bool:

@@ -105,7 +105,7 @@ BROKEN = [
     ("safe = 1", "safe = true", "safe = True, expected 0, 1"),
     ('safe = "hold"', "", "key 'safe' is missing"),
     ("schema = 1", "schema = 2", "schema = 2 is out of range"),
-    ("schema = 1", "schema = true", "schema = True is not a whole number"),
+    ("schema = 1", "schema = true", "schema = true is not a whole number"),
     ('default_revision = "rev-b"', 'default_revision = "rev-x"', "default_revision 'rev-x' is none of"),
     ('default_revision = "rev-b"', "default_revision = 3", "default_revision = 3 is not a text"),
     ('name = "DD2"', 'name = "DD2"\ncolour = "red"', "[[wire]] 2: unknown key 'colour'"),

@@ -71,8 +71,14 @@ def register(app: typer.Typer) -> None:
 
 def drive(
     url: RobotUrl,
-    forward_m: Annotated[float | None, option(LENGTH, "--forward", purpose="How far, negative backwards.")] = None,
-    turn_rad: Annotated[float | None, option(ANGLE, "--turn", purpose="How far round, positive to the left.")] = None,
+    forward_m: Annotated[
+        float | None,
+        option(LENGTH, "--forward", purpose="How far, negative backwards.", least="-1000m", most="1000m"),
+    ] = None,
+    turn_rad: Annotated[
+        float | None,
+        option(ANGLE, "--turn", purpose="How far round, positive to the left.", least="-36000deg", most="36000deg"),
+    ] = None,
     speed_mps: Annotated[float | None, option(SPEED, "--vel", purpose="Speed: held with --for, else the most.")] = None,
     rate_radps: Annotated[float | None, option(TURN_RATE, "--turn-rate", purpose="Turning speed, likewise.")] = None,
     lasts_ns: Annotated[

@@ -13,3 +13,18 @@ def read_text(path: Path) -> str:
         WorldError: It cannot be read, is too large or is no text.
     """
     return read_user_text(path, "a world", WorldError)
+
+
+def read_foreign_text(path: Path) -> str:
+    """Return the text of another program's file: UTF-8, else Latin-1, which gives each byte a character.
+
+    Programs that knew no UTF-8 write names and comments in the code page of their machine; all else is ASCII.
+
+    Raises:
+        OSError: It cannot be read.
+    """
+    data = path.read_bytes()
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")

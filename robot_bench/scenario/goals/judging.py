@@ -7,6 +7,7 @@ not judged there.
 Invariant: a verdict depends on the events of the run alone; played back from its trace they give the same.
 """
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import cast
@@ -17,7 +18,7 @@ from robot_bench.events.kinds import Event, PinEdge, Verdict
 from robot_bench.events.selection import Wires
 from robot_bench.events.stream import EventStream
 from robot_bench.scenario.goals.kinds import kind_named, known_kinds
-from robot_bench.scenario.goals.watch import WIRES, GoalKind, Outcome, Watch
+from robot_bench.scenario.goals.watch import WIRES, GoalKind, Outcome, Watch, number
 from simbase.errors import nearest, shown
 from simbase.state import PartState, Stateful
 from simbase.timing import NS_PER_S, Nanos
@@ -82,6 +83,8 @@ def load_goal(table: Table, where: Where, wires: Wires | None = None) -> Goal:
         raise ScenarioError(f"{where}: there is no goal {shown(name)}", hint=nearest(name, known_kinds()))
     arguments = {key: value for key, value in table.items() if key not in {"kind", "ends_run"}}
     check_table(arguments, kind.keys, f"{where} ({name})" if isinstance(where, str) else where)
+    if kind.any_of and not any(key in arguments for key in kind.any_of):
+        raise ScenarioError(f"{where}: a goal {name} needs {' or '.join(kind.any_of)}", hint="docs/scenarios.md")
     _check(arguments, where)
     if wires is not None:
         arguments[WIRES] = wires
@@ -91,7 +94,14 @@ def load_goal(table: Table, where: Where, wires: Wires | None = None) -> Goal:
 
 
 def _check(arguments: Table, where: Where) -> None:
-    """Check what is in the lists of a goal, and that a region is one."""
+    """Check what is in the lists of a goal, that a region is one, and that bounds leave something."""
+    for key, value in arguments.items():
+        if value in ("", []):
+            raise ScenarioError(f"{where}: {key} is empty")
+        if key.startswith("least") and value > arguments.get(most := f"most{key.removeprefix('least')}", value):
+            raise ScenarioError(f"{where}: {key} is above {most}")
+    if number(arguments, "to_s", math.inf) < number(arguments, "from_s"):
+        raise ScenarioError(f"{where}: to_s lies before from_s: the goal would look at nothing")
     pairs = cast("list[object]", arguments.get("values", []))
     if not all(_is_pair(pair) for pair in pairs):
         raise ScenarioError(
@@ -99,7 +109,7 @@ def _check(arguments: Table, where: Where) -> None:
         )
     for key in ("texts", "events"):
         items = cast("list[object]", arguments.get(key, []))
-        if not all(isinstance(item, str) for item in items) or (key in arguments and not items):
+        if not all(isinstance(item, str) for item in items):
             raise ScenarioError(f"{where}: {key} must be a list of texts in quotes")
     area = arguments.get("area_m")
     circle = [key for key in ("x_m", "y_m", "radius_m") if key in arguments]

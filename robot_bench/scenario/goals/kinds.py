@@ -58,6 +58,7 @@ _REGION = (
     Key(name="radius_m", kind="number", above=0, most=10_000),
     Key(name="area_m", kind="list"),
 )
+_ONE_REGION = ("area_m", "radius_m")
 _SIGNAL = Key(name="signal", kind="text", required=True, choices=_POSE_SIGNALS)
 _THING = Key(name="thing", kind="text")
 
@@ -147,7 +148,7 @@ KINDS: Mapping[str, GoalKind] = {
             Key(name="distance_m", kind="number", above=0, most=1e6),
             Key(name="distance_m_a_minute", kind="number", above=0, most=1e6),
         ),
-        wanted=_wanted_distance, watch=MinDistance,
+        wanted=_wanted_distance, watch=MinDistance, any_of=("distance_m", "distance_m_a_minute"),
     ),
     "cells": GoalKind(
         keys=(Key(name="least", kind="whole", required=True, least=1, most=1_000_000),),
@@ -185,15 +186,15 @@ KINDS: Mapping[str, GoalKind] = {
     ),
     "reach": GoalKind(
         keys=(*_REGION, _WITHIN), wanted=lambda table: f"reaches {_place(table)}{_when(table)}", watch=Reach,
-        is_scripted=True,
+        any_of=_ONE_REGION, is_scripted=True,
     ),
     "avoid": GoalKind(
         keys=_REGION, wanted=lambda table: f"stays out of {_place(table)}",
-        watch=lambda table: Stay(table, is_inside=False),
+        watch=lambda table: Stay(table, is_inside=False), any_of=_ONE_REGION,
     ),
     "stay_within": GoalKind(
         keys=_REGION, wanted=lambda table: f"stays within {_place(table)}",
-        watch=lambda table: Stay(table, is_inside=True),
+        watch=lambda table: Stay(table, is_inside=True), any_of=_ONE_REGION,
     ),
     "clearance": GoalKind(
         keys=(Key(name="least_m", kind="number", required=True, above=0, most=100),),
@@ -250,7 +251,7 @@ KINDS: Mapping[str, GoalKind] = {
             Key(name="most_j", kind="number", above=0, most=1e9),
             Key(name="most_j_a_metre", kind="number", above=0, most=1e9),
         ),
-        wanted=_wanted_energy, watch=Energy, needs_world=True,
+        wanted=_wanted_energy, watch=Energy, any_of=("most_j", "most_j_a_metre"), needs_world=True,
     ),
     "hold_heading": GoalKind(
         keys=(*_HOLD_HEADING, _AFTER, _FROM, _TO),
@@ -274,12 +275,12 @@ KINDS: Mapping[str, GoalKind] = {
     "always": GoalKind(
         keys=(_SIGNAL, _THING, _LEAST, _MOST, _AFTER, _FROM, _TO),
         wanted=lambda table: f"has always {_bounds(table)}{_when(table)}",
-        watch=lambda table: _over_time(table, is_always=True),
+        watch=lambda table: _over_time(table, is_always=True), any_of=("least", "most"),
     ),
     "eventually": GoalKind(
         keys=(_SIGNAL, _THING, _LEAST, _MOST, _AFTER, _FROM, _TO),
         wanted=lambda table: f"has at some time {_bounds(table)}{_when(table)}",
-        watch=lambda table: _over_time(table, is_always=False),
+        watch=lambda table: _over_time(table, is_always=False), any_of=("least", "most"),
     ),
     "happens": GoalKind(
         keys=(_EVENT, *_COUNT, _FROM, _WITHIN),

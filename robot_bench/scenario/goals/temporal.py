@@ -58,8 +58,6 @@ class OverTime(Watch):
         kinds = [kind, *([WorldChange] if self._thing else []), *self._events.kinds]
         self.kinds, self.wires = tuple(dict.fromkeys(kinds)), self._events.wires
         self._from, self._to = nanos(table, "from_s"), nanos(table, "to_s") if "to_s" in table else None
-        if self._to is not None and self._to < self._from:
-            raise UsageError("to_s lies before from_s: the goal would look at nothing")
         #: Where windows begin, and the best margin in each so far; of `always` the worst.
         self._windows: list[tuple[Nanos, float, Nanos]] = [] if self._after else [(0, self._nothing, 0)]
         self._worst = math.inf
@@ -141,14 +139,8 @@ class OverTime(Watch):
 
 
 def bounds(table: Table) -> Margin:
-    """Return the margin to `least` and `most`.
-
-    Raises:
-        UsageError: Any value would do, or none.
-    """
+    """Return the margin to `least` and `most`."""
     least, most = number(table, "least", -math.inf), number(table, "most", math.inf)
-    if least > most or not (math.isfinite(least) or math.isfinite(most)):
-        raise UsageError("least is above most" if least > most else "neither least nor most: any value would do")
     return lambda value: min(value - least, most - value)
 
 
@@ -170,6 +162,8 @@ class Happens(Watch):
         self.kinds, self.wires = self._events.kinds, self._events.wires
         self._least, self._most = number(table, "least", least), number(table, "most", most)
         self._from, self._to = nanos(table, "from_s"), nanos(table, "within_s") if "within_s" in table else None
+        if self._least > self._most:
+            raise UsageError(f"least is {self._least:g} where it is not given", hint='kind = "never", or least = 0')
         self._times: list[Nanos] = []
         self._is_decided = False
 

@@ -54,6 +54,7 @@ class GoalKind:
     Args:
         keys: What its table may have beside `kind`.
         wanted: The goal as a sentence, of its table.
+        any_of: Keys of which its table has one at least; without them any run would meet the goal, or none.
         watch: Makes what watches one run, of its table; a `UsageError` refuses the table.
         needs_world: A robot at a port cannot tell; there the goal is not judged.
         is_scripted: It is on what a program does in an order of its own, which from another start, or with other things
@@ -63,6 +64,7 @@ class GoalKind:
     keys: tuple[Key, ...]
     wanted: Callable[[Table], str]
     watch: Callable[[Table], Watch]
+    any_of: tuple[str, ...] = ()
     needs_world: bool = False
     is_scripted: bool = False
 

@@ -56,6 +56,8 @@ def test_what_is_no_count_is_refused(text: str) -> None:
         ("run dodge --max-speed 300", "--max-speed '300' has no unit: 1mm/s or more, in m/s, cm/s or mm/s"),
         ("run dodge --seed -1", "--seed '-1' is out of range: 0 or more, such as 7"),
         ("demo --duration 0s", "--duration '0s' is out of range: more than 0"),
+        ("drive tcp:x:1 --forward 1000.1m", "--forward '1000.1m' is out of range: -1000m to 1000m, in"),
+        ("drive tcp:x:1 --turn -36001deg", "--turn '-36001deg' is out of range: -36000deg to 36000deg, in"),
         ("serve --status 5", "--status '5' has no unit: 100ms or more"),
         ("serve --speed 1000", "--speed '1000' is out of range: 0.01 to 100"),
         ("serve --robots 0", "--robots '0' is out of range: 1 to 256"),

@@ -413,6 +413,34 @@ def test_a_link_left_by_a_killed_program_is_replaced(tmp_path: Path) -> None:
     listener.close()
 
 
+def test_a_link_left_is_replaced_where_its_terminal_has_the_same_number_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import pty
+
+    link, numbered, make = tmp_path / "robot", tmp_path / "5", pty.openpty
+    link.symlink_to(numbered)
+
+    def openpty() -> tuple[int, int]:
+        numbered.touch()
+        return make()
+
+    monkeypatch.setattr(pty, "openpty", openpty)
+    listener = listen_url(f"pty:{link}")
+    assert link.resolve() != numbered
+    listener.close()
+
+
+def test_a_client_makes_no_terminal_where_none_is(tmp_path: Path) -> None:
+    link = tmp_path / "robot"
+    for _ in range(2):
+        with pytest.raises(TransportError, match="no such port"):
+            open_url(f"pty:{link}")
+        assert not link.exists()
+        if not link.is_symlink():
+            link.symlink_to(tmp_path / "gone")
+
+
 def test_a_file_in_the_way_of_a_link_is_kept(tmp_path: Path) -> None:
     precious = tmp_path / "robot"
     precious.write_text("precious")

@@ -128,7 +128,7 @@ def test_goal_energy_of_a_robot_that_stands_or_spins_its_wheels() -> None:
 
 
 def test_goal_energy_wants_a_bound() -> None:
-    with pytest.raises(ScenarioError, match="neither most_j nor most_j_a_metre"):
+    with pytest.raises(ScenarioError, match="a goal energy needs most_j or most_j_a_metre"):
         outcome("energy", [])
 
 
@@ -315,8 +315,25 @@ def test_a_sonar_a_stop_and_a_place_are_events_once() -> None:
         ({"kind": "happens", "event": "pin PB12 up"}, "not understood: a pin, and high, low or changes"),
         ({"kind": "happens", "event": "uzart1 sends x"}, "no events 'uzart1 sends x' .*did you mean 'usart1'"),
         ({"kind": "happens", "event": "usart1 matches ("}, "not understood: missing"),
-        ({"kind": "in_order", "events": []}, "events must be a list of texts in quotes"),
-        ({"kind": "reach", "x_m": 1}, "a circle needs x_m, y_m and radius_m"),
+        ({"kind": "in_order", "events": []}, "events is empty"),
+        ({"kind": "in_order", "events": [1]}, "events must be a list of texts in quotes"),
+        ({"kind": "usart_contains", "text": ""}, "text is empty"),
+        ({"kind": "turns_away", "near_m": 1, "free_m": 2, "left": []}, "left is empty"),
+        ({"kind": "avoid"}, "a goal avoid needs area_m or radius_m"),
+        ({"kind": "reach", "within_s": 1}, "a goal reach needs area_m or radius_m"),
+        ({"kind": "stay_within"}, "a goal stay_within needs area_m or radius_m"),
+        ({"kind": "min_distance"}, "a goal min_distance needs distance_m or distance_m_a_minute"),
+        ({"kind": "latency", "from": "contact", "to": "contact", "most_s": 1, "least_s": 2}, "least_s is above most_s"),
+        ({"kind": "wave", "pin": "PB7", "least_hz": 2, "most_hz": 1}, "least_hz is above most_hz"),
+        ({"kind": "happens", "event": "contact", "least": 2, "most": 1}, "least is above most"),
+        ({"kind": "happens", "event": "contact", "most": 0}, "least is 1 where it is not given"),
+        ({"kind": "pin_holds", "pin": "PB7", "level": "low", "from_s": 2, "to_s": 1}, "to_s lies before from_s"),
+        ({"kind": "happens", "event": "robot near 1 0 0"}, "0 m are never come to"),
+        ({"kind": "happens", "event": "robot near 1 nan 1"}, "nan is no number of metres"),
+        ({"kind": "happens", "event": "robot within 0 1 2 0"}, "least x and y, then the greatest"),
+        ({"kind": "happens", "event": "robot drives -1"}, "-1 m are never come to"),
+        ({"kind": "happens", "event": "sonar 1 below 0"}, "0 m are never come to"),
+        ({"kind": "reach", "radius_m": 1}, "a circle needs x_m, y_m and radius_m"),
         ({"kind": "avoid", "area_m": [0, 0, 0, 1]}, "area_m must be"),
         ({"kind": "no_collision", "ends_run": "soon"}, "is none of met, missed, decided"),
         ({"kind": "wave", "pin": "PB7", "hz": 3}, "unknown key 'hz'"),
@@ -351,7 +368,7 @@ def test_a_goal_that_came_from_elsewhere_is_judged_like_any(monkeypatch: pytest.
 
 @pytest.mark.parametrize(
     ("keys", "says"),
-    [({}, "neither least nor most: any value would do"), ({"least": 2, "most": 1}, "least is above most"),
+    [({}, "a goal always needs least or most"), ({"least": 2, "most": 1}, "least is above most"),
      ({"least": 1, "from_s": 2, "to_s": 1.999_999_999}, "to_s lies before from_s")],
 )  # fmt: skip
 def test_a_goal_that_any_run_or_none_would_meet_is_refused(keys: dict[str, Any], says: str) -> None:

@@ -172,7 +172,7 @@ BOX = '[[obstacle]]\nat_s = 1\nname = "a"\nx_m = 0\ny_m = 0\nlength_m = 1\nwidth
         (LEAST + "treshold_m = 1\n", "mine.toml:4: unknown key 'treshold_m'", "threshold_m"),
         (LEAST + "threshold_cm = 60\n", "mine.toml:4: unknown key 'threshold_cm'", "threshold_m"),
         (LEAST + 'threshold_m = "60 cm"\n', 'threshold_m = "60 cm" is not a number of metres', "bare number"),
-        (LEAST + "threshold_m = true\n", "threshold_m = True is not a number of metres", None),
+        (LEAST + "threshold_m = true\n", "threshold_m = true is not a number of metres", None),
         (LEAST + "threshold_m = nan\n", "threshold_m = nan is out of range", "above 0"),
         (LEAST + "seed = 1.5\n", "seed = 1.5 is not a whole number", None),
         (LEAST + "seed = -1\n", "seed = -1 is out of range", "at least 0"),

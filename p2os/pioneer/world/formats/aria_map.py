@@ -18,7 +18,7 @@ from p2os.errors import WorldError
 from p2os.pioneer.world.formats.collection import Collection
 from p2os.pioneer.world.formats.rectangles import rectangles
 from p2os.pioneer.world.model import FARTHEST_M, Kind, Mark, Obstacle, Pose, World
-from p2os.pioneer.world.text_file import read_text
+from p2os.pioneer.world.text_file import read_foreign_text
 
 #: A line has no thickness and a wall needs one; every body holds a robot at the least (1e-6 m). chosen: a hundred
 #: times that, which 32-bit numbers still tell from nothing 1 km out. Half of it stands on either side.
@@ -66,7 +66,7 @@ class _Reader:
         self._counted = {"NumLines:": 0, "NumPoints:": 0}
 
     def read(self) -> World:
-        lines = read_text(self._path).removeprefix("\ufeff").splitlines()
+        lines = read_foreign_text(self._path).splitlines()
         if not lines or not lines[0].startswith("2D-Map"):
             raise WorldError(f"{self._path}:1: an ARIA map begins with 2D-Map")
         take: Callable[[str, int], None] = self._header

@@ -8,6 +8,7 @@ together to few boxes.
 Source: the documentation of ROS's map_server and of nav2_map_server.
 """
 
+import contextlib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,7 +23,7 @@ from p2os.pioneer.world.formats.local_file import find_local
 from p2os.pioneer.world.formats.placing import Placing, placed_points
 from p2os.pioneer.world.formats.rectangles import rectangles
 from p2os.pioneer.world.model import FARTHEST_M, Kind, Obstacle, Pose, World
-from p2os.pioneer.world.text_file import read_text
+from p2os.pioneer.world.text_file import read_foreign_text
 
 MODES = ("trinary", "scale", "raw")
 KEYS = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh", "mode")
@@ -86,7 +87,7 @@ def _settings(path: Path) -> _Settings:
     if path.stat().st_size > LARGEST_YAML:
         raise WorldError(f"{path}: larger than {LARGEST_YAML >> 20} MiB", hint="the YAML of a map is a few lines")
     try:
-        table = yaml.safe_load(read_text(path))
+        table = yaml.safe_load(read_foreign_text(path))
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         line = f":{mark.line + 1}" if mark is not None else ""
@@ -117,6 +118,9 @@ def _settings(path: Path) -> _Settings:
 
 
 def _number(path: Path, key: str, value: object, least: float, most: float) -> float:
+    if isinstance(value, str):  # PyYAML's YAML 1.1 has no number 1e-05; yaml-cpp, by which maps are saved, writes it
+        with contextlib.suppress(ValueError):
+            value = float(value)
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not least <= value <= most:
         raise WorldError(f"{path}: {key} = {_shown(value)} must be a number from {least:g} to {most:g}")
     return float(value)

@@ -62,9 +62,12 @@ def read_placed(path: Path, placing: Placing) -> World:
         MissingDependencyError: The reader needs a package that is not installed.
     """
     module = FORMATS.get(path.suffix.lower())
+    if path.suffix.lower() == ".toml":
+        raise WorldError(f"{shown_name(path)}: a world file, where a file of another program is taken", hint=_known())
     if module is None:
         raise WorldError(
-            f"{shown_name(path)}: no reader for {shown_name(path.suffix) or 'a file without an ending'}", hint=_known()
+            f"{shown_name(path)}: no reader for {shown_name(path.suffix) or 'a file without an ending'}",
+            hint=_known(".toml"),
         )
     try:
         path.stat()
@@ -95,5 +98,5 @@ def _load(module: str) -> object:
         raise MissingDependencyError(f"reading this file needs {error.name}", extra="worlds") from error
 
 
-def _known() -> str:
-    return f"readable: .toml, {', '.join(FORMATS)}"
+def _known(*more: str) -> str:
+    return f"readable: {', '.join((*more, *FORMATS))}"

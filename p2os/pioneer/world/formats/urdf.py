@@ -12,6 +12,7 @@ Ours and not yourdfpy's: yourdfpy 0.0.60 brings 300 MB of packages (scipy, embre
 a TypeError on `package://file`, takes one in five damaged files that are refused here, and names no line.
 """
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from p2os.errors import WorldError
@@ -36,7 +37,7 @@ def read(path: Path, up: str) -> World:
         raise WorldError(f"{path}: URDF is Z up; up = {up!r} makes no sense")
     root, collection = read_xml(path, "robot"), Collection(path)
     joints = root.all("joint")
-    parents = {_ends(joint, "child", path): joint for joint in joints}
+    parents = _parents(root.all("link"), joints, path)
     if any(joint.get("type") not in {"fixed", "floating", ""} for joint in joints):
         collection.skip("that joints move: each stands at its zero")
     places: dict[str, Transform] = {}
@@ -70,6 +71,26 @@ def _traits(link: Element, traits: Traits, collection: Collection, path: Path) -
     if moving is traits:
         collection.skip(STANDS_STILL)
     return moving
+
+
+def _parents(links: Sequence[Element], joints: Sequence[Element], path: Path) -> dict[str, Element]:
+    """Return the joint on which each link hangs."""
+    names: set[str] = set()
+    for link in links:
+        if link.get("name") in names:
+            raise WorldError(f"{path}:{link.line}: two links are named {link.get('name')!r}")
+        names.add(link.get("name"))
+    parents: dict[str, Element] = {}
+    for joint in joints:
+        parent, child = _ends(joint, "parent", path), _ends(joint, "child", path)
+        for name in (parent, child):
+            if name not in names:
+                raise WorldError(
+                    f"{path}:{joint.line}: joint {joint.get('name')!r} names {name!r}, which is no link here"
+                )
+        if parents.setdefault(child, joint) is not joint:
+            raise WorldError(f"{path}:{joint.line}: link {child!r} hangs on two joints")
+    return parents
 
 
 def _place(link: str, parents: dict[str, Element], places: dict[str, Transform], path: Path) -> Transform:

@@ -72,7 +72,7 @@ def test_a_file_names_every_robot(tmp_path: Path) -> None:
         ('world = "room"', "f:1: key 'robot' is missing"),
         ("robot = 3", "f:1: robot = 3 is not an array of tables"),
         ("robot = [3]", "f:1: robot = [3] is not an array of tables"),
-        ("seed = true\n[[robot]]", "f:1: seed = True is not a whole number"),
+        ("seed = true\n[[robot]]", "f:1: seed = true is not a whole number"),
         ("[[robot]]\nplace = 1", "f:2: [[robot]] 1: unknown key 'place'"),
         ("[[robot]]\nat = [1]", "f:2: [[robot]] 1: at must be [x, y]"),
         ('[[robot]]\nat = [1, "2"]', "f:2: [[robot]] 1: at must be [x, y]"),

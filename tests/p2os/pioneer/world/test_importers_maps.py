@@ -232,6 +232,13 @@ def test_colours_are_averaged_and_a_transparent_pixel_is_unknown(image_map: Path
     assert len(load_world(image_map).obstacles) == 1
 
 
+def test_a_map_has_its_names_in_latin_1_where_it_is_no_utf_8(tmp_path: Path) -> None:
+    path = tmp_path / "a.map"
+    for encoding in ("utf-8", "utf-8-sig", "latin-1"):
+        path.write_bytes(ARIA.replace('"Goal 1"', '"K\xfcche"').encode(encoding))
+        assert "K\xfcche" in [mark.name for mark in load_world(path).marks]
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -259,6 +266,14 @@ def test_a_broken_yaml_is_one_line(image_map: Path, text: str, message: str | No
         load_world(image_map)
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_numbers_of_a_yaml_are_those_of_yaml_cpp_and_its_comments_any_bytes(image_map: Path) -> None:
+    image_map.write_bytes(b"# caf\xe9\n" + YAML.replace("0.05", "5e-02").replace("-1.0", "1e-05").encode())
+    assert load_world(image_map).extent[:3] == pytest.approx((1e-5, -0.5, 3.00001))
+    image_map.write_text(YAML.replace("0.05", "5 cm"))
+    with pytest.raises(WorldError, match="resolution = '5 cm' must be a number"):
+        load_world(image_map)
 
 
 @pytest.mark.parametrize(

@@ -246,6 +246,7 @@ def test_a_mesh_cut_at_any_place_is_refused_or_read(case: str, tmp_path: Path) -
         ('file = "a.stl"\nup = "q"', "up = 'q' is unknown"),
         ('file = "a.stl"\nscale = 0', "scale = 0 is out of range"),
         ('file = "."', "no reader"),
+        ('file = "w.toml"', "where a file of another program is taken"),
     ],
 )
 def test_a_broken_import_names_its_line(tmp_path: Path, text: str, message: str) -> None:

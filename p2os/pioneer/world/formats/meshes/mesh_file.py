@@ -19,6 +19,7 @@ from p2os.pioneer.world.formats.collection import MOST_TRIANGLES, MOST_VERTICES,
 from p2os.pioneer.world.formats.meshes.polygon import triangulated
 from p2os.pioneer.world.formats.placing import with_z_up
 from p2os.pioneer.world.model import Triangle, Vertex, World
+from p2os.pioneer.world.text_file import read_foreign_text
 from simbase.errors import shown
 
 #: Of a binary STL: a header of 80 bytes, a count, then 50 bytes a triangle.
@@ -68,7 +69,7 @@ def read_triangles(path: Path, up: str = "auto") -> Triangles:
 def _read_obj(path: Path) -> tuple[Triangles, str]:
     found = Triangles()
     left_out: set[str] = set()
-    text = path.read_text(encoding="utf-8-sig", errors="replace")
+    text = read_foreign_text(path)
     joined = ""
     for number, line in enumerate(text.split("\n"), start=1):
         if line.rstrip("\r").endswith("\\"):  # goes on in the next line
