@@ -390,7 +390,7 @@ class BluePill(Stateful):
 
     @property
     def has_died(self) -> bool:
-        """Whether the firmware is in its HardFault handler, is locked up, or was reset out of either."""
+        """Whether the firmware is in its HardFault handler or returns to its fault, is locked up, or was reset then."""
         return self.fault is not None and (self.fault.ended_in_reset or self._is_in_fault())
 
     @property
@@ -407,7 +407,8 @@ class BluePill(Stateful):
         return "; ".join(parts)
 
     def _is_in_fault(self) -> bool:
-        return self.chip.processor.is_locked_up or self._handles_hard_fault()
+        is_repeated = self.fault is not None and self.fault.repeats_at(self.now_ns)
+        return self.chip.processor.is_locked_up or self._handles_hard_fault() or is_repeated
 
     def _handles_hard_fault(self) -> bool:
         return bool(self.chip.processor.nvic.active >> HARD_FAULT & 1)
@@ -557,8 +558,9 @@ class BluePill(Stateful):
         return any(port.receives_at(pin.name) for port in self._usarts) or any(bus.sends_at(pin.name) for bus in buses)
 
     def _reset_begins(self, cause: ResetCause) -> None:
-        if self.fault is not None and self._is_in_fault():
-            self.fault = replace(self.fault, ended_in_reset=True)
+        if self.fault is not None:
+            ended = self.has_died
+            self.fault = replace(self.fault, ended_in_reset=ended, returns=self.fault.returns if ended else 0)
         self.resets[cause] += 1
 
     def _boot_address(self) -> int:
@@ -620,6 +622,10 @@ class BluePill(Stateful):
         seen = seen or self._seen()
         registers = [(register.name, value) for register, value in zip(_SEEN_REGISTERS, seen.registers, strict=True)]
         registers.insert(15, ("PC", pc))
+        known = None if self.fault is None or seen.is_other else (self.fault.kind, self.fault.registers)
+        if self.fault is not None and known == (kind, tuple(registers)):
+            self.fault = self.fault.again(seen)
+            return
         self.fault = FaultReport(
             kind=kind,
             exception=FAULT_ROWS[kind].exception,
@@ -631,6 +637,9 @@ class BluePill(Stateful):
             is_lockup=is_lockup,
             vector=self._vector_of(seen, pc),
             last_rows=seen.last_rows,
+            returns=seen.returns,
+            last_ns=seen.last_ns,
+            round_ns=seen.round_ns,
         )
 
     def _seen(self) -> SeenFault:
@@ -643,6 +652,7 @@ class BluePill(Stateful):
             exception_number=number,
             vector=chip.memory.read_word(processor.vector_table + 4 * number),
             last_rows=chip.engine.log.rows(),
+            last_ns=chip.now_ns,
         )
 
     def _vector_of(self, seen: SeenFault, pc: int) -> str:

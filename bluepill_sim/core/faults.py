@@ -4,7 +4,7 @@ Source: ARMv7-M Architecture Reference Manual B1.5.14 and B3.2.15 to B3.2.18.
 Invariant: every kind has one row in `FAULT_ROWS`.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 from bluepill_sim.core.halts import HaltKind
@@ -70,6 +70,12 @@ FAULT_ROWS = {
 _EXCEPTION_NAMES = {HARD_FAULT: "HardFault", MEM_MANAGE: "MemManage", BUS_FAULT: "BusFault", USAGE_FAULT: "UsageFault"}
 
 
+#: chosen: a handler that has come back so often to the same instruction with the same registers mends nothing.
+MOST_RETURNS = 16
+#: chosen: a handler that takes longer is seen at work, and may wait for something that will change.
+LONGEST_ROUND_NS: Nanos = 5_000_000
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SeenFault:
     """The core as it was at a fault, before anything was stacked."""
@@ -81,6 +87,12 @@ class SeenFault:
     exception_number: int
     vector: int | None
     last_rows: tuple[BlockRow, ...]
+    #: As of `FaultReport`, since a fault was last reported.
+    returns: int = 0
+    last_ns: Nanos
+    round_ns: Nanos = 0
+    #: Whether another fault came between the one reported last and this one.
+    is_other: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,6 +117,10 @@ class FaultReport:
     ended_in_reset: bool = False
     #: What the vector table has to do with it; empty where nothing.
     vector: str = ""
+    #: How often its handler came back to it with nothing changed, when last, and how long that took.
+    returns: int = 0
+    last_ns: Nanos = 0
+    round_ns: Nanos = 0
     #: What ran up to the fault, oldest first: rows of `BlockRecorder`, at most 32.
     last_rows: tuple[BlockRow, ...] = ()
 
@@ -113,10 +129,21 @@ class FaultReport:
         access = "" if self.address is None else f", address {self.address:#010x}"
         end = "; the core locked up" if self.is_lockup and self.ended_in_reset else ""
         end = "; the core is locked up" if self.is_lockup and not self.ended_in_reset else end
+        end += "; its handler came back to it again and again" if self.returns >= MOST_RETURNS else ""
         end += "; a reset ended it" if self.ended_in_reset else ""
         name = _EXCEPTION_NAMES.get(self.exception, f"exception {self.exception}")
         vector = f" ({self.vector})" if self.vector else ""
         return f"{name}: {self.kind.value} at {self.where}{access}{vector}, t = {self.at_ns / 1e9:.6f} s{end}"
+
+    def again(self, seen: SeenFault) -> "FaultReport":
+        """Return it with one more return of its handler, and those that were seen with it."""
+        round_ns = seen.round_ns or seen.at_ns - self.last_ns
+        return replace(self, returns=self.returns + 1 + seen.returns, last_ns=seen.last_ns, round_ns=round_ns)
+
+    def repeats_at(self, now_ns: Nanos) -> bool:
+        """Whether its handler comes back to it for ever, as far as anybody can tell: not two rounds ago it did."""
+        is_quick = self.round_ns <= LONGEST_ROUND_NS
+        return self.returns >= MOST_RETURNS and is_quick and now_ns - self.last_ns <= 2 * self.round_ns
 
     @property
     def register_dump(self) -> str:

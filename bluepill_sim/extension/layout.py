@@ -129,6 +129,10 @@ FAULT = Struct(
         *_fields("u32", "pc", "address", "has_address", "exception_number"),
         Field("vector", "u32", doc="of the handler that ran"),
         Field("registers", "u32", 16, "R0 to R12, SP, LR, xPSR"),
+        Field("last_ns", "u64", doc="when its handler last came back to it with nothing changed,"),
+        Field("round_ns", "u64", doc="how long that took,"),
+        Field("returns", "u32", doc="and how often"),
+        Field("is_other", "u32", doc="another one came before it in this run"),
         Field("last", "record", LAST_ROWS),
     ),
 )

@@ -72,7 +72,7 @@ class NativeProcessor(Processor):
             self._act_on(halt)
 
     def _report_fault(self) -> None:
-        """Report the last HardFault that C has entered."""
+        """Report the last HardFault that C has entered, with how often its handler came back to it."""
         self.shared.has_fault, fault = 0, self.shared.fault
         seen = SeenFault(
             at_ns=fault.ns,
@@ -80,6 +80,10 @@ class NativeProcessor(Processor):
             exception_number=fault.exception_number,
             vector=fault.vector,
             last_rows=tuple(RECORD.iter_unpack(ordered_rows(fault))),
+            last_ns=fault.last_ns,
+            round_ns=fault.round_ns,
+            returns=fault.returns,
+            is_other=bool(fault.is_other),
         )
         address = fault.address if fault.has_address else None
         self._report(FAULT_OF_HALT[HALT_KINDS[fault.kind]], fault.pc, address, is_lockup=False, seen=seen)

@@ -21,7 +21,7 @@ from robot_bench.events.words import last_words
 from robot_bench.recording.recorder import SAMPLE_NS, Recorder
 from robot_bench.wires.nets import Harness
 from simbase.errors import UsageError
-from simbase.timing import NS_PER_S, Nanos, Reached
+from simbase.timing import NS_PER_S, NS_PER_US, Nanos, Reached
 
 
 class Expectations(AwaitedRun):
@@ -201,6 +201,8 @@ class Expectations(AwaitedRun):
 
     def _unmet(self, what: str, since: Nanos, limit: Nanos | None = None) -> ExpectationError:
         until = self.now if limit is None else min(limit, self.now)
+        if limit is not None and limit != self.end and 0 < limit - since < NS_PER_US:
+            what = f"{what} within {limit - since} ns (a number without a unit is nanoseconds)"
         return ExpectationError(
             f"{what}, from {since / NS_PER_S:.3f} s to {until / NS_PER_S:.3f} s", self.last_events()
         )

@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 
 #: Marker → the option of a scenario that its words are values of.
 _AXES = {"worlds": "world", "modes": "mode", "bodies": "body", "seeds": "seed", "faults": "fault"}
+#: Marker → the words with a name that it takes; those of `scenario` and `pioneer` are looked at where they go.
+_WORDS = {"faults": ("at",), "booted": ("event",)}
 _MARKERS = (
     "scenario(name_or_file, **options): what the fixture bench runs; options as of Bench.from_scenario",
     "worlds(*names): run the test in each of these worlds",
@@ -78,9 +80,11 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         return
     axes: list[list[tuple[str, object]]] = []
     for marker, option in _AXES.items():
-        mark = metafunc.definition.get_closest_marker(marker)
+        mark = _mark(metafunc.definition, marker)
         if mark is not None:
             values = [value for given in mark.args for value in (_seeds(given) if marker == "seeds" else [given])]
+            if not values:
+                pytest.fail(f"the marker {marker} names nothing", pytrace=False)
             axes.append([(option, value) for value in values])
     if axes:
         rows = [dict(row) for row in itertools.product(*axes)]
@@ -89,11 +93,24 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 
 def _seeds(given: object) -> list[int]:
-    """Return the seeds of a number or of a range in words."""
-    if isinstance(given, str):
-        first, _, last = given.partition("-")
-        return list(range(int(first), int(last or first) + 1))
-    return [int(str(given))]
+    """Return the seeds of a number, or of a text such as those of `p2os run --seeds`."""
+    from robot_bench.scenario.sweep import read_seeds
+    from simbase.errors import UsageError
+
+    try:
+        return list(read_seeds(str(given)))
+    except UsageError as error:
+        pytest.fail(f"the marker seeds: {error} (hint: {error.hint})", pytrace=False)
+
+
+def _mark(node: pytest.Item, name: str) -> pytest.Mark | None:
+    """Return a marker of a test; one with a word that it does not take fails the test."""
+    mark = node.get_closest_marker(name)
+    for word in mark.kwargs if mark is not None else ():
+        if word not in _WORDS.get(name, ()):
+            line = next(line for line in _MARKERS if line.startswith(name))
+            pytest.fail(f"the marker {name} takes no {word!r} (hint: {line})", pytrace=False)
+    return mark
 
 
 class _Pool:
@@ -147,7 +164,7 @@ def bench(request: pytest.FixtureRequest) -> "Iterator[Bench]":
     from simbase.errors import P2osError
 
     item: pytest.Item = request.node
-    mark = item.get_closest_marker("booted")
+    mark = _mark(item, "booted")
     booted = None if mark is None else str((*mark.args, *mark.kwargs.values(), _BOOTED)[0])
     pool = item.config.stash.setdefault(_POOL, _Pool())
     try:
@@ -242,8 +259,11 @@ def _record(item: pytest.Item, used: "Bench", report: Any, failure: str) -> None
     said, why = failure.partition("\n")[0], ""
     try:
         if said:
-            with contextlib.suppress(P2osError, BluePillError):
-                why = why_failed(used, [said])
+            try:
+                with contextlib.suppress(P2osError, BluePillError):
+                    why = why_failed(used, [said])
+            except Exception as error:  # noqa: BLE001 - a fault of ours must not end the session of the user's tests
+                report.sections.append(("bench: why", f"not found, a fault of p2os: {type(error).__name__}: {error}"))
         page = write_run(used, folder, said, explained=why, files=Files.PLOTS)
     except (P2osError, OSError) as error:  # a test's own outcome counts
         report.sections.append(("bench: no report", str(error)))

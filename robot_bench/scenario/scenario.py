@@ -269,8 +269,13 @@ class Scenario:
         """Return the scenario with what a command line or a program sets otherwise, for each of its robots.
 
         Raises:
-            UsageError: A value cannot be.
+            UsageError: There is no such option, or a value cannot be.
         """
+        for name in options:
+            if name not in ScenarioOptions.__annotations__:
+                raise UsageError(
+                    f"there is no option {shown(name)}", hint=nearest(name, ScenarioOptions.__annotations__)
+                )
         _refuse_unknown("mode", options.get("mode"), MODES)
         body, core = (
             None if name is None else _known(what, name, Path())

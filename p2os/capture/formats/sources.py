@@ -72,7 +72,10 @@ def open_capture(file: BinaryIO, direction: Direction | None = None) -> Source:
     head = buffered.peek(BLOCK_BYTES)
     if is_pcap(head):
         return Source(blocks=in_order(pcap_blocks(_blocks_of_bytes(buffered))))
-    text = _text(head)
+    mark = codecs.BOM_UTF8 if head.startswith(codecs.BOM_UTF8) else b""  # editors of Windows put it before a text
+    text = _text(head.removeprefix(mark))
+    if text is not None:
+        buffered.read(len(mark))
     if text is not None and text.lstrip().startswith("{"):
         return Source(blocks=in_order(_recorded(buffered)), note=note_of(text.lstrip().split("\n")[0]))
     is_hex = bool(text and text.strip())
@@ -102,7 +105,7 @@ def open_argument(words: list[str], direction: Direction | None = None) -> Sourc
     Raises:
         FileError: It is neither.
     """
-    if len(words) == 1 and Path(words[0]).exists():
+    if len(words) == 1 and words[0] and Path(words[0]).exists():
         return open_file(Path(words[0]), direction)
     text = " ".join(words)
     if looks_like_hex(text):

@@ -38,10 +38,13 @@ def numbers(names: Sequence[str]) -> str:
 
 
 def steady_since(record: RunRecord, at: Nanos) -> tuple[tuple[int, int], Nanos]:
-    """Return the codes of the motors at a time, and since when they are those."""
+    """Return the codes of the motors at a time, and since when they are those; 0 where nothing has run."""
     found, since = [], 0
     for motor in (1, 2):
         steps = motor_steps(record.pins, motor)
+        if not steps.times:
+            found.append(0)
+            continue
         place = max(0, bisect_right(steps.times, at) - 1)
         found.append(int(steps.values[place]))
         since = max(since, steps.times[place])

@@ -98,7 +98,8 @@ def _check(arguments: Table, where: Where) -> None:
     for key, value in arguments.items():
         if value in ("", []):
             raise ScenarioError(f"{where}: {key} is empty")
-        if key.startswith("least") and value > arguments.get(most := f"most{key.removeprefix('least')}", value):
+        most = f"most{key.removeprefix('least')}"
+        if key.startswith("least") and number(arguments, key) > number(arguments, most, math.inf):
             raise ScenarioError(f"{where}: {key} is above {most}")
     if number(arguments, "to_s", math.inf) < number(arguments, "from_s"):
         raise ScenarioError(f"{where}: to_s lies before from_s: the goal would look at nothing")

@@ -195,6 +195,52 @@ def test_a_firmware_that_comes_back_from_a_hard_fault_has_not_died(boot, core, m
     )
 
 
+@pytest.mark.parametrize("core", ["python", "native"])
+@pytest.mark.parametrize("slice_ns", [100, 1700, 500_000])
+@pytest.mark.parametrize(("returns", "dies"), [(15, False), (16, True), (40, True)])
+def test_a_handler_that_comes_back_to_the_same_fault_has_died_until_it_goes_on(
+    boot, core, slice_ns, returns, dies, monkeypatch
+) -> None:
+    """A word of SRAM counts how often the handler ran; once it has come back so often, it skips the instruction."""
+    monkeypatch.setenv("P2OS_CORE", core)
+    count = "hard: mov32 r1, #0x20001000\nldr r0, [r1, #0]\nadds r0, #1\nstr r0, [r1, #0]\n"
+    skip = SKIP_TWO_BYTES.removeprefix("hard: ").removesuffix("bx lr\n")
+    text = f"udf\nlog #1\nb stop\n{count}cmp r0, #{returns + 1}\nbne back\n{skip}back: bx lr\n"
+    board = boot(text, {3: "hard"}).board
+    seen = []
+    while board.now_ns < 500_000:
+        board.advance_to(board.now_ns + slice_ns)
+        seen.append(board.has_died and not board._handles_hard_fault())
+    assert board.fault.returns == returns
+    assert any(seen) is (dies and slice_ns < 500_000)
+    assert not board.has_died, "it went on"
+    assert board.fault.at_ns < 1000, "the first is kept"
+
+
+@pytest.mark.parametrize("core", ["python", "native"])
+def test_an_empty_hard_fault_handler_is_a_death_whenever_one_looks(boot, core, monkeypatch) -> None:
+    monkeypatch.setenv("P2OS_CORE", core)
+    board = boot("udf\nb stop\nhard: bx lr\n", {3: "hard"}).board
+    verdicts = []
+    for us in range(100, 140):
+        board.advance_to(us * 1000)
+        assert board.has_died
+        verdicts.append((board.fault.at_ns, board.fault.returns))
+    assert len({at_ns for at_ns, _ in verdicts}) == 1
+    assert board.verdict.startswith("firmware fault: UsageFault: undefined instruction at start")
+    assert "its handler came back to it again and again" in board.verdict
+
+
+@pytest.mark.parametrize("core", ["python", "native"])
+@pytest.mark.parametrize("slice_ns", [100, 50_000])
+def test_faults_in_turn_are_none_that_its_handler_comes_back_to(boot, core, slice_ns, monkeypatch) -> None:
+    monkeypatch.setenv("P2OS_CORE", core)
+    board = boot("again: udf\nnop\nudf\nb again\n" + SKIP_TWO_BYTES, {3: "hard"}).board
+    while board.now_ns < 500_000:
+        board.advance_to(board.now_ns + slice_ns)
+        assert board.fault is None or board.fault.returns == 0
+
+
 def test_the_fault_that_kills_is_shown_in_place_of_one_that_was_survived(boot) -> None:
     text = "udf\nmovs r4, #1\nmovs r3, #0\nldr r3, [r3, #0]\nmov32 r3, #0x60000000\nldr r3, [r3, #0]\nb stop\n"
     again = "hard: cmp r4, #1\nbeq here\n" + SKIP_TWO_BYTES.removeprefix("hard: ") + "here: b here\n"

@@ -102,6 +102,15 @@ def test_an_argument_is_a_file_or_hex(tmp_path: Path) -> None:
     assert open_argument(["fa", "fb", "03000000"]).whole().bytes_of(None) == SYNC0
     with pytest.raises(FileError, match="no file and no hex"):
         open_argument(["nowhere.jsonl"])
+    with pytest.raises(FileError, match="'' is no file and no hex"):
+        open_argument([""])
+
+
+def test_a_byte_order_mark_stands_before_texts_alone() -> None:
+    mark = b"\xef\xbb\xbf"
+    assert read_capture(mark + write_recording(TALK).encode()).chunks == TALK.chunks
+    assert read_capture(mark + SYNC0.hex(" ").encode()).bytes_of(None) == SYNC0
+    assert read_capture(mark + SYNC0).bytes_of(None) == mark + SYNC0
 
 
 @pytest.mark.parametrize(

@@ -80,6 +80,16 @@ def test_it_flies(bench):
 @pytest.mark.scenario("motorz")
 def test_of_nothing(bench): pass
 
+def test_at_once(bench): bench.expect("robot moves", within=5)
+
+def test_before_anything_has_run(bench): bench.expect("robot movs", within="1 s")
+
+@pytest.mark.booted(within="1 s")
+def test_of_no_such_word(bench): pass
+
+@pytest.mark.scenario("motors", duration=3)
+def test_of_no_such_option(bench): pass
+
 def test_without_a_bench(): assert 1 == 2
 """
 
@@ -87,23 +97,37 @@ def test_without_a_bench(): assert 1 == 2
 @pytest.mark.slow
 def test_a_failure_says_what_was_wanted_what_happened_last_and_where_to_look(pytester: pytest.Pytester) -> None:
     result = run(pytester, FAILED, "--junitxml", "junit.xml")
-    result.assert_outcomes(failed=2, errors=1)
+    result.assert_outcomes(failed=4, errors=3)
     result.stdout.fnmatch_lines([
         "E *ExpectationError: 'usart1 sends take-off' did not happen, from 0.700 s to 1.000 s",
         "*last events:*", "*fault inject: link-down*", "*replay:   pytest 'test_mine.py::test_it_flies'*",
     ])  # fmt: skip
     out = result.stdout.str()
     assert "there is no scenario 'motorz' (hint: did you mean 'motors'?)" in out
+    assert "did not happen within 5 ns (a number without a unit is nanoseconds), from 0.000 s to 0.000 s" in out
+    assert "a fault of p2os" not in out, "why it failed was looked for where nothing had run yet"
+    assert "the marker booted takes no 'within' (hint: booted(event=" in out
+    assert "there is no option 'duration' (hint: did you mean 'duration_s'?)" in out
     assert "def expect(" not in out, "the bench's own lines are not shown"
     page = Path(re.findall(r"report:   (\S+)", out)[0])
     assert "did not happen" in page.read_text(encoding="utf-8")
-    assert [folder.name for folder in (pytester.path / "bench-runs").iterdir()] == ["test_mine.py-test_it_flies"]
+    folders = sorted(folder.name for folder in (pytester.path / "bench-runs").iterdir())
+    assert folders == [f"test_mine.py-test_{name}" for name in ("at_once", "before_anything_has_run", "it_flies")]
     if (page.parent / "path.png").exists():
         assert f"picture:  {page.parent / 'path.png'}" in out
     cases = ET.parse(pytester.path / "junit.xml").iter("testcase")  # noqa: S314 - our own file
     told = {case.get("name"): {item.get("name") for item in case.iter("property")} for case in cases}
     assert {"bench_report", "trace_sha256", "bench_seed"} <= told["test_it_flies"]
     assert told["test_without_a_bench"] == set()
+
+
+def test_seeds_are_those_of_the_command_line() -> None:
+    from robot_bench.cli.pytest_plugin import _seeds
+
+    assert [_seeds(given) for given in (7, "7", "1, 5-6")] == [[7], [7], [1, 5, 6]]
+    for given in (-1, "9-0", "x"):
+        with pytest.raises(pytest.fail.Exception, match="names no seeds"):
+            _seeds(given)
 
 
 def test_who_uses_no_bench_loads_none(pytester: pytest.Pytester) -> None:

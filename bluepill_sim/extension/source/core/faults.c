@@ -49,12 +49,25 @@ static void keep(struct core *core, uint32_t kind)
                                     REG_R12,    REG_SP,     REG_LR,     REG_XPSR};
     struct shared *s = &core->shared;
     struct fault *fault = &s->fault;
+    uint32_t seen[16];
     void *at[16];
     for (int n = 0; n < 16; ++n) {
-        at[n] = &fault->registers[n];
+        at[n] = &seen[n];
     }
     core->api.read_registers(core->unicorn, numbers, at, 16);
-    fault->ns = ns_of(core->fabric, s->cycle);
+    const uint64_t now_ns = ns_of(core->fabric, s->cycle);
+    const bool is_same = fault->kind == kind && fault->pc == s->halt_pc && !memcmp(fault->registers, seen, sizeof seen);
+    if (s->has_fault && is_same) {
+        fault->returns++;
+        fault->round_ns = now_ns - fault->last_ns;
+        fault->last_ns = now_ns;
+        return;
+    }
+    fault->is_other = s->has_fault;
+    fault->returns = 0;
+    fault->round_ns = 0;
+    fault->ns = fault->last_ns = now_ns;
+    memcpy(fault->registers, seen, sizeof seen);
     fault->kind = kind;
     fault->pc = s->halt_pc;
     fault->address = s->halt_address;

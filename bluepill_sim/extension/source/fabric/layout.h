@@ -94,9 +94,13 @@ struct fault {
     uint32_t exception_number;
     uint32_t vector; /* of the handler that ran */
     uint32_t registers[16]; /* R0 to R12, SP, LR, xPSR */
+    uint64_t last_ns; /* when its handler last came back to it with nothing changed, */
+    uint64_t round_ns; /* how long that took, */
+    uint32_t returns; /* and how often */
+    uint32_t is_other; /* another one came before it in this run */
     struct record last[32];
 };
-_Static_assert(sizeof(struct fault) == 616, "fault");
+_Static_assert(sizeof(struct fault) == 640, "fault");
 
 /* The state of one core. */
 struct shared {
@@ -187,7 +191,7 @@ struct shared {
     struct fault fault;
     struct record last[32];
 };
-_Static_assert(sizeof(struct shared) == 1736, "shared");
+_Static_assert(sizeof(struct shared) == 1760, "shared");
 
 /* The pins of one port, a bit each. RM0008 9.1, table 20. */
 struct port {
