@@ -168,20 +168,23 @@ class Fabric(Stateful):
         #: hangs on beside the code: values by the number of a register or the address of a word.
         self.forced: Callable[[int], tuple[int, dict[int, int]]] = lambda _address: (0, {})
         self.port_structs: Any = (PortStruct * PORTS)()
-        self._waves: Any = (WaveStruct * SOURCES)()
+        #: The wave that each alternate function offers; its period is 0 where it offers none.
+        self.wave_structs: Any = (WaveStruct * SOURCES)()
         self._callbacks = _Calls(
             _EVENT(self._guarded(self._event, None)),
             _ASK(self._guarded(self._ask, 0)),
             _PAIR(self._guarded(self._electrical, None)),
             _ONE(self._guarded(lambda slot: self._deliveries[slot](), None)),
             _BUS(self._guarded(self._reach_registers, NO_TIME)),
-            _PAIR(self._guarded(self._code_written, None)),
+            _PAIR(self._guarded(chip.code_written, None)),
             _FORCED(self._guarded(self._find_forced, 0)),
         )
         #: `struct fabric`, for the native core.
         self.handle = ctypes.c_void_p(
             calls.fabric_new(
-                ctypes.addressof(self._callbacks), ctypes.addressof(self.port_structs), ctypes.addressof(self._waves)
+                ctypes.addressof(self._callbacks),
+                ctypes.addressof(self.port_structs),
+                ctypes.addressof(self.wave_structs),
             )
         )
         if not self.handle.value:
@@ -389,11 +392,11 @@ class Fabric(Stateful):
     @property
     def waves(self) -> bytes:
         """What the alternate functions offer as waves, as bytes."""
-        return bytes(self._waves)
+        return bytes(self.wave_structs)
 
     @waves.setter
     def waves(self, waves: bytes) -> None:
-        ctypes.memmove(self._waves, waves, len(waves))
+        ctypes.memmove(self.wave_structs, waves, len(waves))
 
     @property
     def inputs(self) -> bytes:
@@ -482,9 +485,6 @@ class Fabric(Stateful):
         self.check()
         return None if answer == NO_TIME else answer
 
-    def _code_written(self, address: int, size: int) -> None:
-        self._chip.code_written(address, size)
-
     def _find_forced(self, address: int, seen_at: int) -> int:
         """Answer what C asks, with what the answer hangs on."""
         bits, seen = self.forced(address)
@@ -529,10 +529,6 @@ class Fabric(Stateful):
         now = PortStruct()
         self._calls_of_c.fabric_look(self.handle, port, ctypes.addressof(now))
         return now
-
-    def wave_of(self, source: int) -> Any:
-        """Return the wave (`WaveStruct`) that an alternate function offers; its period is 0 where it offers none."""
-        return self._waves[source]
 
     def set_wave(self, pin: int, source: int, frequency_hz: int, period: int, high: int, position: int) -> None:
         """Have an alternate function offer a wave on a pin: `wave_set` of `source/fabric/fabric.h`."""
