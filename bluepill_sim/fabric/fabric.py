@@ -176,7 +176,7 @@ class Fabric(Stateful):
             _PAIR(self._guarded(self._electrical, None)),
             _ONE(self._guarded(lambda slot: self._deliveries[slot](), None)),
             _BUS(self._guarded(self._reach_registers, NO_TIME)),
-            _PAIR(self._guarded(chip.code_written, None)),
+            _PAIR(self._guarded(self._code_written, None)),
             _FORCED(self._guarded(self._find_forced, 0)),
         )
         #: `struct fabric`, for the native core.
@@ -484,6 +484,9 @@ class Fabric(Stateful):
         answer: int = self._calls_of_c.fabric_bus(self.handle, slot, is_write, address, size, word)
         self.check()
         return None if answer == NO_TIME else answer
+
+    def _code_written(self, address: int, size: int) -> None:
+        self._chip.code_written(address, size)
 
     def _find_forced(self, address: int, seen_at: int) -> int:
         """Answer what C asks, with what the answer hangs on."""
