@@ -160,37 +160,3 @@ def _take_wave(meter: DutyMeter, wave: PeriodicLevel, begin: Nanos, end: Nanos) 
         for edge, level in ((turn * period, True), (turn * period + high, False)):
             if begin < (at := time_of(edge)) < end:
                 meter.edge(level, at)
-
-
-class Median(Stateful):
-    """A sliding window over readings of several numbers, with the median of each."""
-
-    STATE = ("_window", "_same", "values")
-
-    def __init__(self, count: int, width: int) -> None:
-        self._count = count
-        self._rest: tuple[int, ...] = (0,) * width
-        self._window = [self._rest] * count
-        self._same = count
-        self.values = self._rest
-
-    @property
-    def is_settled(self) -> bool:
-        """Tell whether the window holds nothing but the values taken."""
-        return self._same >= self._count
-
-    def take(self, reading: tuple[int, ...]) -> bool:
-        """Add a sample; tell whether a median has changed."""
-        window = self._window
-        self._same = self._same + 1 if reading == window[-1] else 1
-        del window[0]
-        window.append(reading)
-        before = self.values
-        self.values = tuple(sorted(column)[self._count // 2] for column in zip(*window, strict=True))
-        return self.values != before
-
-    def reset(self) -> None:
-        """Forget all samples, as if all numbers had always been 0."""
-        self._window = [self._rest] * self._count
-        self._same = self._count
-        self.values = self._rest

@@ -33,10 +33,10 @@ and an output is written only when it changes.
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Protocol, TypeAlias
+from typing import ClassVar, Protocol, TypeAlias
 
 from adapter_sim.codec import BitOrder, motor_value
-from adapter_sim.duty import DutyWire, Median, PeriodicLevel
+from adapter_sim.duty import DutyWire, PeriodicLevel
 from adapter_sim.pinout import Pinout, Safe, Value, WireRole
 from adapter_sim.settings import AdapterSettings, MotorCommand
 from simbase.state import Stateful
@@ -219,34 +219,69 @@ class SampleClock(Stateful):
         return other if self.is_suspended else min(self.next, other)
 
 
-class MotorBits(Stateful):
+class Majority(Stateful):
+    """A sliding window over readings, each some numbers, with the one that holds its majority."""
+
+    STATE: ClassVar[tuple[str, ...]] = ("_window", "_same", "taken")
+
+    def __init__(self, count: int, width: int = 1) -> None:
+        self._count = count
+        self.at_rest = self.taken = (0,) * width
+        self._window = [self.at_rest] * count
+        self._same = count
+
+    @property
+    def is_settled(self) -> bool:
+        """Tell whether the window holds nothing but the reading taken."""
+        return self._same >= self._count
+
+    def take(self, reading: tuple[int, ...]) -> bool:
+        """Add a sample; tell whether the reading taken has changed."""
+        window = self._window
+        self._same = self._same + 1 if reading == window[-1] else 1
+        del window[0]
+        window.append(reading)
+        before, self.taken = self.taken, self._choose(window)
+        return self.taken != before
+
+    def reset(self) -> None:
+        """Forget all samples, as if all numbers had always been 0."""
+        self._window = [self.at_rest] * self._count
+        self._same = self._count
+        self.taken = self.at_rest
+
+    def _choose(self, window: list[tuple[int, ...]]) -> tuple[int, ...]:
+        # Only the newest reading can have gained a majority that it had not before.
+        return window[-1] if 2 * window.count(window[-1]) > self._count else self.taken
+
+
+class Median(Majority):
+    """A sliding window over readings, with the median of each of their numbers."""
+
+    def _choose(self, window: list[tuple[int, ...]]) -> tuple[int, ...]:
+        return tuple(sorted(column)[self._count // 2] for column in zip(*window, strict=True))
+
+
+class MotorBits(Majority):
     """The motor values in two's complement, one word of all wires."""
 
-    STATE = ("_majority",)
-    at_rest = (0,)
-
     def __init__(self, pins: PinBank, motors: Sequence[Value], settings: AdapterSettings) -> None:
+        super().__init__(settings.sample_count)
         self._pins = pins
         self._bit_order: BitOrder = settings.bit_order
         self._widths = tuple(motor.width for motor in motors)
         #: Names of the wires that are looked at.
         self.wires = tuple(name for motor in motors for name in motor.wires)
         self._weights = tuple((name, 1 << bit) for bit, name in enumerate(self.wires))
-        self._majority = Majority(settings.sample_count)
 
     @property
     def values(self) -> tuple[int, int]:
         """Return the values taken."""
-        word, values = self._majority.word, []
+        word, values = self.taken[0], []
         for width in self._widths:
             values.append(motor_value(word & ((1 << width) - 1), width, self._bit_order))
             word >>= width
         return values[0], values[1]
-
-    @property
-    def is_settled(self) -> bool:
-        """Tell whether all samples were the one taken."""
-        return self._majority.is_settled
 
     def read(self, now: Nanos) -> tuple[int, ...]:
         """Return what the wires show, as one word."""
@@ -256,52 +291,30 @@ class MotorBits(Stateful):
                 word |= weight
         return (word,)
 
-    def take(self, reading: tuple[int, ...]) -> bool:
-        """Add a sample; tell whether the values taken have changed."""
-        return self._majority.take(reading[0])
 
-    def reset(self) -> None:
-        """Forget all samples."""
-        self._majority.reset()
-
-
-class MotorDuties(Stateful):
+class MotorDuties(Median):
     """The motor values as signed duties; of each the first wire is measured, and the last is high for backward."""
 
-    STATE = ("_duties", "_median")
-    at_rest = (0, 0)
+    STATE = ("_duties",)
 
     def __init__(self, pins: PinBank, motors: Sequence[Value], settings: AdapterSettings) -> None:
+        super().__init__(settings.sample_count, len(motors))
         self._pins = pins
         self._duties = duty_wires(pins, motors, settings)
         self._signs = tuple(motor.wires[-1] for motor in motors)
         #: Names of the wires that are looked at.
         self.wires = tuple(name for motor in motors for name in (motor.wires[0], motor.wires[-1]))
-        self._median = Median(settings.sample_count, len(motors))
 
     @property
     def values(self) -> tuple[int, int]:
         """Return the values taken, of `FULL`."""
-        left, right = self._median.values
+        left, right = self.taken
         return left, right
-
-    @property
-    def is_settled(self) -> bool:
-        """Tell whether all samples were the one taken."""
-        return self._median.is_settled
 
     def read(self, now: Nanos) -> tuple[int, ...]:
         """Return what the wires show."""
         read, duties = self._pins.read, [wire.duty(now) for wire in self._duties]
         return tuple(-duty if read(sign, now) else duty for duty, sign in zip(duties, self._signs, strict=True))
-
-    def take(self, reading: tuple[int, ...]) -> bool:
-        """Add a sample; tell whether the values taken have changed."""
-        return self._median.take(reading)
-
-    def reset(self) -> None:
-        """Forget all samples."""
-        self._median.reset()
 
 
 def duty_wires(pins: PinBank, motors: Sequence[Value], settings: AdapterSettings) -> tuple[DutyWire, ...]:
@@ -309,41 +322,6 @@ def duty_wires(pins: PinBank, motors: Sequence[Value], settings: AdapterSettings
     return tuple(
         DutyWire(partial(pins.course, motor.wires[0]), timeout_ns=settings.duty_timeout_ns) for motor in motors
     )
-
-
-class Majority(Stateful):
-    """A sliding window over words, with the word that holds its majority."""
-
-    STATE = ("_window", "_same", "word")
-
-    def __init__(self, count: int, word: int = 0) -> None:
-        self._count = count
-        self._window = [word] * count
-        self._same = count
-        self.word = word
-
-    @property
-    def is_settled(self) -> bool:
-        """Tell whether the window holds nothing but the word taken."""
-        return self._same >= self._count and self._window[-1] == self.word
-
-    def take(self, word: int) -> bool:
-        """Add a sample; tell whether the word taken has changed."""
-        window = self._window
-        self._same = self._same + 1 if word == window[-1] else 1
-        del window[0]
-        window.append(word)
-        # Only the newest word can have gained a majority that it had not before.
-        if word != self.word and 2 * window.count(word) > self._count:
-            self.word = word
-            return True
-        return False
-
-    def reset(self, word: int = 0) -> None:
-        """Forget all samples, as if `word` had always been there."""
-        self._window = [word] * self._count
-        self._same = self._count
-        self.word = word
 
 
 class Debounce(Stateful):

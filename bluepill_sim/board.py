@@ -39,7 +39,7 @@ from bluepill_sim.fabric.signals import UV_PER_V, to_uv
 from bluepill_sim.fabric.subscriptions import EdgeSink, Of, PinSubscription
 from bluepill_sim.memory.arrays import Memory
 from bluepill_sim.parts.attached import AttachedParts
-from bluepill_sim.parts.serial_port import Activity, SerialPort
+from bluepill_sim.parts.serial_port import Activity, SerialLine, SerialPort
 from bluepill_sim.parts.usb import UsbHost, UsbSerial
 from bluepill_sim.peripherals.can import Can
 from bluepill_sim.peripherals.i2c import I2c
@@ -108,7 +108,6 @@ class BluePill(Stateful):
         self.image = image if isinstance(image, Image) else load_image(image)
         self._strict = strict
         self._warned: dict[str, str] = {}
-        self._vector_offset = self.image.vector_table - FLASH_BASE
         #: The BOOT0 jumper; looked at, with BOOT1 (PB2), at each reset: 0x flash, 11 SRAM, 10 ST's boot loader.
         self.boot0 = False
         self._warning_sinks: list[Callable[[str], None]] = []
@@ -126,7 +125,7 @@ class BluePill(Stateful):
         self.attached = AttachedParts(lambda text: chip.pins.warn(text, once=text), chip.request_stop)
         usb = cast("Usb", chip.parts.by_name["USB"])
         self._usb = UsbHost(usb, self._run_until)
-        self._usb_serial = UsbSerial(self._usb, self._run_until, chip.request_stop)
+        self._usb_serial = UsbSerial(self._usb, self._wait_for_bytes, chip.request_stop)
         usb.attach(self._usb)
         #: How often it was reset since power came up, by cause.
         self.resets: Counter[ResetCause] = Counter()
@@ -582,11 +581,10 @@ class BluePill(Stateful):
                 break
         return holds()
 
-    def _wait_for_bytes(self, port: SerialPort, pattern: bytes, within: Span) -> None:
-        """Run until `pattern` is in what `port` has sent and nobody has taken (`SerialPort.expect`)."""
-        if not pattern:
-            raise BluePillError("an empty pattern is always there", hint="expect at least one byte")
+    def _wait_for_bytes(self, port: SerialLine, pattern: bytes, within: Span) -> None:
+        """Run until `pattern` is in what `port` has sent and nobody has taken (`SerialLine.expect`)."""
         end_ns = self.now_ns + to_nanos(within)
+        usb = f"{self.usb.describe()}; " if port is self._usb_serial else ""
         with _stop_at_characters(port):
             while pattern not in port.unread:
                 reached = self.advance_to(end_ns)
@@ -595,7 +593,7 @@ class BluePill(Stateful):
                     raise _wait_error(
                         self,
                         f"{port.name} did not send {pattern!r} within {to_nanos(within) / NS_PER_S:g} s; "
-                        f"it sent {last!r}; {_state_of(self)}",
+                        f"it sent {last!r}; {usb}{_state_of(self)}",
                     )
 
     def _warn(self, message: str, once: str, pc: int) -> None:
@@ -744,13 +742,13 @@ def _stop_at_pin(board: BluePill, name: str, what: str) -> Iterator[Callable[[],
         subscription.close()
 
 
-def _ports(board: BluePill) -> dict[str, SerialPort | UsbSerial]:
+def _ports(board: BluePill) -> dict[str, SerialLine]:
     """Return what sends characters, by its name in a condition."""
     return {**board.serial_ports, "usb": board.usb_serial}
 
 
 @contextmanager
-def _stop_at_characters(port: SerialPort | UsbSerial, sent: bytearray | None = None) -> Iterator[None]:
+def _stop_at_characters(port: SerialLine, sent: bytearray | None = None) -> Iterator[None]:
     """End the board's slice after each character that a port sends; collect them in `sent`."""
 
     def take(rows: Sequence[tuple[int, Nanos]]) -> None:

@@ -9,7 +9,7 @@ named stands in `BASES`, so that a warning can name what was touched.
 from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from itertools import count
 from typing import TypeAlias, cast
 
@@ -160,13 +160,9 @@ _LARGE_BYTES = {"USB": 0x800, "ETH": 0x2000, "USB OTG": 0x4_0000, "FSMC": 0x1000
 _Maker: TypeAlias = Callable[[ChipPorts, Place], Peripheral]
 
 
-def _make_rcc(chip: ChipPorts, place: Place) -> Rcc:
-    return Rcc(chip, place, gates=CLOCK_GATES)
-
-
 #: The modelled peripherals, in the order in which they are made, reset and act.
 PERIPHERALS: tuple[tuple[_Maker, str], ...] = (
-    (_make_rcc, "RCC"),
+    (partial(Rcc, gates=CLOCK_GATES), "RCC"),
     (Flash, "FLASH"),
     (Afio, "AFIO"),
     (Gpio, "GPIOA"),

@@ -94,10 +94,8 @@ def run_scenario(
     scenario: Scenario,
     folder: Path,
     *,
-    slice_ns: Nanos | None = None,
     speed: float | None = None,
     on_progress: ProgressListener | None = None,
-    clock: Clock = wall_clock,
     drive: RunBench | None = None,
     force: bool = False,
     coverage: bool = False,
@@ -112,11 +110,8 @@ def run_scenario(
     Args:
         scenario: What to run.
         folder: Where to; made where it is missing.
-        slice_ns: How often the loop gives control back; without effect on the result. None: as often as the wall clock
-            wants it.
         speed: Virtual seconds a wall second; None runs as fast as it can.
         on_progress: Called after each slice; a KeyboardInterrupt out of it ends the run in good order.
-        clock: Wall clock in nanoseconds.
         drive: Runs the bench in place of its `run_until`; a debugger.
         force: Overwrite the run that the folder holds.
         coverage: Write which lines and branches of the firmware ran; not with a `drive` that goes back.
@@ -134,19 +129,16 @@ def run_scenario(
         if drive is not None or coverage or profile:
             raise UsageError("a debugger, coverage and profile are for a robot alone", hint="a scenario with one robot")
         return run_together(
-            scenario, folder, slice_ns=slice_ns, speed=speed, on_progress=on_progress, clock=clock, force=force,
-            is_kept=is_kept, files=files,
+            scenario, folder, speed=speed, on_progress=on_progress, force=force, is_kept=is_kept, files=files
         )  # fmt: skip
-    pacer = None if speed is None else RealTimePacer(speed=speed, clock=clock)
+    pacer = None if speed is None else RealTimePacer(speed=speed)
     with reserved(folder, force=force), _trace_of(scenario, folder, is_at_port=False) as trace:
-        bench = Bench(scenario, trace=trace, slice_ns=slice_ns or (PACED_SLICE_NS if pacer else None))
+        bench = Bench(scenario, trace=trace, slice_ns=PACED_SLICE_NS if pacer else None)
 
         bench.on_slice = _after_slice(bench, pacer, on_progress)
         trace.meta(meta_of(scenario, bench.parts.world, bench.note, is_at_port=False))
         with _measured(bench.chip, coverage=coverage, profile=profile, fail_under=fail_under) as measurement:
-            return _record(
-                bench, trace, folder, pacer, clock, drive, measurement, is_kept, explained=explained, files=files
-            )
+            return _record(bench, trace, folder, pacer, drive, measurement, is_kept, explained=explained, files=files)
 
 
 def run_at_port(
@@ -184,7 +176,7 @@ def run_at_port(
 
         bench.on_slice = _after_slice(bench, None, on_progress)  # it keeps pace by itself
         trace.meta(meta_of(scenario, None, bench.note, is_at_port=True))
-        return _record(bench, trace, folder, pacer, clock, drive, files=files)
+        return _record(bench, trace, folder, pacer, drive, clock=clock, files=files)
 
 
 def write_run(
@@ -346,16 +338,16 @@ def _record(
     trace: TraceWriter,
     folder: Path,
     pacer: RealTimePacer | None,
-    clock: Clock,
     drive: Callable[[_AnyBench], None] | None,
     measurement: "Measurement | None" = None,
     is_kept: Callable[[bool], bool] = lambda _passed: True,
     *,
+    clock: Clock = wall_clock,
     explained: bool = False,
     files: Files = Files.REPORT,
 ) -> RunResult:
     """Run to the end, judge the goals, write the trace's last line, and make the rest of the folder."""
-    driven = _drive(bench, pacer, clock, drive)
+    driven = _drive(bench, pacer, drive, clock)
     passed = _conclude(bench, trace, folder, pacer, driven, measurement, explained=explained)
     made = make_artefacts(folder, files) if is_kept(passed) else _removed(folder)
     _LOG.info("%s %s: %s", bench.scenario.name, "passed" if passed else "failed", made.report)
@@ -363,7 +355,10 @@ def _record(
 
 
 def _drive(
-    bench: _AnyBench, pacer: RealTimePacer | None, clock: Clock, drive: Callable[[_AnyBench], None] | None
+    bench: _AnyBench,
+    pacer: RealTimePacer | None,
+    drive: Callable[[_AnyBench], None] | None,
+    clock: Clock = wall_clock,
 ) -> _Driven:
     """Run a bench to its end; what goes wrong in the midst of it is a failure of the run."""
     failures: list[str] = []
@@ -440,10 +435,8 @@ def run_together(
     scenario: Scenario,
     folder: Path,
     *,
-    slice_ns: Nanos | None = None,
     speed: float | None = None,
     on_progress: ProgressListener | None = None,
-    clock: Clock = wall_clock,
     force: bool = False,
     is_kept: Callable[[bool], bool] = lambda _passed: True,
     files: Files = Files.REPORT,
@@ -452,20 +445,19 @@ def run_together(
 
     Arguments and errors as of `run_scenario`.
     """
-    pacer = None if speed is None else RealTimePacer(speed=speed, clock=clock)
+    pacer = None if speed is None else RealTimePacer(speed=speed)
     with contextlib.ExitStack() as stack:
         traces: dict[str, TraceWriter] = {}
         for own in scenario.programmed:
             stack.enter_context(reserved(folder / own.name, force=force))
             traces[own.name] = stack.enter_context(_trace_of(own, folder / own.name, is_at_port=False))
-        length = slice_ns or (PACED_SLICE_NS if pacer else None)
-        benches = Bench.together(scenario, traces=traces, slice_ns=length)
+        benches = Bench.together(scenario, traces=traces, slice_ns=PACED_SLICE_NS if pacer else None)
         first = next(iter(benches.values()))
         first.on_slice = _after_slice(first, pacer, on_progress)
         for name, bench in benches.items():
             meta = meta_of(bench.scenario, bench.parts.world, bench.note, is_at_port=False)
             traces[name].meta(meta | {"robots": list(benches)})
-        driven = _drive(first, pacer, clock, None)
+        driven = _drive(first, pacer, None)
         passed = [_conclude(bench, traces[name], folder / name, pacer, driven) for name, bench in benches.items()]
         if is_kept(all(passed)):
             made = make_artefacts_of_all(folder, list(benches), scenario.name, files)

@@ -51,8 +51,6 @@ VECTOR_COUNT = FIRST_IRQ + len(IRQ_NAMES)
 THREAD_PRIORITY = 256
 #: Priorities that cannot be set.
 FIXED_PRIORITIES = {1: -3, NMI: -2, HARD_FAULT: -1}
-#: Lines that an STM32F10x can have; a medium-density part uses 43.
-IRQ_LINES = 60
 
 SYSTEM_EXCEPTIONS = (1 << FIRST_IRQ) - 1
 

@@ -547,10 +547,10 @@ def load_library() -> Any:
         MissingDependencyError: it is not installed.
     """
     try:
-        from unicorn.unicorn_py3.unicorn import uclib
+        from unicorn import unicorn_py3
     except ImportError as error:
         raise MissingDependencyError(f"the BluePill needs the unicorn library: {error}", extra="sim") from error
-    return _loaded(uclib._name)  # noqa: SLF001 - the only place where the binding keeps it
+    return _loaded(unicorn_py3.unicorn.uclib._name)  # noqa: SLF001 - the only place where the binding keeps it
 
 
 @cache

@@ -1,6 +1,7 @@
 """Attributes that are fields of `self.shared`, the struct that C sees too: there is one copy of the state."""
 
 import ctypes
+from operator import attrgetter
 from typing import Any
 
 #: What stands for "never" and for "none" among times.
@@ -13,25 +14,19 @@ _LOW = (1 << _HALF) - 1
 def field(name: str, doc: str) -> Any:
     """Return a property that is a field of `self.shared`."""
 
-    def read(self: Any) -> int:
-        return getattr(self.shared, name)  # type: ignore[no-any-return]  # a field of a ctypes struct
-
     def write(self: Any, value: int) -> None:
         setattr(self.shared, name, value)
 
-    return property(read, write, doc=doc)
+    return property(attrgetter(f"shared.{name}"), write, doc=doc)
 
 
 def flag(name: str, doc: str) -> Any:
     """Return a property that is a field of `self.shared`, as a bool."""
 
     def read(self: Any) -> bool:
-        return getattr(self.shared, name) != 0  # type: ignore[no-any-return]  # as above
+        return getattr(self.shared, name) != 0  # type: ignore[no-any-return]  # a field of a ctypes struct
 
-    def write(self: Any, value: bool) -> None:
-        setattr(self.shared, name, value)
-
-    return property(read, write, doc=doc)
+    return field(name, doc).getter(read)
 
 
 def time(name: str, doc: str) -> Any:

@@ -163,7 +163,7 @@ class CanNetwork(Stateful):
         _, n, frame = min(offered, key=lambda one: one[:2])
         member = self._members[n]
         others = [one for one in self._members if one is not member]
-        error = CanError.NONE if member.hears_itself else self._error_to_be(others, member.bit_rate or self._rate())
+        error = CanError.NONE if member.hears_itself else self._error_of(others, member.bit_rate or self._rate())
         return member, frame, error
 
     def want(self, member: CanMember, at_ns: Nanos) -> None:
@@ -208,7 +208,10 @@ class CanNetwork(Stateful):
         member = self._members[sender]
         rate = member.bit_rate or self._rate()
         others = [one for one in self._members if one is not member]
-        error = CanError.NONE if member.hears_itself else self._error_of(others, rate)
+        error = CanError.NONE
+        if not member.hears_itself:
+            error = self._error_of(others, rate)
+            self._damaged -= bool(self._damaged)
         length = stuffed_bits(frame) + (_TAIL_BITS if error is CanError.NONE else _ERROR_BITS)
         end_ns = start_ns + self._span_ns(length, rate)
         pause = _BETWEEN_BITS + (_SUSPEND_BITS if member.is_passive else 0)
@@ -219,11 +222,6 @@ class CanNetwork(Stateful):
         self._replan()
 
     def _error_of(self, others: Sequence[CanMember], rate: Fraction) -> CanError:
-        error = self._error_to_be(others, rate)
-        self._damaged -= bool(self._damaged)
-        return error
-
-    def _error_to_be(self, others: Sequence[CanMember], rate: Fraction) -> CanError:
         active = [one for one in others if one.acknowledges]
         strange = [one for one in active if one.bit_rate is not None and abs(one.bit_rate / rate - 1) > TOLERANCE]
         if self._damaged or strange:

@@ -168,7 +168,8 @@ class Fabric(Stateful):
         #: hangs on beside the code: values by the number of a register or the address of a word.
         self.forced: Callable[[int], tuple[int, dict[int, int]]] = lambda _address: (0, {})
         self.port_structs: Any = (PortStruct * PORTS)()
-        self._waves: Any = (WaveStruct * SOURCES)()
+        #: The wave that each alternate function offers; its period is 0 where it offers none.
+        self.wave_structs: Any = (WaveStruct * SOURCES)()
         self._callbacks = _Calls(
             _EVENT(self._guarded(self._event, None)),
             _ASK(self._guarded(self._ask, 0)),
@@ -181,7 +182,9 @@ class Fabric(Stateful):
         #: `struct fabric`, for the native core.
         self.handle = ctypes.c_void_p(
             calls.fabric_new(
-                ctypes.addressof(self._callbacks), ctypes.addressof(self.port_structs), ctypes.addressof(self._waves)
+                ctypes.addressof(self._callbacks),
+                ctypes.addressof(self.port_structs),
+                ctypes.addressof(self.wave_structs),
             )
         )
         if not self.handle.value:
@@ -389,11 +392,11 @@ class Fabric(Stateful):
     @property
     def waves(self) -> bytes:
         """What the alternate functions offer as waves, as bytes."""
-        return bytes(self._waves)
+        return bytes(self.wave_structs)
 
     @waves.setter
     def waves(self, waves: bytes) -> None:
-        ctypes.memmove(self._waves, waves, len(waves))
+        ctypes.memmove(self.wave_structs, waves, len(waves))
 
     @property
     def inputs(self) -> bytes:
@@ -529,10 +532,6 @@ class Fabric(Stateful):
         now = PortStruct()
         self._calls_of_c.fabric_look(self.handle, port, ctypes.addressof(now))
         return now
-
-    def wave_of(self, source: int) -> Any:
-        """Return the wave (`WaveStruct`) that an alternate function offers; its period is 0 where it offers none."""
-        return self._waves[source]
 
     def set_wave(self, pin: int, source: int, frequency_hz: int, period: int, high: int, position: int) -> None:
         """Have an alternate function offer a wave on a pin: `wave_set` of `source/fabric/fabric.h`."""

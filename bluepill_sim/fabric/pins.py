@@ -77,8 +77,6 @@ class PinMode(Enum):
     ALTERNATE_OPEN_DRAIN = "open-drain alternate function", PinDrive.LOW, PinDrive.NONE
 
 
-ALTERNATE_MODES = (PinMode.ALTERNATE_PUSH_PULL, PinMode.ALTERNATE_OPEN_DRAIN)
-
 #: What a wire can be shorted to, and the level that it then has.
 RAILS = {"GND": False, "3V3": True}
 #: An input that is not 5 V-tolerant bears VDD + 0.3 V (DS5319 table 6); chosen: what counts as more than that.
@@ -315,7 +313,7 @@ class Pin:
         if not self._struct.shown & self._bit:
             return None
         sources = self._struct.sources[self.number]
-        wave = self._bank.fabric.wave_of((sources & -sources).bit_length() - 1)
+        wave = self._bank.fabric.wave_structs[(sources & -sources).bit_length() - 1]
         return Wave(wave.ns, wave.at, wave.period, wave.high, wave.hz)
 
     def disconnect(self, source: str) -> None:

@@ -6,7 +6,7 @@ Invariant: `unread` holds what was sent and no `expect` or `read` has taken yet,
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, TypeAlias
 
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.fabric.characters import Characters
@@ -45,33 +45,75 @@ class Activity:
 WordSink = Callable[[Sequence[tuple[int, Nanos]]], None]
 
 
-class WaitForBytes(Protocol):
-    """Runs the chip until a port has sent something."""
+#: Runs the board until a pattern is in what has come over a line and nobody has taken, or for so long; a `WaitError`
+#: where it does not come.
+WaitForBytes: TypeAlias = Callable[["SerialLine", bytes, Span], None]
 
-    def __call__(self, port: "SerialPort", pattern: bytes, within: Span) -> None:
-        """Run until `pattern` is in `port.unread`.
+
+class SerialLine(Stateful):
+    """A serial line of the board, seen from its far end."""
+
+    STATE: ClassVar[tuple[str, ...]] = ("unread",)
+
+    def __init__(self, name: str, wait: WaitForBytes) -> None:
+        self.name, self._wait = name, wait
+        #: What was sent and not yet taken.
+        self.unread = bytearray()
+
+    def read(self) -> bytes:
+        """Return what was sent and not yet taken, and take it."""
+        data = bytes(self.unread)
+        self.unread.clear()
+        return data
+
+    def expect(self, pattern: bytes, *, within: Span = "1 s") -> bytes:
+        """Run the board until the firmware has sent `pattern`; return what it sent, up to and with it.
+
+        What was already sent and not taken counts, so that nothing is missed between two calls.
+
+        Args:
+            pattern: what to wait for, at least one byte.
+            within: the longest wait, in virtual time.
 
         Raises:
-            WaitError: it did not come in time.
+            WaitError: it did not come in time, or the core is locked up.
         """
+        if not pattern:
+            raise BluePillError("an empty pattern is always there", hint="expect at least one byte")
+        if pattern not in self.unread:
+            self._wait(self, pattern, within)
+        end = self.unread.index(pattern) + len(pattern)
+        taken = bytes(self.unread[:end])
+        del self.unread[:end]
+        return taken
+
+    def subscribe(self, sink: WordSink, *, ends_slice: bool = False) -> Callable[[], None]:
+        """Have `sink` called with what comes from now on, in bulk; return a function that ends it.
+
+        Args:
+            sink: called with rows (word, ns at its end), oldest first.
+            ends_slice: whether each character or packet ends the chip's slice.
+        """
+        raise NotImplementedError
+
+    def _keep(self, data: bytes) -> None:
+        self.unread += data
+        if len(self.unread) > 2 * KEPT_BYTES:
+            del self.unread[:-KEPT_BYTES]
 
 
-class SerialPort(Stateful):
+class SerialPort(SerialLine):
     """A USART of the board, seen from outside."""
 
-    STATE = ("unread",)
     #: Who listens.
     DERIVED = ("_sinks", "_waiting")
 
     def __init__(self, usart: Usart, activity: Activity, wait: WaitForBytes) -> None:
+        super().__init__(usart.name, wait)
         self._usart = usart
         self._activity = activity
-        self._wait = wait
-        self.name = usart.name
         self._sinks: list[WordSink] = []
         self._waiting = 0
-        #: What was sent and not yet taken.
-        self.unread = bytearray()
         usart.sinks.append(self._take)
 
     def receive(self, data: bytes) -> None:
@@ -79,15 +121,7 @@ class SerialPort(Stateful):
         self._usart.receive(data)
 
     def subscribe(self, sink: WordSink, *, ends_slice: bool = False) -> Callable[[], None]:
-        """Have `sink` called with the characters that go out from now on, in bulk, before `advance_to` returns.
-
-        Args:
-            sink: called with rows (word, ns at the end of its stop bit), oldest first.
-            ends_slice: whether each character ends the chip's slice.
-
-        Returns:
-            A function that ends the subscription.
-        """
+        """Have `sink` called with the characters that go out from now on, in bulk, before `advance_to` returns."""
         usart = self._usart
         usart.deliver()
         self._sinks.append(sink)
@@ -135,36 +169,8 @@ class SerialPort(Stateful):
             found[baud] = found.get(baud, 0) + count
         return found
 
-    def read(self) -> bytes:
-        """Return what was sent and not yet taken, and take it."""
-        data = bytes(self.unread)
-        self.unread.clear()
-        return data
-
-    def expect(self, pattern: bytes, *, within: Span = "1 s") -> bytes:
-        """Run the board until the firmware has sent `pattern`; return what it sent, up to and with it.
-
-        What was already sent and not taken counts, so that nothing is missed between two calls.
-
-        Args:
-            pattern: what to wait for, at least one byte.
-            within: the longest wait, in virtual time.
-
-        Raises:
-            WaitError: it did not come in time, or the core is locked up.
-        """
-        if pattern not in self.unread:
-            self._wait(self, pattern, within)
-        end = self.unread.index(pattern) + len(pattern)
-        taken = bytes(self.unread[:end])
-        del self.unread[:end]
-        return taken
-
     def _take(self, sent: Characters) -> None:
         self._activity.last_usart_ns = sent.times[-1] if sent else self._activity.last_usart_ns
-        unread = self.unread
-        unread += sent.data
-        if len(unread) > 2 * KEPT_BYTES:
-            del unread[:-KEPT_BYTES]
+        self._keep(sent.data)
         for sink in self._sinks:
             sink(sent)

@@ -274,42 +274,30 @@ def _wide_compare(name: str) -> _Make:
     return make
 
 
-def _wide_sum(name: str, other_name: str) -> _Make:
-    """Return what changes ADD.W and SUB.W with a modified number."""
+def _registers(word: int, suffix: str = ".w") -> str:
+    """Return what follows a name: target and first source; empty where one is SP or PC, of which none is changed."""
+    target, source = word >> 8 & 15, word >> 16 & 15
+    flags = "s" if word >> 20 & 1 else ""
+    return "" if {target, source} & {_SP, _PC} else f"{flags}{suffix} {_r(target)}, {_r(source)}"
+
+
+def _wide_sum(name: str, other_name: str, *, is_plain: bool = False) -> _Make:
+    """Return what changes ADD.W and SUB.W with a modified number, or ADDW and SUBW, whose number is the bits."""
 
     def make(site: Site) -> Iterator[_Change]:
-        word, number = site.word, expanded(_field(site.word))
-        target, source = word >> 8 & 15, word >> 16 & 15
-        if number is None or {target, source} & {_SP, _PC}:
+        word, field = site.word, _field(site.word)
+        number, registers = field if is_plain else expanded(field), _registers(word, "w" if is_plain else ".w")
+        if number is None or not registers:
             return
-        flags = "s" if word >> 20 & 1 else ""
-        operands = f"{flags}.w {_r(target)}, {_r(source)}"
-        before = f"{name}{operands}, #{number}"
-        for other in _neighbours(number):
-            yield (
-                "immediate", _with_field(word, _modified()[1][other]), before, f"{name}{operands}, #{other}"
-            )  # fmt: skip
+        before = f"{name}{registers}, #{number}"
+        if is_plain:
+            others = {other: other for other in (number + 1, number - 1) if 0 <= other < 0x1000}
+        else:
+            others = {other: _modified()[1][other] for other in _neighbours(number)}
+        for other, changed in others.items():
+            yield "immediate", _with_field(word, changed), before, f"{name}{registers}, #{other}"
         if number:
-            yield "sign", word ^ 0x00A0_0000, before, f"{other_name}{operands}, #{number}"
-
-    return make
-
-
-def _plain_sum(name: str, other_name: str) -> _Make:
-    """Return what changes ADDW and SUBW, whose twelve bits are the number."""
-
-    def make(site: Site) -> Iterator[_Change]:
-        word, number = site.word, _field(site.word)
-        target, source = word >> 8 & 15, word >> 16 & 15
-        if {target, source} & {_SP, _PC}:
-            return
-        head = f"{_r(target)}, {_r(source)}"
-        before = f"{name} {head}, #{number}"
-        for other in (number + 1, number - 1):
-            if 0 <= other < 0x1000:
-                yield "immediate", _with_field(word, other), before, f"{name} {head}, #{other}"
-        if number:
-            yield "sign", word ^ 0x00A0_0000, before, f"{other_name} {head}, #{number}"
+            yield "sign", word ^ 0x00A0_0000, before, f"{other_name}{registers}, #{number}"
 
     return make
 
@@ -358,22 +346,17 @@ def _move_half(site: Site) -> Iterator[_Change]:
 
 def _wide_reverse(site: Site) -> Iterator[_Change]:
     """Change n - x to x - n: the same number, its sign not changed."""
-    word, number = site.word, expanded(_field(site.word))
-    target, source = word >> 8 & 15, word >> 16 & 15
-    if number is None or {target, source} & {_SP, _PC}:
-        return
-    operands = f"{'s' if word >> 20 & 1 else ''}.w {_r(target)}, {_r(source)}, #{number}"
-    yield "sign", word ^ 0x0060_0000, f"rsb{operands}", f"sub{operands}"
+    number, registers = expanded(_field(site.word)), _registers(site.word)
+    if number is not None and registers:
+        operands = f"{registers}, #{number}"
+        yield "sign", site.word ^ 0x0060_0000, f"rsb{operands}", f"sub{operands}"
 
 
 def _wide_register_sum(name: str, other_name: str) -> _Make:
     def make(site: Site) -> Iterator[_Change]:
-        word = site.word
-        target, source = word >> 8 & 15, word >> 16 & 15
-        if {target, source} & {_SP, _PC}:
-            return
-        operands = f"{'s' if word >> 20 & 1 else ''}.w {_r(target)}, {_r(source)}, {_shifted(word)}"
-        yield "sign", word ^ 0x00A0_0000, f"{name}{operands}", f"{other_name}{operands}"
+        if registers := _registers(site.word):
+            operands = f"{registers}, {_shifted(site.word)}"
+            yield "sign", site.word ^ 0x00A0_0000, f"{name}{operands}", f"{other_name}{operands}"
 
     return make
 
@@ -431,8 +414,8 @@ _WIDE: tuple[tuple[int, int, _Make], ...] = (
     (0xFBF0_8F00, 0xF110_0F00, _wide_compare("cmn")),
     (0xFBE0_8000, 0xF100_0000, _wide_sum("add", "sub")),
     (0xFBE0_8000, 0xF1A0_0000, _wide_sum("sub", "add")),
-    (0xFBF0_8000, 0xF200_0000, _plain_sum("addw", "subw")),
-    (0xFBF0_8000, 0xF2A0_0000, _plain_sum("subw", "addw")),
+    (0xFBF0_8000, 0xF200_0000, _wide_sum("add", "sub", is_plain=True)),
+    (0xFBF0_8000, 0xF2A0_0000, _wide_sum("sub", "add", is_plain=True)),
     (0xFBEF_8000, 0xF04F_0000, _wide_move),
     (0xFBEF_8000, 0xF06F_0000, _wide_move),
     (0xFBF0_8000, 0xF240_0000, _move_half),

@@ -199,7 +199,7 @@ class Bench(Expectations, Interventions, Stateful):
         )  # fmt: skip
         self.whens.subscribe(self.events)
         self.goals = GoalJudge(scenario.goals)
-        self.goals.on_end = self._end_now
+        self.goals.on_end = lambda: self._end_at(self.loop.now)
         self.goals.subscribe(self.events)
         pin_of = pins_of(scenario)
         self._pins = ChipPins(chip, harness, pin_of, on_watched=self.loop.note_edge, now=lambda: self.loop.led)
@@ -548,10 +548,6 @@ class Bench(Expectations, Interventions, Stateful):
     def _bring_robot_to(self, at: Nanos) -> None:
         for robot in self._robots:
             robot.advance_to(at)
-
-    def _end_now(self) -> None:
-        """End the run where the loop stands: a goal is decided."""
-        self._end_at(self.loop.now)
 
     def _end_at(self, at: Nanos) -> None:
         """End the run at a time, if nothing ends it before."""

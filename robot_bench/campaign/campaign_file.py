@@ -214,22 +214,21 @@ class Campaign:
     disturbances: tuple[Disturbance, ...] = ()
 
 
-def load_campaign(path: Path, *, firmware: Path | None = None) -> Campaign:
+def load_campaign(path: Path) -> Campaign:
     """Read and check a campaign file.
 
     Args:
         path: The file.
-        firmware: Takes the place of its program.
 
     Raises:
         ScenarioError: It cannot be read, breaks the schema, or its scenario does.
     """
     text = read_user_text(path, "a campaign", ScenarioError, hint="p2os campaign new SCENARIO writes one")
-    return parse_campaign(text, path, firmware=firmware)
+    return parse_campaign(text, path)
 
 
 def parse_campaign(text: str, path: Path, *, firmware: Path | None = None) -> Campaign:
-    """Check the text of a campaign file; arguments and errors as of `load_campaign`."""
+    """Check the text of a campaign file, whose program `firmware` may replace; errors as of `load_campaign`."""
     table, places = read_toml(text, path.name, "a campaign", ScenarioError)
     where = Place(TomlSource(path.name, places))
     check_table(table, TOP, where)

@@ -13,7 +13,6 @@ import shlex
 import statistics
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib.resources import files
-from pathlib import Path
 from string import Template
 from typing import cast
 
@@ -26,7 +25,6 @@ from robot_bench.campaign.results import Whole
 from robot_bench.campaign.trial import unpacked
 from robot_bench.campaign.variants.diversity import FailureSet
 from simbase.errors import P2osError
-from simbase.files import write_text
 
 #: chosen: what fits a page that one scrolls through.
 MOST_SHOWN, MOST_DIMENSIONS = 24, 8
@@ -78,15 +76,6 @@ _MEANING: Mapping[Finding, str] = {
     Finding.NOT_REPEATED: "failed once and not again: a bug of the bench",
     Finding.ERROR: "without a verdict",
 }
-
-
-def write_page(path: Path, whole: Whole) -> None:
-    """Write the report.
-
-    Raises:
-        FileError: It cannot be written.
-    """
-    write_text(path, render(whole))
 
 
 def render(whole: Whole) -> str:

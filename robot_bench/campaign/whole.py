@@ -17,10 +17,10 @@ from p2os.toml_file import read_toml, read_user_text, toml_text
 from robot_bench.campaign.campaign_file import Campaign, load_campaign, parse_campaign
 from robot_bench.campaign.conduct import Conduct, Progress, Row, Workers
 from robot_bench.campaign.last_moment import LastMoment, last_moment
-from robot_bench.campaign.page import write_page
+from robot_bench.campaign.page import render
 from robot_bench.campaign.results import Results, Whole
 from simbase.errors import FileError, P2osError, UsageError
-from simbase.files import writing
+from simbase.files import write_text, writing
 from simbase.timing import Nanos
 
 SCENARIO = "scenario"
@@ -109,7 +109,7 @@ def carry_out(
         whole.was_interrupted = True
     finally:
         conduct.close()
-    write_page(whole.folder / "report.html", whole)
+    write_text(whole.folder / "report.html", render(whole))
     text = json.dumps(whole.as_json(), indent=2, sort_keys=True)
     (folder / SUMMARY).write_text(f"{text}\n", encoding="utf-8")
     return whole

@@ -24,27 +24,18 @@ from simbase.errors import FileError, MissingDependencyError, UsageError
 GROUP = 65_536
 
 
-def write_events(events: Iterable[Event], path: Path, meta: Json | None = None) -> int:
+def write_named_events(events: Iterable[tuple[str, Event]], path: Path, meta: Json | None = None) -> int:
     """Write events to a file whose suffix says how, `.jsonl`, `.parquet` or `.mcap`; return how many.
 
     Args:
-        events: In order of time.
+        events: In order of time, each with the robot that tells it; "" where there is one alone.
         path: Where.
         meta: The first entry of the run's trace, for a scene; None: nothing is known of world and robot.
 
     Raises:
-        UsageError: It has another suffix.
+        UsageError: It has another suffix, or a scene is of several robots.
         MissingDependencyError: pyarrow is not installed.
         FileError: It cannot be written.
-    """
-    return write_named_events((("", event) for event in events), path, meta)
-
-
-def write_named_events(events: Iterable[tuple[str, Event]], path: Path, meta: Json | None = None) -> int:
-    """Write events as `write_events` does, each with the robot that tells it; "" where there is one alone.
-
-    Raises:
-        UsageError, MissingDependencyError, FileError: As of `write_events`; a scene of several robots.
     """
     write = WRITERS.get(path.suffix)
     if write is None:

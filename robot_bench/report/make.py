@@ -19,6 +19,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
+from types import ModuleType
 
 from robot_bench.events.codec import Json
 from robot_bench.recording.run_record import TRACE_NAME, RunRecord, read_run
@@ -62,24 +63,24 @@ def make_report(folder: Path) -> ReportFiles:
 
 def make_scene(record: RunRecord, path: Path) -> None:
     """Write a picture of a run's world and path; nothing is written where Matplotlib is not installed."""
+    if (plots := _plots()) is not None:
+        plots.write_scene(page_data(record), path)
+
+
+def _plots() -> ModuleType | None:
     try:
-        from robot_bench.report.plots import write_scene
-    except ModuleNotFoundError:
-        return
-    write_scene(page_data(record), path)
+        from robot_bench.report import plots
+    except ModuleNotFoundError:  # no Matplotlib
+        return None
+    return plots
 
 
 def _report_of(record: RunRecord, folder: Path, files: Files) -> ReportFiles:
     page = folder / REPORT_NAME
     drawn = page_data(record)
     page.write_text(render_page(record, drawn), encoding="utf-8")
-    if files < Files.PLOTS:
-        return ReportFiles(page=page, plots=())
-    try:
-        from robot_bench.report.plots import write_plots
-    except ModuleNotFoundError:
-        return ReportFiles(page=page, plots=())
-    return ReportFiles(page=page, plots=write_plots(drawn, folder))
+    plots = _plots() if files >= Files.PLOTS else None
+    return ReportFiles(page=page, plots=() if plots is None else plots.write_plots(drawn, folder))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

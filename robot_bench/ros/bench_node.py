@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import cast
 
 from adapter_sim.codec import motor_value
-from adapter_sim.pinout import Pinout, WireRole, load_pinout
+from adapter_sim.pinout import WireRole, load_pinout
 from p2os.robots.parameters import RobotParameters
 from p2os.ros.frames import Frames, time_of
 from p2os.ros.robot_messages import Motion, joint_state, odometry, sonar_range
@@ -46,7 +46,6 @@ class BenchNode:
         parameters: Of its robot.
         options: The node's names.
         outside: Kinds of wires that ROS drives, of a scenario's `outside`.
-        pinout: Which wires there are.
     """
 
     def __init__(
@@ -55,11 +54,10 @@ class BenchNode:
         parameters: RobotParameters,
         options: NodeOptions,
         outside: Iterable[str] = (),
-        pinout: Pinout | None = None,
     ) -> None:
         self._level_of, self._options = level_of, options
         self._frames = Frames.of(parameters, options.namespace)
-        pinout = pinout or load_pinout()
+        pinout = load_pinout()
         #: Topic → its wires, the least significant first.
         wires = {self._topic(key): tuple(pinout.value(value).wires) for key, value in VALUES.items()}
         for number, wire in enumerate(pinout.with_role(WireRole.DISTANCE), start=FIRST):

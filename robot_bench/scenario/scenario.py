@@ -276,7 +276,9 @@ class Scenario:
                 raise UsageError(
                     f"there is no option {shown(name)}", hint=nearest(name, ScenarioOptions.__annotations__)
                 )
-        _refuse_unknown("mode", options.get("mode"), MODES)
+        mode = options.get("mode")
+        if mode is not None and mode not in MODES:
+            raise UsageError(f"there is no mode {mode!r}", hint=" or ".join(f"--mode {word}" for word in MODES))
         body, core = (
             None if name is None else _known(what, name, Path())
             for what, name in (("body", options.get("body")), ("adapter", options.get("adapter_core")))
@@ -747,8 +749,3 @@ def _is_of_users(what: str, name: str) -> bool:
 
 def _class_of_users(what: str, name: str) -> Callable[..., object]:
     return body_class(name) if what == "body" else ENDS[what].check(name)
-
-
-def _refuse_unknown(option: str, value: str | None, known: tuple[str, ...]) -> None:
-    if value is not None and value not in known:
-        raise UsageError(f"there is no {option} {value!r}", hint=" or ".join(f"--{option} {word}" for word in known))

@@ -6,8 +6,7 @@
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from bluepill_sim.fabric.subscriptions import PinSubscriptions
-from robot_bench.wires.chip_pins import ChipPin
+from robot_bench.wires.chip_pins import ChipWithPins
 from simbase.timing import Reached
 
 
@@ -41,15 +40,11 @@ class ChipFault(Protocol):
         """When."""
 
 
-class Chip(PinSubscriptions, Protocol):
+class Chip(ChipWithPins, Protocol):
     """A chip that runs a firmware and leads the bench's time."""
 
     def subscribe_warnings(self, sink: Callable[[str], None]) -> Callable[[], None]:
         """Have `sink` called with each new warning, at its time; return a function that ends it."""
-
-    @property
-    def now_ns(self) -> int:
-        """The time reached."""
 
     @property
     def usart1(self) -> Usart:
@@ -77,9 +72,6 @@ class Chip(PinSubscriptions, Protocol):
     @property
     def activity(self) -> ChipActivity:
         """When the firmware last showed activity."""
-
-    def pin(self, name: str) -> ChipPin:
-        """Return a pin by its name, such as "PA4"."""
 
     def advance_to(self, limit_ns: int) -> Reached:
         """Run to `limit_ns`, at most a basic block beyond; less far where a pin changes that ends its slice."""

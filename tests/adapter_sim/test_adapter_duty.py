@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from adapter_sim import AdapterSettings, MotorCommand
-from adapter_sim.duty import COURSE_NS, FULL, DutyMeter, DutyWire, Median
+from adapter_sim.duty import COURSE_NS, FULL, DutyMeter, DutyWire
 from adapter_sim.mixing import Mixer, Speeds
+from adapter_sim.pins import Median
 from bluepill_sim.fabric.subscriptions import Wave
 from tests.adapter_sim.conftest import MS, FakeRobot, Rig
 
@@ -159,19 +160,19 @@ def test_a_median_needs_more_than_half_of_the_samples() -> None:
     changed = [median.take((500, -500)) for _ in range(6)]
     assert changed == [False, False, True, False, False, False]
     assert median.is_settled
-    assert median.values == (500, -500)
+    assert median.taken == (500, -500)
     median.take((510, -490))
     assert not median.is_settled
-    assert median.values == (500, -500)
+    assert median.taken == (500, -500)
     median.reset()
-    assert median.values == (0, 0)
+    assert median.taken == (0, 0)
 
 
 def test_a_sign_that_comes_two_samples_early_moves_nothing() -> None:
     median = Median(5, 1)
     for value in (400,) * 5 + (-400, -400) + (0,) * 5 + (-300,) * 5:
         median.take((value,))
-        assert median.values[0] in {400, 0, -300}
+        assert median.taken[0] in {400, 0, -300}
 
 
 @pytest.mark.parametrize(

@@ -40,21 +40,21 @@ def test_a_dip_starts_the_ten_milliseconds_anew() -> None:
 
 def test_a_word_is_taken_at_its_third_sample_of_five() -> None:
     window = Majority(5)
-    assert [window.take(6) for _ in range(4)] == [False, False, True, False]
-    assert window.word == 6
+    assert [window.take((6,)) for _ in range(4)] == [False, False, True, False]
+    assert window.taken == (6,)
 
 
 def test_two_samples_of_a_glitch_pass_without_effect() -> None:
     window = Majority(5)
     for word in (6, 6, 0, 0, 0, 6, 6, 0, 0, 0):
-        window.take(word)
-        assert window.word == 0
+        window.take((word,))
+        assert window.taken == (0,)
 
 
 def test_no_majority_keeps_the_last_word() -> None:
     window = Majority(5)
     for word in (1, 2, 3, 4, 5, 6, 7, 1, 2, 3):
-        assert not window.take(word)
+        assert not window.take((word,))
 
 
 @pytest.mark.parametrize(("high_ms", "connects"), [(10, False), (12, False), (14, True)])

@@ -283,7 +283,7 @@ class ContactInquest:
         """Return the motor that is never reversed where, mirrored, the other one is; None where there is no such."""
         times = sorted({t for net in prober.replay.outputs if net.startswith("motor")
                         for t in self.scene.record.pins[net].times})  # fmt: skip
-        given = [prober.codes(t) for t in times if t <= prober.replay.end]
+        given = [steady_since(self.scene.record, t)[0] for t in times if t <= prober.replay.end]
         given += [answer.codes for answers in self._asked for answer in answers.values()]
         nets = prober.sensors
         for motor, names in ((0, ("left", "right")), (1, ("right", "left"))):
@@ -370,7 +370,7 @@ class ContactInquest:
         if not times:
             return
         at = max(times)
-        codes = _codes(prober.codes(hit.t))
+        codes = _codes(steady_since(prober.replay.record, hit.t)[0])
         net = next(
             net for net in prober.replay.outputs if net.startswith("motor") and at in self.scene.record.pins[net].times
         )

@@ -6,19 +6,15 @@ outputs or its text do. An input that is never noticed may as well not be connec
 Invariant: what is found is a difference of two exact replays, never a likelihood.
 """
 
-from bisect import bisect_right
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import zip_longest
 
 from adapter_sim.pinout import WireRole
 from bluepill_sim.core import BLOCK
 from bluepill_sim.core.recorder import RECORD
-from robot_bench.recording.signals import motor_steps
 from robot_bench.report.explain.replay import Branch, ChipReplay, Hold, Place, Seen
-from robot_bench.wires.edges import Edges
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: chosen: how often variables are compared.
@@ -74,18 +70,6 @@ class Prober:
         #: At a time, for a span: the chip with no sensor's pin high, and what it does; what one sensor alone changes.
         self._quiet: dict[tuple[Nanos, Nanos], tuple[Branch, Seen]] = {}
         self._answers: dict[tuple[Nanos, Nanos, str], Answer] = {}
-
-    @cached_property
-    def motors(self) -> tuple[Edges | object, ...]:
-        """The recorded codes of both motors."""
-        return motor_steps(self.replay.record.pins, 1), motor_steps(self.replay.record.pins, 2)
-
-    def codes(self, at: Nanos) -> Codes:
-        """Return the recorded codes of the motors at a time."""
-        left, right = (motor_steps(self.replay.record.pins, motor) for motor in (1, 2))
-        return tuple(  # type: ignore[return-value] # two of them
-            int(steps.values[max(0, bisect_right(steps.times, at) - 1)]) for steps in (left, right)
-        )
 
     def codes_with(self, seen: Seen, at: Nanos) -> Codes:
         """Return the codes at a time in a replay."""

@@ -95,12 +95,8 @@ def _when(table: Table) -> str:
     parts = []
     if "after" in table:
         parts.append(f" after {table['after']!r}")
-    if "from_s" in table:
-        parts.append(f" from {number(table, 'from_s'):g} s")
-    if "to_s" in table:
-        parts.append(f" to {number(table, 'to_s'):g} s")
-    if "within_s" in table:
-        parts.append(f" within {number(table, 'within_s'):g} s")
+    times = [word for word in ("from", "to", "within") if f"{word}_s" in table]
+    parts += [f" {word} {number(table, f'{word}_s'):g} s" for word in times]
     return "".join(parts)
 
 

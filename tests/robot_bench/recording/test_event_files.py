@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from p2os.cli.main import run as p2os
 from robot_bench.events.kinds import KINDS, Event, Note
 from robot_bench.recording import event_files
-from robot_bench.recording.event_files import write_events
+from robot_bench.recording.event_files import write_named_events
 from tests.robot_bench.events.test_stream import SAMPLES
 
 events = st.lists(st.one_of(*SAMPLES.values()), max_size=12)
@@ -37,7 +37,7 @@ def again(row: dict[str, object]) -> Event:
 @given(events)
 def test_json_lines_hold_every_event(tmp_path: Path, told: list[Event]) -> None:
     path = tmp_path / "all.jsonl"
-    assert write_events(told, path) == len(told)
+    assert write_named_events([("", event) for event in told], path) == len(told)
     assert [again(json.loads(line)) for line in path.read_text(encoding="utf-8").splitlines()] == told
 
 
@@ -48,7 +48,7 @@ def test_a_parquet_table_holds_every_event(tmp_path: Path, told: list[Event]) ->
     path = tmp_path / "all.parquet"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(event_files, "GROUP", 5)
-        assert write_events(told, path) == len(told)
+        assert write_named_events([("", event) for event in told], path) == len(told)
     assert [again(row) for row in parquet.read_table(path).to_pylist()] == told
 
 

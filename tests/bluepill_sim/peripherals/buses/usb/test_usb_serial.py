@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from bluepill_sim import BluePill
+from bluepill_sim.board import WaitError
 from bluepill_sim.cli.console import PtyConsole, connect, open_console
 from bluepill_sim.errors import BluePillError
-from bluepill_sim.parts.usb import UsbRequestError
 from p2os.cli.main import run
 
 Boards = Callable[[], BluePill]
@@ -31,7 +31,7 @@ def test_what_is_sent_to_a_device_that_goes_is_lost(boards: Boards) -> None:
     board.usb.plug()
     board.usb.unplug()
     board.usb.wait_configured()
-    with pytest.raises(UsbRequestError, match=r"USB did not send b'EARLY' within 0.05 s; it sent b''; 1209:0001"):
+    with pytest.raises(WaitError, match=r"USB did not send b'EARLY' within 0.05 s; it sent b''; 1209:0001"):
         board.usb_serial.expect(b"EARLY", within="50 ms")
     with pytest.raises(BluePillError, match="empty pattern"):
         board.usb_serial.expect(b"")
