@@ -334,9 +334,9 @@ def test_the_shell_lines_of_a_ci_file_pass_on_a_project_as_it_is_written(name: s
     else:
         lines = [*found["bench"]["before_script"], *found["bench"]["script"]]
     assert len(lines) == 5
-    # What a machine needs once, and the network, are left out; quick tests stand for all, and workers that pytest
-    # starts for those of one robot stand for those of both.
-    workers = "" if robot == "p2dx" else "-n 0"
+    # What a machine needs once, and the network, are left out; quick tests stand for all, and one worker that pytest
+    # starts for those of one robot stands for all of both.
+    workers = "-n 1" if robot == "p2dx" else "-n 0"
     shims = {
         "sudo": "exit 0", "apt-get": "exit 0", "pip": "exit 0",
         "pytest": f'exec {forked_pytest()} -k "says or ready or asks" "$@" {workers}',
