@@ -179,9 +179,9 @@ def test_robots_of_three_kinds_share_a_world(tmp_path: Path) -> None:
     bench = Bench.from_scenario(scenario(
         tmp_path, robot("pioneer", -1, 1.5, 0, rest), robot("direct", 1, 1.5, 0, f'{rest}\nmode = "direct"'),
         robot("rover", 0, -0.5, 0, 'firmware = "rover.elf"\nmodel = "rover"'), robot("still", -1.5, -1.5, 0, ""),
-        world="arena", duration=1.7,
+        world="arena", duration=2.2,
     ))  # fmt: skip
-    bench.run_until("1.7 s")
+    bench.run_until("2.2 s")
     assert re.search(r"left (299|30\d) right (299|30\d) mm/s", bench.robots["rover"].text), "by its encoders"
     moved = {name: one.pose for name, one in bench.robots.items()}
     assert moved["pioneer"].x_m > -0.95
