@@ -315,8 +315,8 @@ def test_cmake_builds_a_program_that_does_what_that_of_make_does() -> None:
     for build in ("make", "cmake"):
         project.write_project(Path(build), project.project_files("kinematic", build=build))
         subprocess.run(project.BUILDS[build].commands, shell=True, cwd=build, check=True, timeout=120)  # noqa: S602
-        bench = Bench.from_scenario(f"{build}/just-drive.toml", duration_s=4)
-        bench.run_until("4 s")
+        bench = Bench.from_scenario(f"{build}/just-drive.toml", duration_s=3.2)
+        bench.run_until("3.2 s")
         bench.finish()
         hashes.append(bench.text)
     assert hashes[0] == hashes[1]
