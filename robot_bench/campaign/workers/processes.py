@@ -47,6 +47,8 @@ class Processes:
     def __init__(self, at_once: int, limits: Limits, look: Callable[[], None] = lambda: None) -> None:
         self._at_once, self._limits, self._look = at_once, limits, look
         self._beginnings = Beginnings()
+        #: What this process has loaded: files, body and mode of trials.
+        self._warm: set[object] = set()
 
     def run(self, trials: Sequence[Trial], on_done: Callable[[int, Done], None], *, anew: bool = False) -> None:
         """Run all; call `on_done` with the place of each and what came of it, in the order in which they end.
@@ -59,8 +61,11 @@ class Processes:
         Raises:
             KeyboardInterrupt: `look` has; what was running is gone.
         """
-        for trial in {id(trial.files): trial for trial in trials}.values():
-            warm_up(trial)
+        for trial in trials:
+            needs = tuple(sorted(trial.files.items())), trial.table.get("body"), trial.table.get("mode")
+            if needs not in self._warm:
+                self._warm.add(needs)
+                warm_up(trial)
         self._beginnings.run(trials, on_done, self._do, anew=anew)
 
     def _do(self, works: Sequence[Work], on_worked: Callable[[int, Worked], None]) -> None:

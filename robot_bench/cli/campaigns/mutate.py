@@ -22,7 +22,7 @@ from p2os.cli.main import EXIT_INTERRUPTED
 from p2os.cli.quantities import option
 from robot_bench.campaign.variants.mutation.base_run import BaseRun, base_run
 from robot_bench.campaign.variants.mutation.report import Mutation, as_json, report_lines, write_junit
-from robot_bench.campaign.variants.mutation.suite import Suite, SuiteRun, run_suite
+from robot_bench.campaign.variants.mutation.suite import Suite, SuiteRun, load_pytest, run_suite
 from robot_bench.campaign.variants.mutation.trial import MOST_MORE_NS, MOST_TIMES, Fate, Found, try_mutant
 from robot_bench.cli.progress import RunDisplay, counting_bar
 from robot_bench.cli.sweep import refuse_junit
@@ -149,6 +149,7 @@ def _suite(paths: tuple[Path, ...], board: BluePill, raise_if_interrupted: Calla
         found.cpu_s = time.process_time() - began
         return found.to_plain()
 
+    load_pytest()
     run_in_processes(job, 1, at_once=1, on_done=on_done, raise_if_interrupted=raise_if_interrupted)
     said = " ".join(map(str, paths))
     if found.failed or found.broken:

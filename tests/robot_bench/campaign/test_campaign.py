@@ -26,8 +26,9 @@ from robot_bench.campaign.last_moment import LastMoment
 from robot_bench.campaign.page import _short
 from robot_bench.campaign.search import SEARCHES, Answer, Problem
 from robot_bench.campaign.suggestion import suggested
-from robot_bench.campaign.trial import GoalResult, Outcome, Trial, Verdict, run_trial, trial_of
+from robot_bench.campaign.trial import GoalResult, Outcome, Trial, Verdict, run_trial, trial_of, warm_up
 from robot_bench.campaign.whole import MOST_MOMENTS, Whole, begin, carry_out, resume
+from robot_bench.campaign.workers import processes
 from robot_bench.campaign.workers.processes import Processes
 from robot_bench.scenario.scenario import known_scenarios, load_scenario
 from simbase.errors import FileError, UsageError
@@ -349,8 +350,14 @@ def outcomes(workers: Processes, trials: Sequence[Trial]) -> dict[int, Outcome]:
     return found
 
 
-def test_a_process_comes_to_what_this_one_comes_to(trials: list[Trial]) -> None:
-    found = outcomes(Processes(2, Limits()), trials)
+def test_a_process_comes_to_what_this_one_comes_to(trials: list[Trial], monkeypatch: pytest.MonkeyPatch) -> None:
+    warmed: list[Trial] = []
+    monkeypatch.setattr(processes, "warm_up", lambda trial: (warmed.append(trial), warm_up(trial)))
+    workers = Processes(2, Limits())
+    found = outcomes(workers, trials)
+    other = trials[0].set(("mode", "adapter"))
+    outcomes(workers, [trials[0], other])
+    assert warmed == [trials[0], other], "what is loaded is not loaded again"
     assert [found[place].sha256 for place in range(3)] == [run_trial(trial).sha256 for trial in trials]
 
 

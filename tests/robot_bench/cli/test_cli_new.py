@@ -315,8 +315,8 @@ def test_cmake_builds_a_program_that_does_what_that_of_make_does() -> None:
     for build in ("make", "cmake"):
         project.write_project(Path(build), project.project_files("kinematic", build=build))
         subprocess.run(project.BUILDS[build].commands, shell=True, cwd=build, check=True, timeout=120)  # noqa: S602
-        bench = Bench.from_scenario(f"{build}/just-drive.toml", duration_s=4)
-        bench.run_until("4 s")
+        bench = Bench.from_scenario(f"{build}/just-drive.toml", duration_s=3.2)
+        bench.run_until("3.2 s")
         bench.finish()
         hashes.append(bench.text)
     assert hashes[0] == hashes[1]
@@ -334,9 +334,9 @@ def test_the_shell_lines_of_a_ci_file_pass_on_a_project_as_it_is_written(name: s
     else:
         lines = [*found["bench"]["before_script"], *found["bench"]["script"]]
     assert len(lines) == 5
-    # What a machine needs once, and the network, are left out; quick tests stand for all, and workers that pytest
-    # starts for those of one robot stand for those of both.
-    workers = "" if robot == "p2dx" else "-n 0"
+    # What a machine needs once, and the network, are left out; quick tests stand for all, and one worker that pytest
+    # starts for those of one robot stands for all of both.
+    workers = "-n 1" if robot == "p2dx" else "-n 0"
     shims = {
         "sudo": "exit 0", "apt-get": "exit 0", "pip": "exit 0",
         "pytest": f'exec {forked_pytest()} -k "says or ready or asks" "$@" {workers}',

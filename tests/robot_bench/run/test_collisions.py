@@ -11,6 +11,7 @@ import pytest
 
 from p2os.cli.main import run as p2os
 from robot_bench.recording.run_record import read_run
+from robot_bench.report import plots
 from robot_bench.report.page import page_data
 from tests.p2os.pioneer.body.bodies import each_body
 from tests.robot_bench.firmware.hurried import hurried
@@ -95,7 +96,10 @@ def test_what_no_goal_forbids_is_named_all_the_same(capsys: pytest.CaptureFixtur
 
 
 def test_a_run_that_hits_something_has_the_same_hash_each_time_and_logs_commands_and_stalls_in_mode_direct(
-    tmp_path: Path, crash: Callable[[str, str], tuple[Path, str]], capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    crash: Callable[[str, str], tuple[Path, str]],
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     again = tmp_path / "again"
     crashed(again, "kinematic", "direct")
@@ -104,5 +108,6 @@ def test_a_run_that_hits_something_has_the_same_hash_each_time_and_logs_commands
     log = [(event.what, event.detail) for event in one.events if event.who == "direct"]
     assert ("command", "motors 3, 3") in log
     assert ("stalled", "both wheels") in log
+    monkeypatch.setattr(plots, "write_plots", lambda *_: ())  # no plot is looked at
     assert p2os(["report", str(again)]) == 0
     assert "red box" in capsys.readouterr().out

@@ -127,7 +127,7 @@ def compare(direct: RunRecord, adapter: RunRecord, parameters: RobotParameters, 
 @pytest.mark.parametrize("body", BODIES)
 def test_motors_sets_the_same_pins_and_the_wheels_agree(body: tuple[str, float], tmp_path: Path) -> None:
     name, extra = body
-    scenario = hurried_scenario("motors", LINKED_TICKS, body=name, duration_s=9.5)
+    scenario = hurried_scenario("motors", LINKED_TICKS, body=name, duration_s=7.2)
     direct = recorded(replace(scenario, mode="direct"), tmp_path / "a")
     adapter = recorded(replace(scenario, mode="adapter"), tmp_path / "b")
     assert chip_edges(direct) == chip_edges(adapter)

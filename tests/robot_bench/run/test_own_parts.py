@@ -20,10 +20,12 @@ from robot_bench.wires.line_ends import AdapterPart, ControllerPart
 from simbase import user_classes
 from simbase.errors import P2osError, UsageError
 from simbase.timing import NS_PER_S
+from tests.robot_bench.firmware.hurried import hurried
 
 PAGE = (Path(__file__).parents[3] / "docs" / "bench.md").read_text(encoding="utf-8")
 BLOCKS = {name: text for text, name in re.findall(r"```\w+\n(# (mine\.\w+)\n.*?)```", PAGE, re.DOTALL)}
-SHIPPED = 'firmware = "motors"\nworld = "room"\nduration_s = 8\nbody = "kinematic"\n'
+MOTORS = hurried("motors")
+SHIPPED = f'firmware = "{MOTORS}"\nworld = "room"\nduration_s = 3.2\nbody = "kinematic"\n'
 
 
 @pytest.fixture
@@ -49,13 +51,13 @@ def refusal(folder: Path, **options: str) -> P2osError:
 
 
 def test_own_body_adapter_and_controller_repeat_fork_rewind_and_pickle_to_the_same_trace(folder: Path) -> None:
-    benches = [Bench.from_scenario(str(folder / "mine.toml"), duration_s=10) for _ in range(2)]
-    for bench, stops in zip(benches, ([9], [1, 4.0001, 9]), strict=True):
+    benches = [Bench.from_scenario(str(folder / "mine.toml"), firmware=MOTORS, duration_s=3.6) for _ in range(2)]
+    for bench, stops in zip(benches, ([3.2], [1, 2.0001, 3.2]), strict=True):
         for stop in stops:
             bench.run_until(round(stop * NS_PER_S))
-        # 0.15 m/s for 3 s, and the left motor is 2 % a metre weaker; read, not what the body was told.
-        assert bench.pose.x_m == pytest.approx(0.45, abs=0.01)
-        assert bench.pose.heading_rad > 0.005
+        # 0.15 m/s for 1.58 s, and the left motor is 2 % a metre weaker; read, not what the body was told.
+        assert bench.pose.x_m == pytest.approx(0.237, abs=0.01)
+        assert bench.pose.heading_rad > 0.001
     benches += [benches[0].fork(), pickle.loads(pickle.dumps(benches[0]))]  # noqa: S301 - its own
     for bench in benches:
         bench.judge()
@@ -68,7 +70,7 @@ def test_own_body_moves_the_virtual_pioneer(folder: Path) -> None:
     poses = []
     for body in ("kinematic", f"{folder}/mine.py:Tiring"):
         bench = Bench.from_scenario(str(folder / "mine.toml"), body=body)
-        bench.run_until("8 s")
+        bench.run_until("3.2 s")
         assert bench.parts.pioneer is not None
         poses.append(bench.pose)
     assert poses[0].heading_rad == pytest.approx(0, abs=1e-6)
@@ -77,12 +79,12 @@ def test_own_body_moves_the_virtual_pioneer(folder: Path) -> None:
 
 def test_several_robots_share_an_own_body_and_no_own_controller(folder: Path) -> None:
     robots = "".join(
-        f'[[robot]]\nname = "{name}"\nfirmware = "motors"\nx_m = {x}\ny_m = 0\n' for name, x in ("a0", "b1")
+        f'[[robot]]\nname = "{name}"\nfirmware = "{MOTORS}"\nx_m = {x}\ny_m = 0\n' for name, x in ("a0", "b1")
     )
-    text = f'world = "room"\nduration_s = 8\nbody = "./mine.py:Tiring"\n{robots}'
+    text = f'world = "room"\nduration_s = 3.2\nbody = "./mine.py:Tiring"\n{robots}'
     (folder / "mine.toml").write_text(text, encoding="utf-8")
     bench = Bench.from_scenario(str(folder / "mine.toml"))
-    bench.run_until("8 s")
+    bench.run_until("3.2 s")
     assert [one.pose.heading_rad > 0 for one in bench.robots.values()] == [True, True]
     (folder / "mine.toml").write_text(text + '[robot.controller]\nkind = "./mine.py:Simple"\n', encoding="utf-8")
     assert "stepped together" in str(refusal(folder))

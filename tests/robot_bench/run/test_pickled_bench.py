@@ -5,7 +5,9 @@ import os
 import pickle
 import subprocess
 import sys
+from collections.abc import Iterable
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -69,12 +71,25 @@ def cut_runs(of: Scenario, *cuts_ns: int) -> list[tuple[Bench, tuple[str, str]]]
     return cut
 
 
+def go_on_in_another_process(pairs: Iterable[tuple[str, tuple[str, str]]], folder: Path) -> None:
+    cut = [each for body, way in pairs for each in cut_runs(scenario(way, body), *CUTS[body])]
+    found = in_another_process(pickle.dumps([bench for bench, _ in cut]), folder, "7")
+    assert found == [whole for _, whole in cut]
+
+
+BODIES = [body for body in CUTS if body in installed_bodies()]
+
+
 @pytest.mark.slow
 def test_a_bench_goes_on_in_another_process(tmp_path: Path) -> None:
-    bodies = CUTS.keys() & installed_bodies()
-    cut = [each for body in bodies for way in WAYS for each in cut_runs(scenario(way, body), *CUTS[body])]
-    found = in_another_process(pickle.dumps([bench for bench, _ in cut]), tmp_path, "7")
-    assert found == [whole for _, whole in cut]
+    """Each way with the first body, and each other body in the first way: neither knows the other."""
+    first, *others = BODIES
+    go_on_in_another_process([*((first, way) for way in WAYS), *((body, WAYS[0]) for body in others)], tmp_path)
+
+
+@pytest.mark.soak
+def test_a_bench_of_each_body_goes_on_in_each_way(tmp_path: Path) -> None:
+    go_on_in_another_process(product(BODIES, WAYS), tmp_path)
 
 
 def test_a_bench_is_pickled_from_within_a_slice() -> None:

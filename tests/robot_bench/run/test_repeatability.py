@@ -1,6 +1,5 @@
 """The same run is the same trace: any slice, process, hash seed and folder, and cut in two."""
 
-import json
 import os
 import pickle
 import subprocess
@@ -55,15 +54,18 @@ def test_neither_the_slice_limit_nor_a_restart_half_way_changes_anything_while_d
     assert '"k":"pose"' in first.trace.text
 
 
-#: Runs dodge with the rest of a command line, in each mode and on each body that the line names; prints the outcomes.
+#: Runs dodge with a program into folders, in each mode and on each body that its arguments name; prints the hashes.
 RUNS = """
 import sys
-from p2os.cli.main import run
-modes, bodies, *rest = sys.argv[1:]
+from pathlib import Path
+from robot_bench.report.make import Files
+from robot_bench.run import run_scenario
+from robot_bench.scenario.scenario import load_scenario
+modes, bodies, firmware = sys.argv[1:]
 for mode in modes.split():
     for body in bodies.split():
-        code = run(["run", "dodge", "--mode", mode, "--body", body, "--out", f"{mode}-{body}", "--json", *rest])
-        assert code in {0, 1}, (mode, body, code)
+        scenario = load_scenario("dodge").with_options(mode=mode, body=body, firmware=firmware, duration_s=1.2)
+        print(run_scenario(scenario, Path(f"{mode}-{body}"), files=Files.SUMMARY).outcome["trace_sha256"])
 """
 
 
@@ -76,11 +78,10 @@ def test_process_hash_seed_and_folder_change_nothing(tmp_path: Path) -> None:
         folder = tmp_path / name
         folder.mkdir()
         done = subprocess.run(
-            [python, "-c", RUNS, " ".join(MODES), " ".join(bodies), "--firmware", program, "--duration", "1.2s"],
-            cwd=folder,
+            [python, "-c", RUNS, " ".join(MODES), " ".join(bodies), program], cwd=folder,
             env={**os.environ, **environment}, capture_output=True, text=True, check=False, timeout=300,
         )  # fmt: skip
         assert done.returncode == 0, done.stderr
-        hashes.append([json.loads(line)["trace_sha256"] for line in done.stdout.splitlines()])
+        hashes.append(done.stdout.splitlines())
     assert hashes[0] == hashes[1]
     assert len({*hashes[0]}) == len(MODES) * len(bodies)

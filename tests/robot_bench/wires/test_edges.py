@@ -13,8 +13,18 @@ from robot_bench.wires.edges import NO_WIRE, Edges, changes, codes, dumped, pack
 WIRES = 5
 WIRE_OF_PIN = bytes(pin if pin < WIRES else NO_WIRE for pin in range(256))
 CODES = bytes(range(10, 20)).ljust(256, b"\0")
-rows = st.lists(st.tuples(st.integers(0, 2**40), st.integers(0, 7), st.integers(0, 4)), max_size=30)
-times = st.lists(st.integers(0, 2**40) | st.integers(0, 9), max_size=20).map(sorted)
+
+
+def time_of(data: bytes) -> int:
+    """Return a time of up to 40 bits: 16, so many bits to the left."""
+    return (data[0] << 8 | data[1]) << data[2] % 25
+
+
+# Drawn as bytes: to draw each number takes longer than all else.
+rows = st.lists(
+    st.binary(min_size=4, max_size=4).map(lambda data: (time_of(data), data[3] & 7, (data[3] >> 3) % 5)), max_size=30
+)
+times = st.lists(st.binary(min_size=3, max_size=3).map(time_of), max_size=20).map(sorted)
 tracks = st.lists(times, min_size=1, max_size=WIRES).map(lambda all_: [Edges((at, 1) for at in one) for one in all_])
 
 
@@ -33,8 +43,9 @@ def test_rows_are_sorted_by_wire(rows: list[tuple[int, int, int]]) -> None:
     assert [(wire, list(zip(times, codes, strict=True))) for wire, times, codes in found] == sorted(expected.items())
 
 
-@given(st.lists(st.tuples(st.integers(0, 9), st.integers(0, 1)), max_size=20), st.integers(0, 1))
-def test_changes_alternate_and_end_each_instant_with_its_last_level(levels: list[tuple[int, int]], before: int) -> None:
+@given(st.binary(max_size=20), st.integers(0, 1))
+def test_changes_alternate_and_end_each_instant_with_its_last_level(data: bytes, before: int) -> None:
+    levels = [(byte % 10, byte >> 7) for byte in data]
     found = changes(dense(levels), before)
     last = dict(dense(levels))
     at_instant, level = [], before
@@ -104,8 +115,12 @@ def test_edges_are_a_sequence_of_times_and_levels() -> None:
     assert some[3] == (10, 0)
 
 
-one_level_an_instant = st.dictionaries(st.integers(0, 40), st.integers(0, 1), max_size=15)
-levels = st.lists(one_level_an_instant.map(lambda levels: dense(list(levels.items()))), min_size=1, max_size=8)
+def one_level_an_instant(data: bytes) -> Edges:
+    """Return an edge for each byte, at most one at a time up to 40."""
+    return dense(list({byte % 41: byte >> 7 for byte in data}.items()))
+
+
+levels = st.lists(st.binary(max_size=15).map(one_level_an_instant), min_size=1, max_size=8)
 
 
 @given(levels)

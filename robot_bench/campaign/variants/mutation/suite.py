@@ -15,6 +15,8 @@ import resource
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from importlib import import_module
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -60,6 +62,13 @@ class SuiteRun:
         addresses = set(cast("list[int]", found["addresses"]))
         cpu_s = float(cast("float", found["cpu_s"]))
         return cls(str(found["failed"]), str(found["broken"]), addresses, str(found["sha256"]), cpu_s)
+
+
+def load_pytest() -> None:
+    """Import pytest and its plugins, so that the forks that run it need not each do so."""
+    for name in ("pytest", *(plugin.module for plugin in entry_points(group="pytest11"))):
+        with contextlib.suppress(Exception):  # pytest itself says what ails a plugin
+            import_module(name)
 
 
 def run_suite(paths: Sequence[Path], firmware: Path) -> SuiteRun:
