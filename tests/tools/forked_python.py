@@ -68,9 +68,14 @@ def forked_python() -> str:
     """Return the path of the program; the server, which the first worker that asks starts, ends with the last."""
     folder = _folder()
     with _locked(folder):
-        if not (folder / "python").exists():
+        try:
+            held = _hold(folder)
+        except OSError:  # nobody serves there, or no more: a run of this number was killed
+            for left in ("held", "socket"):
+                (folder / left).unlink(missing_ok=True)
             _start(folder)
-        _held.append(os.open(folder / "held", os.O_WRONLY))
+            held = _hold(folder)
+        _held.append(held)
     return str(folder / "python")
 
 
@@ -78,9 +83,14 @@ def forked_python() -> str:
 _held: list[int] = []
 
 
+@cache
 def _folder() -> Path:
-    """Return the folder of this run's server."""
+    """Return the folder of this run's server, whatever a test makes of the environment."""
     return Path(tempfile.gettempdir(), f"forked-{os.environ.get('PYTEST_XDIST_TESTRUNUID') or os.getpid()}")
+
+
+def _hold(folder: Path) -> int:
+    return os.open(folder / "held", os.O_WRONLY | os.O_NONBLOCK)
 
 
 def _locked(folder: Path) -> TextIO:
