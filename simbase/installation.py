@@ -12,6 +12,10 @@ import sys
 from functools import cache
 from importlib.metadata import PackageNotFoundError, distribution, requires, version
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from packaging.requirements import Requirement
 
 _DISTRIBUTION = "p2os"
 
@@ -38,7 +42,7 @@ def install_command(extra: str = "", *, python: str = "") -> str:
     except ModuleNotFoundError:
         return f"{_pip_install()} packaging"
     try:
-        found = [Requirement(line) for line in requires(_DISTRIBUTION) or ()]
+        found = _parsed(Requirement, tuple(requires(_DISTRIBUTION) or ()))
     except PackageNotFoundError:
         checkout = str(Path(__file__).resolve().parents[1])
         return f"{_pip_install()} -e {shlex.quote(f'{checkout}[{extra}]' if extra else checkout)}"
@@ -49,6 +53,12 @@ def install_command(extra: str = "", *, python: str = "") -> str:
         if one.marker and not one.marker.evaluate(environment):
             return f"{one.name} needs {str(one.marker).removesuffix(f' and {condition}')}"
     return f"{_pip_install()} {' '.join(one.name for one in named)}"
+
+
+@cache
+def _parsed(kind: "type[Requirement]", lines: tuple[str, ...]) -> "list[Requirement]":
+    """Return requirements, parsed once: `p2os doctor` asks for each of its packages."""
+    return list(map(kind, lines))
 
 
 def reinstall_command() -> str:

@@ -75,6 +75,10 @@ WANTS_HIGHER_BAUD = 2
 SYNC0_BYTES = pulse().to_frame().to_bytes()
 #: chosen: one packet could have been on its way at the old rate; two in a row were not.
 PACKETS_THAT_PROVE_A_RATE = 2
+#: Tuples, for a state of an enum is found in them by its identity: a set would hash it, in Python.
+_AT_REST = (Link.CLOSED, Link.FAILED)
+_LOOKED_FOR = (Link.SEARCHING, Link.STARTING)
+_WITH_LINE = (*_LOOKED_FOR, Link.OPEN)
 #: How far a search came → what its error says, and what to look at.
 REASONS: Mapping[str, tuple[str, str]] = {
     "silence": ("no answer{where}", "is the robot on, and the cable in?"),
@@ -145,19 +149,19 @@ class LinkSupervisor:
 
     def connect(self) -> None:
         """Begin to open a session; no effect while one is open or under way."""
-        if self.link in {Link.CLOSED, Link.FAILED}:
+        if self.link in _AT_REST:
             self._tries = 0
             self._was_open = False
             self._open_line()
 
     def close(self, now: Nanos) -> None:
         """Stop the robot, close its session and the line, whatever is under way."""
-        if self.link in {Link.CLOSED, Link.FAILED}:
+        if self.link in _AT_REST:
             self.link = Link.CLOSED
             return
         self.outbox.clear()
         self._good_baud = self._found_baud  # CLOSE takes the robot back to its own rate
-        has_line = self.link in {Link.SEARCHING, Link.STARTING, Link.OPEN}
+        has_line = self.link in _WITH_LINE
         if has_line:
             self._connection.disconnect(now)
             self.outbox.send(self._connection.take_output())
@@ -225,13 +229,13 @@ class LinkSupervisor:
         if self.link is Link.OPEN:
             self.news.append(LinkLost(reason))
             self._wait_or_fail(reason, None, now)
-        elif self.link in {Link.SEARCHING, Link.STARTING}:
+        elif self.link in _LOOKED_FOR:
             self._wait_or_fail(reason, None, now)
         self.outbox.clear()
 
     def receive(self, data: bytes, now: Nanos) -> None:
         """Take bytes of the robot."""
-        if self.link in {Link.SEARCHING, Link.STARTING, Link.OPEN}:
+        if self.link in _WITH_LINE:
             self._connection.receive(data, now)
             self._collect(now)
         if self._listen_due is not None:
@@ -254,19 +258,19 @@ class LinkSupervisor:
     def next_deadline(self) -> Nanos | None:
         """Return when this wants to act; actions that wait have the outbox's own time."""
         due = [self._due]
-        if self.link in {Link.SEARCHING, Link.STARTING, Link.OPEN}:
+        if self.link in _WITH_LINE:
             due += [self._connection.next_deadline(), self._config_due, self._raise_due(), self._listen_due]
         return min((at for at in due if at is not None), default=None)
 
     def advance_to(self, now: Nanos) -> None:
         """Act on what is due at `now`."""
-        if self.link in {Link.SEARCHING, Link.STARTING, Link.OPEN}:
+        if self.link in _WITH_LINE:
             self._connection.advance_to(now)
             self._collect(now)
         if self._due is not None and now >= self._due:
             if self.link is Link.WAITING:
                 self._open_line()
-            elif self.link in {Link.SEARCHING, Link.STARTING}:
+            elif self.link in _LOOKED_FOR:
                 self._give_up_try(*self._why(), now)
         if self._listen_due is not None and now >= self._listen_due:
             self._next_try(now)

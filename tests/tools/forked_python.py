@@ -55,10 +55,11 @@ IMPORTING = ("pytest",)
 #: hypothesis, which imports all of it for 0.1 s to say at the end that it has nothing to say.
 PYTEST = 'import pytest, sys; sys.exit(pytest.main(["-p", "no:hypothesispytest", *sys.argv[1:]]))'
 #: What commands import at their work, beside the verbs and what those import.
-IMPORTED = (
-    "p2os.__main__", "typer._adapters", "p2os.pioneer.body.kinematic", "robot_bench.scenarios",
-    "robot_bench.report.measures", "robot_bench.report.plots", "matplotlib.backends.backend_agg", "unicorn",
-    "elftools.elf.elffile", "pytest",
+IMPORTED = ("p2os.__main__", "typer._adapters", "p2os.pioneer.body.kinematic")
+#: The same of those that do more than p2os does.
+IMPORTED_BY_OTHERS = (
+    "robot_bench.scenarios", "robot_bench.report.measures", "robot_bench.report.plots",
+    "matplotlib.backends.backend_agg", "unicorn", "elftools.elf.elffile", "pytest",
 )  # fmt: skip
 
 
@@ -67,9 +68,14 @@ def forked_python() -> str:
     """Return the path of the program; the server, which the first worker that asks starts, ends with the last."""
     folder = _folder()
     with _locked(folder):
-        if not (folder / "python").exists():
+        try:
+            held = _hold(folder)
+        except OSError:  # nobody serves there, or no more: a run of this number was killed
+            for left in ("held", "socket"):
+                (folder / left).unlink(missing_ok=True)
             _start(folder)
-        _held.append(os.open(folder / "held", os.O_WRONLY))
+            held = _hold(folder)
+        _held.append(held)
     return str(folder / "python")
 
 
@@ -77,9 +83,14 @@ def forked_python() -> str:
 _held: list[int] = []
 
 
+@cache
 def _folder() -> Path:
-    """Return the folder of this run's server."""
+    """Return the folder of this run's server, whatever a test makes of the environment."""
     return Path(tempfile.gettempdir(), f"forked-{os.environ.get('PYTEST_XDIST_TESTRUNUID') or os.getpid()}")
+
+
+def _hold(folder: Path) -> int:
+    return os.open(folder / "held", os.O_WRONLY | os.O_NONBLOCK)
 
 
 def _locked(folder: Path) -> TextIO:
@@ -193,6 +204,8 @@ class Server:
         self._lines: dict[int, socket.socket] = {}  # to clients, by their processes
         self._spent_s: dict[Path, float] = {}
         self._spent_files: dict[int, Path] = {}  # by process
+        self._own_spent = _spent_file(folder, os.environ)
+        self._has_all = False
         self._ended, self._wakes = socket.socketpair()
         self._selector = selectors.DefaultSelector()
         for each in (self._listener, self._ended, self._wakes):
@@ -204,7 +217,7 @@ class Server:
         signal.signal(signal.SIGCHLD, lambda *_: None)
         for each in (self._listener, self._ended, sys.stdin):
             self._selector.register(each, selectors.EVENT_READ)
-        self._spend(_spent_file(self._folder, os.environ), time.process_time())
+        self._spend(self._own_spent, time.process_time())
         while True:
             for key, _ in self._selector.select():
                 if key.fileobj is self._listener:
@@ -247,6 +260,11 @@ class Server:
             return None
         process = 0
         if command.can_be_forked:
+            if not self._has_all and not is_of_p2os(command):
+                begun_s = time.process_time()
+                import_all()
+                self._spend(self._own_spent, time.process_time() - begun_s)
+                self._has_all = True
             process = os.fork()
             if not process:
                 self._forget(line)
@@ -392,22 +410,47 @@ def run(words: Sequence[str]) -> None:
     exec(code, main.__dict__)  # noqa: S102
 
 
-def import_all() -> None:
-    """Import what commands do."""
+def is_of_p2os(command: Command) -> bool:
+    """Tell whether a command has nothing of the packages above p2os, as far as its words and its file show."""
     from p2os.cli.main import verbs  # not in who starts the server
 
-    for name in (*IMPORTED, *(entry.module for entry in verbs())):
+    words = command.words
+    if words[:2] == ["-m", "p2os"]:
+        return any(entry.name in words[2:3] and entry.module.startswith("p2os.") for entry in verbs())
+    if words[0] == "-c":
+        return "robot_bench" not in words[1]
+    with contextlib.suppress(OSError):
+        return b"robot_bench" not in Path(os.fsdecode(command.folder), words[0]).read_bytes()
+    return False
+
+
+def import_p2os() -> None:
+    """Import what commands of p2os do."""
+    from p2os.cli.main import verbs
+
+    _import([*IMPORTED, *(entry.module for entry in verbs() if entry.module.startswith("p2os."))])
+
+
+def import_all() -> None:
+    """Import what all commands do."""
+    from p2os.cli.main import verbs
+
+    _import([*IMPORTED_BY_OTHERS, *(entry.module for entry in verbs())])
+
+
+def _import(names: Sequence[str]) -> None:
+    gc.disable()
+    for name in names:
         with contextlib.suppress(ImportError):
             importlib.import_module(name)
+    gc.freeze()
+    gc.enable()
 
 
 if __name__ == "__main__":
     with socket.socket(fileno=int(sys.argv[1])) as listening:
         base = sys.path[1 + len(os.environ["PYTHONPATH"].split(os.pathsep)) :]
-        gc.disable()
-        import_all()
-        gc.freeze()
-        gc.enable()
+        import_p2os()
         wanted = Server(listening, Path(sys.argv[2])).serve()
     if wanted is not None:
         become(wanted, base)

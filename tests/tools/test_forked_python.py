@@ -6,6 +6,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -72,6 +73,25 @@ def test_another_worker_of_the_run_has_the_same_server_and_leaves_it(tmp_path: P
     run = os.environ.get("PYTEST_XDIST_TESTRUNUID") or str(os.getpid())
     assert ran(sys.executable, ["-c", worker], ROOT, PYTEST_XDIST_TESTRUNUID=run) == (0, f"{ours}\n", "")
     assert ran(ours, ["-c", IS_FORKED], tmp_path)[1] == "True\n"
+
+
+def test_what_a_killed_run_has_left_is_served_anew(tmp_path: Path) -> None:
+    folder = tmp_path / "forked-left"
+    folder.mkdir()
+    os.mkfifo(folder / "held")
+    for name in ("socket", "python"):
+        (folder / name).touch()
+    program = """
+import subprocess
+from tests.tools.forked_python import forked_python
+print(subprocess.run([forked_python(), "-c", "print('p2os.cli.main' in __import__('sys').modules)"], check=True))
+"""
+    code, said, err = ran(sys.executable, ["-c", program], ROOT, PYTEST_XDIST_TESTRUNUID="left", TMPDIR=str(tmp_path))
+    assert (code, said.splitlines()[0]) == (0, "True"), err
+    ends = time.monotonic() + TIMEOUT_S
+    while folder.exists():  # the server has ended with its last worker
+        assert time.monotonic() < ends
+        time.sleep(0.01)
 
 
 @pytest.mark.parametrize(

@@ -170,9 +170,9 @@ def test_nothing_decodes_to_nothing() -> None:
         assert (len(columns), columns.tables, columns.damage().noise_bytes) == (0, {}, len(data))
 
 
-@pytest.mark.parametrize("kind", [*READERS, *SIP_KINDS, IDENTITY_KIND])
-def test_a_packet_without_its_inside_is_read_as_its_object_is(kind: int) -> None:
-    same(Frame(bytes((kind,))).to_bytes())
+def test_a_packet_without_its_inside_is_read_as_its_object_is() -> None:
+    for kind in (*READERS, *SIP_KINDS, IDENTITY_KIND):
+        same(Frame(bytes((kind,))).to_bytes())
 
 
 def test_numbers_come_as_arrays_and_texts_as_bytes() -> None:
@@ -234,11 +234,10 @@ def test_packets_that_hold_nothing_or_rows_keep_their_shape(packet: ServerPacket
     same(packet_frame(packet, Profile.P2OS).to_bytes() * 2)
 
 
-@pytest.mark.parametrize("vector", json.loads((GOLDEN / "p2os_vectors.json").read_text(encoding="utf-8")),
-                         ids=lambda vector: vector["name"])  # fmt: skip
-def test_a_vector_gives_the_rows_of_the_objects(vector: dict) -> None:
-    for profile in Profile:
-        same(bytes.fromhex(vector["hex"]), profile)
+def test_a_vector_gives_the_rows_of_the_objects() -> None:
+    for vector in json.loads((GOLDEN / "p2os_vectors.json").read_text(encoding="utf-8")):
+        for profile in Profile:
+            same(bytes.fromhex(vector["hex"]), profile)
 
 
 @pytest.mark.parametrize("name", ["aria_p2de.jsonl", "player_p2de.jsonl"])

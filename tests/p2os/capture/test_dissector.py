@@ -72,13 +72,15 @@ def test_tshark_shows_a_capture_of_ours(tmp_path: Path) -> None:
 
 def network_file(path: Path, sent: list[tuple[int, int, bytes]]) -> Path:
     """Write TCP segments of (source port, target port, bytes), cut at 50 bytes; return the path."""
-    packets, sequences = [], {source: 1 for source, _, _ in sent}
+    packets, sequences = [], {(source, target): 1 for source, target, _ in sent}
     for source, target, stream in sent:
         for start in range(0, len(stream), 50):
             data = stream[start : start + 50]
-            tcp = struct.pack(">HHIIBBHHH", source, target, sequences[source], 0, 5 << 4, 0x18, 1000, 0, 0) + data
+            tcp = (
+                struct.pack(">HHIIBBHHH", source, target, sequences[source, target], 0, 5 << 4, 0x18, 1000, 0, 0) + data
+            )
             packets.append(struct.pack(">BBHHHBBH", 0x45, 0, 20 + len(tcp), 0, 0, 64, 6, 0) + b"\x7f\0\0\1" * 2 + tcp)
-            sequences[source] += len(data)
+            sequences[source, target] += len(data)
     records = b"".join(
         struct.pack("<IIII", 1, place, len(data), len(data)) + data for place, data in enumerate(packets)
     )
@@ -87,17 +89,24 @@ def network_file(path: Path, sent: list[tuple[int, int, bytes]]) -> Path:
 
 
 @needs_tshark
-@pytest.mark.parametrize(("robot", "client"), [(8101, 40000), (40000, 8101), (45555, 45001)])
-def test_tshark_finds_frames_on_any_port_and_the_robot_is_who_answers(robot: int, client: int, tmp_path: Path) -> None:
+def test_tshark_finds_frames_on_any_port_and_the_robot_is_who_answers(tmp_path: Path) -> None:
     pieces = frame_chunks(read_file(GOLDEN).chunks)
     chunks = [(chunk.direction, chunk.data) for chunk in pieces][:12]
-    ends = {Direction.TO_ROBOT: (client, robot), Direction.FROM_ROBOT: (robot, client)}
-    path = network_file(tmp_path / "tcp.pcap", [(*ends[direction], data) for direction, data in chunks if direction])
-    rows = shown(path, "p2os.packet", "p2os.command", "_ws.col.Protocol")
-    kinds = [kind for row in rows for kind in row[0].split(",") if kind]
-    assert kinds == [f"0x{data[3]:02x}" for direction, data in chunks if direction is Direction.FROM_ROBOT]
-    commands = [kind for row in rows for kind in row[1].split(",") if kind]
-    assert commands == [str(data[3]) for direction, data in chunks if direction is Direction.TO_ROBOT]
+    sent: list[tuple[int, int, bytes]] = []
+    conversations = ((8101, 41000), (40000, 8101), (45555, 45001))  # robot and client, one behind the other
+    for robot, client in conversations:
+        ends = {Direction.TO_ROBOT: (client, robot), Direction.FROM_ROBOT: (robot, client)}
+        sent += [(*ends[direction], data) for direction, data in chunks if direction]
+    rows = shown(
+        network_file(tmp_path / "tcp.pcap", sent),
+        "p2os.packet", "p2os.command", "_ws.col.Protocol", "tcp.srcport", "tcp.dstport",
+    )  # fmt: skip
+    for ports in conversations:
+        ours = [row for row in rows if {row[3], row[4]} == set(map(str, ports))]
+        kinds = [kind for row in ours for kind in row[0].split(",") if kind]
+        assert kinds == [f"0x{data[3]:02x}" for direction, data in chunks if direction is Direction.FROM_ROBOT], ports
+        commands = [kind for row in ours for kind in row[1].split(",") if kind]
+        assert commands == [str(data[3]) for direction, data in chunks if direction is Direction.TO_ROBOT], ports
     assert {row[2] for row in rows} <= {"P2OS", "TCP"}
 
 

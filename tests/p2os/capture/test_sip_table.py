@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import cast
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 
 pytest.importorskip("numpy")
 
@@ -96,6 +96,7 @@ def part_of(draw: Draw) -> bytes:
 
 
 @given(SEEDS)
+@settings(max_examples=60)  # 15 ms each
 def test_a_capture_gives_the_same_cells_either_way(seed: int) -> None:
     draw = Draw(seed)
     direction, now = draw.one_of(ROBOT, None), 0
@@ -146,12 +147,15 @@ def test_the_silence_begins_with_the_last_chunk_of_a_run() -> None:
     assert same(capture_of([*chunks, *((wait, CLIENT, b"\0") for wait in waits)]))["t_s"] == [0.35]
 
 
-@pytest.mark.parametrize(("wait_ns", "found"), [(249 * NS_PER_MS, [0.249, 0.249]), (250 * NS_PER_MS, [0.25])])
-def test_a_sip_that_is_cut_in_two_is_found_unless_its_rest_comes_too_late(wait_ns: int, found: list[float]) -> None:
-    data = sip_bytes(raw_x=7, sonar=(SonarReading(2, 300),))
+@pytest.mark.parametrize(("wait_ns", "count"), [(249 * NS_PER_MS, 2), (250 * NS_PER_MS, 1)])
+def test_a_sip_that_is_cut_in_two_is_found_unless_its_rest_comes_too_late(wait_ns: int, count: int) -> None:
+    data, chunks, found = sip_bytes(raw_x=7, sonar=(SonarReading(2, 300),)), [], list[float]()
     for place in range(1, len(data)):
-        chunks = [(0, ROBOT, data[:place]), (wait_ns, ROBOT, data[place:] + data)]
-        assert same(capture_of(chunks))["t_s"] == found
+        begun_ns = place * NS_PER_S
+        chunks += [(begun_ns, ROBOT, data[:place]), (begun_ns + wait_ns, ROBOT, data[place:] + data)]
+        found += [(begun_ns + wait_ns) / NS_PER_S] * count
+    for together in (1, 2, 3):
+        assert same(capture_of(chunks), together=together)["t_s"] == found
 
 
 @pytest.mark.parametrize("batteries", [(100, 100, 101), (101, 100, 100), (100, 100, 100)])

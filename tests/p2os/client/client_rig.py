@@ -182,7 +182,7 @@ class Rig:
             self._collect()
 
     def _collect(self) -> None:
-        if self.core.link in {Link.SEARCHING, Link.STARTING}:
+        if self.core.link is Link.SEARCHING or self.core.link is Link.STARTING:
             self._searching_since = self.now if self._searching_since is None else self._searching_since
         elif self._searching_since is not None:
             self.searches_ns.append(self.now - self._searching_since)

@@ -118,7 +118,7 @@ def endure(total: int, seed: int) -> None:
 def test_bytes_half_of_them_mutated_sessions_are_endured() -> None:
     tracemalloc.start()
     try:
-        endure(250_000, 1)
+        endure(150_000, 1)
     finally:
         tracemalloc.stop()
 
