@@ -18,16 +18,14 @@ from xml.etree import ElementTree as ET
 from rich.console import Console
 from rich.table import Table
 
-from robot_bench.bench.board import boot
 from robot_bench.cli.progress import runs_bar
-from robot_bench.cli.workers import failure, run_in_processes
+from robot_bench.cli.workers import failure, load_once, run_in_processes
 from robot_bench.events.codec import Json
 from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.recording.summary import INTERRUPTED
 from robot_bench.run import run_scenario
 from robot_bench.scenario.included_files import Setting, as_toml
 from robot_bench.scenario.scenario import Scenario
-from simbase.errors import P2osError
 from simbase.files import writing
 from simbase.units import ranges_text
 
@@ -127,8 +125,7 @@ def run_sweep(
             outcomes[number] = found
             advance(passed=bool(found["passed"]))
 
-        with contextlib.suppress(P2osError):  # each run tells it
-            boot(rows[0].scenario)  # the emulator and the program are loaded once, here: a fork has them
+        load_once(rows[0].scenario)
         is_whole = run_in_processes(
             job, len(rows), at_once=jobs, on_done=on_done, raise_if_interrupted=raise_if_interrupted
         )

@@ -17,9 +17,12 @@ from multiprocessing.context import ForkProcess
 from typing import Annotated
 
 from p2os.cli.quantities import option
+from p2os.pioneer.body.factory import load_engine
+from robot_bench.bench.board import boot
 from robot_bench.events.codec import Json
 from robot_bench.recording.summary import INTERRUPTED
 from robot_bench.running.forks import LOOK_S, begin, how_it_ended, received
+from robot_bench.scenario.scenario import Scenario
 from simbase.errors import P2osError
 from simbase.units import COUNT
 from simbase.user_classes import unforeseen
@@ -36,6 +39,16 @@ Jobs = Annotated[
 def core_count() -> int:
     """Return how many processors this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def load_once(scenario: Scenario) -> None:
+    """Load the emulator, the program and the body's engine here, which takes longer than a short run: forks have them.
+
+    What cannot be loaded each run tells of.
+    """
+    with contextlib.suppress(P2osError):
+        boot(scenario)
+        load_engine(scenario.body)
 
 
 def run_in_processes(

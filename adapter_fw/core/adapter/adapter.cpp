@@ -15,7 +15,6 @@ namespace {
 
 //: A robot whose bytes came so recently is still streaming: one SIP period.
 constexpr Nanos STREAMING_NS = 100 * NS_PER_MS;
-constexpr std::int32_t HEADING_MODULUS = 4'096;
 
 p2os::ClientSettings client_settings(const Settings& settings) {
   p2os::ClientSettings client;

@@ -7,7 +7,6 @@ namespace adapter {
 namespace {
 
 constexpr std::int32_t POSITION_MODULUS = 1 << 15;
-constexpr std::int32_t HEADING_MODULUS = 1 << 12;
 //: The mean of two headings needs half a count.
 constexpr std::int32_t HALF_COUNTS = 2 * HEADING_MODULUS;
 constexpr std::int32_t QUARTER = HALF_COUNTS / 4;

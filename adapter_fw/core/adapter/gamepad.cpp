@@ -4,8 +4,6 @@ namespace adapter {
 
 namespace {
 
-constexpr std::int32_t TRIGGER_FULL = 1'023, STICK_FULL = 511;
-
 // Returns a deflection with its dead zone taken out and the rest stretched to the full range.
 std::int32_t outside(std::int32_t value, std::int32_t dead, std::int32_t full) {
   // Cut first: a report may hold any number, and the most negative one has no magnitude.

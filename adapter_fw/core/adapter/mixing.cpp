@@ -11,8 +11,6 @@ namespace {
 constexpr std::int64_t DEG_PER_RAD_E9 = 57'295'779'513;
 constexpr std::int64_t E9 = 1'000'000'000;
 constexpr std::int64_t E12 = 1'000 * E9;
-//: The pad's full deflections.
-constexpr std::int64_t TRIGGER_FULL = 1'023, STICK_FULL = 511;
 
 std::int64_t lower(std::int64_t robot, std::int64_t wanted) { return wanted >= 0 && wanted < robot ? wanted : robot; }
 

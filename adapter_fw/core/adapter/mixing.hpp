@@ -12,6 +12,9 @@
 
 namespace adapter {
 
+//: A pad's full deflections: triggers, and the sticks to one side.
+constexpr std::int32_t TRIGGER_FULL = 1'023, STICK_FULL = 511;
+
 struct Speeds {
   std::int32_t forward_mm_s = 0;
   std::int32_t turn_deg_s = 0;  // + to the left

@@ -8,6 +8,7 @@ Invariant: an engine is imported only when it is asked for; whether one is insta
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from importlib.util import find_spec
 from typing import cast
 
@@ -69,23 +70,36 @@ def make_scene(
         WorldError: The world has something that this body cannot take.
     """
     name = resolve_body(name)
+    load_engine(name)
     if name == "kinematic":
         from p2os.pioneer.body.kinematic import KinematicScene
 
         return KinematicScene(world, models, starts)
-    if name not in BODY_NAMES:
-        scene = _scene_of_users(name, world, models)
-        if starts is not None:
-            scene.reset(starts, seed)
-        return scene
-    try:
-        if name == "bullet":
-            from p2os.pioneer.body.bullet import BulletScene
+    if name == "bullet":
+        from p2os.pioneer.body.bullet import BulletScene
 
-            return BulletScene(world, models, starts)
+        return BulletScene(world, models, starts)
+    if name == "mujoco":
         from p2os.pioneer.body.mujoco import MujocoScene
 
         return MujocoScene(world, models, starts)
+    scene = _scene_of_users(name, world, models)
+    if starts is not None:
+        scene.reset(starts, seed)
+    return scene
+
+
+def load_engine(name: str) -> None:
+    """Import what a body is made of, so that making one takes no longer than that; of a user's body nothing.
+
+    Raises:
+        UsageError: There is no body of that name.
+        MissingDependencyError: The engine or NumPy is not installed.
+    """
+    name = resolve_body(name)
+    try:
+        if name in BODY_NAMES:
+            import_module(f"{__package__}.{name}")
     except ModuleNotFoundError as error:
         raise MissingDependencyError(f"the {name} body needs {error.name}", extra=name, hint="--body best") from error
 

@@ -12,7 +12,7 @@ from p2os.cli.help_pages import BENCH
 from p2os.cli.names import bodies
 from p2os.cli.quantities import option
 from robot_bench.cli.progress import RunDisplay
-from robot_bench.cli.workers import Jobs, core_count, run_in_processes
+from robot_bench.cli.workers import Jobs, core_count, load_once, run_in_processes
 from robot_bench.events.codec import Json
 from robot_bench.experiments import require
 from robot_bench.scenario.included_files import Setting, as_toml, read_setting
@@ -108,6 +108,7 @@ def sensitivity(
         point, own_seed = runs[number]
         return {"outcomes": outcomes_of(made(design.settings(point), own_seed), lambda _now: look())}
 
+    load_once(made((), None))
     found = _run(job, len(runs), jobs or core_count())
     names = outcome_names(found, outcome or [])
     values = _means(runs, found, names)

@@ -17,7 +17,7 @@ from p2os.cli.names import bodies, urls
 from p2os.cli.quantities import option
 from robot_bench.cli.progress import RunDisplay
 from robot_bench.cli.run import ask, capped, drive_port
-from robot_bench.cli.workers import core_count, run_in_processes
+from robot_bench.cli.workers import core_count, load_once, run_in_processes
 from robot_bench.events.codec import Json
 from robot_bench.experiments.validation.experiments import EXPERIMENTS, AtPort, Experiment
 from robot_bench.experiments.validation.figures import LOOSE_BECAUSE, Figure, loose
@@ -177,6 +177,8 @@ def _run_all(
     seeds: Sequence[int] | None,
     jobs: int,
 ) -> list[Result]:
+    for body in {variant.body for variant in chosen_variants}:
+        load_once(chosen[0].load(settings).with_options(body=body))
     with RunDisplay(is_shown=False) as display:
         console = Console(stderr=True)
         with console.status("validating", spinner="line") as status:

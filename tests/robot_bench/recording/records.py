@@ -9,11 +9,11 @@ from robot_bench.wires.edges import Edges
 S = 10**9
 
 
-def pose(t: int = 0, x: int = 0, y: int = 0, *, la: int = 0, ra: int = 0, collisions: int = 0,
+def pose(t: int = 0, x: int = 0, y: int = 0, *, left: int = 0, la: int = 0, ra: int = 0, collisions: int = 0,
          work: int | None = None) -> Pose:  # fmt: skip
     return Pose(
-        t=t, x=x, y=y, z=0, heading=0, pitch=0, left=0, right=0, left_angle=la, right_angle=ra, collisions=collisions,
-        work=work,
+        t=t, x=x, y=y, z=0, heading=0, pitch=0, left=left, right=0, left_angle=la, right_angle=ra,
+        collisions=collisions, work=work,
     )  # fmt: skip
 
 

@@ -41,7 +41,7 @@ def test_json_lines_hold_every_event(tmp_path: Path, told: list[Event]) -> None:
     assert [again(json.loads(line)) for line in path.read_text(encoding="utf-8").splitlines()] == told
 
 
-@same_folder
+@settings(same_folder, max_examples=40)  # 240 events; a table takes 10 ms
 @given(events)
 def test_a_parquet_table_holds_every_event(tmp_path: Path, told: list[Event]) -> None:
     parquet = pytest.importorskip("pyarrow.parquet")

@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 from p2os.protocol.packets import EncoderPacket
+from robot_bench.events.codec import Json
 from robot_bench.events.kinds import Contact, Note, Packet, WorldChange
 from robot_bench.recording.run_record import RunRecord
 from robot_bench.report.page import page_data, render_page
@@ -21,9 +22,7 @@ MOST_BYTES = 2_000_000
 
 def long_run(seconds: int) -> RunRecord:
     """All that can grow with time, faster than in any shipped scenario, with one thing that stands out in each."""
-    poses = [
-        replace(pose(t=n * 50 * MS, x=n % 4000 * 1000, y=n % 3000 * 1000), left=187_500) for n in range(seconds * 20)
-    ]
+    poses = [pose(t=n * 50 * MS, x=n % 4000 * 1000, y=n % 3000 * 1000, left=187_500) for n in range(seconds * 20)]
     poses[len(poses) // 2] = replace(poses[len(poses) // 2], left=999_000)
     sonar = [(n * 100 * MS, [1500 + n % 700] * 16) for n in range(seconds * 10)]
     sonar[len(sonar) // 3] = (sonar[len(sonar) // 3][0], [1500] * 15 + [123])
@@ -55,16 +54,21 @@ def hour() -> RunRecord:
     return long_run(3600)
 
 
-def test_the_page_of_an_hour_is_bounded_and_says_what_it_leaves_out(hour: RunRecord) -> None:
-    page = render_page(hour, page_data(hour))
+@pytest.fixture(scope="module")
+def data_of_hour(hour: RunRecord) -> Json:
+    return page_data(hour)
+
+
+def test_the_page_of_an_hour_is_bounded_and_says_what_it_leaves_out(hour: RunRecord, data_of_hour: Json) -> None:
+    page = render_page(hour, data_of_hour)
     assert len(page) < MOST_BYTES
     for what in ("poses", "sonar", "pins", "packets", "lines of text", "log"):
         assert f"{what}: " in page[: page.index("<script")], what
     assert "trace.jsonl holds all" in page
 
 
-def test_what_stands_out_is_kept(hour: RunRecord) -> None:
-    data = json.loads(json.dumps(page_data(hour)))
+def test_what_stands_out_is_kept(hour: RunRecord, data_of_hour: Json) -> None:
+    data = json.loads(json.dumps(data_of_hour))
     assert max(row[4] for row in data["poses"]) == 0.999
     assert min(min(row[1:]) for row in data["sonar"]) == 123
     assert any(event[2] == "collision" for event in data["events"])

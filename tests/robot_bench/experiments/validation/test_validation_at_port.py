@@ -54,8 +54,8 @@ def test_a_robot_drives_through_a_gate_and_stops_and_its_pins_say_what_its_packe
 
 @pytest.mark.slow
 def test_a_drive_without_a_stall_holds_and_with_one_does_not(tmp_path: Path) -> None:
-    assert told(at_port(["dodge"], tmp_path / "v", world="arena", duration_s=30.0)[0]) == []
-    blocked = at_port(["dodge"], tmp_path / "w", world="arena", faults=("wheel-blocked left",), duration_s=15.0)
+    assert told(at_port(["dodge"], tmp_path / "v", world="arena", duration_s=20.0)[0]) == []
+    blocked = at_port(["dodge"], tmp_path / "w", world="arena", faults=("wheel-blocked left",), duration_s=8.0)
     assert "packets with a stall" in failing(blocked)
 
 
@@ -76,7 +76,7 @@ def wider(of: Encoders) -> tuple[int, int]:
 
 def short_failing(folder: Path) -> set[str]:
     """Return what fails of a run that is too short to reach every code."""
-    return failing(at_port(["encoders"], folder, world=PLAIN, duration_s=20.0))
+    return failing(at_port(["encoders"], folder, world=PLAIN, duration_s=8.0))
 
 
 @pytest.fixture(scope="module")
@@ -100,12 +100,12 @@ def test_a_pin_that_comes_a_packet_late_is_told(gate: Path, tmp_path: Path, monk
         late[number] = range_um
 
     monkeypatch.setattr(Distances, "take", take_late)
-    found = at_port(["sensors"], tmp_path / "v", world=gate, duration_s=20.0)
+    found = at_port(["sensors"], tmp_path / "v", world=gate, duration_s=15.0)
     assert "readings in packets that stand on their pins" in failing(found)
 
 
 def test_a_sonar_that_never_sees_is_told(gate: Path, tmp_path: Path) -> None:
-    (found,) = at_port(["sensors"], tmp_path / "v", world=gate, faults=("sonar-stuck 3 4.0",), duration_s=20.0)
+    (found,) = at_port(["sensors"], tmp_path / "v", world=gate, faults=("sonar-stuck 3 4.0",), duration_s=15.0)
     (failure,) = found.failures
     assert not isinstance(failure, Missing)
     assert (failure.what, failure.at) == ("sonar that saw something within the threshold and beyond", "not 3")
