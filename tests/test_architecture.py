@@ -76,7 +76,7 @@ ALLOWED = {
 IO_LAYER = (
     "p2os.__main__", "p2os.transport", "p2os.cli", "p2os.pioneer.serve.host", "p2os.pioneer.serve.background_host",
     "p2os.pioneer.serve.fleet", "p2os.pioneer.body.outside.connection",
-    "p2os.pioneer.serve.control_line", "p2os.client.robot_thread", "p2os.client.aio", "simbase.interrupts",
+    "p2os.pioneer.serve.control_line", "p2os.client.robot_thread", "p2os.client.robot_loop", "simbase.interrupts",
     "p2os.ros.zenoh_node",
     "bluepill_sim.cli", "bluepill_sim.cli.console",
     "robot_bench.cli", "robot_bench.campaign.workers",

@@ -6,7 +6,7 @@ import sys
 from importlib.resources import as_file, files
 from pathlib import Path
 
-from simbase.errors import FileError
+from simbase.files import writing
 
 NAME = "p2os.lua"
 
@@ -25,10 +25,8 @@ def install(home: Path | None = None) -> Path:
         FileError: The folder cannot be written.
     """
     target = plugin_folder(home) / NAME
-    try:
+    with writing(target):
         target.parent.mkdir(parents=True, exist_ok=True)
         with as_file(files("p2os.capture") / NAME) as source:
             shutil.copyfile(source, target)
-    except OSError as error:
-        raise FileError(f"cannot write {target}: {(error.strerror or str(error)).lower()}") from error
     return target

@@ -26,7 +26,6 @@ from p2os.protocol.commands import NEGATIVE, POSITIVE, STRING, CommandNumber
 from p2os.protocol.frames import (
     CHECKSUM_BYTES,
     HEADER,
-    MIN_COUNT,
     PREFIX_BYTES,
     BadChecksum,
     BadCount,
@@ -313,6 +312,13 @@ def summary_of(rows: int, damaged: int, capture_s: float) -> str:
     return f"{text}, {damaged} damaged" if damaged else f"{text}, none damaged"
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Piece(Chunk):
+    """A frame, or a run of bytes that is none."""
+
+    frame: Frame | None
+
+
 class FrameCutter:
     """Cuts chunks at frames as they come: one chunk a frame, or a run of bytes that is none.
 
@@ -323,41 +329,33 @@ class FrameCutter:
         self._decoders: dict[Direction | None, Decoder] = {}
         self._last: Nanos = 0
 
-    def take(self, chunk: Chunk) -> Iterator[Chunk]:
+    def take(self, chunk: Chunk) -> Iterator[Piece]:
         """Take a chunk; yield what it completes, with its time."""
         decoder = self._decoders.setdefault(chunk.direction, Decoder())
         self._last = chunk.at_ns
         decoder.receive(chunk.data, self._last)
         yield from self._cut(decoder, chunk.direction)
 
-    def finish(self) -> Iterator[Chunk]:
+    def finish(self) -> Iterator[Piece]:
         """Yield what was begun and never completed."""
         for direction, decoder in self._decoders.items():
             decoder.advance_to(self._last + _LONG_AFTER_NS)
             yield from self._cut(decoder, direction)
 
-    def _cut(self, decoder: Decoder, direction: Direction | None) -> Iterator[Chunk]:
+    def _cut(self, decoder: Decoder, direction: Direction | None) -> Iterator[Piece]:
         while (item := decoder.next_item()) is not None:
-            if isinstance(item, (Frame, Noise)):
-                data = item.data if isinstance(item, Noise) else item.to_bytes()
-                yield Chunk(at_ns=self._last, direction=direction, data=data)
+            if isinstance(item, Frame):
+                yield Piece(at_ns=self._last, direction=direction, data=item.to_bytes(), frame=item)
+            elif isinstance(item, Noise):
+                yield Piece(at_ns=self._last, direction=direction, data=item.data, frame=None)
 
 
-def frame_chunks(chunks: Iterable[Chunk]) -> Iterator[Chunk]:
+def frame_chunks(chunks: Iterable[Chunk]) -> Iterator[Piece]:
     """Yield the same bytes cut at frames."""
     cutter = FrameCutter()
     for chunk in chunks:
         yield from cutter.take(chunk)
     yield from cutter.finish()
-
-
-def frame_of(piece: Chunk) -> Frame | None:
-    """Return the frame that a piece cut by `FrameCutter` is, or None for noise."""
-    data = piece.data
-    if data[:2] != HEADER or len(data) < PREFIX_BYTES + MIN_COUNT or len(data) != data[2] + PREFIX_BYTES:
-        return None
-    frame = Frame(data[PREFIX_BYTES:-CHECKSUM_BYTES])
-    return frame if frame.to_bytes() == data else None
 
 
 class _State(Enum):

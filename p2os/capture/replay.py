@@ -15,7 +15,7 @@ from collections import Counter
 from dataclasses import dataclass
 
 from p2os.capture.chunks import Capture, Chunk, Direction
-from p2os.capture.listing import SYNC_NAMES, FrameCutter, frame_chunks, frame_of
+from p2os.capture.listing import SYNC_NAMES, FrameCutter, frame_chunks
 from p2os.protocol.commands import CommandNumber
 from p2os.protocol.packets import IDENTITY_KIND
 from simbase.timing import Nanos, Reached
@@ -62,9 +62,8 @@ class Replay:
     def receive(self, data: bytes, now: Nanos) -> None:
         """Take bytes of the far side."""
         for piece in self._cutter.take(Chunk(at_ns=now, direction=self._role.opposite, data=data)):
-            frame = frame_of(piece)
-            if frame is not None:
-                self._came[frame.kind] += 1
+            if piece.frame is not None:
+                self._came[piece.frame.kind] += 1
 
     @property
     def is_closed(self) -> bool:
@@ -130,7 +129,7 @@ def _steps(capture: Capture, role: Direction) -> list[_Step]:
     asked: Counter[int] = Counter()
     awaits_open = False
     for piece in frame_chunks(capture.chunks):
-        frame = frame_of(piece)
+        frame = piece.frame
         is_sync = frame is not None and frame.kind <= IDENTITY_KIND
         if piece.direction is not role:
             answers += is_sync

@@ -9,7 +9,7 @@ one: closing frames that were not needed change nothing.
 """
 
 from p2os.capture.chunks import Chunk, Direction
-from p2os.capture.listing import FrameCutter, RecordedSession, frame_of
+from p2os.capture.listing import FrameCutter, RecordedSession
 from p2os.protocol.bauds import BAUDS
 from p2os.protocol.commands import Command, CommandNumber, stop, vel
 from simbase.timing import Nanos
@@ -30,7 +30,7 @@ class Tap:
         """Take bytes that go by at `now` nanoseconds, and return them as a chunk."""
         chunk = Chunk(at_ns=now, direction=direction, data=data)
         for piece in self._cutter.take(chunk):
-            frame = frame_of(piece)
+            frame = piece.frame
             if frame is None:
                 continue
             self._session.name_of(frame.payload, direction, now)

@@ -25,7 +25,7 @@ from p2os.cli.help_pages import VerbList, dress
 from p2os.cli.printing import restored_output
 from p2os.cli.signals import end_on_signals, ignore_signals, restored_signals
 from simbase.errors import MissingDependencyError
-from simbase.installation import install_command, installed_version
+from simbase.installation import installed_version
 from simbase.user_classes import unforeseen
 
 GROUP = "p2os.verbs"
@@ -59,23 +59,6 @@ EPILOG = """Examples:
 
 With --trace anywhere, an error shows where in the program it arose.
 """
-
-#: The hint when a module of a verb needs a package that is not there: package to extra.
-_EXTRAS = {
-    "unicorn": "sim",
-    "elftools": "sim",
-    "intelhex": "sim",
-    "matplotlib": "sim",
-    "pybullet": "bullet",
-    "numpy": "bullet",
-    "mujoco": "mujoco",
-    "pyarrow": "export",
-    "mcap": "export",
-    "cyclonedds": "ros",
-    "zenoh": "ros",
-    "rosbags": "ros",
-    "foxglove": "foxglove",
-}
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -210,15 +193,13 @@ def _run(words: list[str], *, trace: bool) -> int:
 
 def _add_missing(app: typer.Typer, name: str, error: ImportError) -> None:
     lacking = error.name or str(error)
-    extra = _EXTRAS.get(lacking.split(".", maxsplit=1)[0])
-    hint = install_command(extra) if extra else "p2os doctor"
 
     @app.command(
-        name, help=f"(missing: needs {lacking}; {hint})",
+        name, help=f"(missing: needs {lacking}; p2os doctor)",
         context_settings={"allow_extra_args": True, "ignore_unknown_options": True},
     )  # fmt: skip
     def missing() -> None:
-        raise MissingDependencyError(f"`p2os {name}` needs {lacking}", hint=hint) from error
+        raise MissingDependencyError(f"`p2os {name}` needs {lacking}", hint="p2os doctor") from error
 
 
 def _print_version(wanted: bool) -> None:

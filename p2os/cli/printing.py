@@ -27,6 +27,7 @@ from typing import TextIO
 
 from p2os.transport.wall_clock import wall_clock
 from simbase.errors import FileError
+from simbase.files import reason_of
 from simbase.timing import NS_PER_S
 
 #: chosen: some ten thousand lines; minutes of a robot's packets.
@@ -218,7 +219,7 @@ class QueuedStream(io.TextIOBase):
         self._has_raised = True
         if error.errno in _GONE:
             raise BrokenPipeError(errno.EPIPE, f"nobody reads {self._name}") from error
-        raise FileError(f"cannot write to {self._name}: {(error.strerror or str(error)).lower()}") from error
+        raise FileError(f"cannot write to {self._name}: {reason_of(error)}") from error
 
 
 def queue_output() -> None:

@@ -170,7 +170,7 @@ class AuxStream(io.RawIOBase):
         super().close()
 
     def _send(self, command: Command) -> None:
-        self._thread.call(lambda core, now: core.send(command, now))
+        self._thread.run(lambda core, now: core.send(command, now))
 
     def _take(self, notice: Notice) -> None:
         with self._thread.changed:

@@ -8,24 +8,30 @@ Source: Pioneer 3 manual, client commands; Pioneer 2 gripper manual, command 33 
 """
 
 import math
-from abc import ABC, abstractmethod
+import weakref
 from collections.abc import Callable, Iterable
 from enum import IntEnum
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 from p2os.client.core import PacketType, RobotCore
 from p2os.client.goals import as_number
-from p2os.client.line import Result
-from p2os.client.notices import LinkLostError
+from p2os.client.line import Listeners, Result
+from p2os.client.notices import LinkLostError, Notice
 from p2os.client.robot_state import Limits, Link, RobotPose, RobotState
+from p2os.client.robot_thread import Opener
+from p2os.client.settings import DEADMAN_S, ClientSettings
 from p2os.protocol.commands import Command, CommandNumber, sonar
 from p2os.protocol.config_packet import ConfigPacket
 from p2os.protocol.connection import ConnectionStats
 from p2os.protocol.packets import Identity
 from p2os.protocol.profiles import Profile
-from p2os.robots.parameters import RobotParameters
+from p2os.robots.parameters import RobotParameters, load_parameters
+from p2os.transport import open_url
+from p2os.transport.ports import Transport
+from p2os.transport.url import SerialUrl, parse_url
+from p2os.transport.wall_clock import Clock, wall_clock
 from simbase.errors import UsageError
-from simbase.timing import Nanos
+from simbase.timing import NS_PER_S, Nanos
 
 #: What the argument of a request means: one packet, or one a cycle.
 ONCE, ALWAYS = 1, 2
@@ -33,12 +39,70 @@ ONCE, ALWAYS = 1, 2
 MOST_NOTES, LONGEST_NOTE_S, NOTE_UNIT_S = 20, 5.1, 0.02
 
 
-class RobotCalls(ABC):
-    """The calls that both robots share."""
+class Runner(Protocol):
+    """What drives a core on a line: a thread, or an event loop."""
 
-    @abstractmethod
-    def _run(self, call: Callable[[RobotCore, Nanos], Result]) -> Result:
+    listeners: Listeners
+
+    def __init__(
+        self, core: RobotCore, baud: int | None, open_line: Callable[[], Transport], clock: Clock = wall_clock
+    ) -> None: ...
+
+    def run(self, call: Callable[[RobotCore, Nanos], Result]) -> Result:
         """Carry a call out on the core, now."""
+
+    def finish(self) -> None:
+        """Stop the robot and give everything back."""
+
+
+class RobotCalls:
+    """The calls that both robots share. Arguments as those of `p2os.Robot`."""
+
+    _runner_type: ClassVar[type[Runner]]
+    _runner: Runner
+
+    def __init__(
+        self,
+        url: str,
+        *,
+        model: str | RobotParameters | None = None,
+        auto_enable: bool = True,
+        reconnect: bool = True,
+        deadman_s: float | None = DEADMAN_S,
+        settings: ClientSettings | None = None,
+        opener: Opener = open_url,
+        clock: Clock = wall_clock,
+    ) -> None:
+        place = parse_url(url)
+        deadman_ns = None if deadman_s is None else round(deadman_s * NS_PER_S)
+        chosen = settings or ClientSettings(auto_enable=auto_enable, reconnect=reconnect, deadman_ns=deadman_ns)
+        parameters = load_parameters(model) if isinstance(model, str) else model
+        self.url = url
+        self._clock = clock
+        self._core = RobotCore(chosen, parameters=parameters)
+        baud = place.baud if isinstance(place, SerialUrl) else None
+        self._runner = self._runner_type(self._core, baud, lambda: opener(url), clock)
+        self._finalizer = weakref.finalize(self, self._runner.finish)
+
+    # Listening ----------------------------------------------------------------------------
+
+    def on_state(self, callback: Callable[[RobotState], None]) -> Callable[[], None]:
+        """Call `callback` with each state, from the client's thread or loop; return what ends that.
+
+        An exception in it stops the robot and is raised in the program's next call.
+        """
+        return self._runner.listeners.on_state(callback)
+
+    def on_event(self, callback: Callable[[Notice], None]) -> Callable[[], None]:
+        """Call `callback` with what happens beside the states; otherwise as `on_state`."""
+        return self._runner.listeners.on_event(callback)
+
+    def _run(self, call: Callable[[RobotCore, Nanos], Result]) -> Result:
+        return self._runner.run(call)
+
+    def _angle_to(self, heading_rad: float) -> float:
+        """Return the shorter way to a heading of the pose's frame."""
+        return math.remainder(as_number(heading_rad, "turn_to", "radians") - self.pose.heading_rad, 2 * math.pi)
 
     # What is known ------------------------------------------------------------------------
 

@@ -1,7 +1,7 @@
 """The client's core joined to a byte line and a clock, who listens to it, and what a program waits for.
 
 `Line` is what both I/O layers do each time they wake; nothing is waited for here. The
-functions below it make a core for a URL and turn its outcomes into errors. A call that
+functions below it turn the core's outcomes into errors. A call that
 waits is a generator: it yields what it waits for, and is sent whether that came; the
 blocking robot and that of asyncio differ in how they wait alone.
 
@@ -42,13 +42,10 @@ from p2os.client.notices import (
 )
 from p2os.client.outbox import CloseLine, OpenLine, Send, SetBaud
 from p2os.client.robot_state import Link, RobotState
-from p2os.client.settings import ClientSettings
 from p2os.errors import TransportError
 from p2os.event_log import logger
 from p2os.protocol.commands import Command, CommandNumber, enable, stop, vel
-from p2os.robots.parameters import RobotParameters, load_parameters
 from p2os.transport.ports import Transport
-from p2os.transport.url import SerialUrl, parse_url
 from p2os.transport.wall_clock import GAP_NS, Clock, GapWatch, wall_clock
 from simbase.errors import P2osError
 from simbase.interrupts import held_back
@@ -441,29 +438,7 @@ def is_over(core: RobotCore) -> bool:
     return core.link in {Link.CLOSED, Link.FAILED}
 
 
-# Making one, and what goes wrong ---------------------------------------------------------
-
-
-def core_for(
-    url: str,
-    *,
-    model: str | RobotParameters | None,
-    auto_enable: bool,
-    reconnect: bool,
-    deadman_s: float | None,
-    settings: ClientSettings | None,
-) -> tuple[RobotCore, int | None]:
-    """Return a client's core, and the speed at which its line is opened (None: it has none).
-
-    Raises:
-        UsageError: The URL or a setting is none.
-        ParametersError: There is no such model.
-    """
-    place = parse_url(url)
-    deadman_ns = None if deadman_s is None else round(deadman_s * NS_PER_S)
-    chosen = settings or ClientSettings(auto_enable=auto_enable, reconnect=reconnect, deadman_ns=deadman_ns)
-    parameters = load_parameters(model) if isinstance(model, str) else model
-    return RobotCore(chosen, parameters=parameters), place.baud if isinstance(place, SerialUrl) else None
+# What goes wrong ---------------------------------------------------------
 
 
 def not_found(core: RobotCore) -> ConnectError:

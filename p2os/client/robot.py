@@ -9,20 +9,16 @@ The robot is stopped and the session closed when the block is left for any
 reason, and when the program ends without leaving it.
 """
 
-import math
-import weakref
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from types import TracebackType
 from typing import Self
 
 from p2os.client.aux_ports import AuxStream
 from p2os.client.calls import RobotCalls
-from p2os.client.core import PacketType, RobotCore
-from p2os.client.goals import Axis, DriveAxis, MotionResult, TurnAxis, as_number
+from p2os.client.core import PacketType
+from p2os.client.goals import Axis, DriveAxis, MotionResult, TurnAxis
 from p2os.client.line import (
-    Result,
     connecting,
-    core_for,
     fetching,
     newer_state,
     next_notice,
@@ -33,13 +29,9 @@ from p2os.client.line import (
 )
 from p2os.client.notices import Notice
 from p2os.client.robot_state import RobotState
-from p2os.client.robot_thread import Opener, RobotThread
-from p2os.client.settings import DEADMAN_S, ClientSettings
-from p2os.robots.parameters import RobotParameters
-from p2os.transport import open_url
-from p2os.transport.wall_clock import Clock, wall_clock
+from p2os.client.robot_thread import RobotThread
 from simbase.interrupts import exit_on_signals
-from simbase.timing import NS_PER_S, Nanos
+from simbase.timing import NS_PER_S
 
 
 class Robot(RobotCalls):
@@ -56,29 +48,12 @@ class Robot(RobotCalls):
         clock: Nanoseconds that never go back, and go on while the machine sleeps.
 
     Raises:
-        UsageError: The URL is none.
+        UsageError: The URL or a setting is none.
         ParametersError: There is no such model.
     """
 
-    def __init__(
-        self,
-        url: str,
-        *,
-        model: str | RobotParameters | None = None,
-        auto_enable: bool = True,
-        reconnect: bool = True,
-        deadman_s: float | None = DEADMAN_S,
-        settings: ClientSettings | None = None,
-        opener: Opener = open_url,
-        clock: Clock = wall_clock,
-    ) -> None:
-        core, baud = core_for(
-            url, model=model, auto_enable=auto_enable, reconnect=reconnect, deadman_s=deadman_s, settings=settings
-        )
-        self.url = url
-        self._clock = clock
-        self._thread = RobotThread(core, baud, lambda: opener(url), clock)
-        self._finalizer = weakref.finalize(self, self._thread.shut_down)
+    _runner_type = RobotThread
+    _runner: RobotThread
 
     # Coming and going ---------------------------------------------------------------------
 
@@ -88,13 +63,13 @@ class Robot(RobotCalls):
         Raises:
             ConnectError: the line cannot be opened, or no robot answers; the message says how far it came.
         """
-        thread = self._thread
+        thread = self._runner
         exit_on_signals()
         thread.start()
         try:
             with thread.changed:
-                thread.call(lambda core, now: core.connect(now))
-                thread.do(connecting(thread.core))
+                thread.run(lambda core, now: core.connect(now))
+                thread.do(connecting(self._core))
         except BaseException:
             self.close()
             raise
@@ -102,14 +77,14 @@ class Robot(RobotCalls):
 
     def close(self) -> None:
         """Stop the robot, end the session, give the line back; a second call changes nothing."""
-        self._thread.shut_down()
+        self._runner.finish()
 
     def __enter__(self) -> Self:
         return self.connect()
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None) -> None:
         self.close()
-        self._thread.raise_failure(error)
+        self._runner.raise_failure(error)
 
     # Waiting ------------------------------------------------------------------------------
 
@@ -119,7 +94,7 @@ class Robot(RobotCalls):
         Raises:
             P2osError: the client's thread failed meanwhile.
         """
-        self._thread.do(sleeping(duration_s))
+        self._runner.do(sleeping(duration_s))
 
     def next_state(self, timeout_s: float = 2.0) -> RobotState:
         """Wait for the next packet and return its state.
@@ -127,7 +102,7 @@ class Robot(RobotCalls):
         Raises:
             LinkLostError: none came in time.
         """
-        return self._thread.do(next_state(self._thread.core, timeout_s))
+        return self._runner.do(next_state(self._core, timeout_s))
 
     def fetch(self, kind: type[PacketType], timeout_s: float = 1.0) -> PacketType:
         """Ask the robot for a packet of a type, and return it.
@@ -141,7 +116,7 @@ class Robot(RobotCalls):
             LinkLostError: No session is open.
             UsageError: Nothing asks for such a packet.
         """
-        return self._thread.do(fetching(self._thread.core, kind, timeout_s, self.send))
+        return self._runner.do(fetching(self._core, kind, timeout_s, self.send))
 
     def wait_open(self, timeout_s: float | None = None) -> None:
         """Wait until the session is open again after a loss.
@@ -149,7 +124,7 @@ class Robot(RobotCalls):
         Raises:
             LinkLostError: it is not, in time or for good.
         """
-        self._thread.do(opening(self._thread.core, timeout_s))
+        self._runner.do(opening(self._core, timeout_s))
 
     def states(self, lasts_s: float | None = None) -> Iterator[RobotState]:
         """Yield each new state as it comes, the newest where the program is slow.
@@ -160,27 +135,16 @@ class Robot(RobotCalls):
         ends = None if lasts_s is None else self._clock() + round(lasts_s * NS_PER_S)
         while ends is None or self._clock() < ends:
             left_s = None if ends is None else (ends - self._clock()) / NS_PER_S
-            last = self._thread.do(newer_state(self._thread.core, last, left_s))
+            last = self._runner.do(newer_state(self._core, last, left_s))
             if last is None:
                 return
             yield last
 
     def events(self) -> Iterator[Notice]:
         """Yield what happens beside the states, from now on, in order; ends when the client does."""
-        with self._thread.listeners.queue() as queue:
-            while (notice := self._thread.do(next_notice(queue))) is not None:
+        with self._runner.listeners.queue() as queue:
+            while (notice := self._runner.do(next_notice(queue))) is not None:
                 yield notice
-
-    def on_state(self, callback: Callable[[RobotState], None]) -> Callable[[], None]:
-        """Call `callback` with each state, from the client's thread; return what ends that.
-
-        An exception in it stops the robot and is raised in the program's next call.
-        """
-        return self._thread.listeners.on_state(callback)
-
-    def on_event(self, callback: Callable[[Notice], None]) -> Callable[[], None]:
-        """Call `callback` with what happens beside the states; otherwise as `on_state`."""
-        return self._thread.listeners.on_event(callback)
 
     # Motion that waits --------------------------------------------------------------------
 
@@ -220,18 +184,11 @@ class Robot(RobotCalls):
         self, heading_rad: float, *, speed_radps: float | None = None, timeout_s: float | None = None
     ) -> MotionResult:
         """Turn the shorter way to a heading of the pose's frame; otherwise as `turn`."""
-        return self.turn(
-            math.remainder(as_number(heading_rad, "turn_to", "radians") - self.pose.heading_rad, 2 * math.pi),
-            speed_radps=speed_radps,
-            timeout_s=timeout_s,
-        )
+        return self.turn(self._angle_to(heading_rad), speed_radps=speed_radps, timeout_s=timeout_s)
 
     def aux(self, port: int = 1) -> AuxStream:
         """Return one of the robot's own serial ports, as a file of bytes."""
-        return AuxStream(self._thread, port)
+        return AuxStream(self._runner, port)
 
     def _reach(self, axis: Axis, speed: float | None, timeout_s: float | None) -> MotionResult:
-        return self._thread.do(reaching(self._thread.core, axis, speed, timeout_s, self._run))
-
-    def _run(self, call: Callable[[RobotCore, Nanos], Result]) -> Result:
-        return self._thread.call(call)
+        return self._runner.do(reaching(self._core, axis, speed, timeout_s, self._run))

@@ -2,14 +2,13 @@
 
 One lock guards the core. Calls of the program act on the core under it and wake
 the thread; the thread notifies `changed` after each turn. The line is opened
-outside the lock, for that can take seconds. For asyncio, `RobotLoop`
-in `p2os.client.aio` stands in its place.
+outside the lock, for that can take seconds. For asyncio, `RobotLoop` stands in its place.
 
 Closing is the thread's work: signals interrupt the program's own thread only, so
 none of them can come between the frames that stop the robot. Where the thread is
-held up by a callback, the caller of `shut_down` does it in its place.
+held up by a callback, the caller of `finish` does it in its place.
 
-Invariant: `shut_down` returns after STOP has been written, whatever state the
+Invariant: `finish` returns after STOP has been written, whatever state the
 thread is in and however often it is interrupted.
 """
 
@@ -78,11 +77,11 @@ class RobotThread:
             if self._is_ending:
                 raise P2osError("this robot was closed", hint="make another Robot")
             if self._thread is None:
-                self._thread = threading.Thread(target=self._run, name="p2os-robot", daemon=True)
+                self._thread = threading.Thread(target=self._live, name="p2os-robot", daemon=True)
                 self._thread.start()
                 self._waits.add(self._thread)
 
-    def call(self, call: Callable[[RobotCore, Nanos], Result]) -> Result:
+    def run(self, call: Callable[[RobotCore, Nanos], Result]) -> Result:
         """Act on the core, now; what it wants to send leaves at once."""
         with self._lock:
             self._check()
@@ -110,7 +109,7 @@ class RobotThread:
                 result: Result = end.value
                 return result
 
-    def shut_down(self) -> None:
+    def finish(self) -> None:
         """Stop the robot, close the session and the line, end the thread; a second call changes nothing.
 
         Interrupts (Ctrl-C) meanwhile are raised when that is done. From a callback it returns at once, and the
@@ -161,7 +160,7 @@ class RobotThread:
 
     # The thread ---------------------------------------------------------------------------
 
-    def _run(self) -> None:
+    def _live(self) -> None:
         try:
             while not self._turn():
                 self._wait()

@@ -19,6 +19,7 @@ from p2os.ros.codec import Message, to_cdr
 from p2os.ros.message_table import MESSAGES
 from p2os.ros.transport import Topic
 from simbase.errors import FileError, MissingDependencyError, UsageError, shown, shown_name
+from simbase.files import writing
 from simbase.timing import Nanos
 
 if TYPE_CHECKING:
@@ -58,12 +59,11 @@ class BagFile:
         except ImportError as error:
             raise MissingDependencyError(_NO_LIBRARY, extra="ros") from error
         try:
-            self._writer = Writer(folder, version=VERSION, storage_plugin=StoragePlugin[STORAGES[storage]])
-            self._writer.open()
+            with writing(folder):
+                self._writer = Writer(folder, version=VERSION, storage_plugin=StoragePlugin[STORAGES[storage]])
+                self._writer.open()
         except WriterError as error:
             raise FileError(f"{shown_name(folder)} is there already", hint="another name") from error
-        except OSError as error:
-            raise FileError(f"cannot write {shown_name(folder)}: {error.strerror or error}") from error
         self._topics: dict[Topic, Connection] = {}
         self.count = 0
 

@@ -12,6 +12,7 @@ import sys
 from p2os.errors import TransportError
 from p2os.transport.ports import READ_BYTES, HungUpError, Transport
 from p2os.transport.url import TcpUrl
+from simbase.files import reason_of
 
 #: chosen: a robot on the same network answers within milliseconds.
 CONNECT_TIMEOUT_S = 3.0
@@ -123,7 +124,7 @@ class SocketTransport:
         waits = b""
         with contextlib.suppress(OSError):  # a reason may still wait; what waits can be read yet
             waits = self._socket.recv(LONGEST_REASON + 1, socket.MSG_PEEK)
-        return HungUpError(f"{self.description} was lost: {_reason(error)}{self._reason(waits)}", hint=HUNG_UP_HINT)
+        return HungUpError(f"{self.description} was lost: {reason_of(error)}{self._reason(waits)}", hint=HUNG_UP_HINT)
 
     def _reason(self, waits: bytes = b"") -> str:
         """Return what the far side sent if that was a line of text and nothing else, as the end of a message."""
@@ -171,7 +172,7 @@ def connect_tcp(url: TcpUrl) -> Transport:
         raise TransportError(f"cannot connect to {url}: {url.host!r} is no host name", hint="tcp:HOST:8101") from error
     except OSError as error:
         raise TransportError(
-            f"cannot connect to {url}: {_reason(error)}", hint=f"is a robot served there? (p2os serve --port {url})"
+            f"cannot connect to {url}: {reason_of(error)}", hint=f"is a robot served there? (p2os serve --port {url})"
         ) from error
     return SocketTransport(connection, str(url))
 
@@ -188,9 +189,5 @@ def _listening_socket(url: TcpUrl) -> socket.socket:
     except OSError as error:
         listening.close()
         hint = _LISTEN_HINTS.get(error.errno or 0, "listen on this machine: tcp:127.0.0.1:8101")
-        raise TransportError(f"cannot listen on {url}: {_reason(error)}", hint=hint) from error
+        raise TransportError(f"cannot listen on {url}: {reason_of(error)}", hint=hint) from error
     return listening
-
-
-def _reason(error: OSError) -> str:
-    return (error.strerror or str(error)).lower()

@@ -15,6 +15,7 @@ from p2os.capture.formats.hex_text import hex_parts, is_hexdump, looks_like_hex
 from p2os.capture.formats.pcap import is_pcap, pcap_blocks
 from p2os.capture.formats.recording import note_of, recorded_parts
 from simbase.errors import FileError
+from simbase.files import reading
 
 #: The P2OS bytes in the folder that `p2os run` makes.
 RUN_WIRE = "wire.jsonl"
@@ -91,11 +92,9 @@ def open_file(path: Path, direction: Direction | None = None) -> Source:
         FileError: The file cannot be read; taking blocks raises it where the file is broken.
     """
     place = path / RUN_WIRE if path.is_dir() else path
-    try:
+    with reading(place):
         file = place.open("rb", buffering=BLOCK_BYTES)
         source = open_capture(file, direction)
-    except OSError as error:
-        raise _unreadable(place, error) from error
     return replace(source, blocks=_named(source.blocks, file, place))
 
 
@@ -130,27 +129,19 @@ def read_file(path: Path, direction: Direction | None = None) -> Capture:
         FileError: The file cannot be read, or holds no capture.
     """
     place = path / RUN_WIRE if path.is_dir() else path
-    try:
+    with reading(place):
         if place.stat().st_size > LARGEST_BYTES:
             raise FileError(f"{place} is larger than {LARGEST_BYTES // 1_000_000_000} GB")
-    except OSError as error:
-        raise _unreadable(place, error) from error
     return open_file(path, direction).whole()
 
 
 def _named(blocks: Iterator[Block], file: BinaryIO, place: Path) -> Iterator[Block]:
     """Yield blocks; what is wrong names the file, which is closed at the end."""
-    with file:
+    with file, reading(place):
         try:
             yield from blocks
         except FileError as error:
             raise FileError(f"{place}: {error}", hint=error.hint) from error
-        except OSError as error:
-            raise _unreadable(place, error) from error
-
-
-def _unreadable(place: Path, error: OSError) -> FileError:
-    return FileError(f"cannot read {place}: {(error.strerror or str(error)).lower()}")
 
 
 def _raw(file: io.BufferedReader) -> Iterator[Part]:

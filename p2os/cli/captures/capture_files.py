@@ -15,7 +15,7 @@ from p2os.capture.formats.pcap import file_header, record
 from p2os.capture.formats.recording import chunk_line, header_line
 from p2os.capture.listing import FrameCutter
 from p2os.errors import RunFailedError
-from simbase.errors import FileError
+from simbase.files import reason_of, writing
 from simbase.timing import Nanos
 
 
@@ -126,10 +126,8 @@ class _GrowingFile:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        try:
+        with writing(path):
             self._file = path.open("wb", buffering=0)
-        except OSError as error:
-            raise FileError(_refusal(path, error)) from error
         self._size = 0
 
     def add(self, piece: bytes) -> None:
@@ -158,4 +156,4 @@ class _GrowingFile:
 
 
 def _refusal(path: Path, error: OSError) -> str:
-    return f"cannot write {path}: {(error.strerror or str(error)).lower()}"
+    return f"cannot write {path}: {reason_of(error)}"

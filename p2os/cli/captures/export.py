@@ -18,6 +18,7 @@ from p2os.cli.captures.reading import ProfileForLayouts, RobotForUnits, chosen_r
 from p2os.cli.help_pages import CAPTURES
 from p2os.cli.kept_files import FORCE_HELP, refuse_to_overwrite
 from simbase.errors import FileError, UsageError
+from simbase.files import writing
 
 HELP = """Write a capture as CSV, Parquet, Arrow or MCAP.
 
@@ -61,13 +62,11 @@ def export(
     refuse_to_overwrite(target, force=force)
     capture = open_file(source)
     reading, blocks = reading_of(capture.blocks, robot=robot, profile=profile)
-    try:
+    with writing(target):
         if ending == ".mcap":
             count = write_mcap(_chosen(blocks, reading, only or "all"), target)
         else:
             count = _TABLES[ending](_tables(capture, blocks, reading, only), target)
-    except OSError as error:
-        raise FileError(f"cannot write {target}: {(error.strerror or str(error)).lower()}") from error
     if not count:
         raise FileError(f"{source} holds no {only or 'SIP'}", hint="p2os decode shows what it holds; --only all")
     sys.stdout.flush()

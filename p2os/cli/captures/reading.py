@@ -15,7 +15,6 @@ from p2os.capture import Direction, ListingRow, Reading, rows_of
 from p2os.capture.chunks import Block, chunks_of
 from p2os.capture.listing import FrameCutter
 from p2os.cli.names import robots
-from p2os.protocol.frames import Frame
 from p2os.protocol.packets import IDENTITY_KIND, Identity
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import HEAD_BYTES, READING_BYTES, SIP_KINDS
@@ -108,11 +107,11 @@ def _look(blocks: Iterator[Block], seen: list[Block]) -> tuple[str, Profile]:
     for chunk in chunks_of(_noted(blocks, seen)):
         size += len(chunk.data)
         for piece in cutter.take(replace(chunk, data=chunk.data[:LOOKED_AT_BYTES])):
-            if piece.direction is Direction.TO_ROBOT or len(piece.data) < 6 or piece.data[:2] != b"\xfa\xfb":
+            if piece.direction is Direction.TO_ROBOT or piece.frame is None:
                 continue
-            kind, data = piece.data[3], piece.data[4:-2]
+            kind, data = piece.frame.kind, piece.frame.data
             if kind == IDENTITY_KIND and data:
-                subclass = Identity.from_frame(Frame(piece.data[3:-2])).subclass.lower()
+                subclass = Identity.from_frame(piece.frame).subclass.lower()
             elif kind in SIP_KINDS and len(data) >= HEAD_BYTES - 1:
                 if len(data) > HEAD_BYTES - 1 + READING_BYTES * data[18]:
                     profile = Profile.ARCOS

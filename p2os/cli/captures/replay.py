@@ -9,7 +9,6 @@ from typing import Annotated
 import typer
 
 from p2os.capture import Capture, Direction, frame_chunks, read_file
-from p2os.capture.listing import frame_of
 from p2os.capture.replay import Replay
 from p2os.capture.tap import Tap
 from p2os.cli.held_robot import hold_robot
@@ -118,8 +117,8 @@ def play(
 
 def motions_of(capture: Capture) -> int:
     """Return how many commands of a capture move a robot."""
-    frames = (frame_of(piece) for piece in frame_chunks(capture.chunks) if piece.direction is Direction.TO_ROBOT)
-    return sum(frame is not None and frame.kind in MOTION for frame in frames)
+    pieces = (piece for piece in frame_chunks(capture.chunks) if piece.direction is Direction.TO_ROBOT)
+    return sum(piece.frame is not None and piece.frame.kind in MOTION for piece in pieces)
 
 
 def register(app: typer.Typer) -> None:

@@ -8,7 +8,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from p2os.pioneer.world.model import Kind, Obstacle, World
+from p2os.pioneer.world.model import Kind, Obstacle, World, normal_of
 from p2os.pioneer.world.plan import Bands
 from p2os.robots.parameters import RobotParameters
 
@@ -104,9 +104,7 @@ def middle_and_slope(item: Obstacle) -> tuple[Vector, float]:
 
 def is_level(corners: tuple[Vector, Vector, Vector]) -> bool:
     """Tell whether a face is level enough to be driven on."""
-    (ax, ay, az), (bx, by, bz), (cx, cy, cz) = corners
-    ux, uy, uz, vx, vy, vz = bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az
-    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    nx, ny, nz = normal_of(*corners)
     return abs(nz) > math.cos(LEVEL_RAD) * math.sqrt(nx * nx + ny * ny + nz * nz)
 
 

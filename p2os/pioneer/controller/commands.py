@@ -216,10 +216,6 @@ def _sound(context: Context, value: int) -> None:
     context.notes.append(("plays sound", str(value)))
 
 
-def _buzzer(context: Context, value: int) -> None:
-    context.devices.switches.buzzer = value != 0
-
-
 def _bump_stall(context: Context, value: int) -> None:
     context.devices.switches.bump_stall = value & 3
 
@@ -512,7 +508,7 @@ HANDLERS: Mapping[int, Handler] = {
     _C.ARM_STATUS: _request(Extra.ARM),
     _C.SOUND: _number(_sound),
     _C.PLAYLIST: _once(Extra.PLAYLIST),
-    _C.SOUNDTOG: _number(_buzzer),
+    _C.SOUNDTOG: _number(lambda _context, _value: None),
     _C.BATTEST: _number(_battest),
     _C.RESET: _plain(lambda context: _restart(context, "RESET")),
     _C.MAINTENANCE: _plain(lambda context: _restart(context, "MAINTENANCE")),

@@ -14,6 +14,7 @@ own, so that a run with faults repeats. What injecting one does to the robot is 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from p2os.pioneer.controller.order_words import Range, read_words
 from p2os.pioneer.random_source import RandomSource
 from simbase.errors import UsageError, nearest
 
@@ -36,11 +37,11 @@ FAULTS: Mapping[str, tuple[tuple[str, ...], str]] = {
     "stop-button": ((), "the red button is pressed: motors off until it is cleared and ENABLE comes"),
     "bumper": (("SIDE", "SEGMENT"), "a segment of the front or rear bumper, counted from 1, is pressed"),
 }
-SIDES = {"wheel-blocked": ("left", "right"), "bumper": ("front", "rear")}
+SIDES = {"wheel-blocked": ["left", "right"], "bumper": ["front", "rear"]}
 #: Happen once: there is nothing to clear.
 MOMENTARY = frozenset({"brown-out", "reboot"})
-#: Word of a fault → the most that it may be; none is below 0.
-MOST: Mapping[str, float] = {"METRES": 100.0, "RATE": 0.5, "VOLTS": 25.5}
+#: Values of faults; to clear one, they may be left out.
+VALUES: Mapping[str, Range] = {"METRES": (0.0, 100.0), "RATE": (0.0, 0.5), "VOLTS": (0.0, 25.5)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,38 +75,12 @@ def read_fault(text: str, *, sonar: int, complete: bool = True) -> Fault:
     if name not in FAULTS:
         hint = nearest(name, FAULTS, f"faults: {', '.join(FAULTS)}")
         raise UsageError(f"no fault {name!r}" if name else "which fault?", hint=hint)
-    words = FAULTS[name][0]
-    usage = " ".join([name, *words])
-    optional = {"METRES", "RATE", "VOLTS"} if not complete else set()
-    if len(rest) > len(words) or len(rest) < len([word for word in words if word not in optional]):
-        what = "has too many words" if len(rest) > len(words) else "is incomplete"
-        raise UsageError(f"{text!r} {what}", hint=f"usage: {usage}")
-    found = Fault(name)
-    for word, given in zip(words, rest, strict=False):
-        found = _with(found, word, given, usage, sonar)
-    return found
-
-
-def _with(fault: Fault, word: str, given: str, usage: str, sonar: int) -> Fault:
-    side, number, value = fault.side, fault.number, fault.value
-    if word == "SIDE":
-        if given not in SIDES[fault.name]:
-            raise UsageError(f"{given!r} is none of {', '.join(SIDES[fault.name])}", hint=f"usage: {usage}")
-        side = given
-    elif word in {"NUMBER", "SEGMENT"}:
-        most = sonar if word == "NUMBER" else 7
-        number = int(given) if given.isdecimal() else 0
-        if not 1 <= number <= most:
-            raise UsageError(f"{fault.name}: {given!r} is no number of 1 to {most}", hint=f"usage: {usage}")
-    else:
-        most_value = MOST[word]
-        try:
-            value = float(given)
-        except ValueError:
-            value = -1.0
-        if not 0 <= value <= most_value:
-            raise UsageError(f"{fault.name}: {given!r} is no number of 0 to {most_value:g}", hint=f"usage: {usage}")
-    return Fault(fault.name, side, number, value)
+    words = [f"[{word}]" if word in VALUES and not complete else word for word in FAULTS[name][0]]
+    ranges: dict[str, Range] = {**VALUES, "SIDE": SIDES.get(name), "NUMBER": (1, sonar), "SEGMENT": (1, 7)}
+    values = read_words(text, name, rest, words, ranges)
+    number = values.get("NUMBER", values.get("SEGMENT", 0))
+    value = next((values[word] for word in VALUES if word in values), 0.0)
+    return Fault(name, str(values.get("SIDE", "")), int(number), float(value))
 
 
 @dataclass(slots=True)

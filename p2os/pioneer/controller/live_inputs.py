@@ -12,6 +12,7 @@ Faults are injected and cleared by lines of their own (`faults`).
 from collections.abc import Callable, Mapping
 
 from p2os.pioneer.controller.context import Context
+from p2os.pioneer.controller.order_words import Range, read_words
 from simbase.errors import UsageError
 
 #: First word → (the others, what it means).
@@ -22,9 +23,11 @@ INPUTS: Mapping[str, tuple[tuple[str, ...], str]] = {
     "thing": (("ON_OFF",), "something between the gripper's paddles"),
     "charger": (("ON_OFF",), "the charger is plugged in"),
 }
-#: Word → least and most.
-LIMITS = {"X": (0, 1023), "Y": (0, 1023), "BUTTON": (0, 1), "PORT": (1, 9), "RAW": (0, 1023), "BYTE": (0, 255)}
 ON_OFF = {"on": 1, "off": 0}
+RANGES: Mapping[str, Range] = {
+    "X": (0, 1023), "Y": (0, 1023), "BUTTON": (0, 1), "PORT": (1, 9), "RAW": (0, 1023), "BYTE": (0, 255),
+    "ON_OFF": ON_OFF,
+}  # fmt: skip
 
 
 def apply_input(context: Context, text: str) -> None:
@@ -36,22 +39,8 @@ def apply_input(context: Context, text: str) -> None:
     name, *rest = text.split() or [""]
     if name not in INPUTS:
         raise UsageError(f"no input {name!r}", hint=f"inputs: {', '.join(INPUTS)}")
-    words = INPUTS[name][0]
-    usage = f"usage: {' '.join([name, *words])}"
-    if len(rest) != len(words):
-        raise UsageError(f"{text!r} is no input", hint=usage)
-    _ACTS[name](context, [_number(word, given, usage) for word, given in zip(words, rest, strict=True)])
-
-
-def _number(word: str, given: str, usage: str) -> int:
-    if word == "ON_OFF":
-        if given not in ON_OFF:
-            raise UsageError(f"{given!r} is neither on nor off", hint=usage)
-        return ON_OFF[given]
-    least, most = LIMITS[word]
-    if not given.isdecimal() or not least <= int(given) <= most:
-        raise UsageError(f"{given!r} is no number of {least} to {most}", hint=usage)
-    return int(given)
+    values = read_words(text, name, rest, INPUTS[name][0], RANGES).values()
+    _ACTS[name](context, [ON_OFF[value] if isinstance(value, str) else int(value) for value in values])
 
 
 def _joystick(context: Context, values: list[int]) -> None:

@@ -28,20 +28,14 @@ class AuxPort:
     #: How many bytes GETAUX wants, 0 none.
     wanted: int = 0
     baud: int = DEFAULT_BAUD
-    #: Bytes that found the buffer full.
-    lost: int = 0
 
     def receive(self, data: bytes) -> None:
         """Take bytes of the device."""
-        waiting = self.waiting + data
-        self.lost += max(len(waiting) - BUFFER_BYTES, 0)
-        self.waiting = waiting[-BUFFER_BYTES:]
+        self.waiting = (self.waiting + data)[-BUFFER_BYTES:]
 
     def send(self, data: bytes) -> None:
         """Send bytes of a client to the device."""
-        outgoing = self.outgoing + data
-        self.lost += max(len(outgoing) - BUFFER_BYTES, 0)
-        self.outgoing = outgoing[-BUFFER_BYTES:]
+        self.outgoing = (self.outgoing + data)[-BUFFER_BYTES:]
 
     def request(self, count: int) -> None:
         """Answer once `count` bytes have come (GETAUX); 0 forgets what waits."""

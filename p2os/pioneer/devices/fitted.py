@@ -22,7 +22,6 @@ class Switches:
     e_stall: bool = False
     #: The red button is pressed.
     stop_button: bool = False
-    buzzer: bool = True
     #: The low battery has been reported, once a session.
     battery_reported: bool = False
 

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from p2os.pioneer.export.scene import Body, Motion, Place, Scene, Vector
 from p2os.pioneer.export.triangles import triangulated
 from p2os.pioneer.world.formats.meshes.gltf import GLB_HEADER, GLB_MAGIC
+from p2os.pioneer.world.model import normal_of
 
 #: glTF 2.0, sections 3.6.2.2 and 3.6.2: floats, and a buffer of vertices.
 FLOAT, ARRAY_BUFFER = 5126, 34962
@@ -128,8 +129,7 @@ def _placed(place: Place) -> _Object:
 
 
 def _normal(a: Vector, b: Vector, c: Vector) -> Vector:
-    (ux, uy, uz), (vx, vy, vz) = ((q[0] - a[0], q[1] - a[1], q[2] - a[2]) for q in (b, c))
-    x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    x, y, z = normal_of(a, b, c)
     length = math.hypot(x, y, z)
     return (x / length, y / length, z / length) if length > 0 else (0.0, 0.0, 1.0)
 

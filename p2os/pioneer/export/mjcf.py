@@ -10,9 +10,10 @@ Source: https://mujoco.readthedocs.io/en/stable/XMLreference.html
 import math
 
 from p2os.pioneer.body.physical import GRAVITY_MPS2
-from p2os.pioneer.export.scene import Body, Box, Cylinder, Motion, Place, Scene, Sphere, TriangleMesh, Vector
+from p2os.pioneer.export.scene import Body, Box, Cylinder, Motion, Place, Scene, Sphere, TriangleMesh
 from p2os.pioneer.export.xml_text import Tag, spaced
 from p2os.pioneer.world.formats.annotation import ROBOT
+from p2os.pioneer.world.model import normal_of
 
 #: chosen: a wheel's motor holds its speed with the torque that it has, N m s/rad.
 MOTOR_GAIN = 10.0
@@ -96,19 +97,11 @@ def _shape(body: Body, asset: Tag) -> dict[str, str]:
 def _is_flat(mesh: TriangleMesh) -> bool:
     """Tell whether all corners are near one plane: of those MuJoCo makes no hull, and refuses the file."""
     origin = mesh.vertices[0]
-    rays = [(corner[0] - origin[0], corner[1] - origin[1], corner[2] - origin[2]) for corner in mesh.vertices]
-    longest = max(rays, key=_length)
-    normal = max((_cross(longest, ray) for ray in rays), key=_length)
-    off = max(abs(sum(a * b for a, b in zip(ray, normal, strict=True))) for ray in rays)
-    return off <= FLAT * _length(longest) * _length(normal)
-
-
-def _cross(a: Vector, b: Vector) -> Vector:
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-def _length(a: Vector) -> float:
-    return math.hypot(*a)
+    farthest = max(mesh.vertices, key=lambda corner: math.dist(origin, corner))
+    normals = (normal_of(origin, farthest, corner) for corner in mesh.vertices)
+    x, y, z = normal = max(normals, key=lambda upright: math.hypot(*upright))
+    off = max(abs((a - origin[0]) * x + (b - origin[1]) * y + (c - origin[2]) * z) for a, b, c in mesh.vertices)
+    return off <= FLAT * math.dist(origin, farthest) * math.hypot(*normal)
 
 
 def _across(scene: Scene) -> float:

@@ -16,6 +16,7 @@ from dataclasses import replace
 
 from p2os.errors import WorldError
 from p2os.pioneer.body.contract import Changeable
+from p2os.pioneer.controller.order_words import Range, read_words
 from p2os.pioneer.world.model import Obstacle
 from simbase.errors import UsageError
 
@@ -32,7 +33,11 @@ HEIGHT_M = 1.0
 FARTHEST_M = 1000.0
 #: chosen: of one shape; more slow every step.
 MOST_THINGS = 100
-SIZES = frozenset({"LENGTH", "WIDTH", "RADIUS"})
+RANGES: Mapping[str, Range] = {
+    "NAME": None,
+    **dict.fromkeys(("X", "Y", "HEADING"), (-FARTHEST_M, FARTHEST_M)),
+    **dict.fromkeys(("LENGTH", "WIDTH", "RADIUS"), (0.001, FARTHEST_M)),
+}
 
 
 def is_world_order(text: str) -> bool:
@@ -91,24 +96,4 @@ def _read(text: str) -> tuple[str, dict[str, str | float]]:
     order = next((name for name in WORLD_ORDERS if words_given[: len(name.split())] == name.split()), None)
     if order is None:
         raise UsageError(f"{text!r} is no order", hint="orders: place box …, place post …")
-    words = WORLD_ORDERS[order][0]
-    usage, given = f"usage: {' '.join([order, *words])}", words_given[len(order.split()) :]
-    least = len([word for word in words if not word.startswith("[")])
-    if not least <= len(given) <= len(words):
-        raise UsageError(
-            f"{text!r} is incomplete" if len(given) < least else f"{text!r} has too many words", hint=usage
-        )
-    return order, {word.strip("[]"): _value(word, value, usage) for word, value in zip(words, given, strict=False)}
-
-
-def _value(word: str, given: str, usage: str) -> str | float:
-    if word == "NAME":
-        return given
-    try:
-        value = float(given)
-    except ValueError:
-        value = math.nan
-    least = 0.001 if word in SIZES else -FARTHEST_M
-    if not least <= value <= FARTHEST_M:
-        raise UsageError(f"{given!r} is no number of {least:g} to {FARTHEST_M:g}", hint=usage)
-    return value
+    return order, read_words(text, order, words_given[len(order.split()) :], WORLD_ORDERS[order][0], RANGES)

@@ -366,10 +366,15 @@ class Mark:
         _refuse_outside("a mark", "points_m", *(value for point in self.points_m for value in point))
 
 
+def normal_of(a: Vertex, b: Vertex, c: Vertex) -> Vertex:
+    """Return what stands upright on a triangle, as long as twice its area."""
+    (ux, uy, uz), (vx, vy, vz) = ((end[0] - a[0], end[1] - a[1], end[2] - a[2]) for end in (b, c))
+    return uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+
+
 def has_area(a: Vertex, b: Vertex, c: Vertex) -> bool:
     """Tell whether a triangle is more than a point or a line."""
-    (ux, uy, uz), (vx, vy, vz) = (tuple(q - p for p, q in zip(a, end, strict=True)) for end in (b, c))
-    area = math.hypot(uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx) / 2
+    area = math.hypot(*normal_of(a, b, c)) / 2
     longest = max(math.dist(a, b), math.dist(b, c), math.dist(c, a))
     return area > LEAST_M * longest and longest > LEAST_M
 

@@ -71,7 +71,7 @@ def refuse_start(
         FileError: One of `error`.
     """
     where, name = f"{at}: x {start.x_m:g}, y {start.y_m:g}", shown(world.name)
-    if not _is_on_floor(world, start):
+    if not world.contains(start.x_m, start.y_m):
         raise error(f"{where} is not in world {name}", hint=_extent_of(world))
     thing = thing_at(world, model, start)
     if thing is not None:
@@ -92,11 +92,6 @@ def thing_at(world: World, model: RobotParameters, pose: Pose) -> str | None:
     return plan.touched(pose.x_m, pose.y_m, pose.heading_rad)[0] or "a low thing"
 
 
-def _is_on_floor(world: World, pose: Pose) -> bool:
-    """Tell whether a place is within a world's extent."""
-    return world.contains(pose.x_m, pose.y_m)
-
-
 def _extent_of(world: World) -> str:
     """Return a world's extent in words, for a hint."""
     x0, y0, x1, y1 = world.extent
@@ -108,7 +103,7 @@ def _checked(
 ) -> Pose:
     """Return a given place, with its floor's height."""
     where = f"robot {number + 1} at {pose.x_m:g}, {pose.y_m:g}"
-    if not _is_on_floor(world, pose):
+    if not world.contains(pose.x_m, pose.y_m):
         raise UsageError(f"{where} is not in {world.name!r}", hint=_extent_of(world))
     if plan.clearance(pose.x_m, pose.y_m, pose.heading_rad) == 0.0:
         name = plan.touched(pose.x_m, pose.y_m, pose.heading_rad)[0]

@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from p2os.capture import Chunk, Direction, capture_of, frame_chunks, read_file
-from p2os.capture.listing import frame_of
+from p2os.capture import Direction, capture_of, frame_chunks, read_file
 from p2os.capture.replay import Replay
 from p2os.capture.tap import Tap
 from p2os.protocol.commands import Command, CommandNumber
@@ -110,9 +109,3 @@ def test_a_tap_sees_a_change_of_speed(code: int, baud: int | None) -> None:
     tap = Tap()
     tap.observe(TO, command(CommandNumber.HOSTBAUD, code), 0)
     assert tap.new_baud == baud
-
-
-def test_what_is_no_whole_frame_is_none() -> None:
-    good = command(11, 5)
-    for data in (good[:-1], b"\0" + good, good[:-1] + b"\x00", b"\xfa\xfb\x03"):
-        assert frame_of(Chunk(at_ns=0, direction=TO, data=data)) is None

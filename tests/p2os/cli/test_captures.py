@@ -455,7 +455,10 @@ def test_bad_input_is_one_line_and_a_hint(
 
 def test_a_capture_file_that_cannot_be_written_is_named(served: object, run: Run, capsys: Capture) -> None:
     assert run("record", served.url, "--out", "/nowhere/floor.jsonl", "--for", "1s") == 2
-    assert capsys.readouterr().err == "p2os: cannot write /nowhere/floor.jsonl: no such file or directory\n"
+    assert capsys.readouterr().err == (
+        "p2os: cannot write /nowhere/floor.jsonl: no such file or directory\n"
+        "hint: give a file in a folder that exists\n"
+    )
 
 
 @pytest.mark.usefixtures("no_waiting")

@@ -152,9 +152,9 @@ def test_a_burst_of_interrupts_cannot_shorten_the_closing(served: ServedRobot) -
     interrupts: list[str] = []
 
     def interrupt(_number: int, frame: FrameType | None) -> None:
-        while frame is not None and frame.f_code.co_name not in {"shut_down", "unraisable_hook"}:
+        while frame is not None and frame.f_code.co_qualname not in {"RobotThread.finish", "unraisable_hook"}:
             frame = frame.f_back
-        if frame is not None and frame.f_code.co_name == "shut_down" and len(interrupts) < 30:
+        if frame is not None and frame.f_code.co_qualname == "RobotThread.finish" and len(interrupts) < 30:
             interrupts.append("")
             raise KeyboardInterrupt
 
@@ -274,7 +274,7 @@ from p2os.client.aio import Robot
 robot = Robot({served.url!r})
 loop = asyncio.new_event_loop()
 loop.run_until_complete(robot.connect())
-robot._robot_loop._loop = loop
+robot._runner._loop = loop
 async def go(): robot.set_velocity(0.3); await asyncio.sleep(0.3)
 loop.run_until_complete(go())
 """

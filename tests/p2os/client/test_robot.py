@@ -71,7 +71,7 @@ def test_states_and_events_can_be_iterated_and_listened_to(fast: ServedRobot) ->
         events = robot.events()
 
         def drive_when_heard() -> None:
-            until(lambda: robot._thread.listeners._queues)
+            until(lambda: robot._runner.listeners._queues)
             robot.drive(0.0)
 
         threading.Thread(target=drive_when_heard, daemon=True).start()
@@ -129,7 +129,7 @@ def test_ctrl_c_ends_any_wait_and_stops_the_robot(served: ServedRobot, what: str
 
 def _interrupt_when_waiting(robot: Robot, served: ServedRobot, what: str) -> None:
     if what == "connect":
-        until(lambda: robot._thread.core.link is Link.SEARCHING)
+        until(lambda: robot._runner.core.link is Link.SEARCHING)
     else:
         until(lambda: served.is_moving)  # by 0.2 m/s that it was asked for, just before the wait began
         time.sleep(0.1)
@@ -158,7 +158,7 @@ def test_an_error_in_a_callback_stops_the_robot_and_reaches_the_program(fast: Se
             robot.set_velocity(0.3)
     with pytest.raises(P2osError, match="thread failed"), robot_on(fast) as robot:  # noqa: PT012  # its end raises
         robot.on_state(lambda _: 1 // 0)  # type: ignore[arg-type,return-value]
-        fast.until(lambda: robot._thread._failure is not None)
+        fast.until(lambda: robot._runner._failure is not None)
 
 
 def test_a_program_that_hangs_is_stopped_by_the_deadman(served: ServedRobot) -> None:

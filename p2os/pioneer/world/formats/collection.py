@@ -32,6 +32,7 @@ from p2os.pioneer.world.model import (
     has_area,
     shadow,
 )
+from p2os.pioneer.world.solids import Solid, box, cylinder, sphere
 
 #: chosen: a Pioneer turns on the spot in it.
 FREE_M = 0.5
@@ -49,13 +50,8 @@ MARGIN_M = 0.5
 STANDS_STILL = "that a model can move: it stands still"
 #: What a file says of nothing.
 PLAIN = Traits()
-#: A sphere is made of so many bands and sectors.
-BANDS, SECTORS = 8, 16
-
-BOX_TRIANGLES: tuple[Triangle, ...] = (
-    (0, 2, 1), (0, 3, 2), (4, 5, 6), (4, 6, 7), (0, 1, 5), (0, 5, 4),
-    (1, 2, 6), (1, 6, 5), (2, 3, 7), (2, 7, 6), (3, 0, 4), (3, 4, 7),
-)  # fmt: skip
+#: A round thing is made of so many sectors.
+SECTORS = 16
 
 
 class _TraitKeys(TypedDict):
@@ -107,11 +103,7 @@ class Collection:
             )
             return
         self._stands_still(traits)
-        x, y, z = (value / 2 for value in size)
-        corners = [
-            (-x, -y, -z), (x, -y, -z), (x, y, -z), (-x, y, -z), (-x, -y, z), (x, -y, z), (x, y, z), (-x, y, z),
-        ]  # fmt: skip
-        self.add_mesh(name, apply(place, corners), BOX_TRIANGLES)
+        self._add_solid(name, box(size), place)
 
     def add_cylinder(self, name: str, radius: float, length: float, place: Transform, traits: Traits = PLAIN) -> None:
         """Take a cylinder about its middle, along its own Z."""
@@ -131,15 +123,13 @@ class Collection:
             )
             return
         self._stands_still(traits)
-        rings = [(radius, -length / 2), (radius, length / 2)]
-        self._add_lathe(name, [(0.0, -length / 2), *rings, (0.0, length / 2)], place)
+        self._add_solid(name, cylinder(radius, length, SECTORS), place)
 
     def add_sphere(self, name: str, radius: float, place: Transform) -> None:
         """Take a sphere, as a mesh."""
         if radius <= 0:
             raise WorldError(f"{self.path}: sphere {name!r}: its size must be above 0")
-        angles = [math.pi * (band / BANDS - 0.5) for band in range(BANDS + 1)]
-        self._add_lathe(name, [(radius * math.cos(a), radius * math.sin(a)) for a in angles], place)
+        self._add_solid(name, sphere(radius, SECTORS), place)
 
     def add_mesh(self, name: str, vertices: Iterable[Vertex], triangles: Iterable[Triangle]) -> None:
         """Take a mesh in the world's frame; triangles without an area are left out."""
@@ -244,15 +234,8 @@ class Collection:
         if traits.mass_kg > 0:
             self.skip(STANDS_STILL)
 
-    def _add_lathe(self, name: str, profile: Sequence[tuple[float, float]], place: Transform) -> None:
-        """Take a solid of revolution about Z: (radius, height) from the bottom up."""
-        turns = [2 * math.pi * sector / SECTORS for sector in range(SECTORS)]
-        vertices = [(r * math.cos(turn), r * math.sin(turn), z) for r, z in profile for turn in turns]
-        triangles = []
-        for ring in range(len(profile) - 1):
-            for sector in range(SECTORS):
-                a, b = ring * SECTORS + sector, ring * SECTORS + (sector + 1) % SECTORS
-                triangles += [(a, b, b + SECTORS), (a, b + SECTORS, a + SECTORS)]
+    def _add_solid(self, name: str, solid: Solid, place: Transform) -> None:
+        vertices, triangles = solid
         self.add_mesh(name, apply(place, vertices), triangles)
 
     def add_thing(self, item: Obstacle) -> None:

@@ -6,6 +6,7 @@ Every length is rounded to a millimetre, so that a written world is short.
 import math
 from collections.abc import Iterable
 
+from p2os.pioneer.world.geometry import Footprint
 from p2os.pioneer.world.model import Kind, Obstacle, Pose, World
 
 WALL_M = 0.1
@@ -38,18 +39,15 @@ def walls_around(x0: float, y0: float, x1: float, y1: float) -> list[Obstacle]:
     ]
 
 
-def box(name: str, x: float, y: float, length: float, width: float, height: float, turned: float = 0.0) -> Obstacle:
-    """Return a box; metres, and degrees for its turn."""
-    return Obstacle(
-        name=name, x_m=mm(x), y_m=mm(y), length_m=mm(length), width_m=mm(width), height_m=height,
-        heading_rad=math.radians(turned),
-    )  # fmt: skip
+def box(name: str, x: float, y: float, length: float, width: float, height: float) -> Obstacle:
+    """Return a box; metres."""
+    return Obstacle(name=name, x_m=mm(x), y_m=mm(y), length_m=mm(length), width_m=mm(width), height_m=height)
 
 
 def finished(name: str, description: str, start: Pose, things: Iterable[Obstacle]) -> World:
     """Return the world of some things, its floor just larger than they are."""
     obstacles = tuple(things)
-    boxes = [bounds(item) for item in obstacles]
+    boxes = [Footprint(item).bounds for item in obstacles]
     return World(
         name=name,
         source=name,
@@ -63,14 +61,6 @@ def finished(name: str, description: str, start: Pose, things: Iterable[Obstacle
         ),
         obstacles=obstacles,
     )
-
-
-def bounds(item: Obstacle) -> tuple[float, float, float, float]:
-    """Return x0, y0, x1, y1 of an obstacle's footprint."""
-    c, s = abs(math.cos(item.heading_rad)), abs(math.sin(item.heading_rad))
-    along = item.radius_m or (item.length_m * c + item.width_m * s) / 2
-    across = item.radius_m or (item.length_m * s + item.width_m * c) / 2
-    return item.x_m - along, item.y_m - across, item.x_m + along, item.y_m + across
 
 
 def mm(metres: float) -> float:

@@ -16,10 +16,10 @@ from pathlib import Path
 
 from p2os.errors import WorldError
 from p2os.pioneer.world.formats.collection import MOST_TRIANGLES, MOST_VERTICES
-from p2os.pioneer.world.formats.meshes.polygon import triangulated
+from p2os.pioneer.world.formats.meshes.polygon import Triangles, triangulated
 from p2os.pioneer.world.formats.transform import IDENTITY, Transform, about_axis, after, apply, moved, scaled
 from p2os.pioneer.world.formats.xml_tree import Element, numbers, read_xml
-from p2os.pioneer.world.model import Triangle, Vertex
+from p2os.pioneer.world.model import Vertex
 
 #: Nodes that name each other in a ring end here.
 DEEPEST_NODES = 32
@@ -30,8 +30,8 @@ SKIPPED_NODES = ("instance_controller", "instance_camera", "instance_light", "lo
 SKIPPED_FACES = ("lines", "linestrips", "tristrips", "trifans")
 
 
-def read_collada(path: Path) -> tuple[list[Vertex], list[Triangle], str, list[str]]:
-    """Return vertices in metres, triangles, the up axis, and what was left out.
+def read_collada(path: Path) -> tuple[Triangles, str]:
+    """Return the triangles, metres, and the up axis.
 
     Raises:
         WorldError: The file is no COLLADA, or breaks its own rules.
@@ -43,14 +43,12 @@ class _Reader:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._root = read_xml(path, "COLLADA")
-        self._vertices: list[Vertex] = []
-        self._triangles: list[Triangle] = []
-        self._skipped: dict[str, None] = {}
+        self._found = Triangles()
         self._shown = 0
         self._geometries = self._by_id("library_geometries", "geometry")
         self._nodes = self._by_id("library_nodes", "node")
 
-    def read(self) -> tuple[list[Vertex], list[Triangle], str, list[str]]:
+    def read(self) -> tuple[Triangles, str]:
         asset = self._root.first("asset")
         unit_m, up = 1.0, "y"
         if asset is not None:
@@ -64,7 +62,7 @@ class _Reader:
         place = scaled(unit_m, unit_m, unit_m)
         for node in self._scene():
             self._node(node, place, 0)
-        return self._vertices, self._triangles, up, list(self._skipped)
+        return self._found, up
 
     def _scene(self) -> Iterator[Element]:
         """Yield the top nodes of the scene that is shown; of all scenes where none is named."""
@@ -86,7 +84,7 @@ class _Reader:
         for child in node.children:
             place = after(place, self._transform(child))
             if child.tag in SKIPPED_NODES:
-                self._skipped[f"COLLADA <{child.tag}>"] = None
+                self._found.skipped[f"COLLADA <{child.tag}>"] = None
         for child in node.children:
             if child.tag == "instance_geometry":
                 self._geometry(self._named(child, self._geometries), place)
@@ -110,16 +108,16 @@ class _Reader:
     def _geometry(self, geometry: Element, place: Transform) -> None:
         mesh = geometry.first("mesh")
         if mesh is None:
-            self._skipped["COLLADA geometry without a mesh"] = None
+            self._found.skipped["COLLADA geometry without a mesh"] = None
             return
         sources = {source.get("id"): source for source in mesh.all("source")}
         points_of = {item.get("id"): item for item in mesh.all("vertices")}
         for faces in mesh.children:
             if faces.tag in SKIPPED_FACES:
-                self._skipped[f"COLLADA <{faces.tag}>"] = None
+                self._found.skipped[f"COLLADA <{faces.tag}>"] = None
             if faces.tag in {"triangles", "polylist", "polygons"}:
                 if faces.first("ph") is not None:
-                    self._skipped["COLLADA <ph>: polygons with holes"] = None
+                    self._found.skipped["COLLADA <ph>: polygons with holes"] = None
                 self._faces(faces, sources, points_of, place)
 
     def _faces(
@@ -132,18 +130,18 @@ class _Reader:
         points = self._points(self._named(vertex, points_of, "source"), sources)
         stride = 1 + max(self._whole(item, item.get("offset", "0")) for item in inputs)
         offset = self._whole(vertex, vertex.get("offset", "0"))
-        base = len(self._vertices)
-        self._vertices += apply(place, points)
-        if len(self._vertices) > MOST_VERTICES:
+        base = len(self._found.vertices)
+        self._found.vertices += apply(place, points)
+        if len(self._found.vertices) > MOST_VERTICES:
             raise WorldError(f"{self._path}: more than {MOST_VERTICES} vertices", hint="decimate it first")
         for polygon in self._polygons(faces, stride, offset):
             if not all(0 <= index < len(points) for index in polygon):
                 raise WorldError(f"{self._path}:{faces.line}: a face names a vertex that is not there")
-            corners = [self._vertices[base + index] for index in polygon]
-            self._triangles += [
+            corners = [self._found.vertices[base + index] for index in polygon]
+            self._found.triangles += [
                 (base + polygon[a], base + polygon[b], base + polygon[c]) for a, b, c in triangulated(corners)
             ]
-            if len(self._triangles) > MOST_TRIANGLES:
+            if len(self._found.triangles) > MOST_TRIANGLES:
                 raise WorldError(f"{self._path}: more than {MOST_TRIANGLES} triangles", hint="decimate it first")
 
     def _polygons(self, faces: Element, stride: int, offset: int) -> Iterator[list[int]]:

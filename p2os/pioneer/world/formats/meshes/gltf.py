@@ -20,8 +20,9 @@ from urllib.parse import unquote
 from p2os.errors import WorldError
 from p2os.pioneer.world.formats.collection import MOST_TRIANGLES, MOST_VERTICES
 from p2os.pioneer.world.formats.local_file import find_local
+from p2os.pioneer.world.formats.meshes.polygon import Triangles
 from p2os.pioneer.world.formats.transform import IDENTITY, Transform, after, apply, moved, scaled
-from p2os.pioneer.world.model import Triangle, Vertex
+from p2os.pioneer.world.model import Triangle
 from p2os.toml_file import LARGEST_FILE_BYTES
 from simbase.errors import shown
 
@@ -47,8 +48,8 @@ HARMLESS = ("KHR_materials_", "KHR_texture_", "KHR_lights_", "EXT_texture_")
 _Object = Mapping[str, object]
 
 
-def read_gltf(path: Path) -> tuple[list[Vertex], list[Triangle], list[str]]:
-    """Return vertices in metres with Y up, triangles, and what was left out.
+def read_gltf(path: Path) -> tuple[Triangles, str]:
+    """Return the triangles, metres, and which axis is up: Y.
 
     Raises:
         WorldError: The file is no glTF, or breaks its own rules.
@@ -60,14 +61,12 @@ class _Reader:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._root, self._binary = self._opened()
-        self._vertices: list[Vertex] = []
-        self._triangles: list[Triangle] = []
-        self._skipped: dict[str, None] = {}
+        self._found = Triangles()
         self._buffers: dict[int, bytes] = {}
         self._accessors: dict[int, list[tuple[float, ...]]] = {}
         self._bytes = self._rows = self._shown = 0
 
-    def read(self) -> tuple[list[Vertex], list[Triangle], list[str]]:
+    def read(self) -> tuple[Triangles, str]:
         missing = [name for name in self._items(self._root, "extensionsRequired") if not str(name).startswith(HARMLESS)]
         if missing:
             raise self._error(f"it needs the extension {shown(missing[0])}", hint="export it without compression")
@@ -84,14 +83,14 @@ class _Reader:
             seen.add(number)
             place = after(outer, self._place(node, number))
             if "skin" in node:
-                self._skipped["glTF skins: a body stands as it was modelled"] = None
+                self._found.skipped["glTF skins: a body stands as it was modelled"] = None
             if "mesh" in node:
                 mesh = self._whole(node["mesh"], "mesh")
                 for item in self._items(self._entry("meshes", mesh), "primitives"):
                     self._primitive(self._object(item, f"a primitive of mesh {mesh}"), mesh, place)
             inner = [self._whole(child, "a child") for child in self._items(node, "children")]
             waiting += [(child, place, depth + 1) for child in reversed(inner)]
-        return self._vertices, self._triangles, list(self._skipped)
+        return self._found, "y"
 
     # Nodes ------------------------------------------------------------------------------------
 
@@ -144,10 +143,10 @@ class _Reader:
             raise self._error(f"more than {MOST_NODES} shapes", hint="make it simpler first")
         mode = self._whole(primitive.get("mode", TRIANGLES), "mode", len(MODES) - 1)
         if mode < TRIANGLES:
-            self._skipped[f"glTF {MODES[mode]}"] = None
+            self._found.skipped[f"glTF {MODES[mode]}"] = None
             return
         if "targets" in primitive:
-            self._skipped["glTF morph targets: a shape stands as it was modelled"] = None
+            self._found.skipped["glTF morph targets: a shape stands as it was modelled"] = None
         attributes = self._object(primitive.get("attributes"), f"attributes of mesh {mesh}")
         points = self._accessor(attributes.get("POSITION"), "VEC3", POSITION_TYPES)
         order: Sequence[int] = range(len(points))
@@ -157,12 +156,12 @@ class _Reader:
                 raise self._error(f"mesh {mesh}: index {max(order)} of {len(points)} vertices")
         if mode == TRIANGLES and len(order) % 3:
             raise self._error(f"mesh {mesh}: {len(order)} corners make no whole triangles")
-        base = len(self._vertices)
-        self._vertices += apply(place, [(x, y, z) for x, y, z in points])
-        self._triangles += [
+        base = len(self._found.vertices)
+        self._found.vertices += apply(place, [(x, y, z) for x, y, z in points])
+        self._found.triangles += [
             (base + order[a], base + order[b], base + order[c]) for a, b, c in _corners(mode, len(order))
         ]
-        if len(self._triangles) > MOST_TRIANGLES or len(self._vertices) > MOST_VERTICES:
+        if len(self._found.triangles) > MOST_TRIANGLES or len(self._found.vertices) > MOST_VERTICES:
             raise self._error(
                 f"more than {MOST_TRIANGLES} triangles, or {MOST_VERTICES} vertices", hint="decimate it first"
             )

@@ -11,28 +11,20 @@ it names no line, and takes half as long again for 100 000 triangles.
 
 import struct
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from p2os.errors import WorldError
 from p2os.pioneer.world.formats.collection import MOST_TRIANGLES, MOST_VERTICES, Collection
-from p2os.pioneer.world.formats.meshes.polygon import triangulated
+from p2os.pioneer.world.formats.meshes.collada import read_collada
+from p2os.pioneer.world.formats.meshes.gltf import read_gltf
+from p2os.pioneer.world.formats.meshes.polygon import Triangles, triangulated
 from p2os.pioneer.world.formats.placing import with_z_up
-from p2os.pioneer.world.model import Triangle, Vertex, World
+from p2os.pioneer.world.model import Vertex, World
 from p2os.pioneer.world.text_file import read_foreign_text
 from simbase.errors import shown
 
 #: Of a binary STL: a header of 80 bytes, a count, then 50 bytes a triangle.
 STL_HEADER, STL_TRIANGLE = 84, 50
-
-
-@dataclass(slots=True)
-class Triangles:
-    """The corners and faces of a file, and what of it was left out."""
-
-    vertices: list[Vertex] = field(default_factory=list)
-    triangles: list[Triangle] = field(default_factory=list)
-    skipped: list[str] = field(default_factory=list)
 
 
 def read(path: Path, up: str) -> World:
@@ -92,7 +84,8 @@ def _read_obj(path: Path) -> tuple[Triangles, str]:
             raise WorldError(f"{path}:{number}: more than {MOST_TRIANGLES} triangles", hint="decimate it first")
         if words[0] in {"curv", "surf", "l", "p"}:
             left_out.add(words[0])
-    found.skipped += [f"OBJ statement {word!r} (curves, lines and points are no walls)" for word in sorted(left_out)]
+    for word in sorted(left_out):
+        found.skipped[f"OBJ statement {word!r} (curves, lines and points are no walls)"] = None
     return found, "y"
 
 
@@ -161,24 +154,10 @@ def _indexed(corners: list[Vertex]) -> Triangles:
     return Triangles(vertices=list(numbers), triangles=triangles)
 
 
-def _read_dae(path: Path) -> tuple[Triangles, str]:
-    from p2os.pioneer.world.formats.meshes.collada import read_collada
-
-    vertices, triangles, up, skipped = read_collada(path)
-    return Triangles(vertices=vertices, triangles=triangles, skipped=skipped), up
-
-
-def _read_gltf(path: Path) -> tuple[Triangles, str]:
-    from p2os.pioneer.world.formats.meshes.gltf import read_gltf
-
-    vertices, triangles, skipped = read_gltf(path)
-    return Triangles(vertices=vertices, triangles=triangles, skipped=skipped), "y"
-
-
 _READERS: Mapping[str, Callable[[Path], tuple[Triangles, str]]] = {
     ".obj": _read_obj,
     ".stl": _read_stl,
-    ".dae": _read_dae,
-    ".gltf": _read_gltf,
-    ".glb": _read_gltf,
+    ".dae": read_collada,
+    ".gltf": read_gltf,
+    ".glb": read_gltf,
 }

@@ -10,6 +10,7 @@ their corners.
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 from p2os.pioneer.world.model import Triangle, Vertex
 
@@ -17,6 +18,15 @@ from p2os.pioneer.world.model import Triangle, Vertex
 MOST_CORNERS = 100
 
 Flat = list[tuple[float, float]]
+
+
+@dataclass(slots=True)
+class Triangles:
+    """The corners and faces of a file, and what of it was left out."""
+
+    vertices: list[Vertex] = field(default_factory=list)
+    triangles: list[Triangle] = field(default_factory=list)
+    skipped: dict[str, None] = field(default_factory=dict)
 
 
 def triangulated(corners: Sequence[Vertex]) -> list[Triangle]:
