@@ -313,7 +313,7 @@ def test_hulls_never_overlap() -> None:
     for index, turn in enumerate((10, -15, 20, -5)):
         say(made, index, C.RVEL, turn)
     now = 0.0
-    for _ in range(25):
+    for _ in range(20):
         now = live(made, 0.1, since=now)
         for member in made.members:
             hull = member.body.footprint.polygon
