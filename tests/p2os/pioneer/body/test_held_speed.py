@@ -11,14 +11,15 @@ from p2os.pioneer.body.contacts import APART_STEPS
 from p2os.pioneer.body.contract import RobotBody
 from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.body.kinematic import WALK_STEPS
-from p2os.pioneer.body.physical import UNPOWERED_SHARE
+from p2os.pioneer.body.physical import BACK_DRIVE, UNPOWERED_SHARE
 from p2os.pioneer.world import parse_world
 from p2os.pioneer.world.model import Obstacle, Walk
 from p2os.robots.parameters import load_parameters
-from tests.p2os.pioneer.body.bodies import each_body
+from tests.p2os.pioneer.body.bodies import drive, each_body
 
 if TYPE_CHECKING:
     from p2os.pioneer.body.engine_body import EngineBody
+    from p2os.pioneer.body.mujoco import MujocoBody
 
 SPEEDS = st.sampled_from((0.0, 0.1, 0.3, -0.2, 0.30000001))
 COUNTS = st.sampled_from((0, 1, 2, WALK_STEPS - 1, WALK_STEPS, APART_STEPS - 1, APART_STEPS, APART_STEPS + 1, 350))
@@ -117,6 +118,49 @@ def test_a_robot_alone_on_an_engine_makes_the_steps_that_its_scene_makes(scene: 
     went_on = alone.hold(0.4, 0.4, 30)
     alone.restore(saved)
     assert alone.hold(0.4, 0.4, 30) == went_on, "what the motors were told before is forgotten"
+
+
+@pytest.mark.parametrize("engine", each_body("kinematic"))
+def test_a_wall_is_met_in_the_same_step_though_nobody_looks_for_it_while_it_is_far(engine: str) -> None:
+    world = parse_world('name = "empty"\nextent_m = [-4, -4, 4, 4]', "empty")
+    sparing, looking = (make_body(engine, world, load_parameters("p2dx")) for _ in range(2))
+    for body in (sparing, looking):
+        body.place(Obstacle(name="wall", x_m=2.0, y_m=0.0, length_m=0.2, width_m=2.0, height_m=1.0))
+    # With a thing about that can be pushed, each step is looked at.
+    looking.place(Obstacle(name="ball", x_m=-3.0, y_m=3.0, radius_m=0.1, height_m=0.2, mass_kg=1.0))
+
+    def touches(body: RobotBody) -> list[tuple[int, bool]]:
+        return [(state.collisions, state.in_contact) for state in (drive(body, 2.0, 2.0, 0.002) for _ in range(650))]
+
+    met = [touches(body) for body in (sparing, looking)]
+    assert met[0] == met[1]
+    assert met[0][-1][0] > 0
+
+
+@pytest.mark.mujoco
+def test_mujocos_motors_hold_what_has_come_to_rest_through_a_rebuild_and_a_restore() -> None:
+    pytest.importorskip("mujoco")
+    world, parameters = parse_world('name = "empty"\nextent_m = [-4, -4, 4, 4]', "empty"), load_parameters("p2dx")
+    body, other = (cast("MujocoBody", make_body("mujoco", world, parameters)) for _ in range(2))
+
+    def shares_of(one: "MujocoBody") -> list[float]:
+        return [float(most) / parameters.body.motor_torque_nm for most in one.scene.model.tendon_frictionloss]
+
+    body.hold(0.2, 0.2, 50)
+    assert shares_of(body) == pytest.approx([1.0, 1.0])
+    body.hold(0.0, 0.0, 300)
+    assert shares_of(body) == pytest.approx([BACK_DRIVE] * 2)
+    body.place(Obstacle(name="post", x_m=1.0, y_m=0.0, radius_m=0.1, height_m=0.6))
+    body.hold(0.0, 0.0, 1)
+    assert shares_of(body) == pytest.approx([BACK_DRIVE] * 2), "in a model that was made anew"
+    saved = body.snapshot()
+    body.is_powered = False
+    body.hold(0.0, 0.0, 1)
+    assert shares_of(body) == pytest.approx([UNPOWERED_SHARE] * 2)
+    for one in (body, other):
+        one.restore(saved)
+        one.hold(0.0, 0.0, 1)
+        assert shares_of(one) == pytest.approx([BACK_DRIVE] * 2)
 
 
 @pytest.mark.bullet
