@@ -307,6 +307,15 @@ def test_what_one_pushes_the_other_sees_and_is_stopped_by(meet: Meet) -> None:
     assert made.members[0].body.state.stalled_left
 
 
+def test_every_robot_is_told_where_what_walks_is_by_now(meet: Meet) -> None:
+    made = meet(FACING, CARTON)
+    for _ in range(20):
+        made.scene.step([(0.0, 0.0)] * 2)
+    for member in made.members:
+        (visitor,) = [item for item in member.body.take_moved() if item.name == "visitor"]
+        assert visitor.x_m == pytest.approx(20 * 1e-3 * 0.5, abs=1e-6)
+
+
 def test_hulls_never_overlap() -> None:
     made = multi_robot_world(((0.0, 0.0, 0.0), (1.0, 0.1, 170.0), (0.4, 1.0, -90.0), (0.4, -1.0, 80.0)))
     drive(made, 500, 500, 500, 500)
