@@ -36,8 +36,19 @@ MOST_MPS2 = 50.0
 class EngineScene(Scene):
     """Robots and things in one world of an engine."""
 
+    bodies: "tuple[EngineBody, ...]"
     #: Whether something is driven on beside the level floor.
     is_uneven: bool
+
+    def _count_step(self, setpoints: Sequence[tuple[float, float]]) -> None:
+        """Begin a step of all robots with these rim-speed set-points; put what walks where it is by then."""
+        for body, (left_mps, right_mps) in zip(self.bodies, setpoints, strict=True):
+            body.count_step(left_mps, right_mps)
+        first, *others = self.bodies
+        for item in first.walk():
+            self._put(item)
+            for body in others:
+                body.note_moved(item.name)
 
 
 class EngineBody(BodyInWorld):
@@ -300,6 +311,10 @@ class EngineBody(BodyInWorld):
         return list(map(min, met, self._robot_ranges(fan, longest_m))) if self.others else met
 
     # What the engine tells -------------------------------------------------------------------
+
+    def count_step(self, left_mps: float, right_mps: float) -> None:
+        """Begin a step with these rim-speed set-points."""
+        raise NotImplementedError
 
     def _step_alone(self, setpoints: Iterable[tuple[float, float]]) -> list[Turned]:
         """Make the steps that its scene would make, where nobody else moves in it."""

@@ -271,8 +271,10 @@ class Obstacle:
         """
         if not math.isfinite(heading_rad):
             raise WorldError(f"obstacle {shown(self.name)}: its place must be finite")
-        _refuse_outside(f"obstacle {shown(self.name)}", "x_m", x_m)
-        _refuse_outside(f"obstacle {shown(self.name)}", "y_m", y_m)
+        least, most = _PLACE
+        if not (least <= x_m <= most and least <= y_m <= most):  # what walks asks for this in each step
+            _refuse_outside(f"obstacle {shown(self.name)}", "x_m", x_m)
+            _refuse_outside(f"obstacle {shown(self.name)}", "y_m", y_m)
         moved, put = object.__new__(Obstacle), object.__setattr__  # `replace` takes five times as long
         for name, value in zip(_KEPT, _kept_of(self), strict=True):
             put(moved, name, value)

@@ -240,9 +240,13 @@ class Plan(Stateful):
     def _nearest(self, things: Iterable[Footprint], hull: Polygon, x_m: float, y_m: float, nearest: float) -> float:
         """Return the least distance from a hull about (x, y) to some things, or `nearest` where that is less."""
         # No point of the hull is farther from the axle than its reach: the likely nearest first, then stop.
-        looked_at = list(things)
-        bounds = [thing.distance_to_point(x_m, y_m) - self._hull_reach for thing in looked_at]
-        for bound, thing in sorted(zip(bounds, looked_at, strict=True), key=itemgetter(0)):
+        reach, hypot = self._hull_reach, math.hypot
+        looked_at = [
+            (thing.distance_to_point(x_m, y_m) - reach, thing)
+            for thing in things
+            if hypot(thing.x - x_m, thing.y - y_m) - thing.reach - reach < nearest  # of the circle around it: cheaper
+        ]
+        for bound, thing in sorted(looked_at, key=itemgetter(0)):
             if bound >= nearest:
                 break
             nearest = min(nearest, thing.distance(hull))

@@ -128,10 +128,7 @@ class BulletScene(EngineScene):
     def step(self, setpoints: Sequence[tuple[float, float]]) -> Sequence[Turned]:
         """Move all on by one step with these rim-speed set-points."""
         bodies = self.bodies
-        for body, (left_mps, right_mps) in zip(bodies, setpoints, strict=True):
-            for item in body.count_step(left_mps, right_mps):
-                if body is bodies[0]:
-                    self._put(item)
+        self._count_step(setpoints)
         pybullet.stepSimulation(self.client)
         turned = [body.take_step() for body in bodies]
         for body in bodies:
@@ -283,12 +280,11 @@ class BulletBody(EngineBody):
         self._state = None
         return made
 
-    def count_step(self, left_mps: float, right_mps: float) -> Sequence[Obstacle]:
-        """Begin a step with these rim-speed set-points; return what walks, where it is by then."""
+    def count_step(self, left_mps: float, right_mps: float) -> None:
+        """Begin a step with these rim-speed set-points."""
         self._state = None
         self._tell_motors(left_mps, right_mps)
         self._steps += 1
-        return self.walk() if self._walking else ()
 
     def _tell_motors(self, left_mps: float, right_mps: float) -> None:
         """Give the motors these set-points, where that is news to them."""

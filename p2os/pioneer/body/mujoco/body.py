@@ -99,10 +99,7 @@ class MujocoScene(EngineScene):
     def step(self, setpoints: Sequence[tuple[float, float]]) -> Sequence[Turned]:
         """Move all on by one step with these rim-speed set-points."""
         bodies = self.bodies
-        for body, (left_mps, right_mps) in zip(bodies, setpoints, strict=True):
-            for item in body.count_step(left_mps, right_mps):
-                if body is bodies[0]:
-                    self._put(item)
+        self._count_step(setpoints)
         data = self.data
         mujoco.mj_step(self.model, data)
         efforts, contacts = self.efforts_nm, self.contacts
@@ -230,12 +227,11 @@ class MujocoBody(EngineBody):
         self._halt()
         self.scene.changed()
 
-    def count_step(self, left_mps: float, right_mps: float) -> Sequence[Obstacle]:
-        """Begin a step with these rim-speed set-points; return what walks, where it is by then."""
+    def count_step(self, left_mps: float, right_mps: float) -> None:
+        """Begin a step with these rim-speed set-points."""
         self._state = None
         self._steps += 1
         self._turn_rotors(left_mps, right_mps)
-        return self.walk() if self._walking else ()
 
     def _step_alone(self, setpoints: Iterable[tuple[float, float]]) -> list[Turned]:
         step, scene, take_step, made = mujoco.mj_step, self.scene, self.take_step, list[Turned]()
@@ -254,10 +250,10 @@ class MujocoBody(EngineBody):
         told = (left_mps, right_mps, self.is_powered, self._most_nm)
         if self._is_grip_changed or told != self._told:
             self._told, self._is_grip_changed = told, False
-            left, right = self._motor(0, left_mps), self._motor(1, right_mps)
-            self._asked, self._rotor_rates = (left_mps, right_mps), (left[0], right[0])
+            (left_radps, left_nm), (right_radps, right_nm) = self._motor(0, left_mps), self._motor(1, right_mps)
+            self._asked, self._rotor_rates = (left_mps, right_mps), (left_radps, right_radps)
             first, most_torques = 2 * self._number, self._most_torques
-            most_torques[first], most_torques[first + 1] = left[1], right[1]
+            most_torques[first], most_torques[first + 1] = left_nm, right_nm
         (left, right), qvel = self._rotors, self._qvel
         qvel[left], qvel[right] = self._rotor_rates
 

@@ -43,4 +43,4 @@ def ramped(body: RobotBody, left_mps: float, right_mps: float, seconds: float) -
     steps = round(seconds * STEPS_PER_S)
     shares = [min(1.0, (step + 0.5) / 500, (steps - step - 0.5) / 500) for step in range(steps)]
     body.ramp([(left_mps * share, right_mps * share) for share in shares])
-    return drive(body, 0, 0, 0.3)
+    return drive(body, 0, 0, 0.15)

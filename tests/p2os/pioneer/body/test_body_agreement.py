@@ -31,13 +31,13 @@ RAMP_MPS2 = 0.5
 
 #: Left and right rim speed in m/s, and for how long they are held, s.
 Leg = tuple[float, float, float]
-#: Rim speed of a turn by 90 degrees in a ramped leg of 3 s, whose mean is five sixths of it.
-QUARTER = math.pi / 2 / 2.5 * TRACK_M / 2
+#: Rim speed of a turn by 90 degrees in a ramped leg of 2 s, whose mean is three quarters of it.
+QUARTER = math.pi / 2 / 1.5 * TRACK_M / 2
 SIDE: Leg = (0.4, 0.4, 3.0)
 SCRIPTED: dict[str, list[Leg]] = {
     "line back": [(-0.4, -0.4, 3.0)],
     "arc": [(0.3, 0.45, 4.0)],
-    "square": [SIDE, (-QUARTER, QUARTER, 3.0)] * 4,
+    "square": [SIDE, (-QUARTER, QUARTER, 2.0)] * 4,
     "about one wheel": [(0.0, 0.4, 3.0)],
 }
 

@@ -90,7 +90,7 @@ def test_a_robot_that_meets_a_wall_at_a_large_angle_stalls(name: str) -> None:
 def test_a_gear_holds_a_wheel_that_is_pushed_back_and_lets_it_go_again(name: str) -> None:
     body = make_body(name, ARENA, load_parameters("p2dx"))
     body.reset(Pose(0.0, 0.0, math.radians(72)), 0)
-    stuck = drive(body, 0.4, 0.4, 8.0)
+    stuck = drive(body, 0.4, 0.4, 6.5)
     assert stuck.stalled_left or stuck.stalled_right
     free = drive(body, -0.4, -0.4, 1.0)
     assert (free.left_speed_mps, free.right_speed_mps) == pytest.approx((-0.4, -0.4), abs=0.01)

@@ -34,7 +34,7 @@ def crate(name: str, x_m: float, *, fixed: bool = False, y_m: float = 0.0, heigh
 def until_hit(body: RobotBody) -> int:
     """Drive ahead until the first collision; return the number of steps."""
     for step in range(1, 8000):
-        body.step(0.2, 0.2)
+        body.step(0.3, 0.3)
         if body.state.collisions:
             return step
     raise AssertionError("nothing was hit")
@@ -42,11 +42,11 @@ def until_hit(body: RobotBody) -> int:
 
 @pytest.mark.parametrize("fixed", [False, True], ids=["movable", "fixed"])
 def test_a_hit_names_the_thing_the_place_and_the_time(make: Maker, fixed: bool) -> None:
-    body = make(world_of(crate("crate", 1.0, fixed=fixed), crate("behind", -1.0), crate("beside", 0.6, y_m=1.0)))
+    body = make(world_of(crate("crate", 0.6, fixed=fixed), crate("behind", -1.0), crate("beside", 0.6, y_m=1.0)))
     steps = until_hit(body)
     (hit,) = body.take_hits()
     assert (hit.name, hit.at_ns) == ("crate", steps * STEP_NS)
-    assert hit.x_m == pytest.approx(0.9, abs=0.01)
+    assert hit.x_m == pytest.approx(0.5, abs=0.01)
     assert abs(hit.y_m) <= P2DX.body.hull_width_m / 2 + 0.01
     assert body.take_hits() == [], "each is told once"
 
@@ -60,12 +60,13 @@ def test_a_wall_of_a_building_of_many_is_named(make: Maker) -> None:
         for n in range(18)
     ]  # fmt: skip
     body = make(world_of(*ring))
+    body.reset(Pose(0.9, 0, 0), 0)
     until_hit(body)
     assert [hit.name for hit in body.take_hits()] == ["stone 0"]
 
 
 def test_what_only_the_wheels_meet_is_named_too(make: Maker) -> None:
-    body = make(world_of(Obstacle(name="plank", x_m=0.6, y_m=0.0, length_m=0.1, width_m=1.0, height_m=0.04)))
+    body = make(world_of(Obstacle(name="plank", x_m=0.35, y_m=0.0, length_m=0.1, width_m=1.0, height_m=0.04)))
     until_hit(body)
     assert [hit.name for hit in body.take_hits()] == ["plank"]
 
@@ -84,7 +85,7 @@ def test_what_is_put_into_the_robot_and_what_is_pushed_are_named(make: Maker) ->
 def test_hits_that_nobody_has_taken_are_in_the_snapshot(make: Maker) -> None:
     world = load_world("room")
     body = make(world)
-    body.reset(Pose(2.4, 0, 0), 0)
+    body.reset(Pose(2.6, 0, 0), 0)
     until_hit(body)
     saved = pickle.loads(pickle.dumps(body.snapshot()))  # noqa: S301  # our own bytes
     hits = body.take_hits()
@@ -95,7 +96,7 @@ def test_hits_that_nobody_has_taken_are_in_the_snapshot(make: Maker) -> None:
 
 
 def test_a_reset_forgets_what_was_hit(make: Maker) -> None:
-    body = make(world_of(crate("crate", 1.0)))
+    body = make(world_of(crate("crate", 0.6)))
     until_hit(body)
     body.reset(Pose(0, 0, 0), 0)
     assert body.take_hits() == []

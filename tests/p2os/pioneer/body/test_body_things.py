@@ -102,6 +102,8 @@ def test_what_walks_into_the_robot_is_a_collision(make: Maker) -> None:
     body = make(world_of(Obstacle(name="visitor", x_m=0, y_m=0, radius_m=0.2, walk=walk)))
     assert drive(body, 0.0, 0.0, 1.0).collisions == 0
     assert drive(body, 0.0, 0.0, 0.6).collisions == 1
+    # Its front is then 0.2 m before its middle, which walks 0.5 m a second.
+    assert [hit.at_ns / 1e9 for hit in body.take_hits()] == pytest.approx([(1.0 - 0.2 - FRONT_M) / 0.5], abs=0.02)
 
 
 @pytest.mark.parametrize(("height", "passes"), [(0.012, True), (0.04, False)])

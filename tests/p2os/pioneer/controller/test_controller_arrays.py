@@ -99,11 +99,11 @@ ROOM = parse_world(
 class Driver:
     """A PeopleBot that is driven against something, and its packets."""
 
-    def __init__(self, body: str, heading_deg: float = 0.0, **flash: int) -> None:
+    def __init__(self, body: str, heading_deg: float = 0.0, x_m: float = 0.0, **flash: int) -> None:
         self.parameters = load_parameters("perfpb")
         settings = ControllerSettings(profile=Profile.ARCOS, flash=Flash().with_values(flash))
         made = make_body(body, ROOM, self.parameters)
-        made.reset(Pose(0.0, 0.0, math.radians(heading_deg)), 0)
+        made.reset(Pose(x_m, 0.0, math.radians(heading_deg)), 0)
         self.robot = Pioneer(parameters=self.parameters, body=made, settings=settings)
         self.now, self.decoder = 0, Decoder()
         for number in (C.PULSE, C.OPEN, C.CLOSE, C.OPEN):
@@ -126,7 +126,7 @@ class Driver:
             found.append(item)
         return found
 
-    def bumpers(self, milliseconds: int = 6000) -> set[tuple[int, int]]:
+    def bumpers(self, milliseconds: int = 3000) -> set[tuple[int, int]]:
         packets = [frame for frame in self.packets(milliseconds) if frame.kind in SIP_KINDS]
         sips = [StandardSip.from_frame(frame, Profile.ARCOS) for frame in packets]
         return {(sip.front_bumpers, sip.rear_bumpers) for sip in sips if sip.front_bumpers or sip.rear_bumpers}
@@ -142,7 +142,7 @@ class Driver:
 def test_the_segment_is_pressed_where_the_hull_is_touched(
     body: str, heading_deg: float, speed: int, front: int, rear: int
 ) -> None:
-    driver = Driver(body, heading_deg)
+    driver = Driver(body, heading_deg, math.copysign(0.7, speed))
     driver.say(C.VEL, speed)
     seen = driver.bumpers()
     assert any(pair[0] & front or pair[1] & rear for pair in seen), seen

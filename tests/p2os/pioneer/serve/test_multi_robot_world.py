@@ -307,13 +307,22 @@ def test_what_one_pushes_the_other_sees_and_is_stopped_by(meet: Meet) -> None:
     assert made.members[0].body.state.stalled_left
 
 
+def test_every_robot_is_told_where_what_walks_is_by_now(meet: Meet) -> None:
+    made = meet(FACING, CARTON)
+    for _ in range(20):
+        made.scene.step([(0.0, 0.0)] * 2)
+    for member in made.members:
+        (visitor,) = [item for item in member.body.take_moved() if item.name == "visitor"]
+        assert visitor.x_m == pytest.approx(20 * 1e-3 * 0.5, abs=1e-6)
+
+
 def test_hulls_never_overlap() -> None:
     made = multi_robot_world(((0.0, 0.0, 0.0), (1.0, 0.1, 170.0), (0.4, 1.0, -90.0), (0.4, -1.0, 80.0)))
     drive(made, 500, 500, 500, 500)
     for index, turn in enumerate((10, -15, 20, -5)):
         say(made, index, C.RVEL, turn)
     now = 0.0
-    for _ in range(25):
+    for _ in range(20):
         now = live(made, 0.1, since=now)
         for member in made.members:
             hull = member.body.footprint.polygon
@@ -369,8 +378,12 @@ def life(
     looks: Sequence[int],
     *,
     backwards: bool,
+    at_looks: Callable[[list[bytes]], None] = lambda _: None,
 ) -> tuple[list[bytes], list[object]]:
-    """Give orders at their times, look in between, and return every wire's bytes and where everybody is."""
+    """Give orders at their times, look in between, and return every wire's bytes and where everybody is.
+
+    At each look `at_looks` is called with the bytes so far.
+    """
     drive(made, 300, 300, 300, 200, apart_ns=UNEVEN_NS)
     sign = -1 if backwards else 1
     events = [(at, 1, sign * index, words) for at, index, words in orders]
@@ -382,6 +395,8 @@ def life(
         else:
             made.advance_to(at)
         wires = [wire + b"".join(robot.take_output()) for wire, robot in zip(wires, made.robots, strict=True)]
+        if not is_order:
+            at_looks(wires)
     made.advance_to(END_NS)
     wires = [wire + b"".join(robot.take_output()) for wire, robot in zip(wires, made.robots, strict=True)]
     return wires, [member.body.state for member in made.members]
@@ -425,17 +440,19 @@ def test_a_multi_robot_world_that_was_saved_goes_on_as_it_would_have(
 @pytest.mark.parametrize("engine", each_body("kinematic"))
 def test_physical_robots_repeat_and_go_on_after_a_restore(engine: str) -> None:
     orders = [(600_000_123, 0, (C.RVEL, 30)), (640_000_000, 1, (C.VEL, -100)), (640_000_000, 2, (C.RVEL, 40))]
-    first = life(multi_robot_world(CROWD, CARTON, engine), orders, [], backwards=False)
-    assert life(multi_robot_world(CROWD, CARTON, engine), orders, DENSE, backwards=True) == first
-    made = multi_robot_world(CROWD, CARTON, engine)
-    life_until(made, orders, 641_000_000)
-    saved = pickle.loads(pickle.dumps(made.snapshot()))  # noqa: S301  # our own bytes
-    ends = []
-    for other in (made, multi_robot_world(CROWD, CARTON, engine)):
-        other.restore(saved)
-        other.advance_to(END_NS)
-        ends.append(([robot.take_output() for robot in other.robots], [member.body.state for member in other.members]))
-    assert ends[0] == ends[1]
+    made, other = (multi_robot_world(CROWD, CARTON, engine) for _ in range(2))
+    kept = list[tuple[bytes, list[bytes]]]()
+    first = life(
+        made, orders, [641_000_000], backwards=False,
+        at_looks=lambda wires: kept.append((pickle.dumps(made.snapshot()), wires)),
+    )  # fmt: skip
+    assert life(other, orders, DENSE, backwards=True) == first
+    ((saved, heard),) = kept
+    for one in (made, other):
+        one.restore(pickle.loads(saved))  # noqa: S301  # our own bytes
+        one.advance_to(END_NS)
+        wires = [wire + b"".join(robot.take_output()) for wire, robot in zip(heard, one.robots, strict=True)]
+        assert (wires, [member.body.state for member in one.members]) == first
 
 
 def life_until(made: MultiRobotWorld, orders: Sequence[tuple[int, int, tuple[int, int | None]]], end: int) -> None:

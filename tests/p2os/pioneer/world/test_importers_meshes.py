@@ -10,7 +10,8 @@ import pytest
 
 from p2os.errors import WorldError
 from p2os.pioneer.world import load_world, parse_world
-from p2os.pioneer.world.formats import Placing, read_placed
+from p2os.pioneer.world.formats import Placing, read_placed, xml_tree
+from p2os.pioneer.world.formats.meshes import mesh_file
 from p2os.pioneer.world.model import Mesh, cut, shadow
 from p2os.pioneer.world.writer import write_world
 
@@ -188,14 +189,17 @@ def test_entities_are_refused(tmp_path: Path, name: str, text: str) -> None:
         load_world(tmp_path / name)
 
 
-def test_deep_and_wide_xml_is_refused(tmp_path: Path) -> None:
+def test_deep_and_wide_xml_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "a.dae"
     path.write_text("<COLLADA>" + "<node>" * 5000)
     with pytest.raises(WorldError, match="within each other"):
         load_world(path)
-    path.write_text("<COLLADA>" + "<a/>" * 200_001 + "</COLLADA>")
-    with pytest.raises(WorldError, match="more than 200000 elements"):
-        load_world(path)
+    assert xml_tree.MOST_ELEMENTS == 200_000
+    monkeypatch.setattr(xml_tree, "MOST_ELEMENTS", 2_000)
+    for count, message in ((1_999, "nothing in it"), (2_000, "more than 2000 elements")):
+        path.write_text("<COLLADA>" + "<a/>" * count + "</COLLADA>")
+        with pytest.raises(WorldError, match=message):
+            load_world(path)
 
 
 def test_nodes_that_show_each_other_again_and_again_are_refused(tmp_path: Path) -> None:
@@ -210,13 +214,19 @@ def test_nodes_that_show_each_other_again_and_again_are_refused(tmp_path: Path) 
         load_world(tmp_path / "a.dae")
 
 
-def test_too_many_triangles_are_refused_before_they_are_kept(tmp_path: Path) -> None:
-    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\n" + "f 1 2 3\n" * 200_002)
-    with pytest.raises(WorldError, match="more than 200000 triangles"):
-        load_world(tmp_path / "a.obj")
-    (tmp_path / "a.stl").write_bytes(bytes(80) + struct.pack("<I", 200_001) + bytes(50 * 200_001))
-    with pytest.raises(WorldError, match="more than 200000 triangles"):
-        load_world(tmp_path / "a.stl")
+def test_too_many_triangles_are_refused_before_they_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert mesh_file.MOST_TRIANGLES == 200_000
+    monkeypatch.setattr(mesh_file, "MOST_TRIANGLES", 500)
+    facet = struct.pack("<12fH", *(0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0), 0)
+    for count in (500, 501):
+        (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\n" + "f 1 2 3\n" * count + "no more\n")
+        (tmp_path / "a.stl").write_bytes(bytes(80) + struct.pack("<I", count) + facet * count)
+        for name, where in (("a.obj", ":504"), ("a.stl", "")):
+            if count <= 500:
+                assert len(load_world(tmp_path / name).meshes[0].triangles) == count
+            else:
+                with pytest.raises(WorldError, match=f"{name}{where}: more than 500 triangles"):
+                    load_world(tmp_path / name)
 
 
 def refusal(path: Path) -> str:

@@ -1,6 +1,7 @@
 """Worlds: what ships keeps its promises, what is wrong is named with its key."""
 
 import math
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 
@@ -122,6 +123,10 @@ def test_a_cylinder_and_a_floor_are_read() -> None:
         Obstacle(name="x", x_m=math.inf, y_m=0, radius_m=1)
 
 
+#: All over the hull of a P2DX.
+POINTS = [(px / 50, py / 50) for px in range(-13, 10) for py in range(-9, 10)]
+
+
 @settings(deadline=None)
 @given(st.floats(-2, 2), st.floats(-2, 2), st.floats(-4, 4), st.floats(0.05, 0.5), st.booleans())
 def test_clearance_is_zero_just_where_a_sampled_point_is_inside(
@@ -130,10 +135,31 @@ def test_clearance_is_zero_just_where_a_sampled_point_is_inside(
     shape = {"radius_m": size} if is_round else {"length_m": size, "width_m": size / 2}
     thing = Footprint(Obstacle(name="x", x_m=x, y_m=y, heading_rad=heading, **shape))
     hull = placed(hull_polygon(P2DX.body), 0.0, 0.0, 0.0)
-    points = [(px / 50, py / 50) for px in range(-13, 10) for py in range(-9, 10)]
-    nearest = min(distance_to(thing, px, py) for px, py in points)
+    nearest = math.inf
+    for px, py in sorted(POINTS, key=lambda point: math.dist(point, (x, y))):
+        if math.dist((px, py), (x, y)) - size > nearest:  # it reaches no farther than its size
+            break
+        nearest = min(nearest, distance_to(thing, px, py))
     assert thing.distance(hull) <= nearest + 1e-9
     assert nearest - thing.distance(hull) < 0.03
+
+
+def test_a_clearance_is_that_of_the_nearest_of_many_things_or_the_most_that_is_asked_for() -> None:
+    # High enough for the hull, of all lengths, and none of them fixed.
+    things = tuple(
+        Obstacle(name=f"thing {n}", x_m=0.9 * (n % 5) - 1.8, y_m=0.8 * (n // 5) - 1.6, heading_rad=n,
+                 **({"radius_m": 0.05 + n / 200} if n % 3 else {"length_m": 0.1 * (n % 7 + 1), "width_m": 0.1}))
+        for n in range(25)
+    )  # fmt: skip
+    world = parse_world('name = "e"\nextent_m = [-4, -4, 4, 4]', "e")
+    plan = Plan.of_world(replace(world, obstacles=things), P2DX)
+    shapes = [Footprint(item) for item in things]
+    for n in range(60):
+        x, y, heading = 3 * math.sin(n), 3 * math.cos(1.7 * n), 0.4 * n
+        hull = placed(hull_polygon(P2DX.body), x, y, heading)
+        nearest = min(shape.distance(hull) for shape in shapes)
+        for most in (0.05, 0.5, math.inf):
+            assert plan.clearance(x, y, heading, no_more_than=most) == min(nearest, most)
 
 
 def distance_to(thing: Footprint, x: float, y: float) -> float:
