@@ -298,8 +298,8 @@ def test_a_line_without_a_robot_cannot_be_measured(monkeypatch: pytest.MonkeyPat
     ("words", "code", "said"),
     [
         (["drive", "tcp:x"], 2, "p2os: nothing to do"),
-        (["drive", "tcp:x", "--forward", "500"], 2, "p2os: --forward '500' has no unit: in m, cm or mm, such as 0.5m"),
-        (["drive", "tcp:x", "--turn", "1m"], 2, "p2os: --turn '1m' has the unit 'm': in deg, ° or rad, such as 90deg"),
+        (["drive", "tcp:x", "--forward", "500"], 2, "p2os: --forward '500' has no unit: -1000m to 1000m"),
+        (["drive", "tcp:x", "--turn", "1m"], 2, "p2os: --turn '1m' has the unit 'm': -36000deg to 36000deg"),
         (["drive", "tcp:x", "--vel", "1m/s"], 2, "p2os: a speed without an end"),
         (["drive", "tcp:x", "--forward", "1m", "--for", "1s"], 2, "p2os: --for goes with speeds only"),
         (["drive", "tcp:x", "--forward", "1m", "--turn-rate", "1deg/s"], 2, "p2os: --turn-rate has nothing to limit"),
