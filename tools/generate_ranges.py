@@ -91,7 +91,7 @@ def tables() -> dict[str, str]:
         "robot": lines(robots, "table"),
         "fleet": lines({"": {**of_keys((*fleet_file.TOP, *fleet_file.ROBOT)), **plain(at)}}, ""),
         "sensor errors": _one(sensor_errors.RANGES),
-        "faults": _one({word: (0.0, most) for word, most in faults.MOST.items()}),
+        "faults": _one(faults.VALUES),
         "flash": _one(flash.RANGES),
         "pinout": lines(
             {

@@ -173,8 +173,8 @@ def run_planted(planted: Planted, experiments: Sequence[str], folder: Path) -> d
     from robot_bench.report.make import Files
 
     if planted.path.startswith("adapter_fw/"):
-        built = str(library(planted, folder))
-        adapter.find_spec = lambda name: ModuleSpec(name, None, origin=built)  # type: ignore[attr-defined]
+        planted_library = str(library(planted, folder))
+        adapter.built = lambda _: planted_library  # type: ignore[attr-defined]
     found: dict[str, list[str]] = {}
     for name in experiments or EXPERIMENTS:
         experiment = EXPERIMENTS[name]
