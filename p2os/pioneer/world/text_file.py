@@ -18,13 +18,13 @@ def read_text(path: Path) -> str:
 def read_foreign_text(path: Path) -> str:
     """Return the text of another program's file: UTF-8, else Latin-1, which gives each byte a character.
 
-    Programs that knew no UTF-8 write names and comments in the code page of their machine; all else is ASCII.
+    Programs that knew no UTF-8 write names and comments in the code page of their machine; all else is ASCII. Lines
+    may end with CR alone.
 
     Raises:
         OSError: It cannot be read.
     """
-    data = path.read_bytes()
     try:
-        return data.decode("utf-8-sig")
+        return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError:
-        return data.decode("latin-1")
+        return path.read_text(encoding="latin-1")

@@ -123,10 +123,11 @@ def test_a_broken_collada_face_is_one_line(faces: str, message: str, tmp_path: P
 # Lines as other systems end and continue them ----------------------------------------------
 
 
-def test_an_obj_line_that_goes_on_keeps_the_numbers_of_the_lines(tmp_path: Path) -> None:
-    text = "\ufeffv 0 0 0\r\nv 1 0 \\\r\n0\r\nv 1 1 0\r\nf -3// -2/1 \\\r\n3/1/2\r\n"
-    assert len(read(tmp_path / "a.obj", text).meshes[0].triangles) == 1
-    assert ":7:" in refusal(tmp_path / "a.obj", text + "f 1 2\r\n")
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_an_obj_line_that_goes_on_keeps_the_numbers_of_the_lines(end: str, tmp_path: Path) -> None:
+    text = "\ufeffv 0 0 0\nv 1 0 \\\n0\nv 1 1 0\nf -3// -2/1 \\\n3/1/2\n"
+    assert len(read(tmp_path / "a.obj", text.replace("\n", end)).meshes[0].triangles) == 1
+    assert ":7:" in refusal(tmp_path / "a.obj", (text + "f 1 2\n").replace("\n", end))
 
 
 @pytest.mark.parametrize("change", [str.upper, lambda text: text.replace("\n", "\r"), lambda text: text * 2])
