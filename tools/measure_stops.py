@@ -275,8 +275,9 @@ def paused(span_s: float, *, by_suspend: bool) -> Callable[[Driver, Cable], floa
         time.sleep(span_s)
         if by_suspend:
             driver.slept[:8] = struct.pack("q", round(span_s * 1e9))
+        at = time.monotonic()  # before it goes on: it may say STOP before this process runs again
         driver.process.send_signal(signal.SIGCONT)
-        return time.monotonic()
+        return at
 
     return pause
 
@@ -295,8 +296,9 @@ def cut(_: Driver, cable: Cable) -> float:
     """Nothing passes for the pause, and nobody is told; counted from when it carries again."""
     cable.is_cut = True
     time.sleep(CUT_S)
+    at = time.monotonic()
     cable.is_cut = False
-    return time.monotonic()
+    return at
 
 
 def closed(_: Driver, cable: Cable) -> float:
