@@ -390,7 +390,13 @@ class BluePill(Stateful):
     @property
     def has_died(self) -> bool:
         """Whether the firmware is in its HardFault handler or returns to its fault, is locked up, or was reset then."""
-        return self.fault is not None and (self.fault.ended_in_reset or self._is_in_fault())
+        fault = self.fault
+        return fault is not None and (
+            fault.ended_in_reset
+            or self.chip.processor.is_locked_up
+            or self._handles_hard_fault()
+            or fault.repeats_at(self.now_ns)
+        )
 
     @property
     def verdict(self) -> str:
@@ -404,10 +410,6 @@ class BluePill(Stateful):
             times = self.resets.total()
             parts.append(f"{times} reset{'s' if times != 1 else ''} ({causes})")
         return "; ".join(parts)
-
-    def _is_in_fault(self) -> bool:
-        is_repeated = self.fault is not None and self.fault.repeats_at(self.now_ns)
-        return self.chip.processor.is_locked_up or self._handles_hard_fault() or is_repeated
 
     def _handles_hard_fault(self) -> bool:
         return bool(self.chip.processor.nvic.active >> HARD_FAULT & 1)
@@ -584,12 +586,12 @@ class BluePill(Stateful):
     def _wait_for_bytes(self, port: SerialLine, pattern: bytes, within: Span) -> None:
         """Run until `pattern` is in what `port` has sent and nobody has taken (`SerialLine.expect`)."""
         end_ns = self.now_ns + to_nanos(within)
-        usb = f"{self.usb.describe()}; " if port is self._usb_serial else ""
         with _stop_at_characters(port):
             while pattern not in port.unread:
                 reached = self.advance_to(end_ns)
                 if reached.reason is Reason.HALT or (self.now_ns >= end_ns and pattern not in port.unread):
                     last = bytes(port.unread[-_SHOWN_CHARACTERS:])
+                    usb = f"{self.usb.describe()}; " if port is self._usb_serial else ""
                     raise _wait_error(
                         self,
                         f"{port.name} did not send {pattern!r} within {to_nanos(within) / NS_PER_S:g} s; "
@@ -612,7 +614,7 @@ class BluePill(Stateful):
             self._warn("SVC while its priority is masked becomes a HardFault", "masked SVC", pc)
             return
         # A lockup in the same moment is that of a HardFault that could not even be entered.
-        is_same = self.fault is not None and self.fault.at_ns == self.chip.now_ns
+        is_same = self.fault is not None and self.fault.last_ns == self.chip.now_ns
         goes_on = is_lockup and (is_same or self._handles_hard_fault())
         if self.fault is not None and (goes_on or self.fault.ended_in_reset):
             self.fault = replace(self.fault, is_lockup=self.fault.is_lockup or is_lockup)
@@ -620,7 +622,7 @@ class BluePill(Stateful):
         seen = seen or self._seen()
         registers = [(register.name, value) for register, value in zip(_SEEN_REGISTERS, seen.registers, strict=True)]
         registers.insert(15, ("PC", pc))
-        known = None if self.fault is None or seen.is_other else (self.fault.kind, self.fault.registers)
+        known = None if self.fault is None or seen.is_other or is_lockup else (self.fault.kind, self.fault.registers)
         if self.fault is not None and known == (kind, tuple(registers)):
             self.fault = self.fault.again(seen)
             return

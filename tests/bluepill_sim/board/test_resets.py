@@ -233,6 +233,19 @@ def test_an_empty_hard_fault_handler_is_a_death_whenever_one_looks(boot, core, m
 
 @pytest.mark.parametrize("core", ["python", "native"])
 @pytest.mark.parametrize("slice_ns", [100, 50_000])
+def test_a_lockup_at_the_instruction_that_faulted_before_is_told(boot, core, slice_ns, monkeypatch) -> None:
+    """The same fault, with all registers as they were, but under FAULTMASK, where no HardFault can be entered."""
+    monkeypatch.setenv("P2OS_CORE", core)
+    board = boot("again: udf\ncpsid f\nb again\n" + SKIP_TWO_BYTES, {3: "hard"}).board
+    while board.now_ns < 200_000:
+        board.advance_to(board.now_ns + slice_ns)
+    assert board.fault.is_lockup
+    assert board.has_died
+    assert board.fault.returns == 0
+
+
+@pytest.mark.parametrize("core", ["python", "native"])
+@pytest.mark.parametrize("slice_ns", [100, 50_000])
 def test_faults_in_turn_are_none_that_its_handler_comes_back_to(boot, core, slice_ns, monkeypatch) -> None:
     monkeypatch.setenv("P2OS_CORE", core)
     board = boot("again: udf\nnop\nudf\nb again\n" + SKIP_TWO_BYTES, {3: "hard"}).board

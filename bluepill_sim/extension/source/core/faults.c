@@ -41,41 +41,48 @@ bool core_on_bad_access(void *unicorn, int kind, uint64_t address, int size, int
     return false;
 }
 
-/* Keeps what Python reports of a HardFault. */
-static void keep(struct core *core, uint32_t kind)
+/* Returns what Python reports of a HardFault that is about to be entered. */
+static struct fault look(struct core *core, uint32_t kind)
 {
     static const int numbers[16] = {REG_R0,     REG_R0 + 1, REG_R0 + 2, REG_R0 + 3, REG_R0 + 4,  REG_R0 + 5,
                                     REG_R0 + 6, REG_R0 + 7, REG_R0 + 8, REG_R0 + 9, REG_R0 + 10, REG_R0 + 11,
                                     REG_R12,    REG_SP,     REG_LR,     REG_XPSR};
-    struct shared *s = &core->shared;
-    struct fault *fault = &s->fault;
-    uint32_t seen[16];
+    const struct shared *s = &core->shared;
+    const uint64_t now_ns = ns_of(core->fabric, s->cycle);
+    struct fault seen = {
+        .ns = now_ns,
+        .last_ns = now_ns,
+        .kind = kind,
+        .pc = s->halt_pc,
+        .address = s->halt_address,
+        .has_address = s->halt_has_address,
+        .exception_number = s->exception_number,
+        .vector = s->exception_number ? vector(core, s->exception_number) : 0,
+        .logged = s->logged,
+    };
     void *at[16];
     for (int n = 0; n < 16; ++n) {
-        at[n] = &seen[n];
+        at[n] = &seen.registers[n];
     }
     core->api.read_registers(core->unicorn, numbers, at, 16);
-    const uint64_t now_ns = ns_of(core->fabric, s->cycle);
-    const bool is_same = fault->kind == kind && fault->pc == s->halt_pc && !memcmp(fault->registers, seen, sizeof seen);
-    if (s->has_fault && is_same) {
+    memcpy(seen.last, s->last, sizeof seen.last);
+    return seen;
+}
+
+/* Keeps it; or counts it, where nothing has changed since the one that is kept. */
+static void keep(struct shared *s, const struct fault *seen)
+{
+    struct fault *fault = &s->fault;
+    if (s->has_fault && fault->kind == seen->kind && fault->pc == seen->pc &&
+        !memcmp(fault->registers, seen->registers, sizeof seen->registers)) {
         fault->returns++;
-        fault->round_ns = now_ns - fault->last_ns;
-        fault->last_ns = now_ns;
+        fault->round_ns = seen->ns - fault->last_ns;
+        fault->last_ns = seen->ns;
         return;
     }
+    *fault = *seen;
     fault->is_other = s->has_fault;
-    fault->returns = 0;
-    fault->round_ns = 0;
-    fault->ns = fault->last_ns = now_ns;
-    memcpy(fault->registers, seen, sizeof seen);
-    fault->kind = kind;
-    fault->pc = s->halt_pc;
-    fault->address = s->halt_address;
-    fault->has_address = s->halt_has_address;
-    fault->exception_number = s->exception_number;
-    fault->vector = s->exception_number ? vector(core, s->exception_number) : 0;
-    fault->logged = s->logged;
-    memcpy(fault->last, s->last, sizeof fault->last);
+    s->has_fault = 1;
 }
 
 /* Enters the exception of what has ended the run; false: Python has to, or it is none, and nothing has changed. */
@@ -96,9 +103,11 @@ bool take_fault(struct core *core, uint32_t kind)
         if (s->has_debugger || !can_preempt(core, number, false)) {
             return false;
         }
-        if (kind != HALT_SUPERVISOR_CALL) {
-            keep(core, kind);
-        }
+    }
+    const bool is_told = number == HARD_FAULT && kind != HALT_SUPERVISOR_CALL;
+    struct fault seen = {0};
+    if (is_told) {
+        seen = look(core, kind);
     }
     if (!enter(core, number, s->halt_pc)) {
         return false;
@@ -109,8 +118,8 @@ bool take_fault(struct core *core, uint32_t kind)
     if (s->halt_has_address && (kind == HALT_READ_ERROR || kind == HALT_WRITE_ERROR)) {
         s->bfar = s->halt_address;
     }
-    if (number == HARD_FAULT && kind != HALT_SUPERVISOR_CALL) {
-        s->has_fault = 1;
+    if (is_told) {
+        keep(s, &seen);
     }
     return true;
 }

@@ -37,6 +37,13 @@ def test_what_is_sent_to_a_device_that_goes_is_lost(boards: Boards) -> None:
         board.usb_serial.expect(b"")
 
 
+def test_what_is_not_sent_is_told_with_the_state_at_the_end_of_the_wait(boards: Boards) -> None:
+    board = boards()
+    board.usb.plug()
+    with pytest.raises(WaitError, match="it sent b''; 1209:0001"):
+        board.usb_serial.expect(b"never", within="500 ms")
+
+
 def test_a_condition_waits_for_the_packet_in_which_it_comes(boards: Boards) -> None:
     board = boards()
     rows: list[tuple[int, int]] = []
