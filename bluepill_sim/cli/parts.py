@@ -10,7 +10,7 @@ import typer
 
 from bluepill_sim.board import BluePill
 from bluepill_sim.cli.driving import print_status
-from bluepill_sim.parts.attached import words_of
+from bluepill_sim.parts.attached import buses_of, words_of
 from bluepill_sim.parts.registry import PARTS, attach, parse_part, part_class
 from simbase.files import writing
 
@@ -21,8 +21,6 @@ Examples:
   p2os mcu parts             all of them
   p2os mcu parts ssd1306     one of them: what it can be told
 """
-#: Of each method, the bus that a part with it can hang on.
-_BUSES = {"exchange": "SPI", "start": "I2C", "sent": "USART", "join": "CAN"}
 
 
 def parts(name: str | None = typer.Argument(None, help="One of them; all without it.", metavar="[PART]")) -> None:
@@ -33,8 +31,7 @@ def parts(name: str | None = typer.Argument(None, help="One of them; all without
         return
     made = part_class(name)
     typer.echo((inspect.getdoc(made) or name).splitlines()[0])
-    buses = [bus for method, bus in _BUSES.items() if hasattr(made, method)]
-    for what, words in (("on", buses), ("pins", getattr(made, "PINS", {}))):
+    for what, words in (("on", buses_of(made)), ("pins", getattr(made, "PINS", {}))):
         if words:
             typer.echo(f"  {what:5} {', '.join(words)}")
     for key, argument in inspect.signature(made).parameters.items():

@@ -156,7 +156,6 @@ PAGE_CALLBACK = ctypes.CFUNCTYPE(
     ctypes.c_bool, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_int, ctypes.POINTER(TlbEntry), ctypes.c_void_p
 )
 
-#: What C functions take here.
 _Result = TypeVar("_Result")
 
 
@@ -516,7 +515,8 @@ def io_callbacks(
     return on_read, on_write
 
 
-#: What is used of unicorn.h of Unicorn 2.1; result and arguments, as `simbase.c_library` spells them.
+#: What is used of unicorn.h of Unicorn 2.1; result and arguments, as `simbase.c_library` spells them. Those of uc_ctl,
+#: which is variadic, are wrapped at the call.
 _FUNCTIONS = {
     "uc_open": "iiip",
     "uc_close": "ip",

@@ -28,7 +28,7 @@ ACCESS_CYCLE = ctypes.CFUNCTYPE(ctypes.c_uint64)
 ACCESS_PC = ctypes.CFUNCTYPE(ctypes.c_uint32)
 
 
-#: The functions of Unicorn that C calls, by their names in `core.unicorn_core.UnicornLibrary`.
+#: The functions of Unicorn that C calls, in the order of `struct unicorn_api`.
 UNICORN_FUNCTIONS = (
     "uc_emu_start", "uc_emu_stop", "uc_reg_read", "uc_reg_read_batch", "uc_reg_write_batch", "uc_reg_write",
 )  # fmt: skip

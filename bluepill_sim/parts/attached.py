@@ -29,7 +29,7 @@ from simbase.state import Stateful
 from simbase.timing import Nanos
 
 #: By which method a part knows a bus.
-METHODS: Mapping[str, str] = {"SPI": "exchange", "I2C": "start", "USART": "sent", "CAN": "join"}
+_METHODS: Mapping[str, str] = {"SPI": "exchange", "I2C": "start", "USART": "sent", "CAN": "join"}
 #: A change of a pin: ns, the part's name for it, its level then.
 Change = tuple[Nanos, str, bool]
 #: Takes what a part does that is worth a line: (ns, part, what, detail).
@@ -204,7 +204,7 @@ class AttachedParts(Stateful):
     ) -> bool:  # fmt: skip
         """Hang a part on a bus; return whether the bus saves its state."""
         kind = on.rstrip("0123456789")
-        method = METHODS.get(kind)
+        method = _METHODS.get(kind)
         if method is None:
             raise PartError(f"the {name} cannot hang on {on!r}", hint="SPI1, SPI2, I2C1, I2C2, USART1 to 3, or CAN")
         if not hasattr(part, method):
@@ -244,7 +244,7 @@ class AttachedParts(Stateful):
     @staticmethod
     def _refuse_unconnected(part: Any, name: str, uses: Mapping[str, Use], pins: Mapping[str, str]) -> None:
         """Refuse a part that nothing could reach; of what knows a bus, a pin that it only holds serves that bus."""
-        buses = [bus for bus, method in METHODS.items() if hasattr(part, method)]
+        buses = buses_of(part)
         enough = [key for key, use in uses.items() if not buses or use is not Use.HELD]
         if (buses or uses) and not any(key in pins for key in enough):
             ways = [f"on={bus}{'' if bus == 'CAN' else 1}" for bus in buses] + [f"{key}=PA8" for key in enough[:1]]
@@ -263,6 +263,11 @@ class AttachedParts(Stateful):
         """Return a name that no other part has: a second oled is oled-2."""
         names = [name, *(f"{name}-{n}" for n in range(2, len(self.by_name) + 3))]
         return next(one for one in names if one not in self.by_name)
+
+
+def buses_of(part: object) -> list[str]:
+    """Return the buses on which a part, or a class of parts, can hang."""
+    return [bus for bus, method in _METHODS.items() if hasattr(part, method)]
 
 
 def words_of(parts: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -12,6 +12,7 @@ from bluepill_sim.core.nvic import VECTOR_COUNT, exception_name
 from bluepill_sim.errors import ImageError
 from bluepill_sim.program.image import Image
 from bluepill_sim.stm32f103 import FLASH_BASE, FLASH_BYTES, FLASH_BYTES_FITTED, SRAM_BASE, SRAM_BYTES
+from simbase.files import reason_of
 
 _SHF_ALLOC = 2
 
@@ -67,7 +68,7 @@ def read_bytes(image: Image) -> bytes:
     try:
         return Path(image.name).read_bytes()
     except OSError as error:
-        raise ImageError(f"{image.name}: {(error.strerror or str(error)).lower()}", hint="check the path") from error
+        raise ImageError(f"{image.name}: {reason_of(error)}", hint="check the path") from error
 
 
 def layout(image: Image) -> Layout:

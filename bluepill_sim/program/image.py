@@ -18,6 +18,7 @@ from bluepill_sim.errors import ImageError
 from bluepill_sim.program.wrong_files import wrong_kind
 from bluepill_sim.stm32f103 import FLASH_BASE, FLASH_BYTES_FITTED, SRAM_BASE, SRAM_BYTES
 from simbase.errors import MissingDependencyError
+from simbase.files import reason_of
 
 FLASH_END = FLASH_BASE + FLASH_BYTES_FITTED
 #: The stack may start at the very end of the SRAM, not beyond.
@@ -168,7 +169,7 @@ def load_image(path: str | Path) -> Image:
     try:
         data = file.read_bytes()
     except OSError as error:
-        raise ImageError(f"{path}: {(error.strerror or str(error)).lower()}", hint="check the path") from error
+        raise ImageError(f"{path}: {reason_of(error)}", hint="check the path") from error
     return parse_image(data, name=str(path))
 
 

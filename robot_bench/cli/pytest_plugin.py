@@ -160,7 +160,6 @@ _POOL = pytest.StashKey[_Pool]()
 @pytest.fixture
 def bench(request: pytest.FixtureRequest) -> "Iterator[Bench]":
     """A firmware on an emulated BluePill, its robot and its world, in virtual time: a `robot_bench.Bench`."""
-    from bluepill_sim.errors import BluePillError
     from simbase.errors import P2osError
 
     item: pytest.Item = request.node
@@ -169,9 +168,8 @@ def bench(request: pytest.FixtureRequest) -> "Iterator[Bench]":
     pool = item.config.stash.setdefault(_POOL, _Pool())
     try:
         made = pool.take(_scenario_of(item, getattr(request, "param", {})), booted)
-    except (P2osError, BluePillError) as error:
-        hint = getattr(error, "hint", None)
-        pytest.fail(f"{error}{f' (hint: {hint})' if hint else ''}", pytrace=False)
+    except P2osError as error:
+        pytest.fail(f"{error}{f' (hint: {error.hint})' if error.hint else ''}", pytrace=False)
     item.stash[_BENCH] = made
     yield made
     pool.give_back(made)
@@ -249,7 +247,6 @@ def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) ->
 
 def _record(item: pytest.Item, used: "Bench", report: Any, failure: str) -> None:
     """Write the run folder of a test, and tell where it is."""
-    from bluepill_sim.errors import BluePillError
     from robot_bench.report.make import Files
     from robot_bench.run import why_failed, write_run
     from simbase.errors import P2osError
@@ -260,8 +257,9 @@ def _record(item: pytest.Item, used: "Bench", report: Any, failure: str) -> None
     try:
         if said:
             try:
-                with contextlib.suppress(P2osError, BluePillError):
-                    why = why_failed(used, [said])
+                why = why_failed(used, [said])
+            except P2osError:
+                pass
             except Exception as error:  # noqa: BLE001 - a fault of ours must not end the session of the user's tests
                 report.sections.append(("bench: why", f"not found, a fault of p2os: {type(error).__name__}: {error}"))
         page = write_run(used, folder, said, explained=why, files=Files.PLOTS)

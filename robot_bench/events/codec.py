@@ -219,11 +219,11 @@ _READ: Mapping[object, Callable[[Json, str], object]] = {
 def _plain(kind: str, made: type[Any], words: str) -> _Row:
     """Return the row of a kind of which each attribute is a key, read by its type: "key:attribute", or one for both."""
     keys = {key: name or key for key, _, name in (word.partition(":") for word in words.split())}
-    readers = [(name, key, _READ[get_type_hints(made)[name]]) for key, name in keys.items()]
+    types = get_type_hints(made)
+    readers = [(name, key, _READ[types[name]]) for key, name in keys.items()]
 
     def to_entry(event: Event) -> Json:
-        values = {key: getattr(event, name) for key, name in keys.items()}
-        return {key: _SPELLED[type(value)](value) for key, value in values.items()}
+        return {key: _SPELLED[type(value := getattr(event, name))](value) for key, name in keys.items()}
 
     def from_entry(t: Nanos, entry: Json) -> Event:
         event: Event = made(t=t, **{name: read(entry, key) for name, key, read in readers})

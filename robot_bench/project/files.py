@@ -16,6 +16,7 @@ from pathlib import Path
 
 from adapter_sim.pinout import Pinout, Wire, WireRole, load_pinout
 from simbase.errors import FileError, UsageError, shown, shown_name
+from simbase.files import reason_of
 
 FIRMWARE = "build/robot.elf"
 SCENARIO = "just-drive.toml"
@@ -225,7 +226,7 @@ def write_project(folder: Path, contents: dict[str, str]) -> None:
             with contextlib.suppress(OSError):
                 path.rmdir() if path.is_dir() else path.unlink()
         if isinstance(error, OSError):
-            reason = (error.strerror or str(error)).lower()
+            reason = reason_of(error)
             raise FileError(
                 f"cannot write {shown_name(error.filename or folder)}: {reason}", hint="choose another folder"
             ) from error

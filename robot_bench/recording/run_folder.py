@@ -20,6 +20,7 @@ from pathlib import Path
 from robot_bench.recording.run_record import TRACE_NAME
 from robot_bench.recording.summary import SUMMARY_NAME
 from simbase.errors import UsageError
+from simbase.files import reason_of
 
 #: Where run folders go by default, in the current directory.
 RUNS = Path("runs")
@@ -72,7 +73,7 @@ def make_next_folder(name: str, parent: Path = RUNS) -> Path:
                 return folder
     except OSError as error:
         raise UsageError(
-            f"cannot make a run folder in {parent}: {(error.strerror or str(error)).lower()}",
+            f"cannot make a run folder in {parent}: {reason_of(error)}",
             hint="--out FOLDER makes it elsewhere",
         ) from error
 

@@ -70,6 +70,11 @@ def make_scene(
         WorldError: The world has something that this body cannot take.
     """
     name = resolve_body(name)
+    if name not in BODY_NAMES:
+        scene = _scene_of_users(name, world, models)
+        if starts is not None:
+            scene.reset(starts, seed)
+        return scene
     load_engine(name)
     if name == "kinematic":
         from p2os.pioneer.body.kinematic import KinematicScene
@@ -79,14 +84,9 @@ def make_scene(
         from p2os.pioneer.body.bullet import BulletScene
 
         return BulletScene(world, models, starts)
-    if name == "mujoco":
-        from p2os.pioneer.body.mujoco import MujocoScene
+    from p2os.pioneer.body.mujoco import MujocoScene
 
-        return MujocoScene(world, models, starts)
-    scene = _scene_of_users(name, world, models)
-    if starts is not None:
-        scene.reset(starts, seed)
-    return scene
+    return MujocoScene(world, models, starts)
 
 
 def load_engine(name: str) -> None:

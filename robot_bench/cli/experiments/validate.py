@@ -177,8 +177,9 @@ def _run_all(
     seeds: Sequence[int] | None,
     jobs: int,
 ) -> list[Result]:
-    for body in {variant.body for variant in chosen_variants}:
-        load_once(chosen[0].load(settings).with_options(body=body))
+    first = chosen[0].load(settings)
+    for body in dict.fromkeys(variant.body for variant in chosen_variants):
+        load_once(first.with_options(body=body))
     with RunDisplay(is_shown=False) as display:
         console = Console(stderr=True)
         with console.status("validating", spinner="line") as status:

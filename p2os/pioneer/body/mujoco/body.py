@@ -228,25 +228,9 @@ class MujocoBody(EngineBody):
         self.scene.changed()
 
     def count_step(self, left_mps: float, right_mps: float) -> None:
-        """Begin a step with these rim-speed set-points."""
+        """Begin a step with these rim-speed set-points: the rotors pull their wheels along with their torque."""
         self._state = None
         self._steps += 1
-        self._turn_rotors(left_mps, right_mps)
-
-    def _step_alone(self, setpoints: Iterable[tuple[float, float]]) -> list[Turned]:
-        step, scene, take_step, made = mujoco.mj_step, self.scene, self.take_step, list[Turned]()
-        model, data = scene.model, scene.data
-        for left_mps, right_mps in setpoints:
-            self._state = None
-            self._steps += 1
-            self._turn_rotors(left_mps, right_mps)
-            step(model, data)
-            made.append(take_step(scene.efforts_nm, () if self._alone else scene.contacts))
-        self._state = None
-        return made
-
-    def _turn_rotors(self, left_mps: float, right_mps: float) -> None:
-        """Turn the rotors that drive the wheels at what is asked for; each pulls its wheel along with its torque."""
         told = (left_mps, right_mps, self.is_powered, self._most_nm)
         if self._is_grip_changed or told != self._told:
             self._told, self._is_grip_changed = told, False
@@ -256,6 +240,16 @@ class MujocoBody(EngineBody):
             most_torques[first], most_torques[first + 1] = left_nm, right_nm
         (left, right), qvel = self._rotors, self._qvel
         qvel[left], qvel[right] = self._rotor_rates
+
+    def _step_alone(self, setpoints: Iterable[tuple[float, float]]) -> list[Turned]:
+        step, scene, take_step, made = mujoco.mj_step, self.scene, self.take_step, list[Turned]()
+        model, data = scene.model, scene.data
+        for left_mps, right_mps in setpoints:
+            self.count_step(left_mps, right_mps)
+            step(model, data)
+            made.append(take_step(scene.efforts_nm, () if self._alone else scene.contacts))
+        self._state = None
+        return made
 
     def take_step(self, efforts_nm: Sequence[float], contacts: Iterable[Sequence[int]]) -> Turned:
         """Take what the engine's step has made of the robot.

@@ -45,7 +45,7 @@ def read(path: Path, up: str) -> World:
         if is_no_thing(link):
             continue
         place = _place(link.get("name"), parents, places, path)
-        joint = parents.get(link.get("name"))
+        joint, _ = parents.get(link.get("name"), (None, ""))
         traits = noted_traits(link, path) or PLAIN
         if joint is not None and joint.get("type") == "floating":
             traits = _traits(link, traits, collection, path)
@@ -73,14 +73,14 @@ def _traits(link: Element, traits: Traits, collection: Collection, path: Path) -
     return moving
 
 
-def _parents(links: Sequence[Element], joints: Sequence[Element], path: Path) -> dict[str, Element]:
-    """Return the joint on which each link hangs."""
+def _parents(links: Sequence[Element], joints: Sequence[Element], path: Path) -> dict[str, tuple[Element, str]]:
+    """Return the joint on which each link hangs, and the link that the joint hangs on."""
     names: set[str] = set()
     for link in links:
         if link.get("name") in names:
             raise WorldError(f"{path}:{link.line}: two links are named {link.get('name')!r}")
         names.add(link.get("name"))
-    parents: dict[str, Element] = {}
+    parents: dict[str, tuple[Element, str]] = {}
     for joint in joints:
         parent, child = _ends(joint, "parent", path), _ends(joint, "child", path)
         for name in (parent, child):
@@ -88,17 +88,16 @@ def _parents(links: Sequence[Element], joints: Sequence[Element], path: Path) ->
                 raise WorldError(
                     f"{path}:{joint.line}: joint {joint.get('name')!r} names {name!r}, which is no link here"
                 )
-        if parents.setdefault(child, joint) is not joint:
+        if parents.setdefault(child, (joint, parent))[0] is not joint:
             raise WorldError(f"{path}:{joint.line}: link {child!r} hangs on two joints")
     return parents
 
 
-def _place(link: str, parents: dict[str, Element], places: dict[str, Transform], path: Path) -> Transform:
+def _place(link: str, parents: dict[str, tuple[Element, str]], places: dict[str, Transform], path: Path) -> Transform:
     """Return where a link is, from its chain of joints; `places` keeps what is known of other links."""
     chain: dict[str, Element] = {}
     while link in parents and link not in places:
-        chain[link] = parents[link]
-        link = _ends(parents[link], "parent", path)
+        chain[link], link = parents[link]
         if link in chain:
             raise WorldError(f"{path}:{chain[link].line}: the joints go round in a ring at link {link!r}")
     place = places.get(link, IDENTITY)
