@@ -69,18 +69,13 @@ def forked_python() -> str:
     folder = _folder()
     with _locked(folder):
         try:
-            held = _hold(folder)
+            _hold(folder)
         except OSError:  # nobody serves there, or no more: a run of this number was killed
             for left in ("held", "socket"):
                 (folder / left).unlink(missing_ok=True)
             _start(folder)
-            held = _hold(folder)
-        _held.append(held)
+            _hold(folder)
     return str(folder / "python")
-
-
-#: What keeps the server; a worker's end closes it.
-_held: list[int] = []
 
 
 @cache
@@ -89,8 +84,9 @@ def _folder() -> Path:
     return Path(tempfile.gettempdir(), f"forked-{os.environ.get('PYTEST_XDIST_TESTRUNUID') or os.getpid()}")
 
 
-def _hold(folder: Path) -> int:
-    return os.open(folder / "held", os.O_WRONLY | os.O_NONBLOCK)
+def _hold(folder: Path) -> None:
+    """Keep the server until this process ends, which alone closes what is opened here."""
+    os.open(folder / "held", os.O_WRONLY | os.O_NONBLOCK)
 
 
 def _locked(folder: Path) -> TextIO:
@@ -201,9 +197,9 @@ class Server:
 
     def __init__(self, listener: socket.socket, folder: Path) -> None:
         self._listener, self._folder = listener, folder
-        self._lines: dict[int, socket.socket] = {}  # to clients, by their processes
+        #: By process: the line to its client, and where its time is kept.
+        self._running: dict[int, tuple[socket.socket, Path]] = {}
         self._spent_s: dict[Path, float] = {}
-        self._spent_files: dict[int, Path] = {}  # by process
         self._own_spent = _spent_file(folder, os.environ)
         self._has_all = False
         self._ended, self._wakes = socket.socketpair()
@@ -229,16 +225,16 @@ class Server:
                 elif key.fileobj is sys.stdin:
                     if self._is_left():
                         return None
-                else:  # a client has gone
+                elif key.data in self._running:  # its client has gone
                     self._selector.unregister(key.fileobj)
-                    kill(next(process for process, line in self._lines.items() if line is key.fileobj))
+                    kill(key.data)
 
     def _is_left(self) -> bool:
         """End what was forked and remove the folder, unless another worker has come."""
         with _locked(self._folder):
             if not select.select([sys.stdin], [], [], 0)[0]:
                 return False
-            for process in self._lines:
+            for process in self._running:
                 kill(process)
             shutil.rmtree(self._folder)
             return True
@@ -262,7 +258,7 @@ class Server:
         if command.can_be_forked:
             if not self._has_all and not is_of_p2os(command):
                 begun_s = time.process_time()
-                import_all()
+                import_verbs(IMPORTED_BY_OTHERS)
                 self._spend(self._own_spent, time.process_time() - begun_s)
                 self._has_all = True
             process = os.fork()
@@ -274,9 +270,8 @@ class Server:
         with contextlib.suppress(OSError):  # it has gone: that is noticed below
             line.sendall(process.to_bytes(LENGTH, "big"))
         if process:
-            self._lines[process] = line
-            self._spent_files[process] = _spent_file(self._folder, command.environment)
-            self._selector.register(line, selectors.EVENT_READ)
+            self._running[process] = line, _spent_file(self._folder, command.environment)
+            self._selector.register(line, selectors.EVENT_READ, process)
         else:  # it starts Python itself
             line.close()
         return None
@@ -286,7 +281,8 @@ class Server:
         signal.set_wakeup_fd(-1)
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)
         self._selector.close()
-        for each in (line, self._listener, self._ended, self._wakes, *self._lines.values()):
+        others = (other for other, _ in self._running.values())
+        for each in (line, self._listener, self._ended, self._wakes, *others):
             each.close()
 
     def _tell_ended(self) -> None:
@@ -297,8 +293,8 @@ class Server:
                 process, status, used = os.wait4(-1, os.WNOHANG)
                 if not process:
                     break
-                self._spend(self._spent_files.pop(process), used.ru_utime + used.ru_stime)
-                line = self._lines.pop(process)
+                line, file = self._running.pop(process)
+                self._spend(file, used.ru_utime + used.ru_stime)
                 with contextlib.suppress(KeyError):  # where it has gone
                     self._selector.unregister(line)
                 with contextlib.suppress(OSError):
@@ -424,23 +420,12 @@ def is_of_p2os(command: Command) -> bool:
     return False
 
 
-def import_p2os() -> None:
-    """Import what commands of p2os do."""
+def import_verbs(beside: Sequence[str], of: str = "") -> None:
+    """Import the verbs whose modules begin so, and before them what they import at their work."""
     from p2os.cli.main import verbs
 
-    _import([*IMPORTED, *(entry.module for entry in verbs() if entry.module.startswith("p2os."))])
-
-
-def import_all() -> None:
-    """Import what all commands do."""
-    from p2os.cli.main import verbs
-
-    _import([*IMPORTED_BY_OTHERS, *(entry.module for entry in verbs())])
-
-
-def _import(names: Sequence[str]) -> None:
     gc.disable()
-    for name in names:
+    for name in (*beside, *(entry.module for entry in verbs() if entry.module.startswith(of))):
         with contextlib.suppress(ImportError):
             importlib.import_module(name)
     gc.freeze()
@@ -450,7 +435,7 @@ def _import(names: Sequence[str]) -> None:
 if __name__ == "__main__":
     with socket.socket(fileno=int(sys.argv[1])) as listening:
         base = sys.path[1 + len(os.environ["PYTHONPATH"].split(os.pathsep)) :]
-        import_p2os()
+        import_verbs(IMPORTED, "p2os.")
         wanted = Server(listening, Path(sys.argv[2])).serve()
     if wanted is not None:
         become(wanted, base)

@@ -6,12 +6,12 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
+from tests.p2os.client.served_robot import until
 from tests.tools.forked_python import ROOT, forked_python
 
 TIMEOUT_S = 30.0
@@ -88,10 +88,7 @@ print(subprocess.run([forked_python(), "-c", "print('p2os.cli.main' in __import_
 """
     code, said, err = ran(sys.executable, ["-c", program], ROOT, PYTEST_XDIST_TESTRUNUID="left", TMPDIR=str(tmp_path))
     assert (code, said.splitlines()[0]) == (0, "True"), err
-    ends = time.monotonic() + TIMEOUT_S
-    while folder.exists():  # the server has ended with its last worker
-        assert time.monotonic() < ends
-        time.sleep(0.01)
+    until(lambda: not folder.exists(), "the end of the server with its last worker")
 
 
 @pytest.mark.parametrize(

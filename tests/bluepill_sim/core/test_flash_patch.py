@@ -13,7 +13,6 @@ from tests.bluepill_sim.native.test_native_core import state
 FP_CTRL, FP_REMAP, FP_COMP = 0xE000_2000, 0xE000_2004, 0xE000_2008
 TABLE = 0x2000_1000
 #: movs r0, #n twice in a word.
-MOVES = 0x2000_2000
 #: `patched` is `movs r0, #1; nop`, `literal` the word 0x11111111, `run` logs both; each at a multiple of 4.
 BODY = """
 b run

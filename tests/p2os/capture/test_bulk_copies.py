@@ -15,6 +15,7 @@ from p2os.capture.columns.gathering import joined  # noqa: E402
 from p2os.capture.formats.recording import recorded_parts, write_recording  # noqa: E402
 from p2os.capture.formats.recording_bulk import plain_lines  # noqa: E402
 from p2os.capture.formats.tcp_streams import TcpStreams  # noqa: E402
+from tests.p2os.capture.blocks import parts_of  # noqa: E402
 
 steps = st.sampled_from((0, 1, 9, 90, 900, 10**8, 10**13))
 parts = st.lists(
@@ -33,13 +34,11 @@ def test_lines_whose_times_have_any_number_of_digits_are_read_at_once(
         lines = lines.replace(b"\n", b"\r\n")
     block = plain_lines(lines)
     assert block is not None
-    assert [(chunk.at_ns, chunk.direction, chunk.data) for chunk in block] == timed
+    assert parts_of(block) == timed
     place = data.draw(st.integers(0, len(lines)))
     hit = lines[:place] + data.draw(st.sampled_from((b"", b"7", b",", b"\n", b'"'))) + lines[place + 1 :]
     read = plain_lines(hit)
-    assert read is None or [(chunk.at_ns, chunk.direction, chunk.data) for chunk in read] == list(
-        recorded_parts(hit.decode().splitlines())
-    )
+    assert read is None or parts_of(read) == list(recorded_parts(hit.decode().splitlines()))
 
 
 def test_a_time_that_steps_back_within_a_block_of_lines_is_moved_up() -> None:

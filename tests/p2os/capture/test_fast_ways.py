@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from p2os.capture import ListingRow, Reading, open_capture, open_file, rows_of
-from p2os.capture.chunks import Block, Chunk, Direction, Part, block_of, capture_of
+from p2os.capture.chunks import Chunk, Direction, Part, capture_of
 from p2os.capture.formats.recording import recorded_parts, write_recording
 from p2os.capture.formats.recording_bulk import plain_lines
 from p2os.cli.captures.reading import chosen_rows, wanted_names
@@ -21,6 +21,7 @@ from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import load_parameters
 from simbase.errors import FileError
 from simbase.timing import NS_PER_MS
+from tests.p2os.capture.blocks import blocks_of, parts_of
 
 P2DX = Reading(profile=Profile.P2OS, parameters=load_parameters("p2dx"))
 SIP = packet_frame(StandardSip(raw_x=5, sonar=(SonarReading(1, 1000),)), Profile.P2OS).to_bytes()
@@ -53,11 +54,6 @@ def both_ways(chunks: list[Chunk], ways: Iterable[tuple[tuple[int, int], str]] =
             names = wanted_names(listed)
             passed = shown_of(chosen_rows(blocks_of(chunks, together), P2DX, names))
             assert passed == [row for row in fast if str(row[4]).lower() in names or ("damaged" in names and row[5])]
-
-
-def blocks_of(chunks: list[Chunk], together: int) -> list[Block]:
-    blocks = [block_of(parts_of(chunks[place : place + together])) for place in range(0, len(chunks), together)]
-    return [block for block in blocks if len(block)]
 
 
 def chunks_of(stream: bytes, cuts: tuple[int, ...], wait_ns: int, direction: Direction | None = None) -> list[Chunk]:
@@ -142,10 +138,6 @@ def test_the_checksum_is_the_sum_of_pairs_and_an_odd_last_byte(data: bytes) -> N
 
 PARTS: list[Part] = [(0, Direction.FROM_ROBOT, SIP), (999_999_999_999_999, Direction.TO_ROBOT, b"\xfa")]
 BLOCK = write_recording(capture_of(PARTS)).split("\n", 1)[1].encode()
-
-
-def parts_of(block: Iterable[Chunk]) -> list[Part]:
-    return [(chunk.at_ns, chunk.direction, chunk.data) for chunk in block]
 
 
 def test_lines_of_ours_are_read_at_once() -> None:

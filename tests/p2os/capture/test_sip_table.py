@@ -23,7 +23,7 @@ from p2os.protocol.packets import EncoderPacket, SonarReading, StandardSip, pack
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import load_parameters
 from simbase.timing import NS_PER_MS, NS_PER_S
-from tests.p2os.capture.blocks import block_of_chunks
+from tests.p2os.capture.blocks import blocks_of
 from tests.p2os.protocol.drawn_packets import SEEDS, Draw, any_packet, any_sip
 
 GOLDEN = Path(__file__).parents[2] / "golden"
@@ -55,9 +55,7 @@ def plain(table: Table) -> Table:
 def same(
     capture: Capture, reading: Reading = P2DX, *, first_rows: int = 4096, block: int = 1 << 20, together: int = 3
 ) -> dict[str, list[Cell]]:
-    chunks = capture.chunks
-    blocks = [block_of_chunks(chunks[place : place + together]) for place in range(0, len(chunks), together)]
-    blocks = [block for block in blocks if len(block)]
+    blocks = blocks_of(capture.chunks, together)
     ours = joined(sip_tables(blocks, reading, first_rows=first_rows, block=block))
     rows = [row for row in rows_of(capture, reading) if row.direction is not CLIENT and row.is_sip]
     theirs = joined(tables_of(rows, reading, first_rows))

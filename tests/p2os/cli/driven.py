@@ -78,8 +78,9 @@ class Driver:
             os.close(inside)
         else:
             self.process = subprocess.Popen(
-                words, stdin=subprocess.DEVNULL, stdout=stdout, stderr=subprocess.PIPE, cwd=cwd
-            )
+                words, stdin=subprocess.DEVNULL, stdout=stdout, stderr=subprocess.PIPE, cwd=cwd,
+                bufsize=0,  # what `hear` does not take is left to `end`
+            )  # fmt: skip
 
     def listens_at(self) -> str:
         """Return the URL that `p2os sniff` says it listens at, of a port that the system chose."""

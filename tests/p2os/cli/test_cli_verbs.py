@@ -21,7 +21,6 @@ from p2os.protocol.packets import Identity
 from p2os.protocol.sip import SonarReading, StandardSip
 from p2os.robots.parameters import load_parameters
 
-TIMEOUT_S = 30.0
 P2DX = load_parameters("p2dx")
 Capture = pytest.CaptureFixture[str]
 

@@ -15,8 +15,6 @@ from p2os.transport.waiting import RealWaits, waits_of
 from p2os.transport.wall_clock import wall_clock
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
-Session = Callable[[], list[Nanos]]
-
 
 def in_thread(clock: VirtualClock, work: Callable[[], object]) -> threading.Thread:
     thread = threading.Thread(target=work, daemon=True)

@@ -36,4 +36,4 @@ def hurried(name: str, ticks: int = 1) -> Path:
 
 def hurried_scenario(name: str, ticks: int = 1, **options: Unpack[ScenarioOptions]) -> Scenario:
     """Return a shipped scenario with its program in a hurry, and options of `Scenario.with_options`."""
-    return load_scenario(name).with_options(firmware=hurried(name, ticks)).with_options(**options)
+    return load_scenario(name, firmware=hurried(name, ticks)).with_options(**options)

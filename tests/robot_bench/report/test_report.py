@@ -16,8 +16,6 @@ from robot_bench.report.make import Files, make_artefacts
 from robot_bench.report.packets import describe
 from robot_bench.report.page import page_data
 
-SIP = "fafb1b33a604000000049600fa007d00000004030000000000000000"
-
 
 def entries() -> list[dict[str, object]]:
     """A short run: two poses a metre apart, a few edges, a line of text, a packet."""

@@ -24,7 +24,6 @@ from simbase.errors import FileError, UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 OPTIONS = NodeOptions(name="bench")
-INT = "std_msgs/msg/Int32"
 P2DX = load_scenario("sensors").parameters
 
 

@@ -16,8 +16,8 @@ CODES = bytes(range(10, 20)).ljust(256, b"\0")
 
 
 def time_of(data: bytes) -> int:
-    """Return a time of up to 40 bits: 16, so many bits to the left."""
-    return (data[0] << 8 | data[1]) << data[2] % 25
+    """Return a time: one of each two below 10, where edges meet, the other of 16 bits, up to 24 to the left."""
+    return data[1] % 10 if data[2] & 1 else (data[0] << 8 | data[1]) << (data[2] >> 1) % 25
 
 
 # Drawn as bytes: to draw each number takes longer than all else.

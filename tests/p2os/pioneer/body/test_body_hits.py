@@ -13,7 +13,6 @@ from p2os.robots.parameters import load_parameters
 from tests.p2os.pioneer.body.bodies import Maker, drive, each_body
 
 P2DX = load_parameters("p2dx")
-FRONT_M = P2DX.body.hull_front_m
 
 
 @pytest.fixture(params=each_body())
