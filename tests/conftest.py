@@ -9,6 +9,10 @@ from pathlib import Path
 
 import pytest
 
+#: What a run leaves out that names no marks (`-m`): of whole folders, and of files or tests that it names.
+OF_FOLDERS = "not slow and not soak and not hardware"
+OF_FILES = "not soak and not hardware"
+
 
 def pytest_addoption(parser: pytest.Parser, pluginmanager: pytest.PytestPluginManager) -> None:
     """Add the options of tests/tools/counted_lines.py and tests/tools/spent_time.py, and begin to count lines.
@@ -30,14 +34,21 @@ def pytest_addoption(parser: pytest.Parser, pluginmanager: pytest.PytestPluginMa
 
 @pytest.hookimpl(tryfirst=True)  # Hypothesis loads the profile that a command line names
 def pytest_configure(config: pytest.Config) -> None:
-    """Keep compiled modules beside the sources even where PYTHONDONTWRITEBYTECODE is set, and bound no example's time.
+    """Leave long tests out of folders, keep compiled modules beside the sources, and bound no example's time.
 
-    A child that compiles 200 modules of ours takes 1.0 s of processor time to start, and 0.25 s else; and Python looks
-    in one place only: where they are kept in a folder of their own, 3,500 modules of installed packages and its own
-    are compiled anew, too. How long an example takes depends on what else the machine does.
+    Modules are kept even where PYTHONDONTWRITEBYTECODE is set: a child that compiles 200 modules of ours takes 1.0 s
+    of processor time to start, and 0.25 s else; and Python looks in one place only: where they are kept in a folder of
+    their own, 3,500 modules of installed packages and its own are compiled anew, too. How long an example takes
+    depends on what else the machine does.
+
+    `pytest FOLDER` is what one runs again and again beside the work: without the tests that take seconds each, which
+    `make test` runs, with all others.
 
     Examples are the same in each run, so that a commit that passes does so again; `make soak` draws others.
     """
+    if not config.option.markexpr:
+        named = [argument.partition("::")[0] for argument in config.args]
+        config.option.markexpr = OF_FILES if all(name.endswith(".py") for name in named) else OF_FOLDERS
     gc.disable()  # until all is collected: what imports make stays, and looking through it again and again takes long
     if sys.dont_write_bytecode:
         sys.dont_write_bytecode = False

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.tools.forked_python import PYTEST, forked_python
 from tools.check_coverage import merged
 
 ROOT = Path(__file__).parents[1]
@@ -58,3 +59,33 @@ def test_children_keep_the_modules_that_they_compile(tmp_path: Path) -> None:
     code = "import compiled; from pathlib import Path; assert Path(compiled.__cached__).is_file()"
     subprocess.run([sys.executable, "-c", code], cwd=tmp_path, check=True, timeout=60)
     assert not sys.dont_write_bytecode
+
+
+@pytest.mark.parametrize(
+    ("options", "ran"),
+    [
+        (["tests"], ["quick"]),
+        ([], ["quick"]),
+        (["tests", "tests/test_all.py"], ["quick"]),
+        (["tests/test_all.py"], ["quick", "slow"]),
+        (["tests/test_all.py::test_slow"], ["slow"]),
+        (["tests", "-m", "slow"], ["slow"]),
+        (["tests", "-m", "not soak and not hardware"], ["quick", "slow"]),
+        (["tests/test_all.py", "-m", "soak or hardware"], ["soak", "hardware"]),
+        (["tests", "-n", "1"], ["quick"]),
+    ],
+    ids=" ".join,
+)
+def test_long_tests_are_left_out_unless_they_are_asked_for(tmp_path: Path, options: list[str], ran: list[str]) -> None:
+    for name in ("tests/conftest.py", "pyproject.toml"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_bytes((ROOT / name).read_bytes())
+    names = ("quick", "slow", "soak", "hardware")
+    marks = ("", *(f"@pytest.mark.{name}" for name in names[1:]))
+    tests = (f"{mark}\ndef test_{name}(): open('{name}.ran', 'x')\n" for name, mark in zip(names, marks, strict=True))
+    (tmp_path / "tests" / "test_all.py").write_text("import pytest\n" + "".join(tests))
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST")}
+    line = [forked_python(), "-c", PYTEST, "-p", "no:cacheprovider", *options]
+    done = subprocess.run(line, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False, timeout=120)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert [name for name in names if (tmp_path / f"{name}.ran").exists()] == ran
