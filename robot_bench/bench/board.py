@@ -49,7 +49,7 @@ def plug_in(scenario: Scenario, chip: Chip, recorder: Recorder, world: Surroundi
         lambda at, part, what, detail: recorder.event("part", at, part, f"{what} {detail}".rstrip())
     )
     for number, spec in enumerate(scenario.parts):
-        with placed(within(scenario.name, "part", number)):
+        with placed(within(scenario.where or scenario.name, "part", number)):
             attach(board, spec)
 
 

@@ -14,6 +14,7 @@ from adapter_sim.pinout import Pinout, WireRole
 from p2os.errors import ScenarioError
 from p2os.pioneer.body.contract import RobotBody
 from p2os.pioneer.controller import Pioneer
+from p2os.toml_schema import within
 from robot_bench.adapter import make_adapter
 from robot_bench.bench.board import cut_wires
 from robot_bench.direct import DirectRobot, DistanceSensors, JointMotor, WheelEncoder
@@ -73,13 +74,19 @@ def make_far_end(
         robot.on_event, robot.on_ranges = recorder.listener("robot"), recorder.sonar
         return FarEnd(robots=(robot,))
     if scenario.mode == "direct":
-        if scenario.faults or any(when.faults for when in scenario.whens):
-            raise ScenarioError(
-                f"{scenario.name}: [[fault]] acts on the robot's controller, and mode direct has none",
-                hint="--mode adapter",
-            )
+        _refuse_faults(scenario)
         return FarEnd(robots=(_direct_robot(scenario, pinout, body, harness, recorder),))
     return _ends_of_line(scenario, pinout, body, harness, recorder, is_among_others=is_among_others)
+
+
+def _refuse_faults(scenario: Scenario) -> None:
+    where = scenario.where or scenario.name
+    places = [within(where, "fault", 0)] if scenario.faults else []
+    places += [within(where, "when", number) for number, when in enumerate(scenario.whens) if when.faults]
+    if places:
+        raise ScenarioError(
+            f"{places[0]}: a fault acts on the robot's controller, and mode direct has none", hint="--mode adapter"
+        )
 
 
 def _direct_robot(

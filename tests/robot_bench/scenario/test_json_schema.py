@@ -174,10 +174,15 @@ def test_a_check_names_the_row_of_a_sweep_that_cannot_be(
     Path("good.toml").write_text('extends = "dodge"\nseeds = "0-4"\n[sweep]\nthreshold_m = [0.4, 0.6]\n')
     Path("bad.toml").write_text('extends = "dodge"\n[sweep]\nthreshold_m = [0.4, -1]\n')
     Path("faults.toml").write_text('extends = "motors"\nmode = "direct"\n[[fault]]\nat_s = 1.0\nfault = "link-down"\n')
+    Path("when.toml").write_text(
+        'extends = "motors"\nmode = "direct"\n[[when]]\nevent = "contact"\ndo = "end"\n'
+        '[[when]]\nevent = "contact"\ndo = "drop_link"\n'
+    )
     Path("part.toml").write_text('extends = "motors"\n[[part]]\nkind = "gps"\non = "USART9"\n')
-    assert p2os(["check", "good.toml", "bad.toml", "faults.toml", "part.toml"]) == 1
+    assert p2os(["check", "good.toml", "bad.toml", "faults.toml", "when.toml", "part.toml"]) == 1
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "ok     good.toml: 120 s of dodge.elf in room, 4 goals, 10 runs"
     assert lines[1].startswith("wrong  bad.toml: [sweep] threshold_m: threshold_m = -1 is out of range")
-    assert lines[2].startswith("wrong  faults: [[fault]] acts on the robot's controller, and mode direct has none")
-    assert lines[3].startswith("wrong  part: [[part]] 1: no such port: USART9")
+    assert lines[2].startswith("wrong  faults.toml:3: [[fault]] 1: a fault acts on the robot's controller, and mode")
+    assert lines[3].startswith("wrong  when.toml:6: [[when]] 2: a fault acts on the robot's controller, and mode")
+    assert lines[4].startswith("wrong  part.toml:2: [[part]] 1: no such port: USART9")
