@@ -23,7 +23,7 @@ from itertools import combinations
 
 from robot_bench.events.kinds import Contact
 from robot_bench.report.explain.chain import Evidence, Step
-from robot_bench.report.explain.findings import Finding, ended, injected, numbers, obeyed, steady_since
+from robot_bench.report.explain.findings import Finding, all_steady_since, ended, injected, numbers, obeyed, steady_since
 from robot_bench.report.explain.probing import Answer, Prober
 from robot_bench.report.explain.replay import Hold
 from robot_bench.report.explain.scene import Scene
@@ -283,7 +283,9 @@ class ContactInquest:
         """Return the motor that is never reversed where, mirrored, the other one is; None where there is no such."""
         times = sorted({t for net in prober.replay.outputs if net.startswith("motor")
                         for t in self.scene.record.pins[net].times})  # fmt: skip
-        given = [steady_since(self.scene.record, t)[0] for t in times if t <= prober.replay.end]
+        given = [codes for codes, _ in all_steady_since(
+            self.scene.record, [t for t in times if t <= prober.replay.end]
+        )]  # fmt: skip
         given += [answer.codes for answers in self._asked for answer in answers.values()]
         nets = prober.sensors
         for motor, names in ((0, ("left", "right")), (1, ("right", "left"))):

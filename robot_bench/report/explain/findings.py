@@ -5,11 +5,11 @@ Invariant: a finding that is called a cause says no more than what was recorded 
 
 import itertools
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from robot_bench.recording.run_record import RunRecord
-from robot_bench.recording.signals import motor_steps
+from robot_bench.recording.signals import Steps, motor_steps
 from robot_bench.report.explain.chain import Evidence, Step
 from robot_bench.report.explain.probing import Prober
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
@@ -39,16 +39,21 @@ def numbers(names: Sequence[str]) -> str:
 
 def steady_since(record: RunRecord, at: Nanos) -> tuple[tuple[int, int], Nanos]:
     """Return the codes of the motors at a time, and since when they are those; 0 where nothing has run."""
-    found, since = [], 0
-    for motor in (1, 2):
-        steps = motor_steps(record.pins, motor)
+    return all_steady_since(record, (at,))[0]
+
+
+def all_steady_since(record: RunRecord, times: Iterable[Nanos]) -> list[tuple[tuple[int, int], Nanos]]:
+    """Return what `steady_since` does for each of some times; the pins' edges are gone through once."""
+    left, right = (motor_steps(record.pins, motor) for motor in (1, 2))
+
+    def last(steps: Steps, at: Nanos) -> tuple[int, Nanos]:
         if not steps.times:
-            found.append(0)
-            continue
+            return 0, 0
         place = max(0, bisect_right(steps.times, at) - 1)
-        found.append(int(steps.values[place]))
-        since = max(since, steps.times[place])
-    return (found[0], found[1]), since
+        return steps.values[place], steps.times[place]
+
+    found = [(last(left, at), last(right, at)) for at in times]
+    return [((one, other), max(since, later)) for (one, since), (other, later) in found]
 
 
 def obeyed(record: RunRecord, step_mps: float, at: Nanos, steps: list[Step]) -> Finding | None:

@@ -18,10 +18,12 @@ from robot_bench.cli import explain as verb
 from robot_bench.events.kinds import Fault, Pose
 from robot_bench.firmware.build import COMPILER, HERE, compiler_version
 from robot_bench.recording.run_record import RunRecord, read_run
+from robot_bench.recording.signals import motor_steps
+from robot_bench.report.explain import findings
 from robot_bench.report.explain.chain import WIDTH, Evidence, Explanation, Standing, Step
 from robot_bench.report.explain.contact import exchanged
 from robot_bench.report.explain.explain import explain
-from robot_bench.report.explain.findings import injected, let_go
+from robot_bench.report.explain.findings import all_steady_since, injected, let_go
 from robot_bench.report.explain.probing import Answer, first_row
 from robot_bench.report.explain.replay import ChipReplay, Hold, Seen
 from robot_bench.report.explain.scene import Scene
@@ -303,6 +305,19 @@ def test_a_control_wire_that_let_the_robot_go_is_told_until_it_is_connected_agai
     record = RunRecord(pins={"rst": Edges([(0, 0), (100, 1), (200, 0)]), "p2dx_con": Edges([(0, 1)])})
     found = let_go(record, at)
     assert (None if found is None else found[2]) == says
+
+
+def test_the_codes_of_the_motors_at_many_times_go_through_the_edges_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    edges = [(0, 0), *((100 + step, 1 - step % 2) for step in range(400))]
+    record = RunRecord(pins={"motor1_comm1": Edges(edges), "motor2_comm4": Edges([(0, 0), (150, 1)])})
+    asked: list[int] = []
+    monkeypatch.setattr(findings, "motor_steps", lambda pins, motor: asked.append(motor) or motor_steps(pins, motor))
+    at = [99, 100, 149, 150, 151, 9999]
+    assert all_steady_since(record, [*at, *range(1000)])[: len(at)] == [
+        ((0, 0), 0), ((-1, 0), 100), ((0, 0), 149), ((-1, -1), 150), ((0, -1), 151), ((0, -1), 499),
+    ]  # fmt: skip
+    assert asked == [1, 2]
+    assert all_steady_since(RunRecord(pins={}), [5]) == [((0, 0), 0)]
 
 
 def test_a_passed_run_has_nothing_to_explain(unfair: Path) -> None:
