@@ -119,20 +119,23 @@ class _Readings:
         return self._expected(self.kept, cone_deg, delay_s)
 
     def _expected(self, which: npt.NDArray[np.bool_], cone_deg: float, delay_s: float) -> Floats:
-        key = which.tobytes(), delay_s
-        asked = (*key, cone_deg)
+        asked = which.tobytes(), delay_s, cone_deg
         if (known := self._known.get(asked)) is not None:
             return known
-        if key != self._placed[0]:
-            self._placed = key, self._sonars(which, delay_s)
-        x, y, heading = self._placed[1]
+        x, y, heading = self._sonars(which, delay_s)
         spread = np.radians(cone_deg) / 2 * np.linspace(-1, 1, RAYS_PER_CONE)
         found = nearest(self._walls, x, y, heading[:, None] + spread, self._longest_m)
         self._known = dict([*self._known.items(), (asked, found)][-MOST_KNOWN:])
         return found
 
     def _sonars(self, which: npt.NDArray[np.bool_], delay_s: float) -> Floats:
-        """Return where some readings were taken: shape (3, n), metres and radians."""
+        """Return where some readings were taken: shape (3, n), metres and radians; what was asked last is known."""
+        asked = which.tobytes(), delay_s
+        if asked != self._placed[0]:
+            self._placed = asked, self._place(which, delay_s)
+        return self._placed[1]
+
+    def _place(self, which: npt.NDArray[np.bool_], delay_s: float) -> Floats:
         found, begin = [], 0
         for body, t, sonar, _ in self._drives:
             these = which[begin : begin + len(t)]

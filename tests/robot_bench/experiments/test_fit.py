@@ -1,6 +1,7 @@
 """A robot's parameters out of drives: planted errors come back within intervals, and what is not seen is named."""
 
 import dataclasses
+import itertools
 import json
 import math
 import random
@@ -209,6 +210,23 @@ def test_the_nearest_of_walls_is_that_of_each_alone_however_many_are_crossed_at_
     monkeypatch.setattr(sonar, "MOST_AT_ONCE", at_once)
     assert nearest(walls, x, y, fans, 5.0) == pytest.approx(alone)
     assert len(set(alone)) > 10
+
+
+def test_where_readings_were_taken_is_worked_out_once_for_a_delay(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[int, float]] = []
+    interpolated = np.interp
+
+    def interp(t, *rest):
+        asked.append((len(t), float(t.sum())))
+        return interpolated(t, *rest)
+
+    source = random.Random(5)
+    driven = drive(P2DX, Planted.drawn(source), source, 20.0)
+    monkeypatch.setattr(sonar.np, "interp", interp)
+    fit_sonar([driven], WALLS)
+    calls = asked[::3]  # x, y and the heading
+    assert len(calls) > 10
+    assert all(one != other for one, other in itertools.pairwise(calls))
 
 
 def test_the_formulas_give_back_small_errors_of_their_own_derivation() -> None:
