@@ -14,10 +14,9 @@ from p2os.cli.help_pages import BENCH
 from p2os.cli.keyboard import has_keyboard
 from p2os.cli.main import EXIT_INTERRUPTED
 from p2os.cli.names import bodies, urls
-from p2os.cli.quantities import option
 from robot_bench.cli.progress import RunDisplay
 from robot_bench.cli.run import ask, capped, drive_port
-from robot_bench.cli.workers import core_count, load_once, run_in_processes
+from robot_bench.cli.workers import Jobs, core_count, load_once, run_in_processes
 from robot_bench.events.codec import Json
 from robot_bench.experiments.validation.experiments import EXPERIMENTS, AtPort, Experiment
 from robot_bench.experiments.validation.figures import LOOSE_BECAUSE, Figure, loose
@@ -41,7 +40,6 @@ from robot_bench.scenario.scenario import MODES
 from robot_bench.scenario.sweep import read_seeds
 from simbase.errors import UsageError, nearest
 from simbase.files import writing
-from simbase.units import COUNT
 
 REPORT, FIGURES = "validation.html", "validation.json"
 #: chosen: so many failures are told of one by one.
@@ -102,7 +100,7 @@ def validate(
         str | None, typer.Option(help="Validate the robot at this URL.", metavar="URL", autocompletion=urls)
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Where the report goes.", metavar="DIR")] = None,
-    jobs: Annotated[int | None, option(COUNT, "--jobs", "-j", purpose="So many runs at a time.", least="1")] = None,
+    jobs: Jobs = None,
     json_output: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
     yes: Annotated[bool, typer.Option("--yes", help="With --port: do not ask before the first motion.")] = False,
 ) -> None:

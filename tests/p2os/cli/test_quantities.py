@@ -93,6 +93,12 @@ def test_every_option_and_argument_shows_its_value_in_one_style() -> None:
             assert METAVAR.fullmatch(shown), (path, parameter.opts, shown)
 
 
+def test_the_number_of_runs_at_a_time_is_one_option_of_all_verbs() -> None:
+    found = {path: one for path, command in commands() for one in command.params if "--jobs" in one.opts}
+    assert {"p2os run", "p2os campaign", "p2os validate"} <= set(found)
+    assert len({(one.help, one.metavar, *one.opts) for one in found.values()}) == 1, found
+
+
 def test_every_verb_is_in_a_group_and_told_in_a_line(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
