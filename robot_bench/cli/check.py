@@ -7,7 +7,9 @@ from typing import Annotated
 import typer
 
 from p2os.cli.help_pages import BENCH
+from p2os.toml_schema import placed
 from robot_bench.bench import Bench
+from robot_bench.scenario.included_files import as_toml
 from robot_bench.scenario.json_schema import scenario_schema
 from robot_bench.scenario.scenario import Scenario, load_scenario
 from robot_bench.scenario.sweep import rows
@@ -17,7 +19,8 @@ from simbase.timing import NS_PER_S
 HELP = """Check scenario files without running them.
 
 Keys, ranges, names, events in words, firmware, world, parts and wires are looked
-at, in all files that a scenario includes, with every value that it sweeps.
+at, in all files that a scenario includes, with every value that it sweeps: keys and
+names in each row, parts and wires in one row with each value.
 
 Exit code: 0 all can be run, 1 one cannot.
 
@@ -51,8 +54,8 @@ def check(
     for name in files:
         try:
             found = load_scenario(name, firmware=firmware)
+            _build(found)
             runs = _check_rows(name, found, firmware)
-            Bench.from_scenario(found, body="kinematic")  # the cheapest: what is refused here, every body refuses
         except P2osError as error:
             wrong += 1
             typer.echo(f"wrong  {error}" + (f" (hint: {error.hint})" if error.hint else ""))
@@ -68,11 +71,22 @@ def check(
 def _check_rows(name: str, scenario: Scenario, firmware: Path | None) -> int:
     """Check every row of a sweep; return how many runs there are.
 
+    A bench takes several times as long as its scenario: it is built for the first row with each value.
+
     Raises:
         P2osError: A value of a parameter cannot be.
     """
-    count = 0
+    count, built = 0, set[str]()
     for settings in rows(scenario.axes) if scenario.axes else ():
-        load_scenario(name, firmware=firmware, settings=settings, set_by=f"{name}: [sweep]")
+        row = load_scenario(name, firmware=firmware, settings=settings, set_by=f"{name}: [sweep]")
+        words = [f"{key} = {as_toml(value)}" for key, value in settings]
+        if not built.issuperset(words):
+            built.update(words)
+            with placed(f"{name}: [sweep] {', '.join(words)}"):
+                _build(row)
         count += 1
     return max(count, 1) * max(len(scenario.seeds), 1)
+
+
+def _build(scenario: Scenario) -> None:
+    Bench.from_scenario(scenario, body="kinematic")  # the cheapest: what is refused here, every body refuses
