@@ -84,7 +84,7 @@ class Mixer:
         return divide_half_away(value * step * self._steps, self._per)
 
     def steer(self, forward: int, turn: int) -> Speeds:
-        """Return the speeds of a pad's deflections: `forward` of 1023, `turn` of 511 to the left."""
+        """Return the speeds of a pad's deflections: `forward` of `TRIGGER_FULL`, `turn` of `STICK_FULL` to the left."""
         return self._limited(
             divide_half_away(forward * self._pad_velocity_mm_s, TRIGGER_FULL),
             divide_half_away(turn * self._pad_rotation_mrad_s * DEG_PER_RAD_E9, STICK_FULL * 10**12),

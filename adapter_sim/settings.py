@@ -8,7 +8,7 @@ from enum import StrEnum
 
 from adapter_sim.codec import BitOrder
 from adapter_sim.duty import DUTY_TIMEOUT_NS
-from p2os.gamepad import PAD_DEAD, PAD_LOSS_NS, PAD_MM_S, PAD_MRAD_S
+from p2os.gamepad import PAD_DEAD, PAD_LOSS_NS, PAD_MM_S, PAD_MRAD_S, STICK_FULL, TRIGGER_FULL
 from p2os.protocol.bauds import DEFAULT_BAUD
 from p2os.protocol.times import LIVENESS_NS, PULSE_NS
 from simbase.errors import UsageError
@@ -146,11 +146,11 @@ class AdapterSettings:
             )
         if self.sample_count % 2 == 0:
             raise UsageError(f"adapter setting sample_count must be odd for a majority, got {self.sample_count}")
-        if self.pad_trigger_dead >= 1_023 or self.pad_stick_dead >= 511:
+        if self.pad_trigger_dead >= TRIGGER_FULL or self.pad_stick_dead >= STICK_FULL:
             raise UsageError(
                 f"adapter settings pad_trigger_dead = {self.pad_trigger_dead}, pad_stick_dead = {self.pad_stick_dead} "
                 "leave nothing of the pad",
-                hint="below 1023 and below 511",
+                hint=f"below {TRIGGER_FULL} and below {STICK_FULL}",
             )
         if self.refresh_ns < self.pair_spacing_ns:
             raise UsageError(

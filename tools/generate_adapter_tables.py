@@ -1,7 +1,8 @@
 """Write the tables of the adapter's firmware: the robots, the times, the settings, the pins.
 
 There is one copy of each fact: robots in p2os/robots, the client's times in
-p2os/protocol/connection.py, the adapter's settings in adapter_sim/settings.py, wires and
+p2os/protocol/connection.py, the adapter's settings in adapter_sim/settings.py, a game pad's
+full deflections in p2os/gamepad.py, the heading's modulus in adapter_sim/encoders.py, wires and
 pins in adapter_sim/pinout.toml. This turns them into
 C++ headers; a test holds the committed headers to what comes out here.
 
@@ -17,6 +18,7 @@ from pathlib import Path
 from adapter_sim import encoders
 from adapter_sim.pinout import Pinout, WireRole, faults_of, load_pinout
 from adapter_sim.settings import MAX_BAUDS, MAY_BE_ZERO, AdapterSettings
+from p2os.gamepad import STICK_FULL, TRIGGER_FULL
 from p2os.protocol.bauds import DEFAULT_BAUD
 from p2os.protocol.connection import ConnectionSettings
 from p2os.robots.parameters import known_robots, load_parameters
@@ -93,7 +95,11 @@ def setting_table() -> str:
         '#pragma once\n\n#include <cstddef>\n#include <cstdint>\n\n#include "../p2os/time.hpp"\n\n'
         "namespace adapter {\n\nusing p2os::Nanos;\n\n" + "".join(choices) + "\n"
         f"constexpr std::size_t MAX_BAUDS = {MAX_BAUDS};\n"
-        f"constexpr std::int32_t DEFAULT_BAUD = {grouped(DEFAULT_BAUD)};\n\n"
+        f"constexpr std::int32_t DEFAULT_BAUD = {grouped(DEFAULT_BAUD)};\n"
+        "//: A pad's full deflections, from p2os/gamepad.py: triggers, and the sticks to one side.\n"
+        f"constexpr std::int32_t TRIGGER_FULL = {grouped(TRIGGER_FULL)}, STICK_FULL = {grouped(STICK_FULL)};\n"
+        "//: Counts of the heading in a packet to a turn, from adapter_sim/encoders.py.\n"
+        f"constexpr std::int32_t HEADING_MODULUS = {grouped(encoders.HEADING_MODULUS)};\n\n"
         "#define ADAPTER_SETTINGS(SETTING) \\\n" + " \\\n".join(rows) + "\n\n}  // namespace adapter\n"
     )
 

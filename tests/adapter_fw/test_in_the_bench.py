@@ -1,11 +1,14 @@
 """The firmware core in the whole chain, in the model's place."""
 
+from contextlib import nullcontext
 from dataclasses import replace
 
 import pytest
 
+from adapter_sim.encoders import HEADING_MODULUS
+from p2os import gamepad
 from p2os.robots.parameters import load_parameters
-from robot_bench.adapter import FirmwareAdapter, is_available
+from robot_bench.adapter import FirmwareAdapter, is_available, robot_numbers
 from robot_bench.bench import Bench
 from robot_bench.scenario.scenario import Scenario, load_scenario
 from simbase.errors import UsageError
@@ -70,6 +73,29 @@ def test_numbers_that_the_firmware_cannot_hold_are_refused_in_one_line() -> None
         FirmwareAdapter(
             pins=FakePins(), pinout=PINOUT, parameters=PARAMETERS, settings=AdapterSettings(sample_count=33)
         )
+
+
+@pytest.mark.parametrize(
+    ("name", "full"), [("pad_trigger_dead", gamepad.TRIGGER_FULL), ("pad_stick_dead", gamepad.STICK_FULL)]
+)
+def test_a_dead_zone_of_all_but_the_last_step_is_taken_and_of_all_refused_by_both(name: str, full: int) -> None:
+    settings = AdapterSettings(**{name: full - 1})
+    FirmwareAdapter(pins=FakePins(), pinout=PINOUT, parameters=PARAMETERS, settings=settings)
+    with pytest.raises(UsageError, match=f"{name} = {full}.* leave nothing"):
+        AdapterSettings(**{name: full})
+    object.__setattr__(settings, name, full)
+    with pytest.raises(UsageError, match="a dead zone of the pad leaves nothing"):
+        FirmwareAdapter(pins=FakePins(), pinout=PINOUT, parameters=PARAMETERS, settings=settings)
+
+
+@pytest.mark.parametrize(("scale", "is_taken"), [(1, True), (2, False), (0.5, True)])
+def test_a_heading_whose_turn_is_no_part_of_the_modulus_is_refused(
+    scale: float, is_taken: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    numbers = robot_numbers(PARAMETERS) | {"angle_counts_per_turn": int(HEADING_MODULUS * scale)}
+    monkeypatch.setattr("robot_bench.adapter.robot_numbers", lambda _parameters: numbers)
+    with nullcontext() if is_taken else pytest.raises(UsageError, match="must divide the modulus of the heading"):
+        FirmwareAdapter(pins=FakePins(), pinout=PINOUT, parameters=PARAMETERS, settings=AdapterSettings())
 
 
 def test_a_failure_of_the_far_side_comes_out_behind_the_firmware() -> None:

@@ -17,9 +17,6 @@
 
 namespace adapter {
 
-//: Counts of the heading in a packet to a turn.
-constexpr std::int32_t HEADING_MODULUS = 1 << 12;
-
 //: Follows a counter that wraps: any step smaller than half of its modulus is exact.
 class Unwrapper {
  public:

@@ -16,9 +16,9 @@ namespace adapter {
 struct PadReport {
   bool up = false;
   bool down = false;
-  std::int32_t forward = 0;   // R2, 0 to 1023
-  std::int32_t backward = 0;  // L2, 0 to 1023
-  std::int32_t turn = 0;      // right stick, -512 (left) to 511 (right)
+  std::int32_t forward = 0;   // R2, 0 to TRIGGER_FULL
+  std::int32_t backward = 0;  // L2, likewise
+  std::int32_t turn = 0;      // right stick, -STICK_FULL - 1 (left) to STICK_FULL (right)
 };
 
 class Gamepad {
@@ -43,7 +43,7 @@ class Gamepad {
   // Takes note that the pad is lost.
   void lose();
 
-  // Returns the deflections after their dead zones: forward of 1023, turn to the left of 511.
+  // Returns the deflections after their dead zones: forward of TRIGGER_FULL, turn to the left of STICK_FULL.
   std::int32_t forward() const { return forward_; }
   std::int32_t turn() const { return turn_; }
 

@@ -12,9 +12,6 @@
 
 namespace adapter {
 
-//: A pad's full deflections: triggers, and the sticks to one side.
-constexpr std::int32_t TRIGGER_FULL = 1'023, STICK_FULL = 511;
-
 struct Speeds {
   std::int32_t forward_mm_s = 0;
   std::int32_t turn_deg_s = 0;  // + to the left
@@ -40,7 +37,7 @@ class Mixer {
   // Returns the speeds that a pair of signed motor values asks for: steps, or duties in 1/1000.
   Speeds mix(std::int32_t motor1, std::int32_t motor2) const;
 
-  // Returns the speeds of a pad: `forward` of 1023, `turn` of 511 to the left.
+  // Returns the speeds of a pad: `forward` of TRIGGER_FULL, `turn` of STICK_FULL to the left.
   Speeds steer(std::int32_t forward, std::int32_t turn) const;
 
   // Returns the rim speeds that commanded speeds mean, in whole mm/s.

@@ -20,6 +20,10 @@ enum class EncoderAtOpen : std::uint8_t { ZERO, CONTINUE };
 
 constexpr std::size_t MAX_BAUDS = 8;
 constexpr std::int32_t DEFAULT_BAUD = 9'600;
+//: A pad's full deflections, from p2os/gamepad.py: triggers, and the sticks to one side.
+constexpr std::int32_t TRIGGER_FULL = 1'023, STICK_FULL = 511;
+//: Counts of the heading in a packet to a turn, from adapter_sim/encoders.py.
+constexpr std::int32_t HEADING_MODULUS = 4'096;
 
 #define ADAPTER_SETTINGS(SETTING) \
   SETTING(std::int64_t, threshold_um, -1, -1) \

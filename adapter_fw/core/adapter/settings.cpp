@@ -73,8 +73,8 @@ const char* fault_of(const Settings& settings, const WireNumbers& wires) {
   if (settings.pad_velocity_mm_s > MAX_SPEED_MM_S || settings.pad_rotation_mrad_s > MAX_SPEED_MM_S) {
     return "a speed of the pad is larger than any robot's";
   }
-  if (settings.pad_trigger_dead < 0 || settings.pad_trigger_dead >= 1'023 || settings.pad_stick_dead < 0 ||
-      settings.pad_stick_dead >= 511) {
+  if (settings.pad_trigger_dead < 0 || settings.pad_trigger_dead >= TRIGGER_FULL ||
+      settings.pad_stick_dead < 0 || settings.pad_stick_dead >= STICK_FULL) {
     return "a dead zone of the pad leaves nothing";
   }
   if (settings.bauds[0] <= 0) {
@@ -107,8 +107,8 @@ const char* fault_of(const RobotNumbers& robot) {
       return "a number of the robot is out of its range";
     }
   }
-  if (4'096 % robot.angle_counts_per_turn != 0) {
-    return "angle_counts_per_turn must divide 4096";
+  if (HEADING_MODULUS % robot.angle_counts_per_turn != 0) {
+    return "angle_counts_per_turn must divide the modulus of the heading";
   }
   return nullptr;
 }
