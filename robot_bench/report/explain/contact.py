@@ -23,7 +23,15 @@ from itertools import combinations
 
 from robot_bench.events.kinds import Contact
 from robot_bench.report.explain.chain import Evidence, Step
-from robot_bench.report.explain.findings import Finding, all_steady_since, ended, injected, numbers, obeyed, steady_since
+from robot_bench.report.explain.findings import (
+    Finding,
+    all_steady_since,
+    ended,
+    injected,
+    numbers,
+    obeyed,
+    steady_since,
+)
 from robot_bench.report.explain.probing import Answer, Prober
 from robot_bench.report.explain.replay import Hold
 from robot_bench.report.explain.scene import Scene
