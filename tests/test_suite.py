@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from tests.tools.forked_python import PYTEST, forked_python
 from tools.check_coverage import merged
@@ -89,3 +90,10 @@ def test_long_tests_are_left_out_unless_they_are_asked_for(tmp_path: Path, optio
     done = subprocess.run(line, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False, timeout=120)
     assert done.returncode == 0, done.stdout + done.stderr
     assert [name for name in names if (tmp_path / f"{name}.ran").exists()] == ran
+
+
+def test_the_profile_alone_says_that_no_example_has_a_bound_in_time() -> None:
+    own = {path for path in (ROOT / "tests").rglob("*.py") if path.name not in {"conftest.py", "test_suite.py"}}
+    assert [path.name for path in sorted(own) if "deadline=None" in path.read_text(encoding="utf-8")] == []
+    assert settings.default is not None
+    assert settings.default.deadline is None

@@ -107,7 +107,6 @@ for machine in MACHINES.values():
     machine.TestCase.settings = settings(
         max_examples=12,
         stateful_step_count=25,
-        deadline=None,
         suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
     )
 TestFirmware = pytest.mark.slow(FirmwareMachine.TestCase)

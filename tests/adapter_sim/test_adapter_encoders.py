@@ -109,7 +109,7 @@ def test_a_square_of_several_metres_ends_on_the_true_count(side_mm: int, lost: f
     assert worst_error_mm(encoders, walker) < 0.84 * 2 * math.pi + 0.3
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.integers(0, 2**32), st.sampled_from([0.0, 0.05, 0.3]))
 def test_minutes_of_driving_do_not_add_up_an_error(seed: int, lost: float) -> None:
     encoders, walker, random_source = fresh(), Walker(), random.Random(seed)

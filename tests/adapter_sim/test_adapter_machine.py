@@ -208,7 +208,6 @@ for machine, examples in ((AdapterMachine, 30), (DeafRobotMachine, 30), (Pioneer
     machine.TestCase.settings = settings(
         max_examples=examples,
         stateful_step_count=25,
-        deadline=None,
         suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
     )
 

@@ -34,7 +34,7 @@ STEPS = st.lists(
 
 @pytest.mark.slow
 @given(steps=STEPS)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_it_does_the_same_with_sampling_suspended(steps: list[tuple[str, int, int]]) -> None:
     assert story(steps, suspends=True) == story(steps, suspends=False)
 

@@ -164,7 +164,7 @@ TREES = st.recursive(
 )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(TREES, max_size=5))
 def test_what_is_rendered_is_read_back(items: list[object]) -> None:
     tree = ["root", *items]

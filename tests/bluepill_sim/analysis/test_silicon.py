@@ -122,7 +122,7 @@ def test_noise_before_the_first_line_and_line_ends_of_a_terminal_are_no_matter()
 
 
 @given(st.data())
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_a_log_that_is_cut_or_damaged_anywhere_is_refused(data: st.DataObject) -> None:
     at = data.draw(st.integers(0, len(SHORT) - 2))
     with pytest.raises(SiliconLogError) as caught:

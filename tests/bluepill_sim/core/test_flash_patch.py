@@ -190,7 +190,7 @@ def test_there_is_nothing_where_the_copies_are(make: Any) -> None:
     assert machine.board.fault.kind.name == "READ_ERROR"
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(
     st.lists(
         st.tuples(st.sampled_from(["word", "literal", "comparator", "table", "control", "call", "load", "svc"]),

@@ -237,7 +237,7 @@ def test_a_store_that_was_let_go_leaves_no_memory_behind(make: Any) -> None:
     assert machine.board.chip.processor.bfar == NOWHERE
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(
     st.lists(
         st.sampled_from(

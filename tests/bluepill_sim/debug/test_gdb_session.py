@@ -333,7 +333,7 @@ def test_any_payload_is_answered(debug) -> None:
     gdb.execution.wants_stop = lambda: True
     wild = st.one_of(st.binary(max_size=24), st.from_regex(rb"[mMXpPGzZqvQHTb][0-9a-f,:;=]{0,14}", fullmatch=True))
 
-    @settings(max_examples=200, deadline=None)
+    @settings(max_examples=200)
     @given(payload=wild)
     def ask(payload: bytes) -> None:
         assert isinstance(gdb.session.answer(payload), bytes)

@@ -61,7 +61,7 @@ def decoded(data: bytes) -> list[tuple[int, int, bytes]]:
     return found
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(writes=WRITES)
 def test_packets_say_what_was_written_when_and_to_which_port(writes: list[tuple[int, int, bytes]]) -> None:
     file, cycle, expected = Kept(), 0, []

@@ -13,7 +13,7 @@ from bluepill_sim.fabric.pins import PinBank, PinDrive, PinMode
 from bluepill_sim.fabric.subscriptions import EDGE, Of
 from simbase.wire import are_fighting, level_of
 
-QUICK = settings(max_examples=60, deadline=None)
+QUICK = settings(max_examples=60)
 
 
 class Chip:
@@ -111,7 +111,7 @@ class Queue(RuleBasedStateMachine):
 
 
 TestQueue = Queue.TestCase
-TestQueue.settings = settings(max_examples=40, stateful_step_count=30, deadline=None)
+TestQueue.settings = settings(max_examples=40, stateful_step_count=30)
 
 
 def test_those_who_schedule_each_other_act_in_order_of_time() -> None:

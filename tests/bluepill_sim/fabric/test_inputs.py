@@ -13,7 +13,7 @@ from bluepill_sim.fabric.pins import PinDrive
 from bluepill_sim.fabric.subscriptions import EDGE, Of
 from tests.bluepill_sim.fabric.test_waves import Bank
 
-QUICK = settings(max_examples=50, deadline=None)
+QUICK = settings(max_examples=50)
 
 
 @QUICK

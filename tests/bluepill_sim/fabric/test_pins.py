@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from bluepill_sim.fabric.pins import Pin, PinBank, PinDrive, PinMode
 from bluepill_sim.fabric.subscriptions import EDGE, FLOATING, HIGH, LOW, Of
 
-QUICK = settings(max_examples=40, deadline=None)
+QUICK = settings(max_examples=40)
 
 MODES = list(PinMode)
 

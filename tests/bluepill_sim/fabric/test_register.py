@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from bluepill_sim.fabric.registers import WORD, Peripheral, Place, Register, bits
 from bluepill_sim.stm32f103 import PERIPHERALS
 
-QUICK = settings(max_examples=40, deadline=None)
+QUICK = settings(max_examples=40)
 
 WORDS = st.integers(0, WORD)
 NAMES = [name for _, name in PERIPHERALS]

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from bluepill_sim.fabric.signals import Oscillation, Samples, Shape
 
 VOLTS = st.one_of(st.integers(-1_000_000, 5_000_000).map(lambda uv: uv / 1e6), st.sampled_from([-999.9, 999.9]))
-QUICK = settings(max_examples=80, deadline=None)
+QUICK = settings(max_examples=80)
 
 
 def expected(one: Oscillation, at_ns: int) -> float:

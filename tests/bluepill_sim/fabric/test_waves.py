@@ -10,7 +10,7 @@ from bluepill_sim.fabric.pins import PinBank, PinDrive, PinMode
 from bluepill_sim.fabric.subscriptions import EDGE, HIGH, LOW, Of, Wave, read_rows
 from simbase.timing import NS_PER_S
 
-QUICK = settings(max_examples=60, deadline=None)
+QUICK = settings(max_examples=60)
 SOURCES = ("TIM2_CH1", "TIM2_CH2")
 
 

@@ -87,7 +87,7 @@ LOOPS = {
 
 
 @pytest.mark.parametrize("name", LOOPS)
-@settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=8, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(slices=st.lists(st.integers(200, 40_000), max_size=12), rise=st.integers(5_000, 60_000))
 def test_what_a_bus_master_moves_is_seen_in_the_same_cycle_however_the_program_waits(
     name: str, slices: list[int], rise: int, built: None

@@ -43,7 +43,7 @@ def started() -> list[tuple[BluePill, Any]]:
     return boards
 
 
-@settings(max_examples=5, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=5, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(slices=st.lists(st.integers(100, 9_000_000), min_size=2, max_size=8), change_ns=st.integers(STARTED_NS, END_NS))
 def test_samples_and_text_are_the_same_however_the_run_is_cut(
     started: list[tuple[BluePill, Any]], slices: list[int], change_ns: int

@@ -59,7 +59,7 @@ def state(board: BluePill) -> tuple[Any, ...]:
 
 
 @pytest.mark.parametrize("name", PROGRAMS)
-@settings(max_examples=6, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=6, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     irq=st.booleans(),
     slices=st.lists(st.integers(100, 90_000), min_size=2, max_size=8),

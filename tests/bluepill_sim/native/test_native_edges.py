@@ -54,7 +54,7 @@ def recording(text: str, core: str, limit_ms: int = 1) -> tuple[Probe, Machine]:
     return probe, machine
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(accesses=st.lists(ACCESSES, min_size=1, max_size=14))
 def test_every_edge_has_the_time_of_its_store(accesses: list[tuple[int, int, str]]) -> None:
     text = program(accesses, 3)

@@ -121,7 +121,7 @@ def compare(steps: list[list[tuple[int, int]]], waits: list[int], slices: list[i
 FUZZED = given(steps=STEPS, waits=WAITS, slices=st.lists(st.integers(100, 200_000), max_size=6))
 
 
-@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @FUZZED
 def test_whatever_a_program_writes_both_cores_do_the_same(
     steps: list[list[tuple[int, int]]], waits: list[int], slices: list[int], watchdog: None
@@ -130,7 +130,7 @@ def test_whatever_a_program_writes_both_cores_do_the_same(
 
 
 @pytest.mark.soak
-@settings(max_examples=10_000, deadline=None)
+@settings(max_examples=10_000)
 @FUZZED
 def test_whatever_many_programs_write_both_cores_do_the_same(
     steps: list[list[tuple[int, int]]], waits: list[int], slices: list[int]

@@ -90,7 +90,7 @@ def live(board: BluePill, seed: int, slices: int) -> list[tuple[Any, ...]]:
 
 
 @pytest.mark.slow
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(choices=PROGRAMS, seed=st.integers(0, 1000))
 def test_every_slice_ends_alike(choices: dict[str, Any], seed: int) -> None:
     source = PROGRAM.format(**choices)

@@ -94,7 +94,7 @@ def story(source: str, core: str, slice_ns: int) -> tuple[dict[str, Any], Any, l
     return state(board), recorder.drain(), board.warnings, board.fault
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(steps=STEPS, slice_ns=st.sampled_from([1000, 7000, 210_000]))
 def test_random_accesses_and_faults_end_alike_on_both_cores(steps: list[str], slice_ns: int) -> None:
     source = source_of(steps)
@@ -156,7 +156,7 @@ COMPUTING = st.one_of(
 CONSTANTS = st.one_of(st.integers(0, 3000), st.integers(0, 0xFFFF_FFFF), st.just(0xFFFF_FFFF))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     register=st.sampled_from([0xE0001004, 0xE000E018, 0x20000000]), steps=st.lists(COMPUTING, min_size=1, max_size=4),
     condition=st.integers(0, 13), constants=st.lists(CONSTANTS, min_size=3, max_size=3), reload=st.integers(0, 5000),

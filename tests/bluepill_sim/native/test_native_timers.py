@@ -48,7 +48,7 @@ def ends(source: str, slices: tuple[int, ...]) -> list[dict[str, Any]]:
     return found
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     load=st.sampled_from([LOAD_CNT, LOAD_HALF_CNT]), control=st.sampled_from([0x00, 0x01, 0x11, 0x21, 0x61, 0x09]),
     psc=st.sampled_from([0, 1, 6, 71]), arr=st.one_of(st.integers(0, 9), st.integers(10, 3000), st.just(0xFFFF)),
@@ -67,7 +67,7 @@ def test_a_loop_that_computes_with_cnt_is_left_at_the_same_round_on_both_cores(
         assert ours[name] == reference[name], name
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     bit=st.integers(0, 4), arr=st.integers(1, 3000), compare=st.integers(0, 3000), psc=st.sampled_from([0, 3]),
     control=st.sampled_from([1, 0x11, 0x61, 0x09, 0]), clears=st.booleans(),

@@ -1,7 +1,7 @@
 """Pages of memory in the native core: stores to data are fast, stores to code are seen, IT blocks stay whole."""
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.bluepill_sim.machine import Machine
@@ -45,7 +45,6 @@ def function(number: int) -> int:
     return 0x4770_2000 | number
 
 
-@settings(deadline=None)
 @given(first=st.integers(0, 255), second=st.integers(0, 255))
 def test_code_that_is_written_anew_is_what_runs(first: int, second: int) -> None:
     native, python = logs(PUT_AND_CALL.format(first=function(first), second=function(second)))

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from bluepill_sim.stm32f103 import line_of
 
-QUICK = settings(max_examples=40, deadline=None)
+QUICK = settings(max_examples=40)
 
 IRQ_OF_LINE = {0: 6, 1: 7, 2: 8, 3: 9, 4: 10, 5: 23, 9: 23, 10: 40, 12: 40, 15: 40}
 

@@ -11,7 +11,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, rule, run_stat
 from bluepill_sim.fabric.pins import PinDrive, PinMode
 from bluepill_sim.fabric.subscriptions import EDGE, HIGH, LOW
 
-QUICK = settings(max_examples=40, deadline=None)
+QUICK = settings(max_examples=40)
 
 LCKK = 1 << 16
 WORDS = st.integers(0, 0xFFFF_FFFF)

@@ -11,7 +11,7 @@ from bluepill_sim.fabric.clocks import Clocks, illegal_settings
 from bluepill_sim.peripherals.rcc import ILLEGAL_NS, OSCILLATORS, Rcc, ResetCause
 from bluepill_sim.stm32f103 import BASES, CLOCK_GATES, Place
 
-QUICK = settings(max_examples=40, deadline=None)
+QUICK = settings(max_examples=40)
 
 HSEON, HSERDY, HSEBYP, PLLON, PLLRDY = 1 << 16, 1 << 17, 1 << 18, 1 << 24, 1 << 25
 HSE_NS, PLL_NS = 2_000_000, 200_000

@@ -113,7 +113,7 @@ chunks_of_ours = st.lists(st.builds(Chunk, at_ns=st.integers(0, 1 << 50), direct
 
 
 @given(chunks_of_ours, st.sampled_from((1, 40, 1 << 20)))
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 def test_records_of_ours_say_the_same(chunks: list[Chunk], size: int) -> None:
     data = write_pcap(chunks, base_ns=1_700_000_000 * 10**9)
     both_ways(data, size)

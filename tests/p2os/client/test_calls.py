@@ -123,7 +123,7 @@ def test_a_value_that_the_robot_cannot_take_is_refused_by_name(
     assert len(calls.rig.sent) == before
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(
     number=st.integers(0, 255),
     argument=st.one_of(st.none(), st.integers(-65535, 65535), st.binary(max_size=199)),

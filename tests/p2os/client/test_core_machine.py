@@ -138,5 +138,5 @@ class Story(RuleBasedStateMachine):
             assert rig.wheels == (0.0, 0.0)
 
 
-Story.TestCase.settings = hypothesis_settings(max_examples=50, stateful_step_count=30, deadline=None)
+Story.TestCase.settings = hypothesis_settings(max_examples=50, stateful_step_count=30)
 TestStory = Story.TestCase

@@ -471,5 +471,5 @@ class Pair(RuleBasedStateMachine):
             assert due is None or due > self.now
 
 
-Pair.TestCase.settings = hypothesis_settings(max_examples=60, stateful_step_count=40, deadline=None)
+Pair.TestCase.settings = hypothesis_settings(max_examples=60, stateful_step_count=40)
 TestPair = Pair.TestCase

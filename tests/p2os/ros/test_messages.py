@@ -112,7 +112,7 @@ def test_the_hash_is_that_of_the_definition_of_others(name: str) -> None:
     assert rosbags.get_typestore(rosbags.Stores.ROS2_JAZZY).hash_rihs01(name) == MESSAGES[name].hash
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.data())
 def test_a_message_is_written_as_an_independent_serialiser_writes_it_and_comes_back_whole(data: st.DataObject) -> None:
     rosbags = pytest.importorskip("rosbags.typesys", reason="rosbags is not installed")
@@ -140,7 +140,7 @@ def test_ranges_without_an_echo_stay_infinite() -> None:
     assert from_cdr("sensor_msgs/msg/Range", written)["range"] == math.inf
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.sampled_from(sorted(MESSAGES)), st.binary(max_size=80))
 def test_hostile_bytes_are_a_message_or_a_refusal(name: str, data: bytes) -> None:
     with contextlib.suppress(RemoteProtocolError):

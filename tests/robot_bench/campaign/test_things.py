@@ -53,7 +53,7 @@ def drawn(rows: list[tuple[str, float, float, float, float]]) -> list[Thing]:
     ]  # fmt: skip
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(things)
 def test_things_stand_apart_and_off_the_start_and_a_scenario_takes_them(
     rows: list[tuple[str, float, float, float, float]],

@@ -13,7 +13,7 @@ from robot_bench.wires.nets import Net, Strength, WaveDrive
 from robot_bench.wires.waves import edge_times, high_time_ns
 from simbase.timing import NS_PER_S
 
-QUICK = settings(max_examples=80, deadline=None)
+QUICK = settings(max_examples=80)
 PP = Strength.PUSH_PULL
 MS = 1_000_000
 
@@ -131,7 +131,7 @@ def test_edges_alternate_and_the_level_changes_at_each_and_nowhere_else(one: Wav
         assert one.level(at) is not one.level(at - 1)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.lists(st.tuples(st.integers(0, 3 * MS), st.integers(0, 2), st.booleans() | SLOW_WAVES), max_size=8))
 def test_the_parts_are_those_between_all_edges_and_add_up(rows: list[tuple[int, int, bool | Wave]]) -> None:
     made, nets = bridge(BridgeKind.IN1_IN2_PWM, Off.COAST)

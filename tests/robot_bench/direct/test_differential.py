@@ -148,7 +148,7 @@ def test_a_battery_falls_in_a_line_and_is_empty_when_its_charge_is_out() -> None
     assert cell.source_v == 12.6, "it takes no more than it holds"
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(
     st.lists(
         st.tuples(st.integers(0, 60), st.sampled_from(["left", "right"]), st.sampled_from([-1, -0.3, 0, 0.2, 0.7, 1])),

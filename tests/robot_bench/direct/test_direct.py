@@ -114,7 +114,7 @@ def test_three_steps_for_two_seconds_is_three_steps_of_way() -> None:
 
 
 @given(st.lists(st.integers(1, 300 * MS), max_size=8))
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 def test_how_often_it_is_brought_forward_changes_nothing(cuts: list[int]) -> None:
     ends = []
     for times in ([], sorted(cuts)):

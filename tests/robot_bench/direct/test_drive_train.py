@@ -11,7 +11,7 @@ from robot_bench.direct.differential.description import Differential
 from robot_bench.direct.differential.drive_train import DriveTrain
 from tests.robot_bench.direct.robots import rover
 
-QUICK = settings(max_examples=60, deadline=None)
+QUICK = settings(max_examples=60)
 DT = 1e-3
 #: The rover: R = 2.4 + 0.5 ohm, K N = 0.0124 * 34 V s/rad.
 OHM, KN = 2.9, 0.4216

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from robot_bench.direct.differential.quadrature import QUARTERS, Quadrature
 from robot_bench.wires.nets import Net
 
-QUICK = settings(max_examples=60, deadline=None)
+QUICK = settings(max_examples=60)
 MS = 1_000_000
 
 

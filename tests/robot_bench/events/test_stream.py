@@ -234,7 +234,7 @@ def built(plan: dict[str, Any]) -> Bench:
     return Bench(of, chip=chip, slice_ns=MS)
 
 
-@settings(deadline=None, max_examples=10)
+@settings(max_examples=10)
 @given(scenarios)
 def test_the_stream_of_a_live_run_is_the_one_read_from_its_trace(plan: dict[str, Any]) -> None:
     live, unseen = built(plan), built(plan)

@@ -142,7 +142,7 @@ def test_a_passage_that_stays_narrow_is_left(library: ctypes.CDLL) -> None:
     assert dodge.state == "TURN_LEFT"
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(st.tuples(st.integers(0, 255), st.integers(1, 120)), min_size=1, max_size=25))
 def test_it_never_backs_beyond_the_straight_ground_it_has_driven(
     library: ctypes.CDLL, pictures: list[tuple[int, int]]
@@ -160,7 +160,7 @@ def test_it_never_backs_beyond_the_straight_ground_it_has_driven(
             assert (left < 0 and right < 0) == (dodge.state == "BACK_OUT")
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.lists(st.integers(0, 255), min_size=1, max_size=40))
 def test_left_and_right_are_treated_alike(library: ctypes.CDLL, pictures: list[int]) -> None:
     one, other = Dodge(library), Dodge(library)

@@ -15,7 +15,7 @@ from robot_bench.recording.event_files import write_named_events
 from tests.robot_bench.events.test_stream import SAMPLES
 
 events = st.lists(st.one_of(*SAMPLES.values()), max_size=12)
-same_folder = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+same_folder = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 OF_NAME = {kind.__name__: kind for kind in KINDS}
 
 

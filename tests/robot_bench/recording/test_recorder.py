@@ -99,7 +99,7 @@ WORDS = st.lists(st.sampled_from([10, 65, 66, 0x10A, 0x1FF]), max_size=200)
 
 
 @given(words=WORDS, cuts=st.lists(st.integers(0, 200), max_size=6))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_characters_in_any_portions_make_the_lines_that_they_make_one_by_one(words: list[int], cuts: list[int]) -> None:
     rows = [(word, 100 + 7 * n) for n, word in enumerate(words)]
     texts: list[Text] = []

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from bluepill_sim.peripherals.i2c import I2cStep, I2cSymbol
@@ -129,7 +129,6 @@ calls = st.lists(
 )  # fmt: skip
 
 
-@settings(deadline=None)
 @given(calls)
 def test_conditions_and_bytes_of_an_i2c_are_put_together(rows: list[tuple[int, bool, bytes, int, str]]) -> None:
     symbols: list[I2cSymbol] = []

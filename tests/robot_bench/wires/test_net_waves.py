@@ -14,7 +14,7 @@ from robot_bench.wires.nets import Contention, Harness, Net, Strength, WaveDrive
 from simbase.timing import NS_PER_S
 from tests.bluepill_sim.fabric.test_waves import Ports
 
-QUICK = settings(max_examples=60, deadline=None)
+QUICK = settings(max_examples=60)
 PP, PULL = Strength.PUSH_PULL, Strength.PULL
 #: 20 kHz of 72 MHz, high for a quarter, from tick 0 on.
 WAVE = Wave(ns=0, at=0, period=3600, high=900, ticks_hz=72_000_000)

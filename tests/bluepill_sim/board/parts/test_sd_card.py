@@ -107,7 +107,7 @@ def test_the_crc_counts_before_spi_mode_and_where_it_is_asked_for() -> None:
 
 
 @given(st.integers(0, 16383), st.binary(min_size=BLOCK_BYTES, max_size=BLOCK_BYTES))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_what_is_written_is_read_back(number: int, data: bytes) -> None:
     host = Host(SdCard()).start()
     assert host.command(24, number) == 0
@@ -202,7 +202,7 @@ def test_erased_blocks_are_empty_and_their_neighbours_are_not(tmp_path: Path) ->
 @given(
     st.lists(st.one_of(st.integers(0, 255), st.sampled_from([0x40, 0x51, 0x58, 0x59, 0x4C, 0xFE, 0xFF])), max_size=600)
 )
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 def test_whatever_it_is_sent_it_can_be_started_again(stream: Iterable[int]) -> None:
     card = SdCard(size_mb=1)
     host = Host(card).start()

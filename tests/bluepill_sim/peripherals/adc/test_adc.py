@@ -42,7 +42,7 @@ from tests.bluepill_sim.peripherals.adc.model import (
     AdcModel,
 )
 
-QUICK = settings(max_examples=150, deadline=None)
+QUICK = settings(max_examples=150)
 #: A cycle of ADCCLK after a reset: 8 MHz divided by 2.
 CYCLE_NS = 250
 IRQ, DMA_LINE = 18, line_of("ADC1.dma")
@@ -589,7 +589,7 @@ def test_what_is_written_changes_nothing_that_was_converted_unseen(
     assert fake_chip.read("ADC1.DR") == code(expected)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(waits=st.lists(st.tuples(st.integers(1, 3_000), st.booleans()), min_size=1, max_size=5), watches=st.booleans())
 def test_what_nobody_saw_is_as_if_each_conversion_had_been_made(
     make_fake_chip: Callable[[], Any], waits: list[tuple[int, bool]], watches: bool

@@ -22,7 +22,7 @@ from tests.bluepill_sim.peripherals.buses.test_can import (
     standard_bits,
 )
 
-QUICK = settings(max_examples=40, deadline=None)
+QUICK = settings(max_examples=40)
 TX, RX = "PA12", "PA11"
 
 

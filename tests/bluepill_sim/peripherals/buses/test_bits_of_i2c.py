@@ -26,7 +26,7 @@ from tests.bluepill_sim.peripherals.buses.test_i2c import (
     wait,
 )
 
-QUICK = settings(max_examples=40, deadline=None)
+QUICK = settings(max_examples=40)
 #: "S", "P", or a byte and whether it was acknowledged.
 Heard = list[str | tuple[int, bool]]
 

@@ -69,7 +69,7 @@ def send(chip: Any, words: list[int], end_ns: int) -> None:
     chip.advance(end_ns)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     st.lists(st.integers(0, 0xFFFF), min_size=1, max_size=3),
     st.sampled_from([0, CPHA, CPOL, CPOL | CPHA]),

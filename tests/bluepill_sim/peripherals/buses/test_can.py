@@ -23,7 +23,7 @@ EWGF, EPVF, BOFF = 1, 2, 4
 LOOP, SILENT = 1 << 30, 1 << 31
 #: 8 MHz / (2 * (1 + 5 + 2)) = 500 kbit/s: a bit is 2 us.
 TIMING, BIT_NS = 1 | 4 << 16 | 1 << 20, 2000
-QUICK = settings(max_examples=60, deadline=None)
+QUICK = settings(max_examples=60)
 Chips = Callable[[], Any]
 
 
@@ -99,7 +99,7 @@ FRAMES = st.one_of(
 )  # fmt: skip
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(FRAMES)
 def test_a_frame_is_as_long_as_its_bits(frame: CanFrame) -> None:
     assert stuffed_bits(frame) == len(standard_bits(frame))

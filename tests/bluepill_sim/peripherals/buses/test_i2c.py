@@ -19,7 +19,7 @@ SB, ADDR, BTF, ADD10, STOPF, RXNE, TXE, BERR, ARLO, AF, OVR, PECERR, TIMEOUT, SM
 MSL, BUSY, TRA, GENCALL, DUALF = (1 << n for n in (0, 1, 2, 4, 7))
 #: 8 MHz and CCR = 40: 100 kHz; a byte has nine bits, the last of which acknowledges.
 BIT_NS, DATA_NS, BYTE_NS = 10_000, 80_000, 90_000
-QUICK = settings(max_examples=40, deadline=None)
+QUICK = settings(max_examples=40)
 Chips = Callable[[], Any]
 
 

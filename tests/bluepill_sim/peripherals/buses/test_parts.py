@@ -14,7 +14,7 @@ from bluepill_sim.parts.spi_flash import BUSY, ERASES, PROGRAM_NS, SIZE_BYTES, W
 from bluepill_sim.peripherals.spi import Loopback
 
 Boards = Callable[[str], BluePill]
-QUICK = settings(max_examples=40, deadline=None)
+QUICK = settings(max_examples=40)
 WRAPPED = bytes(n * 7 % 256 for n in range(32))
 
 

@@ -17,7 +17,7 @@ RXNE, TXE, CRCERR, MODF, OVR, BSY = (1 << n for n in (0, 1, 4, 5, 6, 7))
 MASTER = MSTR | SPE | SSM | SSI
 #: 8 MHz / 2 is 4 MHz: eight bits take 2 us.
 WORD_NS = 2000
-QUICK = settings(max_examples=60, deadline=None)
+QUICK = settings(max_examples=60)
 Chips = Callable[[], Any]
 
 

@@ -29,7 +29,7 @@ from tests.bluepill_sim.peripherals.dma.model import (
     DmaModel,
 )
 
-QUICK = settings(max_examples=200, deadline=None)
+QUICK = settings(max_examples=200)
 #: A cycle of HCLK after a reset.
 CYCLE_NS = 125
 #: A request of each channel, of a timer: it stands, and leaves its output alone, which a bus sets anew at a remap.

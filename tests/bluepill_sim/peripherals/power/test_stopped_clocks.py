@@ -19,7 +19,7 @@ TIMERS = ("TIM1", "TIM2", "TIM3", "TIM4")
 UPDATE_IRQ = {"TIM1": 25, "TIM2": 28, "TIM3": 29, "TIM4": 30}
 DBGMCU_CR, APB2ENR, APB1ENR = 0xE004_2004, 0x4002_1018, 0x4002_101C
 BASE = {"TIM1": 0x4001_2C00, "TIM2": 0x4000_0000, "TIM3": 0x4000_0400, "TIM4": 0x4000_0800}
-QUICK = settings(max_examples=25, deadline=None)
+QUICK = settings(max_examples=25)
 Chips = Callable[[], Any]
 
 

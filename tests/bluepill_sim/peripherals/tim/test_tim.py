@@ -82,7 +82,7 @@ def tim3(fake_chip: Any) -> Timer:
 
 
 @pytest.mark.parametrize("name", TIMERS)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(data=st.data())
 def test_a_register_keeps_the_bits_that_it_has_and_no_others(
     make_fake_chip: Callable[[], Any], name: str, data: st.DataObject
@@ -162,7 +162,7 @@ def test_the_update_comes_at_its_tick_and_not_before(tim2: Timer, psc: int, arr:
 
 
 @pytest.mark.parametrize("name", TIMERS)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(psc=st.integers(0, 0xFFFF), arr=st.integers(1, 0xFFFF), tick=st.integers(1, 1 << 36))
 def test_a_counter_is_where_its_time_puts_it(
     make_fake_chip: Callable[[], Any], name: str, psc: int, arr: int, tick: int

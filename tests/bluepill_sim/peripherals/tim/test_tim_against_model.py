@@ -253,7 +253,7 @@ def test_a_prescaler_that_starts_again_agrees(fake_chip: Any, ticks: int, then: 
 
 
 @pytest.mark.parametrize("name", ["TIM1", "TIM3"])
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(start=START, steps=ABOUT_OUTPUTS)
 def test_outputs_agree_with_a_model_that_ticks(
     make_fake_chip: Callable[[], Any], name: str, start: list[tuple[Any, ...]], steps: list[tuple[Any, ...]]
@@ -262,7 +262,7 @@ def test_outputs_agree_with_a_model_that_ticks(
 
 
 @pytest.mark.parametrize("name", ["TIM1", "TIM3"])
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(start=START, steps=ABOUT_INPUTS)
 def test_inputs_agree_with_a_model_that_ticks(
     make_fake_chip: Callable[[], Any], name: str, start: list[tuple[Any, ...]], steps: list[tuple[Any, ...]]

@@ -26,7 +26,7 @@ from tests.bluepill_sim.peripherals.usart.usart_line import (
     status,
 )
 
-QUICK = settings(max_examples=40, deadline=None)
+QUICK = settings(max_examples=40)
 
 
 def test_reset_values_are_the_manuals(fake_chip: Any) -> None:

@@ -17,7 +17,7 @@ from hypothesis.stateful import (
 
 from tests.bluepill_sim.peripherals.usart.usart_line import CHARACTER_NS, ORE, RXNE, TXE, set_up, status
 
-QUICK = settings(max_examples=40, deadline=None)
+QUICK = settings(max_examples=40)
 
 
 class UsartMachine(RuleBasedStateMachine):

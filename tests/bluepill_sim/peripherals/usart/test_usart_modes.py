@@ -183,7 +183,7 @@ def seen(rows: bytes) -> list[tuple[int, bool]]:
     return [(row[0], row[3] == HIGH) for row in EDGE.iter_unpack(rows)]
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.lists(st.integers(0, 0xFF), min_size=1, max_size=3), st.sampled_from([0, PCE, PCE | PS, M | PCE]))
 def test_bits_show_on_the_pin_while_somebody_looks(make_fake_chip: Any, data: list[int], control: int) -> None:
     chip = make_fake_chip()

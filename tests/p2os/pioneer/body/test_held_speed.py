@@ -47,7 +47,6 @@ AWAY = (-0.2, -0.2, 2)
 @example("before a wall", [(0.3, 0.3, 400), AWAY, (-0.2, -0.2, APART_STEPS - 3), (-0.2, -0.2, 1), (-0.2, -0.2, 1)])
 @example("before a wall", [(0.3, 0.3, 400), AWAY, (0.3, 0.3, 2), (-0.2, -0.2, 400), (0.3, 0.3, 400)])
 @example("free", [(0.1, 0.1 + 2e-7, 900)])
-@settings(deadline=None)
 @given(st.sampled_from(sorted(SCENES)), st.lists(st.tuples(SPEEDS, SPEEDS, COUNTS), min_size=1, max_size=5))
 def test_many_steps_at_once_are_the_same_steps(scene: str, legs: list[tuple[float, float, int]]) -> None:
     held, stepped = make_kinematic(), make_kinematic()
@@ -67,7 +66,7 @@ RAMPS = st.lists(st.tuples(SPEEDS, SPEEDS, st.sampled_from((1, 2, 8, APART_STEPS
 @example("before a wall", [(0.3, 0.3, 400), (0.0, 0.0, APART_STEPS), (-0.01, -0.01, 2)])
 @example("beside a walker", [(0.1, 0.3, 2 * WALK_STEPS), (0.0, 0.0, WALK_STEPS), (0.1, 0.1, 900)])
 @example("free", [(0.1, 0.1, 2), (0.1, 0.1 + 2e-7, 2), (0.3, 0.3, 1), (0.3, 0.3, 2)])
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.sampled_from(sorted(SCENES)), RAMPS)
 def test_a_ramp_is_the_same_steps(scene: str, legs: list[tuple[float, float, int]]) -> None:
     ramped, stepped = make_kinematic(), make_kinematic()

@@ -109,7 +109,7 @@ def test_a_client_that_asks_and_closes_in_one_breath_gets_no_answer(robot: Any) 
 
 
 @given(noise=st.lists(st.binary(max_size=40), max_size=20), gap_ms=st.integers(0, 300))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_noise_never_moves_raises_or_opens(make_robot: MakeRobot, noise: list[bytes], gap_ms: int) -> None:
     robot = make_robot()
     for data in noise:
@@ -285,4 +285,4 @@ def test_the_robot_keeps_its_safety_rules(make_robot: MakeRobot) -> None:
     class WithRobot(Machine):
         make = staticmethod(make_robot)
 
-    run_state_machine_as_test(WithRobot, settings=settings(max_examples=15, stateful_step_count=25, deadline=None))
+    run_state_machine_as_test(WithRobot, settings=settings(max_examples=15, stateful_step_count=25))

@@ -120,4 +120,4 @@ class Controller(RuleBasedStateMachine):
 
 
 TestController = Controller.TestCase
-TestController.settings = settings(max_examples=40, stateful_step_count=25, deadline=None)
+TestController.settings = settings(max_examples=40, stateful_step_count=25)

@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from p2os.pioneer.body.contract import Turned
@@ -70,7 +70,6 @@ def test_positions_are_counted_modulo_fifteen_bits() -> None:
 
 
 @given(st.lists(st.tuples(st.floats(-50, 50), st.floats(-50, 50)), max_size=20))
-@settings(deadline=None)
 def test_an_odometer_can_be_saved_and_restored(angles: list[tuple[float, float]]) -> None:
     odometer, twin = reckoning(), reckoning()
     for left, right in angles:

@@ -185,7 +185,7 @@ def test_the_simulator_says_what_it_is_and_that_the_world_stays(make_robot: Make
     assert of(robot, MapChangedPacket) == [MapChangedPacket(status=2, raw_name=b"office")] * 2
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     st.lists(st.tuples(st.sampled_from([35, 36, 37, 38, 230, 231, 232, 233]), st.integers(-32767, 65535)), max_size=8)
 )

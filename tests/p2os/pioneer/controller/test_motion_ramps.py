@@ -288,11 +288,11 @@ class MotionMachine(RuleBasedStateMachine):
 
 
 TestMotionMachine = MotionMachine.TestCase
-TestMotionMachine.settings = settings(max_examples=15, stateful_step_count=20, deadline=None)
+TestMotionMachine.settings = settings(max_examples=15, stateful_step_count=20)
 
 
 @given(mm_s=st.integers(-750, 750), accel=st.integers(200, 2000))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_a_ramp_takes_the_whole_steps_that_arithmetic_says(mm_s: int, accel: int) -> None:
     motion = make(LIMITS.with_acceleration(accel))
     motion.set_velocity(mm_s)

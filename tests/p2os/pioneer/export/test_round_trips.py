@@ -19,7 +19,7 @@ from tests.p2os.pioneer.export.exported import differences, expected, worlds, wr
 P2DX = load_parameters("p2dx")
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(world=worlds())
 @pytest.mark.parametrize("name", ["made.sdf", "made.urdf"])
 def test_our_own_readers_give_back_the_world_that_was_exported(name: str, world: World) -> None:
@@ -40,7 +40,7 @@ def test_a_shipped_world_with_a_robot_at_its_start_comes_back_without_the_robot(
     assert [line for line in differences(expected(world), again) if not any(name in line for name in walkers)] == []
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(world=worlds())
 def test_gltf_gives_back_the_triangles_of_every_shape_in_its_place(world: World) -> None:
     with TemporaryDirectory() as folder:
@@ -84,7 +84,7 @@ def sizes_in_mujoco(body: Body) -> list[float]:
     return [body.shape.radius_m]
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(world=worlds())
 def test_mujoco_reads_the_same_shapes_poses_masses_and_frictions(world: World) -> None:
     mujoco = pytest.importorskip("mujoco")

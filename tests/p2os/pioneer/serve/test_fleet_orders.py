@@ -111,7 +111,7 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
             load_fleet(tmp_path / name)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.text(max_size=60) | st.text(alphabet='[]robt="=\n 12.{}', max_size=80))
 def test_any_text_is_a_fleet_or_a_complaint(text: str) -> None:
     with contextlib.suppress(FleetError):

@@ -403,7 +403,7 @@ def life(
 
 
 @pytest.mark.slow
-@settings(max_examples=4, deadline=None)
+@settings(max_examples=4)
 @given(orders=ORDERS, looks=st.lists(TIMES, max_size=20))
 def test_the_same_bytes_however_often_and_in_whatever_order_robots_are_asked(
     orders: list[tuple[int, int, tuple[int, int | None]]], looks: list[int]
@@ -420,7 +420,7 @@ def test_two_that_look_at_each_other_from_near_say_the_same_however_often_they_a
     assert life(multi_robot_world(places), [], DENSE, backwards=True) == first
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=6)
 @given(orders=ORDERS, half=TIMES)
 def test_a_multi_robot_world_that_was_saved_goes_on_as_it_would_have(
     orders: list[tuple[int, int, tuple[int, int | None]]], half: int

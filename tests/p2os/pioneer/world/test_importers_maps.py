@@ -144,7 +144,7 @@ def test_an_empty_map_is_refused(tmp_path: Path) -> None:
         aria(tmp_path, "2D-Map\nLINES\n5 5 5 5\nDATA\n")
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.text(alphabet=st.sampled_from('0123456789 -.\n"CairnGoalLINESDATA:e'), max_size=200))
 def test_no_text_breaks_the_reader_of_maps(text: str) -> None:
     with tempfile.TemporaryDirectory() as folder, contextlib.suppress(WorldError):

@@ -84,7 +84,7 @@ def test_a_wall_around_a_doorway_leaves_it_open(first: int, turned: bool, tmp_pa
         assert walls == [(0.0, 1.0), (2.0, 3.0)]
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(st.lists(st.tuples(*[st.floats(-5, 5)] * 3), min_size=3, max_size=12))
 def test_any_polygon_becomes_triangles_of_its_corners(corners: list[tuple[float, float, float]]) -> None:
     found = triangulated(corners)

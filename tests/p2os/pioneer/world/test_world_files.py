@@ -6,7 +6,7 @@ from importlib.resources import files
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from p2os.errors import WorldError
@@ -127,7 +127,6 @@ def test_a_cylinder_and_a_floor_are_read() -> None:
 POINTS = [(px / 50, py / 50) for px in range(-13, 10) for py in range(-9, 10)]
 
 
-@settings(deadline=None)
 @given(st.floats(-2, 2), st.floats(-2, 2), st.floats(-4, 4), st.floats(0.05, 0.5), st.booleans())
 def test_clearance_is_zero_just_where_a_sampled_point_is_inside(
     x: float, y: float, heading: float, size: float, is_round: bool

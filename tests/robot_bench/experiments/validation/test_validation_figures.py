@@ -73,7 +73,7 @@ def levels(value: str, code: int) -> dict[str, int]:
     return {wire: code >> bit & 1 for bit, wire in enumerate(load_pinout().value(value).wires)}
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.lists(st.tuples(st.integers(-4, 3), st.integers(-4, 3)), min_size=1, max_size=20))
 def test_motor_pairs_are_read_back_as_they_were_put_on_the_wires(pairs: list[tuple[int, int]]) -> None:
     rows = [
@@ -99,7 +99,7 @@ def test_wires_of_one_value_that_change_within_a_millisecond_change_together() -
     assert motor_pairs(record) == [(0, (0, 0)), (10 * MS, (1, 0)), (11 * MS, (3, 0))]
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(0, 7), st.lists(st.sampled_from([-3, -2, -1, 1, 2, 3]), max_size=40))
 def test_encoder_steps_are_counted_over_whole_turns_both_ways(first: int, changes: list[int]) -> None:
     counts = [first]

@@ -188,7 +188,7 @@ def test_requests_that_the_device_does_not_know_stall_and_the_next_one_works(boa
         assert board.usb.transfer(0x80, 6, 0x0100, length=18)[:2] == b"\x12\x01"
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(requests=st.lists(st.binary(min_size=8, max_size=8), min_size=1, max_size=5))
 def test_requests_of_any_bytes_do_the_device_no_harm(configured: BluePill, requests: list[bytes]) -> None:
     board = configured
@@ -307,7 +307,7 @@ def test_an_endpoint_that_is_not_there_is_named_with_those_that_are(configured: 
 GOOD = bytes.fromhex("090220000101008032 09040000020a000000 0705020240 0000 0705820240 0000".replace(" ", ""))
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.one_of(st.binary(max_size=80), st.binary(max_size=40).map(lambda tail: GOOD[:18] + tail)))
 def test_descriptors_of_any_bytes_are_described_or_refused(data: bytes) -> None:
     for parse in (parse_device, parse_configuration, parse_string):

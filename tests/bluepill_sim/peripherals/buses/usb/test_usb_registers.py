@@ -17,7 +17,7 @@ RESUME, FSUSP, LP_MODE, PDWN, FRES = (1 << n for n in (4, 3, 2, 1, 0))
 HP, LP, MS = 19, 20, 1_000_000
 RESET_NS = 2_500
 ACK, SAYS_NAK, SAYS_STALL = (Answer(one) for one in (Handshake.ACK, Handshake.NAK, Handshake.STALL))
-QUICK = settings(max_examples=25, deadline=None)
+QUICK = settings(max_examples=25)
 Chips = Callable[[], Any]
 
 
