@@ -2,7 +2,6 @@
 
 import re
 import shutil
-import struct
 import subprocess
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -16,6 +15,7 @@ from p2os.protocol.commands import CommandNumber
 from p2os.protocol.packets import PACKET_NAMES, SonarReading, StandardSip, packet_frame
 from p2os.protocol.profiles import Profile
 from simbase.errors import FileError
+from tests.p2os.capture.network_files import network_file, segment
 
 GOLDEN = Path(__file__).resolve().parents[2] / "golden" / "captures" / "aria_p2de.jsonl"
 TSHARK = shutil.which("tshark")
@@ -70,21 +70,15 @@ def test_tshark_shows_a_capture_of_ours(tmp_path: Path) -> None:
     assert [row[3] for row in rows if row[1] == "5"] == ["300", "-300"]
 
 
-def network_file(path: Path, sent: list[tuple[int, int, bytes]]) -> Path:
+def conversation(path: Path, sent: list[tuple[int, int, bytes]]) -> Path:
     """Write TCP segments of (source port, target port, bytes), cut at 50 bytes; return the path."""
     packets, sequences = [], {(source, target): 1 for source, target, _ in sent}
     for source, target, stream in sent:
         for start in range(0, len(stream), 50):
             data = stream[start : start + 50]
-            tcp = (
-                struct.pack(">HHIIBBHHH", source, target, sequences[source, target], 0, 5 << 4, 0x18, 1000, 0, 0) + data
-            )
-            packets.append(struct.pack(">BBHHHBBH", 0x45, 0, 20 + len(tcp), 0, 0, 64, 6, 0) + b"\x7f\0\0\1" * 2 + tcp)
+            packets.append(segment(source, target, sequences[source, target], data))
             sequences[source, target] += len(data)
-    records = b"".join(
-        struct.pack("<IIII", 1, place, len(data), len(data)) + data for place, data in enumerate(packets)
-    )
-    path.write_bytes(struct.pack("<IHHiIII", 0xA1B2C3D4, 2, 4, 0, 0, 65535, 101) + records)
+    path.write_bytes(network_file(packets, 101, b""))
     return path
 
 
@@ -98,7 +92,7 @@ def test_tshark_finds_frames_on_any_port_and_the_robot_is_who_answers(tmp_path: 
         ends = {Direction.TO_ROBOT: (client, robot), Direction.FROM_ROBOT: (robot, client)}
         sent += [(*ends[direction], data) for direction, data in chunks if direction]
     rows = shown(
-        network_file(tmp_path / "tcp.pcap", sent),
+        conversation(tmp_path / "tcp.pcap", sent),
         "p2os.packet", "p2os.command", "_ws.col.Protocol", "tcp.srcport", "tcp.dstport",
     )  # fmt: skip
     for ports in conversations:
@@ -117,7 +111,7 @@ def test_tshark_shows_every_field_of_a_sip_and_its_tail(tmp_path: Path) -> None:
         sonar=(SonarReading(3, 700),), analog_port=4, gripper_state=6, raw_analog=77, digital_in=12, digital_out=13,
         tail=(126, -1, -300, 2, 0, -128, 80, 123456, 9),
     )  # fmt: skip
-    path = network_file(tmp_path / "sip.pcap", [(45555, 45001, packet_frame(sip, Profile.P2OS).to_bytes())])
+    path = conversation(tmp_path / "sip.pcap", [(45555, 45001, packet_frame(sip, Profile.P2OS).to_bytes())])
     names = ("rear_bumpers", "front_bumpers", "control", "compass", "analog_port", "analog", "battery_x10",
              "charge_state", "rotation_velocity", "temperature", "state_of_charge", "controller_time_us")  # fmt: skip
     row = shown(path, *(f"p2os.sip.{name}" for name in names))[-1]

@@ -24,6 +24,7 @@ from p2os.capture.formats.pcap import PCAPNG_MAGIC
 from p2os.errors import LocalProtocolError
 from simbase.errors import FileError
 from simbase.timing import NS_PER_S
+from tests.p2os.capture.network_files import ETHERNET, block, network_file, segment
 
 TO, FROM = Direction.TO_ROBOT, Direction.FROM_ROBOT
 SYNC0 = bytes.fromhex("fafb03000000")
@@ -149,29 +150,11 @@ def test_time_begins_at_zero_and_never_runs_back() -> None:
 # captures of network traffic ------------------------------------------------------------
 
 
-def segment(
-    source: int, target: int, sequence: int, data: bytes = b"", flags: int = 0x10, *, v6: bool = False
-) -> bytes:
-    tcp = struct.pack(">HHIIBBHHH", source, target, sequence & 0xFFFFFFFF, 0, 5 << 4, flags, 0, 0, 0) + data
-    if v6:
-        return struct.pack(">IHBB", 6 << 28, len(tcp), 6, 64) + bytes(15) + b"\1" + bytes(15) + b"\2" + tcp
-    return struct.pack(">BBHHHBBH", 0x45, 0, 20 + len(tcp), 0, 0, 64, 6, 0) + b"\x7f\0\0\1" * 2 + tcp
-
-
-def network_file(packets: list[bytes], link: int, before: bytes, *, magic: int = 0xA1B2C3D4, order: str = "<") -> bytes:
-    records = [
-        struct.pack(order + "IIII", 10, 500 * place, len(before + data), len(before + data)) + before + data
-        for place, data in enumerate(packets)
-    ]
-    return struct.pack(order + "IHHiIII", magic, 2, 4, 0, 0, 65535, link) + b"".join(records)
-
-
 CONVERSATION = [
     segment(40000, 8101, 99, flags=2), segment(8101, 40000, 499, flags=0x12), segment(40000, 8101, 100, SYNC0[:2]),
     segment(40000, 8101, 104, SYNC0[4:]), segment(40000, 8101, 102, SYNC0[2:4]), segment(40000, 8101, 100, SYNC0),
     segment(8101, 40000, 500, SYNC0), segment(40000, 8101, 104, SYNC0[4:] + VEL),
 ]  # fmt: skip
-ETHERNET = bytes(12) + b"\x08\x00"
 
 
 @pytest.mark.parametrize(
@@ -206,12 +189,6 @@ def test_what_is_no_tcp_is_left_out() -> None:
         read_capture(network_file([b"beacon"], 105, b""))
     with pytest.raises(FileError, match="gives no direction"):
         read_capture(network_file([b"\x07data"], 147, b""))
-
-
-def block(kind: int, body: bytes, order: str) -> bytes:
-    padded = body + bytes(-len(body) % 4)
-    size = len(padded) + 12
-    return struct.pack(order + "II", kind, size) + padded + struct.pack(order + "I", size)
 
 
 @pytest.mark.parametrize("order", ["<", ">"])

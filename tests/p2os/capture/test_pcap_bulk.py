@@ -15,7 +15,7 @@ from p2os.capture.formats.pcap import pcap_blocks, write_pcap
 from p2os.capture.formats.pcap_records import PCAPNG_MAGIC, Records, read_records
 from p2os.capture.formats.tcp_streams import MOST_WAITING
 from simbase.errors import FileError
-from tests.p2os.capture.test_formats import ETHERNET, block, network_file, segment
+from tests.p2os.capture.network_files import ETHERNET, block, network_file, segment
 from tests.p2os.protocol.drawn_packets import SEEDS, Draw
 
 CLIENT, OTHER, ROBOT = 40000, 41000, 8101

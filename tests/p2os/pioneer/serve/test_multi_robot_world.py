@@ -425,15 +425,18 @@ def test_two_that_look_at_each_other_from_near_say_the_same_however_often_they_a
 def test_a_multi_robot_world_that_was_saved_goes_on_as_it_would_have(
     orders: list[tuple[int, int, tuple[int, int | None]]], half: int
 ) -> None:
-    made = multi_robot_world(CROWD, CARTON)
+    made, fresh = multi_robot_world(CROWD, CARTON), multi_robot_world(CROWD, CARTON)
     life_until(made, orders, half)
     saved = pickle.loads(pickle.dumps(made.snapshot()))  # noqa: S301  # our own bytes
-    ends = []
-    for other in (made, made, multi_robot_world(CROWD, CARTON)):
+
+    def end(world: MultiRobotWorld) -> object:
+        world.advance_to(half + 100 * NS_PER_MS)
+        return [robot.take_output() for robot in world.robots], [member.body.state for member in world.members]
+
+    never_restored = end(made)
+    for other in (made, fresh):
         other.restore(saved)
-        other.advance_to(half + 100 * NS_PER_MS)
-        ends.append(([robot.take_output() for robot in other.robots], [member.body.state for member in other.members]))
-    assert ends[0] == ends[1] == ends[2]
+        assert end(other) == never_restored
 
 
 @pytest.mark.slow
