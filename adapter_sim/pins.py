@@ -219,8 +219,8 @@ class SampleClock(Stateful):
         return other if self.is_suspended else min(self.next, other)
 
 
-class Majority(Stateful):
-    """A sliding window over readings, each some numbers, with the one that holds its majority."""
+class SlidingWindow(Stateful):
+    """The last readings, each some numbers, with what is taken of them, which a kind of window says."""
 
     STATE: ClassVar[tuple[str, ...]] = ("_window", "_same", "taken")
 
@@ -251,12 +251,20 @@ class Majority(Stateful):
         self.taken = self.at_rest
 
     def _choose(self, window: list[tuple[int, ...]]) -> tuple[int, ...]:
+        """Return what is taken of a window whose last reading is new."""
+        raise NotImplementedError
+
+
+class Majority(SlidingWindow):
+    """A sliding window with the reading that holds its majority."""
+
+    def _choose(self, window: list[tuple[int, ...]]) -> tuple[int, ...]:
         # Only the newest reading can have gained a majority that it had not before.
         return window[-1] if 2 * window.count(window[-1]) > self._count else self.taken
 
 
-class Median(Majority):
-    """A sliding window over readings, with the median of each of their numbers."""
+class Median(SlidingWindow):
+    """A sliding window with the median of each number of its readings."""
 
     def _choose(self, window: list[tuple[int, ...]]) -> tuple[int, ...]:
         return tuple(sorted(column)[self._count // 2] for column in zip(*window, strict=True))
