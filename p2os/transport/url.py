@@ -5,12 +5,13 @@ everywhere (it is untried on Windows).
 """
 
 import difflib
+import os
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from p2os.protocol.bauds import DEFAULT_BAUD
-from simbase.errors import UsageError
+from simbase.errors import UsageError, shown
 
 #: The port on which simulated Pioneers have always listened; ARIA tries it first.
 DEFAULT_TCP_PORT = 8101
@@ -20,6 +21,11 @@ DEFAULT_URL = f"tcp:{LOOPBACK}:{DEFAULT_TCP_PORT}"
 
 #: "10.0.0.5:8101", "robot.local:8101"; a word alone may be anything.
 _HOST_AND_PORT = re.compile(r"[\w.-]+:\d{1,5}|\d{1,3}(?:\.\d{1,3}){3}|localhost")
+_COM_PORT = re.compile(r"COM\d+", re.IGNORECASE)
+#: What is no host, and no line of ours either.
+_OTHER_SCHEMES = frozenset({
+    "udp", "http", "https", "ws", "wss", "telnet", "ssh", "unix", "file", "usb", "can", "rfc2217", "socket", "spy",
+})  # fmt: skip
 _HINT = "use serial:/dev/ttyUSB0?baud=9600, serial:COM3, tcp:127.0.0.1:8101 or pty:"
 
 
@@ -73,25 +79,37 @@ def parse_url(text: str) -> PortUrl:
     """Return what a URL names.
 
     Raises:
-        UsageError: the text is no URL of the four kinds; the hint shows those that are.
+        UsageError: it is no text, or no URL of the four kinds; the hint shows those that are.
     """
+    if not isinstance(text, str):
+        meant = _meant(os.fsdecode(text)) if isinstance(text, os.PathLike) else ""
+        raise UsageError(
+            f"{shown(text)} is no text with a port URL", hint=f"did you mean {meant!r}?" if meant else _HINT
+        )
     scheme, colon, rest = text.partition(":")
     reader = _READERS.get(scheme) if colon else None
     if reader is None:
         meant = _meant(text)
-        raise UsageError(f"{text!r} is not a port URL", hint=f"did you mean {meant}?" if meant else _HINT)
+        raise UsageError(f"{shown(text)} is not a port URL", hint=f"did you mean {meant}?" if meant else _HINT)
     return reader(text, rest)
 
 
 def _meant(text: str) -> str:
     """Return the URL that somebody meant who left the scheme out or misspelt it; empty where nobody can tell."""
-    if text.startswith("/") or text.upper().startswith("COM"):
+    if text.startswith("/") or _COM_PORT.fullmatch(text):
         return f"serial:{text}"
-    if _HOST_AND_PORT.fullmatch(text):
-        return f"tcp:{text}"
     scheme, colon, rest = text.partition(":")
-    near = difflib.get_close_matches(scheme, _READERS, n=1) if colon else []
-    return f"{near[0]}:{rest}" if near else ""
+    if scheme.lower() in _OTHER_SCHEMES:
+        return ""
+    near = difflib.get_close_matches(scheme.lower(), _READERS, n=1) if colon else []
+    meant = f"{near[0]}:{rest}" if near else f"tcp:{text}" if _HOST_AND_PORT.fullmatch(text) else ""
+    if not meant:
+        return ""
+    try:
+        parse_url(meant)
+    except UsageError:
+        return ""  # wrong in more than its scheme
+    return meant
 
 
 def _serial(text: str, rest: str) -> SerialUrl:
@@ -114,6 +132,8 @@ def _tcp(text: str, rest: str) -> TcpUrl:
         host = host[1:-1]
     if "[" in host or "]" in host:
         raise UsageError(f"{text!r}: {host!r} is no host", hint="tcp:[::1]:8101")
+    if "/" in host:
+        raise UsageError(f"{text!r}: {host!r} is no host", hint=f"tcp:{LOOPBACK}:{DEFAULT_TCP_PORT}, without slashes")
     host = host or LOOPBACK
     if not port:
         return TcpUrl(host=host)

@@ -76,7 +76,7 @@ from robot_bench.wires.chip_pins import ChipPins
 from robot_bench.wires.line_ends import AdapterPart, ControllerPart
 from robot_bench.wires.nets import Harness
 from robot_bench.wires.ports import Chip
-from simbase.errors import UsageError
+from simbase.errors import UsageError, shown
 from simbase.installation import installed_version
 from simbase.state import PartState, Stateful
 from simbase.timing import NS_PER_S, Nanos, Reached
@@ -223,10 +223,12 @@ class Bench(Expectations, Interventions, Stateful):
 
         Raises:
             ScenarioError: There is no such scenario, or it breaks the schema.
-            UsageError: An option cannot be.
+            UsageError: That is no scenario, or an option cannot be.
             ImageError: The firmware is missing, damaged, or not for this chip.
             MissingDependencyError: The emulator or the body is not installed.
         """
+        if not isinstance(scenario, Scenario | str | Path):
+            raise UsageError(f"{shown(scenario)} is no scenario", hint="a name, a TOML file, or a Scenario")
         found = scenario if isinstance(scenario, Scenario) else load_scenario(str(scenario))
         wanted = found.with_options(**options)
         return next(iter(cls.together(wanted).values())) if wanted.robots else cls(wanted)

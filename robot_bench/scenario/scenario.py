@@ -9,6 +9,8 @@ there, and every value is in range.
 """
 
 import math
+import numbers
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib.resources import files
@@ -176,6 +178,14 @@ class ScenarioOptions(TypedDict, total=False):
     record: str | Sequence[str] | None
 
 
+_TEXT, _FILE, _WHOLE = ((str,), "text"), ((str, os.PathLike), "text or path"), ((numbers.Integral,), "whole number")
+#: Option → what its value is, as types and in words.
+_OPTION_TYPES: Mapping[str, tuple[tuple[type, ...], str]] = {
+    "firmware": _FILE, "mode": _TEXT, "adapter_core": _TEXT, "body": _TEXT, "world": _FILE, "seed": _WHOLE,
+    "duration_s": ((numbers.Real,), "number"), "usart_baud": _WHOLE,
+}  # fmt: skip
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RobotPlace:
     """One of several robots of a scenario."""
@@ -276,6 +286,10 @@ class Scenario:
                 raise UsageError(
                     f"there is no option {shown(name)}", hint=nearest(name, ScenarioOptions.__annotations__)
                 )
+        for name, (types, what) in _OPTION_TYPES.items():
+            value = options.get(name)
+            if value is not None and (not isinstance(value, types) or isinstance(value, bool)):
+                raise UsageError(f"{name} = {shown(value)} is no {what}")
         mode = options.get("mode")
         if mode is not None and mode not in MODES:
             raise UsageError(f"there is no mode {mode!r}", hint=" or ".join(f"--mode {word}" for word in MODES))

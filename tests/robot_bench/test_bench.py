@@ -3,9 +3,11 @@
 import json
 import logging
 import pickle
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -251,6 +253,32 @@ def test_a_wrong_word_to_a_bench_is_refused_with_a_hint(do: Callable[[Bench], ob
     with pytest.raises((UsageError, BluePillError), match=message) as refused:
         do(bench(scenario("direct")))
     assert refused.value.hint or "such as 2s" in str(refused.value)
+
+
+@pytest.mark.parametrize("wrong", [3, None, b"motors", ["motors"]])
+def test_what_is_no_scenario_makes_no_bench(wrong: Any) -> None:
+    with pytest.raises(UsageError, match="is no scenario") as refused:
+        Bench.from_scenario(wrong)
+    assert refused.value.hint == "a name, a TOML file, or a Scenario"
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"firmware": 3}, "firmware = 3 is no text or path"),
+        ({"mode": 3}, "mode = 3 is no text"),
+        ({"adapter_core": b"model"}, "adapter_core = b'model' is no text"),
+        ({"body": 3}, "body = 3 is no text"),
+        ({"world": 3}, "world = 3 is no text or path"),
+        ({"seed": "7"}, "seed = '7' is no whole number"),
+        ({"seed": True}, "seed = True is no whole number"),
+        ({"duration_s": "2s"}, "duration_s = '2s' is no number"),
+        ({"usart_baud": 9600.5}, "usart_baud = 9600.5 is no whole number"),
+    ],
+)
+def test_an_option_of_another_type_is_refused(options: Any, message: str) -> None:
+    with pytest.raises(UsageError, match=re.escape(message)):
+        scenario("direct").with_options(**options)
 
 
 def test_a_bench_logs_what_its_parts_note_with_their_time(caplog: pytest.LogCaptureFixture) -> None:

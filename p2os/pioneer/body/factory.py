@@ -16,7 +16,7 @@ from p2os.pioneer.body.contract import RobotBody, RobotScene
 from p2os.pioneer.body.outside.address import Address, is_address
 from p2os.pioneer.world.model import Pose, World
 from p2os.robots.parameters import RobotParameters
-from simbase.errors import MissingDependencyError, UsageError
+from simbase.errors import MissingDependencyError, UsageError, shown
 from simbase.user_classes import find_class, make, refuse_lacking
 
 BODY_NAMES = ("kinematic", "bullet", "mujoco")
@@ -124,6 +124,8 @@ def body_class(name: str) -> Callable[[World, Sequence[RobotParameters]], RobotS
     Raises:
         UsageError: There is none, or it lacks a method of `RobotScene`.
     """
+    if not isinstance(name, str):
+        raise UsageError(f"{shown(name)} is no body's name", hint=f"one of {', '.join(BODY_CHOICES)}")
     if is_address(name):
         return _BodyAt(Address.of(name))
     found = find_class(name, what="body", group=GROUP, known=BODY_CHOICES)

@@ -4,6 +4,9 @@ import _thread
 import math
 import threading
 import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -17,6 +20,7 @@ from p2os.client import (
     MotionError,
     Notice,
     RobotState,
+    aio,
 )
 from p2os.client.robot_state import Link
 from p2os.client.settings import ClientSettings
@@ -208,6 +212,14 @@ def test_no_line_is_an_error_with_a_hint() -> None:
         Robot("tcp:127.0.0.1:1", model="nobody")
     with pytest.raises(UsageError):
         Robot("nonsense:")
+
+
+@pytest.mark.parametrize("robot", [Robot, aio.Robot])
+def test_what_is_no_text_names_no_robot(robot: Callable[[Any], object]) -> None:
+    for wrong, hint in ((3, "use serial:"), (None, "use serial:"), (Path("/dev/ttyUSB0"), "'serial:/dev/ttyUSB0'?")):
+        with pytest.raises(UsageError, match="is no text with a port URL") as caught:
+            robot(wrong)
+        assert hint in str(caught.value.hint)
 
 
 def test_before_the_first_packet_nothing_is_known(fast: ServedRobot) -> None:

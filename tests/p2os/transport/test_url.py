@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -55,13 +56,38 @@ def test_a_url_is_read_and_written_back(text: str, url: object) -> None:
         ("tcp:[", "no host", "tcp:[::1]:8101"),
         ("tcp:[::1:8101", "no host", "tcp:[::1]:8101"),
         ("loop:", "has no name", "loop:robot"),
+        ("tcp://robot:8101", "'//robot' is no host", "without slashes"),
+        ("TCP:robot:8101", "not a port URL", "mean tcp:robot:8101?"),
+        ("com12", "not a port URL", "mean serial:com12?"),
+        ("robot:65535", "not a port URL", "mean tcp:robot:65535?"),
+        ("robot:65536", "not a port URL", "use serial:"),
+        ("seral:", "not a port URL", "use serial:"),
+        ("comet:3", "not a port URL", "mean tcp:comet:3?"),
+        ("udp:1", "not a port URL", "use serial:"),
+        ("UDP:robot:8101", "not a port URL", "use serial:"),
+        (3, "3 is no text with a port URL", "use serial:"),
+        (None, "None is no text with a port URL", "use serial:"),
+        (b"tcp:", "b'tcp:' is no text with a port URL", "use serial:"),
+        (Path("/dev/ttyUSB0"), "is no text with a port URL", "mean 'serial:/dev/ttyUSB0'?"),
     ],
 )
-def test_a_wrong_url_is_refused_in_words(text: str, message: str, hint: str) -> None:
+def test_a_wrong_url_is_refused_in_words(text: object, message: str, hint: str) -> None:
     with pytest.raises(UsageError, match=message) as caught:
         parse_url(text)
     assert hint in str(caught.value.hint)
     assert caught.value.exit_code == 2
+
+
+@given(
+    st.from_regex(r"[a-zA-Z]{1,7}:[a-z0-9:./?=\[\]]{0,20}", fullmatch=True)
+    | st.builds("{}:{}".format, st.sampled_from(["tpc", "seral", "lop", "host", "10.0.0.1"]), st.integers(0, 99_999))
+)
+def test_a_url_that_is_said_to_be_meant_is_one(text: str) -> None:
+    try:
+        parse_url(text)
+    except UsageError as error:
+        if error.hint is not None and error.hint.startswith("did you mean "):
+            parse_url(error.hint.removeprefix("did you mean ").removesuffix("?"))
 
 
 @given(st.text(max_size=40) | st.from_regex(r"(serial|tcp|pty|loop):[ -~]{0,20}", fullmatch=True))

@@ -92,5 +92,7 @@ def test_a_named_body_needs_no_note() -> None:
     assert body_note(BEST) == "body bullet: the best that is installed"
     body = make_body(BEST, load_world("room"), load_parameters("p2dx"))
     assert body.name == resolve_body(BEST) == "bullet"
+    with pytest.raises(UsageError, match="3 is no body's name"):
+        resolve_body(3)  # type: ignore[arg-type]  # what a program may have got wrong
     with pytest.raises(UsageError, match="no body 'ode'"):
         resolve_body("ode")
