@@ -19,6 +19,8 @@ from simbase.errors import FileError, shown_name
 
 _HEADER = re.compile(r"\s*(\[\[?)\s*([^\]]+?)\s*\]\]?\s*(?:#.*)?$")
 _KEY = re.compile(r"\s*([A-Za-z0-9_.\-\"']+)\s*=")
+#: A part of a name in quotes.
+_QUOTED = re.compile(r"\"([^\"]*)\"|'([^']*)'")
 #: A key that needs no quotes.
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 #: What can begin or end inside a value: strings, comments, brackets.
@@ -98,7 +100,7 @@ def find_places(text: str) -> TomlPlaces:
         if not depth and not closing:
             header = _HEADER.match(line)
             if header is not None and "=" not in header[2]:
-                table = header[2].strip("\"'")
+                table = _QUOTED.sub(r"\1\2", header[2])
                 number = counts.get(table, -1) + 1 if header[1] == "[[" else 0
                 counts[table] = number
                 found.lines[table, number, ""] = line_number
@@ -106,7 +108,7 @@ def find_places(text: str) -> TomlPlaces:
             key = _KEY.match(line)
             if key is None:
                 continue
-            name = key[1].strip("\"'")
+            name = _QUOTED.sub(r"\1\2", key[1])
             found.lines[table, number, name] = line_number
             found.lines.setdefault((table, number, name.split(".")[0]), line_number)
             rest = line[key.end() :]

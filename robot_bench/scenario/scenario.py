@@ -244,8 +244,8 @@ class Scenario:
     faults: tuple[FaultChange, ...] = ()
     whens: tuple[When, ...] = ()
     goals: tuple[Goal, ...] = ()
-    #: World → what is otherwise there.
-    in_world: Mapping[str, Table] = field(default_factory=dict)
+    #: World, as `world` names it → as the file names it, and what is otherwise there.
+    in_world: Mapping[str, tuple[str, Table]] = field(default_factory=dict)
     #: Several robots in one world; what is said above is the first one's then. None: one robot.
     robots: tuple[RobotPlace, ...] = ()
     #: The seeds that `p2os run` takes one after the other; none: `seed` alone.
@@ -339,7 +339,7 @@ class Scenario:
     def _moved_to(self, world: str) -> "Scenario":
         resolve_world(world, Path(), "--world", error=UsageError)
         moved = replace(self, world=world, start=self.start if world == self.world else None)
-        return _apply_in_world(moved, self.in_world.get(world, {}))
+        return _apply_in_world(moved)
 
 
 def load_scenario(
@@ -384,7 +384,30 @@ def read_scenario(
         UsageError: A setting names what is not there.
     """
     found = read_tables(path, settings, set_by)
-    return build_scenario(found, path, firmware=firmware, settings=settings)
+    scenario = build_scenario(found, path, firmware=firmware, settings=settings)
+    _refuse_what_never_comes(found, path, settings)
+    return scenario
+
+
+def _refuse_what_never_comes(found: ScenarioTable, path: Path, settings: Sequence[Setting]) -> None:
+    """Refuse what a file says of worlds that there are not, and of times after its end.
+
+    A run that is cut short beside the file leaves out what would have come later.
+    """
+    where, table = Place(found.source), found.table
+    worlds = cast("Mapping[str, Table]", table.get("in_world", {}))
+    for world in worlds:
+        resolve_world(world, path.parent, str(within(where, f"in_world.{world}")))
+    if "duration_s" in dict(settings):
+        return
+    longest_s = max(cast("float", part["duration_s"]) for part in (table, *worlds.values()) if "duration_s" in part)
+    for kind in ("obstacle", "fault"):
+        for number, item in enumerate(cast("list[Table]", table.get(kind, []))):
+            if cast("float", item["at_s"]) >= longest_s:
+                raise ScenarioError(
+                    f"{within(where, kind, number)}: at_s = {item['at_s']}: the run is over by then",
+                    hint=f"duration_s is {longest_s:g}",
+                )
 
 
 def build_scenario(
@@ -510,11 +533,11 @@ def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | N
         faults=load_faults(cast("list[Table]", table.get("fault", [])), parameters, where),
         whens=load_whens(cast("list[Table]", table.get("when", [])), parameters, where, wires),
         goals=tuple(goals),
-        in_world=in_world,
+        in_world={_world_beside(world, path.parent): (world, part) for world, part in in_world.items()},
         where=where,
     )
     _refuse_unrecorded(scenario, table, where)
-    scenario = _apply_in_world(scenario, in_world.get(scenario.world, {}))
+    scenario = _apply_in_world(scenario)
     _refuse_goals_beyond_the_end(scenario, where)
     return scenario
 
@@ -646,7 +669,15 @@ def _own_robot(robot: str, table: Table, path: Path, where: Place) -> OwnRobot |
     return load_own_robot(file, cast("Table", table.get("pins", {})), where)
 
 
-def _apply_in_world(scenario: Scenario, part: Table) -> Scenario:
+def _world_beside(world: str, folder: Path) -> str:
+    """Return what `resolve_world` does of a world that is there."""
+    return (
+        world if world in known_worlds() or Path(world).suffix.lower() not in world_suffixes() else str(folder / world)
+    )
+
+
+def _apply_in_world(scenario: Scenario) -> Scenario:
+    world, part = scenario.in_world.get(scenario.world, ("", {}))
     if "threshold_m" in part:
         threshold_um = round(cast("float", part["threshold_m"]) * 1e6)
         adapter = replace(scenario.adapter, threshold_um=threshold_um)
@@ -655,7 +686,7 @@ def _apply_in_world(scenario: Scenario, part: Table) -> Scenario:
         planned_ns = round(cast("float", part["duration_s"]) * NS_PER_S)
         scenario = replace(scenario, duration_ns=planned_ns, planned_ns=planned_ns)
     if "start" in part:
-        key = f"in_world.{scenario.world}.start"
+        key = f"in_world.{world}.start"
         start = _start(part, scenario.where, key)
         scenario = replace(scenario, start=start, start_at=str(within(scenario.where, key)))
     return scenario

@@ -300,6 +300,51 @@ def test_a_start_beyond_the_floor_is_refused_with_its_extent(tmp_path: Path, x_m
     assert caught.value.hint == "x is -3 to 3 m there, and y -2 to 2 m"
 
 
+POST = 'name = "post"\nshape = "cylinder"\nradius_m = 0.1\nheight_m = 1\nx_m = 2\ny_m = 0\n'
+
+
+@pytest.mark.parametrize(
+    ("table", "what"), [(f"[[obstacle]]\n{POST}", "[[obstacle]] 1"), ('[[fault]]\nfault = "reboot"\n', "[[fault]] 1")]
+)
+@pytest.mark.parametrize(("at_s", "more", "is_over"), [
+    ("9.999", "", False), ("10", "", True), ("10.5", "", True),
+    ("10", "[in_world.ramp]\nduration_s = 11\n", False), ("11", "[in_world.ramp]\nduration_s = 11\n", True),
+    ("9.999", "[in_world.ramp]\nduration_s = 3\n", False), ("10", "[in_world.ramp]\nthreshold_m = 1\n", True),
+])  # fmt: skip
+def test_what_would_come_after_the_end_is_refused_by_file_and_line(
+    tmp_path: Path, table: str, what: str, at_s: str, more: str, *, is_over: bool
+) -> None:
+    path = write(tmp_path, f"{LEAST}{table}at_s = {at_s}\n{more}")
+    if is_over:
+        with pytest.raises(ScenarioError) as caught:
+            read_scenario(path)
+        assert str(caught.value) == f"mine.toml:4: {what}: at_s = {at_s}: the run is over by then"
+        assert caught.value.hint == f"duration_s is {11 if 'duration_s' in more else 10}"
+    else:
+        read_scenario(path)
+    read_scenario(path, settings=[("duration_s", 1.0)])  # a run that is cut short beside the file
+
+
+def test_what_is_otherwise_in_a_world_that_there_is_not_is_refused_by_file_and_line(tmp_path: Path) -> None:
+    for world, says, hint in (
+        ("rooom", "there is no world 'rooom'", "did you mean 'room'?"),
+        ('"yard.toml"', f"there is no world file {tmp_path / 'yard.toml'}", "worlds that ship: "),
+    ):
+        with pytest.raises(ScenarioError, match=r"^mine\.toml:4: \[in_world\.") as caught:
+            read_scenario(write(tmp_path, f"{LEAST}[in_world.{world}]\nthreshold_m = 1\n"))
+        assert says in str(caught.value)
+        assert str(caught.value.hint).startswith(hint)
+
+
+def test_what_is_otherwise_in_a_world_of_a_file_beside_it_is_so(tmp_path: Path) -> None:
+    (tmp_path / "yard.toml").write_text('name = "yard"\nextent_m = [-3, -3, 3, 3]\n')
+    text = LEAST.replace("room", "yard.toml") + '[in_world."yard.toml"]\nduration_s = 7\n'
+    assert read_scenario(write(tmp_path, text)).planned_ns == 7 * 10**9
+    away = read_scenario(write(tmp_path, text.replace('world = "yard.toml"', 'world = "room"')))
+    assert away.planned_ns == 10 * 10**9
+    assert away.with_options(world=str(tmp_path / "yard.toml")).planned_ns == 7 * 10**9
+
+
 def test_a_start_of_a_world_that_an_option_moves_to_has_its_line_too(tmp_path: Path) -> None:
     text = LEAST + "[in_world.corridor]\nstart = { x_m = 900, y_m = 0 }\n"
     moved = read_scenario(write(tmp_path, text)).with_options(world="corridor", body="kinematic")
