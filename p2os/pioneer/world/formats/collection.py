@@ -36,6 +36,8 @@ from p2os.pioneer.world.solids import Solid, box, cylinder, sphere
 
 #: chosen: a Pioneer turns on the spot in it.
 FREE_M = 0.5
+#: So much beyond the farthest a mesh is cut, not refused: the floor of an exported world reaches 1 m farther than it.
+BEYOND_M = 2.0
 #: Between these heights nothing may stand.
 LOW_M, HIGH_M = 0.05, 0.5
 #: The plan is searched on a grid of so many places along its longer side.
@@ -135,11 +137,12 @@ class Collection:
         """Take a mesh in the world's frame; triangles without an area are left out."""
         corners = tuple(vertices)
         for vertex in corners:
-            if not all(-FARTHEST_M <= value <= FARTHEST_M for value in vertex):
+            if not all(-FARTHEST_M - BEYOND_M <= value <= FARTHEST_M + BEYOND_M for value in vertex):
                 raise WorldError(
                     f"{self.path}: {name!r}: a vertex is not finite, or farther out than {FARTHEST_M:g} m",
                     hint="is its unit the metre?",
                 )
+        corners = tuple((_within(x), _within(y), _within(z)) for x, y, z in corners)
         count = len(corners)
         kept = []
         for triangle in triangles:
@@ -270,10 +273,17 @@ class Collection:
         for mark in self.marks:
             xs += [x for x, _ in mark.points_m]
             ys += [y for _, y in mark.points_m]
-        return min(xs) - MARGIN_M, min(ys) - MARGIN_M, max(xs) + MARGIN_M, max(ys) + MARGIN_M
+        return (
+            _within(min(xs) - MARGIN_M), _within(min(ys) - MARGIN_M),
+            _within(max(xs) + MARGIN_M), _within(max(ys) + MARGIN_M),
+        )  # fmt: skip
 
     def _hint(self) -> str | None:
         return f"skipped: {', '.join(self._skipped)}" if self._skipped else None
+
+
+def _within(value_m: float) -> float:
+    return min(FARTHEST_M, max(-FARTHEST_M, value_m))
 
 
 def _free_start(

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from p2os.pioneer.export import scene_of
 from p2os.pioneer.export.scene import Body, Box, Cylinder, Motion, Scene, Sphere, TriangleMesh
 from p2os.pioneer.export.triangles import triangulated
-from p2os.pioneer.world import known_worlds, load_world
+from p2os.pioneer.world import known_worlds, load_world, parse_world
 from p2os.pioneer.world.formats.transform import IDENTITY, Transform, after, apply
 from p2os.pioneer.world.model import World
 from p2os.robots.parameters import known_robots, load_parameters
@@ -38,6 +38,17 @@ def test_a_shipped_world_with_a_robot_at_its_start_comes_back_without_the_robot(
     again = load_world(written(tmp_path, f"{name}{ending}", world, P2DX))
     walkers = {item.name for item in world.obstacles if item.walk is not None}
     assert [line for line in differences(expected(world), again) if not any(name in line for name in walkers)] == []
+
+
+@pytest.mark.parametrize("ending", [".gltf", ".glb", ".sdf", ".urdf"])
+def test_the_largest_world_comes_back(ending: str, tmp_path: Path) -> None:
+    wall = '[[wall]]\nname = "w"\nfrom_m = [-9999.9, 0]\nto_m = [9999.9, 0]\n'
+    extent = "extent_m = [-10000, -10000, 10000, 10000]\n"
+    world = parse_world(f'name = "far"\n{extent}[start]\nx_m = 0\ny_m = 5\n{wall}', "far")
+    again = load_world(written(tmp_path, f"far{ending}", world))
+    assert again.extent == world.extent
+    xs = [x for mesh in again.meshes for x, _, _ in mesh.vertices] or [item.reach_m for item in again.obstacles]
+    assert max(xs) == pytest.approx(10_000.0, abs=0.2)
 
 
 @settings(max_examples=20)

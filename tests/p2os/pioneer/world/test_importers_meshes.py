@@ -143,6 +143,7 @@ def test_the_cut_and_the_shadow_are_those_of_the_solid(tmp_path: Path) -> None:
         ("a.obj", "", "nothing in it"),
         ("a.obj", obj([(math.nan, 0, 0), *WEDGE_Y_UP[1:]]), "not finite"),
         ("a.obj", obj([(1e30, 0, 0), *WEDGE_Y_UP[1:]]), "farther out"),
+        ("a.obj", obj([(0, -10_002.1, 0), *WEDGE_Y_UP[1:]]), "farther out"),
         ("a.stl", stl_binary(WEDGE)[:-1], "no STL"),
         ("a.stl", bytes(80) + b"\xff\xff\xff\xff" + bytes(100), "no STL"),
         ("a.stl", bytes(10), "no STL"),
