@@ -18,6 +18,7 @@ from p2os.pioneer.world.model import Obstacle, Pose, Walk
 from p2os.robots.parameters import load_parameters
 from simbase.errors import UsageError
 from tests.p2os.pioneer.body.outside.served import Answering, Served, frame, served, serving
+from tests.tools.each_row import each_row
 
 P2DX, ROOM = load_parameters("p2dx"), load_world("room")
 FAN = cones(P2DX)[3]
@@ -118,7 +119,7 @@ def test_what_it_cannot_is_said_in_one_line() -> None:
 # Addresses ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "what"),
     [
         ("tcp:127.0.0.1", "names no host and port"),
