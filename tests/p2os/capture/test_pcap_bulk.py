@@ -17,6 +17,7 @@ from p2os.capture.formats.tcp_streams import MOST_WAITING
 from simbase.errors import FileError
 from tests.p2os.capture.network_files import ETHERNET, block, network_file, segment
 from tests.p2os.protocol.drawn_packets import SEEDS, Draw
+from tests.tools.each_row import each_row
 
 CLIENT, OTHER, ROBOT = 40000, 41000, 8101
 LINKS = {1: ETHERNET, 0: bytes(4), 101: b"", 113: bytes(14) + b"\x08\0", 276: b"\x08\0" + bytes(18)}
@@ -121,8 +122,8 @@ def test_records_of_ours_say_the_same(chunks: list[Chunk], size: int) -> None:
     both_ways(data[:-1] + b"\2", size)
 
 
-@pytest.mark.parametrize("ticks", [b"\x06", b"\x09", b"\x07", b"\x0a", b"\x8a", b"\x80"])
-@pytest.mark.parametrize("late", [0, 1 << 20, 1 << 31])
+@each_row("ticks", [b"\x06", b"\x09", b"\x07", b"\x0a", b"\x8a", b"\x80"])
+@each_row("late", [0, 1 << 20, 1 << 31])
 def test_enhanced_packets_have_the_time_of_their_interface(ticks: bytes, late: int) -> None:
     section = block(PCAPNG_MAGIC, struct.pack("<IHHq", 0x1A2B3C4D, 1, 0, -1), "<")
     option = struct.pack("<HH", 9, 1) + ticks + bytes(3) + bytes(4)

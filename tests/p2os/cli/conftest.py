@@ -11,9 +11,12 @@ import pytest
 from p2os import Robot
 from p2os.cli import main as cli
 from p2os.cli.held_robot import RobotWatch
+from p2os.pioneer.controller import ControllerSettings
 from p2os.pioneer.serve import served_pioneer
+from p2os.protocol.times import CYCLE_NS
 from p2os.transport.virtual_clock import VirtualClock
 from p2os.transport.wall_clock import Clock, wall_clock
+from tests.p2os.client.served_robot import QUICK_CYCLE_NS
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "client"))  # `ServedRobot`, whose wheels can be looked at
 
@@ -37,7 +40,8 @@ def serving(clock: Clock = wall_clock) -> Iterator[Served]:
     def tell(_now: int, what: str, detail: str) -> None:
         served.events.append(f"{what}: {detail}")
 
-    with served_pioneer(body="kinematic", on_event=tell, clock=clock) as served.url:
+    settings = ControllerSettings(sip_period_ns=CYCLE_NS if isinstance(clock, VirtualClock) else QUICK_CYCLE_NS)
+    with served_pioneer(body="kinematic", settings=settings, on_event=tell, clock=clock) as served.url:
         yield served
 
 

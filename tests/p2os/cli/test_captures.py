@@ -195,7 +195,7 @@ def test_a_bridge_follows_a_change_of_speed_and_stops_the_robot_when_it_ends() -
     bridge._robot.set_baud = bauds.append
     robot.write(bytes.fromhex("fafb1b32000000000000000000007d00000000000000000000000000327d"))
     client.write(Command(CommandNumber.HOSTBAUD, 2).to_frame().to_bytes())
-    for _ in range(4):
+    for _ in range(2):
         bridge.turn()
     assert bauds == [38400]
     assert client.read()[:4] == b"\xfa\xfb\x1b\x32"

@@ -20,6 +20,7 @@ from p2os.protocol.config_packet import ConfigPacket
 from p2os.protocol.packets import Identity
 from p2os.protocol.sip import SonarReading, StandardSip
 from p2os.robots.parameters import load_parameters
+from p2os.transport.virtual_clock import VirtualClock
 
 P2DX = load_parameters("p2dx")
 Capture = pytest.CaptureFixture[str]
@@ -161,9 +162,10 @@ def test_a_package_that_is_not_there_has_no_version() -> None:
 # info -----------------------------------------------------------------------------------
 
 
-def test_a_robot_tells_who_it_is_and_is_left_closed() -> None:
+def test_a_robot_tells_who_it_is_and_is_left_closed(clock: VirtualClock) -> None:
     told: list[str] = []
-    with served_pioneer(body="kinematic", on_event=lambda _now, what, _detail: told.append(what)) as url:
+    note = lambda _now, what, _detail: told.append(what)  # noqa: E731
+    with served_pioneer(body="kinematic", on_event=note, clock=clock) as url:
         found = info.ask(url)
     assert found.identity == Identity("Virtual", "Pioneer", "p2dx")
     assert found.config is not None
@@ -173,9 +175,9 @@ def test_a_robot_tells_who_it_is_and_is_left_closed() -> None:
     assert told.index("opened") < told.index("closed")
 
 
-def test_a_robot_that_knows_no_config_still_answers(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_robot_that_knows_no_config_still_answers(monkeypatch: pytest.MonkeyPatch, clock: VirtualClock) -> None:
     monkeypatch.setattr("p2os.pioneer.controller.controller.apply", lambda *_: Effect.UNKNOWN)
-    with served_pioneer(body="kinematic") as url:
+    with served_pioneer(body="kinematic", clock=clock) as url:
         assert info.ask(url).config is None
 
 

@@ -15,6 +15,7 @@ from p2os.cli.robots.teleop import FIRST_HOLD_NS, KEYS, NEXT_HOLD_NS, QUIT_KEYS,
 from p2os.client import DeadmanStopped, GapStopped, Link, LinkLost, Notice
 from simbase.timing import NS_PER_MS
 from tests.p2os.cli.driven import until
+from tests.tools.each_row import each_row
 from tests.tools.forked_python import forked_p2os
 
 TIMEOUT_S = 60.0
@@ -48,7 +49,7 @@ def test_a_held_key_drives_on_and_stops_soon_after_it_is_let_go() -> None:
     assert not keys.is_driving
 
 
-@pytest.mark.parametrize("key", KEYS)
+@each_row("key", KEYS)
 def test_each_key_has_its_direction(key: str) -> None:
     keys = teleop()
     keys.press(key, 5)

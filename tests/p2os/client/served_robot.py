@@ -12,6 +12,7 @@ from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.serve.host import Host
 from p2os.protocol.commands import Command, CommandNumber, enable, stop, vel
 from p2os.protocol.frames import Decoder, Frame
+from p2os.protocol.times import CYCLE_NS
 from p2os.transport import Loops, listen_url, open_url
 from p2os.transport.ports import HungUpError, Transport
 from p2os.transport.virtual_clock import VirtualClock
@@ -21,6 +22,8 @@ from tests.p2os.client.client_rig import new_pioneer
 
 #: A bound on every wait; reached only when something is broken.
 TIMEOUT_S = 30.0
+#: How often a robot in real time reports: as often as firmware can be told to, for tests wait for packets.
+QUICK_CYCLE_NS = 20 * NS_PER_MS
 #: Robots of tests are never open already.
 QUICK = ClientSettings(listen_ns=NS_PER_MS)
 #: What a client says last.
@@ -42,7 +45,8 @@ class ServedRobot:
         self, url: str = "tcp:127.0.0.1:0", pioneer: Pioneer | None = None, *,
         speed: float = 1.0, clock: Clock = wall_clock,
     ) -> None:  # fmt: skip
-        self.pioneer = pioneer or new_pioneer()
+        period_ns = CYCLE_NS if isinstance(clock, VirtualClock) else QUICK_CYCLE_NS
+        self.pioneer = pioneer or new_pioneer(sip_period_ns=period_ns)
         self.clock = clock
         #: What the robot is to do between two turns of its host: called once, in the host's thread; what one of them
         #: adds, after the next turn.

@@ -20,7 +20,7 @@ from p2os.transport.virtual_clock import VirtualClock
 from p2os.transport.wall_clock import GAP_NS
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 from tests.p2os.client.client_rig import free_pioneer
-from tests.p2os.client.served_robot import QUICK, Recorder, ServedRobot
+from tests.p2os.client.served_robot import QUICK, TIMEOUT_S, Recorder, ServedRobot
 
 
 class SuspendingClock:
@@ -329,16 +329,23 @@ def test_an_asyncio_robot_whose_machine_slept_stops_first_and_never_drives_on(fa
     assert isinstance(told[0], GapStopped)
 
 
+async def soon(is_so: Callable[[], object]) -> None:
+    """Let the loop work until something is so, some of which another thread does."""
+    async with asyncio.timeout(TIMEOUT_S):
+        while not is_so():  # noqa: ASYNC110
+            await asyncio.sleep(0.005)
+
+
 async def block_the_loop(robot: ServedRobot, block: Callable[[float], None], pause_s: float) -> None:
     """Drive a robot by a program that does nothing for its loop for so long."""
     recorder, told = Recorder(robot.open), list[Notice]()
     async with AsyncRobot(robot.url, settings=QUICK, opener=recorder, clock=robot.clock) as client:
         client.on_event(told.append)
-        client.set_velocity(0.3)
-        await asyncio.sleep(0.3)
+        client.set_velocity(0.1)
+        await soon(lambda: robot.is_moving)
         sent = len(recorder.sent)
         block(pause_s)
-        await asyncio.sleep(0.3)
+        await soon(lambda: told)
         assert client.link is Link.OPEN
         assert recorder.sent[sent] == stop()
         robot.until(lambda: not robot.is_moving)
@@ -346,7 +353,7 @@ async def block_the_loop(robot: ServedRobot, block: Callable[[float], None], pau
 
 
 def test_an_asyncio_program_that_blocks_its_loop_keeps_a_sound_link_and_stops(served: ServedRobot) -> None:
-    asyncio.run(block_the_loop(served, time.sleep, 1.2))
+    asyncio.run(block_the_loop(served, time.sleep, 0.7))
 
 
 @pytest.mark.parametrize("pause_s", [0.7, 1.2, 2.5, 20.0])
@@ -366,7 +373,7 @@ def block_a_callback(robot: ServedRobot, block: Callable[[float], None], pause_s
 
     with Robot(robot.url, settings=QUICK, opener=Recorder(robot.open), clock=robot.clock) as client:
         client.on_event(told.append)
-        client.set_velocity(0.3)
+        client.set_velocity(0.1)
         robot.until(lambda: robot.is_moving)
         client.on_state(block_once)
         robot.until(lambda: any(isinstance(notice, GapStopped) for notice in told))
@@ -375,7 +382,7 @@ def block_a_callback(robot: ServedRobot, block: Callable[[float], None], pause_s
 
 
 def test_a_callback_that_blocks_keeps_a_sound_link_and_stops(served: ServedRobot) -> None:
-    block_a_callback(served, time.sleep, 1.1)
+    block_a_callback(served, time.sleep, 0.7)
 
 
 @pytest.mark.parametrize("pause_s", [0.7, 1.3, 20.0])

@@ -19,7 +19,7 @@ from p2os.errors import TransportError
 from p2os.protocol.commands import enable, rvel, stop, vel
 from p2os.transport.ports import Transport
 from simbase.timing import NS_PER_MS
-from tests.p2os.client.client_rig import Rig
+from tests.p2os.client.client_rig import Rig, new_pioneer
 from tests.p2os.client.served_robot import QUICK, Recorder, ServedRobot, until
 
 STOPS = b"".join(command.to_frame().to_bytes() for command in (stop(), vel(0), rvel(0)))
@@ -172,7 +172,7 @@ def test_a_line_without_a_descriptor_is_asked_for_bytes() -> None:
 
 
 def test_the_rig_is_the_same_robot_as_the_served_one() -> None:
-    rig, served = Rig().connect(), ServedRobot()
+    rig, served = Rig().connect(), ServedRobot(pioneer=new_pioneer())
     try:
         with Robot(served.url, settings=QUICK) as robot:
             assert robot.identity == rig.core.identity

@@ -18,6 +18,7 @@ from p2os.protocol.commands import Command, CommandNumber, enable, rvel, stop, v
 from p2os.protocol.frames import Decoder, Frame
 from simbase.timing import NS_PER_S
 from tests.p2os.client.client_rig import MS, WIRES, Link, Rig, S, new_pioneer
+from tests.tools.each_row import each_row
 
 STOPS = [stop(), vel(0), rvel(0)]
 CLOSE = Command(CommandNumber.CLOSE)
@@ -143,9 +144,9 @@ def test_a_peer_that_echoes_stop_for_ever_is_a_named_failure() -> None:
     assert rig.core.link is not Link.OPEN
 
 
-@pytest.mark.parametrize("wire", WIRES)
-@pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("baud", [None, 9600])
+@each_row("wire", WIRES)
+@each_row("seed", range(4))
+@each_row("baud", [None, 9600])
 def test_a_session_opens_over_any_wire_or_fails_by_name(wire: str, seed: int, baud: int | None) -> None:
     rig = Rig(wire=wire, seed=seed, baud=baud)
     rig.core.connect(0)
@@ -369,7 +370,7 @@ def test_closing_stops_the_robot_whatever_is_under_way() -> None:
     assert rig.core.is_quiet
 
 
-@pytest.mark.parametrize("at_ms", range(0, 160, 10))
+@each_row("at_ms", range(0, 160, 10))
 def test_closing_during_the_handshake_leaves_a_closed_robot(at_ms: int) -> None:
     rig = Rig()
     rig.core.connect(0)

@@ -7,6 +7,7 @@ from p2os.errors import LocalProtocolError
 from p2os.protocol.commands import ROWS, Argument, Command, CommandNumber, CommandRow, command, command_row
 from p2os.protocol.profiles import Profile
 from tests.p2os.protocol.drawn_packets import SEEDS, Draw, pairs_of_bytes
+from tests.tools.each_row import each_row
 
 
 def argument_of(row: CommandRow, draw: Draw) -> int | bytes | None:
@@ -76,7 +77,7 @@ def test_two_bytes_survive_whatever_their_signs(row: CommandRow) -> None:
         assert (made.signed_bytes if row.two_bytes.is_signed else made.two_bytes) == (low, high)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("which", "argument", "said"),
     [
         ("VEL", (), "VEL: None is not what it takes: integer of -32767 to 32767 mm/s"),

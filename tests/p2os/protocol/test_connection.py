@@ -37,6 +37,7 @@ from p2os.protocol.packets import Identity, RawPacket
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import StandardSip
 from simbase.timing import NS_PER_MS, NS_PER_S
+from tests.tools.each_row import each_row
 
 MS = NS_PER_MS
 WILMA = Identity("Wilma", "Pioneer", "p2dx")
@@ -102,8 +103,8 @@ WIRES: dict[str, Wire] = {
 }
 
 
-@pytest.mark.parametrize("name", WIRES)
-@pytest.mark.parametrize("seed", range(5))
+@each_row("name", WIRES)
+@each_row("seed", range(5))
 def test_a_session_opens_over_any_wire_or_fails_by_name(name: str, seed: int) -> None:
     wire, random_source = WIRES[name], Random(seed)
     here, there = client(), server()

@@ -16,6 +16,7 @@ from p2os.protocol.packets import Identity, RawPacket, packet_frame, read_packet
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import TAIL, SonarReading, StandardSip
 from tests.p2os.protocol.drawn_packets import SEEDS, Draw, pairs_of_bytes, sip
+from tests.tools.each_row import each_row
 
 GOLDEN = Path(__file__).parents[2] / "golden"
 VECTORS = json.loads((GOLDEN / "p2os_vectors.json").read_text(encoding="utf-8"))
@@ -29,7 +30,7 @@ ONLY_READ = {"seto_player_truncated", "tty2_RS_cr_aria_comStr"}
 arguments = st.one_of(st.none(), st.integers(-0xFFFF, 0xFFFF), st.binary(max_size=199))
 
 
-@pytest.mark.parametrize("vector", TO_ROBOT, ids=lambda vector: vector["name"])
+@each_row("vector", TO_ROBOT, ids=lambda vector: vector["name"])
 def test_a_command_vector_reads_and_writes(vector: dict) -> None:
     frame = Frame.from_bytes(bytes.fromhex(vector["hex"]))
     command, said = Command.from_frame(frame), vector["decoded"]
@@ -42,7 +43,7 @@ def test_a_command_vector_reads_and_writes(vector: dict) -> None:
         assert command.to_frame() == frame
 
 
-@pytest.mark.parametrize("vector", FROM_ROBOT, ids=lambda vector: vector["name"])
+@each_row("vector", FROM_ROBOT, ids=lambda vector: vector["name"])
 def test_a_packet_vector_reads_and_writes(vector: dict) -> None:
     frame, said = Frame.from_bytes(bytes.fromhex(vector["hex"])), vector["decoded"]
     packet = Identity.from_frame(frame) if frame.kind == 2 else read_packet(frame, Profile.P2OS)

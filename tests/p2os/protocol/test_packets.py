@@ -43,6 +43,7 @@ from p2os.protocol.packets import (
 )
 from p2os.protocol.profiles import Profile
 from tests.p2os.protocol.drawn_packets import KINDS, SEEDS, Draw
+from tests.tools.each_row import each_row
 
 GOLDEN = Path(__file__).parents[2] / "golden"
 VECTORS = {vector["name"]: vector for vector in json.loads((GOLDEN / "p2os_vectors.json").read_text(encoding="utf-8"))}
@@ -117,7 +118,7 @@ STRICT: list[ServerPacket] = [
 ]
 
 
-@pytest.mark.parametrize("packet", STRICT, ids=lambda packet: type(packet).__name__)
+@each_row("packet", STRICT, ids=lambda packet: type(packet).__name__)
 def test_a_packet_cut_anywhere_is_raw(packet: ServerPacket) -> None:
     whole = packet_frame(packet, Profile.P2OS).payload
     for cut in range(1, len(whole)):
@@ -136,7 +137,7 @@ def test_an_identity_without_its_three_strings_is_raw() -> None:
     assert read_packet(Frame(b"\x02Wilma\0Pioneer\0"), Profile.P2OS) == RawPacket(2, b"Wilma\0Pioneer\0")
 
 
-@pytest.mark.parametrize(
+@each_row(
     "make",
     [
         lambda: EncoderPacket(left_counts=2**31, right_counts=0).to_frame(),

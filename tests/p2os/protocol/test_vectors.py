@@ -5,8 +5,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 from p2os.protocol.commands import NEGATIVE, POSITIVE, STRING, Command
 from p2os.protocol.config_packet import FIELDS, ConfigPacket
 from p2os.protocol.frames import Frame
@@ -28,6 +26,7 @@ from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import POSITION_MASK, TAIL
 from p2os.protocol.units import battery_v, range_m
 from p2os.robots.parameters import load_parameters
+from tests.tools.each_row import each_row
 
 VECTORS = [
     vector
@@ -81,7 +80,7 @@ VALUES: dict[type, Callable[[Any], dict[str, Any]]] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("vector", [v for v in VECTORS if "type" in v["decoded"]], ids=lambda vector: vector["name"])
+@each_row("vector", [v for v in VECTORS if "type" in v["decoded"]], ids=lambda vector: vector["name"])
 def test_a_packet_says_all_that_its_vector_states(vector: dict) -> None:
     stated = {name: value for name, value in vector["decoded"].items() if name not in PROSE}
     frame = Frame.from_bytes(bytes.fromhex(vector["hex"]))
@@ -90,9 +89,7 @@ def test_a_packet_says_all_that_its_vector_states(vector: dict) -> None:
     assert {name: values[name] for name in stated} == stated
 
 
-@pytest.mark.parametrize(
-    "vector", [v for v in VECTORS if "arg_type" in v["decoded"]], ids=lambda vector: vector["name"]
-)
+@each_row("vector", [v for v in VECTORS if "arg_type" in v["decoded"]], ids=lambda vector: vector["name"])
 def test_a_command_says_all_that_its_vector_states(vector: dict) -> None:
     stated = vector["decoded"]
     frame = Frame.from_bytes(bytes.fromhex(vector["hex"]))

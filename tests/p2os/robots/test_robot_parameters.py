@@ -9,11 +9,12 @@ from hypothesis import strategies as st
 
 from p2os.protocol.odometry import Unwrapper
 from p2os.robots.parameters import ParametersError, known_robots, load_parameters
+from tests.tools.each_row import each_row
 
 P2DX = files("p2os.robots").joinpath("p2dx.toml").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("name", known_robots())
+@each_row("name", known_robots())
 def test_a_shipped_robot_loads(name: str) -> None:
     robot = load_parameters(name.upper())
     assert robot.subclass == name
@@ -64,7 +65,7 @@ pionat 0.07 2.5332 0.1734 0.00333 330 400 500 0 0 500 100 7 false -/- false
 """
 
 
-@pytest.mark.parametrize("row", ARIA.splitlines(), ids=lambda row: row.split()[0])
+@each_row("row", ARIA.splitlines(), ids=lambda row: row.split()[0])
 def test_a_model_has_the_numbers_of_arias_file(row: str) -> None:
     name, distance, velocity, ranging, difference, *rest = row.split()
     radius, width, length, front, rear, speed, turn, sonar = map(int, rest[:8])

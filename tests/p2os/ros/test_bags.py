@@ -20,6 +20,7 @@ from p2os.ros.message_table import MESSAGES
 from p2os.ros.topics import TOPICS
 from p2os.ros.transport import NodeOptions, Topic
 from simbase.errors import FileError, MissingDependencyError, UsageError
+from tests.tools.each_row import each_row
 
 INT, ODOMETRY = "std_msgs/msg/Int32", "nav_msgs/msg/Odometry"
 PLAIN = Topic("/encoder_left", INT)
@@ -43,7 +44,7 @@ def file_of(bag: Path) -> Path:
     return found
 
 
-@pytest.mark.parametrize("name", [name for name in MESSAGES if "/srv/" not in name and "rmw" not in name])
+@each_row("name", [name for name in MESSAGES if "/srv/" not in name and "rmw" not in name])
 def test_a_definition_is_read_by_others_as_the_type_with_its_hash(name: str) -> None:
     store = get_typestore(Stores.EMPTY)
     store.register(get_types_from_msg(definition(name), name))

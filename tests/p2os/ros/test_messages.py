@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from p2os.errors import RemoteProtocolError
 from p2os.ros.codec import from_cdr, to_cdr
 from p2os.ros.message_table import MESSAGES, SERVICES, Field
+from tests.tools.each_row import each_row
 
 pytest.importorskip("cyclonedds", reason="the extra ros is not installed")
 NUMBERS = {
@@ -85,7 +86,7 @@ DESCRIBED = {
 HASHED = sorted(name for name in MESSAGES if MESSAGES[name].hash)
 
 
-@pytest.mark.parametrize("name", HASHED)
+@each_row("name", HASHED)
 def test_a_type_has_the_hash_that_its_fields_give(name: str) -> None:
     assert hash_of(name, DESCRIBED) == MESSAGES[name].hash
 
@@ -105,7 +106,7 @@ def test_a_service_has_the_hash_that_its_halves_give(name: str) -> None:
     assert hash_of(name, DESCRIBED | whole) == SERVICES[name]
 
 
-@pytest.mark.parametrize("name", [name for name in HASHED if not name.startswith("rmw_dds_common")])
+@each_row("name", [name for name in HASHED if not name.startswith("rmw_dds_common")])
 def test_the_hash_is_that_of_the_definition_of_others(name: str) -> None:
     # Not of rmw_dds_common: rosbags 0.11 takes `char` for a kind of its own there, which Jazzy's code does not.
     rosbags = pytest.importorskip("rosbags.typesys", reason="rosbags is not installed")

@@ -10,6 +10,7 @@ import pytest
 from p2os.robots.parameters import known_robots, load_parameters
 from p2os.ros.frames import BASE, JOINTS, WHEELS, Frames
 from p2os.ros.urdf import urdf_text
+from tests.tools.each_row import each_row
 
 
 def joints(text: str) -> dict[str, tuple[str, list[float], list[float]]]:
@@ -25,7 +26,7 @@ def joints(text: str) -> dict[str, tuple[str, list[float], list[float]]]:
     return found
 
 
-@pytest.mark.parametrize("robot", known_robots())
+@each_row("robot", known_robots())
 def test_each_frame_of_tf_is_a_link_at_the_same_place(robot: str) -> None:
     parameters = load_parameters(robot)
     frames = Frames.of(parameters, "/r1")

@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 
 from p2os.transport.url import LoopUrl, PtyUrl, SerialUrl, TcpUrl, parse_url
 from simbase.errors import P2osError, UsageError
+from tests.tools.each_row import each_row
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "url"),
     [
         ("serial:/dev/ttyUSB0", SerialUrl(path="/dev/ttyUSB0", baud=9600)),
@@ -37,7 +38,7 @@ def test_a_url_is_read_and_written_back(text: str, url: object) -> None:
     assert parse_url(str(parse_url(text))) == url
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "message", "hint"),
     [
         ("", "not a port URL", "serial:/dev/ttyUSB0"),

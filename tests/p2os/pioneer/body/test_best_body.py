@@ -13,7 +13,7 @@ from p2os.robots.parameters import load_parameters
 from simbase.errors import UsageError
 from tests.tools.forked_python import forked_python
 
-#: Runs the command line in a Python in which some packages are not installed.
+#: Runs the command line in a Python in which some packages are not installed; runs have no plots, which cost most.
 WITHOUT = """
 import importlib.abc, sys
 
@@ -23,6 +23,8 @@ class Missing(importlib.abc.MetaPathFinder):
             raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
 
 sys.meta_path.insert(0, Missing())
+from robot_bench.report import make
+make._plots = lambda: None
 from p2os.cli.main import main
 main({words!r})
 """

@@ -30,10 +30,19 @@ for _model in known_robots():
     )
 
 
+#: Of the two engines, which take long, each build has one in turn; the other one in `make soak`.
+ENGINES = ("bullet", "mujoco")
+
+
+def marks_of_build(engine: str, place: int) -> list[pytest.MarkDecorator]:
+    is_others_turn = engine in ENGINES and ENGINES[place % 2] != engine
+    return [*marks_of(engine), *([pytest.mark.soak] if is_others_turn else [])]
+
+
 @pytest.fixture(
     params=[
-        pytest.param((engine, model), id=f"{engine}-{model}", marks=marks_of(engine))
-        for model in BUILDS
+        pytest.param((engine, model), id=f"{engine}-{model}", marks=marks_of_build(engine, place))
+        for place, model in enumerate(BUILDS)
         for engine in BODY_NAMES
     ]
 )

@@ -13,6 +13,7 @@ from p2os.protocol.commands import CommandNumber as C
 from p2os.protocol.frames import Frame
 from p2os.protocol.profiles import Profile
 from tests.p2os.conftest import context_of
+from tests.tools.each_row import each_row
 
 MakeRobot = Callable[..., Any]
 
@@ -34,7 +35,7 @@ def told(robot: Any, what: str) -> list[str]:
     return [detail for _, told, detail in robot.events if told == what]
 
 
-@pytest.mark.parametrize("row", ROWS, ids=lambda row: row.name)
+@each_row("row", ROWS, ids=lambda row: row.name)
 def test_a_command_is_obeyed_by_the_families_whose_manual_lists_it(
     make_robot: MakeRobot, profile: Profile, row: CommandRow
 ) -> None:
@@ -50,7 +51,7 @@ def test_a_command_is_obeyed_by_the_families_whose_manual_lists_it(
         assert is_ignored, "counted: this robot has no such part"
 
 
-@pytest.mark.parametrize("row", ROWS, ids=lambda row: row.name)
+@each_row("row", ROWS, ids=lambda row: row.name)
 def test_a_lenient_robot_obeys_whatever_any_family_knows(make_robot: MakeRobot, row: CommandRow) -> None:
     robot = make_robot(lenient=True).open()
     robot.say(row.number, an_argument(row))
@@ -80,7 +81,7 @@ def test_no_command_kills_the_robot(
     assert robot.sips(), "packets go on"
 
 
-@pytest.mark.parametrize("row", [row for row in ROWS if row.kind is not Argument.NONE and row.number in HANDLERS])
+@each_row("row", [row for row in ROWS if row.kind is not Argument.NONE and row.number in HANDLERS])
 def test_a_command_without_its_argument_has_no_effect(make_robot: MakeRobot, row: CommandRow) -> None:
     robot = make_robot(lenient=True).open()
     before = context_of(robot.pioneer)

@@ -15,6 +15,7 @@ from p2os.pioneer.world.formats.transform import IDENTITY, Transform, after, app
 from p2os.pioneer.world.model import World
 from p2os.robots.parameters import known_robots, load_parameters
 from tests.p2os.pioneer.export.exported import differences, expected, worlds, written
+from tests.tools.each_row import each_row
 
 P2DX = load_parameters("p2dx")
 
@@ -179,7 +180,7 @@ def test_trimesh_reads_the_same_nodes_with_y_up(ending: str, tmp_path: Path) -> 
     assert all(mesh.volume > 0 for mesh in scene.geometry.values())
 
 
-@pytest.mark.parametrize("name", known_robots())
+@each_row("name", known_robots())
 def test_every_robot_is_exported_with_its_whole_mass_and_every_sonar(name: str) -> None:
     robot = load_parameters(name)
     bodies = scene_of(None, robot).bodies

@@ -54,6 +54,10 @@ KINDS = {0: Kind.OBSTACLE, 1: Kind.OBSTACLE, 2: Kind.FLOOR, 3: Kind.RAMP}
 Answering = Callable[[Request], bytes | None]
 
 
+class Last(bytes):
+    """What is answered before the line is closed."""
+
+
 class Served:
     """The server's side: what each request makes of one of our scenes."""
 
@@ -213,6 +217,8 @@ def _serve(line: socket.socket, answer: Answering) -> None:
                 return
             stream.write(out)
             stream.flush()
+            if isinstance(out, Last):
+                return
     except (OSError, ValueError):
         return
     finally:

@@ -22,6 +22,7 @@ from p2os.pioneer.body.outside.messages import (
     decode,
     encode,
 )
+from tests.tools.each_row import each_row
 
 REAL = st.floats(-LARGEST, LARGEST)
 DISTANCE = REAL | st.just(math.inf)
@@ -124,8 +125,8 @@ def test_any_bytes_are_a_message_or_refused(data: bytes, made: type[Message]) ->
     assert encode(found, 0)[5:] == data
 
 
-@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, LARGEST * 1.0001, -1e300])
-@pytest.mark.parametrize("at", range(13))
+@each_row("bad", [math.nan, math.inf, -math.inf, LARGEST * 1.0001, -1e300])
+@each_row("at", range(13))
 def test_a_state_with_what_is_no_number_of_a_robot_is_refused(bad: float, at: int) -> None:
     data = struct.pack("<13d", *(bad if place == at else LARGEST for place in range(13)))
     with pytest.raises(MessageError, match="where a number within 1e"):

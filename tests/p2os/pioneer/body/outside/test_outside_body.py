@@ -3,6 +3,7 @@
 import math
 import struct
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -11,13 +12,14 @@ from hypothesis import strategies as st
 from p2os.errors import P2osError, RemoteProtocolError, TransportError, WorldError
 from p2os.pioneer.body.factory import body_class, make_body, make_scene
 from p2os.pioneer.body.outside.body import MOST_STEPS, Ability
-from p2os.pioneer.body.outside.messages import LONGEST_FRAME, AskRanges, AskRays, Request, Step, Welcome, encode
+from p2os.pioneer.body.outside.messages import LONGEST_FRAME, AskRanges, AskRays, Hello, Request, Step, Welcome, encode
 from p2os.pioneer.sonar.ring import cones
 from p2os.pioneer.world.loader import load_world
 from p2os.pioneer.world.model import Obstacle, Pose, Walk
 from p2os.robots.parameters import load_parameters
 from simbase.errors import UsageError
-from tests.p2os.pioneer.body.outside.served import Answering, Served, frame, served, serving
+from tests.p2os.pioneer.body.outside.served import Answering, Last, Served, frame, served, serving
+from tests.tools.each_row import each_row
 
 P2DX, ROOM = load_parameters("p2dx"), load_world("room")
 FAN = cones(P2DX)[3]
@@ -118,7 +120,7 @@ def test_what_it_cannot_is_said_in_one_line() -> None:
 # Addresses ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "what"),
     [
         ("tcp:127.0.0.1", "names no host and port"),
@@ -173,12 +175,20 @@ def lying(what: type[Request], data: Callable[[bytes], bytes | None]) -> Callabl
     return make
 
 
-def fails(make: Callable[[], Answering], options: str = "") -> P2osError:
-    """Return the error of a body that such a far end is; it stays in that error."""
+def fails(make: Callable[[], Answering], waits_s: float | None = None) -> P2osError:
+    """Return the error of a body that such a far end is; it stays in that error.
+
+    Args:
+        make: The far end.
+        waits_s: How long the body waits for an answer once it is made: until then the far end answers, however late.
+    """
     with serving(make) as address:
-        body = make_body(address + options, ROOM, P2DX)
+        body = make_body(address, ROOM, P2DX)
         for _ in range(5):
             body.step(0.1, 0.1)
+        if waits_s is not None:
+            line = body.scene.line
+            line._address = replace(line._address, timeout_s=waits_s)
         with pytest.raises(P2osError) as first:
             (body.ranges([0, 1]), body.echoes([0]))
         for again in (lambda: body.ranges([0]), lambda: body.place(Obstacle(name="a", x_m=0, y_m=0, radius_m=1))):
@@ -227,14 +237,28 @@ def test_an_answer_that_cannot_be_is_refused_in_one_line(what, data, says: str) 
 
 def test_a_far_end_that_hangs_up_or_is_silent_is_lost() -> None:
     assert "is lost: it has closed the line" in str(fails(lying(Step, lambda _: None)))
-    assert "did not answer within 0.2 s" in str(fails(lying(Step, lambda _: b""), "?timeout=0.2"))
+    assert "did not answer within 0.02 s" in str(fails(lying(Step, lambda _: b""), 0.02))
+    says = pytest.raises(TransportError, match=r"did not answer within 0\.02 s")
+    with serving(lying(Hello, lambda _: b"")) as address, says:
+        make_body(f"{address}?timeout=0.02", ROOM, P2DX)
 
 
 def test_an_answer_that_is_cut_at_any_byte_is_lost() -> None:
-    whole = 5 + 4 + 5 * 17 + 13 * 8 + 4
-    for size in range(0, whole, 9):
-        error = fails(lying(Step, lambda out, size=size: out[:size]), "?timeout=0.05")
-        assert "did not answer" in str(error)
+    answers = list[bytes]()
+
+    def without_end(out: bytes) -> bytes:
+        answers.append(out)
+        return out[:-1]
+
+    def waits_in_vain(error: P2osError) -> bool:
+        return "did not answer within 0.01 s" in str(error)
+
+    assert waits_in_vain(fails(lying(Step, without_end), 0.01))
+    whole = len(answers[0])
+    for size in (1, 4, 5, 6, whole // 2):  # and then nothing comes
+        assert waits_in_vain(fails(lying(Step, lambda out, size=size: out[:size]), 0.01))
+    for size in (*range(12), *range(12, whole, 9), whole - 1):  # and then the line ends
+        assert "it has closed the line" in str(fails(lying(Step, lambda out, size=size: Last(out[:size])))), size
 
 
 def test_another_version_is_refused() -> None:
