@@ -16,6 +16,7 @@ from robot_bench.bench import Bench
 from robot_bench.scenario.scenario import Scenario, load_scenario
 from simbase.errors import UsageError
 from tests.p2os.pioneer.body.bodies import each_body
+from tests.robot_bench.modes_and_bodies import MODES, modes_and_bodies
 from tests.robot_bench.wires.fake_chip import FakeChip, PinDrive
 
 S, MS = 10**9, 10**6
@@ -52,14 +53,11 @@ def entries(made: Bench, kind: str) -> list[dict[str, object]]:
     return [entry for entry in map(json.loads, made.trace.text.splitlines()) if entry["k"] == kind]
 
 
-BODIES = each_body()
-MODES = ["direct", "adapter"]
 #: Of what is run several times: it drives as soon as the adapter's link stands, after 0.66 s.
 SOON = (0.7, 1.0)
 
 
-@pytest.mark.parametrize("body", BODIES)
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize(("mode", "body"), modes_and_bodies())
 def test_the_slice_limit_changes_nothing(mode: str, body: str) -> None:
     def run(slice_ns: int) -> Bench:
         return finished(bench(scenario(mode, body, 1.2), slice_ns, drives_at=SOON))
@@ -107,8 +105,7 @@ def test_the_first_level_of_every_wire_is_what_it_is_when_all_of_time_0_was_driv
     assert {net: edges[0] for net, edges in made.record().pins.items()} == {net: (0, v) for net, v in levels.items()}
 
 
-@pytest.mark.parametrize("body", BODIES)
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize(("mode", "body"), modes_and_bodies())
 def test_a_bench_restored_half_way_goes_on_alike(mode: str, body: str) -> None:
     of = scenario(mode, body, 1.5)
     whole, seconds = bench(of, drives_at=SOON), []

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -69,8 +70,17 @@ class Robot:
 Rows = list[tuple[str, float, Any]]
 
 
+@cache  # it writes a program for each type that it meets
+def store_of(stores: Stores) -> Any:
+    store = get_typestore(stores)
+    if stores is Stores.ROS1_NOETIC:
+        sonar = "std_msgs/Header header\nint32 ranges_count\nfloat64[] ranges"
+        store.register(get_types_from_msg(sonar, "p2os_msgs/msg/SonarArray"))
+    return store
+
+
 def ros2_bag(path: Path, make: Callable[[Robot], Rows], storage: str = "MCAP") -> Path:
-    store = get_typestore(Stores.ROS2_HUMBLE if storage == "HUMBLE" else Stores.ROS2_JAZZY)
+    store = store_of(Stores.ROS2_HUMBLE if storage == "HUMBLE" else Stores.ROS2_JAZZY)
     plugin = rosbag2.StoragePlugin[storage if storage != "HUMBLE" else "SQLITE3"]
     with rosbag2.Writer(path, version=8, storage_plugin=plugin) as bag:
         connections: dict[str, Any] = {}
@@ -84,9 +94,7 @@ def ros2_bag(path: Path, make: Callable[[Robot], Rows], storage: str = "MCAP") -
 
 
 def ros1_bag(path: Path, make: Callable[[Robot], Rows]) -> Path:
-    store = get_typestore(Stores.ROS1_NOETIC)
-    sonar = "std_msgs/Header header\nint32 ranges_count\nfloat64[] ranges"
-    store.register(get_types_from_msg(sonar, "p2os_msgs/msg/SonarArray"))
+    store = store_of(Stores.ROS1_NOETIC)
     with rosbag1.Writer(path) as bag:
         connections: dict[str, Any] = {}
         for topic, at_s, message in make(Robot(store)):

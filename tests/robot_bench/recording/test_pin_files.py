@@ -103,8 +103,8 @@ def test_sigrok_reads_both_files(tmp_path: Path) -> None:
         timeout=60,
     )
     assert "motor1_comm1" in shown.stdout
-    for source in (["-i", "pins.sr"], ["-i", "pins.vcd", "-I", "vcd"]):
+    for source in (["-i", "pins.sr"], ["-i", "pins.vcd", "-I", "vcd:downsample=1000"]):  # of its nanoseconds
         command = ["sigrok-cli", *source, "-O", "csv", "--channels", "DD1"]
         out = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60, cwd=tmp_path).stdout
         counts = Counter(out.splitlines())  # a line a microsecond
-        assert sum(count for line, count in counts.items() if line.strip() == "1") in range(3_498, 3_500_001)
+        assert sum(count for line, count in counts.items() if line.strip() == "1") in range(3_498, 3_502)

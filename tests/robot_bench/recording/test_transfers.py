@@ -51,7 +51,7 @@ bumper_front = "PA10"
     for keys in (
         'kind = "ssd1306"\non = "I2C1"', 'kind = "mpu6050"\non = "I2C1"', 'kind = "24c02"\non = "I2C1"',
         'kind = "sd-card"\non = "SPI1"\nselect = "PA4"', 'kind = "hc-sr04"\ntrig = "PB8"\necho = "PB9"',
-        'kind = "can-node"\non = "CAN"\nperiod_ms = 60\ndata = "0A"',
+        'kind = "can-node"\non = "CAN"\nperiod_ms = 90\ndata = "0A"',
     )
 )  # fmt: skip
 ALL = 'record = ["spi1", "i2c1", "can"]\n'

@@ -104,7 +104,7 @@ def test_the_page_says_of_a_run_what_the_screen_says(end: dict[str, object], sai
     (run / "trace.jsonl").write_text("\n".join([*lines[:-1], json.dumps({"k": "end", **end}), ""]), encoding="utf-8")
     record = read_run(run)
     assert verdict(record) == said
-    page = make_report(run).page.read_text(encoding="utf-8")
+    page = make_artefacts(run, Files.REPORT).report.read_text(encoding="utf-8")
     assert f'<span class="verdict {said.split(maxsplit=1)[0].strip(",")}">{said}</span>' in page
     assert page_data(record)["title"].endswith(f": {said}")
 

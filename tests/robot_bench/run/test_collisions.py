@@ -11,10 +11,10 @@ import pytest
 
 from p2os.cli.main import run as p2os
 from robot_bench.recording.run_record import read_run
-from robot_bench.report import plots
+from robot_bench.report import make
 from robot_bench.report.page import page_data
-from tests.p2os.pioneer.body.bodies import each_body
 from tests.robot_bench.firmware.hurried import hurried
+from tests.robot_bench.modes_and_bodies import modes_and_bodies
 
 #: A program whose sensors see a hand's breadth, so that it drives straight on, and a crate in its way.
 SCENARIO = """
@@ -63,9 +63,8 @@ def crash(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, str], tupl
     return run
 
 
-@pytest.mark.parametrize("mode", ["direct", "adapter"])
-@pytest.mark.parametrize("body", each_body())
-def test_what_was_hit_is_named_everywhere(body: str, mode: str, crash: Callable[[str, str], tuple[Path, str]]) -> None:
+@pytest.mark.parametrize(("mode", "body"), modes_and_bodies())
+def test_what_was_hit_is_named_everywhere(mode: str, body: str, crash: Callable[[str, str], tuple[Path, str]]) -> None:
     folder, out = crash(body, mode)
     record = read_run(folder)
     (hit, *_) = record.contacts
@@ -108,6 +107,6 @@ def test_a_run_that_hits_something_has_the_same_hash_each_time_and_logs_commands
     log = [(event.what, event.detail) for event in one.events if event.who == "direct"]
     assert ("command", "motors 3, 3") in log
     assert ("stalled", "both wheels") in log
-    monkeypatch.setattr(plots, "write_plots", lambda *_: ())  # no plot is looked at
+    monkeypatch.setattr(make, "_plots", lambda: None)  # no plot is looked at
     assert p2os(["report", str(again)]) == 0
     assert "red box" in capsys.readouterr().out

@@ -94,7 +94,7 @@ def test_a_bench_of_each_body_goes_on_in_each_way(tmp_path: Path) -> None:
 
 def test_a_bench_is_pickled_from_within_a_slice() -> None:
     taken: list[bytes] = []
-    bench = Bench(scenario(), slice_ns=70_000)
+    bench = Bench(scenario(), slice_ns=700_000)
     # In the midst of nothing, and while it drives.
     bench.on_slice = lambda now: taken.append(pickle.dumps(bench)) if now // (S * 3 // 4) > len(taken) - 1 else None
     whole = finished(bench)
