@@ -12,13 +12,13 @@ from simbase.timing import NS_PER_S, Nanos
 def high_time_ns(wave: Wave, begin: Nanos, end: Nanos, dead_ns: int = 0) -> float:
     """Return for how long a wave is high between two times, its rising edges so much later.
 
-    By fractions of a tick of 10**-9, in integers; one division at the end.
+    By fractions of a tick of 10**-9, in integers, from the wave's own beginning on; one division at the end.
     """
-    hz = wave.ticks_hz
+    hz, ns = wave.ticks_hz, wave.ns
     period, dead = wave.period * NS_PER_S, min(dead_ns * hz, wave.high * NS_PER_S)
-    high, base = wave.high * NS_PER_S - dead, wave.at * NS_PER_S - wave.ns * hz - dead
-    first, first_part = divmod(base + begin * hz, period)
-    last, last_part = divmod(base + end * hz, period)
+    high, base = wave.high * NS_PER_S - dead, wave.at * NS_PER_S - dead
+    first, first_part = divmod(base + (begin - ns) * hz, period)
+    last, last_part = divmod(base + (end - ns) * hz, period)
     return ((last - first) * high + min(last_part, high) - min(first_part, high)) / hz
 
 

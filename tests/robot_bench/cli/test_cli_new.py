@@ -235,7 +235,7 @@ def test_the_tests_of_a_new_project_pass_and_notice_what_was_broken() -> None:
     ):
         assert right in text
         main.write_text(text.replace(right, wrong), encoding="utf-8")
-        failed = make("test", f"{pytest_here} --bench-record none -k {noticed.partition('[')[0]}", "-s")
+        failed = make("test", f"{pytest_here} --tb no --bench-record none -k {noticed.partition('[')[0]}", "-s")
         assert failed.returncode != 0
         assert f"FAILED tests/test_robot.py::{noticed}" in failed.stdout, failed.stdout
 
@@ -368,5 +368,5 @@ def test_the_rovers_tests_pass_and_notice_what_was_broken() -> None:
     text = main.read_text(encoding="utf-8")
     assert "#define NEAR_MV 1300u" in text
     main.write_text(text.replace("#define NEAR_MV 1300u", "#define NEAR_MV 3300u"), encoding="utf-8")
-    failed = make("test", f"{pytest_here} --bench-record none -k stops_before", "-s")
+    failed = make("test", f"{pytest_here} --tb no --bench-record none -k stops_before", "-s")
     assert "FAILED tests/test_robot.py::test_it_stops_before_what_its_front_sensor_sees" in failed.stdout

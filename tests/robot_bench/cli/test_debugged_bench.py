@@ -43,10 +43,10 @@ def place(bench: Bench) -> tuple[object, ...]:
 
 @pytest.mark.parametrize("mode", ["adapter", "direct"])
 def test_a_run_that_was_halted_leaves_the_same_trace(mode: str) -> None:
-    plain = Bench(scenario(mode, 1.5))
+    plain = Bench(scenario(mode, 1.2))
     plain.run_until(plain.end)
     plain.finish()
-    bench = Bench(scenario(mode, 1.5))
+    bench = Bench(scenario(mode, 1.2))
     execution = Execution(BenchMachine(bench), lambda _: None)
     breakpoints = board_of(bench).chip.engine.breakpoints
     breakpoints.add(address(bench, "pins_motors"))
@@ -87,10 +87,10 @@ def test_the_robot_goes_back_with_the_chip_while_it_moves() -> None:
 def test_going_back_takes_the_trace_back_too(tmp_path: Path) -> None:
     from robot_bench.recording.trace import TraceWriter
 
-    whole = Bench(scenario(duration_s=1.5), trace=TraceWriter(tmp_path / "whole"))
+    whole = Bench(scenario(duration_s=1.25), trace=TraceWriter(tmp_path / "whole"))
     whole.run_until(whole.end)
     whole.finish()
-    bench = Bench(scenario(duration_s=1.5), trace=TraceWriter(tmp_path / "rewound"))
+    bench = Bench(scenario(duration_s=1.25), trace=TraceWriter(tmp_path / "rewound"))
     execution = Execution(BenchMachine(bench), lambda _: None)
     breakpoints = board_of(bench).chip.engine.breakpoints
     breakpoints.add(address(bench, "pins_motors"))

@@ -36,10 +36,23 @@ def builder_in(folder: Path) -> ModuleType:
     return module
 
 
-def test_the_same_compiler_builds_the_same_bytes(tmp_path: Path) -> None:
+@pytest.fixture
+def _same_compiler() -> None:
     version = build.compiler_version()
     if version != build.COMPILER_VERSION:
         pytest.skip(f"the committed ELFs are of {build.COMPILER_VERSION}; here is {version or 'no cross compiler'}")
+
+
+@pytest.mark.usefixtures("_same_compiler")
+def test_a_program_comes_out_of_the_same_compiler_as_it_is_committed(tmp_path: Path) -> None:
+    output = tmp_path / "motors.elf"
+    build.build_elf(build.PROGRAMS["motors"], folder=build.HERE, linker_script="f103c8.ld", output=output)
+    assert output.read_bytes() == (build.HERE / output.name).read_bytes()
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("_same_compiler")
+def test_the_same_compiler_builds_the_same_bytes(tmp_path: Path) -> None:
     built = [
         *build.build_programs(tmp_path),
         builder_in(FOREIGN).build_foreign(tmp_path),

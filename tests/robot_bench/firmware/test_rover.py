@@ -16,7 +16,11 @@ from robot_bench.scenario.scenario import Scenario, load_scenario
 from tests.robot_bench.direct.robots import rover
 
 MM = 1000
-BODIES = ["kinematic", pytest.param("bullet", marks=pytest.mark.bullet)]
+#: The first leg and its corner on the kinematic body are in the tests that `p2os new --robot rover` writes.
+BODIES = [
+    pytest.param("kinematic", marks=pytest.mark.soak),
+    pytest.param("bullet", marks=[pytest.mark.slow, pytest.mark.bullet]),
+]
 #: "rover: left 299 right 299 mm/s, 12352 mV"
 _SPEEDS = re.compile(r"^rover: left (-?\d+) right (-?\d+) mm/s, (\d+) mV$")
 
@@ -36,7 +40,6 @@ def first_leg() -> RunRecord:
     return made.record()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("body", BODIES)
 def test_it_drives_its_square_and_comes_back(body: str, tmp_path: Path) -> None:
     result = run_scenario(load_scenario("rover").with_options(body=body), tmp_path)

@@ -136,8 +136,20 @@ def test_one_fault_of_each_kind_is_named(tested: Tested, fault: Fault) -> None:
     assert named(tested(fault)) in expected(fault)
 
 
-@pytest.mark.parametrize("between", [False, True], ids=["reads-0", "reads-1"])
-@pytest.mark.parametrize("faults", GROUPS, ids=ids)
+@pytest.mark.parametrize(
+    ("faults", "between"),
+    [
+        # Every group in every run, every other one so and so; `make test` has both of each.
+        pytest.param(
+            group,
+            between,
+            id=f"{ids(group)}-reads-{between:d}",
+            marks=[pytest.mark.slow] if place % 2 ^ between else [],
+        )
+        for place, group in enumerate(GROUPS)
+        for between in (False, True)
+    ],
+)
 def test_each_fault_of_each_wire_is_named_however_a_pad_between_the_limits_reads(
     tested: Tested, faults: list[Fault], between: bool
 ) -> None:
