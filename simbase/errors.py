@@ -12,7 +12,8 @@ class P2osError(Exception):
 
     Args:
         message: What failed, with the values and the place.
-        hint: What to try, as a command or a short sentence; None where there is nothing to say.
+        hint: What to try, as a command or a short sentence; None where there is nothing to say. It is a note of the
+            exception too, so that Python's own traceback, in a script or a test, ends with it.
     """
 
     #: Exit code of a command that ends with this error: 1 it failed, 2 wrong usage or file.
@@ -21,6 +22,8 @@ class P2osError(Exception):
     def __init__(self, message: str, *, hint: str | None = None) -> None:
         super().__init__(one_line(message))
         self.hint = None if hint is None else one_line(hint)
+        if self.hint:
+            self.add_note(f"hint: {self.hint}")
 
 
 class UsageError(P2osError):
