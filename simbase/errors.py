@@ -95,5 +95,5 @@ def nearest(word: str, known: Iterable[str], otherwise: str | None = None) -> st
     from difflib import get_close_matches  # takes longer to load than most commands to fail
 
     words = list(known)
-    close = get_close_matches(word, words, n=1, cutoff=0.5)
+    close = get_close_matches(word, words, n=1, cutoff=0.6)
     return f"did you mean {close[0]!r}?" if close else otherwise or f"known are {', '.join(sorted(words))}"

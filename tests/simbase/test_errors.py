@@ -2,7 +2,7 @@
 
 import traceback
 
-from simbase.errors import LONGEST_LINE, LONGEST_SHOWN, P2osError, UsageError, one_line, shown, shown_name
+from simbase.errors import LONGEST_LINE, LONGEST_SHOWN, P2osError, UsageError, nearest, one_line, shown, shown_name
 
 
 def test_a_value_is_shown_as_python_writes_it_and_cut_where_it_is_long() -> None:
@@ -36,3 +36,8 @@ def test_the_hint_is_in_pythons_own_traceback_too() -> None:
     told = "".join(traceback.format_exception_only(UsageError("no wire 'PB99'", hint="did you mean 'PB9'?")))
     assert told == "simbase.errors.UsageError: no wire 'PB99'\nhint: did you mean 'PB9'?\n"
     assert not hasattr(UsageError("no wire"), "__notes__")
+
+
+def test_a_word_gets_the_nearest_or_all_that_there_are() -> None:
+    assert nearest("DD33", ["DD3", "DD4"]) == "did you mean 'DD3'?"
+    assert nearest("nope", ["p2de", "p2dx"]) == "known are p2de, p2dx"
