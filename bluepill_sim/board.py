@@ -425,8 +425,9 @@ class BluePill(Stateful):
         return self.chip.engine.pc
 
     def where(self) -> str:
-        """Return where the program is: "symbol+0x12 (0x08000123)"."""
-        return self.image.symbols.where(self.pc)
+        """Return where the program is: "symbol+0x12 (0x08000123)", and in a handler of which exception."""
+        number = self.chip.processor.exception_number
+        return self.image.symbols.where(self.pc) + (f", handling {exception_name(number)}" if number else "")
 
     @property
     def last_rows(self) -> tuple[BlockRow, ...]:

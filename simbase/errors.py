@@ -12,7 +12,8 @@ class P2osError(Exception):
 
     Args:
         message: What failed, with the values and the place.
-        hint: What to try, as a command or a short sentence; None where there is nothing to say.
+        hint: What to try, as a command or a short sentence; None where there is nothing to say. It is a note of the
+            exception too, so that Python's own traceback, in a script or a test, ends with it.
     """
 
     #: Exit code of a command that ends with this error: 1 it failed, 2 wrong usage or file.
@@ -21,6 +22,8 @@ class P2osError(Exception):
     def __init__(self, message: str, *, hint: str | None = None) -> None:
         super().__init__(one_line(message))
         self.hint = None if hint is None else one_line(hint)
+        if self.hint:
+            self.add_note(f"hint: {self.hint}")
 
 
 class UsageError(P2osError):
@@ -92,5 +95,5 @@ def nearest(word: str, known: Iterable[str], otherwise: str | None = None) -> st
     from difflib import get_close_matches  # takes longer to load than most commands to fail
 
     words = list(known)
-    close = get_close_matches(word, words, n=1, cutoff=0.5)
+    close = get_close_matches(word, words, n=1, cutoff=0.6)
     return f"did you mean {close[0]!r}?" if close else otherwise or f"known are {', '.join(sorted(words))}"

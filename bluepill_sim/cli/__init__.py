@@ -13,15 +13,8 @@ in the ELF, places are shown by symbol and line.
 
 def register(app: typer.Typer) -> None:
     """Add the verb and what is below it."""
-    mcu = typer.Typer(help=HELP, rich_markup_mode=None, invoke_without_command=True)
-    mcu.callback()(_without_command)
+    mcu = typer.Typer(help=HELP, rich_markup_mode=None)
     for module in (run, parts, debug, info, pins, trace, coverage, profile, compare_silicon):
         name = module.__name__.rpartition(".")[2]
         mcu.command(name.replace("_", "-"), help=module.HELP)(getattr(module, name))
     app.add_typer(mcu, name="mcu", rich_help_panel="BluePill")
-
-
-def _without_command(context: typer.Context) -> None:
-    """Show what there is where nothing is asked for."""
-    if context.invoked_subcommand is None:
-        typer.echo(context.get_help())

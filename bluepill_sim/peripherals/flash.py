@@ -145,9 +145,13 @@ class Flash(Peripheral):
             value: The data.
         """
         if size != 2 and self.words[CR] & PG and not self.words[CR] & LOCK:
-            return False
+            return self._refuse_width(size)
         self._program(offset, value)
         return True
+
+    def _refuse_width(self, size: int) -> bool:
+        self.chip.warn(f"flash programmed by {8 * size} bits: only halfwords can be, a bus error", once="FLASH:width")
+        return False
 
     def _program(self, offset: int, value: int) -> None:
         if not self.words[CR] & PG or self.words[CR] & LOCK:
@@ -181,7 +185,7 @@ class Flash(Peripheral):
             self.chip.warn("write to the option bytes without FLASH_CR OPTPG and OPTWRE: ignored", once="FLASH:options")
             return True
         if size != 2:
-            return False
+            return self._refuse_width(size)
         memory = self._array()
         if memory is None:
             return True

@@ -255,6 +255,7 @@ def _symbols(elf: "ELFFile") -> SymbolTable:  # type: ignore[name-defined]  # no
     if table is None:
         return SymbolTable()
     found: dict[int, Symbol] = {}
+    weak: set[int] = set()
     for entry in table.iter_symbols():
         kind, name = entry["st_info"]["type"], entry.name
         if not name or name.startswith(_MAPPING_PREFIXES) or kind not in {"STT_FUNC", "STT_OBJECT", "STT_NOTYPE"}:
@@ -263,9 +264,13 @@ def _symbols(elf: "ELFFile") -> SymbolTable:  # type: ignore[name-defined]  # no
             continue
         address = entry["st_value"] & ~1 if kind == "STT_FUNC" else entry["st_value"]
         symbol = Symbol(name, address, entry["st_size"], kind == "STT_FUNC")
-        # Of several names at one address the sized one tells more; then the first in the file.
-        if address not in found or (symbol.size and not found[address].size):
+        # Of several names at one address the sized one tells more; then one that is not weak, as the aliases of a
+        # default handler are; then the first in the file.
+        is_weak = entry["st_info"]["bind"] == "STB_WEAK"
+        before = found.get(address)
+        if before is None or (bool(symbol.size), not is_weak) > (bool(before.size), address not in weak):
             found[address] = symbol
+            (weak.add if is_weak else weak.discard)(address)
     return SymbolTable(tuple(found[address] for address in sorted(found)))
 
 

@@ -52,7 +52,12 @@ class VerbPage(TyperCommand):
 
 
 class VerbList(TyperGroup):
-    """The page of a command that has others below it."""
+    """The page of a command that has others below it, which is what it shows where none of them is named."""
+
+    def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override]
+        """Show the page in place of an error where there are no words."""
+        bare = not args and not self.invoke_without_command and not ctx.resilient_parsing
+        return super().parse_args(ctx, ["--help"] if bare else args)
 
     def format_help_text(self, ctx: typer.Context, formatter) -> None:  # type: ignore[no-untyped-def, override]  # noqa: ANN001, ARG002 - click's or typer's own
         """Write what the help says, no line wider than the page."""

@@ -178,7 +178,7 @@ def _run(words: list[str], *, trace: bool) -> int:
             gc.freeze()
             gc.set_threshold(COLLECTED_AFTER, 10, 10)
             gc.enable()
-        result = command.main(words or ["--help"], prog_name="p2os", standalone_mode=False)
+        result = command.main(words, prog_name="p2os", standalone_mode=False)
     except (KeyboardInterrupt, typer.Abort):
         result = EXIT_INTERRUPTED
     except BrokenPipeError:  # the reader of our stdout has left, e.g. `p2os ports | head -1`

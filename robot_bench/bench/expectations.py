@@ -128,7 +128,6 @@ class Expectations(AwaitedRun):
         since = self._waits.since(self.now)
         found = self._wait_for(words, within)
         if found is None:
-            __tracebackhide__ = True
             raise self._unmet(f"{words!r} did not happen", since, self._limit(within, since))
         return found
 
@@ -142,7 +141,6 @@ class Expectations(AwaitedRun):
         since = self._waits.since(self.now)
         found = self._wait_for(words, during)
         if found is not None:
-            __tracebackhide__ = True
             raise self._unmet(f"{words!r} happened at {found.t / NS_PER_S:.3f} s", since)
 
     def expect_text(self, text: str | re.Pattern[str], within: Span | None = None) -> Event:
@@ -151,7 +149,6 @@ class Expectations(AwaitedRun):
         Raises:
             ExpectationError: It did not.
         """
-        __tracebackhide__ = True
         words = f"sends {text}" if isinstance(text, str) else f"matches {text.pattern}"
         return self.expect(f"usart1 {words}", within)
 
@@ -162,7 +159,6 @@ class Expectations(AwaitedRun):
             ExpectationError: It had not.
             UsageError: There is no such wire or level.
         """
-        __tracebackhide__ = True
         select(f"pin {pin} {level}", self._wires)
         if self.level(pin) is not (level == "high"):
             self.expect(f"pin {pin} {level}", within)
@@ -191,7 +187,6 @@ class Expectations(AwaitedRun):
             return off_m <= tolerance_m and abs(math.remainder(turn, math.tau)) <= math.radians(tolerance_deg)
 
         if not self._step_until(is_there, self._limit(within, since)):
-            __tracebackhide__ = True
             rows = (("x", x_m, " m"), ("y", y_m, " m"), ("heading", heading_deg, "°"))
             wanted = ", ".join(f"{name} {value:g}{unit}" for name, value, unit in rows if value is not None)
             pose = self.pose

@@ -14,7 +14,7 @@ from robot_bench.wires.board_test.circuit import EN, Fault, FaultKind, Side
 from robot_bench.wires.board_test.ends import AdapterEnd, BluePillEnd
 from robot_bench.wires.board_test.verdicts import Finding, Verdict, judge
 from robot_bench.wires.board_test.walk import Walk
-from simbase.errors import UsageError
+from simbase.errors import UsageError, nearest
 
 BLUEPILL_BAUD, ADAPTER_BAUD = 57_600, 115_200
 #: chosen: many times what an answer takes, on a busy machine too; a module in reset costs it.
@@ -39,7 +39,7 @@ Examples:
 
 def register(app: typer.Typer) -> None:
     """Add the verb."""
-    board = typer.Typer(no_args_is_help=True, help="Test an adapter board.")
+    board = typer.Typer(help="Test an adapter board.")
     board.command("test", help=HELP)(walk_through)
     app.add_typer(board, name="board", rich_help_panel=BENCH)
 
@@ -55,11 +55,13 @@ def walk_through(
     """Walk through a board and print what was found."""
     pinout = load_pinout()
     if revision not in {known.name for known in pinout.revisions}:
-        raise UsageError(f"there is no revision {revision!r}", hint=", ".join(row.name for row in pinout.revisions))
+        raise UsageError(
+            f"there is no revision {revision!r}", hint=nearest(revision, [row.name for row in pinout.revisions])
+        )
     if emulated:
         if adapter or bluepill:
             raise UsageError("--emulated needs no ports", hint="p2os board test --emulated")
-        findings = _emulated(pinout, fault or [])
+        findings = _emulated(pinout, revision, fault or [])
     elif fault:
         raise UsageError("--fault plants faults in an emulated board only", hint="add --emulated")
     elif adapter and bluepill:
@@ -93,15 +95,18 @@ def fault_of(text: str, pinout: Pinout) -> Fault:
     known = {wire.name for wire in pinout.wires} | ({EN[0]} if kind is FaultKind.SHORT else set())
     for name in names:
         if name not in known:
-            raise UsageError(f"{text!r}: there is no wire {name!r}", hint=", ".join(sorted(known)))
+            raise UsageError(f"{text!r}: there is no wire {name!r}", hint=nearest(name, known))
     if names[0] == EN[0] or len(set(names)) != needed:
         raise UsageError(f"{text!r}: a wire and another one", hint="short:DD1,DD2")
     return Fault(kind, names[0], names[1] if needed == 2 else "", Side(side_word or Side.BLUEPILL.value))
 
 
-def _emulated(pinout: Pinout, faults: list[str]) -> list[Finding]:
+def _emulated(pinout: Pinout, revision: str, faults: list[str]) -> list[Finding]:
     planted = tuple(fault_of(text, pinout) for text in faults)
     from robot_bench.wires.board_test.emulated import REVISION, EmulatedBoard
+
+    if revision != REVISION:
+        raise UsageError(f"the emulated board is a {REVISION}, no {revision}", hint=f"--revision {REVISION}")
 
     board = EmulatedBoard(planted)
     return judge(Walk(board.bluepill_end, board.adapter_end, pinout).measure(), pinout, REVISION)
@@ -150,7 +155,7 @@ def _print(findings: list[Finding], *, as_json: bool) -> None:
         typer.echo(json.dumps(rows))
         return
     for row in findings:
-        typer.echo(f"{row.name:13}{row.path:16}{row.verdict.value:14}{row.detail}".rstrip())
+        typer.echo(f"{row.name:13}{row.path:17}{row.verdict.value:14}{row.detail}".rstrip())
     faults = sum(row.is_fault for row in findings)
     untested = sum(row.verdict is Verdict.UNKNOWN for row in findings)
     told = "no fault" if not faults else "1 fault" if faults == 1 else f"{faults} faults"

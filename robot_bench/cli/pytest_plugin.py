@@ -23,6 +23,7 @@ import re
 from collections.abc import Generator, Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -51,6 +52,8 @@ _MARKERS = (
 _BOOTED = "note adapter driving"
 #: chosen: so long that is waited for.
 _BOOT_WITHIN = "20 s"
+#: Packages whose lines say nothing to a user of them.
+_OURS = frozenset({"adapter_sim", "bluepill_sim", "p2os", "robot_bench", "simbase"})
 _BENCH = pytest.StashKey["Bench"]()
 
 
@@ -100,7 +103,13 @@ def _seeds(given: object) -> list[int]:
     try:
         return list(read_seeds(str(given)))
     except UsageError as error:
-        pytest.fail(f"the marker seeds: {error} (hint: {error.hint})", pytrace=False)
+        raise _refused(error, "the marker seeds: ") from None
+
+
+def _refused(error: Exception, where: str = "") -> BaseException:
+    """Return the failure of a test that cannot begin: one line, with the hint of the error that says why."""
+    hint = getattr(error, "hint", None)
+    return pytest.fail.Exception(f"{where}{error}{f' (hint: {hint})' if hint else ''}", pytrace=False)
 
 
 def _mark(node: pytest.Item, name: str) -> pytest.Mark | None:
@@ -169,7 +178,7 @@ def bench(request: pytest.FixtureRequest) -> "Iterator[Bench]":
     try:
         made = pool.take(_scenario_of(item, getattr(request, "param", {})), booted)
     except P2osError as error:
-        pytest.fail(f"{error}{f' (hint: {error.hint})' if error.hint else ''}", pytrace=False)
+        raise _refused(error) from None
     item.stash[_BENCH] = made
     yield made
     pool.give_back(made)
@@ -190,8 +199,7 @@ def served(request: pytest.FixtureRequest, tmp_path: Path) -> "Iterator[ServedPi
         try:
             made = stack.enter_context(served_pioneer(**wanted))
         except (P2osError, TypeError) as error:  # a type error: a word of the marker that it does not take
-            hint = getattr(error, "hint", None)
-            pytest.fail(f"{error}{f' (hint: {hint})' if hint else ''}", pytrace=False)
+            raise _refused(error) from None
         yield made
 
 
@@ -226,6 +234,50 @@ def _scenario_of(item: pytest.Item, chosen: dict[str, Any]) -> "Scenario":
     at = to_nanos(faults.kwargs.get("at", "0 s") if faults is not None else 0)
     table = {"at_s": at / NS_PER_S, "fault": fault}
     return replace(found, faults=(*found.faults, *load_faults([table], found.parameters, "faults")))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_setup(item: pytest.Item) -> Generator[None, Any, Any]:
+    """End an error of ours in a fixture at the fixture's own line."""
+    with _ends_at_the_tests_line(item):
+        return (yield)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
+    """End an error of ours in a test at the test's own line."""
+    with _ends_at_the_tests_line(item):
+        return (yield)
+
+
+@contextlib.contextmanager
+def _ends_at_the_tests_line(item: pytest.Item) -> Iterator[None]:
+    """Show of an error that we raise for a person the line that called us, not ours; all of it with --full-trace."""
+    try:
+        yield
+    except Exception as error:
+        from simbase.errors import P2osError
+
+        if isinstance(error, P2osError) and not item.config.getoption("fulltrace"):
+            _cut_at_our_lines(error.__traceback__)
+            error.__cause__, error.__suppress_context__ = None, True
+        raise
+
+
+def _cut_at_our_lines(traceback: TracebackType | None) -> None:
+    """Cut a traceback that ends in our packages where it comes to them from elsewhere for the first time."""
+    last_of_others: TracebackType | None = None
+    entered: TracebackType | None = None
+    is_ours = True  # it begins with this plugin
+    while traceback is not None:
+        was_ours, is_ours = is_ours, str(traceback.tb_frame.f_globals.get("__name__")).partition(".")[0] in _OURS
+        if not is_ours:
+            last_of_others = traceback
+        elif not was_ours and entered is None:
+            entered = last_of_others
+        traceback = traceback.tb_next
+    if is_ours and entered is not None:
+        entered.tb_next = None
 
 
 @pytest.hookimpl(wrapper=True)

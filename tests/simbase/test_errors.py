@@ -1,6 +1,8 @@
 """What messages show of values and names: one line, whatever is in them."""
 
-from simbase.errors import LONGEST_LINE, LONGEST_SHOWN, P2osError, one_line, shown, shown_name
+import traceback
+
+from simbase.errors import LONGEST_LINE, LONGEST_SHOWN, P2osError, UsageError, nearest, one_line, shown, shown_name
 
 
 def test_a_value_is_shown_as_python_writes_it_and_cut_where_it_is_long() -> None:
@@ -28,3 +30,14 @@ def test_an_error_is_one_line_whatever_a_file_put_into_it() -> None:
     assert len(error.hint) == LONGEST_LINE
     assert one_line("µ" * LONGEST_LINE) == "µ" * LONGEST_LINE
     assert one_line("a" * LONGEST_LINE + "b").endswith("ab")
+
+
+def test_the_hint_is_in_pythons_own_traceback_too() -> None:
+    told = "".join(traceback.format_exception_only(UsageError("no wire 'PB99'", hint="did you mean 'PB9'?")))
+    assert told == "simbase.errors.UsageError: no wire 'PB99'\nhint: did you mean 'PB9'?\n"
+    assert not hasattr(UsageError("no wire"), "__notes__")
+
+
+def test_a_word_gets_the_nearest_or_all_that_there_are() -> None:
+    assert nearest("DD33", ["DD3", "DD4"]) == "did you mean 'DD3'?"
+    assert nearest("nope", ["p2de", "p2dx"]) == "known are p2de, p2dx"

@@ -164,6 +164,11 @@ def test_the_face_tells_where_the_program_is(boot) -> None:
         machine.board.pin("PZ1")
 
 
+def test_inside_a_handler_the_face_tells_of_which_exception(boot) -> None:
+    machine = boot(f"{BLINK}\nstuck: b stuck", {15: "stuck"}).run(500)
+    assert machine.board.where() == f"stuck+0x0 ({machine.label('stuck'):#010x}), handling SysTick"
+
+
 def test_the_next_deadline_is_the_earliest_of_tick_and_peripherals(boot) -> None:
     machine = boot(BLINK, {15: "tick"}).run(50)
     due = machine.board.next_deadline()

@@ -110,6 +110,9 @@ def test_a_halfword_is_programmed_in_its_time(unlocked: Any, array: Array) -> No
 def test_only_halfwords_can_be_programmed(unlocked: Any, array: Array, size: int, value: int) -> None:
     unlocked.write("FLASH.CR", PG | ERRIE)
     assert not unlocked.parts.flash.program(0, size, value)  # PM0075 2.3.3: a bus error
+    assert (
+        unlocked.warnings["FLASH:width"] == f"flash programmed by {8 * size} bits: only halfwords can be, a bus error"
+    )
     assert unlocked.read("FLASH.SR") == 0
     unlocked.write("FLASH.CR", LOCK)
     assert unlocked.parts.flash.program(0, size, value)  # without PG it is ignored, and warned of
@@ -245,6 +248,7 @@ def test_an_option_byte_gets_its_complement_and_must_be_erased_before(open_optio
 def test_option_bytes_take_halfwords_only(open_options: Any, size: int) -> None:
     open_options.write("FLASH.CR", OPTPG | OPTWRE)
     assert not open_options.parts.flash.program_option(4, size, 0)
+    assert "FLASH:width" in open_options.warnings
 
 
 @settings(max_examples=25)

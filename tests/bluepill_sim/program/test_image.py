@@ -46,6 +46,13 @@ def test_an_elf_brings_its_symbols() -> None:
     assert image.symbols.address_of("no such name") is None
 
 
+def test_of_the_names_of_one_address_a_weak_alias_is_the_last_to_be_told() -> None:
+    symbols = load_image(FIRMWARE).symbols
+    default = symbols.address_of("Default_Handler")
+    assert default is not None
+    assert symbols.where(default) == f"Default_Handler+0x0 ({default:#010x})"
+
+
 def test_what_a_file_holds_is_read_once_whatever_it_is_called() -> None:
     one, other, again = (parse_image(FIRMWARE.read_bytes(), name) for name in ("a.elf", "b.elf", "a.elf"))
     assert (one.name, other.name) == ("a.elf", "b.elf")

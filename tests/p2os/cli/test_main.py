@@ -151,6 +151,14 @@ def test_wrong_usage_ends_with_2(capsys: pytest.CaptureFixture[str], words: list
     assert told[1] == hint
 
 
+@pytest.mark.parametrize("words", [[], ["board"], ["mcu"]])
+def test_verbs_without_the_next_word_show_what_there_is(capsys: pytest.CaptureFixture[str], words: list[str]) -> None:
+    assert cli.run(words) == 0
+    told = capsys.readouterr()
+    assert told.out.startswith(f"Usage: {' '.join(['p2os', *words])} [OPTIONS] COMMAND")
+    assert not told.err
+
+
 def test_only_the_verb_that_is_named_is_imported() -> None:
     code = """
 import sys

@@ -121,6 +121,47 @@ def test_a_failure_says_what_was_wanted_what_happened_last_and_where_to_look(pyt
     assert told["test_without_a_bench"] == set()
 
 
+MISUSED = """
+import pytest
+
+def test_of_no_such_wire(bench): bench.expect_pin("PB99", "high", within="1 s")
+
+def test_of_no_such_event(bench): bench.expect("robot flies", within="1 s")
+
+@pytest.mark.worlds("rom")
+def test_of_no_such_world(bench): pass
+
+@pytest.fixture
+def far(bench): bench.run_until("9 parsec")
+
+def test_of_a_fixture(far): pass
+
+def test_of_ones_own_error(bench):
+    from simbase.errors import UsageError
+    def fails(): raise UsageError("mine", hint="yours")
+    fails()
+"""
+
+
+def test_a_misuse_shows_the_tests_own_line_the_error_and_its_hint_and_none_of_our_source(
+    pytester: pytest.Pytester,
+) -> None:
+    result = run(pytester, MISUSED, "--bench-record", "none")
+    result.assert_outcomes(failed=3, errors=2)
+    told = result.stdout.str()
+    assert "expect_pin(self" not in told
+    assert "robot_bench/" not in told.partition("short test summary")[0]
+    assert "another exception" not in told
+    assert "direct cause" not in told
+    result.stdout.fnmatch_lines([
+        "*no world 'rom' (hint: did you mean 'room'?)", '*run_until("9 parsec")', "E *unit ?parsec?*",
+        '*expect_pin("PB99"*', "E *no wire 'PB99'", "E *hint: *PB7*",
+        '*expect("robot flies"*', "E *robot flies*not understood*", "E *hint: such as robot near*",
+        "*def fails()*", "E *mine", "E *hint: yours",
+    ])  # fmt: skip
+    assert "selection.py" in run(pytester, MISUSED, "--bench-record", "none", "--full-trace").stdout.str()
+
+
 def test_seeds_are_those_of_the_command_line() -> None:
     from robot_bench.cli.pytest_plugin import _seeds
 

@@ -38,7 +38,8 @@ def test_a_sound_board_ends_with_0_and_its_table_fits_a_terminal(run: Run) -> No
     code, said = run("--emulated")
     lines = said.splitlines()
     assert (code, lines[-1]) == (0, "no fault in 26 rows, 1 not tested")
-    assert "DD3          PA6 - IO5       ok" in lines
+    assert "DD3          PA6 - IO5        ok" in lines
+    assert "link         IO17 - J3 - IO16 ok            8 bytes came back" in lines
     assert max(map(len, lines)) <= 80
 
 
@@ -70,6 +71,7 @@ def test_a_fault_is_a_word(text: str, fault: Fault) -> None:
         ("--emulated", "--bluepill", "pty:/dev/null"),
         ("--fault", "open:DD3"),
         ("--emulated", "--revision", "rev-z"),
+        ("--emulated", "--revision", "rev-c"),
         *(("--emulated", "--fault", text) for text in (
             "DD3", "shut:DD3", "open:DD9", "open:DD1,DD2", "short:DD1", "short:DD1,DD1", "open:EN", "short:EN,DD1",
             "open:DD3@left",
@@ -80,6 +82,12 @@ def test_wrong_usage_is_one_line_and_2(run: Run, words: tuple[str, ...]) -> None
     code, said = run(*words)
     assert code == 2
     assert len(said.splitlines()) == 1
+
+
+def test_a_wire_that_is_misspelt_gets_the_nearest() -> None:
+    with pytest.raises(UsageError, match="no wire 'DD33'") as caught:
+        verb.fault_of("open:DD33", verb.load_pinout())
+    assert caught.value.hint == "did you mean 'DD3'?"
 
 
 class Ports:
