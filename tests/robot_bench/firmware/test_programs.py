@@ -50,7 +50,7 @@ def test_any_two_of_program_mode_body_and_world_meet_in_a_quick_run() -> None:
 
 @pytest.mark.parametrize(("program", "mode", "body", "world"), combinations())
 def test_a_program_reaches_its_goals(program: str, mode: str, body: str, world: str, tmp_path: Path) -> None:
-    duration_s = 30.0 if program == "dodge" else None
+    duration_s = 20.0 if program == "dodge" else None
     outcome = run(program, tmp_path, mode=mode, body=body, world=world, duration_s=duration_s)
     assert outcome["collisions"] == 0
     if duration_s is not None:  # its goals are judged from 120 s on

@@ -95,8 +95,8 @@ def test_a_thing_ahead_stops_it_until_it_is_gone(tmp_path: Path) -> None:
     more = """
 [[obstacle]]
 name = "thing"
-at_s = 1.0
-x_m = 0.55
+at_s = 0.6
+x_m = 0.45
 y_m = 0.0
 length_m = 0.1
 width_m = 0.3
@@ -105,17 +105,17 @@ height_m = 0.3
 [[obstacle]]
 name = "thing"
 op = "remove"
-at_s = 2.0
+at_s = 1.2
 """
     path = tmp_path / "blocked.toml"
     path.write_text(load_scenario("rover").text.split("[[goal]]")[0] + more, encoding="utf-8")
-    made = bench(str(path), until="2.6 s")  # type: ignore[arg-type]
+    made = bench(str(path), until="1.6 s")  # type: ignore[arg-type]
     made.finish()
     record = made.record()
     said = [(at / 1e9, line) for at, line in record.usart_lines() if line in {"rover: blocked", "rover: clear"}]
     assert [line for _, line in said] == ["rover: blocked", "rover: clear"]
-    assert said[0][0] < 2.0 < said[1][0] < 2.1
-    stopped = next(pose for pose in record.poses if pose.t >= 1_990_000_000)
+    assert 0.6 < said[0][0] < 1.2 < said[1][0] < 1.3
+    stopped = next(pose for pose in record.poses if pose.t >= 1_150_000_000)
     assert stopped.left == 0
     assert record.poses[-1].left > 100 * MM, "and on it goes"
     assert record.contacts == []
