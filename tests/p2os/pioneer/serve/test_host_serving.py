@@ -21,7 +21,7 @@ from p2os.transport import HungUpError, Listener, Loops, Transport, listen_url, 
 from p2os.transport.wall_clock import wall_clock
 from simbase.timing import NS_PER_MS
 
-#: How often a robot of these tests reports, as often as its firmware can be told to.
+#: chosen: how often a robot of these tests reports, five times as often as others.
 CYCLE_NS = 20 * NS_PER_MS
 #: A bound on every wait; reached only when something is broken.
 PATIENCE_S = 30.0
@@ -154,9 +154,9 @@ def test_packets_come_no_faster_than_the_clock_goes(served: Served) -> None:
     begun_ns = wall_clock()
     caller = Caller(served.url)
     caller.open()
-    for _ in range(5):
+    for _ in range(15):  # many, for the handshake is counted, too
         caller.receive(lambda frame: frame.kind in SIP_KINDS)
-    assert wall_clock() - begun_ns >= 5 * CYCLE_NS  # a loaded machine lags; the bound above is PATIENCE_S
+    assert wall_clock() - begun_ns >= 15 * CYCLE_NS  # a loaded machine lags; the bound above is PATIENCE_S
     caller.close()
 
 
