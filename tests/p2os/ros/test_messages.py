@@ -4,6 +4,7 @@ import contextlib
 import hashlib
 import json
 import math
+import sys
 from collections.abc import Iterable
 from typing import Any
 
@@ -11,9 +12,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from p2os.errors import RemoteProtocolError
+from p2os.errors import MissingDependencyError, RemoteProtocolError
 from p2os.ros.codec import from_cdr, to_cdr
-from p2os.ros.message_table import SERVICES, Field, message_type
+from p2os.ros.message_table import SERVICES, Field, message_type, standard_types
+from p2os.ros.transport import NodeOptions
+from p2os.ros.transports import TRANSPORTS, open_transport
 from tests.p2os.ros.spoken_types import SPOKEN
 
 pytest.importorskip("cyclonedds", reason="the extra ros is not installed")
@@ -161,3 +164,11 @@ def test_each_cut_of_a_message_is_refused_or_is_no_twist_of_the_sender() -> None
     for cut in range(1, len(whole)):
         with pytest.raises(RemoteProtocolError):
             from_cdr("geometry_msgs/msg/Twist", whole[:cut])
+
+
+@pytest.mark.parametrize("transport", TRANSPORTS)
+def test_no_node_is_opened_without_the_definitions(monkeypatch: pytest.MonkeyPatch, transport: str) -> None:
+    standard_types.cache_clear()
+    monkeypatch.setitem(sys.modules, "rosbags.typesys", None)
+    with pytest.raises(MissingDependencyError, match="ROS 2 messages need rosbags"):
+        open_transport(transport, NodeOptions())
