@@ -46,6 +46,7 @@ ALLOWED = {
     "p2os.pioneer.body.mujoco": {"mujoco", "numpy"},
     "p2os.cli.robots.pad_source": {"pygame"},
     "p2os.ros.bags": {"rosbags"},
+    "p2os.ros.message_table": {"rosbags"},
     "p2os.ros.codec": {"cyclonedds"},
     "p2os.ros.dds": {"cyclonedds"},
     "p2os.ros.zenoh_node": {"zenoh"},

@@ -48,7 +48,6 @@ PULSE_NS: Nanos = 50_000
 #: What goes into the FIFO by the bits of FIFO_EN: bytes of the sample.
 _FIFO_PARTS = ((0x08, 0, 6), (0x80, 6, 8), (0x40, 8, 10), (0x20, 10, 12), (0x10, 12, 14))
 _SAMPLE = struct.Struct(">7h")
-_FILTERS = 6
 
 
 class Mpu6050(Stateful):

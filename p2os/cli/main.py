@@ -30,7 +30,6 @@ from simbase.user_classes import unforeseen
 
 GROUP = "p2os.verbs"
 EXIT_FAILED = 1
-EXIT_USAGE = 2
 EXIT_INTERRUPTED = 130
 
 #: chosen: objects made between two searches for garbage; a capture's are tuples by the thousand, and none is garbage.

@@ -16,7 +16,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Literal, Self, cast
 
 from p2os.ros.codec import Message, to_cdr
-from p2os.ros.message_table import MESSAGES
+from p2os.ros.message_table import standard_types
 from p2os.ros.transport import Topic
 from simbase.errors import FileError, MissingDependencyError, UsageError, shown, shown_name
 from simbase.files import writing
@@ -33,8 +33,6 @@ METADATA = "metadata.yaml"
 SUFFIXES = frozenset({".mcap", ".db3", ".bag"})
 #: chosen: the older of the two layouts that rosbags writes; Iron and all after it read it.
 VERSION: Literal[8] = 8
-#: A structure of C cannot be empty; a definition can.
-_FILLER = "structure_needs_at_least_one_member"
 _NO_LIBRARY = "bags need rosbags"
 
 
@@ -79,9 +77,8 @@ class BagFile:
         """Add a message."""
         if topic not in self._topics:
             self._topics[topic] = self._writer.add_connection(
-                topic.name, topic.type, msgdef=definition(topic.type), rihs01=MESSAGES[topic.type].hash,
-                offered_qos_profiles=[_qos(topic)],
-            )  # fmt: skip
+                topic.name, topic.type, typestore=standard_types(), offered_qos_profiles=[_qos(topic)]
+            )
         self._writer.write(self._topics[topic], at_ns, to_cdr(topic.type, message))
         self.count += 1
 
@@ -96,22 +93,6 @@ def _qos(topic: Topic) -> "Qos":
         QosHistory.KEEP_LAST, topic.depth, QosReliability.RELIABLE, durability, endless, endless,
         QosLiveliness.AUTOMATIC, endless, avoid_ros_namespace_conventions=False,
     )  # fmt: skip
-
-
-def definition(name: str) -> str:
-    """Return the text of a type and of those that it holds, as a bag has it: a part each, the type itself first."""
-    parts, wanted = [], [name]
-    for one in wanted:  # grows meanwhile
-        lines = []
-        for field in MESSAGES[one].fields:
-            kind, count = field.kind, field.count
-            if kind in MESSAGES and kind not in wanted:
-                wanted.append(kind)
-            array = "" if count is None else f"[{count or ''}]"
-            lines += [] if field.name == _FILLER else [f"{kind.replace('/msg/', '/')}{array} {field.name}"]
-        parts.append("\n".join(lines))
-    heads = ["", *(f"{'=' * 80}\nMSG: {one.replace('/msg/', '/')}\n" for one in wanted[1:])]
-    return "\n".join(head + part for head, part in zip(heads, parts, strict=True)) + "\n"
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,11 +123,10 @@ def read_bag(path: Path, types: frozenset[str]) -> Iterator[Recorded]:
     """
     try:
         from rosbags.highlevel import AnyReader
-        from rosbags.typesys import Stores, get_typestore
     except ImportError as error:
         raise MissingDependencyError(_NO_LIBRARY, extra="ros") from error
     try:
-        with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as bag:
+        with AnyReader([path], default_typestore=standard_types()) as bag:
             chosen = [one for one in bag.connections if one.msgtype in types]
             # Without any chosen, all would be yielded.
             for connection, at_ns, data in bag.messages(chosen) if chosen else ():

@@ -10,12 +10,11 @@ Invariant: `from_cdr(name, to_cdr(name, message))` has every field of `message`.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
 from typing import Protocol, Self, TypeAlias, cast
 
 from p2os.errors import MissingDependencyError, RemoteProtocolError
-from p2os.ros.message_table import MESSAGES, Field
+from p2os.ros.message_table import Field, message_type
 
 #: A message: what each field holds.
 Message: TypeAlias = Mapping[str, object]
@@ -47,7 +46,7 @@ def to_cdr(name: str, message: Message) -> bytes:
     """Return the bytes of a message.
 
     Raises:
-        MissingDependencyError: cyclonedds is not installed.
+        MissingDependencyError: cyclonedds or rosbags is not installed.
         KeyError: There is no such type, or the message has a field that the type has not.
     """
     return struct_of(name, message).serialize()
@@ -57,7 +56,7 @@ def from_cdr(name: str, data: bytes) -> Message:
     """Return the message of some bytes.
 
     Raises:
-        MissingDependencyError: cyclonedds is not installed.
+        MissingDependencyError: cyclonedds or rosbags is not installed.
         RemoteProtocolError: They are no such message.
     """
     try:
@@ -74,20 +73,22 @@ def struct_of(name: str, message: Message) -> Struct:
     Raises:
         MissingDependencyError, KeyError: As `to_cdr`.
     """
-    layout = layout_of(name)
-    unknown = message.keys() - layout.names
+    known = message_type(name).fields
+    unknown = message.keys() - known.keys()
     if unknown:
         raise KeyError(f"{name} has no {', '.join(sorted(unknown))}")
     values = {
         field.name: _to_struct(field, message[field.name]) if field.name in message else _zero(field)
-        for field in layout.fields
+        for field in known.values()
     }
     return struct_class(name)(**values)
 
 
 def message_of(name: str, struct: Struct) -> Message:
     """Return what a struct holds."""
-    return {field.name: _from_struct(field, getattr(struct, field.name)) for field in layout_of(name).fields}
+    return {
+        field.name: _from_struct(field, getattr(struct, field.name)) for field in message_type(name).fields.values()
+    }
 
 
 @cache
@@ -95,14 +96,14 @@ def struct_class(name: str) -> type[Struct]:
     """Return the class of cyclonedds for a type.
 
     Raises:
-        MissingDependencyError: cyclonedds is not installed.
+        MissingDependencyError: cyclonedds or rosbags is not installed.
         KeyError: There is no such type.
     """
     try:
         from cyclonedds.idl import make_idl_struct, types
     except ImportError as error:
         raise MissingDependencyError("ROS 2 messages need cyclonedds", extra="ros") from error
-    row = MESSAGES[name]
+    row = message_type(name)
     arrays = vars(types)  # generic at run time only
 
     def kind_of(field: Field) -> object:
@@ -115,27 +116,8 @@ def struct_class(name: str) -> type[Struct]:
             return kind
         return arrays["sequence"][kind] if field.count == 0 else arrays["array"][kind, field.count]
 
-    fields = {field.name: kind_of(field) for field in row.fields}
+    fields = {field.name: kind_of(field) for field in row.fields.values()}
     return cast("type[Struct]", make_idl_struct(name.rpartition("/")[2] + "_", row.dds_name, fields))
-
-
-@dataclass(frozen=True, slots=True)
-class Layout:
-    """The fields of a type, and their names."""
-
-    fields: tuple[Field, ...]
-    names: frozenset[str]
-
-
-@cache
-def layout_of(name: str) -> Layout:
-    """Return the fields of a type.
-
-    Raises:
-        KeyError: There is no such type.
-    """
-    fields = MESSAGES[name].fields
-    return Layout(fields, frozenset(field.name for field in fields))
 
 
 def _to_struct(field: Field, value: object) -> object:

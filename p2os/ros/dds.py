@@ -19,7 +19,7 @@ from xml.sax.saxutils import quoteattr
 
 from p2os.errors import MissingDependencyError, TransportError
 from p2os.ros.codec import Message, message_of, struct_class, struct_of
-from p2os.ros.message_table import MESSAGES
+from p2os.ros.message_table import message_type
 from p2os.ros.transport import DEPTH, NodeOptions, Received, Topic
 from simbase.timing import NS_PER_S
 
@@ -163,7 +163,7 @@ class DdsNode:
         durability = Policy.Durability.TransientLocal if topic.is_latched else Policy.Durability.Volatile
         return Qos(
             Policy.Reliability.Reliable(duration(milliseconds=100)), Policy.History.KeepLast(topic.depth), durability,
-            Policy.Userdata(f"typehash={MESSAGES[topic.type].hash};".encode()),
+            Policy.Userdata(f"typehash={message_type(topic.type).hash};".encode()),
         )  # fmt: skip
 
     def _tell_endpoints(self) -> None:

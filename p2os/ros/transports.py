@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 
+from p2os.ros.message_table import standard_types
 from p2os.ros.transport import NodeOptions, Transport
 from simbase.errors import UsageError, shown
 
@@ -27,9 +28,10 @@ def open_transport(name: str, options: NodeOptions) -> Transport:
 
     Raises:
         UsageError: There is no such transport.
-        MissingDependencyError: It is not installed.
+        MissingDependencyError: It is not installed, or rosbags is not.
         TransportError: Its network cannot be had.
     """
     if name not in TRANSPORTS:
         raise UsageError(f"there is no transport {shown(name)}", hint=" or ".join(TRANSPORTS))
+    standard_types()  # now, and not with the first message, when the robot is there
     return TRANSPORTS[name](options)

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from p2os.errors import MissingDependencyError, RemoteProtocolError, TransportError
 from p2os.ros.codec import Message, from_cdr, to_cdr
-from p2os.ros.message_table import MESSAGES, SERVICES, dds_name
+from p2os.ros.message_table import SERVICES, dds_name, message_type
 from p2os.ros.transport import NodeOptions, Received, Topic
 
 if TYPE_CHECKING:
@@ -242,7 +242,8 @@ def _typed(topic: Topic) -> tuple[str, str]:
     """Return the name and the hash of a topic's or a service's type."""
     if topic.type in SERVICES:
         return dds_name(topic.type), SERVICES[topic.type]
-    return MESSAGES[topic.type].dds_name, MESSAGES[topic.type].hash
+    row = message_type(topic.type)
+    return row.dds_name, row.hash
 
 
 def qos_text(topic: Topic) -> str:

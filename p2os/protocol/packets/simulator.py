@@ -25,9 +25,6 @@ from p2os.errors import LocalProtocolError
 from p2os.protocol.frames import Frame
 from p2os.protocol.packets.layout import TEXT, LaidOutPacket, build, parse
 
-#: Latitude, longitude and odometry errors travel as integers of this many a unit.
-TEN_MILLION = 10_000_000
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimstatPacket(LaidOutPacket):

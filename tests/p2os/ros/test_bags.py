@@ -15,17 +15,18 @@ pytest.importorskip("rosbags", reason="the extra ros is not installed")
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from p2os.ros.bags import STORAGES, BagFile, definition, is_bag, read_bag
-from p2os.ros.message_table import MESSAGES
+from p2os.ros.bags import STORAGES, BagFile, is_bag, read_bag
+from p2os.ros.message_table import message_type
 from p2os.ros.topics import TOPICS
 from p2os.ros.transport import NodeOptions, Topic
 from simbase.errors import FileError, MissingDependencyError, UsageError
-from tests.tools.each_row import each_row
+from tests.p2os.ros.spoken_types import SPOKEN
 
 INT, ODOMETRY = "std_msgs/msg/Int32", "nav_msgs/msg/Odometry"
 PLAIN = Topic("/encoder_left", INT)
 LATCHED = TOPICS["robot_description"].topic(NodeOptions())
 STRING = "std_msgs/msg/String"
+STANDARD = [name for name in SPOKEN if "/srv/" not in name and "rmw" not in name]
 
 
 @pytest.fixture(params=STORAGES)
@@ -44,11 +45,18 @@ def file_of(bag: Path) -> Path:
     return found
 
 
-@each_row("name", [name for name in MESSAGES if "/srv/" not in name and "rmw" not in name])
-def test_a_definition_is_read_by_others_as_the_type_with_its_hash(name: str) -> None:
-    store = get_typestore(Stores.EMPTY)
-    store.register(get_types_from_msg(definition(name), name))
-    assert store.hash_rihs01(name) == MESSAGES[name].hash
+@pytest.mark.parametrize("storage", STORAGES)
+def test_definitions_are_read_by_others_as_the_types_with_their_hashes(tmp_path: Path, storage: str) -> None:
+    with BagFile(tmp_path / "bag", storage) as file:
+        for number, name in enumerate(STANDARD):
+            file.write(Topic(f"/of_{number}", name), {}, 0)
+    with Reader(tmp_path / "bag") as reader:
+        assert {connection.msgtype for connection in reader.connections} == set(STANDARD)
+        for connection in reader.connections:
+            name = connection.msgtype
+            store = get_typestore(Stores.EMPTY)
+            store.register(get_types_from_msg(connection.msgdef.data, name))
+            assert store.hash_rihs01(name) == connection.digest == message_type(name).hash, name
 
 
 def test_what_is_written_comes_back_in_order_from_the_folder_and_from_its_one_file(bag: Path) -> None:

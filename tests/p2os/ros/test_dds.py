@@ -27,7 +27,7 @@ from p2os.errors import TransportError
 from p2os.pioneer.serve import served_pioneer
 from p2os.ros.codec import Message, struct_of
 from p2os.ros.dds import configuration
-from p2os.ros.message_table import MESSAGES
+from p2os.ros.message_table import message_type
 from p2os.ros.robot_node import RobotNode
 from p2os.ros.topics import TOPICS
 from p2os.ros.transport import NodeOptions, Topic, Transport
@@ -125,7 +125,7 @@ def test_names_types_and_hashes_are_found_by_discovery_as_ros_writes_them(
     assert wait_for(lambda: look(BuiltinTopicDcpsPublication) or ("rt/odom", "nav_msgs::msg::dds_::Odometry_") in found)
     look(BuiltinTopicDcpsSubscription)
     odom = found["rt/odom", "nav_msgs::msg::dds_::Odometry_"]
-    assert odom[Policy.Userdata].data == f"typehash={MESSAGES['nav_msgs/msg/Odometry'].hash};".encode()
+    assert odom[Policy.Userdata].data == f"typehash={message_type('nav_msgs/msg/Odometry').hash};".encode()
     assert odom[Policy.Durability] == Policy.Durability.Volatile
     latched = found["rt/robot_description", "std_msgs::msg::dds_::String_"]
     assert latched[Policy.Durability] == Policy.Durability.TransientLocal

@@ -4,6 +4,7 @@ import contextlib
 import hashlib
 import json
 import math
+import sys
 from collections.abc import Iterable
 from typing import Any
 
@@ -11,12 +12,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from p2os.errors import RemoteProtocolError
+from p2os.errors import MissingDependencyError, RemoteProtocolError
 from p2os.ros.codec import from_cdr, to_cdr
-from p2os.ros.message_table import MESSAGES, SERVICES, Field
+from p2os.ros.message_table import SERVICES, Field, message_type, standard_types
+from p2os.ros.transport import NodeOptions
+from p2os.ros.transports import TRANSPORTS, open_transport
+from tests.p2os.ros.spoken_types import SPOKEN
 from tests.tools.each_row import each_row
 
 pytest.importorskip("cyclonedds", reason="the extra ros is not installed")
+pytest.importorskip("rosbags", reason="the extra ros is not installed")
 NUMBERS = {
     "bool": st.booleans(), "byte": st.integers(0, 255), "char": st.integers(0, 255), "uint8": st.integers(0, 255),
     "int32": st.integers(-(1 << 31), (1 << 31) - 1), "uint32": st.integers(0, (1 << 32) - 1),
@@ -36,7 +41,7 @@ def values(field: Field) -> st.SearchStrategy[Any]:
 
 def messages(name: str) -> st.SearchStrategy[dict[str, Any]]:
     """Return messages of a type."""
-    return st.fixed_dictionaries({field.name: values(field) for field in MESSAGES[name].fields})
+    return st.fixed_dictionaries({field.name: values(field) for field in message_type(name).fields.values()})
 
 
 #: A type whose strings are bounded to so many characters, of which the wire shows nothing.
@@ -77,18 +82,18 @@ def hash_of(name: str, known: dict[str, dict[str, Any]]) -> str:
 
 
 DESCRIBED = {
-    name: described(name, ((field.name, field.kind, field.count) for field in row.fields))
-    for name, row in MESSAGES.items()
+    name: described(name, ((field.name, field.kind, field.count) for field in message_type(name).fields.values()))
+    for name in SPOKEN
 }
 
 
 #: Types whose hash is on the wire.
-HASHED = sorted(name for name in MESSAGES if MESSAGES[name].hash)
+HASHED = sorted(name for name in SPOKEN if message_type(name).hash)
 
 
 @each_row("name", HASHED)
 def test_a_type_has_the_hash_that_its_fields_give(name: str) -> None:
-    assert hash_of(name, DESCRIBED) == MESSAGES[name].hash
+    assert hash_of(name, DESCRIBED) == message_type(name).hash
 
 
 @pytest.mark.parametrize("name", SERVICES)
@@ -106,11 +111,18 @@ def test_a_service_has_the_hash_that_its_halves_give(name: str) -> None:
     assert hash_of(name, DESCRIBED | whole) == SERVICES[name]
 
 
-@each_row("name", [name for name in HASHED if not name.startswith("rmw_dds_common")])
-def test_the_hash_is_that_of_the_definition_of_others(name: str) -> None:
-    # Not of rmw_dds_common: rosbags 0.11 takes `char` for a kind of its own there, which Jazzy's code does not.
-    rosbags = pytest.importorskip("rosbags.typesys", reason="rosbags is not installed")
-    assert rosbags.get_typestore(rosbags.Stores.ROS2_JAZZY).hash_rihs01(name) == MESSAGES[name].hash
+@pytest.mark.parametrize(
+    ("name", "hash_"),
+    [
+        ("std_msgs/msg/String", "df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"),
+        ("std_msgs/msg/Empty", "20b625256f32d5dbc0d04fee44f43c41e51c70d3502f84b4a08e7a9c26a96312"),
+        ("geometry_msgs/msg/Twist", "9c45bf16fe0983d80e3cfe750d6835843d265a9a6c46bd2e609fcddde6fb8d2a"),
+        ("nav_msgs/msg/Odometry", "3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0"),
+        ("sensor_msgs/msg/Range", "b42b62562e93cbfe9d42b82fe5994dfa3d63d7d5c90a317981703f7388adff3a"),
+    ],
+)
+def test_the_hash_is_that_of_jazzys_generated_code(name: str, hash_: str) -> None:
+    assert message_type(name).hash == f"RIHS01_{hash_}"
 
 
 @settings(max_examples=25)
@@ -118,7 +130,7 @@ def test_the_hash_is_that_of_the_definition_of_others(name: str) -> None:
 def test_a_message_is_written_as_an_independent_serialiser_writes_it_and_comes_back_whole(data: st.DataObject) -> None:
     rosbags = pytest.importorskip("rosbags.typesys", reason="rosbags is not installed")
     store = rosbags.get_typestore(rosbags.Stores.ROS2_JAZZY)
-    name = data.draw(st.sampled_from(sorted(name for name in MESSAGES if name in store.fielddefs)))
+    name = data.draw(st.sampled_from(sorted(name for name in SPOKEN if name in store.fielddefs)))
     message = data.draw(messages(name))
     written = to_cdr(name, message)
     assert bytes(store.serialize_cdr(store.deserialize_cdr(written, name), name)) == written
@@ -142,10 +154,10 @@ def test_ranges_without_an_echo_stay_infinite() -> None:
 
 
 @settings(max_examples=100)
-@given(st.sampled_from(sorted(MESSAGES)), st.binary(max_size=80))
+@given(st.sampled_from(SPOKEN), st.binary(max_size=80))
 def test_hostile_bytes_are_a_message_or_a_refusal(name: str, data: bytes) -> None:
     with contextlib.suppress(RemoteProtocolError):
-        assert from_cdr(name, b"\0\1\0\0" + data).keys() == {field.name for field in MESSAGES[name].fields}
+        assert from_cdr(name, b"\0\1\0\0" + data).keys() == message_type(name).fields.keys()
 
 
 def test_each_cut_of_a_message_is_refused_or_is_no_twist_of_the_sender() -> None:
@@ -153,3 +165,11 @@ def test_each_cut_of_a_message_is_refused_or_is_no_twist_of_the_sender() -> None
     for cut in range(1, len(whole)):
         with pytest.raises(RemoteProtocolError):
             from_cdr("geometry_msgs/msg/Twist", whole[:cut])
+
+
+@pytest.mark.parametrize("transport", TRANSPORTS)
+def test_no_node_is_opened_without_the_definitions(monkeypatch: pytest.MonkeyPatch, transport: str) -> None:
+    standard_types.cache_clear()
+    monkeypatch.setitem(sys.modules, "rosbags.typesys", None)
+    with pytest.raises(MissingDependencyError, match="ROS 2 messages need rosbags"):
+        open_transport(transport, NodeOptions())

@@ -9,7 +9,6 @@ pytest.importorskip("rosbags", reason="the extra ros is not installed")
 
 from p2os.cli.main import run as p2os
 from p2os.ros.bags import Recorded, read_bag
-from p2os.ros.message_table import MESSAGES
 from robot_bench.bench import Bench
 from robot_bench.events.codec import Json
 from robot_bench.events.kinds import Event, Note, Packet, PinEdge, Pose, Text, Verdict
@@ -18,9 +17,10 @@ from robot_bench.run import meta_of
 from robot_bench.scenario.scenario import Scenario, load_scenario
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS
+from tests.p2os.ros.spoken_types import SPOKEN
 from tests.robot_bench.ros.test_bench_node import Script, ran, scenario
 
-TYPES = frozenset(MESSAGES)
+TYPES = frozenset(SPOKEN)
 META = {"robot": {"name": "p2dx"}}
 
 
