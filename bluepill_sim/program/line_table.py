@@ -10,7 +10,7 @@ Invariant: rows are sorted by address and do not overlap.
 import io
 from bisect import bisect_right
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 from bluepill_sim.errors import ImageError
@@ -69,22 +69,28 @@ def read_lines(image: Image) -> LineTable:
     try:
         from elftools.common.exceptions import DWARFError, ELFError
         from elftools.construct.core import ConstructError
-        from elftools.elf.elffile import ELFFile
     except ImportError as error:
         raise MissingDependencyError(f"source lines need pyelftools: {error}", extra="sim") from error
     try:
-        elf = ELFFile(io.BytesIO(data))
-        if not elf.has_dwarf_info():
-            return LineTable()
-        rows: list[LineRow] = []
-        dwarf = elf.get_dwarf_info()
-        for unit in dwarf.iter_CUs():
-            program = dwarf.line_program_for_CU(unit)
-            if program is not None:
-                rows += _rows_of(program, _Files(program, unit), image.linked_at)
+        return _lines_of(data, image.linked_at)
     except (ELFError, DWARFError, ConstructError, KeyError, ValueError, IndexError, AttributeError, TypeError) as error:
         # pyelftools has no one error for a damaged file.
         raise ImageError(f"{image.name}: the debug information is damaged: {error}", hint="build it again") from error
+
+
+@lru_cache(maxsize=4)  # of one program are asked for the board's, the coverage's and each replay's: 50 ms each
+def _lines_of(elf_bytes: bytes, flash: int) -> LineTable:
+    from elftools.elf.elffile import ELFFile
+
+    elf = ELFFile(io.BytesIO(elf_bytes))
+    if not elf.has_dwarf_info():
+        return LineTable()
+    rows: list[LineRow] = []
+    dwarf = elf.get_dwarf_info()
+    for unit in dwarf.iter_CUs():
+        program = dwarf.line_program_for_CU(unit)
+        if program is not None:
+            rows += _rows_of(program, _Files(program, unit), flash)
     return LineTable(_without_overlaps(rows))
 
 

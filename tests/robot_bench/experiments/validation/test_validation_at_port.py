@@ -48,7 +48,7 @@ def test_motors_codes_and_encoders_hold_at_a_port(tmp_path: Path) -> None:
 def test_a_robot_drives_through_a_gate_and_stops_and_its_pins_say_what_its_packets_do(
     gate: Path, tmp_path: Path
 ) -> None:
-    found = at_port(["sensors", "only-while-seen"], tmp_path / "v", world=gate)
+    found = at_port(["sensors", "only-while-seen"], tmp_path / "v", world=gate, duration_s=30.0)  # it stands by then
     assert [line for result in found for line in told(result)] == []
     assert set(loose(one for result in found for one in result.findings)) <= set(LOOSE_BECAUSE)
 

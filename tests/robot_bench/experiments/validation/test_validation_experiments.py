@@ -128,7 +128,7 @@ PLANTED = [
 
 #: How much of an experiment suffices, seconds: with nothing planted it shows nothing wrong either, but for `encoders`,
 #: which has not come to every code by then.
-SHORT_S = {"encoders": 20.0, "motors": 13.0, "sensors-all": 10.0, "only-while-seen": 8.0}
+SHORT_S = {"encoders": 20.0, "motors": 13.0, "sensors-all": 10.0, "only-while-seen": 8.0, "slip": 13.0}
 
 
 @pytest.mark.parametrize(
