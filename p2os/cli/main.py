@@ -180,9 +180,6 @@ def _run(words: list[str], *, trace: bool) -> int:
         result = command.main(words, prog_name="p2os", standalone_mode=False)
     except (KeyboardInterrupt, typer.Abort):
         result = EXIT_INTERRUPTED
-    except BrokenPipeError:  # the reader of our stdout has left, e.g. `p2os ports | head -1`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return EXIT_FAILED
     except Exception as error:  # noqa: BLE001 - the one place where every error becomes a line
         return report(error, trace=trace)
     if result == EXIT_INTERRUPTED:  # the option parser makes it of a KeyboardInterrupt, too

@@ -31,6 +31,8 @@ MOST_WAITING = 64
 IPV4_BYTES, _NO_OPTIONS = 20, b"\x45"
 #: Of such a packet at the least, up to the TCP header's flags.
 _LEAST_BYTES = 34
+#: A TCP header's data offset, five words at the least, beside four bits of no use here.
+_LEAST_OFFSET = 5 << 4
 #: Its size, protocol and addresses, and of the TCP header behind it the ports, the sequence, the size and the flags.
 _PLAIN = struct.Struct(">2xH5xB2x4s4sHHI4xBB").unpack_from
 
@@ -136,7 +138,8 @@ def _segment(link: int, packet: bytes) -> tuple[End, End, int, int, bytes] | Non
             size, protocol, source, target, source_port, target_port, sequence, offset, flags = _PLAIN(packet, skip)
             data = packet[skip + IPV4_BYTES + (offset >> 4) * 4 : skip + size if size else None]
             found = (source, source_port), (target, target_port), sequence, flags, data
-            return found if protocol == TCP and not 0 < size < _LEAST_BYTES else None
+            is_tcp = protocol == TCP and offset >= _LEAST_OFFSET
+            return found if is_tcp and not 0 < size < _LEAST_BYTES else None
         ip = packet[skip:]
         if ip[:1] and ip[0] >> 4 == 4:
             header, size, protocol = (ip[0] & 15) * 4, int.from_bytes(ip[2:4], "big"), ip[9]
@@ -146,9 +149,9 @@ def _segment(link: int, packet: bytes) -> tuple[End, End, int, int, bytes] | Non
             source, target, tcp = ip[8:24], ip[24:40], ip[40 : 40 + size]
         else:
             return None
-        if protocol != TCP:
-            return None
         source_port, target_port, sequence, _, offset, flags = struct.unpack_from(">HHIIBB", tcp)
     except (IndexError, struct.error):
+        return None
+    if protocol != TCP or offset < _LEAST_OFFSET:
         return None
     return (source, source_port), (target, target_port), sequence, flags, tcp[(offset >> 4) * 4 :]

@@ -19,7 +19,7 @@ from p2os.capture.sip_columns import LEADING
 from p2os.capture.sips import sips_of
 from p2os.capture.table import Table, tables_of, tables_of_sips, write_csv
 from p2os.cli.main import run
-from p2os.protocol.packets import EncoderPacket, SonarReading, StandardSip, packet_frame
+from p2os.protocol.packets import EncoderPacket, SerauxPacket, SonarReading, StandardSip, packet_frame
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import load_parameters
 from simbase.timing import NS_PER_MS, NS_PER_S
@@ -130,6 +130,20 @@ def test_positions_are_followed_over_the_wrap_and_sonar_has_a_column_a_number() 
 def test_a_frame_behind_a_false_header_has_the_time_when_that_was_given_up() -> None:
     chunks = [(0, ROBOT, b"\xfa\xfb\xc0" + sip_bytes()), (300 * NS_PER_MS, CLIENT, b"\0")]
     assert same(capture_of(chunks))["t_s"] == [0.3]
+
+
+def test_it_is_given_up_at_the_robots_own_next_byte() -> None:
+    false = b"\xfa\xfb\xc0" + sip_bytes()
+    chunks = [(0, ROBOT, false), (300 * NS_PER_MS, ROBOT, sip_bytes()), (NS_PER_S, ROBOT, sip_bytes())]
+    assert same(capture_of(chunks))["t_s"] == [0.3, 0.3, 1.0]
+
+
+def test_a_sip_within_a_packet_is_none_wherever_a_block_of_the_capture_ends() -> None:
+    within = packet_frame(SerauxPacket(data=bytes(9) + sip_bytes() + bytes(60)), Profile.P2OS).to_bytes()
+    for first in range(len(within)):
+        chunks = [(0, ROBOT, bytes(first)), *((place, ROBOT, within) for place in range(1, 9))]
+        found = same(capture_of([*chunks[first == 0 :], (9, ROBOT, sip_bytes())]), block=1, together=1)
+        assert found["t_s"] == [9 / NS_PER_S]
 
 
 def test_it_is_given_up_at_the_first_byte_of_anyone_once_the_line_was_quiet_for_so_long() -> None:

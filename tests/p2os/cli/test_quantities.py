@@ -57,6 +57,9 @@ def test_what_is_no_count_is_refused(text: str) -> None:
         ("run dodge --seed -1", "--seed '-1' is out of range: 0 or more, such as 7"),
         ("demo --duration 0s", "--duration '0s' is out of range: more than 0"),
         ("drive tcp:x:1 --forward 1000.1m", "--forward '1000.1m' is out of range: -1000m to 1000m, in"),
+        ("drive tcp:x:1 --forward -1000.1m", "--forward '-1000.1m' is out of range: -1000m to 1000m, in"),
+        ("drive tcp:x:1 --turn 36001deg", "--turn '36001deg' is out of range: -36000deg to 36000deg, in"),
+        ("drive tcp:x:1 --vel 1m/s --for 0s", "--for '0s' is out of range: more than 0"),
         ("drive tcp:x:1 --turn -36001deg", "--turn '-36001deg' is out of range: -36000deg to 36000deg, in"),
         ("serve --status 5", "--status '5' has no unit: 100ms or more"),
         ("serve --speed 1000", "--speed '1000' is out of range: 0.01 to 100"),
@@ -79,6 +82,14 @@ def test_a_value_that_cannot_be_is_one_line_with_range_and_units(
     told = capsys.readouterr().err.splitlines()
     assert told[0].startswith(f"p2os: {said}")
     assert len(told) == 2
+
+
+@pytest.mark.parametrize(
+    "words", ["--forward 1000m", "--forward -1000m", "--turn 36000deg", "--turn -36000deg", "--vel 1m/s --for 1ns"]
+)
+def test_a_value_at_its_bound_is_taken(words: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["drive", "loop:nobody", *words.split()]) == 1
+    assert "exists only inside one program" in capsys.readouterr().err
 
 
 def test_every_option_and_argument_shows_its_value_in_one_style() -> None:

@@ -146,6 +146,28 @@ def test_a_program_that_makes_no_call_loses_its_speed_at_the_deadman() -> None:
     assert rig.wheels == (0.3, 0.3)
 
 
+@pytest.mark.parametrize("after_ns", [0, 1, MS, 2 * MS])
+def test_the_deadman_comes_to_the_nanosecond_whatever_else_is_due_just_before(after_ns: int) -> None:
+    def moving(deadman_ns: int) -> tuple[Rig, int]:
+        rig = Rig(settings=ClientSettings(deadman_ns=deadman_ns)).connect()
+        rig.core.set_velocity(0.3, 0.0, rig.now)
+        begun = rig.now
+        rig.run(1.85)
+        return rig, begun
+
+    rig, begun = moving(9 * S)
+    other = rig.core.next_deadline()
+    assert other is not None
+    rig, again = moving(other - begun + after_ns)
+    assert again == begun
+    rig.core.advance_to(other - 1)
+    assert not rig.core.commanded.are_zero
+    rig.core.advance_to(other)
+    assert rig.core.commanded.are_zero is (after_ns == 0)
+    rig.core.advance_to(other + after_ns)
+    assert rig.core.commanded.are_zero
+
+
 def test_the_deadman_can_be_switched_off() -> None:
     rig = Rig(settings=ClientSettings(deadman_ns=None)).connect()
     rig.core.set_velocity(0.3, 0.0, rig.now)

@@ -5,6 +5,7 @@ import pickle
 
 import pytest
 
+from p2os.pioneer.body.contacts import ContactCounter
 from p2os.pioneer.body.contract import STEP_NS, RobotBody
 from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.world import load_world
@@ -18,6 +19,21 @@ P2DX = load_parameters("p2dx")
 @pytest.fixture(params=each_body())
 def make(request: pytest.FixtureRequest) -> Maker:
     return lambda world: make_body(request.param, world, P2DX)
+
+
+@pytest.mark.parametrize(("steps", "count"), [(0, 1), (1, 1), (198, 1), (199, 1), (200, 2), (201, 2), (1000, 2)])
+def test_a_contact_is_a_new_one_after_so_many_steps_apart(steps: int, count: int) -> None:
+    one_by_one, together = ContactCounter(), ContactCounter()
+    for counter in (one_by_one, together):
+        assert counter.update(True), "the first is new"
+        assert not counter.update(True), "and goes on"
+    for _ in range(steps):
+        one_by_one.update(False)
+    if steps:
+        together.update(False, steps)
+    for counter in (one_by_one, together):
+        assert counter.update(True) is (count == 2)
+        assert counter.collisions == count
 
 
 def world_of(*things: Obstacle) -> World:
