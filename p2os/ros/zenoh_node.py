@@ -62,9 +62,8 @@ class ZenohNode:
             self._session = zenoh.open(configuration(endpoint, is_router=options.is_router))
         except zenoh.ZError as error:
             where = f"be the router on {endpoint}" if options.is_router else f"find a router on {endpoint}"
-            raise TransportError(
-                f"zenoh cannot {where}", hint="" if options.is_router else "--router, or run rmw_zenohd"
-            ) from error
+            hint = None if options.is_router else "run rmw_zenohd, or p2os ros URL --transport zenoh --router"
+            raise TransportError(f"zenoh cannot {where}", hint=hint) from error
         self._options = options
         self._clock = clock
         self.damaged = 0

@@ -198,9 +198,11 @@ class Expectations(AwaitedRun):
         until = self.now if limit is None else min(limit, self.now)
         if limit is not None and limit != self.end and 0 < limit - since < NS_PER_US:
             what = f"{what} within {limit - since} ns (a number without a unit is nanoseconds)"
+        is_cut = limit is not None and limit > self.end
         return ExpectationError(
-            f"{what}, from {since / NS_PER_S:.3f} s to {until / NS_PER_S:.3f} s", self.last_events()
-        )
+            f"{what}, from {since / NS_PER_S:.3f} s to {until / NS_PER_S:.3f} s", self.last_events(),
+            hint=f"the run is over at {self.end / NS_PER_S:g} s: duration_s makes it longer" if is_cut else None,
+        )  # fmt: skip
 
     def last_events(self, count: int = 8) -> list[str]:
         """Return what happened last, a line each with its time; poses, edges, packets and ranges aside."""

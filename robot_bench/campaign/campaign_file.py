@@ -19,7 +19,7 @@ Invariant: a `Campaign` that exists can be begun: its scenario is there and can 
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
@@ -168,6 +168,14 @@ class Disturbance:
     #: Name in braces in the words → its values.
     values: Mapping[str, Span]
 
+    def table(self, value: Callable[[str, Span], object]) -> Table:
+        """Return the `[[fault]]` table of a run; `value` chooses from the span of each key."""
+        words = self.words
+        for key, span in self.values.items():
+            words = words.replace(f"{{{key}}}", str(value(key, span)))
+        times = {"at_s": self.at_s} | ({} if self.for_s is None else {"for_s": self.for_s})
+        return {"fault": words} | {key: value(key, span) for key, span in times.items()}
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Budget:
@@ -263,6 +271,9 @@ def parse_campaign(text: str, path: Path, *, firmware: Path | None = None) -> Ca
         disturbances=disturbances,
     )  # fmt: skip
     _refuse_settings(found, path)
+    for number, one in enumerate(disturbances):
+        faults = [one.table(lambda _, span: span.value(0.0)), one.table(lambda _, span: span.value(1.0))]
+        _scenario(trial.set(*cheap).with_lists(fault=faults), str(within(where, "disturb", number)))
     return found
 
 

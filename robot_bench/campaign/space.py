@@ -178,10 +178,4 @@ def _faults(one: Disturbance, number: int, value: Value, at: Mapping[str, float]
     name = f"disturb-{number}"
     if at.get(f"{name}.happens", 0.0) >= one.share:
         return []
-    words = one.words
-    for key, span in one.values.items():
-        words = words.replace(f"{{{key}}}", str(value(f"{name}.{key}", span)))
-    table: dict[str, object] = {"at_s": value(f"{name}.at_s", one.at_s), "fault": words}
-    if one.for_s is not None:
-        table["for_s"] = value(f"{name}.for_s", one.for_s)
-    return [table]
+    return [one.table(lambda key, span: value(f"{name}.{key}", span))]

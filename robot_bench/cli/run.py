@@ -18,6 +18,7 @@ from p2os.cli.quantities import option
 from p2os.errors import RunFailedError
 from p2os.ros.transports import TRANSPORTS
 from p2os.transport import open_url
+from robot_bench.cli.names import scenario_names
 from robot_bench.cli.progress import RunDisplay
 from robot_bench.cli.sweep import (
     KEPT,
@@ -36,7 +37,7 @@ from robot_bench.remote import CAUTIOUS_ROTATION_DEG_S, CAUTIOUS_VELOCITY_MM_S
 from robot_bench.run import Progress, RunBench, RunResult, run_at_port, run_scenario
 from robot_bench.scenario import sweep
 from robot_bench.scenario.included_files import read_setting
-from robot_bench.scenario.scenario import Scenario, ScenarioOptions, known_scenarios, load_scenario
+from robot_bench.scenario.scenario import Scenario, ScenarioOptions, load_scenario
 from robot_bench.scenario.sweep import MOST_RUNS, read_seeds
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
@@ -97,18 +98,15 @@ class RealtimeCommand(VerbPage):
         return super().parse_args(ctx, filled)
 
 
-def scenarios(incomplete: str) -> list[str]:
-    """Return the scenarios that ship, for a shell."""
-    return [name for name in known_scenarios() if name.startswith(incomplete)]
-
-
 def register(app: typer.Typer) -> None:
     """Add the verb."""
     app.command("run", help=HELP, rich_help_panel=BENCH, cls=RealtimeCommand)(run)
 
 
 def run(
-    scenario: Annotated[str, typer.Argument(help="Name or TOML file.", metavar="SCENARIO", autocompletion=scenarios)],
+    scenario: Annotated[
+        str, typer.Argument(help="Name or TOML file.", metavar="SCENARIO", autocompletion=scenario_names)
+    ],
     firmware: Annotated[
         Path | None, typer.Option(help="ELF, HEX or BIN in place of the scenario's.", metavar="FILE")
     ] = None,

@@ -8,8 +8,8 @@ from simbase.errors import P2osError
 class ExpectationError(P2osError, AssertionError):
     """Something did not happen in time, or happened that must not; `last_events` are the last ones, in words."""
 
-    def __init__(self, what: str, last_events: Sequence[str] = ()) -> None:
-        super().__init__(what)
+    def __init__(self, what: str, last_events: Sequence[str] = (), *, hint: str | None = None) -> None:
+        super().__init__(what, hint=hint)
         self.last_events = tuple(last_events)
 
     def __str__(self) -> str:

@@ -50,7 +50,7 @@ from robot_bench.scenario.included_files import (
     shipped_scenarios,
 )
 from robot_bench.scenario.several_robots import robot_keys, split
-from robot_bench.scenario.sweep import Axis, load_axes, load_seeds
+from robot_bench.scenario.sweep import LARGEST_SEED, Axis, load_axes, load_seeds
 from robot_bench.scenario.when_script import When, load_whens
 from robot_bench.scenario.wired_robots import OwnRobot, find_own_robot, known_own_robots, load_own_robot
 from robot_bench.scenario.world_script import Change, load_changes, refuse_names
@@ -74,7 +74,7 @@ _TOP = (
     Key(name="pins", kind="table"),
     Key(name="mode", kind="text", choices=MODES),
     Key(name="body", kind="text", choices=BODY_CHOICES, group=BODY_GROUP),
-    Key(name="seed", kind="whole", least=0, most=2**63 - 1),
+    Key(name="seed", kind="whole", least=0, most=LARGEST_SEED),
     Key(name="seeds", kind="text"),
     Key(name="sweep", kind="table"),
     Key(name="duration_s", kind="number", required=True, above=0, most=LONGEST_S),
@@ -301,6 +301,8 @@ class Scenario:
         seed, usart_baud = options.get("seed"), options.get("usart_baud")
         if duration_s is not None and not 0 < duration_s < math.inf:
             raise UsageError(f"a run of {duration_s:g} s cannot be", hint="--duration takes more than 0, such as 10s")
+        if seed is not None and (type(seed) is not int or not 0 <= seed <= LARGEST_SEED):
+            raise UsageError(f"{shown(seed)} is no seed", hint=f"a whole number from 0 to {LARGEST_SEED}")
         firmware = Path(options.get("firmware") or self.firmware)
         if options.get("firmware") and not firmware.is_file():
             raise UsageError(f"there is no firmware file {firmware}", hint="give an ELF, HEX or BIN file")

@@ -28,7 +28,7 @@ from simbase.errors import UsageError, shown
 
 #: chosen: a night on one core with runs of a second; more is a mistake.
 MOST_RUNS = 100_000
-_LARGEST_SEED = 2**63 - 1
+LARGEST_SEED = 2**63 - 1
 _PART = re.compile(r"(\d+)(?:\s*-\s*(\d+))?", re.ASCII)
 #: Keys of a range.
 RANGE = (
@@ -56,7 +56,7 @@ def read_seeds(text: str) -> tuple[int, ...]:
     for part in text.split(","):
         match = _PART.fullmatch(part.strip())
         first, last = (int(match[1]), int(match[2] or match[1])) if match is not None else (0, -1)
-        if not first <= last <= _LARGEST_SEED:
+        if not first <= last <= LARGEST_SEED:
             raise UsageError(f"{shown(text)} names no seeds", hint='such as "0-99", or "1,5,10-19"')
         if last - first + len(found) >= MOST_RUNS:
             raise UsageError(f"{shown(text)} are more than {MOST_RUNS} seeds", hint="take fewer")

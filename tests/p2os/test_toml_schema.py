@@ -54,7 +54,7 @@ def test_what_is_left_out_has_its_default_or_is_missed() -> None:
 
 def test_an_error_gets_its_place_but_not_one_of_what_is_not_installed() -> None:
     with (
-        pytest.raises(WorldError, match=r"^w\.toml:3: \[\[row\]\] 1: odd$") as caught,
+        pytest.raises(WorldError, match=r"(?m)^w\.toml:3: \[\[row\]\] 1: odd$") as caught,
         placed(within(WHERE, "row", 0), "b"),
     ):
         raise UsageError("odd", hint="even")

@@ -312,7 +312,7 @@ class Host:
             self._notify("client refused", f"{transport.description}: {first} is connected")
             connected_s = (self.now - self._came_at) / self._time.speed / NS_PER_S
             peer = first.removeprefix("tcp:")
-            self._closing_lines.add(transport, f"busy: {peer} is connected for {connected_s:.0f} s")
+            self._closing_lines.add(transport, f"busy: {peer} has been connected for {connected_s:.0f} s")
             return
         self.pioneer.take_output()  # what it sent while no client was there
         self._client, self._came_at, self._open_at = transport, self.now, self.now

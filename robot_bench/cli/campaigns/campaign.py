@@ -36,7 +36,8 @@ A campaign file says what may vary, what has to hold, and how much may be
 spent. Cheap runs propose, runs in full confirm, and each failure was run again
 in another process with the same hash before it is told.
 
-Exit code: 0 nothing fails, 1 something does, 130 interrupted (--resume goes on).
+Exit code: 0 nothing fails, 1 something does or no point has a verdict,
+130 interrupted (--resume goes on).
 
 \b
 Examples:
@@ -185,7 +186,7 @@ def tell(done: Whole, other: Other | None, *, json_output: bool) -> None:
         print_whole(done, parts)
     if done.was_interrupted:
         raise typer.Exit(EXIT_INTERRUPTED)
-    if done.failures:
+    if done.failures or {row.finding for row in done.progress.rows} == {Finding.ERROR}:
         raise typer.Exit(1)
 
 
@@ -214,9 +215,7 @@ def print_whole(done: Whole, parts: Mapping[int, str]) -> None:
         typer.echo(f"        {done.results.replay(row)}")
     if len(done.failures) > MOST_TOLD:
         typer.echo(f"and {len(done.failures) - MOST_TOLD} more; {done.folder / 'failures'} has all")
-    for row in [row for row in done.progress.rows if row.finding in {Finding.ERROR, Finding.NOT_REPEATED}][:MOST_TOLD]:
-        why = next((run.outcome.failures[0] for run in row.runs if run.outcome.failures), "")
-        typer.echo(f"{row.finding.value}  point {row.number}: {why}")
+    print_errors(done)
     counts = [f"{done.counts[finding]} {finding.value}" for finding in Finding if done.counts.get(finding)]
     progress = done.progress
     if done.failures:
@@ -228,3 +227,15 @@ def print_whole(done: Whole, parts: Mapping[int, str]) -> None:
         f"{', '.join(counts) or 'nothing'} of {len(progress.rows)} points, {progress.runs} runs, "
         f"{progress.virtual_ns / 3.6e12:.2f} h of virtual time, {progress.cpu_s:.0f} s of processors{again}"
     )
+
+
+def print_errors(done: Whole) -> None:
+    """Print why points have no verdict that holds, each reason once with its points."""
+    untold: dict[tuple[Finding, str], list[int]] = {}
+    for row in done.progress.rows:
+        if row.finding in {Finding.ERROR, Finding.NOT_REPEATED}:
+            why = next((run.outcome.failures[0] for run in row.runs if run.outcome.failures), "")
+            untold.setdefault((row.finding, why), []).append(row.number)
+    for (finding, why), numbers in [*untold.items()][:MOST_TOLD]:
+        places = ", ".join(map(str, numbers[:MOST_TOLD])) + (", …" if len(numbers) > MOST_TOLD else "")
+        typer.echo(f"{finding.value}  point{'s' if len(numbers) > 1 else ''} {places}: {why}")

@@ -19,11 +19,13 @@ from bluepill_sim.program.mutants import Mutant, mutants, mutated_file
 from bluepill_sim.program.static_code import StaticCode
 from p2os.cli.help_pages import BENCH
 from p2os.cli.main import EXIT_INTERRUPTED
+from p2os.cli.names import bodies
 from p2os.cli.quantities import option
 from robot_bench.campaign.variants.mutation.base_run import BaseRun, base_run
 from robot_bench.campaign.variants.mutation.report import Mutation, as_json, report_lines, write_junit
 from robot_bench.campaign.variants.mutation.suite import Suite, SuiteRun, load_pytest, run_suite
 from robot_bench.campaign.variants.mutation.trial import MOST_MORE_NS, MOST_TIMES, Fate, Found, try_mutant
+from robot_bench.cli.names import scenario_names
 from robot_bench.cli.progress import RunDisplay, counting_bar
 from robot_bench.cli.sweep import refuse_junit
 from robot_bench.cli.workers import Jobs, core_count, run_in_processes
@@ -64,7 +66,12 @@ def register(app: typer.Typer) -> None:
 def mutate(
     firmware: Annotated[Path, typer.Argument(help="ELF, HEX or BIN file.", metavar="FIRMWARE")],
     scenarios: Annotated[
-        list[str], typer.Argument(help="Names or TOML files with goals; tests of pytest.", metavar="SCENARIO...")
+        list[str],
+        typer.Argument(
+            help="Names or TOML files with goals; tests of pytest.",
+            metavar="SCENARIO...",
+            autocompletion=scenario_names,
+        ),
     ],
     sample: Annotated[
         int | None, option(COUNT, "--sample", purpose="So many of the mutants, drawn; default all.", above_zero=True)
@@ -75,7 +82,9 @@ def mutate(
         typer.Option("--only", help="Source file or function; * stands for any; repeatable.", metavar="NAME"),
     ] = None,
     mode: Annotated[str | None, typer.Option(help="As of p2os run.", metavar="direct|adapter")] = None,
-    body: Annotated[str | None, typer.Option(help="As of p2os run; kinematic is quick.", metavar="BODY")] = None,
+    body: Annotated[
+        str | None, typer.Option(help="As of p2os run; kinematic is quick.", metavar="BODY", autocompletion=bodies)
+    ] = None,
     set_: Annotated[
         list[str] | None, typer.Option("--set", help="A key of the scenarios; repeatable.", metavar="KEY=VALUE")
     ] = None,
@@ -98,6 +107,9 @@ def mutate(
     ]  # fmt: skip
     if junit is not None:
         refuse_junit(junit)
+    if write is not None:
+        with writing(write, hint="--write takes a folder"):
+            write.mkdir(parents=True, exist_ok=True)
     with RunDisplay(is_shown=False) as display:
         bases = [base_run(one, time.process_time_ns, display.raise_if_interrupted) for one in wanted]
         board = BluePill(firmware)
@@ -112,15 +124,15 @@ def mutate(
         possible=len(possible), seed=seed if len(tried) < len(possible) else None, tried=tried, found=found,
         coverage=names, lines=read_lines(board.image),
     )  # fmt: skip
-    if write is not None:
-        _write(mutation, board.image, write)
-    if junit is not None:
-        write_junit(mutation, junit)
     if json_output:
         typer.echo(json.dumps(as_json(mutation), sort_keys=True))
     else:
         for line in report_lines(mutation):
             typer.echo(line)
+    if write is not None:
+        _write(mutation, board.image, write)
+    if junit is not None:
+        write_junit(mutation, junit)
     if not is_whole:
         raise typer.Exit(EXIT_INTERRUPTED)
     if broken:
@@ -233,7 +245,6 @@ def _write(mutation: Mutation, image: Image, folder: Path) -> None:
     data = read_bytes(image)
     suffix = ".elf" if data.startswith(b"\x7fELF") else ".bin"
     with writing(folder):
-        folder.mkdir(parents=True, exist_ok=True)
         for mutant in mutation.survivors:
             name = f"{mutant.address:08x}-{mutant.alteration.code.hex()}{suffix}"
             (folder / name).write_bytes(mutated_file(data, mutant, image))

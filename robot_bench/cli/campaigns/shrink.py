@@ -13,6 +13,7 @@ from robot_bench.campaign.trial import Trial, trial_of
 from robot_bench.campaign.variants.shrinking.failure import Failure, Way, failure_of
 from robot_bench.campaign.variants.shrinking.kept import Kept, keep, trial_of_run
 from robot_bench.campaign.variants.shrinking.shrink import BUDGET, Shrunk, shrink
+from robot_bench.cli.names import scenario_names
 from robot_bench.cli.progress import RunDisplay, runs_bar
 from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.recording.run_record import TRACE_NAME
@@ -52,7 +53,9 @@ def register(app: typer.Typer) -> None:
 
 
 def shrink_run(
-    run: Annotated[str, typer.Argument(help="A run folder, or a scenario.", metavar="RUN|SCENARIO")],
+    run: Annotated[
+        str, typer.Argument(help="A run folder, or a scenario.", metavar="RUN|SCENARIO", autocompletion=scenario_names)
+    ],
     firmware: Annotated[
         Path | None, typer.Option(help="ELF, HEX or BIN in place of the scenario's.", metavar="FILE")
     ] = None,

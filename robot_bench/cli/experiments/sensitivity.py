@@ -11,6 +11,7 @@ import typer
 from p2os.cli.help_pages import BENCH
 from p2os.cli.names import bodies
 from p2os.cli.quantities import option
+from robot_bench.cli.names import scenario_names
 from robot_bench.cli.progress import RunDisplay
 from robot_bench.cli.workers import Jobs, core_count, load_once, run_in_processes
 from robot_bench.events.codec import Json
@@ -47,7 +48,10 @@ def register(app: typer.Typer) -> None:
 
 
 def sensitivity(
-    scenario: Annotated[str, typer.Argument(help="A scenario that ships, or a file.", metavar="SCENARIO")],
+    scenario: Annotated[
+        str,
+        typer.Argument(help="A scenario that ships, or a file.", metavar="SCENARIO", autocompletion=scenario_names),
+    ],
     vary: Annotated[
         list[str] | None, typer.Option("--vary", help="A parameter and its range.", metavar="KEY=LOW..HIGH")
     ] = None,

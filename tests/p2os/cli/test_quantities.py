@@ -149,6 +149,11 @@ def test_no_page_of_help_is_wider_than_a_terminal(
         ("p2os world sh", ["show"]),
         ("p2os mcu cov", ["coverage"]),
         ("p2os info tcp:1", ["tcp:127.0.0.1:8101"]),
+        ("p2os run mot", ["motors"]),
+        ("p2os mutate a.elf mot", ["motors"]),
+        ("p2os mutate a.elf motors --body kin", ["kinematic"]),
+        ("p2os sensitivity mot", ["motors"]),
+        ("p2os shrink mot", ["motors"]),
     ],
 )
 def test_a_shell_is_offered_verbs_options_and_names(

@@ -164,6 +164,19 @@ def test_a_score_below_the_least_one_fails(monkeypatch: pytest.MonkeyPatch, caps
         assert "score 40.0 %" in capsys.readouterr().out
 
 
+def test_where_survivors_go_is_looked_at_before_anything_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("robot_bench.cli.campaigns.mutate.base_run", lambda *_: pytest.fail("it ran"))
+    taken = tmp_path / "taken"
+    taken.write_text("mine")
+    assert cli.run(["mutate", "x.bin", "mine.toml", "--write", str(taken)]) == 2
+    assert capsys.readouterr().err.splitlines() == [
+        f"p2os: cannot write {taken}: file exists", "hint: --write takes a folder",
+    ]  # fmt: skip
+    assert taken.read_text() == "mine"
+
+
 def test_a_sample_is_drawn_by_its_seed_and_json_junit_and_files_have_the_same(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

@@ -80,6 +80,35 @@ def test_what_passes_ends_with_0(app: typer.Typer) -> None:
     assert (code, said.splitlines()[0]) == (0, "report  campaigns/mine-001/report.html")
 
 
+DISTURBED = """
+[[disturb]]
+fault = "sonar-stuck {sonar} 0.3"
+at_s = 0.5
+"""
+
+
+@pytest.mark.parametrize(
+    ("sonar", "says"), [("", "'{sonar}' is no number"), ("{ from = 1, to = 9 }", "'9' is no number")]
+)
+def test_a_fault_that_cannot_be_is_refused_before_anything_runs(app: typer.Typer, sonar: str, says: str) -> None:
+    text = FILE.replace("GOAL", "no_collision").replace('mode = "direct"', 'body = "kinematic"') + DISTURBED
+    Path("mine.toml").write_text(f"{text}sonar = {sonar}\n" if sonar else text)
+    with pytest.raises(P2osError, match=rf"^mine.toml:\d+: \[\[disturb\]\] 1: .*{says}"):
+        run(app, "mine.toml")
+    Path("mine.toml").write_text(f"{text}sonar = {{ from = 1, to = 8 }}\n")
+    assert load_campaign(Path("mine.toml")).disturbances
+
+
+def test_points_without_any_verdict_end_with_1_and_each_reason_is_told_once(app: typer.Typer) -> None:
+    path = written("no_collision")
+    path.write_text(path.read_text().replace("[cheap]", "[limits]\nmemory_mb = 64\n[cheap]"))
+    code, said = run(app, "mine.toml", "-j", "1")
+    assert code == 1
+    assert said.count("its process ended") == 1
+    assert said.splitlines()[0].startswith("error  points 1, 2: ")
+    assert said.splitlines()[-1].startswith("2 error of 2 points")
+
+
 @pytest.mark.parametrize(
     ("words", "says"),
     [

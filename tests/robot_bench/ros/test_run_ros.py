@@ -25,7 +25,7 @@ def app() -> typer.Typer:
         (["--ros", "--coverage"], "--ros cannot stand beside --coverage"),
         (["--ros", "--inputs", "x"], "--ros cannot stand beside --inputs"),
         (["--ros", "--seeds", "0-1"], "--ros cannot stand beside a sweep"),
-        (["--inputs", "nothing"], "no trace that can be read"),
+        (["--inputs", "nothing"], "cannot read nothing: no such file or directory"),
         (["--inputs", "x", "--gdb", "0"], "--inputs cannot stand beside --gdb"),
     ],
 )

@@ -169,6 +169,24 @@ def test_a_wrong_word_is_refused_and_the_bench_goes_on(
     one.run_until("0.2 s")
 
 
+@pytest.mark.parametrize("seed", ["x", -1, 1.5, True, 2**63])
+def test_a_seed_is_what_a_scenario_takes(seed: Any) -> None:
+    with pytest.raises(UsageError, match="is no seed") as caught:
+        Bench.from_scenario("motors", seed=seed)
+    assert caught.value.hint == f"a whole number from 0 to {2**63 - 1}"
+
+
+def test_who_waits_at_the_end_of_the_run_is_told_that_it_is_over() -> None:
+    one = made()
+    one.run_until("2.9 s")
+    with pytest.raises(ExpectationError, match=r"to 2\.999 s") as caught:
+        one.expect("contact", within="99 ms")
+    assert caught.value.hint is None
+    with pytest.raises(ExpectationError) as caught:
+        one.expect("contact", within="1 s")
+    assert caught.value.hint == "the run is over at 3 s: duration_s makes it longer"
+
+
 def test_mode_a_has_no_link_to_drop() -> None:
     with pytest.raises(ScenarioError, match="mode direct has none"):
         made("direct").drop_link()

@@ -186,7 +186,7 @@ def test_a_second_tcp_client_is_refused_aloud(make_robot: Callable[..., Any]) ->
     with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S) as second:
         second.sendall(bytes(100))  # to close while these wait would reset the connection: the words would be lost
         heard = b"".join(iter(lambda: second.recv(100), b""))
-    assert re.fullmatch(rb"busy: 127\.0\.0\.1:\d+ is connected for \d+ s\r\n", heard)
+    assert re.fullmatch(rb"busy: 127\.0\.0\.1:\d+ has been connected for \d+ s\r\n", heard)
     served.wait_for("client refused")
     first.receive(lambda frame: frame.kind in SIP_KINDS)
     first.close()
@@ -197,7 +197,7 @@ def test_our_own_client_reports_why_it_was_refused(make_robot: Callable[..., Any
     served = Served(make_robot(), "tcp:127.0.0.1:0")
     first = Caller(served.url)
     first.open()
-    with pytest.raises(HungUpError, match=r"closed the connection: busy: 127\.0\.0\.1:\d+ is connected for 0 s"):
+    with pytest.raises(HungUpError, match=r"closed the connection: busy: 127\.0\.0\.1:\d+ has been connected for 0 s"):
         Caller(served.url).receive(lambda _frame: False)
     first.close()
     served.close()
