@@ -186,6 +186,18 @@ _OPTION_TYPES: Mapping[str, tuple[tuple[type, ...], str]] = {
 }  # fmt: skip
 
 
+def _check_types(options: ScenarioOptions) -> None:
+    """Raise UsageError where there is no such option, or a value is of another type."""
+    for name, value in options.items():
+        if name not in ScenarioOptions.__annotations__:
+            raise UsageError(f"there is no option {shown(name)}", hint=nearest(name, ScenarioOptions.__annotations__))
+        if value is None or name not in _OPTION_TYPES:
+            continue
+        types, what = _OPTION_TYPES[name]
+        if not isinstance(value, types) or isinstance(value, bool):
+            raise UsageError(f"{name} = {shown(value)} is no {what}")
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RobotPlace:
     """One of several robots of a scenario."""
@@ -281,15 +293,7 @@ class Scenario:
         Raises:
             UsageError: There is no such option, or a value cannot be.
         """
-        for name in options:
-            if name not in ScenarioOptions.__annotations__:
-                raise UsageError(
-                    f"there is no option {shown(name)}", hint=nearest(name, ScenarioOptions.__annotations__)
-                )
-        for name, (types, what) in _OPTION_TYPES.items():
-            value = options.get(name)
-            if value is not None and (not isinstance(value, types) or isinstance(value, bool)):
-                raise UsageError(f"{name} = {shown(value)} is no {what}")
+        _check_types(options)
         mode = options.get("mode")
         if mode is not None and mode not in MODES:
             raise UsageError(f"there is no mode {mode!r}", hint=" or ".join(f"--mode {word}" for word in MODES))
@@ -301,7 +305,7 @@ class Scenario:
         seed, usart_baud = options.get("seed"), options.get("usart_baud")
         if duration_s is not None and not 0 < duration_s < math.inf:
             raise UsageError(f"a run of {duration_s:g} s cannot be", hint="--duration takes more than 0, such as 10s")
-        if seed is not None and (type(seed) is not int or not 0 <= seed <= LARGEST_SEED):
+        if seed is not None and not 0 <= seed <= LARGEST_SEED:
             raise UsageError(f"{shown(seed)} is no seed", hint=f"a whole number from 0 to {LARGEST_SEED}")
         firmware = Path(options.get("firmware") or self.firmware)
         if options.get("firmware") and not firmware.is_file():
@@ -318,8 +322,8 @@ class Scenario:
             mode=options.get("mode") or moved.mode,
             adapter_core=core or moved.adapter_core,
             body=body or moved.body,
-            usart_baud=moved.usart_baud if usart_baud is None else usart_baud,
-            seed=moved.seed if seed is None else seed,
+            usart_baud=moved.usart_baud if usart_baud is None else int(usart_baud),
+            seed=moved.seed if seed is None else int(seed),
             duration_ns=moved.duration_ns if duration_s is None else round(duration_s * NS_PER_S),
         )
 

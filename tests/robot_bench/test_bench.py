@@ -269,6 +269,7 @@ def test_what_is_no_scenario_makes_no_bench(wrong: Any) -> None:
         ({"world": 3}, "world = 3 is no text or path"),
         ({"seed": "7"}, "seed = '7' is no whole number"),
         ({"seed": True}, "seed = True is no whole number"),
+        ({"seed": 1.5}, "seed = 1.5 is no whole number"),
         ({"duration_s": "2s"}, "duration_s = '2s' is no number"),
         ({"usart_baud": 9600.5}, "usart_baud = 9600.5 is no whole number"),
     ],
