@@ -61,7 +61,7 @@ type: setup
 # One run for all; how lines are counted says tests/tools/counted_lines.py.
 unit: setup
 	rm -rf .coverage
-	$(BIN)/pytest -n $(JOBS) --dist worksteal -m 'not soak and not hardware' --count-lines .coverage
+	$(BIN)/pytest -n $(JOBS) -m 'not soak and not hardware' --count-lines .coverage
 	$(BIN)/python -m tools.check_coverage .coverage
 
 bench: setup
