@@ -32,6 +32,27 @@ def pytest_addoption(parser: pytest.Parser, pluginmanager: pytest.PytestPluginMa
         pluginmanager.register(LineCounter(config.rootpath, config.rootpath / given.count_lines, is_worker=is_worker))
 
 
+@pytest.hookimpl(tryfirst=True)  # xdist looks at what is set here
+def pytest_cmdline_main(config: pytest.Config) -> None:
+    """Use all cores for a run of folders that says nothing of workers, each of which takes over tests of slower ones.
+
+    Not within another run, nor where somebody looks at single tests. One worker more than cores, for tests wait; slow
+    tests come first, and in rows one worker would get most of them.
+    """
+    option = config.option
+    if "PYTEST_XDIST_WORKER" in os.environ or not config.pluginmanager.has_plugin("xdist"):
+        return
+    is_looked_at = option.usepdb or option.collectonly or option.capture == "no"
+    if option.numprocesses is None and not is_looked_at and not _names_files(config):
+        option.numprocesses = len(os.sched_getaffinity(0)) + 1
+    if option.numprocesses and option.dist == "no":
+        option.dist = "worksteal"
+
+
+def _names_files(config: pytest.Config) -> bool:
+    return all(argument.partition("::")[0].endswith(".py") for argument in config.args)
+
+
 @pytest.hookimpl(tryfirst=True)  # Hypothesis loads the profile that a command line names
 def pytest_configure(config: pytest.Config) -> None:
     """Leave long tests out of folders, keep compiled modules beside the sources, and bound no example's time.
@@ -47,8 +68,7 @@ def pytest_configure(config: pytest.Config) -> None:
     Examples are the same in each run, so that a commit that passes does so again; `make soak` draws others.
     """
     if not config.option.markexpr:
-        named = [argument.partition("::")[0] for argument in config.args]
-        config.option.markexpr = OF_FILES if all(name.endswith(".py") for name in named) else OF_FOLDERS
+        config.option.markexpr = OF_FILES if _names_files(config) else OF_FOLDERS
     gc.disable()  # until all is collected: what imports make stays, and looking through it again and again takes long
     if sys.dont_write_bytecode:
         sys.dont_write_bytecode = False

@@ -26,9 +26,15 @@ from simbase.part import which
 def test_way(first):
     assert which(first) == 2 - first
 """
+LEFT = """
+import os, pytest
+def left(name):
+    with open(f"{name}.ran", "x") as file:
+        file.write(str("PYTEST_XDIST_WORKER" in os.environ))
+"""
 
 
-@pytest.mark.parametrize("workers", [[], ["-n", "2"]], ids=["one process", "two workers"])
+@pytest.mark.parametrize("workers", [["-n", "0"], ["-n", "2"]], ids=["one process", "two workers"])
 @pytest.mark.parametrize(("ways", "missed"), [("[0, 1]", ([], [])), ("[0, 0]", ([4], [(3, 4)]))], ids=["both", "one"])
 def test_lines_and_branches_that_no_test_of_any_worker_reaches_are_counted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, workers: list[str], ways: str,
@@ -63,33 +69,38 @@ def test_children_keep_the_modules_that_they_compile(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "ran"),
+    ("options", "ran", "in_workers"),
     [
-        (["tests"], ["quick"]),
-        ([], ["quick"]),
-        (["tests", "tests/test_all.py"], ["quick"]),
-        (["tests/test_all.py"], ["quick", "slow"]),
-        (["tests/test_all.py::test_slow"], ["slow"]),
-        (["tests", "-m", "slow"], ["slow"]),
-        (["tests", "-m", "not soak and not hardware"], ["quick", "slow"]),
-        (["tests/test_all.py", "-m", "soak or hardware"], ["soak", "hardware"]),
-        (["tests", "-n", "1"], ["quick"]),
+        (["tests"], ["quick"], True),
+        ([], ["quick"], True),
+        (["tests", "tests/test_all.py"], ["quick"], True),
+        (["tests", "-n", "0"], ["quick"], False),
+        (["tests", "-s"], ["quick"], False),
+        (["tests", "--pdb"], ["quick"], False),
+        (["tests/test_all.py"], ["quick", "slow"], False),
+        (["tests/test_all.py::test_slow"], ["slow"], False),
+        (["tests/test_all.py", "-n", "1"], ["quick", "slow"], True),
+        (["tests", "-m", "slow", "-n", "0"], ["slow"], False),
+        (["tests", "-m", "not soak and not hardware", "-n", "0"], ["quick", "slow"], False),
+        (["tests/test_all.py", "-m", "soak or hardware"], ["soak", "hardware"], False),
     ],
-    ids=" ".join,
 )
-def test_long_tests_are_left_out_unless_they_are_asked_for(tmp_path: Path, options: list[str], ran: list[str]) -> None:
+def test_a_run_of_folders_leaves_out_long_tests_and_uses_all_cores(
+    tmp_path: Path, options: list[str], ran: list[str], in_workers: bool
+) -> None:
     for name in ("tests/conftest.py", "pyproject.toml"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_bytes((ROOT / name).read_bytes())
     names = ("quick", "slow", "soak", "hardware")
     marks = ("", *(f"@pytest.mark.{name}" for name in names[1:]))
-    tests = (f"{mark}\ndef test_{name}(): open('{name}.ran', 'x')\n" for name, mark in zip(names, marks, strict=True))
-    (tmp_path / "tests" / "test_all.py").write_text("import pytest\n" + "".join(tests))
+    tests = (f"{mark}\ndef test_{name}(): left('{name}')\n" for name, mark in zip(names, marks, strict=True))
+    (tmp_path / "tests" / "test_all.py").write_text(LEFT + "".join(tests))
     environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST")}
     line = [forked_python(), "-c", PYTEST, "-p", "no:cacheprovider", *options]
     done = subprocess.run(line, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False, timeout=120)
     assert done.returncode == 0, done.stdout + done.stderr
-    assert [name for name in names if (tmp_path / f"{name}.ran").exists()] == ran
+    found = {name: path.read_text() for name in names if (path := tmp_path / f"{name}.ran").exists()}
+    assert found == {name: str(in_workers) for name in ran}
 
 
 def test_the_profile_alone_says_that_no_example_has_a_bound_in_time() -> None:

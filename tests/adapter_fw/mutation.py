@@ -236,7 +236,7 @@ def live(module: str | None, file: str | None, library: str | None) -> int:
     signal.alarm(0)
     if module is None:
         return 0
-    return pytest.main(["-q", "-x", "-m", "not slow and not soak", "-p", "no:cacheprovider", OWN_TESTS])
+    return pytest.main(["-q", "-x", "-n", "0", "-m", "not slow and not soak", "-p", "no:cacheprovider", OWN_TESTS])
 
 
 def _replace_module(name: str, file: str) -> None:
