@@ -463,14 +463,20 @@ def resolve_world(
     """
     if world in known_worlds():
         return world
-    if Path(world).suffix.lower() in world_suffixes():
-        path = folder / world
-        if is_file(path):
-            return str(path)
+    path = _world_file(world, folder)
+    if path is None:
+        raise error(f"{where}: there is no world {shown(world)}", hint=nearest(world, known_worlds()))
+    if not is_file(path):
         raise error(
             f"{where}: there is no world file {shown_name(path)}", hint=f"worlds that ship: {', '.join(known_worlds())}"
         )
-    raise error(f"{where}: there is no world {shown(world)}", hint=nearest(world, known_worlds()))
+    return str(path)
+
+
+def _world_file(world: str, folder: Path) -> Path | None:
+    """Return the file that a world names, there or not; None where it is a word."""
+    is_word = world in known_worlds() or Path(world).suffix.lower() not in world_suffixes()
+    return None if is_word else folder / world
 
 
 def refuse_what_its_world_refuses(scenario: Scenario, world: World) -> None:
@@ -539,7 +545,7 @@ def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | N
         faults=load_faults(cast("list[Table]", table.get("fault", [])), parameters, where),
         whens=load_whens(cast("list[Table]", table.get("when", [])), parameters, where, wires),
         goals=tuple(goals),
-        in_world={_world_beside(world, path.parent): (world, part) for world, part in in_world.items()},
+        in_world={str(_world_file(world, path.parent) or world): (world, part) for world, part in in_world.items()},
         where=where,
     )
     _refuse_unrecorded(scenario, table, where)
@@ -673,13 +679,6 @@ def _own_robot(robot: str, table: Table, path: Path, where: Place) -> OwnRobot |
     if table.get("mode") == "adapter":
         raise ScenarioError(f"{where.at('mode')}: the robot {shown(robot)} hangs on the chip's own pins")
     return load_own_robot(file, cast("Table", table.get("pins", {})), where)
-
-
-def _world_beside(world: str, folder: Path) -> str:
-    """Return what `resolve_world` does of a world that is there."""
-    return (
-        world if world in known_worlds() or Path(world).suffix.lower() not in world_suffixes() else str(folder / world)
-    )
 
 
 def _apply_in_world(scenario: Scenario) -> Scenario:
