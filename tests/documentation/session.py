@@ -73,6 +73,7 @@ class Endless:
     hold_s: float = 0.7  # how long one that serves nobody is left to work
     may_end: bool = False  # once its client has left
     ready: str = ""  # what it prints once it can be used; empty: anything
+    busy: str = ""  # what it ends with where the machine kept it from real time: it is typed again, twice at most
 
     def fits(self, words: list[str]) -> bool:
         """Whether the words are this verb with these options."""
@@ -88,7 +89,7 @@ ENDLESS = (
     Endless(verb="run", given="--gdb", serves=True),
     Endless(verb="p2os-adapter", serves=True),
     Endless(verb="plan_view", serves=True, ready="listening"),
-    Endless(verb="run", given="--port", keys=b"y\n", hold_s=4.0),
+    Endless(verb="run", given="--port", keys=b"y\n", hold_s=4.0, busy="the loop lagged"),
     Endless(verb="record", unless="--for"),
     Endless(verb="monitor", unless="--for", keys=b""),
     Endless(verb="teleop", keys=b"w"),
@@ -132,6 +133,13 @@ class Terminal:
         while self.process.poll() is None and not (self.output and self.kind.ready in self.text):
             assert time.monotonic() < deadline, f"{self.line}: not ready after {READY_S} s\n{self.text}"
             time.sleep(0.01)
+
+    def was_held_up(self) -> bool:
+        """Whether it has ended, and says that the machine was too busy."""
+        if not self.kind.busy or self.process.poll() is None:
+            return False
+        self._reader.join()
+        return self.kind.busy in self.text
 
     def end(self) -> None:
         """Press Ctrl-C where it still runs, and look at what it said and how it ended."""
@@ -283,12 +291,17 @@ class Session:
             self._finish(["bash", "-c", f"{command}\ncode=$?; pwd > {marker}; exit $code"], line, shown)
             self._cwd = Path(marker.read_text().strip())
             return
-        terminal = self._open(command, line, shown, kind, serving)
-        self._terminals.append(terminal)
-        terminal.wait_until_ready()
-        if not kind.serves:
+        for is_last in (False, False, True):
+            terminal = self._open(command, line, shown, kind, serving)
+            self._terminals.append(terminal)
+            terminal.wait_until_ready()
+            if kind.serves:
+                return
             time.sleep(kind.hold_s)
-            self._close(terminal)
+            if is_last or not terminal.was_held_up():
+                break
+            self._terminals.remove(terminal)
+        self._close(terminal)
 
     def _close(self, terminal: Terminal) -> None:
         terminal.end()
