@@ -4,11 +4,13 @@ Theory of operation. While it is awake it takes a sample each period of the samp
 through a low pass for each axis, and into the registers, the FIFO and the data-ready interrupt. A read begins with a
 copy of the fourteen bytes, so that a burst is of one sample. The robot's x, y and z are the chip's.
 
-Modelled: 19 to 1C, 23, 37, 38, 3A, 3B to 48, 68, 6A to 6C, 72 to 75; the FIFO of 1024 bytes; INT with its level,
-latch and clearing; standby of single axes; sleep, from which it starts; DEVICE_RESET. *Chosen*: the low pass is of
-the first order at the bandwidth of DLPF_CFG; the accelerometer repeats itself where the rate is above 1 kHz; 25 °C.
-Not modelled: noise, bias, the auxiliary bus, DMP, motion detection, self-test, cycle mode, the time to start (30 ms).
-Source: InvenSense RM-MPU-6000A rev. 4.2 (registers), PS-MPU-6000A rev. 3.4 (6.1, 6.2: scales).
+Modelled: 06 to 0C, 19 to 1C, 23, 37, 38, 3A, 3B to 48, 68, 6A to 6C, 72 to 75; the FIFO of 1024 bytes; INT with its
+level, latch and clearing; standby of single axes; sleep, from which it starts; DEVICE_RESET. *Chosen*: the low pass is
+of the first order at the bandwidth of DLPF_CFG; the accelerometer repeats itself where the rate is above 1 kHz; 25 °C;
+the factory's offsets. Not modelled: noise, bias and what offsets do about it (they are kept), the auxiliary bus, DMP,
+motion detection, self-test, cycle mode, the time to start (30 ms).
+Source: InvenSense RM-MPU-6000A rev. 4.2 (registers), PS-MPU-6000A rev. 3.4 (6.1, 6.2: scales); 06 to 0C are in neither
+and as two drivers read them, `mpu_init` of InvenSense's Motion Driver and `mpu6050Detect` of baseflight.
 Invariant: sample n is taken n periods after the last change of the rate, whenever somebody looks.
 
 """
@@ -22,16 +24,23 @@ from bluepill_sim.parts.attached import Socket, Use
 from simbase.state import Stateful
 from simbase.timing import NS_PER_S, Nanos
 
+XA_OFFS_H, ZA_OFFS_L, PRODUCT_ID, XG_OFFS_USRH, ZG_OFFS_USRL = 0x06, 0x0B, 0x0C, 0x13, 0x18
 SMPLRT_DIV, CONFIG, GYRO_CONFIG, ACCEL_CONFIG, FIFO_EN = 0x19, 0x1A, 0x1B, 0x1C, 0x23
 INT_PIN_CFG, INT_ENABLE, INT_STATUS, ACCEL_XOUT, GYRO_ZOUT_L = 0x37, 0x38, 0x3A, 0x3B, 0x48
 SIGNAL_PATH_RESET, USER_CTRL, PWR_MGMT_1, PWR_MGMT_2, FIFO_COUNTH, FIFO_COUNTL, FIFO_R_W, WHO_AM_I = (
     0x68, 0x6A, 0x6B, 0x6C, 0x72, 0x73, 0x74, 0x75,
 )  # fmt: skip
+#: Offsets of both sensors: kept as written, and counted as ignored, for they do not move what it measures.
+_OFFSETS = frozenset({*range(XA_OFFS_H, ZA_OFFS_L + 1), *range(XG_OFFS_USRH, ZG_OFFS_USRL + 1)})
 #: The registers that a write changes, and which of their bits.
 WRITABLE = {
+    **dict.fromkeys(_OFFSETS, 0xFF),
     SMPLRT_DIV: 0xFF, CONFIG: 0x3F, GYRO_CONFIG: 0xF8, ACCEL_CONFIG: 0xF8, FIFO_EN: 0xFF, INT_PIN_CFG: 0xFE,
     INT_ENABLE: 0x19, USER_CTRL: 0x70, PWR_MGMT_1: 0x6F, PWR_MGMT_2: 0xFF,
 }  # fmt: skip
+#: What the factory wrote: the accelerometer's offsets, whose lowest bits are the part's revision (Z, Y, X: 2, full
+#: sensitivity), and the product of silicon B1, which drivers read where the revision is 0.
+FACTORY = {XA_OFFS_H: bytes.fromhex("fb82 0251 0698"), PRODUCT_ID: b"\x01", WHO_AM_I: b"\x68"}
 #: Those that it has and that do nothing here: slaves of the auxiliary bus, motion detection, self-test.
 _KNOWN = frozenset({0x0D, 0x0E, 0x0F, 0x10, 0x1F, *range(0x24, 0x37), *range(0x49, 0x68), 0x69})
 #: LSB a g and a degree a second, by FS_SEL (PS 6.1, 6.2).
@@ -83,7 +92,9 @@ class Mpu6050(Stateful):
 
     def _reset(self, at_ns: Nanos) -> None:
         self._registers = bytearray(128)
-        self._registers[PWR_MGMT_1], self._registers[WHO_AM_I] = _SLEEP, 0x68
+        for first, values in FACTORY.items():
+            self._registers[first : first + len(values)] = values
+        self._registers[PWR_MGMT_1] = _SLEEP
         self._sample = self._shadow = bytes(_SAMPLE.size)
         self._fifo = bytearray()
         #: Of the low pass: forces in g, rates in degrees a second; None before the first sample.
@@ -234,6 +245,7 @@ class Mpu6050(Stateful):
         elif number not in WRITABLE:
             self.ignored += number not in _KNOWN or byte != 0
             return
+        self.ignored += number in _OFFSETS
         if number in WRITABLE:
             before = registers[number]
             registers[number] = byte & WRITABLE[number]

@@ -1,16 +1,16 @@
 """A serial flash of the 25 series: a W25Q16JV, as far as single SPI reaches.
 
 A command begins with a select and ends with the deselect; programming and erasing begin then, and go on while BUSY is
-1,
-when only the status can be read. Programming clears bits, within one page of 256 bytes, where it wraps; an erase sets
-all of them. Both need a Write Enable before each.
+1, when only the status can be read. Programming clears bits, within one page of 256 bytes, where it wraps; an erase
+sets all of them. Both need a Write Enable before each.
 
-Modelled: 9F, 90, AB (ids), 03, 0B (read), 02 (page program), 20, 52, D8, C7, 60 (erases), 05, 35, 15 (status), 06, 04,
-B9.
-Not modelled: writes of the status registers and with them the protection of blocks, dual and quad transfers, suspend,
-SFDP,
-resets (66, 99): they are counted in `ignored`. Chosen: a cell changes at once when programming or erasing begins.
-Source: Winbond W25Q16JV, data sheet, sections 8 (instructions) and 9.6 (times, the typical ones).
+Modelled: 9F, 90, AB, 4B, 5A (ids), 03, 0B (read), 02 (page program), 20, 52, D8, C7, 60 (erases), 05, 35, 15 (status),
+06, 04, B9. Not modelled: writes of the status registers and with them the protection of blocks, dual and quad
+transfers, suspend, resets (66, 99): they are counted in `ignored`. Chosen: a cell changes at once when programming or
+erasing begins; the unique id.
+Source: Winbond W25Q16JV, data sheet, sections 7.1 (status), 8 (instructions) and 9.6 (times, the typical ones); JESD216
+for the parameters of 5A, with the words of its series as armink/SFUD (issue 84, W25Q32JV) and Linux's spi-nor list
+(W25Q64JV) print them.
 Invariant: nothing but the status can be read before what was begun has ended.
 """
 
@@ -20,6 +20,14 @@ from simbase.timing import NS_PER_MS, Nanos
 PAGE_BYTES, SECTOR_BYTES, SIZE_BYTES = 256, 4096, 2 * 1024 * 1024
 #: Manufacturer, memory type and capacity; the id of 90 and AB (section 8.1.1).
 JEDEC_ID, DEVICE_ID = bytes((0xEF, 0x40, 0x15)), 0x14
+#: chosen: eight bytes, another number on each part.
+UNIQUE_ID = bytes.fromhex("d1629c7803330a55")
+#: The header, one table of sixteen words (rev. 1.5) at 0x80, and nothing between: 16 Mbit, 256 bytes to a page, 4, 32
+#: and 64 KiB to erase with 20, 52, D8; the whole in 5 s.
+SFDP = bytes.fromhex("53464450 050100ff 00050110 800000ff").ljust(0x80, b"\xff") + bytes.fromhex(
+    "e520f9ff ffffff00 44eb086b 083b42bb feffffff ffff0000 ffff40eb 0c200f52"
+    "10d80000 3602a600 82ea14b3 e9637633 7a757a75 f7bdd55c 19f75dff e930f880"
+).ljust(0x80, b"\xff")
 #: Of the first status register.
 BUSY, WEL = 1, 2
 #: How long a page program takes, and what each erase erases and how long: bytes, ns (typical; section 9.6).
@@ -31,11 +39,22 @@ ERASES: dict[int, tuple[int, Nanos]] = {
     0xC7: (SIZE_BYTES, 5000 * NS_PER_MS),
     0x60: (SIZE_BYTES, 5000 * NS_PER_MS),
 }
-_READ, _FAST_READ, _PROGRAM, _MANUFACTURER, _JEDEC = 0x03, 0x0B, 0x02, 0x90, 0x9F
+_READ, _FAST_READ, _PROGRAM, _MANUFACTURER, _JEDEC, _UNIQUE, _PARAMETERS = 0x03, 0x0B, 0x02, 0x90, 0x9F, 0x4B, 0x5A
 _STATUS = (0x05, 0x35, 0x15)
 _WRITE_ENABLE, _WRITE_DISABLE, _POWER_DOWN, _RELEASE = 0x06, 0x04, 0xB9, 0xAB
+#: What commands read that nothing changes. Of the status registers as they leave the factory: QE, which an IQ cannot
+#: clear, and outputs of a quarter's strength.
+_FIXED = {
+    _MANUFACTURER: bytes((JEDEC_ID[0], DEVICE_ID)), _RELEASE: bytes((DEVICE_ID,)), _JEDEC: JEDEC_ID,
+    _UNIQUE: UNIQUE_ID, _PARAMETERS: SFDP, _STATUS[1]: b"\x02", _STATUS[2]: b"\x60",
+}  # fmt: skip
+#: The commands whose address says where reading begins.
+_FROM_ADDRESS = frozenset({_READ, _FAST_READ, _MANUFACTURER, _PARAMETERS})
 #: Bytes of a command before the first that is read, where it reads: command, address, dummies.
-_HEAD_BYTES = {_READ: 4, _FAST_READ: 5, _MANUFACTURER: 4, _RELEASE: 4, _JEDEC: 1, **dict.fromkeys(_STATUS, 1)}
+_HEAD_BYTES = {
+    _READ: 4, _FAST_READ: 5, _MANUFACTURER: 4, _RELEASE: 4, _JEDEC: 1, _UNIQUE: 5, _PARAMETERS: 5,
+    **dict.fromkeys(_STATUS, 1),
+}  # fmt: skip
 _ADDRESSED_BYTES = 4
 
 
@@ -142,18 +161,11 @@ class SpiFlash(Stateful):
 
     def _read(self, command: int, number: int, at_ns: Nanos) -> int:
         """Return byte `number` of what a command reads."""
-        if command in {_READ, _FAST_READ}:
-            return self.memory[(self._address + number) % SIZE_BYTES]
-        if command == _JEDEC:
-            return JEDEC_ID[number % 3]
-        if command == _MANUFACTURER:
-            return (JEDEC_ID[0], DEVICE_ID)[(self._address + number) % 2]
-        if command == _RELEASE:
-            return DEVICE_ID
-        if command != _STATUS[0]:
-            return 0
-        is_busy = at_ns < self._busy_until_ns
-        return (BUSY if is_busy else 0) | (WEL if is_busy or self._is_enabled else 0)
+        if command == _STATUS[0]:
+            is_busy = at_ns < self._busy_until_ns
+            return (BUSY if is_busy else 0) | (WEL if is_busy or self._is_enabled else 0)
+        contents = _FIXED.get(command, self.memory)
+        return contents[((self._address if command in _FROM_ADDRESS else 0) + number) % len(contents)]
 
     def _end(self, command: int, at_ns: Nanos) -> None:
         if command in {_WRITE_ENABLE, _WRITE_DISABLE}:

@@ -6,8 +6,9 @@ mode says. The picture is what the glass shows: the memory through start line, o
 directions.
 
 Modelled: all three addressing modes, 20 to 22, 00 to 1F, B0 to B7, 40 to 7F, A0 and A1 (for data from then on), A4 to
-A7, A8, AE, AF, C0, C8, D3, the arguments of all others; the status that I2C reads; `res`. *Chosen*: the glass is
-mounted so that A1 and C8 show column 0 and row 0 at the upper left, as modules are.
+A7, A8, AE, AF, C0, C8, D3, the arguments of all others; the status that I2C reads, whose lower half the data sheet
+reserves and drivers tell controllers by; `res`. *Chosen*: the glass is mounted so that A1 and C8 show column 0 and row
+0 at the upper left, as modules are.
 Not modelled: scrolling (26 to 2F: counted in `ignored`), DA's order of the rows, brightness, the charge pump: it
 shines with AF alone.
 Source: Solomon Systech SSD1306, data sheet rev. 1.1, sections 8.1 (interfaces), 9 (commands), 10 (descriptions).
@@ -38,6 +39,8 @@ _LEAST_ROWS = 16
 _CO, _DC = 0x80, 0x40
 #: Of the status byte: the display is off.
 _OFF = 0x40
+#: Its lower half by the rows of the glass, as OneBitDisplay and Meshtastic know it; 0 and 8 are an SH1106 to them.
+_ID = {64: 6, 32: 3}
 
 
 class Ssd1306(Stateful):
@@ -122,7 +125,7 @@ class Ssd1306(Stateful):
 
     def read(self, at_ns: Nanos) -> int:
         """Return the status."""
-        return 0 if self.is_on else _OFF
+        return _ID[self._height] | (0 if self.is_on else _OFF)
 
     def stop(self, at_ns: Nanos) -> None:
         """End what a control byte began."""
