@@ -38,9 +38,9 @@ endef
 $(STAMP): pyproject.toml setup.py constraints.txt $(COMPILED) | $(BIN)/python
 	$(call install,all$(comma)dev)
 
-# The demo needs little of it; what else a verb wants, it says.
+# The demo needs little of it, and a project that `p2os new` writes after it needs pytest; what else a verb wants, it says.
 $(DEMO_STAMP): pyproject.toml setup.py constraints.txt $(COMPILED) | $(BIN)/python
-	$(call install,sim$(comma)bullet)
+	$(call install,sim$(comma)bullet$(comma)test)
 
 demo: $(if $(wildcard $(STAMP)),$(STAMP),$(DEMO_STAMP))
 	@$(BIN)/p2os demo; status=$$?; \

@@ -23,7 +23,7 @@ Examples:
 """
 
 
-def parts(name: str | None = typer.Argument(None, help="One of them; all without it.", metavar="[PART]")) -> None:
+def parts(name: str | None = typer.Argument(None, help="One of them; all without it.", metavar="PART")) -> None:
     """List parts."""
     if name is None:
         for kind, row in PARTS.items():

@@ -1,14 +1,31 @@
-"""The Wireshark dissector that ships with the package, and where Wireshark looks for it."""
+"""The Wireshark dissector that ships with the package, and where Wireshark looks for it.
+
+How frames are read stands in `p2os.lua`; what commands and packets are called comes from the protocol's own tables.
+"""
 
 import os
-import shutil
 import sys
-from importlib.resources import as_file, files
+from collections.abc import Iterable
+from importlib.resources import files
 from pathlib import Path
 
+from p2os.protocol.commands import CommandNumber
+from p2os.protocol.packets import PACKET_NAMES
 from simbase.files import writing
 
 NAME = "p2os.lua"
+
+
+def script() -> str:
+    """Return the dissector, in Lua."""
+    text = (files("p2os.capture") / NAME).read_text(encoding="utf-8")
+    names = {
+        "commands": ((int(number), number.name) for number in CommandNumber),
+        "packets": PACKET_NAMES.items(),
+    }
+    for table, rows in names.items():
+        text = text.replace(f"local {table} = {{}}", f"local {table} = {{{_lua_rows(rows)}\n}}", 1)
+    return text
 
 
 def plugin_folder(home: Path | None = None) -> Path:
@@ -19,7 +36,7 @@ def plugin_folder(home: Path | None = None) -> Path:
 
 
 def install(home: Path | None = None) -> Path:
-    """Copy the dissector to where Wireshark finds it, and return its path.
+    """Write the dissector to where Wireshark finds it, and return its path.
 
     Raises:
         FileError: The folder cannot be written.
@@ -27,6 +44,9 @@ def install(home: Path | None = None) -> Path:
     target = plugin_folder(home) / NAME
     with writing(target):
         target.parent.mkdir(parents=True, exist_ok=True)
-        with as_file(files("p2os.capture") / NAME) as source:
-            shutil.copyfile(source, target)
+        target.write_text(script(), encoding="utf-8")
     return target
+
+
+def _lua_rows(rows: Iterable[tuple[int, str]]) -> str:
+    return "".join(f'\n    [{number:#04x}] = "{name}",' for number, name in rows)

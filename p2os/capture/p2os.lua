@@ -3,46 +3,12 @@
 -- Takes the captures of `p2os sniff --pcap` (link type USER0: one byte of
 -- direction, then one frame) and TCP on any port: a conversation is taken for P2OS
 -- when a segment begins like a frame. Who speaks first is the client, unless
--- it sends what only robots send. Copy this file into Wireshark's folder of personal Lua plug-ins, or
--- let `p2os sniff --install-dissector` do it. MIT licence.
+-- it sends what only robots send. `p2os sniff --install-dissector` puts it into Wireshark's folder of personal
+-- Lua plug-ins. MIT licence.
 
-local commands = {
-    [0] = "PULSE", [1] = "OPEN", [2] = "CLOSE", [3] = "POLLING", [4] = "ENABLE", [5] = "SETA", [6] = "SETV",
-    [7] = "SETO", [8] = "MOVE", [9] = "ROTATE", [10] = "SETRV", [11] = "VEL", [12] = "HEAD", [13] = "DHEAD",
-    [14] = "SETPBV", [15] = "SAY", [17] = "JOYREQUEST", [18] = "CONFIG", [19] = "ENCODER", [20] = "SETRVDIR", [21] = "RVEL",
-    [22] = "DCHEAD", [23] = "SETRA", [26] = "IMUREQUEST", [28] = "SONAR", [29] = "STOP", [30] = "DIGOUT",
-    [31] = "TIMER", [32] = "VEL2", [33] = "GRIPPER", [34] = "KICK", [35] = "ADSEL", [36] = "GRIPPERVAL",
-    [37] = "GRIPREQUEST", [38] = "GYROCALCW", [39] = "GYROCALCCW", [40] = "IOREQUEST", [41] = "PTUPOS", [42] = "TTY2", [43] = "GETAUX",
-    [44] = "BUMPSTALL", [45] = "TCM2", [46] = "DOCK", [47] = "JOYDRIVE", [48] = "SONARCYCLE", [49] = "MOVINGBLINK",
-    [50] = "HOSTBAUD", [51] = "AUX1BAUD", [52] = "AUX2BAUD", [53] = "AUX3BAUD", [55] = "E_STOP", [56] = "E_STALL",
-    [57] = "QSTOP", [58] = "GYRO", [59] = "LCD", [60] = "TTY4", [61] = "GETAUX3", [62] = "BATTERYINFO",
-    [63] = "LOADWORLD", [64] = "STEP", [65] = "CALCOMP", [66] = "TTY3", [67] = "GETAUX2", [68] = "CHARGE",
-    [69] = "RESETSIMTOORIGIN", [70] = "ARM_INFO",
-    [71] = "ARM_STATUS", [72] = "ARM_INIT", [73] = "ARM_CHECK", [74] = "ARM_POWER", [75] = "ARM_HOME",
-    [76] = "ARM_PARK", [77] = "ARM_POS", [78] = "ARM_SPEED", [79] = "ARM_STOP", [80] = "ARM_AUTOPARK",
-    [81] = "ARM_GRIPPARK", [82] = "ROTKP", [83] = "ROTKV", [84] = "ROTKI", [85] = "TRANSKP", [86] = "TRANSKV",
-    [87] = "TRANSKI", [88] = "REVCOUNT", [89] = "DRIFTFACTOR", [90] = "SOUND", [91] = "PLAYLIST", [92] = "SOUNDTOG",
-    [93] = "TICKSMM", [95] = "POWER_PC", [96] = "POWER_LRF", [97] = "POWER_5V", [98] = "POWER_12V",
-    [110] = "LATVEL", [113] = "LATACCEL", [120] = "RECENTERWHEELS", [123] = "ACCELINFO", [124] = "TORQUEINFO",
-    [125] = "POWER_AUX_PC", [126] = "POWER_TOUCHSCREEN", [127] = "POWER_PTZ", [128] = "POWER_AUDIO",
-    [129] = "POWER_LRF2", [149] = "HEADINGINFO", [150] = "ROTVEL_CLOSEDLOOP", [210] = "SRECORD",
-    [211] = "MARCDEBUG", [212] = "WHEEL_LIGHT", [213] = "ABSOLUTE_MAXES", [214] = "SAFETY_STATE_INFO",
-    [215] = "SAFETY_SET_STATE", [216] = "SAFETY_DISABLE_POWER_OFF_TIMER", [217] = "SAFETY_ZONE_ACTIVE",
-    [218] = "WHEELINFO_REQUEST", [219] = "MARC_CONFIG_SET", [220] = "MARC_CONFIG_GET", [224] = "SIM_SET_POSE",
-    [225] = "SIM_RESET", [226] = "SIM_MODEL_CONFIG", [230] = "SIM_LRF_ENABLE", [231] = "SIM_LRF_SET_FOV_START",
-    [232] = "SIM_LRF_SET_FOV_END", [233] = "SIM_LRF_SET_RES", [236] = "SIM_CTRL", [237] = "SIM_STAT",
-    [238] = "SIM_MESSAGE", [239] = "SIM_EXIT", [250] = "BATTEST", [251] = "DIGTEMPTEST", [252] = "SPOOFANALOGTEMP",
-    [253] = "RESET", [255] = "MAINTENANCE",
-}
-local packets = {
-    [0x00] = "SYNC0", [0x01] = "SYNC1", [0x02] = "IDENTITY", [0x20] = "CONFIGpac", [0x30] = "SIP", [0x31] = "SIP",
-    [0x32] = "SIP", [0x33] = "SIP", [0x34] = "SIP", [0x60] = "SIMLASER", [0x61] = "SIMLASER2", [0x62] = "SIMSTAT",
-    [0x63] = "SIMINFO", [0x66] = "SIMMAPCHANGED", [0x7B] = "ACCELpac", [0x7C] = "TORQUEpac", [0x90] = "ENCODERpac",
-    [0x95] = "HEADINGpac", [0x98] = "GYROpac", [0x9A] = "IMUpac", [0xA0] = "ARMpac", [0xA1] = "ARMINFOpac",
-    [0xB0] = "SERAUXpac", [0xB8] = "SERAUX2pac", [0xC0] = "TCM2pac", [0xC8] = "SERAUX3pac", [0xD0] = "PLAYLISTpac",
-    [0xD3] = "MARCDEBUG", [0xD5] = "MAXLIMITS", [0xDA] = "WHEELINFO", [0xE0] = "GRIPPERpac", [0xF0] = "IOpac",
-    [0xF8] = "JOYSTICKpac", [0xFA] = "BATTERYpac", [0xFE] = "RESET", [0xFF] = "RESET",
-}
+-- Names by number, from the tables of the package: `p2os sniff --install-dissector` writes them here.
+local commands = {}
+local packets = {}
 
 local p2os = Proto("p2os", "Pioneer P2OS")
 local directions = { [0] = "client to robot", [1] = "robot to client" }

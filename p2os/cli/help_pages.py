@@ -31,8 +31,8 @@ class VerbPage(TyperCommand):
         _write_text(formatter, self.epilog)
 
     def collect_usage_pieces(self, ctx: typer.Context) -> list[str]:  # type: ignore[override]  # noqa: ARG002 - typer's own
-        """Return what follows the verb: arguments by their metavariables, then options."""
-        return [*(_metavar(argument) for argument in self._arguments()), "[OPTIONS]"]
+        """Return what follows the verb: arguments by their metavariables, in brackets where they may be left out."""
+        return [*(_usage(argument) for argument in self._arguments()), "[OPTIONS]"]
 
     def format_options(self, ctx: typer.Context, formatter) -> None:  # type: ignore[no-untyped-def, override]  # noqa: ANN001 - click's or typer's own
         """Write arguments and options."""
@@ -117,6 +117,14 @@ def _write_text(formatter, text: str | None) -> None:  # type: ignore[no-untyped
         formatter.write_paragraph()
         with formatter.indentation():
             formatter.write_text(folded(inspect.cleandoc(text), formatter.width - formatter.current_indent))
+
+
+def _usage(argument) -> str:  # type: ignore[no-untyped-def]  # noqa: ANN001 - click's or typer's own class
+    words = _metavar(argument)
+    if " " in words:  # several words, which say themselves what may be left out
+        return words
+    words = words if argument.required else f"[{words}]"
+    return words if argument.nargs == 1 else f"{words}..."
 
 
 def _metavar(argument) -> str:  # type: ignore[no-untyped-def]  # noqa: ANN001 - click's or typer's own class

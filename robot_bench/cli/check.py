@@ -38,7 +38,7 @@ def register(app: typer.Typer) -> None:
 
 
 def check(
-    files: Annotated[list[str] | None, typer.Argument(help="Scenario files, or names.", metavar="[FILE]...")] = None,
+    files: Annotated[list[str] | None, typer.Argument(help="Scenario files, or names.", metavar="FILE")] = None,
     firmware: Annotated[
         Path | None, typer.Option(help="ELF, HEX or BIN in place of the scenarios'.", metavar="FILE")
     ] = None,

@@ -47,8 +47,8 @@ def register(app: typer.Typer) -> None:
 
 def explain(
     run: Annotated[Path, typer.Argument(help="A run folder, or a trace.", metavar="RUN")],
-    scenario: Annotated[str | None, typer.Argument(help="Whose goals it is judged by.", metavar="[SCENARIO]")] = None,
-    goal: Annotated[str, typer.Argument(help="A part of the failure's text.", metavar="[GOAL]")] = "",
+    scenario: Annotated[str | None, typer.Argument(help="Whose goals it is judged by.", metavar="SCENARIO")] = None,
+    goal: Annotated[str, typer.Argument(help="A part of the failure's text.", metavar="GOAL")] = "",
     firmware: Annotated[Path | None, typer.Option(help="The program that ran.", metavar="FILE")] = None,
     against: Annotated[
         Path | None, typer.Option(help="A run, or a program, that does what it should.", metavar="RUN")

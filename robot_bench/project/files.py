@@ -67,7 +67,7 @@ class Kind:
     wires: str = ""
 
 
-_CMAKE = "cmake -B build -DCMAKE_TOOLCHAIN_FILE=board/arm.cmake && cmake --build build"
+_CMAKE = "cmake -B build && cmake --build build"
 _WITHOUT_MAKE = {"`make test` runs": "`pytest` runs", "`make && p2os run patrol.toml`": "`p2os run patrol.toml`"}
 BUILDS: Mapping[str, Build] = {
     "make": Build(
@@ -78,7 +78,7 @@ BUILDS: Mapping[str, Build] = {
         commands=_CMAKE, packages="gcc-arm-none-eabi cmake make",
         readme=(
             "sudo apt-get install gcc-arm-none-eabi cmake make   # once\n"
-            "cmake -B build -DCMAKE_TOOLCHAIN_FILE=board/arm.cmake   # once\n"
+            "cmake -B build                       # once\n"
             "cmake --build build                  # builds build/robot.elf\n"
             "cmake --build build --target drive   # drives it on the bench; the last line names the report\n"
             "pytest                               # runs tests/ on the bench (pip install pytest, once)\n"

@@ -251,7 +251,8 @@ const spaced = (hex) => hex.replace(/..(?=.)/g, "$& ");
 function draw() { byId("time").value = 1000 * view.at / end; drawMap(); drawSpeeds(); drawSonar(); drawPins(); }
 byId("time").addEventListener("input", (e) => { view.at = end * e.target.value / 1000; draw(); });
 byId("play").addEventListener("click", () => {
-  view.playing = !view.playing; byId("play").textContent = view.playing ? "⏸" : "▶";
+  view.playing = !view.playing;
+  byId("play").querySelector("path").setAttribute("d", view.playing ? "M2 1h3v10H2zM7 1h3v10H7z" : "M2 1v10l9-5z"); // drawn: fonts lack the pause sign
   if (view.at >= end) view.at = 0;
   let last = performance.now();
   const tick = (now) => {

@@ -49,7 +49,7 @@ def register(app: typer.Typer) -> None:
 
 
 def decode(
-    source: Annotated[list[str], typer.Argument(help="File, folder, hex text, or - for stdin.", metavar="SOURCE...")],
+    source: Annotated[list[str], typer.Argument(help="File, folder, hex text, or - for stdin.", metavar="SOURCE")],
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object a packet.")] = False,
     explained: Annotated[bool, typer.Option("--explain", help="Show what every byte means.")] = False,
     only: Annotated[

@@ -62,9 +62,7 @@ def register(app: typer.Typer) -> None:
 
 
 def scan(
-    urls: Annotated[
-        list[str] | None, typer.Argument(help="Where to look.", metavar="[URL...]", autocompletion=urls)
-    ] = None,
+    urls: Annotated[list[str] | None, typer.Argument(help="Where to look.", metavar="URL", autocompletion=urls)] = None,
     baud: Annotated[
         list[int] | None,
         option(BAUD, "--baud", purpose="Try this speed only; may be repeated.", least="300", most="4000000"),

@@ -101,7 +101,7 @@ def ros(
         str, typer.Argument(help="Where the robot is; or the word urdf.", metavar="URL|urdf", autocompletion=urls)
     ],
     model: Annotated[
-        str | None, typer.Argument(help="With urdf: robot model, or a TOML file.", metavar="[MODEL|FILE]")
+        str | None, typer.Argument(help="With urdf: robot model, or a TOML file.", metavar="MODEL|FILE")
     ] = None,
     transport: TransportName = "dds",
     domain: Domain = DOMAIN,

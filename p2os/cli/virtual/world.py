@@ -56,7 +56,7 @@ WORLD = Annotated[
 ]
 CONVERTED = Annotated[
     str | None,
-    typer.Argument(help="A world that ships, or a file.", metavar="[WORLD|FILE]", autocompletion=worlds),
+    typer.Argument(help="A world that ships, or a file.", metavar="WORLD|FILE", autocompletion=worlds),
 ]
 FORCE = Annotated[bool, typer.Option("--force", help=FORCE_HELP)]
 WORLD_SEED = Annotated[int, option(SEED, "--seed", purpose="Of a world that is made from one.", least="0", shown="0")]

@@ -69,7 +69,7 @@ def mutate(
         list[str],
         typer.Argument(
             help="Names or TOML files with goals; tests of pytest.",
-            metavar="SCENARIO...",
+            metavar="SCENARIO",
             autocompletion=scenario_names,
         ),
     ],

@@ -72,7 +72,7 @@ def register(app: typer.Typer) -> None:
 
 def fit(
     captures: Annotated[
-        list[Path] | None, typer.Argument(help="Run folders or recordings.", metavar="[DRIVE]...")
+        list[Path] | None, typer.Argument(help="Run folders or recordings.", metavar="DRIVE")
     ] = None,
     truth: Annotated[
         list[Path] | None,

@@ -36,7 +36,7 @@ def register(app: typer.Typer) -> None:
 
 
 def metrics(
-    runs: Annotated[list[Path], typer.Argument(help="Run folders, recordings, tables.", metavar="RUN...")],
+    runs: Annotated[list[Path], typer.Argument(help="Run folders, recordings, tables.", metavar="RUN")],
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object a run.")] = False,
     picture: Annotated[
         Path | None, typer.Option("--picture", help="Draw how the latencies of one run lie, PNG.", metavar="FILE")

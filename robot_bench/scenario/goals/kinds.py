@@ -331,7 +331,7 @@ def kind_named(name: str) -> GoalKind | None:
     except Exception as error:
         raise ScenarioError(f"goal {shown(name)} cannot be loaded: {type(error).__name__}: {error}") from error
     if not isinstance(loaded, GoalKind):
-        raise ScenarioError(f"goal {shown(name)}: {others[name].value} is no GoalKind", hint="docs/bench.md")
+        raise ScenarioError(f"goal {shown(name)}: {others[name].value} is no GoalKind", hint="docs/scenarios.md, goals")
     return loaded
 
 

@@ -3,13 +3,12 @@
 import re
 import shutil
 import subprocess
-from importlib.resources import as_file, files
 from pathlib import Path
 
 import pytest
 
 from p2os.capture import Direction, capture_of, frame_chunks, read_file, write_pcap
-from p2os.capture.dissector import install
+from p2os.capture.dissector import install, script
 from p2os.cli.main import run
 from p2os.protocol.commands import CommandNumber
 from p2os.protocol.packets import PACKET_NAMES, SonarReading, StandardSip, packet_frame
@@ -27,18 +26,18 @@ needs_tshark = pytest.mark.skipif(
 def shown(capture: Path, *fields: str) -> list[list[str]]:
     """Return what tshark reads out of a capture with the dissector."""
     asked = [word for field in fields for word in ("-e", field)]
-    with as_file(files("p2os.capture") / "p2os.lua") as script:
-        done = subprocess.run(
-            [str(TSHARK), "-n", "-X", f"lua_script:{script}", "-r", str(capture), "-T", "fields", *asked],
-            capture_output=True, text=True, timeout=60, check=True,
-        )  # fmt: skip
+    lua = capture.with_suffix(".lua")
+    lua.write_text(script(), encoding="utf-8")
+    done = subprocess.run(
+        [str(TSHARK), "-n", "-X", f"lua_script:{lua}", "-r", str(capture), "-T", "fields", *asked],
+        capture_output=True, text=True, timeout=60, check=True,
+    )  # fmt: skip
     assert "Lua" not in done.stderr
     return [line.split("\t") for line in done.stdout.splitlines()]
 
 
 def lua_table(name: str) -> dict[int, str]:
-    text = (files("p2os.capture") / "p2os.lua").read_text(encoding="utf-8")
-    body = re.search(rf"local {name} = {{(.*?)\n}}", text, re.DOTALL)
+    body = re.search(rf"local {name} = {{(.*?)\n}}", script(), re.DOTALL)
     assert body is not None
     return {int(number, 0): word for number, word in re.findall(r'\[(\w+)\] = "([^"]+)"', body[1])}
 
@@ -125,7 +124,7 @@ def test_the_dissector_is_put_where_wireshark_looks(
     assert run(["sniff", "--install-dissector"]) == 0
     target = tmp_path / ".local/lib/wireshark/plugins/p2os.lua"
     assert capsys.readouterr().out == f"installed {target}\n"
-    assert target.read_bytes() == (files("p2os.capture") / "p2os.lua").read_bytes()
+    assert target.read_text(encoding="utf-8") == script()
     (tmp_path / "file").write_text("")
     with pytest.raises(FileError, match="cannot write"):
         install(tmp_path / "file")

@@ -104,6 +104,26 @@ def test_every_option_and_argument_shows_its_value_in_one_style() -> None:
             assert METAVAR.fullmatch(shown), (path, parameter.opts, shown)
 
 
+def test_the_usage_of_every_verb_puts_what_may_be_left_out_in_brackets(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
+    seen = 0
+    for path, command in commands():
+        arguments = [one for one in command.params if one.param_type_name == "argument" and " " not in one.metavar]
+        if not arguments:
+            continue
+        assert run([*path.split()[1:], "--help"]) == 0
+        usage = capsys.readouterr().out.splitlines()[0]
+        for one in arguments:
+            words = one.metavar if one.required else f"[{one.metavar}]"
+            dots = "" if one.nargs == 1 else "..."
+            assert f" {words}{dots} " in usage, (path, usage)
+            assert not set("[].") & set(one.metavar), "brackets and dots follow from the argument"
+            seen += 1
+    assert seen > 30
+
+
 def test_the_number_of_runs_at_a_time_is_one_option_of_all_verbs() -> None:
     found = {path: one for path, command in commands() for one in command.params if "--jobs" in one.opts}
     assert {"p2os run", "p2os campaign", "p2os validate"} <= set(found)

@@ -152,7 +152,7 @@ def test_make_without_the_compiler_is_one_line_with_its_package() -> None:
     done = make("CC=no-such-compiler")
     assert done.returncode == 2
     assert done.stderr == (
-        "Makefile:22: *** no-such-compiler is not installed (hint: sudo apt-get install gcc-arm-none-eabi).  Stop.\n"
+        "Makefile:23: *** no-such-compiler is not installed (hint: sudo apt-get install gcc-arm-none-eabi).  Stop.\n"
     )
 
 
@@ -208,6 +208,32 @@ def forked() -> str:
 def forked_pytest() -> str:
     """Return the words, of a shell or of make, that start pytest in a process that has it imported."""
     return f"{forked()} -c '{PYTEST}' -p no:cacheprovider"
+
+
+@needs_compiler
+def test_make_test_takes_the_pytest_beside_p2os_and_not_the_first_on_the_path(tmp_path: Path) -> None:
+    """An environment's p2os on the path, where another pytest comes first; by a link too, as pipx makes one."""
+    project.write_project(Path("mine"), project.project_files("kinematic"))
+    for folder, name, word in (("own", "p2os", ""), ("own", "pytest", "ours"), ("other", "pytest", "another's")):
+        path = tmp_path / folder / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(f"#!/bin/sh\necho {word!r}\n", encoding="utf-8")
+        path.chmod(0o755)
+    (tmp_path / "links").mkdir()
+    (tmp_path / "links" / "p2os").symlink_to(tmp_path / "own" / "p2os")
+    for first in ("other", "links"):
+        path = f"PATH={tmp_path / 'other'}:{tmp_path / ('own' if first == 'other' else first)}:{os.environ['PATH']}"
+        done = subprocess.run(
+            ["env", path, "make", "-s", "-C", "mine", "test"], capture_output=True, text=True, timeout=60, check=True
+        )
+        assert done.stdout.splitlines()[-1] == "ours"
+    (tmp_path / "own" / "pytest").unlink()
+    path = f"PATH={tmp_path / 'other'}:{tmp_path / 'own'}:{os.environ['PATH']}"
+    done = subprocess.run(
+        ["env", path, "make", "-C", "mine", "test"], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.returncode == 2
+    assert "hint: pip install pytest, where p2os is" in done.stderr
 
 
 @needs_compiler
@@ -314,6 +340,7 @@ def test_cmake_builds_a_program_that_does_what_that_of_make_does() -> None:
     hashes = []
     for build in ("make", "cmake"):
         project.write_project(Path(build), project.project_files("kinematic", build=build))
+        assert "TOOLCHAIN" not in project.BUILDS[build].commands, "the plain words of CMake do"
         subprocess.run(project.BUILDS[build].commands, shell=True, cwd=build, check=True, timeout=120)  # noqa: S602
         bench = Bench.from_scenario(f"{build}/just-drive.toml", duration_s=3.2)
         bench.run_until("3.2 s")
