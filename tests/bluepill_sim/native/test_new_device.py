@@ -1,6 +1,7 @@
 """The page that tells how to add a peripheral, done as it is printed, in a copy of the package."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -13,16 +14,33 @@ from tests.documentation.page import ROOT, Page
 COMPILER = shutil.which("gcc")
 
 
+#: The tables that the page names, and what judges a device by them.
+TABLES = ("conftest.py", "machine.py", "peripherals/test_reset_values.py", "peripherals/test_register_views.py")
+
+
 @pytest.mark.skipif(COMPILER is None, reason="no C compiler")
 @pytest.mark.parametrize("core", ["native", "python"])
 def test_the_device_of_the_page_works_as_it_is_printed(core: str, scratch: Path) -> None:
+    assert "1 passed" in pytest_there(scratch, core, "test_alarm.py")
+
+
+@pytest.mark.skipif(COMPILER is None, reason="no C compiler")
+def test_the_tables_of_the_tests_take_the_device_of_the_page(scratch: Path) -> None:
+    """Each test that has a row for every device of the chip passes with this one."""
+    rows = [name for name in TABLES if "/test_" in name]
+    words = [f"tests/bluepill_sim/{name}" for name in rows]
+    assert "5 passed" in pytest_there(scratch, "native", *words, "-k", "TIM6 or stands_in_the_table")
+
+
+def pytest_there(scratch: Path, core: str, *words: str) -> str:
+    """Return what pytest says there of tests that pass."""
     done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_alarm.py"],
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--rootdir", scratch, *words],
         cwd=scratch, env={**os.environ, "PYTHONPATH": str(scratch), "P2OS_CORE": core},
         capture_output=True, text=True, timeout=60, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
-    assert "1 passed" in done.stdout
+    return done.stdout
 
 
 @pytest.fixture(scope="module")
@@ -36,6 +54,12 @@ def scratch(tmp_path_factory: pytest.TempPathFactory) -> Path:
         name = block.text.split("\n")[0].strip("/*# ").split(":")[0]
         (folder / name).write_text(block.text, encoding="utf-8")
     put_rows(folder / "bluepill_sim" / "stm32f103.py", *rows.text.splitlines())
+    for name in TABLES:
+        target = folder / "tests" / "bluepill_sim" / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(ROOT / "tests" / "bluepill_sim" / name, target)
+    (row,) = re.findall(r"`(\"TIM6\": .*?)`", (ROOT / "docs" / "peripheral.md").read_text(encoding="utf-8"))
+    put_line(folder / "tests/bluepill_sim/peripherals/test_reset_values.py", row, '    "PWR": {},')
     sources = sorted((folder / "bluepill_sim" / "extension" / "source").rglob("*.c"))
     library = folder / "bluepill_sim" / "_native.so"
     command = ["gcc", "-shared", "-fPIC", "-std=c11", "-Wall", "-Wextra", "-Werror", *map(str, sources), "-o", library]
@@ -45,12 +69,13 @@ def scratch(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def put_rows(page: Path, imported: str, peripheral: str, wire: str) -> None:
     """Put the lines where the page says."""
+    put_line(page, imported, "from bluepill_sim.peripherals.exti ")
+    put_line(page, peripheral, '    (Wwdg, "WWDG"),')
+    put_line(page, wire, '    "EXTI.pvd_irq"')
+
+
+def put_line(page: Path, line: str, before: str) -> None:
+    """Put a line before another, which stands there once."""
     text = page.read_text(encoding="utf-8")
-    for line, before in (
-        (imported, "from bluepill_sim.peripherals.exti "),
-        (peripheral, '    (Wwdg, "WWDG"),'),
-        (wire, '    "EXTI.pvd_irq"'),
-    ):
-        assert text.count(before) == 1
-        text = text.replace(before, f"{line}\n{before}")
-    page.write_text(text, encoding="utf-8")
+    assert text.count(before) == 1
+    page.write_text(text.replace(before, f"{line}\n{before}"), encoding="utf-8")
