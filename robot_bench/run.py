@@ -222,6 +222,7 @@ def meta_of(scenario: Scenario, world: World | None, note: str | None, *, is_at_
         "text": scenario.text,
         "scenario_path": None if scenario.path is None else str(scenario.path.absolute()),
         "settings": [[key, value] for key, value in scenario.settings],
+        "code": [code.to_plain() for code in scenario.codes],
         "world_path": str(scenario.world) if scenario.world in known_worlds() else str(Path(scenario.world).absolute()),
         "firmware": scenario.firmware.name,
         "firmware_path": str(scenario.firmware.absolute()),

@@ -1,10 +1,10 @@
 """Files of users, written and read with one line for a person where the system refuses them."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from simbase.errors import FileError, shown_name
+from simbase.errors import FileError, P2osError, shown_name
 
 
 @contextmanager
@@ -43,6 +43,27 @@ def write_text(path: Path, text: str) -> None:
     """
     with writing(path):
         path.write_text(text, encoding="utf-8")
+
+
+def refuse_elsewhere(folder: Path, name: str, error: Callable[..., P2osError] = FileError) -> Path:
+    """Return the path of a file in a folder, by a name that a file or a class gives; one that leads out is refused.
+
+    Args:
+        folder: Where it is to be, or below.
+        name: As seen from there; links are followed.
+        error: What is raised: (message, hint=…).
+
+    Raises:
+        FileError: It leads elsewhere, or is no name; of the type that `error` makes.
+    """
+    try:
+        is_within = (folder / name).resolve().is_relative_to(folder.resolve()) and bool(name)
+    except (OSError, ValueError):  # longer than the system allows, or with a NUL in it
+        is_within = False
+    if not is_within:
+        what = f"{shown_name(name)} leads out of the folder {shown_name(folder)}"
+        raise error(what, hint="name a file within that folder")
+    return folder / name
 
 
 def reason_of(error: OSError) -> str:

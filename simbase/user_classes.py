@@ -1,8 +1,10 @@
 """A class of the user's by its name: `./mine.py:Class`, or an entry point of an installed package.
 
+A file is loaded for a `simbase.trust.Code` that was admitted, and for no plain text: a name out of somebody's file
+becomes one by `Trust.admit`, and one that the caller gives himself by `own_code`.
 What is wrong with it is told in one line: a file that is not there or cannot be loaded, a name that nothing has, and
 which methods of the protocol a class lacks.
-Invariant: nothing of a file or a package is loaded before its class is asked for.
+Invariant: nothing of a file or a package is loaded before its class is asked for, and of a file only what was admitted.
 """
 
 import hashlib
@@ -10,28 +12,21 @@ import importlib.util
 import inspect
 import sys
 from collections.abc import Callable, Sequence
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any, cast
 
-from simbase.errors import P2osError, UsageError, shown
+from simbase.errors import P2osError, UsageError, shown, shown_name
+from simbase.trust.code import Code, is_in_file
+from simbase.trust.decision import UntrustedError
+from simbase.trust.fingerprint import fingerprint_of
+from simbase.trust.installed import installed_points
+from simbase.trust.sources import SourceLoader, read_sources_of
 
 #: What the modules' names of users' files begin with.
 OF_USERS = "p2os_part_"
-
-
-def is_in_file(name: str) -> bool:
-    """Tell whether a name is FILE.py:CLASS."""
-    path, colon, _ = name.rpartition(":")
-    return bool(colon) and path.endswith(".py")
-
-
-def located(name: str, folder: Path) -> str:
-    """Return FILE.py:CLASS with the file's whole path, as seen from a folder; another name as it is."""
-    if not is_in_file(name):
-        return name
-    path, _, kind = name.rpartition(":")
-    return f"{(folder / path).resolve()}:{kind}"
+#: The name by which such a module knows what of its folder was admitted.
+_ADMITTED = "__admitted__"
+_PAGE = "docs/trust.md"
 
 
 def find_class(
@@ -40,19 +35,21 @@ def find_class(
     """Return a class, or what makes such a thing.
 
     Args:
-        name: FILE.py:CLASS, or the name of an entry point.
+        name: FILE.py:CLASS as a `Code` that was admitted, or the name of an entry point.
         what: What it is to be, for messages: `part`, `body`.
         group: The entry points' group.
         known: The names that ship, for the hint.
         error: What is raised: (message, hint=…).
 
     Raises:
+        UntrustedError: It is in a file, and was not admitted, or has changed since.
         P2osError: There is none, or it cannot be loaded; of the type that `error` makes.
     """
     if is_in_file(name):
-        path, _, kind = name.rpartition(":")
-        return _class_in(Path(path), kind, error)
-    points = {point.name: point for point in entry_points(group=group)}
+        if not isinstance(name, Code):
+            raise UntrustedError(f"the {what} {shown_name(name)} is in a file, and was not admitted", hint=_PAGE)
+        return _class_in(name, error)
+    points = installed_points(group)
     if name in points:
         try:
             return cast("Callable[..., Any]", points[name].load())
@@ -130,18 +127,39 @@ def _has(made: object, member: str, *, must_call: bool) -> bool:
     return hasattr(made, member)
 
 
-def _class_in(path: Path, name: str, error: Callable[..., P2osError]) -> Callable[..., Any]:
-    """Return a class of a Python file, which is loaded once."""
+def _refuse_unadmitted(code: Code) -> None:
+    """Refuse a file that may not be executed, or whose folder has changed since it was admitted."""
+    if code.admitted is None:
+        raise UntrustedError(f"{code.where}: {shown_name(code.named)} may not be executed", hint=_PAGE)
+    found = fingerprint_of(code.file.parent)
+    if found != code.admitted:
+        changed = sorted(dict(found.files.items() ^ code.admitted.files.items()))
+        what = f"{shown_name(code)}: {shown_name(changed[0])} in its folder has changed since it was admitted"
+        raise UntrustedError(what, hint="load it anew")
+
+
+def _class_in(code: Code, error: Callable[..., P2osError]) -> Callable[..., Any]:
+    """Return a class of a Python file, which is loaded once, and anew where another content of it is admitted."""
+    path, name = code.file, code.kind
     key = OF_USERS + path.stem
     module = sys.modules.get(key)
-    if module is None or Path(module.__file__ or "") != path.absolute():
-        spec = importlib.util.spec_from_file_location(key, path.absolute())
-        if spec is None or spec.loader is None or not path.is_file():
-            raise error(f"there is no file {path}", hint="FILE.py:CLASS names a class in a Python file")
+    if module is None or Path(module.__file__ or "") != path or getattr(module, _ADMITTED, None) != code.admitted:
+        if not code.is_there:
+            raise error(
+                f"there is no file {shown_name(code.named.rpartition(':')[0])}",
+                hint="FILE.py:CLASS names a class in a Python file",
+            )
+        _refuse_unadmitted(code)
+        read_sources_of(path.parent)
+        loader = SourceLoader(key, str(path))
+        spec = importlib.util.spec_from_file_location(key, path, loader=loader)
+        if spec is None:
+            raise error(f"{path} is no Python file")
         module = importlib.util.module_from_spec(spec)
+        setattr(module, _ADMITTED, code.admitted)
         sys.modules[key] = module
         try:
-            spec.loader.exec_module(module)
+            loader.exec_module(module)
         except BaseException as failure:
             del sys.modules[key]
             if not isinstance(failure, Exception):

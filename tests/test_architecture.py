@@ -95,7 +95,7 @@ LOGGING = (
 LAYERS = {
     "simbase": (
         ("timing", "state", "installation", "wire", "lazy", "interrupts"), ("errors",),
-        ("files", "units", "user_classes", "c_library"),
+        ("files", "units", "c_library"), ("trust",), ("user_classes",),
     ),
     "p2os": (
         ("errors", "event_log"), ("toml_file",), ("toml_schema",), ("robots", "gamepad"), ("protocol",), ("transport",),

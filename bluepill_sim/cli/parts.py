@@ -12,7 +12,8 @@ from bluepill_sim.board import BluePill
 from bluepill_sim.cli.driving import print_status
 from bluepill_sim.parts.attached import buses_of, words_of
 from bluepill_sim.parts.registry import PARTS, attach, parse_part, part_class
-from simbase.files import writing
+from simbase.files import refuse_elsewhere, writing
+from simbase.trust import own_code
 
 HELP = """List the parts that can be attached, with their pins and settings.
 
@@ -29,7 +30,7 @@ def parts(name: str | None = typer.Argument(None, help="One of them; all without
         for kind, row in PARTS.items():
             typer.echo(f"{kind:14} {row.what}")
         return
-    made = part_class(name)
+    made = part_class(own_code(name))
     typer.echo((inspect.getdoc(made) or name).splitlines()[0])
     for what, words in (("on", buses_of(made)), ("pins", getattr(made, "PINS", {}))):
         if words:
@@ -72,9 +73,10 @@ def _write(folder: Path, name: str, part: Any) -> None:
         files["png"] = picture.png(picture.scale())
     with writing(folder):
         for kind, data in files.items():
+            path = refuse_elsewhere(folder, f"{name}.{kind}")
             folder.mkdir(parents=True, exist_ok=True)
-            (folder / f"{name}.{kind}").write_bytes(data)
-            print_status(f"{name}: {folder / f'{name}.{kind}'}")
+            path.write_bytes(data)
+            print_status(f"{name}: {path}")
 
 
 def _written(value: object) -> str:

@@ -25,6 +25,7 @@ from bluepill_sim.parts.serial_port import SerialPort
 from bluepill_sim.peripherals.can import Can
 from bluepill_sim.peripherals.i2c import I2c
 from bluepill_sim.peripherals.spi import Spi
+from simbase.errors import shown
 from simbase.state import Stateful
 from simbase.timing import Nanos
 
@@ -155,7 +156,7 @@ class AttachedParts(Stateful):
             PartError: It cannot be attached so.
         """
         uses: Mapping[str, Use] = getattr(part, "PINS", {})
-        name = self._free_name(name or type(part).__name__)
+        name = self._free_name(_plain(name or type(part).__name__))
         pins = {key: pin.upper() for key, pin in pins.items()}
         for key, pin in pins.items():
             if key not in uses:
@@ -268,6 +269,17 @@ class AttachedParts(Stateful):
 def buses_of(part: object) -> list[str]:
     """Return the buses on which a part, or a class of parts, can hang."""
     return [bus for bus, method in _METHODS.items() if hasattr(part, method)]
+
+
+def _plain(name: str) -> str:
+    """Return the name of a part, by which its files are called.
+
+    Raises:
+        PartError: It is none that a file can have.
+    """
+    if not name.isprintable() or {"/", "\\"} & set(name) or name.startswith("."):
+        raise PartError(f"{shown(name)} is no name of a part: its files are called so", hint="name=card")
+    return name
 
 
 def words_of(parts: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -14,16 +14,21 @@ import types
 import typing
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol, cast
 
 from bluepill_sim.parts.attached import PartError, Use
-from simbase.errors import shown
-from simbase.user_classes import find_class, is_in_file, said
+from simbase.errors import shown, shown_name
+from simbase.files import refuse_elsewhere
+from simbase.trust import own_code
+from simbase.user_classes import find_class, said
 
 #: The entry points of others.
 GROUP = "p2os.parts"
 _HINT = "NAME,KEY=VALUE,... such as ssd1306,on=I2C1 or ./mine.py:Class,on=I2C1"
+#: chosen: the largest card.
+LARGEST_FILE_BYTES = 1024 * 1024 * 1024
 _FLAGS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
 
 
@@ -57,11 +62,11 @@ PARTS: Mapping[str, Row] = {
 class PartSpec:
     """What part is wanted, where, and how it is set."""
 
-    #: A name, or "FILE.py:CLASS".
+    #: A name, or "FILE.py:CLASS" as an admitted `simbase.trust.Code`.
     kind: str
     #: Keys and values: `on`, `select`, `name`, pins, and arguments of its class; texts, numbers, flags, lists.
     settings: tuple[tuple[str, object], ...] = ()
-    #: Where files are looked for that are named relatively.
+    #: Where its files are, or below; empty: anywhere, seen from the current folder.
     folder: str = ""
 
 
@@ -102,7 +107,7 @@ def parse_part(words: str) -> PartSpec:
         settings[key] = value
     if not kind:
         raise PartError(f"--attach {shown(words)} names no part", hint=_HINT)
-    return PartSpec(kind=kind, settings=tuple(settings.items()))
+    return PartSpec(kind=own_code(kind), settings=tuple(settings.items()))
 
 
 def build(spec: PartSpec) -> Wiring:
@@ -111,7 +116,7 @@ def build(spec: PartSpec) -> Wiring:
     Raises:
         PartError: There is no such part, or it cannot be set so.
     """
-    made = part_class(spec.kind, Path(spec.folder))
+    made = part_class(spec.kind)
     settings = dict(spec.settings)
     pins = {
         key: str(settings.pop(key)) for key in cast("Mapping[str, Use]", getattr(made, "PINS", {})) if key in settings
@@ -126,7 +131,7 @@ def build(spec: PartSpec) -> Wiring:
             raise PartError(
                 f"the part {shown(spec.kind)} has no setting {shown(key)}", hint=f"known are {', '.join(known)}"
             )
-        values[key] = _converted(value, arguments[key], f"{spec.kind}: {key}", Path(spec.folder))
+        values[key] = _converted(value, arguments[key], f"{spec.kind}: {key}", spec.folder)
     try:
         part = made(**values)
     except PartError:
@@ -148,18 +153,17 @@ def attach(board: Board, spec: PartSpec) -> None:
     board.attach(wiring.part, on=wiring.on, select=wiring.select, name=wiring.name, **wiring.pins)
 
 
-def part_class(kind: str, folder: Path = Path()) -> Callable[..., Any]:
+def part_class(kind: str) -> Callable[..., Any]:
     """Return the class of a part.
 
     Raises:
         PartError: There is none, or its file cannot be loaded.
+        UntrustedError: It is in a file, and was not admitted.
     """
     row = PARTS.get(kind.lower())
     if row is not None:
         module, _, name = row.target.partition(":")
         return cast("Callable[..., Any]", getattr(importlib.import_module(module), name))
-    if is_in_file(kind):
-        kind = str(folder / kind)
     return find_class(kind, what="part", group=GROUP, known=list(PARTS), error=PartError)
 
 
@@ -172,7 +176,7 @@ def _arguments_of(made: Callable[..., Any], kind: str) -> dict[str, Any]:
     return {name: argument.annotation for name, argument in signature.parameters.items()}
 
 
-def _converted(value: object, wanted: Any, where: str, folder: Path) -> object:
+def _converted(value: object, wanted: Any, where: str, folder: str) -> object:
     """Return a value as an argument's type: a text as it is typed, else what TOML holds."""
     if isinstance(wanted, types.UnionType) or typing.get_origin(wanted) is typing.Union:
         wanted = next(one for one in typing.get_args(wanted) if one is not type(None))
@@ -190,7 +194,7 @@ def _converted(value: object, wanted: Any, where: str, folder: Path) -> object:
         if wanted is float:
             return float(cast("float | str", _no_flag(value)))
         if wanted in {Path, bytes}:
-            path = folder / str(value)
+            path = _file(str(value), folder, where)
             return path if wanted is Path else path.read_bytes()
     except OSError as error:
         raise PartError(f"{where}: {error.filename}: {error.strerror or error}") from error
@@ -198,6 +202,21 @@ def _converted(value: object, wanted: Any, where: str, folder: Path) -> object:
         name = {bool: "true or false", int: "a whole number", float: "a number"}.get(wanted, "what it is to be")
         raise PartError(f"{where}: {shown(value)} is not {name}") from error
     return value
+
+
+def _file(name: str, folder: str, where: str) -> Path:
+    """Return the path of a file of a part; one that a scenario names is in the scenario's folder or below."""
+    refused = partial(_refused, where)
+    path = refuse_elsewhere(Path(folder), name, refused) if folder else Path(name)
+    if path.exists() and not path.is_file():
+        raise refused(f"{shown_name(name)} is no file")
+    if path.exists() and path.stat().st_size > LARGEST_FILE_BYTES:
+        raise refused(f"{shown_name(name)} is larger than {LARGEST_FILE_BYTES >> 20} MiB")
+    return path
+
+
+def _refused(where: str, message: str, *, hint: str | None = None) -> PartError:
+    return PartError(f"{where}: {message}", hint=hint)
 
 
 def _whole(value: object) -> int:

@@ -16,7 +16,7 @@ import sys
 import traceback
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 from typing import Annotated
 
 import typer
@@ -26,6 +26,7 @@ from p2os.cli.printing import restored_output
 from p2os.cli.signals import end_on_signals, ignore_signals, restored_signals
 from simbase.errors import MissingDependencyError
 from simbase.installation import installed_version
+from simbase.trust import installed_points
 from simbase.user_classes import unforeseen
 
 GROUP = "p2os.verbs"
@@ -119,7 +120,7 @@ def verbs() -> list[EntryPoint]:
 
 @cache
 def _installed_verbs() -> tuple[EntryPoint, ...]:
-    return tuple(sorted(entry_points(group=GROUP), key=lambda entry: entry.name))
+    return tuple(sorted(installed_points(GROUP).values(), key=lambda entry: entry.name))
 
 
 def make_app(words: Sequence[str] = ()) -> typer.Typer:

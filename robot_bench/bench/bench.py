@@ -80,6 +80,7 @@ from simbase.errors import UsageError, shown
 from simbase.installation import installed_version
 from simbase.state import PartState, Stateful
 from simbase.timing import NS_PER_S, Nanos, Reached
+from simbase.trust import Trust
 
 #: chosen: so long a run goes on after a fault of the firmware, to show what the robot does then.
 AFTER_FAULT_NS: Nanos = 1 * NS_PER_S
@@ -214,14 +215,18 @@ class Bench(Expectations, Interventions, Stateful):
         self._listeners = self.events.listeners()
 
     @classmethod
-    def from_scenario(cls, scenario: Scenario | str | Path, **options: Unpack[ScenarioOptions]) -> Self:
+    def from_scenario(
+        cls, scenario: Scenario | str | Path, *, trust: bool | Trust = False, **options: Unpack[ScenarioOptions]
+    ) -> Self:
         """Return a bench at its beginning.
 
         Args:
             scenario: A shipped scenario's name, a TOML file, or a `Scenario`.
+            trust: Whether code that a file names may be executed (docs/trust.md); what the options name may always.
             options: What is to be otherwise than it says: see `ScenarioOptions`.
 
         Raises:
+            UntrustedError: The file names code, and nobody has said that it may be executed.
             ScenarioError: There is no such scenario, or it breaks the schema.
             UsageError: That is no scenario, or an option cannot be.
             ImageError: The firmware is missing, damaged, or not for this chip.
@@ -229,7 +234,7 @@ class Bench(Expectations, Interventions, Stateful):
         """
         if not isinstance(scenario, Scenario | str | Path):
             raise UsageError(f"{shown(scenario)} is no scenario", hint="a name, a TOML file, or a Scenario")
-        found = scenario if isinstance(scenario, Scenario) else load_scenario(str(scenario))
+        found = scenario if isinstance(scenario, Scenario) else load_scenario(str(scenario), trust=trust)
         wanted = found.with_options(**options)
         return next(iter(cls.together(wanted).values())) if wanted.robots else cls(wanted)
 
@@ -250,7 +255,7 @@ class Bench(Expectations, Interventions, Stateful):
         world = load_world(scenario.world, seed=scenario.seed)
         models = [robot.parameters for robot in scenario.robots]
         starts = [robot.start for robot in scenario.robots]
-        scene = make_scene(scenario.body, world, models, starts, scenario.seed)
+        scene = make_scene(scenario.body, world, models, starts, scenario.seed, trust=False)
         for robot, body in zip(scenario.robots, scene.bodies, strict=True):
             body.is_powered = robot.scenario is not None
         shared = SharedWorld(scene, [robot.name for robot in scenario.robots])
@@ -579,7 +584,7 @@ class Bench(Expectations, Interventions, Stateful):
 def body_of(scenario: Scenario, world: World) -> RobotBody:
     """Return the body of a scenario's robot alone in a world, standing where it begins."""
     start = scenario.start or world.start
-    return make_body(scenario.body, world, scenario.parameters, start=start, seed=scenario.seed)
+    return make_body(scenario.body, world, scenario.parameters, start=start, seed=scenario.seed, trust=False)
 
 
 def _refuse_several(scenario: Scenario) -> None:

@@ -37,6 +37,7 @@ from robot_bench.scenario.json_schema import DRAFT, goals_schema, table_schema
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.scenario.sweep import MOST_RUNS
 from simbase.errors import UsageError, nearest, shown
+from simbase.trust import Trust
 
 TOP = (
     Key(name="description", kind="text"),
@@ -222,20 +223,21 @@ class Campaign:
     disturbances: tuple[Disturbance, ...] = ()
 
 
-def load_campaign(path: Path) -> Campaign:
+def load_campaign(path: Path, *, trust: bool | Trust = False) -> Campaign:
     """Read and check a campaign file.
 
     Args:
         path: The file.
+        trust: Whether code that its scenario names may be executed (docs/trust.md).
 
     Raises:
         ScenarioError: It cannot be read, breaks the schema, or its scenario does.
     """
     text = read_user_text(path, "a campaign", ScenarioError, hint="p2os campaign new SCENARIO writes one")
-    return parse_campaign(text, path)
+    return parse_campaign(text, path, trust=trust)
 
 
-def parse_campaign(text: str, path: Path, *, firmware: Path | None = None) -> Campaign:
+def parse_campaign(text: str, path: Path, *, firmware: Path | None = None, trust: bool | Trust = False) -> Campaign:
     """Check the text of a campaign file, whose program `firmware` may replace; errors as of `load_campaign`."""
     table, places = read_toml(text, path.name, "a campaign", ScenarioError)
     where = Place(TomlSource(path.name, places))
@@ -244,7 +246,7 @@ def parse_campaign(text: str, path: Path, *, firmware: Path | None = None) -> Ca
         _checked(cast("Table", table.get(name, {})), keys, within(where, name))
         for name, keys in (("budget", BUDGET), ("limits", LIMITS))
     )
-    trial = _with_start(_trial(table, path, where, firmware), cast("Table", table.get("vary", {})), path)
+    trial = _with_start(_trial(table, path, where, firmware, trust), cast("Table", table.get("vary", {})), path)
     draws = _draws(cast("list[Table]", table.get("draw", [])), where)
     disturbances = tuple(
         _disturbance(row, within(where, "disturb", number))
@@ -302,7 +304,7 @@ def _checked(table: Table, keys: Sequence[Key], where: Where) -> dict[str, Any]:
     return dict(table)
 
 
-def _trial(table: Table, path: Path, where: Place, firmware: Path | None) -> Trial:
+def _trial(table: Table, path: Path, where: Place, firmware: Path | None, trust: bool | Trust) -> Trial:
     name = str(table["scenario"])
     beside = path.parent / name
     if firmware is None and "firmware" in table:
@@ -310,7 +312,7 @@ def _trial(table: Table, path: Path, where: Place, firmware: Path | None) -> Tri
         if not is_file(firmware):
             raise ScenarioError(f"{where.at('firmware')}: there is no file {shown(str(table['firmware']))} beside it")
     with placed(where, "scenario"):
-        trial = trial_of(str(beside) if is_file(beside) else name, firmware=firmware)
+        trial = trial_of(str(beside) if is_file(beside) else name, firmware=firmware, trust=trust)
     return trial.with_lists(goal=cast("list[Table]", table["goal"])) if "goal" in table else trial
 
 

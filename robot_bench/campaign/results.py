@@ -75,7 +75,8 @@ class Results:
     def replay(self, row: Row) -> str:
         """Return the command that runs a failure again."""
         name = row.proposal.trial(self._campaign.trial, ()).name
-        return shlex.join(["p2os", "run", str(self.failure_folder(row) / f"{name}.toml")])
+        trust = ["--trust"] if self._campaign.trial.trusted else []
+        return shlex.join(["p2os", "run", str(self.failure_folder(row) / f"{name}.toml"), *trust])
 
     def _entry(self, row: Row, run: Run) -> dict[str, object]:
         outcome = run.outcome

@@ -43,6 +43,9 @@ from robot_bench.scenario.scenario import Scenario, build_scenario, known_scenar
 from simbase.errors import P2osError
 from simbase.files import writing
 from simbase.timing import NS_PER_MS, Nanos
+from simbase.trust import Code, Trust, fingerprint_of
+from simbase.trust.code import is_in_file, located
+from simbase.trust.fingerprint import importable
 
 #: A way is kept as a place each so often.
 WAY_NS: Nanos = 500 * NS_PER_MS
@@ -77,6 +80,8 @@ class Trial:
     files: Mapping[str, bytes]
     #: Of everything random.
     seed: int = 0
+    #: What of its code may be executed: `Code.key` of each.
+    trusted: frozenset[str] = frozenset()
 
     def set(self, *settings: Setting) -> "Trial":
         """Return the trial with keys set as `--set` sets them: `("start.x_m", 1.5)`.
@@ -142,7 +147,8 @@ class Trial:
         path = folder / f"{self.name}.toml"
         source = MergedSource.of(TomlSource(path.name))
         table = {**deepcopy(dict(self.table)), "seed": self.seed}
-        return build_scenario(ScenarioTable(table=table, source=source, text=self.text), path)
+        trust = Trust(keys=self.trusted, hint="a trial has the code that its scenario file names")
+        return build_scenario(ScenarioTable(table=table, source=source, text=self.text), path, trust=trust)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -209,19 +215,24 @@ class Outcome:
 Done = tuple[Outcome, float]
 
 
-def trial_of(name_or_path: str, *, firmware: Path | None = None, settings: Sequence[Setting] = ()) -> Trial:
+def trial_of(
+    name_or_path: str, *, firmware: Path | None = None, settings: Sequence[Setting] = (), trust: bool | Trust = False
+) -> Trial:  # fmt: skip
     """Return the trial of a scenario that ships or of a file, with all files that it names.
 
     Args:
         name_or_path: As of `load_scenario`.
         firmware: Takes the place of its own program.
         settings: What is set beside the file.
+        trust: Whether code that it names may be executed; it travels with the trial.
 
     Raises:
+        UntrustedError: Code is named, and nobody has said that it may be executed.
         ScenarioError: There is no such scenario, or it breaks the schema.
         UsageError: A setting names what is not there, or there is no such firmware.
     """
-    scenario = load_scenario(name_or_path, firmware=firmware, settings=settings).with_options(firmware=firmware)
+    scenario = load_scenario(name_or_path, firmware=firmware, settings=settings, trust=trust)
+    scenario = scenario.with_options(firmware=firmware)
     path = shipped_file(name_or_path) if name_or_path in known_scenarios() else Path(name_or_path)
     table = deepcopy(dict(read_tables(path, settings).table))
     for key in ("seeds", "sweep"):
@@ -231,7 +242,8 @@ def trial_of(name_or_path: str, *, firmware: Path | None = None, settings: Seque
     _pack_world(table, scenario, path.parent, files)
     _pack_others(table, path.parent, files)
     seed = cast("int", table.pop("seed", scenario.seed))
-    return Trial(name=scenario.name, table=table, files=files, seed=seed)
+    trusted = frozenset(code.key for code in scenario.codes)
+    return Trial(name=scenario.name, table=table, files=files, seed=seed, trusted=trusted)
 
 
 @dataclass(slots=True)
@@ -402,9 +414,20 @@ def _pack_others(table: dict[str, object], folder: Path, files: dict[str, bytes]
                 if isinstance(item, dict):
                     _pack_others(item, folder, files)
         elif isinstance(value, str) and key not in _WORDS and value not in files:
-            name, colon, kind = value.rpartition(":") if ".py:" in value else (value, "", "")
-            if "." in Path(name).name and is_file(folder / name):
-                table[key] = _packed(folder / name, files) + colon + kind
+            if is_in_file(value):
+                table[key] = _packed_code(Code(located(value, folder)), files) or value
+            elif "." in Path(value).name and is_file(folder / value):
+                table[key] = _packed(folder / value, files)
+
+
+def _packed_code(code: Code, files: dict[str, bytes]) -> str:
+    """Put all that can be imported beside a class among the files, in a folder of its own; empty: there is no file."""
+    if not code.is_there:
+        return ""
+    there = code.file.parent
+    into = f"code-{fingerprint_of(there).sha256[:12]}"
+    files |= {f"{into}/{name}": path.read_bytes() for name, path in importable(there)}
+    return f"{into}/{code.file.name}:{code.kind}"
 
 
 def _packed(path: Path, files: dict[str, bytes]) -> str:
@@ -424,6 +447,7 @@ def _named(name: str, content: bytes, files: dict[str, bytes]) -> str:
 def _write_files(files: Mapping[str, bytes], folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for name, content in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes(content)
 
 

@@ -22,6 +22,7 @@ from robot_bench.campaign.results import Results, Whole
 from simbase.errors import FileError, P2osError, UsageError
 from simbase.files import write_text, writing
 from simbase.timing import Nanos
+from simbase.trust import Trust
 
 SCENARIO = "scenario"
 SUMMARY = "summary.json"
@@ -29,7 +30,9 @@ SUMMARY = "summary.json"
 MOST_MOMENTS = 3
 
 
-def begin(file: Path, folder: Path, *, firmware: Path | None, overrides: Mapping[str, object]) -> Campaign:
+def begin(
+    file: Path, folder: Path, *, firmware: Path | None, overrides: Mapping[str, object], trust: bool | Trust = False
+) -> Campaign:  # fmt: skip
     """Make a campaign's folder from its file.
 
     Args:
@@ -37,6 +40,7 @@ def begin(file: Path, folder: Path, *, firmware: Path | None, overrides: Mapping
         folder: New or empty.
         firmware: Takes the place of the scenario's.
         overrides: Keys of the file that are set otherwise; of a table, the keys in it.
+        trust: As of `load_campaign`.
 
     Raises:
         ScenarioError: The file breaks the schema.
@@ -48,7 +52,7 @@ def begin(file: Path, folder: Path, *, firmware: Path | None, overrides: Mapping
     for key, value in overrides.items():
         held = table.get(key)
         table[key] = {**held, **value} if isinstance(held, dict) and isinstance(value, dict) else value
-    found = parse_campaign(text if not overrides else toml_text(table), file, firmware=firmware)
+    found = parse_campaign(text if not overrides else toml_text(table), file, firmware=firmware, trust=trust)
     if folder.is_dir() and any(folder.iterdir()):
         raise UsageError(f"{folder} is not empty", hint=f"p2os campaign --resume {folder}, or another folder")
     with writing(folder, hint="--out another folder"):
@@ -56,11 +60,11 @@ def begin(file: Path, folder: Path, *, firmware: Path | None, overrides: Mapping
         kept = {key: value for key, value in table.items() if key not in {"firmware", "goal"}}
         kept["scenario"] = f"{SCENARIO}/{scenario.name}"
         (folder / f"{file.stem}.toml").write_text(toml_text(kept), encoding="utf-8")
-    return load_campaign(folder / f"{file.stem}.toml")
+    return load_campaign(folder / f"{file.stem}.toml", trust=Trust(keys=found.trial.trusted))
 
 
-def resume(folder: Path) -> Campaign:
-    """Return the campaign of a folder that was begun.
+def resume(folder: Path, *, trust: bool | Trust = False) -> Campaign:
+    """Return the campaign of a folder that was begun; `trust` as of `load_campaign`.
 
     Raises:
         FileError: It is none.
@@ -68,7 +72,7 @@ def resume(folder: Path) -> Campaign:
     files = sorted(folder.glob("*.toml")) if folder.is_dir() else []
     if len(files) != 1 or not (folder / SCENARIO).is_dir():
         raise FileError(f"{folder} is no campaign's folder", hint="give the one that `p2os campaign FILE` made")
-    return load_campaign(files[0])
+    return load_campaign(files[0], trust=trust)
 
 
 def carry_out(

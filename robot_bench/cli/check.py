@@ -1,6 +1,7 @@
 """`p2os check`: says whether scenario files can be run, without running them."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -13,14 +14,16 @@ from robot_bench.scenario.included_files import as_toml
 from robot_bench.scenario.json_schema import scenario_schema
 from robot_bench.scenario.scenario import Scenario, load_scenario
 from robot_bench.scenario.sweep import rows
-from simbase.errors import P2osError, UsageError
+from simbase.errors import P2osError, UsageError, shown_name
 from simbase.timing import NS_PER_S
+from simbase.trust import Code, Trust
 
 HELP = """Check scenario files without running them.
 
 Keys, ranges, names, events in words, firmware, world, parts and wires are looked
 at, in all files that a scenario includes, with every value that it sweeps: keys and
-names in each row, parts and wires in one row with each value.
+names in each row, parts and wires in one row with each value. Nothing that a file
+names is executed: of Python code only whether its file is there is looked at.
 
 Exit code: 0 all can be run, 1 one cannot.
 
@@ -30,6 +33,10 @@ Examples:
   p2os check tests/*.toml
   p2os check --schema > scenario.schema.json   for editors that check TOML
 """
+
+
+#: Names are read, and nothing is executed.
+_NOTHING = Trust(only_reads=True)
 
 
 def register(app: typer.Typer) -> None:
@@ -53,9 +60,10 @@ def check(
     wrong = 0
     for name in files:
         try:
-            found = load_scenario(name, firmware=firmware)
+            found = load_scenario(name, firmware=firmware, trust=_NOTHING)
             _build(found)
-            runs = _check_rows(name, found, firmware)
+            codes = {code.where: code for code in found.codes}
+            runs = _check_rows(name, found, firmware, codes)
         except P2osError as error:
             wrong += 1
             typer.echo(f"wrong  {error}" + (f" (hint: {error.hint})" if error.hint else ""))
@@ -64,12 +72,14 @@ def check(
             f"ok     {name}: {found.duration_ns / NS_PER_S:g} s of {found.firmware.name} in {found.world}, "
             f"{len(found.goals)} goals{f', {runs} runs' if runs > 1 else ''}"
         )
+        for code in codes.values():
+            typer.echo(f"not checked: code  {code.where} = {shown_name(code.named)}")
     if wrong:
         raise typer.Exit(1)
 
 
-def _check_rows(name: str, scenario: Scenario, firmware: Path | None) -> int:
-    """Check every row of a sweep; return how many runs there are.
+def _check_rows(name: str, scenario: Scenario, firmware: Path | None, codes: dict[str, Code]) -> int:
+    """Check every row of a sweep; return how many runs there are, and add to the code that is not looked into.
 
     A bench takes several times as long as its scenario: it is built for the first row with each value.
 
@@ -78,7 +88,8 @@ def _check_rows(name: str, scenario: Scenario, firmware: Path | None) -> int:
     """
     count, built = 0, set[str]()
     for settings in rows(scenario.axes) if scenario.axes else ():
-        row = load_scenario(name, firmware=firmware, settings=settings, set_by=f"{name}: [sweep]")
+        row = load_scenario(name, firmware=firmware, settings=settings, set_by=f"{name}: [sweep]", trust=_NOTHING)
+        codes |= {code.where: code for code in row.codes}
         words = [f"{key} = {as_toml(value)}" for key, value in settings]
         if not built.issuperset(words):
             built.update(words)
@@ -89,4 +100,18 @@ def _check_rows(name: str, scenario: Scenario, firmware: Path | None) -> int:
 
 
 def _build(scenario: Scenario) -> None:
-    Bench.from_scenario(scenario, body="kinematic")  # the cheapest: what is refused here, every body refuses
+    robots = tuple(
+        replace(robot, scenario=robot.scenario and _without_code(robot.scenario)) for robot in scenario.robots
+    )
+    # The cheapest body: what is refused here, every body refuses.
+    Bench.from_scenario(replace(_without_code(scenario), robots=robots), body="kinematic")
+
+
+def _without_code(scenario: Scenario) -> Scenario:
+    """Return a scenario with what ships in the place of code, and without the parts that are code."""
+    return replace(
+        scenario,
+        adapter_core="model" if isinstance(scenario.adapter_core, Code) else scenario.adapter_core,
+        controller_kind="pioneer" if isinstance(scenario.controller_kind, Code) else scenario.controller_kind,
+        parts=tuple(part for part in scenario.parts if not isinstance(part.kind, Code)),
+    )

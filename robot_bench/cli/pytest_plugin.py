@@ -52,13 +52,15 @@ _MARKERS = (
 _BOOTED = "note adapter driving"
 #: chosen: so long that is waited for.
 _BOOT_WITHIN = "20 s"
+#: What a test is told whose scenario names code that nobody has said may run.
+_TRUST = "read it, then in pytest's ini: p2os_trust = FILE.py, or its folder; docs/trust.md"
 #: Packages whose lines say nothing to a user of them.
 _OURS = frozenset({"adapter_sim", "bluepill_sim", "p2os", "robot_bench", "simbase"})
 _BENCH = pytest.StashKey["Bench"]()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the options and the setting `bench_scenario`."""
+    """Add the options and the settings `bench_scenario` and `p2os_trust`."""
     group = parser.getgroup("bench", "tests of a firmware on the bench (p2os)")
     group.addoption("--firmware", metavar="FILE", help="ELF, HEX or BIN in place of the scenarios'")
     group.addoption("--bench-mode", choices=("adapter", "direct"), help="of tests that do not name modes")
@@ -68,6 +70,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         help="of which tests a run folder with its report is written (default: failures)",
     )  # fmt: skip
     group.addoption("--bench-out", metavar="FOLDER", default="bench-runs", help="where to (default: bench-runs)")
+    parser.addini("p2os_trust", "files and folders with code that scenarios may name, seen from the ini file", "paths")
     parser.addini("bench_scenario", "scenario of tests that name none: a name, or a file", default="free-drive")
 
 
@@ -217,6 +220,7 @@ def _scenario_of(item: pytest.Item, chosen: dict[str, Any]) -> "Scenario":
     from robot_bench.scenario.fault_script import load_faults
     from robot_bench.scenario.scenario import load_scenario
     from simbase.timing import NS_PER_S
+    from simbase.trust import Trust
 
     config, mark = item.config, item.get_closest_marker("scenario")
     named = str(mark.args[0]) if mark is not None else str(config.getini("bench_scenario"))
@@ -226,8 +230,9 @@ def _scenario_of(item: pytest.Item, chosen: dict[str, Any]) -> "Scenario":
     beside = [folder / named for folder in (item.path.parent, config.rootpath) if (folder / named).is_file()]
     firmware = options["firmware"]
     found = load_scenario(
-        str(beside[0]) if beside else named, firmware=None if firmware is None else Path(firmware)
-    ).with_options(**options)
+        str(beside[0]) if beside else named, firmware=None if firmware is None else Path(firmware),
+        trust=Trust(paths=tuple(config.getini("p2os_trust") or ()), hint=_TRUST),
+    ).with_options(**options)  # fmt: skip
     if fault is None:
         return found
     faults = item.get_closest_marker("faults")

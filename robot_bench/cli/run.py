@@ -15,6 +15,7 @@ from p2os.cli.keyboard import any_key_stops
 from p2os.cli.main import EXIT_INTERRUPTED
 from p2os.cli.names import bodies, urls, worlds
 from p2os.cli.quantities import option
+from p2os.cli.trust import Trusted, said
 from p2os.errors import RunFailedError
 from p2os.ros.transports import TRANSPORTS
 from p2os.transport import open_url
@@ -41,6 +42,7 @@ from robot_bench.scenario.scenario import Scenario, ScenarioOptions, load_scenar
 from robot_bench.scenario.sweep import MOST_RUNS, read_seeds
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
+from simbase.trust import Trust
 from simbase.units import BAUD, FACTOR, PERCENT, PORT, SEED, SPEED, TIME
 
 HELP = """Run a scenario: a BluePill program drives a robot.
@@ -158,6 +160,7 @@ def run(
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Run folder; default runs/SCENARIO-NNN.", metavar="FOLDER")] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite the run that the --out folder holds.")] = False,
+    trust: Trusted = False,
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
     coverage: Annotated[bool, typer.Option("--coverage", help="Write which lines and branches ran.")] = False,
     fail_under: Annotated[
@@ -194,7 +197,7 @@ def run(
 ) -> None:
     """Run a scenario."""
     settings = [read_setting(text) for text in set_ or ()]
-    wanted = load_scenario(scenario, firmware=firmware, settings=settings)
+    wanted = load_scenario(scenario, firmware=firmware, settings=settings, trust=said(trust))
     if coverage or profile:
         refuse(
             {"coverage and --profile": port},
@@ -240,7 +243,7 @@ def run(
             "cannot stand beside a sweep: it is for one run",
             hint="--seed and --set take one run of it",
         )
-        rows = sweep_rows(scenario, wanted, options, seeds)
+        rows = sweep_rows(scenario, wanted, options, seeds, said(trust))
         run_many(rows, out, jobs=jobs or core_count(), kept=keep, junit=junit, json_output=json_output, force=force)
         return
     many = "--seeds 0-9, or a scenario with [sweep]"
@@ -325,7 +328,7 @@ def is_sweep(scenario: Scenario, *, seeds: str | None, seed: int | None, port: s
     return seeds is not None or (port is None and (bool(scenario.axes) or (bool(scenario.seeds) and seed is None)))
 
 
-def sweep_rows(name: str, wanted: Scenario, options: ScenarioOptions, seeds: str | None) -> list[Row]:
+def sweep_rows(name: str, wanted: Scenario, options: ScenarioOptions, seeds: str | None, trust: Trust) -> list[Row]:
     """Return every run of a sweep, each checked.
 
     Args:
@@ -333,8 +336,10 @@ def sweep_rows(name: str, wanted: Scenario, options: ScenarioOptions, seeds: str
         wanted: The scenario as its file says it.
         options: What the command line sets.
         seeds: As typed; None: those of the scenario.
+        trust: Which code that the scenario names may be executed.
 
     Raises:
+        UntrustedError: A value of a parameter is code, and nobody has said that it may be executed.
         ScenarioError: A value of a parameter cannot be.
         UsageError: An option takes the place of a parameter, or there are too many runs.
     """
@@ -348,6 +353,7 @@ def sweep_rows(name: str, wanted: Scenario, options: ScenarioOptions, seeds: str
         if key in swept:
             raise UsageError(f"the scenario sweeps {key}, and an option sets it", hint=f"--set {key}=VALUE ends that")
     words = [word for key, value in given.items() for word in (_FLAGS.get(key, f"--{key}"), _typed(key, value))]
+    words += ["--trust"] if trust.everything else []
     rows: list[Row] = []
     for settings in sweep.rows(wanted.axes):
         if len(rows) >= MOST_RUNS:
@@ -355,7 +361,7 @@ def sweep_rows(name: str, wanted: Scenario, options: ScenarioOptions, seeds: str
         firmware = options.get("firmware")
         row = load_scenario(
             name, firmware=None if firmware is None else Path(firmware), settings=(*wanted.settings, *settings),
-            set_by="[sweep]",
+            set_by="[sweep]", trust=trust,
         ).with_options(**options)  # fmt: skip
         for one in chosen or (row.seed,):
             again = command(name, words, (*wanted.settings, *settings), one)

@@ -7,7 +7,6 @@ Source: JSON Schema, draft 2020-12.
 """
 
 from collections.abc import Sequence
-from importlib.metadata import entry_points
 
 from p2os.toml_schema import Key
 from robot_bench.events.codec import Json
@@ -16,6 +15,7 @@ from robot_bench.scenario.goals.kinds import KINDS
 from robot_bench.scenario.scenario import TABLES
 from robot_bench.scenario.several_robots import ROBOT
 from robot_bench.scenario.when_script import KEYS as WHEN_KEYS
+from simbase.trust import installed_points
 
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
 _TYPES = {
@@ -95,6 +95,6 @@ def _key(key: Key) -> Json:
     found |= {name: bound for name, bound in bounds.items() if bound is not None and key.kind in {"number", "whole"}}
     choices: Json = {"enum": list(key.choices)} if key.choices else {}
     if key.group:
-        installed = [point.name for point in entry_points(group=key.group)]
+        installed = list(installed_points(key.group))
         return found | {"anyOf": [{"enum": [*key.choices, *installed]}, {"pattern": r"\.py:[^:]+$"}]}
     return found | choices

@@ -6,15 +6,16 @@ Invariant: a part that was read can be made, and stands on no wire of the robot'
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
-from bluepill_sim.parts.registry import PartSpec, build
+from bluepill_sim.parts.registry import GROUP, PARTS, PartSpec, build
 from bluepill_sim.stm32f103 import BONDED_PINS
 from p2os.errors import ScenarioError
-from p2os.toml_schema import Key, Table, Where, placed, within
+from p2os.toml_schema import Key, Place, Table, Where, placed, within
 from simbase.errors import shown, shown_name
+from simbase.trust import Code, Trust
 
 #: The keys of every part; all others are its pins and settings.
 KEYS = (
-    Key(name="kind", kind="text", required=True),
+    Key(name="kind", kind="text", required=True, choices=tuple(PARTS), group=GROUP),
     Key(name="name", kind="text"),
     Key(name="on", kind="text"),
     Key(name="select", kind="text"),
@@ -22,7 +23,9 @@ KEYS = (
 _SCALARS = (str, int, float, bool)
 
 
-def load_parts(tables: Sequence[Table], folder: Path, taken: Mapping[str, str], where: Where) -> tuple[PartSpec, ...]:
+def load_parts(
+    tables: Sequence[Table], folder: Path, taken: Mapping[str, str], where: Where, trust: Trust
+) -> tuple[PartSpec, ...]:
     """Return the parts of a scenario.
 
     Args:
@@ -30,18 +33,20 @@ def load_parts(tables: Sequence[Table], folder: Path, taken: Mapping[str, str], 
         folder: Where their files are.
         taken: Pins of the chip that the robot has: pin → its signal.
         where: The file, for messages.
+        trust: Which code of theirs may be executed; the part of code that is only read is not made.
 
     Raises:
+        UntrustedError: A part is code, and nobody has said that it may be executed.
         ScenarioError: There is no such part, or it cannot be plugged in so.
     """
     found = []
     for number, table in enumerate(tables):
         at = within(where, "part", number)
-        found.append(_load(table, folder, taken, at))
+        found.append(_load(table, folder, taken, at, trust))
     return tuple(found)
 
 
-def _load(table: Table, folder: Path, taken: Mapping[str, str], at: Where) -> PartSpec:
+def _load(table: Table, folder: Path, taken: Mapping[str, str], at: Where, trust: Trust) -> PartSpec:
     for known in KEYS:
         text = table.get(known.name)
         if known.required and text is None:
@@ -55,7 +60,11 @@ def _load(table: Table, folder: Path, taken: Mapping[str, str], at: Where) -> Pa
         ):
             raise ScenarioError(f"{at}: {name} = {shown(value)} is no number, text, flag or list of them")
     kept = tuple((key, tuple(value) if isinstance(value, list) else value) for key, value in settings.items())
-    spec = PartSpec(kind=str(table["kind"]), settings=kept, folder=str(folder))
+    named = f"{at.at('kind') if isinstance(at, Place) else at}: kind"
+    kind = trust.admit(str(table["kind"]), folder, named)
+    spec = PartSpec(kind=kind, settings=kept, folder=str(folder))
+    if isinstance(kind, Code) and kind.is_unread:
+        return spec
     with placed(at):
         wiring = build(spec)
     _refuse_taken([*wiring.pins.values(), *filter(None, [wiring.select])], taken, at)

@@ -58,7 +58,8 @@ from robot_bench.wires.line_ends import ENDS
 from robot_bench.wires.power_up import RANDOM_SRAM, ZEROS
 from simbase.errors import FileError, UsageError, nearest, shown, shown_name
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
-from simbase.user_classes import located, source_of
+from simbase.trust import Code, Trust, UntrustedError, own_code
+from simbase.user_classes import source_of
 
 MODES = ("direct", "adapter")
 #: The kinds of wires that may be cut from the robot, for something outside to drive: those to the chip.
@@ -278,9 +279,20 @@ class Scenario:
 
     @property
     def own_classes(self) -> dict[str, str]:
-        """What stands in the place of a part that ships: its name, and the SHA-256 of the file of its class."""
+        """What stands in the place of what ships: its name, and the hash of its folder, or of the file of its class."""
         named = (("body", self.body), ("adapter", self.adapter_core), ("controller", self.controller_kind))
-        return {name: source_of(_class_of_users(what, name)) for what, name in named if _is_of_users(what, name)}
+        return {str(code): code.key for code in self.codes} | {
+            name: source_of(_class_of_users(what, name))
+            for what, name in named if _is_of_users(what, name) and not isinstance(name, Code)
+        }  # fmt: skip
+
+    @property
+    def codes(self) -> tuple[Code, ...]:
+        """The code of files that it has, of all its robots: that of bodies, adapters, controllers and parts."""
+        each = self.programmed or (self,)
+        named = [name for one in each for name in (one.body, one.adapter_core, one.controller_kind)]
+        named += [part.kind for one in each for part in one.parts]
+        return tuple({str(name): name for name in named if isinstance(name, Code)}.values())
 
     @property
     def programmed(self) -> "tuple[Scenario, ...]":
@@ -298,7 +310,7 @@ class Scenario:
         if mode is not None and mode not in MODES:
             raise UsageError(f"there is no mode {mode!r}", hint=" or ".join(f"--mode {word}" for word in MODES))
         body, core = (
-            None if name is None else _known(what, name, Path())
+            None if name is None else _known(what, own_code(name))
             for what, name in (("body", options.get("body")), ("adapter", options.get("adapter_core")))
         )
         duration_s, world = options.get("duration_s"), options.get("world")
@@ -349,8 +361,9 @@ class Scenario:
 
 
 def load_scenario(
-    name_or_path: str, *, firmware: Path | None = None, settings: Sequence[Setting] = (), set_by: str = "--set"
-) -> Scenario:
+    name_or_path: str, *, firmware: Path | None = None, settings: Sequence[Setting] = (), set_by: str = "--set",
+    trust: bool | Trust = False,
+) -> Scenario:  # fmt: skip
     """Return a shipped scenario by its name, or one from a file.
 
     Args:
@@ -358,13 +371,16 @@ def load_scenario(
         firmware: Takes the place of its own program, which need not be there then.
         settings: Keys and values that are set beside the file: ("start.x_m", 1.5).
         set_by: What a message calls that.
+        trust: Whether code that the file or a setting names may be executed (docs/trust.md).
 
     Raises:
+        UntrustedError: Code is named, and nobody has said that it may be executed.
         ScenarioError: There is no such scenario, or it breaks the schema.
         UsageError: A setting names what is not there.
     """
     if name_or_path in known_scenarios():
-        return read_scenario(shipped_file(name_or_path), firmware=firmware, settings=settings, set_by=set_by)
+        shipped = shipped_file(name_or_path)
+        return read_scenario(shipped, firmware=firmware, settings=settings, set_by=set_by, trust=trust)
     path = Path(name_or_path)
     if not path.is_file():
         if path.suffix == ".toml" or len(path.parts) > 1:
@@ -372,7 +388,7 @@ def load_scenario(
         beside = Path(f"{name_or_path}.toml")
         hint = f"the file here is {beside}" if beside.is_file() else nearest(name_or_path, known_scenarios())
         raise ScenarioError(f"there is no scenario {name_or_path!r}", hint=hint)
-    return read_scenario(path, firmware=firmware, settings=settings, set_by=set_by)
+    return read_scenario(path, firmware=firmware, settings=settings, set_by=set_by, trust=trust)
 
 
 def known_scenarios() -> tuple[str, ...]:
@@ -381,16 +397,18 @@ def known_scenarios() -> tuple[str, ...]:
 
 
 def read_scenario(
-    path: Path, *, firmware: Path | None = None, settings: Sequence[Setting] = (), set_by: str = "--set"
-) -> Scenario:
+    path: Path, *, firmware: Path | None = None, settings: Sequence[Setting] = (), set_by: str = "--set",
+    trust: bool | Trust = False,
+) -> Scenario:  # fmt: skip
     """Read and check a scenario file and those that it includes; arguments as of `load_scenario`.
 
     Raises:
+        UntrustedError: As of `load_scenario`.
         ScenarioError: A file cannot be read or breaks the schema.
         UsageError: A setting names what is not there.
     """
     found = read_tables(path, settings, set_by)
-    scenario = build_scenario(found, path, firmware=firmware, settings=settings)
+    scenario = build_scenario(found, path, firmware=firmware, settings=settings, trust=trust)
     _refuse_what_never_comes(found, path, settings)
     return scenario
 
@@ -417,8 +435,9 @@ def _refuse_what_never_comes(found: ScenarioTable, path: Path, settings: Sequenc
 
 
 def build_scenario(
-    found: ScenarioTable, path: Path, *, firmware: Path | None = None, settings: Sequence[Setting] = ()
-) -> Scenario:
+    found: ScenarioTable, path: Path, *, firmware: Path | None = None, settings: Sequence[Setting] = (),
+    trust: bool | Trust = False,
+) -> Scenario:  # fmt: skip
     """Check a scenario's tables and return the scenario.
 
     Args:
@@ -426,12 +445,14 @@ def build_scenario(
         path: What is named in them is looked for beside it; it need not be there.
         firmware: As of `load_scenario`.
         settings: Those of the tables' keys that were set beside the file.
+        trust: As of `load_scenario`.
 
     Raises:
+        UntrustedError: As of `load_scenario`.
         ScenarioError: They break the schema.
     """
     build = _build_several if isinstance(found.table.get("robot"), list) else _build
-    scenario = build(found.table, found.text, path, Place(found.source), firmware)
+    scenario = build(found.table, found.text, path, Place(found.source), firmware, Trust.of(trust))
     kept = tuple(axis for axis in scenario.axes if axis.key not in dict(settings))
     scenario = replace(scenario, settings=tuple(settings), axes=kept, path=path)
     for one in scenario.programmed or (scenario,):
@@ -490,7 +511,7 @@ def refuse_what_its_world_refuses(scenario: Scenario, world: World) -> None:
     refuse_names(scenario.changes, world)
 
 
-def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | None) -> Scenario:
+def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | None, trust: Trust) -> Scenario:
     check_table(table, _TOP, where)
     robot = str(table.get("robot", "p2dx"))
     own_robot = _own_robot(robot, table, path, where)
@@ -517,7 +538,7 @@ def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | N
         robot=robot,
         own_robot=own_robot,
         mode=str(table.get("mode", "direct" if own_robot else "adapter")),
-        body=_named(table, "body", "body", BEST, path, where),
+        body=_named(table, "body", "body", BEST, path, where, trust),
         seed=cast("int", table.get("seed", 0)),
         duration_ns=(planned_ns := round(cast("float", table["duration_s"]) * NS_PER_S)),
         planned_ns=planned_ns,
@@ -531,13 +552,15 @@ def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | N
         start_at=str(within(where, "start")),
         direct=_direct(cast("Table", table.get("direct", {})), where),
         adapter=_adapter(cast("Table", table.get("adapter", {})), round(threshold_m * 1e6), where),
-        adapter_core=_named(table.get("adapter", {}), "core", "adapter", "model", path, within(where, "adapter")),
+        adapter_core=_named(
+            table.get("adapter", {}), "core", "adapter", "model", path, within(where, "adapter"), trust
+        ),
         controller=_controller(cast("Table", table.get("controller", {})), path, where),
         controller_kind=_named(
-            table.get("controller", {}), "kind", "controller", "pioneer", path, within(where, "controller")
+            table.get("controller", {}), "kind", "controller", "pioneer", path, within(where, "controller"), trust
         ),
         parts=plugged_parts.load_parts(
-            cast("list[Table]", table.get("part", [])), path.parent, _taken(own_robot), where
+            cast("list[Table]", table.get("part", [])), path.parent, _taken(own_robot), where, trust
         ),
         changes=changes,
         seeds=load_seeds(table, where.at("seeds")),
@@ -596,11 +619,11 @@ def _refuse_unrecorded(scenario: Scenario, table: Table, where: Place) -> None:
 _EVENT_KEYS = {"goal": {"event", "events", "after", "from", "to"}, "when": {"event"}}
 
 
-def _build_several(table: Table, text: str, path: Path, where: Place, firmware: Path | None) -> Scenario:
+def _build_several(table: Table, text: str, path: Path, where: Place, firmware: Path | None, trust: Trust) -> Scenario:
     """Return a scenario with several robots, from a table of each."""
     tables = split(table, _TOP, where)
     found: list[Scenario | None] = [
-        replace(_build(one.table, text, path, one.place, firmware), name=one.name) if one.has_firmware else None
+        replace(_build(one.table, text, path, one.place, firmware, trust), name=one.name) if one.has_firmware else None
         for one in tables
     ]
     for one, scenario in zip(tables, found, strict=True):
@@ -771,24 +794,25 @@ def _settings(part: Table, path: Path) -> ControllerSettings:
     return settings
 
 
-def _named(table: object, key: str, what: str, default: str, path: Path, where: Where) -> str:
+def _named(table: object, key: str, what: str, default: str, path: Path, where: Where, trust: Trust) -> str:
     """Return the body, adapter or controller that a key names, and refuse one that cannot be."""
-    name = str(cast("Table", table).get(key, default))
+    at = f"{where.at(key) if isinstance(where, Place) else where}: {key}"
+    name = trust.admit(str(cast("Table", table).get(key, default)), path.parent, at)
     try:
-        return _known(what, name, path.parent)
+        return _known(what, name)
+    except UntrustedError:
+        raise
     except UsageError as error:
-        at = where.at(key) if isinstance(where, Place) else where
-        raise ScenarioError(f"{at}: {key}: {error}", hint=error.hint) from error
+        raise ScenarioError(f"{at}: {error}", hint=error.hint) from error
 
 
-def _known(what: str, name: str, folder: Path) -> str:
-    """Return the name of a body, adapter or controller with the path of its file, if it is of the user's.
+def _known(what: str, name: str) -> str:
+    """Return the name of a body, adapter or controller; code that is only read is not looked into.
 
     Raises:
         UsageError: There is none, or its class lacks a method.
     """
-    name = located(name, folder)
-    if _is_of_users(what, name):
+    if _is_of_users(what, name) and not (isinstance(name, Code) and name.is_unread):
         _class_of_users(what, name)
     return name
 

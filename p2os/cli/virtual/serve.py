@@ -26,6 +26,7 @@ from p2os.cli.names import bodies, worlds
 from p2os.cli.names import robots as robot_names
 from p2os.cli.printing import queue_output
 from p2os.cli.quantities import option
+from p2os.cli.trust import Trusted, said
 from p2os.pioneer.body.factory import BEST
 from p2os.pioneer.controller import ControllerSettings, SonarPerSip
 from p2os.pioneer.controller.flash import load_flash
@@ -54,6 +55,7 @@ from p2os.transport.url import DEFAULT_URL
 from p2os.transport.wall_clock import wall_clock
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
+from simbase.trust import own_code
 from simbase.units import ANGLE, BAUD, COUNT, FACTOR, LENGTH, SEED, TIME
 
 #: chosen: several times what an eager client causes, and still readable.
@@ -206,12 +208,13 @@ def serve(
     status_ns: Annotated[
         Nanos | None, option(TIME, "--status", purpose="Print each robot's state so often.", least="100ms")
     ] = None,
+    trust: Trusted = False,
     json_output: Annotated[bool, typer.Option("--json", help="Print the start line as JSON.")] = False,
 ) -> None:
     """Serve virtual robots until Ctrl-C."""
     if fleet is not None:
         _refuse_beside_fleet(context)
-        order = load_fleet(fleet)
+        order = load_fleet(fleet, trust=said(trust))
     else:
         settings = ControllerSettings() if for_client is None else ControllerSettings.for_client(for_client)
         settings = replace(
@@ -237,7 +240,7 @@ def serve(
                 replace(first, port=url, at=places[number] if number < len(places) else None)
                 for number, url in enumerate(ports)
             ),
-            world=world, body=body, seed=seed, apart=apart, worlds=worlds_folder,
+            world=world, body=own_code(body), seed=seed, apart=apart, worlds=worlds_folder,
         )  # fmt: skip
     made = make_fleet(order)
     queue_output()

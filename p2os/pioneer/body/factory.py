@@ -17,6 +17,7 @@ from p2os.pioneer.body.outside.address import Address, is_address
 from p2os.pioneer.world.model import Pose, World
 from p2os.robots.parameters import RobotParameters
 from simbase.errors import MissingDependencyError, UsageError, shown
+from simbase.trust import own_code
 from simbase.user_classes import find_class, make, refuse_lacking
 
 BODY_NAMES = ("kinematic", "bullet", "mujoco")
@@ -32,7 +33,8 @@ NEEDS: Mapping[str, tuple[str, ...]] = {
 
 
 def make_body(
-    name: str, world: World, parameters: RobotParameters, *, start: Pose | None = None, seed: int = 0
+    name: str, world: World, parameters: RobotParameters, *, start: Pose | None = None, seed: int = 0,
+    trust: bool = True,
 ) -> RobotBody:  # fmt: skip
     """Return a body alone in a scene of its own.
 
@@ -43,17 +45,20 @@ def make_body(
         parameters: What it is.
         start: Where it stands; None is at the world's start.
         seed: Of what is random in a body of the user's.
+        trust: Whether the name is the caller's own, so that FILE.py:CLASS is loaded; False where it may be out of a
+            file, of which only an admitted `simbase.trust.Code` is.
 
     Raises:
         UsageError: There is no body of that name, or it is none.
         MissingDependencyError: The engine or NumPy is not installed.
         WorldError: The world has something that this body cannot take.
     """
-    return make_scene(name, world, [parameters], None if start is None else [start], seed).bodies[0]
+    return make_scene(name, world, [parameters], None if start is None else [start], seed, trust=trust).bodies[0]
 
 
 def make_scene(
-    name: str, world: World, models: Sequence[RobotParameters], starts: Sequence[Pose] | None = None, seed: int = 0
+    name: str, world: World, models: Sequence[RobotParameters], starts: Sequence[Pose] | None = None, seed: int = 0,
+    *, trust: bool = True,
 ) -> RobotScene:  # fmt: skip
     """Return a scene with a robot of each of these models.
 
@@ -63,13 +68,15 @@ def make_scene(
         models: One a robot, the first first.
         starts: Where they stand; None: `reset` puts them where they begin, before they are asked for anything.
         seed: Of what is random in a body of the user's.
+        trust: Whether the name is the caller's own, so that FILE.py:CLASS is loaded; False where it may be out of a
+            file, of which only an admitted `simbase.trust.Code` is.
 
     Raises:
         UsageError: There is no body of that name, or it is none.
         MissingDependencyError: The engine or NumPy is not installed.
         WorldError: The world has something that this body cannot take.
     """
-    name = resolve_body(name)
+    name = resolve_body(own_code(name) if trust and isinstance(name, str) else name)
     if name not in BODY_NAMES:
         scene = _scene_of_users(name, world, models)
         if starts is not None:

@@ -21,7 +21,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from p2os.pioneer.body.factory import BEST, resolve_body
+from p2os.pioneer.body.factory import BEST, BODY_CHOICES, resolve_body
+from p2os.pioneer.body.factory import GROUP as BODY_GROUP
 from p2os.pioneer.controller.faults import read_fault
 from p2os.pioneer.controller.flash import load_flash
 from p2os.pioneer.controller.settings import ControllerSettings, SonarPerSip
@@ -39,7 +40,7 @@ from p2os.toml_schema import LONGEST_S, Key, Place, filled, placed, within
 from p2os.transport.url import DEFAULT_URL
 from simbase.errors import FileError, shown, shown_name
 from simbase.timing import NS_PER_S
-from simbase.user_classes import located
+from simbase.trust import Trust
 
 
 class FleetError(FileError):
@@ -48,7 +49,7 @@ class FleetError(FileError):
 
 TOP = (
     Key(name="world", kind="text", default="room"),
-    Key(name="body", kind="text", default=BEST),
+    Key(name="body", kind="text", choices=BODY_CHOICES, group=BODY_GROUP, default=BEST),
     Key(name="seed", kind="whole", least=0, most=2**63 - 1, default=0),
     Key(name="apart", kind="flag", default=False),
     Key(name="cross_talk", kind="flag", default=True),
@@ -77,26 +78,32 @@ FILES = frozenset({"world", "model", "flash", "errors"})
 Values = Mapping[str, Any]
 
 
-def load_fleet(path: Path) -> FleetOrder:
+def load_fleet(path: Path, *, trust: bool | Trust = False) -> FleetOrder:
     """Read a fleet's file.
+
+    Args:
+        path: The file.
+        trust: Whether code that it names may be executed (docs/trust.md).
 
     Raises:
         FleetError: The file cannot be read, or breaks the schema.
+        UntrustedError: It names code, and nobody has said that it may be executed.
     """
-    return parse_fleet(
-        read_user_text(path, "a fleet", FleetError, hint="docs/pioneer.md shows one"), shown_name(path), path.parent
-    )
+    text = read_user_text(path, "a fleet", FleetError, hint="docs/pioneer.md shows one")
+    return parse_fleet(text, shown_name(path), path.parent, trust=trust)
 
 
-def parse_fleet(text: str, source: str, folder: Path) -> FleetOrder:
+def parse_fleet(text: str, source: str, folder: Path, *, trust: bool | Trust = False) -> FleetOrder:
     """Return the order that a TOML text gives.
 
     Args:
         text: The file's text.
         source: What to call it in messages.
         folder: Where files that it names are looked for first.
+        trust: As of `load_fleet`.
 
     Raises:
+        UntrustedError: As of `load_fleet`.
         FleetError: The text is no TOML or breaks the schema; the message names the source, the line and the key.
     """
     table, places = read_toml(text, source, "a fleet", FleetError)
@@ -106,7 +113,7 @@ def parse_fleet(text: str, source: str, folder: Path) -> FleetOrder:
     for number, row in enumerate(top["robot"]):
         at = within(where, "robot", number)
         robots += _robots(_values(row, ROBOT, at, folder), at, robots)
-    world, body = top["world"], located(top["body"], folder)
+    world, body = top["world"], Trust.of(trust).admit(top["body"], folder, f"{where.at('body')}: body")
     if world not in known_worlds() and not is_file(Path(world)):
         hint = f"shipped worlds: {', '.join(known_worlds())}, or a file"
         raise FleetError(f"{where.at('world')}: no world {shown(world)}", hint=hint)

@@ -137,9 +137,9 @@ def make_fleet(order: FleetOrder) -> MadeFleet:
     name = resolve_body(order.body)
     if order.apart:
         each = zip(models, starts, strict=True)
-        scenes = [make_scene(name, world, [model], [start], order.seed) for model, start in each]
+        scenes = [make_scene(name, world, [model], [start], order.seed, trust=False) for model, start in each]
     else:
-        scenes = [make_scene(name, world, models, starts, order.seed)]
+        scenes = [make_scene(name, world, models, starts, order.seed, trust=False)]
     bodies = [body for scene in scenes for body in scene.bodies]
     made: list[tuple[Pioneer, RobotBody]] = []
     for number, (robot, model, body) in enumerate(zip(order.robots, models, bodies, strict=True)):

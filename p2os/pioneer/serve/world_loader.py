@@ -59,7 +59,7 @@ class WorldLoader:
         world = load_world(self._allowed(name), seed=self.seed)
         models = [robot.parameters for robot in self.robots]
         starts = start_places(world, models, [None] * len(models))
-        scene = make_scene(self.body, world, models, starts, self.seed)
+        scene = make_scene(self.body, world, models, starts, self.seed, trust=False)
         raw_name = name.encode("utf-8", "surrogateescape")
         if self.multi_robot_world is not None:
             self.multi_robot_world.enter_world(scene, raw_name, now)

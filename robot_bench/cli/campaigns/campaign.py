@@ -13,6 +13,7 @@ import typer
 from p2os.cli.help_pages import BENCH
 from p2os.cli.main import EXIT_INTERRUPTED
 from p2os.cli.quantities import option
+from p2os.cli.trust import Trusted, said
 from p2os.transport.wall_clock import wall_clock
 from robot_bench.campaign.campaign_file import Campaign, campaign_schema
 from robot_bench.campaign.conduct import Finding, Progress, Workers
@@ -28,6 +29,7 @@ from robot_bench.cli.workers import Jobs, core_count
 from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.scenario.scenario import load_scenario
 from simbase.errors import UsageError, nearest
+from simbase.trust import Trust
 from simbase.units import COUNT
 
 HELP = """Search for worlds in which a firmware fails.
@@ -83,6 +85,7 @@ def campaign(
     ] = None,
     dask: Annotated[str | None, typer.Option(help="Workers of Dask on this machine.", metavar="local")] = None,
     scheduler: Annotated[str | None, typer.Option(help="Dask's scheduler.", metavar="ADDRESS")] = None,
+    trust: Trusted = False,
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
     schema: Annotated[bool, typer.Option("--schema", help="Print the JSON schema of campaigns.")] = False,
 ) -> None:
@@ -92,7 +95,7 @@ def campaign(
         typer.echo(json.dumps(campaign_schema(), indent=2))
         return
     if asked[:1] == ["new"]:
-        write_new(asked[1:], out, firmware)
+        write_new(asked[1:], out, firmware, trust=said(trust))
         return
     if dask not in {None, "local"}:
         raise UsageError(f"there is no --dask {dask!r}", hint="--dask local, or --scheduler ADDRESS")
@@ -105,11 +108,11 @@ def campaign(
     if go_on is not None:
         if asked or overrides or firmware or against or out:
             raise UsageError("--resume goes on with what was begun", hint="leave file and options out, but for -j")
-        folder, found = go_on, resume(go_on)
+        folder, found = go_on, resume(go_on, trust=said(trust))
     elif len(asked) == 1:
         file = Path(asked[0])
         folder = out or make_next_folder(file.stem, CAMPAIGNS)
-        found = begin(file, folder, firmware=firmware, overrides=overrides)
+        found = begin(file, folder, firmware=firmware, overrides=overrides, trust=said(trust))
     else:
         raise UsageError("which campaign?", hint="p2os campaign FILE, or p2os campaign new SCENARIO")
     with RunDisplay(is_shown=False) as display:
@@ -127,7 +130,7 @@ def campaign(
     tell(done, other, json_output=json_output)
 
 
-def write_new(words: list[str], out: Path | None, firmware: Path | None) -> None:
+def write_new(words: list[str], out: Path | None, firmware: Path | None, trust: bool | Trust = False) -> None:
     """Write a campaign file for a scenario.
 
     Raises:
@@ -135,7 +138,7 @@ def write_new(words: list[str], out: Path | None, firmware: Path | None) -> None
     """
     if len(words) != 1:
         raise UsageError("a campaign for which scenario?", hint="p2os campaign new dodge")
-    scenario = load_scenario(words[0], firmware=firmware)
+    scenario = load_scenario(words[0], firmware=firmware, trust=trust)
     path = out or Path(f"{scenario.name}-campaign.toml")
     try:
         with path.open("x", encoding="utf-8") as file:

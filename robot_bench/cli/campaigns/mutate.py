@@ -21,6 +21,7 @@ from p2os.cli.help_pages import BENCH
 from p2os.cli.main import EXIT_INTERRUPTED
 from p2os.cli.names import bodies
 from p2os.cli.quantities import option
+from p2os.cli.trust import Trusted, said
 from robot_bench.campaign.variants.mutation.base_run import BaseRun, base_run
 from robot_bench.campaign.variants.mutation.report import Mutation, as_json, report_lines, write_junit
 from robot_bench.campaign.variants.mutation.suite import Suite, SuiteRun, load_pytest, run_suite
@@ -96,13 +97,16 @@ def mutate(
         Path | None, typer.Option(help="Write the survivors there, as firmware files.", metavar="FOLDER")
     ] = None,
     junit: Annotated[Path | None, typer.Option(help="Write what CI reads.", metavar="FILE")] = None,
+    trust: Trusted = False,
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Judge goals."""
     settings = [read_setting(text) for text in set_ or ()]
     paths = tuple(Path(name) for name in scenarios if name.endswith(".py") or Path(name).is_dir())
     wanted = [
-        load_scenario(name, firmware=firmware, settings=settings).with_options(firmware=firmware, mode=mode, body=body)
+        load_scenario(name, firmware=firmware, settings=settings, trust=said(trust)).with_options(
+            firmware=firmware, mode=mode, body=body
+        )
         for name in scenarios if Path(name) not in paths
     ]  # fmt: skip
     if junit is not None:

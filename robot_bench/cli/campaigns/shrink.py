@@ -8,6 +8,7 @@ import typer
 
 from p2os.cli.help_pages import BENCH
 from p2os.cli.quantities import option
+from p2os.cli.trust import Trusted, said
 from p2os.toml_schema import Table
 from robot_bench.campaign.trial import Trial, trial_of
 from robot_bench.campaign.variants.shrinking.failure import Failure, Way, failure_of
@@ -18,9 +19,9 @@ from robot_bench.cli.progress import RunDisplay, runs_bar
 from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.recording.run_record import TRACE_NAME
 from robot_bench.scenario.included_files import Setting, read_setting
-from robot_bench.scenario.scenario import load_scenario
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
+from simbase.trust import Trust
 from simbase.units import COUNT, SEED
 
 #: What makes a trial cheap.
@@ -73,12 +74,13 @@ def shrink_run(
         int, option(COUNT, "--budget", purpose="Most runs.", shown=str(BUDGET), above_zero=True)
     ] = BUDGET,
     out: Annotated[Path | None, typer.Option(help="Folder; default shrunk/NAME-NNN.", metavar="FOLDER")] = None,
+    trust: Trusted = False,
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Shrink a failing run."""
     options = {"mode": mode, "body": body, "seed": seed}
     settings = [*map(read_setting, set_ or ()), *((key, value) for key, value in options.items() if value is not None)]
-    trial = _trial(run, firmware, settings)
+    trial = _trial(run, firmware, settings, said(trust))
     if goal is not None:
         trial = _with_goal(trial, goal)
     if out is not None and out.exists() and (not out.is_dir() or any(out.iterdir())):
@@ -101,21 +103,21 @@ def shrink_run(
         raise typer.Exit(1)
 
 
-def _trial(run: str, firmware: Path | None, settings: list[Setting]) -> Trial:
+def _trial(run: str, firmware: Path | None, settings: list[Setting], trust: Trust) -> Trial:
     """Return the trial of a run folder or a scenario.
 
     Raises:
+        UntrustedError: Code is named, and nobody has said that it may be executed.
         UsageError: A file is gone.
         ScenarioError: There is no such scenario, or it breaks the schema.
     """
     if firmware is not None and not firmware.is_file():
         raise UsageError(f"there is no firmware file {firmware}", hint="give an ELF, HEX or BIN file")
     if (Path(run) / TRACE_NAME).is_file():
-        return trial_of_run(Path(run), firmware).set(*settings)
+        return trial_of_run(Path(run), firmware, trust=trust).set(*settings)
     if Path(run).is_dir():
         raise UsageError(f"{run} is no run folder: it has no {TRACE_NAME}", hint="p2os run makes one")
-    load_scenario(run, firmware=firmware, settings=settings)
-    return trial_of(run, firmware=firmware, settings=settings)
+    return trial_of(run, firmware=firmware, settings=settings, trust=trust)
 
 
 def _with_goal(trial: Trial, kind: str) -> Trial:
@@ -156,8 +158,9 @@ def _print(small: Shrunk, kept: Kept) -> None:
         typer.echo("")
         typer.echo(kept.explained)
     typer.echo("")
-    typer.echo(f"again     p2os run {kept.scenario}")
-    typer.echo(f"test      pytest {kept.test}")
+    trusts = bool(small.trial.trusted)
+    typer.echo(f"again     p2os run {kept.scenario}{' --trust' if trusts else ''}")
+    typer.echo(f"test      pytest {f'-o p2os_trust={kept.scenario.parent.absolute()} ' if trusts else ''}{kept.test}")
     typer.echo(f"picture   {kept.scenario.parent / 'scene.png'}")
     proof = "the same trace in another process" if kept.is_confirmed else "NOT the same in another process"
     typer.echo(f"proof     {proof}: {kept.outcome.sha256[:16]}")

@@ -11,6 +11,7 @@ import typer
 from p2os.cli.help_pages import BENCH
 from p2os.cli.names import bodies
 from p2os.cli.quantities import option
+from p2os.cli.trust import Trusted, said
 from robot_bench.cli.names import scenario_names
 from robot_bench.cli.progress import RunDisplay
 from robot_bench.cli.workers import Jobs, core_count, load_once, run_in_processes
@@ -80,6 +81,7 @@ def sensitivity(
         Nanos | None, option(TIME, "--duration", purpose="How much virtual time.", above_zero=True)
     ] = None,
     jobs: Jobs = None,
+    trust: Trusted = False,
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
     picture: Annotated[Path | None, typer.Option("--picture", help="Draw the effects, PNG.", metavar="FILE")] = None,
 ) -> None:  # fmt: skip
@@ -98,7 +100,7 @@ def sensitivity(
     fixed = [read_setting(text) for text in setting or []]
 
     def made(settings: Sequence[Setting], own_seed: int | None) -> Scenario:
-        found = load_scenario(scenario, settings=[*fixed, *settings], set_by="--vary")
+        found = load_scenario(scenario, settings=[*fixed, *settings], set_by="--vary", trust=said(trust))
         options: Json = {"body": body or None, "seed": own_seed, "duration_s": duration and duration / NS_PER_S}
         return found.with_options(**{key: value for key, value in options.items() if value is not None})  # type: ignore[arg-type]  # as ScenarioOptions has them
 

@@ -6,7 +6,7 @@ are `GoalKind`s.
 
 from collections.abc import Mapping
 from functools import cache
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 from typing import cast
 
 from p2os.errors import ScenarioError
@@ -37,6 +37,7 @@ from robot_bench.scenario.goals.temporal import (
 from robot_bench.scenario.goals.text import EncoderCounts, InOrder, SensorNamed
 from robot_bench.scenario.goals.watch import GoalKind, Watch, number
 from simbase.errors import shown
+from simbase.trust import installed_points
 
 _POSE_SIGNALS = tuple(SIGNALS)
 _TEXT = Key(name="text", kind="text", required=True)
@@ -342,4 +343,4 @@ def known_kinds() -> list[str]:
 
 @cache
 def _entry_points() -> "Mapping[str, EntryPoint]":
-    return {point.name: point for point in entry_points(group="robot_bench.goals")}
+    return installed_points("robot_bench.goals")

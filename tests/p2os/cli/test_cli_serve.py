@@ -224,7 +224,7 @@ def test_a_terminal_that_is_gone_is_left_and_keeps_nothing_from_stopping(monkeyp
 
 
 def test_serve_without_pybullet_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
-    def missing(*_: object) -> None:
+    def missing(*_: object, **_named: object) -> None:
         raise MissingDependencyError("the bullet body needs pybullet", hint="go and get it")
 
     monkeypatch.setattr(fleet_order, "make_scene", missing)

@@ -18,8 +18,8 @@ ROOT = Path(__file__).resolve().parents[3]
 def p2os(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
     """Run a command line in an empty folder; return its exit code."""
     declared = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["entry-points"]
-    verbs = [EntryPoint(name, value, main.GROUP) for name, value in declared["p2os.verbs"].items()]
-    monkeypatch.setattr(main, "entry_points", lambda **_words: verbs)
+    verbs = {name: EntryPoint(name, value, main.GROUP) for name, value in declared["p2os.verbs"].items()}
+    monkeypatch.setattr(main, "installed_points", lambda _group: verbs)
     monkeypatch.chdir(tmp_path)
     return lambda *words: main.run([str(word) for word in words])
 

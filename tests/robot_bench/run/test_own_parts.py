@@ -44,14 +44,16 @@ def changed(folder: Path, name: str, old: str, new: str) -> str:
 
 def refusal(folder: Path, **options: str) -> P2osError:
     with pytest.raises(P2osError) as caught:
-        Bench.from_scenario(str(folder / "mine.toml"), **options)
+        Bench.from_scenario(str(folder / "mine.toml"), trust=True, **options)
     assert caught.value.exit_code == 2
     assert "\n" not in str(caught.value)
     return caught.value
 
 
 def test_own_body_adapter_and_controller_repeat_fork_rewind_and_pickle_to_the_same_trace(folder: Path) -> None:
-    benches = [Bench.from_scenario(str(folder / "mine.toml"), firmware=MOTORS, duration_s=3.6) for _ in range(2)]
+    benches = [
+        Bench.from_scenario(str(folder / "mine.toml"), trust=True, firmware=MOTORS, duration_s=3.6) for _ in range(2)
+    ]
     for bench, stops in zip(benches, ([3.2], [1, 2.0001, 3.2]), strict=True):
         for stop in stops:
             bench.run_until(round(stop * NS_PER_S))
@@ -83,7 +85,7 @@ def test_several_robots_share_an_own_body_and_no_own_controller(folder: Path) ->
     )
     text = f'world = "room"\nduration_s = 3.2\nbody = "./mine.py:Tiring"\n{robots}'
     (folder / "mine.toml").write_text(text, encoding="utf-8")
-    bench = Bench.from_scenario(str(folder / "mine.toml"))
+    bench = Bench.from_scenario(str(folder / "mine.toml"), trust=True)
     bench.run_until("3.2 s")
     assert [one.pose.heading_rad > 0 for one in bench.robots.values()] == [True, True]
     (folder / "mine.toml").write_text(text + '[robot.controller]\nkind = "./mine.py:Simple"\n', encoding="utf-8")
@@ -137,7 +139,7 @@ def test_what_an_own_class_raises_in_a_run_is_told_with_its_line_and_is_no_bug_h
         "        return super().advance_to(limit) if limit < 10**8 else 1 / 0\n"
     )
     (folder / "late.toml").write_text(SHIPPED + '[controller]\nkind = "./late.py:Late"\n')
-    assert p2os(["run", "late.toml", "--out", "late"]) == 1
+    assert p2os(["run", "late.toml", "--out", "late", "--trust"]) == 1
     said = capsys.readouterr().err
     assert f"p2os: {folder}/late.py:6: ZeroDivisionError: division by zero\n" in said
     assert "bug" not in said
@@ -149,7 +151,7 @@ def test_an_unknown_name_lists_what_there_is(
     folder: Path, key: str, known: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     point = SimpleNamespace(name="theirs", load=lambda: 1 / 0)
-    monkeypatch.setattr(user_classes, "entry_points", lambda **_: [point])
+    monkeypatch.setattr(user_classes, "installed_points", lambda _group: {"theirs": point})
     text = re.sub(rf'{key} = ".*"', f'{key} = "nobody"', BLOCKS["mine.toml"], count=1)
     (folder / "mine.toml").write_text(text)
     error = refusal(folder)
@@ -162,7 +164,7 @@ def test_an_unknown_name_lists_what_there_is(
 def test_an_entry_point_names_a_body(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     point = SimpleNamespace(name="theirs", load=lambda: KinematicScene)
     groups = []
-    monkeypatch.setattr(user_classes, "entry_points", lambda group: groups.append(group) or [point])
+    monkeypatch.setattr(user_classes, "installed_points", lambda group: groups.append(group) or {"theirs": point})
     bench = Bench.from_scenario("motors", body="theirs", duration_s=1)
     assert isinstance(bench.parts.body.scene, KinematicScene)
     assert set(groups) == {"p2os.bodies"}
@@ -170,15 +172,15 @@ def test_an_entry_point_names_a_body(folder: Path, monkeypatch: pytest.MonkeyPat
 
 def test_a_snapshot_is_refused_by_another_version_of_the_class(folder: Path) -> None:
     name = str(folder / "mine.toml")
-    saved = Bench.from_scenario(name).snapshot()
-    Bench.from_scenario(name).restore(saved)
+    saved = Bench.from_scenario(name, trust=True).snapshot()
+    Bench.from_scenario(name, trust=True).restore(saved)
     changed(folder, "mine.py", "0.02", "0.03")
     with pytest.raises(UsageError, match=r"mine\.py:Tiring"):
-        Bench.from_scenario(name).restore(saved)
+        Bench.from_scenario(name, trust=True).restore(saved)
 
 
 def test_an_own_adapter_drives_no_real_robot(folder: Path) -> None:
-    scenario = load_scenario(str(folder / "mine.toml"))
+    scenario = load_scenario(str(folder / "mine.toml"), trust=True)
     with pytest.raises(UsageError, match="TwoBytes drives no real robot"):
         make_shipped_adapter(scenario, SimpleNamespace(), SimpleNamespace())
 

@@ -20,6 +20,7 @@ from robot_bench.report.page import _parts
 from robot_bench.run import parts_of, run_scenario
 from robot_bench.scenario.scenario import load_scenario
 from simbase import user_classes
+from simbase.trust import own_code
 
 PROBE = '''
 from bluepill_sim.parts import Picture
@@ -78,7 +79,7 @@ def probe_of(bench: Bench) -> Any:
 
 
 def test_a_part_senses_the_body_as_it_stood_at_its_last_step(folder: Path) -> None:
-    bench = Bench(load_scenario(str(folder / "mine.toml")))
+    bench = Bench(load_scenario(str(folder / "mine.toml"), trust=True))
     bench.run_until("0.6 s")
     seen = probe_of(bench).seen
     assert [row[0] for row in seen] == [7_000_000 * n for n in range(1, 86)]
@@ -98,7 +99,7 @@ def test_a_part_senses_the_body_as_it_stood_at_its_last_step(folder: Path) -> No
 
 
 def test_it_senses_the_same_in_slices_and_from_a_pickle(folder: Path) -> None:
-    scenario = load_scenario(str(folder / "mine.toml"))
+    scenario = load_scenario(str(folder / "mine.toml"), trust=True)
     whole = Bench(scenario)
     whole.run_until("0.3 s")
     sliced = Bench(scenario, slice_ns=333_333)
@@ -115,11 +116,13 @@ def test_a_fork_and_a_rewound_bench_go_on_as_the_first_with_a_part_of_the_users(
     kind: str, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if kind == "theirs":
-        made = user_classes.find_class(f"{folder}/probe.py:Probe", what="part", group="p2os.parts", known=())
+        name = own_code(f"{folder}/probe.py:Probe")
+        made = user_classes.find_class(name, what="part", group="p2os.parts", known=())
         point = SimpleNamespace(name="theirs", load=lambda: made)
-        monkeypatch.setattr(user_classes, "entry_points", lambda group: [point] if group == "p2os.parts" else [])
+        theirs = {"p2os.parts": {"theirs": point}}
+        monkeypatch.setattr(user_classes, "installed_points", lambda group: theirs.get(group, {}))
     (folder / "mine.toml").write_text(SCENARIO.replace("probe.py:Probe", kind))
-    bench = Bench(load_scenario(str(folder / "mine.toml")))
+    bench = Bench(load_scenario(str(folder / "mine.toml"), trust=True))
     bench.run_until("0.1 s")
     forked = bench.fork()
     found = []
@@ -134,7 +137,7 @@ def test_a_fork_and_a_rewound_bench_go_on_as_the_first_with_a_part_of_the_users(
 
 
 def test_the_report_shows_what_parts_came_to_and_their_pictures(folder: Path) -> None:
-    scenario = load_scenario(str(folder / "mine.toml")).with_options(duration_s=0.1)
+    scenario = load_scenario(str(folder / "mine.toml"), trust=True).with_options(duration_s=0.1)
     result = run_scenario(scenario, folder / "run")
     page = result.report.read_text(encoding="utf-8")
     assert "<h2>Parts</h2>" in page
@@ -164,7 +167,7 @@ def test_a_part_that_cannot_be_is_refused_with_its_place(folder: Path, table: st
     path = folder / "bad.toml"
     path.write_text(SCENARIO.split("[[part]]", maxsplit=1)[0] + "[[part]]\n" + table + "\n")
     with pytest.raises(ScenarioError, match=r"bad\.toml:\d+: \[\[part\]\] 1") as caught:
-        load_scenario(str(path))
+        load_scenario(str(path), trust=True)
     assert message in str(caught.value)
 
 

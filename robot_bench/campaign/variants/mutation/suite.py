@@ -16,7 +16,6 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -26,6 +25,7 @@ from bluepill_sim.program.mutants import Mutant, mutated_file
 from bluepill_sim.program.static_code import StaticCode
 from robot_bench.campaign.variants.mutation.trial import Fate, Found
 from robot_bench.events.codec import Json
+from simbase.trust import installed_points
 
 if TYPE_CHECKING:
     import pytest
@@ -66,7 +66,7 @@ class SuiteRun:
 
 def load_pytest() -> None:
     """Import pytest and its plugins, so that the forks that run it need not each do so."""
-    for name in ("pytest", *(plugin.module for plugin in entry_points(group="pytest11"))):
+    for name in ("pytest", *(plugin.module for plugin in installed_points("pytest11").values())):
         with contextlib.suppress(Exception):  # pytest itself says what ails a plugin
             import_module(name)
 

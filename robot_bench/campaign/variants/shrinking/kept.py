@@ -31,6 +31,7 @@ from robot_bench.recording.run_record import TRACE_NAME, RunRecord, read_run
 from robot_bench.report import make_scene
 from robot_bench.report.explain.explain import explain
 from simbase.errors import FileError, P2osError, UsageError
+from simbase.trust import Trust
 
 #: The folder of the run within.
 RUN_NAME = "run"
@@ -65,11 +66,12 @@ def keep(trial: Trial, way: Way, folder: Path) -> Kept:
         P2osError: The run cannot be read, or explained.
     """
     scenario = trial.write(folder)
+    trust = ["--trust"] if trial.trusted else []
     test = folder / f"test_{_identifier(trial.name)}.py"
     try:
         test.write_text(test_text(trial, way), encoding="utf-8")
         found = subprocess.run(  # noqa: S603 - this interpreter, with files of our own
-            [*_COMMAND, "run", scenario, "--out", folder / RUN_NAME, "--force", "--json"],
+            [*_COMMAND, "run", scenario, *trust, "--out", folder / RUN_NAME, "--force", "--json"],
             capture_output=True, text=True, timeout=_MOST_S, check=False,
         )  # fmt: skip
         there = json.loads(found.stdout) if found.stdout.startswith("{") else {}
@@ -109,14 +111,16 @@ def test_text(trial: Trial, way: Way) -> str:
     )
 
 
-def trial_of_run(folder: Path, firmware: Path | None = None) -> Trial:
+def trial_of_run(folder: Path, firmware: Path | None = None, *, trust: bool | Trust = False) -> Trial:
     """Return the trial that a run folder is of, from the scenario's file and what was set beside it.
 
     Args:
         folder: The run folder of one robot.
         firmware: Takes the place of the program that ran.
+        trust: As of `load_scenario`.
 
     Raises:
+        UntrustedError: As of `load_scenario`.
         UsageError: The scenario's file or the program are gone, or were changed since.
         TraceError: It is no run folder.
     """
@@ -133,7 +137,7 @@ def trial_of_run(folder: Path, firmware: Path | None = None) -> Trial:
     # What options of the command line may have set.
     settings += [(key, meta[key]) for key in ("mode", "body") if meta.get("mode") != "port"]
     settings += [("seed", meta["seed"]), ("duration_s", float(cast("float", meta["duration_s"])))]
-    trial = _in_world(trial_of(path, firmware=program, settings=settings), str(meta["world_path"]))
+    trial = _in_world(trial_of(path, firmware=program, settings=settings, trust=trust), str(meta["world_path"]))
     _refuse_another(record, trial, folder, firmware)
     return replace(trial, name=str(meta["scenario"]))
 

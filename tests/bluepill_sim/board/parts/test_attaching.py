@@ -12,6 +12,7 @@ from bluepill_sim.parts import Ssd1306
 from bluepill_sim.parts.attached import PartError
 from bluepill_sim.parts.registry import PARTS, PartSpec, attach, build, parse_part, part_class
 from p2os.cli.main import run
+from simbase.trust import own_code
 
 PROGRAM = Path(__file__).parents[2] / "firmware" / "parts.elf"
 ATTACHED = (
@@ -145,7 +146,8 @@ class Stuck(Blinker):
 def mine(folder: Path, words: str, text: str = MINE) -> PartSpec:
     (folder / "mine.py").write_text(text)
     sys.modules.pop("p2os_part_mine", None)
-    return PartSpec(kind=f"mine.py:{words.partition(',')[0]}", settings=parse_part(words).settings, folder=str(folder))
+    kind = own_code(f"mine.py:{words.partition(',')[0]}", folder)
+    return PartSpec(kind=kind, settings=parse_part(words).settings, folder=str(folder))
 
 
 def test_a_class_in_a_file_is_a_part_with_settings_of_its_types(tmp_path: Path) -> None:
