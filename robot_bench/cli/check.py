@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from p2os.cli.help_pages import BENCH
-from p2os.toml_schema import placed
+from p2os.toml_schema import placed, within
 from robot_bench.bench import Bench
 from robot_bench.scenario.included_files import as_toml
 from robot_bench.scenario.json_schema import scenario_schema
@@ -88,12 +88,13 @@ def _check_rows(name: str, scenario: Scenario, firmware: Path | None, codes: dic
     """
     count, built = 0, set[str]()
     for settings in rows(scenario.axes) if scenario.axes else ():
-        row = load_scenario(name, firmware=firmware, settings=settings, set_by=f"{name}: [sweep]", trust=_NOTHING)
+        place = str(within(scenario.where, "sweep"))
+        row = load_scenario(name, firmware=firmware, settings=settings, set_by=place, trust=_NOTHING)
         codes |= {code.where: code for code in row.codes}
         words = [f"{key} = {as_toml(value)}" for key, value in settings]
         if not built.issuperset(words):
             built.update(words)
-            with placed(f"{name}: [sweep] {', '.join(words)}"):
+            with placed(f"{place} {', '.join(words)}"):
                 _build(row)
         count += 1
     return max(count, 1) * max(len(scenario.seeds), 1)

@@ -18,6 +18,7 @@ from p2os.cli.quantities import option
 from p2os.cli.trust import Trusted, said
 from p2os.errors import RunFailedError
 from p2os.ros.transports import TRANSPORTS
+from p2os.toml_schema import within
 from p2os.transport import open_url
 from robot_bench.cli.names import scenario_names
 from robot_bench.cli.progress import RunDisplay
@@ -361,7 +362,7 @@ def sweep_rows(name: str, wanted: Scenario, options: ScenarioOptions, seeds: str
         firmware = options.get("firmware")
         row = load_scenario(
             name, firmware=None if firmware is None else Path(firmware), settings=(*wanted.settings, *settings),
-            set_by="[sweep]", trust=trust,
+            set_by=str(within(wanted.where, "sweep")), trust=trust,
         ).with_options(**options)  # fmt: skip
         for one in chosen or (row.seed,):
             again = command(name, words, (*wanted.settings, *settings), one)

@@ -5,7 +5,6 @@ sits there, and no answer is a refusal.
 """
 
 import sys
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
@@ -46,11 +45,6 @@ class Trust:
         if isinstance(given, cls):
             return given
         return cls(everything=bool(given), hint="read it, then trust=True loads it; docs/trust.md")
-
-    @classmethod
-    def of_same(cls, codes: Iterable[Code]) -> Self:
-        """Return trust in what was admitted already, wherever it stands now."""
-        return cls(keys=frozenset(code.key for code in codes if code.admitted is not None))
 
     def admit(self, name: str, folder: Path, where: str) -> str:
         """Return a name out of a file, ready to be loaded.

@@ -18,6 +18,7 @@ from robot_bench.cli.run import sweep_rows
 from robot_bench.cli.sweep import Done, print_sweep
 from robot_bench.cli.workers import run_in_processes
 from robot_bench.scenario.scenario import load_scenario
+from simbase.trust import Trust
 from tests.robot_bench.firmware import thumb
 from tests.robot_bench.firmware.hurried import hurried
 
@@ -98,7 +99,7 @@ def test_of_runs_of_which_none_is_kept_no_folder_is_left(capsys: pytest.CaptureF
 def printed(seeds: str, capsys: pytest.CaptureFixture[str]) -> list[str]:
     """Return what is printed of a sweep whose runs have failed where they began left of the y axis."""
     name = make(LEAST + RIGHT + "[sweep]\nstart.x_m = [-0.5, 0.5]\n")
-    rows = sweep_rows(name, load_scenario(name), {}, seeds)
+    rows = sweep_rows(name, load_scenario(name), {}, seeds, Trust())
     passed = [dict(row.settings)["start.x_m"] == 0.5 for row in rows]
     outcomes = [{"passed": one, "failures": [] if one else ["stay_within: it did not"]} for one in passed]
     print_sweep(Done(rows, outcomes, was_interrupted=False, folder=Path("runs")))

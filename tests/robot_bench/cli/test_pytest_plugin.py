@@ -209,3 +209,36 @@ def test_a_test_may_have_a_served_robot_and_a_client_of_it(pytester: pytest.Pyte
     result.assert_outcomes(passed=2, errors=2)
     result.stdout.fnmatch_lines(["*no world 'nowhere'*", "*unexpected keyword argument 'wold'*"])
     assert "Traceback" not in result.stdout.str()
+
+
+TRUSTING = """
+import pytest
+
+@pytest.mark.scenario("mine.toml")
+def test_with_code_of_its_own(bench):
+    assert bench.parts.body.is_own
+"""
+
+
+@pytest.mark.parametrize(("setting", "passes"), [("", False), ("mine.py", True), (".", True), ("other", False)])
+def test_code_that_a_scenario_names_is_loaded_where_the_ini_file_trusts_it(
+    pytester: pytest.Pytester, setting: str, *, passes: bool
+) -> None:
+    (pytester.path / "mine.toml").write_text(
+        'firmware = "motors"\nworld = "room"\nduration_s = 1\nbody = "./mine.py:Own"\n'
+    )
+    (pytester.path / "mine.py").write_text(
+        "from pathlib import Path\nfrom p2os.pioneer.body.kinematic import KinematicScene\n"
+        "Path(__file__).with_name('canary').touch()\nclass Own(KinematicScene):\n"
+        "    def __init__(self, world, models):\n        super().__init__(world, models)\n"
+        "        self.bodies[0].is_own = True\n"
+    )
+    pytester.makeini(f"[pytest]\np2os_trust = {setting}\n")
+    pytester.makepyfile(test_mine=TRUSTING)
+    found = pytester.run(forked_python(), "-c", PYTEST, *PLUGIN, "--basetemp", str(pytester.path / "temporary"))
+    assert (pytester.path / "canary").exists() == passes
+    if passes:
+        found.assert_outcomes(passed=1)
+    else:
+        found.assert_outcomes(errors=1)
+        found.stdout.fnmatch_lines(["*mine.toml:4: body: ./mine.py:Own is Python code*p2os_trust = *"])

@@ -3,15 +3,19 @@
 import pickle
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
+from typing import ClassVar
 
 import pytest
 
 from bluepill_sim import BluePill, BluePillError
+from bluepill_sim.cli.parts import show_parts
 from bluepill_sim.parts import Ssd1306
-from bluepill_sim.parts.attached import PartError
+from bluepill_sim.parts.attached import PartError, Use
 from bluepill_sim.parts.registry import PARTS, PartSpec, attach, build, parse_part, part_class
 from p2os.cli.main import run
+from simbase.errors import FileError
 from simbase.trust import own_code
 
 PROGRAM = Path(__file__).parents[2] / "firmware" / "parts.elf"
@@ -254,3 +258,47 @@ def test_the_command_line_lists_parts_with_their_settings(capfd: pytest.CaptureF
     one = capfd.readouterr().out
     assert "  pins  trig, echo\n" in one
     assert "  temperature_c = 20.0\n" in one
+
+
+@pytest.mark.parametrize("name", ["../X", "/X", "a/b", "a\\b", "..", ".X", "x\ny", "x\0y"])
+def test_a_part_has_no_name_that_leads_out_of_a_folder(name: str) -> None:
+    board = BluePill(PROGRAM)
+    with pytest.raises(PartError, match="is no name of a part"):
+        attach(board, parse_part(f"sd-card,on=SPI1,select=PA4,save=true,name={name}"))
+    assert not board.attached.by_name
+
+
+class Writer:
+    """A part of a user that leaves a file behind whose name leads elsewhere."""
+
+    PINS: ClassVar = {"out": Use.HELD}
+
+    def files(self) -> dict[str, bytes]:
+        return {"/../../X": b"x"}
+
+
+def test_a_part_writes_no_file_out_of_the_folder(tmp_path: Path) -> None:
+    board = BluePill(PROGRAM)
+    board.attach(Writer(), name="writer", out="PB12")
+    with pytest.raises(FileError, match="leads out of the folder"):
+        show_parts(board, tmp_path / "parts")
+    assert list(tmp_path.parent.rglob("X*")) == []
+
+
+@pytest.mark.parametrize("name", ["../card.img", "above", "/dev/zero", "inner", "there/../../card.img"])
+@pytest.mark.parametrize(("kind", "key"), [("sd-card,on=SPI1", "image"), ("24c02,on=I2C1", "contents")])
+def test_a_part_of_a_scenario_reads_files_of_its_folder_alone(kind: str, key: str, name: str, tmp_path: Path) -> None:
+    here = tmp_path / "here"
+    (here / "inner").mkdir(parents=True)
+    (tmp_path / "card.img").write_bytes(bytes(512 * 1024))
+    (here / "above").symlink_to(tmp_path / "card.img")
+    spec = parse_part(f"{kind},{key}={name}")
+    with pytest.raises(PartError, match=r"leads out of the folder|is no file"):
+        build(replace(spec, folder=str(here)))
+
+
+def test_a_part_of_the_command_line_reads_any_file_but_a_device(tmp_path: Path) -> None:
+    (tmp_path / "card.img").write_bytes(bytes(512 * 1024))
+    assert build(parse_part(f"sd-card,on=SPI1,image={tmp_path}/card.img"))
+    with pytest.raises(PartError, match="/dev/zero is no file"):
+        build(parse_part("sd-card,on=SPI1,image=/dev/zero"))
