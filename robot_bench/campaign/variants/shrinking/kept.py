@@ -37,7 +37,7 @@ from simbase.trust import Trust
 RUN_NAME = "run"
 #: chosen: longer than the other process takes for an hour of virtual time.
 _MOST_S = 3600
-_COMMAND = (sys.executable, "-c", "from p2os.cli.main import main; main()")
+_COMMAND = (sys.executable, "-P", "-c", "from p2os.cli.main import main; main()")
 _HINT = "give the scenario itself, with --firmware where the program is elsewhere"
 
 
