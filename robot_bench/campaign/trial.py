@@ -41,7 +41,7 @@ from robot_bench.scenario.included_files import (
 )
 from robot_bench.scenario.scenario import Scenario, build_scenario, known_scenarios, load_scenario
 from simbase.errors import P2osError
-from simbase.files import writing
+from simbase.files import refuse_elsewhere, writing
 from simbase.timing import NS_PER_MS, Nanos
 from simbase.trust import Code, Trust, fingerprint_of
 from simbase.trust.code import is_in_file, located
@@ -130,9 +130,9 @@ class Trial:
         """Write scenario and files into a folder; return the scenario's path, for `p2os run`.
 
         Raises:
-            FileError: The folder cannot be written.
+            FileError: The folder cannot be written, or a name leads out of it.
         """
-        path = folder / f"{self.name}.toml"
+        path = refuse_elsewhere(folder, f"{self.name}.toml")  # a trace may say what it is called
         with writing(path, hint="name another folder"):
             _write_files(self.files, folder)
             path.write_text(self.text, encoding="utf-8")
@@ -447,8 +447,9 @@ def _named(name: str, content: bytes, files: dict[str, bytes]) -> str:
 def _write_files(files: Mapping[str, bytes], folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for name, content in files.items():
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_bytes(content)
+        path = refuse_elsewhere(folder, name)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
 
 
 class _Folder:

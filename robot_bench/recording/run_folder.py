@@ -20,7 +20,7 @@ from pathlib import Path
 from robot_bench.recording.run_record import TRACE_NAME
 from robot_bench.recording.summary import SUMMARY_NAME
 from simbase.errors import UsageError
-from simbase.files import reason_of
+from simbase.files import reason_of, refuse_elsewhere
 
 #: Where run folders go by default, in the current directory.
 RUNS = Path("runs")
@@ -60,8 +60,9 @@ def make_next_folder(name: str, parent: Path = RUNS) -> Path:
     """Make the folder NAME-NNN with the first number above all that are there, and return it.
 
     Raises:
-        UsageError: It cannot be made.
+        UsageError: It cannot be made, or the name leads elsewhere.
     """
+    refuse_elsewhere(parent, name, UsageError)
     pattern = re.compile(rf"{re.escape(name)}-(\d+)$")
     try:
         parent.mkdir(parents=True, exist_ok=True)

@@ -6,6 +6,8 @@ here. The file writes a canary when it is executed.
 
 import ast
 import contextlib
+import re
+import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -19,6 +21,7 @@ from p2os.toml_file import toml_text
 from p2os.toml_schema import Key
 from robot_bench.campaign import campaign_file
 from robot_bench.campaign.campaign_file import load_campaign
+from robot_bench.campaign.variants.shrinking import kept
 from robot_bench.scenario.scenario import TABLES, load_scenario
 from simbase.errors import P2osError
 from simbase.trust import UntrustedError
@@ -206,3 +209,23 @@ def test_whoever_reads_such_a_file_says_what_is_trusted() -> None:
                     if not ships and not says:
                         forgotten.append(f"{path.relative_to(ROOT)}:{call.lineno}: {call.func.id}")
     assert not forgotten, "\n".join(forgotten)
+
+
+def test_no_process_of_ours_imports_from_the_current_folder() -> None:
+    begun = [
+        line
+        for package in ("p2os", "robot_bench", "bluepill_sim", "adapter_sim", "simbase")
+        for path in (ROOT / package).rglob("*.py")
+        for line in path.read_text(encoding="utf-8").splitlines()
+        if re.search(r"sys\.executable\b.*\"-[cm]\"", line)
+    ]
+    assert begun
+    assert [line for line in begun if '"-P"' not in line] == []
+
+
+def test_the_process_that_runs_what_was_shrunk_takes_nothing_from_the_current_folder(folder: Path) -> None:
+    for name in ("simbase", "typer", "p2os"):
+        (folder / f"{name}.py").write_text((folder / "mine.py").read_text())
+    found = subprocess.run([*kept._COMMAND, "--version"], capture_output=True, cwd=folder, check=False)
+    assert found.returncode == 0, found.stderr
+    assert not (folder.parents[1] / "canary").exists()

@@ -14,9 +14,12 @@ from p2os.cli.main import make_app
 from p2os.cli.main import run as p2os
 from p2os.toml_file import toml_text
 from robot_bench.campaign.trial import Verdict, run_trial, trial_of
-from robot_bench.recording.run_record import read_run
+from robot_bench.campaign.variants.shrinking.kept import trial_of_run
+from robot_bench.recording.run_folder import make_next_folder
+from robot_bench.recording.run_record import TRACE_NAME, read_run
 from robot_bench.run import run_scenario
 from robot_bench.scenario.scenario import load_scenario
+from simbase.errors import FileError, UsageError
 from simbase.trust import Trust, UntrustedError
 from simbase.user_classes import OF_USERS
 from tests.robot_bench.firmware.hurried import hurried
@@ -228,3 +231,16 @@ def test_the_configuration_trusts_without_the_option(folder: Path) -> None:
 def test_what_the_command_line_names_itself_needs_no_trust(folder: Path) -> None:
     assert p2os(["run", "plain.toml", "--body", "./mine.py:Own"]) == 0
     assert executed_by(folder)
+
+
+@pytest.mark.parametrize("name", ["../X", "/X", "a/../../X", "x\0"])
+def test_a_run_folder_that_calls_itself_by_a_way_out_writes_nothing_there(name: str, folder: Path) -> None:
+    runs(["RUN"], folder)
+    trace = folder / "RUN" / TRACE_NAME
+    first, rest = trace.read_text().split("\n", 1)
+    trace.write_text(f"{json.dumps(json.loads(first) | {'scenario': name})}\n{rest}")
+    with pytest.raises(FileError, match="leads out of the folder"):
+        trial_of_run(folder / "RUN").write(folder / "out")
+    with pytest.raises(UsageError, match="leads out of the folder"):
+        make_next_folder(name, folder / "shrunk")
+    assert not list(folder.parent.rglob("X*"))
