@@ -73,7 +73,7 @@ def check(
             f"{len(found.goals)} goals{f', {runs} runs' if runs > 1 else ''}"
         )
         for code in codes.values():
-            typer.echo(f"not checked: code  {code.where} = {shown_name(code.named)}")
+            typer.echo(f"not checked: code  {shown_name(code.where)} = {shown_name(code.named)}")
     if wrong:
         raise typer.Exit(1)
 

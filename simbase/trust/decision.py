@@ -90,7 +90,7 @@ def _answer(code: Code) -> bool:
     count = len(found.files) if found is not None else 0
     others = f" and {count - 1} more file{'s' if count > 2 else ''} beside it" if count > 1 else ""
     sys.stderr.write(
-        f"{code.where}: {shown_name(code.named)} is Python code: {shown_name(code.file)}{others}.\n"
+        f"{shown_name(code.where)}: {shown_name(code.named)} is Python code: {shown_name(code.file)}{others}.\n"
         "It would run as you, with all that you may do. Has it been read, and may it run? [y/N] "
     )
     sys.stderr.flush()

@@ -8,7 +8,7 @@ module of a package's name; Python looks there where `python -m` or PYTHONPATH s
 import json
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from importlib.machinery import ModuleSpec
 from importlib.metadata import Distribution, EntryPoint, distributions
@@ -24,12 +24,15 @@ def installed_points(group: str) -> dict[str, EntryPoint]:
     found: dict[str, EntryPoint] = {}
     here = _here()
     for distribution in distributions():  # not entry_points(): there a package of that name hides the installed one
-        home = _home_of(distribution)
+        points = distribution.entry_points.select(group=group)
+        home = _home_of(distribution) if points else None
         if home is None or home == here:
             continue
-        for point in distribution.entry_points.select(group=group):
-            if point.name not in found and all(_is_of(spec, home, distribution) for spec in _specs(point.module)):
-                found[point.name] = point
+        folders = [home, *_editable(distribution)]
+        packages = {module: _is_in(module, folders) for module in {_package(point.module) for point in points}}
+        for point in points:
+            if packages[_package(point.module)]:
+                found.setdefault(point.name, point)
     return found
 
 
@@ -39,27 +42,33 @@ def _home_of(distribution: Distribution) -> Path | None:
     return place.resolve() if place.is_absolute() else None
 
 
-def _is_of(spec: ModuleSpec, home: Path, distribution: Distribution) -> bool:
-    """Tell whether a module is where the packages of that folder are, or where an editable install has its code."""
-    folders = [home, *_editable(distribution)]
-    places = [spec.origin] if spec.origin not in {None, "built-in", "frozen"} else spec.submodule_search_locations or ()
-    return all(any(Path(str(place)).resolve().is_relative_to(one) for one in folders) for place in places)
+def _package(module: str) -> str:
+    """Return the package whose `__init__` decides where a module is; of one in a namespace the module itself."""
+    top = module.partition(".")[0]
+    spec = _spec(top)
+    return module if spec is not None and spec.origin is None else top
 
 
-def _specs(module: str) -> Iterator[ModuleSpec]:
-    """Yield how a module would be found: its package's, and in a namespace the next one's. Nothing is executed."""
+def _is_in(module: str, folders: Sequence[Path]) -> bool:
+    """Tell whether a module would be found in these folders, or nowhere, as loading it says. Nothing is executed."""
     parts = module.split(".")
     for count in range(1, len(parts) + 1):
-        name = ".".join(parts[:count])
-        spec = None
-        with suppress(ImportError, ValueError):  # half of it is loaded, or it is not there: loading it says so
-            loaded = sys.modules.get(name)
-            spec = getattr(loaded, "__spec__", None) or find_spec(name)
+        spec = _spec(".".join(parts[:count]))
         if spec is None:
-            return
-        yield spec
-        if spec.origin is not None:  # its __init__ decides where the rest is
-            return
+            return True
+        is_file = spec.origin not in {None, "built-in", "frozen"}
+        places = [str(spec.origin)] if is_file else [str(place) for place in spec.submodule_search_locations or ()]
+        if not all(any(Path(place).resolve().is_relative_to(one) for one in folders) for place in places):
+            return False
+        if spec.origin is not None:
+            return True
+    return True
+
+
+def _spec(module: str) -> ModuleSpec | None:
+    with suppress(ImportError, ValueError):  # half of it is loaded, or it is not there
+        return getattr(sys.modules.get(module), "__spec__", None) or find_spec(module)
+    return None
 
 
 def _editable(distribution: Distribution) -> Iterator[Path]:
