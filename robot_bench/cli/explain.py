@@ -10,7 +10,6 @@ from typing import Annotated
 import typer
 
 from p2os.cli.help_pages import BENCH
-from p2os.cli.trust import Trusted, said
 from robot_bench.events.codec import events_of
 from robot_bench.recording.run_record import TRACE_NAME, RunRecord, read_run, record_of
 from robot_bench.recording.together import robots_in
@@ -20,6 +19,7 @@ from robot_bench.scenario.goals.judging import judge
 from robot_bench.scenario.scenario import Scenario, load_scenario
 from simbase.errors import FileError, UsageError
 from simbase.files import reading
+from simbase.trust import Trust
 
 HELP = """Say why a run failed: from the sensor to the wheel, with times.
 
@@ -54,7 +54,6 @@ def explain(
     against: Annotated[
         Path | None, typer.Option(help="A run, or a program, that does what it should.", metavar="RUN")
     ] = None,
-    trust: Trusted = False,
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Explain a run."""
@@ -62,7 +61,7 @@ def explain(
     if names and (firmware is not None or against is not None):
         option = "--firmware" if firmware is not None else "--against"
         raise UsageError(f"{option} is for one robot", hint=f"p2os explain {run / names[0]} {option} FILE")
-    plan = None if scenario is None else load_scenario(scenario, firmware=firmware, trust=said(trust))
+    plan = None if scenario is None else load_scenario(scenario, firmware=firmware, trust=Trust(only_reads=True))
     if firmware is not None and not firmware.is_file():
         raise UsageError(f"there is no firmware file {firmware}", hint="give the ELF, HEX or BIN file that ran")
     reference = None if against is None else _reference(against)

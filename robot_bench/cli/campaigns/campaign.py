@@ -95,7 +95,7 @@ def campaign(
         typer.echo(json.dumps(campaign_schema(), indent=2))
         return
     if asked[:1] == ["new"]:
-        write_new(asked[1:], out, firmware, trust=said(trust))
+        write_new(asked[1:], out, firmware)
         return
     if dask not in {None, "local"}:
         raise UsageError(f"there is no --dask {dask!r}", hint="--dask local, or --scheduler ADDRESS")
@@ -130,7 +130,7 @@ def campaign(
     tell(done, other, json_output=json_output)
 
 
-def write_new(words: list[str], out: Path | None, firmware: Path | None, trust: bool | Trust = False) -> None:
+def write_new(words: list[str], out: Path | None, firmware: Path | None) -> None:
     """Write a campaign file for a scenario.
 
     Raises:
@@ -138,7 +138,7 @@ def write_new(words: list[str], out: Path | None, firmware: Path | None, trust: 
     """
     if len(words) != 1:
         raise UsageError("a campaign for which scenario?", hint="p2os campaign new dodge")
-    scenario = load_scenario(words[0], firmware=firmware, trust=trust)
+    scenario = load_scenario(words[0], firmware=firmware, trust=Trust(only_reads=True))
     path = out or Path(f"{scenario.name}-campaign.toml")
     try:
         with path.open("x", encoding="utf-8") as file:

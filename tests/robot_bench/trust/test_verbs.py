@@ -5,6 +5,7 @@ import os
 import re
 import shlex
 import sys
+from importlib.resources import files
 from pathlib import Path
 
 import pytest
@@ -44,14 +45,12 @@ VERBS = {
     "mutate": [str(MOTORS), "mine.toml"],
     "shrink": ["mine.toml"],
     "sensitivity": ["mine.toml", "--vary", "threshold_m=0.4..0.5"],
-    "explain": ["RUN", "mine.toml"],
     "serve": ["--fleet", "fleet.toml"],
 }
 OTHERS = {
     "a sweep": ["run", "swept.toml", "-j", "2"],
     "seeds": ["run", "mine.toml", "--seeds", "0-1", "-j", "2"],
     "--set": ["run", "plain.toml", "--set", 'body="./mine.py:Own"'],
-    "a new campaign": ["campaign", "new", "mine.toml"],
     "a run folder": ["shrink", "RUN-OF-MINE"],
     "gdb": ["run", "mine.toml", "--gdb", "0"],
 }
@@ -219,6 +218,17 @@ def test_check_says_what_it_has_not_checked_and_executes_nothing(
     assert p2os(["check", "mine.toml"]) == 1
     assert "mine.toml:4: body: there is no file ./none.py" in capsys.readouterr().out
     assert executed_by(folder) == set()
+
+
+@pytest.mark.parametrize("words", [["explain", "RUN", "mine.toml"], ["campaign", "new", "mine.toml"]], ids=" ".join)
+def test_what_needs_goals_or_keys_alone_executes_nothing(words: list[str], folder: Path) -> None:
+    assert p2os(runs(words, folder)) == 0
+    assert executed_by(folder) == set()
+
+
+def test_a_new_project_trusts_itself_in_its_tests() -> None:
+    template = files("robot_bench.project").joinpath("template", "pytest.ini").read_text(encoding="utf-8")
+    assert "\np2os_trust = .\n" in template
 
 
 def test_the_configuration_trusts_without_the_option(folder: Path) -> None:
