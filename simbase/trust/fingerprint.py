@@ -18,10 +18,13 @@ from simbase.files import reading
 
 #: chosen: what a folder of somebody's classes holds, ten times; a whole environment is more.
 MOST_FILES = 2_000
+#: chosen: a large extension module, ten times.
+MOST_BYTES = 256 * 1024 * 1024
 #: chosen: so many entries are looked at, so that `/` or a home folder is told of within a second.
 MOST_ENTRIES = 50_000
 _SUFFIXES = tuple(all_suffixes())
 _CACHE = "__pycache__"
+_HINT = "put the class into a folder of its own"
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +49,7 @@ def fingerprint_of(folder: Path) -> Fingerprint:
         UsageError: There are too many of them.
     """
     found = {}
-    for name, path in sorted(importable(folder)):
+    for name, path in sorted(importable(folder)):  # all are counted before the first is read
         with reading(path):
             found[name] = hashlib.sha256(path.read_bytes()).hexdigest()
     return Fingerprint(found)
@@ -58,7 +61,7 @@ def importable(folder: Path) -> Iterator[tuple[str, Path]]:
     Raises:
         UsageError: There are too many of them.
     """
-    files = entries = 0
+    files = entries = size = 0
     seen = {folder.resolve()}
     for place, folders, names in os.walk(folder, followlinks=True):
         here = Path(place)
@@ -67,12 +70,14 @@ def importable(folder: Path) -> Iterator[tuple[str, Path]]:
         for name in names:
             if name.endswith(_SUFFIXES) and (here / name).is_file():
                 files += 1
+                size += (here / name).stat().st_size
+                if size > MOST_BYTES:
+                    what = f"{shown_name(folder)} has more than {MOST_BYTES >> 20} MiB that can be imported"
+                    raise UsageError(what, hint=_HINT)
                 yield (here / name).relative_to(folder).as_posix(), here / name
         if files > MOST_FILES or entries > MOST_ENTRIES:
             what = f"{MOST_FILES} files that can be imported" if files > MOST_FILES else f"{MOST_ENTRIES} entries"
-            raise UsageError(
-                f"{shown_name(folder)} has more than {what}", hint="put the class into a folder of its own"
-            )
+            raise UsageError(f"{shown_name(folder)} has more than {what}", hint=_HINT)
 
 
 def is_package_name(name: str) -> bool:

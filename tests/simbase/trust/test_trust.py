@@ -244,6 +244,22 @@ def test_a_folder_with_too_many_files_is_refused(folder: Path, monkeypatch: pyte
         fingerprint_of(folder)
 
 
+def test_a_folder_with_too_much_is_refused_before_it_is_read(folder: Path) -> None:
+    with (folder / "huge.py").open("wb") as file:
+        file.truncate(fingerprint.MOST_BYTES + 1)
+    with pytest.raises(UsageError, match="more than 256 MiB that can be imported"):
+        fingerprint_of(folder)
+
+
+def test_a_folder_with_too_many_entries_is_refused(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fingerprint, "MOST_ENTRIES", 2)
+    (folder / "a.txt").write_text("")
+    assert len(fingerprint_of(folder).files) == 1
+    (folder / "b.txt").write_text("")
+    with pytest.raises(UsageError, match="more than 2 entries"):
+        fingerprint_of(folder)
+
+
 def test_links_in_a_circle_end(folder: Path) -> None:
     (folder / "again").symlink_to(folder)
     (folder / "package").mkdir()
