@@ -35,7 +35,7 @@ from p2os.errors import TransportError
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import load_parameters
 from p2os.transport import listen_url, open_url
-from p2os.transport.ports import Listener, Transport
+from p2os.transport.ports import Listener, RefusedPeerError, Transport
 from p2os.transport.waiting import BLIND_POLL_S, wait_readable
 from p2os.transport.wall_clock import Clock, GapWatch, wall_clock
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
@@ -231,6 +231,10 @@ class Bridge:
         target = self._robot if direction is Direction.TO_ROBOT else self._client
         try:
             data = source.read()
+        except RefusedPeerError as error:
+            self._release(str(error))
+            self.sessions -= 1  # it was no client
+            return
         except TransportError as error:
             self._release(str(error))
             return
