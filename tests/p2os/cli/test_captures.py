@@ -496,7 +496,7 @@ def test_a_replay_begins_anew_for_the_client_that_comes_after_a_web_page(
     monkeypatch.setattr("p2os.cli.captures.replay._first", lambda _listener: next(lines))
     assert run("replay", recording, "tcp:127.0.0.1:0") == 0
     assert capsys.readouterr().err.endswith("Ctrl-C ends\nthe client closed the session after 1 of 2 frames\n")
-    assert client.received == sync
+    assert client.received == sync + b"closed"
 
 
 def test_of_refused_connections_some_lines_a_second_are_shown(capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
