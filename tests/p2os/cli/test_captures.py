@@ -3,6 +3,7 @@
 import contextlib
 import json
 import logging
+import socket
 import subprocess
 import threading
 from collections.abc import Callable
@@ -21,6 +22,10 @@ from p2os.errors import RemoteProtocolError, RunFailedError, TransportError
 from p2os.pioneer.controller import ControllerSettings
 from p2os.pioneer.serve import served_pioneer
 from p2os.protocol.commands import Command, CommandNumber
+from p2os.protocol.packets import Identity
+from p2os.protocol.profiles import Profile
+from p2os.protocol.sip import StandardSip
+from p2os.robots.parameters import load_parameters
 from p2os.transport import HungUpError, Loops, listen_url, open_url, waiting
 from p2os.transport.ports import RefusedPeerError
 from simbase.errors import FileError
@@ -121,6 +126,24 @@ def test_sniff_shows_and_records_one_client(served: object, run: Run, tmp_path: 
     rows = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert [row["name"] for row in rows[:6]] == ["SYNC0", "SYNC0", "SYNC1", "SYNC1", "SYNC2", "IDENTITY"]
     assert read_file(out).bytes_of(TO) == read_file(tmp_path / "t.pcap").bytes_of(TO)
+
+
+@pytest.mark.parametrize(("options", "model"), [([], "p3dx-sh"), (["--robot", "p2at"], "p2at")])
+def test_sniff_shows_lengths_in_the_units_of_the_robot_that_answers(
+    options: list[str], model: str, run: Run, monkeypatch: pytest.MonkeyPatch, capsys: Capture
+) -> None:
+    robot = [Identity("Fritz", "Pioneer", "p3dx-sh").to_frame(), StandardSip(raw_x=1000).to_frame(Profile.P2OS)]
+
+    def run_bridge(bridge: Bridge, _until: Callable[[], bool]) -> None:
+        for at_ns, frame in enumerate(robot):
+            bridge._on_chunk(Chunk(at_ns=at_ns, direction=FROM, data=frame.to_bytes()))
+
+    monkeypatch.setattr(Bridge, "run", run_bridge)
+    with socket.create_server(("127.0.0.1", 0)) as there:
+        url = f"tcp:127.0.0.1:{there.getsockname()[1]}"
+        assert run("sniff", url, "--listen", "tcp:127.0.0.1:0", "--json", *options) == 0
+    sip = json.loads(capsys.readouterr().out.splitlines()[1])
+    assert sip["fields"]["x_m"] == pytest.approx(load_parameters(model).distance_conv_mm, abs=1e-6)
 
 
 class Line:
