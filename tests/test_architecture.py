@@ -140,6 +140,7 @@ class Parsed:
 
     imports: tuple[ast.Import | ast.ImportFrom, ...]  # wherever in it
     prints: bool
+    listens: bool
     says_what_it_is: bool
 
 
@@ -152,6 +153,7 @@ def parsed(path: Path) -> Parsed:
     return Parsed(
         imports=tuple(node for node in nodes if isinstance(node, (ast.Import, ast.ImportFrom))),
         prints=any(isinstance(each, ast.Name) and each.id == "print" for each in called),
+        listens=listens(module_name(path), nodes),
         says_what_it_is=not tree.body or bool(ast.get_docstring(tree)),
     )
 
@@ -301,25 +303,23 @@ UNGUARDED_IN_C = {
 def listens(name: str, nodes: Iterable[ast.AST]) -> bool:
     """Tell whether a module makes listening sockets itself, or has a library make one."""
     nodes = list(nodes)
-    libraries = {target.split(".")[0] for target in imports_of(name, nodes)} & LISTENING_LIBRARIES
+    if not {target.split(".")[0] for target in imports_of(name, nodes)} & LISTENING_LIBRARIES:
+        return False
     for node in nodes:
         if isinstance(node, ast.Attribute):
-            what, of = node.attr, node.value.id if isinstance(node.value, ast.Name) else ""
+            words, of = [node.attr], node.value.id if isinstance(node.value, ast.Name) else ""
         elif isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] in LISTENING_LIBRARIES:
-            what, of = " ".join(alias.name for alias in node.names), node.module or ""
+            words, of = [alias.name for alias in node.names], node.module or ""
         else:
             continue
-        if any(LISTENING_NAMES.fullmatch(word) and (word != "open" or of == "zenoh") for word in what.split()):
-            return bool(libraries)
+        if any(LISTENING_NAMES.fullmatch(word) and (word != "open" or of == "zenoh") for word in words):
+            return True
     return False
 
 
 def test_every_tcp_listener_is_guarded_or_says_why_not() -> None:
     files = [*sources(), *(ROOT / "examples").rglob("*.py"), *(ROOT / "tools").rglob("*.py")]
-    found = {
-        module_name(path) for path in files
-        if listens(module_name(path), ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
-    }  # fmt: skip
+    found = {module_name(path) for path in files if parsed(path).listens}
     assert found == UNGUARDED.keys(), "make it by simbase.listening.listen_tcp, or add its row with the reason"
 
 
