@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 import pytest
 
+from p2os.cli.main import run
 from robot_bench.origin_gate import OriginGate, may_look
 from simbase.listening import LOGGER
 from tests.tools.each_row import each_row
@@ -160,3 +161,8 @@ def test_the_scene_is_shown_to_viewers_only(origin: str, is_let_in: bool) -> Non
                 asyncio.run(look())
     finally:
         scene.close()
+
+
+def test_an_origin_without_a_viewer_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["run", "motors", "--foxglove-origin", "https://viewer.example"]) == 2
+    assert capsys.readouterr().err == "p2os: --foxglove-origin goes with --foxglove only\nhint: add --foxglove\n"
