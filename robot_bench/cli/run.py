@@ -189,7 +189,7 @@ def run(
     ] = None,
     foxglove_origin: Annotated[
         list[str] | None,
-        typer.Option(help="With --foxglove: a viewer's page that may look; repeatable.", metavar="https://HOST"),
+        typer.Option(help="With --foxglove: a page that may look (https://HOST); repeatable.", metavar="ORIGIN"),
     ] = None,
     yes: Annotated[bool, typer.Option("--yes", help="With --port: do not ask before the first motion.")] = False,
     max_speed: Annotated[
