@@ -78,11 +78,12 @@ IO_LAYER = (
     "p2os.__main__", "p2os.transport", "p2os.cli", "p2os.pioneer.serve.host", "p2os.pioneer.serve.background_host",
     "p2os.pioneer.serve.fleet", "p2os.pioneer.body.outside.connection",
     "p2os.pioneer.serve.control_line", "p2os.client.robot_thread", "p2os.client.robot_loop", "simbase.interrupts",
+    "simbase.listening",
     "p2os.ros.zenoh_node",
     "bluepill_sim.cli", "bluepill_sim.cli.console",
     "robot_bench.cli", "robot_bench.campaign.workers",
     "robot_bench.campaign.variants.shrinking.kept", "robot_bench.running.forks", "robot_bench.running.pacer",
-    "robot_bench.live", "robot_bench.report", "robot_bench.firmware.build",
+    "robot_bench.live", "robot_bench.origin_gate", "robot_bench.report", "robot_bench.firmware.build",
 )  # fmt: skip
 
 #: What may log beside the I/O layer: what joins models to lines, and the bench. A model tells its owner by a callback.
@@ -94,7 +95,7 @@ LOGGING = (
 #: The map of ARCHITECTURE.md, lowest first: a package imports none of its own row and none above it.
 LAYERS = {
     "simbase": (
-        ("timing", "state", "installation", "wire", "lazy", "interrupts"), ("errors",),
+        ("timing", "state", "installation", "wire", "lazy", "interrupts", "listening"), ("errors",),
         ("files", "units", "c_library"), ("trust",), ("user_classes",),
     ),
     "p2os": (
@@ -111,7 +112,7 @@ LAYERS = {
         ("masters", "driver"), ("adapter",),
     ),
     "robot_bench": (
-        ("running", "firmware", "scenarios"), ("wires",), ("events",), ("direct",), ("recording",),
+        ("running", "firmware", "scenarios", "origin_gate"), ("wires",), ("events",), ("direct",), ("recording",),
         ("drives",), ("scenario", "report"),
         ("adapter",), ("bench",), ("remote",), ("run", "project"),
         ("experiments",), ("campaign",), ("ros", "live"), ("cli",),
@@ -139,6 +140,7 @@ class Parsed:
 
     imports: tuple[ast.Import | ast.ImportFrom, ...]  # wherever in it
     prints: bool
+    listens: bool
     says_what_it_is: bool
 
 
@@ -151,6 +153,7 @@ def parsed(path: Path) -> Parsed:
     return Parsed(
         imports=tuple(node for node in nodes if isinstance(node, (ast.Import, ast.ImportFrom))),
         prints=any(isinstance(each, ast.Name) and each.id == "print" for each in called),
+        listens=listens(module_name(path), nodes),
         says_what_it_is=not tree.body or bool(ast.get_docstring(tree)),
     )
 
@@ -270,6 +273,83 @@ def test_one_peripheral_never_imports_another() -> None:
 )
 def test_the_judge_sees_a_broken_rule(name: str, text: str) -> None:
     assert faults(name, imports_of(name, ast.walk(ast.parse(text)))) != []
+
+
+# Who listens -------------------------------------------------------------------------
+
+#: Libraries that can listen on TCP, and what of them does.
+LISTENING_LIBRARIES = {
+    "socket", "asyncio", "socketserver", "http", "xmlrpc", "wsgiref", "multiprocessing", "websockets", "foxglove",
+    "zenoh", "distributed",
+}  # fmt: skip
+LISTENING_NAMES = re.compile(
+    r"listen|create_(unix_)?server|start_(unix_)?server|\w*Server|serve_forever|make_server|LocalCluster|Listener|open"
+)
+#: Who listens without `simbase.listening`, and why no web page can use it.
+UNGUARDED = {
+    "simbase.listening": "makes the guarded ones",
+    "robot_bench.origin_gate": "its protocol is HTTP: it asks for the Origin",
+    "robot_bench.live": "Foxglove's server: behind the gate, at an address of loopback that is drawn",
+    "p2os.ros.zenoh_node": "zenoh's own router: a link begins with its InitSyn, as no request does",
+    "robot_bench.campaign.workers.dask_workers": "Dask's own scheduler: a link begins with the count of its frames",
+    "examples.outside_body.lock_step": "a program without p2os: a connection begins with Hello",
+}
+UNGUARDED_IN_C = {
+    "examples/outside_body/lock_step.hpp": "as lock_step.py",
+    "adapter_fw/host/wires.cpp": "a Unix socket: no browser opens one",
+}
+
+
+def listens(name: str, nodes: Iterable[ast.AST]) -> bool:
+    """Tell whether a module makes listening sockets itself, or has a library make one."""
+    nodes = list(nodes)
+    if not {target.split(".")[0] for target in imports_of(name, nodes)} & LISTENING_LIBRARIES:
+        return False
+    for node in nodes:
+        if isinstance(node, ast.Attribute):
+            words, of = [node.attr], node.value.id if isinstance(node.value, ast.Name) else ""
+        elif isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] in LISTENING_LIBRARIES:
+            words, of = [alias.name for alias in node.names], node.module or ""
+        else:
+            continue
+        if any(LISTENING_NAMES.fullmatch(word) and (word != "open" or of == "zenoh") for word in words):
+            return True
+    return False
+
+
+def test_every_tcp_listener_is_guarded_or_says_why_not() -> None:
+    files = [*sources(), *(ROOT / "examples").rglob("*.py"), *(ROOT / "tools").rglob("*.py")]
+    found = {module_name(path) for path in files if parsed(path).listens}
+    assert found == UNGUARDED.keys(), "make it by simbase.listening.listen_tcp, or add its row with the reason"
+
+
+def test_every_listener_in_c_is_none_that_a_browser_can_use() -> None:
+    files = [
+        path for folder in ("adapter_fw", "bluepill_sim", "robot_bench", "examples")
+        for pattern in ("*.c", "*.cpp", "*.h", "*.hpp", "*.ino") for path in (ROOT / folder).rglob(pattern)
+    ]  # fmt: skip
+    texts = {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8", errors="replace") for path in files}
+    sockets = {name: text for name, text in texts.items() if re.search(r"sys/socket\.h|WiFiServer|lwip", text)}
+    found = {name for name, text in sockets.items() if re.search(r"\blisten\s*\(|WiFiServer", text)}
+    assert found == UNGUARDED_IN_C.keys()
+    assert not re.search(r"AF_INET|sockaddr_in\b", texts["adapter_fw/host/wires.cpp"])
+
+
+@pytest.mark.parametrize(
+    ("text", "is_seen"),
+    [
+        ("import socket\nmade = socket.socket()\nmade.bind(('', 1))\nmade.listen()", True),
+        ("from socket import create_server\ncreate_server(('', 1))", True),
+        ("import asyncio\nasync def f():\n    await asyncio.start_server(g, port=1)", True),
+        ("from http.server import ThreadingHTTPServer", True),
+        ("import zenoh\nzenoh.open(config)", True),
+        ("import socket\nsocket.create_connection(('', 1))", False),
+        ("loops.listen('robot')", False),
+        ("from simbase.listening import listen_tcp\nlisten_tcp('127.0.0.1', 0)", False),
+    ],
+)
+def test_the_judge_sees_who_listens(text: str, is_seen: bool) -> None:
+    assert listens("robot_bench.bench", ast.walk(ast.parse(text))) is is_seen
 
 
 #: Most names that a folder shows.

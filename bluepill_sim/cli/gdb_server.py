@@ -16,6 +16,7 @@ from bluepill_sim.debug.gdb_session import GdbSession
 from bluepill_sim.debug.machine import Machine
 from bluepill_sim.debug.packets import Mark, Packet, PacketReader, frame
 from bluepill_sim.errors import BluePillError
+from simbase.listening import WebClientError, listen_tcp
 from simbase.timing import NS_PER_S, Nanos
 
 _READ_BYTES = 4096
@@ -42,16 +43,12 @@ class GdbServer:
         self._machine = machine
         self._is_paced = is_paced
         self._on_wait = on_wait
-        self._listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-        self._listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
-            self._listener.bind(("127.0.0.1", port))
+            self._listener = listen_tcp("127.0.0.1", port, backlog=1)
         except (OSError, OverflowError) as error:
-            self._listener.close()
             raise BluePillError(
                 f"cannot listen on port {port}: {error}", hint="another --port, or 0 for any"
             ) from error
-        self._listener.listen(1)
         self.port: int = self._listener.getsockname()[1]
         self._execution = Execution(machine, self._print)
         self._connection: _Connection | None = None
@@ -81,6 +78,8 @@ class GdbServer:
             finally:
                 self._connection = None
                 connection.close()
+            if connection.was_refused:
+                continue
             if session.state.is_over or once:
                 self._execution.detach()
                 return not session.state.was_killed
@@ -132,6 +131,8 @@ class _Connection:
         self._packets: list[Packet] = []
         self._is_interrupted = False
         self._is_lost = False
+        #: Whether it never was a debugger's.
+        self.was_refused = False
         self._last = b""
         self.has_acks = True
 
@@ -168,6 +169,10 @@ class _Connection:
             if not select.select([self._line], [], [], wait_s)[0]:
                 return
             data = self._line.recv(_READ_BYTES)
+        except BlockingIOError:
+            return
+        except WebClientError:
+            data, self.was_refused = b"", True
         except OSError:
             data = b""
         if not data:

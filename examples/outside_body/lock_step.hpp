@@ -25,6 +25,8 @@ namespace lock_step {
 
 constexpr double kInfinity = HUGE_VAL;
 constexpr std::uint32_t kLongestFrame = 64u << 20;
+// Bytes of a Hello at most; a web browser that connects begins with what would be a longer one, or none.
+constexpr std::uint32_t kLongestHello = 1u << 16;
 constexpr int kRaysPerSonar = 9;
 
 enum Type : std::uint8_t {
@@ -285,10 +287,17 @@ bool make_steps(Reader& in, Writer& out, bool touching, Step step, Report report
     return touching;
 }
 
+// Answer each request of a connection that begins with Hello.
 template <typename Body> void serve(int line, Body& body) {
-    for (std::uint32_t size; read_all(line, &size, sizeof size);) {
+    bool greeted = false;
+    for (std::uint32_t size; read_all(line, &size, sizeof size); greeted = true) {
         std::uint8_t type;
-        if (size < 1 || size > kLongestFrame || !read_all(line, &type, 1)) return;
+        if (!read_all(line, &type, 1)) return;
+        if (!greeted && (type != kHello || size > kLongestHello)) {
+            std::fputs("connection refused: it begins with no Hello\n", stderr);
+            return;
+        }
+        if (size < 1 || size > kLongestFrame) return;
         std::vector<char> payload(size - 1);
         if (!read_all(line, payload.data(), payload.size())) return;
         std::vector<char> out;

@@ -17,7 +17,9 @@ REQUESTS = {
     1: "hello", 2: "make_world", 3: "place", 5: "move", 6: "remove", 7: "reset", 8: "stand_at", 9: "step", 12: "save",
     13: "restore",
 }  # fmt: skip
-RANGES, RAYS, BYE = 10, 11, 14
+HELLO, RANGES, RAYS, BYE = 1, 10, 11, 14
+#: Bytes of a Hello at most; a web browser that connects begins with what would be a longer one, or none.
+LONGEST_HELLO = 1 << 16
 ANSWER, FAILED = 0x80, 0xFF
 RAYS_PER_SONAR = 9
 #: What a body can, and what a wheel or the hull does.
@@ -107,10 +109,15 @@ def answer(body, kind, fields):
 
 
 def serve(line, make, errors):
-    """Answer each request of a connection."""
-    stream, body = line.makefile("rwb"), make()
+    """Answer each request of a connection that begins with Hello."""
+    stream, body = line.makefile("rwb"), None
     while len(head := stream.read(5)) == 5:
         size, kind = struct.unpack("<IB", head)
+        if body is None:
+            if kind != HELLO or size > LONGEST_HELLO:
+                print("connection refused: it begins with no Hello", file=sys.stderr, flush=True)
+                return
+            body = make()
         fields = Fields(stream.read(size - 1))
         try:
             payload, kind = answer(body, kind, fields), kind | ANSWER

@@ -16,12 +16,14 @@ from p2os.capture.formats.sources import (
     read_capture,
     read_file,
 )
-from p2os.capture.listing import Lister, ListingRow, Reading, frame_chunks, rows_of
+from p2os.capture.listing import Lister, ListingRow, frame_chunks, rows_of
+from p2os.capture.reading import FollowedReading, Reading
 
 __all__ = [
     "Capture",
     "Chunk",
     "Direction",
+    "FollowedReading",
     "Lister",
     "ListingRow",
     "Part",

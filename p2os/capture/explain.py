@@ -18,7 +18,8 @@ from construct import Array, Construct, ConstructError, Container, Renamed, Stru
 
 from p2os.capture.chunks import Direction
 from p2os.capture.describe import printable
-from p2os.capture.listing import ListingRow, Reading
+from p2os.capture.listing import ListingRow
+from p2os.capture.reading import Reading
 from p2os.protocol.commands import NEGATIVE, POSITIVE, STRING, Command
 from p2os.protocol.config_packet import FIELDS, ConfigPacket
 from p2os.protocol.frames import CHECKSUM_BYTES, HEADER, MAX_COUNT, MIN_COUNT, PREFIX_BYTES, Frame, checksum

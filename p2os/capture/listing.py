@@ -22,6 +22,7 @@ from typing import Protocol, cast
 
 from p2os.capture.chunks import Chunk, Direction
 from p2os.capture.describe import PacketFields, Plain, command_fields, command_name
+from p2os.capture.reading import FollowedReading, Reading
 from p2os.protocol.commands import NEGATIVE, POSITIVE, STRING, CommandNumber
 from p2os.protocol.frames import (
     CHECKSUM_BYTES,
@@ -37,9 +38,7 @@ from p2os.protocol.frames import (
     sound_frames,
 )
 from p2os.protocol.packets import IDENTITY_KIND, RESET_KINDS, packet_name
-from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import SIP_KINDS, is_sip
-from p2os.robots.parameters import RobotParameters
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 SYNC_NAMES = ("SYNC0", "SYNC1", "SYNC2")
@@ -50,14 +49,6 @@ IN_FLIGHT_NS: Nanos = 300 * NS_PER_MS
 _LONG_AFTER_NS: Nanos = NS_PER_S
 #: The longest run of bytes shown in one line; `--explain` shows all.
 SHOWN_BYTES = 24
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Reading:
-    """How a capture is to be read: the firmware's family, and whose units."""
-
-    profile: Profile
-    parameters: RobotParameters
 
 
 class ListingRow:
@@ -138,13 +129,14 @@ class Lister:
     """Turns chunks into rows as they come.
 
     Args:
-        reading: How to read what stands in the frames.
+        reading: How to read what stands in the frames; one that is followed is given each packet of the robot.
         passing: Which packets are passed over; None for none.
     """
 
-    def __init__(self, reading: Reading, passing: Passing | None = None) -> None:
+    def __init__(self, reading: Reading | FollowedReading, passing: Passing | None = None) -> None:
         self._passing = passing
-        self._packets = PacketFields(reading.profile, reading.parameters)
+        self._followed = reading if isinstance(reading, FollowedReading) else None
+        self._read_by(reading.reading if isinstance(reading, FollowedReading) else reading)
         self._session = RecordedSession()
         self._streams: dict[Direction | None, _Stream] = {}
 
@@ -165,6 +157,10 @@ class Lister:
         """Take the last in a row of what `passing` allows to pass over; without direction it is the robot's."""
         if direction is not Direction.TO_ROBOT:
             self._session.take_in_session(now)
+
+    def _read_by(self, reading: Reading) -> None:
+        self._reading = reading
+        self._packets = PacketFields(reading.profile, reading.parameters)
 
     def _take(self, stream: "_Stream", data: bytes, now: Nanos) -> Iterator[ListingRow]:
         # Most bytes are sound frames, one behind the other: these need no decoder. What it has to look at it gets up to
@@ -239,6 +235,10 @@ class Lister:
         kind = payload[0]
         name = self._session.name_of(payload, direction, now)
         if direction is Direction.FROM_ROBOT:
+            if self._followed is not None:
+                self._followed.take(payload)
+                if self._followed.reading is not self._reading:
+                    self._read_by(self._followed.reading)
             name, describe = name or packet_name(kind), self._packets.fields_of
         else:
             name, describe = name or command_name(kind), command_fields
@@ -285,7 +285,9 @@ def next_header(data: bytes, place: int, limit: int | None = None) -> int:
     return limit if place < 0 else place
 
 
-def rows_of(chunks: Iterable[Chunk], reading: Reading, passing: Passing | None = None) -> Iterator[ListingRow]:
+def rows_of(
+    chunks: Iterable[Chunk], reading: Reading | FollowedReading, passing: Passing | None = None
+) -> Iterator[ListingRow]:
     """Yield every row of a capture, or of chunks while they are read; none of what is passed over."""
     lister, last_ns = Lister(reading, passing), 0
     for chunk in chunks:

@@ -13,7 +13,8 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 from p2os.capture.chunks import LETTERS, Block, Chunk, Direction
-from p2os.capture.listing import Lister, ListingRow, Reading, next_header
+from p2os.capture.listing import Lister, ListingRow, next_header
+from p2os.capture.reading import Reading
 from p2os.protocol.frames import CHECKSUM_BYTES, GIVE_UP_NS, PREFIX_BYTES, sound_frames
 from p2os.protocol.sip import SIP_KINDS, is_sip
 from simbase.timing import Nanos

@@ -18,7 +18,8 @@ from typing import IO, Protocol, runtime_checkable
 
 from p2os.capture.cells import Alike, Cell, quoted, texts_of
 from p2os.capture.describe import RAW_OF, Plain
-from p2os.capture.listing import ListingRow, Reading
+from p2os.capture.listing import ListingRow
+from p2os.capture.reading import Reading
 from p2os.capture.sip_columns import LEADING, SipColumns
 from p2os.capture.sips import Sips, in_groups
 from p2os.protocol.sip import POSITION_MASK, unpack_heads

@@ -23,6 +23,7 @@ import typer
 
 from p2os.cli.help_pages import VerbList, dress
 from p2os.cli.printing import restored_output
+from p2os.cli.refused_connections import shown_refusals
 from p2os.cli.signals import end_on_signals, ignore_signals, restored_signals
 from simbase.errors import MissingDependencyError
 from simbase.installation import installed_version
@@ -79,7 +80,7 @@ def run(words: list[str], *, trace: bool = False) -> int:
         trace: show where in the program an error arose.
     """
     try:
-        with restored_signals(), restored_output():
+        with restored_signals(), restored_output(), shown_refusals():
             end_on_signals()
             return _run(words, trace=trace)
     except KeyboardInterrupt:  # while the last lines were being written

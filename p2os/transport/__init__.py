@@ -4,7 +4,7 @@ Nothing here knows of frames or robots, and nothing below the I/O layer imports 
 """
 
 from p2os.transport.loops import Loops
-from p2os.transport.ports import HungUpError, Listener, Transport
+from p2os.transport.ports import HungUpError, Listener, RefusedPeerError, Transport
 from p2os.transport.url import LoopUrl, PortUrl, PtyUrl, SerialUrl, TcpUrl, parse_url
 from simbase.errors import UsageError
 
@@ -15,6 +15,7 @@ __all__ = [
     "Loops",
     "PortUrl",
     "PtyUrl",
+    "RefusedPeerError",
     "SerialUrl",
     "TcpUrl",
     "Transport",

@@ -16,6 +16,10 @@ class HungUpError(TransportError):
     """The far side has gone; nothing more will come."""
 
 
+class RefusedPeerError(HungUpError):
+    """The far side was refused before any byte of it was returned: it never was a peer."""
+
+
 class Transport(Protocol):
     """An open byte line to one peer."""
 
@@ -26,6 +30,7 @@ class Transport(Protocol):
 
         Raises:
             HungUpError: the far side has gone and all its bytes were read.
+            RefusedPeerError: it is none that may speak here; nothing of it was returned.
             TransportError: the line failed.
         """
         ...

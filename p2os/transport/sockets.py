@@ -1,5 +1,7 @@
 """TCP lines: connecting, listening, and the byte line over any connected socket.
 
+A web browser is no client: `simbase.listening` refuses it.
+
 Nagle's algorithm is off: a frame must not wait for its answer. Keepalive is on: a peer
 that vanishes without notice (power, cable, suspend) is noticed within some 10 s.
 """
@@ -7,12 +9,12 @@ that vanishes without notice (power, cable, suspend) is noticed within some 10 s
 import contextlib
 import errno
 import socket
-import sys
 
 from p2os.errors import TransportError
-from p2os.transport.ports import READ_BYTES, HungUpError, Transport
+from p2os.transport.ports import READ_BYTES, HungUpError, RefusedPeerError, Transport
 from p2os.transport.url import TcpUrl
 from simbase.files import reason_of
+from simbase.listening import GuardedListener, WebClientError, listen_tcp
 
 #: chosen: a robot on the same network answers within milliseconds.
 CONNECT_TIMEOUT_S = 3.0
@@ -66,6 +68,8 @@ class SocketTransport:
             data = self._socket.recv(READ_BYTES)
         except (BlockingIOError, InterruptedError):
             return b""
+        except WebClientError as error:
+            raise RefusedPeerError(f"{self.description} was refused: it {error}") from error
         except OSError as error:
             raise self._lost(error) from error
         if not data:
@@ -177,17 +181,11 @@ def connect_tcp(url: TcpUrl) -> Transport:
     return SocketTransport(connection, str(url))
 
 
-def _listening_socket(url: TcpUrl) -> socket.socket:
-    family = socket.AF_INET6 if ":" in url.host else socket.AF_INET
-    listening = socket.socket(family, socket.SOCK_STREAM)
+def _listening_socket(url: TcpUrl) -> GuardedListener:
     try:
-        if sys.platform != "win32":  # there, the option lets two programs share a port
-            listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listening.bind((url.host, url.port))
-        listening.listen()
-        listening.setblocking(False)
+        listening = listen_tcp(url.host, url.port)
     except OSError as error:
-        listening.close()
         hint = _LISTEN_HINTS.get(error.errno or 0, "listen on this machine: tcp:127.0.0.1:8101")
         raise TransportError(f"cannot listen on {url}: {reason_of(error)}", hint=hint) from error
+    listening.setblocking(False)
     return listening

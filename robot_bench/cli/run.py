@@ -191,6 +191,10 @@ def run(
         str | None,
         typer.Option(help="Show it live to Foxglove or Lichtblick, at real time.", metavar="[PORT|HOST:PORT]"),
     ] = None,
+    foxglove_origin: Annotated[
+        list[str] | None,
+        typer.Option(help="With --foxglove: a page that may look (https://HOST); repeatable.", metavar="ORIGIN"),
+    ] = None,
     yes: Annotated[bool, typer.Option("--yes", help="With --port: do not ask before the first motion.")] = False,
     max_speed: Annotated[
         float | None, option(SPEED, "--max-speed", purpose="With --port: cap of the forward speed.", least="1mm/s")
@@ -236,6 +240,8 @@ def run(
     measured = coverage or profile or None
     refuse_beside("ros", ros, port=port, gdb=gdb, coverage=measured, inputs=inputs)
     refuse_beside("inputs", inputs, port=port, gdb=gdb, coverage=measured)
+    if foxglove_origin and foxglove is None:
+        raise UsageError("--foxglove-origin goes with --foxglove only", hint="add --foxglove")
     refuse_beside("foxglove", foxglove, port=port, gdb=gdb, ros=ros, inputs=inputs, robots=wanted.robots or None)
     if is_sweep(wanted, seeds=seeds, seed=seed, port=port):
         alone = {"port": port, "ros": ros, "inputs": inputs, "foxglove": foxglove, "gdb": gdb, "realtime": realtime}
@@ -258,7 +264,7 @@ def run(
     pace = realtime or (None if ros is None and foxglove is None else 1.0)
     with RunDisplay() as display:
         if gdb is None:
-            with driven(wanted, ros=ros, inputs=inputs, foxglove=foxglove) as driver:
+            with driven(wanted, ros=ros, inputs=inputs, foxglove=foxglove, origins=foxglove_origin or ()) as driver:
                 result = run_scenario(
                     wanted, folder, speed=pace, on_progress=display.update, force=force, drive=driver,
                     coverage=coverage, profile=profile, fail_under=fail_under, explained=True,
@@ -296,7 +302,7 @@ def refuse_beside(name: str, given: object, **others: object) -> None:
 
 @contextlib.contextmanager
 def driven(
-    scenario: Scenario, *, ros: str | None, inputs: Path | None, foxglove: str | None
+    scenario: Scenario, *, ros: str | None, inputs: Path | None, foxglove: str | None, origins: Sequence[str] = ()
 ) -> Iterator[RunBench | None]:
     """Yield what runs a bench as a node of ROS, with what came in from it before, or before a viewer; None: the run.
 
@@ -308,7 +314,7 @@ def driven(
         from robot_bench.live import live_scene
 
         tell = "open {} in Foxglove or Lichtblick".format
-        with live_scene(scenario, foxglove, lambda url: typer.echo(tell(url), err=True)) as scene:
+        with live_scene(scenario, foxglove, lambda url: typer.echo(tell(url), err=True), origins) as scene:
             yield scene.drive
         return
     if ros is None and inputs is None:

@@ -16,7 +16,8 @@ import numpy.typing as npt
 from p2os.capture.chunks import LETTERS, Block, Direction
 from p2os.capture.columns.framing import Bytes, Indexes, find_frames
 from p2os.capture.describe import command_name
-from p2os.capture.listing import COMMAND_NAMES, SYNC_NAMES, Finder, Lister, ListingRow, LoopFinder, Reading
+from p2os.capture.listing import COMMAND_NAMES, SYNC_NAMES, Finder, Lister, ListingRow, LoopFinder
+from p2os.capture.reading import FollowedReading, Reading
 from p2os.protocol.commands import CommandNumber
 from p2os.protocol.frames import CHECKSUM_BYTES, GIVE_UP_NS, PREFIX_BYTES
 from p2os.protocol.packets import IDENTITY_KIND, RESET_KINDS, packet_name
@@ -31,7 +32,9 @@ _COMMANDS = tuple((kind, command_name(kind).lower()) for kind in range(CommandNu
 _Flags = npt.NDArray[np.bool_]
 
 
-def rows_passing(blocks: Iterable[Block], reading: Reading, wanted: Iterable[str]) -> Iterator[ListingRow]:
+def rows_passing(
+    blocks: Iterable[Block], reading: Reading | FollowedReading, wanted: Iterable[str]
+) -> Iterator[ListingRow]:
     """Yield the rows of a capture but for some of those whose names nobody wants, all damage with them.
 
     Args:

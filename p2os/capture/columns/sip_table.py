@@ -22,7 +22,7 @@ from p2os.capture.columns.framing import LARGEST_FRAME, Bytes, Indexes, stalls_o
 from p2os.capture.columns.table import Table as RawTable
 from p2os.capture.columns.tables import Columns, decode
 from p2os.capture.describe import RAW_OF, Memo, SipFields
-from p2os.capture.listing import Reading
+from p2os.capture.reading import Reading
 from p2os.capture.sip_columns import KIND_SAYS, LEADING
 from p2os.capture.table import FIRST_ROWS, Table, uniform
 from p2os.protocol.frames import CHECKSUM_BYTES, GIVE_UP_NS, PREFIX_BYTES

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from p2os.capture import ListingRow, Reading, explain, open_argument, open_capture, rows_of
+from p2os.capture import FollowedReading, ListingRow, Reading, explain, open_argument, open_capture, rows_of
 from p2os.capture.chunks import Block, chunks_of
 from p2os.capture.explain import lines_of
 from p2os.capture.listing import line_of, summary_of
@@ -67,13 +67,19 @@ def decode(
     sent_by = direction_of(direction)
     is_live = source == ["-"]
     capture = open_capture(sys.stdin.buffer, sent_by) if is_live else open_argument(source, sent_by)
-    reading, blocks = reading_of(capture.blocks, robot=robot, profile=profile)
+    blocks = capture.blocks
+    reading: Reading | FollowedReading
+    if is_live:  # its beginning may be all that comes for hours
+        reading = FollowedReading(robot, profile)
+    else:
+        reading, blocks = reading_of(blocks, robot=robot, profile=profile)
     wanted = wanted_names(only)
     shown = damaged = 0
     end = _End()
     watched = end.watched(blocks)
     for row in chosen_rows(watched, reading, wanted) if wanted else rows_of(chunks_of(watched), reading):
-        for line in _lines(row, reading, has_time=capture.has_time, as_json=json_output, explained=explained):
+        by = reading.reading if isinstance(reading, FollowedReading) else reading
+        for line in _lines(row, by, has_time=capture.has_time, as_json=json_output, explained=explained):
             sys.stdout.write(f"{line}\n")
         if is_live or not shown:
             sys.stdout.flush()

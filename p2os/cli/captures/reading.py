@@ -1,7 +1,7 @@
 """How the verbs that show captures choose units and layout: `--robot`, `--profile`, `--dir`.
 
-Left open, both are found in the capture itself: the robot gives its model in
-answer to SYNC2, and the model implies which firmware family it runs.
+Left open, both are found in the capture itself (`p2os.capture.reading`): in the beginning of what is read as a whole,
+and as it comes in what is shown while it comes.
 """
 
 from collections.abc import Iterable, Iterator
@@ -11,14 +11,11 @@ from typing import Annotated
 
 import typer
 
-from p2os.capture import Direction, ListingRow, Reading, rows_of
+from p2os.capture import Direction, FollowedReading, ListingRow, Reading, rows_of
 from p2os.capture.chunks import Block, chunks_of
 from p2os.capture.listing import FrameCutter
 from p2os.cli.names import robots
-from p2os.protocol.packets import IDENTITY_KIND, Identity
 from p2os.protocol.profiles import Profile
-from p2os.protocol.sip import HEAD_BYTES, READING_BYTES, SIP_KINDS
-from p2os.robots.parameters import ParametersError, RobotParameters, load_parameters
 from simbase.errors import UsageError
 
 RobotForUnits = Annotated[
@@ -33,7 +30,6 @@ ProfileForLayouts = Annotated[
     Profile | None,
     typer.Option("--profile", help="Firmware family, for layouts; default: as the packets look.", metavar=FAMILIES),
 ]
-DEFAULT_ROBOT = "p2dx"
 #: chosen: some two minutes of SIPs; a robot says who it is before the first.
 LOOKED_AT_BYTES = 1 << 16
 
@@ -57,6 +53,8 @@ def reading_of(
 ) -> tuple[Reading, Iterator[Block]]:
     """Return how to read a capture, and its blocks, of which no more than the beginning was read.
 
+    What is read while it comes is not to wait for a beginning: `FollowedReading`.
+
     Args:
         source: What is to be read.
         robot: Model or file; empty to look into the capture.
@@ -66,9 +64,16 @@ def reading_of(
         ParametersError: There is no such model or file.
     """
     blocks, seen = iter(source), list[Block]()
-    subclass, guessed = _look(blocks, seen) if not robot or profile is None else ("", Profile.P2OS)
-    parameters = load_parameters(robot) if robot else _parameters(subclass)
-    return Reading(profile=profile or guessed, parameters=parameters), chain(seen, blocks)
+    followed, size, cutter = FollowedReading(robot, profile), 0, FrameCutter()
+    given = bool(robot) and profile is not None
+    for chunk in () if given else chunks_of(_noted(blocks, seen)):
+        size += len(chunk.data)
+        for piece in cutter.take(replace(chunk, data=chunk.data[:LOOKED_AT_BYTES])):
+            if piece.direction is not Direction.TO_ROBOT and piece.frame is not None and not followed.is_settled:
+                followed.take(piece.frame.payload)
+        if followed.is_settled or size > LOOKED_AT_BYTES:
+            break
+    return followed.reading, chain(seen, blocks)
 
 
 def wanted_names(only: str) -> set[str]:
@@ -76,7 +81,7 @@ def wanted_names(only: str) -> set[str]:
     return {name.strip().lower() for name in only.split(",") if name.strip()}
 
 
-def chosen_rows(blocks: Iterable[Block], reading: Reading, wanted: set[str]) -> Iterator[ListingRow]:
+def chosen_rows(blocks: Iterable[Block], reading: Reading | FollowedReading, wanted: set[str]) -> Iterator[ListingRow]:
     """Yield the rows of these names (`damaged`: of what is no sound frame); the rest costs little with NumPy."""
     try:
         from p2os.capture.columns.passing import rows_passing
@@ -87,39 +92,6 @@ def chosen_rows(blocks: Iterable[Block], reading: Reading, wanted: set[str]) -> 
     for row in rows:
         if row.name.lower() in wanted or ("damaged" in wanted and not row.valid):
             yield row
-
-
-def _parameters(subclass: str) -> RobotParameters:
-    try:
-        return load_parameters(subclass or DEFAULT_ROBOT)
-    except ParametersError:
-        return load_parameters(DEFAULT_ROBOT)
-
-
-def _look(blocks: Iterator[Block], seen: list[Block]) -> tuple[str, Profile]:
-    """Return the model and the firmware family that a capture's beginning shows, and put what was read into `seen`.
-
-    A SIP longer than its sonar readings need has the tail that only ARCOS sends;
-    AROS and P2OS have the same shape.
-    """
-    subclass, profile, size = "", Profile.P2OS, 0
-    cutter = FrameCutter()
-    for chunk in chunks_of(_noted(blocks, seen)):
-        size += len(chunk.data)
-        for piece in cutter.take(replace(chunk, data=chunk.data[:LOOKED_AT_BYTES])):
-            if piece.direction is Direction.TO_ROBOT or piece.frame is None:
-                continue
-            kind, data = piece.frame.kind, piece.frame.data
-            if kind == IDENTITY_KIND and data:
-                subclass = Identity.from_frame(piece.frame).subclass.lower()
-            elif kind in SIP_KINDS and len(data) >= HEAD_BYTES - 1:
-                if len(data) > HEAD_BYTES - 1 + READING_BYTES * data[18]:
-                    profile = Profile.ARCOS
-                if subclass:
-                    return subclass, profile
-        if size > LOOKED_AT_BYTES:
-            break
-    return subclass, profile
 
 
 def _noted(blocks: Iterator[Block], seen: list[Block]) -> Iterator[Block]:

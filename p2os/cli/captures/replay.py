@@ -20,7 +20,7 @@ from p2os.client import ClientSettings
 from p2os.errors import RemoteProtocolError, RunFailedError, TransportError
 from p2os.protocol.commands import CommandNumber
 from p2os.transport import listen_url, open_url
-from p2os.transport.ports import HungUpError, Listener, Transport
+from p2os.transport.ports import HungUpError, Listener, RefusedPeerError, Transport
 from p2os.transport.waiting import LONGEST_WAIT_NS, wait_for_line, wait_readable
 from p2os.transport.wall_clock import Clock, GapWatch, wall_clock
 from simbase.errors import FileError, UsageError
@@ -142,18 +142,34 @@ def replay(
     if not player.frames_left:
         who = "robot" if side is Side.ROBOT else "client"
         raise FileError(f"{file} holds nothing that a {who} sent", hint="p2os decode shows what it holds")
-    frames = player.frames_left
     if side is Side.CLIENT:
         _ask(motions_of(capture), url, yes=yes)
         hold_robot()
-        transport = open_url(url)
-    else:
-        listener = listen_url(url)
-        sys.stderr.write(f"waiting for a client on {listener.description}; Ctrl-C ends\n")
-        transport = _first(listener)
+        _play(player, open_url(url), side)
+        return
+    listener = listen_url(url)
+    sys.stderr.write(f"waiting for a client on {listener.description}; Ctrl-C ends\n")
+    while True:
+        try:
+            _play(Replay(capture, side.role, speed=speed), _first(listener), side)
+        except RefusedPeerError:  # it was no client
+            continue
+        return
+
+
+def _play(player: Replay, transport: Transport, side: Side) -> None:
+    """Play to the end, or until a client has closed the session.
+
+    Raises:
+        RefusedPeerError: Who came may be no client.
+        TransportError: The far side has gone before.
+    """
+    frames = player.frames_left
     with contextlib.closing(transport):
         try:
             play(player, transport, side.role)
+        except RefusedPeerError:
+            raise
         except HungUpError as error:
             sent = frames - player.frames_left
             if side is Side.ROBOT and player.is_closed:

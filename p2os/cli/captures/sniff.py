@@ -20,22 +20,20 @@ from typing import Annotated
 
 import typer
 
-from p2os.capture import Chunk, Direction, Lister, ListingRow, Reading
+from p2os.capture import Chunk, Direction, FollowedReading, Lister, ListingRow
 from p2os.capture.listing import line_of, summary_of
 from p2os.capture.tap import Tap
 from p2os.cli.captures.capture_files import PcapFile, RecordingFile, Sink, Sinks
-from p2os.cli.captures.reading import DEFAULT_ROBOT, FAMILIES
+from p2os.cli.captures.reading import ProfileForLayouts, RobotForUnits
 from p2os.cli.held_robot import hold_robot
 from p2os.cli.help_pages import CAPTURES
 from p2os.cli.kept_files import FORCE_HELP, refuse_to_overwrite
-from p2os.cli.names import robots, urls
+from p2os.cli.names import urls
 from p2os.cli.quantities import option
 from p2os.cli.signals import postponed
 from p2os.errors import TransportError
-from p2os.protocol.profiles import Profile
-from p2os.robots.parameters import load_parameters
 from p2os.transport import listen_url, open_url
-from p2os.transport.ports import Listener, Transport
+from p2os.transport.ports import Listener, RefusedPeerError, Transport
 from p2os.transport.waiting import BLIND_POLL_S, wait_readable
 from p2os.transport.wall_clock import Clock, GapWatch, wall_clock
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
@@ -83,10 +81,8 @@ def sniff(
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print no packets.")] = False,
     once: Annotated[bool, typer.Option("--once", help="End when the first client has gone.")] = False,
     lasts_ns: Annotated[Nanos | None, option(TIME, "--for", purpose="End after so long.", above_zero=True)] = None,
-    robot: Annotated[
-        str, typer.Option(help="Robot model, or a TOML file, for units.", metavar="MODEL|FILE", autocompletion=robots)
-    ] = DEFAULT_ROBOT,
-    profile: Annotated[Profile, typer.Option(help="Firmware family, for layouts.", metavar=FAMILIES)] = Profile.P2OS,
+    robot: RobotForUnits = "",
+    profile: ProfileForLayouts = None,
     install_dissector: Annotated[
         bool,
         typer.Option("--install-dissector", help="Copy the dissector into Wireshark's folder of plug-ins, and end."),
@@ -102,7 +98,7 @@ def sniff(
         raise typer.BadParameter("name the robot's URL", param_hint="URL")
     for path in (out, pcap):
         refuse_to_overwrite(path, force=force)
-    reading = Reading(profile=profile, parameters=load_parameters(robot))
+    reading = FollowedReading(robot, profile)
     hold_robot()
     robot_line = open_url(url)
     listener = listen_url(listen)
@@ -231,6 +227,10 @@ class Bridge:
         target = self._robot if direction is Direction.TO_ROBOT else self._client
         try:
             data = source.read()
+        except RefusedPeerError as error:
+            self._release(str(error))
+            self.sessions -= 1  # it was no client
+            return
         except TransportError as error:
             self._release(str(error))
             return
@@ -305,7 +305,7 @@ class Bridge:
 class Screen:
     """Shows rows on stdout as they come."""
 
-    def __init__(self, reading: Reading, *, as_json: bool, quiet: bool) -> None:
+    def __init__(self, reading: FollowedReading, *, as_json: bool, quiet: bool) -> None:
         self._lister = Lister(reading)
         self._as_json = as_json
         self._quiet = quiet

@@ -8,14 +8,26 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from p2os.capture import Capture, Direction, ListingRow, Reading, capture_of, explain, frame_chunks, read_file, rows_of
+from p2os.capture import (
+    Capture,
+    Direction,
+    FollowedReading,
+    ListingRow,
+    Reading,
+    capture_of,
+    explain,
+    frame_chunks,
+    read_file,
+    rows_of,
+)
 from p2os.capture.describe import plain
 from p2os.capture.explain import lines_of
 from p2os.capture.listing import guess_direction, line_of, summary_of
 from p2os.protocol.commands import Command, CommandNumber
 from p2os.protocol.frames import Frame
-from p2os.protocol.packets import RawPacket
+from p2os.protocol.packets import Identity, RawPacket
 from p2os.protocol.profiles import Profile
+from p2os.protocol.sip import StandardSip
 from p2os.robots.parameters import load_parameters
 from simbase.timing import NS_PER_MS, NS_PER_S
 
@@ -161,3 +173,65 @@ def test_values_become_what_json_can_hold() -> None:
     }  # fmt: skip
     assert plain(RawPacket(1, b"\2")) == {"kind": 1, "data": "02"}
     assert plain(object).startswith("<class")  # type: ignore[union-attr]
+
+
+# A reading that is followed ------------------------------------------------------------
+
+SHORT, TAILED = StandardSip().to_frame(Profile.P2OS), StandardSip(tail=(1,)).to_frame(Profile.ARCOS)
+SYNC2_WITHOUT_DATA = Frame(b"\x02")
+
+
+def identity(subclass: str) -> Frame:
+    return Identity("Fritz", "Pioneer", subclass).to_frame()
+
+
+def followed(*packets: Frame, robot: str = "", profile: Profile | None = None) -> FollowedReading:
+    reading = FollowedReading(robot, profile)
+    for packet in packets:
+        reading.take(packet.payload)
+    return reading
+
+
+@pytest.mark.parametrize(("packets", "model", "profile", "is_settled"), [
+    ((), "p2dx", Profile.P2OS, False),
+    ((SYNC2_WITHOUT_DATA,), "p2dx", Profile.P2OS, False),
+    ((SHORT,), "p2dx", Profile.P2OS, False),
+    ((TAILED,), "p2dx", Profile.ARCOS, False),
+    ((identity("p3dx-sh"),), "p3dx-sh", Profile.P2OS, False),
+    ((identity("P3DX-SH"), TAILED), "p3dx-sh", Profile.ARCOS, True),
+    ((TAILED, identity("p3dx-sh")), "p3dx-sh", Profile.ARCOS, False),
+    ((identity("p3dx-sh"), TAILED, SHORT), "p3dx-sh", Profile.ARCOS, True),
+    ((identity("p3dx-sh"), TAILED, identity("p2at"), SHORT), "p2at", Profile.P2OS, True),
+    ((identity("nobody"), SHORT), "p2dx", Profile.P2OS, True),
+    ((identity(""), SHORT), "p2dx", Profile.P2OS, True),
+])  # fmt: skip
+def test_a_reading_follows_what_the_robot_says(
+    packets: tuple[Frame, ...], model: str, profile: Profile, is_settled: bool
+) -> None:
+    found = followed(*packets)
+    assert found.reading == Reading(profile=profile, parameters=load_parameters(model))
+    assert found.is_settled is is_settled
+
+
+def test_what_is_given_stays() -> None:
+    packets = (identity("p3dx-sh"), TAILED)
+    assert followed(*packets, robot="p2at").reading == Reading(
+        profile=Profile.ARCOS, parameters=load_parameters("p2at")
+    )
+    assert followed(*packets, profile=Profile.AROS).reading == Reading(
+        profile=Profile.AROS, parameters=load_parameters("p3dx-sh")
+    )
+    assert followed(robot="p2at", profile=Profile.AROS).is_settled
+
+
+@given(st.binary(min_size=1, max_size=200))
+def test_any_payload_can_be_followed(payload: bytes) -> None:
+    followed(Frame(payload), Frame(bytes([2]) + payload[1:]), Frame(bytes([0x32]) + payload[1:]))
+
+
+@pytest.mark.parametrize("direction", [FROM, None])
+def test_a_listing_changes_its_units_with_the_packet_that_tells_the_robot(direction: Direction | None) -> None:
+    sip = StandardSip(raw_x=1000).to_frame(Profile.P2OS)
+    said_first = said(*(frame.to_bytes() for frame in (sip, identity("p3dx-sh"), sip)), direction=direction)
+    metres = [row.fields["x_m"] for row in rows_of(said_first, FollowedReading()) if row.name == "SIP"]
+    assert metres == [load_parameters(model).distance_conv_mm for model in ("p2dx", "p3dx-sh")]

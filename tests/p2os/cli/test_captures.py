@@ -2,6 +2,8 @@
 
 import contextlib
 import json
+import logging
+import socket
 import subprocess
 import threading
 from collections.abc import Callable
@@ -11,6 +13,7 @@ import pytest
 
 from p2os.capture import Chunk, Direction, capture_of, read_capture, read_file, write_recording
 from p2os.capture.replay import Replay
+from p2os.cli import refused_connections
 from p2os.cli.captures.capture_files import RecordingFile, Sinks
 from p2os.cli.captures.record import record_session
 from p2os.cli.captures.replay import motions_of, play
@@ -19,8 +22,14 @@ from p2os.errors import RemoteProtocolError, RunFailedError, TransportError
 from p2os.pioneer.controller import ControllerSettings
 from p2os.pioneer.serve import served_pioneer
 from p2os.protocol.commands import Command, CommandNumber
+from p2os.protocol.packets import Identity
+from p2os.protocol.profiles import Profile
+from p2os.protocol.sip import StandardSip
+from p2os.robots.parameters import load_parameters
 from p2os.transport import HungUpError, Loops, listen_url, open_url, waiting
+from p2os.transport.ports import RefusedPeerError
 from simbase.errors import FileError
+from simbase.listening import LOGGER
 from simbase.timing import NS_PER_MS, NS_PER_S
 from tests.tools.forked_python import forked_python
 
@@ -117,6 +126,24 @@ def test_sniff_shows_and_records_one_client(served: object, run: Run, tmp_path: 
     rows = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert [row["name"] for row in rows[:6]] == ["SYNC0", "SYNC0", "SYNC1", "SYNC1", "SYNC2", "IDENTITY"]
     assert read_file(out).bytes_of(TO) == read_file(tmp_path / "t.pcap").bytes_of(TO)
+
+
+@pytest.mark.parametrize(("options", "model"), [([], "p3dx-sh"), (["--robot", "p2at"], "p2at")])
+def test_sniff_shows_lengths_in_the_units_of_the_robot_that_answers(
+    options: list[str], model: str, run: Run, monkeypatch: pytest.MonkeyPatch, capsys: Capture
+) -> None:
+    robot = [Identity("Fritz", "Pioneer", "p3dx-sh").to_frame(), StandardSip(raw_x=1000).to_frame(Profile.P2OS)]
+
+    def run_bridge(bridge: Bridge, _until: Callable[[], bool]) -> None:
+        for at_ns, frame in enumerate(robot):
+            bridge._on_chunk(Chunk(at_ns=at_ns, direction=FROM, data=frame.to_bytes()))
+
+    monkeypatch.setattr(Bridge, "run", run_bridge)
+    with socket.create_server(("127.0.0.1", 0)) as there:
+        url = f"tcp:127.0.0.1:{there.getsockname()[1]}"
+        assert run("sniff", url, "--listen", "tcp:127.0.0.1:0", "--json", *options) == 0
+    sip = json.loads(capsys.readouterr().out.splitlines()[1])
+    assert sip["fields"]["x_m"] == pytest.approx(load_parameters(model).distance_conv_mm, abs=1e-6)
 
 
 class Line:
@@ -477,3 +504,35 @@ def test_a_client_that_closes_its_session_and_goes_is_no_error(
     monkeypatch.setattr("p2os.cli.captures.replay._first", lambda _listener: line)
     assert run("replay", recording, "tcp:127.0.0.1:0") == code
     assert told in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("no_waiting")
+def test_a_replay_begins_anew_for_the_client_that_comes_after_a_web_page(
+    run: Run, tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recording = tmp_path / "talk.jsonl"
+    sync = Command(0).to_frame().to_bytes()
+    talk = [(0, TO, sync), (1, FROM, sync), (100 * NS_PER_S, FROM, SIP)]
+    recording.write_text(write_recording(capture_of(talk)))
+    client = Line(sync, Command(2).to_frame().to_bytes(), HungUpError("gone"))
+    lines = iter([Line(RefusedPeerError("a page")), client])
+    monkeypatch.setattr("p2os.cli.captures.replay._first", lambda _listener: next(lines))
+    assert run("replay", recording, "tcp:127.0.0.1:0") == 0
+    assert capsys.readouterr().err.endswith("Ctrl-C ends\nthe client closed the session after 1 of 2 frames\n")
+    assert client.received == sync + b"closed"
+
+
+def test_of_refused_connections_some_lines_a_second_are_shown(capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
+    now_s = 100.0
+    monkeypatch.setattr(refused_connections.time, "monotonic", lambda: now_s)
+    log = logging.getLogger(LOGGER)
+    with refused_connections.shown_refusals():
+        for number in range(refused_connections.MOST_A_SECOND + 2):
+            log.warning("refused %s", number)
+        now_s = 100.999
+        log.warning("still the same second")
+        now_s = 101.0
+        log.warning("the next")
+    log.warning("nobody shows it")
+    shown = [f"p2os: refused {number}" for number in range(refused_connections.MOST_A_SECOND)]
+    assert capsys.readouterr().err.splitlines() == [*shown, "p2os: 3 connections more were refused", "p2os: the next"]

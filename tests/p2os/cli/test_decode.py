@@ -3,11 +3,20 @@
 import io
 import json
 import sys
+from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
+from p2os.capture.chunks import Chunk, Direction
+from p2os.capture.formats.pcap import file_header, record
+from p2os.capture.formats.recording import chunk_line
 from p2os.cli.main import run
+from p2os.protocol.packets import Identity
+from p2os.protocol.profiles import Profile
+from p2os.protocol.sip import StandardSip
+from p2os.robots.parameters import load_parameters
 
 Capture = pytest.CaptureFixture[str]
 GOLDEN = Path(__file__).resolve().parent.parent.parent / "golden" / "captures"
@@ -63,6 +72,69 @@ def test_stdin_is_read(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(bytes.fromhex(VEL))))
     assert run(["decode", "-", "--dir", "c2r"]) == 0
     assert capsys.readouterr().out == "> VEL 200 mm/s\n"
+
+
+SYNC2_ANSWER = Identity("Fritz", "Pioneer", "p3dx-sh").to_frame().to_bytes()
+SIP_SENT = StandardSip(raw_x=1000).to_frame(Profile.ARCOS).to_bytes()
+#: The robot's side of a conversation, as a pipe may bring it.
+KINDS = {
+    "raw": lambda chunk: chunk.data,
+    "hex": lambda chunk: f"< {chunk.data.hex(' ')}\n".encode(),
+    "recording": lambda chunk: chunk_line(chunk).encode(),
+    "pcap": lambda chunk: (b"" if chunk.at_ns else file_header()) + record(chunk),
+}
+
+
+class LivePipe(io.RawIOBase):
+    """Standard input that brings a piece a read, and looks what was shown before each further one."""
+
+    def __init__(self, pieces: list[bytes], look: Callable[[], None]) -> None:
+        self._pieces, self._look, self._read = iter(pieces), look, 0
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: bytearray) -> int:
+        if self._read:
+            self._look()
+        self._read += 1
+        piece = next(self._pieces, b"")
+        buffer[: len(piece)] = piece
+        return len(piece)
+
+
+class PipedScreen(io.StringIO):
+    """Standard output into a pipe: what was not flushed nobody sees."""
+
+    seen = ""
+
+    def flush(self) -> None:
+        self.seen = self.getvalue()
+
+
+@pytest.mark.parametrize("options", [[], ["--json"], ["--explain"], ["--only", "identity,sip"], ["--robot", "p3dx-sh"]])
+@pytest.mark.parametrize("kind", KINDS)
+def test_each_packet_is_shown_while_its_pipe_stays_open(
+    kind: str, options: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    frames = [SIP_SENT, SYNC2_ANSWER, SIP_SENT]
+    chunks = [Chunk(at_ns=n * 1_000_000, direction=Direction.FROM_ROBOT, data=data) for n, data in enumerate(frames)]
+    screen, shown = PipedScreen(), list[int]()
+    monkeypatch.setattr(sys, "stdout", screen)
+    pipe = LivePipe([KINDS[kind](chunk) for chunk in chunks], lambda: shown.append(screen.seen.count("SIP")))
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BufferedReader(pipe)))
+    assert run(["decode", "-", "--dir", "r2c", *options]) == 0
+    is_sip_seen = [after > before for before, after in pairwise([0, *shown])]
+    assert is_sip_seen == [True, False, True]
+
+
+def test_units_are_those_of_the_robot_once_it_has_said_who_it_is(
+    monkeypatch: pytest.MonkeyPatch, capsys: Capture
+) -> None:
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(SIP_SENT + SYNC2_ANSWER + SIP_SENT)))
+    assert run(["decode", "-", "--json", "--only", "SIP"]) == 0
+    first, last = (json.loads(line)["fields"]["x_m"] for line in capsys.readouterr().out.splitlines())
+    assert (first, last) == tuple(load_parameters(robot).distance_conv_mm for robot in ("p2dx", "p3dx-sh"))
 
 
 def test_only_what_is_asked_for_is_shown(capsys: Capture) -> None:

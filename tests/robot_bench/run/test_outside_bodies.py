@@ -2,20 +2,24 @@
 
 import json
 import shutil
+import socket
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
+from typing import IO
 
 import pytest
 
 from p2os.cli.main import run as p2os
 from p2os.pioneer.body.outside.body import Ability
+from p2os.pioneer.body.outside.messages import Hello, encode_request
 from p2os.pioneer.world.model import Obstacle
 from robot_bench import Bench
 from simbase.errors import UsageError
+from simbase.listening import OPENINGS
 from tests.p2os.pioneer.body.outside.served import Served, served, serving
 from tests.robot_bench.firmware.hurried import hurried, hurried_scenario
 from tests.tools.made_once import made_once
@@ -25,9 +29,10 @@ needs_compiler = pytest.mark.skipif(shutil.which("g++") is None, reason="g++ is 
 
 
 @contextmanager
-def started(*command: str | Path) -> Iterator[str]:
+def started(*command: str | Path, errors: IO[bytes] | None = None) -> Iterator[str]:
     """Run a program that is a body until the end of the block; yield where it says that it listens."""
-    with subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE, text=True) as program:
+    words = [str(word) for word in command]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=errors, text=True) as program:
         try:
             assert program.stdout is not None
             yield next(line for line in program.stdout if line.startswith("listening on ")).split()[-1]
@@ -79,6 +84,54 @@ def test_a_body_in_c_has_walls_of_its_own(plan_view: Path) -> None:
         assert bench.parts.body.state.collisions >= 1
         assert bench.pose.x_m < 0.4
         assert "own wall" in bench.trace.text
+
+
+def refuses_pages(folder: Path, *command: str | Path) -> None:
+    """Have a body meet what a browser begins with, split at every byte, and then a client of its own."""
+    hello = encode_request(GREETING)
+    log = folder / "errors"
+    with log.open("wb") as errors, started(*command, "tcp:127.0.0.1:0", errors=errors) as address:
+        there = ("127.0.0.1", int(address.rpartition(":")[2]))
+        requests = [opening + b"/ HTTP/1.1\r\nHost: a\r\n\r\n" + hello for opening in OPENINGS]
+        for request, place in ((request, place) for request in requests for place in range(1, 9)):
+            with socket.create_connection(there, timeout=30) as page:
+                page.sendall(request[:place])
+                with suppress(ConnectionError):
+                    page.sendall(request[place:])
+                    assert page.recv(1) == b""
+        with socket.create_connection(there, timeout=30) as client:
+            client.sendall(hello)
+            assert client.recv(5)[4:] == b"\x81", "Welcome"
+    assert log.read_text() == "connection refused: it begins with no Hello\n" * 8 * len(requests)
+
+
+GREETING = Hello(
+    1, 1_000_000, "p2dx", (0.3, 0.19, 0.05, 0.24, 9.0, 0.5, 1.0, 0.2, 5.0, 0.0, 0.5), ((0.2, 0.1), (-0.2, -0.1)), ()
+)
+#: A body that can do nothing but greet.
+GREETER = """
+import sys
+sys.path.insert(0, {folder!r})
+from lock_step import main, welcome
+
+class Body:
+    def hello(self, fields):
+        return welcome(0, "greeter", "")
+
+main(Body)
+"""
+
+
+def test_a_body_in_python_refuses_web_pages(tmp_path: Path) -> None:
+    program = tmp_path / "greeter.py"
+    program.write_text(GREETER.format(folder=str(SOURCE)))
+    refuses_pages(tmp_path, sys.executable, program)
+
+
+@needs_compiler
+@pytest.mark.slow
+def test_a_body_in_c_refuses_web_pages(plan_view: Path, tmp_path: Path) -> None:
+    refuses_pages(tmp_path, plan_view)
 
 
 def same_trace_twice(name: str, *command: str | Path, saves: bool) -> None:
