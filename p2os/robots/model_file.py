@@ -221,9 +221,8 @@ def _firmware(given: str | Sequence[str], where: Place) -> tuple[str, ...]:
     if not found or not set(found) <= set(FIRMWARE):
         strange = next((name for name in found if name not in FIRMWARE), "")
         hint = nearest(strange, FIRMWARE) if strange else "the usual one first"
-        raise ParametersError(
-            f"{where.at('firmware')}: firmware = {shown(given)} names none of {', '.join(FIRMWARE)}", hint=hint
-        )
+        what = f"firmware = {shown(given)} is not of {', '.join(FIRMWARE)}"
+        raise ParametersError(f"{where.at('firmware')}: {what}", hint=hint)
     return found
 
 
