@@ -69,10 +69,18 @@ class Outbox:
         """Queue frames."""
         self._queue.extend(Send(frame) for frame in frames)
 
-    def send_first(self, frames: Iterable[bytes]) -> None:
-        """Put frames before all that waits; the first may go at once, for the line has been still for long."""
-        self._queue.extendleft(reversed([Send(frame) for frame in frames]))
-        self._free_at = 0
+    def send_first(self, frames: Iterable[bytes], *, is_still: bool = False) -> None:
+        """Put frames before all other frames that wait, but behind a change of the line, which they need.
+
+        Args:
+            frames: What is sent.
+            is_still: Nothing was sent for long: the first may go at once.
+        """
+        waiting = list(self._queue)
+        place = max((at for at, action in enumerate(waiting, 1) if not isinstance(action, Send)), default=0)
+        self._queue = deque([*waiting[:place], *map(Send, frames), *waiting[place:]])
+        if is_still:
+            self._free_at = 0
 
     def drop_frames(self, numbers: Container[int] | None = None) -> None:
         """Drop frames that were not sent, those of some commands or all: what follows matters more."""
