@@ -71,7 +71,7 @@ from p2os.protocol.connection import (
     WatchdogRevived,
 )
 from p2os.protocol.packets import Identity, MapChangedPacket, ResetNotice
-from p2os.protocol.profiles import Profile, profiles_of
+from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import RobotParameters
 from simbase.errors import P2osError, UsageError, shown, shown_name
 from simbase.state import Stateful
@@ -156,7 +156,7 @@ class Pioneer(Stateful):
         self.parameters, self.body = parameters, body
         chosen = settings or ControllerSettings()
         #: The family of its firmware.
-        self.profile = chosen.profile or profiles_of(parameters)[0]
+        self.profile = chosen.family_of(parameters)
         self.settings = replace(chosen, profile=self.profile, flash=chosen.flash.for_model(parameters))
         self.on_event = on_event
         #: What its sonar hear of other robots; none by itself.

@@ -8,8 +8,9 @@ from p2os.pioneer.controller.flash import Flash
 from p2os.pioneer.devices.laser import LASERS, LaserModel
 from p2os.pioneer.sensor_errors import IDEAL, SensorErrors
 from p2os.protocol.bauds import BAUDS, BAUDS_TEXT
-from p2os.protocol.profiles import Profile
+from p2os.protocol.profiles import Profile, profiles_of
 from p2os.protocol.times import CYCLE_NS, WATCHDOG_NS
+from p2os.robots.parameters import RobotParameters
 from simbase.errors import UsageError, shown
 from simbase.timing import NS_PER_MS, Nanos
 
@@ -110,6 +111,10 @@ class ControllerSettings:
         if name not in CLIENTS:
             raise UsageError(f"no settings for {shown(name)}", hint=f"there are some for: {', '.join(CLIENTS)}")
         return CLIENTS[name]
+
+    def family_of(self, parameters: RobotParameters) -> Profile:
+        """Return whose packets a model sends with these settings."""
+        return self.profile or profiles_of(parameters)[0]
 
     def with_flash(self, flash: Flash) -> "ControllerSettings":
         """Return these settings with what a FLASH file sets."""
