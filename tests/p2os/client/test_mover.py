@@ -578,3 +578,20 @@ def test_a_robot_that_was_told_to_stand_is_known_to_stand_and_no_other(said: lis
     assert sent.may_move or not moves
     if said and said[-1] == stop():
         assert not sent.may_move
+
+
+@pytest.mark.parametrize("newer", [vel(100), DriveAxis(1.0)], ids=["raw", "goal"])
+def test_a_newer_movement_does_not_drop_a_stop_that_waits(newer: Command | DriveAxis) -> None:
+    rig = Rig().connect()
+    rig.core.set_velocity(0.2, 0.5, rig.now)
+    rig.living(1)
+    before = len(rig.sent)
+    rig.core.stop(rig.now)
+    if isinstance(newer, Command):
+        rig.core.send(newer, rig.now)
+    else:
+        rig.core.begin_goal(newer, None, None, rig.now)
+    rig.living(1.5)
+    assert rig.commands()[before] == stop()
+    left, right = rig.wheels
+    assert left == right > 0.05
