@@ -187,7 +187,7 @@ class _Listener:
     def __init__(self, scenario: Scenario, recorder: Recorder) -> None:
         self.pose = OdometryPose(scenario.parameters)
         self._recorder = recorder
-        self._profile = scenario.controller.profile
+        self._profile = scenario.controller.family_of(scenario.parameters)
         self._decoder = Decoder()
         self._ranges = SipRanges(scenario.parameters, self._profile, on_ranges=recorder.sonar)
 

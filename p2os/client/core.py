@@ -34,7 +34,7 @@ from p2os.client.notices import (
     RobotUnknown,
 )
 from p2os.client.observer import Observer, bumpers_of, limits_of
-from p2os.client.outbox import Action
+from p2os.client.outbox import Action, Send
 from p2os.client.robot_state import Limits, Link, RobotPose, RobotState
 from p2os.client.settings import ClientSettings
 from p2os.protocol.commands import Command, CommandNumber
@@ -103,7 +103,7 @@ class RobotCore:
         self._given = parameters
         self._load = load
         self._supervisor = LinkSupervisor(settings)
-        self._observer = Observer(parameters or load(FALLBACK_MODEL))
+        self._observer = Observer(parameters or load(FALLBACK_MODEL), settings.profile)
         self._mover = Mover(
             settings, self._observer, send=self._supervisor.send, send_first=self._supervisor.send_first,
             drop=self._supervisor.drop, notify=self.news.append,
@@ -152,7 +152,7 @@ class RobotCore:
     @property
     def profile(self) -> Profile:
         """The firmware family in use."""
-        return self._observer.profile
+        return self._observer.firmware.profile
 
     @property
     def limits(self) -> Limits:
@@ -300,8 +300,11 @@ class RobotCore:
             self._mover.take_gap(gap_ns, now)
 
     def take_action(self, now: Nanos) -> Action | None:
-        """Return the next thing to do with the line, if any is due."""
-        return self._supervisor.take_action(now)
+        """Return the next thing to do with the line, if any is due; a frame counts as sent from here on."""
+        action = self._supervisor.take_action(now)
+        if isinstance(action, Send):
+            self._mover.take_sent(action.data)
+        return action
 
     def next_deadline(self) -> Nanos | None:
         """Return when this wants to act, or an action is due."""
@@ -335,14 +338,16 @@ class RobotCore:
         supervisor = self._supervisor
         while supervisor.news:
             item = supervisor.news.popleft()
-            if isinstance(item, StandardSip):
-                self._take_sip(item, now)
+            if isinstance(item, tuple):
+                self._take_sip(*item, now)
                 continue
             match item:
                 case Connected():
                     self._begin_session(item.identity)
                 case ConfigurationKnown():
                     self._observer.bumpers = bumpers_of(item.config)
+                    self._observer.firmware.take_config(item.config)
+                    self._supervisor.set_profile(self.profile)
                 case LinkLost():
                     self.problem, self._unreported_loss = item, item.reason
                     self._mover.lose(now)
@@ -364,16 +369,17 @@ class RobotCore:
                 self.news.append(RobotUnknown(identity.subclass, FALLBACK_MODEL))
         self._packets.clear()
         self._observer.new_session(parameters)
-        self._observer.profile = self.settings.profile or guess_profile(identity.subclass)
-        self._supervisor.set_profile(self._observer.profile)
+        self._supervisor.set_profile(self.profile)
         self._mover.new_session()
 
-    def _take_sip(self, sip: StandardSip, now: Nanos) -> None:
-        if self.settings.profile is None and sip.tail and self._observer.profile is not Profile.ARCOS:
-            # Only ARCOS sends fields after DIGOUT; simulators do so under any model's name.
-            self._observer.profile = Profile.ARCOS
-            sip = StandardSip.from_frame(sip.to_frame(self._supervisor.profile), Profile.ARCOS)
-            self._supervisor.set_profile(Profile.ARCOS)
+    def _take_sip(self, sip: StandardSip, read_as: Profile, now: Nanos) -> None:
+        """Take a packet that was read in a family's layout; where it is of another one, it is read anew."""
+        hint = self.profile
+        sip = _read_anew(sip, read_as, hint)
+        self._observer.firmware.take(sip)
+        if self.profile is not hint:
+            sip = _read_anew(sip, hint, self.profile)
+            self._supervisor.set_profile(self.profile)
         state = self._observer.take(sip, now)
         if (gap_ns := self._observer.doubtful_gap_ns(self.limits)) is not None:
             self.news.append(OdometryDoubtful(gap_ns))
@@ -409,12 +415,9 @@ def request_for(kind: type) -> Command:
     return REQUESTS[kind]
 
 
-def guess_profile(subclass: str) -> Profile:
-    """Return the firmware family that a model's name stands for: -sh is ARCOS, Pioneer 2 is P2OS, the H8's are AROS."""
-    model = subclass.lower()
-    if model.endswith("-sh") or model.startswith(("seekur", "pioneer-lx")):
-        return Profile.ARCOS
-    return Profile.P2OS if model.startswith(("p2", "pion", "psos")) and not model.startswith("p2d8") else Profile.AROS
+def _read_anew(sip: StandardSip, was: Profile, profile: Profile) -> StandardSip:
+    """Return a packet that was read in one family's layout as another's."""
+    return sip if was is profile else StandardSip.from_frame(sip.to_frame(was), profile)
 
 
 def _cut(value: float, most: float) -> float:

@@ -108,8 +108,8 @@ class LinkSupervisor:
         self.config: ConfigPacket | None = None
         #: Line speed now; None without one.
         self.baud: int | None = None
-        #: Standard packets and notices, oldest first.
-        self.news: deque[StandardSip | Notice] = deque()
+        #: Standard packets, each with the family in whose layout it was read, and notices; oldest first.
+        self.news: deque[tuple[StandardSip, Profile] | Notice] = deque()
         self._line_baud: int | None = None
         #: Rates at which the robot was received last, and at which its handshake was found.
         self._good_baud: int | None = None
@@ -175,11 +175,11 @@ class LinkSupervisor:
             self._connection.send(command, now)
             self.outbox.send(self._connection.take_output())
 
-    def send_first(self, command: Command, now: Nanos) -> None:
-        """Send a command of the open session before all that waits, at once."""
+    def send_first(self, command: Command, now: Nanos, *, is_still: bool = False) -> None:
+        """Send a command of the open session before all that waits; `is_still`: at once, nothing was sent for long."""
         if self._connection.is_open:
             self._connection.send(command, now)
-            self.outbox.send_first(self._connection.take_output())
+            self.outbox.send_first(self._connection.take_output(), is_still=is_still)
 
     def drop(self, numbers: Container[int]) -> None:
         """Drop commands that have not left: something overtakes them."""
@@ -378,7 +378,7 @@ class LinkSupervisor:
                 self._good_baud = self._raise.new
                 self._raise = None
                 self.news.append(BaudRaised(self._good_baud))
-        self.news.append(sip)
+        self.news.append((sip, self.profile))
 
     def _begin_without_stops(self) -> None:
         """Open the line anew to a peer that took STOP for a sync: it was waiting for one, so it was not open."""

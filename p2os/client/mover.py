@@ -2,9 +2,17 @@
 
 Which speeds a goal needs is decided in `p2os.client.goals`.
 
-Theory of operation. A new motion takes the old one's place. A loss, the deadman,
-motors that go off, a stop and a goal's end lead to nothing or to held zero speeds;
-only a call of the program leads away from there.
+Theory of operation. A new motion takes the old one's place. Whatever else ends one
+sends STOP in the same step and then holds zero speeds: a goal's end, the deadman,
+motors that go off, a stop. A lost link alone does not, for nothing can be sent: the
+link's own closing frames and the robot's watchdog stop it. Only a call of the program
+leads away from there.
+
+What is wanted and what was sent are two states. `SentMotion` follows the frames that
+have left, and the deadman is armed by these: until a STOP or zero speeds have left
+after the last frame that moves the robot, whatever is held or forgotten meanwhile.
+
+Flags that say that the motors are off while the wheels turn are answered with STOP.
 
 `SpeedKeeper`: P2OS acknowledges nothing, so the present speed is sent on change and
 again at least every `refresh_ns`. Changes that come faster than `speed_spacing_ns`
@@ -21,12 +29,14 @@ reports a stall; each packet that shows one of the three passes the check. "Near
 means that the larger error of the two wheels fell below the least seen under this
 command by more than jitter, so that noise alone does not pass for long.
 
-Invariant: no speed is sent until one was first set, nor after `release`.
+Invariant: a robot that may move by what was sent to it has a movement under way that
+ends, or an armed deadman.
 """
 
 import math
 from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 from p2os.client.goals import Axis, Goal, as_number
 from p2os.client.notices import (
@@ -43,15 +53,25 @@ from p2os.client.robot_state import Limits, RobotState
 from p2os.client.settings import ClientSettings
 from p2os.errors import LocalProtocolError
 from p2os.protocol.commands import Command, CommandNumber, enable, rvel, stop, vel
+from p2os.protocol.frames import PREFIX_BYTES, Frame
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
-#: What moves a robot: sent raw, it takes the place of held speeds.
-MOTION_NUMBERS = frozenset(
-    {CommandNumber.MOVE, CommandNumber.ROTATE, CommandNumber.VEL, CommandNumber.HEAD, CommandNumber.DHEAD,
-     CommandNumber.RVEL, CommandNumber.DCHEAD, CommandNumber.VEL2, CommandNumber.LATVEL, CommandNumber.STOP,
-     CommandNumber.E_STOP, CommandNumber.QSTOP}
-)  # fmt: skip
+#: Ways to move, as bits: along the heading, about the centre, to the side.
+AHEAD, ROUND, ASIDE = 1, 2, 4
+#: What moves a robot → which ways: sent raw, it takes the place of held speeds.
+WAYS: Mapping[int, int] = {
+    CommandNumber.MOVE: AHEAD, CommandNumber.VEL: AHEAD, CommandNumber.VEL2: AHEAD | ROUND,
+    CommandNumber.ROTATE: ROUND, CommandNumber.RVEL: ROUND, CommandNumber.HEAD: ROUND, CommandNumber.DHEAD: ROUND,
+    CommandNumber.DCHEAD: ROUND, CommandNumber.LATVEL: ASIDE,
+}  # fmt: skip
+#: Of these 0 is a stand; 0 of the others is a place.
+SPEED_NUMBERS = frozenset(
+    {CommandNumber.VEL, CommandNumber.VEL2, CommandNumber.RVEL, CommandNumber.ROTATE, CommandNumber.LATVEL}
+)
+#: What stops it; STOP alone is known to every firmware.
+STOP_NUMBERS = frozenset({CommandNumber.STOP, CommandNumber.E_STOP, CommandNumber.QSTOP})
+MOTION_NUMBERS = WAYS.keys() | STOP_NUMBERS
 
 #: (command, is its argument positive) → the limit that it sets.
 LIMIT_NAMES: Mapping[tuple[int, bool], str] = {
@@ -115,7 +135,7 @@ class Mover:
         settings: The client's.
         observer: What is known of the robot.
         send: Sends a command of the open session.
-        send_first: Sends one before all that waits, at once.
+        send_first: Sends one before all that waits; `is_still`: at once.
         drop: Drops those commands, by number, that have not left yet.
         notify: Takes what the program is to know.
     """
@@ -126,7 +146,7 @@ class Mover:
         observer: Observer,
         *,
         send: Callable[[Command, Nanos], None],
-        send_first: Callable[[Command, Nanos], None],
+        send_first: "SendFirst",
         drop: Callable[[Container[int]], None],
         notify: Callable[[Notice], None],
     ) -> None:
@@ -137,6 +157,7 @@ class Mover:
         self._drop = drop
         self._notify = notify
         self._speeds = SpeedKeeper(spacing_ns=settings.speed_spacing_ns, refresh_ns=settings.refresh_ns)
+        self._sent = SentMotion()
         self._motors = Motors()
         self._plausibility = PlausibilityCheck(settings.plausibility_ns)
         self._goal: Goal | None = None
@@ -144,6 +165,8 @@ class Mover:
         self._speed_back: Command | None = None
         self._set_limits: dict[str, float] = {}
         self._called_at: Nanos = 0
+        #: When the deadman last stopped the robot: where no STOP has left since, it does so again.
+        self._tripped_at: Nanos = 0
 
     @property
     def commanded(self) -> Speeds:
@@ -182,9 +205,9 @@ class Mover:
     def enable(self, on: bool, now: Nanos) -> None:
         """Switch the motors."""
         if not on:
-            self._drop(MOTION_NUMBERS)
-            self.release("motors off", now)
+            self._switched_off("motors off", now)
         self._motors.ask(on=on, now=now)
+        self._observer.firmware.take_motors_asked(on)
         self._send(enable(on), now)
 
     def set_velocity(self, speeds: Speeds, now: Nanos) -> None:
@@ -194,19 +217,14 @@ class Mover:
 
     def stop(self, why: str, now: Nanos, *, at_once: bool = False) -> None:
         """Stop, and hold zero speeds."""
-        self._end_goal(why, now)
-        self._drop(MOTION_NUMBERS)
-        if at_once:
-            self._send(Command(CommandNumber.E_STOP), now)
-        self._send(stop(), now)
-        self._hold(STILL, now)
+        self._end(why, now, at_once=at_once)
 
     def take_gap(self, gap_ns: Nanos, now: Nanos) -> None:
         """Stop at once, and hold zero speeds where something moved the robot: what was asked is out of date."""
-        was_moving = self._goal is not None or not self._speeds.wanted.are_zero
+        was_moving = self._goal is not None or self._may_move
         self._end_goal(f"the program or its machine paused for {gap_ns / NS_PER_S:.1f} s", now)
         self._drop(MOTION_NUMBERS)
-        self._send_first(stop(), now)
+        self._send_first(stop(), now, is_still=True)
         if was_moving:
             self._hold(STILL, now)
             self._notify(GapStopped(gap_ns))
@@ -225,7 +243,9 @@ class Mover:
         state = self._observer.state
         if state is None:
             raise LocalProtocolError("the robot has not sent its position yet", hint="wait for a state")
-        self._drop(MOTION_NUMBERS)
+        self._drop(WAYS)
+        if self._may_move:  # MOVE leaves a rotation as it is, and HEAD a translation
+            self._send_first(stop(), now)
         self.release("another goal", now)
         if speed is not None:
             usual = axis.speed_of(limits)
@@ -246,8 +266,12 @@ class Mover:
     def note(self, command: Command, now: Nanos) -> None:
         """Take note of a command that the program sends by itself."""
         if command.number in MOTION_NUMBERS:
-            self._drop(MOTION_NUMBERS)
+            self._drop(WAYS)
             self.release("another command", now)
+        elif command.number == CommandNumber.ENABLE and command.integer == 0:
+            self._switched_off("motors off", now)
+        elif command.number == CommandNumber.PTUPOS:
+            self._observer.firmware.take_servo_set()
         value = command.integer
         name = LIMIT_NAMES.get((command.number, value is not None and value > 0))
         if name is not None and value:
@@ -259,10 +283,11 @@ class Mover:
     def new_session(self) -> None:
         """Know that the motors are off, and the limits the robot's own."""
         self._motors.new_session()
+        self._sent = SentMotion()  # STOP, VEL 0 and RVEL 0 went before the session, or nobody has opened it before
         self._set_limits.clear()  # CLOSE takes the robot back to its own
 
     def release(self, why: str, now: Nanos) -> None:
-        """Let nothing move the robot any more, and send nothing."""
+        """Forget what was asked, and send nothing: another movement takes its place, or the link is lost."""
         self._end_goal(why, now)
         self._speeds.release()
         self._plausibility.expect(None, self._observer.wheels_mps, now)
@@ -275,10 +300,12 @@ class Mover:
 
     def take(self, state: RobotState, now: Nanos) -> None:
         """Hold a state against what was asked."""
-        if (reason := self._motors.take(state, now)) is not None:
-            self.release("the motors went off", now)
-            self._notify(MotorsDisabled(f"motors are disabled: {reason}"))
         wheels = (state.left_mps, state.right_mps)
+        if (reason := self._motors.take(state, now)) is not None:
+            self._switched_off("the motors went off", now)
+            self._notify(MotorsDisabled(f"motors are disabled: {reason}"))
+        elif self._motors.are_reported_off(state, now) and wheels != (0.0, 0.0):
+            self._send_first(stop(), now)
         doubt = self._plausibility.take(wheels, stalled=state.is_stalled, now=now)
         if doubt is not None:
             stands = max(map(abs, wheels)) == 0
@@ -296,6 +323,7 @@ class Mover:
         if (deadman := self._deadman_due()) is not None and now >= deadman:
             self._notify(DeadmanStopped(now - self._called_at))
             self.stop("deadman", now)
+            self._tripped_at = now
         if self._goal is not None and (late := self._goal.time_is_up(now)) is not None:
             self.stop(late, now)
         if self._motors.take_repeat(now):
@@ -305,11 +333,21 @@ class Mover:
             for command in self._speeds.take(now):
                 self._send(command, now)
 
+    def take_sent(self, frame: bytes) -> None:
+        """Take note of a frame that leaves now."""
+        if frame[PREFIX_BYTES] in MOTION_NUMBERS:
+            self._sent.take(Command.from_frame(Frame.from_bytes(frame)))
+
+    @property
+    def _may_move(self) -> bool:
+        """Whether the robot may move by what was sent, or is about to be."""
+        return self._sent.may_move or not self._speeds.wanted.are_zero
+
     def _deadman_due(self) -> Nanos | None:
         timeout_ns = self._settings.deadman_ns
-        if timeout_ns is None or self._speeds.wanted.are_zero:
+        if timeout_ns is None or not self._may_move:
             return None
-        return self._called_at + timeout_ns
+        return max(self._called_at, self._tripped_at) + timeout_ns
 
     def _follow_goal(self, state: RobotState, now: Nanos) -> None:
         if self._goal is None:
@@ -317,11 +355,22 @@ class Mover:
         command, arrived, problem = self._goal.take(state, now)
         if command is not None:
             self._send(command, now)
-        if arrived:
-            self._end_goal(None, now)
-            self._hold(STILL, now)
-        elif problem is not None:
-            self.stop(problem, now)
+        if arrived or problem is not None:
+            self._end(problem, now)
+
+    def _end(self, why: str | None, now: Nanos, *, at_once: bool = False) -> None:
+        """End what moves the robot: STOP before all that waits, and zero speeds held."""
+        self._end_goal(why, now)
+        self._drop(MOTION_NUMBERS)
+        self._send_first(stop(), now)
+        if at_once:
+            self._send_first(Command(CommandNumber.E_STOP), now)
+        self._hold(STILL, now)
+
+    def _switched_off(self, why: str, now: Nanos) -> None:
+        """Stop a robot whose motors go off: it can be pushed by hand from now on."""
+        self._end(why, now)
+        self._plausibility.expect(None, self._observer.wheels_mps, now)
 
     def _hold(self, speeds: Speeds, now: Nanos) -> None:
         self._speeds.hold(speeds)
@@ -339,6 +388,34 @@ class Mover:
         if self._speed_back is not None:
             self._send(self._speed_back, now)
             self._speed_back = None
+
+
+class SendFirst(Protocol):
+    """Sends a command before all that waits."""
+
+    def __call__(self, command: Command, now: Nanos, *, is_still: bool = False) -> None:
+        """Send it; `is_still`: at once, nothing was sent for long."""
+
+
+class SentMotion:
+    """Which ways the robot may move by the frames that have left, in a session."""
+
+    def __init__(self) -> None:
+        self._ways = 0
+
+    @property
+    def may_move(self) -> bool:
+        """Whether a frame that moves the robot left, and since then neither STOP nor zero speeds."""
+        return self._ways != 0
+
+    def take(self, command: Command) -> None:
+        """Take note of a command that leaves now; one without an argument sets nothing, as robots take it."""
+        if command.number == CommandNumber.STOP:
+            self._ways = 0
+        elif command.number in WAYS and command.argument is not None:
+            ways = WAYS[command.number]
+            is_stand = command.number in SPEED_NUMBERS and command.argument == 0
+            self._ways = self._ways & ~ways if is_stand else self._ways | ways
 
 
 class SpeedKeeper:
@@ -412,6 +489,10 @@ class Motors:
         self._left -= 1
         self._due = now + ENABLE_EVERY_NS if self._left else None
         return True
+
+    def are_reported_off(self, state: RobotState, now: Nanos) -> bool:
+        """Tell whether the robot says that its motors are off, and ENABLE is not on its way."""
+        return state.motors_enabled is False and not (self.are_on and now - self._asked_at < GRACE_NS)
 
     def take(self, state: RobotState, now: Nanos) -> str | None:
         """Take a state; return why the motors went off, once."""

@@ -6,6 +6,9 @@ The robot counts from where its session opened. A client's pose goes on: at the
 first packet of a later session the robot is taken to stand where it was last
 seen, since nobody knows how far it was carried meanwhile (`PoseKeeper`).
 
+Which firmware family's packets these are is judged by what arrives (`Firmware`);
+the name of the model is a hint for the order of two bytes, and for nothing else.
+
 Invariant: within a session the pose is the robot's own odometry, moved and
 turned by one fixed amount; nothing is accumulated but whole counts.
 """
@@ -14,9 +17,9 @@ import math
 from dataclasses import dataclass, replace
 
 from p2os.client.robot_state import Limits, RobotPose, RobotState, SonarEcho
-from p2os.protocol.config_packet import AROS_1_6_FIELDS, ConfigPacket
+from p2os.protocol.config_packet import AROS_1_6_FIELDS, AROS_1_8_FIELDS, P2OS_FIELDS, ConfigPacket
 from p2os.protocol.odometry import POSITION_MODULUS, Odometry
-from p2os.protocol.profiles import Profile
+from p2os.protocol.profiles import Profile, profiles_of
 from p2os.protocol.sip import StandardSip
 from p2os.protocol.units import battery_v, range_m, rim_mps
 from p2os.robots.parameters import RobotParameters
@@ -31,6 +34,8 @@ NO_COMPASS = frozenset({0, 181, 255})
 ANALOG_COUNT_V = 5 / 255
 #: Bumper segments sit in bits 1 to 7 of the stall bytes.
 SEGMENTS = range(1, 8)
+#: What the byte of the analog port can be (Pioneer 2 manual, SIP table).
+ANALOG_PORTS = range(1, 6)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,12 +46,90 @@ class Bumpers:
     rear: int = 0
 
 
-class Observer:
-    """What is known of the robot so far."""
+class Firmware:
+    """Which family's packets a robot sends, and whether their word 16 is known to hold flags.
 
-    def __init__(self, parameters: RobotParameters) -> None:
+    P2OS has a servo's pulse width there, so a bit of it says nothing of the motors until one of three things came: a
+    tail, which only ARCOS sends; a CONFIGpac longer than that of P2OS; or bit 0, off until this client sent ENABLE,
+    came on then. AROS before 1.6 has the CONFIGpac of P2OS. The one byte of gripper and analog port that is 0 is the
+    gripper's, which tells their order.
+
+    Args:
+        given: What the program says it is; None: what arrives decides.
+    """
+
+    def __init__(self, given: Profile | None = None) -> None:
+        self._given = given
+        self.new_session(Profile.P2OS)
+
+    def new_session(self, hint: Profile) -> None:
+        """Know nothing but what the model's name hints at."""
+        #: The family whose layout packets are read in.
+        self.profile = self._given or hint
+        self._is_shown = self._given is not None
+        self._has_flags_shown = False
+        self._is_order_shown = False
+        self._is_on_asked = self._was_off = self._has_servo = False
+
+    @property
+    def tells_motors(self) -> bool:
+        """Whether word 16 is known to hold flags."""
+        return self.profile.has_flags and (self._is_shown or self._has_flags_shown)
+
+    def take_motors_asked(self, on: bool) -> None:
+        """Note that ENABLE is sent."""
+        self._is_on_asked = on
+
+    def take_servo_set(self) -> None:
+        """Note that PTUPOS is sent: from here on word 16 may change by it."""
+        self._has_servo = True
+
+    def take_config(self, config: ConfigPacket | None) -> None:
+        """Judge by a CONFIGpac; None: the robot sends none."""
+        if self._is_shown or config is None:
+            return
+        if config.fields_sent > P2OS_FIELDS:
+            self.profile = Profile.ARCOS if config.fields_sent > AROS_1_8_FIELDS else Profile.AROS
+            self._is_shown = True
+        elif self.profile is Profile.ARCOS:
+            self.profile = Profile.P2OS
+
+    def take(self, sip: StandardSip) -> None:
+        """Judge by a standard packet that was read in the present layout."""
+        if self._given is None and sip.tail:
+            self.profile, self._is_shown = Profile.ARCOS, True
+        if self._is_shown:
+            return
+        self._take_order(sip)
+        is_on = bool(sip.raw_flags & MOTORS_FLAG)
+        if not self._is_on_asked:
+            self._was_off = not is_on
+        elif is_on and self._was_off and not self._has_servo:
+            self._has_flags_shown = True
+
+    def _take_order(self, sip: StandardSip) -> None:
+        pair = (sip.analog_port, sip.gripper_state)
+        first, second = reversed(pair) if self.profile.has_gripper_first else pair
+        if self._is_order_shown or 0 not in (first, second) or first + second not in ANALOG_PORTS:
+            return
+        self._is_order_shown = True
+        if second == 0:
+            self.profile = Profile.P2OS
+        elif self.profile is Profile.P2OS:
+            self.profile = Profile.AROS
+
+
+class Observer:
+    """What is known of the robot so far.
+
+    Args:
+        parameters: Its model's.
+        profile: Its firmware family, where the program says it.
+    """
+
+    def __init__(self, parameters: RobotParameters, profile: Profile | None = None) -> None:
         self.parameters = parameters
-        self.profile = Profile.P2OS
+        self.firmware = Firmware(profile)
         self.bumpers = Bumpers()
         self.state: RobotState | None = None
         self._pose = PoseKeeper()
@@ -71,6 +154,7 @@ class Observer:
     def new_session(self, parameters: RobotParameters) -> None:
         """Begin with a robot whose counters start anew."""
         self.parameters = parameters
+        self.firmware.new_session(profiles_of(parameters)[0])
         self._pose.new_session()
         self._sonar.clear()
 
@@ -87,7 +171,7 @@ class Observer:
         for reading in sip.sonar:
             self._take_echo(reading.number, range_m(reading.raw_range, parameters), now)
         left_mps, right_mps = (rim_mps(raw, parameters) for raw in (sip.raw_left_velocity, sip.raw_right_velocity))
-        has_flags = self.profile.has_flags
+        has_flags = self.firmware.tells_motors
         charge, temperature = sip.tail_field("state_of_charge"), sip.tail_field("raw_temperature")
         self.state = RobotState(
             number=self._number,

@@ -1,7 +1,9 @@
 """What an I/O layer is to do with the line, in order and no faster than the robot can take it.
 
 AROS loses commands that come nearer than 3 to 5 ms (Pioneer 2/3 H8 manual, page
-42), so frames leave one by one. Opening, closing and changing the speed of the
+42), so frames leave one by one; on a line with a speed none before the bits of the
+one before are through, so that what waits does so here, where STOP goes first, and
+not in the system's buffer. Opening, closing and changing the speed of the
 line stand in the same queue, so that a STOP is out before the line closes.
 """
 
@@ -69,10 +71,18 @@ class Outbox:
         """Queue frames."""
         self._queue.extend(Send(frame) for frame in frames)
 
-    def send_first(self, frames: Iterable[bytes]) -> None:
-        """Put frames before all that waits; the first may go at once, for the line has been still for long."""
-        self._queue.extendleft(reversed([Send(frame) for frame in frames]))
-        self._free_at = 0
+    def send_first(self, frames: Iterable[bytes], *, is_still: bool = False) -> None:
+        """Put frames before all other frames that wait, but behind a change of the line, which they need.
+
+        Args:
+            frames: What is sent.
+            is_still: Nothing was sent for long: the first may go at once.
+        """
+        waiting = list(self._queue)
+        place = max((at for at, action in enumerate(waiting, 1) if not isinstance(action, Send)), default=0)
+        self._queue = deque([*waiting[:place], *map(Send, frames), *waiting[place:]])
+        if is_still:
+            self._free_at = 0
 
     def drop_frames(self, numbers: Container[int] | None = None) -> None:
         """Drop frames that were not sent, those of some commands or all: what follows matters more."""
@@ -104,10 +114,10 @@ class Outbox:
             return None
         action = self._queue.popleft()
         if isinstance(action, Send):
-            self._free_at = now + self._spacing_ns
+            bits_ns = len(action.data) * BITS_PER_BYTE * NS_PER_S // self.baud if self.baud else 0
+            self._free_at = now + max(self._spacing_ns, bits_ns)
             if self.baud:
-                bits = len(action.data) * BITS_PER_BYTE
-                self._drained_at = max(now, self._drained_at) + bits * NS_PER_S // self.baud + DRAIN_MARGIN_NS
+                self._drained_at = max(now, self._drained_at) + bits_ns + DRAIN_MARGIN_NS
         elif isinstance(action, SetBaud):
             self.baud = action.baud
             self._drained_at = now

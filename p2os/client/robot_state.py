@@ -89,7 +89,7 @@ class RobotState:
     right_mps: float
     #: The packet's own claim that the wheels turn.
     is_moving: bool
-    #: None: P2OS robots do not report it.
+    #: None: P2OS robots do not report it, and of others it is not known before their packets have shown it.
     motors_enabled: bool | None
     battery_v: float
     stall_left: bool
@@ -107,7 +107,7 @@ class RobotState:
     #: Eight bits each.
     digital_in: int
     digital_out: int
-    #: AROS and ARCOS: the STOP button is pressed.
+    #: The STOP button is pressed; None as above.
     stop_button: bool | None
     #: ARCOS tail, where it was sent.
     state_of_charge: float | None

@@ -22,7 +22,7 @@ class ClientSettings:
         UsageError: A value is out of its range.
     """
 
-    #: Firmware family; None: by the robot's model and its packets.
+    #: Firmware family; None: by the robot's packets.
     profile: Profile | None = None
     #: Motors are switched on by the first motion of a session; False: only by `enable()`.
     auto_enable: bool = True

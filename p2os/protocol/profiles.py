@@ -6,6 +6,8 @@ SH2 controllers that followed.
 
 from enum import Enum
 
+from p2os.robots.parameters import RobotParameters
+
 
 class Profile(Enum):
     """The family of a robot's firmware."""
@@ -26,3 +28,8 @@ class Profile(Enum):
     def has_gripper_first(self) -> bool:
         """Whether the gripper's byte stands before the analog port's."""
         return self is not Profile.P2OS
+
+
+def profiles_of(parameters: RobotParameters) -> tuple[Profile, ...]:
+    """Return the families of the firmware that a model had, its usual one first."""
+    return tuple(map(Profile, parameters.firmware))

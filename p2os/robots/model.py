@@ -9,6 +9,9 @@ from dataclasses import dataclass, replace
 
 from simbase.errors import FileError
 
+#: Families of firmware, whose packets differ: the names of `p2os.protocol.profiles.Profile`.
+FIRMWARE = ("P2OS", "AROS", "ARCOS")
+
 
 class ParametersError(FileError):
     """A robot file is missing or breaks its schema."""
@@ -82,6 +85,8 @@ class RobotParameters:
     subclass: str
     robot_class: str
     title: str
+    #: Families of the firmware that the model had, its usual one first.
+    firmware: tuple[str, ...] = FIRMWARE[:1]
     distance_nm_per_count: int
     angle_counts_per_turn: int
     #: A few models count speeds and ranges in fractions of a micrometre (a second): nanometres keep them exact.

@@ -8,10 +8,18 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from p2os.robots.model import BodyParameters, Equipment, MotionDefaults, ParametersError, RobotParameters, SonarPose
+from p2os.robots.model import (
+    FIRMWARE,
+    BodyParameters,
+    Equipment,
+    MotionDefaults,
+    ParametersError,
+    RobotParameters,
+    SonarPose,
+)
 from p2os.toml_file import TomlPlaces, TomlSource, find_places, read_toml
 from p2os.toml_schema import Key, Place, check_table, within
-from simbase.errors import shown, shown_name
+from simbase.errors import nearest, shown, shown_name
 
 #: A TOML table.
 Table = dict[str, Any]
@@ -95,6 +103,7 @@ SECTIONS: Mapping[str, tuple[Key, ...]] = {
 TOP = (
     Key(name="based_on", kind="text"),
     *(Key(name=name, kind="ascii", required=True, most=LONGEST_TEXT) for name in ("subclass", "robot_class", "title")),
+    Key(name="firmware", kind="texts"),
     *(Key(name=name, kind="table", required=name not in {"equipment", "infrared"}) for name in SECTIONS),
 )
 
@@ -181,6 +190,7 @@ def build_parameters(name: str, table: Table, places: TomlPlaces | None = None) 
     for section, keys in SECTIONS.items():
         check_table(parts[section], keys, within(where, section))
     values: Table = {key: table[key] for key in ("subclass", "robot_class", "title")}
+    values["firmware"] = _firmware(table.get("firmware", FIRMWARE[0]), where)
     for section, names in FLAT_SECTIONS.items():
         values |= {key: table[section][key] for key in names if key not in FINE_KEYS}
     values |= {field: round(table["conversion"][key] * 1000) for key, field in FINE_KEYS.items()}
@@ -203,6 +213,17 @@ def build_parameters(name: str, table: Table, places: TomlPlaces | None = None) 
         sonar=tuple(SonarPose(x_mm=x, y_mm=y, heading_deg=heading) for x, y, heading in poses),
         infrared=tuple((x, y) for x, y in points),
     )
+
+
+def _firmware(given: str | Sequence[str], where: Place) -> tuple[str, ...]:
+    """Return the families of firmware that a file names, each once."""
+    found = tuple(dict.fromkeys([given] if isinstance(given, str) else given))
+    if not found or not set(found) <= set(FIRMWARE):
+        strange = next((name for name in found if name not in FIRMWARE), "")
+        hint = nearest(strange, FIRMWARE) if strange else "the usual one first"
+        what = f"firmware = {shown(given)} is not of {', '.join(FIRMWARE)}"
+        raise ParametersError(f"{where.at('firmware')}: {what}", hint=hint)
+    return found
 
 
 def _placed(rows: Sequence[Sequence[float]], where: Place, key: str) -> Sequence[Sequence[float]]:

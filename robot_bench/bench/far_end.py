@@ -134,7 +134,8 @@ def _ends_of_line(
     pins = OwnedPins(harness, "adapter", cut_wires(scenario, pinout))
     adapter = make_adapter(scenario, pins, pinout)
     adapter.on_event = recorder.listener("adapter")
-    settings = replace(scenario.controller, baud=to_client.baud, seed=scenario.seed)
+    profile = scenario.controller.family_of(parameters)
+    settings = replace(scenario.controller, profile=profile, baud=to_client.baud, seed=scenario.seed)
     kind = scenario.controller_kind
     controller: ControllerPart
     if kind in ENDS["controller"].ships:
@@ -142,7 +143,7 @@ def _ends_of_line(
     else:
         controller = ENDS["controller"].make(kind, parameters=parameters, body=body, settings=settings)
     controller.on_event = recorder.listener("pioneer")
-    ranges = SipRanges(parameters, settings.profile, on_ranges=recorder.sonar)
+    ranges = SipRanges(parameters, profile, on_ranges=recorder.sonar)
 
     def arrives_at_client(data: bytes, at: Nanos) -> None:
         recorder.wire("r2c", data, at)

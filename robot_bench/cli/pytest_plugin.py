@@ -46,7 +46,7 @@ _MARKERS = (
     "seeds(*seeds): run it with each seed; a text such as '0-9' is a range",
     "faults(*words, at='0 s'): run it with each of these faults, injected at a time",
     "booted(event='note adapter driving'): begin where this event has happened; it is waited for once for all tests",
-    "pioneer(robot='p2dx', world='room', body, seed, url): the virtual robot of the fixtures served and robot",
+    "pioneer(robot='p2dx', firmware, world='room', url, …): what served and robot are; options of p2os.served_pioneer",
 )
 #: What a test waits for first that is marked `booted`, in mode adapter.
 _BOOTED = "note adapter driving"
@@ -211,7 +211,7 @@ def robot(served: "ServedPioneer") -> "Iterator[Robot]":
     """A client that is connected to a virtual robot: a `p2os.Robot`."""
     from p2os import Robot
 
-    with Robot(served) as made:
+    with Robot(served, clock=served.clock) as made:
         yield made
 
 

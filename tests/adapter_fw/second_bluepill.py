@@ -116,7 +116,7 @@ class SecondBluePillBench(Bench):
         ) -> FarEnd:  # fmt: skip
             pioneer = Pioneer(parameters=scenario.parameters, body=body, settings=scenario.controller)
             pioneer.on_event = recorder.listener("pioneer")
-            ranges = SipRanges(scenario.parameters, pioneer.settings.profile, on_ranges=recorder.sonar)
+            ranges = SipRanges(scenario.parameters, pioneer.profile, on_ranges=recorder.sonar)
             self.second = SecondBluePill(self.elf, OwnedPins(harness, "adapter"), pinout, pioneer)
 
             def comes_back(frame: bytes, at: Nanos) -> None:

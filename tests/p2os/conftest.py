@@ -56,7 +56,7 @@ class Robot:
         return frames
 
     def sips(self) -> list[StandardSip]:
-        profile = self.pioneer.settings.profile
+        profile = self.pioneer.profile
         return [StandardSip.from_frame(frame, profile) for frame in self.frames() if frame.kind in SIP_KINDS]
 
     def sip(self) -> StandardSip:

@@ -28,13 +28,12 @@ from p2os.cli.printing import queue_output
 from p2os.cli.quantities import option
 from p2os.cli.trust import Trusted, said
 from p2os.pioneer.body.factory import BEST
-from p2os.pioneer.controller import ControllerSettings, SonarPerSip
+from p2os.pioneer.controller import ControllerSettings
 from p2os.pioneer.controller.flash import load_flash
 from p2os.pioneer.devices.laser import read_laser
 from p2os.pioneer.sensor_errors import load_sensor_errors
-from p2os.pioneer.serve.aux_endpoint import AuxEndpoint
 from p2os.pioneer.serve.control_line import ControlLine, write_stderr
-from p2os.pioneer.serve.fleet import Fleet
+from p2os.pioneer.serve.fleet import Fleet, open_hosts
 from p2os.pioneer.serve.fleet_file import load_fleet
 from p2os.pioneer.serve.fleet_order import (
     MOST_ROBOTS,
@@ -47,12 +46,10 @@ from p2os.pioneer.serve.fleet_order import (
 )
 from p2os.pioneer.serve.host import Host
 from p2os.pioneer.serve.orders import status_line
-from p2os.pioneer.serve.robot_time import RobotTime
 from p2os.pioneer.world.model import Pose
 from p2os.protocol.profiles import Profile
 from p2os.transport import listen_url
 from p2os.transport.url import DEFAULT_URL
-from p2os.transport.wall_clock import wall_clock
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
 from simbase.trust import own_code
@@ -129,7 +126,7 @@ def serve(
     firmware: Annotated[
         Profile | None,
         typer.Option(
-            help="Whose packets it sends, P2OS by default; some clients of newer robots need ARCOS.",
+            help="Whose packets it sends; by default those of the model's own firmware.",
             metavar="|".join(profile.value for profile in Profile),
         ),
     ] = None,
@@ -216,15 +213,11 @@ def serve(
         _refuse_beside_fleet(context)
         order = load_fleet(fleet, trust=said(trust))
     else:
-        settings = ControllerSettings() if for_client is None else ControllerSettings.for_client(for_client)
-        settings = replace(
-            settings, errors=load_sensor_errors(errors), baud=baud, lenient=lenient or settings.lenient,
-            profile=settings.profile if firmware is None else firmware,
-            sonar_per_sip=SonarPerSip.ALL if all_sonar else settings.sonar_per_sip,
-            laser=settings.laser if laser is None else read_laser(laser), rear_sonar=rear_sonar or settings.rear_sonar,
+        settings = ControllerSettings.of(
+            client=for_client, firmware=firmware, lenient=lenient or None,
+            laser=None if laser is None else read_laser(laser), all_sonar=all_sonar, rear_sonar=rear_sonar or None,
+            flash=None if flash is None else load_flash(flash), errors=load_sensor_errors(errors), baud=baud,
         )  # fmt: skip
-        if flash is not None:
-            settings = settings.with_flash(load_flash(flash))
         ports = following_ports(port or [DEFAULT_URL], robots)
         if aux and len(ports) > 1:
             raise UsageError("--aux is for one robot", hint="--fleet FILE gives each robot its own")
@@ -248,7 +241,9 @@ def serve(
         orders = _control(control)
         if orders is not None:
             opened.callback(orders.close)
-        hosts = open_hosts(order, made, speed=speed)
+        who = "robot {}  " if len(made.robots) > 1 else ""
+        events = [EventLines(_write, who.format(number + 1)).write_event for number in range(len(made.robots))]
+        hosts = open_hosts(order, made, events=events, speed=speed)
         for host in hosts:
             opened.callback(host.close)
         for number, host in enumerate(hosts):
@@ -264,33 +259,6 @@ def serve(
 def _exit_code(made: MadeFleet) -> int | None:
     """Return the code with which a client wants all of this to end, or None."""
     return next((robot.exit_code for robot in made.robots if robot.exit_code is not None), None)
-
-
-def open_hosts(order: FleetOrder, made: MadeFleet, *, speed: float = 1.0) -> list[Host]:
-    """Return a host for each robot of a fleet, listening at its port.
-
-    Raises:
-        TransportError: A port is taken or cannot be had; none is kept open then.
-    """
-    shared_time = RobotTime(wall_clock, speed)
-    hosts: list[Host] = []
-    try:
-        for number, (robot, pioneer) in enumerate(zip(order.robots, made.robots, strict=True)):
-            who = f"robot {number + 1}  " if len(made.robots) > 1 else ""
-            pioneer.on_event = on_event = EventLines(_write, who).write_event
-            hosts.append(
-                Host(
-                    pioneer, listen_url(robot.port), on_event=on_event, speed=speed,
-                    shared=None if made.multi_robot_world is None else (shared_time, made.multi_robot_world, number),
-                    paced=not robot.port.startswith("serial:"), sync_limit_ns=robot.sync_limit_ns,
-                )
-            )  # fmt: skip
-            hosts[-1].aux = tuple(AuxEndpoint(port, listen_url(url)) for port, url in robot.aux)
-    except BaseException:
-        for host in hosts:
-            host.close()
-        raise
-    return hosts
 
 
 def _place(text: str) -> Pose:

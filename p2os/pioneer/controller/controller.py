@@ -154,8 +154,10 @@ class Pioneer(Stateful):
         faults: Sequence[str] = (),
     ) -> None:
         self.parameters, self.body = parameters, body
-        self.settings = settings or ControllerSettings()
-        self.settings = replace(self.settings, flash=self.settings.flash.for_model(parameters))
+        chosen = settings or ControllerSettings()
+        #: The family of its firmware.
+        self.profile = chosen.family_of(parameters)
+        self.settings = replace(chosen, profile=self.profile, flash=chosen.flash.for_model(parameters))
         self.on_event = on_event
         #: What its sonar hear of other robots; none by itself.
         self.hears: Ears | None = None
@@ -184,8 +186,8 @@ class Pioneer(Stateful):
             ),
             sonar=self._new_sonar(),
             vel2_divisor=parameters.vel2_divisor,
-            devices=_new_devices(self.settings),
-            profile=self.settings.profile,
+            devices=_new_devices(self.settings, self.profile),
+            profile=self.profile,
             lenient=self.settings.lenient,
             joystick_mm_s=flash.number("joyvel"),
             joystick_deg_s=flash.number("joyrvel"),
@@ -423,7 +425,7 @@ class Pioneer(Stateful):
         )
         return Connection(
             ConnectionRole.SERVER, identity=identity, watchdog_ns=self.settings.watchdog_ns,
-            settings=ConnectionSettings(profile=self.settings.profile), lenient=self.settings.lenient,
+            settings=ConnectionSettings(profile=self.profile), lenient=self.settings.lenient,
         )  # fmt: skip
 
     def _new_sonar(self) -> SonarSchedule:
@@ -481,7 +483,7 @@ class Pioneer(Stateful):
         context.sonar = self._new_sonar()
         context.requests = Requests(dropped=context.requests.dropped)
         context.kept.clear()
-        devices, defaults = context.devices, _new_devices(self.settings)
+        devices, defaults = context.devices, _new_devices(self.settings, self.profile)
         devices.gyro, devices.compass, devices.laser = defaults.gyro, defaults.compass, defaults.laser
         devices.joystick.may_drive = devices.joystick.drives = devices.switches.battery_reported = False
         devices.switches.bump_stall, devices.switches.e_stall = 0, defaults.switches.e_stall
@@ -500,7 +502,7 @@ class Pioneer(Stateful):
         self._sender.clear()
         self._close(now, notice)
         context, keep = self._context, self._context.devices
-        context.devices = _new_devices(self.settings)
+        context.devices = _new_devices(self.settings, self.profile)
         context.devices.battery, context.devices.pins, context.devices.joystick = keep.battery, keep.pins, keep.joystick
         context.devices.switches.stop_button = keep.switches.stop_button
         context.devices.gripper.has_thing = keep.gripper.has_thing
@@ -622,7 +624,7 @@ class Pioneer(Stateful):
             self.on_event(now, what, detail)
 
 
-def _new_devices(settings: ControllerSettings) -> Devices:
+def _new_devices(settings: ControllerSettings, profile: Profile) -> Devices:
     """Return the devices of a robot that was just switched on."""
     flash = settings.flash
     devices = Devices(
@@ -631,9 +633,9 @@ def _new_devices(settings: ControllerSettings) -> Devices:
         )
     )
     devices.gripper.kind = flash.number("gripper")
-    devices.gyro.is_fitted = flash.number("hasgyro") > 0 and settings.profile is not Profile.P2OS
+    devices.gyro.is_fitted = flash.number("hasgyro") > 0 and profile is not Profile.P2OS
     devices.laser = Laser.of(settings.laser)
-    devices.switches.e_stall = settings.profile is not Profile.P2OS
+    devices.switches.e_stall = profile is not Profile.P2OS
     return devices
 
 

@@ -88,7 +88,7 @@ class Reporter:
         """Return the answer to CONFIG: the robot's own limits, and those in force."""
         settings, limits, kept = self.settings, self.context.motion.limits, self.context.kept
         working: dict[str, Any] = {name: _word(value, is_signed=NUMBERS[name][0] < 0) for name, value in kept.items()}
-        config = settings.flash.config(self.parameters, settings.profile)
+        config = settings.flash.config(self.parameters, self.context.profile)
         return replace(
             config, name=settings.name, serial=settings.serial, sipcycle=settings.sip_period_ns // NS_PER_MS,
             watchdog=settings.watchdog_ns // NS_PER_MS, rotvelmax=limits.max_rotation_deg_s,
@@ -116,7 +116,7 @@ class Reporter:
         )
         self.context.sonar.take_ping(
             [
-                (number, raw_range(range_m, parameters, settings.profile))
+                (number, raw_range(range_m, parameters, self.context.profile))
                 for number, range_m in zip(numbers, ranges, strict=True)
             ]
         )
@@ -161,9 +161,9 @@ class Reporter:
         bumps = self._bumpers_reported(segments)
         packet = _standard_packet(context, state, self.parameters, stalls(context, state, now), bumps, now)
         due = now + settings.sip_period_ns
-        frame = packet_frame(packet, settings.profile)
+        frame = packet_frame(packet, context.profile)
         size = len(frame.to_bytes())
-        before, after = context.requests.wanted(settings.profile)
+        before, after = context.requests.wanted(context.profile)
         for extra in before:
             self._send_extra(extra, segments, size, due, now)
         connection.send(frame, now)
@@ -202,7 +202,7 @@ class Reporter:
             requests.no_room(extra)
             return
         packets = self._packets_of(extra, segments, now)
-        frames = [packet_frame(packet, self.settings.profile).to_bytes() for packet in packets]
+        frames = [packet_frame(packet, self.context.profile).to_bytes() for packet in packets]
         if not line.fits(reserved + sum(map(len, frames)), now, due) and not requests.must_go(extra):
             requests.no_room(extra)
             return
@@ -242,7 +242,7 @@ class Reporter:
     def _bumpers_reported(self, segments: tuple[int, int]) -> tuple[int, int]:
         """Return front and rear as the standard packet has them: without bumpers a P2OS robot reads ones."""
         flash = self.settings.flash
-        floating = 0 if self.settings.profile.has_flags else BUMPERS_NOT_FITTED
+        floating = 0 if self.context.profile.has_flags else BUMPERS_NOT_FITTED
         fitted = flash.number("frontbumps"), flash.number("rearbumps")
         return (
             segments[0] if fitted[0] or segments[0] else floating,

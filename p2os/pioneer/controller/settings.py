@@ -8,8 +8,9 @@ from p2os.pioneer.controller.flash import Flash
 from p2os.pioneer.devices.laser import LASERS, LaserModel
 from p2os.pioneer.sensor_errors import IDEAL, SensorErrors
 from p2os.protocol.bauds import BAUDS, BAUDS_TEXT
-from p2os.protocol.profiles import Profile
+from p2os.protocol.profiles import Profile, profiles_of
 from p2os.protocol.times import CYCLE_NS, WATCHDOG_NS
+from p2os.robots.parameters import RobotParameters
 from simbase.errors import UsageError, shown
 from simbase.timing import NS_PER_MS, Nanos
 
@@ -44,7 +45,8 @@ class ControllerSettings:
     #: In the answer to SYNC2; ARIA takes "MobileSim" for its own simulator, so any other name will do.
     name: str = "Virtual"
     serial: str = "VIRTUAL"
-    profile: Profile = Profile.P2OS
+    #: Whose packets it sends; None: those of the first firmware that the model had.
+    profile: Profile | None = None
     #: Answers syncs out of order and executes what any family or simulator knows, as AMRISim does.
     lenient: bool = False
     sip_period_ns: Nanos = CYCLE_NS
@@ -73,6 +75,33 @@ class ControllerSettings:
             raise UsageError(f"a line of {self.baud} bit/s is none that HOSTBAUD names", hint=f"rates: {BAUDS_TEXT}")
 
     @classmethod
+    def of(
+        cls,
+        *,
+        client: str | None = None,
+        firmware: Profile | None = None,
+        lenient: bool | None = None,
+        laser: LaserModel | None = None,
+        all_sonar: bool = False,
+        rear_sonar: bool | None = None,
+        flash: Flash | None = None,
+        errors: SensorErrors = IDEAL,
+        baud: int | None = None,
+    ) -> "ControllerSettings":
+        """Return what the options of `p2os serve` name, over what a client library expects; None leaves one as it is.
+
+        Raises:
+            UsageError: Nobody has written down what the client expects, or a value cannot be sent.
+        """
+        base = cls() if client is None else cls.for_client(client)
+        found = replace(
+            base, profile=firmware or base.profile, lenient=base.lenient if lenient is None else lenient,
+            laser=laser or base.laser, sonar_per_sip=SonarPerSip.ALL if all_sonar else base.sonar_per_sip,
+            rear_sonar=base.rear_sonar if rear_sonar is None else rear_sonar, errors=errors, baud=baud,
+        )  # fmt: skip
+        return found if flash is None else found.with_flash(flash)
+
+    @classmethod
     def for_client(cls, name: str) -> "ControllerSettings":
         """Return what the programs of a client library expect of a simulated robot.
 
@@ -82,6 +111,10 @@ class ControllerSettings:
         if name not in CLIENTS:
             raise UsageError(f"no settings for {shown(name)}", hint=f"there are some for: {', '.join(CLIENTS)}")
         return CLIENTS[name]
+
+    def family_of(self, parameters: RobotParameters) -> Profile:
+        """Return whose packets a model sends with these settings."""
+        return self.profile or profiles_of(parameters)[0]
 
     def with_flash(self, flash: Flash) -> "ControllerSettings":
         """Return these settings with what a FLASH file sets."""

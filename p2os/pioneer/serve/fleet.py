@@ -5,11 +5,56 @@ Invariant: a host that has nothing due and nothing to read costs a comparison a 
 
 from collections.abc import Callable, Sequence
 
+from p2os.pioneer.controller.controller import EventCallback
+from p2os.pioneer.serve.aux_endpoint import AuxEndpoint
 from p2os.pioneer.serve.control_line import ControlLine
+from p2os.pioneer.serve.fleet_order import FleetOrder, MadeFleet
 from p2os.pioneer.serve.host import IDLE_WAIT_S, Host
+from p2os.pioneer.serve.robot_time import RobotTime
+from p2os.transport import listen_url
 from p2os.transport.waiting import wait_readable
-from p2os.transport.wall_clock import wall_clock
+from p2os.transport.wall_clock import Clock, wall_clock
 from simbase.timing import NS_PER_S
+
+
+def open_hosts(
+    order: FleetOrder,
+    made: MadeFleet,
+    *,
+    events: Sequence[EventCallback | None],
+    speed: float = 1.0,
+    clock: Clock = wall_clock,
+) -> list[Host]:
+    """Return a host for each robot of a fleet, listening at its port.
+
+    Args:
+        order: What was made.
+        made: Its robots.
+        events: Who is told what each of them does.
+        speed: Robot seconds a second of the clock.
+        clock: Nanoseconds; never goes back.
+
+    Raises:
+        TransportError: A port is taken or cannot be had; none is kept open then.
+    """
+    shared_time = RobotTime(clock, speed)
+    hosts: list[Host] = []
+    try:
+        for number, (robot, pioneer) in enumerate(zip(order.robots, made.robots, strict=True)):
+            pioneer.on_event = events[number]
+            hosts.append(
+                Host(
+                    pioneer, listen_url(robot.port), on_event=events[number], clock=clock, speed=speed,
+                    shared=None if made.multi_robot_world is None else (shared_time, made.multi_robot_world, number),
+                    paced=not robot.port.startswith("serial:"), sync_limit_ns=robot.sync_limit_ns,
+                )
+            )  # fmt: skip
+            hosts[-1].aux = tuple(AuxEndpoint(port, listen_url(url)) for port, url in robot.aux)
+    except BaseException:
+        for host in hosts:
+            host.close()
+        raise
+    return hosts
 
 
 class Fleet:

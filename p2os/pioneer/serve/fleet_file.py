@@ -25,7 +25,7 @@ from p2os.pioneer.body.factory import BEST, BODY_CHOICES, resolve_body
 from p2os.pioneer.body.factory import GROUP as BODY_GROUP
 from p2os.pioneer.controller.faults import read_fault
 from p2os.pioneer.controller.flash import load_flash
-from p2os.pioneer.controller.settings import ControllerSettings, SonarPerSip
+from p2os.pioneer.controller.settings import ControllerSettings
 from p2os.pioneer.devices.laser import read_laser
 from p2os.pioneer.sensor_errors import load_sensor_errors
 from p2os.pioneer.serve.fleet_order import MOST_ROBOTS, FleetOrder, RobotOrder, following_ports, read_aux
@@ -182,18 +182,18 @@ def _place(numbers: list[object] | None, where: Place) -> Pose | None:
 
 def _settings(row: Values, where: Place) -> ControllerSettings:
     with placed(where, "for"):
-        base = ControllerSettings() if row["for"] is None else ControllerSettings.for_client(row["for"])
+        ControllerSettings.of(client=row["for"])
     with placed(where, "laser"):
-        laser = base.laser if row["laser"] is None else read_laser(row["laser"])
+        laser = None if row["laser"] is None else read_laser(row["laser"])
     if row["baud"] not in {None, *BAUDS}:
         what = f"a line of {row['baud']} bit/s is none that HOSTBAUD names"
         raise FleetError(f"{where.at('baud')}: {what}", hint=f"rates: {BAUDS_TEXT}")
-    given = {key: row[key] for key in ("lenient", "rear_sonar") if row[key] is not None}
     with placed(where, "errors"):
-        settings = replace(
-            base, profile=Profile(row["firmware"] or base.profile), laser=laser, baud=row["baud"],
-            sonar_per_sip=SonarPerSip.ALL if row["all_sonar"] else base.sonar_per_sip,
-            errors=load_sensor_errors(row["errors"]), **given,
-        )  # fmt: skip
+        errors = load_sensor_errors(row["errors"])
     with placed(where, "flash"):
-        return settings if row["flash"] is None else settings.with_flash(load_flash(Path(row["flash"])))
+        flash = None if row["flash"] is None else load_flash(Path(row["flash"]))
+        return ControllerSettings.of(
+            client=row["for"], firmware=None if row["firmware"] is None else Profile(row["firmware"]),
+            lenient=row["lenient"], laser=laser, all_sonar=bool(row["all_sonar"]), rear_sonar=row["rear_sonar"],
+            flash=flash, errors=errors, baud=row["baud"],
+        )  # fmt: skip

@@ -139,7 +139,7 @@ def drive_figures(trial: Trial) -> list[Finding]:
 
 def _drive_at_port(trial: Trial) -> list[Finding]:
     """Return what the packets tell of a drive: stalls, and the goals that can be judged from outside."""
-    told = packets(trial.record, trial.scenario.controller.profile)
+    told = packets(trial.record, trial.scenario.controller.family_of(trial.scenario.parameters))
     if not told:
         return [Missing(group="wire", what="packets with a stall", why="no packet came")]
     stalls = [t for t, sip in told if sip.stall_left or sip.stall_right]
@@ -232,7 +232,8 @@ EXPERIMENTS: Mapping[str, Experiment] = {one.name: one for one in (
         at_port=AtPort(
             room=_FREE_ROUND,
             measure=lambda trial: [
-                *_encoders(trial), wrap_figure(trial.record, trial.scenario.controller.profile)
+                *_encoders(trial),
+                wrap_figure(trial.record, trial.scenario.controller.family_of(trial.scenario.parameters)),
             ],
         ),
         hypothesis="The encoder pins show the wheels' angles in both directions at every speed; a program misses none.",

@@ -91,7 +91,7 @@ class Nominal:
         self._heading_mm = math.pi * robot.track_mm / robot.angle_counts_per_turn
         #: Without a packet for so long the adapter gives the robot up, seconds.
         self.liveness_s = adapter.liveness_ns / NS_PER_S
-        self._robot, self._profile = robot, scenario.controller.profile
+        self._robot, self._profile = robot, scenario.controller.family_of(robot)
         self._direct, self._adapter = scenario.direct, adapter
         #: From packet to packet, seconds: as the robot's FLASH has it.
         self.cycle_s = CYCLE_NS / NS_PER_S if at_port else scenario.controller.sip_period_ns / NS_PER_S

@@ -84,7 +84,7 @@ def reading_figures(record: RunRecord, scenario: Scenario) -> list[Finding]:
     seen: list[set[bool]] = [set() for _ in courses]
     right = total = 0
     where = ""
-    for t, sip in packets(record, scenario.controller.profile):
+    for t, sip in packets(record, scenario.controller.family_of(scenario.parameters)):
         for reading in sip.sonar if t >= begin else ():
             if reading.number >= len(courses):
                 continue

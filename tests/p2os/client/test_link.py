@@ -13,6 +13,7 @@ from p2os.client.notices import (
     LinkLostError,
     ReconnectPlanned,
 )
+from p2os.client.outbox import Outbox, Send, SetBaud
 from p2os.client.settings import SEARCHED_BAUDS, ClientSettings
 from p2os.protocol.commands import Command, CommandNumber, enable, rvel, stop, vel
 from p2os.protocol.frames import Decoder, Frame
@@ -390,3 +391,30 @@ def test_two_rigs_with_one_seed_say_the_same() -> None:
         return rig.sent
 
     assert story() == story()
+
+
+def test_what_goes_first_waits_for_a_change_of_the_line_and_for_the_robots_spacing() -> None:
+    outbox = Outbox(5 * MS)
+    outbox.send([b"one", b"two"])
+    assert outbox.take(0) == Send(b"one")
+    outbox.send_first([b"first", b"second"])
+    assert outbox.take(5 * MS - 1) is None
+    assert [outbox.take(at * MS) for at in (5, 10)] == [Send(b"first"), Send(b"second")]
+    outbox.put(SetBaud(38400))
+    outbox.send([b"pulse"])
+    outbox.send_first([b"stop"], is_still=True)
+    left = [outbox.take(S + at * S) for at in range(4)]
+    assert left == [Send(b"two"), SetBaud(38400), Send(b"stop"), Send(b"pulse")]
+
+
+@pytest.mark.parametrize(("baud", "free_ms"), [(9600, 10), (115200, 5), (None, 5)])
+def test_a_frame_leaves_when_the_bits_of_the_one_before_are_through(baud: int | None, free_ms: int) -> None:
+    outbox = Outbox(5 * MS)
+    outbox.baud = baud
+    outbox.send([bytes(12) if baud == 115200 else bytes(9), b"two"])
+    assert outbox.take(0) is not None
+    due = outbox.next_deadline()
+    assert due is not None
+    assert due == pytest.approx(free_ms * MS, rel=0.07)
+    assert outbox.take(due - 1) is None
+    assert outbox.take(due) == Send(b"two")

@@ -5,9 +5,11 @@ from dataclasses import replace
 from itertools import pairwise
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from p2os.client.goals import GRACE_NS, DriveAxis, Goal, TurnAxis
-from p2os.client.mover import Speeds
+from p2os.client.mover import MOTION_NUMBERS, SPEED_NUMBERS, WAYS, SentMotion, Speeds
 from p2os.client.notices import (
     DeadmanStopped,
     Disobeyed,
@@ -17,13 +19,14 @@ from p2os.client.notices import (
     MotorsDisabled,
     MotorsDisabledError,
 )
+from p2os.client.outbox import SetBaud
 from p2os.client.robot_state import Limits, RobotPose, RobotState
 from p2os.client.settings import ClientSettings
 from p2os.pioneer.controller import motion
 from p2os.protocol.commands import Command, CommandNumber, enable, rvel, stop, vel
 from p2os.protocol.profiles import Profile
 from simbase.errors import UsageError
-from tests.p2os.client.client_rig import MS, Link, Rig, S, new_pioneer
+from tests.p2os.client.client_rig import MS, Link, Rig, S, free_pioneer, new_pioneer
 
 MOVE, HEAD, SETV = CommandNumber.MOVE, CommandNumber.HEAD, CommandNumber.SETV
 
@@ -253,9 +256,9 @@ def test_turn_arrives_over_any_wire_however_far(wire: str, degrees: float) -> No
 def test_a_long_way_goes_in_legs_without_braking_between() -> None:
     rig = Rig().connect()
     rig.core.begin_goal(DriveAxis(100.0), 10 * S, None, rig.now)
-    rig.run(4)
+    rig.living(4)
     assert [command.argument for _, command in of(rig, MOVE)] == [5000]
-    rig.run(4)
+    rig.living(4)
     assert [command.argument for _, command in of(rig, MOVE)] == [5000, 5000]
     axis = DriveAxis(12.0)
     assert axis.command(12.0, standing=True) == Command(MOVE, 5000)
@@ -428,3 +431,167 @@ def test_after_a_loss_the_robot_began_to_stop_at_its_watchdog_or_earlier_and_sta
               if sent_at > at + 1100 * MS and command.number in {CommandNumber.VEL, CommandNumber.RVEL}]  # fmt: skip
     assert set(speeds) <= {0}
     assert rig.wheels == (0.0, 0.0)
+
+
+def ended_by(rig: Rig, how: str) -> int:
+    """End the movement of a rig that moves; return when."""
+    core, context = rig.core, rig.pioneer._context
+    match how:
+        case "stop":
+            core.stop(rig.now)
+        case "disabled" | "disabled raw":
+            core.enable(False, rig.now) if how == "disabled" else core.send(enable(False), rig.now)
+        case "cancelled":
+            (goal,) = [core._mover._goal]
+            assert goal is not None
+            core.cancel_goal(goal, rig.now)
+        case "motors off" | "stop button":
+            if how == "stop button":
+                context.devices.switches.stop_button = True
+            context.motion.power(on=False)
+            rig.until(lambda: bool(rig.notices(MotorsDisabled)))
+        case "deadman":
+            rig.run(3)
+            return core._mover._called_at + 2 * S
+        case "stalled" | "too late" | "arrived":
+            rig.until(lambda: bool(rig.notices(MotionEnded)))
+    rig.run(0)
+    return rig.now
+
+
+GOALS = ("cancelled", "stalled", "too late", "arrived")
+ENDS = ("stop", "disabled", "disabled raw", "motors off", "stop button", "deadman", *GOALS)
+
+
+@pytest.mark.parametrize("how", ENDS)
+def test_whatever_ends_a_movement_sends_stop_in_the_same_step_and_then_holds_zero(how: str) -> None:
+    pioneer = new_pioneer("p3dx-sh") if how == "stalled" else free_pioneer("p3dx-sh")
+    rig = Rig(pioneer=pioneer).connect()
+    if how in GOALS:
+        far_m = 0.3 if how == "arrived" else 20.0
+        rig.core.begin_goal(DriveAxis(far_m), 2 * S if how == "too late" else None, None, rig.now)
+    else:
+        rig.core.set_velocity(0.3, 0.1, rig.now)
+    if how != "arrived":
+        rig.living(1)
+        assert max(rig.wheels) > 0.2
+    before = len(rig.sent)
+    at = ended_by(rig, how)
+    rig.run(0.02)
+    moving = [number for number, (_, one) in enumerate(rig.sent) if one.number in WAYS and one.argument]
+    after = [(then, one) for then, one in rig.sent[max(before, moving[-1] + 1) :] if one.number in MOTION_NUMBERS]
+    assert after[0][1] == stop()
+    assert 0 <= after[0][0] - at <= rig.core.settings.command_spacing_ns
+    rig.run(1)
+    later = {(one.number, one.argument) for _, one in rig.sent[max(before, moving[-1] + 1) :]}
+    assert {(CommandNumber.VEL, 0), (CommandNumber.RVEL, 0)} <= later
+    assert not [number for number, argument in later if number in WAYS and argument]
+
+
+RAW_MOTIONS = (
+    vel(200), rvel(20), Command(MOVE, 5000), Command(HEAD, 120), Command(CommandNumber.VEL2, 10 << 8 | 5),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("command", RAW_MOTIONS, ids=lambda command: command.name)
+@pytest.mark.parametrize("after_ns", [-1, 0, 1])
+def test_the_deadman_is_armed_by_what_was_sent(command: Command, after_ns: int) -> None:
+    rig = Rig().connect()
+    rig.core.enable(True, rig.now)
+    rig.living(1)
+    rig.core.touch(rig.now)
+    called_at = rig.now
+    rig.core.send(command, rig.now)
+    rig.run(1)
+    rig.core._mover.release("nothing holds it any more", rig.now)
+    rig.run((called_at + 2 * S + after_ns - rig.now) / S)
+    assert (stop() in rig.commands(called_at)) is (after_ns >= 0)
+    rig.run(5)
+    assert [at for at, one in rig.sent if one == stop() and at >= called_at] == [called_at + 2 * S], "and once"
+    assert rig.wheels == (0.0, 0.0)
+
+
+def test_a_deadman_whose_stop_did_not_leave_stops_again() -> None:
+    rig = Rig().connect()
+    rig.core.set_velocity(0.2, 0.0, rig.now)
+    rig.run(1.9)
+    rig.core._supervisor.outbox.put(SetBaud(9600))
+    rig.core._supervisor.outbox._drained_at = rig.now + 3 * S  # the line is taken
+    rig.run(4)
+    assert len(rig.notices(DeadmanStopped)) == 2
+    assert stop() in rig.commands(rig.now - 2 * S)
+    rig.run(5)
+    assert len(rig.notices(DeadmanStopped)) == 2
+
+
+def test_flags_that_say_motors_off_while_the_wheels_turn_are_answered_with_stop() -> None:
+    rig = Rig(pioneer=free_pioneer("p3dx")).connect()
+    rig.core.send(enable(True), rig.now)  # the client has not switched them on
+    rig.core.send(vel(200), rig.now)
+    rig.living(1)
+    assert stop() not in rig.commands()[-20:]
+    state = rig.core.state
+    assert state is not None
+    before = rig.now
+    for _ in range(2):  # each time that they say so: a frame can be lost
+        rig.core._mover.take(replace(state, motors_enabled=False), rig.now)
+        rig.run(0.01)
+    assert [command for command in rig.commands(before) if command == stop()] == [stop(), stop()]
+    still = replace(state, motors_enabled=False, left_mps=0.0, right_mps=0.0)
+    before = len(rig.sent)
+    rig.core._mover.take(still, rig.now)
+    rig.run(0.01)
+    assert stop() not in rig.commands()[before:]
+
+
+@pytest.mark.parametrize("goal", [DriveAxis(0.5), TurnAxis(1.0), DriveAxis(0.0)], ids=["drive", "turn", "nothing"])
+def test_a_goal_leaves_nothing_of_the_speeds_before_it(goal: DriveAxis | TurnAxis) -> None:
+    rig = Rig().connect()
+    rig.core.set_velocity(0.2, 0.5, rig.now)
+    rig.living(1)
+    begun = rig.core.begin_goal(goal, None, None, rig.now)
+    rig.until(lambda: begun.ended is not None)
+    assert begun.ended is not None
+    assert begun.ended.problem is None
+    rig.living(2)
+    assert rig.wheels == (0.0, 0.0)
+
+
+MOVES = st.one_of(
+    st.builds(Command, st.sampled_from(sorted(WAYS.keys() - {CommandNumber.LATVEL})), st.integers(-300, 300)),
+    st.builds(Command, st.sampled_from(sorted(SPEED_NUMBERS - {CommandNumber.LATVEL})), st.just(0)),
+    st.just(stop()), st.builds(Command, st.sampled_from(sorted(WAYS))),
+)  # fmt: skip
+
+
+@given(st.lists(MOVES, max_size=12), st.sampled_from(list(Profile)))
+def test_a_robot_that_was_told_to_stand_is_known_to_stand_and_no_other(said: list[Command], profile: Profile) -> None:
+    """What has left, against what the virtual robot makes of it: its set-points."""
+    pioneer, sent = free_pioneer(profile=profile), SentMotion()
+    for frame in (Command(number) for number in (0, 1, 2, CommandNumber.OPEN)):
+        pioneer.receive(frame.to_frame().to_bytes(), 0)
+    for command in said:
+        sent.take(command)
+        pioneer.receive(command.to_frame().to_bytes(), 0)
+    _, first, first_goal, second, second_goal = pioneer._context.motion.setpoints
+    moves = bool(first or second) or first_goal is not None or second_goal is not None
+    assert sent.may_move or not moves
+    if said and said[-1] == stop():
+        assert not sent.may_move
+
+
+@pytest.mark.parametrize("newer", [vel(100), DriveAxis(1.0)], ids=["raw", "goal"])
+def test_a_newer_movement_does_not_drop_a_stop_that_waits(newer: Command | DriveAxis) -> None:
+    rig = Rig().connect()
+    rig.core.set_velocity(0.2, 0.5, rig.now)
+    rig.living(1)
+    before = len(rig.sent)
+    rig.core.stop(rig.now)
+    if isinstance(newer, Command):
+        rig.core.send(newer, rig.now)
+    else:
+        rig.core.begin_goal(newer, None, None, rig.now)
+    rig.living(1.5)
+    assert rig.commands()[before] == stop()
+    left, right = rig.wheels
+    assert left == right > 0.05

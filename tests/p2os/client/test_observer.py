@@ -7,15 +7,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from p2os.client.core import RobotCore, guess_profile
+from p2os.client.core import RobotCore
 from p2os.client.goals import TurnAxis
 from p2os.client.mover import Motors
 from p2os.client.notices import OdometryDoubtful, PacketArrived, RobotUnknown
-from p2os.client.observer import Observer, PoseKeeper, bumpers_of, limits_of
+from p2os.client.observer import Firmware, Observer, PoseKeeper, bumpers_of, limits_of
 from p2os.client.robot_state import RobotPose
 from p2os.client.settings import ClientSettings
 from p2os.protocol.commands import Command, CommandNumber
-from p2os.protocol.config_packet import AROS_1_6_FIELDS, ConfigPacket
+from p2os.protocol.config_packet import AROS_1_6_FIELDS, AROS_1_8_FIELDS, P2OS_FIELDS, ConfigPacket
 from p2os.protocol.packets import RawPacket
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import SonarReading, StandardSip
@@ -69,8 +69,7 @@ def test_a_sonar_keeps_its_last_reading_until_the_next() -> None:
 
 
 def test_flags_and_the_tail_are_read_where_the_family_has_them() -> None:
-    observer = Observer(P2DX)
-    observer.profile = Profile.ARCOS
+    observer = Observer(P2DX, Profile.ARCOS)
     state = observer.take(StandardSip(raw_flags=0b100001, tail=(130, 0, 0, 0, 0, 25, 80)), 0)
     assert state.motors_enabled is True
     assert state.stop_button is True
@@ -171,15 +170,6 @@ def test_parameters_that_are_given_are_used_and_others_are_loaded_by_name() -> N
     assert rig.notices(RobotUnknown)
 
 
-@pytest.mark.parametrize(
-    ("subclass", "profile"),
-    [("p2dx", Profile.P2OS), ("P2AT8", Profile.P2OS), ("p3dx", Profile.AROS), ("p2d8+", Profile.AROS),
-     ("perfpb", Profile.AROS), ("p3dx-sh", Profile.ARCOS), ("seekurjr", Profile.ARCOS), ("pioneer-lx", Profile.ARCOS)],
-)  # fmt: skip
-def test_the_family_is_guessed_by_the_model(subclass: str, profile: Profile) -> None:
-    assert guess_profile(subclass) is profile
-
-
 def test_a_tail_shows_the_family_whatever_the_model_is_called() -> None:
     rig = Rig(pioneer=new_pioneer(profile=Profile.ARCOS)).connect()
     assert rig.core.profile is Profile.ARCOS
@@ -207,8 +197,7 @@ def test_a_setting_out_of_range_is_refused(change: dict[str, int], text: str) ->
 
 
 def test_motors_that_the_stop_button_took_off_say_whether_it_is_still_pressed() -> None:
-    observer, motors = Observer(P2DX), Motors()
-    observer.profile = Profile.ARCOS
+    observer, motors = Observer(P2DX, Profile.ARCOS), Motors()
 
     def flags(bits: int, now: int) -> str | None:
         return motors.take(observer.take(StandardSip(raw_flags=bits), now), now)
@@ -240,3 +229,97 @@ def test_a_gap_in_which_the_robot_could_have_turned_half_round_is_told(gap_s: fl
     rig.is_cut = False
     rig.run(0.5)
     assert bool(rig.notices(OdometryDoubtful)) is is_doubtful
+
+
+# Which firmware's packets these are ---------------------------------------------------------
+
+P2OS_CONFIG, AROS_CONFIG = ConfigPacket(fields_sent=P2OS_FIELDS), ConfigPacket(fields_sent=AROS_1_8_FIELDS)
+TAIL = (130, 0, 0, 0, 0, -127)
+#: As a packet stands on the wire: the two bytes behind the sonar, P2OS' order and the order of those that followed.
+PORT_FIRST, GRIPPER_FIRST = (5, 0), (0, 5)
+
+
+def judged(hint: Profile, *evidence: object, given: Profile | None = None) -> Firmware:
+    """Return what is known after packets, pairs of bytes, words of flags (`int`) and ENABLE (`bool`)."""
+    firmware = Firmware(given)
+    firmware.new_session(hint)
+    first, second = 0, 0
+    for item in evidence:
+        match item:
+            case ConfigPacket() | None:
+                firmware.take_config(item)
+            case bool():
+                firmware.take_motors_asked(item)
+            case "servo":
+                firmware.take_servo_set()
+            case _:
+                first, second = item if isinstance(item, tuple) and len(item) == 2 else (first, second)
+                gripper, port = (first, second) if firmware.profile.has_gripper_first else (second, first)
+                tail = item if isinstance(item, tuple) and len(item) > 2 else ()
+                word = item if isinstance(item, int) else 0
+                firmware.take(StandardSip(gripper_state=gripper, analog_port=port, raw_flags=word, tail=tail))
+    return firmware
+
+
+@pytest.mark.parametrize("hint", list(Profile))
+@pytest.mark.parametrize(
+    ("evidence", "profile", "tells_motors"),
+    [
+        ([TAIL], Profile.ARCOS, True),
+        ([AROS_CONFIG], Profile.AROS, True),
+        ([ConfigPacket(fields_sent=P2OS_FIELDS + 1)], Profile.AROS, True),
+        ([ConfigPacket(fields_sent=AROS_1_8_FIELDS + 1)], Profile.ARCOS, True),
+        ([AROS_CONFIG, TAIL], Profile.ARCOS, True),
+        ([TAIL, P2OS_CONFIG], Profile.ARCOS, True),
+        ([PORT_FIRST, P2OS_CONFIG], Profile.P2OS, False),
+        ([PORT_FIRST, 0, True, 1, 0], Profile.P2OS, False),
+        ([PORT_FIRST, AROS_CONFIG], Profile.AROS, True),
+    ],
+)  # fmt: skip
+def test_what_arrives_shows_the_family_whatever_the_name_is(
+    hint: Profile, evidence: list[object], profile: Profile, tells_motors: bool
+) -> None:
+    firmware = judged(hint, *evidence)
+    assert (firmware.profile, firmware.tells_motors) == (profile, tells_motors)
+
+
+@pytest.mark.parametrize(
+    ("hint", "evidence", "profile", "tells_motors"),
+    [
+        (Profile.AROS, [], Profile.AROS, False),
+        (Profile.AROS, [None, 1], Profile.AROS, False),
+        (Profile.ARCOS, [P2OS_CONFIG], Profile.P2OS, False),
+        (Profile.P2OS, [GRIPPER_FIRST], Profile.AROS, False),
+        (Profile.ARCOS, [GRIPPER_FIRST], Profile.ARCOS, False),
+        (Profile.AROS, [(0, 0), (1, 2), (0, 6)], Profile.AROS, False),  # neither order, or both
+        (Profile.AROS, [P2OS_CONFIG, 0, True, 1], Profile.AROS, True),  # AROS before 1.6
+        (Profile.AROS, [0, True, 0, 1, 0], Profile.AROS, True),
+        (Profile.AROS, [1, True, 1, 0], Profile.AROS, False),  # on before it was asked for
+        (Profile.AROS, [True, 1], Profile.AROS, False),  # nobody knows what was before
+        (Profile.AROS, ["servo", 0, True, 151], Profile.AROS, False),
+        (Profile.P2OS, [0, True, 1], Profile.P2OS, False),
+    ],
+)  # fmt: skip
+def test_a_name_is_a_hint_for_the_order_of_bytes_and_never_for_the_motors(
+    hint: Profile, evidence: list[object], profile: Profile, tells_motors: bool
+) -> None:
+    firmware = judged(hint, *evidence)
+    assert (firmware.profile, firmware.tells_motors) == (profile, tells_motors)
+    firmware.new_session(hint)
+    assert (firmware.profile, firmware.tells_motors) == (hint, False), "another session knows nothing"
+
+
+def test_a_family_that_is_given_is_believed() -> None:
+    assert judged(Profile.ARCOS, TAIL, AROS_CONFIG, given=Profile.P2OS).profile is Profile.P2OS
+    assert judged(Profile.P2OS, PORT_FIRST, P2OS_CONFIG, given=Profile.AROS).tells_motors
+
+
+@pytest.mark.parametrize("model", ["p2dx", "p3dx", "p3dx-sh"])
+@pytest.mark.parametrize("profile", list(Profile))
+def test_a_client_finds_the_family_of_a_robot_under_any_name(model: str, profile: Profile) -> None:
+    rig = Rig(pioneer=new_pioneer(model, profile=profile)).connect()
+    rig.run(0.2)
+    assert rig.core.profile is profile
+    state = rig.core.state
+    assert state is not None
+    assert (state.analog_port, state.motors_enabled) == (5, False if profile.has_flags else None)

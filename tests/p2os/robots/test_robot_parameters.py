@@ -115,6 +115,9 @@ def test_the_conversions_are_those_of_the_manual() -> None:
         ("track_mm = 357", "track_mm = true", "is not a whole number"),
         ("track_mm = 357", "track = 357\ntrack_mm = 357", "unknown key 'track'"),
         ("fitted = 8", "fitted = -1", "is out of range"),
+        ('firmware = ["P2OS"]', 'firmware = "ARCO"', r"firmware = 'ARCO' is not of P2OS, AROS, ARCOS"),
+        ('firmware = ["P2OS"]', "firmware = []", r"firmware = \[\] is not of"),
+        ('firmware = ["P2OS"]', "firmware = 3", "firmware = 3 is not a text"),
         ('title = "Pioneer 2-DX"', "title = 3", "is not a line of printable ASCII"),
         ("mass_kg = 9.0", 'mass_kg = "9 kg"', "is not a number"),
         ("[motion]", "[motions]", "unknown key 'motions'"),
@@ -161,6 +164,9 @@ def test_a_file_of_ones_own_may_be_based_on_a_shipped_one(tmp_path: Path) -> Non
     path = tmp_path / "mine.toml"
     path.write_text('based_on = "p2dx"\nsubclass = "mine"\n[conversion]\ntrack_mm = 360\n', encoding="utf-8")
     assert (load_parameters(path).track_mm, load_parameters(path).vel2_divisor) == (360, 20)
+    assert load_parameters(path).firmware == ("P2OS",)
+    path.write_text('firmware = ["ARCOS", "AROS", "ARCOS"]\nbased_on = "p3dx"\nsubclass = "mine"\n', encoding="utf-8")
+    assert load_parameters(path).firmware == ("ARCOS", "AROS")
     path.write_text('based_on = "p2dx"\n[title]\nx = 1\n', encoding="utf-8")
     with pytest.raises(ParametersError, match=r"title = .* is not a line"):
         load_parameters(path)

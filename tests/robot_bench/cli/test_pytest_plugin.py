@@ -242,3 +242,44 @@ def test_code_that_a_scenario_names_is_loaded_where_the_ini_file_trusts_it(
     else:
         found.assert_outcomes(errors=1)
         found.stdout.fnmatch_lines(["*mine.toml:4: body: ./mine.py:Own is Python code*p2os_trust = *"])
+
+
+EVERY_MODEL = """
+import pytest
+from p2os import VirtualClock
+from p2os.client import DeadmanStopped
+from p2os.robots.parameters import known_robots
+
+def cell(model, firmware):
+    mark = pytest.mark.pioneer(robot=model, firmware=firmware, body="kinematic", clock=VirtualClock())
+    return pytest.param(model, marks=mark, id=f"{model}-{firmware}")
+
+@pytest.mark.parametrize("model", [cell(model, firmware) for model in MODELS for firmware in FIRMWARE])
+def test_it_drives_and_stops(model, robot, served):
+    stops = []
+    robot.on_event(lambda notice: isinstance(notice, DeadmanStopped) and stops.append(served.clock()))
+    assert robot.identity.subclass == model
+    assert robot.drive(0.3).reached == pytest.approx(0.3, abs=0.02)
+    robot.set_velocity(0.3)
+    called_at = served.clock()
+    served.clock.sleep(5.6)
+    (stopped_at,) = stops
+    assert stopped_at - called_at <= 2.1e9
+    assert "wheels 0.000 0.000 m/s" in served.order("status")[0]
+    assert robot.state.left_mps == robot.state.right_mps == 0
+"""
+
+
+def every_model(pytester: pytest.Pytester, models: str, firmware: str, cells: int) -> None:
+    text = EVERY_MODEL.replace("MODELS", models).replace("FIRMWARE", firmware)
+    run(pytester, text).assert_outcomes(passed=cells)
+
+
+@pytest.mark.slow
+def test_the_marker_takes_the_firmware_and_the_clock_of_a_served_robot(pytester: pytest.Pytester) -> None:
+    every_model(pytester, '("p3dx-sh", "p2at")', '(None, "P2OS", "AROS")', 6)
+
+
+@pytest.mark.soak
+def test_the_fixtures_drive_and_stop_every_model(pytester: pytest.Pytester) -> None:
+    every_model(pytester, "known_robots()", '(None, "P2OS", "AROS", "ARCOS")', 120)
