@@ -72,8 +72,8 @@ Examples:
 DEADMAN_NS: Nanos = 500 * NS_PER_MS
 #: chosen: how often health is told, as ROS' own nodes do.
 HEALTH_NS: Nanos = 1 * NS_PER_S
-#: chosen: at the latest the loop looks whether all is over.
-LOOK_S = 0.1
+#: chosen: how long a wait for the network holds a signal off at most, before STOP leaves.
+LOOK_S = 0.02
 #: chosen: a message that a publisher repeats 20 times a second is complained of once.
 COMPLAINT_NS: Nanos = 1 * NS_PER_S
 #: What is told on stderr.
@@ -189,7 +189,7 @@ class NodeLoop:
         self.counts = {"commands": 0, "refused": 0}
 
     def run(self, is_over: Callable[[], bool]) -> None:
-        """Go on until `is_over` says so; it is asked ten times a second or more often."""
+        """Go on until `is_over` says so; it is asked each `LOOK_S` or more often."""
         with postponed():
             for topic in self._node.commands:
                 self._network.subscribe(topic)
