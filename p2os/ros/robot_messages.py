@@ -17,7 +17,7 @@ from p2os.pioneer.devices.laser import LaserModel
 from p2os.protocol.packets import SimLaserPacket
 from p2os.robots.parameters import RobotParameters
 from p2os.ros.codec import Message
-from p2os.ros.frames import BASE, JOINTS, LASER, ODOM, Frames, about_z, header
+from p2os.ros.frames import BASE, LASER, ODOM, Frames, about_z, header
 from simbase.timing import Nanos
 
 #: metres a metre and radians a radian: the odometry's error of AMRISim's Pioneers.
@@ -125,12 +125,12 @@ def planar(x: float, y: float, yaw: float) -> list[float]:
 
 
 def joint_state(stamp: Nanos, frames: Frames, motion: Motion) -> Message:
-    """Return a sensor_msgs/JointState of both wheels."""
+    """Return a sensor_msgs/JointState of the wheels."""
     return {
         "header": header(stamp, frames.name(BASE)),
-        "name": list(JOINTS),
-        "position": list(motion.wheels_rad),
-        "velocity": list(motion.rates_radps),
+        "name": frames.joints,
+        "position": frames.of_wheels(motion.wheels_rad),
+        "velocity": frames.of_wheels(motion.rates_radps),
     }
 
 

@@ -73,7 +73,8 @@ def known(node: Any) -> Callable[[bytes], bool]:
     """Return what tells whether a participant is known to a node."""
     from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsParticipant
 
-    reader, found = BuiltinDataReader(node._participant, BuiltinTopicDcpsParticipant), set()
+    reader = BuiltinDataReader(node._participant, BuiltinTopicDcpsParticipant)
+    found: set[bytes] = set()
 
     def look(name: bytes) -> bool:
         found.update(sample.key.bytes[:12] for sample in reader.take(100))
