@@ -36,6 +36,7 @@ from p2os.client.notices import (
     words_of,
 )
 from p2os.pioneer.devices.laser import read_laser
+from p2os.protocol.times import CYCLE_NS
 from p2os.robots.parameters import load_parameters
 from p2os.ros.codec import Message
 from p2os.ros.frames import Frames
@@ -143,7 +144,7 @@ def ros(
             fitted = (0, 0) if config is None else (config.frontbumps, config.rearbumps)
             robot_node = RobotNode(
                 client.parameters, options, deadman_ns=deadman_ns, bumpers_fitted=fitted, motor_step_mps=motor_step,
-                laser=scanner,
+                laser=scanner, cycle_ns=(0 if config is None else config.sipcycle * NS_PER_MS) or CYCLE_NS,
             )  # fmt: skip
             where = f"domain {domain}, {interface}"
             typer.echo(f"/{name} on {transport}, {where}: {client.parameters.title} on {url}; Ctrl-C ends")
