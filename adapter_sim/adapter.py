@@ -57,7 +57,7 @@ from adapter_sim.encoders import WheelCodes
 from adapter_sim.masters import Master, Masters
 from adapter_sim.mixing import Speeds
 from adapter_sim.pinout import Pinout, WireRole
-from adapter_sim.pins import EventCallback, Inputs, Outputs, PinBank, SampleClock
+from adapter_sim.pins import EventCallback, Inputs, Outputs, PinBank, SampleClock, released_codes
 from adapter_sim.session import Session, SessionOpened, StopRepeater
 from adapter_sim.settings import AdapterSettings, MotorCommand
 from p2os.gamepad import PadReport
@@ -179,7 +179,7 @@ class Adapter(Stateful):
             threshold_um=threshold_um(settings.threshold_um, parameters),
             stale_ns=settings.distance_stale_ns,
         )
-        self._codes = WheelCodes(settings, parameters, pinout.value("encoder1").width)
+        self._codes = WheelCodes(settings, parameters, pinout.value("encoder1").width, released_codes(pinout))
         self.session = Session(settings)
         self.outputs = Outputs(pins, pinout)
         self.inputs = Inputs(pins, pinout, settings)

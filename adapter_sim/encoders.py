@@ -24,7 +24,8 @@ travel: it becomes the new reference and is counted.
 
 Codes. They walk: at most one code each `encoder_dwell_ns`, so that a program that
 polls never sees a jump, not even when packets were lost and the wheels have
-turned meanwhile. They are absolute: neither a session's end nor a reset forgets where
+turned meanwhile. A new adapter begins at the codes that its wires show before it
+drives them. They are absolute: neither a session's end nor a reset forgets where
 the wheels stand, and travel is kept whole, not only its code. What the wheels turn
 while no session is open is reported by nobody, and so not shown.
 
@@ -71,15 +72,21 @@ class WheelCodes(Stateful):
         settings: Dwell, and where the codes stand when a session opens.
         parameters: The robot's lengths.
         width: Wires of an encoder.
+        released: The codes that the wires show before anybody drives them, left first: what is begun with.
     """
 
     STATE = ("encoders", "_walks")
 
-    def __init__(self, settings: AdapterSettings, parameters: RobotParameters, width: int) -> None:
+    def __init__(
+        self, settings: AdapterSettings, parameters: RobotParameters, width: int, released: tuple[int, int] = (0, 0)
+    ) -> None:
         self.encoders = Encoders(EncoderGeometry.of(parameters, settings.liveness_ns), width)
+        self.encoders.begin(self.encoders.geometry.travel_nm_at(released, width))
         self._at_open = settings.encoder_at_open
         self._heading_scale = HEADING_MODULUS // parameters.angle_counts_per_turn
-        self._walks = (CodeWalk(settings.encoder_dwell_ns), CodeWalk(settings.encoder_dwell_ns))
+        self._walks = (
+            CodeWalk(settings.encoder_dwell_ns, released[0]), CodeWalk(settings.encoder_dwell_ns, released[1]),
+        )  # fmt: skip
 
     @property
     def counts(self) -> tuple[int, int]:
@@ -142,6 +149,11 @@ class EncoderGeometry:
             # mm/s × ns are 1e-9 mm, that is 1e-6 µm.
             longest_step_um=parameters.max_velocity_mm_s * longest_gap_ns // 10**6,
         )
+
+    def travel_nm_at(self, counts: tuple[int, int], width: int) -> tuple[int, int]:
+        """Return how far both wheels have rolled where these counts begin; whole µm, for what is kept has no finer."""
+        left, right = (-(-count * self.circumference_nm // (1_000 << width)) * 1_000 for count in counts)
+        return left, right
 
     @property
     def circumference_nm(self) -> int:
@@ -231,9 +243,9 @@ class CodeWalk(Stateful):
 
     STATE = ("shown", "_stepped_at")
 
-    def __init__(self, dwell_ns: Nanos) -> None:
+    def __init__(self, dwell_ns: Nanos, shown: int = 0) -> None:
         self._dwell_ns = dwell_ns
-        self.shown = 0
+        self.shown = shown
         self._stepped_at: Nanos | None = None
 
     def due_at(self, target: int, now: Nanos) -> Nanos | None:

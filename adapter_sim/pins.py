@@ -176,6 +176,15 @@ class Outputs(Stateful):
             self._pins.write(name, level, now)
 
 
+def released_codes(pinout: Pinout) -> tuple[int, int]:
+    """Return the codes that the encoders' wires show while nobody drives them, left first."""
+    left, right = (
+        sum(pinout.wire(name).idle << bit for bit, name in enumerate(pinout.value(value).wires))
+        for value in ENCODER_VALUES
+    )
+    return left, right
+
+
 class SampleClock(Stateful):
     """The next sample instant.
 

@@ -23,7 +23,7 @@ from adapter_sim.distances import threshold_um
 from adapter_sim.masters import Master
 from adapter_sim.mixing import Speeds
 from adapter_sim.pinout import Pinout, Safe, WireRole
-from adapter_sim.pins import MOTOR_VALUES, EventCallback, PinBank, duty_wires
+from adapter_sim.pins import MOTOR_VALUES, EventCallback, PinBank, duty_wires, released_codes
 from adapter_sim.settings import AdapterSettings, EncoderAtOpen, MotorCommand, MotorMeaning
 from p2os.gamepad import PadReport
 from p2os.robots.parameters import RobotParameters
@@ -395,8 +395,9 @@ def robot_numbers(parameters: RobotParameters) -> dict[str, int]:
 
 
 def wire_numbers(pinout: Pinout) -> dict[str, int]:
-    """Return a pin-out's widths and safe levels as the firmware wants them."""
+    """Return a pin-out's widths and levels as the firmware wants them."""
     distances = pinout.with_role(WireRole.DISTANCE)
+    left, right = released_codes(pinout)
     return {
         "distances": len(distances),
         "motor1_width": pinout.value("motor1").width,
@@ -404,6 +405,7 @@ def wire_numbers(pinout: Pinout) -> dict[str, int]:
         "encoder_width": pinout.value("encoder1").width,
         "safe_mask": sum(1 << bit for bit, wire in enumerate(distances) if wire.safe is not Safe.HOLD),
         "safe_levels": sum(1 << bit for bit, wire in enumerate(distances) if wire.safe is Safe.HIGH),
+        "released_codes": left | right << pinout.value("encoder1").width,
     }
 
 

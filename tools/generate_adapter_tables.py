@@ -155,7 +155,7 @@ def pin_header(pinout: Pinout, revision: str) -> str:
         pins = ", ".join(str(place(wire.esp32_pin(revision))) for wire in wires)
         return f"//: {text}: {', '.join(wire.name for wire in wires)}.\nconstexpr std::int8_t {name}[] = {{{pins}}};\n"
 
-    *widths, safe_mask, safe_levels = wire_numbers(pinout).values()
+    *widths, safe_mask, safe_levels, released = wire_numbers(pinout).values()
     extra = "".join(f"constexpr std::int8_t {name.upper()} = {gpio(auxiliaries.get(name))};\n" for name in AUXILIARIES)
     return (
         f'{NOTICE}//\n// Pins of the ESP32 on board revision "{revision}", from adapter_sim/pinout.toml; '
@@ -167,7 +167,7 @@ def pin_header(pinout: Pinout, revision: str) -> str:
         + row(inputs, "INPUT_PINS", "Read at one instant, in the order of the input word")
         + extra
         + f"constexpr adapter::WireNumbers WIRES = {{{', '.join(map(str, widths))}, "
-        f"0x{safe_mask:X}, 0x{safe_levels:X}}};\n\n}}  // namespace board\n"
+        f"0x{safe_mask:X}, 0x{safe_levels:X}, 0x{released:X}}};\n\n}}  // namespace board\n"
     )
 
 

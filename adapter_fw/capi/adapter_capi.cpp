@@ -30,6 +30,7 @@ constexpr Field<RobotNumbers> ROBOT[] = {
 constexpr Field<WireNumbers> WIRES[] = {
     FIELD(WireNumbers, distances), FIELD(WireNumbers, motor1_width), FIELD(WireNumbers, motor2_width),
     FIELD(WireNumbers, encoder_width), FIELD(WireNumbers, safe_mask), FIELD(WireNumbers, safe_levels),
+    FIELD(WireNumbers, released_codes),
 };
 
 constexpr const char* STATUS[] = {

@@ -346,8 +346,12 @@ void check_codes() {
   using adapter::Wheels;
   app::RetainedWheels memory{1, 2, 3};
   OneNumber store;
-  claim(restored(memory, store) == Wheels{}, "what nobody has kept begins at 0");
   adapter::Adapter part({}, {}, {}, 0);
+  const Wheels unknown = part.wheel_phases_um();
+  claim(part.counts() == Wheels{0, 4} && part.counts_shown() == Wheels{0, 4}, "a new one has the code of its released wires");
+  claim(restored(memory, store) == unknown, "so has what nobody has kept");
+  part.place_wheels(unknown);
+  claim(part.counts() == Wheels{0, 4}, "and what was kept of it, in whole um");
   app::CodeKeeper keeper(memory, store);
   keeper.restore(part);
   part.place_wheels({70'000, 518'000});
@@ -368,7 +372,7 @@ void check_codes() {
   claim(restored(memory, store).right == 5, "any number of the store gives a place");
   memory.check = 0;
   store.save("", -1);
-  claim(restored(memory, store) == Wheels{}, "but a negative one");
+  claim(restored(memory, store) == unknown, "but a negative one");
 }
 
 //: A sound frame of the robot, whose payload is its kind and zeros, but for one byte that is 1.

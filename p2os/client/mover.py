@@ -20,7 +20,8 @@ wait, and what they overtake is never sent.
 
 `Motors`: they are off after every OPEN. ENABLE has no answer; AROS and ARCOS robots
 report in their flags whether the motors are on, P2OS robots do not. ENABLE is sent a
-few times in a row, for a frame can be lost. Once they were on, motors that go off were
+few times in a row, for a frame can be lost; a program that asks for the same again
+and again has it sent no more often. Once they were on, motors that go off were
 switched off by somebody at the robot: they stay off until the program asks for them.
 
 `PlausibilityCheck`: the wheel speeds of the packets are the only evidence that the
@@ -206,9 +207,10 @@ class Mover:
         """Switch the motors."""
         if not on:
             self._switched_off("motors off", now)
-        self._motors.ask(on=on, now=now)
-        self._observer.firmware.take_motors_asked(on)
-        self._send(enable(on), now)
+        if self._motors.ask(on=on, now=now):
+            self._observer.firmware.take_motors_asked(on)
+            self._drop({CommandNumber.ENABLE})  # what the newest overtakes is never sent
+            self._send(enable(on), now)
 
     def set_velocity(self, speeds: Speeds, now: Nanos) -> None:
         """Hold these speeds."""
@@ -465,18 +467,26 @@ class Motors:
         self._left = 0
         self._due: Nanos | None = None
         self._asked_at: Nanos = 0
+        #: What the program's newest ENABLE of this session said, and when it was sent.
+        self._sent: tuple[bool, Nanos] | None = None
 
     def new_session(self) -> None:
         """Know that they are off."""
         self.are_on, self.taken_off = False, None
         self._left, self._due = 0, None
+        self._sent = None
 
-    def ask(self, *, on: bool, now: Nanos) -> None:
-        """Note that ENABLE is being sent."""
+    def ask(self, *, on: bool, now: Nanos) -> bool:
+        """Note what the program asks for; return whether ENABLE is to be sent now: the same again waits."""
+        is_same = self.are_on is on and self.taken_off is None
+        if is_same and self._sent is not None and self._sent[0] is on and now - self._sent[1] < ENABLE_EVERY_NS:
+            return False
         self.are_on, self.taken_off = on, None
         self._asked_at = now
+        self._sent = (on, now)
         self._left = ENABLE_TIMES - 1 if on else 0
         self._due = now + ENABLE_EVERY_NS if self._left else None
+        return True
 
     def next_deadline(self) -> Nanos | None:
         """Return when ENABLE is to be sent again."""

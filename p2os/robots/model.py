@@ -5,6 +5,7 @@ number; `p2os.robots.parameters` loads them.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from simbase.errors import FileError
@@ -41,7 +42,30 @@ class BodyParameters:
     wheel_mass_kg: float
     caster_radius_m: float
     caster_x_m: float
+    #: Of each driven wheel.
     motor_torque_nm: float
+    #: Between the middles of the first and the last axle, and of an axle's wheels, where there is more than one axle;
+    #: 0: as far as the hull reaches.
+    axle_distance_m: float = 0.0
+    wheel_distance_m: float = 0.0
+
+
+#: Axles → what the names of their wheels begin with, the first axle before the others.
+AXLES: Mapping[int, tuple[str, ...]] = {1: ("",), 2: ("front ", "rear ")}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WheelPlace:
+    """Where the middle of a driven wheel is, robot frame, metres."""
+
+    name: str
+    x_m: float
+    y_m: float
+
+    @property
+    def is_left(self) -> bool:
+        """Whether it turns as the robot's left side does."""
+        return self.y_m > 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,7 +91,7 @@ class Equipment:
     has_move: bool = True
     #: Whether ARIA asks this model for IOpacs by itself: its bumpers and infra-red eyes are only there.
     sends_io_packets: bool = False
-    #: Driven wheels.
+    #: Driven wheels, in pairs.
     wheels: int = 2
     #: Largest sideways speed, 0 where it cannot.
     max_lateral_mm_s: int = 0
@@ -117,6 +141,36 @@ class RobotParameters:
     #: What each motor adds to the inertia of its wheel, behind its gear; 0 where wheels are told speeds.
     rotor_inertia_kg_m2: float = 0.0
     body: BodyParameters
+
+    @property
+    def has_caster(self) -> bool:
+        """Whether a caster rolls behind a single pair of wheels."""
+        return self._axles == 1
+
+    @property
+    def wheel_places(self) -> tuple[WheelPlace, ...]:
+        """Return where the driven wheels are, from the front, left before right.
+
+        A single pair stands as far apart as the controller reckons (`track_mm`). Several slip as the robot turns, and
+        that effective distance is no place then.
+        """
+        body, axles = self.body, self._axles
+        long_m, wide_m = 0.0, self.track_mm / 1000
+        if axles > 1:
+            long_m = body.axle_distance_m or body.hull_front_m + body.hull_rear_m - body.wheel_diameter_m
+            wide_m = body.wheel_distance_m or max(body.hull_width_m - body.wheel_width_m, body.wheel_width_m)
+        starts = AXLES.get(axles) or tuple(f"axle {number + 1} " for number in range(axles))
+        return tuple(
+            WheelPlace(
+                name=f"{start}{side} wheel", y_m=wide_m / 2 * sign,
+                x_m=long_m / 2 - (long_m * number / (axles - 1) if axles > 1 else 0.0),
+            )
+            for number, start in enumerate(starts) for side, sign in (("left", 1), ("right", -1))
+        )  # fmt: skip
+
+    @property
+    def _axles(self) -> int:
+        return max(1, self.equipment.wheels // 2)
 
     def with_every_sonar(self) -> "RobotParameters":
         """Return the same robot with a sonar at each of its poses: with the rear ring that is an option of it."""

@@ -69,6 +69,7 @@ RANGES: Mapping[str, Mapping[str, tuple[float, float]]] = {
         "ground_clearance_m": (0.001, 5), "mass_kg": (0.3, 10_000), "wheel_diameter_m": (0.01, 5),
         "wheel_width_m": (0.001, 2), "wheel_mass_kg": (0.01, 1000), "caster_radius_m": (0.001, 2),
         "caster_x_m": (-10, 10), "motor_torque_nm": (0.01, 10_000),
+        "axle_distance_m": (0.01, 10), "wheel_distance_m": (0.01, 20),
     },
 }  # fmt: skip
 #: A sonar's place on its robot, mm and degrees.
@@ -79,6 +80,8 @@ MOST_EYES = 8
 LONGEST_TEXT = 100
 #: A caster of this mass rolls under every robot (`p2os.pioneer.body`).
 CASTER_KG = 0.2
+#: Keys of what has more than one axle.
+_OF_SEVERAL_AXLES = frozenset({"axle_distance_m", "wheel_distance_m"})
 #: Keys of numbers that may have a fraction, beside those of the sonar and the body.
 _FRACTIONS = frozenset({*FINE_KEYS, "gyro_scaler"})
 
@@ -88,7 +91,7 @@ def _keys(section: str) -> tuple[Key, ...]:
     return tuple(
         Key(
             name=name, kind="number" if name in _FRACTIONS or (section in {"sonar", "body"} and name != "fitted")
-            else "whole", least=least, most=most, required=section != "equipment",
+            else "whole", least=least, most=most, required=section != "equipment" and name not in _OF_SEVERAL_AXLES,
         )
         for name, (least, most) in RANGES[section].items()
     )  # fmt: skip
@@ -203,7 +206,7 @@ def build_parameters(name: str, table: Table, places: TomlPlaces | None = None) 
     points = _placed(parts["infrared"]["points"], within(where, "infrared"), "points")
     if len(points) > MOST_EYES:
         raise ParametersError(f"{within(where, 'infrared').at('points')}: points: there are at most {MOST_EYES}")
-    _refuse_impossible(table["body"], within(where, "body"))
+    _refuse_impossible(table["body"], parts["equipment"].get("wheels", 2), within(where, "body"))
     return RobotParameters(
         **values,
         equipment=Equipment(**parts["equipment"]),
@@ -235,8 +238,8 @@ def _placed(rows: Sequence[Sequence[float]], where: Place, key: str) -> Sequence
     return rows
 
 
-def _refuse_impossible(body: Table, where: Place) -> None:
-    wheels_kg = 2 * body["wheel_mass_kg"] + CASTER_KG
+def _refuse_impossible(body: Table, wheels: int, where: Place) -> None:
+    wheels_kg = max(2, wheels) * body["wheel_mass_kg"] + CASTER_KG
     if body["mass_kg"] <= wheels_kg:
         raise ParametersError(
             f"{where.at('mass_kg')}: mass_kg = {body['mass_kg']:g}, but wheels and caster have {wheels_kg:g} kg"

@@ -7,7 +7,8 @@ Services (`rq/…Request`, `rr/…Reply`) are left out. rmw_fastrtps tells reque
 PID_RELATED_SAMPLE_IDENTITY of its inline QoS, which Cyclone DDS 11 neither shows nor writes; rmw_cyclonedds puts 16
 bytes before the message instead. Who served the latter would let every call of the former, ROS' default, hang.
 
-Over loopback no multicast is used: the participants of this machine are asked one by one, by their ports.
+Over loopback no multicast is used: the participants of this machine are asked one by one, by their ports. What is sent
+to another address than the network's own reaches no socket of the node: `p2os.transport.one_address`.
 
 Source: https://design.ros2.org/articles/topic_and_service_names.html; rmw_dds_common 3.1; DDSI-RTPS 2.5, 9.6.1.
 """
@@ -21,6 +22,7 @@ from p2os.errors import MissingDependencyError, TransportError
 from p2os.ros.codec import Message, message_of, struct_class, struct_of
 from p2os.ros.message_table import message_type
 from p2os.ros.transport import DEPTH, NodeOptions, Received, Topic
+from p2os.transport.one_address import opened_on
 from simbase.timing import NS_PER_S
 
 if TYPE_CHECKING:
@@ -59,7 +61,9 @@ class DdsNode:
         self._options = options
         self.damaged = 0
         try:
-            self._domain: object = Domain(options.domain, configuration(options.interface))
+            self._domain: object = opened_on(
+                options.interface, lambda: Domain(options.domain, configuration(options.interface))
+            )
             # Whatever `Tracing` says, each datagram of a stranger that is no RTPS would be a line on standard error.
             DDS._dll_handle.dds_set_log_mask(0)  # noqa: SLF001 - the library's only handle
             self._participant = DomainParticipant(options.domain, qos=Qos(Policy.Userdata(ENCLAVE)))
@@ -67,6 +71,10 @@ class DdsNode:
             raise TransportError(
                 f"no DDS on {options.interface}, domain {options.domain}: {error.msg}",
                 hint="--interface ADDRESS, or another --domain",
+            ) from error
+        except OSError as error:
+            raise TransportError(
+                f"no DDS on {options.interface} alone: {error.strerror}", hint="--transport zenoh"
             ) from error
         self._writers: dict[Topic, DataWriter[object]] = {}
         self._readers: dict[Topic, DataReader[object]] = {}

@@ -13,8 +13,6 @@ from p2os.ros.codec import Message
 from simbase.timing import NS_PER_S, Nanos
 
 ODOM, BASE, CASTER, LASER = "odom", "base_link", "caster", "laser"
-WHEELS = ("left_wheel", "right_wheel")
-JOINTS = tuple(f"{wheel}_joint" for wheel in WHEELS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +38,15 @@ class Frames:
         """Return a frame's whole name."""
         return self.prefix + frame
 
+    @property
+    def joints(self) -> list[str]:
+        """Return the names of the wheels' joints, in the order of `wheel_places`."""
+        return [f"{frame_of(wheel.name)}_joint" for wheel in self.parameters.wheel_places]
+
+    def of_wheels(self, sides: tuple[float, float]) -> list[float]:
+        """Return for each joint what its side has, left first."""
+        return [sides[0] if wheel.is_left else sides[1] for wheel in self.parameters.wheel_places]
+
     def sonar(self, number: int) -> str:
         """Return the name of a sonar's frame."""
         return self.name(f"sonar_{number}")
@@ -57,18 +64,24 @@ class Frames:
             laser = parameters.equipment
             at = (laser.laser_x_mm / 1000, laser.laser_y_mm / 1000, parameters.sonar_height_m)
             found.append(transform(stamp, base, self.name(LASER), at, about_z(0.0)))
-        body = parameters.body
-        at = (body.caster_x_m, 0.0, body.caster_radius_m)
-        return [*found, transform(stamp, base, self.name(CASTER), at, about_z(0.0))]
-
-    def moving(self, stamp: Nanos, pose: tuple[float, float, float], wheels_rad: Iterable[float]) -> list[Message]:
-        """Return the robot's pose (x, y, heading) in `odom`, and its wheels in it."""
-        base, half_track = self.name(BASE), self.parameters.track_mm / 2000
-        found = [transform(stamp, self.name(ODOM), base, (*pose[:2], 0.0), about_z(pose[2]))]
-        for wheel, side, angle in zip(WHEELS, (half_track, -half_track), wheels_rad, strict=True):
-            at = (0.0, side, self.parameters.body.wheel_diameter_m / 2)
-            found.append(transform(stamp, base, self.name(wheel), at, about_y(angle)))
+        if parameters.has_caster:
+            at = (parameters.body.caster_x_m, 0.0, parameters.body.caster_radius_m)
+            found.append(transform(stamp, base, self.name(CASTER), at, about_z(0.0)))
         return found
+
+    def moving(self, stamp: Nanos, pose: tuple[float, float, float], wheels_rad: tuple[float, float]) -> list[Message]:
+        """Return the robot's pose (x, y, heading) in `odom`, and its wheels in it, turned as their sides are."""
+        base = self.name(BASE)
+        found = [transform(stamp, self.name(ODOM), base, (*pose[:2], 0.0), about_z(pose[2]))]
+        for wheel, angle in zip(self.parameters.wheel_places, self.of_wheels(wheels_rad), strict=True):
+            at = (wheel.x_m, wheel.y_m, self.parameters.body.wheel_diameter_m / 2)
+            found.append(transform(stamp, base, self.name(frame_of(wheel.name)), at, about_y(angle)))
+        return found
+
+
+def frame_of(part: str) -> str:
+    """Return the frame of a robot's part, as its parameters call it."""
+    return part.replace(" ", "_")
 
 
 def transform(stamp: Nanos, parent: str, child: str, at: tuple[float, float, float], turned: Message) -> Message:

@@ -15,10 +15,11 @@ from typing import TypeAlias
 from p2os.client.robot_state import RobotState, SonarEcho
 from p2os.pioneer.devices.laser import LaserModel
 from p2os.protocol.packets import SimLaserPacket
+from p2os.protocol.times import CYCLE_NS
 from p2os.robots.parameters import RobotParameters
 from p2os.ros.codec import Message
-from p2os.ros.frames import BASE, JOINTS, LASER, ODOM, Frames, about_z, header
-from simbase.timing import Nanos
+from p2os.ros.frames import BASE, LASER, ODOM, Frames, about_z, header
+from simbase.timing import NS_PER_S, Nanos
 
 #: metres a metre and radians a radian: the odometry's error of AMRISim's Pioneers.
 ODOMETRY_ERROR = 0.0075
@@ -125,26 +126,25 @@ def planar(x: float, y: float, yaw: float) -> list[float]:
 
 
 def joint_state(stamp: Nanos, frames: Frames, motion: Motion) -> Message:
-    """Return a sensor_msgs/JointState of both wheels."""
+    """Return a sensor_msgs/JointState of the wheels."""
     return {
         "header": header(stamp, frames.name(BASE)),
-        "name": list(JOINTS),
-        "position": list(motion.wheels_rad),
-        "velocity": list(motion.rates_radps),
+        "name": frames.joints,
+        "position": frames.of_wheels(motion.wheels_rad),
+        "velocity": frames.of_wheels(motion.rates_radps),
     }
 
 
 def sonar_range(stamp: Nanos, frames: Frames, number: int, range_m: float) -> Message:
     """Return a sensor_msgs/Range of a sonar; what is beyond its reach is +inf, what is nearer than it sees -inf."""
     parameters = frames.parameters
-    value = math.inf if range_m >= parameters.sonar_range_m else range_m
     return {
         "header": header(stamp, frames.sonar(number)),
         "radiation_type": ULTRASOUND,
         "field_of_view": math.radians(parameters.sonar_cone_deg),
         "min_range": parameters.sonar_min_range_m,
         "max_range": parameters.sonar_range_m,
-        "range": -math.inf if value < parameters.sonar_min_range_m else value,
+        "range": seen_as(range_m, parameters.sonar_min_range_m, parameters.sonar_range_m),
     }
 
 
@@ -170,12 +170,13 @@ class Scans:
     """Puts the packets of a simulated laser together.
 
     Args:
-        laser: Its field, step and range.
+        laser: Its field, step and ranges.
         frames: The robot's.
+        cycle_ns: How often the robot reports: a sweep comes with each packet, all rays of it at one moment.
     """
 
-    def __init__(self, laser: LaserModel, frames: Frames) -> None:
-        self._laser, self._frames = laser, frames
+    def __init__(self, laser: LaserModel, frames: Frames, cycle_ns: Nanos = CYCLE_NS) -> None:
+        self._laser, self._frames, self._cycle_ns = laser, frames, cycle_ns
         self._ranges_m: list[float] = []
 
     def take(self, packet: SimLaserPacket, stamp: Nanos) -> Message | None:
@@ -194,9 +195,19 @@ class Scans:
             "angle_min": first_rad,
             "angle_max": first_rad + step_rad * (laser.readings - 1),
             "angle_increment": step_rad,
+            "time_increment": 0.0,
+            "scan_time": self._cycle_ns / NS_PER_S,
+            "range_min": laser.nearest_m,
             "range_max": laser.range_m,
-            "ranges": [math.inf if one >= laser.range_m else one for one in self._ranges_m],
+            "ranges": [seen_as(one, laser.nearest_m, laser.range_m) for one in self._ranges_m],
         }
+
+
+def seen_as(range_m: float, nearest_m: float, farthest_m: float) -> float:
+    """Return a range as ROS has it: +inf where there is no echo, -inf what is nearer than the sensor sees (REP 117)."""
+    if range_m >= farthest_m:
+        return math.inf
+    return -math.inf if range_m < nearest_m else range_m
 
 
 def battery(stamp: Nanos, state: RobotState) -> Message:

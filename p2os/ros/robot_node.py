@@ -17,6 +17,7 @@ from p2os.client.robot_state import RobotState
 from p2os.pioneer.devices.laser import LaserModel
 from p2os.protocol.commands import CommandNumber
 from p2os.protocol.packets import ServerPacket, SimLaserPacket
+from p2os.protocol.times import CYCLE_NS
 from p2os.robots.parameters import RobotParameters
 from p2os.ros.codec import Message
 from p2os.ros.frames import Frames
@@ -90,6 +91,7 @@ class RobotNode:
         bumpers_fitted: Segments in front and at the rear.
         motor_step_mps: Rim speed of one step of `motor_left` and `motor_right`.
         laser: The simulated one that the robot is asked for; None: none.
+        cycle_ns: How often the robot reports, as its CONFIGpac says.
     """
 
     def __init__(
@@ -101,10 +103,11 @@ class RobotNode:
         bumpers_fitted: tuple[int, int] = (0, 0),
         motor_step_mps: float = STEP_MPS,
         laser: LaserModel | None = None,
+        cycle_ns: Nanos = CYCLE_NS,
     ) -> None:
         self.frames = Frames.of(parameters, options.namespace, has_laser=laser is not None)
         self._laser = laser
-        self._scans = None if laser is None else Scans(laser, self.frames)
+        self._scans = None if laser is None else Scans(laser, self.frames, cycle_ns)
         self._options = options
         self._deadman_ns = deadman_ns
         #: When the robot is stopped; None while nothing moves it.

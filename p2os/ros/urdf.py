@@ -7,16 +7,16 @@ from dataclasses import replace
 
 from p2os.pioneer.export import scene_of
 from p2os.pioneer.export.scene import Body, Mark
-from p2os.pioneer.export.scenes import PARTS
+from p2os.pioneer.export.scenes import part_names
 from p2os.pioneer.export.urdf import write
-from p2os.ros.frames import BASE, CASTER, WHEELS, Frames
+from p2os.ros.frames import BASE, Frames, frame_of
 
 
 def urdf_text(frames: Frames) -> str:
     """Return the URDF of a robot."""
     scene = scene_of(None, frames.parameters)
     own = frames.parameters.subclass
-    names = {own + part: frames.name(name) for part, name in zip(PARTS, (BASE, *WHEELS, CASTER), strict=True)}
+    names = {body: frames.name(frame_of(part) or BASE) for body, part in part_names(frames.parameters).items()}
     bodies = tuple(_renamed(body, names, frames) for body in scene.bodies)
     return write(replace(scene, bodies=bodies), own, joint_name="{}_joint")[f"{own}.urdf"].decode()
 

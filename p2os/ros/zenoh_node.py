@@ -6,6 +6,12 @@
 
 A node connects to a router, as all of rmw_zenoh do; where none runs, it can be the router itself.
 
+Theory of operation. What comes waits in rings of zenoh's own, one a topic and one a service, of which the oldest go;
+no code of Python runs for a message that nobody takes, so a flood costs this program a look at each ring and no more.
+zenoh lets a thread wait for one ring alone; so `take` looks at all of them, each `LOOK_S`.
+
+Invariant: `take` returns at most a ring of each topic, however fast messages come.
+
 Source: ros2/rmw_zenoh, docs/design.md and liveliness_utils; tokens were compared with those of PyZeROS 0.1, and read by
 zenoh-ros2-sdk 0.1.8. A stock rmw_zenoh has not been tried.
 """
@@ -13,16 +19,17 @@ zenoh-ros2-sdk 0.1.8. A stock rmw_zenoh has not been tried.
 import contextlib
 import json
 import os
-import queue
 import struct
+import threading
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, TypeAlias
 
 from p2os.errors import MissingDependencyError, RemoteProtocolError, TransportError
 from p2os.ros.codec import Message, from_cdr, to_cdr
 from p2os.ros.message_table import SERVICES, dds_name, message_type
-from p2os.ros.transport import NodeOptions, Received, Topic
+from p2os.ros.transport import DEPTH, NodeOptions, Received, Topic
 
 if TYPE_CHECKING:
     import zenoh
@@ -34,8 +41,8 @@ NODE, PUBLISHER, SUBSCRIBER, SERVICE = "NN", "MP", "MS", "SS"
 SLASH = "%"
 GID_BYTES = 16
 ATTACHMENT = struct.Struct(f"<qqB{GID_BYTES}s")
-#: chosen: more than any burst; the oldest go first.
-MOST_WAITING = 1000
+#: chosen: how long a message waits at most for a look; a robot takes a command each 100 ms.
+LOOK_S = 0.005
 #: chosen: a router of this machine answers at once.
 CONNECT_MS = 2000
 
@@ -68,8 +75,9 @@ class ZenohNode:
         self._clock = clock
         self.damaged = 0
         self._publishers: dict[Topic, _Publisher] = {}
-        self._subscribers: list[object] = []
-        self._arrived: queue.Queue[_Arrived | None] = queue.Queue(MOST_WAITING)
+        self._subscribers: dict[Topic, zenoh.Subscriber[zenoh.Handler[zenoh.Sample]]] = {}
+        self._services: dict[Topic, zenoh.Queryable[zenoh.Handler[zenoh.Query]]] = {}
+        self._woken = threading.Event()
         self._numbers = 0
         self._tokens = [self._session.liveliness().declare_token(self._token(NODE, None))]
 
@@ -97,40 +105,35 @@ class ZenohNode:
 
     def subscribe(self, topic: Topic) -> None:
         """Have messages of a topic returned by `take`."""
+        from zenoh.handlers import RingChannel
 
-        def arrived(sample: "zenoh.Sample") -> None:
-            self._put((topic, topic.type, sample.payload.to_bytes(), None))
-
-        self._subscribers.append(self._session.declare_subscriber(key_of(self._options.domain, topic), arrived))
+        key = key_of(self._options.domain, topic)
+        self._subscribers[topic] = self._session.declare_subscriber(key, RingChannel(topic.depth))
         self._tokens.append(self._session.liveliness().declare_token(self._token(SUBSCRIBER, topic)))
 
     def serve(self, service: Topic) -> bool:
         """Have the calls of a service returned by `take`."""
-
-        def called(query: "zenoh.Query") -> None:
-            data = b"" if query.payload is None else query.payload.to_bytes()
-            self._put((service, f"{service.type}_Request", data, lambda message: self._reply(service, query, message)))
+        from zenoh.handlers import RingChannel
 
         key = key_of(self._options.domain, service)
-        self._subscribers.append(self._session.declare_queryable(key, called, complete=True))
+        self._services[service] = self._session.declare_queryable(key, RingChannel(DEPTH), complete=True)
         self._tokens.append(self._session.liveliness().declare_token(self._token(SERVICE, service)))
         return True
 
     def take(self, timeout_s: float) -> Sequence[Received]:
         """Return what came; wait at most so long."""
-        found: list[Received] = []
-        try:
-            item = self._arrived.get(timeout=max(0.0, timeout_s))
-            while True:
-                if item is not None:
-                    self._decode(*item, found)
-                item = self._arrived.get_nowait()
-        except queue.Empty:
-            return found
+        ends = time.monotonic() + timeout_s
+        while True:
+            found, woken = self._found(), self._woken.is_set()
+            left_s = ends - time.monotonic()
+            if found or woken or left_s <= 0:
+                self._woken.clear()
+                return found
+            self._woken.wait(min(LOOK_S, left_s))
 
     def wake(self) -> None:
         """Let `take` return at once."""
-        self._put(None)
+        self._woken.set()
 
     def close(self) -> None:
         """End the session."""
@@ -138,9 +141,27 @@ class ZenohNode:
         if not self._session.is_closed():
             self._session.close()  # type: ignore[no-untyped-call]  # zenoh's own
 
-    def _decode(self, topic: Topic, kind: str, data: bytes, reply: "_Reply", found: list[Received]) -> None:
+    def _found(self) -> list[Received]:
+        """Return what waits in the rings; as many as each holds, for more may come meanwhile."""
+        found: list[Received] = []
+        for topic, subscriber in self._subscribers.items():
+            for _ in range(topic.depth):
+                if (sample := subscriber.handler.try_recv()) is None:
+                    break
+                self._decode(topic, topic.type, sample.payload, None, found)
+        for service, queryable in self._services.items():
+            for _ in range(DEPTH):
+                if (query := queryable.handler.try_recv()) is None:
+                    break
+                reply = partial(self._reply, service, query)
+                self._decode(service, f"{service.type}_Request", query.payload, reply, found)
+        return found
+
+    def _decode(
+        self, topic: Topic, kind: str, data: "zenoh.ZBytes | None", reply: "_Reply", found: list[Received]
+    ) -> None:
         try:
-            found.append(Received(topic, from_cdr(kind, data), reply))
+            found.append(Received(topic, from_cdr(kind, b"" if data is None else data.to_bytes()), reply))
         except RemoteProtocolError:
             self.damaged += 1
 
@@ -158,20 +179,6 @@ class ZenohNode:
                 attachment=ATTACHMENT.pack(number, self._clock(), GID_BYTES, name),
             )  # fmt: skip
 
-    def _put(self, item: "_Arrived | None") -> None:
-        while True:
-            try:
-                self._arrived.put_nowait(item)
-            except queue.Full:
-                if item is None:  # whoever takes has enough to wake for
-                    return
-                try:
-                    self._arrived.get_nowait()
-                except queue.Empty:
-                    continue
-            else:
-                return
-
     def _token(self, kind: str, topic: Topic | None) -> str:
         session = str(self._session.info.zid())
         token = token_of(self._options, session, kind, self._numbers, topic)
@@ -180,8 +187,6 @@ class ZenohNode:
 
 
 _Reply: TypeAlias = Callable[[Message], None] | None
-#: Topic, type, bytes, and how it is answered.
-_Arrived: TypeAlias = tuple[Topic, str, bytes, _Reply]
 
 
 class _Publisher:

@@ -8,6 +8,7 @@ The BluePill here changes its motor values every few seconds, and asks anew when
 import random
 from dataclasses import dataclass, field
 
+from adapter_sim.pins import released_codes
 from p2os.errors import RemoteProtocolError
 from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.controller import ControllerSettings, Pioneer, SonarPerSip
@@ -17,7 +18,7 @@ from p2os.protocol.frames import Decoder, Frame
 from p2os.robots.parameters import load_parameters
 from robot_bench.adapter import FirmwareAdapter
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
-from tests.adapter_sim.conftest import Rig
+from tests.adapter_sim.conftest import PINOUT, Rig
 
 MS = NS_PER_MS
 #: Start bit, eight of data, stop bit.
@@ -91,7 +92,7 @@ class HardConditions:
             receive(data, now)
 
         self.robot.receive = note
-        self.codes = dict.fromkeys(ENCODERS, 0)
+        self.codes = dict(zip(ENCODERS, released_codes(PINOUT), strict=True))
         self.counts = {"unplugged": 0, "reboots": 0, "sessions": 0, "losses": 0, "code_steps": 0, "forged": 0}
         #: The longest that the robot held a wrong speed: received all along, and while a damaged count hid what came.
         self.longest_wrong_ns = self.longest_hidden_ns = 0

@@ -11,6 +11,9 @@ from adapter_sim import Adapter, AdapterSettings, EncoderAtOpen, parse_pinout
 from p2os.protocol.sip import SonarReading, StandardSip
 from tests.adapter_sim.conftest import MS, PARAMETERS, PINOUT, FakePins, FakeRobot, Rig, four_bits
 
+#: The count of the right wheel at which a new adapter begins: the code that its wires show before, by their pulls.
+RIGHT_BEGINS = 4
+
 
 def names(rig: Rig, since: int = 0) -> list[str]:
     return [name for _, name, _ in rig.sent(since)]
@@ -183,24 +186,36 @@ def test_encoders_follow_the_wheels_one_code_at_a_time(driving: Rig) -> None:
     jumps = {(after - before) % 8 for before, after in pairwise(codes)}
     assert jumps == {0, 1}
     # 1100 counts of 0.84 mm are 14.26 steps of 64.8 mm.
-    assert driving.adapter.status.counts == (14, 14)
+    assert driving.adapter.status.counts == (14, RIGHT_BEGINS + 14)
     assert codes[-1] == 14 % 8
 
 
-@pytest.mark.parametrize(("at_open", "code"), [(EncoderAtOpen.ZERO, 0), (EncoderAtOpen.CONTINUE, 3)])
-def test_encoders_hold_while_lost_and_begin_as_set(at_open: EncoderAtOpen, code: int) -> None:
+@pytest.mark.parametrize(("at_open", "held", "code"), [(EncoderAtOpen.ZERO, 3, 0), (EncoderAtOpen.CONTINUE, 7, 7)])
+def test_encoders_hold_while_lost_and_begin_as_set(at_open: EncoderAtOpen, held: int, code: int) -> None:
     rig = Rig(AdapterSettings(threshold_um=600_000, encoder_at_open=at_open))
     rig.connect()
-    rig.robot.sip = replace(rig.robot.sip, raw_x=-380 & 0x7FFF)  # −4.93 steps: count −5, code 3
+    rig.robot.sip = replace(rig.robot.sip, raw_x=-380 & 0x7FFF)  # −4.93 steps: 5 less than 0, or than 4
     rig.ms(400)
-    assert rig.pins.code("encoder2") == 3
+    assert rig.pins.code("encoder2") == held
     rig.pins.set("p2dx_con", False, rig.now)
     rig.ms(300)
-    assert rig.pins.code("encoder2") == 3
+    assert rig.pins.code("encoder2") == held
     rig.pins.set("p2dx_con", True, rig.now)
     rig.ms(1_500)
     assert rig.adapter.state == "driving"
     assert rig.pins.code("encoder2") == code
+
+
+@pytest.mark.parametrize("code", range(8))
+def test_no_encoder_jumps_as_a_new_adapter_begins_to_drive_its_wires(code: int) -> None:
+    idle = {f"encoder{side}_s{bit + 1}": bool(code >> bit & 1) for side in (1, 2) for bit in range(3)}
+    wires = tuple(replace(wire, idle=idle.get(wire.name, wire.idle)) for wire in PINOUT.wires)
+    pins = FakePins()
+    adapter = Adapter(pins=pins, pinout=replace(PINOUT, wires=wires), parameters=PARAMETERS)
+    adapter.advance_to(300 * MS)
+    assert adapter.state == "idle"
+    assert {name: pins.outputs[name] for name in idle} == idle
+    assert adapter.status.counts == adapter.status.counts_shown == (code, code)
 
 
 def test_a_robot_that_ignores_seto_is_driven_from_where_it_is() -> None:
@@ -213,14 +228,14 @@ def test_a_robot_that_ignores_seto_is_driven_from_where_it_is() -> None:
     assert rig.adapter.state == "settling"
     rig.ms(500)
     assert rig.adapter.state == "driving"
-    assert rig.adapter.status.counts == (0, 0)
+    assert rig.adapter.status.counts == (0, RIGHT_BEGINS)
 
 
 def test_an_odometry_jump_is_reported_and_is_no_travel(driving: Rig) -> None:
     driving.robot.sip = replace(driving.robot.sip, raw_x=9_000)
     driving.ms(150)
     assert driving.events[-1][1] == "odometry jumped"
-    assert driving.adapter.status.counts == (0, 0)
+    assert driving.adapter.status.counts == (0, RIGHT_BEGINS)
     assert driving.adapter.status.odometry_jumps == 1
 
 

@@ -52,6 +52,9 @@ Adapter::Adapter(const Settings& settings, const RobotNumbers& robot, const Wire
       next_sample_(now),
       deadline_(now) {
   client_.set_listener(this);
+  // Of a wheel that nobody knows of the code that its wires show already: a jump would be counted as travel.
+  const std::int64_t steps = std::int64_t{1} << wires_.encoder_width;
+  stand_at(encoders_.travel_nm_at({wires_.released_codes % steps, wires_.released_codes / steps}));
   clear();
   agenda_.boot_at = now + settings_.boot_ns;
   replan();
@@ -127,8 +130,10 @@ void Adapter::skip_to(const char* reason, Nanos now) {
   replan();
 }
 
-void Adapter::place_wheels(Wheels phases_um) {
-  encoders_.begin({phases_um.left * 1'000, phases_um.right * 1'000});
+void Adapter::place_wheels(Wheels phases_um) { stand_at({phases_um.left * 1'000, phases_um.right * 1'000}); }
+
+void Adapter::stand_at(Wheels travel_nm) {
+  encoders_.begin(travel_nm);
   left_walk_.stand_at(encoders_.counts().left);
   right_walk_.stand_at(encoders_.counts().right);
 }

@@ -149,6 +149,7 @@ class Adapter final : private p2os::ClientListener {
   void clear();
   void follow_reset(Nanos now);
   void boot(Nanos now);
+  void stand_at(Wheels travel_nm);
   void begin_session(Nanos now, const char* why);
   void drive(Nanos now);
   void lose(What what, const char* why, Nanos now);

@@ -126,6 +126,12 @@ Wheels Encoders::travel_nm() const {
   return {offset_nm_.left + forward_nm - rim_nm, offset_nm_.right + forward_nm + rim_nm};
 }
 
+Wheels Encoders::travel_nm_at(Wheels counts) const {
+  const std::int64_t step = std::int64_t{1'000} << width_;
+  return {-divide_floor(-counts.left * per_turn_nm_, step) * 1'000,
+          -divide_floor(-counts.right * per_turn_nm_, step) * 1'000};
+}
+
 Wheels Encoders::phases_um() const {
   const Wheels travel = travel_nm();
   return {remainder_floor(travel.left, per_turn_nm_) / 1'000, remainder_floor(travel.right, per_turn_nm_) / 1'000};

@@ -45,6 +45,9 @@ class Encoders {
   // Returns how far both rims have rolled, in nm, + forward.
   Wheels travel_nm() const;
 
+  // Returns how far both rims have rolled where these steps begin, in nm; whole um, for what is kept has no finer.
+  Wheels travel_nm_at(Wheels counts) const;
+
   // Returns where both wheels stand within their turn, in um of the rim.
   Wheels phases_um() const;
 

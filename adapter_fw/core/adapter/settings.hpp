@@ -39,7 +39,7 @@ struct RobotNumbers {
   std::int64_t half_sonar_range_um = 2'500'000;
 };
 
-//: The wires' widths and safe levels; from adapter_sim/pinout.toml.
+//: The wires' widths and levels; from adapter_sim/pinout.toml.
 struct WireNumbers {
   std::int32_t distances = 8;
   std::int32_t motor1_width = 3;
@@ -48,6 +48,8 @@ struct WireNumbers {
   //: Distance wires that are driven to a level when nothing is known, and that level (bit 0 is DD1).
   std::uint32_t safe_mask = 0xFF;
   std::uint32_t safe_levels = 0xFF;
+  //: What the encoders' wires show while nobody drives them, the left one's code in the low bits.
+  std::uint32_t released_codes = 0x20;
 };
 
 struct Settings {

@@ -30,15 +30,16 @@ std::uint32_t check_of(const RetainedWheels& memory) {
 
 void CodeKeeper::restore(adapter::Adapter& part) {
   std::int64_t both = 0;
+  adapter::Wheels kept{-1, -1};
   if (memory_.check == check_of(memory_) && is_phase(memory_.left_um) && is_phase(memory_.right_um)) {
-    last_ = {memory_.left_um, memory_.right_um};
+    kept = {memory_.left_um, memory_.right_um};
   } else if (store_.load(NAME, both) && both >= 0) {
-    last_ = {both >> HALF_BITS, both % (std::int64_t{1} << HALF_BITS)};
+    kept = {both >> HALF_BITS, both % (std::int64_t{1} << HALF_BITS)};
   }
-  if (!is_phase(last_.left) || !is_phase(last_.right)) {
-    last_ = {};
+  if (is_phase(kept.left) && is_phase(kept.right)) {
+    part.place_wheels(kept);
   }
-  part.place_wheels(last_);
+  last_ = part.wheel_phases_um();
   remember(last_);
 }
 

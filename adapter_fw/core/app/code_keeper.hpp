@@ -3,7 +3,7 @@
 //     what happened                           from              the codes go on
 //     restart, watchdog, panic, brown-out     memory            where they were
 //     rst (EN) low, power cut                 store             where the wheels last stood for STANDS_NS
-//     neither is sound (a first start)        -                 at 0
+//     neither is sound (a first start)        -                 the code that its wires show before
 //
 // EN powers an ESP32 down, its RTC memory included, so that only flash is left. Flash wears, and writing it halts
 // the program for milliseconds: it is written at a standstill only. What the wheels turn

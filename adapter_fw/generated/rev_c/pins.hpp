@@ -25,6 +25,6 @@ constexpr std::int8_t SHIFT_DATA = 23;
 constexpr std::int8_t SHIFT_CLOCK = 18;
 constexpr std::int8_t SHIFT_LATCH = 19;
 constexpr std::int8_t SHIFT_ENABLE = 13;
-constexpr adapter::WireNumbers WIRES = {8, 3, 3, 3, 0xFF, 0xFF};
+constexpr adapter::WireNumbers WIRES = {8, 3, 3, 3, 0xFF, 0xFF, 0x20};
 
 }  // namespace board

@@ -36,6 +36,7 @@ from p2os.client.notices import (
     words_of,
 )
 from p2os.pioneer.devices.laser import read_laser
+from p2os.protocol.times import CYCLE_NS
 from p2os.robots.parameters import load_parameters
 from p2os.ros.codec import Message
 from p2os.ros.frames import Frames
@@ -72,8 +73,8 @@ Examples:
 DEADMAN_NS: Nanos = 500 * NS_PER_MS
 #: chosen: how often health is told, as ROS' own nodes do.
 HEALTH_NS: Nanos = 1 * NS_PER_S
-#: chosen: at the latest the loop looks whether all is over.
-LOOK_S = 0.1
+#: chosen: how long a wait for the network holds a signal off at most, before STOP leaves.
+LOOK_S = 0.02
 #: chosen: a message that a publisher repeats 20 times a second is complained of once.
 COMPLAINT_NS: Nanos = 1 * NS_PER_S
 #: What is told on stderr.
@@ -143,7 +144,7 @@ def ros(
             fitted = (0, 0) if config is None else (config.frontbumps, config.rearbumps)
             robot_node = RobotNode(
                 client.parameters, options, deadman_ns=deadman_ns, bumpers_fitted=fitted, motor_step_mps=motor_step,
-                laser=scanner,
+                laser=scanner, cycle_ns=(0 if config is None else config.sipcycle * NS_PER_MS) or CYCLE_NS,
             )  # fmt: skip
             where = f"domain {domain}, {interface}"
             typer.echo(f"/{name} on {transport}, {where}: {client.parameters.title} on {url}; Ctrl-C ends")
@@ -189,7 +190,7 @@ class NodeLoop:
         self.counts = {"commands": 0, "refused": 0}
 
     def run(self, is_over: Callable[[], bool]) -> None:
-        """Go on until `is_over` says so; it is asked ten times a second or more often."""
+        """Go on until `is_over` says so; it is asked each `LOOK_S` or more often."""
         with postponed():
             for topic in self._node.commands:
                 self._network.subscribe(topic)

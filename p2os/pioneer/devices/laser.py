@@ -25,6 +25,8 @@ READINGS_PER_PACKET = 32
 MOST_READINGS = 1081
 #: A range has 16 bits, mm.
 FARTHEST_M = 65.535
+#: chosen, as the driver of SICK's LMS1xx has it: what is nearer is no thing, for ROS.
+NEAREST_M = 0.01
 #: SIM_LRF_ENABLE: what 2 asks for.
 EXTENDED = 2
 #: What a surface without a reflector gives.
@@ -33,7 +35,7 @@ PLAIN_REFLECTANCE = 1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LaserModel:
-    """A laser's field, degrees from straight ahead, the right end first, and its longest range.
+    """A laser's field, degrees from straight ahead, the right end first, and its ranges.
 
     Raises:
         UsageError: The field, the angle between readings or the range cannot be.
@@ -44,6 +46,8 @@ class LaserModel:
     #: Angle between readings.
     step_cdeg: int
     range_m: float
+    #: What is nearer a real one does not see; the simulated one sees it, and a program is told by the laser's sheet.
+    nearest_m: float = NEAREST_M
 
     def __post_init__(self) -> None:
         if not -180 <= self.start_deg < self.end_deg <= 180:
@@ -61,12 +65,13 @@ class LaserModel:
 
 
 HINT = "--laser lms2xx, or field, angle between readings and range: --laser 180deg,1deg,8m"
-#: Models by ARIA's names, as AMRISim has them.
+#: Models by ARIA's names, as AMRISim has them. The nearest ranges are those of ROS' drivers of the same lasers (LMS1xx,
+#: cob_sick_s300, sick_tim); that of the LMS-200 is chosen.
 LASERS: Mapping[str, LaserModel] = {
     "lms2xx": LaserModel(start_deg=-90, end_deg=90, step_cdeg=100, range_m=32.767),
     "lms1XX": LaserModel(start_deg=-135, end_deg=135, step_cdeg=100, range_m=20.0),
-    "s3series": LaserModel(start_deg=-135, end_deg=135, step_cdeg=50, range_m=30.0),
-    "tim510": LaserModel(start_deg=-135, end_deg=135, step_cdeg=300, range_m=4.0),
+    "s3series": LaserModel(start_deg=-135, end_deg=135, step_cdeg=50, range_m=30.0, nearest_m=0.001),
+    "tim510": LaserModel(start_deg=-135, end_deg=135, step_cdeg=300, range_m=4.0, nearest_m=0.05),
 }
 
 

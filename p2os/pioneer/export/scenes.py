@@ -35,8 +35,7 @@ from p2os.pioneer.world.model import LONGEST_NAME, Kind, Obstacle, World
 from p2os.robots.parameters import RobotParameters
 
 WORLD = "world"
-#: Parts of a robot, behind its name.
-PARTS = ("", " left wheel", " right wheel", " caster")
+CASTER = "caster"
 #: chosen: colours of the robot.
 HULL_COLOUR, WHEEL_COLOUR = (0.75, 0.1, 0.1), (0.12, 0.12, 0.12)
 
@@ -66,7 +65,10 @@ def scene_of(world: World | None, robot: RobotParameters | None) -> Scene:
         start = Place() if world is None else _start(world)
         bodies += (body if world is None else replace(body, kind=ROBOT) for body in _robot_bodies(robot, start))
         fitted = robot.sonar[: robot.sonar_fitted]
-        holds |= {Property.WHEEL: 2, Property.TORQUE: 2, Property.SONAR: len(fitted), Property.CONE: len(fitted)}
+        wheels = len(robot.wheel_places)
+        holds |= {
+            Property.WHEEL: wheels, Property.TORQUE: wheels, Property.SONAR: len(fitted), Property.CONE: len(fitted),
+        }  # fmt: skip
     holds |= {
         Property.BOX: sum(isinstance(body.shape, Box) for body in bodies),
         Property.ROUND: sum(isinstance(body.shape, Cylinder | Sphere) for body in bodies),
@@ -89,7 +91,7 @@ class _Names:
     """Names that every format takes: some text, no `::`, no `__`, none that a format or the robot has taken."""
 
     def __init__(self, robot: RobotParameters | None) -> None:
-        self._taken = {WORLD, GROUND, *(robot.subclass + part for part in PARTS if robot is not None)}
+        self._taken = {WORLD, GROUND, *(() if robot is None else part_names(robot))}
         self.changed = 0
 
     def take(self, wanted: str) -> str:
@@ -147,6 +149,12 @@ def _thing(item: Obstacle, name: str) -> Body:
     )
 
 
+def part_names(robot: RobotParameters) -> dict[str, str]:
+    """Return the body of each part of a robot: its name in a scene, and what it is; the hull is ""."""
+    parts = ["", *(wheel.name for wheel in robot.wheel_places), *([CASTER] if robot.has_caster else [])]
+    return {f"{robot.subclass} {part}".strip(): part for part in parts}
+
+
 def _robot_bodies(robot: RobotParameters, start: Place) -> Iterable[Body]:
     """Yield the hull in the robot frame (middle of the axle, on the floor), and what hangs on it."""
     own, chassis, name = robot.body, Chassis.of(robot), robot.subclass
@@ -159,25 +167,29 @@ def _robot_bodies(robot: RobotParameters, start: Place) -> Iterable[Body]:
         )
         for number, pose in enumerate(robot.sonar[: robot.sonar_fitted])
     )  # fmt: skip
-    base, left, right, caster = (name + part for part in PARTS)
+    places = robot.wheel_places
+    # The engines' chassis rolls on two wheels and a caster, whatever the robot has.
+    hull_kg = own.mass_kg - len(places) * own.wheel_mass_kg - (CASTER_MASS_KG if robot.has_caster else 0.0)
     yield Body(
-        name=base, place=start, shape=hull, at=Place(chassis.centre[0], 0.0, chassis.middle_m), friction=HULL_FRICTION,
-        colour=HULL_COLOUR, motion=Motion.FREE, mass_kg=chassis.mass_kg, centre=chassis.centre,
-        inertia=_inertia(hull, chassis.mass_kg), marks=tuple(sonars),
+        name=name, place=start, shape=hull, at=Place(chassis.centre[0], 0.0, chassis.middle_m), friction=HULL_FRICTION,
+        colour=HULL_COLOUR, motion=Motion.FREE, mass_kg=hull_kg, centre=chassis.centre,
+        inertia=_inertia(hull, hull_kg), marks=tuple(sonars),
     )  # fmt: skip
-    radius, half_track = own.wheel_diameter_m / 2, robot.track_mm / 2000
+    radius = own.wheel_diameter_m / 2
     tyre = Cylinder(radius, own.wheel_width_m)
     along, about, _ = _inertia(tyre, own.wheel_mass_kg)[2], *_inertia(tyre, own.wheel_mass_kg)[:2]
-    for wheel, y in ((left, half_track), (right, -half_track)):
+    for wheel in places:
         yield Body(
-            name=wheel, parent=base, motion=Motion.WHEEL, place=Place(0.0, y, radius), shape=tyre,
-            at=Place(roll_rad=math.pi / 2), friction=WHEEL_FRICTION, colour=WHEEL_COLOUR, mass_kg=own.wheel_mass_kg,
-            inertia=(about, along, about), torque_nm=own.motor_torque_nm,
+            name=f"{name} {wheel.name}", parent=name, motion=Motion.WHEEL, place=Place(wheel.x_m, wheel.y_m, radius),
+            shape=tyre, at=Place(roll_rad=math.pi / 2), friction=WHEEL_FRICTION, colour=WHEEL_COLOUR,
+            mass_kg=own.wheel_mass_kg, inertia=(about, along, about), torque_nm=own.motor_torque_nm,
         )  # fmt: skip
+    if not robot.has_caster:
+        return
     ball = Sphere(own.caster_radius_m)
     yield Body(
-        name=caster, parent=base, place=Place(own.caster_x_m, 0.0, own.caster_radius_m), shape=ball, friction=0.0,
-        colour=WHEEL_COLOUR, mass_kg=CASTER_MASS_KG, inertia=_inertia(ball, CASTER_MASS_KG),
+        name=f"{name} {CASTER}", parent=name, place=Place(own.caster_x_m, 0.0, own.caster_radius_m), shape=ball,
+        friction=0.0, colour=WHEEL_COLOUR, mass_kg=CASTER_MASS_KG, inertia=_inertia(ball, CASTER_MASS_KG),
     )  # fmt: skip
 
 

@@ -99,6 +99,39 @@ def test_motors_are_switched_on_by_the_first_motion_and_not_by_a_stop() -> None:
     assert rig.commands().count(enable(True)) == 3
 
 
+@pytest.mark.parametrize("values", [(True,), (False,), (True, False)])
+def test_a_flood_of_enables_holds_no_stop_off(values: tuple[bool, ...]) -> None:
+    rig = Rig().connect()
+    rig.core.set_velocity(0.2, 0.0, rig.now)
+    rig.living(0.5)
+    before = len(rig.sent)
+    for place in range(500):
+        rig.core.enable(values[place % len(values)], rig.now)
+        rig.run(0.001)
+    sent = [command for command in rig.commands(before) if command.number == CommandNumber.ENABLE]
+    assert sent[-1] == enable(values[499 % len(values)])
+    if len(values) == 1:
+        assert len(sent) <= 8, "each 200 ms one that was asked for, and one for what may be lost"
+    rig.core.stop(rig.now)
+    stopped = rig.now
+    rig.run(0.1)
+    assert rig.sent[-1][0] > stopped
+    assert next(at for at, command in rig.sent if command == stop() and at >= stopped) - stopped <= 20 * MS
+
+
+def test_the_same_enable_is_sent_again_after_200_ms_and_another_at_once() -> None:
+    rig = Rig().connect()
+    begun = rig.now
+    for at_ms, on in ((0, False), (199, False), (200, False), (210, True), (220, False)):
+        rig.run((begun + at_ms * MS - rig.now) / S)
+        rig.core.enable(on, rig.now)
+    rig.run(0.05)
+    sent = [(at - begun, command) for at, command in of(rig, CommandNumber.ENABLE) if at >= begun]
+    assert [command for _, command in sent] == [enable(False), enable(False), enable(True), enable(False)]
+    for (at, _), asked_ms in zip(sent, (0, 200, 210, 220), strict=True):
+        assert asked_ms * MS <= at <= (asked_ms + 5) * MS, "5 ms after the frame before it"
+
+
 def test_without_leave_the_motors_stay_off_and_it_is_said_why() -> None:
     rig = Rig(settings=ClientSettings(auto_enable=False)).connect()
     with pytest.raises(MotorsDisabledError, match="motors are disabled: they are after every OPEN"):

@@ -19,7 +19,7 @@ from p2os.ros.robot_messages import Scans
 from p2os.ros.robot_node import RobotNode
 from p2os.ros.transport import Received
 from p2os.transport.virtual_clock import VirtualClock
-from simbase.timing import NS_PER_S
+from simbase.timing import NS_PER_MS, NS_PER_S
 from tests.p2os.ros.test_node_loop import OPTIONS, Network
 
 P2DX = load_parameters("p2dx")
@@ -40,12 +40,12 @@ def packets(cuts: list[int], ranges_mm: list[int]) -> list[SimLaserPacket]:
 def test_a_sweep_is_a_scan_with_its_last_packet_and_one_with_a_gap_is_none(
     cuts: list[int], data: st.DataObject
 ) -> None:
-    sweep = packets(cuts, list(range(READINGS)))
+    sweep = packets(cuts, list(range(1000, 1000 + READINGS)))
     scans = Scans(LASER, Frames(P2DX))
     *early, last = (scans.take(packet, 5) for packet in sweep)
     assert early == [None] * (len(sweep) - 1)
     assert last is not None
-    assert last["ranges"] == [mm / 1000 for mm in range(READINGS)]
+    assert last["ranges"] == [mm / 1000 for mm in range(1000, 1000 + READINGS)]
     lost = data.draw(st.integers(0, len(sweep) - 1))
     left = [packet for number, packet in enumerate(sweep) if number != lost]
     assert [scans.take(packet, 6) for packet in left] == [None] * len(left)
@@ -58,11 +58,22 @@ def test_a_sweep_of_another_length_is_none() -> None:
     assert scans.take(SimLaserPacket(total=READINGS, first=0, ranges_mm=tuple(range(READINGS + 1))), 0) is None
 
 
-@pytest.mark.parametrize(("mm", "metres"), [(7999, 7.999), (8000, math.inf), (65535, math.inf), (0, 0.0)])
-def test_a_range_is_infinite_from_the_longest_on(mm: int, metres: float) -> None:
+@pytest.mark.parametrize(
+    ("mm", "metres"), [(7999, 7.999), (8000, math.inf), (65535, math.inf), (10, 0.01), (9, -math.inf), (0, -math.inf)]
+)
+def test_a_range_is_infinite_from_the_longest_on_and_below_the_nearest(mm: int, metres: float) -> None:
     scan = Scans(LASER, Frames(P2DX)).take(packets([], [mm] * READINGS)[0], 0)
     assert scan is not None
     assert scan["ranges"] == [metres] * READINGS
+
+
+@pytest.mark.parametrize(("cycle_ns", "seconds"), [(100 * NS_PER_MS, 0.1), (50 * NS_PER_MS, 0.05)])
+def test_a_scan_says_how_near_it_sees_and_how_often_one_comes(cycle_ns: int, seconds: float) -> None:
+    for laser in LASERS.values():
+        scan = Scans(laser, Frames(P2DX), cycle_ns).take(packets([], [1000] * laser.readings)[0], 0)
+        assert scan is not None
+        assert (scan["scan_time"], scan["time_increment"]) == (seconds, 0)
+        assert 0 < scan["range_min"] == laser.nearest_m < scan["range_max"]  # type: ignore[operator]  # a message
 
 
 def test_the_lasers_of_aria_span_their_fields() -> None:

@@ -8,7 +8,7 @@ from xml.etree import ElementTree as ET
 import pytest
 
 from p2os.robots.parameters import known_robots, load_parameters
-from p2os.ros.frames import BASE, JOINTS, WHEELS, Frames
+from p2os.ros.frames import BASE, Frames
 from p2os.ros.urdf import urdf_text
 from tests.tools.each_row import each_row
 
@@ -56,5 +56,5 @@ def test_an_engine_of_others_reads_the_joints_of_the_wheels(tmp_path: Path) -> N
     finally:
         engine.disconnect(client)
     turning = {info[1].decode(): info[12].decode() for info in found if info[2] == engine.JOINT_REVOLUTE}
-    assert turning == dict(zip(JOINTS, WHEELS, strict=True))
+    assert turning == {"left_wheel_joint": "left_wheel", "right_wheel_joint": "right_wheel"}
     assert {info[12].decode() for info in found} >= {f"sonar_{number}" for number in range(8)}

@@ -7,14 +7,16 @@ import struct
 import threading
 import time
 from collections.abc import Callable, Iterator
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from p2os.errors import TransportError
 from p2os.ros.topics import SERVICES, TOPICS
-from p2os.ros.transport import NodeOptions, Topic, Transport
+from p2os.ros.transport import DEPTH, NodeOptions, Topic, Transport
 from p2os.ros.transports import open_transport
+from p2os.ros.zenoh_node import ZenohNode
 
 zenoh = pytest.importorskip("zenoh", reason="the extra ros is not installed")
 LIMIT_S = 15.0
@@ -154,16 +156,46 @@ def test_a_service_is_called_by_its_key_and_answered_with_the_number_of_the_call
     assert (number, name) == (41, bytes(range(16)))
 
 
-def test_of_more_messages_than_wait_the_oldest_go(node: Transport) -> None:
-    from p2os.ros.zenoh_node import MOST_WAITING, ZenohNode
-
+def test_a_look_takes_no_more_than_a_topic_keeps_however_fast_messages_come(node: Transport) -> None:
     assert isinstance(node, ZenohNode)
+    topic, looks = TOPICS["cmd_vel"].topic(NAMES), []
+
+    def more() -> SimpleNamespace:  # for ever
+        looks.append(1)
+        assert len(looks) < 100 * DEPTH, "there is no end"
+        return SimpleNamespace(payload=zenoh.ZBytes(bytes((0, 1, 0, 0)) + struct.pack("<6d", *[len(looks)] * 6)))
+
+    node.subscribe(topic)
+    node._subscribers[topic] = SimpleNamespace(handler=SimpleNamespace(try_recv=more))  # type: ignore[assignment]
+    speeds = [item.message["linear"]["x"] for item in node.take(5.0)]  # type: ignore[index]  # of a message
+    assert speeds == list(range(1, DEPTH + 1))
+
+
+def test_of_more_messages_than_a_topic_keeps_the_newest_are_taken(node: Transport, peer: Any) -> None:
     topic = Topic("/r1/x", "std_msgs/msg/Int32")
-    for value in range(MOST_WAITING + 5):
-        node._put((topic, topic.type, b"\0\1\0\0" + struct.pack("<i", value), None))
-    node.wake()
-    values = [item.message["data"] for item in node.take(0.0)]
-    assert values == list(range(5, MOST_WAITING + 5))
+    node.subscribe(topic)
+    key = f"7/r1/x/std_msgs::msg::dds_::Int32_/{INT_HASH}"
+    found: list[Any] = []
+
+    def send(value: int) -> None:
+        peer.put(key, bytes((0, 1, 0, 0)) + struct.pack("<i", value))
+
+    def heard() -> list[Any]:
+        send(-1)
+        found.extend(node.take(0.05))
+        return found
+
+    assert wait_for(heard)
+    last = Topic("/r1/last", "std_msgs/msg/Int32")
+    node.subscribe(last)
+    for value in range(100 * DEPTH):
+        send(value)
+    assert isinstance(node, ZenohNode)
+    ring, taken = node._subscribers.pop(topic), []  # looked at when all is there
+    assert wait_for(lambda: peer.put(key.replace("/x/", "/last/"), bytes((0, 1, 0, 0)) + bytes(4)) or node.take(0.05))
+    while (sample := ring.handler.try_recv()) is not None:
+        taken.append(struct.unpack("<i", sample.payload.to_bytes()[4:])[0])
+    assert taken == list(range(100 * DEPTH - DEPTH, 100 * DEPTH))
 
 
 def test_a_waiting_node_is_woken_by_another_thread(node: Transport) -> None:

@@ -25,6 +25,7 @@ from adapter_sim.pinout import Direction, load_pinout
 from p2os.pioneer.world.model import Pose
 from p2os.robots.parameters import RobotParameters
 from robot_bench.bench import Bench
+from robot_bench.events.kinds import PinEdge
 from robot_bench.recording.run_record import RunRecord, read_run
 from robot_bench.recording.signals import motor_steps
 from robot_bench.recording.trace import TraceWriter
@@ -165,3 +166,14 @@ def test_a_wheel_that_is_too_far_off_is_seen(tmp_path: Path) -> None:
     still, moving = (recorded(scenario, tmp_path / name, FakeChip(chip)) for name, chip in (("a", []), ("b", script)))
     with pytest.raises(AssertionError, match="allowed"):
         compare(still, moving, scenario.parameters, 0.0)
+
+
+@pytest.mark.parametrize("core", ["model", "firmware"])
+def test_no_encoder_moves_in_mode_adapter_before_the_robot_does(core: str) -> None:
+    bench = Bench(load_scenario("encoders").with_options(mode="adapter", body="kinematic", adapter_core=core))
+    edges: list[PinEdge] = []
+    bench.events.subscribe(edges.append, PinEdge)
+    bench.run_until("3.1 s")  # its program drives after 3 s, and a code of its wheels takes half a second
+    moved = [(edge.t, edge.wire) for edge in edges if edge.wire.startswith("encoder") and edge.t]
+    assert any(edge.t for edge in edges), "others do"
+    assert moved == []
