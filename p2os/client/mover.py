@@ -205,7 +205,7 @@ class Mover:
 
     def enable(self, on: bool, now: Nanos) -> None:
         """Switch the motors."""
-        if not on:
+        if not on and (self._goal is not None or self._may_move):  # a STOP for each of a flood would hold ENABLE off
             self._switched_off("motors off", now)
         if self._motors.ask(on=on, now=now):
             self._observer.firmware.take_motors_asked(on)

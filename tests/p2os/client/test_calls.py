@@ -11,7 +11,7 @@ from p2os.client.calls import GripperAction, Result, RobotCalls
 from p2os.client.core import RobotCore
 from p2os.client.goals import DriveAxis, TurnAxis
 from p2os.errors import LocalProtocolError
-from p2os.protocol.commands import Command, stop
+from p2os.protocol.commands import Command
 from p2os.protocol.commands import CommandNumber as C
 from simbase.errors import UsageError
 from simbase.timing import Nanos
@@ -44,7 +44,7 @@ def said_by(calls: Calls, call: Callable[[Calls], object]) -> list[Command]:
 TABLE: list[tuple[Callable[[Calls], object], list[Command]]] = [
     (lambda robot: robot.stop(), [Command(C.STOP)]),
     (lambda robot: robot.emergency_stop(), [Command(C.E_STOP), Command(C.STOP)]),
-    (lambda robot: robot.disable(), [stop(), Command(C.ENABLE, 0)]),
+    (lambda robot: robot.disable(), [Command(C.ENABLE, 0)]),  # nothing moves: test_mover.py has one that does
     (lambda robot: robot.set_sonar(), [Command(C.SONAR, 1)]),
     (lambda robot: robot.set_sonar(on=False), [Command(C.SONAR, 0)]),
     (lambda robot: robot.set_sonar_order([0, 0, 7]), [Command(C.POLLING, b"\x01\x01\x08")]),
