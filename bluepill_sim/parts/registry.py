@@ -18,7 +18,8 @@ from pathlib import Path
 from typing import Any, Protocol, cast
 
 from bluepill_sim.parts.attached import PartError, Use
-from simbase.errors import shown
+from simbase.errors import FileError, shown
+from simbase.files import read_bytes
 from simbase.user_classes import find_class, is_in_file, said
 
 #: The entry points of others.
@@ -191,9 +192,9 @@ def _converted(value: object, wanted: Any, where: str, folder: Path) -> object:
             return float(cast("float | str", _no_flag(value)))
         if wanted in {Path, bytes}:
             path = folder / str(value)
-            return path if wanted is Path else path.read_bytes()
-    except OSError as error:
-        raise PartError(f"{where}: {error.filename}: {error.strerror or error}") from error
+            return path if wanted is Path else read_bytes(path)
+    except FileError as error:
+        raise PartError(f"{where}: {error}", hint=error.hint) from error
     except (ValueError, KeyError, TypeError) as error:
         name = {bool: "true or false", int: "a whole number", float: "a number"}.get(wanted, "what it is to be")
         raise PartError(f"{where}: {shown(value)} is not {name}") from error

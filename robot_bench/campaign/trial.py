@@ -41,7 +41,7 @@ from robot_bench.scenario.included_files import (
 )
 from robot_bench.scenario.scenario import Scenario, build_scenario, known_scenarios, load_scenario
 from simbase.errors import P2osError
-from simbase.files import writing
+from simbase.files import read_bytes, writing
 from simbase.timing import NS_PER_MS, Nanos
 
 #: A way is kept as a place each so often.
@@ -384,7 +384,7 @@ def _pack_world(table: dict[str, object], scenario: Scenario, folder: Path, file
     if world in known_worlds():
         return
     path = folder / world
-    content = path.read_bytes()
+    content = read_bytes(path)
     if path.suffix.lower() == ".toml" and b"[[import]]" not in content:
         table["world"] = _named(path.name, content, files)
         return
@@ -408,7 +408,7 @@ def _pack_others(table: dict[str, object], folder: Path, files: dict[str, bytes]
 
 
 def _packed(path: Path, files: dict[str, bytes]) -> str:
-    return _named(path.name, path.read_bytes(), files)
+    return _named(path.name, read_bytes(path), files)
 
 
 def _named(name: str, content: bytes, files: dict[str, bytes]) -> str:

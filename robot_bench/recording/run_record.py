@@ -45,6 +45,7 @@ from robot_bench.events.kinds import (
     WorldChange,
 )
 from robot_bench.wires.edges import Edges
+from simbase.files import lines_of
 from simbase.timing import NS_PER_S
 
 TRACE_NAME = "trace.jsonl"
@@ -104,8 +105,7 @@ def read_run(folder: Path) -> RunRecord:
         TraceError: The folder or its trace is missing, or its first line is no trace.
     """
     path = _trace_in(folder)
-    with path.open(encoding="utf-8", errors="replace") as lines:
-        record = record_of(lines, str(path))
+    record = record_of(lines_of(path, TraceError), str(path))
     if not record.meta:
         raise TraceError(f"{path} does not start with a trace's meta line", hint="was it made by `p2os run`?")
     return record
@@ -118,8 +118,7 @@ def read_events(folder: Path) -> Iterator[Event]:
         TraceError: The folder or its trace is missing, or a line is damaged.
     """
     path = _trace_in(folder)
-    with path.open(encoding="utf-8", errors="replace") as lines:
-        yield from events_of(lines, str(path))
+    yield from events_of(lines_of(path, TraceError), str(path))
 
 
 def read_meta(folder: Path) -> Json:
@@ -129,8 +128,7 @@ def read_meta(folder: Path) -> Json:
         TraceError: The folder or its trace is missing, or its first line is damaged.
     """
     path = _trace_in(folder)
-    with path.open(encoding="utf-8", errors="replace") as lines:
-        return record_of(islice(lines, 1), str(path)).meta
+    return record_of(islice(lines_of(path, TraceError), 1), str(path)).meta
 
 
 def _trace_in(folder: Path) -> Path:

@@ -19,7 +19,7 @@ from robot_bench.events.codec import events_of
 from robot_bench.events.kinds import Event
 from robot_bench.recording.divergence import Difference, differences
 from simbase.errors import UsageError
-from simbase.files import writing
+from simbase.files import read_bytes, writing
 from simbase.timing import NS_PER_S
 
 #: The other version, in the campaign's folder, with the name that it had.
@@ -42,13 +42,10 @@ class Other:
         """Return a firmware file, and keep it in a campaign's folder.
 
         Raises:
-            UsageError: There is no such file.
+            UsageError: There is no such file, or it is too large.
             FileError: The folder cannot be written.
         """
-        try:
-            found = cls(path.name, path.read_bytes())
-        except OSError as error:
-            raise UsageError(f"there is no firmware file {path}", hint="give an ELF, HEX or BIN file") from error
+        found = cls(path.name, read_bytes(path, UsageError, hint="give an ELF, HEX or BIN file"))
         with writing(folder, hint="--out another folder"):
             (folder / FOLDER).mkdir(parents=True, exist_ok=True)
             (folder / FOLDER / path.name).write_bytes(found.content)
@@ -58,7 +55,7 @@ class Other:
     def of(cls, folder: Path) -> "Other | None":
         """Return the version that a campaign's folder was begun against; None where there is none."""
         files = sorted((folder / FOLDER).glob("*")) if (folder / FOLDER).is_dir() else []
-        return cls(files[0].name, files[0].read_bytes()) if files else None
+        return cls(files[0].name, read_bytes(files[0])) if files else None
 
 
 class Against:
