@@ -16,6 +16,7 @@ from p2os.cli.quantities import option
 from p2os.transport.wall_clock import wall_clock
 from robot_bench.campaign.campaign_file import Campaign, campaign_schema
 from robot_bench.campaign.conduct import Finding, Progress, Workers
+from robot_bench.campaign.journal import NAME as JOURNAL
 from robot_bench.campaign.results import Whole
 from robot_bench.campaign.search import SEARCHES
 from robot_bench.campaign.suggestion import suggested
@@ -179,6 +180,8 @@ def shown(found: Campaign) -> Iterator[Callable[[Progress], None]]:
 
 def tell(done: Whole, other: Other | None, *, json_output: bool) -> None:
     """Print what came of a campaign, and end the command with its exit code."""
+    for words in done.progress.left_out_words():
+        typer.echo(f"{done.folder / JOURNAL}: {words}; left out, what it told was run again", err=True)
     parts = {} if other is None or done.was_interrupted else parted(done, other)
     if json_output:
         typer.echo(json.dumps(done.as_json() | ({"parted": parts} if parts else {}), sort_keys=True))
