@@ -8,14 +8,19 @@ Invariant: no reader here holds more of a file than its bound and one block.
 """
 
 import codecs
+import errno
+import io
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from hashlib import sha256
 from os import fstat
 from pathlib import Path
-from typing import NoReturn
+from typing import TYPE_CHECKING, BinaryIO, NoReturn, TextIO
 
 from simbase.errors import FileError, P2osError, shown_name
+
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer
 
 #: chosen: a world of 100 000 things is below it, and a program with all its debug information; no person writes more.
 LARGEST_FILE_BYTES = 64 << 20
@@ -23,6 +28,9 @@ LARGEST_FILE_BYTES = 64 << 20
 _BLOCK_BYTES = 1 << 20
 #: The first line of a trace has its whole world, and that is the longest that there is.
 LONGEST_LINE = LARGEST_FILE_BYTES
+#: What the system refuses for want of room or of a right, whatever the program: never a bug of it.
+REFUSALS = frozenset({errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO, errno.EROFS, errno.EMFILE, errno.ENFILE})
+MAKE_ROOM = "make room, or name another place"
 _IS_IT = "is this the file that you mean?"
 
 
@@ -38,6 +46,8 @@ def writing(place: object, hint: str | None = None) -> Iterator[None]:
     except OSError as error:
         if hint is None and isinstance(error, (FileNotFoundError, IsADirectoryError, NotADirectoryError)):
             hint = "give a file in a folder that exists"
+        elif hint is None and error.errno in REFUSALS:
+            hint = MAKE_ROOM
         raise FileError(f"cannot write {shown_name(place)}: {reason_of(error)}", hint=hint) from error
 
 
@@ -169,6 +179,39 @@ def lines_of(
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
         why = reason_of(error) if isinstance(error, OSError) else str(error)
         raise error_type(f"cannot read {shown_name(path)}: {why}", hint=hint) from error
+
+
+class _Written(io.FileIO):
+    """A file that is written for long: whatever the system has against a later write names it."""
+
+    def write(self, data: "ReadableBuffer", /) -> int:
+        with writing(self.name, hint=MAKE_ROOM):
+            return super().write(data)
+
+    def close(self) -> None:
+        with writing(self.name, hint=MAKE_ROOM):
+            super().close()
+
+
+def open_to_write(path: Path) -> BinaryIO:
+    """Open a file to be written over a time; each later write, and its end, raise as its opening does.
+
+    Raises:
+        FileError: It cannot be written.
+    """
+    with writing(path):
+        raw = _Written(str(path), "w")
+    return io.BufferedWriter(raw)
+
+
+def open_to_write_text(path: Path, *, newline: str = "\n") -> TextIO:
+    """Open a file of text in UTF-8, as `open_to_write` does."""
+    return io.TextIOWrapper(open_to_write(path), encoding="utf-8", newline=newline)
+
+
+def writing_temporary() -> AbstractContextManager[None]:
+    """Raise, as `writing` does, what the system has against a folder where it keeps what is temporary."""
+    return writing("a temporary folder", hint="make room there, or have TMPDIR name another place")
 
 
 def write_text(path: Path, text: str) -> None:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import BinaryIO, Protocol
 
 from bluepill_sim.errors import BluePillError
-from simbase.files import writing
+from simbase.files import open_to_write
 
 #: Most bytes taken from a pseudo-terminal at one poll. Chosen: more than anybody types.
 _READ_BYTES = 4096
@@ -139,8 +139,7 @@ def open_console(where: str) -> Console:
         return StreamConsole(sys.stdout.buffer, "standard output", is_owner=False)
     if where in PTY:
         return PtyConsole()
-    with writing(where):
-        return StreamConsole(Path(where).open("wb"), where)
+    return StreamConsole(open_to_write(Path(where)), where)
 
 
 def connect(console: Console, port: SerialPort) -> Callable[[], None]:

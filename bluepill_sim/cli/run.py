@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated, Protocol
 
@@ -149,8 +150,9 @@ def run(
             else:
                 run_until(board, until, end_ns, schedule.advance_to)
         finally:
-            for one in opened:
-                one.close()
+            with ExitStack() as closing:  # each, whatever becomes of the others
+                for one in reversed(opened):
+                    closing.callback(one.close)
             if uart == "-" and board.usart1.unread and not board.usart1.unread.endswith(b"\n"):
                 typer.echo("")
     show_parts(board, parts_folder)

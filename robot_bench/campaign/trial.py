@@ -41,7 +41,7 @@ from robot_bench.scenario.included_files import (
 )
 from robot_bench.scenario.scenario import Scenario, build_scenario, known_scenarios, load_scenario
 from simbase.errors import P2osError
-from simbase.files import read_bytes, writing
+from simbase.files import MAKE_ROOM, read_bytes, writing, writing_temporary
 from simbase.timing import NS_PER_MS, Nanos
 
 #: A way is kept as a place each so often.
@@ -422,16 +422,18 @@ def _named(name: str, content: bytes, files: dict[str, bytes]) -> str:
 
 
 def _write_files(files: Mapping[str, bytes], folder: Path) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, content in files.items():
-        (folder / name).write_bytes(content)
+    with writing(folder, hint=MAKE_ROOM):
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, content in files.items():
+            (folder / name).write_bytes(content)
 
 
 class _Folder:
     """A folder that is removed with the object, or at the end of the process that made it."""
 
     def __init__(self) -> None:
-        self.name = tempfile.mkdtemp(prefix="p2os-trial-")
+        with writing_temporary():
+            self.name = tempfile.mkdtemp(prefix="p2os-trial-")
         weakref.finalize(self, _remove, self.name, os.getpid())
 
 

@@ -38,18 +38,23 @@ class Other:
     content: bytes
 
     @classmethod
-    def kept(cls, path: Path, folder: Path) -> "Other":
-        """Return a firmware file, and keep it in a campaign's folder.
+    def read(cls, path: Path) -> "Other":
+        """Return a firmware file.
 
         Raises:
             UsageError: There is no such file, or it is too large.
+        """
+        return cls(path.name, read_bytes(path, UsageError, hint="give an ELF, HEX or BIN file"))
+
+    def keep(self, folder: Path) -> None:
+        """Keep it in a campaign's folder.
+
+        Raises:
             FileError: The folder cannot be written.
         """
-        found = cls(path.name, read_bytes(path, UsageError, hint="give an ELF, HEX or BIN file"))
         with writing(folder, hint="--out another folder"):
             (folder / FOLDER).mkdir(parents=True, exist_ok=True)
-            (folder / FOLDER / path.name).write_bytes(found.content)
-        return found
+            (folder / FOLDER / self.name).write_bytes(self.content)
 
     @classmethod
     def of(cls, folder: Path) -> "Other | None":

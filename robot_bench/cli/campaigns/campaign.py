@@ -107,14 +107,15 @@ def campaign(
         if asked or overrides or firmware or against or out:
             raise UsageError("--resume goes on with what was begun", hint="leave file and options out, but for -j")
         folder, found = go_on, resume(go_on)
+        other = Other.of(folder)
     elif len(asked) == 1:
         file = Path(asked[0])
         folder = out or make_next_folder(file.stem, CAMPAIGNS)
-        found = begin(file, folder, firmware=firmware, overrides=overrides)
+        other = None if against is None else Other.read(against)
+        found = begin(file, folder, firmware=firmware, overrides=overrides, other=other)
     else:
         raise UsageError("which campaign?", hint="p2os campaign FILE, or p2os campaign new SCENARIO")
     with RunDisplay(is_shown=False) as display:
-        other = Other.of(folder) if against is None else Other.kept(against, folder)
         workers = _workers(found, jobs or core_count(), dask, scheduler, display)
         if other is not None:
             workers = Against(workers, other)
