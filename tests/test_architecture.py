@@ -94,7 +94,7 @@ LOGGING = (
 #: The map of ARCHITECTURE.md, lowest first: a package imports none of its own row and none above it.
 LAYERS = {
     "simbase": (
-        ("timing", "state", "installation", "wire", "lazy", "interrupts"), ("errors",),
+        ("timing", "state", "installation", "wire", "lazy", "interrupts", "terminal"), ("errors",),
         ("files", "units", "user_classes", "c_library"),
     ),
     "p2os": (

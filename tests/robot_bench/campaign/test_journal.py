@@ -27,10 +27,15 @@ KEYS = ("cheap:1", "cheap:2", "full:2")
 def written(folder: Path) -> bytes:
     """Write a journal of three lines and return it."""
     kept = Journal(folder)
-    for key in KEYS:
-        kept.add(key, OUTCOME, 0.5)
+    add_all(kept)
     kept.close()
     return (folder / NAME).read_bytes()
+
+
+def add_all(kept: Journal) -> None:
+    """Add an outcome for each key."""
+    for key in KEYS:
+        kept.add(key, OUTCOME, 0.5)
 
 
 def opened(folder: Path, content: bytes) -> Journal:
@@ -132,7 +137,7 @@ def test_a_line_that_the_disk_had_no_room_for_is_told_of_and_taken_off(tmp_path:
         kept = Journal(tmp_path)
         with file_limit(size):
             with pytest.raises(FileError, match=r"cannot write .*: file too large"):
-                _ = [kept.add(key, OUTCOME, 0.5) for key in KEYS]
+                add_all(kept)
             kept.close()
         assert (tmp_path / NAME).stat().st_size <= size
         found = Journal(tmp_path)

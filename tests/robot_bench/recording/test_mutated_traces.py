@@ -63,7 +63,7 @@ EVENTS: tuple[Event, ...] = (
     Verdict(t=30, goal="drives", met=False, says="it did not", robustness=-1.0, unit="m"),
 )  # fmt: skip
 #: What stands in a value's place: each kind of JSON, and the ends of what numbers may be.
-VALUES = (
+VALUES: tuple[object, ...] = (
     None, True, -1, 0, 1, 2, 1.5, 2**31, 2**63, -(2**63), 10**400, float("nan"), float("inf"), "", "x", "zz", "\u202e",
     [], [1], ["x"], [[]], [None], {}, {"a": 1}, {"name": "x"},
 )  # fmt: skip
