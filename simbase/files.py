@@ -15,12 +15,9 @@ from contextlib import AbstractContextManager, contextmanager
 from hashlib import sha256
 from os import fstat
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, NoReturn, TextIO
+from typing import BinaryIO, NoReturn, TextIO
 
 from simbase.errors import FileError, P2osError, shown_name
-
-if TYPE_CHECKING:
-    from _typeshed import ReadableBuffer
 
 #: chosen: a world of 100 000 things is below it, and a program with all its debug information; no person writes more.
 LARGEST_FILE_BYTES = 64 << 20
@@ -184,7 +181,7 @@ def lines_of(
 class _Written(io.FileIO):
     """A file that is written for long: whatever the system has against a later write names it."""
 
-    def write(self, data: "ReadableBuffer", /) -> int:
+    def write(self, data: bytes | memoryview, /) -> int:  # type: ignore[override]  # what BufferedWriter gives it
         with writing(self.name, hint=MAKE_ROOM):
             return super().write(data)
 
@@ -200,7 +197,7 @@ def open_to_write(path: Path) -> BinaryIO:
         FileError: It cannot be written.
     """
     with writing(path):
-        raw = _Written(str(path), "w")
+        raw: io.FileIO = _Written(str(path), "w")
     return io.BufferedWriter(raw)
 
 

@@ -34,7 +34,8 @@ What it sends on USART1 goes to stdout, as text: what would act on a terminal is
 --raw. Time is virtual: a program that sleeps runs much faster than real time. Exit
 code 1: the firmware died of a fault, or the wall clock's budget was used up;
 then the last blocks that it ran are shown. Resets are no failure (a watchdog may be
-what is tried): the last line counts them, by cause.
+what is tried): the last line counts them, by cause. 100 in a row within a millisecond of each other, with no change at
+a pin and no character meanwhile, are: such a program is ended.
 
 \b
 Examples:
