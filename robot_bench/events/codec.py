@@ -105,7 +105,9 @@ def _integer(entry: Json, key: str) -> int:
     value = entry.get(key, 0)
     if type(value) is int and -_MOST <= value <= _MOST:
         return value
-    return _whole(value) if isinstance(value, (int, float)) else 0
+    if not isinstance(value, (int, float)):
+        raise ValueError("no number")  # noqa: TRY004 - a damaged line, as any other
+    return _whole(value)
 
 
 def _whole(value: float) -> int:
