@@ -10,7 +10,7 @@ import pytest
 
 from p2os.errors import WorldError
 from simbase.errors import FileError
-from simbase.files import lines_of, read_bytes, read_text
+from simbase.files import lines_of, open_to_write, open_to_write_text, read_bytes, read_text
 from tests.test_architecture import module_name, sources
 
 READERS: dict[str, Callable[[Path, int], object]] = {
@@ -127,3 +127,45 @@ def test_no_module_reads_a_file_of_a_users_but_within_the_bounds() -> None:
     found = {module_name(path): reads for path in sources() if (reads := _reads(path))}
     assert {name: reads for name, reads in found.items() if name not in READ_ELSEWHERE} == {}
     assert READ_ELSEWHERE.keys() - found.keys() - {"simbase.files"} == set(), "a row that is not needed"
+
+
+#: Where else a file is opened to be written, and who tells of what the system has against it.
+WRITTEN_ELSEWHERE = {
+    "p2os.cli.captures.capture_files": "tells of it itself, and takes back half a piece",
+    "robot_bench.campaign.journal": "each line within `writing`",
+    "robot_bench.cli.campaigns.campaign": "must not be there; tells of it itself",
+    "robot_bench.cli.sweep": "opened only, within `writing`",
+    "robot_bench.project.files": "must not be there; takes back what was written",
+    "robot_bench.recording.waveforms": "whole, within its caller's `writing`",
+    "bluepill_sim.analysis.vcd": "whole, within its caller's `writing`",
+    "bluepill_sim.analysis.sigrok": "an entry of an archive, within its caller's `writing`",
+    "robot_bench.experiments.drive_files": "whole, within `writing`",
+    "robot_bench.campaign.variants.mutation.suite": "nothing is kept of it",
+}
+
+
+def _opens_to_write(path: Path) -> bool:
+    """Tell whether a module opens a file to write it by itself."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "open":
+            modes = [each.value for each in node.args if isinstance(each, ast.Constant) and isinstance(each.value, str)]
+            if any(len(mode) <= len("w+b") and _WRITING & set(mode) for mode in modes):
+                return True
+    return False
+
+
+def test_no_module_opens_a_file_to_write_whose_later_writes_nobody_tells_of() -> None:
+    found = {module_name(path) for path in sources() if _opens_to_write(path)}
+    assert found - WRITTEN_ELSEWHERE.keys() == set()
+    assert WRITTEN_ELSEWHERE.keys() - found == set(), "a row that is not needed"
+
+
+def test_a_file_that_is_written_for_long_tells_of_a_full_disk_whenever_it_meets_it() -> None:
+    file = open_to_write(Path("/dev/full"))
+    with pytest.raises(FileError, match="cannot write /dev/full: no space left on device"):
+        file.write(bytes(1 << 20))
+    file.close()
+    text = open_to_write_text(Path("/dev/full"))
+    text.write("a line\n")
+    with pytest.raises(FileError, match="cannot write /dev/full"):
+        text.close()
