@@ -95,7 +95,7 @@ def test_a_damaged_line_is_named_and_left_out(tmp_path: Path, damage: str, numbe
     assert [found.get(key) is None for key in KEYS] == [place == number - 1 for place in range(3)]
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.data())
 def test_no_changed_byte_is_believed(tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
     folder = tmp_path_factory.getbasetemp()
