@@ -43,12 +43,13 @@ from bluepill_sim.parts.serial_port import Activity, SerialLine, SerialPort
 from bluepill_sim.parts.usb import UsbHost, UsbSerial
 from bluepill_sim.peripherals.can import Can
 from bluepill_sim.peripherals.i2c import I2c
-from bluepill_sim.peripherals.rcc import ResetCause
+from bluepill_sim.peripherals.rcc import OUTSIDE, ResetCause
 from bluepill_sim.peripherals.spi import Spi
 from bluepill_sim.peripherals.usb import Usb
 from bluepill_sim.program.image import Image, load_image
 from bluepill_sim.program.last_blocks import TITLE, shortened
 from bluepill_sim.program.line_table import LineTable, read_lines
+from bluepill_sim.program.reset_loop import ResetRow
 from bluepill_sim.spans import Span, to_nanos
 from bluepill_sim.stm32f103 import FLASH_BASE, SRAM_BASE, SRAM_BYTES
 from simbase.state import PartState, Stateful
@@ -94,7 +95,18 @@ class BluePill(Stateful):
         MissingDependencyError: unicorn, pyelftools or intelhex is not installed.
     """
 
-    STATE = ("chip", "fault", "activity", "_warned", "_usarts", "_usb_serial", "boot0", "resets", "attached")
+    STATE = (
+        "chip",
+        "fault",
+        "activity",
+        "_warned",
+        "_usarts",
+        "_usb_serial",
+        "boot0",
+        "resets",
+        "reset_row",
+        "attached",
+    )
     #: Who listens.
     DERIVED = ("_warning_sinks",)
 
@@ -129,6 +141,8 @@ class BluePill(Stateful):
         usb.attach(self._usb)
         #: How often it was reset since power came up, by cause.
         self.resets: Counter[ResetCause] = Counter()
+        #: Those of them that come one soon after the other, and whether they have no end.
+        self.reset_row = ResetRow()
         chip.on_reset = self._reset_begins
         chip.boot_address = self._boot_address
         chip.pins.is_serial_input = self._is_driven_in_words
@@ -389,8 +403,13 @@ class BluePill(Stateful):
 
     @property
     def has_died(self) -> bool:
-        """Whether the firmware is in its HardFault handler or returns to its fault, is locked up, or was reset then."""
+        """Whether the firmware is in its HardFault handler or returns to its fault, is locked up, or was reset then.
+
+        Or resets for ever, as `ResetRow` has it; it is held in reset then.
+        """
         fault = self.fault
+        if self.reset_row.endless_ns is not None:
+            return True
         return fault is not None and (
             fault.ended_in_reset
             or self.chip.processor.is_locked_up
@@ -399,9 +418,19 @@ class BluePill(Stateful):
         )
 
     @property
+    def died_ns(self) -> Nanos | None:
+        """When the firmware died; None: it has not."""
+        if not self.has_died or self.fault is None:
+            return self.reset_row.endless_ns
+        ends = self.reset_row.endless_ns
+        return self.fault.at_ns if ends is None else min(ends, self.fault.at_ns)
+
+    @property
     def verdict(self) -> str:
         """What became of the firmware, where that is worth a word: faults and resets; empty where it just ran."""
         parts = []
+        if self.reset_row.endless_ns is not None:
+            parts.append(f"firmware fault: {self.reset_row}")
         if self.fault is not None:
             what = "firmware fault" if self.has_died else "the firmware came back from a HardFault"
             parts.append(f"{what}: {self.fault}")
@@ -564,6 +593,20 @@ class BluePill(Stateful):
             ended = self.has_died
             self.fault = replace(self.fault, ended_in_reset=ended, returns=self.fault.returns if ended else 0)
         self.resets[cause] += 1
+        self._count_reset(cause)
+
+    def _count_reset(self, cause: ResetCause) -> None:
+        """Hold a program in reset that resets for ever."""
+        row, now_ns = self.reset_row, self.chip.now_ns
+        if cause in OUTSIDE:
+            row.clear()
+        elif row.endless_ns is None and row.add(now_ns):
+            self.chip.deliver()
+            activity = self.activity
+            if max(activity.last_pin_ns, activity.last_usart_ns) > row.first_ns:
+                row.begin_anew(now_ns)
+            else:
+                row.endless_ns, self.chip.is_held = now_ns, True
 
     def _boot_address(self) -> int:
         """Return where the BOOT pins have a reset start (RM0008 3.4, table 9)."""

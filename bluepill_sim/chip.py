@@ -44,7 +44,7 @@ from bluepill_sim.memory.bus import (
 from bluepill_sim.native.processor import make_core
 from bluepill_sim.native.registers import share_registers
 from bluepill_sim.peripherals.flash import OPTION_BYTES
-from bluepill_sim.peripherals.rcc import ResetCause
+from bluepill_sim.peripherals.rcc import OUTSIDE, ResetCause
 from bluepill_sim.stm32f103 import (
     FLASH_BASE,
     FLASH_BYTES_FITTED,
@@ -87,6 +87,7 @@ class Chip(Stateful):
         "_flash_repairs",
         "_stopped_tick",
         "_stopped_cycle",
+        "is_held",
     )
     DERIVED = ("_flash_access", "_written_code", "_frozen_since", "resets")
 
@@ -118,6 +119,8 @@ class Chip(Stateful):
         #: Called before each reset, for tools.
         self.reset_listeners: list[Callable[[], None]] = []
         self._stop_requested = False
+        #: Whether the core is held in reset until one from outside: its program resets for ever.
+        self.is_held = False
         self._requested_reset: ResetCause | None = None
         self._flash_access = self.clocks.flash_wait_states, self.clocks.flash_prefetch
         self._flash_repairs: list[tuple[int, bytes]] = []
@@ -248,7 +251,8 @@ class Chip(Stateful):
             if self._stop_requested and not engine.is_inside_block:
                 self._stop_requested = False
                 return ChipReached(now, Reason.EDGE)
-            if processor.is_locked_up and now >= limit_ns and not self.parts.has_running_watchdog:
+            is_over = self.is_held or (processor.is_locked_up and not self.parts.has_running_watchdog)
+            if is_over and now >= limit_ns:
                 return ChipReached(now, Reason.HALT)
             if now >= limit_ns and not engine.is_inside_block:
                 return ChipReached(now, Reason.DEADLINE)
@@ -268,6 +272,7 @@ class Chip(Stateful):
     def reset(self, cause: ResetCause) -> None:
         """Reset core and peripherals; time goes on. A power cut clears the SRAM too."""
         self._requested_reset = None
+        self.is_held = self.is_held and cause not in OUTSIDE
         if self.on_reset is not None:
             self.on_reset(cause)
         for listener in self.reset_listeners:
@@ -486,7 +491,7 @@ class Chip(Stateful):
 
     def _core_stands_still(self) -> bool:
         """Tell whether time passes without the core: locked up, in a low-power mode, or while it waits for flash."""
-        if self._frozen_since is not None or self.processor.is_locked_up:
+        if self._frozen_since is not None or self.processor.is_locked_up or self.is_held:
             return True
         if self.low_power.mode is not Mode.RUN and self.low_power.holds():
             return True

@@ -15,7 +15,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from simbase.errors import FileError, shown_name
+from simbase.errors import FileError
+from simbase.files import read_text
 
 _HEADER = re.compile(r"\s*(\[\[?)\s*([^\]]+?)\s*\]\]?\s*(?:#.*)?$")
 _KEY = re.compile(r"\s*([A-Za-z0-9_.\-\"']+)\s*=")
@@ -25,8 +26,6 @@ _QUOTED = re.compile(r"\"([^\"]*)\"|'([^']*)'")
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 #: What can begin or end inside a value: strings, comments, brackets.
 _TOKEN = re.compile(r'"""|\'\'\'|"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\'|#[^\n]*|[\[\]{}]')
-#: chosen: a world of 100 000 things is below it; more is no file that a person wrote.
-LARGEST_FILE_BYTES = 64 * 1024 * 1024
 #: `tomllib` ends its messages so.
 _AT = re.compile(r"^(?P<what>.*) \(at (?:line (?P<line>\d+), column \d+|end of document)\)$", re.DOTALL)
 
@@ -63,15 +62,7 @@ def read_user_text(path: Path, what: str, error_type: type[FileError], *, hint: 
     Raises:
         FileError: One of `error_type`: the file cannot be read, is too large or is no text.
     """
-    try:
-        if path.stat().st_size > LARGEST_FILE_BYTES:
-            raise error_type(f"{shown_name(path)}: larger than {LARGEST_FILE_BYTES >> 20} MiB", hint=f"is it {what}?")
-        return path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise error_type(f"{shown_name(path)}: not a text file", hint=f"{what} is a TOML file") from error
-    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        why = getattr(error, "strerror", None) or error
-        raise error_type(f"cannot read {shown_name(path)}: {why}", hint=hint or f"{what} is a TOML file") from error
+    return read_text(path, error_type, hint=hint or f"{what} is a TOML file")
 
 
 def is_file(path: Path) -> bool:

@@ -13,7 +13,6 @@ a report can be made of the folder.
 
 import base64
 import contextlib
-import hashlib
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -41,7 +40,8 @@ from robot_bench.report.page_of_all import REPORT_NAME
 from robot_bench.running.pacer import PACED_SLICE_NS, RealTimePacer
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.wires.ports import Chip
-from simbase.errors import P2osError, UsageError
+from simbase.errors import FileError, P2osError, UsageError
+from simbase.files import sha256_of
 from simbase.installation import installed_version
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 from simbase.user_classes import unforeseen
@@ -272,8 +272,8 @@ def _measured(
 
 def _sha256_of(firmware: Path) -> str | None:
     try:
-        return hashlib.sha256(firmware.read_bytes()).hexdigest()
-    except OSError:  # who needs the file says so
+        return sha256_of(firmware)
+    except FileError:  # who needs the file says so
         return None
 
 

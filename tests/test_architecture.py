@@ -95,7 +95,7 @@ LOGGING = (
 #: The map of ARCHITECTURE.md, lowest first: a package imports none of its own row and none above it.
 LAYERS = {
     "simbase": (
-        ("timing", "state", "installation", "wire", "lazy", "interrupts", "listening"), ("errors",),
+        ("timing", "state", "installation", "wire", "lazy", "interrupts", "listening", "terminal"), ("errors",),
         ("files", "units", "c_library"), ("trust",), ("user_classes",),
     ),
     "p2os": (

@@ -10,6 +10,8 @@ from pathlib import Path
 
 from bluepill_sim.analysis.coverage import Coverage, FileCoverage
 from bluepill_sim.analysis.coverage_text import coverage_lines
+from simbase.errors import FileError
+from simbase.files import read_text
 
 _STYLE = """
 body{font:15px system-ui,sans-serif;margin:1.5rem auto;max-width:72rem;padding:0 1rem;color:#1b1b1b;background:#fdfcf8}
@@ -75,7 +77,7 @@ def source_lines(name: str, sources: Path | None) -> list[str]:
         candidates += [sources / name, sources / Path(name).name]
     for path in candidates:
         try:
-            return path.read_text(encoding="utf-8", errors="replace").splitlines()
-        except (OSError, ValueError):
+            return read_text(path, errors="replace").splitlines()
+        except FileError:
             continue
     return []

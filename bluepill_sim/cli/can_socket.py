@@ -24,7 +24,7 @@ from bluepill_sim.board import BluePill
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.fabric.bus_parts import CanFrame
 from bluepill_sim.fabric.can_network import CanNetwork, CanNode
-from simbase.files import writing
+from simbase.files import open_to_write_text
 from simbase.timing import NS_PER_S, Nanos
 
 _FRAME = struct.Struct("=IB3x8s")
@@ -321,8 +321,7 @@ def join_can(board: BluePill, where: str | None, log: Path | None) -> list[CanSo
     if network is None:
         network = CanNetwork()
         board.can(network)
-    with writing(log):
-        file = None if log is None else log.open("w", encoding="utf-8")
+    file = None if log is None else open_to_write_text(log)
     name = _LOGGED_AS if ":" in where else where
 
     def keep(at_ns: Nanos, is_sent: bool, frame: CanFrame) -> None:

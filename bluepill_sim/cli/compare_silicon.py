@@ -7,8 +7,8 @@ from typing import Annotated
 import typer
 
 from bluepill_sim.analysis.silicon.comparison import Row, Verdict, ask_model, compare
-from bluepill_sim.analysis.silicon.log import KINDS, read_log
-from simbase.files import reading
+from bluepill_sim.analysis.silicon.log import KINDS, MOST_BYTES, read_log
+from simbase.files import read_bytes
 
 HELP = """Lay what a real STM32F103C8 says of itself beside the model.
 
@@ -28,9 +28,7 @@ def compare_silicon(
     show_all: Annotated[bool, typer.Option("--all", help="Show what is the same too.")] = False,
 ) -> None:
     """Compare a log."""
-    with reading(log):
-        data = log.read_bytes()
-    chip = read_log(data, log.name)
+    chip = read_log(read_bytes(log, most=MOST_BYTES), log.name)
     rows = compare(chip, ask_model())
     for row in rows:
         if show_all or row.verdict is not Verdict.SAME:

@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import BinaryIO, Protocol
 
 from bluepill_sim.errors import BluePillError
-from simbase.files import writing
+from simbase.files import open_to_write
+from simbase.terminal import ReadableBytes
 
 #: Most bytes taken from a pseudo-terminal at one poll. Chosen: more than anybody types.
 _READ_BYTES = 4096
@@ -53,21 +54,25 @@ class Console(Protocol):
 class StreamConsole:
     """Writes to a binary stream; nothing ever comes back."""
 
-    def __init__(self, stream: BinaryIO, description: str, *, is_owner: bool = True) -> None:
+    def __init__(
+        self, stream: BinaryIO, description: str, *, is_owner: bool = True, readable: ReadableBytes | None = None
+    ) -> None:
         """Make it.
 
         Args:
             stream: Where the characters go; flushed at each line end.
             description: Where that is, for people.
             is_owner: Whether `close` closes the stream.
+            readable: Makes the characters text that does not act on a terminal; None: they go as they come.
         """
         self.description = description
         self._stream = stream
         self._is_owner = is_owner
+        self._readable = readable
 
     def write(self, data: bytes) -> None:
         """Write characters."""
-        self._stream.write(data)
+        self._stream.write(data if self._readable is None else self._readable.take(data))
         if b"\n" in data:
             self._stream.flush()
 
@@ -77,6 +82,8 @@ class StreamConsole:
 
     def close(self) -> None:
         """Flush, and close the stream if it is ours."""
+        if self._readable is not None:
+            self._stream.write(self._readable.take(b"", is_end=True))
         self._stream.flush()
         if self._is_owner:
             self._stream.close()
@@ -126,21 +133,22 @@ class PtyConsole:
         os.close(self._slave)
 
 
-def open_console(where: str) -> Console:
+def open_console(where: str, *, raw: bool = False) -> Console:
     """Return the console that a name asks for.
 
     Args:
         where: "-" for standard output, "pty:" or "pty" for a new pseudo-terminal, else a file to write.
+        raw: Whether standard output gets every byte as it is; files and pseudo-terminals do anyway.
 
     Raises:
         BluePillError: It cannot be opened.
     """
     if where == "-":
-        return StreamConsole(sys.stdout.buffer, "standard output", is_owner=False)
+        readable = None if raw else ReadableBytes()
+        return StreamConsole(sys.stdout.buffer, "standard output", is_owner=False, readable=readable)
     if where in PTY:
         return PtyConsole()
-    with writing(where):
-        return StreamConsole(Path(where).open("wb"), where)
+    return StreamConsole(open_to_write(Path(where)), where)
 
 
 def connect(console: Console, port: SerialPort) -> Callable[[], None]:

@@ -189,10 +189,13 @@ def _line_speeds(board: BluePill) -> str:
 
 
 def print_fault(board: BluePill) -> bool:
-    """Print last blocks, registers and, as the last line, the fault of a firmware that died; return whether it did."""
-    if board.fault is None or not board.has_died:
+    """Print last blocks, registers and, as the last line, why a firmware died; return whether it did."""
+    if not board.has_died:
         return False
     print_last_blocks(board)
+    if board.fault is None:
+        print_status(f"fault: {board.reset_row}")
+        return True
     for line in board.fault.register_dump.splitlines():
         print_status(f"  {line}")
     print_status(f"fault: {board.fault}")

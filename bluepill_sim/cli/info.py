@@ -92,7 +92,7 @@ def _print(board: BluePill, found: dict[str, object]) -> None:
         typer.echo("")
     ran = f"in {board.now_ns / NS_PER_S:g} s of virtual time"
     if board.has_died:
-        typer.echo(f"it dies {ran}: {board.fault}")
+        typer.echo(f"it dies {ran}: {board.fault or board.reset_row}")
     elif board.verdict:
         typer.echo(f"{ran}: {board.verdict}")
     for warning in board.warnings:

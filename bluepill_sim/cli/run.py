@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated, Protocol
 
@@ -29,10 +30,12 @@ from simbase.units import BAUD
 
 HELP = """Boot a firmware on an emulated BluePill.
 
-What it sends on USART1 goes to stdout. Time is virtual: a program that sleeps runs much faster than real time. Exit
+What it sends on USART1 goes to stdout, as text: what would act on a terminal is written as \\x1b and the like, unless
+--raw. Time is virtual: a program that sleeps runs much faster than real time. Exit
 code 1: the firmware died of a fault, or the wall clock's budget was used up;
 then the last blocks that it ran are shown. Resets are no failure (a watchdog may be
-what is tried): the last line counts them, by cause.
+what is tried): the last line counts them, by cause. 100 in a row within a millisecond of each other, with no change at
+a pin and no character meanwhile, are: such a program is ended.
 
 \b
 Examples:
@@ -71,6 +74,7 @@ def run(
         Nanos | None, time_option("--for", purpose="How much virtual time.", shown="1s, with --realtime without end")
     ] = None,
     uart: Annotated[str, typer.Option(help="Where USART1 goes: - (stdout), pty:, or a file.", metavar="WHERE")] = "-",
+    raw: Annotated[bool, typer.Option("--raw", help="To stdout every byte as it is, escape sequences too.")] = False,
     realtime: Annotated[bool, typer.Option("--realtime", help="At the speed of the clock, until Ctrl-C.")] = False,
     drive: Annotated[
         list[str] | None,
@@ -127,12 +131,12 @@ def run(
     traces = open_traces(board, itm, swo)
     warn_on_stderr(board)
     attach_parts(board, attach or [])
-    consoles = [open_console(uart)]
+    consoles = [open_console(uart, raw=raw)]
     carriers = [connect(consoles[0], board.usart1)]
     if uart in PTY:
         print_status(f"USART1 is at {consoles[0].description}")
     if usb is not None:
-        consoles.append(open_console(usb))
+        consoles.append(open_console(usb, raw=raw))
         carriers.append(connect(consoles[1], board.usb_serial))
         board.usb.plug()
         print_status(f"USB is plugged in; its serial port goes to {consoles[1].description}")
@@ -149,8 +153,9 @@ def run(
             else:
                 run_until(board, until, end_ns, schedule.advance_to)
         finally:
-            for one in opened:
-                one.close()
+            with ExitStack() as closing:  # each, whatever becomes of the others
+                for one in reversed(opened):
+                    closing.callback(one.close)
             if uart == "-" and board.usart1.unread and not board.usart1.unread.endswith(b"\n"):
                 typer.echo("")
     show_parts(board, parts_folder)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from bluepill_sim.board import BluePill
 from bluepill_sim.debug.itm import PacketWriter, StimulusWriter, TextWriter
-from simbase.files import writing
+from simbase.files import open_to_write, open_to_write_text
 
 
 def open_traces(board: BluePill, text: Path | None, packets: Path | None) -> list[StimulusWriter]:
@@ -15,11 +15,9 @@ def open_traces(board: BluePill, text: Path | None, packets: Path | None) -> lis
     """
     writers: list[StimulusWriter] = []
     if text is not None:
-        with writing(text):
-            writers.append(TextWriter(text.open("w", encoding="utf-8")))
+        writers.append(TextWriter(open_to_write_text(text)))
     if packets is not None:
-        with writing(packets):
-            writers.append(PacketWriter(packets.open("wb")))
+        writers.append(PacketWriter(open_to_write(packets)))
     if writers:
         board.chip.system.enable_trace()
         board.chip.system.stimulus_sinks += [writer.write for writer in writers]

@@ -15,7 +15,7 @@ from bluepill_sim.core import BlockRecorder
 from bluepill_sim.program.functions import FunctionTable
 from bluepill_sim.program.last_blocks import lines_of
 from bluepill_sim.program.line_table import read_lines
-from simbase.files import writing
+from simbase.files import open_to_write_text
 from simbase.timing import NS_PER_MS, Nanos
 
 HELP = """Run a firmware and write what it executes.
@@ -53,7 +53,7 @@ def trace(
     run_driven(board, begin_ns, [change for change in changes if change.at_ns < begin_ns])
     count, last = 0, ""
     with ExitStack() as stack:
-        stream: TextIO = sys.stdout if out is None else stack.enter_context(_open(out))
+        stream: TextIO = sys.stdout if out is None else stack.enter_context(open_to_write_text(out))
 
         def write(recorder: BlockRecorder) -> None:
             nonlocal count, last
@@ -75,8 +75,3 @@ def trace(
     print_status(f"{count} lines; {summary(board)}")
     if print_fault(board):
         raise typer.Exit(1)
-
-
-def _open(path: Path) -> TextIO:
-    with writing(path):
-        return path.open("w", encoding="utf-8")

@@ -20,6 +20,7 @@ from bluepill_sim.debug.packets import MAX_BYTES
 from bluepill_sim.debug.target_description import FLASH_PAGE_BYTES, memory_map_xml, target_xml
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.stm32f103 import FLASH_BASE, FLASH_BYTES_FITTED
+from simbase.terminal import readable
 
 _OK, _NOT_SUPPORTED = b"OK", b""
 #: chosen: errno-like numbers; GDB shows them and knows no others.
@@ -216,7 +217,7 @@ class GdbSession:
             return _transfer(argument)
         if name == b"Rcmd":
             text = self._monitor.run(binascii.unhexlify(argument).decode("utf-8", "replace"))
-            return _hex(text.encode()[:_MAX_READ])
+            return _hex(readable(text).encode()[:_MAX_READ])
         return _ANSWERS.get(name, _NOT_SUPPORTED)
 
     def _set(self, rest: bytes) -> bytes:

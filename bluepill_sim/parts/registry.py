@@ -19,8 +19,8 @@ from pathlib import Path
 from typing import Any, Protocol, cast
 
 from bluepill_sim.parts.attached import PartError, Use
-from simbase.errors import shown, shown_name
-from simbase.files import refuse_elsewhere
+from simbase.errors import FileError, shown, shown_name
+from simbase.files import read_bytes, refuse_elsewhere
 from simbase.trust import own_code
 from simbase.user_classes import find_class, said
 
@@ -195,9 +195,9 @@ def _converted(value: object, wanted: Any, where: str, folder: str) -> object:
             return float(cast("float | str", _no_flag(value)))
         if wanted in {Path, bytes}:
             path = _file(str(value), folder, where)
-            return path if wanted is Path else path.read_bytes()
-    except OSError as error:
-        raise PartError(f"{where}: {error.filename}: {error.strerror or error}") from error
+            return path if wanted is Path else read_bytes(path)
+    except FileError as error:
+        raise PartError(f"{where}: {error}", hint=error.hint) from error
     except (ValueError, KeyError, TypeError) as error:
         name = {bool: "true or false", int: "a whole number", float: "a number"}.get(wanted, "what it is to be")
         raise PartError(f"{where}: {shown(value)} is not {name}") from error

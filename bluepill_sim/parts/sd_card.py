@@ -21,6 +21,7 @@ from itertools import islice
 from pathlib import Path
 from typing import ClassVar
 
+from simbase.files import read_bytes
 from simbase.state import Stateful
 from simbase.timing import NS_PER_MS, Nanos
 
@@ -88,7 +89,7 @@ class SdCard(Stateful):
             ValueError: It is no whole number of half megabytes, or larger than 1 GiB.
             OSError: The image cannot be read.
         """
-        self._image = b"" if image is None else image.read_bytes()
+        self._image = b"" if image is None else read_bytes(image, most=MOST_MB << 20)
         size = len(self._image) or size_mb * 1024 * 1024
         if not 0 < size <= MOST_MB * 1024 * 1024 or size % CAPACITY_BYTES:
             raise ValueError(f"a card of {size} bytes: a multiple of {CAPACITY_BYTES}, up to {MOST_MB} MiB")

@@ -82,6 +82,10 @@ class ResetCause(Enum):
     LOW_POWER = bits(26, 31)
 
 
+#: What no program does by itself.
+OUTSIDE = frozenset({ResetCause.POWER, ResetCause.PIN})
+
+
 @dataclass(frozen=True, slots=True)
 class Oscillator:
     """A clock source: where its bits are and how long it takes to start."""

@@ -12,7 +12,7 @@ from bluepill_sim.core.nvic import VECTOR_COUNT, exception_name
 from bluepill_sim.errors import ImageError
 from bluepill_sim.program.image import Image
 from bluepill_sim.stm32f103 import FLASH_BASE, FLASH_BYTES, FLASH_BYTES_FITTED, SRAM_BASE, SRAM_BYTES
-from simbase.files import reason_of
+from simbase.files import read_bytes
 
 _SHF_ALLOC = 2
 
@@ -59,22 +59,22 @@ class Layout:
         return self.sram_bytes / SRAM_BYTES
 
 
-def read_bytes(image: Image) -> bytes:
+def file_bytes(image: Image) -> bytes:
     """Return the bytes of the file that an image came from.
 
     Raises:
         ImageError: the file is gone or unreadable.
     """
-    try:
-        return Path(image.name).read_bytes()
-    except OSError as error:
-        raise ImageError(f"{image.name}: {reason_of(error)}", hint="check the path") from error
+    path = Path(image.name)
+    if path.exists() and not path.is_file():
+        raise ImageError(f"{image.name}: no file that can be read again", hint="copy it into a file first")
+    return read_bytes(path, ImageError, hint="check the path")
 
 
 def layout(image: Image) -> Layout:
     """Return the sections of an image and what they add up to; HEX and BIN have no sections."""
     flash_bytes = sum(len(data) for _, data in image.segments)
-    data = read_bytes(image)
+    data = file_bytes(image)
     if not data.startswith(b"\x7fELF"):
         return Layout((), flash_bytes, 0)
     sections = tuple(_sections(data))

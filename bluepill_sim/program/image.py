@@ -18,7 +18,7 @@ from bluepill_sim.errors import ImageError
 from bluepill_sim.program.wrong_files import wrong_kind
 from bluepill_sim.stm32f103 import FLASH_BASE, FLASH_BYTES_FITTED, SRAM_BASE, SRAM_BYTES
 from simbase.errors import MissingDependencyError
-from simbase.files import reason_of
+from simbase.files import read_bytes
 
 FLASH_END = FLASH_BASE + FLASH_BYTES_FITTED
 #: The stack may start at the very end of the SRAM, not beyond.
@@ -162,15 +162,10 @@ def load_image(path: str | Path) -> Image:
     """Read a firmware file; its kind is told by its contents.
 
     Raises:
-        ImageError: it is missing, damaged, empty, or not for this chip.
+        ImageError: it is missing, damaged, empty, too large, or not for this chip.
         MissingDependencyError: a reader for its format is not installed.
     """
-    file = Path(path)
-    try:
-        data = file.read_bytes()
-    except OSError as error:
-        raise ImageError(f"{path}: {reason_of(error)}", hint="check the path") from error
-    return parse_image(data, name=str(path))
+    return parse_image(read_bytes(Path(path), ImageError, hint="check the path"), name=str(path))
 
 
 def parse_image(data: bytes, name: str) -> Image:

@@ -14,7 +14,7 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 from bluepill_sim.errors import ImageError
-from bluepill_sim.program.elf_file import read_bytes
+from bluepill_sim.program.elf_file import file_bytes
 from bluepill_sim.program.image import Image
 from bluepill_sim.stm32f103 import FLASH_BYTES_FITTED, SRAM_BASE, SRAM_BYTES
 from simbase.errors import MissingDependencyError
@@ -63,7 +63,7 @@ def read_lines(image: Image) -> LineTable:
         ImageError: the file is gone, or its debug information is damaged.
         MissingDependencyError: pyelftools is not installed.
     """
-    data = read_bytes(image)
+    data = file_bytes(image)
     if not data.startswith(_ELF_MAGIC):
         return LineTable()
     try:

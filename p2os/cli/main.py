@@ -26,6 +26,7 @@ from p2os.cli.printing import restored_output
 from p2os.cli.refused_connections import shown_refusals
 from p2os.cli.signals import end_on_signals, ignore_signals, restored_signals
 from simbase.errors import MissingDependencyError
+from simbase.files import MAKE_ROOM, REFUSALS, reason_of
 from simbase.installation import installed_version
 from simbase.trust import installed_points
 from simbase.user_classes import unforeseen
@@ -96,6 +97,11 @@ def report(error: Exception, *, trace: bool = False) -> int:
     if trace:
         traceback.print_exception(error)
     code = getattr(error, "exit_code", None)
+    if isinstance(error, OSError) and error.errno in REFUSALS:  # of a file that is named, an error of ours tells
+        where = "standard output" if error.filename is None else str(error.filename)
+        _print_error(f"p2os: {_one_line(f'cannot write {where}: {reason_of(error)}')}")
+        _print_error(f"hint: {MAKE_ROOM}")
+        return EXIT_FAILED
     if not isinstance(code, int):
         says = unforeseen(error)
         _print_error(f"p2os: {_one_line(says)}")

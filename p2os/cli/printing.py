@@ -23,11 +23,12 @@ import sys
 import threading
 from collections import deque
 from collections.abc import Iterator
-from typing import TextIO
+from typing import TextIO, cast
 
 from p2os.transport.wall_clock import wall_clock
 from simbase.errors import FileError
 from simbase.files import reason_of
+from simbase.terminal import ReadableStream, drawn
 from simbase.timing import NS_PER_S
 
 #: chosen: some ten thousand lines; minutes of a robot's packets.
@@ -227,26 +228,39 @@ def queue_output() -> None:
 
     Streams without a descriptor (a test's) hold nobody up and stay as they are.
     """
-    if not isinstance(sys.stderr, QueuedStream) and _has_descriptor(sys.stderr):
-        sys.stderr = QueuedStream(sys.stderr, "standard error")
-    notes = sys.stderr if isinstance(sys.stderr, QueuedStream) else None
-    if not isinstance(sys.stdout, QueuedStream) and _has_descriptor(sys.stdout):
-        sys.stdout = QueuedStream(sys.stdout, "standard output", notes)
+    stdout: TextIO = drawn(sys.stdout)
+    stderr: TextIO = drawn(sys.stderr)
+    if not isinstance(stderr, QueuedStream) and _has_descriptor(stderr):
+        stderr = cast("TextIO", QueuedStream(stderr, "standard error"))
+        sys.stderr = stderr if sys.stderr is drawn(sys.stderr) else _readable(stderr)
+    notes = stderr if isinstance(stderr, QueuedStream) else None
+    if not isinstance(stdout, QueuedStream) and _has_descriptor(stdout):
+        stdout = cast("TextIO", QueuedStream(stdout, "standard output", notes))
+        sys.stdout = stdout if sys.stdout is drawn(sys.stdout) else _readable(stdout)
 
 
 @contextlib.contextmanager
 def restored_output() -> Iterator[None]:
-    """Put the streams back that were there before, at the end of the block, and wait a moment for their readers."""
+    """Put the streams back that were there before, at the end of the block, and wait a moment for their readers.
+
+    In the block what is written is readable, whoever it is of.
+    """
     stdout, stderr = sys.stdout, sys.stderr
+    sys.stdout, sys.stderr = _readable(stdout), _readable(stderr)
     try:
         yield
     finally:
-        queued = [stream for stream in (sys.stdout, sys.stderr) if isinstance(stream, QueuedStream)]
+        queued = [behind for stream in (sys.stdout, sys.stderr) if isinstance(behind := drawn(stream), QueuedStream)]
         sys.stdout, sys.stderr = stdout, stderr
         for stream in queued:
             stream.note_left_out()
         for queue in dict.fromkeys(stream.queue for stream in queued):
             queue.end()
+
+
+def _readable(stream: TextIO) -> TextIO:
+    """Return a stream that writes readable text to this one; it has all that a text stream has."""
+    return cast("TextIO", ReadableStream(drawn(stream)))
 
 
 def _has_descriptor(stream: TextIO | None) -> bool:

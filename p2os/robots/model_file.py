@@ -19,7 +19,8 @@ from p2os.robots.model import (
 )
 from p2os.toml_file import TomlPlaces, TomlSource, find_places, read_toml
 from p2os.toml_schema import Key, Place, check_table, within
-from simbase.errors import nearest, shown, shown_name
+from simbase.errors import nearest, shown
+from simbase.files import read_text
 
 #: A TOML table.
 Table = dict[str, Any]
@@ -140,11 +141,7 @@ def text_of(path: Path) -> str:
     Raises:
         ParametersError: The file cannot be read.
     """
-    try:
-        return path.read_text(encoding="utf-8-sig", errors="replace")
-    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        why = getattr(error, "strerror", None) or str(error)
-        raise ParametersError(f"cannot read {shown_name(path)}: {why.lower()}") from error
+    return read_text(path, ParametersError, errors="replace")
 
 
 def table_of(source: str, text: str) -> Table:

@@ -9,7 +9,9 @@ Source: rosbag2, docs/design; https://mcap.dev/spec/registry (profile ros2).
 Invariant: whatever a file holds, reading it yields messages or raises one `FileError`.
 """
 
+import sqlite3
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
 from types import TracebackType
@@ -19,7 +21,7 @@ from p2os.ros.codec import Message, to_cdr
 from p2os.ros.message_table import standard_types
 from p2os.ros.transport import Topic
 from simbase.errors import FileError, MissingDependencyError, UsageError, shown, shown_name
-from simbase.files import writing
+from simbase.files import MAKE_ROOM, writing
 from simbase.timing import Nanos
 
 if TYPE_CHECKING:
@@ -56,8 +58,9 @@ class BagFile:
             from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
         except ImportError as error:
             raise MissingDependencyError(_NO_LIBRARY, extra="ros") from error
+        self._folder = folder
         try:
-            with writing(folder):
+            with self._writing():
                 self._writer = Writer(folder, version=VERSION, storage_plugin=StoragePlugin[STORAGES[storage]])
                 self._writer.open()
         except WriterError as error:
@@ -71,16 +74,32 @@ class BagFile:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._writer.close()
+        with self._writing():
+            self._writer.close()
 
     def write(self, topic: Topic, message: Message, at_ns: Nanos) -> None:
-        """Add a message."""
-        if topic not in self._topics:
-            self._topics[topic] = self._writer.add_connection(
-                topic.name, topic.type, typestore=standard_types(), offered_qos_profiles=[_qos(topic)]
-            )
-        self._writer.write(self._topics[topic], at_ns, to_cdr(topic.type, message))
+        """Add a message.
+
+        Raises:
+            FileError: The system refuses to write it.
+        """
+        data = to_cdr(topic.type, message)
+        with self._writing():
+            if topic not in self._topics:
+                self._topics[topic] = self._writer.add_connection(
+                    topic.name, topic.type, typestore=standard_types(), offered_qos_profiles=[_qos(topic)]
+                )
+            self._writer.write(self._topics[topic], at_ns, data)
         self.count += 1
+
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        """Raise what the system, or SQLite for it, has against writing."""
+        try:
+            with writing(self._folder, hint=MAKE_ROOM):
+                yield
+        except sqlite3.Error as error:
+            raise FileError(f"cannot write {shown_name(self._folder)}: {error}", hint=MAKE_ROOM) from error
 
 
 def _qos(topic: Topic) -> "Qos":

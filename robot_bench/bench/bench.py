@@ -312,9 +312,9 @@ class Bench(Expectations, Interventions, Stateful):
     @property
     def own_end(self) -> Nanos:
         """Return when the run would end if this robot were alone."""
-        fault, ends = self.chip.fault, [self.scenario.duration_ns]
-        if fault is not None and self.chip.has_died:
-            ends.append(fault.at_ns + AFTER_FAULT_NS)
+        died_ns, ends = self.chip.died_ns, [self.scenario.duration_ns]
+        if died_ns is not None:
+            ends.append(died_ns + AFTER_FAULT_NS)
         return min(ends if self._ends_at is None else [*ends, self._ends_at])
 
     @property
@@ -544,11 +544,12 @@ class Bench(Expectations, Interventions, Stateful):
     def _after_slice(self, now: Nanos) -> None:
         if self._slices is not None:
             self.loop.slice_ns = self._slices.after_slice()
-        if self.chip.fault is not None:
+        died_ns = self.chip.died_ns
+        if died_ns is not None or self.chip.fault is not None:
             self.loop.end_at(self.end)
-            if self.chip.has_died and not self._has_told_death:
-                self._has_told_death = True
-                self.recorder.fault("died", self.chip.verdict, self.chip.fault.at_ns)
+        if died_ns is not None and not self._has_told_death:
+            self._has_told_death = True
+            self.recorder.fault("died", self.chip.verdict, died_ns)
         if self.on_slice is not None:
             self.on_slice(now)
 

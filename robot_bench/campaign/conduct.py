@@ -14,7 +14,7 @@ Invariant: the rows, their order and all in them but the seconds depend on the c
 them after a whole batch.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from pathlib import Path
@@ -27,6 +27,7 @@ from robot_bench.campaign.search import SEARCHES, Answer, Problem
 from robot_bench.campaign.space import Proposal, Space
 from robot_bench.campaign.trial import Done, Outcome, Trial, Verdict
 from simbase.timing import NS_PER_S, Nanos
+from simbase.units import ranges_text
 
 NS_PER_HOUR = 3600 * NS_PER_S
 #: What a search is told of a run without a verdict: nothing to go towards.
@@ -143,10 +144,19 @@ class Progress:
     answered: int = 0
     #: Of all runs, how many were in the journal.
     resumed: int = 0
+    #: Lines of the journal that do not count, by number, and why.
+    left_out: Mapping[int, str] = field(default_factory=dict)
     virtual_ns: Nanos = 0
     cpu_s: float = 0.0
     blocks: set[int] = field(default_factory=set)
     states: set[str] = field(default_factory=set)
+
+    def left_out_words(self) -> list[str]:
+        """Return which lines of the journal do not count, a text for each reason."""
+        numbers: dict[str, list[int]] = {}
+        for number, why in self.left_out.items():
+            numbers.setdefault(why, []).append(number)
+        return [f"line{'s' if len(lines) > 1 else ''} {ranges_text(lines)}: {why}" for why, lines in numbers.items()]
 
     @property
     def failures(self) -> list[Row]:
@@ -186,7 +196,7 @@ class Conduct:
             runs=campaign.budget.runs, batch=campaign.batch, seed=campaign.seed,
         ))  # fmt: skip
         self._journal = Journal(folder)
-        self.progress = Progress()
+        self.progress = Progress(left_out=self._journal.left_out)
         self._confirmed = 0
 
     def run(self) -> Progress:

@@ -1,24 +1,35 @@
 """What a campaign has done so far, a line a run, so that nothing is done twice whatever was killed.
 
-Each line is a JSON object with the key of a run (its stage and the hash of its trial) and its outcome, written and
-flushed when the run ends. A line that was cut is passed over: that run is done again.
+Each line is a JSON object with the key of a run (its stage and the hash of its trial), its outcome and, last, a
+checksum of all before it, written and flushed when the run ends. A line counts only where its checksum holds: what was
+damaged, changed by hand, or written by a p2os whose lines had none is named and left out, and its run is done again. A
+last line that was cut, as by a kill or a full disk, is taken off.
 
 Invariant: what is read back is what was written.
 """
 
 import base64
+import contextlib
+import hashlib
 import json
 import os
 import zlib
 from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
-from typing import IO, cast
+from typing import BinaryIO, cast
 
 from robot_bench.campaign.trial import Done, GoalResult, Hit, Outcome, Verdict
-from simbase.files import writing
+from simbase.errors import FileError
+from simbase.files import LONGEST_LINE, writing
 
 NAME = "journal.jsonl"
+#: What stands before a line's checksum: hexadecimal digits of the SHA-256 of all before it, and the end of the object.
+_SUM = b',"sum":"'
+_SUM_DIGITS = 16
+_END = b'"}'
+#: What reading an outcome of another version raises.
+_NO_OUTCOME = (ValueError, KeyError, TypeError, AttributeError, RecursionError, zlib.error)
 
 
 class Journal:
@@ -28,25 +39,43 @@ class Journal:
         folder: Of the campaign.
 
     Raises:
-        FileError: The file cannot be read or written.
+        FileError: The file cannot be read or written, or is no journal.
     """
 
     def __init__(self, folder: Path) -> None:
         self._path = folder / NAME
         self._done: dict[str, Done] = {}
+        #: Lines that do not count, from 1, each with what is wrong with it.
+        self.left_out: dict[int, str] = {}
         with writing(self._path):
-            self._file: IO[str] = self._path.open("a+", encoding="ascii", newline="\n")
+            self._file: BinaryIO = self._path.open("a+b")
             self._file.seek(0)
-            text = self._file.read()
-        whole = text[: text.rfind("\n") + 1]
-        if len(whole) < len(text):
-            self._file.truncate(len(whole))
-        for line in whole.splitlines():
+            self._read()
+
+    def _read(self) -> None:
+        number, length = 0, 0
+        while line := self._file.readline(LONGEST_LINE):
+            number += 1
+            if not line.endswith(b"\n"):
+                if len(line) == LONGEST_LINE:
+                    raise FileError(f"{self._path}:{number}: no line of a journal", hint="move the file away")
+                self._file.truncate(length)
+                return
+            length += len(line)
             try:
-                entry = json.loads(line)
-                self._done[entry["key"]] = outcome_of_plain(entry["outcome"]), float(entry["cpu_s"])
-            except (ValueError, KeyError, TypeError):  # the disk was full there
-                continue
+                entry = json.loads(_checked(line.removesuffix(b"\n")))
+                self._done[str(entry["key"])] = outcome_of_plain(entry["outcome"]), float(entry["cpu_s"])
+            except _LeftOutError as error:
+                self.left_out[number] = str(error)
+            except (
+                ValueError,
+                KeyError,
+                TypeError,
+                AttributeError,
+                RecursionError,
+                zlib.error,
+            ):  # outcomes of another version
+                self.left_out[number] = "what it holds is no outcome"
 
     def __len__(self) -> int:
         return len(self._done)
@@ -62,15 +91,49 @@ class Journal:
             FileError: The disk is full.
         """
         self._done[key] = outcome, cpu_s
-        line = json.dumps({"key": key, "outcome": plain_of(outcome), "cpu_s": cpu_s}, separators=(",", ":"))
+        entry = {"key": key, "outcome": plain_of(outcome), "cpu_s": cpu_s}
+        line = json.dumps(entry, separators=(",", ":")).encode("ascii")
         with writing(self._path, hint="make room, then --resume"):
-            self._file.write(f"{line}\n")
+            self._file.write(_summed(line) + b"\n")
             self._file.flush()
             os.fsync(self._file.fileno())
 
     def close(self) -> None:
-        """Close the file."""
-        self._file.close()
+        """Close the file; a full disk was told of when it was first met."""
+        with contextlib.suppress(OSError):
+            self._file.close()
+
+
+class _LeftOutError(Exception):
+    """A line does not count."""
+
+
+def _summed(line: bytes) -> bytes:
+    """Return an object with its checksum as its last entry."""
+    head = line.removesuffix(b"}")
+    return head + _SUM + _sum_of(head) + _END
+
+
+def _checked(line: bytes) -> bytes:
+    """Return a line whose checksum holds.
+
+    Raises:
+        _LeftOutError: It does not, or there is none.
+    """
+    head, mark, found = line.rpartition(_SUM)
+    if not mark:
+        try:
+            is_older = isinstance(json.loads(line), dict)
+        except (ValueError, RecursionError):
+            is_older = False
+        raise _LeftOutError("no checksum, as an earlier p2os wrote it" if is_older else "damaged")
+    if found != _sum_of(head) + _END:
+        raise _LeftOutError("damaged or changed: its checksum does not hold")
+    return line
+
+
+def _sum_of(data: bytes) -> bytes:
+    return hashlib.sha256(data).hexdigest()[:_SUM_DIGITS].encode("ascii")
 
 
 def plain_of(outcome: Outcome) -> dict[str, object]:
@@ -89,7 +152,7 @@ def outcome_of_plain(plain: Mapping[str, object]) -> Outcome:
     """Return the outcome that `plain_of` has written.
 
     Raises:
-        KeyError, TypeError, ValueError: It is none.
+        KeyError, TypeError, ValueError, AttributeError, zlib.error: It is none.
     """
     rows = {name: cast("list[list[object]]", plain[name]) for name in ("goals", "hits", "way_mm")}
     goal_names, hit_names = ([field.name for field in fields(kind)] for kind in (GoalResult, Hit))

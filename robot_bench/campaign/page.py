@@ -122,6 +122,8 @@ def _cost(whole: Whole) -> Iterator[tuple[str, str]]:
         factor = f", {virtual_s / seconds:.0f} × real time" if seconds else ""
         yield f"{stage} runs", f"{len(runs)}: {virtual_s:.0f} s in {seconds:.0f} s of a processor{factor}"
     yield "of them in the journal already", str(progress.resumed)
+    if progress.left_out:
+        yield "lines of the journal that do not count", "; ".join(progress.left_out_words())
 
 
 def _table(pairs: Iterator[tuple[str, str]]) -> str:

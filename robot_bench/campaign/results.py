@@ -165,6 +165,7 @@ class Whole:
             "search": self.campaign.search,
             "points": len(self.progress.rows),
             "runs": self.progress.runs,
+            "journal_left_out": {str(line): why for line, why in self.progress.left_out.items()},
             "virtual_s": self.progress.virtual_ns / 1e9,
             "blocks": len(self.progress.blocks),
             "states": len(self.progress.states),

@@ -41,7 +41,7 @@ from robot_bench.scenario.included_files import (
 )
 from robot_bench.scenario.scenario import Scenario, build_scenario, known_scenarios, load_scenario
 from simbase.errors import P2osError
-from simbase.files import refuse_elsewhere, writing
+from simbase.files import MAKE_ROOM, read_bytes, refuse_elsewhere, writing, writing_temporary
 from simbase.timing import NS_PER_MS, Nanos
 from simbase.trust import Code, Trust, fingerprint_of
 from simbase.trust.code import is_in_file, located
@@ -396,7 +396,7 @@ def _pack_world(table: dict[str, object], scenario: Scenario, folder: Path, file
     if world in known_worlds():
         return
     path = folder / world
-    content = path.read_bytes()
+    content = read_bytes(path)
     if path.suffix.lower() == ".toml" and b"[[import]]" not in content:
         table["world"] = _named(path.name, content, files)
         return
@@ -431,7 +431,7 @@ def _packed_code(code: Code, files: dict[str, bytes]) -> str:
 
 
 def _packed(path: Path, files: dict[str, bytes]) -> str:
-    return _named(path.name, path.read_bytes(), files)
+    return _named(path.name, read_bytes(path), files)
 
 
 def _named(name: str, content: bytes, files: dict[str, bytes]) -> str:
@@ -445,18 +445,20 @@ def _named(name: str, content: bytes, files: dict[str, bytes]) -> str:
 
 
 def _write_files(files: Mapping[str, bytes], folder: Path) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, content in files.items():
-        path = refuse_elsewhere(folder, name)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content)
+    with writing(folder, hint=MAKE_ROOM):
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, content in files.items():
+            path = refuse_elsewhere(folder, name)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content)
 
 
 class _Folder:
     """A folder that is removed with the object, or at the end of the process that made it."""
 
     def __init__(self) -> None:
-        self.name = tempfile.mkdtemp(prefix="p2os-trial-")
+        with writing_temporary():
+            self.name = tempfile.mkdtemp(prefix="p2os-trial-")
         weakref.finalize(self, _remove, self.name, os.getpid())
 
 

@@ -5,10 +5,14 @@
     dodge-001/journal.jsonl         every run that was done
     dodge-001/results/              the data set; failures/ a folder each; report.html
 
+The campaign's own file is put there last, and whole: without it nothing was begun.
+
 Invariant: the folder alone says what was done and is enough to go on, on another machine too.
 """
 
+import contextlib
 import json
+import shutil
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -19,6 +23,8 @@ from robot_bench.campaign.conduct import Conduct, Progress, Row, Workers
 from robot_bench.campaign.last_moment import LastMoment, last_moment
 from robot_bench.campaign.page import render
 from robot_bench.campaign.results import Results, Whole
+from robot_bench.campaign.variants.against import FOLDER as AGAINST
+from robot_bench.campaign.variants.against import Other
 from simbase.errors import FileError, P2osError, UsageError
 from simbase.files import write_text, writing
 from simbase.timing import Nanos
@@ -31,8 +37,14 @@ MOST_MOMENTS = 3
 
 
 def begin(
-    file: Path, folder: Path, *, firmware: Path | None, overrides: Mapping[str, object], trust: bool | Trust = False
-) -> Campaign:  # fmt: skip
+    file: Path,
+    folder: Path,
+    *,
+    firmware: Path | None,
+    overrides: Mapping[str, object],
+    other: Other | None = None,
+    trust: bool | Trust = False,
+) -> Campaign:
     """Make a campaign's folder from its file.
 
     Args:
@@ -40,12 +52,13 @@ def begin(
         folder: New or empty.
         firmware: Takes the place of the scenario's.
         overrides: Keys of the file that are set otherwise; of a table, the keys in it.
+        other: The version that is compared with, kept beside.
         trust: As of `load_campaign`.
 
     Raises:
         ScenarioError: The file breaks the schema.
         UsageError: The folder is not empty.
-        FileError: It cannot be written.
+        FileError: It cannot be written; then nothing is left of it.
     """
     text = read_user_text(file, "a campaign", ScenarioError, hint="p2os campaign new SCENARIO writes one")
     table = dict(read_toml(text, file.name, "a campaign", ScenarioError)[0])
@@ -55,11 +68,22 @@ def begin(
     found = parse_campaign(text if not overrides else toml_text(table), file, firmware=firmware, trust=trust)
     if folder.is_dir() and any(folder.iterdir()):
         raise UsageError(f"{folder} is not empty", hint=f"p2os campaign --resume {folder}, or another folder")
-    with writing(folder, hint="--out another folder"):
-        scenario = found.trial.write(folder / SCENARIO)
-        kept = {key: value for key, value in table.items() if key not in {"firmware", "goal"}}
-        kept["scenario"] = f"{SCENARIO}/{scenario.name}"
-        (folder / f"{file.stem}.toml").write_text(toml_text(kept), encoding="utf-8")
+    try:
+        with writing(folder, hint="--out another folder"):
+            scenario = found.trial.write(folder / SCENARIO)
+            if other is not None:
+                other.keep(folder)
+            kept = {key: value for key, value in table.items() if key not in {"firmware", "goal"}}
+            kept["scenario"] = f"{SCENARIO}/{scenario.name}"
+            whole = folder / f"{file.stem}.part"
+            whole.write_text(toml_text(kept), encoding="utf-8")
+            whole.replace(folder / f"{file.stem}.toml")
+    except BaseException:
+        for part in (SCENARIO, AGAINST):  # it was empty before
+            shutil.rmtree(folder / part, ignore_errors=True)
+        with contextlib.suppress(OSError):
+            (folder / f"{file.stem}.part").unlink(missing_ok=True)
+        raise
     return load_campaign(folder / f"{file.stem}.toml", trust=Trust(keys=found.trial.trusted))
 
 
@@ -70,6 +94,11 @@ def resume(folder: Path, *, trust: bool | Trust = False) -> Campaign:
         FileError: It is none.
     """
     files = sorted(folder.glob("*.toml")) if folder.is_dir() else []
+    if not files and (folder / SCENARIO).is_dir():
+        raise FileError(
+            f"{folder} was not begun to its end, as by a kill or a full disk: no run was done",
+            hint="remove it, and begin anew: p2os campaign FILE",
+        )
     if len(files) != 1 or not (folder / SCENARIO).is_dir():
         raise FileError(f"{folder} is no campaign's folder", hint="give the one that `p2os campaign FILE` made")
     return load_campaign(files[0], trust=trust)
@@ -115,7 +144,7 @@ def carry_out(
         conduct.close()
     write_text(whole.folder / "report.html", render(whole))
     text = json.dumps(whole.as_json(), indent=2, sort_keys=True)
-    (folder / SUMMARY).write_text(f"{text}\n", encoding="utf-8")
+    write_text(folder / SUMMARY, f"{text}\n")
     return whole
 
 

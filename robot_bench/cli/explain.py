@@ -1,6 +1,5 @@
 """`p2os explain`: why a run failed, from its trace and a replay of its chip."""
 
-import hashlib
 import json
 from dataclasses import replace
 from importlib.resources import as_file, files
@@ -18,7 +17,7 @@ from robot_bench.report.explain.explain import explain as explain_run
 from robot_bench.scenario.goals.judging import judge
 from robot_bench.scenario.scenario import Scenario, load_scenario
 from simbase.errors import FileError, UsageError
-from simbase.files import reading
+from simbase.files import lines_of, sha256_of
 from simbase.trust import Trust
 
 HELP = """Say why a run failed: from the sensor to the wheel, with times.
@@ -105,8 +104,7 @@ def read_record(path: Path) -> RunRecord:
     if path.name == TRACE_NAME:
         return read_run(path.parent)
     hint = "give a run folder, or a trace"
-    with reading(path, hint=hint), path.open(encoding="utf-8", errors="replace") as lines:
-        record = record_of(lines, str(path))
+    record = record_of(lines_of(path, hint=hint), str(path))
     if not record.meta and not record.last_ns:
         raise FileError(f"{path} is no trace", hint=hint)
     return record
@@ -114,10 +112,8 @@ def read_record(path: Path) -> RunRecord:
 
 def judged(record: RunRecord, path: Path, scenario: Scenario) -> RunRecord:
     """Return a run as a scenario's goals judge it."""
-    with path.open(encoding="utf-8", errors="replace") as lines:
-        found = judge(
-            events_of(lines, str(path)), scenario.goals, end_ns=record.last_ns, planned_ns=scenario.planned_ns
-        )
+    events = events_of(lines_of(path), str(path))
+    found = judge(events, scenario.goals, end_ns=record.last_ns, planned_ns=scenario.planned_ns)
     return replace(record, end={**record.end, "failures": found.missed, "goals_met": found.met})
 
 
@@ -129,7 +125,7 @@ def program_of(record: RunRecord, scenario: Scenario | None = None) -> Path | No
         candidates = [Path(str(record.meta.get("firmware_path") or name)), *beside, Path(str(shipped))]
     wanted = record.meta.get("firmware_sha256")
     for candidate in candidates:
-        if candidate.is_file() and hashlib.sha256(candidate.read_bytes()).hexdigest() == wanted:
+        if candidate.is_file() and sha256_of(candidate) == wanted:
             return candidate
     return None
 

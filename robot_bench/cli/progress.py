@@ -11,10 +11,10 @@ from collections.abc import Callable, Iterator
 from types import TracebackType
 from typing import Self
 
-from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn
 from rich.text import Text
 
+from p2os.cli.console import ReadableConsole
 from p2os.cli.signals import postponed
 from p2os.transport.wall_clock import wall_clock
 from robot_bench import run
@@ -41,8 +41,9 @@ class RunDisplay:
         self._signals = postponed()
         self._next_refresh: Nanos = 0
         self._bar = Progress(
-            TextColumn("{task.fields[time]}"), BarColumn(), _SpeedColumn(), TextColumn("{task.fields[doing]}"),
-            console=Console(stderr=True), transient=True, auto_refresh=False, disable=not self._is_shown,
+            TextColumn("{task.fields[time]}"), BarColumn(), _SpeedColumn(),
+            TextColumn("{task.fields[doing]}", markup=False),
+            console=ReadableConsole(stderr=True), transient=True, auto_refresh=False, disable=not self._is_shown,
         )  # fmt: skip
         self._task = self._bar.add_task("run", total=None, time="", doing="")
 
@@ -89,8 +90,8 @@ class RunDisplay:
 def counting_bar(what: str, count: int) -> Iterator[Callable[[int, str], None]]:
     """Show on a terminal how many of something are done, and a word on them; yield what is told of both."""
     bar = Progress(
-        TextColumn(what), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[said]}"),
-        console=Console(stderr=True), transient=True, auto_refresh=False, disable=not sys.stderr.isatty(),
+        TextColumn(what), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[said]}", markup=False),
+        console=ReadableConsole(stderr=True), transient=True, auto_refresh=False, disable=not sys.stderr.isatty(),
     )  # fmt: skip
     with bar:
         task = bar.add_task("", total=count, said="")

@@ -15,9 +15,10 @@ from pathlib import Path
 from typing import cast
 from xml.etree import ElementTree as ET
 
-from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
+from p2os.cli.console import ReadableConsole
 from robot_bench.cli.progress import runs_bar
 from robot_bench.cli.workers import failure, load_once, run_in_processes
 from robot_bench.events.codec import Json
@@ -191,24 +192,24 @@ def as_json(done: Done) -> Json:
 
 def print_sweep(done: Done) -> None:
     """Print the table, what failed and how to see it again, and at the end the sum, on stdout."""
-    console = Console(highlight=False)
+    console = ReadableConsole()
     console.print(_each(done) if len(done.rows) <= MOST_LINES else _summed(done))
     failed = done.failed
     for row, found in failed[:MOST_FAILURES]:
         first = next(iter(cast("Sequence[str]", found["failures"])), "")
-        console.print(f"failed  {row.words}: {first}", markup=False, soft_wrap=True)
+        console.print(f"failed  {row.words}: {first}", soft_wrap=True)
         if found.get("folder"):
-            console.print(f"        {found['folder']}/report.html", markup=False, soft_wrap=True)
-        console.print(f"        {row.replay}", markup=False, soft_wrap=True)
+            console.print(f"        {found['folder']}/report.html", soft_wrap=True)
+        console.print(f"        {row.replay}", soft_wrap=True)
     if len(failed) > MOST_FAILURES:
         console.print(f"and {len(failed) - MOST_FAILURES} more; --json and --junit have all")
     elif not failed:
-        console.print(f"one of them again: {done.rows[0].replay}", markup=False, soft_wrap=True)
+        console.print(f"one of them again: {done.rows[0].replay}", soft_wrap=True)
     if _are_seeds_alike(done):
-        console.print(f"note    {_ALIKE}", markup=False, soft_wrap=True)
+        console.print(f"note    {_ALIKE}", soft_wrap=True)
     counts = [(word, len(done.with_word(word))) for word in (_PASSED, _FAILED, INTERRUPTED, _NOT_RUN)]
     summed = ", ".join(f"{count} {word}" for word, count in counts if count or word in {_PASSED, _FAILED})
-    console.print(f"{summed} of {len(done.rows)}", markup=False)
+    console.print(f"{summed} of {len(done.rows)}")
 
 
 def _are_seeds_alike(done: Done) -> bool:
@@ -229,7 +230,7 @@ def _each(done: Done) -> Table:
         word = word_of(found)
         table.add_row(
             *(as_toml(value) for _, value in row.settings), str(row.scenario.seed),
-            f"[green]{word}[/]" if word == _PASSED else f"[red]{word}[/]", _figure(found, "virtual_s", "s", 1),
+            Text(word, "green" if word == _PASSED else "red"), _figure(found, "virtual_s", "s", 1),
             _figure(found, "distance_m", "m", 2), _figure(found, "min_clearance_m", "m", 3),
             str(found.get("trace_sha256") or "")[:8],
         )  # fmt: skip

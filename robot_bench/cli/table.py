@@ -6,10 +6,10 @@ Why a run failed stands right above its last line, where a person looks first.
 from collections.abc import Mapping, Sequence
 from typing import cast
 
-from rich.console import Console
 from rich.table import Table
 
 from bluepill_sim.program.last_blocks import TITLE
+from p2os.cli.console import ReadableConsole
 from robot_bench.recording.summary import EXPLAINED, LISTED_HITS, verdict_of
 from robot_bench.run import RunResult
 from simbase.errors import shown
@@ -19,13 +19,13 @@ _COUNTED = (("lines", "lines"), ("branch_ways", "ways of branches"))
 
 #: What stands before a goal, and the goals' place in the outcome; what failed is last.
 LABELS = (
-    ("[green]met[/]     ", "goals_met"), ("[yellow]open[/]    ", "goals_not_judged"), ("[red]failed[/]  ", "failures"),
+    ("met     ", "green", "goals_met"), ("open    ", "yellow", "goals_not_judged"), ("failed  ", "red", "failures"),
 )  # fmt: skip
 
 
 def print_result(result: RunResult) -> None:
     """Print what a run came to, on stdout."""
-    console = Console(highlight=False)
+    console = ReadableConsole()
     outcome = result.outcome
     table = Table(show_header=False, box=None, pad_edge=False)
     for name, value in rows(outcome):
@@ -33,22 +33,20 @@ def print_result(result: RunResult) -> None:
     console.print(table)
     blocks = cast("Sequence[str]", outcome["last_blocks"] or ())
     for line in (TITLE, *blocks) if blocks else ():
-        console.print(line, markup=False, soft_wrap=True)
+        console.print(line, soft_wrap=True)
     for note in cast("Sequence[str]", outcome["notes"]):
-        console.print(f"note    {note}", markup=False, soft_wrap=True)
+        console.print(f"note    {note}", soft_wrap=True)
     for line in _hits(outcome):
-        console.print(f"hit     {line}", markup=False, soft_wrap=True)
+        console.print(f"hit     {line}", soft_wrap=True)
     if outcome.get(EXPLAINED):
-        console.print(f"why     {outcome[EXPLAINED]} (p2os explain {result.folder})", markup=False, soft_wrap=True)
-    for label, key in LABELS:
+        console.print(f"why     {outcome[EXPLAINED]} (p2os explain {result.folder})", soft_wrap=True)
+    for label, colour, key in LABELS:
         # What interrupted a run is no goal, and stands in the last line.
         for goal in cast("Sequence[str]", outcome[key] or ())[key == "failures" and result.was_interrupted :]:
-            console.print(label, end="")
-            console.print(goal, markup=False, soft_wrap=True)
+            console.print(label, style=colour, end="")
+            console.print(goal, soft_wrap=True)
     verdict = verdict_of(outcome)
-    console.print(
-        f"{verdict if result.passed else verdict.upper()}; report: {result.report}", markup=False, soft_wrap=True
-    )
+    console.print(f"{verdict if result.passed else verdict.upper()}; report: {result.report}", soft_wrap=True)
 
 
 def _hits(outcome: Mapping[str, object]) -> list[str]:

@@ -8,6 +8,7 @@ Invariant: `event_of` gives back the event that `line_of` has written.
 """
 
 import json
+import math
 import re
 from binascii import a2b_base64
 from collections import deque
@@ -47,6 +48,10 @@ TRACE_VERSION = 2
 BLOCKS_VERSION = 1
 #: What any number of a trace stays within: 64 bits, as the parts that write it count.
 _MOST = 2**63 - 1
+#: chosen: three years; no run is longer, and ROS's seconds and every picture's axis still hold it.
+LAST_NS: Nanos = 10**17
+#: Who sent a packet.
+_DIRECTIONS = frozenset({"c2r", "r2c"})
 #: What a body noted of a collision before contacts were events: what, and where.
 _OLD_CONTACT = re.compile(r"(.*) at x (-?[\d.]+) m, y (-?[\d.]+) m$")
 
@@ -100,13 +105,28 @@ def _integer(entry: Json, key: str) -> int:
     value = entry.get(key, 0)
     if type(value) is int and -_MOST <= value <= _MOST:
         return value
-    return _whole(value) if isinstance(value, (int, float)) else 0
+    if not isinstance(value, (int, float)):
+        raise ValueError("no number")  # noqa: TRY004 - a damaged line, as any other
+    return _whole(value)
 
 
 def _whole(value: float) -> int:
     if abs(value) > _MOST:
         raise ValueError("a number beyond 64 bits")
     return int(value)
+
+
+def _finite(value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value) or abs(value) > _MOST:
+        raise ValueError("no number")
+    return float(value)
+
+
+def _packet(t: Nanos, entry: Json) -> Recorded:
+    direction = str(entry["dir"])
+    if direction not in _DIRECTIONS:
+        raise ValueError("a packet that nobody sent")
+    return Packet(t=t, direction=direction, data=bytes.fromhex(str(entry["hex"])))
 
 
 def _pins_line(kind: str, pins: Levels | EdgeBlock) -> str:
@@ -154,8 +174,14 @@ def _world_change(t: Nanos, entry: Json) -> Recorded | None:
         return None
     sizes = ("length", "width") if entry.get("shape", "box") == "box" else ("radius",)
     needed = (*_NUMBERS[op], *(sizes if op == "place" else ()), *(["heading"] if "heading" in entry else []))
-    numbers = {key: float(cast("float", entry[key])) for key in needed}
+    numbers = {key: _finite(entry[key]) for key in needed}
     rest = {key: value for key, value in entry.items() if key not in {"k", "t", "op", "name"}}
+    for key in ("height", "radius", "length", "width"):
+        if key in rest:
+            _finite(rest[key])
+    for key in ("shape", "kind"):
+        if not isinstance(rest.get(key, ""), str):
+            raise ValueError("no word")  # noqa: TRY004 - a damaged line, as any other
     return WorldChange(t=t, op=op, name=str(entry["name"]), fields=rest | numbers)
 
 
@@ -184,7 +210,7 @@ def _verdict(t: Nanos, entry: Json) -> Recorded:
     by = entry.get("robustness")
     return Verdict(
         t=t, goal=str(entry["goal"]), met=bool(entry["met"]), says=str(entry["says"]),
-        robustness=float(by) if isinstance(by, (int, float)) else None, unit=str(entry.get("unit", "")),
+        robustness=None if by is None else _finite(by), unit=str(entry.get("unit", "")),
     )  # fmt: skip
 
 
@@ -261,7 +287,7 @@ ROWS: Mapping[type, _Row] = {
     Packet: _Row(
         "wire",
         lambda kind, packet: f'{{"dir":"{packet.direction}","hex":"{packet.data.hex()}","k":"{kind}","t":{packet.t}}}',
-        lambda t, entry: Packet(t=t, direction=str(entry["dir"]), data=bytes.fromhex(str(entry["hex"]))),
+        _packet,
     ),
     Note: _Row("event", _note_line, _note),
     Ranges: _Row(
@@ -320,8 +346,14 @@ def event_of(entry: Json) -> Recorded | None:
         TraceError: It is written as a later version does.
         KeyError, TypeError, ValueError: It is damaged.
     """
-    from_entry = _BY_KIND.get(entry.get("k"))
-    return None if from_entry is None else from_entry(_integer(entry, "t"), entry)
+    kind = entry.get("k")
+    from_entry = _BY_KIND.get(kind) if isinstance(kind, str) else None
+    if from_entry is None:
+        return None
+    at = _integer(entry, "t")
+    if not 0 <= at <= LAST_NS:
+        raise ValueError("at no time of a run")
+    return from_entry(at, entry)
 
 
 def entries_of(lines: Iterable[str]) -> Iterator[Json]:

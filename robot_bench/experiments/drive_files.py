@@ -25,9 +25,11 @@ from robot_bench.experiments.aria_logs import is_aria_log, read_aria_log
 from robot_bench.experiments.bag_drives import drive_of_bag
 from robot_bench.recording.run_record import TRACE_NAME, read_events, read_run
 from simbase.errors import FileError, shown_name
-from simbase.files import writing
+from simbase.files import lines_of, reading, writing
 
 _TUM_COLUMNS = 8
+#: chosen: of a table all rows are held; half a day at 100 Hz.
+LARGEST_TABLE_BYTES = 512 << 20
 #: Longer is no number.
 _LONGEST_FIELD = 64
 
@@ -53,23 +55,19 @@ def read_drive(path: Path, *, robot: str = "", how: HowToRead | None = None) -> 
         return drive_of_bag(path, _parameters(robot))
     if path.is_dir() or path.name == TRACE_NAME:
         return _of_run(path if path.is_dir() else path.parent, robot)
-    try:
-        if _is_aria_log(path):
-            with path.open(encoding="utf-8", errors="replace") as lines:
-                return read_aria_log(path.name, lines, _parameters(robot))
-        if path.suffix.lower() == ".csv":
-            return _of_csv(path, robot)
-        if path.suffix.lower() == ".tum":
-            return Drive(name=path.name, parameters=_parameters(robot), truth=read_tum(path))
-    except (OSError, UnicodeDecodeError) as error:
-        raise FileError(f"cannot read {shown_name(path)}: {getattr(error, 'strerror', None) or 'no text'}") from error
+    if path.is_file() and _is_aria_log(path):  # of a pipe what was looked into would be gone
+        return read_aria_log(path.name, lines_of(path, most=LARGEST_TABLE_BYTES), _parameters(robot))
+    if path.suffix.lower() == ".csv":
+        return _of_csv(path, robot)
+    if path.suffix.lower() == ".tum":
+        return Drive(name=path.name, parameters=_parameters(robot), truth=read_tum(path))
     blocks = open_file(path).blocks
     reading, blocks = how(blocks) if how else (Reading(profile=Profile.P2OS, parameters=_parameters(robot)), blocks)
     return drive_of_capture(path.name, chunks_of(blocks), reading.parameters, reading.profile)
 
 
 def _is_aria_log(path: Path) -> bool:
-    with path.open("rb") as file:
+    with reading(path), path.open("rb") as file:
         return is_aria_log(file.readline(_LONGEST_FIELD).decode("utf-8", "replace"))
 
 
@@ -84,18 +82,20 @@ def _of_run(folder: Path, robot: str) -> Drive:
 
 
 def _of_csv(path: Path, robot: str) -> Drive:
-    with path.open(encoding="utf-8-sig", newline="") as file:
-        reader = csv.reader(file)
+    reader = csv.reader(lines_of(path, errors="strict", newline="", most=LARGEST_TABLE_BYTES))
+    try:
         names = next(reader, [])
-        heading = next((name for name in ("heading_rad", "heading_deg") if name in names), "")
-        for name in ("t_s", "x_m", "y_m", heading):
-            if name not in names:
-                raise FileError(
-                    f"{shown_name(path)}:1: no column {name or 'heading_rad'}",
-                    hint="columns: t_s, x_m, y_m, heading_rad or heading_deg",
-                )
-        columns = {name: names.index(name) for name in names}
         rows = [(reader.line_num, row) for row in reader if row]
+    except csv.Error as error:
+        raise FileError(f"{shown_name(path)}:{reader.line_num}: no CSV: {error}") from error
+    heading = next((name for name in ("heading_rad", "heading_deg") if name in names), "")
+    for name in ("t_s", "x_m", "y_m", heading):
+        if name not in names:
+            raise FileError(
+                f"{shown_name(path)}:1: no column {name or 'heading_rad'}",
+                hint="columns: t_s, x_m, y_m, heading_rad or heading_deg",
+            )
+    columns = {name: names.index(name) for name in names}
 
     def column(name: str) -> list[tuple[float, float]]:
         return [
@@ -138,15 +138,14 @@ def read_tum(path: Path) -> Trajectory:
         FileError: A line has not eight numbers, or there are fewer than two lines.
     """
     rows = []
-    with path.open(encoding="utf-8") as file:
-        for number, line in enumerate(file, 1):
-            words = line.split()
-            if not words or words[0].startswith("#"):
-                continue
-            if len(words) != _TUM_COLUMNS:
-                raise FileError(f"{shown_name(path)}:{number}: {len(words)} numbers, expected t x y z qx qy qz qw")
-            t, x, y, _, qx, qy, qz, qw = (_number(path, number, words, place) for place in range(_TUM_COLUMNS))
-            rows.append((t, x, y, heading_of(qx, qy, qz, qw)))
+    for number, line in enumerate(lines_of(path, errors="strict", most=LARGEST_TABLE_BYTES), 1):
+        words = line.split()
+        if not words or words[0].startswith("#"):
+            continue
+        if len(words) != _TUM_COLUMNS:
+            raise FileError(f"{shown_name(path)}:{number}: {len(words)} numbers, expected t x y z qx qy qz qw")
+        t, x, y, _, qx, qy, qz, qw = (_number(path, number, words, place) for place in range(_TUM_COLUMNS))
+        rows.append((t, x, y, heading_of(qx, qy, qz, qw)))
     try:
         return Trajectory.of_rows(rows)
     except FileError as error:

@@ -18,7 +18,8 @@ from p2os.capture.formats.mcap_files import McapFile
 from robot_bench.events.codec import Json
 from robot_bench.events.kinds import KINDS, Event
 from robot_bench.recording.scene_messages import SceneMessages
-from simbase.errors import FileError, MissingDependencyError, UsageError
+from simbase.errors import MissingDependencyError, UsageError
+from simbase.files import open_to_write, open_to_write_text
 
 #: chosen: rows of a group of a Parquet file.
 GROUP = 65_536
@@ -40,10 +41,7 @@ def write_named_events(events: Iterable[tuple[str, Event]], path: Path, meta: Js
     write = WRITERS.get(path.suffix)
     if write is None:
         raise UsageError(f"cannot write events as {path.suffix or path.name}", hint=" or ".join(WRITERS))
-    try:
-        return write(events, path, meta or {})
-    except OSError as error:
-        raise FileError(f"cannot write {path}: {error.strerror or error}") from error
+    return write(events, path, meta or {})
 
 
 def _plain(robot: str, event: Event) -> dict[str, object]:
@@ -57,7 +55,7 @@ def _plain(robot: str, event: Event) -> dict[str, object]:
 
 def _write_json(events: Iterable[tuple[str, Event]], path: Path, _meta: Json) -> int:
     count = 0
-    with path.open("w", encoding="utf-8", newline="\n") as file:
+    with open_to_write_text(path) as file:
         for robot, event in events:
             file.write(json.dumps(_plain(robot, event), separators=(",", ":")) + "\n")
             count += 1
@@ -77,7 +75,7 @@ def _write_parquet(events: Iterable[tuple[str, Event]], path: Path, _meta: Json)
     named = {field.name: field.type for kind in KINDS for field in dataclasses.fields(kind)}
     columns = {"robot": pa.string(), "kind": pa.string()} | {name: _type(types, hint) for name, hint in named.items()}
     schema, count = pa.schema(list(columns.items())), 0
-    with path.open("wb") as file, parquet.ParquetWriter(file, schema) as writer:
+    with open_to_write(path) as file, parquet.ParquetWriter(file, schema) as writer:
         every = iter(events)
         while group := list(islice(every, GROUP)):
             rows = [_row(robot, event) for robot, event in group]

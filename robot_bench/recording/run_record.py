@@ -12,9 +12,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 from robot_bench.events.codec import (
+    LAST_NS,
     TRACE_VERSION,
     Blocks,
     EdgeBlock,
@@ -44,7 +45,9 @@ from robot_bench.events.kinds import (
     Wave,
     WorldChange,
 )
+from robot_bench.events.whole_lines import check_whole_line
 from robot_bench.wires.edges import Edges
+from simbase.files import lines_of
 from simbase.timing import NS_PER_S
 
 TRACE_NAME = "trace.jsonl"
@@ -104,8 +107,7 @@ def read_run(folder: Path) -> RunRecord:
         TraceError: The folder or its trace is missing, or its first line is no trace.
     """
     path = _trace_in(folder)
-    with path.open(encoding="utf-8", errors="replace") as lines:
-        record = record_of(lines, str(path))
+    record = record_of(lines_of(path, TraceError), str(path))
     if not record.meta:
         raise TraceError(f"{path} does not start with a trace's meta line", hint="was it made by `p2os run`?")
     return record
@@ -118,8 +120,7 @@ def read_events(folder: Path) -> Iterator[Event]:
         TraceError: The folder or its trace is missing, or a line is damaged.
     """
     path = _trace_in(folder)
-    with path.open(encoding="utf-8", errors="replace") as lines:
-        yield from events_of(lines, str(path))
+    yield from events_of(lines_of(path, TraceError), str(path))
 
 
 def read_meta(folder: Path) -> Json:
@@ -129,8 +130,7 @@ def read_meta(folder: Path) -> Json:
         TraceError: The folder or its trace is missing, or its first line is damaged.
     """
     path = _trace_in(folder)
-    with path.open(encoding="utf-8", errors="replace") as lines:
-        return record_of(islice(lines, 1), str(path)).meta
+    return record_of(islice(lines_of(path, TraceError), 1), str(path)).meta
 
 
 def _trace_in(folder: Path) -> Path:
@@ -160,6 +160,7 @@ def record_of(lines: Iterable[str], where: str = "the trace") -> RunRecord:
 def _file(record: RunRecord, blocks: Blocks, entry: Json) -> None:
     """Put one entry where it belongs; kinds that a later version adds are passed over."""
     kind = entry.get("k")
+    check_whole_line(entry)
     if kind == "meta":
         record.meta = _meta(entry)
         return
@@ -170,7 +171,7 @@ def _file(record: RunRecord, blocks: Blocks, entry: Json) -> None:
     event = event_of(entry)
     if event is None:
         at = entry.get("t")
-        record.last_ns = max(record.last_ns, at if isinstance(at, int) else 0)
+        record.last_ns = max(record.last_ns, at if type(at) is int and at <= LAST_NS else 0)
         return
     record.last_ns = max(record.last_ns, event.t)
     if isinstance(event, Levels):
@@ -207,9 +208,7 @@ _FILES: Mapping[type, Callable[[RunRecord, Any], None]] = {
 
 
 def _meta(entry: Json) -> Json:
-    """Return the first line, whose world's things have names and places."""
-    things = cast("list[Json]", cast("Json", entry.get("world") or {}).get("obstacles") or [])
-    _ = [(str(item["name"]), float(cast("float", item["x"])), float(cast("float", item["y"]))) for item in things]
+    """Return the first line of a trace that this version reads."""
     version = entry.get("trace", 1)
     if not isinstance(version, int) or version > TRACE_VERSION:
         raise TraceError(

@@ -78,7 +78,8 @@ def figures(record: RunRecord) -> list[tuple[str, str]]:
     if isinstance(clearance, (int, float)):
         rows.append(("least clearance", f"{clearance:.3f} m"))
     rows.append(("packets on the wire", f"{len(record.wire)}"))
-    rows += [(f"PWM on {net}", _pwm([wave for _, wave in waves if wave])) for net, waves in record.waves.items()]
+    rows += [(f"PWM on {net}", _pwm([wave for _, wave in waves if wave])) for net, waves in record.waves.items()
+             if any(wave for _, wave in waves)]  # fmt: skip
     factor = record.end.get("real_time_factor")
     if isinstance(factor, (int, float)):
         rows.append(("speed", f"{factor:.1f} × real time"))

@@ -12,6 +12,8 @@ from typing import cast
 from robot_bench.events.kinds import Event
 from robot_bench.recording.run_record import TRACE_NAME, read_events, read_meta
 from robot_bench.recording.summary import SUMMARY_NAME
+from simbase.errors import FileError
+from simbase.files import read_text
 from simbase.timing import Nanos
 
 
@@ -27,8 +29,8 @@ def robots_in(folder: Path) -> list[str]:
 def scenario_of(folder: Path) -> str:
     """Return the name of the scenario that a folder of several robots was made with, as far as it tells."""
     try:
-        return str(json.loads((folder / SUMMARY_NAME).read_text(encoding="utf-8"))["scenario"])
-    except (OSError, ValueError, KeyError, TypeError):  # a run that was cut has none
+        return str(json.loads(read_text(folder / SUMMARY_NAME))["scenario"])
+    except (FileError, ValueError, KeyError, TypeError):  # a run that was cut has none
         return folder.name
 
 

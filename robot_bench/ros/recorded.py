@@ -9,7 +9,7 @@ from robot_bench.recording.run_record import TRACE_NAME
 from robot_bench.ros.bench_node import SET_PIN, WHO
 from robot_bench.scenario.hand_script import LEVELS, Deed
 from simbase.errors import FileError, shown_name
-from simbase.files import reading
+from simbase.files import lines_of
 
 
 def read_inputs(path: Path) -> list[Deed]:
@@ -20,11 +20,7 @@ def read_inputs(path: Path) -> list[Deed]:
         TraceError: It is damaged.
     """
     trace = path / TRACE_NAME if path.is_dir() else path
-    try:
-        with reading(trace, hint="a run folder"), trace.open(encoding="utf-8") as lines:
-            found = inputs_of(lines, str(trace))
-    except UnicodeDecodeError as error:
-        raise FileError(f"{shown_name(trace)} is no trace that can be read: {error}", hint="a run folder") from error
+    found = inputs_of(lines_of(trace, hint="a run folder", errors="strict"), str(trace))
     if not found:
         raise FileError(f"in {shown_name(trace)} nothing came in from ROS", hint="p2os run SCENARIO --ros makes one")
     return found

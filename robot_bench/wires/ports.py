@@ -60,7 +60,11 @@ class Chip(ChipWithPins, Protocol):
 
     @property
     def has_died(self) -> bool:
-        """Whether the fault ended the firmware."""
+        """Whether the firmware has ended: by its fault, or because it resets for ever."""
+
+    @property
+    def died_ns(self) -> int | None:
+        """When it ended; None: it has not."""
 
     @property
     def verdict(self) -> str:

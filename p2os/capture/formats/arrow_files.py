@@ -8,6 +8,7 @@ from typing import IO, Any
 from p2os.capture.cells import Cell
 from p2os.capture.table import Table
 from simbase.errors import MissingDependencyError
+from simbase.files import open_to_write
 
 #: chosen: larger groups of rows are little faster and smaller in the file, and take more memory.
 GROUP_ROWS = 1 << 16
@@ -69,7 +70,7 @@ def _write(tables: Iterable[Table], path: Path, writer_of: Any) -> int:
     kinds = [kind_of(column) for column in first.columns.values()]
     types = {"b": pa.bool_(), "i": pa.int64(), "f": pa.float64(), "O": pa.string()}
     schema = pa.schema([(name, types[kind]) for name, kind in zip(first.columns, kinds, strict=True)])
-    with path.open("wb") as file, writer_of(file, schema, first.columns) as writer:
+    with open_to_write(path) as file, writer_of(file, schema, first.columns) as writer:
         group: list[Any] = []
         for table in chain([first], every):
             arrays = [cells_array(*both) for both in zip(table.columns.values(), kinds, strict=True)]

@@ -14,6 +14,7 @@ from p2os.capture.chunks import Direction
 from p2os.capture.describe import Plain
 from p2os.capture.listing import ListingRow
 from simbase.errors import MissingDependencyError
+from simbase.files import open_to_write
 from simbase.timing import Nanos
 
 #: Type of a plain value → its name in JSON Schema.
@@ -31,7 +32,7 @@ class McapFile:
 
     Raises:
         MissingDependencyError: mcap is not installed.
-        OSError: The file cannot be written.
+        FileError: The file cannot be written.
     """
 
     def __init__(self, path: Path, *, instead: str) -> None:
@@ -41,7 +42,7 @@ class McapFile:
             raise MissingDependencyError(".mcap files need mcap", extra="export", hint=instead) from error
         self.count = 0
         self._channels: dict[str, int] = {}
-        self._file = path.open("wb")
+        self._file = open_to_write(path)
         self._writer = Writer(self._file, compression=CompressionType.NONE)
         self._writer.start(profile="", library="p2os")
 
@@ -87,7 +88,7 @@ def write_mcap(rows: Iterable[ListingRow], path: Path, base_ns: Nanos = 0) -> in
 
     Raises:
         MissingDependencyError: mcap is not installed.
-        OSError: The file cannot be written.
+        FileError: The file cannot be written.
     """
     with McapFile(path, instead="export to .csv") as file:
         for row in rows:

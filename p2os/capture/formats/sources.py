@@ -14,13 +14,13 @@ from p2os.capture.chunks import Block, Capture, Chunk, Direction, Part, block_of
 from p2os.capture.formats.hex_text import hex_parts, is_hexdump, looks_like_hex
 from p2os.capture.formats.pcap import is_pcap, pcap_blocks
 from p2os.capture.formats.recording import note_of, recorded_parts
-from simbase.errors import FileError
+from simbase.errors import FileError, shown_name
 from simbase.files import reading
 
 #: The P2OS bytes in the folder that `p2os run` makes.
 RUN_WIRE = "wire.jsonl"
-#: chosen: what is held whole in memory, by `read_file`; `open_file` takes any length.
-LARGEST_BYTES = 2_000_000_000
+#: chosen: what is held whole in memory, by `read_file`: 12 hours at 115200 baud. `open_file` takes any length.
+LARGEST_BYTES = 512 << 20
 #: chosen: what is read at a time; the kind of a file is told by its first block.
 BLOCK_BYTES = 1 << 16
 #: chosen: what is read at a time behind the first block; larger ones take more memory and hardly less time.
@@ -129,10 +129,20 @@ def read_file(path: Path, direction: Direction | None = None) -> Capture:
         FileError: The file cannot be read, or holds no capture.
     """
     place = path / RUN_WIRE if path.is_dir() else path
-    with reading(place):
-        if place.stat().st_size > LARGEST_BYTES:
-            raise FileError(f"{place} is larger than {LARGEST_BYTES // 1_000_000_000} GB")
-    return open_file(path, direction).whole()
+    source = open_file(path, direction)
+    return replace(source, blocks=_bounded(source.blocks, place)).whole()
+
+
+def _bounded(blocks: Iterator[Block], place: Path) -> Iterator[Block]:
+    """Yield blocks, as many as are held in memory: what is read may have no end."""
+    left = LARGEST_BYTES
+    for block in blocks:
+        left -= len(block.data)
+        if left < 0:
+            raise FileError(
+                f"{shown_name(place)} holds more than {LARGEST_BYTES >> 20} MiB", hint="p2os decode takes any length"
+            )
+        yield block
 
 
 def _named(blocks: Iterator[Block], file: BinaryIO, place: Path) -> Iterator[Block]:

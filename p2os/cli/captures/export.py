@@ -18,7 +18,7 @@ from p2os.cli.captures.reading import ProfileForLayouts, RobotForUnits, chosen_r
 from p2os.cli.help_pages import CAPTURES
 from p2os.cli.kept_files import FORCE_HELP, refuse_to_overwrite
 from simbase.errors import FileError, UsageError
-from simbase.files import writing
+from simbase.files import open_to_write_text, writing
 
 HELP = """Write a capture as CSV, Parquet, Arrow or MCAP.
 
@@ -109,7 +109,7 @@ def _write_csv(tables: Iterator[Table], target: Path) -> int:
     first = next(tables, None)
     if first is None:
         return 0
-    with target.open("w", encoding="utf-8", newline="") as file:
+    with open_to_write_text(target, newline="") as file:
         return write_csv(chain([first], tables), file)
 
 

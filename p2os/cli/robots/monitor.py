@@ -93,8 +93,9 @@ def _tell(notice: Notice) -> None:
 
 def _show(client: Robot, url: str, lasts_ns: Nanos | None) -> None:
     try:
-        from rich.console import Console
         from rich.live import Live
+
+        from p2os.cli.console import ReadableConsole
     except ImportError as error:  # pragma: no cover - rich comes with every installation
         raise MissingDependencyError("the dashboard needs rich", extra="", hint="--json") from error
     news: deque[str] = deque(maxlen=NEWS_LINES)
@@ -105,7 +106,7 @@ def _show(client: Robot, url: str, lasts_ns: Nanos | None) -> None:
     identity = client.identity
     title = f"{identity.name or 'robot'} ({client.parameters.title}, {client.profile.value}) on {url}"
     ends = None if lasts_ns is None else wall_clock() + lasts_ns
-    console = Console()
+    console = ReadableConsole()
     with Live(console=console, auto_refresh=False, screen=True) as live:
         while ends is None or wall_clock() < ends:
             dashboard = Dashboard(

@@ -4,6 +4,7 @@ from pathlib import Path
 
 from p2os.errors import WorldError
 from p2os.toml_file import read_user_text
+from simbase.files import read_bytes, with_plain_ends
 
 
 def read_text(path: Path) -> str:
@@ -22,9 +23,11 @@ def read_foreign_text(path: Path) -> str:
     may end with CR alone.
 
     Raises:
-        OSError: It cannot be read.
+        WorldError: It cannot be read, or is too large.
     """
+    data = read_bytes(path, WorldError)
     try:
-        return path.read_text(encoding="utf-8-sig")
+        text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
-        return path.read_text(encoding="latin-1")
+        text = data.decode("latin-1")
+    return with_plain_ends(text)

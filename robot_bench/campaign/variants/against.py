@@ -19,7 +19,7 @@ from robot_bench.events.codec import events_of
 from robot_bench.events.kinds import Event
 from robot_bench.recording.divergence import Difference, differences
 from simbase.errors import UsageError
-from simbase.files import writing
+from simbase.files import read_bytes, writing
 from simbase.timing import NS_PER_S
 
 #: The other version, in the campaign's folder, with the name that it had.
@@ -38,27 +38,29 @@ class Other:
     content: bytes
 
     @classmethod
-    def kept(cls, path: Path, folder: Path) -> "Other":
-        """Return a firmware file, and keep it in a campaign's folder.
+    def read(cls, path: Path) -> "Other":
+        """Return a firmware file.
 
         Raises:
-            UsageError: There is no such file.
+            UsageError: There is no such file, or it is too large.
+        """
+        return cls(path.name, read_bytes(path, UsageError, hint="give an ELF, HEX or BIN file"))
+
+    def keep(self, folder: Path) -> None:
+        """Keep it in a campaign's folder.
+
+        Raises:
             FileError: The folder cannot be written.
         """
-        try:
-            found = cls(path.name, path.read_bytes())
-        except OSError as error:
-            raise UsageError(f"there is no firmware file {path}", hint="give an ELF, HEX or BIN file") from error
         with writing(folder, hint="--out another folder"):
             (folder / FOLDER).mkdir(parents=True, exist_ok=True)
-            (folder / FOLDER / path.name).write_bytes(found.content)
-        return found
+            (folder / FOLDER / self.name).write_bytes(self.content)
 
     @classmethod
     def of(cls, folder: Path) -> "Other | None":
         """Return the version that a campaign's folder was begun against; None where there is none."""
         files = sorted((folder / FOLDER).glob("*")) if (folder / FOLDER).is_dir() else []
-        return cls(files[0].name, files[0].read_bytes()) if files else None
+        return cls(files[0].name, read_bytes(files[0])) if files else None
 
 
 class Against:

@@ -26,6 +26,7 @@ from robot_bench.campaign.campaign_file import Limits
 from robot_bench.campaign.trial import Done, Outcome, Trial, Verdict, warm_up
 from robot_bench.campaign.workers.beginnings import Beginnings, Work, Worked
 from robot_bench.running.forks import LOOK_S, begin, how_it_ended, received
+from simbase.files import writing_temporary
 from simbase.user_classes import unforeseen
 
 #: chosen: so often a trial is begun whose process or worker is killed from outside.
@@ -72,8 +73,10 @@ class Processes:
         """Do all, each in a process of its own."""
         waiting = [(place, 1) for place in range(len(works))][::-1]
         running: dict[Connection, tuple[int, int, ForkProcess]] = {}
+        with writing_temporary():
+            made = tempfile.TemporaryDirectory(prefix="p2os-campaign-")
         gc.freeze()
-        with tempfile.TemporaryDirectory(prefix="p2os-campaign-") as folder:
+        with made as folder:
             try:
                 while running or waiting:
                     self._look()

@@ -17,6 +17,7 @@ from p2os.cli.trust import Trusted, said
 from p2os.transport.wall_clock import wall_clock
 from robot_bench.campaign.campaign_file import Campaign, campaign_schema
 from robot_bench.campaign.conduct import Finding, Progress, Workers
+from robot_bench.campaign.journal import NAME as JOURNAL
 from robot_bench.campaign.results import Whole
 from robot_bench.campaign.search import SEARCHES
 from robot_bench.campaign.suggestion import suggested
@@ -109,14 +110,15 @@ def campaign(
         if asked or overrides or firmware or against or out:
             raise UsageError("--resume goes on with what was begun", hint="leave file and options out, but for -j")
         folder, found = go_on, resume(go_on, trust=said(trust))
+        other = Other.of(folder)
     elif len(asked) == 1:
         file = Path(asked[0])
         folder = out or make_next_folder(file.stem, CAMPAIGNS)
-        found = begin(file, folder, firmware=firmware, overrides=overrides, trust=said(trust))
+        other = None if against is None else Other.read(against)
+        found = begin(file, folder, firmware=firmware, overrides=overrides, other=other, trust=said(trust))
     else:
         raise UsageError("which campaign?", hint="p2os campaign FILE, or p2os campaign new SCENARIO")
     with RunDisplay(is_shown=False) as display:
-        other = Other.of(folder) if against is None else Other.kept(against, folder)
         workers = _workers(found, jobs or core_count(), dask, scheduler, display)
         if other is not None:
             workers = Against(workers, other)
@@ -182,6 +184,8 @@ def shown(found: Campaign) -> Iterator[Callable[[Progress], None]]:
 
 def tell(done: Whole, other: Other | None, *, json_output: bool) -> None:
     """Print what came of a campaign, and end the command with its exit code."""
+    for words in done.progress.left_out_words():
+        typer.echo(f"{done.folder / JOURNAL}: {words}; left out, what it told was run again", err=True)
     parts = {} if other is None or done.was_interrupted else parted(done, other)
     if json_output:
         typer.echo(json.dumps(done.as_json() | ({"parted": parts} if parts else {}), sort_keys=True))

@@ -12,7 +12,7 @@ import typer
 
 from bluepill_sim.analysis.coverage import Coverage
 from bluepill_sim.board import BluePill
-from bluepill_sim.program.elf_file import read_bytes
+from bluepill_sim.program.elf_file import file_bytes
 from bluepill_sim.program.image import Image
 from bluepill_sim.program.line_table import read_lines
 from bluepill_sim.program.mutants import Mutant, mutants, mutated_file
@@ -173,7 +173,7 @@ def _suite(paths: tuple[Path, ...], board: BluePill, raise_if_interrupted: Calla
         raise UsageError(f"the tests do not pass with the program itself: {why}", hint=f"pytest {said} shows it")
     if not found.addresses:
         raise UsageError(f"no test of {said} drives the fixture bench", hint="docs/bench.md, tests of a firmware")
-    return Suite(paths=paths, base=found, data=read_bytes(board.image), image=board.image)
+    return Suite(paths=paths, base=found, data=file_bytes(board.image), image=board.image)
 
 
 def _chosen(image: Image, ran: set[int], names: Coverage, only: Sequence[str]) -> list[Mutant]:
@@ -246,7 +246,7 @@ def _write(mutation: Mutation, image: Image, folder: Path) -> None:
     Raises:
         FileError: The folder cannot be written.
     """
-    data = read_bytes(image)
+    data = file_bytes(image)
     suffix = ".elf" if data.startswith(b"\x7fELF") else ".bin"
     with writing(folder):
         for mutant in mutation.survivors:

@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
+from p2os.cli.console import ReadableConsole
 from p2os.cli.help_pages import BENCH
 from p2os.cli.keyboard import has_keyboard
 from p2os.cli.main import EXIT_INTERRUPTED
@@ -179,7 +180,7 @@ def _run_all(
     for body in dict.fromkeys(variant.body for variant in chosen_variants):
         load_once(first.with_options(body=body))
     with RunDisplay(is_shown=False) as display:
-        console = Console(stderr=True)
+        console = ReadableConsole(stderr=True)
         with console.status("validating", spinner="line") as status:
 
             def done(count: int, whole: int) -> None:
@@ -249,7 +250,7 @@ def _plain(results: Sequence[Result]) -> Json:
 
 
 def _print(results: Sequence[Result], folder: Path) -> None:
-    console = Console(highlight=False)
+    console = ReadableConsole()
     chosen = list(dict.fromkeys(result.variant for result in results))
     table = Table(box=None, pad_edge=False)
     table.add_column("experiment")
@@ -262,11 +263,11 @@ def _print(results: Sequence[Result], folder: Path) -> None:
         passed = sum(result.passed for result in found)
         colour = "green" if passed == len(found) else "red"
         shown = "" if near is None else f"{min(near.share, 999):.2f}  {near.what}"
-        table.add_row(name, f"[{colour}]{passed} of {len(found)}[/]", shown)
+        table.add_row(name, Text(f"{passed} of {len(found)}", colour), shown)
     console.print(table)
     lines = [f"{result.variant.name}: {line}" for result in results for line in told(result)]
     for line in lines[:MOST_TOLD]:
-        console.print(f"[red]failed[/]  {line}", soft_wrap=True)
+        console.print(Text.assemble(("failed", "red"), f"  {line}"), soft_wrap=True)
     if len(lines) > MOST_TOLD:
         console.print(f"and {len(lines) - MOST_TOLD} more, in the report")
     untold = [name for name in loose(one for r in results for one in r.findings) if name not in LOOSE_BECAUSE]

@@ -5,7 +5,6 @@ A run without its firmware, or of a robot on own pins, is explained from its tra
 Invariant: the same run gives the same explanation, byte for byte.
 """
 
-import hashlib
 import itertools
 import re
 from collections.abc import Sequence
@@ -25,6 +24,7 @@ from robot_bench.report.explain.progress import ProgressInquest, fed, words_of
 from robot_bench.report.explain.replay import ChipReplay, Hold
 from robot_bench.report.explain.scene import Scene
 from simbase.errors import P2osError
+from simbase.files import sha256_of
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: Goals that a touch decides, and those that want way.
@@ -77,7 +77,7 @@ def _prober(record: RunRecord, firmware: Path | None, limits: list[str]) -> Prob
         limits.append("what the program did: its file is not here (--firmware FILE)")
         return None
     wanted = record.meta.get("firmware_sha256")
-    if wanted and hashlib.sha256(firmware.read_bytes()).hexdigest() != wanted:
+    if wanted and sha256_of(firmware) != wanted:
         limits.append(f"what the program did: {firmware.name} is another file than the one that ran")
         return None
     try:

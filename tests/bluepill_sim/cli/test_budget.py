@@ -29,7 +29,11 @@ class Clock:
 def test_a_program_that_resets_itself_over_and_over_keeps_to_the_budget(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    source = "mov32 r1, #0xE000ED0C\nmov32 r2, #0x05FA0004\nstr r2, [r1, #0]\n"
+    source = (  # it puts PC13 low meanwhile: one that does nothing but reset is ended before
+        "mov32 r1, #0x40021018\nmov32 r2, #0x10\nstr r2, [r1, #0]\n"
+        "mov32 r1, #0x40011004\nmov32 r2, #0x44244444\nstr r2, [r1, #0]\n"
+        "mov32 r1, #0xE000ED0C\nmov32 r2, #0x05FA0004\nstr r2, [r1, #0]\n"
+    )
     ((_, program),) = Machine(source, {}).image.segments
     path = tmp_path / "resets.bin"
     path.write_bytes(program)

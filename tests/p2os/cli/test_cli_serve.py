@@ -132,8 +132,8 @@ def test_serve_refuses_a_port_that_is_taken(serving: Callable[..., Serving], cap
         (["--world", "nowhere"], 2, "p2os: no world 'nowhere'"),
         (["--world", "nowhere.toml"], 2, "p2os: no world 'nowhere.toml': there is no such file"),
         (["--world", "."], 2, "p2os: no world '.': that is a folder"),
-        (["--flash", "none.toml"], 2, "p2os: cannot read none.toml: No such file or directory"),
-        (["--errors", "none.toml"], 2, "p2os: cannot read none.toml: No such file or directory"),
+        (["--flash", "none.toml"], 2, "p2os: cannot read none.toml: no such file or directory"),
+        (["--errors", "none.toml"], 2, "p2os: cannot read none.toml: no such file or directory"),
         (
             ["--body", "kinematic", "--port", "tcp:127.0.0.1:0", "--control", "COM3"],
             2,

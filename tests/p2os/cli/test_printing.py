@@ -20,6 +20,7 @@ from p2os.cli import printing
 from p2os.cli.printing import MOST_BYTES, QueuedStream, queue_output, restored_output
 from p2os.cli.robots.teleop import NEXT_HOLD_NS
 from simbase.errors import FileError
+from simbase.terminal import drawn
 from simbase.timing import NS_PER_S
 from tests.p2os.cli.driven import AT_ONCE_S, STOP, TIMEOUT_S, VEL, Driver, RecordingRobot, is_raw, until
 from tests.tools.forked_python import forked_p2os
@@ -172,9 +173,10 @@ def test_the_streams_are_replaced_for_a_while_where_they_could_hold_anybody_up(
     with restored_output():
         queue_output()
         queue_output()
-        assert sys.stdout is captured
-        assert isinstance(sys.stderr, QueuedStream)
-        assert sys.stderr.below is pipe.below
+        assert drawn(sys.stdout) is captured
+        queued = drawn(sys.stderr)
+        assert isinstance(queued, QueuedStream)
+        assert queued.below is pipe.below
         sys.stderr.write("told\n")
     assert sys.stderr is pipe.below
     assert pipe.read_until("\n") == "told\n"

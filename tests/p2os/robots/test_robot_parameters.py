@@ -148,7 +148,7 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path: Path, monkeypatch: pytest
 
     path = tmp_path / f"mine.{ending}"
     path.write_text("", encoding="utf-8")
-    monkeypatch.setattr(Path, "read_text", refuse)
+    monkeypatch.setattr(Path, "open", refuse)
     with pytest.raises(ParametersError, match=r"cannot read .* permission denied"):
         load_parameters(path)
 

@@ -137,10 +137,11 @@ def test_each_trial_is_run_with_both_versions_in_whatever_order_they_end(seed: i
 def test_the_other_version_is_kept_in_the_folder_so_that_the_campaign_can_go_on(tmp_path: Path) -> None:
     assert Other.of(tmp_path) is None
     (tmp_path / "old.elf").write_bytes(b"other")
-    kept = Other.kept(tmp_path / "old.elf", tmp_path / "campaign")
+    kept = Other.read(tmp_path / "old.elf")
+    kept.keep(tmp_path / "campaign")
     assert Other.of(tmp_path / "campaign") == kept == Other("old.elf", b"other")
-    with pytest.raises(UsageError, match="no firmware file"):
-        Other.kept(tmp_path / "none.elf", tmp_path)
+    with pytest.raises(UsageError, match="no such file"):
+        Other.read(tmp_path / "none.elf")
 
 
 def test_two_versions_part_where_the_first_of_them_does_something_else() -> None:

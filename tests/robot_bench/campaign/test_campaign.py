@@ -1,5 +1,6 @@
 """A campaign from its file to its folder, with runs of seconds: the same set whatever happens on the way."""
 
+import contextlib
 import itertools
 import json
 import os
@@ -10,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import typer
 
 from p2os.errors import ScenarioError
 from robot_bench.campaign.campaign_file import (
@@ -30,6 +32,7 @@ from robot_bench.campaign.trial import GoalResult, Outcome, Trial, Verdict, run_
 from robot_bench.campaign.whole import MOST_MOMENTS, Whole, begin, carry_out, resume
 from robot_bench.campaign.workers import processes
 from robot_bench.campaign.workers.processes import Processes
+from robot_bench.cli.campaigns.campaign import tell
 from robot_bench.scenario.scenario import known_scenarios, load_scenario
 from simbase.errors import FileError, UsageError
 
@@ -172,6 +175,32 @@ def test_a_line_of_the_journal_that_was_cut_is_done_again(tmp_path: Path) -> Non
         assert set_of(carried(resume(tmp_path / "kept"), tmp_path / "kept", workers)) == expected
         assert workers.count == lines - whole[:length].count(b"\n")
         assert journal.read_bytes().count(b"\n") == lines
+
+
+@pytest.mark.slow
+def test_forged_and_older_lines_of_the_journal_are_done_again_and_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    expected = carried(begun(tmp_path), tmp_path / "kept", Shuffled(1))
+    journal = tmp_path / "kept/journal.jsonl"
+    lines = journal.read_bytes().splitlines()
+    lines[1] = lines[1].replace(b'"passed"', b'"failed"') if b'"passed"' in lines[1] else lines[1][:9] + lines[1][11:]
+    lines[3] = b"not a line \xff"
+    lines[4] = lines[4].partition(b',"sum":')[0] + b"}"
+    journal.write_bytes(b"\n".join(lines) + b"\n")
+    workers = Shuffled(2)
+    went_on = carried(resume(tmp_path / "kept"), tmp_path / "kept", workers)
+    assert set_of(went_on) == set_of(expected)
+    assert workers.count == 3
+    assert went_on.progress.left_out.keys() == {2, 4, 5}
+    assert went_on.as_json()["journal_left_out"] == {
+        "2": "damaged or changed: its checksum does not hold", "4": "damaged",
+        "5": "no checksum, as an earlier p2os wrote it",
+    }  # fmt: skip
+    with contextlib.suppress(typer.Exit):
+        tell(went_on, None, json_output=False)
+    assert f"{journal}: line 4: damaged; left out, what it told was run again" in capsys.readouterr().err
+    assert "line 5: no checksum" in (tmp_path / "kept/report.html").read_text(encoding="utf-8")
 
 
 def test_a_failure_whose_replay_has_another_hash_is_not_reported(tmp_path: Path) -> None:

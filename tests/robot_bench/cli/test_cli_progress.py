@@ -21,7 +21,7 @@ def at(now_s: float) -> Progress:
 
 def test_a_terminal_shows_time_speed_and_what_the_robot_does(monkeypatch: pytest.MonkeyPatch) -> None:
     shown = io.StringIO()
-    monkeypatch.setattr(progress, "Console", lambda **_: Console(file=shown, force_terminal=True, width=120))
+    monkeypatch.setattr(progress, "ReadableConsole", lambda **_: Console(file=shown, force_terminal=True, width=120))
     with RunDisplay(is_shown=True) as display:
         display.update(at(12.3))
         display.update(at(12.4))

@@ -67,7 +67,7 @@ def test_a_run_is_exported_by_a_verb(tmp_path: Path, capsys: pytest.CaptureFixtu
 @pytest.mark.parametrize(
     ("folder", "name", "says"),
     [(".", "all.csv", "cannot write events as .csv\nhint: .jsonl or .parquet"),
-     (".", "none/all.jsonl", "No such file or directory"), ("none", "all.jsonl", "holds no trace.jsonl")],
+     (".", "none/all.jsonl", "no such file or directory"), ("none", "all.jsonl", "holds no trace.jsonl")],
 )  # fmt: skip
 def test_what_cannot_be_exported_is_one_line(
     folder: str, name: str, says: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

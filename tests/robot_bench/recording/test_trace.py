@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from p2os.errors import RunFailedError
-from robot_bench.events.codec import TraceError, events_of
+from robot_bench.events.codec import LAST_NS, TraceError, events_of
 from robot_bench.events.kinds import Contact, Note, Verdict
 from robot_bench.recording.run_record import read_run, record_of
 from robot_bench.recording.trace import MOST_UNSPELLED, TraceWriter
@@ -168,10 +168,15 @@ def test_a_killed_process_leaves_everything_up_to_its_last_whole_second(tmp_path
     assert max(times) >= 2 * S
 
 
-def test_the_largest_time_that_64_bits_hold_is_read(tmp_path: Path) -> None:
-    line = f'{{"k":"pin","net":"a","t":{2**63 - 1},"v":1}}'
-    (tmp_path / "trace.jsonl").write_text('{"k":"meta","scenario":"s"}\n' + line + "\n", encoding="utf-8")
-    assert read_run(tmp_path).last_ns == 2**63 - 1
+def test_the_largest_time_of_a_run_is_read(tmp_path: Path) -> None:
+    for time_ns, is_read in ((0, True), (LAST_NS, True), (LAST_NS + 1, False), (-1, False), (2**63 - 1, False)):
+        line = f'{{"k":"pin","net":"a","t":{time_ns},"v":1}}'
+        (tmp_path / "trace.jsonl").write_text('{"k":"meta","scenario":"s"}\n' + line + "\n", encoding="utf-8")
+        if is_read:
+            assert read_run(tmp_path).last_ns == time_ns
+        else:
+            with pytest.raises(TraceError, match="a damaged line"):
+                read_run(tmp_path)
 
 
 @pytest.mark.parametrize(

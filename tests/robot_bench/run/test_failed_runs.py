@@ -140,7 +140,9 @@ def test_a_report_that_cannot_be_written_is_one_line(
     run.run_scenario(wanted(0.01), tmp_path)
     monkeypatch.setattr(Path, "write_text", raising(OSError(28, "No space left on device")))
     assert p2os(["report", str(tmp_path)]) == 2
-    assert capsys.readouterr().err == f"p2os: cannot write {tmp_path}: no space left on device\n"
+    line, hint = capsys.readouterr().err.splitlines()
+    assert line == f"p2os: cannot write {tmp_path}: no space left on device"
+    assert hint == "hint: make room, or name another place"
 
 
 def test_goals_are_judged_from_all_of_the_run(tmp_path: Path) -> None:

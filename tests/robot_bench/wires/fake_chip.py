@@ -103,6 +103,10 @@ class FakeChip:
         return self.fault is not None and not (self.recovers_at is not None and self.now_ns >= self.recovers_at)
 
     @property
+    def died_ns(self) -> int | None:
+        return self.fault.at_ns if self.fault is not None and self.has_died else None
+
+    @property
     def verdict(self) -> str:
         return "" if self.fault is None else f"firmware fault: {self.fault}"
 

@@ -48,6 +48,7 @@ from p2os.pioneer.body.ray_cast import Echo
 from p2os.pioneer.world.model import Obstacle, Pose, World
 from p2os.pioneer.world.plan import Bands
 from p2os.robots.parameters import RobotParameters
+from simbase.files import writing_temporary
 
 #: Bullet keeps contact points a little apart; touching is no farther than this, m.
 TOUCH_M = 1e-4
@@ -171,7 +172,7 @@ class BulletScene(EngineScene):
     @property
     def engine_state(self) -> bytes:
         """The engine's own file; it holds addresses too, so that one state can be written in two ways."""
-        with tempfile.TemporaryDirectory() as folder:
+        with writing_temporary(), tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "state.bullet"
             pybullet.saveBullet(str(path), physicsClientId=self.client)
             return path.read_bytes()
@@ -179,7 +180,7 @@ class BulletScene(EngineScene):
     @engine_state.setter
     def engine_state(self, saved: bytes) -> None:
         self._build(list(self._made.values()), [self.world.start] * len(self.bodies))
-        with tempfile.TemporaryDirectory() as folder:
+        with writing_temporary(), tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "state.bullet"
             path.write_bytes(saved)
             pybullet.restoreState(fileName=str(path), physicsClientId=self.client)

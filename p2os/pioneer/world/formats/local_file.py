@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from p2os.errors import WorldError
-from p2os.toml_file import LARGEST_FILE_BYTES
 from simbase.errors import shown
+from simbase.files import LARGEST_FILE_BYTES
 
 
 def find_local(uri: str, beside: Path) -> Path:

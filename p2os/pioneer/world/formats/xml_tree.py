@@ -13,6 +13,7 @@ from xml.parsers import expat  # declarations are refused below
 
 from p2os.errors import WorldError
 from simbase.errors import shown, shown_name
+from simbase.files import read_bytes
 
 MOST_ELEMENTS = 200_000
 DEEPEST = 64
@@ -100,7 +101,7 @@ def read_xml(path: Path, *roots: str) -> Element:
     parser.EndElementHandler = builder.end
     parser.CharacterDataHandler = builder.characters
     try:
-        parser.Parse(path.read_bytes(), True)
+        parser.Parse(read_bytes(path, WorldError), True)
     except expat.ExpatError as error:
         raise WorldError(
             f"{path}:{error.lineno}: {expat.ErrorString(error.code)}", hint="the file is not XML"

@@ -25,6 +25,7 @@ from bluepill_sim.program.mutants import Mutant, mutated_file
 from bluepill_sim.program.static_code import StaticCode
 from robot_bench.campaign.variants.mutation.trial import Fate, Found
 from robot_bench.events.codec import Json
+from simbase.files import writing_temporary
 from simbase.trust import installed_points
 
 if TYPE_CHECKING:
@@ -113,9 +114,12 @@ class Suite:
         """
         resource.setrlimit(resource.RLIMIT_CPU, (cpu_s, cpu_s))
         suffix = ".elf" if self.data.startswith(b"\x7fELF") else ".bin"
-        with tempfile.TemporaryDirectory(prefix="p2os-mutant-") as folder:
+        with writing_temporary():
+            made = tempfile.TemporaryDirectory(prefix="p2os-mutant-")
+        with made as folder:
             file = Path(folder) / f"mutant{suffix}"
-            file.write_bytes(mutated_file(self.data, mutant, self.image))
+            with writing_temporary():
+                file.write_bytes(mutated_file(self.data, mutant, self.image))
             found = run_suite(self.paths, file)
         if found.failed or found.broken:  # a suite that cannot be collected could with the program itself
             return Found(Fate.MISSED, "pytest", found.failed or found.broken)

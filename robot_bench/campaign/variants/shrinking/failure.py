@@ -142,6 +142,6 @@ class _Witness:
         return is_at_rest or any(0 <= at - change <= SUDDEN_NS for change in self._came)
 
     def _died(self) -> tuple[Way, Nanos, str]:
-        fault, verdict = self._bench.chip.fault, self._bench.chip.verdict
-        at = self._bench.now if fault is None else fault.at_ns
+        died_ns, verdict = self._bench.chip.died_ns, self._bench.chip.verdict
+        at = self._bench.now if died_ns is None else died_ns
         return Way(what=verdict.partition(" at ")[0], robot=self._robot, is_fault=True), at, verdict

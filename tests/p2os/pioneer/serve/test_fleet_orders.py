@@ -106,7 +106,7 @@ def test_a_complaint_names_the_file_the_line_and_the_key(text: str, message: str
 
 def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
     (tmp_path / "noise.toml").write_bytes(b"\xff\xfe\x00")
-    for name, message in (("noise.toml", "not a text file"), ("none.toml", "No such file"), (".", "directory")):
+    for name, message in (("noise.toml", "not a text file"), ("none.toml", "no such file"), (".", "directory")):
         with pytest.raises(FleetError, match=message):
             load_fleet(tmp_path / name)
 

@@ -23,8 +23,8 @@ from p2os.pioneer.world.formats.local_file import find_local
 from p2os.pioneer.world.formats.meshes.polygon import Triangles
 from p2os.pioneer.world.formats.transform import IDENTITY, Transform, after, apply, moved, scaled
 from p2os.pioneer.world.model import Triangle
-from p2os.toml_file import LARGEST_FILE_BYTES
 from simbase.errors import shown
+from simbase.files import LARGEST_FILE_BYTES, read_bytes
 
 MOST_NODES = 20_000
 DEEPEST_NODES = 64
@@ -215,13 +215,13 @@ class _Reader:
         path = find_local(unquote(uri), self._path)
         if not path.resolve().is_relative_to(self._path.resolve().parent) or not path.is_file():
             raise self._error(f"{shown(uri)} is no file in the folder of {self._path.name}")
-        return path.read_bytes()
+        return read_bytes(path, WorldError)
 
     # The file ---------------------------------------------------------------------------------
 
     def _opened(self) -> tuple[_Object, bytes]:
         """Return the JSON of a file, and the binary chunk of a .glb."""
-        text, binary = self._path.read_bytes(), b""
+        text, binary = read_bytes(self._path, WorldError), b""
         if text.startswith(GLB_MAGIC):
             chunks: dict[bytes, bytes] = {}
             at, data = GLB_HEADER, text

@@ -22,6 +22,7 @@ from p2os.pioneer.world.formats.placing import with_z_up
 from p2os.pioneer.world.model import Vertex, World
 from p2os.pioneer.world.text_file import read_foreign_text
 from simbase.errors import shown
+from simbase.files import read_bytes
 
 #: Of a binary STL: a header of 80 bytes, a count, then 50 bytes a triangle.
 STL_HEADER, STL_TRIANGLE = 84, 50
@@ -105,7 +106,7 @@ def _index(word: str, count: int) -> int:
 
 
 def _read_stl(path: Path) -> tuple[Triangles, str]:
-    data = path.read_bytes()
+    data = read_bytes(path, WorldError)
     count = int.from_bytes(data[80:84], "little") if len(data) >= STL_HEADER else -1
     if len(data) == STL_HEADER + STL_TRIANGLE * count:
         if count > MOST_TRIANGLES:
