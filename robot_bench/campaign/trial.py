@@ -346,11 +346,11 @@ def blocks_of(bench: Bench) -> frozenset[int]:
 
 def _goals(bench: Bench, end: Nanos, robot: str) -> list[GoalResult]:
     found = []
-    for goal, outcome, is_decided in bench.goals.outcomes(end):
-        is_open = not outcome.met and not is_decided and end < bench.scenario.planned_ns
+    for one in bench.goals.at_end(bench.ended(end)):
+        goal, outcome = one.goal, one.outcome
         by = outcome.robustness
         found.append(GoalResult(
-            kind=goal.kind, wanted=goal.wanted, met=None if is_open else outcome.met, says=outcome.says,
+            kind=goal.kind, wanted=goal.wanted, met=None if one.is_open else outcome.met, says=outcome.says,
             robustness=None if by is None else round(by, 9), unit="" if by is None else outcome.unit, robot=robot,
         ))  # fmt: skip
     return found

@@ -330,3 +330,18 @@ def test_the_two_robots_that_ship_move_and_never_touch(tmp_path: Path) -> None:
     assert bench.judge().missed == []
     others = [event for event in bench.record().changes if event.name == "east"]
     assert len(others) > 100
+
+
+def test_a_verdict_of_one_robot_that_ends_the_run_cuts_the_time_of_none(tmp_path: Path) -> None:
+    (tmp_path / "x.bin").write_bytes(thumb.SLEEP)
+    rest = 'firmware = "x.bin"\nmode = "direct"'
+    reach = '[[goal]]\nkind = "reach"\nx_m = -1\ny_m = 0\nradius_m = 1\nrobot = "a"\nends_run = "met"\n'
+    for goal, untouched in ((reach, {"a", "b"}), (reach.replace('ends_run = "met"\n', ""), set[str]())):
+        more = goal + '[[goal]]\nkind = "no_collision"\n'
+        bench = Bench.from_scenario(
+            scenario(tmp_path, robot("a", -1, 0, 0, rest), robot("b", 1, 0, 0, rest), more=more)
+        )
+        bench.run_until("0.2 s")
+        found = bench.judge()
+        assert {line.partition(":")[0] for line in found.met if "touches" in line} == untouched
+        assert len(found.not_judged) == 2 - len(untouched)
