@@ -302,7 +302,10 @@ def test_the_events_of_all_are_one_stream_in_order_of_time_each_with_its_robot(
     assert robots_in(Path()) == [], "a folder of runs is no run of several robots"
     capsys.readouterr()
     assert p2os(["diff", "one", "other"]) == 1
-    assert "; a: worldchange differs first" in capsys.readouterr().out  # where b stands, as a has it
+    out = capsys.readouterr().out
+    assert "; a: worldchange differs first" in out  # where b stands, as a has it
+    told = [line.rpartition("   ")[0] for line in out.splitlines() if line.endswith(("   one", "   other"))]
+    assert all(ours != theirs for ours, theirs in zip(told[::2], told[1::2], strict=True)), out
 
 
 def test_a_goal_may_bound_how_far_another_robot_is(tmp_path: Path) -> None:
