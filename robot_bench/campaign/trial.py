@@ -103,10 +103,16 @@ class Trial:
 
     @property
     def firmware_name(self) -> str:
-        """The name of its firmware among the files."""
+        """The name of its firmware among the files, of several robots' that of the first."""
+        return next(iter(self.programs))
+
+    @property
+    def programs(self) -> Mapping[str, str]:
+        """The name of each firmware among the files, in the order of the robots, and the SHA-256 of its bytes."""
         robots = self.table.get("robot")
         tables = cast("list[Table]", robots) if isinstance(robots, list) else [self.table]
-        return str(next(table["firmware"] for table in tables if "firmware" in table))
+        names = dict.fromkeys(str(table["firmware"]) for table in tables if "firmware" in table)
+        return {name: hashlib.sha256(self.files[name]).hexdigest() for name in names}
 
     @property
     def text(self) -> str:

@@ -37,6 +37,11 @@ class Other:
     name: str
     content: bytes
 
+    @property
+    def sha256(self) -> str:
+        """Of its bytes."""
+        return hashlib.sha256(self.content).hexdigest()
+
     @classmethod
     def kept(cls, path: Path, folder: Path) -> "Other":
         """Return a firmware file, and keep it in a campaign's folder.
