@@ -453,7 +453,7 @@ def test_conduct_ends_after_the_batch_in_which_its_virtual_hours_are_spent(tmp_p
 
 
 def test_minutes_that_are_over_leave_one_batch_of_near_misses(tmp_path: Path) -> None:
-    campaign = begun(tmp_path, near_misses=4, budget={"minutes": 1.0, "runs": 12, "confirmations": 12})
+    campaign = begun(tmp_path, near_misses=4, budget={"minutes": 1.0, "runs": 16, "confirmations": 16})
     ticks = iter([0, 1, 2, 60 * 10**9, 60 * 10**9 + 1])
     conduct = Conduct(campaign, tmp_path / "kept", Shuffled(1), clock=lambda: next(ticks))
     rows = conduct.run().rows
