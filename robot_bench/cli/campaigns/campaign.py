@@ -63,7 +63,8 @@ def register(app: typer.Typer) -> None:
 
 def campaign(
     words: Annotated[
-        list[str] | None, typer.Argument(help="A campaign file; or `new` and a scenario.", metavar="FILE|new SCENARIO")
+        list[str] | None,
+        typer.Argument(help="A campaign file; or `new` and a scenario.", metavar="[FILE|new SCENARIO]"),
     ] = None,
     jobs: Jobs = None,
     firmware: Annotated[
