@@ -210,7 +210,7 @@ class ContactInquest:
                 )
             answered = [after]
         near = [answers[net] for answers in self._asked for net in self.on]
-        same = max(self._effect.otherwise_ns, *(one.otherwise_ns for one in near)) < SAME_NS
+        same = max([self._effect.otherwise_ns, *(one.otherwise_ns for one in near)]) < SAME_NS
         if len(self._asked) >= AGREEING and same and left >= STRAIGHT_S * NS_PER_S:
             return Finding(
                 f"the program notices {nets} at {self._effect.by} and sets its motors no otherwise for it (motors "
