@@ -33,7 +33,7 @@ from robot_bench.recording.recorder import Recorder
 from robot_bench.recording.trace import TraceWriter
 from robot_bench.running.loop import RunLoop
 from robot_bench.running.pacer import PACED_SLICE_NS, RealTimePacer
-from robot_bench.scenario.goals.judging import GoalJudge
+from robot_bench.scenario.goals.judging import GoalJudge, RunEnd
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.wires.chip_pins import ChipPins
 from robot_bench.wires.nets import OwnedPins
@@ -152,11 +152,15 @@ class RemoteBench:
         with contextlib.suppress(TransportError):
             self._transport.close()
 
+    def ended(self, at: Nanos) -> RunEnd:
+        """Return what a run that ends at a time is to its goals."""
+        return RunEnd(at, self.scenario.planned_ns, by_scenario=self.goals.has_ended_run)
+
     def finish(self) -> Nanos:
         """Write the rest of the trace; return the end's time."""
         end = min(self.chip.now_ns, self.scenario.duration_ns)
         self.recorder.distance_m = self._listener.pose.distance_m
-        self.goals.end_at(end, self.scenario.planned_ns)
+        self.goals.end_at(self.ended(end))
         self.recorder.finish(end)
         return end
 

@@ -196,7 +196,7 @@ def write_run(
         FileError: It cannot be written.
     """
     end = end_of_a_broken_run(bench.record(), failure) | {"trace_sha256": bench.trace.sha256}
-    goals = bench.goals.finish(bench.now, planned_ns=bench.scenario.planned_ns)
+    goals = bench.goals.finish(bench.ended(bench.now))
     end |= {"goals_met": goals.met, "goals_not_judged": goals.not_judged}
     if not failure:
         end |= {"passed": True, "failures": []}
@@ -407,7 +407,7 @@ def _conclude(
     if measurement is not None:
         measured = measurement.write(folder, bench.scenario.firmware.parent)
         failures += measurement.failures
-    goals = bench.goals.finish(end, planned_ns=bench.scenario.planned_ns)
+    goals = bench.goals.finish(bench.ended(end))
     passed = not failures and not goals.missed
     trace.end(
         _figures(bench, end, driven.wall_s)

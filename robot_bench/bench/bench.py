@@ -62,7 +62,7 @@ from robot_bench.running.loop import RunLoop
 from robot_bench.running.pacer import FIRST_SLICE_NS, SliceLength
 from robot_bench.running.shared_world import Driven, SharedWorld
 from robot_bench.scenario.fault_script import LINK_DOWN, FaultScript
-from robot_bench.scenario.goals.judging import GoalJudge, Judgement
+from robot_bench.scenario.goals.judging import GoalJudge, Judgement, RunEnd
 from robot_bench.scenario.hand_script import Deed, HandScript
 from robot_bench.scenario.scenario import (
     Scenario,
@@ -317,6 +317,12 @@ class Bench(Expectations, Interventions, Stateful):
             ends.append(died_ns + AFTER_FAULT_NS)
         return min(ends if self._ends_at is None else [*ends, self._ends_at])
 
+    def ended(self, at: Nanos) -> RunEnd:
+        """Return what a run that ends at a time is to its goals; several robots end together, by any of them."""
+        ends = [robot._ends_at for robot in self.robots.values()]  # noqa: SLF001 # benches of one world
+        by_scenario = any(end is not None and end <= at for end in ends)
+        return RunEnd(at, self.scenario.planned_ns, by_scenario=by_scenario)
+
     @property
     def now(self) -> Nanos:
         """Return the time that the chip has come to."""
@@ -360,7 +366,7 @@ class Bench(Expectations, Interventions, Stateful):
 
     def judge_own(self) -> Judgement:
         """End the run here and judge the goals of this robot."""
-        return self.goals.finish(self.finish(), planned_ns=self.scenario.planned_ns)
+        return self.goals.finish(self.ended(self.finish()))
 
     def _run_to(self, wanted: Nanos, advance: Callable[[int], Reached] | None = None) -> None:
         end_ns = min(wanted, self.end)
@@ -467,7 +473,7 @@ class Bench(Expectations, Interventions, Stateful):
         if self.events.released_until >= end:
             return
         self.loop.finish(end)
-        self.goals.end_at(end, self.scenario.planned_ns)
+        self.goals.end_at(self.ended(end))
         self.recorder.finish(end)
 
     def snapshot(self) -> PartState:

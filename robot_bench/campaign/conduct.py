@@ -1,17 +1,18 @@
 """Carries a campaign out: asks the search, has the runs done, confirms what fails, and tells the search.
 
 Theory of operation. A batch of points is asked for. Their runs of the cheap stage are done, in any order, by any
-number of workers; then, in the order of the points, each one that failed is run in full, and so are the nearest
-misses, as far as the budget goes. A run in full that failed is done once more in another process, from its very
-beginning, and counts as a failure only where its hash is the same. Then the search is told. Since every step is taken
-in the order of the points and depends on their outcomes alone, the same campaign comes to the same runs on any machine
-of the same version.
+number of workers; then, in the order of the points, each one that failed is run in full, as far as the budget of
+confirmations goes. A run in full that failed is done once more in another process, from its very beginning, and counts
+as a failure only where its hash is the same. Then the search is told. When no batch follows, what is left of the
+confirmations goes to the nearest misses of all batches, the nearest first: a search learns of cheap runs alone, so
+nothing is lost by that, and no near miss takes what a failure needs. Since every step is taken in the order of the
+points and depends on their outcomes alone, the same campaign comes to the same runs on any machine of the same version.
 
 A campaign that goes on begins anew and finds what was done in its journal, so a kill at any instant loses the runs
 that were under way and nothing else.
 
 Invariant: the rows, their order and all in them but the seconds depend on the campaign alone; a limit of minutes cuts
-them after a whole batch.
+them after a whole batch, and the near misses after the first batch of them.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -198,6 +199,8 @@ class Conduct:
         self._journal = Journal(folder)
         self.progress = Progress(left_out=self._journal.left_out)
         self._confirmed = 0
+        #: Places of rows that passed, those of the least margin of each batch.
+        self._near: list[int] = []
 
     def run(self) -> Progress:
         """Do all of it; arguments and errors as of `within_minutes`."""
@@ -208,15 +211,18 @@ class Conduct:
     def within_minutes(self) -> Iterator[Sequence[Row]]:
         """Do one batch after the other, as long as the budget's minutes last; yield the rows of each.
 
+        After them come the near misses, again in batches: rows that were there before, now with their run in full.
+
         Raises:
             KeyboardInterrupt: A worker's `look` has; what was done is in the journal.
             FileError: The disk is full.
         """
         began, minutes = self._clock(), self.campaign.budget.minutes
-        for rows in self.batches():
-            yield rows
-            if minutes is not None and self._clock() - began >= minutes * 60 * NS_PER_S:
-                return
+        for batches in (self.batches(), self.near_misses()):
+            for rows in batches:
+                yield rows
+                if minutes is not None and self._clock() - began >= minutes * 60 * NS_PER_S:
+                    break
 
     def batches(self) -> Iterator[Sequence[Row]]:
         """Do one batch after the other, whatever time it takes; yield the rows of each."""
@@ -228,6 +234,19 @@ class Conduct:
             rows = self._rows(points)
             self._search.tell([self._answer(row) for row in rows])
             done.rows += rows
+            yield rows
+
+    def near_misses(self) -> Iterator[Sequence[Row]]:
+        """Run in full what came nearest to a failure, as far as confirmations are left; yield the rows, by batches."""
+        done, left = self.progress, max(self.campaign.budget.confirmations - self._confirmed, 0)
+        nearest = sorted(self._near, key=lambda at: (done.rows[at].cheap.margin or 0.0, at))[:left]
+        for first in range(0, len(nearest), self.campaign.batch):
+            if first and self._is_spent():
+                return
+            chosen = sorted(nearest[first : first + self.campaign.batch])
+            rows = self._in_full([done.rows[at] for at in chosen])
+            for at, row in zip(chosen, rows, strict=True):
+                done.rows[at] = row
             yield rows
 
     def close(self) -> None:
@@ -246,25 +265,25 @@ class Conduct:
             Row(number, proposal, run, new=self._learn(run.outcome))
             for number, (proposal, run) in enumerate(zip(proposals, cheap, strict=True), first)
         ]
-        chosen = self._to_confirm(rows)
-        full = self._do(Stage.FULL, [rows[at].proposal.trial(self.campaign.trial, self.campaign.full) for at in chosen])
-        for at, run in zip(chosen, full, strict=True):
-            rows[at] = replace(rows[at], full=run)
-        failed = [at for at, run in zip(chosen, full, strict=True) if run.outcome.verdict is Verdict.FAILED]
-        again = self._do(Stage.REPLAY, [one.trial for at in failed if (one := rows[at].full) is not None])
-        for at, run in zip(failed, again, strict=True):
-            rows[at] = replace(rows[at], replay=run)
+        left = max(self.campaign.budget.confirmations - self._confirmed, 0)
+        failed = [at for at, row in enumerate(rows) if row.cheap.outcome.verdict is Verdict.FAILED][:left]
+        self._confirmed += len(failed)
+        for at, row in zip(failed, self._in_full([rows[at] for at in failed]), strict=True):
+            rows[at] = row
+        passed = [row for row in rows if row.cheap.outcome.verdict is Verdict.PASSED]
+        nearest = sorted(passed, key=lambda row: (row.cheap.margin or 0.0, row.number))[: self.campaign.near_misses]
+        self._near += [row.number - 1 for row in nearest]
         return rows
 
-    def _to_confirm(self, rows: Sequence[Row]) -> list[int]:
-        """Return the places of those that are run in full: what failed, and the nearest misses."""
-        left = self.campaign.budget.confirmations - self._confirmed
-        failed = [at for at, row in enumerate(rows) if row.cheap.outcome.verdict is Verdict.FAILED]
-        passed = [at for at, row in enumerate(rows) if row.cheap.outcome.verdict is Verdict.PASSED]
-        nearest = sorted(passed, key=lambda at: (rows[at].cheap.margin or 0.0, at))[: self.campaign.near_misses]
-        chosen = [*failed, *nearest][: max(left, 0)]
-        self._confirmed += len(chosen)
-        return sorted(chosen)
+    def _in_full(self, rows: Sequence[Row]) -> list[Row]:
+        """Return rows with their run in full, and where that failed the one that proves it."""
+        full = self._do(Stage.FULL, [row.proposal.trial(self.campaign.trial, self.campaign.full) for row in rows])
+        found = [replace(row, full=run) for row, run in zip(rows, full, strict=True)]
+        failed = [at for at, run in enumerate(full) if run.outcome.verdict is Verdict.FAILED]
+        again = self._do(Stage.REPLAY, [full[at].trial for at in failed])
+        for at, run in zip(failed, again, strict=True):
+            found[at] = replace(found[at], replay=run)
+        return found
 
     def _do(self, stage: Stage, trials: Sequence[Trial]) -> list[Run]:
         """Return the runs of trials, in their order; those in the journal are not done again."""

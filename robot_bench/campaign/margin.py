@@ -32,7 +32,7 @@ def margin(outcome: Outcome) -> float | None:
 def goal_margin(goal: GoalResult, outcome: Outcome) -> float:
     """Return the margin of one goal of a run."""
     by = goal.robustness
-    if goal.kind == "no_collision" and by is None and goal.met:
+    if goal.kind == "no_collision" and by is None and goal.met is not False:
         by = outcome.clearance_m
     scaled = None if by is None else by / WHOLE.get(goal.unit or "m", 1.0)
     if goal.met is False:

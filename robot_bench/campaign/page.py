@@ -21,7 +21,7 @@ from p2os.pioneer.world.model import World
 from p2os.toml_schema import Table
 from robot_bench.campaign.conduct import FAILURES, Finding, Row, Run
 from robot_bench.campaign.last_moment import LastMoment
-from robot_bench.campaign.results import Whole
+from robot_bench.campaign.results import SHOWN_HASH, Whole
 from robot_bench.campaign.trial import unpacked
 from robot_bench.campaign.variants.diversity import FailureSet
 from simbase.errors import P2osError
@@ -85,13 +85,16 @@ def render(whole: Whole) -> str:
     if whole.was_interrupted:
         verdict = f"interrupted, {verdict}"
     style = files("robot_bench.report").joinpath("page.css").read_text(encoding="utf-8")
-    firmware = campaign.trial.firmware_name
+    firmware = ", ".join(f"{name} ({sha256[:SHOWN_HASH]})" for name, sha256 in campaign.trial.programs.items())
     shown = failures[:MOST_SHOWN]
     left = len(failures) - len(shown)
     return _PAGE.substitute(
         title=html.escape(f"{campaign.name} · {verdict}"), heading=html.escape(campaign.name),
         verdict=html.escape(verdict), verdict_class="failed" if failures else "passed", style=style + _STYLE,
-        lead=html.escape(campaign.description or f"{firmware} in {campaign.trial.table['world']}, {campaign.search}"),
+        lead=html.escape(
+            f"{campaign.description + ': ' if campaign.description else ''}{firmware} in "
+            f"{campaign.trial.table['world']}, {campaign.search}"
+        ),
         figures=_table(_figures(whole)), cost=_table(_cost(whole)),
         failures="".join(_failure(row, whole) for row in shown) or "<p>none</p>",
         more=f"<p>and {left} more in failures/</p>" if left else "",
@@ -107,6 +110,7 @@ def _figures(whole: Whole) -> Iterator[tuple[str, str]]:
             yield meaning, str(whole.counts.get(finding, 0))
     if whole.failures:
         yield from FailureSet.of(whole.progress.rows).words().items()
+    yield "different runs, by their traces", str(whole.different_runs)
     yield "blocks of the firmware that ran", str(len(whole.progress.blocks))
     yield "states that it printed", str(len(whole.progress.states))
 

@@ -8,7 +8,6 @@ nothing else may differ.
 Invariant: what a failure's folder holds is what was run: its trace has the hash that the data set names.
 """
 
-import hashlib
 import json
 import shlex
 from collections import Counter
@@ -27,6 +26,8 @@ from simbase.files import writing
 from simbase.installation import installed_version
 
 RESULTS, FAILURES = "results", "failures"
+#: chosen: so many digits of a program's SHA-256 are shown; the data set has all.
+SHOWN_HASH = 16
 
 
 class Results:
@@ -50,20 +51,31 @@ class Results:
         self.folder = folder
         self._campaign = campaign
         self._spans = {f"vary.{dimension.name}": dimension.span for dimension in space.dimensions}
-        self._parts = 0
+        #: The rows of each part.
+        self._parts: list[list[Row]] = []
         with writing(folder, hint="--out another folder"):
             (folder / RESULTS).mkdir(parents=True, exist_ok=True)
 
     def add(self, rows: Sequence[Row]) -> None:
-        """Write a batch.
+        """Write a batch: a part of its own, or, of rows that are there and have more runs now, their parts again.
 
         Raises:
             FileError: The disk is full.
         """
-        self._parts += 1
-        path = self.folder / RESULTS / f"part-{self._parts:05d}.parquet"
-        with writing(path, hint="make room, then --resume"):
-            self._write([self._entry(row, run) for row in rows for run in row.runs], path)
+        known = {row.number: (part, at) for part, held in enumerate(self._parts) for at, row in enumerate(held)}
+        parts = {known[row.number][0] for row in rows if row.number in known}
+        for row in rows:
+            if row.number in known:
+                part, at = known[row.number]
+                self._parts[part][at] = row
+        if not parts:
+            parts = {len(self._parts)}
+            self._parts.append([*rows])
+        for part in sorted(parts):
+            path = self.folder / RESULTS / f"part-{part + 1:05d}.parquet"
+            with writing(path, hint="make room, then --resume"):
+                self._write([self._entry(row, run) for row in self._parts[part] for run in row.runs], path)
+        with writing(self.folder / FAILURES, hint="make room, then --resume"):
             for row in rows:
                 if row.failing is not None:
                     row.failing.trial.write(self.failure_folder(row))
@@ -80,13 +92,14 @@ class Results:
 
     def _entry(self, row: Row, run: Run) -> dict[str, object]:
         outcome = run.outcome
-        firmware = run.trial.files[run.trial.firmware_name]
+        programs = run.trial.programs
         values: dict[str, object] = {
             "number": row.number, "stage": run.stage.value, "finding": row.finding.value,
             "verdict": outcome.verdict.value, "margin": run.margin, "seed": run.trial.seed,
             "search": self._campaign.search, "campaign_seed": self._campaign.seed,
             "trial_sha256": run.trial.sha256, "trace_sha256": outcome.sha256,
-            "firmware_sha256": hashlib.sha256(firmware).hexdigest(), "p2os": installed_version(),
+            "firmware": ", ".join(programs), "firmware_sha256": ", ".join(programs.values()),
+            "p2os": installed_version(),
             "virtual_s": outcome.virtual_ns / 1e9, "cpu_s": run.cpu_s, "distance_m": outcome.distance_m,
             "clearance_m": outcome.clearance_m, "contacts": len(outcome.hits), "failures": list(outcome.failures),
             "blocks": len(outcome.blocks), "states": len(outcome.lines), "new": row.new,
@@ -158,11 +171,18 @@ class Whole:
         """The points whose failure was proven."""
         return self.progress.failures
 
+    @property
+    def different_runs(self) -> int:
+        """How many runs the points came to, those with the same trace counted once."""
+        return len({row.cheap.outcome.sha256 for row in self.progress.rows})
+
     def as_json(self) -> dict[str, object]:
         """Return all that came of it; times of this machine left out."""
         return {
             "campaign": self.campaign.name,
+            "firmware": [{"name": name, "sha256": sha256} for name, sha256 in self.campaign.trial.programs.items()],
             "search": self.campaign.search,
+            "different_runs": self.different_runs,
             "points": len(self.progress.rows),
             "runs": self.progress.runs,
             "journal_left_out": {str(line): why for line, why in self.progress.left_out.items()},

@@ -7,6 +7,7 @@ from other starts. What it has to show is what any such robot has to: it touches
 stay where a way is free, and turns, bends and goes back for a reason.
 """
 
+from collections.abc import Mapping
 from string import Template
 
 from p2os.pioneer.world import load_world
@@ -23,10 +24,11 @@ HEAD = """\
 # What is searched: $searched.
 #   p2os campaign $file                 docs/campaigns.md has all keys
 scenario = $scenario_name
-"""
+${firmware}"""
 SEARCH = """\
-search = "sobol"        # grid, random, latin-hypercube, sobol, tpe, cma-es, quality-diversity, coverage
+search = $search        # grid, random, latin-hypercube, sobol, tpe, cma-es, quality-diversity, coverage
 
+${seed}
 [budget]
 """
 RUN = """
@@ -46,8 +48,8 @@ SCRIPTED_TEMPLATE = Template(
     HEAD
     + SEARCH
     + """\
-runs = 64               # of the cheap kind
-confirmations = 20      # runs in full: of what failed, and of the nearest misses
+runs = $runs               # of the cheap kind
+confirmations = 20      # runs in full: of what failed, and at the end of the nearest misses
 minutes = 10.0
 """
     + RUN
@@ -67,8 +69,8 @@ gap_m = 0.75             # between things: a robot of 0.38 m passes
 """
     + SEARCH
     + """\
-runs = 600              # of the cheap kind; about a second of a processor each
-confirmations = 40      # runs in full: of what failed, and of the nearest misses
+runs = $runs              # of the cheap kind; about a second of a processor each
+confirmations = 40      # runs in full: of what failed, and at the end of the nearest misses
 minutes = 10.0
 """
     + RUN
@@ -150,31 +152,36 @@ ends_run = "missed"
 )
 
 
-def suggested(scenario: Scenario, scenario_name: str, file: str) -> str:
+def suggested(scenario: Scenario, scenario_name: str, file: str, given: Mapping[str, object] | None = None) -> str:
     """Return the text of a campaign file for a scenario.
 
     Args:
         scenario: It can be run.
         scenario_name: What the file is to call it: a name that ships, or its file as seen from the campaign's.
         file: What the campaign's file will be called.
+        given: What is to stand for its keys `firmware` (as seen from the file), `search`, `seed` and `runs`.
 
     Raises:
         WorldError: Its world cannot be read.
     """
     parts = [robot.scenario for robot in scenario.robots if robot.scenario is not None] or [scenario]
+    keys = dict(given or {})
     common = {
+        "firmware": f"firmware = {toml_value(keys['firmware'])}\n" if "firmware" in keys else "",
+        "search": toml_value(keys.get("search", "sobol")),
+        "seed": f"seed = {keys['seed']}" + " " * 16 + "# of the search\n" if "seed" in keys else "",
         "scenario_name": toml_value(scenario_name), "file": file, "body": toml_value(scenario.body),
         "mode": "" if scenario.robots else f"mode = {toml_value(scenario.mode)}\n",
     }  # fmt: skip
     if any(goal.definition.is_scripted for part in parts for goal in part.goals):
         searched = f"clocks and SRAM with which the firmware of {scenario.name} fails"
-        return SCRIPTED_TEMPLATE.substitute(common, searched=searched, duration="")
+        return SCRIPTED_TEMPLATE.substitute(common, searched=searched, duration="", runs=keys.get("runs", 64))
     world = load_world(scenario.world, seed=scenario.seed)
     start = scenario.robots[0].start if scenario.robots else scenario.start or world.start
     x0, y0, x1, y1 = world.extent
     dx, dy = (x1 - x0) * START_SHARE / 2, (y1 - y0) * START_SHARE / 2
     return TEMPLATE.substitute(
-        common, searched=f"worlds in which the firmware of {scenario.name} fails",
+        common, runs=keys.get("runs", 600), searched=f"worlds in which the firmware of {scenario.name} fails",
         duration=f"duration_s = {min(scenario.duration_ns / NS_PER_S, LONGEST_S)}\n",
         start=f"robot.{scenario.robots[0].name}" if scenario.robots else "start",
         x0=round(start.x_m - dx, 2), x1=round(start.x_m + dx, 2),

@@ -108,10 +108,16 @@ class Trial:
 
     @property
     def firmware_name(self) -> str:
-        """The name of its firmware among the files."""
+        """The name of its firmware among the files, of several robots' that of the first."""
+        return next(iter(self.programs))
+
+    @property
+    def programs(self) -> Mapping[str, str]:
+        """The name of each firmware among the files, in the order of the robots, and the SHA-256 of its bytes."""
         robots = self.table.get("robot")
         tables = cast("list[Table]", robots) if isinstance(robots, list) else [self.table]
-        return str(next(table["firmware"] for table in tables if "firmware" in table))
+        names = dict.fromkeys(str(table["firmware"]) for table in tables if "firmware" in table)
+        return {name: hashlib.sha256(self.files[name]).hexdigest() for name in names}
 
     @property
     def text(self) -> str:
@@ -358,11 +364,11 @@ def blocks_of(bench: Bench) -> frozenset[int]:
 
 def _goals(bench: Bench, end: Nanos, robot: str) -> list[GoalResult]:
     found = []
-    for goal, outcome, is_decided in bench.goals.outcomes(end):
-        is_open = not outcome.met and not is_decided and end < bench.scenario.planned_ns
+    for one in bench.goals.at_end(bench.ended(end)):
+        goal, outcome = one.goal, one.outcome
         by = outcome.robustness
         found.append(GoalResult(
-            kind=goal.kind, wanted=goal.wanted, met=None if is_open else outcome.met, says=outcome.says,
+            kind=goal.kind, wanted=goal.wanted, met=None if one.is_open else outcome.met, says=outcome.says,
             robustness=None if by is None else round(by, 9), unit="" if by is None else outcome.unit, robot=robot,
         ))  # fmt: skip
     return found

@@ -8,7 +8,7 @@ import typer
 
 from p2os.cli.help_pages import BENCH
 from robot_bench.events.kinds import Event
-from robot_bench.events.words import last_words, what_of
+from robot_bench.events.words import last_words, told_apart, what_of
 from robot_bench.recording.divergence import differences
 from robot_bench.recording.together import named_events
 from simbase.timing import NS_PER_S
@@ -53,12 +53,18 @@ def diff(
         typer.echo(f"   {line}")
     for difference in found[:MOST_SIGNALS]:
         typer.echo(f"{difference.signal}:")
-        for folder, event in ((one, difference.one), (other, difference.other)):
-            typer.echo(f"   {_told(event)}   {folder.name}")
+        for folder, told in zip((one, other), _told(difference.one, difference.other), strict=True):
+            typer.echo(f"   {told}   {folder.name}")
     if len(found) > MOST_SIGNALS:
         typer.echo(f"and {len(found) - MOST_SIGNALS} more signals, later")
     raise typer.Exit(1)
 
 
-def _told(event: Event | None) -> str:
-    return "nothing more" if event is None else f"{event.t} ns  {what_of(event)}"
+def _told(one: Event | None, other: Event | None) -> tuple[str, str]:
+    """Return two events that differ, each with its time, so that it is seen in what."""
+    words, others = told_apart(one, other) if one is not None and other is not None else ("", "")
+    return _at(one, words), _at(other, others)
+
+
+def _at(event: Event | None, words: str) -> str:
+    return "nothing more" if event is None else f"{event.t} ns  {words or what_of(event)}"

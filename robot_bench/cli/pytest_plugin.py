@@ -292,7 +292,8 @@ def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) ->
     used = item.stash.get(_BENCH, None)
     wanted = item.config.getoption("--bench-record")
     if call.when == "call" and used is not None:
-        item.user_properties.append(("bench_seed", used.scenario.seed))
+        item.user_properties += [("bench_seed", used.scenario.seed), ("trace_sha256", used.trace.sha256)]
+        report.bench_run = _run_of(item, used)
         said = call.excinfo is not None and hasattr(call.excinfo.value, "last_events")
         if report.failed and not said:
             lines = [f"at {used.now / 1e9:.3f} s of {used.scenario.name}; the last events:", *used.last_events(12)]
@@ -300,6 +301,15 @@ def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) ->
         if wanted == "all" or (wanted == "failures" and report.failed):
             _record(item, used, report, str(call.excinfo.value) if call.excinfo is not None and report.failed else "")
     return report
+
+
+def _run_of(item: pytest.Item, used: "Bench") -> tuple[str, str, int, str]:
+    """Return the test without what is parametrised, what of it is but for the seed, the seed, and the trace's hash."""
+    spec = getattr(item, "callspec", None)
+    row = dict(spec.params.get("bench") or {}) if spec is not None else {}
+    row.pop("seed", None)
+    others = {name: place for name, place in spec.indices.items() if name != "bench"} if spec is not None else {}
+    return item.nodeid.partition("[")[0], repr((row, sorted(others.items()))), used.scenario.seed, used.trace.sha256
 
 
 def _record(item: pytest.Item, used: "Bench", report: Any, failure: str) -> None:
@@ -324,7 +334,6 @@ def _record(item: pytest.Item, used: "Bench", report: Any, failure: str) -> None
         report.sections.append(("bench: no report", str(error)))
         return
     item.user_properties.append(("bench_report", str(page)))
-    item.user_properties.append(("trace_sha256", used.trace.sha256))
     firmware = item.config.getoption("--firmware")
     options = f" --firmware {firmware}" if firmware else ""
     picture = folder / "path.png"
@@ -337,7 +346,27 @@ def _record(item: pytest.Item, used: "Bench", report: Any, failure: str) -> None
 
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
-    """Say with -v how many benches were built, and how many tests began with one that was there."""
+    """Say whose seeds made no difference; with -v how many benches were built, and how many tests began with one."""
+    _tell_seeds_alike(terminalreporter)
     pool = config.stash.get(_POOL, None)
     if pool is not None and config.getoption("verbose") > 0:
         terminalreporter.write_line(f"bench: {pool.built} built and booted, {pool.reused} tests began where one stood")
+
+
+def _tell_seeds_alike(terminalreporter: Any) -> None:
+    """Say of which tests the runs with several seeds were one run each; what ran in other processes counts too."""
+    runs: dict[tuple[str, str], dict[int, str]] = {}
+    for report in itertools.chain.from_iterable(terminalreporter.stats.values()):
+        if getattr(report, "bench_run", None) is not None:
+            test, rest, seed, sha256 = report.bench_run
+            runs.setdefault((test, rest), {})[seed] = sha256
+    if not runs:
+        return
+    from robot_bench.scenario.sweep import ALIKE, are_alike
+
+    alike: dict[str, int] = {}
+    for (test, _), hashes in runs.items():
+        if are_alike(hashes.values()):
+            alike[test] = max(len(hashes), alike.get(test, 0))
+    for test, count in alike.items():
+        terminalreporter.write_line(f"note: {test} was one run with {count} seeds: {ALIKE}", yellow=True)

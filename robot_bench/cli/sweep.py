@@ -27,6 +27,7 @@ from robot_bench.recording.summary import INTERRUPTED
 from robot_bench.run import run_scenario
 from robot_bench.scenario.included_files import Setting, as_toml
 from robot_bench.scenario.scenario import Scenario
+from robot_bench.scenario.sweep import ALIKE, are_alike
 from simbase.files import writing
 from simbase.units import ranges_text
 
@@ -43,8 +44,6 @@ FIGURES = (
     "virtual_s", "distance_m", "collisions", "min_clearance_m", "trace_sha256", "passed", "failures", "goals_met",
     "goals_not_judged", "wall_s",
 )  # fmt: skip
-#: What a person should know whose hundred runs are one.
-_ALIKE = 'the seeds made no difference: nothing here is random, as [controller] errors = "realistic" would be'
 _PASSED, _FAILED, _NOT_RUN = "passed", "failed", "not run"
 #: What XML cannot hold.
 _UNWRITABLE = re.compile(r"[^\t\n\r -\ud7ff\ue000-\ufffd]")
@@ -156,6 +155,8 @@ def write_junit(done: Done, path: Path) -> None:
     suite = ET.Element(
         "testsuite", name=name, tests=str(len(done.rows)), failures=str(len(done.failed)), errors="0", skipped=str(left)
     )
+    if _are_seeds_alike(done):
+        ET.SubElement(ET.SubElement(suite, "properties"), "property", name="note", value=ALIKE)
     for row, found in zip(done.rows, done.outcomes, strict=True):
         case = ET.SubElement(suite, "testcase", classname=name, name=row.words, time=str(found.get("wall_s") or 0))
         properties = ET.SubElement(case, "properties")
@@ -186,6 +187,7 @@ def as_json(done: Done) -> Json:
         "passed": len(done.with_word(_PASSED)),
         "failed": len(done.failed),
         "was_interrupted": done.was_interrupted,
+        "seeds_are_alike": _are_seeds_alike(done),
         "runs": found,
     }
 
@@ -206,7 +208,7 @@ def print_sweep(done: Done) -> None:
     elif not failed:
         console.print(f"one of them again: {done.rows[0].replay}", soft_wrap=True)
     if _are_seeds_alike(done):
-        console.print(f"note    {_ALIKE}", soft_wrap=True)
+        console.print(f"note    {ALIKE}", soft_wrap=True)
     counts = [(word, len(done.with_word(word))) for word in (_PASSED, _FAILED, INTERRUPTED, _NOT_RUN)]
     summed = ", ".join(f"{count} {word}" for word, count in counts if count or word in {_PASSED, _FAILED})
     console.print(f"{summed} of {len(done.rows)}")
@@ -217,7 +219,7 @@ def _are_seeds_alike(done: Done) -> bool:
     hashes: dict[tuple[Setting, ...], list[object]] = {}
     for row, found in zip(done.rows, done.outcomes, strict=True):
         hashes.setdefault(row.settings, []).append(found.get("trace_sha256"))
-    return all(len(set(found)) == 1 < len(found) and None not in found for found in hashes.values())
+    return all(are_alike(found) for found in hashes.values())
 
 
 def _each(done: Done) -> Table:

@@ -7,7 +7,7 @@ Invariant: the times of every array rise strictly.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
@@ -180,6 +180,8 @@ class Drive:
     sensors: Mapping[int, Steps] = field(default_factory=dict)
     #: A run's events; None where there are none.
     events: "list[Event] | None" = None
+    #: Goals that a run left open, as sentences.
+    open_goals: Sequence[str] = ()
     #: A run's first line and its world; empty for a capture.
     meta: Mapping[str, object] = field(default_factory=dict)
 

@@ -59,14 +59,15 @@ class Metrics:
     contacts: int | None
     energy_j: float | None
     energy_j_per_m: float | None
-    #: What each goal came to: name, whether it was met, when.
-    goals: tuple[tuple[str, bool, float], ...]
+    #: What each goal came to: name, whether it was met, when; None twice where the run left it open.
+    goals: tuple[tuple[str, bool | None, float | None], ...]
     latency: Budget
 
     @property
     def time_to_goal_s(self) -> float | None:
-        """When the last of all goals was met; None where one was missed, or there are none."""
-        return max(at for *_, at in self.goals) if self.goals and all(met for _, met, _ in self.goals) else None
+        """When the last of all goals was met; None where one was missed or left open, or there are none."""
+        times = [at for _, met, at in self.goals if met and at is not None]
+        return max(times) if times and len(times) == len(self.goals) else None
 
     def as_plain(self) -> Json:
         """Return it for JSON."""
@@ -101,7 +102,10 @@ def metrics(drive: Drive) -> Metrics:
         clearance_m=min(clearances) if clearances else None,
         contacts=sum(isinstance(event, Contact) for event in events) if drive.truth is not None and events else None,
         energy_j=energy, energy_j_per_m=energy / path if energy is not None and path > 0 else None,
-        goals=tuple((one.goal, one.met, one.t / NS_PER_S) for one in events if isinstance(one, Verdict)),
+        goals=(
+            *((one.goal, one.met, one.t / NS_PER_S) for one in events if isinstance(one, Verdict)),
+            *((goal, None, None) for goal in drive.open_goals),
+        ),
         latency=latency_budget(drive),
     )  # fmt: skip
 

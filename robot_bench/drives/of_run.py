@@ -45,6 +45,10 @@ def drive_of_record(called: str, record: RunRecord, robot: str = "") -> Drive:
     told.take(_chunks_of(record), Profile.P2OS)
     drive = told.into(Drive(name=called, parameters=parameters, meta=record.meta))
     drive.events = [*record.wire, *record.poses, *record.clearances, *record.contacts, *record.verdicts]
+    drive.open_goals = (
+        ["what was not decided when the run was cut"] if record.is_cut
+        else cast("list[str]", record.end.get("goals_not_judged") or [])
+    )  # fmt: skip
     drive.left_mps, drive.right_mps = drive.told_left_mps, drive.told_right_mps
     if record.meta.get("body") != REMOTE and len(record.poses) > 1:
         drive.truth = trajectory_of(record.poses)

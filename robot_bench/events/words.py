@@ -1,6 +1,8 @@
 """Events in words: a line each, for a person who reads why something failed."""
 
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import fields
+from decimal import Decimal
 from typing import Any
 
 from robot_bench.events.kinds import (
@@ -68,6 +70,11 @@ _WORDS: Mapping[type, Callable[[Any], str]] = {
     Fault: lambda fault: f"fault {fault.op}: {fault.words}",
     Verdict: lambda verdict: f"goal {'met' if verdict.met else 'missed'}: {verdict.goal}",
 }
+#: Fields in millionths, and of what.
+_MICRO: Mapping[str, str] = {
+    "x": "m", "y": "m", "z": "m", "um": "m", "heading": "rad", "pitch": "rad", "left_angle": "rad",
+    "right_angle": "rad", "left": "m/s", "right": "m/s", "work": "J",
+}  # fmt: skip
 #: What there is so much of that it would hide the rest.
 _FREQUENT = (PinEdge, Packet, Pose, Clearance, Ranges, SpiTransfer, I2cTransfer, CanTransfer)
 
@@ -85,6 +92,47 @@ def words_of(event: Event) -> str:
 def what_of(event: Event) -> str:
     """Return an event in words, without its time."""
     return _WORDS[type(event)](event)
+
+
+def told_apart(one: Event, other: Event) -> tuple[str, str]:
+    """Return two events in words, with all that they differ in, to the last digit, where the words are the same."""
+    words, others = what_of(one), what_of(other)
+    if words != others or type(one) is not type(other):
+        return words, others
+    names = [part.name for part in fields(one) if part.name != "t"]
+    pairs = [(name, getattr(one, name), getattr(other, name)) for name in names]
+    parted = [_exact(name, ours, theirs) for name, ours, theirs in pairs if ours != theirs]
+    if not parted:
+        return words, others
+    return (
+        f"{words} ({', '.join(ours for ours, _ in parted)})",
+        f"{others} ({', '.join(theirs for _, theirs in parted)})",
+    )
+
+
+def _exact(name: str, one: object, other: object) -> tuple[str, str]:
+    """Return a field of two events, of its elements those that differ, as exactly as it is recorded."""
+    if isinstance(one, bytes) and isinstance(other, bytes):
+        at = next((n for n, (a, b) in enumerate(zip(one, other, strict=False)) if a != b), min(len(one), len(other)))
+        ours, theirs = (f"{name} from byte {at} on: {_bytes(data[at:]) or 'nothing'}" for data in (one, other))
+        return ours, theirs
+    if isinstance(one, tuple) and isinstance(other, tuple):
+        one, other = (dict(enumerate(items, 1)) for items in (one, other))
+    if isinstance(one, Mapping) and isinstance(other, Mapping):
+        keys = [key for key in {**one, **other} if (key in one, one.get(key)) != (key in other, other.get(key))]
+        ours, theirs = (
+            " ".join(f"{key} {items[key]!r}" if key in items else f"no {key}" for key in keys) for items in (one, other)
+        )
+        return f"{name}: {ours}", f"{name}: {theirs}"
+    unit = _MICRO.get(name, "")
+    if unit and isinstance(one, int) and isinstance(other, int):
+        word = name.replace("_", " ") + " " if name != "um" else ""
+        return f"{word}{_millionths(one)} {unit}", f"{word}{_millionths(other)} {unit}"
+    return f"{name} {one!r}", f"{name} {other!r}"
+
+
+def _millionths(value: int) -> str:
+    return f"{Decimal(value).scaleb(-6):f}"
 
 
 def last_words(events: Iterable[Event], count: int = 8) -> list[str]:

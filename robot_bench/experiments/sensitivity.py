@@ -246,6 +246,7 @@ def outcomes_of(scenario: Scenario, look: Callable[[Nanos], None] = lambda _now:
     drive = Drive(
         name=scenario.name, parameters=scenario.parameters, truth=trajectory_of(record.poses),
         events=[*events, *record.clearances, *record.contacts, *record.verdicts],
+        open_goals=bench.judge().not_judged,
     )  # fmt: skip
     plain = metrics(drive).as_plain()
     found = {name: float(cast("float", plain[name])) for name in FIGURES if plain[name] is not None}

@@ -16,7 +16,7 @@ Invariant: the rows and their order depend on the file and the options alone.
 import itertools
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import cast
@@ -44,6 +44,16 @@ class Axis:
 
     key: str
     values: tuple[object, ...]
+
+
+#: What a person should know whose hundred runs are one.
+ALIKE = 'the seeds made no difference: nothing random acts here, as [controller] errors = "realistic" would'
+
+
+def are_alike(hashes: Iterable[object]) -> bool:
+    """Tell whether runs of several seeds, by the hashes of their traces, are one run; None is one without a trace."""
+    found = list(hashes)
+    return len(found) > 1 and len(set(found)) == 1 and None not in found
 
 
 def read_seeds(text: str) -> tuple[int, ...]:

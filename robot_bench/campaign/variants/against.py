@@ -37,6 +37,11 @@ class Other:
     name: str
     content: bytes
 
+    @property
+    def sha256(self) -> str:
+        """Of its bytes."""
+        return hashlib.sha256(self.content).hexdigest()
+
     @classmethod
     def read(cls, path: Path) -> "Other":
         """Return a firmware file.

@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import os
 import shlex
 import sys
 from collections.abc import Callable, Iterator, Mapping
@@ -18,7 +19,7 @@ from p2os.transport.wall_clock import wall_clock
 from robot_bench.campaign.campaign_file import Campaign, campaign_schema
 from robot_bench.campaign.conduct import Finding, Progress, Workers
 from robot_bench.campaign.journal import NAME as JOURNAL
-from robot_bench.campaign.results import Whole
+from robot_bench.campaign.results import SHOWN_HASH, Whole
 from robot_bench.campaign.search import SEARCHES
 from robot_bench.campaign.suggestion import suggested
 from robot_bench.campaign.variants.against import Against, Other, first_apart, told
@@ -26,6 +27,7 @@ from robot_bench.campaign.variants.diversity import FailureSet
 from robot_bench.campaign.whole import begin, carry_out, resume
 from robot_bench.campaign.workers.processes import Processes
 from robot_bench.cli.progress import RunDisplay, counting_bar
+from robot_bench.cli.run import refuse
 from robot_bench.cli.workers import Jobs, core_count
 from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.scenario.scenario import load_scenario
@@ -64,7 +66,8 @@ def register(app: typer.Typer) -> None:
 
 def campaign(
     words: Annotated[
-        list[str] | None, typer.Argument(help="A campaign file; or `new` and a scenario.", metavar="FILE|new SCENARIO")
+        list[str] | None,
+        typer.Argument(help="A campaign file; or `new` and a scenario.", metavar="[FILE|new SCENARIO]"),
     ] = None,
     jobs: Jobs = None,
     firmware: Annotated[
@@ -95,15 +98,21 @@ def campaign(
     if schema:
         typer.echo(json.dumps(campaign_schema(), indent=2))
         return
+    if search is not None and search not in SEARCHES:
+        raise UsageError(f"there is no search {search!r}", hint=nearest(search, list(SEARCHES)))
     if asked[:1] == ["new"]:
-        write_new(asked[1:], out, firmware)
+        refuse(
+            {"jobs": jobs, "against": against, "resume": go_on, "dask": dask, "scheduler": scheduler,
+             "json": json_output or None},
+            "cannot stand beside new: no key of a campaign file holds it", hint="give it when the campaign is run",
+        )  # fmt: skip
+        keys = {"search": search, "seed": seed, "runs": runs}
+        write_new(asked[1:], out, firmware, {key: value for key, value in keys.items() if value is not None})
         return
     if dask not in {None, "local"}:
         raise UsageError(f"there is no --dask {dask!r}", hint="--dask local, or --scheduler ADDRESS")
     if dask and scheduler:
         raise UsageError("--dask local and --scheduler cannot stand together", hint="leave one of the two out")
-    if search is not None and search not in SEARCHES:
-        raise UsageError(f"there is no search {search!r}", hint=nearest(search, list(SEARCHES)))
     given: dict[str, object] = {"search": search, "seed": seed, "budget": None if runs is None else {"runs": runs}}
     overrides = {key: value for key, value in given.items() if value is not None}
     if go_on is not None:
@@ -132,8 +141,14 @@ def campaign(
     tell(done, other, json_output=json_output)
 
 
-def write_new(words: list[str], out: Path | None, firmware: Path | None) -> None:
+def write_new(words: list[str], out: Path | None, firmware: Path | None, keys: Mapping[str, object]) -> None:
     """Write a campaign file for a scenario.
+
+    Args:
+        words: The scenario.
+        out: The file; None: after the scenario.
+        firmware: The program in place of the scenario's; the file names it.
+        keys: Other keys of the file that were given: `search`, `seed`, `runs`.
 
     Raises:
         UsageError: No scenario is named, or the file is there.
@@ -142,16 +157,24 @@ def write_new(words: list[str], out: Path | None, firmware: Path | None) -> None
         raise UsageError("a campaign for which scenario?", hint="p2os campaign new dodge")
     scenario = load_scenario(words[0], firmware=firmware, trust=Trust(only_reads=True))
     path = out or Path(f"{scenario.name}-campaign.toml")
+    given = dict(keys)
+    if firmware is not None:
+        given["firmware"] = _seen_from(path, firmware)
+    name = str(_seen_from(path, Path(words[0]))) if Path(words[0]).is_file() else words[0]
     try:
         with path.open("x", encoding="utf-8") as file:
-            file.write(suggested(scenario, words[0], str(path)))
+            file.write(suggested(scenario, name, str(path), given))
     except FileExistsError as error:
         raise UsageError(f"{path} is there already", hint="--out another file") from error
     except OSError as error:
         raise UsageError(f"cannot write {path}: {error.strerror}", hint="--out another file") from error
     typer.echo(f"{path}: what may vary, what has to hold, how much may be spent")
-    again = "" if firmware is None else f" --firmware {shlex.quote(str(firmware))}"
-    typer.echo(f"next: p2os campaign {shlex.quote(str(path))}{again}")
+    typer.echo(f"next: p2os campaign {shlex.quote(str(path))}")
+
+
+def _seen_from(path: Path, other: Path) -> str:
+    """Return a file as a file in another folder names it; an absolute one as it is."""
+    return str(other) if other.is_absolute() else os.path.relpath(other, path.parent)
 
 
 def _workers(found: Campaign, jobs: int, dask: str | None, scheduler: str | None, display: RunDisplay) -> Workers:
@@ -188,9 +211,10 @@ def tell(done: Whole, other: Other | None, *, json_output: bool) -> None:
         typer.echo(f"{done.folder / JOURNAL}: {words}; left out, what it told was run again", err=True)
     parts = {} if other is None or done.was_interrupted else parted(done, other)
     if json_output:
-        typer.echo(json.dumps(done.as_json() | ({"parted": parts} if parts else {}), sort_keys=True))
+        against = {} if other is None else {"against": {"name": other.name, "sha256": other.sha256}}
+        typer.echo(json.dumps(done.as_json() | against | ({"parted": parts} if parts else {}), sort_keys=True))
     else:
-        print_whole(done, parts)
+        print_whole(done, parts, other)
     if done.was_interrupted:
         raise typer.Exit(EXIT_INTERRUPTED)
     if done.failures or {row.finding for row in done.progress.rows} == {Finding.ERROR}:
@@ -207,7 +231,7 @@ def parted(done: Whole, other: Other) -> dict[int, str]:
     return found
 
 
-def print_whole(done: Whole, parts: Mapping[int, str]) -> None:
+def print_whole(done: Whole, parts: Mapping[int, str], other: Other | None) -> None:
     """Print the failures, each with the command that runs it again, what else was found, and the sum."""
     for row in done.failures[:MOST_TOLD]:
         run = row.failing
@@ -223,17 +247,30 @@ def print_whole(done: Whole, parts: Mapping[int, str]) -> None:
     if len(done.failures) > MOST_TOLD:
         typer.echo(f"and {len(done.failures) - MOST_TOLD} more; {done.folder / 'failures'} has all")
     print_errors(done)
+    for line in _facts(done, other):
+        typer.echo(line)
     counts = [f"{done.counts[finding]} {finding.value}" for finding in Finding if done.counts.get(finding)]
     progress = done.progress
-    if done.failures:
-        for what, value in FailureSet.of(done.progress.rows).words().items():
-            typer.echo(f"{what}: {value}")
     typer.echo(f"report  {done.folder / 'report.html'}")
     again = " (interrupted: --resume goes on)" if done.was_interrupted else ""
     typer.echo(
         f"{', '.join(counts) or 'nothing'} of {len(progress.rows)} points, {progress.runs} runs, "
         f"{progress.virtual_ns / 3.6e12:.2f} h of virtual time, {progress.cpu_s:.0f} s of processors{again}"
     )
+
+
+def _facts(done: Whole, other: Other | None) -> Iterator[str]:
+    """Return how different the failures are, whose they are, and whether some points were one and the same run."""
+    if done.failures:
+        yield from (f"{what}: {value}" for what, value in FailureSet.of(done.progress.rows).words().items())
+    for name, sha256 in done.campaign.trial.programs.items():
+        yield f"firmware {name}, sha256 {sha256[:SHOWN_HASH]}"
+    if other is not None:
+        yield f"against  {other.name}, sha256 {other.sha256[:SHOWN_HASH]}"
+    points, different = len(done.progress.rows), done.different_runs
+    if different < points:
+        several = "s" * (different > 1)
+        yield f"note    {points} points were {different} different run{several}: what varies acts in no more"
 
 
 def print_errors(done: Whole) -> None:

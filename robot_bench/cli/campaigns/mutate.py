@@ -47,6 +47,9 @@ a number moved by one; a sign turned. Each such mutant runs the scenarios that
 execute it, from just before the change matters. A goal that is missed has noticed
 it, and so has a fault. Survivors are listed: what they get wrong, nobody looks at.
 
+The score of a --sample comes with an interval (95 %), and --fail-under asks its
+lower end; without --sample the score is exact.
+
 Exit code: 0 done, 1 the score is below --fail-under, 2 wrong usage or file.
 
 \b
@@ -142,9 +145,20 @@ def mutate(
     if broken:
         typer.echo(f"{len(broken)} could not be run, first {broken[0]}", err=True)
         raise typer.Exit(1)
-    if fail_under and (mutation.score is None or mutation.score < fail_under):
-        typer.echo(f"the score is below {fail_under:g} %", err=True)
+    bounds = mutation.bounds
+    if fail_under and (bounds is None or bounds[0] < fail_under):
+        typer.echo(_below(mutation, fail_under), err=True)
         raise typer.Exit(1)
+
+
+def _below(mutation: Mutation, fail_under: float) -> str:
+    """Return why the score does not do."""
+    if mutation.score is None or mutation.bounds is None or mutation.score < fail_under:
+        return f"the score is below {fail_under:g} %"
+    return (
+        f"the score may be below {fail_under:g} %: by a sample of {len(mutation.pairs)} of {mutation.possible} it is "
+        f"{mutation.bounds[0]:.1f} % at least\nhint: a greater --sample, or none for the exact score"
+    )
 
 
 def _suite(paths: tuple[Path, ...], board: BluePill, raise_if_interrupted: Callable[[], None]) -> Suite:

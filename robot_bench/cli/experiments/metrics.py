@@ -83,7 +83,8 @@ def lines_of(found: "Metrics") -> Iterator[str]:
         if value is not None:
             yield f"  {words:31}{value:10.{decimals}f} {unit}".rstrip()
     for goal, met, at in found.goals:
-        yield f"  {'met' if met else 'missed':7}{at:8.2f} s  {goal}"[:80]
+        when = " " * 10 if at is None else f"{at:8.2f} s"
+        yield f"  {'open' if met is None else 'met' if met else 'missed':7}{when}  {goal}"[:80]
     rows = [(name, quantiles(found.latency.of(name))) for name in (*STEPS, WHOLE)]
     if any(row["count"] for _, row in rows):
         yield f"  {'latency, ms':20}{'times':>8}{'median':>9}{'90 %':>9}{'99 %':>9}{'max':>9}"

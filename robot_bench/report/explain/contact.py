@@ -27,12 +27,14 @@ from robot_bench.report.explain.findings import (
     Finding,
     all_steady_since,
     ended,
+    held_codes,
     injected,
     numbers,
     obeyed,
     steady_since,
+    told,
 )
-from robot_bench.report.explain.probing import Answer, Prober
+from robot_bench.report.explain.probing import SAME_NS, Answer, Prober
 from robot_bench.report.explain.replay import Hold
 from robot_bench.report.explain.scene import Scene
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
@@ -110,7 +112,7 @@ class ContactInquest:
         codes, began = steady_since(self.scene.record, hit.t - NS_PER_MS)
         if sum(codes) < 0:
             return Finding(
-                f"the robot was driven backwards (motors {_codes(codes)}) since {began / NS_PER_S:.3f} s, where no "
+                f"the robot was driven backwards (motors {told(codes)}) since {began / NS_PER_S:.3f} s, where no "
                 "sensor looks; whether that was right is not known",
                 is_cause=False,
             )
@@ -208,12 +210,12 @@ class ContactInquest:
                 )
             answered = [after]
         near = [answers[net] for answers in self._asked for net in self.on]
-        same = self._effect.before == self._effect.after and all(one.codes == one.base for one in near)
+        same = max([self._effect.otherwise_ns, *(one.otherwise_ns for one in near)]) < SAME_NS
         if len(self._asked) >= AGREEING and same and left >= STRAIGHT_S * NS_PER_S:
             return Finding(
                 f"the program notices {nets} at {self._effect.by} and sets its motors no otherwise for it (motors "
-                f"{_codes(self._effect.before)}), here for {left / NS_PER_S:.2f} s and at {len(self._asked)} other "
-                "times"
+                f"{held_codes(self._effect.way, self.hit.t)}), here for {left / NS_PER_S:.2f} s and at "
+                f"{len(self._asked)} other times"
             )
         least = min((one for one in answered if one is not None), default=0)
         answered_ns = None if self._effect.answered is None else self._effect.answered - since
@@ -254,16 +256,16 @@ class ContactInquest:
                 asked[-1][net].at,
                 "firmware",
                 f"when {prober.replay.pin(net)}, which looks {self._side(net)}, alone goes high, the motors go from "
-                f"{_codes(asked[-1][net].base)} to {_codes(asked[-1][net].codes)}: a turn to the "
+                f"{told(asked[-1][net].base)} to {told(asked[-1][net].codes)}: a turn to the "
                 f"{self._side(net)}; so at {len(asked)} times",
                 Evidence.CHANGED,
             )
         if mine * (1 if self.bearing > 0 else -1) <= 0 and not found:
             return None
-        told = f": as with {found}" if found else ""
+        as_with = f": as with {found}" if found else ""
         return Finding(
             f"the program turns towards what {numbers([prober.replay.pin(net) for net in wrong])} "
-            f"see{'s' * (len(wrong) == 1)}{told}"
+            f"see{'s' * (len(wrong) == 1)}{as_with}"
         )
 
     def _is_left(self) -> Finding | None:
@@ -278,13 +280,13 @@ class ContactInquest:
         lost = self._lost_reverse(self._prober)
         if lost:
             return Finding(f"the program never asks the {lost[0]} motor to go backwards, though it does the {lost[1]} "
-                           f"one: it drives straight on (motors {_codes(codes)}) where the mirrored answer would turn "
+                           f"one: it drives straight on (motors {told(codes)}) where the mirrored answer would turn "
                            f"it, for the last {held:.2f} s, with {nets} high")  # fmt: skip
         if self._effect.after == codes:
             return None  # it is not the sensors that make it drive so, and what else does is not known
         return Finding(
-            f"the program drives straight on (motors {_codes(codes)}) for the last {held:.2f} s, with {nets} high all "
-            f"the time; without them it would have set {_codes(self._effect.after)}"
+            f"the program drives straight on (motors {told(codes)}) for the last {held:.2f} s, with {nets} high all "
+            f"the time; without them it would have set {told(self._effect.after)}"
         )
 
     def _lost_reverse(self, prober: Prober) -> tuple[str, str] | None:
@@ -317,8 +319,12 @@ class ContactInquest:
                            is_cause=False)  # fmt: skip
         since, effect = min(self.on.values()), self._effect
         took = "" if effect.answered is None else f" {(effect.answered - since) / 1e6:.0f} ms after"
+        given, without = effect.before, effect.after
+        if given == without and effect.otherwise is not None:
+            given, without = effect.otherwise  # it answered, and has done with it
+            took += f", for {effect.otherwise_ns / NS_PER_S:.2f} s"
         return Finding(
-            f"the program answered{took} (motors {_codes(effect.after)} without, {_codes(effect.before)} with "
+            f"the program answered{took} (motors {told(without)} without, {told(given)} with "
             f"{numbers(list(self.on))}); whether that answer was right is not known",
             is_cause=False,
         )
@@ -380,7 +386,7 @@ class ContactInquest:
         if not times:
             return
         at = max(times)
-        codes = _codes(steady_since(prober.replay.record, hit.t)[0])
+        codes = told(steady_since(prober.replay.record, hit.t)[0])
         net = next(
             net for net in prober.replay.outputs if net.startswith("motor") and at in self.scene.record.pins[net].times
         )
@@ -401,10 +407,6 @@ class ContactInquest:
 
     def _step(self, t: Nanos, part: str, says: str, evidence: Evidence) -> None:
         self.steps.append(Step(t=t, part=part, says=says, evidence=evidence))
-
-
-def _codes(codes: tuple[int, int]) -> str:
-    return f"{codes[0]:+d}, {codes[1]:+d}"
 
 
 def _is_toward(net: str, asked: Sequence[Mapping[str, Answer]], side: str) -> bool:

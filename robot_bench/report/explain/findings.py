@@ -5,13 +5,14 @@ Invariant: a finding that is called a cause says no more than what was recorded 
 
 import itertools
 from bisect import bisect_right
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from robot_bench.recording.run_record import RunRecord
 from robot_bench.recording.signals import Steps, motor_steps
 from robot_bench.report.explain.chain import Evidence, Step
-from robot_bench.report.explain.probing import Prober
+from robot_bench.report.explain.probing import SAME_NS, Codes, Prober, Way
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: chosen: wheels that are off by more than this, and by more than half a motor step, do not do what the pins ask.
@@ -54,6 +55,30 @@ def all_steady_since(record: RunRecord, times: Iterable[Nanos]) -> list[tuple[tu
 
     found = [(last(left, at), last(right, at)) for at in times]
     return [((one, other), max(since, later)) for (one, since), (other, later) in found]
+
+
+def codes_between(record: RunRecord, since: Nanos, until: Nanos) -> Way:
+    """Return since when the motors had which codes, over a time."""
+    times = {t for motor in (1, 2) for t in motor_steps(record.pins, motor).times if since < t <= until}
+    at = [since, *sorted(times)]
+    return [(t, codes) for t, (codes, _) in zip(at, all_steady_since(record, at), strict=True)]
+
+
+def told(codes: Codes) -> str:
+    """Return the codes of both motors as a person reads them."""
+    return f"{codes[0]:+d}, {codes[1]:+d}"
+
+
+def held_codes(way: Way, until: Nanos) -> str:
+    """Return in words which codes the motors had over a time: the one, or that of most of it, and for how long."""
+    spans: Counter[Codes] = Counter()
+    for (t, codes), (end, _) in itertools.pairwise([*way, (until, (0, 0))]):
+        spans[codes] += end - t
+    held = max(spans, key=lambda codes: spans[codes])
+    whole = until - way[0][0]
+    if whole - spans[held] < SAME_NS:
+        return told(held)
+    return f"{told(held)} for {spans[held] / NS_PER_S:.2f} of {whole / NS_PER_S:.2f} s"
 
 
 def obeyed(record: RunRecord, step_mps: float, at: Nanos, steps: list[Step]) -> Finding | None:

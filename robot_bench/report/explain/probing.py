@@ -9,7 +9,7 @@ Invariant: what is found is a difference of two exact replays, never a likelihoo
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import zip_longest
+from itertools import pairwise, zip_longest
 
 from adapter_sim.pinout import WireRole
 from bluepill_sim.core import BLOCK
@@ -25,10 +25,15 @@ ANSWER_NS: Nanos = 1500 * NS_PER_MS
 #: chosen: a program that has not noticed an input after so long does not.
 NOTICE_NS: Nanos = 3 * NS_PER_S
 
+#: chosen: motors that are otherwise for less do the same: another way through a program shifts its outputs, and two
+#: ports are written in turn.
+SAME_NS: Nanos = 5 * NS_PER_MS
 #: chosen: most programs notice in so long, so that is tried first.
 SOON_NS: Nanos = 50 * NS_PER_MS
 
 Codes = tuple[int, int]
+#: Since when the motors had which codes.
+Way = Sequence[tuple[Nanos, Codes]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,6 +47,11 @@ class Effect:
     #: The motors' codes at the end, with the inputs as recorded, and as they were held.
     before: Codes
     after: Codes
+    #: The motors' codes over the time, with the inputs as recorded.
+    way: Way = ()
+    #: For how long the motors had other codes, and of the longest time which: as recorded, and as the inputs were held.
+    otherwise_ns: Nanos = 0
+    otherwise: tuple[Codes, Codes] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,6 +63,8 @@ class Answer:
     codes: Codes
     noticed: Nanos | None
     answered: Nanos | None
+    #: For how long the motors had other codes.
+    otherwise_ns: Nanos = 0
 
     @property
     def turn(self) -> int:
@@ -73,7 +85,20 @@ class Prober:
 
     def codes_with(self, seen: Seen, at: Nanos) -> Codes:
         """Return the codes at a time in a replay."""
-        levels, found = seen.levels_at(at), []
+        return self._codes(seen.levels_at(at))
+
+    def way(self, seen: Seen, since: Nanos, until: Nanos) -> Way:
+        """Return the codes over a time in a replay."""
+        levels = seen.levels_at(since)
+        found = [(since, self._codes(levels))]
+        for t, net, level in seen.edges:
+            if since < t <= until:
+                levels[net] = level
+                found.append((t, self._codes(levels)))
+        return found
+
+    def _codes(self, levels: Mapping[str, bool]) -> Codes:
+        found = []
         for motor in (1, 2):
             nets = [net for net in self.replay.outputs if net.startswith(f"motor{motor}_")]
             code = sum(levels[net] << bit for bit, net in enumerate(nets))
@@ -144,7 +169,7 @@ class Prober:
         return Answer(
             at=at, base=effect.before, codes=effect.after,
             noticed=None if effect.noticed is None else effect.noticed - at,
-            answered=None if effect.answered is None else effect.answered - at,
+            answered=None if effect.answered is None else effect.answered - at, otherwise_ns=effect.otherwise_ns,
         )  # fmt: skip
 
     def held(self, since: Nanos, until: Nanos, *, level: bool) -> list[Hold]:
@@ -242,13 +267,28 @@ class Prober:
             ),
             default=None,
         )
+        one, two = self.way(plain, since, until), self.way(other, since, until)
+        apart = parted(one, two, until)
         return Effect(
-            noticed=noticed, by=by, answered=answered,
-            before=self.codes_with(plain, until), after=self.codes_with(other, until),
+            noticed=noticed, by=by, answered=answered, before=one[-1][1], after=two[-1][1], way=one,
+            otherwise_ns=sum(apart.values()), otherwise=max(apart, key=lambda codes: apart[codes], default=None),
         )  # fmt: skip
 
     def _time_of(self, cycle: int, since: Nanos) -> Nanos:
         return max(since, self.replay.board.chip.ns_of(cycle))
+
+
+def parted(one: Way, other: Way, until: Nanos) -> dict[tuple[Codes, Codes], Nanos]:
+    """Return for how long the motors had which other codes in one way than in another one, up to a time."""
+    found: Counter[tuple[Codes, Codes]] = Counter()
+    times = sorted({t for t, _ in (*one, *other)})
+    codes = [dict(one), dict(other)]
+    ours, theirs = one[0][1], other[0][1]
+    for t, end in pairwise([*times, until]):
+        ours, theirs = codes[0].get(t, ours), codes[1].get(t, theirs)
+        if ours != theirs:
+            found[ours, theirs] += end - t
+    return {pair: span for pair, span in found.items() if span}
 
 
 def first_row(plain: Seen, other: Seen) -> int | None:

@@ -18,7 +18,19 @@ from dataclasses import dataclass
 
 from robot_bench.events.kinds import Pose
 from robot_bench.report.explain.chain import Evidence, Step
-from robot_bench.report.explain.findings import CONTROL, Finding, ended, injected, let_go, numbers, obeyed, steady_since
+from robot_bench.report.explain.findings import (
+    CONTROL,
+    Finding,
+    codes_between,
+    ended,
+    held_codes,
+    injected,
+    let_go,
+    numbers,
+    obeyed,
+    steady_since,
+    told,
+)
 from robot_bench.report.explain.probing import QUIET_NS, Answer, Codes, Prober
 from robot_bench.report.explain.replay import Reset
 from robot_bench.report.explain.scene import Scene
@@ -131,7 +143,9 @@ class ProgressInquest:
         found = ended(prober, middle, stay.until, self.steps)
         if not found.is_cause:
             return None
-        return Finding(f"{found.says}; the motors stay at {codes[0]:+d}, {codes[1]:+d} since {since / NS_PER_S:.3f} s")
+        if steady_since(self.scene.record, stay.until)[1] != since:
+            return found
+        return Finding(f"{found.says}; the motors stay at {told(codes)} since {since / NS_PER_S:.3f} s")
 
     def _opposite(self, until: Nanos) -> Finding | None:
         prober = self._prober
@@ -203,7 +217,7 @@ class ProgressInquest:
         if min(free) <= 0:
             return None
         lasts = (until - middle) / NS_PER_S
-        self._step(middle, "firmware", f"keeps the motors at {codes[0]:+d}, {codes[1]:+d} also when all sensors' pins "
+        self._step(middle, "firmware", f"keeps the motors at {told(codes)} also when all sensors' pins "
                    f"are held low for {lasts:.0f} s", Evidence.CHANGED)  # fmt: skip
         lines = prober.lines_run(middle, middle + 100 * NS_PER_MS)
         was = prober.lines_run(max(0, since - 300 * NS_PER_MS), since)
@@ -211,9 +225,9 @@ class ProgressInquest:
         if gone:
             self._step(since, "firmware", f"runs for the last time: {numbers(gone[:4])}", Evidence.REPLAYED)
         return Finding(
-            f"the program never leaves what it does since {since / NS_PER_S:.3f} s (motors {codes[0]:+d}, "
-            f"{codes[1]:+d}): it does the same with all sensors' pins held low for {lasts:.0f} s, though at "
-            f"{begin / NS_PER_S:.1f} s, with nothing in sight, it drove on ({free[0]:+d}, {free[1]:+d})"
+            f"the program never leaves what it does since {since / NS_PER_S:.3f} s (motors {told(codes)}): it does "
+            f"the same with all sensors' pins held low for {lasts:.0f} s, though at {begin / NS_PER_S:.1f} s, with "
+            f"nothing in sight, it drove on ({told(free)})"
         )
 
     def _sees_what_is_not(self, middle: Nanos) -> Finding | None:
@@ -231,8 +245,8 @@ class ProgressInquest:
                 return Finding(
                     f"{prober.replay.pin(net)} is high, where {fault[1]!r} was injected at "
                     f"{fault[0] / NS_PER_S:.3f} s; with it low, and all others, the program drives on "
-                    f"({answer.base[0]:+d}, {answer.base[1]:+d}), "
-                    f"with it alone high it does not ({answer.codes[0]:+d}, {answer.codes[1]:+d})"
+                    f"({told(answer.base)}), "
+                    f"with it alone high it does not ({told(answer.codes)})"
                 )
         return None
 
@@ -244,12 +258,13 @@ class ProgressInquest:
             nets = [net for net in prober.replay.outputs if since in self.scene.record.pins[net].times]
             place = prober.replay.writer(since, prober.replay.wires[nets[0]].bluepill[1]) if nets else None
             by = "" if place is None else f" by {place}"
-        self._step(since, "firmware", f"sets the motors to {codes[0]:+d}, {codes[1]:+d}{by}", Evidence.REPLAYED)
+        self._step(since, "firmware", f"sets the motors to {told(codes)}{by}", Evidence.REPLAYED)
         high = [] if prober is None else [net for net in prober.sensors if prober.replay.level(net, middle)]
         seen = f" with {numbers(high)} high" if high else " with no sensor's pin high"
+        held = held_codes(codes_between(self.scene.record, stay.since, stay.until), stay.until)
         return Finding(
             f"from {stay.since / NS_PER_S:.1f} s to {stay.until / NS_PER_S:.1f} s the program itself kept the robot "
-            f"there (motors {codes[0]:+d}, {codes[1]:+d}{seen}); whether that was right is not known",
+            f"there (motors {held}{seen}); whether that was right is not known",
             is_cause=False,
         )
 

@@ -1,8 +1,9 @@
 """Judges the goals of a run while it runs: feeds their watches, publishes verdicts, and may end the run early.
 
-What wants something to be reached is missed only by a run that was as long as the scenario plans: a shorter one
-meets it or leaves it open. What was decided before is decided. What is unknown of a real robot (a collision) is
-not judged there.
+What a watch has decided is decided. The rest is judged by a run as long as the scenario plans: one that was cut
+before, by a fault, a signal, a debugger or a shorter duration, leaves it open, also what held so far. Where the
+scenario itself ended the run, by a verdict or a `[[when]]`, what held is met, and what was to be reached yet is open.
+What is unknown of a real robot (a collision) is not judged there.
 
 Invariant: a verdict depends on the events of the run alone; played back from its trace they give the same.
 """
@@ -66,8 +67,30 @@ class Judgement:
 
     met: list[str]
     missed: list[str]
-    #: The run was too short to miss them, and has not met them.
+    #: The run was too short to judge them.
     not_judged: list[str]
+
+
+@dataclass(frozen=True, slots=True)
+class RunEnd:
+    """How a run ended: when, when it was to end (0: then), and whether the scenario itself ended it."""
+
+    at_ns: Nanos
+    planned_ns: Nanos = 0
+    by_scenario: bool = False
+
+    def leaves_open(self, outcome: Outcome) -> bool:
+        """Tell whether a run that ended so is too short for what became of a goal that was not decided in it."""
+        return self.at_ns < self.planned_ns and not (self.by_scenario and outcome.met)
+
+
+@dataclass(frozen=True, slots=True)
+class GoalAtEnd:
+    """What became of a goal; `is_open` where the run was too short to judge it, and `outcome` says how far it got."""
+
+    goal: Goal
+    outcome: Outcome
+    is_open: bool
 
 
 def load_goal(table: Table, where: Where, wires: Wires | None = None) -> Goal:
@@ -156,8 +179,8 @@ class GoalJudge(Stateful):
         self._decided: list[Outcome | None] = [None] * len(self.goals)
         self._begun = super().snapshot()
         self._publish: Callable[[Verdict], object] = _nowhere
-        #: The run's end and how long it was to be, once they are known.
-        self._last: tuple[Nanos, Nanos] | None = None
+        #: The run's end, once it is known.
+        self._last: RunEnd | None = None
         #: Whether it was restored from a run with other goals, and waits for `catch_up`.
         self.is_behind = False
         #: Called when a verdict ends the run.
@@ -224,15 +247,20 @@ class GoalJudge(Stateful):
             outcome = watch.advance_to(limit)
             if outcome is not None:
                 self._decide(place, outcome, limit)
-        if self._last is not None and self._last[0] == limit:
-            planned_ns = self._last[1]
-            for (goal, outcome, _), decided in zip(self.outcomes(limit), self._decided, strict=True):
-                if decided is None and (outcome.met or limit >= planned_ns):
-                    self._publish(_verdict(goal, outcome, limit))
+        if self._last is not None and self._last.at_ns == limit:
+            for found, decided in zip(self.at_end(self._last), self._decided, strict=True):
+                if decided is None and not found.is_open:
+                    self._publish(_verdict(found.goal, found.outcome, limit))
 
-    def end_at(self, end: Nanos, planned_ns: Nanos) -> None:
-        """Take notice that the run ends at `end`, and was to last `planned_ns`."""
-        self._last = end, planned_ns
+    def end_at(self, end: RunEnd) -> None:
+        """Take notice of how the run ends."""
+        self._last = end
+
+    @property
+    def has_ended_run(self) -> bool:
+        """Whether a verdict has ended the run."""
+        pairs = zip(self.goals, self._decided, strict=True)
+        return any(one is not None and _ends_run(goal, one) for goal, one in pairs)
 
     @property
     def missed(self) -> Mapping[int, str]:
@@ -240,21 +268,16 @@ class GoalJudge(Stateful):
         pairs = enumerate(zip(self.goals, self._decided, strict=True))
         return {at: f"{goal.kind}: {one.says}" for at, (goal, one) in pairs if one is not None and not one.met}
 
-    def finish(self, end: Nanos, *, planned_ns: Nanos = 0) -> Judgement:
-        """Return what became of the goals in a run that ended at `end`.
-
-        Args:
-            end: When it ended.
-            planned_ns: How long the scenario plans it to be; 0 judges all.
-        """
+    def finish(self, end: RunEnd) -> Judgement:
+        """Return what became of the goals in a run that ended so."""
         found = Judgement([], [], [])
-        for goal, outcome, is_decided in self.outcomes(end):
-            if outcome.met:
-                found.met.append(goal.wanted)
-            elif not is_decided and end < planned_ns:
-                found.not_judged.append(f"{goal.wanted}: not judged before {planned_ns / NS_PER_S:g} s")
+        for one in self.at_end(end):
+            if one.is_open:
+                found.not_judged.append(f"{one.goal.wanted}: not judged before {end.planned_ns / NS_PER_S:g} s")
+            elif one.outcome.met:
+                found.met.append(one.goal.wanted)
             else:
-                found.missed.append(f"{goal.kind}: {outcome.says}")
+                found.missed.append(f"{one.goal.kind}: {one.outcome.says}")
         return found
 
     def margins(self, end: Nanos) -> list[float | None]:
@@ -268,10 +291,12 @@ class GoalJudge(Stateful):
             for decided, last in rows
         ]
 
-    def outcomes(self, end: Nanos) -> list[tuple[Goal, Outcome, bool]]:
-        """Return each goal with what became of it in a run that ended at `end`, and whether that was decided before."""
-        rows = zip(self.goals, self._watches, self._decided, strict=True)
-        return [(goal, watch.finish(end), decided is not None) for goal, watch, decided in rows]
+    def at_end(self, end: RunEnd) -> list[GoalAtEnd]:
+        """Return each goal with what became of it in a run that ended so."""
+        rows = zip(self.goals, (watch.finish(end.at_ns) for watch in self._watches), self._decided, strict=True)
+        return [
+            GoalAtEnd(goal, outcome, decided is None and end.leaves_open(outcome)) for goal, outcome, decided in rows
+        ]
 
     def _decide(self, place: int, outcome: Outcome, at: Nanos) -> None:
         if self._decided[place] is not None:
@@ -279,7 +304,7 @@ class GoalJudge(Stateful):
         self._decided[place] = outcome
         goal = self.goals[place]
         self._publish(_verdict(goal, outcome, at))
-        if goal.ends_run in {"decided", "met" if outcome.met else "missed"}:
+        if _ends_run(goal, outcome):
             self.on_end()
 
 
@@ -289,6 +314,10 @@ def _nowhere(_verdict: Verdict) -> None:
 
 def _nothing() -> None:
     """Let the run go on."""
+
+
+def _ends_run(goal: Goal, outcome: Outcome) -> bool:
+    return goal.ends_run in {"decided", "met" if outcome.met else "missed"}
 
 
 def _verdict(goal: Goal, outcome: Outcome, at: Nanos) -> Verdict:
@@ -314,4 +343,4 @@ def judge(
     found = GoalJudge(goals, can_tell_world=can_tell_world)
     found.feed(events)
     found.advance_to(end_ns)
-    return found.finish(end_ns, planned_ns=planned_ns)
+    return found.finish(RunEnd(end_ns, planned_ns, by_scenario=found.has_ended_run))

@@ -146,7 +146,7 @@ class Reach(Watch):
         return None if self._was_late else self.finish(event.t)
 
     def advance_to(self, limit: Nanos) -> Outcome | None:
-        if self._within is None or self._reached is not None or limit <= self._within or self._was_late:
+        if self._within is None or self._reached is not None or limit < self._within or self._was_late:
             return None
         self._was_late = True
         return self.finish(limit)

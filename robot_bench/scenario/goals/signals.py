@@ -101,7 +101,8 @@ class PinHolds(Watch):
         return outcome or (self._look(event.t) if self._from <= event.t else None)
 
     def advance_to(self, limit: Nanos) -> Outcome | None:
-        return self._look(self._from) if limit >= self._from else None
+        outcome = self._look(self._from) if limit >= self._from else None
+        return outcome or (self.finish(limit) if limit >= self._to else None)
 
     def finish(self, end: Nanos) -> Outcome:
         if self._wrong is None:
@@ -151,6 +152,9 @@ class WaveWithin(Watch):
         self._count += 1
         period_ns = event.t - rise
         return self._take(event.t, NS_PER_S / period_ns, (self._fall - rise) / period_ns)
+
+    def advance_to(self, limit: Nanos) -> Outcome | None:
+        return self.finish(limit) if limit >= self._to else None
 
     def _take(self, at: Nanos, hz: float, duty: float) -> Outcome | None:
         self._hz = min(self._hz[0], hz), max(self._hz[1], hz)

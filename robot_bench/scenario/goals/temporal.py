@@ -82,7 +82,8 @@ class OverTime(Watch):
         return self._decide(event.t)
 
     def advance_to(self, limit: Nanos) -> Outcome | None:
-        return self._decide(limit)
+        # All samples up to `limit` were fed: a window that ends there is over.
+        return self._decide(limit + 1)
 
     def _sample(self, t: Nanos, by: float) -> None:
         pick = min if self._is_always else max
@@ -93,7 +94,8 @@ class OverTime(Watch):
                 self._windows[place] = begin, best, at
 
     def _decide(self, now: Nanos) -> Outcome | None:
-        was_decided = bool(self._failure)
+        """Close the windows that were over before `now`; return what is decided by that."""
+        was_decided, had_windows = bool(self._failure), bool(self._windows)
         kept = []
         for begin, best, at in self._windows:
             is_over = self._to is not None and now > begin + self._to
@@ -104,12 +106,12 @@ class OverTime(Watch):
             else:
                 kept.append((begin, best, at))
         self._windows = kept
-        if self._failure and not was_decided:
-            return self.finish(now)
-        if not self._after and not self._failure and not was_decided and not self._is_always:
-            met = [best for _, best, _ in kept if best >= 0]
-            return self.finish(now) if met else None
-        return None
+        if self._failure:
+            return None if was_decided else self.finish(now)
+        if self._after:
+            return None
+        is_met = not kept and had_windows if self._is_always else any(best >= 0 for _, best, _ in kept)
+        return self.finish(now) if is_met else None
 
     def _was_never_told(self, best: float) -> bool:
         """Tell whether the thing that a distance is to was nowhere; of other signals no sample is no failure."""
@@ -177,7 +179,7 @@ class Happens(Watch):
         return None
 
     def advance_to(self, limit: Nanos) -> Outcome | None:
-        if self._to is None or limit <= self._to or self._is_decided:
+        if self._to is None or limit < self._to or self._is_decided:
             return None
         self._is_decided = True
         return self.finish(limit)

@@ -43,7 +43,11 @@ class Watch(Stateful):
         return None
 
     def finish(self, end: Nanos) -> Outcome:
-        """Return what became of the goal in a run that ended at `end`."""
+        """Return what became of the goal in a run that ended at `end`.
+
+        A run that was cut leaves open what was not decided until then: what holds so far may be missed later. So a
+        watch decides as soon as nothing can change the outcome any more, at the end of its window for one.
+        """
         raise NotImplementedError
 
 

@@ -9,19 +9,35 @@ from pathlib import Path
 
 import pytest
 
-from tests.documentation.page import ROOT, Page
+from tests.documentation.page import ROOT, Block, Page
 
 COMPILER = shutil.which("gcc")
 
 
+#: Where the page puts its test: a folder that has room for it.
+TEST = "tests/bluepill_sim/peripherals/tim/test_alarm.py"
 #: The tables that the page names, and what judges a device by them.
 TABLES = ("conftest.py", "machine.py", "peripherals/test_reset_values.py", "peripherals/test_register_views.py")
+
+
+def test_the_python_of_the_page_is_as_ruff_has_it() -> None:
+    """`make test` begins with ruff: what is taken from the page passes there too."""
+    _, python_file, _, test = Page(ROOT / "docs" / "peripheral.md").blocks
+    ruff = Path(sys.executable).with_name("ruff")
+    for block in (python_file, test):
+        first, _, text = block.text.partition("\n")
+        for words in (("format", "--diff"), ("check", "--no-cache")):
+            done = subprocess.run(
+                [ruff, *words, "--stdin-filename", first.strip("# "), "-"], input=text, cwd=ROOT,
+                capture_output=True, text=True, timeout=60, check=False,
+            )  # fmt: skip
+            assert done.returncode == 0, done.stdout + done.stderr
 
 
 @pytest.mark.skipif(COMPILER is None, reason="no C compiler")
 @pytest.mark.parametrize("core", ["native", "python"])
 def test_the_device_of_the_page_works_as_it_is_printed(core: str, scratch: Path) -> None:
-    assert "1 passed" in pytest_there(scratch, core, "test_alarm.py")
+    assert "1 passed" in pytest_there(scratch, core, TEST)
 
 
 @pytest.mark.skipif(COMPILER is None, reason="no C compiler")
@@ -51,8 +67,7 @@ def scratch(tmp_path_factory: pytest.TempPathFactory) -> Path:
         shutil.copytree(ROOT / package, folder / package, ignore=shutil.ignore_patterns("__pycache__", "*.so"))
     c_file, python_file, rows, test = Page(ROOT / "docs" / "peripheral.md").blocks
     for block in (c_file, python_file, test):
-        name = block.text.split("\n")[0].strip("/*# ").split(":")[0]
-        (folder / name).write_text(block.text, encoding="utf-8")
+        put_block(block, folder)
     put_rows(folder / "bluepill_sim" / "stm32f103.py", *rows.text.splitlines())
     for name in TABLES:
         target = folder / "tests" / "bluepill_sim" / name
@@ -67,6 +82,13 @@ def scratch(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def put_block(block: Block, folder: Path) -> None:
+    """Write a block where its first line says."""
+    path = folder / block.text.partition("\n")[0].strip("/*# ").split(":")[0]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(block.text, encoding="utf-8")
+
+
 def put_rows(page: Path, imported: str, peripheral: str, wire: str) -> None:
     """Put the lines where the page says."""
     put_line(page, imported, "from bluepill_sim.peripherals.exti ")
@@ -75,7 +97,9 @@ def put_rows(page: Path, imported: str, peripheral: str, wire: str) -> None:
 
 
 def put_line(page: Path, line: str, before: str) -> None:
-    """Put a line before another, which stands there once."""
+    """Put a line before another, which stands there once; whoever has followed the page has it already."""
     text = page.read_text(encoding="utf-8")
+    if line in text.splitlines():
+        return
     assert text.count(before) == 1
     page.write_text(text.replace(before, f"{line}\n{before}"), encoding="utf-8")

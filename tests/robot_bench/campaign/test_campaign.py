@@ -32,7 +32,7 @@ from robot_bench.campaign.trial import GoalResult, Outcome, Trial, Verdict, run_
 from robot_bench.campaign.whole import MOST_MOMENTS, Whole, begin, carry_out, resume
 from robot_bench.campaign.workers import processes
 from robot_bench.campaign.workers.processes import Processes
-from robot_bench.cli.campaigns.campaign import tell
+from robot_bench.cli.campaigns.campaign import _facts, tell
 from robot_bench.scenario.scenario import known_scenarios, load_scenario
 from simbase.errors import FileError, UsageError
 
@@ -232,6 +232,55 @@ def test_confirmations_end_with_their_budget(tmp_path: Path) -> None:
     assert whole.counts[Finding.UNCONFIRMED] > 0
 
 
+def test_no_near_miss_takes_the_confirmation_that_a_failure_needs(tmp_path: Path) -> None:
+    wanted = {"near_misses": 2, "budget": {"runs": 24, "confirmations": 24}}
+    (tmp_path / "free").mkdir()
+    free = carried(begun(tmp_path / "free", **wanted), tmp_path / "free/kept", Shuffled(1))
+    failed = [row.number for row in free.progress.rows if row.cheap.outcome.verdict is Verdict.FAILED]
+    near = [row.number for row in free.progress.rows if row.full is not None and row.number not in failed]
+    assert (len(failed) > 3, len(near)) == (True, 12), "two of each of six batches"
+    for more in (-1, 0, 1):
+        folder = tmp_path / str(more)
+        folder.mkdir()
+        campaign = begun(folder, **{**wanted, "budget": {"runs": 24, "confirmations": len(failed) + more}})
+        whole = carried(campaign, folder / "kept", Shuffled(1))
+        assert whole.counts[Finding.CONFIRMED] == len(failed) + min(more, 0)
+        assert whole.counts.get(Finding.UNCONFIRMED, 0) == (more < 0)
+        in_full = [row.number for row in whole.progress.rows if row.full is not None and row.number not in failed]
+        assert in_full == near[: max(more, 0)], "the nearest, and of those alike the first"
+
+
+def test_a_near_miss_that_fails_in_full_is_a_failure_wherever_it_is_told(tmp_path: Path) -> None:
+    def pessimist(trial: Trial) -> Outcome:
+        found = made_up(trial)
+        by = int(found.sha256, 16) % 1000 / 1000
+        if trial.table["mode"] == "direct":
+            goal = GoalResult(kind="clearance", wanted="", met=True, says="", robustness=by, unit="m")
+            return Outcome(verdict=Verdict.PASSED, goals=(goal,), sha256=found.sha256)
+        return Outcome(verdict=Verdict.FAILED, failures=("clearance: ",), sha256=found.sha256)
+
+    whole = carried(begun(tmp_path, budget={"confirmations": 2}), tmp_path / "kept", Shuffled(1, judge=pessimist))
+    rows = whole.progress.rows
+    nearest = [min(rows[at : at + 4], key=lambda row: row.cheap.margin or 0.0) for at in (0, 4, 8)]
+    expected = sorted(row.number for row in sorted(nearest, key=lambda row: row.cheap.margin or 0.0)[:2])
+    assert [row.number for row in whole.failures] == expected
+    assert all((whole.results.failure_folder(row) / "dodge.toml").is_file() for row in whole.failures)
+    parquet = pytest.importorskip("pyarrow.parquet")
+    table = parquet.read_table(tmp_path / "kept/results").to_pylist()
+    assert {entry["number"] for entry in table if entry["finding"] == "full only"} == set(expected)
+    assert len(table) == sum(len(row.runs) for row in rows)
+    assert [entry["number"] for entry in table] == sorted(entry["number"] for entry in table)
+
+
+def test_points_that_were_one_run_are_said_to_be(tmp_path: Path) -> None:
+    def alike(_: Trial) -> Outcome:
+        return Outcome(verdict=Verdict.PASSED, sha256="1")
+
+    whole = carried(begun(tmp_path), tmp_path / "kept", Shuffled(1, judge=alike))
+    assert "note    12 points were 1 different run: what varies acts in no more" in [*_facts(whole, None)]
+    assert whole.as_json()["different_runs"] == 1
+
+
 def test_each_failure_is_a_folder_that_runs_again_with_its_hash(tmp_path: Path) -> None:
     workers = Shuffled(1)
     whole = carried(begun(tmp_path), tmp_path / "kept", workers)
@@ -429,3 +478,13 @@ def test_conduct_ends_after_the_batch_in_which_its_virtual_hours_are_spent(tmp_p
     campaign = begun(tmp_path, budget={"virtual_hours": 3 / 3600})
     conduct = Conduct(campaign, tmp_path / "kept", Shuffled(1), clock=lambda: 0)
     assert len(conduct.run().rows) == 4
+
+
+def test_minutes_that_are_over_leave_one_batch_of_near_misses(tmp_path: Path) -> None:
+    campaign = begun(tmp_path, near_misses=4, budget={"minutes": 1.0, "runs": 16, "confirmations": 16})
+    ticks = iter([0, 1, 2, 60 * 10**9, 60 * 10**9 + 1])
+    conduct = Conduct(campaign, tmp_path / "kept", Shuffled(1), clock=lambda: next(ticks))
+    rows = conduct.run().rows
+    assert len(rows) == 12
+    failed = sum(row.cheap.outcome.verdict is Verdict.FAILED for row in rows)
+    assert sum(row.full is not None for row in rows) == failed + 4 < 12

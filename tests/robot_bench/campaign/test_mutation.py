@@ -1,6 +1,7 @@
 """Mutants of a program of a dozen instructions: which goals notice them, and that they are run as real programs are."""
 
 import json
+import math
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -16,6 +17,7 @@ from p2os.cli import main as cli
 from robot_bench.bench import Bench
 from robot_bench.campaign.variants.mutation import base_run as runs
 from robot_bench.campaign.variants.mutation.base_run import BaseRun, base_run
+from robot_bench.campaign.variants.mutation.interval import share_interval
 from robot_bench.campaign.variants.mutation.trial import Fate, Found, try_mutant
 from robot_bench.cli.campaigns.mutate import _drawn
 from robot_bench.scenario.scenario import load_scenario
@@ -153,15 +155,47 @@ def test_the_command_prints_a_score_that_is_the_least_one_and_the_survivors_in_8
 
 
 def test_a_score_below_the_least_one_fails(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    """The command above has tried them: here two of each five are noticed."""
+    """The command above has tried them: here two of each five are noticed, and of all eleven the last has one trace."""
 
     def try_all(tried: list[Mutant], *_: object) -> tuple[list[Found], list[str], bool]:
-        return [Found(Fate.MISSED if place % 5 < 2 else Fate.SURVIVED) for place in range(len(tried))], [], True
+        found = [Found(Fate.MISSED if place % 5 < 2 else Fate.SURVIVED) for place in range(len(tried))]
+        return [*found[:10], *(Found(Fate.SAME) for _ in found[10:])], [], True
 
     monkeypatch.setattr("robot_bench.cli.campaigns.mutate._try_all", try_all)
+    words = ["mutate", "x.bin", "mine.toml"]
     for least, code in (("40%", 0), ("40.1%", 1)):
-        assert cli.run(["mutate", "x.bin", "mine.toml", "--sample", "10", "--fail-under", least]) == code
-        assert "score 40.0 %" in capsys.readouterr().out
+        assert cli.run([*words, "--fail-under", least]) == code
+        out, err = capsys.readouterr()
+        assert out.splitlines()[-1].startswith("score 40.0 %: 4 noticed of 10"), "all were tried: it is exact"
+        assert "confidence" not in out
+        assert err == ("the score is below 40.1 %\n" if code else "")
+    # Of ten of eleven, 4 or 5 may be noticed: 36.4 % at least.
+    for least, code in (("36.3%", 0), ("36.4%", 1), ("40.1%", 1)):
+        assert cli.run([*words, "--sample", "10", "--fail-under", least]) == code
+        out, err = capsys.readouterr()
+        assert out.splitlines()[-2] == "score of all 11: 36.4 to 45.5 % (95% confidence, by a sample of 10)"
+        assert all(len(line) <= 80 for line in out.splitlines())
+        assert err.startswith(
+            {"36.3%": "", "36.4%": "the score may be below 36.4 %", "40.1%": "the score is below"}[least]
+        )
+        assert "hint: a greater --sample" in err or least != "36.4%"
+
+
+@pytest.mark.parametrize("whole", [1, 2, 7, 30])
+def test_an_interval_holds_the_share_of_the_whole_in_19_of_20_samples_at_least(whole: int) -> None:
+    for sample in range(1, whole + 1):
+        bounds = [share_interval(hits, sample, whole) for hits in range(sample + 1)]
+        for of in range(whole + 1):
+            ways = {hits: math.comb(of, hits) * math.comb(whole - of, sample - hits) for hits in range(sample + 1)}
+            held = sum(n for hits, n in ways.items() if n and bounds[hits][0] <= of / whole <= bounds[hits][1])
+            assert held >= 0.95 * sum(ways.values()), (sample, of)
+
+
+def test_an_interval_of_the_whole_is_its_share_and_one_of_a_great_whole_is_that_of_clopper_and_pearson() -> None:
+    assert [share_interval(hits, 10, 10) for hits in range(11)] == [(hits / 10, hits / 10) for hits in range(11)]
+    assert share_interval(4, 10, 10**6) == pytest.approx((0.1216, 0.7376), abs=2e-4)  # their table, R's binom.test
+    assert share_interval(0, 20, 10**6) == pytest.approx((0, 0.1684), abs=2e-4)
+    assert share_interval(19, 81, 562) == pytest.approx((0.154, 0.338), abs=0.01)
 
 
 def test_where_survivors_go_is_looked_at_before_anything_runs(
@@ -191,6 +225,8 @@ def test_a_sample_is_drawn_by_its_seed_and_json_junit_and_files_have_the_same(
     assert [mutant["after"] for mutant in one["mutants"]] == of_1 != of_0
     fates = Counter(mutant["fate"] for mutant in one["mutants"])
     suite = ET.fromstring(Path("r.xml").read_text(encoding="utf-8"))  # noqa: S314 - our own file
+    low, high = one["score_bounds"]
+    assert low < one["score"] < high
     assert (one["tried"], suite.get("tests"), suite.get("failures")) == (5, "5", str(fates["survived"]))
     assert len(list(Path("wrong").iterdir())) == fates["survived"] > 0
     assert cli.run(["run", "mine.toml", "--firmware", str(next(Path("wrong").iterdir()))]) == 0

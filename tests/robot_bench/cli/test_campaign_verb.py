@@ -1,6 +1,8 @@
 """`p2os campaign` as one types it: the file that it writes, exit codes, and what is wrong in a line."""
 
+import hashlib
 import json
+from importlib.resources import files
 from pathlib import Path
 
 import pytest
@@ -27,6 +29,15 @@ duration_s = 1
 start.heading_deg = { from = 0, to = 350, step = 10 }
 [[goal]]
 kind = "GOAL"
+"""
+
+SCENARIO = """
+firmware = "build/my robot.elf"
+world = "room"
+duration_s = 2
+threshold_m = 0.6
+[[goal]]
+kind = "no_collision"
 """
 
 
@@ -65,19 +76,53 @@ def test_the_file_that_new_writes_is_a_campaign_for_every_scenario(app: typer.Ty
         run(app, "new", scenario)
 
 
+@pytest.mark.parametrize("out", ["c.toml", "sub/c.toml"])
+@pytest.mark.parametrize("is_absolute", [False, True])
+def test_the_file_that_new_writes_names_program_scenario_and_whatever_else_was_given(
+    app: typer.Typer, out: str, is_absolute: bool
+) -> None:
+    Path("sub").mkdir()
+    Path("build").mkdir()
+    program, folder = Path("build/my robot.elf"), Path.cwd() if is_absolute else Path()
+    program.write_bytes(Path(str(files("robot_bench.firmware").joinpath("motors.elf"))).read_bytes())
+    Path("mine.toml").write_text(SCENARIO)
+    words = ["--firmware", str(folder / program), "--out", out, "--runs", "7", "--seed", "5", "--search", "random"]
+    code, said = run(app, "new", str(folder / "mine.toml"), *words)
+    assert (code, said.splitlines()[-1]) == (0, f"next: p2os campaign {out}"), "nothing is left to be given again"
+    written = load_campaign(Path(out))
+    assert [*written.trial.programs] == ["my robot.elf"]
+    assert written.trial.files["my robot.elf"] == program.read_bytes()
+    assert (written.budget.runs, written.seed, written.search) == (7, 5, "random")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [["-j", "2"], ["--against", "x.elf"], ["--resume", "x"], ["--dask", "local"], ["--scheduler", "x"], ["--json"]],
+)
+def test_what_no_campaign_file_holds_is_refused_beside_new(app: typer.Typer, words: list[str]) -> None:
+    with pytest.raises(UsageError, match="cannot stand beside new"):
+        run(app, "new", "dodge", *words)
+    assert not Path("dodge-campaign.toml").exists()
+
+
 @pytest.mark.slow
 def test_what_fails_ends_with_1_and_the_command_that_runs_it_again(app: typer.Typer) -> None:
     code, said = run(app, str(written('usart_contains"\ntext = "never printed')), "-j", "1", "--out", "kept")
     assert code == 1
     assert "p2os run kept/failures/0001/dodge.toml" in said
     assert said.splitlines()[-1].startswith("2 confirmed of 2 points, 6 runs, ")
+    program = Path(str(files("robot_bench.firmware").joinpath("dodge.elf"))).read_bytes()
+    sha256 = hashlib.sha256(program).hexdigest()
+    assert f"firmware dodge.elf, sha256 {sha256[:16]}" in said.splitlines()
+    assert f"dodge.elf ({sha256[:16]})" in Path("kept/report.html").read_text(encoding="utf-8")
     code, again = run(app, "--resume", "kept", "--json")
     assert (code, json.loads(again)["findings"]["confirmed"]) == (1, 2)
+    assert json.loads(again)["firmware"] == [{"name": "dodge.elf", "sha256": sha256}]
 
 
 def test_what_passes_ends_with_0(app: typer.Typer) -> None:
     code, said = run(app, str(written("no_collision")), "--runs", "1")
-    assert (code, said.splitlines()[0]) == (0, "report  campaigns/mine-001/report.html")
+    assert (code, said.splitlines()[1]) == (0, "report  campaigns/mine-001/report.html")
 
 
 DISTURBED = """

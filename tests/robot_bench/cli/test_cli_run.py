@@ -14,6 +14,7 @@ import pytest
 from bluepill_sim.program.last_blocks import TITLE
 from p2os.cli.main import run as p2os
 from robot_bench.cli.run import capped
+from robot_bench.drives.of_run import drive_of_record
 from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.recording.run_record import read_run
 from robot_bench.scenario.scenario import load_scenario
@@ -279,8 +280,8 @@ def test_a_second_run_with_the_same_out_is_refused_while_the_first_lasts(capsys:
 def test_demo_runs_dodge_in_the_room(capsys: pytest.CaptureFixture[str]) -> None:
     assert p2os(["demo", "--duration", "0.1s", "--json"]) == 0, "nothing can be missed in 0.1 s"
     outcome = json.loads(capsys.readouterr().out)
-    assert outcome["goals_met"] == ["touches nothing"]
-    assert [goal.rpartition(": ")[2] for goal in outcome["goals_not_judged"]] == ["not judged before 120 s"] * 3
+    assert outcome["goals_met"] == []
+    assert [goal.rpartition(": ")[2] for goal in outcome["goals_not_judged"]] == ["not judged before 120 s"] * 4
     assert (outcome["scenario"], outcome["mode"], outcome["world"]) == ("dodge", "adapter", "room")
     assert Path("runs/demo-001/report.html").is_file()
     assert {path.name for path in Path("runs/demo-001").glob("*.png")} == {"path.png", "speeds.png", "pins.png"}
@@ -298,12 +299,21 @@ def test_a_run_shorter_than_its_scenario_names_what_it_left_open(capsys: pytest.
 
 
 def test_why_a_run_failed_stands_right_above_its_last_line(capsys: pytest.CaptureFixture[str]) -> None:
-    goal = '[[goal]]\nkind = "min_distance"\ndistance_m = 1\n'
-    assert p2os(["run", make(thumb.NOWHERE, LEAST.replace("0.2", "5.0") + goal), "--out", "dead"]) == 1
-    *_, is_open, cause, last = capsys.readouterr().out.splitlines()
+    goals = '[[goal]]\nkind = "min_distance"\ndistance_m = 1\n[[goal]]\nkind = "no_collision"\n'
+    assert p2os(["run", make(thumb.NOWHERE, LEAST.replace("0.2", "5.0") + goals), "--out", "dead"]) == 1
+    *_, is_open, untouched, cause, last = capsys.readouterr().out.splitlines()
     assert cause.startswith("failed  firmware fault: ")
     assert last == "FAILED; report: dead/report.html"
     assert is_open.startswith("open    drives at least 1 m"), "what the fault has prevented is no second cause"
+    assert untouched == "open    touches nothing: not judged before 5 s", "the rest of the time nobody knows"
+    record = read_run(Path("dead"))
+    told = json.loads(Path("dead/summary.json").read_text(encoding="utf-8"))
+    assert told["goals_met"] == record.end["goals_met"] == record.verdicts == []
+    assert len(told["goals_not_judged"]) == 2
+    assert f'<li class="open">{untouched[8:]}</li>' in Path("dead/report.html").read_text(encoding="utf-8")
+    assert drive_of_record("dead", record).open_goals == told["goals_not_judged"]
+    assert p2os(["metrics", "dead"]) == 0
+    assert "  open               touches nothing: not judged before 5 s" in capsys.readouterr().out.splitlines()
 
 
 def test_an_untried_program_is_capped_unless_told() -> None:

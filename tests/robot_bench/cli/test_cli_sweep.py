@@ -84,7 +84,13 @@ def test_what_comes_of_a_sweep_does_not_depend_on_how_many_run_at_a_time(capsys:
 
 def test_seeds_that_make_no_difference_are_told_of(capsys: pytest.CaptureFixture[str]) -> None:
     assert p2os(["run", make(), "--seeds", "0-1"]) == 0
-    assert "note    the seeds made no difference" in capsys.readouterr().out
+    assert "note    the seeds made no difference: nothing random acts here" in capsys.readouterr().out
+    assert p2os(["run", make(), "--seeds", "0-1", "--json", "--junit", "r.xml"]) == 0
+    assert found_of(capsys)["seeds_are_alike"] is True
+    (note,) = ET.parse("r.xml").getroot().findall("properties/property")  # noqa: S314  # our own file
+    assert note.get("value", "").startswith("the seeds made no difference")
+    assert p2os(["run", make(), "--seeds", "0", "--json"]) == 0
+    assert not found_of(capsys)["seeds_are_alike"]
     assert p2os(["run", make(), "--seeds", "0"]) == 0
     assert "made no difference" not in capsys.readouterr().out
 

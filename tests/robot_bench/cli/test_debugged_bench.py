@@ -166,7 +166,10 @@ def test_p2os_run_waits_for_gdb_and_goes_on_when_it_detaches(
 def test_a_killed_run_has_failed(gdb: list[bytes]) -> None:
     gdb += [b"s", b"vKill;1"]
     with pytest.raises(RunFailedError, match="killed by the debugger"):
-        debug_bench(0, is_paced=False, on_wait=lambda: None)(Bench(scenario()))
+        debug_bench(0, is_paced=False, on_wait=lambda: None)(bench := Bench(scenario()))
+    judged = bench.judge()
+    assert (judged.met, judged.missed) == ([], []), "what was open at the kill is open"
+    assert any(goal.startswith("touches nothing: not judged before 120 s") for goal in judged.not_judged)
 
 
 def test_a_signal_ends_the_waiting_for_a_debugger() -> None:

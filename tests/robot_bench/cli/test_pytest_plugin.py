@@ -6,6 +6,7 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
+from robot_bench.scenario.sweep import ALIKE
 from tests.tools.forked_python import PYTEST, forked_python
 
 pytest_plugins = ("pytester",)
@@ -169,6 +170,48 @@ def test_seeds_are_those_of_the_command_line() -> None:
     for given in (-1, "9-0", "x"):
         with pytest.raises(pytest.fail.Exception, match="names no seeds"):
             _seeds(given)
+
+
+SEEDED = """
+import pytest
+
+@pytest.mark.seeds("0-2")
+@pytest.mark.worlds("room", "arena")
+def test_alike(bench):
+    bench.run_until("20 ms")
+
+@pytest.mark.seeds("0-1")
+def test_of_seeds_that_are_looked_at(bench):
+    bench.run_until("20 ms")
+    bench.inject(f"sonar-dead {bench.scenario.seed + 1}")
+    bench.run_until("30 ms")
+
+@pytest.mark.seeds(7)
+def test_of_one_seed(bench):
+    bench.run_until("20 ms")
+
+@pytest.mark.parametrize("time", ["10 ms", "20 ms"])
+def test_of_no_seeds(bench, time):
+    bench.run_until(time)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", [(), pytest.param(("-p", "xdist", "-n", "2"), marks=pytest.mark.soak)])
+def test_tests_whose_seeds_made_no_difference_are_named_once(
+    pytester: pytest.Pytester, workers: tuple[str, ...]
+) -> None:
+    pytester.makeini(SETTINGS)
+    pytester.makepyfile(test_mine=SEEDED)
+    words = ("-p", "no:cacheprovider", *(workers or ("-p", "no:xdist")), "--bench-body", "kinematic",
+             "--junitxml", "told.xml", "--basetemp", str(pytester.path / "temporary"))  # fmt: skip
+    result = pytester.run(forked_python(), "-c", PYTEST, *words)
+    result.assert_outcomes(passed=11)
+    notes = [line for line in result.outlines if line.startswith("note: ")]
+    assert notes == [f"note: test_mine.py::test_alike was one run with 3 seeds: {ALIKE}"]
+    hashes = re.findall(r'name="trace_sha256" value="(\w+)"', (pytester.path / "told.xml").read_text())
+    assert len(hashes) == 11
+    assert len({*hashes}) < 11
 
 
 def test_who_uses_no_bench_loads_none(pytester: pytest.Pytester) -> None:

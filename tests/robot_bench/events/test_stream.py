@@ -1,7 +1,7 @@
 """The stream hands on each event once, in order, to whoever wants it; live and from a trace it is the same."""
 
 import json
-from dataclasses import replace
+from dataclasses import fields, replace
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
@@ -35,6 +35,7 @@ from robot_bench.events.kinds import (
     hull_part,
 )
 from robot_bench.events.stream import EventStream
+from robot_bench.events.words import told_apart, what_of
 from robot_bench.scenario.fault_script import FaultChange
 from robot_bench.scenario.scenario import Scenario, load_scenario
 from robot_bench.scenario.world_script import Change, Op
@@ -96,6 +97,36 @@ def test_a_pose_of_an_older_trace_tells_no_work() -> None:
 
 def test_every_kind_of_event_is_tried_here() -> None:
     assert set(SAMPLES) == set(KINDS)
+
+
+@given(st.data())
+def test_two_events_that_differ_are_told_apart(data: st.DataObject) -> None:
+    kind = data.draw(st.sampled_from(KINDS))
+    one, other = data.draw(SAMPLES[kind]), data.draw(SAMPLES[kind])
+    name = data.draw(st.sampled_from([part.name for part in fields(one) if part.name != "t"]))
+    other = replace(one, **{name: getattr(other, name)})
+    ours, theirs = told_apart(one, other)
+    assert (ours == theirs) is (one == other), name
+    assert ours.startswith(what_of(one))
+    assert told_apart(one, one) == (what_of(one), what_of(one))
+
+
+def test_digits_and_bytes_that_words_leave_out_are_told_where_events_differ_in_them() -> None:
+    near, nearer = Clearance(t=5, um=1_476_312), Clearance(t=5, um=1_476_309)
+    assert told_apart(near, nearer) == (
+        "1.476 m of clearance (1.476312 m)", "1.476 m of clearance (1.476309 m)",
+    )  # fmt: skip
+    assert told_apart(near, Clearance(t=5, um=1_475_000)) == ("1.476 m of clearance", "1.475 m of clearance")
+    ours, theirs = told_apart(pose(0, 1), replace(pose(0, 1), left_angle=-7))
+    assert ours.endswith("m/s (left angle 0.000000 rad)")
+    assert theirs.endswith("m/s (left angle -0.000007 rad)")
+    long = SpiTransfer(t=1, bus="spi1", begun=0, ended=1, from_master=bytes(20), from_slave=b"")
+    ours, theirs = told_apart(long, replace(long, from_master=bytes(18) + b"\1\0"))
+    assert ours.endswith("(from_master from byte 18 on: 00 00)")
+    assert theirs.endswith("(from_master from byte 18 on: 01 00)")
+    thing = WorldChange(t=0, op="place", name="a", fields={"x": 1.0, "y": 2.0})
+    assert told_apart(thing, replace(thing, fields={"x": 1.0, "z": 2.5}))[1] == "'a': place (fields: no y z 2.5)"
+    assert told_apart(Ranges(t=0, mm=(1000, 2)), Ranges(t=0, mm=(1000, 1)))[0] == "sonar 1.00 0.00 m (mm: 2 2)"
 
 
 notes = st.lists(

@@ -99,6 +99,8 @@ def test_what_events_tell_is_taken_and_what_they_do_not_tell_is_none(work: int |
     assert found.time_to_goal_s == 0.5
     missed = metrics(drive(trajectory_of(poses), events=[*events, Verdict(t=9, goal="b", met=False, says="")]))
     assert missed.time_to_goal_s is None
+    cut = metrics(replace(drive(trajectory_of(poses), events=events), open_goals=["touches nothing: not judged"]))
+    assert (cut.time_to_goal_s, cut.goals[-1]) == (None, ("touches nothing: not judged", None, None))
     bare = metrics(drive(trajectory_of(poses)))
     assert (bare.clearance_m, bare.contacts, bare.energy_j, bare.time_to_goal_s) == (None, None, None, None)
 

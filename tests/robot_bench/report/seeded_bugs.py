@@ -46,6 +46,8 @@ _NEAR = 1.7
 _BOX = 'shape = "box"\nlength_m = 0.1\nwidth_m = 0.8\nheight_m = 0.5\nbefore_sonar = 4\ndistance_m = 0.3'
 #: So near that no program can help it.
 UNFAIR = _BOX.replace("0.3", "0.2")
+_SETS = "        pins_motors(command.left, command.right);"
+_TURNS = "        pins_motors(turns ? 2 : 3, turns ? -2 : 3);"
 _AHEAD = 'shape = "cylinder"\nradius_m = 0.05\nheight_m = 0.5\nx_m = -0.8\ny_m = 0.0'
 
 
@@ -263,6 +265,27 @@ OTHERS = (
             ("dodge.c", "        pins_motors(c", "        if (dodge.state_ticks == 1 && !dodge.turns) pins_motors(c"),
         ),
         answers=("sets its motors no otherwise",), thing=_AHEAD, duration_s=10.0,
+    ),
+    Bug(
+        # What it drives by is the time: it had +2, -2 for the last hundredths of a second.
+        name="turns-by-the-clock",
+        edits=(
+            ("dodge.c", _SETS, "        int turns = (tick_now() - begun + 46) % 100 < 10;\n" + _TURNS),
+            ("dodge.c", "    for (uint32_t due", "    uint32_t begun = tick_now();\n    for (uint32_t due"),
+        ),
+        answers=("sets its motors no otherwise for it (motors +3, +3 for 2.",), thing=_AHEAD, duration_s=10.0,
+    ),
+    Bug(
+        # It does answer, too briefly, and has gone on when it touches.
+        name="turns-for-a-moment",
+        edits=(
+            (
+                "dodge.c", _SETS,
+                "        static int near;\n        near = pins_distances() & 24 ? near + 1 : 0;\n"
+                "        int turns = near && near < 15;\n" + _TURNS,
+            ),
+        ),
+        answers=("briefly",), thing=_AHEAD, duration_s=10.0, is_found=False,
     ),
     Bug(
         name="speed-beyond-the-code",

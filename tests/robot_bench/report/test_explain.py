@@ -23,8 +23,8 @@ from robot_bench.report.explain import findings
 from robot_bench.report.explain.chain import WIDTH, Evidence, Explanation, Standing, Step
 from robot_bench.report.explain.contact import exchanged
 from robot_bench.report.explain.explain import explain
-from robot_bench.report.explain.findings import all_steady_since, injected, let_go
-from robot_bench.report.explain.probing import Answer, first_row
+from robot_bench.report.explain.findings import all_steady_since, held_codes, injected, let_go
+from robot_bench.report.explain.probing import SAME_NS, Answer, first_row, parted
 from robot_bench.report.explain.replay import ChipReplay, Hold, Seen
 from robot_bench.report.explain.scene import Scene
 from robot_bench.report.make import Files
@@ -32,7 +32,7 @@ from robot_bench.run import run_scenario
 from robot_bench.scenario.scenario import load_scenario
 from robot_bench.wires.edges import Edges
 from simbase.errors import FileError, UsageError
-from simbase.timing import NS_PER_S
+from simbase.timing import NS_PER_MS, NS_PER_S
 from tests.robot_bench.report.seeded_bugs import LONGER, NAMED, OTHERS, UNFAIR, Bug, build, scenario_text
 
 DODGE = HERE / "dodge.elf"
@@ -126,6 +126,26 @@ def pose(t: int, x_m: float) -> Pose:
         right_angle=0,
         collisions=0,
     )
+
+
+AHEAD, TURN = (3, 3), (2, -2)
+
+
+def test_how_long_motors_had_other_codes_is_counted_by_what_they_had() -> None:
+    one = [(0, AHEAD), (50, TURN), (60, AHEAD)]
+    assert parted(one, one, 100) == {}
+    assert parted(one, [(0, AHEAD)], 100) == {(TURN, AHEAD): 10}
+    assert parted(one, [(0, AHEAD), (49, TURN), (61, AHEAD)], 100) == {(AHEAD, TURN): 2}
+    assert parted([(0, TURN)], [(0, AHEAD)], 7) == {(TURN, AHEAD): 7}
+
+
+@pytest.mark.parametrize(
+    ("turns_ns", "says"),
+    [(0, "+3, +3"), (SAME_NS - 1, "+3, +3"), (SAME_NS, "+3, +3 for 0.99 of 1.00 s"),
+     (100 * NS_PER_MS, "+3, +3 for 0.90 of 1.00 s"), (501 * NS_PER_MS, "+2, -2 for 0.50 of 1.00 s")],
+)  # fmt: skip
+def test_the_codes_told_are_those_of_most_of_the_time_not_of_its_end(turns_ns: int, says: str) -> None:
+    assert held_codes([(NS_PER_S, AHEAD), (2 * NS_PER_S - turns_ns, TURN)], 2 * NS_PER_S) == says
 
 
 def test_a_point_is_in_a_cone_up_to_its_border_and_the_threshold() -> None:

@@ -262,7 +262,7 @@ def test_goals_are_saved_with_the_bench_and_caught_up_with_where_they_are_others
         judged.append(each.judge())
     assert judged[0] == judged[1]
     assert sorted(judged[2].met) == sorted(judged[0].met)
-    assert len(judged[0].met) == 2
+    assert (len(judged[0].met), len(judged[0].not_judged)) == (1, 1)
 
 
 def test_a_verdict_may_end_the_run_and_the_slice_changes_nothing() -> None:

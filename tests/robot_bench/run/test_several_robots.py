@@ -302,7 +302,10 @@ def test_the_events_of_all_are_one_stream_in_order_of_time_each_with_its_robot(
     assert robots_in(Path()) == [], "a folder of runs is no run of several robots"
     capsys.readouterr()
     assert p2os(["diff", "one", "other"]) == 1
-    assert "; a: worldchange differs first" in capsys.readouterr().out  # where b stands, as a has it
+    out = capsys.readouterr().out
+    assert "; a: worldchange differs first" in out  # where b stands, as a has it
+    told = [line.rpartition("   ")[0] for line in out.splitlines() if line.endswith(("   one", "   other"))]
+    assert all(ours != theirs for ours, theirs in zip(told[::2], told[1::2], strict=True)), out
 
 
 def test_a_goal_may_bound_how_far_another_robot_is(tmp_path: Path) -> None:
@@ -330,3 +333,18 @@ def test_the_two_robots_that_ship_move_and_never_touch(tmp_path: Path) -> None:
     assert bench.judge().missed == []
     others = [event for event in bench.record().changes if event.name == "east"]
     assert len(others) > 100
+
+
+def test_a_verdict_of_one_robot_that_ends_the_run_cuts_the_time_of_none(tmp_path: Path) -> None:
+    (tmp_path / "x.bin").write_bytes(thumb.SLEEP)
+    rest = 'firmware = "x.bin"\nmode = "direct"'
+    reach = '[[goal]]\nkind = "reach"\nx_m = -1\ny_m = 0\nradius_m = 1\nrobot = "a"\nends_run = "met"\n'
+    for goal, untouched in ((reach, {"a", "b"}), (reach.replace('ends_run = "met"\n', ""), set[str]())):
+        more = goal + '[[goal]]\nkind = "no_collision"\n'
+        bench = Bench.from_scenario(
+            scenario(tmp_path, robot("a", -1, 0, 0, rest), robot("b", 1, 0, 0, rest), more=more)
+        )
+        bench.run_until("0.2 s")
+        found = bench.judge()
+        assert {line.partition(":")[0] for line in found.met if "touches" in line} == untouched
+        assert len(found.not_judged) == 2 - len(untouched)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from p2os.errors import ScenarioError
 from robot_bench.events.kinds import Clearance, Contact, Event, Fault, Note, PinEdge, Pose, Ranges, Text, Wave
-from robot_bench.scenario.goals.judging import Goal, GoalJudge, load_goal
+from robot_bench.scenario.goals.judging import Goal, GoalJudge, RunEnd, load_goal
 from robot_bench.scenario.goals.kinds import KINDS
 from robot_bench.scenario.goals.watch import Outcome
 from tests.robot_bench.recording.records import S, pose
@@ -35,9 +35,9 @@ def outcome(kind: str, run: Sequence[Event], end: int = 10 * S, **arguments: Any
                 fresh.restore(judge.snapshot())
                 judge = fresh
         judge.advance_to(end)
-        ((_, said, is_decided),) = judge.outcomes(end)
-        assert is_decided in {True, False}
-        found.append(said)
+        (said,) = judge.at_end(RunEnd(end))
+        assert not said.is_open
+        found.append(said.outcome)
     assert found[0] == found[1]
     return found[0]
 

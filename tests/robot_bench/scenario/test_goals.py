@@ -4,9 +4,11 @@ import math
 
 import pytest
 
-from robot_bench.events.kinds import WorldChange
+from robot_bench.events.kinds import PinEdge, WorldChange
 from robot_bench.recording.run_record import RunRecord
-from robot_bench.scenario.goals.judging import Goal, Judgement, judge, load_goal
+from robot_bench.scenario.goals.judging import Goal, GoalJudge, Judgement, RunEnd, judge, load_goal
+from robot_bench.scenario.goals.kinds import KINDS
+from robot_bench.wires.edges import Edges
 from tests.robot_bench.recording.records import S, events_in, motor_pins, pose, record, text
 
 EIGHTH = math.pi / 4 * 1e6
@@ -119,7 +121,7 @@ def test_a_real_robot_is_not_asked_what_it_cannot_tell() -> None:
 def test_what_is_met_is_told_as_it_was_wanted() -> None:
     run = record(poses=[pose()], usart=text((1, "x")))
     goals = (Goal(kind="no_collision", arguments={}), Goal(kind="usart_lacks", arguments={"text": "x"}))
-    found = judged(run, *goals, end_ns=S, planned_ns=9 * S)
+    found = judged(run, *goals, end_ns=9 * S, planned_ns=9 * S)
     assert found.met == ["touches nothing"]
     assert found.missed == ["usart_lacks: 'usart1 sends x' happened 1 time(s), first at 1.000 s"], (
         "what forbids is judged from the start"
@@ -154,3 +156,91 @@ def test_what_is_forbidden_is_missed_at_any_time(kind: str, arguments: dict[str,
     )
     assert early == late
     assert len(early.missed) == 1
+
+
+#: Kind → arguments with which a robot that stands still at the origin, prints and touches nothing meets it so far.
+HOLDS_SO_FAR: dict[str, dict[str, object]] = {
+    "no_collision": {}, "min_distance": {"distance_m_a_minute": 1e-9}, "motor_sequence": {"values": [[1, 1]]},
+    "usart_lacks": {"text": "panic"}, "encoder_counts_match": {}, "sensor_named": {},
+    "avoid": {"x_m": 5, "y_m": 0, "radius_m": 1}, "stay_within": {"x_m": 0, "y_m": 0, "radius_m": 1},
+    "clearance": {"least_m": 0.1}, "stop_within": {"after": "usart1 sends sensor", "within_s": 1},
+    "moves_on": {"way_m": 1, "within_s": 9}, "turns_away": {"near_m": 0.5, "free_m": 0.8},
+    "steers_away": {"near_m": 0.5, "free_m": 0.8, "within_s": 1}, "no_idle_turn": {"free_m": 0.8, "within_s": 1},
+    "backs_on_path": {"off_m": 0.1}, "smooth": {"most_mps2": 1}, "energy": {"most_j": 5},
+    "hold_heading": {"heading_deg": 0, "tolerance_deg": 1}, "hold_speed": {"speed_mps": 0, "tolerance_mps": 0.1},
+    "always": {"signal": "x_m", "most": 1}, "happens": {"event": "contact", "least": 0, "most": 1},
+    "never": {"event": "contact"}, "latency": {"from": "usart1 sends left", "to": "usart1 sends sensor", "most_s": 2},
+    "pin_holds": {"pin": "PB7", "level": "high"}, "wave": {"pin": "motor1_comm2", "least_hz": 0.5},
+}  # fmt: skip
+#: Those that are decided once they are met: no later event can change it.
+DECIDED_ONCE = {"cells", "usart_contains", "usart_in_order", "reach", "eventually", "in_order"}
+
+
+def still() -> RunRecord:
+    """Return two seconds of a run in which every goal of `HOLDS_SO_FAR` is held."""
+    ticks = Edges()
+    for tick in range(5):
+        ticks.append(tick * S // 4, tick % 2)
+    pins = {**motor_pins((0.5, 1, 1)), "motor1_comm2": ticks}
+    return record(
+        poses=[pose(), pose(1, 0, work=0), pose(2 * S, 1, work=0)], pins=pins,
+        usart=text((0.5, "left=0 right=0"), (1, "sensor 1 on"), (1.5, "sensor 1 off")),
+        changes=[WorldChange(t=S // 2 + 1, op="place", name="a", fields={"sonar": 1, "x": 0.0, "y": 0.0})],
+    )  # fmt: skip
+
+
+def test_every_kind_of_goal_is_held_so_far_or_decided_once() -> None:
+    assert {*HOLDS_SO_FAR} ^ DECIDED_ONCE == {*KINDS}
+
+
+@pytest.mark.parametrize("kind", HOLDS_SO_FAR)
+def test_what_holds_so_far_is_open_where_the_time_was_cut_and_met_where_it_was_not(kind: str) -> None:
+    arguments, events = HOLDS_SO_FAR[kind], [*events_in(still())]
+    if kind == "motor_sequence":
+        events = [event for event in events if not isinstance(event, PinEdge) or event.wire != "motor1_comm2"]
+    judge = GoalJudge([load_goal({"kind": kind, **arguments}, "mine.toml: [[goal]] 1")])
+    judge.feed(events)
+    judge.advance_to(9 * S - 1)
+    cut = judge.finish(RunEnd(9 * S - 1, 9 * S))
+    assert (cut.met, cut.missed, len(cut.not_judged)) == ([], [], 1)
+    assert cut.not_judged[0].endswith(": not judged before 9 s")
+    for end in (RunEnd(9 * S, 9 * S), RunEnd(9 * S), RunEnd(2 * S, 9 * S, by_scenario=True)):
+        assert len(judge.finish(end).met) == 1, end
+
+
+@pytest.mark.parametrize(
+    ("kind", "window"),
+    [("pin_holds", "to_s"), ("wave", "to_s"), ("always", "to_s"), ("hold_speed", "to_s"), ("hold_heading", "to_s"),
+     ("happens", "within_s")],
+)  # fmt: skip
+@pytest.mark.parametrize(("end_ns", "is_met"), [(3 * S - 1, False), (3 * S, True), (3 * S + 1, True)])
+def test_what_held_to_the_end_of_its_window_is_met_in_a_run_that_was_cut_later(
+    kind: str, window: str, end_ns: int, is_met: bool
+) -> None:
+    goal = load_goal({"kind": kind, **HOLDS_SO_FAR[kind], window: 3}, "mine.toml: [[goal]] 1")
+    found = judged(still(), goal, end_ns=end_ns, planned_ns=9 * S)
+    assert (found.met, found.missed) == ([goal.wanted] if is_met else [], [])
+    assert bool(found.not_judged) is not is_met
+
+
+@pytest.mark.parametrize(
+    ("kind", "arguments"),
+    [("reach", {"x_m": 5, "y_m": 0, "radius_m": 1, "within_s": 3}), ("happens", {"event": "contact", "within_s": 3}),
+     ("eventually", {"signal": "x_m", "least": 1, "to_s": 3}), ("wave", {"pin": "PB7", "to_s": 3})],
+)  # fmt: skip
+@pytest.mark.parametrize(("end_ns", "is_missed"), [(3 * S - 1, False), (3 * S, True)])
+def test_what_was_not_reached_in_its_window_is_missed_in_a_run_that_was_cut_later(
+    kind: str, arguments: dict[str, object], end_ns: int, is_missed: bool
+) -> None:
+    goal = load_goal({"kind": kind, **arguments}, "mine.toml: [[goal]] 1")
+    found = judged(still(), goal, end_ns=end_ns, planned_ns=9 * S)
+    assert (len(found.missed), len(found.not_judged)) == ((1, 0) if is_missed else (0, 1))
+
+
+def test_a_run_that_a_verdict_ended_was_not_cut() -> None:
+    reach = {"kind": "reach", "x_m": 0, "y_m": 0, "radius_m": 1, "ends_run": "met"}
+    far = {"kind": "min_distance", "distance_m": 1}
+    goals = [load_goal(table, "mine.toml: [[goal]]") for table in (reach, {"kind": "no_collision"}, far)]
+    found = judged(still(), *goals, end_ns=2 * S, planned_ns=9 * S)
+    assert (found.met, found.missed) == ([goals[0].wanted, "touches nothing"], [])
+    assert found.not_judged == ["drives at least 1 m: not judged before 9 s"]

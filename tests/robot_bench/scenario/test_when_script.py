@@ -58,6 +58,7 @@ def test_an_event_may_end_the_run_and_the_slices_change_nothing() -> None:
         one = made({"event": "pin PB7 high", "do": "end"}, slice_ns=slice_ns)
         one.run_until("3 s")
         assert one.finish() == one.end == 1050 * MS
+        assert one.judge().met == ["touches nothing"], "the scenario ended the run: its time was not cut"
         traces.add(one.trace.text)
     assert len(traces) == 1
 
@@ -145,7 +146,7 @@ def test_a_level_is_put_on_a_wire_of_a_robot_on_own_pins_and_let_go(tmp_path: Pa
     )  # fmt: skip
     edges: list[tuple[int, bool]] = []
     one.events.subscribe(lambda edge: edges.append((edge.t, edge.level)), PinEdge, wires=["bumper_front"])
-    one.run_until("2 s")
+    one.run_until("3 s")
     assert one.level("PB10")
     one.finish()
     assert edges[-2:] == [(1050 * MS, False), (1250 * MS, True)]  # told with the pose after it

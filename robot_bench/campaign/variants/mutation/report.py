@@ -2,7 +2,8 @@
 
     score = noticed / (noticed + survived)
 
-Mutants that left the same trace are told apart: on these runs no goal could have noticed them.
+Mutants that left the same trace are told apart: on these runs no goal could have noticed them. Of a sample the score of
+all lies within an interval; where all were tried, the score is exact.
 
 Invariant: the same results give the same text.
 """
@@ -20,6 +21,7 @@ from bluepill_sim.analysis.coverage_page import source_lines
 from bluepill_sim.program.alterations import OPERATORS
 from bluepill_sim.program.line_table import LineTable
 from bluepill_sim.program.mutants import Mutant
+from robot_bench.campaign.variants.mutation.interval import CONFIDENCE, share_interval
 from robot_bench.campaign.variants.mutation.trial import Fate, Found
 from robot_bench.events.codec import Json
 from simbase.files import writing
@@ -63,6 +65,23 @@ class Mutation:
         """Noticed among those that changed a run, percent; None where none did."""
         return score([found for _, found in self.pairs])
 
+    @property
+    def is_sample(self) -> bool:
+        """Whether there are changes that were not tried."""
+        return len(self.pairs) < self.possible
+
+    @property
+    def bounds(self) -> tuple[float, float] | None:
+        """Between what the score of all mutants lies, percent, with `CONFIDENCE`; None where none changed a run."""
+        found = [one for _, one in self.pairs]
+        same = sum(one.fate is Fate.SAME for one in found)
+        if same == len(found):
+            return None
+        # Of those not tried some leave the same trace too, so the whole is smaller, and the bounds are nearer.
+        noticed, whole = sum(one.is_noticed for one in found), self.possible - same
+        low, high = share_interval(noticed, len(found) - same, whole)
+        return 100 * low, 100 * high
+
     def words(self, mutant: Mutant) -> str:
         """Return a change as a person reads it."""
         before, after = (_TARGET.sub("", text) for text in (mutant.alteration.before, mutant.alteration.after))
@@ -98,6 +117,12 @@ def report_lines(mutation: Mutation) -> Iterator[str]:
     yield from _tellers(mutation)
     yield from _survivors(mutation)
     yield ""
+    bounds = mutation.bounds
+    if bounds is not None and mutation.is_sample:
+        yield (
+            f"score of all {mutation.possible}: {bounds[0]:.1f} to {bounds[1]:.1f} % ({CONFIDENCE:.0%} confidence, by "
+            f"a sample of {len(mutation.pairs)})"
+        )
     yield _sum(mutation)
 
 
@@ -160,6 +185,7 @@ def as_json(mutation: Mutation) -> Json:
         "seed": mutation.seed,
         "tried": len(mutation.pairs),
         "score": None if mutation.score is None else round(mutation.score, 3),
+        "score_bounds": None if mutation.bounds is None else [round(bound, 3) for bound in mutation.bounds],
         "mutants": [_plain(mutation, mutant) | found.to_plain() for mutant, found in mutation.pairs],
     }
 

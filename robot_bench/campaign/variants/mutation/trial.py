@@ -132,9 +132,9 @@ def _judged(base: BaseRun) -> Found:
     """Return what became of a mutant whose run came to its end."""
     bench, name = base.bench, base.bench.scenario.name
     end = bench.finish()
-    for goal, outcome, _ in bench.goals.outcomes(end):
-        if not outcome.met:
-            return Found(Fate.MISSED, name, f"{goal.wanted}: {outcome.says}", end)
+    for one in bench.goals.at_end(bench.ended(end)):
+        if not one.is_open and not one.outcome.met:
+            return Found(Fate.MISSED, name, f"{one.goal.wanted}: {one.outcome.says}", end)
     return Found(Fate.SAME if bench.trace.sha256 == base.trace_sha256 else Fate.SURVIVED, name)
 
 
