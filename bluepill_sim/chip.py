@@ -622,7 +622,8 @@ class Chip(Stateful):
         if not self.processor.is_privileged and not self.system.is_open_to_all(offset):
             self.engine.stop_before(HaltKind.WRITE_ERROR, self.engine.access_pc, PPB_BASE + offset)
             return
-        self.system.write(offset, size, value)
+        if not self.system.write(offset, size, value) and not self.system.is_modelled(offset):
+            self.engine.declare_zero(PPB_BASE + offset)
 
     def _forced(self, address: int) -> tuple[int, dict[int, int]]:
         """Return which bits of the word at an address the running store means, and what that hangs on."""

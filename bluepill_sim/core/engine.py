@@ -64,6 +64,7 @@ from bluepill_sim.extension.layout import SHARED, VIEW_BYTES, VIEWS_BASE, VIEWS_
 from bluepill_sim.extension.library import library
 from bluepill_sim.extension.windows import NO_TIME
 from simbase.state import Stateful
+from simbase.timing import Nanos
 
 #: Stops the engine before the instruction at an address: (kind, PC, address of the data).
 StopBefore = Callable[[HaltKind, int, int | None], None]
@@ -220,6 +221,18 @@ class Engine(Stateful):
     def map_io(self, address: int, size: int, read: ReadAccess, write: WriteAccess) -> None:
         """Map a region whose accesses are calls; their offsets count from `address`."""
         self._core.map_io(address, size, *io_callbacks(read, write, self._is_denied, self._fail))
+
+    def declare_unclocked(self, address: int, *, is_write: bool, until_ns: Nanos | None = None) -> None:
+        """Have a peripheral without its clock read 0 without asking up to a time, None for ever; or lose what is written.
+
+        That ends with `forget_unclocked`.
+        """
+
+    def forget_unclocked(self) -> None:
+        """Ask again at each access without a clock."""
+
+    def declare_duplicated(self, address: int) -> None:
+        """Have narrow writes to a register duplicated over its word without asking."""
 
     def declare_zero(self, address: int) -> None:
         """Take note that a word of I/O reads 0 and ignores writes, and that whoever is to hear of it has."""

@@ -65,6 +65,7 @@ from bluepill_sim.native.state import (
     Shared,
 )
 from simbase.c_library import guarded
+from simbase.timing import Nanos
 
 #: Flags of a row (`enum row_flag`).
 _CHANGES_MASKS, _SENDS_EVENT, _SELF_LOOP, _WRITABLE, _NOTED, _AMBIGUOUS = 1, 2, 4, 8, 128, 256
@@ -197,6 +198,19 @@ class NativeEngine(Engine):
     def declare_zero(self, address: int) -> None:
         """As of `Engine`; until a state is restored, whose warnings may be others."""
         library().core_declare_zero(self._state, address)
+
+    def declare_unclocked(self, address: int, *, is_write: bool, until_ns: Nanos | None = None) -> None:
+        """As of `Engine`; until a state is restored."""
+        until = NO_TIME if until_ns is None else until_ns
+        library().core_declare_unclocked(self._state, address, is_write, until)
+
+    def forget_unclocked(self) -> None:
+        """As of `Engine`."""
+        library().core_forget_unclocked(self._state)
+
+    def declare_duplicated(self, address: int) -> None:
+        """As of `Engine`; until a state is restored."""
+        library().core_declare_duplicated(self._state, address)
 
     def drop_code(self, address: int, size: int) -> None:
         """As of `Engine`."""

@@ -276,6 +276,8 @@ static inline uint64_t ns_of_tick(const struct ticks *ticks, uint64_t tick)
     return ticks->ns + (uint64_t)((__uint128_t)(tick - ticks->tick) * NS_PER_S / ticks->hz);
 }
 
+/* The first cycle that begins at or after a time. */
+uint64_t cycle_at(struct fabric *fabric, uint64_t ns);
 /* Has the device's event come at a time; NO_TIME takes it back. */
 void schedule(struct device *device, uint64_t ns);
 static inline uint64_t due_ns(const struct device *device) { return device->fabric->slots[device->slot].ns; }
