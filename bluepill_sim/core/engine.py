@@ -153,6 +153,9 @@ class Engine(Stateful):
         self.on_event: Callable[[], None] | None = None
         #: Called with writes to read-only memory, and after the instruction that made them.
         self.on_read_only_write: WriteToReadOnly | None = None
+        #: Called with (address, bytes, value, PC, cycle, when the run ends) of a store to read-only memory: where it leaves
+        #: what it stores and nothing acts meanwhile, returns the cycle at which the core goes on; else does nothing.
+        self.on_read_only_write_at_once: Callable[[int, int, int, int, int, int], int | None] | None = None
         self.on_read_only_written: Callable[[], None] | None = None
         #: Called with a store whose bus error does not stop it: (cycle, PC, address).
         self.on_bus_error: Callable[[int, int, int], None] = lambda _cycle, _pc, _address: None

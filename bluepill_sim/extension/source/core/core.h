@@ -95,6 +95,9 @@ struct callbacks {
     uint32_t (*access_pc)(void);
     /* An access that the memory's protection forbids: whether it may pass. */
     bool (*bad_access)(uint32_t kind, uint32_t address, uint32_t size, uint64_t value);
+    /* A store to read-only memory in a run that goes on to a cycle: whether it is made now, with all that follows from it
+     * up to the next instruction. */
+    bool (*write_at_once)(uint32_t address, uint32_t size, uint64_t value, uint64_t stop);
 };
 
 #define FLASH_SLOTS 65536

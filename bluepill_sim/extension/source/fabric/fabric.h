@@ -233,6 +233,7 @@ struct fabric {
     uint32_t memory_count;
     uint32_t master; /* the slot of the device that makes an access; SLOTS for none */
     struct subscriber subscribers[SUBSCRIBERS];
+    uint32_t subscribers_end; /* none is used from here on */
     struct pin_listener listeners[SLOTS]; /* a device has a slot */
     struct device devices[SLOTS];
 };
