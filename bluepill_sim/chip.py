@@ -655,7 +655,7 @@ class Chip(Stateful):
         self._flash_repairs.append((FLASH_BASE + offset, self.memory.read_flash(offset, size)))
         return True
 
-    def _program_at_once(self, address: int, size: int, value: int, pc: int, cycle: int, stop_at: int) -> int | None:
+    def _program_at_once(self, address: int, size: int, pc: int, cycle: int, stop_at: int) -> int | None:
         """Program a halfword for code in flash, which waits for it, where nothing else is due before it ends."""
         offset = address - FLASH_BASE if address >= FLASH_BASE else address
         if (
@@ -666,7 +666,7 @@ class Chip(Stateful):
         ):
             return None
         done = self._clock.cycle_at(self._clock.ns_of(cycle) + PROGRAM_NS)
-        return done if done < stop_at and self.parts.flash.program_at_once(offset, value) else None
+        return done if done < stop_at and self.parts.flash.program_at_once(offset) else None
 
     def _drop_flash(self) -> None:
         self.engine.drop_code(FLASH_BASE, FLASH_BYTES_FITTED)

@@ -153,9 +153,9 @@ class Engine(Stateful):
         self.on_event: Callable[[], None] | None = None
         #: Called with writes to read-only memory, and after the instruction that made them.
         self.on_read_only_write: WriteToReadOnly | None = None
-        #: Called with (address, bytes, value, PC, cycle, when the run ends) of a store to read-only memory: where it leaves
-        #: what it stores and nothing acts meanwhile, returns the cycle at which the core goes on; else does nothing.
-        self.on_read_only_write_at_once: Callable[[int, int, int, int, int, int], int | None] | None = None
+        #: Called with (address, bytes, PC, cycle, when the run ends) of a store to read-only memory: where that
+        #: stores what it says and nothing acts meanwhile, returns the cycle at which the core goes on; else None.
+        self.on_read_only_write_at_once: Callable[[int, int, int, int, int], int | None] | None = None
         self.on_read_only_written: Callable[[], None] | None = None
         #: Called with a store whose bus error does not stop it: (cycle, PC, address).
         self.on_bus_error: Callable[[int, int, int], None] = lambda _cycle, _pc, _address: None
@@ -226,7 +226,7 @@ class Engine(Stateful):
         self._core.map_io(address, size, *io_callbacks(read, write, self._is_denied, self._fail))
 
     def declare_unclocked(self, address: int, *, is_write: bool, until_ns: Nanos | None = None) -> None:
-        """Have a peripheral without its clock read 0 without asking up to a time, None for ever; or lose what is written.
+        """Have a peripheral without its clock read 0 up to a time, None for ever, or ignore writes; without asking.
 
         That ends with `forget_unclocked`.
         """

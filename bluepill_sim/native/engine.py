@@ -502,7 +502,7 @@ class NativeEngine(Engine):
         if self.recorder is not None:
             self.recorder.put_packed(ctypes.string_at(rows, count * RECORD.size))
 
-    def _write_at_once(self, address: int, size: int, value: int, stop: int) -> bool:
+    def _write_at_once(self, address: int, size: int, stop: int) -> bool:
         """Have a store to read-only memory made where it leaves what it stores, and let the time pass that it takes."""
         take, shared, block, pc = self.on_read_only_write_at_once, self.shared, self.block, self.registers[Register.PC]
         offset = address & ~_FLASH_ALIAS
@@ -510,7 +510,7 @@ class NativeEngine(Engine):
             return False
         after = next((cycles for at, cycles in block.offsets.items() if at > pc), block.straight)
         cycle = shared.cycle
-        done = take(address, size, value & (1 << 8 * size) - 1, pc, cycle + block.cycles_until(pc), stop)
+        done = take(address, size, pc, cycle + block.cycles_until(pc), stop)
         if done is not None:
             shared.cycle = cycle + max(0, done - (cycle + after))
         return done is not None

@@ -50,6 +50,8 @@ _FLAG_BITS = 6
 #: Pins (RX, TX) by the remap field (RM0008 table 42).
 PINS = {0: ("PA11", "PA12"), 2: ("PB8", "PB9"), 3: ("PD0", "PD1")}
 _FILTER_MODES = bits((13, 0))
+#: The outputs in the order in which they are set; the first is for USB, whose memory it shares.
+_UPDATED = ("packets", "tx_irq", "rx0_irq", "rx1_irq", "sce_irq")
 #: Takes frames at their ends, oldest first.
 Sink = Callable[[Sequence[CanEnd]], None]
 
@@ -114,9 +116,9 @@ class Can(Peripheral):
     OUTPUTS = ("tx_irq", "rx0_irq", "rx1_irq", "sce_irq", "packets")
     STATE = (
         "_alone", "_joined", "_mailboxes", "_order", "_fifos", "_ends", "_sync_ns", "_recover_ns", "_tec", "_rec",
-        "_timer_ns", "_lost", "_is_stopped", "_shown", "_shown_ns", "_tx",
+        "_timer_ns", "_lost", "_is_stopped", "_shown", "_shown_ns", "_tx", "_planned_ns",
     )  # fmt: skip
-    DERIVED = ("_pin_names", "_sinks")
+    DERIVED = ("_pin_names", "_sinks", "_levels")
     REGISTERS = (
         Register(
             name="MCR",
@@ -204,6 +206,9 @@ class Can(Peripheral):
     def __init__(self, chip: ChipPorts, place: Place) -> None:
         super().__init__(chip, place)
         self._sinks: list[Sink] = []
+        #: The outputs as they were last set; and when it acts next beside the bits that are shown.
+        self._levels: tuple[bool, ...] | None = None
+        self._planned_ns: Nanos | None = None
         self._alone = CanNetwork()
         self._alone.join(self)
         self._joined: CanNetwork | None = None
@@ -325,19 +330,28 @@ class Can(Peripheral):
         times = [self._sync_ns, self._recover_ns, self.network.next_ns if self._mailboxes or self._joined else None]
         if self._ends:
             times.append(self._ends[0].end_ns)
-        if self._shown:
-            times.append(self._shown[0][0])
-        elif self._is_watched and self.network.start_ns != self._shown_ns:
+        if not self._shown and self._is_watched and self.network.start_ns != self._shown_ns:
             times.append(self.network.start_ns)
         if self._lost:
             times.append(self.chip.now_ns)
-        known = [time for time in times if time is not None]
-        self.due_ns = max(min(known), self.chip.now_ns) if known else None
+        self._planned_ns = min((time for time in times if time is not None), default=None)
+        self._schedule()
+
+    def _schedule(self) -> None:
+        """Come back for the next bit that is to be shown, or for what is planned."""
+        times = (self._planned_ns, self._shown[0][0] if self._shown else None)
+        due_ns = min((time for time in times if time is not None), default=None)
+        self.due_ns = None if due_ns is None else max(due_ns, self.chip.now_ns)
 
     # For the chip.
 
     def advance_to(self, now_ns: Nanos) -> None:
         """Act on what is due: ends of frames, changes of mode, what the network has to decide."""
+        if self._shown and (self._planned_ns is None or self._planned_ns > now_ns) and not self._is_stopped:
+            self._show_due(now_ns)  # the last bit plans anew
+            if self._shown:
+                self._schedule()
+                return
         self.due_ns = None
         if self._is_stopped:
             self.network.advance_to(now_ns)
@@ -395,6 +409,7 @@ class Can(Peripheral):
 
     def _restored(self) -> None:
         self._find_pins()
+        self._levels = None
 
     # Registers.
 
@@ -662,22 +677,23 @@ class Can(Peripheral):
         last = self._last()
         flags |= 0 if last is None or len(self._mailboxes) < 2 else 1 << _LOW_AT + last
         words[TSR] = flags | (free[0] if free else last or 0) << _CODE_AT
-        self.set_output("packets", not words[MSR] & (INAK | SLAK))  # it uses the memory that it shares with USB
-        enabled = words[IER]
-        self.set_output("tx_irq", bool(enabled & TMEIE and words[TSR] & 0x01_0101))
+        enabled, status = words[IER], words[MSR]
+        received = []
         for n in range(2):
-            shift, status = 3 * n + 1, words[RF0R + n]
-            causes = (1 if status & 3 else 0) | (2 if status & FULL else 0) | (4 if status & FOVR else 0)
-            self.set_output(f"rx{n}_irq", bool(enabled >> shift & causes))
-        status = words[MSR]
-        self.set_output(
-            "sce_irq",
-            bool(
-                (status & ERRI and enabled & ERRIE)
-                or (status & WKUI and enabled & WKUIE)
-                or (status & SLAKI and enabled & SLKIE)
-            ),
+            shift, fifo_status = 3 * n + 1, words[RF0R + n]
+            causes = (1 if fifo_status & 3 else 0) | (2 if fifo_status & FULL else 0) | (4 if fifo_status & FOVR else 0)
+            received.append(bool(enabled >> shift & causes))
+        changed = (status & ERRI and enabled & ERRIE) or (status & WKUI and enabled & WKUIE)
+        levels = (
+            not status & (INAK | SLAK),
+            bool(enabled & TMEIE and words[TSR] & 0x01_0101),
+            *received,
+            bool(changed or (status & SLAKI and enabled & SLKIE)),
         )
+        if levels != self._levels:
+            self._levels = levels
+            for name, level in zip(_UPDATED, levels, strict=True):
+                self.set_output(name, level)
 
     def _last(self) -> int | None:
         """Return the mailbox that goes last."""
@@ -723,15 +739,18 @@ class Can(Peripheral):
 
     def _show(self, now_ns: Nanos) -> None:
         """Show the bits that are due, and those of a frame that begins."""
-        while self._shown and self._shown[0][0] <= now_ns:
-            _, tx, rx = self._shown.popleft()
-            self._show_level(tx, rx)
+        self._show_due(now_ns)
         start_ns = self.network.start_ns
         is_new = start_ns is not None and start_ns <= now_ns and start_ns != self._shown_ns
         if start_ns is not None and is_new and not self._shown and self._is_watched:
             self._shown_ns = start_ns
             self._shown.extend(self._show_frame(start_ns))
             self._show(now_ns)
+
+    def _show_due(self, now_ns: Nanos) -> None:
+        while self._shown and self._shown[0][0] <= now_ns:
+            _, tx, rx = self._shown.popleft()
+            self._show_level(tx, rx)
 
     def _show_frame(self, start_ns: Nanos) -> Iterator[tuple[Nanos, int, int]]:
         """Yield when the levels of TX and RX change in the frame that begins."""
@@ -755,7 +774,7 @@ class Can(Peripheral):
         before = (1, 1)
         for n, now in enumerate(zip(tx, bus, strict=True)):
             if now != before:
-                yield start_ns + int(n * NS_PER_S / rate), *now
+                yield start_ns + n * NS_PER_S * rate.denominator // rate.numerator, *now
             before = now
 
     def _show_level(self, tx: int, rx: int) -> None:

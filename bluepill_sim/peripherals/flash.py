@@ -150,7 +150,7 @@ class Flash(Peripheral):
         self._program(offset, value)
         return True
 
-    def program_at_once(self, offset: int, value: int) -> bool:
+    def program_at_once(self, offset: int) -> bool:
         """Program a halfword up to its end, of which EOP alone is seen; False: it is not so simple, nothing was done.
 
         The CPU itself stores the value, and nothing else acts meanwhile.

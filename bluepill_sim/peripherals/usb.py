@@ -151,6 +151,7 @@ class Usb(Peripheral):
         self._turns = 0
         self._forget()
         self.listen_to_pins("A", 1 << 12)
+        self.heed_pull_up(False)
 
     def _forget(self) -> None:
         #: Since when nothing has come, and the next times of what has an event.
@@ -167,6 +168,10 @@ class Usb(Peripheral):
     def attach(self, host: UsbMaster) -> None:
         """Take the host at the other end of the cable."""
         self._host = host
+
+    def heed_pull_up(self, wanted: bool) -> None:
+        """Tell the host when the pull-up of D+ comes or goes, as it wants while the cable is plugged in."""
+        self.listen_to_pins("A", (1 << 12) * wanted)
 
     @property
     def now_ns(self) -> Nanos:

@@ -97,7 +97,7 @@ struct callbacks {
     bool (*bad_access)(uint32_t kind, uint32_t address, uint32_t size, uint64_t value);
     /* A store to read-only memory in a run that goes on to a cycle: whether it is made now, with all that follows from it
      * up to the next instruction. */
-    bool (*write_at_once)(uint32_t address, uint32_t size, uint64_t value, uint64_t stop);
+    bool (*write_at_once)(uint32_t address, uint32_t size, uint64_t stop);
 };
 
 #define FLASH_SLOTS 65536
