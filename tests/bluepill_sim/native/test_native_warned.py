@@ -218,3 +218,46 @@ def test_a_restored_board_warns_again_and_the_clock_ends_the_silence() -> None:
     made.chip.parts.rcc.write(0x18, 4, 0x4000)
     made.advance_to(3_100_000)
     assert made.register("R3") == 0xC0, "its SR reads"
+
+
+#: Programs halfwords of the last page from R4 on: one that is erased, then the same again, which is an error.
+PROGRAMMER = f"""mov32 r0, #{BASES["FLASH"]}
+mov32 r1, #0x45670123
+str r1, [r0, #4]
+mov32 r1, #0xCDEF89AB
+str r1, [r0, #4]
+movs r1, #1
+str r1, [r0, #16]
+mov32 r4, #0x0800FC00
+more: movs r5, #0
+strh r6, [r4, #0]
+ldr r3, [r0, #12]
+ldrh r2, [r4, #0]
+adds r5, r5, r3
+str r3, [r7, #0]
+str r2, [r7, #4]
+adds r7, #8
+movs r1, #0x34
+str r1, [r0, #12]
+adds r6, #3
+cmp r6, #30
+bne past
+strh r6, [r4, #0]
+past: adds r4, #2
+b more"""
+
+
+@pytest.mark.parametrize("slices", [[], [1_000, 60_000, 52_500, 52_499, 3]])
+def test_a_halfword_takes_its_time_and_shows_alike_on_both_cores(slices: list[int]) -> None:
+    boards = []
+    for core in ("python", "native", "native"):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setenv("P2OS_CORE", core)
+            boards.append(Machine(PROGRAMMER, {}).deafen().board)
+    for length in slices:
+        boards[2].advance_to(boards[2].now_ns + length)
+    for one in boards:
+        one.advance_to(1_000_000)
+    first, *others = [(state(one), one.read_memory(0x0800_FC00, 64)) for one in boards]
+    assert first[1][:6] == bytes((0, 0, 3, 0, 6, 0))
+    assert others == [first, first]
