@@ -75,6 +75,7 @@ bench: setup
 	$(BIN)/python tools/bench/shares.py
 	$(BIN)/python tools/bench/costs.py
 	$(BIN)/python tools/bench/devices.py
+	$(BIN)/python tools/bench/beginners.py
 	$(BIN)/python tools/bench/shares.py --timers
 	$(BIN)/python tools/bench/devices.py --timers
 

@@ -43,7 +43,7 @@ from bluepill_sim.memory.bus import (
 )
 from bluepill_sim.native.processor import make_core
 from bluepill_sim.native.registers import share_registers
-from bluepill_sim.peripherals.flash import OPTION_BYTES
+from bluepill_sim.peripherals.flash import OPTION_BYTES, PROGRAM_NS
 from bluepill_sim.peripherals.rcc import OUTSIDE, ResetCause
 from bluepill_sim.stm32f103 import (
     FLASH_BASE,
@@ -63,6 +63,8 @@ from simbase.timing import Nanos, Reason
 
 #: The upper byte of the first halfword of a 32-bit instruction is this or more.
 _FIRST_WIDE_BYTE = 0xE8
+#: The flash is programmed by halfwords.
+_FLASH_WRITE_BYTES = 2
 
 #: Takes a message, its key, and the address of the instruction that caused it.
 WarningListener = Callable[[str, str, int], None]
@@ -610,6 +612,7 @@ class Chip(Stateful):
         share_registers(engine, self.parts.by_name.values(), self.parts.rcc)
         self.fabric.forced = self._forced
         engine.on_read_only_write = self._write_flash
+        engine.on_read_only_write_at_once = self._program_at_once
         engine.on_read_only_written = self._repair_flash
 
     def _read_system(self, offset: int, size: int) -> int:
@@ -627,7 +630,8 @@ class Chip(Stateful):
         if not self.processor.is_privileged and not self.system.is_open_to_all(offset):
             self.engine.stop_before(HaltKind.WRITE_ERROR, self.engine.access_pc, PPB_BASE + offset)
             return
-        self.system.write(offset, size, value)
+        if not self.system.write(offset, size, value) and not self.system.is_modelled(offset):
+            self.engine.declare_zero(PPB_BASE + offset)
 
     def _forced(self, address: int) -> tuple[int, dict[int, int]]:
         """Return which bits of the word at an address the running store means, and what that hangs on."""
@@ -655,6 +659,19 @@ class Chip(Stateful):
         # The engine stores the value whatever the controller says: put back what should be there.
         self._flash_repairs.append((FLASH_BASE + offset, self.memory.read_flash(offset, size)))
         return True
+
+    def _program_at_once(self, address: int, size: int, pc: int, cycle: int, stop_at: int) -> int | None:
+        """Program a halfword for code in flash, which waits for it, where nothing else is due before it ends."""
+        offset = address - FLASH_BASE if address >= FLASH_BASE else address
+        if (
+            size != _FLASH_WRITE_BYTES
+            or offset % size
+            or pc >= SYSTEM_MEMORY_BASE
+            or not 0 <= offset <= FLASH_BYTES_FITTED - size
+        ):
+            return None
+        done = self._clock.cycle_at(self._clock.ns_of(cycle) + PROGRAM_NS)
+        return done if done < stop_at and self.parts.flash.program_at_once(offset) else None
 
     def _drop_flash(self) -> None:
         self.engine.drop_code(FLASH_BASE, FLASH_BYTES_FITTED)

@@ -143,7 +143,7 @@ def run(
     buses = join_can(board, can, can_log)
     carriers += [bus.carry for bus in buses]
     is_paced = realtime or bool(buses) or bool(PTY & {uart, usb})
-    advance = _paced(board, carriers) if is_paced else _bounded(board, budget_ns)
+    advance = _paced(board, carriers) if is_paced else bounded(board, budget_ns)
     schedule = Schedule(board, changes, advance)
     opened: list[_Opened] = [*consoles, *traces, *buses]
     with showing_where_it_hangs(board):
@@ -166,7 +166,7 @@ def run(
         raise typer.Exit(1)
 
 
-def _bounded(board: BluePill, budget_ns: Nanos) -> Callable[[Nanos], ChipReached]:
+def bounded(board: BluePill, budget_ns: Nanos) -> Callable[[Nanos], ChipReached]:
     """Return a way to advance that ends with the wall clock's budget, however a program spins.
 
     A program may cost a thousand times as much as another for the same virtual time, such as one that resets itself

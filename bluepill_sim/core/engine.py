@@ -64,6 +64,7 @@ from bluepill_sim.extension.layout import SHARED, VIEW_BYTES, VIEWS_BASE, VIEWS_
 from bluepill_sim.extension.library import library
 from bluepill_sim.extension.windows import NO_TIME
 from simbase.state import Stateful
+from simbase.timing import Nanos
 
 #: Stops the engine before the instruction at an address: (kind, PC, address of the data).
 StopBefore = Callable[[HaltKind, int, int | None], None]
@@ -152,6 +153,9 @@ class Engine(Stateful):
         self.on_event: Callable[[], None] | None = None
         #: Called with writes to read-only memory, and after the instruction that made them.
         self.on_read_only_write: WriteToReadOnly | None = None
+        #: Called with (address, bytes, PC, cycle, when the run ends) of a store to read-only memory: where that
+        #: stores what it says and nothing acts meanwhile, returns the cycle at which the core goes on; else None.
+        self.on_read_only_write_at_once: Callable[[int, int, int, int, int], int | None] | None = None
         self.on_read_only_written: Callable[[], None] | None = None
         #: Called with a store whose bus error does not stop it: (cycle, PC, address).
         self.on_bus_error: Callable[[int, int, int], None] = lambda _cycle, _pc, _address: None
@@ -220,6 +224,18 @@ class Engine(Stateful):
     def map_io(self, address: int, size: int, read: ReadAccess, write: WriteAccess) -> None:
         """Map a region whose accesses are calls; their offsets count from `address`."""
         self._core.map_io(address, size, *io_callbacks(read, write, self._is_denied, self._fail))
+
+    def declare_unclocked(self, address: int, *, is_write: bool, until_ns: Nanos | None = None) -> None:
+        """Have a peripheral without its clock read 0 up to a time, None for ever, or ignore writes; without asking.
+
+        That ends with `forget_unclocked`.
+        """
+
+    def forget_unclocked(self) -> None:
+        """Ask again at each access without a clock."""
+
+    def declare_duplicated(self, address: int) -> None:
+        """Have narrow writes to a register duplicated over its word without asking."""
 
     def declare_zero(self, address: int) -> None:
         """Take note that a word of I/O reads 0 and ignores writes, and that whoever is to hear of it has."""

@@ -104,8 +104,8 @@ class SystemControl(Stateful):
         self._act_on(answer)
         return self._word.value >> 8 * (offset & 3) & (1 << 8 * size) - 1
 
-    def write(self, offset: int, size: int, value: int) -> None:
-        """Take what the core writes."""
+    def write(self, offset: int, size: int, value: int) -> bool:
+        """Take what the core writes; return whether it is modelled."""
         address, shift = PPB_BASE + (offset & ~3), 8 * (offset & 3)
         mask = ((1 << 8 * size) - 1) << shift
         answer = library().system_write(self._at, address, value << shift & mask, mask, self._chip.access_cycle)
@@ -117,11 +117,12 @@ class SystemControl(Stateful):
             for sink in self.stimulus_sinks:
                 sink(self._chip.now_ns, self._chip.access_cycle, (offset & ~3) >> 2, data)
         if not answer & _WRITTEN:
-            return
+            return bool(answer)
         if _STK_CTRL <= address <= _STK_VAL:
             self._core.systick.was_set()
         self._core.pending_changed()
         self._core.stop_at_boundary()
+        return True
 
     def is_modelled(self, offset: int) -> bool:
         """Tell whether there is a register to be read."""

@@ -488,6 +488,16 @@ INPUT_ROWS = Struct(
     "Levels that the outside puts on pins later: a ring, oldest first.",
     (*_fields("u32", "first", "count"), Field("padding", "u64"), Field("rows", "edge", LATER_INPUTS)),
 )
+#: More than a frame has bits, from its start to behind its error flag.
+CAN_BITS_ROWS = 192
+CAN_BITS = Struct(
+    "can_bits",
+    "Levels of CAN's pins to come: rows whose drive is TX and whose wire is RX, those from `first` on.",
+    (
+        *_fields("u32", "first", "count", "tx_pin", "source", "rx_pin", "is_offered", "tx", "padding"),
+        Field("rows", "edge", CAN_BITS_ROWS),
+    ),
+)
 SENT = Struct(
     "sent",
     "A word that has gone out, when, and how: clock and divider, and what else its device says of its format.",
@@ -497,7 +507,7 @@ SENT = Struct(
 #: All of them; one that holds another comes behind it.
 STRUCTS = (
     RECORD, INSTRUCTION, RAMP, TICKS, STEP, LOOP, FAULT, SHARED, PORT, USART, EXTI, DMA, SIGNAL, ANALOG, ADC, GPIO, RCC,
-    FILTER, SHAPE, TIM, SPI, I2C, WAVE, EDGE, INPUT_ROWS, SENT,
+    FILTER, SHAPE, TIM, SPI, I2C, WAVE, EDGE, INPUT_ROWS, CAN_BITS, SENT,
 )  # fmt: skip
 
 _KINDS: dict[str, Any] = {

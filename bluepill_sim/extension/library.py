@@ -24,6 +24,7 @@ WRITE = ctypes.CFUNCTYPE(None, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint32
 TRAPPED = ctypes.CFUNCTYPE(None, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint32)
 RECORDED = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint32)
 BAD_ACCESS = ctypes.CFUNCTYPE(ctypes.c_bool, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint64)
+WRITE_AT_ONCE = ctypes.CFUNCTYPE(ctypes.c_bool, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint64)
 ACCESS_CYCLE = ctypes.CFUNCTYPE(ctypes.c_uint64)
 ACCESS_PC = ctypes.CFUNCTYPE(ctypes.c_uint32)
 
@@ -52,6 +53,7 @@ class Callbacks(ctypes.Structure):
         ("access_cycle", ACCESS_CYCLE),
         ("access_pc", ACCESS_PC),
         ("bad_access", BAD_ACCESS),
+        ("write_at_once", WRITE_AT_ONCE),
     )
 
 
@@ -67,9 +69,11 @@ _FUNCTIONS = {
     "core_forget_range": "vpuu",
     "core_set_loop": "bpup",
     "core_set_fault": "vpuuuu",
-    "core_set_system_region": "vpu",
     "core_declare_zero": "vpu",
     "core_forget_zeros": "vp",
+    "core_declare_unclocked": "vpubq",
+    "core_forget_unclocked": "vp",
+    "core_declare_duplicated": "vpu",
     "system_init": "vp",
     "system_reset": "vp",
     "system_power_up": "vp",
@@ -81,7 +85,7 @@ _FUNCTIONS = {
     "systick_write": "vpuuq",
     "core_block_start": "up",
     "core_set_page": "vpupupuppu",
-    "core_set_paged_region": "vpu",
+    "core_set_regions": "vpuuuu",
     "core_join": "vpp",
     "core_next_event": "qp",
     "core_clear_exclusive": "vp",

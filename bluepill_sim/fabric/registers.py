@@ -283,7 +283,7 @@ class Peripheral(Stateful):
     """A block of registers at an address of the chip."""
 
     STATE: ClassVar[tuple[str, ...]] = ("words", "held", "due_ns")
-    DERIVED: ClassVar[tuple[str, ...]] = ("_due_ns",)
+    DERIVED: ClassVar[tuple[str, ...]] = ("_due_ns", "duplicated")
 
     REGISTERS: ClassVar[tuple[Register, ...]] = ()
     #: Whether narrow writes touch only their bytes (AHB) or are duplicated over the word (APB).
@@ -307,6 +307,8 @@ class Peripheral(Stateful):
         self.words = array("I", table.words)
         self._table = table
         self._due_ns: int | None = None
+        #: The words, by offset // 4, of which it was warned that narrow writes are duplicated over them.
+        self.duplicated: set[int] = set()
         #: What a device in C holds beside the words: the struct `HOLDS`.
         self.native: Any = None if table.held is None else table.held()
         #: Its place in the queue of events.
@@ -525,6 +527,7 @@ class Peripheral(Stateful):
             return in_lanes
         duplicated = (value & mask) * (0x0101_0101 if size == 1 else 0x0001_0001) & WORD
         if register.stored_after(previous, duplicated) != register.stored_after(previous, in_lanes):
+            self.duplicated.add(register.offset >> 2)
             self.chip.warn(
                 f"{self.name}_{register.name}: a {size * 8}-bit write is duplicated over the word by the APB bridge",
                 once=f"{self.name}_{register.name}:narrow",

@@ -33,7 +33,16 @@ class BusEngine(Protocol):
     """What the bus says to what runs the instructions."""
 
     def declare_zero(self, address: int) -> None:
-        """Let a word be read as 0 without asking."""
+        """Let a word be read as 0, and ignore what is written, without asking."""
+
+    def declare_unclocked(self, address: int, *, is_write: bool, until_ns: Nanos | None = None) -> None:
+        """Let a peripheral without its clock read 0 without asking up to a time, None for ever; or ignore writes."""
+
+    def forget_unclocked(self) -> None:
+        """Ask again at each access without a clock."""
+
+    def declare_duplicated(self, address: int) -> None:
+        """Let narrow writes to a register be duplicated over its word without asking."""
 
 
 class BusPorts(FabricPorts, Protocol):
@@ -74,13 +83,15 @@ class PeripheralBus(Stateful):
         if not self._rcc.is_clocked(part.name):
             now_ns = self._chip.now_ns
             self._rcc.native.watches_gates = True
-            if now_ns - self.read_unclocked_ns.setdefault(part.name, now_ns) >= UNCLOCKED_NS:
+            quiet_ns: Nanos | None = self.read_unclocked_ns.setdefault(part.name, now_ns) + UNCLOCKED_NS
+            if quiet_ns is not None and now_ns >= quiet_ns:
                 self._refuse(part, offset, "read of")
+                quiet_ns = None
+            self._chip.engine.declare_unclocked(PERIPHERAL_BASE + offset, is_write=False, until_ns=quiet_ns)
             return 0
         at = PERIPHERAL_BASE + offset - part.base
         word = part.read(at, size)
-        if not part.has_register(at) and type(part).write is Peripheral.write:  # else it judges each write itself
-            self._chip.engine.declare_zero(PERIPHERAL_BASE + offset)
+        self._forget_warned(part, at)
         return word
 
     def write(self, offset: int, size: int, value: int) -> None:
@@ -92,8 +103,11 @@ class PeripheralBus(Stateful):
         if not self._rcc.is_clocked(part.name):
             if part.changes_reset_value(PERIPHERAL_BASE + offset - part.base, value):
                 self._refuse(part, offset, f"write of {value:#x} to")
+                self._chip.engine.declare_unclocked(PERIPHERAL_BASE + offset, is_write=True)
             return
-        part.write(PERIPHERAL_BASE + offset - part.base, size, value)
+        at = PERIPHERAL_BASE + offset - part.base
+        part.write(at, size, value)
+        self._forget_warned(part, at)
 
     def reach(self, offset: int, size: int, written: int | None) -> int | None:
         """Make an access of a bus master: the word that is read, 0 after a write, None where nothing answers."""
@@ -118,11 +132,20 @@ class PeripheralBus(Stateful):
         word = self.read(offset >> 5 & ~3, 4)
         self.write(offset >> 5 & ~3, 4, word | bit if value & 1 else word & ~bit)
 
+    def _forget_warned(self, part: Peripheral, at: int) -> None:
+        """Let the engine do alone what has now been warned of."""
+        if not part.has_register(at):
+            if type(part).write is Peripheral.write:  # else it judges each write itself
+                self._chip.engine.declare_zero(part.base + at)
+        elif at >> 2 in part.duplicated:
+            self._chip.engine.declare_duplicated(part.base + at)
+
     def _forget_clocked(self) -> None:
         """Begin anew with what has its clock now: drivers look at a peripheral before they switch it on, each time."""
         clocked = [name for name in self.read_unclocked_ns if self._rcc.is_clocked(name)]
         for name in clocked:
             del self.read_unclocked_ns[name]
+        self._chip.engine.forget_unclocked()
         self._rcc.native.watches_gates = bool(self.read_unclocked_ns)
 
     def _refuse(self, part: Peripheral | None, offset: int, what: str) -> None:

@@ -30,6 +30,7 @@ from bluepill_sim.core.unicorn_core import (
     RawRead,
     RawWrite,
     ReadAccess,
+    Register,
     UnicornCore,
     WriteAccess,
     io_callbacks,
@@ -44,6 +45,7 @@ from bluepill_sim.extension.library import (
     UNICORN_FUNCTIONS,
     UNKNOWN_BLOCK,
     WRITE,
+    WRITE_AT_ONCE,
     Callbacks,
     UnicornApi,
     address_of,
@@ -65,6 +67,7 @@ from bluepill_sim.native.state import (
     Shared,
 )
 from simbase.c_library import guarded
+from simbase.timing import Nanos
 
 #: Flags of a row (`enum row_flag`).
 _CHANGES_MASKS, _SENDS_EVENT, _SELF_LOOP, _WRITABLE, _NOTED, _AMBIGUOUS = 1, 2, 4, 8, 128, 256
@@ -76,6 +79,8 @@ _IT_BLOCK_BYTES = 2 + 4 * 4
 _WHOLE_BYTES = 256
 #: Chosen: at least so often Python handles signals, such as Ctrl-C.
 _SLICE_CYCLES = 20_000_000
+#: The flash stands at 0 too; a page of it.
+_FLASH_ALIAS, _PAGE_SHIFT = 0x0800_0000, 10
 #: Chosen: rows that C keeps before Python takes them.
 _RECORD_ROOM = 4096
 
@@ -91,7 +96,7 @@ class NativeEngine(Engine):
         # Shared with C, which has all of the state but what `Engine` declares.
         "shared", "_state", "_calls", "_kept", "_regions", "_code", "_is_joined",
         # Hooks, and what is known of the program.
-        "_native_hooks", "_pc_hooks", "_known", "_noted", "_held",
+        "_native_hooks", "_pc_hooks", "_known", "_code_pages", "_noted", "_held",
     )  # fmt: skip
 
     cycle = field("cycle", "As of `Engine`.")
@@ -106,6 +111,8 @@ class NativeEngine(Engine):
         self._regions: list[tuple[int, int, RawRead, RawWrite]] = []
         self._code: list[tuple[int, int, int]] = []
         self._known: dict[int, Block] = {}
+        #: Pages of flash from which something was translated.
+        self._code_pages: set[int] = set()
         self._noted: set[int] = set()
         #: The block that Python has entered, in place of the one of C; None: ask C.
         self._held: Block | None = NO_BLOCK
@@ -121,6 +128,7 @@ class NativeEngine(Engine):
             TRAPPED(guarded(self._trapped, None, self._fail)), RECORDED(guarded(self._take_records, None, self._fail)),
             ACCESS_CYCLE(lambda: self.access_cycle), ACCESS_PC(lambda: self.access_pc),
             BAD_ACCESS(guarded(self._bad_access, True, self._fail)),
+            WRITE_AT_ONCE(guarded(self._write_at_once, False, self._fail)),
         )  # fmt: skip
         self._state = state = ctypes.c_void_p(
             library().core_new(self._core.handle, ctypes.addressof(api), ctypes.addressof(self._calls))
@@ -197,6 +205,19 @@ class NativeEngine(Engine):
     def declare_zero(self, address: int) -> None:
         """As of `Engine`; until a state is restored, whose warnings may be others."""
         library().core_declare_zero(self._state, address)
+
+    def declare_unclocked(self, address: int, *, is_write: bool, until_ns: Nanos | None = None) -> None:
+        """As of `Engine`; until a state is restored."""
+        until = NO_TIME if until_ns is None else until_ns
+        library().core_declare_unclocked(self._state, address, is_write, until)
+
+    def forget_unclocked(self) -> None:
+        """As of `Engine`."""
+        library().core_forget_unclocked(self._state)
+
+    def declare_duplicated(self, address: int) -> None:
+        """As of `Engine`; until a state is restored."""
+        library().core_declare_duplicated(self._state, address)
 
     def drop_code(self, address: int, size: int) -> None:
         """As of `Engine`."""
@@ -400,6 +421,7 @@ class NativeEngine(Engine):
     def _add_row(self, block: Block) -> None:
         start, size = block.start, block.end - block.start
         self._known[start] = block
+        self._code_pages.update(at >> _PAGE_SHIFT for at in (start & ~_FLASH_ALIAS, (block.end - 1) & ~_FLASH_ALIAS))
         memory = self._blocks.writable_at(start)
         host = None if memory is None else memory[2] + start - memory[0]
         first, _, at = next(memory for memory in self._code if memory[0] <= start < memory[1])
@@ -479,6 +501,19 @@ class NativeEngine(Engine):
     def _take_records(self, rows: int, count: int) -> None:
         if self.recorder is not None:
             self.recorder.put_packed(ctypes.string_at(rows, count * RECORD.size))
+
+    def _write_at_once(self, address: int, size: int, stop: int) -> bool:
+        """Have a store to read-only memory made where it leaves what it stores, and let the time pass that it takes."""
+        take, shared, block, pc = self.on_read_only_write_at_once, self.shared, self.block, self.registers[Register.PC]
+        offset = address & ~_FLASH_ALIAS
+        if take is None or self._frozen is not None or block.has_it or offset >> _PAGE_SHIFT in self._code_pages:
+            return False
+        after = next((cycles for at, cycles in block.offsets.items() if at > pc), block.straight)
+        cycle = shared.cycle
+        done = take(address, size, pc, cycle + block.cycles_until(pc), stop)
+        if done is not None:
+            shared.cycle = cycle + max(0, done - (cycle + after))
+        return done is not None
 
     def _bad_access(self, access: int, address: int, size: int, value: int) -> bool:
         self._halt = None

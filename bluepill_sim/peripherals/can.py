@@ -12,15 +12,18 @@ Source: RM0008 24.
 Invariant: FMP of each FIFO is the number of messages in `_fifos`, and its first stands in the registers.
 """
 
+import ctypes
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache, partialmethod
 
+from bluepill_sim.extension.layout import CAN_BITS, structure
 from bluepill_sim.fabric.bus_parts import CanFrame
 from bluepill_sim.fabric.can_network import CanEnd, CanError, CanNetwork, frame_bits
-from bluepill_sim.fabric.pins import PinDrive
+from bluepill_sim.fabric.fabric import OWN_COMMANDS
+from bluepill_sim.fabric.pins import ALTERNATE_FUNCTIONS, PinDrive
 from bluepill_sim.fabric.ports import ChipPorts
 from bluepill_sim.fabric.registers import Peripheral, Place, Register, bits, numbered
 from simbase.timing import NS_PER_S, Nanos
@@ -50,6 +53,10 @@ _FLAG_BITS = 6
 #: Pins (RX, TX) by the remap field (RM0008 table 42).
 PINS = {0: ("PA11", "PA12"), 2: ("PB8", "PB9"), 3: ("PD0", "PD1")}
 _FILTER_MODES = bits((13, 0))
+#: The outputs in the order in which they are set; the first is for USB, whose memory it shares.
+_UPDATED = ("packets", "tx_irq", "rx0_irq", "rx1_irq", "sce_irq")
+#: Commands of the device in C that shows bits (`devices/can_bits.c`).
+_GO_ON, _SHOW = OWN_COMMANDS, OWN_COMMANDS + 1
 #: Takes frames at their ends, oldest first.
 Sink = Callable[[Sequence[CanEnd]], None]
 
@@ -114,9 +121,9 @@ class Can(Peripheral):
     OUTPUTS = ("tx_irq", "rx0_irq", "rx1_irq", "sce_irq", "packets")
     STATE = (
         "_alone", "_joined", "_mailboxes", "_order", "_fifos", "_ends", "_sync_ns", "_recover_ns", "_tec", "_rec",
-        "_timer_ns", "_lost", "_is_stopped", "_shown", "_shown_ns", "_tx",
+        "_timer_ns", "_lost", "_is_stopped", "_shown_ns", "_bits_held", "_bits_due_ns",
     )  # fmt: skip
-    DERIVED = ("_pin_names", "_sinks")
+    DERIVED = ("_pin_names", "_sinks", "_levels", "_bits", "_bits_slot")
     REGISTERS = (
         Register(
             name="MCR",
@@ -202,13 +209,22 @@ class Can(Peripheral):
     )
 
     def __init__(self, chip: ChipPorts, place: Place) -> None:
+        #: The levels that are still to be shown of a frame; its slot comes before that of what follows from the frame.
+        self._bits = structure(CAN_BITS)()
+        self._bits_slot = chip.pins.fabric.add_device(
+            f"{place.name}.bits", "can_bits", 0, ctypes.addressof(self._bits),
+            act=lambda _ns: None, answer=lambda _what, _value: 0, deliver=lambda: None,
+        )  # fmt: skip
         super().__init__(chip, place)
         self._sinks: list[Sink] = []
+        #: The outputs as they were last set.
+        self._levels: tuple[bool, ...] | None = None
         self._alone = CanNetwork()
         self._alone.join(self)
         self._joined: CanNetwork | None = None
-        self._clear()
         self._pin_names = PINS[0]
+        self._find_pins()
+        self._clear()
         self.on_reset()
         chip.pins.route_listeners.append(self._route_changed)
 
@@ -226,10 +242,10 @@ class Can(Peripheral):
         self._lost: tuple[int, ...] = ()
         #: Its clock stands still: nothing is heard, and what it has begun to send ends with the clock.
         self._is_stopped = False
-        #: What is still to be shown of a frame, as (ns, level of TX, level of RX), and when it began.
-        self._shown: deque[tuple[Nanos, int, int]] = deque()
+        #: When the frame began of which bits are shown.
         self._shown_ns: Nanos = -1
-        self._tx = 1
+        self._put_bits(())
+        self._bits.tx = 1
 
     # From outside the chip.
 
@@ -325,9 +341,7 @@ class Can(Peripheral):
         times = [self._sync_ns, self._recover_ns, self.network.next_ns if self._mailboxes or self._joined else None]
         if self._ends:
             times.append(self._ends[0].end_ns)
-        if self._shown:
-            times.append(self._shown[0][0])
-        elif self._is_watched and self.network.start_ns != self._shown_ns:
+        if not self._is_showing and self._is_watched and self.network.start_ns != self._shown_ns:
             times.append(self.network.start_ns)
         if self._lost:
             times.append(self.chip.now_ns)
@@ -367,7 +381,7 @@ class Can(Peripheral):
         self.advance_to(self.chip.now_ns)
         self._is_stopped = True
         self._show_level(1, 1)
-        self._shown.clear()
+        self._put_bits(())
         self._ends = deque(end for end in self._ends if end.is_own)
         self.plan()
 
@@ -395,6 +409,7 @@ class Can(Peripheral):
 
     def _restored(self) -> None:
         self._find_pins()
+        self._levels = None
 
     # Registers.
 
@@ -527,7 +542,7 @@ class Can(Peripheral):
         if self._mailboxes and self.is_on:
             self.network.want(self, self.chip.now_ns)
             if self._shown_ns == self.chip.now_ns:  # it takes part in the arbitration that has just begun
-                self._shown.clear()
+                self._put_bits(())
                 self._shown_ns = -1
 
     def _complete(self, n: int, flags: int) -> None:
@@ -662,22 +677,23 @@ class Can(Peripheral):
         last = self._last()
         flags |= 0 if last is None or len(self._mailboxes) < 2 else 1 << _LOW_AT + last
         words[TSR] = flags | (free[0] if free else last or 0) << _CODE_AT
-        self.set_output("packets", not words[MSR] & (INAK | SLAK))  # it uses the memory that it shares with USB
-        enabled = words[IER]
-        self.set_output("tx_irq", bool(enabled & TMEIE and words[TSR] & 0x01_0101))
+        enabled, status = words[IER], words[MSR]
+        received = []
         for n in range(2):
-            shift, status = 3 * n + 1, words[RF0R + n]
-            causes = (1 if status & 3 else 0) | (2 if status & FULL else 0) | (4 if status & FOVR else 0)
-            self.set_output(f"rx{n}_irq", bool(enabled >> shift & causes))
-        status = words[MSR]
-        self.set_output(
-            "sce_irq",
-            bool(
-                (status & ERRI and enabled & ERRIE)
-                or (status & WKUI and enabled & WKUIE)
-                or (status & SLAKI and enabled & SLKIE)
-            ),
+            shift, fifo_status = 3 * n + 1, words[RF0R + n]
+            causes = (1 if fifo_status & 3 else 0) | (2 if fifo_status & FULL else 0) | (4 if fifo_status & FOVR else 0)
+            received.append(bool(enabled >> shift & causes))
+        changed = (status & ERRI and enabled & ERRIE) or (status & WKUI and enabled & WKUIE)
+        levels = (
+            not status & (INAK | SLAK),
+            bool(enabled & TMEIE and words[TSR] & 0x01_0101),
+            *received,
+            bool(changed or (status & SLAKI and enabled & SLKIE)),
         )
+        if levels != self._levels:
+            self._levels = levels
+            for name, level in zip(_UPDATED, levels, strict=True):
+                self.set_output(name, level)
 
     def _last(self) -> int | None:
         """Return the mailbox that goes last."""
@@ -709,29 +725,57 @@ class Can(Peripheral):
     def _connect(self) -> None:
         """Offer the pin unless it sleeps, as it does from reset on: chosen (docs/peripherals.md)."""
         pin = self.chip.pins[self._pin_names[1]]
+        self._bits.is_offered = not self.words[MSR] & SLAK
         if self.words[MSR] & SLAK:
             pin.disconnect("CAN_TX")
         else:
-            pin.connect("CAN_TX", level=bool(self._tx))
+            pin.connect("CAN_TX", level=bool(self._bits.tx))
 
     def _find_pins(self) -> None:
         self._pin_names = PINS.get(self.chip.pins.remaps.get("CAN", 0), PINS[0])
+        pins = self.chip.pins
+        self._bits.rx_pin, self._bits.tx_pin = (pins[name].index for name in self._pin_names)
+        self._bits.source = ALTERNATE_FUNCTIONS.index("CAN_TX")
 
     @property
     def _is_watched(self) -> bool:
         return any(self.chip.pins[name].is_watched for name in self._pin_names)
 
     def _show(self, now_ns: Nanos) -> None:
-        """Show the bits that are due, and those of a frame that begins."""
-        while self._shown and self._shown[0][0] <= now_ns:
-            _, tx, rx = self._shown.popleft()
-            self._show_level(tx, rx)
+        """Begin to show the bits of a frame that begins."""
         start_ns = self.network.start_ns
         is_new = start_ns is not None and start_ns <= now_ns and start_ns != self._shown_ns
-        if start_ns is not None and is_new and not self._shown and self._is_watched:
+        if start_ns is not None and is_new and not self._is_showing and self._is_watched:
             self._shown_ns = start_ns
-            self._shown.extend(self._show_frame(start_ns))
-            self._show(now_ns)
+            self._put_bits(tuple(self._show_frame(start_ns)))
+
+    @property
+    def _is_showing(self) -> bool:
+        return bool(self._bits.first < self._bits.count)
+
+    @property
+    def _bits_held(self) -> bytes:
+        return bytes(self._bits)
+
+    @_bits_held.setter
+    def _bits_held(self, held: bytes) -> None:
+        ctypes.memmove(ctypes.addressof(self._bits), held, len(held))
+
+    @property
+    def _bits_due_ns(self) -> Nanos | None:
+        return self.chip.pins.fabric.due(self._bits_slot)
+
+    @_bits_due_ns.setter
+    def _bits_due_ns(self, at_ns: Nanos | None) -> None:
+        self.chip.pins.fabric.schedule(self._bits_slot, at_ns)
+
+    def _put_bits(self, rows: Sequence[tuple[Nanos, int, int]]) -> None:
+        """Have levels of TX and RX shown, each at its time, in place of those that are still to come."""
+        bits = self._bits
+        bits.first, bits.count = 0, len(rows)
+        for n, (at_ns, tx, rx) in enumerate(rows):
+            bits.rows[n].ns, bits.rows[n].drive, bits.rows[n].wire = at_ns, tx, rx
+        self.chip.pins.fabric.command(self._bits_slot, _GO_ON)
 
     def _show_frame(self, start_ns: Nanos) -> Iterator[tuple[Nanos, int, int]]:
         """Yield when the levels of TX and RX change in the frame that begins."""
@@ -755,13 +799,12 @@ class Can(Peripheral):
         before = (1, 1)
         for n, now in enumerate(zip(tx, bus, strict=True)):
             if now != before:
-                yield start_ns + int(n * NS_PER_S / rate), *now
+                yield start_ns + n * NS_PER_S * rate.denominator // rate.numerator, *now
             before = now
 
     def _show_level(self, tx: int, rx: int) -> None:
-        self._tx = tx
         self._connect()
-        self.chip.pins[self._pin_names[0]].hold_low(not rx)
+        self.fabric.command(self._bits_slot, _SHOW, tx, rx)
 
 
 @lru_cache(maxsize=64)  # asked for at each of hundreds of steps of a frame

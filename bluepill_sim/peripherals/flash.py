@@ -16,7 +16,7 @@ Invariant: the memory changes only while CR is unlocked and PG, PER or MER says 
 from typing import Protocol
 
 from bluepill_sim.fabric.ports import ChipPorts
-from bluepill_sim.fabric.registers import Peripheral, Place, Register, bits
+from bluepill_sim.fabric.registers import NATIVE, Peripheral, Place, Register, bits
 
 ACR, KEYR, OPTKEYR, SR, CR, AR, _RESERVED, OBR, WRPR = range(9)
 
@@ -44,7 +44,7 @@ OPTERR, RDPRT = 1, 2
 _USER_AT, _DATA0_AT, _DATA1_AT = 2, 10, 18
 #: One bit of WRPR protects so much; RDP protects the first one.
 GROUP_BYTES = 4 * PAGE_BYTES
-_ERASED = 0xFF
+_ERASED, _HALFWORD = 0xFF, 0xFFFF
 
 
 class FlashMemory(Protocol):
@@ -71,6 +71,7 @@ class FlashMemory(Protocol):
 class Flash(Peripheral):
     """Flash memory interface."""
 
+    KIND = "flash"
     HAS_BYTE_LANES = True
     STATE = ("_key_step", "_option_key_step", "_address")
     OUTPUTS = ("irq",)
@@ -92,7 +93,7 @@ class Flash(Peripheral):
             readable=BSY | PGERR | WRPRTERR | EOP,
             writable=0,
             write_one_to_clear=PGERR | WRPRTERR | EOP,
-            on_write="_write_sr",
+            on_write=NATIVE,
             fields="EOP 5, WRPRTERR 4, PGERR 2, BSY 0",
         ),
         Register(
@@ -100,7 +101,7 @@ class Flash(Peripheral):
             offset=0x10,
             reset=LOCK,
             mask=PG | PER | MER | OPTPG | OPTER | STRT | LOCK | OPTWRE | ERRIE | EOPIE,
-            on_write="_write_cr",
+            on_write=NATIVE,
             fields="EOPIE 12, ERRIE 10, OPTWRE 9, LOCK 7, STRT 6, OPTER 5, OPTPG 4, MER 2, PER 1, PG 0",
         ),
         Register(name="AR", offset=0x14, readable=0, on_write="_write_ar"),
@@ -147,6 +148,20 @@ class Flash(Peripheral):
         if size != 2 and self.words[CR] & PG and not self.words[CR] & LOCK:
             return self._refuse_width(size)
         self._program(offset, value)
+        return True
+
+    def program_at_once(self, offset: int) -> bool:
+        """Program a halfword up to its end, of which EOP alone is seen; False: it is not so simple, nothing was done.
+
+        The CPU itself stores the value, and nothing else acts meanwhile.
+        """
+        control = self.words[CR]
+        is_ready = self.memory is not None and control & (PG | LOCK | EOPIE) == PG and not self.is_busy
+        if not is_ready or self.memory is None or self._is_protected(offset):
+            return False
+        if self.memory.read(offset, 2) != b"\xff\xff":
+            return False
+        self.words[SR] |= EOP
         return True
 
     def _refuse_width(self, size: int) -> bool:
@@ -256,8 +271,15 @@ class Flash(Peripheral):
         else:
             self._option_key_step = 1
 
-    def _write_sr(self, _written: int, _previous: int) -> None:
-        self._update_irq()
+    def answer(self, what: int, value: int) -> int:
+        """Take what the device in C hears: a write after which something is to be done."""
+        del what
+        index, previous = value >> 16, value & _HALFWORD
+        if index == CR:
+            self._write_cr(self.words[CR], previous)
+        else:
+            self._update_irq()
+        return 0
 
     def _write_cr(self, written: int, previous: int) -> None:
         if previous & LOCK or self.is_busy:

@@ -10,8 +10,11 @@ first endpoint whose CTR stands, isochronous and double-buffered ones before the
 event only while their flag is 0: frames that nobody looks at cost nothing, and FNR follows from the time.
 
 An isochronous or double-buffered endpoint has one direction and two buffers: the first is that of ADDRn_TX, the second
-that of ADDRn_RX. DTOG of its direction says which is the device's, DTOG of the other (SW_BUF) which is the program's;
-a bulk endpoint whose two are alike says NAK.
+that of ADDRn_RX. DTOG of its direction says which is the device's, DTOG of the other (SW_BUF) which is the program's.
+A bulk endpoint whose two are alike says NAK, but only once a transaction has ended since DBL_BUF was set: before that
+its STAT alone answers, so that a program may fill both buffers and start with both bits as they are (23.4.3). Chosen:
+STAT stays VALID from the first transaction on. The manual's sentence on that can be read otherwise for the first one,
+but Klipper, which sets STAT once and then waits for both packets to go, runs on the chip.
 
 Source: RM0008 section 23.
 Invariant: with PDWN or FRES set nothing is answered; CTR, DIR and EP_ID of ISTR follow from the endpoint registers.
@@ -76,7 +79,7 @@ class Usb(Peripheral):
     INPUTS = ("can",)
     STATE = (
         "_host", "_bus", "_since_ns", "_frame", "_quiet_ns", "_sof_ns", "_esof_ns", "_susp_ns", "_reset_ns",
-        "_can_is_on", "_is_stopped",
+        "_can_is_on", "_is_stopped", "_turns",
     )  # fmt: skip
     REGISTERS = (
         *(
@@ -144,8 +147,11 @@ class Usb(Peripheral):
         #: When that state began; of FRAMES the start of the frame whose number is `_frame`.
         self._since_ns: Nanos = 0
         self._frame = 0
+        #: Endpoints whose two buffers take turns, a bit each: a transaction has ended since DBL_BUF was set.
+        self._turns = 0
         self._forget()
         self.listen_to_pins("A", 1 << 12)
+        self.heed_pull_up(False)
 
     def _forget(self) -> None:
         #: Since when nothing has come, and the next times of what has an event.
@@ -162,6 +168,10 @@ class Usb(Peripheral):
     def attach(self, host: UsbMaster) -> None:
         """Take the host at the other end of the cable."""
         self._host = host
+
+    def heed_pull_up(self, wanted: bool) -> None:
+        """Tell the host when the pull-up of D+ comes or goes, as it wants while the cable is plugged in."""
+        self.listen_to_pins("A", (1 << 12) * wanted)
 
     @property
     def now_ns(self) -> Nanos:
@@ -211,13 +221,16 @@ class Usb(Peripheral):
         if transaction.token is Token.IN:
             stat = VALID if self._has_two_buffers(word) else NAK
             self.words[n] = (_with_stat(word, STAT_TX_AT, stat) ^ DTOG_TX) | CTR_TX
-        elif self._is_new(word, transaction):
+        elif not self._is_new(word, transaction):
+            return
+        else:
             self._store(self._rx_buffer(n), transaction.data)
             kept = word if word & CTR_RX else word & ~SETUP  # frozen until the one before is acknowledged
             word = (kept ^ DTOG_RX) | CTR_RX
             if transaction.token is Token.SETUP:
                 word = _with_stat(word, STAT_TX_AT, NAK) | SETUP | DTOG_RX | DTOG_TX
             self.words[n] = word if self._has_two_buffers(word) else _with_stat(word, STAT_RX_AT, NAK)
+        self._turns |= self._has_flow_control(word) << n
         self._update()
 
     def would_nak(self, endpoint: int, is_in: bool) -> bool:
@@ -226,7 +239,7 @@ class Usb(Peripheral):
             return False
         transaction = Transaction(Token.IN if is_in else Token.OUT, self.words[DADDR] & ~EF, endpoint)
         n = self._endpoint(transaction)
-        return n is not None and self._says_nak(self.words[n], is_in)
+        return n is not None and self._says_nak(n, is_in)
 
     def plan(self) -> None:
         """Work out when something is due next."""
@@ -264,6 +277,7 @@ class Usb(Peripheral):
     def on_reset(self) -> None:
         """Let go of the pins; the bus stays as it is."""
         self._forget()
+        self._turns = 0
         self._hold_pins()
         self._update()
         self._tell_host()
@@ -309,6 +323,8 @@ class Usb(Peripheral):
                 self._control(value & _HALFWORD)
             elif value >> 16 == ISTR:
                 self._look_for_frames(self.chip.now_ns)
+            elif value >> 16 < ENDPOINTS and not self._has_flow_control(self.words[value >> 16]):
+                self._turns &= ~(1 << (value >> 16))
             self._update()
             self._tell_host()
         elif what == _HEARS_LINE:
@@ -377,6 +393,7 @@ class Usb(Peripheral):
         """Reset what a bus reset does: address and endpoints, but for the transfers that are not acknowledged yet."""
         for n in range(ENDPOINTS):
             self.words[n] &= _CORRECT
+        self._turns = 0
         self.words[DADDR] = 0
         self.words[ISTR] |= RESET
         self._update()
@@ -450,20 +467,24 @@ class Usb(Peripheral):
 
     @staticmethod
     def _has_two_buffers(word: int) -> bool:
-        kind = word >> TYPE_AT & 3
-        return kind == ISOCHRONOUS or (kind == BULK and bool(word & EP_KIND))
+        return word >> TYPE_AT & 3 == ISOCHRONOUS or Usb._has_flow_control(word)
 
-    def _says_nak(self, word: int, is_in: bool) -> bool:
+    @staticmethod
+    def _has_flow_control(word: int) -> bool:
+        """Tell whether it is a bulk endpoint with DBL_BUF."""
+        return word >> TYPE_AT & 3 == BULK and bool(word & EP_KIND)
+
+    def _says_nak(self, n: int, is_in: bool) -> bool:
+        word = self.words[n]
         stat = word >> (STAT_TX_AT if is_in else STAT_RX_AT) & 3
-        kind = word >> TYPE_AT & 3
-        if kind == ISOCHRONOUS:
+        if word >> TYPE_AT & 3 == ISOCHRONOUS:
             return False
-        is_taken = kind == BULK and word & EP_KIND and bool(word & DTOG_RX) == bool(word & DTOG_TX)
+        is_taken = self._turns >> n & 1 and bool(word & DTOG_RX) == bool(word & DTOG_TX)
         return stat == NAK or (stat == VALID and bool(is_taken))
 
     def _begin_in(self, n: int) -> Answer | None:
         word = self.words[n]
-        if self._says_nak(word, is_in=True):
+        if self._says_nak(n, is_in=True):
             return Answer(Handshake.NAK)
         if word >> STAT_TX_AT & 3 == STALL:
             return Answer(Handshake.STALL)
@@ -483,7 +504,7 @@ class Usb(Peripheral):
             return Answer(Handshake.ACK) if is_heard else None
         if kind == ISOCHRONOUS:
             return Answer(None)
-        if self._says_nak(word, is_in=False):
+        if self._says_nak(n, is_in=False):
             return Answer(Handshake.NAK)
         is_wrong_status = kind == CONTROL and word & EP_KIND and transaction.data
         room = self._room(self._memory(self._rx_buffer(n) + 1))

@@ -231,7 +231,10 @@ def with_mover(folder: Path) -> None:
         "-flto=auto",
         f"-I{SOURCES[0].parent}",
     ]
-    subprocess.run(["gcc", *flags, *map(str, SOURCES), str(HERE / "mover.c"), "-o", str(built)], check=True)
+    subprocess.run(
+        ["gcc", *flags, *map(str, SOURCES), str(HERE / "firmware" / "devices" / "mover.c"), "-o", str(built)],
+        check=True,
+    )
     library.library_path = lambda: str(built)  # type: ignore[assignment]  # a cached function
     stm32f103.PERIPHERALS = (*stm32f103.PERIPHERALS, (Mover, PLACE))
 

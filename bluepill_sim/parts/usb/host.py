@@ -195,6 +195,7 @@ class UsbHost(Stateful):
         """Plug the cable in."""
         if self.state is HostState.UNPLUGGED:
             self.state = HostState.WAITING
+            self._function.heed_pull_up(True)
             self._changed()
 
     def unplug(self) -> None:
@@ -205,6 +206,7 @@ class UsbHost(Stateful):
         self._stop_frames(BusState.IDLE)
         self._clear()
         self.state = HostState.UNPLUGGED
+        self._function.heed_pull_up(False)
         self._changed()
 
     def reset(self) -> None:
@@ -433,6 +435,9 @@ class UsbHost(Stateful):
         self._now_ns = max(self._now_ns, now_ns)
 
     # What is next.
+
+    def _restored(self) -> None:
+        self._function.heed_pull_up(self.state is not HostState.UNPLUGGED)
 
     def _catch_up(self) -> None:
         """Come to the time that the board has reached: the user does something."""

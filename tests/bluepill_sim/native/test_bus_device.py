@@ -39,7 +39,9 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Have boards made with a library that knows the device."""
     out = tmp_path_factory.mktemp("library") / "native.so"
     flags = ["-shared", "-fPIC", "-std=c11", "-Wall", "-Wextra", "-Werror", f"-I{SOURCES[0].parent}"]
-    subprocess.run(["gcc", *flags, *map(str, SOURCES), ROOT / "tools/bench/mover.c", "-o", out], check=True)
+    subprocess.run(
+        ["gcc", *flags, *map(str, SOURCES), ROOT / "tools/bench/firmware/devices/mover.c", "-o", out], check=True
+    )
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(library, "library_path", lambda: str(out))
         patch.setattr(stm32f103, "PERIPHERALS", (*stm32f103.PERIPHERALS, (Mover, "TIM7")))

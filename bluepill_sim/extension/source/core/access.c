@@ -11,6 +11,8 @@
  * block Unicorn does not stop: such blocks have hooks that note the PC instead,
  * see `native/engine.py`.
  */
+#include <string.h>
+
 #include "core.h"
 
 struct region_user {
@@ -35,8 +37,14 @@ struct region_user *core_region(struct core *core, uint32_t number, uint32_t bas
     return region;
 }
 
-/* Which region the pages belong to. */
-void core_set_paged_region(struct core *core, uint32_t number) { core->paged_region = number; }
+/* Which regions are registers, their bits, those of SRAM, and the system control space. */
+void core_set_regions(struct core *core, uint32_t paged, uint32_t bits, uint32_t sram_bits, uint32_t system)
+{
+    core->paged_region = paged;
+    core->bits_region = bits;
+    core->sram_bits_region = sram_bits;
+    core->system_region = system;
+}
 
 /* A hook of each access in blocks where the instruction cannot be told from the registers. */
 void core_on_note(void *unicorn, uint64_t address, uint32_t size, void *user)
@@ -262,11 +270,10 @@ static bool may_access(struct core *core)
 
 /* The page of a register that may be answered here: it has a clock, and Python need not act first. `is_late`: its
  * device has to be brought to the time of the access. */
-static struct page *open_page(const struct region_user *region, uint32_t offset, bool *is_late)
+static struct page *open_page(struct core *core, uint32_t offset, bool *is_late)
 {
-    struct core *core = region->core;
     *is_late = false;
-    if (region->number != core->paged_region || core->shared.is_python || offset >> PAGE_SHIFT >= PAGES) {
+    if (core->shared.is_python || offset >> PAGE_SHIFT >= PAGES) {
         return NULL;
     }
     struct page *page = &core->pages[offset >> PAGE_SHIFT];
@@ -291,12 +298,60 @@ static bool catch_up(struct core *core, const struct page *page, uint32_t addres
     return true;
 }
 
-/* Whether no clock is missing there. */
-static bool is_clocked(const struct region_user *region, uint32_t offset)
+/* Has Python not be told again of accesses to a peripheral while it has no clock: of reads up to a time (NO_TIME: of
+ * none), or of writes.
+ */
+void core_declare_unclocked(struct core *core, uint32_t address, bool is_write, uint64_t until_ns)
 {
-    const struct core *core = region->core;
-    return region->number != core->paged_region || offset >> PAGE_SHIFT >= PAGES ||
-           has_clock(&core->pages[offset >> PAGE_SHIFT]);
+    struct page *page = &core->pages[(address - PERIPHERALS) >> PAGE_SHIFT];
+    if (is_write) {
+        page->ignores_writes = 1;
+        return;
+    }
+    page->quiet_until = until_ns == NO_TIME ? NO_TIME : cycle_at(core->fabric, until_ns);
+    page->quiet_cycle = core->fabric->time.cycle;
+    page->quiet_hz = core->fabric->time.hz;
+}
+
+void core_forget_unclocked(struct core *core)
+{
+    for (uint32_t n = 0; n < PAGES; ++n) {
+        core->pages[n].quiet_until = core->pages[n].ignores_writes = 0;
+    }
+}
+
+/* Whether a read finds no clock, and Python need not be told of it. Only once it has warned may the time of a loop that
+ * reads there pass at once: that it waits for so long is what is warned of.
+ */
+static bool reads_nothing(struct core *core, uint32_t offset)
+{
+    if (offset >> PAGE_SHIFT >= PAGES) {
+        return false;
+    }
+    const struct page *page = &core->pages[offset >> PAGE_SHIFT];
+    if (has_clock(page) || core->shared.cycle + core->block->costs[0] >= page->quiet_until || !may_access(core)) {
+        return false;
+    }
+    if (page->quiet_until == NO_TIME) {
+        return true;
+    }
+    core->waiting.has_acted = 1;
+    return page->quiet_cycle == core->fabric->time.cycle && page->quiet_hz == core->fabric->time.hz;
+}
+
+/* The same of a write. One that sets nothing that a reset would leave at 0 is never told of. */
+static bool writes_nothing(struct core *core, uint32_t offset, uint32_t value)
+{
+    if (offset >> PAGE_SHIFT >= PAGES) {
+        return false;
+    }
+    const struct page *page = &core->pages[offset >> PAGE_SHIFT];
+    const uint32_t index = (offset & IN_PAGE) >> 2;
+    if (has_clock(page) || !may_access(core)) {
+        return false;
+    }
+    return page->ignores_writes || (index < page->count && page->behaviour[index] & IS_REGISTER &&
+                                    !(value << 8 * (offset & 3) & page->masks[index][SETS]));
 }
 
 /* Whether an access has to know its time. */
@@ -373,9 +428,6 @@ static void write_page(struct core *core, struct page *page, uint32_t index, uin
         skip(core, address, true, size);
     }
 }
-
-/* Which region is the system control space. */
-void core_set_system_region(struct core *core, uint32_t number) { core->system_region = number; }
 
 bool is_privileged(struct core *core)
 {
@@ -469,68 +521,208 @@ void core_declare_zero(struct core *core, uint32_t address)
     }
 }
 
-void core_forget_zeros(struct core *core) { core->constants = (struct constants){0}; }
-
-static bool is_zero(struct core *core, uint32_t address)
+void core_forget_zeros(struct core *core)
 {
-    return core->constants.count && *constant_slot(core, address & ~3u) && may_access(core);
+    core->constants = (struct constants){0};
+    core_forget_unclocked(core);
+    for (uint32_t n = 0; n < PAGES; ++n) {
+        memset(core->pages[n].duplicated, 0, sizeof core->pages[n].duplicated);
+    }
+}
+
+static bool is_zero(struct core *core, const struct region_user *region, uint32_t offset)
+{
+    if (!core->constants.count || !*constant_slot(core, (region->base + offset) & ~3u) || !may_access(core)) {
+        return false;
+    }
+    if (region->number == core->paged_region) {
+        return offset >> PAGE_SHIFT >= PAGES || has_clock(&core->pages[offset >> PAGE_SHIFT]);
+    }
+    return is_privileged(core);
+}
+
+/* From now on writes of a byte or halfword to a register are duplicated over its word without Python being asked. */
+void core_declare_duplicated(struct core *core, uint32_t address)
+{
+    struct page *page = &core->pages[(address - PERIPHERALS) >> PAGE_SHIFT];
+    const uint32_t index = (address & IN_PAGE) >> 2;
+    page->duplicated[index / 32] |= 1u << index % 32;
+}
+
+/* Finds the word that a peripheral sees of a write of a byte or halfword; false: that is Python's, to warn of it. */
+static bool widen(const struct page *page, uint32_t index, uint32_t offset, uint32_t size, uint32_t *written)
+{
+    const uint32_t *mask = page->masks[index], shift = 8 * (offset & 3), ones = (1u << 8 * size) - 1;
+    const uint32_t value = *written & ones, untouched = (page->words[index] & mask[1]) | mask[3];
+    const uint32_t in_lanes = value << shift | (untouched & ~(ones << shift));
+    const uint32_t duplicated = value * (size == 1 ? 0x01010101u : 0x10001u);
+    if (page->behaviour[index] & BYTE_LANES) {
+        *written = in_lanes;
+        return true;
+    }
+    *written = duplicated;
+    return stored_after(page, index, duplicated) == stored_after(page, index, in_lanes) ||
+           page->duplicated[index / 32] >> index % 32 & 1;
+}
+
+/* The word of the registers that an access to the bits' region reaches, and the bit in it. */
+static uint32_t word_of(uint32_t offset) { return offset >> 5 & ~3u; }
+static uint32_t bit_of(uint32_t offset) { return offset >> 2 & 31; }
+
+/* Reads a register's word for an access at an address of one's choice; false: that is Python's. */
+static bool read_register_word(struct core *core, uint32_t offset, uint32_t address, uint32_t size, uint32_t *word)
+{
+    const uint32_t index = (offset & IN_PAGE) >> 2;
+    bool is_late;
+    struct page *page = open_page(core, offset, &is_late);
+    if (UNLIKELY(core->is_stopping)) { /* the other half of an unaligned access */
+        return true;
+    }
+    if (page != NULL && page->behaviour[index] & (READS_PLAIN | READS_NATIVE)) {
+        *word = read_page(core, page, index, address, size, is_late);
+        return true;
+    }
+    if (reads_nothing(core, offset)) {
+        skip(core, address, false, size);
+        return true;
+    }
+    return false;
+}
+
+/* The bus matrix reads the word, changes the bit, writes the word; false: that is Python's. */
+static bool write_register_bit(struct core *core, uint32_t offset, uint32_t bit, uint32_t address, uint32_t size, bool is_high)
+{
+    const uint32_t index = (offset & IN_PAGE) >> 2;
+    bool is_late;
+    struct page *page = open_page(core, offset, &is_late);
+    if (page == NULL || !(page->behaviour[index] & (READS_PLAIN | READS_NATIVE)) ||
+        !(page->behaviour[index] & (WRITES_PLAIN | WRITES_NATIVE))) {
+        return false;
+    }
+    if (is_late ? !catch_up(core, page, address, true, size) : !begin_access(core, address, true, size)) {
+        return true;
+    }
+    const uint32_t word = read_now(page, index), written = is_high ? word | 1u << bit : word & ~(1u << bit);
+    const uint32_t previous = store(page, index, written);
+    if (page->behaviour[index] & WRITES_NATIVE) {
+        page->device->kind->write(page->device, index, written, previous);
+    }
+    core->shared.in_access = 0;
+    return true;
+}
+
+static uint8_t *sram_byte(struct core *core, uint32_t offset)
+{
+    return (uint8_t *)(uintptr_t)core->shared.sram + (offset >> 5);
+}
+
+/* The bits of SRAM and of registers by their aliases (RM0008 3.3.2). */
+static uint64_t read_alias(const struct region_user *region, uint32_t offset, uint32_t size)
+{
+    struct core *core = region->core;
+    uint32_t word = 0;
+    if (region->number == core->sram_bits_region && may_access(core)) {
+        skip(core, region->base + offset, false, size);
+        return *sram_byte(core, offset) >> (offset >> 2 & 7) & 1;
+    }
+    if (region->number == core->bits_region &&
+        read_register_word(core, word_of(offset), region->base + offset, size, &word)) {
+        return word >> bit_of(offset) & 1;
+    }
+    return ask_read(region, offset, size);
+}
+
+static void write_alias(const struct region_user *region, uint32_t offset, uint32_t size, uint32_t value)
+{
+    struct core *core = region->core;
+    const uint32_t address = region->base + offset, word = word_of(offset), bit = bit_of(offset);
+    if (region->number == core->sram_bits_region && may_access(core)) {
+        uint8_t *byte = sram_byte(core, offset);
+        const uint32_t mask = 1u << (offset >> 2 & 7);
+        skip(core, address, true, size);
+        *byte = (uint8_t)(value & 1 ? *byte | mask : *byte & ~mask);
+    } else if (region->number == core->bits_region &&
+               write_register_bit(core, word, bit, address, size, value & 1)) {
+    } else if (region->number == core->bits_region && reads_nothing(core, word) &&
+               writes_nothing(core, word, (value & 1) << bit)) {
+        skip(core, address, true, size);
+    } else {
+        ask_write(region, offset, size, value);
+    }
+}
+
+static bool is_alias(const struct region_user *region)
+{
+    return region->number == region->core->bits_region || region->number == region->core->sram_bits_region;
 }
 
 uint64_t core_read_io(void *unicorn, uint64_t at, unsigned size, void *user)
 {
     (void)unicorn;
     const struct region_user *region = user;
-    const uint32_t offset = (uint32_t)at, index = (offset & IN_PAGE) >> 2;
-    bool is_late;
-    struct page *page = open_page(region, offset, &is_late);
+    struct core *core = region->core;
+    const uint32_t offset = (uint32_t)at, address = region->base + offset;
     uint32_t word = 0;
-    if (UNLIKELY(region->core->is_stopping)) { /* the other half of an unaligned access */
+    if (UNLIKELY(core->is_stopping)) {
         return 0;
     }
-    if (page != NULL && page->behaviour[index] & (READS_PLAIN | READS_NATIVE)) {
-        word = read_page(region->core, page, index, region->base + offset, size, is_late);
-    } else if (region->number == region->core->system_region &&
-               read_system(region->core, region->base + offset, size, &word)) {
-    } else if (is_clocked(region, offset) && is_zero(region->core, region->base + offset)) {
-        skip(region->core, region->base + offset, false, size);
+    if (region->number == core->paged_region) {
+        if (!read_register_word(core, offset, address, size, &word)) {
+            if (!is_zero(core, region, offset)) {
+                return ask_read(region, offset, size);
+            }
+            skip(core, address, false, size);
+        }
+    } else if (is_alias(region)) {
+        return read_alias(region, offset, size);
+    } else if (region->number == core->system_region && read_system(core, address, size, &word)) {
+    } else if (is_zero(core, region, offset)) {
+        skip(core, address, false, size);
     } else {
         return ask_read(region, offset, size);
     }
     return size == 4 ? word : (word >> (offset & 3) * 8) & ((1u << size * 8) - 1);
 }
 
+/* Stores to a register; false: that is Python's. */
+static bool write_register_word(struct core *core, uint32_t offset, uint32_t address, uint32_t size, uint32_t written)
+{
+    const uint32_t index = (offset & IN_PAGE) >> 2;
+    bool is_late;
+    struct page *page = open_page(core, offset, &is_late);
+    if (page == NULL) {
+        if (!writes_nothing(core, offset, written)) {
+            return false;
+        }
+        skip(core, address, true, size);
+        return true;
+    }
+    if (!(page->behaviour[index] & (WRITES_PLAIN | WRITES_NATIVE)) ||
+        (size != 4 && (is_late || !widen(page, index, offset, size, &written)))) {
+        return false;
+    }
+    write_page(core, page, index, address, size, written, is_late);
+    return true;
+}
+
 void core_write_io(void *unicorn, uint64_t at, unsigned size, uint64_t value, void *user)
 {
     (void)unicorn;
-    const uint32_t offset = (uint32_t)at, index = (offset & IN_PAGE) >> 2;
-    uint32_t written = (uint32_t)value;
     const struct region_user *region = user;
-    bool is_late;
-    struct page *page = open_page(region, offset, &is_late);
-    if (UNLIKELY(region->core->is_stopping)) {
+    struct core *core = region->core;
+    const uint32_t offset = (uint32_t)at, address = region->base + offset, written = (uint32_t)value;
+    if (UNLIKELY(core->is_stopping)) {
         return;
     }
-    region->core->waiting.has_acted = 1;
-    region->core->waiting.polled = 0;
-    if (region->number == region->core->system_region &&
-        write_system(region->core, region->base + offset, size, written)) {
-        return;
-    }
-    if (is_clocked(region, offset) && is_zero(region->core, region->base + offset)) {
-        skip(region->core, region->base + offset, true, size);
-        return;
-    }
-    const bool is_half = size == 2 && !(offset & 3) && page != NULL && page->behaviour[index] & HALFWORDS;
-    if (page == NULL || (size != 4 && !is_half)) {
-        ask_write(region, offset, size, written);
-        return;
-    }
-    if (is_half) { /* the APB bridge puts it on both halves of the bus */
-        written = (written & 0xFFFF) * 0x10001u;
-    }
-    if (page->behaviour[index] & (WRITES_PLAIN | WRITES_NATIVE)) {
-        write_page(region->core, page, index, region->base + offset, size, written, is_late);
+    core->waiting.has_acted = 1;
+    core->waiting.polled = 0;
+    if (is_alias(region)) {
+        write_alias(region, offset, size, written);
+    } else if (region->number == core->paged_region && write_register_word(core, offset, address, size, written)) {
+    } else if (region->number == core->system_region && write_system(core, address, size, written)) {
+    } else if (is_zero(core, region, offset)) {
+        skip(core, address, true, size);
     } else {
-        ask_write(region, offset, size, (uint32_t)value);
+        ask_write(region, offset, size, written);
     }
 }

@@ -95,12 +95,19 @@ struct callbacks {
     uint32_t (*access_pc)(void);
     /* An access that the memory's protection forbids: whether it may pass. */
     bool (*bad_access)(uint32_t kind, uint32_t address, uint32_t size, uint64_t value);
+    /* A store to read-only memory in a run that goes on to a cycle: whether it is made now, with all that follows from it
+     * up to the next instruction. */
+    bool (*write_at_once)(uint32_t address, uint32_t size, uint64_t stop);
 };
 
 #define FLASH_SLOTS 65536
 #define SRAM_SLOTS 10240
 #define PAGE_SHIFT 10
 #define PAGES 144
+
+/* Of each word: the bits that a write keeps, takes, clears by 1, clears by 0; and those that set what a reset leaves at 0. */
+enum { SETS = 4, MASKS };
+enum { PAGE_WORDS = 1 << (PAGE_SHIFT - 2) };
 
 /* A page of peripheral registers, as declared; `words` is null where Python decides everything. */
 struct page {
@@ -109,21 +116,33 @@ struct page {
     uint32_t gate_mask;
     uint32_t count;
     const uint16_t *behaviour; /* of each word: bits of enum behaviour */
-    const uint32_t (*masks)[4]; /* of each word: kept, taken, cleared by 1, cleared by 0 */
-    struct device *device;      /* without a kind it is Python's */
+    const uint32_t (*masks)[MASKS]; /* of each word: see `store` and SETS */
+    struct device *device;          /* without a kind it is Python's */
+    /* Up to which cycle Python need not be told of reads without a clock, 0 for none, while that tie of cycles and time
+     * holds; NO_TIME: it has warned of one. And whether it has warned of a write. */
+    uint64_t quiet_until, quiet_cycle;
+    uint32_t quiet_hz, ignores_writes;
+    uint32_t duplicated[PAGE_WORDS / 32]; /* the words of which Python has warned that narrow writes are duplicated */
 };
 
 /* Whether what is on a page has its clock, or needs none. */
 static inline bool has_clock(const struct page *page) { return page->gate == NULL || *page->gate & page->gate_mask; }
 
 /* The word that latches what is read stands above the bits; 0 for none. */
-enum behaviour { READS_PLAIN = 1, WRITES_PLAIN = 2, READS_NATIVE = 4, WRITES_NATIVE = 8, HALFWORDS = 16, DUPLICATES = 32, LATCH_SHIFT = 6 };
+enum behaviour { READS_PLAIN = 1, WRITES_PLAIN = 2, READS_NATIVE = 4, WRITES_NATIVE = 8, BYTE_LANES = 16, DUPLICATES = 32, IS_REGISTER = 64, LATCH_SHIFT = 7 };
+
+/* What a register holds after a write. */
+static inline uint32_t stored_after(const struct page *page, uint32_t index, uint32_t written)
+{
+    const uint32_t *mask = page->masks[index];
+    return (page->words[index] & mask[0] & ~(written & mask[2]) & (written | ~mask[3])) | (written & mask[1]);
+}
 
 /* Stores a word in a register as its masks say; returns what stood there. */
 static inline uint32_t store(struct page *page, uint32_t index, uint32_t written)
 {
-    const uint32_t previous = page->words[index], *mask = page->masks[index];
-    page->words[index] = (previous & mask[0] & ~(written & mask[2]) & (written | ~mask[3])) | (written & mask[1]);
+    const uint32_t previous = page->words[index];
+    page->words[index] = stored_after(page, index, written);
     return previous;
 }
 
@@ -216,7 +235,8 @@ struct core {
     struct fabric *fabric;
     uint32_t is_scratch;
     uint32_t noted;
-    uint32_t paged_region, system_region;
+    /* The regions of I/O by their numbers: registers, the bits of these, the bits of SRAM, the system control space. */
+    uint32_t paged_region, bits_region, sram_bits_region, system_region;
     struct constants constants;
     enum { PRIVILEGE_UNKNOWN, PRIVILEGED, UNPRIVILEGED } privilege; /* of a thread, since the last MSR */
     struct allocation *allocations;

@@ -22,6 +22,15 @@ void core_set_fault(struct core *core, uint32_t kind, uint32_t exception, uint32
     core->faults[kind] = (struct fault_row){exception, cfsr, hfsr};
 }
 
+/* Whether a store to flash is made without ending the run, and the core has waited for what it begins. */
+static bool may_write_at_once(struct core *core, int kind)
+{
+    const struct shared *s = &core->shared;
+    return kind == WRITE_PROTECTED && !s->is_python && s->halt_kind == HALT_NONE && s->stop_at && !core->view_count &&
+           core->records == NULL && core->block != &core->none && !(core->block->flags & (ROW_AMBIGUOUS | ROW_NOTED)) &&
+           !(read_register(core, REG_CPSR) & IT_BITS);
+}
+
 /* An access to nothing, or against the protection: false ends the run at its instruction. */
 bool core_on_bad_access(void *unicorn, int kind, uint64_t address, int size, int64_t value, void *user)
 {
@@ -29,6 +38,10 @@ bool core_on_bad_access(void *unicorn, int kind, uint64_t address, int size, int
     struct core *core = user;
     struct shared *s = &core->shared;
     const bool is_buffered = kind == WRITE_UNMAPPED && !(s->actlr & DISDEFWBUF);
+    if (may_write_at_once(core, kind) && core->calls.write_at_once((uint32_t)address, (uint32_t)size, next_stop(core))) {
+        core->waiting.has_acted = 1;
+        return true;
+    }
     if (s->is_python || is_buffered || kind == WRITE_PROTECTED || kind == FETCH_PROTECTED) {
         return core->calls.bad_access((uint32_t)kind, (uint32_t)address, (uint32_t)size, (uint64_t)value);
     }

@@ -38,7 +38,7 @@ struct core *core_new(void *unicorn, const struct unicorn_api *api, const struct
         core->calls = *calls;
         core->none.start = core->none.end = UINT32_MAX;
         core->block = &core->none;
-        core->paged_region = core->system_region = UINT32_MAX;
+        core->paged_region = core->bits_region = core->sram_bits_region = core->system_region = UINT32_MAX;
         core->waiting.interval = LEAST_INTERVAL;
         system_init(&core->shared);
     }
@@ -62,7 +62,7 @@ void core_free(struct core *core)
 }
 
 void core_set_page(struct core *core, uint32_t number, uint32_t *words, uint32_t count, const uint32_t *gate,
-                   uint32_t gate_mask, const uint16_t *behaviour, const uint32_t (*masks)[4], uint32_t slot)
+                   uint32_t gate_mask, const uint16_t *behaviour, const uint32_t (*masks)[MASKS], uint32_t slot)
 {
     core->pages[number] = (struct page){.words = words, .gate = gate, .gate_mask = gate_mask, .count = count,
                                         .behaviour = behaviour, .masks = masks,

@@ -196,6 +196,24 @@ static bool needs_time(const struct device *device, uint32_t index, bool is_writ
            (index == SR && lazy_flags(device));
 }
 
+/* Whether a store changes a CCRx that waited for the update event already, and waits on: but for its word nothing does.
+ * That event is one in the queue, so all that came before the store has been done.
+ */
+static bool waits_on(const struct device *device, uint32_t index, uint32_t before, uint32_t after)
+{
+    const struct tim *tim = tim_of(device);
+    if (index < CCR1 || index > CCR4 || is_input(device, index - CCR1) || !is_preloaded(device, index - CCR1)) {
+        return false;
+    }
+    const uint32_t active = tim->ccr[index - CCR1];
+    return tim->ramp.runs && !tim->is_stopped && before != active && after != active;
+}
+
+static bool store_needs_time(const struct device *device, uint32_t index, uint32_t written)
+{
+    return !waits_on(device, index, device->words[index], written & 0xFFFF);
+}
+
 static uint32_t read(struct device *device, uint32_t index)
 {
     struct tim *tim = tim_of(device);
@@ -351,9 +369,32 @@ static void take(struct device *device, uint32_t index, uint32_t written, uint32
     }
 }
 
+/* Whether a store to a CCRx changes its wave alone: nobody sees a match, the flag of one is up already, so that the
+ * matches since the last look change nothing, and all stops are as they were.
+ */
+static bool changes_wave_alone(const struct device *device, uint32_t index)
+{
+    const struct tim *tim = tim_of(device);
+    if (index < CCR1 || index > CCR4 || tim->is_advanced || tim->is_busy || tim->is_stopped || !tim->ramp.runs) {
+        return false;
+    }
+    const uint32_t n = index - CCR1;
+    return !is_input(device, n) && !is_preloaded(device, n) && mode_of(device, n) >= PWM1 && !tim->cleared &&
+           tim->at >= tim->ramp.base && device->words[SR] & CC1IF << n && !sees_channel(device, n) &&
+           due_ns(device) > now_ns(device->fabric);
+}
+
 static void write(struct device *device, uint32_t index, uint32_t written, uint32_t previous)
 {
     uint32_t *words = device->words;
+    if (waits_on(device, index, previous, words[index])) {
+        return;
+    }
+    if (changes_wave_alone(device, index)) {
+        tim_of(device)->ccr[index - CCR1] = words[index];
+        show_output(device, index - CCR1);
+        return;
+    }
     const uint32_t stored = words[index], kept = kept_bits(device, index);
     words[index] = previous;
     synchronize(device, tick_now(device));
@@ -492,5 +533,5 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
     return 0;
 }
 
-DEVICE_KIND(tim_kind) = {.name = "tim", .needs_time = needs_time, .read = read, .write = write, .event = event,
+DEVICE_KIND(tim_kind) = {.name = "tim", .needs_time = needs_time, .store_needs_time = store_needs_time, .read = read, .write = write, .event = event,
                          .hears = hears_line, .line = take_line, .pins = take_pins, .command = command};

@@ -92,6 +92,8 @@ void reinitialize(struct device *device);
 void channel_event(struct device *device, uint32_t channel);
 /* Ticks at which something happens that somebody sees; NO_TIME for none. */
 uint64_t next_count_stop(const struct device *device);
+/* Whether anybody sees a match of a channel, or its OCxREF by TRGO. */
+bool sees_channel(const struct device *device, uint32_t channel);
 /* The first and the number of the phases at which OCxREF of PWM is 1, in a lap of the counter. */
 struct lap {
     uint64_t period, phase, first, active;
@@ -112,6 +114,8 @@ static inline uint64_t tick_after(const struct tim *tim, uint64_t counts)
 bool reference(const struct device *device, uint32_t channel);
 void note_references(struct device *device);
 void show_outputs(struct device *device);
+/* Of one channel alone, without its complement. */
+void show_output(struct device *device, uint32_t channel);
 uint64_t next_output_stop(const struct device *device);
 /* Takes outputs to their idle states, or back. */
 void set_moe(struct device *device, bool is_on);

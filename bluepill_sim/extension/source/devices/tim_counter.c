@@ -331,6 +331,11 @@ static bool is_match_seen(const struct device *device, uint32_t channel)
            is_heard(device, CC_EVENT + channel);
 }
 
+bool sees_channel(const struct device *device, uint32_t channel)
+{
+    return is_match_seen(device, channel) || master_mode(device) == MASTER_REFERENCE + channel;
+}
+
 /* Whether a match changes OCxREF in a way that no wave shows. */
 static bool is_change_seen(const struct device *device, uint32_t channel, bool is_trigger)
 {

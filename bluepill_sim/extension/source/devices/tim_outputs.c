@@ -252,6 +252,8 @@ void show_outputs(struct device *device)
     }
 }
 
+void show_output(struct device *device, uint32_t channel) { show(device, channel, output_shape(device, channel, false)); }
+
 uint64_t next_output_stop(const struct device *device)
 {
     const struct tim *tim = tim_of(device);

@@ -233,6 +233,7 @@ struct fabric {
     uint32_t memory_count;
     uint32_t master; /* the slot of the device that makes an access; SLOTS for none */
     struct subscriber subscribers[SUBSCRIBERS];
+    uint32_t subscribers_end; /* none is used from here on */
     struct pin_listener listeners[SLOTS]; /* a device has a slot */
     struct device devices[SLOTS];
 };
@@ -276,6 +277,8 @@ static inline uint64_t ns_of_tick(const struct ticks *ticks, uint64_t tick)
     return ticks->ns + (uint64_t)((__uint128_t)(tick - ticks->tick) * NS_PER_S / ticks->hz);
 }
 
+/* The first cycle that begins at or after a time. */
+uint64_t cycle_at(struct fabric *fabric, uint64_t ns);
 /* Has the device's event come at a time; NO_TIME takes it back. */
 void schedule(struct device *device, uint64_t ns);
 static inline uint64_t due_ns(const struct device *device) { return device->fabric->slots[device->slot].ns; }

@@ -550,6 +550,20 @@ struct inputs {
 };
 _Static_assert(sizeof(struct inputs) == 16400, "inputs");
 
+/* Levels of CAN's pins to come: rows whose drive is TX and whose wire is RX, those from `first` on. */
+struct can_bits {
+    uint32_t first;
+    uint32_t count;
+    uint32_t tx_pin;
+    uint32_t source;
+    uint32_t rx_pin;
+    uint32_t is_offered;
+    uint32_t tx;
+    uint32_t padding;
+    struct edge rows[192];
+};
+_Static_assert(sizeof(struct can_bits) == 3104, "can_bits");
+
 /* A word that has gone out, when, and how: clock and divider, and what else its device says of its format. */
 struct sent {
     uint64_t ns;

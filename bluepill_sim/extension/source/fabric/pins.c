@@ -52,7 +52,7 @@ static RARELY void tell_subscribers(struct fabric *fabric, uint32_t number, uint
     const struct port *port = &fabric->ports[number];
     const uint64_t ns = now_ns(fabric);
     bool ends_slice = false;
-    for (uint32_t n = 0; n < SUBSCRIBERS; ++n) {
+    for (uint32_t n = 0; n < fabric->subscribers_end; ++n) {
         struct subscriber *one = &fabric->subscribers[n];
         const uint32_t wanted = (drives & one->drive[number]) | (wires & one->wire[number]);
         for (uint32_t left = wanted; left; left &= left - 1) {
@@ -225,6 +225,10 @@ void listen_to_pins(struct device *device, uint32_t port, uint32_t pins)
 
 static void sum_up(struct fabric *fabric)
 {
+    fabric->subscribers_end = 0;
+    for (uint32_t n = 0; n < SUBSCRIBERS; ++n) {
+        fabric->subscribers_end = fabric->subscribers[n].is_used ? n + 1 : fabric->subscribers_end;
+    }
     for (uint32_t port = 0; port < PORTS; ++port) {
         fabric->subscribed[port] = 0;
         for (uint32_t n = 0; n < SUBSCRIBERS; ++n) {

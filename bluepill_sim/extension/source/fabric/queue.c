@@ -11,7 +11,7 @@ static uint64_t cycle_within(const struct time_base *time, uint64_t ns)
     return time->second_cycle + ((ns - time->second_ns) * time->hz + NS_PER_S - 1) / NS_PER_S;
 }
 
-static uint64_t cycle_at(struct fabric *fabric, uint64_t ns)
+uint64_t cycle_at(struct fabric *fabric, uint64_t ns)
 {
     struct time_base *time = &fabric->time;
     if (ns - time->second_ns < NS_PER_S) {

@@ -117,7 +117,7 @@ static void schedule_edges(struct fabric *fabric)
             due = one->is_made && one->next_ns < due ? one->next_ns : due;
         }
     }
-    for (uint32_t n = 0; n < SUBSCRIBERS; ++n) { /* before more rows wait than may */
+    for (uint32_t n = 0; n < fabric->subscribers_end; ++n) { /* before more rows wait than may */
         const struct subscriber *one = &fabric->subscribers[n];
         uint64_t edges_a_second = 0;
         for (uint32_t k = 0; k < one->expanded_count; ++k) {
@@ -137,7 +137,7 @@ void make_edges_where_wanted(struct fabric *fabric)
     for (uint32_t number = 0; number < PORTS; ++number) {
         struct port *port = &fabric->ports[number];
         uint32_t wanted = fabric->listened[number];
-        for (uint32_t n = 0; n < SUBSCRIBERS; ++n) {
+        for (uint32_t n = 0; port->shown && n < fabric->subscribers_end; ++n) {
             const struct subscriber *one = &fabric->subscribers[n];
             wanted |= one->stop[number] & (one->drive[number] | one->wire[number]);
         }
@@ -298,11 +298,11 @@ RARELY uint32_t show_waves(struct fabric *fabric, uint32_t number, const struct 
             continue;
         }
         changed |= 1u << at;
-        for (uint32_t n = 0; n < SUBSCRIBERS; ++n) {
+        for (uint32_t n = 0; n < fabric->subscribers_end; ++n) {
             expand_waves(fabric, &fabric->subscribers[n], ns);
         }
         *shown = is;
-        for (uint32_t n = 0; n < SUBSCRIBERS; ++n) {
+        for (uint32_t n = 0; n < fabric->subscribers_end; ++n) {
             struct subscriber *one = &fabric->subscribers[n];
             if (has_subscribed(one, pin)) {
                 const bool level = stop_expanding(one, pin);
@@ -335,7 +335,7 @@ void show_to(struct fabric *fabric, struct subscriber *subscriber)
 /* A state was put back: what the pins show follows from it. */
 void fabric_resume(struct fabric *fabric)
 {
-    for (uint32_t n = 0; n < SUBSCRIBERS; ++n) {
+    for (uint32_t n = 0; n < fabric->subscribers_end; ++n) {
         fabric->subscribers[n].expanded_count = 0;
     }
     const uint64_t ns = now_ns(fabric);
@@ -348,7 +348,7 @@ void fabric_resume(struct fabric *fabric)
             fabric->shown[PINS * number + at] = showing(fabric, port, &low, &high, at);
         }
     }
-    for (uint32_t n = 0; n < SUBSCRIBERS; ++n) {
+    for (uint32_t n = 0; n < fabric->subscribers_end; ++n) {
         show_to(fabric, &fabric->subscribers[n]);
     }
     make_edges_where_wanted(fabric);
@@ -378,7 +378,7 @@ static void event(struct device *device, uint64_t ns)
         if ((before ^ port->input) & fabric->listened[number]) {
             tell_listeners(fabric, number, before ^ port->input);
         }
-        for (uint32_t n = 0; n < SUBSCRIBERS; ++n) {
+        for (uint32_t n = 0; n < fabric->subscribers_end; ++n) {
             const struct subscriber *one = &fabric->subscribers[n];
             for (uint32_t left = due & one->stop[number]; left; left &= left - 1) {
                 const uint32_t pin = PINS * number + (uint32_t)__builtin_ctz(left);
@@ -389,7 +389,7 @@ static void event(struct device *device, uint64_t ns)
             }
         }
     }
-    for (uint32_t n = 0; n < SUBSCRIBERS; ++n) {
+    for (uint32_t n = 0; n < fabric->subscribers_end; ++n) {
         expand_waves(fabric, &fabric->subscribers[n], ns);
     }
     schedule_edges(fabric);

@@ -1,5 +1,5 @@
 /* A test device, no firmware: moves a word from a register to SRAM, a million times a second of its clock. */
-#include "../../bluepill_sim/extension/source/fabric/fabric.h"
+#include "../../../../bluepill_sim/extension/source/fabric/fabric.h"
 
 enum { FROM, TO, COUNT, ERRORS, BASE_LOW, BASE_HIGH, MOVED };
 enum { RATE_HZ = 1000000 };
