@@ -148,7 +148,8 @@ def fit(
         if not hidden:
             if count <= len(seen):
                 raise FileError(
-                    f"{count} pieces of the drive are too few for {len(seen)} parameters", hint="a longer drive"
+                    f"{count} pieces of the drive are too few for {len(seen)} parameters",
+                    hint="a longer drive, with more speeds and turns",
                 )
             return _result(part, solution, unseen, _Clusters(clusters, count, len(seen), lags), rounding)
         names = " and ".join(one.name for one in hidden)

@@ -86,14 +86,14 @@ def fit_ramps(drives: Sequence[Drive]) -> Fit:
         Parameter(name="turn_gain", start=1.0, scale=0.05, least=0.5, most=2.0),
         Parameter(name="reversal_s", start=0.005, scale=0.02, least=0.0, most=0.5),
     ]
-    speeds = np.concatenate([one.speeds.ravel() for one in told])
+    speeds: Floats = np.concatenate([one.speeds.ravel() for one in told])
     grain = grain_of(speeds)
 
     def model(values: Floats) -> Floats:
         return np.asarray(np.concatenate([one.model(values).ravel() for one in told]), dtype=np.float64)
 
     def residuals(values: Floats) -> Floats:
-        return model(values) - speeds
+        return np.asarray(model(values) - speeds, dtype=np.float64)
 
     def redrawn(values: Floats, random: np.random.Generator) -> Floats:
         exact = model(values)
@@ -145,7 +145,7 @@ class _Told:
         ahead = gain * ramped(self.vel, times, faster, slower, reversal) / 1000
         turn = np.radians(ramped(self.rvel, times, turn_faster, turn_slower, reversal))
         around = turn_gain * self.lever_m * turn
-        return np.stack((ahead - around, ahead + around), axis=1)
+        return np.asarray(np.stack((ahead - around, ahead + around), axis=1), dtype=np.float64)
 
     def held_steps(self) -> Floats:
         """Return the differences of neighbours late in a manoeuvre, its second half, where ramps are mostly over."""

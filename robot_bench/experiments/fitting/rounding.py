@@ -17,15 +17,19 @@ from robot_bench.drives.drive import Floats
 _DEVIATIONS = np.linspace(0.0, 1.0, 201)
 #: chosen: terms of the sum; the next has 1/5000 of the first.
 _TERMS = 70
-#: Less than this part of a reading's size is no grain, but how numbers are held.
-_LEAST_PART = 1e-9
+#: chosen: less than this part of the largest reading is no grain: a wire has 16 bits.
+_LEAST_PART = 1e-6
 
 
 def grain_of(values: Floats) -> float:
-    """Return the least difference between readings that differ, in their unit; 0 where all are alike."""
-    apart = np.diff(np.unique(values))
-    apart = apart[apart > _LEAST_PART * np.abs(values).max(initial=0.0)]
-    return float(apart.min(initial=np.inf)) if len(apart) else 0.0
+    """Return of what all readings are multiples, in their unit: Euclid's algorithm; 0 where there is no such grain."""
+    sizes = np.unique(np.abs(values))
+    grain, least = 0.0, _LEAST_PART * float(sizes.max(initial=0.0))
+    for size in sizes.tolist():
+        other = size
+        while other > least:
+            grain, other = other, abs(grain - other * round(grain / other))
+    return grain if grain > 2 * least else 0.0
 
 
 def noise_before(variance: float, grain: float) -> float:

@@ -173,9 +173,14 @@ def test_noise_before_the_rounding_is_known_by_how_held_values_scatter(deviation
     assert noise_before(variance, 2.0) == pytest.approx(2 * deviation, rel=0.1, abs=0.02)
 
 
+@pytest.mark.parametrize(("grain", "counts"), [(1e-3, [300, -150, 97]), (0.0268, [0, 40, 41, -3000]), (5.0, [0, 1])])
+def test_the_grain_is_of_what_all_readings_are_multiples(grain: float, counts: list[int]) -> None:
+    assert grain_of(np.array(counts) * grain) == pytest.approx(grain)
+
+
 def test_what_is_not_rounded_has_no_grain() -> None:
     assert grain_of(np.zeros(3)) == 0.0
-    assert grain_of(np.array([0.1, 0.1 + 1e-16, 0.1])) == 0.0
+    assert grain_of(np.random.default_rng(1).normal(0, 1, 50)) == 0.0
     assert noise_before(4.0, 0.0) == 2.0
 
 

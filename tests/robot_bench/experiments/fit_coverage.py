@@ -1,8 +1,8 @@
 """How often the 95 % intervals of `p2os fit` hold, and whether they are as wide as they need be.
 
-    python -m tools.fit_coverage                         # 200 robots as P2OS tells of them
-    python -m tools.fit_coverage --robots 50 --make rays
-    python -m tools.fit_coverage --make all              # each make of tests/.../synthetic_robots.py
+    python -m tests.robot_bench.experiments.fit_coverage                # 200 robots as P2OS tells of them
+    python -m tests.robot_bench.experiments.fit_coverage --robots 50 --make rays
+    python -m tests.robot_bench.experiments.fit_coverage --make all     # each of MAKES
 
 A fresh robot with planted errors drives a minute; its intervals hold or do not. A line has how many hold, the median
 half width, the 95 % error of the estimates over all robots, and the first over the second: an interval that is honest
@@ -96,10 +96,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     chosen = parser.parse_args(arguments)
     are_true = True
     for make in MAKES if chosen.make == "all" else [chosen.make]:
-        print(f"{make}: {chosen.robots} robots")
-        print(f"{'group':8}{'parameter':18}{'seen':>5}{'covered':>8}{'half width':>12}{'95 % error':>12}{'ratio':>7}")
+        sys.stdout.write(f"{make}: {chosen.robots} robots\n")
+        titles = f"{'group':8}{'parameter':18}{'seen':>5}{'covered':>8}{'half width':>12}{'95 % error':>12}{'ratio':>7}"
+        sys.stdout.write(f"{titles}\n")
         for row in coverage(make, range(chosen.robots)):
-            print(row.line())
+            sys.stdout.write(f"{row.line()}\n")
             are_true &= row.is_true
     return 0 if are_true else 1
 
