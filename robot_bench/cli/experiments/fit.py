@@ -57,6 +57,7 @@ SHOWN: dict[str, tuple[str, str, float, int]] = {
     "rot_decel_deg_s2": ("turning down", "deg/s²", 1.0, 1),
     "speed_gain": ("speed told over commanded", "", 1.0, 4),
     "turn_gain": ("turn told over commanded", "", 1.0, 4),
+    "reversal_s": ("stands before it reverses", "ms", 1000.0, 1),
     "cone_deg": ("sonar cone", "deg", 1.0, 2),
     "sonar_offset_m": ("sonar offset", "mm", 1000.0, 1),
     "sonar_delay_s": ("sonar readings are old by", "ms", 1000.0, 1),

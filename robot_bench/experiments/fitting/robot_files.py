@@ -16,7 +16,9 @@ _ROBOT: Mapping[str, tuple[str, str]] = {
 }  # fmt: skip
 _WHEELS = ("left_wheel", "right_wheel")
 _NOISE = ("noise_m", "noise_part")
-_NOT_HELD = ("command_delay_s", "packet_delay_s", "sonar_delay_s", "sonar_offset_m", "speed_gain", "turn_gain")
+_NOT_HELD = (
+    "command_delay_s", "packet_delay_s", "sonar_delay_s", "sonar_offset_m", "speed_gain", "turn_gain", "reversal_s",
+)  # fmt: skip
 
 
 def robot_text(base: str, parameters: RobotParameters, found: Mapping[str, Estimate]) -> str:

@@ -1,48 +1,62 @@
 """The sonar's cone and noise, from readings beside poses in a known world.
 
-A reading is the nearest echo of as many rays over the cone as a virtual sonar has, in the plane of the ring, of what
-stands in the world as it was at the start; `sonar_delay_s` before its packet came the robot was where it was taken.
-Readings at either end of the range, and those far from what the model says (lost echoes, another sonar's, things that
-moved), are left out.
+A reading is the nearest echo within the cone, in the plane of the ring, of what stands in the world as it was at the
+start; `sonar_delay_s` before its packet came the robot was where it was taken. A virtual sonar is a fan of rays, a real
+one hears a whole sector: that of both is taken with which the readings are off less.
+
+Where a thing comes into the cone or leaves it, a reading jumps. So cone and delay are tried on a grid, and intervals
+are those of resamples (`resampling`). Readings at either end of the range are left out, and those far from what the
+model says (lost echoes, another sonar's, things that moved) count as off by no more than others may be.
 
 What is not modelled: surfaces that send no echo back by their angle, and reflections.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from p2os.pioneer.sonar.ring import RAYS_PER_CONE
 from p2os.pioneer.world.model import World
 from p2os.pioneer.world.plan import Plan
 from p2os.robots.parameters import RobotParameters
 from robot_bench.drives.drive import Drive, Floats, Trajectory
+from robot_bench.experiments.fitting.echoes import SHAPES, Bearings
 from robot_bench.experiments.fitting.least_squares import Fit, Parameter, fit
+from robot_bench.experiments.fitting.resampling import best_of_resamples, estimate_of
 from simbase.errors import FileError
 
 #: chosen: sides of a polygon in the place of a cylinder; it is flatter than the circle by 0.1 % of the radius.
 SIDES = 64
-#: chosen: of more readings every second, third and so on is taken; in the search for a start, too.
-MOST_READINGS, START_READINGS = 1500, 150
-#: chosen: so many rays and walls are crossed in one step, of some 100 kB an array.
-MOST_AT_ONCE = 16_384
-#: As many answers of the model are kept as one look at all slopes asks for.
-MOST_KNOWN = 4
-#: chosen: where the search for the delay begins, seconds; and how often outliers are looked for.
-START_S, MOST_ROUNDS = 0.05, 4
-#: chosen: what differs by more than four deviations of the readings as far, and by 1 cm, is another echo.
+#: chosen: of more readings of a drive every second, third and so on is taken; fewer in all are too few.
+MOST_READINGS, LEAST_READINGS = 1500, 20
+#: chosen: readings that depend on each other lie within so many seconds, a manoeuvre; fewer blocks are too few.
+BLOCK_S, LEAST_BLOCKS = 2.0, 4
+#: chosen: where the search for the delay begins, seconds.
+START_S = 0.05
+#: Cones that are thought of, degrees: a ping goes ahead.
+LEAST_DEG, MOST_DEG = 0.2, 180.0
+#: chosen: what is tried in turn, cones first, each about the best of before: degrees (at first from 0), seconds.
+STEPS: tuple[tuple[Floats, Floats], ...] = (
+    (np.arange(2.0, 92.0, 2.0), np.arange(-0.25, 1.0, 0.05)),
+    (np.arange(-2.0, 2.05, 0.2), np.arange(-0.05, 0.051, 0.01)),
+    (np.arange(-0.4, 0.41, 0.1), np.arange(-0.01, 0.011, 0.002)),
+)
+#: chosen: cones and delays of the grid, and how far it reaches to either side at first, degrees and seconds.
+GRID, NEAR_DEG, NEAR_S = (25, 13), 2.0, 0.03
+#: chosen: it is to reach four deviations of what resamples come to; so much more or less is well, so often it is moved.
+SPREADS, LEAST_FILLED, MOST_FILLED, MOST_ROUNDS = 4.0, 0.4, 1.3, 6
+#: chosen: more than four deviations of the readings as far, and 1 cm, is another echo.
 OUTLIER_DEVIATIONS, OUTLIER_M, BINS = 4.0, 0.01, 5
 #: chosen: in the search for a start no reading counts for more than this, metres: what meets another thing is far off.
 MOST_OFF_M = 0.1
 #: A reading's grain, evenly spread: about 1 mm.
 GRAIN_M = 1e-3 / 12**0.5
-#: Degrees that are tried before the search, and then around the best of them: a thing that comes into the cone or
-#: leaves it makes a jump, over which no search by slopes leads.
-CONES_DEG, NEAR_DEG = np.arange(2.0, 92.0, 2.0), np.arange(-2.0, 2.05, 0.1)
+#: chosen: how much each could plausibly be off.
+SCALES = {"cone_deg": 10.0, "sonar_delay_s": 0.1, "sonar_offset_m": 0.02}
 WHY = "it takes walls seen at an angle from many poses"
-#: The deviation of a normal variable over the mean of its size.
-_DEVIATION_PER_SIZE = (np.pi / 2) ** 0.5
+#: A normal variable's deviation over the mean of its size, and over the median of it.
+_PER_MEAN, _PER_MEDIAN = (np.pi / 2) ** 0.5, 1.4826
 
 
 def walls_of(world: World, parameters: RobotParameters) -> Floats:
@@ -57,39 +71,14 @@ def walls_of(world: World, parameters: RobotParameters) -> Floats:
     return np.array(rows, dtype=np.float64).reshape(-1, 4)
 
 
-def nearest(walls: Floats, x: Floats, y: Floats, headings: Floats, longest_m: float) -> Floats:
-    """Return the nearest echo of fans of rays.
-
-    Args:
-        walls: Shape (m, 4).
-        x: Where each fan begins, shape (n,), metres.
-        y: Likewise.
-        headings: Shape (n, k), radians.
-        longest_m: What a fan returns that meets nothing.
-    """
-    found = np.full(headings.shape, longest_m)
-    c, s = np.cos(headings), np.sin(headings)
-    at_once = max(1, MOST_AT_ONCE // max(1, headings.size))
-    for first in range(0, len(walls), at_once):
-        ax, ay, bx, by = walls[first : first + at_once].T[:, :, None]
-        ex, ey, fx, fy = bx - ax, by - ay, ax - x, ay - y
-        with np.errstate(divide="ignore", invalid="ignore"):  # a ray along a wall meets it nowhere
-            part = 1 / (c * ey[:, None] - s * ex[:, None])
-            along = (fx * ey - fy * ex)[:, :, None] * part
-            place = (fx[:, :, None] * s - fy[:, :, None] * c) * part
-            hit = (along > 0) & (place >= 0) & (place <= 1)
-        np.minimum(found, np.where(hit, along, longest_m).min(axis=0), out=found)
-    return np.asarray(found.min(axis=1), dtype=np.float64)
-
-
 class _Readings:
     """Every usable reading of some drives: when, of which sonar, what."""
 
     def __init__(self, drives: Sequence[Drive], walls: Floats) -> None:
         parameters = drives[0].parameters
         self._walls, self._longest_m = walls, parameters.sonar_range_m
-        self._drives: list[tuple[Trajectory, Floats, Floats, Floats]] = []
-        ranges = []
+        self._drives: list[tuple[Trajectory, Floats, Floats]] = []
+        ranges, blocks = [], list[npt.NDArray[np.int64]]()
         for drive in drives:
             rows = [
                 (t, number, metres)
@@ -104,57 +93,42 @@ class _Readings:
             sonar = np.array([(at.x_mm / 1000, at.y_mm / 1000, np.radians(at.heading_deg)) for at in places]).reshape(
                 -1, 3
             )
-            self._drives.append((drive.body, t, sonar, metres))
+            self._drives.append((drive.body, t, sonar))
             ranges.append(metres)
+            blocks.append((t // BLOCK_S).astype(np.int64) + (blocks[-1].max(initial=0) + 1 if blocks else 0))
         self.metres = np.concatenate(ranges)
-        self.kept = np.ones(len(self.metres), dtype=np.bool_)
-        #: Of which readings and delay `_sonars` was asked last, and what it found.
-        self._placed: tuple[tuple[bytes, float], Floats] = (b"", 0.0), np.empty((3, 0))
-        #: What the model said last, by readings, cone and delay: slopes are asked of one after the other.
-        self._known: dict[tuple[bytes, float, float], Floats] = {}
-        self._some = np.arange(len(self.metres)) % (1 + len(self.metres) // START_READINGS) == 0
+        #: Of each reading the number of its block, from 0, rising; and how many there are.
+        self.blocks = np.unique(np.concatenate(blocks), return_inverse=True)[1]
+        self.count = int(self.blocks.max(initial=-1)) + 1
 
-    def expected(self, cone_deg: float, delay_s: float) -> Floats:
-        """Return what the model says of each kept reading."""
-        return self._expected(self.kept, cone_deg, delay_s)
+    def off(self, shape: str, cones_deg: Floats, delays_s: Floats) -> Floats:
+        """Return how much farther than the model says each reading is: shape (delays, cones, n), metres."""
+        halves = np.radians(cones_deg) / 2
+        found = [SHAPES[shape](self._bearings(delay, float(halves.max())), halves) for delay in delays_s.tolist()]
+        return self.metres - np.asarray(found, dtype=np.float64)
 
-    def _expected(self, which: npt.NDArray[np.bool_], cone_deg: float, delay_s: float) -> Floats:
-        asked = which.tobytes(), delay_s, cone_deg
-        if (known := self._known.get(asked)) is not None:
-            return known
-        x, y, heading = self._sonars(which, delay_s)
-        spread = np.radians(cone_deg) / 2 * np.linspace(-1, 1, RAYS_PER_CONE)
-        found = nearest(self._walls, x, y, heading[:, None] + spread, self._longest_m)
-        self._known = dict([*self._known.items(), (asked, found)][-MOST_KNOWN:])
-        return found
+    def off_at(self, found: "_Found") -> Floats:
+        """Return the same at one place: shape (n,)."""
+        return np.asarray(self.off(found.shape, np.array([found.cone_deg]), np.array([found.delay_s]))[0, 0])
 
-    def _sonars(self, which: npt.NDArray[np.bool_], delay_s: float) -> Floats:
-        """Return where some readings were taken: shape (3, n), metres and radians; what was asked last is known."""
-        asked = which.tobytes(), delay_s
-        if asked != self._placed[0]:
-            self._placed = asked, self._place(which, delay_s)
-        return self._placed[1]
-
-    def _place(self, which: npt.NDArray[np.bool_], delay_s: float) -> Floats:
-        found, begin = [], 0
-        for body, t, sonar, _ in self._drives:
-            these = which[begin : begin + len(t)]
-            begin += len(t)
-            x, y, heading = (np.interp(t[these] - delay_s, body.t_s, column)
+    def _bearings(self, delay_s: float, widest_rad: float) -> Bearings:
+        found = []
+        for body, t, sonar in self._drives:
+            x, y, heading = (np.interp(t - delay_s, body.t_s, column)
                              for column in (body.x_m, body.y_m, body.heading_rad))  # fmt: skip
-            px, py, turn = sonar[these].T
+            px, py, turn = sonar.T
             c, s = np.cos(heading), np.sin(heading)
             found.append(np.array([x + c * px - s * py, y + s * px + c * py, heading + turn]))
-        return np.concatenate(found, axis=1)
+        return Bearings.of(self._walls, np.concatenate(found, axis=1), widest_rad, self._longest_m)
 
-    def best_of(self, cones_deg: Floats) -> float:
-        """Return the cone with which some readings are off least, in the mean."""
-        x, y, heading = np.tile(self._sonars(self._some, START_S), len(cones_deg))
-        spreads = np.radians(cones_deg)[:, None] / 2 * np.linspace(-1, 1, RAYS_PER_CONE)
-        fans = heading[:, None] + np.repeat(spreads, len(heading) // len(cones_deg), axis=0)
-        found = nearest(self._walls, x, y, fans, self._longest_m).reshape(len(cones_deg), -1)
-        off = np.minimum(np.abs(found - self.metres[self._some]), MOST_OFF_M).mean(axis=1)
-        return float(cones_deg[np.argmin(off)])
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Found:
+    """Where a search has come to: the shape of a ping, a cone and a delay."""
+
+    shape: str
+    cone_deg: float
+    delay_s: float
 
 
 def fit_sonar(drives: Sequence[Drive], walls: Floats) -> Fit:
@@ -168,52 +142,121 @@ def fit_sonar(drives: Sequence[Drive], walls: Floats) -> Fit:
         FileError: There are hardly any readings.
     """
     readings = _Readings(drives, walls)
-    if len(readings.metres) < 20:
-        raise FileError(f"{len(readings.metres)} sonar readings within range are too few", hint="nearer to walls")
-    start = readings.best_of(readings.best_of(CONES_DEG) + NEAR_DEG)
-    for _ in range(MOST_ROUNDS):
-        found, noise, off = _fit_kept(readings, start)
-        far = off > _most(readings.metres[readings.kept], off)
-        if not far.any():
+    if len(readings.metres) < LEAST_READINGS or readings.count < LEAST_BLOCKS:
+        raise FileError(
+            f"{len(readings.metres)} sonar readings within range in {BLOCK_S * readings.count:.0f} s are too few",
+            hint="nearer to walls, or longer",
+        )
+    best = _shaped(readings, [_searched(readings, shape) for shape in SHAPES])
+    hidden = _hidden(readings, best)
+    while True:
+        found = _resampled(readings, best, hidden)
+        wide = [name for name, values in found.values.items() if name not in hidden and values.std() > SCALES[name]]
+        if not wide:
             break
-        readings.kept[np.flatnonzero(readings.kept)[far]] = False
-    return Fit(
-        estimates=found.estimates | noise.estimates, unseen=found.unseen | noise.unseen, residual=found.residual,
-        count=found.count,
-    )  # fmt: skip
-
-
-def _most(metres: Floats, off: Floats) -> Floats:
-    """Return how far each reading may be off, by the median of those about as far."""
-    place = np.argsort(np.argsort(metres)) * BINS // len(metres)
-    deviations = np.array([1.4826 * float(np.median(off[place == number])) for number in range(BINS)])
-    return np.asarray(np.maximum(OUTLIER_DEVIATIONS * deviations[place], OUTLIER_M))
-
-
-def _fit_kept(readings: _Readings, start: float) -> tuple[Fit, Fit, Floats]:
-    """Return what the kept readings say of the geometry and of the noise, and by how much each is off, metres."""
-    measured = readings.metres[readings.kept]
-
-    def residuals(values: Floats) -> Floats:
-        cone, offset, delay = values
-        off: Floats = readings.expected(float(cone), float(delay)) + offset - measured
-        return off
-
-    parameters = [
-        Parameter(name="cone_deg", start=start, scale=10.0, least=0.2, most=180.0),
-        Parameter(name="sonar_offset_m", start=0.0, scale=0.02, least=-0.5, most=0.5),
-        Parameter(name="sonar_delay_s", start=START_S, scale=0.1, least=-0.2, most=1.0),
-    ]
-    numbers = np.arange(len(measured))
-    found = fit(residuals, parameters, numbers, floor=GRAIN_M, why=WHY)
-    best = [found.estimates[one.name].value if one.name in found.estimates else one.start for one in parameters]
-    off = np.abs(residuals(np.array(best)))
+        hidden += wide
+    estimates = {
+        name: estimate_of(name, values, readings.count) for name, values in found.values.items() if name not in hidden
+    }
+    off, kept = found.off, found.kept
     noise = fit(
-        lambda values: values[0] + values[1] * measured - off * _DEVIATION_PER_SIZE,
+        lambda values: values[0] + values[1] * readings.metres[kept] - np.abs(off[kept]) * _PER_MEAN,
         [
             Parameter(name="noise_m", start=0.01, scale=0.02, least=0.0, most=1.0),
             Parameter(name="noise_part", start=0.001, scale=0.02, least=0.0, most=1.0),
         ],
-        numbers, floor=GRAIN_M, why="it takes readings near and far",
+        readings.blocks[kept], floor=GRAIN_M, why="it takes readings near and far",
     )  # fmt: skip
-    return found, noise, off
+    return Fit(
+        estimates=estimates | noise.estimates, unseen=dict.fromkeys(hidden, WHY) | noise.unseen,
+        residual=float(np.sqrt(np.mean(off[kept] ** 2))), count=int(kept.sum()),
+    )  # fmt: skip
+
+
+def _searched(readings: _Readings, shape: str) -> _Found:
+    """Return the cone and the delay with which readings are off least: one after the other, ever finer."""
+    cone, delay = 0.0, START_S
+    for cones, delays in STEPS:
+        tried = (cone + cones)[(cone + cones >= LEAST_DEG) & (cone + cones <= MOST_DEG)]
+        cone = float(tried[_squares(readings.off(shape, tried, np.array([delay]))[0], MOST_OFF_M).argmin()])
+        tried = delay + delays
+        delay = float(tried[_squares(readings.off(shape, np.array([cone]), tried)[:, 0], MOST_OFF_M).argmin()])
+    return _Found(shape=shape, cone_deg=cone, delay_s=delay)
+
+
+def _squares(off: Floats, most: Floats | float) -> Floats:
+    """Return the sums of squares, of which none is of more than its most."""
+    return np.asarray(np.sum(np.minimum(np.abs(off), most) ** 2, axis=-1), dtype=np.float64)
+
+
+def _shaped(readings: _Readings, found: Sequence[_Found]) -> _Found:
+    """Return that with which readings are off least, each by no more than it may with the better one."""
+    offs = [off - np.median(off) for off in map(readings.off_at, found)]
+    most = np.min([_most(readings.metres, off) for off in offs], axis=0)
+    return found[int(np.argmin([float(_squares(off, most)) for off in offs]))]
+
+
+def _most(metres: Floats, off: Floats) -> Floats:
+    """Return how far each reading may be off, by the median of those about as far."""
+    place, sizes = np.argsort(np.argsort(metres)) * BINS // len(metres), np.abs(off)
+    deviations = np.array([_PER_MEDIAN * float(np.median(sizes[place == number])) for number in range(BINS)])
+    return np.asarray(np.maximum(OUTLIER_DEVIATIONS * deviations[place], OUTLIER_M))
+
+
+def _hidden(readings: _Readings, best: _Found) -> list[str]:
+    """Return which of cone and delay could be as much off as is plausible, and the readings say less of it."""
+    steps = np.array([0.0, -1.0, 1.0])
+    cones = np.clip(best.cone_deg + steps * SCALES["cone_deg"], LEAST_DEG, MOST_DEG)
+    delays = best.delay_s + steps * SCALES["sonar_delay_s"]
+    rows = readings.off(best.shape, cones, delays[:1])[0], readings.off(best.shape, cones[:1], delays)[:, 0]
+    hidden = []
+    for name, off in zip(("cone_deg", "sonar_delay_s"), rows, strict=True):
+        left = off - np.median(off, axis=1)[:, None]
+        least, *others = _squares(left, _most(readings.metres, left[0]))
+        if min(others) - least < max(_PER_MEDIAN * float(np.median(np.abs(left[0]))), GRAIN_M) ** 2:
+            hidden.append(name)
+    return hidden
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Resampled:
+    """What resampled readings come to."""
+
+    #: Parameter → its value in each resample.
+    values: dict[str, Floats]
+    #: By how much each reading is off with their means, and whether that counts as noise.
+    off: Floats
+    kept: npt.NDArray[np.bool_]
+
+
+def _resampled(readings: _Readings, best: _Found, hidden: Collection[str]) -> _Resampled:
+    """Return with which cone, delay and offset each resample is off least; the grid follows what comes of them."""
+    names = ("cone_deg", "sonar_delay_s")
+    at = {"cone_deg": best.cone_deg, "sonar_delay_s": best.delay_s}
+    reach = {name: 0.0 if name in hidden else near for name, near in zip(names, (NEAR_DEG, NEAR_S), strict=True)}
+    off = readings.off_at(best)
+    most = _most(readings.metres, off - np.median(off))
+    for _ in range(MOST_ROUNDS):
+        cones, delays = (
+            np.unique(at[name] + reach[name] * np.linspace(-1, 1, count))
+            for name, count in zip(names, GRID, strict=True)
+        )
+        cones = cones[(cones >= LEAST_DEG) & (cones <= MOST_DEG)]
+        grid = readings.off(best.shape, cones, delays).reshape(-1, len(readings.metres))
+        found = best_of_resamples(grid, most, readings.blocks, has_offset="sonar_offset_m" not in hidden)
+        values = {
+            "cone_deg": cones[found.cells % len(cones)], "sonar_delay_s": delays[found.cells // len(cones)],
+            "sonar_offset_m": found.offsets,
+        }  # fmt: skip
+        is_well = True
+        for name in names:
+            filled = SPREADS * float(values[name].std()) / reach[name] if reach[name] else 1.0
+            moved, at[name] = abs(float(values[name].mean()) - at[name]), float(values[name].mean())
+            is_well &= LEAST_FILLED < filled < MOST_FILLED and moved <= reach[name] / SPREADS
+            reach[name] *= float(np.clip(filled, 1 / SPREADS, 2.0))
+        place = _Found(shape=best.shape, cone_deg=at["cone_deg"], delay_s=at["sonar_delay_s"])
+        off = readings.off_at(place) - float(found.offsets.mean())
+        most = _most(readings.metres, off)
+        if is_well:
+            break
+    return _Resampled(values=values, off=off, kept=np.abs(off) < most)

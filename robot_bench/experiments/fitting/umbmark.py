@@ -148,13 +148,15 @@ def umbmark(drives: Sequence[Drive]) -> Umbmark:
     def residuals(values: Floats) -> Floats:
         return np.array(_errors(squares, values[0], values[1], track_m)).ravel()
 
+    # What a run is off ahead and to the left comes of the same drift; one run each way has nothing else to go by.
+    numbers = np.arange(2 * len(squares)) // (2 if len(squares) > 2 else 1)
     found = fit(
         residuals,
         [
             Parameter(name="e_d", start=1.0, scale=0.02, least=0.5, most=2.0),
             Parameter(name="e_b", start=1.0, scale=0.03, least=0.5, most=2.0),
         ],
-        np.arange(2 * len(squares)), floor=1e-3, why=WHY,
+        numbers, floor=1e-3, why=WHY,
     )  # fmt: skip
     fitted = [found.estimates[name].value if name in found.estimates else 1.0 for name in ("e_d", "e_b")]
     before, formulas, least = (

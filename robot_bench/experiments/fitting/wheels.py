@@ -25,6 +25,8 @@ from simbase.errors import FileError
 PIECE_S = 1.0
 #: chosen: metres that a radian counts, in the residual: the robot's own size.
 LEVER_M = 0.2
+#: chosen: pieces so far apart depend on each other: they share the poses at their ends.
+LAGS = 5
 #: A packet's grain: 0.84 mm on the coarsest robot that ships, evenly spread.
 GRAIN_M = 0.84e-3 / 12**0.5
 #: chosen: so much is left at both ends, so that a packet that comes later or sooner is still there.
@@ -89,7 +91,7 @@ def fit_wheels(drives: Sequence[Drive]) -> Fit:
 
     counts = [len(piece.t_s) - 1 for piece in pieces]
     numbers = np.concatenate([np.repeat(np.arange(count), 3) + sum(counts[:n]) for n, count in enumerate(counts)])
-    return fit(residuals, parameters, numbers, floor=GRAIN_M, why=WHY, are_independent=False)
+    return fit(residuals, parameters, numbers, floor=GRAIN_M, why=WHY, lags=LAGS)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
