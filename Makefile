@@ -16,7 +16,7 @@ JOBS   ?= 3
 COMPILED := $(wildcard bluepill_sim/extension/source/*/*) robot_bench/wires/edges.c \
     $(shell find adapter_fw/core adapter_fw/capi -type f)
 
-.PHONY: setup demo test lint type unit bench soak peers clean firmware mutation-tools board board-check board-tools pictures docs
+.PHONY: setup demo test lint type unit wheels bench soak peers clean firmware mutation-tools board board-check board-tools pictures docs
 
 setup: $(STAMP)
 
@@ -47,9 +47,9 @@ demo: $(if $(wildcard $(STAMP)),$(STAMP),$(DEMO_STAMP))
 	    echo; echo "type next:  . $(BIN)/activate    (p2os is then on your PATH in this terminal)"; \
 	    echo "then:       p2os doctor"; exit $$status
 
-# The type check fills the time in which tests wait.
-test: lint
-	$(MAKE) --no-print-directory -j2 type unit
+# All of it, the type check while tests wait; with HOUSE=p2os the tests and pages of one house, nothing else being there.
+test: $(if $(HOUSE),setup,lint)
+	$(if $(HOUSE),$(BIN)/python -m tools.packaging.testing $(HOUSE),$(MAKE) --no-print-directory -j2 type unit)
 
 lint: setup
 	$(BIN)/ruff check .
@@ -78,6 +78,10 @@ bench: setup
 	$(BIN)/python tools/bench/beginners.py
 	$(BIN)/python tools/bench/shares.py --timers
 	$(BIN)/python tools/bench/devices.py --timers
+
+# A source distribution and a wheel of each house, in dist/.
+wheels: setup
+	$(BIN)/python -m tools.packaging
 
 soak: setup mutation-tools
 	$(BIN)/pytest -n $(JOBS) -m '(soak or hypothesis) and not hardware' --hypothesis-profile drawn

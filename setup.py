@@ -1,4 +1,4 @@
-"""What pyproject.toml cannot say: how the parts in C and C++ are built, and the page of the package.
+"""What pyproject.toml cannot say: how the parts in C and C++ are built, a wheel's tag, and the page of the package.
 
 A part that does not compile fails the build. Where there is no compiler, or `P2OS_NATIVE=0` says so, it is left out,
 and a file beside it holds the reason, which `p2os doctor` tells (pip shows nothing of a build that succeeds).
@@ -11,6 +11,7 @@ import subprocess
 from pathlib import Path
 
 from setuptools import Extension, setup
+from setuptools.command.bdist_wheel import bdist_wheel
 from setuptools.command.build_ext import build_ext
 from setuptools.errors import CompileError, PlatformError
 
@@ -39,7 +40,6 @@ class BuildParts(build_ext):
             note = self._note(part.name)
             note.unlink(missing_ok=True)
             if part.name in self.left_out:
-                self._remove(part.name)
                 note.parent.mkdir(parents=True, exist_ok=True)
                 note.write_text(f"{self.left_out[part.name]}\n", encoding="utf-8")
 
@@ -47,9 +47,9 @@ class BuildParts(build_ext):
         """Build each part, or say on one line why not."""
         for part in self.extensions:
             reason = self._reason_against(part)
+            self._remove(part.name)
             if reason:
                 self.left_out[part.name] = reason
-                self._remove(part.name)
                 self.warn(f"{part.name} is left out: {reason}")
         self.extensions = [part for part in self.extensions if part.name not in self.left_out]
         super().build_extensions()
@@ -70,6 +70,10 @@ class BuildParts(build_ext):
                 f"{ext.name} does not compile: {error} (the compiler's words stand above; "
                 "with P2OS_NATIVE=0 in the environment p2os is installed without it)"
             ) from error
+
+    def get_ext_filename(self, ext_name: str) -> str:
+        """Return the file of a part: no tag of a Python, for it calls nothing of Python's; ctypes loads it."""
+        return f"{ext_name.replace('.', os.sep)}.{'pyd' if os.name == 'nt' else 'so'}"
 
     def get_outputs(self) -> list[str]:
         """Return the files that are installed, the notes among them."""
@@ -99,11 +103,23 @@ class BuildParts(build_ext):
         return "__GNUC__" in said.stdout and "__clang__" not in said.stdout
 
     def _remove(self, name: str) -> None:
-        """Remove what an earlier build has left, or it would be installed."""
-        Path(self.get_ext_fullpath(name)).unlink(missing_ok=True)
+        """Remove what earlier builds have left, or it would be installed, or loaded first."""
+        path = Path(self.get_ext_fullpath(name))
+        for folder in (path.parent, Path(*name.split(".")[:-1])):  # in an editable installation the sources'
+            for left in folder.glob(f"{path.stem}.*{path.suffix}"):
+                left.unlink()
+        path.unlink(missing_ok=True)
 
     def _note(self, name: str) -> Path:
         return Path(self.get_ext_fullpath(name)).with_name(f"{name.rpartition('.')[2]}.left_out")
+
+
+class AnyPython(bdist_wheel):
+    """A wheel for every Python 3 of a platform, or of any where it holds no part in C."""
+
+    def get_tag(self) -> tuple[str, str, str]:
+        """Return the tag: no part is bound to the ABI of a Python."""
+        return ("py3", "none", super().get_tag()[2])
 
 
 def expanded(patterns: list[str]) -> list[str]:
@@ -120,4 +136,8 @@ def page() -> str:
     return f"{text}\nThe files named here are in the source distribution.\n"
 
 
-setup(cmdclass={"build_ext": BuildParts}, long_description=page(), long_description_content_type="text/markdown")
+setup(
+    cmdclass={"build_ext": BuildParts, "bdist_wheel": AnyPython},
+    long_description=page(),
+    long_description_content_type="text/markdown",
+)

@@ -33,6 +33,8 @@ from simbase.c_library import built, guarded, loaded
 from simbase.errors import MissingDependencyError, UsageError
 from simbase.timing import NS_PER_S, Nanos, Reached
 
+#: The firmware's core, as a module.
+PART = "robot_bench._adapter_firmware"
 #: Of adapter_capi.h.
 VERSION = 3
 _MAX_FRAME_BYTES = 9
@@ -89,7 +91,7 @@ _FUNCTIONS = {
 
 def is_available() -> bool:
     """Tell whether the firmware's library was built with this package."""
-    return built("robot_bench._adapter_firmware") is not None
+    return built(PART) is not None
 
 
 @dataclass(frozen=True, slots=True)
@@ -414,7 +416,7 @@ def wire_numbers(pinout: Pinout) -> dict[str, int]:
 
 @cache
 def _library() -> Any:
-    library = loaded(built("robot_bench._adapter_firmware"), _FUNCTIONS, "the adapter's firmware core")
+    library = loaded(built(PART), _FUNCTIONS, "the adapter's firmware core", PART)
     if library.adapter_version() != VERSION:
         raise MissingDependencyError(
             f"the adapter's firmware core has interface {library.adapter_version()}, expected {VERSION}",

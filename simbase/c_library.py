@@ -6,6 +6,7 @@ from importlib.util import find_spec
 from typing import Any, TypeVar
 
 from simbase.errors import MissingDependencyError
+from simbase.installation import way_to_build
 
 #: Letters of a signature, the result's first.
 _TYPES: Mapping[str, Any] = {
@@ -23,7 +24,11 @@ def built(module: str) -> str | None:
 
 
 def loaded(
-    path: str | None, functions: Mapping[str, str], what: str, kind: Callable[[str], ctypes.CDLL] = ctypes.CDLL
+    path: str | None,
+    functions: Mapping[str, str],
+    what: str,
+    module: str,
+    kind: Callable[[str], ctypes.CDLL] = ctypes.CDLL,
 ) -> Any:
     """Return a library whose functions have types.
 
@@ -32,13 +37,14 @@ def loaded(
         functions: Name → signature: v nothing, b bool, c one byte, i and u 32 bits, l and q 64 bits (signed, unsigned),
             z size, p pointer, s text; the result's letter first.
         what: What it is, for the refusal.
+        module: What it was to be built as, likewise.
         kind: `ctypes.PyDLL` keeps the interpreter's lock, for callbacks that come often.
 
     Raises:
         MissingDependencyError: It was not built.
     """
     if path is None:
-        raise MissingDependencyError(f"{what} is not built", hint="p2os doctor says why")
+        raise MissingDependencyError(f"{what} is not built", hint=way_to_build(module))
     library = kind(path)
     for name, signature in functions.items():
         function = getattr(library, name)

@@ -7,7 +7,7 @@ when the program started (`nohup` and SIGHUP) stays ignored. Ctrl-Z suspends as 
 robot's watchdog stops it, and STOP is the first frame when the program goes on.
 
 SIGKILL, SIGSTOP and a power cut cannot be caught. The verbs of `p2os` go further: see
-`p2os.cli.signals`.
+`simbase.command_line.signals`.
 
 Invariant: `held_back` returns, or raises an interrupt, only when its work is done.
 """

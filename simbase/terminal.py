@@ -10,8 +10,11 @@ turns text around.
 """
 
 import codecs
+import contextlib
 import re
-from typing import TextIO
+import sys
+from collections.abc import Iterator
+from typing import TextIO, cast
 
 #: C0 but for \\t \\n \\r, DEL, C1, line and paragraph separators, the bidirectional controls, halves of surrogates.
 _ACTING = re.compile(
@@ -67,3 +70,19 @@ class ReadableStream:
 def drawn(stream: TextIO) -> TextIO:
     """Return the stream to which who draws writes."""
     return stream.drawn if isinstance(stream, ReadableStream) else stream
+
+
+def readable_stream(stream: TextIO) -> TextIO:
+    """Return a stream that writes readable text to this one; it has all that a text stream has."""
+    return cast("TextIO", ReadableStream(drawn(stream)))
+
+
+@contextlib.contextmanager
+def readable_output() -> Iterator[None]:
+    """Let what is written to standard output and standard error in the block be readable, whoever it is of."""
+    stdout, stderr = sys.stdout, sys.stderr
+    sys.stdout, sys.stderr = readable_stream(stdout), readable_stream(stderr)
+    try:
+        yield
+    finally:
+        sys.stdout, sys.stderr = stdout, stderr

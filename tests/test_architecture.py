@@ -32,6 +32,7 @@ ALLOWED = {
     "simbase": set(),
     "p2os": {"construct"},
     "simbase.installation": {"packaging"},
+    "simbase.command_line": {"typer"},
     "p2os.transport": {"construct", "serial"},
     "p2os.cli": {"construct", "typer", "rich", "click", "serial"},
     "p2os.capture.formats.pcap_bulk": {"numpy"},
@@ -56,6 +57,7 @@ ALLOWED = {
     "bluepill_sim.program.elf_file": {"elftools"},
     "bluepill_sim.program.line_table": {"elftools"},
     "bluepill_sim.cli": {"typer", "rich", "click"},
+    "bluepill_sim.__main__": {"typer"},
     "adapter_sim": {"p2os"},
     "robot_bench": {"p2os", "bluepill_sim", "adapter_sim", "typer", "rich", "click"},
     "robot_bench.drives": {"p2os", "numpy"},
@@ -78,9 +80,10 @@ IO_LAYER = (
     "p2os.__main__", "p2os.transport", "p2os.cli", "p2os.pioneer.serve.host", "p2os.pioneer.serve.background_host",
     "p2os.pioneer.serve.fleet", "p2os.pioneer.body.outside.connection",
     "p2os.pioneer.serve.control_line", "p2os.client.robot_thread", "p2os.client.robot_loop", "simbase.interrupts",
+    "simbase.command_line",
     "simbase.listening",
     "p2os.ros.zenoh_node",
-    "bluepill_sim.cli", "bluepill_sim.cli.console",
+    "bluepill_sim.cli", "bluepill_sim.cli.console", "bluepill_sim.__main__",
     "robot_bench.cli", "robot_bench.campaign.workers",
     "robot_bench.campaign.variants.shrinking.kept", "robot_bench.running.forks", "robot_bench.running.pacer",
     "robot_bench.live", "robot_bench.origin_gate", "robot_bench.report", "robot_bench.firmware.build",
@@ -96,7 +99,7 @@ LOGGING = (
 LAYERS = {
     "simbase": (
         ("timing", "state", "installation", "wire", "lazy", "interrupts", "listening", "terminal"), ("errors",),
-        ("files", "units", "c_library"), ("trust",), ("user_classes",),
+        ("files", "units", "c_library"), ("trust",), ("user_classes",), ("command_line",),
     ),
     "p2os": (
         ("errors", "event_log"), ("toml_file",), ("toml_schema",), ("robots", "gamepad"), ("protocol",), ("transport",),
@@ -105,7 +108,7 @@ LAYERS = {
     "bluepill_sim": (
         ("errors",), ("spans", "extension"), ("fabric",), ("peripherals",), ("parts",), ("stm32f103",),
         ("memory",), ("core",), ("program", "native"), ("chip",), ("board",),
-        ("analysis", "debug"), ("cli",),
+        ("analysis", "debug"), ("cli",), ("__main__",),
     ),
     "adapter_sim": (
         ("codec",), ("duty",), ("settings", "pinout"), ("pins", "mixing", "encoders", "distances", "session"),
@@ -381,7 +384,9 @@ def shown_names() -> dict[str, set[str]]:
         for parent, child in zip(path.parents, [path, *path.parents], strict=False):
             name = child.stem if child.suffix in {".c", ".cpp", ".h", ".hpp"} else child.name
             folders.setdefault(str(parent), set()).add(name)
-    return {folder: names - {"__init__.py", "py.typed", "conftest.py"} for folder, names in folders.items()}
+    return {
+        folder: names - {"__init__.py", "__main__.py", "py.typed", "conftest.py"} for folder, names in folders.items()
+    }
 
 
 def test_a_folder_shows_no_more_names_than_one_looks_through() -> None:

@@ -11,6 +11,7 @@ from functools import cache
 
 import pytest
 
+from simbase.command_line.help_pages import PROGRAM
 from tests.documentation import command_lines
 from tests.documentation.page import ROOT, Page, pages
 from tests.documentation.session import RUN, run_blocks
@@ -90,7 +91,8 @@ def test_the_examples_in_the_help_of_each_verb_name_verbs_and_options_that_exist
     for name, command in sorted(group.commands.items()):
         below = getattr(command, "commands", {}).values()
         for each in (command, *below):
-            for line in re.findall(r"(?m)^ *(p2os .*?)(?: {2,}|$)", f"{each.help}\n{each.epilog}"):
+            text = f"{each.help}\n{each.epilog}".replace(PROGRAM, f"p2os {name}")
+            for line in re.findall(r"(?m)^ *(p2os .*?)(?: {2,}|$)", text):
                 found += [f"{name}: {fault}" for fault in command_lines.faults(line, group)]
     assert not found, "\n".join(found)
 

@@ -39,7 +39,7 @@ def identifier(index: int) -> str:
 
 
 def _head(probe: Probe, codes: dict[str, str], words: list[str]) -> Iterator[str]:
-    yield "$version p2os bluepill_sim $end"
+    yield "$version bluepill_sim $end"
     yield "$timescale 1 ns $end"
     yield "$scope module bluepill $end"
     for name, code in codes.items():

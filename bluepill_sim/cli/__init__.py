@@ -14,7 +14,12 @@ in the ELF, places are shown by symbol and line.
 def register(app: typer.Typer) -> None:
     """Add the verb and what is below it."""
     mcu = typer.Typer(help=HELP, rich_markup_mode=None)
+    add_verbs(mcu)
+    app.add_typer(mcu, name="mcu", rich_help_panel="BluePill")
+
+
+def add_verbs(app: typer.Typer) -> None:
+    """Add what stands below it."""
     for module in (run, parts, debug, info, pins, trace, coverage, profile, compare_silicon):
         name = module.__name__.rpartition(".")[2]
-        mcu.command(name.replace("_", "-"), help=module.HELP)(getattr(module, name))
-    app.add_typer(mcu, name="mcu", rich_help_panel="BluePill")
+        app.command(name.replace("_", "-"), help=module.HELP)(getattr(module, name))

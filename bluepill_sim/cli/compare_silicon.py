@@ -18,8 +18,8 @@ Exit code 1: something differs by more than is allowed. docs/silicon.md tells wh
 
 \b
 Examples:
-  p2os mcu compare-silicon board.log          what differs, and a count of what does not
-  p2os mcu compare-silicon board.log --all    every number
+  {program} compare-silicon board.log          what differs, and a count of what does not
+  {program} compare-silicon board.log --all    every number
 """
 
 

@@ -26,10 +26,10 @@ written as an lcov tracefile, which genhtml, editors and CI services read.
 
 \b
 Examples:
-  p2os mcu coverage mine.elf --for 5s                     a summary by file
-  p2os mcu coverage mine.elf --lcov mine.info             for genhtml mine.info -o html
-  p2os mcu coverage mine.elf --drive PA6=1@3.5s --missed  what nothing reached
-  p2os mcu coverage mine.elf --fail-under 80              exit code 1 below 80 % of the lines
+  {program} coverage mine.elf --for 5s                     a summary by file
+  {program} coverage mine.elf --lcov mine.info             for genhtml mine.info -o html
+  {program} coverage mine.elf --drive PA6=1@3.5s --missed  what nothing reached
+  {program} coverage mine.elf --fail-under 80              exit code 1 below 80 % of the lines
 """
 
 

@@ -21,9 +21,9 @@ runs away while you think.
 
 \b
 Examples:
-  p2os mcu debug mine.elf                  then: gdb-multiarch mine.elf -ex "target remote :3333"
-  p2os mcu debug mine.elf --fast           virtual time as fast as it can
-  p2os mcu debug mine.elf --uart log.txt   what it sends on USART1 goes to a file
+  {program} debug mine.elf                  then: gdb-multiarch mine.elf -ex "target remote :3333"
+  {program} debug mine.elf --fast           virtual time as fast as it can
+  {program} debug mine.elf --uart log.txt   what it sends on USART1 goes to a file
 """
 
 DEFAULT_PORT = 3333

@@ -20,9 +20,9 @@ Sections, sizes, vectors, largest symbols, stack. It is also run for a moment.
 
 \b
 Examples:
-  p2os mcu info mine.elf             all of it
-  p2os mcu info mine.elf --for 10s   look longer for what is not modelled
-  p2os mcu info mine.elf --json      one JSON object
+  {program} info mine.elf             all of it
+  {program} info mine.elf --for 10s   look longer for what is not modelled
+  {program} info mine.elf --json      one JSON object
 """
 
 #: chosen: how many of the largest symbols a person wants to see.

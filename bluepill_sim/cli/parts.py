@@ -19,8 +19,8 @@ HELP = """List the parts that can be attached, with their pins and settings.
 
 \b
 Examples:
-  p2os mcu parts             all of them
-  p2os mcu parts ssd1306     one of them: what it can be told
+  {program} parts             all of them
+  {program} parts ssd1306     one of them: what it can be told
 """
 
 

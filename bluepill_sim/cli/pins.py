@@ -24,10 +24,10 @@ lines and what the USARTs send beside them.
 
 \b
 Examples:
-  p2os mcu pins mine.elf                                  pins in use after one second
-  p2os mcu pins mine.elf --all                            every pin that has a leg
-  p2os mcu pins mine.elf --for 5s --vcd a.vcd --sr a.sr   for GTKWave and PulseView
-  p2os mcu pins mine.elf --drive PA6=1@3.5s               with something on an input
+  {program} pins mine.elf                                  pins in use after one second
+  {program} pins mine.elf --all                            every pin that has a leg
+  {program} pins mine.elf --for 5s --vcd a.vcd --sr a.sr   for GTKWave and PulseView
+  {program} pins mine.elf --drive PA6=1@3.5s               with something on an input
 """
 
 

@@ -29,9 +29,9 @@ touched that is not modelled.
 
 \b
 Examples:
-  p2os mcu profile mine.elf --for 5s             a table, the dearest first
-  p2os mcu profile mine.elf --flame mine.svg     a flame graph, for any browser
-  p2os mcu profile mine.elf --folded mine.txt    stacks for other flame graph programs
+  {program} profile mine.elf --for 5s             a table, the dearest first
+  {program} profile mine.elf --flame mine.svg     a flame graph, for any browser
+  {program} profile mine.elf --folded mine.txt    stacks for other flame graph programs
 """
 
 #: chosen: how many functions a person wants to see.

@@ -39,18 +39,18 @@ a pin and no character meanwhile, are: such a program is ended.
 
 \b
 Examples:
-  p2os mcu run mine.elf                          one second of virtual time
-  p2os mcu run mine.elf --for 2s --uart log.txt  what it prints goes to a file
-  p2os mcu run mine.elf --realtime --uart pty:   talk to it with any terminal program, until Ctrl-C
-  p2os mcu run mine.elf --itm log.txt            what ITM_SendChar prints, with times
-  p2os mcu run mine.elf --drive PA6=1@500ms      something comes before a sensor
-  p2os mcu run mine.elf --drive PA0=1.65V        what the ADC sees on a pin
-  p2os mcu run mine.elf --until "pin PC13 low"   up to an event
-  p2os mcu run mine.elf --attach ssd1306,on=I2C1 --parts shots      an OLED, and its picture at the end
-  p2os mcu run mine.elf --attach ./mine.py:Sensor,on=I2C1,x=3       a part of your own
-  p2os mcu run mine.elf --usb pty:               plug it in: its USB serial port is a terminal here
-  p2os mcu run mine.elf --can vcan0              its CAN on one of this machine; candump and cansend work
-  p2os mcu run mine.elf --can udp:127.0.0.1:29536     the same without SocketCAN: a frame is a datagram
+  {program} run mine.elf                          one second of virtual time
+  {program} run mine.elf --for 2s --uart log.txt  what it prints goes to a file
+  {program} run mine.elf --realtime --uart pty:   talk to it with any terminal program, until Ctrl-C
+  {program} run mine.elf --itm log.txt            what ITM_SendChar prints, with times
+  {program} run mine.elf --drive PA6=1@500ms      something comes before a sensor
+  {program} run mine.elf --drive PA0=1.65V        what the ADC sees on a pin
+  {program} run mine.elf --until "pin PC13 low"   up to an event
+  {program} run mine.elf --attach ssd1306,on=I2C1 --parts shots      an OLED, and its picture at the end
+  {program} run mine.elf --attach ./mine.py:Sensor,on=I2C1,x=3       a part of your own
+  {program} run mine.elf --usb pty:               plug it in: its USB serial port is a terminal here
+  {program} run mine.elf --can vcan0              its CAN on one of this machine; candump and cansend work
+  {program} run mine.elf --can udp:127.0.0.1:29536     the same without SocketCAN: a frame is a datagram
 """
 
 #: chosen: how often typed input reaches a running program, and its time is held back to the clock.
@@ -117,7 +117,7 @@ def run(
     strict: Annotated[bool, typer.Option("--strict", help="The first warning ends the run.")] = False,
     attach: Annotated[
         list[str] | None,
-        typer.Option(help="Attach a part; repeatable. `p2os mcu parts` lists them.", metavar="PART,KEY=VALUE,..."),
+        typer.Option(help="Attach a part; repeatable. The verb `parts` lists them.", metavar="PART,KEY=VALUE,..."),
     ] = None,
     parts_folder: Annotated[
         Path | None, typer.Option("--parts", help="Where pictures and files of parts go at the end.", metavar="FOLDER")

@@ -25,10 +25,10 @@ Cycle, symbol, source line. A line is a basic block, or the entry of or return f
 
 \b
 Examples:
-  p2os mcu trace mine.elf --for 1ms                    on the screen
-  p2os mcu trace mine.elf --from 2s --for 1ms          the millisecond after two seconds
-  p2os mcu trace mine.elf --for 10ms --out trace.txt   into a file
-  p2os mcu trace mine.elf --for 1ms --json             a JSON object a line
+  {program} trace mine.elf --for 1ms                    on the screen
+  {program} trace mine.elf --from 2s --for 1ms          the millisecond after two seconds
+  {program} trace mine.elf --for 10ms --out trace.txt   into a file
+  {program} trace mine.elf --for 1ms --json             a JSON object a line
 """
 
 _CAPACITY = 1 << 12

@@ -557,4 +557,4 @@ def load_library() -> Any:
 def _loaded(path: str) -> Any:
     # PyDLL keeps the interpreter lock: the engine calls back into Python at each
     # block, and taking the lock there costs as much as the callback.
-    return loaded(path, _FUNCTIONS, "Unicorn", ctypes.PyDLL)
+    return loaded(path, _FUNCTIONS, "Unicorn", "unicorn", ctypes.PyDLL)

@@ -16,6 +16,9 @@ from simbase.c_library import built, loaded
 from simbase.errors import MissingDependencyError
 
 #: The name of the environment variable, and what it may hold.
+#: The library, as a module.
+PART = "bluepill_sim._native"
+
 CORE_VARIABLE, CORE_CHOICES = "P2OS_CORE", ("native", "python")
 
 UNKNOWN_BLOCK = ctypes.CFUNCTYPE(None, ctypes.c_uint32, ctypes.c_uint32)
@@ -173,7 +176,7 @@ def is_native_wanted() -> bool:
 @cache
 def library_path() -> str | None:
     """Return where the library is; None where it was not built."""
-    return built("bluepill_sim._native")
+    return built(PART)
 
 
 @cache
@@ -183,7 +186,7 @@ def library() -> Any:
     Raises:
         MissingDependencyError: it was not built, or is of another version of the package.
     """
-    found = loaded(library_path(), _FUNCTIONS, "the emulator's library", ctypes.PyDLL)
+    found = loaded(library_path(), _FUNCTIONS, "the emulator's library", PART, ctypes.PyDLL)
     if found.core_shared_bytes() != ctypes.sizeof(structure(SHARED)):
         raise MissingDependencyError("the emulator's library is of another version", hint="install the package again")
     return found

@@ -16,7 +16,6 @@ from contextlib import AbstractContextManager
 from typing import TypeVar
 
 from p2os.cli.printing import queue_output
-from p2os.cli.signals import end_on_suspension, postponed
 from p2os.client import (
     ClientSettings,
     DeadmanStopped,
@@ -34,6 +33,7 @@ from p2os.client import (
 )
 from p2os.client.goals import STALL_LIMIT_NS
 from p2os.transport.wall_clock import Clock, GapWatch, wall_clock
+from simbase.command_line.signals import end_on_suspension, postponed
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: chosen: how soon a notice is seen; packets come every 100 ms.

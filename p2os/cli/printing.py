@@ -28,7 +28,7 @@ from typing import TextIO, cast
 from p2os.transport.wall_clock import wall_clock
 from simbase.errors import FileError
 from simbase.files import reason_of
-from simbase.terminal import ReadableStream, drawn
+from simbase.terminal import drawn, readable_output, readable_stream
 from simbase.timing import NS_PER_S
 
 #: chosen: some ten thousand lines; minutes of a robot's packets.
@@ -232,11 +232,11 @@ def queue_output() -> None:
     stderr: TextIO = drawn(sys.stderr)
     if not isinstance(stderr, QueuedStream) and _has_descriptor(stderr):
         stderr = cast("TextIO", QueuedStream(stderr, "standard error"))
-        sys.stderr = stderr if sys.stderr is drawn(sys.stderr) else _readable(stderr)
+        sys.stderr = stderr if sys.stderr is drawn(sys.stderr) else readable_stream(stderr)
     notes = stderr if isinstance(stderr, QueuedStream) else None
     if not isinstance(stdout, QueuedStream) and _has_descriptor(stdout):
         stdout = cast("TextIO", QueuedStream(stdout, "standard output", notes))
-        sys.stdout = stdout if sys.stdout is drawn(sys.stdout) else _readable(stdout)
+        sys.stdout = stdout if sys.stdout is drawn(sys.stdout) else readable_stream(stdout)
 
 
 @contextlib.contextmanager
@@ -245,22 +245,18 @@ def restored_output() -> Iterator[None]:
 
     In the block what is written is readable, whoever it is of.
     """
-    stdout, stderr = sys.stdout, sys.stderr
-    sys.stdout, sys.stderr = _readable(stdout), _readable(stderr)
+    queued: list[QueuedStream] = []
     try:
-        yield
+        with readable_output():
+            try:
+                yield
+            finally:
+                queued += [one for stream in (sys.stdout, sys.stderr) if isinstance(one := drawn(stream), QueuedStream)]
     finally:
-        queued = [behind for stream in (sys.stdout, sys.stderr) if isinstance(behind := drawn(stream), QueuedStream)]
-        sys.stdout, sys.stderr = stdout, stderr
         for stream in queued:
             stream.note_left_out()
         for queue in dict.fromkeys(stream.queue for stream in queued):
             queue.end()
-
-
-def _readable(stream: TextIO) -> TextIO:
-    """Return a stream that writes readable text to this one; it has all that a text stream has."""
-    return cast("TextIO", ReadableStream(drawn(stream)))
 
 
 def _has_descriptor(stream: TextIO | None) -> bool:

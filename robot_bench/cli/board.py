@@ -7,7 +7,7 @@ from typing import Annotated, Self
 import typer
 
 from adapter_sim.pinout import Pinout, load_pinout
-from p2os.cli.help_pages import BENCH
+from p2os.cli.groups import BENCH
 from p2os.transport import Transport, open_url
 from p2os.transport.waiting import wait_for_bytes
 from robot_bench.wires.board_test.circuit import EN, Fault, FaultKind, Side

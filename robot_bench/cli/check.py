@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from p2os.cli.help_pages import BENCH
+from p2os.cli.groups import BENCH
 from p2os.toml_schema import placed, within
 from robot_bench.bench import Bench
 from robot_bench.scenario.included_files import as_toml

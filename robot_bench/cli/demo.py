@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from p2os.cli.help_pages import BENCH
+from p2os.cli.groups import BENCH
 from p2os.cli.quantities import option
 from p2os.pioneer.body.factory import BEST
 from robot_bench.cli.progress import RunDisplay

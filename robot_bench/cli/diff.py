@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from p2os.cli.help_pages import BENCH
+from p2os.cli.groups import BENCH
 from robot_bench.events.kinds import Event
 from robot_bench.events.words import last_words, told_apart, what_of
 from robot_bench.recording.divergence import differences

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from p2os.cli.help_pages import BENCH
+from p2os.cli.groups import BENCH
 from robot_bench.events.codec import events_of
 from robot_bench.recording.run_record import TRACE_NAME, RunRecord, read_run, record_of
 from robot_bench.recording.together import robots_in

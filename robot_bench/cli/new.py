@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from p2os.cli.help_pages import BENCH
+from p2os.cli.groups import BENCH
 from p2os.pioneer.body.factory import BEST, resolve_body
 from robot_bench.firmware.build import COMPILER
 from robot_bench.project.files import BUILDS, ROBOTS, project_files, write_project

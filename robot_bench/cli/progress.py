@@ -15,9 +15,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColum
 from rich.text import Text
 
 from p2os.cli.console import ReadableConsole
-from p2os.cli.signals import postponed
 from p2os.transport.wall_clock import wall_clock
 from robot_bench import run
+from simbase.command_line.signals import postponed
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: chosen: smooth to the eye, and no load.

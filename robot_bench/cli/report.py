@@ -6,7 +6,7 @@ from typing import Annotated, cast
 
 import typer
 
-from p2os.cli.help_pages import BENCH
+from p2os.cli.groups import BENCH
 from p2os.ros.bags import STORAGES
 from robot_bench.recording.event_files import write_named_events
 from robot_bench.recording.run_record import read_events, read_meta

@@ -10,9 +10,8 @@ from typing import Annotated
 
 import typer
 
-from p2os.cli.help_pages import BENCH, VerbPage
+from p2os.cli.groups import BENCH
 from p2os.cli.keyboard import any_key_stops
-from p2os.cli.main import EXIT_INTERRUPTED
 from p2os.cli.names import bodies, urls, worlds
 from p2os.cli.quantities import option
 from p2os.cli.trust import Trusted, said
@@ -41,6 +40,8 @@ from robot_bench.scenario import sweep
 from robot_bench.scenario.included_files import read_setting
 from robot_bench.scenario.scenario import Scenario, ScenarioOptions, load_scenario
 from robot_bench.scenario.sweep import MOST_RUNS, read_seeds
+from simbase.command_line.help_pages import VerbPage
+from simbase.command_line.program import EXIT_INTERRUPTED
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
 from simbase.trust import Trust

@@ -26,6 +26,8 @@ _PIECE = 1 << 20
 #: More bytes than a number of a block has.
 _LONGEST = 9
 #: Result and arguments, as `simbase.c_library` spells them.
+#: The library, as a module.
+PART = "robot_bench._edges"
 _FUNCTIONS = {
     "edges_split": "vpzppzppp",
     "edges_changes": "zppzc",
@@ -224,7 +226,7 @@ def _library() -> Any:
     Raises:
         MissingDependencyError: They were not built.
     """
-    return loaded(built("robot_bench._edges"), _FUNCTIONS, "the library for edges of wires")
+    return loaded(built(PART), _FUNCTIONS, "the library for edges of wires", PART)
 
 
 def _at(times: "array[int]") -> int:

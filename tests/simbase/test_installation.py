@@ -1,18 +1,25 @@
 """The commands that get what is missing."""
 
-import importlib.metadata
 import json
 import re
 import sys
 import tomllib
+from dataclasses import dataclass
+from email.message import Message
 from pathlib import Path
 
 import pytest
 
-from p2os.cli.main import report
 from simbase import installation
+from simbase.command_line.program import report
 from simbase.errors import MissingDependencyError
-from simbase.installation import install_command, reinstall_command
+from simbase.installation import (
+    doubled_packages,
+    install_command,
+    missing_distributions,
+    reinstall_command,
+    way_to_build,
+)
 
 ROOT = Path(__file__).resolve().parents[2]
 EXTRAS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
@@ -26,10 +33,26 @@ REQUIRES = [
 ]
 
 
+@dataclass(frozen=True)
+class Installed:
+    """A distribution, as far as it is looked at."""
+
+    name: str
+    requires: list[str]
+    version: str = "0.1.0"
+
+    @property
+    def metadata(self) -> Message:
+        extras = Message()
+        for name in dict.fromkeys(re.findall(r'extra == "(\w+)"', " ".join(self.requires))):
+            extras["Provides-Extra"] = name
+        return extras
+
+
 @pytest.fixture(autouse=True)
 def pip_is_this_pythons(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(installation.shutil, "which", lambda name: str(Path(sys.executable).with_name(name)))
-    monkeypatch.setattr(installation, "requires", lambda _name: REQUIRES)
+    monkeypatch.setattr(installation, "installed_distributions", lambda: (Installed("p2os", REQUIRES),))
 
 
 @pytest.mark.parametrize(
@@ -54,10 +77,7 @@ def test_a_pip_of_another_python_is_not_named(monkeypatch: pytest.MonkeyPatch, t
 
 
 def test_a_checkout_that_was_never_installed_is_named_by_its_folder(monkeypatch: pytest.MonkeyPatch) -> None:
-    def nothing(name: str) -> list[str]:
-        raise importlib.metadata.PackageNotFoundError(name)
-
-    monkeypatch.setattr(installation, "requires", nothing)
+    monkeypatch.setattr(installation, "installed_distributions", tuple)
     assert install_command("sim") == f"pip install -e '{ROOT}[sim]'"
     assert install_command() == f"pip install -e {ROOT}"
 
@@ -79,8 +99,77 @@ def test_what_reads_requirements_is_asked_for_first(monkeypatch: pytest.MonkeyPa
 def test_what_was_built_is_built_again_from_where_it_came(
     monkeypatch: pytest.MonkeyPatch, origin: object, command: str
 ) -> None:
-    monkeypatch.setattr(installation, "_origin", lambda: json.dumps(origin) if origin else None)
+    monkeypatch.setattr(installation, "_origin", lambda _name: json.dumps(origin) if origin else None)
     assert reinstall_command() == f"pip install --force-reinstall --no-deps {command}"
+
+
+def houses(*names: str) -> tuple[Installed, ...]:
+    """Return distributions as houses.toml describes them: below, of others, and by an extra what is above."""
+    rows = {
+        "simbase": ["packaging>=23"],
+        "p2os": [
+            "simbase==0.1.0", "pyserial>=3.5", 'mcap>=1.1; extra == "export"',
+            'bluepill-sim==0.1.0; extra == "emulator"', 'robot-bench==0.1.0; extra == "bench"',
+        ],
+        "bluepill-sim": ["simbase==0.1.0", "unicorn>=2.1.4"],
+    }  # fmt: skip
+    return tuple(Installed(name, rows[name]) for name in names)
+
+
+def test_an_extra_is_looked_for_in_every_distribution(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(installation, "installed_distributions", lambda: houses("bluepill-sim", "p2os", "simbase"))
+    assert install_command("export") == "pip install mcap"
+    assert install_command() == "pip install unicorn pyserial packaging"
+
+
+def test_what_no_extra_brings_is_what_the_distributions_always_need(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(installation, "installed_distributions", lambda: houses("bluepill-sim", "simbase"))
+    assert install_command("sim") == "pip install unicorn packaging"
+
+
+def test_a_distribution_that_is_not_there_is_told_by_the_extra_that_brings_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    for there, missing in (
+        (("p2os", "simbase"), {"bluepill-sim": "emulator", "robot-bench": "bench"}),
+        (("bluepill-sim", "p2os", "simbase"), {"robot-bench": "bench"}),
+        (("bluepill-sim", "simbase"), {}),
+        ((), {}),
+    ):
+        monkeypatch.setattr(installation, "installed_distributions", lambda names=there: houses(*names))
+        installation.installed_version.cache_clear()
+        assert missing_distributions() == missing
+    installation.installed_version.cache_clear()
+
+
+def test_a_package_of_two_distributions_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    @dataclass(frozen=True)
+    class Point:
+        name: str
+        dist: Installed | None
+
+    whole, house = Installed("p2os", []), Installed("bluepill-sim", [])
+    points = [Point("p2os", whole), Point("bluepill_sim", whole), Point("bluepill_sim", house), Point("x", None)]
+    monkeypatch.setattr(installation, "entry_points", lambda group: points if group == installation.GROUP else [])
+    assert doubled_packages() == {"bluepill_sim": ["bluepill-sim", "p2os"]}
+
+
+@pytest.mark.parametrize(
+    ("file", "compiler", "told"),
+    [
+        ("_part.left_out", "/usr/bin/g++", "pip install --force-reinstall --no-deps -e /src (no C compiler was found)"),
+        ("_part.left_out", "", "sudo apt-get install g++ && pip install --force-reinstall --no-deps -e /src (no"),
+        ("something.else", "/usr/bin/g++", "(nothing was built in this folder)"),
+    ],
+)
+def test_a_part_that_was_not_compiled_says_why(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, file: str, compiler: str, told: str
+) -> None:
+    (tmp_path / "package").mkdir()
+    (tmp_path / "package" / "__init__.py").touch()
+    (tmp_path / "package" / file).write_text("no C compiler was found\n", encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(installation, "_origin", lambda _: '{"url": "file:///src", "dir_info": {"editable": true}}')
+    assert told in way_to_build("package._part", compiler)
+    sys.modules.pop("package")
 
 
 def test_an_error_that_names_an_extra_hints_at_its_packages(capsys: pytest.CaptureFixture[str]) -> None:
@@ -88,7 +177,7 @@ def test_an_error_that_names_an_extra_hints_at_its_packages(capsys: pytest.Captu
         (MissingDependencyError("no", extra="sim", hint="export to .csv"), "unicorn pyelftools, or export to .csv"),
         (MissingDependencyError("no", extra="sim"), "unicorn pyelftools"),
     ):
-        assert report(error) == 2
+        assert report("p2os", error) == 2
         assert capsys.readouterr().err == f"p2os: no\nhint: pip install {hint}\n"
 
 

@@ -13,16 +13,14 @@ from collections import Counter, deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import Enum
+from importlib.metadata import entry_points
 from typing import Any, ClassVar, NamedTuple
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import adapter_sim
-import bluepill_sim
-import p2os
-import robot_bench
+from simbase.installation import GROUP
 from simbase.state import PartState, Rows, Stateful, state_names
 from simbase.user_classes import OF_USERS
 
@@ -310,7 +308,8 @@ def test_any_value_is_restored_over_any_other(before: object, after: object) -> 
 
 # No part forgets an attribute ------------------------------------------------------------
 
-PACKAGES = (p2os, bluepill_sim, adapter_sim, robot_bench)
+#: Of what is installed.
+PACKAGES = [importlib.import_module(point.name) for point in entry_points(group=GROUP)]
 #: Methods that change the container they are called on.
 CHANGING = {"append", "appendleft", "extend", "clear", "pop", "popleft", "popitem", "add", "discard", "remove",
             "update", "insert", "setdefault", "sort", "reverse", "rotate"}  # fmt: skip

@@ -1,11 +1,11 @@
-"""Damaged files of every format: read, or refused in one line that names the file; `tools/fuzz_files.py` damages."""
+"""Damaged files of every format: read, or refused in one line that names the file; `tools/fuzz/files.py` damages."""
 
 import runpy
 from pathlib import Path
 
 import pytest
 
-FUZZ = runpy.run_path(str(Path(__file__).resolve().parents[2] / "tools" / "fuzz_files.py"))
+FUZZ = runpy.run_path(str(Path(__file__).resolve().parents[2] / "tools" / "fuzz" / "files.py"))
 
 
 @pytest.mark.parametrize("name", FUZZ["FORMATS"])

@@ -19,7 +19,7 @@ from p2os.cli.captures.reading import (
     reading_of,
     wanted_names,
 )
-from p2os.cli.help_pages import CAPTURES
+from p2os.cli.groups import CAPTURES
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
 

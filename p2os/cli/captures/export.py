@@ -15,7 +15,7 @@ from p2os.capture.formats.mcap_files import write_mcap
 from p2os.capture.sips import sips_of
 from p2os.capture.table import Table, tables_of, tables_of_sips, write_csv
 from p2os.cli.captures.reading import ProfileForLayouts, RobotForUnits, chosen_rows, reading_of, wanted_names
-from p2os.cli.help_pages import CAPTURES
+from p2os.cli.groups import CAPTURES
 from p2os.cli.kept_files import FORCE_HELP, refuse_to_overwrite
 from simbase.errors import FileError, UsageError
 from simbase.files import open_to_write_text, writing

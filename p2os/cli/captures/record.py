@@ -11,17 +11,17 @@ import typer
 
 from p2os.capture import Chunk, Direction
 from p2os.cli.captures.capture_files import PcapFile, RecordingFile, Sink, Sinks
+from p2os.cli.groups import CAPTURES
 from p2os.cli.held_robot import hold_robot
-from p2os.cli.help_pages import CAPTURES
 from p2os.cli.kept_files import FORCE_HELP, refuse_to_overwrite
 from p2os.cli.names import RobotUrl
 from p2os.cli.quantities import option
-from p2os.cli.signals import postponed
 from p2os.errors import RemoteProtocolError, TransportError
 from p2os.protocol.connection import ConnectFailed, Connection, ConnectionLost, ConnectionRole, SipReceived
 from p2os.transport import Transport, open_url
 from p2os.transport.waiting import wait_for_line
 from p2os.transport.wall_clock import Clock, wall_clock
+from simbase.command_line.signals import postponed
 from simbase.timing import NS_PER_S, Nanos
 from simbase.units import TIME
 

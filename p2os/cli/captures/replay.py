@@ -11,11 +11,10 @@ import typer
 from p2os.capture import Capture, Direction, frame_chunks, read_file
 from p2os.capture.replay import Replay
 from p2os.capture.tap import Tap
+from p2os.cli.groups import CAPTURES
 from p2os.cli.held_robot import hold_robot
-from p2os.cli.help_pages import CAPTURES
 from p2os.cli.names import urls
 from p2os.cli.quantities import option
-from p2os.cli.signals import postponed
 from p2os.client import ClientSettings
 from p2os.errors import RemoteProtocolError, RunFailedError, TransportError
 from p2os.protocol.commands import CommandNumber
@@ -23,6 +22,7 @@ from p2os.transport import listen_url, open_url
 from p2os.transport.ports import HungUpError, Listener, RefusedPeerError, Transport
 from p2os.transport.waiting import LONGEST_WAIT_NS, wait_for_line, wait_readable
 from p2os.transport.wall_clock import Clock, GapWatch, wall_clock
+from simbase.command_line.signals import postponed
 from simbase.errors import FileError, UsageError
 from simbase.timing import NS_PER_S, Nanos
 from simbase.units import FACTOR

@@ -25,17 +25,17 @@ from p2os.capture.listing import line_of, summary_of
 from p2os.capture.tap import Tap
 from p2os.cli.captures.capture_files import PcapFile, RecordingFile, Sink, Sinks
 from p2os.cli.captures.reading import ProfileForLayouts, RobotForUnits
+from p2os.cli.groups import CAPTURES
 from p2os.cli.held_robot import hold_robot
-from p2os.cli.help_pages import CAPTURES
 from p2os.cli.kept_files import FORCE_HELP, refuse_to_overwrite
 from p2os.cli.names import urls
 from p2os.cli.quantities import option
-from p2os.cli.signals import postponed
 from p2os.errors import TransportError
 from p2os.transport import listen_url, open_url
 from p2os.transport.ports import Listener, RefusedPeerError, Transport
 from p2os.transport.waiting import BLIND_POLL_S, wait_readable
 from p2os.transport.wall_clock import Clock, GapWatch, wall_clock
+from simbase.command_line.signals import postponed
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 from simbase.units import TIME
 

@@ -8,12 +8,11 @@ from typing import Annotated
 
 import typer
 
+from p2os.cli.groups import LINKS
 from p2os.cli.held_robot import hold_robot
-from p2os.cli.help_pages import LINKS
 from p2os.cli.links.link_quality import LinkQuality, Spread, spread_of
 from p2os.cli.names import RobotUrl
 from p2os.cli.quantities import option
-from p2os.cli.signals import postponed
 from p2os.errors import RemoteProtocolError, TransportError
 from p2os.protocol.commands import Command, CommandNumber
 from p2os.protocol.connection import (
@@ -27,6 +26,7 @@ from p2os.protocol.connection import (
 from p2os.transport import Transport, open_url
 from p2os.transport.waiting import wait_for_line
 from p2os.transport.wall_clock import Clock, wall_clock
+from simbase.command_line.signals import postponed
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 from simbase.units import TIME
 

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from p2os.cli.help_pages import LINKS
+from p2os.cli.groups import LINKS
 from p2os.transport.serial_port import list_serial_ports
 
 HELP = """List the serial ports of this machine, and what may be there.

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
+from p2os.cli.groups import LINKS
 from p2os.cli.held_robot import ASKED, held, hold_robot
-from p2os.cli.help_pages import LINKS
 from p2os.cli.names import urls
 from p2os.cli.quantities import option
 from p2os.client import Connected, ConnectError, Robot

@@ -10,8 +10,8 @@ from typing import Annotated
 
 import typer
 
+from p2os.cli.groups import ROBOTS
 from p2os.cli.held_robot import RobotWatch, held, say_what_is_beyond
-from p2os.cli.help_pages import ROBOTS
 from p2os.cli.names import ReportedModel, RobotUrl
 from p2os.cli.quantities import option
 from p2os.client import MotionResult, Robot, RobotState

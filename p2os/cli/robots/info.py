@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
+from p2os.cli.groups import ROBOTS
 from p2os.cli.held_robot import ASKED, held
-from p2os.cli.help_pages import ROBOTS
 from p2os.cli.names import RobotUrl
 from p2os.cli.robots.monitor import state_as_plain
 from p2os.client import Robot, RobotState

@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from p2os.capture.describe import plain
+from p2os.cli.groups import ROBOTS
 from p2os.cli.held_robot import held
-from p2os.cli.help_pages import ROBOTS
 from p2os.cli.links.link_quality import LinkQuality
 from p2os.cli.names import ReportedModel, RobotUrl
 from p2os.cli.quantities import option

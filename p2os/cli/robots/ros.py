@@ -17,12 +17,11 @@ from typing import Annotated
 
 import typer
 
+from p2os.cli.groups import ROBOTS
 from p2os.cli.held_robot import held
-from p2os.cli.help_pages import ROBOTS
 from p2os.cli.kept_files import FORCE_HELP, refuse_to_overwrite
 from p2os.cli.names import ReportedModel, urls
 from p2os.cli.quantities import option
-from p2os.cli.signals import postponed
 from p2os.client import Link, LinkLostError, Notice, Robot, RobotState
 from p2os.client.notices import (
     Connected,
@@ -46,6 +45,7 @@ from p2os.ros.transport import DOMAIN, LOOPBACK, MOST_DOMAIN, NodeOptions, Topic
 from p2os.ros.transports import TRANSPORTS, open_transport
 from p2os.ros.urdf import urdf_text
 from p2os.transport.wall_clock import wall_clock
+from simbase.command_line.signals import postponed
 from simbase.errors import UsageError
 from simbase.files import write_text
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos

@@ -7,8 +7,8 @@ from typing import Annotated
 import typer
 
 from p2os.capture.describe import describe_packet
+from p2os.cli.groups import ROBOTS
 from p2os.cli.held_robot import RobotWatch, held
-from p2os.cli.help_pages import ROBOTS
 from p2os.cli.quantities import option
 from p2os.client import ConfigurationKnown, Notice, PacketArrived, Robot
 from p2os.errors import LocalProtocolError

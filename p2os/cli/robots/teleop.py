@@ -25,8 +25,8 @@ from typing import Annotated, Protocol
 
 import typer
 
+from p2os.cli.groups import ROBOTS
 from p2os.cli.held_robot import held, hold_robot, say_what_is_beyond
-from p2os.cli.help_pages import ROBOTS
 from p2os.cli.keyboard import raw_keyboard
 from p2os.cli.names import ReportedModel, RobotUrl
 from p2os.cli.quantities import option

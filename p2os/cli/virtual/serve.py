@@ -21,7 +21,7 @@ from typing import Annotated
 
 import typer
 
-from p2os.cli.help_pages import ROBOTS
+from p2os.cli.groups import ROBOTS
 from p2os.cli.names import bodies, worlds
 from p2os.cli.names import robots as robot_names
 from p2os.cli.printing import queue_output

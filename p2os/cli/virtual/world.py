@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from p2os.cli.help_pages import ROBOTS
+from p2os.cli.groups import ROBOTS
 from p2os.cli.kept_files import FORCE_HELP, refuse_to_overwrite
 from p2os.cli.names import robots, worlds
 from p2os.cli.quantities import option

@@ -11,8 +11,7 @@ from typing import Annotated
 
 import typer
 
-from p2os.cli.help_pages import BENCH
-from p2os.cli.main import EXIT_INTERRUPTED
+from p2os.cli.groups import BENCH
 from p2os.cli.quantities import option
 from p2os.cli.trust import Trusted, said
 from p2os.transport.wall_clock import wall_clock
@@ -31,6 +30,7 @@ from robot_bench.cli.run import refuse
 from robot_bench.cli.workers import Jobs, core_count
 from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.scenario.scenario import load_scenario
+from simbase.command_line.program import EXIT_INTERRUPTED
 from simbase.errors import UsageError, nearest
 from simbase.trust import Trust
 from simbase.units import COUNT

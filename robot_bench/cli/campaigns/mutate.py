@@ -17,8 +17,7 @@ from bluepill_sim.program.image import Image
 from bluepill_sim.program.line_table import read_lines
 from bluepill_sim.program.mutants import Mutant, mutants, mutated_file
 from bluepill_sim.program.static_code import StaticCode
-from p2os.cli.help_pages import BENCH
-from p2os.cli.main import EXIT_INTERRUPTED
+from p2os.cli.groups import BENCH
 from p2os.cli.names import bodies
 from p2os.cli.quantities import option
 from p2os.cli.trust import Trusted, said
@@ -34,6 +33,7 @@ from robot_bench.events.codec import Json
 from robot_bench.recording.summary import INTERRUPTED
 from robot_bench.scenario.included_files import read_setting
 from robot_bench.scenario.scenario import load_scenario
+from simbase.command_line.program import EXIT_INTERRUPTED
 from simbase.errors import UsageError
 from simbase.files import writing
 from simbase.timing import NS_PER_S

@@ -6,7 +6,7 @@ from typing import Annotated, cast
 
 import typer
 
-from p2os.cli.help_pages import BENCH
+from p2os.cli.groups import BENCH
 from p2os.cli.quantities import option
 from p2os.cli.trust import Trusted, said
 from p2os.toml_schema import Table

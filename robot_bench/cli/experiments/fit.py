@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from p2os.cli.captures.reading import ProfileForLayouts, RobotForUnits, reading_of
-from p2os.cli.help_pages import BENCH
+from p2os.cli.groups import BENCH
 from p2os.cli.kept_files import FORCE_HELP, refuse_to_overwrite
 from p2os.cli.names import worlds
 from p2os.cli.quantities import option

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from p2os.cli.captures.reading import ProfileForLayouts, RobotForUnits, reading_of
-from p2os.cli.help_pages import BENCH
+from p2os.cli.groups import BENCH
 from robot_bench.experiments import require
 from simbase.errors import UsageError
 

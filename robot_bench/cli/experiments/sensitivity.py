@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from p2os.cli.help_pages import BENCH
+from p2os.cli.groups import BENCH
 from p2os.cli.names import bodies
 from p2os.cli.quantities import option
 from p2os.cli.trust import Trusted, said

@@ -11,9 +11,8 @@ from rich.table import Table
 from rich.text import Text
 
 from p2os.cli.console import ReadableConsole
-from p2os.cli.help_pages import BENCH
+from p2os.cli.groups import BENCH
 from p2os.cli.keyboard import has_keyboard
-from p2os.cli.main import EXIT_INTERRUPTED
 from p2os.cli.names import bodies, urls
 from robot_bench.cli.progress import RunDisplay
 from robot_bench.cli.run import ask, capped, drive_port
@@ -39,6 +38,7 @@ from robot_bench.run import RunResult
 from robot_bench.scenario.included_files import Setting, read_setting
 from robot_bench.scenario.scenario import MODES
 from robot_bench.scenario.sweep import read_seeds
+from simbase.command_line.program import EXIT_INTERRUPTED
 from simbase.errors import UsageError, nearest
 from simbase.files import writing
 

@@ -15,6 +15,7 @@ from typing import Any
 
 from simbase.c_library import built, loaded
 from simbase.errors import MissingDependencyError
+from simbase.installation import way_to_build
 
 PORTS = 3
 CONSOLE, ROBOT = 0, 2
@@ -48,6 +49,8 @@ _REASONS = {1: ResetReason.RESTART, 2: ResetReason.PANIC, 3: ResetReason.WATCHDO
 
 
 #: Result and arguments of each function, as `simbase.c_library` spells them.
+#: The library, as a module.
+PART = "robot_bench._esp32"
 _FUNCTIONS = {
     "machine": "p", "machine_run": "il", "machine_sent": "zispz", "machine_receive": "visz",
     "machine_pad": "iiiiii", "machine_stack_used": "z", "machine_nvs_count": "z",
@@ -81,9 +84,9 @@ def library_path() -> Path:
     Raises:
         MissingDependencyError: It was not built.
     """
-    path = built("robot_bench._esp32")
+    path = built(PART)
     if path is None:
-        raise MissingDependencyError("the simulated ESP32 is not built", hint="p2os doctor says why")
+        raise MissingDependencyError("the simulated ESP32 is not built", hint=way_to_build(PART))
     return Path(path)
 
 
@@ -91,7 +94,7 @@ class _Library:
     """A loaded program, and whose turn it is."""
 
     def __init__(self, path: Path) -> None:
-        self.calls = loaded(str(path), _FUNCTIONS, "the simulated ESP32")
+        self.calls = loaded(str(path), _FUNCTIONS, "the simulated ESP32", PART)
         self.calls.machine.restype = ctypes.POINTER(_State)
         self.state: _State = self.calls.machine().contents
         self._ram = self._place(self.calls.machine_ram)

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bluepill_sim.__main__ import run
 from bluepill_sim.analysis.silicon.comparison import Model, Row, Verdict, ask_model, compare
 from bluepill_sim.analysis.silicon.log import HEAD, SiliconLog, SiliconLogError, read_log
 from bluepill_sim.peripherals.rcc import Rcc
-from p2os.cli.main import run
 
 
 @pytest.fixture(scope="module")
@@ -147,15 +147,15 @@ def test_the_command_line_tells_what_differs_and_ends_with_1(
     monkeypatch.setattr("bluepill_sim.cli.compare_silicon.ask_model", lambda: model)
     path = tmp_path / "board.log"
     path.write_bytes(printed(model.log))
-    assert run(["mcu", "compare-silicon", str(path)]) == 0
+    assert run(["compare-silicon", str(path)]) == 0
     same = capfd.readouterr().out
     assert same.splitlines()[0].startswith("reg     registers before anything was changed: ")
     assert "differs" not in same
     numbers = {**model.log.numbers, ("sram", "k_loop_subs_bhi"): 400}
     path.write_bytes(printed(SiliconLog(model.log.registers, numbers)))
-    assert run(["mcu", "compare-silicon", str(path)]) == 1
+    assert run(["compare-silicon", str(path)]) == 1
     assert "sram    k_loop_subs_bhi  chip 400  model 300 +33.3 %  differs\n" in capfd.readouterr().out
     path.write_bytes(SHORT[:-20])
-    assert run(["mcu", "compare-silicon", str(path)]) == 2
+    assert run(["compare-silicon", str(path)]) == 2
     assert "board.log" in capfd.readouterr().err
-    assert run(["mcu", "compare-silicon", str(tmp_path / "none.log")]) == 2
+    assert run(["compare-silicon", str(tmp_path / "none.log")]) == 2

@@ -13,8 +13,9 @@ from bluepill_sim.board import BluePill
 from bluepill_sim.errors import UnmodelledError
 from bluepill_sim.fabric.pins import PinDrive
 from simbase.timing import Reason
+from tests.tools.examples import EXAMPLES
 
-FOLDER = Path(__file__).resolve().parents[3] / "robot_bench" / "firmware"
+FOLDER = EXAMPLES
 SYSTICK_CTRL, SYSTICK_LOAD, SYSTICK_VAL = 0xE000E010, 0xE000E014, 0xE000E018
 
 

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from bluepill_sim.__main__ import run
 from bluepill_sim.board import BluePill
 from bluepill_sim.program.reset_loop import LEAST_NS, MOST_RESETS, ResetRow
-from p2os.cli.main import run
 from robot_bench.bench import Bench
 from simbase.timing import NS_PER_MS, Reason
 from tests.bluepill_sim.machine import Machine
@@ -76,7 +76,7 @@ def test_a_button_pressed_often_is_no_such_program(tmp_path: Path) -> None:
 
 
 def test_mcu_run_names_it_and_ends(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    assert run(["mcu", "run", str(program(RESET, tmp_path)), "--for", "10s"]) == 1
+    assert run(["run", str(program(RESET, tmp_path)), "--for", "10s"]) == 1
     error = capfd.readouterr().err
     assert "fault: it resets for ever: 100 times in " in error
     assert "100 resets (SOFTWARE 100)" in error

@@ -1,12 +1,11 @@
 """Resets, their causes, and where a program starts."""
 
-from importlib.resources import files
-
 import pytest
 
 from bluepill_sim.board import BluePill
 from bluepill_sim.peripherals.rcc import ResetCause
 from simbase.timing import Reason
+from tests.tools.examples import EXAMPLES
 
 AIRCR = 0xE000ED0C
 RCC_CSR, RCC_APB1ENR = 0x40021024, 0x4002101C
@@ -19,7 +18,7 @@ def store(address: int, value: int) -> str:
 
 
 def test_a_reset_at_full_speed_is_nothing_to_warn_of() -> None:
-    board = BluePill(str(files("robot_bench.firmware") / "dodge.elf"))
+    board = BluePill(str(EXAMPLES / "dodge.elf"))
     board.chip.pins.is_serial_input = lambda _pin: True
     board.run_for("10 ms")
     assert board.hclk_hz == 72_000_000

@@ -1,15 +1,14 @@
 """Running a board until something is so, and talking to it."""
 
-from importlib.resources import files
-
 import pytest
 
 from bluepill_sim import BluePill, BluePillError, WaitError
 from bluepill_sim.spans import to_nanos
 from simbase.timing import Reason
 from tests.bluepill_sim.machine import listen
+from tests.tools.examples import EXAMPLES
 
-SENSORS = str(files("robot_bench.firmware") / "sensors.elf")
+SENSORS = str(EXAMPLES / "sensors.elf")
 
 
 @pytest.fixture

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from bluepill_sim.__main__ import run
 from bluepill_sim.board import BluePill
 from bluepill_sim.cli import run as run_verb
-from p2os.cli.main import run
 from simbase.timing import NS_PER_S, Nanos
 from tests.bluepill_sim.machine import Machine
 
@@ -46,7 +46,7 @@ def test_a_program_that_resets_itself_over_and_over_keeps_to_the_budget(
 
     monkeypatch.setattr(run_verb, "BluePill", make)
     monkeypatch.setattr(run_verb, "time", Clock(boards))
-    assert run(["mcu", "run", str(path), "--for", "10s", "--budget", "0.5s"]) == 1
+    assert run(["run", str(path), "--for", "10s", "--budget", "0.5s"]) == 1
     took_s = boards[0].resets.total() * RESET_NS / NS_PER_S
     assert 0.5 < took_s <= 0.5 + 2 * run_verb.LOOK_S
     error = capfd.readouterr().err

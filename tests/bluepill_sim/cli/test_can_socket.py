@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bluepill_sim.__main__ import run
 from bluepill_sim.cli import can_socket
 from bluepill_sim.cli.can_socket import (
     MOST_PEERS,
@@ -22,7 +23,6 @@ from bluepill_sim.cli.can_socket import (
     to_datagram,
 )
 from bluepill_sim.parts import CanFrame, CanNetwork, CanNode
-from p2os.cli.main import run
 from tests.bluepill_sim.machine import Machine
 
 HELLO = CanFrame(identifier=0x123, data=b"hello")
@@ -298,7 +298,7 @@ def test_the_verb_answers_programs_of_this_machine_and_logs(
 
     monkeypatch.setattr("bluepill_sim.cli.run.join_can", joined)
     words = ["--for", "10ms", "--attach", "can-node,on=CAN,period_ms=0", "--can", f"unix:{path}", "--can-log", str(log)]
-    assert run(["mcu", "run", str(firmware), *words]) == 0
+    assert run(["run", str(firmware), *words]) == 0
     assert heard == [to_datagram(CanFrame(identifier=0x124, data=b"hello"))]
     assert f"can: unix:{path}: 1 frames out, 1 in" in capfd.readouterr().err
     assert [line.split()[1:] for line in log.read_text().splitlines()] == [
@@ -311,5 +311,5 @@ def test_a_log_without_a_bus_is_refused(tmp_path: Path, capfd: pytest.CaptureFix
     firmware = tmp_path / "loop.bin"
     ((_, program),) = Machine("loop: b loop\n", {}).image.segments
     firmware.write_bytes(program)
-    assert run(["mcu", "run", str(firmware), "--can-log", str(tmp_path / "log")]) == 2
+    assert run(["run", str(firmware), "--can-log", str(tmp_path / "log")]) == 2
     assert "--can-log without --can" in capfd.readouterr().err

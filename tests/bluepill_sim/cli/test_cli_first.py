@@ -1,22 +1,23 @@
 """`p2os mcu run`, `info` and `pins`, as a person meets them."""
 
 import json
+import re
 import zipfile
-from importlib.resources import files
 from pathlib import Path
 
 import pytest
 
+from bluepill_sim.__main__ import NAME, run
 from bluepill_sim.extension import library
-from p2os.cli.main import run
+from tests.tools.examples import EXAMPLES
 
-SENSORS = str(files("robot_bench.firmware") / "sensors.elf")
-ANALOG = str(files("robot_bench.firmware") / "analog.elf")
-DODGE = str(files("robot_bench.firmware") / "dodge.elf")
+SENSORS = str(EXAMPLES / "sensors.elf")
+ANALOG = str(EXAMPLES / "analog.elf")
+DODGE = str(EXAMPLES / "dodge.elf")
 
 
 def test_run_prints_what_the_firmware_sends(capfdbinary: pytest.CaptureFixture[bytes]) -> None:
-    assert run(["mcu", "run", SENSORS, "--for", "3.7s", "--drive", "PA6=1@3.5s"]) == 0
+    assert run(["run", SENSORS, "--for", "3.7s", "--drive", "PA6=1@3.5s"]) == 0
     captured = capfdbinary.readouterr()
     assert captured.out == b"sensors: ready\nsensor 3 on\n"
     assert b"3.700000 s of virtual time" in captured.err
@@ -25,7 +26,7 @@ def test_run_prints_what_the_firmware_sends(capfdbinary: pytest.CaptureFixture[b
 def test_run_puts_volts_on_pins_and_takes_them_off(capfdbinary: pytest.CaptureFixture[bytes]) -> None:
     volts = ["PA0=1.65V", "PA4=2V", "PA4=z@120ms", "PA5=1.5v", "PA5=1@120ms", "PA6=-0.2V"]
     options = [word for one in volts for word in ("--drive", one)]
-    assert run(["mcu", "run", ANALOG, "--for", "230ms", *options]) == 0
+    assert run(["run", ANALOG, "--for", "230ms", *options]) == 0
     first, second = capfdbinary.readouterr().out.decode().splitlines()
     assert "PA0 1651 mV, PA4 2000 mV, PA5 1501 mV, PA6 0 mV" in first
     assert "PA0 1651 mV, PA4 0 mV, PA5 3300 mV, PA6 0 mV" in second
@@ -33,13 +34,13 @@ def test_run_puts_volts_on_pins_and_takes_them_off(capfdbinary: pytest.CaptureFi
 
 def test_run_writes_to_a_file_and_ends_at_an_event(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     log = tmp_path / "log"
-    assert run(["mcu", "run", SENSORS, "--uart", str(log), "--until", "usart1 sends ready"]) == 0
+    assert run(["run", SENSORS, "--uart", str(log), "--until", "usart1 sends ready"]) == 0
     assert log.read_bytes() == b"sensors: ready"
     assert "0.00" in capfd.readouterr().err
 
 
 def test_run_in_real_time_serves_a_pseudo_terminal(capfd: pytest.CaptureFixture[str]) -> None:
-    assert run(["mcu", "run", SENSORS, "--uart", "pty:", "--for", "20ms"]) == 0
+    assert run(["run", SENSORS, "--uart", "pty:", "--for", "20ms"]) == 0
     assert "USART1 is at /dev/" in capfd.readouterr().err
 
 
@@ -64,38 +65,38 @@ def test_run_in_real_time_serves_a_pseudo_terminal(capfd: pytest.CaptureFixture[
     ],
 )
 def test_a_mistake_is_one_line_and_a_hint(words: list[str], message: str, capfd: pytest.CaptureFixture[str]) -> None:
-    assert run(["mcu", *words]) == 2
+    assert run([*words]) == 2
     error = capfd.readouterr().err.splitlines()
     assert message in error[-2]
     assert error[-1].startswith("hint: ")
 
 
 def test_an_event_that_does_not_come_is_a_failure(capfd: pytest.CaptureFixture[str]) -> None:
-    assert run(["mcu", "run", SENSORS, "--for", "5ms", "--until", "pin PA4 high"]) == 1
+    assert run(["run", SENSORS, "--for", "5ms", "--until", "pin PA4 high"]) == 1
     assert "not seen within 0.005 s" in capfd.readouterr().err
 
 
 def test_info_tells_sizes_vectors_and_stack(capfd: pytest.CaptureFixture[str]) -> None:
-    assert run(["mcu", "info", DODGE, "--json"]) == 0
+    assert run(["info", DODGE, "--json"]) == 0
     found = json.loads(capfd.readouterr().out)
     assert found["stack_top"] == 0x2000_5000
     assert found["flash_bytes"] == sum(s["bytes"] for s in found["sections"] if s["name"] != ".bss")
     assert {"SysTick_Handler", "USART1_IRQHandler"} <= {v["handler"] for v in found["vectors"]}
     assert found["warnings"] == []
-    assert run(["mcu", "info", DODGE]) == 0
+    assert run(["info", DODGE]) == 0
     assert "nothing unmodelled was touched in 0.5 s" in capfd.readouterr().out
 
 
 def test_info_of_an_image_without_sections(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     image = tmp_path / "bare.bin"
     image.write_bytes(bytes.fromhex("00500020 09000008 fee7"))
-    assert run(["mcu", "info", str(image), "--for", "1ms"]) == 0
+    assert run(["info", str(image), "--for", "1ms"]) == 0
     assert "10 of 65536 bytes" in capfd.readouterr().out
 
 
 def test_pins_shows_modes_levels_and_edges(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     vcd, sr = tmp_path / "a.vcd", tmp_path / "a.sr"
-    words = ["mcu", "pins", SENSORS, "--for", "10ms", "--vcd", str(vcd), "--sr", str(sr), "--drive", "PA6=1@5ms"]
+    words = ["pins", SENSORS, "--for", "10ms", "--vcd", str(vcd), "--sr", str(sr), "--drive", "PA6=1@5ms"]
     assert run([*words, "--json"]) == 0
     rows = {row["pin"]: row for row in json.loads(capfd.readouterr().out)["pins"]}
     assert rows["PB12"]["mode"] == "output"
@@ -126,7 +127,7 @@ def decoded_words(session: Path) -> bytes:
 
 def test_a_session_shows_the_bits_of_the_usart(tmp_path: Path) -> None:
     session = tmp_path / "a.sr"
-    assert run(["mcu", "pins", SENSORS, "--for", "10ms", "--sr", str(session)]) == 0
+    assert run(["pins", SENSORS, "--for", "10ms", "--sr", str(session)]) == 0
     assert decoded_words(session) == b"sensors: ready\n"
 
 
@@ -134,7 +135,7 @@ def test_a_dump_holds_every_edge_and_every_word(tmp_path: Path) -> None:
     from vcd.reader import TokenKind, tokenize
 
     path = tmp_path / "a.vcd"
-    assert run(["mcu", "pins", SENSORS, "--for", "10ms", "--vcd", str(path)]) == 0
+    assert run(["pins", SENSORS, "--for", "10ms", "--vcd", str(path)]) == 0
     names, words, highest = {}, bytearray(), 0
     with path.open("rb") as file:
         for token in tokenize(file):
@@ -155,7 +156,9 @@ def test_without_its_library_the_emulator_says_so_in_a_line(
     library.library.cache_clear()
     monkeypatch.setattr(library, "library_path", lambda: None)
     try:
-        assert run(["mcu", "run", str(files("robot_bench.firmware") / "motors.elf"), "--for", "1ms"]) == 2
+        assert run(["run", str(EXAMPLES / "motors.elf"), "--for", "1ms"]) == 2
     finally:
         library.library.cache_clear()
-    assert capsys.readouterr().err == "p2os: the emulator's library is not built\nhint: p2os doctor says why\n"
+    said, hint = capsys.readouterr().err.splitlines()
+    assert said == f"{NAME}: the emulator's library is not built"
+    assert re.search(r"pip install --force-reinstall --no-deps .* \(nothing was built in this folder\)", hint)

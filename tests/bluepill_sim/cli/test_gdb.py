@@ -5,19 +5,19 @@ import socket
 import subprocess
 import threading
 from collections.abc import Iterator
-from importlib.resources import files
 from pathlib import Path
 
 import pytest
 
+from bluepill_sim.__main__ import run
 from bluepill_sim.board import BluePill
 from bluepill_sim.cli.gdb_server import GdbServer
 from bluepill_sim.debug.machine import LoneChip
 from bluepill_sim.debug.packets import frame
 from bluepill_sim.errors import BluePillError
-from p2os.cli.main import run
+from tests.tools.examples import EXAMPLES
 
-DODGE = str(files("robot_bench.firmware") / "dodge.elf")
+DODGE = str(EXAMPLES / "dodge.elf")
 #: A generous bound on a loaded machine.
 LIMIT_S = 60
 
@@ -121,7 +121,7 @@ def test_ctrl_c_and_damaged_packets(server: GdbServer) -> None:
 def test_a_port_that_is_taken_is_one_line(server: GdbServer, capfd: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(BluePillError, match="cannot listen on port"):
         GdbServer(LoneChip(BluePill(DODGE)), server.port)
-    assert run(["mcu", "debug", DODGE, "--port", str(server.port)]) == 2
+    assert run(["debug", DODGE, "--port", str(server.port)]) == 2
     assert "hint: another --port" in capfd.readouterr().err
 
 
@@ -138,6 +138,6 @@ def test_the_command_serves_once(capfd: pytest.CaptureFixture[str], monkeypatch:
             return super().serve(once=once)
 
     monkeypatch.setattr("bluepill_sim.cli.debug.GdbServer", Told)
-    assert run(["mcu", "debug", DODGE, "--port", "0", "--once"]) == 0
+    assert run(["debug", DODGE, "--port", "0", "--once"]) == 0
     assert done == [b"T05thread:1;"]
     assert "waiting for GDB on port" in capfd.readouterr().err

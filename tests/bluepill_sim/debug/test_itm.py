@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bluepill_sim.__main__ import run
 from bluepill_sim.debug.itm import PacketWriter, TextWriter
-from p2os.cli.main import run
 from tests.bluepill_sim.machine import Machine
 
 WRITES = st.lists(
@@ -126,10 +126,10 @@ def test_a_program_prints_to_a_file_as_with_a_probe(
     ((_, image),) = Machine(f"{text}b stop\n{SEND}", {}).image.segments
     (tmp_path / "itm.bin").write_bytes(image)
     options = ["--for", "1ms", "--itm", str(tmp_path / "log.txt"), "--swo", str(tmp_path / "log.swo")]
-    assert run(["mcu", "run", str(tmp_path / "itm.bin"), *options]) == 0
+    assert run(["run", str(tmp_path / "itm.bin"), *options]) == 0
     (line,) = (tmp_path / "log.txt").read_text().splitlines()
     assert line.split()[1:] == ["0", "ok"]
     rows = decoded((tmp_path / "log.swo").read_bytes())
     assert b"".join(data for _, _, data in rows) == b"ok\n"
     assert float(line.split()[0]) == pytest.approx(rows[0][0] * 125e-9, abs=1e-9)
-    assert run(["mcu", "run", str(tmp_path / "itm.bin"), "--for", "1ms"]) == 0, "without a probe nothing waits"
+    assert run(["run", str(tmp_path / "itm.bin"), "--for", "1ms"]) == 0, "without a probe nothing waits"

@@ -1,15 +1,14 @@
 """Warnings of what is wrong with a wire, and what is on the board."""
 
-import json
-from importlib.resources import files
 from pathlib import Path
 
 import pytest
 
+from bluepill_sim.__main__ import run
 from bluepill_sim.fabric.pins import PinDrive, PinMode
 from bluepill_sim.stm32f103 import make_pins
-from p2os.cli.main import run
 from tests.bluepill_sim.machine import Machine
+from tests.tools.examples import EXAMPLES
 
 
 class Ports:
@@ -112,7 +111,7 @@ def test_a_short_survives_a_snapshot(ports: Ports) -> None:
     assert other["PA4"].level is True
 
 
-MOTORS = str(files("robot_bench.firmware") / "motors.elf")
+MOTORS = str(EXAMPLES / "motors.elf")
 #: What happens to a pin of a running program, and what is said of it. PB12 (p2dx_con) is an output, high.
 MISHAPS = [
     ("PB12=0@50ms", "PB12: two drivers fight: the chip drives it high, the other end low at "),
@@ -126,7 +125,7 @@ MISHAPS = [
 def test_run_tells_of_what_happens_to_a_pin(change: str, says: str, capsys: pytest.CaptureFixture[str]) -> None:
     wires = ("PA4", "PA5", "PA6", "PA7", "PB0", "PB1", "PB10", "PB11", "PB4", "PB3", "PB15", "PC14", "PC15")
     words = [word for wire in wires for word in ("--drive", f"{wire}=0@0s")]
-    assert run(["mcu", "run", MOTORS, "--for", "60ms", *words, "--drive", change]) == 0
+    assert run(["run", MOTORS, "--for", "60ms", *words, "--drive", change]) == 0
     error = capsys.readouterr().err
     (warning,) = [line for line in error.splitlines() if line.startswith("warning: ")]
     assert warning.startswith(f"warning: {says}")
@@ -154,31 +153,5 @@ def test_a_pin_that_still_belongs_to_jtag_is_reported_on_the_command_line(
 ) -> None:
     image = tmp_path / "jtag.bin"
     image.write_bytes(Machine(PINS_OF_JTAG, {}).image.segments[0][1])
-    assert run(["mcu", "run", str(image), "--for", "5ms"]) == 0
+    assert run(["run", str(image), "--for", "5ms"]) == 0
     assert "warning: PB4 belongs to NJTRST: its GPIO configuration has no effect until" in capsys.readouterr().err
-
-
-def test_a_bench_tells_of_drivers_that_fight(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """DD1 (PA4) comes from the adapter, high while it knows no distance; this program holds it low."""
-    (tmp_path / "fights.bin").write_bytes(Machine(FIGHTS, {}).image.segments[0][1])
-    scenario = tmp_path / "fights.toml"
-    scenario.write_text(
-        'firmware = "fights.bin"\nworld = "room"\nduration_s = 0.5\nthreshold_m = 0.6\nbody = "kinematic"\n',
-        encoding="utf-8",
-    )
-    assert run(["run", str(scenario), "--out", str(tmp_path / "out"), "--json"]) == 0
-    notes = json.loads(capsys.readouterr().out)["notes"]
-    assert any(note.startswith("PA4: two drivers fight: the chip drives it low, the other end high ") for note in notes)
-
-
-FIGHTS = """
-mov32 r1, #0x40021018
-mov32 r2, #0x4
-str r2, [r1, #0]
-ldr r2, [r1, #0]
-mov32 r1, #0x40010800
-mov32 r2, #0x44424444
-str r2, [r1, #0]
-sleep: wfi
-b sleep
-"""

@@ -1,6 +1,5 @@
 """Levels from outside that are to come: each at its time, whoever runs the chip in which slices."""
 
-from importlib.resources import files
 from pathlib import Path
 
 import pytest
@@ -12,6 +11,7 @@ from bluepill_sim.extension.layout import LATER_INPUTS
 from bluepill_sim.fabric.pins import PinDrive
 from bluepill_sim.fabric.subscriptions import EDGE, Of
 from tests.bluepill_sim.fabric.test_waves import Bank
+from tests.tools.examples import EXAMPLES
 
 QUICK = settings(max_examples=50)
 
@@ -78,7 +78,7 @@ def test_a_pin_without_a_leg_is_refused() -> None:
 
 def test_a_restored_board_has_them_to_come_and_an_older_snapshot_has_not() -> None:
     def boot() -> tuple[BluePill, list[tuple[int, int]]]:
-        board, rows = BluePill(Path(str(files("robot_bench.firmware").joinpath("motors.elf")))), []
+        board, rows = BluePill(Path(str(EXAMPLES.joinpath("motors.elf")))), []
         board.pin("PA0").drive(0)
         board.subscribe_pins(
             ["PA0"], lambda data: rows.extend((at, wire) for at, _, _, wire, *_ in EDGE.iter_unpack(data)), of=Of.WIRE

@@ -9,7 +9,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from robot_bench.firmware import build as examples
+from tests.tools.examples import build as examples
 
 HERE = Path(__file__).resolve().parent
 #: Taken from the example programs.

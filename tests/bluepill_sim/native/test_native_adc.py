@@ -1,7 +1,6 @@
 """The ADC with DMA under the example program: the same on both cores, in any slices, from any snapshot."""
 
 import pickle
-from importlib.resources import files
 from typing import Any
 
 import pytest
@@ -10,8 +9,9 @@ from hypothesis import strategies as st
 
 from bluepill_sim import BluePill
 from bluepill_sim.fabric.signals import Oscillation, Samples, Shape
+from tests.tools.examples import EXAMPLES
 
-ANALOG = str(files("robot_bench.firmware") / "analog.elf")
+ANALOG = str(EXAMPLES / "analog.elf")
 STARTED_NS, END_NS = 100_000_000, 140_000_000
 
 

@@ -2,7 +2,6 @@
 
 import random
 from collections.abc import Callable
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +11,9 @@ from bluepill_sim import BluePill
 from bluepill_sim.core import BlockRecorder
 from bluepill_sim.errors import BluePillError
 from tests.bluepill_sim.machine import COUNTER_ON, Machine, listen
+from tests.tools.examples import EXAMPLES
 
-FIRMWARE = files("robot_bench.firmware")
+FIRMWARE = EXAMPLES
 PROGRAMS = {name: Path(str(FIRMWARE / f"{name}.elf")) for name in ("motors", "sensors", "encoders", "dodge")}
 PROGRAMS["foreign"] = Path(__file__).parents[2] / "firmware_foreign" / "foreign.elf"
 PROGRAMS["unoptimised"] = Path(__file__).parents[1] / "firmware" / "unoptimised.elf"

@@ -8,20 +8,20 @@ from pathlib import Path
 
 import pytest
 
+from tests.tools.examples import EXAMPLES
+
 SOURCES = sorted((Path(__file__).parents[3] / "bluepill_sim" / "extension" / "source").rglob("*.c"))
 UNOPTIMISED = Path(__file__).parents[1] / "firmware" / "unoptimised.elf"
 COMPILER = shutil.which("gcc")
 PROGRAM = """
 import sys
-from importlib.resources import files
 from bluepill_sim.extension import library
 library.library_path = lambda: sys.argv[1]
 from pathlib import Path
 from bluepill_sim import BluePill
 from bluepill_sim.analysis.probe import Probe
 from bluepill_sim.analysis.vcd import write_vcd
-programs = [str(files("robot_bench.firmware") / f"{name}.elf") for name in ("dodge", "motors", "encoders")]
-for program in (*programs, *sys.argv[3:]):
+for program in sys.argv[3:]:
     board = BluePill(program)
     board.chip.record_blocks(100)
     for step in range(40):
@@ -65,6 +65,7 @@ def test_no_warning_and_no_finding(tmp_path: Path) -> None:
         PROGRAM,
         str(library),
         str(tmp_path / "pins.vcd"),
+        *(str(EXAMPLES / f"{name}.elf") for name in ("dodge", "motors", "encoders")),
         str(UNOPTIMISED),
         LD_PRELOAD=preload,
         ASAN_OPTIONS="detect_leaks=0",

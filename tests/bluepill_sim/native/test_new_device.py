@@ -17,7 +17,10 @@ COMPILER = shutil.which("gcc")
 #: Where the page puts its test: a folder that has room for it.
 TEST = "tests/bluepill_sim/peripherals/tim/test_alarm.py"
 #: The tables that the page names, and what judges a device by them.
-TABLES = ("conftest.py", "machine.py", "peripherals/test_reset_values.py", "peripherals/test_register_views.py")
+TABLES = (
+    "../tools/examples.py", "conftest.py", "machine.py",
+    "peripherals/test_reset_values.py", "peripherals/test_register_views.py",
+)  # fmt: skip
 
 
 def test_the_python_of_the_page_is_as_ruff_has_it() -> None:

@@ -1,17 +1,17 @@
 """The warning of an input that floats: who is told of, who is not, and when."""
 
 from collections.abc import Callable, Iterable
-from importlib.resources import files
 from pathlib import Path
 
 import pytest
 
 from bluepill_sim import BluePill
+from bluepill_sim.__main__ import run
 from bluepill_sim.extension.library import library_path
-from p2os.cli.main import run
 from tests.bluepill_sim.machine import Machine
+from tests.tools.examples import EXAMPLES
 
-FIRMWARE = files("robot_bench.firmware")
+FIRMWARE = EXAMPLES
 PROGRAMS = {name: Path(str(FIRMWARE / f"{name}.elf")) for name in ("motors", "sensors", "encoders", "dodge")}
 PROGRAMS["foreign"] = Path(__file__).parents[2] / "firmware_foreign" / "foreign.elf"
 #: DD1 to DD8, encoder 1, encoder 2.
@@ -147,5 +147,5 @@ def test_a_reset_begins_anew() -> None:
 
 
 def test_info_asks_for_no_wires(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["mcu", "info", str(PROGRAMS["sensors"]), "--for", "50ms"]) == 0
+    assert run(["info", str(PROGRAMS["sensors"]), "--for", "50ms"]) == 0
     assert "nothing unmodelled was touched" in capsys.readouterr().out

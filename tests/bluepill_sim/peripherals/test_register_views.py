@@ -1,6 +1,5 @@
 """Registers by name with their fields: of every peripheral, without the side effects of a read."""
 
-from importlib.resources import files
 from typing import Any
 
 import pytest
@@ -9,6 +8,7 @@ from bluepill_sim import BluePill
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.fabric.registers import bits, fields_of
 from bluepill_sim.stm32f103 import PERIPHERALS
+from tests.tools.examples import EXAMPLES
 
 NAMES = [name for _, name in PERIPHERALS]
 
@@ -65,7 +65,7 @@ def test_a_running_counter_is_seen_where_it_is(fake_chip: Any) -> None:
 
 
 def test_a_board_names_the_peripherals_that_it_has() -> None:
-    board = BluePill(str(files("robot_bench.firmware") / "motors.elf"))
+    board = BluePill(str(EXAMPLES / "motors.elf"))
     assert board.registers("RCC")["CR"]["HSION"] == 1
     with pytest.raises(BluePillError, match="no peripheral 'TIM9'") as caught:
         board.registers("TIM9")

@@ -15,8 +15,9 @@ from bluepill_sim.board import BluePill
 from bluepill_sim.errors import BluePillError, ImageError
 from bluepill_sim.program.image import Image, Symbol, SymbolTable, load_image, parse_image
 from simbase.errors import MissingDependencyError
+from tests.tools.examples import EXAMPLES
 
-FIRMWARE = Path(__file__).resolve().parents[3] / "robot_bench" / "firmware" / "motors.elf"
+FIRMWARE = EXAMPLES / "motors.elf"
 PROGRAM = struct.pack("<II", 0x2000_5000, 0x0800_0009) + b"\xfe\xe7" * 4
 
 
@@ -216,7 +217,7 @@ def test_where_without_a_symbol_is_the_address() -> None:
 @pytest.mark.parametrize("module", ["elftools.elf.elffile", "intelhex", "unicorn"])
 def test_a_missing_library_is_named_with_its_remedy(module: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, module, None)
-    data = hex_file(0x0800_0000, PROGRAM) if module == "intelhex" else FIRMWARE.read_bytes()
+    data = hex_file(0x0800_0000, PROGRAM) if module == "intelhex" else FIRMWARE.read_bytes() + b"\0"  # read by none
     with pytest.raises(MissingDependencyError) as error:
         BluePill(parse_image(data, "a"))
     assert "unicorn" in str(error.value.hint)

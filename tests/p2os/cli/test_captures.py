@@ -13,7 +13,6 @@ import pytest
 
 from p2os.capture import Chunk, Direction, capture_of, read_capture, read_file, write_recording
 from p2os.capture.replay import Replay
-from p2os.cli import refused_connections
 from p2os.cli.captures.capture_files import RecordingFile, Sinks
 from p2os.cli.captures.record import record_session
 from p2os.cli.captures.replay import motions_of, play
@@ -28,6 +27,7 @@ from p2os.protocol.sip import StandardSip
 from p2os.robots.parameters import load_parameters
 from p2os.transport import HungUpError, Loops, listen_url, open_url, waiting
 from p2os.transport.ports import RefusedPeerError
+from simbase.command_line import refused_connections
 from simbase.errors import FileError
 from simbase.listening import LOGGER
 from simbase.timing import NS_PER_MS, NS_PER_S
@@ -526,7 +526,7 @@ def test_of_refused_connections_some_lines_a_second_are_shown(capsys: Capture, m
     now_s = 100.0
     monkeypatch.setattr(refused_connections.time, "monotonic", lambda: now_s)
     log = logging.getLogger(LOGGER)
-    with refused_connections.shown_refusals():
+    with refused_connections.shown_refusals("p2os"):
         for number in range(refused_connections.MOST_A_SECOND + 2):
             log.warning("refused %s", number)
         now_s = 100.999

@@ -17,12 +17,12 @@ import pytest
 
 from p2os.cli import main
 from p2os.cli.main import run
-from p2os.cli.signals import restored_signals
 from p2os.cli.virtual import serve
 from p2os.pioneer.serve import fleet_order
 from p2os.pioneer.serve.control_line import Terminal
 from p2os.protocol.commands import Command
 from p2os.transport import HungUpError
+from simbase.command_line.signals import restored_signals
 from simbase.errors import MissingDependencyError
 from simbase.timing import NS_PER_S
 from tests.tools.forked_python import forked_p2os

@@ -1,13 +1,9 @@
 """The verbs ports, doctor and info."""
 
 import json
-import sys
-import tomllib
 from collections.abc import Callable
-from pathlib import Path
 
 import pytest
-from packaging.requirements import Requirement
 
 from p2os.cli import doctor
 from p2os.cli.links import ports
@@ -75,27 +71,15 @@ def test_doctor_tells_what_is_there(capsys: Capture) -> None:
     assert " installed, " in captured.err
     assert run(["doctor", "--json"]) == 0
     findings = json.loads(capsys.readouterr().out)
-    assert {"python", "unicorn", "pybullet", "arm-none-eabi-gcc"} <= {finding["name"] for finding in findings}
+    assert {"python", "pyserial", "pybullet", "tshark"} <= {finding["name"] for finding in findings}
 
 
 def test_doctor_tells_how_to_get_what_is_missing() -> None:
     findings = {finding.name: finding for finding in doctor.examine(find_program=lambda _name: None)}
-    compiler = findings["arm-none-eabi-gcc"]
-    assert compiler.found is None
-    assert "missing  arm-none-eabi-gcc" in doctor.line_of(compiler)
-    assert "get it: sudo apt-get install gcc-arm-none-eabi" in doctor.line_of(compiler)
-
-
-def test_doctor_lists_the_packages_of_every_extra() -> None:
-    project = tomllib.loads((Path(__file__).parents[3] / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    extras = project["optional-dependencies"]
-    users = Requirement(*extras["all"]).extras
-    wanted = {(Requirement(line).name, extra) for extra in users for line in extras[extra]} | {
-        (Requirement(line).name, "") for line in project["dependencies"]
-    }
-    listed = {need.name for need in doctor.NEEDS if need.kind == "package"}
-    assert listed == {name for name, _ in wanted}
-    assert {(need.name, need.extra) for need in doctor.NEEDS if need.kind == "package"} <= wanted
+    program = findings["tshark"]
+    assert program.found is None
+    assert "missing  tshark" in doctor.line_of(program)
+    assert "get it: sudo apt-get install tshark" in doctor.line_of(program)
 
 
 def test_the_columns_of_doctor_hold_every_row(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -113,31 +97,6 @@ def test_doctor_tells_what_was_compiled(monkeypatch: pytest.MonkeyPatch) -> None
     assert doctor.built_part("no_such_package.part") is None
     monkeypatch.setattr(doctor, "find_spec", lambda _name: object())
     assert doctor.built_part("bluepill_sim._native") == "built"
-
-
-@pytest.mark.parametrize(
-    ("file", "program", "told"),
-    [
-        ("_part.left_out", "/usr/bin/g++", "pip install --force-reinstall --no-deps -e /src (no C compiler was found)"),
-        (
-            "_part.left_out",
-            None,
-            "sudo apt-get install g++ && pip install --force-reinstall --no-deps -e /src (no",
-        ),
-        ("_part.cpython-27-x86.so", "/usr/bin/g++", "(it was built for another Python)"),
-        ("something.else", "/usr/bin/g++", "(nothing was built in this folder)"),
-    ],
-)
-def test_doctor_says_why_a_part_was_not_compiled(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, file: str, program: str | None, told: str
-) -> None:
-    (tmp_path / "package").mkdir()
-    (tmp_path / "package" / "__init__.py").touch()
-    (tmp_path / "package" / file).write_text("no C compiler was found\n", encoding="utf-8")
-    monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.setattr(doctor, "reinstall_command", lambda: "pip install --force-reinstall --no-deps -e /src")
-    assert told in doctor.way_to_build("package._part", lambda _name: program)
-    sys.modules.pop("package")
 
 
 def test_doctor_knows_which_pythons_have_no_bullet() -> None:

@@ -14,8 +14,8 @@ import pytest
 import typer
 
 from p2os.cli import main as cli
-from p2os.cli.signals import restored_signals
 from p2os.errors import TransportError
+from simbase.command_line.signals import restored_signals
 from simbase.errors import FileError
 
 GROUP = "p2os.verbs"
@@ -138,7 +138,7 @@ def test_a_verb_can_choose_its_exit_code(offer: Callable[[object], None]) -> Non
             "p2os: No such option: --forwrd. Did you mean --forward?",
             "hint: p2os drive --help",
         ),
-        (["mcu", "run", "x.elf", "--for", "5"], "p2os: --for '5' has no unit", "hint: p2os mcu run --help"),
+        (["world", "check", "--frob"], "p2os: No such option: --frob", "hint: p2os world check --help"),
         (["--frob"], "p2os: No such option: --frob", "hint: p2os --help"),
         (["ports", "--frob"], "p2os: No such option: --frob", "hint: p2os ports --help"),
         (["info"], "p2os: Missing argument 'URL'", "hint: p2os info --help"),
@@ -149,14 +149,6 @@ def test_wrong_usage_ends_with_2(capsys: pytest.CaptureFixture[str], words: list
     told = capsys.readouterr().err.splitlines()
     assert told[0].startswith(message)
     assert told[1] == hint
-
-
-@pytest.mark.parametrize("words", [[], ["board"], ["mcu"]])
-def test_verbs_without_the_next_word_show_what_there_is(capsys: pytest.CaptureFixture[str], words: list[str]) -> None:
-    assert cli.run(words) == 0
-    told = capsys.readouterr()
-    assert told.out.startswith(f"Usage: {' '.join(['p2os', *words])} [OPTIONS] COMMAND")
-    assert not told.err
 
 
 def test_only_the_verb_that_is_named_is_imported() -> None:

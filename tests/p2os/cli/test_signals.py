@@ -12,10 +12,17 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 
 from p2os.capture import Direction, capture_of, write_recording
-from p2os.cli import signals
 from p2os.cli.main import run
-from p2os.cli.signals import ENDING_NS, FATAL, end_on_signals, end_on_suspension, postponed, restored_signals
 from p2os.protocol.commands import Command, CommandNumber
+from simbase.command_line import signals
+from simbase.command_line.signals import (
+    ENDING_NS,
+    FATAL,
+    end_on_signals,
+    end_on_suspension,
+    postponed,
+    restored_signals,
+)
 from simbase.timing import NS_PER_S
 from tests.p2os.cli.driven import AT_ONCE_S, CLOSE, COMMAND, STOP, Driver, RecordingRobot, is_raw, until
 from tests.tools.forked_python import forked_p2os, forked_python
@@ -215,7 +222,7 @@ def test_a_program_that_was_suspended_stops_the_robot_before_anything_else(
 def now(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
     """Our handlers, on a clock that a test sets."""
     time_ns = [0]
-    monkeypatch.setattr(signals, "wall_clock", lambda: time_ns[0])
+    monkeypatch.setattr(signals, "monotonic_ns", lambda: time_ns[0])
     with restored_signals():
         for number in NUMBERS:
             signal.signal(number, signal.SIG_DFL)

@@ -1,6 +1,6 @@
 """Mutated sessions and random bytes through everything that reads them: no exception, no hang, no growth.
 
-The targets are those of `tools/fuzz_protocol.py`.
+The targets are those of `tools/fuzz/protocol.py`.
 """
 
 import gc
@@ -22,7 +22,7 @@ from simbase.timing import NS_PER_MS
 
 ROOT = Path(__file__).resolve().parents[3]
 CAPTURES = ROOT / "tests" / "golden" / "captures"
-FUZZ = runpy.run_path(str(ROOT / "tools" / "fuzz_protocol.py"))
+FUZZ = runpy.run_path(str(ROOT / "tools" / "fuzz" / "protocol.py"))
 MEGABYTE = 1_000_000
 
 

@@ -14,7 +14,6 @@ from typing import Any, cast
 import pytest
 
 from p2os.cli.robots.ros import HEALTH_NS, LOOK_S, NodeLoop, stamp_of
-from p2os.cli.signals import end_on_signals, restored_signals
 from p2os.client import LinkLostError, Robot
 from p2os.client.notices import DeadmanStopped, LinkLost, MotorsDisabledError
 from p2os.client.observer import Observer
@@ -27,6 +26,7 @@ from p2os.ros.robot_node import RobotNode
 from p2os.ros.topics import SERVICES, TOPICS
 from p2os.ros.transport import NodeOptions, Received, Topic
 from p2os.transport.wall_clock import wall_clock
+from simbase.command_line.signals import end_on_signals, restored_signals
 from simbase.timing import NS_PER_MS, NS_PER_S
 from tests.p2os.client.served_robot import until
 from tests.tools.forked_python import forked_python

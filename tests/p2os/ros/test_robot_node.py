@@ -6,15 +6,12 @@ from typing import Any, cast
 
 import pytest
 
-from adapter_sim.codec import encoder_code as adapter_encoder_code
-from adapter_sim.codec import motor_value
-from adapter_sim.settings import AdapterSettings
 from p2os.client.observer import Bumpers, Observer
 from p2os.client.robot_state import RobotPose, RobotState
 from p2os.protocol.sip import SonarReading, StandardSip
 from p2os.robots.parameters import load_parameters
 from p2os.ros.robot_node import Motors, Refused, ResetOdometry, RobotNode, Speed, Stop
-from p2os.ros.thesis_topics import CODES, STEP_MPS, encoder_code, motor_speed
+from p2os.ros.thesis_topics import STEP_MPS
 from p2os.ros.topics import TOPICS
 from p2os.ros.transport import NodeOptions, Received
 from simbase.errors import UsageError
@@ -100,21 +97,6 @@ def test_after_a_stop_a_motor_topic_does_not_bring_the_other_wheel_back(node: Ro
     node.advance_to(DEADMAN_NS)
     speed = cast("Speed", node.take_commands([asked("motor_right", data=1)], now=DEADMAN_NS + 1)[0])
     assert speed.forward_mps == pytest.approx(STEP_MPS / 2)
-
-
-def test_motor_values_mean_what_the_adapter_makes_of_the_same_wires() -> None:
-    step = AdapterSettings().step_um_per_s
-    for code in range(CODES):
-        assert motor_speed(code) == pytest.approx(motor_value(code, 3) * step / 1e6)
-        assert motor_speed(motor_value(code, 3)) == motor_speed(code)
-    assert motor_speed(-CODES // 2 - 1) is None
-    assert motor_speed(CODES) is None
-
-
-def test_encoder_values_are_those_of_the_adapter_for_each_degree_of_both_ways() -> None:
-    for degrees in range(-800, 801):
-        wanted = adapter_encoder_code(2 * degrees + 1, 720, 3)
-        assert encoder_code(math.radians(degrees + 0.5)) == wanted, degrees
 
 
 def test_odometry_is_the_pose_in_odom_and_the_speeds_in_base_link(node: RobotNode) -> None:

@@ -6,11 +6,11 @@ import signal
 import pytest
 from rich.console import Console
 
-from p2os.cli.signals import end_on_signals, restored_signals
 from robot_bench.cli import progress
 from robot_bench.cli.progress import RunDisplay
 from robot_bench.cli.table import rows
 from robot_bench.run import Progress
+from simbase.command_line.signals import end_on_signals, restored_signals
 
 S = 10**9
 

@@ -10,11 +10,11 @@ from typing import ClassVar
 import pytest
 
 from bluepill_sim import BluePill, BluePillError
+from bluepill_sim.__main__ import run
 from bluepill_sim.cli.parts import show_parts
 from bluepill_sim.parts import Ssd1306
 from bluepill_sim.parts.attached import PartError, Use
 from bluepill_sim.parts.registry import PARTS, PartSpec, attach, build, parse_part, part_class
-from p2os.cli.main import run
 from simbase.errors import FileError
 from simbase.trust import own_code
 
@@ -242,19 +242,19 @@ def test_the_command_line_shows_what_parts_came_to_and_writes_their_pictures(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     options = ["--for", "60ms", "--parts", str(tmp_path / "shots"), "--attach", "ssd1306,on=I2C1,name=oled"]
-    assert run(["mcu", "run", str(PROGRAM), *options]) == 0
+    assert run(["run", str(PROGRAM), *options]) == 0
     assert "oled: 128x64, on, 688 dots lit\n" in capfd.readouterr().err
     assert (tmp_path / "shots" / "oled.png").read_bytes()[:4] == b"\x89PNG"
-    assert run(["mcu", "run", str(PROGRAM), "--attach", "ssd1307"]) == 2
+    assert run(["run", str(PROGRAM), "--attach", "ssd1307"]) == 2
     assert "there is no part 'ssd1307'" in capfd.readouterr().err
 
 
 def test_the_command_line_lists_parts_with_their_settings(capfd: pytest.CaptureFixture[str]) -> None:
-    assert run(["mcu", "parts"]) == 0
+    assert run(["parts"]) == 0
     listed = capfd.readouterr().out.splitlines()
     assert [line.split()[0] for line in listed] == list(PARTS)
     assert max(map(len, listed)) <= 80
-    assert run(["mcu", "parts", "hc-sr04"]) == 0
+    assert run(["parts", "hc-sr04"]) == 0
     one = capfd.readouterr().out
     assert "  pins  trig, echo\n" in one
     assert "  temperature_c = 20.0\n" in one

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from bluepill_sim import BluePill
-from robot_bench.firmware import build
+from tests.tools.examples import build
 
 HERE = Path(__file__).resolve().parent
 #: Of board.c the clock.

@@ -18,7 +18,7 @@ from tests.p2os.pioneer.world.counted_calls import calls_of
 WEDGE = [(0, 0, 0), (2, 0, 0), (0, 1, 0), (0, 0, 3)]
 FACES = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
 BYTES = b"".join(struct.pack("<3f", x, z, -y) for x, y, z in WEDGE) + struct.pack("<12H", *sum(FACES, ()))
-#: As `tools/fuzz_files.py` writes a document: any JSON.
+#: As `tools/fuzz/files.py` writes a document: any JSON.
 Document = dict[str, Any]
 
 

@@ -1,13 +1,13 @@
 """Boards with the echo program, which answers in capitals."""
 
 from collections.abc import Callable
-from importlib.resources import files
 
 import pytest
 
 from bluepill_sim import BluePill
+from tests.tools.examples import EXAMPLES
 
-ECHO = str(files("robot_bench.firmware") / "usb_echo.elf")
+ECHO = str(EXAMPLES / "usb_echo.elf")
 
 
 @pytest.fixture

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from contextlib import suppress
-from importlib.resources import files
 
 import pytest
 from hypothesis import given, settings
@@ -14,6 +13,7 @@ from bluepill_sim.parts.usb import HostState, UsbRequestError
 from bluepill_sim.parts.usb.descriptors import DescriptorError, parse_configuration, parse_device, parse_string
 from bluepill_sim.parts.usb.host import HEAD_NS, RECOVERY_NS, RESET_NS, STATUS_NS
 from simbase.timing import NS_PER_MS
+from tests.tools.examples import EXAMPLES
 
 Boards = Callable[[], BluePill]
 Row = tuple[int, Transaction, Answer | None]
@@ -216,7 +216,7 @@ def test_requests_of_any_bytes_do_the_device_no_harm(configured: BluePill, reque
 
 @pytest.fixture(scope="module")
 def configured() -> BluePill:
-    board = BluePill(str(files("robot_bench.firmware") / "usb_echo.elf"))
+    board = BluePill(str(EXAMPLES / "usb_echo.elf"))
     board.usb.wait_configured()
     return board
 
@@ -292,7 +292,7 @@ def test_a_suspended_bus_is_still_and_goes_on(boards: Boards) -> None:
 
 def test_a_device_without_a_program_for_it_fails_in_one_line(boards: Boards) -> None:
     del boards  # for its watchdog
-    board = BluePill(str(files("robot_bench.firmware") / "motors.elf"))
+    board = BluePill(str(EXAMPLES / "motors.elf"))
     with pytest.raises(UsbRequestError, match="it is failed: head of the device descriptor: does not answer"):
         board.usb.wait_configured("5 s")
 

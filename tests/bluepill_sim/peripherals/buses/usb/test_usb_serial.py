@@ -3,19 +3,19 @@
 import os
 import tty
 from collections.abc import Callable
-from importlib.resources import files
 from pathlib import Path
 
 import pytest
 
 from bluepill_sim import BluePill
+from bluepill_sim.__main__ import run
 from bluepill_sim.board import WaitError
 from bluepill_sim.cli.console import PtyConsole, connect, open_console
 from bluepill_sim.errors import BluePillError
-from p2os.cli.main import run
+from tests.tools.examples import EXAMPLES
 
 Boards = Callable[[], BluePill]
-ECHO = str(files("robot_bench.firmware") / "usb_echo.elf")
+ECHO = str(EXAMPLES / "usb_echo.elf")
 
 
 def test_what_is_sent_before_the_device_is_there_waits_for_it(boards: Boards) -> None:
@@ -89,7 +89,7 @@ def test_pty_needs_no_colon() -> None:
 def test_the_command_line_plugs_it_in_and_tells_what_it_found(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    assert run(["mcu", "run", ECHO, "--usb", str(tmp_path / "log"), "--for", "300ms"]) == 0
+    assert run(["run", ECHO, "--usb", str(tmp_path / "log"), "--for", "300ms"]) == 0
     captured = capfd.readouterr().err
     assert f"USB is plugged in; its serial port goes to {tmp_path / 'log'}\n" in captured
     assert captured.endswith("usb: 1209:0001 p2os, echo, configured, 0 bytes from it, 0 to it\n")

@@ -10,9 +10,8 @@ import re
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-#: Groups of verbs, as they are listed: first what everybody begins with.
-BENCH, ROBOTS, CAPTURES, LINKS, BLUEPILL = "Bench", "Robots", "Captures", "Links", "BluePill"
-GROUPS = (BENCH, ROBOTS, CAPTURES, LINKS, BLUEPILL)
+#: Stands in help for the words before the verb: the same verbs may be those of several programs.
+PROGRAM = "{program}"
 #: Of verbs that name no group.
 OTHERS = "Others"
 #: An example, a gap, and what it does.
@@ -22,13 +21,13 @@ _COLUMNS = re.compile(r"^(?P<left> *\S+(?: \S+)*)  +(?P<right>\S.*)$")
 class VerbPage(TyperCommand):
     """The page of a verb."""
 
-    def format_help_text(self, ctx: typer.Context, formatter) -> None:  # type: ignore[no-untyped-def, override]  # noqa: ANN001, ARG002 - click's or typer's own
+    def format_help_text(self, ctx: typer.Context, formatter) -> None:  # type: ignore[no-untyped-def, override]  # noqa: ANN001 - click's or typer's own
         """Write what the help says, no line wider than the page."""
-        _write_text(formatter, self.help)
+        _write_text(formatter, _called(self.help, ctx))
 
-    def format_epilog(self, ctx: typer.Context, formatter) -> None:  # type: ignore[no-untyped-def, override]  # noqa: ANN001, ARG002 - click's or typer's own
+    def format_epilog(self, ctx: typer.Context, formatter) -> None:  # type: ignore[no-untyped-def, override]  # noqa: ANN001 - click's or typer's own
         """Write what stands at the end, likewise."""
-        _write_text(formatter, self.epilog)
+        _write_text(formatter, _called(self.epilog, ctx))
 
     def collect_usage_pieces(self, ctx: typer.Context) -> list[str]:  # type: ignore[override]  # noqa: ARG002 - typer's own
         """Return what follows the verb: arguments by their metavariables, in brackets where they may be left out."""
@@ -54,22 +53,25 @@ class VerbPage(TyperCommand):
 class VerbList(TyperGroup):
     """The page of a command that has others below it, which is what it shows where none of them is named."""
 
+    #: Groups that are listed first, in this order.
+    groups: tuple[str, ...] = ()
+
     def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override]
         """Show the page in place of an error where there are no words."""
         bare = not args and not self.invoke_without_command and not ctx.resilient_parsing
         return super().parse_args(ctx, ["--help"] if bare else args)
 
-    def format_help_text(self, ctx: typer.Context, formatter) -> None:  # type: ignore[no-untyped-def, override]  # noqa: ANN001, ARG002 - click's or typer's own
+    def format_help_text(self, ctx: typer.Context, formatter) -> None:  # type: ignore[no-untyped-def, override]  # noqa: ANN001 - click's or typer's own
         """Write what the help says, no line wider than the page."""
-        _write_text(formatter, self.help)
+        _write_text(formatter, _called(self.help, ctx))
 
-    def format_epilog(self, ctx: typer.Context, formatter) -> None:  # type: ignore[no-untyped-def, override]  # noqa: ANN001, ARG002 - click's or typer's own
+    def format_epilog(self, ctx: typer.Context, formatter) -> None:  # type: ignore[no-untyped-def, override]  # noqa: ANN001 - click's or typer's own
         """Write what stands at the end, likewise."""
-        _write_text(formatter, self.epilog)
+        _write_text(formatter, _called(self.epilog, ctx))
 
     def format_commands(self, ctx: typer.Context, formatter) -> None:  # type: ignore[no-untyped-def, override]  # noqa: ANN001 - click's or typer's own
         """Write the verbs, group by group, each with its first sentence."""
-        groups: dict[str, list[tuple[str, str]]] = {name: [] for name in (*GROUPS, OTHERS)}
+        groups: dict[str, list[tuple[str, str]]] = {name: [] for name in self.groups}
         for name in self.list_commands(ctx):
             command = self.get_command(ctx, name)
             if command is not None and not command.hidden:
@@ -77,6 +79,7 @@ class VerbList(TyperGroup):
                 groups.setdefault(panel if isinstance(panel, str) else OTHERS, []).append(
                     (name, first_sentence(command.help))
                 )
+        groups[OTHERS] = groups.pop(OTHERS, [])  # last
         width = max((len(name) for rows in groups.values() for name, _ in rows), default=0)
         shown = {title: rows for title, rows in groups.items() if rows}
         for title, rows in shown.items():
@@ -86,7 +89,8 @@ class VerbList(TyperGroup):
 
 def dress(app: typer.Typer) -> None:
     """Give every command of an application its page, those of packages above as well."""
-    app.info.cls = VerbList
+    if not (isinstance(app.info.cls, type) and issubclass(app.info.cls, VerbList)):
+        app.info.cls = VerbList
     for command in app.registered_commands:
         command.cls = VerbPage if command.cls in {None, TyperCommand} else command.cls
     for group in app.registered_groups:
@@ -110,6 +114,11 @@ def first_sentence(text: str | None) -> str:
     """Return what a verb does, in one line."""
     words = " ".join((text or "").split("\n\n", maxsplit=1)[0].split())
     return words.split(". ", maxsplit=1)[0].removesuffix(".")
+
+
+def _called(text: str | None, ctx: typer.Context) -> str | None:
+    """Return a text in which `{program}` is how the program was called that the verb is of."""
+    return text and text.replace(PROGRAM, ctx.parent.command_path if ctx.parent else ctx.command_path)
 
 
 def _write_text(formatter, text: str | None) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001 - as above

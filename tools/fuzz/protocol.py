@@ -1,9 +1,9 @@
-"""Fuzz targets for whatever reads bytes of others, and a plain mutator to run them with; files: `fuzz_files.py`.
+"""Fuzz targets for whatever reads bytes of others, and a plain mutator to run them with; files: `files.py`.
 
 A target takes any bytes and raises only when something is wrong: an exception
 that its reader does not promise, or a broken invariant.
 
-Usage: python tools/fuzz_protocol.py TARGET COUNT [SEED]
+Usage: python tools/fuzz/protocol.py TARGET COUNT [SEED]
 """
 
 import itertools
@@ -26,7 +26,7 @@ from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import load_parameters
 from simbase.timing import NS_PER_MS, Nanos
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 GOLDEN = ROOT / "tests" / "golden"
 EMPTY = parse_world('name = "empty"\nextent_m = [-4, -4, 4, 4]', "empty")
 P2DX = load_parameters("p2dx")

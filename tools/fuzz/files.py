@@ -1,7 +1,7 @@
 """Fuzzing of every file that users hand in: a hostile file is read, or refused in one line that names it.
 
-    python -m tools.fuzz_files                            a few hundred cases of every format
-    python -m tools.fuzz_files --format world --cases 10000 --seed 7
+    python -m tools.fuzz.files                            a few hundred cases of every format
+    python -m tools.fuzz.files --format world --cases 10000 --seed 7
 
 Each case takes a file that is right and damages it: a value becomes one of another type or an
 extreme number, a key is dropped, doubled or misspelt, a line is cut, bytes are turned. What is
@@ -62,7 +62,7 @@ from tests.p2os.pioneer.world import test_importers_odd as odd
 from tests.p2os.pioneer.world import test_importers_xml as xml
 from tests.p2os.robots.test_robot_files import MINE
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 GOLDEN = ROOT / "tests" / "golden"
 #: chosen: the slowest right file of those below takes a tenth of it.
 LIMIT_S = 2.0

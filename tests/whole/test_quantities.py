@@ -7,13 +7,17 @@ from typing import Any
 import pytest
 import typer
 
-from p2os.cli.help_pages import GROUPS, OTHERS, VerbList, first_sentence
+from p2os.cli.groups import GroupedVerbs
 from p2os.cli.main import completed_words, make_app, run
+from simbase.command_line.help_pages import OTHERS, VerbList, first_sentence
 from simbase.errors import UsageError
 from simbase.units import ANGLE, BAUD, COUNT, FACTOR, LENGTH, SPEED, TIME, TURN_RATE, Quantity
 
 #: One style: what is typed as it is in small letters, what stands for something in capitals.
 METAVAR = re.compile(r"[A-Za-z0-9_|,=@:.\[\]% -]+")
+
+#: Those of the toolkit, then the emulator's.
+GROUPS = (*GroupedVerbs.groups, "BluePill")
 
 
 def commands(command: Any = None, path: str = "p2os") -> Iterator[tuple[str, Any]]:

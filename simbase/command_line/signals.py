@@ -20,10 +20,10 @@ import contextlib
 import signal
 import threading
 from collections.abc import Iterator
+from time import monotonic_ns
 from types import FrameType, TracebackType
 from typing import Self
 
-from p2os.transport.wall_clock import wall_clock
 from simbase.interrupts import FATAL, signal_numbers
 from simbase.timing import NS_PER_S, Nanos
 
@@ -49,7 +49,7 @@ class _Ending:
 
     def handle(self, number: int, _frame: FrameType | None) -> None:
         """Raise KeyboardInterrupt, or note that it is to be raised."""
-        now, name = wall_clock(), signal.Signals(number).name
+        now, name = monotonic_ns(), signal.Signals(number).name
         if self._began_at is None:
             self._began_at = now
             if self.postponements:

@@ -13,9 +13,13 @@ MOST_A_SECOND = 5
 
 
 @contextlib.contextmanager
-def shown_refusals() -> Iterator[None]:
-    """Show each refusal in the block."""
-    log, handler = logging.getLogger(LOGGER), _Lines()
+def shown_refusals(program: str) -> Iterator[None]:
+    """Show each refusal in the block.
+
+    Args:
+        program: How it was called, which lines begin with.
+    """
+    log, handler = logging.getLogger(LOGGER), _Lines(program)
     log.addHandler(handler)
     try:
         yield
@@ -26,8 +30,9 @@ def shown_refusals() -> Iterator[None]:
 class _Lines(logging.Handler):
     """Writes records to whatever standard error is then."""
 
-    def __init__(self) -> None:
+    def __init__(self, program: str) -> None:
         super().__init__(logging.WARNING)
+        self._program = program
         self._second, self._written, self._left_out = -1, 0, 0
 
     def emit(self, record: logging.LogRecord) -> None:
@@ -41,7 +46,7 @@ class _Lines(logging.Handler):
         self._written += 1
         with contextlib.suppress(OSError):  # nobody reads it
             if self._left_out:
-                sys.stderr.write(f"p2os: {self._left_out} connections more were refused\n")
+                sys.stderr.write(f"{self._program}: {self._left_out} connections more were refused\n")
                 self._left_out = 0
-            sys.stderr.write(f"p2os: {record.getMessage()}\n")
+            sys.stderr.write(f"{self._program}: {record.getMessage()}\n")
             sys.stderr.flush()

@@ -1,0 +1,215 @@
+"""What a user gets who has no checkout: the wheel of each house, built from its source distribution.
+
+The slow tests take the build's own tools from a package index and say so where none is reached.
+"""
+
+import email
+import json
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tarfile
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from tests.tools.made_once import made_once
+from tests.whole.building import LIMIT_S, PROJECT, ROOT, build, built, clean_environment, python_of, tracked
+from tools.packaging.staging import houses, stage
+
+HOUSES = houses()
+#: What a build makes of the sources, and what only it reads.
+MADE, READ_BY_THE_BUILD = (".so", ".left_out"), ("bluepill_sim/extension/source/", "robot_bench/wires/edges.c")
+PYTEST = ("-m", "pytest", "-q", "--import-mode=importlib", "-p", "no:cacheprovider")
+PARTS = [part["name"] for part in PROJECT["tool"]["setuptools"]["ext-modules"]]
+
+
+@pytest.fixture(scope="module")
+def builder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return made_once(tmp_path_factory, "builder", lambda place: python_of(place, *PROJECT["build-system"]["requires"]))
+
+
+def unoptimized(folder: Path, compiler: str) -> str:
+    """Return a compiler that takes half the time; how well the parts run is looked at in the checkout's."""
+    script = folder / compiler
+    script.write_text(f'#!/bin/sh\nexec {compiler} "$@" -O0\n')
+    script.chmod(0o755)
+    return str(script)
+
+
+def wheel_of(builder: Path, name: str, place: Path) -> Path:
+    """Return the wheel of a house, from its source distribution."""
+    stage(HOUSES[name], place / "sources")
+    archive = built(build(builder, place / "sources", "sdist", place), place)
+    with tarfile.open(archive) as packed:
+        packed.extractall(place, filter="data")
+    compilers = {"CC": unoptimized(place, "cc"), "CXX": unoptimized(place, "c++")}
+    return built(build(builder, place / archive.name.removesuffix(".tar.gz"), "wheel", place, **compilers), place)
+
+
+@pytest.fixture(scope="module")
+def wheels(builder: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    return {name: made_once(tmp_path_factory, f"wheel-{name}", lambda place, name=name: wheel_of(builder, name, place))
+            for name in HOUSES}  # fmt: skip
+
+
+def files_of(wheel: Path) -> set[str]:
+    """Return the files that a wheel's RECORD names, without those about the distribution."""
+    with zipfile.ZipFile(wheel) as archive:
+        record = next(name for name in archive.namelist() if name.endswith(".dist-info/RECORD"))
+        names = [line.split(",")[0] for line in archive.read(record).decode().splitlines()]
+    return {name for name in names if ".dist-info/" not in name}
+
+
+def left_out(house: str, wheel: Path) -> list[str]:
+    """Return the files of a house's folders that its wheel lacks."""
+    held, folders = files_of(wheel), tuple(f"{folder}/" for folder in HOUSES[house].folders)
+    return [
+        name for name in tracked()
+        if name.startswith(folders) and not name.startswith(READ_BY_THE_BUILD) and name not in held
+    ]  # fmt: skip
+
+
+@pytest.mark.slow
+def test_no_file_is_in_two_wheels_and_none_is_left_out(wheels: dict[str, Path]) -> None:
+    held = [name for wheel in wheels.values() for name in files_of(wheel)]
+    assert len(held) == len(set(held))
+    assert {name: left_out(name, wheel) for name, wheel in wheels.items() if left_out(name, wheel)} == {}
+    assert {name for name in held if name.endswith(MADE)} == {f"{part.replace('.', '/')}.so" for part in PARTS}
+
+
+@pytest.mark.slow
+def test_a_wheel_is_for_every_python_and_of_a_platform_only_where_parts_are_in_c(wheels: dict[str, Path]) -> None:
+    tags = {name: wheel.stem.split("-", 2)[2] for name, wheel in wheels.items()}
+    assert tags["simbase"] == tags["p2os"] == "py3-none-any"
+    for name in ("bluepill-sim", "robot-bench"):
+        assert tags[name].startswith("py3-none-linux_"), tags
+
+
+@pytest.mark.slow
+def test_a_data_file_that_is_left_out_of_a_wheel_is_named(builder: Path, tmp_path: Path) -> None:
+    sources = stage(HOUSES["p2os"], tmp_path / "sources")
+    table = sources / "pyproject.toml"
+    table.write_text(table.read_text(encoding="utf-8").replace(', "*.lua"', ""), encoding="utf-8")
+    wheel = built(build(builder, sources, "wheel", tmp_path), tmp_path)
+    assert left_out("p2os", wheel) == ["p2os/capture/p2os.lua"]
+
+
+def shortest_tests(place: Path, *names: str) -> Path:
+    """Copy tests to where the checkout is not."""
+    for name in ("tests/conftest.py", "tests/tools", *names):
+        source, target = ROOT / name, place / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        (shutil.copytree if source.is_dir() else shutil.copyfile)(source, target)
+    return place
+
+
+@pytest.mark.slow
+def test_the_toolkits_wheel_drives_a_robot_where_nothing_else_is(wheels: dict[str, Path], tmp_path: Path) -> None:
+    program = python_of(tmp_path / "user", str(wheels["simbase"]), str(wheels["p2os"]), "pytest", "hypothesis")
+    code = """
+from p2os import Robot, served_pioneer
+with served_pioneer(world="room") as url, Robot(url) as robot:
+    robot.drive(0.1)
+    print(robot.state.pose)
+"""
+    place = shortest_tests(tmp_path, "tests/p2os/protocol", "tests/golden")
+    for words in (
+        ["-c", code],
+        ["-m", "p2os", "doctor"],
+        [
+            "-m",
+            "pytest",
+            "-q",
+            "--import-mode=importlib",
+            "-p",
+            "no:cacheprovider",
+            "tests/p2os/protocol/test_frames.py",
+        ],
+    ):
+        done = subprocess.run(
+            [program, *words], cwd=place, env=clean_environment(),
+            capture_output=True, text=True, timeout=LIMIT_S, check=False,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.slow
+def test_the_emulators_wheel_runs_a_program_where_nothing_else_is(wheels: dict[str, Path], tmp_path: Path) -> None:
+    program = python_of(tmp_path / "user", str(wheels["simbase"]), str(wheels["bluepill-sim"]), "pytest", "hypothesis")
+    elf = str(ROOT / "robot_bench" / "firmware" / "motors.elf")
+    place = shortest_tests(tmp_path, "tests/bluepill_sim", "robot_bench/firmware")
+    for words in (
+        ["-m", "bluepill_sim", "run", elf, "--for", "10ms"],
+        [*PYTEST, "tests/bluepill_sim/program"],
+    ):
+        done = subprocess.run(
+            [program, *words], cwd=place, env=clean_environment(),
+            capture_output=True, text=True, timeout=LIMIT_S, check=False,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", HOUSES)
+def test_the_page_of_a_house_points_to_nothing_that_only_a_checkout_has(wheels: dict[str, Path], name: str) -> None:
+    with zipfile.ZipFile(wheels[name]) as archive:
+        file = next(name for name in archive.namelist() if name.endswith(".dist-info/METADATA"))
+        page = email.message_from_bytes(archive.read(file)).get_payload()
+    assert f"# {name}\n" in page
+    assert "](" not in page.replace("](http", ""), "a relative link leads nowhere outside the repository"
+
+
+@pytest.mark.slow
+def test_all_houses_drive_the_demo_in_an_empty_environment(wheels: dict[str, Path], tmp_path: Path) -> None:
+    program = python_of(tmp_path / "user", *map(str, wheels.values())).parent / "p2os"
+
+    def said_by(*words: str) -> str:
+        done = subprocess.run(
+            [program, *words], cwd=tmp_path, env=clean_environment(P2OS_CORE="native"),
+            capture_output=True, text=True, timeout=LIMIT_S, check=False,
+        )  # fmt: skip
+        assert done.returncode in {0, 1}, done.stderr  # 1: a goal that this short a run cannot reach
+        return done.stdout
+
+    found = {finding["name"]: finding["found"] for finding in json.loads(said_by("doctor", "--json"))}
+    assert [found[part] for part in PARTS] == ["built"] * len(PARTS)
+    assert json.loads(said_by("demo", "--duration", "1s", "--json"))["scenario"] == "dodge"
+    driven = said_by("run", "motors", "--body", "kinematic", "--adapter", "firmware", "--duration", "1s", "--json")
+    assert json.loads(driven)["scenario"] == "motors"
+
+
+@pytest.fixture
+def emulator(tmp_path: Path) -> Path:
+    return stage(HOUSES["bluepill-sim"], tmp_path / "bluepill-sim")
+
+
+@pytest.mark.slow
+def test_a_part_that_does_not_compile_fails_the_build(builder: Path, emulator: Path, tmp_path: Path) -> None:
+    (emulator / "bluepill_sim/extension/source/core/core.h").unlink()
+    done = build(builder, emulator, "wheel", tmp_path / "out")
+    assert done.returncode != 0
+    assert "bluepill_sim._native does not compile" in done.stderr
+    assert "P2OS_NATIVE=0" in done.stderr, "the way round it"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("environment", "reason"),
+    [({"PATH": ""}, "no C compiler was found"), ({"P2OS_NATIVE": "0"}, "P2OS_NATIVE=0 was set")],
+    ids=["no compiler", "not wanted"],
+)
+def test_a_part_that_is_left_out_leaves_its_reason(
+    builder: Path, emulator: Path, tmp_path: Path, environment: dict[str, str], reason: str
+) -> None:
+    folder = emulator / "build" / f"lib.{sysconfig.get_platform()}-{sys.implementation.cache_tag}" / "bluepill_sim"
+    folder.mkdir(parents=True)
+    for left in ("_native.so", f"_native{sysconfig.get_config_var('EXT_SUFFIX')}"):
+        (folder / left).write_text("of an earlier build")
+    done = build(builder, emulator, "wheel", tmp_path / "out", **environment)
+    with zipfile.ZipFile(built(done, tmp_path / "out")) as archive:
+        assert not [name for name in archive.namelist() if name.endswith(".so")]
+        assert archive.read("bluepill_sim/_native.left_out").decode().startswith(reason[:9])
+    assert f"bluepill_sim._native is left out: {reason}" in done.stdout + done.stderr
