@@ -432,7 +432,7 @@ def _packed_code(code: Code, files: dict[str, bytes]) -> str:
         return ""
     there = code.file.parent
     into = f"code-{fingerprint_of(there).sha256[:12]}"
-    files |= {f"{into}/{name}": path.read_bytes() for name, path in importable(there)}
+    files |= {f"{into}/{name}": read_bytes(path) for name, path in importable(there)}
     return f"{into}/{code.file.name}:{code.kind}"
 
 

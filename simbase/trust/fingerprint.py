@@ -14,7 +14,7 @@ from importlib.machinery import all_suffixes
 from pathlib import Path
 
 from simbase.errors import UsageError, shown_name
-from simbase.files import reading
+from simbase.files import sha256_of
 
 #: chosen: what a folder of somebody's classes holds, ten times; a whole environment is more.
 MOST_FILES = 2_000
@@ -50,8 +50,7 @@ def fingerprint_of(folder: Path) -> Fingerprint:
     """
     found = {}
     for name, path in sorted(importable(folder)):  # all are counted before the first is read
-        with reading(path):
-            found[name] = hashlib.sha256(path.read_bytes()).hexdigest()
+        found[name] = sha256_of(path)
     return Fingerprint(found)
 
 

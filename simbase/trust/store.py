@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from simbase.errors import FileError, shown, shown_name
-from simbase.files import reading, writing
+from simbase.files import read_text, writing
 
 ANSWERS = Path("p2os", "trusted.jsonl")
 CONFIGURATION = Path("p2os", "config.toml")
@@ -24,8 +24,8 @@ TRUST = "trust"
 def answers() -> frozenset[str]:
     """Return the keys of the code to which the answer was yes; a line that cannot be read is none."""
     try:
-        lines = _place("XDG_STATE_HOME", ".local/state", ANSWERS).read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError):
+        lines = read_text(_place("XDG_STATE_HOME", ".local/state", ANSWERS)).splitlines()
+    except FileError:
         return frozenset()
     return frozenset(key for line in lines if (key := _key_of(line)))
 
@@ -55,8 +55,7 @@ def configured(environment: Mapping[str, str] | None = None) -> tuple[Path, ...]
     if not path.is_file():
         return ()
     try:
-        with reading(path):
-            named = tomllib.loads(path.read_text(encoding="utf-8")).get(TRUST, [])
+        named = tomllib.loads(read_text(path)).get(TRUST, [])
     except ValueError as error:  # no TOML, or no text
         raise FileError(f"{shown_name(path)}: {error}", hint='trust = ["~/robots/mine.py"]') from error
     found = [Path(one).expanduser() for one in named if isinstance(one, str)] if isinstance(named, list) else []

@@ -92,8 +92,8 @@ READ_ELSEWHERE = {
     "simbase.files": "the bounds themselves",
     "simbase.user_classes": "Python's own import has read it",
     "simbase.installation": "of an installed package",
+    "simbase.trust.installed": "of an installed package",
     "p2os.capture.formats.sources": "a block or a line at a time",
-    "p2os.cli.doctor": "of this installation",
     "p2os.cli.links.ports": "of the kernel",
     "p2os.pioneer.body.bullet.body": "the engine has just written it",
     "robot_bench.adapter": "of this installation",
@@ -131,6 +131,7 @@ def test_no_module_reads_a_file_of_a_users_but_within_the_bounds() -> None:
 
 #: Where else a file is opened to be written, and who tells of what the system has against it.
 WRITTEN_ELSEWHERE = {
+    "simbase.trust.store": "a line, within `writing`",
     "p2os.cli.captures.capture_files": "tells of it itself, and takes back half a piece",
     "robot_bench.campaign.journal": "each line within `writing`",
     "robot_bench.cli.campaigns.campaign": "must not be there; tells of it itself",

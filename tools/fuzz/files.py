@@ -420,7 +420,7 @@ def _traces() -> list[Seed]:
         "firmware": "dodge.elf", "firmware_sha256": "00", "duration_s": 2.0, "threshold_m": 0.6, "step_mps": 0.0625,
         "start": {"x": 0.0, "y": 0.0, "heading": 0.0}, "note": "",
         "robot": {"name": "p2dx", "front_m": 0.18, "rear_m": 0.26, "width_m": 0.38, "sonar_cone_rad": 0.5,
-                  "sonar": [{"x": 0.1, "y": 0.1, "heading": 1.5}]},
+                  "sonar": [[0.1, 0.1, 1.5]]},
     }  # fmt: skip
     pose = {"x": 0, "y": 0, "z": 0, "h": 0, "p": 0, "l": 0, "r": 0, "la": 0, "ra": 0, "c": 0}
     lines: list[dict[str, object]] = [

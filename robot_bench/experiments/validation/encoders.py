@@ -61,7 +61,7 @@ def encoder_figures(record: RunRecord, nominal: Nominal) -> list[Finding]:
             told += _after_packets(nominal, poses, side, steps)
         if nominal.at_port:
             continue
-        whole = _whole_turns(record, side, start, steps[0][1])
+        whole = _beginning(record, nominal, side, start, steps[0][1])
         is_within_turn = nominal.is_direct and bool(_ambiguous(record, nominal, start))
         for pose in record.poses:
             if pose.t < start or (is_within_turn and pose.t % round(nominal.encoder_period_s * NS_PER_S)):
@@ -112,10 +112,17 @@ def _turned_steps(poses: Sequence[Pose], t: Nanos, side: str) -> float:
     return max(near) - min(near) if near else 0.0
 
 
-def _whole_turns(record: RunRecord, side: str, start: Nanos, code: int) -> int:
-    """Return by how many steps a code is counted from another beginning than the wheel's angle: whole turns."""
-    first = next((wheel_steps(pose, side) for pose in record.poses if pose.t >= start), 0.0)
-    return round((first - code - 0.5) / ENCODER_STEPS) * ENCODER_STEPS
+def _beginning(record: RunRecord, nominal: Nominal, side: str, start: Nanos, code: int) -> int:
+    """Return by how many steps a code is counted from another beginning than the wheel's angle.
+
+    Straight from the body these are whole turns. An adapter counts on from the code that it began with, which is
+    the one that its wires show while it boots.
+    """
+    if nominal.is_direct:
+        first = next((wheel_steps(pose, side) for pose in record.poses if pose.t >= start), 0.0)
+        return round((first - code - 0.5) / ENCODER_STEPS) * ENCODER_STEPS
+    standing = [pose for pose in record.poses if pose.t <= start]
+    return math.floor(wheel_steps(standing[-1], side) if standing else 0.0) - code
 
 
 def _within_turn(steps: float) -> float:
@@ -148,7 +155,7 @@ def sparse_figures(record: RunRecord, nominal: Nominal) -> list[Finding]:
         for side, text in zip(SIDES, found.group(3, 4) if found else (), strict=False):
             begin = next((count for _, count in encoder_steps(record, side, start)), 0)
             truth = wheel_steps(record.poses[-1], side)
-            off = int(text) + begin + _whole_turns(record, side, start, begin) + 0.5 - truth
+            off = int(text) + begin + _beginning(record, nominal, side, start, begin) + 0.5 - truth
             ends.append(Figure(
                 group="pins", what="count of the program at the end, against the wheel", expected=truth,
                 measured=truth + (_within_turn(off) if nominal.is_direct else off), uncertainty=ENCODER_STEPS / MICRO,

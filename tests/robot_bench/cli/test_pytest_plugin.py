@@ -184,7 +184,7 @@ def test_alike(bench):
 def test_of_seeds_that_are_looked_at(bench):
     bench.run_until("20 ms")
     bench.inject(f"sonar-dead {bench.scenario.seed + 1}")
-    bench.run_until("30 ms")
+    bench.run_until("400 ms")
 
 @pytest.mark.seeds(7)
 def test_of_one_seed(bench):
