@@ -442,6 +442,8 @@ class Can(Peripheral):
     def on_reset(self) -> None:
         """Drop everything; it stays on its network."""
         self._settle()
+        for network in filter(None, (self._alone, self._joined)):
+            network.forget(self)
         self.due_ns = None
         self._show_level(1, 1)
         self._clear()
