@@ -60,7 +60,7 @@ class StreamConsole:
         """Make it.
 
         Args:
-            stream: Where the characters go; flushed at each line end.
+            stream: Where the characters go; flushed at each line end, and whenever the far end is looked at.
             description: Where that is, for people.
             is_owner: Whether `close` closes the stream.
             readable: Makes the characters text that does not act on a terminal; None: they go as they come.
@@ -69,22 +69,30 @@ class StreamConsole:
         self._stream = stream
         self._is_owner = is_owner
         self._readable = readable
+        self._is_flushed = True
 
     def write(self, data: bytes) -> None:
         """Write characters."""
         self._stream.write(data if self._readable is None else self._readable.take(data))
+        self._is_flushed = False
         if b"\n" in data:
-            self._stream.flush()
+            self._flush()
 
     def poll(self) -> bytes:
-        """Return nothing: a stream is one-way."""
+        """Return nothing: a stream is one-way. What was written is seen from now on: a prompt ends in no line."""
+        if not self._is_flushed:
+            self._flush()
         return b""
+
+    def _flush(self) -> None:
+        self._stream.flush()
+        self._is_flushed = True
 
     def close(self) -> None:
         """Flush, and close the stream if it is ours."""
         if self._readable is not None:
             self._stream.write(self._readable.take(b"", is_end=True))
-        self._stream.flush()
+        self._flush()
         if self._is_owner:
             self._stream.close()
 

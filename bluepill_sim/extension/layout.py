@@ -492,9 +492,11 @@ INPUT_ROWS = Struct(
 CAN_BITS_ROWS = 192
 CAN_BITS = Struct(
     "can_bits",
-    "Levels of CAN's pins to come: rows whose drive is TX and whose wire is RX, those from `first` on.",
+    "Levels of CAN's pins to come: rows whose drive is TX, whose wire is RX and whose time counts from `shown_ns`, "
+    "those from `first` on; and a frame that is tried over and over: the phase of the try that begins at `start_ns`.",
     (
-        *_fields("u32", "first", "count", "tx_pin", "source", "rx_pin", "is_offered", "tx", "padding"),
+        *_fields("u32", "first", "count", "tx_pin", "source", "rx_pin", "is_offered", "tx", "phase"),
+        *_fields("u64", "shown_ns", "start_ns", "decided_ns", "end_ns", "period_ns", "padding"),
         Field("rows", "edge", CAN_BITS_ROWS),
     ),
 )

@@ -171,6 +171,16 @@ class CanNetwork(Stateful):
         self._wanted.setdefault(self._members.index(member), at_ns)
         self._replan()
 
+    def forget(self, member: CanMember) -> None:
+        """Take that a node wants to send no more: a frame of its own that is not decided does not go out."""
+        if self._wanted.pop(self._members.index(member), None) is not None:
+            self._replan()
+
+    def put(self, member: CanMember, wanted_ns: Nanos | None, free_ns: Nanos) -> None:
+        """Put down since when the only node wants to send, if it does, and when the bus is free: it has kept both."""
+        self._wanted = {} if wanted_ns is None else {self._members.index(member): wanted_ns}
+        self._free_ns = free_ns
+
     def advance_to(self, now_ns: Nanos) -> None:
         """Decide the frames that are due."""
         while (due_ns := self.next_ns) is not None and due_ns <= now_ns:

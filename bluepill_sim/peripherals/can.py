@@ -6,26 +6,31 @@ loop-back mode too.
 
 Theory of operation. A mailbox is latched when TXRQ is set. The network asks for the best one (`offer`) when a frame
 begins, and tells its end in advance (`end`); what follows from it happens at that time.
-While somebody is subscribed to TX or RX, the bits of a frame are worked out when it begins (`_show_frame`); nothing
+While somebody is subscribed to TX or RX, the bits of a frame are worked out when it begins (`_frame_rows`); nothing
 follows from them.
+A frame that nobody acknowledges is tried again without end. Once a try has left everything as the one before, C repeats
+it (`_repeat`), until something acts on CAN: that first takes the tries back (`_settle`).
 Source: RM0008 24.
 Invariant: FMP of each FIFO is the number of messages in `_fifos`, and its first stands in the registers.
 """
 
 import ctypes
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from enum import Enum, auto
 from fractions import Fraction
 from functools import lru_cache, partialmethod
 
 from bluepill_sim.extension.layout import CAN_BITS, structure
+from bluepill_sim.extension.windows import NO_TIME
 from bluepill_sim.fabric.bus_parts import CanFrame
 from bluepill_sim.fabric.can_network import CanEnd, CanError, CanNetwork, frame_bits
 from bluepill_sim.fabric.fabric import OWN_COMMANDS
 from bluepill_sim.fabric.pins import ALTERNATE_FUNCTIONS, PinDrive
 from bluepill_sim.fabric.ports import ChipPorts
 from bluepill_sim.fabric.registers import Peripheral, Place, Register, bits, numbered
+from bluepill_sim.fabric.subscriptions import EDGE
 from simbase.timing import NS_PER_S, Nanos
 
 MCR, MSR, TSR, RF0R, RF1R, IER, ESR, BTR = range(8)
@@ -55,8 +60,9 @@ PINS = {0: ("PA11", "PA12"), 2: ("PB8", "PB9"), 3: ("PD0", "PD1")}
 _FILTER_MODES = bits((13, 0))
 #: The outputs in the order in which they are set; the first is for USB, whose memory it shares.
 _UPDATED = ("packets", "tx_irq", "rx0_irq", "rx1_irq", "sce_irq")
-#: Commands of the device in C that shows bits (`devices/can_bits.c`).
+#: Commands of the device in C that shows bits (`devices/can_bits.c`), and what comes next of a try that it repeats.
 _GO_ON, _SHOW = OWN_COMMANDS, OWN_COMMANDS + 1
+_IS_SINGLE, _TO_START, _TO_DECIDE, _TO_END = range(4)
 #: Takes frames at their ends, oldest first.
 Sink = Callable[[Sequence[CanEnd]], None]
 
@@ -68,6 +74,27 @@ class _Mailbox:
     frame: CanFrame
     asked_ns: Nanos
     order: int
+
+
+class _Part(Enum):
+    """What a chip does while a frame stands on the bus."""
+
+    SENDS = auto()
+    ACKNOWLEDGES = auto()
+    LISTENS = auto()
+    #: In loop-back mode, without SILM and with it.
+    IS_ALONE = auto()
+    IS_MUTE = auto()
+
+
+@dataclass(frozen=True, slots=True)
+class _Tried:
+    """How long a try lasted, and what it left: requests so far, mailboxes that wait, control and status registers."""
+
+    span_ns: Nanos
+    requests: int
+    mailboxes: tuple[int, ...]
+    words: bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +148,7 @@ class Can(Peripheral):
     OUTPUTS = ("tx_irq", "rx0_irq", "rx1_irq", "sce_irq", "packets")
     STATE = (
         "_alone", "_joined", "_mailboxes", "_order", "_fifos", "_ends", "_sync_ns", "_recover_ns", "_tec", "_rec",
-        "_timer_ns", "_lost", "_is_stopped", "_shown_ns", "_bits_held", "_bits_due_ns",
+        "_timer_ns", "_lost", "_is_stopped", "_tried", "_bits_held", "_bits_due_ns",
     )  # fmt: skip
     DERIVED = ("_pin_names", "_sinks", "_levels", "_bits", "_bits_slot")
     REGISTERS = (
@@ -213,7 +240,7 @@ class Can(Peripheral):
         self._bits = structure(CAN_BITS)()
         self._bits_slot = chip.pins.fabric.add_device(
             f"{place.name}.bits", "can_bits", 0, ctypes.addressof(self._bits),
-            act=lambda _ns: None, answer=lambda _what, _value: 0, deliver=lambda: None,
+            act=lambda _ns: None, answer=self._tries_changed, deliver=lambda: None,
         )  # fmt: skip
         super().__init__(chip, place)
         self._sinks: list[Sink] = []
@@ -242,15 +269,16 @@ class Can(Peripheral):
         self._lost: tuple[int, ...] = ()
         #: Its clock stands still: nothing is heard, and what it has begun to send ends with the clock.
         self._is_stopped = False
-        #: When the frame began of which bits are shown.
-        self._shown_ns: Nanos = -1
-        self._put_bits(())
+        #: What a try that nobody acknowledged has left, if nothing was written since.
+        self._tried: _Tried | None = None
+        self._forget_bits()
         self._bits.tx = 1
 
     # From outside the chip.
 
     def attach(self, network: CanNetwork) -> None:
         """Join a network."""
+        self._settle()
         self._joined = network
         network.join(self)
         self._pull_up()
@@ -261,6 +289,7 @@ class Can(Peripheral):
         Returns:
             A function that ends it.
         """
+        self._settle()
         self._sinks.append(sink)
         return lambda: self._sinks.remove(sink)
 
@@ -341,7 +370,7 @@ class Can(Peripheral):
         times = [self._sync_ns, self._recover_ns, self.network.next_ns if self._mailboxes or self._joined else None]
         if self._ends:
             times.append(self._ends[0].end_ns)
-        if not self._is_showing and self._is_watched and self.network.start_ns != self._shown_ns:
+        if not self._is_showing and self._is_watched and self.network.start_ns != self._bits.shown_ns:
             times.append(self.network.start_ns)
         if self._lost:
             times.append(self.chip.now_ns)
@@ -352,13 +381,14 @@ class Can(Peripheral):
 
     def advance_to(self, now_ns: Nanos) -> None:
         """Act on what is due: ends of frames, changes of mode, what the network has to decide."""
+        self._take_back()
         self.due_ns = None
         if self._is_stopped:
             self.network.advance_to(now_ns)
             self.plan()
             return
         self._show(now_ns)
-        self._take_ends(now_ns)
+        last = self._take_ends(now_ns)
         if self._sync_ns is not None and self._sync_ns <= now_ns:
             self._sync_ns = None
             self._synchronise(now_ns)
@@ -375,13 +405,24 @@ class Can(Peripheral):
         self._take_ends(now_ns)  # a chip that others have left behind is told of what is over
         self._update()
         self.plan()
+        if last is not None and last.is_own and last.error is CanError.ACKNOWLEDGE:
+            self._repeat(last)
+
+    def write(self, offset: int, size: int, value: int) -> None:
+        """Take what the bus writes, at the try that is under way."""
+        self._settle()
+        super().write(offset, size, value)
+
+    def clock_changed(self) -> None:
+        """Go on with the tries at another bit rate."""
+        self._settle()
 
     def clock_stopped(self) -> None:
         """Stand still in Stop, or by DBG_CAN_STOP: frames of others that have not ended are lost."""
         self.advance_to(self.chip.now_ns)
         self._is_stopped = True
         self._show_level(1, 1)
-        self._put_bits(())
+        self._forget_bits()
         self._ends = deque(end for end in self._ends if end.is_own)
         self.plan()
 
@@ -400,6 +441,10 @@ class Can(Peripheral):
 
     def on_reset(self) -> None:
         """Drop everything; it stays on its network."""
+        self._settle()
+        for network in filter(None, (self._alone, self._joined)):
+            network.forget(self)
+        self.due_ns = None
         self._show_level(1, 1)
         self._clear()
         self._route_changed()
@@ -541,9 +586,8 @@ class Can(Peripheral):
     def _want(self) -> None:
         if self._mailboxes and self.is_on:
             self.network.want(self, self.chip.now_ns)
-            if self._shown_ns == self.chip.now_ns:  # it takes part in the arbitration that has just begun
-                self._put_bits(())
-                self._shown_ns = -1
+            if self._bits.shown_ns == self.chip.now_ns:  # it takes part in the arbitration that has just begun
+                self._forget_bits()
 
     def _complete(self, n: int, flags: int) -> None:
         """End a mailbox's request."""
@@ -552,9 +596,13 @@ class Can(Peripheral):
         self.words[TI0R + 4 * n] &= ~TXRQ
         self.words[TSR] = self.words[TSR] & ~(ABRQ << 8 * n) | (RQCP | flags) << 8 * n
 
-    def _take_ends(self, now_ns: Nanos) -> None:
+    def _take_ends(self, now_ns: Nanos) -> CanEnd | None:
+        """Act on the ends of frames up to now; return the last."""
+        end = None
         while self._ends and self._ends[0].end_ns <= now_ns:
-            self._take_end(self._ends.popleft())
+            end = self._ends.popleft()
+            self._take_end(end)
+        return end
 
     def _take_end(self, end: CanEnd) -> None:
         if end.is_own or self.is_on:
@@ -709,6 +757,7 @@ class Can(Peripheral):
         return self.chip.pins[self._pin_names[1]].carries("CAN_TX")
 
     def _route_changed(self) -> None:
+        self._settle()
         self.chip.pins[self._pin_names[1]].disconnect("CAN_TX")
         self.chip.pins[self._pin_names[0]].hold_low(False)
         self._find_pins()
@@ -744,10 +793,11 @@ class Can(Peripheral):
     def _show(self, now_ns: Nanos) -> None:
         """Begin to show the bits of a frame that begins."""
         start_ns = self.network.start_ns
-        is_new = start_ns is not None and start_ns <= now_ns and start_ns != self._shown_ns
+        is_new = start_ns is not None and start_ns <= now_ns and start_ns != self._bits.shown_ns
         if start_ns is not None and is_new and not self._is_showing and self._is_watched:
-            self._shown_ns = start_ns
-            self._put_bits(tuple(self._show_frame(start_ns)))
+            self._put_bits(start_ns)
+            self._bits.first = 0
+            self.chip.pins.fabric.command(self._bits_slot, _GO_ON)
 
     @property
     def _is_showing(self) -> bool:
@@ -769,42 +819,115 @@ class Can(Peripheral):
     def _bits_due_ns(self, at_ns: Nanos | None) -> None:
         self.chip.pins.fabric.schedule(self._bits_slot, at_ns)
 
-    def _put_bits(self, rows: Sequence[tuple[Nanos, int, int]]) -> None:
-        """Have levels of TX and RX shown, each at its time, in place of those that are still to come."""
-        bits = self._bits
-        bits.first, bits.count = 0, len(rows)
-        for n, (at_ns, tx, rx) in enumerate(rows):
-            bits.rows[n].ns, bits.rows[n].drive, bits.rows[n].wire = at_ns, tx, rx
+    def _forget_bits(self) -> None:
+        """Have no more levels shown of a frame, and none of it again."""
+        self._bits.first = self._bits.count = 0
+        self._bits.phase, self._bits.shown_ns = _IS_SINGLE, NO_TIME
         self.chip.pins.fabric.command(self._bits_slot, _GO_ON)
 
-    def _show_frame(self, start_ns: Nanos) -> Iterator[tuple[Nanos, int, int]]:
-        """Yield when the levels of TX and RX change in the frame that begins."""
+    def _put_bits(self, start_ns: Nanos) -> None:
+        """Put down the levels of TX and RX in the frame that begins then; none is shown yet."""
+        rows, bits = self._rows_of(start_ns), self._bits
+        ctypes.memmove(ctypes.addressof(bits.rows), rows, len(rows))
+        bits.first = bits.count = len(rows) // EDGE.size
+        bits.shown_ns = start_ns
+
+    def _rows_of(self, start_ns: Nanos) -> bytes:
+        """Return when the levels of TX and RX change in the frame that begins, as C has it."""
         coming = self.network.coming()
         if coming is None:
-            return
+            return b""
         sender, frame, error = coming
+        acts = _Part.SENDS if sender is self else _Part.ACKNOWLEDGES if self.acknowledges else _Part.LISTENS
+        if self.hears_itself:
+            acts = _Part.IS_MUTE if self.words[BTR] & SILM else _Part.IS_ALONE
+        is_flagged = error is not CanError.NONE and not sender.is_passive
         rate = sender.bit_rate or self.bit_rate or Fraction(1)
-        own = self.offer(start_ns)
-        bits = frame_bits(frame)
-        sent = bits if sender is self else _until_lost(frame_bits(own), bits) if own is not None else []
-        acknowledges = sender is not self and error is CanError.NONE and self.acknowledges
-        # The delimiter of the CRC, the acknowledge, and of an error the flag behind it, unless its sender is passive.
-        flag = [1 if error is CanError.NONE or sender.is_passive else 0] * _FLAG_BITS
-        own_flag = flag if sender is self or self.acknowledges else [1] * _FLAG_BITS
-        bus = [*bits, 1, 0 if error is CanError.NONE else 1, *flag, 1]
-        tx = [*sent, *[1] * (len(bits) - len(sent)), 1, 0 if acknowledges else 1, *own_flag, 1]
-        if self.hears_itself:  # RX does not count then, and with SILM nothing goes out
-            bus = [1] * len(tx)
-            tx = bus if self.words[BTR] & SILM else [*bits, *[1] * (len(tx) - len(bits))]
-        before = (1, 1)
-        for n, now in enumerate(zip(tx, bus, strict=True)):
-            if now != before:
-                yield start_ns + n * NS_PER_S * rate.denominator // rate.numerator, *now
-            before = now
+        return _frame_rows(rate, frame, self.offer(start_ns), acts, error is CanError.NONE, is_flagged)
+
+    # A frame that is tried over and over.
+
+    def _repeat(self, end: CanEnd) -> None:
+        """Have C repeat the tries of a frame that nobody acknowledges, if this one has left everything as the last."""
+        tried = _Tried(end.end_ns - end.start_ns, self._order, tuple(self._mailboxes), self.words[:TI0R].tobytes())
+        is_same, self._tried = tried == self._tried, tried
+        start_ns = self.network.start_ns
+        is_free = self._sync_ns is self._recover_ns is None and not self._sinks and not self._is_showing
+        if not is_same or not is_free or start_ns is None or self.network is not self._alone or not self._is_wired():
+            return
+        bits, shown_ns = self._bits, self._bits.shown_ns
+        self._put_bits(start_ns)
+        bits.shown_ns, bits.start_ns, bits.phase = shown_ns, start_ns, _TO_START
+        bits.decided_ns = (self.network.next_ns or start_ns) - start_ns
+        bits.end_ns, bits.period_ns = end.end_ns - end.start_ns, start_ns - end.start_ns
+        self.due_ns = None
+        self.chip.pins.fabric.command(self._bits_slot, _GO_ON)
+
+    def _settle(self) -> None:
+        """Take the tries back, since something acts on CAN: whatever they left, the next may leave something else."""
+        self._tried = None
+        self._take_back()
+
+    def _take_back(self) -> None:
+        """Go on from the tries that C repeats, at the phase that the last of them has come to by now."""
+        bits, fabric = self._bits, self.chip.pins.fabric
+        if bits.phase == _IS_SINGLE:
+            return
+        fabric.catch_up(self._bits_slot, self.chip.now_ns)
+        phase, start_ns, end_ns = bits.phase, bits.start_ns, bits.start_ns + bits.end_ns
+        bits.phase = _IS_SINGLE
+        if phase == _IS_SINGLE:  # it has lost its pin by now
+            return
+        if phase == _TO_END:
+            frame = self._mailboxes[self._best(start_ns) or 0].frame
+            self._ends.append(CanEnd(start_ns, end_ns, frame, is_own=True, error=CanError.ACKNOWLEDGE))
+            self._alone.put(self, None, start_ns + bits.period_ns)
+            self.due_ns = end_ns
+        else:
+            self._alone.put(self, end_ns - bits.period_ns, start_ns)
+            self.due_ns = start_ns + (bits.decided_ns if phase == _TO_DECIDE else 0)
+        fabric.command(self._bits_slot, _GO_ON)
+
+    def _tries_changed(self, _what: int, _value: int) -> int:
+        self._settle()  # it has lost its pin
+        return 0
 
     def _show_level(self, tx: int, rx: int) -> None:
         self._connect()
         self.fabric.command(self._bits_slot, _SHOW, tx, rx)
+
+
+@lru_cache(maxsize=64)  # of frames that are sent or tried again and again
+def _frame_rows(
+    rate: Fraction, frame: CanFrame, own: CanFrame | None, part: _Part, is_good: bool, is_flagged: bool
+) -> bytes:
+    """Return the rows of TX and RX of a frame in one of its ends, in ns from its start.
+
+    Args:
+        rate: Bits a second.
+        frame: What stands on the bus.
+        own: What this end offers meanwhile.
+        part: What this end does.
+        is_good: Whether somebody acknowledges it, or nobody has to.
+        is_flagged: Whether an error flag follows.
+    """
+    bits = frame_bits(frame)
+    sent = bits if part is _Part.SENDS else _until_lost(frame_bits(own), bits) if own is not None else []
+    # The delimiter of the CRC, the acknowledge, and of an error the flag behind it, unless its sender is passive.
+    flag = [0 if is_flagged else 1] * _FLAG_BITS
+    own_flag = flag if part in (_Part.SENDS, _Part.ACKNOWLEDGES) else [1] * _FLAG_BITS
+    bus = [*bits, 1, 0 if is_good else 1, *flag, 1]
+    acknowledge = 0 if part is _Part.ACKNOWLEDGES and is_good else 1
+    tx = [*sent, *[1] * (len(bits) - len(sent)), 1, acknowledge, *own_flag, 1]
+    if part in (_Part.IS_ALONE, _Part.IS_MUTE):  # RX does not count then, and with SILM nothing goes out
+        bus = [1] * len(tx)
+        tx = bus if part is _Part.IS_MUTE else [*bits, *[1] * (len(tx) - len(bits))]
+    rows, before = bytearray(), (1, 1)
+    for n, now in enumerate(zip(tx, bus, strict=True)):
+        if now != before:
+            rows += EDGE.pack(n * NS_PER_S * rate.denominator // rate.numerator, 0, *now, 0, 0)
+        before = now
+    return bytes(rows)
 
 
 @lru_cache(maxsize=64)  # asked for at each of hundreds of steps of a frame

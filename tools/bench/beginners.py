@@ -42,6 +42,8 @@ ROWS = (
     ("flash erased and programmed", "flash", (), 0, "goal 1"),
     ("a CAN frame that nobody acknowledges, 500 kbit/s", "can", (), 0, "goal 1"),
     ("the same, given up after 10 ms", "can", ("-DBENCH_ABORT",), 0, "goal 1"),
+    ("the same at 1 Mbit/s", "can", ("-DBENCH_MBIT",), 0, "goal 1"),
+    ("the same at 1 Mbit/s, given up after 10 ms", "can", ("-DBENCH_MBIT", "-DBENCH_ABORT"), 0, "goal 1"),
     ("SPI at 1.1 MHz polled", "spi", ("-DBENCH_DIVIDER=5",), 0, "goal 1"),
     ("SPI at 9 MHz polled", "spi", (), 0, ""),
     ("a pin by its bit-band alias", "bitband", (), 0, ""),

@@ -40,7 +40,9 @@ def test_a_file_gets_every_character(tmp_path: Path) -> None:
     port.send(b"hello\n")
     assert path.read_bytes() == b"hello\n"
     port.send(b"more")
+    assert path.read_bytes() == b"hello\n"
     carry()
+    assert path.read_bytes() == b"hello\nmore", "a prompt does not wait for its line's end"
     console.close()
     assert path.read_bytes() == b"hello\nmore"
     assert port.received == b""

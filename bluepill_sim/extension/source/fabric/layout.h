@@ -550,7 +550,7 @@ struct inputs {
 };
 _Static_assert(sizeof(struct inputs) == 16400, "inputs");
 
-/* Levels of CAN's pins to come: rows whose drive is TX and whose wire is RX, those from `first` on. */
+/* Levels of CAN's pins to come: rows whose drive is TX, whose wire is RX and whose time counts from `shown_ns`, those from `first` on; and a frame that is tried over and over: the phase of the try that begins at `start_ns`. */
 struct can_bits {
     uint32_t first;
     uint32_t count;
@@ -559,10 +559,16 @@ struct can_bits {
     uint32_t rx_pin;
     uint32_t is_offered;
     uint32_t tx;
-    uint32_t padding;
+    uint32_t phase;
+    uint64_t shown_ns;
+    uint64_t start_ns;
+    uint64_t decided_ns;
+    uint64_t end_ns;
+    uint64_t period_ns;
+    uint64_t padding;
     struct edge rows[192];
 };
-_Static_assert(sizeof(struct can_bits) == 3104, "can_bits");
+_Static_assert(sizeof(struct can_bits) == 3152, "can_bits");
 
 /* A word that has gone out, when, and how: clock and divider, and what else its device says of its format. */
 struct sent {

@@ -532,6 +532,24 @@ def test_whatever_is_written_flags_and_interrupts_agree(
             assert (tsr >> 26 + n & 1) != (chip.read(f"CAN.TI{n}R") & 1), "a mailbox is empty or asked for"
 
 
+@pytest.mark.parametrize("bits", [1, 5, 8, 19, 21, 60])
+def test_what_is_asked_for_right_behind_a_reset_goes_out(fake_chip: Any, bits: int) -> None:
+    node = CanNode()
+    one = network(fake_chip, node)
+    set_up(fake_chip)
+    send(fake_chip, 0x123, b"ab")
+    fake_chip.advance(fake_chip.now_ns + bits * BIT_NS)
+    fake_chip.write("CAN.MCR", RESET)
+    set_up(fake_chip)
+    asked_ns = fake_chip.now_ns
+    send(fake_chip, 0x321, b"cd")
+    fake_chip.advance(asked_ns + 1_000_000)
+    end_ns, frame = node.received[-1]
+    assert frame.identifier == 0x321
+    assert end_ns >= asked_ns + span_ns(frame), "not before it was asked for"
+    assert one.start_ns is None
+
+
 @QUICK
 @given(st.integers(0, 300 * BIT_NS))
 def test_a_snapshot_within_a_frame_goes_on_alike(make_fake_chip: Chips, at: int) -> None:
