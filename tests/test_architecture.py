@@ -365,6 +365,7 @@ LONG_FOLDERS = {
     "robot_bench": "one package or module a layer of the bench",
     "robot_bench/firmware": "the sources and programs of the examples, built by one command",
     "bluepill_sim/peripherals": "one peripheral a file",
+    "bluepill_sim/extension/source/devices": "one device a file",
     "docs": "one page a subject",
     "tests/adapter_fw": "one rig, many runs of the same firmware",
     "tests/bluepill_sim/core": "one assembled machine for all of them",
