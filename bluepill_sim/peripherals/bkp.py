@@ -36,6 +36,7 @@ class Bkp(Peripheral):
     STATE = ("_was_active", "_base_ns", "_edges", "_rtcclk_hz")
     OUTPUTS = ("irq",)
     INPUTS = ("second", "alarm")
+    SOURCE = "RM0008 6.4"
     REGISTERS = (
         *(
             Register(

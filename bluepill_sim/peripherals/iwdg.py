@@ -29,6 +29,7 @@ class Iwdg(Peripheral):
 
     STATE = ("_is_running", "_is_unlocked", "_base_ns", "_base_count", "_lsi_hz", "_updated_ns")
     OUTPUTS = ("lsi",)
+    SOURCE = "RM0008 19.4"
     REGISTERS = (
         Register(name="KR", offset=0x00, readable=0, on_write="_write_kr"),
         Register(

@@ -28,6 +28,7 @@ class Pwr(Peripheral):
     KIND = LISTENER
     OUTPUTS = ("pvd",)
     INPUTS = ("alarm",)
+    SOURCE = "RM0008 5.4"
     REGISTERS = (
         Register(
             name="CR", offset=0x00, readable=LPDS | PDDS | PVDE | _PLS | DBP,

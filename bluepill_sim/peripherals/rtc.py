@@ -50,6 +50,7 @@ class Rtc(Peripheral):
         "_staged", "_written_ns", "_cleared_ns", "_is_stale", "_pulse_end_ns",
     )  # fmt: skip
     OUTPUTS = ("irq", "alarm", "second")
+    SOURCE = "RM0008 18.4"
     REGISTERS = (
         Register(
             name="CRH",

@@ -106,6 +106,7 @@ class Spi(Peripheral):
     OUTPUTS = ("irq", "rx_dma", "tx_dma")
     STATE = ("_hung", "_coming")
     DERIVED = ("_pin_names", "_sinks")
+    SOURCE = "RM0008 25.5"
     REGISTERS = (
         Register(
             name="CR1", offset=0x00, mask=bits((15, 0)), on_write=NATIVE,

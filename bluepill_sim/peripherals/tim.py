@@ -127,6 +127,7 @@ class GeneralTimer(Peripheral):
     KIND, HOLDS = "tim", TIM
     OUTPUTS: ClassVar[tuple[str, ...]] = (*_EVENTS, "irq")
     INPUTS: ClassVar[tuple[str, ...]] = ("itr0", "itr1", "itr2", "itr3")
+    SOURCE: ClassVar[str] = "RM0008 15.4"
     REGISTERS = _registers(is_advanced=False)
 
     def __init__(self, chip: ChipPorts, place: Place) -> None:
@@ -178,6 +179,7 @@ class AdvancedTimer(GeneralTimer):
 
     INPUTS = (*GeneralTimer.INPUTS, "css")
     OUTPUTS: ClassVar[tuple[str, ...]] = (*_EVENTS, "brk_irq", "up_irq", "trg_com_irq", "cc_irq")
+    SOURCE: ClassVar[str] = "RM0008 14.4"
     REGISTERS = _registers(is_advanced=True)
 
     def clock_hz(self) -> int:

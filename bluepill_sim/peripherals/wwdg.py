@@ -27,6 +27,7 @@ class Wwdg(Peripheral):
 
     STATE = ("_base_ns", "_base_count", "_pclk1_hz")
     OUTPUTS = ("irq",)
+    SOURCE = "RM0008 20.6"
     REGISTERS = (
         Register(
             name="CR", offset=0x00, reset=_T, mask=bits((7, 0)), on_read="_read_cr",
