@@ -87,9 +87,9 @@ def registers_header(kind: str, them: list[type[Peripheral]], taken: frozenset[s
         seen |= {name.key for name in names}
         if names:
             sections.append((f"Of {register.name}.", names))
-    one = max(them, key=lambda each: len(each.OUTPUTS))
+    outputs = dict.fromkeys(pair for one in them for pair in enumerate(one.OUTPUTS))
     sections += [
-        ("Its outputs.", list(_numbers("OUTPUT", ((name, n) for n, name in enumerate(one.OUTPUTS))))),
+        ("Its outputs.", list(_numbers("OUTPUT", ((name, n) for n, name in sorted(outputs))))),
         *((_first_line(enum), list(_numbers(enum.__name__.upper(), _members(enum)))) for enum in them[0].ENUMS),
     ]
     counts = Counter(name.short for _, names in sections for name in names if not name.suffix)

@@ -7,6 +7,7 @@ Source: RM0008 sections 14 and 15; 9.3.7 (remaps).
 Invariant: the struct's pins are those that AFIO has given.
 """
 
+from enum import IntEnum
 from typing import ClassVar
 
 from bluepill_sim.extension.layout import TIM
@@ -15,8 +16,6 @@ from bluepill_sim.fabric.pins import ALTERNATE_FUNCTIONS
 from bluepill_sim.fabric.ports import ChipPorts
 from bluepill_sim.fabric.registers import NATIVE, Peripheral, Place, Register, bits, fields_of
 
-#: Commands of its own (tim.c): put one of `pins` elsewhere; listen again; make CNT known to loops that poll it.
-_MOVE, _RESUME, _INTRODUCE = range(OWN_COMMANDS, OWN_COMMANDS + 3)
 
 #: The alternate functions, in the order of `outputs` in the struct.
 _OUTPUTS = ("CH1", "CH2", "CH3", "CH4", "CH1N", "CH2N", "CH3N")
@@ -58,6 +57,17 @@ _EVENTS = (
     "com_dma",
     "trig_dma",
 )
+
+
+class Command(IntEnum):
+    """A command of its own."""
+
+    #: Put one of `pins` on another pin.
+    MOVE = OWN_COMMANDS
+    #: Listen again after a state was put back.
+    RESUME = OWN_COMMANDS + 1
+    #: Make CNT known.
+    INTRODUCE = OWN_COMMANDS + 2
 
 
 def _register(name: str, index: int, fields: str, **more: object) -> Register:
@@ -125,6 +135,7 @@ class GeneralTimer(Peripheral):
     """TIM2, TIM3 or TIM4."""
 
     KIND, HOLDS = "tim", TIM
+    ENUMS: ClassVar[tuple[type[IntEnum], ...]] = (Command,)
     OUTPUTS: ClassVar[tuple[str, ...]] = (*_EVENTS, "irq")
     INPUTS: ClassVar[tuple[str, ...]] = ("itr0", "itr1", "itr2", "itr3")
     SOURCE: ClassVar[str] = "RM0008 15.4"
@@ -139,7 +150,7 @@ class GeneralTimer(Peripheral):
             self.native.sources[number] = ALTERNATE_FUNCTIONS.index(f"{place.name}_{name}")
         self.native.pins[:] = self._routed_pins()
         self.command(CLOCK, self.clock_hz())
-        self.command(_INTRODUCE)
+        self.command(Command.INTRODUCE)
         self.reset()
         chip.pins.route_listeners.append(self._route_changed)
 
@@ -167,11 +178,11 @@ class GeneralTimer(Peripheral):
         wanted = self._routed_pins()
         if wanted != list(self.native.pins):
             for number, pin in enumerate(wanted):
-                self.command(_MOVE, number, pin)
+                self.command(Command.MOVE, number, pin)
             self.command(ROUTE)
 
     def _restored(self) -> None:
-        self.command(_RESUME)
+        self.command(Command.RESUME)
 
 
 class AdvancedTimer(GeneralTimer):

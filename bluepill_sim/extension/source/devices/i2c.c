@@ -29,6 +29,7 @@ enum { TELL_START, TELL_BYTE, TELL_STOP, TELL_LOST, TELL_CUT, TELL_AT = 9 };
 enum { ANSWERED = 1 << 9, HAS_LOST = 1 << 10 };
 /* Of `is_stopped`. */
 enum { CLOCK_STOPPED = 1, TIMEOUT_STOPPED = 2 };
+
 static void begin_to_show(struct device *device);
 static void show_rest(struct device *device, enum phase phase);
 static void go_on(struct device *device, uint64_t ns);

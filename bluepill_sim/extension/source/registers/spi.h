@@ -32,4 +32,10 @@ enum { TXCRC = 0xffff << 0, TXCRC_AT = 0 };
 /* Its outputs. */
 enum { IRQ = 0, RX_DMA = 1, TX_DMA = 2 };
 
+/* What Python is asked: those from NO_SCK on are warnings. */
+enum { EXCHANGE = 0, SELECT = 1, NEXT_WORD = 2, NO_SCK = 3, NO_MOSI = 4, NO_MISO = 5, WORD_LOST = 6, MODE_FAULT = 7 };
+
+/* A command of its own. */
+enum { MOVE = 16, LISTEN = 17, CLOCK_IN = 18 };
+
 #endif

@@ -81,6 +81,9 @@ enum { DMAB = 0xffff << 0, DMAB_AT = 0 };
 
 /* Its outputs. */
 enum { TRGO = 0, CC1 = 1, CC2 = 2, CC3 = 3, CC4 = 4, UP_DMA = 5, CC1_DMA = 6, CC2_DMA = 7, CC3_DMA = 8, CC4_DMA = 9,
-       COM_DMA = 10, TRIG_DMA = 11, BRK_IRQ = 12, UP_IRQ = 13, TRG_COM_IRQ = 14, CC_IRQ = 15 };
+       COM_DMA = 10, TRIG_DMA = 11, BRK_IRQ = 12, IRQ = 12, UP_IRQ = 13, TRG_COM_IRQ = 14, CC_IRQ = 15 };
+
+/* A command of its own. */
+enum { MOVE = 16, RESUME = 17, INTRODUCE = 18 };
 
 #endif
