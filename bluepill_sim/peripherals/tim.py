@@ -16,7 +16,6 @@ from bluepill_sim.fabric.pins import ALTERNATE_FUNCTIONS
 from bluepill_sim.fabric.ports import ChipPorts
 from bluepill_sim.fabric.registers import NATIVE, Peripheral, Place, Register, bits, fields_of
 
-
 #: The alternate functions, in the order of `outputs` in the struct.
 _OUTPUTS = ("CH1", "CH2", "CH3", "CH4", "CH1N", "CH2N", "CH3N")
 #: Pins by the value of the remap field: CH1 to CH4, CH1N to CH3N, ETR, BKIN (RM0008 tables 43 to 46).
