@@ -18,7 +18,7 @@ TEST = "tests/bluepill_sim/peripherals/tim/test_alarm.py"
 #: The tables that the page names, and what judges a device by them.
 TABLES = (
     "../tools/examples.py", "../tools/svd.py", "conftest.py", "machine.py",
-    "peripherals/test_reset_values.py", "peripherals/test_register_views.py", "peripherals/test_descriptions.py",
+    "peripherals/test_reset_values.py", "peripherals/test_register_views.py", "fabric/test_descriptions.py",
 )  # fmt: skip
 
 
