@@ -87,19 +87,28 @@ class Register:
 
         Raises:
             ValueError: A mask is wider than a word, two kinds of bits overlap,
-                or the reset value holds bits that do not read.
+                a trigger does more, or the reset value holds bits that do not read.
         """
         for name in ("readable", "writable"):
             if getattr(self, name) == _AS_MASK:
                 object.__setattr__(self, name, mask)
         if self.offset % 4:
             raise ValueError(f"{self.name}: offset {self.offset:#x} is not that of a word")
-        for word in (self.reset, self.readable, self.writable, self.write_one_to_clear, self.write_zero_to_clear):
+        for word in (
+            self.reset,
+            self.readable,
+            self.writable,
+            self.write_one_to_clear,
+            self.write_zero_to_clear,
+            self.triggers,
+        ):
             if word & ~WORD:
                 raise ValueError(f"{self.name}: {word:#x} is wider than a word")
         clears = self.write_one_to_clear | self.write_zero_to_clear
         if self.write_one_to_clear & self.write_zero_to_clear or clears & self.writable:
             raise ValueError(f"{self.name}: a bit is either writable, cleared by 1 or cleared by 0")
+        if self.triggers & (self.readable | self.writable | clears):
+            raise ValueError(f"{self.name}: a trigger stores nothing and reads 0")
         if self.reset & ~self.readable:
             raise ValueError(f"{self.name}: the reset value holds bits that do not read")
 
