@@ -39,8 +39,6 @@ _RELEASED = 0xFF
 PINS = {"I2C1": {0: ("PB6", "PB7", "PB5"), 1: ("PB8", "PB9", "PB5")}, "I2C2": {0: ("PB10", "PB11", "PB12")}}
 #: CNDTR of the channel of DMA1 that each receives by (RM0008 table 78): its end of transfer is what LAST waits for.
 _COUNTERS = {"I2C1": 0x4002_0000 + 0x0C + 20 * 6, "I2C2": 0x4002_0000 + 0x0C + 20 * 4}
-#: Steps of a master outside (i2c.c): above a byte.
-_FAR_START, _FAR_WRITE, _FAR_READ, _FAR_STOP = (n << 9 for n in range(1, 5))
 
 
 class Question(IntEnum):
@@ -71,6 +69,16 @@ class Command(IntEnum):
     GO_ON_TIMEOUT = OWN_COMMANDS + 5
 
 
+class FarStep(IntEnum):
+    """What a master outside does, above a byte or, for FAR_READ, its acknowledge."""
+
+    FAR_NOTHING = 0
+    FAR_START = 1
+    FAR_WRITE = 2
+    FAR_READ = 3
+    FAR_STOP = 4
+
+
 class I2cStep(IntEnum):
     """What has happened on the bus (i2c.c)."""
 
@@ -96,6 +104,7 @@ class I2cSymbol(NamedTuple):
 #: Takes symbols, oldest first.
 Sink = Callable[[Sequence[I2cSymbol]], None]
 _STEP_AT = 9
+_FAR_START, _FAR_WRITE, _FAR_READ, _FAR_STOP = (step << _STEP_AT for step in FarStep if step)
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +141,7 @@ class I2c(Peripheral):
     OUTPUTS = ("event_irq", "error_irq", "rx_dma", "tx_dma")
     #: SR1 at its last read, half of the sequences that clear its flags.
     HIDDEN = ("SEEN",)
-    ENUMS = (Question, Command)
+    ENUMS = (Question, Command, FarStep)
     STATE = ("_hung", "_addressed", "_high_bits", "_ten_bit", "_calls", "_step", "_is_stopping", "answered")
     DERIVED = ("_pin_names", "_sinks")
     SOURCE = "RM0008 26.6"

@@ -21,8 +21,8 @@ enum phase { FREE, STARTING, ADDRESSING, SENDING, RECEIVING, STOPPING, HOLD, OTH
 /* Its pins. */
 enum { SCL, SDA, SMBA, I2C_PINS };
 /* An answer to a question has HELD for an acknowledge. */
-/* What a master outside does: `far` holds one of these times 2 * HELD, above a byte or, for FAR_READ, its acknowledge. */
-enum { FAR_NOTHING, FAR_START, FAR_WRITE, FAR_READ, FAR_STOP, FAR_AT = 9 };
+/* `far` holds one of FAR_START to FAR_STOP times 2 * HELD. */
+enum { FAR_AT = 9 };
 /* What a row for subscribers tells: one of these times 2 * HELD, a byte and its acknowledge below (`I2cStep` of i2c.py). */
 enum { TELL_START, TELL_BYTE, TELL_STOP, TELL_LOST, TELL_CUT, TELL_AT = 9 };
 /* Of `answer`, beside HELD: they were asked; another master has won. */

@@ -50,4 +50,7 @@ enum { ADDRESS = 0, WRITE = 1, READ = 2, END = 3, NEXT_STEP = 4, NO_PINS = 5, SE
 /* A command of its own. */
 enum { MOVE = 16, CALL = 17, DISTURB = 18, LISTEN = 19, HOLD_TIMEOUT = 20, GO_ON_TIMEOUT = 21 };
 
+/* What a master outside does, above a byte or, for FAR_READ, its acknowledge. */
+enum { FAR_NOTHING = 0, FAR_START = 1, FAR_WRITE = 2, FAR_READ = 3, FAR_STOP = 4 };
+
 #endif
