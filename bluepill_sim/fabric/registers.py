@@ -3,9 +3,11 @@
 This is not a bus: whether a peripheral's clock is on, bit-band, and addresses
 outside the peripherals are the business of `chip.py`.
 
-Theory of operation. A `Register` says which bits store, which clear, and which
-method a read or write calls. A `Peripheral` declares `REGISTERS`, names in
-`STATE` its plain attributes beyond the registers, and writes methods for what a
+Theory of operation. A `Register` says which bits store, which clear, which
+method a read or write calls, and where its fields are. That is written here once:
+Python (`masks`, `indices`), C and docs (`tools/generate_chip.py`) and the views take
+it from there. A `Peripheral` declares `REGISTERS`, names in `STATE` its plain
+attributes beyond the registers, and writes methods for what a
 read or write *causes*. A hot one is a kind of device in C (`KIND`): what a register
 that says `NATIVE` causes is written there, once, and what it holds beside the
 registers is the struct `HOLDS`. The table itself is executed by the native core
@@ -25,6 +27,7 @@ import ctypes
 from array import array
 from collections.abc import Iterable
 from dataclasses import InitVar, dataclass
+from enum import IntEnum
 from functools import cache
 from typing import Any, ClassVar
 
@@ -37,8 +40,8 @@ from simbase.state import Stateful
 NATIVE = "native"
 #: The kind of a device in Python that has `INPUTS`, or listens to pins: `source/devices/listener.c`.
 LISTENER = "listener"
-#: What it is told first (the other is pins), and its command.
-_HEARS_LINE, _LISTEN = 0, OWN_COMMANDS
+#: What it is told first (the other is pins); what a kind tells besides begins at `OWN_ANSWERS`. And its command.
+HEARS_LINE, OWN_ANSWERS, _LISTEN = 0, 2, OWN_COMMANDS
 #: The registers of RCC with a clock gate a bit, by their numbers in C.
 _GATES = ("AHBENR", "APB2ENR", "APB1ENR")
 #: Every bit of a 32-bit register.
@@ -66,10 +69,12 @@ class Register:
     write_one_to_clear: int = 0
     #: Bits cleared by writing 0 and left alone by 1 (rc_w0).
     write_zero_to_clear: int = 0
+    #: Bits that read 0, store nothing and make `on_write` act (w), such as those that clear flags elsewhere.
+    triggers: int = 0
     #: Name of the peripheral's method `() -> int` that answers a read in place of the stored word; or `NATIVE`.
     on_read: str | None = None
-    #: Offset of a hidden word, after the registers, in which each read leaves what it returned; None for none.
-    latched_in: int | None = None
+    #: The hidden word, of `Peripheral.HIDDEN`, in which each read leaves what it returned; None for none.
+    latched_in: str | None = None
     #: Name of the peripheral's method `(written: int, previous: int) -> None`, called after the store; or `NATIVE`.
     on_write: str | None = None
     #: Its fields as the manual names them, from the left: "CKD 9:8, ARPE 7".
@@ -82,19 +87,28 @@ class Register:
 
         Raises:
             ValueError: A mask is wider than a word, two kinds of bits overlap,
-                or the reset value holds bits that do not read.
+                a trigger does more, or the reset value holds bits that do not read.
         """
         for name in ("readable", "writable"):
             if getattr(self, name) == _AS_MASK:
                 object.__setattr__(self, name, mask)
         if self.offset % 4:
             raise ValueError(f"{self.name}: offset {self.offset:#x} is not that of a word")
-        for word in (self.reset, self.readable, self.writable, self.write_one_to_clear, self.write_zero_to_clear):
+        for word in (
+            self.reset,
+            self.readable,
+            self.writable,
+            self.write_one_to_clear,
+            self.write_zero_to_clear,
+            self.triggers,
+        ):
             if word & ~WORD:
                 raise ValueError(f"{self.name}: {word:#x} is wider than a word")
         clears = self.write_one_to_clear | self.write_zero_to_clear
         if self.write_one_to_clear & self.write_zero_to_clear or clears & self.writable:
             raise ValueError(f"{self.name}: a bit is either writable, cleared by 1 or cleared by 0")
+        if self.triggers & (self.readable | self.writable | clears):
+            raise ValueError(f"{self.name}: a trigger stores nothing and reads 0")
         if self.reset & ~self.readable:
             raise ValueError(f"{self.name}: the reset value holds bits that do not read")
 
@@ -113,6 +127,26 @@ class Register:
             self.write_one_to_clear,
             self.write_zero_to_clear,
         )
+
+    def access(self, field: "BitField") -> str:
+        """Return how a program may access a field, by the manual's words: rw, r, w, rc_w1, rc_w0 (RM0008 2.1).
+
+        Where its bits differ, the words of the highest comes first; a bit that takes nothing and reads 0 is reserved.
+        """
+        found: dict[str, None] = {}
+        for place in range(field.high, field.low - 1, -1):
+            bit = 1 << place
+            if self.write_one_to_clear & bit:
+                found["rc_w1"] = None
+            elif self.write_zero_to_clear & bit:
+                found["rc_w0"] = None
+            elif (self.setting | self.triggers) & bit:
+                found["rw" if self.readable & bit else "w"] = None
+            elif self.readable & bit or self.on_read:
+                found["r"] = None
+            else:
+                found["reserved"] = None
+        return "/".join(found)
 
     def widen(self, previous: int, value: int, lanes: int) -> int:
         """Return the whole-word write that does what a write of some byte lanes does.
@@ -199,6 +233,29 @@ def fields_of(text: str) -> tuple[BitField, ...]:
     return tuple(found)
 
 
+def masks(fields: str, names: str) -> tuple[int, ...]:
+    """Return the bits of some of the fields that `Register.fields` names, in the order of the names.
+
+    Raises:
+        KeyError: There is no such field.
+
+    >>> masks("CKD 9:8, ARPE 7", "ARPE CKD")
+    (128, 768)
+    """
+    found = {field.name: bits((field.high, field.low)) for field in fields_of(fields)}
+    return tuple(found[name] for name in names.split())
+
+
+def indices(registers: Iterable[Register], names: str) -> tuple[int, ...]:
+    """Return where registers stand in `Peripheral.words`, which is offset // 4, in the order of the names.
+
+    Raises:
+        KeyError: There is no such register.
+    """
+    found = {register.name: register.offset // 4 for register in registers}
+    return tuple(found[name] for name in names.split())
+
+
 def bits(*positions: int | tuple[int, int]) -> int:
     """Return a mask of bit positions and of (high, low) fields, as the manual prints them.
 
@@ -264,7 +321,7 @@ def _table_of(kind: type["Peripheral"], size: int) -> _Table:
     for register in kind.REGISTERS:
         index = register.offset // 4
         words[index], found[index], masks[index] = register.reset, register, register.masks
-        latches[index] = None if register.latched_in is None else register.latched_in // 4
+        latches[index] = kind.latch_of(register)
         reads[index], writes[index] = register.on_read, register.on_write
         pairs += index, register.reset
     return _Table(
@@ -286,6 +343,8 @@ class Peripheral(Stateful):
     DERIVED: ClassVar[tuple[str, ...]] = ("_due_ns", "duplicated")
 
     REGISTERS: ClassVar[tuple[Register, ...]] = ()
+    #: Where the manual tabulates them: "RM0008 27.6".
+    SOURCE: ClassVar[str] = ""
     #: Whether narrow writes touch only their bytes (AHB) or are duplicated over the word (APB).
     HAS_BYTE_LANES: ClassVar[bool] = False
     #: Its kind of device in C, and the struct that this holds beside the words; None: it is written in Python.
@@ -294,6 +353,10 @@ class Peripheral(Stateful):
     #: Its outputs to lines, and of a device in C its inputs, in the order of their numbers: the chip's page wires them.
     OUTPUTS: ClassVar[tuple[str, ...]] = ()
     INPUTS: ClassVar[tuple[str, ...]] = ()
+    #: Of a device in C: the words behind the last register, which no program reads, and the enumerations that it shares
+    #: with Python, such as what it asks (`answer`) and its own commands, from `OWN_COMMANDS` on.
+    HIDDEN: ClassVar[tuple[str, ...]] = ()
+    ENUMS: ClassVar[tuple[type[IntEnum], ...]] = ()
 
     def __init__(self, chip: ChipPorts, place: Place) -> None:
         self.chip = chip
@@ -315,6 +378,17 @@ class Peripheral(Stateful):
         self.slot = self._take_slot(table)
         if place.clock is not None:
             self.fabric.set_gate(self.slot, _GATES.index(place.clock.register), place.clock.bit)
+
+    @classmethod
+    def hidden(cls) -> dict[str, int]:
+        """Return where the words `HIDDEN` stand, behind the last register: name and index."""
+        first = 1 + max((register.offset // 4 for register in cls.REGISTERS), default=-1)
+        return {name: first + n for n, name in enumerate(cls.HIDDEN)}
+
+    @classmethod
+    def latch_of(cls, register: Register) -> int | None:
+        """Return the index of the word that keeps what a read of a register returned; None: none does."""
+        return None if register.latched_in is None else cls.hidden()[register.latched_in]
 
     @property
     def due_ns(self) -> int | None:
@@ -348,7 +422,7 @@ class Peripheral(Stateful):
         """Answer what the device in C asks."""
         if self.KIND != LISTENER:
             raise NotImplementedError(f"{self.name} was asked {what}, {value}")
-        if what == _HEARS_LINE:
+        if what == HEARS_LINE:
             self.line_changed(self.INPUTS[value >> 1], bool(value & 1))
         else:
             self.pins_changed()

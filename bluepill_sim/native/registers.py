@@ -68,14 +68,14 @@ def _table_of(kind: type[Peripheral]) -> tuple["ctypes.Array[ctypes.c_uint16]", 
     decided = 0 if kind.write is Peripheral.write else _WRITES_PLAIN
     for register in kind.REGISTERS:
         index = register.offset // 4
-        behaviour[index] = _behaviour(register, has_byte_lanes=kind.HAS_BYTE_LANES) & ~decided
+        latch = kind.latch_of(register) or 0
+        behaviour[index] = (_behaviour(register, has_byte_lanes=kind.HAS_BYTE_LANES) | latch << _LATCH_SHIFT) & ~decided
         masks[_MASKS * index : _MASKS * (index + 1)] = [*register.masks, register.setting & ~register.reset & WORD]
     return behaviour, masks
 
 
 def _behaviour(register: Register, *, has_byte_lanes: bool) -> int:
     takes = register.writable | register.write_one_to_clear | register.write_zero_to_clear
-    latch = 0 if register.latched_in is None else register.latched_in // 4
     return (
         _READS_PLAIN * (register.on_read is None)
         | _WRITES_PLAIN * (register.on_write is None)
@@ -84,5 +84,4 @@ def _behaviour(register: Register, *, has_byte_lanes: bool) -> int:
         | _BYTE_LANES * has_byte_lanes
         | _DUPLICATES * (not has_byte_lanes and not takes & register.readable)
         | _IS_REGISTER
-        | latch << _LATCH_SHIFT
     )

@@ -14,8 +14,6 @@ from bluepill_sim.fabric.fabric import CLOCK, OWN_COMMANDS, RESET
 from bluepill_sim.fabric.ports import ChipPorts
 from bluepill_sim.fabric.registers import NATIVE, Peripheral, Place, Register, bits, numbered
 
-#: A command of its own (adc.c): what is on the pins is about to change.
-_INPUTS_CHANGE = OWN_COMMANDS
 #: Inputs by EXTSEL and by JEXTSEL, 0 to 6 (RM0008 tables 67 and 68); 7 is software.
 REGULAR_TRIGGERS = ("tim1_cc1", "tim1_cc2", "tim1_cc3", "tim2_cc2", "tim3_trgo", "tim4_cc4", "exti_line11")
 INJECTED_TRIGGERS = ("tim1_trgo", "tim1_cc4", "tim2_trgo", "tim2_cc1", "tim3_cc4", "tim4_trgo", "exti_line15")
@@ -23,13 +21,20 @@ _PINS = (*(f"PA{n}" for n in range(8)), "PB0", "PB1")
 
 
 class Question(IntEnum):
-    """What the device in C warns of (adc.c), with the number of the channel."""
+    """What the device warns of, with the number of the channel."""
 
     NOT_ANALOG = 0
     NO_PIN = 1
     NOT_ENABLED = 2
     TOO_FAST = 3
     CAL_OFF = 4
+
+
+class Command(IntEnum):
+    """A command of its own."""
+
+    #: What is on the pins is about to change.
+    INPUTS_CHANGE = OWN_COMMANDS
 
 
 _WARNINGS = {
@@ -110,6 +115,8 @@ class Adc(Peripheral):
     KIND, HOLDS = "adc", ADC
     OUTPUTS: ClassVar[tuple[str, ...]] = ("irq", "dma")
     INPUTS = REGULAR_TRIGGERS + INJECTED_TRIGGERS
+    ENUMS = (Question, Command)
+    SOURCE = "RM0008 11.12"
     REGISTERS = _registers(_CR1 | _MASTER_CR1, _CR2 | _MASTER_CR2)
 
     def __init__(self, chip: ChipPorts, place: Place) -> None:
@@ -118,7 +125,7 @@ class Adc(Peripheral):
         self.native.hz, self.native.divider = chip.clocks.pclk2_hz, chip.clocks.adc_divider
         self.command(RESET)
         chip.pins.route_listeners.append(self._route_changed)
-        chip.pins.fabric.input_listeners.append(lambda: self.command(_INPUTS_CHANGE))
+        chip.pins.fabric.input_listeners.append(lambda: self.command(Command.INPUTS_CHANGE))
 
     def clock_hz(self) -> int:
         """Return PCLK2."""

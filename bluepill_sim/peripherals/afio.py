@@ -68,6 +68,7 @@ class Afio(Peripheral):
     """Alternate-function I/O."""
 
     STATE = ("_swj_cfg",)
+    SOURCE = "RM0008 9.4"
     REGISTERS = (
         Register(
             name="EVCR",

@@ -13,16 +13,19 @@ Invariant: a data register is 0 while TEF is set.
 """
 
 from bluepill_sim.fabric.pins import PinDrive
-from bluepill_sim.fabric.registers import LISTENER, Peripheral, Register, bits
+from bluepill_sim.fabric.registers import LISTENER, Peripheral, Register, bits, masks
 from simbase.timing import NS_PER_S, Nanos
 
 #: Data registers of a medium-density part.
 DATA_REGISTERS = range(1, 11)
 RTCCR, CR, CSR = 11, 12, 13
 
-CAL, CCO, ASOE, ASOS = 0x7F, 1 << 7, 1 << 8, 1 << 9
-TPE, TPAL = 1, 2
-CTE, CTI, TPIE, TEF, TIF = (1 << n for n in (0, 1, 2, 8, 9))
+#: Fields, from the left.
+_RTCCR, _CR = "ASOS 9, ASOE 8, CCO 7, CAL 6:0", "TPAL 1, TPE 0"
+_CSR = "TIF 9, TEF 8, TPIE 2, CTI 1, CTE 0"
+CAL, CCO, ASOE, ASOS = masks(_RTCCR, "CAL CCO ASOE ASOS")
+TPE, TPAL = masks(_CR, "TPE TPAL")
+CTE, CTI, TPIE, TEF, TIF = masks(_CSR, "CTE CTI TPIE TEF TIF")
 _HALFWORD = bits((15, 0))
 _PORT, _PIN, _OWNER = "C", 13, "RTC output"
 #: CCO changes the pin after so many cycles of RTCCLK.
@@ -36,6 +39,7 @@ class Bkp(Peripheral):
     STATE = ("_was_active", "_base_ns", "_edges", "_rtcclk_hz")
     OUTPUTS = ("irq",)
     INPUTS = ("second", "alarm")
+    SOURCE = "RM0008 6.4"
     REGISTERS = (
         *(
             Register(
@@ -52,22 +56,23 @@ class Bkp(Peripheral):
             offset=4 * RTCCR,
             mask=bits((9, 0)),
             on_write="_write_rtccr",
-            fields="ASOS 9, ASOE 8, CCO 7, CAL 6:0",
+            fields=_RTCCR,
         ),
         Register(
             name="CR",
             offset=4 * CR,
             mask=TPE | TPAL,
             on_write="_write_cr",
-            fields="TPAL 1, TPE 0",
+            fields=_CR,
         ),
         Register(
             name="CSR",
             offset=4 * CSR,
             readable=TPIE | TEF | TIF,
             writable=TPIE,
+            triggers=CTE | CTI,
             on_write="_write_csr",
-            fields="TIF 9, TEF 8, TPIE 2, CTI 1, CTE 0",
+            fields=_CSR,
         ),
     )
     #: Whether TPE was set and the pin at the level of TPAL.

@@ -151,6 +151,7 @@ class Can(Peripheral):
         "_timer_ns", "_lost", "_is_stopped", "_tried", "_bits_held", "_bits_due_ns",
     )  # fmt: skip
     DERIVED = ("_pin_names", "_sinks", "_levels", "_bits", "_bits_slot")
+    SOURCE = "RM0008 24.9"
     REGISTERS = (
         Register(
             name="MCR",

@@ -15,6 +15,7 @@ class Crc(Peripheral):
     """CRC calculation unit."""
 
     KIND = "crc"
+    SOURCE = "RM0008 4.4"
     REGISTERS = (
         Register(name="DR", offset=0x00, reset=WORD, on_write=NATIVE, fields="DR 31:0"),
         Register(name="IDR", offset=0x04, mask=bits((7, 0)), fields="IDR 7:0"),

@@ -22,7 +22,7 @@ _BRIDGE_CYCLES, _APB_CYCLES = 1, 2
 
 
 class Question(IntEnum):
-    """What the device in C warns of (dma.c), with the number of the channel from 0 on."""
+    """What the device warns of, with the number of the channel from 0 on."""
 
     LOCKED = 0
     FAILED = 1
@@ -48,8 +48,10 @@ class Dma(Peripheral):
 
     KIND, HOLDS = "dma", DMA
     HAS_BYTE_LANES = True
+    ENUMS = (Question,)
     OUTPUTS = tuple(f"ch{n}_irq" for n in CHANNELS)
     INPUTS = tuple(f"ch{n}" for n in CHANNELS)
+    SOURCE = "RM0008 13.4"
     REGISTERS = (
         Register(name="ISR", offset=0x00, readable=bits((27, 0)), writable=0, fields=_flags("TEIF HTIF TCIF GIF")),
         Register(

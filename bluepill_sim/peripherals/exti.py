@@ -12,9 +12,7 @@ Invariant: an IRQ is raised exactly while one of its lines is pending and unmask
 from bluepill_sim.extension.layout import EXTI
 from bluepill_sim.fabric.fabric import ROUTE
 from bluepill_sim.fabric.ports import ChipPorts
-from bluepill_sim.fabric.registers import NATIVE, Peripheral, Place, Register, bits, numbered
-
-IMR, EMR, RTSR, FTSR, SWIER, PR = range(6)
+from bluepill_sim.fabric.registers import NATIVE, Peripheral, Place, Register, bits, indices, numbered
 
 _LINES = bits((18, 0))
 #: From the left.
@@ -30,6 +28,7 @@ class Exti(Peripheral):
         "0", "1", "2", "3", "4", "9_5", "15_10", "pvd_irq", "rtc_alarm_irq", "usb_wakeup_irq", "line11", "line15",
     )  # fmt: skip
     INPUTS = ("pvd", "rtc_alarm", "usb_wakeup")
+    SOURCE = "RM0008 10.3"
     REGISTERS = (
         Register(name="IMR", offset=0x00, mask=_LINES, on_write=NATIVE, fields=numbered("MRn", _DOWN)),
         Register(name="EMR", offset=0x04, mask=_LINES, fields=numbered("MRn", _DOWN)),
@@ -66,3 +65,6 @@ class Exti(Peripheral):
 
     def _restored(self) -> None:
         self.command(ROUTE)
+
+
+IMR, EMR, PR = indices(Exti.REGISTERS, "IMR EMR PR")

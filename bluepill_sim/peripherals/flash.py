@@ -13,16 +13,21 @@ Source: RM0008 section 3.3.3, PM0075 sections 2 and 3; times from DS5319 table 2
 Invariant: the memory changes only while CR is unlocked and PG, PER or MER says so.
 """
 
+from enum import IntEnum
 from typing import Protocol
 
 from bluepill_sim.fabric.ports import ChipPorts
-from bluepill_sim.fabric.registers import NATIVE, Peripheral, Place, Register, bits
-
-ACR, KEYR, OPTKEYR, SR, CR, AR, _RESERVED, OBR, WRPR = range(9)
+from bluepill_sim.fabric.registers import NATIVE, OWN_ANSWERS, Peripheral, Place, Register, bits, indices, masks
 
 KEY1, KEY2 = 0x4567_0123, 0xCDEF_89AB
-PG, PER, MER, OPTPG, OPTER, STRT, LOCK, OPTWRE, ERRIE, EOPIE = (1 << n for n in (0, 1, 2, 4, 5, 6, 7, 9, 10, 12))
-BSY, PGERR, WRPRTERR, EOP = 1, 1 << 2, 1 << 4, 1 << 5
+#: Fields, from the left.
+_SR = "EOP 5, WRPRTERR 4, PGERR 2, BSY 0"
+_CR = "EOPIE 12, ERRIE 10, OPTWRE 9, LOCK 7, STRT 6, OPTER 5, OPTPG 4, MER 2, PER 1, PG 0"
+_OBR = "Data1 25:18, Data0 17:10, UNUSED 9:5, nRST_STDBY 4, nRST_STOP 3, WDG_SW 2, RDPRT 1, OPTERR 0"
+PG, PER, MER, OPTPG, OPTER, STRT, LOCK, OPTWRE, ERRIE, EOPIE = masks(
+    _CR, "PG PER MER OPTPG OPTER STRT LOCK OPTWRE ERRIE EOPIE"
+)
+BSY, PGERR, WRPRTERR, EOP = masks(_SR, "BSY PGERR WRPRTERR EOP")
 
 #: Bytes of a page of a medium-density part (PM0075 table 2).
 PAGE_BYTES = 1024
@@ -40,11 +45,18 @@ UNPROTECTED = 0xA5
 #: USER: 0 starts IWDG with the chip, resets where Stop or Standby begins.
 WDG_SW, N_RST_STOP, N_RST_STDBY = 1, 2, 4
 #: OBR.
-OPTERR, RDPRT = 1, 2
+OPTERR, RDPRT = masks(_OBR, "OPTERR RDPRT")
 _USER_AT, _DATA0_AT, _DATA1_AT = 2, 10, 18
 #: One bit of WRPR protects so much; RDP protects the first one.
 GROUP_BYTES = 4 * PAGE_BYTES
 _ERASED, _HALFWORD = 0xFF, 0xFFFF
+
+
+class Question(IntEnum):
+    """What Python is told beside what a listener hears."""
+
+    #: A write, with the word before it.
+    WRITTEN = OWN_ANSWERS
 
 
 class FlashMemory(Protocol):
@@ -75,6 +87,8 @@ class Flash(Peripheral):
     HAS_BYTE_LANES = True
     STATE = ("_key_step", "_option_key_step", "_address")
     OUTPUTS = ("irq",)
+    ENUMS = (Question,)
+    SOURCE = "PM0075 3"
     REGISTERS = (
         Register(
             name="ACR",
@@ -94,7 +108,7 @@ class Flash(Peripheral):
             writable=0,
             write_one_to_clear=PGERR | WRPRTERR | EOP,
             on_write=NATIVE,
-            fields="EOP 5, WRPRTERR 4, PGERR 2, BSY 0",
+            fields=_SR,
         ),
         Register(
             name="CR",
@@ -102,7 +116,7 @@ class Flash(Peripheral):
             reset=LOCK,
             mask=PG | PER | MER | OPTPG | OPTER | STRT | LOCK | OPTWRE | ERRIE | EOPIE,
             on_write=NATIVE,
-            fields="EOPIE 12, ERRIE 10, OPTWRE 9, LOCK 7, STRT 6, OPTER 5, OPTPG 4, MER 2, PER 1, PG 0",
+            fields=_CR,
         ),
         Register(name="AR", offset=0x14, readable=0, on_write="_write_ar"),
         Register(
@@ -112,7 +126,7 @@ class Flash(Peripheral):
             readable=bits((25, 0)),
             writable=0,
             doc="option bytes as the last reset found them",
-            fields="Data1 25:18, Data0 17:10, UNUSED 9:5, nRST_STDBY 4, nRST_STOP 3, WDG_SW 2, RDPRT 1, OPTERR 0",
+            fields=_OBR,
         ),
         Register(
             name="WRPR",
@@ -364,3 +378,6 @@ class Flash(Peripheral):
         done = status & EOP and control & EOPIE
         failed = status & (PGERR | WRPRTERR) and control & ERRIE
         self.set_output("irq", bool(done or failed))
+
+
+ACR, SR, CR, OBR, WRPR = indices(Flash.REGISTERS, "ACR SR CR OBR WRPR")

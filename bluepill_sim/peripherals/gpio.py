@@ -14,24 +14,32 @@ Invariant: bit n of IDR reads as `pins[n].input`.
 """
 
 from collections.abc import Iterable
+from enum import IntEnum
 
 from bluepill_sim.extension.layout import GPIO
 from bluepill_sim.fabric.fabric import OWN_COMMANDS
 from bluepill_sim.fabric.pins import Pin, PinMode, floating_inputs
 from bluepill_sim.fabric.ports import ChipPorts
-from bluepill_sim.fabric.registers import NATIVE, Peripheral, Place, Register, bits, numbered
-
-CRL, CRH, IDR, ODR, BSRR, BRR, LCKR = range(7)
+from bluepill_sim.fabric.registers import (
+    NATIVE,
+    OWN_ANSWERS,
+    Peripheral,
+    Place,
+    Register,
+    bits,
+    indices,
+    masks,
+    numbered,
+)
 
 _PORT = bits((15, 0))
-_LCKK = 1 << 16
 #: CNF = 01, MODE = 00 for each pin: floating input.
 _CR_RESET = 0x4444_4444
-#: A command of the device in C: pins are looked at a little later (gpio.c).
-_CHECK = OWN_COMMANDS
 
 #: From the left.
 _DOWN = range(15, -1, -1)
+_LCKR = "LCKK 16, " + numbered("LCKn", _DOWN)
+(_LCKK,) = masks(_LCKR, "LCKK")
 
 
 def _modes(numbers: Iterable[int]) -> str:
@@ -41,18 +49,40 @@ def _modes(numbers: Iterable[int]) -> str:
     )
 
 
+class Question(IntEnum):
+    """What Python is told beside what a listener hears."""
+
+    #: A locked pin was configured.
+    LOCKED = OWN_ANSWERS
+
+
+class Command(IntEnum):
+    """A command of its own."""
+
+    #: Pins are looked at a little later.
+    CHECK = OWN_COMMANDS
+
+
 class Gpio(Peripheral):
     """One general-purpose I/O port; the last letter of its name is the port's."""
 
     KIND, HOLDS = "gpio", GPIO
+    ENUMS = (Question, Command)
     STATE = ("_lock_writes",)
+    SOURCE = "RM0008 9.2"
     REGISTERS = (
         Register(name="CRL", offset=0x00, reset=_CR_RESET, on_write=NATIVE, fields=_modes(range(7, -1, -1))),
         Register(name="CRH", offset=0x04, reset=_CR_RESET, on_write=NATIVE, fields=_modes(range(15, 7, -1))),
         Register(name="IDR", offset=0x08, readable=_PORT, writable=0, on_read=NATIVE, fields=numbered("IDRn", _DOWN)),
         Register(name="ODR", offset=0x0C, mask=_PORT, on_write=NATIVE, fields=numbered("ODRn", _DOWN)),
-        Register(name="BSRR", offset=0x10, readable=0, on_write=NATIVE),
-        Register(name="BRR", offset=0x14, readable=0, writable=_PORT, on_write=NATIVE),
+        Register(
+            name="BSRR",
+            offset=0x10,
+            readable=0,
+            on_write=NATIVE,
+            fields=f"{numbered('BRn', _DOWN, first=-16)}, {numbered('BSn', _DOWN)}",
+        ),
+        Register(name="BRR", offset=0x14, readable=0, writable=_PORT, on_write=NATIVE, fields=numbered("BRn", _DOWN)),
         Register(
             name="LCKR",
             offset=0x18,
@@ -60,7 +90,7 @@ class Gpio(Peripheral):
             writable=0,
             on_read="_read_lckr",
             on_write="_write_lckr",
-            fields="LCKK 16, " + numbered("LCKn", _DOWN),
+            fields=_LCKR,
         ),
     )
 
@@ -85,7 +115,7 @@ class Gpio(Peripheral):
     def _released(self, pin: Pin) -> None:
         """Check again an input that is no longer driven."""
         if pin.port == self.name[-1] and self.native.intended >> pin.number & 1:
-            self.command(_CHECK)
+            self.command(Command.CHECK)
 
     def advance_to(self, now_ns: int) -> None:
         """Warn of the pins that belong to another still, and of the intended inputs that float."""
@@ -145,3 +175,6 @@ def _held_pins(pins: list[Pin]) -> str:
 def _is_lost(pin: Pin) -> bool:
     """Tell whether a pin floats as an input of GPIO, on a leg."""
     return pin.is_floating and pin.mode is PinMode.FLOATING and pin.holder is None and pin.is_bonded
+
+
+(LCKR,) = indices(Gpio.REGISTERS, "LCKR")

@@ -21,28 +21,28 @@ from bluepill_sim.fabric.fabric import OWN_COMMANDS
 from bluepill_sim.fabric.fabric import WORD as SENT
 from bluepill_sim.fabric.pins import ALTERNATE_FUNCTIONS, PinDrive
 from bluepill_sim.fabric.ports import ChipPorts
-from bluepill_sim.fabric.registers import NATIVE, WORD, Peripheral, Place, Register, bits
+from bluepill_sim.fabric.registers import NATIVE, WORD, Peripheral, Place, Register, bits, indices, masks
 from simbase.timing import Nanos
 
-CR1, CR2, OAR1, OAR2, DR, SR1, SR2, CCR, TRISE = range(9)
-_SEEN = 0x24
 _CR1, _CR2, _CCR = bits(15, (13, 3), (1, 0)), bits((12, 8), (5, 0)), bits(15, 14, (11, 0))
+#: Fields, from the left.
+_SR1 = (
+    "SMBALERT 15, TIMEOUT 14, PECERR 12, OVR 11, AF 10, ARLO 9, BERR 8, "
+    "TxE 7, RxNE 6, STOPF 4, ADD10 3, BTF 2, ADDR 1, SB 0"
+)
+_ARLO, _BERR = masks(_SR1, "ARLO BERR")
+#: What an answer, a symbol and a byte to a master outside have above the byte.
 _ACK = _HELD = 1 << 8
-_ARLO, _BERR = 1 << 9, 1 << 8
 #: What a byte that is sent to nobody in particular answers.
 _RELEASED = 0xFF
 #: Pins (SCL, SDA, SMBA), by the value of the remap bit (RM0008 table 55, DS5319 table 5).
 PINS = {"I2C1": {0: ("PB6", "PB7", "PB5"), 1: ("PB8", "PB9", "PB5")}, "I2C2": {0: ("PB10", "PB11", "PB12")}}
 #: CNDTR of the channel of DMA1 that each receives by (RM0008 table 78): its end of transfer is what LAST waits for.
 _COUNTERS = {"I2C1": 0x4002_0000 + 0x0C + 20 * 6, "I2C2": 0x4002_0000 + 0x0C + 20 * 4}
-#: Commands of its own (i2c.c).
-_MOVE, _CALL, _DISTURB, _LISTEN, _HOLD_TIMEOUT, _GO_ON_TIMEOUT = range(OWN_COMMANDS, OWN_COMMANDS + 6)
-#: Steps of a master outside (i2c.c): above a byte.
-_FAR_START, _FAR_WRITE, _FAR_READ, _FAR_STOP = (n << 9 for n in range(1, 5))
 
 
 class Question(IntEnum):
-    """What the device in C asks (i2c.c)."""
+    """What Python is asked; from NO_PINS on they are warnings."""
 
     ADDRESS = 0
     WRITE = 1
@@ -51,6 +51,32 @@ class Question(IntEnum):
     NEXT_STEP = 4
     NO_PINS = 5
     SEQUENCE = 6
+
+
+class Command(IntEnum):
+    """A command of its own."""
+
+    #: Move to the pins.
+    MOVE = OWN_COMMANDS
+    #: A master outside has something to do.
+    CALL = OWN_COMMANDS + 1
+    #: Arbitration is lost, or the bus disturbed.
+    DISTURB = OWN_COMMANDS + 2
+    #: Listen again.
+    LISTEN = OWN_COMMANDS + 3
+    #: DBGMCU_CR's freeze of the timeout, and its end after `one` + 2^32 * `other` ns.
+    HOLD_TIMEOUT = OWN_COMMANDS + 4
+    GO_ON_TIMEOUT = OWN_COMMANDS + 5
+
+
+class FarStep(IntEnum):
+    """What a master outside does, above a byte or, for FAR_READ, its acknowledge."""
+
+    FAR_NOTHING = 0
+    FAR_START = 1
+    FAR_WRITE = 2
+    FAR_READ = 3
+    FAR_STOP = 4
 
 
 class I2cStep(IntEnum):
@@ -78,6 +104,7 @@ class I2cSymbol(NamedTuple):
 #: Takes symbols, oldest first.
 Sink = Callable[[Sequence[I2cSymbol]], None]
 _STEP_AT = 9
+_FAR_START, _FAR_WRITE, _FAR_READ, _FAR_STOP = (step << _STEP_AT for step in FarStep if step)
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,8 +139,12 @@ class I2c(Peripheral):
 
     KIND, HOLDS = "i2c", I2C
     OUTPUTS = ("event_irq", "error_irq", "rx_dma", "tx_dma")
+    #: SR1 at its last read, half of the sequences that clear its flags.
+    HIDDEN = ("SEEN",)
+    ENUMS = (Question, Command, FarStep)
     STATE = ("_hung", "_addressed", "_high_bits", "_ten_bit", "_calls", "_step", "_is_stopping", "answered")
     DERIVED = ("_pin_names", "_sinks")
+    SOURCE = "RM0008 26.6"
     REGISTERS = (
         Register(
             name="CR1", offset=0x00, mask=_CR1, on_write=NATIVE,
@@ -136,10 +167,8 @@ class I2c(Peripheral):
         ),
         Register(
             name="SR1", offset=0x14, readable=bits(15, 14, (12, 6), (4, 0)), writable=0,
-            write_zero_to_clear=bits(15, 14, (12, 8)), latched_in=_SEEN, on_write=NATIVE,
-            fields="SMBALERT 15, TIMEOUT 14, PECERR 12, OVR 11, AF 10, ARLO 9, "
-            "BERR 8, TxE 7, RxNE 6, STOPF 4, ADD10 3, BTF 2, "
-            "ADDR 1, SB 0",
+            write_zero_to_clear=bits(15, 14, (12, 8)), latched_in="SEEN", on_write=NATIVE,
+            fields=_SR1,
         ),
         Register(
             name="SR2", offset=0x18, readable=bits((15, 4), (2, 0)), writable=0, on_read=NATIVE,
@@ -208,15 +237,15 @@ class I2c(Peripheral):
         self._calls += (I2cCall(address, written, read_bytes),)
         if len(self._calls) == 1:
             self.native.far_hz = hz
-            self.command(_CALL)
+            self.command(Command.CALL)
 
     def lose_arbitration(self) -> None:
         """Have another master win the bus during the next address or byte that the chip sends."""
-        self.command(_DISTURB, _ARLO)
+        self.command(Command.DISTURB, _ARLO)
 
     def disturb(self) -> None:
         """Put a START or a STOP where none may be: BERR."""
-        self.command(_DISTURB, _BERR)
+        self.command(Command.DISTURB, _BERR)
 
     # For the chip.
 
@@ -226,11 +255,11 @@ class I2c(Peripheral):
 
     def freeze(self) -> None:
         """Have the SMBus timeout alone stand still (RM0008 31.16.3, DBG_I2Cx_SMBUS_TIMEOUT)."""
-        self.command(_HOLD_TIMEOUT)
+        self.command(Command.HOLD_TIMEOUT)
 
     def thaw(self, frozen_ns: int) -> None:
         """Have it go on."""
-        self.command(_GO_ON_TIMEOUT, frozen_ns & WORD, frozen_ns >> 32)
+        self.command(Command.GO_ON_TIMEOUT, frozen_ns & WORD, frozen_ns >> 32)
 
     def on_reset(self) -> None:
         """Forget who was addressed."""
@@ -339,7 +368,7 @@ class I2c(Peripheral):
         """Move to the pins that AFIO now gives; the parts go with them."""
         self._find_pins()
         scl, sda, smba = (self.chip.pins[name].index for name in self._pin_names)
-        self.command(_MOVE, scl | sda << 8 | smba << 16)
+        self.command(Command.MOVE, scl | sda << 8 | smba << 16)
         if self._hung:
             self._pull_up()
 
@@ -350,4 +379,7 @@ class I2c(Peripheral):
     def _restored(self) -> None:
         self._find_pins()
         self.native.wants_words = bool(self._sinks)
-        self.command(_LISTEN)
+        self.command(Command.LISTEN)
+
+
+CR1, CCR = indices(I2c.REGISTERS, "CR1 CCR")

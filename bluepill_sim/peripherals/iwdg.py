@@ -10,7 +10,7 @@ Invariant: while it runs, `due_ns` is when the chip is reset.
 """
 
 from bluepill_sim.fabric.clocks import LSI_HZ
-from bluepill_sim.fabric.registers import Peripheral, Register, bits
+from bluepill_sim.fabric.registers import Peripheral, Register, bits, masks
 from simbase.timing import NS_PER_S, Nanos
 
 KR, PR, RLR, SR = range(4)
@@ -18,7 +18,8 @@ KR, PR, RLR, SR = range(4)
 START, FEED, UNLOCK = 0xCCCC, 0xAAAA, 0x5555
 #: RM0008 19.4.2: an update takes up to five cycles of LSI.
 UPDATE_CYCLES = 5
-_PVU, _RVU = 1, 2
+_SR = "RVU 1, PVU 0"
+_PVU, _RVU = masks(_SR, "PVU RVU")
 #: Divider of LSI by PR.
 DIVIDERS = (4, 8, 16, 32, 64, 128, 256, 256)
 _COUNTS = 0xFFF
@@ -29,6 +30,7 @@ class Iwdg(Peripheral):
 
     STATE = ("_is_running", "_is_unlocked", "_base_ns", "_base_count", "_lsi_hz", "_updated_ns")
     OUTPUTS = ("lsi",)
+    SOURCE = "RM0008 19.4"
     REGISTERS = (
         Register(name="KR", offset=0x00, readable=0, on_write="_write_kr"),
         Register(
@@ -38,7 +40,7 @@ class Iwdg(Peripheral):
             name="RLR", offset=0x08, reset=_COUNTS, mask=_COUNTS, on_write="_write_rlr",
             fields="RL 11:0",
         ),
-        Register(name="SR", offset=0x0C, readable=_PVU | _RVU, writable=0, on_read="_read_sr", fields="RVU 1, PVU 0"),
+        Register(name="SR", offset=0x0C, readable=_PVU | _RVU, writable=0, on_read="_read_sr", fields=_SR),
     )  # fmt: skip
     _is_running = False
     _is_unlocked = False

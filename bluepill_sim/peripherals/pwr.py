@@ -9,13 +9,13 @@ Invariant: PVDO is 1 exactly while PVDE is set and the supply was last seen belo
 """
 
 from bluepill_sim.fabric.pins import PinDrive
-from bluepill_sim.fabric.registers import LISTENER, Peripheral, Register, bits
+from bluepill_sim.fabric.registers import LISTENER, Peripheral, Register, indices, masks
 
-CR, CSR = range(2)
-
-LPDS, PDDS, CWUF, CSBF, PVDE, DBP = (1 << n for n in (0, 1, 2, 3, 4, 8))
-_PLS_AT, _PLS = 5, bits((7, 5))
-WUF, SBF, PVDO, EWUP = (1 << n for n in (0, 1, 2, 8))
+#: Fields, from the left.
+_CR, _CSR = "DBP 8, PLS 7:5, PVDE 4, CSBF 3, CWUF 2, PDDS 1, LPDS 0", "EWUP 8, PVDO 2, SBF 1, WUF 0"
+LPDS, PDDS, CWUF, CSBF, PVDE, DBP, _PLS = masks(_CR, "LPDS PDDS CWUF CSBF PVDE DBP PLS")
+_PLS_AT = 5
+WUF, SBF, PVDO, EWUP = masks(_CSR, "WUF SBF PVDO EWUP")
 #: The lowest threshold for a supply that falls, how far each PLS is above the one before, and how much higher the one
 #: for a supply that rises is, in mV.
 FALLING_MV, STEP_MV, HYSTERESIS_MV = 2_080, 100, 100
@@ -28,14 +28,15 @@ class Pwr(Peripheral):
     KIND = LISTENER
     OUTPUTS = ("pvd",)
     INPUTS = ("alarm",)
+    SOURCE = "RM0008 5.4"
     REGISTERS = (
         Register(
             name="CR", offset=0x00, readable=LPDS | PDDS | PVDE | _PLS | DBP,
             writable=LPDS | PDDS | CWUF | CSBF | PVDE | _PLS | DBP, on_write="_write_cr",
-            fields="DBP 8, PLS 7:5, PVDE 4, CSBF 3, CWUF 2, PDDS 1, LPDS 0",
+            fields=_CR,
         ),
         Register(name="CSR", offset=0x04, readable=WUF | SBF | PVDO | EWUP, writable=EWUP, on_write="_write_csr",
-            fields="EWUP 8, PVDO 2, SBF 1, WUF 0"),
+            fields=_CSR),
     )  # fmt: skip
 
     @property
@@ -120,3 +121,6 @@ class Pwr(Peripheral):
     def _wake(self) -> None:
         self.words[CSR] |= WUF
         self.chip.signal("wake")
+
+
+CR, CSR = indices(Pwr.REGISTERS, "CR CSR")

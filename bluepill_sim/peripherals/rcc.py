@@ -16,43 +16,68 @@ Invariant: `chip.clocks` is what SWS and the dividers say.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from enum import Enum
+from enum import Enum, IntEnum
 
 from bluepill_sim.extension.layout import RCC
 from bluepill_sim.fabric.clocks import CRYSTAL_HZ, HSI_HZ, LEAST_LSI_HZ, LSE_HZ, MOST_LSI_HZ, illegal_settings
 from bluepill_sim.fabric.ports import ChipPorts
-from bluepill_sim.fabric.registers import NATIVE, ClockBit, Peripheral, Place, Register, bits
+from bluepill_sim.fabric.registers import (
+    NATIVE,
+    OWN_ANSWERS,
+    ClockBit,
+    Peripheral,
+    Place,
+    Register,
+    bits,
+    indices,
+    masks,
+)
 
-CR, CFGR, CIR, APB2RSTR, APB1RSTR, AHBENR, APB2ENR, APB1ENR, BDCR, CSR = range(10)
-#: What the device in C tells (rcc.c), beside a line that it hears.
-_RESETS, _GATES = 2, 3
-
+#: Fields of the registers, from the left.
+_CR = "PLLRDY 25, PLLON 24, CSSON 19, HSEBYP 18, HSERDY 17, HSEON 16, HSICAL 15:8, HSITRIM 7:3, HSIRDY 1, HSION 0"
+_CFGR = (
+    "MCO 26:24, USBPRE 22, PLLMUL 21:18, PLLXTPRE 17, PLLSRC 16, ADCPRE 15:14, PPRE2 13:11, PPRE1 10:8, HPRE 7:4, "
+    "SWS 3:2, SW 1:0"
+)
+_CIR = (
+    "CSSC 23, PLLRDYC 20, HSERDYC 19, HSIRDYC 18, LSERDYC 17, LSIRDYC 16, "
+    "PLLRDYIE 12, HSERDYIE 11, HSIRDYIE 10, LSERDYIE 9, LSIRDYIE 8, CSSF 7, "
+    "PLLRDYF 4, HSERDYF 3, HSIRDYF 2, LSERDYF 1, LSIRDYF 0"
+)
+_APB2 = "USART1 14, SPI1 12, TIM1 11, ADC2 10, ADC1 9, IOPE 6, IOPD 5, IOPC 4, IOPB 3, IOPA 2, AFIO 0"
+_APB1 = (
+    "PWR 28, BKP 27, CAN 25, USB 23, I2C2 22, I2C1 21, USART3 18, USART2 17, SPI2 14, WWDG 11, TIM4 2, TIM3 1, TIM2 0"
+)
+_AHB = "CRC 6, FLITF 4, SRAM 2, DMA1 0"
+_BDCR = "BDRST 16, RTCEN 15, RTCSEL 9:8, LSEBYP 2, LSERDY 1, LSEON 0"
+_CSR = "LPWRRSTF 31, WWDGRSTF 30, IWDGRSTF 29, SFTRSTF 28, PORRSTF 27, PINRSTF 26, RMVF 24, LSIRDY 1, LSION 0"
 #: Bits of the enable registers that a medium-density F103 has.
 _AHB_GATES = bits(0, 2, 4, 6)
 _APB2_GATES = bits(0, (6, 2), (12, 9), 14)
 _APB1_GATES = bits((2, 0), 11, 14, 17, 18, (23, 21), 25, 27, 28)
 
-HSION, HSIRDY, HSEON, HSERDY, HSEBYP, PLLON, PLLRDY = (1 << n for n in (0, 1, 16, 17, 18, 24, 25))
+HSION, HSIRDY, HSEON, HSERDY, HSEBYP, PLLON, PLLRDY, CSSON = masks(
+    _CR, "HSION HSIRDY HSEON HSERDY HSEBYP PLLON PLLRDY CSSON"
+)
 #: chosen: so long a forbidden setting must last to be warned of; ST's own code passes through some.
 ILLEGAL_NS = 1_000_000
 #: CFGR's PLLSRC, PLLXTPRE and PLLMUL: fixed while the PLL is on.
-PLLSRC, PLLXTPRE, _USBPRE = 1 << 16, 1 << 17, 1 << 22
-_PLL_SETTINGS = bits((21, 16))
-_SW = bits((1, 0))
+PLLSRC, PLLXTPRE, _PLLMUL, _USBPRE, _SW = masks(_CFGR, "PLLSRC PLLXTPRE PLLMUL USBPRE SW")
+_PLL_SETTINGS = PLLSRC | PLLXTPRE | _PLLMUL
 #: MCO: 0xx is no clock, then SYSCLK, HSI, HSE, PLL / 2.
 _MCO_AT, _MCO_SYSCLK = 24, 4
 _MCO_PIN, _MCO = "PA8", "MCO"
-CSSON, CSSF, CSSC = 1 << 19, 1 << 7, 1 << 23
+CSSF, CSSC = masks(_CIR, "CSSF CSSC")
 #: chosen: so long after its handler NMI comes again while CSSF is set.
 NMI_AGAIN_NS = 1_000
 #: CR HSITRIM: the middle, and what a step does to HSI (DS5319 5.3.7).
 _TRIM_AT, _TRIM_MIDDLE, TRIM_STEP_HZ = 3, 16, 40_000
-_BDRST = 1 << 16
 #: BDCR: RTCSEL's place, which keeps its first choice; RTCEN.
-_RTCSEL_AT, _RTCSEL, _RTCEN = 8, bits((9, 8)), 1 << 15
+_RTCSEL_AT = 8
+_BDRST, _RTCSEL, _RTCEN = masks(_BDCR, "BDRST RTCSEL RTCEN")
 #: HSE is divided by this for the RTC.
 _RTC_HSE_DIVIDER = 128
-_RMVF = 1 << 24
+(_RMVF,) = masks(_CSR, "RMVF")
 _CSR_FLAGS = bits((31, 26))
 
 #: AHB divider by CFGR HPRE; APB divider by PPRE1/PPRE2.
@@ -61,6 +86,15 @@ _APB_DIVIDERS = (1,) * 4 + (2, 4, 8, 16)
 _ADC_DIVIDERS = (2, 4, 6, 8)
 #: PLL factor by CFGR PLLMUL.
 _PLL_FACTORS = (2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 16)
+
+
+class Question(IntEnum):
+    """What Python is told beside what a listener hears."""
+
+    #: The device in a slot is to be reset.
+    RESETS = OWN_ANSWERS
+    #: The gates have changed.
+    GATES = OWN_ANSWERS + 1
 
 
 class ResetCause(Enum):
@@ -84,6 +118,93 @@ class ResetCause(Enum):
 
 #: What no program does by itself.
 OUTSIDE = frozenset({ResetCause.POWER, ResetCause.PIN})
+
+
+_REGISTERS = (
+    Register(
+        name="CR",
+        offset=0x00,
+        reset=HSION | HSIRDY | bits(7),
+        readable=bits((19, 16), 24, 25, (15, 0)) & ~bits(2),
+        writable=HSION | HSEON | HSEBYP | bits(19) | PLLON | bits((7, 3)),
+        on_write="_write_cr",
+        fields=_CR,
+    ),
+    Register(
+        name="CFGR",
+        offset=0x04,
+        readable=bits((26, 24), (22, 0)),
+        writable=bits((26, 24), (22, 4), (1, 0)),
+        on_write="_write_cfgr",
+        fields=_CFGR,
+    ),
+    Register(
+        name="CIR",
+        offset=0x08,
+        readable=bits((12, 8), 7, (4, 0)),
+        writable=bits((12, 8)),
+        triggers=bits(23, (20, 16)),
+        on_write="_write_cir",
+        fields=_CIR,
+    ),
+    Register(
+        name="APB2RSTR",
+        offset=0x0C,
+        mask=_APB2_GATES,
+        on_write=NATIVE,
+        fields=_APB2,
+    ),
+    Register(
+        name="APB1RSTR",
+        offset=0x10,
+        mask=_APB1_GATES,
+        on_write=NATIVE,
+        fields=_APB1,
+    ),
+    Register(
+        name="AHBENR",
+        offset=0x14,
+        reset=0x14,
+        mask=_AHB_GATES,
+        on_write=NATIVE,
+        fields=_AHB,
+    ),
+    Register(
+        name="APB2ENR",
+        offset=0x18,
+        mask=_APB2_GATES,
+        on_write=NATIVE,
+        fields=_APB2,
+    ),
+    Register(
+        name="APB1ENR",
+        offset=0x1C,
+        mask=_APB1_GATES,
+        on_write=NATIVE,
+        fields=_APB1,
+    ),
+    Register(
+        name="BDCR",
+        offset=0x20,
+        readable=bits(16, 15, 9, 8, 2, 1, 0),
+        writable=bits(16, 15, 9, 8, 2, 0),
+        on_write="_write_bdcr",
+        fields=_BDCR,
+    ),
+    Register(
+        name="CSR",
+        offset=0x24,
+        reset=ResetCause.POWER.value,
+        readable=_CSR_FLAGS | bits(1, 0),
+        writable=bits(0),
+        triggers=_RMVF,
+        on_write="_write_csr",
+        fields=_CSR,
+    ),
+)
+CR, CFGR, CIR, APB2RSTR, APB1RSTR, AHBENR, APB2ENR, APB1ENR, BDCR, CSR = indices(
+    _REGISTERS, "CR CFGR CIR APB2RSTR APB1RSTR AHBENR APB2ENR APB1ENR BDCR CSR"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,24 +233,6 @@ _HSE, _PLL, _LSE, _LSI = 1, 2, 3, 4
 _SOURCE_READY = (HSIRDY, HSERDY, PLLRDY)
 
 
-#: Fields of the registers, from the left.
-_CR = "PLLRDY 25, PLLON 24, CSSON 19, HSEBYP 18, HSERDY 17, HSEON 16, HSICAL 15:8, HSITRIM 7:3, HSIRDY 1, HSION 0"
-_CFGR = (
-    "MCO 26:24, USBPRE 22, PLLMUL 21:18, PLLXTPRE 17, PLLSRC 16, ADCPRE 15:14, PPRE2 13:11, PPRE1 10:8, HPRE 7:4, "
-    "SWS 3:2, SW 1:0"
-)
-_CIR = (
-    "PLLRDYIE 12, HSERDYIE 11, HSIRDYIE 10, LSERDYIE 9, LSIRDYIE 8, CSSF 7, "
-    "PLLRDYF 4, HSERDYF 3, HSIRDYF 2, LSERDYF 1, LSIRDYF 0"
-)
-_APB2 = "USART1 14, SPI1 12, TIM1 11, ADC2 10, ADC1 9, IOPE 6, IOPD 5, IOPC 4, IOPB 3, IOPA 2, AFIO 0"
-_APB1 = (
-    "PWR 28, BKP 27, CAN 25, USB 23, I2C2 22, I2C1 21, USART3 18, USART2 17, SPI2 14, WWDG 11, TIM4 2, TIM3 1, TIM2 0"
-)
-_AHB = "CRC 6, FLITF 4, SRAM 2, DMA1 0"
-_CSR = "LPWRRSTF 31, WWDGRSTF 30, IWDGRSTF 29, SFTRSTF 28, PORRSTF 27, PINRSTF 26, LSIRDY 1, LSION 0"
-
-
 class Rcc(Peripheral):
     """Reset and clock control."""
 
@@ -138,86 +241,9 @@ class Rcc(Peripheral):
     STATE = ("_ready_at", "_illegal", "_nmi_ns", "_keeps_lsi", "crystal_works", "_shown")
     OUTPUTS = ("irq", "css")
     INPUTS = ("lsi",)
-    REGISTERS = (
-        Register(
-            name="CR",
-            offset=0x00,
-            reset=HSION | HSIRDY | bits(7),
-            readable=bits((19, 16), 24, 25, (15, 0)) & ~bits(2),
-            writable=HSION | HSEON | HSEBYP | bits(19) | PLLON | bits((7, 3)),
-            on_write="_write_cr",
-            fields=_CR,
-        ),
-        Register(
-            name="CFGR",
-            offset=0x04,
-            readable=bits((26, 24), (22, 0)),
-            writable=bits((26, 24), (22, 4), (1, 0)),
-            on_write="_write_cfgr",
-            fields=_CFGR,
-        ),
-        Register(
-            name="CIR",
-            offset=0x08,
-            readable=bits((12, 8), 7, (4, 0)),
-            writable=bits((12, 8)),
-            on_write="_write_cir",
-            fields=_CIR,
-        ),
-        Register(
-            name="APB2RSTR",
-            offset=0x0C,
-            mask=_APB2_GATES,
-            on_write=NATIVE,
-            fields=_APB2,
-        ),
-        Register(
-            name="APB1RSTR",
-            offset=0x10,
-            mask=_APB1_GATES,
-            on_write=NATIVE,
-            fields=_APB1,
-        ),
-        Register(
-            name="AHBENR",
-            offset=0x14,
-            reset=0x14,
-            mask=_AHB_GATES,
-            on_write=NATIVE,
-            fields=_AHB,
-        ),
-        Register(
-            name="APB2ENR",
-            offset=0x18,
-            mask=_APB2_GATES,
-            on_write=NATIVE,
-            fields=_APB2,
-        ),
-        Register(
-            name="APB1ENR",
-            offset=0x1C,
-            mask=_APB1_GATES,
-            on_write=NATIVE,
-            fields=_APB1,
-        ),
-        Register(
-            name="BDCR",
-            offset=0x20,
-            readable=bits(16, 15, 9, 8, 2, 1, 0),
-            writable=bits(16, 15, 9, 8, 2, 0),
-            on_write="_write_bdcr",
-            fields="BDRST 16, RTCEN 15, RTCSEL 9:8, LSEBYP 2, LSERDY 1, LSEON 0",
-        ),
-        Register(
-            name="CSR",
-            offset=0x24,
-            reset=ResetCause.POWER.value,
-            readable=_CSR_FLAGS | bits(1, 0),
-            writable=bits(0),
-            on_write="_write_csr",
-            fields=_CSR,
-        ),
-    )
+    SOURCE = "RM0008 7.3"
+    ENUMS = (Question,)
+    REGISTERS = _REGISTERS
 
     def __init__(
         self, chip: ChipPorts, place: Place, *, gates: Mapping[str, ClockBit], hse_hz: int | None = CRYSTAL_HZ
@@ -299,9 +325,9 @@ class Rcc(Peripheral):
 
     def answer(self, what: int, value: int) -> int:
         """Reset a peripheral whose bit of APBxRSTR has just gone to 1, tell of the gates, or hear a line."""
-        if what == _RESETS:
+        if what == Question.RESETS:
             self.chip.reset_peripheral(self.fabric.name_of(value))
-        elif what == _GATES:
+        elif what == Question.GATES:
             if self.on_gates is not None:
                 self.on_gates()
         else:

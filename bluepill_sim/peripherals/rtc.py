@@ -23,12 +23,14 @@ Invariant: counter and divider never depend on who looked at them.
 from functools import partialmethod
 
 from bluepill_sim.fabric.ports import ChipPorts
-from bluepill_sim.fabric.registers import WORD, Peripheral, Place, Register, bits
+from bluepill_sim.fabric.registers import WORD, Peripheral, Place, Register, bits, masks
 from simbase.timing import NS_PER_S, Nanos
 
 CRH, CRL, PRLH, PRLL, DIVH, DIVL, CNTH, CNTL, ALRH, ALRL = range(10)
 
-SECF, ALRF, OWF, RSF, CNF, RTOFF = (1 << n for n in range(6))
+#: Fields of CRL, from the left.
+_CRL = "RTOFF 5, CNF 4, RSF 3, OWF 2, ALRF 1, SECF 0"
+SECF, ALRF, OWF, RSF, CNF, RTOFF = masks(_CRL, "SECF ALRF OWF RSF CNF RTOFF")
 _INTERRUPTS = SECF | ALRF | OWF
 _HALFWORD = bits((15, 0))
 _PRLH_BITS = bits((3, 0))
@@ -50,6 +52,7 @@ class Rtc(Peripheral):
         "_staged", "_written_ns", "_cleared_ns", "_is_stale", "_pulse_end_ns",
     )  # fmt: skip
     OUTPUTS = ("irq", "alarm", "second")
+    SOURCE = "RM0008 18.4"
     REGISTERS = (
         Register(
             name="CRH",
@@ -66,7 +69,7 @@ class Rtc(Peripheral):
             writable=CNF,
             write_zero_to_clear=_INTERRUPTS | RSF,
             on_write="_write_crl",
-            fields="RTOFF 5, CNF 4, RSF 3, OWF 2, ALRF 1, SECF 0",
+            fields=_CRL,
         ),
         Register(name="PRLH", offset=0x08, readable=0, writable=_PRLH_BITS, on_write="_write_prlh", fields="PRL 3:0"),
         Register(name="PRLL", offset=0x0C, readable=0, writable=_HALFWORD, on_write="_write_prll", fields="PRL 15:0"),

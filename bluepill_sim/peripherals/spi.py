@@ -18,12 +18,16 @@ from bluepill_sim.fabric.bus_parts import AheadDevice, SpiDevice, subscribe_word
 from bluepill_sim.fabric.fabric import OWN_COMMANDS, WORD
 from bluepill_sim.fabric.pins import ALTERNATE_FUNCTIONS, PinDrive
 from bluepill_sim.fabric.ports import ChipPorts
-from bluepill_sim.fabric.registers import NATIVE, Peripheral, Place, Register, bits
+from bluepill_sim.fabric.registers import NATIVE, Peripheral, Place, Register, bits, indices, masks
 from simbase.state import Stateful
 from simbase.timing import NS_PER_S, Nanos
 
-CR1, CR2, SR, DR = range(4)
-CPHA, CPOL, MSTR, SPE, LSBFIRST, DFF = (1 << n for n in (0, 1, 2, 6, 7, 11))
+#: Fields, from the left.
+_CR1 = (
+    "BIDIMODE 15, BIDIOE 14, CRCEN 13, CRCNEXT 12, DFF 11, RXONLY 10, "
+    "SSM 9, SSI 8, LSBFIRST 7, SPE 6, BR 5:3, MSTR 2, CPOL 1, CPHA 0"
+)
+CPHA, CPOL, MSTR, SPE, LSBFIRST, DFF = masks(_CR1, "CPHA CPOL MSTR SPE LSBFIRST DFF")
 _BR_AT, _HELD, _WHATEVER = 3, 1 << 16, 0xFFFF_FFFF
 _CR2 = bits((7, 5), (2, 0))
 #: Pins (MISO, MOSI, NSS, SCK), by the value of the remap bit (RM0008 table 56, DS5319 table 5).
@@ -31,12 +35,10 @@ PINS = {
     "SPI1": {0: ("PA6", "PA7", "PA4", "PA5"), 1: ("PB4", "PB5", "PA15", "PB3")},
     "SPI2": {0: ("PB14", "PB15", "PB12", "PB13")},
 }
-#: Commands of its own (spi.c): move to pins, listen to those that select, take a word from a master outside.
-_MOVE, _LISTEN, _CLOCK_IN = range(OWN_COMMANDS, OWN_COMMANDS + 3)
 
 
 class Question(IntEnum):
-    """What the device in C asks (spi.c): those from NO_SCK on are warnings."""
+    """What Python is asked: those from NO_SCK on are warnings."""
 
     EXCHANGE = 0
     SELECT = 1
@@ -46,6 +48,17 @@ class Question(IntEnum):
     NO_MISO = 5
     WORD_LOST = 6
     MODE_FAULT = 7
+
+
+class Command(IntEnum):
+    """A command of its own."""
+
+    #: Move to the pins: two, and two.
+    MOVE = OWN_COMMANDS
+    #: Listen to the pins that select.
+    LISTEN = OWN_COMMANDS + 1
+    #: Take a word from a master outside.
+    CLOCK_IN = OWN_COMMANDS + 2
 
 
 _WARNINGS = {
@@ -104,14 +117,14 @@ class Spi(Peripheral):
 
     KIND, HOLDS = "spi", SPI
     OUTPUTS = ("irq", "rx_dma", "tx_dma")
+    ENUMS = (Question, Command)
     STATE = ("_hung", "_coming")
     DERIVED = ("_pin_names", "_sinks")
+    SOURCE = "RM0008 25.5"
     REGISTERS = (
         Register(
             name="CR1", offset=0x00, mask=bits((15, 0)), on_write=NATIVE,
-            fields="BIDIMODE 15, BIDIOE 14, CRCEN 13, CRCNEXT 12, DFF 11, RXONLY 10, "
-            "SSM 9, SSI 8, LSBFIRST 7, SPE 6, BR 5:3, "
-            "MSTR 2, CPOL 1, CPHA 0",
+            fields=_CR1,
         ),
         Register(
             name="CR2", offset=0x04, mask=_CR2, on_write=NATIVE,
@@ -178,7 +191,7 @@ class Spi(Peripheral):
             if pin.board_pull is PinDrive.NONE:
                 pin.board_pull = PinDrive.PULL_UP
             self.native.selects[pin.index // 16] |= 1 << pin.number
-            self.command(_LISTEN)
+            self.command(Command.LISTEN)
         self._follow_selects()
 
     def subscribe(self, sink: Sink) -> Callable[[], None]:
@@ -198,7 +211,7 @@ class Spi(Peripheral):
         if hz <= 0:
             raise ValueError(f"{self.name}: a master's clock of {hz} Hz")
         self._coming += tuple(words)
-        if self._coming and self.command(_CLOCK_IN, self._coming[0], hz):
+        if self._coming and self.command(Command.CLOCK_IN, self._coming[0], hz):
             self._coming = self._coming[1:]
 
     # For the chip.
@@ -318,7 +331,7 @@ class Spi(Peripheral):
         """Move to the pins that AFIO now gives."""
         self._find_pins()
         at = [self.chip.pins[name].index for name in self._pin_names]
-        self.command(_MOVE, at[0] | at[1] << 8, at[2] | at[3] << 8)
+        self.command(Command.MOVE, at[0] | at[1] << 8, at[2] | at[3] << 8)
 
     def _find_pins(self) -> None:
         pins = PINS[self.name]
@@ -327,7 +340,7 @@ class Spi(Peripheral):
     def _restored(self) -> None:
         self._find_pins()
         self.native.wants_words = bool(self._sinks)
-        self.command(_LISTEN)
+        self.command(Command.LISTEN)
 
     def _write_i2s(self, written: int, _previous: int) -> None:
         if written:
@@ -336,3 +349,6 @@ class Spi(Peripheral):
 
 def _reversed(word: int, count: int) -> int:
     return int(f"{word:0{count}b}"[::-1], 2)
+
+
+(CR1,) = indices(Spi.REGISTERS, "CR1")

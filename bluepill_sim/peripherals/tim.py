@@ -7,6 +7,7 @@ Source: RM0008 sections 14 and 15; 9.3.7 (remaps).
 Invariant: the struct's pins are those that AFIO has given.
 """
 
+from enum import IntEnum
 from typing import ClassVar
 
 from bluepill_sim.extension.layout import TIM
@@ -14,9 +15,6 @@ from bluepill_sim.fabric.fabric import CLOCK, OWN_COMMANDS, ROUTE
 from bluepill_sim.fabric.pins import ALTERNATE_FUNCTIONS
 from bluepill_sim.fabric.ports import ChipPorts
 from bluepill_sim.fabric.registers import NATIVE, Peripheral, Place, Register, bits, fields_of
-
-#: Commands of its own (tim.c): put one of `pins` elsewhere; listen again; make CNT known to loops that poll it.
-_MOVE, _RESUME, _INTRODUCE = range(OWN_COMMANDS, OWN_COMMANDS + 3)
 
 #: The alternate functions, in the order of `outputs` in the struct.
 _OUTPUTS = ("CH1", "CH2", "CH3", "CH4", "CH1N", "CH2N", "CH3N")
@@ -58,6 +56,17 @@ _EVENTS = (
     "com_dma",
     "trig_dma",
 )
+
+
+class Command(IntEnum):
+    """A command of its own."""
+
+    #: Put one of `pins` on another pin.
+    MOVE = OWN_COMMANDS
+    #: Listen again after a state was put back.
+    RESUME = OWN_COMMANDS + 1
+    #: Make CNT known.
+    INTRODUCE = OWN_COMMANDS + 2
 
 
 def _register(name: str, index: int, fields: str, **more: object) -> Register:
@@ -125,8 +134,10 @@ class GeneralTimer(Peripheral):
     """TIM2, TIM3 or TIM4."""
 
     KIND, HOLDS = "tim", TIM
+    ENUMS: ClassVar[tuple[type[IntEnum], ...]] = (Command,)
     OUTPUTS: ClassVar[tuple[str, ...]] = (*_EVENTS, "irq")
     INPUTS: ClassVar[tuple[str, ...]] = ("itr0", "itr1", "itr2", "itr3")
+    SOURCE: ClassVar[str] = "RM0008 15.4"
     REGISTERS = _registers(is_advanced=False)
 
     def __init__(self, chip: ChipPorts, place: Place) -> None:
@@ -138,7 +149,7 @@ class GeneralTimer(Peripheral):
             self.native.sources[number] = ALTERNATE_FUNCTIONS.index(f"{place.name}_{name}")
         self.native.pins[:] = self._routed_pins()
         self.command(CLOCK, self.clock_hz())
-        self.command(_INTRODUCE)
+        self.command(Command.INTRODUCE)
         self.reset()
         chip.pins.route_listeners.append(self._route_changed)
 
@@ -166,11 +177,11 @@ class GeneralTimer(Peripheral):
         wanted = self._routed_pins()
         if wanted != list(self.native.pins):
             for number, pin in enumerate(wanted):
-                self.command(_MOVE, number, pin)
+                self.command(Command.MOVE, number, pin)
             self.command(ROUTE)
 
     def _restored(self) -> None:
-        self.command(_RESUME)
+        self.command(Command.RESUME)
 
 
 class AdvancedTimer(GeneralTimer):
@@ -178,6 +189,7 @@ class AdvancedTimer(GeneralTimer):
 
     INPUTS = (*GeneralTimer.INPUTS, "css")
     OUTPUTS: ClassVar[tuple[str, ...]] = (*_EVENTS, "brk_irq", "up_irq", "trg_com_irq", "cc_irq")
+    SOURCE: ClassVar[str] = "RM0008 14.4"
     REGISTERS = _registers(is_advanced=True)
 
     def clock_hz(self) -> int:

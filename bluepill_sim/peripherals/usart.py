@@ -37,23 +37,23 @@ from bluepill_sim.fabric.fabric import OWN_COMMANDS, WORD
 from bluepill_sim.fabric.line_speed import TOLERANCE_PERCENT, Heard, heard, is_usual, nearest_usual
 from bluepill_sim.fabric.pins import ALTERNATE_FUNCTIONS, Pin
 from bluepill_sim.fabric.ports import ChipPorts
-from bluepill_sim.fabric.registers import NATIVE, Peripheral, Place, Register, bits
+from bluepill_sim.fabric.registers import NATIVE, Peripheral, Place, Register, bits, indices, masks
 
-SR, DR, BRR, CR1, CR2, CR3, GTPR = range(7)
-
-PE, FE, NE, ORE, IDLE, RXNE, TC, TXE = (1 << n for n in range(8))
+#: Fields, from the left.
+_SR = "CTS 9, LBD 8, TXE 7, TC 6, RXNE 5, IDLE 4, ORE 3, NE 2, FE 1, PE 0"
+_CR1 = "UE 13, M 12, WAKE 11, PCE 10, PS 9, PEIE 8, TXEIE 7, TCIE 6, RXNEIE 5, IDLEIE 4, TE 3, RE 2, RWU 1, SBK 0"
+_CR2 = "LINEN 14, STOP 13:12, CLKEN 11, CPOL 10, CPHA 9, LBCL 8, LBDIE 6, LBDL 5, ADD 3:0"
+_CR3 = "CTSIE 10, CTSE 9, RTSE 8, DMAT 7, DMAR 6, SCEN 5, NACK 4, HDSEL 3, IRLP 2, IREN 1, EIE 0"
+PE, FE, NE, RXNE, TC, TXE, LBD, _CTS = masks(_SR, "PE FE NE RXNE TC TXE LBD CTS")
 _WORD_BITS = bits((8, 0))
 #: Where a character that arrives has the flags of SR that a character brings.
 _FLAGS_AT = 16
-LBD, _CTS_LBD = 1 << 8, bits(9, 8)
-SBK, RWU, RE, TE, IDLEIE, RXNEIE, TCIE, TXEIE, PEIE, PS, PCE, _WAKE, M, UE = (1 << n for n in range(14))
+RE, TE, PS, PCE, M, UE = masks(_CR1, "RE TE PS PCE M UE")
 #: Of CR2: a LIN break is recognised by 11 bits, not 10.
-_LBDL = 1 << 5
-#: What each bit of the control registers would ask for that is not modelled.
-_UNMODELLED = (
-    (CR3, 1 << 1, "IrDA mode"),
-    (CR3, 1 << 5, "smartcard mode"),
-)
+(_LBDL,) = masks(_CR2, "LBDL")
+_IREN, _SCEN = masks(_CR3, "IREN SCEN")
+#: What each bit of CR3 would ask for that is not modelled.
+_UNMODELLED = ((_IREN, "IrDA mode"), (_SCEN, "smartcard mode"))
 #: Stop bits in halves, by CR2 STOP.
 _STOP_HALF_BITS = (2, 1, 4, 3)
 #: Pins (TX, RX) by the value of the remap field (RM0008 tables 52 to 54).
@@ -70,9 +70,6 @@ _CONTROL_PINS = {
 }
 #: Pins of CK by the same.
 _CLOCK_PINS = {"USART1": {0: "PA8"}, "USART2": {0: "PA4", 1: "PD7"}, "USART3": {0: "PB12", 1: "PC12", 3: "PD10"}}
-#: Commands of its own (usart.c): move to pins; hear a word; tell whether words can be heard;
-#: listen to nCTS; move (nCTS, nRTS); move CK.
-_MOVE, _HEAR, _CAN_HEAR, _LISTEN, _CONTROL, _MOVE_CK = range(OWN_COMMANDS, OWN_COMMANDS + 6)
 
 
 class Damage(IntFlag):
@@ -87,7 +84,7 @@ NOT_DAMAGED = Damage(0)
 
 
 class Question(IntEnum):
-    """What the device in C asks (usart.c): all but the last four are warnings."""
+    """What Python is asked: all but the last four are warnings."""
 
     TX_PIN = 0
     TX_OFF = 1
@@ -100,6 +97,22 @@ class Question(IntEnum):
     GIVE_MORE = 8
     #: What comes in by the clock of a character that goes out.
     EXCHANGE = 9
+
+
+class Command(IntEnum):
+    """A command of its own."""
+
+    #: Move to the pins (TX, RX).
+    MOVE = OWN_COMMANDS
+    #: Hear a word, or learn that no more can be held.
+    HEAR = OWN_COMMANDS + 1
+    #: Tell whether words can be heard.
+    CAN_HEAR = OWN_COMMANDS + 2
+    #: Listen to nCTS.
+    LISTEN = OWN_COMMANDS + 3
+    #: Move (nCTS, nRTS).
+    CONTROL = OWN_COMMANDS + 4
+    MOVE_CK = OWN_COMMANDS + 5
 
 
 #: What is warned of, after the name, and its key.
@@ -122,8 +135,11 @@ class Usart(Peripheral):
 
     KIND, HOLDS = "usart", USART
     OUTPUTS = ("irq", "tx_dma", "rx_dma")
+    ENUMS = (Question, Command)
+    HIDDEN = ("SEEN", "TDR", "SHIFT", "RDR")
     STATE = ("_coming", "sent_at")
     DERIVED = ("_tx_pin", "_rx_pin")
+    SOURCE = "RM0008 27.6"
     REGISTERS = (
         Register(
             name="SR",
@@ -131,10 +147,10 @@ class Usart(Peripheral):
             reset=TXE | TC,
             readable=bits((9, 0)),
             writable=0,
-            write_zero_to_clear=_CTS_LBD | TC | RXNE,
-            latched_in=0x1C,
+            write_zero_to_clear=_CTS | LBD | TC | RXNE,
+            latched_in="SEEN",
             on_write=NATIVE,
-            fields="CTS 9, LBD 8, TXE 7, TC 6, RXNE 5, IDLE 4, ORE 3, NE 2, FE 1, PE 0",
+            fields=_SR,
         ),
         Register(
             name="DR", offset=0x04, readable=0, writable=bits((8, 0)), on_read=NATIVE, on_write=NATIVE, fields="DR 8:0"
@@ -153,8 +169,7 @@ class Usart(Peripheral):
             readable=bits((13, 0)),
             writable=bits((13, 0)),
             on_write=NATIVE,
-            fields="UE 13, M 12, WAKE 11, PCE 10, PS 9, PEIE 8, TXEIE 7, TCIE 6, RXNEIE 5, IDLEIE 4, TE 3, RE 2, "
-            "RWU 1, SBK 0",
+            fields=_CR1,
         ),
         Register(
             name="CR2",
@@ -162,7 +177,7 @@ class Usart(Peripheral):
             readable=bits((14, 8), (6, 5), (3, 0)),
             writable=bits((14, 8), (6, 5), (3, 0)),
             on_write=NATIVE,
-            fields="LINEN 14, STOP 13:12, CLKEN 11, CPOL 10, CPHA 9, LBCL 8, LBDIE 6, LBDL 5, ADD 3:0",
+            fields=_CR2,
         ),
         Register(
             name="CR3",
@@ -170,7 +185,7 @@ class Usart(Peripheral):
             readable=bits((10, 0)),
             writable=bits((10, 0)),
             on_write=NATIVE,
-            fields="CTSIE 10, CTSE 9, RTSE 8, DMAT 7, DMAR 6, SCEN 5, NACK 4, HDSEL 3, IRLP 2, IREN 1, EIE 0",
+            fields=_CR3,
         ),
         Register(name="GTPR", offset=0x18, readable=bits((15, 0)), writable=bits((15, 0)), fields="GT 15:8, PSC 7:0"),
     )
@@ -230,7 +245,7 @@ class Usart(Peripheral):
         self._hear(((FE | (LBD if is_lin else 0)) << _FLAGS_AT,))
 
     def _hear(self, arriving: tuple[int, ...]) -> None:
-        if self.chip.power.is_stopped or not self.command(_CAN_HEAR):
+        if self.chip.power.is_stopped or not self.command(Command.CAN_HEAR):
             self._warn(Question.RX_OFF)
             return
         self._coming += arriving
@@ -299,15 +314,15 @@ class Usart(Peripheral):
         self.chip.warn(f"{self.name}{text}", once=f"{self.name}:{key}")
 
     def _check_modes(self) -> None:
-        for register, mask, what in _UNMODELLED:
-            if self.words[register] & mask:
+        for mask, what in _UNMODELLED:
+            if self.words[CR3] & mask:
                 self.chip.warn(f"{self.name}: {what} is not modelled", once=f"{self.name}:{what}")
 
     def _give_more(self) -> None:
         """Let C have as many of the characters that come as it has room for."""
         given = 0
         for word in self._coming:
-            if not self.command(_HEAR, word):
+            if not self.command(Command.HEAR, word):
                 break
             given += 1
         self._coming = self._coming[given:]
@@ -366,14 +381,14 @@ class Usart(Peripheral):
         self._tx_pin, self._rx_pin = self._routed_pins()
         remap = self.chip.pins.remaps.get(self.name, 0)
         cts, rts = _CONTROL_PINS[self.name].get(remap, _CONTROL_PINS[self.name][0])
-        self.command(_CONTROL, self.chip.pins[cts].index, self.chip.pins[rts].index)
+        self.command(Command.CONTROL, self.chip.pins[cts].index, self.chip.pins[rts].index)
         clocks = _CLOCK_PINS[self.name]
-        self.command(_MOVE_CK, self.chip.pins[clocks.get(remap, clocks[0])].index)
-        self.command(_MOVE, self._tx_pin.index, self._rx_pin.index)
+        self.command(Command.MOVE_CK, self.chip.pins[clocks.get(remap, clocks[0])].index)
+        self.command(Command.MOVE, self._tx_pin.index, self._rx_pin.index)
 
     def _restored(self) -> None:
         self._tx_pin, self._rx_pin = self._routed_pins()
-        self.command(_LISTEN)
+        self.command(Command.LISTEN)
 
     def _routed_pins(self) -> tuple[Pin, Pin]:
         tx, rx = self._pins.get(self.chip.pins.remaps.get(self.name, 0), self._pins[0])
@@ -413,3 +428,6 @@ def _with_parity(word: int, control: int) -> int:
     word &= (1 << top) - 1
     is_odd = word.bit_count() & 1
     return word | (is_odd ^ bool(control & PS)) << top
+
+
+BRR, CR1, CR2, CR3 = indices(Usart.REGISTERS, "BRR CR1 CR2 CR3")

@@ -20,8 +20,20 @@ Source: RM0008 section 23.
 Invariant: with PDWN or FRES set nothing is answered; CTR, DIR and EP_ID of ISTR follow from the endpoint registers.
 """
 
+from enum import IntEnum
+
 from bluepill_sim.fabric.ports import ChipPorts
-from bluepill_sim.fabric.registers import NATIVE, Peripheral, Place, Register, bits
+from bluepill_sim.fabric.registers import (
+    HEARS_LINE,
+    NATIVE,
+    OWN_ANSWERS,
+    Peripheral,
+    Place,
+    Register,
+    bits,
+    indices,
+    masks,
+)
 from bluepill_sim.fabric.usb_bus import (
     FRAME_NS,
     FRAME_NUMBERS,
@@ -35,29 +47,36 @@ from bluepill_sim.fabric.usb_bus import (
 from simbase.timing import Nanos
 
 ENDPOINTS = 8
-CNTR, ISTR, FNR, DADDR, BTABLE = range(16, 21)
 #: The memory of packets: 16 bits in each word, from here on.
 MEMORY_OFFSET, MEMORY_WORDS = 0x400, 256
 _MEMORY = MEMORY_OFFSET // 4
 
-CTR_RX, DTOG_RX, SETUP, EP_KIND, CTR_TX, DTOG_TX = (1 << n for n in (15, 14, 11, 8, 7, 6))
+#: Fields, from the left.
+_INTERRUPTS = "CTR{0} 15, PMAOVR{0} 14, ERR{0} 13, WKUP{0} 12, SUSP{0} 11, RESET{0} 10, SOF{0} 9, ESOF{0} 8"
+_EPR = (
+    "CTR_RX 15, DTOG_RX 14, STAT_RX 13:12, SETUP 11, EP_TYPE 10:9, EP_KIND 8, CTR_TX 7, DTOG_TX 6, STAT_TX 5:4, EA 3:0"
+)
+_CNTR = _INTERRUPTS.format("M") + ", RESUME 4, FSUSP 3, LP_MODE 2, PDWN 1, FRES 0"
+_ISTR = _INTERRUPTS.format("") + ", DIR 4, EP_ID 3:0"
+_FNR = "RXDP 15, RXDM 14, LCK 13, LSOF 12:11, FN 10:0"
+CTR_RX, DTOG_RX, SETUP, EP_KIND, CTR_TX, DTOG_TX = masks(_EPR, "CTR_RX DTOG_RX SETUP EP_KIND CTR_TX DTOG_TX")
 STAT_RX_AT, STAT_TX_AT, TYPE_AT = 12, 4, 9
 DISABLED, STALL, NAK, VALID = range(4)
 BULK, CONTROL, ISOCHRONOUS, INTERRUPT = range(4)
 _CORRECT = CTR_RX | CTR_TX
 
-CTR, PMAOVR, ERR, WKUP, SUSP, RESET, SOF, ESOF, DIR = (1 << n for n in (15, 14, 13, 12, 11, 10, 9, 8, 4))
-RESUME, FSUSP, LP_MODE, PDWN, FRES = (1 << n for n in (4, 3, 2, 1, 0))
+CTR, PMAOVR, ERR, WKUP, SUSP, RESET, SOF, ESOF, DIR = masks(_ISTR, "CTR PMAOVR ERR WKUP SUSP RESET SOF ESOF DIR")
+RESUME, FSUSP, LP_MODE, PDWN, FRES = masks(_CNTR, "RESUME FSUSP LP_MODE PDWN FRES")
 _EVENTS = bits((15, 8))
 _CLEARED = bits((14, 8))
-RXDP, RXDM, LCK, EF = (1 << n for n in (15, 14, 13, 7))
+RXDP, RXDM, LCK = masks(_FNR, "RXDP RXDM LCK")
+_DADDR = "EF 7, ADD 6:0"
+(EF,) = masks(_DADDR, "EF")
 _LSOF_AT, _MOST_LOST = 11, 3
 #: In the words of a buffer's description: ADDRn_TX, COUNTn_TX, ADDRn_RX, COUNTn_RX.
 _COUNT, _BL_SIZE, _BLOCKS_AT, _SECOND = bits((9, 0)), 1 << 15, 10, 2
 _SMALL_BLOCK, _LARGE_BLOCK = 2, 32
 _SETUP_BYTES = 8
-#: What the device in C tells (usb.c).
-_HEARS_LINE, _WRITTEN = 0, 2
 _HALFWORD = 0xFFFF
 
 #: 23.2, USB 2.0 7.1.7: clock; how long a reset must last to be one (chosen: the least); idle that is a suspend.
@@ -68,7 +87,12 @@ _SUSPEND_FRAMES = 3
 _LEAST_PCLK1_HZ = 8_000_000
 _PINS = (("PA11", "USBDM"), ("PA12", "USBDP"))
 
-_INTERRUPTS = "CTR{0} 15, PMAOVR{0} 14, ERR{0} 13, WKUP{0} 12, SUSP{0} 11, RESET{0} 10, SOF{0} 9, ESOF{0} 8"
+
+class Question(IntEnum):
+    """What Python is told beside what a listener hears."""
+
+    #: A write that has changed a word, with the word before it.
+    WRITTEN = OWN_ANSWERS
 
 
 class Usb(Peripheral):
@@ -81,6 +105,8 @@ class Usb(Peripheral):
         "_host", "_bus", "_since_ns", "_frame", "_quiet_ns", "_sof_ns", "_esof_ns", "_susp_ns", "_reset_ns",
         "_can_is_on", "_is_stopped", "_turns",
     )  # fmt: skip
+    SOURCE = "RM0008 23.5"
+    ENUMS = (Question,)
     REGISTERS = (
         *(
             Register(
@@ -90,8 +116,7 @@ class Usb(Peripheral):
                 writable=bits((10, 8), (3, 0)),
                 write_zero_to_clear=_CORRECT,
                 on_write=NATIVE,
-                fields="CTR_RX 15, DTOG_RX 14, STAT_RX 13:12, SETUP 11, EP_TYPE 10:9, EP_KIND 8, CTR_TX 7, DTOG_TX 6, "
-                "STAT_TX 5:4, EA 3:0",
+                fields=_EPR,
             )
             for n in range(ENDPOINTS)
         ),
@@ -101,7 +126,7 @@ class Usb(Peripheral):
             reset=PDWN | FRES,
             mask=bits((15, 8), (4, 0)),
             on_write=NATIVE,
-            fields=_INTERRUPTS.format("M") + ", RESUME 4, FSUSP 3, LP_MODE 2, PDWN 1, FRES 0",
+            fields=_CNTR,
         ),
         Register(
             name="ISTR",
@@ -110,7 +135,7 @@ class Usb(Peripheral):
             writable=0,
             write_zero_to_clear=_CLEARED,
             on_write=NATIVE,
-            fields=_INTERRUPTS.format("") + ", DIR 4, EP_ID 3:0",
+            fields=_ISTR,
         ),
         Register(
             name="FNR",
@@ -118,14 +143,14 @@ class Usb(Peripheral):
             readable=bits((15, 0)),
             writable=0,
             on_read="_read_fnr",
-            fields="RXDP 15, RXDM 14, LCK 13, LSOF 12:11, FN 10:0",
+            fields=_FNR,
         ),
         Register(
             name="DADDR",
             offset=0x4C,
             mask=bits((7, 0)),
             on_write=NATIVE,
-            fields="EF 7, ADD 6:0",
+            fields=_DADDR,
         ),
         Register(name="BTABLE", offset=0x50, mask=bits((15, 3)), fields="BTABLE 15:3"),
         *(
@@ -318,7 +343,7 @@ class Usb(Peripheral):
 
     def answer(self, what: int, value: int) -> int:
         """Take what the device in C hears: a line, a pin, or a write that has changed a word."""
-        if what == _WRITTEN:
+        if what == Question.WRITTEN:
             if value >> 16 == CNTR:
                 self._control(value & _HALFWORD)
             elif value >> 16 == ISTR:
@@ -327,7 +352,7 @@ class Usb(Peripheral):
                 self._turns &= ~(1 << (value >> 16))
             self._update()
             self._tell_host()
-        elif what == _HEARS_LINE:
+        elif what == HEARS_LINE:
             self.line_changed(self.INPUTS[value >> 1], bool(value & 1))
         else:
             self.pins_changed()
@@ -563,3 +588,6 @@ def _with_stat(word: int, at: int, stat: int) -> int:
 def _next(base_ns: Nanos, period_ns: Nanos, now_ns: Nanos) -> Nanos:
     """Return the first time behind `now_ns` that is whole periods, one at least, from a base."""
     return base_ns + max(1, (now_ns - base_ns) // period_ns + 1) * period_ns
+
+
+CNTR, ISTR, FNR, DADDR, BTABLE = indices(Usb.REGISTERS, "CNTR ISTR FNR DADDR BTABLE")

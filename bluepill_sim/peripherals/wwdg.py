@@ -10,16 +10,15 @@ Source: RM0008 section 20.
 Invariant: while it is active, `due_ns` is the earlier of the early wake-up and the reset.
 """
 
-from bluepill_sim.fabric.registers import Peripheral, Register, bits
+from bluepill_sim.fabric.registers import Peripheral, Register, bits, indices, masks
 from simbase.timing import NS_PER_S, Nanos
 
-CR, CFR, SR = range(3)
-
-WDGA, T6 = 1 << 7, 1 << 6
-EWI, EWIF = 1 << 9, 1
+#: Fields, from the left.
+_CR, _CFR, _SR = "WDGA 7, T 6:0", "EWI 9, WDGTB 8:7, W 6:0", "EWIF 0"
+(WDGA, _T), T6 = masks(_CR, "WDGA T"), 1 << 6
+(EWI,), (EWIF,) = masks(_CFR, "EWI"), masks(_SR, "EWIF")
 #: PCLK1 is divided by this before the prescaler.
 _DIVIDER = 4096
-_T = bits((6, 0))
 
 
 class Wwdg(Peripheral):
@@ -27,18 +26,19 @@ class Wwdg(Peripheral):
 
     STATE = ("_base_ns", "_base_count", "_pclk1_hz")
     OUTPUTS = ("irq",)
+    SOURCE = "RM0008 20.6"
     REGISTERS = (
         Register(
             name="CR", offset=0x00, reset=_T, mask=bits((7, 0)), on_read="_read_cr",
-            on_write="_write_cr", fields="WDGA 7, T 6:0",
+            on_write="_write_cr", fields=_CR,
         ),
         Register(
             name="CFR", offset=0x04, reset=_T, mask=bits((9, 0)), on_write="_write_cfr",
-            fields="EWI 9, WDGTB 8:7, W 6:0",
+            fields=_CFR,
         ),
         Register(
             name="SR", offset=0x08, readable=EWIF, writable=0, write_zero_to_clear=EWIF, on_write="_write_sr",
-            fields="EWIF 0",
+            fields=_SR,
         ),
     )  # fmt: skip
     #: The counter held `_base_count` from `_base_ns` on, and counts at this PCLK1.
@@ -129,3 +129,6 @@ class Wwdg(Peripheral):
         self._base_ns, self._base_count = self.chip.now_ns, count
         self._pclk1_hz = self.chip.clocks.pclk1_hz
         self.due_ns = self._time_of(T6 if count > T6 else T6 - 1) if count & T6 else None
+
+
+CR, CFR, SR = indices(Wwdg.REGISTERS, "CR CFR SR")

@@ -1,7 +1,6 @@
 """The parts of the core without the core: clock arithmetic, SysTick, NVIC, each against a naive twin."""
 
 import ctypes
-from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -10,17 +9,12 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, ru
 
 from bluepill_sim.core.nvic import FIRST_IRQ, HARD_FAULT, NMI, THREAD_PRIORITY, Nvic
 from bluepill_sim.core.systick import CLKSOURCE, COUNTFLAG, ENABLE, TICKINT, SysTick
-from bluepill_sim.extension.layout import SHARED, header, structure
+from bluepill_sim.extension.layout import SHARED, structure
 from bluepill_sim.extension.library import library
 from bluepill_sim.fabric.cycle_clock import CycleClock
 from bluepill_sim.memory.arrays import Memory
 
 FREQUENCIES = st.sampled_from([8_000_000, 72_000_000, 1_000_000, 56_000_000, 15_625, 36_000_001])
-
-
-def test_the_committed_header_is_that_of_the_declared_structs() -> None:
-    path = Path(__file__).parents[3] / "bluepill_sim/extension/source/fabric/layout.h"
-    assert path.read_text(encoding="utf-8") == header(), "run tools/generate_layout.py"
 
 
 @given(FREQUENCIES, st.integers(0, 10**13), st.lists(st.tuples(FREQUENCIES, st.integers(0, 10**9)), max_size=5))

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bluepill_sim.fabric.registers import WORD, Peripheral, Place, Register, bits
+from bluepill_sim.fabric.registers import WORD, BitField, Peripheral, Place, Register, bits
+from bluepill_sim.peripherals.usart import Usart
 from bluepill_sim.stm32f103 import PERIPHERALS
 
 QUICK = settings(max_examples=40)
@@ -77,6 +78,9 @@ def test_a_write_of_some_lanes_leaves_the_other_lanes_alone(
         {"write_one_to_clear": 1},
         {"writable": 0, "write_one_to_clear": 1, "write_zero_to_clear": 1},
         {"readable": 0, "reset": 1},
+        {"mask": 1, "triggers": 1},
+        {"mask": 0, "write_zero_to_clear": 2, "triggers": 2},
+        {"mask": 0, "triggers": 1 << 32},
     ],
 )
 def test_a_declaration_that_contradicts_itself_is_refused(fields: dict[str, int]) -> None:
@@ -99,6 +103,23 @@ def test_a_mask_is_what_reads_and_what_is_written_unless_told_otherwise(
 ) -> None:
     register = Register(**{"name": "R", "offset": 0, **given})  # type: ignore[arg-type]  # numbers alone
     assert (register.readable, register.writable) == (readable, writable)
+
+
+def test_a_field_is_accessed_as_its_bits_are() -> None:
+    register = Register(
+        name="R", offset=0, mask=0, readable=bits((7, 0)), writable=bits((3, 2), 9), write_one_to_clear=bits(4),
+        write_zero_to_clear=bits(5, 8), triggers=bits(10), on_write="_write",
+    )  # fmt: skip
+    told = {0: "r", 2: "rw", 4: "rc_w1", 5: "rc_w0", 8: "rc_w0", 9: "w", 10: "w", 11: "reserved"}
+    assert {place: register.access(BitField("F", place, place)) for place in told} == told
+    assert register.access(BitField("F", 5, 3)) == "rc_w0/rc_w1/rw"
+    assert Register(name="R", offset=0, readable=0, writable=0, on_read="_read").access(BitField("F", 1, 0)) == "r"
+
+
+def test_hidden_words_stand_behind_the_last_register() -> None:
+    assert Usart.hidden() == {"SEEN": 7, "TDR": 8, "SHIFT": 9, "RDR": 10}
+    assert [Usart.latch_of(register) for register in Usart.REGISTERS[:2]] == [7, None]
+    assert Peripheral.hidden() == {}
 
 
 def test_bits_reads_as_the_manual_prints() -> None:

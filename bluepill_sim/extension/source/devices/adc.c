@@ -9,19 +9,11 @@
  * Invariant: `settle` up to a time leaves what it would if each conversion had been made at its own.
  */
 #include "../fabric/fabric.h"
+#include "../registers/adc.h"
 
-/* Registers by offset / 4. */
-enum { SR, CR1, CR2, SMPR1, SMPR2, JOFR1, HTR = 9, LTR, SQR1, SQR2, SQR3, JSQR, JDR1, DR = 19 };
-enum { AWD = 1 << 0, EOC = 1 << 1, JEOC = 1 << 2, JSTRT = 1 << 3, STRT = 1 << 4 };
-/* Of CR1. */
-enum { EOCIE = 1 << 5, AWDIE = 1 << 6, JEOCIE = 1 << 7, SCAN = 1 << 8, AWDSGL = 1 << 9, JAUTO = 1 << 10 };
-enum { DISCEN = 1 << 11, JDISCEN = 1 << 12, JAWDEN = 1 << 22, AWDEN = 1 << 23, AWDCH = 31, DISCNUM_AT = 13, DUALMOD_AT = 16 };
-/* Of CR2. */
-enum { ADON = 1 << 0, CONT = 1 << 1, CAL = 1 << 2, RSTCAL = 1 << 3, DMA = 1 << 8, ALIGN = 1 << 11, JEXTTRIG = 1 << 15 };
-enum { EXTTRIG = 1 << 20, JSWSTART = 1 << 21, SWSTART = 1 << 22, TSVREFE = 1 << 23 };
-enum { EXTSEL_AT = 17, JEXTSEL_AT = 12, BY_SOFTWARE = 7, BY_EXTI = 6, TRIGGERS = 7 };
+/* Values of EXTSEL and JEXTSEL. */
+enum { BY_SOFTWARE = 7, BY_EXTI = 6, TRIGGERS = 7 };
 enum { IDLE, REGULAR, INJECTED };
-enum { IRQ, DMA_REQUEST };
 /* Of the dual modes: what ADC2 does with ADC1. */
 enum { WITH_REGULAR = 1, WITH_INJECTED = 2, FAST = 4, SLOW = 8, ALTERNATE = 16 };
 static const uint8_t dual_modes[16] = {
@@ -38,11 +30,6 @@ enum { STABILIZATION_NS = 1000, MOST_HZ = 14000000, RESOLUTION = 4096 };
 enum { PIN_CHANNELS = 10, TEMPERATURE = 16, REFERENCE = 17, REFERENCE_UV = 1200000, V25_UV = 1430000, V25_MC = 25000 };
 /* Microvolts by so many thousandths of a degree. */
 enum { SLOPE_UV = 43, SLOPE_MC = 10 };
-/* What Python is asked: warnings, as `Question` of adc.py. */
-enum { NOT_ANALOG, NO_PIN, NOT_ENABLED, TOO_FAST, CAL_OFF };
-/* A command of its own: what is on the pins is about to change. */
-enum { INPUTS_CHANGE = OWN_COMMANDS };
-
 static void reschedule(struct device *device);
 static void settle(struct device *device, uint64_t until);
 
@@ -233,8 +220,8 @@ static void end_regular(struct device *device, uint32_t code)
     if (is_last || device->words[CR1] & DISCEN) {
         device->words[SR] |= EOC;
     }
-    if (is_master(device) && device->words[CR2] & DMA) {
-        output_set(device, DMA_REQUEST, true);
+    if (is_master(device) && device->words[CR2] & CR2_DMA) {
+        output_set(device, OUTPUT_DMA, true);
     }
     adc->regular_left -= adc->regular_left > 0;
     if (is_last) {
@@ -291,7 +278,7 @@ static bool is_unseen(const struct device *device)
     const uint32_t control = device->words[CR1], flags = device->words[SR];
     const uint32_t wanted = EOC | STRT | (control & JAUTO ? JEOC | JSTRT : 0) | (control & (AWDEN | JAWDEN) ? AWD : 0);
     return adc->state != IDLE && (device->words[CR2] & CONT) && !(control & DISCEN) && (flags & wanted) == wanted &&
-           !(is_master(device) && device->words[CR2] & DMA) && !dual_mode(device) && !adc->regular_waits &&
+           !(is_master(device) && device->words[CR2] & CR2_DMA) && !dual_mode(device) && !adc->regular_waits &&
            (adc->state == REGULAR || adc->is_automatic);
 }
 
@@ -476,7 +463,7 @@ static void switch_off(struct device *device)
     struct adc *adc = device->state;
     stop(adc);
     adc->regular_at = adc->injected_at = adc->regular_waits = adc->is_automatic = adc->turns = 0;
-    output_set(device, DMA_REQUEST, false);
+    output_set(device, OUTPUT_DMA, false);
 }
 
 static void calibrate(struct device *device, uint32_t control, uint64_t now)
@@ -503,8 +490,8 @@ static void write_control(struct device *device, uint32_t written, uint32_t prev
         switch_off(device);
         return;
     }
-    if (!(control & DMA)) {
-        output_set(device, DMA_REQUEST, false);
+    if (!(control & CR2_DMA)) {
+        output_set(device, OUTPUT_DMA, false);
     }
     if (!(previous & ADON)) {
         const uint64_t stable = now + STABILIZATION_NS;
@@ -594,7 +581,7 @@ static uint32_t read(struct device *device, uint32_t index)
     if (index == DR) {
         device->words[SR] &= ~(uint32_t)EOC;
         update_irq(device);
-        output_set(device, DMA_REQUEST, false);
+        output_set(device, OUTPUT_DMA, false);
         reschedule(device);
     }
     return found;
@@ -634,7 +621,7 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
     if (what == RESET) {
         *adc = (struct adc){.number = adc->number, .hz = adc->hz, .divider = adc->divider, .remapped = adc->remapped,
                             .end_ns = NO_TIME, .calibrated_ns = NO_TIME};
-        output_set(device, DMA_REQUEST, false);
+        output_set(device, OUTPUT_DMA, false);
         update_irq(device);
     } else if (what == CLOCK) { /* what is under way ends when it would have */
         settle(device, now);

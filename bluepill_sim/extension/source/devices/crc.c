@@ -3,8 +3,8 @@
  * Source: RM0008 4.
  */
 #include "../fabric/fabric.h"
+#include "../registers/crc.h"
 
-enum { DR, IDR, CR };
 #define POLYNOMIAL 0x04C11DB7u
 
 static bool needs_time(const struct device *device, uint32_t index, bool is_write)
@@ -27,7 +27,7 @@ static void write(struct device *device, uint32_t index, uint32_t written, uint3
 {
     if (index == DR) {
         device->words[DR] = remainder_of(previous ^ written);
-    } else if (written & 1) { /* CR: RESET, which leaves IDR alone */
+    } else if (written & CR_RESET) { /* it leaves IDR alone */
         device->words[DR] = UINT32_MAX;
     }
 }

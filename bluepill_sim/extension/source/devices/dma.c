@@ -7,18 +7,13 @@
  * Invariant: `current` is the channel whose transfer is under way, exactly while an event is scheduled.
  */
 #include "../fabric/fabric.h"
+#include "../registers/dma.h"
 
-/* Registers by offset / 4, and those of a channel from `channel_words` on. */
-enum { ISR, IFCR, FIRST, WORDS_EACH = 5, CHANNELS = 7 };
-enum { CCR, CNDTR, CPAR, CMAR };
-/* Of CCR; the flags in ISR stand at the places of their enable bits. */
-enum { EN = 1 << 0, TCIE = 1 << 1, HTIE = 1 << 2, TEIE = 1 << 3, DIR = 1 << 4, CIRC = 1 << 5, PINC = 1 << 6 };
-enum { MINC = 1 << 7, MEM2MEM = 1 << 14, PSIZE_AT = 8, MSIZE_AT = 10, PL_AT = 12 };
-enum { GIF = 1 << 0, TCIF = 1 << 1, HTIF = 1 << 2, TEIF = 1 << 3, FLAGS = 0xF };
+/* The registers of each channel, from those of the first on, and its flags: in ISR at the places of their enable bits. */
+enum { FIRST = CCR1, WORDS_EACH = CCR2 - CCR1, CHANNELS = CH7_IRQ + 1 };
+enum { CCR, CNDTR = CNDTR1 - CCR1, CPAR = CPAR1 - CCR1, CMAR = CMAR1 - CCR1, FLAGS = TEIF1 | HTIF1 | TCIF1 | GIF1 };
 /* `current` besides 1 + the channel's number. */
 enum { NONE, ACTING = CHANNELS + 1 };
-/* What Python is asked: warnings, as `Question` of dma.py. */
-enum { LOCKED, FAILED, CIRCLES };
 /* chosen: cycles of HCLK for the arbitration, and for an access on the AHB; those of the APBs are Python's. */
 enum { ARBITRATION = 1, AHB_ACCESS = 2 };
 /* RM0008 3.3, table 3. */
@@ -39,7 +34,7 @@ static void update_irq(struct device *device, uint32_t n)
 
 static void raise(struct device *device, uint32_t n, uint32_t flags)
 {
-    device->words[ISR] |= (GIF | flags) << 4 * n;
+    device->words[ISR] |= (GIF1 | flags) << 4 * n;
     update_irq(device, n);
 }
 
@@ -112,7 +107,7 @@ static void count(struct device *device, uint32_t n)
         dma->peripheral[n] = words[CPAR];
         dma->memory[n] = words[CMAR];
     }
-    const uint32_t flags = (left == dma->reload[n] / 2 ? HTIF : 0) | (left ? 0 : TCIF);
+    const uint32_t flags = (left == dma->reload[n] / 2 ? HTIF1 : 0) | (left ? 0 : TCIF1);
     if (flags) {
         follow_control(device, n);
         raise(device, n, flags);
@@ -148,7 +143,7 @@ static void transfer(struct device *device, uint32_t n)
     }
     words_of(device, n)[CCR] &= ~(uint32_t)EN;
     follow_control(device, n);
-    raise(device, n, TEIF);
+    raise(device, n, TEIF1);
     ask(device, FAILED, n);
 }
 
@@ -225,8 +220,8 @@ static void write(struct device *device, uint32_t index, uint32_t written, uint3
     if (index == IFCR) {
         for (uint32_t n = 0; n < CHANNELS; ++n) {
             const uint32_t cleared = written >> 4 * n & FLAGS;
-            uint32_t flags = device->words[ISR] >> 4 * n & FLAGS & ~(cleared & GIF ? FLAGS : cleared | GIF);
-            flags |= flags ? GIF : 0;
+            uint32_t flags = device->words[ISR] >> 4 * n & FLAGS & ~(cleared & GIF1 ? FLAGS : cleared | GIF1);
+            flags |= flags ? GIF1 : 0;
             device->words[ISR] = (device->words[ISR] & ~((uint32_t)FLAGS << 4 * n)) | flags << 4 * n;
             update_irq(device, n);
         }

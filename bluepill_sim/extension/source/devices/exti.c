@@ -5,8 +5,9 @@
  * Invariant: an interrupt is raised exactly while one of its lines is pending and unmasked.
  */
 #include "../fabric/fabric.h"
+#include "../registers/exti.h"
 
-enum { IMR, EMR, RTSR, FTSR, SWIER, PR, PIN_LINES = 0xFFFF, ALL = 0x7FFFF };
+enum { PIN_LINES = 0xFFFF, ALL = 0x7FFFF };
 
 /* Lines that share an interrupt. */
 static const uint32_t lines_by_irq[] = {1 << 0, 1 << 1, 1 << 2, 1 << 3, 1 << 4, 0x3E0, 0xFC00, 1 << 16, 1 << 17, 1 << 18};

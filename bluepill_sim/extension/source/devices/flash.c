@@ -4,12 +4,7 @@
  * Invariant: Python is told of each write after which anything is to be done.
  */
 #include "../fabric/fabric.h"
-
-/* Registers by offset / 4, and their bits. */
-enum { SR = 3, CR = 4 };
-enum { BSY = 1 << 0, PG = 1 << 0, STRT = 1 << 6, LOCK = 1 << 7, ERRIE = 1 << 10, EOPIE = 1 << 12 };
-/* What Python is told beside what a listener hears: a write, with the word before it. */
-enum { WRITTEN = OWN_ANSWERS };
+#include "../registers/flash.h"
 
 static void write(struct device *device, uint32_t index, uint32_t written, uint32_t previous)
 {

@@ -4,14 +4,11 @@
  * Source: RM0008 9.1, 9.2.
  */
 #include "../fabric/fabric.h"
+#include "../registers/gpio.h"
 
-enum { CRL, CRH, ODR = 3, BSRR = 4, BRR = 5, ALL = 0xFFFF };
+enum { ALL = 0xFFFF };
 /* A pin's CNF[1:0] MODE[1:0] in CRL or CRH: MODE is not 0 of an output, and a floating input is a pin after a reset. */
 enum { NIBBLE = 15, MODE_BITS = 3, CNF_AT = 2, FLOATING_INPUT = 4, PINS_EACH = 8 };
-/* What Python is told: a locked pin was configured. */
-enum { LOCKED = OWN_ANSWERS };
-/* A command of its own: pins are looked at a little later. */
-enum { CHECK = OWN_COMMANDS };
 /* chosen: how long after its configuration a wire may still come, and SWJ_CFG release a pin. */
 enum { SETTLING_NS = 1000000 };
 

@@ -12,42 +12,23 @@
  * Invariant: what is under way ends floor(ticks * 10**9 / rate) ns after the last time that SCL was let go.
  */
 #include "../fabric/fabric.h"
+#include "../registers/i2c.h"
 
-/* Registers by offset / 4, and the hidden word behind them: SR1 at its last read, half of the clearing sequences. */
-enum { CR1, CR2, OAR1, OAR2, DR, SR1, SR2, CCR, TRISE, SEEN };
-/* Of CR1. */
-enum { PE = 1 << 0, SMBUS = 1 << 1, SMBTYPE = 1 << 3, ENPEC = 1 << 5, ENGC = 1 << 6, NOSTRETCH = 1 << 7, START = 1 << 8, STOP = 1 << 9 };
-enum { ACK = 1 << 10, POS = 1 << 11, PEC = 1 << 12, ALERT = 1 << 13, SWRST = 1 << 15 };
-/* Of CR2. */
-enum { ITERREN = 1 << 8, ITEVTEN = 1 << 9, ITBUFEN = 1 << 10, DMAEN = 1 << 11, LAST = 1 << 12 };
-/* Of SR1. */
-enum { SB = 1 << 0, ADDR = 1 << 1, BTF = 1 << 2, ADD10 = 1 << 3, STOPF = 1 << 4, RXNE = 1 << 6, TXE = 1 << 7, BERR = 1 << 8 };
-enum { ARLO = 1 << 9, AF = 1 << 10, OVR = 1 << 11, PECERR = 1 << 12, TIMEOUT = 1 << 14, SMBALERT = 1 << 15 };
 enum { EVENTS = SB | ADDR | BTF | ADD10 | STOPF, ERRORS = BERR | ARLO | AF | OVR | PECERR | TIMEOUT | SMBALERT };
-/* Of SR2. */
-enum { MSL = 1 << 0, BUSY = 1 << 1, TRA = 1 << 2, GENCALL = 1 << 4, DUALF = 1 << 7, PEC_AT = 8 };
-/* Of CCR. */
-enum { DUTY = 1 << 14, FS = 1 << 15, CCR_BITS = 0xFFF };
 /* Bits of a condition, of data, and of a byte with its acknowledge; that a byte is held; SCL low for so long is a timeout (RM0008 26.3.8). */
 enum { CONDITION = 1, DATA = 8, ACKNOWLEDGE = 1, BYTE = 9, HELD = 1 << 8, TIMEOUT_NS = 25000000 };
 enum phase { FREE, STARTING, ADDRESSING, SENDING, RECEIVING, STOPPING, HOLD, OTHERS, FAR, FAR_HOLD };
 /* Its pins. */
 enum { SCL, SDA, SMBA, I2C_PINS };
-/* What Python is asked, as `Question` of i2c.py; from NO_PINS on they are warnings. An answer has HELD for an acknowledge. */
-enum { ADDRESS, WRITE, READ, END, NEXT_STEP, NO_PINS, SEQUENCE };
-/* What a master outside does: `far` holds one of these times 2 * HELD, above a byte or, for FAR_READ, its acknowledge. */
-enum { FAR_NOTHING, FAR_START, FAR_WRITE, FAR_READ, FAR_STOP, FAR_AT = 9 };
+/* An answer to a question has HELD for an acknowledge. */
+/* `far` holds one of FAR_START to FAR_STOP times 2 * HELD. */
+enum { FAR_AT = 9 };
 /* What a row for subscribers tells: one of these times 2 * HELD, a byte and its acknowledge below (`I2cStep` of i2c.py). */
 enum { TELL_START, TELL_BYTE, TELL_STOP, TELL_LOST, TELL_CUT, TELL_AT = 9 };
 /* Of `answer`, beside HELD: they were asked; another master has won. */
 enum { ANSWERED = 1 << 9, HAS_LOST = 1 << 10 };
 /* Of `is_stopped`. */
 enum { CLOCK_STOPPED = 1, TIMEOUT_STOPPED = 2 };
-/* Commands of its own: move to pins; a master outside has something to do; arbitration is lost or the bus disturbed; listen
- * again; DBGMCU_CR's freeze of the timeout, and its end after `one` + 2^32 * `other` ns. */
-enum { MOVE = OWN_COMMANDS, CALL, DISTURB, LISTEN, HOLD_TIMEOUT, GO_ON_TIMEOUT };
-/* Its outputs. */
-enum { EVENT_IRQ, ERROR_IRQ, RX_DMA, TX_DMA };
 
 static void begin_to_show(struct device *device);
 static void show_rest(struct device *device, enum phase phase);
@@ -182,7 +163,7 @@ static void resume(struct device *device, uint64_t span)
 static uint64_t bit_ticks(const struct device *device)
 {
     const struct i2c *i2c = device->state;
-    const uint32_t control = device->words[CCR], count = control & CCR_BITS ? control & CCR_BITS : 1;
+    const uint32_t control = device->words[CCR], count = control & CCR_CCR ? control & CCR_CCR : 1;
     return i2c->phase >= FAR ? 1 : (uint64_t)count * (!(control & FS) ? 2 : control & DUTY ? 25 : 3);
 }
 
@@ -226,9 +207,9 @@ static void run_from(struct device *device, uint64_t ns)
 }
 
 /* PEC (RM0008 26.3.6): x^8 + x^2 + x + 1 over all bytes, addresses too. */
-static uint32_t pec_of(const struct device *device) { return device->words[SR2] >> PEC_AT & 0xFF; }
+static uint32_t pec_of(const struct device *device) { return device->words[SR2] >> SR2_PEC_AT & 0xFF; }
 
-static void set_pec(struct device *device, uint32_t pec) { device->words[SR2] = (device->words[SR2] & 0xFF) | pec << PEC_AT; }
+static void set_pec(struct device *device, uint32_t pec) { device->words[SR2] = (device->words[SR2] & 0xFF) | pec << SR2_PEC_AT; }
 
 static void add_to_pec(struct device *device, uint32_t byte)
 {
@@ -262,14 +243,14 @@ static void take(struct device *device, uint32_t byte)
 static bool load(struct device *device)
 {
     struct i2c *i2c = device->state;
-    const bool is_pec = (device->words[CR1] & (PEC | ENPEC)) == (PEC | ENPEC);
+    const bool is_pec = (device->words[CR1] & (CR1_PEC | ENPEC)) == (CR1_PEC | ENPEC);
     i2c->is_pec = !i2c->tdr && is_pec;
     if (!i2c->tdr && !is_pec) {
         return false;
     }
     i2c->shift = i2c->tdr ? i2c->tdr : HELD | pec_of(device);
     i2c->tdr = 0;
-    device->words[CR1] &= i2c->is_pec ? ~(uint32_t)PEC : ~0u;
+    device->words[CR1] &= i2c->is_pec ? ~(uint32_t)CR1_PEC : ~0u;
     device->words[SR1] = (device->words[SR1] & ~(uint32_t)BTF) | (i2c->is_pec ? 0 : TXE);
     return true;
 }
@@ -285,7 +266,7 @@ static bool is_last_of_dma(struct device *device)
     return left == (device->words[SR1] & RXNE ? 2 : 1);
 }
 
-static bool checks_pec(const struct device *device) { return (device->words[CR1] & (PEC | ENPEC)) == (PEC | ENPEC); }
+static bool checks_pec(const struct device *device) { return (device->words[CR1] & (CR1_PEC | ENPEC)) == (CR1_PEC | ENPEC); }
 
 static bool will_acknowledge(struct device *device, uint32_t byte)
 {
@@ -305,7 +286,7 @@ static bool receive(struct device *device, uint32_t byte)
     const bool is_ack = will_acknowledge(device, byte);
     if (checks_pec(device)) {
         words[SR1] |= byte != pec_of(device) ? PECERR : 0;
-        words[CR1] &= ~(uint32_t)PEC;
+        words[CR1] &= ~(uint32_t)CR1_PEC;
     }
     add_to_pec(device, byte);
     take(device, byte);
@@ -442,7 +423,7 @@ static void end_stop(struct device *device, uint64_t ns)
     if (i2c->has_parts) {
         ask(device, END, 0);
     }
-    words[CR1] &= ~(uint32_t)(STOP | PEC);
+    words[CR1] &= ~(uint32_t)(STOP | CR1_PEC);
     words[SR1] &= ~(uint32_t)(SB | ADD10 | TXE | (words[SR2] & TRA ? BTF : 0));
     words[SR2] &= ~(uint32_t)(MSL | BUSY | TRA);
     i2c->tdr = 0;
@@ -545,7 +526,7 @@ static uint32_t end_far_stop(struct device *device)
     uint32_t *words = device->words;
     words[SR1] = (words[SR1] & ~(uint32_t)(TXE | (words[SR2] & TRA ? BTF : 0))) | (i2c->is_own && !(words[SR2] & TRA) ? STOPF : 0);
     words[SR2] &= ~(uint32_t)(BUSY | TRA | GENCALL | DUALF);
-    words[CR1] &= ~(uint32_t)PEC;
+    words[CR1] &= ~(uint32_t)CR1_PEC;
     i2c->is_own = i2c->is_second = i2c->header = 0;
     return 0;
 }
@@ -557,7 +538,7 @@ static void go_on_far(struct device *device, uint64_t ns)
     uint32_t *words = device->words;
     const uint32_t step = i2c->far >> FAR_AT;
     const bool sends = step == FAR_READ && i2c->is_own && words[SR2] & TRA;
-    const bool waits = words[SR1] & ADDR || i2c->received || (sends && !i2c->tdr && !(words[CR1] & PEC));
+    const bool waits = words[SR1] & ADDR || i2c->received || (sends && !i2c->tdr && !(words[CR1] & CR1_PEC));
     if (i2c->phase == FAR_HOLD) {
         run_from(device, ns);
     }
@@ -936,7 +917,7 @@ static void write_data(struct device *device, uint32_t byte)
 static void clear(struct device *device, bool keeps_busy)
 {
     struct i2c *i2c = device->state;
-    device->words[CR1] &= ~(uint32_t)(START | STOP | ACK | PEC | ALERT);
+    device->words[CR1] &= ~(uint32_t)(START | STOP | ACK | CR1_PEC | ALERT);
     device->words[SR1] = 0;
     device->words[SR2] = keeps_busy && i2c->phase == FREE ? device->words[SR2] & BUSY : 0;
     device->words[SEEN] = 0;

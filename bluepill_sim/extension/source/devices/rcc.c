@@ -3,12 +3,9 @@
  * Which bit is whose stands in the fabric, from the chip's page. Source: RM0008 7.3.4, 7.3.5, 7.3.6 to 7.3.8.
  */
 #include "../fabric/fabric.h"
+#include "../registers/rcc.h"
 
-/* Registers by offset / 4; those of the enables follow those of the resets in the same order, behind that of the AHB. */
-enum { APB2RSTR = 3, APB1RSTR, AHBENR, APB2ENR, APB1ENR };
-/* What Python is told beside what a listener hears: a device in this slot is to be reset; the gates have changed. */
-enum { RESETS = OWN_ANSWERS, GATES };
-
+/* The registers of the enables follow those of the resets in the same order, behind that of the AHB. */
 static void write(struct device *device, uint32_t index, uint32_t written, uint32_t previous)
 {
     (void)written;

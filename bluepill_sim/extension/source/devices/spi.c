@@ -8,26 +8,12 @@
  * Invariant: a word ends floor(ticks * 10**9 / rate) ns after the point from which its run of words is counted.
  */
 #include "../fabric/fabric.h"
+#include "../registers/spi.h"
 
-/* Registers by offset / 4. */
-enum { CR1, CR2, SR, DR, CRCPR, RXCRCR, TXCRCR };
-/* Of CR1. */
-enum { CPHA = 1 << 0, CPOL = 1 << 1, MSTR = 1 << 2, SPE = 1 << 6, LSBFIRST = 1 << 7, SSI = 1 << 8, SSM = 1 << 9, RXONLY = 1 << 10 };
-enum { DFF = 1 << 11, CRCNEXT = 1 << 12, CRCEN = 1 << 13, BIDIOE = 1 << 14, BIDIMODE = 1 << 15, BR_AT = 3 };
-/* Of CR2. */
-enum { RXDMAEN = 1 << 0, TXDMAEN = 1 << 1, SSOE = 1 << 2, ERRIE = 1 << 5, RXNEIE = 1 << 6, TXEIE = 1 << 7 };
-/* Of SR. */
-enum { RXNE = 1 << 0, TXE = 1 << 1, CRCERR = 1 << 4, MODF = 1 << 5, OVR = 1 << 6, BSY = 1 << 7 };
 /* What `shift`, `tdr` and `far` hold besides a word: that they do, that it is the CRC, and that nobody listens. */
 enum { HELD = 1 << 16, IS_CRC = 1 << 17, IS_DEAF = 1 << 18 };
 /* Its pins, in the order of its alternate functions. */
 enum { MISO, MOSI, NSS, SCK, SPI_PINS };
-/* What Python is asked, as `Question` of spi.py: those from NO_SCK on are warnings. */
-enum { EXCHANGE, SELECT, NEXT_WORD, NO_SCK, NO_MOSI, NO_MISO, WORD_LOST, MODE_FAULT };
-/* Commands of its own: move to the pins (two, and two); listen to pins that select; a word from a master outside. */
-enum { MOVE = OWN_COMMANDS, LISTEN, CLOCK_IN };
-/* Its outputs. */
-enum { IRQ, RX_DMA, TX_DMA };
 
 static uint32_t bits_of(const struct device *device) { return device->words[CR1] & DFF ? 16 : 8; }
 

@@ -18,8 +18,6 @@
 
 #include "tim.h"
 
-/* Commands of its own: puts `pins[one]` on another pin; listens again after a state was put back; makes CNT known. */
-enum { MOVE = OWN_COMMANDS, RESUME, INTRODUCE };
 /* Ticks are counted from here on, so that the base of a prescaler may lie before the first. */
 #define FIRST_TICK (UINT64_C(1) << 32)
 enum { LOCKED = 1 << 8, OIS = 0x7F00, LEVEL_1 = AOE | BKP | BKE | DTG, LEVEL_2 = OSSR | OSSI };

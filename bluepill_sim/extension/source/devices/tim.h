@@ -3,27 +3,19 @@
 #define BLUEPILL_TIM_H
 
 #include "../fabric/fabric.h"
+#include "../registers/tim.h"
 
-/* Registers by offset / 4. */
-enum {
-    CR1, CR2, SMCR, DIER, SR, EGR, CCMR1, CCMR2, CCER, CNT, PSC, ARR, RCR, CCR1, CCR4 = 16, BDTR, DCR, DMAR, REGISTERS
-};
+enum { REGISTERS = DMAR + 1, OIS_AT = 8 };
 enum { CHANNELS = 4, PAIRS = 3 };
-/* Of CR1. */
-enum { CEN = 1 << 0, UDIS = 1 << 1, URS = 1 << 2, OPM = 1 << 3, DIR = 1 << 4, CMS = 3 << 5, ARPE = 1 << 7, CKD_AT = 8 };
-/* Of CR2. */
-enum { CCPC = 1 << 0, CCUS = 1 << 2, CCDS = 1 << 3, MMS_AT = 4, TI1S = 1 << 7, OIS_AT = 8 };
+/* Of CR2, MMS. */
 enum { MASTER_RESET, MASTER_ENABLE, MASTER_UPDATE, MASTER_COMPARE, MASTER_REFERENCE };
-/* Of SMCR. */
-enum { SMS = 7, TS_AT = 4, ETF_AT = 8, ETPS_AT = 12, ECE = 1 << 14, ETP = 1 << 15 };
+/* Of SMCR, SMS and TS. */
 enum { SLAVE_OFF, ENCODER_TI2, ENCODER_TI1, ENCODER_BOTH, SLAVE_RESET, SLAVE_GATED, SLAVE_TRIGGER, SLAVE_CLOCK };
 enum { TRIGGER_ED = 4, TRIGGER_TI1, TRIGGER_TI2, TRIGGER_ETRF };
 /* Of SR, of DIER at the same places, and of EGR. The flag of overcapture stands OVER bits above that of its channel,
  * and requests of DMA in DIER stand DMA_AT bits above. */
-enum { UIF = 1 << 0, CC1IF = 1 << 1, COMIF = 1 << 5, TIF = 1 << 6, BIF = 1 << 7, OVER = 8, DMA_AT = 8 };
+enum { OVER = 8, DMA_AT = 8 };
 enum { FLAGS = 0x1EFF, CCIFS = 0x1E, INTERRUPTS = 0xFF };
-/* Of BDTR. */
-enum { DTG = 0xFF, LOCK_AT = 8, OSSI = 1 << 10, OSSR = 1 << 11, BKE = 1 << 12, BKP = 1 << 13, AOE = 1 << 14, MOE = 1 << 15 };
 /* OCxM. */
 enum { FROZEN, SET_ON_MATCH, CLEAR_ON_MATCH, TOGGLE, FORCE_LOW, FORCE_HIGH, PWM1, PWM2 };
 /* Inputs behind their filters. */
@@ -32,11 +24,6 @@ enum { ETR = 4, INPUTS };
 enum { PIN_COMPLEMENT = 4, PIN_ETR = 7, PIN_BKIN, PIN_COUNT };
 /* Its last input: the clock security system has found HSE failed. The first four are the internal triggers. */
 enum { CSS = 4 };
-/* The outputs of the device, in the order of OUTPUTS in tim.py. */
-enum {
-    TRGO, CC_EVENT, UP_DMA = CC_EVENT + CHANNELS, CC_DMA, COM_DMA = CC_DMA + CHANNELS, TRIG_DMA, IRQ,
-    BRK_IRQ = IRQ, UP_IRQ, TRG_COM_IRQ, CC_IRQ
-};
 enum { SHOWS_NOTHING, SHOWS_LOW, SHOWS_HIGH, SHOWS_WAVE, SHOWS_UNKNOWN };
 /* What has happened within some counts: an update event may be due, and matches of the channels. */
 enum { OVERFLOWED = 1 << 0, MATCHED = 1 << 1 };

@@ -242,7 +242,7 @@ void update_event(struct device *device, bool is_by_counter)
         }
         for (uint32_t n = 0; n < CHANNELS; ++n) {
             if (words[CR2] & CCDS && words[DIER] & CC1IF << (DMA_AT + n)) {
-                request(device, CC_DMA + n);
+                request(device, CC1_DMA + n);
             }
         }
     }
@@ -278,12 +278,12 @@ void channel_event(struct device *device, uint32_t channel)
     words[SR] |= CC1IF << channel;
     tim->armed &= ~(CC1IF << channel);
     if (words[DIER] & CC1IF << (DMA_AT + channel) && !(words[CR2] & CCDS)) {
-        request(device, CC_DMA + channel);
+        request(device, CC1_DMA + channel);
     }
     if (channel == 0 && master_mode(device) == MASTER_COMPARE) {
         pulse(device, TRGO);
     }
-    pulse(device, CC_EVENT + channel);
+    pulse(device, CC1 + channel);
 }
 
 /* Whether a flag that rises is seen: it interrupts, or the program looks for it. */
@@ -318,7 +318,7 @@ static bool is_update_seen(const struct device *device)
                    is_request_seen(device, UIF, UP_DMA) || (master_mode(device) == MASTER_UPDATE && is_heard(device, TRGO)) ||
                    (tim->is_advanced && (words[BDTR] & (AOE | MOE)) == AOE);
     for (uint32_t n = 0; n < CHANNELS && words[CR2] & CCDS; ++n) {
-        is_seen |= is_request_seen(device, CC1IF << n, CC_DMA + n);
+        is_seen |= is_request_seen(device, CC1IF << n, CC1_DMA + n);
     }
     return is_seen;
 }
@@ -326,9 +326,9 @@ static bool is_update_seen(const struct device *device)
 static bool is_match_seen(const struct device *device, uint32_t channel)
 {
     return is_flag_seen(device, CC1IF << channel) ||
-           (!(device->words[CR2] & CCDS) && is_request_seen(device, CC1IF << channel, CC_DMA + channel)) ||
+           (!(device->words[CR2] & CCDS) && is_request_seen(device, CC1IF << channel, CC1_DMA + channel)) ||
            (channel == 0 && master_mode(device) == MASTER_COMPARE && is_heard(device, TRGO)) ||
-           is_heard(device, CC_EVENT + channel);
+           is_heard(device, CC1 + channel);
 }
 
 bool sees_channel(const struct device *device, uint32_t channel)

@@ -6,32 +6,15 @@
  * of characters is counted.
  */
 #include "../fabric/fabric.h"
+#include "../registers/usart.h"
 
-/* Registers by offset / 4, and the hidden words behind them: SR at its last read (half of the sequence that clears a
- * flag), what stands behind the shift register, what is in it (0: nothing), and what DR reads. */
-enum { SR, DR, BRR, CR1, CR2, CR3, SEEN = 7, TDR, SHIFT, RDR };
-/* Of SR, and of what it enables in CR1 at the same places. */
-enum { PE = 1 << 0, FE = 1 << 1, NE = 1 << 2, ORE = 1 << 3, IDLE = 1 << 4, RXNE = 1 << 5, TC = 1 << 6, TXE = 1 << 7,
-       LBD = 1 << 8, CTS = 1 << 9 };
+/* SEEN is SR at its last read (half of the sequence that clears a flag), TDR stands behind the shift register, SHIFT is
+ * what is in it (0: nothing), RDR what DR reads. Flags of SR, and what enables the first of them in CR1 at the same places. */
 enum { ASKING = TXE | TC | RXNE | IDLE, READ_SEQUENCE = 0x1F };
-/* Of CR1. */
-enum { SBK = 1 << 0, RWU = 1 << 1, RE = 1 << 2, TE = 1 << 3, RXNEIE = 1 << 5, PEIE = 1 << 8, PS = 1 << 9, PCE = 1 << 10,
-       WAKE = 1 << 11, M = 1 << 12, UE = 1 << 13 };
-/* Of CR2 and CR3. */
-enum { ADD = 0xF, LBDIE = 1 << 6, LBCL = 1 << 8, CPHA = 1 << 9, CPOL = 1 << 10, CLKEN = 1 << 11, LINEN = 1 << 14 };
-enum { EIE = 1 << 0, HDSEL = 1 << 3, DMAR = 1 << 6, DMAT = 1 << 7, RTSE = 1 << 8, CTSE = 1 << 9, CTSIE = 1 << 10 };
 /* How far its alternate functions RTS and CK stand before TX; bits of a break in LIN mode. */
 enum { RTS_FROM_TX = 2, CK_FROM_TX = 3, LIN_BREAK_BITS = 13 };
 /* A data word, what marks one in TDR and SHIFT, and what SHIFT holds besides. */
 enum { WORD = 0x1FF, HELD = 1 << 16, PREAMBLE = 1 << 17, BREAK = 1 << 18, FLAGS_AT = 16 };
-/* What Python is asked, as `Question` of usart.py: all but the last four are warnings. */
-enum { TX_PIN, TX_OFF, NO_RATE, CHARACTER_LOST, RX_OFF, CUT_OFF, CHECK_MODES, JUDGE_SPEED, GIVE_MORE, EXCHANGE };
-/* Commands of its own: move to the pins (TX, RX); hear a word, or learn that no more can be held; listen to nCTS,
- * move (nCTS, nRTS), move CK. */
-enum { MOVE = OWN_COMMANDS, HEAR, CAN_HEAR, LISTEN, CONTROL, MOVE_CK };
-/* Its outputs. */
-enum { IRQ, TX_DMA, RX_DMA };
-
 static bool is_transmitting(const struct device *device) { return (device->words[CR1] & (UE | TE)) == (UE | TE); }
 
 static bool carries(const struct device *device)

@@ -4,13 +4,10 @@
  * Invariant: Python is told of each write that may change anything.
  */
 #include "../fabric/fabric.h"
+#include "../registers/usb.h"
 
-/* Registers by offset / 4: EP0R to EP7R come first. */
-enum { ENDPOINTS = 8 };
-/* DTOG_RX, STAT_RX, DTOG_TX, STAT_TX: a 1 turns them over. */
-enum { TOGGLES = 0x7070 };
-/* What Python is told beside what a listener hears: a write, with the word before it. */
-enum { WRITTEN = OWN_ANSWERS };
+/* EP0R to EP7R come first. What a 1 turns over in them: */
+enum { ENDPOINTS = EP7R + 1, TOGGLES = DTOG_RX | STAT_RX | DTOG_TX | STAT_TX };
 
 static void write(struct device *device, uint32_t index, uint32_t written, uint32_t previous)
 {
