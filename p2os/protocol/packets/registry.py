@@ -11,6 +11,7 @@ has a name here and comes through raw.
 Invariant: `packet_frame(read_packet(frame, profile), profile) == frame` for every frame.
 """
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
@@ -129,27 +130,36 @@ class PacketKind:
         name: Its name in the manuals.
         read: How it is read; None: it comes through raw, or stands apart (the SIP, the identity).
         layout: Its fields, each with what it means; None where it is no layout of fixed fields.
+        table: What a table of such packets is called; empty where it comes through raw.
     """
 
     kind: int
     name: str
     read: Callable[[Frame], PlainPacket] | None = None
     layout: Construct | None = None
+    table: str = ""
 
 
 def _of(packet: type[Declared]) -> PacketKind:
-    return PacketKind(packet.KIND, packet.NAME, packet.from_frame, packet.LAYOUT)
+    table = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", packet.__name__.removesuffix("Packet")).lower()
+    return PacketKind(packet.KIND, packet.NAME, packet.from_frame, packet.LAYOUT, table)
 
 
 #: Every type that has a name.
 PACKET_KINDS = (
     PacketKind(0x00, SYNC_NAMES[0]),
     PacketKind(0x01, SYNC_NAMES[1]),
-    PacketKind(IDENTITY_KIND, "IDENTITY"),
-    PacketKind(CONFIG_KIND, "CONFIGpac", ConfigPacket.from_frame),
-    *(PacketKind(kind, "SIP") for kind in SIP_KINDS),
-    PacketKind(SimLaserPacket.KINDS[0], "SIMLASER", SimLaserPacket.from_frame, SimLaserPacket.LAYOUT),
-    PacketKind(SimLaserPacket.KINDS[1], "SIMLASER2", SimLaserPacket.from_frame, SimLaserPacket.EXTENDED_LAYOUT),
+    PacketKind(IDENTITY_KIND, "IDENTITY", table="identity"),
+    PacketKind(CONFIG_KIND, "CONFIGpac", ConfigPacket.from_frame, table="config"),
+    *(PacketKind(kind, "SIP", table="sip") for kind in SIP_KINDS),
+    PacketKind(SimLaserPacket.KINDS[0], "SIMLASER", SimLaserPacket.from_frame, SimLaserPacket.LAYOUT, "sim_laser"),
+    PacketKind(
+        SimLaserPacket.KINDS[1],
+        "SIMLASER2",
+        SimLaserPacket.from_frame,
+        SimLaserPacket.EXTENDED_LAYOUT,
+        "sim_laser_extended",
+    ),
     _of(SimstatPacket),
     _of(SiminfoPacket),
     _of(MapChangedPacket),
@@ -161,7 +171,7 @@ PACKET_KINDS = (
     PacketKind(0x9A, "IMUpac"),
     _of(ArmPacket),
     _of(ArmInfoPacket),
-    *(PacketKind(kind, name, SerauxPacket.from_frame) for kind, name in SerauxPacket.NAMES.items()),
+    *(PacketKind(kind, name, SerauxPacket.from_frame, table="seraux") for kind, name in SerauxPacket.NAMES.items()),
     _of(CompassPacket),
     _of(PlaylistPacket),
     PacketKind(0xD3, "MARCDEBUG"),
@@ -171,7 +181,7 @@ PACKET_KINDS = (
     _of(IoPacket),
     _of(JoystickPacket),
     _of(BatteryPacket),
-    *(PacketKind(kind, "RESET", ResetNotice.from_frame) for kind in ResetNotice.KINDS),
+    *(PacketKind(kind, "RESET", ResetNotice.from_frame, table="reset") for kind in ResetNotice.KINDS),
 )
 #: Packet type → how it is read; the SIP and the identity stand apart.
 READERS: Mapping[int, Callable[[Frame], PlainPacket]] = {
