@@ -11,6 +11,7 @@ from adapter_sim.duty import DUTY_TIMEOUT_NS
 from p2os.gamepad import PAD_DEAD, PAD_LOSS_NS, PAD_MM_S, PAD_MRAD_S, STICK_FULL, TRIGGER_FULL
 from p2os.protocol.bauds import DEFAULT_BAUD
 from p2os.protocol.times import LIVENESS_NS, PULSE_NS
+from p2os.robots.motor_step import STEP_UM_PER_S
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
@@ -44,10 +45,6 @@ class EncoderAtOpen(StrEnum):
 
 #: More line speeds than this are not searched.
 MAX_BAUDS = 8
-
-
-#: Rim speed of one step of a motor value (62.5 mm/s: four steps are 250 mm/s, and so is a full duty).
-STEP_UM_PER_S = 62_500
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,7 +94,7 @@ class AdapterSettings:
     retry_ns: Nanos = 1 * NS_PER_S
     #: SIP speeds that neither approach the command nor come with a stall flag for this long.
     plausibility_ns: Nanos = 1 * NS_PER_S
-    #: A wheel within this of its command follows it. # chosen: over half a step of 62.5 mm/s
+    #: A wheel within this of its command follows it. # chosen: over half a step
     plausibility_tolerance_mm_s: int = 40
     #: Coming nearer by this much counts as approaching. # chosen: above the jitter of a wheel at rest
     plausibility_progress_mm_s: int = 5

@@ -232,6 +232,7 @@ def meta_of(scenario: Scenario, world: World | None, note: str | None, *, is_at_
         "seed": None if is_at_port else scenario.seed,
         "sram": scenario.sram,
         "crystal_ppm": scenario.crystal_ppm,
+        "gives_up_s": scenario.gives_up_s,
         "duration_s": scenario.duration_ns / NS_PER_S,
         "threshold_m": scenario.threshold_m,
         "step_mps": (scenario.direct if scenario.mode == "direct" else scenario.adapter).step_um_per_s / 1e6,

@@ -115,9 +115,9 @@ LAYERS = {
         ("masters", "driver"), ("adapter",),
     ),
     "robot_bench": (
-        ("running", "firmware", "scenarios", "origin_gate"), ("wires",), ("events",), ("direct",), ("recording",),
+        ("running", "firmware", "origin_gate"), ("wires",), ("events",), ("direct",), ("recording",),
         ("drives",), ("scenario", "report"),
-        ("adapter",), ("bench",), ("remote",), ("run", "project"),
+        ("adapter", "scenarios"), ("bench",), ("remote",), ("run", "project"),
         ("experiments",), ("campaign",), ("ros", "live"), ("cli",),
     ),
 }  # fmt: skip
@@ -451,6 +451,30 @@ def test_no_neighbours_in_a_folder_import_each_other_in_a_circle() -> None:
 
 def test_the_judge_sees_a_circle() -> None:
     assert circles({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}, "e": set()}) == ["a", "b", "c"]
+
+
+#: Rim speed of one step of a motor value, in mm/s, m/s and µm/s.
+MOTOR_STEP = {62.5, 0.0625, 62_500}
+
+
+def test_the_speed_of_a_motor_step_is_said_once() -> None:
+    found = {
+        module_name(path) for path in sources()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Constant)
+        and (node.value in MOTOR_STEP if isinstance(node.value, int | float) else "62.5 mm/s" in str(node.value))
+    }  # fmt: skip
+    assert found == {"p2os.robots.motor_step"}
+
+
+def test_what_is_written_of_a_motor_step_for_readers_is_that_speed() -> None:
+    written = re.compile(r"([\d.]+) mm/s (?:a (?:motor )?step|\(four steps)|(?:eight steps of|step is) ([\d.]+) mm/s")
+    files = [*(ROOT / "docs").glob("*.md"), *(ROOT / "robot_bench").glob("firmware/*.[ch]"),
+             ROOT / "robot_bench" / "project" / "template" / "main.c"]  # fmt: skip
+    said = {(path.name, float(one or other)) for path in files
+            for one, other in written.findall(path.read_text(encoding="utf-8"))}  # fmt: skip
+    assert len(said) >= 5
+    assert {speed for _, speed in said} == {62.5}
 
 
 def test_the_map_names_what_is_there() -> None:

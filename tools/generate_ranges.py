@@ -19,6 +19,7 @@ from p2os.pioneer.world import model as world
 from p2os.robots import model_file
 from p2os.toml_schema import Key
 from robot_bench.scenario import scenario
+from robot_bench.scenario.goals.kinds import every_kind
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = tuple(ROOT / "docs" / name for name in ("worlds.md", "scenarios.md", "pioneer.md", "adapter.md"))
@@ -80,13 +81,15 @@ def exports() -> str:
 
 def tables() -> dict[str, str]:
     """Return every generated table by its name."""
+    goals = {f"[[goal]] {name}": kind.keys for name, kind in every_kind().items()}
     robots = {f"`[{name}]`": plain(keys) for name, keys in model_file.RANGES.items()}
     robots["`[sonar]` `poses`"] = plain(_poses(("x_mm", "y_mm", "heading_deg"), model_file.POSE_RANGES))
     at = _poses(("at[0]", "at[1]", "at[2]"), fleet_file.PLACE_RANGES)
     return {
         "world": _one(world.RANGES),
         "scenario": lines(
-            {f"`{name}`" if name else "the file": of_keys(keys) for name, keys in scenario.TABLES.items()}, "table"
+            {f"`{name}`" if name else "the file": of_keys(keys) for name, keys in {**scenario.TABLES, **goals}.items()},
+            "table",
         ),
         "robot": lines(robots, "table"),
         "fleet": lines({"": {**of_keys((*fleet_file.TOP, *fleet_file.ROBOT)), **plain(at)}}, ""),

@@ -23,6 +23,7 @@ from typing import Protocol, cast
 from p2os.capture.chunks import Chunk, Direction
 from p2os.capture.describe import PacketFields, Plain, command_fields, command_name
 from p2os.capture.reading import FollowedReading, Reading
+from p2os.protocol.command_table import SYNC_NAMES
 from p2os.protocol.commands import NEGATIVE, POSITIVE, STRING, CommandNumber
 from p2os.protocol.frames import (
     CHECKSUM_BYTES,
@@ -41,8 +42,8 @@ from p2os.protocol.packets import IDENTITY_KIND, RESET_KINDS, packet_name
 from p2os.protocol.sip import SIP_KINDS, is_sip
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
-SYNC_NAMES = ("SYNC0", "SYNC1", "SYNC2")
-COMMAND_NAMES = ("PULSE", "OPEN", "CLOSE")
+#: What the numbers of `SYNC_NAMES` are called in a session.
+COMMAND_NAMES = tuple(CommandNumber(number).name for number in range(len(SYNC_NAMES)))
 #: chosen: packets that were on their way when CLOSE was sent; three cycles.
 IN_FLIGHT_NS: Nanos = 300 * NS_PER_MS
 #: Longer than any decoder waits for the rest of a frame.

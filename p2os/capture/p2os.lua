@@ -6,15 +6,25 @@
 -- it sends what only robots send. `p2os sniff --install-dissector` puts it into Wireshark's folder of personal
 -- Lua plug-ins. MIT licence.
 
--- Names by number, from the tables of the package: `p2os sniff --install-dissector` writes them here.
+-- Names, numbers and layouts, from the tables of the package: `p2os sniff --install-dissector` writes them here.
 local commands = {}
 local packets = {}
+-- Without an argument these are the same bytes; only the whole conversation tells.
+local bare = {}
+local argument_types = {}
+local wire = {}
+-- The fields of a SIP before its sonar readings, and those behind them: name, place (type byte first), bytes, signed.
+local head = {}
+local behind = {}
+-- The ARCOS tail, in the order of the wire: name, bytes, signed, what it is.
+local tail = {}
 
 local p2os = Proto("p2os", "Pioneer P2OS")
 local directions = { [0] = "client to robot", [1] = "robot to client" }
--- Without an argument these three are the same bytes; only the whole conversation tells.
-local bare = { [0] = "SYNC0 or PULSE", [1] = "SYNC1 or OPEN", [2] = "SYNC2 or CLOSE" }
-local argument_types = { [0x3B] = "integer", [0x1B] = "negative integer", [0x2B] = "string" }
+
+local function of_sip(row, name, title, shown)
+    return ProtoField[(row.signed and "int" or "uint") .. 8 * row.bytes]("p2os.sip." .. name, title, shown or base.DEC)
+end
 
 local field = {
     direction = ProtoField.uint8("p2os.direction", "Direction", base.DEC, directions),
@@ -27,33 +37,25 @@ local field = {
     data = ProtoField.bytes("p2os.data", "Data"),
     checksum = ProtoField.uint16("p2os.checksum", "Checksum", base.HEX),
     bad = ProtoField.bool("p2os.bad", "Damaged"),
-    x = ProtoField.uint16("p2os.sip.x", "XPOS (counts)"),
-    y = ProtoField.uint16("p2os.sip.y", "YPOS (counts)"),
-    heading = ProtoField.int16("p2os.sip.heading", "THPOS (4096 a turn)"),
-    left = ProtoField.int16("p2os.sip.left", "Left wheel (mm/s)"),
-    right = ProtoField.int16("p2os.sip.right", "Right wheel (mm/s)"),
-    battery = ProtoField.uint8("p2os.sip.battery", "Battery (0.1 V)"),
+    x = of_sip(head.raw_x, "x", "XPOS (counts)"),
+    y = of_sip(head.raw_y, "y", "YPOS (counts)"),
+    heading = of_sip(head.raw_heading, "heading", "THPOS (4096 a turn)"),
+    left = of_sip(head.raw_left_velocity, "left", "Left wheel (mm/s)"),
+    right = of_sip(head.raw_right_velocity, "right", "Right wheel (mm/s)"),
+    battery = of_sip(head.raw_battery, "battery", "Battery (0.1 V)"),
     stall_left = ProtoField.bool("p2os.sip.stall_left", "Left wheel stalled", 8, nil, 1),
     stall_right = ProtoField.bool("p2os.sip.stall_right", "Right wheel stalled", 8, nil, 1),
     rear_bumpers = ProtoField.uint8("p2os.sip.rear_bumpers", "Rear bumpers", base.HEX, nil, 0xFE),
     front_bumpers = ProtoField.uint8("p2os.sip.front_bumpers", "Front bumpers", base.HEX, nil, 0xFE),
-    control = ProtoField.int16("p2os.sip.control", "CONTROL (4096 a turn)"),
-    flags = ProtoField.uint16("p2os.sip.flags", "FLAGS, or servo 1 on P2OS", base.HEX),
-    compass = ProtoField.uint8("p2os.sip.compass", "Compass (2 deg)"),
-    analog_port = ProtoField.uint8("p2os.sip.analog_port", "Analog port (P2OS; gripper on AROS and ARCOS)"),
-    gripper = ProtoField.uint8("p2os.sip.gripper", "Gripper (P2OS; analog port on AROS and ARCOS)", base.HEX),
-    analog = ProtoField.uint8("p2os.sip.analog", "Analog input"),
-    digital_in = ProtoField.uint8("p2os.sip.digital_in", "Digital inputs", base.HEX),
-    digital_out = ProtoField.uint8("p2os.sip.digital_out", "Digital outputs", base.HEX),
+    control = of_sip(head.raw_control, "control", "CONTROL (4096 a turn)"),
+    flags = of_sip(head.raw_flags, "flags", "FLAGS, or servo 1 on P2OS", base.HEX),
+    compass = of_sip(head.raw_compass, "compass", "Compass (2 deg)"),
+    analog_port = of_sip(behind.first, "analog_port", "Analog port (P2OS; gripper on AROS and ARCOS)"),
+    gripper = of_sip(behind.second, "gripper", "Gripper (P2OS; analog port on AROS and ARCOS)", base.HEX),
+    analog = of_sip(behind.raw_analog, "analog", "Analog input"),
+    digital_in = of_sip(behind.digital_in, "digital_in", "Digital inputs", base.HEX),
+    digital_out = of_sip(behind.digital_out, "digital_out", "Digital outputs", base.HEX),
     sonar = ProtoField.string("p2os.sip.sonar", "Sonar (number: counts)"),
-}
--- The ARCOS tail, in the order of the wire: name, bytes, signed, what it is.
-local tail = {
-    { "battery_x10", 2, false, "Battery (0.1 V, 16 bits)" }, { "charge_state", 1, true, "Charge state" },
-    { "rotation_velocity", 2, true, "Rotation velocity (0.1 deg/s)" }, { "fault_flags", 2, false, "Fault flags" },
-    { "lateral_velocity", 2, true, "Lateral velocity (mm/s)" }, { "temperature", 1, true, "Temperature (deg C)" },
-    { "state_of_charge", 1, false, "State of charge (%)" }, { "controller_time_us", 4, false, "Controller time (us)" },
-    { "flags3", 4, false, "Flags 3" },
 }
 for _, row in ipairs(tail) do
     field["tail_" .. row[1]] = ProtoField[(row[3] and "int" or "uint") .. 8 * row[2]]("p2os.sip." .. row[1], row[4])
@@ -77,55 +79,53 @@ local function checksum(buffer, first, last)
 end
 
 local function add_sip(buffer, tree)
-    if buffer:len() < 25 then return "" end
-    tree:add_le(field.x, buffer(1, 2))
-    tree:add_le(field.y, buffer(3, 2))
-    tree:add_le(field.heading, buffer(5, 2))
-    tree:add_le(field.left, buffer(7, 2))
-    tree:add_le(field.right, buffer(9, 2))
-    tree:add(field.battery, buffer(11, 1))
-    tree:add(field.stall_left, buffer(12, 1))
-    tree:add(field.stall_right, buffer(13, 1))
-    tree:add(field.rear_bumpers, buffer(12, 1))
-    tree:add(field.front_bumpers, buffer(13, 1))
-    tree:add_le(field.control, buffer(14, 2))
-    tree:add_le(field.flags, buffer(16, 2))
-    tree:add(field.compass, buffer(18, 1))
-    local readings = {}
-    for number = 0, buffer(19, 1):uint() - 1 do
-        local place = 20 + 3 * number
-        if place + 3 > buffer:len() then break end
+    if buffer:len() < wire.sip_bytes then return "" end
+    local function at(row, past) return buffer(row.place + (past or 0), row.bytes) end
+    for _, shown in ipairs({ { "x", head.raw_x }, { "y", head.raw_y }, { "heading", head.raw_heading },
+        { "left", head.raw_left_velocity }, { "right", head.raw_right_velocity }, { "battery", head.raw_battery },
+        { "stall_left", head.left }, { "stall_right", head.right }, { "rear_bumpers", head.left },
+        { "front_bumpers", head.right }, { "control", head.raw_control }, { "flags", head.raw_flags },
+        { "compass", head.raw_compass } }) do
+        tree:add_le(field[shown[1]], at(shown[2]))
+    end
+    local readings, count = {}, at(head.count):uint()
+    for number = 0, count - 1 do
+        local place = wire.sonar_at + wire.reading_bytes * number
+        if place + wire.reading_bytes > buffer:len() then break end
         readings[#readings + 1] = buffer(place, 1):uint() .. ": " .. buffer(place + 1, 2):le_uint()
     end
     if #readings > 0 then
-        tree:add(field.sonar, buffer(20, 3 * #readings), table.concat(readings, ", "))
+        tree:add(field.sonar, buffer(wire.sonar_at, wire.reading_bytes * #readings), table.concat(readings, ", "))
     end
-    local place = 20 + 3 * buffer(19, 1):uint()
-    if place + 5 <= buffer:len() then
-        for number, name in ipairs({ "analog_port", "gripper", "analog", "digital_in", "digital_out" }) do
-            tree:add(field[name], buffer(place + number - 1, 1))
+    local past = wire.reading_bytes * count
+    local place = wire.sip_bytes + past
+    if place <= buffer:len() then
+        for _, shown in ipairs({ { "analog_port", behind.first }, { "gripper", behind.second },
+            { "analog", behind.raw_analog }, { "digital_in", behind.digital_in },
+            { "digital_out", behind.digital_out } }) do
+            tree:add_le(field[shown[1]], at(shown[2], past))
         end
-        place = place + 5
         for _, row in ipairs(tail) do
             if place + row[2] > buffer:len() then break end
             tree:add_le(field["tail_" .. row[1]], buffer(place, row[2]))
             place = place + row[2]
         end
     end
-    return string.format(" x %d, y %d, heading %.1f deg, wheels %d %d mm/s", buffer(1, 2):le_uint() % 0x8000,
-        buffer(3, 2):le_uint() % 0x8000, buffer(5, 2):le_int() * 360 / 4096, buffer(7, 2):le_int(), buffer(9, 2):le_int())
+    return string.format(" x %d, y %d, heading %.1f deg, wheels %d %d mm/s", at(head.raw_x):le_uint() % wire.positions,
+        at(head.raw_y):le_uint() % wire.positions, at(head.raw_heading):le_int() * 360 / 4096,
+        at(head.raw_left_velocity):le_int(), at(head.raw_right_velocity):le_int())
 end
 
 local function add_command(buffer, tree)
     if buffer:len() < 2 then return "" end
     local kind = buffer(1, 1):uint()
     tree:add(field.argument_type, buffer(1, 1))
-    if (kind == 0x3B or kind == 0x1B) and buffer:len() >= 4 then
+    if (kind == wire.positive or kind == wire.negative) and buffer:len() >= 4 then
         local value = buffer(2, 2):le_uint()
-        if kind == 0x1B then value = -value end
+        if kind == wire.negative then value = -value end
         tree:add(field.argument, buffer(2, 2), value)
         return " " .. value
-    elseif kind == 0x2B and buffer:len() >= 3 then
+    elseif kind == wire.string and buffer:len() >= 3 then
         local length = math.min(buffer(2, 1):uint(), buffer:len() - 3)
         if length > 0 then tree:add(field.text, buffer(3, length)) end
         return " (" .. length .. " bytes)"
@@ -140,7 +140,7 @@ local function dissect_frame(buffer, tree, direction)
     local size = buffer:len()
     local branch = tree:add(p2os, buffer())
     branch:add(field.direction, direction):set_generated()
-    local is_frame = size >= 6 and buffer(0, 2):uint() == 0xFAFB and buffer(2, 1):uint() + 3 == size
+    local is_frame = size >= 6 and buffer(0, 2):uint() == wire.header and buffer(2, 1):uint() + 3 == size
     if is_frame and checksum(buffer, 3, size - 3) ~= buffer(size - 2, 2):uint() then is_frame = false end
     branch:add(field.bad, not is_frame):set_generated()
     if not is_frame then
@@ -155,7 +155,7 @@ local function dissect_frame(buffer, tree, direction)
     if direction == 1 then
         name = packets[kind] or string.format("packet 0x%02X", kind)
         branch:add(field.packet, buffer(3, 1))
-        if kind >= 0x30 and kind <= 0x34 then
+        if kind >= wire.sip_first and kind <= wire.sip_last then
             detail = add_sip(inside:tvb(), branch)
         else
             detail = ""
@@ -174,9 +174,9 @@ end
 -- Whether bytes begin like a frame; where all of it is there, with its checksum.
 local function is_frame(buffer)
     local size = buffer:len()
-    if size < 6 or buffer(0, 2):uint() ~= 0xFAFB then return false end
+    if size < 6 or buffer(0, 2):uint() ~= wire.header then return false end
     local count = buffer(2, 1):uint()
-    if count < 3 or count > 204 then return false end
+    if count < wire.min_count or count > wire.max_count then return false end
     if count + 3 > size then return true end
     return checksum(buffer, 3, count) == buffer(count + 1, 2):uint()
 end
@@ -184,8 +184,8 @@ end
 -- What only a robot sends: a SIP, or an identity with its name.
 local function is_robots(buffer)
     local kind, size = buffer(3, 1):uint(), buffer(2, 1):uint() - 2
-    return (kind >= 0x30 and kind <= 0x34 and size >= 25)
-        or (kind == 2 and size > 3)
+    return (kind >= wire.sip_first and kind <= wire.sip_last and size >= wire.sip_bytes)
+        or (kind == wire.identity and size > 3)
 end
 
 -- Number of a TCP conversation -> address and port of its client; the first frame decides.

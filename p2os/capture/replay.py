@@ -15,7 +15,8 @@ from collections import Counter
 from dataclasses import dataclass
 
 from p2os.capture.chunks import Capture, Chunk, Direction
-from p2os.capture.listing import SYNC_NAMES, FrameCutter, frame_chunks
+from p2os.capture.listing import FrameCutter, frame_chunks
+from p2os.protocol.command_table import SYNC_NAMES
 from p2os.protocol.commands import CommandNumber
 from p2os.protocol.packets import IDENTITY_KIND
 from simbase.timing import Nanos, Reached

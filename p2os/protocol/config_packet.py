@@ -28,25 +28,35 @@ from p2os.protocol.frames import Frame
 CONFIG_KIND = 0x20
 _TEXT = NullTerminated(GreedyBytes)
 
-#: Every field in the order of the wire.
-FIELDS = (
-    ("robot_class", _TEXT), ("subclass", _TEXT), ("serial", _TEXT), ("four_motors", Int8ul),
-    ("rotveltop", Int16ul), ("transveltop", Int16ul), ("rotacctop", Int16ul), ("transacctop", Int16ul),
-    ("pwmmax", Int16ul), ("name", _TEXT), ("sipcycle", Int8ul), ("hostbaud", Int8ul), ("auxbaud", Int8ul),
-    ("gripper", Int16ul), ("frontsonar", Int16ul), ("rearsonar", Int8ul), ("lowbattery", Int16ul),
-    ("revcount", Int16ul), ("watchdog", Int16ul), ("p2mpacs", Int8ul), ("stallval", Int16ul),
-    ("stallcount", Int16ul), ("joyvel", Int16ul), ("joyrvel", Int16ul), ("rotvelmax", Int16ul),
-    ("transvelmax", Int16ul), ("rotacc", Int16ul), ("rotdecel", Int16ul), ("rotkp", Int16ul), ("rotkv", Int16ul),
-    ("rotki", Int16ul), ("transacc", Int16ul), ("transdecel", Int16ul), ("transkp", Int16ul), ("transkv", Int16ul),
-    ("transki", Int16ul), ("frontbumps", Int8ul), ("rearbumps", Int8ul), ("charger", Int8ul), ("sonarcycle", Int8ul),
-    ("autobaud", Int8ul), ("hasgyro", Int8ul), ("driftfactor", Int16sl), ("aux2baud", Int8ul), ("aux3baud", Int8ul),
-    ("ticksmm", Int16ul), ("shutdownvolts", Int16ul), ("firmware_version", _TEXT), ("gyrocw", Int16ul),
-    ("gyroccw", Int16ul), ("kinematicsdelay", Int8ul), ("latveltop", Int16ul), ("latacctop", Int16ul),
-    ("latvelmax", Int16ul), ("latacc", Int16ul), ("latdecel", Int16ul), ("chargethreshold", Int16ul),
-    ("pdbport", Int8ul), ("gyroratelimit", Int16ul), ("hightemp", Int8sl), ("powerbits", Int16ul),
-    ("batterytype", Int8ul), ("soclow", Int16ul), ("socshutdown", Int16ul), ("bootloader_version", _TEXT),
-    ("configflags", Int32ul), ("gyrofw", Int16sl),
+#: Every field in the order of the wire: name, type, meaning beyond the name.
+_ROWS = (
+    ("robot_class", _TEXT, "`Pioneer`"), ("subclass", _TEXT, "the model, such as `p2dx`"),
+    ("serial", _TEXT, "`SIM` in a simulator"), ("four_motors", Int8ul, "1 on an AT with P2OS"),
+    ("rotveltop", Int16ul, "°/s"), ("transveltop", Int16ul, "mm/s"), ("rotacctop", Int16ul, "°/s²"),
+    ("transacctop", Int16ul, "mm/s²"), ("pwmmax", Int16ul, "500 is full"), ("name", _TEXT, "of the robot"),
+    ("sipcycle", Int8ul, "ms"), ("hostbaud", Int8ul, "as HOSTBAUD"), ("auxbaud", Int8ul, "as HOSTBAUD"),
+    ("gripper", Int16ul, ""), ("frontsonar", Int16ul, ""), ("rearsonar", Int8ul, "one byte, unlike the front's"),
+    ("lowbattery", Int16ul, "0.1 V"), ("revcount", Int16ul, "counts a turn of the robot"),
+    ("watchdog", Int16ul, "ms"), ("p2mpacs", Int8ul, "1: another SIP that nobody has described"),
+    ("stallval", Int16ul, ""), ("stallcount", Int16ul, "ms"), ("joyvel", Int16ul, "mm/s"),
+    ("joyrvel", Int16ul, "°/s"), ("rotvelmax", Int16ul, "°/s"), ("transvelmax", Int16ul, "mm/s"),
+    ("rotacc", Int16ul, "°/s²"), ("rotdecel", Int16ul, "°/s²"), ("rotkp", Int16ul, ""), ("rotkv", Int16ul, ""),
+    ("rotki", Int16ul, ""), ("transacc", Int16ul, "mm/s²"), ("transdecel", Int16ul, "mm/s²"),
+    ("transkp", Int16ul, ""), ("transkv", Int16ul, ""), ("transki", Int16ul, ""), ("frontbumps", Int8ul, "segments"),
+    ("rearbumps", Int8ul, "segments"), ("charger", Int8ul, "1 P3, 2 PowerBot"), ("sonarcycle", Int8ul, "ms"),
+    ("autobaud", Int8ul, "1: HOSTBAUD works, 2: raise it by itself"),
+    ("hasgyro", Int8ul, "1: GYROpac, 2: used inside"), ("driftfactor", Int16sl, ""),
+    ("aux2baud", Int8ul, "as HOSTBAUD"), ("aux3baud", Int8ul, "as HOSTBAUD"), ("ticksmm", Int16ul, "counts a mm"),
+    ("shutdownvolts", Int16ul, "0.1 V"), ("firmware_version", _TEXT, ""), ("gyrocw", Int16ul, ""),
+    ("gyroccw", Int16ul, ""), ("kinematicsdelay", Int8ul, "ms"), ("latveltop", Int16ul, "mm/s"),
+    ("latacctop", Int16ul, "mm/s²"), ("latvelmax", Int16ul, "mm/s"), ("latacc", Int16ul, "mm/s²"),
+    ("latdecel", Int16ul, "mm/s²"), ("chargethreshold", Int16ul, ""), ("pdbport", Int8ul, ""),
+    ("gyroratelimit", Int16ul, ""), ("hightemp", Int8sl, "°C, −128 none"), ("powerbits", Int16ul, ""),
+    ("batterytype", Int8ul, "2: state of charge"), ("soclow", Int16ul, ""), ("socshutdown", Int16ul, ""),
+    ("bootloader_version", _TEXT, ""), ("configflags", Int32ul, ""), ("gyrofw", Int16sl, ""),
 )  # fmt: skip
+FIELDS = tuple((name, kind) for name, kind, _ in _ROWS)
+MEANINGS = {name: means for name, _, means in _ROWS}
 
 #: Field that is a number → least and most that it holds.
 NUMBERS = {

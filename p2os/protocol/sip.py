@@ -17,6 +17,7 @@ from itertools import accumulate, chain, repeat
 from construct import Array, Int8ul, Int16sl, Int16ul, Struct, this
 
 from p2os.errors import LocalProtocolError, RemoteProtocolError
+from p2os.protocol.fields import part
 from p2os.protocol.frames import Frame
 from p2os.protocol.profiles import Profile
 
@@ -27,27 +28,32 @@ STANDING, MOVING = 0x32, 0x33
 POSITION_MASK = 0x7FFF
 
 #: One sonar reading.
-READING = Struct("number" / Int8ul, "raw_range" / Int16ul)
+READING = Struct(part("number", Int8ul, "sonar, from 0"), part("raw_range", Int16ul, "counts of RangeConvFactor"))
 #: From the byte after the type to the end of the fields that every robot sends.
 HEAD = Struct(
-    "raw_x" / Int16ul,
-    "raw_y" / Int16ul,
-    "raw_heading" / Int16sl,
-    "raw_left_velocity" / Int16sl,
-    "raw_right_velocity" / Int16sl,
-    "raw_battery" / Int8ul,
-    "left" / Int8ul,
-    "right" / Int8ul,
-    "raw_control" / Int16sl,
-    "raw_flags" / Int16ul,
-    "raw_compass" / Int8ul,
-    "count" / Int8ul,
-    "sonar" / Array(this.count, READING),
-    "first" / Int8ul,
-    "second" / Int8ul,
-    "raw_analog" / Int8ul,
-    "digital_in" / Int8ul,
-    "digital_out" / Int8ul,
+    part("raw_x", Int16ul, f"counts of DistConvFactor, {POSITION_MASK.bit_length()} bits; bit 15 is masked"),
+    part("raw_y", Int16ul, "as x"),
+    part("raw_heading", Int16sl, "4096 counts a turn, + counter-clockwise"),
+    part("raw_left_velocity", Int16sl, "VelConvFactor mm/s"),
+    part("raw_right_velocity", Int16sl, "VelConvFactor mm/s"),
+    part("raw_battery", Int8ul, "0.1 V"),
+    part("left", Int8ul, "bit 0 the left wheel has stalled, bits 1 to 7 the **rear** bumper's segments"),
+    part("right", Int8ul, "bit 0 the right wheel has stalled, bits 1 to 7 the **front** bumper's segments"),
+    part("raw_control", Int16sl, "heading set-point, as the heading"),
+    part(
+        "raw_flags",
+        Int16ul,
+        "P2OS: pulse width of servo 1. AROS, ARCOS: bit 0 motors enabled, 1 to 4 sonar arrays on, 5 stop button, "
+        "6 stall by it, 7 far and 8 near ledge, 9 joystick button, 10 charger has power",
+    ),
+    part("raw_compass", Int8ul, "2° units"),
+    part("count", Int8ul, "new sonar readings that follow, n"),
+    part("sonar", Array(this.count, READING)),
+    part("first", Int8ul, "P2OS: analog port. AROS, ARCOS: gripper"),
+    part("second", Int8ul, "P2OS: gripper. AROS, ARCOS: analog port"),
+    part("raw_analog", Int8ul, "0 to 255 for 0 to 5 V"),
+    part("digital_in", Int8ul, "a bit an input"),
+    part("digital_out", Int8ul, "a bit an output. **A P2OS or AROS SIP ends here**"),
 )
 #: Bytes of the head without sonar, type byte included.
 HEAD_BYTES = 25
@@ -66,18 +72,20 @@ _LETTERS = {
     str(sub.name): str(sub.subcon.fmtstr[1:]) for sub in (*HEAD.subcons, *READING.subcons) if sub.name != "sonar"
 }
 
-#: The ARCOS tail: (field, bytes, signed). Firmware only ever appends.
-TAIL = (
-    ("raw_battery_x10", 2, False),
-    ("charge_state", 1, True),
-    ("raw_rotation_velocity", 2, True),
-    ("fault_flags", 2, False),
-    ("raw_lateral_velocity", 2, True),
-    ("raw_temperature", 1, True),
-    ("state_of_charge", 1, False),
-    ("controller_time_us", 4, False),
-    ("raw_flags3", 4, False),
+#: The ARCOS tail: (field, bytes, signed, meaning). Firmware only ever appends.
+_TAIL_ROWS = (
+    ("raw_battery_x10", 2, False, "0.1 V"),
+    ("charge_state", 1, True, "−1 unknown, 0 none, 1 bulk, 2 overcharge, 3 float, 4 balance"),
+    ("raw_rotation_velocity", 2, True, "0.1 °/s"),
+    ("fault_flags", 2, False, "bits"),
+    ("raw_lateral_velocity", 2, True, "mm/s"),
+    ("raw_temperature", 1, True, "°C, −127 none"),
+    ("state_of_charge", 1, False, "percent"),
+    ("controller_time_us", 4, False, "µs (Pioneer LX)"),
+    ("raw_flags3", 4, False, "more flags (Pioneer LX)"),
 )
+TAIL = tuple((name, size, signed) for name, size, signed, _ in _TAIL_ROWS)
+TAIL_MEANINGS: Mapping[str, str] = {name: means for name, *_, means in _TAIL_ROWS}
 
 
 @dataclass(frozen=True, slots=True)

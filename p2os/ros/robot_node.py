@@ -18,6 +18,7 @@ from p2os.pioneer.devices.laser import LaserModel
 from p2os.protocol.commands import CommandNumber
 from p2os.protocol.packets import ServerPacket, SimLaserPacket
 from p2os.protocol.times import CYCLE_NS
+from p2os.robots.motor_step import STEP_MPS
 from p2os.robots.parameters import RobotParameters
 from p2os.ros.codec import Message
 from p2os.ros.frames import Frames
@@ -34,7 +35,7 @@ from p2os.ros.robot_messages import (
     sonar_points,
     sonar_range,
 )
-from p2os.ros.thesis_topics import FIRST, STEP_MPS, encoder_code, motor_speed, near
+from p2os.ros.thesis_topics import FIRST, encoder_code, motor_speed, near
 from p2os.ros.topics import SERVICES, TOPICS
 from p2os.ros.transport import NodeOptions, Received, Topic
 from p2os.ros.urdf import urdf_text

@@ -8,14 +8,14 @@ the thesis's plug-in, which cuts towards zero, had 0 twice as wide.
 
 import math
 
+from p2os.robots.motor_step import STEP_MPS
+
 #: Places of an encoder a turn, and codes of a motor.
 CODES = 8
 #: The topics are numbered from 1; the sonar from 0.
 FIRST = 1
 #: The largest code ahead.
 _MOST_AHEAD = CODES // 2 - 1
-#: Rim speed of one step of a motor: the adapter's, which stands in `adapter_sim.settings`; a test compares them.
-STEP_MPS = 0.0625
 
 
 def motor_speed(code: int, step_mps: float = STEP_MPS) -> float | None:

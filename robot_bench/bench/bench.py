@@ -108,10 +108,10 @@ class BenchParts:
 class Bench(Expectations, Interventions, Stateful):
     """A firmware, its robot and its world, run in virtual time; `from_scenario` makes one.
 
-    >>> bench = Bench.from_scenario("motors", body="kinematic")  # doctest: +SKIP
-    >>> bench.run_until("2 s")                                   # doctest: +SKIP
-    >>> bench.pose, bench.level("PB12"), bench.text              # doctest: +SKIP
-    >>> bench.judge().missed                                     # doctest: +SKIP
+    >>> bench = Bench.from_scenario("mine.toml", body="kinematic")  # doctest: +SKIP
+    >>> bench.run_until("2 s")                                      # doctest: +SKIP
+    >>> bench.pose, bench.level("PB12"), bench.text                 # doctest: +SKIP
+    >>> bench.judge().missed                                        # doctest: +SKIP
 
     Args:
         scenario: What to run.

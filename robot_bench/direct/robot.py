@@ -17,8 +17,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from adapter_sim.codec import BitOrder
-from adapter_sim.settings import STEP_UM_PER_S, MotorCommand
+from adapter_sim.settings import MotorCommand
 from p2os.pioneer.body.contract import RobotBody, Wheels
+from p2os.robots.motor_step import STEP_UM_PER_S
 from robot_bench.direct.distance import DistanceSensors
 from robot_bench.direct.encoder import WheelEncoder
 from robot_bench.direct.motor import JointMotor

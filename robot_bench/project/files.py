@@ -15,6 +15,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from adapter_sim.pinout import Pinout, Wire, WireRole, load_pinout
+from p2os.robots.motor_step import STEP_UM_PER_S
 from simbase.errors import FileError, UsageError, shown, shown_name
 from simbase.files import reason_of
 
@@ -137,7 +138,8 @@ struct wire {
 _ROLES = {
     WireRole.DISTANCE: "Inputs: high while something is nearer than the threshold; DD1 looks left, DD8 right.",
     WireRole.ENCODER: "Inputs: the position of a wheel, eight a turn; encoder 1 is the left wheel.",
-    WireRole.MOTOR: "Outputs: the speed of a wheel, -4 to +3 in steps of 62.5 mm/s; motor 1 is the left wheel.",
+    WireRole.MOTOR: "Outputs: the speed of a wheel, -4 to +3 in steps of "
+    f"{STEP_UM_PER_S / 1000:g} mm/s; motor 1 is the left wheel.",
     WireRole.CONNECT: "Output: high asks the adapter to connect the robot.",
     WireRole.RESET: "Output: high holds the adapter in reset.",
 }

@@ -12,8 +12,9 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
+from p2os.robots.motor_step import STEP_MPS
 from robot_bench.events.codec import (
     LAST_NS,
     TRACE_VERSION,
@@ -87,6 +88,11 @@ class RunRecord:
         return (
             f"<RunRecord of {name}, {self.last_ns / NS_PER_S:g} s, {len(self.poses)} poses, {len(self.events)} notes>"
         )
+
+    @property
+    def step_mps(self) -> float:
+        """Rim speed of one step of a motor value, m/s."""
+        return float(cast("float", self.meta.get("step_mps") or STEP_MPS))
 
     def usart_lines(self) -> list[tuple[int, str]]:
         """Return (ns of its last character, text) for each printed line."""

@@ -2,16 +2,17 @@
 
 from dataclasses import fields
 
-from p2os.protocol.commands import Command
+from p2os.protocol.command_table import SYNC_NAMES
+from p2os.protocol.commands import Command, CommandNumber
 from p2os.protocol.config_packet import ConfigPacket
 from p2os.protocol.frames import Decoder, Frame
-from p2os.protocol.packets import Identity, RawPacket, read_packet
+from p2os.protocol.packets import Identity, RawPacket, packet_name, read_packet
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import StandardSip
 from robot_bench.events.kinds import Packet
 
 #: The numbers that mean something else until the session is open.
-SYNCS = {0: "SYNC0 / PULSE", 1: "SYNC1 / OPEN", 2: "SYNC2 / CLOSE"}
+SYNCS = {number: (sync, f"{sync} / {CommandNumber(number).name}") for number, sync in enumerate(SYNC_NAMES)}
 
 
 def describe(chunk: Packet) -> list[tuple[str, str]]:
@@ -36,14 +37,14 @@ def describe(chunk: Packet) -> list[tuple[str, str]]:
 def _command(frame: Frame) -> tuple[str, str]:
     command = Command.from_frame(frame)
     if command.number in SYNCS and not frame.data:
-        return SYNCS[command.number], ""
+        return SYNCS[command.number][1], ""
     argument = command.argument
     return command.name, repr(argument) if isinstance(argument, bytes) else "" if argument is None else str(argument)
 
 
 def _packet(frame: Frame) -> tuple[str, str]:
     if frame.kind in SYNCS and not frame.data:
-        return SYNCS[frame.kind].split(" ", maxsplit=1)[0], "echo"
+        return SYNCS[frame.kind][0], "echo"
     packet = Identity.from_frame(frame) if frame.kind == 2 else read_packet(frame, Profile.P2OS)
     match packet:
         case Identity():
@@ -53,11 +54,11 @@ def _packet(frame: Frame) -> tuple[str, str]:
             echoes = " ".join(f"{echo.number}:{echo.raw_range}" for echo in packet.sonar)
             place = f"x {packet.raw_x} y {packet.raw_y} th {packet.raw_heading}"
             speeds = f"{packet.raw_left_velocity}/{packet.raw_right_velocity} mm/s"
-            return "SIP", f"{place}, {speeds}{stalls}, sonar {echoes}"
+            return packet_name(frame.kind), f"{place}, {speeds}{stalls}, sonar {echoes}"
         case ConfigPacket():
-            return "CONFIGpac", f"{packet.subclass}, watchdog {packet.watchdog} ms"
+            return packet_name(frame.kind), f"{packet.subclass}, watchdog {packet.watchdog} ms"
         case RawPacket():
-            return f"packet 0x{packet.kind:02X}", f"{len(packet.data)} bytes"
+            return packet_name(packet.kind), f"{len(packet.data)} bytes"
         case _:
             values = ((part.name, getattr(packet, part.name)) for part in fields(packet))
             return type(packet).__name__, ", ".join(f"{name} {value}" for name, value in values if value != b"")

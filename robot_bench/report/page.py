@@ -21,8 +21,6 @@ from robot_bench.report.plan import plan
 from robot_bench.report.thinning import ends, extremes, pulses
 from simbase.timing import NS_PER_S
 
-#: Speed of one motor step where a trace does not hold it: the adapter's default, m/s.
-DEFAULT_STEP_MPS = 0.0625
 #: chosen: of all rows of the page none makes it larger than 2 MB; what a list may take, in characters.
 LIST_BYTES, WIRE_BYTES = 120_000, 500_000
 #: What a row costs besides its text; a packet's name and meaning.
@@ -62,7 +60,6 @@ def page_data(record: RunRecord) -> Json:
     """Return what the page's script draws: seconds, metres, radians and m/s; of a long run as much as can be seen."""
     left_out: list[str] = []
     world = cast("Json", record.meta.get("world") or {})
-    step = float(cast("float", record.meta.get("step_mps") or DEFAULT_STEP_MPS))
     obstacles = [_obstacle(item) for item in cast("list[Json]", world.get("obstacles") or [])]
     changes, poses = _changes(record, left_out), _poses(record, left_out)
     hits = [(_seconds(hit.t), hit.x_m, hit.y_m, hit.what) for hit in record.contacts[:MOST_HITS]]
@@ -78,7 +75,7 @@ def page_data(record: RunRecord) -> Json:
         "changes": changes,
         "poses": poses,
         "sonar": _sonar(record, left_out),
-        "motors": [_motor(record, motor, step) for motor in (1, 2)],
+        "motors": [_motor(record, motor, record.step_mps) for motor in (1, 2)],
         "pins": _pins(record, left_out),
         "hits": hits,
         "events": _events(record, left_out),

@@ -1,6 +1,6 @@
 """A scenario's table, put together from the files that it names and from what a command line sets.
 
-    extends = "dodge"                  a scenario that ships, or a file: what it says holds where this file says nothing
+    extends = "base.toml"              a scenario that ships, or a file: what it says holds where this file says nothing
     include = ["posts.toml"]           files whose keys count as if they stood here
 
 Tables are merged key by key; this file's own value counts, then that of the last file named. Of lists of tables

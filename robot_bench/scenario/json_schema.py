@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from p2os.toml_schema import Key
 from robot_bench.events.codec import Json
 from robot_bench.scenario.goals.judging import COMMON
-from robot_bench.scenario.goals.kinds import KINDS
+from robot_bench.scenario.goals.kinds import every_kind
 from robot_bench.scenario.scenario import TABLES
 from robot_bench.scenario.several_robots import ROBOT
 from robot_bench.scenario.when_script import KEYS as WHEN_KEYS
@@ -63,7 +63,7 @@ def goals_schema() -> Json:
     """Return the schema of the `[[goal]]` tables."""
     goals = [
         table_schema((*(key for key in COMMON if key.name != "kind"), ROBOT, *kind.keys), kind=name)
-        for name, kind in KINDS.items()
+        for name, kind in every_kind().items()
     ]
     return {"type": "array", "items": {"oneOf": goals}}
 

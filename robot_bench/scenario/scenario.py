@@ -39,7 +39,6 @@ from robot_bench.events.selection import BUSES, bus_of
 from robot_bench.scenario import fault_script, plugged_parts, when_script, world_script
 from robot_bench.scenario.fault_script import FaultChange, load_faults
 from robot_bench.scenario.goals.judging import Goal, load_goal
-from robot_bench.scenario.goals.kinds import KINDS
 from robot_bench.scenario.included_files import KEYS as INCLUDING
 from robot_bench.scenario.included_files import (
     VERSION,
@@ -85,6 +84,7 @@ _TOP = (
     Key(name="outside", kind="text"),
     Key(name="sram", kind="text", choices=(ZEROS, RANDOM_SRAM)),
     Key(name="crystal_ppm", kind="whole", least=-1000, most=1000),
+    Key(name="gives_up_s", kind="number", above=0, most=LONGEST_S),
     Key(name="start", kind="table"),
     Key(name="direct", kind="table"),
     Key(name="adapter", kind="table"),
@@ -139,7 +139,7 @@ _IN_WORLD = (
     Key(name="duration_s", kind="number", above=0, most=LONGEST_S),
     Key(name="start", kind="table"),
 )
-#: Every table of a scenario file and its keys.
+#: Every table of a scenario file and its keys, but `[[goal]]`, whose keys are those of its kind (`every_kind`).
 TABLES: Mapping[str, tuple[Key, ...]] = {
     "": _TOP,
     "[start]": _START,
@@ -152,7 +152,6 @@ TABLES: Mapping[str, tuple[Key, ...]] = {
     "[[part]]": plugged_parts.KEYS,
     "[[fault]]": fault_script.KEYS,
     "[[when]]": tuple(key for key in when_script.KEYS if key not in world_script.KEYS),
-    **{f"[[goal]] {name}": kind.keys for name, kind in KINDS.items()},
 }
 
 
@@ -242,6 +241,9 @@ class Scenario:
     sram: str = ZEROS
     #: By how many millionths the 8 MHz crystal of the chip is too fast.
     crystal_ppm: int = 0
+    #: For so long its program may go on with what it does before it does something else; None is not known, and
+    #: `explain` takes what it holds for long. It changes nothing in the run.
+    gives_up_s: float | None = None
     #: None starts at the world's own place.
     start: Pose | None = None
     #: What a message calls the start: file, line and key.
@@ -548,6 +550,7 @@ def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | N
         outside=_outside(str(table.get("outside", "")), own_robot, where.at("outside")),
         sram=str(table.get("sram", ZEROS)),
         crystal_ppm=cast("int", table.get("crystal_ppm", 0)),
+        gives_up_s=cast("float | None", table.get("gives_up_s")),
         start=_start(table, where),
         start_at=str(within(where, "start")),
         direct=_direct(cast("Table", table.get("direct", {})), where),

@@ -5,7 +5,7 @@
 
     [[robot]]                          [[robot]]                        [[goal]]
     name = "scout"                     name = "post"                    robot = "scout"
-    firmware = "dodge.elf"             model = "p2dx"                   kind = "min_distance"
+    firmware = "mine.elf"              model = "p2dx"                   kind = "min_distance"
     x_m = -1.0                         (no firmware: it stands)         distance_m = 1.0
     y_m = 0.0
 
@@ -119,7 +119,7 @@ def split(table: Table, top: Sequence[Key], place: Place) -> list[RobotTable]:
     names = _names(robots, robot_keys(top), place)
     programmed = [name for name, robot in zip(names, robots, strict=True) if "firmware" in robot]
     if not programmed:
-        raise ScenarioError(f"{within(place, 'robot', 0)}: no robot has a firmware", hint='firmware = "dodge.elf"')
+        raise ScenarioError(f"{within(place, 'robot', 0)}: no robot has a firmware", hint='firmware = "mine.elf"')
     lists = {key: _by_robot(cast("Sequence[Table]", table.get(key, [])), key, programmed, place) for key in OF_ROBOTS}
     shared = {key: value for key, value in table.items() if key not in {"robot", "seeds", "sweep", *OF_ROBOTS}}
     found = []

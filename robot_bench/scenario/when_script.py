@@ -1,7 +1,7 @@
 """Something is done when something happens: the `[[when]]` tables of a scenario, and what carries them out.
 
     [[when]]                                  [[when]]
-    event = "usart1 sends dodge: CRUISE"      event = "robot near 2.0 1.0 0.3"
+    event = "usart1 sends ready"              event = "robot near 2.0 1.0 0.3"
     do = "place"                              do = "inject"
     name = "crate"                            fault = "sonar-dead 3"
     before_sonar = 4                          for_s = 2.0

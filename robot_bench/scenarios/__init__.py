@@ -1,1 +1,1 @@
-"""The scenarios that ship."""
+"""The scenarios that ship, and beside them the goals that know what one of their programs prints."""

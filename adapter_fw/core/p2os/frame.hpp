@@ -8,6 +8,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "commands.hpp"
+
 namespace p2os {
 
 constexpr std::uint8_t HEADER_0 = 0xFA;
@@ -28,24 +30,6 @@ struct Bytes {
 
   constexpr std::uint8_t operator[](std::size_t place) const { return data[place]; }
   constexpr Bytes from(std::size_t place) const { return {data + place, size - place}; }
-};
-
-//: Every command that the adapter and the small client send.
-enum class CommandNumber : std::uint8_t {
-  PULSE = 0,  // SYNC0 before the session is open
-  OPEN = 1,   // SYNC1
-  CLOSE = 2,  // SYNC2
-  ENABLE = 4,
-  SETO = 7,
-  MOVE = 8,
-  VEL = 11,
-  HEAD = 12,
-  DHEAD = 13,
-  CONFIG = 18,
-  RVEL = 21,
-  SONAR = 28,
-  STOP = 29,
-  ESTOP = 55,
 };
 
 //: A command's frame: at most a number, a type byte and 16 bits.

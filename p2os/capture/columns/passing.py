@@ -16,8 +16,9 @@ import numpy.typing as npt
 from p2os.capture.chunks import LETTERS, Block, Direction
 from p2os.capture.columns.framing import Bytes, Indexes, find_frames
 from p2os.capture.describe import command_name
-from p2os.capture.listing import COMMAND_NAMES, SYNC_NAMES, Finder, Lister, ListingRow, LoopFinder
+from p2os.capture.listing import COMMAND_NAMES, Finder, Lister, ListingRow, LoopFinder
 from p2os.capture.reading import FollowedReading, Reading
+from p2os.protocol.command_table import SYNC_NAMES
 from p2os.protocol.commands import CommandNumber
 from p2os.protocol.frames import CHECKSUM_BYTES, GIVE_UP_NS, PREFIX_BYTES
 from p2os.protocol.packets import IDENTITY_KIND, RESET_KINDS, packet_name

@@ -8,22 +8,7 @@ from construct import Construct, Struct
 from p2os.capture.columns.gathering import gather
 from p2os.capture.columns.walker import Spans, Walk
 from p2os.protocol.config_packet import FIELDS, ConfigPacket
-from p2os.protocol.packets import (
-    ArmInfoPacket,
-    ArmPacket,
-    BatteryPacket,
-    CompassPacket,
-    EncoderPacket,
-    GripperPacket,
-    GyroPacket,
-    IoPacket,
-    JoystickPacket,
-    MapChangedPacket,
-    PlaylistPacket,
-    SiminfoPacket,
-    SimLaserPacket,
-    SimstatPacket,
-)
+from p2os.protocol.packets import PACKET_KINDS, BatteryPacket, CompassPacket, PlaylistPacket, SiminfoPacket
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import HEAD, TAIL
 
@@ -153,28 +138,17 @@ def read_siminfo(walk: Walk, profile: Profile) -> None:
     take_rest(walk)
 
 
-#: Name of a table → how its packets are read.
+#: Name of a table → how its packets are read: by their layout, where it is not said otherwise.
 READERS: Mapping[str, Reader] = {
+    **{row.table: by_layout(row.layout) for row in PACKET_KINDS if row.layout is not None},
     "sip": read_sip,
     "identity": read_identity,
     "config": read_config,
-    "encoder": by_layout(EncoderPacket.LAYOUT),
-    "gyro": by_layout(GyroPacket.LAYOUT),
-    "compass": by_layout(CompassPacket.LAYOUT),
     "compass_unsized": by_layout(CompassPacket.READING),
-    "io": by_layout(IoPacket.LAYOUT),
     "seraux": read_bytes,
-    "gripper": by_layout(GripperPacket.LAYOUT),
-    "joystick": by_layout(JoystickPacket.LAYOUT),
     "playlist": read_playlist,
-    "arm": by_layout(ArmPacket.LAYOUT),
-    "arm_info": by_layout(ArmInfoPacket.LAYOUT),
     "battery": by_layout(BatteryPacket.LAYOUT, keep="count"),
     "reset": read_bytes,
-    "simstat": by_layout(SimstatPacket.LAYOUT),
     "siminfo": read_siminfo,
-    "sim_laser": by_layout(SimLaserPacket.LAYOUT),
-    "sim_laser_extended": by_layout(SimLaserPacket.EXTENDED_LAYOUT),
-    "map_changed": by_layout(MapChangedPacket.LAYOUT),
     "raw": read_bytes,
 }

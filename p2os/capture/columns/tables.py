@@ -18,51 +18,13 @@ from p2os.capture.columns.framing import Damage, Indexes, damage_of, find_frames
 from p2os.capture.columns.readers import READERS
 from p2os.capture.columns.table import Table
 from p2os.capture.columns.walker import Walk
-from p2os.protocol.config_packet import CONFIG_KIND
-from p2os.protocol.packets import (
-    ArmInfoPacket,
-    ArmPacket,
-    BatteryPacket,
-    CompassPacket,
-    EncoderPacket,
-    GripperPacket,
-    GyroPacket,
-    IoPacket,
-    JoystickPacket,
-    MapChangedPacket,
-    PlaylistPacket,
-    ResetNotice,
-    SerauxPacket,
-    SiminfoPacket,
-    SimLaserPacket,
-    SimstatPacket,
-)
-from p2os.protocol.packets.registry import IDENTITY_KIND
+from p2os.protocol.packets import PACKET_KINDS, CompassPacket
 from p2os.protocol.profiles import Profile
-from p2os.protocol.sip import SIP_KINDS
 
 #: Table → the packet types that go into it.
 KINDS = {
-    "sip": SIP_KINDS,
-    "identity": (IDENTITY_KIND,),
-    "config": (CONFIG_KIND,),
-    "encoder": (EncoderPacket.KIND,),
-    "gyro": (GyroPacket.KIND,),
-    "compass": (CompassPacket.KIND,),
-    "io": (IoPacket.KIND,),
-    "seraux": tuple(SerauxPacket.KINDS.values()),
-    "gripper": (GripperPacket.KIND,),
-    "joystick": (JoystickPacket.KIND,),
-    "playlist": (PlaylistPacket.KIND,),
-    "arm": (ArmPacket.KIND,),
-    "arm_info": (ArmInfoPacket.KIND,),
-    "battery": (BatteryPacket.KIND,),
-    "reset": ResetNotice.KINDS,
-    "simstat": (SimstatPacket.KIND,),
-    "siminfo": (SiminfoPacket.KIND,),
-    "sim_laser": SimLaserPacket.KINDS[:1],
-    "sim_laser_extended": SimLaserPacket.KINDS[1:],
-    "map_changed": (MapChangedPacket.KIND,),
+    table: tuple(row.kind for row in PACKET_KINDS if row.table == table)
+    for table in dict.fromkeys(row.table for row in PACKET_KINDS if row.table)
 }
 _NAMES = [*KINDS, "raw"]
 _RAW = len(_NAMES) - 1

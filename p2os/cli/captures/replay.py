@@ -17,7 +17,7 @@ from p2os.cli.names import urls
 from p2os.cli.quantities import option
 from p2os.client import ClientSettings
 from p2os.errors import RemoteProtocolError, RunFailedError, TransportError
-from p2os.protocol.commands import CommandNumber
+from p2os.protocol.command_table import MOTION_COMMANDS
 from p2os.transport import listen_url, open_url
 from p2os.transport.ports import HungUpError, Listener, RefusedPeerError, Transport
 from p2os.transport.waiting import LONGEST_WAIT_NS, wait_for_line, wait_readable
@@ -48,11 +48,6 @@ ANSWER_TIMEOUT_NS: Nanos = 3 * NS_PER_S
 SILENCE_NS: Nanos = ClientSettings().liveness_ns
 #: Speeds that are refused are mistakes.
 SLOWEST, FASTEST = 0.01, 100.0
-#: Commands that move a robot whose motors are on.
-MOTION = frozenset({
-    CommandNumber.MOVE, CommandNumber.ROTATE, CommandNumber.VEL, CommandNumber.HEAD, CommandNumber.DHEAD,
-    CommandNumber.RVEL, CommandNumber.DCHEAD, CommandNumber.VEL2, CommandNumber.LATVEL,
-})  # fmt: skip
 
 
 class Side(Enum):
@@ -118,7 +113,7 @@ def play(
 def motions_of(capture: Capture) -> int:
     """Return how many commands of a capture move a robot."""
     pieces = (piece for piece in frame_chunks(capture.chunks) if piece.direction is Direction.TO_ROBOT)
-    return sum(piece.frame is not None and piece.frame.kind in MOTION for piece in pieces)
+    return sum(piece.frame is not None and piece.frame.kind in MOTION_COMMANDS for piece in pieces)
 
 
 def register(app: typer.Typer) -> None:

@@ -36,11 +36,11 @@ from p2os.client.notices import (
 )
 from p2os.pioneer.devices.laser import read_laser
 from p2os.protocol.times import CYCLE_NS
+from p2os.robots.motor_step import STEP_MPS
 from p2os.robots.parameters import load_parameters
 from p2os.ros.codec import Message
 from p2os.ros.frames import Frames
 from p2os.ros.robot_node import Asked, Motors, Refused, ResetOdometry, RobotNode, Speed, Stop
-from p2os.ros.thesis_topics import STEP_MPS
 from p2os.ros.transport import DOMAIN, LOOPBACK, MOST_DOMAIN, NodeOptions, Topic, Transport
 from p2os.ros.transports import TRANSPORTS, open_transport
 from p2os.ros.urdf import urdf_text

@@ -25,7 +25,7 @@ from p2os.pioneer.controller.packet_requests import Extra
 from p2os.pioneer.devices.heading_sensors import CompassMode
 from p2os.pioneer.devices.laser import EXTENDED
 from p2os.protocol.bauds import BAUDS
-from p2os.protocol.command_table import BY_NUMBER
+from p2os.protocol.command_table import BY_NUMBER, MOTION_COMMANDS
 from p2os.protocol.commands import Command, CommandNumber
 from p2os.protocol.profiles import Profile
 from simbase.timing import NS_PER_MS, Nanos
@@ -38,8 +38,6 @@ _C = CommandNumber
 SAY_UNIT_MS = 20
 #: Least and most of SONARCYCLE, ms (H8 manual).
 SONAR_CYCLE_MS = (2, 120)
-#: What moves the robot, once its motors are on.
-MOTION_COMMANDS = frozenset({_C.MOVE, _C.ROTATE, _C.VEL, _C.HEAD, _C.DHEAD, _C.RVEL, _C.DCHEAD, _C.VEL2})
 #: Working gains and calibrations: reported by CONFIG, without effect here.
 KEPT = {
     _C.ROTKP: "rotkp", _C.ROTKV: "rotkv", _C.ROTKI: "rotki", _C.TRANSKP: "transkp", _C.TRANSKV: "transkv",

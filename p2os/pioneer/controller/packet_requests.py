@@ -9,28 +9,44 @@ slow. One that was asked for once waits for a cycle with room.
 from dataclasses import dataclass
 from enum import Enum
 
+from p2os.protocol.packets import (
+    ArmInfoPacket,
+    ArmPacket,
+    BatteryPacket,
+    CompassPacket,
+    EncoderPacket,
+    GripperPacket,
+    GyroPacket,
+    IoPacket,
+    JoystickPacket,
+    PlaylistPacket,
+    SerauxPacket,
+    SiminfoPacket,
+    SimLaserPacket,
+    SimstatPacket,
+)
 from p2os.protocol.profiles import Profile
 
 
 class Extra(Enum):
-    """A packet that goes out beside the standard one, in the order in which they go."""
+    """A packet that goes out beside the standard one, in the order in which they go: its packet type."""
 
-    GYRO = "GYROpac"
-    JOYSTICK = "JOYSTICKpac"
-    IO = "IOpac"
-    ENCODER = "ENCODERpac"
-    GRIPPER = "GRIPPERpac"
-    COMPASS = "TCM2pac"
-    AUX1 = "SERAUXpac"
-    AUX2 = "SERAUX2pac"
-    AUX3 = "SERAUX3pac"
-    PLAYLIST = "PLAYLISTpac"
-    ARM = "ARMpac"
-    ARM_INFO = "ARMINFOpac"
-    BATTERY = "BATTERYpac"
-    SIMSTAT = "SIMSTAT"
-    SIMINFO = "SIMINFO"
-    LASER = "SIMLASER"
+    GYRO = GyroPacket.KIND
+    JOYSTICK = JoystickPacket.KIND
+    IO = IoPacket.KIND
+    ENCODER = EncoderPacket.KIND
+    GRIPPER = GripperPacket.KIND
+    COMPASS = CompassPacket.KIND
+    AUX1 = SerauxPacket.KINDS[1]
+    AUX2 = SerauxPacket.KINDS[2]
+    AUX3 = SerauxPacket.KINDS[3]
+    PLAYLIST = PlaylistPacket.KIND
+    ARM = ArmPacket.KIND
+    ARM_INFO = ArmInfoPacket.KIND
+    BATTERY = BatteryPacket.KIND
+    SIMSTAT = SimstatPacket.KIND
+    SIMINFO = SiminfoPacket.KIND
+    LASER = SimLaserPacket.KINDS[0]
 
 
 #: What ARCOS sends before the standard packet.

@@ -21,9 +21,11 @@ from p2os.protocol.packets.devices import (
 )
 from p2os.protocol.packets.registry import (
     IDENTITY_KIND,
+    PACKET_KINDS,
     PACKET_NAMES,
     READERS,
     Identity,
+    PacketKind,
     PlainPacket,
     RawPacket,
     ServerPacket,
@@ -40,6 +42,7 @@ RESET_KINDS = ResetNotice.KINDS
 
 __all__ = [
     "IDENTITY_KIND",
+    "PACKET_KINDS",
     "PACKET_NAMES",
     "READERS",
     "RESET_KINDS",
@@ -58,6 +61,7 @@ __all__ = [
     "IoPacket",
     "JoystickPacket",
     "MapChangedPacket",
+    "PacketKind",
     "PlainPacket",
     "PlaylistPacket",
     "RawPacket",

@@ -12,6 +12,7 @@ from typing import ClassVar
 from construct import Array, Bytes, Construct, Int8ul, Int16ul, Int32ul, Struct, this
 
 from p2os.errors import LocalProtocolError, RemoteProtocolError
+from p2os.protocol.fields import part
 from p2os.protocol.frames import Frame
 from p2os.protocol.packets.layout import TEXT, LaidOutPacket, build, parse
 
@@ -25,8 +26,9 @@ class SerauxPacket:
         data: 0 to 201 bytes.
     """
 
-    #: Packet type of each port.
-    KINDS: ClassVar[dict[int, int]] = {1: 0xB0, 2: 0xB8, 3: 0xC8}
+    #: Packet type of each port, and its name.
+    KINDS: ClassVar[Mapping[int, int]] = {1: 0xB0, 2: 0xB8, 3: 0xC8}
+    NAMES: ClassVar[Mapping[int, str]] = {0xB0: "SERAUXpac", 0xB8: "SERAUX2pac", 0xC8: "SERAUX3pac"}
 
     port: int = 1
     data: bytes = b""
@@ -68,6 +70,11 @@ class GripperState(IntFlag):
     GRIPPER_MOVING = 1 << 7
 
 
+_STATE_BITS = "bits: " + ", ".join(
+    f"{bit.value.bit_length() - 1} {(bit.name or '').lower().replace('_', ' ')}" for bit in GripperState
+)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GripperPacket(LaidOutPacket):
     """GRIPPERpac: what kind of gripper there is and what it does.
@@ -78,8 +85,13 @@ class GripperPacket(LaidOutPacket):
         grasp_time: In the robot's own units.
     """
 
+    NAME: ClassVar[str] = "GRIPPERpac"
     KIND: ClassVar[int] = 0xE0
-    LAYOUT: ClassVar[Construct] = Struct("gripper_type" / Int8ul, "state" / Int8ul, "grasp_time" / Int8ul)
+    LAYOUT: ClassVar[Construct] = Struct(
+        part("gripper_type", Int8ul, "0 none, 1 on the user I/O, 2 on the general I/O"),
+        part("state", Int8ul, _STATE_BITS),
+        part("grasp_time", Int8ul, "in the robot's own units"),
+    )
 
     gripper_type: int = 0
     state: int = 0
@@ -100,9 +112,14 @@ class JoystickPacket(LaidOutPacket):
     Axes and throttle are 0 to 1023, 512 in the middle. ARIA turns the sign of x.
     """
 
+    NAME: ClassVar[str] = "JOYSTICKpac"
     KIND: ClassVar[int] = 0xF8
     LAYOUT: ClassVar[Construct] = Struct(
-        "button1" / Int8ul, "button2" / Int8ul, "raw_x" / Int16ul, "raw_y" / Int16ul, "raw_throttle" / Int16ul
+        part("button1", Int8ul, "1 pressed"),
+        part("button2", Int8ul, "1 pressed"),
+        part("raw_x", Int16ul, "0 to 1023, 512 in the middle"),
+        part("raw_y", Int16ul, "as x"),
+        part("raw_throttle", Int16ul, "0 to 1023"),
     )
 
     button1: int = 0
@@ -142,9 +159,14 @@ class Sound:
 class PlaylistPacket:
     """PLAYLISTpac: one sound of an AmigoBot, or None from a robot that has no sounds (25 NUL bytes)."""
 
+    NAME: ClassVar[str] = "PLAYLISTpac"
     KIND: ClassVar[int] = 0xD0
     LAYOUT: ClassVar[Construct] = Struct(
-        "number" / Int8ul, "toggle" / Int8ul, "raw_name" / Bytes(16), "offset" / Int32ul, "length" / Int32ul
+        part("number", Int8ul, "what SOUND plays it by"),
+        part("toggle", Int8ul, "as the robot says it"),
+        part("raw_name", Bytes(16), "NUL at the end unless all are used; `~` marks a group"),
+        part("offset", Int32ul, "in the robot's memory"),
+        part("length", Int32ul, "bytes"),
     )
     #: What AROS sends when there are no sounds (Pioneer 2/3 H8 manual).
     NO_SOUNDS: ClassVar[bytes] = bytes(25)
@@ -187,8 +209,13 @@ class ArmPacket(LaidOutPacket):
         positions: Six joints, 0 to 255 in the servo's counts.
     """
 
+    NAME: ClassVar[str] = "ARMpac"
     KIND: ClassVar[int] = 0xA0
-    LAYOUT: ClassVar[Construct] = Struct("status" / Int8ul, "moving" / Int8ul, "positions" / Array(6, Int8ul))
+    LAYOUT: ClassVar[Construct] = Struct(
+        part("status", Int8ul, "bit 0 power, bit 1 connected"),
+        part("moving", Int8ul, "a bit a joint, joint 1 in bit 0"),
+        part("positions", Array(6, Int8ul), "servo counts of joints 1 to 6"),
+    )
 
     status: int = 0
     moving: int = 0
@@ -214,13 +241,18 @@ class ArmJoint:
 class ArmInfoPacket(LaidOutPacket):
     """ARMINFOpac: the arm's firmware and what each joint can do."""
 
+    NAME: ClassVar[str] = "ARMINFOpac"
     KIND: ClassVar[int] = 0xA1
     COUNTS: ClassVar[Mapping[str, str]] = {"count": "joints"}
     LAYOUT: ClassVar[Construct] = Struct(
-        "raw_version" / TEXT,
-        "count" / Int8ul,
-        "joints" / Array(this.count, Struct(*(name / Int8ul for name in ArmJoint.__dataclass_fields__))),
-    )
+        part("raw_version", TEXT, "the arm's firmware"),
+        part("count", Int8ul, "joints that follow"),
+        part("joints", Array(this.count, Struct(
+            part("speed", Int8ul, "set speed"), part("home", Int8ul, "position"), part("least", Int8ul, "position"),
+            part("centre", Int8ul, "position"), part("most", Int8ul, "position"),
+            part("ticks_per_90", Int8ul, "counts of 90°"),
+        ))),
+    )  # fmt: skip
     ITEM: ClassVar[type] = ArmJoint
 
     raw_version: bytes = b""
@@ -242,12 +274,17 @@ class BatteryPacket(LaidOutPacket):
     of charge in percent; firmware may send fewer or more.
     """
 
+    NAME: ClassVar[str] = "BATTERYpac"
     KIND: ClassVar[int] = 0xFA
     COUNTS: ClassVar[Mapping[str, str]] = {"count": "batteries"}
     LAYOUT: ClassVar[Construct] = Struct(
-        "count" / Int8ul,
-        "row_bytes" / Int8ul,
-        "batteries" / Array(this.count, Array(this.row_bytes, Int8ul)),
+        part("count", Int8ul, "batteries"),
+        part("row_bytes", Int8ul, "bytes of each"),
+        part(
+            "batteries",
+            Array(this.count, Array(this.row_bytes, Int8ul)),
+            "flags 1, 2, 3, relative and absolute charge in percent, where there are five",
+        ),
     )
 
     batteries: tuple[tuple[int, ...], ...] = ()

@@ -57,6 +57,8 @@ def build(kind: int, layout: Construct, fields: Fields) -> Frame:
 class LaidOutPacket:
     """A packet whose fields are those of its layout, by the same names."""
 
+    #: In the manuals.
+    NAME: ClassVar[str]
     KIND: ClassVar[int]
     LAYOUT: ClassVar[Construct]
     #: Fields that say how many rows a list has, and the list.

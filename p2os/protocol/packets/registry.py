@@ -11,10 +11,15 @@ has a name here and comes through raw.
 Invariant: `packet_frame(read_packet(frame, profile), profile) == frame` for every frame.
 """
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import ClassVar, Protocol
+
+from construct import Construct
 
 from p2os.errors import RemoteProtocolError
+from p2os.protocol.command_table import SYNC_NAMES
 from p2os.protocol.config_packet import CONFIG_KIND, ConfigPacket
 from p2os.protocol.frames import Frame
 from p2os.protocol.packets.devices import (
@@ -103,37 +108,87 @@ PlainPacket = (
 )
 ServerPacket = StandardSip | Identity | PlainPacket | RawPacket
 
+
+class Declared(Protocol):
+    """A packet that one class says: its name, its type, its fields, and how it is read."""
+
+    NAME: ClassVar[str]
+    KIND: ClassVar[int]
+    LAYOUT: ClassVar[Construct]
+
+    @classmethod
+    def from_frame(cls, frame: Frame) -> PlainPacket:
+        """Read the packet."""
+
+
+@dataclass(frozen=True, slots=True)
+class PacketKind:
+    """A type of packet.
+
+    Args:
+        kind: Packet type, 0 to 255.
+        name: Its name in the manuals.
+        read: How it is read; None: it comes through raw, or stands apart (the SIP, the identity).
+        layout: Its fields, each with what it means; None where it is no layout of fixed fields.
+        table: What a table of such packets is called; empty where it comes through raw.
+    """
+
+    kind: int
+    name: str
+    read: Callable[[Frame], PlainPacket] | None = None
+    layout: Construct | None = None
+    table: str = ""
+
+
+def _of(packet: type[Declared]) -> PacketKind:
+    table = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", packet.__name__.removesuffix("Packet")).lower()
+    return PacketKind(packet.KIND, packet.NAME, packet.from_frame, packet.LAYOUT, table)
+
+
+#: Every type that has a name.
+PACKET_KINDS = (
+    PacketKind(0x00, SYNC_NAMES[0]),
+    PacketKind(0x01, SYNC_NAMES[1]),
+    PacketKind(IDENTITY_KIND, "IDENTITY", table="identity"),
+    PacketKind(CONFIG_KIND, "CONFIGpac", ConfigPacket.from_frame, table="config"),
+    *(PacketKind(kind, "SIP", table="sip") for kind in SIP_KINDS),
+    PacketKind(SimLaserPacket.KINDS[0], "SIMLASER", SimLaserPacket.from_frame, SimLaserPacket.LAYOUT, "sim_laser"),
+    PacketKind(
+        SimLaserPacket.KINDS[1],
+        "SIMLASER2",
+        SimLaserPacket.from_frame,
+        SimLaserPacket.EXTENDED_LAYOUT,
+        "sim_laser_extended",
+    ),
+    _of(SimstatPacket),
+    _of(SiminfoPacket),
+    _of(MapChangedPacket),
+    PacketKind(0x7B, "ACCELpac"),
+    PacketKind(0x7C, "TORQUEpac"),
+    _of(EncoderPacket),
+    PacketKind(0x95, "HEADINGpac"),
+    _of(GyroPacket),
+    PacketKind(0x9A, "IMUpac"),
+    _of(ArmPacket),
+    _of(ArmInfoPacket),
+    *(PacketKind(kind, name, SerauxPacket.from_frame, table="seraux") for kind, name in SerauxPacket.NAMES.items()),
+    _of(CompassPacket),
+    _of(PlaylistPacket),
+    PacketKind(0xD3, "MARCDEBUG"),
+    PacketKind(0xD5, "MAXLIMITS"),
+    PacketKind(0xDA, "WHEELINFO"),
+    _of(GripperPacket),
+    _of(IoPacket),
+    _of(JoystickPacket),
+    _of(BatteryPacket),
+    *(PacketKind(kind, "RESET", ResetNotice.from_frame, table="reset") for kind in ResetNotice.KINDS),
+)
 #: Packet type → how it is read; the SIP and the identity stand apart.
 READERS: Mapping[int, Callable[[Frame], PlainPacket]] = {
-    CONFIG_KIND: ConfigPacket.from_frame,
-    **dict.fromkeys(SimLaserPacket.KINDS, SimLaserPacket.from_frame),
-    SimstatPacket.KIND: SimstatPacket.from_frame,
-    SiminfoPacket.KIND: SiminfoPacket.from_frame,
-    MapChangedPacket.KIND: MapChangedPacket.from_frame,
-    EncoderPacket.KIND: EncoderPacket.from_frame,
-    GyroPacket.KIND: GyroPacket.from_frame,
-    ArmPacket.KIND: ArmPacket.from_frame,
-    ArmInfoPacket.KIND: ArmInfoPacket.from_frame,
-    **dict.fromkeys(SerauxPacket.KINDS.values(), SerauxPacket.from_frame),
-    CompassPacket.KIND: CompassPacket.from_frame,
-    PlaylistPacket.KIND: PlaylistPacket.from_frame,
-    GripperPacket.KIND: GripperPacket.from_frame,
-    IoPacket.KIND: IoPacket.from_frame,
-    JoystickPacket.KIND: JoystickPacket.from_frame,
-    BatteryPacket.KIND: BatteryPacket.from_frame,
-    **dict.fromkeys(ResetNotice.KINDS, ResetNotice.from_frame),
+    row.kind: row.read for row in PACKET_KINDS if row.read is not None
 }
-
 #: Packet type → its name in the manuals.
-PACKET_NAMES: Mapping[int, str] = {
-    0x00: "SYNC0", 0x01: "SYNC1", IDENTITY_KIND: "IDENTITY", CONFIG_KIND: "CONFIGpac",
-    **dict.fromkeys(SIP_KINDS, "SIP"),
-    0x60: "SIMLASER", 0x61: "SIMLASER2", 0x62: "SIMSTAT", 0x63: "SIMINFO", 0x66: "SIMMAPCHANGED",
-    0x7B: "ACCELpac", 0x7C: "TORQUEpac", 0x90: "ENCODERpac", 0x95: "HEADINGpac", 0x98: "GYROpac", 0x9A: "IMUpac",
-    0xA0: "ARMpac", 0xA1: "ARMINFOpac", 0xB0: "SERAUXpac", 0xB8: "SERAUX2pac", 0xC0: "TCM2pac", 0xC8: "SERAUX3pac",
-    0xD0: "PLAYLISTpac", 0xD3: "MARCDEBUG", 0xD5: "MAXLIMITS", 0xDA: "WHEELINFO", 0xE0: "GRIPPERpac",
-    0xF0: "IOpac", 0xF8: "JOYSTICKpac", 0xFA: "BATTERYpac", 0xFE: "RESET", 0xFF: "RESET",
-}  # fmt: skip
+PACKET_NAMES: Mapping[int, str] = {row.kind: row.name for row in PACKET_KINDS}
 
 
 def packet_name(kind: int) -> str:

@@ -11,6 +11,7 @@ from typing import ClassVar
 
 from construct import Array, Construct, Int8ul, Int16sl, Int16ul, Int32sl, Struct, this
 
+from p2os.protocol.fields import part
 from p2os.protocol.frames import Frame
 from p2os.protocol.packets.layout import LaidOutPacket, build, parse
 
@@ -26,8 +27,12 @@ GYRO_DEG_S_PER_COUNT = 5 / 1023 * 300 / 2.5
 class EncoderPacket(LaidOutPacket):
     """ENCODERpac: both wheels' encoder counts since the robot was switched on, signed 32 bits."""
 
+    NAME: ClassVar[str] = "ENCODERpac"
     KIND: ClassVar[int] = 0x90
-    LAYOUT: ClassVar[Construct] = Struct("left_counts" / Int32sl, "right_counts" / Int32sl)
+    LAYOUT: ClassVar[Construct] = Struct(
+        part("left_counts", Int32sl, "left wheel's encoder since power-on"),
+        part("right_counts", Int32sl, "right wheel's"),
+    )
 
     left_counts: int
     right_counts: int
@@ -61,11 +66,21 @@ class GyroReading:
 class GyroPacket(LaidOutPacket):
     """GYROpac: the readings since the last packet, oldest first; ARCOS sends it just before the SIP."""
 
+    NAME: ClassVar[str] = "GYROpac"
     KIND: ClassVar[int] = 0x98
     COUNTS: ClassVar[Mapping[str, str]] = {"count": "readings"}
     LAYOUT: ClassVar[Construct] = Struct(
-        "count" / Int8ul,
-        "readings" / Array(this.count, Struct("raw_rate" / Int16ul, "raw_temperature" / Int8ul)),
+        part("count", Int8ul, "readings that follow, 25 ms apart, oldest first"),
+        part(
+            "readings",
+            Array(
+                this.count,
+                Struct(
+                    part("raw_rate", Int16ul, "0 to 1023, about 512 at rest, less is counter-clockwise"),
+                    part("raw_temperature", Int8ul, "uncalibrated"),
+                ),
+            ),
+        ),
     )
     ITEM: ClassVar[type] = GyroReading
 
@@ -83,13 +98,30 @@ class CompassPacket:
     `raw_size` is None when a packet comes without it.
     """
 
+    NAME: ClassVar[str] = "TCM2pac"
     KIND: ClassVar[int] = 0xC0
     READING: ClassVar[Construct] = Struct(
-        "raw_compass" / Int16ul, "raw_pitch" / Int16sl, "raw_roll" / Int16sl,
-        "raw_x" / Int16sl, "raw_y" / Int16sl, "raw_z" / Int16sl, "raw_temperature" / Int16sl,
-        "error_bits" / Int16ul, "h_score" / Int8ul, "v_score" / Int8ul, "raw_m_score" / Int16ul,
-    )  # fmt: skip
-    LAYOUT: ClassVar[Construct] = Struct("raw_size" / Int8ul, *READING.subcons)
+        part("raw_compass", Int16ul, "0.1°"),
+        part("raw_pitch", Int16sl, "0.1°"),
+        part("raw_roll", Int16sl, "0.1°"),
+        part("raw_x", Int16sl, "0.01 µT"),
+        part("raw_y", Int16sl, "0.01 µT"),
+        part("raw_z", Int16sl, "0.01 µT"),
+        part("raw_temperature", Int16sl, "0.1 °C"),
+        part("error_bits", Int16ul, "bits"),
+        part("h_score", Int8ul, "of a calibration"),
+        part("v_score", Int8ul, "of a calibration"),
+        part("raw_m_score", Int16ul, "of a calibration, 0.01"),
+    )
+    LAYOUT: ClassVar[Construct] = Struct(
+        part(
+            "raw_size",
+            Int8ul,
+            "23 in the manual, which counts more than follows; not seen on a wire, so a packet of 20 bytes "
+            "is read without it",
+        ),
+        *READING.subcons,
+    )
     #: Bytes of a reading without its size byte.
     READING_BYTES: ClassVar[int] = 20
 
@@ -163,6 +195,7 @@ class IoPacket(LaidOutPacket):
     values, the battery last. Bumpers are raw here: low is pressed.
     """
 
+    NAME: ClassVar[str] = "IOpac"
     KIND: ClassVar[int] = 0xF0
     COUNTS: ClassVar[Mapping[str, str]] = {
         "input_count": "digital_in",
@@ -170,12 +203,16 @@ class IoPacket(LaidOutPacket):
         "analog_count": "raw_analog",
     }
     LAYOUT: ClassVar[Construct] = Struct(
-        "input_count" / Int8ul,
-        "digital_in" / Array(this.input_count, Int8ul),
-        "output_count" / Int8ul,
-        "digital_out" / Array(this.output_count, Int8ul),
-        "analog_count" / Int8ul,
-        "raw_analog" / Array(this.analog_count, Int16ul),
+        part("input_count", Int8ul, "4 on ARCOS"),
+        part(
+            "digital_in",
+            Array(this.input_count, Int8ul),
+            "DIGIN, front bumpers, rear bumpers, infra-red (order not seen on a wire); bumpers raw, low is pressed",
+        ),
+        part("output_count", Int8ul, "1 on ARCOS"),
+        part("digital_out", Array(this.output_count, Int8ul), "as in the SIP"),
+        part("analog_count", Int8ul, "9 on ARCOS"),
+        part("raw_analog", Array(this.analog_count, Int16ul), "0 to 1023 for 0 to 5 V; the last is the battery"),
     )
 
     digital_in: tuple[int, ...] = ()

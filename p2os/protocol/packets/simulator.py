@@ -22,6 +22,7 @@ from construct import (
 )
 
 from p2os.errors import LocalProtocolError
+from p2os.protocol.fields import part
 from p2os.protocol.frames import Frame
 from p2os.protocol.packets.layout import TEXT, LaidOutPacket, build, parse
 
@@ -35,14 +36,27 @@ class SimstatPacket(LaidOutPacket):
     is 100 times the dilution of precision, 0 for a bad fix, -1 for none.
     """
 
+    NAME: ClassVar[str] = "SIMSTAT"
     KIND: ClassVar[int] = 0x62
     LAYOUT: ClassVar[Construct] = Struct(
-        "raw_name" / TEXT, "raw_version" / TEXT, "flags" / Int32ul,
-        "wanted_interval_ms" / Int16ul, "real_interval_ms" / Int16ul, "last_interval_ms" / Int16ul,
-        "x_mm" / Int32sl, "y_mm" / Int32sl, "z_mm" / Int32sl, "heading_deg" / Int32sl,
-        "raw_latitude" / Int32sl, "raw_longitude" / Int32sl, "altitude_cm" / Int32sl, "raw_precision" / Int32sl,
-        "raw_error_x" / Int32sl, "raw_error_y" / Int32sl, "raw_error_heading" / Int32sl,
-    )  # fmt: skip
+        part("raw_name", TEXT, "of the simulator"),
+        part("raw_version", TEXT, "of it"),
+        part("flags", Int32ul, "bit 1 the map has a geographic origin, bit 2 the odometry has errors"),
+        part("wanted_interval_ms", Int16ul, "ms"),
+        part("real_interval_ms", Int16ul, "ms"),
+        part("last_interval_ms", Int16ul, "ms"),
+        part("x_mm", Int32sl, "true position"),
+        part("y_mm", Int32sl, "true position"),
+        part("z_mm", Int32sl, "true position"),
+        part("heading_deg", Int32sl, "true heading"),
+        part("raw_latitude", Int32sl, "1e-7°"),
+        part("raw_longitude", Int32sl, "1e-7°"),
+        part("altitude_cm", Int32sl, "cm"),
+        part("raw_precision", Int32sl, "100 times the dilution of precision; 0 a bad fix, −1 none"),
+        part("raw_error_x", Int32sl, "1e-7"),
+        part("raw_error_y", Int32sl, "1e-7"),
+        part("raw_error_heading", Int32sl, "1e-7"),
+    )
     #: Bits of `flags`: the map has a geographic origin; the odometry has an error of its own.
     HAS_GEOGRAPHIC_ORIGIN: ClassVar[int] = 1 << 1
     HAS_ODOMETRY_ERROR: ClassVar[int] = 1 << 2
@@ -87,17 +101,27 @@ class SiminfoPacket(LaidOutPacket):
         devices: In its own order.
     """
 
+    NAME: ClassVar[str] = "SIMINFO"
     KIND: ClassVar[int] = 0x63
     COUNTS: ClassVar[Mapping[str, str]] = {"count": "devices"}
     LAYOUT: ClassVar[Construct] = Struct(
-        "raw_name" / TEXT,
-        "raw_version" / TEXT,
-        "flags" / Int32ul,
-        "count" / Int32ul,
-        "devices" / Array(
-            this.count, Struct("raw_name" / TEXT, "raw_type" / TEXT, "number" / Int8ul, "status" / Int32ul)
+        part("raw_name", TEXT, "of the simulator or device"),
+        part("raw_version", TEXT, "of it"),
+        part("flags", Int32ul, "bit 0 it has a window, bit 1 it was restarted after a crash"),
+        part("count", Int32ul, "devices that follow"),
+        part(
+            "devices",
+            Array(
+                this.count,
+                Struct(
+                    part("raw_name", TEXT, "of the simulator or device"),
+                    part("raw_type", TEXT, "of the device"),
+                    part("number", Int8ul, "of its type"),
+                    part("status", Int32ul, "as the simulator says it"),
+                ),
+            ),
         ),
-    )  # fmt: skip
+    )
     ITEM: ClassVar[type] = SimDevice
 
     raw_name: bytes = b""
@@ -126,19 +150,29 @@ class SimLaserPacket:
 
     KINDS: ClassVar[tuple[int, int]] = (0x60, 0x61)
     LAYOUT: ClassVar[Construct] = Struct(
-        "raw_pose" / Array(3, Int16sl),
-        "total" / Int16ul,
-        "first" / Int16ul,
-        "count" / Int8ul,
-        "ranges_mm" / Array(this.count, Int16ul),
+        part("raw_pose", Array(3, Int16sl), "x, y (mm), heading (°)"),
+        part("total", Int16ul, "readings of the whole sweep"),
+        part("first", Int16ul, "number of the first reading here"),
+        part("count", Int8ul, "readings that follow"),
+        part("ranges_mm", Array(this.count, Int16ul), "mm"),
     )
     EXTENDED_LAYOUT: ClassVar[Construct] = Struct(
-        "total" / Int16ul,
-        "first" / Int16ul,
-        "count" / Int8ul,
-        "readings" / Array(this.count, Struct("range_mm" / Int16ul, "reflectance" / Int8ul, "flags" / Int16ul)),
-        "laser" / Int8ul,
-        "flags" / Int8ul,
+        part("total", Int16ul, "readings of the whole sweep"),
+        part("first", Int16ul, "number of the first reading here"),
+        part("count", Int8ul, "readings that follow"),
+        part(
+            "readings",
+            Array(
+                this.count,
+                Struct(
+                    part("range_mm", Int16ul, "mm"),
+                    part("reflectance", Int8ul, "0 none"),
+                    part("flags", Int16ul, "reserved; at the end: bit 0 the robot has moved since"),
+                ),
+            ),
+        ),
+        part("laser", Int8ul, "which one"),
+        part("flags", Int8ul, "reserved; at the end: bit 0 the robot has moved since"),
     )
 
     is_extended: bool = False
@@ -201,8 +235,13 @@ class MapChangedPacket(LaidOutPacket):
         raw_name: The map's file.
     """
 
+    NAME: ClassVar[str] = "SIMMAPCHANGED"
     KIND: ClassVar[int] = 0x66
-    LAYOUT: ClassVar[Construct] = Struct("by_user" / Int8ul, "status" / Int8sl, "raw_name" / TEXT)
+    LAYOUT: ClassVar[Construct] = Struct(
+        part("by_user", Int8ul, "1 a person did it, 0 a client"),
+        part("status", Int8sl, "negative where it failed"),
+        part("raw_name", TEXT, "its file"),
+    )
 
     by_user: int = 0
     status: int = 0

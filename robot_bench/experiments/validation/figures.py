@@ -112,7 +112,7 @@ def shown_value(value: float, unit: str) -> str:
 #: Bounds that hold at half their size too: name → why they are not made tighter.
 LOOSE_BECAUSE: Mapping[str, str] = {
     "rim speed, direct": "the motor of mode direct is exact; the bound is the trace's last digit",
-    "rounding of RVEL": "half of the unit it is sent in; no pair of codes at 62.5 mm/s falls nearer to the middle",
+    "rounding of RVEL": "half of the unit it is sent in; no pair of codes falls nearer to the middle",
     "watchdog": "a whole step of the body passes rarely before the ramp begins",
     "time to stop": "poses are 50 ms apart, and the delay to the wheels is rarely at its longest",
     "time to stop, direct": "poses are 50 ms apart",

@@ -41,7 +41,7 @@ from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: chosen: so long before a contact its place is looked for in the cones.
 BEFORE_NS: Nanos = 8 * NS_PER_S
-#: chosen: sonar, line and sampling of the adapter take less than this (dodge_fsm.c tells how it adds up).
+#: chosen: sonar, line and sampling of the adapter take less than this together.
 TELLING_NS: Nanos = 600 * NS_PER_MS
 #: chosen: an answer is late that comes after so large a part of the time that was left, and takes so long.
 LATE_PART, LATE_NS = 0.4, 150 * NS_PER_MS

@@ -40,8 +40,6 @@ from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 STAYS_M, PART = 0.15, 0.25
 #: chosen: a program begins to drive within so long of its reset.
 BEGINS_NS: Nanos = 6 * NS_PER_S
-#: chosen: a program that knows nothing of its way still gives up what it does after so long (dodge_fsm.c: 12 s).
-LEAVES_NS: Nanos = 15 * NS_PER_S
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,8 +202,8 @@ class ProgressInquest:
         """Tell of a program that drove on with nothing in sight before, and does so no more."""
         prober, record = self._prober, self.scene.record
         codes, since = steady_since(record, middle)
-        until = min(middle + LEAVES_NS, stay.until, self._until)
-        if prober is None or until - middle < LEAVES_NS or middle - since < LEAVES_NS:
+        until = min(middle + self.scene.gives_up_ns, stay.until, self._until)
+        if prober is None or until - middle < self.scene.gives_up_ns or middle - since < self.scene.gives_up_ns:
             return None
         held = prober.replay.run(middle, until, prober.held(middle, until, level=False))
         if any(net.startswith("motor") for _, net, _ in held.edges):

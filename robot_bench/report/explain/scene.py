@@ -16,10 +16,12 @@ from typing import cast
 from robot_bench.events.codec import Json
 from robot_bench.events.kinds import Contact, Pose
 from robot_bench.recording.run_record import RunRecord
-from simbase.timing import Nanos
+from simbase.timing import NS_PER_S, Nanos
 
 #: chosen: metres; a point so near to the border of the threshold is neither surely inside nor outside.
 EDGE_M = 0.03
+#: chosen: a program that knows nothing of its way still gives up what it does after so long, where no scenario says it.
+GIVES_UP_S = 15.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,7 +53,9 @@ class Scene:
         ]
         self.cone_rad = float(cast("float", robot.get("sonar_cone_rad", 0.52)))
         self.threshold_m = float(cast("float", record.meta.get("threshold_m") or 0.5))
-        self.step_mps = float(cast("float", record.meta.get("step_mps") or 0.0625))
+        self.step_mps = record.step_mps
+        #: For so long the program may go on with what it does before it does something else.
+        self.gives_up_ns: Nanos = round(float(cast("float", record.meta.get("gives_up_s") or GIVES_UP_S)) * NS_PER_S)
 
     @cached_property
     def _pose_times(self) -> list[Nanos]:

@@ -1,7 +1,7 @@
 """The kinds of goals: a row each, with the keys of its table, its sentence, and what watches a run for it.
 
 A kind that is not here is looked for among the entry points of the group `robot_bench.goals`, whose values
-are `GoalKind`s.
+are `GoalKind`s. So are those that know a program which ships: they stand in `robot_bench.scenarios`.
 """
 
 from collections.abc import Mapping
@@ -34,7 +34,7 @@ from robot_bench.scenario.goals.temporal import (
     around,
     bounds,
 )
-from robot_bench.scenario.goals.text import EncoderCounts, InOrder, SensorNamed
+from robot_bench.scenario.goals.text import InOrder
 from robot_bench.scenario.goals.watch import GoalKind, Watch, number
 from simbase.errors import shown
 from simbase.trust import installed_points
@@ -171,15 +171,6 @@ KINDS: Mapping[str, GoalKind] = {
         keys=(Key(name="texts", kind="list", required=True),),
         wanted=lambda table: f"prints in order {', '.join(map(repr, _texts(table)))}",
         watch=lambda table: InOrder(_texts(table), "was not printed in its turn"), is_scripted=True,
-    ),
-    "encoder_counts_match": GoalKind(
-        keys=(Key(name="steps", kind="whole", least=0, most=1_000_000),),
-        wanted=lambda table: f"counts the wheels' turns to {table.get('steps', 1)} step",
-        watch=EncoderCounts, needs_world=True, is_scripted=True,
-    ),
-    "sensor_named": GoalKind(
-        keys=(), wanted=lambda _: "names the sensor before which something stands, and no other",
-        watch=lambda _: SensorNamed(), needs_world=True, is_scripted=True,
     ),
     "reach": GoalKind(
         keys=(*_REGION, _WITHIN), wanted=lambda table: f"reaches {_place(table)}{_when(table)}", watch=Reach,
@@ -334,6 +325,16 @@ def kind_named(name: str) -> GoalKind | None:
     if not isinstance(loaded, GoalKind):
         raise ScenarioError(f"goal {shown(name)}: {others[name].value} is no GoalKind", hint="docs/scenarios.md, goals")
     return loaded
+
+
+def every_kind() -> Mapping[str, GoalKind]:
+    """Return all kinds by their names, those of entry points behind the package's own.
+
+    Raises:
+        ScenarioError: As `kind_named`.
+    """
+    named = ((name, kind_named(name)) for name in (*KINDS, *sorted(_entry_points())))
+    return {name: kind for name, kind in named if kind is not None}
 
 
 def known_kinds() -> list[str]:

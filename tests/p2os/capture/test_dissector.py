@@ -106,15 +106,23 @@ def test_tshark_finds_frames_on_any_port_and_the_robot_is_who_answers(tmp_path: 
 @needs_tshark
 def test_tshark_shows_every_field_of_a_sip_and_its_tail(tmp_path: Path) -> None:
     sip = StandardSip(
+        raw_x=0x8123, raw_y=40000, raw_heading=-5, raw_left_velocity=-120, raw_right_velocity=340, raw_battery=121,
         stall_left=True, rear_bumpers=5, front_bumpers=9, raw_control=-7, raw_flags=513, raw_compass=90,
         sonar=(SonarReading(3, 700),), analog_port=4, gripper_state=6, raw_analog=77, digital_in=12, digital_out=13,
         tail=(126, -1, -300, 2, 0, -128, 80, 123456, 9),
     )  # fmt: skip
     path = conversation(tmp_path / "sip.pcap", [(45555, 45001, packet_frame(sip, Profile.P2OS).to_bytes())])
-    names = ("rear_bumpers", "front_bumpers", "control", "compass", "analog_port", "analog", "battery_x10",
+    names = ("x", "y", "heading", "left", "right", "battery", "stall_left", "stall_right", "flags", "gripper",
+             "digital_in", "digital_out", "sonar", "flags3", "fault_flags", "lateral_velocity", "rear_bumpers",
+             "front_bumpers", "control", "compass", "analog_port", "analog", "battery_x10",
              "charge_state", "rotation_velocity", "temperature", "state_of_charge", "controller_time_us")  # fmt: skip
     row = shown(path, *(f"p2os.sip.{name}" for name in names))[-1]
-    assert [int(cell, 0) for cell in row] == [5, 9, -7, 90, 4, 77, 126, -1, -300, -128, 80, 123456]
+    assert row.pop(12) == "3: 700"
+    truth = {"True": 1, "False": 0}
+    assert [truth[cell] if cell in truth else int(cell, 0) for cell in row] == [
+        0x8123, 40000, -5, -120, 340, 121, 1, 0, 513, 6, 12, 13, 9, 2, 0, 5, 9, -7, 90, 4, 77, 126, -1, -300, -128, 80,
+        123456,
+    ]  # fmt: skip
 
 
 def test_the_dissector_is_put_where_wireshark_looks(

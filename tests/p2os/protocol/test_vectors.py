@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from p2os.protocol.commands import NEGATIVE, POSITIVE, STRING, Command
+from p2os.protocol.commands import NEGATIVE, POSITIVE, STRING, Command, command_row
 from p2os.protocol.config_packet import FIELDS, ConfigPacket
 from p2os.protocol.frames import Frame
 from p2os.protocol.packets import (
@@ -110,3 +110,10 @@ def test_a_command_says_all_that_its_vector_states(vector: dict) -> None:
         assert bytes(argument) in {command.argument, bytes(whole.two_bytes)}
     else:
         assert command.argument == argument
+
+
+@each_row("vector", [v for v in VECTORS if "command_name" in v["decoded"]], ids=lambda vector: vector["name"])
+def test_a_command_has_the_number_that_its_vector_names(vector: dict) -> None:
+    stated = vector["decoded"]
+    for name in stated["command_name"].split("/"):
+        assert command_row(name).number == stated["command"]

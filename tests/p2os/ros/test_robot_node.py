@@ -9,9 +9,9 @@ import pytest
 from p2os.client.observer import Bumpers, Observer
 from p2os.client.robot_state import RobotPose, RobotState
 from p2os.protocol.sip import SonarReading, StandardSip
+from p2os.robots.motor_step import STEP_MPS
 from p2os.robots.parameters import load_parameters
 from p2os.ros.robot_node import Motors, Refused, ResetOdometry, RobotNode, Speed, Stop
-from p2os.ros.thesis_topics import STEP_MPS
 from p2os.ros.topics import TOPICS
 from p2os.ros.transport import NodeOptions, Received
 from simbase.errors import UsageError

@@ -364,3 +364,24 @@ def test_a_seeded_bug_is_explained_or_said_to_be_unknown_and_never_wrong(bug: Bu
     is_right = any(answer in found.summary for answer in bug.answers)
     assert is_right or found.standing is not Standing.CAUSE, found.text()
     assert is_right is bug.is_found, found.text()
+
+
+@pytest.mark.parametrize(
+    ("meta", "gives_up_s"), [({}, 15), ({"gives_up_s": None}, 15), ({"gives_up_s": 2.5}, 2.5), ({"gives_up_s": 90}, 90)]
+)
+def test_how_long_a_program_may_go_on_is_what_its_scenario_says(meta: dict[str, float], gives_up_s: float) -> None:
+    assert Scene(RunRecord(meta=meta)).gives_up_ns == gives_up_s * NS_PER_S
+
+
+@needs_compiler
+@pytest.mark.soak
+def test_a_program_that_may_go_on_for_longer_is_not_told_to_never_leave_what_it_does(tmp_path: Path) -> None:
+    bug = next(bug for bug in LONGER if bug.name == "never-clear-again")
+    firmware = build(bug, tmp_path)
+    text = scenario_text(bug.thing, bug.duration_s, bug.placed_s, bug.x_m)
+    for gives_up_s in (12, 40):
+        folder = tmp_path / str(gives_up_s)
+        folder.mkdir()
+        record = run_with(firmware, folder, f"gives_up_s = {gives_up_s}\n{text}")
+        said = explain(record, firmware).summary
+        assert ("never leaves what it does" in said) is (gives_up_s == 12), said

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from p2os.errors import ScenarioError
 from robot_bench.events.kinds import Clearance, Contact, Event, Fault, Note, PinEdge, Pose, Ranges, Text, Wave
 from robot_bench.scenario.goals.judging import Goal, GoalJudge, RunEnd, load_goal
-from robot_bench.scenario.goals.kinds import KINDS
+from robot_bench.scenario.goals.kinds import KINDS, every_kind
 from robot_bench.scenario.goals.watch import Outcome
 from tests.robot_bench.recording.records import S, pose
 
@@ -62,7 +62,7 @@ def test_every_kind_of_goal_is_tried() -> None:
 
     tests = [*globals(), *vars(test_goals), *vars(test_goals_on_steering)]
     names = " ".join(name for name in tests if name.startswith("test_goal_"))
-    assert [kind for kind in KINDS if kind not in names] == []
+    assert [kind for kind in every_kind() if kind not in names] == []
 
 
 @pytest.mark.parametrize(("t", "met"), [(2 * S - 1, True), (2 * S, True), (2 * S + 1, False)])
@@ -375,3 +375,19 @@ def test_a_goal_that_any_run_or_none_would_meet_is_refused(keys: dict[str, Any],
     with pytest.raises(ScenarioError, match=says):
         load_goal({"kind": "always", "signal": "x_m", **keys}, "mine.toml: [[goal]] 1")
     load_goal({"kind": "always", "signal": "x_m", "least": 1, "most": 1, "from_s": 2, "to_s": 2}, "at the bound")
+
+
+def test_goals_that_know_a_shipped_program_come_by_entry_points_and_are_in_the_schema(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    from robot_bench.scenario.goals import kinds
+    from robot_bench.scenario.json_schema import goals_schema
+
+    plugged = {"encoder_counts_match", "sensor_named"}
+    assert plugged <= set(every_kind()) - set(KINDS)
+    named = {goal["properties"]["kind"]["const"] for goal in goals_schema()["items"]["oneOf"]}
+    assert named == set(every_kind())
+    monkeypatch.setattr(kinds, "_entry_points", dict)
+    assert set(every_kind()) == set(KINDS)
+    with pytest.raises(ScenarioError, match="there is no goal 'sensor_named'"):
+        load_goal({"kind": "sensor_named"}, "x")

@@ -13,7 +13,7 @@ from p2os.pioneer.controller.settings import SonarPerSip
 from p2os.pioneer.world import load_world
 from p2os.toml_schema import Key
 from robot_bench.bench import Bench
-from robot_bench.scenario.goals.kinds import KINDS
+from robot_bench.scenario.goals.kinds import every_kind
 from robot_bench.scenario.scenario import _ADAPTER_TIMES, known_scenarios, load_scenario, read_scenario
 from robot_bench.scenario.world_script import Op
 from simbase.errors import P2osError, UsageError
@@ -363,7 +363,7 @@ def test_a_program_that_moves_a_scenario_to_another_world_is_told_of_its_names_t
 def test_every_number_of_a_scenario_has_a_range(module: str) -> None:
     tables = vars(importlib.import_module(f"robot_bench.scenario.{module}")).values()
     keys = [key for table in tables if isinstance(table, tuple) for key in table if isinstance(key, Key)]
-    keys += [key for kind in KINDS.values() for key in kind.keys]
+    keys += [key for kind in every_kind().values() for key in kind.keys]
     numbers = [key for key in keys if key.kind in {"number", "whole"}]
     assert numbers
     assert [key.name for key in numbers if key.most is None or (key.least is None and key.above is None)] == []

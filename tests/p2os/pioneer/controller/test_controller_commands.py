@@ -90,6 +90,20 @@ def test_a_command_without_its_argument_has_no_effect(make_robot: MakeRobot, row
         assert context_of(robot.pioneer) == before
 
 
+@each_row("row", [row for row in ROWS if row.number in HANDLERS], ids=lambda row: row.name)
+def test_a_handler_takes_each_argument_that_its_description_names(make_robot: MakeRobot, row: CommandRow) -> None:
+    for kind in row.kinds:
+        least, most = (0, 0) if kind is Argument.NONE else row.limits(kind)
+        value: int | bytes | None = min(max(1, least), most)
+        if kind is Argument.NONE:
+            value = None
+        elif kind in {Argument.STRING, Argument.DATA}:
+            value = b"\x01" * max(least, min(2, most))
+        robot = make_robot(lenient=True).open()
+        robot.say(row.number, value)
+        assert f"{row.name}: malformed" not in told(robot, "command ignored"), kind
+
+
 EXTRAS = [
     (C.ENCODER, 0x90, Profile.AROS), (C.IOREQUEST, 0xF0, Profile.P2OS), (C.GRIPREQUEST, 0xE0, Profile.P2OS),
     (C.JOYREQUEST, 0xF8, Profile.ARCOS),
