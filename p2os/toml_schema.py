@@ -12,6 +12,7 @@ from typing import Any, Literal, Protocol, cast, overload, runtime_checkable
 
 from p2os.errors import ScenarioError
 from simbase.errors import FileError, MissingDependencyError, P2osError, nearest, shown
+from simbase.trust import installed_points
 
 #: chosen: eleven days; a larger number of seconds is a mistake of the unit.
 LONGEST_S = 1_000_000
@@ -240,7 +241,8 @@ def _wanted(key: Key) -> str:
     if key.most is not None:
         meaning += f", at most {key.most:g}" + (" of them" if key.kind in {"line", "ascii"} else "")
     if key.choices:
-        meaning = "one of " + ", ".join(key.choices) + (", or FILE.py:CLASS" if key.group else "")
+        installed = [name for name in installed_points(key.group) if name not in key.choices] if key.group else []
+        meaning = "one of " + ", ".join((*key.choices, *installed)) + (", or FILE.py:CLASS" if key.group else "")
     return meaning
 
 

@@ -44,6 +44,7 @@ from simbase.errors import FileError, P2osError, UsageError
 from simbase.files import sha256_of
 from simbase.installation import installed_version
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
+from simbase.trust import installed_points
 from simbase.user_classes import unforeseen
 
 if TYPE_CHECKING:
@@ -51,6 +52,8 @@ if TYPE_CHECKING:
 
 #: What is recorded as the world where nothing is known of it: 8 m of an empty plan.
 UNKNOWN_PLACE: Json = {"extent": [-4.0, -4.0, 4.0, 4.0], "obstacles": []}
+#: Entry points that say in a line why a run failed: a function of its record and the firmware's file.
+EXPLAINERS = "robot_bench.explainers"
 #: Exit code of errors that whoever types the command can mend.
 WRONG_USAGE = 2
 _LOG = logger("bench")
@@ -491,14 +494,12 @@ def parts_of(chip: Chip) -> list[Json]:
 
 
 def why_failed(bench: Bench | RemoteBench, failures: Sequence[str]) -> str:
-    """Return the one line of `p2os explain` for a bench that has run; empty where that finds no cause."""
+    """Return why a bench that has run has failed, in a line; empty where no entry point of `EXPLAINERS` finds it."""
     if isinstance(bench, RemoteBench):
         return ""
-    from robot_bench.report.explain.chain import Standing
-    from robot_bench.report.explain.explain import explain
-
-    found = explain(replace(bench.record(), end={"failures": list(failures)}), bench.scenario.firmware)
-    return found.line if found.standing is Standing.CAUSE else ""
+    explainers = installed_points(EXPLAINERS).values()
+    ended = replace(bench.record(), end={"failures": list(failures)})
+    return next((line for one in explainers if (line := one.load()(ended, bench.scenario.firmware))), "")
 
 
 def _figures(bench: Bench | RemoteBench, end: Nanos, wall_s: float) -> Json:

@@ -30,13 +30,20 @@ class Need:
     """Something that a feature needs; a package is of an extra, or, with "", needed by every verb."""
 
     name: str
-    kind: str  # "package", "program", or "built" with the distribution
+    kind: str  # "package", "program", "built" with the distribution, or a "plug-in" of it
     feature: str
     extra: str = ""
     get: str = ""
+    points: tuple[str, ...] = ()  # of a plug-in: the groups of entry points to which it belongs
+    point: str = ""  # the name of its entry point in the first of them, by which it is known to be there
+
+    @property
+    def is_plugged_in(self) -> bool:
+        """Whether a plug-in is there."""
+        return any(one.name == self.point for one in entry_points(group=self.points[0]))
 
 
-_KINDS = ("package", "built", "program")
+_KINDS = ("package", "built", "plug-in", "program")
 
 #: Of this package.
 NEEDS = (
@@ -58,6 +65,12 @@ def installed_needs() -> tuple[Need, ...]:
     points = sorted(entry_points(group=GROUP), key=lambda point: point.name)
     needs = dict.fromkeys(need for point in points for need in point.load())
     return tuple(sorted(needs, key=lambda need: (_KINDS.index(need.kind), need.kind == "package" and bool(need.extra))))
+
+
+def way_to_plug_in(group: str) -> str:
+    """Return which plug-in of a group of entry points is not there, and the command that gets it; empty: none lacks."""
+    lacking = [need for need in installed_needs() if group in need.points and not need.is_plugged_in]
+    return f"{lacking[0].name} ({lacking[0].feature}) is not installed: {reinstall_command()}" if lacking else ""
 
 
 def missing_distributions() -> dict[str, str]:

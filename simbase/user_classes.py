@@ -30,8 +30,9 @@ _PAGE = "docs/trust.md"
 
 
 def find_class(
-    name: str, *, what: str, group: str, known: Sequence[str], error: Callable[..., P2osError] = UsageError
-) -> Callable[..., Any]:
+    name: str, *, what: str, group: str, known: Sequence[str], error: Callable[..., P2osError] = UsageError,
+    absent: str = "",
+) -> Callable[..., Any]:  # fmt: skip
     """Return a class, or what makes such a thing.
 
     Args:
@@ -40,6 +41,7 @@ def find_class(
         group: The entry points' group.
         known: The names that ship, for the hint.
         error: What is raised: (message, hint=…).
+        absent: What of the group is not installed and how it is got, for the hint.
 
     Raises:
         UntrustedError: It is in a file, and was not admitted, or has changed since.
@@ -56,7 +58,8 @@ def find_class(
         except Exception as failure:  # of another's package
             raise error(f"the {what} {name} cannot be loaded: {said(failure)}") from failure
     all_known = ", ".join([*known, *(point for point in points if point not in known)])
-    raise error(f"there is no {what} {shown(name)}", hint=f"known are {all_known}, and FILE.py:CLASS")
+    lacking = absent and f"; {absent}"
+    raise error(f"there is no {what} {shown(name)}", hint=f"known are {all_known}, and FILE.py:CLASS{lacking}")
 
 
 def refuse_lacking(made: object, protocol: type, name: str, what: str) -> None:

@@ -118,7 +118,7 @@ LAYERS = {
         ("running", "firmware", "origin_gate"), ("wires",), ("events",), ("direct",), ("recording",),
         ("drives",), ("scenario", "report"),
         ("adapter", "scenarios"), ("bench",), ("remote",), ("run", "project"),
-        ("experiments",), ("campaign",), ("ros", "live"), ("cli",),
+        ("networks", "experiments"), ("campaign",), ("ros", "live"), ("cli",),
     ),
 }  # fmt: skip
 

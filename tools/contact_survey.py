@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from p2os.pioneer.body.contract import BodyState, RobotBody
-from p2os.pioneer.body.factory import BODY_NAMES, make_body
+from p2os.pioneer.body.factory import engines, make_body
 from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import Pose, World
 from p2os.robots.parameters import RobotParameters, load_parameters
@@ -239,7 +239,7 @@ def _text(x_px: float, y_px: float, words: str) -> str:
 def main() -> int:
     """Print what each contact was, and what of it breaks the contract."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--body", action="append", choices=BODY_NAMES, help="may be given more than once; default: all")
+    parser.add_argument("--body", action="append", choices=engines(), help="may be given more than once; default: all")
     parser.add_argument("--model", action="append", help=f"may be given more than once; default: {', '.join(MODELS)}")
     parser.add_argument("--headings", type=int, default=30, help="default: 30")
     parser.add_argument("--seed", type=int, default=1, help="of the arena; default: 1")
@@ -248,7 +248,7 @@ def main() -> int:
     world = load_world("arena", options.seed)
     found = []
     print("model      body       heading   stall    rest  slides  signs  energy")
-    for one in survey(options.body or BODY_NAMES, options.model or MODELS, options.headings, world):
+    for one in survey(options.body or engines(), options.model or MODELS, options.headings, world):
         found.append(one)
         stall, rest = (f"{'never':>7}" if s is None else f"{s:5.2f} s" for s in (one.stall_s, one.rest_s))
         print(f"{one.model:<10} {one.body:<10} {one.heading_deg:5.0f} \N{DEGREE SIGN} {stall} {rest}"

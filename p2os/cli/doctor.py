@@ -21,6 +21,7 @@ from simbase.installation import (
     install_command,
     installed_needs,
     missing_distributions,
+    reinstall_command,
     way_to_build,
 )
 
@@ -64,6 +65,13 @@ def examine(
     ]  # fmt: skip
     finders = {"program": find_program, "package": package_version, "built": built_part}
     for need in installed_needs():
+        if need.kind == "plug-in":
+            if not need.is_plugged_in:
+                get, feature = reinstall_command(), need.feature
+                findings.append(
+                    Finding(name=need.name, kind=need.kind, found=None, feature=feature, get=get, required=False)
+                )
+            continue
         if need.kind == "package":
             get = install_command(need.extra, python=".".join(map(str, python)))
         else:

@@ -24,11 +24,19 @@ def worlds(incomplete: str) -> list[str]:
     return [name for name in known_worlds() if name.startswith(incomplete)]
 
 
+def body_help() -> str:
+    """Return the help of `--body`: the engines that are installed, and what else may stand there."""
+    from p2os.pioneer.body.factory import BEST, KINEMATIC, engines
+
+    others = [name for name in engines() if name != KINEMATIC.name]
+    return f"{', '.join([*others, f'{KINEMATIC.name} (plan view)'])}, or {BEST} installed."
+
+
 def bodies(incomplete: str) -> list[str]:
     """Return the bodies."""
-    from p2os.pioneer.body.factory import BODY_CHOICES
+    from p2os.pioneer.body.factory import body_names
 
-    return [name for name in BODY_CHOICES if name.startswith(incomplete)]
+    return [name for name in body_names() if name.startswith(incomplete)]
 
 
 def urls(incomplete: str) -> list[str]:

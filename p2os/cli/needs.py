@@ -16,5 +16,20 @@ NEEDS = (
     Need(name="pillow", kind="package", feature="worlds from ROS maps: pictures", extra="worlds"),
     Need(name="pyyaml", kind="package", feature="worlds from ROS maps", extra="worlds"),
     Need(name="pygame-ce", kind="package", feature="teleop --pad", extra="pad"),
+    Need(
+        name="physics",
+        kind="plug-in",
+        feature="--body bullet, mujoco, tcp:, unix:",
+        points=("p2os.bodies", "p2os.body_addresses"),
+        point="bullet",
+    ),
+    Need(
+        name="world files",
+        kind="plug-in",
+        feature="worlds of .sdf, .urdf, .obj",
+        points=("p2os.world_readers",),
+        point="sdf",
+    ),
+    Need(name="ROS", kind="plug-in", feature="ros", points=("p2os.verbs",), point="ros"),
     Need(name="tshark", kind="program", feature="captures on the command line", get="sudo apt-get install tshark"),
 )

@@ -7,13 +7,16 @@ from typing import Annotated, cast
 import typer
 
 from p2os.cli.groups import BENCH
-from p2os.ros.bags import STORAGES
 from robot_bench.recording.event_files import write_named_events
 from robot_bench.recording.run_record import read_events, read_meta
 from robot_bench.recording.together import named_events, robots_in, scenario_of
 from robot_bench.report.make import Files, make_artefacts, make_artefacts_of_all
-from robot_bench.ros.run_bag import write_bag
-from simbase.errors import UsageError
+from simbase.errors import UsageError, shown
+from simbase.installation import way_to_plug_in
+from simbase.trust import installed_points
+
+#: Entry points that write the events of a run as a bag, each by the name of its storage.
+BAGS = "robot_bench.bags"
 
 HELP = """Make the report of a run anew, and all else in its folder.
 
@@ -48,7 +51,12 @@ def report(
         Path | None, typer.Option(help="Write its events, .jsonl, .parquet or .mcap, and no report.", metavar="FILE")
     ] = None,
     ros2: Annotated[
-        str, typer.Option("--ros2", help="With --events: a rosbag2 of this storage.", metavar="|".join(STORAGES))
+        str,
+        typer.Option(
+            "--ros2",
+            help="With --events: a rosbag2 of this storage.",
+            metavar="|".join(installed_points(BAGS)) or "STORAGE",
+        ),
     ] = "",
 ) -> None:
     """Make a run's report."""
@@ -58,7 +66,10 @@ def report(
             raise UsageError("--ros2 goes with --events FOLDER", hint="--events bag --ros2 mcap")
         if names:
             raise UsageError(f"{folder} is of several robots; a bag is of one", hint=f"p2os report {folder / names[0]}")
-        count = write_bag(read_events(folder), events, read_meta(folder), ros2)
+        bags = installed_points(BAGS)
+        if ros2 not in bags:
+            raise UsageError(f"there is no storage {shown(ros2)}", hint=" or ".join(bags) or way_to_plug_in(BAGS))
+        count = bags[ros2].load()(read_events(folder), events, read_meta(folder), ros2)
         typer.echo(f"{events}: {count} messages")
         return
     if events is not None:

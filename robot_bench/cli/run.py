@@ -2,7 +2,6 @@
 
 import contextlib
 import json
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -12,11 +11,10 @@ import typer
 
 from p2os.cli.groups import BENCH
 from p2os.cli.keyboard import any_key_stops
-from p2os.cli.names import bodies, urls, worlds
+from p2os.cli.names import bodies, body_help, urls, worlds
 from p2os.cli.quantities import option
 from p2os.cli.trust import Trusted, said
 from p2os.errors import RunFailedError
-from p2os.ros.transports import TRANSPORTS
 from p2os.toml_schema import within
 from p2os.transport import open_url
 from robot_bench.cli.names import scenario_names
@@ -33,6 +31,7 @@ from robot_bench.cli.sweep import (
 )
 from robot_bench.cli.table import print_result
 from robot_bench.cli.workers import Jobs, core_count
+from robot_bench.networks import network_of
 from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.remote import CAUTIOUS_ROTATION_DEG_S, CAUTIOUS_VELOCITY_MM_S
 from robot_bench.run import Progress, RunBench, RunResult, run_at_port, run_scenario
@@ -97,8 +96,8 @@ class RealtimeCommand(VerbPage):
                 filled.append("1")
             if word == "--foxglove" and not following.rpartition(":")[2].isdecimal():
                 filled.append(FOXGLOVE_PORT)
-            if word == "--ros" and re.split("[:@]", following)[0] not in TRANSPORTS:
-                filled.append(next(iter(TRANSPORTS)))
+            if word == "--ros":
+                filled += network_of("ros").place_before(following)
         return super().parse_args(ctx, filled)
 
 
@@ -123,9 +122,7 @@ def run(
     ] = None,
     body: Annotated[
         str | None,
-        typer.Option(
-            help="bullet, mujoco, kinematic (plan view), or best installed.", metavar="BODY", autocompletion=bodies
-        ),
+        typer.Option(help=body_help(), metavar="BODY", autocompletion=bodies),
     ] = None,
     world: Annotated[
         str | None, typer.Option(help="World, or a TOML file.", metavar="WORLD|FILE", autocompletion=worlds)
@@ -309,7 +306,7 @@ def driven(
 
     Raises:
         UsageError: The scenario has no pins of the pin-out, or a place is none.
-        MissingDependencyError, TransportError, FileError: As `met`, `with_inputs` and `live_scene`.
+        MissingDependencyError, TransportError, FileError: As of `Network` and `live_scene`.
     """
     if foxglove is not None:
         from robot_bench.live import live_scene
@@ -321,13 +318,12 @@ def driven(
     if ros is None and inputs is None:
         yield None
         return
-    from robot_bench.ros.drive import RosPlace, met, refuse_without_pins, with_inputs
-
-    refuse_without_pins(scenario)
+    network = network_of("ros")
+    network.refuse_without_pins(scenario)
     if inputs is not None:
-        yield with_inputs(inputs)
+        yield network.with_inputs(inputs)
         return
-    with met(RosPlace.read(ros or "")) as driver:
+    with network.met(ros or "") as driver:
         yield driver
 
 

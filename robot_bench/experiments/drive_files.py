@@ -11,27 +11,47 @@ import csv
 import math
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import TypeAlias
+from typing import Protocol, TypeAlias, cast
 
 from p2os.capture import Reading, open_file
 from p2os.capture.chunks import Block, chunks_of
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import RobotParameters, load_parameters
-from p2os.ros.bags import is_bag
 from robot_bench.drives.drive import Drive, Floats, Trajectory, heading_of, number_of, steps_of
 from robot_bench.drives.of_packets import drive_of_capture
 from robot_bench.drives.of_run import DEFAULT_ROBOT, drive_of_record
 from robot_bench.experiments.aria_logs import is_aria_log, read_aria_log
-from robot_bench.experiments.bag_drives import drive_of_bag
 from robot_bench.recording.run_record import TRACE_NAME, read_events, read_run
 from simbase.errors import FileError, shown_name
 from simbase.files import lines_of, reading, writing
+from simbase.trust import installed_points
 
 _TUM_COLUMNS = 8
 #: chosen: of a table all rows are held; half a day at 100 Hz.
 LARGEST_TABLE_BYTES = 512 << 20
 #: Longer is no number.
 _LONGEST_FIELD = 64
+
+
+#: Entry points that read drives of further kinds of recordings.
+READERS = "robot_bench.drive_readers"
+
+
+class DriveReader(Protocol):
+    """What an entry point of `READERS` is: a module with these functions."""
+
+    def knows(self, path: Path) -> bool:
+        """Tell whether a path looks like what it reads."""
+        ...
+
+    def read(self, path: Path, parameters: RobotParameters) -> Drive:
+        """Return what a recording tells of a drive.
+
+        Raises:
+            MissingDependencyError: What it needs is not installed.
+            FileError: It is damaged, or tells of no poses.
+        """
+        ...
 
 
 #: Says how to read a capture, whose chunks it looks into.
@@ -51,8 +71,8 @@ def read_drive(path: Path, *, robot: str = "", how: HowToRead | None = None) -> 
     """
     if not path.exists():
         raise FileError(f"there is no {shown_name(path)}", hint="a run folder, a recording, pcap, bag, .csv or .tum")
-    if is_bag(path):
-        return drive_of_bag(path, _parameters(robot))
+    if (reader := _reader_of(path)) is not None:
+        return reader.read(path, _parameters(robot))
     if path.is_dir() or path.name == TRACE_NAME:
         return _of_run(path if path.is_dir() else path.parent, robot)
     if path.is_file() and _is_aria_log(path):  # of a pipe what was looked into would be gone
@@ -64,6 +84,16 @@ def read_drive(path: Path, *, robot: str = "", how: HowToRead | None = None) -> 
     blocks = open_file(path).blocks
     reading, blocks = how(blocks) if how else (Reading(profile=Profile.P2OS, parameters=_parameters(robot)), blocks)
     return drive_of_capture(path.name, chunks_of(blocks), reading.parameters, reading.profile)
+
+
+def is_recording(path: Path) -> bool:
+    """Return whether a path is one recording of a drive, and no run: a file, or a folder that a reader knows."""
+    return path.is_file() or _reader_of(path) is not None
+
+
+def _reader_of(path: Path) -> DriveReader | None:
+    readers = (cast("DriveReader", point.load()) for point in installed_points(READERS).values())
+    return next((one for one in readers if one.knows(path)), None)
 
 
 def _is_aria_log(path: Path) -> bool:

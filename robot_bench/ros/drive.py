@@ -1,7 +1,7 @@
 """Runs a bench beside ROS: in steps, between which messages go both ways.
 
 What comes in acts from the nanosecond after the step on, as everything that a script does, so that a run with these
-inputs out of its trace, and without ROS, is the same.
+inputs out of its trace, and without ROS, is the same. This module is the bench's network `ros`, by its entry point.
 """
 
 import re
@@ -58,13 +58,20 @@ def refuse_without_pins(scenario: Scenario) -> None:
         raise UsageError("--ros is for one Pioneer on the wires of the pin-out", hint="a scenario such as dodge")
 
 
+def place_before(word: str) -> list[str]:
+    """Return the first transport where the word that follows `--ros` names none."""
+    return [] if re.split("[:@]", word)[0] in TRANSPORTS else [next(iter(TRANSPORTS))]
+
+
 @contextmanager
-def met(place: RosPlace) -> Iterator[RunBench]:
-    """Join a network for a block, and yield what runs a bench as a node of it.
+def met(text: str) -> Iterator[RunBench]:
+    """Join the network at a place for a block, and yield what runs a bench as a node of it.
 
     Raises:
+        UsageError: The text names no place.
         MissingDependencyError, TransportError: As `open_transport`.
     """
+    place = RosPlace.read(text)
     with closing(open_transport(place.transport, place.options)) as network:
         yield lambda bench: run_beside(bench, network, place.options)
 

@@ -22,7 +22,7 @@ from adapter_sim.pinout import WireRole, load_pinout
 from adapter_sim.settings import AdapterSettings, MotorCommand
 from bluepill_sim.parts.registry import PartSpec
 from p2os.errors import ScenarioError
-from p2os.pioneer.body.factory import BEST, BODY_CHOICES, body_class
+from p2os.pioneer.body.factory import BEST, BODY_CHOICES, body_class, may_ship
 from p2os.pioneer.body.factory import GROUP as BODY_GROUP
 from p2os.pioneer.controller import ControllerSettings, SonarPerSip
 from p2os.pioneer.controller.flash import load_flash
@@ -821,7 +821,7 @@ def _known(what: str, name: str) -> str:
 
 
 def _is_of_users(what: str, name: str) -> bool:
-    return name not in (BODY_CHOICES if what == "body" else ENDS[what].ships)
+    return not may_ship(name) if what == "body" else name not in ENDS[what].ships
 
 
 def _class_of_users(what: str, name: str) -> Callable[..., object]:

@@ -5,7 +5,7 @@ from itertools import product
 import pytest
 from _pytest.mark.structures import ParameterSet
 
-from p2os.pioneer.body.factory import BODY_NAMES
+from p2os.pioneer.body.factory import engines
 from tests.p2os.pioneer.body.bodies import marks_of
 
 MODES = ("direct", "adapter")
@@ -17,5 +17,5 @@ def modes_and_bodies() -> list[ParameterSet]:
     """Return (mode, body) of all, all but a few with the mark `slow`."""
     return [
         pytest.param(mode, body, marks=[*marks_of(body), *([] if (mode, body) in EACH_RUN else [pytest.mark.slow])])
-        for mode, body in product(MODES, BODY_NAMES)
+        for mode, body in product(MODES, engines())
     ]

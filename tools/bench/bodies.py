@@ -9,7 +9,7 @@ import statistics
 
 from measuring import IS_QUICK, cpu_s, several
 
-from p2os.pioneer.body.factory import BODY_NAMES, make_body
+from p2os.pioneer.body.factory import engines, make_body
 from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.world import load_world, parse_world
 from p2os.pioneer.world.model import Pose
@@ -70,7 +70,7 @@ def times_real(name: str, lived_s: int = LIVED_S) -> float:
 def main() -> None:
     """Print a table."""
     print(f"{'body':<10} {'1 m line':>11} {'full turn':>12} {'1 m square':>11} {'one robot at 1 kHz, 8 sonar':>29}")
-    for name in BODY_NAMES:
+    for name in engines():
         try:
             line, turn, square = found = errors(name)
         except MissingDependencyError as error:

@@ -18,6 +18,9 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[2]
 HOUSES = Path(__file__).with_name("houses.toml")
 
+#: The table of `HOUSES` that is no house.
+PLUGINS = "plugins"
+
 #: What every house carries beside its folders.
 SHARED = ("LICENSE", "NOTICE", "setup.py")
 
@@ -46,13 +49,37 @@ class House:
         return re.split(r"[./]", module, maxsplit=1)[0] in self.folders
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plugin:
+    """What only some need of a house and entry points find, as `houses.toml` describes it."""
+
+    name: str
+    house: str  # the last that has some of it
+    modules: Sequence[str]  # with all that is below them
+    quick: str  # a file of tests that shows that the house stands without it
+    words: Sequence[str] = ()  # that nothing outside says
+    verbs: Sequence[str] = ()
+    uses: Sequence[str] = ()  # plug-ins that it may import
+    tests: Sequence[str] = ()  # of it, in the house's folders of tests
+    marks: Sequence[str] = ()  # of its tests in files of others
+
+    def holds(self, module: str) -> bool:
+        """Tell whether a module is of this plug-in."""
+        return any(module == name or module.startswith(f"{name}.") for name in self.modules)
+
+
+def plugins() -> dict[str, Plugin]:
+    """Return the plug-ins by name."""
+    return {name: Plugin(name=name, **table) for name, table in _read(HOUSES)[PLUGINS].items()}
+
+
 def houses(*, with_tests_alone: bool = False) -> dict[str, House]:
     """Return the houses by name, each after those that it stands on.
 
     Args:
         with_tests_alone: Also what has tests of its own and is in no distribution.
     """
-    found = {name: House(name=name, **table) for name, table in _read(HOUSES).items()}
+    found = {name: House(name=name, **table) for name, table in _read(HOUSES).items() if name != PLUGINS}
     return {name: house for name, house in found.items() if house.is_published or with_tests_alone}
 
 

@@ -22,7 +22,7 @@ from typing import Annotated
 import typer
 
 from p2os.cli.groups import ROBOTS
-from p2os.cli.names import bodies, worlds
+from p2os.cli.names import bodies, body_help, worlds
 from p2os.cli.names import robots as robot_names
 from p2os.cli.printing import queue_output
 from p2os.cli.quantities import option
@@ -112,9 +112,7 @@ def serve(
     ] = "room",
     body: Annotated[
         str,
-        typer.Option(
-            help="bullet, mujoco, kinematic (plan view), or best installed.", metavar="BODY", autocompletion=bodies
-        ),
+        typer.Option(help=body_help(), metavar="BODY", autocompletion=bodies),
     ] = BEST,
     seed: Annotated[
         int, option(SEED, "--seed", purpose="Of a scattered world and of every sensor's error.", least="0", shown="0")

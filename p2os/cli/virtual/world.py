@@ -16,9 +16,10 @@ from p2os.cli.quantities import option
 from p2os.pioneer.export import FORMATS, Export, export
 from p2os.pioneer.world import known_worlds, load_world
 from p2os.pioneer.world.drawing import svg, text, text_key
-from p2os.pioneer.world.formats import Placing, read_placed
 from p2os.pioneer.world.makers import KINDS, make_world
 from p2os.pioneer.world.model import World
+from p2os.pioneer.world.placing import Placing
+from p2os.pioneer.world.readers import read_placed
 from p2os.pioneer.world.start_places import refuse_start
 from p2os.pioneer.world.writer import write_world
 from p2os.robots.parameters import load_parameters

@@ -1,35 +1,43 @@
 """Make a body by its name, and know which is the best that is installed.
 
 A body of the user's is a `RobotScene` that is made as (world, models): an entry point of the group `p2os.bodies`,
-`./mine.py:Class`, or another program at `tcp:HOST:PORT` or `unix:PATH`.
+`./mine.py:Class`, or another program at an address, whose scheme is an entry point of `p2os.body_addresses`. An entry
+point of `p2os.bodies` whose value ends in `:ENGINE` is an engine (`engine`): those stand in line for `best`.
 
 Invariant: an engine is imported only when it is asked for; whether one is installed is looked up, not tried.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from importlib import import_module
-from importlib.util import find_spec
+from functools import cache
 from typing import cast
 
 from p2os.pioneer.body.contract import RobotBody, RobotScene
-from p2os.pioneer.body.outside.address import Address, is_address
+from p2os.pioneer.body.engine import ATTRIBUTE, Engine
 from p2os.pioneer.world.model import Pose, World
 from p2os.robots.parameters import RobotParameters
-from simbase.errors import MissingDependencyError, UsageError, shown
-from simbase.trust import own_code
+from simbase.errors import UsageError, shown
+from simbase.installation import way_to_plug_in
+from simbase.trust import installed_points, own_code
+from simbase.trust.code import is_in_file
 from simbase.user_classes import find_class, make, refuse_lacking
 
-BODY_NAMES = ("kinematic", "bullet", "mujoco")
-#: The body of who names none: the first of `NEEDS` that is installed.
+#: The exact body, which needs nothing.
+KINEMATIC = Engine(name="kinematic", module="p2os.pioneer.body.kinematic", scene="KinematicScene")
+#: The body of who names none: of the engines that are installed that with the highest rank.
 BEST = "best"
-BODY_CHOICES = (BEST, *BODY_NAMES)
-#: The entry points of others.
+#: The names that are there without any entry point.
+BODY_CHOICES = (BEST, KINEMATIC.name)
+#: Entry points of engines and of users' bodies by name, and of bodies in other programs by the scheme of an address.
 GROUP = "p2os.bodies"
-#: Body → the packages that it needs, the best body first; the last needs none.
-NEEDS: Mapping[str, tuple[str, ...]] = {
-    "bullet": ("pybullet", "numpy"), "mujoco": ("mujoco", "numpy"), "kinematic": (),
-}  # fmt: skip
+ADDRESSES = "p2os.body_addresses"
+
+
+@cache
+def engines() -> Mapping[str, Engine]:
+    """Return the engines by their names, the exact body first, then the best first; looked up once a process."""
+    points = installed_points(GROUP).values()
+    found = [cast("Engine", point.load()) for point in points if point.attr == ATTRIBUTE]
+    return {one.name: one for one in (KINEMATIC, *sorted(found, key=lambda one: -one.rank))}
 
 
 def make_body(
@@ -77,23 +85,12 @@ def make_scene(
         WorldError: The world has something that this body cannot take.
     """
     name = resolve_body(own_code(name) if trust and isinstance(name, str) else name)
-    if name not in BODY_NAMES:
-        scene = _scene_of_users(name, world, models)
-        if starts is not None:
-            scene.reset(starts, seed)
-        return scene
-    load_engine(name)
-    if name == "kinematic":
-        from p2os.pioneer.body.kinematic import KinematicScene
-
-        return KinematicScene(world, models, starts)
-    if name == "bullet":
-        from p2os.pioneer.body.bullet import BulletScene
-
-        return BulletScene(world, models, starts)
-    from p2os.pioneer.body.mujoco import MujocoScene
-
-    return MujocoScene(world, models, starts)
+    if name in engines():
+        return engines()[name](world, models, starts)
+    scene = _scene_of_users(name, world, models)
+    if starts is not None:
+        scene.reset(starts, seed)
+    return scene
 
 
 def load_engine(name: str) -> None:
@@ -103,12 +100,9 @@ def load_engine(name: str) -> None:
         UsageError: There is no body of that name.
         MissingDependencyError: The engine or NumPy is not installed.
     """
-    name = resolve_body(name)
-    try:
-        if name in BODY_NAMES:
-            import_module(f"{__package__}.{name}")
-    except ModuleNotFoundError as error:
-        raise MissingDependencyError(f"the {name} body needs {error.name}", extra=name, hint="--body best") from error
+    engine = engines().get(resolve_body(name))
+    if engine is not None:
+        engine.load()
 
 
 def resolve_body(name: str) -> str:
@@ -117,9 +111,28 @@ def resolve_body(name: str) -> str:
     Raises:
         UsageError: There is no body of that name, or its class lacks a method.
     """
-    if name not in BODY_CHOICES:
+    if not is_shipped(name):
         body_class(name)
-    return next(body for body in NEEDS if not _missing(body)) if name == BEST else name
+    return max((engines()[one] for one in installed_bodies()), key=lambda one: one.rank).name if name == BEST else name
+
+
+def is_shipped(name: str) -> bool:
+    """Tell whether a name is that of an engine, or `best`."""
+    return name == BEST or name in engines()
+
+
+def may_ship(name: str) -> bool:
+    """Tell whether a name is that of an engine, or may be that of one whose plug-in is not installed.
+
+    Such a name is refused where the body is made, as an engine without its packages: a scenario that names it runs
+    with another body (`--body kinematic`).
+    """
+    return is_shipped(name) or (":" not in name and name not in installed_points(GROUP) and bool(way_to_plug_in(GROUP)))
+
+
+def body_names() -> tuple[str, ...]:
+    """Return the names of the engines and `best`, in the order in which they are told."""
+    return BEST, *engines()
 
 
 def body_class(name: str) -> Callable[[World, Sequence[RobotParameters]], RobotScene]:
@@ -132,24 +145,13 @@ def body_class(name: str) -> Callable[[World, Sequence[RobotParameters]], RobotS
         UsageError: There is none, or it lacks a method of `RobotScene`.
     """
     if not isinstance(name, str):
-        raise UsageError(f"{shown(name)} is no body's name", hint=f"one of {', '.join(BODY_CHOICES)}")
-    if is_address(name):
-        return _BodyAt(Address.of(name))
-    found = find_class(name, what="body", group=GROUP, known=BODY_CHOICES)
+        raise UsageError(f"{shown(name)} is no body's name", hint=f"one of {', '.join(body_names())}")
+    scheme, colon, _ = name.partition(":")
+    if colon and not is_in_file(name) and (point := installed_points(ADDRESSES).get(scheme)) is not None:
+        return cast("Callable[..., RobotScene]", point.load()(name))
+    found = find_class(name, what="body", group=GROUP, known=body_names(), absent=way_to_plug_in(GROUP))
     refuse_lacking(found, RobotScene, name, "body")
     return found
-
-
-@dataclass(frozen=True, slots=True)
-class _BodyAt:
-    """What makes the body of another program."""
-
-    address: Address
-
-    def __call__(self, world: World, models: Sequence[RobotParameters]) -> RobotScene:
-        from p2os.pioneer.body.outside.body import OutsideScene
-
-        return OutsideScene(self.address, world, models)
 
 
 def _scene_of_users(name: str, world: World, models: Sequence[RobotParameters]) -> RobotScene:
@@ -166,23 +168,12 @@ def body_note(name: str) -> str | None:
     """Return the line that says which body the best one is, and what better ones lack; None where one was named."""
     if name != BEST:
         return None
-    best = resolve_body(name)
-    better = list(NEEDS)[: list(NEEDS).index(best)]
-    lacking = ", ".join(f"{body} needs {' and '.join(_missing(body))}" for body in better)
-    return f"body {best}: the best that is installed{f' ({lacking})' if lacking else ''}"
+    best = engines()[resolve_body(name)]
+    better = sorted((one for one in engines().values() if one.rank > best.rank), key=lambda one: -one.rank)
+    lacking = ", ".join(f"{one.name} needs {' and '.join(one.missing())}" for one in better)
+    return f"body {best.name}: the best that is installed{f' ({lacking})' if lacking else ''}"
 
 
 def installed_bodies() -> tuple[str, ...]:
-    """Return the bodies that ship and can be made here, the simplest first."""
-    return tuple(body for body in BODY_NAMES if not _missing(body))
-
-
-def _missing(body: str) -> list[str]:
-    return [package for package in NEEDS[body] if not _is_installed(package)]
-
-
-def _is_installed(package: str) -> bool:
-    try:
-        return find_spec(package) is not None
-    except (ImportError, ValueError):  # someone forbids its import, or has half of it loaded
-        return False
+    """Return the engines that can be made here, the simplest first."""
+    return tuple(name for name, one in engines().items() if not one.missing())

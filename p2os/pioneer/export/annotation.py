@@ -5,7 +5,7 @@ Other programs pass over them; `p2os.pioneer.world.formats.annotation` reads the
 
 from p2os.pioneer.export.scene import Body, Scene
 from p2os.pioneer.export.xml_text import Tag, spaced
-from p2os.pioneer.world.formats.annotation import NAMESPACE, THING, WORLD
+from p2os.pioneer.world.interchange.words import NAMESPACE, THING, WORLD
 
 PREFIX = "p2os"
 DECLARATION = {f"xmlns:{PREFIX}": NAMESPACE}

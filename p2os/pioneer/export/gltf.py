@@ -14,7 +14,7 @@ from collections.abc import Sequence
 
 from p2os.pioneer.export.scene import Body, Motion, Place, Scene, Vector
 from p2os.pioneer.export.triangles import triangulated
-from p2os.pioneer.world.formats.meshes.gltf import GLB_HEADER, GLB_MAGIC
+from p2os.pioneer.world.interchange.words import GLB_HEADER, GLB_MAGIC
 from p2os.pioneer.world.model import normal_of
 
 #: glTF 2.0, sections 3.6.2.2 and 3.6.2: floats, and a buffer of vertices.

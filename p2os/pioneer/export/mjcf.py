@@ -12,7 +12,7 @@ import math
 from p2os.pioneer.body.physical import GRAVITY_MPS2
 from p2os.pioneer.export.scene import Body, Box, Cylinder, Motion, Place, Scene, Sphere, TriangleMesh
 from p2os.pioneer.export.xml_text import Tag, spaced
-from p2os.pioneer.world.formats.annotation import ROBOT
+from p2os.pioneer.world.interchange.words import ROBOT
 from p2os.pioneer.world.model import normal_of
 
 #: chosen: a wheel's motor holds its speed with the torque that it has, N m s/rad.

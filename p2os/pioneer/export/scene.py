@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 
-from p2os.pioneer.world.formats.transform import Transform, from_roll_pitch_yaw
+from p2os.pioneer.world.interchange.transform import Transform, from_roll_pitch_yaw
 from p2os.pioneer.world.model import Triangle, Vertex
 
 Vector = tuple[float, float, float]

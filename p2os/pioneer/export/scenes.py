@@ -30,7 +30,7 @@ from p2os.pioneer.export.scene import (
     Vector,
 )
 from p2os.pioneer.world.drawing import Look, look_of
-from p2os.pioneer.world.formats.annotation import GROUND, ROBOT
+from p2os.pioneer.world.interchange.words import GROUND, ROBOT
 from p2os.pioneer.world.model import LONGEST_NAME, Kind, Obstacle, World
 from p2os.robots.parameters import RobotParameters
 

@@ -14,6 +14,8 @@ from typing import Any
 from p2os.errors import WorldError
 from p2os.pioneer.world.makers.arena import arena
 from p2os.pioneer.world.model import LONGEST_NAME, RANGES, Kind, Mark, Mesh, Obstacle, Pose, Repeat, Walk, World
+from p2os.pioneer.world.placing import Placing
+from p2os.pioneer.world.readers import read_placed
 from p2os.toml_file import TomlSource, read_toml
 from p2os.toml_schema import Key, Place, Table, check_table, filled, placed, within
 from p2os.toml_schema import Kind as KeyKind
@@ -193,8 +195,6 @@ def _mark(v: Values, at: Place) -> Mark:
 
 
 def _imported(v: Values, at: Place, folder: Path) -> World:
-    from p2os.pioneer.world.formats import Placing, read_placed  # they stand above the world file
-
     with placed(at, "file"):
         placing = Placing(
             x_m=v["x_m"], y_m=v["y_m"], z_m=v["z_m"], heading_rad=math.radians(v["heading_deg"]), scale=v["scale"],

@@ -1,7 +1,7 @@
 """Load a world: one that ships, a world file, or a file of another program.
 
 Worlds that ship and our own files are TOML (`file`); all else is read by
-`formats`.
+`readers`.
 """
 
 from functools import lru_cache
@@ -11,6 +11,7 @@ from pathlib import Path
 from p2os.errors import WorldError
 from p2os.pioneer.world.file import parse_world
 from p2os.pioneer.world.model import World
+from p2os.pioneer.world.readers import read_world, readers
 from p2os.pioneer.world.text_file import read_text
 from p2os.toml_file import is_file, is_folder
 from simbase.errors import nearest, shown
@@ -24,9 +25,7 @@ def known_worlds() -> tuple[str, ...]:
 
 def world_suffixes() -> tuple[str, ...]:
     """Return the endings of the files that are read as worlds, `.toml` first."""
-    from p2os.pioneer.world.formats import FORMATS
-
-    return (".toml", *FORMATS)
+    return (".toml", *readers())
 
 
 def load_world(name_or_path: str | Path, seed: int = 0) -> World:
@@ -54,8 +53,6 @@ def load_world(name_or_path: str | Path, seed: int = 0) -> World:
             hint=nearest(name, known_worlds(), f"shipped worlds: {', '.join(known_worlds())}"),
         )
     if path.suffix.lower() != ".toml":
-        from p2os.pioneer.world.formats import read_world
-
         return read_world(path)
     return parse_world(read_text(path), name, seed, path.parent)
 

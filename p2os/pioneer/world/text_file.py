@@ -1,10 +1,10 @@
-"""The text of a world file: bounded, and every error a `WorldError`."""
+"""The text of a world file, and its size: bounded, and every error a `WorldError`."""
 
 from pathlib import Path
 
 from p2os.errors import WorldError
 from p2os.toml_file import read_user_text
-from simbase.files import read_bytes, with_plain_ends
+from simbase.files import LARGEST_FILE_BYTES, read_bytes, with_plain_ends
 
 
 def read_text(path: Path) -> str:
@@ -31,3 +31,16 @@ def read_foreign_text(path: Path) -> str:
     except UnicodeDecodeError:
         text = data.decode("latin-1")
     return with_plain_ends(text)
+
+
+def sized(path: Path) -> Path:
+    """Return a path that may be read.
+
+    Raises:
+        WorldError: It is no file or folder, or a file that is too large.
+    """
+    if not path.is_file() and not path.is_dir():
+        raise WorldError(f"{path}: neither a file nor a folder", hint="a pipe or a device is not read")
+    if path.is_file() and path.stat().st_size > LARGEST_FILE_BYTES:
+        raise WorldError(f"{path}: larger than {LARGEST_FILE_BYTES >> 20} MiB", hint="make it simpler first")
+    return path

@@ -16,7 +16,6 @@ from p2os.cli.names import worlds
 from p2os.cli.quantities import option
 from p2os.errors import WorldError
 from p2os.robots.parameters import known_robots
-from p2os.ros.bags import is_bag
 from robot_bench.experiments import require
 from simbase.errors import FileError, UsageError
 from simbase.files import write_text
@@ -130,14 +129,14 @@ def _write_example(folder: Path, world: str, seed: int, *, force: bool) -> None:
 
 
 def _drives(captures: Sequence[Path], truths: Sequence[Path], robot: str, how: "HowToRead") -> "list[Drive]":
-    from robot_bench.experiments.drive_files import read_drive
+    from robot_bench.experiments.drive_files import is_recording, read_drive
 
     if len(truths) > len(captures):
         raise UsageError(f"{len(truths)} --truth for {len(captures)} drives")
     found = []
     for number, path in enumerate(captures):
         drive = read_drive(path, robot=robot, how=how)
-        beside = [path.with_suffix(suffix) for suffix in TRUTH_SUFFIXES if path.is_file() or is_bag(path)]
+        beside = [path.with_suffix(suffix) for suffix in TRUTH_SUFFIXES if is_recording(path)]
         measured = truths[number] if number < len(truths) else next((one for one in beside if one.is_file()), None)
         if measured is not None:
             drive.truth = read_drive(measured).truth

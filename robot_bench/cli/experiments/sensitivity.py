@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from p2os.cli.groups import BENCH
-from p2os.cli.names import bodies
+from p2os.cli.names import bodies, body_help
 from p2os.cli.quantities import option
 from p2os.cli.trust import Trusted, said
 from robot_bench.cli.names import scenario_names
@@ -74,7 +74,7 @@ def sensitivity(
         list[str] | None, typer.Option("--set", help="Set a key of the scenario.", metavar="KEY=VALUE")
     ] = None,
     body: Annotated[
-        str, typer.Option(help="kinematic, bullet, mujoco, best.", metavar="BODY", autocompletion=bodies,
+        str, typer.Option(help=body_help(), metavar="BODY", autocompletion=bodies,
                           show_default=False)
     ] = "",
     duration: Annotated[

@@ -72,6 +72,16 @@ def explain(
     )  # fmt: skip
 
 
+def cause_in_a_line(record: RunRecord, firmware: Path | None) -> str:
+    """Return why a run failed in one line; empty where no cause is found. The bench finds it by its entry point.
+
+    Raises:
+        ImageError, MissingDependencyError, UsageError: As `explain`.
+    """
+    found = explain(record, firmware)
+    return found.line if found.standing is Standing.CAUSE else ""
+
+
 def _prober(record: RunRecord, firmware: Path | None, limits: list[str]) -> Prober | None:
     if firmware is None:
         limits.append("what the program did: its file is not here (--firmware FILE)")

@@ -10,13 +10,10 @@ from pathlib import Path
 
 from p2os.errors import WorldError
 from p2os.pioneer.world.formats.xml_tree import Element, numbers
+from p2os.pioneer.world.interchange.words import GROUND, ROBOT, THING, WORLD
 from p2os.pioneer.world.model import LEAST_PUSHED_KG, MOST_PUSHED_KG, RANGES, Kind, Pose
 from simbase.errors import shown
 
-NAMESPACE = "urn:p2os:world"
-THING, WORLD = "thing", "world"
-#: What is written for other programs alone: the level ground, and a robot at the start.
-GROUND, ROBOT = "ground", "robot"
 _KINDS = {kind.value: kind for kind in Kind}
 
 

@@ -15,8 +15,8 @@ from typing import TypedDict
 
 from p2os.errors import WorldError
 from p2os.pioneer.world.formats.annotation import Traits
-from p2os.pioneer.world.formats.transform import Transform, apply, upright_heading
 from p2os.pioneer.world.geometry import Footprint, point_segment
+from p2os.pioneer.world.interchange.transform import Transform, apply, upright_heading
 from p2os.pioneer.world.model import (
     FARTHEST_M,
     LEAST_PUSHED_M,

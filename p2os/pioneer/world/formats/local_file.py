@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from p2os.errors import WorldError
+from p2os.pioneer.world.text_file import sized
 from simbase.errors import shown
-from simbase.files import LARGEST_FILE_BYTES
 
 
 def find_local(uri: str, beside: Path) -> Path:
@@ -34,16 +34,3 @@ def find_local(uri: str, beside: Path) -> Path:
             except (OSError, ValueError) as error:
                 raise WorldError(f"{beside}: {shown(uri)} is no path") from error
     raise WorldError(f"{beside}: it names {shown(uri)}, which is not there", hint=f"put it beside {beside.name}")
-
-
-def sized(path: Path) -> Path:
-    """Return a path that may be read.
-
-    Raises:
-        WorldError: It is no file or folder, or a file that is too large.
-    """
-    if not path.is_file() and not path.is_dir():
-        raise WorldError(f"{path}: neither a file nor a folder", hint="a pipe or a device is not read")
-    if path.is_file() and path.stat().st_size > LARGEST_FILE_BYTES:
-        raise WorldError(f"{path}: larger than {LARGEST_FILE_BYTES >> 20} MiB", hint="make it simpler first")
-    return path

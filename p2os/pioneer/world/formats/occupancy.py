@@ -20,9 +20,9 @@ from PIL import Image
 from p2os.errors import WorldError
 from p2os.pioneer.world.formats.collection import Collection
 from p2os.pioneer.world.formats.local_file import find_local
-from p2os.pioneer.world.formats.placing import Placing, placed_points
 from p2os.pioneer.world.formats.rectangles import rectangles
 from p2os.pioneer.world.model import FARTHEST_M, Kind, Obstacle, Pose, World
+from p2os.pioneer.world.placing import Placing, placed_points
 from p2os.pioneer.world.text_file import read_foreign_text
 
 MODES = ("trinary", "scale", "raw")

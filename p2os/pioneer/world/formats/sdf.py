@@ -17,8 +17,8 @@ from p2os.pioneer.world.formats.annotation import Traits, is_no_thing, noted_tra
 from p2os.pioneer.world.formats.collection import PLAIN, STANDS_STILL, Collection
 from p2os.pioneer.world.formats.local_file import find_local
 from p2os.pioneer.world.formats.shapes import take_geometry
-from p2os.pioneer.world.formats.transform import IDENTITY, Transform, after, from_roll_pitch_yaw
 from p2os.pioneer.world.formats.xml_tree import Element, numbers, read_xml
+from p2os.pioneer.world.interchange.transform import IDENTITY, Transform, after, from_roll_pitch_yaw
 from p2os.pioneer.world.model import Pose, World
 
 #: Files that include each other in a ring end here.

@@ -7,8 +7,8 @@ from p2os.pioneer.world.formats.annotation import Traits
 from p2os.pioneer.world.formats.collection import PLAIN, Collection
 from p2os.pioneer.world.formats.local_file import find_local
 from p2os.pioneer.world.formats.meshes.mesh_file import read_triangles
-from p2os.pioneer.world.formats.transform import Transform, after, apply, scaled
 from p2os.pioneer.world.formats.xml_tree import Element, numbers
+from p2os.pioneer.world.interchange.transform import Transform, after, apply, scaled
 
 #: Mesh formats that say which axis is up.
 STATES_ITS_AXIS = (".dae", ".gltf", ".glb")

@@ -19,8 +19,8 @@ from p2os.errors import WorldError
 from p2os.pioneer.world.formats.annotation import Traits, is_no_thing, noted_traits, noted_world, pushed
 from p2os.pioneer.world.formats.collection import PLAIN, STANDS_STILL, Collection
 from p2os.pioneer.world.formats.shapes import take_geometry
-from p2os.pioneer.world.formats.transform import IDENTITY, Transform, after, from_roll_pitch_yaw
 from p2os.pioneer.world.formats.xml_tree import Element, numbers, read_xml
+from p2os.pioneer.world.interchange.transform import IDENTITY, Transform, after, from_roll_pitch_yaw
 from p2os.pioneer.world.model import World
 
 #: PyBullet's, of a link that names none.

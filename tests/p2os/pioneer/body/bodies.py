@@ -7,7 +7,7 @@ import pytest
 from _pytest.mark.structures import ParameterSet
 
 from p2os.pioneer.body.contract import BodyState, RobotBody
-from p2os.pioneer.body.factory import BODY_NAMES
+from p2os.pioneer.body.factory import engines
 
 #: The package that a body needs, which is also the name of its test mark where it has one.
 ENGINES = {"bullet": "pybullet", "mujoco": "mujoco"}
@@ -26,7 +26,7 @@ def marks_of(body: str) -> list[pytest.MarkDecorator]:
 
 def each_body(*left_out: str) -> list[ParameterSet]:
     """Return the name of each body as a parameter."""
-    return [pytest.param(name, id=name, marks=marks_of(name)) for name in BODY_NAMES if name not in left_out]
+    return [pytest.param(name, id=name, marks=marks_of(name)) for name in engines() if name not in left_out]
 
 
 def drive(body: RobotBody, left_mps: float, right_mps: float, seconds: float) -> BodyState:

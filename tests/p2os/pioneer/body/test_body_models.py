@@ -6,7 +6,7 @@ import pickle
 import pytest
 
 from p2os.pioneer.body.contract import RobotBody
-from p2os.pioneer.body.factory import BODY_NAMES, make_body
+from p2os.pioneer.body.factory import engines, make_body
 from p2os.pioneer.world.model import Obstacle, Pose, World
 from p2os.robots.parameters import RobotParameters, known_robots, load_parameters
 from tests.p2os.pioneer.body.bodies import Maker, drive, each_body, marks_of, ramped
@@ -43,7 +43,7 @@ def marks_of_build(engine: str, place: int) -> list[pytest.MarkDecorator]:
     params=[
         pytest.param((engine, model), id=f"{engine}-{model}", marks=marks_of_build(engine, place))
         for place, model in enumerate(BUILDS)
-        for engine in BODY_NAMES
+        for engine in engines()
     ]
 )
 def robot(request: pytest.FixtureRequest) -> tuple[RobotParameters, Maker]:

@@ -13,7 +13,7 @@ from types import SimpleNamespace
 import pytest
 
 from p2os.pioneer.body.contract import RobotBody
-from p2os.pioneer.body.factory import BODY_NAMES, make_body, make_scene
+from p2os.pioneer.body.factory import engines, make_body, make_scene
 from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import Obstacle
 from p2os.robots.parameters import load_parameters
@@ -86,7 +86,7 @@ def run(*arguments: str, seed: str = "0") -> subprocess.CompletedProcess[str]:
 
 
 def test_snapshots_of_all_bodies_go_on_alike_in_other_processes(tmp_path: Path) -> None:
-    names = [name for name in BODY_NAMES if name not in ENGINES or find_spec(ENGINES[name])]
+    names = [name for name in engines() if name not in ENGINES or find_spec(ENGINES[name])]
     here = []
     for name in names:
         body = make_body(name, load_world("arena", 3), P2DX)

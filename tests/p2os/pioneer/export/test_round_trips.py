@@ -11,7 +11,7 @@ from p2os.pioneer.export import scene_of
 from p2os.pioneer.export.scene import Body, Box, Cylinder, Scene, Sphere, TriangleMesh
 from p2os.pioneer.export.triangles import triangulated
 from p2os.pioneer.world import known_worlds, load_world, parse_world
-from p2os.pioneer.world.formats.transform import IDENTITY, Transform, after, apply
+from p2os.pioneer.world.interchange.transform import IDENTITY, Transform, after, apply
 from p2os.pioneer.world.model import World
 from p2os.robots.parameters import known_robots, load_parameters
 from tests.p2os.pioneer.export.exported import differences, expected, worlds, written

@@ -10,9 +10,11 @@ import pytest
 
 from p2os.errors import WorldError
 from p2os.pioneer.world import load_world, parse_world
-from p2os.pioneer.world.formats import Placing, read_placed, xml_tree
+from p2os.pioneer.world.formats import xml_tree
 from p2os.pioneer.world.formats.meshes import mesh_file
 from p2os.pioneer.world.model import Mesh, cut, shadow
+from p2os.pioneer.world.placing import Placing
+from p2os.pioneer.world.readers import read_placed
 from p2os.pioneer.world.writer import write_world
 
 #: A wedge that no mirror image and no wrong turn leaves as it is: 2 m along x, 1 m along y, 3 m high at x = 0, y = 0.

@@ -134,7 +134,8 @@ def test_a_model_folder_is_found_by_its_name(folder: Path) -> None:
 
 @pytest.mark.parametrize("name", ["w.sdf", "a.urdf"])
 def test_only_a_mesh_has_another_up_axis(folder: Path, name: str) -> None:
-    from p2os.pioneer.world.formats import Placing, read_placed
+    from p2os.pioneer.world.placing import Placing
+    from p2os.pioneer.world.readers import read_placed
 
     (folder / "a.urdf").write_text(URDF)
     with pytest.raises(WorldError, match="Z up"):

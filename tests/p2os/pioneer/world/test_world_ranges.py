@@ -10,6 +10,7 @@ from p2os.pioneer.world import load_world
 from p2os.pioneer.world.file import IMPORT_KEYS, MESH_KEYS, SHAPES, START_KEYS, parse_world
 from p2os.pioneer.world.model import Mesh, Obstacle
 from p2os.robots.parameters import load_parameters
+from tests.p2os.pioneer.body.bodies import each_body
 
 HEAD = 'name = "w"\nextent_m = [-5, -5, 5, 5]\n'
 BOX = '[[box]]\nname = "b"\nx_m = 1\ny_m = 1\nlength_m = 1\nwidth_m = 1\n'
@@ -43,7 +44,7 @@ def test_what_no_body_bears_is_refused_by_its_place(text: str, place: str) -> No
     assert str(caught.value).isprintable()
 
 
-@pytest.mark.parametrize("body", ["bullet", "mujoco"])
+@pytest.mark.parametrize("body", each_body("kinematic"))
 def test_an_engine_takes_the_ends_of_what_can_be_pushed(body: str) -> None:
     pytest.importorskip({"bullet": "pybullet"}.get(body, body))
     for size, mass in ((0.01, 0.001), (0.01, 10_000.0), (2.0, 10_000.0)):

@@ -17,8 +17,8 @@ from pathlib import Path
 from p2os.errors import WorldError
 from p2os.pioneer.world.formats.collection import MOST_TRIANGLES, MOST_VERTICES
 from p2os.pioneer.world.formats.meshes.polygon import Triangles, triangulated
-from p2os.pioneer.world.formats.transform import IDENTITY, Transform, about_axis, after, apply, moved, scaled
 from p2os.pioneer.world.formats.xml_tree import Element, numbers, read_xml
+from p2os.pioneer.world.interchange.transform import IDENTITY, Transform, about_axis, after, apply, moved, scaled
 from p2os.pioneer.world.model import Vertex
 
 #: Nodes that name each other in a ring end here.

@@ -21,7 +21,8 @@ from p2os.errors import WorldError
 from p2os.pioneer.world.formats.collection import MOST_TRIANGLES, MOST_VERTICES
 from p2os.pioneer.world.formats.local_file import find_local
 from p2os.pioneer.world.formats.meshes.polygon import Triangles
-from p2os.pioneer.world.formats.transform import IDENTITY, Transform, after, apply, moved, scaled
+from p2os.pioneer.world.interchange.transform import IDENTITY, Transform, after, apply, moved, scaled
+from p2os.pioneer.world.interchange.words import CHUNK_HEADER, GLB_HEADER, GLB_MAGIC
 from p2os.pioneer.world.model import Triangle
 from simbase.errors import shown
 from simbase.files import LARGEST_FILE_BYTES, read_bytes
@@ -33,8 +34,6 @@ MOST_VALUES = 1_000_000
 #: chosen: of all buffers.
 MOST_BYTES = 4 * LARGEST_FILE_BYTES
 
-#: Of a .glb: magic number, version and length, then chunks of a length, a type and data (glTF 2.0, section 4.4).
-GLB_MAGIC, GLB_HEADER, CHUNK_HEADER = b"glTF", 12, 8
 #: glTF 2.0, section 3.6.2.2: component type → its letter for `struct`; of positions, and of indices.
 POSITION_TYPES = {5126: "3f"}
 INDEX_TYPES = {5121: "B", 5123: "H", 5125: "I"}

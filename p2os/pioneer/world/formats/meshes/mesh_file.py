@@ -18,8 +18,8 @@ from p2os.pioneer.world.formats.collection import MOST_TRIANGLES, MOST_VERTICES,
 from p2os.pioneer.world.formats.meshes.collada import read_collada
 from p2os.pioneer.world.formats.meshes.gltf import read_gltf
 from p2os.pioneer.world.formats.meshes.polygon import Triangles, triangulated
-from p2os.pioneer.world.formats.placing import with_z_up
 from p2os.pioneer.world.model import Vertex, World
+from p2os.pioneer.world.placing import with_z_up
 from p2os.pioneer.world.text_file import read_foreign_text
 from simbase.errors import shown
 from simbase.files import read_bytes

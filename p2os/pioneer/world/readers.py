@@ -1,37 +1,28 @@
-"""Which reader reads which file."""
+"""Files of other programs as worlds: the reader of a file is an entry point, found by the file's ending."""
 
 from collections.abc import Mapping
 from dataclasses import replace
-from importlib import import_module
+from functools import cache
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Protocol, cast
 
 from p2os.errors import WorldError
-from p2os.pioneer.world.formats.local_file import sized
-from p2os.pioneer.world.formats.placing import Placing, placed_world
 from p2os.pioneer.world.model import World
+from p2os.pioneer.world.placing import Placing, placed_world
+from p2os.pioneer.world.text_file import sized
 from simbase.errors import MissingDependencyError, shown_name
+from simbase.installation import way_to_plug_in
+from simbase.trust import installed_points
 
-#: Ending → module of this package that reads such files.
-FORMATS: Mapping[str, str] = {
-    ".map": "aria_map",
-    ".yaml": "occupancy",
-    ".yml": "occupancy",
-    ".sdf": "sdf",
-    ".world": "sdf",
-    ".urdf": "urdf",
-    ".obj": "meshes.mesh_file",
-    ".stl": "meshes.mesh_file",
-    ".dae": "meshes.mesh_file",
-    ".gltf": "meshes.mesh_file",
-    ".glb": "meshes.mesh_file",
-}
+#: The entry points: the ending without its dot → `Reader`.
+GROUP = "p2os.world_readers"
 
 
 class Reader(Protocol):
-    """What a module of `FORMATS` has."""
+    """What an entry point of `GROUP` is."""
 
-    def read(self, path: Path, up: str) -> World:
+    def __call__(self, path: Path, up: str) -> World:
         """Return what a file holds, in metres with Z up.
 
         Args:
@@ -42,6 +33,12 @@ class Reader(Protocol):
             WorldError: The file is not what its ending names.
         """
         ...
+
+
+@cache
+def readers() -> Mapping[str, EntryPoint]:
+    """Return what reads files of other programs, by their endings; looked up once a process."""
+    return {f".{name}": point for name, point in installed_points(GROUP).items()}
 
 
 def read_world(path: Path) -> World:
@@ -61,10 +58,10 @@ def read_placed(path: Path, placing: Placing) -> World:
         WorldError: No reader knows the ending, or the file is broken.
         MissingDependencyError: The reader needs a package that is not installed.
     """
-    module = FORMATS.get(path.suffix.lower())
+    point = readers().get(path.suffix.lower())
     if path.suffix.lower() == ".toml":
         raise WorldError(f"{shown_name(path)}: a world file, where a file of another program is taken", hint=_known())
-    if module is None:
+    if point is None:
         raise WorldError(
             f"{shown_name(path)}: no reader for {shown_name(path.suffix) or 'a file without an ending'}",
             hint=_known(".toml"),
@@ -76,9 +73,9 @@ def read_placed(path: Path, placing: Placing) -> World:
     if not path.is_file():
         raise WorldError(f"{path}: not a file")
     sized(path)
-    reader = cast("Reader", _load(module))
+    reader = _load(point)
     try:
-        world = reader.read(path, placing.up)
+        world = reader(path, placing.up)
         return placed_world(replace(world, source=str(path)), placing)
     except WorldError as error:
         if str(path.parent) in str(error):
@@ -90,13 +87,14 @@ def read_placed(path: Path, placing: Placing) -> World:
         raise WorldError(f"{path}: too large or too deep to read", hint="make it simpler first") from error
 
 
-def _load(module: str) -> object:
+def _load(point: EntryPoint) -> Reader:
     """Import a reader, or name the package that it lacks."""
     try:
-        return import_module(f"p2os.pioneer.world.formats.{module}")
+        return cast("Reader", point.load())
     except ModuleNotFoundError as error:
         raise MissingDependencyError(f"reading this file needs {error.name}", extra="worlds") from error
 
 
 def _known(*more: str) -> str:
-    return f"readable: {', '.join((*more, *FORMATS))}"
+    absent = way_to_plug_in(GROUP)
+    return f"readable: {', '.join((*more, *readers())) or 'none'}{absent and f'; {absent}'}"

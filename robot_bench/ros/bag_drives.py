@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from p2os.robots.parameters import RobotParameters
-from p2os.ros.bags import Recorded, read_bag
+from p2os.ros.bags import Recorded, is_bag, read_bag
 from robot_bench.drives.drive import Drive, Trajectory, heading_of, steps_of
 from simbase.errors import FileError, shown_name
 from simbase.timing import NS_PER_S, Nanos
@@ -37,7 +37,12 @@ Pairs = list[tuple[float, float]]
 Echoes = Iterator[tuple[int, float]]
 
 
-def drive_of_bag(path: Path, parameters: RobotParameters) -> Drive:
+def knows(path: Path) -> bool:
+    """Tell whether a path looks like a bag."""
+    return is_bag(path)
+
+
+def read(path: Path, parameters: RobotParameters) -> Drive:
     """Return what a bag tells of a drive.
 
     Args:
