@@ -7,7 +7,6 @@ import pytest
 from bluepill_sim.__main__ import run
 from bluepill_sim.board import BluePill
 from bluepill_sim.program.reset_loop import LEAST_NS, MOST_RESETS, ResetRow
-from robot_bench.bench import Bench
 from simbase.timing import NS_PER_MS, Reason
 from tests.bluepill_sim.machine import Machine
 
@@ -80,11 +79,3 @@ def test_mcu_run_names_it_and_ends(tmp_path: Path, capfd: pytest.CaptureFixture[
     error = capfd.readouterr().err
     assert "fault: it resets for ever: 100 times in " in error
     assert "100 resets (SOFTWARE 100)" in error
-
-
-def test_a_bench_ends_and_says_so(tmp_path: Path) -> None:
-    bench = Bench.from_scenario("motors", body="kinematic", firmware=program(RESET, tmp_path))
-    bench.run_until("5 s")
-    assert bench.chip.has_died
-    assert bench.end < 2_000 * NS_PER_MS
-    assert "it resets for ever" in bench.chip.verdict

@@ -298,7 +298,7 @@ def test_the_current_folder_is_no_installed_package(entry: str, folder: Path, mo
     monkeypatch.chdir(folder)
     monkeypatch.setattr(sys, "path", [str(folder) if entry == "HERE" else entry, *sys.path])
     assert "rogue" not in installed_points("p2os.parts")
-    assert "run" in installed_points("p2os.verbs")
+    assert "simbase" in installed_points("simbase.packages")
     with pytest.raises(UsageError, match="there is no part 'rogue'"):
         loaded("rogue")
     assert not was_executed(folder)
