@@ -238,6 +238,7 @@ static RARELY uint32_t ask_read(const struct region_user *region, uint32_t offse
     if (!begin_access(core, region->base + offset, false, size)) {
         return 0;
     }
+    leave_ahead(core->fabric);
     const uint32_t word = core->calls.read(region->number, offset, size);
     core->shared.in_access = 0;
     return word;
@@ -249,6 +250,7 @@ static RARELY void ask_write(const struct region_user *region, uint32_t offset, 
     if (!begin_access(core, region->base + offset, true, size)) {
         return;
     }
+    leave_ahead(core->fabric);
     core->calls.write(region->number, offset, size, value);
     core->shared.in_access = 0;
 }
@@ -410,6 +412,22 @@ static uint32_t read_page(struct core *core, struct page *page, uint32_t index, 
     return word;
 }
 
+/* Reads a register that only events change, for a loop that has read it a round before; false: it is none. */
+bool read_again(struct core *core, uint32_t address, uint32_t *word)
+{
+    const uint32_t offset = address - PERIPHERALS, index = (offset & IN_PAGE) >> 2;
+    if (offset >> PAGE_SHIFT >= PAGES || !may_access(core)) {
+        return false;
+    }
+    struct page *page = &core->pages[offset >> PAGE_SHIFT];
+    if (index >= page->count || !has_clock(page) || !(page->behaviour[index] & (READS_PLAIN | READS_NATIVE)) ||
+        read_needs_time(page, index)) {
+        return false;
+    }
+    *word = read_now(page, index);
+    return true;
+}
+
 static void write_page(struct core *core, struct page *page, uint32_t index, uint32_t address, uint32_t size,
                        uint32_t written, bool is_late)
 {
@@ -418,6 +436,7 @@ static void write_page(struct core *core, struct page *page, uint32_t index, uin
         (is_late ? !catch_up(core, page, address, true, size) : !begin_access(core, address, true, size))) {
         return;
     }
+    leave_for_store(page->device, index);
     const uint32_t previous = store(page, index, written);
     if (page->behaviour[index] & WRITES_NATIVE) {
         page->device->kind->write(page->device, index, written, previous);
@@ -603,6 +622,7 @@ static bool write_register_bit(struct core *core, uint32_t offset, uint32_t bit,
         return true;
     }
     const uint32_t word = read_now(page, index), written = is_high ? word | 1u << bit : word & ~(1u << bit);
+    leave_for_store(page->device, index);
     const uint32_t previous = store(page, index, written);
     if (page->behaviour[index] & WRITES_NATIVE) {
         page->device->kind->write(page->device, index, written, previous);

@@ -44,6 +44,7 @@ void core_flush(struct core *core)
     if (core->record_count) {
         const uint32_t count = core->record_count;
         core->record_count = 0;
+        leave_ahead(core->fabric);
         core->calls.recorded(core->records, count);
     }
 }
@@ -97,6 +98,7 @@ static void enter_special(struct core *core, uint32_t address, uint32_t size, st
     }
     core->waiting.has_acted |= row == NULL || row->flags & (ROW_CHANGES_MASKS | ROW_SENDS_EVENT);
     if (row == NULL) {
+        leave_ahead(core->fabric);
         core->calls.unknown_block(address, size);
         row = find(core, address);
         if (s->halt_kind != HALT_NONE || row == NULL) {
@@ -170,6 +172,7 @@ static RARELY void trim_registers(struct core *core)
 static __attribute__((noinline)) void enter_block(struct core *core, uint32_t address, uint32_t size)
 {
     const struct row *before = core->block;
+    bool has_looked = false;
     core->shared.cycle += before->costs[address != before->end];
     if (UNLIKELY(before->flags & ROW_CHANGES_MASKS)) {
         trim_registers(core);
@@ -188,6 +191,7 @@ static __attribute__((noinline)) void enter_block(struct core *core, uint32_t ad
         if (way != GOES_ON) {
             return;
         }
+        has_looked = true;
     }
     struct row *row = find(core, address);
     if (UNLIKELY(row == NULL || row->flags & ROW_ATTENTION)) {
@@ -197,7 +201,7 @@ static __attribute__((noinline)) void enter_block(struct core *core, uint32_t ad
     begin_block(core, row);
     record(core, address, 0);
     if (UNLIKELY(row == before) && row->loop != NULL && core->records == NULL) {
-        wait_on(core, row, rounds_of_counter(core, row));
+        wait_on(core, row, rounds_of_loop(core, row, has_looked));
     }
 }
 

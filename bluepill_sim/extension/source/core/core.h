@@ -270,9 +270,10 @@ void record_at(struct core *core, uint64_t cycle, uint32_t address, int32_t kind
 /* polling.c */
 void look_later(struct core *core);
 void look_now(struct core *core);
+bool read_again(struct core *core, uint32_t address, uint32_t *word);
 bool looks_for_waiting(struct core *core, uint32_t address);
 void wait_on(struct core *core, const struct row *row, uint64_t rounds);
-uint64_t rounds_of_counter(struct core *core, const struct row *row);
+uint64_t rounds_of_loop(struct core *core, const struct row *row, bool is_first);
 /* forced.c */
 uint32_t core_forced(void *user, uint32_t address);
 /* access.c */

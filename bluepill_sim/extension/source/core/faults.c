@@ -38,6 +38,7 @@ bool core_on_bad_access(void *unicorn, int kind, uint64_t address, int size, int
     struct core *core = user;
     struct shared *s = &core->shared;
     const bool is_buffered = kind == WRITE_UNMAPPED && !(s->actlr & DISDEFWBUF);
+    leave_ahead(core->fabric);
     if (may_write_at_once(core, kind) && core->calls.write_at_once((uint32_t)address, (uint32_t)size, next_stop(core))) {
         core->waiting.has_acted = 1;
         return true;

@@ -52,6 +52,7 @@ uint32_t core_forced(void *user, uint32_t address)
         }
     }
     struct forced found = {.pc = pc, .start = start, .address = address, .seen = {UINT32_MAX}};
+    leave_ahead(core->fabric);
     found.bits = core->fabric->calls.forced(address, found.seen);
     if (is_known && can_be_kept(core, &found)) {
         core->forced[set][core->forced_next[set]++ % FORCED_WAYS] = found;

@@ -59,6 +59,7 @@ static bool write_register_of(struct page *page, uint32_t index, struct bus_acce
         }
         access->word = (access->word & (access->bytes == 1 ? 0xFF : 0xFFFF)) * (access->bytes == 1 ? 0x01010101u : 0x10001u);
     }
+    leave_for_store(page->device, index);
     const uint32_t previous = store(page, index, access->word);
     if (behaviour & WRITES_NATIVE) {
         page->device->kind->write(page->device, index, access->word, previous);

@@ -6,8 +6,8 @@
  * with the same registers, and the second time with the same SRAM. A round does not count where something was written
  * to a peripheral, where a value was read that may be a clock, or that Python has answered, and where priorities or
  * masks may have changed. A register that is read many times in a row has a round looked for at once. Where a loop of
- * one block reads a counter that is known to be a ramp of time, as native/polling.py says, the round that leaves it is
- * worked out.
+ * one block does nothing but read a register, as native/polling.py says, the round that leaves it is worked out: of a
+ * counter that is known to be a ramp of time, or of a register that only events change, at the next of them.
  */
 #include <stdlib.h>
 #include <string.h>
@@ -240,16 +240,23 @@ static uint32_t count_at(const struct fabric *fabric, const struct counter *coun
     return ramp_at(ramp, tick);
 }
 
-/* How many of the next rounds of such a loop go round again, of those that end before the run does: the value of a
- * counter follows from the time, and each round but the last leaves nothing that the next one does not overwrite.
+/* How many of the next rounds of such a loop go round again, of those that end before the run does: each round but the
+ * last leaves nothing that the next one does not overwrite. The value of a counter follows from the time; that of any other
+ * register only events change, and they and the read of the round before have done so. `is_first`: an event may have
+ * come since that read, so one has to be made before.
  */
-uint64_t rounds_of_counter(struct core *core, const struct row *row)
+uint64_t rounds_of_loop(struct core *core, const struct row *row, bool is_first)
 {
     const struct loop *loop = row->loop;
     const struct shared *s = &core->shared;
     const uint32_t address = read_register(core, REG_R0 + loop->base) + loop->offset;
-    const struct counter *counter = s->stop_at ? counter_at(core, address) : NULL;
-    if (counter == NULL) {
+    const uint64_t left = s->stop_at ? rounds_left(core, row) : 0, first = s->cycle + loop->read_cycle, cost = row->costs[1];
+    if (!left) {
+        return 0;
+    }
+    const struct counter *counter = counter_at(core, address);
+    uint32_t word = 0;
+    if (counter == NULL && (is_first || !read_again(core, address, &word))) {
         return 0;
     }
     uint32_t operands[sizeof loop->steps / sizeof *loop->steps];
@@ -257,8 +264,10 @@ uint64_t rounds_of_counter(struct core *core, const struct row *row)
         const struct step *step = &loop->steps[k];
         operands[k] = step->is_register ? read_register(core, REG_R0 + (int)step->operand) : step->operand;
     }
-    const uint64_t left = rounds_left(core, row), first = s->cycle + loop->read_cycle, cost = row->costs[1];
     uint64_t n = 0, changes;
+    if (counter == NULL) {
+        return holds(loop->condition, run_steps(loop, operands, word)) ? left : 0;
+    }
     while (n < left && holds(loop->condition, run_steps(loop, operands, count_at(core->fabric, counter, first + n * cost, &changes)))) {
         if (changes == NO_TIME) {
             return left;

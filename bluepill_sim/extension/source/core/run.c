@@ -248,6 +248,7 @@ void core_on_trap(void *unicorn, uint64_t address, uint32_t size, void *user)
     struct core *core = trap->core;
     const uint32_t value = read_register(core, (int)trap->number);
     if (trap->kind == HALT_UNALIGNED ? (value & 3) != 0 : core->shared.traps_division && value == 0) {
+        leave_ahead(core->fabric);
         core->calls.trapped(trap->kind, trap->address, value);
     }
 }
@@ -426,7 +427,10 @@ static uint32_t run(struct core *core, uint64_t limit)
 /* Goes on to the first boundary at or after `limit`; returns why it ended, HALT_BOUNDARY at a boundary or when asked to. */
 uint32_t core_run(struct core *core, uint64_t limit)
 {
+    core->fabric->may_run_ahead = true;
     const uint32_t kind = run(core, limit);
+    leave_ahead(core->fabric);
+    core->fabric->may_run_ahead = false;
     core_flush(core);
     return kind;
 }

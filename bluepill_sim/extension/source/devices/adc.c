@@ -102,7 +102,7 @@ static uint32_t switching_cycles(const struct adc *adc) { return adc->divider ==
 
 static int64_t input_uv(const struct device *device, uint32_t channel, uint64_t ns)
 {
-    const struct fabric *fabric = device->fabric;
+    struct fabric *fabric = device->fabric;
     if (channel < PIN_CHANNELS) {
         return channel_uv(fabric, channel, ns);
     }

@@ -66,7 +66,7 @@ static void tell(struct device *device, uint64_t ns, uint32_t what, uint32_t byt
 static bool is_low(const struct device *device, uint32_t which)
 {
     const struct i2c *i2c = device->state;
-    const struct port *port = &device->fabric->ports[i2c->pins[which] / PINS];
+    const struct port *port = port_now(device->fabric, i2c->pins[which] / PINS);
     const uint32_t bit = 1u << i2c->pins[which] % PINS;
     if (i2c->show && (i2c->offered[which] == LOW || port->bus_low & bit)) { /* what is shown hides all but a hard driver */
         return (port->rail & ~port->rail_high & bit) || (port->outside & ~port->outside_high & ~port->rail & bit);

@@ -73,6 +73,15 @@ static void update_outputs(struct device *device)
 
 /* Pins. */
 
+static bool runs_ahead(const struct device *device) { return device->fabric->ahead.device == device; }
+
+static void stop_running_ahead(struct device *device)
+{
+    if (runs_ahead(device)) {
+        leave_ahead(device->fabric);
+    }
+}
+
 static void put(struct device *device, uint32_t which, uint32_t level)
 {
     struct spi *spi = device->state;
@@ -129,6 +138,7 @@ static void check_mode_fault(struct device *device)
 
 static void pins(struct device *device, uint32_t port, uint32_t changed)
 {
+    stop_running_ahead(device);
     const struct spi *spi = device->state;
     for (uint32_t left = changed & spi->selects[port]; left; left &= left - 1) {
         ask(device, SELECT, PINS * port + (uint32_t)__builtin_ctz(left));
@@ -189,35 +199,108 @@ static uint64_t word_ticks(const struct device *device)
     return spi->far ? bits_of(device) : (uint64_t)bits_of(device) << ((device->words[CR1] >> BR_AT & 7) + 1);
 }
 
+static uint64_t ns_after(const struct spi *spi, uint64_t ticks)
+{
+    const struct ticks since = {.ns = spi->base_ns, .hz = spi->rate_hz};
+    return ns_of_tick(&since, ticks);
+}
+
 static uint64_t end_ns(const struct spi *spi)
 {
-    return spi->base_ns + (uint64_t)((__uint128_t)spi->ticks * NS_PER_S / spi->rate_hz);
+    return ns_after(spi, spi->ticks);
 }
 
 static uint64_t half_ns(const struct spi *spi)
 {
     const uint64_t ticks = spi->word_at_ticks + (uint64_t)spi->half * spi->half_ticks;
-    return spi->base_ns + (uint64_t)((__uint128_t)ticks * NS_PER_S / spi->rate_hz);
+    return ns_after(spi, ticks);
 }
 
 /* Waits for the end of the word, or for a half-bit before it that is shown. */
 static void wait(struct device *device)
 {
     const struct spi *spi = device->state;
-    schedule(device, spi->half && spi->half < spi->halves ? half_ns(spi) : end_ns(spi));
+    schedule(device, !runs_ahead(device) && spi->half && spi->half < spi->halves ? half_ns(spi) : end_ns(spi));
 }
 
-/* Puts the next half of a bit on the pins: data change at the first, and are sampled at the second. */
+/* The levels in a half of a bit: data change at the first, and are sampled at the second. */
+static uint32_t mosi_at(const struct device *device, uint32_t half)
+{
+    const struct spi *spi = device->state;
+    const uint32_t bit = half / 2, at = device->words[CR1] & LSBFIRST ? bit : spi->halves / 2 - 1 - bit;
+    return spi->shift >> at & 1 ? HIGH : LOW;
+}
+
+static uint32_t sck_at(const struct device *device, uint32_t half)
+{
+    const uint32_t control = device->words[CR1];
+    return ((half & 1) != (control & CPHA)) != !!(control & CPOL) ? HIGH : LOW;
+}
+
+/* Puts the next half of a bit on the pins. */
 static void show_half(struct device *device)
 {
     struct spi *spi = device->state;
-    const uint32_t control = device->words[CR1], n = spi->half++;
-    const bool is_active = (n & 1) != (control & CPHA);
+    const uint32_t n = spi->half++;
     if (!(n & 1) && !only_receives(device)) {
-        const uint32_t at = control & LSBFIRST ? n / 2 : spi->halves / 2 - 1 - n / 2;
-        put(device, MOSI, spi->shift >> at & 1 ? HIGH : LOW);
+        put(device, MOSI, mosi_at(device, n));
     }
-    put(device, SCK, is_active != !!(control & CPOL) ? HIGH : LOW);
+    put(device, SCK, sck_at(device, n));
+}
+
+/* Runs ahead of the edges of a word; false: each must come at its time. */
+static bool runs_ahead_of_word(struct device *device)
+{
+    const struct spi *spi = device->state;
+    const uint32_t number = spi->pins[SCK] / PINS;
+    uint32_t shown = 1u << spi->pins[SCK] % PINS;
+    if (!carries(device, SCK) || spi->offered[SCK] == FLOATING) {
+        return false;
+    }
+    if (!only_receives(device)) {
+        if (!carries(device, MOSI) || spi->offered[MOSI] == FLOATING || spi->pins[MOSI] / PINS != number) {
+            return false;
+        }
+        shown |= 1u << spi->pins[MOSI] % PINS;
+    }
+    return run_ahead(device, number, shown);
+}
+
+static void put_level_ahead(struct device *device, uint32_t which, uint32_t level, uint64_t ns, bool is_first)
+{
+    struct spi *spi = device->state;
+    if (spi->offered[which] != level) {
+        spi->offered[which] = level;
+        put_ahead(device->fabric, 1u << spi->pins[which] % PINS, level == HIGH, ns, is_first);
+    }
+}
+
+/* The first half of all begins with the word. */
+static void show_due(struct device *device, uint64_t until_ns)
+{
+    struct spi *spi = device->state;
+    const uint32_t first = spi->half;
+    uint64_t ns;
+    while (spi->half < spi->halves && ((ns = half_ns(spi)) <= until_ns || !spi->half)) {
+        const uint32_t n = spi->half++;
+        if (!(n & 1) && !only_receives(device)) {
+            put_level_ahead(device, MOSI, mosi_at(device, n), ns, !n);
+        }
+        put_level_ahead(device, SCK, sck_at(device, n), ns, !n);
+    }
+    if (spi->half == first) {
+        return;
+    }
+    come_to(device->fabric, 1u << spi->pins[SCK] % PINS, spi->source + SCK, spi->offered[SCK] == HIGH);
+    if (!only_receives(device)) {
+        come_to(device->fabric, 1u << spi->pins[MOSI] % PINS, spi->source + MOSI, spi->offered[MOSI] == HIGH);
+    }
+}
+
+static void show(struct device *device, uint64_t until_ns)
+{
+    show_due(device, until_ns);
+    wait(device);
 }
 
 static void show_word(struct device *device)
@@ -228,7 +311,9 @@ static void show_word(struct device *device)
     if (is_master(device) && !spi->far && (is_watched(device, SCK) || is_watched(device, MOSI))) {
         spi->halves = 2 * bits_of(device);
         spi->half_ticks = 1u << (device->words[CR1] >> BR_AT & 7);
-        show_half(device);
+        if (!runs_ahead_of_word(device)) {
+            show_half(device);
+        }
     } else if (was_shown) {
         connect(device);
     }
@@ -347,6 +432,10 @@ static void event(struct device *device, uint64_t until)
 {
     const struct spi *spi = device->state;
     uint64_t ns;
+    if (runs_ahead(device) && due_ns(device) <= until) {
+        device->fabric->ahead.device = NULL;
+        show_due(device, NO_TIME);
+    }
     while ((ns = due_ns(device)) <= until) {
         if (spi->half && spi->half < spi->halves) {
             show_half(device);
@@ -367,7 +456,9 @@ static uint32_t read(struct device *device, uint32_t index)
     if (index == SR) { /* a read of DR, then of SR clears OVR; a read of SR, then a write of CR1 clears MODF */
         device->words[SR] &= ~(spi->seen & OVR);
         spi->seen = status & MODF;
-        update_outputs(device);
+        if (device->words[SR] != status) {
+            update_outputs(device);
+        }
         return status;
     }
     spi->seen |= status & OVR;
@@ -452,6 +543,7 @@ static void clear(struct device *device)
 static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint32_t other)
 {
     struct spi *spi = device->state;
+    stop_running_ahead(device);
     const uint64_t now = now_ns(device->fabric);
     switch (what) {
     case SETTLE: return one == SR ? device->words[SR] : spi->rdr;
@@ -499,4 +591,4 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
     return 0;
 }
 
-DEVICE_KIND(spi_kind) = {.name = "spi", .needs_time = needs_time, .read = read, .write = write, .event = event, .pins = pins, .command = command};
+DEVICE_KIND(spi_kind) = {.name = "spi", .needs_time = needs_time, .read = read, .write = write, .event = event, .pins = pins, .show = show, .command = command};

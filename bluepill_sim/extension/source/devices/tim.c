@@ -389,8 +389,7 @@ static void write(struct device *device, uint32_t index, uint32_t written, uint3
         return;
     }
     if (changes_wave_alone(device, index)) {
-        tim_of(device)->ccr[index - CCR1] = words[index];
-        show_output(device, index - CCR1);
+        show_duty(device, index - CCR1, words[index]);
         return;
     }
     const uint32_t stored = words[index], kept = kept_bits(device, index);

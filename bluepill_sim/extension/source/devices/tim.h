@@ -101,8 +101,8 @@ static inline uint64_t tick_after(const struct tim *tim, uint64_t counts)
 bool reference(const struct device *device, uint32_t channel);
 void note_references(struct device *device);
 void show_outputs(struct device *device);
-/* Of one channel alone, without its complement. */
-void show_output(struct device *device, uint32_t channel);
+/* Of one channel of PWM alone, without its complement: its CCRx in effect becomes another one. */
+void show_duty(struct device *device, uint32_t channel, uint32_t ccr);
 uint64_t next_output_stop(const struct device *device);
 /* Takes outputs to their idle states, or back. */
 void set_moe(struct device *device, bool is_on);

@@ -51,7 +51,7 @@ bool hears_line(const struct device *device, uint32_t input)
 bool is_break_active(const struct device *device)
 {
     const uint32_t pin = tim_of(device)->pins[PIN_BKIN], bdtr = device->words[BDTR];
-    const uint32_t is_high = device->fabric->ports[pin / PINS].input >> pin % PINS & 1;
+    const uint32_t is_high = port_now(device->fabric, pin / PINS)->input >> pin % PINS & 1;
     return bdtr & BKE && is_high == (bdtr & BKP) / BKP;
 }
 
@@ -367,7 +367,7 @@ void set_filters(struct device *device)
 static bool pin_level(const struct device *device, uint32_t which)
 {
     const uint32_t pin = tim_of(device)->pins[which];
-    return device->fabric->ports[pin / PINS].input >> pin % PINS & 1;
+    return port_now(device->fabric, pin / PINS)->input >> pin % PINS & 1;
 }
 
 /* The level in front of the filter of an input; ETR behind its polarity and prescaler. */

@@ -14,7 +14,7 @@ static struct shape level(bool is_high) { return is_high ? high : low; }
 
 static struct shape wave(uint64_t period, uint64_t ones, uint64_t rises)
 {
-    return (struct shape){.kind = SHOWS_WAVE, .period = period, .high = ones, .edge = rises % period};
+    return (struct shape){.kind = SHOWS_WAVE, .period = period, .high = ones, .edge = within(rises, period)};
 }
 
 static bool level_at(const struct shape *shape, uint64_t tick)
@@ -95,20 +95,20 @@ static struct shape reference_shape(const struct device *device, uint32_t channe
     const struct tim *tim = tim_of(device);
     const struct ramp *ramp = &tim->ramp;
     const uint32_t mode = mode_of(device, channel);
-    const bool is_high = reference(device, channel);
     if (!ramp->runs || tim->at < ramp->base || tim->cleared >> channel & 1 || (mode < PWM1 && mode != TOGGLE)) {
-        return level(is_high);
+        return level(reference(device, channel));
     }
     struct lap lap = lap_of(ramp);
     const uint64_t period = lap.period * ramp->divider;
     if (mode != TOGGLE) {
         find_active(device, channel, &lap);
         if (!lap.active || lap.active == lap.period) {
-            return level(is_high);
+            return level(reference(device, channel));
         }
-        const uint64_t since = (lap.phase + lap.period - lap.first % lap.period) % lap.period;
+        const uint64_t since = distance(within(lap.first, lap.period), within(lap.phase, lap.period), lap.period);
         return wave(period, lap.active * ramp->divider, ramp->base + period - since * ramp->divider);
     }
+    const bool is_high = reference(device, channel);
     uint64_t phases[2];
     const uint32_t count = match_phases(device, tim->ccr[channel], true, phases);
     if (!count) {
@@ -194,7 +194,7 @@ static void show(struct device *device, uint32_t output, struct shape shape)
     struct fabric *fabric = device->fabric;
     const uint32_t pin = tim->pins[output], source = tim->sources[output];
     if (shape.kind == SHOWS_WAVE) {
-        const uint64_t position = (tick_now(device) % shape.period + shape.period - shape.edge) % shape.period;
+        const uint64_t position = distance(shape.edge, tick_now(device) % shape.period, shape.period);
         wave_set(fabric, pin, source, tim->ticks.hz, shape.period, shape.high, position);
     } else {
         offer(fabric, pin, source, shape.kind == SHOWS_NOTHING ? FLOATING : shape.kind == SHOWS_HIGH ? HIGH : LOW);
@@ -252,7 +252,25 @@ void show_outputs(struct device *device)
     }
 }
 
-void show_output(struct device *device, uint32_t channel) { show(device, channel, output_shape(device, channel, false)); }
+void show_duty(struct device *device, uint32_t channel, uint32_t ccr)
+{
+    struct tim *tim = tim_of(device);
+    struct shape *shown = &tim->outputs[channel];
+    struct lap was = lap_of(&tim->ramp), is = was;
+    find_active(device, channel, &was);
+    tim->ccr[channel] = ccr;
+    find_active(device, channel, &is);
+    const uint64_t divider = tim->ramp.divider, ones = is.active * divider;
+    const uint64_t later = divider * distance(within(was.first, was.period), within(is.first, is.period), is.period);
+    if (shown->kind == SHOWS_WAVE && shown->period == is.period * divider && shown->high == was.active * divider &&
+        !is_inverted(device, channel) && is.active && is.active < is.period &&
+        wave_change(device->fabric, tim->pins[channel], tim->sources[channel], &tim->ticks, ones, later)) {
+        shown->high = ones;
+        shown->edge = within(shown->edge + later, shown->period);
+        return;
+    }
+    show(device, channel, output_shape(device, channel, false));
+}
 
 uint64_t next_output_stop(const struct device *device)
 {

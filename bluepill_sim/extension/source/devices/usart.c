@@ -52,7 +52,7 @@ static uint64_t frame_half_bits(const struct device *device)
 static bool may_send(const struct device *device)
 {
     const struct usart *usart = device->state;
-    const bool is_high = device->fabric->ports[usart->cts_pin / PINS].input >> usart->cts_pin % PINS & 1;
+    const bool is_high = port_now(device->fabric, usart->cts_pin / PINS)->input >> usart->cts_pin % PINS & 1;
     return !(device->words[CR3] & CTSE && is_high);
 }
 

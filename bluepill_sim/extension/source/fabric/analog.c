@@ -66,9 +66,9 @@ static int64_t signal_uv(const struct signal *signal, const int32_t *samples, ui
 }
 
 /* The logic level of a pin at a time, where it shows a wave too. */
-static bool level_at(const struct fabric *fabric, uint32_t number, uint32_t bit, uint64_t ns)
+static bool level_at(struct fabric *fabric, uint32_t number, uint32_t bit, uint64_t ns)
 {
-    struct port port = fabric->ports[number];
+    struct port port = *port_now(fabric, number);
     if (port.shown & bit) {
         sample_waves(fabric, &port, bit, ns);
         work_out(&port);
@@ -76,7 +76,7 @@ static bool level_at(const struct fabric *fabric, uint32_t number, uint32_t bit,
     return port.level & bit;
 }
 
-int64_t channel_uv(const struct fabric *fabric, uint32_t number, uint64_t ns)
+int64_t channel_uv(struct fabric *fabric, uint32_t number, uint64_t ns)
 {
     const struct signal *signal = &fabric->analog->signals[number];
     if (signal->shape != LOGIC) {
@@ -86,7 +86,7 @@ int64_t channel_uv(const struct fabric *fabric, uint32_t number, uint64_t ns)
 }
 
 /* For Python. */
-int64_t fabric_channel_uv(const struct fabric *fabric, uint32_t number, uint64_t ns)
+int64_t fabric_channel_uv(struct fabric *fabric, uint32_t number, uint64_t ns)
 {
     return channel_uv(fabric, number, ns);
 }

@@ -55,7 +55,8 @@ static bool reach_memory(struct fabric *fabric, struct bus_access *access)
         const struct host *host = &fabric->host;
         copy(memory->bytes + at, &access->word, access->bytes);
         if (host->holds_code == NULL || host->holds_code(host->user, access->address, access->bytes)) {
-            fabric->calls.code_written(access->address, access->bytes);
+            leave_ahead(fabric);
+        fabric->calls.code_written(access->address, access->bytes);
         }
         return true;
     }
@@ -68,6 +69,7 @@ static bool reach_registers(struct fabric *fabric, struct bus_access *access)
     if (host->registers != NULL && host->registers(host->user, access)) {
         return !access->is_error;
     }
+    leave_ahead(fabric);
     const uint64_t answer = fabric->calls.bus(access->is_write, access->address, access->bytes, access->word);
     access->word = (uint32_t)answer;
     return answer != NO_TIME;

@@ -90,6 +90,7 @@ void fabric_set_initial(struct fabric *fabric, uint32_t slot, const uint32_t (*i
 
 void reset_device(struct device *device)
 {
+    leave_ahead(device->fabric);
     schedule(device, NO_TIME);
     for (uint32_t n = 0; n < device->initial_count; ++n) {
         device->words[device->initial[n][0]] = device->initial[n][1];
@@ -167,6 +168,7 @@ void send_word(struct device *device, const struct sent *row)
         }
     }
     if (device->word_count == WORDS) {
+        leave_ahead(fabric);
         fabric->calls.deliver(device->slot);
     }
     device->words_out[device->word_count++] = *row;

@@ -9,6 +9,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <string.h>
 
 #include "layout.h"
 
@@ -103,6 +104,8 @@ struct device_kind {
     void (*line)(struct device *device, uint32_t input, bool level);
     /* Pins of a port that it listens to have changed their input. */
     void (*pins)(struct device *device, uint32_t port, uint32_t changed);
+    /* Makes the edges that it runs ahead of (ahead.c), up to a time, and waits for what comes next. */
+    void (*show)(struct device *device, uint64_t until_ns);
     /* What Python has it do: one of `enum command`, or one of its own from `OWN_COMMANDS` on. */
     uint32_t (*command)(struct device *device, uint32_t what, uint32_t one, uint32_t other);
 };
@@ -182,12 +185,22 @@ struct pin_listener {
     uint32_t pins[PORTS];
 };
 
+/* A device that runs ahead of the edges that it puts on pins of a port. */
+struct ahead {
+    struct device *device; /* null: none does */
+    uint32_t number, pins; /* the port, and its pins */
+    uint32_t drives, wires; /* those at which what the chip drives, and the wire, follow the level */
+    uint64_t boundary; /* of a block that began it; NO_TIME: an event did */
+    struct port low, high; /* the port with all of the pins at 0, and at 1 */
+};
+
 /* Where cycles and nanoseconds are tied together. */
 struct time_base {
     uint64_t ns, cycle;
     uint32_t hz;
     uint64_t most_s; /* seconds whose cycles are a number */
     uint64_t second_ns, second_cycle; /* the whole second since then that was worked out last */
+    uint64_t asked_cycle, asked_ns;   /* a cycle since then, and its time, that was */
 };
 
 /* A register that reads what a ramp of time is: a loop that polls it is worked out (`core/polling.c`). */
@@ -234,6 +247,8 @@ struct fabric {
     uint32_t master; /* the slot of the device that makes an access; SLOTS for none */
     struct subscriber subscribers[SUBSCRIBERS];
     uint32_t subscribers_end; /* none is used from here on */
+    bool may_run_ahead; /* the core is in C */
+    struct ahead ahead;
     struct pin_listener listeners[SLOTS]; /* a device has a slot */
     struct device devices[SLOTS];
 };
@@ -259,7 +274,17 @@ static inline uint64_t ns_of(const struct fabric *fabric, uint64_t cycle)
 
 static inline uint64_t now_ns(struct fabric *fabric)
 {
-    return fabric->event_ns != NO_TIME ? fabric->event_ns : ns_of(fabric, fabric->host.cycle(fabric->host.user));
+    if (fabric->event_ns != NO_TIME) {
+        return fabric->event_ns;
+    }
+    struct time_base *time = &fabric->time;
+    const uint64_t cycle = fabric->host.cycle(fabric->host.user);
+    if (cycle != time->asked_cycle) {
+        const uint64_t cycles = cycle - time->second_cycle;
+        time->asked_ns = cycles < time->hz ? time->second_ns + cycles * NS_PER_S / time->hz : ns_of(fabric, cycle);
+        time->asked_cycle = cycle;
+    }
+    return time->asked_ns;
 }
 
 /* The last tick of a clock that begins at or before a time. */
@@ -268,13 +293,24 @@ static inline uint64_t tick_at(const struct ticks *ticks, uint64_t ns)
     if (ns < ticks->ns) {
         return ticks->tick;
     }
-    return ticks->tick + (uint64_t)(((__uint128_t)(ns - ticks->ns + 1) * ticks->hz + NS_PER_S - 1) / NS_PER_S - 1);
+    const uint64_t seconds = (ns - ticks->ns) / NS_PER_S, rest = (ns - ticks->ns) % NS_PER_S;
+    return ticks->tick + seconds * ticks->hz + ((rest + 1) * ticks->hz + NS_PER_S - 1) / NS_PER_S - 1;
+}
+
+/* `x` modulo `period`, which is seldom to be worked out. */
+static inline uint64_t within(uint64_t x, uint64_t period) { return x < period ? x : x % period; }
+
+/* How far it is from one place of a period to another. */
+static inline uint64_t distance(uint64_t from, uint64_t to, uint64_t period)
+{
+    return to >= from ? to - from : to + period - from;
 }
 
 /* When a tick begins. */
 static inline uint64_t ns_of_tick(const struct ticks *ticks, uint64_t tick)
 {
-    return ticks->ns + (uint64_t)((__uint128_t)(tick - ticks->tick) * NS_PER_S / ticks->hz);
+    const uint64_t ticks_since = tick - ticks->tick;
+    return ticks->ns + ticks_since / ticks->hz * NS_PER_S + ticks_since % ticks->hz * NS_PER_S / ticks->hz;
 }
 
 /* The first cycle that begins at or after a time. */
@@ -298,7 +334,45 @@ bool is_heard(const struct device *device, uint32_t output);
 void hearing_changed(struct device *device);
 void output_set(struct device *device, uint32_t output, bool level);
 
-static inline uint32_t forced_bits(const struct fabric *fabric, uint32_t address)
+/* ahead.c */
+void make_edges_ahead(struct fabric *fabric, bool is_left);
+/* Has edges of pins made up to now, of a device that runs ahead of them. */
+static inline void show_ahead(struct fabric *fabric)
+{
+    if (UNLIKELY(fabric->ahead.device != NULL)) {
+        make_edges_ahead(fabric, false);
+    }
+}
+/* The same, and from now on each is made at its time: Python, or what else knows nothing of it, may look at the pins. */
+static inline void leave_ahead(struct fabric *fabric)
+{
+    if (UNLIKELY(fabric->ahead.device != NULL)) {
+        make_edges_ahead(fabric, true);
+    }
+}
+/* Before a store to a register of such a device. */
+static inline void leave_for_store(struct device *device, uint32_t index)
+{
+    if (UNLIKELY(device->fabric->ahead.device == device) && device->kind->needs_time(device, index, true)) {
+        make_edges_ahead(device->fabric, true);
+    }
+}
+/* A port as it is now, for who looks at what is on its pins. */
+static inline const struct port *port_now(struct fabric *fabric, uint32_t number)
+{
+    if (UNLIKELY(fabric->ahead.device != NULL) && fabric->ahead.number == number) {
+        make_edges_ahead(fabric, true);
+    }
+    return &fabric->ports[number];
+}
+/* Has a device run ahead of the edges of pins on which it is the only driver, of one port; false: it must not. */
+bool run_ahead(struct device *device, uint32_t number, uint32_t pins);
+/* It has put a level on one of them. */
+void put_ahead(struct fabric *fabric, uint32_t bit, bool level, uint64_t ns, bool is_first);
+/* It has come to that level, as the alternate function with a number offers it. */
+void come_to(struct fabric *fabric, uint32_t bit, uint32_t source, bool level);
+
+static inline uint32_t forced_bits(struct fabric *fabric, uint32_t address)
 {
     uint32_t seen[SEEN_WORDS];
     return fabric->host.forced != NULL ? fabric->host.forced(fabric->host.user, address)
@@ -307,6 +381,7 @@ static inline uint32_t forced_bits(const struct fabric *fabric, uint32_t address
 
 static inline uint32_t ask(struct device *device, uint32_t what, uint32_t value)
 {
+    leave_ahead(device->fabric);
     return device->fabric->calls.ask(device->slot, what, value);
 }
 
@@ -331,8 +406,26 @@ enum pin_mode { PIN_ANALOG, PIN_FLOATING, PIN_PULLED, PIN_PUSH_PULL, PIN_OPEN_DR
 /* Gives a pin what GPIO has configured: its mode, and its bit of ODR. */
 void configure_pin(struct fabric *fabric, uint32_t pin, uint32_t mode, bool is_high);
 void offer(struct fabric *fabric, uint32_t pin, uint32_t source, uint32_t level);
-void put_row(struct fabric *fabric, struct subscriber *subscriber, const struct edge *row);
+void make_room(struct subscriber *subscriber, uint32_t count);
+static inline void put_rows(struct fabric *fabric, struct subscriber *subscriber, const struct edge *rows, uint32_t count)
+{
+    if (UNLIKELY(subscriber->count + count > subscriber->room)) {
+        make_room(subscriber, count);
+    }
+    memcpy(&subscriber->rows[subscriber->count], rows, count * sizeof *rows);
+    subscriber->count += count;
+    if (UNLIKELY(subscriber->count >= MOST_ROWS)) {
+        fabric->host.end_slice(fabric->host.user);
+    }
+}
+static inline void put_row(struct fabric *fabric, struct subscriber *subscriber, const struct edge *row)
+{
+    put_rows(fabric, subscriber, row, 1);
+}
+
 void pins_changed(struct fabric *fabric, uint32_t port);
+/* Notes when the chip has changed what it drives. */
+void note_output(struct fabric *fabric);
 void listen_to_pins(struct device *device, uint32_t port, uint32_t pins);
 /* What a port's inputs are now, those that show waves too. */
 uint32_t port_input(struct fabric *fabric, uint32_t number);
@@ -348,6 +441,9 @@ void tell_listeners(struct fabric *fabric, uint32_t number, uint32_t changed);
  * core's clock was last changed: so an edge comes exactly where a count of this clock puts it. */
 void wave_set(struct fabric *fabric, uint32_t pin, uint32_t source, uint32_t hz, uint64_t period, uint64_t high,
               uint64_t position);
+/* Has the wave that is offered be `high` ticks long at 1, and come `later` ticks of its period later; false: it is not
+ * counted in these ticks. */
+bool wave_change(struct fabric *fabric, uint32_t pin, uint32_t source, const struct ticks *ticks, uint64_t high, uint64_t later);
 /* Puts pins that show a wave at its level at a time; `work_out` follows. */
 void sample_waves(const struct fabric *fabric, struct port *port, uint32_t pins, uint64_t ns);
 /* Follows the waves of a port that may have changed; returns the pins whose wave has. */
@@ -364,7 +460,7 @@ extern struct device_kind waves_kind;
 
 /* analog.c */
 /* Microvolts on the pin of an ADC channel, which may be an earlier time's. */
-int64_t channel_uv(const struct fabric *fabric, uint32_t channel, uint64_t ns);
+int64_t channel_uv(struct fabric *fabric, uint32_t channel, uint64_t ns);
 
 /* bus.c */
 /* Reads or writes 1, 2 or 4 bytes for a device, at the time of its event; false: an error of the bus. */

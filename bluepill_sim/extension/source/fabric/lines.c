@@ -11,6 +11,7 @@
 static RARELY void tell_subscribers(struct fabric *fabric, uint32_t number, bool level, bool is_enabled)
 {
     const struct edge row = {.ns = now_ns(fabric), .pin = (uint8_t)(PORTS * PINS + number), .drive = is_enabled, .wire = level};
+    show_ahead(fabric);
     for (uint32_t n = 0; n < SUBSCRIBERS; ++n) {
         if (fabric->subscribers[n].lines[number / 64] >> number % 64 & 1) {
             put_row(fabric, &fabric->subscribers[n], &row);

@@ -30,9 +30,9 @@ uint8_t wire_of(const struct port *port, uint32_t bit)
     return port->floating & bit ? FLOATING : port->level & bit ? HIGH : LOW;
 }
 
-void put_row(struct fabric *fabric, struct subscriber *subscriber, const struct edge *row)
+RARELY void make_room(struct subscriber *subscriber, uint32_t count)
 {
-    if (subscriber->count == subscriber->room) {
+    while (subscriber->count + count > subscriber->room) {
         const size_t room = subscriber->room ? 2 * subscriber->room : FIRST_ROOM;
         struct edge *rows = realloc(subscriber->rows, room * sizeof *rows);
         if (rows == NULL) {
@@ -40,10 +40,6 @@ void put_row(struct fabric *fabric, struct subscriber *subscriber, const struct 
         }
         subscriber->rows = rows;
         subscriber->room = room;
-    }
-    subscriber->rows[subscriber->count++] = *row;
-    if (subscriber->count >= MOST_ROWS) {
-        fabric->host.end_slice(fabric->host.user);
     }
 }
 
@@ -72,6 +68,7 @@ static RARELY void tell_subscribers(struct fabric *fabric, uint32_t number, uint
 
 static RARELY void tell_trouble(struct fabric *fabric, uint32_t number, uint32_t pins, uint32_t what)
 {
+    leave_ahead(fabric);
     for (uint32_t left = pins; left; left &= left - 1) {
         fabric->calls.electrical(PINS * number + (uint32_t)__builtin_ctz(left), what);
     }
@@ -108,10 +105,22 @@ void work_out(struct port *port)
     port->shorted = port->rail & strong & (port->high ^ port->rail_high);
 }
 
+void note_output(struct fabric *fabric)
+{
+    fabric->last_output = fabric->host.boundary != NULL ? *fabric->host.boundary : fabric->host.cycle(fabric->host.user);
+    if (UNLIKELY(fabric->event_ns != NO_TIME)) {
+        fabric->last_output = NO_TIME;
+        fabric->last_output_ns = fabric->event_ns;
+    }
+}
+
 /* Works out what the pins of a port are, and tells whoever has to know. */
 void pins_changed(struct fabric *fabric, uint32_t number)
 {
     struct port *port = &fabric->ports[number];
+    if (UNLIKELY(fabric->ahead.device != NULL)) {
+        make_edges_ahead(fabric, fabric->ahead.number == number);
+    }
     const struct port before = *port;
     port->shown = port->waving & port->alternate & ~port->held;
     const uint32_t waves = port->shown | before.shown;
@@ -125,11 +134,7 @@ void pins_changed(struct fabric *fabric, uint32_t number)
                             (before.down ^ port->down);
     const uint32_t wires = (before.level ^ port->level) | (before.floating ^ port->floating);
     if ((drives & ~waves) | changed_waves) {
-        fabric->last_output = fabric->host.boundary != NULL ? *fabric->host.boundary : fabric->host.cycle(fabric->host.user);
-        if (UNLIKELY(fabric->event_ns != NO_TIME)) {
-            fabric->last_output = NO_TIME;
-            fabric->last_output_ns = fabric->event_ns;
-        }
+        note_output(fabric);
     }
     if (UNLIKELY((drives | wires) & ~waves & fabric->subscribed[number])) {
         tell_subscribers(fabric, number, drives & ~waves, wires & ~waves);
@@ -204,6 +209,7 @@ void listen_to_pins(struct device *device, uint32_t port, uint32_t pins)
 {
     struct fabric *fabric = device->fabric;
     uint32_t n = 0;
+    port_now(fabric, port);
     while (n < fabric->listener_count && fabric->listeners[n].device != device) {
         ++n;
     }

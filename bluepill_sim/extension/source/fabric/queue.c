@@ -127,6 +127,7 @@ static void act(struct fabric *fabric, struct slot *slot)
 {
     slot->is_acting = 1;
     if (slot->event == NULL) {
+        leave_ahead(fabric);
         fabric->calls.event((uint32_t)(slot - fabric->slots), slot->ns);
     } else {
         slot->event(slot->device, slot->ns);
@@ -213,7 +214,7 @@ void fabric_set_time(struct fabric *fabric, uint64_t ns, uint64_t cycle, uint32_
 {
     fabric->last_output_ns = fabric_last_output(fabric);
     fabric->last_output = NO_TIME;
-    fabric->time = (struct time_base){ns, cycle, hz, NO_TIME / 8 / hz, ns, cycle};
+    fabric->time = (struct time_base){ns, cycle, hz, NO_TIME / 8 / hz, ns, cycle, cycle, ns};
     for (uint32_t n = 0; n < fabric->ordered; ++n) {
         struct slot *slot = &fabric->slots[fabric->order[n]];
         slot->cycle = cycle_at(fabric, slot->ns);

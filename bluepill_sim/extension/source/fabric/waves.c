@@ -65,7 +65,7 @@ void sample_waves(const struct fabric *fabric, struct port *port, uint32_t pins,
 
 uint32_t port_input(struct fabric *fabric, uint32_t number)
 {
-    const struct port *port = &fabric->ports[number];
+    const struct port *port = port_now(fabric, number);
     if (!port->shown) {
         return port->input;
     }
@@ -216,14 +216,11 @@ uint64_t settled_ns(struct fabric *fabric)
 static void put_wave(struct fabric *fabric, struct subscriber *subscriber, uint32_t pin, uint64_t ns)
 {
     const struct shown *shown = &fabric->shown[pin];
-    struct edge rows[sizeof shown->wave / sizeof(struct edge)];
-    const struct edge head = {.ns = ns, .pin = (uint8_t)pin, .drive = (uint8_t)(shown->drive[0] | shown->drive[1] << 4),
+    struct edge rows[1 + sizeof shown->wave / sizeof(struct edge)];
+    rows[0] = (struct edge){.ns = ns, .pin = (uint8_t)pin, .drive = (uint8_t)(shown->drive[0] | shown->drive[1] << 4),
                               .wire = (uint8_t)(shown->wire[0] | shown->wire[1] << 4), .kind = WAVE_ROW};
-    memcpy(rows, &shown->wave, sizeof rows);
-    put_row(fabric, subscriber, &head);
-    for (size_t n = 0; n < sizeof rows / sizeof *rows; ++n) {
-        put_row(fabric, subscriber, &rows[n]);
-    }
+    memcpy(&rows[1], &shown->wave, sizeof shown->wave);
+    put_rows(fabric, subscriber, rows, sizeof rows / sizeof *rows);
 }
 
 /* Tells a subscriber what a pin shows from now on; `told` is what it has shown up to now. */
@@ -284,6 +281,27 @@ static bool is_same(const struct shown *one, const struct shown *other)
            memcmp(one->wire, other->wire, sizeof one->wire) == 0 && memcmp(&one->wave, &other->wave, sizeof one->wave) == 0;
 }
 
+/* Makes the edges that subscribers have waiting of what is about to be another wave. */
+static void expand_all(struct fabric *fabric, uint64_t ns)
+{
+    for (uint32_t n = 0; n < fabric->subscribers_end; ++n) {
+        expand_waves(fabric, &fabric->subscribers[n], ns);
+    }
+}
+
+/* Tells those who have subscribed to a pin what it shows from now on; up to now it was this at either level. */
+static void tell_all(struct fabric *fabric, uint32_t pin, const uint8_t drive[2], const uint8_t wire[2], uint64_t ns)
+{
+    for (uint32_t n = 0; n < fabric->subscribers_end; ++n) {
+        struct subscriber *one = &fabric->subscribers[n];
+        if (has_subscribed(one, pin)) {
+            const bool level = stop_expanding(one, pin);
+            const struct edge told = {.ns = ns, .drive = drive[level], .wire = wire[level]};
+            tell(fabric, one, pin, &told);
+        }
+    }
+}
+
 RARELY uint32_t show_waves(struct fabric *fabric, uint32_t number, const struct port *before)
 {
     struct port *port = &fabric->ports[number], low, high;
@@ -292,25 +310,18 @@ RARELY uint32_t show_waves(struct fabric *fabric, uint32_t number, const struct 
     work_out_both(port, &low, &high);
     for (uint32_t left = port->shown | before->shown; left; left &= left - 1) {
         const uint32_t at = (uint32_t)__builtin_ctz(left), pin = PINS * number + at;
-        struct shown *shown = &fabric->shown[pin];
-        const struct shown was = *shown, is = showing(fabric, port, &low, &high, at);
-        if (is_same(&was, &is)) {
+        const struct shown is = showing(fabric, port, &low, &high, at);
+        if (is_same(&fabric->shown[pin], &is)) {
             continue;
         }
         changed |= 1u << at;
-        for (uint32_t n = 0; n < fabric->subscribers_end; ++n) {
-            expand_waves(fabric, &fabric->subscribers[n], ns);
-        }
-        *shown = is;
-        for (uint32_t n = 0; n < fabric->subscribers_end; ++n) {
-            struct subscriber *one = &fabric->subscribers[n];
-            if (has_subscribed(one, pin)) {
-                const bool level = stop_expanding(one, pin);
-                const struct edge told = {.ns = ns, .drive = was.is_wave ? was.drive[level] : drive_of(before, 1u << at),
-                                          .wire = was.is_wave ? was.wire[level] : wire_of(before, 1u << at)};
-                tell(fabric, one, pin, &told);
-            }
-        }
+        const struct shown was = fabric->shown[pin];
+        const uint8_t drive = drive_of(before, 1u << at), wire = wire_of(before, 1u << at);
+        const uint8_t drives[2] = {was.is_wave ? was.drive[0] : drive, was.is_wave ? was.drive[1] : drive};
+        const uint8_t wires[2] = {was.is_wave ? was.wire[0] : wire, was.is_wave ? was.wire[1] : wire};
+        expand_all(fabric, ns);
+        fabric->shown[pin] = is;
+        tell_all(fabric, pin, drives, wires, ns);
     }
     if (changed) {
         make_edges_where_wanted(fabric);
@@ -395,6 +406,61 @@ static void event(struct device *device, uint64_t ns)
     schedule_edges(fabric);
 }
 
+/* Has a pin that shows a wave, and goes on showing it, follow what has become of that; false: more than it may change. */
+static bool follow_wave(struct fabric *fabric, uint32_t pin, uint32_t source, bool level, uint64_t now)
+{
+    struct port *port = &fabric->ports[pin / PINS];
+    struct shown *shown = &fabric->shown[pin];
+    const struct wave *wave = &fabric->waves[source];
+    const uint32_t at = pin % PINS, bit = 1u << at;
+    const uint64_t mask = UINT64_C(1) << source;
+    if (!(port->shown & bit) || !shown->is_wave || shown->is_made || (port->sources[at] & -port->sources[at]) != mask ||
+        (port->fighting | port->shorted) & bit || fabric->ahead.device != NULL) {
+        return false;
+    }
+    port->source_levels[at] = level ? port->source_levels[at] | mask : port->source_levels[at] & ~mask;
+    if (!(port->offered_high & bit) == level) {
+        const uint32_t fighting = port->fighting & port->shown, shorted = port->shorted & port->shown;
+        port->offered_high ^= bit;
+        work_out(port);
+        port->fighting |= fighting;
+        port->shorted |= shorted;
+    }
+    if (shown->wave.high == wave->high && shown->wave.at == wave->at && memcmp(&shown->wave, wave, sizeof *wave) == 0) {
+        return true;
+    }
+    note_output(fabric);
+    expand_all(fabric, now);
+    shown->wave = *wave;
+    tell_all(fabric, pin, shown->drive, shown->wire, now);
+    for (uint32_t n = 0; n < fabric->subscribers_end; ++n) {
+        if (fabric->subscribers[n].expanded_count) {
+            schedule_edges(fabric);
+            break;
+        }
+    }
+    return true;
+}
+
+bool wave_change(struct fabric *fabric, uint32_t pin, uint32_t source, const struct ticks *ticks, uint64_t high, uint64_t later)
+{
+    struct wave *wave = &fabric->waves[source];
+    if (!wave->period || wave->pin != pin || wave->ns != ticks->ns || wave->hz != ticks->hz || wave->ns != fabric->time.ns) {
+        return false;
+    }
+    const uint64_t now = now_ns(fabric);
+    if (now < wave->ns || (wave->high == high && !later)) {
+        return now >= wave->ns;
+    }
+    wave->high = high;
+    wave->at = distance(later, wave->at, wave->period);
+    const bool level = wave_level(wave, now);
+    if (!follow_wave(fabric, pin, source, level, now)) {
+        take_offer(fabric, pin, source, level);
+    }
+    return true;
+}
+
 void wave_set(struct fabric *fabric, uint32_t pin, uint32_t source, uint32_t hz, uint64_t period, uint64_t high,
               uint64_t at)
 {
@@ -406,10 +472,14 @@ void wave_set(struct fabric *fabric, uint32_t pin, uint32_t source, uint32_t hz,
         offer(fabric, pin, source, high != 0);
         return;
     }
+    const bool was_offered = wave->period != 0;
     const uint64_t now = now_ns(fabric), ns = now < fabric->time.ns ? now : fabric->time.ns;
     *wave = (struct wave){.ns = ns, .period = period, .high = high, .hz = hz, .pin = pin};
-    wave->at = (at % period + period - wave_tick(wave, now) % period) % period;
-    take_offer(fabric, pin, source, wave_level(wave, now));
+    at = within(at, period);
+    wave->at = distance(wave_tick(wave, now) % period, at, period);
+    if (!was_offered || !follow_wave(fabric, pin, source, at < high, now)) {
+        take_offer(fabric, pin, source, at < high);
+    }
 }
 
 void fabric_set_wave(struct fabric *fabric, uint32_t pin, uint32_t source, uint32_t hz, uint64_t period, uint64_t high,
