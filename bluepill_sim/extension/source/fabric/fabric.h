@@ -254,6 +254,9 @@ struct fabric {
 };
 
 /* Services. */
+/* pins.c: also for Python. */
+bool fabric_is_watched(const struct fabric *fabric, uint32_t pin);
+
 #pragma GCC visibility push(hidden)
 
 /* ramp.c */
