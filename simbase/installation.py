@@ -13,10 +13,12 @@ import sys
 from collections import Counter
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import Distribution, PackageNotFoundError, distribution, entry_points
+from importlib.metadata import Distribution, PackageNotFoundError, distribution
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from simbase.entry_points import every_installed_point, installed_points
 
 if TYPE_CHECKING:
     from packaging.requirements import Requirement
@@ -40,7 +42,7 @@ class Need:
     @property
     def is_plugged_in(self) -> bool:
         """Whether a plug-in is there."""
-        return any(one.name == self.point for one in entry_points(group=self.points[0]))
+        return self.point in installed_points(self.points[0])
 
 
 _KINDS = ("package", "built", "plug-in", "program")
@@ -56,13 +58,13 @@ NEEDS = (
 @cache
 def installed_distributions() -> tuple[Distribution, ...]:
     """Return every distribution of this project that is installed, by name."""
-    found = {point.dist.name: point.dist for point in entry_points(group=GROUP) if point.dist is not None}
+    found = {point.dist.name: point.dist for point in every_installed_point(GROUP) if point.dist is not None}
     return tuple(found[name] for name in sorted(found))
 
 
 def installed_needs() -> tuple[Need, ...]:
     """Return what the installed packages may need, each need once: what every verb needs first, programs last."""
-    points = sorted(entry_points(group=GROUP), key=lambda point: point.name)
+    points = sorted(every_installed_point(GROUP), key=lambda point: point.name)
     needs = dict.fromkeys(need for point in points for need in point.load())
     return tuple(sorted(needs, key=lambda need: (_KINDS.index(need.kind), need.kind == "package" and bool(need.extra))))
 
@@ -89,7 +91,7 @@ def missing_distributions() -> dict[str, str]:
 
 def doubled_packages() -> dict[str, list[str]]:
     """Return the packages that more than one distribution has installed, by their names: one wrote over another."""
-    points = [(point.name, point.dist.name) for point in entry_points(group=GROUP) if point.dist is not None]
+    points = [(point.name, point.dist.name) for point in every_installed_point(GROUP) if point.dist is not None]
     counts = Counter(name for name, _ in set(points))
     return {name: sorted({dist for one, dist in points if one == name}) for name, n in sorted(counts.items()) if n > 1}
 
@@ -149,7 +151,7 @@ def reinstall_command(package: str = "") -> str:
     from urllib.parse import urlsplit
     from urllib.request import url2pathname
 
-    names = [point.dist.name for point in entry_points(group=GROUP) if point.dist and point.name == package]
+    names = [point.dist.name for point in every_installed_point(GROUP) if point.dist and point.name == package]
     name = (names or [one.name for one in installed_distributions()] or [GROUP.partition(".")[0]])[0]
     origin = json.loads(_origin(name) or "{}")
     if "dir_info" in origin:

@@ -15,11 +15,11 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, cast
 
+from simbase.entry_points import installed_points
 from simbase.errors import P2osError, UsageError, shown, shown_name
 from simbase.trust.code import Code, is_in_file
 from simbase.trust.decision import UntrustedError
 from simbase.trust.fingerprint import fingerprint_of
-from simbase.trust.installed import installed_points
 from simbase.trust.sources import SourceLoader, read_sources_of
 
 #: What the modules' names of users' files begin with.

@@ -2,14 +2,14 @@
 
 A scenario, a fleet or a campaign may name a class in a Python file (`./mine.py:Class`), and such files travel. A name
 out of a file becomes a `Code`, and only one that somebody has admitted is executed; a plain text never is
-(`simbase.user_classes`). What an installed package brings by entry points is part of the tool (`installed`).
+(`simbase.user_classes`). What an installed package brings by entry points is part of the tool (`simbase.entry_points`).
 
 What a command line or a program names itself needs nobody's word: `own_code`.
 """
 
+from simbase.entry_points import installed_points
 from simbase.trust.code import Code, own_code
 from simbase.trust.decision import Trust, UntrustedError
 from simbase.trust.fingerprint import Fingerprint, fingerprint_of
-from simbase.trust.installed import installed_points
 
 __all__ = ["Code", "Fingerprint", "Trust", "UntrustedError", "fingerprint_of", "installed_points", "own_code"]

@@ -95,7 +95,7 @@ READ_ELSEWHERE = {
     "simbase.files": "the bounds themselves",
     "simbase.user_classes": "Python's own import has read it",
     "simbase.installation": "of an installed package",
-    "simbase.trust.installed": "of an installed package",
+    "simbase.entry_points": "of an installed package",
     "p2os.capture.formats.sources": "a block or a line at a time",
     "p2os.cli.links.ports": "of the kernel",
     "p2os.pioneer.body.bullet.body": "the engine has just written it",

@@ -148,7 +148,9 @@ def test_a_package_of_two_distributions_is_told(monkeypatch: pytest.MonkeyPatch)
 
     whole, house = Installed("p2os", []), Installed("bluepill-sim", [])
     points = [Point("p2os", whole), Point("bluepill_sim", whole), Point("bluepill_sim", house), Point("x", None)]
-    monkeypatch.setattr(installation, "entry_points", lambda group: points if group == installation.GROUP else [])
+    monkeypatch.setattr(
+        installation, "every_installed_point", lambda group: points if group == installation.GROUP else []
+    )
     assert doubled_packages() == {"bluepill_sim": ["bluepill-sim", "p2os"]}
 
 

@@ -14,6 +14,7 @@ import pytest
 
 from simbase import user_classes
 from simbase.errors import FileError, UsageError
+from simbase.installation import installed_needs
 from simbase.trust import Code, Trust, UntrustedError, fingerprint, fingerprint_of, installed_points, own_code, store
 from simbase.user_classes import OF_USERS, find_class
 
@@ -301,6 +302,15 @@ def test_the_current_folder_is_no_installed_package(entry: str, folder: Path, mo
     assert "simbase" in installed_points("simbase.packages")
     with pytest.raises(UsageError, match="there is no part 'rogue'"):
         loaded("rogue")
+    assert not was_executed(folder)
+
+
+def test_what_the_current_folder_says_it_needs_is_not_loaded(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    distribution(folder, "rogue", "mine")
+    (folder / "rogue-1.dist-info" / "entry_points.txt").write_text("[simbase.packages]\nrogue = mine:C\n")
+    monkeypatch.chdir(folder)
+    monkeypatch.setattr(sys, "path", ["", *sys.path])
+    assert installed_needs()
     assert not was_executed(folder)
 
 

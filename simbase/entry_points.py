@@ -22,6 +22,13 @@ _DIRECT_URL = "direct_url.json"
 def installed_points(group: str) -> dict[str, EntryPoint]:
     """Return the entry points of a group that installed packages offer, by name; of two of a name the first found."""
     found: dict[str, EntryPoint] = {}
+    for point in every_installed_point(group):
+        found.setdefault(point.name, point)
+    return found
+
+
+def every_installed_point(group: str) -> Iterator[EntryPoint]:
+    """Yield the entry points of a group that installed packages offer, also those of one name."""
     here = _here()
     for distribution in distributions():  # not entry_points(): there a package of that name hides the installed one
         points = distribution.entry_points.select(group=group)
@@ -30,10 +37,7 @@ def installed_points(group: str) -> dict[str, EntryPoint]:
             continue
         folders = [home, *_editable(distribution)]
         packages = {module: _is_in(module, folders) for module in {_package(point.module) for point in points}}
-        for point in points:
-            if packages[_package(point.module)]:
-                found.setdefault(point.name, point)
-    return found
+        yield from (point for point in points if packages[_package(point.module)])
 
 
 def _home_of(distribution: Distribution) -> Path | None:
