@@ -105,6 +105,8 @@ class Line:
         #: The clock's time of the last look, and what the core's time leaves out of it.
         self._looked_at: Nanos = clock()
         self._left_out: Nanos = 0
+        #: Frames that had come at the last look: a pause within a read begins after it.
+        self._received = 0
         self._watch = GapWatch(self._looked_at)
         #: The core's time of the last turn.
         self._turned_at: Nanos = 0
@@ -129,6 +131,7 @@ class Line:
         self._looked_at = self._clock()
         if (gap_ns := self._watch.gap(self._looked_at)) > 0:
             self._take_gap(gap_ns)
+        self._received = self.core.stats.frames_received
         return self._looked_at - self._left_out
 
     def opened(self, transport: Transport) -> None:
@@ -241,12 +244,11 @@ class Line:
         if self.core.link is not Link.OPEN:
             self._left_out += gap_ns  # a search goes on where it was
             return
-        received = self.core.stats.frames_received
         now = self._looked_at - self._left_out - gap_ns
         self.core.take_gap(gap_ns, now)
         self.write(now)
         self._read(now)
-        if self.core.stats.frames_received != received:
+        if self.core.stats.frames_received != self._received:
             self._left_out += gap_ns
             return
         now += gap_ns  # the robot was silent for so long

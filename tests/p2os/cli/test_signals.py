@@ -203,17 +203,8 @@ def test_a_program_that_was_suspended_stops_the_robot_before_anything_else(
         woken_at = time.monotonic()
         driver.process.send_signal(signal.SIGCONT)
         assert robot.when_received(STOP, woken_at) - woken_at < AT_ONCE_S
-        if begin is by_drive:  # whose own client stops it; on a busy machine its CLOSE was lost once in 16 runs
-            driver.process.wait(AT_ONCE_S)
-            assert set(robot.numbers[received:]) <= {
-                STOP,
-                CommandNumber.VEL,
-                CommandNumber.RVEL,
-                CommandNumber.ENABLE,
-                CLOSE,
-            }
-        else:
-            robot.when_received(CLOSE, woken_at)
+        robot.when_received(CLOSE, woken_at)
+        if begin is not by_drive:  # whose own client stops it
             assert robot.numbers[received:] == [STOP, CommandNumber.VEL, CLOSE]
         paused = r"paused for \d+\.\d"
         if begin is through_sniff:

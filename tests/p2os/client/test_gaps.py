@@ -153,6 +153,28 @@ def test_after_a_gap_in_which_packets_came_the_robot_stands_and_the_link_lives(g
     assert bench.wheels[0] > 0, "asked anew it moves"
 
 
+@pytest.mark.parametrize("gap_ms", [400, 1100, 60_000])
+def test_a_program_that_is_stopped_within_a_read_has_heard_what_that_read_brings(gap_ms: int) -> None:
+    bench = Bench()
+    bench.drive()
+    read = bench.read
+
+    def stopped() -> bytes:
+        bench.read = read  # type: ignore[method-assign]  # once
+        bench.pass_by(gap_ms * NS_PER_MS)
+        return read()
+
+    bench.late_by(0)
+    bench.read = stopped  # type: ignore[method-assign]
+    bench.turn()
+    bench.turn()
+    assert bench.sent[0] == stop()
+    assert [type(notice) for notice in bench.notices] == [GapStopped]
+    bench.run(3.0)
+    assert bench.core.link is Link.OPEN
+    assert bench.wheels == (0.0, 0.0)
+
+
 def test_a_gap_in_which_nothing_came_is_silence_and_loses_the_link() -> None:
     bench = Bench()
     bench.drive()
