@@ -1,6 +1,5 @@
 """The emulator on the command line: `python -m bluepill_sim run mine.elf`."""
 
-import sys
 from collections.abc import Sequence
 
 import typer
@@ -37,7 +36,7 @@ def run(words: Sequence[str], *, trace: bool = False) -> int:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and end the process with its exit code."""
-    program.main(run, sys.argv[1:] if arguments is None else arguments)
+    program.main(run, arguments)
 
 
 if __name__ == "__main__":

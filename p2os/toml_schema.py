@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Any, Literal, Protocol, cast, overload, runtime_checkable
 
 from p2os.errors import ScenarioError
+from simbase.entry_points import installed_points
 from simbase.errors import FileError, MissingDependencyError, P2osError, nearest, shown
-from simbase.trust import installed_points
 
 #: chosen: eleven days; a larger number of seconds is a mistake of the unit.
 LONGEST_S = 1_000_000

@@ -7,9 +7,9 @@ from typing import Protocol, cast
 
 from robot_bench.run import RunBench
 from robot_bench.scenario.scenario import Scenario
+from simbase.entry_points import installed_points
 from simbase.errors import UsageError
 from simbase.installation import way_to_plug_in
-from simbase.trust import installed_points
 
 GROUP = "robot_bench.networks"
 

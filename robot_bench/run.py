@@ -40,11 +40,11 @@ from robot_bench.report.page_of_all import REPORT_NAME
 from robot_bench.running.pacer import PACED_SLICE_NS, RealTimePacer
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.wires.ports import Chip
+from simbase.entry_points import installed_points
 from simbase.errors import FileError, P2osError, UsageError
 from simbase.files import sha256_of
 from simbase.installation import installed_version
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
-from simbase.trust import installed_points
 from simbase.user_classes import unforeseen
 
 if TYPE_CHECKING:

@@ -18,9 +18,9 @@ from p2os.cli.printing import restored_output
 from simbase.command_line import program
 from simbase.command_line.help_pages import dress
 from simbase.command_line.program import EXIT_INTERRUPTED
+from simbase.entry_points import installed_points
 from simbase.errors import MissingDependencyError
 from simbase.installation import installed_version
-from simbase.trust import installed_points
 
 NAME = "p2os"
 GROUP = "p2os.verbs"

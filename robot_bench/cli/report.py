@@ -11,9 +11,9 @@ from robot_bench.recording.event_files import write_named_events
 from robot_bench.recording.run_record import read_events, read_meta
 from robot_bench.recording.together import named_events, robots_in, scenario_of
 from robot_bench.report.make import Files, make_artefacts, make_artefacts_of_all
+from simbase.entry_points import installed_points
 from simbase.errors import UsageError, shown
 from simbase.installation import way_to_plug_in
-from simbase.trust import installed_points
 
 #: Entry points that write the events of a run as a bag, each by the name of its storage.
 BAGS = "robot_bench.bags"

@@ -7,9 +7,8 @@ out of a file becomes a `Code`, and only one that somebody has admitted is execu
 What a command line or a program names itself needs nobody's word: `own_code`.
 """
 
-from simbase.entry_points import installed_points
 from simbase.trust.code import Code, own_code
 from simbase.trust.decision import Trust, UntrustedError
 from simbase.trust.fingerprint import Fingerprint, fingerprint_of
 
-__all__ = ["Code", "Fingerprint", "Trust", "UntrustedError", "fingerprint_of", "installed_points", "own_code"]
+__all__ = ["Code", "Fingerprint", "Trust", "UntrustedError", "fingerprint_of", "own_code"]

@@ -15,9 +15,10 @@ from p2os.pioneer.body.contract import RobotBody, RobotScene
 from p2os.pioneer.body.engine import ATTRIBUTE, Engine
 from p2os.pioneer.world.model import Pose, World
 from p2os.robots.parameters import RobotParameters
+from simbase.entry_points import installed_points
 from simbase.errors import UsageError, shown
 from simbase.installation import way_to_plug_in
-from simbase.trust import installed_points, own_code
+from simbase.trust import own_code
 from simbase.trust.code import is_in_file
 from simbase.user_classes import find_class, make, refuse_lacking
 

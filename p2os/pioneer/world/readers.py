@@ -11,9 +11,9 @@ from p2os.errors import WorldError
 from p2os.pioneer.world.model import World
 from p2os.pioneer.world.placing import Placing, placed_world
 from p2os.pioneer.world.text_file import sized
+from simbase.entry_points import installed_points
 from simbase.errors import MissingDependencyError, shown_name
 from simbase.installation import way_to_plug_in
-from simbase.trust import installed_points
 
 #: The entry points: the ending without its dot → `Reader`.
 GROUP = "p2os.world_readers"

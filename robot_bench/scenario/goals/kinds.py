@@ -36,8 +36,8 @@ from robot_bench.scenario.goals.temporal import (
 )
 from robot_bench.scenario.goals.text import InOrder
 from robot_bench.scenario.goals.watch import GoalKind, Watch, number
+from simbase.entry_points import installed_points
 from simbase.errors import shown
-from simbase.trust import installed_points
 
 _POSE_SIGNALS = tuple(SIGNALS)
 _TEXT = Key(name="text", kind="text", required=True)

@@ -13,9 +13,10 @@ from pathlib import Path
 import pytest
 
 from simbase import user_classes
+from simbase.entry_points import installed_points
 from simbase.errors import FileError, UsageError
 from simbase.installation import installed_needs
-from simbase.trust import Code, Trust, UntrustedError, fingerprint, fingerprint_of, installed_points, own_code, store
+from simbase.trust import Code, Trust, UntrustedError, fingerprint, fingerprint_of, own_code, store
 from simbase.user_classes import OF_USERS, find_class
 
 WHERE = "a.toml:4: body"

@@ -253,10 +253,10 @@ struct fabric {
     struct device devices[SLOTS];
 };
 
-/* Services. */
-/* pins.c: also for Python. */
+/* Also for Python: pins.c. */
 bool fabric_is_watched(const struct fabric *fabric, uint32_t pin);
 
+/* Services. */
 #pragma GCC visibility push(hidden)
 
 /* ramp.c */

@@ -25,8 +25,8 @@ from bluepill_sim.program.mutants import Mutant, mutated_file
 from bluepill_sim.program.static_code import StaticCode
 from robot_bench.campaign.variants.mutation.trial import Fate, Found
 from robot_bench.events.codec import Json
+from simbase.entry_points import installed_points
 from simbase.files import writing_temporary
-from simbase.trust import installed_points
 
 if TYPE_CHECKING:
     import pytest
