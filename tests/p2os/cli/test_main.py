@@ -218,7 +218,7 @@ def test_help_shows_each_example_beside_what_it_does_and_each_verb_in_a_group(
     examples = [line for line in cli.EPILOG.splitlines() if line.startswith("  p2os ")]
     assert len(examples) > 5
     assert [line for line in examples if not re.search(r"\S {2,}\S", line) or line not in out] == []
-    assert "Others:" not in out
+    assert "Others:" not in out, "a verb has no group: app.command(rich_help_panel=...), p2os/cli/groups.py"
 
 
 def test_main_ends_the_process_and_understands_trace_anywhere(
