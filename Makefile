@@ -16,7 +16,7 @@ JOBS   ?= 3
 COMPILED := $(wildcard bluepill_sim/extension/source/*/*) robot_bench/wires/edges.c \
     $(shell find adapter_fw/core adapter_fw/capi -type f)
 
-.PHONY: setup demo test lint type unit wheels bench soak peers clean firmware mutation-tools board board-check board-tools pictures docs
+.PHONY: setup demo test lint type unit wheels bench soak peers clean firmware mutation-tools board board-check board-tools pictures docs generated
 
 setup: $(STAMP)
 
@@ -119,6 +119,10 @@ board-tools: setup
 # Every picture of docs/ whose inputs have changed, made anew; `make test` names those that are out of date.
 pictures: board-tools
 	$(BIN)/python -m tools.make_pictures
+
+# Every committed file that is made of a declaration (C headers, tables of pages), made anew; `make test` names those that are stale.
+generated: setup
+	@for tool in tools/generate_*.py; do $(BIN)/python $$tool || exit; done
 
 # The pages of the API, from the docstrings, in build/api.
 docs: setup

@@ -1,4 +1,4 @@
-"""The STM32F103C8T6 on one page: memory map, peripherals, interrupts, clock gates, pins.
+"""The STM32F103C8T6 on one page: memory map, peripherals, interrupts, pins.
 
 Source: RM0008 sections 3.1 (memory map), 7.3 (enable registers) and 10.1.2
 (vector table), data sheet DS5319 tables 3 and 5 (LQFP48).
@@ -16,7 +16,7 @@ from typing import TypeAlias, cast
 from bluepill_sim.fabric.fabric import Fabric, FabricPorts
 from bluepill_sim.fabric.pins import PinBank
 from bluepill_sim.fabric.ports import ChipPorts
-from bluepill_sim.fabric.registers import ClockBit, Peripheral, PeripheralMapping
+from bluepill_sim.fabric.registers import ClockBit, Peripheral, PeripheralMapping, fields_of
 from bluepill_sim.peripherals import flash
 from bluepill_sim.peripherals.adc import Adc, Adc2
 from bluepill_sim.peripherals.afio import Afio
@@ -59,41 +59,6 @@ BONDED_PINS = frozenset(
 )
 #: Pins that bear 5 V (DS5319 table 5, column "FT").
 FIVE_VOLT_PINS = frozenset([f"PA{n}" for n in range(8, 16)] + [f"PB{n}" for n in (2, 3, 4, *range(6, 16))])
-
-#: Name of each bit of the enable registers, which is also the bit of the reset registers.
-_GATES = {
-    "AHBENR": {0: "DMA1", 6: "CRC"},
-    "APB2ENR": {
-        0: "AFIO",
-        2: "GPIOA",
-        3: "GPIOB",
-        4: "GPIOC",
-        5: "GPIOD",
-        6: "GPIOE",
-        9: "ADC1",
-        10: "ADC2",
-        11: "TIM1",
-        12: "SPI1",
-        14: "USART1",
-    },
-    "APB1ENR": {
-        0: "TIM2",
-        1: "TIM3",
-        2: "TIM4",
-        11: "WWDG",
-        14: "SPI2",
-        17: "USART2",
-        18: "USART3",
-        21: "I2C1",
-        22: "I2C2",
-        23: "USB",
-        25: "CAN",
-        27: "BKP",
-        28: "PWR",
-    },
-}
-#: Enable bit by peripheral, modelled or not; who is missing is always clocked.
-CLOCK_GATES = {name: ClockBit(register, bit) for register, names in _GATES.items() for bit, name in names.items()}
 
 #: Base of every peripheral of the F103 family, for warnings by name (RM0008 table 3).
 BASES = {
@@ -156,6 +121,16 @@ BASES = {
 _NAMES = sorted((base, name) for name, base in BASES.items())
 #: The blocks that are larger than 1 KiB; that of USB has its packets.
 _LARGE_BYTES = {"USB": 0x800, "ETH": 0x2000, "USB OTG": 0x4_0000, "FSMC": 0x1000}
+
+#: Enable bit by peripheral, modelled or not, as RCC's fields name them (GPIOA is IOPA there); who is missing is always
+#: clocked. FLITF and SRAM, whose bits count in sleep alone, are no peripherals.
+CLOCK_GATES = {
+    name: ClockBit(register.name, field.high)
+    for register in Rcc.REGISTERS
+    if register.name.endswith("ENR")
+    for field in fields_of(register.fields)
+    if (name := field.name.replace("IOP", "GPIO")) in BASES
+}
 
 _Maker: TypeAlias = Callable[[ChipPorts, PeripheralMapping], Peripheral]
 

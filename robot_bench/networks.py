@@ -10,6 +10,7 @@ from robot_bench.scenario.scenario import Scenario
 from simbase.entry_points import installed_points
 from simbase.errors import UsageError
 from simbase.installation import way_to_plug_in
+from simbase.user_classes import loaded
 
 GROUP = "robot_bench.networks"
 
@@ -56,4 +57,4 @@ def network_of(name: str) -> Network:
     point = installed_points(GROUP).get(name)
     if point is None:
         raise UsageError(f"--{name} is not there", hint=way_to_plug_in(GROUP) or "p2os doctor")
-    return cast("Network", point.load())
+    return cast("Network", loaded(point))

@@ -17,7 +17,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, TypeVar, cast
 
 from bluepill_sim.parts.attached import AttachedParts
 from bluepill_sim.parts.serial_port import QUIET_NS
@@ -45,7 +45,7 @@ from simbase.errors import FileError, P2osError, UsageError
 from simbase.files import sha256_of
 from simbase.installation import installed_version
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
-from simbase.user_classes import unforeseen
+from simbase.user_classes import loaded, unforeseen
 
 if TYPE_CHECKING:
     from robot_bench.recording.measurement import Measurement
@@ -497,9 +497,9 @@ def why_failed(bench: Bench | RemoteBench, failures: Sequence[str]) -> str:
     """Return why a bench that has run has failed, in a line; empty where no entry point of `EXPLAINERS` finds it."""
     if isinstance(bench, RemoteBench):
         return ""
-    explainers = installed_points(EXPLAINERS).values()
+    explainers = (cast("Callable[..., str]", loaded(one)) for one in installed_points(EXPLAINERS).values())
     ended = replace(bench.record(), end={"failures": list(failures)})
-    return next((line for one in explainers if (line := one.load()(ended, bench.scenario.firmware))), "")
+    return next((line for one in explainers if (line := one(ended, bench.scenario.firmware))), "")
 
 
 def _figures(bench: Bench | RemoteBench, end: Nanos, wall_s: float) -> Json:

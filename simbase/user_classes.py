@@ -12,6 +12,7 @@ import importlib.util
 import inspect
 import sys
 from collections.abc import Callable, Sequence
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any, cast
 
@@ -98,6 +99,30 @@ def source_of(made: Callable[..., Any]) -> str:
         return hashlib.sha256(Path(inspect.getsourcefile(made) or "").read_bytes()).hexdigest()
     except (OSError, TypeError):
         return f"{made.__module__}.{getattr(made, '__qualname__', type(made).__name__)}"
+
+
+def loaded(point: EntryPoint) -> object:
+    """Return what an entry point names.
+
+    Raises:
+        ModuleNotFoundError: A module that it needs is not installed; what brings it, the caller knows.
+        P2osError: It cannot be had; the message names the package that offers it.
+    """
+    try:
+        return point.load()
+    except (ModuleNotFoundError, P2osError):
+        raise
+    except Exception as error:  # of another's package
+        raise broken(point, error) from error
+
+
+def broken(point: EntryPoint, error: Exception) -> P2osError:
+    """Return the error that names the package whose entry point fails."""
+    package = point.dist.name if point.dist is not None else point.module
+    return P2osError(
+        f"{point.name} ({point.group}) of the package {package} cannot be loaded: {said(error)}",
+        hint=f"pip uninstall {package} does without it; --trace shows where it fails",
+    )
 
 
 def said(error: Exception) -> str:

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.tools.installed import hide, plug_ins_of_others, stale_points
+
 #: What a run leaves out that names no marks (`-m`): of whole folders, and of files or tests that it names.
 OF_FOLDERS = "not slow and not soak and not hardware"
 OF_FILES = "not soak and not hardware"
@@ -65,8 +67,15 @@ def pytest_configure(config: pytest.Config) -> None:
     `pytest FOLDER` is what one runs again and again beside the work: without the tests that take seconds each, which
     `make test` runs, with all others.
 
+    An install older than pyproject.toml is refused, and plug-ins of others are hidden.
+
     Examples are the same in each run, so that a commit that passes does so again; `make soak` draws others.
     """
+    stale = stale_points(config.rootpath)
+    if stale:
+        raise pytest.UsageError(f"pyproject.toml and what is installed differ in {', '.join(stale)}: run `make setup`")
+    if hidden := plug_ins_of_others():
+        hide(hidden)
     if not config.option.markexpr:
         config.option.markexpr = OF_FILES if _names_files(config) else OF_FOLDERS
     gc.disable()  # until all is collected: what imports make stays, and looking through it again and again takes long

@@ -148,4 +148,4 @@ def test_the_ranges_in_the_pages_are_those_that_the_readers_check_by() -> None:
     generator = runpy.run_path(str(ROOT / "tools" / "generate_ranges.py"))
     texts = [path.read_text(encoding="utf-8") for path in generator["PAGES"]]
     assert sorted(re.findall(r"<!-- (?:ranges|table): ([a-z ]+) -->", "".join(texts))) == sorted(generator["tables"]())
-    assert [generator["page"](text) for text in texts] == texts, "run tools/generate_ranges.py"
+    assert [generator["page"](text) for text in texts] == texts, "run `make generated`"

@@ -291,7 +291,7 @@ class Fabric(Stateful):
         """
         slot = self._new_slot(name)
         if not self._calls_of_c.fabric_add_device(self.handle, slot, kind.encode(), words, state):
-            raise ValueError(f"no kind of device is called {kind!r}")
+            raise ValueError(f"no kind of device is called {kind!r} (hint: build its C again: pip install -e .)")
         self._acts[slot], self._answers[slot], self._deliveries[slot] = act, answer, deliver
         return slot
 

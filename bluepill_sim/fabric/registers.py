@@ -24,11 +24,14 @@ Invariant: a stored word never holds a bit outside `readable`, so that
 """
 
 import ctypes
+import re
 from array import array
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import InitVar, dataclass
 from enum import IntEnum
 from functools import cache
+from itertools import pairwise
 from typing import Any, ClassVar
 
 from bluepill_sim.extension.layout import Struct, structure
@@ -46,7 +49,10 @@ HEARS_LINE, OWN_ANSWERS, _LISTEN = 0, 2, OWN_COMMANDS
 _GATES = ("AHBENR", "APB2ENR", "APB1ENR")
 #: Every bit of a 32-bit register.
 WORD = 0xFFFF_FFFF
-_AS_MASK = -1
+_AS_MASK = _AS_FIELDS = -1
+_WORD_BITS = 32
+#: An entry of `Register.fields`: its name, its highest and its lowest bit.
+_FIELD = re.compile(r"(\w+) (\d+)(?::(\d+))?")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,8 +65,8 @@ class Register:
     offset: int
     #: Value after reset, as it reads.
     reset: int = 0
-    #: Its bits, where the next two do not say otherwise.
-    mask: InitVar[int] = WORD
+    #: Its bits, where the next two do not say otherwise; left out, those of `fields`, or all where it names none.
+    mask: InitVar[int] = _AS_FIELDS
     #: Bits that read as stored; all others read 0.
     readable: int = _AS_MASK
     #: Bits that take the value written (r/w). Bits that are writable but not readable are seen by `on_write` only.
@@ -77,7 +83,7 @@ class Register:
     latched_in: str | None = None
     #: Name of the peripheral's method `(written: int, previous: int) -> None`, called after the store; or `NATIVE`.
     on_write: str | None = None
-    #: Its fields as the manual names them, from the left: "CKD 9:8, ARPE 7".
+    #: Its fields as the manual names them, in any order: "CKD 9:8, ARPE 7". Every bit that reads is of one of them.
     fields: str = ""
     #: One line for people.
     doc: str = ""
@@ -86,12 +92,13 @@ class Register:
         """Fill in the mask, and refuse a declaration that contradicts itself.
 
         Raises:
-            ValueError: A mask is wider than a word, two kinds of bits overlap,
-                a trigger does more, or the reset value holds bits that do not read.
+            ValueError: A mask is wider than a word, two kinds of bits overlap, a trigger does more, the reset value
+                holds bits that do not read, or `fields` is no list of fields that has each bit that reads once.
         """
+        fields = self._bits_of_fields()
         for name in ("readable", "writable"):
             if getattr(self, name) == _AS_MASK:
-                object.__setattr__(self, name, mask)
+                object.__setattr__(self, name, fields if mask == _AS_FIELDS else mask)
         if self.offset % 4:
             raise ValueError(f"{self.name}: offset {self.offset:#x} is not that of a word")
         for word in (
@@ -111,6 +118,15 @@ class Register:
             raise ValueError(f"{self.name}: a trigger stores nothing and reads 0")
         if self.reset & ~self.readable:
             raise ValueError(f"{self.name}: the reset value holds bits that do not read")
+        if self.readable & ~fields:
+            raise ValueError(f"{self.name}: bits {self.readable & ~fields:#x} read, and no field has them")
+
+    def _bits_of_fields(self) -> int:
+        """Return the bits that a field has; all of them where none is named."""
+        try:
+            return bits(*((field.high, field.low) for field in fields_of(self.fields))) if self.fields else WORD
+        except ValueError as error:
+            raise ValueError(f"{self.name}: {error}") from None
 
     @property
     def setting(self) -> int:
@@ -220,16 +236,30 @@ def numbered(pattern: str, numbers: Iterable[int], width: int = 1, first: int = 
 
 @cache
 def fields_of(text: str) -> tuple[BitField, ...]:
-    """Return the fields that `Register.fields` names.
+    """Return the fields that `Register.fields` names, the highest first.
 
-    >>> fields_of("CKD 9:8, ARPE 7")[0].of(0x200)
+    Raises:
+        ValueError: An entry is no field of a word, two have one name, or one bit.
+
+    >>> fields_of("ARPE 7, CKD 9:8")[0].of(0x200)
     2
     """
     found = []
     for entry in filter(None, text.split(", ")):
-        name, place = entry.split()
-        high, _, low = place.partition(":")
+        match = _FIELD.fullmatch(entry)
+        if match is None:
+            raise ValueError(f'no field: {entry!r} (hint: fields="CKD 9:8, ARPE 7")')
+        name, high, low = match.groups()
         found.append(BitField(name, int(high), int(low or high)))
+        if not _WORD_BITS > found[-1].high >= found[-1].low:
+            raise ValueError(f"{entry}: no bits of a word, the highest first")
+    found.sort(key=lambda field: -field.high)
+    for higher, lower in pairwise(found):
+        if lower.high >= higher.low:
+            raise ValueError(f"fields {higher.name} and {lower.name} have bit {lower.high} both")
+    twice = [name for name, times in Counter(field.name for field in found).items() if times > 1]
+    if twice:
+        raise ValueError(f"two fields are called {twice[0]}")
     return tuple(found)
 
 

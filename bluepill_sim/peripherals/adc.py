@@ -50,8 +50,8 @@ _MASTER_CR1, _MASTER_CR2 = bits((19, 16)), bits(8, 23)
 _STARTS = bits(22, 21)
 
 
-def _stored(name: str, offset: int, mask: int, fields: str, reset: int = 0) -> Register:
-    return Register(name=name, offset=offset, reset=reset, mask=mask, on_write=NATIVE, fields=fields)
+def _stored(name: str, offset: int, fields: str, reset: int = 0) -> Register:
+    return Register(name=name, offset=offset, reset=reset, on_write=NATIVE, fields=fields)
 
 
 def _registers(cr1: int, cr2: int) -> tuple[Register, ...]:
@@ -66,12 +66,13 @@ def _registers(cr1: int, cr2: int) -> tuple[Register, ...]:
             on_write=NATIVE,
             fields="STRT 4, JSTRT 3, JEOC 2, EOC 1, AWD 0",
         ),
-        _stored(
-            "CR1",
-            0x04,
-            cr1,
-            "AWDEN 23, JAWDEN 22, DUALMOD 19:16, DISCNUM 15:13, JDISCEN 12, DISCEN 11, JAUTO 10, AWDSGL 9, SCAN 8, "
-            "JEOCIE 7, AWDIE 6, EOCIE 5, AWDCH 4:0",
+        Register(
+            name="CR1",
+            offset=0x04,
+            mask=cr1,
+            on_write=NATIVE,
+            fields="AWDEN 23, JAWDEN 22, DUALMOD 19:16, DISCNUM 15:13, JDISCEN 12, DISCEN 11, JAUTO 10, AWDSGL 9, "
+            "SCAN 8, JEOCIE 7, AWDIE 6, EOCIE 5, AWDCH 4:0",
         ),
         Register(
             name="CR2",
@@ -82,15 +83,15 @@ def _registers(cr1: int, cr2: int) -> tuple[Register, ...]:
             fields="TSVREFE 23, SWSTART 22, JSWSTART 21, EXTTRIG 20, EXTSEL 19:17, JEXTTRIG 15, JEXTSEL 14:12, "
             "ALIGN 11, DMA 8, RSTCAL 3, CAL 2, CONT 1, ADON 0",
         ),
-        _stored("SMPR1", 0x0C, bits((23, 0)), numbered("SMPn", range(17, 9, -1), 3, 10)),
-        _stored("SMPR2", 0x10, bits((29, 0)), numbered("SMPn", range(9, -1, -1), 3, 0)),
-        *(_stored(f"JOFR{n}", 0x10 + 4 * n, bits((11, 0)), f"JOFFSET{n} 11:0") for n in (1, 2, 3, 4)),
-        _stored("HTR", 0x24, bits((11, 0)), "HT 11:0", 0xFFF),
-        _stored("LTR", 0x28, bits((11, 0)), "LT 11:0"),
-        _stored("SQR1", 0x2C, bits((23, 0)), "L 23:20, " + numbered("SQn", range(16, 12, -1), 5, 13)),
-        _stored("SQR2", 0x30, bits((29, 0)), numbered("SQn", range(12, 6, -1), 5, 7)),
-        _stored("SQR3", 0x34, bits((29, 0)), numbered("SQn", range(6, 0, -1), 5, 1)),
-        _stored("JSQR", 0x38, bits((21, 0)), "JL 21:20, " + numbered("JSQn", range(4, 0, -1), 5, 1)),
+        _stored("SMPR1", 0x0C, numbered("SMPn", range(17, 9, -1), 3, 10)),
+        _stored("SMPR2", 0x10, numbered("SMPn", range(9, -1, -1), 3, 0)),
+        *(_stored(f"JOFR{n}", 0x10 + 4 * n, f"JOFFSET{n} 11:0") for n in (1, 2, 3, 4)),
+        _stored("HTR", 0x24, "HT 11:0", 0xFFF),
+        _stored("LTR", 0x28, "LT 11:0"),
+        _stored("SQR1", 0x2C, "L 23:20, " + numbered("SQn", range(16, 12, -1), 5, 13)),
+        _stored("SQR2", 0x30, numbered("SQn", range(12, 6, -1), 5, 7)),
+        _stored("SQR3", 0x34, numbered("SQn", range(6, 0, -1), 5, 1)),
+        _stored("JSQR", 0x38, "JL 21:20, " + numbered("JSQn", range(4, 0, -1), 5, 1)),
         *(
             Register(
                 name=f"JDR{n}",

@@ -73,7 +73,6 @@ class Afio(Peripheral):
         Register(
             name="EVCR",
             offset=0x00,
-            mask=bits((7, 0)),
             on_write="_write_evcr",
             fields="EVOE 7, PORT 6:4, PIN 3:0",
         ),
@@ -89,7 +88,6 @@ class Afio(Peripheral):
             Register(
                 name=f"EXTICR{n + 1}",
                 offset=0x08 + 4 * n,
-                mask=bits((15, 0)),
                 on_write="_write_exticr",
                 fields=", ".join(f"EXTI{4 * n + k} {4 * k + 3}:{4 * k}" for k in range(3, -1, -1)),
             )

@@ -13,7 +13,7 @@ Invariant: a data register is 0 while TEF is set.
 """
 
 from bluepill_sim.fabric.pins import PinDrive
-from bluepill_sim.fabric.registers import LISTENER, Peripheral, Register, bits, masks
+from bluepill_sim.fabric.registers import LISTENER, Peripheral, Register, masks
 from simbase.timing import NS_PER_S, Nanos
 
 #: Data registers of a medium-density part.
@@ -26,7 +26,6 @@ _CSR = "TIF 9, TEF 8, TPIE 2, CTI 1, CTE 0"
 CAL, CCO, ASOE, ASOS = masks(_RTCCR, "CAL CCO ASOE ASOS")
 TPE, TPAL = masks(_CR, "TPE TPAL")
 CTE, CTI, TPIE, TEF, TIF = masks(_CSR, "CTE CTI TPIE TEF TIF")
-_HALFWORD = bits((15, 0))
 _PORT, _PIN, _OWNER = "C", 13, "RTC output"
 #: CCO changes the pin after so many cycles of RTCCLK.
 _HALF_PERIOD = 32
@@ -45,7 +44,6 @@ class Bkp(Peripheral):
             Register(
                 name=f"DR{n}",
                 offset=4 * n,
-                mask=_HALFWORD,
                 on_write="_write_data",
                 fields="D 15:0",
             )
@@ -54,14 +52,12 @@ class Bkp(Peripheral):
         Register(
             name="RTCCR",
             offset=4 * RTCCR,
-            mask=bits((9, 0)),
             on_write="_write_rtccr",
             fields=_RTCCR,
         ),
         Register(
             name="CR",
             offset=4 * CR,
-            mask=TPE | TPAL,
             on_write="_write_cr",
             fields=_CR,
         ),

@@ -57,7 +57,6 @@ _CRC_ERROR = 6
 _FLAG_BITS = 6
 #: Pins (RX, TX) by the remap field (RM0008 table 42).
 PINS = {0: ("PA11", "PA12"), 2: ("PB8", "PB9"), 3: ("PD0", "PD1")}
-_FILTER_MODES = bits((13, 0))
 #: The outputs in the order in which they are set; the first is for USB, whose memory it shares.
 _UPDATED = ("packets", "tx_irq", "rx0_irq", "rx1_irq", "sce_irq")
 #: Commands of the device in C that shows bits (`devices/can_bits.c`), and what comes next of a try that it repeats.
@@ -196,7 +195,6 @@ class Can(Peripheral):
             fields="SLKIE 17, WKUIE 16, ERRIE 15, LECIE 11, BOFIE 10, EPVIE 9, EWGIE 8, "
             "FOVIE1 6, FFIE1 5, FMPIE1 4, FOVIE0 3, FFIE0 2, FMPIE0 1, TMEIE 0",
             offset=0x14,
-            mask=bits((17, 15), (11, 8), (6, 0)),
             on_write="_write_flags",
         ),
         Register(
@@ -212,7 +210,6 @@ class Can(Peripheral):
             fields="SILM 31, LBKM 30, SJW 25:24, TS2 22:20, TS1 19:16, BRP 9:0",
             offset=0x1C,
             reset=0x0123_0000,
-            mask=bits((31, 30), (25, 24), (22, 16), (9, 0)),
             on_write="_write_btr",
         ),
         *_mailbox_registers(),
@@ -221,7 +218,6 @@ class Can(Peripheral):
             Register(
                 name=name,
                 offset=offset,
-                mask=_FILTER_MODES,
                 on_write=f"_write_{name.lower()}",
                 fields=numbered(f"{bit}n", range(_BANKS - 1, -1, -1)),
             )
@@ -230,7 +226,6 @@ class Can(Peripheral):
         Register(
             name="FA1R",
             offset=0x21C,
-            mask=_FILTER_MODES,
             fields=numbered("FACTn", range(_BANKS - 1, -1, -1)),
         ),
         *(Register(name=f"F{n // 2}R{n % 2 + 1}", offset=0x240 + 4 * n, fields="FB 31:0") for n in range(2 * _BANKS)),

@@ -18,6 +18,6 @@ class Crc(Peripheral):
     SOURCE = "RM0008 4.4"
     REGISTERS = (
         Register(name="DR", offset=0x00, reset=WORD, on_write=NATIVE, fields="DR 31:0"),
-        Register(name="IDR", offset=0x04, mask=bits((7, 0)), fields="IDR 7:0"),
+        Register(name="IDR", offset=0x04, fields="IDR 7:0"),
         Register(name="CR", offset=0x08, readable=0, writable=bits(0), on_write=NATIVE, fields="RESET 0"),
     )

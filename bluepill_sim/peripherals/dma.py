@@ -63,13 +63,13 @@ class Dma(Peripheral):
             fields=_flags("CTEIF CHTIF CTCIF CGIF"),
         ),
         *(
-            Register(name=f"{name}{n}", offset=offset + 20 * n, mask=mask, on_write=NATIVE, fields=fields)
+            Register(name=f"{name}{n}", offset=offset + 20 * n, on_write=NATIVE, fields=fields)
             for n in CHANNELS
-            for name, offset, mask, fields in (
-                ("CCR", -0x0C, bits((14, 0)), _CONTROL),
-                ("CNDTR", -0x08, bits((15, 0)), "NDT 15:0"),
-                ("CPAR", -0x04, bits((31, 0)), "PA 31:0"),
-                ("CMAR", 0x00, bits((31, 0)), "MA 31:0"),
+            for name, offset, fields in (
+                ("CCR", -0x0C, _CONTROL),
+                ("CNDTR", -0x08, "NDT 15:0"),
+                ("CPAR", -0x04, "PA 31:0"),
+                ("CMAR", 0x00, "MA 31:0"),
             )
         ),
     )

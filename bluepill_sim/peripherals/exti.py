@@ -30,10 +30,10 @@ class Exti(Peripheral):
     INPUTS = ("pvd", "rtc_alarm", "usb_wakeup")
     SOURCE = "RM0008 10.3"
     REGISTERS = (
-        Register(name="IMR", offset=0x00, mask=_LINES, on_write=NATIVE, fields=numbered("MRn", _DOWN)),
-        Register(name="EMR", offset=0x04, mask=_LINES, fields=numbered("MRn", _DOWN)),
-        Register(name="RTSR", offset=0x08, mask=_LINES, on_write=NATIVE, fields=numbered("TRn", _DOWN)),
-        Register(name="FTSR", offset=0x0C, mask=_LINES, on_write=NATIVE, fields=numbered("TRn", _DOWN)),
+        Register(name="IMR", offset=0x00, on_write=NATIVE, fields=numbered("MRn", _DOWN)),
+        Register(name="EMR", offset=0x04, fields=numbered("MRn", _DOWN)),
+        Register(name="RTSR", offset=0x08, on_write=NATIVE, fields=numbered("TRn", _DOWN)),
+        Register(name="FTSR", offset=0x0C, on_write=NATIVE, fields=numbered("TRn", _DOWN)),
         Register(
             name="SWIER", offset=0x10, readable=_LINES, writable=0, on_write=NATIVE, fields=numbered("SWIERn", _DOWN)
         ),

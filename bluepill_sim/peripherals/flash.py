@@ -123,7 +123,6 @@ class Flash(Peripheral):
             name="CR",
             offset=0x10,
             reset=LOCK,
-            mask=PG | PER | MER | OPTPG | OPTER | STRT | LOCK | OPTWRE | ERRIE | EOPIE,
             on_write=NATIVE,
             fields=_CR,
         ),

@@ -74,7 +74,7 @@ class Gpio(Peripheral):
         Register(name="CRL", offset=0x00, reset=_CR_RESET, on_write=NATIVE, fields=_modes(range(7, -1, -1))),
         Register(name="CRH", offset=0x04, reset=_CR_RESET, on_write=NATIVE, fields=_modes(range(15, 7, -1))),
         Register(name="IDR", offset=0x08, readable=_PORT, writable=0, on_read=NATIVE, fields=numbered("IDRn", _DOWN)),
-        Register(name="ODR", offset=0x0C, mask=_PORT, on_write=NATIVE, fields=numbered("ODRn", _DOWN)),
+        Register(name="ODR", offset=0x0C, on_write=NATIVE, fields=numbered("ODRn", _DOWN)),
         Register(
             name="BSRR",
             offset=0x10,

@@ -24,7 +24,6 @@ from bluepill_sim.fabric.ports import ChipPorts
 from bluepill_sim.fabric.registers import NATIVE, WORD, Peripheral, PeripheralMapping, Register, bits, indices, masks
 from simbase.timing import Nanos
 
-_CR1, _CR2, _CCR = bits(15, (13, 3), (1, 0)), bits((12, 8), (5, 0)), bits(15, 14, (11, 0))
 #: Fields, from the left.
 _SR1 = (
     "SMBALERT 15, TIMEOUT 14, PECERR 12, OVR 11, AF 10, ARLO 9, BERR 8, "
@@ -147,20 +146,20 @@ class I2c(Peripheral):
     SOURCE = "RM0008 26.6"
     REGISTERS = (
         Register(
-            name="CR1", offset=0x00, mask=_CR1, on_write=NATIVE,
+            name="CR1", offset=0x00, on_write=NATIVE,
             fields="SWRST 15, ALERT 13, PEC 12, POS 11, ACK 10, STOP 9, "
             "START 8, NOSTRETCH 7, ENGC 6, ENPEC 5, ENARP 4, "
             "SMBTYPE 3, SMBUS 1, PE 0",
         ),
         Register(
-            name="CR2", offset=0x04, mask=_CR2, on_write=NATIVE,
+            name="CR2", offset=0x04, on_write=NATIVE,
             fields="LAST 12, DMAEN 11, ITBUFEN 10, ITEVTEN 9, ITERREN 8, FREQ 5:0",
         ),
         Register(
-            name="OAR1", offset=0x08, mask=bits(15, 14, (9, 0)), fields="ADDMODE 15, one 14, ADD 9:0",
+            name="OAR1", offset=0x08, fields="ADDMODE 15, one 14, ADD 9:0",
         ),
         Register(
-            name="OAR2", offset=0x0C, mask=bits((7, 0)), fields="ADD2 7:1, ENDUAL 0"
+            name="OAR2", offset=0x0C, fields="ADD2 7:1, ENDUAL 0"
         ),
         Register(
             name="DR", offset=0x10, readable=0, writable=bits((7, 0)), on_read=NATIVE, on_write=NATIVE, fields="DR 7:0"
@@ -175,10 +174,10 @@ class I2c(Peripheral):
             fields="PEC 15:8, DUALF 7, SMBHOST 6, SMBDEFAULT 5, GENCALL 4, TRA 2, BUSY 1, MSL 0",
         ),
         Register(
-            name="CCR", offset=0x1C, mask=_CCR, on_write="_write_ccr",
+            name="CCR", offset=0x1C, on_write="_write_ccr",
             fields="FS 15, DUTY 14, CCR 11:0",
         ),
-        Register(name="TRISE", offset=0x20, reset=2, mask=bits((5, 0)), fields="TRISE 5:0"),
+        Register(name="TRISE", offset=0x20, reset=2, fields="TRISE 5:0"),
     )  # fmt: skip
 
     def __init__(self, chip: ChipPorts, place: PeripheralMapping) -> None:

@@ -10,7 +10,7 @@ Invariant: while it runs, `due_ns` is when the chip is reset.
 """
 
 from bluepill_sim.fabric.clocks import LSI_HZ
-from bluepill_sim.fabric.registers import Peripheral, Register, bits, masks
+from bluepill_sim.fabric.registers import Peripheral, Register, masks
 from simbase.timing import NS_PER_S, Nanos
 
 KR, PR, RLR, SR = range(4)
@@ -34,10 +34,10 @@ class Iwdg(Peripheral):
     REGISTERS = (
         Register(name="KR", offset=0x00, readable=0, on_write="_write_kr"),
         Register(
-            name="PR", offset=0x04, mask=bits((2, 0)), on_write="_write_pr", fields="PR 2:0"
+            name="PR", offset=0x04, on_write="_write_pr", fields="PR 2:0"
         ),
         Register(
-            name="RLR", offset=0x08, reset=_COUNTS, mask=_COUNTS, on_write="_write_rlr",
+            name="RLR", offset=0x08, reset=_COUNTS, on_write="_write_rlr",
             fields="RL 11:0",
         ),
         Register(name="SR", offset=0x0C, readable=_PVU | _RVU, writable=0, on_read="_read_sr", fields=_SR),

@@ -44,6 +44,7 @@ _CIR = (
     "PLLRDYIE 12, HSERDYIE 11, HSIRDYIE 10, LSERDYIE 9, LSIRDYIE 8, CSSF 7, "
     "PLLRDYF 4, HSERDYF 3, HSIRDYF 2, LSERDYF 1, LSIRDYF 0"
 )
+#: Those of the enable registers, by the peripheral that each clocks; the reset registers have the same.
 _APB2 = "USART1 14, SPI1 12, TIM1 11, ADC2 10, ADC1 9, IOPE 6, IOPD 5, IOPC 4, IOPB 3, IOPA 2, AFIO 0"
 _APB1 = (
     "PWR 28, BKP 27, CAN 25, USB 23, I2C2 22, I2C1 21, USART3 18, USART2 17, SPI2 14, WWDG 11, TIM4 2, TIM3 1, TIM2 0"
@@ -51,10 +52,6 @@ _APB1 = (
 _AHB = "CRC 6, FLITF 4, SRAM 2, DMA1 0"
 _BDCR = "BDRST 16, RTCEN 15, RTCSEL 9:8, LSEBYP 2, LSERDY 1, LSEON 0"
 _CSR = "LPWRRSTF 31, WWDGRSTF 30, IWDGRSTF 29, SFTRSTF 28, PORRSTF 27, PINRSTF 26, RMVF 24, LSIRDY 1, LSION 0"
-#: Bits of the enable registers that a medium-density F103 has.
-_AHB_GATES = bits(0, 2, 4, 6)
-_APB2_GATES = bits(0, (6, 2), (12, 9), 14)
-_APB1_GATES = bits((2, 0), 11, 14, 17, 18, (23, 21), 25, 27, 28)
 
 HSION, HSIRDY, HSEON, HSERDY, HSEBYP, PLLON, PLLRDY, CSSON = masks(
     _CR, "HSION HSIRDY HSEON HSERDY HSEBYP PLLON PLLRDY CSSON"
@@ -150,14 +147,12 @@ _REGISTERS = (
     Register(
         name="APB2RSTR",
         offset=0x0C,
-        mask=_APB2_GATES,
         on_write=NATIVE,
         fields=_APB2,
     ),
     Register(
         name="APB1RSTR",
         offset=0x10,
-        mask=_APB1_GATES,
         on_write=NATIVE,
         fields=_APB1,
     ),
@@ -165,21 +160,18 @@ _REGISTERS = (
         name="AHBENR",
         offset=0x14,
         reset=0x14,
-        mask=_AHB_GATES,
         on_write=NATIVE,
         fields=_AHB,
     ),
     Register(
         name="APB2ENR",
         offset=0x18,
-        mask=_APB2_GATES,
         on_write=NATIVE,
         fields=_APB2,
     ),
     Register(
         name="APB1ENR",
         offset=0x1C,
-        mask=_APB1_GATES,
         on_write=NATIVE,
         fields=_APB1,
     ),

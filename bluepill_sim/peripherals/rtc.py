@@ -57,7 +57,6 @@ class Rtc(Peripheral):
         Register(
             name="CRH",
             offset=0x00,
-            mask=_INTERRUPTS,
             on_write="_write_crh",
             fields="OWIE 2, ALRIE 1, SECIE 0",
         ),

@@ -29,7 +29,6 @@ _CR1 = (
 )
 CPHA, CPOL, MSTR, SPE, LSBFIRST, DFF = masks(_CR1, "CPHA CPOL MSTR SPE LSBFIRST DFF")
 _BR_AT, _HELD, _WHATEVER = 3, 1 << 16, 0xFFFF_FFFF
-_CR2 = bits((7, 5), (2, 0))
 #: Pins (MISO, MOSI, NSS, SCK), by the value of the remap bit (RM0008 table 56, DS5319 table 5).
 PINS = {
     "SPI1": {0: ("PA6", "PA7", "PA4", "PA5"), 1: ("PB4", "PB5", "PA15", "PB3")},
@@ -123,11 +122,11 @@ class Spi(Peripheral):
     SOURCE = "RM0008 25.5"
     REGISTERS = (
         Register(
-            name="CR1", offset=0x00, mask=bits((15, 0)), on_write=NATIVE,
+            name="CR1", offset=0x00, on_write=NATIVE,
             fields=_CR1,
         ),
         Register(
-            name="CR2", offset=0x04, mask=_CR2, on_write=NATIVE,
+            name="CR2", offset=0x04, on_write=NATIVE,
             fields="TXEIE 7, RXNEIE 6, ERRIE 5, SSOE 2, TXDMAEN 1, RXDMAEN 0",
         ),
         Register(
@@ -140,7 +139,7 @@ class Spi(Peripheral):
             fields="DR 15:0",
         ),
         Register(
-            name="CRCPR", offset=0x10, reset=7, mask=bits((15, 0)), fields="CRCPOLY 15:0"
+            name="CRCPR", offset=0x10, reset=7, fields="CRCPOLY 15:0"
         ),
         Register(name="RXCRCR", offset=0x14, readable=bits((15, 0)), writable=0, fields="RxCRC 15:0"),
         Register(name="TXCRCR", offset=0x18, readable=bits((15, 0)), writable=0, fields="TxCRC 15:0"),

@@ -124,7 +124,6 @@ class Usb(Peripheral):
             name="CNTR",
             offset=0x40,
             reset=PDWN | FRES,
-            mask=bits((15, 8), (4, 0)),
             on_write=NATIVE,
             fields=_CNTR,
         ),
@@ -148,16 +147,14 @@ class Usb(Peripheral):
         Register(
             name="DADDR",
             offset=0x4C,
-            mask=bits((7, 0)),
             on_write=NATIVE,
             fields=_DADDR,
         ),
-        Register(name="BTABLE", offset=0x50, mask=bits((15, 3)), fields="BTABLE 15:3"),
+        Register(name="BTABLE", offset=0x50, fields="BTABLE 15:3"),
         *(
             Register(
                 name=f"PMA_{2 * n:03X}",
                 offset=MEMORY_OFFSET + 4 * n,
-                mask=bits((15, 0)),
                 fields="DATA 15:0",
             )
             for n in range(MEMORY_WORDS)

@@ -10,7 +10,7 @@ Source: RM0008 section 20.
 Invariant: while it is active, `due_ns` is the earlier of the early wake-up and the reset.
 """
 
-from bluepill_sim.fabric.registers import Peripheral, Register, bits, indices, masks
+from bluepill_sim.fabric.registers import Peripheral, Register, indices, masks
 from simbase.timing import NS_PER_S, Nanos
 
 #: Fields, from the left.
@@ -29,11 +29,11 @@ class Wwdg(Peripheral):
     SOURCE = "RM0008 20.6"
     REGISTERS = (
         Register(
-            name="CR", offset=0x00, reset=_T, mask=bits((7, 0)), on_read="_read_cr",
+            name="CR", offset=0x00, reset=_T, on_read="_read_cr",
             on_write="_write_cr", fields=_CR,
         ),
         Register(
-            name="CFR", offset=0x04, reset=_T, mask=bits((9, 0)), on_write="_write_cfr",
+            name="CFR", offset=0x04, reset=_T, on_write="_write_cfr",
             fields=_CFR,
         ),
         Register(

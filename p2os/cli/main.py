@@ -2,7 +2,8 @@
 
 Verbs are modules with `register(app)`, found by the entry points of the group
 `p2os.verbs`, so that packages above this one add theirs without being imported
-here. A verb whose module cannot be imported is still listed, with what it lacks.
+here. A verb whose module cannot be imported is still listed, with what it lacks,
+and one that fails otherwise with the package that it is of.
 """
 
 import os
@@ -19,8 +20,9 @@ from simbase.command_line import program
 from simbase.command_line.help_pages import dress
 from simbase.command_line.program import EXIT_INTERRUPTED
 from simbase.entry_points import installed_points
-from simbase.errors import MissingDependencyError
+from simbase.errors import MissingDependencyError, P2osError
 from simbase.installation import installed_version
+from simbase.user_classes import broken
 
 NAME = "p2os"
 GROUP = "p2os.verbs"
@@ -117,25 +119,29 @@ def completed_words(environment: Mapping[str, str]) -> list[str] | None:
 
 
 def add_verbs(app: typer.Typer, entries: Iterable[EntryPoint]) -> None:
-    """Register each verb, or in its place a command that shows what it lacks."""
+    """Register each verb, or in its place a command that tells what it lacks, or which package is broken."""
     for entry in entries:
+        count = len(app.registered_commands), len(app.registered_groups)
         try:
-            module = entry.load()
-        except ImportError as error:
-            _add_missing(app, entry.name, error)
-        else:
-            module.register(app)
+            entry.load().register(app)
+        except Exception as error:  # noqa: BLE001 - of another's package: the other verbs work on
+            del app.registered_commands[count[0] :], app.registered_groups[count[1] :]
+            if isinstance(error, ModuleNotFoundError):
+                failure: P2osError = MissingDependencyError(
+                    f"`{NAME} {entry.name}` needs {error.name}", hint=f"{NAME} doctor"
+                )
+                _add_failing(app, entry.name, f"missing: needs {error.name}; p2os doctor", failure, error)
+            else:
+                failure = broken(entry, error)
+                _add_failing(app, entry.name, f"{failure}", failure, error)
 
 
-def _add_missing(app: typer.Typer, name: str, error: ImportError) -> None:
-    lacking = error.name or str(error)
+def _add_failing(app: typer.Typer, name: str, why: str, failure: P2osError, cause: Exception) -> None:
+    """Register, in place of a verb, what tells why it cannot be had."""
 
-    @app.command(
-        name, help=f"(missing: needs {lacking}; p2os doctor)",
-        context_settings={"allow_extra_args": True, "ignore_unknown_options": True},
-    )  # fmt: skip
-    def missing() -> None:
-        raise MissingDependencyError(f"`{NAME} {name}` needs {lacking}", hint=f"{NAME} doctor") from error
+    @app.command(name, help=f"({why})", context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
+    def failing() -> None:
+        raise failure from cause
 
 
 def _print_version(wanted: bool) -> None:

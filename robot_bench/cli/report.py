@@ -1,6 +1,7 @@
 """`p2os report`: makes everything in a run folder anew from its trace."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, cast
 
@@ -14,6 +15,7 @@ from robot_bench.report.make import Files, make_artefacts, make_artefacts_of_all
 from simbase.entry_points import installed_points
 from simbase.errors import UsageError, shown
 from simbase.installation import way_to_plug_in
+from simbase.user_classes import loaded
 
 #: Entry points that write the events of a run as a bag, each by the name of its storage.
 BAGS = "robot_bench.bags"
@@ -69,7 +71,8 @@ def report(
         bags = installed_points(BAGS)
         if ros2 not in bags:
             raise UsageError(f"there is no storage {shown(ros2)}", hint=" or ".join(bags) or way_to_plug_in(BAGS))
-        count = bags[ros2].load()(read_events(folder), events, read_meta(folder), ros2)
+        write = cast("Callable[..., int]", loaded(bags[ros2]))
+        count = write(read_events(folder), events, read_meta(folder), ros2)
         typer.echo(f"{events}: {count} messages")
         return
     if events is not None:

@@ -25,6 +25,7 @@ from robot_bench.recording.run_record import TRACE_NAME, read_events, read_run
 from simbase.entry_points import installed_points
 from simbase.errors import FileError, shown_name
 from simbase.files import lines_of, reading, writing
+from simbase.user_classes import loaded
 
 _TUM_COLUMNS = 8
 #: chosen: of a table all rows are held; half a day at 100 Hz.
@@ -92,7 +93,7 @@ def is_recording(path: Path) -> bool:
 
 
 def _reader_of(path: Path) -> DriveReader | None:
-    readers = (cast("DriveReader", point.load()) for point in installed_points(READERS).values())
+    readers = (cast("DriveReader", loaded(point)) for point in installed_points(READERS).values())
     return next((one for one in readers if one.knows(path)), None)
 
 

@@ -5,7 +5,8 @@ from typing import Any
 import pytest
 
 from bluepill_sim import stm32f103
-from bluepill_sim.peripherals.rcc import ResetCause
+from bluepill_sim.fabric.registers import ClockBit, fields_of
+from bluepill_sim.peripherals.rcc import Rcc, ResetCause
 from bluepill_sim.stm32f103 import (
     BASES,
     BONDED_PINS,
@@ -65,7 +66,9 @@ def test_a_table_of_wires_with_a_mistake_is_refused_at_the_start(
 def test_every_gate_has_its_own_bit() -> None:
     gates = list(CLOCK_GATES.values())
     assert len(set(gates)) == len(gates)
-    assert set(CLOCK_GATES) <= set(BASES)
+    fields = [field.name for one in Rcc.REGISTERS if one.name.endswith("ENR") for field in fields_of(one.fields)]
+    assert {name for name in fields if name.replace("IOP", "GPIO") not in CLOCK_GATES} == {"FLITF", "SRAM"}
+    assert CLOCK_GATES["GPIOA"] == ClockBit("APB2ENR", 2)
 
 
 @pytest.mark.parametrize(

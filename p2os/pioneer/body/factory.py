@@ -20,7 +20,7 @@ from simbase.errors import UsageError, shown
 from simbase.installation import way_to_plug_in
 from simbase.trust import own_code
 from simbase.trust.code import is_in_file
-from simbase.user_classes import find_class, make, refuse_lacking
+from simbase.user_classes import find_class, loaded, make, refuse_lacking
 
 #: The exact body, which needs nothing.
 KINEMATIC = Engine(name="kinematic", module="p2os.pioneer.body.kinematic", scene="KinematicScene")
@@ -37,7 +37,7 @@ ADDRESSES = "p2os.body_addresses"
 def engines() -> Mapping[str, Engine]:
     """Return the engines by their names, the exact body first, then the best first; looked up once a process."""
     points = installed_points(GROUP).values()
-    found = [cast("Engine", point.load()) for point in points if point.attr == ATTRIBUTE]
+    found = [cast("Engine", loaded(point)) for point in points if point.attr == ATTRIBUTE]
     return {one.name: one for one in (KINEMATIC, *sorted(found, key=lambda one: -one.rank))}
 
 
@@ -149,7 +149,7 @@ def body_class(name: str) -> Callable[[World, Sequence[RobotParameters]], RobotS
         raise UsageError(f"{shown(name)} is no body's name", hint=f"one of {', '.join(body_names())}")
     scheme, colon, _ = name.partition(":")
     if colon and not is_in_file(name) and (point := installed_points(ADDRESSES).get(scheme)) is not None:
-        return cast("Callable[..., RobotScene]", point.load()(name))
+        return cast("Callable[[str], Callable[..., RobotScene]]", loaded(point))(name)
     found = find_class(name, what="body", group=GROUP, known=body_names(), absent=way_to_plug_in(GROUP))
     refuse_lacking(found, RobotScene, name, "body")
     return found

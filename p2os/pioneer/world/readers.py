@@ -14,6 +14,7 @@ from p2os.pioneer.world.text_file import sized
 from simbase.entry_points import installed_points
 from simbase.errors import MissingDependencyError, shown_name
 from simbase.installation import way_to_plug_in
+from simbase.user_classes import loaded
 
 #: The entry points: the ending without its dot → `Reader`.
 GROUP = "p2os.world_readers"
@@ -90,7 +91,7 @@ def read_placed(path: Path, placing: Placing) -> World:
 def _load(point: EntryPoint) -> Reader:
     """Import a reader, or name the package that it lacks."""
     try:
-        return cast("Reader", point.load())
+        return cast("Reader", loaded(point))
     except ModuleNotFoundError as error:
         raise MissingDependencyError(f"reading this file needs {error.name}", extra="worlds") from error
 

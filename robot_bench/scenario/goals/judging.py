@@ -11,7 +11,6 @@ Invariant: a verdict depends on the events of the run alone; played back from it
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import cast
 
 from p2os.errors import ScenarioError
 from p2os.toml_schema import Key, Table, Where, check_table, placed
@@ -117,7 +116,7 @@ def load_goal(table: Table, where: Where, wires: Wires | None = None) -> Goal:
 
 
 def _check(arguments: Table, where: Where) -> None:
-    """Check what is in the lists of a goal, that a region is one, and that bounds leave something."""
+    """Check what keys mean by their names in goals of every kind: no value is empty, and bounds leave something."""
     for key, value in arguments.items():
         if value in ("", []):
             raise ScenarioError(f"{where}: {key} is empty")
@@ -126,39 +125,6 @@ def _check(arguments: Table, where: Where) -> None:
             raise ScenarioError(f"{where}: {key} is above {most}")
     if number(arguments, "to_s", math.inf) < number(arguments, "from_s"):
         raise ScenarioError(f"{where}: to_s lies before from_s: the goal would look at nothing")
-    pairs = cast("list[object]", arguments.get("values", []))
-    if not all(_is_pair(pair) for pair in pairs):
-        raise ScenarioError(
-            f"{where}: values must be pairs of motor values, [[left, right], ...]", hint="of -128 to 127"
-        )
-    for key in ("texts", "events"):
-        items = cast("list[object]", arguments.get(key, []))
-        if not all(isinstance(item, str) for item in items):
-            raise ScenarioError(f"{where}: {key} must be a list of texts in quotes")
-    area = arguments.get("area_m")
-    circle = [key for key in ("x_m", "y_m", "radius_m") if key in arguments]
-    if area is not None and (circle or not _is_area(area)):
-        raise ScenarioError(f"{where}: area_m must be [least x, least y, most x, most y], and stand alone")
-    if circle and len(circle) < 3:
-        raise ScenarioError(f"{where}: a circle needs x_m, y_m and radius_m")
-
-
-def _is_area(area: object) -> bool:
-    return (
-        isinstance(area, list)
-        and len(area) == 4
-        and all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in area)
-        and area[0] < area[2]
-        and area[1] < area[3]
-    )
-
-
-def _is_pair(pair: object) -> bool:
-    return (
-        isinstance(pair, list)
-        and len(pair) == 2
-        and all(isinstance(value, int) and not isinstance(value, bool) and -128 <= value <= 127 for value in pair)
-    )
 
 
 class GoalJudge(Stateful):

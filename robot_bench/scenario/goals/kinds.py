@@ -35,7 +35,7 @@ from robot_bench.scenario.goals.temporal import (
     bounds,
 )
 from robot_bench.scenario.goals.text import InOrder
-from robot_bench.scenario.goals.watch import GoalKind, Watch, number
+from robot_bench.scenario.goals.watch import GoalKind, Watch, number, texts_of
 from simbase.entry_points import installed_points
 from simbase.errors import shown
 
@@ -62,10 +62,6 @@ _REGION = (
 _ONE_REGION = ("area_m", "radius_m")
 _SIGNAL = Key(name="signal", kind="text", required=True, choices=_POSE_SIGNALS)
 _THING = Key(name="thing", kind="text")
-
-
-def _texts(table: Table) -> list[str]:
-    return cast("list[str]", table["texts"])
 
 
 def _wanted_distance(table: Table) -> str:
@@ -169,8 +165,8 @@ KINDS: Mapping[str, GoalKind] = {
     ),
     "usart_in_order": GoalKind(
         keys=(Key(name="texts", kind="list", required=True),),
-        wanted=lambda table: f"prints in order {', '.join(map(repr, _texts(table)))}",
-        watch=lambda table: InOrder(_texts(table), "was not printed in its turn"), is_scripted=True,
+        wanted=lambda table: f"prints in order {', '.join(map(repr, texts_of(table, 'texts')))}",
+        watch=lambda table: InOrder(texts_of(table, "texts"), "was not printed in its turn"), is_scripted=True,
     ),
     "reach": GoalKind(
         keys=(*_REGION, _WITHIN), wanted=lambda table: f"reaches {_place(table)}{_when(table)}", watch=Reach,

@@ -7,6 +7,7 @@ from p2os.toml_schema import Table
 from robot_bench.events.kinds import MICRO, Clearance, Contact, Event, Pose
 from robot_bench.events.selection import moves
 from robot_bench.scenario.goals.watch import GoalOutcome, SelectorFeed, Watch, nanos, number, seconds, selected
+from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
 
 NS_PER_MINUTE = 60 * NS_PER_S
@@ -114,13 +115,32 @@ Inside = Callable[[float, float], float]
 
 
 def region(table: Table) -> Inside:
-    """Return the region of a goal's table: a circle, or a rectangle along the axes."""
+    """Return the region of a goal's table: a circle, or a rectangle along the axes.
+
+    Raises:
+        UsageError: It is neither.
+    """
+    circle = [key for key in ("x_m", "y_m", "radius_m") if key in table]
     area = table.get("area_m")
+    if area is not None and (circle or not _is_area(area)):
+        raise UsageError("area_m must be [least x, least y, most x, most y], and stand alone")
     if isinstance(area, list):
         low_x, low_y, high_x, high_y = map(float, area)
         return lambda x, y: min(x - low_x, high_x - x, y - low_y, high_y - y)
-    x_m, y_m, radius_m = (number(table, key) for key in ("x_m", "y_m", "radius_m"))
+    if len(circle) < 3:
+        raise UsageError("a circle needs x_m, y_m and radius_m")
+    x_m, y_m, radius_m = (number(table, key) for key in circle)
     return lambda x, y: radius_m - math.hypot(x - x_m, y - y_m)
+
+
+def _is_area(area: object) -> bool:
+    return (
+        isinstance(area, list)
+        and len(area) == 4
+        and all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in area)
+        and area[0] < area[2]
+        and area[1] < area[3]
+    )
 
 
 class Reach(Watch):

@@ -10,11 +10,20 @@ from p2os.toml_schema import Table
 from robot_bench.events.kinds import Event, PinEdge, Wave
 from robot_bench.events.selection import wire_named
 from robot_bench.scenario.goals.watch import GoalOutcome, Watch, nanos, number, seconds, wires_of
+from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: chosen: two motor values that follow each other within this are one change (two ports are written in turn).
 SKEW_NS: Nanos = 1 * NS_PER_MS
 _SIDES = ("motor1", "motor2")
+
+
+def _is_pair(pair: object) -> bool:
+    return (
+        isinstance(pair, list)
+        and len(pair) == 2
+        and all(isinstance(value, int) and not isinstance(value, bool) and -128 <= value <= 127 for value in pair)
+    )
 
 
 class MotorSequence(Watch):
@@ -24,7 +33,10 @@ class MotorSequence(Watch):
     kinds = (PinEdge,)
 
     def __init__(self, table: Table) -> None:
-        self._wanted = [tuple(pair) for pair in cast("list[list[int]]", table["values"])]
+        values = cast("list[object]", table["values"])
+        if not all(_is_pair(pair) for pair in values):
+            raise UsageError("values must be pairs of motor values, [[left, right], ...]", hint="of -128 to 127")
+        self._wanted = [tuple(pair) for pair in cast("list[list[int]]", values)]
         self._held_ns = nanos(table, "held_s")
         pinout = load_pinout()
         self._nets = [pinout.value(side).wires for side in _SIDES]

@@ -7,11 +7,20 @@ in its window, that of `eventually` the greatest; after an event, that of the wo
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Any, cast
+from typing import Any
 
 from p2os.toml_schema import Table
 from robot_bench.events.kinds import MICRO, Clearance, Event, Pose, Ranges, WorldChange
-from robot_bench.scenario.goals.watch import GoalOutcome, SelectorFeed, Watch, nanos, number, seconds, selected
+from robot_bench.scenario.goals.watch import (
+    GoalOutcome,
+    SelectorFeed,
+    Watch,
+    nanos,
+    number,
+    seconds,
+    selected,
+    texts_of,
+)
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
 
@@ -203,7 +212,7 @@ class InOrderOfEvents(Watch):
     STATE = ("_events", "_place", "_last")
 
     def __init__(self, table: Table) -> None:
-        self._words = [str(words) for words in cast("list[object]", table["events"])]
+        self._words = texts_of(table, "events")
         self._events = SelectorFeed(*(selected(table, words) for words in self._words))
         self.kinds, self.wires = self._events.kinds, self._events.wires
         self._place = 0

@@ -10,6 +10,7 @@ from typing import cast
 from p2os.toml_schema import Key, Table
 from robot_bench.events.kinds import Event
 from robot_bench.events.selection import Selector, Wires, select
+from simbase.errors import UsageError
 from simbase.state import Stateful
 from simbase.timing import NS_PER_S, Nanos
 
@@ -89,6 +90,18 @@ def selected(table: Table, words: object) -> Selector:
         UsageError: They mean none.
     """
     return select(str(words), wires_of(table))
+
+
+def texts_of(table: Table, name: str) -> list[str]:
+    """Return a key that is a list of texts.
+
+    Raises:
+        UsageError: Something else is in it.
+    """
+    texts = cast("list[object]", table[name])
+    if not all(isinstance(text, str) for text in texts):
+        raise UsageError(f"{name} must be a list of texts in quotes")
+    return cast("list[str]", texts)
 
 
 class SelectorFeed(Stateful):

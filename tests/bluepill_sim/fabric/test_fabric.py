@@ -336,7 +336,7 @@ def test_a_pin_that_the_chip_has_not_cannot_be_subscribed_to() -> None:
 
 
 def test_a_kind_that_is_not_there_is_refused() -> None:
-    with pytest.raises(ValueError, match="no kind of device is called 'toaster'"):
+    with pytest.raises(ValueError, match=r"no kind of device is called 'toaster' .hint: build"):
         Fabric(Chip()).add_device(
             "toaster", "toaster", 0, 0, act=lambda _at: None, answer=lambda _what, _value: 0, deliver=lambda: None
         )

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bluepill_sim.fabric.registers import WORD, BitField, Peripheral, PeripheralMapping, Register, bits
+from bluepill_sim.fabric.registers import WORD, BitField, Peripheral, PeripheralMapping, Register, bits, fields_of
 from bluepill_sim.peripherals.usart import Usart
 from bluepill_sim.stm32f103 import PERIPHERALS
 
@@ -103,6 +103,38 @@ def test_a_mask_is_what_reads_and_what_is_written_unless_told_otherwise(
 ) -> None:
     register = Register(**{"name": "R", "offset": 0, **given})  # type: ignore[arg-type]  # numbers alone
     assert (register.readable, register.writable) == (readable, writable)
+
+
+@pytest.mark.parametrize(
+    ("fields", "told"),
+    [
+        ("EN 0 TEN 1", "R: no field: 'EN 0 TEN 1' .hint: fields="),
+        ("EN 0,TEN 1", "R: no field"),
+        ("EN", "R: no field: 'EN'"),
+        ("TSEL 3:5", "R: TSEL 3:5: no bits of a word"),
+        ("EN 32", "R: EN 32: no bits of a word"),
+        ("EN 31:0, TEN 31", "R: fields EN and TEN have bit 31 both"),
+        ("TEN 4:3, EN 3:2", "R: fields TEN and EN have bit 3 both"),
+        ("EN 1, EN 0", "R: two fields are called EN"),
+    ],
+)
+def test_what_is_no_list_of_fields_is_refused_by_the_name_of_its_register(fields: str, told: str) -> None:
+    with pytest.raises(ValueError, match=told):
+        Register(name="R", offset=0, fields=fields)
+
+
+def test_a_bit_that_reads_is_of_a_field() -> None:
+    Register(name="R", offset=0, mask=3, fields="EN 1, TEN 0")
+    with pytest.raises(ValueError, match="R: bits 0x5 read, and no field has them"):
+        Register(name="R", offset=0, mask=7, fields="EN 1")
+
+
+def test_the_bits_of_a_register_are_those_of_its_fields_in_any_order() -> None:
+    one = Register(name="R", offset=0, fields="EN 0, TSEL 5:3, DMAEN 31")
+    other = Register(name="R", offset=0, fields="DMAEN 31, EN 0, TSEL 5:3")
+    assert one.readable == one.writable == other.readable == 0x8000_0039
+    assert [field.name for field in fields_of(one.fields)] == ["DMAEN", "TSEL", "EN"]
+    assert fields_of(one.fields) == fields_of(other.fields)
 
 
 def test_a_field_is_accessed_as_its_bits_are() -> None:

@@ -17,6 +17,8 @@ from tests.bluepill_sim.machine import LOG, Machine
 
 ROOT = Path(__file__).resolve().parents[3]
 SOURCES = sorted((ROOT / "bluepill_sim" / "extension" / "source").rglob("*.c"))
+#: A place of the family where no device is modelled.
+FREE = next(name for name in stm32f103.BASES if name not in {name for _, name in stm32f103.PERIPHERALS})
 GPIOA_IDR, BUFFER, WORDS = 0x4001_0808, 0x2000_3000, 16
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler")
@@ -44,7 +46,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     )
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(library, "library_path", lambda: str(out))
-        patch.setattr(stm32f103, "PERIPHERALS", (*stm32f103.PERIPHERALS, (Mover, "TIM7")))
+        patch.setattr(stm32f103, "PERIPHERALS", (*stm32f103.PERIPHERALS, (Mover, FREE)))
         library.library.cache_clear()
         yield
     library.library.cache_clear()
@@ -57,7 +59,7 @@ def moving(text: str, core: str, to: int = BUFFER, words: int = WORDS) -> tuple[
         machine = Machine(text, {})
     chip = machine.board.chip
     chip.parts.rcc.write(0x18, 4, 4)
-    mover = chip.parts.by_name["TIM7"]
+    mover = chip.parts.by_name[FREE]
     for offset, word in ((0, GPIOA_IDR), (4, to), (8, words)):
         mover.write(offset, 4, word)
     asked: list[int] = []
@@ -73,7 +75,7 @@ def moving(text: str, core: str, to: int = BUFFER, words: int = WORDS) -> tuple[
 
 def state(machine: Machine) -> tuple[Any, ...]:
     board = machine.board
-    mover = board.chip.parts.by_name["TIM7"]
+    mover = board.chip.parts.by_name[FREE]
     return (
         board.cycle, board.pc, board.read_memory(0x2000_0000, 0x4000), tuple(mover.words[:8]), mover.due_ns,
         [board.register(f"R{n}") for n in range(8)], board.last_rows,
@@ -108,7 +110,7 @@ def test_what_a_bus_master_moves_is_seen_in_the_same_cycle_however_the_program_w
     assert native == python
     assert sliced == python
     assert machines[1][1] == []  # a register of a device in C is answered in C
-    assert machines[0][0].board.chip.parts.by_name["TIM7"].words[3] == 0
+    assert machines[0][0].board.chip.parts.by_name[FREE].words[3] == 0
     if name in {"waits for a word", "counts"}:
         assert machines[0][0].is_done
 

@@ -180,6 +180,35 @@ def test_a_verb_that_cannot_be_imported_says_what_it_lacks_and_others_work(
     assert cli.run(["ports", "--json"]) == 0
 
 
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("raise ValueError('no lamp')", "no lamp"),
+        ("from p2os import no_such_name", "ImportError: cannot import name 'no_such_name' from 'p2os'"),
+        ("x = 1", "AttributeError: module 'broken_verb' has no attribute 'register'"),
+        ("def register(app):\n    app.command('half')(print)\n    1 / 0", "ZeroDivisionError: division by zero"),
+    ],
+)
+def test_a_broken_verb_names_its_package_and_others_work(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path, text: str, why: str
+) -> None:
+    (tmp_path / "broken_verb.py").write_text(text)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.delitem(sys.modules, "broken_verb", raising=False)
+    monkeypatch.setattr(cli, "verbs", lambda: [entry("lamp", "broken_verb"), entry("ports", "p2os.cli.links.ports")])
+    said = "lamp (p2os.verbs) of the package broken_verb cannot be loaded: "
+    assert cli.run(["--help"]) == 0
+    out = " ".join(capsys.readouterr().out.split())
+    assert f"lamp ({said}" in out
+    assert "half" not in out
+    assert "ports List the serial ports" in out
+    assert cli.run(["lamp", "--on"]) == 1
+    error = capsys.readouterr().err
+    assert error.startswith(f"p2os: {said}{why}")
+    assert error.endswith("hint: pip uninstall broken_verb does without it; --trace shows where it fails\n")
+    assert cli.run(["ports", "--json"]) == 0
+
+
 def test_help_shows_each_example_beside_what_it_does_and_each_verb_in_a_group(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -189,7 +218,7 @@ def test_help_shows_each_example_beside_what_it_does_and_each_verb_in_a_group(
     examples = [line for line in cli.EPILOG.splitlines() if line.startswith("  p2os ")]
     assert len(examples) > 5
     assert [line for line in examples if not re.search(r"\S {2,}\S", line) or line not in out] == []
-    assert "Others:" not in out
+    assert "Others:" not in out, "a verb has no group: app.command(rich_help_panel=...), p2os/cli/groups.py"
 
 
 def test_main_ends_the_process_and_understands_trace_anywhere(

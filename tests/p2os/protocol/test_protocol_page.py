@@ -15,7 +15,7 @@ GENERATOR = runpy.run_path(str(ROOT / "tools" / "generate_protocol.py"))
 
 def test_the_tables_are_those_of_the_code() -> None:
     assert set(re.findall(r"<!-- table: ([a-z ]+) -->", PAGE)) == set(GENERATOR["TABLES"])
-    assert GENERATOR["page"](PAGE) == PAGE, "run tools/generate_protocol.py"
+    assert GENERATOR["page"](PAGE) == PAGE, "run `make generated`"
 
 
 def test_every_command_and_packet_is_in_the_page() -> None:

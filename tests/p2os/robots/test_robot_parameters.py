@@ -85,9 +85,10 @@ def test_a_model_has_the_numbers_of_arias_file(row: str) -> None:
     assert robot.angle_counts_per_turn == (1024 if name in {"pion1m", "pionat"} else 4096)
 
 
-def test_all_models_are_there() -> None:
-    assert sorted(row.split()[0] for row in ARIA.splitlines()) == list(known_robots())
-    assert len(known_robots()) == 30
+def test_all_models_that_aria_has_are_there() -> None:
+    arias = {row.split()[0] for row in ARIA.splitlines()}
+    assert len(arias) == 30
+    assert arias <= set(known_robots())
 
 
 def test_speeds_in_fractions_stay_exact() -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -62,7 +63,8 @@ def test_every_kind_of_goal_is_tried() -> None:
 
     tests = [*globals(), *vars(test_goals), *vars(test_goals_on_steering)]
     names = " ".join(name for name in tests if name.startswith("test_goal_"))
-    assert [kind for kind in every_kind() if kind not in names] == []
+    missing = [kind for kind in every_kind() if kind not in names]
+    assert missing == [], "write test_goal_KIND_... in tests/robot_bench/scenario/test_goals.py"
 
 
 @pytest.mark.parametrize(("t", "met"), [(2 * S - 1, True), (2 * S, True), (2 * S + 1, False)])
@@ -335,6 +337,9 @@ def test_a_sonar_a_stop_and_a_place_are_events_once() -> None:
         ({"kind": "happens", "event": "sonar 1 below 0"}, "0 m are never come to"),
         ({"kind": "reach", "radius_m": 1}, "a circle needs x_m, y_m and radius_m"),
         ({"kind": "avoid", "area_m": [0, 0, 0, 1]}, "area_m must be"),
+        ({"kind": "avoid", "area_m": [0, 0, 1, 1], "x_m": 1}, "and stand alone"),
+        ({"kind": "usart_in_order", "texts": [1]}, "texts must be a list of texts in quotes"),
+        ({"kind": "motor_sequence", "values": [[0, 200]]}, "values must be pairs of motor values"),
         ({"kind": "no_collision", "ends_run": "soon"}, "is none of met, missed, decided"),
         ({"kind": "wave", "pin": "PB7", "hz": 3}, "unknown key 'hz'"),
     ],
@@ -364,6 +369,20 @@ def test_a_goal_that_came_from_elsewhere_is_judged_like_any(monkeypatch: pytest.
     monkeypatch.setattr(Point, "load", staticmethod(lambda: 7))
     with pytest.raises(ScenarioError, match="mine:goal is no GoalKind"):
         load_goal({"kind": "untouched"}, "x")
+
+
+def test_keys_of_a_goal_from_elsewhere_mean_what_its_package_says(monkeypatch: pytest.MonkeyPatch) -> None:
+    from p2os.toml_schema import Key
+    from robot_bench.scenario.goals import kinds
+    from robot_bench.scenario.goals.watch import GoalKind
+
+    own = GoalKind(
+        keys=tuple(Key(name=name, kind="any") for name in ("x_m", "area_m", "values", "texts", "events")),
+        wanted=str, watch=KINDS["no_collision"].watch,
+    )  # fmt: skip
+    monkeypatch.setattr(kinds, "_entry_points", lambda: {"own": SimpleNamespace(load=lambda: own)})
+    table = {"kind": "own", "x_m": 1, "area_m": 2.5, "values": [1], "texts": [2], "events": [3]}
+    assert load_goal(table, "x").arguments["values"] == [1]
 
 
 @pytest.mark.parametrize(

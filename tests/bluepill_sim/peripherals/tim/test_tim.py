@@ -849,7 +849,9 @@ def requests(monkeypatch: pytest.MonkeyPatch, make_fake_chip: Callable[[], Any])
     """A chip on which some outputs of TIM3 lead to a line each, which leads nowhere, and the ticks of their pulses."""
 
     def make(*outputs: str) -> tuple[Timer, dict[str, list[int]]]:
-        wiring = {output: (f"DAC.test{n}",) for n, output in enumerate(outputs)}
+        modelled = {name for _, name in stm32f103.PERIPHERALS}
+        nobody = next(name for name in stm32f103.BASES if name not in modelled)
+        wiring = {output: (f"{nobody}.test{n}",) for n, output in enumerate(outputs)}
         kept = {row: ends for row, ends in stm32f103.WIRING.items() if row not in wiring}
         monkeypatch.setattr(stm32f103, "WIRING", kept | wiring)
         chip = make_fake_chip()
