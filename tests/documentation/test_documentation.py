@@ -87,7 +87,7 @@ def test_a_block_that_does_not_go_as_it_says_fails(page_of, block: str, what: st
     if "```c\n" in block and shutil.which("arm-none-eabi-gcc") is None:
         pytest.skip("no arm-none-eabi-gcc")
     with pytest.raises(AssertionError, match=what):
-        run_blocks(page_of(block), slow=False)
+        run_blocks(page_of(block), 0)
 
 
 def test_folders_environments_and_shown_numbers_are_followed(page_of) -> None:
