@@ -11,6 +11,7 @@ from collections.abc import Iterable
 import pytest
 
 from tests.test_architecture import parsed, texts_of
+from tests.test_docs import runnable
 from tests.whole.building import PROJECT, ROOT
 from tools.packaging.staging import as_toml, houses, pyproject
 from tools.packaging.testing import closure, environment
@@ -150,6 +151,11 @@ def test_what_is_hidden_is_not_there() -> None:
     for house, module in (("simbase", "p2os"), ("p2os", "bluepill_sim.board"), ("bluepill-sim", "p2os.robots")):
         done = python(house, "-c", f"import {module}")
         assert f"No module named '{module.split('.')[0]}" in done.stderr
+
+
+def test_each_page_of_a_house_has_examples_to_run() -> None:
+    pages = {page for house in houses(with_tests_alone=True).values() for page in house.pages}
+    assert sorted(pages - {str(page) for page in runnable(0)}) == []
 
 
 @pytest.mark.soak
