@@ -295,6 +295,7 @@ VALUES = st.recursive(
 )  # fmt: skip
 
 
+@pytest.mark.slow
 @given(VALUES, VALUES)
 def test_any_value_is_restored_over_any_other(before: object, after: object) -> None:
     part = Holder(before)
@@ -374,6 +375,7 @@ def undeclared(part: type) -> set[str]:
     return changes(part) - set(state_names(part)) - derived
 
 
+@pytest.mark.slow
 def test_every_part_declares_what_it_changes() -> None:
     for package in PACKAGES:
         for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):

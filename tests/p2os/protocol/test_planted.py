@@ -133,6 +133,7 @@ def test_a_command_and_a_packet_that_are_each_said_once_are_seen_everywhere(tmp_
     assert found["columns"] == ["lamp"]
 
 
+@pytest.mark.slow
 def test_what_was_not_planted_is_seen_nowhere() -> None:
     found = seen(ROOT)
     assert found["takes"].startswith("no command 'lamp'")
