@@ -11,7 +11,7 @@ from p2os.pioneer.body.factory import engines
 
 #: The package that a body needs, which is also the name of its test mark where it has one.
 ENGINES = {"bullet": "pybullet", "mujoco": "mujoco"}
-#: Checked by in `make test`; a run of folders has the first engine alone.
+#: Tried like the first by `make test`, and left out of a run of folders.
 SECOND = "mujoco"
 STEPS_PER_S = 1000
 
