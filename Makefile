@@ -48,8 +48,13 @@ demo: $(if $(wildcard $(STAMP)),$(STAMP),$(DEMO_STAMP))
 	    echo "then:       p2os doctor"; exit $$status
 
 # All of it, the type check while tests wait; with HOUSE=p2os the tests and pages of one house, nothing else being there.
-test: $(if $(HOUSE),setup,lint)
-	$(if $(HOUSE),$(BIN)/python -m tools.packaging.testing $(HOUSE),$(MAKE) --no-print-directory -j2 type unit)
+ifdef HOUSE
+test: setup
+	$(BIN)/python -m tools.packaging.testing $(HOUSE)
+else
+test: lint
+	$(MAKE) --no-print-directory -j2 type unit
+endif
 
 lint: setup
 	$(BIN)/ruff check .

@@ -31,33 +31,36 @@ def extras() -> set[str]:
     return set(project["optional-dependencies"])
 
 
-def run(page: Page, *, slow: bool) -> None:
-    missing = run_blocks(page, slow=slow)
+def run(page: Page, pace: int) -> None:
+    missing = run_blocks(page, pace)
     if missing:
         pytest.skip(f"all ran but what needs a program that is not installed: {missing}")
 
 
-def runnable(*, slow: bool) -> list[Page]:
+def runnable(pace: int) -> list[Page]:
     return [
         page for page in PAGES
-        if any(
-            block.language in RUN and block.note("not run") is None and (block.note("slow") is not None) == slow
-            for block in page.blocks
-        )
+        if any(block.language in RUN and block.note("not run") is None and block.pace == pace for block in page.blocks)
     ]  # fmt: skip
 
 
-@pytest.mark.parametrize("page", runnable(slow=False), ids=str)
+@pytest.mark.parametrize("page", runnable(0), ids=str)
 def test_the_examples_of_a_page_run(page: Page, request: pytest.FixtureRequest) -> None:
     if any(f"{LONG}[{page}]" == item.name for item in request.session.items):
         pytest.skip("they run among the long ones")
-    run(page, slow=False)
+    run(page, 0)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", runnable(slow=True), ids=str)
+@pytest.mark.parametrize("page", runnable(1), ids=str)
 def test_the_long_examples_of_a_page_run_among_the_others(page: Page) -> None:
-    run(page, slow=True)
+    run(page, 1)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("page", runnable(2), ids=str)
+def test_all_examples_of_a_page_run(page: Page) -> None:
+    run(page, 2)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=str)

@@ -4,6 +4,7 @@ Lines directly before a fence may say how the block is to be taken, invisibly to
 
     <!-- not run: REASON -->         it needs hardware or the network
     <!-- slow: REASON -->            it runs among the slow tests
+    <!-- soak: REASON -->            it runs in `make soak`
     <!-- given: FILE = SOURCE -->    a file of the reader's; here a copy of SOURCE, a path from the root
 """
 
@@ -16,7 +17,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 FENCE = re.compile(r"^(?P<indent>\s*)```(?P<language>\S*)\s*$")
-NOTE = re.compile(r"^<!-- (?P<kind>not run|slow|given): (?P<text>.+) -->$")
+NOTE = re.compile(r"^<!-- (?P<kind>not run|slow|soak|given): (?P<text>.+) -->$")
 HEADING = re.compile(r"^#{1,6} +(?P<text>.+?) *$")
 SPAN = re.compile(r"(?<!`)`(?P<text>[^`\n]+)`(?!`)")
 LINK = re.compile(r"\]\((?P<page>[^)\s#:]*)(?:#(?P<anchor>[^)\s]+))?\)")
@@ -31,6 +32,11 @@ class Block:
     line: int  # of the fence, counted from 1
     section: int  # number of the heading above it
     notes: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def pace(self) -> int:
+        """Where it runs: 0 always, 1 among the slow tests, 2 in `make soak`."""
+        return 2 if self.note("soak") else 1 if self.note("slow") else 0
 
     def note(self, kind: str) -> str | None:
         """Return the text of the note of that kind, or None."""

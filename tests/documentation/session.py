@@ -390,11 +390,11 @@ class Session:
         return clients, serving
 
 
-def run_blocks(page: Page, *, slow: bool) -> list[str]:
-    """Do what a page says, with its slow blocks or without; return what was left out for want of a program."""
+def run_blocks(page: Page, pace: int) -> list[str]:
+    """Do what the blocks of a page say that are of this pace or below; return what a program is missing for."""
     with Session() as session:
         for block in page.blocks:
-            if block.language in RUN and block.note("not run") is None and (slow or block.note("slow") is None):
+            if block.language in RUN and block.note("not run") is None and block.pace <= pace:
                 session.take(block)
         session.end_terminals()
     return session.missing

@@ -87,7 +87,17 @@ def test_a_block_that_does_not_go_as_it_says_fails(page_of, block: str, what: st
     if "```c\n" in block and shutil.which("arm-none-eabi-gcc") is None:
         pytest.skip("no arm-none-eabi-gcc")
     with pytest.raises(AssertionError, match=what):
-        run_blocks(page_of(block), slow=False)
+        run_blocks(page_of(block), 0)
+
+
+@pytest.mark.parametrize(("note", "pace"), [("", 0), ("<!-- slow: x -->\n", 1), ("<!-- soak: x -->\n", 2)])
+def test_a_block_runs_at_its_pace_and_above(page_of, note: str, pace: int) -> None:
+    page = page_of(f"{note}```python\nassert False\n```")
+    for below in range(pace):
+        run_blocks(page, below)
+    for above in range(pace, 3):
+        with pytest.raises(AssertionError, match="exit code 1"):
+            run_blocks(page, above)
 
 
 def test_folders_environments_and_shown_numbers_are_followed(page_of) -> None:

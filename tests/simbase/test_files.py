@@ -2,6 +2,7 @@
 
 import ast
 import os
+import re
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -109,11 +110,18 @@ _READS = {"read_text", "read_bytes"}
 _WRITING = set("wax+")
 
 
+def calls(path: Path, names: str) -> list[ast.Call]:
+    """Return the calls of a module; none where it has none of the names, so that few are parsed."""
+    text = path.read_text(encoding="utf-8")
+    nodes = ast.walk(ast.parse(text)) if re.search(names, text) else ()
+    return [node for node in nodes if isinstance(node, ast.Call)]
+
+
 def _reads(path: Path) -> list[str]:
     """Return the calls of a module that read a file whole, or open one to be read; not those of package resources."""
     found = []
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Attribute):
+    for node in calls(path, r"\b(read_text|read_bytes|open)\b"):
+        if not isinstance(node.func, ast.Attribute):
             continue
         owner = ast.unparse(node.func.value)
         if node.func.attr in _READS and "files(" not in owner and "joinpath(" not in owner:
@@ -150,8 +158,8 @@ WRITTEN_ELSEWHERE = {
 
 def _opens_to_write(path: Path) -> bool:
     """Tell whether a module opens a file to write it by itself."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "open":
+    for node in calls(path, r"\bopen\b"):
+        if getattr(node.func, "attr", "") == "open":
             modes = [each.value for each in node.args if isinstance(each, ast.Constant) and isinstance(each.value, str)]
             if any(len(mode) <= len("w+b") and _WRITING & set(mode) for mode in modes):
                 return True

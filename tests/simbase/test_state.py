@@ -7,13 +7,14 @@ import inspect
 import pickle
 import pkgutil
 import random
-import textwrap
 from array import array
 from collections import Counter, deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import cache
 from importlib.metadata import entry_points
+from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
 import pytest
@@ -294,6 +295,7 @@ VALUES = st.recursive(
 )  # fmt: skip
 
 
+@pytest.mark.slow
 @given(VALUES, VALUES)
 def test_any_value_is_restored_over_any_other(before: object, after: object) -> None:
     part = Holder(before)
@@ -332,10 +334,27 @@ def own_attribute(node: ast.expr) -> str | None:
     return None
 
 
+@cache
+def classes(file: str) -> dict[str, ast.ClassDef]:
+    """Return the classes of a source file by their qualified names; `inspect.getsource` parses it for each anew."""
+    found = {}
+
+    def look(tree: ast.AST, within: str) -> None:
+        for node in ast.iter_child_nodes(tree):
+            inside = within
+            if isinstance(node, ast.ClassDef):
+                found[f"{within}{node.name}"], inside = node, f"{within}{node.name}."
+            elif isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                inside = f"{within}{node.name}.<locals>."
+            look(node, inside)
+
+    look(ast.parse(Path(file).read_text(encoding="utf-8")), "")
+    return found
+
+
 def changes(part: type) -> set[str]:
     """Return the attributes that a class changes after it was built."""
-    tree = ast.parse(textwrap.dedent(inspect.getsource(part))).body[0]
-    assert isinstance(tree, ast.ClassDef)
+    tree = classes(inspect.getfile(part))[part.__qualname__]
     found: set[str | None] = set()
     for method in tree.body:
         if not isinstance(method, ast.FunctionDef) or method.name in BUILDING:
@@ -356,6 +375,7 @@ def undeclared(part: type) -> set[str]:
     return changes(part) - set(state_names(part)) - derived
 
 
+@pytest.mark.slow
 def test_every_part_declares_what_it_changes() -> None:
     for package in PACKAGES:
         for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):

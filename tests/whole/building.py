@@ -1,13 +1,18 @@
-"""Distributions built and installed as pip does, with the build's own tools from a package index."""
+"""Distributions built as pip does, and installed in environments that hold nothing else."""
 
 import os
 import subprocess
 import sys
 import tomllib
 import venv
+import zipfile
+from collections.abc import Iterable, Sequence
+from importlib.metadata import Distribution, distribution, distributions
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
@@ -26,14 +31,47 @@ def tracked() -> list[str]:
     return [name for name in listed if (ROOT / name).is_file() and not (ROOT / name).is_symlink()]
 
 
-def python_of(folder: Path, *requirements: str) -> Path:
-    """Return the Python of a new environment that holds nothing but what is named."""
+def unpacked(folder: Path, wheels: Iterable[Path], others: Sequence[str] = ()) -> Path:
+    """Return the Python of a new environment with wheels and what they require, and no more.
+
+    The wheels are unpacked as an installer does it; packages of others are those of this environment, by links.
+    """
+    venv.create(folder, symlinks=True)
+    (place,) = folder.glob("lib/python3*/site-packages")
+    for wheel in wheels:
+        with zipfile.ZipFile(wheel) as archive:
+            archive.extractall(place)
+    own = {canonicalize_name(one.name): one for one in distributions(path=[str(place)])}
+    for one in required([*own, *others], own):
+        for name in {path.parts[0] for path in one.files or () if path.parts[0] not in {"..", "__pycache__"}}:
+            (place / name).symlink_to(Path(str(one.locate_file(name))))
+    for point in (point for one in own.values() for point in one.entry_points.select(group="console_scripts")):
+        script = folder / "bin" / point.name
+        script.write_text(f"#!{folder}/bin/python\nimport sys\nfrom {point.module} import {point.attr}\n"
+                          f"sys.exit({point.attr}())\n")  # fmt: skip
+        script.chmod(0o755)
+    return folder / "bin" / "python"
+
+
+def required(names: Iterable[str], own: dict[str, Distribution]) -> list[Distribution]:
+    """Return what distributions require, whatever of it is not among the own: of this environment."""
+    found: dict[str, Distribution] = {}
+    left = list(names)
+    while left:
+        name = canonicalize_name(left.pop())
+        if name not in found:
+            found[name] = own[name] if name in own else distribution(name)
+            lines = [Requirement(line) for line in found[name].requires or ()]
+            left += [line.name for line in lines if line.marker is None or line.marker.evaluate({"extra": ""})]
+    return [one for name, one in found.items() if name not in own]
+
+
+def pip_installed(folder: Path, wheels: Iterable[Path], others: Sequence[str] = ()) -> Path:
+    """Return the Python of a new environment, as pip makes it with a package index."""
     venv.create(folder)
     command = [sys.executable, "-m", "pip", "--python", folder / "bin" / "python", "install"]
-    # Compiled is what a test imports, and no more: half of the time otherwise.
-    options = ["--quiet", "--disable-pip-version-check", "--no-compile"]
     done = subprocess.run(
-        [*command, *options, "-c", CONSTRAINTS, *requirements],
+        [*command, "--quiet", "--disable-pip-version-check", "-c", CONSTRAINTS, *wheels, *others],
         cwd=folder, env=clean_environment(), capture_output=True, text=True, timeout=LIMIT_S, check=False,
     )  # fmt: skip
     if "No matching distribution found" in done.stderr or "connection" in done.stderr.lower():
@@ -48,11 +86,11 @@ def clean_environment(**more: str) -> dict[str, str]:
     return {name: value for name, value in os.environ.items() if name not in left_out} | more
 
 
-def build(builder: Path, sources: Path, kind: str, out: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+def build(sources: Path, kind: str, out: Path, **environment: str) -> subprocess.CompletedProcess[str]:
     """Run a step of the build as pip does, in a folder of sources."""
     out.mkdir(exist_ok=True)
     return subprocess.run(
-        [builder, "-c", BUILD, f"build_{kind}", out],
+        [sys.executable, "-c", BUILD, f"build_{kind}", out],
         cwd=sources, env=clean_environment(**environment), capture_output=True, text=True, timeout=LIMIT_S, check=False,
     )  # fmt: skip
 

@@ -6,9 +6,12 @@ import re
 import subprocess
 import sys
 import tomllib
+from collections.abc import Iterable
 
 import pytest
 
+from tests.test_architecture import parsed, texts_of
+from tests.test_docs import runnable
 from tests.whole.building import PROJECT, ROOT
 from tools.packaging.staging import as_toml, houses, pyproject
 from tools.packaging.testing import closure, environment
@@ -55,23 +58,18 @@ def upper_names(package: str) -> set[str]:
     return others | {house.name for house in HOUSES.values() if not set(house.folders) & below}
 
 
-def named_upwards(package: str, text: str) -> list[str]:
-    """Return the texts of a source that name a module or distribution above its package; docstrings are for readers."""
-    tree = ast.parse(text)
-    told = {
-        node.body[0].value
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and node.body
-        and isinstance(node.body[0], ast.Expr)
-    }  # fmt: skip
+def named_upwards(package: str, texts: Iterable[str]) -> list[str]:
+    """Return the texts of a source that name a module or distribution above its package."""
     names = upper_names(package)
     return [
-        node.value
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and node not in told
-        and any(is_module(word) or word in names - set(PACKAGES) for word in re.findall(r"[\w.-]+", node.value)
-                if re.split(r"\.", word)[0] in names)
+        text for text in texts
+        if any(is_module(word) or word in names - set(PACKAGES) for word in re.findall(r"[\w.-]+", text)
+               if re.split(r"\.", word)[0] in names)
     ]  # fmt: skip
+
+
+def texts(source: str) -> list[str]:
+    return texts_of(ast.walk(ast.parse(source)))
 
 
 def is_module(word: str) -> bool:
@@ -89,7 +87,7 @@ def test_no_text_of_a_program_names_a_module_or_distribution_above(package: str)
     found = {
         path.relative_to(ROOT).as_posix(): names
         for path in (ROOT / package).rglob("*.py")
-        if (names := named_upwards(package, path.read_text(encoding="utf-8")))
+        if (names := named_upwards(package, parsed(path).texts))
         and path.relative_to(ROOT).as_posix() not in NAMES_THE_PROJECT
     }
     assert found == {}
@@ -106,13 +104,13 @@ def test_no_text_of_a_program_names_a_module_or_distribution_above(package: str)
     ],
 )
 def test_a_text_that_names_what_is_above_is_seen(package: str, text: str) -> None:
-    assert len(named_upwards(package, text)) == 1
+    assert len(named_upwards(package, texts(text))) == 1
 
 
 def test_what_is_below_beside_or_no_module_may_be_named() -> None:
-    assert named_upwards("robot_bench", '"p2os.cli.main"') == []
-    assert named_upwards("bluepill_sim", '"p2os.parts"') == [], "a group of entry points"
-    assert named_upwards("p2os", '"""Beside robot_bench.run."""') == [], "a docstring"
+    assert named_upwards("robot_bench", texts('"p2os.cli.main"')) == []
+    assert named_upwards("bluepill_sim", texts('"p2os.parts"')) == [], "a group of entry points"
+    assert named_upwards("p2os", texts('"""Beside robot_bench.run."""')) == [], "a docstring"
 
 
 # A house where nothing else is, by hiding the rest.
@@ -153,6 +151,11 @@ def test_what_is_hidden_is_not_there() -> None:
     for house, module in (("simbase", "p2os"), ("p2os", "bluepill_sim.board"), ("bluepill-sim", "p2os.robots")):
         done = python(house, "-c", f"import {module}")
         assert f"No module named '{module.split('.')[0]}" in done.stderr
+
+
+def test_each_page_of_a_house_has_examples_to_run() -> None:
+    pages = {page for house in houses(with_tests_alone=True).values() for page in house.pages}
+    assert sorted(pages - {str(page) for page in runnable(0)}) == []
 
 
 @pytest.mark.soak

@@ -5,6 +5,8 @@ import json
 import re
 import subprocess
 import sys
+from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -13,7 +15,7 @@ from p2os.cli.needs import NEEDS as TOOLKIT_NEEDS
 from p2os.ros.bags import STORAGES
 from robot_bench.cli.needs import NEEDS as BENCH_NEEDS
 from simbase.installation import Need
-from tests.test_architecture import imports, module_name, sources
+from tests.test_architecture import imports, imports_of, module_name, parsed, sources, texts_of
 from tests.whole.building import PROJECT, ROOT
 from tools.packaging.staging import Plugin, houses, plugins
 from tools.packaging.testing import environment
@@ -27,23 +29,12 @@ TABLES = {"p2os.cli.needs", "robot_bench.cli.needs"}
 OTHER_MEANINGS = {("p2os.pioneer.export.mjcf", "mujoco"): "the element of MJCF at the top"}
 
 
-def strings(text: str) -> set[str]:
-    """Return the words of a source's texts; docstrings, and an `f"…"`'s names, are not among them."""
-    tree = ast.parse(text)
-    told = {
-        id(node.body[0].value)
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and node.body
-        and isinstance(node.body[0], ast.Expr)
-    }  # fmt: skip
-    texts = [
-        node.value for node in ast.walk(tree)
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in told
-    ]  # fmt: skip
+def words_of(texts: Iterable[str]) -> set[str]:
+    """Return the words of a source's texts."""
     return {word.strip(".") for text in texts for word in re.findall(r"[\w.]+", text)}
 
 
-def faults(name: str, text: str, imported: set[str]) -> list[str]:
+def faults(name: str, words: set[str], imported: set[str]) -> list[str]:
     """Return what a module imports or names of the plug-ins of which it is not."""
     own = next((one for one in PLUGINS.values() if one.holds(name)), None)
     found = []
@@ -53,15 +44,15 @@ def faults(name: str, text: str, imported: set[str]) -> list[str]:
         found += [f"{name} imports {target}, of {plugin.name}" for target in sorted(imported) if plugin.holds(target)]
         if name not in TABLES:
             found += [
-                f"{name} names {word}, of {plugin.name}" for word in sorted(strings(text))
+                f"{name} names {word}, of {plugin.name}" for word in sorted(words)
                 if plugin.holds(word) or (word in plugin.words and (name, word) not in OTHER_MEANINGS)
             ]  # fmt: skip
     return found
 
 
 def test_nothing_outside_a_plugin_imports_or_names_it() -> None:
-    read = [(module_name(path), path.read_text(encoding="utf-8"), imports(path)) for path in sources()]
-    assert [fault for name, text, imported in read for fault in faults(name, text, imported)] == []
+    read = [(module_name(path), words_of(parsed(path).texts), imports(path)) for path in sources()]
+    assert [fault for name, words, imported in read for fault in faults(name, words, imported)] == []
 
 
 @pytest.mark.parametrize(
@@ -79,17 +70,20 @@ def test_nothing_outside_a_plugin_imports_or_names_it() -> None:
     ],
 )
 def test_a_planted_import_or_text_is_named(name: str, text: str) -> None:
-    tree = ast.walk(ast.parse(text))
-    imported = {node.module for node in tree if isinstance(node, ast.ImportFrom)}
-    imported |= {f"{node.module}.{alias.name}" for node in ast.walk(ast.parse(text))
-                 if isinstance(node, ast.ImportFrom) for alias in node.names}  # fmt: skip
-    assert faults(name, text, {target for target in imported if target}) != []
+    nodes = list(ast.walk(ast.parse(text)))
+    assert faults(name, words_of(texts_of(nodes)), imports_of(name, nodes)) != []
 
 
 def test_what_is_of_the_plugin_itself_or_a_docstring_may_name_it() -> None:
-    assert faults("p2os.pioneer.body.bullet", 'NAME = "bullet"', {"p2os.pioneer.body.bullet.engine"}) == []
-    assert faults("p2os.pioneer.body.factory", '"""Beside p2os.pioneer.body.bullet, or bullet."""', set()) == []
-    assert faults("p2os.pioneer.world.loader", 'read_world("p2os.pioneer.world")', {"p2os.pioneer.world.readers"}) == []
+    def told(text: str) -> set[str]:
+        return words_of(texts_of(ast.walk(ast.parse(text))))
+
+    assert faults("p2os.pioneer.body.bullet", told('NAME = "bullet"'), {"p2os.pioneer.body.bullet.engine"}) == []
+    assert faults("p2os.pioneer.body.factory", told('"""Beside p2os.pioneer.body.bullet, or bullet."""'), set()) == []
+    assert (
+        faults("p2os.pioneer.world.loader", told('read_world("p2os.pioneer.world")'), {"p2os.pioneer.world.readers"})
+        == []
+    )
 
 
 @pytest.mark.parametrize("plugin", PLUGINS.values(), ids=PLUGINS)
@@ -101,7 +95,7 @@ def test_the_table_names_what_is_there(plugin: Plugin) -> None:
     offered = {group for group, rows in points.items() if any(plugin.holds(one.split(":")[0]) for one in rows.values())}
     told = {group for need in needs_of(plugin) for group in need.points}
     assert offered - {"p2os.verbs"} <= told, "p2os doctor could not tell that it is not there"
-    assert all((ROOT / path.partition("::")[0]).exists() for path in (plugin.quick, *plugin.tests))
+    assert all((ROOT / path.partition("::")[0]).exists() for path in plugin.tests)
 
 
 def needs_of(plugin: Plugin) -> list[Need]:
@@ -116,64 +110,93 @@ def test_the_storages_of_a_bag_are_those_that_it_can_be_written_in() -> None:
 
 # A house where a plug-in is hidden.
 
+#: Plug-in → words of a command that ask for it, a file that they name, and what the error says.
+ASKED = [
+    ("physics", "run motors --body bullet", "", "there is no body 'bullet'", "physics (--body"),
+    ("physics", "run motors --body tcp:127.0.0.1:9", "", "there is no body 'tcp:127.0.0.1:9'", "physics (--body"),
+    ("worlds", "world check place.sdf", "place.sdf", "no reader for .sdf", "world files (worlds"),
+    ("ros", "run motors --ros", "", "--ros is not there", "ROS bench (run --ros"),
+    ("ros", "report run --events b --ros2 mcap", "run/trace.jsonl", "there is no storage 'mcap'", "ROS bench (run"),
+]
+#: What is looked at without each plug-in.
+WORDS = ("--help", "doctor --json", "run motors --body kinematic --duration 50ms --out out")
+#: Runs commands, one after the other in one process, and says how each ended and what it said.
+RUN = """
+import contextlib, io, json, sys
+from p2os.cli.main import run
+done = {}
+for words in sys.argv[1:]:
+    with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as err:
+        code = run(words.split())
+    done[words] = code, out.getvalue(), err.getvalue()
+print(json.dumps(done))
+"""
+
+
+@dataclass(frozen=True)
+class Done:
+    """How a command ended, and what it said."""
+
+    code: int
+    out: str
+    err: str
+
 
 def python(
     plugin: Plugin, *words: str, house: str = "robot-bench", cwd: Path = ROOT
 ) -> subprocess.CompletedProcess[str]:
     """Run Python where the bench and all below it is there, without a plug-in."""
     return subprocess.run(
-        [sys.executable, *words], cwd=cwd, env=environment(HOUSES["robot-bench"], HOUSES, [plugin]),
+        [sys.executable, *words], cwd=cwd, env=environment(HOUSES[house], HOUSES, [plugin]),
         capture_output=True, text=True, timeout=60, check=False,
     )  # fmt: skip
 
 
+@pytest.fixture(scope="module", params=PLUGINS.values(), ids=PLUGINS)
+def without(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[Plugin, dict[str, Done]]:
+    """Return a plug-in, and what is said where it is not there."""
+    plugin, place = request.param, tmp_path_factory.mktemp("without")
+    asked = [row for row in ASKED if row[0] == plugin.name]
+    for name in filter(None, (row[2] for row in asked)):
+        (place / name).parent.mkdir(exist_ok=True)
+        (place / name).write_text("", encoding="utf-8")
+    ran = python(plugin, "-c", RUN, *WORDS, *(row[1] for row in asked), cwd=place)
+    assert ran.returncode == 0, ran.stderr
+    return plugin, {words: Done(*told) for words, told in json.loads(ran.stdout).items()}
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("plugin", PLUGINS.values(), ids=PLUGINS)
-def test_a_house_works_without_a_plugin_and_tells_that_it_is_not_there(plugin: Plugin, tmp_path: Path) -> None:
-    listed = python(plugin, "-m", "p2os", "--help")
-    assert listed.returncode == 0, listed.stderr
-    assert "missing: needs" not in listed.stdout
-    shown = set(re.findall(r"(?m)^  ([a-z]+) ", listed.stdout))
+def test_a_house_works_without_a_plugin_and_tells_that_it_is_not_there(without: tuple[Plugin, dict[str, Done]]) -> None:
+    plugin, done = without
+    listed, told, ran = (done[words] for words in WORDS)
+    assert [one.code for one in (listed, told, ran)] == [0, 0, 0], ran.err
+    assert "missing: needs" not in listed.out
+    shown = set(re.findall(r"(?m)^  ([a-z]+) ", listed.out))
     assert {"run", "serve", "doctor"} <= shown
     assert not shown & set(plugin.verbs)
-    told = python(plugin, "-m", "p2os", "doctor", "--json")
-    assert told.returncode == 0, told.stderr
-    rows = {row["name"]: row for row in json.loads(told.stdout) if row["kind"] == "plug-in"}
+    rows = {row["name"]: row for row in json.loads(told.out) if row["kind"] == "plug-in"}
     assert rows.keys() == {need.name for need in needs_of(plugin)} != set()
     assert all(row["found"] is None and "pip install" in row["get"] for row in rows.values())
-    ran = python(plugin, "-m", "p2os", "run", "motors", "--body", "kinematic", "--duration", "50ms",
-                 "--out", str(tmp_path / "run"))  # fmt: skip
-    assert ran.returncode == 0, ran.stderr
-    tested = python(plugin, "-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider", plugin.quick)
+
+
+@pytest.mark.slow
+def test_who_asks_for_a_plugin_that_is_not_there_is_told_what_to_do(without: tuple[Plugin, dict[str, Done]]) -> None:
+    plugin, done = without
+    for name, words, _, says, hint in ASKED:
+        if name == plugin.name:
+            assert done[words].code == 2, done[words].err
+            assert done[words].err.startswith("p2os: ")
+            assert says in done[words].err
+            assert hint in done[words].err
+            assert "pip install" in done[words].err
+            assert "Traceback" not in done[words].err
+
+
+@pytest.mark.slow
+def test_tests_run_without_a_plugin() -> None:
+    words = ("-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider", "tests/p2os/pioneer/world/test_world_files.py")
+    tested = python(PLUGINS["physics"], *words)
     assert tested.returncode == 0, tested.stdout
-
-
-#: Plug-in → words of a command that ask for it, a file that they name, and what the error says.
-ASKED = [
-    ("physics", "run motors --body bullet", "", "there is no body 'bullet'", "physics (--body"),
-    ("physics", "run motors --body tcp:127.0.0.1:9", "", "there is no body 'tcp:127.0.0.1:9'", "physics (--body"),
-    ("worlds", "world check {file}", "place.sdf", "no reader for .sdf", "world files (worlds"),
-    ("ros", "run motors --ros", "", "--ros is not there", "ROS bench (run --ros"),
-    ("ros", "report {file} --events b --ros2 mcap", "run/trace.jsonl", "there is no storage 'mcap'", "ROS bench (run"),
-]
-
-
-@pytest.mark.parametrize(("name", "words", "file", "says", "hint"), ASKED)
-def test_who_asks_for_a_plugin_that_is_not_there_is_told_what_to_do(
-    name: str, words: str, file: str, says: str, hint: str, tmp_path: Path
-) -> None:
-    place = tmp_path / file
-    place.parent.mkdir(exist_ok=True)
-    if file:
-        place.write_text("", encoding="utf-8")
-    typed = words.format(file=place.parent if place.name == "trace.jsonl" else place).split()
-    done = python(PLUGINS[name], "-m", "p2os", *typed, cwd=tmp_path)
-    assert done.returncode == 2, done.stderr
-    assert done.stderr.startswith("p2os: ")
-    assert says in done.stderr
-    assert hint in done.stderr
-    assert "pip install" in done.stderr
-    assert "Traceback" not in done.stderr
 
 
 @pytest.mark.soak

@@ -1,6 +1,8 @@
 """What a user gets who has no checkout: the wheel of each house, built from its source distribution.
 
-The slow tests take the build's own tools from a package index and say so where none is reached.
+In `make test` the parts in C and C++ are those that the checkout has built, and wheels are unpacked beside links to the
+packages that they require. `make soak` compiles them, and has pip install them from a package index, where one is
+reached.
 """
 
 import email
@@ -11,12 +13,23 @@ import sys
 import sysconfig
 import tarfile
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from tests.tools.made_once import made_once
-from tests.whole.building import LIMIT_S, PROJECT, ROOT, build, built, clean_environment, python_of, tracked
+from tests.whole.building import (
+    LIMIT_S,
+    PROJECT,
+    ROOT,
+    build,
+    built,
+    clean_environment,
+    pip_installed,
+    tracked,
+    unpacked,
+)
 from tools.packaging.staging import houses, stage
 
 HOUSES = houses()
@@ -26,33 +39,59 @@ PYTEST = ("-m", "pytest", "-q", "--import-mode=importlib", "-p", "no:cacheprovid
 PARTS = [part["name"] for part in PROJECT["tool"]["setuptools"]["ext-modules"]]
 
 
-@pytest.fixture(scope="module")
-def builder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return made_once(tmp_path_factory, "builder", lambda place: python_of(place, *PROJECT["build-system"]["requires"]))
+#: Instead of a compiler: sees that what a source includes is there, and links what the checkout has built.
+LOOKING = """#!/bin/sh
+case " $* " in *" -shared "*) ;; *) exec {compiler} "$@" -E;; esac
+while [ "$1" != -o ]; do shift; done
+folder=${{2%/*}}
+cp "{root}/${{folder##*/}}/${{2##*/}}" "$2"
+"""
 
 
-def unoptimized(folder: Path, compiler: str) -> str:
-    """Return a compiler that takes half the time; how well the parts run is looked at in the checkout's."""
-    script = folder / compiler
-    script.write_text(f'#!/bin/sh\nexec {compiler} "$@" -O0\n')
+def looking(folder: Path, compiler: str) -> str:
+    script = folder / f"looking-{compiler}"
+    script.write_text(LOOKING.format(compiler=compiler, root=ROOT))
     script.chmod(0o755)
     return str(script)
 
 
-def wheel_of(builder: Path, name: str, place: Path) -> Path:
+def wheel_of(name: str, place: Path, *, is_compiled: bool) -> Path:
     """Return the wheel of a house, from its source distribution."""
     stage(HOUSES[name], place / "sources")
-    archive = built(build(builder, place / "sources", "sdist", place), place)
+    archive = built(build(place / "sources", "sdist", place), place)
     with tarfile.open(archive) as packed:
         packed.extractall(place, filter="data")
-    compilers = {"CC": unoptimized(place, "cc"), "CXX": unoptimized(place, "c++")}
-    return built(build(builder, place / archive.name.removesuffix(".tar.gz"), "wheel", place, **compilers), place)
+    compilers = {} if is_compiled else {"CC": looking(place, "cc"), "CXX": looking(place, "c++")}
+    return built(build(place / archive.name.removesuffix(".tar.gz"), "wheel", place, **compilers), place)
+
+
+def all_wheels(factory: pytest.TempPathFactory, *, is_compiled: bool) -> dict[str, Path]:
+    """Return the wheel of each house, made once a run."""
+    return {
+        name: made_once(
+            factory,
+            f"wheel-{name}-{is_compiled}",
+            lambda place, name=name: wheel_of(name, place, is_compiled=is_compiled),
+        )
+        for name in HOUSES
+    }
 
 
 @pytest.fixture(scope="module")
-def wheels(builder: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    return {name: made_once(tmp_path_factory, f"wheel-{name}", lambda place, name=name: wheel_of(builder, name, place))
-            for name in HOUSES}  # fmt: skip
+def wheels(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    return all_wheels(tmp_path_factory, is_compiled=False)
+
+
+@pytest.fixture(params=["unpacked", pytest.param("by pip", marks=pytest.mark.soak)])
+def installed(
+    request: pytest.FixtureRequest, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Callable[..., Path]:
+    """Return what makes an environment of houses and packages of others, by their names, and returns its Python."""
+    made = all_wheels(tmp_path_factory, is_compiled=request.param == "by pip")
+    install = pip_installed if request.param == "by pip" else unpacked
+    return lambda *names: install(
+        tmp_path / "user", [made[name] for name in names if name in made], [name for name in names if name not in made]
+    )
 
 
 def files_of(wheel: Path) -> set[str]:
@@ -81,6 +120,21 @@ def test_no_file_is_in_two_wheels_and_none_is_left_out(wheels: dict[str, Path]) 
 
 
 @pytest.mark.slow
+def test_a_source_distribution_has_every_source_of_its_parts(wheels: dict[str, Path]) -> None:
+    found: set[str] = set()
+    for wheel in wheels.values():
+        (archive,) = wheel.parent.glob("*.tar.gz")
+        with tarfile.open(archive) as packed:
+            found |= {name.partition("/")[2] for name in packed.getnames()}
+    parts = PROJECT["tool"]["setuptools"]["ext-modules"]
+    named = {
+        pattern: list(ROOT.glob(pattern)) for part in parts for pattern in (*part["sources"], *part.get("depends", ()))
+    }
+    assert [pattern for pattern, files in named.items() if not files] == []
+    assert {path.relative_to(ROOT).as_posix() for files in named.values() for path in files} - found == set()
+
+
+@pytest.mark.slow
 def test_a_wheel_is_for_every_python_and_of_a_platform_only_where_parts_are_in_c(wheels: dict[str, Path]) -> None:
     tags = {name: wheel.stem.split("-", 2)[2] for name, wheel in wheels.items()}
     assert tags["simbase"] == tags["p2os"] == "py3-none-any"
@@ -89,11 +143,11 @@ def test_a_wheel_is_for_every_python_and_of_a_platform_only_where_parts_are_in_c
 
 
 @pytest.mark.slow
-def test_a_data_file_that_is_left_out_of_a_wheel_is_named(builder: Path, tmp_path: Path) -> None:
+def test_a_data_file_that_is_left_out_of_a_wheel_is_named(tmp_path: Path) -> None:
     sources = stage(HOUSES["p2os"], tmp_path / "sources")
     table = sources / "pyproject.toml"
     table.write_text(table.read_text(encoding="utf-8").replace(', "*.lua"', ""), encoding="utf-8")
-    wheel = built(build(builder, sources, "wheel", tmp_path), tmp_path)
+    wheel = built(build(sources, "wheel", tmp_path), tmp_path)
     assert left_out("p2os", wheel) == ["p2os/capture/p2os.lua"]
 
 
@@ -107,8 +161,10 @@ def shortest_tests(place: Path, *names: str) -> Path:
 
 
 @pytest.mark.slow
-def test_the_toolkits_wheel_drives_a_robot_where_nothing_else_is(wheels: dict[str, Path], tmp_path: Path) -> None:
-    program = python_of(tmp_path / "user", str(wheels["simbase"]), str(wheels["p2os"]), "pytest", "hypothesis")
+def test_the_toolkits_wheel_drives_a_robot_where_nothing_else_is(
+    installed: Callable[..., Path], tmp_path: Path
+) -> None:
+    program = installed("simbase", "p2os", "pytest", "hypothesis")
     code = """
 from p2os import Robot, served_pioneer
 with served_pioneer(world="room") as url, Robot(url) as robot:
@@ -119,15 +175,7 @@ with served_pioneer(world="room") as url, Robot(url) as robot:
     for words in (
         ["-c", code],
         ["-m", "p2os", "doctor"],
-        [
-            "-m",
-            "pytest",
-            "-q",
-            "--import-mode=importlib",
-            "-p",
-            "no:cacheprovider",
-            "tests/p2os/protocol/test_frames.py",
-        ],
+        [*PYTEST, "tests/p2os/protocol/test_frames.py"],
     ):
         done = subprocess.run(
             [program, *words], cwd=place, env=clean_environment(),
@@ -137,8 +185,10 @@ with served_pioneer(world="room") as url, Robot(url) as robot:
 
 
 @pytest.mark.slow
-def test_the_emulators_wheel_runs_a_program_where_nothing_else_is(wheels: dict[str, Path], tmp_path: Path) -> None:
-    program = python_of(tmp_path / "user", str(wheels["simbase"]), str(wheels["bluepill-sim"]), "pytest", "hypothesis")
+def test_the_emulators_wheel_runs_a_program_where_nothing_else_is(
+    installed: Callable[..., Path], tmp_path: Path
+) -> None:
+    program = installed("simbase", "bluepill-sim", "pytest", "hypothesis")
     elf = str(ROOT / "robot_bench" / "firmware" / "motors.elf")
     place = shortest_tests(tmp_path, "tests/bluepill_sim", "robot_bench/firmware")
     for words in (
@@ -163,8 +213,8 @@ def test_the_page_of_a_house_points_to_nothing_that_only_a_checkout_has(wheels: 
 
 
 @pytest.mark.slow
-def test_all_houses_drive_the_demo_in_an_empty_environment(wheels: dict[str, Path], tmp_path: Path) -> None:
-    program = python_of(tmp_path / "user", *map(str, wheels.values())).parent / "p2os"
+def test_all_houses_drive_the_demo_in_an_empty_environment(installed: Callable[..., Path], tmp_path: Path) -> None:
+    program = installed(*HOUSES).parent / "p2os"
 
     def said_by(*words: str) -> str:
         done = subprocess.run(
@@ -187,9 +237,9 @@ def emulator(tmp_path: Path) -> Path:
 
 
 @pytest.mark.slow
-def test_a_part_that_does_not_compile_fails_the_build(builder: Path, emulator: Path, tmp_path: Path) -> None:
+def test_a_part_that_does_not_compile_fails_the_build(emulator: Path, tmp_path: Path) -> None:
     (emulator / "bluepill_sim/extension/source/core/core.h").unlink()
-    done = build(builder, emulator, "wheel", tmp_path / "out")
+    done = build(emulator, "wheel", tmp_path / "out")
     assert done.returncode != 0
     assert "bluepill_sim._native does not compile" in done.stderr
     assert "P2OS_NATIVE=0" in done.stderr, "the way round it"
@@ -202,13 +252,13 @@ def test_a_part_that_does_not_compile_fails_the_build(builder: Path, emulator: P
     ids=["no compiler", "not wanted"],
 )
 def test_a_part_that_is_left_out_leaves_its_reason(
-    builder: Path, emulator: Path, tmp_path: Path, environment: dict[str, str], reason: str
+    emulator: Path, tmp_path: Path, environment: dict[str, str], reason: str
 ) -> None:
     folder = emulator / "build" / f"lib.{sysconfig.get_platform()}-{sys.implementation.cache_tag}" / "bluepill_sim"
     folder.mkdir(parents=True)
     for left in ("_native.so", f"_native{sysconfig.get_config_var('EXT_SUFFIX')}"):
         (folder / left).write_text("of an earlier build")
-    done = build(builder, emulator, "wheel", tmp_path / "out", **environment)
+    done = build(emulator, "wheel", tmp_path / "out", **environment)
     with zipfile.ZipFile(built(done, tmp_path / "out")) as archive:
         assert not [name for name in archive.namelist() if name.endswith(".so")]
         assert archive.read("bluepill_sim/_native.left_out").decode().startswith(reason[:9])

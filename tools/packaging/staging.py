@@ -56,7 +56,6 @@ class Plugin:
     name: str
     house: str  # the last that has some of it
     modules: Sequence[str]  # with all that is below them
-    quick: str  # a file of tests that shows that the house stands without it
     words: Sequence[str] = ()  # that nothing outside says
     verbs: Sequence[str] = ()
     uses: Sequence[str] = ()  # plug-ins that it may import

@@ -13,7 +13,7 @@ from bluepill_sim.fabric.registers import WORD, BitField, Peripheral, Peripheral
 from bluepill_sim.peripherals.usart import Usart
 from bluepill_sim.stm32f103 import PERIPHERALS
 
-QUICK = settings(max_examples=40)
+QUICK = settings(max_examples=20)
 
 WORDS = st.integers(0, WORD)
 NAMES = [name for _, name in PERIPHERALS]

@@ -114,7 +114,7 @@ def live(board: BluePill, seed: int, slices: int) -> list[dict[str, Any]]:
 
 
 @pytest.mark.slow
-@settings(max_examples=80)
+@settings(max_examples=30)
 @given(waits=st.lists(st.sampled_from(sorted(WAITS)), min_size=1, max_size=4), seed=st.integers(0, 1000))
 def test_every_slice_ends_alike(waits: list[str], seed: int) -> None:
     source = program(waits)

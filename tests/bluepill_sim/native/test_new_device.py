@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.documentation.page import ROOT, Block, Page
+from tests.tools.made_once import made_once
 
 COMPILER = shutil.which("gcc")
 
@@ -65,10 +66,13 @@ def pytest_there(scratch: Path, core: str, *words: str) -> str:
 
 @pytest.fixture(scope="module")
 def scratch(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Make a copy of the package, and do there what the page says."""
-    folder = tmp_path_factory.mktemp("scratch")
-    for package in ("bluepill_sim", "simbase"):
-        shutil.copytree(ROOT / package, folder / package, ignore=shutil.ignore_patterns("__pycache__", "*.so"))
+    """Return a copy of the package in which is done what the page says."""
+    return made_once(tmp_path_factory, "new-device", make_scratch)
+
+
+def make_scratch(folder: Path) -> Path:
+    for package in ("bluepill_sim", "simbase"):  # compiled modules too
+        shutil.copytree(ROOT / package, folder / package, ignore=shutil.ignore_patterns("*.so"))
     python_file, header, c_file, rows, test = Page(ROOT / "docs" / "peripheral.md").blocks
     for block in (c_file, python_file, test):
         put_block(block, folder)

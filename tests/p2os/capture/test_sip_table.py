@@ -93,6 +93,7 @@ def part_of(draw: Draw) -> bytes:
     return data[cut : max(cut, draw.integer(0, 206))]
 
 
+@pytest.mark.slow
 @given(SEEDS)
 @settings(max_examples=60)  # 15 ms each
 def test_a_capture_gives_the_same_cells_either_way(seed: int) -> None:
@@ -138,6 +139,7 @@ def test_it_is_given_up_at_the_robots_own_next_byte() -> None:
     assert same(capture_of(chunks))["t_s"] == [0.3, 0.3, 1.0]
 
 
+@pytest.mark.slow
 def test_a_sip_within_a_packet_is_none_wherever_a_block_of_the_capture_ends() -> None:
     within = packet_frame(SerauxPacket(data=bytes(9) + sip_bytes() + bytes(60)), Profile.P2OS).to_bytes()
     for first in range(len(within)):

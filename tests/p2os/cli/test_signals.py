@@ -185,6 +185,7 @@ def test_many_signals_do_not_cut_the_stopping_short(robot: RecordingRobot, drive
     assert STOP in robot.numbers
 
 
+@pytest.mark.slow
 def test_a_program_that_was_suspended_stops_the_robot_before_anything_else(
     robots: Robots, drivers: list[Driver], tmp_path: Path
 ) -> None:

@@ -118,6 +118,7 @@ def test_a_second_ctrl_c_at_any_line_of_an_asyncio_closing_leaves_the_robot_told
     assert interrupt_an_asyncio_closing(hasty, step) > 100
 
 
+@pytest.mark.slow
 def test_a_second_ctrl_c_at_a_line_of_an_asyncio_closing_leaves_the_robot_told_in_any_time(fast: ServedRobot) -> None:
     assert interrupt_an_asyncio_closing(fast, 7) > 100
 

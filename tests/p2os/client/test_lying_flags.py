@@ -124,6 +124,7 @@ WHOLE = given(
 )  # fmt: skip
 
 
+@pytest.mark.slow
 @hypothesis_settings(max_examples=60)
 @WHOLE
 def test_a_robot_whose_flags_lie_is_told_to_stand_and_stands(

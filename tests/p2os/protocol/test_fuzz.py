@@ -115,6 +115,7 @@ def endure(total: int, seed: int) -> None:
     assert decoder.stats.bad_checksums > 0
 
 
+@pytest.mark.slow
 def test_bytes_half_of_them_mutated_sessions_are_endured() -> None:
     tracemalloc.start()
     try:

@@ -79,38 +79,41 @@ print(json.dumps({"lua": script(), "page": page, "takes": takes, "sent": sent, "
 """
 
 
-def seen(folder: Path, *planted: dict[str, tuple[str, str]]) -> dict:
-    """Return what a copy of the toolkit shows with lines planted in it."""
+def planted(folder: Path) -> Path:
+    """Return a copy of the toolkit with both planted in it."""
     for name in ("p2os", "tools/generate_protocol.py", "PROTOCOL.md"):
         target, source = folder / name, ROOT / name
         target.parent.mkdir(parents=True, exist_ok=True)
         if source.is_dir():
-            shutil.copytree(source, target, ignore=shutil.ignore_patterns("__pycache__", "*.so"))
+            shutil.copytree(source, target)  # compiled modules too
         else:
             shutil.copy(source, target)
-    for rows in planted:
-        for name, (before, lines) in rows.items():
-            path = folder / name
-            text = path.read_text(encoding="utf-8")
-            assert text.count(before) == 1, name
-            path.write_text(text.replace(before, lines + before), encoding="utf-8")
-    if PACKET in planted:
-        path = folder / REGISTRY
-        text = path.read_text(encoding="utf-8").replace("from p2os.protocol.packets.sensors",
-                                                        "from p2os.protocol.packets import sensors\n"
-                                                        "from p2os.protocol.packets.sensors", 1)  # fmt: skip
-        path.write_text(text, encoding="utf-8")
+    for name, (before, lines) in (COMMAND | PACKET).items():
+        path = folder / name
+        text = path.read_text(encoding="utf-8")
+        assert text.count(before) == 1, name
+        path.write_text(text.replace(before, lines + before), encoding="utf-8")
+    path = folder / REGISTRY
+    text = path.read_text(encoding="utf-8").replace("from p2os.protocol.packets.sensors",
+                                                    "from p2os.protocol.packets import sensors\n"
+                                                    "from p2os.protocol.packets.sensors", 1)  # fmt: skip
+    path.write_text(text, encoding="utf-8")
+    return folder
+
+
+def seen(folder: Path) -> dict:
+    """Return what a toolkit shows."""
     done = subprocess.run(
         [sys.executable, "-P", "-c", LOOK], cwd=folder, capture_output=True, text=True, timeout=60, check=False,
-        env={**os.environ, "PYTHONPATH": f"{folder}{os.pathsep}{ROOT}", "PYTHONDONTWRITEBYTECODE": "1"},
+        env={**os.environ, "PYTHONPATH": f"{folder}{os.pathsep}{ROOT}"},
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 
 
 @pytest.mark.slow
-def test_a_command_of_one_description_and_its_handler_is_seen_everywhere(tmp_path: Path) -> None:
-    found = seen(tmp_path, COMMAND)
+def test_a_command_and_a_packet_that_are_each_said_once_are_seen_everywhere(tmp_path: Path) -> None:
+    found = seen(planted(tmp_path))
     assert '[0xc9] = "LAMP",' in found["lua"]
     assert (
         "| 201 | LAMP | two bytes, level and lamp, each 0 to 255 | 1.0 | 1.0 | 1.0 | Planted: light a lamp. |"
@@ -121,10 +124,6 @@ def test_a_command_of_one_description_and_its_handler_is_seen_everywhere(tmp_pat
     assert "level 3" in found["sent"], found["sent"]
     assert ["lamp lit", "2 3"] in found["told"]
 
-
-@pytest.mark.slow
-def test_a_packet_of_one_declaration_and_its_row_is_seen_everywhere(tmp_path: Path) -> None:
-    found = seen(tmp_path, PACKET)
     assert '[0x91] = "LAMPpac",' in found["lua"]
     assert "| `91` | LAMPpac | every field |" in found["page"]
     assert "**LAMPpac**, type `91`" in found["page"]
@@ -132,12 +131,12 @@ def test_a_packet_of_one_declaration_and_its_row_is_seen_everywhere(tmp_path: Pa
     assert "LAMPpac" in found["came"]
     assert "-100" in found["came"]
     assert found["columns"] == ["lamp"]
-    assert found["takes"].startswith("no command 'lamp'")
 
 
 @pytest.mark.slow
-def test_what_was_not_planted_is_seen_nowhere(tmp_path: Path) -> None:
-    found = seen(tmp_path)
+def test_what_was_not_planted_is_seen_nowhere() -> None:
+    found = seen(ROOT)
+    assert found["takes"].startswith("no command 'lamp'")
     assert not [name for name in ("lua", "page", "sent", "came") if "LAMP" in found[name]]
     assert found["columns"] == ["raw"]
     assert found["page"] == (ROOT / "PROTOCOL.md").read_text(encoding="utf-8")

@@ -83,11 +83,18 @@ class Lateness:
             self.worst_s = max(self.worst_s, time.monotonic() - slept - 0.001)
 
 
-@pytest.fixture(params=["zenoh", "dds"])
-def transport(request: pytest.FixtureRequest) -> str:
-    name: str = request.param
-    pytest.importorskip({"zenoh": "zenoh", "dds": "cyclonedds"}[name], reason="the extra ros is not installed")
-    return name
+MODULES = {"zenoh": "zenoh", "dds": "cyclonedds"}
+
+
+def transports(first: str) -> pytest.MarkDecorator:
+    """Try one transport in `make test`, and each in `make soak`."""
+    rows = [pytest.param(name, marks=[] if name == first else pytest.mark.soak) for name in MODULES]
+    return pytest.mark.parametrize("transport", rows)
+
+
+@pytest.fixture(autouse=True)
+def installed(transport: str) -> None:
+    pytest.importorskip(MODULES[transport], reason="the extra ros is not installed")
 
 
 @contextlib.contextmanager
@@ -134,6 +141,7 @@ def stopped_after(seen: Seen, act: Callable[[], None]) -> tuple[float, float]:
 
 
 @pytest.mark.slow
+@transports("dds")
 def test_the_deadman_of_a_flood_that_ends_stops_the_robot_as_soon_as_that_of_any_other(
     transport: str, domain: int
 ) -> None:
@@ -150,6 +158,7 @@ def test_the_deadman_of_a_flood_that_ends_stops_the_robot_as_soon_as_that_of_any
 
 
 @pytest.mark.slow
+@transports("zenoh")
 def test_a_signal_stops_the_robot_at_once_in_a_flood(transport: str, domain: int) -> None:
     rows = []
     for _ in range(TRIES):

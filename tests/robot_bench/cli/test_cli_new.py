@@ -352,7 +352,10 @@ def test_cmake_builds_a_program_that_does_what_that_of_make_does() -> None:
 
 @needs_compiler
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "robot"), [(".github/workflows/robot.yml", "p2dx"), (".gitlab-ci.yml", "rover")])
+@pytest.mark.parametrize(
+    ("name", "robot"),
+    [pytest.param(".github/workflows/robot.yml", "p2dx", marks=pytest.mark.soak), (".gitlab-ci.yml", "rover")],
+)
 def test_the_shell_lines_of_a_ci_file_pass_on_a_project_as_it_is_written(name: str, robot: str) -> None:
     project.write_project(Path("mine"), project.project_files("kinematic", robot=robot))
     found = yaml.safe_load(Path("mine", name).read_text(encoding="utf-8"))
@@ -385,7 +388,7 @@ def test_the_shell_lines_of_a_ci_file_pass_on_a_project_as_it_is_written(name: s
 
 
 @needs_compiler
-@pytest.mark.slow
+@pytest.mark.soak
 def test_the_rovers_tests_pass_and_notice_what_was_broken() -> None:
     project.write_project(Path("mine"), project.project_files("kinematic", robot="rover"))
     pytest_here = f"PYTEST={forked_pytest()} -q"

@@ -271,7 +271,7 @@ def test_without_noise_the_largest_return_error_falls_ten_times(two_squares: lis
     assert found.least_squares.largest_m < found.before.largest_m / 10
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_the_return_errors_of_robots_fall_ten_times_without_noise_and_their_centres_five_times_with_it() -> None:
     for seed in range(2, 5):
         found = umbmark(squares(seed, 1, noise=False))

@@ -50,7 +50,7 @@ def long_run(seconds: int) -> RunRecord:
     )  # fmt: skip
 
 
-@pytest.fixture(scope="module", params=[15, pytest.param(60, marks=pytest.mark.slow)])
+@pytest.fixture(scope="module", params=[15, pytest.param(60, marks=pytest.mark.soak)])
 def long(request: pytest.FixtureRequest) -> RunRecord:
     """Return a run of so many minutes; the first leaves something out of each list already."""
     return long_run(request.param * 60)

@@ -303,7 +303,11 @@ def test_a_robot_that_vanishes_ends_the_run_with_1(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP])
+@pytest.mark.parametrize(
+    "number",
+    [signal.SIGINT, signal.SIGTERM]
+    + [pytest.param(one, marks=pytest.mark.soak) for one in (signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)],
+)
 def test_a_signal_stops_a_served_robot_and_ends_with_130(
     number: signal.Signals, robot: tuple[str, subprocess.Popen[str]], tmp_path: Path
 ) -> None:

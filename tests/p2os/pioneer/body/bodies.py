@@ -11,6 +11,8 @@ from p2os.pioneer.body.factory import engines
 
 #: The package that a body needs, which is also the name of its test mark where it has one.
 ENGINES = {"bullet": "pybullet", "mujoco": "mujoco"}
+#: Tried like the first by `make test`, and left out of a run of folders.
+SECOND = "mujoco"
 STEPS_PER_S = 1000
 
 Maker = Callable[..., RobotBody]
@@ -21,7 +23,8 @@ def marks_of(body: str) -> list[pytest.MarkDecorator]:
     if body not in ENGINES:
         return []
     is_there = find_spec(ENGINES[body]) is not None
-    return [getattr(pytest.mark, body), pytest.mark.skipif(not is_there, reason=f"{ENGINES[body]} is not installed")]
+    skip = pytest.mark.skipif(not is_there, reason=f"{ENGINES[body]} is not installed")
+    return [getattr(pytest.mark, body), skip, *([pytest.mark.slow] if body == SECOND else [])]
 
 
 def each_body(*left_out: str) -> list[ParameterSet]:

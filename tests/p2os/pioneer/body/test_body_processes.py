@@ -85,6 +85,7 @@ def run(*arguments: str, seed: str = "0") -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.slow
 def test_snapshots_of_all_bodies_go_on_alike_in_other_processes(tmp_path: Path) -> None:
     names = [name for name in engines() if name not in ENGINES or find_spec(ENGINES[name])]
     here = []
@@ -158,6 +159,7 @@ def test_a_client_that_other_robots_had_is_as_good_as_a_new_one(monkeypatch: pyt
     first.scene.client = others.client = -1  # one of them gives it back
 
 
+@pytest.mark.slow
 @pytest.mark.bullet
 def test_scenes_that_nobody_uses_any_more_leave_their_clients_to_new_ones(monkeypatch: pytest.MonkeyPatch) -> None:
     engine = pytest.importorskip("p2os.pioneer.body.bullet.engine")

@@ -44,6 +44,7 @@ def make_kinematic() -> RobotBody:
 AWAY = (-0.2, -0.2, 2)
 
 
+@pytest.mark.slow
 @example("before a wall", [(0.3, 0.3, 400), AWAY, (-0.2, -0.2, APART_STEPS - 3), (-0.2, -0.2, 1), (-0.2, -0.2, 1)])
 @example("before a wall", [(0.3, 0.3, 400), AWAY, (0.3, 0.3, 2), (-0.2, -0.2, 400), (0.3, 0.3, 400)])
 @example("free", [(0.1, 0.1 + 2e-7, 900)])

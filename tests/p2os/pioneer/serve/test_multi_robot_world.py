@@ -41,7 +41,7 @@ Meet = Callable[..., MultiRobotWorld]
     params=[
         "kinematic",
         pytest.param("bullet", marks=pytest.mark.bullet),
-        pytest.param("mujoco", marks=pytest.mark.slow),
+        pytest.param("mujoco", marks=pytest.mark.soak),
     ]
 )
 def meet(request: pytest.FixtureRequest) -> Meet:

@@ -68,7 +68,7 @@ def test_short_experiments_hold_pins_straight_to_the_body_and_through_the_adapte
     assert set(found) <= set(LOOSE_BECAUSE) | NEAR_WITH_ALL_PAIRS
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_experiments_with_all_pairs_of_codes_hold_and_each_bound_would_be_broken_at_half_its_size_or_says_why_not(
     passing_long: list[TrialResult],
 ) -> None:
@@ -188,8 +188,9 @@ def test_more_than_half_a_turn_between_two_samples_is_followed_and_jumps_of_the_
 
 
 @pytest.mark.slow
-def test_the_physical_body_holds_too(tmp_path: Path) -> None:
-    found = results_of(["motors", "sensors-all", "slip"], [Variant("adapter", "firmware", "bullet")], tmp_path)
+@pytest.mark.parametrize("names", [["motors"], pytest.param(["sensors-all", "slip"], marks=pytest.mark.soak)])
+def test_the_physical_body_holds_too(names: list[str], tmp_path: Path) -> None:
+    found = results_of(names, [Variant("adapter", "firmware", "bullet")], tmp_path)
     assert [line for result in found for line in told(result)] == []
 
 
