@@ -16,6 +16,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from tests.documentation.page import Page
 from tools.packaging.staging import ROOT, House, Plugin, houses, plugins
 
 CLOSURE = ROOT / "tests" / "tools" / "closure"
@@ -33,6 +34,13 @@ def environment(house: House, known: dict[str, House], without: Sequence[Plugin]
     hidden |= {module for one in without for module in one.modules}
     path = os.pathsep.join(filter(None, (str(CLOSURE), os.environ.get("PYTHONPATH", ""))))
     return {**os.environ, "HIDDEN_PACKAGES": ",".join(sorted(hidden)), "PYTHONPATH": path}
+
+
+def tests_of(page: str) -> list[str]:
+    """Return the tests that do what a page says; of a page without a block that is run there are none."""
+    names = {False: "examples_of_a_page_run", True: "long_examples_of_a_page_run_among_the_others"}
+    kinds = {block.is_slow for block in Page(ROOT / page).blocks if block.is_run}
+    return [f"tests/test_docs.py::test_the_{names[is_slow]}[{page}]" for is_slow in sorted(kinds)]
 
 
 def left_out(plugin: Plugin, folders: Sequence[str]) -> list[str]:
@@ -62,7 +70,7 @@ def main() -> int:
     parser.add_argument("--without", choices=plugins(), default=[], action="append", help="hide a plug-in too")
     options, words = parser.parse_known_args()
     house = known[options.house]
-    pages = [f"tests/test_docs.py::test_the_examples_of_a_page_run[{page}]" for page in house.pages]
+    pages = [word for page in house.pages for word in tests_of(page)]
     without = [plugins()[name] for name in options.without]
     if without:  # pages are of a house with all that it has
         pages = [word for one in without for word in left_out(one, house.tests)]
