@@ -55,8 +55,20 @@ def upper_names(package: str) -> set[str]:
     return others | {house.name for house in HOUSES.values() if not set(house.folders) & below}
 
 
+def upper_verbs(package: str) -> set[str]:
+    """Return the verbs of `p2os` that a package does not stand on."""
+    below = closure(PACKAGES[package], HOUSES)
+    return {
+        name for name, module in PROJECT["project"]["entry-points"]["p2os.verbs"].items()
+        if module.partition(".")[0] not in below
+    }  # fmt: skip
+
+
 def named_upwards(package: str, text: str) -> list[str]:
-    """Return the texts of a source that name a module or distribution above its package; docstrings are for readers."""
+    """Return the texts of a source that name a module, distribution or verb above its package.
+
+    Docstrings are for readers.
+    """
     tree = ast.parse(text)
     told = {
         node.body[0].value
@@ -64,13 +76,14 @@ def named_upwards(package: str, text: str) -> list[str]:
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and node.body
         and isinstance(node.body[0], ast.Expr)
     }  # fmt: skip
-    names = upper_names(package)
+    names, verbs = upper_names(package), upper_verbs(package)
     return [
         node.value
         for node in ast.walk(tree)
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and node not in told
-        and any(is_module(word) or word in names - set(PACKAGES) for word in re.findall(r"[\w.-]+", node.value)
-                if re.split(r"\.", word)[0] in names)
+        and (not verbs.isdisjoint(re.findall(r"\bp2os ([a-z]+)", node.value))
+             or any(is_module(word) or word in names - set(PACKAGES) for word in re.findall(r"[\w.-]+", node.value)
+                    if re.split(r"\.", word)[0] in names))
     ]  # fmt: skip
 
 
@@ -85,7 +98,7 @@ NAMES_THE_PROJECT = ("simbase/trust/store.py",)
 
 
 @pytest.mark.parametrize("package", ["simbase", "p2os", "bluepill_sim"])
-def test_no_text_of_a_program_names_a_module_or_distribution_above(package: str) -> None:
+def test_no_text_of_a_program_names_a_module_distribution_or_verb_above(package: str) -> None:
     found = {
         path.relative_to(ROOT).as_posix(): names
         for path in (ROOT / package).rglob("*.py")
@@ -102,6 +115,8 @@ def test_no_text_of_a_program_names_a_module_or_distribution_above(package: str)
         ("p2os", "import_module('robot_bench.run')"),
         ("p2os", 'hint = f"pip install {x} robot-bench"'),
         ("bluepill_sim", 'hint = "see p2os.client"'),
+        ("p2os", 'EPILOG = "p2os run dodge --world arena"'),
+        ("bluepill_sim", 'hint = "p2os doctor"'),
         ("simbase", 'def f():\n    """What it is."""\n    return "bluepill-sim"'),
     ],
 )
@@ -130,7 +145,9 @@ def test_the_toolkit_alone_lists_its_verbs_and_tells_the_rest_as_not_installed()
     listed = python("p2os", "-m", "p2os", "--help")
     assert listed.returncode == 0
     assert re.search(r"(?m)^  serve ", listed.stdout)
-    assert not re.search(r"(?m)^  (run|mcu) ", listed.stdout)
+    shown = set(re.findall(r"(?m)^  ([a-z]+) ", listed.stdout))
+    assert not shown & {"run", "mcu"}
+    assert set(re.findall(r"\bp2os ([a-z]+)", listed.stdout)) <= shown, "the examples are of what is there"
     told = python("p2os", "-m", "p2os", "doctor", "--json")
     assert told.returncode == 0, told.stderr
     names = {row["name"] for row in json.loads(told.stdout)}

@@ -33,7 +33,8 @@ def environment(house: House, known: dict[str, House], without: Sequence[Plugin]
     hidden = {folder for one in known.values() for folder in one.folders} - closure(house, known)
     hidden |= {module for one in without for module in one.modules}
     path = os.pathsep.join(filter(None, (str(CLOSURE), os.environ.get("PYTHONPATH", ""))))
-    return {**os.environ, "HIDDEN_PACKAGES": ",".join(sorted(hidden)), "PYTHONPATH": path}
+    verbs = ",".join(verb for one in without for verb in one.verbs)
+    return {**os.environ, "HIDDEN_PACKAGES": ",".join(sorted(hidden)), "HIDDEN_VERBS": verbs, "PYTHONPATH": path}
 
 
 def tests_of(page: str) -> list[str]:
@@ -75,7 +76,7 @@ def main() -> int:
     if without:  # pages are of a house with all that it has
         pages = [word for one in without for word in left_out(one, house.tests)]
         marks = "".join(f" and not {mark}" for one in without for mark in one.marks)
-        words += ["-m", f"not slow and not soak and not hardware{marks}"]
+        words += ["-p", "without_verbs", "-m", f"not slow and not soak and not hardware{marks}"]
     command = [sys.executable, "-m", "pytest", *house.tests, *pages, *words]
     return subprocess.run(command, cwd=ROOT, env=environment(house, known, without), check=False).returncode
 
