@@ -166,6 +166,16 @@ def test_the_emulator_alone_runs_a_program_and_a_wrong_word_is_a_line() -> None:
     assert "p2os" not in python("bluepill-sim", "-m", "bluepill_sim", "run", "--help").stdout
 
 
+def test_the_emulator_alone_has_the_verbs_of_the_toolkits_mcu() -> None:
+    pages = [
+        python("bluepill-sim", "-m", "bluepill_sim", "--help").stdout,
+        python("robot-bench", "-m", "p2os", "mcu", "--help").stdout,
+    ]
+    alone, together = (set(re.findall(r"(?m)^  ([a-z]+)  ", page)) for page in pages)
+    assert alone == together >= {"run", "debug", "pins"}
+    assert "p2os" not in pages[0]
+
+
 def test_what_is_hidden_is_not_there() -> None:
     for house, module in (("simbase", "p2os"), ("p2os", "bluepill_sim.board"), ("bluepill-sim", "p2os.robots")):
         done = python(house, "-c", f"import {module}")

@@ -5,7 +5,7 @@
 A use is done in a process of its own, and what that has loaded at its end is the closure: modules, and parts in C with
 all their sources. What is imported for it is then imported anew in fresh processes, in the same order; their
 processor time is told without that of Python's own start, the median of `ROUNDS`, the uses in turn. Wheels are those
-in dist/, and what is installed is what pip installs from them and from a package index into an empty folder.
+in dist/; installed are what they hold and the packages of others that they need, in the size that those have here.
 """
 
 import argparse
@@ -16,9 +16,14 @@ import subprocess
 import sys
 import tempfile
 import tomllib
-from collections.abc import Mapping, Sequence
+import zipfile
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from importlib.metadata import distribution
 from pathlib import Path
+
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 from tools.packaging.staging import ROOT, House, houses
 
@@ -144,12 +149,31 @@ def wheel(house: House, dist: Path) -> Path:
     return found[-1]
 
 
-def installed_bytes(requirement: str, dist: Path) -> int:
-    """Return the size of what pip installs for a requirement, without compiled bytecode."""
-    with tempfile.TemporaryDirectory() as folder:
-        command = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-compile"]
-        subprocess.run([*command, "--find-links", dist, "--target", folder, requirement], check=True, cwd=folder)
-        return sum(path.stat().st_size for path in Path(folder).rglob("*") if path.is_file())
+def unpacked_bytes(wheels: Iterable[Path]) -> int:
+    """Return the size of what wheels hold."""
+    return sum(one.file_size for path in wheels for one in zipfile.ZipFile(path).infolist())
+
+
+def others(requirements: Iterable[str]) -> dict[str, int]:
+    """Return the packages that requirements bring, with what those need themselves: the size of each as it is here.
+
+    Compiled bytecode is not counted.
+
+    Raises:
+        PackageNotFoundError: One of them is not installed here.
+    """
+    found: dict[str, int] = {}
+    waiting = [*requirements]
+    while waiting:
+        wanted = Requirement(waiting.pop())
+        name = canonicalize_name(wanted.name)
+        if name in found or (wanted.marker is not None and not wanted.marker.evaluate({"extra": ""})):
+            continue
+        here = distribution(wanted.name)
+        files = [Path(str(here.locate_file(file))) for file in here.files or () if "__pycache__" not in file.parts]
+        found[name] = sum(path.stat().st_size for path in files if path.is_file())
+        waiting += here.requires or ()
+    return found
 
 
 def main() -> int:
@@ -168,11 +192,13 @@ def main() -> int:
     print("| use | `pip install` | Python, lines | C, lines | wheels, kB | imports, s | installed, MB |")
     print("|---|---|---|---|---|---|---|")
     for name, (house, _) in USES.items():
-        wheels_kb = sum(wheel(one, options.dist).stat().st_size for one in needed(known[house], known)) / 1e3
-        installed_mb = installed_bytes(house, options.dist.resolve()) / 1e6
+        all_needed = needed(known[house], known)
+        wheels = [wheel(each, options.dist) for each in all_needed]
+        wheels_kb = sum(path.stat().st_size for path in wheels) / 1e3
+        installed = unpacked_bytes(wheels) + sum(others(each for one in all_needed for each in one.requires).values())
         one = found[name]
         print(f"| {name} | `{house}` | {one.python_lines} | {one.c_lines} | {wheels_kb:.0f} "
-              f"| {statistics.median(spent[name]):.2f} | {installed_mb:.0f} |")  # fmt: skip
+              f"| {statistics.median(spent[name]):.2f} | {installed / 1e6:.0f} |")  # fmt: skip
     return 0
 
 
