@@ -166,6 +166,7 @@ ASKED = [
     ("worlds", "world check {file}", "place.sdf", "no reader for .sdf", "world files (worlds"),
     ("ros", "run motors --ros", "", "--ros is not there", "ROS bench (run --ros"),
     ("ros", "report {file} --events b --ros2 mcap", "run/trace.jsonl", "there is no storage 'mcap'", "ROS bench (run"),
+    ("ros", "compare {file} {file}", "bag/metadata.yaml", "bag holds no trace.jsonl", "ROS bench (run"),
 ]
 
 
@@ -177,7 +178,7 @@ def test_who_asks_for_a_plugin_that_is_not_there_is_told_what_to_do(
     place.parent.mkdir(exist_ok=True)
     if file:
         place.write_text("", encoding="utf-8")
-    typed = words.format(file=place.parent if place.name == "trace.jsonl" else place).split()
+    typed = words.format(file=place if place.parent == tmp_path else place.parent).split()
     done = python(PLUGINS[name], "-m", "p2os", *typed, cwd=tmp_path)
     assert done.returncode == 2, done.stderr
     assert done.stderr.startswith("p2os: ")
