@@ -13,8 +13,8 @@ import pytest
 
 from simbase.command_line.help_pages import PROGRAM
 from tests.documentation import command_lines
-from tests.documentation.page import ROOT, Page, pages
-from tests.documentation.session import RUN, run_blocks
+from tests.documentation.page import ROOT, RUN, Page, pages
+from tests.documentation.session import run_blocks
 
 KEPT = {"", "text"}  # drawings, and what is no program
 PAGES = pages()
@@ -38,10 +38,7 @@ def run(page: Page, pace: int) -> None:
 
 
 def runnable(pace: int) -> list[Page]:
-    return [
-        page for page in PAGES
-        if any(block.language in RUN and block.note("not run") is None and block.pace == pace for block in page.blocks)
-    ]  # fmt: skip
+    return [page for page in PAGES if any(block.is_run and block.pace == pace for block in page.blocks)]
 
 
 @pytest.mark.parametrize("page", runnable(0), ids=str)

@@ -30,17 +30,9 @@ GROUP = "p2os.verbs"
 #: What the scripts of `--install-completion` set, and why this program was called then.
 COMPLETE_VARIABLE = "_P2OS_COMPLETE"
 
-HELP = """A test bench for the firmware of mobile robots, and tools for Pioneers that speak P2OS.
-
-It runs BluePill programs on an emulated board that drives a virtual or a real robot, serves virtual
-Pioneers to other programs, drives, watches and records robots, and reads recordings.
-"""
-
 EPILOG = """Examples:
 
 \b
-  p2os demo                         watch a BluePill program drive a Pioneer
-  p2os run dodge --world arena      run one scenario and write a report
   p2os serve                        be a Pioneer on tcp:127.0.0.1:8101
   p2os scan                         find a robot, and identify it
   p2os monitor tcp:127.0.0.1:8101   watch it
@@ -83,14 +75,15 @@ def _installed_verbs() -> tuple[EntryPoint, ...]:
 
 def make_app(words: Sequence[str] = ()) -> typer.Typer:
     """Return the application with the verb that `words` name, or with all when they name none."""
-    app = typer.Typer(
-        help=HELP, epilog=EPILOG, rich_markup_mode=None, cls=GroupedVerbs,
-        pretty_exceptions_enable=False, context_settings={"help_option_names": ["-h", "--help"]},
-    )  # fmt: skip
-    app.callback()(_options)
     found = verbs()
     completed = completed_words(os.environ)
     first = next((word for word in (words if completed is None else completed) if not word.startswith("-")), None)
+    app = typer.Typer(
+        help=summary(found) if first is None and completed is None else None, epilog=EPILOG,
+        rich_markup_mode=None, cls=GroupedVerbs,
+        pretty_exceptions_enable=False, context_settings={"help_option_names": ["-h", "--help"]},
+    )  # fmt: skip
+    app.callback()(_options)
     wanted = [entry for entry in found if entry.name == first]
     if first is None and "--version" in words:
         return app  # no verb is wanted
@@ -101,6 +94,12 @@ def make_app(words: Sequence[str] = ()) -> typer.Typer:
     add_verbs(app, wanted or found)
     dress(app)
     return app
+
+
+def summary(found: Iterable[EntryPoint]) -> str:
+    """Return what the distributions that offer these verbs say of themselves, a paragraph each."""
+    told = dict.fromkeys(entry.dist for entry in found if entry.dist is not None)
+    return "\n\n".join(f"{each.metadata['Summary']}." for each in told)
 
 
 def completed_words(environment: Mapping[str, str]) -> list[str] | None:

@@ -25,6 +25,7 @@ from robot_bench.recording.run_record import TRACE_NAME, read_events, read_run
 from simbase.entry_points import installed_points
 from simbase.errors import FileError, shown_name
 from simbase.files import lines_of, reading, writing
+from simbase.installation import way_to_plug_in
 from simbase.user_classes import loaded
 
 _TUM_COLUMNS = 8
@@ -74,6 +75,8 @@ def read_drive(path: Path, *, robot: str = "", how: HowToRead | None = None) -> 
         raise FileError(f"there is no {shown_name(path)}", hint="a run folder, a recording, pcap, bag, .csv or .tum")
     if (reader := _reader_of(path)) is not None:
         return reader.read(path, _parameters(robot))
+    if path.is_dir() and not (path / TRACE_NAME).exists() and (way := way_to_plug_in(READERS)):
+        raise FileError(f"{shown_name(path)} holds no {TRACE_NAME}", hint=way)
     if path.is_dir() or path.name == TRACE_NAME:
         return _of_run(path if path.is_dir() else path.parent, robot)
     if path.is_file() and _is_aria_log(path):  # of a pipe what was looked into would be gone

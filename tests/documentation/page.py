@@ -16,6 +16,7 @@ from functools import cached_property
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
+RUN = {"python", "console", "sh", "c", "toml"}  # languages of blocks that are run
 FENCE = re.compile(r"^(?P<indent>\s*)```(?P<language>\S*)\s*$")
 NOTE = re.compile(r"^<!-- (?P<kind>not run|slow|soak|given): (?P<text>.+) -->$")
 HEADING = re.compile(r"^#{1,6} +(?P<text>.+?) *$")
@@ -41,6 +42,11 @@ class Block:
     def note(self, kind: str) -> str | None:
         """Return the text of the note of that kind, or None."""
         return next((text for name, text in self.notes if name == kind), None)
+
+    @property
+    def is_run(self) -> bool:
+        """Whether it is done what the block says."""
+        return self.language in RUN and self.note("not run") is None
 
     @property
     def entries(self) -> list[tuple[str, list[str]]]:

@@ -20,6 +20,7 @@ import signal
 import socket
 import struct
 import subprocess
+import sys
 import tempfile
 import termios
 import threading
@@ -27,19 +28,19 @@ import time
 import tomllib
 from dataclasses import dataclass, field
 from fcntl import ioctl
+from importlib.metadata import entry_points
 from pathlib import Path
 from types import TracebackType
 from typing import ClassVar, Self
 
-from p2os.pioneer.serve import served_pioneer
 from tests.documentation.page import ROOT, Block, Page
 from tests.tools.forked_python import forked_python
 
+HAS_TOOLKIT = any(point.name == "p2os" for point in entry_points(group="simbase.packages"))
 LIMIT_S = 240.0
 READY_S = 60.0
 ENDING_S = 60.0
 PORTS = 24
-RUN = {"python", "console", "sh", "c", "toml"}  # languages of blocks that are run
 FAILURES = ("p2os: ", "fault: ", "FAILED ")
 NAMED_FILE = re.compile(r"^(?:/\*|//|#)\s*(?P<name>[\w./-]+\.(?:c|h|ld|toml|py|yml|yaml))\b")
 TCP = re.compile(r"(?<=tcp:127\.0\.0\.1:)\d+|(?<=--gdb )\d+|(?<=remote :)\d+")
@@ -49,7 +50,10 @@ OPTIONAL = {"arm-none-eabi-gcc", "gdb-multiarch", "tshark", "make", "g++"}
 #: What a reader's shell finds first. `make` in the checkout, and tests inside the tests, are looked at, not executed:
 #: of the latter that their options are options, and that their files are there.
 SHIMS = {
-    "p2os": 'exec {python} -m p2os "$@"',
+    # Where only the emulator is (tools/packaging/testing.py), the verbs of `p2os mcu` are a program of its own.
+    "p2os": 'exec {python} -m p2os "$@"'
+    if HAS_TOOLKIT
+    else '[ "$1" = mcu ] || exit 127; shift\nexec {python} -m bluepill_sim "$@"',
     "python": 'case "$1 $2" in "-m venv") exit 0;; esac; exec {python} "$@"',
     "python3": 'case "$1 $2" in "-m venv") exit 0;; esac; exec {python} "$@"',
     "pip": 'case "$*" in "install "*) exit 0;; esac; exit 2',  # the network; test_docs.py looks at the extras
@@ -191,7 +195,7 @@ class Session:
         bin_ = self._folder / ".venv" / "bin"
         (bin_ / "activate").touch()
         for name, script in SHIMS.items():
-            text = script.format(python=forked_python(), root=ROOT, make=shutil.which("make"))
+            text = script.format(python=python(), root=ROOT, make=shutil.which("make"))
             (bin_ / name).write_text(f"#!/bin/sh\n{text}\n")
             (bin_ / name).chmod(0o755)
         return self
@@ -237,7 +241,7 @@ class Session:
         named = NAMED_FILE.match(block.text)
         if named is not None and "/" not in named["name"]:  # one in a folder is of the checkout
             self._keep(block)
-        self._finish([forked_python(), "-c", self._placed(block.text)], f"line {block.line}", [])
+        self._finish([python(), "-c", self._placed(block.text)], f"line {block.line}", [])
 
     def _take_toml(self, block: Block) -> None:
         tomllib.loads(block.text)
@@ -281,6 +285,8 @@ class Session:
         kind = next((each for each in ENDLESS if each.fits(verb)), None)
         clients, serving = self._urls(verb, command)
         for url in clients - self._places:
+            from p2os.pioneer.serve import served_pioneer  # not where only the emulator is
+
             self._robots.enter_context(served_pioneer(url=url.replace("serial:", "pty:")))
             self._places.add(url)
         for terminal in [each for each in self._terminals if each.places & serving]:
@@ -344,7 +350,8 @@ class Session:
 
     def _environment(self) -> dict[str, str]:
         own = {
-            "PATH": f"{self._folder / '.venv/bin'}:{os.environ['PATH']}", "PYTHONPATH": str(ROOT),
+            "PATH": f"{self._folder / '.venv/bin'}:{os.environ['PATH']}",
+            "PYTHONPATH": os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")])),
             "HOME": str(self._folder / "home"), "NO_COLOR": "1", "TERM": "xterm", "COLUMNS": "200",
             "MPLCONFIGDIR": str(Path.home() / ".cache" / "matplotlib"),  # its list of fonts takes seconds to make
         }  # fmt: skip
@@ -390,11 +397,16 @@ class Session:
         return clients, serving
 
 
+def python() -> str:
+    """Return the Python of a reader; a server's fork where there are verbs that it imports."""
+    return forked_python() if HAS_TOOLKIT else sys.executable
+
+
 def run_blocks(page: Page, pace: int) -> list[str]:
     """Do what the blocks of a page say that are of this pace or below; return what a program is missing for."""
     with Session() as session:
         for block in page.blocks:
-            if block.language in RUN and block.note("not run") is None and block.pace <= pace:
+            if block.is_run and block.pace <= pace:
                 session.take(block)
         session.end_terminals()
     return session.missing

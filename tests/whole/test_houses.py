@@ -58,12 +58,22 @@ def upper_names(package: str) -> set[str]:
     return others | {house.name for house in HOUSES.values() if not set(house.folders) & below}
 
 
+def upper_verbs(package: str) -> set[str]:
+    """Return the verbs of `p2os` that a package does not stand on."""
+    below = closure(PACKAGES[package], HOUSES)
+    return {
+        name for name, module in PROJECT["project"]["entry-points"]["p2os.verbs"].items()
+        if module.partition(".")[0] not in below
+    }  # fmt: skip
+
+
 def named_upwards(package: str, texts: Iterable[str]) -> list[str]:
-    """Return the texts of a source that name a module or distribution above its package."""
-    names = upper_names(package)
+    """Return the texts of a source that name a module, distribution or verb above its package."""
+    names, verbs = upper_names(package), upper_verbs(package)
     return [
         text for text in texts
-        if any(is_module(word) or word in names - set(PACKAGES) for word in re.findall(r"[\w.-]+", text)
+        if not verbs.isdisjoint(re.findall(r"\bp2os ([a-z]+)", text))
+        or any(is_module(word) or word in names - set(PACKAGES) for word in re.findall(r"[\w.-]+", text)
                if re.split(r"\.", word)[0] in names)
     ]  # fmt: skip
 
@@ -83,7 +93,7 @@ NAMES_THE_PROJECT = ("simbase/trust/store.py",)
 
 
 @pytest.mark.parametrize("package", ["simbase", "p2os", "bluepill_sim"])
-def test_no_text_of_a_program_names_a_module_or_distribution_above(package: str) -> None:
+def test_no_text_of_a_program_names_a_module_distribution_or_verb_above(package: str) -> None:
     found = {
         path.relative_to(ROOT).as_posix(): names
         for path in (ROOT / package).rglob("*.py")
@@ -100,6 +110,8 @@ def test_no_text_of_a_program_names_a_module_or_distribution_above(package: str)
         ("p2os", "import_module('robot_bench.run')"),
         ("p2os", 'hint = f"pip install {x} robot-bench"'),
         ("bluepill_sim", 'hint = "see p2os.client"'),
+        ("p2os", 'EPILOG = "p2os run dodge --world arena"'),
+        ("bluepill_sim", 'hint = "p2os doctor"'),
         ("simbase", 'def f():\n    """What it is."""\n    return "bluepill-sim"'),
     ],
 )
@@ -128,7 +140,9 @@ def test_the_toolkit_alone_lists_its_verbs_and_tells_the_rest_as_not_installed()
     listed = python("p2os", "-m", "p2os", "--help")
     assert listed.returncode == 0
     assert re.search(r"(?m)^  serve ", listed.stdout)
-    assert not re.search(r"(?m)^  (run|mcu) ", listed.stdout)
+    shown = set(re.findall(r"(?m)^  ([a-z]+) ", listed.stdout))
+    assert not shown & {"run", "mcu"}
+    assert set(re.findall(r"\bp2os ([a-z]+)", listed.stdout)) <= shown, "the examples are of what is there"
     told = python("p2os", "-m", "p2os", "doctor", "--json")
     assert told.returncode == 0, told.stderr
     names = {row["name"] for row in json.loads(told.stdout)}
@@ -145,6 +159,16 @@ def test_the_emulator_alone_runs_a_program_and_a_wrong_word_is_a_line() -> None:
     assert wrong.returncode == 2
     assert wrong.stderr.startswith("python -m bluepill_sim: cannot read no_such.elf")
     assert "p2os" not in python("bluepill-sim", "-m", "bluepill_sim", "run", "--help").stdout
+
+
+def test_the_emulator_alone_has_the_verbs_of_the_toolkits_mcu() -> None:
+    pages = [
+        python("bluepill-sim", "-m", "bluepill_sim", "--help").stdout,
+        python("robot-bench", "-m", "p2os", "mcu", "--help").stdout,
+    ]
+    alone, together = (set(re.findall(r"(?m)^  ([a-z]+)  ", page)) for page in pages)
+    assert alone == together >= {"run", "debug", "pins"}
+    assert "p2os" not in pages[0]
 
 
 def test_what_is_hidden_is_not_there() -> None:

@@ -25,6 +25,8 @@ HOUSES = houses()
 NEEDS = [need for need in (*TOOLKIT_NEEDS, *BENCH_NEEDS) if need.kind == "plug-in"]
 #: The tables in which a plug-in has a row, beside pyproject.toml.
 TABLES = {"p2os.cli.needs", "robot_bench.cli.needs"}
+#: What the bench may have in Python beside its plug-ins and verbs; the adapter's model is a package of its own.
+KERNEL_LINES = 20_000
 #: Who says a word of a plug-in that means something else there, and what.
 OTHER_MEANINGS = {("p2os.pioneer.export.mjcf", "mujoco"): "the element of MJCF at the top"}
 
@@ -104,6 +106,15 @@ def needs_of(plugin: Plugin) -> list[Need]:
     return [need for need in NEEDS if plugin.holds(points[need.points[0]][need.point].partition(":")[0])]
 
 
+def test_the_kernel_of_the_bench_stays_small() -> None:
+    kernel = [
+        path for path in sources()
+        if (name := module_name(path)).startswith("robot_bench") and not name.startswith("robot_bench.cli")
+        and not any(one.holds(name) for one in PLUGINS.values())
+    ]  # fmt: skip
+    assert sum(len(path.read_bytes().splitlines()) for path in kernel) < KERNEL_LINES
+
+
 def test_the_storages_of_a_bag_are_those_that_it_can_be_written_in() -> None:
     assert PROJECT["project"]["entry-points"]["robot_bench.bags"].keys() == STORAGES.keys()
 
@@ -117,6 +128,7 @@ ASKED = [
     ("worlds", "world check place.sdf", "place.sdf", "no reader for .sdf", "world files (worlds"),
     ("ros", "run motors --ros", "", "--ros is not there", "ROS bench (run --ros"),
     ("ros", "report run --events b --ros2 mcap", "run/trace.jsonl", "there is no storage 'mcap'", "ROS bench (run"),
+    ("ros", "compare bag bag", "bag/metadata.yaml", "bag holds no trace.jsonl", "ROS bench (run"),
 ]
 #: What is looked at without each plug-in.
 WORDS = ("--help", "doctor --json", "run motors --body kinematic --duration 50ms --out out")

@@ -16,6 +16,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from tests.documentation.page import Page
 from tools.packaging.staging import ROOT, House, Plugin, houses, plugins
 
 CLOSURE = ROOT / "tests" / "tools" / "closure"
@@ -32,7 +33,19 @@ def environment(house: House, known: dict[str, House], without: Sequence[Plugin]
     hidden = {folder for one in known.values() for folder in one.folders} - closure(house, known)
     hidden |= {module for one in without for module in one.modules}
     path = os.pathsep.join(filter(None, (str(CLOSURE), os.environ.get("PYTHONPATH", ""))))
-    return {**os.environ, "HIDDEN_PACKAGES": ",".join(sorted(hidden)), "PYTHONPATH": path}
+    verbs = ",".join(verb for one in without for verb in one.verbs)
+    return {**os.environ, "HIDDEN_PACKAGES": ",".join(sorted(hidden)), "HIDDEN_VERBS": verbs, "PYTHONPATH": path}
+
+
+def tests_of(page: str) -> list[str]:
+    """Return the tests that do what a page says; of a page without a block that is run there are none."""
+    names = (
+        "the_examples_of_a_page_run",
+        "the_long_examples_of_a_page_run_among_the_others",
+        "all_examples_of_a_page_run",
+    )
+    paces = {block.pace for block in Page(ROOT / page).blocks if block.is_run}
+    return [f"tests/test_docs.py::test_{names[pace]}[{page}]" for pace in sorted(paces)]
 
 
 def left_out(plugin: Plugin, folders: Sequence[str]) -> list[str]:
@@ -62,12 +75,12 @@ def main() -> int:
     parser.add_argument("--without", choices=plugins(), default=[], action="append", help="hide a plug-in too")
     options, words = parser.parse_known_args()
     house = known[options.house]
-    pages = [f"tests/test_docs.py::test_the_examples_of_a_page_run[{page}]" for page in house.pages]
+    pages = [word for page in house.pages for word in tests_of(page)]
     without = [plugins()[name] for name in options.without]
     if without:  # pages are of a house with all that it has
         pages = [word for one in without for word in left_out(one, house.tests)]
         marks = "".join(f" and not {mark}" for one in without for mark in one.marks)
-        words += ["-m", f"not slow and not soak and not hardware{marks}"]
+        words += ["-p", "without_verbs", "-m", f"not slow and not soak and not hardware{marks}"]
     command = [sys.executable, "-m", "pytest", *house.tests, *pages, *words]
     return subprocess.run(command, cwd=ROOT, env=environment(house, known, without), check=False).returncode
 
