@@ -6,7 +6,6 @@ and is in the trace; so each step notes where the trace stood before it, and a n
 Invariant: what is found depends on the times of the events alone, not on where the bench stands.
 """
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 
@@ -16,7 +15,6 @@ from robot_bench.events.selection import Selector
 from robot_bench.events.stream import EventStream
 from robot_bench.recording.recorder import SAMPLE_NS
 from robot_bench.recording.trace import TraceWriter
-from robot_bench.scenario.scenario import Scenario
 from robot_bench.wires.nets import Harness
 from simbase.timing import Nanos
 
@@ -83,15 +81,3 @@ class EventWait:
             return events_of(self._trace.lines())
         length, blocks = self._mark
         return events_of(self._trace.lines(length), begun=replace(blocks, levels=bytearray(blocks.levels)))
-
-
-class AwaitedRun(ABC):
-    """A run whose events can be waited for."""
-
-    scenario: Scenario
-    _waits: EventWait
-
-    @property
-    @abstractmethod
-    def now(self) -> Nanos:
-        """Return the time that the chip has come to."""

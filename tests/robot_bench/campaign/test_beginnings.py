@@ -7,6 +7,7 @@ from typing import cast
 
 import pytest
 
+from robot_bench.bench import run_of
 from robot_bench.campaign.campaign_file import Limits
 from robot_bench.campaign.trial import Outcome, Trial, Verdict, bench_of, run_trial, trial_of, unpacked
 from robot_bench.campaign.workers.beginnings import EACH_NS, LEAST_NS, MOST_KEPT, Beginnings, Saved, Task, Work, Worked
@@ -170,11 +171,11 @@ def test_a_state_of_another_run_is_refused(base: Trial) -> None:
         ):  # fmt: skip
             other = bench_of(base.with_lists(fault=faults).scenario(folder))
             with pytest.raises(UsageError, match="until 2 s something else happens here"):
-                other.begin_as(*states[name])
+                run_of(other).begin_as(*states[name])
         later = bench_of(base.with_lists(fault=[stuck(1.0), stuck((now + 1) / NS_PER_S)]).scenario(folder))
-        later.begin_as(*states["early"])
+        run_of(later).begin_as(*states["early"])
         with pytest.raises(UsageError, match="another threshold"):
-            bench_of(base.set(("threshold_m", 0.3)).scenario(folder)).begin_as(*states["none"])
+            run_of(bench_of(base.set(("threshold_m", 0.3)).scenario(folder))).begin_as(*states["none"])
 
 
 def test_robots_in_one_world_are_not_begun_elsewhere() -> None:
@@ -182,4 +183,4 @@ def test_robots_in_one_world_are_not_begun_elsewhere() -> None:
     with unpacked(two.files) as folder:
         bench = bench_of(two.scenario(folder))
         with pytest.raises(UsageError, match="begin at the beginning"):
-            bench.begin_as(bench.snapshot(), 0)
+            run_of(bench).begin_as(bench.snapshot(), 0)

@@ -13,7 +13,7 @@ from p2os.errors import ScenarioError
 from p2os.ros.codec import Message
 from p2os.ros.topics import TOPICS
 from p2os.ros.transport import NodeOptions, Received, Topic
-from robot_bench.bench import Bench
+from robot_bench.bench import Bench, run_of
 from robot_bench.bench.board import make_harness
 from robot_bench.ros.bench_node import BenchNode
 from robot_bench.ros.drive import RosPlace, refuse_without_pins, run_beside, with_inputs
@@ -101,7 +101,7 @@ def test_a_run_with_the_inputs_of_another_and_without_ros_has_the_same_hash(mode
     made = scenario(mode=mode, outside="distance encoder")
     live = ran(made, Script(INCOMING))
     trace = tmp_path / "trace.jsonl"
-    trace.write_text("".join(live.recorder.lines()))
+    trace.write_text("".join(run_of(live).recorder.lines()))
     again = Bench(made, slice_ns=777_777)
     with_inputs(trace)(again)
     again.finish()
@@ -112,7 +112,9 @@ def test_a_run_with_the_inputs_of_another_and_without_ros_has_the_same_hash(mode
 
 def test_messages_reach_the_chips_pins_at_their_times_and_the_trace_has_each_change_once() -> None:
     bench = ran(scenario(outside="distance encoder"), Script(INCOMING))
-    deeds = [(deed.at // (10 * NS_PER_MS), deed.place, deed.level) for deed in inputs_of(bench.recorder.lines(), "t")]
+    deeds = [
+        (deed.at // (10 * NS_PER_MS), deed.place, deed.level) for deed in inputs_of(run_of(bench).recorder.lines(), "t")
+    ]
     assert deeds == [
         (5, "DD3", True), (5, "encoder1_s1", True), (5, "encoder1_s2", False), (5, "encoder1_s3", True),
         (20, "DD3", False), (20, "DD7", True),

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from p2os.errors import ScenarioError, WorldError
-from robot_bench.bench import Bench
+from robot_bench.bench import Bench, run_of
 from robot_bench.events.codec import events_of
 from robot_bench.events.expectation import ExpectationError
 from robot_bench.events.kinds import Fault, PinEdge, Pose, WorldChange
@@ -142,7 +142,7 @@ def test_a_broken_link_is_noticed_and_mended() -> None:
     one.run_until(dropped + 2900 * MS)
     assert not [packet for packet in one.record().wire if dropped + 50 * MS < packet.t < dropped + 2900 * MS]
     one.run_until(dropped + 4 * S)
-    faults = [(event.op, event.words) for event in events_of(one.recorder.lines()) if isinstance(event, Fault)]
+    faults = [(event.op, event.words) for event in events_of(run_of(one).recorder.lines()) if isinstance(event, Fault)]
     assert faults == [("inject", "link-down"), ("clear", "link-down")]
     assert [packet for packet in one.record().wire if packet.t > dropped + 3 * S], "the line carries bytes again"
 
@@ -234,7 +234,7 @@ def test_a_bench_goes_back_and_on_again_as_if_nothing_had_been(in_file: bool, tm
     one.inject("sonar-dead 1")
     one.run_until("1 s")
     one.rewind("0.9 s")
-    faults = [event for event in events_of(one.recorder.lines()) if isinstance(event, Fault)]
+    faults = [event for event in events_of(run_of(one).recorder.lines()) if isinstance(event, Fault)]
     assert len(faults) == 1, "what was done before it stays done"
     one.rewind("0.3 s")
     assert ended(one) == whole

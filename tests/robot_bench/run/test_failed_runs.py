@@ -11,7 +11,7 @@ import pytest
 from bluepill_sim.errors import UnmodelledError
 from p2os.cli.main import run as p2os
 from robot_bench import run
-from robot_bench.bench import bench
+from robot_bench.bench import Bench, robot_run
 from robot_bench.events.kinds import Pose
 from robot_bench.recording.run_record import read_run
 from robot_bench.recording.summary import outcome_of, verdict
@@ -62,7 +62,7 @@ def told(folder: Path) -> list[object]:
 def test_a_run_that_cannot_begin_leaves_a_folder_that_says_why(
     part: str, error: BaseException, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(bench, part, raising(error))
+    monkeypatch.setattr(robot_run, part, raising(error))
     with pytest.raises(type(error)) as caught:
         run.run_scenario(wanted(), tmp_path / "run")
     assert caught.value is error
@@ -76,7 +76,7 @@ def test_a_run_that_cannot_begin_leaves_a_folder_that_says_why(
     ids=["chip", "bench"],
 )
 def test_a_run_that_breaks_off_is_judged_and_says_why(error: Exception, tmp_path: Path) -> None:
-    def drive(made: bench.Bench) -> None:
+    def drive(made: Bench) -> None:
         made.run_until(10_000_000)
         raise error
 
@@ -87,7 +87,7 @@ def test_a_run_that_breaks_off_is_judged_and_says_why(error: Exception, tmp_path
 
 
 def test_a_bug_in_the_midst_of_a_run_is_raised_and_its_folder_says_so(tmp_path: Path) -> None:
-    def drive(made: bench.Bench) -> None:
+    def drive(made: Bench) -> None:
         made.run_until(10_000_000)
         raise ZeroDivisionError("integer modulo by zero")
 
@@ -98,7 +98,7 @@ def test_a_bug_in_the_midst_of_a_run_is_raised_and_its_folder_says_so(tmp_path: 
 
 
 def test_ctrl_c_in_the_midst_of_the_chips_work_is_an_end_in_good_order(tmp_path: Path) -> None:
-    def drive(made: bench.Bench) -> None:
+    def drive(made: Bench) -> None:
         made.run_until(10_000_000)
         raise KeyboardInterrupt
 
@@ -148,7 +148,7 @@ def test_a_report_that_cannot_be_written_is_one_line(
 def test_goals_are_judged_from_all_of_the_run(tmp_path: Path) -> None:
     seen: list[int] = []
 
-    def drive(made: bench.Bench) -> None:
+    def drive(made: Bench) -> None:
         made.events.subscribe(lambda pose: seen.append(pose.t), Pose)
         made.run_until(made.end)
 

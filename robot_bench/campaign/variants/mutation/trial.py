@@ -14,6 +14,7 @@ from typing import cast
 
 from bluepill_sim.program.mutants import Mutant
 from p2os.transport.wall_clock import Clock
+from robot_bench.bench import run_of
 from robot_bench.campaign.variants.mutation.base_run import BaseRun
 from robot_bench.events.codec import Json
 from robot_bench.events.kinds import Event, Verdict
@@ -132,7 +133,7 @@ def _judged(base: BaseRun) -> Found:
     """Return what became of a mutant whose run came to its end."""
     bench, name = base.bench, base.bench.scenario.name
     end = bench.finish()
-    for one in bench.goals.at_end(bench.ended(end)):
+    for one in run_of(bench).goals.at_end(run_of(bench).ended(end)):
         if not one.is_open and not one.outcome.met:
             return Found(Fate.MISSED, name, f"{one.goal.wanted}: {one.outcome.says}", end)
     return Found(Fate.SAME if bench.trace.sha256 == base.trace_sha256 else Fate.SURVIVED, name)
