@@ -76,7 +76,7 @@ class RemoteBench:
         self.scenario = scenario
         self.trace = trace or TraceWriter()
         self.chip = chip = chip or boot(scenario)
-        self.note: str | None = "the pose is the robot's own odometry; collisions and clearance cannot be told"
+        self.note: str | None = "the pose is the robot's own odometry; collisions and clearance are not known"
         if scenario.changes:
             self.note += "; the scenario's obstacles are not placed"
         if scenario.parts:

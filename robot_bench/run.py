@@ -283,13 +283,13 @@ def _sha256_of(firmware: Path) -> str | None:
 
 @contextlib.contextmanager
 def _trace_of(scenario: Scenario, folder: Path, *, is_at_port: bool) -> Iterator[TraceWriter]:
-    """Open a folder's trace for a block; what leaves the block as an error is told of in the folder first."""
+    """Open a folder's trace for a block; what leaves the block as an error is reported in the folder first."""
     with contextlib.closing(TraceWriter(folder / TRACE_NAME)) as trace:
         try:
             yield trace
         except BaseException as error:
             if not trace.has_end:
-                with contextlib.suppress(P2osError):  # a disk that is full: the first failure is the one to be told
+                with contextlib.suppress(P2osError):  # a disk that is full: the first failure is the one to be reported
                     if not trace.has_meta:
                         trace.meta(meta_of(scenario, None, None, is_at_port=is_at_port))
                     trace.flush()

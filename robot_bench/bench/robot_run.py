@@ -43,9 +43,9 @@ from robot_bench.running.pacer import FIRST_SLICE_NS, SliceLength
 from robot_bench.running.shared_world import Driven, SharedWorld
 from robot_bench.scenario.fault_script import LINK_DOWN, FaultScript
 from robot_bench.scenario.goals.judging import GoalJudge, Judgement, RunEnd
-from robot_bench.scenario.hand_script import Deed, HandScript
+from robot_bench.scenario.hand_script import Action, HandScript
 from robot_bench.scenario.scenario import Scenario, refuse_what_its_world_refuses
-from robot_bench.scenario.when_script import WhenScript
+from robot_bench.scenario.trigger_script import TriggerScript
 from robot_bench.scenario.world_script import WorldScript
 from robot_bench.wires.chip_pins import ChipPins
 from robot_bench.wires.line_ends import AdapterPart, ControllerPart
@@ -84,8 +84,8 @@ class RobotRun(Stateful):
     """
 
     STATE = (
-        "made_of", "chip", "harness", "_robots", "_ranges", "script", "faults", "hands", "whens", "recorder", "goals",
-        "loop", "_senses", "ends_at", "_has_reported_death",
+        "made_of", "chip", "harness", "_robots", "_ranges", "script", "faults", "hands", "triggers", "recorder",
+        "goals", "loop", "_senses", "ends_at", "_has_reported_death",
     )  # fmt: skip
     #: What the caller asked of this object; the lines, which are parts of the loop.
     DERIVED = ("_lines", "waits", "on_slice")
@@ -143,12 +143,12 @@ class RobotRun(Stateful):
         #: When a goal's verdict or a `[[when]]` ends the run; None while none does.
         self.ends_at: Nanos | None = None
         self._has_reported_death = False
-        self.whens = WhenScript(
-            scenario.whens, on_end=self._end_at,
+        self.triggers = TriggerScript(
+            scenario.triggers, on_end=self._end_at,
             on_change=lambda changes: self.script.add(*changes), on_fault=lambda faults: self.faults.add(*faults),
-            on_deed=lambda deeds: self.hands.add(*deeds),
+            on_action=lambda actions: self.hands.add(*actions),
         )  # fmt: skip
-        self.whens.subscribe(self.events)
+        self.triggers.subscribe(self.events)
         self.goals = GoalJudge(scenario.goals)
         self.goals.on_end = lambda: self._end_at(self.loop.now)
         self.goals.subscribe(self.events)
@@ -277,7 +277,7 @@ class RobotRun(Stateful):
         if not isinstance(snapshot, PartState) or tuple(snapshot) != state_names(RobotRun):
             raise TypeError("not a snapshot of a bench")
 
-    def take_inputs(self, deeds: Sequence[Deed]) -> None:
+    def take_inputs(self, actions: Sequence[Action]) -> None:
         """Take what comes in from outside, to be done at its times, which are after now; the trace notes each.
 
         `Bench.rewind` forgets what came in after the state that it goes back to.
@@ -287,7 +287,7 @@ class RobotRun(Stateful):
         """
         self.refuse_the_ended()
         self.waits.forget()
-        self.hands.add(*deeds)
+        self.hands.add(*actions)
 
     def refuse_the_ended(self) -> None:
         """Refuse to change what has been finished.
@@ -334,9 +334,9 @@ class RobotRun(Stateful):
         elif self.parts.controller is not None:
             self.parts.controller.do(words, at)
 
-    def _do_by_hand(self, deed: Deed) -> None:
-        self.recorder.event(deed.who, deed.at, deed.do, deed.words)
-        do_by_hand(deed, self.chip, self.parts.harness)
+    def _do_by_hand(self, action: Action) -> None:
+        self.recorder.event(action.who, action.at, action.do, action.words)
+        do_by_hand(action, self.chip, self.parts.harness)
 
     def _plug_in(self, chip: Chip) -> tuple[WorldSenses, ...]:
         """Attach the scenario's parts to the board, and have them sense the world."""

@@ -17,7 +17,7 @@ from adapter_sim.pinout import WireRole, load_pinout
 from p2os.errors import ScenarioError
 from robot_bench.bench import Bench, run_of
 from robot_bench.campaign.trial import Trial, bench_of, unpacked
-from robot_bench.scenario.hand_script import Deed
+from robot_bench.scenario.hand_script import Action
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: chosen: how often the run is saved.
@@ -131,7 +131,7 @@ class _Search:
         bench.restore(self._saved[number][1])
         bench.run_until(at)
         run_of(bench).hands.add(
-            *(Deed(at=bench.now, do="set_pin", place=wire, level=False) for wire in _motor_wires()), now=bench.now
+            *(Action(at=bench.now, do="set_pin", place=wire, level=False) for wire in _motor_wires()), now=bench.now
         )
         bench.run_until(min(self._failed_ns + WATCHED_NS, bench.end))
         return self._goal not in run_of(bench).goals.missed

@@ -136,19 +136,19 @@ def test_the_trace_begins_with_every_wire_and_ends_with_a_pose() -> None:
     assert [entry["t"] for entry in entries(made, "pose")][-2:] == [S, S + 20 * MS]
 
 
-def test_text_is_told_by_line_and_the_rest_at_the_end() -> None:
+def test_text_is_reported_by_line_and_the_rest_at_the_end() -> None:
     made = finished(bench(scenario("direct", duration_s=1)))
     lines = [(entry["t"], bytes.fromhex(str(entry["hex"]))) for entry in entries(made, "usart")]
     assert lines == [(S // 2 + 87_000 * 5, b"hello\n"), (S, b"world")]
     assert run_of(made).recorder.last_line == "world"
 
 
-def test_text_without_an_end_is_told_in_pieces() -> None:
+def test_text_without_an_end_is_reported_in_pieces() -> None:
     made = finished(Bench(scenario("direct", duration_s=1), chip=FakeChip(text=[(0, b"x" * 100)])))
     assert [len(bytes.fromhex(str(entry["hex"]))) for entry in entries(made, "usart")] == [64, 36]
 
 
-def test_a_fight_over_a_wire_is_told() -> None:
+def test_a_fight_over_a_wire_is_reported() -> None:
     chip = FakeChip([*drives((0, 0, 0)), (S, "PA4", PinDrive.HIGH)])
     made = finished(Bench(scenario("direct", duration_s=1.5), chip=chip))
     fights = [entry for entry in entries(made, "event") if entry["what"] == "contention"]
@@ -158,9 +158,9 @@ def test_a_fight_over_a_wire_is_told() -> None:
 def test_the_adapter_is_reset_by_an_edge_at_its_very_time() -> None:
     chip = FakeChip([*drives((0, 0, 0)), (S + 123, "PB13", PinDrive.HIGH), (S + 456_789, "PB13", PinDrive.LOW)])
     made = finished(Bench(scenario("adapter", duration_s=2), chip=chip))
-    told = [(entry["t"], entry["what"]) for entry in entries(made, "event") if entry["who"] == "adapter"]
-    assert (S + 123, "reset") in told
-    assert (S + 456_789 + 300 * MS, "booted") in told
+    reported = [(entry["t"], entry["what"]) for entry in entries(made, "event") if entry["who"] == "adapter"]
+    assert (S + 123, "reset") in reported
+    assert (S + 456_789 + 300 * MS, "booted") in reported
 
 
 def test_changes_of_the_world_happen_at_their_time() -> None:

@@ -58,7 +58,7 @@ def upper_names(package: str) -> set[str]:
 def named_upwards(package: str, text: str) -> list[str]:
     """Return the texts of a source that name a module or distribution above its package; docstrings are for readers."""
     tree = ast.parse(text)
-    told = {
+    reported = {
         node.body[0].value
         for node in ast.walk(tree)
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and node.body
@@ -68,7 +68,7 @@ def named_upwards(package: str, text: str) -> list[str]:
     return [
         node.value
         for node in ast.walk(tree)
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and node not in told
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and node not in reported
         and any(is_module(word) or word in names - set(PACKAGES) for word in re.findall(r"[\w.-]+", node.value)
                 if re.split(r"\.", word)[0] in names)
     ]  # fmt: skip
@@ -131,9 +131,9 @@ def test_the_toolkit_alone_lists_its_verbs_and_tells_the_rest_as_not_installed()
     assert listed.returncode == 0
     assert re.search(r"(?m)^  serve ", listed.stdout)
     assert not re.search(r"(?m)^  (run|mcu) ", listed.stdout)
-    told = python("p2os", "-m", "p2os", "doctor", "--json")
-    assert told.returncode == 0, told.stderr
-    names = {row["name"] for row in json.loads(told.stdout)}
+    reported = python("p2os", "-m", "p2os", "doctor", "--json")
+    assert reported.returncode == 0, reported.stderr
+    names = {row["name"] for row in json.loads(reported.stdout)}
     assert {"pyserial", "packaging"} <= names
     assert not names & {"unicorn", "bluepill_sim._native", "robot_bench._edges"}
 

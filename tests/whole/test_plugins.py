@@ -30,7 +30,7 @@ OTHER_MEANINGS = {("p2os.pioneer.export.mjcf", "mujoco"): "the element of MJCF a
 def strings(text: str) -> set[str]:
     """Return the words of a source's texts; docstrings, and an `f"…"`'s names, are not among them."""
     tree = ast.parse(text)
-    told = {
+    reported = {
         id(node.body[0].value)
         for node in ast.walk(tree)
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and node.body
@@ -38,7 +38,7 @@ def strings(text: str) -> set[str]:
     }  # fmt: skip
     texts = [
         node.value for node in ast.walk(tree)
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in told
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in reported
     ]  # fmt: skip
     return {word.strip(".") for text in texts for word in re.findall(r"[\w.]+", text)}
 
@@ -99,8 +99,8 @@ def test_the_table_names_what_is_there(plugin: Plugin) -> None:
     points = PROJECT["project"]["entry-points"]
     assert {name for name, module in points["p2os.verbs"].items() if plugin.holds(module)} == set(plugin.verbs)
     offered = {group for group, rows in points.items() if any(plugin.holds(one.split(":")[0]) for one in rows.values())}
-    told = {group for need in needs_of(plugin) for group in need.points}
-    assert offered - {"p2os.verbs"} <= told, "p2os doctor could not tell that it is not there"
+    reported = {group for need in needs_of(plugin) for group in need.points}
+    assert offered - {"p2os.verbs"} <= reported, "p2os doctor could not tell that it is not there"
     assert all((ROOT / path.partition("::")[0]).exists() for path in (plugin.quick, *plugin.tests))
 
 
@@ -136,9 +136,9 @@ def test_a_house_works_without_a_plugin_and_tells_that_it_is_not_there(plugin: P
     shown = set(re.findall(r"(?m)^  ([a-z]+) ", listed.stdout))
     assert {"run", "serve", "doctor"} <= shown
     assert not shown & set(plugin.verbs)
-    told = python(plugin, "-m", "p2os", "doctor", "--json")
-    assert told.returncode == 0, told.stderr
-    rows = {row["name"]: row for row in json.loads(told.stdout) if row["kind"] == "plug-in"}
+    reported = python(plugin, "-m", "p2os", "doctor", "--json")
+    assert reported.returncode == 0, reported.stderr
+    rows = {row["name"]: row for row in json.loads(reported.stdout) if row["kind"] == "plug-in"}
     assert rows.keys() == {need.name for need in needs_of(plugin)} != set()
     assert all(row["found"] is None and "pip install" in row["get"] for row in rows.values())
     ran = python(plugin, "-m", "p2os", "run", "motors", "--body", "kinematic", "--duration", "50ms",

@@ -69,7 +69,7 @@ def events_and_goals(folder: Path, body: str) -> None:
     for _ in range(RUNS):
         wanted = scenario(body)
         whole = Bench(wanted, trace=TraceWriter(folder / "whole"))
-        bare = Bench(replace(wanted, goals=(), whens=()), trace=TraceWriter(folder / "bare"))
+        bare = Bench(replace(wanted, goals=(), triggers=()), trace=TraceWriter(folder / "bare"))
         bare.recorder.events = Lines(bare.trace.take)  # type: ignore[assignment] # what the recorder uses of it
         took = [0.0, 0.0]
         for second in range(1, RUN_S + 1):

@@ -130,7 +130,7 @@ def test_a_run_that_ends_before_its_own_event_comes_to_the_same(base: Trial) -> 
     assert found[0].virtual_ns < 6 * NS_PER_S
 
 
-def test_a_beginning_that_cannot_be_is_told_by_each_trial(base: Trial) -> None:
+def test_a_beginning_that_cannot_be_is_reported_by_each_trial(base: Trial) -> None:
     nowhere = base.set(("start", {"x_m": 50.0, "y_m": 0.0, "heading_deg": 0.0}))
     found = outcomes([nowhere.with_lists(fault=[stuck(at_s)]) for at_s in (7.0, 8.0)], Beginnings(), Counted())
     assert [one.verdict for one in found] == [Verdict.ERROR] * 2

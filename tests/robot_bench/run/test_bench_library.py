@@ -98,7 +98,7 @@ def test_what_was_expected_and_came_is_returned() -> None:
         (lambda one: one.expect_no("usart1 sends hello", "1 s"), "'usart1 sends hello' happened at 0.500 s"),
     ],
 )  # fmt: skip
-def test_what_was_expected_and_did_not_come_is_told_with_the_last_events(
+def test_what_was_expected_and_did_not_come_is_reported_with_the_last_events(
     expects: Callable[[Bench], Any], says: str
 ) -> None:
     one = made()
@@ -271,7 +271,7 @@ def test_a_verdict_may_end_the_run_and_the_slice_changes_nothing() -> None:
     from robot_bench.scenario.goals.judging import Goal
 
     goal = Goal(kind="happens", arguments={"event": "pin PB7 high"}, ends_run="met")
-    told = set()
+    reported = set()
     for slice_ns in (MS, 10 * MS, 77_777):
         one = bench(replace(scenario("direct"), goals=(goal,)), slice_ns)
         one.run_until("3 s")
@@ -280,8 +280,8 @@ def test_a_verdict_may_end_the_run_and_the_slice_changes_nothing() -> None:
         assert judged.met == [goal.wanted]
         (verdict,) = one.record().verdicts
         assert (verdict.t, verdict.met) == (S, True)
-        told.add(one.trace.text)
-    assert len(told) == 1
+        reported.add(one.trace.text)
+    assert len(reported) == 1
 
 
 def test_a_series_of_waits_reads_each_line_of_the_trace_no_more_than_twice(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -35,7 +35,7 @@ def raising(error: BaseException) -> Callable[..., object]:
     return make
 
 
-def told(folder: Path) -> list[object]:
+def reported(folder: Path) -> list[object]:
     """Return the failures that a folder tells of, the same from trace, summary and a report made anew."""
     record = read_run(folder)
     assert verdict(record) in {"failed", "interrupted"}
@@ -67,7 +67,7 @@ def test_a_run_that_cannot_begin_leaves_a_folder_that_says_why(
         run.run_scenario(wanted(), tmp_path / "run")
     assert caught.value is error
     says = {"KeyboardInterrupt": "interrupted", "ZeroDivisionError": "this is a bug: ZeroDivisionError: integer modulo"}
-    assert str(told(tmp_path / "run")[0]).startswith(says.get(type(error).__name__, str(error)))
+    assert str(reported(tmp_path / "run")[0]).startswith(says.get(type(error).__name__, str(error)))
 
 
 @pytest.mark.parametrize(
@@ -82,7 +82,7 @@ def test_a_run_that_breaks_off_is_judged_and_says_why(error: Exception, tmp_path
 
     result = run.run_scenario(wanted(), tmp_path / "run", drive=drive)
     assert not result.passed
-    assert told(tmp_path / "run")[0] == str(error)
+    assert reported(tmp_path / "run")[0] == str(error)
     assert result.outcome["virtual_s"] == pytest.approx(0.01, abs=0.001)
 
 
@@ -93,7 +93,7 @@ def test_a_bug_in_the_midst_of_a_run_is_raised_and_its_folder_says_so(tmp_path: 
 
     with pytest.raises(ZeroDivisionError):
         run.run_scenario(wanted(), tmp_path / "run", drive=drive)
-    assert told(tmp_path / "run") == ["this is a bug: ZeroDivisionError: integer modulo by zero"]
+    assert reported(tmp_path / "run") == ["this is a bug: ZeroDivisionError: integer modulo by zero"]
     assert read_run(tmp_path / "run").pins, "what was seen before stays"
 
 
@@ -104,7 +104,7 @@ def test_ctrl_c_in_the_midst_of_the_chips_work_is_an_end_in_good_order(tmp_path:
 
     result = run.run_scenario(wanted(), tmp_path / "run", drive=drive)
     assert result.was_interrupted
-    assert told(tmp_path / "run")[0] == "interrupted"
+    assert reported(tmp_path / "run")[0] == "interrupted"
 
 
 LIMITED = """

@@ -143,7 +143,7 @@ def test_the_report_shows_what_parts_came_to_and_their_pictures(folder: Path) ->
     assert "<h2>Parts</h2>" in page
     assert "14 &lt;looks&gt;" in page
     assert 'alt="probe" src="data:image/png;base64,iVBORw0KGgo' in page
-    assert "at +0.0 deg, told +0.0 deg by 0 pulses" in page
+    assert "at +0.0 deg, commanded +0.0 deg by 0 pulses" in page
     assert _parts({}) == ""
     assert parts_of(object()) == []  # type: ignore[arg-type] # a chip without parts
 

@@ -128,7 +128,7 @@ struct page {
     const uint16_t *behaviour; /* of each word: bits of enum behaviour */
     const uint32_t (*masks)[MASKS]; /* of each word: see `store` and SETS */
     struct device *device;          /* without a kind it is Python's */
-    /* Up to which cycle Python need not be told of reads without a clock, 0 for none, while that tie of cycles and time
+    /* Up to which cycle Python need not be notified of reads without a clock, 0 for none, while that tie of cycles and time
      * holds; NO_TIME: it has warned of one. And whether it has warned of a write. */
     uint64_t quiet_until, quiet_cycle;
     uint32_t quiet_hz, ignores_writes;

@@ -88,11 +88,11 @@ void make_edges_where_wanted(struct fabric *fabric)
     schedule_edges(fabric);
 }
 
-/* Tells a subscriber what a pin shows from now on; `told` is what it has shown up to now. */
-static void tell(struct fabric *fabric, struct subscriber *subscriber, uint32_t pin, const struct edge *told)
+/* Tells a subscriber what a pin shows from now on; `before` is what it has shown up to now. */
+static void tell(struct fabric *fabric, struct subscriber *subscriber, uint32_t pin, const struct edge *before)
 {
     const struct shown *shown = &fabric->shown[pin];
-    const uint64_t ns = told->ns;
+    const uint64_t ns = before->ns;
     if (subscriber->takes_waves && shown->is_wave) {
         put_wave(fabric, subscriber, pin, ns);
         return;
@@ -100,8 +100,8 @@ static void tell(struct fabric *fabric, struct subscriber *subscriber, uint32_t 
     const bool level = shown->is_wave && wave_level(&shown->wave, ns);
     const struct edge row = {.ns = ns, .pin = (uint8_t)pin, .drive = shown->drive[level], .wire = shown->wire[level]};
     const uint32_t bit = 1u << pin % PINS;
-    if (subscriber->takes_waves || (subscriber->drive[pin / PINS] & bit && row.drive != told->drive) ||
-        (subscriber->wire[pin / PINS] & bit && row.wire != told->wire)) {
+    if (subscriber->takes_waves || (subscriber->drive[pin / PINS] & bit && row.drive != before->drive) ||
+        (subscriber->wire[pin / PINS] & bit && row.wire != before->wire)) {
         put_row(fabric, subscriber, &row);
     }
     if (shown->is_wave && wants(subscriber, shown, pin)) {
@@ -139,8 +139,8 @@ void tell_all(struct fabric *fabric, uint32_t pin, const uint8_t drive[2], const
         struct subscriber *one = &fabric->subscribers[n];
         if (has_subscribed(one, pin)) {
             const bool level = stop_expanding(one, pin);
-            const struct edge told = {.ns = ns, .drive = drive[level], .wire = wire[level]};
-            tell(fabric, one, pin, &told);
+            const struct edge before = {.ns = ns, .drive = drive[level], .wire = wire[level]};
+            tell(fabric, one, pin, &before);
         }
     }
 }
@@ -179,8 +179,8 @@ void show_to(struct fabric *fabric, struct subscriber *subscriber)
         const struct shown *shown = &fabric->shown[pin];
         if (shown->is_wave && has_subscribed(subscriber, pin)) {
             const bool level = wave_level(&shown->wave, ns);
-            const struct edge told = {.ns = ns, .drive = shown->drive[level], .wire = shown->wire[level]};
-            tell(fabric, subscriber, pin, &told);
+            const struct edge before = {.ns = ns, .drive = shown->drive[level], .wire = shown->wire[level]};
+            tell(fabric, subscriber, pin, &before);
         }
     }
     make_edges_where_wanted(fabric);

@@ -114,7 +114,7 @@ def _run(mutant: Mutant, base: BaseRun, clock: Clock, look: Callable[[], None]) 
     def after_slice(now: Nanos) -> None:
         look()
         if clock() - began > most_ns:
-            raise _TooDearError(f"it costs more than {MOST_TIMES} times the unchanged program, at {now / NS_PER_S:g} s")
+            raise _TooCostlyError(f"it costs more than {MOST_TIMES} times the unchanged one, at {now / NS_PER_S:g} s")
 
     bench.on_slice = after_slice
     try:
@@ -139,5 +139,5 @@ def _judged(base: BaseRun) -> Found:
     return Found(Fate.SAME if bench.trace.sha256 == base.trace_sha256 else Fate.SURVIVED, name)
 
 
-class _TooDearError(P2osError):
+class _TooCostlyError(P2osError):
     """A run is stopped for what it costs."""
