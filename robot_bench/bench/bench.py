@@ -46,7 +46,7 @@ from robot_bench.scenario.scenario import (
     ScenarioOptions,
     load_scenario,
 )
-from robot_bench.wires.ports import Chip
+from robot_bench.wires.ports import LeadingChip
 from simbase.errors import UsageError, shown
 from simbase.installation import installed_version
 from simbase.state import PartState
@@ -94,7 +94,7 @@ class Bench(Expectations, Interventions):
         scenario: Scenario,
         *,
         trace: TraceWriter | None = None,
-        chip: Chip | None = None,
+        chip: LeadingChip | None = None,
         slice_ns: Nanos | None = None,
         on_slice: Callable[[Nanos], None] | None = None,
         _whole: _Whole | None = None,
@@ -187,7 +187,7 @@ class Bench(Expectations, Interventions):
         return self._run.events
 
     @property
-    def chip(self) -> Chip:
+    def chip(self) -> LeadingChip:
         """Return the chip."""
         return self.parts.chip
 

@@ -12,12 +12,12 @@ from bluepill_sim.spans import Span, to_nanos
 from p2os.errors import ScenarioError
 from robot_bench.bench.robot_run import RunningBench
 from robot_bench.scenario.fault_script import LINK_DOWN, FaultChange, load_faults
-from robot_bench.scenario.timeline import Timed, Timeline
+from robot_bench.scenario.timeline import TimedAction, Timeline
 from robot_bench.scenario.world_script import load_changes
 from simbase.errors import shown
 from simbase.timing import NS_PER_S
 
-T = TypeVar("T", bound=Timed)
+T = TypeVar("T", bound=TimedAction)
 
 
 class Interventions(RunningBench):

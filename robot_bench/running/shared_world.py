@@ -24,7 +24,7 @@ from simbase.state import Stateful
 from simbase.timing import Nanos
 
 
-class Driven(Protocol):
+class SharedRobot(Protocol):
     """A robot whose body is stepped together with others."""
 
     def next_setpoints(self) -> tuple[float, float]:
@@ -34,7 +34,7 @@ class Driven(Protocol):
         """Take the wheels' angles after a step that was made with `next_setpoints`."""
 
 
-class Member(Protocol):
+class BenchMember(Protocol):
     """The run of one of the robots."""
 
     @property
@@ -69,9 +69,9 @@ class SharedWorld(Stateful):
         self.names = tuple(names)
         scene.name_robots(self.names)
         #: The runs of those that have a chip, by name.
-        self.members: dict[str, Member] = {}
-        self._own: tuple[Member, ...] = ()
-        self._driven: dict[int, Driven] = {}
+        self.members: dict[str, BenchMember] = {}
+        self._own: tuple[BenchMember, ...] = ()
+        self._driven: dict[int, SharedRobot] = {}
         self._pings = PingTable(scene.bodies)
         #: The time until which all has happened, and where the scene stands.
         self.now: Nanos = 0
@@ -81,7 +81,7 @@ class SharedWorld(Stateful):
         """Return a robot's body."""
         return self.scene.bodies[self.names.index(name)]
 
-    def join(self, name: str, member: Member, driven: Driven) -> None:
+    def join(self, name: str, member: BenchMember, driven: SharedRobot) -> None:
         """Take the run of a robot, and what drives its body."""
         number = self.names.index(name)
         self.members[name] = member
