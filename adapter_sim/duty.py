@@ -18,7 +18,7 @@ bits does by majority.
 A wire that was not looked at for more than `COURSE_NS` is measured anew.
 
 Invariant: what a meter shows depends on the edges and on when it is read, not on how
-the edges were told: as edges, or as a wave.
+the edges were reported: as edges, or as a wave.
 """
 
 from collections.abc import Callable, Sequence

@@ -140,7 +140,7 @@ class Chip(Stateful):
         self._is_made = True
         self._time_changed()
         self.parts = make_parts(self)
-        self._tellers = [part for part in self.parts.by_name.values() if type(part).deliver is not Peripheral.deliver]
+        self._reporters = [part for part in self.parts.by_name.values() if type(part).deliver is not Peripheral.deliver]
         self._is_complete = True
         memory.on_reprogrammed = self._drop_flash
         self.parts.flash.memory = _FlashArray(memory, self._flash_repairs)
@@ -207,7 +207,7 @@ class Chip(Stateful):
         """Hand the subscribers what has happened."""
         if self.fabric.has_news:
             self.pins.deliver()
-            for part in self._tellers:
+            for part in self._reporters:
                 part.deliver()
 
     def record_blocks(self, capacity: int, on_full: Callable[[BlockRecorder], None] | None = None) -> BlockRecorder:

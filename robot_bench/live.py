@@ -15,7 +15,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from typing import Any
 
 from adapter_sim.pinout import load_pinout
-from robot_bench.bench import Bench
+from robot_bench.bench import Bench, run_of
 from robot_bench.events.kinds import PinEdge
 from robot_bench.origin_gate import OriginGate
 from robot_bench.recording.scene_messages import Message, SceneMessages, topics
@@ -96,7 +96,7 @@ class LiveScene:
 
     def drive(self, bench: Bench) -> None:
         """Run a bench to its end and tell of it, as `run_scenario` takes it."""
-        messages = SceneMessages(meta_of(bench.scenario, bench.parts.world, bench.note, is_at_port=False))
+        messages = SceneMessages(meta_of(bench.scenario, bench.parts.world, run_of(bench).note, is_at_port=False))
         for net in bench.parts.harness:
             self._send(messages.of(PinEdge(t=bench.now, wire=net.name, level=net.level(bench.now))))
         self._send(messages.anew(bench.now))

@@ -33,7 +33,7 @@ from robot_bench.recording.recorder import Recorder
 from robot_bench.recording.trace import TraceWriter
 from robot_bench.running.loop import RunLoop
 from robot_bench.running.pacer import PACED_SLICE_NS, RealTimePacer
-from robot_bench.scenario.goals.judging import GoalJudge, RunEnd
+from robot_bench.scenario.goals.judging import GoalJudge, Judgement, RunEnd
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.wires.chip_pins import ChipPins
 from robot_bench.wires.nets import OwnedPins
@@ -76,7 +76,7 @@ class RemoteBench:
         self.scenario = scenario
         self.trace = trace or TraceWriter()
         self.chip = chip = chip or boot(scenario)
-        self.note: str | None = "the pose is the robot's own odometry; collisions and clearance cannot be told"
+        self.note: str | None = "the pose is the robot's own odometry; collisions and clearance are not known"
         if scenario.changes:
             self.note += "; the scenario's obstacles are not placed"
         if scenario.parts:
@@ -155,6 +155,10 @@ class RemoteBench:
     def ended(self, at: Nanos) -> RunEnd:
         """Return what a run that ends at a time is to its goals."""
         return RunEnd(at, self.scenario.planned_ns, by_scenario=self.goals.has_ended_run)
+
+    def judge(self, end: Nanos) -> Judgement:
+        """Judge the goals, the run having been finished at a time."""
+        return self.goals.finish(self.ended(end))
 
     def finish(self) -> Nanos:
         """Write the rest of the trace; return the end's time."""

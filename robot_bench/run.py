@@ -27,7 +27,7 @@ from p2os.pioneer.world import known_worlds
 from p2os.pioneer.world.model import Pose, World
 from p2os.transport import Transport
 from p2os.transport.wall_clock import Clock, wall_clock
-from robot_bench.bench import Bench
+from robot_bench.bench import Bench, RobotRun, run_of
 from robot_bench.bench.board import pins_of
 from robot_bench.events.codec import Json
 from robot_bench.recording.run_folder import remove_run, reserved
@@ -139,7 +139,7 @@ def run_scenario(
         bench = Bench(scenario, trace=trace, slice_ns=PACED_SLICE_NS if pacer else None)
 
         bench.on_slice = _after_slice(bench, pacer, on_progress)
-        trace.meta(meta_of(scenario, bench.parts.world, bench.note, is_at_port=False))
+        trace.meta(meta_of(scenario, bench.parts.world, run_of(bench).note, is_at_port=False))
         with _measured(bench.chip, coverage=coverage, profile=profile, fail_under=fail_under) as measurement:
             return _record(bench, trace, folder, pacer, drive, measurement, is_kept, explained=explained, files=files)
 
@@ -199,16 +199,16 @@ def write_run(
         FileError: It cannot be written.
     """
     end = end_of_a_broken_run(bench.record(), failure) | {"trace_sha256": bench.trace.sha256}
-    goals = bench.goals.finish(bench.ended(bench.now))
+    goals = run_of(bench).judge(bench.now)
     end |= {"goals_met": goals.met, "goals_not_judged": goals.not_judged}
     if not failure:
         end |= {"passed": True, "failures": []}
     if explained:
         end |= {"explained": explained}
-    meta = meta_of(bench.scenario, bench.parts.world, bench.note, is_at_port=False)
+    meta = meta_of(bench.scenario, bench.parts.world, run_of(bench).note, is_at_port=False)
     with reserved(folder, force=True), contextlib.closing(TraceWriter(folder / TRACE_NAME)) as trace:
         trace.meta(meta)
-        trace.copy(bench.recorder.lines())
+        trace.copy(run_of(bench).recorder.lines())
         trace.end(end)
         return make_artefacts(folder, files).report
 
@@ -283,13 +283,13 @@ def _sha256_of(firmware: Path) -> str | None:
 
 @contextlib.contextmanager
 def _trace_of(scenario: Scenario, folder: Path, *, is_at_port: bool) -> Iterator[TraceWriter]:
-    """Open a folder's trace for a block; what leaves the block as an error is told of in the folder first."""
+    """Open a folder's trace for a block; what leaves the block as an error is reported in the folder first."""
     with contextlib.closing(TraceWriter(folder / TRACE_NAME)) as trace:
         try:
             yield trace
         except BaseException as error:
             if not trace.has_end:
-                with contextlib.suppress(P2osError):  # a disk that is full: the first failure is the one to be told
+                with contextlib.suppress(P2osError):  # a disk that is full: the first failure is the one to be reported
                     if not trace.has_meta:
                         trace.meta(meta_of(scenario, None, None, is_at_port=is_at_port))
                     trace.flush()
@@ -307,9 +307,15 @@ def _reason(error: BaseException) -> str:
     return unforeseen(error)
 
 
+def held(bench: Bench | RemoteBench) -> RobotRun | RemoteBench:
+    """Return what the runner holds of a bench: its recorder, its goals, its loop."""
+    return run_of(bench) if isinstance(bench, Bench) else bench
+
+
 def doing(bench: Bench | RemoteBench) -> str:
     """Return what the robot is doing, in a few words."""
-    state, text = bench.recorder.last_state, bench.recorder.last_line
+    recorder = held(bench).recorder
+    state, text = recorder.last_state, recorder.last_line
     wheels = "" if state is None else f"{state.left_speed_mps * 1000:+.0f} / {state.right_speed_mps * 1000:+.0f} mm/s"
     return f"{wheels}  {text}".strip()
 
@@ -411,7 +417,7 @@ def _conclude(
     if measurement is not None:
         measured = measurement.write(folder, bench.scenario.firmware.parent)
         failures += measurement.failures
-    goals = bench.goals.finish(bench.ended(end))
+    goals = held(bench).judge(end)
     passed = not failures and not goals.missed
     trace.end(
         _figures(bench, end, driven.wall_s)
@@ -460,7 +466,7 @@ def run_together(
         first = next(iter(benches.values()))
         first.on_slice = _after_slice(first, pacer, on_progress)
         for name, bench in benches.items():
-            meta = meta_of(bench.scenario, bench.parts.world, bench.note, is_at_port=False)
+            meta = meta_of(bench.scenario, bench.parts.world, run_of(bench).note, is_at_port=False)
             traces[name].meta(meta | {"robots": list(benches)})
         driven = _drive(first, pacer, None)
         passed = [_conclude(bench, traces[name], folder / name, pacer, driven) for name, bench in benches.items()]
@@ -503,7 +509,7 @@ def why_failed(bench: Bench | RemoteBench, failures: Sequence[str]) -> str:
 
 
 def _figures(bench: Bench | RemoteBench, end: Nanos, wall_s: float) -> Json:
-    recorder, virtual_s = bench.recorder, end / NS_PER_S
+    recorder, virtual_s = held(bench).recorder, end / NS_PER_S
     clearance = recorder.min_clearance_m
     return {
         "virtual_s": virtual_s,
@@ -519,7 +525,7 @@ def _figures(bench: Bench | RemoteBench, end: Nanos, wall_s: float) -> Json:
 def notes(bench: Bench | RemoteBench, end: Nanos, pacer: RealTimePacer | None) -> list[str]:
     """Return what a reader of the result should know besides the verdict."""
     chip = bench.chip
-    result = [note for note in (bench.note,) if note]
+    result = [note for note in (held(bench).note,) if note]
     if chip.verdict and not chip.has_died:
         result.append(chip.verdict)
     result += chip.warnings

@@ -2,8 +2,8 @@
 
 A file is loaded for a `simbase.trust.Code` that was admitted, and for no plain text: a name out of somebody's file
 becomes one by `Trust.admit`, and one that the caller gives himself by `own_code`.
-What is wrong with it is told in one line: a file that is not there or cannot be loaded, a name that nothing has, and
-which methods of the protocol a class lacks.
+What is wrong with it is reported in one line: a file that is not there or cannot be loaded, a name that nothing has,
+and which methods of the protocol a class lacks.
 Invariant: nothing of a file or a package is loaded before its class is asked for, and of a file only what was admitted.
 """
 

@@ -6,6 +6,7 @@ here may import only what its package's row allows.
 
 import ast
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterable
@@ -441,12 +442,11 @@ def test_every_part_of_a_package_has_its_layer() -> None:
 
 
 def circles(graph: dict[str, set[str]]) -> list[str]:
-    """Return the names that lead back to themselves."""
+    """Return the names that lead back to themselves, or stand between two that do."""
     left = {name: set(targets) & graph.keys() for name, targets in graph.items()}
-    while free := {name for name, targets in left.items() if not targets}:
+    while free := left.keys() - set().union(*left.values()) | {name for name, targets in left.items() if not targets}:
         left = {name: targets - free for name, targets in left.items() if name not in free}
-    entered = set().union(*left.values()) if left else set()
-    return sorted(name for name in left if name in entered)
+    return sorted(left)
 
 
 def test_no_modules_import_each_other_in_a_circle() -> None:
@@ -469,6 +469,115 @@ def test_no_neighbours_in_a_folder_import_each_other_in_a_circle() -> None:
 
 def test_the_judge_sees_a_circle() -> None:
     assert circles({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}, "e": set()}) == ["a", "b", "c"]
+
+
+#: Where the emulator's C stands, and of which folders the files of each may call functions.
+C_SOURCES = ROOT / "bluepill_sim" / "extension" / "source"
+C_FOLDERS = {"fabric": {"fabric"}, "devices": {"devices", "fabric"}, "core": {"core", "fabric"}}
+#: Ideas that are longer than a file: their files call each other; `core.h` and `tim.h` say what each has.
+C_IDEAS = {
+    "core": {f"core/{name}.c" for name in ("access", "blocks", "exceptions", "faults", "polling", "run", "scs")},
+    "timers": {f"devices/{name}.c" for name in ("tim", "tim_counter", "tim_inputs", "tim_outputs")},
+}
+
+C_NO_CODE = re.compile(r'/\*.*?\*/|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\])\'', re.DOTALL)
+C_MACRO = re.compile(r"^#define (\w+)\([^)]*\)((?:[^\n]*\\\n)*[^\n]*)", re.MULTILINE)
+C_FUNCTION = re.compile(
+    r"^(?P<head>[A-Za-z][^\n;={}#()]*\b)(?P<name>\w+)\([^;{}()]*(?:\([^()]*\)[^;{}()]*)*\)\s*\{(?P<body>[^\n]*\}$|.*?^\})",
+    re.MULTILINE | re.DOTALL,
+)
+C_DATA = re.compile(r"^(?!static|extern)(?:const )?struct \w+ (\w+)(?:\[\w*\])? = ", re.MULTILINE)
+#: A call, an address, a value of a field, a struct whose field is meant.
+C_USE = re.compile(r"(?<![\w.>])\w+(?=\()|(?<=&)\w+|(?<== )\w+(?=[,;}]|\s*\})|(?<![\w.>])\w+(?=\.)")
+
+
+def c_graph(texts: dict[str, str]) -> dict[str, set[str]]:
+    """Return each file of C with those that define what it uses, by itself or by what headers have it do."""
+    texts = {name: C_NO_CODE.sub(" ", text) for name, text in texts.items()}
+    owners: dict[str, str] = {}
+    inlined: dict[str, set[str]] = {}
+    own: dict[str, set[str]] = {name: set() for name in texts}
+    for name, text in texts.items():
+        inlined |= {macro: set(C_USE.findall(body)) for macro, body in C_MACRO.findall(text)}
+        owners |= dict.fromkeys(C_DATA.findall(text), name)
+        for found in C_FUNCTION.finditer(text):
+            if name.endswith(".h"):
+                inlined[found["name"]] = set(C_USE.findall(found["body"]))
+            elif "static" in found["head"].split():
+                own[name].add(found["name"])
+            else:
+                owners[found["name"]] = name
+    graph = {}
+    for name, text in texts.items():
+        if name.endswith(".c"):
+            used, left = set(own[name]), set(C_USE.findall(text)) - own[name]
+            while left:
+                used.add(word := left.pop())
+                left |= inlined.get(word, set()) - used
+            graph[name] = {owners[word] for word in used - own[name] if word in owners} - {name}
+    return graph
+
+
+@cache
+def emulator_graph() -> dict[str, set[str]]:
+    """Return what the files of the emulator's C use of each other."""
+    return c_graph({path.relative_to(C_SOURCES).as_posix(): path.read_text(encoding="utf-8")
+                    for path in C_SOURCES.rglob("*.[ch]")})  # fmt: skip
+
+
+def test_no_c_files_call_each_other_in_a_circle_but_those_of_one_idea() -> None:
+    ideas = {file: idea for idea, files in C_IDEAS.items() for file in files}
+    merged: dict[str, set[str]] = {}
+    for file, targets in emulator_graph().items():
+        idea = ideas.get(file, file)
+        merged.setdefault(idea, set()).update({ideas.get(target, target) for target in targets} - {idea})
+    assert circles(merged) == []
+
+
+@pytest.mark.parametrize("idea", C_IDEAS)
+def test_the_files_of_an_idea_in_c_are_no_more_than_call_each_other(idea: str) -> None:
+    files = C_IDEAS[idea]
+    assert set(circles({file: targets & files for file, targets in emulator_graph().items() if file in files})) == files
+
+
+def test_a_c_file_calls_nothing_of_a_folder_above_its_own() -> None:
+    wrong = [(file, target) for file, targets in emulator_graph().items() for target in targets
+             if target.partition("/")[0] not in C_FOLDERS[file.partition("/")[0]]]  # fmt: skip
+    assert wrong == []
+
+
+@pytest.mark.parametrize(
+    ("pins", "waves", "is_seen"),
+    [
+        ("void pins(void)\n{\n    show();\n}", "void show(void) { pins(); }", True),
+        ("void pins(void)\n{\n    shown();\n}", "void show(void) { pins(); }", True),
+        ("void pins(void)\n{\n    SHOWN(1);\n}", "void show(void) { pins(); }", True),
+        ("void pins(void) { wave_kind.event(); }", "struct kind wave_kind = {.event = pins};", True),
+        ("void pins(void) { show(); }", '/* pins(); */ void show(void) { put("pins()"); port->pins(); }', False),
+        ("void pins(void) { show(); }", "static void pins(void) { }\nvoid show(void) { pins(); }", False),
+    ],
+)  # fmt: skip
+def test_the_judge_sees_a_circle_in_c(pins: str, waves: str, is_seen: bool) -> None:
+    header = "static inline void shown(void)\n{\n    show();\n}\n#define SHOWN(x) \\\n    show()\n"
+    assert bool(circles(c_graph({"fabric.h": header, "pins.c": pins, "waves.c": waves}))) is is_seen
+
+
+@pytest.mark.soak
+@pytest.mark.skipif(shutil.which("nm") is None or shutil.which("gcc") is None, reason="needs gcc and nm")
+def test_the_judge_sees_in_c_what_the_linker_does(tmp_path: Path) -> None:
+    owners: dict[str, str] = {}
+    wanted: dict[str, set[str]] = {}
+    for file in emulator_graph():
+        made = tmp_path / f"{Path(file).stem}.o"
+        subprocess.run(["gcc", "-O1", "-std=c11", "-c", C_SOURCES / file, "-o", made], check=True)
+        listed = subprocess.run(["nm", made], capture_output=True, text=True, check=True).stdout
+        for kind, name in (line.split()[-2:] for line in listed.splitlines()):
+            if kind in set("TDBR"):
+                owners[name] = file
+            elif kind == "U":
+                wanted.setdefault(file, set()).add(name)
+    linked = {file: {owners[name] for name in wanted.get(file, ()) if name in owners} for file in emulator_graph()}
+    assert linked == emulator_graph()
 
 
 #: Rim speed of one step of a motor value, in mm/s, m/s and µm/s.

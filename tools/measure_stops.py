@@ -433,9 +433,9 @@ def drives(robot: ServedRobot) -> bool:
 
 def has_given_up(cable: Cable, driver: DrivingProgram) -> bool:
     """Tell whether the driver has ended, or has sent STOP after a speed: every way drives by VEL."""
-    told = [command for _, command in cable.since(0.0)]
-    speeds = [place for place, command in enumerate(told) if command.number == CommandNumber.VEL and command.integer]
-    is_stopped = any(command.number == CommandNumber.STOP for command in told[min(speeds, default=len(told)) :])
+    commands = [command for _, command in cable.since(0.0)]
+    speeds = [n for n, command in enumerate(commands) if command.number == CommandNumber.VEL and command.integer]
+    is_stopped = any(command.number == CommandNumber.STOP for command in commands[min(speeds, default=len(commands)) :])
     return is_stopped or driver.process.poll() is not None
 
 

@@ -425,9 +425,9 @@ def _second_client(served: Served) -> str:
         return "-"
     with socket.create_connection((parsed.host, parsed.port), 5) as line:
         line.settimeout(5)
-        told = line.recv(200)
-    if not told.startswith(b"busy"):
-        raise PeerError(f"a second client was told {told[:40]!r}")
+        answer = line.recv(200)
+    if not answer.startswith(b"busy"):
+        raise PeerError(f"a second client was told {answer[:40]!r}")
     return "told busy"
 
 

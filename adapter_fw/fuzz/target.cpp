@@ -1,10 +1,10 @@
 // What the fuzzer drives: a whole adapter with console, pins, pad, a robot of a few lines, and time.
 //
-// Theory of operation. The input is a program: each byte is a deed, what it needs
-// follows. The deeds are all that the outside world can do to an adapter: bytes on
+// Theory of operation. The input is a program: each byte is a action, what it needs
+// follows. The actions are all that the outside world can do to an adapter: bytes on
 // the line (any, or those of a robot, whole or damaged), levels on the pins, reports
 // of a pad, characters on the console, a change of masters, settings, and time. The
-// rules that must hold whatever happens are checked after each deed; a broken one
+// rules that must hold whatever happens are checked after each action; a broken one
 // traps, as a sanitizer's finding does.
 //
 //     clang++ -fsanitize=fuzzer,address,undefined …   searches (adapter_fw/fuzz/search.py)
@@ -85,13 +85,13 @@ class World final : private hal::PinsIn,
 
   void run() {
     while (!source_.is_empty()) {
-      deed();
+      action();
       check();
     }
   }
 
  private:
-  void deed() {
+  void action() {
     switch (source_.byte() % 12) {
       case 0:
         pins_ = source_.byte();

@@ -126,7 +126,7 @@ class CycleProfile:
         return sum(self.stacks.values())
 
     def functions(self) -> list[FunctionCost]:
-        """Return what each function costs, the dearest first."""
+        """Return what each function costs, the costliest first."""
         found: dict[str, FunctionCost] = {}
         for names, cycles in self.stacks.items():
             if not names:

@@ -1,4 +1,4 @@
-"""A profile for a person to read: functions by their cycles, the dearest first, and how long exceptions waited."""
+"""A profile for a person to read: functions by their cycles, the costliest first, and how long exceptions waited."""
 
 from collections.abc import Sequence
 

@@ -107,7 +107,7 @@ class CanSocket:
             where: an interface of SocketCAN; "udp:HOST:PORT" on a loopback address, "udp-open:HOST:PORT" on any;
                 or "unix:PATH".
             network: The board's.
-            on_frame: Told of each frame that has gone over.
+            on_frame: Called with each frame that has gone over.
 
         Raises:
             CanSocketError: It cannot be opened.

@@ -29,7 +29,7 @@ touched that is not modelled.
 
 \b
 Examples:
-  {program} profile mine.elf --for 5s             a table, the dearest first
+  {program} profile mine.elf --for 5s             a table, the costliest first
   {program} profile mine.elf --flame mine.svg     a flame graph, for any browser
   {program} profile mine.elf --folded mine.txt    stacks for other flame graph programs
 """

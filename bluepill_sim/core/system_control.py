@@ -1,6 +1,6 @@
 """The private peripheral bus (`extension/source/core/scs.c`): registers of SCB, NVIC, SysTick, DWT, DEMCR, DBGMCU.
 
-Here stands what C leaves to its caller: requests to the chip, warnings, what traps, and who is told of what.
+Here stands what C leaves to its caller: requests to the chip, warnings, what traps, and who is notified of what.
 The MPU is absent, as on the part: its registers read 0.
 
 Source: ARMv7-M Architecture Reference Manual B3.2 to B3.4 and C1; PM0056

@@ -140,7 +140,7 @@ _WIDE: tuple[tuple[int, int, Kind], ...] = (
     (0xFFE0_D000, 0xF3E0_8000, Kind.READ_SPECIAL),
     (0xFB80_D000, 0xF380_8000, Kind.PLAIN),  # the rest of the control space, no branch
     (0xF800_D000, 0xF000_8000, Kind.BRANCH),
-    (0xFFF0_00F0, 0xFB00_0000, Kind.MULTIPLY_ACCUMULATE),  # MUL is told by Ra = 15
+    (0xFFF0_00F0, 0xFB00_0000, Kind.MULTIPLY_ACCUMULATE),  # MUL is known by Ra = 15
     (0xFFF0_00F0, 0xFB00_0010, Kind.MULTIPLY_ACCUMULATE),  # MLS
     (0xFFD0_00F0, 0xFB90_00F0, Kind.DIVIDE),
     (0xFFD0_00F0, 0xFB80_0000, Kind.MULTIPLY_LONG),

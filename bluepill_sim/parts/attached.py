@@ -7,7 +7,7 @@ that the part can answer at once. A part with deadlines is brought to each of th
 earliest, to the first block boundary at or after it. What a part puts on a pin at a time to come (`drive_later`) is
 exact.
 
-Invariant: what a part does depends on its state and on what it was told with its times, not on the slices in which
+Invariant: what a part does depends on its state and on what came to it with its times, not on the slices in which
 the board runs.
 
 """
@@ -46,9 +46,9 @@ class PartError(BluePillError):
 class Use(Enum):
     """What a part does with a pin of its own."""
 
-    #: It is told of changes, in bulk.
+    #: It is notified of changes, in bulk.
     HEARD = "heard"
-    #: It is told of each change at the end of the block that made it.
+    #: It is notified of each change at the end of the block that made it.
     WATCHED = "watched"
     #: It drives the pin, or gives it volts, or reads its level when it is asked.
     HELD = "held"

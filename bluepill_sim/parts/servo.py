@@ -87,7 +87,7 @@ class Servo(Stateful):
 
     def words(self) -> str:
         """Return where it stands."""
-        return f"at {self.angle_deg:+.1f} deg, told {self.target_deg:+.1f} deg by {self.pulses} pulses"
+        return f"at {self.angle_deg:+.1f} deg, commanded {self.target_deg:+.1f} deg by {self.pulses} pulses"
 
     def _take(self, width_ns: Nanos, at_ns: Nanos) -> None:
         least_ns, most_ns = (us * _NS_PER_US for us in self._us)

@@ -398,7 +398,7 @@ class Can(Peripheral):
         for mailbox in self._lost:
             self._complete(mailbox, ALST)
         self._lost = ()
-        self._take_ends(now_ns)  # a chip that others have left behind is told of what is over
+        self._take_ends(now_ns)  # a chip that others have left behind is notified of what is over
         self._update()
         self.plan()
         if last is not None and last.is_own and last.error is CanError.ACKNOWLEDGE:

@@ -125,11 +125,11 @@ class Gpio(Peripheral):
         native = self.native
         held = [
             (pin, native.claimed_pc[pin.number])
-            for pin in self._of(native.claimed & ~native.told)
+            for pin in self._of(native.claimed & ~native.reported)
             if pin.holder is not None
         ]
         if held:
-            native.told |= sum(1 << pin.number for pin, _ in held)
+            native.reported |= sum(1 << pin.number for pin, _ in held)
             names = [pin.name for pin, _ in held]
             self.chip.warn(_held_pins([pin for pin, _ in held]), once=f"{' '.join(names)}:held", pc=held[0][1])
         native.claimed = 0

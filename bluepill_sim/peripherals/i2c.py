@@ -268,10 +268,10 @@ class I2c(Peripheral):
 
     def deliver(self) -> None:
         """Hand what was on the bus to the sinks."""
-        if told := self.fabric.take_words(self.slot):
+        if rows_sent := self.fabric.take_words(self.slot):
             rows = [
                 I2cSymbol(at_ns, I2cStep(word >> _STEP_AT), word & 0xFF, bool(word & _ACK))
-                for at_ns, word, *_ in SENT.iter_unpack(told)
+                for at_ns, word, *_ in SENT.iter_unpack(rows_sent)
             ]
             for sink in list(self._sinks):
                 sink(rows)

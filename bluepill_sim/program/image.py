@@ -159,7 +159,7 @@ class Image:
 
 
 def load_image(path: str | Path) -> Image:
-    """Read a firmware file; its kind is told by its contents.
+    """Read a firmware file; its kind is known by its contents.
 
     Raises:
         ImageError: it is missing, damaged, empty, too large, or not for this chip.

@@ -263,7 +263,7 @@ inline std::uint8_t stalled(std::uint8_t bit, double asked, double rim) {
 }
 
 // Answer Step: make each by `step(left, right, is_powered)`, then tell `report(out)` and the things that have `moved()`.
-// A touch is told where it begins; return whether the last step touches.
+// A touch is reported where it begins; return whether the last step touches.
 template <typename Step, typename Report, typename Moved>
 bool make_steps(Reader& in, Writer& out, bool touching, Step step, Report report, Moved moved) {
     const auto steps = in.take<std::uint32_t>();

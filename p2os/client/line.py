@@ -56,7 +56,7 @@ MOST_READS = 16
 #: chosen: the longest wait of a line that has nothing to do.
 LONGEST_WAIT_NS: Nanos = NS_PER_S // 2
 
-#: chosen: how often a noisy line is told of at most.
+#: chosen: how often a noisy line is reported at most.
 DROPS_LOG_NS: Nanos = NS_PER_S
 
 #: How many notices wait for a slow reader.
@@ -110,7 +110,7 @@ class Line:
         self._watch = GapWatch(self._looked_at)
         #: The core's time of the last turn.
         self._turned_at: Nanos = 0
-        #: Packets that were dropped on this connection, so far as the log knows, and when it was told.
+        #: Packets that were dropped on this connection, so far as the log knows, and when it was reported.
         self._logged_drops = 0
         self._logged_drops_at: Nanos = -DROPS_LOG_NS
         #: The owner is to open the line and to call `opened` or `failed`.
@@ -178,7 +178,7 @@ class Line:
                     pass  # the line has gone meanwhile
 
     def take_news(self) -> list[RobotState | Notice]:
-        """Return what the program has to be told, oldest first, and forget it."""
+        """Return what the program has to be notified of, oldest first, and forget it."""
         news = list(self.core.news)
         self.core.news.clear()
         return news

@@ -71,7 +71,7 @@ class PtyMaster:
 
 def _remove_left(link: Path) -> None:
     """Remove a link that a program left which was killed: its terminal is gone."""
-    with contextlib.suppress(OSError):  # it is told where the new one is made
+    with contextlib.suppress(OSError):  # it is reported where the new one is made
         if link.is_symlink() and not link.exists():
             link.unlink()
 

@@ -26,59 +26,30 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Self, Unpack, cast
 
-from adapter_sim.pinout import load_pinout
 from bluepill_sim.spans import Span, to_nanos
 from p2os.event_log import logger
-from p2os.pioneer.body.contract import RobotBody
-from p2os.pioneer.body.factory import body_note, make_body, make_scene
-from p2os.pioneer.controller import Pioneer
+from p2os.pioneer.body.factory import make_scene
 from p2os.pioneer.world import load_world
-from p2os.pioneer.world.model import Pose, World
-from robot_bench.adapter import RUN_ANEW, AnyAdapter
-from robot_bench.bench.board import (
-    boot,
-    do_by_hand,
-    hear_buses,
-    hear_usarts,
-    log_bench_event,
-    make_harness,
-    make_own_harness,
-    pins_of,
-    plug_in,
-)
+from p2os.pioneer.world.model import Pose
+from robot_bench.adapter import RUN_ANEW
 from robot_bench.bench.expectations import Expectations
-from robot_bench.bench.far_end import make_far_end
 from robot_bench.bench.interventions import Interventions
-from robot_bench.bench.origin import LATER, VERSION, origin_of, refuse_others
-from robot_bench.bench.waiting import EventWait
-from robot_bench.direct.differential.robot import DifferentialRobot
-from robot_bench.direct.senses import WorldSenses
-from robot_bench.events.codec import events_of
+from robot_bench.bench.origin import VERSION, refuse_others
+from robot_bench.bench.robot_run import RobotRun
 from robot_bench.events.stream import EventStream
-from robot_bench.recording.recorder import Recorder
 from robot_bench.recording.run_record import RunRecord, record_of
 from robot_bench.recording.trace import TraceWriter
-from robot_bench.running.loop import RunLoop
-from robot_bench.running.pacer import FIRST_SLICE_NS, SliceLength
-from robot_bench.running.shared_world import SharedRobot, SharedWorld
-from robot_bench.scenario.fault_script import LINK_DOWN, FaultScript
-from robot_bench.scenario.goals.judging import GoalJudge, Judgement, RunEnd
-from robot_bench.scenario.hand_script import Deed, HandScript
+from robot_bench.running.shared_world import SharedWorld
+from robot_bench.scenario.goals.judging import Judgement
 from robot_bench.scenario.scenario import (
     Scenario,
     ScenarioOptions,
     load_scenario,
-    refuse_what_its_world_refuses,
 )
-from robot_bench.scenario.when_script import WhenScript
-from robot_bench.scenario.world_script import WorldScript
-from robot_bench.wires.chip_pins import ChipPins
-from robot_bench.wires.line_ends import AdapterPart, ControllerPart
-from robot_bench.wires.nets import Harness
 from robot_bench.wires.ports import LeadingChip
 from simbase.errors import UsageError, shown
 from simbase.installation import installed_version
-from simbase.state import PartState, Stateful
+from simbase.state import PartState
 from simbase.timing import NS_PER_S, Nanos, Reached
 from simbase.trust import Trust
 
@@ -87,25 +58,16 @@ AFTER_FAULT_NS: Nanos = 1 * NS_PER_S
 _LOG = logger("bench")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BenchParts:
-    """The parts of a bench, for those who want to look at one."""
+@dataclass(frozen=True, slots=True)
+class _Whole:
+    """What the benches of several robots share: their world, the scenario with all of them, and each other."""
 
-    chip: LeadingChip
-    harness: Harness
-    body: RobotBody
-    world: World
-    adapter: AdapterPart | None = None
-    #: The robot's controller: the virtual Pioneer, or one of the user's.
-    controller: ControllerPart | None = None
-
-    @property
-    def pioneer(self) -> Pioneer | None:
-        """The controller, where it is the virtual Pioneer."""
-        return self.controller if isinstance(self.controller, Pioneer) else None
+    world: SharedWorld
+    scenario: Scenario
+    benches: "dict[str, Bench]"
 
 
-class Bench(Expectations, Interventions, Stateful):
+class Bench(Expectations, Interventions):
     """A firmware, its robot and its world, run in virtual time; `from_scenario` makes one.
 
     >>> bench = Bench.from_scenario("mine.toml", body="kinematic")  # doctest: +SKIP
@@ -120,21 +82,12 @@ class Bench(Expectations, Interventions, Stateful):
         slice_ns: How often the loop gives control back, in virtual time; without effect on the result. None: as often
             as the wall clock wants it.
         on_slice: Called after each slice with the time reached; may raise to end the run.
-        shared: The world that its robot shares with others; None: it is alone.
-        whole: The scenario with all of these.
 
     Raises:
         ScenarioError: The scenario's world refuses it, or its mode has not what it asks for.
         ImageError: The firmware is missing, damaged, or not for this chip.
         MissingDependencyError: The emulator or the body is not installed.
     """
-
-    STATE = (
-        "made_of", "chip", "_harness", "_robots", "_ranges", "script", "faults", "hands", "whens", "recorder", "goals",
-        "loop", "_senses", "_ends_at", "_has_told_death",
-    )  # fmt: skip
-    #: What the caller asked of this object; the lines, which are parts of the loop.
-    DERIVED = ("_lines", "_checkpoints", "_waits", "on_slice")
 
     def __init__(
         self,
@@ -144,74 +97,18 @@ class Bench(Expectations, Interventions, Stateful):
         chip: LeadingChip | None = None,
         slice_ns: Nanos | None = None,
         on_slice: Callable[[Nanos], None] | None = None,
-        shared: SharedWorld | None = None,
-        whole: Scenario | None = None,
+        _whole: _Whole | None = None,
     ) -> None:
-        self.scenario = scenario
-        self.trace = trace or TraceWriter()
-        self.on_slice = on_slice
-        self._shared = shared
-        self._whole = whole or scenario
-        pinout = load_pinout()
-        world = load_world(scenario.world, seed=scenario.seed)
-        refuse_what_its_world_refuses(scenario, world)
-        _refuse_several(scenario)
-        body = body_of(scenario, world) if shared is None else shared.body_of(scenario.name)
+        self._whole = _whole
         self._is_rebuildable = chip is None
-        chip = chip or boot(scenario)
-        own = scenario.own_robot
-        self._harness = harness = make_harness(pinout) if own is None else make_own_harness(own.robot.signals)
-        self.recorder = Recorder(self.trace, harness, body=body)
-        self.recorder.on_event = log_bench_event
+        self._run = RobotRun(
+            scenario, trace=trace, chip=chip, slice_ns=slice_ns, on_slice=on_slice,
+            shared=None if _whole is None else _whole.world,
+        )  # fmt: skip
+        #: What runs, and where its recording goes; the parts.
+        self.scenario, self.trace, self.parts = scenario, self._run.trace, self._run.parts
         #: States that `rewind` may go back to, oldest first: times and snapshots.
         self._checkpoints: list[tuple[Nanos, object]] = []
-        self._waits = EventWait(self.events, self.trace, harness)
-        far_end = make_far_end(scenario, pinout, body, chip, harness, self.recorder, is_among_others=shared is not None)
-        #: What stands at the far end of the wires and owns the body.
-        self._robots = far_end.robots
-        self._lines, self._ranges = far_end.lines, far_end.ranges
-        self.parts = BenchParts(
-            chip=chip, harness=harness, body=body, world=world, adapter=far_end.adapter, controller=far_end.controller
-        )
-        #: What must be the same where a snapshot of this bench is restored.
-        self.made_of = origin_of(scenario, world, chip)
-        self.script = WorldScript(
-            scenario.changes, body, scenario.parameters,
-            bring_to=self._bring_robot_to, on_change=self.recorder.obstacle,
-        )  # fmt: skip
-        self.recorder.bring_to = self._bring_robot_to
-        self.faults = FaultScript(scenario.faults, bring_to=self._bring_robot_to, do=self._inject)
-        #: What parts on the board sense of the world; none where nothing is plugged in.
-        self._senses = self._plug_in(chip) if scenario.parts else ()
-        self.hands = HandScript(bring_to=self._bring_robot_to, do=self._do_by_hand)
-        followers = (*self._robots, self.script, self.faults, self.hands, *self._senses)
-        self._slices = SliceLength() if slice_ns is None else None
-        self.loop = RunLoop(
-            chip, followers, observers=(self.recorder,), slice_ns=slice_ns or FIRST_SLICE_NS,
-            on_slice=self._after_slice, choose_watched=self._watch_wires,
-        )  # fmt: skip
-        #: When a goal's verdict or a `[[when]]` ends the run; None while none does.
-        self._ends_at: Nanos | None = None
-        self._has_told_death = False
-        self.whens = WhenScript(
-            scenario.whens, on_end=self._end_at,
-            on_change=lambda changes: self.script.add(*changes), on_fault=lambda faults: self.faults.add(*faults),
-            on_deed=lambda deeds: self.hands.add(*deeds),
-        )  # fmt: skip
-        self.whens.subscribe(self.events)
-        self.goals = GoalJudge(scenario.goals)
-        self.goals.on_end = lambda: self._end_at(self.loop.now)
-        self.goals.subscribe(self.events)
-        pin_of = pins_of(scenario)
-        self._pins = ChipPins(chip, harness, pin_of, on_watched=self.loop.note_edge, now=lambda: self.loop.led)
-        if isinstance(self.parts.adapter, AnyAdapter):
-            self.parts.adapter.wait_for_edges()
-        chip.usart1.far_baud = scenario.usart_baud
-        hear_usarts(chip, self.recorder)
-        hear_buses(chip, self.recorder, scenario.record)
-        chip.subscribe_warnings(lambda text: self.recorder.event("chip", chip.now_ns, "warning", text))
-        self.recorder.start()
-        self._join_others()
         self._listeners = self.events.listeners()
 
     @classmethod
@@ -259,31 +156,26 @@ class Bench(Expectations, Interventions, Stateful):
         for robot, body in zip(scenario.robots, scene.bodies, strict=True):
             body.is_powered = robot.scenario is not None
         shared = SharedWorld(scene, [robot.name for robot in scenario.robots])
-        return {
-            robot.name: cls(
-                robot.scenario, trace=(traces or {}).get(robot.name), slice_ns=slice_ns, shared=shared, whole=scenario
-            )
-            for robot in scenario.robots if robot.scenario is not None
-        }  # fmt: skip
+        whole = _Whole(shared, scenario, {})
+        for robot in scenario.robots:
+            if robot.scenario is not None:
+                trace = (traces or {}).get(robot.name)
+                whole.benches[robot.name] = cls(robot.scenario, trace=trace, slice_ns=slice_ns, _whole=whole)
+        return cast("dict[str, Self]", whole.benches)
 
     @property
     def robots(self) -> Mapping[str, "Bench"]:
         """The benches of all robots of its world that have a chip, by name; alone in its world, itself."""
-        if self._shared is None:
-            return {self.scenario.name: self}
-        return cast("Mapping[str, Bench]", self._shared.members)
+        return {self.scenario.name: self} if self._whole is None else self._whole.benches
 
-    def _join_others(self) -> None:
-        """Have the body stepped with those of other robots, and these in the trace among the things of the world."""
-        if self._shared is None:
-            return
-        robot = self._robots[-1]
-        if isinstance(robot, DifferentialRobot):
-            robot.is_stepped_by_others = True
-        self._shared.join(self.scenario.name, self, cast("SharedRobot", self.parts.pioneer or robot))
-        for body in self._shared.scene.bodies:
-            if body is not self.parts.body:
-                self.recorder.watch_robot(body)
+    @property
+    def on_slice(self) -> Callable[[Nanos], None] | None:
+        """What is called after each slice with the time reached, ns; it may raise to end the run."""
+        return self._run.on_slice
+
+    @on_slice.setter
+    def on_slice(self, called: Callable[[Nanos], None] | None) -> None:
+        self._run.on_slice = called
 
     def __repr__(self) -> str:
         what = self.scenario
@@ -292,7 +184,7 @@ class Bench(Expectations, Interventions, Stateful):
     @property
     def events(self) -> EventStream:
         """What happens, for whoever subscribes; it lags up to 50 ms behind `now`."""
-        return self.recorder.events
+        return self._run.events
 
     @property
     def chip(self) -> LeadingChip:
@@ -300,85 +192,58 @@ class Bench(Expectations, Interventions, Stateful):
         return self.parts.chip
 
     @property
-    def note(self) -> str | None:
-        """Return what a reader of the result has to know of the body."""
-        return "; ".join(filter(None, (body_note(self.scenario.body), self.parts.body.note))) or None
-
-    @property
     def end(self) -> Nanos:
         """Return when the run ends, as far as is known now; of several robots with the first that ends."""
-        return self.own_end if self._shared is None else self._shared.end
-
-    @property
-    def own_end(self) -> Nanos:
-        """Return when the run would end if this robot were alone."""
-        died_ns, ends = self.chip.died_ns, [self.scenario.duration_ns]
-        if died_ns is not None:
-            ends.append(died_ns + AFTER_FAULT_NS)
-        return min(ends if self._ends_at is None else [*ends, self._ends_at])
-
-    def ended(self, at: Nanos) -> RunEnd:
-        """Return what a run that ends at a time is to its goals; several robots end together, by any of them."""
-        ends = [robot._ends_at for robot in self.robots.values()]  # noqa: SLF001 # benches of one world
-        by_scenario = any(end is not None and end <= at for end in ends)
-        return RunEnd(at, self.scenario.planned_ns, by_scenario=by_scenario)
+        return self._run.whole_end
 
     @property
     def now(self) -> Nanos:
         """Return the time that the chip has come to."""
-        return self.parts.chip.now_ns
-
-    @property
-    def _reached(self) -> Nanos:
-        """The time that the robot may be brought to: the chip's own, or that of all."""
-        return self.now if self._shared is None else min(self.now, self._shared.now)
+        return self._run.now
 
     @property
     def pose(self) -> Pose:
         """Where the robot is now: metres and radians of the world's plan."""
-        self._bring_robot_to(self._reached)
+        self._run.bring_robot_to(self._run.reached)
         state = self.parts.body.state
         return Pose(state.x_m, state.y_m, state.heading_rad, state.z_m)
 
     @property
     def text(self) -> str:
         """All that the firmware has printed on USART1 so far, undecodable bytes replaced."""
-        printed = record_of(line for line in self.recorder.lines() if '"k":"usart"' in line)
-        pieces = [*(data for _, data in printed.usart), self.recorder.unfinished_text]
+        printed = record_of(line for line in self._run.recorder.lines() if '"k":"usart"' in line)
+        pieces = [*(data for _, data in printed.usart), self._run.recorder.unfinished_text]
         return b"".join(pieces).decode("utf-8", "replace")
 
     def record(self) -> RunRecord:
         """Return what was recorded so far: poses, edges, texts, packets and the state log, each with its time."""
-        return record_of(self.recorder.lines())
+        return record_of(self._run.recorder.lines())
 
     def judge(self) -> Judgement:
         """End the run here and judge the scenario's goals; what an unfinished run could still meet is left open.
 
         Of several robots the goals of all, each with the robot's name before it.
         """
-        if self._shared is None:
-            return self.judge_own()
-        found = {name: bench.judge_own() for name, bench in self.robots.items()}
+        end = self.finish()
+        found = {name: run_of(bench).judge(end) for name, bench in self.robots.items()}
+        if self._whole is None:
+            return found[self.scenario.name]
         return Judgement(*(
             [f"{name}: {goal}" for name, one in found.items() for goal in getattr(one, field.name)]
             for field in fields(Judgement)
         ))  # fmt: skip
 
-    def judge_own(self) -> Judgement:
-        """End the run here and judge the goals of this robot."""
-        return self.goals.finish(self.ended(self.finish()))
-
     def _run_to(self, wanted: Nanos, advance: Callable[[int], Reached] | None = None) -> None:
         end_ns = min(wanted, self.end)
-        if end_ns > self.now and self.events.released_until >= self.now:
-            raise UsageError(f"the run was ended at {self.now / NS_PER_S:g} s", hint="make another Bench")
+        if end_ns > self.now:
+            self._run.refuse_the_ended()
         had_died = self.chip.has_died
-        if self._shared is None:
-            self.loop.run_until(end_ns, advance)
+        if self._whole is None:
+            self._run.loop.run_until(end_ns, advance)
         elif advance is not None:
             raise UsageError("a debugger's steps are for a robot alone in its world", hint="a scenario with one robot")
         else:
-            self._shared.run_to(end_ns)
+            self._whole.world.run_to(end_ns)
         if self.chip.has_died and not had_died:
             _LOG.error("chip: %s", self.chip.verdict)
 
@@ -430,10 +295,10 @@ class Bench(Expectations, Interventions, Stateful):
 
     def _anew(self) -> "Bench":
         """Return a bench of the same at its beginning, with its trace in memory."""
-        slice_ns = self.loop.slice_ns if self._slices is None else None
-        if self._shared is None:
+        slice_ns = self._run.slice_ns
+        if self._whole is None:
             return Bench(self.scenario, slice_ns=slice_ns)
-        return Bench.together(self._whole, slice_ns=slice_ns)[self.scenario.name]
+        return Bench.together(self._whole.scenario, slice_ns=slice_ns)[self.scenario.name]
 
     def _at_beginning(self) -> object:
         """Return the snapshot of this bench at time 0, whose trace has no more than its first line."""
@@ -455,7 +320,7 @@ class Bench(Expectations, Interventions, Stateful):
 
     def _own_parts(self, snapshot: object) -> Sequence[object]:
         """Return the parts of a snapshot that are each robot's own, in the order of `robots`."""
-        return [snapshot] if self._shared is None else cast("dict[str, Sequence[object]]", snapshot)["_own"]
+        return [snapshot] if self._whole is None else cast("dict[str, Sequence[object]]", snapshot)["_own"]
 
     def _refuse_a_chip_of_others(self) -> None:
         if not self._is_rebuildable:
@@ -463,26 +328,14 @@ class Bench(Expectations, Interventions, Stateful):
 
     def finish(self) -> Nanos:
         """Bring everything to the end of the run and write the rest of the trace; return the end's time."""
-        end = min(self._reached, self.end)
+        end = min(self._run.reached, self.end)
         for bench in self.robots.values():
-            bench.finish_own(end)
+            run_of(bench).finish(end)
         return end
-
-    def finish_own(self, end: Nanos) -> None:
-        """Bring the parts of this robot to the end of the run and write the rest of its trace."""
-        if self.events.released_until >= end:
-            return
-        self.loop.finish(end)
-        self.goals.end_at(self.ended(end))
-        self.recorder.finish(end)
 
     def snapshot(self) -> PartState:
         """Return all that decides the future, of all robots of its world, as a value."""
-        return self.own_snapshot() if self._shared is None else self._shared.snapshot()
-
-    def own_snapshot(self) -> PartState:
-        """Return what is this robot's own of it."""
-        return super().snapshot()
+        return self._run.snapshot() if self._whole is None else self._whole.world.snapshot()
 
     def restore(self, snapshot: object) -> None:
         """Put back what `snapshot` returned, the trace too; the end of the run and its goals may be others.
@@ -494,41 +347,11 @@ class Bench(Expectations, Interventions, Stateful):
         """
         parts = self._own_parts(snapshot) if isinstance(snapshot, PartState) and "_own" in snapshot else [snapshot]
         for part, bench in zip(parts, self.robots.values(), strict=False):
-            made_of = part.get("made_of") if isinstance(part, PartState) else None
-            if isinstance(made_of, dict):
-                refuse_others(made_of, bench.made_of)
-        if self._shared is None:
-            self.restore_own(snapshot)
+            run_of(bench).refuse(part)
+        if self._whole is None:
+            self._run.restore(snapshot)
         else:
-            self._shared.restore(snapshot)
-
-    def begin_as(self, snapshot: PartState, now: Nanos) -> None:
-        """Put back what the bench of another scenario saved, which is the same as this one but for what comes later.
-
-        Args:
-            snapshot: As of `snapshot`.
-            now: When it was taken. Things that come later, and faults, are this bench's own.
-
-        Raises:
-            UsageError: It has several robots; or up to that time the two are not the same.
-        """
-        if self._shared is not None:
-            raise UsageError("robots that share a world begin at the beginning", hint="run it anew")
-        made_of = cast("dict[str, object]", snapshot["made_of"])
-        refuse_others({what: value for what, value in made_of.items() if what not in LATER}, self.made_of)
-        script, faults = (
-            timeline.begun_as(cast("PartState", snapshot[name]), now)
-            for name, timeline in (("script", self.script), ("faults", self.faults))
-        )
-        self.restore(PartState(snapshot, made_of=self.made_of, script=script, faults=faults))
-
-    def restore_own(self, snapshot: object) -> None:
-        """Put back what `own_snapshot` returned, as `restore` asks for it."""
-        super().restore(snapshot)
-        self._pins.chip_restored()
-        self._waits.forget()
-        if self.goals.is_behind:
-            self.goals.catch_up(events_of(self.trace.lines()), self.events.released_until)
+            self._whole.world.restore(snapshot)
 
     def __reduce__(self) -> "tuple[Callable[[str, bytes], Bench], tuple[str, bytes]]":
         if not self._is_rebuildable:
@@ -538,65 +361,14 @@ class Bench(Expectations, Interventions, Stateful):
             if not bench.trace.has_end:
                 bench.trace.flush()
             paths[name] = None if bench.trace.path is None else bench.trace.path.absolute()
-        slice_ns = self.loop.slice_ns if self._slices is None else None
-        recipe = pickle.dumps((self._whole, self.scenario.name, slice_ns, paths, self.snapshot()))
+        whole = self.scenario if self._whole is None else self._whole.scenario
+        recipe = pickle.dumps((whole, self.scenario.name, self._run.slice_ns, paths, self.snapshot()))
         return _built_anew, (installed_version(), recipe)
 
-    def _watch_wires(self, now: Nanos) -> None:
-        """Let an edge end the chip's slice where a part may change an input before its own next deadline."""
-        if self.parts.adapter is not None:
-            self._pins.watch(self.parts.adapter.wakes_on, now)
 
-    def _after_slice(self, now: Nanos) -> None:
-        if self._slices is not None:
-            self.loop.slice_ns = self._slices.after_slice()
-        died_ns = self.chip.died_ns
-        if died_ns is not None or self.chip.fault is not None:
-            self.loop.end_at(self.end)
-        if died_ns is not None and not self._has_told_death:
-            self._has_told_death = True
-            self.recorder.fault("died", self.chip.verdict, died_ns)
-        if self.on_slice is not None:
-            self.on_slice(now)
-
-    def _bring_robot_to(self, at: Nanos) -> None:
-        for robot in self._robots:
-            robot.advance_to(at)
-
-    def _end_at(self, at: Nanos) -> None:
-        """End the run at a time, if nothing ends it before."""
-        self._ends_at = at if self._ends_at is None else min(at, self._ends_at)
-        self.loop.end_at(self.end)
-
-    def _inject(self, words: str, at: Nanos) -> None:
-        op, _, fault = words.partition(" ")
-        self.recorder.fault("inject" if op == "fault" else op, fault, at)
-        if fault == LINK_DOWN:
-            for line in self._lines:
-                line.is_cut = op == "fault"
-        elif self.parts.controller is not None:
-            self.parts.controller.do(words, at)
-
-    def _do_by_hand(self, deed: Deed) -> None:
-        self.recorder.event(deed.who, deed.at, deed.do, deed.words)
-        do_by_hand(deed, self.chip, self.parts.harness)
-
-    def _plug_in(self, chip: LeadingChip) -> tuple[WorldSenses, ...]:
-        """Attach the scenario's parts to the board, and have them sense the world."""
-        senses = WorldSenses(self.parts.body, self._bring_robot_to)
-        plug_in(self.scenario, chip, self.recorder, senses)
-        return (senses,)
-
-
-def body_of(scenario: Scenario, world: World) -> RobotBody:
-    """Return the body of a scenario's robot alone in a world, standing where it begins."""
-    start = scenario.start or world.start
-    return make_body(scenario.body, world, scenario.parameters, start=start, seed=scenario.seed, trust=False)
-
-
-def _refuse_several(scenario: Scenario) -> None:
-    if scenario.robots:
-        raise TypeError("a scenario with several robots has a bench each: Bench.from_scenario, or Bench.together")
+def run_of(bench: Bench) -> RobotRun:
+    """Return what runs a bench's own robot, for what runs, judges and debugs benches: no promise to users."""
+    return bench._run  # noqa: SLF001  # the one way to it
 
 
 def _built_anew(saved_by: str, recipe: bytes) -> Bench:

@@ -14,7 +14,7 @@ from p2os.toml_schema import placed, within
 from robot_bench.direct.wired import AnalogPin, RobotWire
 from robot_bench.recording.recorder import Recorder
 from robot_bench.recording.transfers import hear_bus
-from robot_bench.scenario.hand_script import Deed
+from robot_bench.scenario.hand_script import Action
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.wires.nets import Harness, Net, Strength
 from robot_bench.wires.ports import LeadingChip
@@ -128,15 +128,15 @@ def make_harness(pinout: Pinout) -> Harness:
     return harness
 
 
-def do_by_hand(deed: Deed, chip: LeadingChip, harness: Harness) -> None:
+def do_by_hand(action: Action, chip: LeadingChip, harness: Harness) -> None:
     """Have a hand do something at the board, now."""
-    if deed.do == "type":
-        getattr(chip, deed.place).receive(deed.text)
-    elif deed.do == "set_volts":
-        cast("AnalogPin", chip.pin(deed.place)).set_volts(deed.volts)
-    elif deed.place not in [net.name for net in harness]:
-        chip.pin(deed.place).drive(deed.level)
-    elif deed.level is None:
-        harness[deed.place].release(BY_HAND, deed.at)
+    if action.do == "type":
+        getattr(chip, action.place).receive(action.text)
+    elif action.do == "set_volts":
+        cast("AnalogPin", chip.pin(action.place)).set_volts(action.volts)
+    elif action.place not in [net.name for net in harness]:
+        chip.pin(action.place).drive(action.level)
+    elif action.level is None:
+        harness[action.place].release(BY_HAND, action.at)
     else:
-        harness[deed.place].drive(BY_HAND, deed.level, Strength.PUSH_PULL, deed.at)
+        harness[action.place].drive(BY_HAND, action.level, Strength.PUSH_PULL, action.at)

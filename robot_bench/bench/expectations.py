@@ -12,23 +12,19 @@ from typing import Self
 
 from bluepill_sim.spans import Span, to_nanos
 from p2os.pioneer.world.model import Pose
-from robot_bench.bench.waiting import AwaitedRun
+from robot_bench.bench.robot_run import RunningBench
 from robot_bench.events.codec import events_of
 from robot_bench.events.expectation import ExpectationError
 from robot_bench.events.kinds import Event
 from robot_bench.events.selection import SELECTORS, Wires, bus_of, select, wire_named
 from robot_bench.events.words import last_words
-from robot_bench.recording.recorder import SAMPLE_NS, Recorder
-from robot_bench.wires.nets import Harness
+from robot_bench.recording.recorder import SAMPLE_NS
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, NS_PER_US, Nanos, Reached
 
 
-class Expectations(AwaitedRun):
+class Expectations(RunningBench):
     """A run of which events, levels, texts and places can be expected."""
-
-    recorder: Recorder
-    _harness: Harness
 
     @property
     @abstractmethod
@@ -53,7 +49,7 @@ class Expectations(AwaitedRun):
         Raises:
             UsageError: There is no such wire.
         """
-        return self._harness[wire_named(wire, self._wires)].level(self.now)
+        return self._run.harness[wire_named(wire, self._wires)].level(self.now)
 
     @property
     def _wires(self) -> Wires | None:
@@ -110,8 +106,8 @@ class Expectations(AwaitedRun):
         selector = select(words, self._wires)
         if (bus := bus_of(words)) and bus not in self.scenario.record:
             raise UsageError(f"{bus} is not recorded", hint=f'record = ["{bus}"] in the scenario')
-        limit = self._limit(within, self._waits.since(self.now))
-        return self._waits.wait(selector, limit, lambda: self.now, self._step_until)
+        limit = self._limit(within, self._run.waits.since(self.now))
+        return self._run.waits.wait(selector, limit, lambda: self.now, self._step_until)
 
     def expect(self, words: str, within: Span | None = None) -> Event:
         """Run until an event happens and return it.
@@ -125,7 +121,7 @@ class Expectations(AwaitedRun):
             ExpectationError: It did not happen; the message has the last events.
             UsageError: The words mean no events.
         """
-        since = self._waits.since(self.now)
+        since = self._run.waits.since(self.now)
         found = self._wait_for(words, within)
         if found is None:
             raise self._unmet(f"{words!r} did not happen", since, self._limit(within, since))
@@ -138,7 +134,7 @@ class Expectations(AwaitedRun):
             ExpectationError: It happened.
             UsageError: The words mean no events.
         """
-        since = self._waits.since(self.now)
+        since = self._run.waits.since(self.now)
         found = self._wait_for(words, during)
         if found is not None:
             raise self._unmet(f"{words!r} happened at {found.t / NS_PER_S:.3f} s", since)
@@ -206,4 +202,4 @@ class Expectations(AwaitedRun):
 
     def last_events(self, count: int = 8) -> list[str]:
         """Return what happened last, a line each with its time; poses, edges, packets and ranges aside."""
-        return last_words(events_of(self.recorder.lines()), count)
+        return last_words(events_of(self._run.recorder.lines()), count)

@@ -62,7 +62,7 @@ def make_far_end(
         body: What moves.
         chip: Its analog pins are those of a robot on own pins.
         harness: The wires.
-        recorder: Is told all.
+        recorder: Gets all.
         is_among_others: Whether other robots are in its world.
 
     Raises:
@@ -82,7 +82,7 @@ def make_far_end(
 def _refuse_faults(scenario: Scenario) -> None:
     where = scenario.where or scenario.name
     places = [within(where, "fault", 0)] if scenario.faults else []
-    places += [within(where, "when", number) for number, when in enumerate(scenario.whens) if when.faults]
+    places += [within(where, "when", number) for number, when in enumerate(scenario.triggers) if when.faults]
     if places:
         raise ScenarioError(
             f"{places[0]}: a fault acts on the robot's controller, and mode direct has none", hint="--mode adapter"

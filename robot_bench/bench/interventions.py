@@ -10,29 +10,18 @@ from typing import TypeVar
 
 from bluepill_sim.spans import Span, to_nanos
 from p2os.errors import ScenarioError
-from robot_bench.bench.waiting import AwaitedRun
-from robot_bench.events.stream import EventStream
-from robot_bench.scenario.fault_script import LINK_DOWN, FaultChange, FaultScript, load_faults
-from robot_bench.scenario.hand_script import Deed, HandScript
+from robot_bench.bench.robot_run import RunningBench
+from robot_bench.scenario.fault_script import LINK_DOWN, FaultChange, load_faults
 from robot_bench.scenario.timeline import TimedAction, Timeline
-from robot_bench.scenario.world_script import WorldScript, load_changes
-from simbase.errors import UsageError, shown
+from robot_bench.scenario.world_script import load_changes
+from simbase.errors import shown
 from simbase.timing import NS_PER_S
 
 T = TypeVar("T", bound=TimedAction)
 
 
-class Interventions(AwaitedRun):
+class Interventions(RunningBench):
     """A run that can be changed from outside."""
-
-    script: WorldScript
-    faults: FaultScript
-    hands: HandScript
-
-    @property
-    @abstractmethod
-    def events(self) -> EventStream:
-        """What happens."""
 
     @abstractmethod
     def checkpoint(self) -> None:
@@ -79,7 +68,7 @@ class Interventions(AwaitedRun):
         if during is not None:
             table["for_s"] = to_nanos(during) / NS_PER_S
         changes = load_faults([table], self.scenario.parameters, "inject")
-        self._intervene(self.faults, [replace(change, at=self.now + change.at) for change in changes])
+        self._intervene(self._run.faults, [replace(change, at=self.now + change.at) for change in changes])
 
     def clear(self, words: str) -> None:
         """Set right again what `inject` did.
@@ -88,7 +77,7 @@ class Interventions(AwaitedRun):
             ScenarioError: The bench is in mode direct.
         """
         self._refuse_faults_in_mode_a()
-        self._intervene(self.faults, [FaultChange(self.now, f"clear {words}")])
+        self._intervene(self._run.faults, [FaultChange(self.now, f"clear {words}")])
 
     def press(self, button: str, during: Span | None = None) -> None:
         """Press a button of the robot now: "stop-button", or a bumper such as "bumper front 1".
@@ -110,30 +99,14 @@ class Interventions(AwaitedRun):
 
     def _change_world(self, table: dict[str, object]) -> None:
         changes = load_changes([{"at_s": 0, **table}], self.scenario.parameters, str(table["name"]), are_later=True)
-        self._intervene(self.script, [replace(change, at=self.now + change.at) for change in changes])
+        self._intervene(self._run.script, [replace(change, at=self.now + change.at) for change in changes])
 
     def _intervene(self, script: Timeline[T], changes: Sequence[T]) -> None:
         """Add changes to what a scenario has; `rewind` will not go on through them, but begin after them."""
-        self._refuse_the_ended()
-        self._waits.forget()
+        self._run.refuse_the_ended()
+        self._run.waits.forget()
         script.add(*changes, now=self.now)
         self.checkpoint()
-
-    def take_inputs(self, deeds: Sequence[Deed]) -> None:
-        """Take what comes in from outside, to be done at its times, which are after now; the trace notes each.
-
-        `rewind` forgets what came in after the state that it goes back to.
-
-        Raises:
-            UsageError: The run has been judged, or finished.
-        """
-        self._refuse_the_ended()
-        self._waits.forget()
-        self.hands.add(*deeds)
-
-    def _refuse_the_ended(self) -> None:
-        if self.events.released_until >= self.now:
-            raise UsageError(f"the run was ended at {self.now / NS_PER_S:g} s", hint="make another Bench")
 
     def _refuse_faults_in_mode_a(self) -> None:
         if self.scenario.mode == "direct":

@@ -1,12 +1,11 @@
 """Waits for an event of a bench, from the one on that was waited for last.
 
-A bench stands up to 50 ms after the event that it has waited for. What happens next may be told by then already,
+A bench stands up to 50 ms after the event that it has waited for. What happens next may be reported by then already,
 and is in the trace; so each step notes where the trace stood before it, and a next wait reads on from there.
 
 Invariant: what is found depends on the times of the events alone, not on where the bench stands.
 """
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 
@@ -16,7 +15,6 @@ from robot_bench.events.selection import Selector
 from robot_bench.events.stream import EventStream
 from robot_bench.recording.recorder import SAMPLE_NS
 from robot_bench.recording.trace import TraceWriter
-from robot_bench.scenario.scenario import Scenario
 from robot_bench.wires.nets import Harness
 from simbase.timing import Nanos
 
@@ -58,12 +56,12 @@ class EventWait:
                 found.append(event)
 
         if since < now():
-            for event in self._told_since_mark():
+            for event in self._reported_since_mark():
                 if type(event) in selector.kinds:
                     take(event)
         end = self._events.subscribe(take, *selector.kinds, wires=selector.wires)
         try:
-            # What happened until the limit is told at the pose after it.
+            # What happened until the limit is reported at the pose after it.
             step_until(lambda: bool(found), -(-limit // SAMPLE_NS) * SAMPLE_NS, self._mark_here)
         finally:
             end()
@@ -71,27 +69,15 @@ class EventWait:
         return found[0] if found else None
 
     def _mark_here(self) -> None:
-        """Note where the trace stands: what is told from now on begins there."""
-        told = self._events.released_until
-        levels = bytearray(not net.wave(told) and net.level(told) for net in self._nets) if told >= 0 else bytearray()
+        """Note where the trace stands: what is reported from now on begins there."""
+        at = self._events.released_until
+        levels = bytearray(not net.wave(at) and net.level(at) for net in self._nets) if at >= 0 else bytearray()
         names = tuple(net.name for net in self._nets)
         self._mark = (self._trace.length, Blocks(names, levels)) if levels else None
 
-    def _told_since_mark(self) -> Iterable[Event]:
+    def _reported_since_mark(self) -> Iterable[Event]:
         """Return the events of the last step."""
         if self._mark is None:
             return events_of(self._trace.lines())
         length, blocks = self._mark
         return events_of(self._trace.lines(length), begun=replace(blocks, levels=bytearray(blocks.levels)))
-
-
-class AwaitedRun(ABC):
-    """A run whose events can be waited for."""
-
-    scenario: Scenario
-    _waits: EventWait
-
-    @property
-    @abstractmethod
-    def now(self) -> Nanos:
-        """Return the time that the chip has come to."""

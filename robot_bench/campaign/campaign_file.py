@@ -208,7 +208,7 @@ class Campaign:
     trial: Trial
     search: str = "sobol"
     seed: int = 0
-    #: chosen: so many are asked for before any is told of; the set of runs depends on it, not on the workers.
+    #: chosen: so many are asked for before any is reported; the set of runs depends on it, not on the workers.
     batch: int = 16
     #: Of each batch so many that passed, those with the least margin, are run in full too.
     near_misses: int = 1

@@ -31,7 +31,7 @@ from simbase.timing import NS_PER_S, Nanos
 from simbase.units import ranges_text
 
 NS_PER_HOUR = 3600 * NS_PER_S
-#: What a search is told of a run without a verdict: nothing to go towards.
+#: What a search gets of a run without a verdict: nothing to go towards.
 NO_VERDICT = 1.0
 
 

@@ -99,7 +99,7 @@ class Journal:
             os.fsync(self._file.fileno())
 
     def close(self) -> None:
-        """Close the file; a full disk was told of when it was first met."""
+        """Close the file; a full disk was reported when it was first met."""
         with contextlib.suppress(OSError):
             self._file.close()
 

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 
 from adapter_sim.pinout import WireRole, load_pinout
 from p2os.errors import ScenarioError
-from robot_bench.bench import Bench
+from robot_bench.bench import Bench, run_of
 from robot_bench.campaign.trial import Trial, bench_of, unpacked
-from robot_bench.scenario.hand_script import Deed
+from robot_bench.scenario.hand_script import Action
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: chosen: how often the run is saved.
@@ -120,7 +120,7 @@ class _Search:
             target = bench.now // SAVED_EACH_NS * SAVED_EACH_NS + SAVED_EACH_NS
             while bench.now < min(target, bench.end):
                 bench.run_until(min(bench.now // STEP_NS * STEP_NS + STEP_NS, bench.end))
-                for self._goal, words in bench.goals.missed.items():
+                for self._goal, words in run_of(bench).goals.missed.items():
                     self._failed_ns = bench.now
                     return words
         return None
@@ -130,11 +130,11 @@ class _Search:
         bench = self._bench
         bench.restore(self._saved[number][1])
         bench.run_until(at)
-        bench.hands.add(
-            *(Deed(at=bench.now, do="set_pin", place=wire, level=False) for wire in _motor_wires()), now=bench.now
+        run_of(bench).hands.add(
+            *(Action(at=bench.now, do="set_pin", place=wire, level=False) for wire in _motor_wires()), now=bench.now
         )
         bench.run_until(min(self._failed_ns + WATCHED_NS, bench.end))
-        return self._goal not in bench.goals.missed
+        return self._goal not in run_of(bench).goals.missed
 
 
 def _motor_wires() -> list[str]:
@@ -142,4 +142,4 @@ def _motor_wires() -> list[str]:
 
 
 def _last_line(bench: Bench) -> str:
-    return bench.recorder.last_line
+    return run_of(bench).recorder.last_line

@@ -28,7 +28,7 @@ from p2os.pioneer.world import known_worlds, load_world
 from p2os.pioneer.world.writer import write_world
 from p2os.toml_file import TomlSource, is_file, toml_text
 from p2os.toml_schema import Table
-from robot_bench.bench import Bench
+from robot_bench.bench import Bench, run_of
 from robot_bench.bench.board import boot
 from robot_bench.events.kinds import Contact, Event, Pose, Text
 from robot_bench.scenario.included_files import (
@@ -345,12 +345,12 @@ def outcome_of(bench: Bench, seen: SeenSoFar) -> Outcome:
         goals += found
         failures += [f"{before}{goal.kind}: {goal.says}" for goal in found if goal.met is False]
         hashes.append(one.trace.sha256)
-    clearances = [one.recorder.min_clearance_m for one in bench.robots.values()]
+    clearances = [run_of(one).recorder.min_clearance_m for one in bench.robots.values()]
     known = [clearance for clearance in clearances if clearance is not None]
     return Outcome(
         verdict=TrialVerdict.FAILED if failures else TrialVerdict.PASSED, failures=tuple(failures), goals=tuple(goals),
         virtual_ns=end, sha256=hashes[0] if len(hashes) == 1 else hashlib.sha256("".join(hashes).encode()).hexdigest(),
-        distance_m=round(bench.recorder.distance_m, 6), clearance_m=round(min(known), 6) if known else None,
+        distance_m=round(run_of(bench).recorder.distance_m, 6), clearance_m=round(min(known), 6) if known else None,
         hits=tuple(seen.hits), way_mm=tuple(seen.way_mm), died=died, blocks=seen.blocks | blocks_of(bench),
         lines=_states(list(seen.printed)),
     )  # fmt: skip
@@ -364,7 +364,7 @@ def blocks_of(bench: Bench) -> frozenset[int]:
 
 def _goals(bench: Bench, end: Nanos, robot: str) -> list[GoalResult]:
     found = []
-    for one in bench.goals.at_end(bench.ended(end)):
+    for one in run_of(bench).goals.at_end(run_of(bench).ended(end)):
         goal, outcome = one.goal, one.outcome
         by = outcome.robustness
         found.append(GoalResult(

@@ -158,5 +158,5 @@ def _print(findings: list[VerdictRow], *, as_json: bool) -> None:
         typer.echo(f"{row.name:13}{row.path:17}{row.verdict.value:14}{row.detail}".rstrip())
     faults = sum(row.is_fault for row in findings)
     untested = sum(row.verdict is BoardVerdict.UNKNOWN for row in findings)
-    told = "no fault" if not faults else "1 fault" if faults == 1 else f"{faults} faults"
-    typer.echo(f"{told} in {len(findings)} rows, {untested} not tested")
+    reported = "no fault" if not faults else "1 fault" if faults == 1 else f"{faults} faults"
+    typer.echo(f"{reported} in {len(findings)} rows, {untested} not tested")

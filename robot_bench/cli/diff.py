@@ -8,7 +8,7 @@ import typer
 
 from p2os.cli.groups import BENCH
 from robot_bench.events.kinds import Event
-from robot_bench.events.words import last_words, told_apart, what_of
+from robot_bench.events.words import distinguishing_words, last_words, what_of
 from robot_bench.recording.divergence import differences
 from robot_bench.recording.together import named_events
 from simbase.timing import NS_PER_S
@@ -17,7 +17,7 @@ from simbase.timing import NS_PER_S
 MOST_SIGNALS = 8
 HELP = """Tell where two runs part: the first difference of each signal.
 
-Of several robots each is told with the robot's name.
+Of several robots each is shown with the robot's name.
 
 Exit code: 0 they are alike, 1 they differ.
 
@@ -53,16 +53,16 @@ def diff(
         typer.echo(f"   {line}")
     for difference in found[:MOST_SIGNALS]:
         typer.echo(f"{difference.signal}:")
-        for folder, told in zip((one, other), _told(difference.one, difference.other), strict=True):
-            typer.echo(f"   {told}   {folder.name}")
+        for folder, reported in zip((one, other), _reported(difference.one, difference.other), strict=True):
+            typer.echo(f"   {reported}   {folder.name}")
     if len(found) > MOST_SIGNALS:
         typer.echo(f"and {len(found) - MOST_SIGNALS} more signals, later")
     raise typer.Exit(1)
 
 
-def _told(one: Event | None, other: Event | None) -> tuple[str, str]:
+def _reported(one: Event | None, other: Event | None) -> tuple[str, str]:
     """Return two events that differ, each with its time, so that it is seen in what."""
-    words, others = told_apart(one, other) if one is not None and other is not None else ("", "")
+    words, others = distinguishing_words(one, other) if one is not None and other is not None else ("", "")
     return _at(one, words), _at(other, others)
 
 

@@ -114,8 +114,8 @@ def judged(record: RunRecord, path: Path, scenario: Scenario) -> RunRecord:
     """Return a run as a scenario's goals judge it."""
     events = events_of(lines_of(path), str(path))
     found = judge(events, scenario.goals, end_ns=record.last_ns, planned_ns=scenario.planned_ns)
-    told = {"failures": found.missed, "goals_met": found.met, "goals_not_judged": found.not_judged}
-    return replace(record, end={**record.end, **told})
+    reported = {"failures": found.missed, "goals_met": found.met, "goals_not_judged": found.not_judged}
+    return replace(record, end={**record.end, **reported})
 
 
 def program_of(record: RunRecord, scenario: Scenario | None = None) -> Path | None:

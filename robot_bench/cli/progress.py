@@ -88,7 +88,7 @@ class RunDisplay:
 
 @contextlib.contextmanager
 def counting_bar(what: str, count: int) -> Iterator[Callable[[int, str], None]]:
-    """Show on a terminal how many of something are done, and a word on them; yield what is told of both."""
+    """Show on a terminal how many of something are done, and a word on them; yield what reports both."""
     bar = Progress(
         TextColumn(what), BarColumn(), MofNCompleteColumn(), TextColumn("{task.fields[said]}", markup=False),
         console=ReadableConsole(stderr=True), transient=True, auto_refresh=False, disable=not sys.stderr.isatty(),
@@ -101,7 +101,7 @@ def counting_bar(what: str, count: int) -> Iterator[Callable[[int, str], None]]:
 
 @contextlib.contextmanager
 def runs_bar(count: int) -> Iterator[Callable[..., None]]:
-    """Show on a terminal how many runs have ended; yield what is told of each."""
+    """Show on a terminal how many runs have ended; yield what reports each."""
     done = failed = 0
 
     def advance(*, passed: bool = True) -> None:

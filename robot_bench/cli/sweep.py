@@ -37,7 +37,7 @@ KEPT: Mapping[str, Callable[[bool], bool]] = {
 }  # fmt: skip
 #: chosen: a screen; of more runs the table has a line for all seeds of a row.
 MOST_LINES = 40
-#: chosen: so many failures are told of one by one.
+#: chosen: so many failures are shown one by one.
 MOST_FAILURES = 12
 #: What a sweep writes of each run.
 FIGURES = (

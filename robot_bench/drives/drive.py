@@ -168,8 +168,8 @@ class Drive:
     #: Whether those are the body's own.
     has_true_wheels: bool = False
     #: The rims' speeds by the packets.
-    told_left_mps: Steps | None = None
-    told_right_mps: Steps | None = None
+    reported_left_mps: Steps | None = None
+    reported_right_mps: Steps | None = None
     #: Command's name → its argument over time, in the units of the wire.
     commands: Mapping[str, Steps] = field(default_factory=dict)
     #: Sonar, from 0 → metres, where a reading is new.

@@ -20,7 +20,7 @@ LONGEST_CYCLE_S = 0.255
 
 
 @dataclass(slots=True, kw_only=True)
-class Told(DriveRows):
+class Reported(DriveRows):
     """What the packets of a line tell, row by row."""
 
     parameters: RobotParameters
@@ -55,7 +55,7 @@ class Told(DriveRows):
     def into(self, drive: Drive) -> Drive:
         """Put it into a drive."""
         drive.odometry = Trajectory.of_rows(self.poses) if len({row[0] for row in self.poses}) > 1 else None
-        drive.told_left_mps, drive.told_right_mps = steps_of(self.left), steps_of(self.right)
+        drive.reported_left_mps, drive.reported_right_mps = steps_of(self.left), steps_of(self.right)
         drive.commands = {name: steps_of(pairs) for name, pairs in self.commands.items()}
         drive.sonar_m = {number: steps_of(pairs) for number, pairs in self.sonar.items()}
         return drive
@@ -86,10 +86,10 @@ def drive_of_capture(
     Raises:
         FileError: It has no two standard packets.
     """
-    told = Told(parameters=parameters)
-    told.take(chunks, profile)
-    drive = told.into(Drive(name=name, parameters=parameters))
+    reported = Reported(parameters=parameters)
+    reported.take(chunks, profile)
+    drive = reported.into(Drive(name=name, parameters=parameters))
     if drive.odometry is None:
         raise FileError(f"{shown_name(name)} holds no two standard packets of a robot", hint="p2os decode FILE")
-    drive.left_mps, drive.right_mps = drive.told_left_mps, drive.told_right_mps
+    drive.left_mps, drive.right_mps = drive.reported_left_mps, drive.reported_right_mps
     return drive

@@ -9,7 +9,7 @@ from p2os.capture import Chunk, Direction
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import ParametersError, load_parameters
 from robot_bench.drives.drive import Drive, Steps, Trajectory, steps_of
-from robot_bench.drives.of_packets import Told
+from robot_bench.drives.of_packets import Reported
 from robot_bench.events.kinds import Pose
 from robot_bench.recording.run_record import RunRecord
 from robot_bench.recording.signals import motor_steps
@@ -41,15 +41,15 @@ def drive_of_record(called: str, record: RunRecord, robot: str = "") -> Drive:
         if robot:
             raise
         parameters = load_parameters(DEFAULT_ROBOT)  # a robot on own pins sends no packets
-    told = Told(parameters=parameters)
-    told.take(_chunks_of(record), Profile.P2OS)
-    drive = told.into(Drive(name=called, parameters=parameters, meta=record.meta))
+    reported = Reported(parameters=parameters)
+    reported.take(_chunks_of(record), Profile.P2OS)
+    drive = reported.into(Drive(name=called, parameters=parameters, meta=record.meta))
     drive.events = [*record.wire, *record.poses, *record.clearances, *record.contacts, *record.verdicts]
     drive.open_goals = (
         ["what was not decided when the run was cut"] if record.is_cut
         else cast("list[str]", record.end.get("goals_not_judged") or [])
     )  # fmt: skip
-    drive.left_mps, drive.right_mps = drive.told_left_mps, drive.told_right_mps
+    drive.left_mps, drive.right_mps = drive.reported_left_mps, drive.reported_right_mps
     if record.meta.get("body") != REMOTE and len(record.poses) > 1:
         drive.truth = trajectory_of(record.poses)
         drive.left_mps = steps_of([(pose.t / NS_PER_S, pose.left / 1e6) for pose in record.poses])

@@ -34,14 +34,14 @@ class CommandResponse:
         return self.onset_s - self.command_s
 
 
-def answers(drive: Drive, *, told: bool = False) -> list[CommandResponse]:
+def answers(drive: Drive, *, reported: bool = False) -> list[CommandResponse]:
     """Return each command that changes a set speed with the wheels' answer to it, where there is one.
 
     Args:
         drive: Has commands and the rims' speeds.
-        told: By the packets' speeds, also where the body's own are known.
+        reported: By the packets' speeds, also where the body's own are known.
     """
-    left, right = (drive.told_left_mps, drive.told_right_mps) if told else (drive.left_mps, drive.right_mps)
+    left, right = (drive.reported_left_mps, drive.reported_right_mps) if reported else (drive.left_mps, drive.right_mps)
     if left is None or right is None or not len(left.t_s):
         return []
     times = sorted(at for name in SPEED_COMMANDS if name in drive.commands for at in changes(drive.commands[name]))

@@ -89,8 +89,8 @@ def select(words: str, wires: Wires | None = None) -> Selector:
         raise UsageError(f"no events {shown(words)}", hint=hint)
     usage, make = row
     try:
-        told = rest[0] if rest else ""
-        return make(words, told) if wires is None or make is not _Pin else _Pin(words, told, wires)
+        place = rest[0] if rest else ""
+        return make(words, place) if wires is None or make is not _Pin else _Pin(words, place, wires)
     except (ValueError, re.error) as error:
         raise UsageError(f"events {shown(words)} are not understood: {error}", hint=f"such as {usage}") from error
 

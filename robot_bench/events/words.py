@@ -94,7 +94,7 @@ def what_of(event: Event) -> str:
     return _WORDS[type(event)](event)
 
 
-def told_apart(one: Event, other: Event) -> tuple[str, str]:
+def distinguishing_words(one: Event, other: Event) -> tuple[str, str]:
     """Return two events in words, with all that they differ in, to the last digit, where the words are the same."""
     words, others = what_of(one), what_of(other)
     if words != others or type(one) is not type(other):

@@ -77,11 +77,11 @@ def read_aria_log(name: str, lines: Iterable[str], parameters: RobotParameters) 
         odometry = Trajectory.of_rows(rows.poses)
     except FileError as error:
         raise FileError(f"{shown_name(name)}: {error}", hint="ARIA logs poses where LogPose is on") from error
-    told = steps_of(rows.left), steps_of(rows.right)
+    reported = steps_of(rows.left), steps_of(rows.right)
     return Drive(
-        name=name, parameters=parameters, odometry=odometry, told_left_mps=told[0] if rows.left else None,
-        told_right_mps=told[1] if rows.right else None, left_mps=told[0] if rows.left else None,
-        right_mps=told[1] if rows.right else None,
+        name=name, parameters=parameters, odometry=odometry, reported_left_mps=reported[0] if rows.left else None,
+        reported_right_mps=reported[1] if rows.right else None, left_mps=reported[0] if rows.left else None,
+        right_mps=reported[1] if rows.right else None,
         commands={name: steps_of(pairs) for name, pairs in rows.commands.items()},
     )  # fmt: skip
 

@@ -148,16 +148,16 @@ def _of_csv(path: Path, robot: str) -> Drive:
     except FileError as error:
         raise FileError(f"{shown_name(path)}: {error}", hint=error.hint) from error
     # What a robot's own packets were exported to has their names; other poses were measured.
-    is_told = "dir" in names and "type" in names
+    is_reported = "dir" in names and "type" in names
     drive = Drive(
-        name=path.name, parameters=_parameters(robot), odometry=trajectory if is_told else None,
-        truth=None if is_told else trajectory, has_true_wheels=not is_told,
+        name=path.name, parameters=_parameters(robot), odometry=trajectory if is_reported else None,
+        truth=None if is_reported else trajectory, has_true_wheels=not is_reported,
         sonar_m={number: steps_of(column(name)) for number, name in sonar.items()},
     )  # fmt: skip
     if "left_mps" in names and "right_mps" in names:
         drive.left_mps, drive.right_mps = steps_of(column("left_mps")), steps_of(column("right_mps"))
-        if is_told:
-            drive.told_left_mps, drive.told_right_mps = drive.left_mps, drive.right_mps
+        if is_reported:
+            drive.reported_left_mps, drive.reported_right_mps = drive.left_mps, drive.right_mps
     return drive
 
 

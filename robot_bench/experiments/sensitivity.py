@@ -22,7 +22,7 @@ from typing import cast
 import numpy as np
 
 from p2os.errors import ScenarioError
-from robot_bench.bench import Bench
+from robot_bench.bench import Bench, run_of
 from robot_bench.drives.drive import Drive, Floats
 from robot_bench.drives.metrics import metrics
 from robot_bench.drives.of_run import trajectory_of
@@ -250,7 +250,7 @@ def outcomes_of(scenario: Scenario, look: Callable[[Nanos], None] = lambda _now:
     )  # fmt: skip
     plain = metrics(drive).as_plain()
     found = {name: float(cast("float", plain[name])) for name in FIGURES if plain[name] is not None}
-    for number, (goal, margin) in enumerate(zip(scenario.goals, bench.goals.margins(end), strict=True), 1):
+    for number, (goal, margin) in enumerate(zip(scenario.goals, run_of(bench).goals.margins(end), strict=True), 1):
         if margin is not None:
             found[f"goal {number} {goal.kind}"] = margin
     return found

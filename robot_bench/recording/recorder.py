@@ -45,7 +45,7 @@ from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reached
 SAMPLE_NS: Nanos = 50 * NS_PER_MS
 #: chosen: a line of some 10 kB, all that a cut can cost.
 MOST_EDGES = 4096
-#: A line of text longer than this is told in pieces.
+#: A line of text longer than this is reported in pieces.
 LONGEST_TEXT = 64
 #: The port that firmware prints on.
 CONSOLE = "usart1"
@@ -100,7 +100,7 @@ class Recorder(Stateful):
         self._sample_ns = sample_ns
         self._next_sample: Nanos = 0
         self._changed: dict[str, None] = {}
-        #: Whether the levels at time 0 are told: not before everything of that instant was driven.
+        #: Whether the levels at time 0 are reported: not before everything of that instant was driven.
         self._has_levels = False
         #: Port → what was sent of a line whose end has not come.
         self._text: dict[str, bytearray] = {}
@@ -108,7 +108,7 @@ class Recorder(Stateful):
         self.transfers: dict[str, Transfers] = {}
         self._sonar_mm: tuple[int, ...] | None = None
         self._clearance_um: int | None = None
-        #: Other robots of the world, and where each was told to be.
+        #: Other robots of the world, and where each was reported to be.
         self._others: list[RobotBody] = []
         self._other_places: list[tuple[float, float, float] | None] = []
         for net in harness:
@@ -120,7 +120,7 @@ class Recorder(Stateful):
         self._other_places.append(None)
 
     def start(self) -> None:
-        """Have every wire's level at time 0 told once nobody can drive at that instant any more."""
+        """Have every wire's level at time 0 reported once nobody can drive at that instant any more."""
         self._changed = dict.fromkeys(net.name for net in self._harness)
 
     @property
@@ -171,7 +171,7 @@ class Recorder(Stateful):
         self.events.publish(Fault(t=at, op=op, words=words))
 
     def sonar(self, at: Nanos, metres: Sequence[float]) -> None:
-        """Take ranges in metres, all sonar in order; told when they differ from the last."""
+        """Take ranges in metres, all sonar in order; reported when they differ from the last."""
         mm = tuple(round(value * 1000) for value in metres)
         if mm != self._sonar_mm:
             self._sonar_mm = mm
@@ -242,13 +242,13 @@ class Recorder(Stateful):
         middle = (front + rear) / 2
         there = state.x_m + middle * cosine, state.y_m + middle * sine, state.heading_rad
         place = (round(there[0], 6), round(there[1], 6), round(there[2], 6))
-        told, self._other_places[number] = self._other_places[number], place
+        reported, self._other_places[number] = self._other_places[number], place
         fields: dict[str, object] = dict(zip(("x", "y", "heading"), place, strict=True))
-        if told is None:
+        if reported is None:
             box = {"kind": "obstacle", "shape": "box", "height": 0.0, "length": round(front - rear, 6)}
             width = round(2 * max(y for _, y in hull), 6)
             self.obstacle("place", robot.robot_name, at, fields | box | {"width": width})
-        elif told != place:
+        elif reported != place:
             self.obstacle("move", robot.robot_name, at, fields)
 
     def _measure_clearance(self, body: RobotBody, at: Nanos) -> None:

@@ -46,7 +46,7 @@ from simbase.timing import NS_PER_S, Nanos
 WORLD_FRAME, ROBOT_FRAME = "world", "base_link"
 #: chosen: rays that a sonar's cone is drawn with.
 CONE_RAYS = 7
-#: chosen: the path is told each second, in at most so many poses.
+#: chosen: the path is sent each second, in at most so many poses.
 PATH_NS: Nanos = NS_PER_S
 MOST_PATH_POSES = 500
 #: chosen: metres; a trace does not hold them.
@@ -92,7 +92,7 @@ class SceneMessages:
         self._things: dict[str, Mapping[str, Any]] = {str(item["name"]): item for item in world.get("obstacles") or ()}
         self._path: list[dict[str, object]] = []
         self._path_at: Nanos = 0
-        #: What each wire was told to be last.
+        #: What each wire was reported to be last.
         self._pins: dict[str, Mapping[str, object]] = {}
 
     def anew(self, t: Nanos) -> Iterator[Message]:
@@ -182,7 +182,7 @@ class SceneMessages:
         data = {"from": "client" if packet.direction == "c2r" else "robot", "hex": packet.data.hex(" ")}
         yield Message("/wire", "p2os.Packet", packet.t, data)
 
-    def told(self, event: Event) -> Iterator[Message]:
+    def logged(self, event: Event) -> Iterator[Message]:
         """Yield a line of the log."""
         is_bad = isinstance(event, (Contact, Fault)) or (isinstance(event, Verdict) and not event.met)
         name = event.who if isinstance(event, Note) else type(event).__name__.lower()
@@ -196,7 +196,8 @@ class SceneMessages:
 _MAKERS: Mapping[type, Callable[[SceneMessages, Any], Iterator[Message]]] = {
     Pose: SceneMessages.pose, Ranges: SceneMessages.ranges, WorldChange: SceneMessages.change,
     PinEdge: SceneMessages.edge, Wave: SceneMessages.wave, Text: SceneMessages.text, Packet: SceneMessages.packet,
-    Note: SceneMessages.told, Contact: SceneMessages.told, Fault: SceneMessages.told, Verdict: SceneMessages.told,
+    Note: SceneMessages.logged, Contact: SceneMessages.logged,
+    Fault: SceneMessages.logged, Verdict: SceneMessages.logged,
     SpiTransfer: SceneMessages.transfer, I2cTransfer: SceneMessages.transfer, CanTransfer: SceneMessages.transfer,
 }  # fmt: skip
 

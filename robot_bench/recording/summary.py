@@ -119,7 +119,7 @@ def outcome_of_all(scenario: str, robots: Mapping[str, Json]) -> Json:
     def each(key: str) -> list[object]:
         return [one[key] for one in robots.values() if one.get(key) is not None]
 
-    def told(key: str) -> list[str]:
+    def texts(key: str) -> list[str]:
         return [f"{name}: {line}" for name, one in robots.items() for line in cast("Sequence[str]", one.get(key) or ())]
 
     interrupted = [line for line in cast("Sequence[str]", first["failures"]) if line.startswith(INTERRUPTED)]
@@ -129,8 +129,8 @@ def outcome_of_all(scenario: str, robots: Mapping[str, Json]) -> Json:
         "scenario": scenario,
         "mode": f"{len(robots)} robots",
         "passed": all(one["passed"] for one in robots.values()),
-        "failures": interrupted or told("failures"),
-        **{key: told(key) for key in ("goals_met", "goals_not_judged", "notes", "last_blocks")},
+        "failures": interrupted or texts("failures"),
+        **{key: texts(key) for key in ("goals_met", "goals_not_judged", "notes", "last_blocks")},
         "distance_m": sum(cast("list[float]", each("distance_m"))),
         "collisions": sum(cast("list[int]", each("collisions"))),
         "min_clearance_m": min(cast("list[float]", each("min_clearance_m")), default=None),

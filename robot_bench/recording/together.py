@@ -22,8 +22,8 @@ def robots_in(folder: Path) -> list[str]:
     if (folder / TRACE_NAME).is_file() or not folder.is_dir():
         return []
     there = sorted(one.name for one in folder.iterdir() if (one / TRACE_NAME).is_file())
-    told = cast("Sequence[str]", read_meta(folder / there[0]).get("robots") or ()) if there else ()
-    return [name for name in told if name in there]
+    listed = cast("Sequence[str]", read_meta(folder / there[0]).get("robots") or ()) if there else ()
+    return [name for name in listed if name in there]
 
 
 def scenario_of(folder: Path) -> str:

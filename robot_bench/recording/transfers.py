@@ -3,10 +3,10 @@
 A bus is heard by the same subscriptions as the pins and the USARTs are; where nobody asked for it, nothing is done.
 
 Theory of operation. A chip tells of words and conditions in bulk, behind its time slice; the recorder calls `release`
-before it hands on events, so that what is over by then is told by then. An SPI has no end of a transfer but the pause
+before it hands on events, so what is over by then is reported by then. An SPI has no end of a transfer but the pause
 that follows: a word belongs to it that ends no later than a pause and a word's time behind the one before, and that is
 when its event comes. (Ends count, not begins: of a word that is under way nothing is known yet.)
-Invariant: what is told, and when, depends on the bus alone, not on slices.
+Invariant: what is reported, and when, depends on the bus alone, not on slices.
 """
 
 from collections.abc import Callable, Sequence
@@ -169,7 +169,7 @@ _KINDS: dict[str, type[Transfers]] = {
 
 
 def hear_bus(board: Any, bus: str, tell: Tell) -> Transfers:
-    """Have what goes over a bus of a board told from now on; return what puts it together.
+    """Have what goes over a bus of a board reported from now on; return what puts it together.
 
     Args:
         board: A `BluePill`.

@@ -54,11 +54,11 @@ def _latency(found: Metrics) -> str:
 
 
 def _row(name: str, values: Floats, scale_ms: float) -> str:
-    told = quantiles(values)
-    cells = "".join(f"<td>{float(str(told[column])):.2f}</td>" for column in COLUMNS)
-    median = float(str(told["median"]))
+    figures = quantiles(values)
+    cells = "".join(f"<td>{float(str(figures[column])):.2f}</td>" for column in COLUMNS)
+    median = float(str(figures["median"]))
     return (
-        f"<tr><td>{html.escape(name)}</td><td>{told['count']}</td>{cells}"
+        f"<tr><td>{html.escape(name)}</td><td>{figures['count']}</td>{cells}"
         f"<td>{_distribution(name, values.tolist(), median, scale_ms)}</td></tr>"
     )
 

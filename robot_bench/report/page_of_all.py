@@ -145,17 +145,17 @@ def _shape(item: Json) -> str:
 
 def _log(events: Iterable[tuple[str, Event]], colours: Mapping[str, str]) -> list[str]:
     """Return what all robots tell, in order of time, but for what there is so much of, and where the others are."""
-    told = [
+    reported = [
         (event.t, name, what_of(event))
         for name, event in events
         if not is_frequent(event) and not (isinstance(event, WorldChange) and event.name in colours)
     ]
-    head, tail = ends([len(what) + _ROW_BYTES for _, _, what in told], _LIST_BYTES)
-    shown = [*told[:head], *told[len(told) - tail :]]
+    head, tail = ends([len(what) + _ROW_BYTES for _, _, what in reported], _LIST_BYTES)
+    shown = [*reported[:head], *reported[len(reported) - tail :]]
     rows = [
         f'<tr><td>{t / NS_PER_S:.3f} s<td style="color:{colours[name]}">{name}<td>{escape(what)}</tr>'
         for t, name, what in shown
     ]
-    if len(shown) < len(told):
-        rows.insert(head, f"<tr><td><td><td>… {len(told) - len(shown)} more: p2os report FOLDER --events FILE</tr>")
+    if len(shown) < len(reported):
+        rows.insert(head, f"<tr><td><td><td>… {len(reported) - len(shown)} more: p2os report FOLDER --events FILE</tr>")
     return rows

@@ -55,23 +55,23 @@ def read(path: Path, parameters: RobotParameters) -> Drive:
     """
     found = list(read_bag(path, frozenset({ODOMETRY, MEASURED, *TWISTS, *SONAR})))
     begins = min((_time_of(one) for one in found), default=0)
-    told = _of_topic(found, {ODOMETRY}, ODOMETRY_NAMES)
+    reported = _of_topic(found, {ODOMETRY}, ODOMETRY_NAMES)
     named = [one for one in found if one.topic.rpartition("/")[2] in TRUTH_NAMES]
     drive = Drive(
-        name=path.name, parameters=parameters, odometry=_trajectory(told, begins),
+        name=path.name, parameters=parameters, odometry=_trajectory(reported, begins),
         truth=_trajectory(_of_topic(named, {MEASURED}, TRUTH_NAMES), begins),
     )  # fmt: skip
     if drive.odometry is None:
         raise FileError(f"{shown_name(path)} holds no two odometry messages", hint="nav_msgs/Odometry on odom or pose")
     speeds = []
-    for one in told:
+    for one in reported:
         message: Mapping[str, Any] = one.message
         twist = message["twist"]["twist"]
         rim = twist["angular"]["z"] * parameters.track_mm / 2000
         speeds.append((_seconds(one, begins), twist["linear"]["x"], rim))
     sides = ([(at, forward + sign * rim) for at, forward, rim in speeds] for sign in (-1, 1))
-    drive.told_left_mps, drive.told_right_mps = (steps_of(_finite(side)) for side in sides)
-    drive.left_mps, drive.right_mps = drive.told_left_mps, drive.told_right_mps
+    drive.reported_left_mps, drive.reported_right_mps = (steps_of(_finite(side)) for side in sides)
+    drive.left_mps, drive.right_mps = drive.reported_left_mps, drive.reported_right_mps
     drive.commands = _commands(_of_topic(found, TWISTS, TWIST_NAMES), begins)
     drive.sonar_m = {number: steps_of(pairs) for number, pairs in _sonar(found, parameters, begins).items()}
     return drive
@@ -101,13 +101,13 @@ def _of_topic(found: Sequence[BagMessage], types: Iterable[str], names: Sequence
 
 def _commands(found: Iterable[BagMessage], begins: Nanos) -> dict[str, Any]:
     """Return speeds as the commands of the wire: mm/s and degrees a second."""
-    told: dict[str, Pairs] = {"VEL": [], "RVEL": []}
+    reported: dict[str, Pairs] = {"VEL": [], "RVEL": []}
     for one in found:
         message: Mapping[str, Any] = one.message
         twist, at_s = message.get("twist", message), _seconds(one, begins)
-        told["VEL"].append((at_s, twist["linear"]["x"] * 1000))
-        told["RVEL"].append((at_s, math.degrees(twist["angular"]["z"])))
-    return {name: steps_of(_finite(pairs)) for name, pairs in told.items() if pairs}
+        reported["VEL"].append((at_s, twist["linear"]["x"] * 1000))
+        reported["RVEL"].append((at_s, math.degrees(twist["angular"]["z"])))
+    return {name: steps_of(_finite(pairs)) for name, pairs in reported.items() if pairs}
 
 
 def _sonar(found: Iterable[BagMessage], parameters: RobotParameters, begins: Nanos) -> dict[int, Pairs]:

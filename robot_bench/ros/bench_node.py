@@ -2,7 +2,7 @@
 
 Published: `/clock`, odometry and TF (of the true pose: a bench knows it), wheels, ranges, and the thesis's topics, as
 they stand on the pins. Taken: the distance and encoder topics of wires that the scenario cuts from its robot
-(`outside`); what changes a level becomes a deed at the next nanosecond, which the trace notes.
+(`outside`); what changes a level becomes an action at the next nanosecond, which the trace notes.
 
 Source: the thesis, chapter 5.1.2.2: motors are published each 100 ms, sensors put on the pins when a message comes.
 
@@ -23,7 +23,7 @@ from p2os.ros.topics import TOPICS
 from p2os.ros.transport import NodeOptions, Received, Topic
 from p2os.ros.urdf import urdf_text
 from robot_bench.events.kinds import MICRO, Pose, Ranges
-from robot_bench.scenario.hand_script import Deed
+from robot_bench.scenario.hand_script import Action
 from simbase.timing import NS_PER_MS, Nanos
 
 #: Who did it, in the trace.
@@ -64,11 +64,11 @@ class BenchNode:
             wires[self._topic("distance_sensor", number)] = (wire.name,)
         self._signed = {self._topic(key) for key in VALUES if key.startswith("motor")}
         roles = {wire.name: wire.role.value for wire in pinout.wires}
-        #: Topics whose wires ROS drives, and those that it is told of.
+        #: Topics whose wires ROS drives, and those that it is sent.
         self.taken: Mapping[Topic, tuple[str, ...]] = {
             topic: names for topic, names in wires.items() if roles[names[0]] in set(outside)
         }
-        self._told = {topic: names for topic, names in wires.items() if topic not in self.taken}
+        self._published = {topic: names for topic, names in wires.items() if topic not in self.taken}
         self._values: dict[Topic, int] = {}
         self._repeat_at: Nanos = 0
         #: What ROS has put on the wires.
@@ -78,7 +78,7 @@ class BenchNode:
     def announced(self) -> Iterator[Topic]:
         """Yield what is published from the beginning."""
         yield from (self._topic(key) for key in ALWAYS)
-        yield from self._told
+        yield from self._published
         yield from (self._topic("range", number) for number in range(self._frames.parameters.sonar_fitted))
 
     def first(self) -> list[Outgoing]:
@@ -119,14 +119,14 @@ class BenchNode:
         is_due = now >= self._repeat_at
         if is_due:
             self._repeat_at = now + REPEAT_NS
-        for topic, wires in self._told.items():
+        for topic, wires in self._published.items():
             value = self._value(topic, wires, now)
             if is_due or value != self._values.get(topic):
                 self._values[topic] = value
                 found.append((topic, {"data": value}))
         return found
 
-    def take(self, received: Iterable[Received], at: Nanos) -> list[Deed]:
+    def take(self, received: Iterable[Received], at: Nanos) -> list[Action]:
         """Return what messages do to wires at a time: the levels that they change."""
         wanted: dict[str, bool] = {}
         for item in received:
@@ -138,7 +138,7 @@ class BenchNode:
             wanted |= {wire: bool(bits >> place & 1) for place, wire in enumerate(wires)}
         changed = {wire: level for wire, level in wanted.items() if self._levels.get(wire) is not level}
         self._levels |= changed
-        return [Deed(at=at, do=SET_PIN, place=wire, level=level, who=WHO) for wire, level in changed.items()]
+        return [Action(at=at, do=SET_PIN, place=wire, level=level, who=WHO) for wire, level in changed.items()]
 
     def _value(self, topic: Topic, wires: tuple[str, ...], now: Nanos) -> int:
         code = sum(self._level_of(wire, now) << place for place, wire in enumerate(wires))

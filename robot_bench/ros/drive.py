@@ -12,7 +12,7 @@ from pathlib import Path
 
 from p2os.ros.transport import DOMAIN, LOOPBACK, NodeOptions, RosTransport
 from p2os.ros.transports import TRANSPORTS, open_transport
-from robot_bench.bench import Bench
+from robot_bench.bench import Bench, run_of
 from robot_bench.events.kinds import Pose, Ranges
 from robot_bench.ros.bench_node import BenchNode
 from robot_bench.ros.recorded import read_inputs
@@ -85,7 +85,7 @@ def with_inputs(path: Path) -> RunBench:
     inputs = read_inputs(path)
 
     def drive(bench: Bench) -> None:
-        bench.take_inputs(inputs)
+        run_of(bench).take_inputs(inputs)
         bench.run_until(bench.scenario.duration_ns)
 
     return drive
@@ -114,7 +114,7 @@ def run_beside(bench: Bench, network: RosTransport, options: NodeOptions) -> Non
                 network.publish(topic, message)
             outgoing.clear()
             if bench.now < bench.end:
-                bench.take_inputs(node.take(network.take(0.0), bench.now + 1))
+                run_of(bench).take_inputs(node.take(network.take(0.0), bench.now + 1))
             if bench.now == before:  # a chip that stands still for good
                 return
     finally:

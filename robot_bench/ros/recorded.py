@@ -7,12 +7,12 @@ from robot_bench.events.codec import events_of
 from robot_bench.events.kinds import Note
 from robot_bench.recording.run_record import TRACE_NAME
 from robot_bench.ros.bench_node import SET_PIN, WHO
-from robot_bench.scenario.hand_script import LEVELS, Deed
+from robot_bench.scenario.hand_script import LEVELS, Action
 from simbase.errors import FileError, shown_name
 from simbase.files import lines_of
 
 
-def read_inputs(path: Path) -> list[Deed]:
+def read_inputs(path: Path) -> list[Action]:
     """Return what came in, of a run folder or a trace.
 
     Raises:
@@ -26,18 +26,18 @@ def read_inputs(path: Path) -> list[Deed]:
     return found
 
 
-def inputs_of(lines: Iterable[str], where: str) -> list[Deed]:
+def inputs_of(lines: Iterable[str], where: str) -> list[Action]:
     """Return the inputs among the lines of a trace.
 
     Raises:
         TraceError: A line is damaged.
         FileError: An input is none that ROS could have made.
     """
-    return [_deed(event, where) for event in events_of(lines, where) if isinstance(event, Note) and event.who == WHO]
+    return [_action(event, where) for event in events_of(lines, where) if isinstance(event, Note) and event.who == WHO]
 
 
-def _deed(note: Note, where: str) -> Deed:
+def _action(note: Note, where: str) -> Action:
     place, _, level = note.detail.partition(" ")
     if note.what != SET_PIN or level not in LEVELS:
         raise FileError(f"{where}: {note.what} {note.detail} at {note.t} ns is no input", hint="cut that line")
-    return Deed(at=note.t, do=SET_PIN, place=place, level=LEVELS[level], who=WHO)
+    return Action(at=note.t, do=SET_PIN, place=place, level=LEVELS[level], who=WHO)

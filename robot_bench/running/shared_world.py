@@ -35,36 +35,21 @@ class SharedRobot(Protocol):
 
 
 class BenchMember(Protocol):
-    """A bench with one of the robots."""
+    """The run of one of the robots."""
 
     @property
-    def own_end(self) -> Nanos:
-        """When its run ends."""
+    def end(self) -> Nanos:
+        """When it would end if this robot were alone."""
 
     @property
     def loop(self) -> RunLoop:
         """Brings its chip and all its parts forward."""
 
-    def own_snapshot(self) -> object:
-        """Return all that decides its future, but for the scene."""
-
-    def restore_own(self, snapshot: object) -> None:
-        """Put back what `own_snapshot` returned."""
-
-
-class _Own:
-    """A bench as a part of its world."""
-
-    def __init__(self, member: BenchMember) -> None:
-        self._member = member
-
     def snapshot(self) -> object:
-        """Return the bench's state without that of the scene."""
-        return self._member.own_snapshot()
+        """Return all that decides its future, but for the scene."""
 
     def restore(self, snapshot: object) -> None:
         """Put back what `snapshot` returned."""
-        self._member.restore_own(snapshot)
 
 
 class SharedWorld(Stateful):
@@ -83,9 +68,9 @@ class SharedWorld(Stateful):
         self.scene = scene
         self.names = tuple(names)
         scene.name_robots(self.names)
-        #: The benches of those that have a chip, by name.
+        #: The runs of those that have a chip, by name.
         self.members: dict[str, BenchMember] = {}
-        self._own: tuple[_Own, ...] = ()
+        self._own: tuple[BenchMember, ...] = ()
         self._driven: dict[int, SharedRobot] = {}
         self._pings = PingTable(scene.bodies)
         #: The time until which all has happened, and where the scene stands.
@@ -97,10 +82,10 @@ class SharedWorld(Stateful):
         return self.scene.bodies[self.names.index(name)]
 
     def join(self, name: str, member: BenchMember, driven: SharedRobot) -> None:
-        """Take the bench of a robot, and what drives its body."""
+        """Take the run of a robot, and what drives its body."""
         number = self.names.index(name)
         self.members[name] = member
-        self._own = (*self._own, _Own(member))
+        self._own = (*self._own, member)
         self._driven[number] = driven
         if isinstance(driven, Pioneer):
             driven.hears = self._pings.ears_of(number)
@@ -108,7 +93,7 @@ class SharedWorld(Stateful):
     @property
     def end(self) -> Nanos:
         """When the run ends, as far as is known now: with the first of them."""
-        return min(member.own_end for member in self.members.values())
+        return min(member.end for member in self.members.values())
 
     def run_to(self, wanted: Nanos) -> None:
         """Bring all to a time, or to the end of the run."""

@@ -10,7 +10,7 @@ r"""What a hand does at the board during a run: types into a USART, puts a level
 A level is held as hard as a wire to 3.3 V or to ground does: where a part drives the same wire hard, the trace notes
 a contention. After `for_s` the hand lets go.
 
-Invariant: a deed at t acts on everything after t, and each is noted in the trace.
+Invariant: an action at t acts on everything after t, and each is noted in the trace.
 """
 
 import re
@@ -29,7 +29,7 @@ LEVELS = {"high": True, "low": False}
 _FOR = Key(name="for_s", kind="number", above=0, most=LONGEST_S)
 _PIN = Key(name="pin", kind="text", required=True)
 #: What can be done → the keys of its table.
-DEEDS = {
+ACTIONS = {
     "type": (Key(name="text", kind="text", required=True), Key(name="port", kind="text", choices=PORTS)),
     "set_pin": (_PIN, Key(name="level", kind="text", required=True, choices=tuple(LEVELS)), _FOR),
     "set_volts": (_PIN, Key(name="volts", kind="number", required=True, least=0, most=25.5), _FOR),
@@ -39,7 +39,7 @@ _CHIP_PIN = re.compile(r"P(A([0-9]|1[0-5])|B([0-9]|1[0-5])|C1[345])$")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Deed:
+class Action:
     """One thing that a hand does; a level or volts of None let go."""
 
     at: Nanos
@@ -62,14 +62,14 @@ class Deed:
         return f"{self.place} {'lets go' if self.level is None else 'high' if self.level else 'low'}"
 
 
-def load_deeds(do: str, table: Table, where: Where, wires: Wires | None) -> tuple[Deed, ...]:
+def load_actions(do: str, table: Table, where: Where, wires: Wires | None) -> tuple[Action, ...]:
     """Return what a checked table asks for, counted from 0.
 
     Raises:
         ScenarioError: There is no such pin.
     """
     if do == "type":
-        return (Deed(at=0, do=do, place=str(table.get("port", PORTS[0])), text=str(table["text"]).encode()),)
+        return (Action(at=0, do=do, place=str(table.get("port", PORTS[0])), text=str(table["text"]).encode()),)
     pin = str(table["pin"])
     try:
         place = pin if do == "set_volts" and _CHIP_PIN.match(pin) else wire_named(pin, wires)
@@ -80,29 +80,29 @@ def load_deeds(do: str, table: Table, where: Where, wires: Wires | None) -> tupl
     if do == "set_volts" and not _CHIP_PIN.match(place):
         raise ScenarioError(f"{where}: volts are put on a pin of the BluePill", hint='such as pin = "PA0"')
     level, volts = table.get("level"), table.get("volts")
-    begin = Deed(
+    begin = Action(
         at=0, do=do, place=place, level=None if level is None else LEVELS[str(level)],
         volts=float(volts) if isinstance(volts, (int, float)) else None,
     )  # fmt: skip
     span = table.get("for_s")
     if not isinstance(span, (int, float)):
         return (begin,)
-    return begin, Deed(at=round(span * NS_PER_S), do=do, place=place)
+    return begin, Action(at=round(span * NS_PER_S), do=do, place=place)
 
 
-class HandScript(Timeline[Deed]):
-    """Does each deed at its time.
+class HandScript(Timeline[Action]):
+    """Does each action at its time.
 
     Args:
         bring_to: Brings the robot to an instant.
-        do: Carries a deed out.
+        do: Carries an action out.
     """
 
-    def __init__(self, *, bring_to: Callable[[Nanos], None], do: Callable[[Deed], None]) -> None:
+    def __init__(self, *, bring_to: Callable[[Nanos], None], do: Callable[[Action], None]) -> None:
         super().__init__((), self._apply)
         self._bring_to = bring_to
         self._do = do
 
-    def _apply(self, deed: Deed) -> None:
-        self._bring_to(deed.at)
-        self._do(deed)
+    def _apply(self, action: Action) -> None:
+        self._bring_to(action.at)
+        self._do(action)

@@ -14,7 +14,7 @@ from robot_bench.scenario.goals.judging import COMMON
 from robot_bench.scenario.goals.kinds import every_kind
 from robot_bench.scenario.scenario import TABLES
 from robot_bench.scenario.several_robots import ROBOT
-from robot_bench.scenario.when_script import KEYS as WHEN_KEYS
+from robot_bench.scenario.trigger_script import KEYS as WHEN_KEYS
 from simbase.entry_points import installed_points
 
 DRAFT = "https://json-schema.org/draft/2020-12/schema"

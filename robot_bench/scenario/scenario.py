@@ -36,7 +36,7 @@ from p2os.toml_file import is_file
 from p2os.toml_schema import LONGEST_S, Key, Table, TablePlace, Where, check_table, placed, within
 from robot_bench.direct.robot import DirectSettings
 from robot_bench.events.selection import BUSES, bus_of
-from robot_bench.scenario import fault_script, plugged_parts, when_script, world_script
+from robot_bench.scenario import fault_script, plugged_parts, trigger_script, world_script
 from robot_bench.scenario.fault_script import FaultChange, load_faults
 from robot_bench.scenario.goals.judging import Goal, load_goal
 from robot_bench.scenario.included_files import KEYS as INCLUDING
@@ -50,7 +50,7 @@ from robot_bench.scenario.included_files import (
 )
 from robot_bench.scenario.several_robots import robot_keys, split
 from robot_bench.scenario.sweep import LARGEST_SEED, SweptParameter, load_axes, load_seeds
-from robot_bench.scenario.when_script import When, load_whens
+from robot_bench.scenario.trigger_script import Trigger, load_triggers
 from robot_bench.scenario.wired_robots import OwnRobot, find_own_robot, known_own_robots, load_own_robot
 from robot_bench.scenario.world_script import ScriptedChange, load_changes, refuse_names
 from robot_bench.wires.line_ends import ENDS
@@ -151,7 +151,7 @@ TABLES: Mapping[str, tuple[Key, ...]] = {
     "[[obstacle]]": world_script.KEYS,
     "[[part]]": plugged_parts.KEYS,
     "[[fault]]": fault_script.KEYS,
-    "[[when]]": tuple(key for key in when_script.KEYS if key not in world_script.KEYS),
+    "[[when]]": tuple(key for key in trigger_script.KEYS if key not in world_script.KEYS),
 }
 
 
@@ -257,7 +257,7 @@ class Scenario:
     parts: tuple[PartSpec, ...] = ()
     changes: tuple[ScriptedChange, ...] = ()
     faults: tuple[FaultChange, ...] = ()
-    whens: tuple[When, ...] = ()
+    triggers: tuple[Trigger, ...] = ()
     goals: tuple[Goal, ...] = ()
     #: World, as `world` names it → as the file names it, and what is otherwise there.
     in_world: Mapping[str, tuple[str, Table]] = field(default_factory=dict)
@@ -569,7 +569,7 @@ def _build(table: Table, text: str, path: Path, where: TablePlace, firmware: Pat
         seeds=load_seeds(table, where.at("seeds")),
         axes=load_axes(cast("Table", table.get("sweep", {})), where),
         faults=load_faults(cast("list[Table]", table.get("fault", [])), parameters, where),
-        whens=load_whens(cast("list[Table]", table.get("when", [])), parameters, where, wires),
+        triggers=load_triggers(cast("list[Table]", table.get("when", [])), parameters, where, wires),
         goals=tuple(goals),
         in_world={str(_world_file(world, path.parent) or world): (world, part) for world, part in in_world.items()},
         where=where,

@@ -160,7 +160,7 @@ class Net(Stateful):
         """Hold the wire from `now` on; it replaces what the same owner did before.
 
         Raises:
-            LocalProtocolError: `owner` has already reported something later, or the edges of that instant were told.
+            LocalProtocolError: `owner` has already reported something later, or that instant's edges were reported.
         """
         code = strength.codes[level]
         history = self._drives.get(owner)
@@ -354,7 +354,7 @@ class Net(Stateful):
             )
         if now <= self._notified_until:
             raise LocalProtocolError(
-                f"{owner} drives {self.name} at {now} ns after its edges up to {self._notified_until} ns were told"
+                f"{owner} drives {self.name} at {now} ns after its edges up to {self._notified_until} ns were reported"
             )
         if history is None:
             history = self._drives[owner] = CodeHistory()

@@ -20,7 +20,7 @@ from simbase.files import sha256_of
 MOST_FILES = 2_000
 #: chosen: a large extension module, ten times.
 MOST_BYTES = 256 * 1024 * 1024
-#: chosen: so many entries are looked at, so that `/` or a home folder is told of within a second.
+#: chosen: so many entries are looked at, so that `/` or a home folder is refused within a second.
 MOST_ENTRIES = 50_000
 _SUFFIXES = tuple(all_suffixes())
 _CACHE = "__pycache__"

@@ -126,5 +126,5 @@ class SecondBluePillBench(Bench):
             self.second.on_packet = comes_back
             return FarEnd(robots=(self.second,), adapter=self.second, controller=pioneer, ranges=ranges)
 
-        with patch("robot_bench.bench.bench.make_far_end", far_end):
+        with patch("robot_bench.bench.robot_run.make_far_end", far_end):
             super().__init__(scenario)

@@ -31,10 +31,10 @@ class Robot:
     """What a served robot has told so far."""
 
     def __init__(self) -> None:
-        self.told: list[str] = []
+        self.reported: list[str] = []
 
     def happened(self, _now: int, what: str, detail: str) -> None:
-        self.told.append(f"{what}: {detail}")
+        self.reported.append(f"{what}: {detail}")
 
 
 @pytest.fixture
@@ -68,7 +68,7 @@ def test_wires_drive_the_robot_and_encoders_come_back(adapter: Path, line: str, 
         program.event("disconnected: p2dx_con is low")
         program.event("idle")
         assert program.end() == 130
-    assert any(what.startswith("closed") for what in robot.told), robot.told
+    assert any(what.startswith("closed") for what in robot.reported), robot.reported
 
 
 #: Every signal of the program's table; the real-time ones and those of a crash are not caught.
@@ -87,7 +87,7 @@ def test_an_interrupted_program_stops_and_closes_the_robot_first(
         program.event("command: VEL 125")
         assert program.end(number) == 130
         program.event("shutdown: the program ends")
-    assert "closed: by its client" in robot.told
+    assert "closed: by its client" in robot.reported
 
 
 def test_wires_that_are_pulled_out_end_the_connect_request_and_the_next_ones_see_the_levels(
@@ -168,7 +168,7 @@ def test_a_pad_on_the_wires_socket_drives_and_its_silence_stops(adapter: Path, t
             program.event("command: VEL 400, RVEL 0")
         program.event("pad lost: no report of the pad in time")
         program.end()
-    assert "closed: by its client" in robot.told
+    assert "closed: by its client" in robot.reported
 
 
 def test_a_robot_that_goes_away_ends_the_program_with_one_line(adapter: Path) -> None:
@@ -294,7 +294,7 @@ def test_a_stopped_program_that_is_ended_says_stop_first_too(adapter: Path, rela
         assert program.process.wait(PATIENCE_S) == 130
         relay.wait(lambda said: len(said) >= before + 4)
         assert [command.number for command in relay.said[before : before + 4]] == STOPS
-    assert "closed: by its client" in robot.told
+    assert "closed: by its client" in robot.reported
 
 
 #: Takes the place of the C library's: the clock that counts suspend runs ahead by what a file says.
@@ -379,7 +379,7 @@ def test_nobody_who_reads_the_events_keeps_no_command_from_the_robot(
         assert fcntl.fcntl(unread, fcntl.F_GETFL) & os.O_NONBLOCK == 0, "others have it open too"
         assert program.end() == 130
         relay.wait(lambda said: [command.number for command in said[-4:]] == STOPS)
-    assert "closed: by its client" in robot.told
+    assert "closed: by its client" in robot.reported
 
 
 def test_lines_that_nobody_read_are_counted(adapter: Path, tcp: str) -> None:

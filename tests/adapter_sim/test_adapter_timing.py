@@ -140,7 +140,7 @@ def test_350_ms_without_a_sip_is_a_loss_and_stop_goes_first(driving: Rig) -> Non
     assert "no packet for 350 ms" in driving.adapter.status.reason
 
 
-def test_what_is_implausible_is_told_wheel_by_wheel() -> None:
+def test_what_is_implausible_is_reported_wheel_by_wheel() -> None:
     check = SpeedPlausibility(timeout_ns=1_500 * MS, tolerance_mm_s=40, progress_mm_s=5)
     check.measured, check.command = (1, 2), (300, 400)
     assert check.describe() == "wheels at 1 and 2 mm/s for 1.5 s, commanded 300 and 400, and no stall flag"

@@ -91,11 +91,11 @@ def test_a_deadline_that_moves_is_met_to_the_nanosecond(ports: Ports) -> None:
 
 def test_a_changed_clock_is_notified_to_every_peripheral(ports: Ports) -> None:
     chip = ports.chip
-    told: list[str] = []
+    reported: list[str] = []
     for part in chip.parts.by_name.values():
-        part.clock_changed = lambda name=part.name: told.append(name)
+        part.clock_changed = lambda name=part.name: reported.append(name)
     chip.parts.rcc.write(4, 4, 8 << 4)
-    assert told == list(chip.parts.by_name)
+    assert reported == list(chip.parts.by_name)
     assert chip.clocks.hclk_hz == 4_000_000
 
 

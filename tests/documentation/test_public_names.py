@@ -52,7 +52,7 @@ def test_importing_a_package_loads_nothing_heavy(package: str) -> None:
     assert done.stdout.split() == []
 
 
-def test_a_name_that_a_package_has_not_is_told_as_python_tells_it() -> None:
+def test_a_name_that_a_package_has_not_is_reported_as_python_tells_it() -> None:
     with pytest.raises(AttributeError, match="module 'p2os' has no attribute 'Robbot'"):
         _ = import_module("p2os").Robbot
 
@@ -75,7 +75,7 @@ def test_the_pages_of_the_api_are_made_without_a_warning_and_every_public_name_i
     assert set(PACKAGES) <= {path.stem for path in tmp_path.glob("*.html")}
 
 
-def test_public_names_without_a_docstring_are_told(
+def test_public_names_without_a_docstring_are_reported(
     api_pages: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     source = '"""A module."""\nclass Told:\n    """It is."""\n    def bare(self): ...\ndef told(): ...\n'

@@ -78,7 +78,7 @@ class Robot:
         self.frames()
         return self
 
-    def told(self) -> list[str]:
+    def reported(self) -> list[str]:
         return [what for _, what, _ in self.events]
 
 

@@ -41,9 +41,9 @@ def test_our_own_client_drives_is_killed_and_drives_again(capsys: pytest.Capture
 
 def test_a_peer_that_is_not_there_is_skipped_aloud(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--peer", "mine=/no/such/program {host}"]) == 0
-    told = capsys.readouterr()
-    assert "mine: skipped: no /no/such/program" in told.err
-    assert told.out.splitlines()[-1] == "not on PATH: mine"
+    reported = capsys.readouterr()
+    assert "mine: skipped: no /no/such/program" in reported.err
+    assert reported.out.splitlines()[-1] == "not on PATH: mine"
     assert [peer.name for peer in PEERS if not peer.commands] == []
 
 
@@ -78,5 +78,5 @@ def test_a_robot_that_nobody_knows_is_wrong_usage(capsys: pytest.CaptureFixture[
 
 def test_each_peer_meets_each_robot_that_is_named(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--peer", "mine=/no/such/program {host}", "--robot", "all"]) == 0
-    told = capsys.readouterr().out.split("not on PATH:")[1]
-    assert all(f"mine, {model}" in " ".join(told.split()) for model in known_robots())
+    reported = capsys.readouterr().out.split("not on PATH:")[1]
+    assert all(f"mine, {model}" in " ".join(reported.split()) for model in known_robots())

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from bluepill_sim.errors import BluePillError
-from robot_bench.bench import Bench
+from robot_bench.bench import Bench, run_of
 from robot_bench.scenario.scenario import Scenario, load_scenario
 from simbase.errors import UsageError
 from tests.p2os.pioneer.body.bodies import each_body
@@ -71,8 +71,8 @@ def test_encoders_that_cannot_have_changed_are_not_waited_for_and_change_nothing
 ) -> None:
     def run() -> tuple[str, int]:
         made, stops = bench(scenario("direct", body)), []
-        made.loop.on_slice = stops.append
-        made.loop.slice_ns = S
+        run_of(made).loop.on_slice = stops.append
+        run_of(made).loop.slice_ns = S
         return finished(made).trace.sha256, len(stops)
 
     ahead = run()
@@ -126,8 +126,8 @@ def test_the_robot_drives_as_its_pins_say(mode: str) -> None:
     assert pose["t"] == 3 * S
     # -4 and +1 steps of 62.5 mm/s, reached by then from 187.5 mm/s at 300 mm/s² or more a wheel: 1.46 s is not enough.
     assert pose["l"] < 0 < pose["r"]  # type: ignore[operator]
-    assert made.recorder.distance_m > 0.1
-    assert made.recorder.min_clearance_m is not None
+    assert run_of(made).recorder.distance_m > 0.1
+    assert run_of(made).recorder.min_clearance_m is not None
 
 
 def test_the_trace_begins_with_every_wire_and_ends_with_a_pose() -> None:
@@ -136,19 +136,19 @@ def test_the_trace_begins_with_every_wire_and_ends_with_a_pose() -> None:
     assert [entry["t"] for entry in entries(made, "pose")][-2:] == [S, S + 20 * MS]
 
 
-def test_text_is_told_by_line_and_the_rest_at_the_end() -> None:
+def test_text_is_reported_by_line_and_the_rest_at_the_end() -> None:
     made = finished(bench(scenario("direct", duration_s=1)))
     lines = [(entry["t"], bytes.fromhex(str(entry["hex"]))) for entry in entries(made, "usart")]
     assert lines == [(S // 2 + 87_000 * 5, b"hello\n"), (S, b"world")]
-    assert made.recorder.last_line == "world"
+    assert run_of(made).recorder.last_line == "world"
 
 
-def test_text_without_an_end_is_told_in_pieces() -> None:
+def test_text_without_an_end_is_reported_in_pieces() -> None:
     made = finished(Bench(scenario("direct", duration_s=1), chip=FakeChip(text=[(0, b"x" * 100)])))
     assert [len(bytes.fromhex(str(entry["hex"]))) for entry in entries(made, "usart")] == [64, 36]
 
 
-def test_a_fight_over_a_wire_is_told() -> None:
+def test_a_fight_over_a_wire_is_reported() -> None:
     chip = FakeChip([*drives((0, 0, 0)), (S, "PA4", PinDrive.HIGH)])
     made = finished(Bench(scenario("direct", duration_s=1.5), chip=chip))
     fights = [entry for entry in entries(made, "event") if entry["what"] == "contention"]
@@ -158,9 +158,9 @@ def test_a_fight_over_a_wire_is_told() -> None:
 def test_the_adapter_is_reset_by_an_edge_at_its_very_time() -> None:
     chip = FakeChip([*drives((0, 0, 0)), (S + 123, "PB13", PinDrive.HIGH), (S + 456_789, "PB13", PinDrive.LOW)])
     made = finished(Bench(scenario("adapter", duration_s=2), chip=chip))
-    told = [(entry["t"], entry["what"]) for entry in entries(made, "event") if entry["who"] == "adapter"]
-    assert (S + 123, "reset") in told
-    assert (S + 456_789 + 300 * MS, "booted") in told
+    reported = [(entry["t"], entry["what"]) for entry in entries(made, "event") if entry["who"] == "adapter"]
+    assert (S + 123, "reset") in reported
+    assert (S + 456_789 + 300 * MS, "booted") in reported
 
 
 def test_changes_of_the_world_happen_at_their_time() -> None:
@@ -286,3 +286,11 @@ def test_a_bench_logs_what_its_parts_note_with_their_time(caplog: pytest.LogCapt
     assert lines[0].startswith("adapter at 0.")
     assert any(line.startswith("pioneer at ") and line.endswith(": opened") for line in lines)
     assert not any(": command" in line for line in lines)
+
+
+def test_a_bench_shows_what_the_page_says_and_nothing_else() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "bench.md").read_text(encoding="utf-8")
+    rows = page.partition("| call | what it gives |\n|---|---|\n")[2].partition("\n\n")[0].splitlines()
+    listed = {name for row in rows for name in re.findall(r"`(\w+)[^`]*`", row.split("|")[1])}
+    made = bench(scenario("adapter"))
+    assert {name for name in dir(made) if not name.startswith("_")} == listed

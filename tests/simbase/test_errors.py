@@ -33,8 +33,8 @@ def test_an_error_is_one_line_whatever_a_file_put_into_it() -> None:
 
 
 def test_the_hint_is_in_pythons_own_traceback_too() -> None:
-    told = "".join(traceback.format_exception_only(UsageError("no wire 'PB99'", hint="did you mean 'PB9'?")))
-    assert told == "simbase.errors.UsageError: no wire 'PB99'\nhint: did you mean 'PB9'?\n"
+    reported = "".join(traceback.format_exception_only(UsageError("no wire 'PB99'", hint="did you mean 'PB9'?")))
+    assert reported == "simbase.errors.UsageError: no wire 'PB99'\nhint: did you mean 'PB9'?\n"
     assert not hasattr(UsageError("no wire"), "__notes__")
 
 

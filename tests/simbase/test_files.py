@@ -72,7 +72,7 @@ def test_a_fifo_is_read_to_its_end_and_no_further_than_the_bound(tmp_path: Path,
         writer.join()
 
 
-def test_what_cannot_be_read_is_told_in_one_line(tmp_path: Path) -> None:
+def test_what_cannot_be_read_is_reported_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "latin").write_bytes(b"caf\xe9")
     for read in (read_text, lambda path: list(lines_of(path, errors="strict"))):
         with pytest.raises(FileError, match="not a text file"):

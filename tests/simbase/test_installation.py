@@ -127,7 +127,9 @@ def test_what_no_extra_brings_is_what_the_distributions_always_need(monkeypatch:
     assert install_command("sim") == "pip install unicorn packaging"
 
 
-def test_a_distribution_that_is_not_there_is_told_by_the_extra_that_brings_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_distribution_that_is_missing_is_reported_by_the_extra_that_brings_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     for there, missing in (
         (("p2os", "simbase"), {"bluepill-sim": "emulator", "robot-bench": "bench"}),
         (("bluepill-sim", "p2os", "simbase"), {"robot-bench": "bench"}),
@@ -140,7 +142,7 @@ def test_a_distribution_that_is_not_there_is_told_by_the_extra_that_brings_it(mo
     installation.installed_version.cache_clear()
 
 
-def test_a_package_of_two_distributions_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_package_of_two_distributions_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     @dataclass(frozen=True)
     class Point:
         name: str
@@ -155,7 +157,7 @@ def test_a_package_of_two_distributions_is_told(monkeypatch: pytest.MonkeyPatch)
 
 
 @pytest.mark.parametrize(
-    ("file", "compiler", "told"),
+    ("file", "compiler", "reported"),
     [
         ("_part.left_out", "/usr/bin/g++", "pip install --force-reinstall --no-deps -e /src (no C compiler was found)"),
         ("_part.left_out", "", "sudo apt-get install g++ && pip install --force-reinstall --no-deps -e /src (no"),
@@ -163,14 +165,14 @@ def test_a_package_of_two_distributions_is_told(monkeypatch: pytest.MonkeyPatch)
     ],
 )
 def test_a_part_that_was_not_compiled_says_why(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, file: str, compiler: str, told: str
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, file: str, compiler: str, reported: str
 ) -> None:
     (tmp_path / "package").mkdir()
     (tmp_path / "package" / "__init__.py").touch()
     (tmp_path / "package" / file).write_text("no C compiler was found\n", encoding="utf-8")
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.setattr(installation, "_origin", lambda _: '{"url": "file:///src", "dir_info": {"editable": true}}')
-    assert told in way_to_build("package._part", compiler)
+    assert reported in way_to_build("package._part", compiler)
     sys.modules.pop("package")
 
 
@@ -195,5 +197,5 @@ def test_no_page_or_hint_names_an_index_that_has_no_p2os() -> None:
     places = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]
     for package in ("p2os", "bluepill_sim", "robot_bench", "hardware"):
         places += (ROOT / package).rglob("*.py")
-    told = re.compile(r"""pip install (?:-\w+ )?["']?p2os\b""")
-    assert [str(path) for path in places if told.search(path.read_text(encoding="utf-8"))] == []
+    reported = re.compile(r"""pip install (?:-\w+ )?["']?p2os\b""")
+    assert [str(path) for path in places if reported.search(path.read_text(encoding="utf-8"))] == []

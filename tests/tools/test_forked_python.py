@@ -111,7 +111,7 @@ def test_what_cannot_be_handed_over_is_started(tmp_path: Path) -> None:
     assert subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT_S, check=True).stdout == "False\n"
 
 
-def test_a_module_that_is_not_there_is_told(tmp_path: Path) -> None:
+def test_a_module_that_is_not_there_is_reported(tmp_path: Path) -> None:
     code, _, err = ran(forked_python(), ["-m", "no_such_module"], tmp_path)
     assert (code, "No module named no_such_module" in err) == (1, True)
 

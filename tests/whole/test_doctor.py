@@ -35,14 +35,14 @@ def test_a_verb_of_another_house_is_refused_as_one_of_the_toolkit(
     words: list[str], said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run(words) == 2
-    told, hint = capsys.readouterr().err.splitlines()
-    assert told.startswith(said)
+    reported, hint = capsys.readouterr().err.splitlines()
+    assert reported.startswith(said)
     assert hint == f"hint: p2os {' '.join(word for word in words[:2] if word.isalpha())} --help"
 
 
 @pytest.mark.parametrize("verb", ["board", "mcu"])
 def test_a_verb_without_the_next_word_shows_what_there_is(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run([verb]) == 0
-    told = capsys.readouterr()
-    assert told.out.startswith(f"Usage: p2os {verb} [OPTIONS] COMMAND")
-    assert not told.err
+    reported = capsys.readouterr()
+    assert reported.out.startswith(f"Usage: p2os {verb} [OPTIONS] COMMAND")
+    assert not reported.err

@@ -83,9 +83,9 @@ def test_a_value_that_cannot_be_is_one_line_with_range_and_units(
     words: str, said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run(words.split()) == 2
-    told = capsys.readouterr().err.splitlines()
-    assert told[0].startswith(f"p2os: {said}")
-    assert len(told) == 2
+    reported = capsys.readouterr().err.splitlines()
+    assert reported[0].startswith(f"p2os: {said}")
+    assert len(reported) == 2
 
 
 @pytest.mark.parametrize(

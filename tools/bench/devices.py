@@ -189,7 +189,7 @@ class WirePart:
         return byte
 
 
-class Teller(WirePart):
+class Announcer(WirePart):
     """One that says ahead what it sends, as a flash does that is read."""
 
     def ahead(self, count: int) -> tuple[bytes, int | None]:
@@ -208,7 +208,7 @@ def buses(folder: Path) -> None:
     for name, device, is_i2c in (
         ("SPI at 18 MHz, MISO tied to MOSI", Loopback(), False),
         ("SPI at 18 MHz, a part in Python", WirePart(), False),
-        ("SPI at 18 MHz, a part in Python that says ahead", Teller(), False),
+        ("SPI at 18 MHz, a part in Python that says ahead", Announcer(), False),
         ("I2C at 400 kHz, the EEPROM", Loopback(), True),
     ):
         board = BluePill(elf)

@@ -169,9 +169,9 @@ def qemu_cpu_s(program: Path, seconds: float, commands: str, *options: str) -> t
         [*QEMU, *options, "-kernel", str(program)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     ) as qemu:
         time.sleep(seconds)
-        told, _ = qemu.communicate(f"{commands}quit\n", timeout=20)
+        output, _ = qemu.communicate(f"{commands}quit\n", timeout=20)
     after = os.times()
-    return after.children_user + after.children_system - before.children_user - before.children_system, told
+    return after.children_user + after.children_system - before.children_user - before.children_system, output
 
 
 def against_qemu(folder: Path) -> None:
@@ -187,8 +187,8 @@ def against_qemu(folder: Path) -> None:
     def pair() -> float:
         ours = rate(rounds, lambda: made.advance_to(made.now_ns + 40_000_000_000))
         start_s, _ = qemu_cpu_s(program, 0.1, "", "-S")
-        took_s, told = qemu_cpu_s(program, 2.0, f"stop\nxp /1wx {at:#x}\n")
-        word = next(line.split(":")[1] for line in told.splitlines() if line.startswith(f"{at:016x}:"))
+        took_s, output = qemu_cpu_s(program, 2.0, f"stop\nxp /1wx {at:#x}\n")
+        word = next(line.split(":")[1] for line in output.splitlines() if line.startswith(f"{at:016x}:"))
         return int(word, 16) / (took_s - start_s) / ours
 
     note = "of our rounds a CPU second, paired; goal 1.45 at most"

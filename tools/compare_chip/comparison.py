@@ -49,7 +49,7 @@ WORDS = {"whole": "one call", "random": "random slices"}
 
 
 #: chosen: different differences of a program that are printed; the others are counted.
-MOST_TOLD = 3
+MOST_SHOWN = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -180,12 +180,12 @@ class ChipComparison:
         return [one.text(lambda address: names.get(address, address)) for one in found]
 
     def _tell(self, found: dict[str, list[ComparedRun]]) -> None:
-        for text, runs in list(found.items())[:MOST_TOLD]:
+        for text, runs in list(found.items())[:MOST_SHOWN]:
             self.say("\n".join([f"  {runs[0]}", *(f"    {line}" for line in text.splitlines())]))
             if len(runs) > 1:
                 self.say(f"    and alike in {len(runs) - 1} more runs, the last: {runs[-1]}")
-        if len(found) > MOST_TOLD:
-            self.say(f"  {len(found) - MOST_TOLD} more differences (--level and --slices show them)")
+        if len(found) > MOST_SHOWN:
+            self.say(f"  {len(found) - MOST_SHOWN} more differences (--level and --slices show them)")
 
 
 #: The folder of what was seen, and of which kinds.

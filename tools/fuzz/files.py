@@ -627,11 +627,11 @@ def run_case(name: str, seed: Seed, data: bytes, folder: Path, rng: random.Rando
         with limited(LIMIT_S):
             FORMATS[name].use(path, rng)
     except P2osError as error:
-        told = str(error)
-        if "\n" in told or len(told) > LONGEST_MESSAGE or not told.isprintable():
-            raise CaseFailedError(f"a refusal that is no single line: {told[:200]!r}") from error
-        if not any(file in told for file in (str(folder), seed.name, *seed.beside)):
-            raise CaseFailedError(f"a refusal that names no file: {told!r}") from error
+        reported = str(error)
+        if "\n" in reported or len(reported) > LONGEST_MESSAGE or not reported.isprintable():
+            raise CaseFailedError(f"a refusal that is no single line: {reported[:200]!r}") from error
+        if not any(file in reported for file in (str(folder), seed.name, *seed.beside)):
+            raise CaseFailedError(f"a refusal that names no file: {reported!r}") from error
         return False
     except CaseTimeoutError as error:
         raise CaseFailedError(f"not done within {LIMIT_S:g} s of processor time") from error

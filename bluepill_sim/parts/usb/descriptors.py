@@ -102,14 +102,14 @@ class DeviceInfo:
     #: Numbers of the strings for maker, product and serial number; 0 for none.
     strings: tuple[int, int, int]
     configurations: int
-    #: The strings that it has told, by their numbers.
+    #: The strings that it has sent, by their numbers.
     texts: dict[int, str] = field(default_factory=dict, hash=False)
     configuration: ConfigurationInfo | None = None
 
     def __str__(self) -> str:
         """Return "0483:5740 maker, product, serial number"."""
-        told = ", ".join(self.texts[number] for number in self.strings if number in self.texts)
-        return f"{self.vendor:04x}:{self.product:04x} {told}".rstrip()
+        known = ", ".join(self.texts[number] for number in self.strings if number in self.texts)
+        return f"{self.vendor:04x}:{self.product:04x} {known}".rstrip()
 
 
 def packet_bytes_of(data: bytes) -> int:

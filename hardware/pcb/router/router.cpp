@@ -8,7 +8,7 @@
 // three rasters of foreign copper: track on layer 0, track on layer 1, via. Pads and keep-outs block
 // cells for good (`fixed`). The copper of routed nets only counts there (`busy`): a path may cross it at
 // a price that grows round by round, nets in conflict are ripped up and routed anew, and places that
-// were fought over stay dear (`history`). It ends when no cell is used twice.
+// were fought over stay costly (`history`). It ends when no cell is used twice.
 //
 // Input:  grid W H edge ; classes N then (track clearance via drill) each ; nets N then (name class) each ;
 //         pads N then (net layers x0 y0 x1 y1) each, net -1 for foreign copper ;

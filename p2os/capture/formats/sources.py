@@ -21,7 +21,7 @@ from simbase.files import reading
 RUN_WIRE = "wire.jsonl"
 #: chosen: what is held whole in memory, by `read_file`: 12 hours at 115200 baud. `open_file` takes any length.
 LARGEST_BYTES = 512 << 20
-#: chosen: what is read at a time; the kind of a file is told by its first block.
+#: chosen: what is read at a time; the kind of a file is known by its first block.
 BLOCK_BYTES = 1 << 16
 #: chosen: what is read at a time behind the first block; larger ones take more memory and hardly less time.
 LARGE_BLOCK_BYTES = 1 << 19

@@ -36,7 +36,7 @@ Examples:
 #: How often the picture is renewed; packets come ten times a second.
 PICTURES_PER_S = 10
 NEWS_LINES = 4
-#: What is told on stderr where no dashboard shows it: what explains a gap in the lines.
+#: What is reported on stderr where no dashboard shows it: what explains a gap in the lines.
 LINK_NOTICES = (LinkLost, Connected, GaveUp)
 
 
@@ -84,7 +84,7 @@ def _print_states(client: Robot, lasts_ns: Nanos | None, *, as_json: bool) -> No
         count += 1
     if not as_json:
         sys.stderr.write(f"{count} packets\n")
-    client.wait_open(0.0)  # whoever asked for so long a time is told when the robot is gone at its end
+    client.wait_open(0.0)  # whoever asked for so long a time hears when the robot is gone at its end
 
 
 def _tell(notice: Notice) -> None:

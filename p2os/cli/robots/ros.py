@@ -71,14 +71,14 @@ Examples:
 """
 #: chosen: within it a loop of 10 Hz may lose four messages.
 DEADMAN_NS: Nanos = 500 * NS_PER_MS
-#: chosen: how often health is told, as ROS' own nodes do.
+#: chosen: how often health is reported, as ROS' own nodes do.
 HEALTH_NS: Nanos = 1 * NS_PER_S
 #: chosen: how long a wait for the network holds a signal off at most, before STOP leaves.
 LOOK_S = 0.02
 #: chosen: a message that a publisher repeats 20 times a second is complained of once.
 COMPLAINT_NS: Nanos = 1 * NS_PER_S
-#: What is told on stderr.
-TOLD = (Connected, LinkLost, GaveUp, DeadmanStopped, GapStopped, MotorsDisabled)
+#: What is reported on stderr.
+REPORTED = (Connected, LinkLost, GaveUp, DeadmanStopped, GapStopped, MotorsDisabled)
 #: In place of a URL.
 URDF = "urdf"
 
@@ -264,7 +264,7 @@ class NodeLoop:
             self._is_open, self._link = False, words_of(notice)
         if isinstance(notice, LinkLost | GapStopped | DeadmanStopped | MotorsDisabled):
             self._node.stopped()
-        if isinstance(notice, TOLD):
+        if isinstance(notice, REPORTED):
             sys.stderr.write(f"{words_of(notice)}\n")
 
     def _ask(self, asked: Asked) -> str:

@@ -1,7 +1,7 @@
 """What the bodies on a physics engine share: their state as it is read, stalls, and what the engine moves.
 
 The engine's own state is one value, `engine_state`, that any process can take up; all that is
-told of it here is worked out from poses and speeds that the engine gives.
+said of it here is worked out from poses and speeds that the engine gives.
 """
 
 import math

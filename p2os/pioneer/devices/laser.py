@@ -46,7 +46,7 @@ class LaserModel:
     #: Angle between readings.
     step_cdeg: int
     range_m: float
-    #: What is nearer a real one does not see; the simulated one sees it, and a program is told by the laser's sheet.
+    #: What is nearer a real one does not see; the simulated one sees it, and the laser's sheet says so to a program.
     nearest_m: float = NEAREST_M
 
     def __post_init__(self) -> None:

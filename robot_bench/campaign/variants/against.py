@@ -116,7 +116,7 @@ def compared(one: Outcome, other: Outcome, names: tuple[str, str]) -> Outcome:
     is_other = _missed(one) != _missed(other)
     by = MOST_APART - apart if not is_other else min(MOST_APART - apart, 0.0)
     differs = is_other or apart > MOST_APART
-    says = "; ".join(f"{name} {_told(run, at)}" for name, run, at in zip(names, (one, other), margins, strict=True))
+    says = "; ".join(f"{name} {_reported(run, at)}" for name, run, at in zip(names, (one, other), margins, strict=True))
     goal = GoalResult(
         kind=KIND, wanted=f"does what {names[1]} does", met=not differs, says=says, robustness=round(by, 9), unit=""
     )
@@ -136,7 +136,7 @@ def first_apart(trial: Trial, other: Other) -> Difference | None:
     return found[0] if found else None
 
 
-def told(difference: Difference) -> str:
+def reported(difference: Difference) -> str:
     """Return when and in what two runs part."""
     return f"they part at {difference.at / NS_PER_S:.6f} s, first in {difference.signal}"
 
@@ -153,6 +153,6 @@ def _missed(outcome: Outcome) -> object:
     return frozenset((goal.robot, goal.wanted) for goal in outcome.failing_goals), bool(outcome.died)
 
 
-def _told(outcome: Outcome, at: float) -> str:
+def _reported(outcome: Outcome, at: float) -> str:
     what = outcome.failures[0] if outcome.failures else "passes"
     return f"{what} (margin {at:.2f})"

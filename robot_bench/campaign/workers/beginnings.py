@@ -18,7 +18,7 @@ from functools import partial
 from typing import TypeAlias, cast
 
 from p2os.toml_schema import Table
-from robot_bench.bench import Bench
+from robot_bench.bench import Bench, run_of
 from robot_bench.campaign.trial import Done, Outcome, SeenSoFar, Trial, bench_of, blocks_of, run_trial, unpacked
 from simbase.errors import P2osError
 from simbase.timing import NS_PER_S, Nanos
@@ -53,7 +53,7 @@ class SavedBeginning:
             UsageError: Its run is another until then.
         """
         snapshot, seen = pickle.loads(zlib.decompress(self.packed))  # noqa: S301 - of this campaign
-        bench.begin_as(snapshot, self.at)
+        run_of(bench).begin_as(snapshot, self.at)
         return cast("SeenSoFar", seen)
 
 

@@ -21,7 +21,7 @@ from robot_bench.campaign.journal import NAME as JOURNAL
 from robot_bench.campaign.results import SHOWN_HASH, Whole
 from robot_bench.campaign.search import SEARCHES
 from robot_bench.campaign.suggestion import suggested
-from robot_bench.campaign.variants.against import Against, Other, first_apart, told
+from robot_bench.campaign.variants.against import Against, Other, first_apart, reported
 from robot_bench.campaign.variants.diversity import FailureSet
 from robot_bench.campaign.whole import begin, carry_out, resume
 from robot_bench.campaign.workers.processes import Processes
@@ -53,8 +53,8 @@ Examples:
   p2os campaign c.toml --firmware new.elf --against old.elf    where do they differ?
   p2os campaign big.toml --dask local -j 4       workers of Dask
 """
-#: chosen: so many failures are told of one by one.
-MOST_TOLD = 12
+#: chosen: so many failures are shown one by one.
+MOST_SHOWN = 12
 #: Where the folders of campaigns are made.
 CAMPAIGNS = Path("campaigns")
 
@@ -190,15 +190,15 @@ def _workers(found: Campaign, jobs: int, dask: str | None, scheduler: str | None
 @contextlib.contextmanager
 def shown(found: Campaign) -> Iterator[Callable[[CampaignProgress], None]]:
     """Tell on stderr how a campaign goes: a bar on a terminal, elsewhere a line each tenth; yield what is told."""
-    whole, told = found.budget.runs, 0
+    whole, reported = found.budget.runs, 0
 
     def update(progress: CampaignProgress) -> None:
-        nonlocal told
+        nonlocal reported
         points = progress.answered
         said = f"{progress.runs} runs, {len(progress.failures)} failures, {len(progress.blocks)} blocks"
         tell_bar(points, said)
-        if not sys.stderr.isatty() and points * 10 // whole > told:
-            told = points * 10 // whole
+        if not sys.stderr.isatty() and points * 10 // whole > reported:
+            reported = points * 10 // whole
             typer.echo(f"{points} of {whole} points: {said}", err=True)
 
     with counting_bar("points", whole) as tell_bar:
@@ -224,16 +224,16 @@ def tell(done: Whole, other: Other | None, *, json_output: bool) -> None:
 def parted(done: Whole, other: Other) -> dict[int, str]:
     """Return of the first points where two versions differ when and in what they part."""
     found: dict[int, str] = {}
-    for row in done.failures[:MOST_TOLD]:
+    for row in done.failures[:MOST_SHOWN]:
         difference = None if row.failing is None else first_apart(row.failing.trial, other)
         if difference is not None:
-            found[row.number] = told(difference)
+            found[row.number] = reported(difference)
     return found
 
 
 def print_whole(done: Whole, parts: Mapping[int, str], other: Other | None) -> None:
     """Print the failures, each with the command that runs it again, what else was found, and the sum."""
-    for row in done.failures[:MOST_TOLD]:
+    for row in done.failures[:MOST_SHOWN]:
         run = row.failing
         if run is None:
             continue
@@ -244,8 +244,8 @@ def print_whole(done: Whole, parts: Mapping[int, str], other: Other | None) -> N
         if row.number in parts:
             typer.echo(f"        {parts[row.number]}")
         typer.echo(f"        {done.results.replay(row)}")
-    if len(done.failures) > MOST_TOLD:
-        typer.echo(f"and {len(done.failures) - MOST_TOLD} more; {done.folder / 'failures'} has all")
+    if len(done.failures) > MOST_SHOWN:
+        typer.echo(f"and {len(done.failures) - MOST_SHOWN} more; {done.folder / 'failures'} has all")
     print_errors(done)
     for line in _facts(done, other):
         typer.echo(line)
@@ -275,11 +275,11 @@ def _facts(done: Whole, other: Other | None) -> Iterator[str]:
 
 def print_errors(done: Whole) -> None:
     """Print why points have no verdict that holds, each reason once with its points."""
-    untold: dict[tuple[PointFinding, str], list[int]] = {}
+    unexplained: dict[tuple[PointFinding, str], list[int]] = {}
     for row in done.progress.rows:
         if row.finding in {PointFinding.ERROR, PointFinding.NOT_REPEATED}:
             why = next((run.outcome.failures[0] for run in row.runs if run.outcome.failures), "")
-            untold.setdefault((row.finding, why), []).append(row.number)
-    for (finding, why), numbers in [*untold.items()][:MOST_TOLD]:
-        places = ", ".join(map(str, numbers[:MOST_TOLD])) + (", …" if len(numbers) > MOST_TOLD else "")
+            unexplained.setdefault((row.finding, why), []).append(row.number)
+    for (finding, why), numbers in [*unexplained.items()][:MOST_SHOWN]:
+        places = ", ".join(map(str, numbers[:MOST_SHOWN])) + (", …" if len(numbers) > MOST_SHOWN else "")
         typer.echo(f"{finding.value}  point{'s' if len(numbers) > 1 else ''} {places}: {why}")

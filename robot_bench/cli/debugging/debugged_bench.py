@@ -16,6 +16,7 @@ from bluepill_sim.core.halts import ChipReached
 from bluepill_sim.errors import BluePillError
 from robot_bench.bench import Bench
 from robot_bench.remote import RemoteBench
+from robot_bench.run import held
 from simbase.timing import Nanos, Reason
 
 
@@ -112,7 +113,7 @@ def _advanced(
         reached = run(limit)
         if reached.halt is not None:
             halts.append(reached)
-            bench.loop.note_halt(is_inside_block=board.chip.engine.is_inside_block)
+            held(bench).loop.note_halt(is_inside_block=board.chip.engine.is_inside_block)
         return reached
 
     run_until(limit_ns, advance)

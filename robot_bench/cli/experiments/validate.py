@@ -28,9 +28,9 @@ from robot_bench.experiments.validation.trials import (
     longest_s,
     port_runs,
     refuse,
+    reported,
     run_port,
     run_trials,
-    told,
     variants,
 )
 from robot_bench.recording.run_folder import RUNS, make_next_folder
@@ -43,8 +43,8 @@ from simbase.errors import UsageError, nearest
 from simbase.files import writing
 
 REPORT, FIGURES = "validation.html", "validation.json"
-#: chosen: so many failures are told of one by one.
-MOST_TOLD = 20
+#: chosen: so many failures are shown one by one.
+MOST_SHOWN = 20
 HELP = """Validate the bench by experiments: motors, sensors, encoders.
 
 Each EXPERIMENT has a hypothesis, figures with units, and a bound for each, whose
@@ -240,7 +240,7 @@ def _plain(results: Sequence[TrialResult]) -> Json:
         "results": [
             {
                 "experiment": result.experiment, "variant": result.variant.name, "world": result.world,
-                "seed": result.seed, "passed": result.passed, "failures": told(result), "folder": result.folder,
+                "seed": result.seed, "passed": result.passed, "failures": reported(result), "folder": result.folder,
                 "trace_sha256": result.trace_sha256,
                 "figures": [one.to_plain() for one in result.findings if isinstance(one, Figure)],
             }
@@ -265,13 +265,13 @@ def _print(results: Sequence[TrialResult], folder: Path) -> None:
         shown = "" if near is None else f"{min(near.share, 999):.2f}  {near.what}"
         table.add_row(name, Text(f"{passed} of {len(found)}", colour), shown)
     console.print(table)
-    lines = [f"{result.variant.name}: {line}" for result in results for line in told(result)]
-    for line in lines[:MOST_TOLD]:
+    lines = [f"{result.variant.name}: {line}" for result in results for line in reported(result)]
+    for line in lines[:MOST_SHOWN]:
         console.print(Text.assemble(("failed", "red"), f"  {line}"), soft_wrap=True)
-    if len(lines) > MOST_TOLD:
-        console.print(f"and {len(lines) - MOST_TOLD} more, in the report")
-    untold = [name for name in loose(one for r in results for one in r.findings) if name not in LOOSE_BECAUSE]
-    if untold and not lines:
-        console.print(f"note    half of these bounds would do for these runs: {', '.join(untold)}", soft_wrap=True)
+    if len(lines) > MOST_SHOWN:
+        console.print(f"and {len(lines) - MOST_SHOWN} more, in the report")
+    unexplained = [name for name in loose(one for r in results for one in r.findings) if name not in LOOSE_BECAUSE]
+    if unexplained and not lines:
+        console.print(f"note    half of these bounds would do for these runs: {', '.join(unexplained)}", soft_wrap=True)
     verdict = "passed" if not lines else "FAILED"
     console.print(f"{verdict} in {len(chosen)} variants; report: {folder / REPORT}", soft_wrap=True)

@@ -7,7 +7,7 @@ the speeds told over those commanded; `reversal_s` is how long an axis stands wh
 firmware that ramps in steps half a step at least.
 
 A manoeuvre, from one command to the next, is a cluster: what a command comes late by, or motors lag, lasts as long as
-it. Speeds are told in whole grains: where a speed is held, every packet of every such manoeuvre is off by the same part
+it. Speeds come in whole grains: where a speed is held, every packet of every such manoeuvre is off by the same part
 of a grain, so that intervals count with robots near by that round alike. What the speeds do within a manoeuvre where
 none changes says how much noise there is before they are rounded, which would make them round each time otherwise.
 
@@ -28,7 +28,7 @@ from simbase.errors import FileError
 
 #: The grain of a speed on the wire: 1 mm/s, evenly spread.
 GRAIN_MPS = 1e-3 / 12**0.5
-#: chosen: a step of more deviations than this, of those that are told of a speed that is held, lies on a ramp.
+#: chosen: a step of more deviations than this, of those reported of a speed that is held, lies on a ramp.
 OUTLIER_DEVIATIONS = 4.0
 #: What either axis has.
 AXES = ("accel_mm_s2", "decel_mm_s2", "speed_gain"), ("rot_accel_deg_s2", "rot_decel_deg_s2", "turn_gain")
@@ -75,7 +75,7 @@ def fit_ramps(drives: Sequence[Drive]) -> Fit:
         FileError: A drive has no packets, or no speed is commanded in it, or too few are.
     """
     motion = drives[0].parameters.motion
-    told = [_Told.of(drive) for drive in drives]
+    reported = [_Reported.of(drive) for drive in drives]
     parameters = [
         Parameter(name="command_delay_s", start=0.05, scale=0.1, least=-0.1, most=1.0),
         Parameter(name="accel_mm_s2", start=float(motion.accel_mm_s2), scale=100.0, least=10.0, most=10_000.0),
@@ -86,11 +86,11 @@ def fit_ramps(drives: Sequence[Drive]) -> Fit:
         Parameter(name="turn_gain", start=1.0, scale=0.05, least=0.5, most=2.0),
         Parameter(name="reversal_s", start=0.005, scale=0.02, least=0.0, most=0.5),
     ]
-    speeds: Floats = np.concatenate([one.speeds.ravel() for one in told])
+    speeds: Floats = np.concatenate([one.speeds.ravel() for one in reported])
     grain = grain_of(speeds)
 
     def model(values: Floats) -> Floats:
-        return np.asarray(np.concatenate([one.model(values).ravel() for one in told]), dtype=np.float64)
+        return np.asarray(np.concatenate([one.model(values).ravel() for one in reported]), dtype=np.float64)
 
     def residuals(values: Floats) -> Floats:
         return np.asarray(model(values) - speeds, dtype=np.float64)
@@ -101,14 +101,14 @@ def fit_ramps(drives: Sequence[Drive]) -> Fit:
         return np.asarray(exact - np.round((exact + noise) / grain) * grain, dtype=np.float64)
 
     rounding = Rounding(redrawn=redrawn, groups=AXES) if grain else None
-    noise_mps = noise_before(_scatter(np.concatenate([one.held_steps() for one in told]), grain), grain)
-    counts = [int(one.manoeuvres[-1]) + 1 for one in told]
-    numbers = np.concatenate([np.repeat(one.manoeuvres, 2) + sum(counts[:n]) for n, one in enumerate(told)])
+    noise_mps = noise_before(_scatter(np.concatenate([one.held_steps() for one in reported]), grain), grain)
+    counts = [int(one.manoeuvres[-1]) + 1 for one in reported]
+    numbers = np.concatenate([np.repeat(one.manoeuvres, 2) + sum(counts[:n]) for n, one in enumerate(reported)])
     return fit(residuals, parameters, numbers, floor=GRAIN_MPS, why=WHY, rounding=rounding)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Told:
+class _Reported:
     """What the packets of a drive tell, and what was commanded."""
 
     times: Floats
@@ -122,8 +122,8 @@ class _Told:
     manoeuvres: npt.NDArray[np.int64]
 
     @classmethod
-    def of(cls, drive: Drive) -> "_Told":
-        left, right = drive.told_left_mps, drive.told_right_mps
+    def of(cls, drive: Drive) -> "_Reported":
+        left, right = drive.reported_left_mps, drive.reported_right_mps
         if left is None or right is None or not len(left.t_s):
             raise FileError(f"{drive.name} has no packets with speeds")
         axes = [drive.commands.get(name, Steps(np.zeros(0), np.zeros(0))) for name in ("VEL", "RVEL")]

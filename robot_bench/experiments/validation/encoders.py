@@ -50,7 +50,7 @@ def encoder_figures(record: RunRecord, nominal: Nominal) -> list[Finding]:
         return [Missing(group="pins", what="encoder pins", why="the motor pins never said anything but 0")]
     result: list[Finding] = []
     moving: list[Figure] = []
-    told: list[Figure] = []
+    reported: list[Figure] = []
     poses = nominal.packet_poses(record)
     for side in SIDES:
         steps = encoder_steps(record, side, start)
@@ -58,7 +58,7 @@ def encoder_figures(record: RunRecord, nominal: Nominal) -> list[Finding]:
             return [Missing(group="pins", what="encoder pins", why=f"no wire of {side} was recorded")]
         result.append(_changes(steps, side))
         if not nominal.is_direct:
-            told += _after_packets(nominal, poses, side, steps)
+            reported += _after_packets(nominal, poses, side, steps)
         if nominal.at_port:
             continue
         whole = _beginning(record, nominal, side, start, steps[0][1])
@@ -73,7 +73,7 @@ def encoder_figures(record: RunRecord, nominal: Nominal) -> list[Finding]:
                 nominal.encoder_bound(0.0 if is_within_turn else _fastest(record, nominal, pose.t, side)),
             ))  # fmt: skip
     if not nominal.is_direct:
-        result.append(worst_or_missing(told, "pins", BY_PACKETS, "no packet came"))
+        result.append(worst_or_missing(reported, "pins", BY_PACKETS, "no packet came"))
     if not nominal.at_port:
         result.append(worst_or_missing(moving, "motion", BY_ANGLE, "no pose was recorded"))
     return result
@@ -174,10 +174,10 @@ def sparse_figures(record: RunRecord, nominal: Nominal) -> list[Finding]:
 
 def wrap_figure(record: RunRecord, profile: Profile) -> Finding:
     """Return whether the position in the packets wraps at all: it counts no negative numbers."""
-    told = [(sip.raw_x, sip.raw_y) for _, sip in packets(record, profile)]
+    reported = [(sip.raw_x, sip.raw_y) for _, sip in packets(record, profile)]
     wraps = sum(
         abs(now - before) > POSITION_MODULUS // 2
-        for one, other in pairwise(told) for before, now in zip(one, other, strict=True)
+        for one, other in pairwise(reported) for before, now in zip(one, other, strict=True)
     )  # fmt: skip
     return Figure(
         group="wire", what="a wrap of the position counter, at least", expected=1, measured=min(wraps, 1),

@@ -140,15 +140,15 @@ def drive_figures(trial: ExperimentTrial) -> list[Finding]:
 
 def _drive_at_port(trial: ExperimentTrial) -> list[Finding]:
     """Return what the packets tell of a drive: stalls, and the goals that can be judged from outside."""
-    told = packets(trial.record, trial.scenario.controller.family_of(trial.scenario.parameters))
-    if not told:
+    reported = packets(trial.record, trial.scenario.controller.family_of(trial.scenario.parameters))
+    if not reported:
         return [Missing(group="wire", what="packets with a stall", why="no packet came")]
-    stalls = [t for t, sip in told if sip.stall_left or sip.stall_right]
+    stalls = [t for t, sip in reported if sip.stall_left or sip.stall_right]
     judgement = trial.judgement
     return [
         Figure(
             group="wire", what="packets with a stall", expected=0, measured=len(stalls), uncertainty=0, unit="",
-            bound=FigureTolerance(name="stalls", value=0, formula="none"), count=len(told),
+            bound=FigureTolerance(name="stalls", value=0, formula="none"), count=len(reported),
             at=f"{stalls[0] / NS_PER_S:.2f} s" if stalls else "",
         ),
         Figure(

@@ -143,15 +143,15 @@ class Nominal:
 
     def speed_bound(self, pair: tuple[int, int]) -> FigureTolerance:
         """How far a steady rim speed may be off, mm/s."""
-        seen, told = (PORT_MM_S, "of its packets") if self.at_port else (BODY_MM_S, "of the trace")
+        seen, reported = (PORT_MM_S, "of its packets") if self.at_port else (BODY_MM_S, "of the trace")
         if self.is_direct:
-            return FigureTolerance(name="rim speed, direct", value=seen, formula=f"resolution {told} {seen:g} mm/s")
+            return FigureTolerance(name="rim speed, direct", value=seen, formula=f"resolution {reported} {seen:g} mm/s")
         (vel, _), (rvel, _) = self.rounding(pair)
         rim = math.radians(rvel) * self.track_mm / 2
         return FigureTolerance(
             name="rim speed" + self._kind(pair), value=vel + rim + seen,
             formula=f"{vel:.3g} mm/s (VEL is whole mm/s) + {rvel:.3g} deg/s x {self.track_mm / 2:g} mm (RVEL is whole"
-            f" deg/s) + resolution {told} {seen:g} mm/s = {vel + rim + seen:.3g} mm/s",
+            f" deg/s) + resolution {reported} {seen:g} mm/s = {vel + rim + seen:.3g} mm/s",
         )  # fmt: skip
 
     def rounding_bounds(self, pair: tuple[int, int]) -> tuple[FigureTolerance, FigureTolerance]:

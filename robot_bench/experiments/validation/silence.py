@@ -25,7 +25,7 @@ def silence_figures(record: RunRecord, nominal: Nominal) -> list[Finding]:
     if down is None:
         return [Missing(group="wire", what="a line that goes down", why="no fault was injected")]
     # What was on its way when the line went down still comes.
-    told, heard = (
+    reported, heard = (
         max((one.t for one in record.wire if one.direction == way and one.t < down + 100 * NS_PER_MS), default=0)
         for way in ("r2c", "c2r")
     )
@@ -35,7 +35,7 @@ def silence_figures(record: RunRecord, nominal: Nominal) -> list[Finding]:
     pins: list[Figure] = [
         Figure(
             group="pins", what="the last packet to the distance pins that are safe", expected=nominal.liveness_s,
-            measured=(t - told) / NS_PER_S, uncertainty=1e-9, unit="s", at=wire,
+            measured=(t - reported) / NS_PER_S, uncertainty=1e-9, unit="s", at=wire,
             bound=FigureTolerance(name="liveness", value=0, formula="in the very nanosecond"),
         )
         for wire, t in zip(distance_wires(), edges, strict=True) if t is not None

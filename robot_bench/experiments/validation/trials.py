@@ -192,7 +192,7 @@ def _do(
         expected = _in_variant(experiment, run, ())
         trial = ExperimentTrial(record=record, nominal=Nominal(expected), scenario=expected, judgement=judgement)
         results.append(_result(experiment, run, tuple(experiment.measure(trial)), bench.trace.sha256))
-    failures = [text for result in results for text in told(result)]
+    failures = [text for result in results for text in reported(result)]
     if failures:
         place = folder / "-".join(_word(part) for part in (results[0].experiment, run.variant.name, *_where(run)))
         write_run(bench, place, "; ".join(failures[:3]), files=files)
@@ -223,7 +223,7 @@ def _results(run: _Run, found: Json) -> list[TrialResult]:
     return [_result(one, run, (Missing(group="pins", what="the run", why=why),)) for one in run.experiments]
 
 
-def told(result: TrialResult) -> list[str]:
+def reported(result: TrialResult) -> list[str]:
     """Return a line for each figure that fails."""
     lines = []
     for one in result.failures:

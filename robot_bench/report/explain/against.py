@@ -13,7 +13,7 @@ from robot_bench.report.explain.probing import Prober
 from robot_bench.report.explain.replay import ChipReplay
 from simbase.timing import NS_PER_MS, Nanos
 
-#: chosen: two programs that differ for less are not told of: they take turns at other instants.
+#: chosen: two programs that differ for less are not reported: they take turns at other instants.
 _LASTS_NS: Nanos = 60 * NS_PER_MS
 
 
@@ -29,7 +29,7 @@ def compare(prober: Prober, reference: Path, until: Nanos) -> list[ChainLink]:
     since: Nanos | None = None
     for at in [*sorted({t for seen in (ours, theirs) for t, net, _ in seen.edges if net.startswith("motor")}), until]:
         if since is not None and at - since > _LASTS_NS:
-            return [_told(prober, replay, reference, since)]
+            return [_reported(prober, replay, reference, since)]
         same = prober.codes_with(ours, at) == prober.codes_with(theirs, at)
         since = None if same else at if since is None else since
     return [
@@ -42,7 +42,7 @@ def compare(prober: Prober, reference: Path, until: Nanos) -> list[ChainLink]:
     ]
 
 
-def _told(prober: Prober, replay: ChipReplay, reference: Path, since: Nanos) -> ChainLink:
+def _reported(prober: Prober, replay: ChipReplay, reference: Path, since: Nanos) -> ChainLink:
     at = since + _LASTS_NS
     codes = [prober.codes_with(one.run(0, at), at) for one in (prober.replay, replay)]
     high = [net for net in prober.sensors if prober.replay.level(net, since)]

@@ -4,7 +4,7 @@ Theory of operation. Each link is looked at in turn, and the first that did not 
 
     obeyed    did the wheels do what the motor pins asked?            else: link, robot, adapter
     in sight  was the place in a sensor's cone before it was touched? else: a blind spot
-    told      did that sensor's pin go high?                          else: sensor, line, adapter
+    reported  did that sensor's pin go high?                          else: sensor, line, adapter
     noticed   does the program's way, or a variable, depend on it?    else: the program does not look, or looks away
     in time   how much of the time that was left had gone by then?    else: late
     away      does it answer by turning away from the sensor's side?  else: sides or sensors exchanged
@@ -12,7 +12,7 @@ Theory of operation. Each link is looked at in turn, and the first that did not 
 
 Where all hold, the program did answer, in time, and whether its answer was right is not known: so it is said.
 
-Invariant: a cause is told only of a link whose failure was recorded, or shown by two replays that differ in it.
+Invariant: a cause is given only of a link whose failure was recorded, or shown by two replays that differ in it.
 """
 
 import math
@@ -28,11 +28,11 @@ from robot_bench.report.explain.findings import (
     all_steady_since,
     ended,
     held_codes,
+    in_words,
     injected,
     numbers,
     obeyed,
     steady_since,
-    told,
 )
 from robot_bench.report.explain.probing import SAME_NS, Prober, SensorResponse
 from robot_bench.report.explain.replay import Hold
@@ -47,11 +47,11 @@ TELLING_NS: Nanos = 600 * NS_PER_MS
 LATE_PART, LATE_NS = 0.4, 150 * NS_PER_MS
 #: chosen: for so long nobody drives straight on at something near that he sees.
 STRAIGHT_S = 1.0
-#: chosen: a side is told of at least so many moments that agree.
+#: chosen: a side is named of at least so many moments that agree.
 AGREEING = 3
 
 
-class ContactInquest:
+class ContactAnalysis:
     """Looks for why one contact came about.
 
     Args:
@@ -74,7 +74,7 @@ class ContactInquest:
         """Return the first link that did not hold, or what is known."""
         self._tell_motion()
         links: Sequence[Callable[[], Finding | None]] = (
-            self._is_obeyed, self._is_in_sight, self._is_told, self._is_noticed, self._is_in_time, self._is_away,
+            self._is_obeyed, self._is_in_sight, self._is_reported, self._is_noticed, self._is_in_time, self._is_away,
             self._is_left,
         )  # fmt: skip
         for link in links:
@@ -112,7 +112,7 @@ class ContactInquest:
         codes, began = steady_since(self.scene.record, hit.t - NS_PER_MS)
         if sum(codes) < 0:
             return Finding(
-                f"the robot was driven backwards (motors {told(codes)}) since {began / NS_PER_S:.3f} s, where no "
+                f"the robot was driven backwards (motors {in_words(codes)}) since {began / NS_PER_S:.3f} s, where no "
                 "sensor looks; whether that was right is not known",
                 is_cause=False,
             )
@@ -123,7 +123,7 @@ class ContactInquest:
             f"{math.degrees(ahead):.0f}° beside the axis of the nearest one",
         )
 
-    def _is_told(self) -> Finding | None:
+    def _is_reported(self) -> Finding | None:
         if self.on or not self.expected:
             return None
         first = min(self.expected.values())
@@ -189,7 +189,7 @@ class ContactInquest:
     def _is_in_time(self) -> Finding | None:
         prober = self._prober
         if not self.on or prober is None or self._effect.noticed is None:
-            return None  # what is not noticed is told of before
+            return None  # what is not noticed is reported before
         since = min(self.on.values())
         took, left = self._effect.noticed - since, self.hit.t - since
         if took >= LATE_NS and took >= LATE_PART * left:
@@ -256,7 +256,7 @@ class ContactInquest:
                 asked[-1][net].at,
                 "firmware",
                 f"when {prober.replay.pin(net)}, which looks {self._side(net)}, alone goes high, the motors go from "
-                f"{told(asked[-1][net].base)} to {told(asked[-1][net].codes)}: a turn to the "
+                f"{in_words(asked[-1][net].base)} to {in_words(asked[-1][net].codes)}: a turn to the "
                 f"{self._side(net)}; so at {len(asked)} times",
                 Evidence.CHANGED,
             )
@@ -280,13 +280,13 @@ class ContactInquest:
         lost = self._lost_reverse(self._prober)
         if lost:
             return Finding(f"the program never asks the {lost[0]} motor to go backwards, though it does the {lost[1]} "
-                           f"one: it drives straight on (motors {told(codes)}) where the mirrored answer would turn "
-                           f"it, for the last {held:.2f} s, with {nets} high")  # fmt: skip
+                           f"one: it drives straight on (motors {in_words(codes)}) where the mirrored answer would "
+                           f"turn it, for the last {held:.2f} s, with {nets} high")  # fmt: skip
         if self._effect.after == codes:
             return None  # it is not the sensors that make it drive so, and what else does is not known
         return Finding(
-            f"the program drives straight on (motors {told(codes)}) for the last {held:.2f} s, with {nets} high all "
-            f"the time; without them it would have set {told(self._effect.after)}"
+            f"the program drives straight on (motors {in_words(codes)}) for the last {held:.2f} s, with {nets} high "
+            f"all the time; without them it would have set {in_words(self._effect.after)}"
         )
 
     def _lost_reverse(self, prober: Prober) -> tuple[str, str] | None:
@@ -324,7 +324,7 @@ class ContactInquest:
             given, without = effect.otherwise  # it answered, and has done with it
             took += f", for {effect.otherwise_ns / NS_PER_S:.2f} s"
         return Finding(
-            f"the program answered{took} (motors {told(without)} without, {told(given)} with "
+            f"the program answered{took} (motors {in_words(without)} without, {in_words(given)} with "
             f"{numbers(list(self.on))}); whether that answer was right is not known",
             is_cause=False,
         )
@@ -386,7 +386,7 @@ class ContactInquest:
         if not times:
             return
         at = max(times)
-        codes = told(steady_since(prober.replay.record, hit.t)[0])
+        codes = in_words(steady_since(prober.replay.record, hit.t)[0])
         net = next(
             net for net in prober.replay.outputs if net.startswith("motor") and at in self.scene.record.pins[net].times
         )

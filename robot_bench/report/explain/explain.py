@@ -17,10 +17,10 @@ from robot_bench.events.kinds import Contact, Verdict
 from robot_bench.recording.run_record import RunRecord
 from robot_bench.report.explain.against import compare
 from robot_bench.report.explain.chain import ChainLink, Evidence, Explanation, Standing
-from robot_bench.report.explain.contact import ContactInquest
+from robot_bench.report.explain.contact import ContactAnalysis
 from robot_bench.report.explain.findings import Finding, ended, numbers, obeyed
 from robot_bench.report.explain.probing import NOTICE_NS, Prober
-from robot_bench.report.explain.progress import ProgressInquest, fed, words_of
+from robot_bench.report.explain.progress import ProgressAnalysis, fed, words_of
 from robot_bench.report.explain.replay import ChipReplay, Hold
 from robot_bench.report.explain.scene import Scene
 from simbase.errors import P2osError
@@ -114,7 +114,7 @@ def _find(record: RunRecord, scene: Scene, prober: Prober | None, failure: str) 
     if failure.startswith((*_TOUCH, "contact")) and hit is not None:
         return _contact(scene, prober, hit)
     if failure.partition(":")[0] in _WAY:
-        progress = ProgressInquest(scene, prober, at)
+        progress = ProgressAnalysis(scene, prober, at)
         return progress.find(), progress.steps
     if failure.startswith("energy:"):
         # A program that takes no notice of anything takes no more work for that.
@@ -163,20 +163,20 @@ def _ignored(prober: Prober | None, at: Nanos) -> str:
 
 def _contact(scene: Scene, prober: Prober | None, hit: Contact) -> tuple[Finding, list[ChainLink]]:
     resets = [] if prober is None else [r for r in prober.replay.resets if 0 <= hit.t - r.at < _AFTER_RESET_NS]
-    inquest = ContactInquest(scene, prober, hit)
+    analysis = ContactAnalysis(scene, prober, hit)
     if prober is not None and hit.t > prober.replay.end:
-        inquest = ContactInquest(scene, None, hit)
+        analysis = ContactAnalysis(scene, None, hit)
     if prober is not None and resets:
         reset = resets[-1]
-        inquest._tell_motion()  # noqa: SLF001 - the same steps without its links
-        steps = inquest.steps
+        analysis._tell_motion()  # noqa: SLF001 - the same steps without its links
+        steps = analysis.steps
         steps.append(ChainLink(t=reset.at, part="firmware", says=f"is reset by {reset.cause}, while at {reset.place}",
-                               evidence=Evidence.REPLAYED))  # fmt: skip
+                          evidence=Evidence.REPLAYED))  # fmt: skip
         tail = fed(prober, reset.cause, steps)
         return Finding(
             f"{words_of(reset)} reset the chip {(hit.t - reset.at) / NS_PER_S:.2f} s before the contact{tail}"
         ), steps
-    return inquest.find(), inquest.steps
+    return analysis.find(), analysis.steps
 
 
 def _died(record: RunRecord, prober: Prober | None, at: Nanos) -> tuple[Finding, list[ChainLink]] | None:

@@ -64,7 +64,7 @@ def codes_between(record: RunRecord, since: Nanos, until: Nanos) -> Way:
     return [(t, codes) for t, (codes, _) in zip(at, all_steady_since(record, at), strict=True)]
 
 
-def told(codes: Codes) -> str:
+def in_words(codes: Codes) -> str:
     """Return the codes of both motors as a person reads them."""
     return f"{codes[0]:+d}, {codes[1]:+d}"
 
@@ -77,8 +77,8 @@ def held_codes(way: Way, until: Nanos) -> str:
     held = max(spans, key=lambda codes: spans[codes])
     whole = until - way[0][0]
     if whole - spans[held] < SAME_NS:
-        return told(held)
-    return f"{told(held)} for {spans[held] / NS_PER_S:.2f} of {whole / NS_PER_S:.2f} s"
+        return in_words(held)
+    return f"{in_words(held)} for {spans[held] / NS_PER_S:.2f} of {whole / NS_PER_S:.2f} s"
 
 
 def obeyed(record: RunRecord, step_mps: float, at: Nanos, steps: list[ChainLink]) -> Finding | None:
@@ -207,9 +207,9 @@ def ended(prober: Prober, silent: Nanos, failed: Nanos, steps: list[ChainLink]) 
                                evidence=Evidence.REPLAYED))  # fmt: skip
         says += f"; {gone[0]} ran until then and not after"
     if variables:
-        at, told = next(iter(variables.items()))
-        steps.append(ChainLink(t=at, part="firmware", says=told, evidence=Evidence.REPLAYED))
-        says += f"; {told} at {at / NS_PER_S:.3f} s"
+        at, says_of_it = next(iter(variables.items()))
+        steps.append(ChainLink(t=at, part="firmware", says=says_of_it, evidence=Evidence.REPLAYED))
+        says += f"; {says_of_it} at {at / NS_PER_S:.3f} s"
     return Finding(says)
 
 

@@ -24,12 +24,12 @@ from robot_bench.report.explain.findings import (
     codes_between,
     ended,
     held_codes,
+    in_words,
     injected,
     let_go,
     numbers,
     obeyed,
     steady_since,
-    told,
 )
 from robot_bench.report.explain.probing import QUIET_NS, Codes, Prober, SensorResponse
 from robot_bench.report.explain.replay import ChipReset
@@ -49,7 +49,7 @@ class _Stay:
     turned_rad: float
 
 
-class ProgressInquest:
+class ProgressAnalysis:
     """Looks for why a robot stayed where it was.
 
     Args:
@@ -143,7 +143,7 @@ class ProgressInquest:
             return None
         if steady_since(self.scene.record, stay.until)[1] != since:
             return found
-        return Finding(f"{found.says}; the motors stay at {told(codes)} since {since / NS_PER_S:.3f} s")
+        return Finding(f"{found.says}; the motors stay at {in_words(codes)} since {since / NS_PER_S:.3f} s")
 
     def _opposite(self, until: Nanos) -> Finding | None:
         prober = self._prober
@@ -215,7 +215,7 @@ class ProgressInquest:
         if min(free) <= 0:
             return None
         lasts = (until - middle) / NS_PER_S
-        self._step(middle, "firmware", f"keeps the motors at {told(codes)} also when all sensors' pins "
+        self._step(middle, "firmware", f"keeps the motors at {in_words(codes)} also when all sensors' pins "
                    f"are held low for {lasts:.0f} s", Evidence.CHANGED)  # fmt: skip
         lines = prober.lines_run(middle, middle + 100 * NS_PER_MS)
         was = prober.lines_run(max(0, since - 300 * NS_PER_MS), since)
@@ -223,9 +223,9 @@ class ProgressInquest:
         if gone:
             self._step(since, "firmware", f"runs for the last time: {numbers(gone[:4])}", Evidence.REPLAYED)
         return Finding(
-            f"the program never leaves what it does since {since / NS_PER_S:.3f} s (motors {told(codes)}): it does "
+            f"the program never leaves what it does since {since / NS_PER_S:.3f} s (motors {in_words(codes)}): it does "
             f"the same with all sensors' pins held low for {lasts:.0f} s, though at {begin / NS_PER_S:.1f} s, with "
-            f"nothing in sight, it drove on ({told(free)})"
+            f"nothing in sight, it drove on ({in_words(free)})"
         )
 
     def _sees_what_is_not(self, middle: Nanos) -> Finding | None:
@@ -243,8 +243,8 @@ class ProgressInquest:
                 return Finding(
                     f"{prober.replay.pin(net)} is high, where {fault[1]!r} was injected at "
                     f"{fault[0] / NS_PER_S:.3f} s; with it low, and all others, the program drives on "
-                    f"({told(answer.base)}), "
-                    f"with it alone high it does not ({told(answer.codes)})"
+                    f"({in_words(answer.base)}), "
+                    f"with it alone high it does not ({in_words(answer.codes)})"
                 )
         return None
 
@@ -256,7 +256,7 @@ class ProgressInquest:
             nets = [net for net in prober.replay.outputs if since in self.scene.record.pins[net].times]
             place = prober.replay.writer(since, prober.replay.wires[nets[0]].bluepill[1]) if nets else None
             by = "" if place is None else f" by {place}"
-        self._step(since, "firmware", f"sets the motors to {told(codes)}{by}", Evidence.REPLAYED)
+        self._step(since, "firmware", f"sets the motors to {in_words(codes)}{by}", Evidence.REPLAYED)
         high = [] if prober is None else [net for net in prober.sensors if prober.replay.level(net, middle)]
         seen = f" with {numbers(high)} high" if high else " with no sensor's pin high"
         held = held_codes(codes_between(self.scene.record, stay.since, stay.until), stay.until)

@@ -157,10 +157,10 @@ class ChipReplay:
         if missing := [wire.name for wire in wires if wire.name not in record.pins]:
             raise UsageError(f"the trace has not the wires of the pin-out, such as {missing[0]}")
         self.record = record
-        told = record.meta
+        meta = record.meta
         self.board = power_up(
-            firmware, sram=str(told.get("sram", ZEROS)), crystal_ppm=int(cast("int", told.get("crystal_ppm") or 0)),
-            seed=int(cast("int", told.get("seed") or 0)),
+            firmware, sram=str(meta.get("sram", ZEROS)), crystal_ppm=int(cast("int", meta.get("crystal_ppm") or 0)),
+            seed=int(cast("int", meta.get("seed") or 0)),
         )  # fmt: skip
         self.wires: Mapping[str, Wire] = {wire.name: wire for wire in wires}
         self.inputs = [wire.name for wire in wires if wire.direction is WireDirection.TO_BLUEPILL]
@@ -482,7 +482,7 @@ class ChipReplay:
 
 
 def changes(level: bool, rows: Sequence[tuple[Nanos, bool]]) -> list[Nanos]:
-    """Return when a wire changes, of the levels told of it; a pin that drives what the wire is anyway does not."""
+    """Return when a wire changes, of the levels reported of it; a pin that drives what the wire is anyway does not."""
     found = []
     for at, after in rows:
         if after is not level:

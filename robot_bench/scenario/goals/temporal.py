@@ -54,7 +54,7 @@ class OverTime(Watch):
     def __init__(self, table: Table, signal: str, margin: Margin, *, is_always: bool) -> None:
         kind, self._value, self._unit = SIGNALS[signal]
         self._signal = signal
-        #: A thing of the world, and where it was told to be last.
+        #: A thing of the world, and where it was reported to be last.
         self._thing = str(table.get("thing", ""))
         self._there: tuple[float, float] | None = None
         if bool(self._thing) is not (signal == APART):
@@ -108,7 +108,7 @@ class OverTime(Watch):
         kept = []
         for begin, best, at in self._windows:
             is_over = self._to is not None and now > begin + self._to
-            if (best < 0 and (self._is_always or is_over)) or (is_over and self._was_never_told(best)):
+            if (best < 0 and (self._is_always or is_over)) or (is_over and self._was_never_reported(best)):
                 self._fail(begin, best, at)
             if is_over:
                 self._worst = min(self._worst, best)
@@ -122,7 +122,7 @@ class OverTime(Watch):
         is_met = not kept and had_windows if self._is_always else any(best >= 0 for _, best, _ in kept)
         return self.finish(now) if is_met else None
 
-    def _was_never_told(self, best: float) -> bool:
+    def _was_never_reported(self, best: float) -> bool:
         """Tell whether the thing that a distance is to was nowhere; of other signals no sample is no failure."""
         return bool(self._thing) and not self._after and not math.isfinite(best)
 
@@ -132,7 +132,7 @@ class OverTime(Watch):
         since = f" after {self._after!r} at {seconds(begin)}" if self._after else ""
         how = f"{self._signal} was out of bounds by {-best:.3g} {self._unit}"
         if not math.isfinite(best):
-            self._failure = f"{self._signal} was never told{since}"
+            self._failure = f"{self._signal} was never reported{since}"
         else:
             self._failure = f"{how} at {seconds(at)}{since}" if self._is_always else f"{how} at its best{since}"
 
@@ -143,7 +143,7 @@ class OverTime(Watch):
         if not self._count:
             return GoalOutcome(met=False, says=f"{self._after!r} did not happen")
         for begin, best, at in self._windows:
-            if self._was_never_told(best) or (best < 0 and not self._is_always):
+            if self._was_never_reported(best) or (best < 0 and not self._is_always):
                 self._fail(begin, best, at)
         says = self._failure or (f"by {by:.3g} {self._unit} at the least" if robustness is not None else "")
         return GoalOutcome(met=not self._failure, says=says, robustness=robustness, unit=self._unit)

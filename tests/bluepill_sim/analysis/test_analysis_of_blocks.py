@@ -65,7 +65,7 @@ def test_what_an_it_block_skips_counts_as_run(boot) -> None:
     assert counts[machine.label("moveq")] == counts[machine.label("movne")] == 4
 
 
-def test_both_ways_of_a_branch_are_told_apart(boot) -> None:
+def test_both_ways_of_a_branch_are_distinguished(boot) -> None:
     machine = boot(CALLS)
     branches = observed(machine)[0].branches()
     loop, work = machine.label("loop"), machine.label("work")
@@ -120,23 +120,23 @@ def test_functions_are_called_and_charged_by_hand_count(boot) -> None:
 
 
 def test_a_walk_tells_blocks_with_what_follows() -> None:
-    told = []
+    reported = []
 
     class Ear:
         def block(self, *words) -> None:
-            told.append(words)
+            reported.append(words)
 
         def enter(self, *words) -> None:
-            told.append(("enter", *words))
+            reported.append(("enter", *words))
 
         def leave(self, *words) -> None:
-            told.append(("leave", *words))
+            reported.append(("leave", *words))
 
     walk = BlockWalk([Ear()])
     walk.take([(0, 10, BLOCK), (5, 20, BLOCK), (9, 24, 15), (21, 50, BLOCK), (30, 24, EXCEPTION_RETURN)])
     walk.take([(42, 24, BLOCK)])
     walk.finish(50)
-    assert told == [
+    assert reported == [
         (10, 20, 0, 5), (20, 24, 5, 4), ("enter", 15, 9), (50, HANDLER_LEFT, 21, 9), ("leave", 30), (24, None, 42, 8),
     ]  # fmt: skip
 

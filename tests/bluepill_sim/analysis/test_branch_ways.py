@@ -164,7 +164,7 @@ def test_code_in_sram_has_lines_and_branches(boot) -> None:
     assert file.functions == [("in_sram", 1, 1)]
 
 
-def test_without_debug_information_functions_are_told_and_without_symbols_addresses(boot) -> None:
+def test_without_debug_information_functions_are_reported_and_without_symbols_addresses(boot) -> None:
     machine = boot(NEVER_ONCE_BOTH)
     functions = (Symbol("start", machine.label("start"), 0x100, is_function=True),)
     machine.image = replace(machine.image, symbols=SymbolTable(functions))

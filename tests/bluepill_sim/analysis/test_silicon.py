@@ -107,7 +107,7 @@ def test_a_time_may_differ_by_a_fiftieth(model: Model, apart: int, verdict: Numb
         assert [row.verdict for row in differing(other, model)] == [verdict]
 
 
-def test_a_number_that_only_one_of_them_has_is_told(model: Model) -> None:
+def test_a_number_that_only_one_of_them_has_is_reported(model: Model) -> None:
     numbers = dict(model.log.numbers)
     del numbers["irq", "exit"]
     numbers["irq", "later"] = 5

@@ -137,12 +137,12 @@ def test_strict_mode_raises_at_the_first_warning(boot, access: str) -> None:
 
 def test_warnings_are_reported_once_as_they_come(boot) -> None:
     machine = boot("movs r4, #3\nloop: " + store(0x40013400, 1) + "subs r4, #1\nbne loop")
-    told = []
-    end = machine.board.subscribe_warnings(told.append)
+    reported = []
+    end = machine.board.subscribe_warnings(reported.append)
     machine.run(100)
     end()
-    assert told == machine.board.warnings
-    assert len(told) == 1
+    assert reported == machine.board.warnings
+    assert len(reported) == 1
 
 
 def test_the_reset_button_starts_again_while_time_goes_on(boot) -> None:

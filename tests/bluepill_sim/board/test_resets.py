@@ -102,7 +102,7 @@ FLAGS = {
     ResetCause.WWDG: 0x4400_0000,
 }
 #: What the program does at its first start.
-DEEDS = {
+RESETS = {
     ResetCause.SOFTWARE: store(AIRCR, 0x05FA0004) + "here: b here",
     ResetCause.IWDG: START_IWDG + "here: b here",
     ResetCause.WWDG: store(RCC_APB1ENR, 1 << 11) + store(WWDG_CR, 0xFF) + "here: wfi\nb here",
@@ -116,15 +116,15 @@ def starts(machine) -> list[int]:
     return words[1 : words[0] + 1]
 
 
-@pytest.mark.parametrize("cause", DEEDS)
+@pytest.mark.parametrize("cause", RESETS)
 def test_the_program_reads_why_it_was_reset(boot, cause: ResetCause) -> None:
-    machine = boot(TELL + DEEDS[cause]).run(500_000)
+    machine = boot(TELL + RESETS[cause]).run(500_000)
     assert starts(machine) == [FLAGS[ResetCause.POWER], FLAGS[cause]]
     assert machine.is_done
     assert machine.board.fault is None
 
 
-def test_the_reset_button_is_told_from_power(boot) -> None:
+def test_the_reset_button_is_distinguished_from_power(boot) -> None:
     machine = boot(TELL).run(100)
     machine.board.reset()
     machine.run(100)
@@ -232,7 +232,7 @@ def test_an_empty_hard_fault_handler_is_a_death_whenever_one_looks(boot, core, m
 
 @pytest.mark.parametrize("core", ["python", "native"])
 @pytest.mark.parametrize("slice_ns", [100, 50_000])
-def test_a_lockup_at_the_instruction_that_faulted_before_is_told(boot, core, slice_ns, monkeypatch) -> None:
+def test_a_lockup_at_the_instruction_that_faulted_before_is_reported(boot, core, slice_ns, monkeypatch) -> None:
     """The same fault, with all registers as they were, but under FAULTMASK, where no HardFault can be entered."""
     monkeypatch.setenv("P2OS_CORE", core)
     board = boot("again: udf\ncpsid f\nb again\n" + SKIP_TWO_BYTES, {3: "hard"}).board

@@ -127,9 +127,9 @@ def test_a_datagram_that_is_no_frame_is_counted_and_nothing_else(
 
 
 def test_frames_go_out_and_come_in_with_their_times(network: CanNetwork, node: CanNode) -> None:
-    told: list[tuple[int, bool, CanFrame]] = []
+    reported: list[tuple[int, bool, CanFrame]] = []
     answer = CanFrame(identifier=0x7, data=b"\x01")
-    with CanSocket("udp:127.0.0.1:0", network, lambda *row: told.append(row)) as bus, peer_of(bus) as peer:
+    with CanSocket("udp:127.0.0.1:0", network, lambda *row: reported.append(row)) as bus, peer_of(bus) as peer:
         bus.carry()
         node.send(HELLO, at_ns=1000)
         end(network)
@@ -137,8 +137,8 @@ def test_frames_go_out_and_come_in_with_their_times(network: CanNetwork, node: C
         peer.send(to_datagram(answer))
         bus.carry()
         end(network)
-        ends = [at_ns for at_ns, _, _ in told]
-        assert [row[1:] for row in told] == [(True, HELLO), (False, answer)]
+        ends = [at_ns for at_ns, _, _ in reported]
+        assert [row[1:] for row in reported] == [(True, HELLO), (False, answer)]
         assert node.received == [(ends[1], answer)]
         assert 1000 + 44 * 2000 < ends[0] < ends[1]
         assert (bus.sent, bus.received) == (1, 1)

@@ -132,12 +132,12 @@ def test_the_command_serves_once(capfd: pytest.CaptureFixture[str], monkeypatch:
         with socket.create_connection(("127.0.0.1", port), timeout=LIMIT_S) as line:
             done.append(talk(line, b"s"))
 
-    class Told(GdbServer):
+    class Reported(GdbServer):
         def serve(self, *, once: bool = False) -> bool:
             threading.Thread(target=meet, args=(self.port,), daemon=True).start()
             return super().serve(once=once)
 
-    monkeypatch.setattr("bluepill_sim.cli.debug.GdbServer", Told)
+    monkeypatch.setattr("bluepill_sim.cli.debug.GdbServer", Reported)
     assert run(["debug", DODGE, "--port", "0", "--once"]) == 0
     assert done == [b"T05thread:1;"]
     assert "waiting for GDB on port" in capfd.readouterr().err

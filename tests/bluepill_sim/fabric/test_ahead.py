@@ -76,10 +76,10 @@ class Seen:
             self.board: BluePill = Machine(PROGRAM, {}).deafen().board
         packed = b"".join(struct.pack("<III", *row) for row in (*SET_UP, (STORE, TIM3, 1), *rows))
         self.board.chip.memory.write(TABLE, packed + bytes(4))
-        self._told: list[list[bytes]] = [[], [], []]
+        self._reported: list[list[bytes]] = [[], [], []]
         names = [pin.name for pin in self.board.pins]
-        for told, of, waves in zip(self._told, (Of.DRIVE, Of.WIRE, Of.DRIVE), (False, False, True), strict=True):
-            self.board.subscribe_pins(names, told.append, of=of, waves=waves, ends_slice=stops)
+        for seen, of, waves in zip(self._reported, (Of.DRIVE, Of.WIRE, Of.DRIVE), (False, False, True), strict=True):
+            self.board.subscribe_pins(names, seen.append, of=of, waves=waves, ends_slice=stops)
 
     def ended(self, *slices: int) -> Any:
         """Return what was seen by the end, and how the chip stands there."""
@@ -87,8 +87,8 @@ class Seen:
             self.board.advance_to(self.board.now_ns + length)
             assert self.board.chip.fabric.last_output_ns <= self.board.now_ns
         self.board.advance_to(END_NS)
-        edges = [sorted(EDGE.iter_unpack(b"".join(told))) for told in self._told[:2]]
-        return edges, b"".join(self._told[2]), self.board.chip.fabric.last_output_ns, state(self.board)
+        edges = [sorted(EDGE.iter_unpack(b"".join(reported))) for reported in self._reported[:2]]
+        return edges, b"".join(self._reported[2]), self.board.chip.fabric.last_output_ns, state(self.board)
 
 
 @settings(max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -172,7 +172,7 @@ def test_the_descriptions_are_what_st_says(theirs: dict[int, list[SvdRegister]])
 
 
 @pytest.mark.parametrize(
-    ("register", "change", "told"),
+    ("register", "change", "reported"),
     [
         ("CCR1", {"fields": "EN 1, TCIE 0"}, "DMA1.CCR1: EN at 1:1, ST has TCIE"),
         ("CCR1", {"reset": 1, "mask": 1}, "DMA1.CCR1: reset 0x1, ST has 0x0"),
@@ -185,8 +185,8 @@ def test_what_is_planted_in_a_description_is_named(
     monkeypatch: pytest.MonkeyPatch,
     register: str,
     change: dict[str, int],
-    told: str,
+    reported: str,
 ) -> None:
     planted = tuple(replace(one, **({"mask": 0} | change)) if one.name == register else one for one in Dma.REGISTERS)
     monkeypatch.setattr(Dma, "REGISTERS", planted)
-    assert told in svd_differences(Dma, "DMA1", theirs)
+    assert reported in svd_differences(Dma, "DMA1", theirs)

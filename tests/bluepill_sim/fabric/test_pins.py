@@ -153,8 +153,8 @@ def test_every_change_of_the_own_drive_is_notified_once_with_its_time(bank: PinB
     pin.configure(PinMode.PUSH_PULL, output_bit=True)
     pin.drive(True)
     bank.deliver()
-    told = [(at, index, list(PinDrive)[drive]) for at, index, drive, *_ in EDGE.iter_unpack(rows)]
-    assert told == [(0, 1, PinDrive.LOW), (17, 1, PinDrive.HIGH)]
+    reported = [(at, index, list(PinDrive)[drive]) for at, index, drive, *_ in EDGE.iter_unpack(rows)]
+    assert reported == [(0, 1, PinDrive.LOW), (17, 1, PinDrive.HIGH)]
 
 
 def test_a_subscriber_to_the_wire_sees_what_the_outside_does(bank: PinBank, ports: Ports) -> None:
@@ -259,6 +259,6 @@ def test_output_and_level_follow_from_the_state_alone(actions: Any) -> None:
     other.fabric.pins_changed(0)
     assert (copy.output, copy.level, copy.input) == (pin.output, pin.level, pin.input)
     bank.deliver()
-    told = [list(PinDrive)[row[2]] for row in EDGE.iter_unpack(rows)]
-    assert all(a is not b for a, b in itertools.pairwise(told))
-    assert (told[-1] if told else PinDrive.NONE) is pin.output
+    reported = [list(PinDrive)[row[2]] for row in EDGE.iter_unpack(rows)]
+    assert all(a is not b for a, b in itertools.pairwise(reported))
+    assert (reported[-1] if reported else PinDrive.NONE) is pin.output

@@ -142,8 +142,8 @@ def test_a_field_is_accessed_as_its_bits_are() -> None:
         name="R", offset=0, mask=0, readable=bits((7, 0)), writable=bits((3, 2), 9), write_one_to_clear=bits(4),
         write_zero_to_clear=bits(5, 8), triggers=bits(10), on_write="_write",
     )  # fmt: skip
-    told = {0: "r", 2: "rw", 4: "rc_w1", 5: "rc_w0", 8: "rc_w0", 9: "w", 10: "w", 11: "reserved"}
-    assert {place: register.access(BitField("F", place, place)) for place in told} == told
+    reported = {0: "r", 2: "rw", 4: "rc_w1", 5: "rc_w0", 8: "rc_w0", 9: "w", 10: "w", 11: "reserved"}
+    assert {place: register.access(BitField("F", place, place)) for place in reported} == reported
     assert register.access(BitField("F", 5, 3)) == "rc_w0/rc_w1/rw"
     assert Register(name="R", offset=0, readable=0, writable=0, on_read="_read").access(BitField("F", 1, 0)) == "r"
 

@@ -168,7 +168,7 @@ def act(bank: Bank, step: tuple[Any, ...]) -> None:
             pins.fabric.resume()
 
 
-def told(rows: list[tuple[int, int, int]]) -> list[tuple[int, int, int]]:
+def reported(rows: list[tuple[int, int, int]]) -> list[tuple[int, int, int]]:
     """Return rows without what one pin shows only for an instant, in an order that does not depend on the cause."""
     kept: dict[tuple[int, int], int] = {(ns, pin): wire for ns, pin, wire in rows}
     last: dict[int, int] = {}
@@ -201,7 +201,7 @@ def test_edges_made_in_bulk_are_those_made_one_by_one(script: list[tuple[Any, ..
             assert bulk.pins[name].level is single.pins[name].level
     bulk.run(now)
     single.run(now)
-    assert told(bulk_rows) == told(single.made)
+    assert reported(bulk_rows) == reported(single.made)
     assert single_rows == bulk_rows[3:]
     assert [row[0] for row in bulk_rows] == sorted(row[0] for row in bulk_rows)
 

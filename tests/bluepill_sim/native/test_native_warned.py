@@ -78,9 +78,9 @@ def board(core: str, rows: list[tuple[int, int, int]]) -> tuple[BluePill, list[t
         patch.setenv("P2OS_CORE", core)
         made = Machine(PROGRAM, {}).deafen().board
     made.chip.memory.write(TABLE, b"".join(struct.pack("<III", *row) for row in rows) + bytes(4))
-    told: list[tuple[int, str]] = []
-    made.subscribe_warnings(lambda text: told.append((made.chip.engine.access_cycle, text)))
-    return made, told
+    reported: list[tuple[int, str]] = []
+    made.subscribe_warnings(lambda text: reported.append((made.chip.engine.access_cycle, text)))
+    return made, reported
 
 
 @settings(max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -104,7 +104,7 @@ def compare(rows: list[tuple[int, int, int]], slices: list[int]) -> None:
         boards[2][0].advance_to(boards[2][0].now_ns + length)
     for one, _ in boards:
         one.advance_to(2_200_000)
-    first, *others = [(told, state(one)) for one, told in boards]
+    first, *others = [(reported, state(one)) for one, reported in boards]
     assert others[0] == first
     assert others[1] == first
 
@@ -142,19 +142,19 @@ def asked_of(made: BluePill) -> list[int]:
     ],
 )
 def test_python_hears_of_what_is_warned_of_once(row: tuple[int, int, int], most: int) -> None:
-    made, told = board("native", [row])
+    made, reported = board("native", [row])
     asked = asked_of(made)
     made.advance_to(20_000_000)
     assert len(asked) <= most
-    assert len(told) == (most > 0)
+    assert len(reported) == (most > 0)
 
 
 def test_a_narrow_write_that_is_warned_of_is_python_s_once() -> None:
     odr = BASES["GPIOA"] + 0x0C
-    made, told = board("native", [(1, RCC + 0x18, 4), (3, odr, 0x5A), (3, odr, 0xA5), (2, odr, 0x1234)])
+    made, reported = board("native", [(1, RCC + 0x18, 4), (3, odr, 0x5A), (3, odr, 0xA5), (2, odr, 0x1234)])
     asked = asked_of(made)
     made.advance_to(5_000_000)
-    assert (len(asked), len(told)) == (1, 1)
+    assert (len(asked), len(reported)) == (1, 1)
     assert made.chip.parts.by_name["GPIOA"].words[3] in (0x5A5A, 0xA5A5, 0x1234)
 
 
@@ -162,9 +162,9 @@ def test_a_narrow_write_that_needs_no_warning_leaves_the_warning_to_the_first_th
     crl = BASES["GPIOA"]
     rows = [(1, RCC + 0x18, 4), (2, crl, 0x4444), (3, crl, 0x44), (2, crl, 0x4443)]  # the first two change nothing
     compare(rows, [1_000])
-    _, told = boards = board("native", rows)
+    _, reported = boards = board("native", rows)
     boards[0].advance_to(100_000)
-    assert len(told) == 1
+    assert len(reported) == 1
 
 
 @pytest.mark.parametrize("place", [USART1, BASES["DMA1"], alias(BASES["GPIOA"] + 8, 3)])
@@ -174,47 +174,47 @@ def test_the_warning_comes_at_the_same_access_where_a_loop_polls(place: int) -> 
 
 @pytest.mark.parametrize("core", ["native", "python"])
 def test_a_clock_that_was_on_meanwhile_begins_the_millisecond_anew(core: str) -> None:
-    made, told = board(core, [(5, USART1, 0)])
+    made, reported = board(core, [(5, USART1, 0)])
     made.advance_to(600_000)
     for gates in (0x4000, 0):
         made.chip.parts.rcc.write(0x18, 4, gates)
     made.advance_to(1_595_000)
-    assert not told
+    assert not reported
     made.advance_to(1_620_000)
-    assert len(told) == 1
+    assert len(reported) == 1
 
 
 @pytest.mark.parametrize("core", ["native", "python"])
 def test_the_millisecond_is_one_at_another_frequency_too(core: str) -> None:
-    made, told = board(core, [(5, USART1, 0)])
+    made, reported = board(core, [(5, USART1, 0)])
     made.advance_to(600_000)
     made.chip.parts.rcc.write(4, 4, 8 << 4)  # HCLK is 4 MHz
     made.advance_to(995_000)
-    assert not told
+    assert not reported
     made.advance_to(1_020_000)
-    assert len(told) == 1
+    assert len(reported) == 1
 
 
 def test_the_warning_comes_with_the_first_read_a_millisecond_after_the_first() -> None:
-    slow, slow_told = board("python", [(4, USART1, 0)])
-    quick, quick_told = board("native", [(4, USART1, 0)])
+    slow, slow_reported = board("python", [(4, USART1, 0)])
+    quick, quick_reported = board("native", [(4, USART1, 0)])
     quick.advance_to(1_500_000)
     slow.advance_to(1_500_000)
-    assert quick_told == slow_told
+    assert quick_reported == slow_reported
     first_ns = slow.chip._bus.read_unclocked_ns["USART1"]
     round_ns = 5_000  # chosen: longer than a round of the program at 8 MHz
-    assert 0 <= slow_told[0][0] * 125 - first_ns - UNCLOCKED_NS < round_ns
+    assert 0 <= slow_reported[0][0] * 125 - first_ns - UNCLOCKED_NS < round_ns
 
 
 def test_a_restored_board_warns_again_and_the_clock_ends_the_silence() -> None:
-    made, told = board("native", [(5, USART1, 0)])
+    made, reported = board("native", [(5, USART1, 0)])
     made.advance_to(500_000)
     early = made.snapshot()
     made.advance_to(3_000_000)
     made.restore(early)
     made.advance_to(3_000_000)
-    assert len(told) == 2
-    assert told[0] == told[1]
+    assert len(reported) == 2
+    assert reported[0] == reported[1]
     made.chip.parts.rcc.write(0x18, 4, 0x4000)
     made.advance_to(3_100_000)
     assert made.register("R3") == 0xC0, "its SR reads"

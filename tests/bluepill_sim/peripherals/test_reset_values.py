@@ -87,7 +87,7 @@ def test_registers_read_their_reset_values(fake_chip: Any, name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "field", "wrong", "told"),
+    ("name", "field", "wrong", "reported"),
     [
         ("HTR", "reset", 0xFFE, "ADC1.HTR reads 0xffe, the manual says 0xfff"),
         ("LTR", "reset", 1, "ADC1.LTR reads 0x1, the manual says 0x0"),
@@ -95,14 +95,14 @@ def test_registers_read_their_reset_values(fake_chip: Any, name: str) -> None:
     ],
 )
 def test_a_wrong_value_in_a_description_is_named(
-    fake_chip: Any, monkeypatch: pytest.MonkeyPatch, name: str, field: str, wrong: object, told: str
+    fake_chip: Any, monkeypatch: pytest.MonkeyPatch, name: str, field: str, wrong: object, reported: str
 ) -> None:
     planted = tuple(replace(one, mask=0, **{field: wrong}) if one.name == name else one for one in Adc.REGISTERS)
     monkeypatch.setattr(Adc, "REGISTERS", planted)
     for table in (registers._table_of, native_registers._table_of):
         table.cache_clear()
     try:
-        assert told in differences(type(fake_chip)().parts.by_name["ADC1"])
+        assert reported in differences(type(fake_chip)().parts.by_name["ADC1"])
     finally:
         for table in (registers._table_of, native_registers._table_of):
             table.cache_clear()

@@ -62,7 +62,7 @@ def test_the_first_row_of_a_file_without_end_comes_before_more_than_two_blocks_a
     assert file.read_bytes <= 2 * BLOCK_BYTES
 
 
-def test_how_to_read_a_capture_is_told_by_its_beginning() -> None:
+def test_how_to_read_a_capture_is_known_by_its_beginning() -> None:
     file = Endless(SIP, SIP)
     reading, blocks = reading_of(open_capture(cast("BinaryIO", file)).blocks)
     assert reading.profile is Profile.P2OS

@@ -109,7 +109,7 @@ def test_a_frame_with_one_wrong_byte_is_shown_as_damaged_and_hides_nothing(place
 
 
 @pytest.mark.parametrize("size", range(1, len(VEL)))
-def test_a_frame_cut_anywhere_is_told(size: int) -> None:
+def test_a_frame_cut_anywhere_is_reported(size: int) -> None:
     (row,) = rows(said(VEL[:size]))
     assert not row.valid
     if size >= 3:

@@ -80,9 +80,9 @@ def test_a_recorded_session_is_sniffed_while_it_is_replayed(
     recording, received = tmp_path / "talk.jsonl", tmp_path / "received.jsonl"
     recording.write_text(write_recording(capture_of(talk)))
     listener = listen_url("tcp:127.0.0.1:0")
-    bridge_url, chunks, told = listener.description, [], []
+    bridge_url, chunks, reported = listener.description, [], []
     bridge = TapBridge(listener, open_url(served.url), lambda: open_url(served.url),
-                       on_chunk=chunks.append, on_event=told.append)  # fmt: skip
+                    on_chunk=chunks.append, on_event=reported.append)  # fmt: skip
     thread = threading.Thread(target=lambda: bridge.run(lambda: bridge.sessions == 2))
     thread.start()
     assert run("replay", recording, bridge_url, "--as", "client", "--speed", "3") == 0
@@ -93,7 +93,7 @@ def test_a_recorded_session_is_sniffed_while_it_is_replayed(
     spoken = b"".join(chunk.data for chunk in chunks if chunk.direction is TO)
     session = b"".join(data for _, direction, data in talk if direction is TO) + STOP_FIRST
     assert spoken == session * 2
-    assert sum(text.startswith("client gone") for text in told) == 2
+    assert sum(text.startswith("client gone") for text in reported) == 2
     received.write_text(write_recording(capture_of([(chunk.at_ns, chunk.direction, chunk.data) for chunk in chunks])))
     assert run("decode", received, "--only", "IDENTITY,ENABLE,damaged") == 0
     assert capsys.readouterr().out.count("IDENTITY  name Virtual") == 2
@@ -213,10 +213,10 @@ def test_a_replay_that_is_interrupted_or_loses_its_line_stops_the_robot() -> Non
 
 
 def test_a_bridge_follows_a_change_of_speed_and_stops_the_robot_when_it_ends() -> None:
-    loops, told, chunks, bauds = Loops(), [], [], []
+    loops, reported, chunks, bauds = Loops(), [], [], []
     robot_end = loops.listen("robot")
     bridge = TapBridge(loops.listen("client"), loops.connect("robot"), lambda: loops.connect("robot"),
-                       on_chunk=chunks.append, on_event=told.append, clock=Clock())  # fmt: skip
+                    on_chunk=chunks.append, on_event=reported.append, clock=Clock())  # fmt: skip
     robot, client = robot_end.accept(), loops.connect("client")
     bridge.turn()
     bridge._robot.set_baud = bauds.append
@@ -228,7 +228,7 @@ def test_a_bridge_follows_a_change_of_speed_and_stops_the_robot_when_it_ends() -
     assert client.read()[:4] == b"\xfa\xfb\x1b\x32"
     bridge.close()
     assert robot.read().endswith(STOP_FIRST)
-    assert told[-2:] == ["the session was open: sent STOP, VEL 0 and CLOSE", "client gone: the bridge ends"]
+    assert reported[-2:] == ["the session was open: sent STOP, VEL 0 and CLOSE", "client gone: the bridge ends"]
     assert chunks[-1].data == STOP_FIRST
 
 
@@ -240,11 +240,11 @@ class Joined:
     """A bridge between a client and a robot whose session is open, on a clock that a test sets."""
 
     def __init__(self, on_chunk: Callable[[Chunk], None] = lambda _chunk: None) -> None:
-        loops, self.now, self.told = Loops(), 0, []
+        loops, self.now, self.reported = Loops(), 0, []
         robots = loops.listen("robot")
         self.bridge = TapBridge(
             loops.listen("client"), loops.connect("robot"), lambda: loops.connect("robot"),
-            on_chunk=on_chunk, on_event=self.told.append, clock=lambda: self.now,
+            on_chunk=on_chunk, on_event=self.reported.append, clock=lambda: self.now,
         )  # fmt: skip
         self.robot, self.client = robots.accept(), loops.connect("client")
         self.bridge.turn()
@@ -258,7 +258,7 @@ def test_after_a_pause_a_bridge_stops_the_robot_and_passes_nothing_on_that_has_w
     joined.now += 3_200_000_000
     joined.bridge.turn()
     assert joined.robot.read() == STOP_FIRST
-    assert joined.told[-1] == "client gone: the bridge paused for 3.0 s"
+    assert joined.reported[-1] == "client gone: the bridge paused for 3.0 s"
     assert joined.client.read() == SIP
     with pytest.raises(HungUpError):
         joined.client.read()
@@ -278,7 +278,7 @@ def test_a_pause_before_a_bridge_reads_is_one_too(pause_ns: int, passes: bool) -
     joined.client.write(VEL_200)
     joined.bridge.turn()
     assert joined.robot.read() == (VEL_200 if passes else STOP_FIRST)
-    assert joined.told[1:] == ([] if passes else ["the session was open: sent STOP, VEL 0 and CLOSE",
+    assert joined.reported[1:] == ([] if passes else ["the session was open: sent STOP, VEL 0 and CLOSE",
                                                   "client gone: the bridge paused for 0.4 s"])  # fmt: skip
 
 
@@ -293,7 +293,7 @@ def test_a_pause_of_a_third_of_a_second_is_borne_and_one_without_a_session_harms
     joined.now += 10 * NS_PER_S
     joined.bridge.turn()
     assert joined.robot.read() == STOP_FIRST
-    assert len(joined.told) == 1
+    assert len(joined.reported) == 1
 
 
 def test_a_bridge_passes_on_before_it_shows_and_sends_the_closing_frames_when_showing_fails() -> None:
@@ -436,15 +436,15 @@ def test_what_one_file_refuses_the_others_still_take(tmp_path: Path) -> None:
 
 
 def test_a_bridge_whose_robot_is_gone_refuses_its_client() -> None:
-    loops, told = Loops(), []
+    loops, reported = Loops(), []
     robots = loops.listen("robot")
     bridge = TapBridge(loops.listen("client"), loops.connect("robot"), lambda: loops.connect("robot"),
-                       on_chunk=lambda _chunk: None, on_event=told.append)  # fmt: skip
+                    on_chunk=lambda _chunk: None, on_event=reported.append)  # fmt: skip
     robots.accept().close()
     robots.close()
     client = loops.connect("client")
     bridge.turn()
-    assert told == ["client refused: cannot connect to loop:robot: nobody listens"]
+    assert reported == ["client refused: cannot connect to loop:robot: nobody listens"]
     with pytest.raises(HungUpError):
         client.read()
     bridge.close()
@@ -489,12 +489,12 @@ def test_a_capture_file_that_cannot_be_written_is_named(served: object, run: Run
 
 
 @pytest.mark.usefixtures("no_waiting")
-@pytest.mark.parametrize(("said", "code", "told"), [
+@pytest.mark.parametrize(("said", "code", "reported"), [
     (Command(2).to_frame().to_bytes(), 0, "the client closed the session after 1 of 2 frames\n"),
     (b"", 1, "p2os: after 1 of 2 frames: gone\n"),
 ])  # fmt: skip
 def test_a_client_that_closes_its_session_and_goes_is_no_error(
-    run: Run, tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch, said: bytes, code: int, told: str
+    run: Run, tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch, said: bytes, code: int, reported: str
 ) -> None:
     recording = tmp_path / "talk.jsonl"
     sync = Command(0).to_frame().to_bytes()
@@ -503,7 +503,7 @@ def test_a_client_that_closes_its_session_and_goes_is_no_error(
     line = Line(sync, said, HungUpError("gone"))
     monkeypatch.setattr("p2os.cli.captures.replay._first", lambda _listener: line)
     assert run("replay", recording, "tcp:127.0.0.1:0") == code
-    assert told in capsys.readouterr().err
+    assert reported in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("no_waiting")

@@ -122,16 +122,16 @@ def test_a_package_that_is_not_there_has_no_version() -> None:
 
 
 def test_a_robot_tells_who_it_is_and_is_left_closed(clock: VirtualClock) -> None:
-    told: list[str] = []
-    note = lambda _now, what, _detail: told.append(what)  # noqa: E731
+    reported: list[str] = []
+    note = lambda _now, what, _detail: reported.append(what)  # noqa: E731
     with served_pioneer(body="kinematic", on_event=note, clock=clock) as url:
         found = info.ask(url)
     assert found.identity == Identity("Virtual", "Pioneer", "p2dx")
     assert found.config is not None
     assert found.state.battery_v == 12.6
     assert found.state.sonar
-    assert "motors" not in told
-    assert told.index("opened") < told.index("closed")
+    assert "motors" not in reported
+    assert reported.index("opened") < reported.index("closed")
 
 
 def test_a_robot_that_knows_no_config_still_answers(monkeypatch: pytest.MonkeyPatch, clock: VirtualClock) -> None:
@@ -141,7 +141,7 @@ def test_a_robot_that_knows_no_config_still_answers(monkeypatch: pytest.MonkeyPa
 
 
 @pytest.fixture
-def told(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+def reported(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     """Let `p2os info` find a robot that says this."""
 
     def tell(identity: Identity, sip: StandardSip, config: ConfigPacket | None) -> None:
@@ -157,8 +157,8 @@ SIP = StandardSip(
 )  # fmt: skip
 
 
-def test_info_is_printed_with_units(told: Callable[..., None], capsys: Capture) -> None:
-    told(Identity("", "Pioneer", "p2dx"), SIP, ConfigPacket(subclass="p2dx", watchdog=2000, fields_sent=19))
+def test_info_is_printed_with_units(reported: Callable[..., None], capsys: Capture) -> None:
+    reported(Identity("", "Pioneer", "p2dx"), SIP, ConfigPacket(subclass="p2dx", watchdog=2000, fields_sent=19))
     assert run(["info", "tcp:x"]) == 0
     out = capsys.readouterr().out
     for line in (
@@ -175,8 +175,8 @@ def test_info_is_printed_with_units(told: Callable[..., None], capsys: Capture) 
     assert "stallval" not in out, "fields that were not sent are not shown"
 
 
-def test_info_of_an_unknown_model_says_whose_units_it_uses(told: Callable[..., None], capsys: Capture) -> None:
-    told(Identity("Box", "Pioneer", "box9000"), StandardSip(), None)
+def test_info_of_an_unknown_model_says_whose_units_it_uses(reported: Callable[..., None], capsys: Capture) -> None:
+    reported(Identity("Box", "Pioneer", "box9000"), StandardSip(), None)
     assert run(["info", "tcp:x"]) == 0
     out = capsys.readouterr().out
     assert "model     box9000 (unknown model, units of a Pioneer 2-DX)\n" in out
@@ -185,14 +185,14 @@ def test_info_of_an_unknown_model_says_whose_units_it_uses(told: Callable[..., N
     assert "config    the robot does not send it\n" in out
 
 
-def test_info_is_printed_for_programs(told: Callable[..., None], capsys: Capture) -> None:
-    told(Identity("Wilma", "Pioneer", "p2dx"), SIP, ConfigPacket(subclass="p2dx", fields_sent=3))
+def test_info_is_printed_for_programs(reported: Callable[..., None], capsys: Capture) -> None:
+    reported(Identity("Wilma", "Pioneer", "p2dx"), SIP, ConfigPacket(subclass="p2dx", fields_sent=3))
     assert run(["info", "tcp:x", "--json"]) == 0
     plain = json.loads(capsys.readouterr().out)
     assert plain["name"] == "Wilma"
     assert plain["sip"]["x_m"] == -0.00084
     assert plain["sip"]["sonar_m"] == {"3": 0.268}
     assert plain["config"] == {"robot_class": "Pioneer", "subclass": "p2dx", "serial": ""}
-    told(Identity("Wilma", "Pioneer", "p2dx"), SIP, None)
+    reported(Identity("Wilma", "Pioneer", "p2dx"), SIP, None)
     assert run(["info", "tcp:x", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["config"] is None

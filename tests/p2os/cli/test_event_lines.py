@@ -12,7 +12,7 @@ def test_a_robot_that_is_one_of_many_says_which() -> None:
     assert lines == ["     1.500 s  robot 2  motors: on\n", "     1.500 s  robot 2  opened\n"]
 
 
-def test_a_flood_is_cut_each_second_and_what_was_left_out_is_told() -> None:
+def test_a_flood_is_cut_each_second_and_what_was_left_out_is_reported() -> None:
     lines: list[str] = []
     events = EventLines(lines.append)
     for count in range(3 * MOST_LINES):

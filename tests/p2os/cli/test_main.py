@@ -100,9 +100,9 @@ def test_an_error_is_one_line_and_one_hint(
     assert cli.run(["act"]) == code
     captured = capsys.readouterr()
     assert captured.out == ""
-    told = captured.err.splitlines()
-    assert len(told) == len(lines)
-    assert all(line.startswith(wanted) for line, wanted in zip(told, lines, strict=True))
+    reported = captured.err.splitlines()
+    assert len(reported) == len(lines)
+    assert all(line.startswith(wanted) for line, wanted in zip(reported, lines, strict=True))
 
 
 def test_trace_shows_where_an_error_arose(offer: Callable[[object], None], capsys: pytest.CaptureFixture[str]) -> None:
@@ -146,9 +146,9 @@ def test_a_verb_can_choose_its_exit_code(offer: Callable[[object], None]) -> Non
 )
 def test_wrong_usage_ends_with_2(capsys: pytest.CaptureFixture[str], words: list[str], message: str, hint: str) -> None:
     assert cli.run(words) == 2
-    told = capsys.readouterr().err.splitlines()
-    assert told[0].startswith(message)
-    assert told[1] == hint
+    reported = capsys.readouterr().err.splitlines()
+    assert reported[0].startswith(message)
+    assert reported[1] == hint
 
 
 def test_only_the_verb_that_is_named_is_imported() -> None:

@@ -120,11 +120,11 @@ def test_a_reader_that_does_not_read_misses_whole_lines_and_is_told_how_many(pip
     assert time.monotonic() - began < TIMEOUT_S
     lines = pipe.read_until("read\n").splitlines(keepends=True)
     written = lines.count(line)
-    told = f"p2os: {most + 3 - written} lines of standard output left out: the reader does not read\n"
-    assert lines == [line] * written + [told]
+    reported = f"p2os: {most + 3 - written} lines of standard output left out: the reader does not read\n"
+    assert lines == [line] * written + [reported]
 
 
-def test_lines_left_out_of_standard_output_are_told_of_on_standard_error(pipe: Pipe) -> None:
+def test_lines_left_out_of_standard_output_are_reported_on_standard_error(pipe: Pipe) -> None:
     errors = Pipe()
     notes = QueuedStream(errors.below, "standard error")
     stream = QueuedStream(pipe.below, "standard output", notes)
@@ -138,9 +138,9 @@ def test_lines_left_out_of_standard_output_are_told_of_on_standard_error(pipe: P
     until(lambda: stream.queue.waiting < MOST_BYTES // 2, "room")
     stream.write("{}\n")
     pipe.read_until("{}\n")
-    told = errors.read_until("read\n")
-    assert told.startswith("p2os: ")
-    assert 50 < int(told.split()[1]) <= 100
+    reported = errors.read_until("read\n")
+    assert reported.startswith("p2os: ")
+    assert 50 < int(reported.split()[1]) <= 100
 
 
 def test_a_reader_that_goes_is_told_of_once(pipe: Pipe) -> None:
@@ -250,7 +250,7 @@ def test_a_signal_while_the_last_words_wait_for_a_reader_ends_at_once(robot: Rec
     os.close(writer)
     try:
         began = time.monotonic()
-        until(lambda: "client gone" in robot.told, "the end")
+        until(lambda: "client gone" in robot.reported, "the end")
         time.sleep(0.3)
         process.terminate()
         assert process.wait(TIMEOUT_S) == 130

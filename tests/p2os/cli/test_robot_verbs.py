@@ -359,7 +359,7 @@ def test_ports_are_guessed_by_what_they_say_they_are(
 
 
 @pytest.mark.parametrize(("timer", "is_reported"), [("16\n", True), ("1\n", False), ("soon", False)])
-def test_a_slow_latency_timer_is_told(timer: str, is_reported: bool, tmp_path: object) -> None:
+def test_a_slow_latency_timer_is_reported(timer: str, is_reported: bool, tmp_path: object) -> None:
     (tmp_path / "ttyUSB0").mkdir()
     (tmp_path / "ttyUSB0" / "latency_timer").write_text(timer)
     port = {"url": "serial:/dev/ttyUSB0", "description": "FT232R", "hardware": "USB VID:PID=0403:6001"}

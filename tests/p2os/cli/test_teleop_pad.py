@@ -29,7 +29,7 @@ class Bench:
     def __init__(self, reports: list[PadReport | None], *, link_fails_at: int = -1) -> None:
         self.reports = iter(reports)
         self.now = 0
-        self.told: list[tuple[int, float, float]] = []
+        self.reported: list[tuple[int, float, float]] = []
         self.lines: list[str] = []
         self.entered = self.left = 0
         self.link_fails_at = link_fails_at
@@ -56,17 +56,17 @@ class Bench:
         self.tell = callback
 
     def set_velocity(self, forward_mps: float, turn_radps: float) -> None:
-        if len(self.told) == self.link_fails_at:
-            self.told.append((self.now, 0, 0))
+        if len(self.reported) == self.link_fails_at:
+            self.reported.append((self.now, 0, 0))
             raise LinkLostError("silence")
-        self.told.append((self.now, forward_mps, turn_radps))
+        self.reported.append((self.now, forward_mps, turn_radps))
 
 
 def test_up_connects_the_sticks_drive_and_down_lets_go() -> None:
     drive = PadReport(forward=1023, turn=511)
     bench = Bench([NOTHING, UP, drive, PadReport(backward=1023), PadReport(turn=-511), DOWN])
     assert (bench.entered, bench.left) == (1, 1)
-    speeds = [(forward, turn) for _, forward, turn in bench.told]
+    speeds = [(forward, turn) for _, forward, turn in bench.reported]
     assert speeds == [(PAD_MPS, -PAD_RADPS), (-PAD_MPS, 0), (0, PAD_RADPS), (0, 0)]
     assert bench.lines[-2:] == ["Down was pressed: the robot stands; Up connects again", "the pad is gone"]
 
@@ -79,7 +79,7 @@ def test_a_pad_that_goes_stops_the_robot_in_200_ms_and_up_must_be_given_anew() -
     drive = PadReport(forward=1023)
     bench = Bench([NOTHING, UP, drive, *[None] * 9, PadReport(up=True, forward=1023), drive, drive])
     assert (bench.entered, bench.left) == (1, 1)
-    lost_at = next(at for at, forward, _ in bench.told if forward == 0)
+    lost_at = next(at for at, forward, _ in bench.reported if forward == 0)
     assert lost_at - 2 * PAD_PERIOD_NS <= 200 * NS_PER_MS
     assert "the pad is lost: the robot stands; Up connects again" in bench.lines
 
@@ -98,7 +98,7 @@ def test_after_a_pause_up_must_be_given_anew() -> None:
     drive = PadReport(forward=1023)
     bench = PausedBench([NOTHING, UP, drive, drive, drive, drive])
     assert (bench.entered, bench.left) == (1, 1)
-    assert [forward for _, forward, _ in bench.told] == [PAD_MPS, PAD_MPS, 0]
+    assert [forward for _, forward, _ in bench.reported] == [PAD_MPS, PAD_MPS, 0]
     assert "paused for 0.5 s: the robot stands; Up connects again" in bench.lines
 
 
@@ -107,14 +107,14 @@ class StoppedBench(Bench):
 
     def set_velocity(self, forward_mps: float, turn_radps: float) -> None:
         super().set_velocity(forward_mps, turn_radps)
-        if len(self.told) == 2:
+        if len(self.reported) == 2:
             self.tell(GapStopped(NS_PER_MS))
 
 
 def test_after_a_stop_of_the_client_up_must_be_given_anew() -> None:
     bench = StoppedBench([NOTHING, UP, *[PadReport(forward=1023)] * 4])
     assert bench.left == 1
-    assert [forward for _, forward, _ in bench.told] == [PAD_MPS, PAD_MPS, 0]
+    assert [forward for _, forward, _ in bench.reported] == [PAD_MPS, PAD_MPS, 0]
     assert "the client stopped the robot: the robot stands; Up connects again" in bench.lines
 
 

@@ -54,9 +54,9 @@ class ServedRobot:
         self._loops = Loops()
         listener = listen_url(url, loops=self._loops)
         self.url = listener.description
-        self.told: list[str] = []
+        self.reported: list[str] = []
         self._host = Host(
-            self.pioneer, listener, on_event=lambda _now, what, _detail: self.told.append(what),
+            self.pioneer, listener, on_event=lambda _now, what, _detail: self.reported.append(what),
             speed=speed, clock=clock,
         )  # fmt: skip
         self._end = threading.Event()

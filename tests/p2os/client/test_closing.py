@@ -35,7 +35,7 @@ OURS = str(Path(p2os.__file__).parent)
 WAITING = virtual_clock.__file__
 
 
-def was_told(recorder: Recorder) -> bool:
+def was_stopped(recorder: Recorder) -> bool:
     """Tell whether STOP, VEL 0, ENABLE 0 and CLOSE were sent, in this order, after the last speed."""
     sent = recorder.sent
     last_speed = max((place for place, command in enumerate(sent) if command == vel(300)), default=-1)
@@ -77,7 +77,7 @@ def interrupt_everywhere(story: Callable[[int], tuple[int, str, Recorder]], serv
     while True:
         lines, at, recorder = story(place)
         gc.collect()
-        served.until(lambda recorder=recorder: was_told(recorder), f"the last words after an interrupt at {at}")  # type: ignore[misc]
+        served.until(lambda recorder=recorder: was_stopped(recorder), f"the last words after an interrupt at {at}")  # type: ignore[misc]
         served.until(lambda: not served.pioneer.state.open)
         if lines < place:
             return place - 1
@@ -215,7 +215,7 @@ def test_closing_while_a_callback_blocks_stops_the_robot_at_once(served: ServedR
     began = time.monotonic()
     threading.Timer(0.6, over.set).start()
     robot.close()
-    assert was_told(recorder)
+    assert was_stopped(recorder)
     assert time.monotonic() - began < 5
     until(lambda: not served.is_moving and not served.pioneer.state.open)
 

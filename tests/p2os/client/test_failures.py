@@ -29,7 +29,7 @@ class Mishap:
     happen: Callable[[Rig], None]
     clear: Callable[[Rig], None] = lambda _rig: None
     mended_after_s: float = 3.0
-    told: str | None = None
+    reported: str | None = None
 
 
 def cut(rig: Rig) -> None:
@@ -54,15 +54,15 @@ def ungarble(rig: Rig) -> None:
 
 
 MISHAPS = [
-    Mishap("serial cable pulled and put back", 9600, Rig.pull, Rig.plug, told="the line vanished"),
-    Mishap("network cable pulled, the system notices", None, Rig.pull, Rig.plug, told="the line vanished"),
-    Mishap("wire loose, nobody is told", 9600, cut, join, told="no packet for 1000 ms"),
-    Mishap("half-open TCP peer", None, cut, join, told="no packet for 1000 ms"),
+    Mishap("serial cable pulled and put back", 9600, Rig.pull, Rig.plug, reported="the line vanished"),
+    Mishap("network cable pulled, the system notices", None, Rig.pull, Rig.plug, reported="the line vanished"),
+    Mishap("wire loose, nobody is told", 9600, cut, join, reported="no packet for 1000 ms"),
+    Mishap("half-open TCP peer", None, cut, join, reported="no packet for 1000 ms"),
     Mishap("wire loose for a moment", 9600, cut, join, 0.5),
-    Mishap("robot reboots", 9600, Rig.reboot, told="no packet for 1000 ms"),
-    Mishap("robot reboots behind a network box", None, Rig.reboot, told="no packet for 1000 ms"),
-    Mishap("robot comes back at another rate", 9600, reboot_at_another_rate, told="no packet for 1000 ms"),
-    Mishap("line turns to noise for a while", 9600, garble, ungarble, told="no packet for 1000 ms"),
+    Mishap("robot reboots", 9600, Rig.reboot, reported="no packet for 1000 ms"),
+    Mishap("robot reboots behind a network box", None, Rig.reboot, reported="no packet for 1000 ms"),
+    Mishap("robot comes back at another rate", 9600, reboot_at_another_rate, reported="no packet for 1000 ms"),
+    Mishap("line turns to noise for a while", 9600, garble, ungarble, reported="no packet for 1000 ms"),
 ]
 
 
@@ -106,11 +106,11 @@ def test_the_robot_stops_by_its_watchdog_and_stays_until_it_is_asked(mishap: Mis
     watch = Watch(rig).living(mishap.mended_after_s)
     mishap.clear(rig)
     watch.living(10)
-    if mishap.told is None:
+    if mishap.reported is None:
         assert rig.notices(LinkLost) == []
         assert rig.wheels == (SPEED_MPS, SPEED_MPS), "a moment is no loss, and the speed was asked for"
         return
-    assert rig.notices(LinkLost) == [LinkLost(mishap.told)]
+    assert rig.notices(LinkLost) == [LinkLost(mishap.reported)]
     assert watch.began_to_stop_ns(at) <= WATCHDOG_NS
     assert not watch.moves_again()
     assert rig.wheels == (0.0, 0.0)

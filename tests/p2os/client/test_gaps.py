@@ -305,9 +305,9 @@ def test_a_gap_while_the_robot_is_looked_for_does_not_use_the_search_up() -> Non
 
 @pytest.mark.parametrize("what", ["hold", "drive"])
 def test_a_blocking_robot_whose_machine_slept_stops_first_and_never_drives_on(fast: ServedRobot, what: str) -> None:
-    clock, recorder, told = SuspendingClock(fast.virtual), Recorder(fast.open), list[Notice]()
+    clock, recorder, reported = SuspendingClock(fast.virtual), Recorder(fast.open), list[Notice]()
     with Robot(fast.url, settings=QUICK, opener=recorder, clock=clock) as robot:
-        robot.on_event(told.append)
+        robot.on_event(reported.append)
         sent: list[int] = []
 
         def fall_asleep(_: object) -> None:
@@ -326,15 +326,15 @@ def test_a_blocking_robot_whose_machine_slept_stops_first_and_never_drives_on(fa
         assert recorder.sent[sent[0]] == stop()
         assert vel(300) not in recorder.sent[sent[0] :]
         fast.until(lambda: not fast.is_moving)
-        assert any(isinstance(notice, GapStopped) for notice in told)
+        assert any(isinstance(notice, GapStopped) for notice in reported)
 
 
 def test_an_asyncio_robot_whose_machine_slept_stops_first_and_never_drives_on(fast: ServedRobot) -> None:
-    clock, recorder, told = SuspendingClock(fast.virtual), Recorder(fast.open), list[Notice]()
+    clock, recorder, reported = SuspendingClock(fast.virtual), Recorder(fast.open), list[Notice]()
 
     async def story() -> None:
         async with AsyncRobot(fast.url, settings=QUICK, opener=recorder, clock=clock) as robot:
-            robot.on_event(told.append)
+            robot.on_event(reported.append)
             robot.set_velocity(0.3)
             while not fast.is_moving:  # noqa: ASYNC110  # it moves in another thread
                 await asyncio.sleep(0.005)
@@ -348,7 +348,7 @@ def test_an_asyncio_robot_whose_machine_slept_stops_first_and_never_drives_on(fa
 
     with asyncio.Runner(loop_factory=fast.virtual.event_loop) as runner:
         runner.run(story())
-    assert isinstance(told[0], GapStopped)
+    assert isinstance(reported[0], GapStopped)
 
 
 async def soon(is_so: Callable[[], object]) -> None:
@@ -360,18 +360,18 @@ async def soon(is_so: Callable[[], object]) -> None:
 
 async def block_the_loop(robot: ServedRobot, block: Callable[[float], None], pause_s: float) -> None:
     """Drive a robot by a program that does nothing for its loop for so long."""
-    recorder, told = Recorder(robot.open), list[Notice]()
+    recorder, reported = Recorder(robot.open), list[Notice]()
     async with AsyncRobot(robot.url, settings=QUICK, opener=recorder, clock=robot.clock) as client:
-        client.on_event(told.append)
+        client.on_event(reported.append)
         client.set_velocity(0.1)
         await soon(lambda: robot.is_moving)
         sent = len(recorder.sent)
         block(pause_s)
-        await soon(lambda: told)
+        await soon(lambda: reported)
         assert client.link is Link.OPEN
         assert recorder.sent[sent] == stop()
         robot.until(lambda: not robot.is_moving)
-    assert [type(notice) for notice in told] == [GapStopped]
+    assert [type(notice) for notice in reported] == [GapStopped]
 
 
 def test_an_asyncio_program_that_blocks_its_loop_keeps_a_sound_link_and_stops(served: ServedRobot) -> None:
@@ -386,7 +386,7 @@ def test_however_long_an_asyncio_program_blocks_its_loop_the_link_is_sound(fast:
 
 def block_a_callback(robot: ServedRobot, block: Callable[[float], None], pause_s: float) -> None:
     """Drive a robot by a program whose callback takes so long."""
-    told, blocked = list[Notice](), threading.Event()
+    reported, blocked = list[Notice](), threading.Event()
 
     def block_once(_: object) -> None:
         if not blocked.is_set():
@@ -394,11 +394,11 @@ def block_a_callback(robot: ServedRobot, block: Callable[[float], None], pause_s
             block(pause_s)
 
     with Robot(robot.url, settings=QUICK, opener=Recorder(robot.open), clock=robot.clock) as client:
-        client.on_event(told.append)
+        client.on_event(reported.append)
         client.set_velocity(0.1)
         robot.until(lambda: robot.is_moving)
         client.on_state(block_once)
-        robot.until(lambda: any(isinstance(notice, GapStopped) for notice in told))
+        robot.until(lambda: any(isinstance(notice, GapStopped) for notice in reported))
         assert client.link is Link.OPEN
         robot.until(lambda: not robot.is_moving)
 

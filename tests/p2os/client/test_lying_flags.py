@@ -54,7 +54,7 @@ class LyingRig(Rig):
         super()._carry(data, to_robot=to_robot)
 
     @property
-    def is_told_to_move(self) -> bool:
+    def is_commanded_to_move(self) -> bool:
         """Whether what the robot has taken so far moves it: its own set-points, not the client's account of them."""
         _, first, first_goal, second, second_goal = self.pioneer._context.motion.setpoints
         is_asked = bool(first or second) or first_goal is not None or second_goal is not None
@@ -98,7 +98,7 @@ ACTS: st.SearchStrategy[Act] = st.one_of(
 STORIES = st.lists(st.tuples(ACTS, st.sampled_from(LIES), st.sampled_from([0, 3, 30, 300, 900, 1500])), max_size=4)
 
 
-def told(model: str, profile: Profile | None, seed: int, story: list[tuple[Act, str, int]]) -> None:
+def reported(model: str, profile: Profile | None, seed: int, story: list[tuple[Act, str, int]]) -> None:
     """Tell a story, and hold its end against the limits."""
     rig = LyingRig(seed=seed, pioneer=free_pioneer(model, profile=profile)).connect()
     rig.core.enable(True, rig.now)
@@ -113,7 +113,7 @@ def told(model: str, profile: Profile | None, seed: int, story: list[tuple[Act, 
         rig.run(milliseconds / 1000)
     assert rig.core.link is Link.OPEN
     rig.run((called_at + STOP_WITHIN_NS - rig.now) / S)
-    assert not rig.is_told_to_move, rig.sent[-12:]
+    assert not rig.is_commanded_to_move, rig.sent[-12:]
     rig.run(STAND_WITHIN_NS / S)
     assert rig.wheels == (0.0, 0.0)
 
@@ -130,7 +130,7 @@ WHOLE = given(
 def test_a_robot_whose_flags_lie_is_told_to_stand_and_stands(
     model: str, profile: Profile | None, seed: int, story: list[tuple[Act, str, int]]
 ) -> None:
-    told(model, profile, seed, story)
+    reported(model, profile, seed, story)
 
 
 @pytest.mark.soak
@@ -139,4 +139,4 @@ def test_a_robot_whose_flags_lie_is_told_to_stand_and_stands(
 def test_any_robot_whose_flags_lie_is_told_to_stand_and_stands(
     model: str, profile: Profile | None, seed: int, story: list[tuple[Act, str, int]]
 ) -> None:
-    told(model, profile, seed, story)
+    reported(model, profile, seed, story)

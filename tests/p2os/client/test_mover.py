@@ -241,8 +241,8 @@ def test_a_deaf_robot_is_reported_after_a_second_and_once() -> None:
     rig.living(3)
     (doubt,) = rig.notices(Disobeyed)
     assert "commanded 0.30 and 0.30, and no stall flag; are the motors disabled" in doubt.text
-    told = next(state.at_ns for state in rig.states if state.at_ns >= begun + S)
-    assert told - begun <= 2.3 * S
+    reported = next(state.at_ns for state in rig.states if state.at_ns >= begun + S)
+    assert reported - begun <= 2.3 * S
 
 
 def test_a_ramp_is_no_disobedience() -> None:

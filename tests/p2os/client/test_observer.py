@@ -91,10 +91,10 @@ def test_bumpers_are_those_that_are_fitted(fitted: int, pressed: tuple[int, ...]
 def test_limits_are_the_configurations_below_the_models() -> None:
     own = limits_of(P2DX, None)
     assert (own.forward_mps, own.accel_mps2) == (0.75, 0.3)
-    told = limits_of(P2DX, ConfigPacket(transvelmax=400, rotvelmax=60, transacc=250, rotdecel=80))
-    assert (told.forward_mps, told.accel_mps2, told.decel_mps2) == (0.4, 0.25, 0.3)
-    assert told.turn_radps == pytest.approx(math.radians(60))
-    assert told.turn_decel_radps2 == pytest.approx(math.radians(80))
+    reported = limits_of(P2DX, ConfigPacket(transvelmax=400, rotvelmax=60, transacc=250, rotdecel=80))
+    assert (reported.forward_mps, reported.accel_mps2, reported.decel_mps2) == (0.4, 0.25, 0.3)
+    assert reported.turn_radps == pytest.approx(math.radians(60))
+    assert reported.turn_decel_radps2 == pytest.approx(math.radians(80))
     assert limits_of(P2DX, ConfigPacket(transvelmax=9999)).forward_mps == 2.2, "simulators send 9999"
 
 
@@ -175,8 +175,8 @@ def test_a_tail_shows_the_family_whatever_the_model_is_called() -> None:
     assert rig.core.profile is Profile.ARCOS
     assert rig.core.state is not None
     assert rig.core.state.motors_enabled is False
-    told = Rig(settings=ClientSettings(profile=Profile.AROS), pioneer=new_pioneer(profile=Profile.ARCOS)).connect()
-    assert told.core.profile is Profile.AROS
+    reported = Rig(settings=ClientSettings(profile=Profile.AROS), pioneer=new_pioneer(profile=Profile.ARCOS)).connect()
+    assert reported.core.profile is Profile.AROS
 
 
 def test_packets_of_other_kinds_come_through() -> None:

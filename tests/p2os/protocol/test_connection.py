@@ -109,19 +109,19 @@ def test_a_session_opens_over_any_wire_or_fails_by_name(name: str, seed: int) ->
     wire, random_source = WIRES[name], Random(seed)
     here, there = client(), server()
     here.connect(0)
-    told: list[Event] = []
+    reported: list[Event] = []
     now = 0
-    while now < 20 * NS_PER_S and not any(isinstance(event, Opened | ConnectFailed) for event in told):
+    while now < 20 * NS_PER_S and not any(isinstance(event, Opened | ConnectFailed) for event in reported):
         now += 10 * MS
         for near, far in ((here, there), (there, here)):
             near.advance_to(now)
             for data in near.take_output():
                 for part in wire(data, random_source):
                     far.receive(part, now)
-        told += events(here)
-    assert any(isinstance(event, Opened | ConnectFailed) for event in told)
+        reported += events(here)
+    assert any(isinstance(event, Opened | ConnectFailed) for event in reported)
     if name in {"perfect", "byte by byte", "with junk before"}:
-        assert Synchronised(WILMA) in told
+        assert Synchronised(WILMA) in reported
         assert here.is_open
     assert pickle.dumps(here.snapshot())
 

@@ -100,13 +100,13 @@ def check(role: ConnectionRole, name: str, damage: Damage, most_chunks: int | No
 
 def has_a_name(end: Connection, now: Nanos) -> None:
     """Hold an end that has heard nothing for long to what it must have said."""
-    told = list(events(end))
+    reported = list(events(end))
     if end.role is ConnectionRole.CLIENT:
         assert end.state in {ConnectionState.LOST, ConnectionState.FAILED}
-        assert any(isinstance(event, (ConnectFailed, ConnectionLost)) for event in told)
+        assert any(isinstance(event, (ConnectFailed, ConnectionLost)) for event in reported)
         assert end.next_deadline() is None or end.next_deadline() > now  # type: ignore[operator]  # not None here
     elif end.is_open:
-        assert any(isinstance(event, WatchdogExpired) for event in told), "open, silent, and not stopped"
+        assert any(isinstance(event, WatchdogExpired) for event in reported), "open, silent, and not stopped"
 
 
 @pytest.mark.parametrize("role", list(ConnectionRole), ids=lambda role: role.value)

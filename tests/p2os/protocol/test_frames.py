@@ -141,7 +141,7 @@ def test_a_frame_inside_a_damaged_one_is_found_and_counted() -> None:
     assert (decoder.stats.bad_checksums, decoder.stats.rescued) == (1, 1)
 
 
-def test_every_kind_of_damage_is_told_and_counted() -> None:
+def test_every_kind_of_damage_is_reported_and_counted() -> None:
     decoder = Decoder()
     decoder.receive(b"\x01\x02" + bytes.fromhex("fafb060b3bc8001234") + bytes.fromhex("fafb00"), 0)
     decoder.receive(bytes.fromhex("fafb06"), 5)

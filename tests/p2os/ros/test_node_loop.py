@@ -250,8 +250,8 @@ def test_a_signal_stops_the_robot_before_the_node_ends() -> None:
                 assert select.select([peer.stdout], [], [], 15.0)[0], "the peer hears nothing"
                 heard = peer.stdout.readline()
             node.send_signal(number)
-            _, told = node.communicate(timeout=15)
-            assert node.returncode == 130, told
-            assert "the robot was stopped and let go" in told
+            _, reported = node.communicate(timeout=15)
+            assert node.returncode == 130, reported
+            assert "the robot was stopped and let go" in reported
             assert "motors off" in " ".join(url.order("status"))
             until(lambda: "wheels 0.000 0.000" in " ".join(url.order("status")), "a stand")  # noqa: B023  # by its ramp

@@ -186,17 +186,17 @@ def test_a_reset_of_the_odometry_does_not_turn_the_wheels(node: RobotNode) -> No
     assert published(node, back)["/r1/joint_states"]["position"] == before
 
 
-def test_bumpers_are_told_where_they_are_fitted(node: RobotNode) -> None:
+def test_bumpers_are_reported_where_they_are_fitted(node: RobotNode) -> None:
     (state,) = states(StandardSip(front_bumpers=0b00101, rear_bumpers=1))
     found = published(node, state)
     assert found["/r1/bumper_front"]["data"] == [1, 0, 1, 0, 0]
     assert "/r1/bumper_rear" not in found
 
 
-@pytest.mark.parametrize(("told", "share"), [(None, math.nan), (0.0, math.nan), (0.01, 0.01), (1.0, 1.0)])
-def test_a_charge_that_nothing_measures_is_not_a_number(node: RobotNode, told: float | None, share: float) -> None:
+@pytest.mark.parametrize(("reported", "share"), [(None, math.nan), (0.0, math.nan), (0.01, 0.01), (1.0, 1.0)])
+def test_a_charge_that_nothing_measures_is_not_a_number(node: RobotNode, reported: float | None, share: float) -> None:
     (state,) = states(StandardSip(raw_battery=126))
-    found = published(node, replace(state, state_of_charge=told, temperature_c=31.0))["/r1/battery_state"]
+    found = published(node, replace(state, state_of_charge=reported, temperature_c=31.0))["/r1/battery_state"]
     assert found["percentage"] == pytest.approx(share, nan_ok=True)
     assert (found["voltage"], found["temperature"]) == (12.6, 31.0)
     assert math.isnan(found["current"])

@@ -167,10 +167,10 @@ def test_a_campaign_against_a_blind_version_finds_it_and_names_when_they_part(
     Path("bad.elf").write_bytes(bad_firmware())
     Path("dodge.elf").write_bytes(hurried("dodge").read_bytes())
     assert cli.run(["campaign", "c.toml", "--against", "bad.elf", "--out", "there", "--json"]) == 1
-    told = json.loads(capsys.readouterr().out)
-    assert told["parted"]["1"].startswith("they part at 0.")
-    assert "bad.elf no_collision" in told["failures"][0]["failures"][0]
-    assert (told["clusters"], told["diversity"]) == ([[1]], {"obstacles": None, "ways": None})
+    reported = json.loads(capsys.readouterr().out)
+    assert reported["parted"]["1"].startswith("they part at 0.")
+    assert "bad.elf no_collision" in reported["failures"][0]["failures"][0]
+    assert (reported["clusters"], reported["diversity"]) == ([[1]], {"obstacles": None, "ways": None})
     assert [path.name for path in Path("there", FOLDER).iterdir()] == ["bad.elf"]
     assert cli.run(["campaign", "--resume", "there"]) == 1
     assert "they part at 0." in capsys.readouterr().out

@@ -7,6 +7,7 @@ from typing import cast
 
 import pytest
 
+from robot_bench.bench import run_of
 from robot_bench.campaign.campaign_file import RunLimits
 from robot_bench.campaign.trial import Outcome, Trial, TrialVerdict, bench_of, run_trial, trial_of, unpacked
 from robot_bench.campaign.workers.beginnings import (
@@ -138,7 +139,7 @@ def test_a_run_that_ends_before_its_own_event_comes_to_the_same(base: Trial) -> 
     assert found[0].virtual_ns < 6 * NS_PER_S
 
 
-def test_a_beginning_that_cannot_be_is_told_by_each_trial(base: Trial) -> None:
+def test_a_beginning_that_cannot_be_is_reported_by_each_trial(base: Trial) -> None:
     nowhere = base.set(("start", {"x_m": 50.0, "y_m": 0.0, "heading_deg": 0.0}))
     found = outcomes([nowhere.with_lists(fault=[stuck(at_s)]) for at_s in (7.0, 8.0)], Beginnings(), Counted())
     assert [one.verdict for one in found] == [TrialVerdict.ERROR] * 2
@@ -179,11 +180,11 @@ def test_a_state_of_another_run_is_refused(base: Trial) -> None:
         ):  # fmt: skip
             other = bench_of(base.with_lists(fault=faults).scenario(folder))
             with pytest.raises(UsageError, match="until 2 s something else happens here"):
-                other.begin_as(*states[name])
+                run_of(other).begin_as(*states[name])
         later = bench_of(base.with_lists(fault=[stuck(1.0), stuck((now + 1) / NS_PER_S)]).scenario(folder))
-        later.begin_as(*states["early"])
+        run_of(later).begin_as(*states["early"])
         with pytest.raises(UsageError, match="another threshold"):
-            bench_of(base.set(("threshold_m", 0.3)).scenario(folder)).begin_as(*states["none"])
+            run_of(bench_of(base.set(("threshold_m", 0.3)).scenario(folder))).begin_as(*states["none"])
 
 
 def test_robots_in_one_world_are_not_begun_elsewhere() -> None:
@@ -191,4 +192,4 @@ def test_robots_in_one_world_are_not_begun_elsewhere() -> None:
     with unpacked(two.files) as folder:
         bench = bench_of(two.scenario(folder))
         with pytest.raises(UsageError, match="begin at the beginning"):
-            bench.begin_as(bench.snapshot(), 0)
+            run_of(bench).begin_as(bench.snapshot(), 0)

@@ -313,7 +313,7 @@ def test_the_data_set_has_a_row_a_run_and_the_page_names_every_failure(tmp_path:
     assert all(f"point {number}</b>" in page for number in failed)
 
 
-def test_until_when_failures_were_avoidable_is_told_by_summary_and_page(tmp_path: Path) -> None:
+def test_until_when_failures_were_avoidable_is_reported_by_summary_and_page(tmp_path: Path) -> None:
     moment = LastMoment(failure="x", failed_ns=2 * 10**9, avoidable_ns=10**9, place=(1.0, 2.0, 30.0), printed="")
     whole = carried(begun(tmp_path), tmp_path / "kept", Shuffled(1), moment)
     failures = json.loads((tmp_path / "kept/summary.json").read_text())["failures"]
@@ -336,7 +336,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("right", WRONG)
-def test_what_is_wrong_in_a_file_is_told_with_a_hint(right: str, tmp_path: Path) -> None:
+def test_what_is_wrong_in_a_file_is_reported_with_a_hint(right: str, tmp_path: Path) -> None:
     wrong, words = WRONG[right]
     file = tmp_path / "mine.toml"
     file.write_text(FILE.replace(right, wrong, 1))

@@ -134,7 +134,7 @@ def test_dask_of_this_machine_comes_to_what_a_process_comes_to() -> None:
 
 
 @pytest.mark.slow
-def test_a_scheduler_that_is_not_there_is_told_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_scheduler_that_is_not_there_is_reported_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(dask_workers, "BEGIN_S", 0.0)
     monkeypatch.setattr(dask_workers, "ATTEMPT_S", 0.5)
     with pytest.raises(UsageError, match="no scheduler answers at tcp://"):

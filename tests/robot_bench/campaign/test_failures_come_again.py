@@ -56,16 +56,16 @@ def test_a_hundred_different_failures_fail_again_after_a_restart(tmp_path: Path)
     whole = carry_out(campaign, folder, Processes(2, RunLimits()), clock=time.monotonic_ns)
     findings = {row.finding for row in whole.progress.rows}
     assert not findings & {PointFinding.NOT_REPEATED, PointFinding.ERROR, PointFinding.UNCONFIRMED}
-    told = {
+    reported = {
         f"{row.number:04d}": (run.outcome.verdict.value, run.outcome.sha256, list(run.outcome.failures))
         for row in whole.failures
         if (run := row.failing) is not None
     }
-    assert len({sha256 for _, sha256, _ in told.values()}) >= WANTED
+    assert len({sha256 for _, sha256, _ in reported.values()}) >= WANTED
     folders = sorted(str(path) for path in (folder / "failures").iterdir())
     again = subprocess.run([sys.executable, "-c", AGAIN, *folders], check=True, capture_output=True, text=True)
     found = {
         name: (verdict, sha256, failures)
         for name, verdict, sha256, failures in map(json.loads, again.stdout.splitlines())
     }
-    assert found == told
+    assert found == reported

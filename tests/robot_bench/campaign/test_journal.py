@@ -129,7 +129,7 @@ def file_limit(size: int) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
-def test_a_line_that_the_disk_had_no_room_for_is_told_of_and_taken_off(tmp_path: Path) -> None:
+def test_a_line_that_the_disk_had_no_room_for_is_reported_and_taken_off(tmp_path: Path) -> None:
     whole = written(tmp_path)
     first = whole.index(b"\n") + 1
     for size in (first - 1, first, first + 1, first + 100, len(whole) - 1):

@@ -184,7 +184,7 @@ def test_a_robot_that_sees_nothing_needs_one_obstacle_of_nine_to_fail_the_same_w
     assert (again.way.what, again.way.part) == ("touches nothing", "front")
 
 
-def test_a_failure_is_told_with_its_time_and_part_and_one_of_another_way_is_not() -> None:
+def test_a_failure_is_reported_with_its_time_and_part_and_one_of_another_way_is_not() -> None:
     settings = [*BLIND, ("start.x_m", 2.2), ("start.y_m", 0.0), ("duration_s", 6.0)]
     trial = trial_of("dodge", settings=settings, firmware=hurried("dodge"))
     found = failure_of(trial)

@@ -144,7 +144,7 @@ def test_a_fault_that_cannot_be_is_refused_before_anything_runs(app: typer.Typer
     assert load_campaign(Path("mine.toml")).disturbances
 
 
-def test_points_without_any_verdict_end_with_1_and_each_reason_is_told_once(app: typer.Typer) -> None:
+def test_points_without_any_verdict_end_with_1_and_each_reason_is_reported_once(app: typer.Typer) -> None:
     path = written("no_collision")
     path.write_text(path.read_text().replace("[cheap]", "[limits]\nmemory_mb = 64\n[cheap]"))
     code, said = run(app, "mine.toml", "-j", "1")

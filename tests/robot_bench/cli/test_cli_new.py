@@ -136,7 +136,7 @@ def test_a_disk_that_fills_up_leaves_nothing_behind(written: int, monkeypatch: p
     assert list(Path().iterdir()) == []
 
 
-def test_a_missing_compiler_is_told_with_its_package(
+def test_a_missing_compiler_is_reported_with_its_package(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr("robot_bench.cli.new.COMPILER", "no-such-compiler")

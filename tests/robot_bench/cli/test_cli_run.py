@@ -307,11 +307,11 @@ def test_why_a_run_failed_stands_right_above_its_last_line(capsys: pytest.Captur
     assert is_open.startswith("open    drives at least 1 m"), "what the fault has prevented is no second cause"
     assert untouched == "open    touches nothing: not judged before 5 s", "the rest of the time nobody knows"
     record = read_run(Path("dead"))
-    told = json.loads(Path("dead/summary.json").read_text(encoding="utf-8"))
-    assert told["goals_met"] == record.end["goals_met"] == record.verdicts == []
-    assert len(told["goals_not_judged"]) == 2
+    reported = json.loads(Path("dead/summary.json").read_text(encoding="utf-8"))
+    assert reported["goals_met"] == record.end["goals_met"] == record.verdicts == []
+    assert len(reported["goals_not_judged"]) == 2
     assert f'<li class="open">{untouched[8:]}</li>' in Path("dead/report.html").read_text(encoding="utf-8")
-    assert drive_of_record("dead", record).open_goals == told["goals_not_judged"]
+    assert drive_of_record("dead", record).open_goals == reported["goals_not_judged"]
     assert p2os(["metrics", "dead"]) == 0
     assert "  open               touches nothing: not judged before 5 s" in capsys.readouterr().out.splitlines()
 

@@ -82,7 +82,7 @@ def test_what_comes_of_a_sweep_does_not_depend_on_how_many_run_at_a_time(capsys:
     assert len({run["trace_sha256"] for run in found[0]["runs"]}) == 3  # type: ignore[attr-defined] # JSON
 
 
-def test_seeds_that_make_no_difference_are_told_of(capsys: pytest.CaptureFixture[str]) -> None:
+def test_seeds_that_make_no_difference_are_reported(capsys: pytest.CaptureFixture[str]) -> None:
     assert p2os(["run", make(), "--seeds", "0-1"]) == 0
     assert "note    the seeds made no difference: nothing random acts here" in capsys.readouterr().out
     assert p2os(["run", make(), "--seeds", "0-1", "--json", "--junit", "r.xml"]) == 0
@@ -163,7 +163,7 @@ def test_a_process_that_is_killed_is_a_failed_run_and_the_others_go_on() -> None
     assert found[1]["failures"] == ["its process ended by SIGKILL"]
 
 
-def test_a_bug_in_one_piece_is_told_by_its_name() -> None:
+def test_a_bug_in_one_piece_is_reported_by_its_name() -> None:
     found: dict[int, dict[str, object]] = {}
 
     def job(number: int, look: object) -> dict[str, object]:

@@ -139,7 +139,7 @@ def refused(done: subprocess.CompletedProcess[str]) -> None:
 
 
 @pytest.mark.parametrize(("verb", "size"), ROWS)
-def test_no_room_is_told_in_one_line_with_the_file(verb: str, size: int, place: Path) -> None:
+def test_no_room_is_reported_in_one_line_with_the_file(verb: str, size: int, place: Path) -> None:
     refused(child(place, size, verb))
 
 

@@ -117,9 +117,9 @@ def test_a_failure_says_what_was_wanted_what_happened_last_and_where_to_look(pyt
     if (page.parent / "path.png").exists():
         assert f"picture:  {page.parent / 'path.png'}" in out
     cases = ET.parse(pytester.path / "junit.xml").iter("testcase")  # noqa: S314 - our own file
-    told = {case.get("name"): {item.get("name") for item in case.iter("property")} for case in cases}
-    assert {"bench_report", "trace_sha256", "bench_seed"} <= told["test_it_flies"]
-    assert told["test_without_a_bench"] == set()
+    reported = {case.get("name"): {item.get("name") for item in case.iter("property")} for case in cases}
+    assert {"bench_report", "trace_sha256", "bench_seed"} <= reported["test_it_flies"]
+    assert reported["test_without_a_bench"] == set()
 
 
 MISUSED = """
@@ -149,11 +149,11 @@ def test_a_misuse_shows_the_tests_own_line_the_error_and_its_hint_and_none_of_ou
 ) -> None:
     result = run(pytester, MISUSED, "--bench-record", "none")
     result.assert_outcomes(failed=3, errors=2)
-    told = result.stdout.str()
-    assert "expect_pin(self" not in told
-    assert "robot_bench/" not in told.partition("short test summary")[0]
-    assert "another exception" not in told
-    assert "direct cause" not in told
+    reported = result.stdout.str()
+    assert "expect_pin(self" not in reported
+    assert "robot_bench/" not in reported.partition("short test summary")[0]
+    assert "another exception" not in reported
+    assert "direct cause" not in reported
     result.stdout.fnmatch_lines([
         "*no world 'rom' (hint: did you mean 'room'?)", '*run_until("9 parsec")', "E *unit ?parsec?*",
         '*expect_pin("PB99"*', "E *no wire 'PB99'", "E *hint: *PB7*",

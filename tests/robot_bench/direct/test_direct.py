@@ -74,13 +74,13 @@ def test_a_wheel_a_little_behind_its_start_shows_the_last_sector() -> None:
 
 def test_at_the_threshold_is_not_nearer() -> None:
     wires = nets(3)
-    told: list[tuple[int, list[float]]] = []
+    reported: list[tuple[int, list[float]]] = []
     sensors = DistanceSensors(wires, threshold_um=600_000, period_ns=50 * MS)
-    sensors.on_sample = lambda at, metres: told.append((at, list(metres)))
+    sensors.on_sample = lambda at, metres: reported.append((at, list(metres)))
     sensors.sample([0.599_999, 0.6, 5.0], 7)
     assert [net.level(7) for net in wires] == [True, False, False]
     assert sensors.next_deadline() == 7 + 50 * MS
-    assert told == [(7, [0.599_999, 0.6, 5.0])]
+    assert reported == [(7, [0.599_999, 0.6, 5.0])]
 
 
 def robot() -> tuple[DirectRobot, list[Net], list[Net], list[Net]]:

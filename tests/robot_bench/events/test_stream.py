@@ -35,7 +35,7 @@ from robot_bench.events.kinds import (
     hull_part,
 )
 from robot_bench.events.stream import EventStream
-from robot_bench.events.words import told_apart, what_of
+from robot_bench.events.words import distinguishing_words, what_of
 from robot_bench.scenario.fault_script import FaultChange
 from robot_bench.scenario.scenario import Scenario, load_scenario
 from robot_bench.scenario.world_script import Op, ScriptedChange
@@ -100,33 +100,35 @@ def test_every_kind_of_event_is_tried_here() -> None:
 
 
 @given(st.data())
-def test_two_events_that_differ_are_told_apart(data: st.DataObject) -> None:
+def test_two_events_that_differ_are_distinguished(data: st.DataObject) -> None:
     kind = data.draw(st.sampled_from(KINDS))
     one, other = data.draw(SAMPLES[kind]), data.draw(SAMPLES[kind])
     name = data.draw(st.sampled_from([part.name for part in fields(one) if part.name != "t"]))
     other = replace(one, **{name: getattr(other, name)})
-    ours, theirs = told_apart(one, other)
+    ours, theirs = distinguishing_words(one, other)
     assert (ours == theirs) is (one == other), name
     assert ours.startswith(what_of(one))
-    assert told_apart(one, one) == (what_of(one), what_of(one))
+    assert distinguishing_words(one, one) == (what_of(one), what_of(one))
 
 
-def test_digits_and_bytes_that_words_leave_out_are_told_where_events_differ_in_them() -> None:
+def test_digits_and_bytes_that_words_leave_out_are_reported_where_events_differ_in_them() -> None:
     near, nearer = Clearance(t=5, um=1_476_312), Clearance(t=5, um=1_476_309)
-    assert told_apart(near, nearer) == (
+    assert distinguishing_words(near, nearer) == (
         "1.476 m of clearance (1.476312 m)", "1.476 m of clearance (1.476309 m)",
     )  # fmt: skip
-    assert told_apart(near, Clearance(t=5, um=1_475_000)) == ("1.476 m of clearance", "1.475 m of clearance")
-    ours, theirs = told_apart(pose(0, 1), replace(pose(0, 1), left_angle=-7))
+    assert distinguishing_words(near, Clearance(t=5, um=1_475_000)) == ("1.476 m of clearance", "1.475 m of clearance")
+    ours, theirs = distinguishing_words(pose(0, 1), replace(pose(0, 1), left_angle=-7))
     assert ours.endswith("m/s (left angle 0.000000 rad)")
     assert theirs.endswith("m/s (left angle -0.000007 rad)")
     long = SpiTransfer(t=1, bus="spi1", begun=0, ended=1, from_master=bytes(20), from_slave=b"")
-    ours, theirs = told_apart(long, replace(long, from_master=bytes(18) + b"\1\0"))
+    ours, theirs = distinguishing_words(long, replace(long, from_master=bytes(18) + b"\1\0"))
     assert ours.endswith("(from_master from byte 18 on: 00 00)")
     assert theirs.endswith("(from_master from byte 18 on: 01 00)")
     thing = WorldChange(t=0, op="place", name="a", fields={"x": 1.0, "y": 2.0})
-    assert told_apart(thing, replace(thing, fields={"x": 1.0, "z": 2.5}))[1] == "'a': place (fields: no y z 2.5)"
-    assert told_apart(Ranges(t=0, mm=(1000, 2)), Ranges(t=0, mm=(1000, 1)))[0] == "sonar 1.00 0.00 m (mm: 2 2)"
+    other = replace(thing, fields={"x": 1.0, "z": 2.5})
+    assert distinguishing_words(thing, other)[1] == "'a': place (fields: no y z 2.5)"
+    ranges = Ranges(t=0, mm=(1000, 2))
+    assert distinguishing_words(ranges, Ranges(t=0, mm=(1000, 1)))[0] == "sonar 1.00 0.00 m (mm: 2 2)"
 
 
 notes = st.lists(
@@ -206,8 +208,8 @@ def test_what_a_sink_publishes_comes_in_its_order() -> None:
 
 def test_a_restored_stream_goes_on_alike() -> None:
     first, second = EventStream(), EventStream()
-    told: list[list[Event]] = [[], []]
-    for stream, seen in zip((first, second), told, strict=True):
+    reported: list[list[Event]] = [[], []]
+    for stream, seen in zip((first, second), reported, strict=True):
         stream.subscribe(seen.append)
     first.publish(pose(9))
     first.publish(Note(t=3, who="x", what="y"))
@@ -216,7 +218,7 @@ def test_a_restored_stream_goes_on_alike() -> None:
     for stream in (first, second):
         stream.publish(Text(t=9, data=b"x"))
         stream.release(9)
-    assert told[0][1:] == told[1] == [Text(t=9, data=b"x"), pose(9)]
+    assert reported[0][1:] == reported[1] == [Text(t=9, data=b"x"), pose(9)]
 
 
 @pytest.mark.parametrize(

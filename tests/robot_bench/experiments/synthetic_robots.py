@@ -31,7 +31,7 @@ class Make:
     """What kind of robots they are, beside what each has planted."""
 
     #: Noise of speeds before they are rounded, mm/s: of each packet, and one that lasts for a second.
-    told_mm_s: float = 0.0
+    reported_mm_s: float = 0.0
     lag_mm_s: float = 0.0
     #: A command acts at the next of such ticks; it and packets are late by so much more at most, evenly spread.
     tick_ms: int = 1
@@ -43,8 +43,8 @@ class Make:
 
 MAKES: Mapping[str, Make] = {
     "rounded": Make(),
-    "noisy": Make(told_mm_s=0.6, packet_ms=3.0),
-    "lagging": Make(told_mm_s=0.3, lag_mm_s=1.0, command_ms=4.0),
+    "noisy": Make(reported_mm_s=0.6, packet_ms=3.0),
+    "lagging": Make(reported_mm_s=0.3, lag_mm_s=1.0, command_ms=4.0),
     "ticking": Make(tick_ms=5),
     "rays": Make(rays=9),
 }
@@ -212,14 +212,14 @@ def drive(
         at, np.round(ox[made] / 1000 / unit) * unit, np.round(oy[made] / 1000 / unit) * unit,
         np.round(oh[made] * 4096 / math.tau) * math.tau / 4096,
     )  # fmt: skip
-    told = []
+    reported = []
     for side in (-1, 1):
         speed = planted.speed_gain * v[made] + side * np.radians(w[made]) * half_mm * planted.turn_gain
-        noise = make.told_mm_s * normal.standard_normal(len(made)) + make.lag_mm_s * _slow(len(made), normal)
-        told.append(Steps(at, np.round(speed + noise * (speed != 0)) / 1000))
+        noise = make.reported_mm_s * normal.standard_normal(len(made)) + make.lag_mm_s * _slow(len(made), normal)
+        reported.append(Steps(at, np.round(speed + noise * (speed != 0)) / 1000))
     return Drive(
-        name="synthetic", parameters=parameters, truth=truth, odometry=odometry, told_left_mps=told[0],
-        told_right_mps=told[1],
+        name="synthetic", parameters=parameters, truth=truth, odometry=odometry, reported_left_mps=reported[0],
+        reported_right_mps=reported[1],
         commands={"VEL": steps_of([(t, value) for t, value, _ in rows]),
                   "RVEL": steps_of([(t, value) for t, _, value in rows])},
         sonar_m=_sonar(parameters, planted, make, np.stack((x[made], y[made], h[made])), at, normal),

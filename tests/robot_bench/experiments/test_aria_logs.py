@@ -88,7 +88,7 @@ def test_a_scan_file_gives_the_odometry_and_the_rims_by_their_speeds(tmp_path: P
         ("LaserOdometryLog\nlogTime:\n", "log:2: logTime with 0 numbers, expected 1"),
     ],
 )
-def test_what_is_broken_is_told_with_its_line(text: str, says: str) -> None:
+def test_what_is_broken_is_reported_with_its_line(text: str, says: str) -> None:
     with pytest.raises(FileError) as failure:
         read_aria_log("log", text.splitlines(keepends=True), load_parameters("p2dx"))
     assert says in f"{failure.value} {failure.value.hint}"

@@ -114,24 +114,24 @@ def driver(robot: Robot) -> Rows:
 
 def is_the_circle(drive: Drive) -> None:
     assert drive.odometry is not None
-    assert drive.told_left_mps is not None
-    assert drive.told_right_mps is not None
+    assert drive.reported_left_mps is not None
+    assert drive.reported_right_mps is not None
     assert len(drive.odometry) == COUNT
     assert drive.odometry.t_s == pytest.approx(np.arange(COUNT) / 10, abs=1e-6)
     assert drive.odometry.heading_rad == pytest.approx(TURN * np.arange(COUNT) / 10)
     assert drive.odometry.speeds()[1] == pytest.approx(SPEED, rel=1e-4)
     rim = TURN * P2DX.track_mm / 2000
-    assert drive.told_left_mps.values == pytest.approx(SPEED - rim)
-    assert drive.told_right_mps.values == pytest.approx(SPEED + rim)
+    assert drive.reported_left_mps.values == pytest.approx(SPEED - rim)
+    assert drive.reported_right_mps.values == pytest.approx(SPEED + rim)
 
 
 @pytest.mark.parametrize("storage", ["MCAP", "SQLITE3", "HUMBLE"])
 def test_a_ros_2_drivers_bag_is_a_drive(storage: str, tmp_path: Path) -> None:
     drive = read_drive(ros2_bag(tmp_path / "bag", driver, storage))
     is_the_circle(drive)
-    told = {name: (steps.t_s.tolist(), steps.values.tolist()) for name, steps in drive.commands.items()}
-    assert told["VEL"] == ([pytest.approx(0.5, abs=1e-6)], [300.0])
-    assert told["RVEL"][1] == [0.0, pytest.approx(math.degrees(TURN))]
+    reported = {name: (steps.t_s.tolist(), steps.values.tolist()) for name, steps in drive.commands.items()}
+    assert reported["VEL"] == ([pytest.approx(0.5, abs=1e-6)], [300.0])
+    assert reported["RVEL"][1] == [0.0, pytest.approx(math.degrees(TURN))]
 
 
 def test_poses_of_motion_capture_are_the_truth_and_goals_are_not(tmp_path: Path) -> None:
@@ -151,8 +151,8 @@ def test_ranges_have_the_number_of_their_topic_and_end_at_the_sonars_reach(tmp_p
         return [*driver(robot), *((f"/sonar_{number}", 0.2, robot.range(0.2, metres)) for number, metres in ranges)]
 
     drive = read_drive(ros2_bag(tmp_path / "bag", make))
-    told = {number: steps.values.tolist() for number, steps in drive.sonar_m.items()}
-    assert told == {3: [1.25], 15: [P2DX.sonar_range_m], 4: [0.0]}
+    reported = {number: steps.values.tolist() for number, steps in drive.sonar_m.items()}
+    assert reported == {3: [1.25], 15: [P2DX.sonar_range_m], 4: [0.0]}
 
 
 def test_rosarias_bag_of_ros_1_is_a_drive_with_all_its_sonar(tmp_path: Path) -> None:
@@ -164,8 +164,8 @@ def test_rosarias_bag_of_ros_1_is_a_drive_with_all_its_sonar(tmp_path: Path) -> 
 
     drive = read_drive(ros1_bag(tmp_path / "old.bag", make))
     is_the_circle(drive)
-    told = [drive.sonar_m[number].values.tolist() for number in range(P2DX.sonar_fitted)]
-    assert told == [[pytest.approx(1.5, abs=1e-6)]] * P2DX.sonar_fitted
+    reported = [drive.sonar_m[number].values.tolist() for number in range(P2DX.sonar_fitted)]
+    assert reported == [[pytest.approx(1.5, abs=1e-6)]] * P2DX.sonar_fitted
 
 
 def test_p2os_drivers_own_type_is_read_by_the_definition_that_its_bag_brings(tmp_path: Path) -> None:
@@ -188,6 +188,6 @@ def test_poses_that_are_no_numbers_are_passed_over_and_too_few_are_refused(tmp_p
 def test_a_bag_is_compared_with_another_of_the_same_drive(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     one, other = ros2_bag(tmp_path / "one", driver), ros1_bag(tmp_path / "other.bag", driver)
     assert p2os(["compare", f"{one}", f"{other}"]) == 0
-    told = capsys.readouterr().out
-    assert "APE, m                           0.0000" in told
-    assert "do not part" in told
+    reported = capsys.readouterr().out
+    assert "APE, m                           0.0000" in reported
+    assert "do not part" in reported

@@ -280,7 +280,7 @@ def test_any_table_is_a_trajectory_or_told_in_one_line(rows: list[list[str]]) ->
         (["near", "near", "--shift", "100s"], "in common"),
     ],
 )
-def test_what_cannot_be_compared_is_told_in_one_line(words: list[str], says: str, runs: Path, p2os, capsys) -> None:
+def test_what_cannot_be_compared_is_reported_in_one_line(words: list[str], says: str, runs: Path, p2os, capsys) -> None:
     Path("near").symlink_to(runs / "near")
     Path("bad.csv").write_text("t_s,x_m,y_m\n0,0,0\n", encoding="utf-8")
     Path("worse.csv").write_text("t_s,x_m,y_m,heading_rad\n0,0,0,0\n1,x,0,0\n", encoding="utf-8")

@@ -160,10 +160,10 @@ def test_readings_that_round_alike_for_ever_are_off_by_that_part_of_a_grain(leve
         exact = np.full(200, values[0])
         return exact - np.round(exact)
 
-    told = np.round(np.full(200, 100.0 + level))
+    reported = np.round(np.full(200, 100.0 + level))
     for rounding in (None, Rounding(redrawn=redrawn, groups=[("a",)])):
         found = fit(
-            lambda v: v[0] - told, [Parameter(name="a", start=90.0, scale=10.0, least=0, most=200)],
+            lambda v: v[0] - reported, [Parameter(name="a", start=90.0, scale=10.0, least=0, most=200)],
             np.arange(200) // 5, floor=1e-3, why="", rounding=rounding,
         ).estimates["a"]  # fmt: skip
         assert found.value == pytest.approx(100.0 + level - error)
@@ -175,9 +175,9 @@ def test_readings_that_round_alike_for_ever_are_off_by_that_part_of_a_grain(leve
 def test_noise_before_the_rounding_is_known_by_how_held_values_scatter(deviation: float) -> None:
     random_ = np.random.default_rng(7)
     levels = random_.uniform(0, 50, (400, 1))
-    told = 2.0 * np.round(levels + random_.normal(0, deviation, (400, 60)))
-    assert grain_of(told.ravel()) == pytest.approx(2.0)
-    variance = float(np.mean(np.var(told, axis=1, ddof=1)))
+    reported = 2.0 * np.round(levels + random_.normal(0, deviation, (400, 60)))
+    assert grain_of(reported.ravel()) == pytest.approx(2.0)
+    variance = float(np.mean(np.var(reported, axis=1, ddof=1)))
     assert noise_before(variance, 2.0) == pytest.approx(2 * deviation, rel=0.1, abs=0.02)
 
 
@@ -323,7 +323,7 @@ def test_a_run_folder_is_fitted_without_any_other_file(runs: Path) -> None:
         (["--umbmark", "w.jsonl"], "no measured poses"),
     ],
 )
-def test_what_cannot_be_fitted_is_told_in_one_line(words: list[str], says: str, runs: Path, p2os, capsys) -> None:
+def test_what_cannot_be_fitted_is_reported_in_one_line(words: list[str], says: str, runs: Path, p2os, capsys) -> None:
     Path("w.jsonl").write_bytes((runs / "near" / "wire.jsonl").read_bytes())
     Path("full").mkdir()
     Path("full/a").write_text("a", encoding="utf-8")

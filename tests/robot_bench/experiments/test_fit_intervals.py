@@ -37,9 +37,9 @@ def to_and_fro(gain: float, noise_mm_s: np.ndarray) -> Drive:
     targets = [300.0, 0.0] * 10
     steps = np.arange(0, 41_000, 100)
     speeds = gain * ramp(targets, starts, 41_001, (331.0, 297.0), 0.0)[steps]
-    told = Steps(steps / 1000 + 0.04, np.round(speeds + noise_mm_s * (speeds > 0)) / 1000)
+    reported = Steps(steps / 1000 + 0.04, np.round(speeds + noise_mm_s * (speeds > 0)) / 1000)
     return Drive(
-        name="to and fro", parameters=load_parameters("p2dx"), told_left_mps=told, told_right_mps=told,
+        name="to and fro", parameters=load_parameters("p2dx"), reported_left_mps=reported, reported_right_mps=reported,
         commands={"VEL": Steps(np.array(starts), np.array(targets))},
     )  # fmt: skip
 

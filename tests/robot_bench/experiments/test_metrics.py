@@ -191,7 +191,7 @@ def test_a_run_has_every_step_and_none_is_negative(runs: Path, p2os, capsys) -> 
     [(["missing"], "there is no missing"), (["a.csv", "--picture", "x.png"], "shows no latencies"),
      (["a.csv", "a.csv", "--picture", "x.png"], "of one run")],
 )  # fmt: skip
-def test_what_cannot_be_measured_is_told_in_one_line(words: list[str], says: str, p2os, capsys) -> None:
+def test_what_cannot_be_measured_is_reported_in_one_line(words: list[str], says: str, p2os, capsys) -> None:
     Path("a.csv").write_text("t_s,x_m,y_m,heading_deg\n0,0,0,0\n1,0.1,0,0\n2,0.2,0,0\n", encoding="utf-8")
     assert p2os("metrics", *words) == 2
     errors = capsys.readouterr().err

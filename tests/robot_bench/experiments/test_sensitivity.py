@@ -160,7 +160,7 @@ def test_the_step_of_the_motors_decides_how_far_they_drive_whatever_the_number_o
         (["two-dodge", "--vary", "robot.east.threshold_m=0.4..0.8", "--steps", "2", "--trajectories", "0"], "several"),
     ],
 )
-def test_what_cannot_be_varied_is_told_in_one_line(words: list[str], says: str, p2os, capsys) -> None:
+def test_what_cannot_be_varied_is_reported_in_one_line(words: list[str], says: str, p2os, capsys) -> None:
     Path("mine.toml").write_text(SCENARIO, encoding="utf-8")
     assert p2os("sensitivity", *words) in {1, 2}
     errors = capsys.readouterr().err

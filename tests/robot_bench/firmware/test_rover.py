@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from robot_bench.bench import Bench
+from robot_bench.bench import Bench, run_of
 from robot_bench.bench.board import pins_of
 from robot_bench.firmware import build
 from robot_bench.recording.run_record import RunRecord
@@ -124,7 +124,7 @@ at_s = 1.2
 def test_it_is_the_same_in_any_slices_and_from_a_pickle() -> None:
     whole = bench(until="400 ms")
     sliced = bench(until="150 ms", duration_s=16.0)
-    sliced.loop.slice_ns = 333_333
+    run_of(sliced).loop.slice_ns = 333_333
     sliced.run_until("250 ms")
     again = pickle.loads(pickle.dumps(sliced))  # noqa: S301 - its own
     again.run_until("400 ms")

@@ -16,9 +16,9 @@ from robot_bench.recording.divergence import differences, signal_of
 rows = st.lists(st.tuples(st.integers(1, 9), st.sampled_from(["DD1", "DD2"]), st.booleans()), max_size=9)
 
 
-def edges(told: list[tuple[int, str, bool]]) -> list[Event]:
+def edges(reported: list[tuple[int, str, bool]]) -> list[Event]:
     t, found = 0, []
-    for after, wire, level in told:
+    for after, wire, level in reported:
         t += after
         found.append(PinEdge(t=t, wire=wire, level=level))
     return found

@@ -35,21 +35,21 @@ def again(row: dict[str, object]) -> Event:
 
 @same_folder
 @given(events)
-def test_json_lines_hold_every_event(tmp_path: Path, told: list[Event]) -> None:
+def test_json_lines_hold_every_event(tmp_path: Path, reported: list[Event]) -> None:
     path = tmp_path / "all.jsonl"
-    assert write_named_events([("", event) for event in told], path) == len(told)
-    assert [again(json.loads(line)) for line in path.read_text(encoding="utf-8").splitlines()] == told
+    assert write_named_events([("", event) for event in reported], path) == len(reported)
+    assert [again(json.loads(line)) for line in path.read_text(encoding="utf-8").splitlines()] == reported
 
 
 @settings(same_folder, max_examples=40)  # 240 events; a table takes 10 ms
 @given(events)
-def test_a_parquet_table_holds_every_event(tmp_path: Path, told: list[Event]) -> None:
+def test_a_parquet_table_holds_every_event(tmp_path: Path, reported: list[Event]) -> None:
     parquet = pytest.importorskip("pyarrow.parquet")
     path = tmp_path / "all.parquet"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(event_files, "GROUP", 5)
-        assert write_named_events([("", event) for event in told], path) == len(told)
-    assert [again(row) for row in parquet.read_table(path).to_pylist()] == told
+        assert write_named_events([("", event) for event in reported], path) == len(reported)
+    assert [again(row) for row in parquet.read_table(path).to_pylist()] == reported
 
 
 def test_a_run_is_exported_by_a_verb(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

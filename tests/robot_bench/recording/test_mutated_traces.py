@@ -8,7 +8,7 @@ from random import Random
 
 import pytest
 
-from robot_bench.bench import Bench
+from robot_bench.bench import Bench, run_of
 from robot_bench.drives.metrics import metrics
 from robot_bench.drives.of_run import drive_of_record
 from robot_bench.events.codec import line_of
@@ -75,7 +75,7 @@ def lines() -> list[dict[str, object]]:
     bench = Bench.from_scenario("motors", body="kinematic")
     bench.run_until("50 ms")
     world = bench.parts.world
-    levels = [json.loads(line) for line in bench.recorder.lines() if '"nets"' in line or '"d":' in line][:3]
+    levels = [json.loads(line) for line in run_of(bench).recorder.lines() if '"nets"' in line or '"d":' in line][:3]
     meta = {"k": "meta", "trace": 2, **meta_of(bench.scenario, world, "", is_at_port=False)}
     table = {"files": ["coverage.txt"], "table": ["a 1"]}
     end = {

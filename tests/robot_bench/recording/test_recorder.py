@@ -24,21 +24,21 @@ drives = st.tuples(
     st.booleans(),
     st.sampled_from(Strength),
 )
-Told = list[tuple[str, int, int]]
+Reported = list[tuple[str, int, int]]
 
 
-def told(trace: TraceWriter) -> Told:
+def reported(trace: TraceWriter) -> Reported:
     """Return (net, ns, level) of each recorded level, sorted by net and time."""
     pins = record_of(trace.text.splitlines(keepends=True)).pins
     return sorted((net, at, level) for net, edges in pins.items() for at, level in edges)
 
 
-def settled(idle: bool, wanted: list[tuple[int, str, str, bool, Strength]]) -> Told:
+def settled(idle: bool, wanted: list[tuple[int, str, str, bool, Strength]]) -> Reported:
     """Return what the wires do when every drive is known beforehand."""
     harness = Harness(Net(name, idle=idle) for name in NETS)
     for at, net, owner, level, strength in wanted:
         harness[net].drive(owner, level, strength, at)
-    found: Told = []
+    found: Reported = []
     for name in NETS:
         levels = [int(harness[name].level(at)) for at in range(END + 1)]
         found.append((name, 0, levels[0]))
@@ -47,7 +47,7 @@ def settled(idle: bool, wanted: list[tuple[int, str, str, bool, Strength]]) -> T
 
 
 @given(idle=st.booleans(), wanted=st.lists(drives, max_size=24), data=st.data())
-def test_every_wire_is_told_of_as_if_all_had_been_known_beforehand(
+def test_every_wire_is_reported_as_if_all_had_been_known_beforehand(
     idle: bool, wanted: list[tuple[int, str, str, bool, Strength]], data: st.DataObject
 ) -> None:
     wanted.sort(key=lambda drive: drive[0])
@@ -64,7 +64,7 @@ def test_every_wire_is_told_of_as_if_all_had_been_known_beforehand(
     if before == len(wanted):
         recorder.start()
     recorder.finish(END)
-    assert told(trace) == settled(idle, wanted)
+    assert reported(trace) == settled(idle, wanted)
 
 
 def test_a_sensor_that_first_drives_at_time_0_is_recorded_as_it_is_and_not_as_its_pull() -> None:
@@ -75,7 +75,7 @@ def test_a_sensor_that_first_drives_at_time_0_is_recorded_as_it_is_and_not_as_it
     recorder.advance_to(0)
     harness["DD3"].drive("sensor", False, Strength.PUSH_PULL, 0)
     recorder.finish(10)
-    assert told(trace) == [("DD3", 0, 0)]
+    assert reported(trace) == [("DD3", 0, 0)]
 
 
 def test_a_run_that_ends_at_time_0_has_every_level() -> None:
@@ -83,13 +83,13 @@ def test_a_run_that_ends_at_time_0_has_every_level() -> None:
     recorder = Recorder(trace, harness, body=None)
     recorder.start()
     recorder.finish(0)
-    assert told(trace) == [("DD1", 0, 0), ("DD2", 0, 1)]
+    assert reported(trace) == [("DD1", 0, 0), ("DD2", 0, 1)]
 
 
-def test_a_drive_at_an_instant_whose_edges_were_told_is_a_bug_and_not_lost() -> None:
+def test_a_drive_at_an_instant_whose_edges_were_reported_is_a_bug_and_not_lost() -> None:
     net = Net("DD1")
     net.edges_until(5)
-    with pytest.raises(LocalProtocolError, match="sensor drives DD1 at 5 ns after its edges up to 5 ns were told"):
+    with pytest.raises(LocalProtocolError, match="sensor drives DD1 at 5 ns after its edges up to 5 ns were reported"):
         net.drive("sensor", True, Strength.PUSH_PULL, 5)
     net.drive("sensor", True, Strength.PUSH_PULL, 6)
     assert net.edges_until(6) == [(6, True)]

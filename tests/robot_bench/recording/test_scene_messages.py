@@ -102,8 +102,8 @@ def test_a_run_as_mcap_holds_scene_motion_pins_text_and_the_very_bytes_of_the_li
     found = messages_of(out)
     events = list(read_events(run))
     packets = [event for event in events if isinstance(event, Packet)]
-    told = [bytes.fromhex(message["hex"]) for _, _, message in found["/wire"]]
-    assert told == [packet.data for packet in packets]
+    reported = [bytes.fromhex(message["hex"]) for _, _, message in found["/wire"]]
+    assert reported == [packet.data for packet in packets]
     assert [at for at, _, _ in found["/wire"]] == [packet.t for packet in packets]
     poses = [event for event in events if isinstance(event, Pose)]
     assert [message["translation"]["x"] for _, _, message in found["/tf"]] == [pose.x / MICRO for pose in poses]
@@ -222,10 +222,10 @@ def looked_on(url: str, found: dict[str, list[dict[str, Any]]], subprotocols: li
             topics: dict[int, str] = {}
             async for message in line:
                 if isinstance(message, str):
-                    told = json.loads(message)
-                    if told["op"] == "advertise":
-                        topics |= {channel["id"]: channel["topic"] for channel in told["channels"]}
-                        wanted = [{"id": channel["id"], "channelId": channel["id"]} for channel in told["channels"]]
+                    reported = json.loads(message)
+                    if reported["op"] == "advertise":
+                        topics |= {channel["id"]: channel["topic"] for channel in reported["channels"]}
+                        wanted = [{"id": channel["id"], "channelId": channel["id"]} for channel in reported["channels"]]
                         await line.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
                 elif message[0] == 1:
                     (number,) = struct.unpack("<I", message[1:5])
@@ -268,7 +268,7 @@ def test_a_place_that_is_none_is_refused(place: str) -> None:
         pass
 
 
-def test_a_taken_port_is_told_in_a_line() -> None:
+def test_a_taken_port_is_reported_in_a_line() -> None:
     pytest.importorskip("foxglove")
     from robot_bench.live import LiveScene
 

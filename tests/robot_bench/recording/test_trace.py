@@ -55,9 +55,9 @@ def test_lines_are_made_a_second_at_a_time_and_for_whoever_asks(tmp_path: Path) 
         trace.take(events, S - 1)
     for number, ask in enumerate(("sha256", "length", "written")):
         pieces.take([note(S - 1, ask)], S - 1)
-        told, text = getattr(pieces, ask), "".join(pieces.lines())
+        reported, text = getattr(pieces, ask), "".join(pieces.lines())
         assert text.count("\n") == len(events) + number + 1
-        assert told == (chain(text) if ask == "sha256" else len(text))
+        assert reported == (chain(text) if ask == "sha256" else len(text))
     assert (tmp_path / "whole").read_bytes() == b""
     whole.take([note(S - 1), note(S - 1)], S - 1)  # so many are kept no longer
     assert (tmp_path / "whole").read_text().count("\n") > len(events) // 2  # the rest is in the file's own buffer

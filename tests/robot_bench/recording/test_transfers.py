@@ -60,12 +60,12 @@ WORD_NS = 1_000
 
 def spi_events(words: list[SpiWord], cuts: dict[int, int]) -> list[Event]:
     """What is told of words, which come in pieces; all that is told must not have been handed on already."""
-    told: list[Event] = []
+    reported: list[Event] = []
     released = -1
 
     def tell(event: Event) -> None:
         assert event.t > released
-        told.append(event)
+        reported.append(event)
 
     transfers = SpiTransfers("spi1", tell)
     for number, word in enumerate(words):
@@ -75,7 +75,7 @@ def spi_events(words: list[SpiWord], cuts: dict[int, int]) -> list[Event]:
         transfers.take([word])
     released = -1
     transfers.release(10**12, is_end=True)
-    return told
+    return reported
 
 
 def words_after(gaps: list[int], bits: int = 8) -> list[SpiWord]:
@@ -93,12 +93,12 @@ def words_after(gaps: list[int], bits: int = 8) -> list[SpiWord]:
 )
 def test_words_of_an_spi_are_parted_by_pauses_alone(gaps: list[int], cuts: dict[int, int]) -> None:
     words = words_after(gaps)
-    told = spi_events(words, cuts)
-    assert told == spi_events(words, {})
-    assert len(told) == 1 + sum(gap > PAUSE_NS for gap in gaps[1:])
-    sent = b"".join(event.from_master for event in told if isinstance(event, SpiTransfer))
+    reported = spi_events(words, cuts)
+    assert reported == spi_events(words, {})
+    assert len(reported) == 1 + sum(gap > PAUSE_NS for gap in gaps[1:])
+    sent = b"".join(event.from_master for event in reported if isinstance(event, SpiTransfer))
     assert sent == bytes(word.from_master for word in words)
-    for event in told:
+    for event in reported:
         assert isinstance(event, SpiTransfer)
         assert event.t == event.ended + PAUSE_NS + WORD_NS
 
@@ -107,14 +107,14 @@ def test_words_of_an_spi_are_parted_by_pauses_alone(gaps: list[int], cuts: dict[
     (MOST_BYTES - 1, [MOST_BYTES - 1]), (MOST_BYTES, [MOST_BYTES]), (MOST_BYTES + 1, [MOST_BYTES, 1]),
 ])  # fmt: skip
 def test_a_long_transfer_of_an_spi_comes_in_pieces(count: int, lengths: list[int]) -> None:
-    told = spi_events(words_after([0] * count), {})
-    assert [len(event.from_slave) for event in told if isinstance(event, SpiTransfer)] == lengths
+    reported = spi_events(words_after([0] * count), {})
+    assert [len(event.from_slave) for event in reported if isinstance(event, SpiTransfer)] == lengths
 
 
 def test_words_of_sixteen_bits_are_two_bytes_and_begin_a_transfer_of_their_own() -> None:
     words = [SpiWord(1_000, 0x12, 0x34, 8, WORD_NS), SpiWord(2_000, 0x1234, 0x5678, 16, WORD_NS)]
-    told = [event for event in spi_events(words, {}) if isinstance(event, SpiTransfer)]
-    assert [(event.from_master, event.from_slave, event.bits) for event in told] == [
+    reported = [event for event in spi_events(words, {}) if isinstance(event, SpiTransfer)]
+    assert [(event.from_master, event.from_slave, event.bits) for event in reported] == [
         (b"\x12", b"\x34", 8), (b"\x12\x34", b"\x56\x78", 16),
     ]  # fmt: skip
 
@@ -160,23 +160,23 @@ def test_conditions_and_bytes_of_an_i2c_are_put_together(rows: list[tuple[int, b
         expected.append(
             (begun, address, is_read, data, min(accepted, len(data)), "more" if is_last and end == "restart" else end)
         )
-    told: list[Event] = []
-    transfers = I2cTransfers("i2c2", told.append)
+    reported: list[Event] = []
+    transfers = I2cTransfers("i2c2", reported.append)
     for symbol in symbols:
         transfers.take([symbol])
     transfers.release(10**9, is_end=True)
-    found = [event for event in told if isinstance(event, I2cTransfer)]
+    found = [event for event in reported if isinstance(event, I2cTransfer)]
     assert [(e.begun, e.address, e.is_read, e.data, e.acknowledged, e.end) for e in found] == expected
     assert all(event.answered and event.bus == "i2c2" for event in found)
 
 
 def test_an_address_that_nobody_answers_is_told_so() -> None:
-    told: list[Event] = []
+    reported: list[Event] = []
     rows = [(10, I2cStep.START, 0, False), (20, I2cStep.BYTE, 0xA1, False), (30, I2cStep.STOP, 0, False)]
-    I2cTransfers("i2c1", told.append).take([I2cSymbol(*row) for row in rows])
-    assert told == [I2cTransfer(t=30, bus="i2c1", begun=10, address=0x50, is_read=True, data=b"", answered=False,
+    I2cTransfers("i2c1", reported.append).take([I2cSymbol(*row) for row in rows])
+    assert reported == [I2cTransfer(t=30, bus="i2c1", begun=10, address=0x50, is_read=True, data=b"", answered=False,
                                 acknowledged=0, end="stop")]  # fmt: skip
-    assert [select(words).takes(told[0]) for words in ("i2c1 fails", "i2c2 fails", "i2c1 reads 0x50")] == [
+    assert [select(words).takes(reported[0]) for words in ("i2c1 fails", "i2c2 fails", "i2c1 reads 0x50")] == [
         True,
         False,
         False,
@@ -217,9 +217,10 @@ def test_transfers_are_events_of_the_run_and_change_nothing_else_of_it(tmp_path:
     assert [line for line in lines if json.loads(line)["k"] not in {*buses, "meta", "verdict"}] == [
         line for line in without if json.loads(line)["k"] not in {"meta", "verdict"}
     ]
-    told = [event for event in events_of(lines) if isinstance(event, SpiTransfer | I2cTransfer | CanTransfer)]
-    assert told == heard.record().transfers
-    frame = b"".join(event.data[1:] for event in told if isinstance(event, I2cTransfer) and event.data[:1] == b"\x40")
+    reported = [event for event in events_of(lines) if isinstance(event, SpiTransfer | I2cTransfer | CanTransfer)]
+    assert reported == heard.record().transfers
+    written = [event.data for event in reported if isinstance(event, I2cTransfer)]
+    frame = b"".join(data[1:] for data in written if data[:1] == b"\x40")
     assert len(frame) == 1024  # the picture of 128 x 64 points
     assert not heard.judge().missed
 

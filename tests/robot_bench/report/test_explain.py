@@ -76,7 +76,7 @@ def test_answers_that_turn_away_show_no_exchange() -> None:
 
 
 @pytest.mark.parametrize(("one", "other"), [(3, 6), (4, 6), (3, 5), (4, 5)])
-def test_an_exchange_of_two_sensors_is_told_by_their_answers(one: int, other: int) -> None:
+def test_an_exchange_of_two_sensors_is_reported_by_their_answers(one: int, other: int) -> None:
     swapped = AWAY | {one: AWAY[other], other: AWAY[one]}
     assert exchanged(NETS, [answers(swapped)] * 3, side) == f"DD{one} and DD{other} exchanged"
 

@@ -13,7 +13,7 @@ from p2os.errors import ScenarioError
 from p2os.ros.codec import Message
 from p2os.ros.topics import TOPICS
 from p2os.ros.transport import NodeOptions, Received, Topic
-from robot_bench.bench import Bench
+from robot_bench.bench import Bench, run_of
 from robot_bench.bench.board import make_harness
 from robot_bench.ros.bench_node import BenchNode
 from robot_bench.ros.drive import RosPlace, refuse_without_pins, run_beside, with_inputs
@@ -101,7 +101,7 @@ def test_a_run_with_the_inputs_of_another_and_without_ros_has_the_same_hash(mode
     made = scenario(mode=mode, outside="distance encoder")
     live = ran(made, Script(INCOMING))
     trace = tmp_path / "trace.jsonl"
-    trace.write_text("".join(live.recorder.lines()))
+    trace.write_text("".join(run_of(live).recorder.lines()))
     again = Bench(made, slice_ns=777_777)
     with_inputs(trace)(again)
     again.finish()
@@ -112,8 +112,9 @@ def test_a_run_with_the_inputs_of_another_and_without_ros_has_the_same_hash(mode
 
 def test_messages_reach_the_chips_pins_at_their_times_and_the_trace_has_each_change_once() -> None:
     bench = ran(scenario(outside="distance encoder"), Script(INCOMING))
-    deeds = [(deed.at // (10 * NS_PER_MS), deed.place, deed.level) for deed in inputs_of(bench.recorder.lines(), "t")]
-    assert deeds == [
+    lines = run_of(bench).recorder.lines()
+    actions = [(action.at // (10 * NS_PER_MS), action.place, action.level) for action in inputs_of(lines, "t")]
+    assert actions == [
         (5, "DD3", True), (5, "encoder1_s1", True), (5, "encoder1_s2", False), (5, "encoder1_s3", True),
         (20, "DD3", False), (20, "DD7", True),
     ]  # fmt: skip
@@ -148,7 +149,7 @@ def test_motor_topics_say_what_stands_on_the_motor_pins() -> None:
         assert dict(node.tell(at))[topic("motor_left")] == {"data": value}
 
 
-def test_values_are_told_when_they_change_and_each_100_ms_and_the_clock_always() -> None:
+def test_values_are_reported_when_they_change_and_each_100_ms_and_the_clock_always() -> None:
     harness = make_harness(load_pinout())
     node = BenchNode(levels_of(harness), P2DX, OPTIONS)
     clock, left = topic("clock"), topic("motor_left")
@@ -164,9 +165,9 @@ def test_values_are_told_when_they_change_and_each_100_ms_and_the_clock_always()
 def test_pins_that_ros_drives_are_not_told_back() -> None:
     node = BenchNode(levels_of(make_harness(load_pinout())), P2DX, OPTIONS, outside=["distance"])
     assert {one.name for one in node.taken} == {f"/distance_sensor_{number}" for number in range(1, 9)}
-    told = {one.name for one in node.announced()}
-    assert not told & {one.name for one in node.taken}
-    assert {"/motor_left", "/motor_right", "/encoder_left", "/encoder_right", "/clock", "/odom"} <= told
+    reported = {one.name for one in node.announced()}
+    assert not reported & {one.name for one in node.taken}
+    assert {"/motor_left", "/motor_right", "/encoder_left", "/encoder_right", "/clock", "/odom"} <= reported
 
 
 def test_each_distance_topic_is_the_wire_of_its_number() -> None:

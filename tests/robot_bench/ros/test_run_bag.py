@@ -55,30 +55,30 @@ def test_the_bytes_of_the_line_are_found_again(bag: list[BagMessage]) -> None:
     packets = events(bag, Packet)
     assert {packet.direction for packet in packets} == {"c2r", "r2c"}
     for topic, direction in (("/p2os/from_client", "c2r"), ("/p2os/from_robot", "r2c")):
-        told = [(at, bytes(message["data"])) for at, message in of(bag, topic)]
-        assert told == [(packet.t, packet.data) for packet in packets if packet.direction == direction]
+        reported = [(at, bytes(message["data"])) for at, message in of(bag, topic)]
+        assert reported == [(packet.t, packet.data) for packet in packets if packet.direction == direction]
 
 
 def test_odometry_is_the_true_pose_with_its_time(bag: list[BagMessage]) -> None:
-    told = [
+    reported = [
         (at, message["header"]["stamp"]["nanosec"], message["pose"]["pose"]["position"]["x"])
         for at, message in of(bag, "/odom")
     ]
-    assert told == [(pose.t, pose.t, pose.x_m) for pose in events(bag, Pose)]
+    assert reported == [(pose.t, pose.t, pose.x_m) for pose in events(bag, Pose)]
 
 
 def test_prints_and_notes_are_in_rosout(bag: list[BagMessage]) -> None:
-    told = [(message["name"], message["msg"]) for _, message in of(bag, "/rosout")]
+    reported = [(message["name"], message["msg"]) for _, message in of(bag, "/rosout")]
     for text in events(bag, Text):
-        assert (text.port, text.data.decode().rstrip("\r\n")) in told
-    assert len(told) == sum(len(events(bag, kind)) for kind in (Text, Note, Verdict))
+        assert (text.port, text.data.decode().rstrip("\r\n")) in reported
+    assert len(reported) == sum(len(events(bag, kind)) for kind in (Text, Note, Verdict))
 
 
 def test_a_goal_that_was_missed_is_an_error(tmp_path: Path) -> None:
     verdicts = [Verdict(t=1, goal=f"{met}", met=met, says="") for met in (True, False)]
     assert write_bag(verdicts, tmp_path / "bag", META, "mcap") > 2
-    told = [message["level"] for _, message in of(list(read_bag(tmp_path / "bag", TYPES)), "/rosout")]
-    assert told == [INFO, ERROR]
+    reported = [message["level"] for _, message in of(list(read_bag(tmp_path / "bag", TYPES)), "/rosout")]
+    assert reported == [INFO, ERROR]
 
 
 def test_a_bag_holds_what_a_node_of_the_same_run_publishes() -> None:
@@ -88,21 +88,21 @@ def test_a_bag_holds_what_a_node_of_the_same_run_publishes() -> None:
     ours = [one for _, one in RunMessages(meta).of(seen) if one[0].name != "/rosout"]
     for name in ("/clock", "/motor_left", "/distance_sensor_4", "/encoder_right", "/odom", "/tf", "/sonar_3"):
         live = [message for topic, message in network.published if topic.name == name]
-        told = [message for topic, message in ours if topic.name == name]
+        reported = [message for topic, message in ours if topic.name == name]
         # The bag ends with the last event, a pose each 50 ms; the node's clock goes on until the end.
-        assert 0 < len(told) > len(live) - 6
-        assert told == live[: len(told)]
+        assert 0 < len(reported) > len(live) - 6
+        assert reported == live[: len(reported)]
 
 
 def test_a_level_counts_from_its_own_nanosecond() -> None:
     step = 10 * NS_PER_MS
     edges = [PinEdge(t=step, wire="DD1", level=True), PinEdge(t=2 * step + 1, wire="DD1", level=False)]
-    told = {
+    reported = {
         at: message["data"]
         for at, (topic, message) in RunMessages(META).of(edges)
         if topic.name == "/distance_sensor_1"
     }
-    assert told == {step: 1, 3 * step: 0}
+    assert reported == {step: 1, 3 * step: 0}
 
 
 def test_a_robot_on_own_pins_is_refused(tmp_path: Path) -> None:
@@ -117,8 +117,8 @@ def test_a_run_folder_is_written_as_a_bag_by_a_verb(tmp_path: Path, capsys: pyte
     (tmp_path / "trace.jsonl").write_text('{"k":"meta","scenario":"s","trace":2,"robot":{"name":"p2dx"}}\n')
     words = ["report", f"{tmp_path}", "--events", f"{tmp_path}/bag", "--ros2", "mcap"]
     assert p2os(words) == 0
-    told = list(read_bag(tmp_path / "bag", TYPES))
-    assert capsys.readouterr().out == f"{tmp_path}/bag: {len(told)} messages\n"
+    reported = list(read_bag(tmp_path / "bag", TYPES))
+    assert capsys.readouterr().out == f"{tmp_path}/bag: {len(reported)} messages\n"
     assert p2os(words) == 2
     assert "is there already" in capsys.readouterr().err
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from p2os.errors import ScenarioError, WorldError
-from robot_bench.bench import Bench
+from robot_bench.bench import Bench, run_of
 from robot_bench.events.codec import events_of
 from robot_bench.events.expectation import ExpectationError
 from robot_bench.events.kinds import Fault, PinEdge, Pose, WorldChange
@@ -98,7 +98,7 @@ def test_what_was_expected_and_came_is_returned() -> None:
         (lambda one: one.expect_no("usart1 sends hello", "1 s"), "'usart1 sends hello' happened at 0.500 s"),
     ],
 )  # fmt: skip
-def test_what_was_expected_and_did_not_come_is_told_with_the_last_events(
+def test_what_was_expected_and_did_not_come_is_reported_with_the_last_events(
     expects: Callable[[Bench], Any], says: str
 ) -> None:
     one = made()
@@ -142,7 +142,7 @@ def test_a_broken_link_is_noticed_and_mended() -> None:
     one.run_until(dropped + 2900 * MS)
     assert not [packet for packet in one.record().wire if dropped + 50 * MS < packet.t < dropped + 2900 * MS]
     one.run_until(dropped + 4 * S)
-    faults = [(event.op, event.words) for event in events_of(one.recorder.lines()) if isinstance(event, Fault)]
+    faults = [(event.op, event.words) for event in events_of(run_of(one).recorder.lines()) if isinstance(event, Fault)]
     assert faults == [("inject", "link-down"), ("clear", "link-down")]
     assert [packet for packet in one.record().wire if packet.t > dropped + 3 * S], "the line carries bytes again"
 
@@ -234,7 +234,7 @@ def test_a_bench_goes_back_and_on_again_as_if_nothing_had_been(in_file: bool, tm
     one.inject("sonar-dead 1")
     one.run_until("1 s")
     one.rewind("0.9 s")
-    faults = [event for event in events_of(one.recorder.lines()) if isinstance(event, Fault)]
+    faults = [event for event in events_of(run_of(one).recorder.lines()) if isinstance(event, Fault)]
     assert len(faults) == 1, "what was done before it stays done"
     one.rewind("0.3 s")
     assert ended(one) == whole
@@ -271,7 +271,7 @@ def test_a_verdict_may_end_the_run_and_the_slice_changes_nothing() -> None:
     from robot_bench.scenario.goals.judging import Goal
 
     goal = Goal(kind="happens", arguments={"event": "pin PB7 high"}, ends_run="met")
-    told = set()
+    reported = set()
     for slice_ns in (MS, 10 * MS, 77_777):
         one = bench(replace(scenario("direct"), goals=(goal,)), slice_ns)
         one.run_until("3 s")
@@ -280,8 +280,8 @@ def test_a_verdict_may_end_the_run_and_the_slice_changes_nothing() -> None:
         assert judged.met == [goal.wanted]
         (verdict,) = one.record().verdicts
         assert (verdict.t, verdict.met) == (S, True)
-        told.add(one.trace.text)
-    assert len(told) == 1
+        reported.add(one.trace.text)
+    assert len(reported) == 1
 
 
 def test_a_series_of_waits_reads_each_line_of_the_trace_no_more_than_twice(monkeypatch: pytest.MonkeyPatch) -> None:

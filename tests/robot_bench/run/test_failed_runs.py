@@ -11,7 +11,7 @@ import pytest
 from bluepill_sim.errors import UnmodelledError
 from p2os.cli.main import run as p2os
 from robot_bench import run
-from robot_bench.bench import bench
+from robot_bench.bench import Bench, robot_run
 from robot_bench.events.kinds import Pose
 from robot_bench.recording.run_record import read_run
 from robot_bench.recording.summary import outcome_of, verdict
@@ -35,7 +35,7 @@ def raising(error: BaseException) -> Callable[..., object]:
     return make
 
 
-def told(folder: Path) -> list[object]:
+def reported(folder: Path) -> list[object]:
     """Return the failures that a folder tells of, the same from trace, summary and a report made anew."""
     record = read_run(folder)
     assert verdict(record) in {"failed", "interrupted"}
@@ -62,12 +62,12 @@ def told(folder: Path) -> list[object]:
 def test_a_run_that_cannot_begin_leaves_a_folder_that_says_why(
     part: str, error: BaseException, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(bench, part, raising(error))
+    monkeypatch.setattr(robot_run, part, raising(error))
     with pytest.raises(type(error)) as caught:
         run.run_scenario(wanted(), tmp_path / "run")
     assert caught.value is error
     says = {"KeyboardInterrupt": "interrupted", "ZeroDivisionError": "this is a bug: ZeroDivisionError: integer modulo"}
-    assert str(told(tmp_path / "run")[0]).startswith(says.get(type(error).__name__, str(error)))
+    assert str(reported(tmp_path / "run")[0]).startswith(says.get(type(error).__name__, str(error)))
 
 
 @pytest.mark.parametrize(
@@ -76,35 +76,35 @@ def test_a_run_that_cannot_begin_leaves_a_folder_that_says_why(
     ids=["chip", "bench"],
 )
 def test_a_run_that_breaks_off_is_judged_and_says_why(error: Exception, tmp_path: Path) -> None:
-    def drive(made: bench.Bench) -> None:
+    def drive(made: Bench) -> None:
         made.run_until(10_000_000)
         raise error
 
     result = run.run_scenario(wanted(), tmp_path / "run", drive=drive)
     assert not result.passed
-    assert told(tmp_path / "run")[0] == str(error)
+    assert reported(tmp_path / "run")[0] == str(error)
     assert result.outcome["virtual_s"] == pytest.approx(0.01, abs=0.001)
 
 
 def test_a_bug_in_the_midst_of_a_run_is_raised_and_its_folder_says_so(tmp_path: Path) -> None:
-    def drive(made: bench.Bench) -> None:
+    def drive(made: Bench) -> None:
         made.run_until(10_000_000)
         raise ZeroDivisionError("integer modulo by zero")
 
     with pytest.raises(ZeroDivisionError):
         run.run_scenario(wanted(), tmp_path / "run", drive=drive)
-    assert told(tmp_path / "run") == ["this is a bug: ZeroDivisionError: integer modulo by zero"]
+    assert reported(tmp_path / "run") == ["this is a bug: ZeroDivisionError: integer modulo by zero"]
     assert read_run(tmp_path / "run").pins, "what was seen before stays"
 
 
 def test_ctrl_c_in_the_midst_of_the_chips_work_is_an_end_in_good_order(tmp_path: Path) -> None:
-    def drive(made: bench.Bench) -> None:
+    def drive(made: Bench) -> None:
         made.run_until(10_000_000)
         raise KeyboardInterrupt
 
     result = run.run_scenario(wanted(), tmp_path / "run", drive=drive)
     assert result.was_interrupted
-    assert told(tmp_path / "run")[0] == "interrupted"
+    assert reported(tmp_path / "run")[0] == "interrupted"
 
 
 LIMITED = """
@@ -148,7 +148,7 @@ def test_a_report_that_cannot_be_written_is_one_line(
 def test_goals_are_judged_from_all_of_the_run(tmp_path: Path) -> None:
     seen: list[int] = []
 
-    def drive(made: bench.Bench) -> None:
+    def drive(made: Bench) -> None:
         made.events.subscribe(lambda pose: seen.append(pose.t), Pose)
         made.run_until(made.end)
 

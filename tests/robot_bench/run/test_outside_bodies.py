@@ -231,7 +231,7 @@ def test_a_body_that_cannot_save_is_run_but_not_forked_or_wound_back() -> None:
     with served(abilities=Ability.ROLLS) as (address, _):
         bench = bench_with(address, "direct", 1)
         bench.run_until("0.2 s")
-        for deed in (bench.fork, bench.snapshot, lambda: bench.rewind("0.1 s")):
+        for call in (bench.fork, bench.snapshot, lambda: bench.rewind("0.1 s")):
             with pytest.raises(UsageError, match="cannot save its state"):
-                deed()
+                call()
         bench.run_until("0.3 s")

@@ -130,7 +130,7 @@ def test_a_broken_class_is_one_line(folder: Path, old: str, new: str, message: s
     assert message in str(refusal(folder))
 
 
-def test_what_an_own_class_raises_in_a_run_is_told_with_its_line_and_is_no_bug_here(
+def test_what_an_own_class_raises_in_a_run_is_reported_with_its_line_and_is_no_bug_here(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(folder)

@@ -15,7 +15,7 @@ import pytest
 
 from p2os.pioneer.body.factory import installed_bodies
 from robot_bench.adapter import FirmwareAdapter, is_available
-from robot_bench.bench import Bench
+from robot_bench.bench import Bench, run_of
 from robot_bench.recording.trace import TraceWriter
 from robot_bench.scenario.fault_script import FaultChange
 from robot_bench.scenario.scenario import Scenario, load_scenario
@@ -138,14 +138,14 @@ def test_a_bench_at_its_end_can_be_pickled_too(tmp_path: Path) -> None:
     bench.trace.end({"passed": True})
     again = loaded(pickle.dumps(bench))
     assert again.trace.sha256 == bench.trace.sha256
-    assert again.recorder.last_line == bench.recorder.last_line
+    assert run_of(again).recorder.last_line == run_of(bench).recorder.last_line
 
 
 def test_what_was_printed_last_is_known_after_a_restart() -> None:
     bench = Bench(scenario(("direct", "model"), duration_s=0.6))
     bench.run_until(S // 2)
-    assert bench.recorder.last_line
-    assert loaded(pickle.dumps(bench)).recorder.last_line == bench.recorder.last_line
+    assert run_of(bench).recorder.last_line
+    assert run_of(loaded(pickle.dumps(bench))).recorder.last_line == run_of(bench).recorder.last_line
 
 
 def test_a_run_can_be_made_longer_where_it_goes_on() -> None:
@@ -192,7 +192,7 @@ def test_another_version_is_refused_before_anything_else_is_read() -> None:
         make("0.0.1", b"of another shape")
     *recipe_of, snapshot = loaded(recipe)
     del snapshot["script"]
-    with pytest.raises(UsageError, match="another state of this version: not a snapshot of Bench"):
+    with pytest.raises(UsageError, match="another state of this version: not a snapshot of a bench"):
         make(version, pickle.dumps((*recipe_of, snapshot)))
 
 

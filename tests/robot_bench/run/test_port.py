@@ -199,9 +199,9 @@ def test_odometry_wraps_without_a_jump() -> None:
     pose = OdometryPose(load_parameters("p2dx"))
     for raw_x in (32_760, 32_767, 3):
         sip = StandardSip(raw_x=raw_x, raw_heading=-1024, raw_left_velocity=100, raw_right_velocity=-5)
-        told = pose.take(sip, 7)
-    assert (told.t, told.x) == (7, 11 * 840)
-    assert (told.heading, told.left, told.right) == (-1_570_796, 100_000, -5_000)
+        reported = pose.take(sip, 7)
+    assert (reported.t, reported.x) == (7, 11 * 840)
+    assert (reported.heading, reported.left, reported.right) == (-1_570_796, 100_000, -5_000)
     assert pose.distance_m == pytest.approx(0.00924)
 
 
@@ -213,14 +213,14 @@ def test_the_wheels_angles_follow_from_the_packets_over_wraps_and_arcs(turned: i
     steps, x_mm, y_mm, heading = 500, 0.0, 0.0, 0.0
     for _ in range(steps + 1):
         raw = [round(mm / 0.84) % 32768 for mm in (x_mm, y_mm)]
-        told = pose.take(StandardSip(raw_x=raw[0], raw_y=raw[1], raw_heading=round(heading) % 4096), 0)
+        reported = pose.take(StandardSip(raw_x=raw[0], raw_y=raw[1], raw_heading=round(heading) % 4096), 0)
         middle = (heading + turned / steps / 2) / 4096 * 2 * math.pi
         x_mm, y_mm = x_mm - 2 * math.cos(middle), y_mm - 2 * math.sin(middle)
         heading += turned / steps
     rim_m = math.pi * parameters.track_mm / 2000 if turned else 0.0
     radius_m = parameters.body.wheel_diameter_m / 2
-    assert told.left_angle / 1e6 * radius_m == pytest.approx(-1.0 - rim_m, abs=0.004)
-    assert told.right_angle / 1e6 * radius_m == pytest.approx(-1.0 + rim_m, abs=0.004)
+    assert reported.left_angle / 1e6 * radius_m == pytest.approx(-1.0 - rim_m, abs=0.004)
+    assert reported.right_angle / 1e6 * radius_m == pytest.approx(-1.0 + rim_m, abs=0.004)
 
 
 @pytest.fixture(params=["tcp"])
@@ -251,8 +251,8 @@ def begun(
                 return run
             assert time.monotonic() < ends, "the run never began"
             time.sleep(0.02)
-        told = "".join(filter(None, run.communicate()))
-        assert "lagged" in told, told
+        reported = "".join(filter(None, run.communicate()))
+        assert "lagged" in reported, reported
     pytest.skip("this machine is too busy for real time now")
 
 
@@ -265,10 +265,10 @@ def test_the_emulated_bluepill_drives_a_served_robot(
     words += ["--out", str(tmp_path / "run"), "--json", "--force"]  # over what a run that lagged has left
     for _attempt in range(3):
         code = p2os(words)
-        told = capsys.readouterr()
-        if not told.out and "lagged" in told.err:
+        reported = capsys.readouterr()
+        if not reported.out and "lagged" in reported.err:
             continue
-        outcome = json.loads(told.out)
+        outcome = json.loads(reported.out)
         if not any("lagged" in failure for failure in outcome["failures"]):
             break
     else:
@@ -319,8 +319,8 @@ def test_a_signal_stops_a_served_robot_and_ends_with_130(
     assert json.loads(out)["failures"][0] == f"interrupted ({number.name})"
     assert (tmp_path / "run" / "report.html").is_file()
     robot[1].send_signal(signal.SIGINT)
-    told = robot[1].communicate(timeout=20)[1]
-    assert "closed: by its client" in told, told  # not: line dropped
+    reported = robot[1].communicate(timeout=20)[1]
+    assert "closed: by its client" in reported, reported  # not: line dropped
 
 
 def test_a_key_counts_once_it_is_pressed_and_the_terminal_is_put_back(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -304,8 +304,8 @@ def test_the_events_of_all_are_one_stream_in_order_of_time_each_with_its_robot(
     assert p2os(["diff", "one", "other"]) == 1
     out = capsys.readouterr().out
     assert "; a: worldchange differs first" in out  # where b stands, as a has it
-    told = [line.rpartition("   ")[0] for line in out.splitlines() if line.endswith(("   one", "   other"))]
-    assert all(ours != theirs for ours, theirs in zip(told[::2], told[1::2], strict=True)), out
+    reported = [line.rpartition("   ")[0] for line in out.splitlines() if line.endswith(("   one", "   other"))]
+    assert all(ours != theirs for ours, theirs in zip(reported[::2], reported[1::2], strict=True)), out
 
 
 def test_a_goal_may_bound_how_far_another_robot_is(tmp_path: Path) -> None:
@@ -316,7 +316,7 @@ def test_a_goal_may_bound_how_far_another_robot_is(tmp_path: Path) -> None:
     assert found.met == ["a: has always apart_m from b at least 1.5"]
     nobody = Bench.from_scenario(two(tmp_path, duration=0.1, more=far.format(1.5).replace('"b"', '"c"')))
     nobody.run_until("0.1 s")
-    assert nobody.judge().missed == ["a: always: apart_m was never told"]
+    assert nobody.judge().missed == ["a: always: apart_m was never reported"]
     assert found.missed == ["a: always: apart_m was out of bounds by 0.157 m at 0.000 s"]
 
 

@@ -76,18 +76,18 @@ def test_two_parts_that_wake_each_other_for_ever_are_named() -> None:
         RunLoop(FakeChip(), [Stubborn("s", 10, [])]).run_until(100)
 
 
-def test_slices_are_told_and_may_end_the_run() -> None:
-    told: list[int] = []
+def test_slices_are_reported_and_may_end_the_run() -> None:
+    reported: list[int] = []
 
     def listen(now: int) -> None:
-        told.append(now)
+        reported.append(now)
         if now >= 3_000:
             raise KeyboardInterrupt
 
     loop = RunLoop(FakeChip(block_ns=10), [], slice_ns=1_000, on_slice=listen)
     with pytest.raises(KeyboardInterrupt):
         loop.run_until(10_000)
-    assert told == [1_000, 2_000, 3_000]
+    assert reported == [1_000, 2_000, 3_000]
 
 
 def test_a_restored_loop_goes_on_alike() -> None:

@@ -38,7 +38,7 @@ def test_double_speed_waits_half_as_long() -> None:
     assert clock.slept == [0.001]
 
 
-def test_lag_is_told_and_the_worst_is_kept() -> None:
+def test_lag_is_reported_and_the_worst_is_kept() -> None:
     clock = Clock()
     pacer = RealTimePacer(clock=clock, sleep=clock.sleep)
     pacer.start(0)

@@ -45,10 +45,10 @@ def test_a_fault_is_felt_from_its_time_on_and_cleared() -> None:
 def test_a_reboot_in_motion_stops_the_robot_and_its_master_is_told() -> None:
     made = bench(FaultChange(2 * S, "fault reboot"))
     text = finished(made)
-    told = [(row["t"], row["what"]) for row in map(json.loads, text.splitlines()) if row["k"] == "event"]
-    assert (2 * S, "controller down") in told
-    assert (2 * S + S // 2, "controller up") in told
-    assert "lost" in [what for _, what in told], "the adapter has noticed"
+    reported = [(row["t"], row["what"]) for row in map(json.loads, text.splitlines()) if row["k"] == "event"]
+    assert (2 * S, "controller down") in reported
+    assert (2 * S + S // 2, "controller up") in reported
+    assert "lost" in [what for _, what in reported], "the adapter has noticed"
     assert made.parts.pioneer is not None
     assert made.parts.pioneer.state.left_setpoint_mps == 0
 

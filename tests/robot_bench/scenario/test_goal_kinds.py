@@ -210,8 +210,8 @@ def test_goal_always_and_goal_eventually_are_the_least_and_greatest_margin(
 
 
 def test_goal_always_after_an_event_looks_at_each_occurrence() -> None:
-    told = [Note(t=t * S, who="adapter", what="driving") for t in (1, 5)]
-    run = [*told, at(S, left=1.0), at(2 * S), at(5 * S), at(6 * S, left=0.3)]
+    reported = [Note(t=t * S, who="adapter", what="driving") for t in (1, 5)]
+    run = [*reported, at(S, left=1.0), at(2 * S), at(5 * S), at(6 * S, left=0.3)]
     ends = {"signal": "left_mps", "most": 0.2, "after": "note adapter driving", "from_s": 0.5, "to_s": 1}
     found = outcome("always", run, **ends)
     assert (found.met, found.robustness) == (False, pytest.approx(-0.1))

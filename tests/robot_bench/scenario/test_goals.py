@@ -114,11 +114,11 @@ def test_a_real_robot_is_not_asked_what_it_cannot_tell() -> None:
     run = record(poses=[pose(collisions=1)])
     goals = (Goal(kind="no_collision", arguments={}), Goal(kind="min_distance", arguments={"distance_m": 1}))
     assert [line.split(":")[0] for line in judged(run, *goals, end_ns=S).missed] == ["no_collision", "min_distance"]
-    told = judged(run, *goals, end_ns=S, can_tell_world=False)
-    assert [line.split(":")[0] for line in told.missed] == ["min_distance"]
+    reported = judged(run, *goals, end_ns=S, can_tell_world=False)
+    assert [line.split(":")[0] for line in reported.missed] == ["min_distance"]
 
 
-def test_what_is_met_is_told_as_it_was_wanted() -> None:
+def test_what_is_met_is_reported_as_it_was_wanted() -> None:
     run = record(poses=[pose()], usart=text((1, "x")))
     goals = (Goal(kind="no_collision", arguments={}), Goal(kind="usart_lacks", arguments={"text": "x"}))
     found = judged(run, *goals, end_ns=9 * S, planned_ns=9 * S)

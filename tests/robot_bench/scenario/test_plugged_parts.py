@@ -14,7 +14,7 @@ import pytest
 
 from p2os.errors import ScenarioError
 from p2os.pioneer.body.contract import BodyState
-from robot_bench.bench import Bench
+from robot_bench.bench import Bench, run_of
 from robot_bench.direct.senses import motion_of
 from robot_bench.report.page import _parts
 from robot_bench.run import parts_of, run_scenario
@@ -94,7 +94,7 @@ def test_a_part_senses_the_body_as_it_stood_at_its_last_step(folder: Path) -> No
     assert {row[3][2] for row in seen} == {9.80665}
     nearer = seen[0][5] - seen[-1][5]
     assert seen[0][5] == 4.0 or abs(nearer - (seen[-1][1] - seen[0][1])) < 0.01
-    notes = [line for line in map(json.loads, bench.recorder.lines()) if line.get("who") == "part"]
+    notes = [line for line in map(json.loads, run_of(bench).recorder.lines()) if line.get("who") == "part"]
     assert [(line["t"], line["what"], line["detail"]) for line in notes] == [(70_000_000, "probe", "tenth")]
 
 
@@ -143,7 +143,7 @@ def test_the_report_shows_what_parts_came_to_and_their_pictures(folder: Path) ->
     assert "<h2>Parts</h2>" in page
     assert "14 &lt;looks&gt;" in page
     assert 'alt="probe" src="data:image/png;base64,iVBORw0KGgo' in page
-    assert "at +0.0 deg, told +0.0 deg by 0 pulses" in page
+    assert "at +0.0 deg, commanded +0.0 deg by 0 pulses" in page
     assert _parts({}) == ""
     assert parts_of(object()) == []  # type: ignore[arg-type] # a chip without parts
 

@@ -140,8 +140,8 @@ def test_no_text_of_any_table_has_code_executed(
         assert refused >= groups, "each place that names code is refused for that, and not for anything else"
     said = capsys.readouterr().out
     if what == "scenario":
-        told = len(groups) + len([row for row in OTHERS[what] if "sweep" in row])
-        assert said.count("not checked: code") == (told if spelling in {"beside", "above", "whole"} else 0)
+        reported = len(groups) + len([row for row in OTHERS[what] if "sweep" in row])
+        assert said.count("not checked: code") == (reported if spelling in {"beside", "above", "whole"} else 0)
 
 
 def _line(path: Path, value: str) -> int:

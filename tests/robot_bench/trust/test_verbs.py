@@ -112,11 +112,11 @@ def test_a_verb_without_trust_refuses_in_one_line_and_executes_nothing(
     words = runs(WORDS[what], folder)
     capsys.readouterr()
     assert p2os(words) == 2
-    told = capsys.readouterr().err.splitlines()
+    reported = capsys.readouterr().err.splitlines()
     assert executed_by(folder) == set()
-    assert len(told) == 2, told
-    assert re.match(r"p2os: .*(toml:\d+|--set).*body: .*mine\.py:Own is Python code", told[0])
-    assert re.match(r"hint: .*--trust", told[1])
+    assert len(reported) == 2, reported
+    assert re.match(r"p2os: .*(toml:\d+|--set).*body: .*mine\.py:Own is Python code", reported[0])
+    assert re.match(r"hint: .*--trust", reported[1])
 
 
 def test_the_verbs_with_the_option_are_those_that_were_looked_at() -> None:
@@ -152,9 +152,9 @@ def test_the_workers_of_a_sweep_have_the_trust_of_the_verb_and_its_commands_say_
 ) -> None:
     assert p2os(["run", "swept.toml", "-j", "2", "--trust"]) == 0
     assert executed_by(folder)
-    told = re.search("one of them again: (p2os run .*)", capsys.readouterr().out)
-    assert told is not None
-    assert p2os(shlex.split(told[1])[1:]) == 0
+    reported = re.search("one of them again: (p2os run .*)", capsys.readouterr().out)
+    assert reported is not None
+    assert p2os(shlex.split(reported[1])[1:]) == 0
     assert executed_by(folder)
 
 
@@ -209,8 +209,8 @@ def test_check_says_what_it_has_not_checked_and_executes_nothing(
     (folder.parent / "config" / "p2os").mkdir(parents=True)
     (folder.parent / "config" / "p2os" / "config.toml").write_text(f'trust = ["{folder}"]\n')
     assert p2os(["check", "mine.toml", "swept.toml", "plain.toml"]) == 0
-    told = capsys.readouterr().out.splitlines()
-    assert [line for line in told if "not checked" in line] == [
+    reported = capsys.readouterr().out.splitlines()
+    assert [line for line in reported if "not checked" in line] == [
         "not checked: code  mine.toml:4: body = ./mine.py:Own",
         "not checked: code  swept.toml:5: [sweep] body: body = ./mine.py:Own",
     ]

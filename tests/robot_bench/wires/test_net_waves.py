@@ -68,7 +68,7 @@ def test_a_wave_is_one_drive_and_its_level_is_that_of_the_time() -> None:
     assert net.course(99, 101) == [(99, False), (100, WAVE)]
 
 
-def test_edges_of_a_net_have_a_wave_as_low_and_its_changes_are_told_once() -> None:
+def test_edges_of_a_net_have_a_wave_as_low_and_its_changes_are_reported_once() -> None:
     net = Net("pwm", idle=True)
     net.wave_from("chip", DRIVE, 100)
     net.wave_from("chip", DRIVE, 200)  # the same: nothing new
@@ -107,10 +107,10 @@ def test_an_open_drain_wave_needs_a_pull() -> None:
     assert net.wave(5) == WAVE
 
 
-def test_a_wave_that_comes_after_its_time_was_told_is_refused() -> None:
+def test_a_wave_that_comes_after_its_time_was_reported_is_refused() -> None:
     net = Net("pwm")
     net.edges_until(100)
-    with pytest.raises(LocalProtocolError, match="at 100 ns after its edges up to 100 ns were told"):
+    with pytest.raises(LocalProtocolError, match="at 100 ns after its edges up to 100 ns were reported"):
         net.wave_from("chip", DRIVE, 100)
     net.wave_from("chip", DRIVE, 101)
 

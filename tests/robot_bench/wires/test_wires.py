@@ -121,7 +121,7 @@ def test_a_watcher_hears_of_each_new_drive_once() -> None:
     assert heard == [("wire", "a", 1), ("wire", "b", 3), ("wire", "a", 4)]
 
 
-def test_what_the_others_do_is_told_apart_from_ones_own() -> None:
+def test_what_the_others_do_is_distinguished_from_ones_own() -> None:
     net = Net("wire")
     net.drive("board", False, PULL, 0)
     net.drive("chip", True, PP, 1)

@@ -31,17 +31,17 @@ def memory(runs: int, body: str) -> None:
     trials = [base.set(("seed", number)) for number in range(runs)]
     marks = (1, runs // 2, runs)
     for name, run in (("the program beside forks", _forked), ("one process that runs all", _in_turn)):
-        told: list[str] = []
+        reported: list[str] = []
         count = 0
 
-        def on_done(_place: int, _done: Done, told: list[str] = told) -> None:
+        def on_done(_place: int, _done: Done, reported: list[str] = reported) -> None:
             nonlocal count
             count += 1
             if count in marks:
-                told.append(f"{_held_mb():.1f}")
+                reported.append(f"{_held_mb():.1f}")
 
         run(trials, on_done)
-        print(f"memory, {name}, after {marks[0]}, {marks[1]} and {marks[2]} runs: {', '.join(told)} MB", flush=True)
+        print(f"memory, {name}, after {marks[0]}, {marks[1]} and {marks[2]} runs: {', '.join(reported)} MB", flush=True)
 
 
 def throughput(runs: int, body: str) -> None:
@@ -51,8 +51,8 @@ def throughput(runs: int, body: str) -> None:
     run_trial(base)  # loads what all need
     alone = _spent(lambda: _in_turn(trials, lambda *_: None))
     forked = [_spent(lambda count=count: _forked(trials, lambda *_: None, count)) for count in AT_ONCE]  # type: ignore[misc]  # mypy knows no defaults here
-    told = ", ".join(f"{spent:.1f} s ({alone / spent:.2f})" for spent in forked)
-    print(f"throughput, {body}: {runs} runs of 30 s: {alone:.1f} s in turn; in forks, {AT_ONCE} at a time: {told}")
+    reported = ", ".join(f"{spent:.1f} s ({alone / spent:.2f})" for spent in forked)
+    print(f"throughput, {body}: {runs} runs of 30 s: {alone:.1f} s in turn; in forks, {AT_ONCE} at a time: {reported}")
 
 
 def beginnings(runs: int, body: str) -> None:

@@ -300,7 +300,7 @@ static bool catch_up(struct core *core, const struct page *page, uint32_t addres
     return true;
 }
 
-/* Has Python not be told again of accesses to a peripheral while it has no clock: of reads up to a time (NO_TIME: of
+/* Has Python not notified again of accesses to a peripheral while it has no clock: of reads up to a time (NO_TIME: of
  * none), or of writes.
  */
 void core_declare_unclocked(struct core *core, uint32_t address, bool is_write, uint64_t until_ns)
@@ -322,7 +322,7 @@ void core_forget_unclocked(struct core *core)
     }
 }
 
-/* Whether a read finds no clock, and Python need not be told of it. Only once it has warned may the time of a loop that
+/* Whether a read finds no clock, and Python need not be notified of it. Only once it has warned may the time of a loop that
  * reads there pass at once: that it waits for so long is what is warned of.
  */
 static bool reads_nothing(struct core *core, uint32_t offset)
@@ -341,7 +341,7 @@ static bool reads_nothing(struct core *core, uint32_t offset)
     return page->quiet_cycle == core->fabric->time.cycle && page->quiet_hz == core->fabric->time.hz;
 }
 
-/* The same of a write. One that sets nothing that a reset would leave at 0 is never told of. */
+/* The same of a write. One that sets nothing that a reset would leave at 0 is never reported. */
 static bool writes_nothing(struct core *core, uint32_t offset, uint32_t value)
 {
     if (offset >> PAGE_SHIFT >= PAGES) {

@@ -1,4 +1,14 @@
-/* The state of one native core: it begins with what Python sees, `struct shared`. */
+/* The core: one idea in several files, which call each other and share `struct core`.
+ *
+ * A slice goes from block boundary to block boundary (`run.c`). Entering a block charges the one before it (`blocks.c`);
+ * within it an access to I/O is told apart from all others (`access.c`), to a register of a device or of the core itself
+ * (`scs.c`). At a boundary, or right before an access, an exception may be entered or left (`exceptions.c`), a fault be
+ * taken (`faults.c`), or a loop that waits be worked out (`polling.c`); each of these leads to the next block. So none of
+ * the seven works, or can be read, without the others. What needs no other stands beside them: `forced.c`, `host.c`,
+ * `systick.c`, `tlb.c`.
+ *
+ * `struct core` begins with what Python sees, `struct shared`.
+ */
 #ifndef BLUEPILL_CORE_H
 #define BLUEPILL_CORE_H
 
@@ -118,7 +128,7 @@ struct page {
     const uint16_t *behaviour; /* of each word: bits of enum behaviour */
     const uint32_t (*masks)[MASKS]; /* of each word: see `store` and SETS */
     struct device *device;          /* without a kind it is Python's */
-    /* Up to which cycle Python need not be told of reads without a clock, 0 for none, while that tie of cycles and time
+    /* Up to which cycle Python need not be notified of reads without a clock, 0 for none, while that tie of cycles and time
      * holds; NO_TIME: it has warned of one. And whether it has warned of a write. */
     uint64_t quiet_until, quiet_cycle;
     uint32_t quiet_hz, ignores_writes;

@@ -118,9 +118,9 @@ bool take_fault(struct core *core, uint32_t kind)
             return false;
         }
     }
-    const bool is_told = number == HARD_FAULT && kind != HALT_SUPERVISOR_CALL;
+    const bool is_reported = number == HARD_FAULT && kind != HALT_SUPERVISOR_CALL;
     struct fault seen = {0};
-    if (is_told) {
+    if (is_reported) {
         seen = look(core, kind);
     }
     if (!enter(core, number, s->halt_pc)) {
@@ -132,7 +132,7 @@ bool take_fault(struct core *core, uint32_t kind)
     if (s->halt_has_address && (kind == HALT_READ_ERROR || kind == HALT_WRITE_ERROR)) {
         s->bfar = s->halt_address;
     }
-    if (is_told) {
+    if (is_reported) {
         keep(s, &seen);
     }
     return true;

@@ -147,7 +147,7 @@ static void transfer(struct device *device, uint32_t n)
     ask(device, FAILED, n);
 }
 
-/* Whether the transfer under way moves a word of memory to memory, and changes nothing that anyone is told of. */
+/* Whether the transfer under way moves a word of memory to memory, and changes nothing that anyone is notified of. */
 static bool is_silent(const struct device *device)
 {
     const struct dma *dma = device->state;

@@ -1,7 +1,7 @@
 /* FLASH: the part of its registers that drivers write for each halfword: PG of CR, and the flags of SR.
  *
  * All else is Python's: `peripherals/flash.py`.
- * Invariant: Python is told of each write after which anything is to be done.
+ * Invariant: Python is notified of each write after which anything is to be done.
  */
 #include "../fabric/fabric.h"
 #include "../registers/flash.h"

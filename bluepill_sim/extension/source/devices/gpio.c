@@ -115,7 +115,7 @@ static void write_modes(struct device *device, uint32_t index, uint32_t previous
 static void reset(struct device *device)
 {
     struct gpio *gpio = device->state;
-    *gpio = (struct gpio){.port = gpio->port, .base = gpio->base, .warned = gpio->warned, .told = gpio->told};
+    *gpio = (struct gpio){.port = gpio->port, .base = gpio->base, .warned = gpio->warned, .reported = gpio->reported};
     for (uint32_t n = 0; n < PINS; ++n) {
         configure_pin(device->fabric, PINS * gpio->port + n, PIN_FLOATING, false);
     }

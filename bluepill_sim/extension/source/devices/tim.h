@@ -1,4 +1,9 @@
-/* What the files of a timer share. `tim.c` has its theory of operation. */
+/* A timer: one idea in four files, which call each other and share `struct tim`. `tim.c` has its theory of operation.
+ *
+ * In the hardware, too, each of them acts on the others: an input may reset or clock the counter, a match of the counter
+ * changes an output, an output's level may be an input's trigger, and a store to a register any of them. `tim.c` has
+ * the registers and brings the three others to a time in the order in which things happen.
+ */
 #ifndef BLUEPILL_TIM_H
 #define BLUEPILL_TIM_H
 

@@ -1,7 +1,7 @@
 /* USB: the part of its registers that programs write without end: toggles of EPnR, and CNTR with what it has already.
  *
  * What follows from a write, transactions and frames are Python's: `peripherals/usb.py`.
- * Invariant: Python is told of each write that may change anything.
+ * Invariant: Python is notified of each write that may change anything.
  */
 #include "../fabric/fabric.h"
 #include "../registers/usb.h"

@@ -329,6 +329,8 @@ void run_events(struct fabric *fabric, uint64_t until_ns);
 void run_due(struct fabric *fabric, uint64_t cycle);
 /* Whether anything due at or before a cycle is Python's business. */
 bool waits_for_python(const struct fabric *fabric, uint64_t cycle);
+/* Up to when nothing changes any more. */
+uint64_t settled_ns(struct fabric *fabric);
 
 /* lines.c */
 /* Whether a change of an output would be seen by anyone. */
@@ -403,12 +405,23 @@ void hand_on_line(struct device *device, uint32_t input, bool level);
 void hand_on_pins(struct device *device, uint32_t port, uint32_t changed);
 uint32_t obey_listen(struct device *device, uint32_t what, uint32_t one, uint32_t other);
 
-/* pins.c */
-/* Indices of `PinMode`. */
-enum pin_mode { PIN_ANALOG, PIN_FLOATING, PIN_PULLED, PIN_PUSH_PULL, PIN_OPEN_DRAIN, PIN_ALTERNATE, PIN_ALTERNATE_OPEN_DRAIN };
-/* Gives a pin what GPIO has configured: its mode, and its bit of ODR. */
-void configure_pin(struct fabric *fabric, uint32_t pin, uint32_t mode, bool is_high);
-void offer(struct fabric *fabric, uint32_t pin, uint32_t source, uint32_t level);
+/* port.c */
+/* Of one pin: LOW, HIGH or FLOATING; an index of `PinDrive`. */
+uint8_t wire_of(const struct port *port, uint32_t bit);
+uint8_t drive_of(const struct port *port, uint32_t bit);
+/* Works out what the pins of a port are. */
+void work_out(struct port *port);
+/* Works a port out for both levels of its waves; what is electrically wrong in one of them is wrong. */
+void work_out_both(struct port *port, struct port *low, struct port *high);
+/* The wave that drives a pin which shows one. */
+const struct wave *wave_of(const struct fabric *fabric, const struct port *port, uint32_t at);
+/* Puts pins that show a wave at its level at a time; `work_out` follows. */
+void sample_waves(const struct fabric *fabric, struct port *port, uint32_t pins, uint64_t ns);
+/* Notes when the chip has changed what it drives. */
+void note_output(struct fabric *fabric);
+void tell_listeners(struct fabric *fabric, uint32_t number, uint32_t changed);
+
+/* subscribers.c */
 void make_room(struct subscriber *subscriber, uint32_t count);
 static inline void put_rows(struct fabric *fabric, struct subscriber *subscriber, const struct edge *rows, uint32_t count)
 {
@@ -425,20 +438,46 @@ static inline void put_row(struct fabric *fabric, struct subscriber *subscriber,
 {
     put_rows(fabric, subscriber, row, 1);
 }
-
-void pins_changed(struct fabric *fabric, uint32_t port);
-/* Notes when the chip has changed what it drives. */
-void note_output(struct fabric *fabric);
-void listen_to_pins(struct device *device, uint32_t port, uint32_t pins);
-/* What a port's inputs are now, those that show waves too. */
-uint32_t port_input(struct fabric *fabric, uint32_t number);
-uint8_t wire_of(const struct port *port, uint32_t bit);
-uint8_t drive_of(const struct port *port, uint32_t bit);
-void work_out(struct port *port);
-void take_offer(struct fabric *fabric, uint32_t pin, uint32_t source, uint32_t level);
-void tell_listeners(struct fabric *fabric, uint32_t number, uint32_t changed);
+/* Puts a wave that a pin shows from a time on, as it is. */
+void put_wave(struct fabric *fabric, struct subscriber *subscriber, uint32_t pin, uint64_t ns);
+/* Whether the edges of a wave that a pin shows are any to it; whether it has subscribed to a pin. */
+bool wants(const struct subscriber *subscriber, const struct shown *shown, uint32_t pin);
+bool has_subscribed(const struct subscriber *subscriber, uint32_t pin);
+/* Gives it the edges of the wave that a pin shows, from a time on. */
+void expand(struct fabric *fabric, struct subscriber *subscriber, uint32_t pin, uint64_t ns);
+/* Takes that back; returns the level that the wave had there. */
+bool stop_expanding(struct subscriber *subscriber, uint32_t pin);
+/* Makes the edges that a subscriber has waiting; that all have, of what is about to be another wave. */
+void expand_waves(struct fabric *fabric, struct subscriber *subscriber, uint64_t until_ns);
+void expand_all(struct fabric *fabric, uint64_t ns);
 
 /* waves.c */
+/* What a port's inputs are now, those that show waves too. */
+uint32_t port_input(struct fabric *fabric, uint32_t number);
+/* Follows the waves of a port that may have changed; returns the pins whose wave has. */
+uint32_t show_waves(struct fabric *fabric, uint32_t number, const struct port *before);
+/* The next time at which edges must be made. */
+void schedule_edges(struct fabric *fabric);
+/* Who wants edges at their time has changed. */
+void make_edges_where_wanted(struct fabric *fabric);
+/* Tells those who have subscribed to a pin what it shows from now on; up to now it was this at either level. */
+void tell_all(struct fabric *fabric, uint32_t pin, const uint8_t drive[2], const uint8_t wire[2], uint64_t ns);
+/* Begins a subscription with the waves that are there. */
+void show_to(struct fabric *fabric, struct subscriber *subscriber);
+extern struct device_kind waves_kind;
+
+/* pins.c */
+/* Indices of `PinMode`. */
+enum pin_mode { PIN_ANALOG, PIN_FLOATING, PIN_PULLED, PIN_PUSH_PULL, PIN_OPEN_DRAIN, PIN_ALTERNATE, PIN_ALTERNATE_OPEN_DRAIN };
+/* Gives a pin what GPIO has configured: its mode, and its bit of ODR. */
+void configure_pin(struct fabric *fabric, uint32_t pin, uint32_t mode, bool is_high);
+/* Works out what the pins of a port are, and tells whoever has to know. */
+void pins_changed(struct fabric *fabric, uint32_t port);
+void listen_to_pins(struct device *device, uint32_t port, uint32_t pins);
+
+/* offers.c */
+/* The level that an alternate function offers on a pin: 0, 1, or 2 for none any more. */
+void offer(struct fabric *fabric, uint32_t pin, uint32_t source, uint32_t level);
 /* Has an alternate function offer a wave on a pin, in place of what it offered before: it is `position` of `period`
  * ticks after a rising edge now, and `high` ticks long at 1. A tick is one of `hz`, which are counted from where the
  * core's clock was last changed: so an edge comes exactly where a count of this clock puts it. */
@@ -447,19 +486,6 @@ void wave_set(struct fabric *fabric, uint32_t pin, uint32_t source, uint32_t hz,
 /* Has the wave that is offered be `high` ticks long at 1, and come `later` ticks of its period later; false: it is not
  * counted in these ticks. */
 bool wave_change(struct fabric *fabric, uint32_t pin, uint32_t source, const struct ticks *ticks, uint64_t high, uint64_t later);
-/* Puts pins that show a wave at its level at a time; `work_out` follows. */
-void sample_waves(const struct fabric *fabric, struct port *port, uint32_t pins, uint64_t ns);
-/* Follows the waves of a port that may have changed; returns the pins whose wave has. */
-uint32_t show_waves(struct fabric *fabric, uint32_t number, const struct port *before);
-/* Makes the edges that a subscriber has waiting. */
-void expand_waves(struct fabric *fabric, struct subscriber *subscriber, uint64_t until_ns);
-/* Who wants edges at their time has changed. */
-void make_edges_where_wanted(struct fabric *fabric);
-/* Begins a subscription with the waves that are there. */
-void show_to(struct fabric *fabric, struct subscriber *subscriber);
-/* Up to when nothing changes any more. */
-uint64_t settled_ns(struct fabric *fabric);
-extern struct device_kind waves_kind;
 
 /* analog.c */
 /* Microvolts on the pin of an ADC channel, which may be an earlier time's. */

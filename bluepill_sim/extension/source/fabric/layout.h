@@ -181,7 +181,7 @@ struct shared {
     struct ramp cyccnt;
     uint32_t hears_ticks; /* Python wants to know when SysTick is set */
     uint32_t has_debugger; /* Python sees to BKPT and HardFaults */
-    uint32_t knows_masked_svc; /* Python was told of an SVC that its priority does not allow */
+    uint32_t knows_masked_svc; /* Python was notified of an SVC that its priority does not allow */
     uint32_t has_fault; /* `fault` waits for Python */
     uint32_t waits; /* the block ends before its next access: the flash cannot give more code now */
     uint32_t waits_end;
@@ -358,7 +358,7 @@ struct gpio {
     uint32_t intended; /* made floating inputs on purpose, and where */
     uint32_t claimed; /* configured while they belong to another, and where */
     uint32_t warned;
-    uint32_t told;
+    uint32_t reported;
     uint32_t intended_pc[16];
     uint32_t claimed_pc[16];
 };

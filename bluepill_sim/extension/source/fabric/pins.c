@@ -1,9 +1,6 @@
-/* Pins: what the chip drives, what is on the wire, what its inputs read; a port at a time, a bit a pin.
+/* Pins: who has to know when the pins of a port change, how GPIO configures them, and who listens or is subscribed.
  *
- * A pin has one driver inside (GPIO, an alternate function, or a fixed function that holds it) and one outside, hard
- * or through a resistor. A wire that is fought over is low, as in simbase/wire.py.
- * Source: RM0008 9.1, table 20.
- * Invariant: everything from `low` on in `struct port` follows from what stands before it.
+ * `port.c` works out what they are.
  */
 #include <stdlib.h>
 #include <string.h>
@@ -11,37 +8,6 @@
 #include "fabric.h"
 
 enum { IS_FIGHTING, IS_SHORTED };
-/* Indices of `PinDrive`. */
-enum { DRIVES_NOTHING, DRIVES_LOW, DRIVES_HIGH, PULLS_UP, PULLS_DOWN };
-/* Room for rows at first. */
-enum { FIRST_ROOM = 256 };
-
-uint8_t drive_of(const struct port *port, uint32_t bit)
-{
-    return port->low & bit    ? DRIVES_LOW
-           : port->high & bit ? DRIVES_HIGH
-           : port->up & bit   ? PULLS_UP
-           : port->down & bit ? PULLS_DOWN
-                              : DRIVES_NOTHING;
-}
-
-uint8_t wire_of(const struct port *port, uint32_t bit)
-{
-    return port->floating & bit ? FLOATING : port->level & bit ? HIGH : LOW;
-}
-
-RARELY void make_room(struct subscriber *subscriber, uint32_t count)
-{
-    while (subscriber->count + count > subscriber->room) {
-        const size_t room = subscriber->room ? 2 * subscriber->room : FIRST_ROOM;
-        struct edge *rows = realloc(subscriber->rows, room * sizeof *rows);
-        if (rows == NULL) {
-            abort(); /* a few megabytes: nothing that could be done about it would work either */
-        }
-        subscriber->rows = rows;
-        subscriber->room = room;
-    }
-}
 
 static RARELY void tell_subscribers(struct fabric *fabric, uint32_t number, uint32_t drives, uint32_t wires)
 {
@@ -74,47 +40,6 @@ static RARELY void tell_trouble(struct fabric *fabric, uint32_t number, uint32_t
     }
 }
 
-void tell_listeners(struct fabric *fabric, uint32_t number, uint32_t changed)
-{
-    for (uint32_t n = 0; n < fabric->listener_count; ++n) {
-        struct pin_listener *one = &fabric->listeners[n];
-        if (changed & one->pins[number]) {
-            one->device->kind->pins(one->device, number, changed & one->pins[number]);
-        }
-    }
-}
-
-/* Works out what the pins of a port are. */
-void work_out(struct port *port)
-{
-    const uint32_t free = ~port->held;
-    const uint32_t offered = port->alternate & port->offered;
-    port->high = ((((port->output & port->odr) | (offered & port->offered_high)) & ~port->open_drain & free) | port->hold_high);
-    port->low = ((((port->output & ~port->odr) | (offered & ~port->offered_high)) & free) | port->hold_low);
-    port->up = (port->pulled & port->odr & free) | port->hold_up;
-    port->down = (port->pulled & ~port->odr & free) | port->hold_down;
-    const uint32_t strong = port->low | port->high;
-    const uint32_t hard = port->outside & ~port->outside_weak;
-    const uint32_t driven = port->high & (~hard | port->outside_high);
-    const uint32_t undriven = (port->outside & port->outside_high) |
-                              (~port->outside & (port->up | (~port->down & port->board_up)));
-    port->level = ((port->rail & port->rail_high) | (~port->rail & ((strong & driven) | (~strong & undriven)))) & ~port->bus_low;
-    port->floating = 0xFFFF & ~(strong | port->up | port->down | port->outside | port->rail | port->board_up | port->board_down | port->bus_low);
-    port->input = port->level & ((~port->analog & free) | port->hold_up | port->hold_down);
-    port->fighting = ~port->rail & strong & hard & (port->high ^ port->outside_high);
-    port->shorted = port->rail & strong & (port->high ^ port->rail_high);
-}
-
-void note_output(struct fabric *fabric)
-{
-    fabric->last_output = fabric->host.boundary != NULL ? *fabric->host.boundary : fabric->host.cycle(fabric->host.user);
-    if (UNLIKELY(fabric->event_ns != NO_TIME)) {
-        fabric->last_output = NO_TIME;
-        fabric->last_output_ns = fabric->event_ns;
-    }
-}
-
-/* Works out what the pins of a port are, and tells whoever has to know. */
 void pins_changed(struct fabric *fabric, uint32_t number)
 {
     struct port *port = &fabric->ports[number];
@@ -172,36 +97,6 @@ void configure_pin(struct fabric *fabric, uint32_t pin, uint32_t mode, bool is_h
 void fabric_configure_pin(struct fabric *fabric, uint32_t pin, uint32_t mode, bool is_high)
 {
     configure_pin(fabric, pin, mode, is_high);
-}
-
-void take_offer(struct fabric *fabric, uint32_t pin, uint32_t source, uint32_t level)
-{
-    struct port *port = &fabric->ports[pin / PINS];
-    const uint32_t at = pin % PINS, bit = 1u << at;
-    const uint64_t mask = UINT64_C(1) << source;
-    port->sources[at] = level == FLOATING ? port->sources[at] & ~mask : port->sources[at] | mask;
-    port->source_levels[at] = level == HIGH ? port->source_levels[at] | mask : port->source_levels[at] & ~mask;
-    const uint64_t first = port->sources[at] & -port->sources[at];
-    port->offered = first ? port->offered | bit : port->offered & ~bit;
-    port->offered_high = port->source_levels[at] & first ? port->offered_high | bit : port->offered_high & ~bit;
-    const struct wave *wave = first ? &fabric->waves[__builtin_ctzll(first)] : NULL;
-    port->waving = wave != NULL && wave->period && wave->pin == pin ? port->waving | bit : port->waving & ~bit;
-    sample_waves(fabric, port, port->waving & bit, now_ns(fabric));
-    pins_changed(fabric, pin / PINS);
-}
-
-/* The level that an alternate function offers on a pin: 0, 1, or 2 for none any more. */
-void offer(struct fabric *fabric, uint32_t pin, uint32_t source, uint32_t level)
-{
-    if (fabric->waves[source].pin == pin) {
-        fabric->waves[source].period = 0;
-    }
-    take_offer(fabric, pin, source, level);
-}
-
-void fabric_offer(struct fabric *fabric, uint32_t pin, uint32_t source, uint32_t level)
-{
-    offer(fabric, pin, source, level);
 }
 
 /* Has a device notified of changes of these pins' inputs, in place of those before. */
@@ -294,11 +189,4 @@ size_t fabric_row_count(struct fabric *fabric, uint32_t number)
 {
     expand_waves(fabric, &fabric->subscribers[number], settled_ns(fabric));
     return fabric->subscribers[number].count;
-}
-
-/* The rows of a subscriber, which has them then: they stand until the chip goes on. */
-const struct edge *fabric_take_rows(struct fabric *fabric, uint32_t number)
-{
-    fabric->subscribers[number].count = 0;
-    return fabric->subscribers[number].rows;
 }

@@ -99,6 +99,12 @@ uint64_t fabric_next_ns(const struct fabric *fabric)
     return fabric->ordered ? fabric->slots[fabric->order[0]].ns : NO_TIME;
 }
 
+uint64_t settled_ns(struct fabric *fabric)
+{
+    const uint64_t now = now_ns(fabric), due = fabric_next_ns(fabric);
+    return due <= now && due ? due - 1 : now;
+}
+
 uint64_t quiet_ns(const struct device *device)
 {
     const struct fabric *fabric = device->fabric;

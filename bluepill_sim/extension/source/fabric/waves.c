@@ -15,53 +15,7 @@
 #include <string.h>
 
 #include "fabric.h"
-
-enum { EDGE_ROW, WAVE_ROW };
-
-static struct ticks ticks_of(const struct wave *wave) { return (struct ticks){.ns = wave->ns, .hz = wave->hz}; }
-
-static uint64_t wave_tick(const struct wave *wave, uint64_t ns)
-{
-    const struct ticks ticks = ticks_of(wave);
-    return tick_at(&ticks, ns);
-}
-
-static uint64_t wave_ns(const struct wave *wave, uint64_t tick)
-{
-    const struct ticks ticks = ticks_of(wave);
-    return ns_of_tick(&ticks, tick);
-}
-
-static uint64_t position(const struct wave *wave, uint64_t tick) { return (wave->at + tick) % wave->period; }
-
-static bool wave_level(const struct wave *wave, uint64_t ns) { return position(wave, wave_tick(wave, ns)) < wave->high; }
-
-/* The tick of the first edge after a tick. */
-static uint64_t next_edge(const struct wave *wave, uint64_t tick)
-{
-    const uint64_t at = position(wave, tick);
-    return tick + (at < wave->high ? wave->high : wave->period) - at;
-}
-
-static uint64_t next_edge_ns(const struct wave *wave, uint64_t ns)
-{
-    return wave_ns(wave, next_edge(wave, wave_tick(wave, ns)));
-}
-
-/* The wave that drives a pin which shows one. */
-static const struct wave *wave_of(const struct fabric *fabric, const struct port *port, uint32_t at)
-{
-    return &fabric->waves[__builtin_ctzll(port->sources[at])];
-}
-
-void sample_waves(const struct fabric *fabric, struct port *port, uint32_t pins, uint64_t ns)
-{
-    for (uint32_t left = pins; left; left &= left - 1) {
-        const uint32_t bit = left & -left;
-        const bool level = wave_level(wave_of(fabric, port, (uint32_t)__builtin_ctz(left)), ns);
-        port->offered_high = level ? port->offered_high | bit : port->offered_high & ~bit;
-    }
-}
+#include "waves.h"
 
 uint32_t port_input(struct fabric *fabric, uint32_t number)
 {
@@ -83,32 +37,7 @@ void fabric_look(struct fabric *fabric, uint32_t number, struct port *now)
     work_out(now);
 }
 
-/* Works a port out for both levels of its waves; what is electrically wrong in one of them is wrong. */
-static void work_out_both(struct port *port, struct port *low, struct port *high)
-{
-    *low = *high = *port;
-    low->offered_high &= ~port->shown;
-    high->offered_high |= port->shown;
-    work_out(low);
-    work_out(high);
-    port->fighting |= (low->fighting | high->fighting) & port->shown;
-    port->shorted |= (low->shorted | high->shorted) & port->shown;
-}
-
-static bool wants(const struct subscriber *subscriber, const struct shown *shown, uint32_t pin)
-{
-    const uint32_t bit = 1u << pin % PINS;
-    return (subscriber->drive[pin / PINS] & bit && shown->drive[0] != shown->drive[1]) ||
-           (subscriber->wire[pin / PINS] & bit && shown->wire[0] != shown->wire[1]);
-}
-
-static bool has_subscribed(const struct subscriber *subscriber, uint32_t pin)
-{
-    return (subscriber->drive[pin / PINS] | subscriber->wire[pin / PINS]) >> pin % PINS & 1;
-}
-
-/* The next time at which edges must be made. */
-static void schedule_edges(struct fabric *fabric)
+void schedule_edges(struct fabric *fabric)
 {
     uint64_t due = NO_TIME;
     for (uint32_t number = 0; number < PORTS; ++number) {
@@ -159,75 +88,11 @@ void make_edges_where_wanted(struct fabric *fabric)
     schedule_edges(fabric);
 }
 
-static void expand(struct fabric *fabric, struct subscriber *subscriber, uint32_t pin, uint64_t ns)
+/* Tells a subscriber what a pin shows from now on; `before` is what it has shown up to now. */
+static void tell(struct fabric *fabric, struct subscriber *subscriber, uint32_t pin, const struct edge *before)
 {
     const struct shown *shown = &fabric->shown[pin];
-    if (!subscriber->expanded_count) {
-        subscriber->expanded_ns = ns;
-    }
-    struct expanded *one = &subscriber->expanded[subscriber->expanded_count++];
-    const uint64_t tick = wave_tick(&shown->wave, ns);
-    one->pin = (uint8_t)pin;
-    one->level = position(&shown->wave, tick) < shown->wave.high;
-    one->tick = next_edge(&shown->wave, tick);
-    one->next_ns = wave_ns(&shown->wave, one->tick);
-}
-
-static RARELY void make_rows(struct fabric *fabric, struct subscriber *subscriber, uint64_t until_ns)
-{
-    for (;;) {
-        struct expanded *first = &subscriber->expanded[0];
-        for (uint32_t n = 1; n < subscriber->expanded_count; ++n) {
-            struct expanded *one = &subscriber->expanded[n];
-            if (one->next_ns < first->next_ns || (one->next_ns == first->next_ns && one->pin < first->pin)) {
-                first = one;
-            }
-        }
-        if (first->next_ns > until_ns) {
-            break;
-        }
-        const struct shown *shown = &fabric->shown[first->pin];
-        const struct wave *wave = &shown->wave;
-        first->level ^= 1;
-        const struct edge row = {.ns = first->next_ns, .pin = first->pin, .drive = shown->drive[first->level],
-                                 .wire = shown->wire[first->level]};
-        first->tick += first->level ? wave->high : wave->period - wave->high;
-        first->next_ns = wave_ns(wave, first->tick);
-        put_row(fabric, subscriber, &row);
-    }
-    if (subscriber->expanded_ns < until_ns) {
-        subscriber->expanded_ns = until_ns;
-    }
-}
-
-void expand_waves(struct fabric *fabric, struct subscriber *subscriber, uint64_t until_ns)
-{
-    if (UNLIKELY(subscriber->expanded_count)) {
-        make_rows(fabric, subscriber, until_ns);
-    }
-}
-
-uint64_t settled_ns(struct fabric *fabric)
-{
-    const uint64_t now = now_ns(fabric), due = fabric_next_ns(fabric);
-    return due <= now && due ? due - 1 : now;
-}
-
-static void put_wave(struct fabric *fabric, struct subscriber *subscriber, uint32_t pin, uint64_t ns)
-{
-    const struct shown *shown = &fabric->shown[pin];
-    struct edge rows[1 + sizeof shown->wave / sizeof(struct edge)];
-    rows[0] = (struct edge){.ns = ns, .pin = (uint8_t)pin, .drive = (uint8_t)(shown->drive[0] | shown->drive[1] << 4),
-                              .wire = (uint8_t)(shown->wire[0] | shown->wire[1] << 4), .kind = WAVE_ROW};
-    memcpy(&rows[1], &shown->wave, sizeof shown->wave);
-    put_rows(fabric, subscriber, rows, sizeof rows / sizeof *rows);
-}
-
-/* Tells a subscriber what a pin shows from now on; `told` is what it has shown up to now. */
-static void tell(struct fabric *fabric, struct subscriber *subscriber, uint32_t pin, const struct edge *told)
-{
-    const struct shown *shown = &fabric->shown[pin];
-    const uint64_t ns = told->ns;
+    const uint64_t ns = before->ns;
     if (subscriber->takes_waves && shown->is_wave) {
         put_wave(fabric, subscriber, pin, ns);
         return;
@@ -235,26 +100,13 @@ static void tell(struct fabric *fabric, struct subscriber *subscriber, uint32_t 
     const bool level = shown->is_wave && wave_level(&shown->wave, ns);
     const struct edge row = {.ns = ns, .pin = (uint8_t)pin, .drive = shown->drive[level], .wire = shown->wire[level]};
     const uint32_t bit = 1u << pin % PINS;
-    if (subscriber->takes_waves || (subscriber->drive[pin / PINS] & bit && row.drive != told->drive) ||
-        (subscriber->wire[pin / PINS] & bit && row.wire != told->wire)) {
+    if (subscriber->takes_waves || (subscriber->drive[pin / PINS] & bit && row.drive != before->drive) ||
+        (subscriber->wire[pin / PINS] & bit && row.wire != before->wire)) {
         put_row(fabric, subscriber, &row);
     }
     if (shown->is_wave && wants(subscriber, shown, pin)) {
         expand(fabric, subscriber, pin, ns);
     }
-}
-
-/* Takes an entry away; returns the level that the wave had there. */
-static bool stop_expanding(struct subscriber *subscriber, uint32_t pin)
-{
-    for (uint32_t n = 0; n < subscriber->expanded_count; ++n) {
-        if (subscriber->expanded[n].pin == pin) {
-            const bool level = subscriber->expanded[n].level;
-            subscriber->expanded[n] = subscriber->expanded[--subscriber->expanded_count];
-            return level;
-        }
-    }
-    return false;
 }
 
 static struct shown showing(const struct fabric *fabric, const struct port *port, const struct port *low,
@@ -281,23 +133,14 @@ static bool is_same(const struct shown *one, const struct shown *other)
            memcmp(one->wire, other->wire, sizeof one->wire) == 0 && memcmp(&one->wave, &other->wave, sizeof one->wave) == 0;
 }
 
-/* Makes the edges that subscribers have waiting of what is about to be another wave. */
-static void expand_all(struct fabric *fabric, uint64_t ns)
-{
-    for (uint32_t n = 0; n < fabric->subscribers_end; ++n) {
-        expand_waves(fabric, &fabric->subscribers[n], ns);
-    }
-}
-
-/* Tells those who have subscribed to a pin what it shows from now on; up to now it was this at either level. */
-static void tell_all(struct fabric *fabric, uint32_t pin, const uint8_t drive[2], const uint8_t wire[2], uint64_t ns)
+void tell_all(struct fabric *fabric, uint32_t pin, const uint8_t drive[2], const uint8_t wire[2], uint64_t ns)
 {
     for (uint32_t n = 0; n < fabric->subscribers_end; ++n) {
         struct subscriber *one = &fabric->subscribers[n];
         if (has_subscribed(one, pin)) {
             const bool level = stop_expanding(one, pin);
-            const struct edge told = {.ns = ns, .drive = drive[level], .wire = wire[level]};
-            tell(fabric, one, pin, &told);
+            const struct edge before = {.ns = ns, .drive = drive[level], .wire = wire[level]};
+            tell(fabric, one, pin, &before);
         }
     }
 }
@@ -336,8 +179,8 @@ void show_to(struct fabric *fabric, struct subscriber *subscriber)
         const struct shown *shown = &fabric->shown[pin];
         if (shown->is_wave && has_subscribed(subscriber, pin)) {
             const bool level = wave_level(&shown->wave, ns);
-            const struct edge told = {.ns = ns, .drive = shown->drive[level], .wire = shown->wire[level]};
-            tell(fabric, subscriber, pin, &told);
+            const struct edge before = {.ns = ns, .drive = shown->drive[level], .wire = shown->wire[level]};
+            tell(fabric, subscriber, pin, &before);
         }
     }
     make_edges_where_wanted(fabric);
@@ -404,88 +247,6 @@ static void event(struct device *device, uint64_t ns)
         expand_waves(fabric, &fabric->subscribers[n], ns);
     }
     schedule_edges(fabric);
-}
-
-/* Has a pin that shows a wave, and goes on showing it, follow what has become of that; false: more than it may change. */
-static bool follow_wave(struct fabric *fabric, uint32_t pin, uint32_t source, bool level, uint64_t now)
-{
-    struct port *port = &fabric->ports[pin / PINS];
-    struct shown *shown = &fabric->shown[pin];
-    const struct wave *wave = &fabric->waves[source];
-    const uint32_t at = pin % PINS, bit = 1u << at;
-    const uint64_t mask = UINT64_C(1) << source;
-    if (!(port->shown & bit) || !shown->is_wave || shown->is_made || (port->sources[at] & -port->sources[at]) != mask ||
-        (port->fighting | port->shorted) & bit || fabric->ahead.device != NULL) {
-        return false;
-    }
-    port->source_levels[at] = level ? port->source_levels[at] | mask : port->source_levels[at] & ~mask;
-    if (!(port->offered_high & bit) == level) {
-        const uint32_t fighting = port->fighting & port->shown, shorted = port->shorted & port->shown;
-        port->offered_high ^= bit;
-        work_out(port);
-        port->fighting |= fighting;
-        port->shorted |= shorted;
-    }
-    if (shown->wave.high == wave->high && shown->wave.at == wave->at && memcmp(&shown->wave, wave, sizeof *wave) == 0) {
-        return true;
-    }
-    note_output(fabric);
-    expand_all(fabric, now);
-    shown->wave = *wave;
-    tell_all(fabric, pin, shown->drive, shown->wire, now);
-    for (uint32_t n = 0; n < fabric->subscribers_end; ++n) {
-        if (fabric->subscribers[n].expanded_count) {
-            schedule_edges(fabric);
-            break;
-        }
-    }
-    return true;
-}
-
-bool wave_change(struct fabric *fabric, uint32_t pin, uint32_t source, const struct ticks *ticks, uint64_t high, uint64_t later)
-{
-    struct wave *wave = &fabric->waves[source];
-    if (!wave->period || wave->pin != pin || wave->ns != ticks->ns || wave->hz != ticks->hz || wave->ns != fabric->time.ns) {
-        return false;
-    }
-    const uint64_t now = now_ns(fabric);
-    if (now < wave->ns || (wave->high == high && !later)) {
-        return now >= wave->ns;
-    }
-    wave->high = high;
-    wave->at = distance(later, wave->at, wave->period);
-    const bool level = wave_level(wave, now);
-    if (!follow_wave(fabric, pin, source, level, now)) {
-        take_offer(fabric, pin, source, level);
-    }
-    return true;
-}
-
-void wave_set(struct fabric *fabric, uint32_t pin, uint32_t source, uint32_t hz, uint64_t period, uint64_t high,
-              uint64_t at)
-{
-    struct wave *wave = &fabric->waves[source];
-    if (wave->period && wave->pin != pin) {
-        offer(fabric, wave->pin, source, FLOATING);
-    }
-    if (!high || high >= period) {
-        offer(fabric, pin, source, high != 0);
-        return;
-    }
-    const bool was_offered = wave->period != 0;
-    const uint64_t now = now_ns(fabric), ns = now < fabric->time.ns ? now : fabric->time.ns;
-    *wave = (struct wave){.ns = ns, .period = period, .high = high, .hz = hz, .pin = pin};
-    at = within(at, period);
-    wave->at = distance(wave_tick(wave, now) % period, at, period);
-    if (!was_offered || !follow_wave(fabric, pin, source, at < high, now)) {
-        take_offer(fabric, pin, source, at < high);
-    }
-}
-
-void fabric_set_wave(struct fabric *fabric, uint32_t pin, uint32_t source, uint32_t hz, uint64_t period, uint64_t high,
-                     uint64_t at)
-{
-    wave_set(fabric, pin, source, hz, period, high, at);
 }
 
 struct device_kind waves_kind = {.name = "waves", .event = event};

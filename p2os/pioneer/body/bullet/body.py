@@ -193,7 +193,7 @@ class BulletBody(EngineBody):
 
     STATE = ("_targets", "_start")
     #: What the scene's `engine_state` makes anew, and what is read from the engine.
-    DERIVED = ("robot", "_centre", "_joints", "_matrix", "_origin", "_motors", "_told")
+    DERIVED = ("robot", "_centre", "_joints", "_matrix", "_origin", "_motors", "_commanded")
 
     _rays_of = SonarRays
     name = "bullet"
@@ -205,10 +205,10 @@ class BulletBody(EngineBody):
         self._sonar_rays = SonarRays(self._cones, parameters.sonar_height_m, parameters.sonar_range_m)
         self._client = scene.client
         self._targets = (0.0, 0.0)
-        #: What the motors were told last, a rate and a torque each, and what that was worked out from beside the grip
+        #: What the motors were commanded, a rate and a torque each, and what that was worked out from beside the grip
         #: of the wheels.
         self._motors: list[tuple[float, float]] = []
-        self._told: tuple[object, ...] = ()
+        self._commanded: tuple[object, ...] = ()
 
     def make(self, pose: Pose) -> None:
         """Make the robot in the engine's empty world."""
@@ -269,11 +269,11 @@ class BulletBody(EngineBody):
 
     def _step_alone(self, setpoints: Iterable[tuple[float, float]]) -> list[Turned]:
         step, take_step, client, made = pybullet.stepSimulation, self.take_step, self._client, list[Turned]()
-        told: object = None
+        commanded: object = None
         for asked in setpoints:
-            if self._is_grip_changed or asked is not told:
+            if self._is_grip_changed or asked is not commanded:
                 self._tell_motors(*asked)
-                told = asked
+                commanded = asked
             self._state = None
             self._steps += 1
             step(client)
@@ -289,12 +289,12 @@ class BulletBody(EngineBody):
 
     def _tell_motors(self, left_mps: float, right_mps: float) -> None:
         """Give the motors these set-points, where that is news to them."""
-        told = (left_mps, right_mps, self.is_powered, self._most_nm)
-        if self._is_grip_changed or told != self._told:
+        commanded = (left_mps, right_mps, self.is_powered, self._most_nm)
+        if self._is_grip_changed or commanded != self._commanded:
             self._targets = (left_mps, right_mps)
             if self._wanted_motors() != self._motors:
                 self._command()
-            self._told, self._is_grip_changed = told, False
+            self._commanded, self._is_grip_changed = commanded, False
 
     def take_step(self) -> Turned:
         """Take what the engine's step has made of the robot."""
@@ -330,7 +330,7 @@ class BulletBody(EngineBody):
     def _command(self) -> None:
         """Give the motors their targets; the engine does not save them with its state."""
         left, right = self._motors = self._wanted_motors()
-        self._told = ()
+        self._commanded = ()
         pybullet.setJointMotorControlArray(
             self.robot, WHEELS, pybullet.VELOCITY_CONTROL,
             targetVelocities=[left[0], right[0]], forces=[left[1], right[1]],

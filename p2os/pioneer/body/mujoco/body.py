@@ -161,7 +161,7 @@ class MujocoBody(EngineBody):
     STATE = ("_start",)
     #: Where in the engine's objects things are.
     DERIVED = ("_qpos", "_qvel", "_most_torques", "_wheel_places", "_wheel_speeds", "_rotors", "_robot_place",
-               "_robot_speed", "_hull_number", "_wheel_numbers", "_asked", "_told", "_rotor_rates")  # fmt: skip
+               "_robot_speed", "_hull_number", "_wheel_numbers", "_asked", "_commanded", "_rotor_rates")  # fmt: skip
 
     _rays_of = SonarRays
     name = "mujoco"
@@ -172,8 +172,8 @@ class MujocoBody(EngineBody):
         super().__init__(scene, parameters, number)
         self._names, self._number = RobotNames.of(number), number
         self._sonar_rays = SonarRays(self._cones, parameters.sonar_height_m, parameters.sonar_range_m)
-        #: What the motors were told last, that and what it was worked out from, and the rates of the rotors, rad/s.
-        self._asked, self._told, self._rotor_rates = (0.0, 0.0), tuple[object, ...](), (0.0, 0.0)
+        #: What the motors were commanded, that and what it was worked out from, and the rates of the rotors, rad/s.
+        self._asked, self._commanded, self._rotor_rates = (0.0, 0.0), tuple[object, ...](), (0.0, 0.0)
 
     @property
     def note(self) -> str | None:
@@ -186,7 +186,7 @@ class MujocoBody(EngineBody):
         """Find the robot in a model that was made anew."""
         model, data, names = self.scene.model, self.scene.data, self._names
         self._qpos, self._qvel, self._most_torques = data.qpos, data.qvel, model.tendon_frictionloss
-        self._told = ()
+        self._commanded = ()
         joints = [model.joint(name) for name in names.wheels]
         self._wheel_places = [int(joint.qposadr[0]) for joint in joints]
         self._wheel_speeds = [int(joint.dofadr[0]) for joint in joints]
@@ -231,9 +231,9 @@ class MujocoBody(EngineBody):
         """Begin a step with these rim-speed set-points: the rotors pull their wheels along with their torque."""
         self._state = None
         self._steps += 1
-        told = (left_mps, right_mps, self.is_powered, self._most_nm)
-        if self._is_grip_changed or told != self._told:
-            self._told, self._is_grip_changed = told, False
+        commanded = (left_mps, right_mps, self.is_powered, self._most_nm)
+        if self._is_grip_changed or commanded != self._commanded:
+            self._commanded, self._is_grip_changed = commanded, False
             (left_radps, left_nm), (right_radps, right_nm) = self._motor(0, left_mps), self._motor(1, right_mps)
             self._asked, self._rotor_rates = (left_mps, right_mps), (left_radps, right_radps)
             first, most_torques = 2 * self._number, self._most_torques

@@ -396,9 +396,9 @@ class OutsideBody(BodyInWorld):
 
     def clearance(self, *, no_more_than: float = math.inf) -> float:
         """Return the free distance around the hull, metres: as the other program tells it, or in our plan."""
-        state, told = self.state, self._numbers[11]
-        if told >= 0.0:
-            return min(told, no_more_than)
+        state, given = self.state, self._numbers[11]
+        if given >= 0.0:
+            return min(given, no_more_than)
         return self._plan.clearance(state.x_m, state.y_m, state.heading_rad, no_more_than=no_more_than)
 
     # Sensors ---------------------------------------------------------------------------------

@@ -50,7 +50,7 @@ def base_run(scenario: Scenario, clock: Clock, look: Callable[[], None] = lambda
 
     Args:
         scenario: One robot, with goals.
-        clock: What the cost is told in.
+        clock: What the cost is measured by.
         look: Called between steps; may raise to end it.
 
     Raises:

@@ -114,7 +114,7 @@ def report_lines(mutation: Mutation) -> Iterator[str]:
     yield from in_columns(
         ("changed", "tried", "noticed", "survived", "same trace", "score"), list(_rows(mutation)), right=range(1, 6)
     )
-    yield from _tellers(mutation)
+    yield from _reporters(mutation)
     yield from _survivors(mutation)
     yield ""
     bounds = mutation.bounds
@@ -135,7 +135,7 @@ def _rows(mutation: Mutation) -> Iterator[Sequence[str]]:
         yield name, *map(str, counts), _percent(score(found))
 
 
-def _tellers(mutation: Mutation) -> Iterator[str]:
+def _reporters(mutation: Mutation) -> Iterator[str]:
     """Tell what noticed how many: a goal that notices none could be left out as far as these mutants go."""
     words = {Fate.CRASHED: "the program ended in a fault", Fate.STOPPED: "it cost far more than the program"}
     counts = Counter(

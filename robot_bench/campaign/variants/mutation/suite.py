@@ -1,7 +1,7 @@
 """Tests of pytest as the judge of mutants: those that drive a bench by the fixture `bench`.
 
 The suite is run with the program itself first, then with a file of each mutant, as `pytest --firmware FILE -x` does.
-What its benches executed and recorded is told by the chips and the traces of the tests.
+What its benches executed and recorded is known from the chips and the traces of the tests.
 
 Not here: processes. Each run leaves modules of the tests behind, so each is to have a process of its own.
 

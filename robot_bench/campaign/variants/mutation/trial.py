@@ -14,6 +14,7 @@ from typing import cast
 
 from bluepill_sim.program.mutants import Mutant
 from p2os.transport.wall_clock import Clock
+from robot_bench.bench import run_of
 from robot_bench.campaign.variants.mutation.base_run import BaseRun
 from robot_bench.events.codec import Json
 from robot_bench.events.kinds import Event, Verdict
@@ -113,7 +114,7 @@ def _run(mutant: Mutant, base: BaseRun, clock: Clock, look: Callable[[], None]) 
     def after_slice(now: Nanos) -> None:
         look()
         if clock() - began > most_ns:
-            raise _TooDearError(f"it costs more than {MOST_TIMES} times the unchanged program, at {now / NS_PER_S:g} s")
+            raise _TooCostlyError(f"it costs more than {MOST_TIMES} times the unchanged one, at {now / NS_PER_S:g} s")
 
     bench.on_slice = after_slice
     try:
@@ -132,11 +133,11 @@ def _judged(base: BaseRun) -> MutantResult:
     """Return what became of a mutant whose run came to its end."""
     bench, name = base.bench, base.bench.scenario.name
     end = bench.finish()
-    for one in bench.goals.at_end(bench.ended(end)):
+    for one in run_of(bench).goals.at_end(run_of(bench).ended(end)):
         if not one.is_open and not one.outcome.met:
             return MutantResult(Fate.MISSED, name, f"{one.goal.wanted}: {one.outcome.says}", end)
     return MutantResult(Fate.SAME if bench.trace.sha256 == base.trace_sha256 else Fate.SURVIVED, name)
 
 
-class _TooDearError(P2osError):
+class _TooCostlyError(P2osError):
     """A run is stopped for what it costs."""

@@ -69,7 +69,7 @@ def equipped() -> BluePill:
     return board
 
 
-def told(board: BluePill) -> dict[str, str]:
+def reported(board: BluePill) -> dict[str, str]:
     return {name: part.words() for name, part in board.attached.by_name.items() if hasattr(part, "words")}
 
 
@@ -84,13 +84,13 @@ def test_a_program_drives_one_of_every_part_at_once(finished: BluePill) -> None:
     assert finished.usart1.unread.decode() == SAID
     # 2.912 ms are 1 m at 343.42 m/s: 2911.9 us.
     assert finished.warnings == []
-    words = told(finished)
+    words = reported(finished)
     oled = finished.attached.by_name["ssd1306"]
     dots = [(x, y) for y, row in enumerate(oled.dots()) for x, dot in enumerate(row) if dot]
     # Eight squares of 8 by 8, the upper row beside the first, and the left column below it.
     assert len(dots) == 8 * 64 + 120 + 56
     assert ((0, 0) in dots, (63, 63) in dots, (64, 63) in dots) == (True, True, False)
-    assert words["servo"] == "at +45.0 deg, told +45.0 deg by 25 pulses"
+    assert words["servo"] == "at +45.0 deg, commanded +45.0 deg by 25 pulses"
     assert words["ws2812"] == "#ff1020 #0000ff #ffffff after 1 frames"
     assert words["sd-card"] == "8 MiB, 1 blocks read, 1 written"
     assert words["leds"].startswith("led0 lit after ")
@@ -111,7 +111,7 @@ def test_the_result_depends_neither_on_slices_nor_on_a_snapshot_in_between(finis
     while other.now_ns < end:
         other.advance_to(end)
     assert said.decode() == SAID
-    assert (told(other), other.cycle) == (told(finished), finished.cycle)
+    assert (reported(other), other.cycle) == (reported(finished), finished.cycle)
 
 
 def test_every_part_that_ships_is_found_and_has_a_section_in_its_page() -> None:

@@ -139,7 +139,7 @@ def test_what_stands_beside_the_offsets_keeps_its_value(number: int) -> None:
 
 
 @pytest.mark.parametrize(("height", "low"), [(64, 6), (32, 3)])
-def test_an_oled_is_told_from_an_sh1106_by_the_lower_half_of_its_status(height: int, low: int) -> None:
+def test_an_oled_is_distinguished_from_an_sh1106_by_the_lower_half_of_its_status(height: int, low: int) -> None:
     oled = Ssd1306(height=height)
     assert oled.start(0x3C, True, 0)
     assert oled.read(0) == 0x40 | low

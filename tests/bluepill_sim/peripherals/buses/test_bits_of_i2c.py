@@ -71,7 +71,7 @@ def decoded(edges: list[tuple[int, bool, bool]]) -> Heard:
     return heard
 
 
-def as_told(symbols: list[I2cSymbol]) -> Heard:
+def as_reported(symbols: list[I2cSymbol]) -> Heard:
     return [
         "S" if row.step is I2cStep.START else "P" if row.step is I2cStep.STOP else (row.byte, row.is_acknowledged)
         for row in symbols
@@ -131,8 +131,8 @@ def test_the_bits_on_scl_and_sda_are_the_conditions_bytes_and_acknowledges(
     ends = []
     for looks in (True, False):
         chip = make_fake_chip()
-        told: list[I2cSymbol] = []
-        chip.parts.by_name["I2C1"].subscribe(told.extend)
+        reported: list[I2cSymbol] = []
+        chip.parts.by_name["I2C1"].subscribe(reported.extend)
         part = set_up(chip, device=Echo(room=room), ccr=ccr)
         lines = Lines(chip) if looks else None
         expected: Heard = []
@@ -147,11 +147,11 @@ def test_the_bits_on_scl_and_sda_are_the_conditions_bytes_and_acknowledges(
                 wait(chip, BIT_NS)
         chip.deliver() if hasattr(chip, "deliver") else None
         if lines is not None:
-            assert {(one.byte, one.is_acknowledged) for one in told if one.step is I2cStep.START} <= {(0, False)}
+            assert {(one.byte, one.is_acknowledged) for one in reported if one.step is I2cStep.START} <= {(0, False)}
             assert decoded(lines.edges) == expected
             lines.subscription.close()
-        assert as_told(told) == expected
-        ends.append((part.log, told, chip.now_ns, chip.pins["PB6"].level, chip.pins["PB7"].level))
+        assert as_reported(reported) == expected
+        ends.append((part.log, reported, chip.now_ns, chip.pins["PB6"].level, chip.pins["PB7"].level))
     assert ends[0] == ends[1]
     assert ends[0][3:] == (True, True)
 
@@ -188,8 +188,8 @@ def test_a_master_outside_is_seen_on_the_lines_too(make_fake_chip: Any, call: tu
     chip = make_fake_chip()
     chip.write("GPIOB.CRL", 0xDD44_4444)
     part = chip.parts.by_name["I2C1"]
-    told: list[I2cSymbol] = []
-    part.subscribe(told.extend)
+    reported: list[I2cSymbol] = []
+    part.subscribe(reported.extend)
     chip.write("I2C1.CR2", 8)
     chip.write("I2C1.OAR1", 0x30 << 1)
     chip.write("I2C1.CR1", PE | ACK)
@@ -207,7 +207,7 @@ def test_a_master_outside_is_seen_on_the_lines_too(make_fake_chip: Any, call: tu
             chip.write("I2C1.DR", 0x80 | n)
     chip.deliver() if hasattr(chip, "deliver") else None
     heard = decoded(lines.edges)
-    assert heard == as_told(told)
+    assert heard == as_reported(reported)
     assert (heard[0], heard[-1]) == ("S", "P")
     answer = part.answered[0]
     assert sum(isinstance(one, tuple) and one[1] for one in heard) >= answer.acknowledged

@@ -417,7 +417,7 @@ def test_sda_pulled_low_from_outside_loses_the_arbitration(fake_chip: Any) -> No
     assert sr1(fake_chip) == ARLO
 
 
-def test_a_bus_error_is_told_and_cleared_by_zero(fake_chip: Any) -> None:
+def test_a_bus_error_is_reported_and_cleared_by_zero(fake_chip: Any) -> None:
     set_up(fake_chip)
     fake_chip.write("I2C1.CR2", 8 | ITERREN)
     fake_chip.parts.by_name["I2C1"].disturb()
@@ -614,7 +614,7 @@ def test_a_slave_sends_and_the_last_byte_is_refused(fake_chip: Any) -> None:
         (0x2A5, 0, 1 << 15 | 0x2A5, 0, 0),
     ],
 )
-def test_every_address_of_its_own_is_told(
+def test_every_address_of_its_own_is_reported(
     fake_chip: Any, address: int, bits: int, own: int, dual: int, flags: int
 ) -> None:
     part = slave(fake_chip, bits, own, dual)

@@ -229,7 +229,7 @@ def crc_by_division(words: list[int], polynomial: int, bits: int, *, lsb_first: 
 @QUICK
 @given(st.lists(st.integers(0, 0xFFFF), min_size=1, max_size=6), st.integers(0, 0xFFFF), st.sampled_from([0, DFF]),
        st.sampled_from([0, LSBFIRST]), st.booleans())  # fmt: skip
-def test_the_crc_is_that_of_the_words_and_a_wrong_one_is_told(
+def test_the_crc_is_that_of_the_words_and_a_wrong_one_is_reported(
     make_fake_chip: Chips, words: list[int], polynomial: int, frame: int, order: int, is_damaged: bool
 ) -> None:
     chip = make_fake_chip()
@@ -353,7 +353,7 @@ def test_of_two_selected_parts_a_zero_wins_and_of_none_the_wire(fake_chip: Any) 
         assert fake_chip.read("SPI2.DR") == 0xFF * level
 
 
-def test_a_part_of_another_mode_hears_nothing_and_a_slow_one_is_told(fake_chip: Any) -> None:
+def test_a_part_of_another_mode_hears_nothing_and_a_slow_one_is_reported(fake_chip: Any) -> None:
     part = Recorder(b"\x01" * 4)
     part.spi_modes, part.max_hz = frozenset({0}), 1_000_000  # type: ignore[misc]
     set_up(fake_chip, MASTER | CPOL, part)
@@ -428,7 +428,7 @@ def test_a_slave_that_is_not_selected_hears_nothing(fake_chip: Any) -> None:
     assert fake_chip.read("SPI1.DR") == 2
 
 
-def test_i2s_is_told_to_be_absent(fake_chip: Any) -> None:
+def test_i2s_is_reported_to_be_absent(fake_chip: Any) -> None:
     fake_chip.write("SPI1.I2SCFGR", 0)
     assert fake_chip.warnings == {}
     fake_chip.write("SPI1.I2SCFGR", 1 << 11)

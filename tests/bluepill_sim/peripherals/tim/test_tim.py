@@ -624,7 +624,7 @@ def test_captures_take_the_count_of_their_edges(
     assert found == captured
 
 
-def test_a_capture_over_an_unread_one_is_told(tim3: Timer) -> None:
+def test_a_capture_over_an_unread_one_is_reported(tim3: Timer) -> None:
     tim3.chip.pins["PA6"].drive(False)
     tim3.set(CCMR1=0x01, CCER=1, CR1=CEN)
     _feed(tim3, "PA6", [(10, 1), (20, 0)])

@@ -72,8 +72,8 @@ def play(folder: Path, seed: int, steps: int, cuts: int) -> tuple[Any, ...]:
     edges: list[tuple[int, ...]] = []
     board.subscribe_pins(PINS, lambda rows: edges.extend(EDGE.iter_unpack(rows)), of=Of.WIRE)
     seen: list[int] = []
-    told = story(seed, steps)
-    for at, what, *more in [*told, (told[-1][0] + 500_000, "end")]:
+    reported = story(seed, steps)
+    for at, what, *more in [*reported, (reported[-1][0] + 500_000, "end")]:
         while cuts and board.now_ns < at and rng.random() < 0.7:
             board.advance_to(min(at, board.now_ns + rng.randrange(1, 20_000)))
         board.advance_to(at)

@@ -31,7 +31,7 @@ WALL = parse_world(
 OFF_CENTRE_DEG = {"kinematic": (72, 120, 312), "bullet": (72, 312), "mujoco": (120,)}
 
 
-def told(contact: SurveyedContact) -> str:
+def reported(contact: SurveyedContact) -> str:
     return f"{contact.model} on {contact.body}, heading {contact.heading_deg:g}: {'; '.join(contact.faults())}"
 
 
@@ -47,7 +47,7 @@ def test_a_robot_that_meets_a_thing_beside_its_middle_slides_or_stalls_and_rests
     model = load_parameters("p2dx")
     contact = measure(make_body(name, ARENA, model), model, heading_deg, 3.0)
     assert contact is not None
-    assert not contact.faults(), told(contact)
+    assert not contact.faults(), reported(contact)
 
 
 def test_the_picture_shows_the_stall_and_the_rest_of_each_contact() -> None:
@@ -63,7 +63,7 @@ def test_the_picture_shows_the_stall_and_the_rest_of_each_contact() -> None:
 def test_every_contact_of_thirty_headings_is_within_the_contract(name: str, model: str) -> None:
     contacts = list(survey([name], [model], 30, ARENA))
     assert len(contacts) == 30
-    assert not [told(contact) for contact in contacts if contact.faults()]
+    assert not [reported(contact) for contact in contacts if contact.faults()]
 
 
 @pytest.mark.parametrize("model", ["p2dx", "powerbot"])

@@ -117,8 +117,8 @@ def test_the_engine_comes_where_standard_error_is_closed() -> None:
 def test_a_missing_engine_is_named_with_the_way_to_get_it() -> None:
     cases = [("bullet", "pybullet"), ("mujoco", "mujoco")]
     cases += [(body, "numpy") for body, package in ENGINES.items() if find_spec(package)]
-    told = run("-c", MISSING, *[":".join(case) for case in cases]).stdout.splitlines()
-    for (body, missing), line in zip(cases, told, strict=True):
+    reported = run("-c", MISSING, *[":".join(case) for case in cases]).stdout.splitlines()
+    for (body, missing), line in zip(cases, reported, strict=True):
         assert f"the {body} body needs {missing}" in line
         assert f"{install_command(body)}, or --body" in line
 

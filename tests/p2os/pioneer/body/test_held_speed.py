@@ -167,23 +167,23 @@ def test_mujocos_motors_hold_what_has_come_to_rest_through_a_rebuild_and_a_resto
 def test_bullets_motors_are_told_what_is_new_to_them_and_nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
     pybullet = pytest.importorskip("pybullet")
     world = parse_world('name = "empty"\nextent_m = [-4, -4, 4, 4]', "empty")
-    body, told = make_body("bullet", world, load_parameters("p2dx")), list[float]()
+    body, reported = make_body("bullet", world, load_parameters("p2dx")), list[float]()
     tell = pybullet.setJointMotorControlArray
 
     def note(*words: object, forces: list[float], **more: object) -> None:
-        told.append(forces[0])
+        reported.append(forces[0])
         tell(*words, forces=forces, **more)
 
     monkeypatch.setattr(pybullet, "setJointMotorControlArray", note)
     body.hold(0.2, 0.2, 50)
-    assert len(told) == 1
+    assert len(reported) == 1
     body.hold(0.2, 0.2, 50)
-    assert len(told) == 1
+    assert len(reported) == 1
     body.hold(0.0, 0.0, 300)
-    assert len(told) == 3, "the set-point, and that it has come to rest"
+    assert len(reported) == 3, "the set-point, and that it has come to rest"
     body.is_powered = False
     body.hold(0.0, 0.0, 10)
-    assert told[3:] == [pytest.approx(told[1] * UNPOWERED_SHARE)]
+    assert reported[3:] == [pytest.approx(reported[1] * UNPOWERED_SHARE)]
     body.is_powered = True
     body.hold(0.0, 0.0, 10)
-    assert told[4:] == [told[2]]
+    assert reported[4:] == [reported[2]]

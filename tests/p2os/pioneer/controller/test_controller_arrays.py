@@ -53,7 +53,7 @@ def test_one_array_is_switched_by_its_number_and_bit_0(make_robot: Any, array: i
     assert fired(robot) == set(range(32))
 
 
-def test_an_array_that_is_not_fitted_is_told_of_and_nothing_changes(make_robot: Any) -> None:
+def test_an_array_that_is_not_fitted_is_reported_and_nothing_changes(make_robot: Any) -> None:
     robot = make_robot(profile=Profile.ARCOS, sonar_per_sip=SonarPerSip.ALL).open()
     robot.say(C.SONAR, 4)
     assert ("no such sonar", "array 2") in [(what, detail) for _, what, detail in robot.events]

@@ -70,12 +70,12 @@ def test_a_captured_client_connects_drives_and_leaves(make_robot: MakeRobot, cap
     kinds = [frame.kind for _, frame in heard]
     assert kinds[:3] == [0, 1, 2]
     assert kinds.count(0x33) > 20, "the robot moved"
-    assert "watchdog expired" not in robot.told(), "what it says keeps the robot awake"
-    assert robot.told()[-1] == "closed"
+    assert "watchdog expired" not in robot.reported(), "what it says keeps the robot awake"
+    assert robot.reported()[-1] == "closed"
     assert robot.pioneer.state.ignored_commands == 0
     assert not robot.pioneer.state.motors_enabled
     converse(robot, [(robot.now / NS_PER_S + at, data) for at, data in captured(name)])
-    assert robot.told().count("opened") == 2, "it may come again at once"
+    assert robot.reported().count("opened") == 2, "it may come again at once"
 
 
 @pytest.mark.parametrize("name", ONE_PACKET_A_COMMAND)
@@ -118,7 +118,7 @@ def test_aria_with_a_gyro_is_silent_for_three_seconds_and_drives_after_them(
     """It waits for the gyro to settle and says nothing meanwhile: the watchdog bites, and lets go again."""
     robot = make_robot(model="p3dx", profile=Profile.ARCOS)
     heard = converse(robot, captured("aria_p3dx_gyro"))
-    told = robot.told()
-    assert told.index("watchdog expired") < told.index("watchdog revived") < told.index("motors")
+    reported = robot.reported()
+    assert reported.index("watchdog expired") < reported.index("watchdog revived") < reported.index("motors")
     assert sum(frame.kind == 0x98 for _, frame in heard) > 40, "gyro packets while it waits"
     assert any(frame.kind == 0x33 for _, frame in heard)

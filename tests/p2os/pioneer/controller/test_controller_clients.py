@@ -52,9 +52,9 @@ def test_aria_connects_drives_and_leaves(make_robot: MakeRobot, aria: Capture) -
     assert kinds[:4] == [0, 1, 2, 0x20], "each sync and CONFIG are answered at once"
     assert kinds.count(0x32) > 10
     assert kinds.count(0x33) > 100, "the robot moved"
-    assert robot.told()[0] == "synchronised"
-    assert robot.told()[-1] == "closed"
-    assert "watchdog expired" not in robot.told(), "whatever ARIA sends feeds the watchdog"
+    assert robot.reported()[0] == "synchronised"
+    assert robot.reported()[-1] == "closed"
+    assert "watchdog expired" not in robot.reported(), "whatever ARIA sends feeds the watchdog"
     ignored = {detail for _, what, detail in robot.events if what == "command ignored"}
     assert ignored == {"BATTERYINFO: unknown"}
     assert not robot.pioneer.state.motors_enabled
@@ -196,7 +196,7 @@ def test_a_client_that_finds_the_robot_streaming_stops_it_first(make_robot: Make
     couple.run(1500)
     assert couple.client.state is ConnectionState.OPEN
     assert couple.robot.body.state.left_speed_mps == 0
-    assert couple.robot.told().count("opened") == 2
+    assert couple.robot.reported().count("opened") == 2
 
 
 class Machine(RuleBasedStateMachine):

@@ -31,8 +31,8 @@ def an_argument(row: CommandRow) -> int | bytes | None:
     return min(max(1, least), most)
 
 
-def told(robot: Any, what: str) -> list[str]:
-    return [detail for _, told, detail in robot.events if told == what]
+def reported(robot: Any, what: str) -> list[str]:
+    return [detail for _, reported, detail in robot.events if reported == what]
 
 
 @each_row("row", ROWS, ids=lambda row: row.name)
@@ -42,7 +42,7 @@ def test_a_command_is_obeyed_by_the_families_whose_manual_lists_it(
     robot = make_robot(profile=profile).open()
     robot.say(row.number, an_argument(row))
     robot.run(300)
-    is_ignored = f"{row.name}: unknown" in told(robot, "command ignored")
+    is_ignored = f"{row.name}: unknown" in reported(robot, "command ignored")
     if row.is_known_to(profile) is False:
         assert is_ignored
     elif row.number in HANDLERS or row.number is C.CLOSE:
@@ -55,7 +55,7 @@ def test_a_command_is_obeyed_by_the_families_whose_manual_lists_it(
 def test_a_lenient_robot_obeys_whatever_any_family_knows(make_robot: MakeRobot, row: CommandRow) -> None:
     robot = make_robot(lenient=True).open()
     robot.say(row.number, an_argument(row))
-    assert (f"{row.name}: unknown" in told(robot, "command ignored")) is (row.number in PAST_HANDLERS)
+    assert (f"{row.name}: unknown" in reported(robot, "command ignored")) is (row.number in PAST_HANDLERS)
 
 
 def test_what_has_no_handler_is_of_no_family_of_pioneers() -> None:
@@ -86,7 +86,7 @@ def test_a_command_without_its_argument_has_no_effect(make_robot: MakeRobot, row
     robot = make_robot(lenient=True).open()
     before = context_of(robot.pioneer)
     robot.say(row.number)
-    if f"{row.name}: {'malformed'}" in told(robot, "command ignored"):
+    if f"{row.name}: {'malformed'}" in reported(robot, "command ignored"):
         assert context_of(robot.pioneer) == before
 
 
@@ -101,7 +101,7 @@ def test_a_handler_takes_each_argument_that_its_description_names(make_robot: Ma
             value = b"\x01" * max(least, min(2, most))
         robot = make_robot(lenient=True).open()
         robot.say(row.number, value)
-        assert f"{row.name}: malformed" not in told(robot, "command ignored"), kind
+        assert f"{row.name}: malformed" not in reported(robot, "command ignored"), kind
 
 
 EXTRAS = [

@@ -40,7 +40,7 @@ def test_every_fault_can_be_said_read_back_and_cleared(robot: Any, name: str) ->
     assert read_fault(fault.text, sonar=8) == fault
     robot.open()
     robot.pioneer.do(f"fault {words_of(name)}", robot.now)
-    assert "fault" in robot.told()
+    assert "fault" in robot.reported()
     if name in MOMENTARY:
         with pytest.raises(UsageError, match="nothing to clear"):
             robot.pioneer.do(f"clear {name}", robot.now)
@@ -124,11 +124,11 @@ def test_wheels_of_another_size_and_drift_show_in_the_odometry_alone(make_robot:
 
 def test_the_battery_drains_sags_and_is_reported_low(make_robot: MakeRobot) -> None:
     robot = make_robot(battery_decivolts=112, errors=REALISTIC).open()
-    assert "battery low" not in robot.told()
+    assert "battery low" not in robot.reported()
     robot.say(C.VEL, 500)
     robot.run(1900)
     assert robot.pioneer.state.battery_v < 11.0, "sags under load"
-    assert "battery low" in robot.told()
+    assert "battery low" in robot.reported()
     robot.pioneer.do("fault low-battery 9.5", robot.now)
     assert robot.sip().raw_battery == 95
 
@@ -141,7 +141,7 @@ def test_a_stop_button_takes_the_power_until_enable(robot: Any) -> None:
     assert robot.pioneer.state.left_setpoint_mps == 0
     robot.say(C.ENABLE, 1)
     assert not robot.pioneer.state.motors_enabled
-    assert "motors stay off" in robot.told()
+    assert "motors stay off" in robot.reported()
     robot.pioneer.do("clear stop-button", robot.now)
     assert not robot.pioneer.state.motors_enabled
     robot.say(C.ENABLE, 1)
@@ -197,7 +197,7 @@ def test_a_flash_file_sets_what_config_reports_and_the_robot_does(make_robot: Ma
     robot.run(400)
     assert len(robot.sips()) == 8
     robot.run(1000)
-    assert "watchdog expired" in robot.told()
+    assert "watchdog expired" in robot.reported()
     robot.say(C.CONFIG)
     from p2os.protocol.config_packet import ConfigPacket
 

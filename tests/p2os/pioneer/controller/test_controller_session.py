@@ -50,7 +50,7 @@ def test_packets_flow_every_cycle_from_open(robot: Any, argument: int | None) ->
     assert len(robot.sips()) == 1
     robot.run(900)
     assert len(robot.sips()) == 9
-    assert robot.told() == ["synchronised", "opened"]
+    assert robot.reported() == ["synchronised", "opened"]
 
 
 def test_motors_are_off_on_a_new_connection_and_who_drives_is_notified(robot: Any) -> None:
@@ -103,7 +103,7 @@ def test_closing_stops_the_robot_and_its_packets(robot: Any) -> None:
     assert robot.pioneer.next_deadline() is None
     robot.run(1000)
     assert robot.frames() == []
-    assert robot.told()[-1] == "closed"
+    assert robot.reported()[-1] == "closed"
 
 
 def test_what_a_client_has_set_is_lost_when_it_closes(robot: Any) -> None:
@@ -134,7 +134,7 @@ def test_opening_twice_changes_nothing(robot: Any) -> None:
     robot.say(C.OPEN, 1)
     assert robot.pioneer.next_deadline() == 100 * NS_PER_MS
     assert robot.pioneer.state.motors_enabled
-    assert robot.told().count("opened") == 1
+    assert robot.reported().count("opened") == 1
     assert robot.pioneer.state.ignored_commands == 0
 
 
@@ -145,7 +145,7 @@ def test_the_watchdog_stops_the_robot_after_two_silent_seconds_and_the_next_fram
     robot.open()
     robot.say(C.VEL, 300)
     robot.run(2000 - 0.000001)
-    assert "watchdog expired" not in robot.told()
+    assert "watchdog expired" not in robot.reported()
     assert robot.body.state.left_speed_mps == 0.3
     robot.run(0.000001)
     assert robot.events[-1][:2] == (2 * NS_PER_S, "watchdog expired")
@@ -161,7 +161,7 @@ def test_the_watchdog_stops_the_robot_after_two_silent_seconds_and_the_next_fram
     robot.say(C.PULSE)
     robot.run(1000)
     assert robot.body.state.left_speed_mps == 0.3
-    assert robot.told()[-1] == "watchdog revived"
+    assert robot.reported()[-1] == "watchdog revived"
     assert not robot.pioneer.state.watchdog_expired
 
 
@@ -183,12 +183,12 @@ def test_any_frame_feeds_the_watchdog_and_noise_does_not(robot: Any) -> None:
     for _ in range(5):
         robot.run(1900)
         robot.say(200)  # a command that nobody knows
-    assert "watchdog expired" not in robot.told()
+    assert "watchdog expired" not in robot.reported()
     robot.run(1000)
     robot.send(b"\xfa\xfb\x06\x0b\x3b\xc8\x00\xd3\x00")  # a bad checksum
     robot.send(b"WMS2\r")
     robot.run(1000)
-    assert "watchdog expired" in robot.told()
+    assert "watchdog expired" in robot.reported()
 
 
 # Odd but legal clients -------------------------------------------------------------------
@@ -263,7 +263,7 @@ def test_a_hang_up_stops_at_once_and_frees_the_robot(robot: Any) -> None:
     assert robot.sip().kind == STANDING
     robot.say(C.CLOSE)
     robot.pioneer.hang_up(robot.now)
-    assert robot.told().count("closed") == 2, "nothing more to close"
+    assert robot.reported().count("closed") == 2, "nothing more to close"
 
 
 # Time and saving -------------------------------------------------------------------------
@@ -305,7 +305,7 @@ def test_results_do_not_depend_on_the_slices(make_robot: MakeRobot, slice_ns: in
     assert play(sliced, slice_ns) == play(reference, 10 * NS_PER_MS)
     assert sliced.body.state == reference.body.state
     assert sliced.events == reference.events
-    assert {"watchdog expired", "watchdog revived"} <= set(sliced.told())
+    assert {"watchdog expired", "watchdog revived"} <= set(sliced.reported())
     assert sliced.pioneer.snapshot() == reference.pioneer.snapshot()
 
 

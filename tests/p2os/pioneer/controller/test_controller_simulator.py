@@ -162,7 +162,7 @@ def test_without_a_laser_the_old_numbers_keep_their_meaning(make_robot: MakeRobo
     robot.say(C.ADSEL, 2)
     robot.say(C.SIM_LRF_ENABLE, 1)
     assert robot.sip().analog_port == 2
-    assert "no laser" in robot.told()
+    assert "no laser" in robot.reported()
     assert lasers(robot) == []
 
 

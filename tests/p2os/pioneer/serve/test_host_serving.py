@@ -109,7 +109,7 @@ def test_a_client_opens_drives_and_leaves(served: Served) -> None:
     caller.say(C.CLOSE)
     caller.close()
     served.wait_for("client gone")
-    assert served.robot.told() == ["synchronised", "opened", "motors", "closed"]
+    assert served.robot.reported() == ["synchronised", "opened", "motors", "closed"]
 
 
 def test_a_client_that_vanishes_stops_the_robot_and_the_next_is_served(served: Served) -> None:
@@ -175,7 +175,7 @@ def test_a_captured_client_is_served(served: Served, name: str, request: pytest.
     caller.receive(lambda frame: frame.kind == 0x33)
     caller.close()
     served.wait_for("client gone")
-    assert "opened" in served.robot.told()
+    assert "opened" in served.robot.reported()
 
 
 def test_a_second_tcp_client_is_refused_aloud(make_robot: Callable[..., Any]) -> None:

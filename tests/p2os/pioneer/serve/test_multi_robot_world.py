@@ -219,19 +219,19 @@ def test_a_ping_that_is_under_way_is_saved_with_the_world() -> None:
 def test_what_is_due_happens_in_the_order_of_the_times_and_of_the_robots() -> None:
     made = multi_robot_world(FACING)
     due = {0: [700, 900], 1: [300, 900, 1_001]}
-    told: list[tuple[int, int]] = []
+    reported: list[tuple[int, int]] = []
     for member in made.members:
 
         def act(limit: int, number: int = member.number) -> None:
-            told.append((limit, number))
+            reported.append((limit, number))
             due[number].remove(limit)
 
         member.advance_to = act
         member.next_due = lambda number=member.number: min(due[number], default=None)  # type: ignore[misc]
     made.advance_to(1_000)
-    assert told == [(300, 1), (700, 0), (900, 0), (900, 1)]
+    assert reported == [(300, 1), (700, 0), (900, 0), (900, 1)]
     made.advance_to(1_001)
-    assert told[4:] == [(1_001, 1)]
+    assert reported[4:] == [(1_001, 1)]
 
 
 def test_a_reset_or_a_reboot_of_one_leaves_the_others_and_its_own_body_standing() -> None:

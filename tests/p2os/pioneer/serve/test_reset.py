@@ -96,7 +96,7 @@ def test_a_controller_that_starts_over_is_as_one_that_was_switched_on(make_robot
     assert robot.frames() == []
     assert robot.pioneer.state == new.pioneer.state
     assert robot.body.state == new.body.state
-    assert "started over" in robot.told()
+    assert "started over" in robot.reported()
     robot.say(0)
     robot.run(BOOT_NS / NS_PER_MS - 1)
     assert robot.frames() == [], "it receives nothing while it boots"

@@ -124,8 +124,8 @@ def test_outside_and_missing_are_answered_alike(folder: Path) -> None:
     fleet = Fleet(folder)
     fleet.say(0, C.LOADWORLD, b"../secret.toml")
     fleet.say(0, C.LOADWORLD, b"../nothing.toml")
-    told = [detail for what, detail in fleet.events if what == "world stays"]
-    assert told[0].replace("secret", "nothing") == told[1]
+    reported = [detail for what, detail in fleet.events if what == "world stays"]
+    assert reported[0].replace("secret", "nothing") == reported[1]
 
 
 def test_without_a_folder_only_what_ships_is_loaded(folder: Path) -> None:
@@ -195,15 +195,15 @@ def test_a_client_cannot_reset_its_robot_into_another_one(body: str, command: in
         body=body,
     )  # fmt: skip
     made = make_fleet(order)
-    told: list[tuple[str, str]] = []
-    made.robots[0].on_event = lambda _now, what, detail: told.append((what, detail))
+    reported: list[tuple[str, str]] = []
+    made.robots[0].on_event = lambda _now, what, detail: reported.append((what, detail))
     for number in (C.PULSE, C.OPEN, C.CLOSE, C.OPEN):
         made.robots[0].receive(Command(number).to_frame().to_bytes(), 0)
     made.robots[0].body.stand_at(-1.5, 0.0, 0.0)
     made.robots[1].body.stand_at(0.1, 0.0, 0.0)
     made.robots[0].receive(Command(command, 1).to_frame().to_bytes(), 0)
     assert place(made.robots[0]) == (-1.5, 0.0)
-    assert ("not reset", "robot 2 stands where this robot starts") in told
+    assert ("not reset", "robot 2 stands where this robot starts") in reported
     made.robots[1].body.stand_at(0.0, 1.5, 0.0)
     made.robots[0].receive(Command(command, 1).to_frame().to_bytes(), 0)
     assert place(made.robots[0]) == (0.0, 0.0)

@@ -197,7 +197,7 @@ def _here(job: Callable[..., dict[str, object]], count: int, on_done: Callable[[
     return True
 
 
-def told_of(planted: Planted, experiments: Sequence[str]) -> dict[str, list[str]]:
+def figures_that_report(planted: Planted, experiments: Sequence[str]) -> dict[str, list[str]]:
     """Return which figures of which experiments tell of an error, found in a process of its own."""
     words = [planted.path, planted.old, planted.new, *planted.variant, *experiments]
     # A module is replaced before it is imported; a forked Python has imported it.
@@ -229,16 +229,18 @@ def main() -> int:
     if asked.file:
         ways = (FIRMWARE,) if asked.file.startswith("adapter_fw/") else (MODEL, DIRECT)
         for way in ways:
-            for name, figures in told_of(Planted("", asked.file, asked.old, asked.new, "", "", way), []).items():
+            for name, figures in figures_that_report(
+                Planted("", asked.file, asked.old, asked.new, "", "", way), []
+            ).items():
                 print(f"{' '.join(way):17} {name:16} {'; '.join(figures)}")  # noqa: T201
         return 0
     missed = 0
     for number, row in enumerate(PLANTED, start=1):
         if asked.row and number not in asked.row:
             continue
-        figures = told_of(row, [row.experiment])[row.experiment]
+        figures = figures_that_report(row, [row.experiment])[row.experiment]
         missed += row.figure not in figures
-        verdict = "told" if row.figure in figures else "NOT TOLD"
+        verdict = "noticed" if row.figure in figures else "NOT NOTICED"
         print(f"{number:3} {verdict:9} {row.error}: {row.experiment}: {'; '.join(figures)}", flush=True)  # noqa: T201
     return 1 if missed else 0
 

@@ -3,7 +3,7 @@
 import pytest
 
 from robot_bench.experiments.validation.experiments import EXPERIMENTS
-from tests.robot_bench.experiments.validation.planted_errors import PLANTED, Planted, changed, told_of
+from tests.robot_bench.experiments.validation.planted_errors import PLANTED, Planted, changed, figures_that_report
 
 #: One of each language in every run, that whose compiler takes long beside the slow ones; the others in `make soak`.
 MARKS = {"motor value without a sign": [pytest.mark.slow], "ranges 2 % long": [], "tick 1 % slow": []}
@@ -20,8 +20,8 @@ def test_every_planted_error_is_an_edit_of_its_file_as_it_stands() -> None:
     "planted",
     [pytest.param(row, marks=MARKS.get(row.error, [pytest.mark.soak]), id=row.error) for row in PLANTED],
 )
-def test_an_error_in_the_sources_is_told_by_the_right_figure(planted: Planted) -> None:
-    assert planted.figure in told_of(planted, [planted.experiment])[planted.experiment]
+def test_an_error_in_the_sources_is_reported_by_the_right_figure(planted: Planted) -> None:
+    assert planted.figure in figures_that_report(planted, [planted.experiment])[planted.experiment]
 
 
 @pytest.mark.parametrize(
@@ -31,6 +31,6 @@ def test_an_error_in_the_sources_is_told_by_the_right_figure(planted: Planted) -
         pytest.param("robot_bench/firmware/tick.c", "HCLK_HZ", "motors", id="C"),
     ],
 )
-def test_nothing_planted_is_told_by_nothing(path: str, text: str, experiment: str) -> None:
+def test_nothing_planted_is_reported_by_nothing(path: str, text: str, experiment: str) -> None:
     nothing = Planted("none", path, text, text, "", "", ("adapter", "model"))
-    assert told_of(nothing, [experiment]) == {experiment: []}
+    assert figures_that_report(nothing, [experiment]) == {experiment: []}

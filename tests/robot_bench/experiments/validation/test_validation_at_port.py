@@ -16,7 +16,7 @@ from p2os.cli.main import run as p2os
 from robot_bench.cli import run as driving
 from robot_bench.experiments.validation.experiments import EXPERIMENTS, AtPort
 from robot_bench.experiments.validation.figures import LOOSE_BECAUSE, Missing, loose
-from robot_bench.experiments.validation.trials import TrialResult, longest_s, port_runs, told
+from robot_bench.experiments.validation.trials import TrialResult, longest_s, port_runs, reported
 from robot_bench.run import run_at_port
 from tests.robot_bench.experiments.validation.virtual_port import FILES, GATE, at_port, virtual_line
 from tests.tools.forked_python import forked_p2os
@@ -39,7 +39,7 @@ def failing(found: list[TrialResult]) -> set[str]:
 @pytest.mark.slow  # all pairs of codes; `failing_of_itself` is what a few of them show
 def test_motors_codes_and_encoders_hold_at_a_port(tmp_path: Path) -> None:
     found = at_port(ROUND, tmp_path / "v", world=PLAIN)
-    assert [line for result in found for line in told(result)] == []
+    assert [line for result in found for line in reported(result)] == []
     assert [result.experiment for result in found] == ROUND
     assert sorted(path.name for path in (tmp_path / "v").iterdir()) == ["codes", "motors"]  # one run for two
     assert set(loose(one for result in found for one in result.findings)) <= set(LOOSE_BECAUSE)
@@ -49,13 +49,13 @@ def test_a_robot_drives_through_a_gate_and_stops_and_its_pins_say_what_its_packe
     gate: Path, tmp_path: Path
 ) -> None:
     found = at_port(["sensors", "only-while-seen"], tmp_path / "v", world=gate, duration_s=30.0)  # it stands by then
-    assert [line for result in found for line in told(result)] == []
+    assert [line for result in found for line in reported(result)] == []
     assert set(loose(one for result in found for one in result.findings)) <= set(LOOSE_BECAUSE)
 
 
 @pytest.mark.slow
 def test_a_drive_without_a_stall_holds_and_with_one_does_not(tmp_path: Path) -> None:
-    assert told(at_port(["dodge"], tmp_path / "v", world="arena", duration_s=20.0)[0]) == []
+    assert reported(at_port(["dodge"], tmp_path / "v", world="arena", duration_s=20.0)[0]) == []
     blocked = at_port(["dodge"], tmp_path / "w", world="arena", faults=("wheel-blocked left",), duration_s=8.0)
     assert "packets with a stall" in failing(blocked)
 
@@ -86,14 +86,16 @@ def failing_of_itself(tmp_path_factory: pytest.TempPathFactory) -> set[str]:
 
 
 @pytest.mark.parametrize("wrong", [swapped, other_way, wider], ids=["swapped", "sign", "scale 2 %"])
-def test_encoders_that_are_wrong_are_told_by_what_the_packets_tell(
+def test_encoders_that_are_wrong_are_reported_by_what_the_packets_tell(
     wrong: object, failing_of_itself: set[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(Encoders, "counts", property(wrong))  # type: ignore[arg-type]  # of this class
     assert short_failing(tmp_path / "v") - failing_of_itself == {"encoder code against the packets' odometry"}
 
 
-def test_a_pin_that_comes_a_packet_late_is_told(gate: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_pin_that_comes_a_packet_late_is_reported(
+    gate: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     take, late = Distances.take, dict[int, int]()
 
     def take_late(self: Distances, number: int, range_um: int, now: int) -> None:
@@ -105,7 +107,7 @@ def test_a_pin_that_comes_a_packet_late_is_told(gate: Path, tmp_path: Path, monk
     assert "readings in packets that stand on their pins" in failing(found)
 
 
-def test_a_sonar_that_never_sees_is_told(gate: Path, tmp_path: Path) -> None:
+def test_a_sonar_that_never_sees_is_reported(gate: Path, tmp_path: Path) -> None:
     (found,) = at_port(["sensors"], tmp_path / "v", world=gate, faults=("sonar-stuck 3 4.0",), duration_s=15.0)
     (failure,) = found.failures
     assert not isinstance(failure, Missing)
@@ -120,7 +122,7 @@ def test_a_run_that_shows_nothing_is_missing_with_its_reason(
     faults: tuple[str, ...], lasts_s: float, why: str, tmp_path: Path
 ) -> None:
     (found,) = at_port(["motors"], tmp_path / "v", world=PLAIN, faults=faults, lasts_s=lasts_s)
-    (line,) = told(found)
+    (line,) = reported(found)
     assert line.startswith("motors: the run: ")
     assert why in line
 

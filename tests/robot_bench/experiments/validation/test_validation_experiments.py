@@ -14,7 +14,7 @@ from p2os.cli.main import run as p2os
 from robot_bench.events.codec import Json
 from robot_bench.experiments.validation.experiments import CODES, EXPERIMENTS, MOTORS
 from robot_bench.experiments.validation.figures import LOOSE_BECAUSE, Figure, loose
-from robot_bench.experiments.validation.trials import TrialResult, Variant, run_trials, told, variants
+from robot_bench.experiments.validation.trials import TrialResult, Variant, reported, run_trials, variants
 from robot_bench.report.make import Files
 from robot_bench.scenario.included_files import Setting
 
@@ -55,7 +55,7 @@ def passing_long(passing: list[TrialResult], tmp_path_factory: pytest.TempPathFa
 
 def all_hold(found: list[TrialResult], names: set[str]) -> None:
     """See that experiments have passed in both modes, or in the one that they have."""
-    assert [line for result in found for line in told(result)] == []
+    assert [line for result in found for line in reported(result)] == []
     ways = {(name, mode) for name in names for mode in EXPERIMENTS[name].modes or ("direct", "adapter")}
     assert sorted((result.experiment, result.variant.mode) for result in found) == sorted(ways)
     assert all(result.passed and not result.folder for result in found)
@@ -134,7 +134,7 @@ SHORT_S = {"encoders": 20.0, "motors": 13.0, "sensors-all": 10.0, "only-while-se
 @pytest.mark.parametrize(
     ("name", "variant", "setting", "what"), PLANTED, ids=[f"{row[0]}-{row[2][0]}-{row[2][1]}" for row in PLANTED]
 )
-def test_a_planted_error_is_told_by_the_right_figure(
+def test_a_planted_error_is_reported_by_the_right_figure(
     name: str, variant: Variant, setting: Setting, what: str, tmp_path: Path
 ) -> None:
     short = [("duration_s", SHORT_S[name])] if name in SHORT_S else []
@@ -161,7 +161,7 @@ PLANTED_PARTS = [
 
 
 @pytest.mark.parametrize(("name", "part", "wrong", "what"), PLANTED_PARTS, ids=["threshold", "sampler"])
-def test_a_part_of_the_adapter_that_is_a_little_off_is_told(
+def test_a_part_of_the_adapter_that_is_a_little_off_is_reported(
     name: str, part: str, wrong: object, what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(part, wrong)
@@ -170,11 +170,11 @@ def test_a_part_of_the_adapter_that_is_a_little_off_is_told(
 
 
 @pytest.mark.slow
-def test_more_than_half_a_turn_between_two_samples_is_followed_and_jumps_of_the_codes_are_told(
+def test_more_than_half_a_turn_between_two_samples_is_followed_and_jumps_of_the_codes_are_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     found = results_of(["sparse"], [DIRECT, ADAPTER], tmp_path)
-    assert [line for result in found for line in told(result)] == []
+    assert [line for result in found for line in reported(result)] == []
     assert loose(one for result in found for one in result.findings) == {}
     late = results_of(["sparse"], [DIRECT], tmp_path, [("direct.encoder_period_ms", 300)])
     assert "encoder code against the wheel's angle" in {failure.what for failure in late[0].failures}
@@ -191,13 +191,13 @@ def test_more_than_half_a_turn_between_two_samples_is_followed_and_jumps_of_the_
 @pytest.mark.parametrize("names", [["motors"], pytest.param(["sensors-all", "slip"], marks=pytest.mark.soak)])
 def test_the_physical_body_holds_too(names: list[str], tmp_path: Path) -> None:
     found = results_of(names, [Variant("adapter", "firmware", "bullet")], tmp_path)
-    assert [line for result in found for line in told(result)] == []
+    assert [line for result in found for line in reported(result)] == []
 
 
 @pytest.mark.soak
 def test_every_experiment_holds_in_every_variant(tmp_path: Path) -> None:
     found = results_of(list(EXPERIMENTS), variants(), tmp_path)
-    assert [line for result in found for line in told(result)] == []
+    assert [line for result in found for line in reported(result)] == []
 
 
 def test_the_command_passes_and_writes_page_and_figures(

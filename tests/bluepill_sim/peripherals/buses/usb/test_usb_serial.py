@@ -37,7 +37,7 @@ def test_what_is_sent_to_a_device_that_goes_is_lost(boards: Boards) -> None:
         board.usb_serial.expect(b"")
 
 
-def test_what_is_not_sent_is_told_with_the_state_at_the_end_of_the_wait(boards: Boards) -> None:
+def test_what_is_not_sent_is_reported_with_the_state_at_the_end_of_the_wait(boards: Boards) -> None:
     board = boards()
     board.usb.plug()
     with pytest.raises(WaitError, match="it sent b''; 1209:0001"):

@@ -27,7 +27,7 @@ RIM = st.sampled_from([0.0, 0.0, 0.3, -0.2, 0.5])
 LEGS = st.lists(st.tuples(RIM, RIM, st.integers(1, 700), st.booleans()), min_size=1, max_size=6)
 
 
-def told(body) -> tuple[object, ...]:
+def reported(body) -> tuple[object, ...]:
     return body.state, body.ranges(range(8)), body.take_hits(), body.take_moved(), body.clearance()
 
 
@@ -44,17 +44,17 @@ def test_a_body_behind_the_protocol_is_the_body_itself(legs) -> None:
                 for _ in range(steps):
                     wheels = body.step(left, right)
             if looks:
-                assert told(bodies[0]) == told(bodies[1])
+                assert reported(bodies[0]) == reported(bodies[1])
                 assert wheels.left_angle_rad == bodies[0].state.left_angle_rad
         for body in bodies:
             body.move("cart", 2.0, 1.0, 0.5)
             body.put_back()
-        assert told(bodies[0]) == told(bodies[1])
+        assert reported(bodies[0]) == reported(bodies[1])
         for body in bodies:
             body.remove("cart")
             body.stand_at(0.5, 0.5, 1.0)
             body.step(0.2, 0.1)
-        assert told(bodies[0]) == told(bodies[1])
+        assert reported(bodies[0]) == reported(bodies[1])
         assert bodies[0].scan(FAN, 8.0) == bodies[1].scan(FAN, 8.0)
 
 
@@ -97,18 +97,18 @@ def test_a_state_that_is_put_back_in_another_connection_goes_on_alike() -> None:
             for _ in range(3000):
                 body.step(0.4, 0.4)
         assert one.state.collisions == 1
-        assert told(one) == told(other)
+        assert reported(one) == reported(other)
 
 
 def test_what_it_cannot_is_said_in_one_line() -> None:
     with served(abilities=Ability(0)) as (address, _):
         body = make_body(address, ROOM, P2DX)
-        for deed in (body.snapshot, lambda: body.restore(None)):
+        for call in (body.snapshot, lambda: body.restore(None)):
             with pytest.raises(UsageError, match=r"kinematic, served at unix:\S+ cannot save its state"):
-                deed()
-        for deed in (lambda: body.echoes([0]), lambda: body.scan(FAN, 1.0)):
+                call()
+        for call in (lambda: body.echoes([0]), lambda: body.scan(FAN, 1.0)):
             with pytest.raises(UsageError, match="casts no rays"):
-                deed()
+                call()
         assert body.steps_within(1.0, 1.0) == 0
         assert body.state == make_body("kinematic", ROOM, P2DX).state
         with pytest.raises(UsageError, match="one robot, not 2"):
@@ -280,4 +280,4 @@ def test_a_reset_begins_in_the_world_as_it_was_made() -> None:
         body.step(0.3, 0.3)
         pose = Pose(0.2, 0.1, 0.3)
         assert body.reset(pose, 5) == exact.reset(pose, 5)
-        assert told(body) == told(exact)
+        assert reported(body) == reported(exact)

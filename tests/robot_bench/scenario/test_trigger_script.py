@@ -11,7 +11,7 @@ from p2os.errors import ScenarioError
 from p2os.robots.parameters import load_parameters
 from robot_bench.bench import Bench
 from robot_bench.events.kinds import Fault, PinEdge, WorldChange
-from robot_bench.scenario.when_script import load_whens
+from robot_bench.scenario.trigger_script import load_triggers
 from tests.robot_bench.test_bench import MS, S, bench, scenario
 
 P2DX = load_parameters("p2dx")
@@ -19,11 +19,11 @@ POST = {"name": "post", "shape": "cylinder", "radius_m": 0.05, "height_m": 0.5}
 
 
 def made(*tables: dict[str, Any], mode: str = "adapter", slice_ns: int = MS) -> Bench:
-    whens = load_whens(tables, P2DX, "x.toml")
-    return bench(replace(scenario(mode), whens=whens), slice_ns)
+    triggers = load_triggers(tables, P2DX, "x.toml")
+    return bench(replace(scenario(mode), triggers=triggers), slice_ns)
 
 
-def told(one: Bench, kind: type) -> list[tuple[int, str]]:
+def reported(one: Bench, kind: type) -> list[tuple[int, str]]:
     found: list[tuple[int, str]] = []
     one.events.subscribe(lambda event: found.append((event.t, event.op)), kind)
     one.run_until("3 s")
@@ -35,7 +35,7 @@ def told(one: Bench, kind: type) -> list[tuple[int, str]]:
 def test_a_thing_is_placed_and_held_after_an_edge(after_s: float, at: int) -> None:
     table = {"event": "pin PB7 high", "do": "place", "after_s": after_s, **POST, "before_sonar": 2, "distance_m": 0.4,
              "hold_s": 0.1}  # fmt: skip
-    assert told(made(table), WorldChange) == [(at, "place"), (at + 50 * MS, "move"), (at + 100 * MS, "remove")]
+    assert reported(made(table), WorldChange) == [(at, "place"), (at + 50 * MS, "move"), (at + 100 * MS, "remove")]
 
 
 @pytest.mark.parametrize(("every", "times"), [(False, 1), (True, 2)])
@@ -43,13 +43,13 @@ def test_it_is_done_once_or_each_time(every: bool, times: int) -> None:
     # PB7 rises at 1 s and falls at 2 s; the level that it begins with is no change.
     table = {"event": "pin PB7 changes", "do": "inject", "fault": "sonar-dead 1", "every": every}
     other = {"event": "pin PB6 changes", "do": "clear", "fault": "sonar-dead 1", "every": every}
-    found = told(made(table, other), Fault)
+    found = reported(made(table, other), Fault)
     assert [row for row in found if row[1] == "inject"] == [(1050 * MS, "inject"), (2050 * MS, "inject")][:times]
 
 
 def test_a_fault_is_cleared_again() -> None:
     table = {"event": "usart1 sends hello", "do": "inject", "fault": "link-down", "for_s": 0.5}
-    assert told(made(table), Fault) == [(550 * MS, "inject"), (1050 * MS, "clear")]
+    assert reported(made(table), Fault) == [(550 * MS, "inject"), (1050 * MS, "clear")]
 
 
 def test_an_event_may_end_the_run_and_the_slices_change_nothing() -> None:
@@ -69,9 +69,9 @@ def test_an_event_may_end_the_run_and_the_slices_change_nothing() -> None:
     [(0, 1050 * MS), (50 * MS - 1, 1050 * MS), (50 * MS, 1050 * MS), (50 * MS + 1, 1050 * MS + 1),
      (123_456_789, S + 123_456_789)],
 )  # fmt: skip
-def test_what_is_due_after_its_event_is_told_is_done_to_the_nanosecond(after_ns: int, at: int) -> None:
+def test_what_is_due_after_its_event_is_reported_is_done_to_the_nanosecond(after_ns: int, at: int) -> None:
     tables = [{"event": "pin PB7 high", "do": "inject", "fault": "sonar-dead 1", "after_s": after_ns / S}]
-    assert told(made(*tables), Fault) == [(at, "inject")]
+    assert reported(made(*tables), Fault) == [(at, "inject")]
 
 
 @pytest.mark.parametrize(("after_ns", "at"), [(50 * MS, 1050 * MS), (50 * MS + 1, 1050 * MS + 1), (S, 2 * S)])
@@ -82,7 +82,7 @@ def test_a_run_ends_so_long_after_the_event(after_ns: int, at: int) -> None:
     assert 0 <= one.finish() - at < 1000  # a block of the program
 
 
-def test_a_bench_saved_between_event_and_deed_goes_on_alike() -> None:
+def test_a_bench_saved_between_event_and_action_goes_on_alike() -> None:
     table = {"event": "usart1 sends hello", "do": "inject", "fault": "sonar-dead 2", "after_s": 0.5}
     whole, first, second = made(table), made(table), made(table)
     first.run_until("0.7 s")
@@ -108,16 +108,16 @@ def test_a_bench_saved_between_event_and_deed_goes_on_alike() -> None:
 )
 def test_a_wrong_table_is_refused_with_its_place(table: dict[str, Any], says: str) -> None:
     with pytest.raises(ScenarioError, match=says) as refused:
-        load_whens([table], P2DX, "x.toml")
+        load_triggers([table], P2DX, "x.toml")
     assert "x.toml: [[when]] 1" in str(refused.value)
 
 
 @pytest.mark.parametrize("chain", ["aa", "ab ba", "ab bc ca", "xa ab ba"])
-def test_whens_that_wait_for_each_other_are_refused(chain: str) -> None:
+def test_triggers_that_wait_for_each_other_are_refused(chain: str) -> None:
     rows = [chain] if len(chain) == 2 else chain.split()
     tables = [{"id": row[0], "after": row[1], "event": "time 1", "do": "end"} for row in rows]
     with pytest.raises(ScenarioError, match="in turn: neither happens"):
-        load_whens(tables, P2DX, "x.toml")
+        load_triggers(tables, P2DX, "x.toml")
 
 
 def test_mode_a_has_no_controller_to_break() -> None:
@@ -197,7 +197,7 @@ def test_an_event_counts_only_after_that_of_another() -> None:
         {"event": "pin PB7 high", "do": "clear", "fault": "sonar-dead 1", "id": "first", "after_s": 5},
         {"event": "pin PB7 changes", "do": "inject", "fault": "sonar-dead 1", "after": "first"},
     )
-    assert [row for row in told(one, Fault) if row[1] == "inject"] == [(2050 * MS, "inject")]
+    assert [row for row in reported(one, Fault) if row[1] == "inject"] == [(2050 * MS, "inject")]
 
 
 @pytest.mark.parametrize(
@@ -212,4 +212,4 @@ def test_an_event_counts_only_after_that_of_another() -> None:
 )
 def test_what_cannot_be_done_is_refused(table: dict[str, Any], words: str) -> None:
     with pytest.raises(ScenarioError, match=words):
-        load_whens([{"event": "contact", **table}], P2DX, "x.toml")
+        load_triggers([{"event": "contact", **table}], P2DX, "x.toml")

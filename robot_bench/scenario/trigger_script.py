@@ -10,8 +10,8 @@
 
 With `after = "ID"` an event counts from when the table with `id = "ID"` has had its own.
 
-It is done `after_s` after the event, to the nanosecond. Events are told each 50 ms, at a pose: what is due before
-its event is told is done then, up to 50 ms late.
+It is done `after_s` after the event, to the nanosecond. Events are reported each 50 ms, at a pose: what is due before
+its event is reported is done then, up to 50 ms late.
 
 Invariant: when it is done depends on the events of the run alone, not on the slices of the loop.
 """
@@ -28,7 +28,7 @@ from robot_bench.events.selection import Wires, select
 from robot_bench.events.stream import EventStream
 from robot_bench.scenario import world_script
 from robot_bench.scenario.fault_script import LINK_DOWN, FaultChange, load_faults
-from robot_bench.scenario.hand_script import DEEDS, Deed, load_deeds
+from robot_bench.scenario.hand_script import ACTIONS, Action, load_actions
 from robot_bench.scenario.world_script import ScriptedChange, load_changes
 from simbase.errors import nearest, shown
 from simbase.state import Stateful
@@ -48,7 +48,7 @@ _AS_FAULTS: Mapping[str, tuple[tuple[Key, ...], Callable[[Table], str]]] = {
 _BUTTONS = ("stop-button", "bumper")
 _OWN = (
     Key(name="event", kind="text", required=True),
-    Key(name="do", kind="text", required=True, choices=(*_WORLD, *_FAULTS, *_AS_FAULTS, *DEEDS, "end")),
+    Key(name="do", kind="text", required=True, choices=(*_WORLD, *_FAULTS, *_AS_FAULTS, *ACTIONS, "end")),
     Key(name="id", kind="text"),
     Key(name="after", kind="text"),
     Key(name="after_s", kind="number", least=0, most=LONGEST_S),
@@ -60,14 +60,14 @@ _THING = tuple(key for key in world_script.KEYS if key.name not in {"at_s", "op"
 KEYS = tuple(
     {
         key.name: replace(key, required=key.required and key in _OWN)
-        for keys in (_THING, *(row[0] for row in _AS_FAULTS.values()), *DEEDS.values(), _FAULT, _OWN)
+        for keys in (_THING, *(row[0] for row in _AS_FAULTS.values()), *ACTIONS.values(), _FAULT, _OWN)
         for key in keys
     }.values()
 )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class When:
+class Trigger:
     """What is done at an event; times of changes and faults are counted from it."""
 
     event: str
@@ -77,7 +77,7 @@ class When:
     every: bool = False
     changes: tuple[ScriptedChange, ...] = ()
     faults: tuple[FaultChange, ...] = ()
-    deeds: tuple[Deed, ...] = ()
+    actions: tuple[Action, ...] = ()
     name: str = ""
     #: The name of another one whose event has to have happened; empty for none.
     after: str = ""
@@ -85,9 +85,9 @@ class When:
     wires: Wires | None = None
 
 
-def load_whens(
+def load_triggers(
     tables: Sequence[Table], parameters: RobotParameters, where: Where, wires: Wires | None = None
-) -> tuple[When, ...]:
+) -> tuple[Trigger, ...]:
     """Return what a scenario's `[[when]]` tables ask for; `wires` are those of a robot on own pins.
 
     Raises:
@@ -112,13 +112,13 @@ def load_whens(
     return found
 
 
-def _load(table: Table, parameters: RobotParameters, place: Where, wires: Wires | None) -> When:
+def _load(table: Table, parameters: RobotParameters, place: Where, wires: Wires | None) -> Trigger:
     own = {key.name for key in _OWN}
     mine, rest = ({key: value for key, value in table.items() if (key in own) is is_own} for is_own in (True, False))
     check_table(mine, _OWN, place)
     do = str(mine["do"])
     as_fault, _ = _AS_FAULTS.get(do, ((), None))
-    check_table(rest, _THING if do in _WORLD else _FAULT if do in _FAULTS else as_fault or DEEDS.get(do, ()), place)
+    check_table(rest, _THING if do in _WORLD else _FAULT if do in _FAULTS else as_fault or ACTIONS.get(do, ()), place)
     with placed(place):
         select(str(mine["event"]), wires)
     changes: tuple[ScriptedChange, ...] = ()
@@ -138,18 +138,18 @@ def _load(table: Table, parameters: RobotParameters, place: Where, wires: Wires 
     elif do == "clear":
         faults = (FaultChange(0, f"clear {rest['fault']}"),)
     after_ns = round(float(cast("float", mine.get("after_s", 0))) * NS_PER_S)
-    return When(
+    return Trigger(
         event=str(mine["event"]), do=do, after_ns=after_ns, every=bool(mine.get("every", False)),
-        changes=changes, faults=faults, deeds=load_deeds(do, rest, place, wires) if do in DEEDS else (),
+        changes=changes, faults=faults, actions=load_actions(do, rest, place, wires) if do in ACTIONS else (),
         name=str(mine.get("id", "")), after=str(mine.get("after", "")), wires=wires,
     )  # fmt: skip
 
 
-class WhenScript(Stateful):
+class TriggerScript(Stateful):
     """Does what is asked for when its event has happened.
 
     Args:
-        whens: What is asked for.
+        triggers: What is asked for.
         on_change: Takes changes of the world, with their times.
         on_fault: Takes faults, with their times.
         on_deed: Takes what a hand does, with its times.
@@ -160,32 +160,32 @@ class WhenScript(Stateful):
 
     def __init__(
         self,
-        whens: Sequence[When],
+        triggers: Sequence[Trigger],
         *,
         on_change: Callable[[Sequence[ScriptedChange]], None],
         on_fault: Callable[[Sequence[FaultChange]], None],
-        on_deed: Callable[[Sequence[Deed]], None],
+        on_action: Callable[[Sequence[Action]], None],
         on_end: Callable[[Nanos], None],
     ) -> None:
-        self._whens = tuple(whens)
-        self._selectors = [select(when.event, when.wires) for when in self._whens]
+        self._triggers = tuple(triggers)
+        self._selectors = [select(when.event, when.wires) for when in self._triggers]
         #: Which one has to have had its event, by place; None where none has.
         self._before = [
-            next((n for n, other in enumerate(self._whens) if when.after and other.name == when.after), None)
-            for when in self._whens
+            next((n for n, other in enumerate(self._triggers) if when.after and other.name == when.after), None)
+            for when in self._triggers
         ]
-        self._done = [False] * len(self._whens)
+        self._done = [False] * len(self._triggers)
         #: When each had its first event; -1: not yet.
-        self._first: list[Nanos] = [-1] * len(self._whens)
+        self._first: list[Nanos] = [-1] * len(self._triggers)
         #: Places whose event has happened in the batch that is handed on, and when.
         self._happened: list[tuple[int, Nanos]] = []
-        self._on_change, self._on_fault, self._on_deed, self._on_end = on_change, on_fault, on_deed, on_end
+        self._on_change, self._on_fault, self._on_action, self._on_end = on_change, on_fault, on_action, on_end
 
     def subscribe(self, stream: EventStream) -> None:
         """Have the events of a run looked at."""
         for place, selector in enumerate(self._selectors):
             stream.subscribe(self._watcher(place), *selector.kinds, wires=selector.wires)
-        if self._whens:
+        if self._triggers:
             stream.at_limit(self._act)
 
     def _watcher(self, place: int) -> Callable[[Event], None]:
@@ -193,7 +193,7 @@ class WhenScript(Stateful):
             is_meant, before = self._selectors[place].takes(event), self._before[place]
             if before is not None and not 0 <= self._first[before] < event.t:
                 return
-            if is_meant and (self._whens[place].every or not self._done[place]):
+            if is_meant and (self._triggers[place].every or not self._done[place]):
                 if not self._done[place]:
                     self._done[place], self._first[place] = True, event.t
                 self._happened.append((place, event.t))
@@ -204,13 +204,13 @@ class WhenScript(Stateful):
         """Do what is due after all events up to `limit`: at its time, but not before the instant after `limit`."""
         happened, self._happened = self._happened, []
         for place, since in happened:
-            when = self._whens[place]
+            when = self._triggers[place]
             at = max(limit + 1, since + when.after_ns)
             if when.changes:
                 self._on_change([replace(change, at=at + change.at) for change in when.changes])
             if when.faults:
                 self._on_fault([FaultChange(at + fault.at, fault.words) for fault in when.faults])
-            if when.deeds:
-                self._on_deed([replace(deed, at=at + deed.at) for deed in when.deeds])
+            if when.actions:
+                self._on_action([replace(action, at=at + action.at) for action in when.actions])
             if when.do == "end":
                 self._on_end(at)
