@@ -64,12 +64,9 @@ from robot_bench.running.shared_world import Driven, SharedWorld
 from robot_bench.scenario.fault_script import LINK_DOWN, FaultScript
 from robot_bench.scenario.goals.judging import GoalJudge, Judgement, RunEnd
 from robot_bench.scenario.hand_script import Deed, HandScript
-from robot_bench.scenario.scenario import (
-    Scenario,
-    ScenarioOptions,
-    load_scenario,
-    refuse_what_its_world_refuses,
-)
+from robot_bench.scenario.loading import load_scenario, refuse_what_its_world_refuses
+from robot_bench.scenario.options import ScenarioOptions
+from robot_bench.scenario.scenario import Scenario
 from robot_bench.scenario.when_script import WhenScript
 from robot_bench.scenario.world_script import WorldScript
 from robot_bench.wires.chip_pins import ChipPins

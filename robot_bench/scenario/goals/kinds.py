@@ -5,306 +5,281 @@ are `GoalKind`s. So are those that know a program which ships: they stand in `ro
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import EntryPoint
-from typing import cast
+from typing import Annotated
 
 from p2os.errors import ScenarioError
-from p2os.toml_schema import LONGEST_S, Key, Table
+from p2os.toml_schema import Key
 from robot_bench.scenario.goals.motion import (
     Cells,
+    CellsTable,
+    ClearanceTable,
     Energy,
+    EnergyTable,
     LeastClearance,
     MinDistance,
+    MinDistanceTable,
     MovesOn,
+    MovesOnTable,
     NoCollision,
     Reach,
+    ReachTable,
+    RegionTable,
     Smooth,
+    SmoothTable,
     Stay,
     StopWithin,
+    StopWithinTable,
 )
-from robot_bench.scenario.goals.signals import MotorSequence, PinHolds, WaveWithin, shown_pairs
-from robot_bench.scenario.goals.steering import BacksOnPath, NoIdleTurn, SteersAway, TurnsAway
+from robot_bench.scenario.goals.signals import (
+    MotorSequence,
+    MotorSequenceTable,
+    PinHolds,
+    PinHoldsTable,
+    WaveTable,
+    WaveWithin,
+    shown_pairs,
+)
+from robot_bench.scenario.goals.steering import (
+    BacksOnPath,
+    BacksOnPathTable,
+    NoIdleTurn,
+    NoIdleTurnTable,
+    SteersAway,
+    SteersAwayTable,
+    TurnsAway,
+    TurnsAwayTable,
+)
 from robot_bench.scenario.goals.temporal import (
-    SIGNALS,
     Happens,
+    HappensTable,
+    HoldHeadingTable,
+    HoldSpeedTable,
     InOrderOfEvents,
+    InOrderTable,
     Latency,
+    LatencyTable,
+    NeverTable,
     OverTime,
+    OverTimeTable,
+    WindowTable,
     around,
-    bounds,
+    refuse_other_than_texts,
 )
 from robot_bench.scenario.goals.text import InOrder
-from robot_bench.scenario.goals.watch import GoalKind, Watch, number
+from robot_bench.scenario.goals.watch import GoalKind, NoKeys, OfEvents, Watch
 from simbase.entry_points import installed_points
 from simbase.errors import shown
 
-_POSE_SIGNALS = tuple(SIGNALS)
-_TEXT = Key(name="text", kind="text", required=True)
-_PIN = Key(name="pin", kind="text", required=True)
-_EVENT = Key(name="event", kind="text", required=True)
-_AFTER = Key(name="after", kind="text")
-_FROM = Key(name="from_s", kind="number", least=0, most=LONGEST_S)
-_TO = Key(name="to_s", kind="number", above=0, most=LONGEST_S)
-_WITHIN = Key(name="within_s", kind="number", above=0, most=LONGEST_S)
-_LEAST = Key(name="least", kind="number", least=-1e6, most=1e6)
-_MOST = Key(name="most", kind="number", least=-1e6, most=1e6)
-_COUNT = (
-    Key(name="least", kind="whole", least=0, most=1_000_000),
-    Key(name="most", kind="whole", least=0, most=1_000_000),
-)
-_REGION = (
-    Key(name="x_m", kind="number", least=-10_000, most=10_000),
-    Key(name="y_m", kind="number", least=-10_000, most=10_000),
-    Key(name="radius_m", kind="number", above=0, most=10_000),
-    Key(name="area_m", kind="list"),
-)
-_ONE_REGION = ("area_m", "radius_m")
-_SIGNAL = Key(name="signal", kind="text", required=True, choices=_POSE_SIGNALS)
-_THING = Key(name="thing", kind="text")
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PrintsTable:
+    """A text."""
+
+    text: Annotated[str, Key(doc="what the firmware prints")]
 
 
-def _texts(table: Table) -> list[str]:
-    return cast("list[str]", table["texts"])
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PrintsInOrderTable:
+    """Texts one after the other."""
+
+    texts: Annotated[tuple[str, ...], Key(kind="list", doc="in this order")]
+
+    def __post_init__(self) -> None:
+        refuse_other_than_texts("texts", self.texts)
 
 
-def _wanted_distance(table: Table) -> str:
-    parts = []
-    if "distance_m" in table:
-        parts.append(f"{number(table, 'distance_m'):g} m")
-    if "distance_m_a_minute" in table:
-        parts.append(f"{number(table, 'distance_m_a_minute'):g} m a minute")
-    return f"drives at least {' and '.join(parts)}"
+def _given(*parts: tuple[str, float | None, str]) -> list[str]:
+    """Return words, number and unit of those that are given."""
+    return [f"{words}{number:g}{unit}" for words, number, unit in parts if number is not None]
 
 
-def _wanted_energy(table: Table) -> str:
-    bounds = {"most_j": "J", "most_j_a_metre": "J a metre"}
-    wanted = [f"{number(table, key):g} {unit}" for key, unit in bounds.items() if key in table]
-    return f"takes at most {' and '.join(wanted)}"
-
-
-def _place(table: Table) -> str:
-    if "area_m" in table:
-        low_x, low_y, high_x, high_y = cast("list[float]", table["area_m"])
+def _place(table: RegionTable) -> str:
+    if table.area_m is not None:
+        low_x, low_y, high_x, high_y = table.area_m
         return f"x {low_x:g} to {high_x:g} m, y {low_y:g} to {high_y:g} m"
-    x_m, y_m, radius_m = (number(table, key) for key in ("x_m", "y_m", "radius_m"))
+    x_m, y_m, radius_m = table.circle
     return f"the {radius_m:g} m around x {x_m:g} m, y {y_m:g} m"
 
 
-def _when(table: Table) -> str:
+def _when(
+    after: str | None = None, *, from_s: float | None = None, to_s: float | None = None, within_s: float | None = None
+) -> str:
     """Return the window of a goal as the end of its sentence."""
-    parts = []
-    if "after" in table:
-        parts.append(f" after {table['after']!r}")
-    times = [word for word in ("from", "to", "within") if f"{word}_s" in table]
-    parts += [f" {word} {number(table, f'{word}_s'):g} s" for word in times]
-    return "".join(parts)
+    times = _given((" from ", from_s, " s"), (" to ", to_s, " s"), (" within ", within_s, " s"))
+    return "".join([*([] if after is None else [f" after {after!r}"]), *times])
 
 
-def _bounds(table: Table) -> str:
-    least = f" at least {number(table, 'least'):g}" if "least" in table else ""
-    most = f" at most {number(table, 'most'):g}" if "most" in table else ""
-    to = f" from {table['thing']}" if "thing" in table else ""
-    return f"{table['signal']}{to}{least}{' and' if least and most else ''}{most}"
+def _window(table: WindowTable) -> str:
+    return _when(table.after, from_s=table.from_s, to_s=table.to_s)
 
 
-def _count(table: Table) -> str:
-    least, most = (f"{table[key]} time(s)" if key in table else "" for key in ("least", "most"))
-    return (f" at least {least}" if least else "") + (f" at most {most}" if most else "")
+def _bounds(table: OverTimeTable) -> str:
+    bounds = " and".join(_given((" at least ", table.least, ""), (" at most ", table.most, "")))
+    return f"{table.signal}{'' if table.thing is None else f' from {table.thing}'}{bounds}"
 
 
-def _over_time(table: Table, *, is_always: bool) -> Watch:
-    return OverTime(table, str(table["signal"]), bounds(table), is_always=is_always)
+def _over_time(table: OverTimeTable, *, is_always: bool) -> Watch:
+    return OverTime(table, table.signal, table.margin, is_always=is_always, thing=table.thing)
 
 
-_HOLD_HEADING = (
-    Key(name="heading_deg", kind="number", required=True, least=-36_000, most=36_000),
-    Key(name="tolerance_deg", kind="number", required=True, above=0, most=180),
-)
-_HOLD_SPEED = (
-    Key(name="speed_mps", kind="number", required=True, least=-100, most=100),
-    Key(name="tolerance_mps", kind="number", required=True, above=0, most=100),
-)
+def _never(words: str, table: OfEvents, *, from_s: float | None = None) -> Watch:
+    return Happens(HappensTable(event=words, least=0, most=0, from_s=from_s, wires=table.wires))
 
-_FREE = Key(name="free_m", kind="number", required=True, above=0, most=100)
-_ONE_SIDE = (
-    Key(name="near_m", kind="number", required=True, above=0, most=100),
-    _FREE,
-    Key(name="left", kind="list"),
-    Key(name="right", kind="list"),
-)
-_APART = Key(name="apart_m", kind="number", least=0, most=100)
-_NOT_LONGER = Key(name="within_s", kind="number", required=True, above=0, most=LONGEST_S)
+
+_ONE_REGION = ("area_m", "radius_m")
 
 KINDS: Mapping[str, GoalKind] = {
     "no_collision": GoalKind(
-        keys=(), wanted=lambda _: "touches nothing", watch=lambda _: NoCollision(), needs_world=True
+        NoKeys, lambda _: "touches nothing", lambda _: NoCollision(),
+        doc="the hull touches nothing; a failure names what was hit, when, where and with which part",
+        needs_world=True,
     ),
     "min_distance": GoalKind(
-        keys=(
-            Key(name="distance_m", kind="number", above=0, most=1e6),
-            Key(name="distance_m_a_minute", kind="number", above=0, most=1e6),
+        MinDistanceTable,
+        lambda table: "drives at least " + " and ".join(
+            _given(("", table.distance_m, " m"), ("", table.distance_m_a_minute, " m a minute"))
         ),
-        wanted=_wanted_distance, watch=MinDistance, any_of=("distance_m", "distance_m_a_minute"),
+        MinDistance, doc="the path is at least so long", any_of=("distance_m", "distance_m_a_minute"),
     ),
     "cells": GoalKind(
-        keys=(Key(name="least", kind="whole", required=True, least=1, most=1_000_000),),
-        wanted=lambda table: f"enters at least {table['least']} different cells of 0.5 m", watch=Cells,
+        CellsTable, lambda table: f"enters at least {table.least} different cells of 0.5 m", Cells,
+        doc="so many different cells of 0.5 m were entered",
     ),
     "motor_sequence": GoalKind(
-        keys=(
-            Key(name="values", kind="list", required=True),
-            Key(name="held_s", kind="number", least=0, most=LONGEST_S),
-        ),
-        wanted=lambda table: f"sets the motors to {shown_pairs(table['values'])}", watch=MotorSequence,
-        is_scripted=True,
+        MotorSequenceTable, lambda table: f"sets the motors to {shown_pairs(table.values)}", MotorSequence,
+        doc="the motor pins showed exactly these values, each held so long", is_scripted=True,
     ),
     "usart_contains": GoalKind(
-        keys=(_TEXT,), wanted=lambda table: f"prints {table['text']!r}",
-        watch=lambda table: InOrder([str(table["text"])], "was not printed"),
+        PrintsTable, lambda table: f"prints {table.text!r}",
+        lambda table: InOrder([table.text], "was not printed"), doc="the firmware printed it",
     ),
     "usart_lacks": GoalKind(
-        keys=(_TEXT,), wanted=lambda table: f"never prints {table['text']!r}",
-        watch=lambda table: Happens({**table, "event": f"usart1 sends {table['text']}"}, least=0, most=0),
+        PrintsTable, lambda table: f"never prints {table.text!r}",
+        lambda table: _never(f"usart1 sends {table.text}", OfEvents()), doc="the firmware never printed it",
     ),
     "usart_in_order": GoalKind(
-        keys=(Key(name="texts", kind="list", required=True),),
-        wanted=lambda table: f"prints in order {', '.join(map(repr, _texts(table)))}",
-        watch=lambda table: InOrder(_texts(table), "was not printed in its turn"), is_scripted=True,
+        PrintsInOrderTable, lambda table: f"prints in order {', '.join(map(repr, table.texts))}",
+        lambda table: InOrder(list(table.texts), "was not printed in its turn"),
+        doc="the firmware printed these, in this order", is_scripted=True,
     ),
     "reach": GoalKind(
-        keys=(*_REGION, _WITHIN), wanted=lambda table: f"reaches {_place(table)}{_when(table)}", watch=Reach,
-        any_of=_ONE_REGION, is_scripted=True,
+        ReachTable, lambda table: f"reaches {_place(table)}{_when(within_s=table.within_s)}", Reach,
+        doc="the robot's centre comes into the region, in time", any_of=_ONE_REGION, is_scripted=True,
     ),
     "avoid": GoalKind(
-        keys=_REGION, wanted=lambda table: f"stays out of {_place(table)}",
-        watch=lambda table: Stay(table, is_inside=False), any_of=_ONE_REGION,
+        RegionTable, lambda table: f"stays out of {_place(table)}", lambda table: Stay(table, is_inside=False),
+        doc="its centre stays out of the region", any_of=_ONE_REGION,
     ),
     "stay_within": GoalKind(
-        keys=_REGION, wanted=lambda table: f"stays within {_place(table)}",
-        watch=lambda table: Stay(table, is_inside=True), any_of=_ONE_REGION,
+        RegionTable, lambda table: f"stays within {_place(table)}", lambda table: Stay(table, is_inside=True),
+        doc="its centre stays in the region", any_of=_ONE_REGION,
     ),
     "clearance": GoalKind(
-        keys=(Key(name="least_m", kind="number", required=True, above=0, most=100),),
-        wanted=lambda table: f"keeps {number(table, 'least_m'):g} m away from everything",
-        watch=LeastClearance, needs_world=True,
+        ClearanceTable, lambda table: f"keeps {table.least_m:g} m away from everything", LeastClearance,
+        doc="the hull stays so far from everything", needs_world=True,
     ),
     "stop_within": GoalKind(
-        keys=(
-            Key(name="after", kind="text", required=True),
-            Key(name="within_s", kind="number", required=True, above=0, most=LONGEST_S),
-            Key(name="way_m", kind="number", above=0, most=1e6),
-        ),
-        wanted=lambda table: f"stands still{_when(table)}"
-        + (f" and {number(table, 'way_m'):g} m" if "way_m" in table else ""),
-        watch=StopWithin,
+        StopWithinTable,
+        lambda table: f"stands still{_when(table.after, within_s=table.within_s)}"
+        + "".join(_given((" and ", table.way_m, " m"))),
+        StopWithin, doc="after each such event the robot stands in time, no further on",
     ),
     "moves_on": GoalKind(
-        keys=(
-            Key(name="way_m", kind="number", required=True, above=0, most=1e6),
-            Key(name="within_s", kind="number", required=True, above=0, most=LONGEST_S),
-            _FROM,
-        ),
-        wanted=lambda table: f"gets {number(table, 'way_m'):g} m away from each place{_when(table)}", watch=MovesOn,
+        MovesOnTable,
+        lambda table: f"gets {table.way_m:g} m away from each place"
+        + _when(from_s=table.from_s, within_s=table.within_s),
+        MovesOn, doc="it gets so far away from each place in time: it neither stands nor turns on the spot nor is shut "
+        "in; the next place is where it was so far away",
     ),
     "turns_away": GoalKind(
-        keys=(*_ONE_SIDE, Key(name="row", kind="whole", least=0, most=1000), _APART),
-        wanted=lambda table: "turns on the spot away from what stands on one side, but for "
-        f"{table.get('row', 0)} in a row",
-        watch=TurnsAway,
+        TurnsAwayTable,
+        lambda table: f"turns on the spot away from what stands on one side, but for {table.row} in a row",
+        TurnsAway, doc="a turn on the spot that begins with something nearer than `near_m` on one side and the other "
+        "free beyond `free_m` goes to the free one",
     ),
     "steers_away": GoalKind(
-        keys=(*_ONE_SIDE, _NOT_LONGER),
-        wanted=lambda table: "bends towards what stands on one side for no longer than "
-        f"{number(table, 'within_s'):g} s",
-        watch=SteersAway,
+        SteersAwayTable,
+        lambda table: f"bends towards what stands on one side for no longer than {table.within_s:g} s",
+        SteersAway, doc="driving forward it does not bend towards the side that is not free, as above, for longer",
     ),
     "no_idle_turn": GoalKind(
-        keys=(_FREE, _NOT_LONGER),
-        wanted=lambda table: f"turns on the spot for no longer than {number(table, 'within_s'):g} s where "
-        f"{number(table, 'free_m'):g} m are free",
-        watch=NoIdleTurn,
+        NoIdleTurnTable,
+        lambda table: f"turns on the spot for no longer than {table.within_s:g} s where {table.free_m:g} m are free",
+        NoIdleTurn, doc="it does not go on turning on the spot for longer than that where every sonar is free",
     ),
     "backs_on_path": GoalKind(
-        keys=(Key(name="off_m", kind="number", required=True, above=0, most=100),),
-        wanted=lambda table: f"goes back only within {number(table, 'off_m'):g} m of the way that it came",
-        watch=BacksOnPath,
+        BacksOnPathTable, lambda table: f"goes back only within {table.off_m:g} m of the way that it came",
+        BacksOnPath, doc="going back it stays so near to the way that it has come",
     ),
     "smooth": GoalKind(
-        keys=(Key(name="most_mps2", kind="number", required=True, above=0, most=1000),),
-        wanted=lambda table: f"accelerates no rim by more than {number(table, 'most_mps2'):g} m/s²", watch=Smooth,
+        SmoothTable, lambda table: f"accelerates no rim by more than {table.most_mps2:g} m/s²", Smooth,
+        doc="no rim changes its speed faster, from pose to pose",
     ),
     "energy": GoalKind(
-        keys=(
-            Key(name="most_j", kind="number", above=0, most=1e9),
-            Key(name="most_j_a_metre", kind="number", above=0, most=1e9),
+        EnergyTable,
+        lambda table: "takes at most " + " and ".join(
+            _given(("", table.most_j, " J"), ("", table.most_j_a_metre, " J a metre"))
         ),
-        wanted=_wanted_energy, watch=Energy, any_of=("most_j", "most_j_a_metre"), needs_world=True,
+        Energy, doc="the work at the rims, |torque · rate| of both wheels over the run, stays within so many "
+        "joules; a failure says where it became more, and where the power was greatest",
+        any_of=("most_j", "most_j_a_metre"), needs_world=True,
     ),
     "hold_heading": GoalKind(
-        keys=(*_HOLD_HEADING, _AFTER, _FROM, _TO),
-        wanted=lambda table: f"holds heading {number(table, 'heading_deg'):g}° to "
-        f"{number(table, 'tolerance_deg'):g}°{_when(table)}",
-        watch=lambda table: OverTime(
-            table, "heading_deg",
-            around(number(table, "heading_deg"), number(table, "tolerance_deg"), is_angle=True), is_always=True,
+        HoldHeadingTable,
+        lambda table: f"holds heading {table.heading_deg:g}° to {table.tolerance_deg:g}°{_window(table)}",
+        lambda table: OverTime(
+            table, "heading_deg", around(table.heading_deg, table.tolerance_deg, is_angle=True), is_always=True
         ),
-        is_scripted=True,
+        doc="its heading stays so, the short way round", is_scripted=True,
     ),
     "hold_speed": GoalKind(
-        keys=(*_HOLD_SPEED, _AFTER, _FROM, _TO),
-        wanted=lambda table: f"holds {number(table, 'speed_mps'):g} m/s to "
-        f"{number(table, 'tolerance_mps'):g} m/s{_when(table)}",
-        watch=lambda table: OverTime(
-            table, "speed_mps", around(number(table, "speed_mps"), number(table, "tolerance_mps")), is_always=True
-        ),
-        is_scripted=True,
+        HoldSpeedTable,
+        lambda table: f"holds {table.speed_mps:g} m/s to {table.tolerance_mps:g} m/s{_window(table)}",
+        lambda table: OverTime(table, "speed_mps", around(table.speed_mps, table.tolerance_mps), is_always=True),
+        doc="its speed stays so", is_scripted=True,
     ),
     "always": GoalKind(
-        keys=(_SIGNAL, _THING, _LEAST, _MOST, _AFTER, _FROM, _TO),
-        wanted=lambda table: f"has always {_bounds(table)}{_when(table)}",
-        watch=lambda table: _over_time(table, is_always=True), any_of=("least", "most"),
+        OverTimeTable, lambda table: f"has always {_bounds(table)}{_window(table)}",
+        lambda table: _over_time(table, is_always=True), doc="the signal is in bounds at each sample",
+        any_of=("least", "most"),
     ),
     "eventually": GoalKind(
-        keys=(_SIGNAL, _THING, _LEAST, _MOST, _AFTER, _FROM, _TO),
-        wanted=lambda table: f"has at some time {_bounds(table)}{_when(table)}",
-        watch=lambda table: _over_time(table, is_always=False), any_of=("least", "most"),
+        OverTimeTable, lambda table: f"has at some time {_bounds(table)}{_window(table)}",
+        lambda table: _over_time(table, is_always=False), doc="the signal is in bounds at one of them",
+        any_of=("least", "most"),
     ),
     "happens": GoalKind(
-        keys=(_EVENT, *_COUNT, _FROM, _WITHIN),
-        wanted=lambda table: f"{table['event']!r} happens{_count(table)}{_when(table)}", watch=Happens,
+        HappensTable,
+        lambda table: f"{table.event!r} happens"
+        + ("" if table.least is None else f" at least {table.least} time(s)")
+        + ("" if table.most is None else f" at most {table.most} time(s)")
+        + _when(from_s=table.from_s, within_s=table.within_s),
+        Happens, doc="the event happens so often in that time: once at least where `least` is not given",
     ),
     "never": GoalKind(
-        keys=(_EVENT, _FROM), wanted=lambda table: f"{table['event']!r} never happens{_when(table)}",
-        watch=lambda table: Happens(table, least=0, most=0),
+        NeverTable, lambda table: f"{table.event!r} never happens{_when(from_s=table.from_s)}",
+        lambda table: _never(table.event, table, from_s=table.from_s), doc="it does not happen",
     ),
     "in_order": GoalKind(
-        keys=(Key(name="events", kind="list", required=True),),
-        wanted=lambda table: f"in order {', '.join(map(repr, cast('list[str]', table['events'])))}",
-        watch=InOrderOfEvents, is_scripted=True,
+        InOrderTable, lambda table: f"in order {', '.join(map(repr, table.events))}", InOrderOfEvents,
+        doc="they happen one after the other", is_scripted=True,
     ),
     "latency": GoalKind(
-        keys=(
-            Key(name="from", kind="text", required=True),
-            Key(name="to", kind="text", required=True),
-            Key(name="most_s", kind="number", required=True, above=0, most=LONGEST_S),
-            Key(name="least_s", kind="number", least=0, most=LONGEST_S),
-        ),
-        wanted=lambda table: f"{table['to']!r} follows {table['from']!r} within {number(table, 'most_s'):g} s",
-        watch=Latency,
+        LatencyTable, lambda table: f"{table.to!r} follows {table.from_!r} within {table.most_s:g} s", Latency,
+        doc="each `from` is followed by a `to` in time",
     ),
     "pin_holds": GoalKind(
-        keys=(_PIN, Key(name="level", kind="text", required=True, choices=("high", "low")), _FROM, _TO),
-        wanted=lambda table: f"holds {table['pin']} {table['level']}{_when(table)}", watch=PinHolds,
+        PinHoldsTable,
+        lambda table: f"holds {table.pin} {table.level}{_when(from_s=table.from_s, to_s=table.to_s)}",
+        PinHolds, doc="the wire has this level all the time",
     ),
     "wave": GoalKind(
-        keys=(
-            _PIN, _FROM, _TO,
-            *(Key(name=name, kind="number", above=0, most=1e8) for name in ("least_hz", "most_hz")),
-            *(Key(name=name, kind="number", least=0, most=1) for name in ("least_duty", "most_duty")),
-            Key(name="periods", kind="whole", least=1, most=1_000_000_000),
-        ),
-        wanted=lambda table: f"has a wave in bounds on {table['pin']}{_when(table)}", watch=WaveWithin,
+        WaveTable,
+        lambda table: f"has a wave in bounds on {table.pin}{_when(from_s=table.from_s, to_s=table.to_s)}",
+        WaveWithin, doc="every period is in bounds, and there are so many",
     ),
 }  # fmt: skip
 

@@ -7,13 +7,15 @@ in its window, that of `eventually` the greatest; after an event, that of the wo
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Any, cast
+from dataclasses import dataclass
+from typing import Annotated, Any
 
-from p2os.toml_schema import Table
+from p2os.errors import ScenarioError
+from p2os.toml_schema import LONGEST_S, Key
 from robot_bench.events.kinds import MICRO, Clearance, Event, Pose, Ranges, WorldChange
-from robot_bench.scenario.goals.watch import Outcome, SelectorFeed, Watch, nanos, number, seconds, selected
+from robot_bench.scenario.goals.watch import From, OfEvents, Outcome, SelectorFeed, To, Watch, Within, seconds
 from simbase.errors import UsageError
-from simbase.timing import NS_PER_S, Nanos
+from simbase.timing import NS_PER_S, Nanos, nanos
 
 #: Signal → what tells it, its value there, its unit.
 SIGNALS: Mapping[str, tuple[type, Callable[[Any], float], str]] = {
@@ -31,6 +33,98 @@ SIGNALS: Mapping[str, tuple[type, Callable[[Any], float], str]] = {
 APART = "apart_m"
 #: Of a value, metres, degrees or m/s within bounds; negative beyond them.
 Margin = Callable[[float], float]
+_Bound = Annotated[float | None, Key(least=-1e6, most=1e6, doc="of the signal")]
+_Count = Annotated[int | None, Key(least=0, most=1_000_000, doc="how often")]
+_Event = Annotated[str, Key(doc="the event")]
+_Most = Annotated[float, Key(above=0, most=LONGEST_S, doc="in so many seconds")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class WindowTable(OfEvents):
+    """A window of time, from the beginning or from each occurrence of an event."""
+
+    after: Annotated[str | None, Key(doc="the event from which the window counts")] = None
+    from_s: From = None
+    to_s: To = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class OverTimeTable(WindowTable):
+    """Bounds of a signal in a window."""
+
+    signal: Annotated[str, Key(choices=tuple(SIGNALS), doc="which")]
+    thing: Annotated[str | None, Key(doc="of `apart_m`: to what")] = None
+    least: _Bound = None
+    most: _Bound = None
+
+    @property
+    def margin(self) -> Margin:
+        """The margin to `least` and `most`."""
+        least, most = (-math.inf if self.least is None else self.least), (math.inf if self.most is None else self.most)
+        return lambda value: min(value - least, most - value)
+
+
+@dataclass(frozen=True, kw_only=True)
+class HoldHeadingTable(WindowTable):
+    """A heading in a window."""
+
+    heading_deg: Annotated[float, Key(least=-36_000, most=36_000, doc="the short way round")]
+    tolerance_deg: Annotated[float, Key(above=0, most=180, doc="off it at most")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class HoldSpeedTable(WindowTable):
+    """A speed in a window."""
+
+    speed_mps: Annotated[float, Key(least=-100, most=100, doc="forward")]
+    tolerance_mps: Annotated[float, Key(above=0, most=100, doc="off it at most")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class NeverTable(OfEvents):
+    """An event that must not happen."""
+
+    event: _Event
+    from_s: From = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class HappensTable(NeverTable):
+    """An event, and how often it may happen."""
+
+    least: _Count = None
+    most: _Count = None
+    within_s: Within = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class InOrderTable(OfEvents):
+    """Events one after the other."""
+
+    events: Annotated[tuple[str, ...], Key(kind="list", doc="in this order")]
+
+    def __post_init__(self) -> None:
+        refuse_other_than_texts("events", self.events)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LatencyTable(OfEvents):
+    """An event that follows another one."""
+
+    from_: Annotated[str, Key(doc="an event")]
+    to: Annotated[str, Key(doc="the event that follows")]
+    most_s: _Most
+    least_s: Annotated[float, Key(least=0, most=LONGEST_S, doc="no sooner")] = 0.0
+
+
+def refuse_other_than_texts(key: str, items: tuple[str, ...]) -> None:
+    """Refuse a list that has other than texts in it.
+
+    Raises:
+        ScenarioError: It has.
+    """
+    if not all(isinstance(item, str) for item in items):
+        raise ScenarioError(f"{key} must be a list of texts in quotes")
 
 
 class OverTime(Watch):
@@ -42,22 +136,24 @@ class OverTime(Watch):
 
     STATE = ("_events", "_windows", "_worst", "_failure", "_count", "_there")
 
-    def __init__(self, table: Table, signal: str, margin: Margin, *, is_always: bool) -> None:
+    def __init__(
+        self, table: WindowTable, signal: str, margin: Margin, *, is_always: bool, thing: str | None = None
+    ) -> None:
         kind, self._value, self._unit = SIGNALS[signal]
         self._signal = signal
         #: A thing of the world, and where it was told to be last.
-        self._thing = str(table.get("thing", ""))
+        self._thing = thing or ""
         self._there: tuple[float, float] | None = None
         if bool(self._thing) is not (signal == APART):
             raise UsageError(f"signal {APART} and thing belong together", hint='thing = "NAME" of a robot or a thing')
         self._margin = margin
         self._is_always = is_always
-        self._after = str(table["after"]) if "after" in table else ""
-        self._events = SelectorFeed(*([selected(table, self._after)] if self._after else []))
+        self._after = table.after or ""
+        self._events = SelectorFeed(*([table.selected(self._after)] if self._after else []))
         self._kind = kind
         kinds = [kind, *([WorldChange] if self._thing else []), *self._events.kinds]
         self.kinds, self.wires = tuple(dict.fromkeys(kinds)), self._events.wires
-        self._from, self._to = nanos(table, "from_s"), nanos(table, "to_s") if "to_s" in table else None
+        self._from, self._to = nanos(table.from_s or 0.0), None if table.to_s is None else nanos(table.to_s)
         #: Where windows begin, and the best margin in each so far; of `always` the worst.
         self._windows: list[tuple[Nanos, float, Nanos]] = [] if self._after else [(0, self._nothing, 0)]
         self._worst = math.inf
@@ -140,12 +236,6 @@ class OverTime(Watch):
         return Outcome(met=not self._failure, says=says, robustness=robustness, unit=self._unit)
 
 
-def bounds(table: Table) -> Margin:
-    """Return the margin to `least` and `most`."""
-    least, most = number(table, "least", -math.inf), number(table, "most", math.inf)
-    return lambda value: min(value - least, most - value)
-
-
 def around(wanted: float, tolerance: float, *, is_angle: bool = False) -> Margin:
     """Return the margin to a tolerance around a value; angles, in degrees, go the short way."""
     if is_angle:
@@ -158,12 +248,13 @@ class Happens(Watch):
 
     STATE = ("_events", "_times", "_is_decided")
 
-    def __init__(self, table: Table, *, least: int = 1, most: float = math.inf) -> None:
-        self._words = str(table["event"])
-        self._events = SelectorFeed(selected(table, self._words))
+    def __init__(self, table: HappensTable) -> None:
+        self._words = table.event
+        self._events = SelectorFeed(table.selected(table.event))
         self.kinds, self.wires = self._events.kinds, self._events.wires
-        self._least, self._most = number(table, "least", least), number(table, "most", most)
-        self._from, self._to = nanos(table, "from_s"), nanos(table, "within_s") if "within_s" in table else None
+        self._least = 1 if table.least is None else table.least
+        self._most = math.inf if table.most is None else table.most
+        self._from, self._to = nanos(table.from_s or 0.0), None if table.within_s is None else nanos(table.within_s)
         if self._least > self._most:
             raise UsageError(f"least is {self._least:g} where it is not given", hint='kind = "never", or least = 0')
         self._times: list[Nanos] = []
@@ -202,9 +293,9 @@ class InOrderOfEvents(Watch):
 
     STATE = ("_events", "_place", "_last")
 
-    def __init__(self, table: Table) -> None:
-        self._words = [str(words) for words in cast("list[object]", table["events"])]
-        self._events = SelectorFeed(*(selected(table, words) for words in self._words))
+    def __init__(self, table: InOrderTable) -> None:
+        self._words = table.events
+        self._events = SelectorFeed(*map(table.selected, table.events))
         self.kinds, self.wires = self._events.kinds, self._events.wires
         self._place = 0
         self._last: Nanos = 0
@@ -229,11 +320,11 @@ class Latency(Watch):
 
     STATE = ("_events", "_since", "_worst", "_count", "_failure")
 
-    def __init__(self, table: Table) -> None:
-        self._first, self._then = str(table["from"]), str(table["to"])
-        self._events = SelectorFeed(selected(table, self._first), selected(table, self._then))
+    def __init__(self, table: LatencyTable) -> None:
+        self._first, self._then = table.from_, table.to
+        self._events = SelectorFeed(table.selected(table.from_), table.selected(table.to))
         self.kinds, self.wires = self._events.kinds, self._events.wires
-        self._most, self._least = nanos(table, "most_s"), nanos(table, "least_s")
+        self._most, self._least = nanos(table.most_s), nanos(table.least_s)
         #: The first event that was not answered yet.
         self._since: Nanos | None = None
         self._worst: tuple[Nanos, Nanos] = (0, 0)
