@@ -1,7 +1,6 @@
-"""Tables of TOML files as typed records: one frozen dataclass declares a table, and what is read of a file is that.
+"""Tables of TOML files as typed records: one class declares a table, and what is read of a file is one of it.
 
-    @dataclass(frozen=True, slots=True, kw_only=True)
-    class Circle:
+    class Circle(Record):
         x_m: Annotated[float, Key(least=-100, most=100, doc="its middle")]
         radius_m: Annotated[float, Key(above=0, most=10, doc="its radius")] = 0.5
 
@@ -13,20 +12,36 @@ for who reads each by its record. What a schema, a page or a shell says of a key
 Invariant: a record that was read has values of its fields' types, in their ranges; `__post_init__` may refuse more.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import MISSING, Field, dataclass, fields, is_dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import MISSING, Field, dataclass, fields, replace
 from enum import Enum
 from functools import cache
 from types import NoneType, UnionType
-from typing import Annotated, Any, ClassVar, Literal, Protocol, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import (
+    Annotated,
+    Any,
+    ClassVar,
+    Literal,
+    TypeVar,
+    Union,
+    dataclass_transform,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
 from p2os.toml_schema import Key, Kind, Place, Table, Where, check_table, placed, within
 
 
-class Record(Protocol):
-    """A dataclass."""
+@dataclass_transform(frozen_default=True, kw_only_default=True)
+class Record:
+    """A table of a file: a subclass declares its keys, and is a frozen dataclass with keywords."""
 
     __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        dataclass(frozen=True, kw_only=True)(cls)
 
 
 T = TypeVar("T", bound=Record)
@@ -92,11 +107,14 @@ def _header(key: Key, name: str) -> str:
     return f"[[{name}]]" if key.kind == "tables" else f"[{name}.NAME]" if key.is_named else f"[{name}]"
 
 
-@cache
-def _columns(record: type) -> tuple[_Column, ...]:
+def _made_columns(record: type) -> tuple[_Column, ...]:
     hints = get_type_hints(record, include_extras=True)
     found = ((one, hints[one.name]) for one in fields(record))
     return tuple(_column(one, hint) for one, hint in found if get_origin(hint) is Annotated)
+
+
+#: The fields of a record that are keys.
+_columns: Callable[[type], tuple[_Column, ...]] = cache(_made_columns)
 
 
 def _column(field: "Field[Any]", hint: object) -> _Column:
@@ -128,7 +146,7 @@ def _said(hint: Any) -> Iterator[tuple[str, object]]:
 
 
 def _record(hint: object) -> type[Record] | None:
-    return hint if isinstance(hint, type) and is_dataclass(hint) else None
+    return hint if isinstance(hint, type) and issubclass(hint, Record) else None
 
 
 def _typed(value: Any, column: _Column, where: Where) -> object:

@@ -27,7 +27,7 @@ from typing import Annotated
 from p2os.errors import ScenarioError
 from p2os.pioneer.world import load_world
 from p2os.toml_file import TomlSource, is_file, read_toml, read_user_text
-from p2os.toml_record import keys_of, number_of, read, sections
+from p2os.toml_record import Record, keys_of, number_of, read, sections
 from p2os.toml_schema import LONGEST_S, Key, Place, Table, Where, check_table, placed, within
 from robot_bench.campaign.search import SEARCHES
 from robot_bench.campaign.things import KINDS
@@ -49,8 +49,7 @@ GAP_M = 0.9
 _Settings = Annotated[Mapping[str, object] | None, Key(doc="keys as of `--set`")]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SpanTable:
+class SpanTable(Record):
     """A range of numbers."""
 
     from_: Annotated[int | float, Key(kind="number", doc="the least")]
@@ -58,8 +57,7 @@ class SpanTable:
     step: Annotated[int | float | None, Key(kind="number", above=0, doc="from one value to the next")] = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DrawTable:
+class DrawTable(Record):
     """`[[draw]]`: things of a kind; numbers may be ranges. The measures of the kinds are keys too."""
 
     kind: Annotated[str, Key(choices=tuple(KINDS), doc="of thing")]
@@ -71,8 +69,7 @@ class DrawTable:
     aside_m: Annotated[float | None, Key(least=-1000, most=1000, doc="to the left of the robot at its start")] = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DisturbTable:
+class DisturbTable(Record):
     """`[[disturb]]`: a fault; its times may be ranges."""
 
     fault: Annotated[str, Key(doc="its words")]
@@ -166,8 +163,7 @@ class Disturbance:
         return {"fault": words} | {key: value(key, span) for key, span in times.items()}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Budget:
+class Budget(Record):
     """`[budget]`: how much may be spent; None: without end."""
 
     runs: Annotated[int, Key(least=1, most=MOST_RUNS, doc="that propose")] = 200
@@ -176,16 +172,14 @@ class Budget:
     virtual_hours: Annotated[float | None, Key(above=0, most=LONGEST_S, doc="of virtual time")] = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Limits:
+class Limits(Record):
     """`[limits]`: what one run may take; more is an error of that run."""
 
     cpu_s: Annotated[float, Key(least=1, most=LONGEST_S, doc="of the processor")] = 300.0
     memory_mb: Annotated[int, Key(least=64, most=1_000_000, doc="of memory")] = 2000
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CampaignTable:
+class CampaignTable(Record):
     """The top of the file."""
 
     description: Annotated[str, Key(doc="one sentence")] = ""

@@ -20,7 +20,7 @@ from typing import Annotated
 from p2os.errors import ScenarioError
 from p2os.pioneer.controller.faults import MOMENTARY, read_fault
 from p2os.robots.parameters import RobotParameters
-from p2os.toml_record import read
+from p2os.toml_record import Record, read
 from p2os.toml_schema import LONGEST_S, Key, Table, Where, placed, within
 from robot_bench.scenario.timeline import Timeline
 from simbase.timing import Nanos, nanos
@@ -31,8 +31,7 @@ LINK_DOWN = "link-down"
 Span = Annotated[float | None, Key(above=0, most=LONGEST_S, doc="it ends after so long; without it stays")]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FaultTable:
+class FaultTable(Record):
     """`[[fault]]`: what goes wrong at a time."""
 
     at_s: Annotated[float, Key(least=0, most=LONGEST_S, doc="when")]

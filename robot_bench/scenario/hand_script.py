@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from p2os.errors import ScenarioError
+from p2os.toml_record import Record
 from p2os.toml_schema import Key, Where
 from robot_bench.events.selection import Wires, wire_named
 from robot_bench.scenario.fault_script import Span
@@ -30,16 +31,14 @@ LEVELS = {"high": True, "low": False}
 _Pin = Annotated[str, Key(doc="a wire's name, or a pin of the BluePill")]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TypeTable:
+class TypeTable(Record):
     """Characters come in at a USART of the BluePill."""
 
     text: Annotated[str, Key(doc="the characters")]
     port: Annotated[Literal["usart1", "usart2", "usart3"], Key(doc="where they come in")] = "usart1"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SetPinTable:
+class SetPinTable(Record):
     """A level on a wire or a free pin, held as a wire to 3.3 V or ground; where a part drives it hard too, low wins."""
 
     pin: _Pin
@@ -47,8 +46,7 @@ class SetPinTable:
     for_s: Span = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SetVoltsTable:
+class SetVoltsTable(Record):
     """Volts on a pin of the BluePill, for its ADC."""
 
     pin: _Pin

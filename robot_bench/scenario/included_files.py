@@ -23,7 +23,7 @@ from typing import Annotated, TypeGuard
 
 from p2os.errors import ScenarioError
 from p2os.toml_file import TomlSource, is_file, read_toml, read_user_text
-from p2os.toml_record import read_part
+from p2os.toml_record import Record, read_part
 from p2os.toml_schema import Key, Place, Table
 from simbase.errors import UsageError, nearest, shown, shown_name
 
@@ -39,8 +39,7 @@ FILES: Mapping[str, tuple[str, ...]] = {
 Setting = tuple[str, object]
 
 
-@dataclass(frozen=True, kw_only=True)
-class IncludeTable:
+class IncludeTable(Record):
     """What a file says of itself and of others; none that names another is left in the table that is put together."""
 
     version: Annotated[int, Key(

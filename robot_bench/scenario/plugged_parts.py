@@ -4,21 +4,19 @@ Invariant: a part that was read can be made, and stands on no wire of the robot'
 """
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 from bluepill_sim.parts.registry import GROUP, PARTS, PartSpec, build
 from bluepill_sim.stm32f103 import BONDED_PINS
 from p2os.errors import ScenarioError
-from p2os.toml_record import keys_of
+from p2os.toml_record import Record, keys_of
 from p2os.toml_schema import Key, Place, Table, Where, placed, within
 from simbase.errors import shown, shown_name
 from simbase.trust import Code, Trust
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PartTable:
+class PartTable(Record):
     """`[[part]]`: the keys of every part; all others are its pins and settings."""
 
     kind: Annotated[str, Key(choices=tuple(PARTS), group=GROUP, doc="which part")]

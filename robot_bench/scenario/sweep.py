@@ -22,7 +22,7 @@ from fractions import Fraction
 from typing import Annotated
 
 from p2os.errors import ScenarioError
-from p2os.toml_record import read
+from p2os.toml_record import Record, read
 from p2os.toml_schema import Key, Table, Where, within
 from robot_bench.scenario.included_files import Setting
 from simbase.errors import UsageError, shown
@@ -33,8 +33,7 @@ LARGEST_SEED = 2**63 - 1
 _PART = re.compile(r"(\d+)(?:\s*-\s*(\d+))?", re.ASCII)
 
 
-@dataclass(frozen=True, slots=True)
-class RangeTable:
+class RangeTable(Record):
     """A range of values, both ends included."""
 
     from_: Annotated[int | float, Key(kind="number", doc="the first value")]

@@ -6,7 +6,7 @@ Reader, JSON schema, page of keys (docs/scenarios.md) and completion are made of
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import field, fields, replace
 from typing import Annotated, Any, Literal, TypeVar
 
 from adapter_sim.codec import BitOrder
@@ -31,7 +31,7 @@ from robot_bench.wires.line_ends import ENDS
 from robot_bench.wires.power_up import RANDOM_SRAM, ZEROS
 from simbase.timing import NS_PER_MS
 
-T = TypeVar("T", bound=Record)
+T = TypeVar("T", DirectSettings, AdapterSettings)
 
 #: Of a list's table: the robot of several that it is for.
 ROBOT = Key(name="robot", kind="text", doc="of [several robots](#several-robots) the one that it is for")
@@ -52,8 +52,7 @@ _Threshold = Annotated[
 ]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StartTable:
+class StartTable(Record):
     """`[start]`: where the robot begins."""
 
     x_m: Annotated[float, in_range("x_m", doc="its place in the world")]
@@ -66,8 +65,7 @@ class StartTable:
         return Pose(x_m=self.x_m, y_m=self.y_m, heading_rad=math.radians(self.heading_deg))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DirectTable:
+class DirectTable(Record):
     """`[direct]`: the robot on the chip's pins, mode A."""
 
     step_mm_s: _Step = None
@@ -84,8 +82,7 @@ class DirectTable:
         return replace(found, ramp_um_per_s2=found.ramp_um_per_s2 or None)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AdapterTable:
+class AdapterTable(Record):
     """`[adapter]`: the adapter between chip and robot, mode B."""
 
     core: Annotated[str, Key(
@@ -120,8 +117,7 @@ class AdapterTable:
         return _in_units_of(AdapterSettings(threshold_um=threshold_um), self)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ControllerTable:
+class ControllerTable(Record):
     """`[controller]`: the virtual robot's own firmware."""
 
     kind: Annotated[str, Key(
@@ -133,8 +129,7 @@ class ControllerTable:
     flash: Annotated[str | None, Key(doc="a TOML file, see [pioneer.md](pioneer.md)")] = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class InWorldTable:
+class InWorldTable(Record):
     """`[in_world.NAME]`: what is otherwise in one world."""
 
     threshold_m: _Threshold = None
@@ -142,8 +137,7 @@ class InWorldTable:
     start: Annotated[StartTable | None, Key(doc="where the robot begins")] = None
 
 
-@dataclass(frozen=True, kw_only=True)
-class OwnTable:
+class OwnTable(Record):
     """What each of several robots has for itself, and the one robot of a scenario at its top."""
 
     mode: Annotated[
@@ -170,7 +164,6 @@ class OwnTable:
     )] = ()  # fmt: skip
 
 
-@dataclass(frozen=True, kw_only=True)
 class EachRobotTable(OwnTable):
     """`[[robot]]`: one of several robots."""
 
@@ -182,7 +175,6 @@ class EachRobotTable(OwnTable):
     heading_deg: Annotated[float | None, in_range("heading_deg", doc="counter-clockwise")] = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class TopTable(OwnTable, IncludeTable):
     """The top of the file."""
 

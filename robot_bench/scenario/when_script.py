@@ -22,7 +22,7 @@ from typing import Annotated, ClassVar
 
 from p2os.errors import ScenarioError
 from p2os.robots.parameters import RobotParameters
-from p2os.toml_record import read, read_part
+from p2os.toml_record import Record, read, read_part
 from p2os.toml_schema import LONGEST_S, Key, Table, Where, placed, within
 from robot_bench.events.kinds import Event
 from robot_bench.events.selection import Wires, select
@@ -37,8 +37,7 @@ from simbase.timing import Nanos, nanos
 _BUTTONS = ("stop-button", "bumper")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FaultActionTable:
+class FaultActionTable(Record):
     """A [fault](#fault-faults-injected-during-the-run-mode-b)."""
 
     fault: Annotated[str, Key(doc="the words of a fault")]
@@ -50,8 +49,7 @@ class FaultActionTable:
         return self.fault
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PressTable:
+class PressTable(Record):
     """A button of a Pioneer (mode B)."""
 
     button: Annotated[str, Key(doc='`"stop-button"`, or `"bumper front 1"`')]
@@ -67,16 +65,14 @@ class PressTable:
         return self.button
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DropLinkTable:
+class DropLinkTable(Record):
     """The P2OS line is broken, both ways (mode B)."""
 
     for_s: Span = None
     words: ClassVar[str] = LINK_DOWN
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SagBatteryTable:
+class SagBatteryTable(Record):
     """A Pioneer's battery shows so much (mode B)."""
 
     volts: Annotated[int | float, Key(kind="number", least=0, most=25.5, doc="what it shows")]
@@ -88,8 +84,7 @@ class SagBatteryTable:
         return f"low-battery {self.volts}"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class EndTable:
+class EndTable(Record):
     """The run ends."""
 
 
@@ -105,8 +100,7 @@ ACTIONS: Mapping[str, type[Action]] = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class WhenTable:
+class WhenTable(Record):
     """`[[when]]`: what is done when something happens."""
 
     event: Annotated[str, Key(doc="in the words of goals")]

@@ -32,7 +32,7 @@ from p2os.pioneer.body.contract import RobotBody
 from p2os.pioneer.world.file import in_range
 from p2os.pioneer.world.model import Obstacle, Repeat, Walk, World
 from p2os.robots.parameters import RobotParameters
-from p2os.toml_record import read
+from p2os.toml_record import Record, read
 from p2os.toml_schema import LONGEST_S, Key, Table, Where, placed, within
 from robot_bench.scenario.timeline import Timeline
 from simbase.errors import nearest, shown
@@ -84,8 +84,7 @@ LONGEST_HOLD_S = 3600
 _SIZES = {"box": ("length_m", "width_m", "height_m"), "cylinder": ("radius_m", "height_m")}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ThingTable:
+class ThingTable(Record):
     """A thing that is placed, moved or removed."""
 
     name: Annotated[str, Key(doc="of the thing")]
@@ -111,7 +110,6 @@ class ThingTable:
     repeat: Annotated[Repeat, Key(doc="what follows the last point of a path")] = Repeat.BACK_AND_FORTH
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class ObstacleTable(ThingTable):
     """`[[obstacle]]`: what is done to a thing at a time."""
 

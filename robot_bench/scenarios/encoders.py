@@ -5,10 +5,10 @@ A kind of goal as any package may offer one: its entry point stands under `robot
 
 import math
 import re
-from dataclasses import dataclass
 from typing import Annotated
 
 from adapter_sim.pinout import load_pinout
+from p2os.toml_record import Record
 from p2os.toml_schema import Key
 from robot_bench.events.kinds import Event, Pose, Text
 from robot_bench.scenario.goals.text import Printed
@@ -18,8 +18,7 @@ from simbase.timing import Nanos
 _COUNTS = re.compile(r"left=(-?\d+) right=(-?\d+)")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class EncoderCountsTable:
+class EncoderCountsTable(Record):
     """How near the counts are."""
 
     steps: Annotated[int, Key(least=0, most=1_000_000, doc="so many steps off at most")] = 1

@@ -1,7 +1,7 @@
 """A record declares a table once: what is read is typed, what is wrong is told with its line, and others can ask."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import Enum
 from typing import Annotated, Literal
 
@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from p2os.errors import ScenarioError
 from p2os.toml_file import TomlSource, read_toml
-from p2os.toml_record import given, keys_of, number_of, read, read_part, sections, table_of, tables_of
+from p2os.toml_record import Record, given, keys_of, number_of, read, read_part, sections, table_of, tables_of
 from p2os.toml_schema import Key, Place, Table
 from simbase.errors import UsageError
 
@@ -20,14 +20,12 @@ class Colour(Enum):
     RED = "red"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Inner:
+class Inner(Record):
     x_m: Annotated[float, Key(least=-1, most=1, doc="its place")]
     note: str = "no key"
 
 
-@dataclass(frozen=True, kw_only=True)
-class Outer:
+class Outer(Record):
     from_: Annotated[int, Key(least=0, most=9)]
     share: Annotated[float | None, Key(above=0, most=1)] = None
     volts: Annotated[int | float, Key(kind="number", least=0, most=25)] = 12

@@ -26,8 +26,7 @@ from simbase.state import PartState, Stateful
 from simbase.timing import NS_PER_S, Nanos
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class GoalTable:
+class GoalTable(Record):
     """`[[goal]]`: what every goal may say, beside the keys of its kind."""
 
     kind: Annotated[str, Key(doc="which")]

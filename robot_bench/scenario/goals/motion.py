@@ -1,15 +1,28 @@
 """Goals on where the robot is and how it moves, by its pose each 50 ms and its contacts."""
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from typing import Annotated
 
 from p2os.errors import ScenarioError
+from p2os.toml_record import Record
 from p2os.toml_schema import Key
 from robot_bench.events.kinds import MICRO, Clearance, Contact, Event, Pose
 from robot_bench.events.selection import moves
-from robot_bench.scenario.goals.watch import From, InTime, OfEvents, Outcome, SelectorFeed, Watch, Within, seconds
+from robot_bench.scenario.goals.watch import (
+    From,
+    GoalKind,
+    InTime,
+    NoKeys,
+    OfEvents,
+    Outcome,
+    SelectorFeed,
+    Watch,
+    Within,
+    given_in_words,
+    seconds,
+    window_in_words,
+)
 from simbase.timing import NS_PER_S, Nanos, nanos
 
 NS_PER_MINUTE = 60 * NS_PER_S
@@ -61,8 +74,7 @@ class NoCollision(Watch):
         return Outcome(met=False, says=f"{self._last.collisions} collision(s), {where}")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MinDistanceTable:
+class MinDistanceTable(Record):
     """A way by itself or by the minute."""
 
     distance_m: _Way = None
@@ -98,8 +110,7 @@ class MinDistance(Watch):
         )  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CellsTable:
+class CellsTable(Record):
     """How many cells."""
 
     least: Annotated[int, Key(least=1, most=1_000_000, doc="so many different ones")]
@@ -133,8 +144,7 @@ class Cells(Watch):
 Inside = Callable[[float, float], float]
 
 
-@dataclass(frozen=True, kw_only=True)
-class RegionTable:
+class RegionTable(Record):
     """A circle, or a rectangle along the axes."""
 
     x_m: _Coordinate = None
@@ -169,7 +179,6 @@ def _is_area(area: tuple[float, ...]) -> bool:
     return is_numbers and len(area) == 4 and area[0] < area[2] and area[1] < area[3]
 
 
-@dataclass(frozen=True, kw_only=True)
 class ReachTable(RegionTable):
     """A region, and when."""
 
@@ -251,8 +260,7 @@ class Stay(Watch):
         return Outcome(met=False, says=says, robustness=worst_m, unit="m")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ClearanceTable:
+class ClearanceTable(Record):
     """A distance to everything."""
 
     least_m: Annotated[float, Key(above=0, most=100, doc="so far away")]
@@ -285,7 +293,6 @@ class LeastClearance(Watch):
         return Outcome(met=least_m >= self._wanted_m, says=says, robustness=least_m - self._wanted_m, unit="m")
 
 
-@dataclass(frozen=True, kw_only=True)
 class StopWithinTable(OfEvents):
     """An event, and how soon the robot stands after it."""
 
@@ -350,8 +357,7 @@ class StopWithin(Watch):
         )  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MovesOnTable:
+class MovesOnTable(Record):
     """How far away from each place, and how soon."""
 
     way_m: Annotated[float, Key(above=0, most=1e6, doc="so far away")]
@@ -400,8 +406,7 @@ class MovesOn(Watch):
         return Outcome(met=False, says=f"{says} within {self._within / NS_PER_S:g} s", robustness=left_s, unit="s")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SmoothTable:
+class SmoothTable(Record):
     """An acceleration."""
 
     most_mps2: Annotated[float, Key(above=0, most=1000, doc="of a rim, m/s²")]
@@ -438,8 +443,7 @@ class Smooth(Watch):
         return Outcome(met=by >= 0, says=says, robustness=by, unit="m/s²")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class EnergyTable:
+class EnergyTable(Record):
     """Work at the rims, joules."""
 
     most_j: _Work = None
@@ -493,3 +497,75 @@ class Energy(Watch):
         elif by < 0:
             says += f"; {self._a_metre_j:g} J a metre are allowed"
         return Outcome(met=by >= 0, says=says, robustness=by, unit="J")
+
+
+def _region(table: RegionTable) -> str:
+    if table.area_m is not None:
+        low_x, low_y, high_x, high_y = table.area_m
+        return f"x {low_x:g} to {high_x:g} m, y {low_y:g} to {high_y:g} m"
+    x_m, y_m, radius_m = table.circle
+    return f"the {radius_m:g} m around x {x_m:g} m, y {y_m:g} m"
+
+
+_ONE_REGION = ("area_m", "radius_m")
+
+KINDS: Mapping[str, GoalKind] = {
+    "no_collision": GoalKind(
+        NoKeys, lambda _: "touches nothing", lambda _: NoCollision(),
+        doc="the hull touches nothing; a failure names what was hit, when, where and with which part",
+        needs_world=True,
+    ),
+    "min_distance": GoalKind(
+        MinDistanceTable,
+        lambda table: "drives at least " + " and ".join(
+            given_in_words(("", table.distance_m, " m"), ("", table.distance_m_a_minute, " m a minute"))
+        ),
+        MinDistance, doc="the path is at least so long", any_of=("distance_m", "distance_m_a_minute"),
+    ),
+    "cells": GoalKind(
+        CellsTable, lambda table: f"enters at least {table.least} different cells of 0.5 m", Cells,
+        doc="so many different cells of 0.5 m were entered",
+    ),
+    "reach": GoalKind(
+        ReachTable, lambda table: f"reaches {_region(table)}{window_in_words(within_s=table.within_s)}", Reach,
+        doc="the robot's centre comes into the region, in time", any_of=_ONE_REGION, is_scripted=True,
+    ),
+    "avoid": GoalKind(
+        RegionTable, lambda table: f"stays out of {_region(table)}", lambda table: Stay(table, is_inside=False),
+        doc="its centre stays out of the region", any_of=_ONE_REGION,
+    ),
+    "stay_within": GoalKind(
+        RegionTable, lambda table: f"stays within {_region(table)}", lambda table: Stay(table, is_inside=True),
+        doc="its centre stays in the region", any_of=_ONE_REGION,
+    ),
+    "clearance": GoalKind(
+        ClearanceTable, lambda table: f"keeps {table.least_m:g} m away from everything", LeastClearance,
+        doc="the hull stays so far from everything", needs_world=True,
+    ),
+    "stop_within": GoalKind(
+        StopWithinTable,
+        lambda table: f"stands still{window_in_words(table.after, within_s=table.within_s)}"
+        + "".join(given_in_words((" and ", table.way_m, " m"))),
+        StopWithin, doc="after each such event the robot stands in time, no further on",
+    ),
+    "moves_on": GoalKind(
+        MovesOnTable,
+        lambda table: f"gets {table.way_m:g} m away from each place"
+        + window_in_words(from_s=table.from_s, within_s=table.within_s),
+        MovesOn, doc="it gets so far away from each place in time: it neither stands nor turns on the spot nor is shut "
+        "in; the next place is where it was so far away",
+    ),
+    "smooth": GoalKind(
+        SmoothTable, lambda table: f"accelerates no rim by more than {table.most_mps2:g} m/s²", Smooth,
+        doc="no rim changes its speed faster, from pose to pose",
+    ),
+    "energy": GoalKind(
+        EnergyTable,
+        lambda table: "takes at most " + " and ".join(
+            given_in_words(("", table.most_j, " J"), ("", table.most_j_a_metre, " J a metre"))
+        ),
+        Energy, doc="the work at the rims, |torque · rate| of both wheels over the run, stays within so many "
+        "joules; a failure says where it became more, and where the power was greatest",
+        any_of=("most_j", "most_j_a_metre"), needs_world=True,
+    ),
+}  # fmt: skip

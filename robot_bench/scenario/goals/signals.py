@@ -1,18 +1,18 @@
 """Goals on wires: the values of the motors' pins, a level that holds, a wave in bounds."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Annotated, Literal
 
 from adapter_sim.codec import motor_value
 from adapter_sim.pinout import load_pinout
 from p2os.errors import ScenarioError
+from p2os.toml_record import Record
 from p2os.toml_schema import LONGEST_S, Key
 from robot_bench.events.kinds import Event, PinEdge, Wave
 from robot_bench.events.selection import wire_named
-from robot_bench.scenario.goals.watch import From, OfEvents, Outcome, To, Watch, seconds
+from robot_bench.scenario.goals.watch import From, GoalKind, OfEvents, Outcome, To, Watch, seconds, window_in_words
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, nanos
 
 #: chosen: two motor values that follow each other within this are one change (two ports are written in turn).
@@ -22,8 +22,7 @@ _Hz = Annotated[float | None, Key(above=0, most=1e8, doc="of each period")]
 _Duty = Annotated[float | None, Key(least=0, most=1, doc="the high part of each period")]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MotorSequenceTable:
+class MotorSequenceTable(Record):
     """Values of the motors' pins, one pair after the other."""
 
     values: Annotated[tuple[tuple[int, int], ...], Key(doc="`[[left, right], …]`")]
@@ -100,7 +99,6 @@ def shown_pairs(pairs: Sequence[tuple[int, ...]]) -> str:
     return " ".join(f"{left:+d}/{right:+d}" for left, right in pairs)
 
 
-@dataclass(frozen=True, kw_only=True)
 class OfPin(OfEvents):
     """A wire over a span of time."""
 
@@ -123,7 +121,6 @@ class OfPin(OfEvents):
         return nanos(self.from_s or 0.0), nanos(self.to_s or LONGEST_S)
 
 
-@dataclass(frozen=True, kw_only=True)
 class PinHoldsTable(OfPin):
     """A level of a wire."""
 
@@ -169,7 +166,6 @@ class PinHolds(Watch):
         return self.finish(at)
 
 
-@dataclass(frozen=True, kw_only=True)
 class WaveTable(OfPin):
     """Bounds of the periods of a wire."""
 
@@ -235,3 +231,21 @@ class WaveWithin(Watch):
             return Outcome(met=False, says=f"{self._name} had {self._count} whole periods, {self._periods} are wanted")
         by = min(self._hz[0] - self._hz_bounds[0], self._hz_bounds[1] - self._hz[1])
         return Outcome(met=True, robustness=by if math.isfinite(by) else None, unit="Hz")
+
+
+KINDS: Mapping[str, GoalKind] = {
+    "motor_sequence": GoalKind(
+        MotorSequenceTable, lambda table: f"sets the motors to {shown_pairs(table.values)}", MotorSequence,
+        doc="the motor pins showed exactly these values, each held so long", is_scripted=True,
+    ),
+    "pin_holds": GoalKind(
+        PinHoldsTable,
+        lambda table: f"holds {table.pin} {table.level}{window_in_words(from_s=table.from_s, to_s=table.to_s)}",
+        PinHolds, doc="the wire has this level all the time",
+    ),
+    "wave": GoalKind(
+        WaveTable,
+        lambda table: f"has a wave in bounds on {table.pin}{window_in_words(from_s=table.from_s, to_s=table.to_s)}",
+        WaveWithin, doc="every period is in bounds, and there are so many",
+    ),
+}  # fmt: skip

@@ -5,18 +5,20 @@ a contact. The sides are those of a Pioneer's front ring, sonar 2 to 4 left and 
 others. Ranges are as old as the ring is slow: each sonar of eight is new every 0.4 s.
 
 The measure of a goal is the share that is left of what it allows: 1 at best, so that it hides no other goal's margin
+from collections.abc import Mapping
 from a search.
 
 Invariant: where no range is known yet, nothing is missed.
 """
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Annotated
 
+from p2os.toml_record import Record
 from p2os.toml_schema import Key
 from robot_bench.events.kinds import MICRO, Event, Pose, Ranges
-from robot_bench.scenario.goals.watch import InTime, Outcome, Watch, seconds
+from robot_bench.scenario.goals.watch import GoalKind, InTime, Outcome, Watch, seconds
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
 
@@ -36,8 +38,7 @@ _Free = Annotated[float, Key(above=0, most=100, doc="beyond that a side is free"
 _Sonar = Annotated[tuple[int, ...], Key(doc="numbers of the sonar on that side, from 1")]
 
 
-@dataclass(frozen=True, kw_only=True)
-class SidesTable:
+class SidesTable(Record):
     """What counts as near on one side and as free on the other."""
 
     near_m: Annotated[float, Key(above=0, most=100, doc="nearer than that something is on a side")]
@@ -85,7 +86,6 @@ class _Sides:
         return -1 if right_mm < self._near_mm and left_mm > self._free_mm else 0
 
 
-@dataclass(frozen=True, kw_only=True)
 class TurnsAwayTable(SidesTable):
     """Sides, and how many turns in a row may go the wrong way."""
 
@@ -190,15 +190,13 @@ class _NotLong(Watch):
         return Outcome(met=False, says=f"{says}; {self._within_s:g} s are allowed", robustness=by, unit=ALLOWED)
 
 
-@dataclass(frozen=True, kw_only=True)
 class SteersAwayTable(SidesTable):
     """Sides, and for how long it may bend the wrong way."""
 
     within_s: InTime
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class NoIdleTurnTable:
+class NoIdleTurnTable(Record):
     """What is free, and for how long it may turn there."""
 
     free_m: _Free
@@ -234,8 +232,7 @@ class NoIdleTurn(_NotLong):
         return _spins(pose) and self._ranges is not None and min(self._ranges.mm, default=0) > self._free_mm
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BacksOnPathTable:
+class BacksOnPathTable(Record):
     """How far off its way."""
 
     off_m: Annotated[float, Key(above=0, most=100, doc="so near to the way that it has come")]
@@ -273,3 +270,27 @@ class BacksOnPath(Watch):
             return Outcome(met=True, robustness=by, unit=ALLOWED)
         says = f"it went back {self._worst_m:.2f} m off the way that it had come at {_place(self._worst_at)}"
         return Outcome(met=False, says=f"{says}, {self._most_m:g} m are allowed", robustness=by, unit=ALLOWED)
+
+
+KINDS: Mapping[str, GoalKind] = {
+    "turns_away": GoalKind(
+        TurnsAwayTable,
+        lambda table: f"turns on the spot away from what stands on one side, but for {table.row} in a row",
+        TurnsAway, doc="a turn on the spot that begins with something nearer than `near_m` on one side and the other "
+        "free beyond `free_m` goes to the free one",
+    ),
+    "steers_away": GoalKind(
+        SteersAwayTable,
+        lambda table: f"bends towards what stands on one side for no longer than {table.within_s:g} s",
+        SteersAway, doc="driving forward it does not bend towards the side that is not free, as above, for longer",
+    ),
+    "no_idle_turn": GoalKind(
+        NoIdleTurnTable,
+        lambda table: f"turns on the spot for no longer than {table.within_s:g} s where {table.free_m:g} m are free",
+        NoIdleTurn, doc="it does not go on turning on the spot for longer than that where every sonar is free",
+    ),
+    "backs_on_path": GoalKind(
+        BacksOnPathTable, lambda table: f"goes back only within {table.off_m:g} m of the way that it came",
+        BacksOnPath, doc="going back it stays so near to the way that it has come",
+    ),
+}  # fmt: skip

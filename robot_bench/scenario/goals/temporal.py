@@ -7,13 +7,24 @@ in its window, that of `eventually` the greatest; after an event, that of the wo
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Annotated, Any
 
 from p2os.errors import ScenarioError
 from p2os.toml_schema import LONGEST_S, Key
 from robot_bench.events.kinds import MICRO, Clearance, Event, Pose, Ranges, WorldChange
-from robot_bench.scenario.goals.watch import From, OfEvents, Outcome, SelectorFeed, To, Watch, Within, seconds
+from robot_bench.scenario.goals.watch import (
+    From,
+    GoalKind,
+    OfEvents,
+    Outcome,
+    SelectorFeed,
+    To,
+    Watch,
+    Within,
+    given_in_words,
+    seconds,
+    window_in_words,
+)
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos, nanos
 
@@ -39,7 +50,6 @@ _Event = Annotated[str, Key(doc="the event")]
 _Most = Annotated[float, Key(above=0, most=LONGEST_S, doc="in so many seconds")]
 
 
-@dataclass(frozen=True, kw_only=True)
 class WindowTable(OfEvents):
     """A window of time, from the beginning or from each occurrence of an event."""
 
@@ -48,7 +58,6 @@ class WindowTable(OfEvents):
     to_s: To = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class OverTimeTable(WindowTable):
     """Bounds of a signal in a window."""
 
@@ -64,7 +73,6 @@ class OverTimeTable(WindowTable):
         return lambda value: min(value - least, most - value)
 
 
-@dataclass(frozen=True, kw_only=True)
 class HoldHeadingTable(WindowTable):
     """A heading in a window."""
 
@@ -72,7 +80,6 @@ class HoldHeadingTable(WindowTable):
     tolerance_deg: Annotated[float, Key(above=0, most=180, doc="off it at most")]
 
 
-@dataclass(frozen=True, kw_only=True)
 class HoldSpeedTable(WindowTable):
     """A speed in a window."""
 
@@ -80,7 +87,6 @@ class HoldSpeedTable(WindowTable):
     tolerance_mps: Annotated[float, Key(above=0, most=100, doc="off it at most")]
 
 
-@dataclass(frozen=True, kw_only=True)
 class NeverTable(OfEvents):
     """An event that must not happen."""
 
@@ -88,7 +94,6 @@ class NeverTable(OfEvents):
     from_s: From = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class HappensTable(NeverTable):
     """An event, and how often it may happen."""
 
@@ -97,7 +102,6 @@ class HappensTable(NeverTable):
     within_s: Within = None
 
 
-@dataclass(frozen=True, kw_only=True)
 class InOrderTable(OfEvents):
     """Events one after the other."""
 
@@ -107,7 +111,6 @@ class InOrderTable(OfEvents):
         refuse_other_than_texts("events", self.events)
 
 
-@dataclass(frozen=True, kw_only=True)
 class LatencyTable(OfEvents):
     """An event that follows another one."""
 
@@ -375,3 +378,69 @@ class Latency(Watch):
         took, at = self._worst
         says = f"{self._count} times, at most {took / NS_PER_S:.6f} s (at {seconds(at)})"
         return Outcome(met=True, says=says, robustness=(self._most - took) / NS_PER_S, unit="s")
+
+
+def _window(table: WindowTable) -> str:
+    return window_in_words(table.after, from_s=table.from_s, to_s=table.to_s)
+
+
+def _bounds(table: OverTimeTable) -> str:
+    bounds = " and".join(given_in_words((" at least ", table.least, ""), (" at most ", table.most, "")))
+    return f"{table.signal}{'' if table.thing is None else f' from {table.thing}'}{bounds}"
+
+
+def _over_time(table: OverTimeTable, *, is_always: bool) -> Watch:
+    return OverTime(table, table.signal, table.margin, is_always=is_always, thing=table.thing)
+
+
+def never(words: str, table: OfEvents, *, from_s: float | None = None) -> Watch:
+    """Return what watches that an event in words does not happen."""
+    return Happens(HappensTable(event=words, least=0, most=0, from_s=from_s, wires=table.wires))
+
+
+KINDS: Mapping[str, GoalKind] = {
+    "hold_heading": GoalKind(
+        HoldHeadingTable,
+        lambda table: f"holds heading {table.heading_deg:g}° to {table.tolerance_deg:g}°{_window(table)}",
+        lambda table: OverTime(
+            table, "heading_deg", around(table.heading_deg, table.tolerance_deg, is_angle=True), is_always=True
+        ),
+        doc="its heading stays so, the short way round", is_scripted=True,
+    ),
+    "hold_speed": GoalKind(
+        HoldSpeedTable,
+        lambda table: f"holds {table.speed_mps:g} m/s to {table.tolerance_mps:g} m/s{_window(table)}",
+        lambda table: OverTime(table, "speed_mps", around(table.speed_mps, table.tolerance_mps), is_always=True),
+        doc="its speed stays so", is_scripted=True,
+    ),
+    "always": GoalKind(
+        OverTimeTable, lambda table: f"has always {_bounds(table)}{_window(table)}",
+        lambda table: _over_time(table, is_always=True), doc="the signal is in bounds at each sample",
+        any_of=("least", "most"),
+    ),
+    "eventually": GoalKind(
+        OverTimeTable, lambda table: f"has at some time {_bounds(table)}{_window(table)}",
+        lambda table: _over_time(table, is_always=False), doc="the signal is in bounds at one of them",
+        any_of=("least", "most"),
+    ),
+    "happens": GoalKind(
+        HappensTable,
+        lambda table: f"{table.event!r} happens"
+        + ("" if table.least is None else f" at least {table.least} time(s)")
+        + ("" if table.most is None else f" at most {table.most} time(s)")
+        + window_in_words(from_s=table.from_s, within_s=table.within_s),
+        Happens, doc="the event happens so often in that time: once at least where `least` is not given",
+    ),
+    "never": GoalKind(
+        NeverTable, lambda table: f"{table.event!r} never happens{window_in_words(from_s=table.from_s)}",
+        lambda table: never(table.event, table, from_s=table.from_s), doc="it does not happen",
+    ),
+    "in_order": GoalKind(
+        InOrderTable, lambda table: f"in order {', '.join(map(repr, table.events))}", InOrderOfEvents,
+        doc="they happen one after the other", is_scripted=True,
+    ),
+    "latency": GoalKind(
+        LatencyTable, lambda table: f"{table.to!r} follows {table.from_!r} within {table.most_s:g} s", Latency,
+        doc="each `from` is followed by a `to` in time",
+    ),
+}  # fmt: skip

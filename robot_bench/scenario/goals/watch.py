@@ -58,13 +58,11 @@ Within = Annotated[float | None, Key(above=0, most=LONGEST_S, doc="in so many se
 InTime = Annotated[float, Key(above=0, most=LONGEST_S, doc="in so many seconds")]
 
 
-@dataclass(frozen=True, kw_only=True)
-class NoKeys:
+class NoKeys(Record):
     """Of a kind of goal without keys of its own."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class OfEvents:
+class OfEvents(Record):
     """Of a kind of goal with events or wires in words: it is told which wires they may name."""
 
     #: Those of a robot on own pins; None: those of the pin-out. No key of a file.
@@ -86,7 +84,7 @@ class GoalKind:
     """A kind of goal: a row of the table.
 
     Args:
-        table: Declares the keys of its table beside `kind`: a frozen dataclass, see `p2os.toml_record`.
+        table: Declares the keys of its table beside `kind`, see `p2os.toml_record`.
         wanted: The goal as a sentence, of its table.
         watch: Makes what watches one run, of its table; a `UsageError` refuses the table.
         doc: When it is met, a line of Markdown for schema and page.
@@ -125,3 +123,16 @@ class SelectorFeed(Stateful):
 def seconds(at: Nanos) -> str:
     """Return a time in words."""
     return f"{at / NS_PER_S:.3f} s"
+
+
+def given_in_words(*parts: tuple[str, float | None, str]) -> list[str]:
+    """Return words, number and unit of those that are given."""
+    return [f"{words}{number:g}{unit}" for words, number, unit in parts if number is not None]
+
+
+def window_in_words(
+    after: str | None = None, *, from_s: float | None = None, to_s: float | None = None, within_s: float | None = None
+) -> str:
+    """Return the window of a goal as the end of its sentence."""
+    times = given_in_words((" from ", from_s, " s"), (" to ", to_s, " s"), (" within ", within_s, " s"))
+    return "".join([*([] if after is None else [f" after {after!r}"]), *times])

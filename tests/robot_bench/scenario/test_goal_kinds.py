@@ -3,7 +3,7 @@
 import json
 import runpy
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Annotated, Any, Literal
@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from p2os.errors import ScenarioError
+from p2os.toml_record import Record
 from p2os.toml_schema import Key
 from robot_bench.cli.names import setting_keys
 from robot_bench.events.kinds import Clearance, Contact, Event, Fault, Note, PinEdge, Pose, Ranges, Text, Wave
@@ -402,8 +403,7 @@ def test_goals_that_know_a_shipped_program_come_by_entry_points_and_are_in_the_s
         load_goal({"kind": "sensor_named"}, "x")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TiltTable:
+class TiltTable(Record):
     most_deg: Annotated[float, Key(above=0, most=90, doc="it leans no further ([why](x.md))")]
     axis: Annotated[Literal["roll", "pitch"], Key(doc="about which")] = "roll"
     samples: Annotated[int, Key(least=1, most=100, doc="in so many poses")] = 5
