@@ -25,6 +25,10 @@ class Inner(Record):
     note: str = "no key"
 
 
+class Middle(Record):
+    inner: Annotated[Inner | None, Key()] = None
+
+
 class Outer(Record):
     from_: Annotated[int, Key(least=0, most=9)]
     share: Annotated[float | None, Key(above=0, most=1)] = None
@@ -34,6 +38,7 @@ class Outer(Record):
     names: Annotated[tuple[str, ...], Key()] = ()
     path_m: Annotated[tuple[tuple[float, float], ...], Key(kind="points", count=2, least=0, most=5)] = ()
     inner: Annotated[Inner | None, Key()] = None
+    deep: Annotated[Middle, Key()] = field(default_factory=Middle)
     by_name: Annotated[Mapping[str, Inner], Key()] = field(default_factory=dict)
     rows: Annotated[tuple[Table, ...], Key(record=Inner)] = ()
 
@@ -67,11 +72,12 @@ def test_values_are_of_the_types_that_are_declared() -> None:
         ("", "w.toml:1: key 'from' is missing", "a whole number, at least 0, at most 9"),
         ("\nfrom = 10", "w.toml:2: from = 10 is out of range", "it is a whole number, at least 0, at most 9"),
         ("from = 1\nfrom_ = 1", "w.toml:2: unknown key 'from_'", "did you mean 'from'?"),
-        ("from = 1\nnote = 1", "w.toml:2: unknown key 'note'", "known are by_name"),
+        ("from = 1\nnote = 1", "w.toml:2: unknown key 'note'", "known are by_name, colour, deep"),
         ("from = 1\nshare = 0", "w.toml:2: share = 0 is out of range", "it is a number above 0, at most 1"),
         ('from = 1\ncolour = "rad"', 'w.toml:2: colour = "rad" is none of red', "did you mean 'red'?"),
         ('from = 1\nside = "up"', 'w.toml:2: side = "up" is none of left, right', None),
         ("from = 1\n[inner]\nx_m = 2", "w.toml:3: [inner]: x_m = 2 is out of range", "at least -1, at most 1"),
+        ("from = 1\n[deep.inner]\n\nx_m = 2", "w.toml:4: [deep.inner]: x_m = 2 is out of range", None),
         ("from = 1\n[by_name.a]\n\nx_m = 2", "w.toml:4: [by_name.a]: x_m = 2 is out of range", None),
         ("from = 1\n[by_name]\na = 2", "w.toml:3: [by_name]: a = 2 is not a table", None),
         ("from = 7", "w.toml:1: seven is taken", "eight is free"),
@@ -89,13 +95,14 @@ def test_a_key_is_what_its_field_says() -> None:
     kinds = {name: key.kind for name, key in keys.items()}
     assert kinds == {
         "from": "whole", "share": "number", "volts": "number", "colour": "text", "side": "text", "names": "texts",
-        "path_m": "points", "inner": "table", "by_name": "table", "rows": "tables",
+        "path_m": "points", "inner": "table", "deep": "table", "by_name": "table", "rows": "tables",
     }  # fmt: skip
     assert [name for name, key in keys.items() if key.required] == ["from"]
     assert (keys["volts"].default, keys["colour"].choices, keys["side"].choices) == (12, ("red",), ("left", "right"))
     assert [key.doc for key in keys_of(Inner)] == ["its place"], "a field without a Key is none of the file's"
     assert dict(sections(Outer)) == {
-        "": keys_of(Outer), "[inner]": keys_of(Inner), "[by_name.NAME]": keys_of(Inner), "[[rows]]": keys_of(Inner),
+        "": keys_of(Outer), "[inner]": keys_of(Inner), "[deep]": keys_of(Middle), "[deep.inner]": keys_of(Inner),
+        "[by_name.NAME]": keys_of(Inner), "[[rows]]": keys_of(Inner),
     }  # fmt: skip
 
 

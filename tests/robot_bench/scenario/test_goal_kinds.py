@@ -305,6 +305,7 @@ def test_goal_wave_by_edges_and_goal_wave_by_wave(high_ms: int, met: bool) -> No
     assert met or found.says == "PB7 had 100 Hz and 30.0% duty in the period up to 0.020 s"
     wave = Wave(t=5, wire="motor1_comm1", at=0, period=10_000, high=high_ms * 1000, ticks_hz=1_000_000)
     assert outcome("wave", [wave], **bounds).met is met
+    assert not outcome("wave", [wave], pin="PB7", most_duty=0).met, "a bound of 0 is one"
     few = outcome("wave", edges("motor1_comm1", *rows), periods=3, pin="PB7")
     assert few.says == "PB7 had 2 whole periods, 3 are wanted"
 
