@@ -30,7 +30,7 @@ from typing import (
     get_type_hints,
 )
 
-from p2os.toml_schema import Key, Kind, Place, Table, Where, check_table, placed, within
+from p2os.toml_schema import Key, Kind, Table, TablePlace, Where, check_table, placed, within
 
 
 @dataclass_transform(frozen_default=True, kw_only_default=True)
@@ -155,7 +155,7 @@ def _typed(value: Any, column: _Column, where: Where) -> object:
     origin, record = get_origin(hint), _record(hint)
     if isinstance(hint, type) and (hint is float or issubclass(hint, Enum)):
         return hint(value)
-    inner = f"{where.table}.{key.name}" if isinstance(where, Place) and where.table else key.name
+    inner = f"{where.table}.{key.name}" if isinstance(where, TablePlace) and where.table else key.name
     if record is not None:
         return read(record, value, within(where, inner))
     if key.is_named:

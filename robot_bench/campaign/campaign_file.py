@@ -28,7 +28,7 @@ from p2os.errors import ScenarioError
 from p2os.pioneer.world import load_world
 from p2os.toml_file import TomlSource, is_file, read_toml, read_user_text
 from p2os.toml_record import Record, keys_of, number_of, read, sections
-from p2os.toml_schema import LONGEST_S, Key, Place, Table, Where, check_table, placed, within
+from p2os.toml_schema import LONGEST_S, Key, Table, TablePlace, Where, check_table, placed, within
 from robot_bench.campaign.search import SEARCHES
 from robot_bench.campaign.things import KINDS
 from robot_bench.campaign.trial import Trial, trial_of, unpacked
@@ -172,7 +172,7 @@ class Budget(Record):
     virtual_hours: Annotated[float | None, Key(above=0, most=LONGEST_S, doc="of virtual time")] = None
 
 
-class Limits(Record):
+class RunLimits(Record):
     """`[limits]`: what one run may take; more is an error of that run."""
 
     cpu_s: Annotated[float, Key(least=1, most=LONGEST_S, doc="of the processor")] = 300.0
@@ -195,7 +195,7 @@ class CampaignTable(Record):
     gap_m: Annotated[float, Key(least=0, most=100, doc="between things that are drawn")] = GAP_M
     free_m: Annotated[float, Key(least=0, most=100, doc="around the start")] = FREE_M
     budget: Annotated[Budget, Key(doc="how much may be spent")] = field(default_factory=Budget)
-    limits: Annotated[Limits, Key(doc="what one run may take")] = field(default_factory=Limits)
+    limits: Annotated[RunLimits, Key(doc="what one run may take")] = field(default_factory=RunLimits)
     cheap: _Settings = None
     full: _Settings = None
     vary: _Settings = None
@@ -225,7 +225,7 @@ class Campaign:
     gap_m: float
     free_m: float
     budget: Budget
-    limits: Limits
+    limits: RunLimits
     cheap: tuple[Setting, ...] = ()
     full: tuple[Setting, ...] = ()
     vary: Mapping[str, Span] = field(default_factory=dict)
@@ -250,7 +250,7 @@ def load_campaign(path: Path, *, trust: bool | Trust = False) -> Campaign:
 def parse_campaign(text: str, path: Path, *, firmware: Path | None = None, trust: bool | Trust = False) -> Campaign:
     """Check the text of a campaign file, whose program `firmware` may replace; errors as of `load_campaign`."""
     table, places = read_toml(text, path.name, "a campaign", ScenarioError)
-    where = Place(TomlSource(path.name, places))
+    where = TablePlace(TomlSource(path.name, places))
     top = read(CampaignTable, table, where)
     trial = _with_start(_trial(top, path, where, firmware, trust), top.vary or {}, path)
     draws = _draws(top.draw, where)
@@ -293,7 +293,7 @@ def campaign_schema() -> Json:
     return {"$schema": DRAFT, "title": "A campaign of p2os", **top}
 
 
-def _trial(top: CampaignTable, path: Path, where: Place, firmware: Path | None, trust: bool | Trust) -> Trial:
+def _trial(top: CampaignTable, path: Path, where: TablePlace, firmware: Path | None, trust: bool | Trust) -> Trial:
     beside = path.parent / top.scenario
     if firmware is None and top.firmware is not None:
         firmware = path.parent / top.firmware
@@ -351,7 +351,7 @@ def _leaves(table: Table, above: str, where: Where) -> Iterator[tuple[str, objec
             yield key, value, f"{at}: {key}"
 
 
-def _draws(tables: Sequence[Table], where: Place) -> tuple[Drawn, ...]:
+def _draws(tables: Sequence[Table], where: TablePlace) -> tuple[Drawn, ...]:
     found: list[Drawn] = []
     for number, table in enumerate(tables):
         place = within(where, "draw", number)

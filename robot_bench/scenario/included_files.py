@@ -24,7 +24,7 @@ from typing import Annotated, TypeGuard
 from p2os.errors import ScenarioError
 from p2os.toml_file import TomlSource, is_file, read_toml, read_user_text
 from p2os.toml_record import Record, read_part
-from p2os.toml_schema import Key, Place, Table
+from p2os.toml_schema import Key, Table, TablePlace
 from simbase.errors import UsageError, nearest, shown, shown_name
 
 #: Of the schema of scenario files.
@@ -233,7 +233,7 @@ def _read(path: Path, folder: Path, above: tuple[Path, ...], count: list[int]) -
         raise ScenarioError(f"{shown_name(above[0].name)} includes more than {MOST_FILES} files")
     text = read_user_text(path, "a scenario", ScenarioError)
     table, places = read_toml(text, name, "a scenario", ScenarioError)
-    place = Place(TomlSource(name, places))
+    place = TablePlace(TomlSource(name, places))
     own, _ = read_part(IncludeTable, table, place)
     table = {name: value for name, value in table.items() if name not in {"extends", "include"}}
     for name_of, keys in FILES.items():

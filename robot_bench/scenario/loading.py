@@ -20,7 +20,7 @@ from p2os.pioneer.world.start_places import refuse_start, start_places
 from p2os.robots.parameters import RobotParameters, load_parameters
 from p2os.toml_file import is_file
 from p2os.toml_record import given, number_of, read, table_of, tables_of
-from p2os.toml_schema import Place, Table, placed, within
+from p2os.toml_schema import Table, TablePlace, placed, within
 from robot_bench.events.selection import bus_of
 from robot_bench.scenario import plugged_parts
 from robot_bench.scenario.fault_script import load_faults
@@ -100,7 +100,7 @@ def _refuse_what_never_comes(found: ScenarioTable, path: Path, settings: Sequenc
 
     A run that is cut short beside the file leaves out what would have come later.
     """
-    where, table = Place(found.source), found.table
+    where, table = TablePlace(found.source), found.table
     worlds = table_of(table, "in_world")
     for world in worlds:
         resolve_world(world, path.parent, str(within(where, f"in_world.{world}")))
@@ -134,7 +134,7 @@ def build_scenario(
         ScenarioError: They break the schema.
     """
     build = _build_several if isinstance(found.table.get("robot"), list) else _build
-    scenario = build(found.table, found.text, path, Place(found.source), firmware, Trust.of(trust))
+    scenario = build(found.table, found.text, path, TablePlace(found.source), firmware, Trust.of(trust))
     kept = tuple(axis for axis in scenario.axes if axis.key not in dict(settings))
     scenario = replace(scenario, settings=tuple(settings), axes=kept, path=path)
     for one in scenario.programmed or (scenario,):
@@ -166,7 +166,7 @@ def refuse_what_its_world_refuses(scenario: Scenario, world: World) -> None:
     refuse_names(scenario.changes, world)
 
 
-def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | None, trust: Trust) -> Scenario:
+def _build(table: Table, text: str, path: Path, where: TablePlace, firmware: Path | None, trust: Trust) -> Scenario:
     top = read(TopTable, table, where)
     own_robot = _own_robot(top.robot, table, path, where)
     parameters = own_robot.robot.parameters if own_robot else _parameters(top.robot, path, where)
@@ -223,7 +223,7 @@ def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | N
     return scenario
 
 
-def _refuse_goals_beyond_the_end(scenario: Scenario, where: Place) -> None:
+def _refuse_goals_beyond_the_end(scenario: Scenario, where: TablePlace) -> None:
     """Refuse goals that would look at nothing, and so be met by any run."""
     for number, goal in enumerate(scenario.goals):
         said = dict(given(goal.table))
@@ -235,7 +235,7 @@ def _refuse_goals_beyond_the_end(scenario: Scenario, where: Place) -> None:
             )
 
 
-def _refuse_unrecorded(scenario: Scenario, table: Table, where: Place) -> None:
+def _refuse_unrecorded(scenario: Scenario, table: Table, where: TablePlace) -> None:
     """Refuse goals and `[[when]]` that wait for what a bus does that is not recorded."""
     for kind, keys in _EVENT_KEYS.items():
         for number, item in enumerate(tables_of(table, kind)):
@@ -251,7 +251,9 @@ def _refuse_unrecorded(scenario: Scenario, table: Table, where: Place) -> None:
 _EVENT_KEYS = {"goal": {"event", "events", "after", "from", "to"}, "when": {"event"}}
 
 
-def _build_several(table: Table, text: str, path: Path, where: Place, firmware: Path | None, trust: Trust) -> Scenario:
+def _build_several(
+    table: Table, text: str, path: Path, where: TablePlace, firmware: Path | None, trust: Trust
+) -> Scenario:
     """Return a scenario with several robots, from a table of each."""
     tables = split(table, where)
     found: list[Scenario | None] = [
@@ -293,7 +295,7 @@ def _build_several(table: Table, text: str, path: Path, where: Place, firmware: 
     )  # fmt: skip
 
 
-def _model(table: Table, path: Path, where: Place) -> RobotParameters:
+def _model(table: Table, path: Path, where: TablePlace) -> RobotParameters:
     """Return what a robot without a program is."""
     robot = str(table["robot"])
     own = _own_robot(robot, {key: value for key, value in table.items() if key == "pins"}, path, where)
@@ -307,7 +309,7 @@ def _taken(own_robot: OwnRobot | None) -> dict[str, str]:
     return {wire.pin: wire.name for wire in own_robot.robot.signals}
 
 
-def _parameters(robot: str, path: Path, where: Place) -> RobotParameters:
+def _parameters(robot: str, path: Path, where: TablePlace) -> RobotParameters:
     """Return a model's parameters; a file of them stands beside the scenario, as all that it names."""
     beside = path.parent / robot
     try:
@@ -317,7 +319,7 @@ def _parameters(robot: str, path: Path, where: Place) -> RobotParameters:
         raise ScenarioError(f"{where.at('robot')}: {error}", hint=hint) from error
 
 
-def _own_robot(robot: str, table: Table, path: Path, where: Place) -> OwnRobot | None:
+def _own_robot(robot: str, table: Table, path: Path, where: TablePlace) -> OwnRobot | None:
     """Return the robot, where it hangs on the chip's own pins; what only another one can have is refused."""
     file = find_own_robot(robot, path.parent)
     if file is None:
@@ -336,7 +338,7 @@ def _own_robot(robot: str, table: Table, path: Path, where: Place) -> OwnRobot |
     return load_own_robot(file, table_of(table, "pins"), where)
 
 
-def _firmware(name: str, path: Path, where: Place) -> Path:
+def _firmware(name: str, path: Path, where: TablePlace) -> Path:
     """Return the file beside the scenario, or the shipped program of that name."""
     beside = path.parent / name
     if is_file(beside):
@@ -351,7 +353,7 @@ def _firmware(name: str, path: Path, where: Place) -> Path:
     )
 
 
-def _start(table: Table, where: Place) -> Pose | None:
+def _start(table: Table, where: TablePlace) -> Pose | None:
     return read(StartTable, table_of(table, "start"), within(where, "start")).pose if "start" in table else None
 
 
@@ -367,7 +369,7 @@ def _controller(table: ControllerTable, folder: Path) -> ControllerSettings:
     return settings if table.name is None else replace(settings, name=table.name)
 
 
-def _code(name: str, key: str, what: str, path: Path, where: Place, trust: Trust) -> str:
+def _code(name: str, key: str, what: str, path: Path, where: TablePlace, trust: Trust) -> str:
     """Return the body, adapter or controller that a key names, and refuse one that cannot be."""
     at = f"{where.at(key)}: {key}"
     admitted = trust.admit(name, path.parent, at)

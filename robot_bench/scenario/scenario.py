@@ -32,11 +32,11 @@ from robot_bench.scenario.options import (
     listed,
     resolve_world,
 )
-from robot_bench.scenario.sweep import Axis
+from robot_bench.scenario.sweep import SweptParameter
 from robot_bench.scenario.tables import InWorldTable
 from robot_bench.scenario.when_script import When
 from robot_bench.scenario.wired_robots import OwnRobot
-from robot_bench.scenario.world_script import Change
+from robot_bench.scenario.world_script import ScriptedChange
 from robot_bench.wires.power_up import ZEROS
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos, nanos
@@ -101,7 +101,7 @@ class Scenario:
     controller_kind: str = "pioneer"
     #: What is plugged into the board besides the robot.
     parts: tuple[PartSpec, ...] = ()
-    changes: tuple[Change, ...] = ()
+    changes: tuple[ScriptedChange, ...] = ()
     faults: tuple[FaultChange, ...] = ()
     whens: tuple[When, ...] = ()
     goals: tuple[Goal, ...] = ()
@@ -112,7 +112,7 @@ class Scenario:
     #: The seeds that `p2os run` takes one after the other; none: `seed` alone.
     seeds: tuple[int, ...] = ()
     #: The parameters that it sweeps.
-    axes: tuple[Axis, ...] = ()
+    axes: tuple[SweptParameter, ...] = ()
     #: What was set beside the file.
     settings: tuple[Setting, ...] = ()
     #: The file; None: made by a program.

@@ -29,7 +29,7 @@ from robot_bench.events.selection import Wires, select
 from robot_bench.events.stream import EventStream
 from robot_bench.scenario.fault_script import LINK_DOWN, FaultChange, FaultTable, Span, faults_of
 from robot_bench.scenario.hand_script import DEEDS, Deed, SetPinTable, SetVoltsTable, TypeTable, deeds_of
-from robot_bench.scenario.world_script import Change, Op, ThingTable, changes_of
+from robot_bench.scenario.world_script import Op, ScriptedChange, ThingTable, changes_of
 from simbase.errors import nearest, shown
 from simbase.state import Stateful
 from simbase.timing import Nanos, nanos
@@ -120,7 +120,7 @@ class When:
     after_ns: Nanos = 0
     #: At each such event, not at the first one only.
     every: bool = False
-    changes: tuple[Change, ...] = ()
+    changes: tuple[ScriptedChange, ...] = ()
     faults: tuple[FaultChange, ...] = ()
     deeds: tuple[Deed, ...] = ()
     name: str = ""
@@ -162,7 +162,7 @@ def _load(table: Table, parameters: RobotParameters, place: Where, wires: Wires 
     action = read(ACTIONS[row.do], rest, place)
     with placed(place):
         select(row.event, wires)
-    changes: Sequence[Change] = ()
+    changes: Sequence[ScriptedChange] = ()
     faults: tuple[FaultChange, ...] = ()
     deeds: tuple[Deed, ...] = ()
     if isinstance(action, ThingTable):
@@ -197,7 +197,7 @@ class WhenScript(Stateful):
         self,
         whens: Sequence[When],
         *,
-        on_change: Callable[[Sequence[Change]], None],
+        on_change: Callable[[Sequence[ScriptedChange]], None],
         on_fault: Callable[[Sequence[FaultChange]], None],
         on_deed: Callable[[Sequence[Deed]], None],
         on_end: Callable[[Nanos], None],

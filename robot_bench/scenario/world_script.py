@@ -59,7 +59,7 @@ class BeforeSonar:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Change:
+class ScriptedChange:
     """One change of the world at a given time."""
 
     at: Nanos
@@ -119,7 +119,7 @@ class ObstacleTable(ThingTable):
 
 def load_changes(
     tables: Sequence[Table], parameters: RobotParameters, where: Where, *, are_later: bool = False
-) -> tuple[Change, ...]:
+) -> tuple[ScriptedChange, ...]:
     """Return the changes that a scenario's `[[obstacle]]` tables ask for, in order of time.
 
     With `are_later` the tables are not all: things may have been placed before.
@@ -127,7 +127,7 @@ def load_changes(
     Raises:
         ScenarioError: A table breaks the schema, or asks for what cannot be.
     """
-    changes: list[Change] = []
+    changes: list[ScriptedChange] = []
     for number, table in enumerate(tables):
         place = within(where, "obstacle", number)
         row = read(ObstacleTable, table, place)
@@ -138,7 +138,7 @@ def load_changes(
     return tuple(changes)
 
 
-class WorldScript(Timeline[Change]):
+class WorldScript(Timeline[ScriptedChange]):
     """Applies changes at their times.
 
     Args:
@@ -154,7 +154,7 @@ class WorldScript(Timeline[Change]):
 
     def __init__(
         self,
-        changes: Sequence[Change],
+        changes: Sequence[ScriptedChange],
         body: RobotBody,
         parameters: RobotParameters,
         *,
@@ -167,7 +167,7 @@ class WorldScript(Timeline[Change]):
         self._bring_to = bring_to
         self._on_change = on_change
 
-    def _apply(self, change: Change) -> None:
+    def _apply(self, change: ScriptedChange) -> None:
         self._bring_to(change.at)
         x_m, y_m, heading_rad = change.x_m, change.y_m, change.heading_rad
         if change.before is not None:
@@ -197,7 +197,7 @@ class WorldScript(Timeline[Change]):
         return x_m, y_m, direction
 
 
-def changes_of(row: ThingTable, op: Op, at: Nanos, parameters: RobotParameters, where: str) -> list[Change]:
+def changes_of(row: ThingTable, op: Op, at: Nanos, parameters: RobotParameters, where: str) -> list[ScriptedChange]:
     """Return what a thing's table asks for at a time, in order of time.
 
     Raises:
@@ -205,12 +205,12 @@ def changes_of(row: ThingTable, op: Op, at: Nanos, parameters: RobotParameters, 
     """
     name, before = row.name, _before(row, parameters, where)
     if op is Op.REMOVE:
-        return [Change(at=at, op=op, name=name, where=where)]
+        return [ScriptedChange(at=at, op=op, name=name, where=where)]
     if before is None and row.path_m is None:
         _need(row, ("x_m", "y_m"), where)
     if row.path_m is not None and (row.before_sonar is not None or op is not Op.PLACE):
         raise ScenarioError(f"{where}: path_m is for a thing that is placed in the world")
-    first = Change(
+    first = ScriptedChange(
         at=at, op=op, name=name, x_m=row.x_m or 0.0, y_m=row.y_m or 0.0, heading_rad=math.radians(row.heading_deg),
         obstacle=_obstacle(row, where) if op is Op.PLACE else None, before=before, where=where,
     )  # fmt: skip
@@ -220,10 +220,10 @@ def changes_of(row: ThingTable, op: Op, at: Nanos, parameters: RobotParameters, 
         raise ScenarioError(f"{where}: hold_s without before_sonar", hint="only a thing placed before a sonar is held")
     end = at + nanos(row.hold_s)
     moves = [
-        Change(at=moment, op=Op.MOVE, name=name, before=before, where=where)
+        ScriptedChange(at=moment, op=Op.MOVE, name=name, before=before, where=where)
         for moment in range(at + FOLLOW_NS, end, FOLLOW_NS)
     ]
-    return [first, *moves, Change(at=end, op=Op.REMOVE, name=name, where=where)]
+    return [first, *moves, ScriptedChange(at=end, op=Op.REMOVE, name=name, where=where)]
 
 
 def _before(row: ThingTable, parameters: RobotParameters, where: str) -> BeforeSonar | None:
@@ -253,7 +253,7 @@ def _obstacle(row: ThingTable, where: str) -> Obstacle:
         )  # fmt: skip
 
 
-def refuse_names(changes: Sequence[Change], world: World) -> None:
+def refuse_names(changes: Sequence[ScriptedChange], world: World) -> None:
     """Refuse to place what the world has, and to move or take out what it has not or what is fixed.
 
     Raises:
@@ -278,7 +278,7 @@ def refuse_names(changes: Sequence[Change], world: World) -> None:
             there[change.name] = False
 
 
-def _check_names(changes: list[Change]) -> None:
+def _check_names(changes: list[ScriptedChange]) -> None:
     """Refuse a thing that is placed twice, or moved while it is not there."""
     there: set[str] = set()
     for change in changes:
@@ -296,7 +296,7 @@ def _need(row: ThingTable, keys: tuple[str, ...], where: str) -> None:
             raise ScenarioError(f"{where}: key {key!r} is missing", hint=f"it needs {', '.join(keys)}")
 
 
-def _at(change: Change) -> str:
+def _at(change: ScriptedChange) -> str:
     return f"{change.at / NS_PER_S:g} s"
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from p2os.errors import ScenarioError
 from p2os.toml_file import TomlSource, read_toml
 from p2os.toml_record import Record, given, keys_of, number_of, read, read_part, sections, table_of, tables_of
-from p2os.toml_schema import Key, Place, Table
+from p2os.toml_schema import Key, Table, TablePlace
 from simbase.errors import UsageError
 
 
@@ -49,7 +49,7 @@ class Outer(Record):
 
 def of(text: str) -> Outer:
     table, places = read_toml(text, "w.toml", "a file", ScenarioError)
-    return read(Outer, table, Place(TomlSource("w.toml", places)))
+    return read(Outer, table, TablePlace(TomlSource("w.toml", places)))
 
 
 def test_values_are_of_the_types_that_are_declared() -> None:

@@ -58,7 +58,7 @@ Along = Annotated[float, Key(least=-MOST_M, most=MOST_M, doc="from the middle of
 _Heading = Annotated[float, Key(least=-360, most=360, doc="counter-clockwise from ahead")]
 
 
-class Bridge(Record):
+class BridgeDescription(Record):
     """`[bridge]`: an H-bridge."""
 
     kind: Annotated[BridgeKind, Key(doc="which pins it has")]
@@ -95,7 +95,7 @@ class Encoder(Record):
         return 4 * self.lines * (motor.gear_ratio if self.on == "motor" else 1.0)
 
 
-class Battery(Record):
+class BatteryDescription(Record):
     """`[battery]`: the battery, what else it feeds, and the divider at which the chip measures it."""
 
     full_v: Annotated[float, Key(above=0, most=_MOST_V, doc="full")]
@@ -145,10 +145,10 @@ class Differential:
     #: About the middle of the axle; of all but the wheels' and rotors' own rotation.
     yaw_inertia_kg_m2: float
     body: BodyParameters
-    bridge: Bridge
+    bridge: BridgeDescription
     motor: Motor
     encoder: Encoder
-    battery: Battery
+    battery: BatteryDescription
     distances: tuple[DistanceSensor, ...] = ()
     distance_period_ns: int = 38_300_000
     bumpers: tuple[Bumper, ...] = ()

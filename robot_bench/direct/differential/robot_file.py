@@ -12,12 +12,12 @@ from typing import Annotated, TypeVar
 from p2os.errors import ScenarioError
 from p2os.robots.parameters import BodyParameters
 from p2os.toml_record import Record, given, read, sections
-from p2os.toml_schema import Key, Place, Table, within
+from p2os.toml_schema import Key, Table, TablePlace, within
 from robot_bench.direct.differential.description import (
     MOST_M,
     Along,
-    Battery,
-    Bridge,
+    BatteryDescription,
+    BridgeDescription,
     Bumper,
     Differential,
     DistanceSensor,
@@ -67,10 +67,10 @@ class DifferentialTable(Record):
     kind: Annotated[str, Key(doc="`differential`")]
     title: Annotated[str, Key(doc="what reports call it")] = "differential robot"
     body: Annotated[BodyTable, Key(doc="the robot as a physical thing")]
-    bridge: Annotated[Bridge, Key(doc="the H-bridges")]
+    bridge: Annotated[BridgeDescription, Key(doc="the H-bridges")]
     motor: Annotated[Motor, Key(doc="the motors with their gears")]
     encoder: Annotated[Encoder, Key(doc="the quadrature encoders")]
-    battery: Annotated[Battery, Key(doc="the battery and its divider")]
+    battery: Annotated[BatteryDescription, Key(doc="the battery and its divider")]
     pins: Annotated[Mapping[str, object], Key(doc="signal = pin of the BluePill")]
     distance_period_ms: Annotated[float, Key(least=1, most=10_000, doc="from one measurement to the next")] = 38.3
     distance: Annotated[tuple[Table, ...], Key(record=DistanceSensor, doc="analog distance sensors")] = ()
@@ -83,7 +83,7 @@ TABLES: Mapping[str, tuple[Key, ...]] = dict(sections(DifferentialTable))
 _MOST_POINTS, _MOST_PIN_V = 100, 3.3
 
 
-def load_differential(table: Table, where: Place, pins: Mapping[str, str]) -> Differential:
+def load_differential(table: Table, where: TablePlace, pins: Mapping[str, str]) -> Differential:
     """Return the robot that a file describes.
 
     Args:
@@ -123,9 +123,9 @@ def load_differential(table: Table, where: Place, pins: Mapping[str, str]) -> Di
 T = TypeVar("T", DistanceSensor, Bumper)
 
 
-def _rows(record: type[T], rows: Sequence[Table], name: str, where: Place) -> list[tuple[T, Place]]:
+def _rows(record: type[T], rows: Sequence[Table], name: str, where: TablePlace) -> list[tuple[T, TablePlace]]:
     """Return the tables of an array with their places; names are given once."""
-    found: dict[str, tuple[T, Place]] = {}
+    found: dict[str, tuple[T, TablePlace]] = {}
     for number, row in enumerate(rows):
         at = within(where, name, number)
         one = read(record, row, at)
@@ -137,13 +137,13 @@ def _rows(record: type[T], rows: Sequence[Table], name: str, where: Place) -> li
     return list(found.values())
 
 
-def _stall_torque(motor: Motor, battery: Battery) -> float:
+def _stall_torque(motor: Motor, battery: BatteryDescription) -> float:
     return min(
         max(motor.torque_constant_nm_a * motor.gear_ratio * battery.full_v / motor.resistance_ohm, 0.01), 10_000.0
     )
 
 
-def _curve(points: Sequence[tuple[float, float]], at: Place) -> tuple[tuple[float, float], ...]:
+def _curve(points: Sequence[tuple[float, float]], at: TablePlace) -> tuple[tuple[float, float], ...]:
     """Return the points of a sensor's curve."""
     found = tuple((float(metres), float(volts)) for metres, volts in points)
     good = 2 <= len(found) <= _MOST_POINTS and all(volts <= _MOST_PIN_V for _, volts in found)
@@ -155,7 +155,7 @@ def _curve(points: Sequence[tuple[float, float]], at: Place) -> tuple[tuple[floa
     return found
 
 
-def _refuse_fast_encoder(robot: Differential, where: Place) -> None:
+def _refuse_fast_encoder(robot: Differential, where: TablePlace) -> None:
     edges = robot.encoder.edges_per_turn(robot.motor) * no_load_radps(robot) / (2 * math.pi)
     if edges > MOST_EDGES_A_SECOND:
         raise ScenarioError(

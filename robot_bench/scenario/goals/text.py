@@ -8,7 +8,7 @@ from p2os.toml_schema import Key
 from robot_bench.events.kinds import Event, Text
 from robot_bench.events.selection import Lines
 from robot_bench.scenario.goals.temporal import never, refuse_other_than_texts
-from robot_bench.scenario.goals.watch import GoalKind, OfEvents, Outcome, Watch
+from robot_bench.scenario.goals.watch import GoalKind, GoalOutcome, OfEvents, Watch
 from simbase.timing import Nanos
 
 
@@ -46,7 +46,7 @@ class InOrder(Printed):
         self._place = 0
         self._tail = b""
 
-    def feed(self, event: Event) -> Outcome | None:
+    def feed(self, event: Event) -> GoalOutcome | None:
         if not isinstance(event, Text) or self.read(event) is None:
             return None
         self._tail += event.data
@@ -60,12 +60,12 @@ class InOrder(Printed):
             self._tail = self._tail[at + len(wanted) :]
             self._place += 1
         self._tail = b""
-        return Outcome(met=True)
+        return GoalOutcome(met=True)
 
-    def finish(self, end: Nanos) -> Outcome:
+    def finish(self, end: Nanos) -> GoalOutcome:
         if self._place == len(self._texts):
-            return Outcome(met=True)
-        return Outcome(met=False, says=f"{self._texts[self._place]!r} {self._missing}; {self.last}")
+            return GoalOutcome(met=True)
+        return GoalOutcome(met=False, says=f"{self._texts[self._place]!r} {self._missing}; {self.last}")
 
 
 class PrintsTable(Record):

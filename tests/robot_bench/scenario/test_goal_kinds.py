@@ -19,7 +19,7 @@ from robot_bench.cli.names import setting_keys
 from robot_bench.events.kinds import Clearance, Contact, Event, Fault, Note, PinEdge, Pose, Ranges, Text, Wave
 from robot_bench.scenario.goals.judging import GoalJudge, RunEnd, judge, load_goal
 from robot_bench.scenario.goals.kinds import KINDS, every_kind
-from robot_bench.scenario.goals.watch import GoalKind, Outcome, Watch
+from robot_bench.scenario.goals.watch import GoalKind, GoalOutcome, Watch
 from robot_bench.scenario.loading import load_scenario
 from simbase.errors import UsageError
 from tests.robot_bench.recording.records import S, pose
@@ -29,7 +29,7 @@ MS = 10**6
 UM = 1_000_000
 
 
-def outcome(kind: str, run: Sequence[Event], end: int = 10 * S, **arguments: Any) -> Outcome:
+def outcome(kind: str, run: Sequence[Event], end: int = 10 * S, **arguments: Any) -> GoalOutcome:
     """Return what a goal says of a run; it must say the same where it was saved and restored between any two events."""
     goal = load_goal(
         {"kind": kind, **{key.rstrip("_"): value for key, value in arguments.items()}}, "mine.toml: [[goal]] 1"
@@ -418,8 +418,8 @@ class Tilt(Watch):
     def __init__(self, table: TiltTable) -> None:
         self.table = table
 
-    def finish(self, end: int) -> Outcome:
-        return Outcome(met=self.table.most_deg > 10 and end > 0)
+    def finish(self, end: int) -> GoalOutcome:
+        return GoalOutcome(met=self.table.most_deg > 10 and end > 0)
 
 
 @pytest.fixture
