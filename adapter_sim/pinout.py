@@ -12,7 +12,7 @@ a revision of the board can work is another question: `faults_of` answers it.
 """
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from p2os.toml_file import TomlSource, read_toml, read_user_text
+from p2os.toml_record import tables_of
 from p2os.toml_schema import Key, Kind, Table, TablePlace, filled, within
 from simbase.errors import FileError, shown, shown_name
 
@@ -304,7 +305,7 @@ def faults_of(pinout: Pinout, revision: str) -> list[str]:
 
 def _rows(top: Table, name: str, where: TablePlace) -> Iterator[tuple[TablePlace, dict[str, Any]]]:
     """Yield the tables `[[name]]` with their places, checked."""
-    for number, row in enumerate(cast("Sequence[Table]", top[name] or ())):
+    for number, row in enumerate(tables_of(top, name)):
         at = within(where, name, number)
         more = _OF_ROLE.get(str(row.get("role")), ()) if name == "wire" else ()
         yield at, filled(row, (*KEYS[name], *more), at)

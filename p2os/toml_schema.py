@@ -5,7 +5,7 @@ the nearest key that exists. Units stand in the key (`threshold_m`), so a value
 is a bare number: `"60 cm"` is refused with the unit that is wanted.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol, cast, overload, runtime_checkable
@@ -58,6 +58,18 @@ _UNITS = {
 }  # fmt: skip
 
 
+@dataclass(frozen=True, slots=True)
+class Variants:
+    """Tables of one array whose keys depend on their kind."""
+
+    #: The key that says the kind.
+    tag: str
+    #: Declares what all of them have, the tag among it.
+    common: type
+    #: Returns what declares the rest, by the kind; plug-ins too.
+    kinds: Callable[[], Mapping[str, type]]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Key:
     """One key that a table may have.
@@ -65,11 +77,13 @@ class Key:
     `least` and `most` are inclusive; `above` is not; of a line, `most` is how long it may be. `count` is how many
     numbers stand in a list of them, each within the range. `default` is what `filled` puts where there is none.
     `group` names the entry points that may stand there beside the choices, as may FILE.py:CLASS; the loader looks
-    for them.
+    for them. `doc` says in a line of Markdown what the key is for. Of a key that a record declares (`toml_record`)
+    name, kind, choices and default are the field's.
     """
 
-    name: str
-    kind: Kind
+    name: str = ""
+    kind: Kind = "any"
+    doc: str = ""
     required: bool = False
     least: float | None = None
     above: float | None = None
@@ -78,6 +92,16 @@ class Key:
     choices: tuple[str, ...] = ()
     group: str = ""
     default: object = None
+    #: Declares the table that stands here, or each of them.
+    record: type | None = None
+    #: There are tables of any name, each of that record.
+    is_named: bool = False
+    #: That table may have any keys more.
+    is_open: bool = False
+    #: Tables of several kinds stand here.
+    variants: Variants | None = None
+    #: What each of the tables may have besides, which is taken out before they are read.
+    beside: tuple["Key", ...] = ()
 
 
 class KeyPlaces(Protocol):

@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from robot_bench.run import RunResult, run_at_port, run_scenario
     from robot_bench.scenario.goals.judging import Goal, Judgement
     from robot_bench.scenario.goals.watch import GoalKind, GoalOutcome, Watch
-    from robot_bench.scenario.scenario import Scenario, known_scenarios, load_scenario
+    from robot_bench.scenario.loading import known_scenarios, load_scenario
+    from robot_bench.scenario.scenario import Scenario
 
 __all__ = [
     "Bench",
@@ -64,6 +65,7 @@ if not TYPE_CHECKING:
             "robot_bench.run": ("RunResult", "run_at_port", "run_scenario"),
             "robot_bench.scenario.goals.judging": ("Goal", "Judgement"),
             "robot_bench.scenario.goals.watch": ("GoalKind", "GoalOutcome", "Watch"),
-            "robot_bench.scenario.scenario": ("Scenario", "known_scenarios", "load_scenario"),
+            "robot_bench.scenario.loading": ("known_scenarios", "load_scenario"),
+            "robot_bench.scenario.scenario": ("Scenario",),
         },
     )

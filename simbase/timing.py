@@ -20,6 +20,11 @@ NS_PER_MS = 1_000_000
 NS_PER_S = 1_000_000_000
 
 
+def nanos(span_s: float) -> Nanos:
+    """Return seconds as the nearest nanosecond."""
+    return round(span_s * NS_PER_S)
+
+
 class Reason(Enum):
     """Why a part stopped where it did."""
 

@@ -104,7 +104,8 @@ LAYERS = {
         ("files", "units", "c_library"), ("trust",), ("user_classes",), ("command_line",),
     ),
     "p2os": (
-        ("errors", "event_log"), ("toml_file",), ("toml_schema",), ("robots", "gamepad"), ("protocol",), ("transport",),
+        ("errors", "event_log"), ("toml_file",), ("toml_schema",), ("toml_record",), ("robots", "gamepad"),
+        ("protocol",), ("transport",),
         ("capture", "client", "pioneer"), ("ros",), ("cli",), ("__main__",),
     ),
     "bluepill_sim": (

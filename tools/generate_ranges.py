@@ -1,4 +1,4 @@
-"""Write into their pages what the files' readers and writers check by: ranges of numbers, and what a format holds.
+"""Write into their pages what the files' readers and writers check by: keys, ranges, and what a format holds.
 
 What stands between `<!-- ranges: NAME -->`, or `table: NAME`, and `<!-- end -->` is generated; a test holds the
 committed pages to what comes out here.
@@ -7,6 +7,7 @@ Usage: python tools/generate_ranges.py
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from enum import Enum
 from pathlib import Path
 
 from adapter_sim import pinout
@@ -17,9 +18,12 @@ from p2os.pioneer.export.scene import Property
 from p2os.pioneer.serve import fleet_file
 from p2os.pioneer.world import model as world
 from p2os.robots import model_file
+from p2os.toml_record import keys_of
 from p2os.toml_schema import Key
-from robot_bench.scenario import scenario
 from robot_bench.scenario.goals.kinds import every_kind
+from robot_bench.scenario.tables import TABLES, TopTable
+from robot_bench.scenario.trigger_script import ACTION_TABLES, WhenTable
+from robot_bench.scenario.world_script import ThingTable
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = tuple(ROOT / "docs" / name for name in ("worlds.md", "scenarios.md", "pioneer.md", "adapter.md"))
@@ -68,6 +72,82 @@ def _poses(names: Sequence[str], ranges: Sequence[tuple[float, float]]) -> dict[
     return dict(zip(names, ranges, strict=True))
 
 
+#: What has a section of its own.
+_OF_SCRIPTS = ("[[obstacle]]", "[[fault]]")
+
+
+def keys_table(tables: Mapping[str, Iterable[Key]]) -> str:
+    """Return every key of some tables: its default, what may stand there, what it is for; a row for equal ones."""
+    is_one = list(tables) == [""]
+    head = [*([] if is_one else ["table"]), "key", "default", "values", "meaning"]
+    rows = [_row(head), f"|{'---|' * len(head)}"]
+    for table, keys in tables.items():
+        named: dict[tuple[str, ...], list[str]] = {}
+        for key in sorted(keys, key=lambda key: not key.required):
+            words = "required" if key.required else _default(key), _values(key), _cell(key.doc)
+            named.setdefault(words, []).append(f"`{_header(key)}`")
+        rows += [_row([*([] if is_one else [f"`{table}`"]), ", ".join(one), *words]) for words, one in named.items()]
+    return "\n".join(rows)
+
+
+def kinds_table(kind: str, doc: str, kinds: Mapping[str, tuple[type, str]]) -> str:
+    """Return a row for each kind of a table: its keys, required ones in bold, with their ranges; what it is."""
+    named: dict[tuple[type, str], list[str]] = {}
+    for name, said in kinds.items():
+        named.setdefault(said, []).append(f"`{name}`")
+    rows = [_row([kind, "keys", doc]), "|---|---|---|"]
+    for (record, words), names in named.items():
+        keys = _ELSEWHERE.get(record) or ", ".join(map(_short, keys_of(record)))
+        rows.append(_row([", ".join(names), keys, _cell(words)]))
+    return "\n".join(rows)
+
+
+#: Whose keys have a table of their own.
+_ELSEWHERE = {ThingTable: "those of `[[obstacle]]` but `at_s` and `op`"}
+
+
+def _row(cells: Sequence[str]) -> str:
+    return f"|{'|'.join(f' {cell} ' if cell else ' ' for cell in cells)}|"
+
+
+def _short(key: Key) -> str:
+    name, default, values = f"`{key.name}`", "" if key.required else _default(key), _values(key)
+    told = (f" = {default}" if default else "") + (f" ({values})" if values != "text" else "")
+    return (f"**{name}**" if key.required else name) + told
+
+
+def _header(key: Key) -> str:
+    if key.kind == "tables":
+        return f"[[{key.name}]]"
+    if key.kind == "table":
+        return f"[{key.name}.NAME]" if key.is_named else f"[{key.name}]"
+    return key.name
+
+
+def _default(key: Key) -> str:
+    value = key.default.value if isinstance(key.default, Enum) else key.default
+    if value in (None, "", ()) or key.kind in {"table", "tables"}:
+        return ""
+    if isinstance(value, (int, float)):
+        return str(value).lower() if isinstance(value, bool) else number(value)
+    return f"`{value if isinstance(value, str) else list(value)}`"
+
+
+def _values(key: Key) -> str:
+    """Return what may stand in a key."""
+    if key.choices:
+        return ", ".join(f"`{choice}`" for choice in key.choices)
+    if key.kind in {"number", "whole"}:
+        return _of_key(key)
+    words = {"flag": "true, false", "table": "", "tables": "", "points": "list", "texts": "text, list"}
+    return words.get(key.kind, key.kind)
+
+
+def _cell(doc: str) -> str:
+    first = doc.strip().partition("\n")[0].removesuffix(".").replace("scenarios.md#", "#")
+    return first.replace("|", "\\|")
+
+
 def exports() -> str:
     """Return what the formats hold of a world and a robot: a row a property, a column a format."""
     made = {one.title: one for one in FORMATS.values()}
@@ -81,16 +161,17 @@ def exports() -> str:
 
 def tables() -> dict[str, str]:
     """Return every generated table by its name."""
-    goals = {f"[[goal]] {name}": kind.keys for name, kind in every_kind().items()}
     robots = {f"`[{name}]`": plain(keys) for name, keys in model_file.RANGES.items()}
     robots["`[sonar]` `poses`"] = plain(_poses(("x_mm", "y_mm", "heading_deg"), model_file.POSE_RANGES))
     at = _poses(("at[0]", "at[1]", "at[2]"), fleet_file.PLACE_RANGES)
     return {
         "world": _one(world.RANGES),
-        "scenario": lines(
-            {f"`{name}`" if name else "the file": of_keys(keys) for name, keys in {**scenario.TABLES, **goals}.items()},
-            "table",
-        ),
+        "scenario file": keys_table({"": keys_of(TopTable)}),
+        "scenario tables": keys_table({name: keys for name, keys in TABLES.items() if name not in {"", *_OF_SCRIPTS}}),
+        **{name.strip("[]"): keys_table({"": TABLES[name]}) for name in _OF_SCRIPTS},
+        "when": keys_table({"": keys_of(WhenTable)}),
+        "actions": kinds_table("`do`", "what is done", {do: (one, one.__doc__ or "") for do, one in ACTION_TABLES.items()}),
+        "goals": kinds_table("kind", "met when", {name: (one.table, one.doc) for name, one in every_kind().items()}),
         "robot": lines(robots, "table"),
         "fleet": lines({"": {**of_keys((*fleet_file.TOP, *fleet_file.ROBOT)), **plain(at)}}, ""),
         "sensor errors": _one(sensor_errors.RANGES),

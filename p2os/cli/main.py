@@ -98,8 +98,8 @@ def make_app(words: Sequence[str] = ()) -> typer.Typer:
 
 def summary(found: Iterable[EntryPoint]) -> str:
     """Return what the distributions that offer these verbs say of themselves, a paragraph each."""
-    told = dict.fromkeys(entry.dist for entry in found if entry.dist is not None)
-    return "\n\n".join(f"{each.metadata['Summary']}." for each in told)
+    installed = dict.fromkeys(entry.dist for entry in found if entry.dist is not None)
+    return "\n\n".join(f"{each.metadata['Summary']}." for each in installed)
 
 
 def completed_words(environment: Mapping[str, str]) -> list[str] | None:

@@ -41,11 +41,9 @@ from robot_bench.recording.run_record import RunRecord, record_of
 from robot_bench.recording.trace import TraceWriter
 from robot_bench.running.shared_world import SharedWorld
 from robot_bench.scenario.goals.judging import Judgement
-from robot_bench.scenario.scenario import (
-    Scenario,
-    ScenarioOptions,
-    load_scenario,
-)
+from robot_bench.scenario.loading import load_scenario
+from robot_bench.scenario.options import ScenarioOptions
+from robot_bench.scenario.scenario import Scenario
 from robot_bench.wires.ports import LeadingChip
 from simbase.errors import UsageError, shown
 from simbase.installation import installed_version

@@ -44,7 +44,8 @@ from robot_bench.running.shared_world import SharedRobot, SharedWorld
 from robot_bench.scenario.fault_script import LINK_DOWN, FaultScript
 from robot_bench.scenario.goals.judging import GoalJudge, Judgement, RunEnd
 from robot_bench.scenario.hand_script import Action, HandScript
-from robot_bench.scenario.scenario import Scenario, refuse_what_its_world_refuses
+from robot_bench.scenario.loading import refuse_what_its_world_refuses
+from robot_bench.scenario.scenario import Scenario
 from robot_bench.scenario.trigger_script import TriggerScript
 from robot_bench.scenario.world_script import WorldScript
 from robot_bench.wires.chip_pins import ChipPins

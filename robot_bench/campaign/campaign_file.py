@@ -22,87 +22,72 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, cast
+from typing import Annotated
 
 from p2os.errors import ScenarioError
 from p2os.pioneer.world import load_world
 from p2os.toml_file import TomlSource, is_file, read_toml, read_user_text
+from p2os.toml_record import Record, keys_of, number_of, read, sections
 from p2os.toml_schema import LONGEST_S, Key, Table, TablePlace, Where, check_table, placed, within
 from robot_bench.campaign.search import SEARCHES
 from robot_bench.campaign.things import KINDS
 from robot_bench.campaign.trial import Trial, trial_of, unpacked
 from robot_bench.events.codec import Json
 from robot_bench.scenario.included_files import Setting
-from robot_bench.scenario.json_schema import DRAFT, goals_schema, table_schema
+from robot_bench.scenario.json_schema import DRAFT, table_schema, with_properties
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.scenario.sweep import MOST_RUNS
+from robot_bench.scenario.tables import GOALS
 from simbase.errors import UsageError, nearest, shown
 from simbase.trust import Trust
 
-TOP = (
-    Key(name="description", kind="text"),
-    Key(name="scenario", kind="text", required=True),
-    Key(name="firmware", kind="text"),
-    Key(name="search", kind="text", choices=tuple(SEARCHES)),
-    Key(name="seed", kind="whole", least=0, most=2**31 - 1),
-    Key(name="batch", kind="whole", least=1, most=1024),
-    Key(name="near_misses", kind="whole", least=0, most=1024),
-    Key(name="gap_m", kind="number", least=0, most=100),
-    Key(name="free_m", kind="number", least=0, most=100),
-    Key(name="budget", kind="table"),
-    Key(name="limits", kind="table"),
-    Key(name="cheap", kind="table"),
-    Key(name="full", kind="table"),
-    Key(name="vary", kind="table"),
-    Key(name="draw", kind="tables"),
-    Key(name="disturb", kind="tables"),
-    Key(name="goal", kind="tables"),
-)
-BUDGET = (
-    Key(name="runs", kind="whole", least=1, most=MOST_RUNS),
-    Key(name="confirmations", kind="whole", least=0, most=MOST_RUNS),
-    Key(name="minutes", kind="number", above=0, most=LONGEST_S),
-    Key(name="virtual_hours", kind="number", above=0, most=LONGEST_S),
-)
-LIMITS = (
-    Key(name="cpu_s", kind="number", least=1, most=LONGEST_S),
-    Key(name="memory_mb", kind="whole", least=64, most=1_000_000),
-)
-RANGE = (
-    Key(name="from", kind="number", required=True),
-    Key(name="to", kind="number", required=True),
-    Key(name="step", kind="number", above=0),
-)
+#: chosen: of a drawn place, how far from the start's middle it is free: the hull turns within 0.32 m.
+FREE_M = 0.45
+#: chosen: a robot of 0.38 m passes with room on both sides.
+GAP_M = 0.9
+#: Of all files of campaigns: what varies, and what a stage sets.
+_Settings = Annotated[Mapping[str, object] | None, Key(doc="keys as of `--set`")]
+
+
+class SpanTable(Record):
+    """A range of numbers."""
+
+    from_: Annotated[int | float, Key(kind="number", doc="the least")]
+    to: Annotated[int | float, Key(kind="number", doc="the greatest")]
+    step: Annotated[int | float | None, Key(kind="number", above=0, doc="from one value to the next")] = None
+
+
+class DrawTable(Record):
+    """`[[draw]]`: things of a kind; numbers may be ranges. The measures of the kinds are keys too."""
+
+    kind: Annotated[str, Key(choices=tuple(KINDS), doc="of thing")]
+    name: Annotated[str | None, Key(doc="tells two of a kind apart")] = None
+    count: Annotated[int | None, Key(least=0, most=64, doc="how many")] = None
+    area_m: Annotated[tuple[float, ...] | None, Key(doc="`[least x, least y, greatest x, greatest y]`")] = None
+    heading_deg: Annotated[float | None, Key(least=-36_000, most=36_000, doc="counter-clockwise")] = None
+    ahead_m: Annotated[float | None, Key(least=-1000, most=1000, doc="of the robot at its start")] = None
+    aside_m: Annotated[float | None, Key(least=-1000, most=1000, doc="to the left of the robot at its start")] = None
+
+
+class DisturbTable(Record):
+    """`[[disturb]]`: a fault; its times may be ranges."""
+
+    fault: Annotated[str, Key(doc="its words")]
+    at_s: Annotated[float, Key(least=0, most=LONGEST_S, doc="when")] = 0.0
+    for_s: Annotated[float | None, Key(above=0, most=LONGEST_S, doc="it ends after so long")] = None
+    share: Annotated[float, Key(above=0, most=1, doc="in so many of the runs it happens")] = 1.0
+
+
 DRAW = (
-    Key(name="kind", kind="text", required=True, choices=tuple(KINDS)),
-    Key(name="name", kind="text"),
-    Key(name="count", kind="whole", least=0, most=64),
-    Key(name="area_m", kind="list"),
-    Key(name="heading_deg", kind="number", least=-36_000, most=36_000),
-    Key(name="ahead_m", kind="number", least=-1000, most=1000),
-    Key(name="aside_m", kind="number", least=-1000, most=1000),
+    *keys_of(DrawTable),
     *(
         Key(name=name, kind="number", above=0, most=1000)
         for name in sorted({name for kind in KINDS.values() for name in kind.measures})
     ),
 )
-DISTURB = (
-    Key(name="fault", kind="text", required=True),
-    Key(name="at_s", kind="number", least=0, most=LONGEST_S),
-    Key(name="for_s", kind="number", above=0, most=LONGEST_S),
-    Key(name="share", kind="number", above=0, most=1),
-)
-#: Every table of a campaign file and its keys.
-TABLES: Mapping[str, tuple[Key, ...]] = {
-    "": TOP, "[budget]": BUDGET, "[limits]": LIMITS, "[[draw]]": DRAW, "[[disturb]]": DISTURB,
-}  # fmt: skip
 #: What the runs that propose set, and those that confirm, where the file says nothing.
 CHEAP: Table = {"body": "kinematic"}
 FULL: Table = {}
-#: chosen: of a drawn place, how far from the start's middle it is free: the hull turns within 0.32 m.
-FREE_M = 0.45
-#: chosen: a robot of 0.38 m passes with room on both sides.
-GAP_M = 0.9
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,22 +163,49 @@ class Disturbance:
         return {"fault": words} | {key: value(key, span) for key, span in times.items()}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Budget:
-    """How much may be spent; None: without end."""
+class Budget(Record):
+    """`[budget]`: how much may be spent; None: without end."""
 
-    runs: int = 200
-    confirmations: int = 20
-    minutes: float | None = None
-    virtual_hours: float | None = None
+    runs: Annotated[int, Key(least=1, most=MOST_RUNS, doc="that propose")] = 200
+    confirmations: Annotated[int, Key(least=0, most=MOST_RUNS, doc="runs in full")] = 20
+    minutes: Annotated[float | None, Key(above=0, most=LONGEST_S, doc="of the clock")] = None
+    virtual_hours: Annotated[float | None, Key(above=0, most=LONGEST_S, doc="of virtual time")] = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RunLimits:
-    """What one run may take; more is an error of that run."""
+class RunLimits(Record):
+    """`[limits]`: what one run may take; more is an error of that run."""
 
-    cpu_s: float = 300.0
-    memory_mb: int = 2000
+    cpu_s: Annotated[float, Key(least=1, most=LONGEST_S, doc="of the processor")] = 300.0
+    memory_mb: Annotated[int, Key(least=64, most=1_000_000, doc="of memory")] = 2000
+
+
+class CampaignTable(Record):
+    """The top of the file."""
+
+    description: Annotated[str, Key(doc="one sentence")] = ""
+    scenario: Annotated[str, Key(doc="a name, or a file beside this one")]
+    firmware: Annotated[str | None, Key(doc="a file beside this one, in place of the scenario's")] = None
+    search: Annotated[str, Key(choices=tuple(SEARCHES), doc="who searches")] = "sobol"
+    seed: Annotated[int, Key(least=0, most=2**31 - 1, doc="of the search")] = 0
+    #: chosen: the set of runs depends on it, not on the workers.
+    batch: Annotated[int, Key(least=1, most=1024, doc="so many are asked for before any is told of")] = 16
+    near_misses: Annotated[int, Key(
+        least=0, most=1024, doc="of each batch so many that passed, those with the least margin, are run in full too"
+    )] = 1  # fmt: skip
+    gap_m: Annotated[float, Key(least=0, most=100, doc="between things that are drawn")] = GAP_M
+    free_m: Annotated[float, Key(least=0, most=100, doc="around the start")] = FREE_M
+    budget: Annotated[Budget, Key(doc="how much may be spent")] = field(default_factory=Budget)
+    limits: Annotated[RunLimits, Key(doc="what one run may take")] = field(default_factory=RunLimits)
+    cheap: _Settings = None
+    full: _Settings = None
+    vary: _Settings = None
+    draw: Annotated[tuple[Table, ...], Key(record=DrawTable, doc="things that are drawn")] = ()
+    disturb: Annotated[tuple[Table, ...], Key(record=DisturbTable, doc="faults that are drawn")] = ()
+    goal: Annotated[tuple[Table, ...], GOALS] = ()
+
+
+#: Every table of a campaign file and its keys.
+TABLES: Mapping[str, tuple[Key, ...]] = {**dict(sections(CampaignTable)), "[[draw]]": DRAW}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -206,16 +218,14 @@ class Campaign:
     text: str
     #: The scenario, with the campaign's goals where it has any.
     trial: Trial
-    search: str = "sobol"
-    seed: int = 0
-    #: chosen: so many are asked for before any is reported; the set of runs depends on it, not on the workers.
-    batch: int = 16
-    #: Of each batch so many that passed, those with the least margin, are run in full too.
-    near_misses: int = 1
-    gap_m: float = GAP_M
-    free_m: float = FREE_M
-    budget: Budget = field(default_factory=Budget)
-    limits: RunLimits = field(default_factory=RunLimits)
+    search: str
+    seed: int
+    batch: int
+    near_misses: int
+    gap_m: float
+    free_m: float
+    budget: Budget
+    limits: RunLimits
     cheap: tuple[Setting, ...] = ()
     full: tuple[Setting, ...] = ()
     vary: Mapping[str, Span] = field(default_factory=dict)
@@ -241,21 +251,14 @@ def parse_campaign(text: str, path: Path, *, firmware: Path | None = None, trust
     """Check the text of a campaign file, whose program `firmware` may replace; errors as of `load_campaign`."""
     table, places = read_toml(text, path.name, "a campaign", ScenarioError)
     where = TablePlace(TomlSource(path.name, places))
-    check_table(table, TOP, where)
-    budget, limits = (
-        _checked(cast("Table", table.get(name, {})), keys, within(where, name))
-        for name, keys in (("budget", BUDGET), ("limits", LIMITS))
-    )
-    trial = _with_start(_trial(table, path, where, firmware, trust), cast("Table", table.get("vary", {})), path)
-    draws = _draws(cast("list[Table]", table.get("draw", [])), where)
-    disturbances = tuple(
-        _disturbance(row, within(where, "disturb", number))
-        for number, row in enumerate(cast("list[Table]", table.get("disturb", [])))
-    )
-    vary = {key: _span(value, at) for key, value, at in _leaves(table.get("vary", {}), "", within(where, "vary"))}
+    top = read(CampaignTable, table, where)
+    trial = _with_start(_trial(top, path, where, firmware, trust), top.vary or {}, path)
+    draws = _draws(top.draw, where)
+    disturbances = tuple(_disturbance(row, within(where, "disturb", n)) for n, row in enumerate(top.disturb))
+    vary = {key: _span(value, at) for key, value, at in _leaves(top.vary or {}, "", within(where, "vary"))}
     cheap, full = (
-        tuple((key, value) for key, value, _ in _leaves({**defaults, **cast("Table", table.get(name, {}))}, "", where))
-        for name, defaults in (("cheap", CHEAP), ("full", FULL))
+        tuple((key, value) for key, value, _ in _leaves({**defaults, **(said or {})}, "", where))
+        for said, defaults in ((top.cheap, CHEAP), (top.full, FULL))
     )
     mode = dict(cheap).get("mode", trial.table.get("mode"))
     if disturbances and mode == "direct":
@@ -266,11 +269,9 @@ def parse_campaign(text: str, path: Path, *, firmware: Path | None = None, trust
     if not vary and not draws and not disturbances:
         raise ScenarioError(f"{where}: nothing varies", hint="[vary], [[draw]] or [[disturb]]")
     found = Campaign(
-        name=path.stem, description=str(table.get("description", "")), text=text, trial=trial,
-        search=str(table.get("search", "sobol")),
-        **{key: table[key] for key in ("seed", "batch", "near_misses", "gap_m", "free_m") if key in table},
-        budget=Budget(**budget), limits=RunLimits(**limits), cheap=cheap, full=full, vary=vary, draws=draws,
-        disturbances=disturbances,
+        name=path.stem, description=top.description, text=text, trial=trial, search=top.search, seed=top.seed,
+        batch=top.batch, near_misses=top.near_misses, gap_m=top.gap_m, free_m=top.free_m, budget=top.budget,
+        limits=top.limits, cheap=cheap, full=full, vary=vary, draws=draws, disturbances=disturbances,
     )  # fmt: skip
     _refuse_settings(found, path)
     for number, one in enumerate(disturbances):
@@ -281,39 +282,26 @@ def parse_campaign(text: str, path: Path, *, firmware: Path | None = None, trust
 
 def campaign_schema() -> Json:
     """Return the JSON schema of a campaign file, made of the keys that the loader checks by."""
-    top = table_schema(TOP)
-    spans: Json = {"oneOf": [{"type": ["number", "string", "boolean"]}, {"type": "array"}, table_schema(RANGE)]}
-    draw, disturb = table_schema(DRAW), table_schema(DISTURB)
-    keys: Json = dict(draw["properties"])  # type: ignore[call-overload] # table_schema has made it
-    draw["properties"] = keys | dict.fromkeys(_SPANNED, spans)
-    times: Json = dict(disturb["properties"])  # type: ignore[call-overload] # as above
-    disturb |= {"properties": times | {"at_s": spans, "for_s": spans}, "additionalProperties": spans}
-    properties: Json = dict(top["properties"])  # type: ignore[call-overload] # as above
-    properties |= {
-        "budget": table_schema(BUDGET),
-        "limits": table_schema(LIMITS),
-        "draw": {"type": "array", "items": draw},
-        "disturb": {"type": "array", "items": disturb},
-        "goal": goals_schema(),
+    spans: Json = {
+        "oneOf": [{"type": ["number", "string", "boolean"]}, {"type": "array"}, table_schema(keys_of(SpanTable))]
     }
-    return {"$schema": DRAFT, "title": "A campaign of p2os", **top, "properties": properties}
+    draw = with_properties(table_schema(DRAW), dict.fromkeys(_SPANNED, spans))
+    disturb = with_properties(table_schema(keys_of(DisturbTable)), {"at_s": spans, "for_s": spans})
+    disturb["additionalProperties"] = spans
+    own: Json = {"draw": {"type": "array", "items": draw}, "disturb": {"type": "array", "items": disturb}}
+    top = with_properties(table_schema(keys_of(CampaignTable)), own)
+    return {"$schema": DRAFT, "title": "A campaign of p2os", **top}
 
 
-def _checked(table: Table, keys: Sequence[Key], where: Where) -> dict[str, Any]:
-    check_table(table, keys, where)
-    return dict(table)
-
-
-def _trial(table: Table, path: Path, where: TablePlace, firmware: Path | None, trust: bool | Trust) -> Trial:
-    name = str(table["scenario"])
-    beside = path.parent / name
-    if firmware is None and "firmware" in table:
-        firmware = path.parent / str(table["firmware"])
+def _trial(top: CampaignTable, path: Path, where: TablePlace, firmware: Path | None, trust: bool | Trust) -> Trial:
+    beside = path.parent / top.scenario
+    if firmware is None and top.firmware is not None:
+        firmware = path.parent / top.firmware
         if not is_file(firmware):
-            raise ScenarioError(f"{where.at('firmware')}: there is no file {shown(str(table['firmware']))} beside it")
+            raise ScenarioError(f"{where.at('firmware')}: there is no file {shown(top.firmware)} beside it")
     with placed(where, "scenario"):
-        trial = trial_of(str(beside) if is_file(beside) else name, firmware=firmware, trust=trust)
-    return trial.with_lists(goal=cast("list[Table]", table["goal"])) if "goal" in table else trial
+        trial = trial_of(str(beside) if is_file(beside) else top.scenario, firmware=firmware, trust=trust)
+    return trial.with_lists(goal=top.goal) if top.goal else trial
 
 
 def _with_start(trial: Trial, vary: Table, path: Path) -> Trial:
@@ -352,9 +340,9 @@ def _scenario(trial: Trial, where: str) -> Scenario:
         return trial.scenario(folder)
 
 
-def _leaves(table: object, above: str, where: Where) -> Iterator[tuple[str, object, str]]:
+def _leaves(table: Table, above: str, where: Where) -> Iterator[tuple[str, object, str]]:
     """Yield each key of nested tables with its value and its place; what has `from` is a value."""
-    for name, value in cast("Table", table).items():
+    for name, value in table.items():
         key = f"{above}.{name}".removeprefix(".")
         if isinstance(value, Mapping) and "from" not in value:
             yield from _leaves(value, key, where)
@@ -408,11 +396,11 @@ def _disturbance(table: Table, where: Where) -> Disturbance:
         key: _span(value, f"{where}: {key}").value(0.5) if key in {"at_s", "for_s"} else value
         for key, value in table.items() if key not in named
     }  # fmt: skip
-    check_table(plain, DISTURB, where)
+    check_table(plain, keys_of(DisturbTable), where)
     return Disturbance(
         words=str(table["fault"]), at_s=_span(table.get("at_s", 0.0), f"{where}: at_s"),
         for_s=_span(table["for_s"], f"{where}: for_s") if "for_s" in table else None,
-        share=float(cast("float", table.get("share", 1.0))),
+        share=number_of(table, "share", 1.0),
         values={key: _span(value, f"{where}: {key}") for key, value in named.items()},
     )  # fmt: skip
 
@@ -420,7 +408,7 @@ def _disturbance(table: Table, where: Where) -> Disturbance:
 def _area(value: object, where: Where) -> tuple[float, float, float, float] | None:
     if value is None:
         return None
-    numbers = [float(item) for item in cast("list[object]", value) if isinstance(item, (int, float))]
+    numbers = [float(item) for item in value if isinstance(item, (int, float))] if isinstance(value, list) else []
     if len(numbers) != 4 or numbers[0] >= numbers[2] or numbers[1] >= numbers[3]:
         raise ScenarioError(f"{where}: area_m must be [least x, least y, greatest x, greatest y]")
     return numbers[0], numbers[1], numbers[2], numbers[3]
@@ -432,12 +420,11 @@ def _span(value: object, where: str) -> Span:
             raise ScenarioError(f"{where} = {shown(value)} is no list of values", hint="[0.4, 0.6]")
         return Span(choices=tuple(value))
     if isinstance(value, Mapping):
-        check_table(cast("Table", value), RANGE, where)
-        low, high = (cast("float", value[key]) for key in ("from", "to"))
-        if not low <= high:
+        span = read(SpanTable, value, where)
+        if not span.from_ <= span.to:
             raise ScenarioError(f"{where}: to is below from", hint="{ from = 0.1, to = 0.5 }")
         is_whole = all(isinstance(item, int) for item in value.values())
-        return Span(low, high, float(cast("float", value.get("step", 1 if is_whole else 0))), is_whole)
+        return Span(span.from_, span.to, float((1 if is_whole else 0) if span.step is None else span.step), is_whole)
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         return Span(value, value, is_whole=isinstance(value, int))
     return Span(choices=(value,))

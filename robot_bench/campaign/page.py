@@ -14,10 +14,10 @@ import statistics
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib.resources import files
 from string import Template
-from typing import cast
 
 from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import World
+from p2os.toml_record import tables_of
 from p2os.toml_schema import Table
 from robot_bench.campaign.conduct import FAILURES, PointFinding, PointRow, Run
 from robot_bench.campaign.last_moment import LastMoment
@@ -158,7 +158,7 @@ def _plan(run: Run, moment: LastMoment | None) -> str:
         return ""
     to = _place_in(world.extent)
     parts = _things(world, to)
-    parts += [_drawn(table, to) for table in cast("list[Table]", run.trial.table.get("obstacle", []))]
+    parts += [_drawn(table, to) for table in tables_of(run.trial.table, "obstacle")]
     way = [to(x / 1000, y / 1000) for x, y in run.outcome.way_mm]
     if way:
         parts.append(_polyline(way, "way"))
@@ -207,8 +207,8 @@ def _drawn(table: Table, to: _To) -> str:
         "drawn", to, values["x_m"], values["y_m"], math.radians(values.get("heading_deg", 0.0)),
         values.get("length_m", 0.0), values.get("width_m", 0.0), values.get("radius_m", 0.0),
     )  # fmt: skip
-    path = cast("list[list[float]]", table.get("path_m", []))
-    return found + (_polyline([to(x, y) for x, y in path], "walk") if path else "")
+    path = table.get("path_m")
+    return found + (_polyline([to(x, y) for x, y in path], "walk") if isinstance(path, list) and path else "")
 
 
 def _shape(

@@ -14,6 +14,7 @@ from typing import cast
 
 from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import Pose, World
+from p2os.toml_record import number_of, table_of, tables_of
 from p2os.toml_schema import Table
 from robot_bench.campaign.campaign_file import Campaign, Disturbance, Drawn, Span
 from robot_bench.campaign.things import DrawnThing, Room
@@ -54,7 +55,7 @@ class Proposal:
         lists: dict[str, Sequence[Table]] = {}
         for name, more in (("obstacle", self.obstacles), ("fault", self.faults)):
             if more:
-                lists[name] = [*cast("list[Table]", base.table.get(name, [])), *more]
+                lists[name] = [*tables_of(base.table, name), *more]
         return found.with_lists(**lists)
 
 
@@ -109,17 +110,13 @@ def _world_and_starts(trial: Trial, settings: tuple[Setting, ...]) -> tuple[Worl
     with unpacked(trial.files) as folder:
         name = str(changed.table["world"])
         world = _world(str(folder / name) if name in trial.files else name, changed.seed)
-    robots = changed.table.get("robot")
-    tables = (
-        cast("list[Mapping[str, float]]", robots)
-        if isinstance(robots, list)
-        else [cast("Mapping[str, float]", changed.table.get("start", {}))]
-    )
+    tables = tables_of(changed.table, "robot") or [table_of(changed.table, "start")]
     return world, [_pose(table) if "x_m" in table else world.start for table in tables]
 
 
-def _pose(table: Mapping[str, float]) -> Pose:
-    return Pose(table["x_m"], table["y_m"], math.radians(table.get("heading_deg", 0.0)))
+def _pose(table: Table) -> Pose:
+    x_m, y_m, heading_deg = (number_of(table, key) for key in ("x_m", "y_m", "heading_deg"))
+    return Pose(x_m, y_m, math.radians(heading_deg))
 
 
 @lru_cache(maxsize=64)

@@ -27,6 +27,7 @@ from bluepill_sim.program.image import Image, load_image
 from p2os.pioneer.world import known_worlds, load_world
 from p2os.pioneer.world.writer import write_world
 from p2os.toml_file import TomlSource, is_file, toml_text
+from p2os.toml_record import tables_of
 from p2os.toml_schema import Table
 from robot_bench.bench import Bench, run_of
 from robot_bench.bench.board import boot
@@ -39,7 +40,8 @@ from robot_bench.scenario.included_files import (
     set_key,
     shipped_file,
 )
-from robot_bench.scenario.scenario import Scenario, build_scenario, known_scenarios, load_scenario
+from robot_bench.scenario.loading import build_scenario, known_scenarios, load_scenario
+from robot_bench.scenario.scenario import Scenario
 from simbase.errors import P2osError
 from simbase.files import MAKE_ROOM, read_bytes, refuse_elsewhere, writing, writing_temporary
 from simbase.timing import NS_PER_MS, Nanos
@@ -115,7 +117,7 @@ class Trial:
     def programs(self) -> Mapping[str, str]:
         """The name of each firmware among the files, in the order of the robots, and the SHA-256 of its bytes."""
         robots = self.table.get("robot")
-        tables = cast("list[Table]", robots) if isinstance(robots, list) else [self.table]
+        tables = tables_of(self.table, "robot") if isinstance(robots, list) else [self.table]
         names = dict.fromkeys(str(table["firmware"]) for table in tables if "firmware" in table)
         return {name: hashlib.sha256(self.files[name]).hexdigest() for name in names}
 
@@ -247,9 +249,9 @@ def trial_of(
     _pack_firmware(table, scenario, files)
     _pack_world(table, scenario, path.parent, files)
     _pack_others(table, path.parent, files)
-    seed = cast("int", table.pop("seed", scenario.seed))
+    table.pop("seed", None)
     trusted = frozenset(code.key for code in scenario.codes)
-    return Trial(name=scenario.name, table=table, files=files, seed=seed, trusted=trusted)
+    return Trial(name=scenario.name, table=table, files=files, seed=scenario.seed, trusted=trusted)
 
 
 @dataclass(slots=True)
@@ -390,7 +392,7 @@ def _pack_firmware(table: dict[str, object], scenario: Scenario, files: dict[str
         table["firmware"] = _packed(scenario.firmware, files)
         return
     found = {robot.name: robot.scenario.firmware for robot in scenario.robots if robot.scenario is not None}
-    for one in cast("list[dict[str, object]]", robots):
+    for one in robots:
         if one["name"] in found:
             one["firmware"] = _packed(found[str(one["name"])], files)
     table.pop("firmware", None)

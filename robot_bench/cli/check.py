@@ -12,7 +12,8 @@ from p2os.toml_schema import placed, within
 from robot_bench.bench import Bench
 from robot_bench.scenario.included_files import as_toml
 from robot_bench.scenario.json_schema import scenario_schema
-from robot_bench.scenario.scenario import Scenario, load_scenario
+from robot_bench.scenario.loading import load_scenario
+from robot_bench.scenario.scenario import Scenario
 from robot_bench.scenario.sweep import rows
 from simbase.errors import P2osError, UsageError, shown_name
 from simbase.timing import NS_PER_S

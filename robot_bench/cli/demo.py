@@ -13,7 +13,7 @@ from robot_bench.cli.run import end_with
 from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.report.make import Files
 from robot_bench.run import run_scenario
-from robot_bench.scenario.scenario import load_scenario
+from robot_bench.scenario.loading import load_scenario
 from simbase.timing import NS_PER_S, Nanos
 from simbase.units import TIME
 

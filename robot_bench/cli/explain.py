@@ -15,7 +15,8 @@ from robot_bench.recording.together import robots_in
 from robot_bench.report.explain.chain import Explanation, Standing
 from robot_bench.report.explain.explain import explain as explain_run
 from robot_bench.scenario.goals.judging import judge
-from robot_bench.scenario.scenario import Scenario, load_scenario
+from robot_bench.scenario.loading import load_scenario
+from robot_bench.scenario.scenario import Scenario
 from simbase.errors import FileError, UsageError
 from simbase.files import lines_of, sha256_of
 from simbase.trust import Trust

@@ -218,7 +218,7 @@ def robot(served: "ServedPioneer") -> "Iterator[Robot]":
 def _scenario_of(item: pytest.Item, chosen: dict[str, Any]) -> "Scenario":
     from bluepill_sim.spans import to_nanos
     from robot_bench.scenario.fault_script import load_faults
-    from robot_bench.scenario.scenario import load_scenario
+    from robot_bench.scenario.loading import load_scenario
     from simbase.timing import NS_PER_S
     from simbase.trust import Trust
 

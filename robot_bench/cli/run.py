@@ -17,7 +17,7 @@ from p2os.cli.trust import Trusted, said
 from p2os.errors import RunFailedError
 from p2os.toml_schema import within
 from p2os.transport import open_url
-from robot_bench.cli.names import scenario_names
+from robot_bench.cli.names import scenario_names, setting_keys
 from robot_bench.cli.progress import RunDisplay
 from robot_bench.cli.sweep import (
     KEPT,
@@ -37,7 +37,9 @@ from robot_bench.remote import CAUTIOUS_ROTATION_DEG_S, CAUTIOUS_VELOCITY_MM_S
 from robot_bench.run import RunBench, RunProgress, RunResult, run_at_port, run_scenario
 from robot_bench.scenario import sweep
 from robot_bench.scenario.included_files import read_setting
-from robot_bench.scenario.scenario import Scenario, ScenarioOptions, load_scenario
+from robot_bench.scenario.loading import load_scenario
+from robot_bench.scenario.options import ScenarioOptions
+from robot_bench.scenario.scenario import Scenario
 from robot_bench.scenario.sweep import MOST_RUNS, read_seeds
 from simbase.command_line.help_pages import VerbPage
 from simbase.command_line.program import EXIT_INTERRUPTED
@@ -130,7 +132,10 @@ def run(
     seed: Annotated[int | None, option(SEED, "--seed", purpose="Of everything random.", least="0")] = None,
     seeds: Annotated[str | None, typer.Option(help="A run for each: 0-99, or 1,5,10-19.", metavar="SEEDS")] = None,
     set_: Annotated[
-        list[str] | None, typer.Option("--set", help="A key of the scenario; repeatable.", metavar="KEY=VALUE")
+        list[str] | None,
+        typer.Option(
+            "--set", help="A key of the scenario; repeatable.", metavar="KEY=VALUE", autocompletion=setting_keys
+        ),
     ] = None,
     jobs: Jobs = None,
     junit: Annotated[Path | None, typer.Option(help="Write what CI reads.", metavar="FILE")] = None,

@@ -15,22 +15,28 @@ nothing that happened up to t.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import cast
+from typing import Annotated
 
 from p2os.errors import ScenarioError
 from p2os.pioneer.controller.faults import MOMENTARY, read_fault
 from p2os.robots.parameters import RobotParameters
-from p2os.toml_schema import LONGEST_S, Key, Table, Where, check_table, placed, within
+from p2os.toml_record import Record, read
+from p2os.toml_schema import LONGEST_S, Key, Table, Where, placed, within
 from robot_bench.scenario.timeline import Timeline
-from simbase.timing import NS_PER_S, Nanos
+from simbase.timing import Nanos, nanos
 
 #: The fault of the line itself.
 LINK_DOWN = "link-down"
-KEYS = (
-    Key(name="at_s", kind="number", required=True, least=0, most=LONGEST_S),
-    Key(name="fault", kind="text", required=True),
-    Key(name="for_s", kind="number", above=0, most=LONGEST_S),
-)
+#: Of a fault, or of what a hand holds.
+Span = Annotated[float | None, Key(above=0, most=LONGEST_S, doc="it ends after so long; without it stays")]
+
+
+class FaultTable(Record):
+    """`[[fault]]`: what goes wrong at a time."""
+
+    at_s: Annotated[float, Key(least=0, most=LONGEST_S, doc="when")]
+    fault: Annotated[str, Key(doc='the words of [pioneer.md](pioneer.md#faults), or `"link-down"`')]
+    for_s: Span = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,19 +56,25 @@ def load_faults(tables: Sequence[Table], parameters: RobotParameters, where: Whe
     found: list[FaultChange] = []
     for number, table in enumerate(tables):
         place = within(where, "fault", number)
-        check_table(table, KEYS, place)
-        words = str(table["fault"])
-        name = words
-        if words != LINK_DOWN:
-            with placed(place):
-                name = read_fault(words, sonar=parameters.sonar_fitted).name
-        at = _nanos(table, "at_s")
-        found.append(FaultChange(at, f"fault {words}"))
-        if "for_s" in table:
-            if name in MOMENTARY:
-                raise ScenarioError(f"{place}: for_s, but {name} happens once", hint="leave for_s out")
-            found.append(FaultChange(at + _nanos(table, "for_s"), f"clear {words}"))
+        found += faults_of(read(FaultTable, table, place), parameters, place)
     return tuple(sorted(found, key=lambda change: change.at))
+
+
+def faults_of(row: FaultTable, parameters: RobotParameters, place: Where) -> tuple[FaultChange, ...]:
+    """Return what one fault's table asks for, in order of time.
+
+    Raises:
+        ScenarioError: It names no fault, or ends one that happens once.
+    """
+    name, begin = row.fault, nanos(row.at_s)
+    if row.fault != LINK_DOWN:
+        with placed(place):
+            name = read_fault(row.fault, sonar=parameters.sonar_fitted).name
+    if row.for_s is None:
+        return (FaultChange(begin, f"fault {row.fault}"),)
+    if name in MOMENTARY:
+        raise ScenarioError(f"{place}: for_s, but {name} happens once", hint="leave for_s out")
+    return FaultChange(begin, f"fault {row.fault}"), FaultChange(begin + nanos(row.for_s), f"clear {row.fault}")
 
 
 class FaultScript(Timeline[FaultChange]):
@@ -85,7 +97,3 @@ class FaultScript(Timeline[FaultChange]):
         self._bring_to(change.at)
         self._do(change.words, change.at)
         self._bring_to(change.at)
-
-
-def _nanos(table: Table, key: str) -> Nanos:
-    return round(float(cast("float", table[key])) * NS_PER_S)

@@ -14,26 +14,50 @@ Invariant: an action at t acts on everything after t, and each is noted in the t
 """
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Annotated, Literal
 
 from p2os.errors import ScenarioError
-from p2os.toml_schema import LONGEST_S, Key, Table, Where
+from p2os.toml_record import Record
+from p2os.toml_schema import Key, Where
 from robot_bench.events.selection import Wires, wire_named
+from robot_bench.scenario.fault_script import Span
 from robot_bench.scenario.timeline import Timeline
 from simbase.errors import UsageError
-from simbase.timing import NS_PER_S, Nanos
+from simbase.timing import Nanos, nanos
 
-PORTS = ("usart1", "usart2", "usart3")
 LEVELS = {"high": True, "low": False}
-_FOR = Key(name="for_s", kind="number", above=0, most=LONGEST_S)
-_PIN = Key(name="pin", kind="text", required=True)
-#: What can be done → the keys of its table.
-ACTIONS = {
-    "type": (Key(name="text", kind="text", required=True), Key(name="port", kind="text", choices=PORTS)),
-    "set_pin": (_PIN, Key(name="level", kind="text", required=True, choices=tuple(LEVELS)), _FOR),
-    "set_volts": (_PIN, Key(name="volts", kind="number", required=True, least=0, most=25.5), _FOR),
-}
+_Pin = Annotated[str, Key(doc="a wire's name, or a pin of the BluePill")]
+
+
+class TypeTable(Record):
+    """Characters come in at a USART of the BluePill."""
+
+    text: Annotated[str, Key(doc="the characters")]
+    port: Annotated[Literal["usart1", "usart2", "usart3"], Key(doc="where they come in")] = "usart1"
+
+
+class SetPinTable(Record):
+    """A level on a wire or a free pin, held as a wire to 3.3 V or ground; where a part drives it hard too, low wins."""
+
+    pin: _Pin
+    level: Annotated[Literal["high", "low"], Key(doc="what it is held at")]
+    for_s: Span = None
+
+
+class SetVoltsTable(Record):
+    """Volts on a pin of the BluePill, for its ADC."""
+
+    pin: _Pin
+    volts: Annotated[float, Key(least=0, most=25.5, doc="what it is held at")]
+    for_s: Span = None
+
+
+#: What can be done → its table.
+ACTIONS: Mapping[str, type[TypeTable | SetPinTable | SetVoltsTable]] = {
+    "type": TypeTable, "set_pin": SetPinTable, "set_volts": SetVoltsTable,
+}  # fmt: skip
 #: A pin of the chip that may be on no wire.
 _CHIP_PIN = re.compile(r"P(A([0-9]|1[0-5])|B([0-9]|1[0-5])|C1[345])$")
 
@@ -62,32 +86,30 @@ class Action:
         return f"{self.place} {'lets go' if self.level is None else 'high' if self.level else 'low'}"
 
 
-def load_actions(do: str, table: Table, where: Where, wires: Wires | None) -> tuple[Action, ...]:
-    """Return what a checked table asks for, counted from 0.
+def actions_of(
+    row: TypeTable | SetPinTable | SetVoltsTable, do: str, where: Where, wires: Wires | None
+) -> tuple[Action, ...]:
+    """Return what a table asks for, counted from 0.
 
     Raises:
         ScenarioError: There is no such pin.
     """
-    if do == "type":
-        return (Action(at=0, do=do, place=str(table.get("port", PORTS[0])), text=str(table["text"]).encode()),)
-    pin = str(table["pin"])
-    try:
-        place = pin if do == "set_volts" and _CHIP_PIN.match(pin) else wire_named(pin, wires)
-    except UsageError as error:
-        if not _CHIP_PIN.match(pin):
-            raise ScenarioError(f"{where}: {error}", hint=error.hint) from error
-        place = pin
-    if do == "set_volts" and not _CHIP_PIN.match(place):
+    if isinstance(row, TypeTable):
+        return (Action(at=0, do=do, place=row.port, text=row.text.encode()),)
+    is_pin, place = _CHIP_PIN.match(row.pin), row.pin
+    if isinstance(row, SetPinTable) or not is_pin:
+        try:
+            place = wire_named(row.pin, wires)
+        except UsageError as error:
+            if not is_pin:
+                raise ScenarioError(f"{where}: {error}", hint=error.hint) from error
+    if isinstance(row, SetPinTable):
+        begin = Action(at=0, do=do, place=place, level=LEVELS[row.level])
+    elif _CHIP_PIN.match(place):
+        begin = Action(at=0, do=do, place=place, volts=row.volts)
+    else:
         raise ScenarioError(f"{where}: volts are put on a pin of the BluePill", hint='such as pin = "PA0"')
-    level, volts = table.get("level"), table.get("volts")
-    begin = Action(
-        at=0, do=do, place=place, level=None if level is None else LEVELS[str(level)],
-        volts=float(volts) if isinstance(volts, (int, float)) else None,
-    )  # fmt: skip
-    span = table.get("for_s")
-    if not isinstance(span, (int, float)):
-        return (begin,)
-    return begin, Action(at=round(span * NS_PER_S), do=do, place=place)
+    return (begin,) if row.for_s is None else (begin, Action(at=nanos(row.for_s), do=do, place=place))
 
 
 class HandScript(Timeline[Action]):

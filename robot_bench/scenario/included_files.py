@@ -19,19 +19,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import cast
+from typing import Annotated, TypeGuard
 
 from p2os.errors import ScenarioError
 from p2os.toml_file import TomlSource, is_file, read_toml, read_user_text
-from p2os.toml_schema import Key, Table, TablePlace, check_table
+from p2os.toml_record import Record, read_part
+from p2os.toml_schema import Key, Table, TablePlace
 from simbase.errors import UsageError, nearest, shown, shown_name
 
 #: Of the schema of scenario files.
 SCHEMA_VERSION = 1
-VERSION = Key(name="version", kind="whole", least=1, most=SCHEMA_VERSION)
-#: What names other files; none of them is left in the table.
-KEYS = (Key(name="extends", kind="text"), Key(name="include", kind="texts"))
-_OWN = (*KEYS, VERSION)
 #: chosen: what a person keeps in his head is less, and files that include each other twice each come to it soon.
 MOST_FILES = 64
 #: Keys whose value may be a file, by the table that they stand in; `robot` of a `[[robot]]` too.
@@ -40,6 +37,20 @@ FILES: Mapping[str, tuple[str, ...]] = {
 }  # fmt: skip
 #: Key and value, as of `--set`.
 Setting = tuple[str, object]
+
+
+class IncludeTable(Record):
+    """What a file says of itself and of others; none that names another is left in the table that is put together."""
+
+    version: Annotated[int, Key(
+        least=1, most=SCHEMA_VERSION, doc="of these keys; a file for a later version is refused"
+    )] = SCHEMA_VERSION  # fmt: skip
+    extends: Annotated[str | None, Key(
+        doc="a scenario that ships, or a file: [what it says](#files-of-files) holds where this one says nothing"
+    )] = None  # fmt: skip
+    include: Annotated[tuple[str, ...], Key(
+        doc='files whose keys count as if they stood here: `"posts.toml"`, or a list'
+    )] = ()  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,16 +234,16 @@ def _read(path: Path, folder: Path, above: tuple[Path, ...], count: list[int]) -
     text = read_user_text(path, "a scenario", ScenarioError)
     table, places = read_toml(text, name, "a scenario", ScenarioError)
     place = TablePlace(TomlSource(name, places))
-    check_table({key.name: table[key.name] for key in _OWN if key.name in table}, _OWN, place)
-    extended, included = table.pop("extends", None), table.pop("include", [])
-    for own, keys in FILES.items():
-        _look_beside(table, own, keys, path.parent, folder)
+    own, _ = read_part(IncludeTable, table, place)
+    table = {name: value for name, value in table.items() if name not in {"extends", "include"}}
+    for name_of, keys in FILES.items():
+        _look_beside(table, name_of, keys, path.parent, folder)
     found = _Read(table=table, parts=(_Part(TomlSource(name, places)),), texts=(f"{name}:\n{text}",))
     here = (*above, path)
-    for other in reversed([included] if isinstance(included, str) else included):
+    for other in reversed(own.include):
         found = _merged(_read(_named(other, here, place.at("include"), "include"), folder, here, count), found)
-    if extended is not None:
-        base = _read(_named(extended, here, place.at("extends"), "extends"), folder, here, count)
+    if own.extends is not None:
+        base = _read(_named(own.extends, here, place.at("extends"), "extends"), folder, here, count)
         found = _merged(base, found, is_replaced=True)
     return found
 
@@ -261,8 +272,7 @@ def _named(name: str, here: tuple[Path, ...], at: str, key: str) -> Path:
 def _look_beside(table: dict[str, object], own: str, keys: Sequence[str], there: Path, folder: Path) -> None:
     """Name the files that stand beside an included file as seen from the folder of the first."""
     held = table.get(own) if own else table
-    parts = [part for part in (held if isinstance(held, list) else [held]) if isinstance(part, dict)]
-    for part in cast("list[dict[str, object]]", parts):
+    for part in (part for part in (held if isinstance(held, list) else [held]) if isinstance(part, dict)):
         for key in keys:
             name = part.get(key)
             if isinstance(name, str) and there != folder and is_file(there / name):
@@ -279,8 +289,7 @@ def _merged(lower: _Read, upper: _Read, *, is_replaced: bool = False) -> _Read:
         shifts: dict[str, int] = {}
     else:
         table = lower.table
-        there = {name: cast("list[object]", table.get(name, [])) for name in lists}
-        shifts = {name: len(held) for name, held in there.items() if _is_list_of_tables(held)}
+        shifts = {name: len(held) for name in lists if _is_list_of_tables(held := table.get(name))}
     return _Read(
         table=_joined(table, upper.table), parts=(*parts, *(part.shifted(shifts) for part in upper.parts)),
         texts=(*lower.texts, *upper.texts),
@@ -294,13 +303,13 @@ def _joined(lower: Mapping[str, object], upper: Mapping[str, object]) -> dict[st
         if isinstance(held, dict) and isinstance(value, dict):
             table[name] = _joined(held, value)
         elif _is_list_of_tables(held) and _is_list_of_tables(value):
-            table[name] = [*cast("list[object]", held), *cast("list[object]", value)]
+            table[name] = [*held, *value]
         else:
             table[name] = value
     return table
 
 
-def _is_list_of_tables(value: object) -> bool:
+def _is_list_of_tables(value: object) -> TypeGuard[list[dict[str, object]]]:
     return isinstance(value, list) and bool(value) and all(isinstance(item, dict) for item in value)
 
 

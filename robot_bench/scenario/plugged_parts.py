@@ -5,21 +5,26 @@ Invariant: a part that was read can be made, and stands on no wire of the robot'
 
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
+from typing import Annotated
 
 from bluepill_sim.parts.registry import GROUP, PARTS, PartSpec, build
 from bluepill_sim.stm32f103 import BONDED_PINS
 from p2os.errors import ScenarioError
+from p2os.toml_record import Record, keys_of
 from p2os.toml_schema import Key, Table, TablePlace, Where, placed, within
 from simbase.errors import shown, shown_name
 from simbase.trust import Code, Trust
 
-#: The keys of every part; all others are its pins and settings.
-KEYS = (
-    Key(name="kind", kind="text", required=True, choices=tuple(PARTS), group=GROUP),
-    Key(name="name", kind="text"),
-    Key(name="on", kind="text"),
-    Key(name="select", kind="text"),
-)
+
+class PartTable(Record):
+    """`[[part]]`: the keys of every part; all others are its pins and settings."""
+
+    kind: Annotated[str, Key(choices=tuple(PARTS), group=GROUP, doc="which part")]
+    name: Annotated[str | None, Key(doc="what messages call it")] = None
+    on: Annotated[str | None, Key(doc="the port of the chip")] = None
+    select: Annotated[str | None, Key(doc="the pin that selects it")] = None
+
+
 _SCALARS = (str, int, float, bool)
 
 
@@ -47,7 +52,7 @@ def load_parts(
 
 
 def _load(table: Table, folder: Path, taken: Mapping[str, str], at: Where, trust: Trust) -> PartSpec:
-    for known in KEYS:
+    for known in keys_of(PartTable):
         text = table.get(known.name)
         if known.required and text is None:
             raise ScenarioError(f"{at}: key {known.name!r} is missing", hint="p2os mcu parts lists what there is")

@@ -17,36 +17,27 @@ Invariant: a message about a robot names the line of the file where it stands.
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import cast
+from dataclasses import dataclass
 
 from p2os.errors import ScenarioError
-from p2os.pioneer.world.file import in_range
+from p2os.toml_record import keys_of, tables_of
 from p2os.toml_schema import Key, KeyPlaces, Table, TablePlace, check_table, within
+from robot_bench.scenario.tables import ROBOT, EachRobotTable, OwnTable, TopTable
 from simbase.errors import nearest, shown
 
 #: What a robot has for itself; those that a scenario of one robot has at its top, and where it stands.
-OWN = ("firmware", "mode", "threshold_m", "usart_baud", "pins", "direct", "adapter", "controller", "record")
+OWN = ("firmware", *(key.name for key in keys_of(OwnTable)))
 _PLACE = ("x_m", "y_m", "heading_deg")
+#: What a scenario with several robots has at its top.
+_TOP = (
+    *(key for key in keys_of(TopTable) if key.name not in {*OWN, "start", "in_world", "robot"}),
+    Key(name="robot", kind="tables", required=True),
+)
 #: chosen: more than a person can watch; each runs a chip.
 MOST_ROBOTS = 16
 _NAME = re.compile(r"[A-Za-z_][\w.-]{0,31}", re.ASCII)
 #: Lists of a scenario whose tables may name a robot.
 OF_ROBOTS = ("goal", "fault", "when", "obstacle", "part")
-ROBOT = Key(name="robot", kind="text")
-
-
-def robot_keys(top: Sequence[Key]) -> tuple[Key, ...]:
-    """Return the keys of a `[[robot]]` table, those of the file's top among them."""
-    own = tuple(replace(key, required=False) for key in top if key.name in OWN)
-    place = tuple(in_range(name) for name in _PLACE)
-    return (Key(name="name", kind="text", required=True), Key(name="model", kind="text"), *own, *place)
-
-
-def top_keys(top: Sequence[Key]) -> tuple[Key, ...]:
-    """Return the keys of the top of a scenario with several robots."""
-    left_out = {*OWN, "start", "in_world", "robot"}
-    return (*(key for key in top if key.name not in left_out), Key(name="robot", kind="tables", required=True))
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,12 +87,11 @@ class RobotTable:
         return "firmware" in self.table
 
 
-def split(table: Table, top: Sequence[Key], place: TablePlace) -> list[RobotTable]:
+def split(table: Table, place: TablePlace) -> list[RobotTable]:
     """Return each robot of a scenario's table as one of its own.
 
     Args:
         table: What the file says.
-        top: The keys of a scenario with one robot.
         place: The file's.
 
     Raises:
@@ -112,15 +102,15 @@ def split(table: Table, top: Sequence[Key], place: TablePlace) -> list[RobotTabl
             raise ScenarioError(
                 f"{place.at(name)}: {name} beside [[robot]]", hint="each robot has its own: move it there"
             )
-    check_table(table, top_keys(top), place)
-    robots = cast("Sequence[Table]", table["robot"])
+    check_table(table, _TOP, place)
+    robots = tables_of(table, "robot")
     if len(robots) > MOST_ROBOTS:
         raise ScenarioError(f"{place.at('robot')}: more than {MOST_ROBOTS} robots")
-    names = _names(robots, robot_keys(top), place)
+    names = _names(robots, place)
     programmed = [name for name, robot in zip(names, robots, strict=True) if "firmware" in robot]
     if not programmed:
         raise ScenarioError(f"{within(place, 'robot', 0)}: no robot has a firmware", hint='firmware = "mine.elf"')
-    lists = {key: _by_robot(cast("Sequence[Table]", table.get(key, [])), key, programmed, place) for key in OF_ROBOTS}
+    lists = {key: _by_robot(tables_of(table, key), key, programmed, place) for key in OF_ROBOTS}
     shared = {key: value for key, value in table.items() if key not in {"robot", "seeds", "sweep", *OF_ROBOTS}}
     found = []
     for number, (name, robot) in enumerate(zip(names, robots, strict=True)):
@@ -134,11 +124,11 @@ def split(table: Table, top: Sequence[Key], place: TablePlace) -> list[RobotTabl
     return found
 
 
-def _names(robots: Sequence[Table], keys: Sequence[Key], place: TablePlace) -> list[str]:
+def _names(robots: Sequence[Table], place: TablePlace) -> list[str]:
     names: list[str] = []
     for number, robot in enumerate(robots):
         at = within(place, "robot", number)
-        check_table(robot, keys, at)
+        check_table(robot, keys_of(EachRobotTable), at)
         name = str(robot["name"])
         where = at.at("name") if isinstance(at, TablePlace) else at
         if not _NAME.fullmatch(name) or name in names:

@@ -17,12 +17,13 @@ import itertools
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from fractions import Fraction
-from typing import cast
+from typing import Annotated
 
 from p2os.errors import ScenarioError
-from p2os.toml_schema import Key, Table, Where, check_table, within
+from p2os.toml_record import Record, read
+from p2os.toml_schema import Key, Table, Where, within
 from robot_bench.scenario.included_files import Setting
 from simbase.errors import UsageError, shown
 
@@ -30,12 +31,14 @@ from simbase.errors import UsageError, shown
 MOST_RUNS = 100_000
 LARGEST_SEED = 2**63 - 1
 _PART = re.compile(r"(\d+)(?:\s*-\s*(\d+))?", re.ASCII)
-#: Keys of a range.
-RANGE = (
-    Key(name="from", kind="number", required=True),
-    Key(name="to", kind="number", required=True),
-    Key(name="step", kind="number", required=True, above=0),
-)
+
+
+class RangeTable(Record):
+    """A range of values, both ends included."""
+
+    from_: Annotated[int | float, Key(kind="number", doc="the first value")]
+    to: Annotated[int | float, Key(kind="number", doc="the last value that may be")]
+    step: Annotated[int | float, Key(kind="number", above=0, doc="from one value to the next")]
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,14 +77,14 @@ def read_seeds(text: str) -> tuple[int, ...]:
     return tuple(found)
 
 
-def load_seeds(table: Table, where: str) -> tuple[int, ...]:
+def load_seeds(text: str | None, where: str) -> tuple[int, ...]:
     """Return the seeds of a scenario, none where it names none.
 
     Raises:
         ScenarioError: Its text names none.
     """
     try:
-        return read_seeds(str(table["seeds"])) if "seeds" in table else ()
+        return read_seeds(text) if text is not None else ()
     except UsageError as error:
         raise ScenarioError(f"{where}: seeds: {error}", hint=error.hint) from error
 
@@ -113,10 +116,9 @@ def _axes(table: Table, above: str, where: Where) -> Iterator[SweptParameter]:
                 raise ScenarioError(f"{at}: {key}: a table cannot be swept", hint="sweep a key of it")
             yield SweptParameter(key, tuple(value))
         elif isinstance(value, Mapping) and "from" in value:
-            check_table(cast("Table", value), RANGE, f"{at}: {key}")
-            yield SweptParameter(key, _range(cast("Mapping[str, float]", value), f"{at}: {key}"))
+            yield SweptParameter(key, _range(read(RangeTable, value, f"{at}: {key}"), f"{at}: {key}"))
         elif isinstance(value, Mapping) and value:
-            yield from _axes(cast("Table", value), key, where)
+            yield from _axes(value, key, where)
         else:
             raise ScenarioError(
                 f"{at}: {key} = {shown(value)} is no list of values",
@@ -124,15 +126,15 @@ def _axes(table: Table, above: str, where: Where) -> Iterator[SweptParameter]:
             )
 
 
-def _range(table: Mapping[str, float], where: str) -> tuple[object, ...]:
+def _range(table: RangeTable, where: str) -> tuple[object, ...]:
     """Return the values of a range: in decimals, as they are written, both ends included."""
     try:
-        first, last, step = (Fraction(str(table[key])) for key in ("from", "to", "step"))
+        first, last, step = (Fraction(str(one)) for one in astuple(table))
     except ValueError:  # infinity
         raise ScenarioError(f"{where}: a range has ends") from None
     if last < first or (last - first) / step >= MOST_RUNS:
         wrong = "to is below from" if last < first else f"more than {MOST_RUNS} values"
         raise ScenarioError(f"{where}: {wrong}", hint="{ from = 0, to = 330, step = 30 }")
     values = [first + number * step for number in range(int((last - first) / step) + 1)]
-    is_whole = all(isinstance(table[key], int) for key in ("from", "to", "step"))
+    is_whole = all(isinstance(one, int) for one in astuple(table))
     return tuple(int(value) if is_whole else float(value) for value in values)

@@ -18,52 +18,97 @@ Invariant: when it is done depends on the events of the run alone, not on the sl
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import cast
+from typing import Annotated, ClassVar
 
 from p2os.errors import ScenarioError
 from p2os.robots.parameters import RobotParameters
-from p2os.toml_schema import LONGEST_S, Key, Table, Where, check_table, placed, within
+from p2os.toml_record import Record, read, read_part
+from p2os.toml_schema import LONGEST_S, Key, Table, Where, placed, within
 from robot_bench.events.kinds import Event
 from robot_bench.events.selection import Wires, select
 from robot_bench.events.stream import EventStream
-from robot_bench.scenario import world_script
-from robot_bench.scenario.fault_script import LINK_DOWN, FaultChange, load_faults
-from robot_bench.scenario.hand_script import ACTIONS, Action, load_actions
-from robot_bench.scenario.world_script import ScriptedChange, load_changes
+from robot_bench.scenario.fault_script import LINK_DOWN, FaultChange, FaultTable, Span, faults_of
+from robot_bench.scenario.hand_script import ACTIONS, Action, SetPinTable, SetVoltsTable, TypeTable, actions_of
+from robot_bench.scenario.world_script import Op, ScriptedChange, ThingTable, changes_of
 from simbase.errors import nearest, shown
 from simbase.state import Stateful
-from simbase.timing import NS_PER_S, Nanos
+from simbase.timing import Nanos, nanos
 
-_WORLD, _FAULTS = ("place", "move", "remove"), ("inject", "clear")
-_SPAN = Key(name="for_s", kind="number", above=0, most=LONGEST_S)
-#: What is a fault in other words → the keys of its table, and the words.
-_AS_FAULTS: Mapping[str, tuple[tuple[Key, ...], Callable[[Table], str]]] = {
-    "press": ((Key(name="button", kind="text", required=True), _SPAN), lambda table: str(table["button"])),
-    "drop_link": ((_SPAN,), lambda _: LINK_DOWN),
-    "sag_battery": (
-        (Key(name="volts", kind="number", required=True, least=0, most=25.5), _SPAN),
-        lambda table: f"low-battery {table['volts']}",
-    ),
-}
 _BUTTONS = ("stop-button", "bumper")
-_OWN = (
-    Key(name="event", kind="text", required=True),
-    Key(name="do", kind="text", required=True, choices=(*_WORLD, *_FAULTS, *_AS_FAULTS, *ACTIONS, "end")),
-    Key(name="id", kind="text"),
-    Key(name="after", kind="text"),
-    Key(name="after_s", kind="number", least=0, most=LONGEST_S),
-    Key(name="every", kind="flag"),
-)
-_FAULT = (Key(name="fault", kind="text", required=True), _SPAN)
-_THING = tuple(key for key in world_script.KEYS if key.name not in {"at_s", "op"})
-#: All that may stand in a table.
-KEYS = tuple(
-    {
-        key.name: replace(key, required=key.required and key in _OWN)
-        for keys in (_THING, *(row[0] for row in _AS_FAULTS.values()), *ACTIONS.values(), _FAULT, _OWN)
-        for key in keys
-    }.values()
-)
+
+
+class FaultActionTable(Record):
+    """A [fault](#fault-faults-injected-during-the-run-mode-b)."""
+
+    fault: Annotated[str, Key(doc="the words of a fault")]
+    for_s: Span = None
+
+    @property
+    def words(self) -> str:
+        """The fault in words."""
+        return self.fault
+
+
+class PressTable(Record):
+    """A button of a Pioneer (mode B)."""
+
+    button: Annotated[str, Key(doc='`"stop-button"`, or `"bumper front 1"`')]
+    for_s: Span = None
+
+    def __post_init__(self) -> None:
+        if self.button.split()[:1] not in [[button] for button in _BUTTONS]:
+            raise ScenarioError(f"there is no button {shown(self.button)}", hint='"stop-button", or "bumper front 1"')
+
+    @property
+    def words(self) -> str:
+        """The fault in words."""
+        return self.button
+
+
+class DropLinkTable(Record):
+    """The P2OS line is broken, both ways (mode B)."""
+
+    for_s: Span = None
+    words: ClassVar[str] = LINK_DOWN
+
+
+class SagBatteryTable(Record):
+    """A Pioneer's battery shows so much (mode B)."""
+
+    volts: Annotated[int | float, Key(kind="number", least=0, most=25.5, doc="what it shows")]
+    for_s: Span = None
+
+    @property
+    def words(self) -> str:
+        """The fault in words."""
+        return f"low-battery {self.volts}"
+
+
+class EndTable(Record):
+    """The run ends."""
+
+
+ActionTable = (
+    ThingTable | FaultActionTable | PressTable | DropLinkTable | SagBatteryTable | TypeTable | SetPinTable
+    | SetVoltsTable | EndTable
+)  # fmt: skip
+#: What is done → the table of its keys.
+ACTION_TABLES: Mapping[str, type[ActionTable]] = {
+    "place": ThingTable, "move": ThingTable, "remove": ThingTable, "inject": FaultActionTable,
+    "clear": FaultActionTable, "press": PressTable, "drop_link": DropLinkTable, "sag_battery": SagBatteryTable,
+    **ACTIONS, "end": EndTable,
+}  # fmt: skip
+
+
+class WhenTable(Record):
+    """`[[when]]`: what is done when something happens."""
+
+    event: Annotated[str, Key(doc="in the words of goals")]
+    do: Annotated[str, Key(choices=tuple(ACTION_TABLES), doc="what is done")]
+    id: Annotated[str, Key(doc="what `after` of another table calls it")] = ""
+    after: Annotated[str, Key(doc="the event counts from when the table with that `id` has had its own")] = ""
+    after_s: Annotated[float, Key(least=0, most=LONGEST_S, doc="how long after the event it is done")] = 0.0
+    every: Annotated[bool, Key(doc="at each such event, not at the first one only")] = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,35 +158,25 @@ def load_triggers(
 
 
 def _load(table: Table, parameters: RobotParameters, place: Where, wires: Wires | None) -> Trigger:
-    own = {key.name for key in _OWN}
-    mine, rest = ({key: value for key, value in table.items() if (key in own) is is_own} for is_own in (True, False))
-    check_table(mine, _OWN, place)
-    do = str(mine["do"])
-    as_fault, _ = _AS_FAULTS.get(do, ((), None))
-    check_table(rest, _THING if do in _WORLD else _FAULT if do in _FAULTS else as_fault or ACTIONS.get(do, ()), place)
+    row, rest = read_part(WhenTable, table, place)
+    action = read(ACTION_TABLES[row.do], rest, place)
     with placed(place):
-        select(str(mine["event"]), wires)
-    changes: tuple[ScriptedChange, ...] = ()
+        select(row.event, wires)
+    changes: Sequence[ScriptedChange] = ()
     faults: tuple[FaultChange, ...] = ()
-    if do in _WORLD:
-        changes = load_changes([{"at_s": 0, "op": do, **rest}], parameters, f"{place}", are_later=True)
-    elif do == "inject":
-        faults = load_faults([{"at_s": 0, **rest}], parameters, f"{place}")
-    elif do in _AS_FAULTS:
-        words = _AS_FAULTS[do][1](rest)
-        if do == "press" and words.split()[:1] not in [[button] for button in _BUTTONS]:
-            raise ScenarioError(
-                f"{place}: there is no button {shown(words)}", hint='"stop-button", or "bumper front 1"'
-            )
-        span = {"for_s": rest["for_s"]} if "for_s" in rest else {}
-        faults = load_faults([{"at_s": 0, "fault": words, **span}], parameters, f"{place}")
-    elif do == "clear":
-        faults = (FaultChange(0, f"clear {rest['fault']}"),)
-    after_ns = round(float(cast("float", mine.get("after_s", 0))) * NS_PER_S)
+    actions: tuple[Action, ...] = ()
+    if isinstance(action, ThingTable):
+        changes = changes_of(action, Op(row.do), 0, parameters, f"{place}: [[obstacle]] 1")
+    elif isinstance(action, (TypeTable, SetPinTable, SetVoltsTable)):
+        actions = actions_of(action, row.do, place, wires)
+    elif row.do == "clear" and isinstance(action, FaultActionTable):
+        faults = (FaultChange(0, f"clear {action.words}"),)
+    elif not isinstance(action, EndTable):
+        fault = FaultTable(at_s=0, fault=action.words, for_s=action.for_s)
+        faults = faults_of(fault, parameters, f"{place}: [[fault]] 1")
     return Trigger(
-        event=str(mine["event"]), do=do, after_ns=after_ns, every=bool(mine.get("every", False)),
-        changes=changes, faults=faults, actions=load_actions(do, rest, place, wires) if do in ACTIONS else (),
-        name=str(mine.get("id", "")), after=str(mine.get("after", "")), wires=wires,
+        event=row.event, do=row.do, after_ns=nanos(row.after_s), every=row.every, changes=tuple(changes),
+        faults=faults, actions=actions, name=row.id, after=row.after, wires=wires,
     )  # fmt: skip
 
 
@@ -152,7 +187,7 @@ class TriggerScript(Stateful):
         triggers: What is asked for.
         on_change: Takes changes of the world, with their times.
         on_fault: Takes faults, with their times.
-        on_deed: Takes what a hand does, with its times.
+        on_action: Takes what a hand does, with its times.
         on_end: Ends the run at a time.
     """
 

@@ -17,11 +17,12 @@ from p2os.errors import ScenarioError
 from p2os.pioneer.body.contract import RobotBody
 from p2os.robots.parameters import RobotParameters
 from p2os.toml_file import TomlSource, is_file, read_toml, read_user_text
+from p2os.toml_record import table_of
 from p2os.toml_schema import Table, TablePlace, Where, within
 from robot_bench.direct.differential.robot import DifferentialRobot
+from robot_bench.direct.differential.robot_file import load_differential
 from robot_bench.direct.wired import AnalogPin, RobotWire
 from robot_bench.events.selection import wire_named
-from robot_bench.scenario.differential_file import load_differential
 from robot_bench.wires.nets import Harness
 from simbase.errors import nearest, shown, shown_name
 from simbase.timing import Nanos, Timed
@@ -123,18 +124,17 @@ def load_own_robot(path: Path, pins: Table, where: Where) -> OwnRobot:
     name = shown_name(path.name)
     table, places = read_toml(read_user_text(path, "a robot", ScenarioError), name, "a robot", ScenarioError)
     at = TablePlace(TomlSource(name, places))
-    kind = table.get("kind")
+    kind, own = table.get("kind"), table_of(table, "pins")
     if kind not in KINDS:
         raise ScenarioError(f"{at.at('kind')}: there is no kind of robot {shown(kind)}", hint=nearest(str(kind), KINDS))
-    own = table.get("pins", {})
-    asked = {**own, **pins} if isinstance(own, dict) else {}
-    robot = KINDS[str(kind)].load(table, at, cast("Mapping[str, str]", asked))
+    asked = {signal: str(pin) for signal, pin in {**own, **pins}.items()}
+    robot = KINDS[str(kind)].load(table, at, asked)
     for part, its_place in ((own, within(at, "pins")), (pins, within(where, "pins"))):
-        _check_pins(cast("Table", part), robot.signals, its_place)
+        _check_pins(part, robot.signals, its_place)
     missing = next((wire.name for wire in robot.signals if wire.name not in asked), None)
     if missing is not None:
         raise ScenarioError(f"{within(at, 'pins')}: the pin of {missing} is missing", hint=f'{missing} = "PA8"')
-    _refuse_twice(cast("Mapping[str, str]", asked), within(where if pins else at, "pins"))
+    _refuse_twice(asked, within(where if pins else at, "pins"))
     return OwnRobot(str(kind), robot)
 
 

@@ -25,17 +25,18 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
-from typing import cast
+from typing import Annotated, Literal
 
-from p2os.errors import ScenarioError, WorldError
+from p2os.errors import ScenarioError
 from p2os.pioneer.body.contract import RobotBody
 from p2os.pioneer.world.file import in_range
 from p2os.pioneer.world.model import Obstacle, Repeat, Walk, World
 from p2os.robots.parameters import RobotParameters
-from p2os.toml_schema import LONGEST_S, Key, Table, Where, check_table, within
+from p2os.toml_record import Record, read
+from p2os.toml_schema import LONGEST_S, Key, Table, Where, placed, within
 from robot_bench.scenario.timeline import Timeline
 from simbase.errors import nearest, shown
-from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, nanos
 
 #: chosen: the robot moves 10 mm at most in between.
 FOLLOW_NS: Nanos = 50 * NS_PER_MS
@@ -80,34 +81,44 @@ ChangeListener = Callable[[str, str, Nanos, Mapping[str, object]], None]
 
 #: chosen: an hour is 72 000 placings.
 LONGEST_HOLD_S = 3600
-KEYS = (
-    Key(name="at_s", kind="number", required=True, least=0, most=LONGEST_S),
-    Key(name="op", kind="text", choices=tuple(op.value for op in Op)),
-    Key(name="name", kind="text", required=True),
-    Key(name="shape", kind="text", choices=("box", "cylinder")),
-    in_range("x_m"),
-    in_range("y_m"),
-    in_range("heading_deg"),
-    in_range("length_m"),
-    in_range("width_m"),
-    in_range("height_m"),
-    in_range("radius_m"),
-    Key(name="before_sonar", kind="whole", least=1, most=256),
-    Key(name="distance_m", kind="number", above=0, most=100),
-    Key(name="hold_s", kind="number", above=0, most=LONGEST_HOLD_S),
-    in_range("mass_kg"),
-    in_range("friction"),
-    in_range("path_m"),
-    in_range("speed_mps"),
-    Key(name="repeat", kind="text", choices=tuple(member.value for member in Repeat)),
-)
-#: Of a thing that is pushed, and of one that walks; the same as in a world file.
-DEFAULT_FRICTION, DEFAULT_SPEED_MPS = 0.5, 0.5
 _SIZES = {"box": ("length_m", "width_m", "height_m"), "cylinder": ("radius_m", "height_m")}
 
 
+class ThingTable(Record):
+    """A thing that is placed, moved or removed."""
+
+    name: Annotated[str, Key(doc="of the thing")]
+    shape: Annotated[Literal["box", "cylinder"], Key(doc="of what is placed")] = "box"
+    x_m: Annotated[float | None, in_range("x_m", doc="its place in the world")] = None
+    y_m: Annotated[float | None, in_range("y_m", doc="its place in the world")] = None
+    heading_deg: Annotated[float, in_range("heading_deg", doc="counter-clockwise")] = 0.0
+    length_m: Annotated[float | None, in_range("length_m", doc="of a box")] = None
+    width_m: Annotated[float | None, in_range("width_m", doc="of a box")] = None
+    height_m: Annotated[float | None, in_range("height_m", doc="of what is placed")] = None
+    radius_m: Annotated[float | None, in_range("radius_m", doc="of a cylinder")] = None
+    before_sonar: Annotated[int | None, Key(least=1, most=256, doc="in place of a place in the world, from 1")] = None
+    distance_m: Annotated[float | None, Key(above=0, most=100, doc="how far before that sonar")] = None
+    hold_s: Annotated[float | None, Key(
+        above=0, most=LONGEST_HOLD_S, doc="it stays before that sonar for so long, and is taken away"
+    )] = None  # fmt: skip
+    mass_kg: Annotated[float, in_range("mass_kg", doc="of what the robot can push; 0 stands fast")] = 0.0
+    friction: Annotated[float, in_range("friction", doc="of what the robot can push")] = 0.5
+    path_m: Annotated[tuple[tuple[float, float], ...] | None, in_range(
+        "path_m", doc="`[[x, y], …]` along which it walks from its placing on, whatever `x_m` and `y_m` are"
+    )] = None  # fmt: skip
+    speed_mps: Annotated[float, in_range("speed_mps", doc="of what walks")] = 0.5
+    repeat: Annotated[Repeat, Key(doc="what follows the last point of a path")] = Repeat.BACK_AND_FORTH
+
+
+class ObstacleTable(ThingTable):
+    """`[[obstacle]]`: what is done to a thing at a time."""
+
+    at_s: Annotated[float, Key(least=0, most=LONGEST_S, doc="when")]
+    op: Annotated[Op, Key(doc="what is done")] = Op.PLACE
+
+
 def load_changes(
-    tables: list[Table], parameters: RobotParameters, where: Where, *, are_later: bool = False
+    tables: Sequence[Table], parameters: RobotParameters, where: Where, *, are_later: bool = False
 ) -> tuple[ScriptedChange, ...]:
     """Return the changes that a scenario's `[[obstacle]]` tables ask for, in order of time.
 
@@ -119,8 +130,8 @@ def load_changes(
     changes: list[ScriptedChange] = []
     for number, table in enumerate(tables):
         place = within(where, "obstacle", number)
-        check_table(table, KEYS, place)
-        changes += _changes(table, parameters, str(place))
+        row = read(ObstacleTable, table, place)
+        changes += changes_of(row, row.op, nanos(row.at_s), parameters, str(place))
     changes.sort(key=lambda change: change.at)
     if not are_later:
         _check_names(changes)
@@ -186,33 +197,28 @@ class WorldScript(Timeline[ScriptedChange]):
         return x_m, y_m, direction
 
 
-def _changes(table: Table, parameters: RobotParameters, where: str) -> list[ScriptedChange]:
-    at = _nanos(table, "at_s")
-    op = Op(str(table.get("op", "place")))
-    name = str(table["name"])
-    before = _before(table, parameters, where)
+def changes_of(row: ThingTable, op: Op, at: Nanos, parameters: RobotParameters, where: str) -> list[ScriptedChange]:
+    """Return what a thing's table asks for at a time, in order of time.
+
+    Raises:
+        ScenarioError: It cannot be.
+    """
+    name, before = row.name, _before(row, parameters, where)
     if op is Op.REMOVE:
         return [ScriptedChange(at=at, op=op, name=name, where=where)]
-    if before is None and "path_m" not in table:
-        _need(table, ("x_m", "y_m"), where)
-    x_m, y_m = _number(table, "x_m"), _number(table, "y_m")
-    heading_rad = math.radians(_number(table, "heading_deg"))
+    if before is None and row.path_m is None:
+        _need(row, ("x_m", "y_m"), where)
+    if row.path_m is not None and (row.before_sonar is not None or op is not Op.PLACE):
+        raise ScenarioError(f"{where}: path_m is for a thing that is placed in the world")
     first = ScriptedChange(
-        at=at,
-        op=op,
-        name=name,
-        x_m=x_m,
-        y_m=y_m,
-        heading_rad=heading_rad,
-        obstacle=_obstacle(table, where) if op is Op.PLACE else None,
-        before=before,
-        where=where,
-    )
-    if "hold_s" not in table:
+        at=at, op=op, name=name, x_m=row.x_m or 0.0, y_m=row.y_m or 0.0, heading_rad=math.radians(row.heading_deg),
+        obstacle=_obstacle(row, where) if op is Op.PLACE else None, before=before, where=where,
+    )  # fmt: skip
+    if row.hold_s is None:
         return [first]
     if before is None or op is not Op.PLACE:
         raise ScenarioError(f"{where}: hold_s without before_sonar", hint="only a thing placed before a sonar is held")
-    end = at + _nanos(table, "hold_s")
+    end = at + nanos(row.hold_s)
     moves = [
         ScriptedChange(at=moment, op=Op.MOVE, name=name, before=before, where=where)
         for moment in range(at + FOLLOW_NS, end, FOLLOW_NS)
@@ -220,51 +226,31 @@ def _changes(table: Table, parameters: RobotParameters, where: str) -> list[Scri
     return [first, *moves, ScriptedChange(at=end, op=Op.REMOVE, name=name, where=where)]
 
 
-def _before(table: Table, parameters: RobotParameters, where: str) -> BeforeSonar | None:
-    if "before_sonar" not in table:
+def _before(row: ThingTable, parameters: RobotParameters, where: str) -> BeforeSonar | None:
+    number = row.before_sonar
+    if number is None:
         return None
-    number = cast("int", table["before_sonar"])
     if number > parameters.sonar_fitted:
         raise ScenarioError(f"{where}: before_sonar = {number}, the robot has {parameters.sonar_fitted}")
-    _need(table, ("distance_m",), where)
-    return BeforeSonar(number=number, distance_m=_number(table, "distance_m"))
+    _need(row, ("distance_m",), where)
+    return BeforeSonar(number=number, distance_m=row.distance_m or 0.0)
 
 
-def _obstacle(table: Table, where: str) -> Obstacle:
-    shape = str(table.get("shape", "box"))
-    sizes = _SIZES[shape]
-    _need(table, sizes, where)
-    strange = next((key for key in ("length_m", "width_m", "radius_m") if key in table and key not in sizes), None)
+def _obstacle(row: ThingTable, where: str) -> Obstacle:
+    sizes = _SIZES[row.shape]
+    _need(row, sizes, where)
+    has = (key for key in ("length_m", "width_m", "radius_m") if getattr(row, key) is not None)
+    strange = next((key for key in has if key not in sizes), None)
     if strange is not None:
-        raise ScenarioError(f"{where}: a {shape} has no {strange}", hint=f"it has {', '.join(sizes)}")
-    try:
+        raise ScenarioError(f"{where}: a {row.shape} has no {strange}", hint=f"it has {', '.join(sizes)}")
+    points_m = tuple((float(x), float(y)) for x, y in row.path_m or ())
+    with placed(where):
+        walk = None if row.path_m is None else Walk(points_m=points_m, speed_mps=row.speed_mps, repeat=row.repeat)
         return Obstacle(
-            name=str(table["name"]),
-            x_m=0.0,
-            y_m=0.0,
-            length_m=_number(table, "length_m"),
-            width_m=_number(table, "width_m"),
-            radius_m=_number(table, "radius_m"),
-            height_m=_number(table, "height_m"),
-            mass_kg=_number(table, "mass_kg"),
-            friction=float(cast("float", table.get("friction", DEFAULT_FRICTION))),
-            walk=_walk(table, where),
-        )
-    except WorldError as error:
-        raise ScenarioError(f"{where}: {error}") from error
-
-
-def _walk(table: Table, where: str) -> Walk | None:
-    """Return the path that a thing walks from its placing on."""
-    if "path_m" not in table:
-        return None
-    if "before_sonar" in table or str(table.get("op", "place")) != Op.PLACE.value:
-        raise ScenarioError(f"{where}: path_m is for a thing that is placed in the world")
-    return Walk(
-        points_m=tuple((float(x), float(y)) for x, y in cast("list[list[float]]", table["path_m"])),
-        speed_mps=float(cast("float", table.get("speed_mps", DEFAULT_SPEED_MPS))),
-        repeat=Repeat(str(table.get("repeat", Repeat.BACK_AND_FORTH.value))),
-    )
+            name=row.name, x_m=0.0, y_m=0.0, length_m=row.length_m or 0.0, width_m=row.width_m or 0.0,
+            radius_m=row.radius_m or 0.0, height_m=row.height_m or 0.0, mass_kg=row.mass_kg, friction=row.friction,
+            walk=walk,
+        )  # fmt: skip
 
 
 def refuse_names(changes: Sequence[ScriptedChange], world: World) -> None:
@@ -294,28 +280,20 @@ def refuse_names(changes: Sequence[ScriptedChange], world: World) -> None:
 
 def _check_names(changes: list[ScriptedChange]) -> None:
     """Refuse a thing that is placed twice, or moved while it is not there."""
-    placed: set[str] = set()
+    there: set[str] = set()
     for change in changes:
-        if change.op is Op.PLACE and change.name in placed:
+        if change.op is Op.PLACE and change.name in there:
             raise ScenarioError(f"{change.where}: {shown(change.name)} is placed at {_at(change)} while it is there")
         if change.op is Op.PLACE:
-            placed.add(change.name)
+            there.add(change.name)
         elif change.op is Op.REMOVE:
-            placed.discard(change.name)
+            there.discard(change.name)
 
 
-def _need(table: Table, keys: tuple[str, ...], where: str) -> None:
+def _need(row: ThingTable, keys: tuple[str, ...], where: str) -> None:
     for key in keys:
-        if key not in table:
+        if getattr(row, key) is None:
             raise ScenarioError(f"{where}: key {key!r} is missing", hint=f"it needs {', '.join(keys)}")
-
-
-def _number(table: Table, key: str) -> float:
-    return float(cast("float", table.get(key, 0.0)))
-
-
-def _nanos(table: Table, key: str) -> Nanos:
-    return round(_number(table, key) * NS_PER_S)
 
 
 def _at(change: ScriptedChange) -> str:

@@ -5,15 +5,23 @@ A kind of goal as any package may offer one: its entry point stands under `robot
 
 import math
 import re
+from typing import Annotated
 
 from adapter_sim.pinout import load_pinout
-from p2os.toml_schema import Key, Table
+from p2os.toml_record import Record
+from p2os.toml_schema import Key
 from robot_bench.events.kinds import Event, Pose, Text
 from robot_bench.scenario.goals.text import Printed
-from robot_bench.scenario.goals.watch import GoalKind, GoalOutcome, number, seconds
+from robot_bench.scenario.goals.watch import GoalKind, GoalOutcome, seconds
 from simbase.timing import Nanos
 
 _COUNTS = re.compile(r"left=(-?\d+) right=(-?\d+)")
+
+
+class EncoderCountsTable(Record):
+    """How near the counts are."""
+
+    steps: Annotated[int, Key(least=0, most=1_000_000, doc="so many steps off at most")] = 1
 
 
 class EncoderCounts(Printed):
@@ -22,9 +30,9 @@ class EncoderCounts(Printed):
     STATE = ("_pending", "_pose", "_has_counts", "_wrong")
     kinds = (Text, Pose)
 
-    def __init__(self, table: Table) -> None:
+    def __init__(self, table: EncoderCountsTable) -> None:
         super().__init__()
-        self._allowed = int(number(table, "steps", 1))
+        self._allowed = table.steps
         self._positions = 1 << len(load_pinout().value("encoder1").wires)
         #: Counts that wait for the pose after them: ns, left, right.
         self._pending: list[tuple[Nanos, int, int]] = []
@@ -66,7 +74,6 @@ class EncoderCounts(Printed):
 
 
 GOAL = GoalKind(
-    keys=(Key(name="steps", kind="whole", least=0, most=1_000_000),),
-    wanted=lambda table: f"counts the wheels' turns to {table.get('steps', 1)} step",
-    watch=EncoderCounts, needs_world=True, is_scripted=True,
+    EncoderCountsTable, lambda table: f"counts the wheels' turns to {table.steps} step", EncoderCounts,
+    doc="the `left=… right=…` printed equal the wheels' turns to so many steps", needs_world=True, is_scripted=True,
 )  # fmt: skip

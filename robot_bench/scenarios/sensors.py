@@ -4,11 +4,10 @@ A kind of goal as any package may offer one: its entry point stands under `robot
 """
 
 import re
-from typing import cast
 
 from robot_bench.events.kinds import Event, Text, WorldChange
 from robot_bench.scenario.goals.text import Printed
-from robot_bench.scenario.goals.watch import GoalKind, GoalOutcome, seconds
+from robot_bench.scenario.goals.watch import GoalKind, GoalOutcome, NoKeys, seconds
 from simbase.timing import Nanos
 
 _SENSOR = re.compile(r"^sensor (\d+) (on|off)$")
@@ -27,7 +26,7 @@ class SensorNamed(Printed):
 
     def feed(self, event: Event) -> GoalOutcome | None:
         if isinstance(event, WorldChange) and event.op == "place" and "sonar" in event.fields:
-            self._placed.append((event.t, int(cast("int", event.fields["sonar"]))))
+            self._placed.append((event.t, int(str(event.fields["sonar"]))))
         elif isinstance(event, Text):
             line = self.read(event)
             if line is not None and event.data.endswith(b"\n") and _SENSOR.match(line):
@@ -54,6 +53,7 @@ class SensorNamed(Printed):
 
 
 GOAL = GoalKind(
-    keys=(), wanted=lambda _: "names the sensor before which something stands, and no other",
-    watch=lambda _: SensorNamed(), needs_world=True, is_scripted=True,
+    NoKeys, lambda _: "names the sensor before which something stands, and no other", lambda _: SensorNamed(),
+    doc="every obstacle held before a sonar made `sensor N on` and `sensor N off`, and no other", needs_world=True,
+    is_scripted=True,
 )  # fmt: skip

@@ -10,7 +10,8 @@ from p2os import gamepad
 from p2os.robots.parameters import load_parameters
 from robot_bench.adapter import FirmwareAdapter, is_available, robot_numbers
 from robot_bench.bench import Bench
-from robot_bench.scenario.scenario import Scenario, load_scenario
+from robot_bench.scenario.loading import load_scenario
+from robot_bench.scenario.scenario import Scenario
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S
 from tests.adapter_fw.builds import load_script

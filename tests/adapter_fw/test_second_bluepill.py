@@ -9,7 +9,8 @@ import pytest
 from p2os.protocol.commands import Command
 from p2os.protocol.frames import Decoder, Frame
 from robot_bench.bench import Bench
-from robot_bench.scenario.scenario import Scenario, load_scenario
+from robot_bench.scenario.loading import load_scenario
+from robot_bench.scenario.scenario import Scenario
 from simbase.timing import NS_PER_MS, NS_PER_S
 from tests.adapter_fw.budgets import documented, is_as_documented
 from tests.adapter_fw.builds import built

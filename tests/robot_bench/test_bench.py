@@ -13,7 +13,8 @@ import pytest
 
 from bluepill_sim.errors import BluePillError
 from robot_bench.bench import Bench, run_of
-from robot_bench.scenario.scenario import Scenario, load_scenario
+from robot_bench.scenario.loading import load_scenario
+from robot_bench.scenario.scenario import Scenario
 from simbase.errors import UsageError
 from tests.p2os.pioneer.body.bodies import each_body
 from tests.robot_bench.modes_and_bodies import MODES, modes_and_bodies

@@ -178,6 +178,11 @@ def test_no_page_of_help_is_wider_than_a_terminal(
         ("p2os mutate a.elf motors --body kin", ["kinematic"]),
         ("p2os sensitivity mot", ["motors"]),
         ("p2os shrink mot", ["motors"]),
+        ("p2os run dodge --set mo", ["mode=direct", "mode=adapter"]),
+        ("p2os run dodge --seed 1 --set start.h", ["start.heading_deg="]),
+        ("p2os run dodge --set goal.2.dis", ["goal.2.distance_m=", "goal.2.distance_m_a_minute="]),
+        ("p2os run two-dodge --set robot.2.na", ["robot.2.name="]),
+        ("p2os run nowhere.toml --set goal.", []),
     ],
 )
 def test_a_shell_is_offered_verbs_options_and_names(

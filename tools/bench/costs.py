@@ -19,7 +19,8 @@ from robot_bench.bench import Bench, run_of
 from robot_bench.events.codec import Recorded
 from robot_bench.recording.trace import TraceWriter
 from robot_bench.run import run_scenario
-from robot_bench.scenario.scenario import Scenario, load_scenario
+from robot_bench.scenario.loading import load_scenario
+from robot_bench.scenario.scenario import Scenario
 from robot_bench.wires.edges import Edges
 from simbase.timing import NS_PER_S, Nanos
 

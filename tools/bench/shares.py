@@ -18,7 +18,7 @@ from timers import start_timers
 from bluepill_sim import BluePill
 from robot_bench.bench import Bench
 from robot_bench.recording.trace import TraceWriter
-from robot_bench.scenario.scenario import load_scenario
+from robot_bench.scenario.loading import load_scenario
 from simbase.timing import NS_PER_S
 
 HAS_TIMERS = "--timers" in sys.argv

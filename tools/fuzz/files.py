@@ -50,7 +50,9 @@ from robot_bench.recording.run_record import read_run
 from robot_bench.recording.summary import outcome_of
 from robot_bench.report.page import page_data, render_page
 from robot_bench.scenario.goals.judging import judge
-from robot_bench.scenario.scenario import TABLES, Scenario, known_scenarios, read_scenario
+from robot_bench.scenario.loading import known_scenarios, read_scenario
+from robot_bench.scenario.scenario import Scenario
+from robot_bench.scenario.tables import TABLES
 from robot_bench.scenario.world_script import WorldScript
 from simbase.errors import P2osError
 from simbase.timing import NS_PER_MS

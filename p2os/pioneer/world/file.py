@@ -30,15 +30,16 @@ _KINDS: Mapping[str, tuple[KeyKind, int]] = {
 }  # fmt: skip
 
 
-def in_range(name: str, *, required: bool = False, default: object = None) -> Key:
+def in_range(name: str, *, required: bool = False, default: object = None, doc: str = "") -> Key:
     """Return the key of a world file that has this name; a default of an enumeration stands for its choices."""
     choices = tuple(one.value for one in type(default)) if isinstance(default, Enum) else ()
     default = default.value if isinstance(default, Enum) else default
     kind, count = _KINDS.get(name, ("number", 0))
     least, most = RANGES.get(name, (None, LONGEST_NAME if kind == "line" else None))
     return Key(
-        name=name, kind=kind, count=count, required=required, default=default, choices=choices, least=least, most=most
-    )
+        name=name, kind=kind, count=count, required=required, default=default, choices=choices, least=least, most=most,
+        doc=doc,
+    )  # fmt: skip
 
 
 def _keys(defaults: Mapping[str, object]) -> tuple[Key, ...]:

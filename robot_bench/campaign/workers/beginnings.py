@@ -17,11 +17,12 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TypeAlias, cast
 
+from p2os.toml_record import number_of, tables_of
 from p2os.toml_schema import Table
 from robot_bench.bench import Bench, run_of
 from robot_bench.campaign.trial import Done, Outcome, SeenSoFar, Trial, bench_of, blocks_of, run_trial, unpacked
 from simbase.errors import P2osError
-from simbase.timing import NS_PER_S, Nanos
+from simbase.timing import NS_PER_S, Nanos, nanos
 
 #: What happens in a scenario at a time of its own, each a list of tables with `at_s`.
 EVENTS = ("obstacle", "fault")
@@ -192,8 +193,8 @@ def _before(trial: Trial, at: Nanos) -> Trial:
 
 
 def _events(trial: Trial, name: str) -> list[Table]:
-    return cast("list[Table]", trial.table.get(name, []))
+    return list(tables_of(trial.table, name))
 
 
 def _at(table: Table) -> Nanos:
-    return round(float(cast("float", table.get("at_s", 0.0))) * NS_PER_S)
+    return nanos(number_of(table, "at_s"))

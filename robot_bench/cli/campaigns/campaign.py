@@ -29,7 +29,7 @@ from robot_bench.cli.progress import RunDisplay, counting_bar
 from robot_bench.cli.run import refuse
 from robot_bench.cli.workers import Jobs, core_count
 from robot_bench.recording.run_folder import make_next_folder
-from robot_bench.scenario.scenario import load_scenario
+from robot_bench.scenario.loading import load_scenario
 from simbase.command_line.program import EXIT_INTERRUPTED
 from simbase.errors import UsageError, nearest
 from simbase.trust import Trust

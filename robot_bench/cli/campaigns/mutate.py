@@ -32,7 +32,7 @@ from robot_bench.cli.workers import Jobs, core_count, run_in_processes
 from robot_bench.events.codec import Json
 from robot_bench.recording.summary import INTERRUPTED
 from robot_bench.scenario.included_files import read_setting
-from robot_bench.scenario.scenario import load_scenario
+from robot_bench.scenario.loading import load_scenario
 from simbase.command_line.program import EXIT_INTERRUPTED
 from simbase.errors import UsageError
 from simbase.files import writing

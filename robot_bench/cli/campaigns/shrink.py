@@ -2,14 +2,14 @@
 
 import json
 from pathlib import Path
-from typing import Annotated, cast
+from typing import Annotated
 
 import typer
 
 from p2os.cli.groups import BENCH
 from p2os.cli.quantities import option
 from p2os.cli.trust import Trusted, said
-from p2os.toml_schema import Table
+from p2os.toml_record import tables_of
 from robot_bench.campaign.trial import Trial, trial_of
 from robot_bench.campaign.variants.shrinking.failure import Failure, FailureMode, failure_of
 from robot_bench.campaign.variants.shrinking.kept import Kept, keep, trial_of_run
@@ -126,7 +126,7 @@ def _with_goal(trial: Trial, kind: str) -> Trial:
     Raises:
         UsageError: It has none.
     """
-    goals = [goal for goal in cast("list[Table]", trial.table.get("goal", [])) if goal["kind"] == kind]
+    goals = [goal for goal in tables_of(trial.table, "goal") if goal["kind"] == kind]
     if not goals:
         raise UsageError(f"{trial.name} has no goal {kind!r}", hint="the kinds are those of its [[goal]] tables")
     return trial.with_lists(goal=goals)

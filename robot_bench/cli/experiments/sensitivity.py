@@ -18,7 +18,8 @@ from robot_bench.cli.workers import Jobs, core_count, load_once, run_in_processe
 from robot_bench.events.codec import Json
 from robot_bench.experiments import require
 from robot_bench.scenario.included_files import Setting, as_toml, read_setting
-from robot_bench.scenario.scenario import Scenario, load_scenario
+from robot_bench.scenario.loading import load_scenario
+from robot_bench.scenario.scenario import Scenario
 from robot_bench.scenario.sweep import read_seeds
 from simbase.errors import P2osError, UsageError
 from simbase.timing import NS_PER_S, Nanos

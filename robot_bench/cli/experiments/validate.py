@@ -36,7 +36,7 @@ from robot_bench.experiments.validation.trials import (
 from robot_bench.recording.run_folder import RUNS, make_next_folder
 from robot_bench.run import RunResult
 from robot_bench.scenario.included_files import Setting, read_setting
-from robot_bench.scenario.scenario import MODES
+from robot_bench.scenario.options import MODES
 from robot_bench.scenario.sweep import read_seeds
 from simbase.command_line.program import EXIT_INTERRUPTED
 from simbase.errors import UsageError, nearest

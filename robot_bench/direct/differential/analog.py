@@ -1,7 +1,5 @@
 """What a robot puts on analog pins: the battery's volts through a divider, and those of distance sensors.
 
-Source of the curve: the example in the data sheet of GP2Y0A21YK (10 to 80 cm), read off its graph; nearer than 7 cm its
-volts fall again, as they do there.
 Not modelled: noise, the colour of what is seen, and the time that a sensor needs after power-on.
 """
 
@@ -11,11 +9,6 @@ from collections.abc import Sequence
 from robot_bench.direct.differential.description import BatteryDescription
 from simbase.state import Stateful
 
-#: (metres, volts) of a GP2Y0A21YK.
-GP2Y0A21: tuple[tuple[float, float], ...] = (
-    (0.0, 0.3), (0.03, 1.9), (0.05, 2.8), (0.07, 3.1), (0.10, 2.3), (0.15, 1.65), (0.20, 1.3), (0.25, 1.08),
-    (0.30, 0.92), (0.40, 0.74), (0.50, 0.60), (0.60, 0.51), (0.70, 0.45), (0.80, 0.40),
-)  # fmt: skip
 SECONDS_PER_HOUR = 3600.0
 
 

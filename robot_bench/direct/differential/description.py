@@ -7,8 +7,12 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from typing import Annotated, Literal
 
+from p2os.errors import ScenarioError
 from p2os.robots.parameters import BodyParameters, RobotParameters, SonarPose, load_parameters
+from p2os.toml_record import Record
+from p2os.toml_schema import Key
 from robot_bench.direct.wired import RobotWire
 
 SIDES = ("left", "right")
@@ -41,80 +45,95 @@ class BridgeKind(StrEnum):
         return ("in1", "in2") if self is BridgeKind.TWO_PWM else tuple(self.value.split("_"))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BridgeDescription:
-    """An H-bridge."""
-
-    kind: BridgeKind
-    off: Off = Off.BRAKE
-    #: Of both switches together.
-    resistance_ohm: float = 0.0
-    #: What a bridge of bipolar transistors takes off the supply.
-    drop_v: float = 0.0
-    #: A pulse acts so much later than it begins; a shorter one does nothing.
-    dead_time_ns: int = 0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Motor:
-    """A DC motor with its gear."""
-
-    resistance_ohm: float
-    #: N·m/A, and V·s/rad: the same number.
-    torque_constant: float
-    rotor_inertia_kg_m2: float
-    #: Against each motion, at the motor's shaft.
-    friction_nm: float
-    #: Against the speed, at the motor's shaft.
-    damping_nm_s: float
-    #: Turns of the motor a turn of the wheel.
-    gear_ratio: float
+#: (metres, volts) of a GP2Y0A21YK. Source: the example in its data sheet (10 to 80 cm), read off the graph; nearer
+#: than 7 cm its volts fall again, as they do there.
+GP2Y0A21: tuple[tuple[float, float], ...] = (
+    (0.0, 0.3), (0.03, 1.9), (0.05, 2.8), (0.07, 3.1), (0.10, 2.3), (0.15, 1.65), (0.20, 1.3), (0.25, 1.08),
+    (0.30, 0.92), (0.40, 0.74), (0.50, 0.60), (0.60, 0.51), (0.70, 0.45), (0.80, 0.40),
+)  # fmt: skip
+#: chosen: the largest voltage that is no danger to who touches it, and batteries of robots of this size.
+_MOST_V, _MOST_OHM, MOST_M = 60.0, 10_000.0, 5.0
+_Name = Annotated[str, Key(doc="of its signal")]
+Along = Annotated[float, Key(least=-MOST_M, most=MOST_M, doc="from the middle of the axle")]
+_Heading = Annotated[float, Key(least=-360, most=360, doc="counter-clockwise from ahead")]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Encoder:
-    """A quadrature encoder: four edges a line."""
+class BridgeDescription(Record):
+    """`[bridge]`: an H-bridge."""
 
-    lines: float
-    is_on_motor: bool = True
+    kind: Annotated[BridgeKind, Key(doc="which pins it has")]
+    off: Annotated[Off, Key(doc="what it does with a motor that it does not drive")] = Off.BRAKE
+    resistance_ohm: Annotated[float, Key(least=0, most=_MOST_OHM, doc="of both switches together")] = 0.0
+    drop_v: Annotated[float, Key(least=0, most=10, doc="of bipolar transistors")] = 0.0
+    dead_time_us: Annotated[float, Key(least=0, most=100, doc="a shorter pulse does nothing")] = 0.0
+
+    @property
+    def dead_time_ns(self) -> int:
+        """A pulse acts so much later than it begins; a shorter one does nothing."""
+        return round(1000 * self.dead_time_us)
+
+
+class Motor(Record):
+    """`[motor]`: a DC motor with its gear."""
+
+    resistance_ohm: Annotated[float, Key(least=0.001, most=_MOST_OHM, doc="of the winding")]
+    torque_constant_nm_a: Annotated[float, Key(least=1e-6, most=10, doc="N·m/A, and V·s/rad")]
+    rotor_inertia_kg_m2: Annotated[float, Key(least=0, most=1, doc="of the rotor")]
+    friction_nm: Annotated[float, Key(least=0, most=10, doc="against each motion, at the motor's shaft")]
+    damping_nm_s: Annotated[float, Key(least=0, most=1, doc="against the speed, at the motor's shaft")] = 0.0
+    gear_ratio: Annotated[float, Key(least=0.1, most=10_000, doc="turns of the motor a turn of the wheel")]
+
+
+class Encoder(Record):
+    """`[encoder]`: a quadrature encoder: four edges a line."""
+
+    lines: Annotated[float, Key(least=1, most=100_000, doc="a turn")]
+    on: Annotated[Literal["motor", "wheel"], Key(doc="what it turns with")] = "motor"
 
     def edges_per_turn(self, motor: Motor) -> float:
         """Return the edges of both channels together, a turn of the wheel."""
-        return 4 * self.lines * (motor.gear_ratio if self.is_on_motor else 1.0)
+        return 4 * self.lines * (motor.gear_ratio if self.on == "motor" else 1.0)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BatteryDescription:
-    """A battery, what else it feeds, and the divider at which the chip measures it."""
+class BatteryDescription(Record):
+    """`[battery]`: the battery, what else it feeds, and the divider at which the chip measures it."""
 
-    full_v: float
-    empty_v: float
-    capacity_ah: float
-    resistance_ohm: float
-    idle_current_a: float
-    #: The part of its volts that the divider gives.
-    divider: float
+    full_v: Annotated[float, Key(above=0, most=_MOST_V, doc="full")]
+    empty_v: Annotated[float, Key(above=0, most=_MOST_V, doc="empty")]
+    capacity_ah: Annotated[float, Key(above=0, most=10_000, doc="from full to empty")]
+    resistance_ohm: Annotated[float, Key(least=0, most=100, doc="inside")]
+    idle_current_a: Annotated[float, Key(least=0, most=100, doc="of all but the motors")] = 0.0
+    divider_top_ohm: Annotated[float, Key(least=0, most=1e8, doc="from the battery to the pin")]
+    divider_bottom_ohm: Annotated[float, Key(above=0, most=1e8, doc="from the pin to ground")]
 
+    def __post_init__(self) -> None:
+        if self.empty_v > self.full_v:
+            raise ScenarioError("empty_v is above full_v")
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DistanceSensor:
-    """An analog distance sensor."""
-
-    name: str
-    x_m: float
-    y_m: float
-    heading_deg: float
-    #: (metres, volts), nearest first; between them a straight line.
-    curve: tuple[tuple[float, float], ...]
+    @property
+    def divider(self) -> float:
+        """The part of its volts that the divider gives."""
+        return self.divider_bottom_ohm / (self.divider_top_ohm + self.divider_bottom_ohm)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Bumper:
-    """A switch that pulls its pin low while something touches the hull within its sector."""
+class DistanceSensor(Record):
+    """`[[distance]]`: an analog distance sensor."""
 
-    name: str
-    heading_deg: float
-    width_deg: float
+    name: _Name
+    x_m: Along
+    y_m: Along
+    heading_deg: _Heading
+    curve: Annotated[tuple[tuple[float, float], ...], Key(
+        kind="points", count=2, least=0, most=100, doc="[metres, volts], nearest first"
+    )] = GP2Y0A21  # fmt: skip
+
+
+class Bumper(Record):
+    """`[[bumper]]`: a switch that pulls its pin low while something touches the hull within its sector."""
+
+    name: _Name
+    heading_deg: _Heading
+    width_deg: Annotated[float, Key(least=1, most=360, doc="of its sector")]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

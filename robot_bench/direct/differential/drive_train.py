@@ -60,7 +60,7 @@ class DriveTrain(Stateful):
         self._dt_s = dt_s
         self._resistance = motor.resistance_ohm + robot.bridge.resistance_ohm
         self._drop_v = robot.bridge.drop_v
-        self._k = motor.torque_constant * gear
+        self._k = motor.torque_constant_nm_a * gear
         self._friction = motor.friction_nm * gear
         self._damping = motor.damping_nm_s * gear**2
         # chosen: a wheel is a disc
@@ -166,7 +166,7 @@ class DriveTrain(Stateful):
 def no_load_radps(robot: Differential) -> float:
     """Return how fast a free wheel turns at most."""
     volts = max(0.0, robot.battery.full_v - robot.bridge.drop_v)
-    return volts / (robot.motor.torque_constant * robot.motor.gear_ratio)
+    return volts / (robot.motor.torque_constant_nm_a * robot.motor.gear_ratio)
 
 
 def box_inertia(mass_kg: float, length_m: float, width_m: float, offset_m: float) -> float:

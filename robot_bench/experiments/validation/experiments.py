@@ -22,7 +22,8 @@ from robot_bench.experiments.validation.silence import silence_figures
 from robot_bench.recording.run_record import RunRecord
 from robot_bench.scenario.goals.judging import Judgement
 from robot_bench.scenario.included_files import Setting
-from robot_bench.scenario.scenario import Scenario, known_scenarios, load_scenario
+from robot_bench.scenario.loading import known_scenarios, load_scenario
+from robot_bench.scenario.scenario import Scenario
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S
 

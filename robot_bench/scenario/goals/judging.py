@@ -10,33 +10,38 @@ Invariant: a verdict depends on the events of the run alone; played back from it
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Annotated, Literal
 
 from p2os.errors import ScenarioError
-from p2os.toml_schema import Key, Table, Where, check_table, placed
+from p2os.toml_record import Record, read, read_part
+from p2os.toml_schema import Key, Table, Where, placed
 from robot_bench.events.kinds import Event, PinEdge, Verdict
 from robot_bench.events.selection import Wires
 from robot_bench.events.stream import EventStream
 from robot_bench.scenario.goals.kinds import kind_named, known_kinds
-from robot_bench.scenario.goals.watch import WIRES, GoalKind, GoalOutcome, Watch, number
+from robot_bench.scenario.goals.watch import GoalKind, GoalOutcome, OfEvents, Watch
 from simbase.errors import nearest, shown
 from simbase.state import PartState, Stateful
 from simbase.timing import NS_PER_S, Nanos
 
-#: When a verdict ends the run.
-_ENDS_RUN = Key(name="ends_run", kind="text", choices=("met", "missed", "decided"))
-#: What every goal may say.
-COMMON = (Key(name="kind", kind="text", required=True), _ENDS_RUN)
+
+class GoalTable(Record):
+    """`[[goal]]`: what every goal may say, beside the keys of its kind."""
+
+    kind: Annotated[str, Key(doc="which")]
+    ends_run: Annotated[Literal["met", "missed", "decided"] | None, Key(doc="the verdict that ends the run")] = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Goal:
-    """One thing that a run must show."""
+    """One thing that a run must show; `load_goal` makes one of a table."""
 
     kind: str
-    arguments: Table
+    #: What its table says: the record of its kind.
+    table: Record
     #: Which verdict ends the run: `met`, `missed`, `decided` (either), or none.
-    ends_run: str = ""
+    ends_run: str | None = None
 
     @property
     def definition(self) -> GoalKind:
@@ -53,11 +58,11 @@ class Goal:
     @property
     def wanted(self) -> str:
         """Return the goal as a sentence."""
-        return self.definition.wanted(self.arguments)
+        return self.definition.wanted(self.table)
 
     def watch(self) -> Watch:
         """Return what watches one run for it."""
-        return self.definition.watch(self.arguments)
+        return self.definition.watch(self.table)
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,33 +103,32 @@ def load_goal(table: Table, where: Where, wires: Wires | None = None) -> Goal:
     Raises:
         ScenarioError: The kind or a key is unknown, or a value is wrong.
     """
-    check_table({name: table[name] for name in ("kind", "ends_run") if name in table}, COMMON, where)
-    name = str(table["kind"])
-    kind = kind_named(name)
+    common, rest = read_part(GoalTable, table, where)
+    kind = kind_named(common.kind)
     if kind is None:
-        raise ScenarioError(f"{where}: there is no goal {shown(name)}", hint=nearest(name, known_kinds()))
-    arguments = {key: value for key, value in table.items() if key not in {"kind", "ends_run"}}
-    check_table(arguments, kind.keys, f"{where} ({name})" if isinstance(where, str) else where)
-    if kind.any_of and not any(key in arguments for key in kind.any_of):
-        raise ScenarioError(f"{where}: a goal {name} needs {' or '.join(kind.any_of)}", hint="docs/scenarios.md")
-    _check(arguments, where)
-    if wires is not None:
-        arguments[WIRES] = wires
+        raise ScenarioError(f"{where}: there is no goal {shown(common.kind)}", hint=nearest(common.kind, known_kinds()))
+    made = read(kind.table, rest, f"{where} ({common.kind})" if isinstance(where, str) else where)
+    if kind.any_of and not any(key in rest for key in kind.any_of):
+        raise ScenarioError(f"{where}: a goal {common.kind} needs {' or '.join(kind.any_of)}", hint="docs/scenarios.md")
     with placed(where):
-        kind.watch(arguments)
-    return Goal(kind=name, arguments=arguments, ends_run=str(table.get("ends_run", "")))
+        _check(rest)
+        if wires is not None and isinstance(made, OfEvents):
+            made = replace(made, wires=wires)
+        kind.watch(made)
+    return Goal(kind=common.kind, table=made, ends_run=common.ends_run)
 
 
-def _check(arguments: Table, where: Where) -> None:
-    """Check what keys mean by their names in goals of every kind: no value is empty, and bounds leave something."""
-    for key, value in arguments.items():
+def _check(rest: Table) -> None:
+    """Check that texts and lists hold something, and that bounds and windows leave something."""
+    numbers = {key: value for key, value in rest.items() if isinstance(value, (int, float))}
+    for key, value in rest.items():
         if value in ("", []):
-            raise ScenarioError(f"{where}: {key} is empty")
+            raise ScenarioError(f"{key} is empty")
         most = f"most{key.removeprefix('least')}"
-        if key.startswith("least") and number(arguments, key) > number(arguments, most, math.inf):
-            raise ScenarioError(f"{where}: {key} is above {most}")
-    if number(arguments, "to_s", math.inf) < number(arguments, "from_s"):
-        raise ScenarioError(f"{where}: to_s lies before from_s: the goal would look at nothing")
+        if key.startswith("least") and numbers.get(key, -math.inf) > numbers.get(most, math.inf):
+            raise ScenarioError(f"{key} is above {most}")
+    if numbers.get("to_s", math.inf) < numbers.get("from_s", 0):
+        raise ScenarioError("to_s lies before from_s: the goal would look at nothing")
 
 
 class GoalJudge(Stateful):

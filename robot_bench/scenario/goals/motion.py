@@ -1,20 +1,38 @@
 """Goals on where the robot is and how it moves, by its pose each 50 ms and its contacts."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Annotated
 
-from p2os.toml_schema import Table
+from p2os.errors import ScenarioError
+from p2os.toml_record import Record
+from p2os.toml_schema import Key
 from robot_bench.events.kinds import MICRO, Clearance, Contact, Event, Pose
 from robot_bench.events.selection import moves
-from robot_bench.scenario.goals.watch import GoalOutcome, SelectorFeed, Watch, nanos, number, seconds, selected
-from simbase.errors import UsageError
-from simbase.timing import NS_PER_S, Nanos
+from robot_bench.scenario.goals.watch import (
+    From,
+    GoalKind,
+    GoalOutcome,
+    InTime,
+    NoKeys,
+    OfEvents,
+    SelectorFeed,
+    Watch,
+    Within,
+    given_in_words,
+    seconds,
+    window_in_words,
+)
+from simbase.timing import NS_PER_S, Nanos, nanos
 
 NS_PER_MINUTE = 60 * NS_PER_S
 #: chosen: so many collisions are named in one line; all stand in the state log.
 NAMED_HITS = 3
 #: Side of the cells that a run's coverage is counted in, micrometres.
 CELL_UM = 500_000
+_Way = Annotated[float | None, Key(above=0, most=1e6, doc="the way that it may take, or has to")]
+_Work = Annotated[float | None, Key(above=0, most=1e9, doc="the work at the rims")]
+_Coordinate = Annotated[float | None, Key(least=-10_000, most=10_000, doc="the middle of a circle")]
 
 
 def _place(pose: Pose) -> str:
@@ -56,15 +74,21 @@ class NoCollision(Watch):
         return GoalOutcome(met=False, says=f"{self._last.collisions} collision(s), {where}")
 
 
+class MinDistanceTable(Record):
+    """A way by itself or by the minute."""
+
+    distance_m: _Way = None
+    distance_m_a_minute: _Way = None
+
+
 class MinDistance(Watch):
     """The path is long enough, by itself or by the minute."""
 
     STATE = ("_driven_um", "_at")
     kinds = (Pose,)
 
-    def __init__(self, table: Table) -> None:
-        self._wanted_m = number(table, "distance_m")
-        self._a_minute_m = number(table, "distance_m_a_minute")
+    def __init__(self, table: MinDistanceTable) -> None:
+        self._wanted_m, self._a_minute_m = table.distance_m or 0.0, table.distance_m_a_minute or 0.0
         self._driven_um = 0.0
         self._at: tuple[int, int] | None = None
 
@@ -86,14 +110,20 @@ class MinDistance(Watch):
         )  # fmt: skip
 
 
+class CellsTable(Record):
+    """How many cells."""
+
+    least: Annotated[int, Key(least=1, most=1_000_000, doc="so many different ones")]
+
+
 class Cells(Watch):
     """So many different cells were entered."""
 
     STATE = ("_entered",)
     kinds = (Pose,)
 
-    def __init__(self, table: Table) -> None:
-        self._wanted = int(number(table, "least"))
+    def __init__(self, table: CellsTable) -> None:
+        self._wanted = table.least
         self._entered: set[tuple[int, int]] = set()
 
     def feed(self, event: Event) -> GoalOutcome | None:
@@ -114,33 +144,45 @@ class Cells(Watch):
 Inside = Callable[[float, float], float]
 
 
-def region(table: Table) -> Inside:
-    """Return the region of a goal's table: a circle, or a rectangle along the axes.
+class RegionTable(Record):
+    """A circle, or a rectangle along the axes."""
 
-    Raises:
-        UsageError: It is neither.
-    """
-    circle = [key for key in ("x_m", "y_m", "radius_m") if key in table]
-    area = table.get("area_m")
-    if area is not None and (circle or not _is_area(area)):
-        raise UsageError("area_m must be [least x, least y, most x, most y], and stand alone")
-    if isinstance(area, list):
-        low_x, low_y, high_x, high_y = map(float, area)
-        return lambda x, y: min(x - low_x, high_x - x, y - low_y, high_y - y)
-    if len(circle) < 3:
-        raise UsageError("a circle needs x_m, y_m and radius_m")
-    x_m, y_m, radius_m = (number(table, key) for key in circle)
-    return lambda x, y: radius_m - math.hypot(x - x_m, y - y_m)
+    x_m: _Coordinate = None
+    y_m: _Coordinate = None
+    radius_m: Annotated[float | None, Key(above=0, most=10_000, doc="of a circle")] = None
+    area_m: Annotated[tuple[float, ...] | None, Key(doc="`[least x, least y, most x, most y]`")] = None
+
+    def __post_init__(self) -> None:
+        circle = sum(one is not None for one in (self.x_m, self.y_m, self.radius_m))
+        if self.area_m is not None and (circle or not _is_area(self.area_m)):
+            raise ScenarioError("area_m must be [least x, least y, most x, most y], and stand alone")
+        if circle not in {0, 3}:
+            raise ScenarioError("a circle needs x_m, y_m and radius_m")
+
+    @property
+    def circle(self) -> tuple[float, float, float]:
+        """Its middle and radius, metres; of a rectangle zeros."""
+        return self.x_m or 0.0, self.y_m or 0.0, self.radius_m or 0.0
+
+    @property
+    def inside(self) -> Inside:
+        """How far a place lies inside."""
+        if self.area_m is not None:
+            low_x, low_y, high_x, high_y = map(float, self.area_m)
+            return lambda x, y: min(x - low_x, high_x - x, y - low_y, high_y - y)
+        x_m, y_m, radius_m = self.circle
+        return lambda x, y: radius_m - math.hypot(x - x_m, y - y_m)
 
 
-def _is_area(area: object) -> bool:
-    return (
-        isinstance(area, list)
-        and len(area) == 4
-        and all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in area)
-        and area[0] < area[2]
-        and area[1] < area[3]
-    )
+def _is_area(area: tuple[float, ...]) -> bool:
+    is_numbers = all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in area)
+    return is_numbers and len(area) == 4 and area[0] < area[2] and area[1] < area[3]
+
+
+class ReachTable(RegionTable):
+    """A region, and when."""
+
+    within_s: Within = None
 
 
 class Reach(Watch):
@@ -149,9 +191,9 @@ class Reach(Watch):
     STATE = ("_best_m", "_reached", "_was_late")
     kinds = (Pose,)
 
-    def __init__(self, table: Table) -> None:
-        self._inside = region(table)
-        self._within = nanos(table, "within_s") if "within_s" in table else None
+    def __init__(self, table: ReachTable) -> None:
+        self._inside = table.inside
+        self._within = None if table.within_s is None else nanos(table.within_s)
         self._best_m = -math.inf
         self._reached: Nanos | None = None
         self._was_late = False
@@ -192,8 +234,8 @@ class Stay(Watch):
     STATE = ("_worst_m", "_left")
     kinds = (Pose,)
 
-    def __init__(self, table: Table, *, is_inside: bool) -> None:
-        inside = region(table)
+    def __init__(self, table: RegionTable, *, is_inside: bool) -> None:
+        inside = table.inside
         self._by: Inside = inside if is_inside else lambda x, y: -inside(x, y)
         self._word = "left" if is_inside else "entered"
         self._worst_m = math.inf
@@ -218,14 +260,20 @@ class Stay(Watch):
         return GoalOutcome(met=False, says=says, robustness=worst_m, unit="m")
 
 
+class ClearanceTable(Record):
+    """A distance to everything."""
+
+    least_m: Annotated[float, Key(above=0, most=100, doc="so far away")]
+
+
 class LeastClearance(Watch):
     """The hull stays away from everything."""
 
     STATE = ("_least", "_was_near")
     kinds = (Clearance,)
 
-    def __init__(self, table: Table) -> None:
-        self._wanted_m = number(table, "least_m")
+    def __init__(self, table: ClearanceTable) -> None:
+        self._wanted_m = table.least_m
         self._least: Clearance | None = None
         self._was_near = False
 
@@ -245,16 +293,24 @@ class LeastClearance(Watch):
         return GoalOutcome(met=least_m >= self._wanted_m, says=says, robustness=least_m - self._wanted_m, unit="m")
 
 
+class StopWithinTable(OfEvents):
+    """An event, and how soon the robot stands after it."""
+
+    after: Annotated[str, Key(doc="the event")]
+    within_s: InTime
+    way_m: _Way = None
+
+
 class StopWithin(Watch):
     """After an event the robot stands still in time, and has not gone too far."""
 
     STATE = ("_events", "_since", "_at", "_way_m", "_worst_s", "_worst_m", "_failure", "_count")
 
-    def __init__(self, table: Table) -> None:
-        self._words = str(table["after"])
-        self._events = SelectorFeed(selected(table, self._words))
+    def __init__(self, table: StopWithinTable) -> None:
+        self._words = table.after
+        self._events = SelectorFeed(table.selected(table.after))
         self.kinds, self.wires = (*{Pose: None, **dict.fromkeys(self._events.kinds)},), self._events.wires
-        self._most_s, self._most_m = number(table, "within_s"), number(table, "way_m", math.inf)
+        self._most_s, self._most_m = table.within_s, table.way_m or math.inf
         #: When the event came that is waited for now; the last place, and the way since then.
         self._since: Nanos | None = None
         self._at: tuple[float, float] | None = None
@@ -301,6 +357,14 @@ class StopWithin(Watch):
         )  # fmt: skip
 
 
+class MovesOnTable(Record):
+    """How far away from each place, and how soon."""
+
+    way_m: Annotated[float, Key(above=0, most=1e6, doc="so far away")]
+    within_s: InTime
+    from_s: From = None
+
+
 class MovesOn(Watch):
     """The robot gets so far away from each place in time: it neither stands, nor turns on the spot, nor is shut in.
 
@@ -310,9 +374,9 @@ class MovesOn(Watch):
     STATE = ("_place", "_least", "_least_at", "_has_missed")
     kinds = (Pose,)
 
-    def __init__(self, table: Table) -> None:
-        self._way_m = number(table, "way_m")
-        self._within, self._from = nanos(table, "within_s"), nanos(table, "from_s")
+    def __init__(self, table: MovesOnTable) -> None:
+        self._way_m = table.way_m
+        self._within, self._from = nanos(table.within_s), nanos(table.from_s or 0.0)
         self._place: Pose | None = None
         #: The least time that was left when it got away, and when.
         self._least = self._within
@@ -342,14 +406,20 @@ class MovesOn(Watch):
         return GoalOutcome(met=False, says=f"{says} within {self._within / NS_PER_S:g} s", robustness=left_s, unit="s")
 
 
+class SmoothTable(Record):
+    """An acceleration."""
+
+    most_mps2: Annotated[float, Key(above=0, most=1000, doc="of a rim, m/s²")]
+
+
 class Smooth(Watch):
     """No rim is accelerated harder than allowed, between two poses."""
 
     STATE = ("_last", "_worst_mps2", "_worst_at")
     kinds = (Pose,)
 
-    def __init__(self, table: Table) -> None:
-        self._most_mps2 = number(table, "most_mps2")
+    def __init__(self, table: SmoothTable) -> None:
+        self._most_mps2 = table.most_mps2
         self._last: Pose | None = None
         self._worst_mps2 = 0.0
         self._worst_at: Nanos = 0
@@ -373,14 +443,21 @@ class Smooth(Watch):
         return GoalOutcome(met=by >= 0, says=says, robustness=by, unit="m/s²")
 
 
+class EnergyTable(Record):
+    """Work at the rims, joules."""
+
+    most_j: _Work = None
+    most_j_a_metre: _Work = None
+
+
 class Energy(Watch):
     """The work at the rims stays within so many joules, of the whole run or for each metre of its way."""
 
     STATE = ("_last", "_driven_m", "_peak_w", "_peak", "_over")
     kinds = (Pose,)
 
-    def __init__(self, table: Table) -> None:
-        self._most_j, self._a_metre_j = number(table, "most_j", math.inf), number(table, "most_j_a_metre", math.inf)
+    def __init__(self, table: EnergyTable) -> None:
+        self._most_j, self._a_metre_j = table.most_j or math.inf, table.most_j_a_metre or math.inf
         self._last: Pose | None = None
         self._driven_m = 0.0
         #: The greatest mean power between two poses, and the second of them.
@@ -420,3 +497,75 @@ class Energy(Watch):
         elif by < 0:
             says += f"; {self._a_metre_j:g} J a metre are allowed"
         return GoalOutcome(met=by >= 0, says=says, robustness=by, unit="J")
+
+
+def _region(table: RegionTable) -> str:
+    if table.area_m is not None:
+        low_x, low_y, high_x, high_y = table.area_m
+        return f"x {low_x:g} to {high_x:g} m, y {low_y:g} to {high_y:g} m"
+    x_m, y_m, radius_m = table.circle
+    return f"the {radius_m:g} m around x {x_m:g} m, y {y_m:g} m"
+
+
+_ONE_REGION = ("area_m", "radius_m")
+
+KINDS: Mapping[str, GoalKind] = {
+    "no_collision": GoalKind(
+        NoKeys, lambda _: "touches nothing", lambda _: NoCollision(),
+        doc="the hull touches nothing; a failure names what was hit, when, where and with which part",
+        needs_world=True,
+    ),
+    "min_distance": GoalKind(
+        MinDistanceTable,
+        lambda table: "drives at least " + " and ".join(
+            given_in_words(("", table.distance_m, " m"), ("", table.distance_m_a_minute, " m a minute"))
+        ),
+        MinDistance, doc="the path is at least so long", any_of=("distance_m", "distance_m_a_minute"),
+    ),
+    "cells": GoalKind(
+        CellsTable, lambda table: f"enters at least {table.least} different cells of 0.5 m", Cells,
+        doc="so many different cells of 0.5 m were entered",
+    ),
+    "reach": GoalKind(
+        ReachTable, lambda table: f"reaches {_region(table)}{window_in_words(within_s=table.within_s)}", Reach,
+        doc="the robot's centre comes into the region, in time", any_of=_ONE_REGION, is_scripted=True,
+    ),
+    "avoid": GoalKind(
+        RegionTable, lambda table: f"stays out of {_region(table)}", lambda table: Stay(table, is_inside=False),
+        doc="its centre stays out of the region", any_of=_ONE_REGION,
+    ),
+    "stay_within": GoalKind(
+        RegionTable, lambda table: f"stays within {_region(table)}", lambda table: Stay(table, is_inside=True),
+        doc="its centre stays in the region", any_of=_ONE_REGION,
+    ),
+    "clearance": GoalKind(
+        ClearanceTable, lambda table: f"keeps {table.least_m:g} m away from everything", LeastClearance,
+        doc="the hull stays so far from everything", needs_world=True,
+    ),
+    "stop_within": GoalKind(
+        StopWithinTable,
+        lambda table: f"stands still{window_in_words(table.after, within_s=table.within_s)}"
+        + "".join(given_in_words((" and ", table.way_m, " m"))),
+        StopWithin, doc="after each such event the robot stands in time, no further on",
+    ),
+    "moves_on": GoalKind(
+        MovesOnTable,
+        lambda table: f"gets {table.way_m:g} m away from each place"
+        + window_in_words(from_s=table.from_s, within_s=table.within_s),
+        MovesOn, doc="it gets so far away from each place in time: it neither stands nor turns on the spot nor is shut "
+        "in; the next place is where it was so far away",
+    ),
+    "smooth": GoalKind(
+        SmoothTable, lambda table: f"accelerates no rim by more than {table.most_mps2:g} m/s²", Smooth,
+        doc="no rim changes its speed faster, from pose to pose",
+    ),
+    "energy": GoalKind(
+        EnergyTable,
+        lambda table: "takes at most " + " and ".join(
+            given_in_words(("", table.most_j, " J"), ("", table.most_j_a_metre, " J a metre"))
+        ),
+        Energy, doc="the work at the rims, |torque · rate| of both wheels over the run, stays within so many "
+        "joules; a failure says where it became more, and where the power was greatest",
+        any_of=("most_j", "most_j_a_metre"), needs_world=True,
+    ),
+}  # fmt: skip

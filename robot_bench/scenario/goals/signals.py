@@ -1,29 +1,41 @@
 """Goals on wires: the values of the motors' pins, a level that holds, a wave in bounds."""
 
 import math
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import cast
+from typing import Annotated, Literal
 
 from adapter_sim.codec import motor_value
 from adapter_sim.pinout import load_pinout
-from p2os.toml_schema import Table
+from p2os.errors import ScenarioError
+from p2os.toml_record import Record
+from p2os.toml_schema import LONGEST_S, Key
 from robot_bench.events.kinds import Event, PinEdge, Wave
 from robot_bench.events.selection import wire_named
-from robot_bench.scenario.goals.watch import GoalOutcome, Watch, nanos, number, seconds, wires_of
-from simbase.errors import UsageError
-from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
+from robot_bench.scenario.goals.watch import From, GoalKind, GoalOutcome, OfEvents, To, Watch, seconds, window_in_words
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, nanos
 
 #: chosen: two motor values that follow each other within this are one change (two ports are written in turn).
 SKEW_NS: Nanos = 1 * NS_PER_MS
 _SIDES = ("motor1", "motor2")
+_Hz = Annotated[float | None, Key(above=0, most=1e8, doc="of each period")]
+_Duty = Annotated[float | None, Key(least=0, most=1, doc="the high part of each period")]
+
+
+class MotorSequenceTable(Record):
+    """Values of the motors' pins, one pair after the other."""
+
+    values: Annotated[tuple[tuple[int, int], ...], Key(doc="`[[left, right], …]`")]
+    held_s: Annotated[float, Key(least=0, most=LONGEST_S, doc="each is held so long")] = 0.0
+
+    def __post_init__(self) -> None:
+        if not all(_is_pair(pair) for pair in self.values):
+            hint = "of -128 to 127"
+            raise ScenarioError("values must be pairs of motor values, [[left, right], ...]", hint=hint)
 
 
 def _is_pair(pair: object) -> bool:
-    return (
-        isinstance(pair, list)
-        and len(pair) == 2
-        and all(isinstance(value, int) and not isinstance(value, bool) and -128 <= value <= 127 for value in pair)
-    )
+    return isinstance(pair, tuple) and len(pair) == 2 and all(type(one) is int and -128 <= one <= 127 for one in pair)
 
 
 class MotorSequence(Watch):
@@ -32,12 +44,9 @@ class MotorSequence(Watch):
     STATE = ("_bits", "_seen", "_is_decided")
     kinds = (PinEdge,)
 
-    def __init__(self, table: Table) -> None:
-        values = cast("list[object]", table["values"])
-        if not all(_is_pair(pair) for pair in values):
-            raise UsageError("values must be pairs of motor values, [[left, right], ...]", hint="of -128 to 127")
-        self._wanted = [tuple(pair) for pair in cast("list[list[int]]", values)]
-        self._held_ns = nanos(table, "held_s")
+    def __init__(self, table: MotorSequenceTable) -> None:
+        self._wanted: list[tuple[int, ...]] = list(table.values)
+        self._held_ns = nanos(table.held_s)
         pinout = load_pinout()
         self._nets = [pinout.value(side).wires for side in _SIDES]
         self._place_of = {net: (side, bit) for side, nets in enumerate(self._nets) for bit, net in enumerate(nets)}
@@ -87,9 +96,37 @@ class MotorSequence(Watch):
         return ""
 
 
-def shown_pairs(pairs: object) -> str:
+def shown_pairs(pairs: Sequence[tuple[int, ...]]) -> str:
     """Return motor values as a person reads them."""
-    return " ".join(f"{left:+d}/{right:+d}" for left, right in cast("list[tuple[int, int]]", pairs))
+    return " ".join(f"{left:+d}/{right:+d}" for left, right in pairs)
+
+
+class OfPin(OfEvents):
+    """A wire over a span of time."""
+
+    pin: Annotated[str, Key(doc="the BluePill's pin, or a wire's name")]
+    from_s: From = None
+    to_s: To = None
+
+    @property
+    def wire(self) -> str:
+        """The wire's name.
+
+        Raises:
+            UsageError: There is none of that name.
+        """
+        return wire_named(self.pin, self.wires)
+
+    @property
+    def span(self) -> tuple[Nanos, Nanos]:
+        """When it begins and ends."""
+        return nanos(self.from_s or 0.0), nanos(self.to_s or LONGEST_S)
+
+
+class PinHoldsTable(OfPin):
+    """A level of a wire."""
+
+    level: Annotated[Literal["high", "low"], Key(doc="which it has all the time")]
 
 
 class PinHolds(Watch):
@@ -98,11 +135,11 @@ class PinHolds(Watch):
     STATE = ("_level", "_wrong")
     kinds = (PinEdge,)
 
-    def __init__(self, table: Table) -> None:
-        self._name = str(table["pin"])
-        self.wires = (wire_named(self._name, wires_of(table)),)
-        self._wanted = table["level"] == "high"
-        self._from, self._to = nanos(table, "from_s"), nanos(table, "to_s", 1e6)
+    def __init__(self, table: PinHoldsTable) -> None:
+        self._name = table.pin
+        self.wires = (table.wire,)
+        self._wanted = table.level == "high"
+        self._from, self._to = table.span
         self._level: bool | None = None
         self._wrong: Nanos | None = None
 
@@ -131,20 +168,29 @@ class PinHolds(Watch):
         return self.finish(at)
 
 
+class WaveTable(OfPin):
+    """Bounds of the periods of a wire."""
+
+    least_hz: _Hz = None
+    most_hz: _Hz = None
+    least_duty: _Duty = None
+    most_duty: _Duty = None
+    periods: Annotated[int, Key(least=1, most=1_000_000_000, doc="so many at least")] = 1
+
+
 class WaveWithin(Watch):
     """Every period of a wire, from its rise to the next, is in bounds."""
 
     STATE = ("_rise", "_fall", "_count", "_failure", "_hz")
     kinds = (PinEdge, Wave)
 
-    def __init__(self, table: Table) -> None:
-        self._name = str(table["pin"])
-        self._wire = wire_named(self._name, wires_of(table))
+    def __init__(self, table: WaveTable) -> None:
+        self._name, self._wire = table.pin, table.wire
         self.wires = (self._wire,)
-        self._hz_bounds = number(table, "least_hz"), number(table, "most_hz", math.inf)
-        self._duty_bounds = number(table, "least_duty"), number(table, "most_duty", 1.0)
-        self._periods = int(number(table, "periods", 1))
-        self._from, self._to = nanos(table, "from_s"), nanos(table, "to_s", 1e6)
+        self._hz_bounds = table.least_hz or 0.0, table.most_hz or math.inf
+        self._duty_bounds = table.least_duty or 0.0, 1.0 if table.most_duty is None else table.most_duty
+        self._periods = table.periods
+        self._from, self._to = table.span
         self._rise: Nanos | None = None
         self._fall: Nanos | None = None
         self._count = 0
@@ -189,3 +235,21 @@ class WaveWithin(Watch):
             )
         by = min(self._hz[0] - self._hz_bounds[0], self._hz_bounds[1] - self._hz[1])
         return GoalOutcome(met=True, robustness=by if math.isfinite(by) else None, unit="Hz")
+
+
+KINDS: Mapping[str, GoalKind] = {
+    "motor_sequence": GoalKind(
+        MotorSequenceTable, lambda table: f"sets the motors to {shown_pairs(table.values)}", MotorSequence,
+        doc="the motor pins showed exactly these values, each held so long", is_scripted=True,
+    ),
+    "pin_holds": GoalKind(
+        PinHoldsTable,
+        lambda table: f"holds {table.pin} {table.level}{window_in_words(from_s=table.from_s, to_s=table.to_s)}",
+        PinHolds, doc="the wire has this level all the time",
+    ),
+    "wave": GoalKind(
+        WaveTable,
+        lambda table: f"has a wave in bounds on {table.pin}{window_in_words(from_s=table.from_s, to_s=table.to_s)}",
+        WaveWithin, doc="every period is in bounds, and there are so many",
+    ),
+}  # fmt: skip

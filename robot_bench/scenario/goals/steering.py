@@ -5,17 +5,20 @@ a contact. The sides are those of a Pioneer's front ring, sonar 2 to 4 left and 
 others. Ranges are as old as the ring is slow: each sonar of eight is new every 0.4 s.
 
 The measure of a goal is the share that is left of what it allows: 1 at best, so that it hides no other goal's margin
+from collections.abc import Mapping
 from a search.
 
 Invariant: where no range is known yet, nothing is missed.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping
+from typing import Annotated
 
-from p2os.toml_schema import Table
+from p2os.toml_record import Record
+from p2os.toml_schema import Key
 from robot_bench.events.kinds import MICRO, Event, Pose, Ranges
-from robot_bench.scenario.goals.watch import GoalOutcome, Watch, number, seconds
+from robot_bench.scenario.goals.watch import GoalKind, GoalOutcome, InTime, Watch, seconds
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
 
@@ -31,6 +34,24 @@ TURN_M = 0.12
 ALLOWED = "of what is allowed"
 #: Poses of a path are kept so far apart, m.
 PATH_STEP_M = 0.02
+_Free = Annotated[float, Key(above=0, most=100, doc="beyond that a side is free")]
+_Sonar = Annotated[tuple[int, ...], Key(doc="numbers of the sonar on that side, from 1")]
+
+
+class SidesTable(Record):
+    """What counts as near on one side and as free on the other."""
+
+    near_m: Annotated[float, Key(above=0, most=100, doc="nearer than that something is on a side")]
+    free_m: _Free
+    left: _Sonar = LEFT
+    right: _Sonar = RIGHT
+
+    def __post_init__(self) -> None:
+        if self.free_m < self.near_m:
+            raise UsageError("free_m is below near_m", hint="near_m = 0.5 and free_m = 0.8")
+        for key, side, usual in (("left", self.left, LEFT), ("right", self.right, RIGHT)):
+            if not all(type(one) is int and one > 0 for one in side):
+                raise UsageError(f"{key} must be a list of the numbers of sonar, from 1", hint=f"{key} = {list(usual)}")
 
 
 def _place(pose: Pose) -> str:
@@ -49,11 +70,9 @@ def _spins(pose: Pose) -> bool:
 class _Sides:
     """What stands near on one side only."""
 
-    def __init__(self, table: Table) -> None:
-        self._near_mm, self._free_mm = (1000 * number(table, key) for key in ("near_m", "free_m"))
-        if self._free_mm < self._near_mm:
-            raise UsageError("free_m is below near_m", hint="near_m = 0.5 and free_m = 0.8")
-        self._sides = tuple(_numbers(table, key, default) for key, default in (("left", LEFT), ("right", RIGHT)))
+    def __init__(self, table: SidesTable) -> None:
+        self._near_mm, self._free_mm = 1000 * table.near_m, 1000 * table.free_m
+        self._sides = table.left, table.right
 
     def nearer(self, ranges: Ranges | None) -> int:
         """Return the side on which something is near while the other is free: 1 left, -1 right, 0 neither or both."""
@@ -67,11 +86,11 @@ class _Sides:
         return -1 if right_mm < self._near_mm and left_mm > self._free_mm else 0
 
 
-def _numbers(table: Table, key: str, default: Sequence[int]) -> Sequence[int]:
-    found = table.get(key, default)
-    if not isinstance(found, (list, tuple)) or not all(type(one) is int and one > 0 for one in found):
-        raise UsageError(f"{key} must be a list of the numbers of sonar, from 1", hint=f"{key} = {list(default)}")
-    return [int(one) for one in found]
+class TurnsAwayTable(SidesTable):
+    """Sides, and how many turns in a row may go the wrong way."""
+
+    row: Annotated[int, Key(least=0, most=1000, doc="so many in a row may not")] = 0
+    apart_m: Annotated[float, Key(least=0, most=100, doc="what begins nearer to the last turn belongs to it")] = 0.5
 
 
 class TurnsAway(Watch):
@@ -80,10 +99,9 @@ class TurnsAway(Watch):
     STATE = ("_ranges", "_last", "_side", "_turned_m", "_begun", "_ended", "_row", "_worst", "_worst_at")
     kinds = (Ranges, Pose)
 
-    def __init__(self, table: Table) -> None:
+    def __init__(self, table: TurnsAwayTable) -> None:
         self._sides = _Sides(table)
-        self._most = int(number(table, "row"))
-        self._apart_m = number(table, "apart_m", 0.5)
+        self._most, self._apart_m = table.row, table.apart_m
         self._ranges: Ranges | None = None
         self._last: Pose | None = None
         #: Of the turn that goes on: the side that was nearer as it began, how far the rims parted, its first pose.
@@ -139,8 +157,8 @@ class _NotLong(Watch):
     #: What is said of it.
     words = ""
 
-    def __init__(self, table: Table) -> None:
-        self._within_s = number(table, "within_s")
+    def __init__(self, within_s: float) -> None:
+        self._within_s = within_s
         self._ranges: Ranges | None = None
         self._since: Pose | None = None
         self._longest: Nanos = 0
@@ -172,13 +190,26 @@ class _NotLong(Watch):
         return GoalOutcome(met=False, says=f"{says}; {self._within_s:g} s are allowed", robustness=by, unit=ALLOWED)
 
 
+class SteersAwayTable(SidesTable):
+    """Sides, and for how long it may bend the wrong way."""
+
+    within_s: InTime
+
+
+class NoIdleTurnTable(Record):
+    """What is free, and for how long it may turn there."""
+
+    free_m: _Free
+    within_s: InTime
+
+
 class SteersAway(_NotLong):
     """On its way forward the robot bends away from what stands on one side only."""
 
     words = "it bent towards what stood on one side alone"
 
-    def __init__(self, table: Table) -> None:
-        super().__init__(table)
+    def __init__(self, table: SteersAwayTable) -> None:
+        super().__init__(table.within_s)
         self._sides = _Sides(table)
 
     def is_bad(self, pose: Pose) -> bool:
@@ -193,12 +224,18 @@ class NoIdleTurn(_NotLong):
 
     words = "it turned on the spot where everything was free"
 
-    def __init__(self, table: Table) -> None:
-        super().__init__(table)
-        self._free_mm = 1000 * number(table, "free_m")
+    def __init__(self, table: NoIdleTurnTable) -> None:
+        super().__init__(table.within_s)
+        self._free_mm = 1000 * table.free_m
 
     def is_bad(self, pose: Pose) -> bool:
         return _spins(pose) and self._ranges is not None and min(self._ranges.mm, default=0) > self._free_mm
+
+
+class BacksOnPathTable(Record):
+    """How far off its way."""
+
+    off_m: Annotated[float, Key(above=0, most=100, doc="so near to the way that it has come")]
 
 
 class BacksOnPath(Watch):
@@ -207,8 +244,8 @@ class BacksOnPath(Watch):
     STATE = ("_path", "_worst_m", "_worst_at")
     kinds = (Pose,)
 
-    def __init__(self, table: Table) -> None:
-        self._most_m = number(table, "off_m")
+    def __init__(self, table: BacksOnPathTable) -> None:
+        self._most_m = table.off_m
         #: Places before the robot last began to go back, micrometres.
         self._path: list[tuple[int, int]] = []
         self._worst_m = 0.0
@@ -233,3 +270,27 @@ class BacksOnPath(Watch):
             return GoalOutcome(met=True, robustness=by, unit=ALLOWED)
         says = f"it went back {self._worst_m:.2f} m off the way that it had come at {_place(self._worst_at)}"
         return GoalOutcome(met=False, says=f"{says}, {self._most_m:g} m are allowed", robustness=by, unit=ALLOWED)
+
+
+KINDS: Mapping[str, GoalKind] = {
+    "turns_away": GoalKind(
+        TurnsAwayTable,
+        lambda table: f"turns on the spot away from what stands on one side, but for {table.row} in a row",
+        TurnsAway, doc="a turn on the spot that begins with something nearer than `near_m` on one side and the other "
+        "free beyond `free_m` goes to the free one",
+    ),
+    "steers_away": GoalKind(
+        SteersAwayTable,
+        lambda table: f"bends towards what stands on one side for no longer than {table.within_s:g} s",
+        SteersAway, doc="driving forward it does not bend towards the side that is not free, as above, for longer",
+    ),
+    "no_idle_turn": GoalKind(
+        NoIdleTurnTable,
+        lambda table: f"turns on the spot for no longer than {table.within_s:g} s where {table.free_m:g} m are free",
+        NoIdleTurn, doc="it does not go on turning on the spot for longer than that where every sonar is free",
+    ),
+    "backs_on_path": GoalKind(
+        BacksOnPathTable, lambda table: f"goes back only within {table.off_m:g} m of the way that it came",
+        BacksOnPath, doc="going back it stays so near to the way that it has come",
+    ),
+}  # fmt: skip

@@ -7,22 +7,26 @@ in its window, that of `eventually` the greatest; after an event, that of the wo
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Annotated, Any
 
-from p2os.toml_schema import Table
+from p2os.errors import ScenarioError
+from p2os.toml_schema import LONGEST_S, Key
 from robot_bench.events.kinds import MICRO, Clearance, Event, Pose, Ranges, WorldChange
 from robot_bench.scenario.goals.watch import (
+    From,
+    GoalKind,
     GoalOutcome,
+    OfEvents,
     SelectorFeed,
+    To,
     Watch,
-    nanos,
-    number,
+    Within,
+    given_in_words,
     seconds,
-    selected,
-    texts_of,
+    window_in_words,
 )
 from simbase.errors import UsageError
-from simbase.timing import NS_PER_S, Nanos
+from simbase.timing import NS_PER_S, Nanos, nanos
 
 #: Signal → what tells it, its value there, its unit.
 SIGNALS: Mapping[str, tuple[type, Callable[[Any], float], str]] = {
@@ -40,6 +44,90 @@ SIGNALS: Mapping[str, tuple[type, Callable[[Any], float], str]] = {
 APART = "apart_m"
 #: Of a value, metres, degrees or m/s within bounds; negative beyond them.
 Margin = Callable[[float], float]
+_Bound = Annotated[float | None, Key(least=-1e6, most=1e6, doc="of the signal")]
+_Count = Annotated[int | None, Key(least=0, most=1_000_000, doc="how often")]
+_Event = Annotated[str, Key(doc="the event")]
+_Most = Annotated[float, Key(above=0, most=LONGEST_S, doc="in so many seconds")]
+
+
+class WindowTable(OfEvents):
+    """A window of time, from the beginning or from each occurrence of an event."""
+
+    after: Annotated[str | None, Key(doc="the event from which the window counts")] = None
+    from_s: From = None
+    to_s: To = None
+
+
+class OverTimeTable(WindowTable):
+    """Bounds of a signal in a window."""
+
+    signal: Annotated[str, Key(choices=tuple(SIGNALS), doc="which")]
+    thing: Annotated[str | None, Key(doc="of `apart_m`: to what")] = None
+    least: _Bound = None
+    most: _Bound = None
+
+    @property
+    def margin(self) -> Margin:
+        """The margin to `least` and `most`."""
+        least, most = (-math.inf if self.least is None else self.least), (math.inf if self.most is None else self.most)
+        return lambda value: min(value - least, most - value)
+
+
+class HoldHeadingTable(WindowTable):
+    """A heading in a window."""
+
+    heading_deg: Annotated[float, Key(least=-36_000, most=36_000, doc="the short way round")]
+    tolerance_deg: Annotated[float, Key(above=0, most=180, doc="off it at most")]
+
+
+class HoldSpeedTable(WindowTable):
+    """A speed in a window."""
+
+    speed_mps: Annotated[float, Key(least=-100, most=100, doc="forward")]
+    tolerance_mps: Annotated[float, Key(above=0, most=100, doc="off it at most")]
+
+
+class NeverTable(OfEvents):
+    """An event that must not happen."""
+
+    event: _Event
+    from_s: From = None
+
+
+class HappensTable(NeverTable):
+    """An event, and how often it may happen."""
+
+    least: _Count = None
+    most: _Count = None
+    within_s: Within = None
+
+
+class InOrderTable(OfEvents):
+    """Events one after the other."""
+
+    events: Annotated[tuple[str, ...], Key(kind="list", doc="in this order")]
+
+    def __post_init__(self) -> None:
+        refuse_other_than_texts("events", self.events)
+
+
+class LatencyTable(OfEvents):
+    """An event that follows another one."""
+
+    from_: Annotated[str, Key(doc="an event")]
+    to: Annotated[str, Key(doc="the event that follows")]
+    most_s: _Most
+    least_s: Annotated[float, Key(least=0, most=LONGEST_S, doc="no sooner")] = 0.0
+
+
+def refuse_other_than_texts(key: str, items: tuple[str, ...]) -> None:
+    """Refuse a list that has other than texts in it.
+
+    Raises:
+        ScenarioError: It has.
+    """
+    if not all(isinstance(item, str) for item in items):
+        raise ScenarioError(f"{key} must be a list of texts in quotes")
 
 
 class OverTime(Watch):
@@ -51,22 +139,24 @@ class OverTime(Watch):
 
     STATE = ("_events", "_windows", "_worst", "_failure", "_count", "_there")
 
-    def __init__(self, table: Table, signal: str, margin: Margin, *, is_always: bool) -> None:
+    def __init__(
+        self, table: WindowTable, signal: str, margin: Margin, *, is_always: bool, thing: str | None = None
+    ) -> None:
         kind, self._value, self._unit = SIGNALS[signal]
         self._signal = signal
-        #: A thing of the world, and where it was reported to be last.
-        self._thing = str(table.get("thing", ""))
+        #: A thing of the world, and where it was reported last.
+        self._thing = thing or ""
         self._there: tuple[float, float] | None = None
         if bool(self._thing) is not (signal == APART):
             raise UsageError(f"signal {APART} and thing belong together", hint='thing = "NAME" of a robot or a thing')
         self._margin = margin
         self._is_always = is_always
-        self._after = str(table["after"]) if "after" in table else ""
-        self._events = SelectorFeed(*([selected(table, self._after)] if self._after else []))
+        self._after = table.after or ""
+        self._events = SelectorFeed(*([table.selected(self._after)] if self._after else []))
         self._kind = kind
         kinds = [kind, *([WorldChange] if self._thing else []), *self._events.kinds]
         self.kinds, self.wires = tuple(dict.fromkeys(kinds)), self._events.wires
-        self._from, self._to = nanos(table, "from_s"), nanos(table, "to_s") if "to_s" in table else None
+        self._from, self._to = nanos(table.from_s or 0.0), None if table.to_s is None else nanos(table.to_s)
         #: Where windows begin, and the best margin in each so far; of `always` the worst.
         self._windows: list[tuple[Nanos, float, Nanos]] = [] if self._after else [(0, self._nothing, 0)]
         self._worst = math.inf
@@ -149,12 +239,6 @@ class OverTime(Watch):
         return GoalOutcome(met=not self._failure, says=says, robustness=robustness, unit=self._unit)
 
 
-def bounds(table: Table) -> Margin:
-    """Return the margin to `least` and `most`."""
-    least, most = number(table, "least", -math.inf), number(table, "most", math.inf)
-    return lambda value: min(value - least, most - value)
-
-
 def around(wanted: float, tolerance: float, *, is_angle: bool = False) -> Margin:
     """Return the margin to a tolerance around a value; angles, in degrees, go the short way."""
     if is_angle:
@@ -167,12 +251,13 @@ class Happens(Watch):
 
     STATE = ("_events", "_times", "_is_decided")
 
-    def __init__(self, table: Table, *, least: int = 1, most: float = math.inf) -> None:
-        self._words = str(table["event"])
-        self._events = SelectorFeed(selected(table, self._words))
+    def __init__(self, table: HappensTable) -> None:
+        self._words = table.event
+        self._events = SelectorFeed(table.selected(table.event))
         self.kinds, self.wires = self._events.kinds, self._events.wires
-        self._least, self._most = number(table, "least", least), number(table, "most", most)
-        self._from, self._to = nanos(table, "from_s"), nanos(table, "within_s") if "within_s" in table else None
+        self._least = 1 if table.least is None else table.least
+        self._most = math.inf if table.most is None else table.most
+        self._from, self._to = nanos(table.from_s or 0.0), None if table.within_s is None else nanos(table.within_s)
         if self._least > self._most:
             raise UsageError(f"least is {self._least:g} where it is not given", hint='kind = "never", or least = 0')
         self._times: list[Nanos] = []
@@ -211,9 +296,9 @@ class InOrderOfEvents(Watch):
 
     STATE = ("_events", "_place", "_last")
 
-    def __init__(self, table: Table) -> None:
-        self._words = texts_of(table, "events")
-        self._events = SelectorFeed(*(selected(table, words) for words in self._words))
+    def __init__(self, table: InOrderTable) -> None:
+        self._words = table.events
+        self._events = SelectorFeed(*map(table.selected, table.events))
         self.kinds, self.wires = self._events.kinds, self._events.wires
         self._place = 0
         self._last: Nanos = 0
@@ -238,11 +323,11 @@ class Latency(Watch):
 
     STATE = ("_events", "_since", "_worst", "_count", "_failure")
 
-    def __init__(self, table: Table) -> None:
-        self._first, self._then = str(table["from"]), str(table["to"])
-        self._events = SelectorFeed(selected(table, self._first), selected(table, self._then))
+    def __init__(self, table: LatencyTable) -> None:
+        self._first, self._then = table.from_, table.to
+        self._events = SelectorFeed(table.selected(table.from_), table.selected(table.to))
         self.kinds, self.wires = self._events.kinds, self._events.wires
-        self._most, self._least = nanos(table, "most_s"), nanos(table, "least_s")
+        self._most, self._least = nanos(table.most_s), nanos(table.least_s)
         #: The first event that was not answered yet.
         self._since: Nanos | None = None
         self._worst: tuple[Nanos, Nanos] = (0, 0)
@@ -293,3 +378,69 @@ class Latency(Watch):
         took, at = self._worst
         says = f"{self._count} times, at most {took / NS_PER_S:.6f} s (at {seconds(at)})"
         return GoalOutcome(met=True, says=says, robustness=(self._most - took) / NS_PER_S, unit="s")
+
+
+def _window(table: WindowTable) -> str:
+    return window_in_words(table.after, from_s=table.from_s, to_s=table.to_s)
+
+
+def _bounds(table: OverTimeTable) -> str:
+    bounds = " and".join(given_in_words((" at least ", table.least, ""), (" at most ", table.most, "")))
+    return f"{table.signal}{'' if table.thing is None else f' from {table.thing}'}{bounds}"
+
+
+def _over_time(table: OverTimeTable, *, is_always: bool) -> Watch:
+    return OverTime(table, table.signal, table.margin, is_always=is_always, thing=table.thing)
+
+
+def never(words: str, table: OfEvents, *, from_s: float | None = None) -> Watch:
+    """Return what watches that an event in words does not happen."""
+    return Happens(HappensTable(event=words, least=0, most=0, from_s=from_s, wires=table.wires))
+
+
+KINDS: Mapping[str, GoalKind] = {
+    "hold_heading": GoalKind(
+        HoldHeadingTable,
+        lambda table: f"holds heading {table.heading_deg:g}° to {table.tolerance_deg:g}°{_window(table)}",
+        lambda table: OverTime(
+            table, "heading_deg", around(table.heading_deg, table.tolerance_deg, is_angle=True), is_always=True
+        ),
+        doc="its heading stays so, the short way round", is_scripted=True,
+    ),
+    "hold_speed": GoalKind(
+        HoldSpeedTable,
+        lambda table: f"holds {table.speed_mps:g} m/s to {table.tolerance_mps:g} m/s{_window(table)}",
+        lambda table: OverTime(table, "speed_mps", around(table.speed_mps, table.tolerance_mps), is_always=True),
+        doc="its speed stays so", is_scripted=True,
+    ),
+    "always": GoalKind(
+        OverTimeTable, lambda table: f"has always {_bounds(table)}{_window(table)}",
+        lambda table: _over_time(table, is_always=True), doc="the signal is in bounds at each sample",
+        any_of=("least", "most"),
+    ),
+    "eventually": GoalKind(
+        OverTimeTable, lambda table: f"has at some time {_bounds(table)}{_window(table)}",
+        lambda table: _over_time(table, is_always=False), doc="the signal is in bounds at one of them",
+        any_of=("least", "most"),
+    ),
+    "happens": GoalKind(
+        HappensTable,
+        lambda table: f"{table.event!r} happens"
+        + ("" if table.least is None else f" at least {table.least} time(s)")
+        + ("" if table.most is None else f" at most {table.most} time(s)")
+        + window_in_words(from_s=table.from_s, within_s=table.within_s),
+        Happens, doc="the event happens so often in that time: once at least where `least` is not given",
+    ),
+    "never": GoalKind(
+        NeverTable, lambda table: f"{table.event!r} never happens{window_in_words(from_s=table.from_s)}",
+        lambda table: never(table.event, table, from_s=table.from_s), doc="it does not happen",
+    ),
+    "in_order": GoalKind(
+        InOrderTable, lambda table: f"in order {', '.join(map(repr, table.events))}", InOrderOfEvents,
+        doc="they happen one after the other", is_scripted=True,
+    ),
+    "latency": GoalKind(
+        LatencyTable, lambda table: f"{table.to!r} follows {table.from_!r} within {table.most_s:g} s", Latency,
+        doc="each `from` is followed by a `to` in time",
+    ),
+}  # fmt: skip

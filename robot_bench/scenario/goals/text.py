@@ -1,10 +1,14 @@
 """Goals on what the firmware prints: that it is there, that it is not, and in which order."""
 
-from typing import ClassVar
+from collections.abc import Mapping
+from typing import Annotated, ClassVar
 
+from p2os.toml_record import Record
+from p2os.toml_schema import Key
 from robot_bench.events.kinds import Event, Text
 from robot_bench.events.selection import Lines
-from robot_bench.scenario.goals.watch import GoalOutcome, Watch
+from robot_bench.scenario.goals.temporal import never, refuse_other_than_texts
+from robot_bench.scenario.goals.watch import GoalKind, GoalOutcome, OfEvents, Watch
 from simbase.timing import Nanos
 
 
@@ -62,3 +66,35 @@ class InOrder(Printed):
         if self._place == len(self._texts):
             return GoalOutcome(met=True)
         return GoalOutcome(met=False, says=f"{self._texts[self._place]!r} {self._missing}; {self.last}")
+
+
+class PrintsTable(Record):
+    """A text."""
+
+    text: Annotated[str, Key(doc="what the firmware prints")]
+
+
+class PrintsInOrderTable(Record):
+    """Texts one after the other."""
+
+    texts: Annotated[tuple[str, ...], Key(kind="list", doc="in this order")]
+
+    def __post_init__(self) -> None:
+        refuse_other_than_texts("texts", self.texts)
+
+
+KINDS: Mapping[str, GoalKind] = {
+    "usart_contains": GoalKind(
+        PrintsTable, lambda table: f"prints {table.text!r}",
+        lambda table: InOrder([table.text], "was not printed"), doc="the firmware printed it",
+    ),
+    "usart_lacks": GoalKind(
+        PrintsTable, lambda table: f"never prints {table.text!r}",
+        lambda table: never(f"usart1 sends {table.text}", OfEvents()), doc="the firmware never printed it",
+    ),
+    "usart_in_order": GoalKind(
+        PrintsInOrderTable, lambda table: f"prints in order {', '.join(map(repr, table.texts))}",
+        lambda table: InOrder(list(table.texts), "was not printed in its turn"),
+        doc="the firmware printed these, in this order", is_scripted=True,
+    ),
+}  # fmt: skip

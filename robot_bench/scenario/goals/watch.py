@@ -5,12 +5,12 @@ Invariant: what a watch has decided stands: `finish` says the same, in more word
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import cast
+from typing import Annotated, Any, TypeVar
 
-from p2os.toml_schema import Key, Table
+from p2os.toml_record import Record
+from p2os.toml_schema import LONGEST_S, Key
 from robot_bench.events.kinds import Event
 from robot_bench.events.selection import Selector, Wires, select
-from simbase.errors import UsageError
 from simbase.state import Stateful
 from simbase.timing import NS_PER_S, Nanos
 
@@ -52,56 +52,56 @@ class Watch(Stateful):
         raise NotImplementedError
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+From = Annotated[float | None, Key(least=0, most=LONGEST_S, doc="where its window begins")]
+To = Annotated[float | None, Key(above=0, most=LONGEST_S, doc="where its window ends")]
+Within = Annotated[float | None, Key(above=0, most=LONGEST_S, doc="in so many seconds")]
+InTime = Annotated[float, Key(above=0, most=LONGEST_S, doc="in so many seconds")]
+
+
+class NoKeys(Record):
+    """Of a kind of goal without keys of its own."""
+
+
+class OfEvents(Record):
+    """Of a kind of goal with events or wires in words: it learns which wires they may name."""
+
+    #: Those of a robot on own pins; None: those of the pin-out. No key of a file.
+    wires: Wires | None = None
+
+    def selected(self, words: str) -> Selector:
+        """Return what picks the events that words of the goal mean.
+
+        Raises:
+            UsageError: They mean none.
+        """
+        return select(words, self.wires)
+
+
+T = TypeVar("T", bound=Record)
+
+
 class GoalKind:
     """A kind of goal: a row of the table.
 
     Args:
-        keys: What its table may have beside `kind`.
+        table: Declares the keys of its table beside `kind`, see `p2os.toml_record`.
         wanted: The goal as a sentence, of its table.
-        any_of: Keys of which its table has one at least; without them any run would meet the goal, or none.
         watch: Makes what watches one run, of its table; a `UsageError` refuses the table.
+        doc: When it is met, a line of Markdown for schema and page.
+        any_of: Keys of which its table has one at least; without them any run would meet the goal, or none.
         needs_world: A robot at a port cannot tell; there the goal is not judged.
         is_scripted: It is on what a program does in an order of its own, which from another start, or with other things
             in the way, it need not meet.
     """
 
-    keys: tuple[Key, ...]
-    wanted: Callable[[Table], str]
-    watch: Callable[[Table], Watch]
-    any_of: tuple[str, ...] = ()
-    needs_world: bool = False
-    is_scripted: bool = False
-
-
-#: Where a goal's table has the wires of a robot on own pins; no key of a file can be called so.
-WIRES = "wires of the robot"
-
-
-def wires_of(table: Table) -> Wires | None:
-    """Return the wires that a goal's words may name; None: those of the pin-out."""
-    return cast("Wires | None", table.get(WIRES))
-
-
-def selected(table: Table, words: object) -> Selector:
-    """Return what picks the events that words of a goal mean.
-
-    Raises:
-        UsageError: They mean none.
-    """
-    return select(str(words), wires_of(table))
-
-
-def texts_of(table: Table, name: str) -> list[str]:
-    """Return a key that is a list of texts.
-
-    Raises:
-        UsageError: Something else is in it.
-    """
-    texts = cast("list[object]", table[name])
-    if not all(isinstance(text, str) for text in texts):
-        raise UsageError(f"{name} must be a list of texts in quotes")
-    return cast("list[str]", texts)
+    def __init__(
+        self, table: type[T], wanted: Callable[[T], str], watch: Callable[[T], Watch], *, doc: str = "",
+        any_of: tuple[str, ...] = (), needs_world: bool = False, is_scripted: bool = False,
+    ) -> None:  # fmt: skip
+        self.table: type[Record] = table
+        self.wanted: Callable[[Any], str] = wanted
+        self.watch: Callable[[Any], Watch] = watch
+        self.doc, self.any_of, self.needs_world, self.is_scripted = doc, any_of, needs_world, is_scripted
 
 
 class SelectorFeed(Stateful):
@@ -125,12 +125,14 @@ def seconds(at: Nanos) -> str:
     return f"{at / NS_PER_S:.3f} s"
 
 
-def number(table: Table, name: str, default: float = 0.0) -> float:
-    """Return a number of a goal's table."""
-    value = table.get(name, default)
-    return float(value) if isinstance(value, (int, float)) else default
+def given_in_words(*parts: tuple[str, float | None, str]) -> list[str]:
+    """Return words, number and unit of those that are given."""
+    return [f"{words}{number:g}{unit}" for words, number, unit in parts if number is not None]
 
 
-def nanos(table: Table, name: str, default: float = 0.0) -> Nanos:
-    """Return a key in seconds as nanoseconds."""
-    return round(number(table, name, default) * NS_PER_S)
+def window_in_words(
+    after: str | None = None, *, from_s: float | None = None, to_s: float | None = None, within_s: float | None = None
+) -> str:
+    """Return the window of a goal as the end of its sentence."""
+    times = given_in_words((" from ", from_s, " s"), (" to ", to_s, " s"), (" within ", within_s, " s"))
+    return "".join([*([] if after is None else [f" after {after!r}"]), *times])

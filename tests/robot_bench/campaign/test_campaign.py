@@ -14,10 +14,11 @@ import pytest
 import typer
 
 from p2os.errors import ScenarioError
+from p2os.toml_record import keys_of
 from robot_bench.campaign.campaign_file import (
     DRAW,
-    TOP,
     Campaign,
+    CampaignTable,
     RunLimits,
     campaign_schema,
     load_campaign,
@@ -33,7 +34,7 @@ from robot_bench.campaign.whole import MOST_MOMENTS, Whole, begin, carry_out, re
 from robot_bench.campaign.workers import processes
 from robot_bench.campaign.workers.processes import Processes
 from robot_bench.cli.campaigns.campaign import _facts, tell
-from robot_bench.scenario.scenario import known_scenarios, load_scenario
+from robot_bench.scenario.loading import known_scenarios, load_scenario
 from simbase.errors import FileError, UsageError
 
 #: numba, which ribs compiles its steps by: for 8 s what then runs for some milliseconds.
@@ -349,7 +350,7 @@ def test_what_is_wrong_in_a_file_is_reported_with_a_hint(right: str, tmp_path: P
 def test_the_schema_has_every_key_that_the_loader_takes() -> None:
     schema = campaign_schema()
     properties: dict[str, Any] = schema["properties"]  # type: ignore[assignment]  # an object
-    assert set(properties) == {key.name for key in TOP}
+    assert set(properties) == {key.name for key in keys_of(CampaignTable)}
     assert set(properties["draw"]["items"]["properties"]) == {key.name for key in DRAW}
     assert schema["required"] == ["scenario"]
     json.dumps(schema)

@@ -14,7 +14,7 @@ from robot_bench.campaign.variants.shrinking.kept import test_text as text_of_te
 from robot_bench.campaign.variants.shrinking.kept import trial_of_run
 from robot_bench.report.make import Files
 from robot_bench.run import run_scenario
-from robot_bench.scenario.scenario import load_scenario
+from robot_bench.scenario.loading import load_scenario
 from tests.robot_bench.firmware.hurried import hurried
 from tests.tools.forked_python import PYTEST, forked_p2os, forked_python
 

@@ -20,7 +20,7 @@ from robot_bench.campaign.variants.mutation.base_run import BaseRun, base_run
 from robot_bench.campaign.variants.mutation.interval import share_interval
 from robot_bench.campaign.variants.mutation.trial import Fate, MutantResult, try_mutant
 from robot_bench.cli.campaigns.mutate import _drawn
-from robot_bench.scenario.scenario import load_scenario
+from robot_bench.scenario.loading import load_scenario
 from tests.bluepill_sim.machine import Assembler
 from tests.robot_bench.firmware import thumb
 

@@ -12,7 +12,7 @@ from robot_bench.campaign.conduct import Conduct
 from robot_bench.campaign.suggestion import suggested
 from robot_bench.campaign.workers.processes import Processes
 from robot_bench.firmware import build
-from robot_bench.scenario.scenario import load_scenario
+from robot_bench.scenario.loading import load_scenario
 
 #: What is wrong → what stands in dodge_fsm.c, and what takes its place.
 FAULTS = {

@@ -9,7 +9,7 @@ import pytest
 from robot_bench.campaign.trial import Outcome, Trial, TrialVerdict, bench_of, run_trial, trial_of, unpacked
 from robot_bench.events.kinds import Note, Text
 from robot_bench.run import run_scenario
-from robot_bench.scenario.scenario import load_scenario
+from robot_bench.scenario.loading import load_scenario
 from simbase.errors import UsageError
 from tests.robot_bench.firmware.hurried import hurried
 from tests.tools.forked_python import forked_python

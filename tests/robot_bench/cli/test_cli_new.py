@@ -17,7 +17,7 @@ from p2os.pioneer.body.factory import BEST, resolve_body
 from robot_bench import Bench
 from robot_bench.firmware.build import COMPILER
 from robot_bench.project import files as project
-from robot_bench.scenario.scenario import read_scenario
+from robot_bench.scenario.loading import read_scenario
 from tests.tools.forked_python import PYTEST, forked_python
 
 NAMES = {

@@ -17,7 +17,7 @@ from robot_bench.cli.run import capped
 from robot_bench.drives.of_run import drive_of_record
 from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.recording.run_record import read_run
-from robot_bench.scenario.scenario import load_scenario
+from robot_bench.scenario.loading import load_scenario
 from tests.robot_bench.firmware import thumb
 from tests.tools.forked_python import forked_p2os
 

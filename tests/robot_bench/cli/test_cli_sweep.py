@@ -17,7 +17,7 @@ from p2os.cli.main import run as p2os
 from robot_bench.cli.run import sweep_rows
 from robot_bench.cli.sweep import SweepResult, print_sweep
 from robot_bench.cli.workers import run_in_processes
-from robot_bench.scenario.scenario import load_scenario
+from robot_bench.scenario.loading import load_scenario
 from simbase.trust import Trust
 from tests.robot_bench.firmware import thumb
 from tests.robot_bench.firmware.hurried import hurried

@@ -24,7 +24,7 @@ def wave(high: int, *, period: int = 3600, hz: int = 72_000_000, at: int = 0, ns
 
 def bridge(kind: BridgeKind, off: Off = Off.BRAKE, dead_time_ns: int = 0) -> tuple[HBridge, list[Net]]:
     nets = [Net(name) for name in kind.pins]
-    return HBridge(nets, BridgeDescription(kind=kind, off=off, dead_time_ns=dead_time_ns)), nets
+    return HBridge(nets, BridgeDescription(kind=kind, off=off, dead_time_us=dead_time_ns / 1000)), nets
 
 
 @pytest.mark.parametrize("off", list(Off))

@@ -13,8 +13,8 @@ from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import Obstacle, Pose
 from robot_bench.bench.board import make_own_harness
-from robot_bench.direct.differential.analog import GP2Y0A21, DischargingBattery, volts_at
-from robot_bench.direct.differential.description import Differential, Off
+from robot_bench.direct.differential.analog import DischargingBattery, volts_at
+from robot_bench.direct.differential.description import GP2Y0A21, Differential, Off
 from robot_bench.direct.differential.robot import DifferentialRobot
 from robot_bench.wires.nets import Harness, Strength, WaveDrive
 from tests.robot_bench.direct.robots import rover
@@ -248,10 +248,10 @@ def test_a_slope_loads_the_motors_of_a_physical_robot(body: str) -> None:
     motor, parameters, pitch = rover().motor, rover().body, abs(rig.body.state.pitch_rad)
     assert pitch == pytest.approx(math.atan(0.18 / 3.0), rel=0.02)
     weight_nm = parameters.mass_kg * 9.81 * math.sin(pitch) * parameters.wheel_diameter_m / 2
-    load_a = weight_nm / (2 * motor.torque_constant * motor.gear_ratio)
+    load_a = weight_nm / (2 * motor.torque_constant_nm_a * motor.gear_ratio)
     assert current_a[4500] - current_a[2000] == pytest.approx(load_a, rel=0.1)
 
 
 def test_a_wheel_of_few_edges_and_one_on_the_wheel_itself_have_theirs() -> None:
-    robot = replace(rover(), encoder=replace(rover().encoder, lines=5, is_on_motor=False))
+    robot = replace(rover(), encoder=replace(rover().encoder, lines=5, on="wheel"))
     assert robot.encoder.edges_per_turn(robot.motor) == 20

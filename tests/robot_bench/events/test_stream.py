@@ -37,7 +37,8 @@ from robot_bench.events.kinds import (
 from robot_bench.events.stream import EventStream
 from robot_bench.events.words import distinguishing_words, what_of
 from robot_bench.scenario.fault_script import FaultChange
-from robot_bench.scenario.scenario import Scenario, load_scenario
+from robot_bench.scenario.loading import load_scenario
+from robot_bench.scenario.scenario import Scenario
 from robot_bench.scenario.world_script import Op, ScriptedChange
 from robot_bench.wires.edges import Edges
 from tests.robot_bench.wires.fake_chip import FakeChip, PinDrive

@@ -30,7 +30,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
     def make(folder: Path) -> Path:
         from robot_bench.run import run_scenario
-        from robot_bench.scenario.scenario import load_scenario
+        from robot_bench.scenario.loading import load_scenario
 
         for name, threshold_m in (("near", 0.6), ("far", 0.9)):
             scenario = load_scenario("dodge", settings=[("threshold_m", threshold_m)])

@@ -8,7 +8,9 @@ from functools import cache
 from pathlib import Path
 from typing import Unpack
 
-from robot_bench.scenario.scenario import Scenario, ScenarioOptions, load_scenario
+from robot_bench.scenario.loading import load_scenario
+from robot_bench.scenario.options import ScenarioOptions
+from robot_bench.scenario.scenario import Scenario
 
 #: `mov.w r0, #300` of board_wait_for_link, in ticks of 10 ms.
 WAIT = bytes.fromhex("4ff49670")

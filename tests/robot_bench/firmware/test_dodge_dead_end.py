@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from robot_bench.run import run_scenario
-from robot_bench.scenario.scenario import load_scenario
+from robot_bench.scenario.loading import load_scenario
 
 POCKET = """
 name = "pocket"

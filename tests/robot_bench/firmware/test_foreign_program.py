@@ -7,7 +7,7 @@ import pytest
 from bluepill_sim.board import BluePill
 from bluepill_sim.fabric.subscriptions import EDGE
 from robot_bench.run import run_scenario
-from robot_bench.scenario.scenario import load_scenario
+from robot_bench.scenario.loading import load_scenario
 
 FOREIGN = Path(__file__).parents[2] / "firmware_foreign"
 MS = 1_000_000

@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 from _pytest.mark.structures import ParameterSet
 
+from p2os.toml_record import given
 from robot_bench.run import run_scenario
-from robot_bench.scenario.scenario import load_scenario
+from robot_bench.scenario.loading import load_scenario
 
 BODIES = ["kinematic", pytest.param("bullet", marks=pytest.mark.bullet)]
 MODES = ["direct", "adapter"]
@@ -77,7 +78,7 @@ def test_dodge_touches_nothing_in_the_arena(mode: str, body: str, seed: int, tmp
 
 
 def test_dodge_wants_what_it_must_show() -> None:
-    wanted = {goal.kind: goal.arguments for goal in load_scenario("dodge").goals}
+    wanted = {goal.kind: dict(given(goal.table)) for goal in load_scenario("dodge").goals}
     assert wanted["no_collision"] == {}
     assert wanted["min_distance"] == {"distance_m_a_minute": LEAST_M_A_MINUTE}
     assert wanted["cells"] == {"least": LEAST_CELLS}

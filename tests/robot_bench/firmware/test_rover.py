@@ -12,7 +12,8 @@ from robot_bench.bench.board import pins_of
 from robot_bench.firmware import build
 from robot_bench.recording.run_record import RunRecord
 from robot_bench.run import run_scenario
-from robot_bench.scenario.scenario import Scenario, load_scenario
+from robot_bench.scenario.loading import load_scenario
+from robot_bench.scenario.scenario import Scenario
 from tests.robot_bench.direct.robots import rover
 
 MM = 1000

@@ -22,7 +22,7 @@ from robot_bench.events.kinds import MICRO, Contact, Packet, PinEdge, Pose, Rang
 from robot_bench.recording.run_record import read_events, read_meta
 from robot_bench.recording.scene_messages import ERROR, INFO, SceneMessages
 from robot_bench.run import run_scenario
-from robot_bench.scenario.scenario import load_scenario
+from robot_bench.scenario.loading import load_scenario
 from simbase.errors import UsageError
 
 MCAP_MAGIC = b"\x89MCAP0\r\n"

@@ -18,7 +18,7 @@ from robot_bench.events.kinds import CanTransfer, Event, I2cTransfer, SpiTransfe
 from robot_bench.events.selection import select
 from robot_bench.firmware.build import HERE as FIRMWARE
 from robot_bench.recording.transfers import MOST_BYTES, PAUSE_NS, I2cTransfers, SpiTransfers
-from robot_bench.scenario.scenario import load_scenario
+from robot_bench.scenario.loading import load_scenario
 from simbase.errors import UsageError
 
 PARTS = Path(__file__).parents[2] / "bluepill_sim" / "firmware" / "parts.elf"

@@ -29,7 +29,7 @@ from robot_bench.report.explain.replay import ChipReplay, Hold, ReplayPart
 from robot_bench.report.explain.scene import Scene
 from robot_bench.report.make import Files
 from robot_bench.run import run_scenario
-from robot_bench.scenario.scenario import load_scenario
+from robot_bench.scenario.loading import load_scenario
 from robot_bench.wires.edges import Edges
 from simbase.errors import FileError, UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S

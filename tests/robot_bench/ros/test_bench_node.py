@@ -18,7 +18,8 @@ from robot_bench.bench.board import make_harness
 from robot_bench.ros.bench_node import BenchNode
 from robot_bench.ros.drive import RosPlace, refuse_without_pins, run_beside, with_inputs
 from robot_bench.ros.recorded import inputs_of, read_inputs
-from robot_bench.scenario.scenario import Scenario, load_scenario
+from robot_bench.scenario.loading import load_scenario
+from robot_bench.scenario.scenario import Scenario
 from robot_bench.wires.nets import Harness, Strength
 from simbase.errors import FileError, UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos

@@ -14,7 +14,8 @@ from robot_bench.events.codec import Json
 from robot_bench.events.kinds import Event, Note, Packet, PinEdge, Pose, Text, Verdict
 from robot_bench.ros.run_bag import ERROR, INFO, RunMessages, write_bag
 from robot_bench.run import meta_of
-from robot_bench.scenario.scenario import Scenario, load_scenario
+from robot_bench.scenario.loading import load_scenario
+from robot_bench.scenario.scenario import Scenario
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS
 from tests.p2os.ros.spoken_types import SPOKEN

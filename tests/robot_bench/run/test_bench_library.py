@@ -13,7 +13,7 @@ from robot_bench.events.codec import events_of
 from robot_bench.events.expectation import ExpectationError
 from robot_bench.events.kinds import Fault, PinEdge, Pose, WorldChange
 from robot_bench.recording.trace import TraceWriter
-from robot_bench.scenario.scenario import load_scenario
+from robot_bench.scenario.loading import load_scenario
 from simbase.errors import UsageError
 from tests.robot_bench.test_bench import S, bench, scenario
 from tests.robot_bench.wires.fake_chip import FakeChip, PinDrive
@@ -243,10 +243,10 @@ def test_a_bench_goes_back_and_on_again_as_if_nothing_had_been(in_file: bool, tm
 def test_goals_are_saved_with_the_bench_and_caught_up_with_where_they_are_others() -> None:
     from dataclasses import replace
 
-    from robot_bench.scenario.goals.judging import Goal
+    from robot_bench.scenario.goals.judging import Goal, load_goal
 
-    latency = Goal(kind="latency", arguments={"from": "pin PB12 high", "to": "pin PB7 high", "most_s": 1.0})
-    text = Goal(kind="usart_contains", arguments={"text": "hello"})
+    latency = load_goal({"kind": "latency", "from": "pin PB12 high", "to": "pin PB7 high", "most_s": 1.0}, "x")
+    text = load_goal({"kind": "usart_contains", "text": "hello"}, "x")
     plain = scenario("adapter")
 
     def of(*goals: Goal) -> Bench:
@@ -268,9 +268,9 @@ def test_goals_are_saved_with_the_bench_and_caught_up_with_where_they_are_others
 def test_a_verdict_may_end_the_run_and_the_slice_changes_nothing() -> None:
     from dataclasses import replace
 
-    from robot_bench.scenario.goals.judging import Goal
+    from robot_bench.scenario.goals.judging import load_goal
 
-    goal = Goal(kind="happens", arguments={"event": "pin PB7 high"}, ends_run="met")
+    goal = load_goal({"kind": "happens", "event": "pin PB7 high", "ends_run": "met"}, "x")
     reported = set()
     for slice_ns in (MS, 10 * MS, 77_777):
         one = bench(replace(scenario("direct"), goals=(goal,)), slice_ns)

@@ -17,7 +17,8 @@ from robot_bench.recording.run_record import read_run
 from robot_bench.recording.summary import outcome_of, verdict
 from robot_bench.report import make
 from robot_bench.report.make import make_artefacts
-from robot_bench.scenario.scenario import Scenario, load_scenario
+from robot_bench.scenario.loading import load_scenario
+from robot_bench.scenario.scenario import Scenario
 from simbase.errors import MissingDependencyError, P2osError
 from tests.tools.forked_python import forked_python
 

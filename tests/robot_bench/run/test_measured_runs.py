@@ -9,7 +9,8 @@ from bluepill_sim.program.image import load_image
 from p2os.cli.main import run as p2os
 from robot_bench.recording.run_folder import FILES
 from robot_bench.run import RunProgress, RunResult, run_scenario
-from robot_bench.scenario.scenario import Scenario, load_scenario
+from robot_bench.scenario.loading import load_scenario
+from robot_bench.scenario.scenario import Scenario
 
 CASES = [("python", "adapter"), ("native", "direct"), ("native", "adapter")]
 COVERAGE = {"coverage.txt", "coverage.html", "coverage.info"}

@@ -30,7 +30,8 @@ from robot_bench.recording.run_record import RunRecord, read_run
 from robot_bench.recording.signals import motor_steps
 from robot_bench.recording.trace import TraceWriter
 from robot_bench.scenario.goals.signals import SKEW_NS
-from robot_bench.scenario.scenario import Scenario, load_scenario
+from robot_bench.scenario.loading import load_scenario
+from robot_bench.scenario.scenario import Scenario
 from tests.robot_bench.firmware.hurried import hurried_scenario
 from tests.robot_bench.wires.fake_chip import FakeChip, PinDrive
 

@@ -15,7 +15,7 @@ from robot_bench import Bench
 from robot_bench.adapter import make_shipped_adapter
 from robot_bench.recording.run_record import read_run
 from robot_bench.scenario.json_schema import scenario_schema
-from robot_bench.scenario.scenario import load_scenario
+from robot_bench.scenario.loading import load_scenario
 from robot_bench.wires.line_ends import AdapterPart, ControllerPart
 from simbase import user_classes
 from simbase.errors import P2osError, UsageError

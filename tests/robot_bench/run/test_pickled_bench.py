@@ -18,7 +18,8 @@ from robot_bench.adapter import FirmwareAdapter, is_available
 from robot_bench.bench import Bench, run_of
 from robot_bench.recording.trace import TraceWriter
 from robot_bench.scenario.fault_script import FaultChange
-from robot_bench.scenario.scenario import Scenario, load_scenario
+from robot_bench.scenario.loading import load_scenario
+from robot_bench.scenario.scenario import Scenario
 from simbase.errors import FileError, UsageError
 from tests.robot_bench.firmware.hurried import hurried_scenario
 from tests.robot_bench.run.finished_bench import finished

@@ -28,7 +28,7 @@ from robot_bench.recording.client_view import OdometryPose
 from robot_bench.recording.run_record import read_run
 from robot_bench.remote import RemoteBench
 from robot_bench.running.pacer import RealTimePacer
-from robot_bench.scenario.scenario import load_scenario
+from robot_bench.scenario.loading import load_scenario
 from robot_bench.wires.port_endpoint import STOP_SEQUENCE
 from tests.robot_bench.firmware.hurried import hurried
 from tests.robot_bench.wires.fake_chip import FakeChip, PinDrive

@@ -60,7 +60,7 @@ import sys
 from pathlib import Path
 from robot_bench.report.make import Files
 from robot_bench.run import run_scenario
-from robot_bench.scenario.scenario import load_scenario
+from robot_bench.scenario.loading import load_scenario
 modes, bodies, firmware = sys.argv[1:]
 for mode in modes.split():
     for body in bodies.split():

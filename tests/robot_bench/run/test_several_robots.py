@@ -15,7 +15,7 @@ from robot_bench.events.kinds import Pose, Ranges, Text, WorldChange
 from robot_bench.recording.run_record import read_events
 from robot_bench.recording.together import named_events, robots_in
 from robot_bench.report import make
-from robot_bench.scenario.scenario import read_scenario
+from robot_bench.scenario.loading import read_scenario
 from simbase.errors import UsageError
 from tests.robot_bench.firmware import thumb
 from tests.robot_bench.firmware.hurried import hurried

@@ -10,7 +10,7 @@ from p2os.errors import ScenarioError
 from p2os.robots.parameters import load_parameters
 from robot_bench.bench import Bench
 from robot_bench.scenario.fault_script import FaultChange, load_faults
-from robot_bench.scenario.scenario import load_scenario
+from robot_bench.scenario.loading import load_scenario
 from tests.robot_bench.wires.fake_chip import FakeChip, PinDrive
 
 S, MS = 10**9, 10**6

@@ -1,21 +1,30 @@
 """Each kind of goal that watches motion, wires and events: one tick before, at and after its bound."""
 
+import json
+import runpy
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from p2os.errors import ScenarioError
+from p2os.toml_record import Record
+from p2os.toml_schema import Key
+from robot_bench.cli.names import setting_keys
 from robot_bench.events.kinds import Clearance, Contact, Event, Fault, Note, PinEdge, Pose, Ranges, Text, Wave
-from robot_bench.scenario.goals.judging import Goal, GoalJudge, RunEnd, load_goal
+from robot_bench.scenario.goals.judging import GoalJudge, RunEnd, judge, load_goal
 from robot_bench.scenario.goals.kinds import KINDS, every_kind
-from robot_bench.scenario.goals.watch import GoalOutcome
+from robot_bench.scenario.goals.watch import GoalKind, GoalOutcome, Watch
+from robot_bench.scenario.loading import load_scenario
+from simbase.errors import UsageError
 from tests.robot_bench.recording.records import S, pose
 
+ROOT = Path(__file__).resolve().parents[3]
 MS = 10**6
 UM = 1_000_000
 
@@ -297,6 +306,7 @@ def test_goal_wave_by_edges_and_goal_wave_by_wave(high_ms: int, met: bool) -> No
     assert met or found.says == "PB7 had 100 Hz and 30.0% duty in the period up to 0.020 s"
     wave = Wave(t=5, wire="motor1_comm1", at=0, period=10_000, high=high_ms * 1000, ticks_hz=1_000_000)
     assert outcome("wave", [wave], **bounds).met is met
+    assert not outcome("wave", [wave], pin="PB7", most_duty=0).met, "a bound of 0 is one"
     few = outcome("wave", edges("motor1_comm1", *rows), periods=3, pin="PB7")
     assert few.says == "PB7 had 2 whole periods, 3 are wanted"
 
@@ -364,7 +374,7 @@ def test_a_goal_that_came_from_elsewhere_is_judged_like_any(monkeypatch: pytest.
             return KINDS["no_collision"]
 
     monkeypatch.setattr(kinds, "_entry_points", lambda: {"untouched": Point})
-    assert Goal(kind="untouched", arguments={}).wanted == "touches nothing"
+    assert load_goal({"kind": "untouched"}, "x").wanted == "touches nothing"
     assert load_goal({"kind": "untouched"}, "x").kind == "untouched"
     monkeypatch.setattr(Point, "load", staticmethod(lambda: 7))
     with pytest.raises(ScenarioError, match="mine:goal is no GoalKind"):
@@ -400,13 +410,113 @@ def test_goals_that_know_a_shipped_program_come_by_entry_points_and_are_in_the_s
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     from robot_bench.scenario.goals import kinds
-    from robot_bench.scenario.json_schema import goals_schema
+    from robot_bench.scenario.json_schema import scenario_schema
 
     plugged = {"encoder_counts_match", "sensor_named"}
     assert plugged <= set(every_kind()) - set(KINDS)
-    named = {goal["properties"]["kind"]["const"] for goal in goals_schema()["items"]["oneOf"]}
+    named = {goal["properties"]["kind"]["const"] for goal in scenario_schema()["properties"]["goal"]["items"]["oneOf"]}
     assert named == set(every_kind())
     monkeypatch.setattr(kinds, "_entry_points", dict)
     assert set(every_kind()) == set(KINDS)
     with pytest.raises(ScenarioError, match="there is no goal 'sensor_named'"):
         load_goal({"kind": "sensor_named"}, "x")
+
+
+class TiltTable(Record):
+    most_deg: Annotated[float, Key(above=0, most=90, doc="it leans no further ([why](x.md))")]
+    axis: Annotated[Literal["roll", "pitch"], Key(doc="about which")] = "roll"
+    samples: Annotated[int, Key(least=1, most=100, doc="in so many poses")] = 5
+
+    def __post_init__(self) -> None:
+        if self.axis == "pitch" and self.samples > 50:
+            raise UsageError("so many samples of the pitch there are not")
+
+
+class Tilt(Watch):
+    def __init__(self, table: TiltTable) -> None:
+        self.table = table
+
+    def finish(self, end: int) -> GoalOutcome:
+        return GoalOutcome(met=self.table.most_deg > 10 and end > 0)
+
+
+@pytest.fixture
+def tilt(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have a package installed that offers a kind of goal of its own, with parameters."""
+    from robot_bench.scenario.goals import kinds
+
+    class Point:
+        value = "mine:GOAL"
+
+        @staticmethod
+        def load() -> object:
+            return GoalKind(
+                TiltTable, lambda table: f"leans {table.most_deg:g}° at most", Tilt, doc="it never leans more"
+            )
+
+    monkeypatch.setattr(kinds, "_entry_points", lambda: {"tilt": Point})
+
+
+@pytest.mark.usefixtures("tilt")
+def test_one_declaration_of_a_plug_in_gives_reader_schema_page_and_completion(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from p2os.cli.main import run as p2os
+
+    text = 'extends = "dodge"\n[[goal]]\nkind = "tilt"\nmost_deg = 12\n'
+    (tmp_path / "mine.toml").write_text(text)
+    monkeypatch.chdir(tmp_path)
+    goal = load_scenario("mine.toml").goals[0]
+    assert (goal.table, goal.wanted) == (TiltTable(most_deg=12.0), "leans 12° at most")
+    assert judge([], [goal], end_ns=1).met == ["leans 12° at most"]
+
+    assert p2os(["check", "--schema"]) == 0
+    goals = json.loads(capsys.readouterr().out)["properties"]["goal"]["items"]["oneOf"]
+    schema = next(one for one in goals if one["properties"]["kind"] == {"const": "tilt"})
+    assert schema["required"] == ["kind", "most_deg"]
+    own = {key: schema["properties"][key] for key in ("most_deg", "axis", "samples")}
+    assert own == {
+        "most_deg": {
+            "description": "it leans no further (why)", "type": "number", "exclusiveMinimum": 0, "maximum": 90,
+        },
+        "axis": {"description": "about which", "default": "roll", "type": "string", "enum": ["roll", "pitch"]},
+        "samples": {
+            "description": "in so many poses", "default": 5, "type": "integer", "minimum": 1, "maximum": 100,
+        },
+    }  # fmt: skip
+
+    page = runpy.run_path(str(ROOT / "tools" / "generate_ranges.py"))["tables"]()["goals"]
+    row = "| `tilt` | **`most_deg`** (above 0 to 90), `axis` = `roll` (`roll`, `pitch`), `samples` = 5 (1 to 100) |"
+    assert f"{row} it never leans more |" in page.splitlines()
+
+    context = SimpleNamespace(params={"scenario": "mine.toml"}, args=[])
+    assert [one for one, _ in setting_keys(context, "goal.1.")] == [  # type: ignore[arg-type] # all that it looks at
+        *(f"goal.1.kind={name}" for name in every_kind()), "goal.1.ends_run=met", "goal.1.ends_run=missed",
+        "goal.1.ends_run=decided", "goal.1.most_deg=", "goal.1.axis=roll", "goal.1.axis=pitch", "goal.1.samples=",
+    ]  # fmt: skip
+
+
+@pytest.mark.usefixtures("tilt")
+@pytest.mark.parametrize(
+    ("line", "says", "hint"),
+    [
+        (
+            "most_deg = 0",
+            "4: [[goal]] 1: most_deg = 0 is out of range",
+            "it is a number of degrees above 0, at most 90",
+        ),
+        ("most_deg = 90.1", "4: [[goal]] 1: most_deg = 90.1 is out of range", "at most 90"),
+        ('most_deg = "9 deg"', '4: [[goal]] 1: most_deg = "9 deg" is not a number of degrees', "write the bare number"),
+        ("most_dog = 9", "4: [[goal]] 1: unknown key 'most_dog'", "did you mean 'most_deg'?"),
+        ("samples = 9", "2: [[goal]] 1: key 'most_deg' is missing", "a number of degrees"),
+        ('most_deg = 9\naxis = "yaw"', '5: [[goal]] 1: axis = "yaw" is none of roll, pitch', ""),
+        ('most_deg = 9\naxis = "pitch"\nsamples = 51', "2: [[goal]] 1: so many samples of the pitch there are not", ""),
+    ],
+)
+def test_a_plug_in_s_parameters_are_held_to_what_it_declares(line: str, says: str, hint: str, tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(f'extends = "dodge"\n[[goal]]\nkind = "tilt"\n{line}\n')
+    with pytest.raises(ScenarioError) as refused:
+        load_scenario(str(path))
+    assert str(refused.value).startswith(f"mine.toml:{says}")
+    assert hint in str(refused.value.hint or "")

@@ -112,7 +112,7 @@ def test_goal_sensor_named() -> None:
 
 def test_a_real_robot_is_not_asked_what_it_cannot_tell() -> None:
     run = record(poses=[pose(collisions=1)])
-    goals = (Goal(kind="no_collision", arguments={}), Goal(kind="min_distance", arguments={"distance_m": 1}))
+    goals = (load_goal({"kind": "no_collision"}, "x"), load_goal({"kind": "min_distance", "distance_m": 1}, "x"))
     assert [line.split(":")[0] for line in judged(run, *goals, end_ns=S).missed] == ["no_collision", "min_distance"]
     reported = judged(run, *goals, end_ns=S, can_tell_world=False)
     assert [line.split(":")[0] for line in reported.missed] == ["min_distance"]
@@ -120,7 +120,7 @@ def test_a_real_robot_is_not_asked_what_it_cannot_tell() -> None:
 
 def test_what_is_met_is_reported_as_it_was_wanted() -> None:
     run = record(poses=[pose()], usart=text((1, "x")))
-    goals = (Goal(kind="no_collision", arguments={}), Goal(kind="usart_lacks", arguments={"text": "x"}))
+    goals = (load_goal({"kind": "no_collision"}, "x"), load_goal({"kind": "usart_lacks", "text": "x"}, "x"))
     found = judged(run, *goals, end_ns=9 * S, planned_ns=9 * S)
     assert found.met == ["touches nothing"]
     assert found.missed == ["usart_lacks: 'usart1 sends x' happened 1 time(s), first at 1.000 s"], (
@@ -142,7 +142,7 @@ def test_what_is_met_is_reported_as_it_was_wanted() -> None:
 def test_what_is_to_be_reached_is_missed_from_the_planned_end_on_and_not_before(
     kind: str, arguments: dict[str, object]
 ) -> None:
-    run, goal = record(poses=[pose()], usart=text((1, "panic"))), Goal(kind=kind, arguments=arguments)
+    run, goal = record(poses=[pose()], usart=text((1, "panic"))), load_goal({"kind": kind, **arguments}, "x")
     early, late = (judged(run, goal, end_ns=end_ns, planned_ns=9 * S) for end_ns in (9 * S - 1, 9 * S))
     assert (len(late.missed), late.not_judged) == (1, [])
     assert (early.missed, early.not_judged) == ([], [f"{goal.wanted}: not judged before 9 s"])
@@ -152,7 +152,7 @@ def test_what_is_to_be_reached_is_missed_from_the_planned_end_on_and_not_before(
 def test_what_is_forbidden_is_missed_at_any_time(kind: str, arguments: dict[str, object]) -> None:
     run = record(poses=[pose(collisions=1)], usart=text((1, "panic")))
     early, late = (
-        judged(run, Goal(kind=kind, arguments=arguments), end_ns=t, planned_ns=9 * S) for t in (2 * S, 9 * S)
+        judged(run, load_goal({"kind": kind, **arguments}, "x"), end_ns=t, planned_ns=9 * S) for t in (2 * S, 9 * S)
     )
     assert early == late
     assert len(early.missed) == 1

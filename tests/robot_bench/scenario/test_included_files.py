@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 
 from p2os.errors import ScenarioError
 from robot_bench.scenario.included_files import MOST_FILES, as_toml, parsed, read_setting
-from robot_bench.scenario.scenario import Scenario, load_scenario, read_scenario
+from robot_bench.scenario.loading import load_scenario, read_scenario
+from robot_bench.scenario.scenario import Scenario
 from robot_bench.scenario.sweep import read_seeds, rows
 from simbase.errors import UsageError
 

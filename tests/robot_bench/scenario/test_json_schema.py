@@ -15,7 +15,7 @@ from p2os.cli.main import run as p2os
 from p2os.errors import ScenarioError
 from robot_bench.cli import check
 from robot_bench.scenario.json_schema import scenario_schema
-from robot_bench.scenario.scenario import known_scenarios, load_scenario, read_scenario
+from robot_bench.scenario.loading import known_scenarios, load_scenario, read_scenario
 from simbase.errors import UsageError
 
 SCHEMA = scenario_schema()

@@ -8,8 +8,9 @@ import pytest
 from p2os.errors import ScenarioError
 from robot_bench.bench import Bench
 from robot_bench.bench.board import pins_of
-from robot_bench.scenario.differential_file import MOST_EDGES_A_SECOND, TABLES
-from robot_bench.scenario.scenario import Scenario, read_scenario
+from robot_bench.direct.differential.robot_file import MOST_EDGES_A_SECOND, TABLES
+from robot_bench.scenario.loading import read_scenario
+from robot_bench.scenario.scenario import Scenario
 from robot_bench.scenario.wired_robots import KINDS, known_own_robots
 from simbase.errors import UsageError
 from tests.robot_bench.direct.robots import ROVER, rover

@@ -18,7 +18,7 @@ from robot_bench.bench import Bench, run_of
 from robot_bench.direct.senses import motion_of
 from robot_bench.report.page import _parts
 from robot_bench.run import parts_of, run_scenario
-from robot_bench.scenario.scenario import load_scenario
+from robot_bench.scenario.loading import load_scenario
 from simbase import user_classes
 from simbase.trust import own_code
 

@@ -1,20 +1,21 @@
 """Scenario files: what ships is right, and what is wrong is one line that says where."""
 
-import importlib
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from robot_bench.scenario.when_script import ACTIONS
 
 from adapter_sim.codec import BitOrder
 from adapter_sim.settings import AdapterSettings
 from p2os.errors import ScenarioError
 from p2os.pioneer.controller.settings import SonarPerSip
 from p2os.pioneer.world import load_world
-from p2os.toml_schema import Key
+from p2os.toml_record import keys_of
 from robot_bench.bench import Bench
 from robot_bench.scenario.goals.kinds import every_kind
-from robot_bench.scenario.scenario import _ADAPTER_TIMES, known_scenarios, load_scenario, read_scenario
+from robot_bench.scenario.loading import known_scenarios, load_scenario, read_scenario
+from robot_bench.scenario.tables import TABLES
 from robot_bench.scenario.world_script import Op
 from simbase.errors import P2osError, UsageError
 
@@ -52,7 +53,7 @@ def test_what_a_scenario_leaves_out_has_its_default(tmp_path: Path) -> None:
     assert scenario.start is None
 
 
-@pytest.mark.parametrize("name", _ADAPTER_TIMES)
+@pytest.mark.parametrize("name", [key.name for key in TABLES["[adapter]"] if key.name.endswith("_ms")])
 def test_a_time_of_the_adapter_is_one_of_its_settings(name: str, tmp_path: Path) -> None:
     scenario = read_scenario(write(tmp_path, f"{LEAST}[adapter]\n{name} = 123\n"))
     changed = replace(AdapterSettings(threshold_um=2_500_000), **{f"{name.removesuffix('_ms')}_ns": 123_000_000})
@@ -359,14 +360,21 @@ def test_a_program_that_moves_a_scenario_to_another_world_is_told_of_its_names_t
         Bench(moved)
 
 
-@pytest.mark.parametrize("module", ["scenario", "world_script", "fault_script"])
-def test_every_number_of_a_scenario_has_a_range(module: str) -> None:
-    tables = vars(importlib.import_module(f"robot_bench.scenario.{module}")).values()
-    keys = [key for table in tables if isinstance(table, tuple) for key in table if isinstance(key, Key)]
-    keys += [key for kind in every_kind().values() for key in kind.keys]
+def test_every_number_of_a_scenario_has_a_range() -> None:
+    keys = [key for table in TABLES.values() for key in table]
+    keys += [key for kind in every_kind().values() for key in keys_of(kind.table)]
+    keys += [key for action in ACTIONS.values() for key in keys_of(action)]
     numbers = [key for key in keys if key.kind in {"number", "whole"}]
-    assert numbers
+    assert len(numbers) > 100
     assert [key.name for key in numbers if key.most is None or (key.least is None and key.above is None)] == []
+
+
+def test_every_key_says_what_it_is_for() -> None:
+    keys = [key for table in TABLES.values() for key in table]
+    keys += [key for kind in every_kind().values() for key in keys_of(kind.table)]
+    keys += [key for action in ACTIONS.values() for key in keys_of(action)]
+    assert [key.name for key in keys if not key.doc] == []
+    assert [name for name, kind in every_kind().items() if not kind.doc] == []
 
 
 def test_a_scenario_with_a_byte_order_mark_is_read(tmp_path: Path) -> None:

@@ -38,6 +38,15 @@ def test_a_thing_is_placed_and_held_after_an_edge(after_s: float, at: int) -> No
     assert reported(made(table), WorldChange) == [(at, "place"), (at + 50 * MS, "move"), (at + 100 * MS, "remove")]
 
 
+@pytest.mark.parametrize("do", ["place", "move", "remove"])
+def test_what_is_done_to_a_thing_is_what_is_asked_for(do: str) -> None:
+    (when,) = load_triggers([{"event": "contact", "do": do, **POST, "x_m": 1, "y_m": 2}], P2DX, "x.toml")
+    (change,) = when.changes
+    place = (0.0, 0.0) if do == "remove" else (1.0, 2.0)
+    assert (change.op.value, change.name, change.x_m, change.y_m) == (do, "post", *place)
+    assert (change.obstacle is not None) is (do == "place")
+
+
 @pytest.mark.parametrize(("every", "times"), [(False, 1), (True, 2)])
 def test_it_is_done_once_or_each_time(every: bool, times: int) -> None:
     # PB7 rises at 1 s and falls at 2 s; the level that it begins with is no change.

@@ -22,7 +22,8 @@ from p2os.toml_schema import Key
 from robot_bench.campaign import campaign_file
 from robot_bench.campaign.campaign_file import load_campaign
 from robot_bench.campaign.variants.shrinking import kept
-from robot_bench.scenario.scenario import TABLES, load_scenario
+from robot_bench.scenario.loading import load_scenario
+from robot_bench.scenario.tables import TABLES
 from simbase.errors import P2osError
 from simbase.trust import UntrustedError
 from simbase.user_classes import OF_USERS

@@ -19,7 +19,7 @@ from robot_bench.campaign.variants.shrinking.kept import trial_of_run
 from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.recording.run_record import TRACE_NAME, read_run
 from robot_bench.run import run_scenario
-from robot_bench.scenario.scenario import load_scenario
+from robot_bench.scenario.loading import load_scenario
 from simbase.errors import FileError, UsageError
 from simbase.trust import Trust, UntrustedError
 from simbase.user_classes import OF_USERS

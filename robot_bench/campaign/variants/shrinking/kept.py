@@ -16,14 +16,13 @@ import json
 import re
 import subprocess
 import sys
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import cast
 
 from p2os.pioneer.world import known_worlds, load_world
 from p2os.pioneer.world.writer import write_world
-from p2os.toml_schema import Table
+from p2os.toml_record import number_of, table_of
 from robot_bench.campaign.trial import Outcome, Trial, TrialVerdict, run_trial, trial_of
 from robot_bench.campaign.variants.shrinking.failure import FailureMode
 from robot_bench.campaign.variants.shrinking.things import WORLD_NAME
@@ -106,7 +105,7 @@ def test_text(trial: Trial, way: FailureMode) -> str:
         "import pytest\n\n\n"
         f"@pytest.mark.scenario({json.dumps(f'{trial.name}.toml')})\n"
         f"def test_{_identifier(trial.name)}_{_identifier(wanted)}(bench):\n"
-        f'    bench.run_until("{cast("float", trial.table["duration_s"]):g} s")\n'
+        f'    bench.run_until("{number_of(trial.table, "duration_s"):g} s")\n'
         f"{judged}"
     )
 
@@ -136,7 +135,7 @@ def trial_of_run(folder: Path, firmware: Path | None = None, *, trust: bool | Tr
     settings = [(str(key), value) for key, value in cast("list[list[object]]", meta.get("settings") or [])]
     # What options of the command line may have set.
     settings += [(key, meta[key]) for key in ("mode", "body") if meta.get("mode") != "port"]
-    settings += [("seed", meta["seed"]), ("duration_s", float(cast("float", meta["duration_s"])))]
+    settings += [("seed", meta["seed"]), ("duration_s", number_of(meta, "duration_s"))]
     trial = _in_world(trial_of(path, firmware=program, settings=settings, trust=trust), str(meta["world_path"]))
     _refuse_another(record, trial, folder, firmware)
     return replace(trial, name=str(meta["scenario"]))
@@ -147,7 +146,7 @@ def _in_world(trial: Trial, world: str) -> Trial:
     own = str(trial.table["world"])
     if world == own or Path(world).name == own:
         return trial
-    there = cast("Mapping[str, Table]", trial.table.get("in_world", {})).get(world, {})
+    there = table_of(table_of(trial.table, "in_world"), world)
     table = {key: value for key, value in trial.table.items() if key != "start"} | dict(there)
     if world in known_worlds():
         return replace(trial, table={**table, "world": world})

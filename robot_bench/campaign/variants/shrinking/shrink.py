@@ -13,9 +13,8 @@ Invariant: what is returned fails in the same way as what was given; the same tr
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import cast
 
-from p2os.toml_schema import Table
+from p2os.toml_record import number_of, tables_of
 from robot_bench.campaign.trial import Trial
 from robot_bench.campaign.variants.shrinking.failure import Failure, FailureMode, failure_of
 from robot_bench.campaign.variants.shrinking.reduction import ANGLE_STEPS, STEPS, fewest, rounded, rounder
@@ -113,8 +112,8 @@ class _Shrinker:
         if way.is_fault:
             self.takes(self.trial.with_lists(goal=[]))
             return
-        for number in range(len(_tables(self.trial.table.get("goal")))):
-            if self.takes(self.trial.with_lists(goal=[_tables(self.trial.table["goal"])[number]])):
+        for number in range(len(tables_of(self.trial.table, "goal"))):
+            if self.takes(self.trial.with_lists(goal=[tables_of(self.trial.table, "goal")[number]])):
                 return
 
     def _fewest_things(self) -> int:
@@ -142,7 +141,7 @@ class _Shrinker:
             return
         for more_s in (0, 1, 2):
             wanted_s = float(-(-self.failure.at_ns // NS_PER_S) + more_s)
-            if 0 < wanted_s < cast("float", self.trial.table["duration_s"]) and self.takes(
+            if 0 < wanted_s < number_of(self.trial.table, "duration_s") and self.takes(
                 self.trial.set(("duration_s", wanted_s))
             ):
                 return
@@ -203,7 +202,3 @@ def _as_meant(small: Trial, trial: Trial, quick: Sequence[Setting]) -> Trial:
 
 def _steps(number: Number) -> Sequence[float]:
     return ANGLE_STEPS if number.is_angle else STEPS
-
-
-def _tables(value: object) -> list[Table]:
-    return cast("list[Table]", value) if isinstance(value, list) else []
