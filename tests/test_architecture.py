@@ -169,7 +169,7 @@ def parsed(path: Path) -> Parsed:
 def texts_of(nodes: Iterable[ast.AST]) -> list[str]:
     """Return the texts of a source; docstrings, which are for readers, are not among them."""
     nodes = list(nodes)
-    told = {
+    reported = {
         id(node.body[0].value)
         for node in nodes
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and node.body
@@ -177,7 +177,7 @@ def texts_of(nodes: Iterable[ast.AST]) -> list[str]:
     }  # fmt: skip
     return [
         node.value for node in nodes
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in told
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in reported
     ]  # fmt: skip
 
 

@@ -112,8 +112,8 @@ def _row(cells: Sequence[str]) -> str:
 
 def _short(key: Key) -> str:
     name, default, values = f"`{key.name}`", "" if key.required else _default(key), _values(key)
-    told = (f" = {default}" if default else "") + (f" ({values})" if values != "text" else "")
-    return (f"**{name}**" if key.required else name) + told
+    limits = (f" = {default}" if default else "") + (f" ({values})" if values != "text" else "")
+    return (f"**{name}**" if key.required else name) + limits
 
 
 def _header(key: Key) -> str:
@@ -170,7 +170,9 @@ def tables() -> dict[str, str]:
         "scenario tables": keys_table({name: keys for name, keys in TABLES.items() if name not in {"", *_OF_SCRIPTS}}),
         **{name.strip("[]"): keys_table({"": TABLES[name]}) for name in _OF_SCRIPTS},
         "when": keys_table({"": keys_of(WhenTable)}),
-        "actions": kinds_table("`do`", "what is done", {do: (one, one.__doc__ or "") for do, one in ACTION_TABLES.items()}),
+        "actions": kinds_table(
+            "`do`", "what is done", {do: (one, one.__doc__ or "") for do, one in ACTION_TABLES.items()}
+        ),
         "goals": kinds_table("kind", "met when", {name: (one.table, one.doc) for name, one in every_kind().items()}),
         "robot": lines(robots, "table"),
         "fleet": lines({"": {**of_keys((*fleet_file.TOP, *fleet_file.ROBOT)), **plain(at)}}, ""),

@@ -188,7 +188,7 @@ class CampaignTable(Record):
     search: Annotated[str, Key(choices=tuple(SEARCHES), doc="who searches")] = "sobol"
     seed: Annotated[int, Key(least=0, most=2**31 - 1, doc="of the search")] = 0
     #: chosen: the set of runs depends on it, not on the workers.
-    batch: Annotated[int, Key(least=1, most=1024, doc="so many are asked for before any is told of")] = 16
+    batch: Annotated[int, Key(least=1, most=1024, doc="so many are asked for before any result comes back")] = 16
     near_misses: Annotated[int, Key(
         least=0, most=1024, doc="of each batch so many that passed, those with the least margin, are run in full too"
     )] = 1  # fmt: skip

@@ -143,9 +143,9 @@ def test_the_toolkit_alone_lists_its_verbs_and_tells_the_rest_as_not_installed()
     shown = set(re.findall(r"(?m)^  ([a-z]+) ", listed.stdout))
     assert not shown & {"run", "mcu"}
     assert set(re.findall(r"\bp2os ([a-z]+)", listed.stdout)) <= shown, "the examples are of what is there"
-    told = python("p2os", "-m", "p2os", "doctor", "--json")
-    assert told.returncode == 0, told.stderr
-    names = {row["name"] for row in json.loads(told.stdout)}
+    reported = python("p2os", "-m", "p2os", "doctor", "--json")
+    assert reported.returncode == 0, reported.stderr
+    names = {row["name"] for row in json.loads(reported.stdout)}
     assert {"pyserial", "packaging"} <= names
     assert not names & {"unicorn", "bluepill_sim._native", "robot_bench._edges"}
 

@@ -77,13 +77,17 @@ def test_a_planted_import_or_text_is_named(name: str, text: str) -> None:
 
 
 def test_what_is_of_the_plugin_itself_or_a_docstring_may_name_it() -> None:
-    def told(text: str) -> set[str]:
+    def reported(text: str) -> set[str]:
         return words_of(texts_of(ast.walk(ast.parse(text))))
 
-    assert faults("p2os.pioneer.body.bullet", told('NAME = "bullet"'), {"p2os.pioneer.body.bullet.engine"}) == []
-    assert faults("p2os.pioneer.body.factory", told('"""Beside p2os.pioneer.body.bullet, or bullet."""'), set()) == []
+    assert faults("p2os.pioneer.body.bullet", reported('NAME = "bullet"'), {"p2os.pioneer.body.bullet.engine"}) == []
     assert (
-        faults("p2os.pioneer.world.loader", told('read_world("p2os.pioneer.world")'), {"p2os.pioneer.world.readers"})
+        faults("p2os.pioneer.body.factory", reported('"""Beside p2os.pioneer.body.bullet, or bullet."""'), set()) == []
+    )
+    assert (
+        faults(
+            "p2os.pioneer.world.loader", reported('read_world("p2os.pioneer.world")'), {"p2os.pioneer.world.readers"}
+        )
         == []
     )
 
@@ -95,8 +99,8 @@ def test_the_table_names_what_is_there(plugin: Plugin) -> None:
     points = PROJECT["project"]["entry-points"]
     assert {name for name, module in points["p2os.verbs"].items() if plugin.holds(module)} == set(plugin.verbs)
     offered = {group for group, rows in points.items() if any(plugin.holds(one.split(":")[0]) for one in rows.values())}
-    told = {group for need in needs_of(plugin) for group in need.points}
-    assert offered - {"p2os.verbs"} <= told, "p2os doctor could not tell that it is not there"
+    reported = {group for need in needs_of(plugin) for group in need.points}
+    assert offered - {"p2os.verbs"} <= reported, "p2os doctor could not tell that it is not there"
     assert all((ROOT / path.partition("::")[0]).exists() for path in plugin.tests)
 
 
@@ -174,19 +178,19 @@ def without(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
         (place / name).write_text("", encoding="utf-8")
     ran = python(plugin, "-c", RUN, *WORDS, *(row[1] for row in asked), cwd=place)
     assert ran.returncode == 0, ran.stderr
-    return plugin, {words: Done(*told) for words, told in json.loads(ran.stdout).items()}
+    return plugin, {words: Done(*reported) for words, reported in json.loads(ran.stdout).items()}
 
 
 @pytest.mark.slow
 def test_a_house_works_without_a_plugin_and_tells_that_it_is_not_there(without: tuple[Plugin, dict[str, Done]]) -> None:
     plugin, done = without
-    listed, told, ran = (done[words] for words in WORDS)
-    assert [one.code for one in (listed, told, ran)] == [0, 0, 0], ran.err
+    listed, reported, ran = (done[words] for words in WORDS)
+    assert [one.code for one in (listed, reported, ran)] == [0, 0, 0], ran.err
     assert "missing: needs" not in listed.out
     shown = set(re.findall(r"(?m)^  ([a-z]+) ", listed.out))
     assert {"run", "serve", "doctor"} <= shown
     assert not shown & set(plugin.verbs)
-    rows = {row["name"]: row for row in json.loads(told.out) if row["kind"] == "plug-in"}
+    rows = {row["name"]: row for row in json.loads(reported.out) if row["kind"] == "plug-in"}
     assert rows.keys() == {need.name for need in needs_of(plugin)} != set()
     assert all(row["found"] is None and "pip install" in row["get"] for row in rows.values())
 

@@ -106,7 +106,7 @@ def test_a_mask_is_what_reads_and_what_is_written_unless_told_otherwise(
 
 
 @pytest.mark.parametrize(
-    ("fields", "told"),
+    ("fields", "reported"),
     [
         ("EN 0 TEN 1", "R: no field: 'EN 0 TEN 1' .hint: fields="),
         ("EN 0,TEN 1", "R: no field"),
@@ -118,8 +118,8 @@ def test_a_mask_is_what_reads_and_what_is_written_unless_told_otherwise(
         ("EN 1, EN 0", "R: two fields are called EN"),
     ],
 )
-def test_what_is_no_list_of_fields_is_refused_by_the_name_of_its_register(fields: str, told: str) -> None:
-    with pytest.raises(ValueError, match=told):
+def test_what_is_no_list_of_fields_is_refused_by_the_name_of_its_register(fields: str, reported: str) -> None:
+    with pytest.raises(ValueError, match=reported):
         Register(name="R", offset=0, fields=fields)
 
 

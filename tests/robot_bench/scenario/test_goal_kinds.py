@@ -381,18 +381,23 @@ def test_a_goal_that_came_from_elsewhere_is_judged_like_any(monkeypatch: pytest.
         load_goal({"kind": "untouched"}, "x")
 
 
-def test_keys_of_a_goal_from_elsewhere_mean_what_its_package_says(monkeypatch: pytest.MonkeyPatch) -> None:
-    from p2os.toml_schema import Key
-    from robot_bench.scenario.goals import kinds
-    from robot_bench.scenario.goals.watch import GoalKind
+class NamesakesTable(Record):
+    """Keys that mean something else in goals of the bench."""
 
-    own = GoalKind(
-        keys=tuple(Key(name=name, kind="any") for name in ("x_m", "area_m", "values", "texts", "events")),
-        wanted=str, watch=KINDS["no_collision"].watch,
-    )  # fmt: skip
+    x_m: Annotated[float, Key(doc="no centre")]
+    area_m: Annotated[float, Key(doc="no corners")]
+    values: Annotated[tuple[int, ...], Key(doc="no motor values")]
+    texts: Annotated[str, Key(doc="no list")]
+    events: Annotated[tuple[int, ...], Key(doc="no words")]
+
+
+def test_keys_of_a_goal_from_elsewhere_mean_what_its_package_says(monkeypatch: pytest.MonkeyPatch) -> None:
+    from robot_bench.scenario.goals import kinds
+
+    own = GoalKind(NamesakesTable, str, lambda _: KINDS["no_collision"].watch(None))
     monkeypatch.setattr(kinds, "_entry_points", lambda: {"own": SimpleNamespace(load=lambda: own)})
-    table = {"kind": "own", "x_m": 1, "area_m": 2.5, "values": [1], "texts": [2], "events": [3]}
-    assert load_goal(table, "x").arguments["values"] == [1]
+    table = {"kind": "own", "x_m": 1, "area_m": 2.5, "values": [1], "texts": "a", "events": [3]}
+    assert load_goal(table, "x").table == NamesakesTable(x_m=1, area_m=2.5, values=(1,), texts="a", events=(3,))
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from robot_bench.scenario.when_script import ACTIONS
 
 from adapter_sim.codec import BitOrder
 from adapter_sim.settings import AdapterSettings
@@ -16,6 +15,7 @@ from robot_bench.bench import Bench
 from robot_bench.scenario.goals.kinds import every_kind
 from robot_bench.scenario.loading import known_scenarios, load_scenario, read_scenario
 from robot_bench.scenario.tables import TABLES
+from robot_bench.scenario.trigger_script import ACTION_TABLES
 from robot_bench.scenario.world_script import Op
 from simbase.errors import P2osError, UsageError
 
@@ -363,7 +363,7 @@ def test_a_program_that_moves_a_scenario_to_another_world_is_told_of_its_names_t
 def test_every_number_of_a_scenario_has_a_range() -> None:
     keys = [key for table in TABLES.values() for key in table]
     keys += [key for kind in every_kind().values() for key in keys_of(kind.table)]
-    keys += [key for action in ACTIONS.values() for key in keys_of(action)]
+    keys += [key for action in ACTION_TABLES.values() for key in keys_of(action)]
     numbers = [key for key in keys if key.kind in {"number", "whole"}]
     assert len(numbers) > 100
     assert [key.name for key in numbers if key.most is None or (key.least is None and key.above is None)] == []
@@ -372,7 +372,7 @@ def test_every_number_of_a_scenario_has_a_range() -> None:
 def test_every_key_says_what_it_is_for() -> None:
     keys = [key for table in TABLES.values() for key in table]
     keys += [key for kind in every_kind().values() for key in keys_of(kind.table)]
-    keys += [key for action in ACTIONS.values() for key in keys_of(action)]
+    keys += [key for action in ACTION_TABLES.values() for key in keys_of(action)]
     assert [key.name for key in keys if not key.doc] == []
     assert [name for name, kind in every_kind().items() if not kind.doc] == []
 
