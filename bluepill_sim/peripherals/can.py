@@ -29,7 +29,7 @@ from bluepill_sim.fabric.can_network import CanEnd, CanError, CanNetwork, frame_
 from bluepill_sim.fabric.fabric import OWN_COMMANDS
 from bluepill_sim.fabric.pins import ALTERNATE_FUNCTIONS, PinDrive
 from bluepill_sim.fabric.ports import ChipPorts
-from bluepill_sim.fabric.registers import Peripheral, PeripheralMapping, Register, bits, numbered
+from bluepill_sim.fabric.registers import Peripheral, PeripheralMapping, Register, bits, fields_of, masks, numbered
 from bluepill_sim.fabric.subscriptions import EDGE
 from simbase.timing import NS_PER_S, Nanos
 
@@ -37,17 +37,41 @@ MCR, MSR, TSR, RF0R, RF1R, IER, ESR, BTR = range(8)
 TI0R, RI0R, FMR, FM1R, FS1R, FFA1R, FA1R, F0R1 = (
     at // 4 for at in (0x180, 0x1B0, 0x200, 0x204, 0x20C, 0x214, 0x21C, 0x240)
 )
-INRQ, SLEEP, TXFP, RFLM, NART, AWUM, ABOM, TTCM, RESET = (1 << n for n in (0, 1, 2, 3, 4, 5, 6, 7, 15))
-INAK, SLAK, ERRI, WKUI, SLAKI = (1 << n for n in range(5))
-RQCP, TXOK, ALST, TERR, ABRQ = (1 << n for n in (0, 1, 2, 3, 7))
-FULL, FOVR, RFOM = (1 << n for n in (3, 4, 5))
-TMEIE, EWGIE, EPVIE, BOFIE, LECIE, ERRIE, WKUIE, SLKIE = (1 << n for n in (0, 8, 9, 10, 11, 15, 16, 17))
-EWGF, EPVF, BOFF = 1, 2, 4
-LBKM, SILM = 1 << 30, 1 << 31
-TXRQ, RTR, IDE = 1, 2, 4
-_TME_AT, _LOW_AT, _CODE_AT = 26, 29, 24
 _MAILBOXES, _FIFO_DEPTH, _BANKS = 3, 3, 14
-_LEC = bits((6, 4))
+#: Fields, RM0008 24.9.
+_MASTER = "DBF 16, RESET 15, TTCM 7, ABOM 6, AWUM 5, NART 4, RFLM 3, TXFP 2, SLEEP 1, INRQ 0"
+_STATUS = "RX 11, SAMP 10, RXM 9, TXM 8, SLAKI 4, WKUI 3, ERRI 2, SLAK 1, INAK 0"
+_TRANSMISSION = (
+    "LOW2 31, LOW1 30, LOW0 29, TME2 28, TME1 27, TME0 26, CODE 25:24, ABRQ2 23, RESERVED2 22:20, TERR2 19, ALST2 18, "
+    "TXOK2 17, RQCP2 16, ABRQ1 15, RESERVED1 14:12, TERR1 11, ALST1 10, TXOK1 9, RQCP1 8, ABRQ0 7, RESERVED0 6:4, "
+    "TERR0 3, ALST0 2, TXOK0 1, RQCP0 0"
+)
+_RECEPTION = "RFOM{n} 5, FOVR{n} 4, FULL{n} 3, FMP{n} 1:0"
+_INTERRUPTS = (
+    "SLKIE 17, WKUIE 16, ERRIE 15, LECIE 11, BOFIE 10, EPVIE 9, EWGIE 8, FOVIE1 6, FFIE1 5, FMPIE1 4, FOVIE0 3, "
+    "FFIE0 2, FMPIE0 1, TMEIE 0"
+)
+_ERRORS = "REC 31:24, TEC 23:16, LEC 6:4, BOFF 2, EPVF 1, EWGF 0"
+_TIMING = "SILM 31, LBKM 30, SJW 25:24, TS2 22:20, TS1 19:16, BRP 9:0"
+_IDENTIFIER = "STID 31:21, EXID 20:3, IDE 2, RTR 1"
+_REQUEST = f"{_IDENTIFIER}, TXRQ 0"
+_RECEIVED = "TIME 31:16, FMI 15:8, RESERVED 7:4, DLC 3:0"
+_LOW, _HIGH = ("DATA{3} 31:24, DATA{2} 23:16, DATA{1} 15:8, DATA{0} 7:0".format(*names) for names in ("0123", "4567"))
+INRQ, SLEEP, TXFP, RFLM, NART, AWUM, ABOM, TTCM, RESET = masks(
+    _MASTER, "INRQ SLEEP TXFP RFLM NART AWUM ABOM TTCM RESET"
+)
+INAK, SLAK, ERRI, WKUI, SLAKI = masks(_STATUS, "INAK SLAK ERRI WKUI SLAKI")
+#: Those of the first mailbox; the others' stand 8 and 16 bits above.
+RQCP, TXOK, ALST, TERR, ABRQ = masks(_TRANSMISSION, "RQCP0 TXOK0 ALST0 TERR0 ABRQ0")
+FULL, FOVR, RFOM = masks(_RECEPTION.format(n=0), "FULL0 FOVR0 RFOM0")
+TMEIE, EWGIE, EPVIE, BOFIE, LECIE, ERRIE, WKUIE, SLKIE = masks(
+    _INTERRUPTS, "TMEIE EWGIE EPVIE BOFIE LECIE ERRIE WKUIE SLKIE"
+)
+EWGF, EPVF, BOFF, _LEC = masks(_ERRORS, "EWGF EPVF BOFF LEC")
+LBKM, SILM = masks(_TIMING, "LBKM SILM")
+TXRQ, RTR, IDE = masks(_REQUEST, "TXRQ RTR IDE")
+_TME, _LOW_PRIORITY = masks(_TRANSMISSION, "TME0 LOW0")
+_CODE_AT = next(field.low for field in fields_of(_TRANSMISSION) if field.name == "CODE")
 #: RM0008 24.7.6; ISO 11898-1: warning, passive, off; bits at 1 that end an initialisation, and a bus-off.
 _WARNING, _PASSIVE, _OFF = 96, 128, 256
 _SYNC_BITS, _RECOVERY_BITS = 11, 128 * 11
@@ -103,23 +127,12 @@ class _Message:
     words: tuple[int, int, int, int]
 
 
-#: Fields, RM0008 24.9.
-_IDENTIFIER = "STID 31:21, EXID 20:3, IDE 2, RTR 1"
-_RECEIVED = "TIME 31:16, FMI 15:8, RESERVED 7:4, DLC 3:0"
-_LOW, _HIGH = ("DATA{3} 31:24, DATA{2} 23:16, DATA{1} 15:8, DATA{0} 7:0".format(*names) for names in ("0123", "4567"))
-_TRANSMISSION = (
-    "LOW2 31, LOW1 30, LOW0 29, TME2 28, TME1 27, TME0 26, CODE 25:24, ABRQ2 23, RESERVED2 22:20, TERR2 19, ALST2 18, "
-    "TXOK2 17, RQCP2 16, ABRQ1 15, RESERVED1 14:12, TERR1 11, ALST1 10, TXOK1 9, RQCP1 8, ABRQ0 7, RESERVED0 6:4, "
-    "TERR0 3, ALST0 2, TXOK0 1, RQCP0 0"
-)
-
-
 def _mailbox_registers() -> tuple[Register, ...]:
     rows: list[Register] = []
     for n in range(_MAILBOXES):
         at = 0x180 + 0x10 * n
         rows += (
-            Register(name=f"TI{n}R", offset=at, on_write=f"_write_ti{n}r", fields=_IDENTIFIER + ", TXRQ 0"),
+            Register(name=f"TI{n}R", offset=at, on_write=f"_write_ti{n}r", fields=_REQUEST),
             Register(
                 name=f"TDT{n}R",
                 offset=at + 4,
@@ -154,7 +167,7 @@ class Can(Peripheral):
     REGISTERS = (
         Register(
             name="MCR",
-            fields="DBF 16, RESET 15, TTCM 7, ABOM 6, AWUM 5, NART 4, RFLM 3, TXFP 2, SLEEP 1, INRQ 0",
+            fields=_MASTER,
             offset=0x00,
             reset=0x1_0002,
             readable=bits(16, (7, 0)),
@@ -163,7 +176,7 @@ class Can(Peripheral):
         ),
         Register(
             name="MSR",
-            fields="RX 11, SAMP 10, RXM 9, TXM 8, SLAKI 4, WKUI 3, ERRI 2, SLAK 1, INAK 0",
+            fields=_STATUS,
             offset=0x04,
             reset=0xC02,
             readable=bits((11, 8), (4, 0)),
@@ -174,7 +187,7 @@ class Can(Peripheral):
         Register(name="TSR", offset=0x08, reset=0x1C00_0000, writable=0, on_write="_write_tsr", fields=_TRANSMISSION),
         Register(
             name="RF0R",
-            fields="RFOM0 5, FOVR0 4, FULL0 3, FMP0 1:0",
+            fields=_RECEPTION.format(n=0),
             offset=0x0C,
             readable=bits((4, 3), (1, 0)),
             writable=0,
@@ -183,7 +196,7 @@ class Can(Peripheral):
         ),
         Register(
             name="RF1R",
-            fields="RFOM1 5, FOVR1 4, FULL1 3, FMP1 1:0",
+            fields=_RECEPTION.format(n=1),
             offset=0x10,
             readable=bits((4, 3), (1, 0)),
             writable=0,
@@ -192,8 +205,7 @@ class Can(Peripheral):
         ),
         Register(
             name="IER",
-            fields="SLKIE 17, WKUIE 16, ERRIE 15, LECIE 11, BOFIE 10, EPVIE 9, EWGIE 8, "
-            "FOVIE1 6, FFIE1 5, FMPIE1 4, FOVIE0 3, FFIE0 2, FMPIE0 1, TMEIE 0",
+            fields=_INTERRUPTS,
             offset=0x14,
             on_write="_write_flags",
         ),
@@ -203,11 +215,11 @@ class Can(Peripheral):
             readable=bits((31, 16), (6, 4), (2, 0)),
             writable=_LEC,
             on_write="_write_flags",
-            fields="REC 31:24, TEC 23:16, LEC 6:4, BOFF 2, EPVF 1, EWGF 0",
+            fields=_ERRORS,
         ),
         Register(
             name="BTR",
-            fields="SILM 31, LBKM 30, SJW 25:24, TS2 22:20, TS1 19:16, BRP 9:0",
+            fields=_TIMING,
             offset=0x1C,
             reset=0x0123_0000,
             on_write="_write_btr",
@@ -717,9 +729,9 @@ class Can(Peripheral):
                 for k, word in enumerate(fifo[0].words):
                     words[at + k] = word
         free = [n for n in range(_MAILBOXES) if n not in self._mailboxes]
-        flags = words[TSR] & 0xFF_FFFF | sum(1 << _TME_AT + n for n in free)
+        flags = words[TSR] & 0xFF_FFFF | sum(_TME << n for n in free)
         last = self._last()
-        flags |= 0 if last is None or len(self._mailboxes) < 2 else 1 << _LOW_AT + last
+        flags |= 0 if last is None or len(self._mailboxes) < 2 else _LOW_PRIORITY << last
         words[TSR] = flags | (free[0] if free else last or 0) << _CODE_AT
         enabled, status = words[IER], words[MSR]
         received = []
