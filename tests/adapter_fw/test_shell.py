@@ -167,7 +167,7 @@ def test_the_log_keeps_the_last_events_oldest_first(shell: Shell) -> None:
     shell.run_ms(BOOT_MS + 10)
     masters = ["pad", "bluepill"] * KEPT_EVENTS
     for master in masters[: KEPT_EVENTS + 3]:
-        shell.type(f"master {master}", wait_ms=12)
+        shell.type(f"master {master}", wait_ms=30)
     kept = shell.type("log", wait_ms=400).strip().splitlines()
     assert len(kept) == KEPT_EVENTS
     times = [int(line.split(" ")[0]) for line in kept]
@@ -288,13 +288,14 @@ def test_a_console_that_nobody_reads_fast_enough_keeps_no_frame_back(driving: Sh
     assert len([name for _, name in driving.commands[before:] if name == "VEL"]) >= 6, "one each 200 ms"
 
 
-def test_more_than_the_receiver_holds_is_lost_and_the_console_goes_on(shell: Shell) -> None:
+# Twice 120 bytes are in the ring of 256, the third 120 wait for room in it, the FIFO holds 128: one more empties it.
+@pytest.mark.parametrize(("size", "lost"), [(488, 0), (489, 129)])
+def test_more_than_the_receiver_holds_is_lost_and_the_console_goes_on(shell: Shell, size: int, lost: int) -> None:
     shell.run_ms(BOOT_MS + 10)
-    shell.esp32.receive(CONSOLE, b"x" * 384)
-    assert shell.esp32.state.lost[CONSOLE] == 0
-    shell.esp32.receive(CONSOLE, b"y")
-    assert shell.esp32.state.lost[CONSOLE] == 1
-    shell.run_ms(5)
+    shell.esp32.state.stall_us = 60_000
+    shell.esp32.receive(CONSOLE, b"x" * size)
+    shell.run_ms(80)
+    assert shell.esp32.state.lost[CONSOLE] == lost
     assert "error: the line is longer than 79 characters" in shell.type("")
     assert "P2OS adapter" in shell.type("version")
 
@@ -388,7 +389,7 @@ def test_the_last_bytes_of_the_line_are_kept_for_the_console(shell: Shell) -> No
     shell.run_ms(BOOT_MS + 10)
     shell.type("test on")
     shell.esp32.receive(2, bytes(range(40)))
-    shell.run_ms(5)
+    shell.run_ms(45)
     assert f"link {bytes(range(8, 40)).hex()}\n" in shell.type("link")
     assert "link \n" in shell.type("link")
 

@@ -116,9 +116,11 @@ adapter::Master other(adapter::Master master) {
     if (console.wants_restart()) {
       part.shutdown("restart", clock.now());
       runner.pass();
+      terminal.send();
       line.drain();
       esp_restart();
     }
+    terminal.send();
     esp32::show_on_led(part, now);
     esp_task_wdt_reset();
     vTaskDelayUntil(&woken_at, 1);
