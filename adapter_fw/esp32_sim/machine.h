@@ -74,7 +74,10 @@ void machine_ram(uint8_t** start, size_t* size);
 // The memory that every reset but one by EN or power leaves as it is.
 void machine_rtc(uint8_t** start, size_t* size);
 
-// A report of a game pad; false in a program without one.
+// A pad is found, or comes by itself, and wants to connect; false where the program has none, or declines this one.
+int machine_pad_connect(int64_t address, int is_found);
+void machine_pad_disconnect(void);
+// A report of the pad that is connected; false where none is.
 int machine_pad(int up, int down, int32_t throttle, int32_t brake, int32_t axis_rx);
 
 #ifdef __cplusplus

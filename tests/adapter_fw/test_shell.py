@@ -320,21 +320,100 @@ def test_the_task_has_the_stack_that_it_needs(driving: Shell) -> None:
     assert driving.esp32.stack_used < driving.esp32.state.stack_bytes
 
 
-def test_a_pad_drives_and_its_silence_stops(pad_library: Path) -> None:
+OURS, STRANGERS = 0xA0B1C2D3E4F5, 0xA0B1C2D3E4F6
+PAIRING_MS = 30_000
+
+
+@pytest.fixture
+def paired(pad_library: Path) -> Shell:
+    """A robot that a paired pad may drive."""
     shell = Shell(pad_library, robot=FakeRobot())
     shell.run_ms(BOOT_MS + 10)
+    assert "ok, for 30 s" in shell.type("pad pair")
+    assert shell.esp32.connect_pad(OURS)
     shell.type("master pad")
+    return shell
+
+
+def drive_by_pad(shell: Shell) -> None:
     for up in (False, True):
         shell.esp32.pad(up=up)
         shell.run_ms(50)
     for _ in range(30):
         shell.esp32.pad(forward=1023)
         shell.run_ms(50)
-    assert shell.robot.forward > 0
-    said = shell.run_ms(400)
+
+
+def test_a_pad_drives_and_its_silence_stops(paired: Shell) -> None:
+    drive_by_pad(paired)
+    assert paired.robot.forward > 0
+    said = paired.run_ms(400)
     assert "pad lost" in said
-    assert shell.robot.forward == 0
-    assert "forward 1023" in shell.type("pad")
+    assert paired.robot.forward == 0
+    assert "forward 1023" in paired.type("pad")
+
+
+# 150 ms of silence (pad_loss_ns), a pass, a pair on the line (18.75 ms) and STOP (6.25 ms).
+def test_a_pad_that_goes_away_stops_the_robot_and_drives_on_only_after_a_new_up(paired: Shell) -> None:
+    drive_by_pad(paired)
+    gone_us = paired.esp32.now_us
+    paired.esp32.disconnect_pad()
+    paired.run_ms(300)
+    stop_us = next(at for at, name in paired.commands if at > gone_us - 50_000 and name == "STOP")
+    assert stop_us - (gone_us - 50_000) <= 150_000 + 1_000 + 18_750 + 6_250
+    assert paired.esp32.connect_pad(OURS), "it is known"
+    for _ in range(30):
+        paired.esp32.pad(forward=1023)
+        paired.run_ms(50)
+    assert paired.robot.forward == 0
+    drive_by_pad(paired)
+    assert paired.robot.forward > 0
+
+
+@pytest.mark.parametrize("is_found", [True, False])
+def test_only_the_pad_that_was_paired_is_obeyed_also_after_a_power_cut(paired: Shell, is_found: bool) -> None:
+    paired.esp32.disconnect_pad()
+    assert not paired.esp32.connect_pad(STRANGERS, is_found=is_found)
+    assert not paired.esp32.pad(up=True)
+    paired.esp32.power_off()
+    paired.run_ms(5)
+    paired.esp32.power_on()
+    paired.run_ms(BOOT_MS + 10)
+    assert not paired.esp32.connect_pad(STRANGERS, is_found=is_found)
+    assert paired.esp32.connect_pad(OURS, is_found=is_found)
+    assert "pad 0" in paired.type("pad")
+
+
+def test_no_pad_is_obeyed_before_one_was_paired(pad_library: Path) -> None:
+    shell = Shell(pad_library)
+    shell.run_ms(BOOT_MS + 10)
+    assert not shell.esp32.connect_pad(OURS)
+
+
+@pytest.mark.parametrize(("wait_ms", "is_paired"), [(PAIRING_MS - 1_100, True), (PAIRING_MS + 1, False)])
+def test_a_pairing_ends_by_itself(pad_library: Path, wait_ms: int, is_paired: bool) -> None:
+    shell = Shell(pad_library)
+    shell.run_ms(BOOT_MS + 10)
+    shell.type("pad pair", wait_ms=1)
+    shell.esp32.run_until(shell.esp32.now_us + wait_ms * 1000)
+    assert shell.esp32.connect_pad(OURS) is is_paired
+
+
+def test_one_pairing_takes_one_pad_and_the_next_replaces_it(paired: Shell) -> None:
+    paired.esp32.disconnect_pad()
+    assert not paired.esp32.connect_pad(STRANGERS), "the pairing has had its pad"
+    paired.type("pad pair")
+    assert paired.esp32.connect_pad(STRANGERS)
+    paired.esp32.disconnect_pad()
+    assert not paired.esp32.connect_pad(OURS)
+
+
+def test_a_pad_that_flash_cannot_keep_is_not_paired(pad_library: Path) -> None:
+    shell = Shell(pad_library)
+    shell.run_ms(BOOT_MS + 10)
+    shell.esp32.state.nvs_fault = NvsFault.FULL
+    shell.type("pad pair")
+    assert not shell.esp32.connect_pad(OURS)
 
 
 def test_a_test_of_the_board_stops_the_robot_and_gives_the_wires_back(driving: Shell) -> None:
@@ -359,6 +438,8 @@ def test_a_test_of_the_board_stops_the_robot_and_gives_the_wires_back(driving: S
         ("wires 1 1", "error: only in a test; type test on"),
         ("link 55", "error: only in a test; type test on"),
         ("pad", "pad none"),
+        ("pad pair", "pad none"),
+        ("pad peer", "error: no such command; type help"),
         ("test", "error: no such command; type help"),
     ],
 )

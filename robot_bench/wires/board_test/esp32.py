@@ -59,7 +59,8 @@ _REASONS = {1: ResetReason.RESTART, 2: ResetReason.PANIC, 3: ResetReason.WATCHDO
 PART = "robot_bench._esp32"
 _FUNCTIONS = {
     "machine": "p", "machine_run": "il", "machine_sent": "zispz", "machine_receive": "vispz",
-    "machine_pad": "iiiiii", "machine_stack_used": "z", "machine_nvs_count": "z",
+    "machine_pad": "iiiiii", "machine_pad_connect": "ili", "machine_pad_disconnect": "v",
+    "machine_stack_used": "z", "machine_nvs_count": "z",
     "machine_nvs_put": "vssl", "machine_nvs_entry": "vzppp", "machine_ram": "vpp", "machine_rtc": "vpp",
 }  # fmt: skip
 
@@ -223,8 +224,22 @@ class Esp32:
         """Return how many bytes the driver of a UART has taken from its receiver since the reset."""
         return int(self.state.handed[port])
 
+    def connect_pad(self, address: int, *, is_found: bool = True) -> bool:
+        """Let a game pad come; False where the program has none, or declines this one.
+
+        Args:
+            address: Its Bluetooth address.
+            is_found: Whether the radio has found it, as it must a new one; False: it comes by itself.
+        """
+        return self.is_running and bool(self._calls.machine_pad_connect(address, is_found))
+
+    def disconnect_pad(self) -> None:
+        """Let the connected game pad go."""
+        if self.is_running:
+            self._calls.machine_pad_disconnect()
+
     def pad(self, *, up: bool = False, down: bool = False, forward: int = 0, backward: int = 0, turn: int = 0) -> bool:
-        """Let a game pad report; False where the program has none."""
+        """Let the connected game pad report; False where none is."""
         return self.is_running and bool(self._calls.machine_pad(up, down, forward, backward, turn))
 
     def run_until(self, until_us: int) -> None:
