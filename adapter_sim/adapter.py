@@ -185,6 +185,8 @@ class Adapter(Stateful):
         self._codes = WheelCodes(settings, parameters, pinout.value("encoder1").width, released_codes(pinout))
         self.session = Session(settings)
         self._receiver = receiver
+        if receiver is not None:
+            receiver.restart(now)
         self.outputs = Outputs(pins, pinout)
         self.inputs = Inputs(pins, pinout, settings)
         self._masters = Masters(self.inputs, self._driver.mixer, settings, master)
@@ -453,19 +455,15 @@ class Adapter(Stateful):
         self.distances.forget()
         self._codes.reset()
         self.session.forget()
-        self._restart_receiver(self._now)
         self._baud_place = 0
-
-    def _restart_receiver(self, now: Nanos) -> None:
-        if self._receiver is not None:
-            self._receiver.restart(now)
 
     def _follow_reset(self, now: Nanos) -> None:
         """Follow the reset wire, whose level does not fit the state."""
         self._now = now
         if self._state is AdapterState.RESET:
             self._agenda.boot_at = now + self.settings.boot_ns
-            self._restart_receiver(now)
+            if self._receiver is not None:
+                self._receiver.restart(now)
             self._enter(AdapterState.BOOTING, now, "booting", "rst is low")
             return
         self._clear()

@@ -44,7 +44,7 @@ class Receiver(Stateful):
         self._timeout_ns = -(-_TIMEOUT_BITS * NS_PER_S // baud)
         #: A pass.
         self._origin: Nanos = 0
-        #: Bytes in the FIFO, unless the time-out has emptied it since.
+        #: Bytes in the FIFO while the last that is held waits for its time-out.
         self._level = 0
         #: When the driver takes them, and the bytes.
         self._held: deque[tuple[Nanos, bytes]] = deque()
@@ -57,7 +57,6 @@ class Receiver(Stateful):
     def restart(self, now: Nanos) -> None:
         """Begin anew, as after a reset: nothing is held, and passes count from `now`."""
         self._origin = now
-        self._level = 0
         self._held.clear()
 
     def arrive(self, data: bytes, now: Nanos) -> None:

@@ -39,8 +39,6 @@ PART = "robot_bench._adapter_firmware"
 #: Of adapter_capi.h.
 VERSION = 3
 _MAX_FRAME_BYTES = 9
-#: What the core says when the chip's UART begins anew with it.
-_RESTARTS = frozenset({b"reset", b"booting"})
 #: What helps when a state cannot be taken up.
 RUN_ANEW = "run the scenario anew, and save it again"
 
@@ -332,7 +330,7 @@ class FirmwareAdapter:
         self._raise_failure()
 
     def _happened(self, _user: object, now: int, what: bytes, detail: bytes, first: int, second: int) -> None:
-        if what in _RESTARTS and self._receiver is not None:
+        if what == b"booting" and self._receiver is not None:
             self._receiver.restart(now)
         if self.on_event is not None:
             self.on_event(now, what.decode(), self._detail(what.decode(), detail.decode(), first, second))

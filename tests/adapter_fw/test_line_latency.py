@@ -102,7 +102,9 @@ def test_stop_is_out_375_ms_after_the_robots_last_byte_however_full_the_line(lib
 
 
 # As many as come in a millisecond, and the time-out of a byte, which its register rounds up to 16 bits.
-@pytest.mark.parametrize(("baud", "threshold"), [(9600, 1), (19200, 1), (38400, 3), (57600, 5), (115200, 11)])
+@pytest.mark.parametrize(
+    ("baud", "threshold"), [(9600, 1), (19200, 1), (38400, 3), (57600, 5), (115200, 11), (1_000_000, 64)]
+)
 def test_at_every_speed_a_byte_is_handed_over_within_a_pass(library: Path, baud: int, threshold: int) -> None:
     shell = Shell(library)
     shell.run_ms(310)

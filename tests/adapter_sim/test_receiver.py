@@ -61,6 +61,14 @@ def test_bytes_that_come_at_the_time_out_are_counted_anew() -> None:
     assert receiver.take(20 * MS) == [b"ab"], "the third waits for its own"
 
 
+def test_the_time_out_comes_before_a_byte_of_its_instant() -> None:
+    receiver = Receiver(38_400)
+    receiver.arrive(b"ab", 10 * MS - TIMEOUT_NS)
+    receiver.arrive(b"c", 10 * MS)
+    assert receiver.take(10 * MS) == [b"ab"]
+    assert receiver.due_at == 11 * MS, "one byte alone, not the third of three"
+
+
 def test_a_restart_forgets_and_counts_passes_anew() -> None:
     receiver = Receiver()
     receiver.arrive(b"old", 5)
