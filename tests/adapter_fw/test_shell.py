@@ -137,6 +137,15 @@ def test_every_setting_has_a_name_in_flash_of_its_own(shell: Shell) -> None:
     assert len(shell.esp32.nvs) == len(shell.type("get", wait_ms=300).strip().splitlines())
 
 
+@pytest.mark.parametrize("place", [0, -1], ids=["first", "last"])
+def test_the_first_and_the_last_setting_come_back_too(shell: Shell, place: int) -> None:
+    shell.run_ms(BOOT_MS + 10)
+    name = shell.type("get", wait_ms=300).strip().splitlines()[place].split(" = ")[0]
+    assert "ok" in shell.type(f"set {name} 9601")
+    shell.type("restart", wait_ms=50)
+    assert f"{name} = 9601" in shell.type(f"get {name}")
+
+
 def test_a_full_flash_is_said_and_one_of_another_layout_is_begun_anew(library: Path) -> None:
     shell = Shell(library)
     shell.run_ms(20)
