@@ -55,10 +55,7 @@ std::int64_t number_of(const bd_addr_t address) {
   return number;
 }
 
-bool is_pairing() {
-  const std::uint32_t ends_s = pairing_ends_s;
-  return ends_s != 0 && esp_timer_get_time() < ends_s * US_PER_S;
-}
+bool is_pairing() { return esp_timer_get_time() < pairing_ends_s * US_PER_S; }
 
 bool is_paired(std::int64_t address) {
   Store* store = settings;
