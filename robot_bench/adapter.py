@@ -21,9 +21,9 @@ from adapter_sim.adapter import RUNNING_STATES, Adapter, AdapterState, AdapterSt
 from adapter_sim.codec import BitOrder
 from adapter_sim.distances import threshold_um
 from adapter_sim.masters import Master
-from adapter_sim.mixing import Speeds
+from adapter_sim.mixing import CommandedSpeeds
 from adapter_sim.pinout import Pinout, Safe, WireRole
-from adapter_sim.pins import MOTOR_VALUES, EventCallback, PinBank, duty_wires, released_codes
+from adapter_sim.pins import MOTOR_VALUES, AdapterPins, EventCallback, duty_wires, released_codes
 from adapter_sim.receiver import Receiver
 from adapter_sim.settings import AdapterSettings, EncoderAtOpen, MotorCommand, MotorMeaning
 from p2os.gamepad import PadReport
@@ -127,7 +127,7 @@ class FirmwareAdapter:
     def __init__(
         self,
         *,
-        pins: PinBank,
+        pins: AdapterPins,
         pinout: Pinout,
         parameters: RobotParameters,
         settings: AdapterSettings | None = None,
@@ -209,7 +209,7 @@ class FirmwareAdapter:
             state=self.state,
             reason=self._library.adapter_reason(self._handle).decode(),
             motors=(numbers["motor1"], numbers["motor2"]),
-            speeds=Speeds(numbers["forward_mm_s"], numbers["turn_deg_s"]),
+            speeds=CommandedSpeeds(numbers["forward_mm_s"], numbers["turn_deg_s"]),
             distances=tuple(bool(numbers["levels"] >> bit & 1) for bit in range(count)),
             ranges_um=(None,) * count,
             counts=(numbers["left_count"], numbers["right_count"]),
@@ -363,7 +363,7 @@ AnyAdapter: TypeAlias = Adapter | FirmwareAdapter
 _SHIPPED: Mapping[str, type[AnyAdapter]] = {"model": Adapter, "firmware": FirmwareAdapter}
 
 
-def make_adapter(scenario: Scenario, pins: PinBank, pinout: Pinout) -> AdapterPart:
+def make_adapter(scenario: Scenario, pins: AdapterPins, pinout: Pinout) -> AdapterPart:
     """Return the adapter that a scenario wants.
 
     Raises:
@@ -381,7 +381,7 @@ def make_adapter(scenario: Scenario, pins: PinBank, pinout: Pinout) -> AdapterPa
 
 
 def make_shipped_adapter(
-    scenario: Scenario, pins: PinBank, pinout: Pinout, receiver: Receiver | None = None
+    scenario: Scenario, pins: AdapterPins, pinout: Pinout, receiver: Receiver | None = None
 ) -> AnyAdapter:
     """Return the adapter that a scenario wants, also for a real robot: its stops are tested, those of others are not.
 

@@ -9,7 +9,7 @@ from hardware.pcb.checks.pin_checks import BOARDS, count_by_rule, findings
 from hardware.pcb.circuit.design import VARIANTS, build
 from hardware.pcb.circuit.electrical import Check, all_checks, bom_faults, netlist_faults
 from hardware.pcb.circuit.modules import BLUEPILL_PINS, ESP32_PINS
-from hardware.pcb.circuit.netlist import POWER_NETS, Design, DesignError, make
+from hardware.pcb.circuit.netlist import POWER_NETS, BoardDesign, DesignError, make
 from hardware.pcb.circuit.parts import PARTS, Part
 
 PINOUT = load_pinout()
@@ -99,8 +99,9 @@ def test_the_divider_of_the_thesis_leaves_the_lm317_below_its_minimum_load() -> 
 
 def test_a_wire_without_its_resistor_and_a_lone_pin_are_missed() -> None:
     design = build()
-    fewer = Design(variant=design.variant, revision=design.revision, title=design.title,
-                   components=tuple(part for part in design.components if part.ref not in {"R1", "U1"}))  # fmt: skip
+    fewer = BoardDesign(variant=design.variant, revision=design.revision, title=design.title,
+                        components=tuple(part for part in design.components if part.ref not in {"R1",
+                                                                                                "U1"}))  # fmt: skip
     faults = netlist_faults(fewer)
     assert "net DD2_BP ends at" not in faults
     assert any(fault.startswith("net MOTOR1_COMM1_BP ends at") for fault in faults)
@@ -109,10 +110,10 @@ def test_a_wire_without_its_resistor_and_a_lone_pin_are_missed() -> None:
 def test_a_design_refuses_twins_and_unknown_parts() -> None:
     one = make("R1", "20k", ["A", "B"])
     with pytest.raises(DesignError, match="R1 stands twice"):
-        Design(variant="x", revision="rev-b", title="", components=(one, one))
+        BoardDesign(variant="x", revision="rev-b", title="", components=(one, one))
     twice = dataclasses.replace(one, ref="R2", pins=(("1", "A"), ("1", "B")))
     with pytest.raises(DesignError, match="R2 has a pin twice"):
-        Design(variant="x", revision="rev-b", title="", components=(twice,))
+        BoardDesign(variant="x", revision="rev-b", title="", components=(twice,))
     with pytest.raises(DesignError, match="no part 'R 9M'"):
         make("R3", "R 9M", ["A"])
     with pytest.raises(DesignError, match="variant 'rev-z' is unknown"):
@@ -124,7 +125,7 @@ def test_a_bought_part_needs_a_number_to_order_it_by() -> None:
         Part(key="X", value="1", symbol="R", footprint="R_0805", description="nameless")
     nameless = dataclasses.replace(PARTS["20k"], source="")
     component = dataclasses.replace(make("R1", "20k", ["A", "B"]), part=nameless)
-    design = Design(variant="x", revision="rev-b", title="", components=(component,))
+    design = BoardDesign(variant="x", revision="rev-b", title="", components=(component,))
     assert bom_faults(design) == ["R1: no source"]
 
 
@@ -133,7 +134,7 @@ def test_a_check_says_its_figure_and_its_limits() -> None:
     assert str(check) == "FAIL rail: 3.44 V (limits 3.135 to 3.4)"
 
 
-def with_resistor(design: Design, refs: list[str], ohm: float) -> Design:
+def with_resistor(design: BoardDesign, refs: list[str], ohm: float) -> BoardDesign:
     """Return the design with other resistor values."""
     parts = tuple(
         dataclasses.replace(part, part=dataclasses.replace(part.part, facts={"ohm": ohm})) if part.ref in refs else part

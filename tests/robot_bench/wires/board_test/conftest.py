@@ -5,14 +5,14 @@ from pathlib import Path
 
 import pytest
 
-from robot_bench.wires.board_test.circuit import Fault
+from robot_bench.wires.board_test.circuit import BoardFault
 from robot_bench.wires.board_test.emulated import REVISION, EmulatedBoard
 from robot_bench.wires.board_test.esp32 import library_path
-from robot_bench.wires.board_test.verdicts import Finding, judge
-from robot_bench.wires.board_test.walk import Walk
+from robot_bench.wires.board_test.verdicts import VerdictRow, judge
+from robot_bench.wires.board_test.walk import BoardWalk
 from simbase.errors import MissingDependencyError
 
-Tested = Callable[..., list[Finding]]
+Tested = Callable[..., list[VerdictRow]]
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -28,8 +28,8 @@ def program() -> Path:
 def tested() -> Tested:
     """Return what tests a board with faults."""
 
-    def test(*faults: Fault, between: bool = False, has_loop_plug: bool = True) -> list[Finding]:
+    def test(*faults: BoardFault, between: bool = False, has_loop_plug: bool = True) -> list[VerdictRow]:
         board = EmulatedBoard(faults, between=between, has_loop_plug=has_loop_plug)
-        return judge(Walk(board.bluepill_end, board.adapter_end, board.pinout).measure(), board.pinout, REVISION)
+        return judge(BoardWalk(board.bluepill_end, board.adapter_end, board.pinout).measure(), board.pinout, REVISION)
 
     return test
