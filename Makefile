@@ -14,7 +14,7 @@ comma := ,
 JOBS   ?= 3
 # What is built with the package: set up again when it has changed.
 COMPILED := $(wildcard bluepill_sim/extension/source/*/*) robot_bench/wires/edges.c \
-    $(shell find adapter_fw/core adapter_fw/capi -type f)
+    $(shell find adapter_fw/core adapter_fw/capi adapter_fw/esp32/main adapter_fw/esp32_sim -type f)
 
 .PHONY: setup demo test lint type unit wheels bench soak peers clean firmware mutation-tools board board-check board-tools pictures docs generated
 

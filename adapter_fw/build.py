@@ -11,15 +11,17 @@
     bluepill   the adapter itself on an STM32F103, its USART as the P2OS line (bluepill/)
     xtensa     the self-test on an ESP8266's core
     esp32-core the same for an ESP32's memory, without its system: code in IRAM, what is read in bytes in DRAM
+    esp32-windows  the same for the ESP32's processor: its instructions and windowed calls, by LLVM; to be linked and
+               measured, not to be run: it has no handler for the exception of MOVSP
 
-Prints how much flash and RAM the core alone takes. The ESP32 itself cannot be
-built here: its compiler is not in Debian; the Xtensa targets share the
-instruction set but not the windowed calls.
+Prints how much flash and RAM the core alone takes. An image of the ESP32 cannot be
+built here: ESP-IDF wants a compiler and a C library of its own (docs/adapter-firmware.md, Builds).
 """
 
 import argparse
 import hashlib
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -59,6 +61,16 @@ class Target:
     after: tuple[str, ...] = ()
     #: Whether the size of the core is printed.
     is_small: bool = False
+    #: A linker of its own; "": the compiler links.
+    linker: str = ""
+    #: An assembler for what the compiler writes, with its literals in a section of their own.
+    assembler: tuple[str, ...] = ()
+    size_tool: str = ""
+
+    @property
+    def tools(self) -> tuple[str, ...]:
+        """Return the programs that it is built with."""
+        return tuple(filter(None, (self.compiler, self.linker, *self.assembler[:1])))
 
 
 def _on_host(output: str, *sources: Path, include: tuple[Path, ...] = ()) -> Target:
@@ -118,6 +130,34 @@ def _on_xtensa(start: str, layout: str) -> Target:
     )  # fmt: skip
 
 
+#: What an ESP32 has, by LLVM's names; its front end does not know the processor itself.
+ESP32_FEATURES = (
+    "density", "windowed", "bool", "loop", "sext", "nsa", "clamps", "minmax", "mul32", "mul32high", "mul16", "div32",
+    "mac16", "s32c1i", "threadptr", "fp",
+)  # fmt: skip
+#: LLVM 22 finds no instruction for a constant that its combiner has made in these; without that they are larger.
+UNCOMBINED = frozenset({"encoders.cpp"})
+
+
+def _on_esp32_with_windows() -> Target:
+    folder = SELFTEST / "xtensa"
+    features = tuple(word for name in ESP32_FEATURES for word in ("-Xclang", "-target-feature", "-Xclang", f"+{name}"))
+    return Target(
+        output="selftest-esp32-windows.elf",
+        compiler="clang++-22",
+        package="clang-22 llvm-22 binutils-xtensa-lx106",
+        flags=("--target=xtensa", *features, "-Os", "-ffreestanding", "-nostdlibinc", "-isystem",
+               str(folder / "include")),
+        sources=(*TRIAL, folder / "main.cpp", SELFTEST / "bare_memory.cpp", folder / "esp32_windows.S",
+                 folder / "arithmetic.c"),
+        linker="xtensa-lx106-elf-ld",
+        link=("--no-relax", "--gc-sections", "-z", "noexecstack", "-T", str(folder / "esp32.ld")),
+        is_small=True,
+        assembler=("llvm-mc-22", "-arch=xtensa", "-mcpu=esp32", "-filetype=obj"),
+        size_tool="xtensa-lx106-elf-size",
+    )  # fmt: skip
+
+
 TARGETS = {
     "host": _on_host("selftest-host", *TRIAL, SELFTEST / "host.cpp"),
     "program": _on_host("p2os-adapter", *sorted((HERE / "host").glob("*.cpp"))),
@@ -134,12 +174,13 @@ TARGETS = {
     "bluepill": _on_cortex_m("adapter-bluepill.elf", *sorted((HERE / "bluepill").glob("*.cpp"))),
     "xtensa": _on_xtensa("start.S", "sim.ld"),
     "esp32-core": _on_xtensa("esp32.S", "esp32.ld"),
+    "esp32-windows": _on_esp32_with_windows(),
 }  # fmt: skip
 
 
 def is_installed(name: str) -> bool:
-    """Tell whether a target's compiler is there."""
-    return shutil.which(TARGETS[name].compiler) is not None
+    """Tell whether a target's compiler and what else it needs is there."""
+    return all(shutil.which(tool) is not None for tool in TARGETS[name].tools)
 
 
 def build(name: str, output: Path) -> dict[str, int]:
@@ -150,24 +191,44 @@ def build(name: str, output: Path) -> dict[str, int]:
     """
     target = TARGETS[name]
     objects = {source: _compile(target, source) for source in (*CORE, *target.sources)}
-    _run([target.compiler, *target.link, *map(str, objects.values()), *target.after, "-o", str(output)])
+    _run(
+        [target.linker or target.compiler, *target.link, *map(str, objects.values()), *target.after, "-o", str(output)]
+    )
     return _size(target, [objects[source] for source in CORE])
 
 
 def _compile(target: Target, source: Path) -> Path:
     """Compile a source unless the same has been compiled before."""
     is_cxx = source.suffix == ".cpp"
-    compiler = target.compiler if is_cxx else target.compiler.replace("g++", "gcc")
+    compiler = target.compiler if is_cxx else target.compiler.replace("clang++", "clang").replace("g++", "gcc")
     flags = (*(CXX_FLAGS if is_cxx else ("-Wall",)), *target.flags, *(() if source in CORE else target.own_flags))
-    command = [compiler, *flags, "-c", str(source)]
+    if target.assembler and source.name in UNCOMBINED:
+        flags = (*flags, "-mllvm", "--combiner-disabled")
+    command = [compiler, *flags, "-S" if target.assembler else "-c", str(source)]
     made_of = hashlib.sha256("\0".join([_version(compiler), _headers(), *command]).encode() + source.read_bytes())
     result = OBJECTS / f"{source.stem}-{made_of.hexdigest()[:24]}.o"
     if not result.exists():
         OBJECTS.mkdir(parents=True, exist_ok=True)
         beside = result.with_suffix(f".{os.getpid()}")
-        _run([*command, "-o", str(beside)])
+        if not target.assembler:
+            _run([*command, "-o", str(beside)])
+        elif source.suffix == ".S":
+            _run([*target.assembler, str(source), "-o", str(beside)])
+        else:
+            _compile_and_assemble(target, command, beside)
         beside.replace(result)
     return result
+
+
+def _compile_and_assemble(target: Target, command: list[str], output: Path) -> None:
+    """Compile to text, put the literals into a section of their own, and assemble it.
+
+    LLVM's own assembler leaves those of a function unaligned at the end of the function before.
+    """
+    text = subprocess.run([*command, "-o", "-"], stdout=subprocess.PIPE, text=True, check=True).stdout
+    text = text.replace("\t.literal_position", '\t.section .literal,"ax",@progbits\n\t.p2align 2')
+    text = re.sub(r"^\t\.literal ([^,]+), (.+)$", r"\1:\n\t.4byte \2", text, flags=re.MULTILINE)
+    subprocess.run([*target.assembler, "-o", str(output), "-"], input=text, text=True, check=True)
 
 
 @cache
@@ -184,7 +245,7 @@ def _headers() -> str:
 
 def _size(target: Target, objects: list[Path]) -> dict[str, int]:
     """Return the sums of `size`: code and constants are flash, variables are RAM."""
-    tool = target.compiler.removesuffix("g++") + "size"
+    tool = target.size_tool or target.compiler.removesuffix("g++") + "size"
     done = subprocess.run([tool, *map(str, objects)], capture_output=True, text=True, check=True)
     rows = [[int(word) for word in line.split()[:3]] for line in done.stdout.splitlines()[1:]]
     return {"flash": sum(row[0] + row[1] for row in rows), "ram": sum(row[1] + row[2] for row in rows)}
@@ -210,7 +271,8 @@ def main() -> int:
     for name in words.targets or TARGETS:
         target = TARGETS[name]
         if not is_installed(name):
-            print(f"{name}: {target.compiler} is not installed (apt-get install {target.package})")
+            missing = next(tool for tool in target.tools if shutil.which(tool) is None)
+            print(f"{name}: {missing} is not installed (apt-get install {target.package})")
             continue
         try:
             size = build(name, words.out / target.output)

@@ -6,10 +6,12 @@ pad: each board, with and without a pad; what is deprecated is an error. Also, w
 looked for in it: the components that CMakeLists.txt requires and the options that sdkconfig.* sets. What cannot be
 read is skipped aloud.
 
-This is no build: the ESP32's compiler is not reachable from here, nothing is linked and nothing has been flashed.
+Where LLVM 22 is installed it is compiled and assembled for the ESP32's processor, else only read. This is no build:
+ESP-IDF's compiler and C library are not reachable from here, nothing is linked and nothing has been flashed.
 """
 
 import argparse
+import importlib.util
 import re
 import shutil
 import subprocess
@@ -23,10 +25,12 @@ HERE = Path(__file__).resolve().parent
 PROJECT = HERE / "esp32"
 BOARDS = ("rev_b", "rev_c", "thesis_board", "thesis_table3")
 PADS = ("none", "bluepad32")
-FLAGS = ("-std=gnu++17", "-Wall", "-Wextra", "-Wshadow", "-Werror", "-fno-exceptions", "-fno-rtti", "-fsyntax-only")
-STUBS = ("g++", "-isystem", str(HERE / "stubs" / "esp32"))
+FLAGS = ("-std=gnu++17", "-Wall", "-Wextra", "-Wshadow", "-Werror", "-fno-exceptions", "-fno-rtti")
+STUBS = ("g++", "-fsyntax-only", "-isystem", str(HERE / "stubs" / "esp32"))
 #: For the real headers: 32 bits and newlib, as on the ESP32; its inline assembly is read, not assembled.
 CROSS = "arm-none-eabi-g++"
+#: Where it is there: compiles and assembles for the ESP32's processor, with the same newlib's headers.
+CLANG = "clang++-22"
 
 #: Folders of headers that the program's own pull in, below components/; those that a version has not are left out.
 HEADERS = (
@@ -143,12 +147,34 @@ class Copies:
     @property
     def compiler(self) -> tuple[str, ...]:
         """Return a compiler that finds these headers."""
-        return (
-            CROSS,
+        idf = (
             "-D__XTENSA__",
             "-DESP_PLATFORM",
             *(word for path in self.folders for word in ("-isystem", str(path))),
         )
+        if shutil.which(CLANG) is None:
+            return CROSS, "-fsyntax-only", *idf
+        asked = subprocess.run(
+            [CROSS, "-E", "-v", "-x", "c++", "-"], input="", capture_output=True, text=True, check=True
+        )
+        listed = asked.stderr.partition("search starts here:\n#include <...>")[2].partition("End of search list")[0]
+        newlib = [path for line in listed.split() if "/lib/gcc/" not in (path := str(Path(line).resolve()))]
+        builtin = subprocess.run(
+            [CLANG, "-print-resource-dir"], capture_output=True, text=True, check=True
+        ).stdout.strip()
+        own = [word for path in (*newlib, f"{builtin}/include") for word in ("-isystem", path)]
+        features = [word for name in esp32_features() for word in ("-Xclang", "-target-feature", "-Xclang", f"+{name}")]
+        return CLANG, "--target=xtensa", *features, "-Os", "-ffunction-sections", "-nostdinc", "-c", *idf, *own
+
+
+def esp32_features() -> tuple[str, ...]:
+    """Return what an ESP32's processor has, as build.py says it."""
+    spec = importlib.util.spec_from_file_location("adapter_fw_build", HERE / "build.py")
+    assert spec is not None and spec.loader is not None  # noqa: PT018, S101 - it stands beside this file
+    sys.modules["adapter_fw_build"] = module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    features: tuple[str, ...] = module.ESP32_FEATURES
+    return features
 
 
 def sources(pad: str) -> list[Path]:
@@ -160,7 +186,10 @@ def sources(pad: str) -> list[Path]:
 def complaints(board: str, pad: str, robot: str = "p2dx", compiler: tuple[str, ...] = STUBS) -> str:
     """Return the compiler's words; nothing where all is sound."""
     command = [*compiler, *FLAGS, f'-DADAPTER_ROBOT="{robot}"', "-I", str(HERE / "generated" / board)]
-    done = subprocess.run([*command, *map(str, sources(pad))], capture_output=True, text=True, check=False)
+    with tempfile.TemporaryDirectory() as folder:  # for objects, where there are any
+        done = subprocess.run(
+            [*command, *map(str, sources(pad))], capture_output=True, text=True, check=False, cwd=folder
+        )
     return done.stderr
 
 
@@ -238,7 +267,8 @@ def check_copy(words: argparse.Namespace, idf: SourceCopy, folder: Path) -> int:
     except ValueError as error:
         print(f"{idf.name}: skipped, {error}")
         return 0
-    print(f"{idf.name}, headers of its own:")
+    how = "compiled for the ESP32" if shutil.which(CLANG) is not None else "read"
+    print(f"{idf.name}, headers of its own, {how}:")
     pads = PADS if all(pad) else ("none",)
     if len(pads) == 1:
         print("  pad bluepad32: skipped, needs --bluepad32 and --btstack")

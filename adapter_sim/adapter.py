@@ -41,7 +41,7 @@ the first frames after a loss are STOP, VEL 0, RVEL 0, and the same three stand
 before every SYNC0 and go out after a boot: the adapter cannot know what the
 robot was doing before.
 
-Within one instant the order is fixed: reset wire, boot, connection, sample, pad, loss,
+Within one instant the order is fixed: bytes, reset wire, boot, connection, sample, pad, loss,
 plausibility, distances, encoders, speeds, stops. A change of rst is seen at the end of
 a slice, where the bench's watched nets put it, and at each sample.
 
@@ -58,6 +58,7 @@ from adapter_sim.masters import Master, Masters
 from adapter_sim.mixing import CommandedSpeeds
 from adapter_sim.pinout import Pinout, WireRole
 from adapter_sim.pins import AdapterPins, EventCallback, Inputs, Outputs, SampleClock, released_codes
+from adapter_sim.receiver import Receiver
 from adapter_sim.session import Session, SessionOpened, StopRepeater
 from adapter_sim.settings import AdapterSettings, MotorCommand
 from p2os.gamepad import PadReport
@@ -147,13 +148,14 @@ class Adapter(Stateful):
         on_event: Called at each transition.
         now: When power comes, in nanoseconds.
         master: Who commands; the board reads a jumper at boot.
+        receiver: The UART in front of it; None: bytes are seen when they arrive.
     """
 
     STATE = (
         "_state", "_reason", "_now", "_baud_place", "_agenda", "samples", "_masters", "_stop_repeater", "_driver",
-        "distances", "_codes", "outputs", "session",
+        "distances", "_codes", "outputs", "session", "_receiver",
     )  # fmt: skip
-    DERIVED = ("_deadline", "_other")
+    DERIVED = ("_deadline", "_other", "_bytes_at")
 
     def __init__(
         self,
@@ -165,6 +167,7 @@ class Adapter(Stateful):
         on_event: EventCallback | None = None,
         now: Nanos = 0,
         master: Master = Master.BLUEPILL,
+        receiver: Receiver | None = None,
     ) -> None:
         self.pinout = pinout
         self.parameters = parameters
@@ -181,6 +184,9 @@ class Adapter(Stateful):
         )
         self._codes = WheelCodes(settings, parameters, pinout.value("encoder1").width, released_codes(pinout))
         self.session = Session(settings)
+        self._receiver = receiver
+        if receiver is not None:
+            receiver.restart(now)
         self.outputs = Outputs(pins, pinout)
         self.inputs = Inputs(pins, pinout, settings)
         self._masters = Masters(self.inputs, self._driver.mixer, settings, master)
@@ -190,6 +196,8 @@ class Adapter(Stateful):
         #: The earliest deadline, and the earliest that is no sample.
         self._deadline: Nanos = now
         self._other: Nanos = now
+        #: When bytes that the receiver holds are seen.
+        self._bytes_at: Nanos = NEVER
         self._clear()
         self._state = AdapterState.BOOTING
         self._reason = "power"
@@ -231,10 +239,11 @@ class Adapter(Stateful):
         """Take bytes that the line has delivered at `now`; what was due earlier is done first."""
         self._run(now - 1)
         if self._state in RUNNING_STATES:
-            self._now = now
-            self._stop_repeater.note_bytes(now)
-            self.session.receive(data, now)
-            self._take_session_events(now)
+            if self._receiver is None:
+                self._now = now
+                self._see_bytes(data, now)
+            else:
+                self._receiver.arrive(data, now)
             self._replan()
 
     def receive_pad(self, report: PadReport, now: Nanos) -> None:
@@ -306,9 +315,13 @@ class Adapter(Stateful):
 
     def _run(self, limit: Nanos) -> Nanos | None:
         """Act on all that is due; return the last instant at which the pins were looked at, None for none."""
-        now = None
+        looked_at = None
         while self._deadline <= limit:
             now = self._deadline
+            if now == self._bytes_at:
+                self._see_received(now)
+                continue
+            looked_at = now
             if now < self._other and not self._has_pending_request and self.inputs.is_quiet(now):
                 self._now = now
                 self.samples.was_quiet(now)
@@ -317,7 +330,14 @@ class Adapter(Stateful):
                 self.samples.resume(now)
                 self._act(now)
                 self._replan()
-        return now
+        return looked_at
+
+    def _see_received(self, now: Nanos) -> None:
+        """Take what a pass sees, before all else that is due then."""
+        self._now = now
+        for data in self._receiver.take(now) if self._receiver is not None else ():
+            self._see_bytes(data, now)
+        self._replan()
 
     @property
     def _has_pending_request(self) -> bool:
@@ -360,6 +380,11 @@ class Adapter(Stateful):
         if self._state is AdapterState.CONNECTING and now >= self._agenda.retry_at:
             self._begin_session(now, "trying again")
 
+    def _see_bytes(self, data: bytes, now: Nanos) -> None:
+        self._stop_repeater.note_bytes(now)
+        self.session.receive(data, now)
+        self._take_session_events(now)
+
     def _run_open(self, now: Nanos) -> None:
         if now >= self._agenda.sip_deadline:
             self._lose(now, "lost", "no SIP in time")
@@ -398,11 +423,14 @@ class Adapter(Stateful):
         """Find the next deadline; `_other` is the earliest that is no sample."""
         self.samples.resume(self._now)
         state = self._state
+        self._bytes_at = NEVER
         if state not in RUNNING_STATES:
             # Only rst is looked at; `_other` keeps these instants off the fast path.
             self._other = self._deadline = min(self._agenda.boot_at, self.samples.next)
             return
-        times = [self.session.next_deadline(), self._masters.pad_lost_at]
+        if self._receiver is not None and (due_at := self._receiver.due_at) is not None:
+            self._bytes_at = due_at
+        times = [self.session.next_deadline(), self._masters.pad_lost_at, self._bytes_at]
         if state in OPEN_STATES:
             times += [self._agenda.sip_deadline, self._agenda.sonar_at, self.distances.expires_at]
             times += self._codes.due_at(self._now)
@@ -434,6 +462,8 @@ class Adapter(Stateful):
         self._now = now
         if self._state is AdapterState.RESET:
             self._agenda.boot_at = now + self.settings.boot_ns
+            if self._receiver is not None:
+                self._receiver.restart(now)
             self._enter(AdapterState.BOOTING, now, "booting", "rst is low")
             return
         self._clear()

@@ -17,13 +17,14 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeAlias, cast
 
-from adapter_sim.adapter import Adapter, AdapterState, AdapterStatus
+from adapter_sim.adapter import RUNNING_STATES, Adapter, AdapterState, AdapterStatus
 from adapter_sim.codec import BitOrder
 from adapter_sim.distances import threshold_um
 from adapter_sim.masters import Master
 from adapter_sim.mixing import CommandedSpeeds
 from adapter_sim.pinout import Pinout, Safe, WireRole
 from adapter_sim.pins import MOTOR_VALUES, AdapterPins, EventCallback, duty_wires, released_codes
+from adapter_sim.receiver import Receiver
 from adapter_sim.settings import AdapterSettings, EncoderAtOpen, MotorCommand, MotorMeaning
 from p2os.gamepad import PadReport
 from p2os.robots.parameters import RobotParameters
@@ -101,8 +102,9 @@ class FirmwareState:
     #: SHA-256 of the library.
     build: str
     data: bytes
-    #: Of what measures the duties.
+    #: Of what measures the duties, and of the UART.
     duties: tuple[object, ...]
+    receiver: object
 
 
 class FirmwareAdapter:
@@ -115,6 +117,7 @@ class FirmwareAdapter:
         settings: None takes the defaults.
         on_event: Called at each transition.
         now: When power comes, in nanoseconds.
+        receiver: The UART in front of it; None: bytes are seen when they arrive.
 
     Raises:
         MissingDependencyError: The library was not built.
@@ -130,12 +133,16 @@ class FirmwareAdapter:
         settings: AdapterSettings | None = None,
         on_event: EventCallback | None = None,
         now: Nanos = 0,
+        receiver: Receiver | None = None,
     ) -> None:
         self._library = library = _library()
         self.pinout = pinout
         self.parameters = parameters
         self.settings = settings = settings or AdapterSettings()
         self.on_event = on_event
+        self._receiver = receiver
+        if receiver is not None:
+            receiver.restart(now)
         self._pins = pins
         motors = [name for value in MOTOR_VALUES for name in pinout.value(value).wires]
         ends = [pinout.with_role(role)[0].name for role in (WireRole.CONNECT, WireRole.RESET)]
@@ -213,22 +220,29 @@ class FirmwareAdapter:
 
     def receive(self, data: bytes, now: Nanos) -> None:
         """Take bytes that the line has delivered at `now`."""
-        self._library.adapter_receive(self._handle, data, len(data), now)
-        self._raise_failure()
+        if self._receiver is None:
+            self._see_bytes(data, now)
+            return
+        self._receive_until(now - 1)
+        if self.state in RUNNING_STATES:
+            self._receiver.arrive(data, now)
 
     def receive_pad(self, report: PadReport, now: Nanos) -> None:
         """Take a pad's report that came at `now`."""
+        self._receive_until(now - 1)
         buttons = report.up | report.down << 1
         self._library.adapter_receive_pad(self._handle, buttons, report.forward, report.backward, report.turn, now)
         self._raise_failure()
 
     def set_master(self, master: Master, now: Nanos) -> None:
         """Give the robot to another master."""
+        self._receive_until(now - 1)
         self._library.adapter_set_master(self._handle, list(Master).index(master), now)
         self._raise_failure()
 
     def shutdown(self, reason: str, now: Nanos) -> None:
         """Stop the robot, drive every output to its safe level, and wait for the connect request to be withdrawn."""
+        self._receive_until(now - 1)
         self._library.adapter_shutdown(self._handle, reason.encode(), now)
         self._raise_failure()
 
@@ -250,10 +264,13 @@ class FirmwareAdapter:
 
     def next_deadline(self) -> Nanos | None:
         """Return the next sample instant or deadline, in nanoseconds."""
-        return cast("int", self._library.adapter_next_deadline(self._handle))
+        deadline = cast("int", self._library.adapter_next_deadline(self._handle))
+        due_at = self._receiver.due_at if self._receiver is not None else None
+        return deadline if due_at is None else min(deadline, due_at)
 
     def advance_to(self, limit: Nanos) -> Reached:
         """Act on everything due up to and including `limit`, then look at rst."""
+        self._receive_until(limit)
         self._library.adapter_advance_to(self._handle, limit)
         self._raise_failure()
         return Reached(limit)
@@ -262,7 +279,8 @@ class FirmwareAdapter:
         """Return all that decides the future: one value, laid out by the firmware itself."""
         state = ctypes.create_string_buffer(self._library.adapter_state_size())
         self._library.adapter_save(self._handle, state)
-        return FirmwareState(_build(), state.raw, tuple(wire.snapshot() for wire in self._duties.values()))
+        receiver = self._receiver.snapshot() if self._receiver is not None else None
+        return FirmwareState(_build(), state.raw, tuple(wire.snapshot() for wire in self._duties.values()), receiver)
 
     def restore(self, snapshot: object) -> None:
         """Put back what `snapshot` returned.
@@ -278,6 +296,8 @@ class FirmwareAdapter:
         self._library.adapter_restore(self._handle, snapshot.data)
         for wire, duty in zip(self._duties.values(), snapshot.duties, strict=True):
             wire.restore(duty)
+        if self._receiver is not None:
+            self._receiver.restore(snapshot.receiver)
 
     # What the firmware calls. An exception must not cross the C code: it is kept, and raised behind it.
 
@@ -298,7 +318,20 @@ class FirmwareAdapter:
             elif mask >> bit & 1:
                 self._pins.write(name, bool(levels >> bit & 1), now)
 
+    def _receive_until(self, limit: Nanos) -> None:
+        """Give the core what its loop has seen by a time."""
+        receiver = self._receiver
+        while receiver is not None and (due_at := receiver.due_at) is not None and due_at <= limit:
+            for data in receiver.take(due_at):
+                self._see_bytes(data, due_at)
+
+    def _see_bytes(self, data: bytes, now: Nanos) -> None:
+        self._library.adapter_receive(self._handle, data, len(data), now)
+        self._raise_failure()
+
     def _happened(self, _user: object, now: int, what: bytes, detail: bytes, first: int, second: int) -> None:
+        if what == b"booting" and self._receiver is not None:
+            self._receiver.restart(now)
         if self.on_event is not None:
             self.on_event(now, what.decode(), self._detail(what.decode(), detail.decode(), first, second))
 
@@ -338,7 +371,7 @@ def make_adapter(scenario: Scenario, pins: AdapterPins, pinout: Pinout) -> Adapt
         MissingDependencyError: The firmware's core is wanted and was not built.
     """
     if scenario.adapter_core in _SHIPPED:
-        return make_shipped_adapter(scenario, pins, pinout)
+        return make_shipped_adapter(scenario, pins, pinout, Receiver())
     return cast(
         "AdapterPart",
         ENDS["adapter"].make(
@@ -347,8 +380,16 @@ def make_adapter(scenario: Scenario, pins: AdapterPins, pinout: Pinout) -> Adapt
     )
 
 
-def make_shipped_adapter(scenario: Scenario, pins: AdapterPins, pinout: Pinout) -> AnyAdapter:
-    """Return the adapter that a scenario wants, for a real robot: its stops are tested, those of others are not.
+def make_shipped_adapter(
+    scenario: Scenario, pins: AdapterPins, pinout: Pinout, receiver: Receiver | None = None
+) -> AnyAdapter:
+    """Return the adapter that a scenario wants, also for a real robot: its stops are tested, those of others are not.
+
+    Args:
+        scenario: The scenario.
+        pins: The adapter's ends of the wires.
+        pinout: Their names.
+        receiver: The ESP32's UART; None where a machine's own stands in front of the adapter.
 
     Raises:
         UsageError: The scenario wants one of the user's.
@@ -360,7 +401,7 @@ def make_shipped_adapter(scenario: Scenario, pins: AdapterPins, pinout: Pinout) 
             f"the adapter {scenario.adapter_core} drives no real robot: nobody has tested how it stops one",
             hint=f"--adapter {' or '.join(_SHIPPED)}",
         )
-    return kind(pins=pins, pinout=pinout, parameters=scenario.parameters, settings=scenario.adapter)
+    return kind(pins=pins, pinout=pinout, parameters=scenario.parameters, settings=scenario.adapter, receiver=receiver)
 
 
 def setting_numbers(settings: AdapterSettings, parameters: RobotParameters) -> dict[str, int]:

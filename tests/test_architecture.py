@@ -114,8 +114,8 @@ LAYERS = {
         ("analysis", "debug"), ("cli",), ("__main__",),
     ),
     "adapter_sim": (
-        ("codec",), ("duty",), ("settings", "pinout"), ("pins", "mixing", "encoders", "distances", "session"),
-        ("masters", "driver"), ("adapter",),
+        ("codec",), ("duty",), ("settings", "pinout"),
+        ("pins", "receiver", "mixing", "encoders", "distances", "session"), ("masters", "driver"), ("adapter",),
     ),
     "robot_bench": (
         ("running", "firmware", "origin_gate"), ("wires",), ("events",), ("direct",), ("recording",),

@@ -9,7 +9,7 @@
 // heap. What outlives a reset is copied by whoever resets: NVS (`machine_nvs_*`), RTC memory (`machine_rtc`).
 //
 // Not modelled: the boot loader and its time, its words on UART0, the radio, the second core, interrupts but those of
-// the capture unit.
+// the capture unit and the UARTs, and the time that an interrupt takes.
 #pragma once
 
 #include <stddef.h>
@@ -45,7 +45,8 @@ struct machine_state {
   int32_t nvs_fault;         // set from outside: machine_nvs_fault
   int64_t stall_us;          // set from outside: the task's next sleep is longer by this
   int32_t baud[MACHINE_PORTS], tx_pin[MACHINE_PORTS], rx_pin[MACHINE_PORTS];
-  uint32_t lost[MACHINE_PORTS];   // bytes that found a receiver full
+  uint32_t lost[MACHINE_PORTS];  // bytes that found a receiver full, and those that it held
+  uint32_t handed[MACHINE_PORTS];  // bytes that the driver has taken from a receiver
   uint32_t stack_bytes;      // what the program asked for
   int32_t shift_data, shift_clock, shift_latch;  // set from outside: pins of a 74HC595; latch 0: there is none
   uint32_t shifted;          // its outputs, QA is bit 0
@@ -59,8 +60,8 @@ int machine_run(int64_t until_us);
 // Returns the bytes of stack that the program has used so far, on this machine's processor.
 size_t machine_stack_used(void);
 
-// Bytes on the RX pin, as fast as they are given.
-void machine_receive(int port, const uint8_t* data, size_t size);
+// Bytes on the RX pin; `at_us` is when each one's stop bit ends, in order, none before now.
+void machine_receive(int port, const uint8_t* data, const int64_t* at_us, size_t size);
 // Takes bytes that have left at the TX pin by now; `at_us` is when each one's stop bit ended. Returns how many.
 size_t machine_sent(int port, uint8_t* data, int64_t* at_us, size_t size);
 
@@ -73,7 +74,10 @@ void machine_ram(uint8_t** start, size_t* size);
 // The memory that every reset but one by EN or power leaves as it is.
 void machine_rtc(uint8_t** start, size_t* size);
 
-// A report of a game pad; false in a program without one.
+// A pad is found, or comes by itself, and wants to connect; false where the program has none, or declines this one.
+int machine_pad_connect(int64_t address, int is_found);
+void machine_pad_disconnect(void);
+// A report of the pad that is connected; false where none is.
 int machine_pad(int up, int down, int32_t throttle, int32_t brake, int32_t axis_rx);
 
 #ifdef __cplusplus

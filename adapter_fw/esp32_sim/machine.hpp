@@ -15,7 +15,7 @@ void take_captures();
 
 // Called as time passes, up to `now_us`.
 void move_uarts(std::int64_t now_us);
-// When a byte next leaves; far away where none waits.
-std::int64_t next_byte_us();
+// When a byte next leaves or arrives, or a receiver's time-out ends; far away where nothing is to come.
+std::int64_t next_uart_us();
 
 }  // namespace simulated

@@ -90,7 +90,7 @@ int machine_run(std::int64_t until_us) {
   take_captures();
   while (state.end == MACHINE_RUNS) {
     const std::int64_t hangs_us = fed_us < 0 ? NEVER_US : fed_us + WATCHDOG_US;
-    const std::int64_t next_us = std::min({task.wakes_us, next_byte_us(), hangs_us});
+    const std::int64_t next_us = std::min({task.wakes_us, next_uart_us(), hangs_us});
     if (next_us > until_us) {
       state.now_us = std::max(state.now_us, until_us);
       break;

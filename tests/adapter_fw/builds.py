@@ -31,6 +31,6 @@ def built(name: str, folder: Path) -> tuple[Path, dict[str, int]]:
     """Return a target's program and the size of its core; skip the test where its compiler is missing."""
     target = BUILD.TARGETS[name]
     if not BUILD.is_installed(name):
-        pytest.skip(f"{target.compiler} is not installed: apt-get install {target.package}")
+        pytest.skip(f"{' or '.join(target.tools)} is not installed: apt-get install {target.package}")
     program = folder / target.output
     return program, BUILD.build(name, program)

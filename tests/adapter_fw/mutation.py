@@ -28,7 +28,19 @@ import pytest
 ROOT = Path(__file__).parents[2]
 MODEL = tuple(
     f"adapter_sim/{name}.py"
-    for name in ("adapter", "codec", "distances", "driver", "duty", "encoders", "masters", "mixing", "pins", "session")
+    for name in (
+        "adapter",
+        "codec",
+        "distances",
+        "driver",
+        "duty",
+        "encoders",
+        "masters",
+        "mixing",
+        "pins",
+        "receiver",
+        "session",
+    )
 )
 FIRMWARE = tuple(
     f"adapter_fw/core/{name}.cpp"

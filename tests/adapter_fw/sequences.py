@@ -17,10 +17,12 @@ class Sequence:
 
     def __init__(
         self, adapter_settings: AdapterSettings, *, has_four_bits: bool, robot: str = "p2dx", start: Nanos = 0,
-        waits_for_edges: bool = False,
+        waits_for_edges: bool = False, has_uart: bool = False,
     ) -> None:  # fmt: skip
         pinout = {"pinout": parse_pinout(four_bits().replace("safe = 1", "safe = 0", 1))} if has_four_bits else {}
-        self.twins = Twins(adapter_settings, robot=robot, start=start, waits_for_edges=waits_for_edges, **pinout)
+        self.twins = Twins(
+            adapter_settings, robot=robot, start=start, waits_for_edges=waits_for_edges, has_uart=has_uart, **pinout
+        )
         self.width = 4 if has_four_bits else 3
         #: Of the robot when it is found to stand at its origin.
         self.rim_speed = 0

@@ -10,6 +10,8 @@ from tests.adapter_sim.conftest import FakeRobot
 
 PINOUT = load_pinout()
 US_PER_MS, NS_PER_US = 1_000, 1_000
+#: Of the robot's line.
+BAUD = 9600
 
 
 def pad_of(name: str, revision: str, pinout: Pinout = PINOUT) -> int | None:
@@ -34,8 +36,11 @@ class Shell:
         self.esp32 = Esp32(library)
         self.robot = robot
         self.text = ""
-        #: Of each frame that has left at the line: ms, and the command's name.
+        #: Of each frame that has left at the line: when its last byte was out in µs, and the command's name.
         self.commands: list[tuple[int, str]] = []
+        #: Of each frame of the robot: when its last byte arrives in µs, and its bytes.
+        self.answers: list[tuple[int, bytes]] = []
+        self.line_free_us = 0
         self._frames = b""
         #: The button's pin is pulled up by the chip, as are the pulls of the board.
         self.levels = 1 << (pad_of("mode_button", revision) or 0)
@@ -59,10 +64,9 @@ class Shell:
         """Let time pass; return what the console has written meanwhile."""
         before = len(self.text)
         for _ in range(span_ms):
-            until_us = self.esp32.now_us + US_PER_MS
-            self.esp32.run_until(until_us)
+            self.esp32.run_until(self.esp32.now_us + US_PER_MS)
             self.text += self.esp32.sent(CONSOLE).decode()
-            self._serve(self.esp32.sent(ROBOT), until_us * NS_PER_US)
+            self._serve()
         return self.text[before:]
 
     def type(self, line: str, wait_ms: int = 30) -> str:
@@ -103,13 +107,32 @@ class Shell:
         said = self.run_ms(1500)
         assert " driving" in said, said
 
-    def _serve(self, data: bytes, now: int) -> None:
-        self._frames += data
-        while len(self._frames) >= 3 and len(self._frames) >= 3 + self._frames[2]:
-            size = 3 + self._frames[2]
-            frame, self._frames = self._frames[:size], self._frames[size:]
-            self.commands.append((self.now_ms, Command.from_frame(Frame.from_bytes(frame)).name))
-        if self.robot is not None:
-            self.robot.receive(data, now)
-            self.robot.advance_to(now)
-            self.esp32.receive(ROBOT, b"".join(self.robot.take_output()))
+    def _serve(self) -> None:
+        """Give the robot what has left, each byte in its time; what it sends takes its time too."""
+        for at_us, byte in self.esp32.sent_in_time(ROBOT):
+            self._frames += bytes((byte,))
+            if len(self._frames) < 3 or len(self._frames) < 3 + self._frames[2]:
+                continue
+            frame, self._frames = self._frames, b""
+            self.commands.append((at_us, Command.from_frame(Frame.from_bytes(frame)).name))
+            self._run_robot(at_us)
+            if self.robot is not None:
+                self.robot.receive(frame, at_us * NS_PER_US)
+                self._take_answers(at_us)
+        self._run_robot(self.esp32.now_us)
+
+    def _run_robot(self, until_us: int) -> None:
+        while (
+            self.robot is not None and (due := self.robot.next_deadline()) is not None and due <= until_us * NS_PER_US
+        ):
+            self.robot.advance_to(due)
+            self._take_answers(-(-due // NS_PER_US))
+
+    def _take_answers(self, at_us: int) -> None:
+        """Put the robot's frames on the line, behind what is on it."""
+        for frame in self.robot.take_output():
+            begin_us = max(self.line_free_us, at_us)
+            times = [begin_us - -(number * 10 * 10**6) // BAUD for number in range(1, len(frame) + 1)]
+            self.line_free_us = times[-1]
+            self.answers.append((times[-1], frame))
+            self.esp32.receive(ROBOT, frame, times)

@@ -5,7 +5,9 @@ from dataclasses import replace
 
 import pytest
 
+from adapter_sim import Adapter
 from adapter_sim.encoders import HEADING_MODULUS
+from adapter_sim.receiver import Receiver
 from p2os import gamepad
 from p2os.robots.parameters import load_parameters
 from robot_bench.adapter import FirmwareAdapter, is_available, robot_numbers
@@ -16,6 +18,7 @@ from simbase.errors import UsageError
 from simbase.timing import NS_PER_S
 from tests.adapter_fw.builds import load_script
 from tests.adapter_fw.twins import PINOUT, AdapterSettings, FakePins
+from tests.adapter_sim.conftest import MS, Rig
 
 PARAMETERS = load_parameters("p2dx")
 pytestmark = pytest.mark.skipif(not is_available(), reason="the firmware core is not built: no C++17 compiler")
@@ -113,3 +116,23 @@ def test_generated_tables_are_up_to_date() -> None:
     tables = load_script("tools/generate_adapter_tables.py")
     stale = [path.name for path, text in tables.tables().items() if path.read_text(encoding="utf-8") != text]
     assert not stale, "run `make generated`"
+
+
+@pytest.mark.parametrize("kind", [Adapter, FirmwareAdapter])
+def test_passes_count_from_where_the_chip_began(kind: type) -> None:
+    """From power, and after a reset from the fall of rst: SIPs show at instants of that phase only."""
+    rig = Rig(now=300_000, kind=kind, receiver=Receiver())
+    rig.connect()
+    assert connected_at(rig) % MS == 300_000
+    falls_at = rig.now // MS * MS + 20 * MS + 700_000
+    rig.pins.set("rst", True, falls_at - 10 * MS)
+    rig.pins.set("p2dx_con", False, falls_at - 10 * MS)
+    rig.run(falls_at - 1)
+    rig.pins.set("rst", False, falls_at)
+    rig.run(falls_at)
+    rig.connect()
+    assert connected_at(rig) % MS == 700_000
+
+
+def connected_at(rig: Rig) -> int:
+    return next(at for at, what, _ in reversed(rig.events) if what == "connected")

@@ -79,15 +79,15 @@ SETTINGS = st.builds(
 
 
 def run_both(
-    steps: list[tuple[object, ...]], adapter_settings: AdapterSettings, *, has_four_bits: bool, waits: bool
+    steps: list[tuple[object, ...]], adapter_settings: AdapterSettings, *, has_four_bits: bool, waits: bool, uart: bool
 ) -> int:
-    sequence = Sequence(adapter_settings, has_four_bits=has_four_bits, waits_for_edges=waits)
+    sequence = Sequence(adapter_settings, has_four_bits=has_four_bits, waits_for_edges=waits, has_uart=uart)
     for kind, *values in steps:
         sequence.step(str(kind), *values)
     return sequence.twins.steps
 
 
-SEQUENCES = given(st.lists(STEPS, min_size=30, max_size=60), SETTINGS, st.booleans(), st.booleans())
+SEQUENCES = given(st.lists(STEPS, min_size=30, max_size=60), SETTINGS, st.booleans(), st.booleans(), st.booleans())
 QUIET = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.large_base_example]
 
 
@@ -97,18 +97,18 @@ QUIET = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.large_bas
 @settings(max_examples=115, suppress_health_check=QUIET)
 @SEQUENCES
 def test_firmware_and_model_do_the_same_over_five_thousand_steps(
-    steps: list, adapter_settings: AdapterSettings, four: bool, waits: bool
+    steps: list, adapter_settings: AdapterSettings, four: bool, waits: bool, uart: bool
 ) -> None:
-    run_both(steps, adapter_settings, has_four_bits=four, waits=waits)
+    run_both(steps, adapter_settings, has_four_bits=four, waits=waits, uart=uart)
 
 
 @pytest.mark.soak
 @settings(max_examples=2_500, suppress_health_check=QUIET)
 @SEQUENCES
 def test_firmware_and_model_agree_in_thousands_of_sequences(
-    steps: list, adapter_settings: AdapterSettings, four: bool, waits: bool
+    steps: list, adapter_settings: AdapterSettings, four: bool, waits: bool, uart: bool
 ) -> None:
-    run_both(steps, adapter_settings, has_four_bits=four, waits=waits)
+    run_both(steps, adapter_settings, has_four_bits=four, waits=waits, uart=uart)
 
 
 def test_a_firmware_that_waits_for_edges_does_the_same_at_a_tenth_of_the_deadlines() -> None:

@@ -76,6 +76,14 @@ def test_an_xtensa_in_qemu_gives_the_same_run(host: Path, tmp_path: Path) -> Non
     assert size["ram"] <= RAM_BYTES
 
 
+@pytest.mark.slow
+def test_the_core_links_for_the_esp32s_processor_with_its_register_windows(tmp_path: Path) -> None:
+    program, size = built("esp32-windows", tmp_path)
+    assert program.read_bytes()[:4] == b"\x7fELF"
+    assert is_as_documented(size["flash"], documented("core, flash").esp32)
+    assert size["ram"] <= RAM_BYTES
+
+
 @pytest.mark.soak
 def test_an_esp32_in_labwired_gives_the_same_run(host: Path, tmp_path: Path) -> None:
     labwired = pytest.importorskip("labwired", reason="make mutation-tools")

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field, replace
 
 from adapter_sim import Adapter, AdapterSettings, Pinout, load_pinout
 from adapter_sim.masters import Master
+from adapter_sim.receiver import Receiver
 from p2os.gamepad import PadReport
 from p2os.protocol.frames import Frame
 from p2os.protocol.packets import Identity
@@ -63,6 +64,7 @@ class Twins:
         robot: str = "p2dx",
         start: Nanos = 0,
         waits_for_edges: bool = False,
+        has_uart: bool = False,
     ) -> None:
         self.now: Nanos = start
         parameters = load_parameters(robot)
@@ -70,7 +72,10 @@ class Twins:
         self.sides = []
         for kind in (Adapter, FirmwareAdapter):
             pins = FakePins()
-            adapter = kind(pins=pins, pinout=pinout, parameters=parameters, settings=settings, now=start)
+            receiver = Receiver() if has_uart else None
+            adapter = kind(
+                pins=pins, pinout=pinout, parameters=parameters, settings=settings, now=start, receiver=receiver
+            )
             self.sides.append(Side(pins, adapter))
             self.sides[-1].listen()
         #: When which wire has an edge, if the firmware waits for it; None where it samples on.
@@ -179,7 +184,7 @@ class Twins:
             side.collect()
         assert one.frames == other.frames, f"frames differ at {self.now} ns"
         assert one.pins.writes == other.pins.writes, f"pins differ at {self.now} ns"
-        assert one.events == other.events
+        assert one.events == other.events, f"{one.events}\n{other.events}"
         model, firmware = self.model, self.firmware
         assert model.state == firmware.state
         assert (model.master, model.baud) == (firmware.master, firmware.baud)

@@ -10,6 +10,7 @@ import pytest
 
 from adapter_sim import Adapter, AdapterSettings, Pinout, load_pinout
 from adapter_sim.codec import motor_code
+from adapter_sim.receiver import Receiver
 from p2os.protocol.commands import Command
 from p2os.protocol.connection import CommandReceived, Connection, ConnectionRole, Opened
 from p2os.protocol.frames import Frame
@@ -174,6 +175,7 @@ class Rig:
         now: Nanos = 0,
         pinout: Pinout = PINOUT,
         kind: type = Adapter,
+        receiver: Receiver | None = None,
     ) -> None:
         self.now = now
         self.pins = FakePins()
@@ -186,6 +188,7 @@ class Rig:
             settings=settings or AdapterSettings(threshold_um=600_000),
             on_event=lambda now, what, detail: self.events.append((now, what, detail)),
             now=now,
+            receiver=receiver,
         )
         self.to_robot, self.to_adapter = Line(), Line()
 

@@ -9,6 +9,7 @@ from adapter_sim import AdapterSettings
 from adapter_sim.driver import CommandPacer, SpeedPlausibility
 from adapter_sim.mixing import CommandedSpeeds
 from adapter_sim.pins import Debounce, Majority
+from adapter_sim.receiver import Receiver
 from p2os.protocol.commands import CommandNumber
 from p2os.protocol.frames import Frame
 from p2os.protocol.sip import SonarReading
@@ -294,7 +295,7 @@ def stop_is_out_at(rig: Rig, since: int) -> int:
 
 def busy(seed_ms: int) -> Rig:
     """Return a rig whose line is as full of speeds as it gets: the motor pins change at every sample."""
-    rig = Rig()
+    rig = Rig(receiver=Receiver())
     rig.connect()
     for step in range(120):
         rig.pins.motors(step % 3 + 1, 3 - step % 3, rig.now + step * 8 * MS + seed_ms * MS)
@@ -316,7 +317,7 @@ def test_stop_is_out_375_ms_after_the_last_sip_and_35_ms_after_p2dx_con_fell_how
         rig.pins.set("p2dx_con", False, released_at)
         rig.ms(100)
         releases.append(stop_is_out_at(rig, released_at) - released_at)
-    # 350 ms, then up to two pairs of 18.75 ms that are on the line or next to it, and STOP's own 6.25 ms.
-    assert 370 * MS < max(silences) <= 375 * MS, max(silences)
+    # Seen in the next pass; 350 ms; a pair of 18.75 ms of the pass before that, and STOP's own 6.25 ms.
+    assert 372 * MS < max(silences) <= 375 * MS, max(silences)
     # 10 ms of debouncing from the next sample on, and the same.
     assert 17 * MS < max(releases) <= 35 * MS, max(releases)

@@ -62,6 +62,7 @@ class BoardTest final : public hal::PinsIn, public hal::PinsOut, public hal::Uar
   void write(p2os::Bytes data) override { hardware_.line.write(data); }
   void set_baud(std::int32_t baud) override { hardware_.line.set_baud(baud); }
   bool take(adapter::PadReport& report) override;
+  void pair(p2os::Nanos now) override { hardware_.pad->pair(now); }
   // Returns the pad's side, nullptr where there is none.
   hal::Pad* pad() { return has_pad() ? this : nullptr; }
 

@@ -10,7 +10,7 @@ namespace {
 constexpr char HELP[] =
     "version | status | pins | log | get [NAME] | set NAME VALUE | reset NAME\n"
     "master bluepill|pad | stop | restart\n"
-    "test on|off | wires [MASK LEVELS] | link [HEX] | pad\n";
+    "test on|off | wires [MASK LEVELS] | link [HEX] | pad | pad pair\n";
 
 void write_bits(Writer& writer, const char* name, std::uint32_t levels, std::int32_t from, std::int32_t count) {
   writer.write(name);
@@ -99,6 +99,8 @@ void Console::run(char* line, p2os::Nanos now) {
     link(given.words[1]);
   } else if (is("pad", 1)) {
     pad();
+  } else if (is("pad", 2) && is_same(given.words[1], "pair")) {
+    pair(now);
   } else {
     writer.write("error: no such command; type help\n");
   }
@@ -208,6 +210,16 @@ void Console::link(const char* hex) {
     write_hex(parts_.writer, back[place], 2);
   }
   parts_.writer.write("\n");
+}
+
+void Console::pair(p2os::Nanos now) {
+  hal::Pad* pad = parts_.test.pad();
+  if (pad == nullptr) {
+    parts_.writer.write("pad none\n");
+    return;
+  }
+  pad->pair(now);
+  parts_.writer.write("ok, for 30 s: hold the pad's pairing buttons\n");
 }
 
 void Console::pad() {

@@ -15,6 +15,7 @@
 //   wires [MASK LEVELS]  every pad in hexadecimal, after these outputs alone were driven (in a test)
 //   link [HEX]           what came on the line; or sends up to 16 bytes (in a test)
 //   pad                  the last report of the game pad, and how many came
+//   pad pair             obeys the pad that connects within 30 s, and no other from then on
 #pragma once
 
 #include <array>
@@ -78,6 +79,7 @@ class Console {
   void wires(const char* mask, const char* levels, p2os::Nanos now);
   void link(const char* hex);
   void pad();
+  void pair(p2os::Nanos now);
   bool is_in_test();
   void get(const char* name);
   void set(const char* name, const char* value);

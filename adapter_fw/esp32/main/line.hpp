@@ -1,4 +1,6 @@
 // UART2 as the line to the robot; the driver's rings stand between it and the loop.
+//
+// A byte is handed over within a millisecond of its stop bit at every speed, so that the loop's next pass sees it.
 #pragma once
 
 #include "../../hal/uart.hpp"

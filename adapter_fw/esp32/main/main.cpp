@@ -90,7 +90,7 @@ adapter::Master other(adapter::Master master) {
   static app::EventLog log;
   static app::EventPrinter printer(log, terminal);
   static adapter::Adapter part(settings, ROBOT, board::WIRES, clock.now());
-  static app::BoardTest test({wires, wires, wires, line, esp32::pad()});
+  static app::BoardTest test({wires, wires, wires, line, esp32::pad(store)});
   part.attach(&test, &test, &printer);
   app::CodeKeeper keeper(retained, store);
   keeper.restore(part);
@@ -116,9 +116,11 @@ adapter::Master other(adapter::Master master) {
     if (console.wants_restart()) {
       part.shutdown("restart", clock.now());
       runner.pass();
+      terminal.send();
       line.drain();
       esp_restart();
     }
+    terminal.send();
     esp32::show_on_led(part, now);
     esp_task_wdt_reset();
     vTaskDelayUntil(&woken_at, 1);

@@ -2,7 +2,7 @@
 
 namespace esp32 {
 
-hal::Pad* pad() { return nullptr; }
+hal::Pad* pad(Store&) { return nullptr; }
 
 void run_pad() {}
 

@@ -40,7 +40,7 @@ constexpr std::uint64_t bit_of(std::int8_t pin) { return pin >= 0 ? std::uint64_
 constexpr auto SHIFT_ENABLE = static_cast<std::uint32_t>(bit_of(board::SHIFT_ENABLE));
 
 //: Those outputs of a word that hang on the shift register.
-constexpr std::uint32_t shifted_outputs() {
+[[maybe_unused]] constexpr std::uint32_t shifted_outputs() {
   std::uint32_t word = 0;
   for (std::size_t place = 0; place < OUTPUTS; ++place) {
     word |= board::OUTPUT_PLACES[place] >= 0 ? 1U << place : 0;

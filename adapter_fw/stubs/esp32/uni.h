@@ -1,10 +1,15 @@
 // Bluepad32 4.2.
 #pragma once
 #include <cstdint>
-typedef struct uni_hid_device_s uni_hid_device_t;
+typedef std::uint8_t bd_addr_t[6];
+typedef struct uni_hid_device_s {
+  struct {
+    bd_addr_t btaddr;
+  } conn;
+} uni_hid_device_t;
 typedef struct uni_property_s uni_property_t;
 typedef enum { UNI_PROPERTY_IDX_COUNT } uni_property_idx_t;
-typedef enum { UNI_ERROR_SUCCESS = 0 } uni_error_t;
+typedef enum { UNI_ERROR_SUCCESS = 0, UNI_ERROR_IGNORE_DEVICE = 5 } uni_error_t;
 typedef enum { UNI_PLATFORM_OOB_GAMEPAD_SYSTEM_BUTTON } uni_platform_oob_event_t;
 typedef enum { UNI_CONTROLLER_CLASS_NONE, UNI_CONTROLLER_CLASS_GAMEPAD } uni_controller_class_t;
 enum { DPAD_UP = 1 << 0, DPAD_DOWN = 1 << 1 };
@@ -23,6 +28,7 @@ struct uni_platform {
   char* name;
   void (*init)(int count, const char** words);
   void (*on_init_complete)(void);
+  uni_error_t (*on_device_discovered)(bd_addr_t address, const char* name, std::uint16_t kind, std::uint8_t strength);
   void (*on_device_connected)(uni_hid_device_t* device);
   void (*on_device_disconnected)(uni_hid_device_t* device);
   uni_error_t (*on_device_ready)(uni_hid_device_t* device);

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
+from adapter_sim.receiver import PASS_NS
 from robot_bench.experiments.validation.figures import Figure, FigureTolerance, Finding, Missing, worst_or_missing
 from robot_bench.experiments.validation.nominal import PORT_MM_S, PROGRAM_S, TICK_S, Nominal
 from robot_bench.experiments.validation.signals import (
@@ -73,7 +74,7 @@ def sensor_figures(record: RunRecord, nominal: Nominal, scenario: Scenario) -> l
 def reading_figures(record: RunRecord, scenario: Scenario) -> list[Finding]:
     """Return whether each distance pin says what the packets do: the last reading is nearer than the threshold, or not.
 
-    A reading stands on its pin in the instant in which its packet has arrived, and no pin changes at any other.
+    A reading stands on its pin a pass of the adapter's loop after its packet has arrived, and no pin changes later.
     """
     what = "readings in packets that stand on their pins"
     begin = driving_since(record)
@@ -92,7 +93,7 @@ def reading_figures(record: RunRecord, scenario: Scenario) -> list[Finding]:
             brought[reading.number].add(t)
             seen[reading.number].add(is_near)
             total += 1
-            if at(courses[reading.number], t) == is_near:
+            if at(courses[reading.number], t + PASS_NS) == is_near:
                 right += 1
             else:
                 where = where or f"sonar {reading.number + 1} at {t / NS_PER_S:.2f} s"
@@ -101,13 +102,14 @@ def reading_figures(record: RunRecord, scenario: Scenario) -> list[Finding]:
     alone = [
         (t, number)
         for number, (course, times) in enumerate(zip(courses, brought, strict=True), start=1)
-        for t, _ in course if t > begin and t not in times
+        for t, _ in course if t > begin and not any(t - PASS_NS <= come <= t for come in times)
     ]  # fmt: skip
     both = [number for number, levels in enumerate(seen, start=1) if len(levels) == 2]
     found: list[Finding] = [
         Figure(
             group="pins", what=what, expected=total, measured=right, uncertainty=0, unit="", count=total, at=where,
-            bound=FigureTolerance(name="readings on pins", value=0, formula="each, when its packet has arrived"),
+            bound=FigureTolerance(name="readings on pins", value=0,
+                                  formula="each, a pass after its packet has arrived"),
         ),
         Figure(
             group="pins", what="changes of a distance pin without a reading", expected=0, measured=len(alone),

@@ -117,7 +117,8 @@ class EmulatedBoard:
             volts = self._settle()
             self._follow_enable(volts[EN])
             if self._has_loop_plug:
-                self.esp32.receive(ROBOT, self.esp32.sent(ROBOT))
+                left = self.esp32.sent_in_time(ROBOT)
+                self.esp32.receive(ROBOT, bytes(byte for _, byte in left), [at for at, _ in left])
 
     def _follow_enable(self, volts: float) -> None:
         is_high = self._reads(volts, ESP32_INPUT)

@@ -8,6 +8,8 @@ Invariant: time goes forward in microseconds, and what the program does follows 
 """
 
 import ctypes
+from collections import deque
+from collections.abc import Sequence
 from enum import IntEnum
 from functools import cache
 from pathlib import Path
@@ -19,6 +21,10 @@ from simbase.installation import way_to_build
 
 PORTS = 3
 CONSOLE, ROBOT = 0, 2
+#: Of a byte with its start and stop bit, at 1 bit/s.
+_US_A_BYTE = 10 * 10**6
+#: Of a port that no program has set up.
+_RESET_BAUD = 115_200
 _CHUNK = 4096
 #: Where bytes that have left, and their times, are put, a chunk at a time.
 _BUFFERS = ctypes.create_string_buffer(_CHUNK), (ctypes.c_int64 * _CHUNK)()
@@ -52,8 +58,9 @@ _REASONS = {1: ResetReason.RESTART, 2: ResetReason.PANIC, 3: ResetReason.WATCHDO
 #: The library, as a module.
 PART = "robot_bench._esp32"
 _FUNCTIONS = {
-    "machine": "p", "machine_run": "il", "machine_sent": "zispz", "machine_receive": "visz",
-    "machine_pad": "iiiiii", "machine_stack_used": "z", "machine_nvs_count": "z",
+    "machine": "p", "machine_run": "il", "machine_sent": "zispz", "machine_receive": "vispz",
+    "machine_pad": "iiiiii", "machine_pad_connect": "ili", "machine_pad_disconnect": "v",
+    "machine_stack_used": "z", "machine_nvs_count": "z",
     "machine_nvs_put": "vssl", "machine_nvs_entry": "vzppp", "machine_ram": "vpp", "machine_rtc": "vpp",
 }  # fmt: skip
 
@@ -71,7 +78,7 @@ class _State(ctypes.Structure):
         ("nvs_fault", ctypes.c_int32),
         ("stall_us", ctypes.c_int64),
         *((name, ctypes.c_int32 * PORTS) for name in ("baud", "tx_pin", "rx_pin")),
-        ("lost", ctypes.c_uint32 * PORTS),
+        *((name, ctypes.c_uint32 * PORTS) for name in ("lost", "handed")),
         ("stack_bytes", ctypes.c_uint32),
         *((name, ctypes.c_int32) for name in ("shift_data", "shift_clock", "shift_latch")),
         ("shifted", ctypes.c_uint32),
@@ -148,7 +155,9 @@ class Esp32:
         self.panic = ""
         self._started_us = 0
         self._levels = 0
-        self._sent: list[bytearray] = [bytearray() for _ in range(PORTS)]
+        #: Of each port: bytes that have left, with the time at which their stop bit ended; and those that are to come.
+        self._sent: list[list[tuple[int, int]]] = [[] for _ in range(PORTS)]
+        self._arriving: list[deque[tuple[int, int]]] = [deque() for _ in range(PORTS)]
         self.power_on()
 
     @property
@@ -187,26 +196,57 @@ class Esp32:
         self._levels = levels
         self.state.levels = levels
 
-    def receive(self, port: int, data: bytes) -> None:
-        """Let bytes arrive at a UART."""
-        if self.is_running and data:
-            self._calls.machine_receive(port, data, len(data))
+    def receive(self, port: int, data: bytes, at_us: Sequence[int] | None = None) -> None:
+        """Let bytes arrive at a UART.
+
+        Args:
+            port: Its number.
+            data: The bytes.
+            at_us: When the stop bit of each ends, in order; None: one after the other at the port's speed, from now on.
+        """
+        if at_us is None:
+            arriving, baud = self._arriving[port], self.state.baud[port] or _RESET_BAUD
+            begin_us = max(self.now_us, arriving[-1][0] if arriving else 0)
+            at_us = [begin_us - -(number * _US_A_BYTE) // baud for number in range(1, len(data) + 1)]
+        self._arriving[port] += zip(at_us, data, strict=True)
 
     def sent(self, port: int) -> bytes:
         """Return what has left at a UART since the last call."""
+        return bytes(byte for _, byte in self.sent_in_time(port))
+
+    def sent_in_time(self, port: int) -> list[tuple[int, int]]:
+        """Return what has left at a UART since the last call: when each byte's stop bit ended in µs, and the byte."""
         self._collect()
-        data = bytes(self._sent[port])
-        self._sent[port].clear()
-        return data
+        sent, self._sent[port] = self._sent[port], []
+        return sent
+
+    def handed_over(self, port: int) -> int:
+        """Return how many bytes the driver of a UART has taken from its receiver since the reset."""
+        return int(self.state.handed[port])
+
+    def connect_pad(self, address: int, *, is_found: bool = True) -> bool:
+        """Let a game pad come; False where the program has none, or declines this one.
+
+        Args:
+            address: Its Bluetooth address.
+            is_found: Whether the radio has found it, as it must a new one; False: it comes by itself.
+        """
+        return self.is_running and bool(self._calls.machine_pad_connect(address, is_found))
+
+    def disconnect_pad(self) -> None:
+        """Let the connected game pad go."""
+        if self.is_running:
+            self._calls.machine_pad_disconnect()
 
     def pad(self, *, up: bool = False, down: bool = False, forward: int = 0, backward: int = 0, turn: int = 0) -> bool:
-        """Let a game pad report; False where the program has none."""
+        """Let the connected game pad report; False where none is."""
         return self.is_running and bool(self._calls.machine_pad(up, down, forward, backward, turn))
 
     def run_until(self, until_us: int) -> None:
         """Run to a time; a program that ends begins anew, as the chip does."""
         while self.is_running:
             calls, state = self._calls_and_state()
+            self._give_bytes(until_us)
             end = calls.machine_run(until_us - self._started_us)
             if end == 0:
                 break
@@ -216,6 +256,9 @@ class Esp32:
             self._stop()
             self._start(_REASONS[end], memory)
         self.now_us = max(self.now_us, until_us)
+        for arriving in self._arriving:  # nobody was there to hear them
+            while arriving and arriving[0][0] <= self.now_us:
+                arriving.popleft()
 
     @property
     def _calls(self) -> Any:
@@ -252,13 +295,28 @@ class Esp32:
         self._library.turn_of = None
         self.is_running = False
 
+    def _give_bytes(self, until_us: int) -> None:
+        """Give the program what arrives up to a time."""
+        calls = self._calls
+        for port, arriving in enumerate(self._arriving):
+            due = []
+            while arriving and arriving[0][0] <= until_us:
+                due.append(arriving.popleft())
+            if due:
+                times = [max(at, self.now_us) - self._started_us for at, _ in due]
+                calls.machine_receive(
+                    port, bytes(byte for _, byte in due), (ctypes.c_int64 * len(due))(*times), len(due)
+                )
+
     def _collect(self) -> None:
         if not self.is_running:
             return
         calls, (data, times) = self._calls, _BUFFERS
         for port in range(PORTS):
             while size := calls.machine_sent(port, data, times, _CHUNK):
-                self._sent[port] += data.raw[:size]
+                self._sent[port] += (
+                    (self._started_us + at, byte) for at, byte in zip(times[:size], data.raw[:size], strict=True)
+                )
 
 
 @cache

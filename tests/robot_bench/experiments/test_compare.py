@@ -214,9 +214,10 @@ def test_a_run_compared_with_itself_does_not_part(runs: Path) -> None:
 def test_odometry_follows_the_truth_as_late_as_a_packet_takes(runs: Path) -> None:
     near = read_drive(runs / "near")
     found = compare(near, near, How(poses=("truth", "odometry")))
-    # 40 bytes of a SIP with two readings at 9600 bit/s take 41.7 ms.
-    assert -0.05 < found.shift_s < -0.03
-    assert found.ape_m.max < 2 * 0.84e-3  # a count of the packet, at the beginning and now
+    # 40 bytes of a SIP with two readings at 9600 bit/s take 41.7 ms; at 0.25 m/s a count is passed in 3.4 ms, and how
+    # counts and turns fall in 16 s moves the estimate by a few of them.
+    assert abs(found.shift_s + 0.0417) < 4 * 0.0034
+    assert found.ape_m.max < 3 * 0.84e-3  # a count of the packet, at the beginning and now, and one of the shift
 
 
 def test_two_thresholds_part_at_the_sensor_that_sees_farther(runs: Path, p2os, capsys) -> None:

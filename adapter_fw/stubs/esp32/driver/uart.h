@@ -24,8 +24,11 @@ esp_err_t uart_driver_install(uart_port_t port, int receive_bytes, int send_byte
 esp_err_t uart_param_config(uart_port_t port, const uart_config_t* config);
 esp_err_t uart_set_pin(uart_port_t port, int tx, int rx, int rts, int cts);
 esp_err_t uart_set_baudrate(uart_port_t port, std::uint32_t baud);
+esp_err_t uart_set_rx_full_threshold(uart_port_t port, int bytes);
+esp_err_t uart_set_rx_timeout(uart_port_t port, std::uint8_t bytes);
 esp_err_t uart_wait_tx_done(uart_port_t port, TickType_t ticks);
 esp_err_t uart_get_tx_buffer_free_size(uart_port_t port, std::size_t* size);
 int uart_read_bytes(uart_port_t port, void* data, std::uint32_t size, TickType_t ticks);
+int uart_tx_chars(uart_port_t port, const char* data, std::uint32_t size);
 int uart_write_bytes(uart_port_t port, const void* data, std::size_t size);
 }

@@ -82,7 +82,7 @@ PLANTED: Sequence[Planted] = (
             "RVEL for a pair of codes", FIRMWARE),
     Planted("a robot is given up 5 % early", f"{_FW}transitions.cpp", "received_at + settings_.liveness_ns",
             "received_at + settings_.liveness_ns * 19 / 20", "silence",
-            "the last packet to the distance pins that are safe", FIRMWARE),
+            "seeing the last packet to the distance pins that are safe", FIRMWARE),
     # the adapter's model, Python
     Planted("ranges 2 % long", f"{_MODEL}distances.py", "self._readings[number] = (range_um, now)",
             "self._readings[number] = (range_um * 51 // 50, now)", "sensors-all", READINGS, MODEL),
