@@ -26,12 +26,12 @@ def silence_figures(record: RunRecord, nominal: Nominal) -> list[Finding]:
     if down is None:
         return [Missing(group="wire", what="a line that goes down", why="no fault was injected")]
     # What was on its way when the line went down still comes.
-    reported, heard = (
+    last_sent, heard = (
         max((one.t for one in record.wire if one.direction == way and one.t < down + 100 * NS_PER_MS), default=0)
         for way in ("r2c", "c2r")
     )
     # Passes count from where the adapter got its power.
-    seen = told + -told % PASS_NS
+    seen = last_sent + -last_sent % PASS_NS
     edges = [
         next((t for t, level in value_course(record, (wire,)) if t > down and level), None) for wire in distance_wires()
     ]
