@@ -163,6 +163,11 @@ def _all() -> list[Symbol]:
         Pin(number="3", name="C", kind="open_collector", at=(0, 2 * G), side="top", length=G),
         Pin(number="2", name="E", kind="passive", at=(0, -2 * G), side="bottom", length=G),
     )
+    emitter_up = (
+        Pin(number="1", name="B", kind="input", at=(-2 * G, 0), side="left", length=G),
+        Pin(number="2", name="E", kind="passive", at=(0, 2 * G), side="top", length=G),
+        Pin(number="3", name="C", kind="open_emitter", at=(0, -2 * G), side="bottom", length=G),
+    )
     return [
         _two("R", "R", ("1", "2"), [("rectangle", ((-2.54, 1.0), (2.54, -1.0)))]),
         _two("FUSE", "F", ("1", "2"),
@@ -170,6 +175,9 @@ def _all() -> list[Symbol]:
         _two("SCHOTTKY", "D", ("A", "K"), [*_DIODE, _SCHOTTKY_BAR]),
         _two("LED", "D", ("A", "K"),
              [*_DIODE, _BAR, ("polyline", ((0, 1.5), (1.0, 2.6))), ("polyline", ((0.9, 1.5), (1.9, 2.6)))]),
+        _two("SWITCH", "SW", ("1", "2"),
+             [("circle", ((-1.9, 0), (-1.5, 0))), ("circle", ((1.9, 0), (2.3, 0))),
+              ("polyline", ((-1.9, 1.2), (1.9, 1.2))), ("polyline", ((0, 1.2), (0, 2.0)))]),
         _upright("C", "C", ("1", "2"), _PLATES),
         _upright("CP", "C", ("1", "2"),
                  [*_PLATES, ("polyline", ((-1.5, 1.4), (-0.7, 1.4))), ("polyline", ((-1.1, 1.8), (-1.1, 1.0)))]),
@@ -191,6 +199,11 @@ def _all() -> list[Symbol]:
                picture=(("polyline", ((-2.54, 2.0), (-2.54, -2.0))), ("polyline", ((-2.54, 0.8), (0, 2.54))),
                         ("polyline", ((-2.54, -0.8), (0, -2.54))),
                         ("polyline", ((-1.4, -1.0), (-0.6, -2.2), (-2.0, -1.9))))),
+        Symbol(name="PNP", prefix="Q", pins=emitter_up, ref_at=(1.6, 1.1), value_at=(1.6, -1.1), shows_names=False,
+               justify="left",
+               picture=(("polyline", ((-2.54, 2.0), (-2.54, -2.0))), ("polyline", ((-2.54, 0.8), (0, 2.54))),
+                        ("polyline", ((-2.54, -0.8), (0, -2.54))),
+                        ("polyline", ((-1.2, 2.2), (-2.0, 1.2), (-0.8, 1.4))))),
         Symbol(name="TESTPOINT", prefix="TP", ref_at=(3.4, 0), value_at=(3.4, -1.9), shows_names=False, justify="left",
                pins=(Pin(number="1", name="1", kind="passive", at=(0, 0), side="left", length=1.27),),
                picture=(("circle", ((1.97, 0), (2.67, 0))),)),
