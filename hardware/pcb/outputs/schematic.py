@@ -101,8 +101,8 @@ _SERIAL = {
 }  # fmt: skip
 _STOP = {
     "R77": (40, 32), "J7": (34, 44), "R78": (40, 56), "C14": (66, 54),
-    "R79": (98, 34), "Q3": (118, 34), "R80": (150, 50), "R81": (150, 62), "Q2": (176, 50),
-    "R82": (98, 62), "Q4": (118, 62),
+    "R79": (104, 32), "Q3": (118, 32), "R80": (160, 46), "R81": (160, 58), "Q2": (174, 46),
+    "R82": (104, 58), "Q4": (118, 58),
     "R75": (40, 94), "R76": (66, 104), "SW1": (80, 104),
 }  # fmt: skip
 _TEST = {"J4": (44, 44), **_test_points(), **{f"H{n}": (20 + 20 * n, 118) for n in range(1, 5)}}
@@ -172,7 +172,7 @@ _FRAMES = {
     "stop": [
         Frame(title="Emergency stop: a loop that must be closed", left=10, top=12, right=78, bottom=74,
               note="J7: a contact that opens, or its jumper. Open, cut, at ground: stop."),
-        Frame(title="Stop: EN low and TXD at mark, apart from each other", left=82, top=12, right=200, bottom=82,
+        Frame(title="Stop: EN low and TXD at mark, apart from each other", left=82, top=12, right=200, bottom=74,
               note="The ESP32 is held in reset, the line falls silent: the robot stops by its own watchdog, in 2 s."),
         Frame(title="Mode button; held at reset: download", left=10, top=80, right=100, bottom=118,
               note="IO0 is a strap: high at boot unless the button is held. The module has no button for it."),
