@@ -121,8 +121,8 @@ def _notes(design: Design, step: Step, pads: list[PlacedPad]) -> Iterator[str]:
             edge, anchor = (-2.0, "end") if is_left else (rules.BOARD_WIDTH_MM + 2.0, "start")
             yield f'<path class="line" d="M{x:.2f} {y:.2f} L{edge:g} {level:.2f}"/>'
             yield f'<circle class="end" cx="{x:.2f}" cy="{y:.2f}" r="0.7"/>'
-            at = edge - 1 if is_left else edge + 1
-            yield f'<text x="{at:g}" y="{level + 0.8:.2f}" text-anchor="{anchor}">{html.escape(words)}</text>'
+            words_x = edge - 1 if is_left else edge + 1
+            yield f'<text x="{words_x:g}" y="{level + 0.8:.2f}" text-anchor="{anchor}">{html.escape(words)}</text>'
 
 
 def _pad_at(design: Design, name: str, pads: list[PlacedPad]) -> tuple[float, float] | None:

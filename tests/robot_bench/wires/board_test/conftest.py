@@ -28,8 +28,10 @@ def program() -> Path:
 def tested() -> Tested:
     """Return what tests a board with faults."""
 
-    def test(*faults: Fault, between: bool = False, has_loop_plug: bool = True) -> list[Finding]:
-        board = EmulatedBoard(faults, between=between, has_loop_plug=has_loop_plug)
-        return judge(Walk(board.bluepill_end, board.adapter_end, board.pinout).measure(), board.pinout, REVISION)
+    def test(
+        *faults: Fault, between: bool = False, has_loop_plug: bool = True, revision: str = REVISION
+    ) -> list[Finding]:
+        board = EmulatedBoard(faults, between=between, has_loop_plug=has_loop_plug, revision=revision)
+        return judge(Walk(board.bluepill_end, board.adapter_end, board.pinout).measure(), board.pinout, revision)
 
     return test
