@@ -1,8 +1,10 @@
 """What KiCad says of the board (where it is installed), and how we read it (everywhere)."""
 
 import json
+import subprocess
 import sys
 import zipfile
+from pathlib import Path
 
 import pytest
 
@@ -40,6 +42,43 @@ def test_a_board_passes_the_design_rule_check_with_parity_and_gives_the_committe
     results = kicad_checks.board_checks(variant)
     assert [result for result in results if result.verdict is not Verdict.GOOD] == []
     assert len(results) == 3
+
+
+#: Closes what is narrower than 0.08 mm in each pour, and writes the areas in mm² that this adds.
+_SLITS = """
+import sys, pcbnew
+board = pcbnew.LoadBoard(sys.argv[1])
+for zone in board.Zones():
+    for layer in zone.GetLayerSet().Seq() if not zone.GetIsRuleArea() else ():
+        shape = pcbnew.SHAPE_POLY_SET(zone.GetFilledPolysList(layer))
+        closed = pcbnew.SHAPE_POLY_SET(shape)
+        closed.Inflate(40000, pcbnew.CORNER_STRATEGY_ROUND_ALL_CORNERS, 5000)
+        closed.Deflate(42000, pcbnew.CORNER_STRATEGY_ROUND_ALL_CORNERS, 5000)
+        for area in board.Zones():
+            if area.GetIsRuleArea():
+                closed.BooleanSubtract(area.Outline())
+        closed.BooleanSubtract(shape)
+        for number in range(closed.OutlineCount()):
+            print(closed.Outline(number).Area() * 1e-12)
+"""
+#: More than the round of a corner, measured 0.00008; a slit of 0.02 mm across a neck of a quarter millimetre has 0.005,
+#: and the smallest that KiCad leaves 0.0008.
+CORNER_MM2 = 0.0002
+
+
+def widest_slit_mm2(folder: Path) -> float:
+    """Return the largest area of a slit in any pour of rev B."""
+    board = generated_files.filled_project("rev-b", folder)
+    done = subprocess.run(["/usr/bin/python3", "-c", _SLITS, str(board)], capture_output=True, text=True, check=True)
+    return max(float(line) for line in done.stdout.splitlines())
+
+
+@needs_kicad
+@pytest.mark.slow
+def test_no_slit_of_a_pour_is_too_narrow_to_be_etched(monkeypatch, tmp_path) -> None:
+    assert widest_slit_mm2(tmp_path) < CORNER_MM2
+    monkeypatch.setattr(pours, "SLIT_MM", 0.0)
+    assert widest_slit_mm2(tmp_path) > CORNER_MM2
 
 
 @needs_kicad
