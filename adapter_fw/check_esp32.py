@@ -76,7 +76,7 @@ include("%s")
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class SourceCopy:
     """A copy of somebody's repository: a checkout, or a git directory with a revision."""
 
     words: str
@@ -219,7 +219,7 @@ def check_project(copies: Copies) -> int:
     return len(missing)
 
 
-def check_copy(words: argparse.Namespace, idf: Source, folder: Path) -> int:
+def check_copy(words: argparse.Namespace, idf: SourceCopy, folder: Path) -> int:
     """Check against one copy of ESP-IDF; return how much is wrong."""
     if shutil.which(CROSS) is None:
         print(
@@ -228,7 +228,7 @@ def check_copy(words: argparse.Namespace, idf: Source, folder: Path) -> int:
         return 0
     try:
         pad = [
-            Source(text).unpack(folder / name, *parts) if text else None
+            SourceCopy(text).unpack(folder / name, *parts) if text else None
             for name, text, parts in (
                 ("bluepad32", words.bluepad32, ("src/components",)),
                 ("btstack", words.btstack, ("src", "platform/freertos", "port/esp32", "3rd-party")),
@@ -260,7 +260,7 @@ def main() -> int:
         print("stub headers:")
         return min(check_boards(), 1)
     failed = 0
-    for idf in map(Source, words.idf):
+    for idf in map(SourceCopy, words.idf):
         with tempfile.TemporaryDirectory() as folder:
             failed += check_copy(words, idf, Path(folder))
     return min(failed, 1)

@@ -12,11 +12,12 @@ if TYPE_CHECKING:
     from adapter_sim.adapter import Adapter, AdapterState, AdapterStatus
     from adapter_sim.codec import BitOrder
     from adapter_sim.pinout import Pinout, PinoutError, load_pinout, parse_pinout
-    from adapter_sim.pins import PinBank
+    from adapter_sim.pins import AdapterPins
     from adapter_sim.settings import AdapterSettings, EncoderAtOpen, MotorCommand, MotorMeaning
 
 __all__ = [
     "Adapter",
+    "AdapterPins",
     "AdapterSettings",
     "AdapterState",
     "AdapterStatus",
@@ -24,7 +25,6 @@ __all__ = [
     "EncoderAtOpen",
     "MotorCommand",
     "MotorMeaning",
-    "PinBank",
     "Pinout",
     "PinoutError",
     "load_pinout",
@@ -38,7 +38,7 @@ if not TYPE_CHECKING:
             "adapter_sim.adapter": ("Adapter", "AdapterState", "AdapterStatus"),
             "adapter_sim.codec": ("BitOrder",),
             "adapter_sim.pinout": ("Pinout", "PinoutError", "load_pinout", "parse_pinout"),
-            "adapter_sim.pins": ("PinBank",),
+            "adapter_sim.pins": ("AdapterPins",),
             "adapter_sim.settings": ("AdapterSettings", "EncoderAtOpen", "MotorCommand", "MotorMeaning"),
         },
     )

@@ -55,9 +55,9 @@ from adapter_sim.distances import Distances, threshold_um
 from adapter_sim.driver import Driver
 from adapter_sim.encoders import WheelCodes
 from adapter_sim.masters import Master, Masters
-from adapter_sim.mixing import Speeds
+from adapter_sim.mixing import CommandedSpeeds
 from adapter_sim.pinout import Pinout, WireRole
-from adapter_sim.pins import EventCallback, Inputs, Outputs, PinBank, SampleClock, released_codes
+from adapter_sim.pins import AdapterPins, EventCallback, Inputs, Outputs, SampleClock, released_codes
 from adapter_sim.session import Session, SessionOpened, StopRepeater
 from adapter_sim.settings import AdapterSettings, MotorCommand
 from p2os.gamepad import PadReport
@@ -103,7 +103,7 @@ class AdapterStatus:
     #: Motor values taken, motor1 first.
     motors: tuple[int, int]
     #: Speeds of the last pair sent.
-    speeds: Speeds
+    speeds: CommandedSpeeds
     #: Level of each distance wire, wire 1 first.
     distances: tuple[bool, ...]
     #: Last range of each sonar in µm, None where unknown.
@@ -158,7 +158,7 @@ class Adapter(Stateful):
     def __init__(
         self,
         *,
-        pins: PinBank,
+        pins: AdapterPins,
         pinout: Pinout,
         parameters: RobotParameters,
         settings: AdapterSettings | None = None,

@@ -24,7 +24,7 @@ Invariant: a new command buys no time; only a SIP that passes extends the deadli
 """
 
 from adapter_sim.codec import divide_half_away
-from adapter_sim.mixing import STILL, Mixer, Speeds
+from adapter_sim.mixing import STILL, CommandedSpeeds, Mixer
 from adapter_sim.session import Session
 from adapter_sim.settings import AdapterSettings
 from p2os.protocol.commands import enable, rvel, vel
@@ -56,7 +56,7 @@ class Driver(Stateful):
             max_velocity_mm_s=min(parameters.max_velocity_mm_s, parameters.motion.max_velocity_mm_s),
             max_rotation_deg_s=min(parameters.max_rotation_deg_s, parameters.motion.max_rotation_deg_s),
         )
-        self.plausibility = PlausibilityCheck(
+        self.plausibility = SpeedPlausibility(
             timeout_ns=settings.plausibility_ns,
             tolerance_mm_s=settings.plausibility_tolerance_mm_s,
             progress_mm_s=settings.plausibility_progress_mm_s,
@@ -66,11 +66,11 @@ class Driver(Stateful):
         self._enables_left = 0
 
     @property
-    def sent(self) -> Speeds:
+    def sent(self) -> CommandedSpeeds:
         """Return the speeds of the last pair."""
         return self._pacer.sent
 
-    def begin(self, speeds: Speeds, now: Nanos) -> None:
+    def begin(self, speeds: CommandedSpeeds, now: Nanos) -> None:
         """Start to drive: the first pair is due at once, the motors are enabled with it."""
         self._enables_left = _ENABLES
         self._pacer.begin(speeds)
@@ -86,7 +86,7 @@ class Driver(Stateful):
         self.stop()
         self.plausibility.begin(now)
 
-    def want(self, speeds: Speeds) -> None:
+    def want(self, speeds: CommandedSpeeds) -> None:
         """Take the newest speeds."""
         self._pacer.wanted = speeds
 
@@ -128,7 +128,7 @@ class CommandPacer(Stateful):
         self.sent = STILL
         self._sent_at: Nanos | None = None
 
-    def begin(self, speeds: Speeds) -> None:
+    def begin(self, speeds: CommandedSpeeds) -> None:
         """Start with a first pair that is due at once."""
         self.wanted = speeds
         self.sent = STILL
@@ -142,14 +142,14 @@ class CommandPacer(Stateful):
             return max(now, self._sent_at + self._spacing_ns)
         return self._sent_at + self._refresh_ns
 
-    def take(self, now: Nanos) -> Speeds:
+    def take(self, now: Nanos) -> CommandedSpeeds:
         """Return the speeds to send at `now`, as sent."""
         self.sent = self.wanted
         self._sent_at = now
         return self.sent
 
 
-class PlausibilityCheck(Stateful):
+class SpeedPlausibility(Stateful):
     """Compares the commanded wheel speeds with those of the SIPs, all in mm/s."""
 
     STATE = ("command", "measured", "_least_error", "_passed_at")

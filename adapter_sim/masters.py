@@ -6,7 +6,7 @@ stale after a change, but they move nothing.
 
 from enum import StrEnum
 
-from adapter_sim.mixing import Mixer, Speeds
+from adapter_sim.mixing import CommandedSpeeds, Mixer
 from adapter_sim.pins import Inputs
 from adapter_sim.settings import AdapterSettings
 from p2os.gamepad import Gamepad, PadReport
@@ -47,7 +47,7 @@ class Masters(Stateful):
         return self._pad.wants_robot if self.master is Master.PAD else self.inputs.wants_robot
 
     @property
-    def speeds(self) -> Speeds:
+    def speeds(self) -> CommandedSpeeds:
         """Return the speeds that the master asks for."""
         if self.master is Master.PAD:
             return self._mixer.steer(self._pad.forward, self._pad.turn)

@@ -24,7 +24,7 @@ DEG_PER_RAD_E9 = 57_295_779_513
 
 
 @dataclass(frozen=True, slots=True)
-class Speeds:
+class CommandedSpeeds:
     """What is commanded: forward mm/s and deg/s to the left."""
 
     forward_mm_s: int
@@ -32,7 +32,7 @@ class Speeds:
 
 
 #: Standing still.
-STILL = Speeds(0, 0)
+STILL = CommandedSpeeds(0, 0)
 
 
 class Mixer:
@@ -66,7 +66,7 @@ class Mixer:
         self._pad_velocity_mm_s = settings.pad_velocity_mm_s
         self._pad_rotation_mrad_s = settings.pad_rotation_mrad_s
 
-    def mix(self, motor1: int, motor2: int) -> Speeds:
+    def mix(self, motor1: int, motor2: int) -> CommandedSpeeds:
         """Return the speeds that a pair of signed motor values asks for: steps, or duties of `FULL`."""
         first = self._of_steps(motor1, self._step_um_per_s)
         if self._meaning is MotorMeaning.WHEELS:
@@ -83,26 +83,26 @@ class Mixer:
     def _of_steps(self, value: int, step: int) -> int:
         return divide_half_away(value * step * self._steps, self._per)
 
-    def steer(self, forward: int, turn: int) -> Speeds:
+    def steer(self, forward: int, turn: int) -> CommandedSpeeds:
         """Return the speeds of a pad's deflections: `forward` of `TRIGGER_FULL`, `turn` of `STICK_FULL` to the left."""
         return self._limited(
             divide_half_away(forward * self._pad_velocity_mm_s, TRIGGER_FULL),
             divide_half_away(turn * self._pad_rotation_mrad_s * DEG_PER_RAD_E9, STICK_FULL * 10**12),
         )
 
-    def wheels_mm_s(self, speeds: Speeds) -> tuple[int, int]:
+    def wheels_mm_s(self, speeds: CommandedSpeeds) -> tuple[int, int]:
         """Return the rim speeds (left, right) that commanded speeds mean, in whole mm/s."""
         rim = divide_half_away(speeds.turn_deg_s * self.track_mm * 10**9, 2 * DEG_PER_RAD_E9)
         return speeds.forward_mm_s - rim, speeds.forward_mm_s + rim
 
-    def _limited(self, forward: int, turn: int) -> Speeds:
+    def _limited(self, forward: int, turn: int) -> CommandedSpeeds:
         if abs(forward) > self.max_velocity_mm_s:
             turn = _scaled(turn, self.max_velocity_mm_s, abs(forward))
             forward = _scaled(forward, self.max_velocity_mm_s, abs(forward))
         if abs(turn) > self.max_rotation_deg_s:
             forward = _scaled(forward, self.max_rotation_deg_s, abs(turn))
             turn = _scaled(turn, self.max_rotation_deg_s, abs(turn))
-        return Speeds(forward, turn)
+        return CommandedSpeeds(forward, turn)
 
 
 def _lower(robot: int, wanted: int | None) -> int:

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from p2os.toml_file import TomlSource, read_toml, read_user_text
-from p2os.toml_schema import Key, Kind, Place, Table, filled, within
+from p2os.toml_schema import Key, Kind, Table, TablePlace, filled, within
 from simbase.errors import FileError, shown, shown_name
 
 
@@ -29,7 +29,7 @@ class PinoutError(FileError):
     """A pin-out file is missing or contradicts itself."""
 
 
-class Direction(StrEnum):
+class WireDirection(StrEnum):
     """Who drives a wire."""
 
     #: The adapter drives, the BluePill reads.
@@ -84,7 +84,7 @@ class Wire:
 
     name: str
     role: WireRole
-    direction: Direction
+    direction: WireDirection
     #: Pin of the BluePill, for example "PA4".
     bluepill: str
     pull: Pull
@@ -166,11 +166,11 @@ _BLUEPILL_PIN = re.compile(r"P[A-C]([0-9]|1[0-5])")
 _ESP32_PIN = re.compile(r"IO([0-9]|[12][0-9]|3[0-9])|EN|HC595\.Q[A-H]")
 #: Who drives the wires of a role.
 _DRIVEN = {
-    WireRole.DISTANCE: Direction.TO_BLUEPILL,
-    WireRole.ENCODER: Direction.TO_BLUEPILL,
-    WireRole.MOTOR: Direction.TO_ADAPTER,
-    WireRole.CONNECT: Direction.TO_ADAPTER,
-    WireRole.RESET: Direction.TO_ADAPTER,
+    WireRole.DISTANCE: WireDirection.TO_BLUEPILL,
+    WireRole.ENCODER: WireDirection.TO_BLUEPILL,
+    WireRole.MOTOR: WireDirection.TO_ADAPTER,
+    WireRole.CONNECT: WireDirection.TO_ADAPTER,
+    WireRole.RESET: WireDirection.TO_ADAPTER,
 }
 #: Values that the adapter cannot do without, with their roles and sides.
 _NEEDED_VALUES = {
@@ -201,7 +201,7 @@ KEYS: Mapping[str, tuple[Key, ...]] = {
     ),
     "revision": (_key("name"), _key("status", choices=Status), _key("note")),
     "wire": (
-        _key("name"), _key("role", choices=WireRole), _key("direction", choices=Direction), _key("bluepill"),
+        _key("name"), _key("role", choices=WireRole), _key("direction", choices=WireDirection), _key("bluepill"),
         _key("pull", choices=Pull), _key("idle", "whole"), _key("safe", "any"), _key("esp32", "table"),
     ),
     "value": (_key("name"), _key("role", choices=WireRole), _key("width", "whole"), _key("side")),
@@ -247,7 +247,7 @@ def _shipped() -> Pinout:
 def parse_pinout(text: str, where: str = "pinout") -> Pinout:
     """Check the text of a pin-out file; `where` names it in messages."""
     table, places = read_toml(text, where, "a pin-out", PinoutError)
-    place = Place(TomlSource(where, places), error=PinoutError)
+    place = TablePlace(TomlSource(where, places), error=PinoutError)
     top = filled(table, KEYS[""], place)
     default = top["default_revision"]
     revisions = tuple(
@@ -302,7 +302,7 @@ def faults_of(pinout: Pinout, revision: str) -> list[str]:
 # Reading a file, table by table.
 
 
-def _rows(top: Table, name: str, where: Place) -> Iterator[tuple[Place, dict[str, Any]]]:
+def _rows(top: Table, name: str, where: TablePlace) -> Iterator[tuple[TablePlace, dict[str, Any]]]:
     """Yield the tables `[[name]]` with their places, checked."""
     for number, row in enumerate(cast("Sequence[Table]", top[name] or ())):
         at = within(where, name, number)
@@ -310,11 +310,11 @@ def _rows(top: Table, name: str, where: Place) -> Iterator[tuple[Place, dict[str
         yield at, filled(row, (*KEYS[name], *more), at)
 
 
-def _fault(where: Place, key: str, value: object, expected: str) -> PinoutError:
+def _fault(where: TablePlace, key: str, value: object, expected: str) -> PinoutError:
     return PinoutError(f"{where.at(key.partition('.')[0])}: {shown_name(key)} = {shown(value)}, expected {expected}")
 
 
-def _pins(row: Table, where: Place, revisions: list[str]) -> dict[str, str]:
+def _pins(row: Table, where: TablePlace, revisions: list[str]) -> dict[str, str]:
     """Return the pin of each revision that the row names."""
     pins = cast("dict[str, str]", row["esp32"])
     for revision, pin in pins.items():
@@ -325,7 +325,7 @@ def _pins(row: Table, where: Place, revisions: list[str]) -> dict[str, str]:
     return pins
 
 
-def _wire(row: dict[str, Any], where: Place, revisions: list[str]) -> Wire:
+def _wire(row: dict[str, Any], where: TablePlace, revisions: list[str]) -> Wire:
     role, pins = WireRole(row["role"]), _pins(row, where, revisions)
     pull, idle, safe = row["pull"], row["idle"], row["safe"]
     missing = [revision for revision in revisions if revision not in pins]
@@ -340,14 +340,15 @@ def _wire(row: dict[str, Any], where: Place, revisions: list[str]) -> Wire:
     if safe not in (0, 1, "hold") or not isinstance(safe, (int, str)) or isinstance(safe, bool):
         raise _fault(where, "safe", safe, '0, 1 or "hold"')
     return Wire(
-        name=row["name"], role=role, direction=Direction(row["direction"]), bluepill=row["bluepill"], pull=Pull(pull),
+        name=row["name"], role=role, direction=WireDirection(row["direction"]), bluepill=row["bluepill"],
+        pull=Pull(pull),
         idle=bool(idle), safe=Safe.HOLD if safe == "hold" else Safe.HIGH if safe else Safe.LOW,
         esp32=tuple((revision, None if pins[revision] == "NC" else pins[revision]) for revision in revisions),
         value=row.get("value"), bit=row.get("bit"), number=row.get("number"),
     )  # fmt: skip
 
 
-def _value(row: dict[str, Any], where: Place, wires: tuple[Wire, ...]) -> Value:
+def _value(row: dict[str, Any], where: TablePlace, wires: tuple[Wire, ...]) -> Value:
     name, role, width = row["name"], WireRole(row["role"]), row["width"]
     own = sorted((wire for wire in wires if wire.value == name), key=lambda wire: wire.bit or 0)
     bits = [wire.bit for wire in own]
@@ -359,7 +360,7 @@ def _value(row: dict[str, Any], where: Place, wires: tuple[Wire, ...]) -> Value:
     return Value(name=name, role=role, side=row["side"], width=width, wires=tuple(wire.name for wire in own))
 
 
-def _auxiliary(row: dict[str, Any], where: Place, revisions: list[str], wires: tuple[Wire, ...]) -> Auxiliary:
+def _auxiliary(row: dict[str, Any], where: TablePlace, revisions: list[str], wires: tuple[Wire, ...]) -> Auxiliary:
     shares, pins = row["shares"], _pins(row, where, revisions)
     if shares is not None and shares not in [wire.name for wire in wires]:
         raise _fault(where, "shares", shares, "the name of a wire")
@@ -407,9 +408,9 @@ def _wire_faults(wire: Wire, pin: str | None) -> list[str]:
     faults = []
     if gpio in FLASH_GPIO:
         faults.append(f"{wire.name}: {pin} carries the module's flash")
-    if wire.direction is Direction.TO_BLUEPILL and gpio in INPUT_ONLY_GPIO:
+    if wire.direction is WireDirection.TO_BLUEPILL and gpio in INPUT_ONLY_GPIO:
         faults.append(f"{wire.name}: {pin} is an input only, but must be driven")
-    if wire.direction is Direction.TO_ADAPTER and gpio in STRAP_GPIO:
+    if wire.direction is WireDirection.TO_ADAPTER and gpio in STRAP_GPIO:
         faults.append(f"{wire.name}: {pin} is a boot strap, but the BluePill drives it")
     return faults
 

@@ -1,6 +1,6 @@
 """The adapter's pins: what it needs of the far side, when it samples, debounced inputs, outputs.
 
-The bench's nets, a real GPIO bank and the fakes of the tests all fit `PinBank`. What
+The bench's nets, a real GPIO bank and the fakes of the tests all fit `AdapterPins`. What
 the levels mean for the robot is not decided here; names and weights come from the
 pin-out.
 
@@ -50,7 +50,7 @@ MOTOR_VALUES = ("motor1", "motor2")
 ENCODER_VALUES = ("encoder1", "encoder2")
 
 
-class PinBank(Protocol):
+class AdapterPins(Protocol):
     """The adapter's ends of the wires, by the names of pinout.toml."""
 
     def read(self, signal: str, at: Nanos) -> bool:
@@ -71,7 +71,7 @@ class Inputs(Stateful):
 
     STATE = ("_motors", "_connect", "_seen")
 
-    def __init__(self, pins: PinBank, pinout: Pinout, settings: AdapterSettings) -> None:
+    def __init__(self, pins: AdapterPins, pinout: Pinout, settings: AdapterSettings) -> None:
         self._pins = pins
         kind = MotorDuties if settings.motor_command is MotorCommand.DUTY else MotorBits
         self._motors: MotorBits | MotorDuties = kind(pins, [pinout.value(name) for name in MOTOR_VALUES], settings)
@@ -125,7 +125,7 @@ class Outputs(Stateful):
     STATE = ("_shown",)
     DERIVED = ("_counts",)
 
-    def __init__(self, pins: PinBank, pinout: Pinout) -> None:
+    def __init__(self, pins: AdapterPins, pinout: Pinout) -> None:
         self._pins = pins
         self._distances = pinout.with_role(WireRole.DISTANCE)
         self._encoders = tuple(
@@ -282,7 +282,7 @@ class Median(SlidingWindow):
 class MotorBits(Majority):
     """The motor values in two's complement, one word of all wires."""
 
-    def __init__(self, pins: PinBank, motors: Sequence[Value], settings: AdapterSettings) -> None:
+    def __init__(self, pins: AdapterPins, motors: Sequence[Value], settings: AdapterSettings) -> None:
         super().__init__(settings.sample_count)
         self._pins = pins
         self._bit_order: BitOrder = settings.bit_order
@@ -314,7 +314,7 @@ class MotorDuties(Median):
 
     STATE = ("_duties",)
 
-    def __init__(self, pins: PinBank, motors: Sequence[Value], settings: AdapterSettings) -> None:
+    def __init__(self, pins: AdapterPins, motors: Sequence[Value], settings: AdapterSettings) -> None:
         super().__init__(settings.sample_count, len(motors))
         self._pins = pins
         self._duties = duty_wires(pins, motors, settings)
@@ -334,7 +334,7 @@ class MotorDuties(Median):
         return tuple(-duty if read(sign, now) else duty for duty, sign in zip(duties, self._signs, strict=True))
 
 
-def duty_wires(pins: PinBank, motors: Sequence[Value], settings: AdapterSettings) -> tuple[DutyWire, ...]:
+def duty_wires(pins: AdapterPins, motors: Sequence[Value], settings: AdapterSettings) -> tuple[DutyWire, ...]:
     """Return what measures the magnitude of each motor value."""
     return tuple(
         DutyWire(partial(pins.course, motor.wires[0]), timeout_ns=settings.duty_timeout_ns) for motor in motors

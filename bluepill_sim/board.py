@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import TypeAlias, cast
 
 from bluepill_sim.chip import Chip
-from bluepill_sim.core import GENERAL, BlockRow, Register
+from bluepill_sim.core import GENERAL, BlockRow, Reg
 from bluepill_sim.core.faults import FAULT_ROWS, FaultKind, FaultReport, SeenFault
 from bluepill_sim.core.halts import ChipReached
 from bluepill_sim.core.nvic import HARD_FAULT, exception_name
@@ -39,7 +39,7 @@ from bluepill_sim.fabric.signals import UV_PER_V, to_uv
 from bluepill_sim.fabric.subscriptions import EdgeSink, Of, PinSubscription
 from bluepill_sim.memory.arrays import Memory
 from bluepill_sim.parts.attached import AttachedParts
-from bluepill_sim.parts.serial_port import Activity, SerialLine, SerialPort
+from bluepill_sim.parts.serial_port import Activity, BoardSerialLine, SerialPort
 from bluepill_sim.parts.usb import UsbHost, UsbSerial
 from bluepill_sim.peripherals.can import Can
 from bluepill_sim.peripherals.i2c import I2c
@@ -68,7 +68,7 @@ _SHOWN_CHARACTERS = 60
 _MOST_VDDA_V, _MOST_DEGREES = 4.0, 200
 _ERASED_WORD = 0xFFFF_FFFF
 #: Those of `SeenFault`.
-_SEEN_REGISTERS = (*GENERAL[:15], Register.XPSR)
+_SEEN_REGISTERS = (*GENERAL[:15], Reg.XPSR)
 _HINT = 'such as "pin PA4 high", "usart1 sends ready", "asleep", "fault", or a function of the board'
 
 
@@ -484,7 +484,7 @@ class BluePill(Stateful):
 
     def register(self, name: str) -> int:
         """Return a register by its name, such as "R0", "SP" or "XPSR"."""
-        return self.chip.engine.registers[Register[name.upper()]]
+        return self.chip.engine.registers[Reg[name.upper()]]
 
     def registers(self, peripheral: str) -> dict[str, RegisterView]:
         """Return the registers of a peripheral by name, with their fields, as a read would find them; nothing changes.
@@ -627,7 +627,7 @@ class BluePill(Stateful):
                 break
         return holds()
 
-    def _wait_for_bytes(self, port: SerialLine, pattern: bytes, within: Span) -> None:
+    def _wait_for_bytes(self, port: BoardSerialLine, pattern: bytes, within: Span) -> None:
         """Run until `pattern` is in what `port` has sent and nobody has taken (`SerialLine.expect`)."""
         end_ns = self.now_ns + to_nanos(within)
         with _stop_at_characters(port):
@@ -788,13 +788,13 @@ def _stop_at_pin(board: BluePill, name: str, what: str) -> Iterator[Callable[[],
         subscription.close()
 
 
-def _ports(board: BluePill) -> dict[str, SerialLine]:
+def _ports(board: BluePill) -> dict[str, BoardSerialLine]:
     """Return what sends characters, by its name in a condition."""
     return {**board.serial_ports, "usb": board.usb_serial}
 
 
 @contextmanager
-def _stop_at_characters(port: SerialLine, sent: bytearray | None = None) -> Iterator[None]:
+def _stop_at_characters(port: BoardSerialLine, sent: bytearray | None = None) -> Iterator[None]:
     """End the board's slice after each character that a port sends; collect them in `sent`."""
 
     def take(rows: Sequence[tuple[int, Nanos]]) -> None:

@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 
 from bluepill_sim.core import GENERAL, BlockRecorder
-from bluepill_sim.core.block_cost import NO_BLOCK, Block, measure_block
+from bluepill_sim.core.block_cost import NO_BLOCK, BasicBlock, measure_block
 from bluepill_sim.core.debugging.comparators import cycles_to_match
 from bluepill_sim.core.debugging.debug_unit import Watchpoint
 from bluepill_sim.core.forced_bits import forced_bits
@@ -29,7 +29,7 @@ from bluepill_sim.core.processor import FaultListener
 from bluepill_sim.core.system_control import PPB_BASE, PPB_BYTES, SystemControl
 from bluepill_sim.fabric.clocks import Clocks
 from bluepill_sim.fabric.cycle_clock import CycleClock
-from bluepill_sim.fabric.low_power import STOP_WAKE_NS, LowPower, Mode
+from bluepill_sim.fabric.low_power import STOP_WAKE_NS, LowPower, PowerMode
 from bluepill_sim.fabric.power import LEAST_SUPPLY_MV, MOST_SUPPLY_MV, Power
 from bluepill_sim.fabric.registers import WORD, Peripheral
 from bluepill_sim.memory.arrays import Memory
@@ -495,7 +495,7 @@ class Chip(Stateful):
         """Tell whether time passes without the core: locked up, in a low-power mode, or while it waits for flash."""
         if self._frozen_since is not None or self.processor.is_locked_up or self.is_held:
             return True
-        if self.low_power.mode is not Mode.RUN and self.low_power.holds():
+        if self.low_power.mode is not PowerMode.RUN and self.low_power.holds():
             return True
         self.engine.shared.waits = is_waiting = self.parts.flash.is_busy and self.engine.pc < SYSTEM_MEMORY_BASE
         return is_waiting
@@ -589,7 +589,7 @@ class Chip(Stateful):
         self.memory.lose_power()
         self.engine.drop_code(SRAM_BASE, SRAM_BYTES)
 
-    def _measure(self, address: int, size: int) -> Block:
+    def _measure(self, address: int, size: int) -> BasicBlock:
         """Return the costs of a block at the present flash settings."""
         code = self.engine.flash_patch.fetched(address, self.memory.read(address, size) or b"")
         is_sram = SRAM_BASE <= address < SRAM_BASE + SRAM_BYTES

@@ -16,7 +16,7 @@ from typing import TypeAlias, cast
 from bluepill_sim.fabric.fabric import Fabric, FabricPorts
 from bluepill_sim.fabric.pins import PinBank
 from bluepill_sim.fabric.ports import ChipPorts
-from bluepill_sim.fabric.registers import ClockBit, Peripheral, Place
+from bluepill_sim.fabric.registers import ClockBit, Peripheral, PeripheralMapping
 from bluepill_sim.peripherals import flash
 from bluepill_sim.peripherals.adc import Adc, Adc2
 from bluepill_sim.peripherals.afio import Afio
@@ -157,7 +157,7 @@ _NAMES = sorted((base, name) for name, base in BASES.items())
 #: The blocks that are larger than 1 KiB; that of USB has its packets.
 _LARGE_BYTES = {"USB": 0x800, "ETH": 0x2000, "USB OTG": 0x4_0000, "FSMC": 0x1000}
 
-_Maker: TypeAlias = Callable[[ChipPorts, Place], Peripheral]
+_Maker: TypeAlias = Callable[[ChipPorts, PeripheralMapping], Peripheral]
 
 
 #: The modelled peripherals, in the order in which they are made, reset and act.
@@ -387,7 +387,9 @@ def make_parts(chip: ChipPorts) -> ChipParts:
     by_name: dict[str, Peripheral] = {}
     for make, name in PERIPHERALS:
         size = _LARGE_BYTES.get(name, 0x400)
-        by_name[name] = make(chip, Place(name=name, base=BASES[name], clock=CLOCK_GATES.get(name), size=size))
+        by_name[name] = make(
+            chip, PeripheralMapping(name=name, base=BASES[name], clock=CLOCK_GATES.get(name), size=size)
+        )
     _wire(by_name, chip.pins.fabric)
     return ChipParts(by_name)
 

@@ -80,7 +80,7 @@ class Key:
     default: object = None
 
 
-class Source(Protocol):
+class KeyPlaces(Protocol):
     """What names the places of a file's keys, or of several files'."""
 
     def at(self, table: str = "", key: str = "", number: int = 0) -> str:
@@ -89,7 +89,7 @@ class Source(Protocol):
 
 
 @runtime_checkable
-class PartSource(Source, Protocol):
+class PartSource(KeyPlaces, Protocol):
     """Names the places of a part of a file, whose lists hold some of the file's tables."""
 
     def number_of(self, table: str, number: int) -> int:
@@ -98,10 +98,10 @@ class PartSource(Source, Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class TablePlace:
     """Where a table stands, for messages: `dodge.toml:12: [[obstacle]] 2`."""
 
-    source: Source
+    source: KeyPlaces
     table: str = ""
     number: int = 0
     title: str = ""
@@ -118,22 +118,22 @@ class Place:
 
 
 #: A place, or its words where there is no file.
-Where = str | Place
+Where = str | TablePlace
 
 
 @overload
-def within(where: Place, table: str, number: int | None = None) -> Place: ...
+def within(where: TablePlace, table: str, number: int | None = None) -> TablePlace: ...
 @overload
 def within(where: Where, table: str, number: int | None = None) -> Where: ...
 def within(where: Where, table: str, number: int | None = None) -> Where:
     """Return the place of a table of a file: `[table]`, or the number-th `[[table]]`, counted from 0."""
     listed = number or 0
-    if isinstance(where, Place) and isinstance(where.source, PartSource):
+    if isinstance(where, TablePlace) and isinstance(where.source, PartSource):
         listed = where.source.number_of(table, listed)
     title = f"[{table}]" if number is None else f"[[{table}]] {listed + 1}"
     if isinstance(where, str):
         return f"{where}: {title}"
-    return Place(where.source, table, number or 0, title, where.error)
+    return TablePlace(where.source, table, number or 0, title, where.error)
 
 
 def check_table(table: Table, keys: Sequence[Key], where: Where) -> None:

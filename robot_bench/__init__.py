@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from robot_bench.report.make import Files
     from robot_bench.run import RunResult, run_at_port, run_scenario
     from robot_bench.scenario.goals.judging import Goal, Judgement
-    from robot_bench.scenario.goals.watch import GoalKind, Outcome, Watch
+    from robot_bench.scenario.goals.watch import GoalKind, GoalOutcome, Watch
     from robot_bench.scenario.scenario import Scenario, known_scenarios, load_scenario
 
 __all__ = [
@@ -35,8 +35,8 @@ __all__ = [
     "Files",
     "Goal",
     "GoalKind",
+    "GoalOutcome",
     "Judgement",
-    "Outcome",
     "RemoteBench",
     "RunRecord",
     "RunResult",
@@ -63,7 +63,7 @@ if not TYPE_CHECKING:
             "robot_bench.report.make": ("Files",),
             "robot_bench.run": ("RunResult", "run_at_port", "run_scenario"),
             "robot_bench.scenario.goals.judging": ("Goal", "Judgement"),
-            "robot_bench.scenario.goals.watch": ("GoalKind", "Outcome", "Watch"),
+            "robot_bench.scenario.goals.watch": ("GoalKind", "GoalOutcome", "Watch"),
             "robot_bench.scenario.scenario": ("Scenario", "known_scenarios", "load_scenario"),
         },
     )

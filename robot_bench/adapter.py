@@ -21,9 +21,9 @@ from adapter_sim.adapter import Adapter, AdapterState, AdapterStatus
 from adapter_sim.codec import BitOrder
 from adapter_sim.distances import threshold_um
 from adapter_sim.masters import Master
-from adapter_sim.mixing import Speeds
+from adapter_sim.mixing import CommandedSpeeds
 from adapter_sim.pinout import Pinout, Safe, WireRole
-from adapter_sim.pins import MOTOR_VALUES, EventCallback, PinBank, duty_wires, released_codes
+from adapter_sim.pins import MOTOR_VALUES, AdapterPins, EventCallback, duty_wires, released_codes
 from adapter_sim.settings import AdapterSettings, EncoderAtOpen, MotorCommand, MotorMeaning
 from p2os.gamepad import PadReport
 from p2os.robots.parameters import RobotParameters
@@ -124,7 +124,7 @@ class FirmwareAdapter:
     def __init__(
         self,
         *,
-        pins: PinBank,
+        pins: AdapterPins,
         pinout: Pinout,
         parameters: RobotParameters,
         settings: AdapterSettings | None = None,
@@ -202,7 +202,7 @@ class FirmwareAdapter:
             state=self.state,
             reason=self._library.adapter_reason(self._handle).decode(),
             motors=(numbers["motor1"], numbers["motor2"]),
-            speeds=Speeds(numbers["forward_mm_s"], numbers["turn_deg_s"]),
+            speeds=CommandedSpeeds(numbers["forward_mm_s"], numbers["turn_deg_s"]),
             distances=tuple(bool(numbers["levels"] >> bit & 1) for bit in range(count)),
             ranges_um=(None,) * count,
             counts=(numbers["left_count"], numbers["right_count"]),
@@ -330,7 +330,7 @@ AnyAdapter: TypeAlias = Adapter | FirmwareAdapter
 _SHIPPED: Mapping[str, type[AnyAdapter]] = {"model": Adapter, "firmware": FirmwareAdapter}
 
 
-def make_adapter(scenario: Scenario, pins: PinBank, pinout: Pinout) -> AdapterPart:
+def make_adapter(scenario: Scenario, pins: AdapterPins, pinout: Pinout) -> AdapterPart:
     """Return the adapter that a scenario wants.
 
     Raises:
@@ -347,7 +347,7 @@ def make_adapter(scenario: Scenario, pins: PinBank, pinout: Pinout) -> AdapterPa
     )
 
 
-def make_shipped_adapter(scenario: Scenario, pins: PinBank, pinout: Pinout) -> AnyAdapter:
+def make_shipped_adapter(scenario: Scenario, pins: AdapterPins, pinout: Pinout) -> AnyAdapter:
     """Return the adapter that a scenario wants, for a real robot: its stops are tested, those of others are not.
 
     Raises:

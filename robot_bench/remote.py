@@ -38,7 +38,7 @@ from robot_bench.scenario.scenario import Scenario
 from robot_bench.wires.chip_pins import ChipPins
 from robot_bench.wires.nets import OwnedPins
 from robot_bench.wires.port_endpoint import PortEndpoint, stop_robot
-from robot_bench.wires.ports import Chip
+from robot_bench.wires.ports import LeadingChip
 from simbase.interrupts import held_back
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
@@ -71,7 +71,7 @@ class RemoteBench:
         pacer: RealTimePacer,
         *,
         trace: TraceWriter | None = None,
-        chip: Chip | None = None,
+        chip: LeadingChip | None = None,
     ) -> None:
         self.scenario = scenario
         self.trace = trace or TraceWriter()

@@ -39,7 +39,7 @@ from robot_bench.report.make import Artefacts, Files, make_artefacts, make_artef
 from robot_bench.report.page_of_all import REPORT_NAME
 from robot_bench.running.pacer import PACED_SLICE_NS, RealTimePacer
 from robot_bench.scenario.scenario import Scenario
-from robot_bench.wires.ports import Chip
+from robot_bench.wires.ports import LeadingChip
 from simbase.entry_points import installed_points
 from simbase.errors import FileError, P2osError, UsageError
 from simbase.files import sha256_of
@@ -60,7 +60,7 @@ _LOG = logger("bench")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Progress:
+class RunProgress:
     """Where a run stands."""
 
     now: Nanos
@@ -73,7 +73,7 @@ class Progress:
 RunBench = Callable[[Bench], None]
 RunRemoteBench = Callable[[RemoteBench], None]
 _AnyBench = TypeVar("_AnyBench", Bench, RemoteBench)
-ProgressListener = Callable[[Progress], None]
+ProgressListener = Callable[[RunProgress], None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -261,7 +261,7 @@ def meta_of(scenario: Scenario, world: World | None, note: str | None, *, is_at_
 
 
 def _measured(
-    chip: Chip, *, coverage: bool, profile: bool, fail_under: float
+    chip: LeadingChip, *, coverage: bool, profile: bool, fail_under: float
 ) -> "contextlib.AbstractContextManager[Measurement | None]":
     """Return a block in which coverage and profile of a chip are measured; nothing is where neither is wanted."""
     if not coverage and not profile:
@@ -323,7 +323,7 @@ def _after_slice(
         if pacer is not None:
             pacer.keep_pace(now)
         if on_progress is not None:
-            on_progress(Progress(now=now, duration_ns=bench.scenario.duration_ns, doing=lambda: doing(bench)))
+            on_progress(RunProgress(now=now, duration_ns=bench.scenario.duration_ns, doing=lambda: doing(bench)))
 
     return after_slice
 
@@ -480,7 +480,7 @@ def _removed(folder: Path) -> Artefacts:
     return Artefacts(outcome=outcome, report=folder / REPORT_NAME)
 
 
-def parts_of(chip: Chip) -> list[Json]:
+def parts_of(chip: LeadingChip) -> list[Json]:
     """Return what each part on the board came to: its name, a line, and a picture (PNG, base64) where it has one."""
     found: list[Json] = []
     attached: AttachedParts | None = getattr(chip, "attached", None)

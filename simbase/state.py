@@ -90,7 +90,7 @@ class Stateful:
 
 
 @runtime_checkable
-class Part(Protocol):
+class StatefulPart(Protocol):
     """Whatever saves and restores itself, such as a twin in another language that keeps its state itself."""
 
     def snapshot(self) -> object:
@@ -105,7 +105,7 @@ class _Rebuilders(dict[type, Callable[[Any, str, _Inner], object] | None]):
 
     def __missing__(self, kind: type) -> Callable[[Any, str, _Inner], object] | None:
         parameters = getattr(kind, "__dataclass_params__", None)
-        is_frozen = parameters is not None and parameters.frozen and not issubclass(kind, Part)
+        is_frozen = parameters is not None and parameters.frozen and not issubclass(kind, StatefulPart)
         if issubclass(kind, _LEAVES) or is_frozen:
             self[kind] = None
         else:
@@ -282,7 +282,7 @@ def _refuse_left_over(items: Iterable[object], path: str) -> None:
 @cache
 def _is_part(kind: type) -> bool:
     """Tell whether what is of a type is a part; found out once a type, for a protocol's check takes 20 µs."""
-    return issubclass(kind, Part)
+    return issubclass(kind, StatefulPart)
 
 
 def _like_dict(value: dict[Any, Any], items: dict[Any, Any]) -> object:
@@ -319,7 +319,7 @@ class _Generator(tuple[object, ...]):
 
 #: How a value is copied: of what kind, and how, with a function for what it holds.
 _REBUILD: tuple[tuple[type, Callable[[Any, str, _Inner], object]], ...] = (
-    (Part, lambda part, _path, _inner: part.snapshot()),
+    (StatefulPart, lambda part, _path, _inner: part.snapshot()),
     (_Generator, lambda saved, _path, _inner: saved.made()),
     (tuple, _rebuild_tuple),
     (deque, lambda value, path, inner: deque([inner(item, path) for item in value], value.maxlen)),
@@ -334,7 +334,7 @@ _REBUILD: tuple[tuple[type, Callable[[Any, str, _Inner], object]], ...] = (
 
 #: What is always restored in place, from a snapshot of another kind than itself.
 _IN_PLACE: tuple[tuple[type, Callable[[Any, Any], object]], ...] = (
-    (Part, lambda part, saved: part.restore(saved)),
+    (StatefulPart, lambda part, saved: part.restore(saved)),
     (ctypes.Array, lambda words, saved: ctypes.memmove(words, saved, len(saved))),
     (random.Random, lambda source, saved: source.setstate(saved)),
 )

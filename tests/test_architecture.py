@@ -488,3 +488,34 @@ def test_the_map_names_what_is_there() -> None:
         (name, path) for name, path in facts if name.split(".")[-1] not in (ROOT / path).read_text(encoding="utf-8")
     ]
     assert gone == []
+
+
+#: Class names that stand in more than one module of what we ship, with what makes them one word of one meaning.
+NAMED_TWICE = {
+    "Body": "examples of an outside body: each is a program that a user copies whole",
+    "Engine": "the engine of a simulation, in each field's own sense: of instructions, and of physics",
+    "Pose": "a pose: of a world's things, and the event that tells one; an event's class is named as its trace says",
+    "Ranges": "sonar ranges: the message of an outside body, and the event that tells them",
+    "Robot": "the client, blocking and asyncio: one program changes its import alone",
+    "SonarRays": "the same idea on two physics engines, exchanged for each other",
+    "Wave": "a timer's wave on a pin, and the event that tells one",
+}
+
+
+def classes_by_name() -> dict[str, list[str]]:
+    """Return the modules of each public class at a module's top, of all tracked code but the tests."""
+    found: dict[str, list[str]] = {}
+    for folder in (*PACKAGES, "adapter_fw", "hardware", "tools", "examples"):
+        for path in sorted((ROOT / folder).rglob("*.py")):
+            for node in ast.parse(path.read_text(encoding="utf-8")).body:
+                if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                    found.setdefault(node.name, []).append(module_name(path))
+    return found
+
+
+def test_a_class_name_stands_once_or_says_why_not() -> None:
+    twice = {name: modules for name, modules in classes_by_name().items() if len(modules) > 1}
+    surprising = {name: modules for name, modules in twice.items() if name not in NAMED_TWICE}
+    assert surprising == {}, "name the class by what it is in its field, or say in NAMED_TWICE why both are one word"
+    assert sorted(NAMED_TWICE) == sorted(twice), "a reason stands for a name that no longer stands twice"
+    assert len(NAMED_TWICE) <= 20

@@ -6,7 +6,7 @@
 
 A robot drives from the middle of the arena with both rims at 0.4 m/s, ramped as the firmware
 ramps, until it meets a thing; the same command goes on for some seconds, then both set-points
-are zero. `Contact.faults` says what of a contact breaks the contract of `body`'s data sheet.
+are zero. `SurveyedContact.faults` says what of a contact breaks the contract of `body`'s data sheet.
 
 Needs the engines of the bodies. Ends with 1 where a contact
 breaks the contract.
@@ -48,7 +48,7 @@ ENERGY_MARGIN = 1.05
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Contact:
+class SurveyedContact:
     """What was measured of one contact; times in seconds from the first touch, None where it did not happen."""
 
     body: str
@@ -93,7 +93,7 @@ class Contact:
 
 def measure(
     body: RobotBody, model: RobotParameters, heading_deg: float, watched_s: float = WATCHED_S
-) -> Contact | None:
+) -> SurveyedContact | None:
     """Drive against whatever is there; return what was measured, None where nothing is met."""
     body.reset(Pose(0.0, 0.0, math.radians(heading_deg)), 0)
     for step in range(round(LONGEST_WAY_S * 1000)):
@@ -116,7 +116,7 @@ def _watch(body: RobotBody, speed_mps: float, seconds: float) -> Iterator[BodySt
 
 def _judge(
     name: str, model: RobotParameters, heading_deg: float, states: Sequence[BodyState], stopping: Sequence[BodyState]
-) -> Contact:
+) -> SurveyedContact:
     """Return what the states after a first touch, and those after the command to stop, amount to."""
     speeds = [_speed(states, look) for look in range(len(states))]
     slides = [speed >= SLIDE_SHARE * COMMAND_MPS for speed in speeds]
@@ -135,7 +135,7 @@ def _judge(
         speed**2 + gyration_m2 * state.turn_radps**2
         for speed, state in list(zip(speeds, states, strict=True))[MEAN_LOOKS:]
     ]
-    return Contact(
+    return SurveyedContact(
         body=name,
         model=model.subclass,
         heading_deg=heading_deg,
@@ -175,7 +175,7 @@ def _longest(claims: Iterable[bool]) -> float:
     return max((sum(1 for _ in run) * LOOK_S for claim, run in itertools.groupby(claims) if claim), default=0.0)
 
 
-def survey(bodies: Sequence[str], models: Sequence[str], headings: int, world: World) -> Iterator[Contact]:
+def survey(bodies: Sequence[str], models: Sequence[str], headings: int, world: World) -> Iterator[SurveyedContact]:
     """Measure a contact for each model, body and heading that meets a thing."""
     for model in models:
         parameters = load_parameters(model)
@@ -193,7 +193,7 @@ PANEL_PX, TALL_PX, LEFT_PX, TOP_PX, GAP_PX = 620, 130, 60, 56, 34
 SHOWN_S = 4.0
 
 
-def picture(contacts: Sequence[Contact]) -> str:
+def picture(contacts: Sequence[SurveyedContact]) -> str:
     """Return an SVG of when each contact had its first stall bit (filled) and came to rest (ring), by heading."""
     models = list(dict.fromkeys(one.model for one in contacts))
     bodies = list(dict.fromkeys(one.body for one in contacts))

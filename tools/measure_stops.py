@@ -226,7 +226,7 @@ class Cable:
 
 
 @dataclass
-class Driver:
+class DrivingProgram:
     """A process that drives, and what it needs to go on."""
 
     process: subprocess.Popen[bytes]
@@ -267,10 +267,10 @@ WAYS = (
 )  # fmt: skip
 
 
-def paused(span_s: float, *, by_suspend: bool) -> Callable[[Driver, Cable], float]:
+def paused(span_s: float, *, by_suspend: bool) -> Callable[[DrivingProgram, Cable], float]:
     """Return what stops the process for so long, or lets its machine sleep; counted from when it goes on."""
 
-    def pause(driver: Driver, _: Cable) -> float:
+    def pause(driver: DrivingProgram, _: Cable) -> float:
         driver.process.send_signal(signal.SIGSTOP)
         time.sleep(span_s)
         if by_suspend:
@@ -282,7 +282,7 @@ def paused(span_s: float, *, by_suspend: bool) -> Callable[[Driver, Cable], floa
     return pause
 
 
-def twice(driver: Driver, _: Cable) -> float:
+def twice(driver: DrivingProgram, _: Cable) -> float:
     """Ctrl-C by somebody who is in a hurry."""
     at = time.monotonic()
     for _round in range(20):
@@ -292,7 +292,7 @@ def twice(driver: Driver, _: Cable) -> float:
     return at
 
 
-def cut(_: Driver, cable: Cable) -> float:
+def cut(_: DrivingProgram, cable: Cable) -> float:
     """Nothing passes for the pause, and nobody is told; counted from when it carries again."""
     cable.is_cut = True
     time.sleep(CUT_S)
@@ -301,24 +301,24 @@ def cut(_: Driver, cable: Cable) -> float:
     return at
 
 
-def closed(_: Driver, cable: Cable) -> float:
+def closed(_: DrivingProgram, cable: Cable) -> float:
     """The client's end is closed under it."""
     at = time.monotonic()
     cable.closes.set()
     return at
 
 
-def released(driver: Driver, _: Cable) -> float:
+def released(driver: DrivingProgram, _: Cable) -> float:
     """The key is let go, or with no keys: nothing."""
     at = time.monotonic()
     driver.is_held.clear()
     return at
 
 
-def sent(number: signal.Signals) -> Callable[[Driver, Cable], float]:
+def sent(number: signal.Signals) -> Callable[[DrivingProgram, Cable], float]:
     """Return what sends a signal."""
 
-    def send(driver: Driver, _: Cable) -> float:
+    def send(driver: DrivingProgram, _: Cable) -> float:
         at = time.monotonic()
         driver.process.send_signal(number)
         return at
@@ -331,7 +331,7 @@ class Happening:
     """Something that can happen: does it, and returns from when on STOP is counted."""
 
     name: str
-    do: Callable[[Driver, Cable], float]
+    do: Callable[[DrivingProgram, Cable], float]
     #: The process can say nothing, the line carries nothing and the robot's watchdog stops it, or zero speeds do.
     without_stop: bool = False
     #: The wheels may stand before it is over; STOP has to be the first frame afterwards, if any comes.
@@ -364,7 +364,7 @@ HAPPENINGS = (
 
 
 @dataclass
-class Row:
+class StopRow:
     """What came of it; milliseconds from the event, or from the end of a pause."""
 
     way: str
@@ -377,7 +377,7 @@ class Row:
     problem: str = ""
 
 
-def measure(way: Way, event: Happening, tools: "Tools") -> Row:
+def measure(way: Way, event: Happening, tools: "Tools") -> StopRow:
     """Drive, let it happen, and look; where a busy machine ended the driver before the event, anew."""
     for _ in range(TRIES):
         row = measure_once(way, event, tools)
@@ -386,9 +386,9 @@ def measure(way: Way, event: Happening, tools: "Tools") -> Row:
     return row
 
 
-def measure_once(way: Way, event: Happening, tools: "Tools") -> Row:
+def measure_once(way: Way, event: Happening, tools: "Tools") -> StopRow:
     """Drive, let it happen, and look."""
-    row = Row(way.name, event.name)
+    row = StopRow(way.name, event.name)
     robot = ServedRobot()
     cable = Cable(robot.url)
     with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as stack:
@@ -431,7 +431,7 @@ def drives(robot: ServedRobot) -> bool:
     return robot.speeds[-1][1] > 0.15
 
 
-def has_given_up(cable: Cable, driver: Driver) -> bool:
+def has_given_up(cable: Cable, driver: DrivingProgram) -> bool:
     """Tell whether the driver has ended, or has sent STOP after a speed: every way drives by VEL."""
     told = [command for _, command in cable.since(0.0)]
     speeds = [place for place, command in enumerate(told) if command.number == CommandNumber.VEL and command.integer]
@@ -444,7 +444,7 @@ def stops(cable: Cable, at: float) -> list[float]:
     return [when for when, command in cable.since(at) if command.number == CommandNumber.STOP]
 
 
-def fault(row: Row, event: Happening) -> str:
+def fault(row: StopRow, event: Happening) -> str:
     """Return what is wrong with a row, or nothing."""
     if row.stands_ms is None:
         return "it never stands"
@@ -475,7 +475,9 @@ class Tools:
     adapter: Path | None
 
 
-def start(way: Way, url: str, folder: Path, tools: Tools, *, blocked: bool, stack: contextlib.ExitStack) -> Driver:
+def start(
+    way: Way, url: str, folder: Path, tools: Tools, *, blocked: bool, stack: contextlib.ExitStack
+) -> DrivingProgram:
     """Start a way of driving; `stack` ends it."""
     slept_path = folder / "slept"
     slept_path.write_bytes(bytes(mmap.PAGESIZE))
@@ -508,7 +510,7 @@ def start(way: Way, url: str, folder: Path, tools: Tools, *, blocked: bool, stac
         stdin=terminal if way.has_keys else subprocess.PIPE,
         stdout=output, stderr=terminal if way.has_keys else output,
     )  # fmt: skip
-    driver = Driver(process, slept)
+    driver = DrivingProgram(process, slept)
     stack.callback(end, driver)
     driver.is_held.set()
     if way.has_keys:
@@ -525,7 +527,7 @@ def start(way: Way, url: str, folder: Path, tools: Tools, *, blocked: bool, stac
     return driver
 
 
-def end(driver: Driver) -> None:
+def end(driver: DrivingProgram) -> None:
     """End what was started."""
     driver.is_held.clear()
     for process in (*driver.others, driver.process):
@@ -542,7 +544,7 @@ def begin(work: Callable[..., None], *arguments: object, stack: contextlib.ExitS
     stack.callback(is_over.set)
 
 
-def hold_key(keys: int, driver: Driver, is_blocked: bool, is_over: threading.Event) -> None:
+def hold_key(keys: int, driver: DrivingProgram, is_blocked: bool, is_over: threading.Event) -> None:
     """Hold `w` as a keyboard does, and read what the terminal shows unless it is held with Ctrl-S."""
     os.set_blocking(keys, False)
     while not is_over.wait(0.03):
@@ -648,7 +650,7 @@ def main() -> int:
     return int(is_bad)
 
 
-def line_of(row: Row) -> str:
+def line_of(row: StopRow) -> str:
     """Return a row of the table."""
 
     def ms(value: int | None) -> str:

@@ -82,7 +82,7 @@ while True:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Peer:
+class PeerProgram:
     """A program that drives a robot.
 
     Args:
@@ -139,9 +139,9 @@ ARIA_SHOWS = {
 }
 
 
-def _aria(program: str) -> Peer:
+def _aria(program: str) -> PeerProgram:
     words = (program, "-rh", "{host}", "-rrtp", "{port}", *ARIA_WORDS.get(program, ()))
-    return Peer(
+    return PeerProgram(
         name=f"ARIA {program}", needs=(program,), commands=(words,), serve=("--for", "aria"),
         moves=program in ARIA_DRIVES, shows=ARIA_SHOWS.get(program, ""),
         flash="[flash]\ngripper = 2\n" if "gripper" in program else "",
@@ -149,12 +149,12 @@ def _aria(program: str) -> Peer:
 
 
 PEERS = (
-    Peer(
+    PeerProgram(
         name="p2os drive", needs=(sys.executable,),
         commands=((sys.executable, "-m", "p2os", "drive", "{url}", "--vel", "0.2m/s", "--for", "60s"),),
     ),
     *map(_aria, (*ARIA_DRIVES, *ARIA_TALKS)),
-    Peer(
+    PeerProgram(
         name="ROS 1 p2os", needs=("rosrun", "roscore", "rostopic"), killed=1,
         commands=(
             ("roscore",),
@@ -163,22 +163,22 @@ PEERS = (
             ("rostopic", "pub", "-r", "5", "/cmd_vel", "geometry_msgs/Twist", "{linear: {x: 0.2}}"),
         ),
     ),
-    Peer(
+    PeerProgram(
         name="player", needs=("player",), files=(("player.cfg", PLAYER),),
         commands=(("player", "{folder}/player.cfg"), (sys.executable, "-c", PLAYER_MOVER)),
     ),
-    Peer(
+    PeerProgram(
         name="Soar", needs=("soar",), serve=("--firmware", "ARCOS"), files=(("mover.py", SOAR_MOVER),),
         commands=(("{python}", "{folder}/mover.py"),),
     ),
-    Peer(name="p2os-arduino", needs=("p2os-arduino",), commands=(("p2os-arduino", "{line}"),)),
+    PeerProgram(name="p2os-arduino", needs=("p2os-arduino",), commands=(("p2os-arduino", "{line}"),)),
 )  # fmt: skip
 
 
 class Served:
     """A robot of its own for one peer, its line, and what `serve` says of it."""
 
-    def __init__(self, peer: Peer, folder: Path) -> None:
+    def __init__(self, peer: PeerProgram, folder: Path) -> None:
         port = f"pty:{folder / 'line'}" if peer.has_terminal else "tcp:127.0.0.1:0"
         words = ["serve", "--port", port, "--body", "kinematic", "--json", "--status", STATUS, *peer.serve]
         if peer.flash:
@@ -252,7 +252,7 @@ class Served:
 
 
 @dataclass
-class Row:
+class PeerRow:
     """What a peer did, for the table; an empty word is not reached."""
 
     peer: str
@@ -309,7 +309,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return int(any(row.problem and not row.is_skipped for row in rows))
 
 
-def _named(text: str, refuse: Callable[[str], object]) -> Peer:
+def _named(text: str, refuse: Callable[[str], object]) -> PeerProgram:
     """Return the peer that an option names."""
     name, equals, command = text.partition("=")
     known = next((peer for peer in PEERS if peer.name == name), None)
@@ -317,14 +317,14 @@ def _named(text: str, refuse: Callable[[str], object]) -> Peer:
         words = tuple(shlex.split(command))
         if not words:
             refuse(f"--peer {text}: no command")
-        return Peer(name=name, needs=words[:1], commands=(words,), serve=known.serve if known else ())
+        return PeerProgram(name=name, needs=words[:1], commands=(words,), serve=known.serve if known else ())
     if known is None:
         refuse(f"no peer {name!r}; there are: {', '.join(peer.name for peer in PEERS)}; or NAME=COMMAND")
         raise AssertionError
     return known
 
 
-def table(rows: Sequence[Row]) -> str:
+def table(rows: Sequence[PeerRow]) -> str:
     """Return the rows as a table of 80 columns."""
     head = ("peer", "drives", "2nd client", "stands", "next", "again", "result")
     lines = [head] + [
@@ -337,9 +337,9 @@ def table(rows: Sequence[Row]) -> str:
     )
 
 
-def measured(peer: Peer) -> Row:
+def measured(peer: PeerProgram) -> PeerRow:
     """Take one peer through everything; return its row."""
-    row = Row(peer.name)
+    row = PeerRow(peer.name)
     missing = [program for program in peer.needs if shutil.which(program) is None]
     if missing:
         row.problem = f"skipped: no {', '.join(missing)}"
@@ -356,7 +356,7 @@ def measured(peer: Peer) -> Row:
     return row
 
 
-def _through(peer: Peer, served: Served, folder: Path, row: Row) -> None:
+def _through(peer: PeerProgram, served: Served, folder: Path, row: PeerRow) -> None:
     never = "never drove" if peer.moves else "never opened a session"
     started = time.monotonic()
     with _started(peer, served, folder) as processes:
@@ -384,7 +384,7 @@ def _through(peer: Peer, served: Served, folder: Path, row: Row) -> None:
 
 
 @contextlib.contextmanager
-def _started(peer: Peer, served: Served, folder: Path) -> Iterator[list[subprocess.Popen[bytes]]]:
+def _started(peer: PeerProgram, served: Served, folder: Path) -> Iterator[list[subprocess.Popen[bytes]]]:
     """Start a peer's programs, and kill what is left of them in the end."""
     parsed = parse_url(served.line_url)
     values = {"url": served.line_url, "folder": str(folder), "line": str(folder / "line")}

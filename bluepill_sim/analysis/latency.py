@@ -50,7 +50,7 @@ class ExceptionCost:
         return max(self.durations, default=None)
 
 
-class Latency:
+class LatencyProbe:
     """Measures waits; a `BlockListener`, which must be fed in the run's own order of time."""
 
     def __init__(self, board: BluePill) -> None:

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from bluepill_sim.analysis.silicon.comparison import Row, Verdict, ask_model, compare
+from bluepill_sim.analysis.silicon.comparison import ComparedNumber, NumberVerdict, ask_model, compare
 from bluepill_sim.analysis.silicon.log import KINDS, MOST_BYTES, read_log
 from simbase.files import read_bytes
 
@@ -31,17 +31,17 @@ def compare_silicon(
     chip = read_log(read_bytes(log, most=MOST_BYTES), log.name)
     rows = compare(chip, ask_model())
     for row in rows:
-        if show_all or row.verdict is not Verdict.SAME:
+        if show_all or row.verdict is not NumberVerdict.SAME:
             typer.echo(line_of(row))
     for kind, what in {"reg": "registers before anything was changed", **KINDS}.items():
         found = Counter(row.verdict for row in rows if row.kind == kind)
-        counts = ", ".join(f"{found[verdict]} {verdict.value}" for verdict in Verdict if found[verdict])
+        counts = ", ".join(f"{found[verdict]} {verdict.value}" for verdict in NumberVerdict if found[verdict])
         typer.echo(f"{kind:7} {what}: {counts or 'none'}")
-    if any(row.verdict in {Verdict.DIFFERS, Verdict.MISSING} for row in rows):
+    if any(row.verdict in {NumberVerdict.DIFFERS, NumberVerdict.MISSING} for row in rows):
         raise typer.Exit(1)
 
 
-def line_of(row: Row) -> str:
+def line_of(row: ComparedNumber) -> str:
     """Return a number of both as a line: registers and flags in hex, cycles as numbers with their difference."""
     is_word = row.kind in {"reg", "flag"}
     chip, model = (_written(value, is_word=is_word) for value in (row.chip, row.model))

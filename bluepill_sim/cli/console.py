@@ -24,7 +24,7 @@ _READ_BYTES = 4096
 PTY = frozenset({"pty:", "pty"})
 
 
-class SerialPort(Protocol):
+class ConsolePort(Protocol):
     """What a console needs of a USART, or of a serial port over USB."""
 
     def subscribe(self, sink: Callable[[Sequence[tuple[int, int]]], None]) -> Callable[[], None]:
@@ -159,7 +159,7 @@ def open_console(where: str, *, raw: bool = False) -> Console:
     return StreamConsole(open_to_write(Path(where)), where)
 
 
-def connect(console: Console, port: SerialPort) -> Callable[[], None]:
+def connect(console: Console, port: ConsolePort) -> Callable[[], None]:
     """Connect a console to a port, and return the function that carries what was typed to the chip."""
     port.subscribe(lambda rows: console.write(bytes(word & 0xFF for word, _ in rows)))
 

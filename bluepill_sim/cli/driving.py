@@ -41,7 +41,7 @@ class OverBudgetError(BluePillError):
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class PinChange:
     """A level put on a pin from outside, at a time."""
 
     at_ns: Nanos
@@ -50,7 +50,7 @@ class Change:
     level: str
 
 
-def parse_changes(texts: Sequence[str], board: BluePill) -> list[Change]:
+def parse_changes(texts: Sequence[str], board: BluePill) -> list[PinChange]:
     """Return what `--drive` asks for, by time.
 
     Raises:
@@ -68,7 +68,7 @@ def parse_changes(texts: Sequence[str], board: BluePill) -> list[Change]:
             is_bonded = False
         if not is_bonded:
             raise BluePillError(f"--drive {text!r}: the chip has no leg {name.upper()}", hint=_HINT)
-        changes.append(Change(to_nanos(at) if at else 0, name.upper(), level.lower()))
+        changes.append(PinChange(to_nanos(at) if at else 0, name.upper(), level.lower()))
     return sorted(changes, key=lambda change: change.at_ns)
 
 
@@ -76,7 +76,7 @@ class Schedule:
     """A board, and what happens at its pins."""
 
     def __init__(
-        self, board: BluePill, changes: Sequence[Change], advance: Callable[[Nanos], ChipReached] | None = None
+        self, board: BluePill, changes: Sequence[PinChange], advance: Callable[[Nanos], ChipReached] | None = None
     ) -> None:
         """Plan changes.
 
@@ -131,7 +131,7 @@ def _put(pin: Pin, level: str) -> None:
         pin.set_volts(float(level[:-1]))
 
 
-def run_driven(board: BluePill, end_ns: Nanos, changes: Sequence[Change]) -> ChipReached:
+def run_driven(board: BluePill, end_ns: Nanos, changes: Sequence[PinChange]) -> ChipReached:
     """Run to a time and put the changes on the pins at theirs; a halt for good ends it."""
     with showing_where_it_hangs(board):
         return Schedule(board, changes).run_to(end_ns)

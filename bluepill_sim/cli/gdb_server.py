@@ -14,7 +14,7 @@ from collections.abc import Callable
 from bluepill_sim.debug.execution import Execution
 from bluepill_sim.debug.gdb_session import GdbSession
 from bluepill_sim.debug.machine import Machine
-from bluepill_sim.debug.packets import Mark, Packet, PacketReader, frame
+from bluepill_sim.debug.packets import GdbPacket, PacketMark, PacketReader, frame
 from bluepill_sim.errors import BluePillError
 from simbase.listening import WebClientError, listen_tcp
 from simbase.timing import NS_PER_S, Nanos
@@ -128,7 +128,7 @@ class _Connection:
         self._on_wait = on_wait
         line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._reader = PacketReader()
-        self._packets: list[Packet] = []
+        self._packets: list[GdbPacket] = []
         self._is_interrupted = False
         self._is_lost = False
         #: Whether it never was a debugger's.
@@ -139,7 +139,7 @@ class _Connection:
     def close(self) -> None:
         self._line.close()
 
-    def next_packet(self) -> Packet | None:
+    def next_packet(self) -> GdbPacket | None:
         """Wait for a packet; None once the other end is gone."""
         while not self._packets:
             if self._is_lost:
@@ -180,15 +180,15 @@ class _Connection:
         for event in self._reader.receive(data):
             self._take(event)
 
-    def _take(self, event: Packet | Mark) -> None:
-        if isinstance(event, Packet):
+    def _take(self, event: GdbPacket | PacketMark) -> None:
+        if isinstance(event, GdbPacket):
             if self.has_acks:
                 self._write(b"+")
             self._packets.append(event)
             self._is_interrupted = False  # a Ctrl-C is for what was asked for before it
-        elif event is Mark.INTERRUPT:
+        elif event is PacketMark.INTERRUPT:
             self._is_interrupted = True
-        elif event is Mark.DAMAGED and self.has_acks:
+        elif event is PacketMark.DAMAGED and self.has_acks:
             self._write(b"-")
-        elif event is Mark.NAK:
+        elif event is PacketMark.NAK:
             self._write(self._last)

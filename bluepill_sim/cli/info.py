@@ -9,7 +9,7 @@ from bluepill_sim.analysis.columns import in_columns
 from bluepill_sim.board import BluePill
 from bluepill_sim.cli.driving import run_driven
 from bluepill_sim.cli.quantities import Firmware, JsonOutput, time_option
-from bluepill_sim.program.elf_file import Layout, layout, stack_top, variables_end, vectors
+from bluepill_sim.program.elf_file import MemoryLayout, layout, stack_top, variables_end, vectors
 from bluepill_sim.program.image import Image
 from bluepill_sim.stm32f103 import FLASH_BYTES, SRAM_BYTES
 from simbase.timing import NS_PER_S, Nanos
@@ -101,7 +101,7 @@ def _print(board: BluePill, found: dict[str, object]) -> None:
         typer.echo(f"nothing unmodelled was touched {ran}")
 
 
-def _print_sections(lies: Layout) -> None:
+def _print_sections(lies: MemoryLayout) -> None:
     rows = [
         (
             s.name,

@@ -24,7 +24,7 @@ from bluepill_sim.core.debugging.debug_unit import WatchKind, Watchpoint
 from bluepill_sim.core.engine import Engine
 from bluepill_sim.core.halts import DEBUG_HALTS, Halt, HaltKind
 from bluepill_sim.core.recorder import BLOCK, EXCEPTION_RETURN, BlockRecorder, BlockRow
-from bluepill_sim.core.unicorn_core import GENERAL, Register, RegisterFile
+from bluepill_sim.core.unicorn_core import GENERAL, Reg, RegisterFile
 
 __all__ = [
     "BLOCK",
@@ -36,7 +36,7 @@ __all__ = [
     "Engine",
     "Halt",
     "HaltKind",
-    "Register",
+    "Reg",
     "RegisterFile",
     "WatchKind",
     "Watchpoint",

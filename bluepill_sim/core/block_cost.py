@@ -75,7 +75,7 @@ _PIPELINED_AFTER_LOAD = frozenset({Kind.LOAD, Kind.LOAD_LITERAL, Kind.STORE_INDE
 
 
 @dataclass(frozen=True, slots=True)
-class Block:
+class BasicBlock:
     """A basic block's costs and what in it needs attention."""
 
     start: int
@@ -122,12 +122,12 @@ class Block:
             state = _advance(state)
         return state or self.it_states.get(address, 0)
 
-    def rest(self, address: int) -> "Block":
+    def rest(self, address: int) -> "BasicBlock":
         """Return what is left of it when the core stands before the instruction at `address`."""
         done = self.cycles_until(address)
         offsets = {at: cycles - done for at, cycles in self.offsets.items() if at >= address}
         # It has an IT instruction at least in so far as it may begin inside an IT block.
-        return Block(
+        return BasicBlock(
             address, self.end, self.straight - done, self.taken - done, offsets,
             has_it=True, it_states=self.it_states, last=self.last,
         )  # fmt: skip
@@ -139,11 +139,11 @@ class Block:
 
 
 #: What stands for "no block is running": it costs nothing.
-NO_BLOCK = Block(-1, -1, 0, 0, {})
+NO_BLOCK = BasicBlock(-1, -1, 0, 0, {})
 
 
 @lru_cache(maxsize=KNOWN_BLOCKS)  # after each restored state a chip asks anew
-def measure_block(code: bytes, start: int, wait_states: int, *, has_prefetch: bool) -> Block:
+def measure_block(code: bytes, start: int, wait_states: int, *, has_prefetch: bool) -> BasicBlock:
     """Return the costs of the block whose bytes are `code`.
 
     Args:
@@ -167,7 +167,7 @@ def measure_block(code: bytes, start: int, wait_states: int, *, has_prefetch: bo
     divides = tuple((i.address, i.base) for i in instructions if i.kind is Kind.DIVIDE and i.base is not None)
     stores = [i.address for i in instructions if i.kind in {Kind.STORE, Kind.STORE_INDEXED}]
     kinds = {i.kind for i in instructions}
-    return Block(
+    return BasicBlock(
         start,
         start + len(code),
         clock,

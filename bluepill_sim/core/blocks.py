@@ -21,9 +21,9 @@ import ctypes
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from bluepill_sim.core.block_cost import NO_BLOCK, Block
+from bluepill_sim.core.block_cost import NO_BLOCK, BasicBlock
 from bluepill_sim.core.halts import Halt
-from bluepill_sim.core.unicorn_core import CoreContext, Register, UnicornCore
+from bluepill_sim.core.unicorn_core import CoreContext, Reg, UnicornCore
 from simbase.state import Stateful
 
 #: ITSTATE in CPSR and xPSR: bits 1 to 0 at 26, bits 7 to 2 at 15.
@@ -33,7 +33,7 @@ IT_BITS = 0x0600_FC00
 HostMemory = tuple[int, int, int]
 
 #: Returns the costs of the block of `size` bytes at `address`.
-Measure = Callable[[int, int], Block]
+Measure = Callable[[int, int], BasicBlock]
 
 
 class BlockTable(Stateful):
@@ -47,9 +47,9 @@ class BlockTable(Stateful):
         #: Tells whether a block, by its address and size, is to be looked at each time that it is entered.
         self.must_look: Callable[[int, int], bool] = lambda _address, _size: False
         #: Blocks that take no attention.
-        self.plain: dict[int, Block] = {}
-        self._special: dict[int, Block] = {}
-        self._in_writable: dict[int, tuple[bytes, Block]] = {}
+        self.plain: dict[int, BasicBlock] = {}
+        self._special: dict[int, BasicBlock] = {}
+        self._in_writable: dict[int, tuple[bytes, BasicBlock]] = {}
         self.writable: list[HostMemory] = []
         #: Whether code has run from writable memory.
         self.ran_writable = False
@@ -58,7 +58,7 @@ class BlockTable(Stateful):
         #: The first address of every block that this engine has ever entered; a snapshot takes none back.
         self.entered: set[int] = set()
 
-    def at(self, address: int, size: int) -> Block:
+    def at(self, address: int, size: int) -> BasicBlock:
         """Return a block that is not in `plain`; measure it if it is new or its bytes have changed."""
         self.entered.add(address)
         special = self._special.get(address)
@@ -109,7 +109,7 @@ class Frozen:
     """The state before the instruction at which a hook ended a run: all that running on would change."""
 
     halt: Halt
-    block: Block
+    block: BasicBlock
     cycle: int
     stop_at: int
     it_state: int
@@ -124,10 +124,10 @@ class Frozen:
                 ctypes.memmove(at, data, len(data))
                 core.drop_code(first, end - first)
         core.context = self.registers
-        flags = core.registers[Register.CPSR] & ~IT_BITS
-        core.registers[Register.CPSR] = flags | (self.it_state & 3) << 25 | (self.it_state >> 2) << 10
+        flags = core.registers[Reg.CPSR] & ~IT_BITS
+        core.registers[Reg.CPSR] = flags | (self.it_state & 3) << 25 | (self.it_state >> 2) << 10
         # Not every hook finds it up to date; nothing but a comparison of states looks at it.
-        core.registers[Register.PC] = self.halt.pc | flags >> 5 & 1
+        core.registers[Reg.PC] = self.halt.pc | flags >> 5 & 1
 
 
 class RestOfBlock(Stateful):
@@ -138,40 +138,40 @@ class RestOfBlock(Stateful):
 
     def __init__(self) -> None:
         #: None where the core stands at a boundary.
-        self.block: Block | None = None
+        self.block: BasicBlock | None = None
         #: The one that the present run began with.
-        self.resumed: Block | None = None
+        self.resumed: BasicBlock | None = None
         self._stop_at = 0
         #: Whether an access before the halt raised an exception: it interrupts before the next one.
         self.has_raised = False
         #: The block of the table that usually stands in its place.
-        self._displaced: Block | None = None
+        self._displaced: BasicBlock | None = None
 
     @property
-    def halted_in(self) -> tuple[Block, int, bool] | None:
+    def halted_in(self) -> tuple[BasicBlock, int, bool] | None:
         """What is left of the block, when the run was to end, and `has_raised`; None at a boundary."""
         return None if self.block is None else (self.block, self._stop_at, self.has_raised)
 
     @halted_in.setter
-    def halted_in(self, halted_in: tuple[Block, int, bool] | None) -> None:
+    def halted_in(self, halted_in: tuple[BasicBlock, int, bool] | None) -> None:
         self.block, self._stop_at, self.has_raised = halted_in or (None, 0, False)
 
     def is_at(self, pc: int) -> bool:
         """Tell whether the core, at `pc`, stands inside a block."""
         return self.block is not None and self.block.start == pc
 
-    def keep(self, block: Block, pc: int, stop_at: int, *, has_raised: bool) -> None:
+    def keep(self, block: BasicBlock, pc: int, stop_at: int, *, has_raised: bool) -> None:
         """Halt inside `block`, before the instruction at `pc`, in a run that was to end at `stop_at`."""
         if block is not NO_BLOCK:
             self.block, self._stop_at, self.has_raised = block.rest(pc), stop_at, has_raised
 
-    def resume(self, table: dict[int, Block], stop_at: int) -> None:
+    def resume(self, table: dict[int, BasicBlock], stop_at: int) -> None:
         """Prepare a run that begins inside the block."""
         if self.block is not None:
             self._displaced = table.pop(self.block.start, None)
             self._stop_at = min(stop_at, self._stop_at)
 
-    def enter(self, table: dict[int, Block], address: int, size: int) -> tuple[Block | None, int]:
+    def enter(self, table: dict[int, BasicBlock], address: int, size: int) -> tuple[BasicBlock | None, int]:
         """Return it, or None where its code has changed, and when the run is to end."""
         rest, self.block = self.block, None
         if self._displaced is not None:

@@ -27,7 +27,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import ClassVar
 
-from bluepill_sim.core.block_cost import NO_BLOCK, Block
+from bluepill_sim.core.block_cost import NO_BLOCK, BasicBlock
 from bluepill_sim.core.blocks import (
     IT_BITS,
     BlockTable,
@@ -54,7 +54,7 @@ from bluepill_sim.core.unicorn_core import (
     WRITE_PROTECTED,
     WRITE_UNMAPPED,
     ReadAccess,
-    Register,
+    Reg,
     UnicornCore,
     WriteAccess,
     WriteToReadOnly,
@@ -72,12 +72,12 @@ StopBefore = Callable[[HaltKind, int, int | None], None]
 _LAST_NORMAL_ADDRESS = 0x21FF_FFFF
 
 #: BASEPRI has its upper four bits (PM0056 2.1.3), a stack pointer is a multiple of 4 (ARM B1.4.1).
-_KEPT_BITS = ((Register.BASEPRI, 0xF0), (Register.MSP, 0xFFFF_FFFC), (Register.PSP, 0xFFFF_FFFC))
+_KEPT_BITS = ((Reg.BASEPRI, 0xF0), (Reg.MSP, 0xFFFF_FFFC), (Reg.PSP, 0xFFFF_FFFC))
 #: Branches to these addresses are exception returns in handler mode (ARMv7-M B1.5.8).
 FIRST_EXCEPTION_RETURN = 0xFFFF_FFE0
 
 #: The scratch page as a block: it costs nothing.
-_SCRATCH_BLOCK = Block(SCRATCH_BASE, SCRATCH_END, 0, 0, {})
+_SCRATCH_BLOCK = BasicBlock(SCRATCH_BASE, SCRATCH_END, 0, 0, {})
 
 #: Later than any run.
 _NEVER = 1 << 62
@@ -347,7 +347,7 @@ class Engine(Stateful):
             if self._failure is not None:
                 failure, self._failure = self._failure, None
                 self._frozen = None
-                self._settle(self.registers[Register.PC])
+                self._settle(self.registers[Reg.PC])
                 self.has_branched_to_return = self.pc >= FIRST_EXCEPTION_RETURN
                 raise failure
             if not traps.stale and not self._waits_for_views:
@@ -359,7 +359,7 @@ class Engine(Stateful):
         if self._frozen is not None:
             return self._thaw(self._frozen)
         self.it_state = 0
-        halt = self._halt or _halt_without_reason(error, self.block, self.registers[Register.PC])
+        halt = self._halt or _halt_without_reason(error, self.block, self.registers[Reg.PC])
         self._settle(halt.pc)
         return halt
 
@@ -435,12 +435,12 @@ class Engine(Stateful):
         block = self.block
         if block is NO_BLOCK:
             return self.cycle
-        return self.cycle + block.cycles_until(self.registers[Register.PC])
+        return self.cycle + block.cycles_until(self.registers[Reg.PC])
 
     @property
     def access_pc(self) -> int:
         """The instruction that is accessing a peripheral; the next one between runs."""
-        return self.pc if self.block is NO_BLOCK else self.registers[Register.PC]
+        return self.pc if self.block is NO_BLOCK else self.registers[Reg.PC]
 
     def note_raised(self) -> None:
         """Note that the instruction that is accessing a peripheral has raised an exception."""
@@ -463,7 +463,7 @@ class Engine(Stateful):
 
     def _restored(self) -> None:
         """Follow the registers; memory was restored before, so that code in it may be another."""
-        self.it_state = it_state_of(self.registers[Register.CPSR])
+        self.it_state = it_state_of(self.registers[Reg.CPSR])
         self.block = NO_BLOCK
         if self._blocks.ran_writable:
             self._core.drop_all_code()
@@ -555,12 +555,12 @@ class Engine(Stateful):
         self.stop_at = 0
 
     def _interrupted(self, number: int) -> None:
-        pc = self.registers[Register.PC]
+        pc = self.registers[Reg.PC]
         self._end(_kind_of_interrupt(number, pc), pc)
 
     def _invalid(self) -> bool:
-        pc = self.registers[Register.PC]
-        kind = _kind_of_invalid(self.block, pc, is_thumb=bool(self.registers[Register.XPSR] & _T_BIT))
+        pc = self.registers[Reg.PC]
+        kind = _kind_of_invalid(self.block, pc, is_thumb=bool(self.registers[Reg.XPSR] & _T_BIT))
         if kind is not None:
             self._end(kind, pc)
         return True
@@ -572,7 +572,7 @@ class Engine(Stateful):
         is_buffered = access in {WRITE_PROTECTED, WRITE_UNMAPPED} and not self.shared.actlr & DISDEFWBUF
         if may_be_taken or is_buffered:
             if not self._lets_writes_through:
-                self.stop_before(HaltKind.TAKEN_WRITE, self.registers[Register.PC], address)
+                self.stop_before(HaltKind.TAKEN_WRITE, self.registers[Reg.PC], address)
                 return False
             taken = self.on_read_only_write if may_be_taken else None
             if taken is not None and taken(address, size, value & (1 << 8 * size) - 1):
@@ -583,7 +583,7 @@ class Engine(Stateful):
         if access == FETCH_PROTECTED and (memory := self._blocks.writable_at(address)) is not None:
             self._core.allow_execution(memory[0], memory[1] - memory[0])
             return True
-        self._halt = Halt(_BAD_ACCESSES.get(access, HaltKind.READ_ERROR), self.registers[Register.PC], address)
+        self._halt = Halt(_BAD_ACCESSES.get(access, HaltKind.READ_ERROR), self.registers[Reg.PC], address)
         return False
 
     def _let_fail(self, access: int, address: int, size: int) -> None:
@@ -594,7 +594,7 @@ class Engine(Stateful):
             first, _, host = next(memory for memory in self._read_only if memory[0] <= address < memory[1])
             at = host + address - first
             self._spoiled.append((address, at, ctypes.string_at(at, size)))
-        self.on_bus_error(self.access_cycle, self.registers[Register.PC], address)
+        self.on_bus_error(self.access_cycle, self.registers[Reg.PC], address)
 
     def stop_before(self, kind: HaltKind, pc: int, address: int | None = None) -> None:
         """End the run before the instruction at `pc`, from a hook of it; what runs after that is undone."""
@@ -655,9 +655,9 @@ class Engine(Stateful):
         ITSTATE included; but translated code keeps ITSTATE clear while a block runs,
         and the next block would start in the middle of an IT block.
         """
-        state = self.registers[Register.CPSR]
+        state = self.registers[Reg.CPSR]
         if state & IT_BITS:
-            self.registers[Register.CPSR] = state & ~IT_BITS
+            self.registers[Reg.CPSR] = state & ~IT_BITS
         return self._frozen is not None
 
     def _settle(self, pc: int) -> None:
@@ -667,7 +667,7 @@ class Engine(Stateful):
             is_return = pc >= FIRST_EXCEPTION_RETURN  # the refill is part of the exception's exit
             self.cycle += block.straight if is_return else block.cycles_until(pc)
         self.pc = pc
-        self.is_thumb = bool(self.registers[Register.XPSR] & _T_BIT)
+        self.is_thumb = bool(self.registers[Reg.XPSR] & _T_BIT)
 
 
 def _kind_of_interrupt(number: int, pc: int) -> HaltKind:
@@ -678,7 +678,7 @@ def _kind_of_interrupt(number: int, pc: int) -> HaltKind:
     return kind
 
 
-def _kind_of_invalid(block: Block, pc: int, *, is_thumb: bool) -> HaltKind | None:
+def _kind_of_invalid(block: BasicBlock, pc: int, *, is_thumb: bool) -> HaltKind | None:
     """Return what an instruction is that Unicorn does not know; None for one that does nothing.
 
     It takes WFE and YIELD for undefined, with the PC already past them; the rest stands at the PC.
@@ -691,7 +691,7 @@ def _kind_of_invalid(block: Block, pc: int, *, is_thumb: bool) -> HaltKind | Non
     return HaltKind.UNDEFINED if is_thumb else HaltKind.INVALID_STATE
 
 
-def _halt_without_reason(error: int, block: Block, pc: int) -> Halt:
+def _halt_without_reason(error: int, block: BasicBlock, pc: int) -> Halt:
     """Return why Unicorn came back without having called a hook: WFI, or a fetch that its TLB denied.
 
     Raises:
@@ -720,7 +720,7 @@ class Traps:
         #: Whether that has changed since the last run.
         self.have_changed = False
         #: Blocks to be translated again.
-        self.stale: list[Block] = []
+        self.stale: list[BasicBlock] = []
         self._watches_alignment = False
         self._trapped: set[tuple[int, int, HaltKind]] = set()
         self._armed: set[tuple[int, tuple[tuple[int, int], ...]]] = set()
@@ -740,7 +740,7 @@ class Traps:
             self._watches_alignment = True
             self._core.on_access(0, _LAST_NORMAL_ADDRESS, self._watch_alignment)
 
-    def needs_hooks(self, block: Block) -> bool:
+    def needs_hooks(self, block: BasicBlock) -> bool:
         """Tell whether a block must be translated again before it runs, and remember that."""
         if not block.aligned and not block.divides:
             return False
@@ -761,16 +761,16 @@ class Traps:
             self._core.drop_code(block.start, block.end - block.start)
         self.stale.clear()
 
-    def _of(self, block: Block) -> tuple[tuple[int, int], ...]:
+    def _of(self, block: BasicBlock) -> tuple[tuple[int, int], ...]:
         return block.aligned + self._divides_of(block)
 
-    def _divides_of(self, block: Block) -> tuple[tuple[int, int], ...]:
+    def _divides_of(self, block: BasicBlock) -> tuple[tuple[int, int], ...]:
         """Return the divisions to look at: all while the trap is on, else those that may come just after its switch."""
         return block.divides if self._division else block.late_divides
 
     def _watch_alignment(self, _access: int, address: int, size: int, _value: int) -> bool:
         if self._unaligned and address % size:
-            self._stop_before(HaltKind.UNALIGNED, self._core.registers[Register.PC], address)
+            self._stop_before(HaltKind.UNALIGNED, self._core.registers[Reg.PC], address)
         else:
             self._leave_it_block()
         return True

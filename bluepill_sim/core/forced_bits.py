@@ -31,7 +31,7 @@ ReadMemory = Callable[[int, int], bytes | None]
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class BitStep:
     """One instruction: `target` becomes `name` of the sources; None: one or more unknown registers."""
 
     name: str
@@ -65,7 +65,7 @@ def forced_bits(
 class _Walk:
     """Goes back through a block."""
 
-    def __init__(self, steps: tuple[Step, ...], registers: Callable[[int], int], read: ReadMemory) -> None:
+    def __init__(self, steps: tuple[BitStep, ...], registers: Callable[[int], int], read: ReadMemory) -> None:
         #: What it has looked at.
         self.seen: dict[int, int] = {}
         self._steps = steps
@@ -99,7 +99,7 @@ class _Walk:
             return None
         return kept & (mask if step.name == "and" else ~mask)
 
-    def _combined(self, step: Step, at: int, address: int) -> tuple[int | None, int | None]:
+    def _combined(self, step: BitStep, at: int, address: int) -> tuple[int | None, int | None]:
         """Return what was kept in one operand, and the other one."""
         first, *second = step.sources
         kept = self._kept(first, at, address)
@@ -155,12 +155,12 @@ _MEANING: dict[str, Callable[[list[int]], int]] = {
     "right": lambda v: v[0] >> min(v[1] & 0xFF, 32),
 }
 
-_OTHER = Step("other")
-_NOTHING = Step("nothing", 16)
+_OTHER = BitStep("other")
+_NOTHING = BitStep("nothing", 16)
 
 
 @lru_cache(maxsize=_BLOCKS)
-def _steps_of(code: bytes) -> tuple[Step, ...]:
+def _steps_of(code: bytes) -> tuple[BitStep, ...]:
     found, at = [], 0
     while at + 2 <= len(code):
         word = int.from_bytes(code[at : at + 2], "little")
@@ -173,103 +173,103 @@ def _steps_of(code: bytes) -> tuple[Step, ...]:
     return tuple(found)
 
 
-def _narrow_pair(word: int) -> Step:
+def _narrow_pair(word: int) -> BitStep:
     """Data processing on two low registers (A5.2.2)."""
     name = _NARROW_PAIRS.get(word >> 6 & 15, "unknown")
     low, middle = word & 7, word >> 3 & 7
-    return _NOTHING if name == "nothing" else Step(name, low, (middle,) if name == "not" else (low, middle))
+    return _NOTHING if name == "nothing" else BitStep(name, low, (middle,) if name == "not" else (low, middle))
 
 
-def _narrow_shift(name: str) -> Callable[[int], Step]:
-    return lambda word: Step(name, word & 7, (word >> 3 & 7,), word >> 6 & 31 or 32)
+def _narrow_shift(name: str) -> Callable[[int], BitStep]:
+    return lambda word: BitStep(name, word & 7, (word >> 3 & 7,), word >> 6 & 31 or 32)
 
 
-def _narrow_sum(word: int) -> Step:
+def _narrow_sum(word: int) -> BitStep:
     name, low, middle, third = "subtract" if word & 0x200 else "add", word & 7, word >> 3 & 7, word >> 6 & 7
-    return Step(name, low, (middle,), third) if word & 0x400 else Step(name, low, (middle, third))
+    return BitStep(name, low, (middle,), third) if word & 0x400 else BitStep(name, low, (middle, third))
 
 
-def _narrow_constant(name: str) -> Callable[[int], Step]:
-    return lambda word: Step(name, word >> 8 & 7, (word >> 8 & 7,) if name != "move" else (), word & 0xFF)
+def _narrow_constant(name: str) -> Callable[[int], BitStep]:
+    return lambda word: BitStep(name, word >> 8 & 7, (word >> 8 & 7,) if name != "move" else (), word & 0xFF)
 
 
 #: 16-bit data processing by bits 9 to 6; what is missing writes a register.
 _NARROW_PAIRS = {0: "and", 2: "left", 3: "right", 8: "nothing", 10: "nothing", 11: "nothing", 12: "or", 14: "clear",
                  15: "not"}  # fmt: skip
 #: Mask, value, what it is; the first match wins, and what is not found may do anything (A5.2).
-_NARROW: tuple[tuple[int, int, Callable[[int], Step]], ...] = (
-    (0xFFC0, 0x0000, lambda w: Step("move", w & 7, (w >> 3 & 7,))),
+_NARROW: tuple[tuple[int, int, Callable[[int], BitStep]], ...] = (
+    (0xFFC0, 0x0000, lambda w: BitStep("move", w & 7, (w >> 3 & 7,))),
     (0xF800, 0x0000, _narrow_shift("left")),
     (0xF800, 0x0800, _narrow_shift("right")),
-    (0xF800, 0x1000, lambda w: Step("unknown", w & 7)),
+    (0xF800, 0x1000, lambda w: BitStep("unknown", w & 7)),
     (0xF800, 0x1800, _narrow_sum),
     (0xF800, 0x2000, _narrow_constant("move")),
     (0xF800, 0x2800, lambda _: _NOTHING),
     (0xF800, 0x3000, _narrow_constant("add")),
     (0xF800, 0x3800, _narrow_constant("subtract")),
     (0xFC00, 0x4000, _narrow_pair),
-    (0xFF00, 0x4600, lambda w: Step("move", w & 7 | w >> 4 & 8, (w >> 3 & 15,))),
-    (0xF800, 0x4800, lambda w: Step("unknown", w >> 8 & 7)),
-    (0xF800, 0x6000, lambda w: Step("store", 16, (w & 7, w >> 3 & 7), 4 * (w >> 6 & 31))),
-    (0xF800, 0x6800, lambda w: Step("load", w & 7, (w >> 3 & 7,), 4 * (w >> 6 & 31))),
+    (0xFF00, 0x4600, lambda w: BitStep("move", w & 7 | w >> 4 & 8, (w >> 3 & 15,))),
+    (0xF800, 0x4800, lambda w: BitStep("unknown", w >> 8 & 7)),
+    (0xF800, 0x6000, lambda w: BitStep("store", 16, (w & 7, w >> 3 & 7), 4 * (w >> 6 & 31))),
+    (0xF800, 0x6800, lambda w: BitStep("load", w & 7, (w >> 3 & 7,), 4 * (w >> 6 & 31))),
     (0xE800, 0x6000, lambda _: _NOTHING),  # STRB
-    (0xE800, 0x6800, lambda w: Step("unknown", w & 7)),  # LDRB
+    (0xE800, 0x6800, lambda w: BitStep("unknown", w & 7)),  # LDRB
     (0xF800, 0x8000, lambda _: _NOTHING),  # STRH
-    (0xF800, 0x8800, lambda w: Step("unknown", w & 7)),  # LDRH
-    (0xF800, 0x9000, lambda w: Step("store", 16, (w >> 8 & 7, 13), 4 * (w & 0xFF))),
-    (0xF800, 0x9800, lambda w: Step("load", w >> 8 & 7, (13,), 4 * (w & 0xFF))),
+    (0xF800, 0x8800, lambda w: BitStep("unknown", w & 7)),  # LDRH
+    (0xF800, 0x9000, lambda w: BitStep("store", 16, (w >> 8 & 7, 13), 4 * (w & 0xFF))),
+    (0xF800, 0x9800, lambda w: BitStep("load", w >> 8 & 7, (13,), 4 * (w & 0xFF))),
 )
 
 
-def _pair(word: int, second: tuple[int, ...], constant: int | None) -> Step:
+def _pair(word: int, second: tuple[int, ...], constant: int | None) -> BitStep:
     """Data processing of a register and a second one or a constant (A5.3.1, A5.3.11)."""
     name, base, target = _WIDE_PAIRS.get(word >> 21 & 15, "unknown"), word >> 16 & 15, word >> 8 & 15
     if target == _PC:
         return _NOTHING
     if base == _PC and name in {"or", "not"}:
-        return Step("move" if name == "or" else "not", target, second, constant)
-    return Step("unknown", target) if name == "not" else Step(name, target, (base, *second), constant)
+        return BitStep("move" if name == "or" else "not", target, second, constant)
+    return BitStep("unknown", target) if name == "not" else BitStep(name, target, (base, *second), constant)
 
 
-def _shifted(word: int) -> Step:
+def _shifted(word: int) -> BitStep:
     """Data processing whose second register may be shifted."""
     amount, target = word >> 10 & 0x1C | word >> 6 & 3, word >> 8 & 15
     if word & 0x70F0 == 0:
         return _pair(word, (word & 15,), None)
     if word & 0x01EF_0020 == 0x004F_0000:
-        return Step("right" if word & 0x10 else "left", target, (word & 15,), amount or 32)
-    return _NOTHING if target == _PC else Step("unknown", target)
+        return BitStep("right" if word & 0x10 else "left", target, (word & 15,), amount or 32)
+    return _NOTHING if target == _PC else BitStep("unknown", target)
 
 
-def _insert(word: int) -> Step:
+def _insert(word: int) -> BitStep:
     """BFI and BFC: bits from `low` to `top` are new."""
     low, top = word >> 10 & 0x1C | word >> 6 & 3, word & 31
-    return Step("insert", word >> 8 & 15, (), (2 << top) - (1 << low))
+    return BitStep("insert", word >> 8 & 15, (), (2 << top) - (1 << low))
 
 
-def _move_wide(word: int) -> Step:
+def _move_wide(word: int) -> BitStep:
     high = (word >> 16 & 15) << 12 | (word >> 26 & 1) << 11
-    return Step("move", word >> 8 & 15, (), high | (word >> 12 & 7) << 8 | word & 0xFF)
+    return BitStep("move", word >> 8 & 15, (), high | (word >> 12 & 7) << 8 | word & 0xFF)
 
 
-def _unknown(word: int) -> Step:
-    return Step("unknown", word >> 8 & 15)
+def _unknown(word: int) -> BitStep:
+    return BitStep("unknown", word >> 8 & 15)
 
 
 #: 32-bit data processing by bits 24 to 21 of the pair; what is missing writes a register.
 _WIDE_PAIRS = {0: "and", 1: "clear", 2: "or", 3: "not", 8: "add", 13: "subtract"}
 #: As `_NARROW`, of both halfwords (A5.3).
-_WIDE: tuple[tuple[int, int, Callable[[int], Step]], ...] = (
-    (0xFFF0_0000, 0xF8D0_0000, lambda w: Step("load", w >> 12 & 15, (w >> 16 & 15,), w & 0xFFF)),
-    (0xFFF0_0000, 0xF8C0_0000, lambda w: Step("store", 16, (w >> 12 & 15, w >> 16 & 15), w & 0xFFF)),
-    (0xFF90_0000, 0xF890_0000, lambda w: Step("unknown", w >> 12 & 15)),
-    (0xFF90_0FC0, 0xF810_0000, lambda w: Step("unknown", w >> 12 & 15)),
+_WIDE: tuple[tuple[int, int, Callable[[int], BitStep]], ...] = (
+    (0xFFF0_0000, 0xF8D0_0000, lambda w: BitStep("load", w >> 12 & 15, (w >> 16 & 15,), w & 0xFFF)),
+    (0xFFF0_0000, 0xF8C0_0000, lambda w: BitStep("store", 16, (w >> 12 & 15, w >> 16 & 15), w & 0xFFF)),
+    (0xFF90_0000, 0xF890_0000, lambda w: BitStep("unknown", w >> 12 & 15)),
+    (0xFF90_0FC0, 0xF810_0000, lambda w: BitStep("unknown", w >> 12 & 15)),
     (0xFBF0_8000, 0xF240_0000, _move_wide),
     (0xFBF0_8000, 0xF2C0_0000, _unknown),  # MOVT
     (0xFFF0_8020, 0xF360_0000, _insert),
     (0xFB40_8000, 0xF340_0000, _unknown),  # bit fields
-    (0xFFE0_F0F0, 0xFA00_F000, lambda w: Step("left", w >> 8 & 15, (w >> 16 & 15, w & 15))),
-    (0xFFE0_F0F0, 0xFA20_F000, lambda w: Step("right", w >> 8 & 15, (w >> 16 & 15, w & 15))),
+    (0xFFE0_F0F0, 0xFA00_F000, lambda w: BitStep("left", w >> 8 & 15, (w >> 16 & 15, w & 15))),
+    (0xFFE0_F0F0, 0xFA20_F000, lambda w: BitStep("right", w >> 8 & 15, (w >> 16 & 15, w & 15))),
     (0xFF00_0000, 0xFA00_0000, _unknown),  # other shifts, extensions, CLZ, RBIT
     (0xFF80_0000, 0xFB00_0000, _unknown),  # MUL, MLA
     (0xFA00_8000, 0xF000_0000, lambda w: _pair(w, (), _expanded(w))),

@@ -40,7 +40,7 @@ from bluepill_sim.core.nvic import (
 )
 from bluepill_sim.core.recorder import EXCEPTION_RETURN
 from bluepill_sim.core.systick import SysTick
-from bluepill_sim.core.unicorn_core import Register
+from bluepill_sim.core.unicorn_core import Reg
 from bluepill_sim.extension.windows import field, flag, time
 from bluepill_sim.memory.arrays import Memory
 from simbase.state import Stateful
@@ -155,7 +155,7 @@ class Processor(Stateful):
         engine.on_event = self.send_event
         engine.on_bus_error = self._expect_bus_error
         engine.is_interrupted = lambda: bool(self.shared.waits) or self.is_interrupted()
-        r = Register
+        r = Reg
         file = engine.registers
         self._masks = file.batch(r.PRIMASK, r.BASEPRI, r.FAULTMASK)
         self._entry_read = file.batch(r.R0, r.R1, r.R2, r.R3, r.R12, r.LR, r.XPSR, r.SP, r.CONTROL, r.CPSR)
@@ -190,20 +190,20 @@ class Processor(Stateful):
         self.set_ccr(STKALIGN)
         registers = self.engine.registers
         # A faulting handler may have left any of these; nPRIV goes in handler mode, SPSEL only in thread mode.
-        registers[Register.IPSR] = 3
+        registers[Reg.IPSR] = 3
         for register in (
-            Register.CONTROL, Register.PRIMASK, Register.BASEPRI, Register.FAULTMASK, Register.IPSR, Register.CONTROL
+            Reg.CONTROL, Reg.PRIMASK, Reg.BASEPRI, Reg.FAULTMASK, Reg.IPSR, Reg.CONTROL
         ):  # fmt: skip
             registers[register] = 0
-        registers[Register.CPSR] = registers[Register.CPSR] & ~(_IT_BITS | _FLAG_BITS) | _CPSR_T
-        registers[Register.LR] = 0xFFFF_FFFF
+        registers[Reg.CPSR] = registers[Reg.CPSR] & ~(_IT_BITS | _FLAG_BITS) | _CPSR_T
+        registers[Reg.LR] = 0xFFFF_FFFF
         self.engine.clear_exclusive()
         stack = self._memory.read_word(vector_table)
         entry = self._memory.read_word(vector_table + 4)
         if stack is None or entry is None:
             self._lock_up(FaultKind.VECTOR_READ, vector_table, vector_table)
             return
-        registers[Register.SP] = stack & ~3
+        registers[Reg.SP] = stack & ~3
         self._jump(entry)
 
     def run(self, stop_at: int) -> None:
@@ -288,7 +288,7 @@ class Processor(Stateful):
     @property
     def is_privileged(self) -> bool:
         """Whether what runs is a handler, or a thread with CONTROL.nPRIV clear."""
-        return bool(self.exception_number) or not self.engine.registers[Register.CONTROL] & _NPRIV
+        return bool(self.exception_number) or not self.engine.registers[Reg.CONTROL] & _NPRIV
 
     def execution_priority(self, *, ignores_primask: bool = False) -> int:
         """Return the priority of what runs, masks included."""
@@ -601,7 +601,7 @@ class Processor(Stateful):
             return
         self.nvic.deactivate(number)
         if number != NMI:
-            self.engine.registers[Register.FAULTMASK] = 0
+            self.engine.registers[Reg.FAULTMASK] = 0
         self.event_register = True
         self.engine.clear_exclusive()
         control, cpsr, psp, msp = self._return_read.read()

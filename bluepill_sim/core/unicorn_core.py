@@ -33,7 +33,7 @@ from simbase.errors import MissingDependencyError
 from simbase.state import Stateful
 
 
-class Register(Enum):
+class Reg(Enum):
     """A register of the core, by the number that the library gives it (arm.h of Unicorn 2.1)."""
 
     R0 = 66
@@ -67,8 +67,8 @@ class Register(Enum):
 
 #: R0 to R15 in order.
 GENERAL = (
-    Register.R0, Register.R1, Register.R2, Register.R3, Register.R4, Register.R5, Register.R6, Register.R7,
-    Register.R8, Register.R9, Register.R10, Register.R11, Register.R12, Register.SP, Register.LR, Register.PC,
+    Reg.R0, Reg.R1, Reg.R2, Reg.R3, Reg.R4, Reg.R5, Reg.R6, Reg.R7,
+    Reg.R8, Reg.R9, Reg.R10, Reg.R11, Reg.R12, Reg.SP, Reg.LR, Reg.PC,
 )  # fmt: skip
 
 #: Kind of a good access that is not a write.
@@ -452,17 +452,17 @@ class RegisterFile:
         self._read = library.uc_reg_read
         self._write = library.uc_reg_write
 
-    def __getitem__(self, register: Register) -> int:
+    def __getitem__(self, register: Reg) -> int:
         """Return one register."""
         self._read(self._handle, register._value_, self._at)  # `value` is a property, which takes as long as the call
         return self._value.value
 
-    def __setitem__(self, register: Register, value: int) -> None:
+    def __setitem__(self, register: Reg, value: int) -> None:
         """Set one register."""
         self._value.value = value
         self._write(self._handle, register._value_, self._at)
 
-    def batch(self, *registers: Register) -> "Batch":
+    def batch(self, *registers: Reg) -> "Batch":
         """Return a list of registers to be moved together."""
         return Batch(self._library, self._handle, registers)
 
@@ -470,7 +470,7 @@ class RegisterFile:
 class Batch:
     """A fixed list of registers, moved together."""
 
-    def __init__(self, library: Any, handle: int, registers: tuple[Register, ...]) -> None:
+    def __init__(self, library: Any, handle: int, registers: tuple[Reg, ...]) -> None:
         count = len(registers)
         self.values = (ctypes.c_uint32 * count)()
         self._numbers = (ctypes.c_int * count)(*(r.value for r in registers))

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from bluepill_sim.core import HaltKind
 from bluepill_sim.core.faults import FaultKind, SeenFault
 from bluepill_sim.debug.history import History, Point
-from bluepill_sim.debug.machine import Machine, Stop, StopKind
+from bluepill_sim.debug.machine import HaltReason, Machine, StopKind
 from bluepill_sim.debug.semihosting import Semihosting
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reason
 
@@ -80,33 +80,33 @@ class Execution:
 
     # Forwards.
 
-    def go_on(self) -> Stop:
+    def go_on(self) -> HaltReason:
         """Run until something stops the chip."""
         stop = self._run(None)
         self.machine.halted()
         return stop
 
-    def step(self) -> Stop:
+    def step(self) -> HaltReason:
         """Run one instruction of the program, or the entry of the exception that comes before it."""
         self._pass_bkpt()
-        stop = self._step_once() or Stop(StopKind.INTERRUPT)
+        stop = self._step_once() or HaltReason(StopKind.INTERRUPT)
         self.machine.halted()
         return stop
 
-    def _run(self, until: _Place | None) -> Stop:
+    def _run(self, until: _Place | None) -> HaltReason:
         """Run to a stop; with `until` also to a state, which then counts as none: INTERRUPT."""
         self._pass_bkpt()
         board = self.machine.board
         while True:
             if self._has_ended():
-                return Stop(StopKind.END)
+                return HaltReason(StopKind.END)
             limit = board.now_ns + SLICE_NS
             if not self._is_replaying:
                 self.history.pass_by()
             if self.machine.end_ns is not None:
                 limit = min(limit, self.machine.end_ns)
             if until is not None and board.cycle >= until.cycle:
-                return Stop(StopKind.INTERRUPT)
+                return HaltReason(StopKind.INTERRUPT)
             reached = self.machine.advance_to(limit)
             if reached.halt is not None:
                 stop = self._stop_of(reached.halt.kind, reached.halt.address)
@@ -115,35 +115,35 @@ class Execution:
                 continue
             if self._has_new_fault() or reached.reason is Reason.HALT:
                 self._reported_fault = True
-                return Stop(StopKind.FAULT)
+                return HaltReason(StopKind.FAULT)
             if not self._is_replaying and self.wants_stop():
-                return Stop(StopKind.INTERRUPT)
+                return HaltReason(StopKind.INTERRUPT)
 
-    def _step_once(self) -> Stop | None:
+    def _step_once(self) -> HaltReason | None:
         """Run one instruction; None where the chip sleeps until a stop is requested."""
         while True:
             if self._has_ended():
-                return Stop(StopKind.END)
+                return HaltReason(StopKind.END)
             reached = self.machine.advance_to(self.machine.board.now_ns + SLICE_NS, by_step=True)
             if reached.halt is not None:
                 stop = self._stop_of(reached.halt.kind, reached.halt.address)
-                return stop or Stop(StopKind.STEP)
+                return stop or HaltReason(StopKind.STEP)
             if self._has_new_fault() or reached.reason is Reason.HALT:
                 self._reported_fault = True
-                return Stop(StopKind.FAULT)
+                return HaltReason(StopKind.FAULT)
             if self.wants_stop():
                 return None
 
-    def _stop_of(self, kind: HaltKind, address: int | None) -> Stop | None:
+    def _stop_of(self, kind: HaltKind, address: int | None) -> HaltReason | None:
         """Return what a halt is to the debugger; None for a call of semihosting that was served."""
         if kind is HaltKind.BKPT:
             pc = self.machine.board.pc
             if not self._semihosting.is_call(pc):
                 self._bkpt_at = pc
-                return Stop(StopKind.BKPT)
+                return HaltReason(StopKind.BKPT)
             ended = self._semihosting.serve()
-            return None if ended is None else Stop(StopKind.EXIT, code=ended.code)
-        return Stop(_STOP_OF_HALT[kind], address)
+            return None if ended is None else HaltReason(StopKind.EXIT, code=ended.code)
+        return HaltReason(_STOP_OF_HALT[kind], address)
 
     def _pass_bkpt(self) -> None:
         """Go past the BKPT that was reported to the debugger."""
@@ -171,15 +171,15 @@ class Execution:
 
     # Backwards.
 
-    def step_back(self) -> Stop:
+    def step_back(self) -> HaltReason:
         """Go to the state before the last instruction."""
         return self._replay(self._step_back)
 
-    def go_back(self) -> Stop:
+    def go_back(self) -> HaltReason:
         """Go to the last stop before this state, or to where the history begins."""
         return self._replay(self._go_back)
 
-    def _replay(self, act: Callable[[_Place], Stop]) -> Stop:
+    def _replay(self, act: Callable[[_Place], HaltReason]) -> HaltReason:
         board = self.machine.board
         self._is_replaying = True
         self._bkpt_at = None
@@ -191,7 +191,7 @@ class Execution:
         self._reported_fault = board.fault is not None
         return stop
 
-    def _step_back(self, here: _Place) -> Stop:
+    def _step_back(self, here: _Place) -> HaltReason:
         for margin in _MARGINS:
             for point in self.history.before(here.cycle)[:2]:
                 self.machine.restore(point.snapshot)
@@ -205,7 +205,7 @@ class Execution:
                     continue
                 for _ in range(count - 1):
                     self._step_once()
-                return Stop(StopKind.STEP)
+                return HaltReason(StopKind.STEP)
         return self._to_begin(here)
 
     def _approach(self, here: _Place, margin: int) -> None:
@@ -239,7 +239,7 @@ class Execution:
                 return None
         return None
 
-    def _go_back(self, here: _Place) -> Stop:
+    def _go_back(self, here: _Place) -> HaltReason:
         for point in self.history.before(here.cycle):
             stops = self._stops_between(point, here)
             if stops:
@@ -251,10 +251,10 @@ class Execution:
             here = _Place(point.cycle, here.pc)
         return self._to_begin(here)
 
-    def _stops_between(self, point: Point, here: _Place) -> list[Stop]:
+    def _stops_between(self, point: Point, here: _Place) -> list[HaltReason]:
         self.machine.restore(point.snapshot)
         self._reported_fault = True
-        board, stops = self.machine.board, list[Stop]()
+        board, stops = self.machine.board, list[HaltReason]()
         while True:
             stop = self._run(here)
             if (
@@ -265,8 +265,8 @@ class Execution:
                 return stops
             stops.append(stop)
 
-    def _to_begin(self, here: _Place) -> Stop:
+    def _to_begin(self, here: _Place) -> HaltReason:
         first = self.history.before(here.cycle + 1)[-1:]
         if first:
             self.machine.restore(first[0].snapshot)
-        return Stop(StopKind.BEGIN)
+        return HaltReason(StopKind.BEGIN)

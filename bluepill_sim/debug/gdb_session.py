@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from bluepill_sim.core import WatchKind, Watchpoint
 from bluepill_sim.debug.execution import Execution
 from bluepill_sim.debug.inspector import Inspector
-from bluepill_sim.debug.machine import Stop, StopKind
+from bluepill_sim.debug.machine import HaltReason, StopKind
 from bluepill_sim.debug.monitor import Monitor
 from bluepill_sim.debug.packets import MAX_BYTES
 from bluepill_sim.debug.target_description import FLASH_PAGE_BYTES, memory_map_xml, target_xml
@@ -65,7 +65,7 @@ class GdbSession:
         self._execution = execution
         self._inspector = Inspector(execution.machine.board)
         self._monitor = Monitor(execution)
-        self._stop = Stop(StopKind.STEP)
+        self._stop = HaltReason(StopKind.STEP)
         self._flash: dict[int, bytes] = {}
         self._by_letter: dict[bytes, Callable[[bytes], bytes]] = {
             b"?": lambda _: self._stop_reply(self._stop),
@@ -157,7 +157,7 @@ class GdbSession:
 
     # Running.
 
-    def _resume(self, address: bytes, run: Callable[[], Stop]) -> bytes:
+    def _resume(self, address: bytes, run: Callable[[], HaltReason]) -> bytes:
         if address:
             self._inspector.set_register("pc", _address(address))
             self._execution.changed()
@@ -172,7 +172,7 @@ class GdbSession:
         self._stop = self._execution.step_back() if rest == b"s" else self._execution.go_back()
         return self._stop_reply(self._stop)
 
-    def _stop_reply(self, stop: Stop) -> bytes:
+    def _stop_reply(self, stop: HaltReason) -> bytes:
         match stop.kind:
             case StopKind.EXIT:
                 return b"W%02x" % stop.code

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from itertools import accumulate
 
 from bluepill_sim.board import BluePill
-from bluepill_sim.core import Register
+from bluepill_sim.core import Reg
 from bluepill_sim.core.system_control import PPB_BASE, PPB_BYTES
 from bluepill_sim.debug.target_description import REGISTERS
 from bluepill_sim.errors import BluePillError
@@ -67,12 +67,12 @@ class Inspector:
         if name == _PC:
             return engine.pc
         if name == _XPSR:
-            kept = engine.registers[Register.XPSR] & ~(0x1FF | _T_BIT)
+            kept = engine.registers[Reg.XPSR] & ~(0x1FF | _T_BIT)
             return kept | self._board.chip.processor.exception_number | (_T_BIT if engine.is_thumb else 0)
         if name in {"msp", "psp", *_BYTE_MASKS}:
-            value = self._privileged(lambda: engine.registers[Register[name.upper()]])
+            value = self._privileged(lambda: engine.registers[Reg[name.upper()]])
             return value & _BYTE_MASKS.get(name, 0xFFFF_FFFF)
-        return engine.registers[Register[name.upper()]]
+        return engine.registers[Reg[name.upper()]]
 
     def set_register(self, name: str, value: int) -> None:
         """Set a register by its name in lower case; of xPSR only the flags."""
@@ -80,9 +80,9 @@ class Inspector:
         if name == _PC:
             engine.jump(value | 1)
         elif name == _XPSR:
-            engine.registers[Register.CPSR] = engine.registers[Register.CPSR] & ~_FLAGS | value & _FLAGS
+            engine.registers[Reg.CPSR] = engine.registers[Reg.CPSR] & ~_FLAGS | value & _FLAGS
         else:
-            engine.registers[Register[name.upper()]] = value & _BYTE_MASKS.get(name, 0xFFFF_FFFF)
+            engine.registers[Reg[name.upper()]] = value & _BYTE_MASKS.get(name, 0xFFFF_FFFF)
 
     def _privileged(self, read: Callable[[], int]) -> int:
         """Read what an unprivileged thread may not: the engine is taken into handler mode and back."""
@@ -90,14 +90,14 @@ class Inspector:
         if self._board.chip.processor.exception_number:
             return read()
         # The engine banks r13 by IPSR: put back exactly what was there.
-        saved = registers[Register.SP]
-        registers[Register.IPSR] = _HANDLER_IPSR
+        saved = registers[Reg.SP]
+        registers[Reg.IPSR] = _HANDLER_IPSR
         try:
             return read()
         finally:
-            registers[Register.IPSR] = 0
-            if registers[Register.SP] != saved:
-                registers[Register.SP] = saved
+            registers[Reg.IPSR] = 0
+            if registers[Reg.SP] != saved:
+                registers[Reg.SP] = saved
 
     # Memory.
 

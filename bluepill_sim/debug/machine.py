@@ -40,7 +40,7 @@ class StopKind(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Stop:
+class HaltReason:
     """Why and where."""
 
     kind: StopKind

@@ -19,7 +19,7 @@ _ESCAPE_BIT = 0x20
 _HEX = b"0123456789abcdefABCDEF"
 
 
-class Mark(Enum):
+class PacketMark(Enum):
     """What comes between packets."""
 
     ACK = "+"
@@ -31,13 +31,13 @@ class Mark(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Packet:
+class GdbPacket:
     """A whole packet, its escapes undone."""
 
     payload: bytes
 
 
-Event = Packet | Mark
+Event = GdbPacket | PacketMark
 
 
 class PacketReader:
@@ -80,11 +80,11 @@ class PacketReader:
         payload, digits = bytes(self._payload or b""), bytes(self._digits or b"")
         self._payload = self._digits = None
         if self._is_too_long or any(digit not in _HEX for digit in digits) or int(digits, 16) != checksum(payload):
-            return Mark.DAMAGED
-        return Packet(unescape(payload))
+            return PacketMark.DAMAGED
+        return GdbPacket(unescape(payload))
 
 
-_MARKS = {ord("+"): Mark.ACK, ord("-"): Mark.NAK, _INTERRUPT: Mark.INTERRUPT}
+_MARKS = {ord("+"): PacketMark.ACK, ord("-"): PacketMark.NAK, _INTERRUPT: PacketMark.INTERRUPT}
 
 
 def checksum(payload: bytes) -> int:

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from bluepill_sim.board import BluePill
-from bluepill_sim.core import Register
+from bluepill_sim.core import Reg
 from simbase.timing import NS_PER_S
 
 #: The encoding of BKPT 0xAB.
@@ -56,11 +56,11 @@ class Semihosting:
     def serve(self) -> Ended | None:
         """Carry out the call that the chip stands at, and go past it; tell whether the program has ended."""
         registers = self._board.chip.engine.registers
-        operation, parameter = registers[Register.R0], registers[Register.R1]
+        operation, parameter = registers[Reg.R0], registers[Reg.R1]
         if operation in {_EXIT, _EXIT_EXTENDED}:
             return Ended(self._exit_code(operation, parameter))
         served = self._calls().get(operation)
-        registers[Register.R0] = (_FAILED if served is None else served(parameter)) & 0xFFFF_FFFF
+        registers[Reg.R0] = (_FAILED if served is None else served(parameter)) & 0xFFFF_FFFF
         self._board.chip.engine.jump(self._board.pc + 2 | 1)
         return None
 

@@ -91,7 +91,7 @@ class CanMember(Protocol):
         """Take that `next_ns` of the network has changed."""
 
 
-class Runner(Protocol):
+class ChipRunner(Protocol):
     """What brings a chip forward."""
 
     @property
@@ -186,7 +186,7 @@ class CanNetwork(Stateful):
         while (due_ns := self.next_ns) is not None and due_ns <= now_ns:
             self._decide()
 
-    def run(self, boards: Sequence[Runner], until_ns: Nanos) -> None:
+    def run(self, boards: Sequence[ChipRunner], until_ns: Nanos) -> None:
         """Bring boards forward together, in steps that are short enough for this bus."""
         while (now_ns := min(board.now_ns for board in boards)) < until_ns:
             step_ns = now_ns + max(1, self._span_ns(STEP_BITS, self._rate()))

@@ -63,7 +63,7 @@ _SEEN_WORDS = 1 + 2 * _MOST_SEEN
 _Result = TypeVar("_Result")
 
 
-class Host(ctypes.Structure):
+class HostCalls(ctypes.Structure):
     """`struct host`: what the fabric needs of the core."""
 
     _fields_ = (
@@ -207,7 +207,7 @@ class Fabric(Stateful):
 
     # The core.
 
-    def use_host(self, host: Host, *kept: object) -> None:
+    def use_host(self, host: HostCalls, *kept: object) -> None:
         """Take another core than Python's."""
         self._kept[:] = [host, *kept]
         self._calls_of_c.fabric_set_host(self.handle, ctypes.addressof(host))
@@ -635,7 +635,7 @@ class Fabric(Stateful):
             _PLAIN(self._guarded(lambda _user: chip.signal("event"), None)),
         )
         at = [ctypes.cast(call, ctypes.c_void_p) for call in calls]
-        self.use_host(Host(None, at[0], None, *at[1:], None, None, None, None), *calls)
+        self.use_host(HostCalls(None, at[0], None, *at[1:], None, None, None, None), *calls)
 
 
 def _masks(values: Iterable[int]) -> "ctypes.Array[ctypes.c_uint32]":

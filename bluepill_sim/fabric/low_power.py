@@ -30,7 +30,7 @@ STOP_WAKE_NS: tuple[Nanos, Nanos] = 3_600, 5_400
 STANDBY_WAKE_NS: Nanos = 50_000
 
 
-class Mode(Enum):
+class PowerMode(Enum):
     """How the chip's clocks run."""
 
     RUN = "run"
@@ -95,7 +95,7 @@ class LowPower(Stateful):
 
     def __init__(self, chip: LowPowerPorts) -> None:
         self._chip = chip
-        self.mode = Mode.RUN
+        self.mode = PowerMode.RUN
         self._since_ns: Nanos = 0
         #: While WAKING: when the program goes on.
         self.wake_ns: Nanos | None = None
@@ -104,35 +104,35 @@ class LowPower(Stateful):
     def lose_clock(self) -> None:
         """Stop until a reset: what SYSCLK came from has failed."""
         self._is_standby = False
-        self.mode = Mode.UNCLOCKED
+        self.mode = PowerMode.UNCLOCKED
         self._chip.enter_stop()
 
     def begin(self) -> None:
         """Take up a sleep with SLEEPDEEP."""
-        self.mode = Mode.ENTERING
+        self.mode = PowerMode.ENTERING
 
     def end(self) -> None:
         """Forget the mode: the chip is reset."""
-        self.mode, self.wake_ns = Mode.RUN, None
+        self.mode, self.wake_ns = PowerMode.RUN, None
 
     def wake(self) -> None:
         """Take a wake-up event of PWR."""
-        if self.mode is Mode.STANDBY:
+        if self.mode is PowerMode.STANDBY:
             self._wake_after(STANDBY_WAKE_NS)
 
     def holds(self) -> bool:
         """Follow the mode at a boundary; return whether the core stands still."""
-        if self.mode is Mode.ENTERING and not self._chip.flash_is_busy:
+        if self.mode is PowerMode.ENTERING and not self._chip.flash_is_busy:
             self._enter()
-        if self.mode is Mode.STOP and self._chip.is_woken_from_stop():
+        if self.mode is PowerMode.STOP and self._chip.is_woken_from_stop():
             self._wake_after(self._chip.stop_wake_ns)
-        if self.mode is Mode.WAKING and self.wake_ns is not None and self._chip.now_ns >= self.wake_ns:
+        if self.mode is PowerMode.WAKING and self.wake_ns is not None and self._chip.now_ns >= self.wake_ns:
             self.end()
             if self._is_standby:
                 self._chip.leave_standby()
             else:
                 self._chip.leave_stop(self._chip.now_ns - self._since_ns)
-        return self.mode is not Mode.RUN
+        return self.mode is not PowerMode.RUN
 
     def _enter(self) -> None:
         chip = self._chip
@@ -145,11 +145,11 @@ class LowPower(Stateful):
             self.end()
             chip.reset_instead()
         elif self._is_standby:
-            self.mode = Mode.STANDBY
+            self.mode = PowerMode.STANDBY
             chip.enter_standby()
         else:
-            self.mode = Mode.STOP
+            self.mode = PowerMode.STOP
             chip.enter_stop()
 
     def _wake_after(self, span_ns: Nanos) -> None:
-        self.mode, self.wake_ns = Mode.WAKING, self._chip.now_ns + span_ns
+        self.mode, self.wake_ns = PowerMode.WAKING, self._chip.now_ns + span_ns

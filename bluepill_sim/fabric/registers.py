@@ -279,7 +279,7 @@ class ClockBit:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Place:
+class PeripheralMapping:
     """Where one peripheral sits in the chip: a row of the chip's page."""
 
     name: str
@@ -358,7 +358,7 @@ class Peripheral(Stateful):
     HIDDEN: ClassVar[tuple[str, ...]] = ()
     ENUMS: ClassVar[tuple[type[IntEnum], ...]] = ()
 
-    def __init__(self, chip: ChipPorts, place: Place) -> None:
+    def __init__(self, chip: ChipPorts, place: PeripheralMapping) -> None:
         self.chip = chip
         self.place = place
         self.name = place.name

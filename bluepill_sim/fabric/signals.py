@@ -19,11 +19,11 @@ if TYPE_CHECKING:
 UV_PER_V = 1_000_000
 #: What 31 bits of microvolts hold, so that a span of them has 32.
 _MOST_V = 1000
-#: Numbers of shapes in analog.c that are no `Shape`.
+#: Numbers of shapes in analog.c that are no `Waveform`.
 _CONSTANT, _SAMPLES, _HELD = 1, 6, 7
 
 
-class Shape(Enum):
+class Waveform(Enum):
     """What an oscillation does in a period; it begins in the middle (sine) or at its low end."""
 
     SINE = 2
@@ -39,7 +39,7 @@ class Shape(Enum):
 class Oscillation:
     """Volts that go up and down for ever."""
 
-    shape: Shape
+    shape: Waveform
     low_v: float
     high_v: float
     #: At least 1.

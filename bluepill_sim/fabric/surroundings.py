@@ -13,7 +13,7 @@ GRAVITY_MPS2 = 9.80665
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Motion:
+class BoardMotion:
     """Where the board is and how it moves."""
 
     #: In the world's plan; the heading is counter-clockwise from its x axis.
@@ -33,7 +33,7 @@ class Motion:
 class Surroundings(Protocol):
     """A world, as a part on the board senses it."""
 
-    def motion(self) -> Motion:
+    def motion(self) -> BoardMotion:
         """Return how the board moves now."""
 
     def range_m(self, x_m: float, y_m: float, heading_rad: float, cone_rad: float, longest_m: float) -> float:
@@ -51,9 +51,9 @@ class Surroundings(Protocol):
 class Nowhere:
     """An empty place, in which the board stands still."""
 
-    def motion(self) -> Motion:
+    def motion(self) -> BoardMotion:
         """Return no motion."""
-        return Motion()
+        return BoardMotion()
 
     def range_m(self, x_m: float, y_m: float, heading_rad: float, cone_rad: float, longest_m: float) -> float:  # noqa: ARG002 - the interface's
         """Return that nothing is there."""

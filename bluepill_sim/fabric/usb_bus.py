@@ -69,7 +69,7 @@ class Transaction:
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class UsbResponse:
     """What the device sends: a handshake, or data in answer to IN."""
 
     #: None: data, which the host acknowledges unless they are isochronous; or nothing in answer to isochronous data.

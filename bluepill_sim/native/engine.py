@@ -19,7 +19,7 @@ from collections.abc import Callable
 from typing import Any
 
 from bluepill_sim.core.accesses import Access, accesses_of, is_ambiguous, may_end_in_it
-from bluepill_sim.core.block_cost import NO_BLOCK, Block
+from bluepill_sim.core.block_cost import NO_BLOCK, BasicBlock
 from bluepill_sim.core.engine import Engine, StopBefore, Traps
 from bluepill_sim.core.halts import Halt, HaltKind
 from bluepill_sim.core.recorder import RECORD, BlockRecorder, KeptRows
@@ -30,7 +30,7 @@ from bluepill_sim.core.unicorn_core import (
     RawRead,
     RawWrite,
     ReadAccess,
-    Register,
+    Reg,
     UnicornCore,
     WriteAccess,
     io_callbacks,
@@ -110,12 +110,12 @@ class NativeEngine(Engine):
     def _make_state(self) -> None:
         self._regions: list[tuple[int, int, RawRead, RawWrite]] = []
         self._code: list[tuple[int, int, int]] = []
-        self._known: dict[int, Block] = {}
+        self._known: dict[int, BasicBlock] = {}
         #: Pages of flash from which something was translated.
         self._code_pages: set[int] = set()
         self._noted: set[int] = set()
         #: The block that Python has entered, in place of the one of C; None: ask C.
-        self._held: Block | None = NO_BLOCK
+        self._held: BasicBlock | None = NO_BLOCK
         self._native_hooks: tuple[int, ...] = ()
         self._pc_hooks: tuple[int, ...] = ()
         self._kept: list[object] = []
@@ -316,7 +316,7 @@ class NativeEngine(Engine):
         core.drop_all_code()
 
     @property
-    def block(self) -> Block:
+    def block(self) -> BasicBlock:
         """As of `Engine`."""
         if self._held is not None:
             return self._held
@@ -324,7 +324,7 @@ class NativeEngine(Engine):
         return NO_BLOCK if start == _NO_BLOCK_START else self._known[start]
 
     @block.setter
-    def block(self, block: Block) -> None:
+    def block(self, block: BasicBlock) -> None:
         if self.shared.is_python:
             self._held = block
         else:
@@ -418,7 +418,7 @@ class NativeEngine(Engine):
             self._fail(error)
             self.shared.halt_kind = FAILED
 
-    def _add_row(self, block: Block) -> None:
+    def _add_row(self, block: BasicBlock) -> None:
         start, size = block.start, block.end - block.start
         self._known[start] = block
         self._code_pages.update(at >> _PAGE_SHIFT for at in (start & ~_FLASH_ALIAS, (block.end - 1) & ~_FLASH_ALIAS))
@@ -504,7 +504,7 @@ class NativeEngine(Engine):
 
     def _write_at_once(self, address: int, size: int, stop: int) -> bool:
         """Have a store to read-only memory made where it leaves what it stores, and let the time pass that it takes."""
-        take, shared, block, pc = self.on_read_only_write_at_once, self.shared, self.block, self.registers[Register.PC]
+        take, shared, block, pc = self.on_read_only_write_at_once, self.shared, self.block, self.registers[Reg.PC]
         offset = address & ~_FLASH_ALIAS
         if take is None or self._frozen is not None or block.has_it or offset >> _PAGE_SHIFT in self._code_pages:
             return False
@@ -543,7 +543,7 @@ class NativeTraps(Traps):
         self._core.hook_native("instruction", address_of("core_on_trap"), user, address, address)
 
 
-def _has_like_access_under_it(block: Block, accesses: dict[int, Access]) -> bool:
+def _has_like_access_under_it(block: BasicBlock, accesses: dict[int, Access]) -> bool:
     """Tell whether an access under IT has the kind and the width of another one of its block."""
     kinds = [(access.is_load, access.bytes) for access in accesses.values()]
     return any(kinds.count(kind) > 1 for at, kind in zip(accesses, kinds, strict=True) if block.it_state_at(at, 0))

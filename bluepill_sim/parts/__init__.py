@@ -8,7 +8,7 @@ Invariant: a part is told the time; it has no clock.
 
 from bluepill_sim.fabric.bus_parts import CanFrame
 from bluepill_sim.fabric.can_network import CanNetwork, CanNode
-from bluepill_sim.fabric.surroundings import Motion, Surroundings
+from bluepill_sim.fabric.surroundings import BoardMotion, Surroundings
 from bluepill_sim.parts.attached import PartError, Socket, Use
 from bluepill_sim.parts.can_talker import CanTalker
 from bluepill_sim.parts.eeprom_24c02 import Eeprom24C02
@@ -24,6 +24,7 @@ from bluepill_sim.parts.ssd1306 import Ssd1306
 from bluepill_sim.parts.ws2812 import Ws2812
 
 __all__ = [
+    "BoardMotion",
     "Button",
     "CanFrame",
     "CanNetwork",
@@ -33,7 +34,6 @@ __all__ = [
     "Gps",
     "HcSr04",
     "LedPanel",
-    "Motion",
     "Mpu6050",
     "PartError",
     "Picture",

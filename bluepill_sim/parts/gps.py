@@ -14,7 +14,7 @@ import math
 import re
 from collections.abc import Sequence
 
-from bluepill_sim.fabric.surroundings import Motion
+from bluepill_sim.fabric.surroundings import BoardMotion
 from bluepill_sim.parts.attached import Socket
 from simbase.state import Stateful
 from simbase.timing import NS_PER_S, Nanos
@@ -102,7 +102,7 @@ class Gps(Stateful):
         """Return what it has sent."""
         return f"{self.sent_count} fixes sent"
 
-    def sentences(self, motion: Motion, at_ns: Nanos) -> tuple[bytes, bytes]:
+    def sentences(self, motion: BoardMotion, at_ns: Nanos) -> tuple[bytes, bytes]:
         """Return GGA and RMC of a motion at a time."""
         hundredths = self._start_s * 100 + at_ns // (NS_PER_S // 100)
         days, second = divmod(hundredths // 100, 86_400)
@@ -124,7 +124,7 @@ class Gps(Stateful):
             with_checksum(f"GPRMC,{clock},A,{at},{knots:.3f},{course:.2f},{date},,,A"),
         )
 
-    def place(self, motion: Motion) -> tuple[float, float]:
+    def place(self, motion: BoardMotion) -> tuple[float, float]:
         """Return latitude and longitude of a motion, degrees: on the plane that touches the ellipsoid at the origin."""
         latitude, longitude, altitude_m = self._origin
         sine = math.sin(math.radians(latitude))

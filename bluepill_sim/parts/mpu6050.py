@@ -19,7 +19,7 @@ import math
 import struct
 from typing import ClassVar
 
-from bluepill_sim.fabric.surroundings import GRAVITY_MPS2, Motion
+from bluepill_sim.fabric.surroundings import GRAVITY_MPS2, BoardMotion
 from bluepill_sim.parts.attached import Socket, Use
 from simbase.state import Stateful
 from simbase.timing import NS_PER_S, Nanos
@@ -128,7 +128,7 @@ class Mpu6050(Stateful):
         """Take the sample that is due."""
         self._count += 1
         self.samples += 1
-        motion = self._socket.surroundings.motion() if self._socket is not None else Motion()
+        motion = self._socket.surroundings.motion() if self._socket is not None else BoardMotion()
         self._sample = self._converted(motion)
         registers = self._registers
         if registers[USER_CTRL] & _FIFO_ON:
@@ -140,7 +140,7 @@ class Mpu6050(Stateful):
                 self._raise(_FIFO_OVERFLOW, now_ns)
         self._raise(_DATA_READY, now_ns)
 
-    def _converted(self, motion: Motion) -> bytes:
+    def _converted(self, motion: BoardMotion) -> bytes:
         forces = [force / GRAVITY_MPS2 for force in motion.force_mps2]
         rates = [math.degrees(rate) for rate in motion.rates_radps]
         values = (*forces, *rates)

@@ -11,7 +11,7 @@ import random
 from collections.abc import Sequence
 from typing import ClassVar
 
-from bluepill_sim.fabric.signals import Oscillation, Shape
+from bluepill_sim.fabric.signals import Oscillation, Waveform
 from bluepill_sim.parts.attached import Change, Socket, Use
 from bluepill_sim.parts.picture import Colour, Picture
 from simbase.state import Stateful
@@ -219,6 +219,6 @@ class Potentiometer(Stateful):
             return
         pin = self._socket.pin("wiper")
         if self._sweep_ns:
-            pin.set_volts(Oscillation(shape=Shape.TRIANGLE, low_v=low, high_v=high, period_ns=self._sweep_ns))
+            pin.set_volts(Oscillation(shape=Waveform.TRIANGLE, low_v=low, high_v=high, period_ns=self._sweep_ns))
         else:
             pin.set_volts(low + (high - low) * self._position)

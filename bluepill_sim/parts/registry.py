@@ -33,7 +33,7 @@ _FLAGS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0"
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class ShippedPart:
     """A part that ships: its class as "module:Class", and what it is."""
 
     target: str
@@ -41,20 +41,20 @@ class Row:
 
 
 _OWN = "bluepill_sim.parts"
-PARTS: Mapping[str, Row] = {
-    "24c02": Row(f"{_OWN}.eeprom_24c02:Eeprom24C02", "I2C EEPROM, 256 bytes"),
-    "button": Row(f"{_OWN}.panel:Button", "push button that bounces"),
-    "can-node": Row(f"{_OWN}.can_talker:CanTalker", "node on a CAN: sends at a period, echoes"),
-    "gps": Row(f"{_OWN}.gps:Gps", "GPS receiver on a USART: GGA and RMC"),
-    "hc-sr04": Row(f"{_OWN}.hc_sr04:HcSr04", "ultrasonic distance sensor"),
-    "leds": Row(f"{_OWN}.panel:LedPanel", "up to eight LEDs"),
-    "mpu6050": Row(f"{_OWN}.mpu6050:Mpu6050", "gyroscope and accelerometer on I2C"),
-    "potentiometer": Row(f"{_OWN}.panel:Potentiometer", "volts for the ADC"),
-    "sd-card": Row(f"{_OWN}.sd_card:SdCard", "SD card on an SPI"),
-    "servo": Row(f"{_OWN}.servo:Servo", "hobby servo"),
-    "ssd1306": Row(f"{_OWN}.ssd1306:Ssd1306", "OLED, 128 by 64, on I2C or SPI"),
-    "w25q16": Row(f"{_OWN}.spi_flash:SpiFlash", "SPI flash, 2 MiB"),
-    "ws2812": Row(f"{_OWN}.ws2812:Ws2812", "string of LEDs on a pin or an SPI"),
+PARTS: Mapping[str, ShippedPart] = {
+    "24c02": ShippedPart(f"{_OWN}.eeprom_24c02:Eeprom24C02", "I2C EEPROM, 256 bytes"),
+    "button": ShippedPart(f"{_OWN}.panel:Button", "push button that bounces"),
+    "can-node": ShippedPart(f"{_OWN}.can_talker:CanTalker", "node on a CAN: sends at a period, echoes"),
+    "gps": ShippedPart(f"{_OWN}.gps:Gps", "GPS receiver on a USART: GGA and RMC"),
+    "hc-sr04": ShippedPart(f"{_OWN}.hc_sr04:HcSr04", "ultrasonic distance sensor"),
+    "leds": ShippedPart(f"{_OWN}.panel:LedPanel", "up to eight LEDs"),
+    "mpu6050": ShippedPart(f"{_OWN}.mpu6050:Mpu6050", "gyroscope and accelerometer on I2C"),
+    "potentiometer": ShippedPart(f"{_OWN}.panel:Potentiometer", "volts for the ADC"),
+    "sd-card": ShippedPart(f"{_OWN}.sd_card:SdCard", "SD card on an SPI"),
+    "servo": ShippedPart(f"{_OWN}.servo:Servo", "hobby servo"),
+    "ssd1306": ShippedPart(f"{_OWN}.ssd1306:Ssd1306", "OLED, 128 by 64, on I2C or SPI"),
+    "w25q16": ShippedPart(f"{_OWN}.spi_flash:SpiFlash", "SPI flash, 2 MiB"),
+    "ws2812": ShippedPart(f"{_OWN}.ws2812:Ws2812", "string of LEDs on a pin or an SPI"),
 }
 
 

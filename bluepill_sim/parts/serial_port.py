@@ -47,10 +47,10 @@ WordSink = Callable[[Sequence[tuple[int, Nanos]]], None]
 
 #: Runs the board until a pattern is in what has come over a line and nobody has taken, or for so long; a `WaitError`
 #: where it does not come.
-WaitForBytes: TypeAlias = Callable[["SerialLine", bytes, Span], None]
+WaitForBytes: TypeAlias = Callable[["BoardSerialLine", bytes, Span], None]
 
 
-class SerialLine(Stateful):
+class BoardSerialLine(Stateful):
     """A serial line of the board, seen from its far end."""
 
     STATE: ClassVar[tuple[str, ...]] = ("unread",)
@@ -102,7 +102,7 @@ class SerialLine(Stateful):
             del self.unread[:-KEPT_BYTES]
 
 
-class SerialPort(SerialLine):
+class SerialPort(BoardSerialLine):
     """A USART of the board, seen from outside."""
 
     #: Who listens.

@@ -12,7 +12,7 @@ from typing import ClassVar
 from bluepill_sim.extension.layout import ADC
 from bluepill_sim.fabric.fabric import CLOCK, OWN_COMMANDS, RESET
 from bluepill_sim.fabric.ports import ChipPorts
-from bluepill_sim.fabric.registers import NATIVE, Peripheral, Place, Register, bits, numbered
+from bluepill_sim.fabric.registers import NATIVE, Peripheral, PeripheralMapping, Register, bits, numbered
 
 #: Inputs by EXTSEL and by JEXTSEL, 0 to 6 (RM0008 tables 67 and 68); 7 is software.
 REGULAR_TRIGGERS = ("tim1_cc1", "tim1_cc2", "tim1_cc3", "tim2_cc2", "tim3_trgo", "tim4_cc4", "exti_line11")
@@ -20,7 +20,7 @@ INJECTED_TRIGGERS = ("tim1_trgo", "tim1_cc4", "tim2_trgo", "tim2_cc1", "tim3_cc4
 _PINS = (*(f"PA{n}" for n in range(8)), "PB0", "PB1")
 
 
-class Question(IntEnum):
+class AdcQuestion(IntEnum):
     """What the device warns of, with the number of the channel."""
 
     NOT_ANALOG = 0
@@ -30,7 +30,7 @@ class Question(IntEnum):
     CAL_OFF = 4
 
 
-class Command(IntEnum):
+class AdcCommand(IntEnum):
     """A command of its own."""
 
     #: What is on the pins is about to change.
@@ -38,11 +38,11 @@ class Command(IntEnum):
 
 
 _WARNINGS = {
-    Question.NOT_ANALOG: "{pin} is converted (channel {channel}) and is no analog input ({mode})",
-    Question.NO_PIN: "channel {channel} leads to no pin of this package: it reads 0",
-    Question.NOT_ENABLED: "channel {channel} is converted while TSVREFE is 0: it reads 0",
-    Question.TOO_FAST: "ADCCLK is {mhz:g} MHz, above 14 MHz: RCC_CFGR ADCPRE divides PCLK2 by {divider}",
-    Question.CAL_OFF: "calibrated while ADON is 0",
+    AdcQuestion.NOT_ANALOG: "{pin} is converted (channel {channel}) and is no analog input ({mode})",
+    AdcQuestion.NO_PIN: "channel {channel} leads to no pin of this package: it reads 0",
+    AdcQuestion.NOT_ENABLED: "channel {channel} is converted while TSVREFE is 0: it reads 0",
+    AdcQuestion.TOO_FAST: "ADCCLK is {mhz:g} MHz, above 14 MHz: RCC_CFGR ADCPRE divides PCLK2 by {divider}",
+    AdcQuestion.CAL_OFF: "calibrated while ADON is 0",
 }
 #: Bits of CR1 and CR2 that ADC1 alone has: DUALMOD; DMA and TSVREFE.
 _MASTER_CR1, _MASTER_CR2 = bits((19, 16)), bits(8, 23)
@@ -115,17 +115,17 @@ class Adc(Peripheral):
     KIND, HOLDS = "adc", ADC
     OUTPUTS: ClassVar[tuple[str, ...]] = ("irq", "dma")
     INPUTS = REGULAR_TRIGGERS + INJECTED_TRIGGERS
-    ENUMS = (Question, Command)
+    ENUMS = (AdcQuestion, AdcCommand)
     SOURCE = "RM0008 11.12"
     REGISTERS = _registers(_CR1 | _MASTER_CR1, _CR2 | _MASTER_CR2)
 
-    def __init__(self, chip: ChipPorts, place: Place) -> None:
+    def __init__(self, chip: ChipPorts, place: PeripheralMapping) -> None:
         super().__init__(chip, place)
         self.native.number = int(place.name[-1])
         self.native.hz, self.native.divider = chip.clocks.pclk2_hz, chip.clocks.adc_divider
         self.command(RESET)
         chip.pins.route_listeners.append(self._route_changed)
-        chip.pins.fabric.input_listeners.append(lambda: self.command(Command.INPUTS_CHANGE))
+        chip.pins.fabric.input_listeners.append(lambda: self.command(AdcCommand.INPUTS_CHANGE))
 
     def clock_hz(self) -> int:
         """Return PCLK2."""
@@ -137,8 +137,8 @@ class Adc(Peripheral):
 
     def answer(self, what: int, value: int) -> int:
         """Warn."""
-        question, divider = Question(what), self.native.divider
-        has_pin = question is Question.NOT_ANALOG
+        question, divider = AdcQuestion(what), self.native.divider
+        has_pin = question is AdcQuestion.NOT_ANALOG
         mode = self.chip.pins[_PINS[value]].mode.value if has_pin else ""
         text = _WARNINGS[question].format(
             pin=_PINS[value] if has_pin else "", mode=mode, channel=value, divider=divider,

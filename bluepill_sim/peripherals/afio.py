@@ -16,7 +16,7 @@ Invariant: each debug pin is held exactly while SWJ_CFG (or reset) says so.
 
 from bluepill_sim.fabric.pins import PinDrive
 from bluepill_sim.fabric.ports import ChipPorts
-from bluepill_sim.fabric.registers import Peripheral, Place, Register, bits
+from bluepill_sim.fabric.registers import Peripheral, PeripheralMapping, Register, bits
 
 EVCR, MAPR, EXTICR1 = range(3)
 _EXTICR_INDEXES = range(EXTICR1, EXTICR1 + 4)
@@ -97,7 +97,7 @@ class Afio(Peripheral):
         ),
     )
 
-    def __init__(self, chip: ChipPorts, place: Place) -> None:
+    def __init__(self, chip: ChipPorts, place: PeripheralMapping) -> None:
         super().__init__(chip, place)
         self._swj_cfg = 0
         self._place_pins()

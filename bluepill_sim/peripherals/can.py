@@ -29,7 +29,7 @@ from bluepill_sim.fabric.can_network import CanEnd, CanError, CanNetwork, frame_
 from bluepill_sim.fabric.fabric import OWN_COMMANDS
 from bluepill_sim.fabric.pins import ALTERNATE_FUNCTIONS, PinDrive
 from bluepill_sim.fabric.ports import ChipPorts
-from bluepill_sim.fabric.registers import Peripheral, Place, Register, bits, numbered
+from bluepill_sim.fabric.registers import Peripheral, PeripheralMapping, Register, bits, numbered
 from bluepill_sim.fabric.subscriptions import EDGE
 from simbase.timing import NS_PER_S, Nanos
 
@@ -236,7 +236,7 @@ class Can(Peripheral):
         *(Register(name=f"F{n // 2}R{n % 2 + 1}", offset=0x240 + 4 * n, fields="FB 31:0") for n in range(2 * _BANKS)),
     )
 
-    def __init__(self, chip: ChipPorts, place: Place) -> None:
+    def __init__(self, chip: ChipPorts, place: PeripheralMapping) -> None:
         #: The levels that are still to be shown of a frame; its slot comes before that of what follows from the frame.
         self._bits = structure(CAN_BITS)()
         self._bits_slot = chip.pins.fabric.add_device(

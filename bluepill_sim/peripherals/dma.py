@@ -12,7 +12,7 @@ from enum import IntEnum
 from bluepill_sim.extension.layout import DMA
 from bluepill_sim.fabric.fabric import CLOCK
 from bluepill_sim.fabric.ports import ChipPorts
-from bluepill_sim.fabric.registers import NATIVE, Peripheral, Place, Register, bits
+from bluepill_sim.fabric.registers import NATIVE, Peripheral, PeripheralMapping, Register, bits
 
 CHANNELS = range(1, 8)
 #: Of CCRx, RM0008 13.4.3.
@@ -21,7 +21,7 @@ _CONTROL = "MEM2MEM 14, PL 13:12, MSIZE 11:10, PSIZE 9:8, MINC 7, PINC 6, CIRC 5
 _BRIDGE_CYCLES, _APB_CYCLES = 1, 2
 
 
-class Question(IntEnum):
+class DmaQuestion(IntEnum):
     """What the device warns of, with the number of the channel from 0 on."""
 
     LOCKED = 0
@@ -30,9 +30,9 @@ class Question(IntEnum):
 
 
 _WARNINGS = {
-    Question.LOCKED: "CNDTR, CPAR or CMAR written while the channel is enabled: ignored",
-    Question.FAILED: "an access to nothing, or to what has no clock: the channel is disabled, TEIF set",
-    Question.CIRCLES: "MEM2MEM and CIRC exclude each other: it ends at 0",
+    DmaQuestion.LOCKED: "CNDTR, CPAR or CMAR written while the channel is enabled: ignored",
+    DmaQuestion.FAILED: "an access to nothing, or to what has no clock: the channel is disabled, TEIF set",
+    DmaQuestion.CIRCLES: "MEM2MEM and CIRC exclude each other: it ends at 0",
 }
 
 
@@ -48,7 +48,7 @@ class Dma(Peripheral):
 
     KIND, HOLDS = "dma", DMA
     HAS_BYTE_LANES = True
-    ENUMS = (Question,)
+    ENUMS = (DmaQuestion,)
     OUTPUTS = tuple(f"ch{n}_irq" for n in CHANNELS)
     INPUTS = tuple(f"ch{n}" for n in CHANNELS)
     SOURCE = "RM0008 13.4"
@@ -74,7 +74,7 @@ class Dma(Peripheral):
         ),
     )
 
-    def __init__(self, chip: ChipPorts, place: Place) -> None:
+    def __init__(self, chip: ChipPorts, place: PeripheralMapping) -> None:
         super().__init__(chip, place)
         self.clock_changed()
 
@@ -91,6 +91,6 @@ class Dma(Peripheral):
 
     def answer(self, what: int, value: int) -> int:
         """Warn."""
-        question = Question(what)
+        question = DmaQuestion(what)
         self.chip.warn(f"{self.name} channel {value + 1}: {_WARNINGS[question]}", once=f"{self.name}:{value}:{what}")
         return 0

@@ -12,7 +12,7 @@ Invariant: an IRQ is raised exactly while one of its lines is pending and unmask
 from bluepill_sim.extension.layout import EXTI
 from bluepill_sim.fabric.fabric import ROUTE
 from bluepill_sim.fabric.ports import ChipPorts
-from bluepill_sim.fabric.registers import NATIVE, Peripheral, Place, Register, bits, indices, numbered
+from bluepill_sim.fabric.registers import NATIVE, Peripheral, PeripheralMapping, Register, bits, indices, numbered
 
 _LINES = bits((18, 0))
 #: From the left.
@@ -53,7 +53,7 @@ class Exti(Peripheral):
         """The lines that are pending, and would make an interrupt or an event, as a mask."""
         return self.words[PR] & (self.words[IMR] | self.words[EMR])
 
-    def __init__(self, chip: ChipPorts, place: Place) -> None:
+    def __init__(self, chip: ChipPorts, place: PeripheralMapping) -> None:
         super().__init__(chip, place)
         chip.pins.route_listeners.append(self._route_changed)
         self._route_changed()

@@ -17,7 +17,16 @@ from enum import IntEnum
 from typing import Protocol
 
 from bluepill_sim.fabric.ports import ChipPorts
-from bluepill_sim.fabric.registers import NATIVE, OWN_ANSWERS, Peripheral, Place, Register, bits, indices, masks
+from bluepill_sim.fabric.registers import (
+    NATIVE,
+    OWN_ANSWERS,
+    Peripheral,
+    PeripheralMapping,
+    Register,
+    bits,
+    indices,
+    masks,
+)
 
 KEY1, KEY2 = 0x4567_0123, 0xCDEF_89AB
 #: Fields, from the left.
@@ -52,7 +61,7 @@ GROUP_BYTES = 4 * PAGE_BYTES
 _ERASED, _HALFWORD = 0xFF, 0xFFFF
 
 
-class Question(IntEnum):
+class FlashQuestion(IntEnum):
     """What Python is told beside what a listener hears."""
 
     #: A write, with the word before it.
@@ -87,7 +96,7 @@ class Flash(Peripheral):
     HAS_BYTE_LANES = True
     STATE = ("_key_step", "_option_key_step", "_address")
     OUTPUTS = ("irq",)
-    ENUMS = (Question,)
+    ENUMS = (FlashQuestion,)
     SOURCE = "PM0075 3"
     REGISTERS = (
         Register(
@@ -138,7 +147,7 @@ class Flash(Peripheral):
         ),
     )
 
-    def __init__(self, chip: ChipPorts, place: Place) -> None:
+    def __init__(self, chip: ChipPorts, place: PeripheralMapping) -> None:
         super().__init__(chip, place)
         #: The array; the board sets it. None: programming is warned of and does nothing.
         self.memory: FlashMemory | None = None

@@ -24,7 +24,7 @@ from bluepill_sim.fabric.registers import (
     NATIVE,
     OWN_ANSWERS,
     Peripheral,
-    Place,
+    PeripheralMapping,
     Register,
     bits,
     indices,
@@ -49,14 +49,14 @@ def _modes(numbers: Iterable[int]) -> str:
     )
 
 
-class Question(IntEnum):
+class GpioQuestion(IntEnum):
     """What Python is told beside what a listener hears."""
 
     #: A locked pin was configured.
     LOCKED = OWN_ANSWERS
 
 
-class Command(IntEnum):
+class GpioCommand(IntEnum):
     """A command of its own."""
 
     #: Pins are looked at a little later.
@@ -67,7 +67,7 @@ class Gpio(Peripheral):
     """One general-purpose I/O port; the last letter of its name is the port's."""
 
     KIND, HOLDS = "gpio", GPIO
-    ENUMS = (Question, Command)
+    ENUMS = (GpioQuestion, GpioCommand)
     STATE = ("_lock_writes",)
     SOURCE = "RM0008 9.2"
     REGISTERS = (
@@ -94,7 +94,7 @@ class Gpio(Peripheral):
         ),
     )
 
-    def __init__(self, chip: ChipPorts, place: Place) -> None:
+    def __init__(self, chip: ChipPorts, place: PeripheralMapping) -> None:
         super().__init__(chip, place)
         self._pins = chip.pins.port(place.name[-1])
         #: The last three writes to LCKR.
@@ -115,7 +115,7 @@ class Gpio(Peripheral):
     def _released(self, pin: Pin) -> None:
         """Check again an input that is no longer driven."""
         if pin.port == self.name[-1] and self.native.intended >> pin.number & 1:
-            self.command(Command.CHECK)
+            self.command(GpioCommand.CHECK)
 
     def advance_to(self, now_ns: int) -> None:
         """Warn of the pins that belong to another still, and of the intended inputs that float."""

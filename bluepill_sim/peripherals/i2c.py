@@ -21,7 +21,7 @@ from bluepill_sim.fabric.fabric import OWN_COMMANDS
 from bluepill_sim.fabric.fabric import WORD as SENT
 from bluepill_sim.fabric.pins import ALTERNATE_FUNCTIONS, PinDrive
 from bluepill_sim.fabric.ports import ChipPorts
-from bluepill_sim.fabric.registers import NATIVE, WORD, Peripheral, Place, Register, bits, indices, masks
+from bluepill_sim.fabric.registers import NATIVE, WORD, Peripheral, PeripheralMapping, Register, bits, indices, masks
 from simbase.timing import Nanos
 
 _CR1, _CR2, _CCR = bits(15, (13, 3), (1, 0)), bits((12, 8), (5, 0)), bits(15, 14, (11, 0))
@@ -41,7 +41,7 @@ PINS = {"I2C1": {0: ("PB6", "PB7", "PB5"), 1: ("PB8", "PB9", "PB5")}, "I2C2": {0
 _COUNTERS = {"I2C1": 0x4002_0000 + 0x0C + 20 * 6, "I2C2": 0x4002_0000 + 0x0C + 20 * 4}
 
 
-class Question(IntEnum):
+class I2cQuestion(IntEnum):
     """What Python is asked; from NO_PINS on they are warnings."""
 
     ADDRESS = 0
@@ -53,7 +53,7 @@ class Question(IntEnum):
     SEQUENCE = 6
 
 
-class Command(IntEnum):
+class I2cCommand(IntEnum):
     """A command of its own."""
 
     #: Move to the pins.
@@ -141,7 +141,7 @@ class I2c(Peripheral):
     OUTPUTS = ("event_irq", "error_irq", "rx_dma", "tx_dma")
     #: SR1 at its last read, half of the sequences that clear its flags.
     HIDDEN = ("SEEN",)
-    ENUMS = (Question, Command, FarStep)
+    ENUMS = (I2cQuestion, I2cCommand, FarStep)
     STATE = ("_hung", "_addressed", "_high_bits", "_ten_bit", "_calls", "_step", "_is_stopping", "answered")
     DERIVED = ("_pin_names", "_sinks")
     SOURCE = "RM0008 26.6"
@@ -181,7 +181,7 @@ class I2c(Peripheral):
         Register(name="TRISE", offset=0x20, reset=2, mask=bits((5, 0)), fields="TRISE 5:0"),
     )  # fmt: skip
 
-    def __init__(self, chip: ChipPorts, place: Place) -> None:
+    def __init__(self, chip: ChipPorts, place: PeripheralMapping) -> None:
         super().__init__(chip, place)
         #: Get what is on the bus, in bulk, when the chip has run.
         self._sinks: list[Sink] = []
@@ -237,15 +237,15 @@ class I2c(Peripheral):
         self._calls += (I2cCall(address, written, read_bytes),)
         if len(self._calls) == 1:
             self.native.far_hz = hz
-            self.command(Command.CALL)
+            self.command(I2cCommand.CALL)
 
     def lose_arbitration(self) -> None:
         """Have another master win the bus during the next address or byte that the chip sends."""
-        self.command(Command.DISTURB, _ARLO)
+        self.command(I2cCommand.DISTURB, _ARLO)
 
     def disturb(self) -> None:
         """Put a START or a STOP where none may be: BERR."""
-        self.command(Command.DISTURB, _BERR)
+        self.command(I2cCommand.DISTURB, _BERR)
 
     # For the chip.
 
@@ -255,11 +255,11 @@ class I2c(Peripheral):
 
     def freeze(self) -> None:
         """Have the SMBus timeout alone stand still (RM0008 31.16.3, DBG_I2Cx_SMBUS_TIMEOUT)."""
-        self.command(Command.HOLD_TIMEOUT)
+        self.command(I2cCommand.HOLD_TIMEOUT)
 
     def thaw(self, frozen_ns: int) -> None:
         """Have it go on."""
-        self.command(Command.GO_ON_TIMEOUT, frozen_ns & WORD, frozen_ns >> 32)
+        self.command(I2cCommand.GO_ON_TIMEOUT, frozen_ns & WORD, frozen_ns >> 32)
 
     def on_reset(self) -> None:
         """Forget who was addressed."""
@@ -280,23 +280,23 @@ class I2c(Peripheral):
     def answer(self, what: int, value: int) -> int:
         """Tell the parts what is on the bus, or the master outside what became of its step; or warn."""
         now_ns = self.chip.now_ns
-        if what == Question.ADDRESS:
+        if what == I2cQuestion.ADDRESS:
             return _ACK if self._address(value, now_ns) else 0
-        if what == Question.WRITE:
+        if what == I2cQuestion.WRITE:
             acknowledges = [self._hung[n].write(value, now_ns) for n in self._addressed]
             return _ACK if any(acknowledges) else 0
-        if what == Question.READ:
+        if what == I2cQuestion.READ:
             byte = _RELEASED
             for n in self._addressed:
                 byte &= self._hung[n].read(now_ns)
             return byte
-        if what == Question.END:
+        if what == I2cQuestion.END:
             self._addressed, self._high_bits = (), None
             for device in self._hung:
                 device.stop(now_ns)
-        elif what == Question.NEXT_STEP:
+        elif what == I2cQuestion.NEXT_STEP:
             return self._next_step(value)
-        elif what == Question.NO_PINS:
+        elif what == I2cQuestion.NO_PINS:
             names = " or ".join(self._pin_names[:2])
             self.chip.warn(
                 f"{self.name}: nobody hears it: {names} is no alternate-function output", once=f"{self.name}:pins"
@@ -368,7 +368,7 @@ class I2c(Peripheral):
         """Move to the pins that AFIO now gives; the parts go with them."""
         self._find_pins()
         scl, sda, smba = (self.chip.pins[name].index for name in self._pin_names)
-        self.command(Command.MOVE, scl | sda << 8 | smba << 16)
+        self.command(I2cCommand.MOVE, scl | sda << 8 | smba << 16)
         if self._hung:
             self._pull_up()
 
@@ -379,7 +379,7 @@ class I2c(Peripheral):
     def _restored(self) -> None:
         self._find_pins()
         self.native.wants_words = bool(self._sinks)
-        self.command(Command.LISTEN)
+        self.command(I2cCommand.LISTEN)
 
 
 CR1, CCR = indices(I2c.REGISTERS, "CR1 CCR")

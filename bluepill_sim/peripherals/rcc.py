@@ -26,7 +26,7 @@ from bluepill_sim.fabric.registers import (
     OWN_ANSWERS,
     ClockBit,
     Peripheral,
-    Place,
+    PeripheralMapping,
     Register,
     bits,
     indices,
@@ -88,7 +88,7 @@ _ADC_DIVIDERS = (2, 4, 6, 8)
 _PLL_FACTORS = (2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 16)
 
 
-class Question(IntEnum):
+class RccQuestion(IntEnum):
     """What Python is told beside what a listener hears."""
 
     #: The device in a slot is to be reset.
@@ -242,11 +242,16 @@ class Rcc(Peripheral):
     OUTPUTS = ("irq", "css")
     INPUTS = ("lsi",)
     SOURCE = "RM0008 7.3"
-    ENUMS = (Question,)
+    ENUMS = (RccQuestion,)
     REGISTERS = _REGISTERS
 
     def __init__(
-        self, chip: ChipPorts, place: Place, *, gates: Mapping[str, ClockBit], hse_hz: int | None = CRYSTAL_HZ
+        self,
+        chip: ChipPorts,
+        place: PeripheralMapping,
+        *,
+        gates: Mapping[str, ClockBit],
+        hse_hz: int | None = CRYSTAL_HZ,
     ) -> None:
         """Make the RCC.
 
@@ -325,9 +330,9 @@ class Rcc(Peripheral):
 
     def answer(self, what: int, value: int) -> int:
         """Reset a peripheral whose bit of APBxRSTR has just gone to 1, tell of the gates, or hear a line."""
-        if what == Question.RESETS:
+        if what == RccQuestion.RESETS:
             self.chip.reset_peripheral(self.fabric.name_of(value))
-        elif what == Question.GATES:
+        elif what == RccQuestion.GATES:
             if self.on_gates is not None:
                 self.on_gates()
         else:

@@ -23,7 +23,7 @@ Invariant: counter and divider never depend on who looked at them.
 from functools import partialmethod
 
 from bluepill_sim.fabric.ports import ChipPorts
-from bluepill_sim.fabric.registers import WORD, Peripheral, Place, Register, bits, masks
+from bluepill_sim.fabric.registers import WORD, Peripheral, PeripheralMapping, Register, bits, masks
 from simbase.timing import NS_PER_S, Nanos
 
 CRH, CRL, PRLH, PRLL, DIVH, DIVL, CNTH, CNTL, ALRH, ALRL = range(10)
@@ -109,7 +109,7 @@ class Rtc(Peripheral):
         ),
     )
 
-    def __init__(self, chip: ChipPorts, place: Place) -> None:
+    def __init__(self, chip: ChipPorts, place: PeripheralMapping) -> None:
         super().__init__(chip, place)
         #: When cycle 0 of RTCCLK began, and the cycle in which divider and counter held these.
         self._origin_ns: Nanos = 0

@@ -18,7 +18,7 @@ from bluepill_sim.fabric.bus_parts import AheadDevice, SpiDevice, subscribe_word
 from bluepill_sim.fabric.fabric import OWN_COMMANDS, WORD
 from bluepill_sim.fabric.pins import ALTERNATE_FUNCTIONS, PinDrive
 from bluepill_sim.fabric.ports import ChipPorts
-from bluepill_sim.fabric.registers import NATIVE, Peripheral, Place, Register, bits, indices, masks
+from bluepill_sim.fabric.registers import NATIVE, Peripheral, PeripheralMapping, Register, bits, indices, masks
 from simbase.state import Stateful
 from simbase.timing import NS_PER_S, Nanos
 
@@ -37,7 +37,7 @@ PINS = {
 }
 
 
-class Question(IntEnum):
+class SpiQuestion(IntEnum):
     """What Python is asked: those from NO_SCK on are warnings."""
 
     EXCHANGE = 0
@@ -50,7 +50,7 @@ class Question(IntEnum):
     MODE_FAULT = 7
 
 
-class Command(IntEnum):
+class SpiCommand(IntEnum):
     """A command of its own."""
 
     #: Move to the pins: two, and two.
@@ -62,11 +62,11 @@ class Command(IntEnum):
 
 
 _WARNINGS = {
-    Question.NO_SCK: ": nobody is clocked: {SCK} is no alternate-function output",
-    Question.NO_MOSI: ": what is sent does not come out: {MOSI} is no alternate-function output",
-    Question.NO_MISO: ": it reads 0: {MISO} cannot be read (analog, or the debug port has it)",
-    Question.WORD_LOST: "_DR: written while TXE is 0: a word is lost",
-    Question.MODE_FAULT: ": mode fault: a master whose NSS ({NSS}, or SSI) is low; it is switched off",
+    SpiQuestion.NO_SCK: ": nobody is clocked: {SCK} is no alternate-function output",
+    SpiQuestion.NO_MOSI: ": what is sent does not come out: {MOSI} is no alternate-function output",
+    SpiQuestion.NO_MISO: ": it reads 0: {MISO} cannot be read (analog, or the debug port has it)",
+    SpiQuestion.WORD_LOST: "_DR: written while TXE is 0: a word is lost",
+    SpiQuestion.MODE_FAULT: ": mode fault: a master whose NSS ({NSS}, or SSI) is low; it is switched off",
 }
 
 
@@ -117,7 +117,7 @@ class Spi(Peripheral):
 
     KIND, HOLDS = "spi", SPI
     OUTPUTS = ("irq", "rx_dma", "tx_dma")
-    ENUMS = (Question, Command)
+    ENUMS = (SpiQuestion, SpiCommand)
     STATE = ("_hung", "_coming")
     DERIVED = ("_pin_names", "_sinks")
     SOURCE = "RM0008 25.5"
@@ -148,7 +148,7 @@ class Spi(Peripheral):
         Register(name="I2SPR", offset=0x20, mask=0, doc="no I2S"),
     )  # fmt: skip
 
-    def __init__(self, chip: ChipPorts, place: Place) -> None:
+    def __init__(self, chip: ChipPorts, place: PeripheralMapping) -> None:
         super().__init__(chip, place)
         #: Get the words that were exchanged, in bulk, when the chip has run.
         self._sinks: list[Sink] = []
@@ -191,7 +191,7 @@ class Spi(Peripheral):
             if pin.board_pull is PinDrive.NONE:
                 pin.board_pull = PinDrive.PULL_UP
             self.native.selects[pin.index // 16] |= 1 << pin.number
-            self.command(Command.LISTEN)
+            self.command(SpiCommand.LISTEN)
         self._follow_selects()
 
     def subscribe(self, sink: Sink) -> Callable[[], None]:
@@ -211,7 +211,7 @@ class Spi(Peripheral):
         if hz <= 0:
             raise ValueError(f"{self.name}: a master's clock of {hz} Hz")
         self._coming += tuple(words)
-        if self._coming and self.command(Command.CLOCK_IN, self._coming[0], hz):
+        if self._coming and self.command(SpiCommand.CLOCK_IN, self._coming[0], hz):
             self._coming = self._coming[1:]
 
     # For the chip.
@@ -240,18 +240,18 @@ class Spi(Peripheral):
 
     def answer(self, what: int, value: int) -> int:
         """Exchange a word with the parts, follow their select pins, or warn."""
-        if what == Question.EXCHANGE:
+        if what == SpiQuestion.EXCHANGE:
             return self._exchange(value)
-        if what == Question.NEXT_WORD:
+        if what == SpiQuestion.NEXT_WORD:
             if not self._coming:
                 return 0
             word, self._coming = self._coming[0], self._coming[1:]
             return _HELD | word
-        if what == Question.SELECT:
+        if what == SpiQuestion.SELECT:
             self._follow_selects()
         else:
             names = dict(zip(("MISO", "MOSI", "NSS", "SCK"), self._pin_names, strict=True))
-            question = Question(what)
+            question = SpiQuestion(what)
             self.chip.warn(f"{self.name}{_WARNINGS[question].format(**names)}", once=f"{self.name}:{question.name}")
         return 0
 
@@ -331,7 +331,7 @@ class Spi(Peripheral):
         """Move to the pins that AFIO now gives."""
         self._find_pins()
         at = [self.chip.pins[name].index for name in self._pin_names]
-        self.command(Command.MOVE, at[0] | at[1] << 8, at[2] | at[3] << 8)
+        self.command(SpiCommand.MOVE, at[0] | at[1] << 8, at[2] | at[3] << 8)
 
     def _find_pins(self) -> None:
         pins = PINS[self.name]
@@ -340,7 +340,7 @@ class Spi(Peripheral):
     def _restored(self) -> None:
         self._find_pins()
         self.native.wants_words = bool(self._sinks)
-        self.command(Command.LISTEN)
+        self.command(SpiCommand.LISTEN)
 
     def _write_i2s(self, written: int, _previous: int) -> None:
         if written:

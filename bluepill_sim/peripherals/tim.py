@@ -14,7 +14,7 @@ from bluepill_sim.extension.layout import TIM
 from bluepill_sim.fabric.fabric import CLOCK, OWN_COMMANDS, ROUTE
 from bluepill_sim.fabric.pins import ALTERNATE_FUNCTIONS
 from bluepill_sim.fabric.ports import ChipPorts
-from bluepill_sim.fabric.registers import NATIVE, Peripheral, Place, Register, bits, fields_of
+from bluepill_sim.fabric.registers import NATIVE, Peripheral, PeripheralMapping, Register, bits, fields_of
 
 #: The alternate functions, in the order of `outputs` in the struct.
 _OUTPUTS = ("CH1", "CH2", "CH3", "CH4", "CH1N", "CH2N", "CH3N")
@@ -58,7 +58,7 @@ _EVENTS = (
 )
 
 
-class Command(IntEnum):
+class TimCommand(IntEnum):
     """A command of its own."""
 
     #: Put one of `pins` on another pin.
@@ -134,13 +134,13 @@ class GeneralTimer(Peripheral):
     """TIM2, TIM3 or TIM4."""
 
     KIND, HOLDS = "tim", TIM
-    ENUMS: ClassVar[tuple[type[IntEnum], ...]] = (Command,)
+    ENUMS: ClassVar[tuple[type[IntEnum], ...]] = (TimCommand,)
     OUTPUTS: ClassVar[tuple[str, ...]] = (*_EVENTS, "irq")
     INPUTS: ClassVar[tuple[str, ...]] = ("itr0", "itr1", "itr2", "itr3")
     SOURCE: ClassVar[str] = "RM0008 15.4"
     REGISTERS = _registers(is_advanced=False)
 
-    def __init__(self, chip: ChipPorts, place: Place) -> None:
+    def __init__(self, chip: ChipPorts, place: PeripheralMapping) -> None:
         super().__init__(chip, place)
         self._pins = PINS[place.name]
         self.native.base = place.base
@@ -149,7 +149,7 @@ class GeneralTimer(Peripheral):
             self.native.sources[number] = ALTERNATE_FUNCTIONS.index(f"{place.name}_{name}")
         self.native.pins[:] = self._routed_pins()
         self.command(CLOCK, self.clock_hz())
-        self.command(Command.INTRODUCE)
+        self.command(TimCommand.INTRODUCE)
         self.reset()
         chip.pins.route_listeners.append(self._route_changed)
 
@@ -177,11 +177,11 @@ class GeneralTimer(Peripheral):
         wanted = self._routed_pins()
         if wanted != list(self.native.pins):
             for number, pin in enumerate(wanted):
-                self.command(Command.MOVE, number, pin)
+                self.command(TimCommand.MOVE, number, pin)
             self.command(ROUTE)
 
     def _restored(self) -> None:
-        self.command(Command.RESUME)
+        self.command(TimCommand.RESUME)
 
 
 class AdvancedTimer(GeneralTimer):

@@ -37,7 +37,7 @@ from bluepill_sim.fabric.fabric import OWN_COMMANDS, WORD
 from bluepill_sim.fabric.line_speed import TOLERANCE_PERCENT, Heard, heard, is_usual, nearest_usual
 from bluepill_sim.fabric.pins import ALTERNATE_FUNCTIONS, Pin
 from bluepill_sim.fabric.ports import ChipPorts
-from bluepill_sim.fabric.registers import NATIVE, Peripheral, Place, Register, bits, indices, masks
+from bluepill_sim.fabric.registers import NATIVE, Peripheral, PeripheralMapping, Register, bits, indices, masks
 
 #: Fields, from the left.
 _SR = "CTS 9, LBD 8, TXE 7, TC 6, RXNE 5, IDLE 4, ORE 3, NE 2, FE 1, PE 0"
@@ -72,7 +72,7 @@ _CONTROL_PINS = {
 _CLOCK_PINS = {"USART1": {0: "PA8"}, "USART2": {0: "PA4", 1: "PD7"}, "USART3": {0: "PB12", 1: "PC12", 3: "PD10"}}
 
 
-class Damage(IntFlag):
+class ReceiveError(IntFlag):
     """What a character that comes in raises beside RXNE."""
 
     PARITY = PE
@@ -80,10 +80,10 @@ class Damage(IntFlag):
     NOISE = NE
 
 
-NOT_DAMAGED = Damage(0)
+NOT_DAMAGED = ReceiveError(0)
 
 
-class Question(IntEnum):
+class UsartQuestion(IntEnum):
     """What Python is asked: all but the last four are warnings."""
 
     TX_PIN = 0
@@ -99,7 +99,7 @@ class Question(IntEnum):
     EXCHANGE = 9
 
 
-class Command(IntEnum):
+class UsartCommand(IntEnum):
     """A command of its own."""
 
     #: Move to the pins (TX, RX).
@@ -117,11 +117,11 @@ class Command(IntEnum):
 
 #: What is warned of, after the name, and its key.
 _WARNINGS = {
-    Question.TX_OFF: ("_DR: written while the transmitter is off", "tx-off"),
-    Question.NO_RATE: ("_DR: written while BRR is 0: no baud rate", "brr"),
-    Question.CHARACTER_LOST: ("_DR: written while TXE is 0: a character is lost", "txe"),
-    Question.RX_OFF: (": characters lost, the receiver is not set up", "rx-off"),
-    Question.CUT_OFF: ("_CR1: TE cleared during a character, which is lost", "te"),
+    UsartQuestion.TX_OFF: ("_DR: written while the transmitter is off", "tx-off"),
+    UsartQuestion.NO_RATE: ("_DR: written while BRR is 0: no baud rate", "brr"),
+    UsartQuestion.CHARACTER_LOST: ("_DR: written while TXE is 0: a character is lost", "txe"),
+    UsartQuestion.RX_OFF: (": characters lost, the receiver is not set up", "rx-off"),
+    UsartQuestion.CUT_OFF: ("_CR1: TE cleared during a character, which is lost", "te"),
 }
 #: Takes characters that have gone out.
 Sink = Callable[[Characters], None]
@@ -135,7 +135,7 @@ class Usart(Peripheral):
 
     KIND, HOLDS = "usart", USART
     OUTPUTS = ("irq", "tx_dma", "rx_dma")
-    ENUMS = (Question, Command)
+    ENUMS = (UsartQuestion, UsartCommand)
     HIDDEN = ("SEEN", "TDR", "SHIFT", "RDR")
     STATE = ("_coming", "sent_at")
     DERIVED = ("_tx_pin", "_rx_pin")
@@ -190,7 +190,7 @@ class Usart(Peripheral):
         Register(name="GTPR", offset=0x18, readable=bits((15, 0)), writable=bits((15, 0)), fields="GT 15:8, PSC 7:0"),
     )
 
-    def __init__(self, chip: ChipPorts, place: Place) -> None:
+    def __init__(self, chip: ChipPorts, place: PeripheralMapping) -> None:
         super().__init__(chip, place)
         #: Get the characters that have gone out, in bulk, when the chip has run.
         self.sinks: list[Sink] = []
@@ -219,7 +219,7 @@ class Usart(Peripheral):
         """How long one bit takes at the present baud rate, in ns; 0 while none is set."""
         return self.words[BRR] * 1_000_000_000 // self.clock_hz()
 
-    def receive(self, data: Iterable[int], damage: Damage = NOT_DAMAGED) -> None:
+    def receive(self, data: Iterable[int], damage: ReceiveError = NOT_DAMAGED) -> None:
         """Send characters to the RX pin, at the speed of the line, behind those still on their way.
 
         Args:
@@ -228,7 +228,7 @@ class Usart(Peripheral):
         """
         control = self.words[CR1]
         words = [_with_parity(word & _WORD_BITS, control) for word in data]
-        if damage & Damage.PARITY and control & PCE:
+        if damage & ReceiveError.PARITY and control & PCE:
             words = [word ^ 1 << (8 if control & M else 7) for word in words]
         self._hear(tuple(word | damage << _FLAGS_AT for word in self._arriving(words)))
 
@@ -245,8 +245,8 @@ class Usart(Peripheral):
         self._hear(((FE | (LBD if is_lin else 0)) << _FLAGS_AT,))
 
     def _hear(self, arriving: tuple[int, ...]) -> None:
-        if self.chip.power.is_stopped or not self.command(Command.CAN_HEAR):
-            self._warn(Question.RX_OFF)
+        if self.chip.power.is_stopped or not self.command(UsartCommand.CAN_HEAR):
+            self._warn(UsartQuestion.RX_OFF)
             return
         self._coming += arriving
         self._give_more()
@@ -281,16 +281,16 @@ class Usart(Peripheral):
 
     def answer(self, what: int, value: int) -> int:
         """Warn, or give the next characters."""
-        if what == Question.EXCHANGE:
+        if what == UsartQuestion.EXCHANGE:
             return self._exchange(value)
-        if what == Question.GIVE_MORE:
+        if what == UsartQuestion.GIVE_MORE:
             self._give_more()
-        elif what == Question.JUDGE_SPEED:
+        elif what == UsartQuestion.JUDGE_SPEED:
             self._judge_speed()
-        elif what == Question.CHECK_MODES:
+        elif what == UsartQuestion.CHECK_MODES:
             self._check_modes()
         else:
-            self._warn(Question(what))
+            self._warn(UsartQuestion(what))
         return 0
 
     def _exchange(self, word: int) -> int:
@@ -300,14 +300,14 @@ class Usart(Peripheral):
         level = _WORD_BITS if self._rx_pin.level else 0
         return int(self.native.ck_word | level << self.native.ck_count)
 
-    def _warn(self, question: Question) -> None:
-        if question is Question.TX_PIN:
+    def _warn(self, question: UsartQuestion) -> None:
+        if question is UsartQuestion.TX_PIN:
             pin = self._tx_pin
             text = f": nothing comes out, {pin.name} is no alternate-function output ({pin.mode.value})"
             self.chip.warn(f"{self.name}{text}", once=f"{self.name}:tx-pin")
             return
         text, key = _WARNINGS[question]
-        if question is Question.RX_OFF and self.words[CR1] & (UE | RE) == UE | RE and self.words[BRR]:
+        if question is UsartQuestion.RX_OFF and self.words[CR1] & (UE | RE) == UE | RE and self.words[BRR]:
             pin = self._rx_pin
             why = "asleep" if self.chip.power.is_stopped else f"deaf: {pin.name} is {pin.mode.value}"
             text, key = f": characters lost, the receiver is {why}", "rx-pin"
@@ -322,7 +322,7 @@ class Usart(Peripheral):
         """Let C have as many of the characters that come as it has room for."""
         given = 0
         for word in self._coming:
-            if not self.command(Command.HEAR, word):
+            if not self.command(UsartCommand.HEAR, word):
                 break
             given += 1
         self._coming = self._coming[given:]
@@ -381,14 +381,14 @@ class Usart(Peripheral):
         self._tx_pin, self._rx_pin = self._routed_pins()
         remap = self.chip.pins.remaps.get(self.name, 0)
         cts, rts = _CONTROL_PINS[self.name].get(remap, _CONTROL_PINS[self.name][0])
-        self.command(Command.CONTROL, self.chip.pins[cts].index, self.chip.pins[rts].index)
+        self.command(UsartCommand.CONTROL, self.chip.pins[cts].index, self.chip.pins[rts].index)
         clocks = _CLOCK_PINS[self.name]
-        self.command(Command.MOVE_CK, self.chip.pins[clocks.get(remap, clocks[0])].index)
-        self.command(Command.MOVE, self._tx_pin.index, self._rx_pin.index)
+        self.command(UsartCommand.MOVE_CK, self.chip.pins[clocks.get(remap, clocks[0])].index)
+        self.command(UsartCommand.MOVE, self._tx_pin.index, self._rx_pin.index)
 
     def _restored(self) -> None:
         self._tx_pin, self._rx_pin = self._routed_pins()
-        self.command(Command.LISTEN)
+        self.command(UsartCommand.LISTEN)
 
     def _routed_pins(self) -> tuple[Pin, Pin]:
         tx, rx = self._pins.get(self.chip.pins.remaps.get(self.name, 0), self._pins[0])

@@ -28,7 +28,7 @@ from bluepill_sim.fabric.registers import (
     NATIVE,
     OWN_ANSWERS,
     Peripheral,
-    Place,
+    PeripheralMapping,
     Register,
     bits,
     indices,
@@ -37,12 +37,12 @@ from bluepill_sim.fabric.registers import (
 from bluepill_sim.fabric.usb_bus import (
     FRAME_NS,
     FRAME_NUMBERS,
-    Answer,
     BusState,
     Handshake,
     Token,
     Transaction,
     UsbMaster,
+    UsbResponse,
 )
 from simbase.timing import Nanos
 
@@ -88,7 +88,7 @@ _LEAST_PCLK1_HZ = 8_000_000
 _PINS = (("PA11", "USBDM"), ("PA12", "USBDP"))
 
 
-class Question(IntEnum):
+class UsbQuestion(IntEnum):
     """What Python is told beside what a listener hears."""
 
     #: A write that has changed a word, with the word before it.
@@ -106,7 +106,7 @@ class Usb(Peripheral):
         "_can_is_on", "_is_stopped", "_turns",
     )  # fmt: skip
     SOURCE = "RM0008 23.5"
-    ENUMS = (Question,)
+    ENUMS = (UsbQuestion,)
     REGISTERS = (
         *(
             Register(
@@ -164,7 +164,7 @@ class Usb(Peripheral):
         ),
     )
 
-    def __init__(self, chip: ChipPorts, place: Place) -> None:
+    def __init__(self, chip: ChipPorts, place: PeripheralMapping) -> None:
         super().__init__(chip, place)
         self._host: UsbMaster | None = None
         self._can_is_on = False
@@ -222,7 +222,7 @@ class Usb(Peripheral):
             self._quiet_ns = at_ns
         self._look_for_frames(at_ns)
 
-    def begin(self, transaction: Transaction) -> Answer | None:
+    def begin(self, transaction: Transaction) -> UsbResponse | None:
         """Return the answer to a transaction that begins now; None: none."""
         if not self._is_listening:
             return None
@@ -343,7 +343,7 @@ class Usb(Peripheral):
 
     def answer(self, what: int, value: int) -> int:
         """Take what the device in C hears: a line, a pin, or a write that has changed a word."""
-        if what == Question.WRITTEN:
+        if what == UsbQuestion.WRITTEN:
             if value >> 16 == CNTR:
                 self._control(value & _HALFWORD)
             elif value >> 16 == ISTR:
@@ -507,35 +507,35 @@ class Usb(Peripheral):
         is_taken = self._turns >> n & 1 and bool(word & DTOG_RX) == bool(word & DTOG_TX)
         return stat == NAK or (stat == VALID and bool(is_taken))
 
-    def _begin_in(self, n: int) -> Answer | None:
+    def _begin_in(self, n: int) -> UsbResponse | None:
         word = self.words[n]
         if self._says_nak(n, is_in=True):
-            return Answer(Handshake.NAK)
+            return UsbResponse(Handshake.NAK)
         if word >> STAT_TX_AT & 3 == STALL:
-            return Answer(Handshake.STALL)
+            return UsbResponse(Handshake.STALL)
         toggle = bool(word & DTOG_TX)
         second = self._has_two_buffers(word) and toggle
         at = self._description(n) + (_SECOND if second else 0)
         count = self._memory(at + 1) & _COUNT
         pid = 0 if word >> TYPE_AT & 3 == ISOCHRONOUS else int(toggle)
-        return Answer(None, pid, self._load(self._memory(at), count))
+        return UsbResponse(None, pid, self._load(self._memory(at), count))
 
-    def _begin_out(self, n: int, transaction: Transaction) -> Answer | None:
+    def _begin_out(self, n: int, transaction: Transaction) -> UsbResponse | None:
         word = self.words[n]
         kind = word >> TYPE_AT & 3
         if transaction.token is Token.SETUP:
             # What comes before the last one is acknowledged is not heard, whatever STAT (23.4.2, control transfers).
             is_heard = kind == CONTROL and not word & CTR_RX and len(transaction.data) == _SETUP_BYTES
-            return Answer(Handshake.ACK) if is_heard else None
+            return UsbResponse(Handshake.ACK) if is_heard else None
         if kind == ISOCHRONOUS:
-            return Answer(None)
+            return UsbResponse(None)
         if self._says_nak(n, is_in=False):
-            return Answer(Handshake.NAK)
+            return UsbResponse(Handshake.NAK)
         is_wrong_status = kind == CONTROL and word & EP_KIND and transaction.data
         room = self._room(self._memory(self._rx_buffer(n) + 1))
         if word >> STAT_RX_AT & 3 == STALL or is_wrong_status or len(transaction.data) > room:
-            return Answer(Handshake.STALL)
-        return Answer(Handshake.ACK)
+            return UsbResponse(Handshake.STALL)
+        return UsbResponse(Handshake.ACK)
 
     @staticmethod
     def _is_new(word: int, transaction: Transaction) -> bool:

@@ -40,7 +40,7 @@ class Vector:
 
 
 @dataclass(frozen=True, slots=True)
-class Layout:
+class MemoryLayout:
     """How a program lies in the chip's memories."""
 
     sections: tuple[Section, ...]
@@ -71,15 +71,15 @@ def file_bytes(image: Image) -> bytes:
     return read_bytes(path, ImageError, hint="check the path")
 
 
-def layout(image: Image) -> Layout:
+def layout(image: Image) -> MemoryLayout:
     """Return the sections of an image and what they add up to; HEX and BIN have no sections."""
     flash_bytes = sum(len(data) for _, data in image.segments)
     data = file_bytes(image)
     if not data.startswith(b"\x7fELF"):
-        return Layout((), flash_bytes, 0)
+        return MemoryLayout((), flash_bytes, 0)
     sections = tuple(_sections(data))
     sram = sum(section.size for section in sections if section.in_sram)
-    return Layout(sections, flash_bytes, sram)
+    return MemoryLayout(sections, flash_bytes, sram)
 
 
 def file_offset(data: bytes, flash_offset: int) -> int:

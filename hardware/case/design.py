@@ -18,7 +18,7 @@ import hashlib
 from functools import cache
 
 from hardware.case.board import PlacedBox, body_of, mounting_holes, part_place
-from hardware.case.solids import Block, Body, Cylinder, Solid
+from hardware.case.solids import Block, PrintedPart, Solid, UprightCylinder
 from hardware.pcb.layout.rules import BOARD_HEIGHT_MM, BOARD_THICKNESS_MM, BOARD_WIDTH_MM, CORNER_MM
 
 WALL_MM, PLAY_MM = 2.4, 0.6
@@ -49,7 +49,7 @@ _BOTTOM = _FLOOR_TOP - WALL_MM
 
 
 @cache
-def base() -> Body:
+def base() -> PrintedPart:
     """Return the tray."""
     walls: list[Solid] = [
         Block(x=_OUTER[:2], y=_OUTER[2:], z=(_BOTTOM, SPACER_MM), corner_mm=CORNER_MM + PLAY_MM + WALL_MM,
@@ -58,14 +58,15 @@ def base() -> Body:
               name="inside"),
     ]  # fmt: skip
     for at in mounting_holes():
-        walls.append(Cylinder(at=at, radius_mm=BOSS_MM / 2, z=(_FLOOR_TOP, -BOARD_THICKNESS_MM), name="boss"))
-        walls.append(Cylinder(at=at, radius_mm=INSERT_HOLE_MM / 2, z=(_BOTTOM + 0.8, -BOARD_THICKNESS_MM), is_cut=True,
-                              name="insert"))  # fmt: skip
-    return Body(name="base", solids=(*walls, *_front(), *_back(), *_ears(), *_tongue()))
+        walls.append(UprightCylinder(at=at, radius_mm=BOSS_MM / 2, z=(_FLOOR_TOP, -BOARD_THICKNESS_MM), name="boss"))
+        walls.append(UprightCylinder(at=at, radius_mm=INSERT_HOLE_MM / 2, z=(_BOTTOM + 0.8, -BOARD_THICKNESS_MM),
+                                     is_cut=True,
+                                     name="insert"))  # fmt: skip
+    return PrintedPart(name="base", solids=(*walls, *_front(), *_back(), *_ears(), *_tongue()))
 
 
 @cache
-def lid() -> Body:
+def lid() -> PrintedPart:
     """Return the cover."""
     top = (SPACER_MM, SPACER_MM + WALL_MM)
     left, right, top_side, bottom_side = _INNER
@@ -80,11 +81,11 @@ def lid() -> Body:
         *(Block(x=(x[0] - 1, x[1] + 1), y=y, z=lip, is_cut=True, name="gap of the lip") for x, y in _cable_gaps()),
     ]  # fmt: skip
     for at in mounting_holes():
-        solids.append(Cylinder(at=at, radius_mm=BOSS_MM / 2, z=lip, is_cut=True, name="room for a spacer"))
-        solids.append(Cylinder(at=at, radius_mm=SCREW_HOLE_MM / 2, z=top, is_cut=True, name="screw"))
+        solids.append(UprightCylinder(at=at, radius_mm=BOSS_MM / 2, z=lip, is_cut=True, name="room for a spacer"))
+        solids.append(UprightCylinder(at=at, radius_mm=SCREW_HOLE_MM / 2, z=top, is_cut=True, name="screw"))
     solids += [
-        Cylinder(at=part_place(part, LIGHTS_VARIANT), radius_mm=LIGHT_MM / 2, z=top, is_cut=True,
-                 name=f"light of {part}")
+        UprightCylinder(at=part_place(part, LIGHTS_VARIANT), radius_mm=LIGHT_MM / 2, z=top, is_cut=True,
+                        name=f"light of {part}")
         for part in LIGHTS
     ]  # fmt: skip
     logic, regulator = body_of("J4", index=-1), body_of("U3")
@@ -92,13 +93,13 @@ def lid() -> Body:
         _around(logic, 2.0, top, "LOGIC"),
         Block(x=usb_way().x, y=usb_way().y, z=top, is_cut=True, name="USB of the ESP32"),
         _around(body_of("J7", index=-1), 2.0, top, "STOP"),
-        Cylinder(at=button_place(), radius_mm=BUTTON_MM / 2, z=top, is_cut=True, name="button"),
+        UprightCylinder(at=button_place(), radius_mm=BUTTON_MM / 2, z=top, is_cut=True, name="button"),
     ]
     solids += [
         Block(x=(x, x + 2.0), y=(regulator.y[0] - 6, regulator.y[1] + 6), z=top, is_cut=True, name="vent")
         for x in (regulator.x[0], regulator.x[0] + 4.5, regulator.x[0] + 9.0)
     ]
-    return Body(name="lid", solids=tuple(solids))
+    return PrintedPart(name="lid", solids=tuple(solids))
 
 
 def usb_way() -> PlacedBox:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 
 from hardware.case import design
 from hardware.case.board import PlacedBox, bodies, body_of, mounting_holes, part_place, through_pads
-from hardware.case.solids import Block, Body
+from hardware.case.solids import Block, PrintedPart
 from hardware.pcb.circuit.design import VARIANTS, build
 from hardware.pcb.layout.rules import BOARD_HEIGHT_MM, BOARD_THICKNESS_MM, BOARD_WIDTH_MM, CORNER_MM
 
@@ -165,7 +165,7 @@ CHECKS: dict[str, Callable[[], list[str]]] = {
 }
 
 
-def _printed() -> tuple[Body, Body]:
+def _printed() -> tuple[PrintedPart, PrintedPart]:
     return design.base(), design.lid()
 
 
@@ -175,7 +175,7 @@ def _board() -> PlacedBox:
                      z=(-BOARD_THICKNESS_MM + 0.01, 0.0))  # fmt: skip
 
 
-def _first_touch(body: Body, box: PlacedBox) -> tuple[float, float, float] | None:
+def _first_touch(body: PrintedPart, box: PlacedBox) -> tuple[float, float, float] | None:
     near = body.near((*box.x, *box.y, *box.z))
     if all(solid.is_cut for solid in near.solids):
         return None

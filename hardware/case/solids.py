@@ -42,7 +42,7 @@ class Block:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Cylinder:
+class UprightCylinder:
     """An upright cylinder."""
 
     at: tuple[float, float]
@@ -62,11 +62,11 @@ class Cylinder:
         return (x - self.at[0]) ** 2 + (y - self.at[1]) ** 2 <= self.radius_mm**2 and self.z[0] <= z <= self.z[1]
 
 
-Solid: TypeAlias = Block | Cylinder
+Solid: TypeAlias = Block | UprightCylinder
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Body:
+class PrintedPart:
     """A printed part."""
 
     name: str
@@ -80,10 +80,10 @@ class Body:
                 is_there = not solid.is_cut
         return is_there
 
-    def near(self, extent: Extent) -> "Body":
+    def near(self, extent: Extent) -> "PrintedPart":
         """Return the body of those solids only that reach into a space."""
         left, right, top, bottom, low, high = extent
-        return Body(name=self.name, solids=tuple(
+        return PrintedPart(name=self.name, solids=tuple(
             solid for solid in self.solids
             if (of := solid.extent)[0] <= right and of[1] >= left and of[2] <= bottom and of[3] >= top
             and of[4] <= high and of[5] >= low

@@ -6,7 +6,7 @@ STEP and STL have y up where the board's axes have it down: each y changes its s
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from hardware.case.solids import Block, Body, Solid
+from hardware.case.solids import Block, PrintedPart, Solid
 from simbase.errors import MissingDependencyError
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 TOLERANCE_MM = 0.05
 
 
-def export(body: Body, folder: Path) -> list[Path]:
+def export(body: PrintedPart, folder: Path) -> list[Path]:
     """Write a body as STEP and STL; return the files.
 
     Raises:
@@ -30,7 +30,7 @@ def export(body: Body, folder: Path) -> list[Path]:
     return [step, stl]
 
 
-def model(body: Body) -> Any:
+def model(body: PrintedPart) -> Any:
     """Return a body as build123d's solid, y up.
 
     Raises:

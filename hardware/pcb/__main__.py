@@ -11,7 +11,7 @@ from pathlib import Path
 
 from hardware.pcb.checks import suite
 from hardware.pcb.checks.kicad_checks import stitches_of
-from hardware.pcb.checks.results import Verdict, table
+from hardware.pcb.checks.results import CheckStatus, table
 from hardware.pcb.circuit.design import VARIANTS
 from hardware.pcb.circuit.design import build as design_of
 from hardware.pcb.circuit.netlist import DesignError
@@ -74,7 +74,7 @@ def _build(_: argparse.Namespace) -> int:
 def _check(given: argparse.Namespace) -> int:
     results = suite.run_all()
     print(table(results))
-    bad = {Verdict.BAD, Verdict.SKIPPED} if given.strict else {Verdict.BAD}
+    bad = {CheckStatus.BAD, CheckStatus.SKIPPED} if given.strict else {CheckStatus.BAD}
     return 1 if any(result.verdict in bad for result in results) else 0
 
 
@@ -104,7 +104,7 @@ def _simulate(_: argparse.Namespace) -> int:
     page = page_text(decks(), {one.deck.name: one.figures for one in ran})
     generated_files.SIMULATION_PAGE.write_text(page, encoding="utf-8", newline="\n")
     print(f"{generated_files.SIMULATION_PAGE.name}: {len(ran)} simulations")
-    return 1 if any(result.verdict is Verdict.BAD for result in results) else 0
+    return 1 if any(result.verdict is CheckStatus.BAD for result in results) else 0
 
 
 def _diff(given: argparse.Namespace) -> int:

@@ -5,11 +5,11 @@ Nothing here reads a clock or opens a port; `p2os decode`, `sniff`, `record`,
 """
 
 from p2os.capture.chunks import Capture, Chunk, Direction, capture_of
-from p2os.capture.explain import Part, explain
+from p2os.capture.explain import FramePart, explain
 from p2os.capture.formats.pcap import write_pcap
 from p2os.capture.formats.recording import write_recording
 from p2os.capture.formats.sources import (
-    Source,
+    CaptureSource,
     open_argument,
     open_capture,
     open_file,
@@ -21,14 +21,14 @@ from p2os.capture.reading import FollowedReading, Reading
 
 __all__ = [
     "Capture",
+    "CaptureSource",
     "Chunk",
     "Direction",
     "FollowedReading",
+    "FramePart",
     "Lister",
     "ListingRow",
-    "Part",
     "Reading",
-    "Source",
     "capture_of",
     "explain",
     "frame_chunks",

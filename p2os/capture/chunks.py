@@ -4,7 +4,7 @@ A capture knows nothing of frames; `p2os.capture.listing` finds them. Where a
 source gives no direction (raw bytes, plain hex), a chunk has none and each
 frame's is guessed from its shape.
 
-A `Chunk` is an object; a `Block` holds as many as were read together without an object each, for captures of
+A `Chunk` is an object; a `ChunkBlock` holds as many as were read together without an object each, for captures of
 millions.
 
 Invariant: chunks are in the order in which they were read, and time never runs back.
@@ -97,7 +97,7 @@ _DIRECTIONS = {letter[0]: direction for direction, letter in LETTERS.items()}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Block:
+class ChunkBlock:
     """Chunks that were read together, none of them empty.
 
     Args:
@@ -134,10 +134,10 @@ class Block:
             start = end
 
 
-def block_of(parts: Iterable[Part]) -> Block:
+def block_of(parts: Iterable[Part]) -> ChunkBlock:
     """Return parts as a block, those without bytes left out."""
     kept = [part for part in parts if part[2]]
-    return Block(
+    return ChunkBlock(
         at_ns=array("q", [at_ns for at_ns, _, _ in kept]),
         senders=b"".join([LETTERS[direction] for _, direction, _ in kept]),
         ends=array("q", accumulate(len(data) for _, _, data in kept)),
@@ -145,7 +145,7 @@ def block_of(parts: Iterable[Part]) -> Block:
     )
 
 
-def blocks_of(parts: Iterable[Part]) -> Iterator[Block]:
+def blocks_of(parts: Iterable[Part]) -> Iterator[ChunkBlock]:
     """Yield parts as one block; where reading them fails, what came before, and then the error."""
     kept: list[Part] = []
     try:
@@ -156,12 +156,12 @@ def blocks_of(parts: Iterable[Part]) -> Iterator[Block]:
     yield block_of(kept)
 
 
-def chunks_of(blocks: Iterable[Block]) -> Iterator[Chunk]:
+def chunks_of(blocks: Iterable[ChunkBlock]) -> Iterator[Chunk]:
     """Yield the chunks of blocks one by one."""
     return chain.from_iterable(blocks)
 
 
-def in_order(blocks: Iterable[Block]) -> Iterator[Block]:
+def in_order(blocks: Iterable[ChunkBlock]) -> Iterator[ChunkBlock]:
     """Yield blocks that hold something; a time that steps back a little, as clocks of captures do, is moved up."""
     last_ns = 0
     for block in filter(len, blocks):

@@ -67,7 +67,7 @@ _TAIL_MEANINGS: Mapping[str, Callable[[int], str]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class FramePart:
     """Some bytes of a frame and what they mean.
 
     Args:
@@ -83,12 +83,12 @@ class Part:
     meaning: str = ""
 
 
-def explain(row: ListingRow, reading: Reading) -> list[Part]:
+def explain(row: ListingRow, reading: Reading) -> list[FramePart]:
     """Return the parts of a row's bytes, in order."""
     return list(_placed(_sound(row, reading) if row.valid else _damaged(row.data)))
 
 
-def lines_of(parts: list[Part]) -> list[str]:
+def lines_of(parts: list[FramePart]) -> list[str]:
     """Return an explanation as aligned lines: offset, bytes, name, meaning."""
     lines = []
     for part in parts:
@@ -99,11 +99,11 @@ def lines_of(parts: list[Part]) -> list[str]:
     return lines
 
 
-def _placed(spans: Iterator[Span]) -> Iterator[Part]:
+def _placed(spans: Iterator[Span]) -> Iterator[FramePart]:
     offset = 0
     for data, name, meaning in spans:
         if data:
-            yield Part(offset, data, name, meaning)
+            yield FramePart(offset, data, name, meaning)
             offset += len(data)
 
 

@@ -105,7 +105,7 @@ class ListingRow:
         }
 
 
-class Passing(Protocol):
+class RowFilter(Protocol):
     """What finds sound frames and says which of them need no row."""
 
     def found_in(self, data: bytes, direction: Direction | None) -> "Finder":
@@ -134,7 +134,7 @@ class Lister:
         passing: Which packets are passed over; None for none.
     """
 
-    def __init__(self, reading: Reading | FollowedReading, passing: Passing | None = None) -> None:
+    def __init__(self, reading: Reading | FollowedReading, passing: RowFilter | None = None) -> None:
         self._passing = passing
         self._followed = reading if isinstance(reading, FollowedReading) else None
         self._read_by(reading.reading if isinstance(reading, FollowedReading) else reading)
@@ -287,7 +287,7 @@ def next_header(data: bytes, place: int, limit: int | None = None) -> int:
 
 
 def rows_of(
-    chunks: Iterable[Chunk], reading: Reading | FollowedReading, passing: Passing | None = None
+    chunks: Iterable[Chunk], reading: Reading | FollowedReading, passing: RowFilter | None = None
 ) -> Iterator[ListingRow]:
     """Yield every row of a capture, or of chunks while they are read; none of what is passed over."""
     lister, last_ns = Lister(reading, passing), 0

@@ -30,7 +30,7 @@ KIND_SAYS: Mapping[str, Callable[[int], Cell]] = {
 }  # fmt: skip
 
 
-class Conversion:
+class FieldConversion:
     """What a field says of each raw value that occurs, and how that stands in CSV.
 
     Args:
@@ -50,7 +50,7 @@ class RawColumn(Sequence[Cell]):
         conversion: What they say.
     """
 
-    def __init__(self, raw: Sequence[int], conversion: Conversion) -> None:
+    def __init__(self, raw: Sequence[int], conversion: FieldConversion) -> None:
         self._raw, self._conversion = raw, conversion
 
     def texts(self) -> Sequence[str] | Alike:
@@ -83,7 +83,7 @@ class _Readings:
         conversion: What a raw range says.
     """
 
-    def __init__(self, heads: Heads, count: int, conversion: Conversion) -> None:
+    def __init__(self, heads: Heads, count: int, conversion: FieldConversion) -> None:
         self._heads, self._count, self._conversion = heads, count, conversion
 
     @cached_property
@@ -146,9 +146,9 @@ class SipColumns:
         self._fields = SipFields(profile, parameters)
         port, gripper = ("second", "first") if profile.has_gripper_first else ("first", "second")
         self._renamed = {"analog_port": port, "gripper_state": gripper}
-        self._conversions = {name: Conversion(memo) for name, memo in self._fields.memos.items()}
+        self._conversions = {name: FieldConversion(memo) for name, memo in self._fields.memos.items()}
         self._range = self._conversions["sonar_m"]
-        self._leading = {name: Conversion(Memo(convert)) for name, convert in KIND_SAYS.items()}
+        self._leading = {name: FieldConversion(Memo(convert)) for name, convert in KIND_SAYS.items()}
 
     def of(self, payloads: Sequence[bytes], heads: Heads) -> dict[str, Sequence[Cell]]:
         """Return the columns of SIPs but for the time, in the order in which SIPs first have them.

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
 
-from p2os.capture.chunks import LETTERS, Block, Chunk, Direction
+from p2os.capture.chunks import LETTERS, Chunk, ChunkBlock, Direction
 from p2os.capture.listing import Lister, ListingRow, next_header
 from p2os.capture.reading import Reading
 from p2os.protocol.frames import CHECKSUM_BYTES, GIVE_UP_NS, PREFIX_BYTES, sound_frames
@@ -46,7 +46,7 @@ class Sips:
                 self.payloads.append(row.data[PREFIX_BYTES:-CHECKSUM_BYTES])
 
 
-def sips_of(blocks: Iterable[Block], reading: Reading) -> Iterator[Sips]:
+def sips_of(blocks: Iterable[ChunkBlock], reading: Reading) -> Iterator[Sips]:
     """Yield the SIPs of a capture's robot, in the order in which they had come, those of each block together."""
     reader, now = _Reader(reading), 0
     for block in blocks:
@@ -82,7 +82,7 @@ class _Reader:
         self._lister = Lister(reading)
         self._is_waiting = False
 
-    def take(self, block: Block) -> Sips:
+    def take(self, block: ChunkBlock) -> Sips:
         """Return the SIPs that a block completes."""
         found = Sips()
         for first, last in pairwise(_runs(block)):
@@ -103,7 +103,7 @@ class _Reader:
         found.add(rows)
         self._is_waiting = self._lister.is_waiting
 
-    def _run(self, block: Block, first: int, last: int, found: Sips) -> None:
+    def _run(self, block: ChunkBlock, first: int, last: int, found: Sips) -> None:
         """Find the SIPs in chunks of the robot without a long pause between them."""
         data, ends, at_ns = block.data, block.ends, block.at_ns
         place, limit = ends[first - 1] if first else 0, ends[last - 1]
@@ -130,7 +130,7 @@ class _Reader:
             place = cut
 
 
-def _runs(block: Block) -> list[int]:
+def _runs(block: ChunkBlock) -> list[int]:
     """Return where runs of one sender's chunks begin between which no frame is given up, and one past the last."""
     at_ns, senders, end = block.at_ns, block.senders, len(block)
     chunks = zip(range(1, end), senders, senders[1:], at_ns, at_ns[1:], strict=False)

@@ -44,7 +44,7 @@ class TextColumn(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class CaptureTable:
     """Columns of equal length, by name; None where a packet has no such field."""
 
     columns: Mapping[str, Sequence[Cell]]
@@ -55,7 +55,7 @@ class Table:
         return len(self.columns["t_s"])
 
 
-def tables_of(rows: Iterable[ListingRow], reading: Reading, first_rows: int = FIRST_ROWS) -> Iterator[Table]:
+def tables_of(rows: Iterable[ListingRow], reading: Reading, first_rows: int = FIRST_ROWS) -> Iterator[CaptureTable]:
     """Yield rows as tables, each of `first_rows` rows, the last of fewer.
 
     Args:
@@ -68,17 +68,17 @@ def tables_of(rows: Iterable[ListingRow], reading: Reading, first_rows: int = FI
     yield from uniform(tables.table(block) for block in iter(lambda: list(islice(every, first_rows)), []))
 
 
-def tables_of_sips(sips: Iterable[Sips], reading: Reading, first_rows: int = FIRST_ROWS) -> Iterator[Table]:
+def tables_of_sips(sips: Iterable[Sips], reading: Reading, first_rows: int = FIRST_ROWS) -> Iterator[CaptureTable]:
     """Yield a robot's SIPs as tables, as `tables_of` does rows."""
     yield from uniform(map(_Tables(reading).sip_table, in_groups(sips, first_rows)))
 
 
-def table_of(rows: Iterable[ListingRow], reading: Reading) -> Table:
+def table_of(rows: Iterable[ListingRow], reading: Reading) -> CaptureTable:
     """Return rows as one table, as `tables_of` with room for all."""
     return _Tables(reading).table(list(rows))
 
 
-def uniform(tables: Iterable[Table]) -> Iterator[Table]:
+def uniform(tables: Iterable[CaptureTable]) -> Iterator[CaptureTable]:
     """Yield tables with the columns of the first; what other columns hold goes to `MORE` if a second one comes."""
     every = iter(tables)
     head = next(every, None)
@@ -107,10 +107,10 @@ def uniform(tables: Iterable[Table]) -> Iterator[Table]:
         texts = none
         if more:
             texts = [json.dumps(more[row], sort_keys=True) if row in more else None for row in range(table.rows)]
-        yield Table({**{name: columns.get(name, none) for name in kinds}, MORE: texts})
+        yield CaptureTable({**{name: columns.get(name, none) for name in kinds}, MORE: texts})
 
 
-def write_csv(tables: Iterable[Table], file: IO[str]) -> int:
+def write_csv(tables: Iterable[CaptureTable], file: IO[str]) -> int:
     """Write tables as CSV with one line of names, each as it comes; empty cells are None.
 
     Returns:
@@ -126,7 +126,7 @@ def write_csv(tables: Iterable[Table], file: IO[str]) -> int:
     return count
 
 
-def _texts(table: Table) -> Iterator[Iterable[str]]:
+def _texts(table: CaptureTable) -> Iterator[Iterable[str]]:
     """Yield what stands in each column, such as are alike and stand together as one."""
     columns = (
         column.texts() if isinstance(column, TextColumn) else texts_of(column) for column in table.columns.values()
@@ -155,7 +155,7 @@ class _Tables:
         self._sips = SipColumns(reading.profile, reading.parameters)
         self._x, self._y = (_Place(reading.parameters, name) for name in ("x_m", "y_m"))
 
-    def table(self, rows: list[ListingRow]) -> Table:
+    def table(self, rows: list[ListingRow]) -> CaptureTable:
         """Return the next rows as a table."""
         sips = Sips()
         sips.add(rows)
@@ -176,16 +176,16 @@ class _Tables:
                 raw = [row.data[at] | row.data[at + 1] << 8 if there else None
                        for row, there in zip(rows, has, strict=True)]  # fmt: skip
                 columns[place.name] = place.follow(raw)
-        return Table(columns)
+        return CaptureTable(columns)
 
-    def sip_table(self, sips: Sips) -> Table:
+    def sip_table(self, sips: Sips) -> CaptureTable:
         """Return the next SIPs as a table."""
         heads = unpack_heads(sips.payloads)
         columns = self._sips.of(sips.payloads, heads)
         for place in (self._x, self._y):
             columns[place.name] = place.follow(heads.columns[RAW_OF[place.name]])
         times: list[Cell] = [at_ns / NS_PER_S for at_ns in sips.at_ns]
-        return Table({LEADING[0]: times, **columns})
+        return CaptureTable({LEADING[0]: times, **columns})
 
 
 def _described(rows: list[ListingRow]) -> dict[str, Sequence[Cell]]:

@@ -39,7 +39,7 @@ LOWEST_PYTHON = (3, 11)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Finding:
+class NeedStatus:
     """A need, and what this machine has of it: a version, a path, or None."""
 
     name: str
@@ -54,11 +54,11 @@ def examine(
     *,
     find_program: Callable[[str], str | None] = shutil.which,
     python: tuple[int, int] = sys.version_info[:2],
-) -> list[Finding]:
+) -> list[NeedStatus]:
     """Return what this machine has of everything that any feature needs."""
     ok = python >= LOWEST_PYTHON
     findings = [
-        Finding(
+        NeedStatus(
             name="python", kind="program", found=platform.python_version() if ok else None, feature="everything",
             get="install Python 3.11 or newer", required=True,
         )
@@ -69,7 +69,7 @@ def examine(
             if not need.is_plugged_in:
                 get, feature = reinstall_command(), need.feature
                 findings.append(
-                    Finding(name=need.name, kind=need.kind, found=None, feature=feature, get=get, required=False)
+                    NeedStatus(name=need.name, kind=need.kind, found=None, feature=feature, get=get, required=False)
                 )
             continue
         if need.kind == "package":
@@ -77,17 +77,19 @@ def examine(
         else:
             get = need.get or way_to_build(need.name)
         findings.append(
-            Finding(
+            NeedStatus(
                 name=need.name, kind=need.kind, found=finders[need.kind](need.name), feature=need.feature,
                 get=get, required=need.kind == "package" and not need.extra,
             )
         )  # fmt: skip
     findings += [
-        Finding(name=name, kind="distribution", found=None, feature=extra, get=install_command(extra), required=False)
+        NeedStatus(
+            name=name, kind="distribution", found=None, feature=extra, get=install_command(extra), required=False
+        )
         for name, extra in missing_distributions().items()
     ]
     findings += [
-        Finding(
+        NeedStatus(
             name=package, kind="package twice", found=None, feature=f"of {' and '.join(names)}",
             get=f"pip uninstall -y {' '.join(names)}, then install one of them again", required=True,
         )
@@ -133,7 +135,7 @@ def doctor(json_output: Annotated[bool, typer.Option("--json", help="Print a JSO
         raise typer.Exit(1)
 
 
-def line_of(finding: Finding) -> str:
+def line_of(finding: NeedStatus) -> str:
     """Return a line of the table, and of what is missing a second one with the way to get it."""
     state = "ok     " if finding.found is not None else "missing"
     name = finding.name.rpartition(".")[2] if finding.kind == "built" else finding.name

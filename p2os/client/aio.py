@@ -13,7 +13,7 @@ from typing import Self
 from p2os.client.aux_ports import AsyncAux
 from p2os.client.calls import RobotCalls
 from p2os.client.core import PacketType
-from p2os.client.goals import Axis, DriveAxis, MotionResult, TurnAxis
+from p2os.client.goals import DriveAxis, MotionAxis, MotionResult, TurnAxis
 from p2os.client.line import (
     connecting,
     fetching,
@@ -140,7 +140,7 @@ class Robot(RobotCalls):
         """Turn the shorter way to a heading of the pose's frame."""
         return await self.turn(self._angle_to(heading_rad), speed_radps=speed_radps, timeout_s=timeout_s)
 
-    async def _reach(self, axis: Axis, speed: float | None, timeout_s: float | None) -> MotionResult:
+    async def _reach(self, axis: MotionAxis, speed: float | None, timeout_s: float | None) -> MotionResult:
         return await self._runner.do(reaching(self._core, axis, speed, timeout_s, self._run))
 
     # The robot's own serial ports ---------------------------------------------------------

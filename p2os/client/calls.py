@@ -341,7 +341,7 @@ class GripperAction(IntEnum):
     LIFT_CARRY = 17
 
 
-class Sender(Protocol):
+class CommandSender(Protocol):
     """Sends one command with its argument."""
 
     def __call__(self, command: int, argument: int | bytes | None = None) -> None:
@@ -351,7 +351,7 @@ class Sender(Protocol):
 class Gripper:
     """Paddles and lift; what they do shows in GRIPPERpacs (`request`)."""
 
-    def __init__(self, send: Sender) -> None:
+    def __init__(self, send: CommandSender) -> None:
         self._send = send
 
     def act(self, action: GripperAction) -> None:

@@ -19,7 +19,7 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from typing import TypeVar
 
-from p2os.client.goals import Axis, Goal, as_number
+from p2os.client.goals import MotionAxis, MotionGoal, as_number
 from p2os.client.link import LinkSupervisor
 from p2os.client.mover import Mover, Speeds
 from p2os.client.notices import (
@@ -245,7 +245,7 @@ class RobotCore:
         self._require_open()
         self._mover.enable(on, now)
 
-    def begin_goal(self, axis: Axis, limit_ns: Nanos | None, speed: float | None, now: Nanos) -> Goal:
+    def begin_goal(self, axis: MotionAxis, limit_ns: Nanos | None, speed: float | None, now: Nanos) -> MotionGoal:
         """Begin a `drive` or a `turn`; its end is a `MotionEnded`.
 
         Args:
@@ -260,7 +260,7 @@ class RobotCore:
         self._require_motion(now)
         return self._mover.begin_goal(axis, limit_ns, speed, self.limits, now)
 
-    def cancel_goal(self, goal: Goal, now: Nanos) -> None:
+    def cancel_goal(self, goal: MotionGoal, now: Nanos) -> None:
         """Stop, if this goal is still under way."""
         self._mover.cancel_goal(goal, now)
 

@@ -74,7 +74,7 @@ def as_number(value: object, call: str, unit: str) -> float:
     return float(value)
 
 
-class Axis(Protocol):
+class MotionAxis(Protocol):
     """What differs between driving and turning."""
 
     what: str
@@ -213,7 +213,7 @@ class TurnAxis:
         return Command(CommandNumber.SETRV, max(1, round(math.degrees(speed))))
 
 
-class Goal:
+class MotionGoal:
     """One `drive` or `turn` under way.
 
     Args:
@@ -222,7 +222,7 @@ class Goal:
             later while the robot comes nearer.
     """
 
-    def __init__(self, axis: Axis, limit_ns: Nanos | None) -> None:
+    def __init__(self, axis: MotionAxis, limit_ns: Nanos | None) -> None:
         self.axis = axis
         self._limit_ns = limit_ns
         self._ends_at: Nanos = 0

@@ -21,7 +21,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from typing import TypeAlias, TypeVar
 
 from p2os.client.core import PacketType, RobotCore, request_for
-from p2os.client.goals import Axis, Goal, MotionResult, as_number
+from p2os.client.goals import MotionAxis, MotionGoal, MotionResult, as_number
 from p2os.client.notices import (
     BaudKept,
     ConnectError,
@@ -416,7 +416,11 @@ def opening(core: RobotCore, timeout_s: float | None) -> Waiting[None]:
 
 
 def reaching(
-    core: RobotCore, axis: Axis, speed: float | None, timeout_s: float | None, run: Callable[[Act[object]], object]
+    core: RobotCore,
+    axis: MotionAxis,
+    speed: float | None,
+    timeout_s: float | None,
+    run: Callable[[Act[object]], object],
 ) -> Waiting[MotionResult]:
     """Begin a goal and wait for its end; who gives up waiting stops the robot.
 
@@ -424,7 +428,7 @@ def reaching(
         MotionError, LinkLostError, MotorsDisabledError: It did not arrive.
     """
     limit_ns = None if timeout_s is None else round(as_number(timeout_s, "timeout_s", "seconds") * NS_PER_S)
-    begun: list[Goal] = []
+    begun: list[MotionGoal] = []
     run(lambda core, now: begun.append(core.begin_goal(axis, limit_ns, speed, now)))
     (goal,) = begun
     try:
@@ -463,7 +467,7 @@ def no_answer(core: RobotCore, kind: type, timeout_s: float) -> TransportError:
     return NoAnswerError(f"no {kind.__name__} within {timeout_s:g} s", hint="does this robot have the device?")
 
 
-def motion_result(goal: Goal, core: RobotCore) -> MotionResult:
+def motion_result(goal: MotionGoal, core: RobotCore) -> MotionResult:
     """Return what a goal came to, or raise why it did not arrive.
 
     Raises:

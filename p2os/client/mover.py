@@ -18,7 +18,7 @@ Flags that say that the motors are off while the wheels turn are answered with S
 again at least every `refresh_ns`. Changes that come faster than `speed_spacing_ns`
 wait, and what they overtake is never sent.
 
-`Motors`: they are off after every OPEN. ENABLE has no answer; AROS and ARCOS robots
+`MotorState`: they are off after every OPEN. ENABLE has no answer; AROS and ARCOS robots
 report in their flags whether the motors are on, P2OS robots do not. ENABLE is sent a
 few times in a row, for a frame can be lost; a program that asks for the same again
 and again has it sent no more often. Once they were on, motors that go off were
@@ -39,7 +39,7 @@ from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass, replace
 from typing import Protocol
 
-from p2os.client.goals import Axis, Goal, as_number
+from p2os.client.goals import MotionAxis, MotionGoal, as_number
 from p2os.client.notices import (
     DeadmanStopped,
     Disobeyed,
@@ -159,9 +159,9 @@ class Mover:
         self._notify = notify
         self._speeds = SpeedKeeper(spacing_ns=settings.speed_spacing_ns, refresh_ns=settings.refresh_ns)
         self._sent = SentMotion()
-        self._motors = Motors()
+        self._motors = MotorState()
         self._plausibility = PlausibilityCheck(settings.plausibility_ns)
-        self._goal: Goal | None = None
+        self._goal: MotionGoal | None = None
         #: Puts the robot's largest speed back after a goal with its own.
         self._speed_back: Command | None = None
         self._set_limits: dict[str, float] = {}
@@ -231,7 +231,9 @@ class Mover:
             self._hold(STILL, now)
             self._notify(GapStopped(gap_ns))
 
-    def begin_goal(self, axis: Axis, limit_ns: Nanos | None, speed: float | None, limits: Limits, now: Nanos) -> Goal:
+    def begin_goal(
+        self, axis: MotionAxis, limit_ns: Nanos | None, speed: float | None, limits: Limits, now: Nanos
+    ) -> MotionGoal:
         """Begin a goal; its end is a `MotionEnded`.
 
         Raises:
@@ -254,13 +256,13 @@ class Mover:
             limits = axis.with_speed(limits, min(speed, usual))
             self._send(axis.speed_command(min(speed, usual)), now)
             self._speed_back = axis.speed_command(usual)
-        goal = self._goal = Goal(axis, limit_ns)
+        goal = self._goal = MotionGoal(axis, limit_ns)
         command = goal.begin(state, limits, now)
         if command is not None:
             self._send(command, now)
         return goal
 
-    def cancel_goal(self, goal: Goal, now: Nanos) -> None:
+    def cancel_goal(self, goal: MotionGoal, now: Nanos) -> None:
         """Stop, if this goal is still under way."""
         if self._goal is goal:
             self.stop("cancelled", now)
@@ -456,7 +458,7 @@ class SpeedKeeper:
         return vel(self.wanted.forward_mm_s), rvel(self.wanted.turn_deg_s)
 
 
-class Motors:
+class MotorState:
     """What is known of the motors of one session after another."""
 
     def __init__(self) -> None:

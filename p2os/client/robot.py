@@ -16,7 +16,7 @@ from typing import Self
 from p2os.client.aux_ports import AuxStream
 from p2os.client.calls import RobotCalls
 from p2os.client.core import PacketType
-from p2os.client.goals import Axis, DriveAxis, MotionResult, TurnAxis
+from p2os.client.goals import DriveAxis, MotionAxis, MotionResult, TurnAxis
 from p2os.client.line import (
     connecting,
     fetching,
@@ -190,5 +190,5 @@ class Robot(RobotCalls):
         """Return one of the robot's own serial ports, as a file of bytes."""
         return AuxStream(self._runner, port)
 
-    def _reach(self, axis: Axis, speed: float | None, timeout_s: float | None) -> MotionResult:
+    def _reach(self, axis: MotionAxis, speed: float | None, timeout_s: float | None) -> MotionResult:
         return self._runner.do(reaching(self._core, axis, speed, timeout_s, self._run))

@@ -19,7 +19,7 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 from p2os.toml_file import TomlPlaces, TomlSource, is_file, read_toml, read_user_text
-from p2os.toml_schema import Key, Place, filled, within
+from p2os.toml_schema import Key, TablePlace, filled, within
 from simbase.errors import FileError, nearest, shown, shown_name
 
 
@@ -129,7 +129,7 @@ def parse_sensor_errors(table: Mapping[str, object], where: str, places: TomlPla
     Raises:
         SensorErrorsError: The table breaks the schema.
     """
-    place = Place(TomlSource(where, places), error=SensorErrorsError)
+    place = TablePlace(TomlSource(where, places), error=SensorErrorsError)
     given = filled(table, _TOP, place)
     found = SETS[given.pop("based_on")]
     for section, values in given.items():

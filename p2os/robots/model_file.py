@@ -18,7 +18,7 @@ from p2os.robots.model import (
     SonarPose,
 )
 from p2os.toml_file import TomlPlaces, TomlSource, find_places, read_toml
-from p2os.toml_schema import Key, Place, check_table, within
+from p2os.toml_schema import Key, TablePlace, check_table, within
 from simbase.errors import nearest, shown
 from simbase.files import read_text
 
@@ -184,7 +184,7 @@ def build_parameters(name: str, table: Table, places: TomlPlaces | None = None) 
     Raises:
         ParametersError: A key is missing, unknown, of another type, or out of range.
     """
-    where = Place(TomlSource(name, places), error=ParametersError)
+    where = TablePlace(TomlSource(name, places), error=ParametersError)
     check_table(table, TOP, where)
     parts = {"equipment": {}, "infrared": {"points": []}, **table}
     for section, keys in SECTIONS.items():
@@ -215,7 +215,7 @@ def build_parameters(name: str, table: Table, places: TomlPlaces | None = None) 
     )
 
 
-def _firmware(given: str | Sequence[str], where: Place) -> tuple[str, ...]:
+def _firmware(given: str | Sequence[str], where: TablePlace) -> tuple[str, ...]:
     """Return the families of firmware that a file names, each once."""
     found = tuple(dict.fromkeys([given] if isinstance(given, str) else given))
     if not found or not set(found) <= set(FIRMWARE):
@@ -226,7 +226,7 @@ def _firmware(given: str | Sequence[str], where: Place) -> tuple[str, ...]:
     return found
 
 
-def _placed(rows: Sequence[Sequence[float]], where: Place, key: str) -> Sequence[Sequence[float]]:
+def _placed(rows: Sequence[Sequence[float]], where: TablePlace, key: str) -> Sequence[Sequence[float]]:
     """Return rows of [x mm, y mm, heading degrees], or of the first two, none of them far off."""
     for row in rows:
         if not all(least <= item <= most for item, (least, most) in zip(row, POSE_RANGES, strict=False)):
@@ -235,7 +235,7 @@ def _placed(rows: Sequence[Sequence[float]], where: Place, key: str) -> Sequence
     return rows
 
 
-def _refuse_impossible(body: Table, wheels: int, where: Place) -> None:
+def _refuse_impossible(body: Table, wheels: int, where: TablePlace) -> None:
     wheels_kg = max(2, wheels) * body["wheel_mass_kg"] + CASTER_KG
     if body["mass_kg"] <= wheels_kg:
         raise ParametersError(

@@ -115,7 +115,7 @@ def _qos(topic: Topic) -> "Qos":
 
 
 @dataclass(frozen=True, slots=True)
-class Recorded:
+class BagMessage:
     """A message of a bag: nested messages are mappings, arrays sequences, octets bytes or NumPy arrays."""
 
     topic: str
@@ -129,7 +129,7 @@ def is_bag(path: Path) -> bool:
     return (path / METADATA).is_file() if path.is_dir() else path.suffix.lower() in SUFFIXES
 
 
-def read_bag(path: Path, types: frozenset[str]) -> Iterator[Recorded]:
+def read_bag(path: Path, types: frozenset[str]) -> Iterator[BagMessage]:
     """Yield the messages of some types, in order of their recording.
 
     Args:
@@ -150,7 +150,7 @@ def read_bag(path: Path, types: frozenset[str]) -> Iterator[Recorded]:
             # Without any chosen, all would be yielded.
             for connection, at_ns, data in bag.messages(chosen) if chosen else ():
                 message = cast("Message", _plain(bag.deserialize(data, connection.msgtype)))
-                yield Recorded(connection.topic, connection.msgtype, at_ns, message)
+                yield BagMessage(connection.topic, connection.msgtype, at_ns, message)
     except GeneratorExit:
         raise
     except Exception as error:  # whatever the library makes of hostile bytes, such as a length of terabytes

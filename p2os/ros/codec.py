@@ -14,7 +14,7 @@ from functools import cache
 from typing import Protocol, Self, TypeAlias, cast
 
 from p2os.errors import MissingDependencyError, RemoteProtocolError
-from p2os.ros.message_table import Field, message_type
+from p2os.ros.message_table import MessageField, message_type
 
 #: A message: what each field holds.
 Message: TypeAlias = Mapping[str, object]
@@ -29,7 +29,7 @@ _PRIMITIVES: Mapping[str, tuple[str, object]] = {
 _OCTETS = frozenset({"byte", "char", "uint8"})
 
 
-class Struct(Protocol):
+class MessageStruct(Protocol):
     """A message as cyclonedds has it."""
 
     def serialize(self) -> bytes:
@@ -67,7 +67,7 @@ def from_cdr(name: str, data: bytes) -> Message:
         raise RemoteProtocolError(f"{len(data)} bytes are no {name}: {error}") from error
 
 
-def struct_of(name: str, message: Message) -> Struct:
+def struct_of(name: str, message: Message) -> MessageStruct:
     """Return a message as cyclonedds takes it.
 
     Raises:
@@ -84,7 +84,7 @@ def struct_of(name: str, message: Message) -> Struct:
     return struct_class(name)(**values)
 
 
-def message_of(name: str, struct: Struct) -> Message:
+def message_of(name: str, struct: MessageStruct) -> Message:
     """Return what a struct holds."""
     return {
         field.name: _from_struct(field, getattr(struct, field.name)) for field in message_type(name).fields.values()
@@ -92,7 +92,7 @@ def message_of(name: str, struct: Struct) -> Message:
 
 
 @cache
-def struct_class(name: str) -> type[Struct]:
+def struct_class(name: str) -> type[MessageStruct]:
     """Return the class of cyclonedds for a type.
 
     Raises:
@@ -106,7 +106,7 @@ def struct_class(name: str) -> type[Struct]:
     row = message_type(name)
     arrays = vars(types)  # generic at run time only
 
-    def kind_of(field: Field) -> object:
+    def kind_of(field: MessageField) -> object:
         primitive = _PRIMITIVES.get(field.kind)
         if primitive is None:
             kind: object = struct_class(field.kind)
@@ -117,10 +117,10 @@ def struct_class(name: str) -> type[Struct]:
         return arrays["sequence"][kind] if field.count == 0 else arrays["array"][kind, field.count]
 
     fields = {field.name: kind_of(field) for field in row.fields.values()}
-    return cast("type[Struct]", make_idl_struct(name.rpartition("/")[2] + "_", row.dds_name, fields))
+    return cast("type[MessageStruct]", make_idl_struct(name.rpartition("/")[2] + "_", row.dds_name, fields))
 
 
-def _to_struct(field: Field, value: object) -> object:
+def _to_struct(field: MessageField, value: object) -> object:
     if field.kind in _PRIMITIVES:
         return value if field.count is None else list(cast("Sequence[object]", value))
     if field.count is None:
@@ -128,17 +128,17 @@ def _to_struct(field: Field, value: object) -> object:
     return [struct_of(field.kind, one) for one in cast("Sequence[Message]", value)]
 
 
-def _from_struct(field: Field, value: object) -> object:
+def _from_struct(field: MessageField, value: object) -> object:
     if field.kind in _PRIMITIVES:
         if field.count is not None and field.kind in _OCTETS:
             return bytes(cast("Sequence[int]", value))
         return value if field.count is None else list(cast("Sequence[object]", value))
     if field.count is None:
-        return message_of(field.kind, cast("Struct", value))
-    return [message_of(field.kind, one) for one in cast("Sequence[Struct]", value)]
+        return message_of(field.kind, cast("MessageStruct", value))
+    return [message_of(field.kind, one) for one in cast("Sequence[MessageStruct]", value)]
 
 
-def _zero(field: Field) -> object:
+def _zero(field: MessageField) -> object:
     if field.count == 0:
         return []
     primitive = _PRIMITIVES.get(field.kind)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Field:
+class MessageField:
     """One field of a message.
 
     Args:
@@ -46,7 +46,7 @@ class MessageType:
 
     name: str
     hash: str
-    fields: Mapping[str, Field]
+    fields: Mapping[str, MessageField]
 
     @property
     def dds_name(self) -> str:
@@ -88,16 +88,16 @@ def message_type(name: str) -> MessageType:
     return _type(name, store.hash_rihs01(name), *(_field(field, *kind) for field, kind in store.fielddefs[name][1]))
 
 
-def _field(name: str, node: int, inner: Any) -> Field:  # as rosbags nests them
+def _field(name: str, node: int, inner: Any) -> MessageField:  # as rosbags nests them
     from rosbags.interfaces import Nodetype
 
     count = None
     if node in {Nodetype.ARRAY, Nodetype.SEQUENCE}:
         (node, inner), count = inner
-    return Field(name, inner if node == Nodetype.NAME else inner[0], count)
+    return MessageField(name, inner if node == Nodetype.NAME else inner[0], count)
 
 
-def _type(name: str, hash_: str, *fields: Field) -> MessageType:
+def _type(name: str, hash_: str, *fields: MessageField) -> MessageType:
     return MessageType(name, hash_, {field.name: field for field in fields})
 
 
@@ -105,18 +105,19 @@ _GID = "rmw_dds_common/msg/Gid"
 _NODE = "rmw_dds_common/msg/NodeEntitiesInfo"
 #: What rosbags has not, or not as it stands on the wire; of services only the whole has a hash there.
 _OWN = {row.name: row for row in (
-    _type(_GID, "RIHS01_ab6f21cfbb0a6dbb837161e1110c2051a2850ed9f9c53944d7115d9bcebedf71", Field("data", "char", 16)),
+    _type(_GID, "RIHS01_ab6f21cfbb0a6dbb837161e1110c2051a2850ed9f9c53944d7115d9bcebedf71",
+          MessageField("data", "char", 16)),
     _type(_NODE, "RIHS01_8ffef65ee2d088c63b1e8fcd31e800ba9fc8dbe0ee15ca60d1676de5218087a7",
-          Field("node_namespace", "string"), Field("node_name", "string"),
-          Field("reader_gid_seq", _GID, 0), Field("writer_gid_seq", _GID, 0)),
+          MessageField("node_namespace", "string"), MessageField("node_name", "string"),
+          MessageField("reader_gid_seq", _GID, 0), MessageField("writer_gid_seq", _GID, 0)),
     _type("rmw_dds_common/msg/ParticipantEntitiesInfo",
           "RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e",
-          Field("gid", _GID), Field("node_entities_info_seq", _NODE, 0)),
-    _type("std_srvs/srv/SetBool_Request", "", Field("data", "bool")),
-    _type("std_srvs/srv/SetBool_Response", "", Field("success", "bool"), Field("message", "string")),
+          MessageField("gid", _GID), MessageField("node_entities_info_seq", _NODE, 0)),
+    _type("std_srvs/srv/SetBool_Request", "", MessageField("data", "bool")),
+    _type("std_srvs/srv/SetBool_Response", "", MessageField("success", "bool"), MessageField("message", "string")),
     # A structure of C cannot be empty: ROS IDL puts this member into those that are.
-    _type("std_srvs/srv/Trigger_Request", "", Field("structure_needs_at_least_one_member", "uint8")),
-    _type("std_srvs/srv/Trigger_Response", "", Field("success", "bool"), Field("message", "string")),
+    _type("std_srvs/srv/Trigger_Request", "", MessageField("structure_needs_at_least_one_member", "uint8")),
+    _type("std_srvs/srv/Trigger_Response", "", MessageField("success", "bool"), MessageField("message", "string")),
 )}  # fmt: skip
 
 #: Service → its hash, as the generated code of Jazzy's std_srvs has it.

@@ -40,7 +40,7 @@ HealthRow: TypeAlias = tuple[str, int, str, Mapping[str, object]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Motion:
+class OdometryMotion:
     """Where a robot is and how it moves; metres, radians, seconds."""
 
     x_m: float
@@ -68,7 +68,7 @@ class WheelTravel:
         self._last: tuple[float, float, float] | None = None
         self._forward_m = self._heading_rad = self._way_m = self._turned_rad = 0.0
 
-    def take(self, state: RobotState) -> Motion:
+    def take(self, state: RobotState) -> OdometryMotion:
         """Return the motion of the robot at its newest state."""
         pose = state.pose
         here = (pose.x_m, pose.y_m, pose.heading_rad)
@@ -83,7 +83,7 @@ class WheelTravel:
             self._turned_rad += abs(turn)
         self._last = here
         rim_m = self._heading_rad * self._half_track_m
-        return Motion(
+        return OdometryMotion(
             x_m=pose.x_m, y_m=pose.y_m, heading_rad=pose.heading_rad,
             forward_mps=state.forward_mps, turn_radps=state.turn_radps,
             wheels_rad=((self._forward_m - rim_m) / self._radius_m, (self._forward_m + rim_m) / self._radius_m),
@@ -96,7 +96,7 @@ class WheelTravel:
         self._last = None
 
 
-def odometry(stamp: Nanos, frames: Frames, motion: Motion) -> Message:
+def odometry(stamp: Nanos, frames: Frames, motion: OdometryMotion) -> Message:
     """Return a nav_msgs/Odometry."""
     place = (ODOMETRY_ERROR * motion.way_m) ** 2
     turn = (ODOMETRY_ERROR * motion.turned_rad) ** 2
@@ -125,7 +125,7 @@ def planar(x: float, y: float, yaw: float) -> list[float]:
     return [diagonal[row] if row == column else 0.0 for row in range(6) for column in range(6)]
 
 
-def joint_state(stamp: Nanos, frames: Frames, motion: Motion) -> Message:
+def joint_state(stamp: Nanos, frames: Frames, motion: OdometryMotion) -> Message:
     """Return a sensor_msgs/JointState of the wheels."""
     return {
         "header": header(stamp, frames.name(BASE)),

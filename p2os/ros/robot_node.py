@@ -56,7 +56,7 @@ class Speed:
 
 
 @dataclass(frozen=True, slots=True)
-class Motors:
+class MotorPower:
     """Switch the motors."""
 
     on: bool
@@ -75,11 +75,11 @@ class Refused:
 
 
 @dataclass(frozen=True, slots=True)
-class Stop:
+class StopRequest:
     """Nobody has asked for a speed in time: stop."""
 
 
-Asked: TypeAlias = Speed | Stop | Motors | ResetOdometry | Refused
+Asked: TypeAlias = Speed | StopRequest | MotorPower | ResetOdometry | Refused
 
 
 class RobotNode:
@@ -216,7 +216,7 @@ class RobotNode:
         if self._stops_at is None or now < self._stops_at:
             return []
         self.stopped()
-        return [Stop()]
+        return [StopRequest()]
 
     def forget_place(self) -> None:
         """Take the next pose as a place that the robot was put to."""
@@ -244,7 +244,7 @@ class RobotNode:
     def _asked(self, key: str, message: Message) -> Asked:
         match key:
             case "enable_motors":
-                return Motors(bool(message["data"]))
+                return MotorPower(bool(message["data"]))
             case "reset_odometry":
                 return ResetOdometry()
             case "motor_left" | "motor_right":

@@ -89,7 +89,7 @@ class Received:
     reply: Callable[[Message], None] | None = None
 
 
-class Transport(Protocol):
+class RosTransport(Protocol):
     """A node's way to the others."""
 
     def publish(self, topic: Topic, message: Message) -> None:

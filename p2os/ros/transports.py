@@ -3,27 +3,27 @@
 from collections.abc import Callable, Mapping
 
 from p2os.ros.message_table import standard_types
-from p2os.ros.transport import NodeOptions, Transport
+from p2os.ros.transport import NodeOptions, RosTransport
 from simbase.errors import UsageError, shown
 
 
-def _dds(options: NodeOptions) -> Transport:
+def _dds(options: NodeOptions) -> RosTransport:
     from p2os.ros.dds import DdsNode
 
     return DdsNode(options)
 
 
-def _zenoh(options: NodeOptions) -> Transport:
+def _zenoh(options: NodeOptions) -> RosTransport:
     from p2os.ros.zenoh_node import ZenohNode
 
     return ZenohNode(options)
 
 
 #: Name → what opens it.
-TRANSPORTS: Mapping[str, Callable[[NodeOptions], Transport]] = {"dds": _dds, "zenoh": _zenoh}
+TRANSPORTS: Mapping[str, Callable[[NodeOptions], RosTransport]] = {"dds": _dds, "zenoh": _zenoh}
 
 
-def open_transport(name: str, options: NodeOptions) -> Transport:
+def open_transport(name: str, options: NodeOptions) -> RosTransport:
     """Return a node of a transport.
 
     Raises:

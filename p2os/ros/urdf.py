@@ -6,7 +6,7 @@ The shapes are those of `p2os world convert --robot`; here the links are called 
 from dataclasses import replace
 
 from p2os.pioneer.export import scene_of
-from p2os.pioneer.export.scene import Body, Mark
+from p2os.pioneer.export.scene import SceneBody, SceneMark
 from p2os.pioneer.export.scenes import part_names
 from p2os.pioneer.export.urdf import write
 from p2os.ros.frames import BASE, Frames, frame_of
@@ -21,6 +21,6 @@ def urdf_text(frames: Frames) -> str:
     return write(replace(scene, bodies=bodies), own, joint_name="{}_joint")[f"{own}.urdf"].decode()
 
 
-def _renamed(body: Body, names: dict[str, str], frames: Frames) -> Body:
-    marks = tuple(Mark(name=frames.sonar(number), place=mark.place) for number, mark in enumerate(body.marks))
+def _renamed(body: SceneBody, names: dict[str, str], frames: Frames) -> SceneBody:
+    marks = tuple(SceneMark(name=frames.sonar(number), place=mark.place) for number, mark in enumerate(body.marks))
     return replace(body, name=names[body.name], parent=names.get(body.parent or ""), marks=marks)

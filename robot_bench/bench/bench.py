@@ -60,7 +60,7 @@ from robot_bench.recording.run_record import RunRecord, record_of
 from robot_bench.recording.trace import TraceWriter
 from robot_bench.running.loop import RunLoop
 from robot_bench.running.pacer import FIRST_SLICE_NS, SliceLength
-from robot_bench.running.shared_world import Driven, SharedWorld
+from robot_bench.running.shared_world import SharedRobot, SharedWorld
 from robot_bench.scenario.fault_script import LINK_DOWN, FaultScript
 from robot_bench.scenario.goals.judging import GoalJudge, Judgement, RunEnd
 from robot_bench.scenario.hand_script import Deed, HandScript
@@ -75,7 +75,7 @@ from robot_bench.scenario.world_script import WorldScript
 from robot_bench.wires.chip_pins import ChipPins
 from robot_bench.wires.line_ends import AdapterPart, ControllerPart
 from robot_bench.wires.nets import Harness
-from robot_bench.wires.ports import Chip
+from robot_bench.wires.ports import LeadingChip
 from simbase.errors import UsageError, shown
 from simbase.installation import installed_version
 from simbase.state import PartState, Stateful
@@ -91,7 +91,7 @@ _LOG = logger("bench")
 class BenchParts:
     """The parts of a bench, for those who want to look at one."""
 
-    chip: Chip
+    chip: LeadingChip
     harness: Harness
     body: RobotBody
     world: World
@@ -141,7 +141,7 @@ class Bench(Expectations, Interventions, Stateful):
         scenario: Scenario,
         *,
         trace: TraceWriter | None = None,
-        chip: Chip | None = None,
+        chip: LeadingChip | None = None,
         slice_ns: Nanos | None = None,
         on_slice: Callable[[Nanos], None] | None = None,
         shared: SharedWorld | None = None,
@@ -280,7 +280,7 @@ class Bench(Expectations, Interventions, Stateful):
         robot = self._robots[-1]
         if isinstance(robot, DifferentialRobot):
             robot.is_stepped_by_others = True
-        self._shared.join(self.scenario.name, self, cast("Driven", self.parts.pioneer or robot))
+        self._shared.join(self.scenario.name, self, cast("SharedRobot", self.parts.pioneer or robot))
         for body in self._shared.scene.bodies:
             if body is not self.parts.body:
                 self.recorder.watch_robot(body)
@@ -295,7 +295,7 @@ class Bench(Expectations, Interventions, Stateful):
         return self.recorder.events
 
     @property
-    def chip(self) -> Chip:
+    def chip(self) -> LeadingChip:
         """Return the chip."""
         return self.parts.chip
 
@@ -581,7 +581,7 @@ class Bench(Expectations, Interventions, Stateful):
         self.recorder.event(deed.who, deed.at, deed.do, deed.words)
         do_by_hand(deed, self.chip, self.parts.harness)
 
-    def _plug_in(self, chip: Chip) -> tuple[WorldSenses, ...]:
+    def _plug_in(self, chip: LeadingChip) -> tuple[WorldSenses, ...]:
         """Attach the scenario's parts to the board, and have them sense the world."""
         senses = WorldSenses(self.parts.body, self._bring_robot_to)
         plug_in(self.scenario, chip, self.recorder, senses)

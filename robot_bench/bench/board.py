@@ -17,7 +17,7 @@ from robot_bench.recording.transfers import hear_bus
 from robot_bench.scenario.hand_script import Deed
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.wires.nets import Harness, Net, Strength
-from robot_bench.wires.ports import Chip
+from robot_bench.wires.ports import LeadingChip
 from robot_bench.wires.power_up import power_up
 from simbase.errors import UsageError
 from simbase.timing import Nanos
@@ -33,7 +33,7 @@ BY_HAND = "hand"
 _LOG = logger("bench")
 
 
-def plug_in(scenario: Scenario, chip: Chip, recorder: Recorder, world: Surroundings | None = None) -> None:
+def plug_in(scenario: Scenario, chip: LeadingChip, recorder: Recorder, world: Surroundings | None = None) -> None:
     """Attach a scenario's parts to a board, have what they tell recorded, and have them sense a world if there is one.
 
     Raises:
@@ -53,7 +53,7 @@ def plug_in(scenario: Scenario, chip: Chip, recorder: Recorder, world: Surroundi
             attach(board, spec)
 
 
-def hear_usarts(chip: Chip, recorder: Recorder) -> None:
+def hear_usarts(chip: LeadingChip, recorder: Recorder) -> None:
     """Have all that a chip sends on any of its ports recorded."""
     chip.usart1.subscribe(recorder.usart)
     for port in ("usart2", "usart3"):
@@ -61,7 +61,7 @@ def hear_usarts(chip: Chip, recorder: Recorder) -> None:
             other.subscribe(lambda sent, port=port: recorder.usart(sent, port))
 
 
-def hear_buses(chip: Chip, recorder: Recorder, buses: Sequence[str]) -> None:
+def hear_buses(chip: LeadingChip, recorder: Recorder, buses: Sequence[str]) -> None:
     """Have recorded what goes over buses of a chip; a host is plugged into its USB where that is one of them.
 
     Raises:
@@ -83,7 +83,7 @@ def log_bench_event(who: str, at: Nanos, what: str, detail: str) -> None:
     log_event(_LOG, who, at, what, detail)
 
 
-def boot(scenario: Scenario, image: "Image | None" = None) -> Chip:
+def boot(scenario: Scenario, image: "Image | None" = None) -> LeadingChip:
     """Return an emulated BluePill with a scenario's firmware, at its reset.
 
     Args:
@@ -128,7 +128,7 @@ def make_harness(pinout: Pinout) -> Harness:
     return harness
 
 
-def do_by_hand(deed: Deed, chip: Chip, harness: Harness) -> None:
+def do_by_hand(deed: Deed, chip: LeadingChip, harness: Harness) -> None:
     """Have a hand do something at the board, now."""
     if deed.do == "type":
         getattr(chip, deed.place).receive(deed.text)

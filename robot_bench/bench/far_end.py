@@ -26,7 +26,7 @@ from robot_bench.scenario.wired_robots import WiredPart
 from robot_bench.wires.endpoints import Endpoint
 from robot_bench.wires.line_ends import ENDS, AdapterPart, ControllerPart
 from robot_bench.wires.nets import Harness, Net, OwnedPins, Unconnected
-from robot_bench.wires.ports import Chip
+from robot_bench.wires.ports import LeadingChip
 from robot_bench.wires.serial_line import SerialLine
 from simbase.timing import Nanos
 
@@ -48,7 +48,7 @@ def make_far_end(
     scenario: Scenario,
     pinout: Pinout,
     body: RobotBody,
-    chip: Chip,
+    chip: LeadingChip,
     harness: Harness,
     recorder: Recorder,
     *,

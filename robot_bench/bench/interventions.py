@@ -14,12 +14,12 @@ from robot_bench.bench.waiting import AwaitedRun
 from robot_bench.events.stream import EventStream
 from robot_bench.scenario.fault_script import LINK_DOWN, FaultChange, FaultScript, load_faults
 from robot_bench.scenario.hand_script import Deed, HandScript
-from robot_bench.scenario.timeline import Timed, Timeline
+from robot_bench.scenario.timeline import TimedAction, Timeline
 from robot_bench.scenario.world_script import WorldScript, load_changes
 from simbase.errors import UsageError, shown
 from simbase.timing import NS_PER_S
 
-T = TypeVar("T", bound=Timed)
+T = TypeVar("T", bound=TimedAction)
 
 
 class Interventions(AwaitedRun):

@@ -10,7 +10,7 @@ from p2os.pioneer.body.factory import resolve_body
 from p2os.pioneer.world.model import World
 from robot_bench.adapter import RUN_ANEW
 from robot_bench.scenario.scenario import Scenario
-from robot_bench.wires.ports import Chip
+from robot_bench.wires.ports import LeadingChip
 from simbase.errors import UsageError
 from simbase.installation import installed_version
 
@@ -25,7 +25,7 @@ DECISIVE = (
 LATER = ("changes", "faults")
 
 
-def origin_of(scenario: Scenario, world: World, chip: Chip) -> dict[str, object]:
+def origin_of(scenario: Scenario, world: World, chip: LeadingChip) -> dict[str, object]:
     """Return what a bench is made of, each under its name for a person."""
     return {
         VERSION: installed_version(),

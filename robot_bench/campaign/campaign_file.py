@@ -27,7 +27,7 @@ from typing import Any, cast
 from p2os.errors import ScenarioError
 from p2os.pioneer.world import load_world
 from p2os.toml_file import TomlSource, is_file, read_toml, read_user_text
-from p2os.toml_schema import LONGEST_S, Key, Place, Table, Where, check_table, placed, within
+from p2os.toml_schema import LONGEST_S, Key, Table, TablePlace, Where, check_table, placed, within
 from robot_bench.campaign.search import SEARCHES
 from robot_bench.campaign.things import KINDS
 from robot_bench.campaign.trial import Trial, trial_of, unpacked
@@ -189,7 +189,7 @@ class Budget:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Limits:
+class RunLimits:
     """What one run may take; more is an error of that run."""
 
     cpu_s: float = 300.0
@@ -215,7 +215,7 @@ class Campaign:
     gap_m: float = GAP_M
     free_m: float = FREE_M
     budget: Budget = field(default_factory=Budget)
-    limits: Limits = field(default_factory=Limits)
+    limits: RunLimits = field(default_factory=RunLimits)
     cheap: tuple[Setting, ...] = ()
     full: tuple[Setting, ...] = ()
     vary: Mapping[str, Span] = field(default_factory=dict)
@@ -240,7 +240,7 @@ def load_campaign(path: Path, *, trust: bool | Trust = False) -> Campaign:
 def parse_campaign(text: str, path: Path, *, firmware: Path | None = None, trust: bool | Trust = False) -> Campaign:
     """Check the text of a campaign file, whose program `firmware` may replace; errors as of `load_campaign`."""
     table, places = read_toml(text, path.name, "a campaign", ScenarioError)
-    where = Place(TomlSource(path.name, places))
+    where = TablePlace(TomlSource(path.name, places))
     check_table(table, TOP, where)
     budget, limits = (
         _checked(cast("Table", table.get(name, {})), keys, within(where, name))
@@ -269,7 +269,7 @@ def parse_campaign(text: str, path: Path, *, firmware: Path | None = None, trust
         name=path.stem, description=str(table.get("description", "")), text=text, trial=trial,
         search=str(table.get("search", "sobol")),
         **{key: table[key] for key in ("seed", "batch", "near_misses", "gap_m", "free_m") if key in table},
-        budget=Budget(**budget), limits=Limits(**limits), cheap=cheap, full=full, vary=vary, draws=draws,
+        budget=Budget(**budget), limits=RunLimits(**limits), cheap=cheap, full=full, vary=vary, draws=draws,
         disturbances=disturbances,
     )  # fmt: skip
     _refuse_settings(found, path)
@@ -304,7 +304,7 @@ def _checked(table: Table, keys: Sequence[Key], where: Where) -> dict[str, Any]:
     return dict(table)
 
 
-def _trial(table: Table, path: Path, where: Place, firmware: Path | None, trust: bool | Trust) -> Trial:
+def _trial(table: Table, path: Path, where: TablePlace, firmware: Path | None, trust: bool | Trust) -> Trial:
     name = str(table["scenario"])
     beside = path.parent / name
     if firmware is None and "firmware" in table:
@@ -363,7 +363,7 @@ def _leaves(table: object, above: str, where: Where) -> Iterator[tuple[str, obje
             yield key, value, f"{at}: {key}"
 
 
-def _draws(tables: Sequence[Table], where: Place) -> tuple[Drawn, ...]:
+def _draws(tables: Sequence[Table], where: TablePlace) -> tuple[Drawn, ...]:
     found: list[Drawn] = []
     for number, table in enumerate(tables):
         place = within(where, "draw", number)

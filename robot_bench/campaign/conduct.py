@@ -24,9 +24,9 @@ from typing import Protocol
 from robot_bench.campaign.campaign_file import Campaign
 from robot_bench.campaign.journal import Journal
 from robot_bench.campaign.margin import margin
-from robot_bench.campaign.search import SEARCHES, Answer, Problem
+from robot_bench.campaign.search import SEARCHES, PointResult, Problem
 from robot_bench.campaign.space import Proposal, Space
-from robot_bench.campaign.trial import Done, Outcome, Trial, Verdict
+from robot_bench.campaign.trial import Done, Outcome, Trial, TrialVerdict
 from simbase.timing import NS_PER_S, Nanos
 from simbase.units import ranges_text
 
@@ -35,7 +35,7 @@ NS_PER_HOUR = 3600 * NS_PER_S
 NO_VERDICT = 1.0
 
 
-class Stage(Enum):
+class RunPurpose(Enum):
     """What a run is for."""
 
     #: Proposes: the cheap fidelity.
@@ -46,7 +46,7 @@ class Stage(Enum):
     REPLAY = "replay"
 
 
-class Finding(Enum):
+class PointFinding(Enum):
     """What came of a point, both fidelities considered."""
 
     PASSED = "passed"
@@ -65,14 +65,14 @@ class Finding(Enum):
 
 
 #: What is reported as a failure.
-FAILURES = frozenset({Finding.CONFIRMED, Finding.FULL_ONLY})
+FAILURES = frozenset({PointFinding.CONFIRMED, PointFinding.FULL_ONLY})
 
 
 @dataclass(frozen=True, slots=True)
 class Run:
     """A run that was done."""
 
-    stage: Stage
+    stage: RunPurpose
     trial: Trial
     outcome: Outcome
     cpu_s: float
@@ -84,7 +84,7 @@ class Run:
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class PointRow:
     """A point with all that was run of it."""
 
     number: int
@@ -101,20 +101,21 @@ class Row:
         return [run for run in (self.cheap, self.full, self.replay) if run is not None]
 
     @property
-    def finding(self) -> Finding:
+    def finding(self) -> PointFinding:
         """What came of it."""
         cheap = self.cheap.outcome.verdict
         if self.full is None:
             return {
-                Verdict.PASSED: Finding.PASSED, Verdict.FAILED: Finding.UNCONFIRMED, Verdict.ERROR: Finding.ERROR,
+                TrialVerdict.PASSED: PointFinding.PASSED, TrialVerdict.FAILED: PointFinding.UNCONFIRMED,
+                TrialVerdict.ERROR: PointFinding.ERROR,
             }[cheap]  # fmt: skip
-        if self.full.outcome.verdict is Verdict.ERROR:
-            return Finding.ERROR
-        if self.full.outcome.verdict is Verdict.PASSED:
-            return Finding.CHEAP_ONLY if cheap is Verdict.FAILED else Finding.PASSED
+        if self.full.outcome.verdict is TrialVerdict.ERROR:
+            return PointFinding.ERROR
+        if self.full.outcome.verdict is TrialVerdict.PASSED:
+            return PointFinding.CHEAP_ONLY if cheap is TrialVerdict.FAILED else PointFinding.PASSED
         if self.replay is None or self.replay.outcome.sha256 != self.full.outcome.sha256:
-            return Finding.NOT_REPEATED
-        return Finding.CONFIRMED if cheap is Verdict.FAILED else Finding.FULL_ONLY
+            return PointFinding.NOT_REPEATED
+        return PointFinding.CONFIRMED if cheap is TrialVerdict.FAILED else PointFinding.FULL_ONLY
 
     @property
     def failing(self) -> Run | None:
@@ -136,10 +137,10 @@ class Workers(Protocol):
 
 
 @dataclass(slots=True)
-class Progress:
+class CampaignProgress:
     """Where a campaign stands."""
 
-    rows: list[Row] = field(default_factory=list)
+    rows: list[PointRow] = field(default_factory=list)
     runs: int = 0
     #: Of these, how many were cheap ones: points that have an answer.
     answered: int = 0
@@ -160,7 +161,7 @@ class Progress:
         return [f"line{'s' if len(lines) > 1 else ''} {ranges_text(lines)}: {why}" for why, lines in numbers.items()]
 
     @property
-    def failures(self) -> list[Row]:
+    def failures(self) -> list[PointRow]:
         """The points that failed."""
         return [row for row in self.rows if row.finding in FAILURES]
 
@@ -187,7 +188,7 @@ class Conduct:
         workers: Workers,
         *,
         clock: Callable[[], Nanos],
-        on_run: Callable[[Progress], None] = lambda _: None,
+        on_run: Callable[[CampaignProgress], None] = lambda _: None,
     ) -> None:
         self.campaign, self._workers, self._clock, self._on_run = campaign, workers, clock, on_run
         self.space = Space(campaign)
@@ -197,18 +198,18 @@ class Conduct:
             runs=campaign.budget.runs, batch=campaign.batch, seed=campaign.seed,
         ))  # fmt: skip
         self._journal = Journal(folder)
-        self.progress = Progress(left_out=self._journal.left_out)
+        self.progress = CampaignProgress(left_out=self._journal.left_out)
         self._confirmed = 0
         #: Places of rows that passed, those of the least margin of each batch.
         self._near: list[int] = []
 
-    def run(self) -> Progress:
+    def run(self) -> CampaignProgress:
         """Do all of it; arguments and errors as of `within_minutes`."""
         for _ in self.within_minutes():
             pass
         return self.progress
 
-    def within_minutes(self) -> Iterator[Sequence[Row]]:
+    def within_minutes(self) -> Iterator[Sequence[PointRow]]:
         """Do one batch after the other, as long as the budget's minutes last; yield the rows of each.
 
         After them come the near misses, again in batches: rows that were there before, now with their run in full.
@@ -224,7 +225,7 @@ class Conduct:
                 if minutes is not None and self._clock() - began >= minutes * 60 * NS_PER_S:
                     break
 
-    def batches(self) -> Iterator[Sequence[Row]]:
+    def batches(self) -> Iterator[Sequence[PointRow]]:
         """Do one batch after the other, whatever time it takes; yield the rows of each."""
         budget, done = self.campaign.budget, self.progress
         while len(done.rows) < budget.runs and not self._is_spent():
@@ -236,7 +237,7 @@ class Conduct:
             done.rows += rows
             yield rows
 
-    def near_misses(self) -> Iterator[Sequence[Row]]:
+    def near_misses(self) -> Iterator[Sequence[PointRow]]:
         """Run in full what came nearest to a failure, as far as confirmations are left; yield the rows, by batches."""
         done, left = self.progress, max(self.campaign.budget.confirmations - self._confirmed, 0)
         nearest = sorted(self._near, key=lambda at: (done.rows[at].cheap.margin or 0.0, at))[:left]
@@ -257,35 +258,35 @@ class Conduct:
         hours = self.campaign.budget.virtual_hours
         return hours is not None and self.progress.virtual_ns >= hours * NS_PER_HOUR
 
-    def _rows(self, points: Sequence[tuple[float, ...]]) -> list[Row]:
+    def _rows(self, points: Sequence[tuple[float, ...]]) -> list[PointRow]:
         proposals = [self.space.proposal(point) for point in points]
         first = len(self.progress.rows) + 1
-        cheap = self._do(Stage.CHEAP, [one.trial(self.campaign.trial, self.campaign.cheap) for one in proposals])
+        cheap = self._do(RunPurpose.CHEAP, [one.trial(self.campaign.trial, self.campaign.cheap) for one in proposals])
         rows = [
-            Row(number, proposal, run, new=self._learn(run.outcome))
+            PointRow(number, proposal, run, new=self._learn(run.outcome))
             for number, (proposal, run) in enumerate(zip(proposals, cheap, strict=True), first)
         ]
         left = max(self.campaign.budget.confirmations - self._confirmed, 0)
-        failed = [at for at, row in enumerate(rows) if row.cheap.outcome.verdict is Verdict.FAILED][:left]
+        failed = [at for at, row in enumerate(rows) if row.cheap.outcome.verdict is TrialVerdict.FAILED][:left]
         self._confirmed += len(failed)
         for at, row in zip(failed, self._in_full([rows[at] for at in failed]), strict=True):
             rows[at] = row
-        passed = [row for row in rows if row.cheap.outcome.verdict is Verdict.PASSED]
+        passed = [row for row in rows if row.cheap.outcome.verdict is TrialVerdict.PASSED]
         nearest = sorted(passed, key=lambda row: (row.cheap.margin or 0.0, row.number))[: self.campaign.near_misses]
         self._near += [row.number - 1 for row in nearest]
         return rows
 
-    def _in_full(self, rows: Sequence[Row]) -> list[Row]:
+    def _in_full(self, rows: Sequence[PointRow]) -> list[PointRow]:
         """Return rows with their run in full, and where that failed the one that proves it."""
-        full = self._do(Stage.FULL, [row.proposal.trial(self.campaign.trial, self.campaign.full) for row in rows])
+        full = self._do(RunPurpose.FULL, [row.proposal.trial(self.campaign.trial, self.campaign.full) for row in rows])
         found = [replace(row, full=run) for row, run in zip(rows, full, strict=True)]
-        failed = [at for at, run in enumerate(full) if run.outcome.verdict is Verdict.FAILED]
-        again = self._do(Stage.REPLAY, [full[at].trial for at in failed])
+        failed = [at for at, run in enumerate(full) if run.outcome.verdict is TrialVerdict.FAILED]
+        again = self._do(RunPurpose.REPLAY, [full[at].trial for at in failed])
         for at, run in zip(failed, again, strict=True):
             found[at] = replace(found[at], replay=run)
         return found
 
-    def _do(self, stage: Stage, trials: Sequence[Trial]) -> list[Run]:
+    def _do(self, stage: RunPurpose, trials: Sequence[Trial]) -> list[Run]:
         """Return the runs of trials, in their order; those in the journal are not done again."""
         keys = [f"{stage.value}:{trial.sha256}" for trial in trials]
         places = {key: place for place, key in enumerate(keys) if self._journal.get(key) is None}
@@ -298,7 +299,7 @@ class Conduct:
 
         for key in set(keys) - places.keys():
             self._count(stage, *self._kept(key))
-        self._workers.run([trials[place] for place in missing], on_done, anew=stage is Stage.REPLAY)
+        self._workers.run([trials[place] for place in missing], on_done, anew=stage is RunPurpose.REPLAY)
         return [Run(stage, trial, *self._kept(key)) for trial, key in zip(trials, keys, strict=True)]
 
     def _kept(self, key: str) -> Done:
@@ -307,9 +308,9 @@ class Conduct:
             raise RuntimeError(f"the workers have left out {key}")
         return found
 
-    def _count(self, stage: Stage, outcome: Outcome, cpu_s: float) -> None:
+    def _count(self, stage: RunPurpose, outcome: Outcome, cpu_s: float) -> None:
         self.progress.runs += 1
-        self.progress.answered += stage is Stage.CHEAP
+        self.progress.answered += stage is RunPurpose.CHEAP
         self.progress.virtual_ns += outcome.virtual_ns
         self.progress.cpu_s += cpu_s
         self._on_run(self.progress)
@@ -322,10 +323,10 @@ class Conduct:
         done.states |= outcome.lines
         return new
 
-    def _answer(self, row: Row) -> Answer:
+    def _answer(self, row: PointRow) -> PointResult:
         outcome, found = row.cheap.outcome, row.cheap.margin
         x0, y0, x1, y1 = self.space.extent
         x_m, y_m = (at / 1000 for at in (outcome.way_mm or ((0, 0),))[-1])
         ended = min(max((x_m - x0) / (x1 - x0), 0.0), 1.0), min(max((y_m - y0) / (y1 - y0), 0.0), 1.0)
         reached: frozenset[object] = frozenset(outcome.blocks | outcome.lines)
-        return Answer(margin=NO_VERDICT if found is None else found, ended=ended, reached=reached)
+        return PointResult(margin=NO_VERDICT if found is None else found, ended=ended, reached=reached)

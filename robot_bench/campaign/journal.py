@@ -19,7 +19,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import BinaryIO, cast
 
-from robot_bench.campaign.trial import Done, GoalResult, Hit, Outcome, Verdict
+from robot_bench.campaign.trial import Done, GoalResult, HullContact, Outcome, TrialVerdict
 from simbase.errors import FileError
 from simbase.files import LONGEST_LINE, writing
 
@@ -155,13 +155,13 @@ def outcome_of_plain(plain: Mapping[str, object]) -> Outcome:
         KeyError, TypeError, ValueError, AttributeError, zlib.error: It is none.
     """
     rows = {name: cast("list[list[object]]", plain[name]) for name in ("goals", "hits", "way_mm")}
-    goal_names, hit_names = ([field.name for field in fields(kind)] for kind in (GoalResult, Hit))
+    goal_names, hit_names = ([field.name for field in fields(kind)] for kind in (GoalResult, HullContact))
     values = {field.name: plain[field.name] for field in fields(Outcome)}
     values |= {
-        "verdict": Verdict(plain["verdict"]),
+        "verdict": TrialVerdict(plain["verdict"]),
         "failures": tuple(cast("list[str]", plain["failures"])),
         "goals": tuple(GoalResult(**dict(zip(goal_names, row, strict=True))) for row in rows["goals"]),  # type: ignore[arg-type]  # as they were written
-        "hits": tuple(Hit(**dict(zip(hit_names, row, strict=True))) for row in rows["hits"]),  # type: ignore[arg-type]  # as above
+        "hits": tuple(HullContact(**dict(zip(hit_names, row, strict=True))) for row in rows["hits"]),  # type: ignore[arg-type]  # as above
         "way_mm": tuple((cast("int", x), cast("int", y)) for x, y in rows["way_mm"]),
         "blocks": frozenset(_unpacked(str(plain["blocks"]))),
         "lines": frozenset(cast("list[str]", plain["lines"])),

@@ -8,7 +8,7 @@ Invariant: a margin is negative exactly where the run failed.
 
 from collections.abc import Mapping
 
-from robot_bench.campaign.trial import GoalResult, Outcome, Verdict
+from robot_bench.campaign.trial import GoalResult, Outcome, TrialVerdict
 
 #: How much of a unit counts as a whole margin.
 WHOLE: Mapping[str, float] = {"m": 1.0, "s": 10.0, "deg": 45.0, "°": 45.0, "m/s": 0.5, "m/s²": 5.0, "J": 100.0}
@@ -21,7 +21,7 @@ MET = 1.0
 
 def margin(outcome: Outcome) -> float | None:
     """Return the margin of a run, -1 to 1; None where there is no verdict."""
-    if outcome.verdict is Verdict.ERROR:
+    if outcome.verdict is TrialVerdict.ERROR:
         return None
     found = [goal_margin(goal, outcome) for goal in outcome.goals]
     if outcome.died:

@@ -19,7 +19,7 @@ from typing import cast
 from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import World
 from p2os.toml_schema import Table
-from robot_bench.campaign.conduct import FAILURES, Finding, Row, Run
+from robot_bench.campaign.conduct import FAILURES, PointFinding, PointRow, Run
 from robot_bench.campaign.last_moment import LastMoment
 from robot_bench.campaign.results import SHOWN_HASH, Whole
 from robot_bench.campaign.trial import unpacked
@@ -63,18 +63,19 @@ figcaption b { color: var(--ink); } figcaption code { display: block; font-size:
 .line { fill: none; stroke: var(--left); stroke-width: 1.8; } .line.bad { stroke: var(--bad); }
 @media (max-width: 820px) { .halves.even { grid-template-columns: 1fr; } }
 """
-_CLASS: Mapping[Finding, str] = {
-    Finding.PASSED: "passed", Finding.CONFIRMED: "failed", Finding.FULL_ONLY: "failed", Finding.CHEAP_ONLY: "seen",
-    Finding.UNCONFIRMED: "seen", Finding.NOT_REPEATED: "seen", Finding.ERROR: "seen",
+_CLASS: Mapping[PointFinding, str] = {
+    PointFinding.PASSED: "passed", PointFinding.CONFIRMED: "failed", PointFinding.FULL_ONLY: "failed",
+    PointFinding.CHEAP_ONLY: "seen",
+    PointFinding.UNCONFIRMED: "seen", PointFinding.NOT_REPEATED: "seen", PointFinding.ERROR: "seen",
 }  # fmt: skip
-_MEANING: Mapping[Finding, str] = {
-    Finding.PASSED: "passed",
-    Finding.CONFIRMED: "failed, cheap and in full",
-    Finding.FULL_ONLY: "failed in full alone",
-    Finding.CHEAP_ONLY: "failed in the cheap run alone, no failure",
-    Finding.UNCONFIRMED: "failed in the cheap run, not confirmed: no budget",
-    Finding.NOT_REPEATED: "failed once and not again: a bug of the bench",
-    Finding.ERROR: "without a verdict",
+_MEANING: Mapping[PointFinding, str] = {
+    PointFinding.PASSED: "passed",
+    PointFinding.CONFIRMED: "failed, cheap and in full",
+    PointFinding.FULL_ONLY: "failed in full alone",
+    PointFinding.CHEAP_ONLY: "failed in the cheap run alone, no failure",
+    PointFinding.UNCONFIRMED: "failed in the cheap run, not confirmed: no budget",
+    PointFinding.NOT_REPEATED: "failed once and not again: a bug of the bench",
+    PointFinding.ERROR: "without a verdict",
 }
 
 
@@ -134,7 +135,7 @@ def _table(pairs: Iterator[tuple[str, str]]) -> str:
     return "".join(f"<tr><td>{html.escape(name)}</td><td>{html.escape(value)}</td></tr>" for name, value in pairs)
 
 
-def _failure(row: Row, whole: Whole) -> str:
+def _failure(row: PointRow, whole: Whole) -> str:
     run = row.failing
     if run is None:
         return ""
@@ -239,7 +240,7 @@ def _map(whole: Whole) -> str:
     return f"<figure>{_svg(_SIDE, _high(extent), parts)}</figure>"
 
 
-def _dimensions(rows: Sequence[Row]) -> list[str]:
+def _dimensions(rows: Sequence[PointRow]) -> list[str]:
     """Return the dimensions along which the margin changes most, by the correlation of numbers, the first first."""
     found: dict[str, list[tuple[float, float]]] = {}
     for row in rows:
@@ -259,7 +260,7 @@ def _correlation(pairs: Sequence[tuple[float, float]]) -> float:
         return 0.0
 
 
-def _over(name: str, rows: Sequence[Row]) -> str:
+def _over(name: str, rows: Sequence[PointRow]) -> str:
     points = [
         (float(value), row.cheap.margin, _CLASS[row.finding], f"point {row.number}")
         for row in rows
@@ -268,7 +269,7 @@ def _over(name: str, rows: Sequence[Row]) -> str:
     return _chart(name, points, [])
 
 
-def _course(rows: Sequence[Row]) -> Iterator[str]:
+def _course(rows: Sequence[PointRow]) -> Iterator[str]:
     points = [
         (float(row.number), row.cheap.margin, _CLASS[row.finding], f"point {row.number}")
         for row in rows if row.cheap.margin is not None

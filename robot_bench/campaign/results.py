@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from robot_bench.campaign.campaign_file import Campaign
-from robot_bench.campaign.conduct import Finding, Progress, Row, Run
+from robot_bench.campaign.conduct import CampaignProgress, PointFinding, PointRow, Run
 from robot_bench.campaign.last_moment import LastMoment
 from robot_bench.campaign.margin import goal_margin
 from robot_bench.campaign.space import Space
@@ -52,11 +52,11 @@ class Results:
         self._campaign = campaign
         self._spans = {f"vary.{dimension.name}": dimension.span for dimension in space.dimensions}
         #: The rows of each part.
-        self._parts: list[list[Row]] = []
+        self._parts: list[list[PointRow]] = []
         with writing(folder, hint="--out another folder"):
             (folder / RESULTS).mkdir(parents=True, exist_ok=True)
 
-    def add(self, rows: Sequence[Row]) -> None:
+    def add(self, rows: Sequence[PointRow]) -> None:
         """Write a batch: a part of its own, or, of rows that are there and have more runs now, their parts again.
 
         Raises:
@@ -80,17 +80,17 @@ class Results:
                 if row.failing is not None:
                     row.failing.trial.write(self.failure_folder(row))
 
-    def failure_folder(self, row: Row) -> Path:
+    def failure_folder(self, row: PointRow) -> Path:
         """Return the folder of a point that failed."""
         return self.folder / FAILURES / f"{row.number:04d}"
 
-    def replay(self, row: Row) -> str:
+    def replay(self, row: PointRow) -> str:
         """Return the command that runs a failure again."""
         name = row.proposal.trial(self._campaign.trial, ()).name
         trust = ["--trust"] if self._campaign.trial.trusted else []
         return shlex.join(["p2os", "run", str(self.failure_folder(row) / f"{name}.toml"), *trust])
 
-    def _entry(self, row: Row, run: Run) -> dict[str, object]:
+    def _entry(self, row: PointRow, run: Run) -> dict[str, object]:
         outcome = run.outcome
         programs = run.trial.programs
         values: dict[str, object] = {
@@ -155,19 +155,19 @@ class Whole:
     campaign: Campaign
     space: Space
     folder: Path
-    progress: Progress
+    progress: CampaignProgress
     results: Results
     #: Number of a point → until when its failure was avoidable.
     moments: dict[int, LastMoment] = field(default_factory=dict)
     was_interrupted: bool = False
 
     @property
-    def counts(self) -> Mapping[Finding, int]:
+    def counts(self) -> Mapping[PointFinding, int]:
         """How many points came to each finding."""
         return Counter(row.finding for row in self.progress.rows)
 
     @property
-    def failures(self) -> list[Row]:
+    def failures(self) -> list[PointRow]:
         """The points whose failure was proven."""
         return self.progress.failures
 
@@ -190,7 +190,7 @@ class Whole:
             "blocks": len(self.progress.blocks),
             "states": len(self.progress.states),
             "was_interrupted": self.was_interrupted,
-            "findings": {finding.value: self.counts.get(finding, 0) for finding in Finding},
+            "findings": {finding.value: self.counts.get(finding, 0) for finding in PointFinding},
             "failures": [
                 {
                     "number": row.number, "finding": row.finding.value, "failures": list(run.outcome.failures),

@@ -32,7 +32,7 @@ MOST = 1 - 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Answer:
+class PointResult:
     """What came of a point."""
 
     #: By how much all goals were met, about 0 to 1; negative where one was missed.
@@ -49,7 +49,7 @@ class Search(Protocol):
     def ask(self, count: int) -> list[Point]:
         """Return at most so many points; none where it has no more."""
 
-    def tell(self, answers: Sequence[Answer]) -> None:
+    def tell(self, answers: Sequence[PointResult]) -> None:
         """Take what came of the points that were asked for last, of all of them, in their order."""
 
 
@@ -76,7 +76,7 @@ class Listed:
         """Return the next ones."""
         return list(itertools.islice(self._points, count))
 
-    def tell(self, answers: Sequence[Answer]) -> None:
+    def tell(self, answers: Sequence[PointResult]) -> None:
         """Answers change nothing."""
 
 
@@ -141,7 +141,7 @@ class Tpe:
             for trial in self._asked
         ]
 
-    def tell(self, answers: Sequence[Answer]) -> None:
+    def tell(self, answers: Sequence[PointResult]) -> None:
         """Take the margins."""
         for trial, answer in zip(self._asked, answers, strict=True):
             self._study.tell(trial, answer.margin)
@@ -178,7 +178,7 @@ class Evolution:
         """Return the next generation, which is a batch; none where less is left than that."""
         return list(_points(self._scheduler.ask())) if count >= self._batch else []
 
-    def tell(self, answers: Sequence[Answer]) -> None:
+    def tell(self, answers: Sequence[PointResult]) -> None:
         """Take margins, and where the robots ended."""
         self._scheduler.tell([-answer.margin for answer in answers], [list(answer.ended) for answer in answers])
 
@@ -220,7 +220,7 @@ class Guided:
         self._asked = found
         return found
 
-    def tell(self, answers: Sequence[Answer]) -> None:
+    def tell(self, answers: Sequence[PointResult]) -> None:
         """Keep what reached something new."""
         for point, answer in zip(self._asked, answers, strict=True):
             if not answer.reached <= self._seen:

@@ -16,7 +16,7 @@ from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import Pose, World
 from p2os.toml_schema import Table
 from robot_bench.campaign.campaign_file import Campaign, Disturbance, Drawn, Span
-from robot_bench.campaign.things import Room, Thing
+from robot_bench.campaign.things import DrawnThing, Room
 from robot_bench.campaign.trial import Trial, unpacked
 from robot_bench.scenario.included_files import Setting
 
@@ -151,7 +151,7 @@ def _dimensions(campaign: Campaign) -> list[Dimension]:
     return [one for one in found if one.span.count != 1]
 
 
-def _things(draw: Drawn, world: World, start: Pose, value: Value) -> list[Thing]:
+def _things(draw: Drawn, world: World, start: Pose, value: Value) -> list[DrawnThing]:
     count = cast("int", value(f"{draw.name}.count", draw.count))
     found = []
     for number in range(1, count + 1):
@@ -170,7 +170,7 @@ def _things(draw: Drawn, world: World, start: Pose, value: Value) -> list[Thing]
             heading_deg += math.degrees(start.heading_rad) + 180
         place = (round(x_m, 3), round(y_m, 3), round(heading_deg % 360, 1))
         measures = {key: cast("float", value(f"{name}.{key}", span)) for key, span in draw.measures.items()}
-        found.append(Thing(name=name, kind=draw.kind, place=place, measures=measures))
+        found.append(DrawnThing(name=name, kind=draw.kind, place=place, measures=measures))
     return found
 
 

@@ -96,7 +96,7 @@ KINDS: Mapping[str, ThingKind] = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Thing:
+class DrawnThing:
     """A drawn thing: its kind, where it is wanted, and its measures."""
 
     name: str
@@ -121,7 +121,7 @@ class Room:
     gap_m: float
     free_m: float
 
-    def tables(self, things: Sequence[Thing]) -> list[Table]:
+    def tables(self, things: Sequence[DrawnThing]) -> list[Table]:
         """Return the `[[obstacle]]` tables of the things that find room, in their order."""
         taken = [Footprint(item) for item in self.world.obstacles if item.walk is None and not item.kind.is_driven_on]
         found: list[Table] = []
@@ -180,7 +180,7 @@ def _obstacle(part: Mapping[str, float]) -> Obstacle:
     )  # fmt: skip
 
 
-def _table(name: str, part: Mapping[str, float], thing: Thing, heading_deg: float) -> Table:
+def _table(name: str, part: Mapping[str, float], thing: DrawnThing, heading_deg: float) -> Table:
     shape = "cylinder" if "radius_m" in part else "box"
     table: dict[str, object] = {"at_s": 0.0, "name": name, "shape": shape, **part, "height_m": HEIGHT_M}
     if KINDS[thing.kind].walks:

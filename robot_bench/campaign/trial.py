@@ -57,7 +57,7 @@ _WORDS = frozenset({"text", "texts", "description", "event", "events", "name", "
 _KEPT_FOLDERS = 8
 
 
-class Verdict(Enum):
+class TrialVerdict(Enum):
     """What came of a trial."""
 
     #: Each goal was met, or left open by a run that was asked to be shorter.
@@ -176,7 +176,7 @@ class GoalResult:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Hit:
+class HullContact:
     """A contact of the hull."""
 
     t: Nanos
@@ -191,7 +191,7 @@ class Hit:
 class Outcome:
     """What came of a trial."""
 
-    verdict: Verdict
+    verdict: TrialVerdict
     #: What was missed, each a sentence; of an error why.
     failures: tuple[str, ...] = ()
     goals: tuple[GoalResult, ...] = ()
@@ -201,7 +201,7 @@ class Outcome:
     distance_m: float = 0.0
     #: The least distance of the hull from anything, metres; None where nothing is known.
     clearance_m: float | None = None
-    hits: tuple[Hit, ...] = ()
+    hits: tuple[HullContact, ...] = ()
     #: Where the (first) robot was each half second, millimetres.
     way_mm: tuple[tuple[int, int], ...] = ()
     #: How the firmware died; empty where it did not.
@@ -253,11 +253,11 @@ def trial_of(
 
 
 @dataclass(slots=True)
-class Seen:
+class SeenSoFar:
     """What a run has shown so far, of what its outcome tells."""
 
     way_mm: list[tuple[int, int]] = field(default_factory=list)
-    hits: list[Hit] = field(default_factory=list)
+    hits: list[HullContact] = field(default_factory=list)
     #: Each line once, in the order in which they came.
     printed: dict[bytes, None] = field(default_factory=dict)
     #: Of the firmware, those that this process has not run itself.
@@ -272,13 +272,13 @@ class Seen:
             if event.t % WAY_NS == 0:
                 self.way_mm.append((event.x // 1000, event.y // 1000))
         elif isinstance(event, Contact):
-            self.hits.append(Hit(t=event.t, what=event.what, part=event.part, x_m=event.x_m, y_m=event.y_m))
+            self.hits.append(HullContact(t=event.t, what=event.what, part=event.part, x_m=event.x_m, y_m=event.y_m))
         elif isinstance(event, Text) and len(self.printed) < MOST_LINES:
             self.printed[event.data] = None
 
 
 #: Puts a bench at its beginning where its run goes on, and returns what the run had shown until there.
-Start = Callable[[Bench], Seen]
+Start = Callable[[Bench], SeenSoFar]
 
 
 def run_trial(trial: Trial, look: Callable[[], None] | None = None, start: Start | None = None) -> Outcome:
@@ -292,7 +292,7 @@ def run_trial(trial: Trial, look: Callable[[], None] | None = None, start: Start
     with unpacked(trial.files) as folder:
         try:
             bench = bench_of(trial.scenario(folder))
-            seen = Seen() if start is None else start(bench)
+            seen = SeenSoFar() if start is None else start(bench)
             seen.subscribe(bench)
             if look is not None:
                 for one in bench.robots.values():
@@ -301,7 +301,7 @@ def run_trial(trial: Trial, look: Callable[[], None] | None = None, start: Start
             return outcome_of(bench, seen)
         except P2osError as error:
             hint = f" ({error.hint})" if error.hint else ""
-            return Outcome(verdict=Verdict.ERROR, failures=(f"{error}{hint}",))
+            return Outcome(verdict=TrialVerdict.ERROR, failures=(f"{error}{hint}",))
 
 
 def warm_up(trial: Trial) -> None:
@@ -328,7 +328,7 @@ def bench_of(scenario: Scenario) -> Bench:
     return Bench(scenario, chip=boot(scenario, _image_of(scenario.firmware, stat.st_mtime_ns, stat.st_size)))
 
 
-def outcome_of(bench: Bench, seen: Seen) -> Outcome:
+def outcome_of(bench: Bench, seen: SeenSoFar) -> Outcome:
     """End a run and return what came of it."""
     end = bench.finish()
     goals: list[GoalResult] = []
@@ -348,7 +348,7 @@ def outcome_of(bench: Bench, seen: Seen) -> Outcome:
     clearances = [one.recorder.min_clearance_m for one in bench.robots.values()]
     known = [clearance for clearance in clearances if clearance is not None]
     return Outcome(
-        verdict=Verdict.FAILED if failures else Verdict.PASSED, failures=tuple(failures), goals=tuple(goals),
+        verdict=TrialVerdict.FAILED if failures else TrialVerdict.PASSED, failures=tuple(failures), goals=tuple(goals),
         virtual_ns=end, sha256=hashes[0] if len(hashes) == 1 else hashlib.sha256("".join(hashes).encode()).hexdigest(),
         distance_m=round(bench.recorder.distance_m, 6), clearance_m=round(min(known), 6) if known else None,
         hits=tuple(seen.hits), way_mm=tuple(seen.way_mm), died=died, blocks=seen.blocks | blocks_of(bench),

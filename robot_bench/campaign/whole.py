@@ -19,7 +19,7 @@ from pathlib import Path
 from p2os.errors import ScenarioError
 from p2os.toml_file import read_toml, read_user_text, toml_text
 from robot_bench.campaign.campaign_file import Campaign, load_campaign, parse_campaign
-from robot_bench.campaign.conduct import Conduct, Progress, Row, Workers
+from robot_bench.campaign.conduct import CampaignProgress, Conduct, PointRow, Workers
 from robot_bench.campaign.last_moment import LastMoment, last_moment
 from robot_bench.campaign.page import render
 from robot_bench.campaign.results import Results, Whole
@@ -110,7 +110,7 @@ def carry_out(
     workers: Workers,
     *,
     clock: Callable[[], Nanos],
-    on_run: Callable[[Progress], None] = lambda _: None,
+    on_run: Callable[[CampaignProgress], None] = lambda _: None,
     look: Callable[[], None] = lambda: None,
 ) -> Whole:
     """Carry a campaign out in its folder; a KeyboardInterrupt ends it in good order.
@@ -148,7 +148,7 @@ def carry_out(
     return whole
 
 
-def _moment(row: Row, look: Callable[[], None]) -> LastMoment | None:
+def _moment(row: PointRow, look: Callable[[], None]) -> LastMoment | None:
     run = row.failing
     if run is None:
         return None

@@ -10,10 +10,10 @@ from adapter_sim.pinout import Pinout, load_pinout
 from p2os.cli.groups import BENCH
 from p2os.transport import Transport, open_url
 from p2os.transport.waiting import wait_for_bytes
-from robot_bench.wires.board_test.circuit import EN, Fault, FaultKind, Side
+from robot_bench.wires.board_test.circuit import EN, BoardFault, Side, WireFault
 from robot_bench.wires.board_test.ends import AdapterEnd, BluePillEnd
-from robot_bench.wires.board_test.verdicts import Finding, Verdict, judge
-from robot_bench.wires.board_test.walk import Walk
+from robot_bench.wires.board_test.verdicts import BoardVerdict, VerdictRow, judge
+from robot_bench.wires.board_test.walk import BoardWalk
 from simbase.errors import UsageError, nearest
 
 BLUEPILL_BAUD, ADAPTER_BAUD = 57_600, 115_200
@@ -75,33 +75,33 @@ def walk_through(
         raise typer.Exit(1)
 
 
-def fault_of(text: str, pinout: Pinout) -> Fault:
+def fault_of(text: str, pinout: Pinout) -> BoardFault:
     """Return the fault that a word such as "short:DD1,DD2@esp32" names.
 
     Raises:
         UsageError: It names none.
     """
-    kinds = ", ".join(kind.value for kind in FaultKind)
+    kinds = ", ".join(kind.value for kind in WireFault)
     kind_word, _, rest = text.partition(":")
     wires, _, side_word = rest.partition("@")
-    if kind_word not in {kind.value for kind in FaultKind}:
+    if kind_word not in {kind.value for kind in WireFault}:
         raise UsageError(f"{text!r} is no fault", hint=f"KIND:WIRE, KIND one of {kinds}")
-    kind, names = FaultKind(kind_word), wires.split(",")
-    needed = 2 if kind in {FaultKind.SHORT, FaultKind.SWAPPED} else 1
+    kind, names = WireFault(kind_word), wires.split(",")
+    needed = 2 if kind in {WireFault.SHORT, WireFault.SWAPPED} else 1
     if len(names) != needed:
         raise UsageError(f"{text!r}: {kind.value} takes {needed} wire{'s' if needed == 2 else ''}", hint="open:DD3")
     if side_word not in {"", *(side.value for side in Side)}:
         raise UsageError(f"{text!r}: there is no side {side_word!r}", hint="@bluepill or @esp32")
-    known = {wire.name for wire in pinout.wires} | ({EN[0]} if kind is FaultKind.SHORT else set())
+    known = {wire.name for wire in pinout.wires} | ({EN[0]} if kind is WireFault.SHORT else set())
     for name in names:
         if name not in known:
             raise UsageError(f"{text!r}: there is no wire {name!r}", hint=nearest(name, known))
     if names[0] == EN[0] or len(set(names)) != needed:
         raise UsageError(f"{text!r}: a wire and another one", hint="short:DD1,DD2")
-    return Fault(kind, names[0], names[1] if needed == 2 else "", Side(side_word or Side.BLUEPILL.value))
+    return BoardFault(kind, names[0], names[1] if needed == 2 else "", Side(side_word or Side.BLUEPILL.value))
 
 
-def _emulated(pinout: Pinout, revision: str, faults: list[str]) -> list[Finding]:
+def _emulated(pinout: Pinout, revision: str, faults: list[str]) -> list[VerdictRow]:
     planted = tuple(fault_of(text, pinout) for text in faults)
     from robot_bench.wires.board_test.emulated import EmulatedBoard
     from robot_bench.wires.board_test.esp32 import PARTS
@@ -110,12 +110,12 @@ def _emulated(pinout: Pinout, revision: str, faults: list[str]) -> list[Finding]
         raise UsageError(f"there is no program for {revision}", hint=f"--revision {' or '.join(PARTS)}")
 
     board = EmulatedBoard(planted, revision=revision)
-    return judge(Walk(board.bluepill_end, board.adapter_end, pinout).measure(), pinout, revision)
+    return judge(BoardWalk(board.bluepill_end, board.adapter_end, pinout).measure(), pinout, revision)
 
 
-def _at_ports(adapter: str, bluepill: str, pinout: Pinout, revision: str) -> list[Finding]:
+def _at_ports(adapter: str, bluepill: str, pinout: Pinout, revision: str) -> list[VerdictRow]:
     with _PortLine(adapter, ADAPTER_BAUD) as one, _PortLine(bluepill, BLUEPILL_BAUD) as other:
-        walk = Walk(BluePillEnd(other), AdapterEnd(one, pinout), pinout)
+        walk = BoardWalk(BluePillEnd(other), AdapterEnd(one, pinout), pinout)
         return judge(walk.measure(), pinout, revision)
 
 
@@ -133,7 +133,7 @@ class _PortLine:
         self._line.close()
 
     def ask(self, line: str, prefix: str) -> str | None:
-        """Send a line and wait for its answer; see `ends.Line`."""
+        """Send a line and wait for its answer; see `ends.ConsoleLine`."""
         while self._line.read():
             pass
         self._line.write(f"{line}\n".encode())
@@ -147,7 +147,7 @@ class _PortLine:
         return None
 
 
-def _print(findings: list[Finding], *, as_json: bool) -> None:
+def _print(findings: list[VerdictRow], *, as_json: bool) -> None:
     if as_json:
         rows = [
             {"name": row.name, "path": row.path, "verdict": row.verdict.value, "detail": row.detail, "with": row.others}
@@ -158,6 +158,6 @@ def _print(findings: list[Finding], *, as_json: bool) -> None:
     for row in findings:
         typer.echo(f"{row.name:13}{row.path:17}{row.verdict.value:14}{row.detail}".rstrip())
     faults = sum(row.is_fault for row in findings)
-    untested = sum(row.verdict is Verdict.UNKNOWN for row in findings)
+    untested = sum(row.verdict is BoardVerdict.UNKNOWN for row in findings)
     told = "no fault" if not faults else "1 fault" if faults == 1 else f"{faults} faults"
     typer.echo(f"{told} in {len(findings)} rows, {untested} not tested")

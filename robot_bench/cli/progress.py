@@ -58,7 +58,7 @@ class RunDisplay:
         self._bar.stop()
         self._signals.__exit__(kind, error, trace)
 
-    def update(self, progress: "run.Progress") -> None:
+    def update(self, progress: "run.RunProgress") -> None:
         """Show where the run stands; called between two slices.
 
         Raises:

@@ -21,7 +21,7 @@ from robot_bench.cli.names import scenario_names
 from robot_bench.cli.progress import RunDisplay
 from robot_bench.cli.sweep import (
     KEPT,
-    Row,
+    SweepRow,
     as_json,
     command,
     print_sweep,
@@ -34,7 +34,7 @@ from robot_bench.cli.workers import Jobs, core_count
 from robot_bench.networks import network_of
 from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.remote import CAUTIOUS_ROTATION_DEG_S, CAUTIOUS_VELOCITY_MM_S
-from robot_bench.run import Progress, RunBench, RunResult, run_at_port, run_scenario
+from robot_bench.run import RunBench, RunProgress, RunResult, run_at_port, run_scenario
 from robot_bench.scenario import sweep
 from robot_bench.scenario.included_files import read_setting
 from robot_bench.scenario.scenario import Scenario, ScenarioOptions, load_scenario
@@ -332,7 +332,9 @@ def is_sweep(scenario: Scenario, *, seeds: str | None, seed: int | None, port: s
     return seeds is not None or (port is None and (bool(scenario.axes) or (bool(scenario.seeds) and seed is None)))
 
 
-def sweep_rows(name: str, wanted: Scenario, options: ScenarioOptions, seeds: str | None, trust: Trust) -> list[Row]:
+def sweep_rows(
+    name: str, wanted: Scenario, options: ScenarioOptions, seeds: str | None, trust: Trust
+) -> list[SweepRow]:
     """Return every run of a sweep, each checked.
 
     Args:
@@ -358,7 +360,7 @@ def sweep_rows(name: str, wanted: Scenario, options: ScenarioOptions, seeds: str
             raise UsageError(f"the scenario sweeps {key}, and an option sets it", hint=f"--set {key}=VALUE ends that")
     words = [word for key, value in given.items() for word in (_FLAGS.get(key, f"--{key}"), _typed(key, value))]
     words += ["--trust"] if trust.everything else []
-    rows: list[Row] = []
+    rows: list[SweepRow] = []
     for settings in sweep.rows(wanted.axes):
         if len(rows) >= MOST_RUNS:
             raise UsageError(f"more than {MOST_RUNS} runs", hint="fewer seeds, or a wider step")
@@ -369,12 +371,12 @@ def sweep_rows(name: str, wanted: Scenario, options: ScenarioOptions, seeds: str
         ).with_options(**options)  # fmt: skip
         for one in chosen or (row.seed,):
             again = command(name, words, (*wanted.settings, *settings), one)
-            rows.append(Row(row.with_options(seed=one), settings, again))
+            rows.append(SweepRow(row.with_options(seed=one), settings, again))
     return rows
 
 
 def run_many(
-    rows: Sequence[Row],
+    rows: Sequence[SweepRow],
     out: Path | None,
     *,
     jobs: int | None,
@@ -448,7 +450,7 @@ def drive_port(
             driver = None if gdb is None else debug_port(gdb, on_wait=display.raise_if_interrupted)
             folder = out or make_next_folder(scenario.name)
 
-            def look(progress: Progress) -> None:
+            def look(progress: RunProgress) -> None:
                 raise_if_pressed()
                 display.update(progress)
 

@@ -50,7 +50,7 @@ _UNWRITABLE = re.compile(r"[^\t\n\r -\ud7ff\ue000-\ufffd]")
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class SweepRow:
     """One run of a sweep."""
 
     scenario: Scenario
@@ -66,20 +66,20 @@ class Row:
 
 
 @dataclass(frozen=True, slots=True)
-class Done:
+class SweepResult:
     """What came of all runs."""
 
-    rows: Sequence[Row]
+    rows: Sequence[SweepRow]
     outcomes: Sequence[Json]
     was_interrupted: bool
     folder: Path
 
-    def with_word(self, word: str) -> list[tuple[Row, Json]]:
+    def with_word(self, word: str) -> list[tuple[SweepRow, Json]]:
         """Return the runs of which this came: "passed", "failed", "interrupted" or "not run"."""
         return [pair for pair in zip(self.rows, self.outcomes, strict=True) if word_of(pair[1]) == word]
 
     @property
-    def failed(self) -> list[tuple[Row, Json]]:
+    def failed(self) -> list[tuple[SweepRow, Json]]:
         """Those that came to their end and did not pass."""
         return self.with_word(_FAILED)
 
@@ -99,9 +99,9 @@ def command(scenario: str, options: Sequence[str], settings: Sequence[Setting], 
 
 
 def run_sweep(
-    rows: Sequence[Row], folder: Path | None, *, jobs: int, kept: str, raise_if_interrupted: Callable[[], None],
+    rows: Sequence[SweepRow], folder: Path | None, *, jobs: int, kept: str, raise_if_interrupted: Callable[[], None],
     force: bool = False,
-) -> Done:  # fmt: skip
+) -> SweepResult:  # fmt: skip
     """Run all rows, so many at a time.
 
     Raises:
@@ -131,7 +131,7 @@ def run_sweep(
         )
     with contextlib.suppress(OSError):  # it holds runs
         whole.rmdir()
-    return Done(rows, outcomes, not is_whole, whole)
+    return SweepResult(rows, outcomes, not is_whole, whole)
 
 
 def refuse_junit(path: Path) -> None:
@@ -144,7 +144,7 @@ def refuse_junit(path: Path) -> None:
         path.open("a", encoding="utf-8").close()
 
 
-def write_junit(done: Done, path: Path) -> None:
+def write_junit(done: SweepResult, path: Path) -> None:
     """Write what CI services read: a test case a run, with its command, seed and hash.
 
     Raises:
@@ -175,7 +175,7 @@ def write_junit(done: Done, path: Path) -> None:
         ET.ElementTree(suite).write(path, encoding="utf-8", xml_declaration=True)
 
 
-def as_json(done: Done) -> Json:
+def as_json(done: SweepResult) -> Json:
     """Return all that came of a sweep as one JSON object; times of this machine left out."""
     found = [
         {"seed": row.scenario.seed, "parameters": dict(row.settings), "replay": row.replay}
@@ -192,7 +192,7 @@ def as_json(done: Done) -> Json:
     }
 
 
-def print_sweep(done: Done) -> None:
+def print_sweep(done: SweepResult) -> None:
     """Print the table, what failed and how to see it again, and at the end the sum, on stdout."""
     console = ReadableConsole()
     console.print(_each(done) if len(done.rows) <= MOST_LINES else _summed(done))
@@ -214,7 +214,7 @@ def print_sweep(done: Done) -> None:
     console.print(f"{summed} of {len(done.rows)}")
 
 
-def _are_seeds_alike(done: Done) -> bool:
+def _are_seeds_alike(done: SweepResult) -> bool:
     """Tell whether the seeds made no difference to any row, where there were several."""
     hashes: dict[tuple[Setting, ...], list[object]] = {}
     for row, found in zip(done.rows, done.outcomes, strict=True):
@@ -222,7 +222,7 @@ def _are_seeds_alike(done: Done) -> bool:
     return all(are_alike(found) for found in hashes.values())
 
 
-def _each(done: Done) -> Table:
+def _each(done: SweepResult) -> Table:
     """Return a table with a line for each run."""
     keys = _headings([key for key, _ in done.rows[0].settings])
     table = Table(box=None, pad_edge=False)
@@ -239,7 +239,7 @@ def _each(done: Done) -> Table:
     return table
 
 
-def _summed(done: Done) -> Table:
+def _summed(done: SweepResult) -> Table:
     """Return a table with a line for all seeds of a row."""
     keys = _headings([key for key, _ in done.rows[0].settings])
     table = Table(box=None, pad_edge=False)
@@ -265,7 +265,7 @@ def _figure(found: Json, key: str, unit: str, places: int) -> str:
     return f"{value:.{places}f} {unit}" if isinstance(value, (int, float)) else ""
 
 
-def _places(rows: Sequence[Row]) -> list[str]:
+def _places(rows: Sequence[SweepRow]) -> list[str]:
     """Return a name for the folder of each run: what it is, with its number in front where two would have one."""
     names = [re.sub(r"[^\w.-]+", "-", row.words).strip("-")[:80] for row in rows]
     if len(set(names)) == len(names):

@@ -11,7 +11,7 @@ Invariant: between two steps of the body every answer of `motion` is the same.
 import math
 from collections.abc import Callable
 
-from bluepill_sim.fabric.surroundings import GRAVITY_MPS2, Motion
+from bluepill_sim.fabric.surroundings import GRAVITY_MPS2, BoardMotion
 from p2os.pioneer.body.contract import BodyState, RobotBody
 from p2os.pioneer.sonar.ring import Cone
 from simbase.state import Stateful
@@ -51,7 +51,7 @@ class WorldSenses(Stateful):
             self._steps += 1
         return Reached(limit)
 
-    def motion(self) -> Motion:
+    def motion(self) -> BoardMotion:
         """Return how the robot moved in the body's last step."""
         return self._motion
 
@@ -62,12 +62,12 @@ class WorldSenses(Stateful):
         return min(self._body.scan(rays, longest_m))
 
 
-def motion_of(before: BodyState, state: BodyState, dt_ns: Nanos) -> Motion:
+def motion_of(before: BodyState, state: BodyState, dt_ns: Nanos) -> BoardMotion:
     """Return how a body moves that was in one state before a step and is in another after it."""
     dt_s = dt_ns / NS_PER_S
     faster = (state.forward_mps - before.forward_mps) / dt_s
     nodding = (state.pitch_rad - before.pitch_rad) / dt_s
-    return Motion(
+    return BoardMotion(
         x_m=state.x_m,
         y_m=state.y_m,
         z_m=state.z_m,

@@ -114,7 +114,7 @@ class Steps:
 
 
 @dataclass(slots=True, kw_only=True)
-class Rows:
+class DriveRows:
     """What a recording tells of a drive, row by row: seconds, metres, radians and m/s; commands in their own units."""
 
     #: (t, x, y, heading).

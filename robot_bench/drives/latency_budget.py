@@ -43,7 +43,7 @@ WHOLE = "ping to wheel"
 
 
 @dataclass(slots=True)
-class Budget:
+class LatencyBudget:
     """Seconds of each step, as often as it was seen; of the whole, where a chain has all of them."""
 
     steps: dict[str, list[float]] = field(default_factory=lambda: {name: [] for name in (*STEPS, WHOLE)})
@@ -70,9 +70,9 @@ class _Reading:
     packet_s: float
 
 
-def latency_budget(drive: Drive) -> Budget:
+def latency_budget(drive: Drive) -> LatencyBudget:
     """Return the budget of a run; a step that a recording does not show has no times."""
-    found = Budget()
+    found = LatencyBudget()
     pins = _pin_changes(drive)
     pin_times = pins[0].tolist()
     motors = _motor_changes(drive)

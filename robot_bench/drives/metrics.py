@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from robot_bench.drives.drive import Drive, Floats
-from robot_bench.drives.latency_budget import STEPS, WHOLE, Budget, latency_budget, quantiles
+from robot_bench.drives.latency_budget import STEPS, WHOLE, LatencyBudget, latency_budget, quantiles
 from robot_bench.events.codec import Json
 from robot_bench.events.kinds import Clearance, Contact, Pose, Verdict
 from simbase.timing import NS_PER_S
@@ -61,7 +61,7 @@ class Metrics:
     energy_j_per_m: float | None
     #: What each goal came to: name, whether it was met, when; None twice where the run left it open.
     goals: tuple[tuple[str, bool | None, float | None], ...]
-    latency: Budget
+    latency: LatencyBudget
 
     @property
     def time_to_goal_s(self) -> float | None:

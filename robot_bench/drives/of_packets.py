@@ -9,7 +9,7 @@ from p2os.protocol.odometry import Odometry
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import StandardSip
 from p2os.robots.parameters import RobotParameters
-from robot_bench.drives.drive import Drive, Rows, Trajectory, steps_of
+from robot_bench.drives.drive import Drive, DriveRows, Trajectory, steps_of
 from simbase.errors import FileError, shown_name
 from simbase.timing import NS_PER_S
 
@@ -20,7 +20,7 @@ LONGEST_CYCLE_S = 0.255
 
 
 @dataclass(slots=True, kw_only=True)
-class Told(Rows):
+class Told(DriveRows):
     """What the packets of a line tell, row by row."""
 
     parameters: RobotParameters

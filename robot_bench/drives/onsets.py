@@ -22,7 +22,7 @@ SPEED_COMMANDS = ("VEL", "RVEL", "VEL2")
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class CommandResponse:
     """A command and when the wheels answered it, seconds."""
 
     command_s: float
@@ -34,7 +34,7 @@ class Answer:
         return self.onset_s - self.command_s
 
 
-def answers(drive: Drive, *, told: bool = False) -> list[Answer]:
+def answers(drive: Drive, *, told: bool = False) -> list[CommandResponse]:
     """Return each command that changes a set speed with the wheels' answer to it, where there is one.
 
     Args:
@@ -52,7 +52,7 @@ def answers(drive: Drive, *, told: bool = False) -> list[Answer]:
         until = min(at + LONGEST_S, firsts[place + 1] if place + 1 < len(firsts) else np.inf)
         onsets = [onset for side in (left, right) if (onset := onset_after(side, at, until)) is not None]
         if onsets:
-            found.append(Answer(at, min(onsets)))
+            found.append(CommandResponse(at, min(onsets)))
     return found
 
 

@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from p2os.robots.parameters import RobotParameters
-from robot_bench.drives.drive import Drive, Rows, Trajectory, number_of, steps_of
+from robot_bench.drives.drive import Drive, DriveRows, Trajectory, number_of, steps_of
 from simbase.errors import FileError, shown_name
 
 TABLE, SCANS = ";time", "laserodometrylog"
@@ -31,7 +31,7 @@ _LONGEST = 32
 
 
 @dataclass(slots=True, kw_only=True)
-class _Rows(Rows):
+class _Rows(DriveRows):
     """What the lines tell so far."""
 
     name: str

@@ -20,7 +20,7 @@ from robot_bench.experiments.alignment import (
     on_common_times,
     shift_by_speeds,
 )
-from robot_bench.experiments.parting import Part, motion_parts_s, origin, parts
+from robot_bench.experiments.parting import SignalParting, motion_parts_s, origin, parts
 from robot_bench.experiments.trajectory_errors import Statistics, absolute_errors, relative_errors
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S
@@ -72,10 +72,10 @@ class Comparison:
     speed_mps: Statistics
     turn_radps: Statistics
     latency_s: tuple[Floats, Floats]
-    parts: list[Part]
+    parts: list[SignalParting]
 
     @property
-    def origin(self) -> tuple[Part, float] | None:
+    def origin(self) -> tuple[SignalParting, float] | None:
         """Where the difference came from, and when; None where the drives do not part."""
         return origin(self.parts)
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Protocol, TypeAlias, cast
 
 from p2os.capture import Reading, open_file
-from p2os.capture.chunks import Block, chunks_of
+from p2os.capture.chunks import ChunkBlock, chunks_of
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import RobotParameters, load_parameters
 from robot_bench.drives.drive import Drive, Floats, Trajectory, heading_of, number_of, steps_of
@@ -55,7 +55,7 @@ class DriveReader(Protocol):
 
 
 #: Says how to read a capture, whose chunks it looks into.
-HowToRead: TypeAlias = Callable[[Iterable[Block]], tuple[Reading, Iterator[Block]]]
+HowToRead: TypeAlias = Callable[[Iterable[ChunkBlock]], tuple[Reading, Iterator[ChunkBlock]]]
 
 
 def read_drive(path: Path, *, robot: str = "", how: HowToRead | None = None) -> Drive:

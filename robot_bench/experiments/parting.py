@@ -25,7 +25,7 @@ CHAIN = ("sensor", "firmware", "wire", "motion")
 
 
 @dataclass(frozen=True, slots=True)
-class Bound:
+class SignalTolerance:
     """A signal may differ by so much, and by more for no longer than `pause_s`."""
 
     stage: str
@@ -37,19 +37,19 @@ class Bound:
 #: chosen: sonar by its beam's grain and the 100 ms of a reading; pins and commands by the periods of who reads them;
 #: motion by what a person sees on a plan.
 BOUNDS = {
-    "sensor pin": Bound("sensor", "", 0.5, 0.25),
-    "sonar": Bound("sensor", "m", 0.15, 0.5),
-    "motor pins": Bound("firmware", "steps", 0.5, 0.25),
-    "command": Bound("wire", "", 0.5, 0.25),
-    "speed": Bound("motion", "m/s", 0.05, 0.25),
-    "turn rate": Bound("motion", "rad/s", 0.2, 0.25),
-    "position": Bound("motion", "m", 0.05, 0.0),
-    "heading": Bound("motion", "rad", 0.05, 0.0),
+    "sensor pin": SignalTolerance("sensor", "", 0.5, 0.25),
+    "sonar": SignalTolerance("sensor", "m", 0.15, 0.5),
+    "motor pins": SignalTolerance("firmware", "steps", 0.5, 0.25),
+    "command": SignalTolerance("wire", "", 0.5, 0.25),
+    "speed": SignalTolerance("motion", "m/s", 0.05, 0.25),
+    "turn rate": SignalTolerance("motion", "rad/s", 0.2, 0.25),
+    "position": SignalTolerance("motion", "m", 0.05, 0.0),
+    "heading": SignalTolerance("motion", "rad", 0.05, 0.0),
 }  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class SignalParting:
     """A signal that both drives have, and where it parts: None where it never does."""
 
     signal: str
@@ -65,12 +65,12 @@ class Part:
     spans: tuple[tuple[float, float], ...] = ()
 
     @property
-    def bound(self) -> Bound:
+    def bound(self) -> SignalTolerance:
         """What it was judged by."""
         return BOUNDS[self.kind]
 
 
-def parts(one: Drive, other: Drive, shift_s: float, ours: Trajectory, theirs: Trajectory) -> list[Part]:
+def parts(one: Drive, other: Drive, shift_s: float, ours: Trajectory, theirs: Trajectory) -> list[SignalParting]:
     """Return every signal that both have, the first to part first, then those that never do.
 
     Args:
@@ -82,7 +82,7 @@ def parts(one: Drive, other: Drive, shift_s: float, ours: Trajectory, theirs: Tr
     """
     grid = np.arange(ours.t_s[0], ours.t_s[-1], LOOK_S)
 
-    def held(name: str, kind: str, a: Steps | None, b: Steps | None) -> Part | None:
+    def held(name: str, kind: str, a: Steps | None, b: Steps | None) -> SignalParting | None:
         if a is None or b is None or not len(a.t_s) or not len(b.t_s):
             return None
         return _part(name, kind, grid, a.at(grid), b.later(shift_s).at(grid))
@@ -107,12 +107,12 @@ def parts(one: Drive, other: Drive, shift_s: float, ours: Trajectory, theirs: Tr
     return sorted(rows, key=lambda part: np.inf if part.parts_s is None else part.parts_s)
 
 
-def motion_parts_s(rows: list[Part]) -> float | None:
+def motion_parts_s(rows: list[SignalParting]) -> float | None:
     """Return when the motion parts; None where it does not."""
     return min((row.parts_s for row in rows if row.bound.stage == CHAIN[-1] and row.parts_s is not None), default=None)
 
 
-def origin(rows: list[Part]) -> tuple[Part, float] | None:
+def origin(rows: list[SignalParting]) -> tuple[SignalParting, float] | None:
     """Return where the difference came from and when: of the motion's where that parts, else of what parted first."""
     at = motion_parts_s(rows)
     found = [
@@ -127,7 +127,7 @@ def origin(rows: list[Part]) -> tuple[Part, float] | None:
     return row, begin
 
 
-def _part(name: str, kind: str, times: Floats, ours: Floats, theirs: Floats) -> Part | None:
+def _part(name: str, kind: str, times: Floats, ours: Floats, theirs: Floats) -> SignalParting | None:
     known = ~(np.isnan(ours) | np.isnan(theirs))
     if known.sum() < 2:
         return None
@@ -138,9 +138,9 @@ def _part(name: str, kind: str, times: Floats, ours: Floats, theirs: Floats) -> 
     spans = _lasting(times, difference > bound.most, bound.pause_s)
     most = float(difference[largest]), float(times[largest])
     if not spans:
-        return Part(name, kind, rms, *most, None)
+        return SignalParting(name, kind, rms, *most, None)
     place = spans[0][0]
-    return Part(
+    return SignalParting(
         name, kind, rms, *most, float(times[place]), float(ours[place]), float(theirs[place]),
         tuple((float(times[begin]), float(times[last])) for begin, last in spans),
     )  # fmt: skip

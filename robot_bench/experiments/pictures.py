@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from robot_bench.experiments.comparison import Comparison
 from robot_bench.experiments.parting import motion_parts_s
-from robot_bench.experiments.sensitivity import Effect
+from robot_bench.experiments.sensitivity import ParameterEffect
 from simbase.files import writing
 
 #: The colours of the report's plots.
@@ -109,7 +109,7 @@ def latency_figure(title: str, rows: Sequence[tuple[str, Sequence[float]]]) -> F
     return figure
 
 
-def effects_figure(title: str, effects: Mapping[str, Sequence[Effect]]) -> Figure:
+def effects_figure(title: str, effects: Mapping[str, Sequence[ParameterEffect]]) -> Figure:
     """Draw, for each outcome, each parameter's mu* with its interval, what it does alone, and Sobol's indices."""
     counts = [len(rows) for rows in effects.values()]
     has_indices = any(one.ST is not None for rows in effects.values() for one in rows)
@@ -141,7 +141,7 @@ def effects_figure(title: str, effects: Mapping[str, Sequence[Effect]]) -> Figur
     return figure
 
 
-def _draw_indices(axes: Axes, rows: Sequence[Effect]) -> None:
+def _draw_indices(axes: Axes, rows: Sequence[ParameterEffect]) -> None:
     """Draw each parameter's shares of the variance: by itself, and below it together with the others."""
     places = [*range(len(rows))]
     for aside, colour, name, label in ((-0.2, OTHER, "S1", "S1, alone"), (0.2, "#dccfc4", "ST", "ST, with the others")):

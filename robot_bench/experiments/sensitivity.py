@@ -41,7 +41,7 @@ FIGURES = (
     "contacts", "energy_j", "energy_j_per_m", "time_to_goal_s",
 )  # fmt: skip
 _RANGE = re.compile(r"(?P<key>[^=]+)=(?P<low>[^=]+?)\.\.(?P<high>[^=]+)")
-#: What SALib calls what it finds, and so are the fields of `Effect`.
+#: What SALib calls what it finds, and so are the fields of `ParameterEffect`.
 MORRIS, SOBOL = ("mu", "mu_star", "mu_star_conf", "sigma"), ("S1", "S1_conf", "ST", "ST_conf")
 #: One point of the box: a value for each parameter.
 Point = tuple[float, ...]
@@ -80,7 +80,7 @@ def read_range(text: str) -> Range:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Design:
+class SampleDesign:
     """Which points are run: those of one at a time, Morris' trajectories, Saltelli's sample for Sobol's indices.
 
     Args:
@@ -155,7 +155,7 @@ class Design:
         """Return a point as settings of the scenario."""
         return [(one.key, int(value) if one.is_whole else value) for one, value in zip(self.ranges, point, strict=True)]
 
-    def effects(self, of: Callable[[Point], float]) -> "list[Effect]":
+    def effects(self, of: Callable[[Point], float]) -> "list[ParameterEffect]":
         """Return each parameter's effect on an outcome.
 
         Args:
@@ -172,7 +172,7 @@ class Design:
         if self.samples:
             found |= self._indices(np.array([of(self.point(row)) for row in self.sobol_shares()]))
         return [
-            Effect(
+            ParameterEffect(
                 key=one.key,
                 alone=tuple(alone[number]) if alone else (),
                 **{name: float(found[name][number]) if name in found else None for name in (*MORRIS, *SOBOL)},
@@ -191,7 +191,7 @@ class Design:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Effect:
+class ParameterEffect:
     """What one parameter does to one outcome, in the outcome's unit."""
 
     key: str

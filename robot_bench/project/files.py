@@ -54,7 +54,7 @@ class Build:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Kind:
+class ProjectKind:
     """What a project's robot is."""
 
     #: Files of the example programs: file of the project → file of `robot_bench.firmware`, beside `_SHIPPED`.
@@ -98,12 +98,12 @@ BUILDS: Mapping[str, Build] = {
         words={**_WITHOUT_MAKE, "`Makefile`": "`platformio.ini`", "SOURCES` in the Makefile": "platformio.ini`"},
     ),
 }  # fmt: skip
-ROBOTS: Mapping[str, Kind] = {
-    "p2dx": Kind(
+ROBOTS: Mapping[str, ProjectKind] = {
+    "p2dx": ProjectKind(
         shipped={}, templates={"main.c": "main.c", "tests/test_robot.py": "test_robot"}, scenario=_SHIPPED_SCENARIO,
         sources=("main.c",),
     ),
-    "rover": Kind(
+    "rover": ProjectKind(
         shipped={
             "main.c": "rover.c",
             **{f"board/{name}": name for name in (

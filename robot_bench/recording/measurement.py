@@ -17,7 +17,7 @@ from bluepill_sim.analysis.coverage_page import coverage_page
 from bluepill_sim.analysis.coverage_text import coverage_lines, refuse_without_lines, shortfall
 from bluepill_sim.analysis.cycle_profile import ASLEEP, CycleProfile
 from bluepill_sim.analysis.flame_graph import flame_svg
-from bluepill_sim.analysis.latency import Latency
+from bluepill_sim.analysis.latency import LatencyProbe
 from bluepill_sim.analysis.lcov import lcov_lines
 from bluepill_sim.analysis.observation import Observation
 from bluepill_sim.analysis.profile_text import exception_lines, function_lines
@@ -40,7 +40,7 @@ class Measurement:
     board: BluePill
     coverage: Coverage | None
     profile: CycleProfile | None
-    latency: Latency | None
+    latency: LatencyProbe | None
     observation: Observation
     fail_under: float = 0.0
 
@@ -104,7 +104,7 @@ def measuring(board: BluePill, *, coverage: bool, profile: bool, fail_under: flo
     if lines is not None and fail_under:
         refuse_without_lines(lines, board.image.name)
     cycles = CycleProfile(FunctionTable(board.image), code) if profile else None
-    latency = Latency(board) if profile else None
+    latency = LatencyProbe(board) if profile else None
     listeners = [listener for listener in (lines, cycles, latency) if listener is not None]
     try:
         with Observation(board, listeners) as observation:

@@ -53,7 +53,7 @@ def levels_and_duties(record: RunRecord, net: str) -> list[tuple[int, float]]:
     return sorted((dict(edges) | duties).items())
 
 
-class Steps(Sequence[tuple[int, int]]):
+class SignalSteps(Sequence[tuple[int, int]]):
     """Signed values over time, as (ns, steps), oldest first."""
 
     def __init__(self, times: "array[int]", values: "array[int]") -> None:
@@ -65,11 +65,11 @@ class Steps(Sequence[tuple[int, int]]):
     @overload
     def __getitem__(self, place: int) -> tuple[int, int]: ...
     @overload
-    def __getitem__(self, place: slice) -> "Steps": ...
-    def __getitem__(self, place: int | slice) -> "tuple[int, int] | Steps":
+    def __getitem__(self, place: slice) -> "SignalSteps": ...
+    def __getitem__(self, place: int | slice) -> "tuple[int, int] | SignalSteps":
         if isinstance(place, int):
             return self.times[place], self.values[place]
-        return Steps(self.times[place], self.values[place])
+        return SignalSteps(self.times[place], self.values[place])
 
     def __iter__(self) -> Iterator[tuple[int, int]]:
         return zip(self.times, self.values, strict=True)
@@ -80,7 +80,7 @@ class Steps(Sequence[tuple[int, int]]):
     __hash__ = None  # type: ignore[assignment]  # it holds arrays
 
 
-def motor_steps(pins: Mapping[str, Edges], motor: int) -> Steps:
+def motor_steps(pins: Mapping[str, Edges], motor: int) -> SignalSteps:
     """Return the value of a motor's pins over time, as (ns, steps).
 
     Two's complement with comm1 as the least significant bit. Edges at one
@@ -89,4 +89,4 @@ def motor_steps(pins: Mapping[str, Edges], motor: int) -> Steps:
     nets = [net for net in GROUPS[f"motor {motor} ({'left' if motor == 1 else 'right'})"] if net in pins]
     found, sign = codes([pins[net] for net in nets]), 1 << max(0, len(nets) - 1)
     signed = bytes((code ^ sign) - sign & 0xFF for code in range(256))
-    return Steps(found.times, array("b", bytes(found.levels).translate(signed)))
+    return SignalSteps(found.times, array("b", bytes(found.levels).translate(signed)))

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from p2os.robots.parameters import RobotParameters
-from p2os.ros.bags import Recorded, is_bag, read_bag
+from p2os.ros.bags import BagMessage, is_bag, read_bag
 from robot_bench.drives.drive import Drive, Trajectory, heading_of, steps_of
 from simbase.errors import FileError, shown_name
 from simbase.timing import NS_PER_S, Nanos
@@ -77,7 +77,7 @@ def read(path: Path, parameters: RobotParameters) -> Drive:
     return drive
 
 
-def _trajectory(found: Iterable[Recorded], begins: Nanos) -> Trajectory | None:
+def _trajectory(found: Iterable[BagMessage], begins: Nanos) -> Trajectory | None:
     """Return poses as a trajectory; None where fewer than two are finite."""
     rows = []
     for one in found:
@@ -89,7 +89,7 @@ def _trajectory(found: Iterable[Recorded], begins: Nanos) -> Trajectory | None:
     return Trajectory.of_rows(rows) if len({row[0] for row in rows}) > 1 else None
 
 
-def _of_topic(found: Sequence[Recorded], types: Iterable[str], names: Sequence[str]) -> list[Recorded]:
+def _of_topic(found: Sequence[BagMessage], types: Iterable[str], names: Sequence[str]) -> list[BagMessage]:
     """Return the messages of one topic: the first of `names` that is there, else the topic with the most messages."""
     ours = [one for one in found if one.type in types]
     counts = Counter(one.topic for one in ours)
@@ -99,7 +99,7 @@ def _of_topic(found: Sequence[Recorded], types: Iterable[str], names: Sequence[s
     return [one for one in ours if one.topic == chosen]
 
 
-def _commands(found: Iterable[Recorded], begins: Nanos) -> dict[str, Any]:
+def _commands(found: Iterable[BagMessage], begins: Nanos) -> dict[str, Any]:
     """Return speeds as the commands of the wire: mm/s and degrees a second."""
     told: dict[str, Pairs] = {"VEL": [], "RVEL": []}
     for one in found:
@@ -110,7 +110,7 @@ def _commands(found: Iterable[Recorded], begins: Nanos) -> dict[str, Any]:
     return {name: steps_of(_finite(pairs)) for name, pairs in told.items() if pairs}
 
 
-def _sonar(found: Iterable[Recorded], parameters: RobotParameters, begins: Nanos) -> dict[int, Pairs]:
+def _sonar(found: Iterable[BagMessage], parameters: RobotParameters, begins: Nanos) -> dict[int, Pairs]:
     sonar: dict[int, Pairs] = {}
     for one in found:
         for number, metres in SONAR[one.type](one, parameters) if one.type in SONAR else ():
@@ -120,24 +120,24 @@ def _sonar(found: Iterable[Recorded], parameters: RobotParameters, begins: Nanos
     return sonar
 
 
-def _range(one: Recorded, _: RobotParameters) -> Echoes:
+def _range(one: BagMessage, _: RobotParameters) -> Echoes:
     digits = re.search(r"(\d{1,3})$", one.topic)
     message: Mapping[str, Any] = one.message
     if digits is not None:
         yield int(digits[1]), float(message["range"])
 
 
-def _array(one: Recorded, _: RobotParameters) -> Echoes:
+def _array(one: BagMessage, _: RobotParameters) -> Echoes:
     message: Mapping[str, Any] = one.message
     yield from ((number, float(metres)) for number, metres in enumerate(message["ranges"]))
 
 
-def _points(one: Recorded, parameters: RobotParameters) -> Echoes:
+def _points(one: BagMessage, parameters: RobotParameters) -> Echoes:
     message: Mapping[str, Any] = one.message
     yield from _of_points([(point["x"], point["y"]) for point in message["points"]], parameters)
 
 
-def _points2(one: Recorded, parameters: RobotParameters) -> Echoes:
+def _points2(one: BagMessage, parameters: RobotParameters) -> Echoes:
     message: Mapping[str, Any] = one.message
     offsets = {field["name"]: field["offset"] for field in message["fields"] if field["datatype"] == FLOAT32}
     data, order = bytes(message["data"]), ">" if message["is_bigendian"] else "<"
@@ -162,7 +162,7 @@ def _of_points(points: Sequence[Sequence[float]], parameters: RobotParameters) -
 
 
 #: Type → what reads its ranges.
-SONAR: Mapping[str, Callable[[Recorded, RobotParameters], Echoes]] = {
+SONAR: Mapping[str, Callable[[BagMessage, RobotParameters], Echoes]] = {
     "sensor_msgs/msg/Range": _range, "p2os_msgs/msg/SonarArray": _array,
     "sensor_msgs/msg/PointCloud": _points, "sensor_msgs/msg/PointCloud2": _points2,
 }  # fmt: skip
@@ -176,12 +176,12 @@ def _heading(turned: Mapping[str, float]) -> float:
     return heading_of(*(turned[name] for name in "xyzw"))
 
 
-def _time_of(one: Recorded) -> Nanos:
+def _time_of(one: BagMessage) -> Nanos:
     message: Mapping[str, Any] = one.message
     stamp = message.get("header", {}).get("stamp", {})
     at_ns = int(stamp.get("sec", 0)) * NS_PER_S + int(stamp.get("nanosec", 0))
     return at_ns or one.at_ns
 
 
-def _seconds(one: Recorded, begins: Nanos) -> float:
+def _seconds(one: BagMessage, begins: Nanos) -> float:
     return (_time_of(one) - begins) / NS_PER_S

@@ -16,7 +16,7 @@ from adapter_sim.codec import motor_value
 from adapter_sim.pinout import WireRole, load_pinout
 from p2os.robots.parameters import RobotParameters
 from p2os.ros.frames import Frames, time_of
-from p2os.ros.robot_messages import Motion, joint_state, odometry, sonar_range
+from p2os.ros.robot_messages import OdometryMotion, joint_state, odometry, sonar_range
 from p2os.ros.robot_node import Outgoing
 from p2os.ros.thesis_topics import CODES, FIRST
 from p2os.ros.topics import TOPICS
@@ -93,7 +93,7 @@ class BenchNode:
         """Return what a pose of the robot makes."""
         body, track_m = self._frames.parameters.body, self._frames.parameters.track_mm / 1000
         radius_m, left, right = body.wheel_diameter_m / 2, pose.left / MICRO, pose.right / MICRO
-        motion = Motion(
+        motion = OdometryMotion(
             x_m=pose.x_m, y_m=pose.y_m, heading_rad=pose.heading_rad,
             forward_mps=pose.speed_mps, turn_radps=(right - left) / track_m,
             wheels_rad=(pose.left_angle / MICRO, pose.right_angle / MICRO),

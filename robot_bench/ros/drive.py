@@ -10,7 +10,7 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from p2os.ros.transport import DOMAIN, LOOPBACK, NodeOptions, Transport
+from p2os.ros.transport import DOMAIN, LOOPBACK, NodeOptions, RosTransport
 from p2os.ros.transports import TRANSPORTS, open_transport
 from robot_bench.bench import Bench
 from robot_bench.events.kinds import Pose, Ranges
@@ -91,7 +91,7 @@ def with_inputs(path: Path) -> RunBench:
     return drive
 
 
-def run_beside(bench: Bench, network: Transport, options: NodeOptions) -> None:
+def run_beside(bench: Bench, network: RosTransport, options: NodeOptions) -> None:
     """Run a bench to its end as a node of a network."""
     harness = bench.parts.harness
     node = BenchNode(

@@ -24,7 +24,7 @@ from simbase.state import Stateful
 from simbase.timing import Nanos
 
 
-class Driven(Protocol):
+class SharedRobot(Protocol):
     """A robot whose body is stepped together with others."""
 
     def next_setpoints(self) -> tuple[float, float]:
@@ -34,7 +34,7 @@ class Driven(Protocol):
         """Take the wheels' angles after a step that was made with `next_setpoints`."""
 
 
-class Member(Protocol):
+class BenchMember(Protocol):
     """A bench with one of the robots."""
 
     @property
@@ -55,7 +55,7 @@ class Member(Protocol):
 class _Own:
     """A bench as a part of its world."""
 
-    def __init__(self, member: Member) -> None:
+    def __init__(self, member: BenchMember) -> None:
         self._member = member
 
     def snapshot(self) -> object:
@@ -84,9 +84,9 @@ class SharedWorld(Stateful):
         self.names = tuple(names)
         scene.name_robots(self.names)
         #: The benches of those that have a chip, by name.
-        self.members: dict[str, Member] = {}
+        self.members: dict[str, BenchMember] = {}
         self._own: tuple[_Own, ...] = ()
-        self._driven: dict[int, Driven] = {}
+        self._driven: dict[int, SharedRobot] = {}
         self._pings = PingTable(scene.bodies)
         #: The time until which all has happened, and where the scene stands.
         self.now: Nanos = 0
@@ -96,7 +96,7 @@ class SharedWorld(Stateful):
         """Return a robot's body."""
         return self.scene.bodies[self.names.index(name)]
 
-    def join(self, name: str, member: Member, driven: Driven) -> None:
+    def join(self, name: str, member: BenchMember, driven: SharedRobot) -> None:
         """Take the bench of a robot, and what drives its body."""
         number = self.names.index(name)
         self.members[name] = member

@@ -10,11 +10,11 @@ from typing import Any
 
 from p2os.errors import ScenarioError
 from p2os.robots.parameters import BodyParameters
-from p2os.toml_schema import Key, Place, Table, filled, within
+from p2os.toml_schema import Key, Table, TablePlace, filled, within
 from robot_bench.direct.differential.analog import GP2Y0A21
 from robot_bench.direct.differential.description import (
-    Battery,
-    Bridge,
+    BatteryDescription,
+    BridgeDescription,
     BridgeKind,
     Bumper,
     Differential,
@@ -108,7 +108,7 @@ TABLES: Mapping[str, tuple[Key, ...]] = {
 _MOST_POINTS, _MOST_PIN_V = 100, 3.3
 
 
-def load_differential(table: Table, where: Place, pins: Mapping[str, str]) -> Differential:
+def load_differential(table: Table, where: TablePlace, pins: Mapping[str, str]) -> Differential:
     """Return the robot that a file describes.
 
     Args:
@@ -139,13 +139,13 @@ def load_differential(table: Table, where: Place, pins: Mapping[str, str]) -> Di
         body=BodyParameters(
             motor_torque_nm=_stall_torque(motor, battery), **{name: float(body[name]) for name in named}
         ),
-        bridge=Bridge(
+        bridge=BridgeDescription(
             kind=BridgeKind(bridge["kind"]), off=Off(bridge["off"]), resistance_ohm=bridge["resistance_ohm"],
             drop_v=bridge["drop_v"], dead_time_ns=round(1000 * bridge["dead_time_us"]),
         ),
         motor=Motor(torque_constant=motor.pop("torque_constant_nm_a"), **motor),
         encoder=Encoder(lines=encoder["lines"], is_on_motor=encoder["on"] == "motor"),
-        battery=Battery(divider=under / (over + under), **battery),
+        battery=BatteryDescription(divider=under / (over + under), **battery),
         distances=tuple(
             DistanceSensor(**one | {"curve": _curve(one["curve"], at)})
             for one, at in _rows(top["distance"], "distance", where)
@@ -158,11 +158,11 @@ def load_differential(table: Table, where: Place, pins: Mapping[str, str]) -> Di
     return robot
 
 
-def _rows(rows: list[Table], name: str, where: Place) -> list[tuple[Values, Place]]:
+def _rows(rows: list[Table], name: str, where: TablePlace) -> list[tuple[Values, TablePlace]]:
     """Return the tables of an array with their places; names are given once."""
-    found: dict[str, tuple[Values, Place]] = {}
+    found: dict[str, tuple[Values, TablePlace]] = {}
     for number, row in enumerate(rows):
-        at = Place(where.source, name, number, f"[[{name}]] {number + 1}")
+        at = TablePlace(where.source, name, number, f"[[{name}]] {number + 1}")
         one = filled(row, TABLES[name], at)
         word = str(one["name"])
         if not word.isidentifier() or not word.isascii() or word in found:
@@ -178,7 +178,7 @@ def _stall_torque(motor: Values, battery: Values) -> float:
     return min(max(torque, 0.01), 10_000.0)
 
 
-def _curve(points: list[list[float]], at: Place) -> tuple[tuple[float, float], ...]:
+def _curve(points: list[list[float]], at: TablePlace) -> tuple[tuple[float, float], ...]:
     """Return the points of a sensor's curve."""
     found = tuple((float(metres), float(volts)) for metres, volts in points)
     good = 2 <= len(found) <= _MOST_POINTS and all(volts <= _MOST_PIN_V for _, volts in found)
@@ -190,7 +190,7 @@ def _curve(points: list[list[float]], at: Place) -> tuple[tuple[float, float], .
     return found
 
 
-def _refuse_impossible(body: Values, battery: Values, where: Place) -> None:
+def _refuse_impossible(body: Values, battery: Values, where: TablePlace) -> None:
     mass, wheel = body["mass_kg"], body["wheel_mass_kg"]
     if mass <= 2 * wheel + 0.2:
         raise ScenarioError(
@@ -203,7 +203,7 @@ def _refuse_impossible(body: Values, battery: Values, where: Place) -> None:
         raise ScenarioError(f"{within(where, 'battery')}: empty_v is above full_v")
 
 
-def _refuse_fast_encoder(robot: Differential, where: Place) -> None:
+def _refuse_fast_encoder(robot: Differential, where: TablePlace) -> None:
     edges = robot.encoder.edges_per_turn(robot.motor) * no_load_radps(robot) / (2 * math.pi)
     if edges > MOST_EDGES_A_SECOND:
         raise ScenarioError(

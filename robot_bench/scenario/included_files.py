@@ -23,7 +23,7 @@ from typing import cast
 
 from p2os.errors import ScenarioError
 from p2os.toml_file import TomlSource, is_file, read_toml, read_user_text
-from p2os.toml_schema import Key, Place, Table, check_table
+from p2os.toml_schema import Key, Table, TablePlace, check_table
 from simbase.errors import UsageError, nearest, shown, shown_name
 
 #: Of the schema of scenario files.
@@ -222,7 +222,7 @@ def _read(path: Path, folder: Path, above: tuple[Path, ...], count: list[int]) -
         raise ScenarioError(f"{shown_name(above[0].name)} includes more than {MOST_FILES} files")
     text = read_user_text(path, "a scenario", ScenarioError)
     table, places = read_toml(text, name, "a scenario", ScenarioError)
-    place = Place(TomlSource(name, places))
+    place = TablePlace(TomlSource(name, places))
     check_table({key.name: table[key.name] for key in _OWN if key.name in table}, _OWN, place)
     extended, included = table.pop("extends", None), table.pop("include", [])
     for own, keys in FILES.items():

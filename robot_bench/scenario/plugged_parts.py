@@ -9,7 +9,7 @@ from pathlib import Path
 from bluepill_sim.parts.registry import GROUP, PARTS, PartSpec, build
 from bluepill_sim.stm32f103 import BONDED_PINS
 from p2os.errors import ScenarioError
-from p2os.toml_schema import Key, Place, Table, Where, placed, within
+from p2os.toml_schema import Key, Table, TablePlace, Where, placed, within
 from simbase.errors import shown, shown_name
 from simbase.trust import Code, Trust
 
@@ -60,7 +60,7 @@ def _load(table: Table, folder: Path, taken: Mapping[str, str], at: Where, trust
         ):
             raise ScenarioError(f"{at}: {name} = {shown(value)} is no number, text, flag or list of them")
     kept = tuple((key, tuple(value) if isinstance(value, list) else value) for key, value in settings.items())
-    named = f"{at.at('kind') if isinstance(at, Place) else at}: kind"
+    named = f"{at.at('kind') if isinstance(at, TablePlace) else at}: kind"
     kind = trust.admit(str(table["kind"]), folder, named)
     spec = PartSpec(kind=kind, settings=kept, folder=str(folder))
     if isinstance(kind, Code) and kind.is_unread:

@@ -33,7 +33,7 @@ from p2os.pioneer.world.model import World
 from p2os.pioneer.world.start_places import refuse_start, start_places
 from p2os.robots.parameters import RobotParameters, load_parameters
 from p2os.toml_file import is_file
-from p2os.toml_schema import LONGEST_S, Key, Place, Table, Where, check_table, placed, within
+from p2os.toml_schema import LONGEST_S, Key, Table, TablePlace, Where, check_table, placed, within
 from robot_bench.direct.robot import DirectSettings
 from robot_bench.events.selection import BUSES, bus_of
 from robot_bench.scenario import fault_script, plugged_parts, when_script, world_script
@@ -49,10 +49,10 @@ from robot_bench.scenario.included_files import (
     shipped_scenarios,
 )
 from robot_bench.scenario.several_robots import robot_keys, split
-from robot_bench.scenario.sweep import LARGEST_SEED, Axis, load_axes, load_seeds
+from robot_bench.scenario.sweep import LARGEST_SEED, SweptParameter, load_axes, load_seeds
 from robot_bench.scenario.when_script import When, load_whens
 from robot_bench.scenario.wired_robots import OwnRobot, find_own_robot, known_own_robots, load_own_robot
-from robot_bench.scenario.world_script import Change, load_changes, refuse_names
+from robot_bench.scenario.world_script import ScriptedChange, load_changes, refuse_names
 from robot_bench.wires.line_ends import ENDS
 from robot_bench.wires.power_up import RANDOM_SRAM, ZEROS
 from simbase.errors import FileError, UsageError, nearest, shown, shown_name
@@ -255,7 +255,7 @@ class Scenario:
     controller_kind: str = "pioneer"
     #: What is plugged into the board besides the robot.
     parts: tuple[PartSpec, ...] = ()
-    changes: tuple[Change, ...] = ()
+    changes: tuple[ScriptedChange, ...] = ()
     faults: tuple[FaultChange, ...] = ()
     whens: tuple[When, ...] = ()
     goals: tuple[Goal, ...] = ()
@@ -266,7 +266,7 @@ class Scenario:
     #: The seeds that `p2os run` takes one after the other; none: `seed` alone.
     seeds: tuple[int, ...] = ()
     #: The parameters that it sweeps.
-    axes: tuple[Axis, ...] = ()
+    axes: tuple[SweptParameter, ...] = ()
     #: What was set beside the file.
     settings: tuple[Setting, ...] = ()
     #: The file; None: made by a program.
@@ -420,7 +420,7 @@ def _refuse_what_never_comes(found: ScenarioTable, path: Path, settings: Sequenc
 
     A run that is cut short beside the file leaves out what would have come later.
     """
-    where, table = Place(found.source), found.table
+    where, table = TablePlace(found.source), found.table
     worlds = cast("Mapping[str, Table]", table.get("in_world", {}))
     for world in worlds:
         resolve_world(world, path.parent, str(within(where, f"in_world.{world}")))
@@ -454,7 +454,7 @@ def build_scenario(
         ScenarioError: They break the schema.
     """
     build = _build_several if isinstance(found.table.get("robot"), list) else _build
-    scenario = build(found.table, found.text, path, Place(found.source), firmware, Trust.of(trust))
+    scenario = build(found.table, found.text, path, TablePlace(found.source), firmware, Trust.of(trust))
     kept = tuple(axis for axis in scenario.axes if axis.key not in dict(settings))
     scenario = replace(scenario, settings=tuple(settings), axes=kept, path=path)
     for one in scenario.programmed or (scenario,):
@@ -513,7 +513,7 @@ def refuse_what_its_world_refuses(scenario: Scenario, world: World) -> None:
     refuse_names(scenario.changes, world)
 
 
-def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | None, trust: Trust) -> Scenario:
+def _build(table: Table, text: str, path: Path, where: TablePlace, firmware: Path | None, trust: Trust) -> Scenario:
     check_table(table, _TOP, where)
     robot = str(table.get("robot", "p2dx"))
     own_robot = _own_robot(robot, table, path, where)
@@ -580,7 +580,7 @@ def _build(table: Table, text: str, path: Path, where: Place, firmware: Path | N
     return scenario
 
 
-def _refuse_goals_beyond_the_end(scenario: Scenario, where: Place) -> None:
+def _refuse_goals_beyond_the_end(scenario: Scenario, where: TablePlace) -> None:
     """Refuse goals that would look at nothing, and so be met by any run."""
     for number, goal in enumerate(scenario.goals):
         begin = goal.arguments.get("from_s", 0)
@@ -606,7 +606,7 @@ def _buses(names: Sequence[str], where: str, error: type[ScenarioError | UsageEr
     return tuple(bus for bus in BUSES if bus in names)
 
 
-def _refuse_unrecorded(scenario: Scenario, table: Table, where: Place) -> None:
+def _refuse_unrecorded(scenario: Scenario, table: Table, where: TablePlace) -> None:
     """Refuse goals and `[[when]]` that wait for what a bus does that is not recorded."""
     for kind, keys in _EVENT_KEYS.items():
         for number, item in enumerate(cast("list[Table]", table.get(kind, []))):
@@ -622,7 +622,9 @@ def _refuse_unrecorded(scenario: Scenario, table: Table, where: Place) -> None:
 _EVENT_KEYS = {"goal": {"event", "events", "after", "from", "to"}, "when": {"event"}}
 
 
-def _build_several(table: Table, text: str, path: Path, where: Place, firmware: Path | None, trust: Trust) -> Scenario:
+def _build_several(
+    table: Table, text: str, path: Path, where: TablePlace, firmware: Path | None, trust: Trust
+) -> Scenario:
     """Return a scenario with several robots, from a table of each."""
     tables = split(table, _TOP, where)
     found: list[Scenario | None] = [
@@ -664,7 +666,7 @@ def _build_several(table: Table, text: str, path: Path, where: Place, firmware: 
     )  # fmt: skip
 
 
-def _model(table: Table, path: Path, where: Place) -> RobotParameters:
+def _model(table: Table, path: Path, where: TablePlace) -> RobotParameters:
     """Return what a robot without a program is."""
     robot = str(table["robot"])
     own = _own_robot(robot, {key: value for key, value in table.items() if key == "pins"}, path, where)
@@ -678,7 +680,7 @@ def _taken(own_robot: OwnRobot | None) -> dict[str, str]:
     return {wire.pin: wire.name for wire in own_robot.robot.signals}
 
 
-def _parameters(robot: str, path: Path, where: Place) -> RobotParameters:
+def _parameters(robot: str, path: Path, where: TablePlace) -> RobotParameters:
     """Return a model's parameters; a file of them stands beside the scenario, as all that it names."""
     beside = path.parent / robot
     try:
@@ -688,7 +690,7 @@ def _parameters(robot: str, path: Path, where: Place) -> RobotParameters:
         raise ScenarioError(f"{where.at('robot')}: {error}", hint=hint) from error
 
 
-def _own_robot(robot: str, table: Table, path: Path, where: Place) -> OwnRobot | None:
+def _own_robot(robot: str, table: Table, path: Path, where: TablePlace) -> OwnRobot | None:
     """Return the robot, where it hangs on the chip's own pins; what only another one can have is refused."""
     file = find_own_robot(robot, path.parent)
     if file is None:
@@ -723,7 +725,7 @@ def _apply_in_world(scenario: Scenario) -> Scenario:
     return scenario
 
 
-def _firmware(name: str, path: Path, where: Place) -> Path:
+def _firmware(name: str, path: Path, where: TablePlace) -> Path:
     """Return the file beside the scenario, or the shipped program of that name."""
     beside = path.parent / name
     if is_file(beside):
@@ -799,7 +801,7 @@ def _settings(part: Table, path: Path) -> ControllerSettings:
 
 def _named(table: object, key: str, what: str, default: str, path: Path, where: Where, trust: Trust) -> str:
     """Return the body, adapter or controller that a key names, and refuse one that cannot be."""
-    at = f"{where.at(key) if isinstance(where, Place) else where}: {key}"
+    at = f"{where.at(key) if isinstance(where, TablePlace) else where}: {key}"
     name = trust.admit(str(cast("Table", table).get(key, default)), path.parent, at)
     try:
         return _known(what, name)

@@ -22,7 +22,7 @@ from typing import cast
 
 from p2os.errors import ScenarioError
 from p2os.pioneer.world.file import in_range
-from p2os.toml_schema import Key, Place, Source, Table, check_table, within
+from p2os.toml_schema import Key, KeyPlaces, Table, TablePlace, check_table, within
 from simbase.errors import nearest, shown
 
 #: What a robot has for itself; those that a scenario of one robot has at its top, and where it stands.
@@ -53,7 +53,7 @@ def top_keys(top: Sequence[Key]) -> tuple[Key, ...]:
 class RobotSource:
     """The places of one robot's scenario in the file that holds all."""
 
-    source: Source
+    source: KeyPlaces
     #: Which of the `[[robot]]` tables it is.
     number: int
     #: What stands in that.
@@ -88,7 +88,7 @@ class RobotTable:
     name: str
     #: As of a scenario with this robot alone; without `firmware` where it has no program.
     table: Table
-    place: Place
+    place: TablePlace
 
     @property
     def has_firmware(self) -> bool:
@@ -96,7 +96,7 @@ class RobotTable:
         return "firmware" in self.table
 
 
-def split(table: Table, top: Sequence[Key], place: Place) -> list[RobotTable]:
+def split(table: Table, top: Sequence[Key], place: TablePlace) -> list[RobotTable]:
     """Return each robot of a scenario's table as one of its own.
 
     Args:
@@ -130,17 +130,17 @@ def split(table: Table, top: Sequence[Key], place: Place) -> list[RobotTable]:
         numbers = {key: tuple(place for place, _ in rows.get(name, [])) for key, rows in lists.items()}
         whole = {**shared, **own, **mine, "robot": robot.get("model", "p2dx"), **({"start": start} if start else {})}
         source = RobotSource(place.source, number, frozenset(robot), numbers)
-        found.append(RobotTable(name, {key: value for key, value in whole.items() if value != []}, Place(source)))
+        found.append(RobotTable(name, {key: value for key, value in whole.items() if value != []}, TablePlace(source)))
     return found
 
 
-def _names(robots: Sequence[Table], keys: Sequence[Key], place: Place) -> list[str]:
+def _names(robots: Sequence[Table], keys: Sequence[Key], place: TablePlace) -> list[str]:
     names: list[str] = []
     for number, robot in enumerate(robots):
         at = within(place, "robot", number)
         check_table(robot, keys, at)
         name = str(robot["name"])
-        where = at.at("name") if isinstance(at, Place) else at
+        where = at.at("name") if isinstance(at, TablePlace) else at
         if not _NAME.fullmatch(name) or name in names:
             wrong = "two robots are called so" if name in names else "that is no name for a robot"
             raise ScenarioError(f"{where}: name = {shown(name)}: {wrong}", hint="letters, digits, _ - and .")
@@ -149,7 +149,7 @@ def _names(robots: Sequence[Table], keys: Sequence[Key], place: Place) -> list[s
 
 
 def _by_robot(
-    tables: Sequence[Table], key: str, programmed: Sequence[str], place: Place
+    tables: Sequence[Table], key: str, programmed: Sequence[str], place: TablePlace
 ) -> dict[str, list[tuple[int, Table]]]:
     """Return the tables of a list by the robot that they are for, each with its number and without `robot`."""
     found: dict[str, list[tuple[int, Table]]] = {}
@@ -158,7 +158,7 @@ def _by_robot(
         check_table({"robot": table["robot"]} if "robot" in table else {}, (ROBOT,), at)
         name = table.get("robot")
         if name is not None and name not in programmed:
-            where = at.at("robot") if isinstance(at, Place) else at
+            where = at.at("robot") if isinstance(at, TablePlace) else at
             raise ScenarioError(
                 f"{where}: robot = {shown(name)}: no robot with a program is called so",
                 hint=nearest(str(name), programmed),

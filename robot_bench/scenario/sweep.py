@@ -39,7 +39,7 @@ RANGE = (
 
 
 @dataclass(frozen=True, slots=True)
-class Axis:
+class SweptParameter:
     """A parameter and the values that it takes."""
 
     key: str
@@ -86,7 +86,7 @@ def load_seeds(table: Table, where: str) -> tuple[int, ...]:
         raise ScenarioError(f"{where}: seeds: {error}", hint=error.hint) from error
 
 
-def load_axes(table: Table, where: Where) -> tuple[Axis, ...]:
+def load_axes(table: Table, where: Where) -> tuple[SweptParameter, ...]:
     """Return the parameters of a `[sweep]` table.
 
     Raises:
@@ -98,23 +98,23 @@ def load_axes(table: Table, where: Where) -> tuple[Axis, ...]:
     return axes
 
 
-def rows(axes: tuple[Axis, ...]) -> Iterator[tuple[Setting, ...]]:
+def rows(axes: tuple[SweptParameter, ...]) -> Iterator[tuple[Setting, ...]]:
     """Yield each row of a sweep: a value of each parameter; one empty row where there are no parameters."""
     for values in itertools.product(*(axis.values for axis in axes)):
         yield tuple((axis.key, value) for axis, value in zip(axes, values, strict=True))
 
 
-def _axes(table: Table, above: str, where: Where) -> Iterator[Axis]:
+def _axes(table: Table, above: str, where: Where) -> Iterator[SweptParameter]:
     for name, value in table.items():
         key = f"{above}.{name}".removeprefix(".")
         at = where if isinstance(where, str) else where.at(key)
         if isinstance(value, list) and value:
             if any(isinstance(item, dict) for item in value):
                 raise ScenarioError(f"{at}: {key}: a table cannot be swept", hint="sweep a key of it")
-            yield Axis(key, tuple(value))
+            yield SweptParameter(key, tuple(value))
         elif isinstance(value, Mapping) and "from" in value:
             check_table(cast("Table", value), RANGE, f"{at}: {key}")
-            yield Axis(key, _range(cast("Mapping[str, float]", value), f"{at}: {key}"))
+            yield SweptParameter(key, _range(cast("Mapping[str, float]", value), f"{at}: {key}"))
         elif isinstance(value, Mapping) and value:
             yield from _axes(cast("Table", value), key, where)
         else:

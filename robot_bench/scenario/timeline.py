@@ -11,7 +11,7 @@ from simbase.state import PartState, Stateful
 from simbase.timing import NS_PER_S, Nanos, Reached
 
 
-class Timed(Protocol):
+class TimedAction(Protocol):
     """What is due at a time."""
 
     @property
@@ -19,7 +19,7 @@ class Timed(Protocol):
         """When."""
 
 
-T = TypeVar("T", bound=Timed)
+T = TypeVar("T", bound=TimedAction)
 
 
 class Timeline(Stateful, Generic[T]):

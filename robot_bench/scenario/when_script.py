@@ -29,7 +29,7 @@ from robot_bench.events.stream import EventStream
 from robot_bench.scenario import world_script
 from robot_bench.scenario.fault_script import LINK_DOWN, FaultChange, load_faults
 from robot_bench.scenario.hand_script import DEEDS, Deed, load_deeds
-from robot_bench.scenario.world_script import Change, load_changes
+from robot_bench.scenario.world_script import ScriptedChange, load_changes
 from simbase.errors import nearest, shown
 from simbase.state import Stateful
 from simbase.timing import NS_PER_S, Nanos
@@ -75,7 +75,7 @@ class When:
     after_ns: Nanos = 0
     #: At each such event, not at the first one only.
     every: bool = False
-    changes: tuple[Change, ...] = ()
+    changes: tuple[ScriptedChange, ...] = ()
     faults: tuple[FaultChange, ...] = ()
     deeds: tuple[Deed, ...] = ()
     name: str = ""
@@ -121,7 +121,7 @@ def _load(table: Table, parameters: RobotParameters, place: Where, wires: Wires 
     check_table(rest, _THING if do in _WORLD else _FAULT if do in _FAULTS else as_fault or DEEDS.get(do, ()), place)
     with placed(place):
         select(str(mine["event"]), wires)
-    changes: tuple[Change, ...] = ()
+    changes: tuple[ScriptedChange, ...] = ()
     faults: tuple[FaultChange, ...] = ()
     if do in _WORLD:
         changes = load_changes([{"at_s": 0, "op": do, **rest}], parameters, f"{place}", are_later=True)
@@ -162,7 +162,7 @@ class WhenScript(Stateful):
         self,
         whens: Sequence[When],
         *,
-        on_change: Callable[[Sequence[Change]], None],
+        on_change: Callable[[Sequence[ScriptedChange]], None],
         on_fault: Callable[[Sequence[FaultChange]], None],
         on_deed: Callable[[Sequence[Deed]], None],
         on_end: Callable[[Nanos], None],

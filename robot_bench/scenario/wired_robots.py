@@ -17,7 +17,7 @@ from p2os.errors import ScenarioError
 from p2os.pioneer.body.contract import RobotBody
 from p2os.robots.parameters import RobotParameters
 from p2os.toml_file import TomlSource, is_file, read_toml, read_user_text
-from p2os.toml_schema import Place, Table, Where, within
+from p2os.toml_schema import Table, TablePlace, Where, within
 from robot_bench.direct.differential.robot import DifferentialRobot
 from robot_bench.direct.wired import AnalogPin, RobotWire
 from robot_bench.events.selection import wire_named
@@ -52,7 +52,7 @@ class WiredPart(Timed, Protocol):
 @dataclass(frozen=True, slots=True)
 class _Kind:
     #: Reads a file's table: (table, place, pins).
-    load: Callable[[Table, Place, Mapping[str, str]], WiredRobot]
+    load: Callable[[Table, TablePlace, Mapping[str, str]], WiredRobot]
     #: Makes the part of the bench: (robot, body, harness, pins of analog signals).
     build: Callable[[object, RobotBody, Harness, Callable[[str], AnalogPin]], WiredPart]
 
@@ -122,7 +122,7 @@ def load_own_robot(path: Path, pins: Table, where: Where) -> OwnRobot:
     """
     name = shown_name(path.name)
     table, places = read_toml(read_user_text(path, "a robot", ScenarioError), name, "a robot", ScenarioError)
-    at = Place(TomlSource(name, places))
+    at = TablePlace(TomlSource(name, places))
     kind = table.get("kind")
     if kind not in KINDS:
         raise ScenarioError(f"{at.at('kind')}: there is no kind of robot {shown(kind)}", hint=nearest(str(kind), KINDS))
@@ -142,7 +142,7 @@ def _check_pins(pins: Table, signals: Sequence[RobotWire], where: Where) -> None
     """Refuse signals that the robot has not, and pins that the chip has not, or that cannot measure."""
     wires = {wire.name: wire for wire in signals}
     for signal, pin in pins.items():
-        at = where.at(signal) if isinstance(where, Place) else where
+        at = where.at(signal) if isinstance(where, TablePlace) else where
         if signal not in wires:
             raise ScenarioError(f"{at}: unknown signal {shown(signal)}", hint=nearest(signal, wires))
         if pin not in BONDED_PINS:
@@ -157,6 +157,6 @@ def _refuse_twice(pins: Mapping[str, str], where: Where) -> None:
     seen: dict[str, str] = {}
     for signal, pin in pins.items():
         if pin in seen:
-            at = where.at(signal) if isinstance(where, Place) else where
+            at = where.at(signal) if isinstance(where, TablePlace) else where
             raise ScenarioError(f"{at}: {pin} is {seen[pin]} already, and cannot be {signal} too")
         seen[pin] = signal

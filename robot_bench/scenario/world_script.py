@@ -58,7 +58,7 @@ class BeforeSonar:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Change:
+class ScriptedChange:
     """One change of the world at a given time."""
 
     at: Nanos
@@ -108,7 +108,7 @@ _SIZES = {"box": ("length_m", "width_m", "height_m"), "cylinder": ("radius_m", "
 
 def load_changes(
     tables: list[Table], parameters: RobotParameters, where: Where, *, are_later: bool = False
-) -> tuple[Change, ...]:
+) -> tuple[ScriptedChange, ...]:
     """Return the changes that a scenario's `[[obstacle]]` tables ask for, in order of time.
 
     With `are_later` the tables are not all: things may have been placed before.
@@ -116,7 +116,7 @@ def load_changes(
     Raises:
         ScenarioError: A table breaks the schema, or asks for what cannot be.
     """
-    changes: list[Change] = []
+    changes: list[ScriptedChange] = []
     for number, table in enumerate(tables):
         place = within(where, "obstacle", number)
         check_table(table, KEYS, place)
@@ -127,7 +127,7 @@ def load_changes(
     return tuple(changes)
 
 
-class WorldScript(Timeline[Change]):
+class WorldScript(Timeline[ScriptedChange]):
     """Applies changes at their times.
 
     Args:
@@ -143,7 +143,7 @@ class WorldScript(Timeline[Change]):
 
     def __init__(
         self,
-        changes: Sequence[Change],
+        changes: Sequence[ScriptedChange],
         body: RobotBody,
         parameters: RobotParameters,
         *,
@@ -156,7 +156,7 @@ class WorldScript(Timeline[Change]):
         self._bring_to = bring_to
         self._on_change = on_change
 
-    def _apply(self, change: Change) -> None:
+    def _apply(self, change: ScriptedChange) -> None:
         self._bring_to(change.at)
         x_m, y_m, heading_rad = change.x_m, change.y_m, change.heading_rad
         if change.before is not None:
@@ -186,18 +186,18 @@ class WorldScript(Timeline[Change]):
         return x_m, y_m, direction
 
 
-def _changes(table: Table, parameters: RobotParameters, where: str) -> list[Change]:
+def _changes(table: Table, parameters: RobotParameters, where: str) -> list[ScriptedChange]:
     at = _nanos(table, "at_s")
     op = Op(str(table.get("op", "place")))
     name = str(table["name"])
     before = _before(table, parameters, where)
     if op is Op.REMOVE:
-        return [Change(at=at, op=op, name=name, where=where)]
+        return [ScriptedChange(at=at, op=op, name=name, where=where)]
     if before is None and "path_m" not in table:
         _need(table, ("x_m", "y_m"), where)
     x_m, y_m = _number(table, "x_m"), _number(table, "y_m")
     heading_rad = math.radians(_number(table, "heading_deg"))
-    first = Change(
+    first = ScriptedChange(
         at=at,
         op=op,
         name=name,
@@ -214,10 +214,10 @@ def _changes(table: Table, parameters: RobotParameters, where: str) -> list[Chan
         raise ScenarioError(f"{where}: hold_s without before_sonar", hint="only a thing placed before a sonar is held")
     end = at + _nanos(table, "hold_s")
     moves = [
-        Change(at=moment, op=Op.MOVE, name=name, before=before, where=where)
+        ScriptedChange(at=moment, op=Op.MOVE, name=name, before=before, where=where)
         for moment in range(at + FOLLOW_NS, end, FOLLOW_NS)
     ]
-    return [first, *moves, Change(at=end, op=Op.REMOVE, name=name, where=where)]
+    return [first, *moves, ScriptedChange(at=end, op=Op.REMOVE, name=name, where=where)]
 
 
 def _before(table: Table, parameters: RobotParameters, where: str) -> BeforeSonar | None:
@@ -267,7 +267,7 @@ def _walk(table: Table, where: str) -> Walk | None:
     )
 
 
-def refuse_names(changes: Sequence[Change], world: World) -> None:
+def refuse_names(changes: Sequence[ScriptedChange], world: World) -> None:
     """Refuse to place what the world has, and to move or take out what it has not or what is fixed.
 
     Raises:
@@ -292,7 +292,7 @@ def refuse_names(changes: Sequence[Change], world: World) -> None:
             there[change.name] = False
 
 
-def _check_names(changes: list[Change]) -> None:
+def _check_names(changes: list[ScriptedChange]) -> None:
     """Refuse a thing that is placed twice, or moved while it is not there."""
     placed: set[str] = set()
     for change in changes:
@@ -318,7 +318,7 @@ def _nanos(table: Table, key: str) -> Nanos:
     return round(_number(table, key) * NS_PER_S)
 
 
-def _at(change: Change) -> str:
+def _at(change: ScriptedChange) -> str:
     return f"{change.at / NS_PER_S:g} s"
 
 

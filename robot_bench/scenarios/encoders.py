@@ -10,7 +10,7 @@ from adapter_sim.pinout import load_pinout
 from p2os.toml_schema import Key, Table
 from robot_bench.events.kinds import Event, Pose, Text
 from robot_bench.scenario.goals.text import Printed
-from robot_bench.scenario.goals.watch import GoalKind, Outcome, number, seconds
+from robot_bench.scenario.goals.watch import GoalKind, GoalOutcome, number, seconds
 from simbase.timing import Nanos
 
 _COUNTS = re.compile(r"left=(-?\d+) right=(-?\d+)")
@@ -32,7 +32,7 @@ class EncoderCounts(Printed):
         self._has_counts = False
         self._wrong = ""
 
-    def feed(self, event: Event) -> Outcome | None:
+    def feed(self, event: Event) -> GoalOutcome | None:
         if isinstance(event, Pose):
             return self._compare(event)
         line = self.read(event) if isinstance(event, Text) else None
@@ -41,14 +41,14 @@ class EncoderCounts(Printed):
             self._pending.append((event.t, int(m[1]), int(m[2])))
         return None
 
-    def finish(self, end: Nanos) -> Outcome:
+    def finish(self, end: Nanos) -> GoalOutcome:
         if self._pose is not None:
             self._compare(self._pose)
         if not self._has_counts or self._pose is None:
-            return Outcome(met=False, says=f"no counts were printed; {self.last}")
-        return Outcome(met=not self._wrong, says=self._wrong)
+            return GoalOutcome(met=False, says=f"no counts were printed; {self.last}")
+        return GoalOutcome(met=not self._wrong, says=self._wrong)
 
-    def _compare(self, pose: Pose) -> Outcome | None:
+    def _compare(self, pose: Pose) -> GoalOutcome | None:
         before, self._pose = self._pose, pose
         pending, self._pending = self._pending, []
         for at, *counts in pending:
@@ -61,7 +61,7 @@ class EncoderCounts(Printed):
                     self._wrong = (
                         f"{side} was printed as {printed} at {seconds(at)}, the wheel had turned {turned} steps"
                     )
-                    return Outcome(met=False, says=self._wrong)
+                    return GoalOutcome(met=False, says=self._wrong)
         return None
 
 

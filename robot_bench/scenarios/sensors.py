@@ -8,7 +8,7 @@ from typing import cast
 
 from robot_bench.events.kinds import Event, Text, WorldChange
 from robot_bench.scenario.goals.text import Printed
-from robot_bench.scenario.goals.watch import GoalKind, Outcome, seconds
+from robot_bench.scenario.goals.watch import GoalKind, GoalOutcome, seconds
 from simbase.timing import Nanos
 
 _SENSOR = re.compile(r"^sensor (\d+) (on|off)$")
@@ -25,7 +25,7 @@ class SensorNamed(Printed):
         self._placed: list[tuple[Nanos, int]] = []
         self._said: list[tuple[Nanos, str]] = []
 
-    def feed(self, event: Event) -> Outcome | None:
+    def feed(self, event: Event) -> GoalOutcome | None:
         if isinstance(event, WorldChange) and event.op == "place" and "sonar" in event.fields:
             self._placed.append((event.t, int(cast("int", event.fields["sonar"]))))
         elif isinstance(event, Text):
@@ -34,9 +34,9 @@ class SensorNamed(Printed):
                 self._said.append((event.t, line))
         return None
 
-    def finish(self, end: Nanos) -> Outcome:
+    def finish(self, end: Nanos) -> GoalOutcome:
         says = self._failure(end)
-        return Outcome(met=not says, says=says)
+        return GoalOutcome(met=not says, says=says)
 
     def _failure(self, end: Nanos) -> str:
         if not self._placed:

@@ -77,7 +77,7 @@ class WaveDrive:
 
 
 @dataclass(slots=True)
-class History:
+class CodeHistory:
     """What one owner has done to a wire: times in ns, and the code from each on."""
 
     times: "array[int]" = field(default_factory=lambda: array("q"))
@@ -138,7 +138,7 @@ class Net(Stateful):
     def __init__(self, name: str, *, idle: bool = False) -> None:
         self.name = name
         self.idle = idle
-        self._drives: dict[str, History] = {}
+        self._drives: dict[str, CodeHistory] = {}
         self._watchers: list[Watcher] = []
         #: The time of the last drive known so far, and the level after it; None: not worked out.
         self._last_level: bool | None = idle
@@ -243,11 +243,11 @@ class Net(Stateful):
 
     def drive_at(self, owner: str, at: Nanos) -> WaveDrive | None:
         """Return the wave that `owner` puts on the wire at the instant `at`; None for none."""
-        return self._drives.get(owner, History()).wave_at(at)
+        return self._drives.get(owner, CodeHistory()).wave_at(at)
 
     def times_after(self, owner: str, after: Nanos) -> "array[int]":
         """Return when `owner` has driven the wire after `after`."""
-        history = self._drives.get(owner, History())
+        history = self._drives.get(owner, CodeHistory())
         return history.times[bisect_right(history.times, after) :]
 
     def watch(self, watcher: Watcher) -> None:
@@ -345,7 +345,7 @@ class Net(Stateful):
         low, high = _phases((*codes, *drive.codes), self.idle)
         return low if low == high else drive.wave
 
-    def _history(self, owner: str, now: Nanos) -> History:
+    def _history(self, owner: str, now: Nanos) -> CodeHistory:
         """Return an owner's history, which goes on at `now`."""
         history = self._drives.get(owner)
         if history is not None and now < history.times[-1]:
@@ -357,7 +357,7 @@ class Net(Stateful):
                 f"{owner} drives {self.name} at {now} ns after its edges up to {self._notified_until} ns were told"
             )
         if history is None:
-            history = self._drives[owner] = History()
+            history = self._drives[owner] = CodeHistory()
         return history
 
     def _driven(self, owner: str, first: Nanos, last: Nanos) -> None:

@@ -10,7 +10,7 @@ from robot_bench.wires.chip_pins import ChipWithPins
 from simbase.timing import Reached
 
 
-class Usart(Protocol):
+class ChipUsart(Protocol):
     """A serial port of the chip, from outside."""
 
     #: The far end's speed in bit/s; None follows the firmware.
@@ -40,14 +40,14 @@ class ChipFault(Protocol):
         """When."""
 
 
-class Chip(ChipWithPins, Protocol):
+class LeadingChip(ChipWithPins, Protocol):
     """A chip that runs a firmware and leads the bench's time."""
 
     def subscribe_warnings(self, sink: Callable[[str], None]) -> Callable[[], None]:
         """Have `sink` called with each new warning, at its time; return a function that ends it."""
 
     @property
-    def usart1(self) -> Usart:
+    def usart1(self) -> ChipUsart:
         """The port that firmware prints on."""
 
     @property

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from adapter_sim.pinout import Direction, Pinout, WireRole, load_pinout
+from adapter_sim.pinout import Pinout, WireDirection, WireRole, load_pinout
 from p2os.protocol.commands import Command
 from p2os.protocol.frames import Frame
 from robot_bench.wires.board_test.esp32 import CONSOLE, ROBOT, Esp32
@@ -77,7 +77,7 @@ class Shell:
         is_enabled = bool(state.driven >> enable & 1) and not state.out >> enable & 1
         result = {}
         for wire in PINOUT.wires:
-            if wire.direction is Direction.TO_BLUEPILL and wire.role is not WireRole.RESET:
+            if wire.direction is WireDirection.TO_BLUEPILL and wire.role is not WireRole.RESET:
                 pad, pin = pad_of(wire.name, self.revision), wire.esp32_pin(self.revision) or ""
                 if pad is not None and state.driven >> pad & 1:
                     result[wire.name] = bool(state.out >> pad & 1)

@@ -2,7 +2,7 @@
 
 import re
 
-from adapter_sim.pinout import Direction, load_pinout
+from adapter_sim.pinout import WireDirection, load_pinout
 from tests.adapter_fw.budgets import PAGE
 from tests.adapter_fw.builds import ROOT
 
@@ -11,7 +11,7 @@ TEXT = PAGE.read_text(encoding="utf-8")
 
 def test_the_wiring_is_that_of_the_pinout() -> None:
     for wire in load_pinout().wires:
-        arrow = "→" if wire.direction is Direction.TO_ADAPTER else "←"
+        arrow = "→" if wire.direction is WireDirection.TO_ADAPTER else "←"
         pins = f"{wire.esp32_pin('rev-b')} | {wire.esp32_pin('rev-c')}"
         assert f"| {wire.name} | {wire.bluepill} | {arrow} | {pins} |\n" in TEXT
 

@@ -7,7 +7,7 @@ from random import Random
 import pytest
 
 from adapter_sim.duty import DUTY_TIMEOUT_NS, DutyMeter
-from adapter_sim.pinout import Direction, WireRole
+from adapter_sim.pinout import WireDirection, WireRole
 from robot_bench.wires.board_test.esp32 import CONSOLE, NvsFault, ResetReason
 from tests.adapter_fw.builds import built
 from tests.adapter_fw.shell import PINOUT, Shell, pad_of
@@ -55,8 +55,8 @@ def test_each_wire_stands_on_its_pad_and_nothing_else_is_driven(any_board: Shell
     shell = any_board
     shell.run_ms(BOOT_MS + 10)
     assert "test on" in shell.type("test on")
-    outputs = [wire for wire in PINOUT.wires if wire.direction is Direction.TO_BLUEPILL]
-    inputs = [wire for wire in PINOUT.wires if wire.direction is not Direction.TO_BLUEPILL]
+    outputs = [wire for wire in PINOUT.wires if wire.direction is WireDirection.TO_BLUEPILL]
+    inputs = [wire for wire in PINOUT.wires if wire.direction is not WireDirection.TO_BLUEPILL]
     for bit, wire in enumerate(outputs):
         shell.type(f"wires {1 << bit:x} {1 << bit:x}", wait_ms=6)
         levels = shell.driven()

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from adapter_sim import AdapterSettings, MotorCommand
 from adapter_sim.duty import COURSE_NS, FULL, DutyMeter, DutyWire
-from adapter_sim.mixing import Mixer, Speeds
+from adapter_sim.mixing import CommandedSpeeds, Mixer
 from adapter_sim.pins import Median
 from bluepill_sim.fabric.subscriptions import Wave
 from tests.adapter_sim.conftest import MS, FakeRobot, Rig
@@ -178,16 +178,16 @@ def test_a_sign_that_comes_two_samples_early_moves_nothing() -> None:
 @pytest.mark.parametrize(
     ("left", "right", "speeds"),
     [
-        (FULL, FULL, Speeds(250, 0)),
-        (-FULL, -FULL, Speeds(-250, 0)),
-        (500, 500, Speeds(125, 0)),
-        (10, 10, Speeds(3, 0)),  # 2.5 mm/s, away from zero
-        (1, 1, Speeds(0, 0)),
-        (400, 600, Speeds(125, 8)),
-        (-200, 200, Speeds(0, 16)),
+        (FULL, FULL, CommandedSpeeds(250, 0)),
+        (-FULL, -FULL, CommandedSpeeds(-250, 0)),
+        (500, 500, CommandedSpeeds(125, 0)),
+        (10, 10, CommandedSpeeds(3, 0)),  # 2.5 mm/s, away from zero
+        (1, 1, CommandedSpeeds(0, 0)),
+        (400, 600, CommandedSpeeds(125, 8)),
+        (-200, 200, CommandedSpeeds(0, 16)),
     ],
 )
-def test_a_full_duty_is_as_fast_as_the_lowest_value_of_the_bits(left: int, right: int, speeds: Speeds) -> None:
+def test_a_full_duty_is_as_fast_as_the_lowest_value_of_the_bits(left: int, right: int, speeds: CommandedSpeeds) -> None:
     settings = AdapterSettings(motor_command=MotorCommand.DUTY)
     mixer = Mixer(settings, full_steps=4, track_mm=357, max_velocity_mm_s=750, max_rotation_deg_s=100)
     assert mixer.mix(left, right) == speeds

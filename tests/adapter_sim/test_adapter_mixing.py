@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from adapter_sim import AdapterSettings, MotorMeaning
 from adapter_sim.distances import threshold_um
-from adapter_sim.mixing import Mixer, Speeds
+from adapter_sim.mixing import CommandedSpeeds, Mixer
 from p2os.robots.parameters import load_parameters
 from simbase.errors import UsageError
 
@@ -22,17 +22,17 @@ def mixer(**settings: object) -> Mixer:
 @pytest.mark.parametrize(
     ("left", "right", "speeds"),
     [
-        (0, 0, Speeds(0, 0)),
-        (2, 2, Speeds(125, 0)),
-        (3, 3, Speeds(188, 0)),  # 187.5, away from zero
-        (-3, -3, Speeds(-188, 0)),
-        (-4, -4, Speeds(-250, 0)),
-        (1, 2, Speeds(94, 10)),  # 93.75 mm/s; 62.5 / 357 rad/s = 10.03 deg/s
-        (-2, 2, Speeds(0, 40)),
-        (3, -4, Speeds(-31, -70)),  # -31.25 mm/s; 437.5 / 357 rad/s = 70.2 deg/s
+        (0, 0, CommandedSpeeds(0, 0)),
+        (2, 2, CommandedSpeeds(125, 0)),
+        (3, 3, CommandedSpeeds(188, 0)),  # 187.5, away from zero
+        (-3, -3, CommandedSpeeds(-188, 0)),
+        (-4, -4, CommandedSpeeds(-250, 0)),
+        (1, 2, CommandedSpeeds(94, 10)),  # 93.75 mm/s; 62.5 / 357 rad/s = 10.03 deg/s
+        (-2, 2, CommandedSpeeds(0, 40)),
+        (3, -4, CommandedSpeeds(-31, -70)),  # -31.25 mm/s; 437.5 / 357 rad/s = 70.2 deg/s
     ],
 )
-def test_wheel_steps_become_a_differential_drive(left: int, right: int, speeds: Speeds) -> None:
+def test_wheel_steps_become_a_differential_drive(left: int, right: int, speeds: CommandedSpeeds) -> None:
     assert mixer().mix(left, right) == speeds
 
 
@@ -58,7 +58,7 @@ def test_mixing_is_the_true_drive_to_half_a_unit(left: int, right: int, step: in
 @given(STEPS, STEPS)
 def test_a_mirrored_command_turns_the_other_way(left: int, right: int) -> None:
     speeds, mirrored = mixer().mix(left, right), mixer().mix(right, left)
-    assert mirrored == Speeds(speeds.forward_mm_s, -speeds.turn_deg_s)
+    assert mirrored == CommandedSpeeds(speeds.forward_mm_s, -speeds.turn_deg_s)
 
 
 @given(STEPS, STEPS, st.integers(0, 400), st.integers(0, 120))
@@ -69,15 +69,15 @@ def test_no_speed_passes_its_limit(left: int, right: int, velocity: int, rotatio
 
 
 def test_a_limit_slows_the_robot_but_keeps_its_path() -> None:
-    assert mixer(max_velocity_mm_s=47).mix(1, 2) == Speeds(47, 5)  # half of 94 mm/s and 10 deg/s
-    assert mixer(max_rotation_deg_s=35).mix(3, -4) == Speeds(-15, -35)  # half of -31 and -70
+    assert mixer(max_velocity_mm_s=47).mix(1, 2) == CommandedSpeeds(47, 5)  # half of 94 mm/s and 10 deg/s
+    assert mixer(max_rotation_deg_s=35).mix(3, -4) == CommandedSpeeds(-15, -35)  # half of -31 and -70
 
 
 def test_the_linear_and_angular_meaning_takes_motor2_as_the_turn() -> None:
     robot = mixer(motor_meaning="linear_angular")
-    assert robot.mix(2, 0) == Speeds(125, 0)
-    assert robot.mix(-4, 3) == Speeds(-250, 73)  # 3 × 0.425 rad/s = 73.05 deg/s
-    assert robot.mix(0, -4) == Speeds(0, -97)  # 97.4
+    assert robot.mix(2, 0) == CommandedSpeeds(125, 0)
+    assert robot.mix(-4, 3) == CommandedSpeeds(-250, 73)  # 3 × 0.425 rad/s = 73.05 deg/s
+    assert robot.mix(0, -4) == CommandedSpeeds(0, -97)  # 97.4
 
 
 @pytest.mark.parametrize(

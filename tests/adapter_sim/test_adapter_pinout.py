@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from adapter_sim import PinoutError, load_pinout, parse_pinout
-from adapter_sim.pinout import Direction, Pull, Safe, WireRole, faults_of
+from adapter_sim.pinout import Pull, Safe, WireDirection, WireRole, faults_of
 from tests.adapter_sim.conftest import PINOUT, four_bits
 from tests.adapter_sim.conftest import PINOUT_TEXT as TEXT
 
@@ -37,7 +37,7 @@ def test_levels_are_safe_by_role() -> None:
     for wire in PINOUT.wires:
         assert wire.safe is safe.get(wire.role, Safe.LOW)
         assert wire.idle is (wire.pull is Pull.UP)
-        assert wire.direction is (Direction.TO_BLUEPILL if wire.role in safe else Direction.TO_ADAPTER)
+        assert wire.direction is (WireDirection.TO_BLUEPILL if wire.role in safe else WireDirection.TO_ADAPTER)
 
 
 def test_rev_b_is_the_default_and_breaks_no_rule() -> None:

@@ -6,8 +6,8 @@ from itertools import pairwise
 import pytest
 
 from adapter_sim import AdapterSettings
-from adapter_sim.driver import CommandPacer, PlausibilityCheck
-from adapter_sim.mixing import Speeds
+from adapter_sim.driver import CommandPacer, SpeedPlausibility
+from adapter_sim.mixing import CommandedSpeeds
 from adapter_sim.pins import Debounce, Majority
 from p2os.protocol.commands import CommandNumber
 from p2os.protocol.frames import Frame
@@ -82,13 +82,13 @@ def test_the_adapter_boots_300_ms_after_rst_falls(rig: Rig) -> None:
 
 def test_a_changed_pair_goes_out_at_once_or_at_the_spacing() -> None:
     pacer = CommandPacer(spacing_ns=25 * MS, refresh_ns=200 * MS)
-    pacer.begin(Speeds(1, 0))
+    pacer.begin(CommandedSpeeds(1, 0))
     assert pacer.due_at(7) == 7
     pacer.take(1_000)
-    pacer.wanted = Speeds(2, 0)
+    pacer.wanted = CommandedSpeeds(2, 0)
     assert pacer.due_at(2_000) == 1_000 + 25 * MS
-    pacer.wanted = Speeds(3, 0)
-    assert pacer.take(1_000 + 25 * MS) == Speeds(3, 0)  # the latest only
+    pacer.wanted = CommandedSpeeds(3, 0)
+    assert pacer.take(1_000 + 25 * MS) == CommandedSpeeds(3, 0)  # the latest only
     assert pacer.due_at(1_000 + 26 * MS) == 1_000 + 225 * MS
 
 
@@ -141,7 +141,7 @@ def test_350_ms_without_a_sip_is_a_loss_and_stop_goes_first(driving: Rig) -> Non
 
 
 def test_what_is_implausible_is_told_wheel_by_wheel() -> None:
-    check = PlausibilityCheck(timeout_ns=1_500 * MS, tolerance_mm_s=40, progress_mm_s=5)
+    check = SpeedPlausibility(timeout_ns=1_500 * MS, tolerance_mm_s=40, progress_mm_s=5)
     check.measured, check.command = (1, 2), (300, 400)
     assert check.describe() == "wheels at 1 and 2 mm/s for 1.5 s, commanded 300 and 400, and no stall flag"
 
@@ -156,8 +156,8 @@ def test_one_second_of_wheels_that_do_not_follow_is_implausible(driving: Rig) ->
     assert [name for _, name, _ in driving.sent(at)][:4] == ["STOP", "VEL", "RVEL", "CLOSE"]
 
 
-def doubt() -> PlausibilityCheck:
-    plausibility = PlausibilityCheck(timeout_ns=1_000, tolerance_mm_s=40, progress_mm_s=5)
+def doubt() -> SpeedPlausibility:
+    plausibility = SpeedPlausibility(timeout_ns=1_000, tolerance_mm_s=40, progress_mm_s=5)
     plausibility.begin(0)
     plausibility.take(0, 0, stalled=False, now=0)
     plausibility.expect(200, 200)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from hardware.case import __main__ as command
 from hardware.case import design, fit
 from hardware.case.picture import draw, read_stl
-from hardware.case.solids import Block, Body, Cylinder, Solid
+from hardware.case.solids import Block, PrintedPart, Solid, UprightCylinder
 
 GENERATED = command.GENERATED
 COORDINATES = st.floats(-4, 4)
@@ -21,9 +21,9 @@ COORDINATES = st.floats(-4, 4)
 @given(COORDINATES, COORDINATES, COORDINATES)
 def test_what_is_cut_away_is_gone_and_what_comes_later_is_there(x: float, y: float, z: float) -> None:
     outer = Block(x=(-3, 3), y=(-3, 3), z=(-3, 3), corner_mm=1)
-    hole = Cylinder(at=(0, 0), radius_mm=2, z=(-3, 3), is_cut=True)
-    pin = Cylinder(at=(0, 0), radius_mm=1, z=(-3, 3))
-    body = Body(name="ring", solids=(outer, hole, pin))
+    hole = UprightCylinder(at=(0, 0), radius_mm=2, z=(-3, 3), is_cut=True)
+    pin = UprightCylinder(at=(0, 0), radius_mm=1, z=(-3, 3))
+    body = PrintedPart(name="ring", solids=(outer, hole, pin))
     assert body.holds(x, y, z) == ((outer.holds(x, y, z) and not hole.holds(x, y, z)) or pin.holds(x, y, z))
     assert body.near((x, x, y, y, z, z)).holds(x, y, z) == body.holds(x, y, z)
 
@@ -40,20 +40,20 @@ def test_the_case_fits_every_board(capsys: pytest.CaptureFixture[str]) -> None:
     assert capsys.readouterr().out.count("good") == len(fit.CHECKS)
 
 
-def without(body: Body, name: str) -> Body:
+def without(body: PrintedPart, name: str) -> PrintedPart:
     assert any(solid.name == name for solid in body.solids)
-    return Body(name=body.name, solids=tuple(solid for solid in body.solids if solid.name != name))
+    return PrintedPart(name=body.name, solids=tuple(solid for solid in body.solids if solid.name != name))
 
 
-def shifted(body: Body, name: str, dx: float) -> Body:
+def shifted(body: PrintedPart, name: str, dx: float) -> PrintedPart:
     def moved(solid: Solid) -> Solid:
         if solid.name != name:
             return solid
-        if isinstance(solid, Cylinder):
+        if isinstance(solid, UprightCylinder):
             return replace(solid, at=(solid.at[0] + dx, solid.at[1]))
         return replace(solid, x=(solid.x[0] + dx, solid.x[1] + dx))
 
-    return Body(name=body.name, solids=tuple(moved(solid) for solid in body.solids))
+    return PrintedPart(name=body.name, solids=tuple(moved(solid) for solid in body.solids))
 
 
 @pytest.mark.parametrize(
@@ -99,7 +99,7 @@ def test_the_files_are_of_this_design() -> None:
 
 @pytest.mark.parametrize("name", ["base", "lid"])
 def test_an_stl_file_has_the_size_and_the_volume_of_its_body(name: str) -> None:
-    body: Body = getattr(design, name)()
+    body: PrintedPart = getattr(design, name)()
     triangles = read_stl(GENERATED / f"{name}.stl")
     left, right, top, bottom, low, high = body.extent
     corners = [corner for triangle in triangles for corner in triangle]

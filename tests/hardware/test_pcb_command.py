@@ -6,12 +6,12 @@ import pytest
 
 from hardware.pcb import __main__ as command
 from hardware.pcb.checks import suite
-from hardware.pcb.checks.results import Verdict, judged, skipped
+from hardware.pcb.checks.results import CheckStatus, judged, skipped
 from hardware.pcb.circuit.design import VARIANTS
 from hardware.pcb.layout.routing import RoutingError
 from hardware.pcb.outputs import generated_files, kicad_cli
 from hardware.pcb.spice.deck import Deck, limits
-from hardware.pcb.spice.run import Result
+from hardware.pcb.spice.run import DeckResult
 
 RESULTS = [judged("ERC", "rev-b", True, "0 findings"), skipped("DRC", "rev-b", "KiCad 9 is not installed")]
 
@@ -83,7 +83,7 @@ def test_simulate_prints_figures_and_renews_the_page(capsys, monkeypatch, tmp_pa
                 traces=(), x_label="", y_label="", cannot_say="Nothing.")  # fmt: skip
     monkeypatch.setattr(command, "is_installed", lambda: True)
     monkeypatch.setattr(command, "decks", lambda: (deck,))
-    monkeypatch.setattr(command, "simulate", lambda _: Result(deck=deck, figures={"top": 2.5}, columns=[]))
+    monkeypatch.setattr(command, "simulate", lambda _: DeckResult(deck=deck, figures={"top": 2.5}, columns=[]))
     monkeypatch.setattr(generated_files, "SIMULATION_PAGE", tmp_path / "page.md")
     assert command.main(["simulate"]) == 1
     assert capsys.readouterr().out.splitlines() == [
@@ -121,4 +121,4 @@ def test_a_missing_verb_is_wrong_usage() -> None:
 
 
 def test_verdicts_are_the_words_of_the_table() -> None:
-    assert [str(verdict) for verdict in Verdict] == ["ok", "FAIL", "skipped"]
+    assert [str(verdict) for verdict in CheckStatus] == ["ok", "FAIL", "skipped"]

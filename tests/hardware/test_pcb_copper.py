@@ -11,7 +11,7 @@ from hardware.pcb.circuit.design import build as design_of
 from hardware.pcb.circuit.netlist import DesignError, make
 from hardware.pcb.layout import rules
 from hardware.pcb.layout.footprints import FOOTPRINTS
-from hardware.pcb.layout.placement import Place, place, unturn
+from hardware.pcb.layout.placement import Placement, place, unturn
 from hardware.pcb.layout.routing import (
     RoutingError,
     antenna_area,
@@ -116,7 +116,7 @@ def test_a_part_without_a_place_is_named() -> None:
 
 @pytest.mark.parametrize("angle", [0, 90, 180, 270])
 def test_unturning_an_offset_is_the_inverse_of_turning(angle: int) -> None:
-    assert turn(unturn((2.0, -1.0), angle), Place(x_mm=0, y_mm=0, angle_deg=angle)) == (2.0, -1.0)
+    assert turn(unturn((2.0, -1.0), angle), Placement(x_mm=0, y_mm=0, angle_deg=angle)) == (2.0, -1.0)
 
 
 def test_a_module_socket_has_the_pitch_and_drill_of_its_pins() -> None:

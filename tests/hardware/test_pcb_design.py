@@ -9,9 +9,9 @@ from hardware.pcb.checks.pin_checks import BOARDS, count_by_rule, findings
 from hardware.pcb.circuit.design import VARIANTS, build
 from hardware.pcb.circuit.electrical import Check, all_checks, bom_faults, netlist_faults
 from hardware.pcb.circuit.modules import BLUEPILL_PINS, ESP32_PINS
-from hardware.pcb.circuit.netlist import POWER_NETS, Design, DesignError, make
+from hardware.pcb.circuit.netlist import POWER_NETS, BoardDesign, DesignError, make
 from hardware.pcb.circuit.parts import PARTS, Part
-from hardware.pcb.proof.mutants import Mutant, apply
+from hardware.pcb.proof.mutants import BoardMutant, apply
 
 PINOUT = load_pinout()
 
@@ -100,8 +100,9 @@ def test_the_divider_of_the_thesis_leaves_the_lm317_below_its_minimum_load() -> 
 
 def test_a_wire_without_its_resistor_and_a_lone_pin_are_missed() -> None:
     design = build()
-    fewer = Design(variant=design.variant, revision=design.revision, title=design.title,
-                   components=tuple(part for part in design.components if part.ref not in {"R1", "U1"}))  # fmt: skip
+    fewer = BoardDesign(variant=design.variant, revision=design.revision, title=design.title,
+                        components=tuple(part for part in design.components if part.ref not in {"R1",
+                                                                                                "U1"}))  # fmt: skip
     faults = netlist_faults(fewer)
     assert "net DD2_BP ends at" not in faults
     assert any(fault.startswith("net MOTOR1_COMM1_BP ends at") for fault in faults)
@@ -109,7 +110,7 @@ def test_a_wire_without_its_resistor_and_a_lone_pin_are_missed() -> None:
 
 def test_a_button_that_reaches_no_pad_is_missed() -> None:
     # The board as it was: IO0 open, and the firmware's mode button nowhere.
-    design = apply(build(), Mutant(rule="x", name="x", edits=("net U2.37 -",)))
+    design = apply(build(), BoardMutant(rule="x", name="x", edits=("net U2.37 -",)))
     assert netlist_faults(design) == ["mode_button is on IO0, which reaches nothing on this board"]
     failed = {check.name for check in all_checks(design) if not check.is_good}
     assert failed == {"strap IO0: pull-up on the board", "strap IO0 with the button held"}
@@ -127,7 +128,7 @@ def test_a_button_that_reaches_no_pad_is_missed() -> None:
     ],
 )  # fmt: skip
 def test_button_and_stop_loop_are_held_to_their_limits(edit: str, name: str | None) -> None:
-    design = apply(build(), Mutant(rule="x", name="x", edits=(edit,)))
+    design = apply(build(), BoardMutant(rule="x", name="x", edits=(edit,)))
     failed = {check.name for check in all_checks(design) if not check.is_good}
     assert failed == set() if name is None else name in failed
 
@@ -135,10 +136,10 @@ def test_button_and_stop_loop_are_held_to_their_limits(edit: str, name: str | No
 def test_a_design_refuses_twins_and_unknown_parts() -> None:
     one = make("R1", "20k", ["A", "B"])
     with pytest.raises(DesignError, match="R1 stands twice"):
-        Design(variant="x", revision="rev-b", title="", components=(one, one))
+        BoardDesign(variant="x", revision="rev-b", title="", components=(one, one))
     twice = dataclasses.replace(one, ref="R2", pins=(("1", "A"), ("1", "B")))
     with pytest.raises(DesignError, match="R2 has a pin twice"):
-        Design(variant="x", revision="rev-b", title="", components=(twice,))
+        BoardDesign(variant="x", revision="rev-b", title="", components=(twice,))
     with pytest.raises(DesignError, match="no part 'R 9M'"):
         make("R3", "R 9M", ["A"])
     with pytest.raises(DesignError, match="variant 'rev-z' is unknown"):
@@ -150,7 +151,7 @@ def test_a_bought_part_needs_a_number_to_order_it_by() -> None:
         Part(key="X", value="1", symbol="R", footprint="R_0805", description="nameless")
     nameless = dataclasses.replace(PARTS["20k"], source="")
     component = dataclasses.replace(make("R1", "20k", ["A", "B"]), part=nameless)
-    design = Design(variant="x", revision="rev-b", title="", components=(component,))
+    design = BoardDesign(variant="x", revision="rev-b", title="", components=(component,))
     assert bom_faults(design) == ["R1: no source"]
 
 
@@ -159,7 +160,7 @@ def test_a_check_says_its_figure_and_its_limits() -> None:
     assert str(check) == "FAIL rail: 3.44 V (limits 3.135 to 3.4)"
 
 
-def with_resistor(design: Design, refs: list[str], ohm: float) -> Design:
+def with_resistor(design: BoardDesign, refs: list[str], ohm: float) -> BoardDesign:
     """Return the design with other resistor values."""
     parts = tuple(
         dataclasses.replace(part, part=dataclasses.replace(part.part, facts={"ohm": ohm})) if part.ref in refs else part

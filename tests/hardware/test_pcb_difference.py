@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from hardware.pcb.__main__ import main
-from hardware.pcb.outputs.difference import NEW, OLD, Board, picture, read_source, words
+from hardware.pcb.outputs.difference import NEW, OLD, BoardContents, picture, read_source, words
 from hardware.pcb.outputs.generated_files import GENERATED
 
 BOARD = GENERATED / "rev-b" / "rev-b.kicad_pcb"
@@ -26,7 +26,7 @@ def changed(tmp_path: Path):
 
 
 @cache
-def committed() -> Board:
+def committed() -> BoardContents:
     return read_source("rev-b")
 
 

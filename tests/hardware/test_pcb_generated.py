@@ -10,13 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hardware.pcb.checks import gerbers, suite
-from hardware.pcb.checks.results import Verdict, table
+from hardware.pcb.checks.results import CheckStatus, table
 from hardware.pcb.circuit.design import VARIANTS
 from hardware.pcb.circuit.design import build as design_of
 from hardware.pcb.layout.placement import place
 from hardware.pcb.outputs import generated_files, project
 from hardware.pcb.outputs.bom import rows
-from hardware.pcb.outputs.sexp import SexpError, Text, child, children, node, number, parse, render, word
+from hardware.pcb.outputs.sexp import QuotedText, SexpError, child, children, node, number, parse, render, word
 
 
 @pytest.fixture(scope="module")
@@ -110,12 +110,12 @@ def test_committed_gerbers_are_read_back_by_another_library(variant: str) -> Non
     if not gerbers.is_installed():
         pytest.skip("gerbonara is not installed: the gerbers are not re-read (hint: make board-tools)")
     result = suite.gerbers_reread(variant)
-    assert result.verdict is Verdict.GOOD, result.detail
+    assert result.verdict is CheckStatus.GOOD, result.detail
 
 
 def test_gerbers_of_another_size_or_with_other_holes_are_found() -> None:
-    reading = gerbers.Reading(width_mm=99.0, height_mm=100.0, layers=("top copper",), copper_layers=1, plated=3,
-                              unplated=4, smallest_drill_mm=0.3)  # fmt: skip
+    reading = gerbers.GerberReading(width_mm=99.0, height_mm=100.0, layers=("top copper",), copper_layers=1, plated=3,
+                                    unplated=4, smallest_drill_mm=0.3)  # fmt: skip
     found = gerbers.faults(design_of(), generated_files.copper_of(design_of())[1], reading)
     assert found[:3] == ["width is 99, the design has 100", "copper layers is 1, the design has 2",
                          "plated holes is 3, the design has 359"]  # fmt: skip
@@ -123,7 +123,7 @@ def test_gerbers_of_another_size_or_with_other_holes_are_found() -> None:
 
 
 def test_a_hole_that_stands_elsewhere_in_the_gerbers_is_named() -> None:
-    reading = gerbers.Reading(width_mm=100.0, height_mm=100.0, layers=(), copper_layers=2, plated=359, unplated=4,
+    reading = gerbers.GerberReading(width_mm=100.0, height_mm=100.0, layers=(), copper_layers=2, plated=359, unplated=4,
                               smallest_drill_mm=0.3, holes=frozenset({(4.0, 4.0, 3.2), (5.0, 96.0, 3.2)}))  # fmt: skip
     found = gerbers.faults(design_of(), generated_files.copper_of(design_of())[1], reading)
     assert "a hole of 3.2 mm at 5, 96" in found
@@ -133,7 +133,7 @@ def test_a_hole_that_stands_elsewhere_in_the_gerbers_is_named() -> None:
 
 def test_a_board_without_gerbers_or_without_the_library_says_so(monkeypatch) -> None:
     monkeypatch.setattr(gerbers, "is_installed", lambda: False)
-    assert suite.gerbers_reread("rev-b").verdict is Verdict.SKIPPED
+    assert suite.gerbers_reread("rev-b").verdict is CheckStatus.SKIPPED
     monkeypatch.setattr(generated_files, "fabrication_archive", lambda _: {})
     assert suite.gerbers_reread("rev-c").detail == "1: there is no archive (hint: make board)"
 
@@ -145,7 +145,7 @@ def test_an_archive_of_the_same_files_is_the_same_and_says_no_date() -> None:
 
 def test_the_plain_checks_all_pass_and_are_explained(sources: dict[str, str]) -> None:
     results = suite.plain()
-    assert [result for result in results if result.verdict is Verdict.BAD] == []
+    assert [result for result in results if result.verdict is CheckStatus.BAD] == []
     assert {result.subject for result in results if result.name == "pin rules"} == {
         "rev-b", "rev-c", "thesis-table3", "thesis-board"}  # fmt: skip
     assert table(results).splitlines()[-1].startswith(f"{len(results)} ok, 0 failed") or "skipped" in table(results)
@@ -160,7 +160,8 @@ def test_the_plain_checks_all_pass_and_are_explained(sources: dict[str, str]) ->
 
 WORDS = st.text(st.characters(codec="ascii", exclude_characters='()" \t\r\n', categories=["L", "N", "P"]), min_size=1)
 TREES = st.recursive(
-    st.one_of(WORDS, st.text().map(Text)), lambda items: st.lists(items, max_size=4).map(lambda tail: ["n", *tail])
+    st.one_of(WORDS, st.text().map(QuotedText)),
+    lambda items: st.lists(items, max_size=4).map(lambda tail: ["n", *tail]),
 )
 
 

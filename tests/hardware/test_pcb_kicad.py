@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from hardware.pcb.checks import kicad_checks
-from hardware.pcb.checks.results import Verdict
+from hardware.pcb.checks.results import CheckStatus
 from hardware.pcb.circuit.design import VARIANTS
 from hardware.pcb.circuit.design import build as design_of
 from hardware.pcb.layout.routing import RoutingError
@@ -40,7 +40,7 @@ def test_the_schematic_s_netlist_is_the_design(variant: str) -> None:
 @pytest.mark.parametrize("variant", ["rev-b", "rev-c"])
 def test_a_board_passes_the_design_rule_check_with_parity_and_gives_the_committed_gerbers(variant: str) -> None:
     results = kicad_checks.board_checks(variant)
-    assert [result for result in results if result.verdict is not Verdict.GOOD] == []
+    assert [result for result in results if result.verdict is not CheckStatus.GOOD] == []
     assert len(results) == 3
 
 
@@ -131,7 +131,7 @@ def test_fabrication_files_lose_their_dates(fake_kicad, tmp_path) -> None:
     files = generated_files.fabrication_files(tmp_path / "board.kicad_pcb", tmp_path / "out")
     assert files == {"board-F_Cu.gtl": "G01*\n", "board-PTH.drl": "G01*\n"}
     monkeyed = kicad_checks.gerbers_up_to_date("rev-b", files)
-    assert monkeyed.verdict is Verdict.BAD
+    assert monkeyed.verdict is CheckStatus.BAD
 
 
 def test_reports_lose_their_dates_and_are_named_by_variant(fake_kicad, tmp_path) -> None:
@@ -164,7 +164,7 @@ def test_an_older_kicad_and_none_are_missing(fake_kicad, monkeypatch, tmp_path) 
     monkeypatch.setenv("PATH", str(tmp_path))
     assert kicad_cli.version() is None
     (result,) = kicad_checks.with_kicad()
-    assert result.verdict is Verdict.SKIPPED
+    assert result.verdict is CheckStatus.SKIPPED
     assert "ERC, DRC, netlist, pours, gerbers not checked" in result.detail
 
 
@@ -205,8 +205,8 @@ def test_board_checks_make_one_line_each(fake_kicad, monkeypatch) -> None:
     names = [result.name for result in results if result.subject == "lm317"]
     assert names == ["ERC", "netlist equals design", "DRC with parity", "stitching", "gerbers up to date"]
     verdicts = {result.name: result.verdict for result in results}
-    assert verdicts["ERC"] is Verdict.GOOD
-    assert verdicts["stitching"] is verdicts["gerbers up to date"] is Verdict.BAD
+    assert verdicts["ERC"] is CheckStatus.GOOD
+    assert verdicts["stitching"] is verdicts["gerbers up to date"] is CheckStatus.BAD
 
 
 def test_an_archive_is_read_back(tmp_path) -> None:

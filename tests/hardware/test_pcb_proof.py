@@ -8,18 +8,18 @@ import pytest
 from hardware.pcb.circuit.design import VARIANTS, build
 from hardware.pcb.circuit.netlist import DesignError
 from hardware.pcb.layout.footprints import FOOTPRINTS
-from hardware.pcb.layout.shapes import SILK_MM, Circle, Label, Line
+from hardware.pcb.layout.shapes import SILK_MM, Circle, Label, StraightStroke
 from hardware.pcb.outputs.board import text_effects
 from hardware.pcb.outputs.sexp import child, word
 from hardware.pcb.proof import mutants
 from hardware.pcb.proof.expected import differences, expected, si, symbol_differences
-from hardware.pcb.proof.mutants import Mutant, apply, load
+from hardware.pcb.proof.mutants import BoardMutant, apply, load
 
 #: KiCad's own symbols, where they are installed.
 SYMBOLS = Path("/usr/share/kicad/symbols")
 
 
-def named(mutant: Mutant, lines: list[str]) -> bool:
+def named(mutant: BoardMutant, lines: list[str]) -> bool:
     """Tell whether a line names a part, pin or net that the mutant's edits touch."""
     words = {word for line in lines for word in re.findall(r"[\w+.-]+", line)}
     words |= {word.split(".")[0] for word in words}
@@ -70,12 +70,12 @@ def test_a_whole_part_that_is_wrong_and_a_torn_net_are_named(variant: str) -> No
 
 
 def test_a_part_the_wrong_way_round_is_called_so() -> None:
-    lines = differences(apply(build(), Mutant(rule="x", name="x", edits=("swap D3.K D3.A",))))
+    lines = differences(apply(build(), BoardMutant(rule="x", name="x", edits=("swap D3.K D3.A",))))
     assert lines[0] == "D3 is the wrong way round: D3.K is on net 5V_EXT, D3.A on net 5V_BANK"
 
 
 def test_a_pin_that_must_stay_open_says_why() -> None:
-    lines = differences(apply(build(), Mutant(rule="x", name="x", edits=("net J3.7 +12V",))))
+    lines = differences(apply(build(), BoardMutant(rule="x", name="x", edits=("net J3.7 +12V",))))
     (line,) = lines
     assert line.startswith("J3.7 is on net +12V")
     assert line.endswith("must stay open (thesis 2.4: a straight ribbon from JP8 puts 12 V here)")
@@ -84,7 +84,7 @@ def test_a_pin_that_must_stay_open_says_why() -> None:
 @pytest.mark.parametrize("edit", ["net U9.1 GND", "swap U5.1 U9.1", "join GND NOWHERE", "value R99 1k", "drop R99"])
 def test_an_edit_of_what_is_not_there_is_refused(edit: str) -> None:
     with pytest.raises(DesignError, match=r"no (pin|net|part)"):
-        apply(build(), Mutant(rule="x", name="x", edits=(edit,)))
+        apply(build(), BoardMutant(rule="x", name="x", edits=(edit,)))
 
 
 def test_every_row_of_the_table_names_its_source_and_values_read_as_printed() -> None:
@@ -125,7 +125,7 @@ def test_no_stroke_on_the_print_is_thinner_than_makers_print() -> None:
         for drawing in footprint.drawings:
             if drawing.layer != "F.SilkS":
                 continue
-            if isinstance(drawing, Line | Circle):
+            if isinstance(drawing, StraightStroke | Circle):
                 assert drawing.width_mm >= SILK_MM, footprint.name
             elif isinstance(drawing, Label):
                 effects = text_effects(drawing.size_mm)[0]

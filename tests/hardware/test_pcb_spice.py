@@ -7,11 +7,11 @@ from functools import cache
 import pytest
 
 from hardware.pcb.checks import suite
-from hardware.pcb.checks.results import Verdict
+from hardware.pcb.checks.results import CheckStatus
 from hardware.pcb.circuit.design import build
-from hardware.pcb.circuit.netlist import Design
+from hardware.pcb.circuit.netlist import BoardDesign
 from hardware.pcb.outputs import generated_files
-from hardware.pcb.proof.mutants import Mutant, apply
+from hardware.pcb.proof.mutants import BoardMutant, apply
 from hardware.pcb.spice import run
 from hardware.pcb.spice.deck import Deck, limits
 from hardware.pcb.spice.decks import decks
@@ -117,7 +117,7 @@ def test_checks_of_decks_pass_and_fail_by_their_limits(fake_ngspice, monkeypatch
     low = dataclasses.replace(DECK, limits=limits(("top", 1.8, 2.0, "V", "m")))
     monkeypatch.setattr(suite, "decks", lambda: (DECK, low))
     results = suite.simulations()
-    assert [result.verdict for result in results] == [Verdict.GOOD, Verdict.BAD]
+    assert [result.verdict for result in results] == [CheckStatus.GOOD, CheckStatus.BAD]
     assert results[0].detail == "top 1.75 V"
 
 
@@ -126,7 +126,7 @@ def test_without_ngspice_it_is_said_and_skipped(monkeypatch, tmp_path) -> None:
     with pytest.raises(MissingDependencyError, match="not installed"):
         run.simulate(DECK)
     (result,) = suite.simulations()
-    assert result.verdict is Verdict.SKIPPED
+    assert result.verdict is CheckStatus.SKIPPED
 
 
 def test_a_plot_is_drawn_for_each_deck(fake_ngspice, monkeypatch, tmp_path) -> None:
@@ -160,9 +160,9 @@ def test_figures_have_three_digits(value: float, text: str) -> None:
     assert shown(value) == text
 
 
-def wrong(edit: str) -> Design:
+def wrong(edit: str) -> BoardDesign:
     """Return rev-b with one edit of proof/mutants.py."""
-    return apply(build(), Mutant(rule="x", name="x", edits=(edit,)))
+    return apply(build(), BoardMutant(rule="x", name="x", edits=(edit,)))
 
 
 #: Edits of the circuit, the deck that must notice it, and one figure that leaves its limits.

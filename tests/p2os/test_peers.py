@@ -10,7 +10,7 @@ import pytest
 from p2os.robots.parameters import known_robots
 from tests.tools.forked_python import forked_python
 from tools import peers
-from tools.peers import PEERS, Peer, main
+from tools.peers import PEERS, PeerProgram, main
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals and terminals are Unix's")
 
@@ -20,7 +20,7 @@ def _forked(monkeypatch: pytest.MonkeyPatch) -> None:
     """Fork what the table starts by Python's own name."""
     ours, forked = sys.executable, forked_python()
 
-    def of_forked(peer: Peer) -> Peer:
+    def of_forked(peer: PeerProgram) -> PeerProgram:
         commands = [[forked if word == ours else word for word in words] for words in peer.commands]
         return replace(peer, commands=tuple(map(tuple, commands)))
 

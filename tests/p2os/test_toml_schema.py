@@ -4,10 +4,10 @@ import pytest
 
 from p2os.errors import ScenarioError, WorldError
 from p2os.toml_file import TomlSource, find_places
-from p2os.toml_schema import Key, Place, check_table, filled, placed, within
+from p2os.toml_schema import Key, TablePlace, check_table, filled, placed, within
 from simbase.errors import FileError, MissingDependencyError, UsageError
 
-WHERE = Place(TomlSource("w.toml", find_places("a = 1\n[[row]]\nb = 2\n")), error=WorldError)
+WHERE = TablePlace(TomlSource("w.toml", find_places("a = 1\n[[row]]\nb = 2\n")), error=WorldError)
 NUMBERS = Key(name="a", kind="numbers", count=2, least=0, most=9)
 POINTS = Key(name="a", kind="points", count=2, least=0, most=9)
 LINE, ASCII = Key(name="a", kind="line", most=3), Key(name="a", kind="ascii", most=3)

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from tools.compare_chip.comparison import LEVELS, Comparison
+from tools.compare_chip.comparison import LEVELS, ChipComparison
 from tools.compare_chip.differences import compare, difference_of_states
 from tools.compare_chip.generator import generate, labels_at, name_of
 from tools.compare_chip.programs import script_of
@@ -74,7 +74,7 @@ def worker() -> Any:
 
 def test_a_chip_compared_with_itself_is_the_same_and_a_job_that_hangs_is_named(tmp_path: Path, worker: Worker) -> None:
     said: list[str] = []
-    comparison = Comparison(worker, worker, tmp_path, said.append, slices=("whole", 7919), is_quick=True)
+    comparison = ChipComparison(worker, worker, tmp_path, said.append, slices=("whole", 7919), is_quick=True)
     image = ROOT / "robot_bench" / "firmware" / "sensors.elf"
     assert comparison.compare("sensors", image, LEVELS[:1])
     assert (comparison.runs, comparison.differing, said) == (2, 0, [])
@@ -108,7 +108,7 @@ def test_addresses_in_a_generated_program_have_its_labels(tmp_path: Path) -> Non
 
 def test_generated_programs_run_on_both_cores_alike(tmp_path: Path, worker: Worker) -> None:
     said: list[str] = []
-    comparison = Comparison(worker, worker, tmp_path, said.append, slices=("random",), is_quick=True)
+    comparison = ChipComparison(worker, worker, tmp_path, said.append, slices=("random",), is_quick=True)
     for number in range(2):
         assert comparison.compare(name_of(0, number), generate(0, number, tmp_path)), said
     assert comparison.runs == 2 * len(LEVELS)

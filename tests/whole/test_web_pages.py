@@ -20,7 +20,7 @@ from bluepill_sim.board import BluePill
 from bluepill_sim.cli.gdb_server import GdbServer
 from bluepill_sim.debug.machine import LoneChip
 from bluepill_sim.debug.packets import frame
-from p2os.cli.captures.sniff import Bridge
+from p2os.cli.captures.sniff import TapBridge
 from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.controller import Pioneer
 from p2os.pioneer.serve.aux_endpoint import AuxEndpoint
@@ -103,7 +103,7 @@ def sniffing() -> Iterator[Listening]:
     """A bridge before a served robot."""
     loops, listener = Loops(), listen_url("tcp:127.0.0.1:0")
     wheels = Wheels(loops.listen("robot"))
-    bridge = Bridge(
+    bridge = TapBridge(
         listener, loops.connect("robot"), lambda: loops.connect("robot"), on_chunk=lambda _: None,
         on_event=lambda _: None, clock=lambda: wheels.now,
     )  # fmt: skip

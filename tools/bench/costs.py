@@ -30,7 +30,7 @@ BODIES = ("kinematic", "bullet")
 BOOTED = "usart1 sends dodge: ready"
 
 
-class Lines:
+class SortedLines:
     """The recorder's stream as it was when it had no subscribers: sorted by time, and written."""
 
     released_until: Nanos = -1
@@ -70,7 +70,7 @@ def events_and_goals(folder: Path, body: str) -> None:
         wanted = scenario(body)
         whole = Bench(wanted, trace=TraceWriter(folder / "whole"))
         bare = Bench(replace(wanted, goals=(), whens=()), trace=TraceWriter(folder / "bare"))
-        bare.recorder.events = Lines(bare.trace.take)  # type: ignore[assignment] # what the recorder uses of it
+        bare.recorder.events = SortedLines(bare.trace.take)  # type: ignore[assignment] # what the recorder uses of it
         took = [0.0, 0.0]
         for second in range(1, RUN_S + 1):
             for place, bench in enumerate((whole, bare)):

@@ -18,7 +18,7 @@ from bluepill_sim.analysis.probe import Probe
 from bluepill_sim.analysis.vcd import write_vcd
 from bluepill_sim.extension import library
 from bluepill_sim.fabric.registers import NATIVE, Peripheral, Register
-from bluepill_sim.fabric.signals import Oscillation, Shape
+from bluepill_sim.fabric.signals import Oscillation, Waveform
 from bluepill_sim.parts import Eeprom24C02
 from bluepill_sim.peripherals.spi import Loopback
 from robot_bench.firmware.build import HERE as RUNTIME
@@ -50,7 +50,7 @@ GPIOA_ENABLE = 1 << 2
 GPIOA_IDR, BUFFER, BUFFER_WORDS = 0x4001_0808, 0x2000_3000, 256
 
 
-class Mover(Peripheral):
+class MoverDevice(Peripheral):
     """`mover.c`."""
 
     KIND = "mover"
@@ -145,7 +145,7 @@ def conversions(folder: Path) -> None:
     def times_real(name: str, program: Path) -> float:
         made = bench(folder, program, ADC_S, "adapter")
         made.run_until(STARTED_NS)
-        made.chip.pin("PA0").set_volts(Oscillation(shape=Shape.SINE, low_v=0, high_v=3.3, period_ns=1_000_000))
+        made.chip.pin("PA0").set_volts(Oscillation(shape=Waveform.SINE, low_v=0, high_v=3.3, period_ns=1_000_000))
         samples = made.chip.image.symbols.address_of("bench_samples") or 0
         took = run_s(made)
         if made.chip.warnings or not any(made.chip.read_memory(samples, 128) or b"") or not made.chip.is_asleep:
@@ -172,7 +172,7 @@ def polled(folder: Path) -> None:
         row(f"{what}: times real", several(times_real, build(name, folder)), note=note)
 
 
-class Wire:
+class WirePart:
     """A part in Python that answers what it hears."""
 
     spi_modes = frozenset(range(4))
@@ -189,7 +189,7 @@ class Wire:
         return byte
 
 
-class Teller(Wire):
+class Teller(WirePart):
     """One that says ahead what it sends, as a flash does that is read."""
 
     def ahead(self, count: int) -> tuple[bytes, int | None]:
@@ -207,7 +207,7 @@ def buses(folder: Path) -> None:
     build_elf(sources, folder=RUNTIME, linker_script="f103c8.ld", output=elf, more_flags=flags)
     for name, device, is_i2c in (
         ("SPI at 18 MHz, MISO tied to MOSI", Loopback(), False),
-        ("SPI at 18 MHz, a part in Python", Wire(), False),
+        ("SPI at 18 MHz, a part in Python", WirePart(), False),
         ("SPI at 18 MHz, a part in Python that says ahead", Teller(), False),
         ("I2C at 400 kHz, the EEPROM", Loopback(), True),
     ):
@@ -236,7 +236,7 @@ def with_mover(folder: Path) -> None:
         check=True,
     )
     library.library_path = lambda: str(built)  # type: ignore[assignment]  # a cached function
-    stm32f103.PERIPHERALS = (*stm32f103.PERIPHERALS, (Mover, PLACE))
+    stm32f103.PERIPHERALS = (*stm32f103.PERIPHERALS, (MoverDevice, PLACE))
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ from measuring import CROSS_COMPILER, RUNS, TIMES_REAL, cpu_s, print_tables, row
 from bluepill_sim import BluePill
 from bluepill_sim.analysis.probe import Probe
 from bluepill_sim.analysis.vcd import write_vcd
-from bluepill_sim.core.unicorn_core import Register
+from bluepill_sim.core.unicorn_core import Reg
 from bluepill_sim.extension.library import CORE_VARIABLE, library_path
 
 HERE = Path(__file__).parent
@@ -138,7 +138,7 @@ def stripped(program: Path, hook: int) -> Callable[[], float]:
     core.drop_all_code()
 
     def work() -> None:
-        core.library.uc_emu_start(core.handle, core.registers[Register.PC] | 1, 0xFFFF_FFFF, 500_000, 0)
+        core.library.uc_emu_start(core.handle, core.registers[Reg.PC] | 1, 0xFFFF_FFFF, 500_000, 0)
 
     return lambda: rate(rounds, work, time.thread_time)  # the clock of Unicorn's time-out is a thread of its own
 

@@ -16,7 +16,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from tools.compare_chip.comparison import LEVELS, SLICES, Comparison
+from tools.compare_chip.comparison import LEVELS, SLICES, ChipComparison
 from tools.compare_chip.programs import chosen, generated, programs_of
 from tools.compare_chip.worker import PACKAGE, Worker
 
@@ -38,7 +38,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         old, new = Worker(options.old, BUDGET_S), Worker(options.new, BUDGET_S)
-        comparison = Comparison(
+        comparison = ChipComparison(
             old, new, folder, print, options.seed, tuple(options.slices or SLICES), is_quick=options.quick
         )
         levels = [level for level in LEVELS if not options.level or level.name in options.level]

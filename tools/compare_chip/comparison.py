@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from tools.compare_chip.differences import STATE, Difference, compare
+from tools.compare_chip.differences import STATE, ChipDifference, compare
 from tools.compare_chip.generator import labels_at
 from tools.compare_chip.programs import MS, script_of
 from tools.compare_chip.worker import Worker, WorkerError
@@ -53,7 +53,7 @@ MOST_TOLD = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Run:
+class ComparedRun:
     """One run of a program, on whichever chip."""
 
     program: str
@@ -85,7 +85,7 @@ class Run:
 
 
 @dataclass
-class Comparison:
+class ChipComparison:
     """Runs programs on two chips and tells what differs."""
 
     old: Worker
@@ -107,11 +107,11 @@ class Comparison:
         """Run a program every way; tell whether it is the same everywhere, and say what is not."""
         references: dict[int, Reference] = {}
         #: Runs by how they differ.
-        found: dict[str, list[Run]] = {}
+        found: dict[str, list[ComparedRun]] = {}
         before = self.differing
         for level in levels:
             end_ns = (level.quick_ms if self.is_quick else level.ms) * MS
-            run = Run(program=program, image=image, level=level, end_ns=end_ns, seed=self.seed)
+            run = ComparedRun(program=program, image=image, level=level, end_ns=end_ns, seed=self.seed)
             if end_ns not in references:
                 made = self._run(self.old, replace(run, level=replace(level, core="native")))
                 if isinstance(made, str):
@@ -129,7 +129,7 @@ class Comparison:
         self._tell(found)
         return self.differing == before
 
-    def _compare_run(self, run: Run, reference: "Reference") -> str:
+    def _compare_run(self, run: ComparedRun, reference: "Reference") -> str:
         """Return how a run on the new chip differs from that of the old one; empty where it does not."""
         self.runs += 1
         new = self._differences(self.new, run, reference)
@@ -146,7 +146,7 @@ class Comparison:
                 note = ["the old chip differs too from its own first run, in another way"]
         return "\n".join([*note, *(new if isinstance(new[0], str) else self._texts(run, new))])
 
-    def _differences(self, worker: Worker, run: Run, reference: "Reference") -> list[Any]:
+    def _differences(self, worker: Worker, run: ComparedRun, reference: "Reference") -> list[Any]:
         """Run a program and return its differences; a text where it did not run."""
         made = self._run(worker, run)
         if isinstance(made, str):
@@ -156,7 +156,7 @@ class Comparison:
         shutil.rmtree(made[0])
         return found
 
-    def _run(self, worker: Worker, run: Run) -> "Reference | str":
+    def _run(self, worker: Worker, run: ComparedRun) -> "Reference | str":
         """Run a program; return what was seen, or what happened instead."""
         folder = Path(tempfile.mkdtemp(dir=self.folder))
         try:
@@ -167,7 +167,7 @@ class Comparison:
             return str(error)
         return folder, set(run.level.kinds)
 
-    def _texts(self, run: Run, found: list[Difference]) -> list[str]:
+    def _texts(self, run: ComparedRun, found: list[ChipDifference]) -> list[str]:
         """Return differences for a person, with the symbols of the program where it has any."""
         addresses = sorted(set().union(*(difference.addresses() for difference in found)))
         names = labels_at(run.image, addresses)
@@ -179,7 +179,7 @@ class Comparison:
                 names = {}
         return [one.text(lambda address: names.get(address, address)) for one in found]
 
-    def _tell(self, found: dict[str, list[Run]]) -> None:
+    def _tell(self, found: dict[str, list[ComparedRun]]) -> None:
         for text, runs in list(found.items())[:MOST_TOLD]:
             self.say("\n".join([f"  {runs[0]}", *(f"    {line}" for line in text.splitlines())]))
             if len(runs) > 1:

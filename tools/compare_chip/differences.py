@@ -22,7 +22,7 @@ _ADDRESS = re.compile(r"(?<!\()0x080[0-9a-f]{5}\b")
 
 
 @dataclass(frozen=True, slots=True)
-class Difference:
+class ChipDifference:
     """How one kind of what was seen differs."""
 
     kind: str
@@ -41,7 +41,7 @@ class Difference:
         return {found for line in self.lines for found in _ADDRESS.findall(line)}
 
 
-def compare(first: Path, second: Path, kinds: Iterable[str]) -> list[Difference]:
+def compare(first: Path, second: Path, kinds: Iterable[str]) -> list[ChipDifference]:
     """Return how two runs differ, in the order of the kinds."""
     found = []
     for kind in kinds:
@@ -54,7 +54,7 @@ def compare(first: Path, second: Path, kinds: Iterable[str]) -> list[Difference]
     return found
 
 
-def difference_of_states(first: Mapping[str, str], second: Mapping[str, str]) -> Difference | None:
+def difference_of_states(first: Mapping[str, str], second: Mapping[str, str]) -> ChipDifference | None:
     """Return which names have other values; None where all of the first are there and the same."""
     names = [name for name, value in first.items() if second.get(name) != value and name not in EXPLAINED]
     if not names:
@@ -64,10 +64,10 @@ def difference_of_states(first: Mapping[str, str], second: Mapping[str, str]) ->
         lines += [f"- {name} = {first[name]}", f"+ {name} = {second.get(name, 'is not there')}"]
     if len(names) > MOST_NAMES:
         lines.append(f"  and {len(names) - MOST_NAMES} more: {', '.join(names[MOST_NAMES : 2 * MOST_NAMES])}")
-    return Difference(STATE, f"{len(names)} of {len(first)} differ", tuple(lines))
+    return ChipDifference(STATE, f"{len(names)} of {len(first)} differ", tuple(lines))
 
 
-def _of_rows(kind: str, first: Path, second: Path) -> Difference:
+def _of_rows(kind: str, first: Path, second: Path) -> ChipDifference:
     before: list[str] = []
     with first.open(encoding="utf-8") as one, second.open(encoding="utf-8") as other:
         for count, (row, twin) in enumerate(zip_longest(one, other)):
@@ -77,7 +77,7 @@ def _of_rows(kind: str, first: Path, second: Path) -> Difference:
                     f"{sign} {'(no more)' if line is None else line.rstrip()}"
                     for sign, line in (("-", row), ("+", twin))
                 ]
-                return Difference(kind, f"{count:,} alike, then", tuple(lines))
+                return ChipDifference(kind, f"{count:,} alike, then", tuple(lines))
             before = [*before[1 - BEFORE :], row.rstrip()] if BEFORE else []
     raise ValueError(f"{first} and {second} differ in bytes, not in lines")
 

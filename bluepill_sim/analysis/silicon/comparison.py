@@ -20,7 +20,7 @@ _MOST = "20 s"
 _ALL = 0xFFFF_FFFF
 
 
-class Verdict(Enum):
+class NumberVerdict(Enum):
     """How a number of the chip stands to the model's."""
 
     SAME = "the same"
@@ -73,14 +73,14 @@ NUMBERS: Mapping[tuple[str, str], Allowance] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class ComparedNumber:
     """One number of both."""
 
     kind: str
     name: str
     chip: int | None
     model: int | None
-    verdict: Verdict
+    verdict: NumberVerdict
     #: Why it is allowed; empty where it is not.
     reason: str = ""
 
@@ -109,32 +109,32 @@ def ask_model() -> Model:
     return Model(read_log(bytes(said), "the model"), names)
 
 
-def compare(chip: SiliconLog, model: Model) -> list[Row]:
+def compare(chip: SiliconLog, model: Model) -> list[ComparedNumber]:
     """Return every number of both, in the model's order."""
     return [*_registers(chip, model), *_numbers(chip, model.log)]
 
 
-def _registers(chip: SiliconLog, model: Model) -> Iterator[Row]:
+def _registers(chip: SiliconLog, model: Model) -> Iterator[ComparedNumber]:
     for address in {**model.log.registers, **chip.registers}:
         name = model.names.get(address, f"{name_at(address) or 'core'} {address:#010x}")
         yield _row("reg", name, chip.registers.get(address), model.log.registers.get(address), REGISTERS.get(address))
 
 
-def _numbers(chip: SiliconLog, model: SiliconLog) -> Iterator[Row]:
+def _numbers(chip: SiliconLog, model: SiliconLog) -> Iterator[ComparedNumber]:
     for kind, name in {**model.numbers, **chip.numbers}:
         key = (kind, name)
         allowance = NUMBERS.get(key) or NUMBERS.get((kind, ""))
         yield _row(kind, name, chip.numbers.get(key), model.numbers.get(key), allowance)
 
 
-def _row(kind: str, name: str, chip: int | None, model: int | None, allowance: Allowance | None) -> Row:
+def _row(kind: str, name: str, chip: int | None, model: int | None, allowance: Allowance | None) -> ComparedNumber:
     if chip is None or model is None:
-        return Row(kind, name, chip, model, Verdict.MISSING)
+        return ComparedNumber(kind, name, chip, model, NumberVerdict.MISSING)
     if chip == model:
-        return Row(kind, name, chip, model, Verdict.SAME)
+        return ComparedNumber(kind, name, chip, model, NumberVerdict.SAME)
     if allowance is not None and _is_allowed(chip, model, allowance):
-        return Row(kind, name, chip, model, Verdict.ALLOWED, allowance.reason)
-    return Row(kind, name, chip, model, Verdict.DIFFERS)
+        return ComparedNumber(kind, name, chip, model, NumberVerdict.ALLOWED, allowance.reason)
+    return ComparedNumber(kind, name, chip, model, NumberVerdict.DIFFERS)
 
 
 def _is_allowed(chip: int, model: int, allowance: Allowance) -> bool:

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from bluepill_sim.core.halts import HaltKind
-from bluepill_sim.core.unicorn_core import READ_ACCESS, Register, UnicornCore
+from bluepill_sim.core.unicorn_core import READ_ACCESS, Reg, UnicornCore
 
 
 class WatchKind(Enum):
@@ -169,5 +169,5 @@ class DebugUnit:
         if met:
             self.met = tuple(point for point in met if point in self.own_watchpoints)
             self.is_debuggers = any(point in self.watchpoints for point in met)
-            self._stop_before(HaltKind.WATCHPOINT, self._core.registers[Register.PC], address)
+            self._stop_before(HaltKind.WATCHPOINT, self._core.registers[Reg.PC], address)
         return True

@@ -6,7 +6,7 @@ Invariant: all that it does follows from the time and what it was told to do.
 
 from bluepill_sim.parts.usb.descriptors import ConfigurationInfo, DeviceInfo, EndpointInfo, InterfaceInfo
 from bluepill_sim.parts.usb.host import HostState, UsbHost, UsbRequestError
-from bluepill_sim.parts.usb.pipes import Packet
+from bluepill_sim.parts.usb.pipes import UsbPacket
 from bluepill_sim.parts.usb.serial import UsbSerial
 
 __all__ = [
@@ -15,8 +15,8 @@ __all__ = [
     "EndpointInfo",
     "HostState",
     "InterfaceInfo",
-    "Packet",
     "UsbHost",
+    "UsbPacket",
     "UsbRequestError",
     "UsbSerial",
 ]

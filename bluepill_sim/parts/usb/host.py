@@ -29,11 +29,11 @@ from bluepill_sim.fabric.usb_bus import (
     FRAME_NS,
     FRAME_NUMBERS,
     TOKEN_BITS,
-    Answer,
     BusState,
     Handshake,
     Token,
     Transaction,
+    UsbResponse,
     span_ns,
     transaction_ns,
 )
@@ -52,7 +52,7 @@ from bluepill_sim.parts.usb.descriptors import (
     parse_string,
     total_bytes_of,
 )
-from bluepill_sim.parts.usb.pipes import Packet, Pipe, Request, Stage
+from bluepill_sim.parts.usb.pipes import Pipe, Request, TransferStage, UsbPacket
 from bluepill_sim.peripherals.usb import Usb
 from bluepill_sim.spans import Span
 from simbase.state import Stateful
@@ -113,7 +113,7 @@ class _Running:
 
     address: int
     transaction: Transaction
-    answer: Answer
+    answer: UsbResponse
     end_ns: Nanos
     #: Whether its last packet is lost on the way to the device, or on that to the host.
     device_misses_it: bool
@@ -123,9 +123,9 @@ class _Running:
 #: Runs the board until something is so, for as long as that at most; returns whether it is.
 Wait = Callable[[Callable[[], bool], Span], bool]
 #: Called with (address of the endpoint, its packet).
-PacketSink = Callable[[int, Packet], None]
+PacketSink = Callable[[int, UsbPacket], None]
 #: Called with each transaction and what was answered, when it began.
-TransactionSink = Callable[[Nanos, Transaction, Answer | None], None]
+TransactionSink = Callable[[Nanos, Transaction, UsbResponse | None], None]
 
 
 class UsbHost(Stateful):
@@ -169,7 +169,7 @@ class UsbHost(Stateful):
         self._asked = 0
         #: For the CDC line, until there is one.
         self._line = b""
-        self._packets: deque[tuple[int, Packet]] = deque(maxlen=_KEPT_PACKETS)
+        self._packets: deque[tuple[int, UsbPacket]] = deque(maxlen=_KEPT_PACKETS)
         self._silenced: deque[tuple[str, int]] = deque()
         self._clear()
 
@@ -184,7 +184,7 @@ class UsbHost(Stateful):
         self._address = self._attempts = self._turn = 0
         self._todo: deque[Request] = deque()
         self._request: Request | None = None
-        self._stage = Stage.SETUP
+        self._stage = TransferStage.SETUP
         self._taken = b""
         self._deadline_ns: Nanos | None = None
         self._can_wake = self._is_set = False
@@ -316,7 +316,7 @@ class UsbHost(Stateful):
         """Return and take what an endpoint has sent."""
         return b"".join(packet.data for packet in self.packets(endpoint))
 
-    def packets(self, endpoint: int) -> list[Packet]:
+    def packets(self, endpoint: int) -> list[UsbPacket]:
         """Return and take the packets that an endpoint has sent: the reports of a HID device, for one."""
         found = [packet for address, packet in self._packets if address == endpoint]
         left = [row for row in self._packets if row[0] != endpoint]
@@ -324,7 +324,7 @@ class UsbHost(Stateful):
         self._packets.extend(left)
         return found
 
-    def wait_packet(self, endpoint: int, within: Span = "1 s") -> Packet:
+    def wait_packet(self, endpoint: int, within: Span = "1 s") -> UsbPacket:
         """Run the board until an endpoint has sent a packet that nobody has taken; take it.
 
         Raises:
@@ -549,12 +549,12 @@ class UsbHost(Stateful):
     def _transaction(self, pipe: Pipe) -> Transaction:
         number = pipe.address & 0xF
         if pipe.address == 0 and self._request is not None:
-            if self._stage is Stage.SETUP:
+            if self._stage is TransferStage.SETUP:
                 return Transaction(Token.SETUP, self._address, 0, 0, self._request.to_bytes())
             if self._is_in_now(pipe):
                 return Transaction(Token.IN, self._address, 0)
             data = b""
-            if self._stage is Stage.DATA:
+            if self._stage is TransferStage.DATA:
                 sent = len(self._taken)
                 data = self._request.data[sent : sent + pipe.packet_bytes]
             return Transaction(Token.OUT, self._address, 0, pipe.toggle, data)
@@ -563,13 +563,13 @@ class UsbHost(Stateful):
         return Transaction(Token.OUT, self._address, number, pipe.toggle, pipe.to_send[0])
 
     def _is_setup(self, pipe: Pipe) -> bool:
-        return pipe.address == 0 and self._stage is Stage.SETUP
+        return pipe.address == 0 and self._stage is TransferStage.SETUP
 
     def _is_in_now(self, pipe: Pipe) -> bool:
         """Whether the next transaction of a pipe is IN: a status goes the other way than the data."""
         if pipe.address or self._request is None:
             return pipe.is_in
-        return self._request.is_in is (self._stage is Stage.DATA)
+        return self._request.is_in is (self._stage is TransferStage.DATA)
 
     def _next_damage(self) -> str:
         if not self._silenced:
@@ -634,11 +634,11 @@ class UsbHost(Stateful):
 
     def _take_data(self, pipe: Pipe, data: bytes) -> None:
         if pipe.address:
-            packet = Packet(self._now_ns, data)
+            packet = UsbPacket(self._now_ns, data)
             self._packets.append((pipe.address, packet))
             for sink in self._packet_sinks:
                 sink(pipe.address, packet)
-        elif self._stage is Stage.STATUS:
+        elif self._stage is TransferStage.STATUS:
             self._end_request()
         elif self._request is not None:
             self._taken += data
@@ -652,10 +652,10 @@ class UsbHost(Stateful):
         request = self._request
         if request is None:
             return
-        if self._stage is Stage.STATUS:
+        if self._stage is TransferStage.STATUS:
             self._end_request()
-        elif self._stage is Stage.SETUP:
-            self._stage, pipe.toggle = Stage.DATA, 1
+        elif self._stage is TransferStage.SETUP:
+            self._stage, pipe.toggle = TransferStage.DATA, 1
             if not (request.is_in or request.data):
                 self._begin_status(pipe)
         else:
@@ -664,14 +664,14 @@ class UsbHost(Stateful):
                 self._begin_status(pipe)
 
     def _begin_status(self, pipe: Pipe) -> None:
-        self._stage, pipe.toggle = Stage.STATUS, 1
+        self._stage, pipe.toggle = TransferStage.STATUS, 1
         pipe.not_before_ns = self._now_ns + STATUS_NS
 
     # Control transfers.
 
     def _take_request(self) -> None:
         if self._request is None and self._todo and self._timer is None and 0 in self._pipes:
-            self._request, self._stage, self._taken = self._todo.popleft(), Stage.SETUP, b""
+            self._request, self._stage, self._taken = self._todo.popleft(), TransferStage.SETUP, b""
             pipe = self._pipes[0]
             pipe.toggle, pipe.errors, pipe.nak_ns = 0, 0, None
             pipe.next_frame = self._frame_index() + 1  # its driver has to come to it first

@@ -16,7 +16,7 @@ TO_HOST = 0x80
 
 
 @dataclass(frozen=True, slots=True)
-class Packet:
+class UsbPacket:
     """Data that an endpoint has sent."""
 
     #: When its last bit had gone.
@@ -91,7 +91,7 @@ class Request:
         return bytes((self.kind, self.request)) + b"".join(word.to_bytes(2, "little") for word in words)
 
 
-class Stage(Enum):
+class TransferStage(Enum):
     """Stages of a control transfer."""
 
     SETUP = "setup"

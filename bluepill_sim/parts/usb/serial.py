@@ -7,12 +7,12 @@ Invariant: bytes come and go in the order of the bus.
 
 from collections.abc import Callable
 
-from bluepill_sim.parts.serial_port import SerialLine, WaitForBytes, WordSink
+from bluepill_sim.parts.serial_port import BoardSerialLine, WaitForBytes, WordSink
 from bluepill_sim.parts.usb.host import UsbHost
-from bluepill_sim.parts.usb.pipes import Packet
+from bluepill_sim.parts.usb.pipes import UsbPacket
 
 
-class UsbSerial(SerialLine):
+class UsbSerial(BoardSerialLine):
     """A CDC line, seen from the host."""
 
     STATE = ("received_bytes", "sent_bytes")
@@ -43,7 +43,7 @@ class UsbSerial(SerialLine):
         self._sinks.append(row)
         return lambda: self._sinks.remove(row)
 
-    def _take(self, endpoint: int, packet: Packet) -> None:
+    def _take(self, endpoint: int, packet: UsbPacket) -> None:
         if endpoint != self._host.serial_in or not packet.data:
             return
         self.received_bytes += len(packet.data)

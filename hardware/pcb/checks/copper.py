@@ -4,12 +4,12 @@ KiCad's design rule check says more (clearances, pours); this runs everywhere. T
 net is judged by its tracks alone, so it would work without its pours.
 """
 
-from hardware.pcb.circuit.netlist import Design
+from hardware.pcb.circuit.netlist import BoardDesign
 from hardware.pcb.layout import rules
 from hardware.pcb.layout.routing import PlacedPad, Track, Via, placed_pads
 
 
-def faults(design: Design, tracks: list[Track], vias: list[Via]) -> list[str]:
+def faults(design: BoardDesign, tracks: list[Track], vias: list[Via]) -> list[str]:
     """Return nets in several pieces, tracks thinner than their class, and copper of no known net."""
     nets = design.nets()
     found = [f"track of {track.net}, which is no net" for track in tracks if track.net not in nets]

@@ -9,14 +9,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hardware.pcb.circuit.netlist import Design
+from hardware.pcb.circuit.netlist import BoardDesign
 from hardware.pcb.layout import rules
 from hardware.pcb.layout.routing import Via, placed_pads
 from hardware.pcb.layout.shapes import PadKind
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Reading:
+class GerberReading:
     """What an independent reader finds in a set of gerbers."""
 
     width_mm: float
@@ -35,7 +35,7 @@ def is_installed() -> bool:
     return importlib.util.find_spec("gerbonara") is not None
 
 
-def read(files: dict[str, str]) -> Reading:
+def read(files: dict[str, str]) -> GerberReading:
     """Read a set of gerber and drill files."""
     import warnings
 
@@ -52,7 +52,7 @@ def read(files: dict[str, str]) -> Reading:
         plated, unplated = stack.drill_pth, stack.drill_npth
         drilled = [hole for layer in (plated, unplated) if layer for hole in layer.objects]
         holes = {_place(hole, left + pen / 2, top - pen / 2) for hole in drilled}
-        return Reading(
+        return GerberReading(
             width_mm=round(right - left - pen, 3), height_mm=round(top - bottom - pen, 3),
             layers=tuple(sorted(" ".join(key) for key, layer in stack.graphic_layers.items() if layer is not None)),
             copper_layers=len(stack.copper_layers), plated=len(plated.objects) if plated else 0,
@@ -66,7 +66,7 @@ def _place(hole: Any, left: float, top: float) -> tuple[float, float, float]:  #
     return round(x - left, 2), round(top - y, 2), round(size, 2)
 
 
-def faults(design: Design, vias: list[Via], reading: Reading) -> list[str]:
+def faults(design: BoardDesign, vias: list[Via], reading: GerberReading) -> list[str]:
     """Return where the gerbers differ from the design."""
     pads = placed_pads(design)
     plated = len(vias) + sum(pad.pad.kind is PadKind.THROUGH for pad in pads)

@@ -6,7 +6,7 @@ Invariant: they work on a copy; the committed files are only read.
 import tempfile
 from pathlib import Path
 
-from hardware.pcb.checks.results import Result, judged, listed, skipped
+from hardware.pcb.checks.results import CheckResult, judged, listed, skipped
 from hardware.pcb.circuit.design import VARIANTS
 from hardware.pcb.circuit.design import build as design_of
 from hardware.pcb.layout.routing import load_routes
@@ -16,7 +16,7 @@ from hardware.pcb.outputs.pours import fill, kept_stitches, load_stitches, stitc
 from hardware.pcb.outputs.schematic import placed_pins
 
 
-def with_kicad() -> list[Result]:
+def with_kicad() -> list[CheckResult]:
     """Run them all; without KiCad one line says so."""
     version = kicad_cli.version()
     if version is None:
@@ -33,7 +33,7 @@ def with_kicad() -> list[Result]:
     return results
 
 
-def board_checks(variant: str) -> list[Result]:
+def board_checks(variant: str) -> list[CheckResult]:
     """Check a board that is filled anew: rules and parity, stitching, gerbers."""
     with tempfile.TemporaryDirectory() as folder:
         board = generated_files.filled_project(variant, Path(folder))
@@ -72,7 +72,7 @@ def stitches_of(variant: str) -> str:
     return stitches_text(kept_stitches([via for via in vias if via.is_stitch], bare))
 
 
-def gerbers_up_to_date(variant: str, files: dict[str, str]) -> Result:
+def gerbers_up_to_date(variant: str, files: dict[str, str]) -> CheckResult:
     """Compare fabrication files with the committed archive."""
     old = generated_files.fabrication_archive(variant)
     changed = sorted(name for name in {*files, *old} if files.get(name) != old.get(name))
@@ -80,7 +80,7 @@ def gerbers_up_to_date(variant: str, files: dict[str, str]) -> Result:
     return listed("gerbers up to date", variant, [f"{name} differs" for name in changed], words)
 
 
-def _stitches(variant: str) -> Result:
+def _stitches(variant: str) -> CheckResult:
     same = stitches_of(variant) == stitches_text(load_stitches(variant))
     words = "filled again: the same vias" if same else "filled again: other vias (hint: python -m hardware.pcb stitch)"
     return judged("stitching", variant, same, words)

@@ -9,12 +9,12 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from adapter_sim.pinout import FLASH_GPIO, INPUT_ONLY_GPIO, STRAP_GPIO, Direction, Pinout, Pull, Wire
+from adapter_sim.pinout import FLASH_GPIO, INPUT_ONLY_GPIO, STRAP_GPIO, Pinout, Pull, Wire, WireDirection
 from hardware.pcb.circuit.modules import BLUEPILL_PINS, ESP32_PINS, JTAG_ONLY, NOT_5V_TOLERANT, STRAP_LEVEL, SWD
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Finding:
+class PinFinding:
     """One pin that breaks a rule."""
 
     rule: str
@@ -27,7 +27,7 @@ class Finding:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Board:
+class PinnedBoard:
     """What a revision of the board does around its pin map, as far as the rules ask."""
 
     revision: str
@@ -52,11 +52,11 @@ _THESIS_VOLTS = (
 _THESIS_EXTRA = (("mode_2", "IO23", "in"), ("led_state", "IO36", "out"), ("fw_DD5", "IO19", "out"))
 
 BOARDS = {
-    "rev-b": Board(revision="rev-b"),
-    "rev-c": Board(revision="rev-c"),
+    "rev-b": PinnedBoard(revision="rev-b"),
+    "rev-c": PinnedBoard(revision="rev-c"),
     # Table 3 is a pin map alone, judged with the resistors of the schematic; nothing is said to bring 5 V.
-    "thesis-table3": Board(revision="thesis-table3", has_series_resistors=False, pulls_all_down=True),
-    "thesis-board": Board(
+    "thesis-table3": PinnedBoard(revision="thesis-table3", has_series_resistors=False, pulls_all_down=True),
+    "thesis-board": PinnedBoard(
         revision="thesis-board",
         volts=_THESIS_VOLTS,
         has_series_resistors=False,
@@ -66,13 +66,13 @@ BOARDS = {
 }
 
 
-def findings(pinout: Pinout, board: Board) -> list[Finding]:
+def findings(pinout: Pinout, board: PinnedBoard) -> list[PinFinding]:
     """Return every rule that a revision breaks, in the order of the pin map.
 
     Raises:
         KeyError: The pin map has no such revision.
     """
-    found: list[Finding] = []
+    found: list[PinFinding] = []
     taken: dict[str, str] = {}
     for wire in pinout.wires:
         pin = wire.esp32_pin(board.revision)
@@ -94,7 +94,7 @@ def findings(pinout: Pinout, board: Board) -> list[Finding]:
     return found
 
 
-def count_by_rule(found: Iterable[Finding]) -> dict[str, int]:
+def count_by_rule(found: Iterable[PinFinding]) -> dict[str, int]:
     """Return how often each rule is broken, rules sorted."""
     return dict(sorted(Counter(finding.rule for finding in found).items()))
 
@@ -115,20 +115,20 @@ def _auxiliaries(pinout: Pinout, revision: str) -> list[tuple[str, str, str]]:
     return [(name, pin, direction) for name, pin, direction in rows if pin is not None]
 
 
-def _double(signal: str, pin: str, taken: dict[str, str]) -> list[Finding]:
+def _double(signal: str, pin: str, taken: dict[str, str]) -> list[PinFinding]:
     found = _broken(signal, ("double", pin in taken, f"{pin} is {taken.get(pin)} already"))
     taken.setdefault(pin, signal)
     return found
 
 
-def _broken(signal: str, *rows: tuple[str, bool, str]) -> list[Finding]:
+def _broken(signal: str, *rows: tuple[str, bool, str]) -> list[PinFinding]:
     """Return those of a signal's rules, each with whether it is broken, that are."""
-    return [Finding(rule=rule, signal=signal, text=text) for rule, is_broken, text in rows if is_broken]
+    return [PinFinding(rule=rule, signal=signal, text=text) for rule, is_broken, text in rows if is_broken]
 
 
-def _bluepill(wire: Wire, volts: float) -> list[Finding]:
+def _bluepill(wire: Wire, volts: float) -> list[PinFinding]:
     pin = wire.bluepill
-    is_driven = pin in JTAG_ONLY and wire.direction is Direction.TO_ADAPTER
+    is_driven = pin in JTAG_ONLY and wire.direction is WireDirection.TO_ADAPTER
     return _broken(
         wire.name,
         ("no-pin", pin not in BLUEPILL_PINS, f"the BluePill has no pin {pin}"),
@@ -138,12 +138,12 @@ def _bluepill(wire: Wire, volts: float) -> list[Finding]:
     )
 
 
-def _esp32(wire: Wire, pin: str | None, board: Board) -> list[Finding]:
+def _esp32(wire: Wire, pin: str | None, board: PinnedBoard) -> list[PinFinding]:
     number = gpio(pin)
     if pin is None or number is None:
         return _broken(wire.name, ("no-pin", pin is None, "no pin of the ESP32"))
     is_down = board.pulls_all_down or wire.pull is Pull.DOWN
-    is_driven = wire.direction is Direction.TO_ADAPTER
+    is_driven = wire.direction is WireDirection.TO_ADAPTER
     volts = dict(board.volts).get(wire.name, LOGIC_V)
     has_jtag = wire.bluepill in JTAG_ONLY and not board.has_series_resistors
     return _broken(

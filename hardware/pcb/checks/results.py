@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 
-class Verdict(StrEnum):
+class CheckStatus(StrEnum):
     """How a check ended."""
 
     GOOD = "ok"
@@ -15,38 +15,40 @@ class Verdict(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Result:
+class CheckResult:
     """One check of one subject."""
 
     name: str
     subject: str
-    verdict: Verdict
+    verdict: CheckStatus
     detail: str
 
 
-def judged(name: str, subject: str, is_good: bool, detail: str) -> Result:
+def judged(name: str, subject: str, is_good: bool, detail: str) -> CheckResult:
     """Return the result of a check that has run."""
-    return Result(name=name, subject=subject, verdict=Verdict.GOOD if is_good else Verdict.BAD, detail=detail)
+    return CheckResult(
+        name=name, subject=subject, verdict=CheckStatus.GOOD if is_good else CheckStatus.BAD, detail=detail
+    )
 
 
-def listed(name: str, subject: str, faults: Iterable[str], detail: str) -> Result:
+def listed(name: str, subject: str, faults: Iterable[str], detail: str) -> CheckResult:
     """Return the result of a check that lists faults: good where there are none."""
     found = list(faults)
     return judged(name, subject, not found, f"{len(found)}: {found[0]}" if found else detail)
 
 
-def skipped(name: str, subject: str, why: str) -> Result:
+def skipped(name: str, subject: str, why: str) -> CheckResult:
     """Return the result of a check that could not run."""
-    return Result(name=name, subject=subject, verdict=Verdict.SKIPPED, detail=why)
+    return CheckResult(name=name, subject=subject, verdict=CheckStatus.SKIPPED, detail=why)
 
 
-def table(results: list[Result]) -> str:
+def table(results: list[CheckResult]) -> str:
     """Return the table that a person reads; the last line sums up."""
     widths = [max(len(str(getattr(one, name))) for one in results) for name in ("name", "subject", "verdict")]
     lines = [
         f"{one.verdict:<{widths[2]}}  {one.name:<{widths[0]}}  {one.subject:<{widths[1]}}  {one.detail}"
         for one in results
     ]
-    counts = {verdict: sum(one.verdict is verdict for one in results) for verdict in Verdict}
-    summary = f"{counts[Verdict.GOOD]} ok, {counts[Verdict.BAD]} failed, {counts[Verdict.SKIPPED]} skipped"
+    counts = {verdict: sum(one.verdict is verdict for one in results) for verdict in CheckStatus}
+    summary = f"{counts[CheckStatus.GOOD]} ok, {counts[CheckStatus.BAD]} failed, {counts[CheckStatus.SKIPPED]} skipped"
     return "\n".join([*lines, summary])

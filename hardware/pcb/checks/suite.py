@@ -9,11 +9,11 @@ from collections import Counter
 from adapter_sim.pinout import load_pinout
 from hardware.pcb.checks import copper, gerbers, kicad_checks
 from hardware.pcb.checks.pin_checks import BOARDS, count_by_rule, findings
-from hardware.pcb.checks.results import Result, judged, listed, skipped
+from hardware.pcb.checks.results import CheckResult, judged, listed, skipped
 from hardware.pcb.circuit.design import VARIANTS
 from hardware.pcb.circuit.design import build as design_of
 from hardware.pcb.circuit.electrical import all_checks, bom_faults, netlist_faults
-from hardware.pcb.circuit.netlist import Design
+from hardware.pcb.circuit.netlist import BoardDesign
 from hardware.pcb.outputs import generated_files
 from hardware.pcb.proof import lands, printed
 from hardware.pcb.proof.board_file import read_board
@@ -29,12 +29,12 @@ THESIS_FINDINGS = {
 }
 
 
-def run_all() -> list[Result]:
+def run_all() -> list[CheckResult]:
     """Run every check, plain ones first."""
     return [*plain(), *kicad_checks.with_kicad(), *simulations()]
 
 
-def plain() -> list[Result]:
+def plain() -> list[CheckResult]:
     """Run what needs nothing but Python."""
     results = pin_rules()
     for variant in VARIANTS:
@@ -58,7 +58,7 @@ def plain() -> list[Result]:
     return results
 
 
-def print_and_lands(design: Design) -> list[Result]:
+def print_and_lands(design: BoardDesign) -> list[CheckResult]:
     """Read print, lands and wires back from the committed board, and hold them against circuit and drawings."""
     file = generated_files.GENERATED / design.variant / f"{design.variant}.kicad_pcb"
     board = read_board(file.read_text(encoding="utf-8"))
@@ -72,7 +72,7 @@ def print_and_lands(design: Design) -> list[Result]:
     ]
 
 
-def gerbers_reread(variant: str) -> Result:
+def gerbers_reread(variant: str) -> CheckResult:
     """Read the committed gerbers with a library that is not KiCad's, and hold them against the design."""
     files = generated_files.fabrication_archive(variant)
     if not files:
@@ -90,7 +90,7 @@ def gerbers_reread(variant: str) -> Result:
     return listed("gerbers re-read", variant, faults, words)
 
 
-def pin_rules() -> list[Result]:
+def pin_rules() -> list[CheckResult]:
     """Ask the pin rules of our revisions, which break none, and of the thesis's, whose faults they must find."""
     results = []
     for board in BOARDS.values():
@@ -104,14 +104,14 @@ def pin_rules() -> list[Result]:
     return results
 
 
-def simulations() -> list[Result]:
+def simulations() -> list[CheckResult]:
     """Run every deck; without ngspice one line says so."""
     if not is_installed():
         return [skipped("simulation", "all", "ngspice is not installed (hint: tools/install_board_tools.sh)")]
     return [simulation(simulate(deck)) for deck in decks()]
 
 
-def simulation(ran: run.Result) -> Result:
+def simulation(ran: run.DeckResult) -> CheckResult:
     """Judge what a deck gave."""
     verdicts = ran.verdicts()
     words = "; ".join(f"{limit.measure} {value:.4g} {limit.unit}" for limit, value, _ in verdicts)

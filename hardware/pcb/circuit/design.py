@@ -4,9 +4,9 @@ What each block is for, and why it differs from the thesis's board, stands in
 docs/board.md. Invariant: `build` is a function of the variant's name alone.
 """
 
-from adapter_sim.pinout import Direction, Pinout, Pull, Wire, WireRole, load_pinout
+from adapter_sim.pinout import Pinout, Pull, Wire, WireDirection, WireRole, load_pinout
 from hardware.pcb.circuit.modules import BLUEPILL_PINS, ESP32_PINS
-from hardware.pcb.circuit.netlist import Component, Design, DesignError, make
+from hardware.pcb.circuit.netlist import BoardDesign, Component, DesignError, make
 
 #: Variant: (revision of the pin map, title).
 VARIANTS = {
@@ -24,7 +24,7 @@ SERIES_SPECIAL = {"encoder2_s1": "680R"}
 PULL_OFFSET = 30
 
 
-def build(variant: str = "rev-b") -> Design:
+def build(variant: str = "rev-b") -> BoardDesign:
     """Return the circuit of a variant.
 
     Raises:
@@ -39,7 +39,7 @@ def build(variant: str = "rev-b") -> Design:
         *_reset_and_mode(pinout, variant), *_stop(), *_shift_register(pinout, variant), *_old_header(variant),
         *_test_points(),
     )  # fmt: skip
-    return Design(variant=variant, revision=revision, title=title, components=components)
+    return BoardDesign(variant=variant, revision=revision, title=title, components=components)
 
 
 def bluepill_net(wire: Wire) -> str:
@@ -94,7 +94,7 @@ def _test_header(pinout: Pinout) -> list[Component]:
     """Build the logic-analyser header: it taps each wire at its receiver, behind the series resistor."""
     taps: list[str | None] = [
         bluepill_net(wire)
-        if wire.direction is Direction.TO_BLUEPILL or wire.role is WireRole.RESET
+        if wire.direction is WireDirection.TO_BLUEPILL or wire.role is WireRole.RESET
         else adapter_net(wire)
         for wire in pinout.wires
     ]

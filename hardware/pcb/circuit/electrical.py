@@ -6,10 +6,10 @@ table of `make board-check` and the tests read the same values. No simulator her
 
 from dataclasses import dataclass
 
-from adapter_sim.pinout import Direction, load_pinout
+from adapter_sim.pinout import WireDirection, load_pinout
 from hardware.pcb.circuit.design import PULL_OFFSET, adapter_net, bluepill_net, series_wires
 from hardware.pcb.circuit.modules import BLUEPILL_PINS, ESP32_PINS, NOT_5V_TOLERANT
-from hardware.pcb.circuit.netlist import Design
+from hardware.pcb.circuit.netlist import BoardDesign
 from hardware.pcb.circuit.part_numbers import disagreements
 from hardware.pcb.circuit.parts import ACCESSORIES, PARTS, Part
 
@@ -36,7 +36,7 @@ class Check:
         return f"{verdict} {self.name}: {self.value:.4g} {self.unit} (limits {self.low:.4g} to {self.high:.4g})"
 
 
-def all_checks(design: Design) -> list[Check]:
+def all_checks(design: BoardDesign) -> list[Check]:
     """Return every electrical check of a variant."""
     found = [*mode_divider(design), *logic_levels(design), *injection(design), *power_budget(design)]
     found += [*supply_margins(design), *reset_transistor(design), *ratings(design)]
@@ -46,12 +46,12 @@ def all_checks(design: Design) -> list[Check]:
     return found
 
 
-def ohms(design: Design, ref: str) -> float:
+def ohms(design: BoardDesign, ref: str) -> float:
     """Return a resistor's value; KeyError where the reference is none."""
     return design.component(ref).part.facts["ohm"]
 
 
-def mode_divider(design: Design) -> list[Check]:
+def mode_divider(design: BoardDesign) -> list[Check]:
     """Judge the mode jumper: fitted, the pin reads high against the ESP32's pull-down and the board's, if any."""
     esp = PARTS["ESP32"].facts
     at_pin = dict(design.component("R60").pins)["2"]
@@ -61,7 +61,7 @@ def mode_divider(design: Design) -> list[Check]:
     return [Check(name="mode jumper fitted, level at the ESP32", value=level, low=esp["vih_v"], high=RAIL_V, unit="V")]
 
 
-def logic_levels(design: Design) -> list[Check]:
+def logic_levels(design: BoardDesign) -> list[Check]:
     """Judge the lowest high and the highest low that a receiver behind the series resistors sees."""
     bluepill, esp = PARTS["BLUEPILL"].facts, PARTS["ESP32"].facts
     highs, lows = [], []
@@ -69,7 +69,7 @@ def logic_levels(design: Design) -> list[Check]:
         series = ohms(design, f"R{index}")
         pull = f"R{index + PULL_OFFSET}"
         down = ohms(design, pull) if pull in {component.ref for component in design.components} else float("inf")
-        divide = 1.0 if wire.direction is Direction.TO_BLUEPILL else 1 / (1 + series / down)
+        divide = 1.0 if wire.direction is WireDirection.TO_BLUEPILL else 1 / (1 + series / down)
         highs.append(DRIVER_HIGH_V * divide)
         if wire.bluepill == "PC13":
             sunk_a = (RAIL_V - LED_V) / (LED_OHM + series)
@@ -81,19 +81,19 @@ def logic_levels(design: Design) -> list[Check]:
     ]  # fmt: skip
 
 
-def injection(design: Design) -> list[Check]:
+def injection(design: BoardDesign) -> list[Check]:
     """Judge what flows into an unpowered BluePill whose rail is held at 0 V: the worst case there is."""
     facts = PARTS["BLUEPILL"].facts
     wires = list(enumerate(series_wires(load_pinout()), start=1))
     into = [
         1e3 * (RAIL_V - CLAMP_V) / ohms(design, f"R{index}")
         for index, wire in wires
-        if wire.direction is Direction.TO_BLUEPILL and wire.bluepill in NOT_5V_TOLERANT
+        if wire.direction is WireDirection.TO_BLUEPILL and wire.bluepill in NOT_5V_TOLERANT
     ]
     back = [
         1e3 * (RAIL_V - CLAMP_V) / ohms(design, f"R{index}")
         for index, wire in wires
-        if wire.direction is Direction.TO_ADAPTER
+        if wire.direction is WireDirection.TO_ADAPTER
     ]
     return [
         Check(name="injected into one BluePill pin", value=max(into), low=0, high=facts["injection_pin_ma"], unit="mA"),
@@ -104,7 +104,7 @@ def injection(design: Design) -> list[Check]:
     ]  # fmt: skip
 
 
-def load_ma(design: Design) -> float:
+def load_ma(design: BoardDesign) -> float:
     """Return the greatest load on +5V: both modules at their peaks, transceiver, LEDs."""
     leds = sum(component.part.symbol == "LED" for component in design.components) * LED_MA
     rs232 = 2 * PARTS["MAX3232"].facts["swing_typ_v"] / 3.0 + PARTS["MAX3232"].facts["supply_ma"]
@@ -112,7 +112,7 @@ def load_ma(design: Design) -> float:
     return PARTS["ESP32"].facts["current_max_ma"] + PARTS["BLUEPILL"].facts["current_max_ma"] + leds + rail
 
 
-def power_budget(design: Design) -> list[Check]:
+def power_budget(design: BoardDesign) -> list[Check]:
     """Judge supply against load; the LM317 is held to its stated average, for heat decides there."""
     checks = []
     if design.variant == "lm317":
@@ -135,7 +135,7 @@ def power_budget(design: Design) -> list[Check]:
     return checks
 
 
-def supply_margins(design: Design) -> list[Check]:
+def supply_margins(design: BoardDesign) -> list[Check]:
     """Judge voltages along the supply at the battery's extremes."""
     drop = PARTS["SCHOTTKY"].facts["forward_v"] + 0.5 * PARTS["PTC"].facts["ohm_max"]
     low_drop = PARTS["SCHOTTKY 5V"].facts["forward_v"]
@@ -154,7 +154,7 @@ def supply_margins(design: Design) -> list[Check]:
     ]  # fmt: skip
 
 
-def reset_transistor(design: Design) -> list[Check]:
+def reset_transistor(design: BoardDesign) -> list[Check]:
     """Judge the base current: enough to saturate with the module's pull-up as load."""
     base_a = (DRIVER_HIGH_V - 0.7) / ohms(design, "R66") - 0.7 / ohms(design, "R67")
     collector_a = RAIL_V / PARTS["ESP32"].facts["en_pull_ohm"]
@@ -162,7 +162,7 @@ def reset_transistor(design: Design) -> list[Check]:
     return [Check(name="reset transistor's overdrive", value=drive, low=10, high=1000, unit="x")]
 
 
-def mode_button(design: Design) -> list[Check]:
+def mode_button(design: BoardDesign) -> list[Check]:
     """Judge IO0, a strap: high at boot by the board's own pull, low while the button is held, whatever pulls."""
     esp = PARTS["ESP32"].facts
     strap = _net_at(design, "U2", "IO0")
@@ -179,7 +179,7 @@ def mode_button(design: Design) -> list[Check]:
     ]  # fmt: skip
 
 
-def stop_loop(design: Design) -> list[Check]:
+def stop_loop(design: BoardDesign) -> list[Check]:
     """Judge the emergency stop: quiet while its loop is closed, and strong enough against what it overrides."""
     closed = RAIL_V * ohms(design, "R78") / (ohms(design, "R78") + ohms(design, "R77"))
     # Open: both bases drive into R78 through resistors of their own.
@@ -201,13 +201,13 @@ def stop_loop(design: Design) -> list[Check]:
     ]  # fmt: skip
 
 
-def _net_at(design: Design, ref: str, pin: str) -> str | None:
+def _net_at(design: BoardDesign, ref: str, pin: str) -> str | None:
     """Return the net at a module's pin, by its print."""
     names = {"U1": BLUEPILL_PINS, "U2": ESP32_PINS}[ref]
     return dict(design.component(ref).pins)[str(names.index(pin) + 1)]
 
 
-def _between(design: Design, one: str | None, other: str | None) -> list[float]:
+def _between(design: BoardDesign, one: str | None, other: str | None) -> list[float]:
     """Return the resistors that join two nets."""
     return [
         part.part.facts["ohm"]
@@ -220,7 +220,7 @@ def _parallel(ohm: list[float]) -> float:
     return 1 / sum(1 / one for one in ohm) if ohm else float("inf")
 
 
-def ratings(design: Design) -> list[Check]:
+def ratings(design: BoardDesign) -> list[Check]:
     """Judge every capacitor's voltage and the hottest resistor's power."""
     worst = 0.0
     for component in design.components:
@@ -238,7 +238,7 @@ def ratings(design: Design) -> list[Check]:
     ]
 
 
-def linear_regulators(design: Design) -> list[Check]:
+def linear_regulators(design: BoardDesign) -> list[Check]:
     """Judge both LM317 dividers: level with the adjust current, minimum load without any other load."""
     facts = PARTS["LM317"].facts
     checks = []
@@ -254,7 +254,7 @@ def linear_regulators(design: Design) -> list[Check]:
     return checks
 
 
-def netlist_faults(design: Design) -> list[str]:
+def netlist_faults(design: BoardDesign) -> list[str]:
     """Return what is incomplete in the netlist, one line each."""
     faults = [f"net {net} ends at {members[0]} alone" for net, members in design.nets().items() if len(members) < 2]
     nets = design.nets()
@@ -269,7 +269,7 @@ def netlist_faults(design: Design) -> list[str]:
     return faults
 
 
-def bom_faults(design: Design) -> list[str]:
+def bom_faults(design: BoardDesign) -> list[str]:
     """Return what is wrong in the bill of materials: missing, unproven without a question, not what its number says."""
     faults = [f"{where}: {fault}" for _, where, part in ACCESSORIES for fault in _order_faults(part)]
     for component in design.components:

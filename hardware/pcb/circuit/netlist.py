@@ -1,6 +1,6 @@
 """Components and the nets between them, as plain values.
 
-Invariant: a `Design` that exists has no reference twice, and no pin in two nets.
+Invariant: a `BoardDesign` that exists has no reference twice, and no pin in two nets.
 """
 
 from collections.abc import Iterable, Mapping
@@ -33,7 +33,7 @@ class Component:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Design:
+class BoardDesign:
     """A whole board of one variant."""
 
     variant: str

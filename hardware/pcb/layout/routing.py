@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from math import cos, radians, sin
 from pathlib import Path
 
-from hardware.pcb.circuit.netlist import Design
+from hardware.pcb.circuit.netlist import BoardDesign
 from hardware.pcb.layout import rules
 from hardware.pcb.layout.footprints import ANTENNA_AREA_MM, FOOTPRINTS
-from hardware.pcb.layout.placement import ESP32_AT_MM, Place, place
+from hardware.pcb.layout.placement import ESP32_AT_MM, Placement, place
 from hardware.pcb.layout.shapes import Pad, PadKind
 from simbase.errors import P2osError
 
@@ -69,7 +69,7 @@ class PlacedPad:
         return 1 if self.pad.kind is PadKind.SMD else 3
 
 
-def placed_pads(design: Design) -> list[PlacedPad]:
+def placed_pads(design: BoardDesign) -> list[PlacedPad]:
     """Return every pad of the board in board coordinates, parts in the design's order."""
     places = place(design)
     found = []
@@ -84,7 +84,7 @@ def placed_pads(design: Design) -> list[PlacedPad]:
     return found
 
 
-def turn(point: tuple[float, float], at: Place) -> tuple[float, float]:
+def turn(point: tuple[float, float], at: Placement) -> tuple[float, float]:
     """Return a point of a footprint in board coordinates; angles turn counter-clockwise as seen."""
     angle = radians(at.angle_deg)
     x, y = point
@@ -98,7 +98,7 @@ def antenna_area() -> tuple[float, float, float, float]:
     return (x + left, max(0.0, y + top), x + right, y + bottom)
 
 
-def router_input(design: Design) -> str:
+def router_input(design: BoardDesign) -> str:
     """Return the text that the router reads."""
     nets = sorted(design.nets())
     index = {net: number for number, net in enumerate(nets)}
@@ -120,12 +120,12 @@ def router_input(design: Design) -> str:
     return "\n".join(lines) + "\n"
 
 
-def fingerprint(design: Design) -> str:
+def fingerprint(design: BoardDesign) -> str:
     """Return the hash that ties a routing result to placement, nets and rules."""
     return hashlib.sha256(router_input(design).encode()).hexdigest()[:16]
 
 
-def run_router(design: Design) -> str:
+def run_router(design: BoardDesign) -> str:
     """Compile and run the router; return the text for routes/VARIANT.txt.
 
     Raises:
@@ -161,7 +161,7 @@ def read_lines(file: Path, verb: str) -> list[str]:
         raise RoutingError(f"cannot read {file.name}: {error.strerror}", hint=hint) from error
 
 
-def load_routes(design: Design, path: Path | None = None) -> tuple[list[Track], list[Via]]:
+def load_routes(design: BoardDesign, path: Path | None = None) -> tuple[list[Track], list[Via]]:
     """Read the committed routing of a variant.
 
     Raises:

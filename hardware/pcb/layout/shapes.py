@@ -41,7 +41,7 @@ class Pad:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Line:
+class StraightStroke:
     """A straight stroke on a layer."""
 
     layer: str
@@ -75,7 +75,7 @@ class Label:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Box:
+class PartBox:
     """A body of the 3D picture: centre and size seen from above, and its height range."""
 
     center_mm: tuple[float, float]
@@ -86,16 +86,16 @@ class Box:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Footprint:
+class PartFootprint:
     """What a part needs on the board."""
 
     name: str
     description: str
     pads: tuple[Pad, ...]
-    drawings: tuple[Line | Circle | Label, ...]
+    drawings: tuple[StraightStroke | Circle | Label, ...]
     #: Where the reference stands, before rotation.
     ref_at_mm: tuple[float, float]
-    boxes: tuple[Box, ...] = ()
+    boxes: tuple[PartBox, ...] = ()
 
     @property
     def is_smd(self) -> bool:
@@ -103,15 +103,17 @@ class Footprint:
         return all(pad.kind is PadKind.SMD for pad in self.pads)
 
 
-def rectangle(layer: str, left: float, top: float, right: float, bottom: float, width: float = SILK_MM) -> list[Line]:
+def rectangle(
+    layer: str, left: float, top: float, right: float, bottom: float, width: float = SILK_MM
+) -> list[StraightStroke]:
     """Return the four sides of a rectangle."""
     corners = [(left, top), (right, top), (right, bottom), (left, bottom)]
     return [
-        Line(layer=layer, start_mm=corners[index], end_mm=corners[(index + 1) % 4], width_mm=width)
+        StraightStroke(layer=layer, start_mm=corners[index], end_mm=corners[(index + 1) % 4], width_mm=width)
         for index in range(4)
     ]  # fmt: skip
 
 
-def courtyard(left: float, top: float, right: float, bottom: float) -> list[Line]:
+def courtyard(left: float, top: float, right: float, bottom: float) -> list[StraightStroke]:
     """Return the keep-away rectangle of a part."""
     return rectangle("F.CrtYd", left, top, right, bottom, 0.05)

@@ -7,12 +7,12 @@ Invariant: same design, same bytes.
 import html
 from collections.abc import Iterator
 
-from hardware.pcb.circuit.netlist import Component, Design
+from hardware.pcb.circuit.netlist import BoardDesign, Component
 from hardware.pcb.layout import rules
 from hardware.pcb.layout.footprints import FOOTPRINTS
-from hardware.pcb.layout.placement import Place, place, silk_labels, unturn
+from hardware.pcb.layout.placement import Placement, place, silk_labels, unturn
 from hardware.pcb.layout.routing import PlacedPad, placed_pads, turn
-from hardware.pcb.layout.shapes import Circle, Label, Line, PadKind
+from hardware.pcb.layout.shapes import Circle, Label, PadKind, StraightStroke
 
 #: Colours and strokes; the page of the bill of materials adds the marked states to them.
 STYLE = """
@@ -25,14 +25,14 @@ _LAYER_CLASS = {"F.Fab": "fab", "F.SilkS": "silk"}
 _ANCHOR = {"left": "start", "center": "middle", "right": "end"}
 
 
-def assembly_svg(design: Design) -> str:
+def assembly_svg(design: BoardDesign) -> str:
     """Return the drawing as a file of its own, with a title line below the board."""
     title = html.escape(f"{design.title}: assembly, top side, {rules.BOARD_WIDTH_MM:g} x {rules.BOARD_HEIGHT_MM:g} mm")
     caption = f'<text x="0" y="{rules.BOARD_HEIGHT_MM + 5:g}" font-size="2.6">{title}</text>'
     return board_svg(design, head=f"<style>{STYLE}</style>", tail=caption) + "\n"
 
 
-def board_svg(design: Design, head: str = "", tail: str = "") -> str:
+def board_svg(design: BoardDesign, head: str = "", tail: str = "") -> str:
     """Return the drawing; each part is a group with its reference as identifier.
 
     Args:
@@ -56,7 +56,7 @@ def board_svg(design: Design, head: str = "", tail: str = "") -> str:
     return "\n".join([*out, tail, "</svg>"])
 
 
-def _part(component: Component, at: Place, pads: list[PlacedPad]) -> Iterator[str]:
+def _part(component: Component, at: Placement, pads: list[PlacedPad]) -> Iterator[str]:
     footprint = FOOTPRINTS[component.part.footprint]
     body = body_mm(component, at)
     if body:
@@ -68,7 +68,7 @@ def _part(component: Component, at: Place, pads: list[PlacedPad]) -> Iterator[st
     for shape in footprint.drawings:
         if shape.layer not in _LAYER_CLASS:
             continue
-        if isinstance(shape, Line):
+        if isinstance(shape, StraightStroke):
             (x0, y0), (x1, y1) = turn(shape.start_mm, at), turn(shape.end_mm, at)
             kind = _LAYER_CLASS[shape.layer]
             yield f'<line class="{kind}" x1="{x0:.2f}" y1="{y0:.2f}" x2="{x1:.2f}" y2="{y1:.2f}"/>'
@@ -87,12 +87,12 @@ def _part(component: Component, at: Place, pads: list[PlacedPad]) -> Iterator[st
     yield _text(component.ref, turn(offset, at), Label(layer="F.SilkS", text="", at_mm=(0, 0), size_mm=0.9), "ref")
 
 
-def body_mm(component: Component, at: Place) -> tuple[float, float, float, float] | None:
+def body_mm(component: Component, at: Placement) -> tuple[float, float, float, float] | None:
     """Return the box around a part's drawn body: left, top, right, bottom; None where nothing is drawn."""
     ends = [
         turn(point, at)
         for shape in FOOTPRINTS[component.part.footprint].drawings
-        if isinstance(shape, Line) and shape.layer == "F.Fab"
+        if isinstance(shape, StraightStroke) and shape.layer == "F.Fab"
         for point in (shape.start_mm, shape.end_mm)
     ]
     if not ends:

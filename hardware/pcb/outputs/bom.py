@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from hardware.pcb.circuit.netlist import Design
+from hardware.pcb.circuit.netlist import BoardDesign
 from hardware.pcb.circuit.parts import ACCESSORIES, Part
 from hardware.pcb.layout import rules
 from hardware.pcb.layout.footprints import FOOTPRINTS
@@ -32,7 +32,7 @@ class BomRow:
     quantity: int
 
 
-def rows(design: Design) -> list[BomRow]:
+def rows(design: BoardDesign) -> list[BomRow]:
     """Return the bill of materials, the largest quantity last, references in natural order; accessories follow."""
     groups: dict[str, list[str]] = {}
     parts: dict[str, Part] = {}
@@ -50,7 +50,7 @@ def rows(design: Design) -> list[BomRow]:
     ]
 
 
-def csv_text(design: Design) -> str:
+def csv_text(design: BoardDesign) -> str:
     """Return the list as CSV."""
     head = [
         "Quantity",
@@ -70,7 +70,7 @@ def csv_text(design: Design) -> str:
     ))  # fmt: skip
 
 
-def placement_csv(design: Design) -> str:
+def placement_csv(design: BoardDesign) -> str:
     """Return centres of the surface parts for a placing machine: from the lower left corner, y up, millimetres."""
     places = place(design)
     return _csv(["Reference", "Value", "Footprint", "X mm", "Y mm", "Angle deg", "Side"], (
@@ -87,7 +87,7 @@ def _csv(head: list[str], lines: Iterable[list[object]]) -> str:
     return out.getvalue()
 
 
-def html_text(design: Design) -> str:
+def html_text(design: BoardDesign) -> str:
     """Return the interactive page."""
     lines = "".join(
         f'<tr data-refs="{" ".join(row.refs)}" data-part="{html.escape(row.part.key)}">'

@@ -51,7 +51,7 @@ class Land:
 
 
 @dataclass(frozen=True, slots=True)
-class Board:
+class BoardContents:
     """What is compared."""
 
     #: Reference to value, footprint and place.
@@ -61,7 +61,7 @@ class Board:
     nets: frozenset[str]
 
 
-def read_source(text: str) -> Board:
+def read_source(text: str) -> BoardContents:
     """Read a board that is named by its variant, by its file, or as REVISION:VARIANT of git.
 
     Raises:
@@ -82,7 +82,7 @@ def read_source(text: str) -> Board:
     return _board(done.stdout, text)
 
 
-def _board(text: str, name: str) -> Board:
+def _board(text: str, name: str) -> BoardContents:
     try:
         tree = parse(text)
     except (SexpError, StopIteration) as error:
@@ -106,7 +106,7 @@ def _board(text: str, name: str) -> Board:
         if one.layer in COPPER else one
         for one in strokes
     }  # fmt: skip
-    return Board(parts, frozenset(named), frozenset(lands), nets)
+    return BoardContents(parts, frozenset(named), frozenset(lands), nets)
 
 
 def _point(at: Node, index: int = 1) -> tuple[float, float]:
@@ -162,7 +162,7 @@ def _drawn(tree: Node, prefix: str, at: tuple[float, float], angle: float) -> li
     return result
 
 
-def words(old: Board, new: Board) -> list[str]:
+def words(old: BoardContents, new: BoardContents) -> list[str]:
     """Return a line for each part and each kind of thing that differ."""
     said = []
     for name in sorted(old.parts.keys() | new.parts.keys()):
@@ -182,7 +182,7 @@ def words(old: Board, new: Board) -> list[str]:
     return said
 
 
-def picture(old: Board, new: Board, names: tuple[str, str]) -> str:
+def picture(old: BoardContents, new: BoardContents, names: tuple[str, str]) -> str:
     """Return an SVG of both boards, front and back side by side."""
     outline = [one for one in old.strokes | new.strokes if one.layer == "Edge.Cuts"]
     if not outline:

@@ -12,7 +12,7 @@ import zipfile
 from pathlib import Path
 
 from hardware.pcb.circuit.design import VARIANTS, build
-from hardware.pcb.circuit.netlist import Design
+from hardware.pcb.circuit.netlist import BoardDesign
 from hardware.pcb.circuit.parts import PARTS
 from hardware.pcb.layout.footprints import FOOTPRINTS
 from hardware.pcb.layout.routing import HERE, Track, Via, load_routes
@@ -51,7 +51,7 @@ def sources() -> dict[str, str]:
     return files
 
 
-def variant_sources(design: Design) -> dict[str, str]:
+def variant_sources(design: BoardDesign) -> dict[str, str]:
     """Return the files of one variant by name."""
     variant = design.variant
     files = {f"{variant}.kicad_sch": root_text(design), f"{variant}.kicad_pro": project.project_text(design)}
@@ -65,7 +65,7 @@ def variant_sources(design: Design) -> dict[str, str]:
     return files | steps.pictures(design)
 
 
-def copper_of(design: Design) -> tuple[list[Track], list[Via]]:
+def copper_of(design: BoardDesign) -> tuple[list[Track], list[Via]]:
     """Return tracks and vias of a board: the router's, and the stitching vias that meet ground on both sides."""
     tracks, vias = load_routes(design)
     return tracks, [*(via for via in vias if not via.is_stitch), *load_stitches(design.variant)]

@@ -13,14 +13,14 @@ from pathlib import Path
 from typing import Any
 
 from hardware.pcb.circuit.design import build
-from hardware.pcb.circuit.netlist import Design
+from hardware.pcb.circuit.netlist import BoardDesign
 from hardware.pcb.layout.footprints import FOOTPRINTS
 from hardware.pcb.layout.placement import place
 from hardware.pcb.layout.routing import placed_pads, turn
 from hardware.pcb.layout.shapes import Label
 from hardware.pcb.outputs import generated_files, kicad_cli
 from hardware.pcb.outputs.schematic import PAGES
-from hardware.pcb.spice.run import Result
+from hardware.pcb.spice.run import DeckResult
 
 _PAGE_DPI = 110
 _SIDES = {
@@ -63,7 +63,7 @@ def board_pictures(variant: str, board: Path) -> list[Path]:
     return files
 
 
-def _write_names(file: Path, design: Design) -> None:
+def _write_names(file: Path, design: BoardDesign) -> None:
     """Write on a board from above what its parts hide: modules and their pins, connectors, + and - of the terminals."""
     from PIL import Image, ImageDraw, ImageFont
 
@@ -129,7 +129,7 @@ def _bare_picture(variant: str, board: Path) -> Path:
     return file
 
 
-def plot(result: Result) -> Path:
+def plot(result: DeckResult) -> Path:
     """Renew the plot of a deck that has run; return its file."""
     import matplotlib as mpl
 

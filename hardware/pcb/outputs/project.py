@@ -9,15 +9,15 @@ Invariant: same design, same bytes.
 
 import json
 
-from hardware.pcb.circuit.netlist import POWER_NETS, Design
+from hardware.pcb.circuit.netlist import POWER_NETS, BoardDesign
 from hardware.pcb.layout import rules
-from hardware.pcb.layout.shapes import Box, Footprint
+from hardware.pcb.layout.shapes import PartBox, PartFootprint
 
 #: KiCad's VRML unit: a tenth of an inch.
 _UNIT_MM = 2.54
 
 
-def project_text(design: Design) -> str:
+def project_text(design: BoardDesign) -> str:
     """Return the .kicad_pro file of a variant."""
     settings = {
         "board": {
@@ -69,7 +69,7 @@ def library_tables() -> dict[str, str]:
     }  # fmt: skip
 
 
-def model_text(footprint: Footprint) -> str:
+def model_text(footprint: PartFootprint) -> str:
     """Return the .wrl file of a footprint; y points up there."""
     return "#VRML V2.0 utf8\n" + "".join(_box(box) for box in footprint.boxes)
 
@@ -84,7 +84,7 @@ def _class(entry: rules.NetClass, priority: int) -> dict[str, object]:
     }  # fmt: skip
 
 
-def _box(box: Box) -> str:
+def _box(box: PartBox) -> str:
     low, high = box.z_mm
     x, y = box.center_mm
     centre = " ".join(f"{value / _UNIT_MM:.4f}" for value in (x, -y, (low + high) / 2))

@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 
 from adapter_sim.pinout import load_pinout
 from hardware.pcb.circuit.design import PULL_OFFSET, series_wires
-from hardware.pcb.circuit.netlist import Component, Design, DesignError
-from hardware.pcb.outputs.sexp import Node, Text, node, render, sheet_path, uid, uuid_node
-from hardware.pcb.outputs.symbols import POWER_SYMBOLS, SYMBOLS, Pin, property_node, symbol_node
+from hardware.pcb.circuit.netlist import BoardDesign, Component, DesignError
+from hardware.pcb.outputs.sexp import Node, QuotedText, node, render, sheet_path, uid, uuid_node
+from hardware.pcb.outputs.symbols import POWER_SYMBOLS, SYMBOLS, SymbolPin, property_node, symbol_node
 
 #: One step, millimetres: half of KiCad's usual grid, on which all pins lie.
 STEP_MM = 1.27
@@ -30,7 +30,7 @@ TITLES = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Frame:
+class SheetFrame:
     """A group on a page: corners in steps, a title, and a note below it."""
 
     title: str
@@ -58,7 +58,7 @@ def place_of(component: Component) -> tuple[int, int]:
     return _TABLES[page_of(component)][component.ref]
 
 
-def frames(design: Design, page: str) -> list[Frame]:
+def frames(design: BoardDesign, page: str) -> list[SheetFrame]:
     """Return the groups of a page."""
     if page == "supply":
         own = {"rev-b": _BUCK_FRAMES, "lm317": _LINEAR_FRAMES, "rev-c": [*_BUCK_FRAMES, _JP8_FRAME]}
@@ -116,30 +116,30 @@ _TABLES = {
 }
 
 _SUPPLY_FRAMES = [
-    Frame(title="12 V input", left=10, top=12, right=112, bottom=46,
-          note="Fuse, reverse protection, transient suppressor. 11 to 14.8 V."),
-    Frame(title="5 V power bank and choice of source", left=10, top=52, right=112, bottom=88,
-          note="JP1 1-2: from 12 V; 2-3: from the power bank. One jumper only."),
-    Frame(title="To the modules", left=116, top=52, right=224, bottom=88,
-          note="A diode each: neither module's USB feeds the board or the other module."),
-    Frame(title="For the rule check: these nets are supplied", left=10, top=136, right=130, bottom=156),
+    SheetFrame(title="12 V input", left=10, top=12, right=112, bottom=46,
+               note="Fuse, reverse protection, transient suppressor. 11 to 14.8 V."),
+    SheetFrame(title="5 V power bank and choice of source", left=10, top=52, right=112, bottom=88,
+               note="JP1 1-2: from 12 V; 2-3: from the power bank. One jumper only."),
+    SheetFrame(title="To the modules", left=116, top=52, right=224, bottom=88,
+               note="A diode each: neither module's USB feeds the board or the other module."),
+    SheetFrame(title="For the rule check: these nets are supplied", left=10, top=136, right=130, bottom=156),
 ]  # fmt: skip
 _BUCK_FRAMES = [
-    Frame(title="12 V to 5 V, 1 A", left=116, top=12, right=224, bottom=46,
-          note="The 3.3 V of this board comes from the ESP32 module's own regulator.")
+    SheetFrame(title="12 V to 5 V, 1 A", left=116, top=12, right=224, bottom=46,
+               note="The 3.3 V of this board comes from the ESP32 module's own regulator.")
 ]  # fmt: skip
 _LINEAR_FRAMES = [
-    Frame(title="12 V to 5 V, LM317: 150 mA on average, 250 mA in peaks", left=116, top=12, right=224, bottom=50,
-          note="5.02 V; 10.4 mA through the divider: above the minimum load."),
-    Frame(title="12 V to 3.3 V, LM317: transceiver and LEDs only", left=10, top=92, right=112, bottom=132,
-          note="3.34 V; the ESP32 keeps its own 3.3 V regulator."),
+    SheetFrame(title="12 V to 5 V, LM317: 150 mA on average, 250 mA in peaks", left=116, top=12, right=224, bottom=50,
+               note="5.02 V; 10.4 mA through the divider: above the minimum load."),
+    SheetFrame(title="12 V to 3.3 V, LM317: transceiver and LEDs only", left=10, top=92, right=112, bottom=132,
+               note="3.34 V; the ESP32 keeps its own 3.3 V regulator."),
 ]  # fmt: skip
-_JP8_FRAME = Frame(
+_JP8_FRAME = SheetFrame(
     title="An old Pioneer 2's JP8: straight ribbon, instead of J3", left=116, top=92, right=224, bottom=128,
     note="What JP8 can give is unknown: JP3 stays off unless it was measured. 5 V and port pins stay open.",
 )  # fmt: skip
 _REV_C_FRAMES = [
-    Frame(
+    SheetFrame(
         title="Distances by shift register",
         left=174,
         top=12,
@@ -147,41 +147,41 @@ _REV_C_FRAMES = [
         bottom=70,
         note="Released until the program enables it.",
     ),
-    Frame(title="Status LED", left=174, top=74, right=224, bottom=118),
+    SheetFrame(title="Status LED", left=174, top=74, right=224, bottom=118),
 ]
 _FRAMES = {
     "modules": [
-        Frame(title="BluePill (USB at the top)", left=10, top=20, right=108, bottom=112),
-        Frame(title="ESP32 D1 mini (antenna at the top)", left=114, top=20, right=224, bottom=112,
-              note="GPIO6 to 11 carry the module's flash: never connected."),
+        SheetFrame(title="BluePill (USB at the top)", left=10, top=20, right=108, bottom=112),
+        SheetFrame(title="ESP32 D1 mini (antenna at the top)", left=114, top=20, right=224, bottom=112,
+                   note="GPIO6 to 11 carry the module's flash: never connected."),
     ],
     "signals": [
-        Frame(title="One row a wire, from pad to pad", left=10, top=12, right=224, bottom=128,
-              note="_BP: the BluePill's side. 1k2 limits what an unpowered module takes; "
-                   "680R at PC13 holds a low against the BluePill's LED. IO5 and IO15 boot high: pulled up."),
+        SheetFrame(title="One row a wire, from pad to pad", left=10, top=12, right=224, bottom=128,
+                   note="_BP: the BluePill's side. 1k2 limits what an unpowered module takes; "
+                        "680R at PC13 holds a low against the BluePill's LED. IO5 and IO15 boot high: pulled up."),
     ],
     "serial": [
-        Frame(title="RS-232 at 3.3 V; DIN2 low asserts DTR", left=10, top=12, right=170, bottom=70,
-              note="Plug, wired as DTE: straight cable to the robot's HOST socket."),
-        Frame(title="UART with activity lights", left=10, top=74, right=100, bottom=118,
-              note="A light is on while its line is low: it flickers with data."),
-        Frame(title="Reset: PB13 high pulls EN low", left=106, top=74, right=170, bottom=118,
-              note="Emitter to ground. The module has its own pull-up at EN."),
-        Frame(title="Mode jumper, read at boot only", left=10, top=122, right=100, bottom=144),
+        SheetFrame(title="RS-232 at 3.3 V; DIN2 low asserts DTR", left=10, top=12, right=170, bottom=70,
+                   note="Plug, wired as DTE: straight cable to the robot's HOST socket."),
+        SheetFrame(title="UART with activity lights", left=10, top=74, right=100, bottom=118,
+                   note="A light is on while its line is low: it flickers with data."),
+        SheetFrame(title="Reset: PB13 high pulls EN low", left=106, top=74, right=170, bottom=118,
+                   note="Emitter to ground. The module has its own pull-up at EN."),
+        SheetFrame(title="Mode jumper, read at boot only", left=10, top=122, right=100, bottom=144),
     ],
     "stop": [
-        Frame(title="Emergency stop: a loop that must be closed", left=10, top=12, right=78, bottom=74,
+        SheetFrame(title="Emergency stop: a loop that must be closed", left=10, top=12, right=78, bottom=74,
               note="J7: a contact that opens, or its jumper. Open, cut, at ground: stop."),
-        Frame(title="Stop: EN low and TXD at mark, apart from each other", left=82, top=12, right=200, bottom=74,
+        SheetFrame(title="Stop: EN low and TXD at mark, apart from each other", left=82, top=12, right=200, bottom=74,
               note="The ESP32 is held in reset, the line falls silent: the robot stops by its own watchdog, in 2 s."),
-        Frame(title="Mode button; held at reset: download", left=10, top=80, right=100, bottom=118,
+        SheetFrame(title="Mode button; held at reset: download", left=10, top=80, right=100, bottom=118,
               note="IO0 is a strap: high at boot unless the button is held. The module has no button for it."),
     ],
     "test": [
-        Frame(title="Logic header: each wire at its receiver", left=10, top=12, right=84, bottom=70,
-              note="3.3 V signals. Drive nothing here that a module drives."),
-        Frame(title="Test points", left=90, top=12, right=200, bottom=80),
-        Frame(title="Mounting holes M3", left=10, top=106, right=112, bottom=130),
+        SheetFrame(title="Logic header: each wire at its receiver", left=10, top=12, right=84, bottom=70,
+                   note="3.3 V signals. Drive nothing here that a module drives."),
+        SheetFrame(title="Test points", left=90, top=12, right=200, bottom=80),
+        SheetFrame(title="Mounting holes M3", left=10, top=106, right=112, bottom=130),
     ],
 }  # fmt: skip
 
@@ -204,7 +204,7 @@ class PlacedPin:
     """A pin on a page: its end in steps, its outward side and its net."""
 
     component: Component
-    pin: Pin
+    pin: SymbolPin
     x: int
     y: int
     net: str | None
@@ -214,7 +214,7 @@ class PlacedPin:
 class Page:
     """A page under construction."""
 
-    design: Design
+    design: BoardDesign
     name: str
     nodes: list[Node] = field(default_factory=list)
     used: set[str] = field(default_factory=set)
@@ -226,7 +226,7 @@ class Page:
         return uuid_node(self.design.variant, self.name, kind, self.count)
 
 
-def page_text(design: Design, name: str) -> str:
+def page_text(design: BoardDesign, name: str) -> str:
     """Return the file of one page."""
     page = Page(design, name)
     for frame in frames(design, name):
@@ -252,7 +252,7 @@ def page_text(design: Design, name: str) -> str:
     return render(tree) + "\n"
 
 
-def root_text(design: Design) -> str:
+def root_text(design: BoardDesign) -> str:
     """Return the root sheet: one box a page, and what the board is."""
     tree = _head(design, "root", design.title)
     tree.append(node("lib_symbols"))
@@ -269,24 +269,25 @@ def root_text(design: Design) -> str:
         tree.append(node(
             "sheet", node("at", x, y), node("size", 63.5, 25.4), node("exclude_from_sim", "no"), node("in_bom", "yes"),
             node("on_board", "yes"), node("dnp", "no"), node("stroke", node("width", 0.2), node("type", "solid")),
-            node("fill", node("color", 235, 240, 250, 1)), node("uuid", Text(uid(design.variant, "sheet", name))),
-            node("property", Text("Sheetname"), Text(name), node("at", x, y - 0.8, 0), font),
-            node("property", Text("Sheetfile"), Text(f"{design.variant}-{name}.kicad_sch"), node("at", x, y + 26.2, 0),
+            node("fill", node("color", 235, 240, 250, 1)), node("uuid", QuotedText(uid(design.variant, "sheet", name))),
+            node("property", QuotedText("Sheetname"), QuotedText(name), node("at", x, y - 0.8, 0), font),
+            node("property", QuotedText("Sheetfile"), QuotedText(f"{design.variant}-{name}.kicad_sch"),
+                 node("at", x, y + 26.2, 0),
                  small),
-            node("instances", node("project", Text(design.variant),
-                                   node("path", Text(f"/{uid(design.variant, 'root')}"),
-                                        node("page", Text(str(number + 2)))))),
+            node("instances", node("project", QuotedText(design.variant),
+                                   node("path", QuotedText(f"/{uid(design.variant, 'root')}"),
+                                        node("page", QuotedText(str(number + 2)))))),
         ))  # fmt: skip
         tree.append(_text(TITLES[name], (x + 4.0, y + 12.0), 2.0, uuid_node(design.variant, "root", name)))
-    tree.append(node("sheet_instances", node("path", Text("/"), node("page", Text("1")))))
+    tree.append(node("sheet_instances", node("path", QuotedText("/"), node("page", QuotedText("1")))))
     tree.append(node("embedded_fonts", "no"))
     return render(tree) + "\n"
 
 
 def library_text() -> str:
     """Return the symbol library that the pages were drawn from."""
-    tree = node("kicad_symbol_lib", node("version", _LIBRARY_VERSION), node("generator", Text("hardware_pcb")),
-                node("generator_version", Text("9.0")))  # fmt: skip
+    tree = node("kicad_symbol_lib", node("version", _LIBRARY_VERSION), node("generator", QuotedText("hardware_pcb")),
+                node("generator_version", QuotedText("9.0")))  # fmt: skip
     tree += [symbol_node(SYMBOLS[name], name) for name in sorted(SYMBOLS)]
     return render(tree) + "\n"
 
@@ -306,22 +307,22 @@ def _mm(*steps: float) -> list[float]:
     return [round(step * STEP_MM, 4) for step in steps]
 
 
-def _head(design: Design, name: str, title: str) -> Node:
+def _head(design: BoardDesign, name: str, title: str) -> Node:
     ident = uid(design.variant, "root") if name == "root" else uid(design.variant, "file", name)
     number = 1 if name == "root" else PAGES.index(name) + 2
     return node(
-        "kicad_sch", node("version", _VERSION), node("generator", Text("hardware_pcb")),
-        node("generator_version", Text("9.0")), node("uuid", Text(ident)), node("paper", Text("A4")),
-        node("title_block", node("title", Text(f"{number}. {title}" if name != "root" else title)),
-             node("rev", Text(design.variant)), node("company", Text("p2os: BluePill to Pioneer 2-DX")),
-             node("comment", "1", Text(design.title)),
-             node("comment", "2", Text("Generated from hardware/pcb; no board has been made yet"))),
+        "kicad_sch", node("version", _VERSION), node("generator", QuotedText("hardware_pcb")),
+        node("generator_version", QuotedText("9.0")), node("uuid", QuotedText(ident)), node("paper", QuotedText("A4")),
+        node("title_block", node("title", QuotedText(f"{number}. {title}" if name != "root" else title)),
+             node("rev", QuotedText(design.variant)), node("company", QuotedText("p2os: BluePill to Pioneer 2-DX")),
+             node("comment", "1", QuotedText(design.title)),
+             node("comment", "2", QuotedText("Generated from hardware/pcb; no board has been made yet"))),
     )  # fmt: skip
 
 
 def _text(text: str, at: tuple[float, float], size: float, ident: Node, *, is_bold: bool = False) -> Node:
     font = node("font", node("size", size, size), *([node("bold", "yes")] if is_bold else []))
-    return node("text", Text(text), node("exclude_from_sim", "no"), node("at", *at, 0),
+    return node("text", QuotedText(text), node("exclude_from_sim", "no"), node("at", *at, 0),
                 node("effects", font, node("justify", "left", "top")), ident)  # fmt: skip
 
 
@@ -415,10 +416,10 @@ def _label(page: Page, net: str, at: tuple[int, int], side: str) -> None:
     angle = {"left": 180, "right": 0, "top": 90, "bottom": 270}[side]
     justify = "right" if side in {"left", "bottom"} else "left"
     page.nodes.append(node(
-        "global_label", Text(net), node("shape", "passive"), node("at", *_mm(*at), angle),
+        "global_label", QuotedText(net), node("shape", "passive"), node("at", *_mm(*at), angle),
         node("fields_autoplaced", "yes"),
         node("effects", node("font", node("size", 1.27, 1.27)), node("justify", justify)), page.ident("label"),
-        node("property", Text("Intersheetrefs"), Text("${INTERSHEET_REFS}"), node("at", *_mm(*at), 0),
+        node("property", QuotedText("Intersheetrefs"), QuotedText("${INTERSHEET_REFS}"), node("at", *_mm(*at), 0),
              node("effects", node("font", node("size", 1.27, 1.27)), node("hide", "yes"))),
     ))  # fmt: skip
 
@@ -456,10 +457,10 @@ def _symbol(
     symbol = SYMBOLS[name]
     x, y = _mm(*at)
     tree = node(
-        "symbol", node("lib_id", Text(f"{LIBRARY}:{name}")), node("at", x, y, 0), node("unit", 1),
+        "symbol", node("lib_id", QuotedText(f"{LIBRARY}:{name}")), node("at", x, y, 0), node("unit", 1),
         node("exclude_from_sim", "no"), node("in_bom", "yes" if in_bom and not symbol.is_power else "no"),
         node("on_board", "yes"), node("dnp", "no"),
-        node("uuid", Text(uid(page.design.variant, ref, "symbol"))),
+        node("uuid", QuotedText(uid(page.design.variant, ref, "symbol"))),
     )  # fmt: skip
     tree.append(
         property_node(
@@ -475,9 +476,10 @@ def _symbol(
     rows = fields or {"Footprint": "", "Datasheet": "", "Description": ""}
     tree += [property_node(key, text, (x, y), is_hidden=True) for key, text in rows.items()]
     tree += [
-        node("pin", Text(pin.number), uuid_node(page.design.variant, ref, "pin", pin.number)) for pin in symbol.pins
+        node("pin", QuotedText(pin.number), uuid_node(page.design.variant, ref, "pin", pin.number))
+        for pin in symbol.pins
     ]
     path = sheet_path(page.design.variant, page.name)
-    tree.append(node("instances", node("project", Text(page.design.variant), node(
-        "path", Text(path), node("reference", Text(ref)), node("unit", 1)))))  # fmt: skip
+    tree.append(node("instances", node("project", QuotedText(page.design.variant), node(
+        "path", QuotedText(path), node("reference", QuotedText(ref)), node("unit", 1)))))  # fmt: skip
     return tree

@@ -4,7 +4,7 @@ KiCad names every object by a UUID. Ours are UUIDs of version 5 over a readable 
 (`rev-b/U5/pad 3`), so that two builds write the same bytes.
 
 Not here: what any list means. Invariant: `parse(render(tree)) == tree` for trees
-of lists, bare words (`str`) and quoted strings (`Text`).
+of lists, bare words (`str`) and quoted strings (`QuotedText`).
 """
 
 import re
@@ -27,7 +27,7 @@ _TOKEN = re.compile(r"""([()])|([^()"\s]+)|"((?:[^"\\]|\\.)*)"?""", re.DOTALL)
 _ESCAPED = re.compile(r"\\(.)", re.DOTALL)
 
 
-class Text(str):
+class QuotedText(str):
     """A string that is written in quotes."""
 
     __slots__ = ()
@@ -44,7 +44,7 @@ def number(value: float) -> str:
 
 
 def node(name: str, *items: "str | float | Node") -> Node:
-    """Build a list; numbers become words, strings stay as they are (`Text` is quoted)."""
+    """Build a list; numbers become words, strings stay as they are (`QuotedText` is quoted)."""
     return [name, *(number(item) if isinstance(item, (int, float)) else item for item in items)]
 
 
@@ -83,7 +83,7 @@ def parse(text: str) -> Node:
                 return done
             items.append(done)
         else:
-            items.append(Text(_ESCAPED.sub(_unescaped, quoted) if "\\" in quoted else quoted))
+            items.append(QuotedText(_ESCAPED.sub(_unescaped, quoted) if "\\" in quoted else quoted))
     raise SexpError("the text ends inside a list")
 
 
@@ -123,7 +123,7 @@ def uid(*path: object) -> str:
 
 def uuid_node(*path: object) -> Node:
     """Return `(uuid "...")` of a path."""
-    return node("uuid", Text(uid(*path)))
+    return node("uuid", QuotedText(uid(*path)))
 
 
 def sheet_path(variant: str, page: str) -> str:
@@ -132,7 +132,7 @@ def sheet_path(variant: str, page: str) -> str:
 
 
 def _word(item: str) -> str:
-    if isinstance(item, Text):
+    if isinstance(item, QuotedText):
         return '"' + item.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n") + '"'
     return item
 

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from hardware.pcb.circuit.modules import BLUEPILL_PINS, ESP32_PINS
-from hardware.pcb.circuit.netlist import Component, Design
+from hardware.pcb.circuit.netlist import BoardDesign, Component
 from hardware.pcb.layout import rules
 from hardware.pcb.layout.placement import place
 from hardware.pcb.layout.routing import PlacedPad, placed_pads
@@ -73,14 +73,14 @@ _STYLE = (
 MARGIN_MM, LINE_MM = 62.0, 4.2
 
 
-def pictures(design: Design) -> dict[str, str]:
+def pictures(design: BoardDesign) -> dict[str, str]:
     """Return every step's picture as SVG, by file name."""
     return {
         f"{design.variant}-step-{number:02}.svg": _picture(design, number, step) for number, step in enumerate(STEPS, 1)
     }
 
 
-def _picture(design: Design, number: int, step: Step) -> str:
+def _picture(design: BoardDesign, number: int, step: Step) -> str:
     width, height = rules.BOARD_WIDTH_MM, rules.BOARD_HEIGHT_MM
     places, pads = place(design), placed_pads(design)
     title = html.escape(f"{number}. {step.title}")
@@ -108,7 +108,7 @@ def _picture(design: Design, number: int, step: Step) -> str:
     return "\n".join([*out, *_notes(design, step, pads), "</svg>", ""])
 
 
-def _notes(design: Design, step: Step, pads: list[PlacedPad]) -> Iterator[str]:
+def _notes(design: BoardDesign, step: Step, pads: list[PlacedPad]) -> Iterator[str]:
     """Yield words at both sides of the board, in the order of their pads from the top, each with its line."""
     found = [(at, words) for name, words in step.notes if (at := _pad_at(design, name, pads)) is not None]
     for is_left in (True, False):
@@ -125,7 +125,7 @@ def _notes(design: Design, step: Step, pads: list[PlacedPad]) -> Iterator[str]:
             yield f'<text x="{words_x:g}" y="{level + 0.8:.2f}" text-anchor="{anchor}">{html.escape(words)}</text>'
 
 
-def _pad_at(design: Design, name: str, pads: list[PlacedPad]) -> tuple[float, float] | None:
+def _pad_at(design: BoardDesign, name: str, pads: list[PlacedPad]) -> tuple[float, float] | None:
     """Return where a pad is, None where this variant has no such part; KeyError of a pin that the part lacks."""
     ref, pin = name.split(".")
     part = next((one for one in design.components if one.ref == ref), None)

@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import TypeAlias
 
 from hardware.pcb.circuit.modules import BLUEPILL_PINS, ESP32_PINS, ESP32_SILKSCREEN
-from hardware.pcb.outputs.sexp import Node, Text, node
+from hardware.pcb.outputs.sexp import Node, QuotedText, node
 
 G = 2.54
 #: Kind of a stroke (rectangle, polyline, circle) and its points.
@@ -20,7 +20,7 @@ Row: TypeAlias = tuple[str, str, str] | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Pin:
+class SymbolPin:
     """A pin: `side` is where it leaves the body (left, right, top or bottom), `at` its outer end."""
 
     number: str
@@ -32,12 +32,12 @@ class Pin:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Symbol:
+class SchematicSymbol:
     """A symbol: its pins and its picture."""
 
     name: str
     prefix: str
-    pins: tuple[Pin, ...]
+    pins: tuple[SymbolPin, ...]
     picture: tuple[Stroke, ...]
     #: Positions of reference and value.
     ref_at: tuple[float, float]
@@ -57,24 +57,26 @@ class Symbol:
             yield pin.number, pin.name, pin.kind
 
 
-def _two(name: str, prefix: str, numbers: tuple[str, str], picture: Sequence[Stroke]) -> Symbol:
+def _two(name: str, prefix: str, numbers: tuple[str, str], picture: Sequence[Stroke]) -> SchematicSymbol:
     """Draw a part that lies across the page, first pin at the left."""
     left, right = numbers
-    pins = (Pin(number=left, name=left, kind="passive", at=(-1.5 * G, 0), side="left", length=1.27),
-            Pin(number=right, name=right, kind="passive", at=(1.5 * G, 0), side="right", length=1.27))  # fmt: skip
+    pins = (SymbolPin(number=left, name=left, kind="passive", at=(-1.5 * G, 0), side="left", length=1.27),
+            SymbolPin(number=right, name=right, kind="passive", at=(1.5 * G, 0), side="right",
+                      length=1.27))  # fmt: skip
     # Above the tallest picture: a light's arrows.
-    return Symbol(name=name, prefix=prefix, pins=pins, picture=tuple(picture),
-                  ref_at=(0, 3.3 if name == "LED" else 2.54),
-                  value_at=(0, -2.54), shows_names=False)  # fmt: skip
+    return SchematicSymbol(name=name, prefix=prefix, pins=pins, picture=tuple(picture),
+                           ref_at=(0, 3.3 if name == "LED" else 2.54),
+                           value_at=(0, -2.54), shows_names=False)  # fmt: skip
 
 
-def _upright(name: str, prefix: str, numbers: tuple[str, str], picture: Sequence[Stroke]) -> Symbol:
+def _upright(name: str, prefix: str, numbers: tuple[str, str], picture: Sequence[Stroke]) -> SchematicSymbol:
     """Draw a part that stands, first pin at the top."""
     top, bottom = numbers
-    pins = (Pin(number=top, name=top, kind="passive", at=(0, 1.5 * G), side="top", length=2.54),
-            Pin(number=bottom, name=bottom, kind="passive", at=(0, -1.5 * G), side="bottom", length=2.54))  # fmt: skip
-    return Symbol(name=name, prefix=prefix, pins=pins, picture=tuple(picture), ref_at=(2.2, 1.1),
-                  value_at=(2.2, -1.1), shows_names=False, justify="left")  # fmt: skip
+    pins = (SymbolPin(number=top, name=top, kind="passive", at=(0, 1.5 * G), side="top", length=2.54),
+            SymbolPin(number=bottom, name=bottom, kind="passive", at=(0, -1.5 * G), side="bottom",
+                      length=2.54))  # fmt: skip
+    return SchematicSymbol(name=name, prefix=prefix, pins=pins, picture=tuple(picture), ref_at=(2.2, 1.1),
+                           value_at=(2.2, -1.1), shows_names=False, justify="left")  # fmt: skip
 
 
 def _box(
@@ -82,7 +84,7 @@ def _box(
     prefix: str,
     sides: Mapping[str, list[Row]],
     half_width: float,
-) -> Symbol:
+) -> SchematicSymbol:
     """Draw a box; each side lists (number, name, kind) from top or left, None leaves a gap."""
     rows = max(len(sides.get("left", [])), len(sides.get("right", [])), 1)
     half_height = (rows + 1) * G / 2
@@ -92,25 +94,27 @@ def _box(
         sign = -1 if side == "left" else 1
         for index, row in enumerate(sides.get(side, [])):
             if row is not None:
-                pins.append(Pin(number=row[0], name=row[1], kind=row[2], side=side,
-                                at=(sign * (half_width + G), half_height - G * (index + 1))))  # fmt: skip
+                pins.append(SymbolPin(number=row[0], name=row[1], kind=row[2], side=side,
+                                      at=(sign * (half_width + G), half_height - G * (index + 1))))  # fmt: skip
     for side in ("top", "bottom"):
         sign = 1 if side == "top" else -1
         entries = sides.get(side, [])
         for index, row in enumerate(entries):
             if row is not None:
                 x = G * (index - (len(entries) - 1) // 2)
-                pins.append(Pin(number=row[0], name=row[1], kind=row[2], side=side, at=(x, sign * (half_height + G))))
+                pins.append(
+                    SymbolPin(number=row[0], name=row[1], kind=row[2], side=side, at=(x, sign * (half_height + G)))
+                )
     body = (("rectangle", ((-half_width, half_height), (half_width, -half_height))),)
     value_at = (half_width - 2.54, half_height + 1.9) if half_width > 6 else (0.0, -half_height - 1.9)
-    return Symbol(name=name, prefix=prefix, pins=tuple(pins), picture=body, value_at=value_at,
-                  ref_at=(-half_width + 2.54, half_height + 1.9))  # fmt: skip
+    return SchematicSymbol(name=name, prefix=prefix, pins=tuple(pins), picture=body, value_at=value_at,
+                           ref_at=(-half_width + 2.54, half_height + 1.9))  # fmt: skip
 
 
-def _power(name: str, picture: Sequence[Stroke], *, is_up: bool) -> Symbol:
-    pin = Pin(number="1", name=name, kind="power_in", at=(0, 0), side="bottom" if is_up else "top", length=0)
-    return Symbol(name=name, prefix="#PWR", pins=(pin,), picture=tuple(picture), ref_at=(0, 0),
-                  value_at=(0, 3.3 if is_up else -3.3), shows_names=False, is_power=True)  # fmt: skip
+def _power(name: str, picture: Sequence[Stroke], *, is_up: bool) -> SchematicSymbol:
+    pin = SymbolPin(number="1", name=name, kind="power_in", at=(0, 0), side="bottom" if is_up else "top", length=0)
+    return SchematicSymbol(name=name, prefix="#PWR", pins=(pin,), picture=tuple(picture), ref_at=(0, 0),
+                           value_at=(0, 3.3 if is_up else -3.3), shows_names=False, is_power=True)  # fmt: skip
 
 
 _ARROW = [("polyline", ((0, 0), (0, 2.0))), ("polyline", ((-0.8, 1.0), (0, 2.2), (0.8, 1.0)))]
@@ -136,7 +140,7 @@ def _numbered(count: int) -> list[Row]:
     return [(str(number), str(number), "passive") for number in range(1, count + 1)]
 
 
-def _all() -> list[Symbol]:
+def _all() -> list[SchematicSymbol]:
     header = _numbered(24)
     rs232: dict[str, list[Row]] = {
         "left": [("1", "C1+", "passive"), ("3", "C1-", "passive"), ("4", "C2+", "passive"), ("5", "C2-", "passive"),
@@ -159,14 +163,14 @@ def _all() -> list[Symbol]:
            ("5", "GND", "passive"), ("6", "DSR", "passive"), ("7", "RTS", "passive"), ("8", "CTS", "passive"),
            ("9", "RI", "passive"), ("0", "SHELL", "passive")]  # fmt: skip
     transistor = (
-        Pin(number="1", name="B", kind="input", at=(-2 * G, 0), side="left", length=G),
-        Pin(number="3", name="C", kind="open_collector", at=(0, 2 * G), side="top", length=G),
-        Pin(number="2", name="E", kind="passive", at=(0, -2 * G), side="bottom", length=G),
+        SymbolPin(number="1", name="B", kind="input", at=(-2 * G, 0), side="left", length=G),
+        SymbolPin(number="3", name="C", kind="open_collector", at=(0, 2 * G), side="top", length=G),
+        SymbolPin(number="2", name="E", kind="passive", at=(0, -2 * G), side="bottom", length=G),
     )
     emitter_up = (
-        Pin(number="1", name="B", kind="input", at=(-2 * G, 0), side="left", length=G),
-        Pin(number="2", name="E", kind="passive", at=(0, 2 * G), side="top", length=G),
-        Pin(number="3", name="C", kind="open_emitter", at=(0, -2 * G), side="bottom", length=G),
+        SymbolPin(number="1", name="B", kind="input", at=(-2 * G, 0), side="left", length=G),
+        SymbolPin(number="2", name="E", kind="passive", at=(0, 2 * G), side="top", length=G),
+        SymbolPin(number="3", name="C", kind="open_emitter", at=(0, -2 * G), side="bottom", length=G),
     )
     return [
         _two("R", "R", ("1", "2"), [("rectangle", ((-2.54, 1.0), (2.54, -1.0)))]),
@@ -194,20 +198,23 @@ def _all() -> list[Symbol]:
         _box("MAX3232", "U", rs232, 10.16),
         _box("HC595", "U", shift, 7.62),
         _box("DE9", "J", {"left": [*de9]}, 5.08),
-        Symbol(name="NPN", prefix="Q", pins=transistor, ref_at=(1.6, 1.1), value_at=(1.6, -1.1), shows_names=False,
+        SchematicSymbol(name="NPN", prefix="Q", pins=transistor, ref_at=(1.6, 1.1), value_at=(1.6, -1.1),
+                        shows_names=False,
                justify="left",
                picture=(("polyline", ((-2.54, 2.0), (-2.54, -2.0))), ("polyline", ((-2.54, 0.8), (0, 2.54))),
                         ("polyline", ((-2.54, -0.8), (0, -2.54))),
                         ("polyline", ((-1.4, -1.0), (-0.6, -2.2), (-2.0, -1.9))))),
-        Symbol(name="PNP", prefix="Q", pins=emitter_up, ref_at=(1.6, 1.1), value_at=(1.6, -1.1), shows_names=False,
+        SchematicSymbol(name="PNP", prefix="Q", pins=emitter_up, ref_at=(1.6, 1.1), value_at=(1.6, -1.1),
+                        shows_names=False,
                justify="left",
                picture=(("polyline", ((-2.54, 2.0), (-2.54, -2.0))), ("polyline", ((-2.54, 0.8), (0, 2.54))),
                         ("polyline", ((-2.54, -0.8), (0, -2.54))),
                         ("polyline", ((-1.2, 2.2), (-2.0, 1.2), (-0.8, 1.4))))),
-        Symbol(name="TESTPOINT", prefix="TP", ref_at=(3.4, 0), value_at=(3.4, -1.9), shows_names=False, justify="left",
-               pins=(Pin(number="1", name="1", kind="passive", at=(0, 0), side="left", length=1.27),),
+        SchematicSymbol(name="TESTPOINT", prefix="TP", ref_at=(3.4, 0), value_at=(3.4, -1.9), shows_names=False,
+                        justify="left",
+               pins=(SymbolPin(number="1", name="1", kind="passive", at=(0, 0), side="left", length=1.27),),
                picture=(("circle", ((1.97, 0), (2.67, 0))),)),
-        Symbol(name="HOLE", prefix="H", pins=(), ref_at=(2.4, 0), value_at=(2.4, -1.9), shows_names=False,
+        SchematicSymbol(name="HOLE", prefix="H", pins=(), ref_at=(2.4, 0), value_at=(2.4, -1.9), shows_names=False,
                justify="left",
                picture=(("circle", ((0, 0), (1.6, 0))),)),
         _box("BLUEPILL", "U", _module(BLUEPILL_PINS, {}, is_source=False), 15.24),
@@ -217,23 +224,25 @@ def _all() -> list[Symbol]:
                 ("polyline", ((-1.27, -1.27), (1.27, -1.27), (0, -2.3), (-1.27, -1.27)))],
                is_up=False),
         _power("+5V", _ARROW, is_up=True), _power("+3V3", _ARROW, is_up=True), _power("+12V", _ARROW, is_up=True),
-        Symbol(name="PWR_FLAG", prefix="#FLG", ref_at=(0, 0), value_at=(0, 4.2), shows_names=False, is_power=True,
-               pins=(Pin(number="1", name="flag", kind="power_out", at=(0, 0), side="bottom", length=0),),
-               picture=(("polyline", ((0, 0), (0, 1.27), (-1.0, 2.0), (0, 2.8), (1.0, 2.0), (0, 1.27))),)),
+        SchematicSymbol(name="PWR_FLAG", prefix="#FLG", ref_at=(0, 0), value_at=(0, 4.2), shows_names=False,
+                        is_power=True,
+                        pins=(SymbolPin(number="1", name="flag", kind="power_out", at=(0, 0), side="bottom",
+                                        length=0),),
+                        picture=(("polyline", ((0, 0), (0, 1.27), (-1.0, 2.0), (0, 2.8), (1.0, 2.0), (0, 1.27))),)),
     ]  # fmt: skip
 
 
 #: Every symbol by its name.
-SYMBOLS: Mapping[str, Symbol] = MappingProxyType({symbol.name: symbol for symbol in _all()})
+SYMBOLS: Mapping[str, SchematicSymbol] = MappingProxyType({symbol.name: symbol for symbol in _all()})
 #: Nets that pages show as a power symbol instead of a label.
 POWER_SYMBOLS = ("GND", "+5V", "+3V3", "+12V")
 
 _ANGLE = {"left": 0, "right": 180, "top": 270, "bottom": 90}
 
 
-def symbol_node(symbol: Symbol, name: str) -> Node:
+def symbol_node(symbol: SchematicSymbol, name: str) -> Node:
     """Return a symbol's definition under a name (`R` in the library, `adapter:R` on a page)."""
-    tree = node("symbol", Text(name))
+    tree = node("symbol", QuotedText(name))
     if symbol.is_power:
         tree.append(node("power"))
     if not symbol.shows_names:
@@ -247,8 +256,8 @@ def symbol_node(symbol: Symbol, name: str) -> Node:
         ("Footprint", "", (0.0, 0.0), True), ("Datasheet", "", (0.0, 0.0), True), ("Description", "", (0.0, 0.0), True),
     ):  # fmt: skip
         tree.append(property_node(key, text, at, is_hidden=is_hidden, justify=symbol.justify))
-    body = node("symbol", Text(f"{symbol.name}_0_1"), *(_shape(kind, points) for kind, points in symbol.picture))
-    legs = node("symbol", Text(f"{symbol.name}_1_1"), *(_pin(pin) for pin in symbol.pins))
+    body = node("symbol", QuotedText(f"{symbol.name}_0_1"), *(_shape(kind, points) for kind, points in symbol.picture))
+    legs = node("symbol", QuotedText(f"{symbol.name}_1_1"), *(_pin(pin) for pin in symbol.pins))
     tree += [body, legs, node("embedded_fonts", "no")]
     return tree
 
@@ -260,7 +269,7 @@ def property_node(key: str, text: str, at: tuple[float, float], *, is_hidden: bo
         effects.append(node("justify", justify))
     if is_hidden:
         effects.append(node("hide", "yes"))
-    return node("property", Text(key), Text(text), node("at", *at, 0), effects)
+    return node("property", QuotedText(key), QuotedText(text), node("at", *at, 0), effects)
 
 
 def _shape(kind: str, points: tuple[tuple[float, float], ...]) -> Node:
@@ -276,7 +285,7 @@ def _shape(kind: str, points: tuple[tuple[float, float], ...]) -> Node:
     )
 
 
-def _pin(pin: Pin) -> Node:
+def _pin(pin: SymbolPin) -> Node:
     font = node("effects", node("font", node("size", 1.1, 1.1)))
     return node("pin", pin.kind, "line", node("at", *pin.at, _ANGLE[pin.side]), node("length", pin.length),
-                node("name", Text(pin.name), font), node("number", Text(pin.number), font))  # fmt: skip
+                node("name", QuotedText(pin.name), font), node("number", QuotedText(pin.number), font))  # fmt: skip

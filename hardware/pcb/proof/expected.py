@@ -16,7 +16,7 @@ from itertools import combinations
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from hardware.pcb.circuit.netlist import Component, Design
+from hardware.pcb.circuit.netlist import BoardDesign, Component
 from hardware.pcb.layout.footprints import FOOTPRINTS
 from hardware.pcb.outputs.sexp import children, parse, word
 
@@ -82,7 +82,7 @@ def expected(variant: str) -> Expected:
     )
 
 
-def differences(design: Design) -> list[str]:
+def differences(design: BoardDesign) -> list[str]:
     """Return where a circuit differs from the table: pins, parts and values, one line each.
 
     Raises:
@@ -93,7 +93,7 @@ def differences(design: Design) -> list[str]:
     return [*_parts(design, table), *_crossed(pins, table), *_joints(pins, table), *_values(design, table)]
 
 
-def _parts(design: Design, table: Expected) -> list[str]:
+def _parts(design: BoardDesign, table: Expected) -> list[str]:
     """Compare which parts there are."""
     wanted = {pin.split(".")[0] for pins in table.nodes.values() for pin in pins}
     there = {part.ref for part in design.components if part.pins}
@@ -220,7 +220,7 @@ def _by_place(part: Component, rows: list[list[str]]) -> dict[str, str]:
     return {pad.number: names[pad.at_mm] for pad in pads}
 
 
-def _values(design: Design, table: Expected) -> list[str]:
+def _values(design: BoardDesign, table: Expected) -> list[str]:
     found = []
     for part in design.components:
         wanted = table.values.get(part.ref)

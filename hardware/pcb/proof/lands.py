@@ -14,7 +14,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from hardware.pcb.circuit.netlist import Design
+from hardware.pcb.circuit.netlist import BoardDesign
 from hardware.pcb.outputs.sexp import children, parse, word
 from hardware.pcb.proof.board_file import Land, Point, PrintedBoard, PrintedPart
 
@@ -32,7 +32,7 @@ def table() -> dict[str, Any]:  # what TOML holds
     return tomllib.loads(TABLE.read_text(encoding="utf-8"))
 
 
-def faults(board: PrintedBoard, design: Design) -> list[str]:
+def faults(board: PrintedBoard, design: BoardDesign) -> list[str]:
     """Return where the board's lands, their nets and its wires differ from drawings and circuit, one line each."""
     found = []
     for component in design.components:
@@ -120,7 +120,7 @@ def _edge(part: PrintedPart, board: PrintedBoard) -> Iterator[str]:
         )
 
 
-def wire_faults(board: PrintedBoard, design: Design) -> list[str]:
+def wire_faults(board: PrintedBoard, design: BoardDesign) -> list[str]:
     """Return the wires that do not run from pin to pin as the modules' public pin-outs count them."""
     rows, found = table()["wires"]["rows"], []
     for name, near, *far in rows:

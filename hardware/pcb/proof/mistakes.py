@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from hardware.pcb.circuit.electrical import bom_faults
-from hardware.pcb.circuit.netlist import Component, Design
+from hardware.pcb.circuit.netlist import BoardDesign, Component
 from hardware.pcb.proof import lands, mutants, printed
 from hardware.pcb.proof.board_file import Land, Mark, PrintedBoard, PrintedPart
 from hardware.pcb.proof.expected import differences
@@ -26,7 +26,7 @@ class Mistake:
     kind: str
     name: str
     touches: frozenset[str]
-    design: Design
+    design: BoardDesign
     board: PrintedBoard
 
     def lines(self) -> list[str]:
@@ -43,7 +43,7 @@ class Mistake:
         )
 
 
-def draw(design: Design, board: PrintedBoard, seed: int, count: int = 60) -> list[Mistake]:
+def draw(design: BoardDesign, board: PrintedBoard, seed: int, count: int = 60) -> list[Mistake]:
     """Return mistakes, a quarter of each kind, in the order of their kinds.
 
     Args:
@@ -57,7 +57,7 @@ def draw(design: Design, board: PrintedBoard, seed: int, count: int = 60) -> lis
     for kind, one in (("bom", _order), ("print", _print), ("land", _land)):
         for _ in range(count // 4):
             name, touches, changed = one(design, board, chance)
-            other = changed if isinstance(changed, Design) else design
+            other = changed if isinstance(changed, BoardDesign) else design
             found.append(Mistake(kind=kind, name=name, touches=frozenset(touches), design=other,
                                  board=changed if isinstance(changed, PrintedBoard) else board))  # fmt: skip
     found += [
@@ -68,7 +68,7 @@ def draw(design: Design, board: PrintedBoard, seed: int, count: int = 60) -> lis
 
 
 #: What is drawn: a name, what must be named, and the changed order or board.
-Drawn = tuple[str, Sequence[str], "Design | PrintedBoard"]
+Drawn = tuple[str, Sequence[str], "BoardDesign | PrintedBoard"]
 
 #: Codes that are read wrongly: in a number, for another.
 _SLIPS: tuple[tuple[str, str], ...] = (
@@ -90,7 +90,7 @@ _SLIPS: tuple[tuple[str, str], ...] = (
 )  # fmt: skip
 
 
-def _order(design: Design, board: PrintedBoard, chance: random.Random) -> Drawn:
+def _order(design: BoardDesign, board: PrintedBoard, chance: random.Random) -> Drawn:
     """A part's order number with another code in it, another part's number, or another value beside it."""
     _ = board
     keys = sorted({part.part.key for part in design.components if part.part.bought})
@@ -110,11 +110,11 @@ def _order(design: Design, board: PrintedBoard, chance: random.Random) -> Drawn:
     return f"{key}: {field} {value}", [one.ref for one in of_key], _with(design, changed)
 
 
-def _with(design: Design, components: Sequence[Component]) -> Design:
+def _with(design: BoardDesign, components: Sequence[Component]) -> BoardDesign:
     return dataclasses.replace(design, components=tuple(components))
 
 
-def _print(design: Design, board: PrintedBoard, chance: random.Random) -> Drawn:
+def _print(design: BoardDesign, board: PrintedBoard, chance: random.Random) -> Drawn:
     """A bar, plus, dot, name, reference or label that stands where it should not."""
     _ = design
     return chance.choice((_bar, _text_pair, _text_pair, _dot, _label_pair, _label_away, _references, _gone))(
@@ -219,7 +219,7 @@ def _gone(board: PrintedBoard, chance: random.Random) -> Drawn:
     return f"{mark.text} forgotten", [mark.text], changed
 
 
-def _land(design: Design, board: PrintedBoard, chance: random.Random) -> Drawn:
+def _land(design: BoardDesign, board: PrintedBoard, chance: random.Random) -> Drawn:
     """A pad that stands, is counted, sized or drilled otherwise."""
     _ = design
     part = chance.choice([part for _, part in sorted(board.parts.items()) if part.lands])

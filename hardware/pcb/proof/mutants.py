@@ -1,6 +1,6 @@
 """Wrong circuits, drawn by rule and seed: what the checks of the board must notice.
 
-A mutant changes the circuit (`Design`), never a file. The committed list
+A mutant changes the circuit (`BoardDesign`), never a file. The committed list
 `mutants.txt` was drawn from the circuit as it stood before the checks of this package were written;
 it is kept, so that a check cannot choose its own faults. A line of it is a name and
 the edits that make the fault.
@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from hardware.pcb.circuit.netlist import Component, Design, DesignError
+from hardware.pcb.circuit.netlist import BoardDesign, Component, DesignError
 from hardware.pcb.circuit.parts import PARTS
 from hardware.pcb.proof.expected import ALIKE
 
@@ -25,7 +25,7 @@ OPEN = "-"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Mutant:
+class BoardMutant:
     """One wrong circuit: rule, name, edits.
 
     An edit is a word and what it acts on: `net U5.13 TXD` moves a pin (`-`: open), `swap U5.13 U5.12` exchanges
@@ -47,13 +47,13 @@ class Mutant:
         return frozenset(words | {word.split(".")[0] for word in words})
 
 
-def load(file: Path = LIST) -> tuple[Mutant, ...]:
+def load(file: Path = LIST) -> tuple[BoardMutant, ...]:
     """Return the committed list."""
     rows = [line.split("\t") for line in file.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
-    return tuple(Mutant(rule=rule, name=name, edits=tuple(edits.split("; "))) for rule, name, edits in rows)
+    return tuple(BoardMutant(rule=rule, name=name, edits=tuple(edits.split("; "))) for rule, name, edits in rows)
 
 
-def apply(design: Design, mutant: Mutant) -> Design:
+def apply(design: BoardDesign, mutant: BoardMutant) -> BoardDesign:
     """Return the wrong circuit.
 
     Raises:
@@ -65,7 +65,7 @@ def apply(design: Design, mutant: Mutant) -> Design:
     return design
 
 
-def draw(design: Design, seed: int) -> tuple[Mutant, ...]:
+def draw(design: BoardDesign, seed: int) -> tuple[BoardMutant, ...]:
     """Return faults of single pins, values and parts: each pin open, on another net and crossed, each net joined.
 
     The seed decides which other net, pin, value and part it is.
@@ -99,10 +99,10 @@ def draw(design: Design, seed: int) -> tuple[Mutant, ...]:
             edits += [f"swap {part.ref}.{pin} {chance.choice(others)}"] if others else []
         keys = [key for key, one in PARTS.items() if one.symbol == part.part.symbol and one is not part.part]
         edits += [f"value {part.ref} {chance.choice(keys)}"] if keys else []
-    return tuple(Mutant(rule="drawn", name=edit, edits=(edit,)) for edit in edits)
+    return tuple(BoardMutant(rule="drawn", name=edit, edits=(edit,)) for edit in edits)
 
 
-def draw_whole(design: Design, seed: int) -> tuple[Mutant, ...]:
+def draw_whole(design: BoardDesign, seed: int) -> tuple[BoardMutant, ...]:
     """Return faults of whole parts: turned, mirrored, a pin further, exchanged with another, a net torn in two.
 
     Written when all checks stood, so no check was made for them.
@@ -126,34 +126,34 @@ def draw_whole(design: Design, seed: int) -> tuple[Mutant, ...]:
         unlike = [(one, two) for one in group for two in group if one.ref < two.ref and one.part is not two.part]
         for one, two in chance.sample(unlike, min(2, len(unlike))):
             edits = (f"value {one.ref} {two.part.key}", f"value {two.ref} {one.part.key}")
-            found.append(Mutant(rule="whole", name=f"{one.ref} and {two.ref} exchanged", edits=edits))
+            found.append(BoardMutant(rule="whole", name=f"{one.ref} and {two.ref} exchanged", edits=edits))
     for net, members in design.nets().items():
         if len(members) > 3:
             torn = chance.sample(members, len(members) // 2)
             moves = tuple(f"net {_pin(member)} TORN" for member in torn)
-            found.append(Mutant(rule="whole", name=f"{net} torn in two", edits=moves))
+            found.append(BoardMutant(rule="whole", name=f"{net} torn in two", edits=moves))
     chance.shuffle(found)
     return tuple(found)
 
 
-def _permuted(part: Component, how: str, place: Callable[[int, int], int]) -> Mutant:
+def _permuted(part: Component, how: str, place: Callable[[int, int], int]) -> BoardMutant:
     """Give each pin the net of another one, by its place."""
     nets = [net for _, net in part.pins]
     edits = tuple(
         f"net {part.ref}.{pin} {nets[place(number, len(nets))] or OPEN}" for number, (pin, _) in enumerate(part.pins)
     )
-    return Mutant(rule="whole", name=f"{part.ref} {how}", edits=edits)
+    return BoardMutant(rule="whole", name=f"{part.ref} {how}", edits=edits)
 
 
 def _pin(member: tuple[str, str]) -> str:
     return ".".join(member)
 
 
-def _changed(design: Design, parts: Iterable[Component]) -> Design:
+def _changed(design: BoardDesign, parts: Iterable[Component]) -> BoardDesign:
     return dataclasses.replace(design, components=tuple(parts))
 
 
-def _with_nets(design: Design, nets: Mapping[str, str | None]) -> Design:
+def _with_nets(design: BoardDesign, nets: Mapping[str, str | None]) -> BoardDesign:
     """Return the design with other nets at some pins, which are named REF.PIN."""
     concerned = {name.split(".")[0] for name in nets}
     unknown = set(nets)
@@ -169,25 +169,25 @@ def _with_nets(design: Design, nets: Mapping[str, str | None]) -> Design:
     return _changed(design, parts)
 
 
-def _move(design: Design, pin: str, net: str) -> Design:
+def _move(design: BoardDesign, pin: str, net: str) -> BoardDesign:
     return _with_nets(design, {pin: None if net == OPEN else net})
 
 
-def _exchange(design: Design, first: str, second: str) -> Design:
+def _exchange(design: BoardDesign, first: str, second: str) -> BoardDesign:
     nets = {f"{part.ref}.{pin}": net for part in design.components for pin, net in part.pins}
     if not {first, second} <= set(nets):
         raise DesignError(f"no pin {first} or {second}")
     return _with_nets(design, {first: nets[second], second: nets[first]})
 
 
-def _join(design: Design, first: str, second: str) -> Design:
+def _join(design: BoardDesign, first: str, second: str) -> BoardDesign:
     nets = design.nets()
     if not {first, second} <= set(nets):
         raise DesignError(f"no net {first} or {second}")
     return _with_nets(design, {_pin(member): first for member in nets[second]})
 
 
-def _value(design: Design, ref: str, key: str) -> Design:
+def _value(design: BoardDesign, ref: str, key: str) -> BoardDesign:
     _known(design, ref)
     return _changed(
         design,
@@ -195,16 +195,16 @@ def _value(design: Design, ref: str, key: str) -> Design:
     )
 
 
-def _drop(design: Design, ref: str) -> Design:
+def _drop(design: BoardDesign, ref: str) -> BoardDesign:
     _known(design, ref)
     return _changed(design, (part for part in design.components if part.ref != ref))
 
 
-def _known(design: Design, ref: str) -> None:
+def _known(design: BoardDesign, ref: str) -> None:
     if ref not in {part.ref for part in design.components}:
         raise DesignError(f"no part {ref}")
 
 
-_EDITS: Mapping[str, Callable[..., Design]] = {
+_EDITS: Mapping[str, Callable[..., BoardDesign]] = {
     "net": _move, "swap": _exchange, "join": _join, "value": _value, "drop": _drop,
 }  # fmt: skip

@@ -13,7 +13,7 @@ import math
 import re
 from collections.abc import Iterator, Mapping
 
-from hardware.pcb.circuit.netlist import Component, Design
+from hardware.pcb.circuit.netlist import BoardDesign, Component
 from hardware.pcb.proof.board_file import Land, Mark, Point, PrintedBoard, PrintedPart
 from hardware.pcb.proof.expected import print_names
 
@@ -43,7 +43,7 @@ _BUCK = {"IN": "1", "G": "2", "OUT": "3"}
 _HEADER = {r"DD(\d)": r"DD\1", r"E(\d)S(\d)": r"ENCODER\1_S\2", r"M(\d)C(\d)": r"MOTOR\1_COMM\2", "CON": "P2DX_CON"}
 
 
-def faults(board: PrintedBoard, design: Design) -> list[str]:
+def faults(board: PrintedBoard, design: BoardDesign) -> list[str]:
     """Return what the print says wrongly, one line each."""
     found = [f"{part.ref} is not on the board" for part in design.components if part.ref not in board.parts]
     for component in design.components:
@@ -171,7 +171,7 @@ def _beside(part: PrintedPart, point: Point) -> float:
     return math.hypot(max(left - x, x - right, 0.0), max(top - y, y - bottom, 0.0))
 
 
-def _labels(board: PrintedBoard, design: Design) -> Iterator[str]:
+def _labels(board: PrintedBoard, design: BoardDesign) -> Iterator[str]:
     lands = {ref: part.lands for ref, part in board.parts.items() if part.lands and not ref.startswith("TP")}
     header = {ref: lands[ref] for ref in ("J4",) if ref in lands}
     seen = []
@@ -212,7 +212,7 @@ def header_net(text: str) -> tuple[str, ...] | None:
 
 
 def _poles(
-    mark: Mark, ref: str, board: PrintedBoard, lands: Mapping[str, tuple[Land, ...]], design: Design
+    mark: Mark, ref: str, board: PrintedBoard, lands: Mapping[str, tuple[Land, ...]], design: BoardDesign
 ) -> Iterator[str]:
     """The sign at either end of a text belongs to the pad of its part that stands nearest to it."""
     half = (len(mark.text) - 1) / 2 * LETTER * mark.width_mm

@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable, Collection, Mapping
 
 from hardware.pcb.circuit.modules import BLUEPILL_PINS, ESP32_PINS
-from hardware.pcb.circuit.netlist import Component, Design
+from hardware.pcb.circuit.netlist import BoardDesign, Component
 
 _MODULE_PINS = {"U1": BLUEPILL_PINS, "U2": ESP32_PINS}
 #: A fuse between its lowest and highest resistance.
@@ -19,7 +19,7 @@ FUSE_OHM = 0.13
 CERAMIC_OHM = 0.02
 
 
-def node(design: Design, pin: str) -> str:
+def node(design: BoardDesign, pin: str) -> str:
     """Return the simulator's name of the node at a pin: `U5.13`, or by the print of a module `U2.IO17`.
 
     A pin that is open, or whose part is left out, has a node of its own.
@@ -34,7 +34,7 @@ def node(design: Design, pin: str) -> str:
 
 
 def circuit(
-    design: Design,
+    design: BoardDesign,
     *,
     closed: Collection[tuple[str, str]] = (),
     without: Collection[str] = (),
@@ -75,14 +75,14 @@ def _nodes(part: Component) -> dict[str, str]:
     return {pin: _name(net, f"{part.ref}_{pin}") for pin, net in part.pins}
 
 
-def _resistor(design: Design, part: Component, fuse_ohm: float) -> list[str]:
+def _resistor(design: BoardDesign, part: Component, fuse_ohm: float) -> list[str]:
     _ = design
     one, two = _nodes(part).values()
     ohm = fuse_ohm if part.part.symbol == "FUSE" else part.part.facts["ohm"]
     return [f"R{part.ref} {one} {two} {ohm:g}"]
 
 
-def _capacitor(design: Design, part: Component, fuse_ohm: float) -> list[str]:
+def _capacitor(design: BoardDesign, part: Component, fuse_ohm: float) -> list[str]:
     _ = design, fuse_ohm
     one, two = _nodes(part).values()
     facts, inner = part.part.facts, f"n_in_{part.ref.lower()}"
@@ -92,21 +92,21 @@ def _capacitor(design: Design, part: Component, fuse_ohm: float) -> list[str]:
     ]
 
 
-def _diode(design: Design, part: Component, fuse_ohm: float) -> list[str]:
+def _diode(design: BoardDesign, part: Component, fuse_ohm: float) -> list[str]:
     _ = design, fuse_ohm
     pins = _nodes(part)
     model = "LED" if part.part.symbol == "LED" else part.part.value
     return [f"D{part.ref} {pins['A']} {pins['K']} {model}"]
 
 
-def _transistor(design: Design, part: Component, fuse_ohm: float) -> list[str]:
+def _transistor(design: BoardDesign, part: Component, fuse_ohm: float) -> list[str]:
     _ = design, fuse_ohm
     pins = _nodes(part)
     return [f"Q{part.ref} {pins['3']} {pins['1']} {pins['2']} {part.part.key}"]
 
 
-def _chip(model: str, order: str) -> Callable[[Design, Component, float], list[str]]:
-    def lines(design: Design, part: Component, fuse_ohm: float) -> list[str]:
+def _chip(model: str, order: str) -> Callable[[BoardDesign, Component, float], list[str]]:
+    def lines(design: BoardDesign, part: Component, fuse_ohm: float) -> list[str]:
         _ = design, fuse_ohm
         pins = _nodes(part)
         return [f"X{part.ref} {' '.join(pins[pin] for pin in order.split())} {model}"]
@@ -114,7 +114,7 @@ def _chip(model: str, order: str) -> Callable[[Design, Component, float], list[s
     return lines
 
 
-def _transceiver(design: Design, part: Component, fuse_ohm: float) -> list[str]:
+def _transceiver(design: BoardDesign, part: Component, fuse_ohm: float) -> list[str]:
     """Return the transceiver; its averaged pump takes the smaller of both flying capacitors as fitted."""
     pins = dict(part.pins)
     pumps = [_farad_between(design, pins["1"], pins["3"]), _farad_between(design, pins["4"], pins["5"])]
@@ -122,7 +122,7 @@ def _transceiver(design: Design, part: Component, fuse_ohm: float) -> list[str]:
     return [f"{line} cpump={max(min(pumps), 1e-12):g}"]
 
 
-def _farad_between(design: Design, one: str | None, two: str | None) -> float:
+def _farad_between(design: BoardDesign, one: str | None, two: str | None) -> float:
     return sum(
         part.part.facts["farad"]
         for part in design.components
@@ -130,7 +130,7 @@ def _farad_between(design: Design, one: str | None, two: str | None) -> float:
     )
 
 
-_ELEMENTS: Mapping[str, Callable[[Design, Component, float], list[str]]] = {
+_ELEMENTS: Mapping[str, Callable[[BoardDesign, Component, float], list[str]]] = {
     "R": _resistor, "FUSE": _resistor, "C": _capacitor, "CP": _capacitor, "SCHOTTKY": _diode, "LED": _diode,
     "TVS": _diode, "NPN": _transistor, "PNP": _transistor, "REGULATOR3": _chip("BUCK", "1 2 3"),
     "LM317": _chip("LM317", "3 1 2"), "MAX3232": _transceiver,

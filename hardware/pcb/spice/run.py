@@ -21,7 +21,7 @@ class SimulationError(P2osError):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Result:
+class DeckResult:
     """What a deck gave."""
 
     deck: Deck
@@ -42,7 +42,7 @@ def is_installed() -> bool:
     return shutil.which("ngspice") is not None
 
 
-def simulate(deck: Deck) -> Result:
+def simulate(deck: Deck) -> DeckResult:
     """Run a deck.
 
     Raises:
@@ -65,7 +65,7 @@ def simulate(deck: Deck) -> Result:
         rows = [[float(word) for word in line.split()] for line in data.read_text(encoding="utf-8").splitlines()]
     count = len(deck.traces)
     columns = [[row[0] for row in rows], *([row[2 * index + 1] for row in rows] for index in range(count))]
-    return Result(deck=deck, figures=figures, columns=columns)
+    return DeckResult(deck=deck, figures=figures, columns=columns)
 
 
 def deck_text(deck: Deck, data: Path) -> str:

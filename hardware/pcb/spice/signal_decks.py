@@ -1,15 +1,15 @@
 """Signals: reset, boot, every wire, RS-232 levels, and current that one module feeds into the other."""
 
-from adapter_sim.pinout import Direction, Wire, WireRole, load_pinout
+from adapter_sim.pinout import Wire, WireDirection, WireRole, load_pinout
 from hardware.pcb.circuit.design import series_wires
 from hardware.pcb.circuit.modules import NOT_5V_TOLERANT
-from hardware.pcb.circuit.netlist import Design
+from hardware.pcb.circuit.netlist import BoardDesign
 from hardware.pcb.circuit.parts import PARTS
 from hardware.pcb.spice.deck import CLAMP, MODELS, Deck, limits
 from hardware.pcb.spice.netlist import circuit, node
 
 
-def signal_decks(design: Design) -> tuple[Deck, ...]:
+def signal_decks(design: BoardDesign) -> tuple[Deck, ...]:
     """Return the decks of a variant's signals."""
     return (_reset(design), _stop(design), _boot(design), _wires(design), _rs232(design), _rs232_low(design),
             _back_power(design), _back_power_esp(design))  # fmt: skip
@@ -19,16 +19,16 @@ def signal_decks(design: Design) -> tuple[Deck, ...]:
 _DTR, _LOOP = ("JP2.1", "JP2.2"), ("J7.1", "J7.2")
 
 
-def _board(design: Design, *without: str) -> str:
+def _board(design: BoardDesign, *without: str) -> str:
     """Return models and board without its regulator, its jumpers as delivered."""
     return f"{MODELS}\n" + circuit(design, closed=[_DTR, _LOOP], without=("REGULATOR3", *without))
 
 
-def _rail(design: Design, volts: float = 3.3) -> str:
+def _rail(design: BoardDesign, volts: float = 3.3) -> str:
     return f"Vrail33 {node(design, 'U2.3V3')} 0 {volts:g}"
 
 
-def _reset(design: Design) -> Deck:
+def _reset(design: BoardDesign) -> Deck:
     esp, en, pin = PARTS["ESP32"].facts, node(design, "U2.EN"), node(design, "U1.PB13")
     text = f"""
 {_board(design, "MAX3232")}
@@ -65,7 +65,7 @@ Qthesis en2 b2 e2 BC817
     )  # fmt: skip
 
 
-def _stop(design: Design) -> Deck:
+def _stop(design: BoardDesign) -> Deck:
     """Open the stop's loop while IO17 holds the line at space: the worst that a program can do."""
     esp, en, din, line = PARTS["ESP32"].facts, *(node(design, pin) for pin in ("U2.EN", "U5.11", "J3.3"))
     text = f"""
@@ -114,7 +114,7 @@ Vearth earth 0 PWL(0 0 120m 0 120.01m 1)
     )  # fmt: skip
 
 
-def _boot(design: Design) -> Deck:
+def _boot(design: BoardDesign) -> Deck:
     """Sweep the ESP32's own pull-downs in while nothing drives its pins: 0 is high-impedance, 1 is 45k each."""
     esp = PARTS["ESP32"].facts
     pins = ("IO17", "IO5", "IO15", "IO26", "IO12", "IO2", "IO23")
@@ -163,10 +163,10 @@ _SLOT_S = 1e-3
 def _ends(wire: Wire) -> tuple[str, str]:
     """Return driver and receiver of a wire as pins."""
     pads = f"U1.{wire.bluepill}", f"U2.{wire.esp32_pin('rev-b')}"
-    return pads if wire.direction is Direction.TO_ADAPTER else (pads[1], pads[0])
+    return pads if wire.direction is WireDirection.TO_ADAPTER else (pads[1], pads[0])
 
 
-def _wires(design: Design) -> Deck:
+def _wires(design: BoardDesign) -> Deck:
     wires = series_wires(load_pinout())
     drivers, receivers = [], []
     for slot, wire in enumerate(wires):
@@ -182,7 +182,10 @@ def _wires(design: Design) -> Deck:
 Ball all 0 V = {" + ".join(f"V({far})" for far in receivers)}
 .tran 20u {len(wires) * _SLOT_S:g}
 """
-    low = {Direction.TO_ADAPTER: PARTS["ESP32"].facts["vih_v"], Direction.TO_BLUEPILL: PARTS["BLUEPILL"].facts["vih_v"]}
+    low = {
+        WireDirection.TO_ADAPTER: PARTS["ESP32"].facts["vih_v"],
+        WireDirection.TO_BLUEPILL: PARTS["BLUEPILL"].facts["vih_v"],
+    }
     rows = [
         (wire.name.lower(), low[wire.direction], 3.4, "V", f"{_ends(wire)[0]} high, at {_ends(wire)[1]}")
         for wire in wires
@@ -200,7 +203,7 @@ Ball all 0 V = {" + ".join(f"V({far})" for far in receivers)}
     )  # fmt: skip
 
 
-def _serial(design: Design, vcc: float) -> str:
+def _serial(design: BoardDesign, vcc: float) -> str:
     pump, minus = node(design, "U5.2"), node(design, "U5.6")
     return f"""
 {_board(design)}
@@ -222,7 +225,7 @@ Rrobot robot {node(design, "J3.2")} 300
 _SERIAL_CANNOT = "The averaged pump is fitted to the sheet's typical 5.4 V (5.0 V guaranteed); no ripple, no spread."
 
 
-def _serial_deck(design: Design, name: str, title: str, vcc: float, swing: float) -> Deck:
+def _serial_deck(design: BoardDesign, name: str, title: str, vcc: float, swing: float) -> Deck:
     tx, dtr, rx = node(design, "J3.3"), node(design, "J3.4"), node(design, "U2.IO16")
     return Deck(
         name=name, title=title, circuit=_serial(design, vcc),
@@ -241,11 +244,11 @@ def _serial_deck(design: Design, name: str, title: str, vcc: float, swing: float
     )  # fmt: skip
 
 
-def _rs232(design: Design) -> Deck:
+def _rs232(design: BoardDesign) -> Deck:
     return _serial_deck(design, "rs232", "RS-232 both ways at 3.3 V, 3 kohm at TX and DTR, 9600 baud", 3.3, 5.0)
 
 
-def _rs232_low(design: Design) -> Deck:
+def _rs232_low(design: BoardDesign) -> Deck:
     return _serial_deck(design, "rs232-low", "RS-232 at 3.0 V: a receiver needs 3 V", 3.0, 3.7)
 
 
@@ -259,7 +262,7 @@ Bmeet meet 0 V = V(total) - V(load)
 """
 
 
-def _fed(design: Design, direction: Direction) -> str:
+def _fed(design: BoardDesign, direction: WireDirection) -> str:
     """Drive the wires of a direction high at the module that is on; clamp them at the one that is off."""
     lines = [CLAMP, _board(design, "MAX3232")]
     for number, wire in enumerate(load_pinout().wires):
@@ -267,17 +270,17 @@ def _fed(design: Design, direction: Direction) -> str:
             continue
         near, far = (node(design, pin) for pin in _ends(wire))
         lines.append(f"Vd{number} d{number} 0 3.3\nRo{number} d{number} {near} 30")
-        if direction is Direction.TO_ADAPTER or wire.bluepill in NOT_5V_TOLERANT:
+        if direction is WireDirection.TO_ADAPTER or wire.bluepill in NOT_5V_TOLERANT:
             lines.append(f"Vm{wire.bluepill} {far} c{number} 0\nDc{number} c{number} rail CLAMP")
-    if direction is Direction.TO_BLUEPILL:
+    if direction is WireDirection.TO_BLUEPILL:
         lines.append(_rail(design))
     return "\n".join([*lines, _RAIL])
 
 
-def _back_power(design: Design) -> Deck:
+def _back_power(design: BoardDesign) -> Deck:
     return Deck(
         name="back-power", title="ESP32 on, BluePill off: current through the series resistors",
-        circuit=_fed(design, Direction.TO_BLUEPILL),
+        circuit=_fed(design, WireDirection.TO_BLUEPILL),
         measures=("dc all_pins find v(total) at=0", "dc pin find i(vmpc13) at=0",
                   "dc rail100 find v(rail) when v(meet)=0"),
         limits=limits(("all_pins", 0, 25, "mA", "into the BluePill in all, its rail held at 0 V"),
@@ -292,10 +295,10 @@ def _back_power(design: Design) -> Deck:
     )  # fmt: skip
 
 
-def _back_power_esp(design: Design) -> Deck:
+def _back_power_esp(design: BoardDesign) -> Deck:
     return Deck(
         name="back-power-esp32", title="BluePill on, ESP32 off: current through the series resistors",
-        circuit=_fed(design, Direction.TO_ADAPTER),
+        circuit=_fed(design, WireDirection.TO_ADAPTER),
         measures=("dc all_pins find v(total) at=0", "dc rail100 find v(rail) when v(meet)=0"),
         limits=limits(("all_pins", 0, 25, "mA", "into the ESP32 in all, its rail held at 0 V"),
                       ("rail100", 0, 2.3, "V", "rail with a load of 100 ohm: below the ESP32's brown-out level")),

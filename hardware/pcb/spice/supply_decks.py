@@ -3,13 +3,13 @@
 import re
 
 from hardware.pcb.circuit.electrical import BATTERY_MAX_V, LM317_LIMIT_MA, load_ma
-from hardware.pcb.circuit.netlist import Design
+from hardware.pcb.circuit.netlist import BoardDesign
 from hardware.pcb.circuit.parts import PARTS
 from hardware.pcb.spice.deck import MODELS, Deck, limits
 from hardware.pcb.spice.netlist import circuit, node
 
 
-def supply_decks(buck: Design, linear: Design, ribbon: Design) -> tuple[Deck, ...]:
+def supply_decks(buck: BoardDesign, linear: BoardDesign, ribbon: BoardDesign) -> tuple[Deck, ...]:
     """Return the decks of both supplies; `linear` is the variant lm317, `ribbon` has a header for JP8."""
     return (
         _startup_buck(buck), _startup_lm317(linear), _step_buck(buck), _step_lm317(linear), _bank(buck),
@@ -23,7 +23,7 @@ _FROM_12V, _FROM_BANK = ("JP1.1", "JP1.2"), ("JP1.2", "JP1.3")
 _QUIET = ("MAX3232",)
 
 
-def _supplied(design: Design) -> str:
+def _supplied(design: BoardDesign) -> str:
     """Return the board with a battery at J1 that comes at 1 ms, and both modules' loads."""
     return f"""
 {MODELS}
@@ -39,14 +39,14 @@ Resp {node(design, "U2.5V")} 0 40
 _MODULES = (("bluepill", 4.3, 5.2, "V", "5V at the BluePill"), ("esp", 4.3, 5.2, "V", "5V at the ESP32"))
 
 
-def _at_modules(design: Design, at: str) -> tuple[str, str]:
+def _at_modules(design: BoardDesign, at: str) -> tuple[str, str]:
     return (
         f"tran bluepill find v({node(design, 'U1.5V')}) at={at}",
         f"tran esp find v({node(design, 'U2.5V')}) at={at}",
     )
 
 
-def _startup_buck(design: Design) -> Deck:
+def _startup_buck(design: BoardDesign) -> Deck:
     out, rail = node(design, "JP1.1"), node(design, "U3.1")
     return Deck(
         name="startup-buck", title="Start-up, rev B (buck module)", circuit=f"{_supplied(design)}.tran 5u 12m\n",
@@ -64,7 +64,7 @@ def _startup_buck(design: Design) -> Deck:
     )  # fmt: skip
 
 
-def _startup_lm317(design: Design) -> Deck:
+def _startup_lm317(design: BoardDesign) -> Deck:
     out, rail, adjust = node(design, "JP1.1"), node(design, "U3.3"), node(design, "U3.1")
     return Deck(
         name="startup-lm317", title="Start-up, variant lm317 (5 V)", circuit=f"{_supplied(design)}.tran 5u 60m\n",
@@ -79,7 +79,7 @@ def _startup_lm317(design: Design) -> Deck:
     )  # fmt: skip
 
 
-def _stepped(design: Design, most_ma: float, start: str, analysis: str) -> str:
+def _stepped(design: BoardDesign, most_ma: float, start: str, analysis: str) -> str:
     """Return the board at a steady low battery, with a step of load at the choice of source."""
     return f"""
 {MODELS}
@@ -90,7 +90,7 @@ Istep {node(design, "JP1.2")} 0 PULSE(20m {most_ma:g}m {start} 1u 1u 2m 10m)
 """
 
 
-def _step_buck(design: Design) -> Deck:
+def _step_buck(design: BoardDesign) -> Deck:
     out = node(design, "JP1.2")
     return Deck(
         name="step-buck", title="Load step 20 to 500 mA, rev B", circuit=_stepped(design, 500, "8m", ".tran 1u 12m 6m"),
@@ -106,7 +106,7 @@ def _step_buck(design: Design) -> Deck:
     )  # fmt: skip
 
 
-def _step_lm317(design: Design) -> Deck:
+def _step_lm317(design: BoardDesign) -> Deck:
     out = node(design, "JP1.2")
     return Deck(
         name="step-lm317", title=f"Load step 20 to {LM317_LIMIT_MA:g} mA, variant lm317",
@@ -123,7 +123,7 @@ def _step_lm317(design: Design) -> Deck:
     )  # fmt: skip
 
 
-def _bank(design: Design) -> Deck:
+def _bank(design: BoardDesign) -> Deck:
     text = f"""
 {MODELS}
 {circuit(design, closed=[_FROM_BANK], without=(*_QUIET, "REGULATOR3"))}
@@ -145,7 +145,7 @@ Resp {node(design, "U2.5V")} 0 10
     )  # fmt: skip
 
 
-def _minimum_load(design: Design) -> Deck:
+def _minimum_load(design: BoardDesign) -> Deck:
     out = node(design, "U4.2")
     text = f"""
 {MODELS}
@@ -177,7 +177,7 @@ Vcur cur 0 0
     )  # fmt: skip
 
 
-def _inrush(design: Design) -> Deck:
+def _inrush(design: BoardDesign) -> Deck:
     rail = node(design, "U3.1")
     text = f"""
 {MODELS}
@@ -202,7 +202,7 @@ Rq q 0 1g
     )  # fmt: skip
 
 
-def _reverse(design: Design) -> Deck:
+def _reverse(design: BoardDesign) -> Deck:
     rail = node(design, "U3.1")
     text = f"""
 {MODELS}
@@ -224,7 +224,7 @@ Rload {rail} 0 100
     )  # fmt: skip
 
 
-def _jp8(design: Design) -> Deck:
+def _jp8(design: BoardDesign) -> Deck:
     """Sweep JP8's 12 V, its jumper fitted, with a battery of 12 V at J1 and without: who feeds whom, and with what."""
     without = (*_QUIET, "REGULATOR3")
     joined = circuit(design, closed=[("JP3.1", "JP3.2")], without=without)

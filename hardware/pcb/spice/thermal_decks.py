@@ -1,12 +1,12 @@
 """Heat: junction of the LM317 and allowed current of the buck module against ambient."""
 
 from hardware.pcb.circuit.electrical import BATTERY_MAX_V, LM317_AVERAGE_MA, LM317_CHARGING_MA, LM317_LIMIT_MA, load_ma
-from hardware.pcb.circuit.netlist import Design
+from hardware.pcb.circuit.netlist import BoardDesign
 from hardware.pcb.circuit.parts import PARTS
 from hardware.pcb.spice.deck import Deck, limits
 
 
-def thermal_decks(buck: Design) -> tuple[Deck, ...]:
+def thermal_decks(buck: BoardDesign) -> tuple[Deck, ...]:
     """Return the decks of heat; `buck` is rev-b."""
     return (_thermal_lm317(), _thermal_buck(buck))
 
@@ -55,7 +55,7 @@ Ipc 0 tjc {charging:g}
     )  # fmt: skip
 
 
-def _thermal_buck(design: Design) -> Deck:
+def _thermal_buck(design: BoardDesign) -> Deck:
     amps = load_ma(design) * 1e-3
     loss = 5 * amps * (1 / PARTS["BUCK"].facts["efficiency"] - 1)
     circuit = f"""

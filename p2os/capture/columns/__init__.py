@@ -12,9 +12,9 @@ sip["raw_x"], sip.structured(), sip.ragged["sonar"].columns["raw_range"]
 Needs NumPy (`pip install numpy`).
 """
 
-from p2os.capture.columns.framing import Damage, find_frames
+from p2os.capture.columns.framing import RejectedCounts, find_frames
 from p2os.capture.columns.table import Table
 from p2os.capture.columns.tables import Columns, decode
 from p2os.capture.columns.walker import Ragged, Spans
 
-__all__ = ["Columns", "Damage", "Ragged", "Spans", "Table", "decode", "find_frames"]
+__all__ = ["Columns", "Ragged", "RejectedCounts", "Spans", "Table", "decode", "find_frames"]

@@ -17,7 +17,7 @@ from p2os.capture.columns.framing import Flags, Indexes
 _KINDS: dict[str, tuple[type, Cell]] = {"b": (np.bool_, False), "i": (np.int64, 0), "f": (np.float64, 0.0)}
 
 
-class Conversion:
+class ArrayConversion:
     """What a field says of each raw value of 16 bits or fewer, as arrays that are indexed by its bits.
 
     Args:
@@ -62,7 +62,7 @@ class Column(Sequence[Cell]):
 
     def __init__(
         self, codes: npt.NDArray[Any], present: Flags | None = None,
-        conversion: Conversion | None = None,
+        conversion: ArrayConversion | None = None,
     ) -> None:  # fmt: skip
         self.codes, self.present, self.conversion = codes, present, conversion
 

@@ -9,7 +9,7 @@ candidate. A prefix sum of pairs, modulo 2^32, gives each candidate's checksum a
 a difference of two numbers. Of candidates that overlap (rare: a frame within a
 payload) the first wins.
 
-Invariants: the frames are in the order of the stream and do not overlap; `Damage` equals the
+Invariants: the frames are in the order of the stream and do not overlap; `RejectedCounts` equals the
 `p2os.protocol.frames.DecoderStats` of a decoder that was fed the same bytes and left alone.
 """
 
@@ -138,7 +138,7 @@ Flags: TypeAlias = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Damage:
+class RejectedCounts:
     """Counts of what was rejected; of bytes where the name ends so."""
 
     noise_bytes: int
@@ -150,7 +150,7 @@ class Damage:
     rescued: int
 
 
-def damage_of(data: Bytes, starts: Indexes, ends: Indexes, pauses: Indexes | None) -> Damage:
+def damage_of(data: Bytes, starts: Indexes, ends: Indexes, pauses: Indexes | None) -> RejectedCounts:
     """Return what was wrong.
 
     Args:
@@ -165,7 +165,7 @@ def damage_of(data: Bytes, starts: Indexes, ends: Indexes, pauses: Indexes | Non
     reach = np.maximum.accumulate(np.where(stalled, rejected.limits, rejected.places + rejected.sizes))
     before = np.searchsorted(rejected.places, first)
     rescued = np.concatenate(([0], reach))[before] > first
-    return Damage(
+    return RejectedCounts(
         noise_bytes=len(data) - int((last - first).sum()),
         bad_checksums=int((~illegal & ~stalled).sum()),
         bad_counts=int(illegal.sum()),

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 import numpy.typing as npt
 
-from p2os.capture.chunks import LETTERS, Block, Direction
+from p2os.capture.chunks import LETTERS, ChunkBlock, Direction
 from p2os.capture.columns.framing import Bytes, Indexes, find_frames
 from p2os.capture.describe import command_name
 from p2os.capture.listing import COMMAND_NAMES, Finder, Lister, ListingRow, LoopFinder
@@ -34,7 +34,7 @@ _Flags = npt.NDArray[np.bool_]
 
 
 def rows_passing(
-    blocks: Iterable[Block], reading: Reading | FollowedReading, wanted: Iterable[str]
+    blocks: Iterable[ChunkBlock], reading: Reading | FollowedReading, wanted: Iterable[str]
 ) -> Iterator[ListingRow]:
     """Yield the rows of a capture but for some of those whose names nobody wants, all damage with them.
 
@@ -127,7 +127,7 @@ class _Chunks:
         passing: What is passed over.
     """
 
-    def __init__(self, block: Block, passing: Passing) -> None:
+    def __init__(self, block: ChunkBlock, passing: Passing) -> None:
         self._block, self._passing = block, passing
         self._passed = np.zeros(len(block), np.bool_)
         #: Before the chunk, and behind the last, no frame that is passed over has begun and not ended.

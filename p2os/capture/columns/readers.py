@@ -6,14 +6,14 @@ import numpy as np
 from construct import Construct, Struct
 
 from p2os.capture.columns.gathering import gather
-from p2os.capture.columns.walker import Spans, Walk
+from p2os.capture.columns.walker import PacketWalk, Spans
 from p2os.protocol.config_packet import FIELDS, ConfigPacket
 from p2os.protocol.packets import PACKET_KINDS, BatteryPacket, CompassPacket, PlaylistPacket, SiminfoPacket
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import HEAD, TAIL
 
 #: Reads into a walk; the walk's `sound` says which packets it could read.
-Reader = Callable[[Walk, Profile], None]
+Reader = Callable[[PacketWalk, Profile], None]
 #: Fields of a layout that only count others; a battery packet keeps its own, as its rows may be empty.
 COUNTS = frozenset({"count", "input_count", "output_count", "analog_count"})
 
@@ -29,7 +29,7 @@ _TAIL_BYTES = np.concatenate(([0], _TAIL_ENDS))
 def by_layout(layout: Construct, *, keep: str = "") -> Reader:
     """Return the reader of a packet that is one declared layout and what follows it."""
 
-    def read(walk: Walk, profile: Profile) -> None:
+    def read(walk: PacketWalk, profile: Profile) -> None:
         del profile
         walk.read(layout)
         for name in COUNTS & walk.columns.keys() - {keep}:
@@ -39,12 +39,12 @@ def by_layout(layout: Construct, *, keep: str = "") -> Reader:
     return read
 
 
-def take_rest(walk: Walk, name: str = "rest") -> None:
+def take_rest(walk: PacketWalk, name: str = "rest") -> None:
     """Keep what follows the last known field."""
     walk.texts[name] = Spans(walk.places, walk.ends)
 
 
-def read_sip(walk: Walk, profile: Profile) -> None:
+def read_sip(walk: PacketWalk, profile: Profile) -> None:
     """Read standard SIPs in all their lengths."""
     walk.columns["kind"] = walk.data[walk.places - 1]
     walk.read(HEAD)
@@ -62,7 +62,7 @@ def read_sip(walk: Walk, profile: Profile) -> None:
     take_rest(walk)
 
 
-def _read_tail(walk: Walk) -> None:
+def _read_tail(walk: PacketWalk) -> None:
     """Read as many fields of the tail as each packet has room for; those that it has not are 0."""
     counts = _TAIL_FIELDS[np.clip(walk.ends - walk.places, 0, 255)]
     counts[~walk.sound] = 0
@@ -80,7 +80,7 @@ def _read_tail(walk: Walk) -> None:
     walk.places = walk.places + _TAIL_BYTES[counts]
 
 
-def read_config(walk: Walk, profile: Profile) -> None:
+def read_config(walk: PacketWalk, profile: Profile) -> None:
     """Read CONFIGpacs; a field that was not sent is 0 or empty, as in the packet's class."""
     del profile
     sent = np.zeros(len(walk.places), np.uint8)
@@ -97,7 +97,7 @@ def read_config(walk: Walk, profile: Profile) -> None:
     take_rest(walk)
 
 
-def read_identity(walk: Walk, profile: Profile) -> None:
+def read_identity(walk: PacketWalk, profile: Profile) -> None:
     """Read identities: three texts and nothing more."""
     del profile
     for name in ("name", "robot_class", "subclass"):
@@ -105,14 +105,14 @@ def read_identity(walk: Walk, profile: Profile) -> None:
     walk.sound &= walk.places == walk.ends
 
 
-def read_bytes(walk: Walk, profile: Profile) -> None:
+def read_bytes(walk: PacketWalk, profile: Profile) -> None:
     """Read packets that have a type and bytes: SERAUXpacs, reset notices, and what is not read."""
     del profile
     walk.columns["kind"] = walk.data[walk.places - 1]
     take_rest(walk, "data")
 
 
-def read_playlist(walk: Walk, profile: Profile) -> None:
+def read_playlist(walk: PacketWalk, profile: Profile) -> None:
     """Read PLAYLISTpacs; a robot without sounds sends zeros, one less than a sound takes."""
     del profile
     starts, size = walk.places, len(PlaylistPacket.NO_SOUNDS)
@@ -128,7 +128,7 @@ def read_playlist(walk: Walk, profile: Profile) -> None:
     take_rest(walk)
 
 
-def read_siminfo(walk: Walk, profile: Profile) -> None:
+def read_siminfo(walk: PacketWalk, profile: Profile) -> None:
     """Read SIMINFOs: their devices have texts of any length, so one device of each packet is read at a time."""
     del profile
     *head, devices = SiminfoPacket.LAYOUT.subcons

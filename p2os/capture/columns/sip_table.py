@@ -16,15 +16,15 @@ import numpy as np
 import numpy.typing as npt
 
 from p2os.capture.cells import Cell
-from p2os.capture.chunks import LETTERS, Block, Direction
-from p2os.capture.columns.column import Column, Conversion
+from p2os.capture.chunks import LETTERS, ChunkBlock, Direction
+from p2os.capture.columns.column import ArrayConversion, Column
 from p2os.capture.columns.framing import LARGEST_FRAME, Bytes, Indexes, stalls_of
 from p2os.capture.columns.table import Table as RawTable
 from p2os.capture.columns.tables import Columns, decode
 from p2os.capture.describe import RAW_OF, Memo, SipFields
 from p2os.capture.reading import Reading
 from p2os.capture.sip_columns import KIND_SAYS, LEADING
-from p2os.capture.table import FIRST_ROWS, Table, uniform
+from p2os.capture.table import FIRST_ROWS, CaptureTable, uniform
 from p2os.protocol.frames import CHECKSUM_BYTES, GIVE_UP_NS, PREFIX_BYTES
 from p2os.protocol.sip import POSITION_MASK, SIP_KINDS, TAIL
 from simbase.timing import NS_PER_S, Nanos
@@ -34,8 +34,8 @@ BLOCK_BYTES = 1 << 19
 
 
 def sip_tables(
-    blocks: Iterable[Block], reading: Reading, *, first_rows: int = FIRST_ROWS, block: int = BLOCK_BYTES
-) -> Iterator[Table]:
+    blocks: Iterable[ChunkBlock], reading: Reading, *, first_rows: int = FIRST_ROWS, block: int = BLOCK_BYTES
+) -> Iterator[CaptureTable]:
     """Yield a robot's SIPs as tables in SI units.
 
     Args:
@@ -48,9 +48,9 @@ def sip_tables(
     return uniform(_first_alone((builder.table(*part) for part in _blocks(blocks, reading, block)), first_rows))
 
 
-def _first_alone(tables: Iterator[Table], first_rows: int) -> Iterator[Table]:
+def _first_alone(tables: Iterator[CaptureTable], first_rows: int) -> Iterator[CaptureTable]:
     """Yield the same rows with exactly so many in the first table, if there are."""
-    head: Table | None = None
+    head: CaptureTable | None = None
     for table in tables:
         head = table if head is None else _joined(head, table)
         if head.rows >= first_rows:
@@ -63,21 +63,21 @@ def _first_alone(tables: Iterator[Table], first_rows: int) -> Iterator[Table]:
         yield head
 
 
-def _joined(first: Table, second: Table) -> Table:
+def _joined(first: CaptureTable, second: CaptureTable) -> CaptureTable:
     none = [[None] * table.rows for table in (first, second)]
     parts = {
         name: (first.columns.get(name, none[0]), second.columns.get(name, none[1]))
         for name in {**first.columns, **second.columns}
     }
-    return Table({name: Column.joined(*pair) for name, pair in parts.items()})
+    return CaptureTable({name: Column.joined(*pair) for name, pair in parts.items()})
 
 
-def _cut(table: Table, start: int, end: int) -> Table:
+def _cut(table: CaptureTable, start: int, end: int) -> CaptureTable:
     columns = {name: column[start:end] for name, column in table.columns.items()}
     has = {
         name: name in LEADING or not isinstance(column, Column) or column.has_any() for name, column in columns.items()
     }
-    return Table({name: column for name, column in columns.items() if has[name]})
+    return CaptureTable({name: column for name, column in columns.items() if has[name]})
 
 
 class _Held:
@@ -95,7 +95,7 @@ class _Held:
         self._last_ns: Nanos = 0
         self.size = 0
 
-    def take(self, block: Block) -> None:
+    def take(self, block: ChunkBlock) -> None:
         """Take a block of both sides."""
         at_ns, ends = np.frombuffer(block.at_ns, np.int64), np.frombuffer(block.ends, np.int64)
         sizes, data = np.diff(ends, prepend=0), block.data
@@ -148,7 +148,7 @@ class _Held:
             self._ticks = self._ticks[self._ticks >= self._at_ns[0]]
 
 
-def _blocks(blocks: Iterable[Block], reading: Reading, size: int) -> Iterator[tuple[RawTable, int, Indexes]]:
+def _blocks(blocks: Iterable[ChunkBlock], reading: Reading, size: int) -> Iterator[tuple[RawTable, int, Indexes]]:
     held, least = _Held(reading), 0
     for block in blocks:
         held.take(block)
@@ -203,15 +203,15 @@ class _Builder:
         self._metres = reading.parameters.distance_conv_mm / 1000
         memos = cast("dict[str, Memo[Cell]]", SipFields(reading.profile, reading.parameters).memos)
         self._names = list(memos)
-        self._fields = {name: Conversion(memo.__getitem__, type(memo[0])) for name, memo in memos.items()}
+        self._fields = {name: ArrayConversion(memo.__getitem__, type(memo[0])) for name, memo in memos.items()}
         kind = SIP_KINDS[0]
-        self._names_of = {name: Conversion(convert, type(convert(kind))) for name, convert in KIND_SAYS.items()}
+        self._names_of = {name: ArrayConversion(convert, type(convert(kind))) for name, convert in KIND_SAYS.items()}
         self._range = self._fields["sonar_m"]
-        self._tail = {name: Conversion(int, int) for name, _, _ in TAIL}
+        self._tail = {name: ArrayConversion(int, int) for name, _, _ in TAIL}
         #: Counts and raw value of the last SIP, by coordinate.
         self._last: dict[str, tuple[int, int]] = {}
 
-    def table(self, raw: RawTable, rows: int, times: Indexes) -> Table:
+    def table(self, raw: RawTable, rows: int, times: Indexes) -> CaptureTable:
         """Return the first rows of a block, columns in the order in which the rows first have them."""
         kinds = raw["kind"][:rows]
         leading = [conversion.column(kinds) for conversion in self._names_of.values()]
@@ -237,7 +237,7 @@ class _Builder:
         columns: dict[str, Sequence[Cell]] = dict(
             zip(LEADING, (Column(times[:rows] / NS_PER_S), *leading), strict=True)
         )
-        return Table({**columns, **dict(found[order] for order in sorted(found))})
+        return CaptureTable({**columns, **dict(found[order] for order in sorted(found))})
 
     def _followed(self, name: str, raw: RawTable, rows: int) -> Column:
         """Return a coordinate followed over the wraps of its counter, metres; the first within half a span of 0."""

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from p2os.capture.columns.framing import Damage, Indexes, damage_of, find_frames
+from p2os.capture.columns.framing import Indexes, RejectedCounts, damage_of, find_frames
 from p2os.capture.columns.readers import READERS
 from p2os.capture.columns.table import Table
-from p2os.capture.columns.walker import Walk
+from p2os.capture.columns.walker import PacketWalk
 from p2os.protocol.packets import PACKET_KINDS, CompassPacket
 from p2os.protocol.profiles import Profile
 
@@ -60,7 +60,7 @@ class Columns:
         """The type of each packet."""
         return self.data[self.starts]
 
-    def damage(self) -> Damage:
+    def damage(self) -> RejectedCounts:
         """Return what was wrong with the capture, by kind of error."""
         return damage_of(self.data, self.starts, self.ends, self.pauses)
 
@@ -117,7 +117,7 @@ def _read(
             lost += _read(tables, "compass_unsized", data, starts, ends, packets[short], profile)
             packets = packets[~short]
     while len(packets):
-        walk = Walk(data, starts[packets] + 1, ends[packets])
+        walk = PacketWalk(data, starts[packets] + 1, ends[packets])
         READERS[name](walk, profile)
         if walk.sound.all():
             tables[name] = Table(

@@ -52,7 +52,7 @@ class Ragged:
 
 
 @dataclass(slots=True)
-class Walk:
+class PacketWalk:
     """What was read so far of the packets of one kind, and which of them are sound."""
 
     data: npt.NDArray[np.uint8]
@@ -131,10 +131,10 @@ class Walk:
     def take_items(self, item: Construct, counts: Column) -> Ragged:
         """Read so many items of any length of each packet, one item of every packet at a time."""
         rows: list[Indexes] = []
-        walks: list[Walk] = []
+        walks: list[PacketWalk] = []
         active, taken = np.flatnonzero(self.sound & (counts > 0)), 0
         while len(active):
-            walk = Walk(self.data, self.places[active], self.ends[active])
+            walk = PacketWalk(self.data, self.places[active], self.ends[active])
             walk.read(item)
             self.places[active], self.sound[active] = walk.places, walk.sound
             rows.append(active)

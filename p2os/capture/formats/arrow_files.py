@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from p2os.capture.cells import Cell
-from p2os.capture.table import Table
+from p2os.capture.table import CaptureTable
 from simbase.errors import MissingDependencyError
 from simbase.files import open_to_write
 
@@ -14,7 +14,7 @@ from simbase.files import open_to_write
 GROUP_ROWS = 1 << 16
 
 
-def write_parquet(tables: Iterable[Table], path: Path) -> int:
+def write_parquet(tables: Iterable[CaptureTable], path: Path) -> int:
     """Write tables as a Parquet file; return how many rows.
 
     Raises:
@@ -32,7 +32,7 @@ def write_parquet(tables: Iterable[Table], path: Path) -> int:
     return _write(tables, path, writer_of)
 
 
-def write_arrow(tables: Iterable[Table], path: Path) -> int:
+def write_arrow(tables: Iterable[CaptureTable], path: Path) -> int:
     """Write tables as an Arrow IPC file (also known as Feather 2); return how many rows.
 
     Raises:
@@ -57,7 +57,7 @@ def _pyarrow(path: Path) -> Any:
     return pa
 
 
-def _write(tables: Iterable[Table], path: Path, writer_of: Any) -> int:
+def _write(tables: Iterable[CaptureTable], path: Path, writer_of: Any) -> int:
     """Write tables; without any there is no file."""
     pa = _pyarrow(path)
     from p2os.capture.columns.arrow import cells_array, kind_of

@@ -13,7 +13,7 @@ import contextlib
 import struct
 from collections.abc import Callable, Iterable, Iterator
 
-from p2os.capture.chunks import Block, Chunk, Direction, blocks_of
+from p2os.capture.chunks import Chunk, ChunkBlock, Direction, blocks_of
 from p2os.capture.formats.conversations import IN_DIRECTION, LEAST_RECORDS, LINKTYPE_USER0, Conversations
 from p2os.capture.formats.pcap_records import (
     FILE_HEADER,
@@ -59,7 +59,7 @@ def write_pcap(chunks: Iterable[Chunk], base_ns: Nanos = 0) -> bytes:
     return file_header() + b"".join(record(chunk, base_ns) for chunk in chunks)
 
 
-def pcap_blocks(blocks: Iterable[bytes]) -> Iterator[Block]:
+def pcap_blocks(blocks: Iterable[bytes]) -> Iterator[ChunkBlock]:
     """Yield what a pcap or pcapng file holds; times count from its first record.
 
     Args:
@@ -79,7 +79,7 @@ def pcap_blocks(blocks: Iterable[bytes]) -> Iterator[Block]:
         )
 
 
-def _bulk(count: int) -> Callable[[Records, Conversations], Iterator[Block]]:
+def _bulk(count: int) -> Callable[[Records, Conversations], Iterator[ChunkBlock]]:
     """Return how so many records are read."""
     if count >= LEAST_RECORDS:
         with contextlib.suppress(ImportError):

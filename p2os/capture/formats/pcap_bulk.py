@@ -15,7 +15,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from p2os.capture.chunks import LETTERS, Block, Direction, blocks_of
+from p2os.capture.chunks import LETTERS, ChunkBlock, Direction, blocks_of
 from p2os.capture.columns.gathering import gather, joined
 from p2os.capture.formats.conversations import IN_DIRECTION, LEAST_RECORDS, LINKTYPE_USER0, LONGEST_NS, Conversations
 from p2os.capture.formats.pcap_records import Records
@@ -33,7 +33,7 @@ _MOST_ENDS = 8
 _CODES = np.frombuffer(b"".join(LETTERS[direction] for direction in IN_DIRECTION.values()), np.uint8)
 
 
-def in_bulk(records: Records, said: Conversations) -> Iterator[Block]:
+def in_bulk(records: Records, said: Conversations) -> Iterator[ChunkBlock]:
     """Yield what records hold; `said` knows what came before, and learns of them."""
     bulk = _times(records, said)
     if bulk is None:
@@ -73,20 +73,22 @@ def _times(records: Records, said: Conversations) -> tuple[_Numbers, _Numbers, _
     return at_ns, starts + layout.data_at, starts + (layout.data_at + lengths)
 
 
-def _block(data: bytes, at_ns: _Numbers, senders: _Bytes, begins: _Numbers, ends: _Numbers) -> Iterator[Block]:
+def _block(data: bytes, at_ns: _Numbers, senders: _Bytes, begins: _Numbers, ends: _Numbers) -> Iterator[ChunkBlock]:
     """Yield what stands between some places, if any does."""
     sizes = ends - begins
     if not sizes.all():
         has = sizes > 0
         at_ns, senders, begins, ends, sizes = at_ns[has], senders[has], begins[has], ends[has], sizes[has]
     if len(sizes):
-        yield Block(
+        yield ChunkBlock(
             at_ns=array("q", at_ns.tobytes()), senders=senders.tobytes(), ends=array("q", np.cumsum(sizes).tobytes()),
             data=joined(data, begins, sizes), is_in_order=bool((at_ns[1:] >= at_ns[:-1]).all()),
         )  # fmt: skip
 
 
-def _ours(records: Records, said: Conversations, at_ns: _Numbers, begins: _Numbers, ends: _Numbers) -> Iterator[Block]:
+def _ours(
+    records: Records, said: Conversations, at_ns: _Numbers, begins: _Numbers, ends: _Numbers
+) -> Iterator[ChunkBlock]:
     codes = np.frombuffer(records.data + b"\xff", np.uint8)[begins]
     if (codes > 1).any() or (begins == ends).any():
         yield from blocks_of(said.parts(records))
@@ -134,7 +136,7 @@ class _Segments:
         self._begins = begins + skip + 20 + header
         self._sizes = whole - 20 - header
 
-    def blocks(self) -> Iterator[Block]:
+    def blocks(self) -> Iterator[ChunkBlock]:
         """Yield what they hold."""
         place = 0
         odd = np.flatnonzero(~self._plain & ~self._empty).tolist()
@@ -147,7 +149,7 @@ class _Segments:
             yield from self._one_by_one(place, last + 1)
             place = last + 1
 
-    def _one_by_one(self, first: int, last: int) -> Iterator[Block]:
+    def _one_by_one(self, first: int, last: int) -> Iterator[ChunkBlock]:
         if first < last:
             yield from blocks_of(self._said.parts(self._records, first, last))
 
@@ -174,7 +176,7 @@ class _Segments:
             self._halves.append((mine, self._said.streams.direction(source, target), half))
         return place
 
-    def _run(self, first: int, last: int) -> Iterator[Block]:
+    def _run(self, first: int, last: int) -> Iterator[ChunkBlock]:
         """Yield what packets in order hold."""
         senders = np.zeros(last - first, np.uint8)
         for mine, direction, half in self._halves:

@@ -29,7 +29,7 @@ _CUT_IN_RECORD = "the capture file is cut off in the middle of a record"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Layout:
+class RecordLayout:
     """Where what stands in a record; numbers are of four bytes.
 
     Args:
@@ -66,7 +66,7 @@ class Records:
 
     data: bytes
     starts: list[int]
-    layout: Layout
+    layout: RecordLayout
     link: int
 
     def packets(self, first: int, last: int) -> Iterator[tuple[Nanos, bytes]]:
@@ -114,7 +114,7 @@ class _Pcap:
         order = "<" if int.from_bytes(data[:4], "little") in {MAGIC_US, MAGIC_NS} else ">"
         magic, _, _, _, _, _, link = struct.unpack_from(order + FILE_HEADER, data)
         unit = NS_PER_S if magic == MAGIC_NS else 1_000_000
-        self._layout = Layout(
+        self._layout = RecordLayout(
             order=order, high_at=0, low_at=4, radix=unit, ticks_per_s=unit, length_at=8, data_at=16
         )  # fmt: skip
         self._link, self._is_first = link & 0xFFFF, True
@@ -200,7 +200,7 @@ class _PcapNg:
         if number >= len(self._interfaces):
             raise FileError(f"the capture file names interface {number}, which it never declared")
         link, ticks = self._interfaces[number]
-        layout = Layout(
+        layout = RecordLayout(
             order=self._order, high_at=12, low_at=16, radix=1 << 32, ticks_per_s=0 if is_simple else ticks,
             length_at=8 if is_simple else 20, data_at=12 if is_simple else 28, size_at=4,
         )  # fmt: skip

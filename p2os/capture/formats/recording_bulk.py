@@ -12,7 +12,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from p2os.capture.chunks import Block, Direction
+from p2os.capture.chunks import ChunkBlock, Direction
 from p2os.capture.columns.gathering import gather, joined
 from p2os.capture.formats.recording import chunk_words
 
@@ -26,7 +26,7 @@ Indexes: TypeAlias = npt.NDArray[np.int64]
 _NEWLINE, _RETURN, _ZERO, _COMMA = b"\n\r0,"
 
 
-def plain_lines(lines: bytes) -> Block | None:
+def plain_lines(lines: bytes) -> ChunkBlock | None:
     """Return what whole lines hold if each is spelled as `chunk_line` does."""
     data = np.frombuffer(lines, np.uint8)
     ends = np.flatnonzero(data == _NEWLINE)
@@ -45,7 +45,7 @@ def plain_lines(lines: bytes) -> Block | None:
         whole = unhexlify(joined(lines, texts, sizes))
     except ValueError:
         return None
-    return Block(
+    return ChunkBlock(
         at_ns=array("q", at_ns.tobytes()), senders=senders.tobytes(), ends=array("q", np.cumsum(sizes >> 1).tobytes()),
         data=whole, is_in_order=bool((at_ns[1:] >= at_ns[:-1]).all()),
     )  # fmt: skip

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO, cast
 
-from p2os.capture.chunks import Block, Capture, Chunk, Direction, Part, block_of, blocks_of, chunks_of, in_order
+from p2os.capture.chunks import Capture, Chunk, ChunkBlock, Direction, Part, block_of, blocks_of, chunks_of, in_order
 from p2os.capture.formats.hex_text import hex_parts, is_hexdump, looks_like_hex
 from p2os.capture.formats.pcap import is_pcap, pcap_blocks
 from p2os.capture.formats.recording import note_of, recorded_parts
@@ -30,7 +30,7 @@ LONGEST_LINE = 16 << 20
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Source:
+class CaptureSource:
     """A capture that is read while its blocks are taken.
 
     Args:
@@ -40,7 +40,7 @@ class Source:
         has_one_origin: Whether all of the robot's chunks have a direction, or none has.
     """
 
-    blocks: Iterator[Block]
+    blocks: Iterator[ChunkBlock]
     has_time: bool = True
     note: str = ""
     has_one_origin: bool = True
@@ -59,7 +59,7 @@ class Source:
         return Capture(chunks=tuple(self.chunks), has_time=self.has_time, note=self.note)
 
 
-def open_capture(file: BinaryIO, direction: Direction | None = None) -> Source:
+def open_capture(file: BinaryIO, direction: Direction | None = None) -> CaptureSource:
     """Begin to read a capture of whatever kind its bytes are: pcap, pcapng, JSON lines, hex text, else raw bytes.
 
     Args:
@@ -72,20 +72,22 @@ def open_capture(file: BinaryIO, direction: Direction | None = None) -> Source:
     )
     head = buffered.peek(BLOCK_BYTES)
     if is_pcap(head):
-        return Source(blocks=in_order(pcap_blocks(_blocks_of_bytes(buffered))))
+        return CaptureSource(blocks=in_order(pcap_blocks(_blocks_of_bytes(buffered))))
     mark = codecs.BOM_UTF8 if head.startswith(codecs.BOM_UTF8) else b""  # editors of Windows put it before a text
     text = _text(head.removeprefix(mark))
     if text is not None:
         buffered.read(len(mark))
     if text is not None and text.lstrip().startswith("{"):
-        return Source(blocks=in_order(_recorded(buffered)), note=note_of(text.lstrip().split("\n")[0]))
+        return CaptureSource(blocks=in_order(_recorded(buffered)), note=note_of(text.lstrip().split("\n")[0]))
     is_hex = bool(text and text.strip())
     parts = hex_parts(_lines(_blocks_of_lines(buffered)), is_dump=is_hexdump(text or "")) if is_hex else _raw(buffered)
     directed = ((at_ns, sent_by or direction, data) for at_ns, sent_by, data in parts)
-    return Source(blocks=in_order(block_of([part]) for part in directed), has_time=False, has_one_origin=not is_hex)
+    return CaptureSource(
+        blocks=in_order(block_of([part]) for part in directed), has_time=False, has_one_origin=not is_hex
+    )
 
 
-def open_file(path: Path, direction: Direction | None = None) -> Source:
+def open_file(path: Path, direction: Direction | None = None) -> CaptureSource:
     """Begin to read a capture from a file, or from the folder of a run.
 
     Raises:
@@ -98,7 +100,7 @@ def open_file(path: Path, direction: Direction | None = None) -> Source:
     return replace(source, blocks=_named(source.blocks, file, place))
 
 
-def open_argument(words: list[str], direction: Direction | None = None) -> Source:
+def open_argument(words: list[str], direction: Direction | None = None) -> CaptureSource:
     """Begin to read what a person named: one file or folder, or hex text in one or more words.
 
     Raises:
@@ -133,7 +135,7 @@ def read_file(path: Path, direction: Direction | None = None) -> Capture:
     return replace(source, blocks=_bounded(source.blocks, place)).whole()
 
 
-def _bounded(blocks: Iterator[Block], place: Path) -> Iterator[Block]:
+def _bounded(blocks: Iterator[ChunkBlock], place: Path) -> Iterator[ChunkBlock]:
     """Yield blocks, as many as are held in memory: what is read may have no end."""
     left = LARGEST_BYTES
     for block in blocks:
@@ -145,7 +147,7 @@ def _bounded(blocks: Iterator[Block], place: Path) -> Iterator[Block]:
         yield block
 
 
-def _named(blocks: Iterator[Block], file: BinaryIO, place: Path) -> Iterator[Block]:
+def _named(blocks: Iterator[ChunkBlock], file: BinaryIO, place: Path) -> Iterator[ChunkBlock]:
     """Yield blocks; what is wrong names the file, which is closed at the end."""
     with file, reading(place):
         try:
@@ -159,7 +161,7 @@ def _raw(file: io.BufferedReader) -> Iterator[Part]:
         yield 0, None, data
 
 
-def _recorded(file: io.BufferedReader) -> Iterator[Block]:
+def _recorded(file: io.BufferedReader) -> Iterator[ChunkBlock]:
     before = 0
     for lines in _blocks_of_lines(file):
         block = _in_bulk(lines) if before else None  # a small file is read before NumPy is loaded
@@ -172,7 +174,7 @@ def _recorded(file: io.BufferedReader) -> Iterator[Block]:
             before += len(block)
 
 
-def _in_bulk(lines: bytes) -> Block | None:
+def _in_bulk(lines: bytes) -> ChunkBlock | None:
     """Return what lines of ours hold; None where one is spelled otherwise, and without NumPy."""
     try:
         from p2os.capture.formats.recording_bulk import plain_lines

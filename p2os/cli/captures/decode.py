@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from p2os.capture import FollowedReading, ListingRow, Reading, explain, open_argument, open_capture, rows_of
-from p2os.capture.chunks import Block, chunks_of
+from p2os.capture.chunks import ChunkBlock, chunks_of
 from p2os.capture.explain import lines_of
 from p2os.capture.listing import line_of, summary_of
 from p2os.cli.captures.reading import (
@@ -96,7 +96,7 @@ class _End:
     def __init__(self) -> None:
         self.at_ns: Nanos = 0
 
-    def watched(self, blocks: Iterator[Block]) -> Iterator[Block]:
+    def watched(self, blocks: Iterator[ChunkBlock]) -> Iterator[ChunkBlock]:
         """Yield the same blocks."""
         for block in blocks:
             self.at_ns = block.at_ns[-1]

@@ -8,12 +8,12 @@ from typing import Annotated
 
 import typer
 
-from p2os.capture import ListingRow, Reading, Source, open_file, rows_of
-from p2os.capture.chunks import Block, chunks_of
+from p2os.capture import CaptureSource, ListingRow, Reading, open_file, rows_of
+from p2os.capture.chunks import ChunkBlock, chunks_of
 from p2os.capture.formats.arrow_files import write_arrow, write_parquet
 from p2os.capture.formats.mcap_files import write_mcap
 from p2os.capture.sips import sips_of
-from p2os.capture.table import Table, tables_of, tables_of_sips, write_csv
+from p2os.capture.table import CaptureTable, tables_of, tables_of_sips, write_csv
 from p2os.cli.captures.reading import ProfileForLayouts, RobotForUnits, chosen_rows, reading_of, wanted_names
 from p2os.cli.groups import CAPTURES
 from p2os.cli.kept_files import FORCE_HELP, refuse_to_overwrite
@@ -73,9 +73,11 @@ def export(
     sys.stderr.write(f"{count} packets\n")
 
 
-def _tables(capture: Source, blocks: Iterator[Block], reading: Reading, only: str) -> Iterator[Table]:
+def _tables(
+    capture: CaptureSource, blocks: Iterator[ChunkBlock], reading: Reading, only: str
+) -> Iterator[CaptureTable]:
     """Return what was chosen as tables; a large capture's SIPs the fast way, where NumPy is installed."""
-    seen: list[Block] = []
+    seen: list[ChunkBlock] = []
     if not only and capture.has_one_origin:
         size = 0
         for block in blocks:
@@ -96,14 +98,14 @@ def _tables(capture: Source, blocks: Iterator[Block], reading: Reading, only: st
     return tables_of(_chosen(blocks, reading, only), reading)
 
 
-def _chosen(blocks: Iterable[Block], reading: Reading, only: str) -> Iterable[ListingRow]:
+def _chosen(blocks: Iterable[ChunkBlock], reading: Reading, only: str) -> Iterable[ListingRow]:
     wanted = wanted_names(only)
     if "all" in wanted:
         return rows_of(chunks_of(blocks), reading)
     return chosen_rows(blocks, reading, wanted - {"damaged"})
 
 
-def _write_csv(tables: Iterator[Table], target: Path) -> int:
+def _write_csv(tables: Iterator[CaptureTable], target: Path) -> int:
     if str(target) == "-":
         return write_csv(tables, sys.stdout)
     first = next(tables, None)
@@ -113,7 +115,7 @@ def _write_csv(tables: Iterator[Table], target: Path) -> int:
         return write_csv(chain([first], tables), file)
 
 
-_TABLES: dict[str, Callable[[Iterator[Table], Path], int]] = {
+_TABLES: dict[str, Callable[[Iterator[CaptureTable], Path], int]] = {
     ".csv": _write_csv,
     ".parquet": write_parquet,
     ".arrow": write_arrow,

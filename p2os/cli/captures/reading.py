@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 from p2os.capture import Direction, FollowedReading, ListingRow, Reading, rows_of
-from p2os.capture.chunks import Block, chunks_of
+from p2os.capture.chunks import ChunkBlock, chunks_of
 from p2os.capture.listing import FrameCutter
 from p2os.cli.names import robots
 from p2os.protocol.profiles import Profile
@@ -49,8 +49,8 @@ def direction_of(text: str) -> Direction | None:
 
 
 def reading_of(
-    source: Iterable[Block], *, robot: str = "", profile: Profile | None = None
-) -> tuple[Reading, Iterator[Block]]:
+    source: Iterable[ChunkBlock], *, robot: str = "", profile: Profile | None = None
+) -> tuple[Reading, Iterator[ChunkBlock]]:
     """Return how to read a capture, and its blocks, of which no more than the beginning was read.
 
     What is read while it comes is not to wait for a beginning: `FollowedReading`.
@@ -63,7 +63,7 @@ def reading_of(
     Raises:
         ParametersError: There is no such model or file.
     """
-    blocks, seen = iter(source), list[Block]()
+    blocks, seen = iter(source), list[ChunkBlock]()
     followed, size, cutter = FollowedReading(robot, profile), 0, FrameCutter()
     given = bool(robot) and profile is not None
     for chunk in () if given else chunks_of(_noted(blocks, seen)):
@@ -81,7 +81,9 @@ def wanted_names(only: str) -> set[str]:
     return {name.strip().lower() for name in only.split(",") if name.strip()}
 
 
-def chosen_rows(blocks: Iterable[Block], reading: Reading | FollowedReading, wanted: set[str]) -> Iterator[ListingRow]:
+def chosen_rows(
+    blocks: Iterable[ChunkBlock], reading: Reading | FollowedReading, wanted: set[str]
+) -> Iterator[ListingRow]:
     """Yield the rows of these names (`damaged`: of what is no sound frame); the rest costs little with NumPy."""
     try:
         from p2os.capture.columns.passing import rows_passing
@@ -94,7 +96,7 @@ def chosen_rows(blocks: Iterable[Block], reading: Reading | FollowedReading, wan
             yield row
 
 
-def _noted(blocks: Iterator[Block], seen: list[Block]) -> Iterator[Block]:
+def _noted(blocks: Iterator[ChunkBlock], seen: list[ChunkBlock]) -> Iterator[ChunkBlock]:
     for block in blocks:
         seen.append(block)
         yield block

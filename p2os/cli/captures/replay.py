@@ -50,7 +50,7 @@ SILENCE_NS: Nanos = ClientSettings().liveness_ns
 SLOWEST, FASTEST = 0.01, 100.0
 
 
-class Side(Enum):
+class ReplaySide(Enum):
     """Whom to be."""
 
     ROBOT = "robot"
@@ -59,7 +59,7 @@ class Side(Enum):
     @property
     def role(self) -> Direction:
         """Whose bytes are sent."""
-        return Direction.FROM_ROBOT if self is Side.ROBOT else Direction.TO_ROBOT
+        return Direction.FROM_ROBOT if self is ReplaySide.ROBOT else Direction.TO_ROBOT
 
 
 def play(
@@ -124,7 +124,7 @@ def register(app: typer.Typer) -> None:
 def replay(
     file: Annotated[Path, typer.Argument(help="Recording, JSON lines, pcap, or a run's folder.", metavar="FILE")],
     url: Annotated[str, typer.Argument(help="Where the far side is, or comes.", metavar="URL", autocompletion=urls)],
-    side: Annotated[Side, typer.Option("--as", help="Whom to be.", metavar="robot|client")] = Side.ROBOT,
+    side: Annotated[ReplaySide, typer.Option("--as", help="Whom to be.", metavar="robot|client")] = ReplaySide.ROBOT,
     speed: Annotated[
         float,
         option(FACTOR, "--speed", purpose="2: twice as fast.", least=f"{SLOWEST:g}", most=f"{FASTEST:g}", shown="1"),
@@ -135,9 +135,9 @@ def replay(
     capture = read_file(file)
     player = Replay(capture, side.role, speed=speed)
     if not player.frames_left:
-        who = "robot" if side is Side.ROBOT else "client"
+        who = "robot" if side is ReplaySide.ROBOT else "client"
         raise FileError(f"{file} holds nothing that a {who} sent", hint="p2os decode shows what it holds")
-    if side is Side.CLIENT:
+    if side is ReplaySide.CLIENT:
         _ask(motions_of(capture), url, yes=yes)
         hold_robot()
         _play(player, open_url(url), side)
@@ -152,7 +152,7 @@ def replay(
         return
 
 
-def _play(player: Replay, transport: Transport, side: Side) -> None:
+def _play(player: Replay, transport: Transport, side: ReplaySide) -> None:
     """Play to the end, or until a client has closed the session.
 
     Raises:
@@ -167,7 +167,7 @@ def _play(player: Replay, transport: Transport, side: Side) -> None:
             raise
         except HungUpError as error:
             sent = frames - player.frames_left
-            if side is Side.ROBOT and player.is_closed:
+            if side is ReplaySide.ROBOT and player.is_closed:
                 sys.stderr.write(f"the client closed the session after {sent} of {frames} frames\n")
                 return
             raise TransportError(f"after {sent} of {frames} frames: {error}", hint=error.hint) from error

@@ -1,6 +1,6 @@
 """`p2os sniff`: stand between a client and a robot, and show or record what they send.
 
-`Bridge` passes bytes on and knows neither screen nor files; the verb joins them.
+`TapBridge` passes bytes on and knows neither screen nor files; the verb joins them.
 
 One client at a time; each gets its own line to the robot. When either side
 goes, the other is released too, and a robot whose session was open is stopped
@@ -109,7 +109,7 @@ def sniff(
             sinks.append(RecordingFile(out, note=f"p2os sniff {url}"))
         if pcap is not None:
             sinks.append(PcapFile(pcap, time.time_ns()))
-        bridge = Bridge(listener, robot_line, lambda: open_url(url), on_chunk=all_sinks.take, on_event=_print)
+        bridge = TapBridge(listener, robot_line, lambda: open_url(url), on_chunk=all_sinks.take, on_event=_print)
         _print(f"listening on {listener.description} for the robot on {url}; Ctrl-C ends")
         try:
             bridge.run(lambda: (once and bridge.sessions > 0) or (lasts_ns is not None and bridge.now >= lasts_ns))
@@ -124,7 +124,7 @@ def _print(text: str) -> None:
     sys.stderr.write(f"{text}\n")
 
 
-class Bridge:
+class TapBridge:
     """Bridges the clients of a listener to a robot.
 
     Args:

@@ -67,7 +67,7 @@ class Measured:
     seconds: float
 
 
-class Bench:
+class LinkBenchmark:
     """Asks, and notes when what came.
 
     Passive: `turn` is called with what has arrived and returns what to send.
@@ -133,7 +133,7 @@ def measure(transport: Transport, lasts_ns: Nanos, clock: Clock = wall_clock) ->
         RemoteProtocolError: No robot answers.
         TransportError: The line was lost.
     """
-    bench = Bench(clock())
+    bench = LinkBenchmark(clock())
     try:
         data = b""
         while bench.first_sip_ns is None or clock() < bench.first_sip_ns + lasts_ns:

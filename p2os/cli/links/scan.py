@@ -41,7 +41,7 @@ Ends with exit code 1 when nobody answers.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Found:
+class FoundRobot:
     """A robot and where it is."""
 
     url: str
@@ -97,7 +97,7 @@ def scan(
         )
 
 
-def identify(url: str, bauds: tuple[int, ...] = SEARCHED_BAUDS) -> Found:
+def identify(url: str, bauds: tuple[int, ...] = SEARCHED_BAUDS) -> FoundRobot:
     """Return the identity of the robot on a line.
 
     Args:
@@ -124,13 +124,13 @@ def identify(url: str, bauds: tuple[int, ...] = SEARCHED_BAUDS) -> Found:
             firmware += f" {config.firmware_version}"
         rate = robot.baud
     where = url.split("?", maxsplit=1)[0] + (f"?baud={rate}" if rate else "")
-    return Found(
+    return FoundRobot(
         url=where, name=identity.name, robot_class=identity.robot_class, subclass=identity.subclass,
         title=_title(identity.subclass), firmware=firmware, baud=rate, connect_ms=took_ns // NS_PER_MS,
     )  # fmt: skip
 
 
-def line_of(robot: Found) -> str:
+def line_of(robot: FoundRobot) -> str:
     """Return a robot as one line."""
     title = f" ({robot.title})" if robot.title else " (unknown model)"
     return (

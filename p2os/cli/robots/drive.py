@@ -35,7 +35,7 @@ Examples:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Plan:
+class DriveRequest:
     """What is to be done, in SI units.
 
     Raises:
@@ -88,7 +88,7 @@ def drive(
     json_output: Annotated[bool, typer.Option("--json", help="Print a JSON object.")] = False,
 ) -> None:
     """Move a robot."""
-    plan = Plan(
+    plan = DriveRequest(
         forward_m=forward_m, turn_rad=turn_rad, speed_mps=speed_mps, rate_radps=rate_radps, lasts_ns=lasts_ns,
     )  # fmt: skip
     with held(Robot(url, model=robot or None, reconnect=False), moves=True) as client:
@@ -102,7 +102,7 @@ def drive(
     typer.echo(f"at x {pose.x_m:.3f} m, y {pose.y_m:.3f} m, heading {math.degrees(pose.heading_rad):.1f} deg")
 
 
-def carry_out(plan: Plan, robot: Robot) -> list[dict[str, object]]:
+def carry_out(plan: DriveRequest, robot: Robot) -> list[dict[str, object]]:
     """Carry out a plan, each step with a line on stderr; return the steps in SI units.
 
     Raises:

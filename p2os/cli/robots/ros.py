@@ -40,8 +40,8 @@ from p2os.robots.motor_step import STEP_MPS
 from p2os.robots.parameters import load_parameters
 from p2os.ros.codec import Message
 from p2os.ros.frames import Frames
-from p2os.ros.robot_node import Asked, Motors, Refused, ResetOdometry, RobotNode, Speed, Stop
-from p2os.ros.transport import DOMAIN, LOOPBACK, MOST_DOMAIN, NodeOptions, Topic, Transport
+from p2os.ros.robot_node import Asked, MotorPower, Refused, ResetOdometry, RobotNode, Speed, StopRequest
+from p2os.ros.transport import DOMAIN, LOOPBACK, MOST_DOMAIN, NodeOptions, RosTransport, Topic
 from p2os.ros.transports import TRANSPORTS, open_transport
 from p2os.ros.urdf import urdf_text
 from p2os.transport.wall_clock import wall_clock
@@ -179,7 +179,7 @@ class NodeLoop:
         robot_node: What becomes of what.
     """
 
-    def __init__(self, client: Robot, network: Transport, robot_node: RobotNode) -> None:
+    def __init__(self, client: Robot, network: RosTransport, robot_node: RobotNode) -> None:
         self._client, self._network, self._node = client, network, robot_node
         self._news: deque[RobotState | Notice] = deque()
         self._state: RobotState | None = None
@@ -273,10 +273,10 @@ class NodeLoop:
             match asked:
                 case Speed(forward_mps, turn_radps):
                     self._client.set_velocity(forward_mps, turn_radps)
-                case Stop():
+                case StopRequest():
                     self._client.stop()
                     sys.stderr.write("stopped: nobody asked for a speed any more\n")
-                case Motors(on):
+                case MotorPower(on):
                     self._client.enable(on)
                 case ResetOdometry():
                     self._client.set_pose()

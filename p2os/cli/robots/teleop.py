@@ -319,7 +319,7 @@ def read_keys(longest_ns: Nanos) -> list[str]:
     return split_keys(data.decode("utf-8", "replace"))
 
 
-class Driven(Protocol):
+class DrivenClient(Protocol):
     """What is needed of the robot's client."""
 
     def set_velocity(self, forward_mps: float, turn_radps: float) -> None:
@@ -346,7 +346,7 @@ class PadDriver:
     def __init__(
         self,
         reports: Reports,
-        connect: Callable[[], AbstractContextManager[Driven]],
+        connect: Callable[[], AbstractContextManager[DrivenClient]],
         fastest: tuple[float, float],
         *,
         clock: Callable[[], Nanos],
@@ -372,7 +372,7 @@ class PadDriver:
             self._pad.forget_request()
             self._report(f"{why}: the robot stands; Up connects again")
 
-    def _drive(self, robot: Driven) -> str:
+    def _drive(self, robot: DrivenClient) -> str:
         """Hand speeds on while the connect request lasts; return why it ended."""
         stops: deque[Notice] = deque()
         robot.on_event(lambda notice: stops.append(notice) if is_stop(notice) else None)
@@ -412,6 +412,6 @@ def is_stop(notice: Notice) -> bool:
     return isinstance(notice, (GapStopped, DeadmanStopped))
 
 
-def _stop(robot: Driven) -> None:
+def _stop(robot: DrivenClient) -> None:
     with contextlib.suppress(LinkLostError):  # it stands by itself then
         robot.set_velocity(0.0, 0.0)

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 from p2os.pioneer.body.contacts import ContactCounter
 from p2os.pioneer.body.contract import FASTEST_MPS, BodyState, Turned, Wheels
-from p2os.pioneer.body.in_world import DT_S, BodyInWorld, Scene
+from p2os.pioneer.body.in_world import DT_S, BodyInWorld, WorldScene
 from p2os.pioneer.body.physical import (
     BACK_DRIVE,
     PUSHED_BACK_MPS,
@@ -33,7 +33,7 @@ FAR_M, LOOK_STEPS = 0.1, 50
 MOST_MPS2 = 50.0
 
 
-class EngineScene(Scene):
+class EngineScene(WorldScene):
     """Robots and things in one world of an engine."""
 
     bodies: "tuple[EngineBody, ...]"

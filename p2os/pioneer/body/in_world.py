@@ -1,6 +1,6 @@
 """Robots in one world: a scene steps all of them together, and a body is one of them.
 
-A `Scene` holds what is one for all: the engine, the step, and who meets whom. A `BodyInWorld` holds what is a
+A `WorldScene` holds what is one for all: the engine, the step, and who meets whom. A `BodyInWorld` holds what is a
 robot's own: its plan of the world (heights decide what its hull, wheels and sonar meet), what walks and what has
 moved, its collisions. A body that is made by itself is the only one of a scene. How robots move, and what they do
 to each other, is the scene's own.
@@ -40,7 +40,7 @@ class StandingPose(NamedTuple):
     z_m: float = 0.0
 
 
-class Scene(Stateful):
+class WorldScene(Stateful):
     """Robots in one world, stepped together.
 
     Its snapshot is that of all of them; a body that is alone in its scene gives it as its own.
@@ -127,7 +127,7 @@ class BodyInWorld(Stateful):
 
     dt_ns: Nanos = STEP_NS
 
-    def __init__(self, scene: Scene, parameters: RobotParameters, number: int) -> None:
+    def __init__(self, scene: WorldScene, parameters: RobotParameters, number: int) -> None:
         self.scene, self.robot_name = scene, scene.names[number]
         self._world, self._parameters = scene.world, parameters
         self._static = StaticPlan(scene.world, parameters)

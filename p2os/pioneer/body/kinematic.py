@@ -26,7 +26,7 @@ from itertools import islice, repeat
 
 from p2os.pioneer.body.contacts import APART_STEPS, ContactCounter
 from p2os.pioneer.body.contract import BodyState, Turned, free_wheels
-from p2os.pioneer.body.in_world import DT_S, BodyInWorld, Scene, StandingPose
+from p2os.pioneer.body.in_world import DT_S, BodyInWorld, StandingPose, WorldScene
 from p2os.pioneer.body.physical import BACK_DRIVE, GRAVITY_MPS2, UNPOWERED_SHARE, WHEEL_FRICTION
 from p2os.pioneer.body.ray_cast import Direction, Echo, cast, echoes, narrow_parts
 from p2os.pioneer.body.rim_work import RimLoad
@@ -55,7 +55,7 @@ SPARE_M = 0.1
 _Standing = tuple[float, float, float, tuple[float, float], bool]
 
 
-class KinematicScene(Scene):
+class KinematicScene(WorldScene):
     """Robots on one plan, one after the other in each step."""
 
     DERIVED = ("_spare_m",)

@@ -8,7 +8,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from p2os.pioneer.world.model import Kind, Obstacle, World, normal_of
+from p2os.pioneer.world.model import Obstacle, ObstacleKind, World, normal_of
 from p2os.pioneer.world.plan import Bands
 from p2os.robots.parameters import RobotParameters
 
@@ -82,14 +82,14 @@ def floor_box(world: World) -> tuple[Vector, Vector]:
 
 def half_sizes(item: Obstacle) -> Vector:
     """Return half the length, width and height of a box, metres; of a ramp, of the box under its upper face."""
-    if item.kind is Kind.RAMP:
+    if item.kind is ObstacleKind.RAMP:
         return math.hypot(item.length_m, item.height_m) / 2, item.width_m / 2, FLOOR_THICKNESS_M / 2
     return item.length_m / 2, item.width_m / 2, item.height_m / 2
 
 
 def middle_and_slope(item: Obstacle) -> tuple[Vector, float]:
     """Return the middle of an obstacle's box, metres, and how far its length rises, radians."""
-    if item.kind is not Kind.RAMP:
+    if item.kind is not ObstacleKind.RAMP:
         return (item.x_m, item.y_m, item.base_m + item.height_m / 2), 0.0
     slope = math.atan2(item.height_m, item.length_m)
     # From the middle of the upper face down along its normal.

@@ -14,7 +14,7 @@ import math
 
 from p2os.pioneer.body.contract import BodyState
 from p2os.pioneer.controller.context import Context
-from p2os.pioneer.controller.flash import Flash
+from p2os.pioneer.controller.flash import FlashParameters
 from simbase.timing import NS_PER_MS, Nanos
 
 #: chosen: the bumpers are looked at so often while BUMPSTALL is on.
@@ -29,7 +29,7 @@ def is_watching(context: Context) -> bool:
     return context.devices.switches.bump_stall != 0
 
 
-def check_bumpers(context: Context, body: BodyState, flash: Flash, now: Nanos) -> bool:
+def check_bumpers(context: Context, body: BodyState, flash: FlashParameters, now: Nanos) -> bool:
     """Stop for a bumper that is pressed on the side of the way; tell whether it did just now."""
     context.bumper_watch.next_ns = now + BUMPER_WATCH_NS
     front, rear = pressed(context, body, flash)
@@ -43,7 +43,7 @@ def check_bumpers(context: Context, body: BodyState, flash: Flash, now: Nanos) -
     return True
 
 
-def pressed(context: Context, body: BodyState, flash: Flash) -> tuple[int, int]:
+def pressed(context: Context, body: BodyState, flash: FlashParameters) -> tuple[int, int]:
     """Return the pressed segments, front and rear, bit 0 is segment 1."""
     pins = context.devices.pins
     front, rear = pins.front_pressed, pins.rear_pressed

@@ -61,7 +61,7 @@ POSE = struct.Struct("<iii")
 SIM_CTRL_INFO, SIM_CTRL_LOAD_MAP = 6, frozenset({1, 2})
 
 
-class Effect(Enum):
+class CommandEffect(Enum):
     """What has become of a command."""
 
     #: It acts.
@@ -75,18 +75,18 @@ class Effect(Enum):
 
 
 #: What has no effect.
-IGNORED = frozenset({Effect.UNKNOWN, Effect.MALFORMED})
+IGNORED = frozenset({CommandEffect.UNKNOWN, CommandEffect.MALFORMED})
 
 
-def apply(context: Context, command: Command, now: Nanos) -> Effect:
+def apply(context: Context, command: Command, now: Nanos) -> CommandEffect:
     """Execute a command on the robot's parts, and return what has become of it."""
     handler = HANDLERS.get(command.number)
     if handler is None or not is_known(command.number, context):
-        return Effect.UNKNOWN
+        return CommandEffect.UNKNOWN
     if not handler(context, command, now):
-        return Effect.MALFORMED
+        return CommandEffect.MALFORMED
     is_to_move = command.number in MOTION_COMMANDS and command.argument != 0
-    return Effect.WAITS if is_to_move and not context.motors_enabled else Effect.DONE
+    return CommandEffect.WAITS if is_to_move and not context.motors_enabled else CommandEffect.DONE
 
 
 def is_known(which: int, context: Context) -> bool:

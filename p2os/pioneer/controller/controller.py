@@ -38,12 +38,12 @@ from dataclasses import dataclass, replace
 from p2os.errors import WorldError
 from p2os.pioneer.body.contract import RobotBody, Wheels
 from p2os.pioneer.controller.bumper_watch import check_bumpers, is_watching
-from p2os.pioneer.controller.commands import IGNORED, Effect, apply
+from p2os.pioneer.controller.commands import IGNORED, CommandEffect, apply
 from p2os.pioneer.controller.context import BumperWatch, Context
 from p2os.pioneer.controller.dead_reckoning import DeadReckoning
 from p2os.pioneer.controller.fault_actions import FaultTarget, clear_now, inject_now, injected_now
 from p2os.pioneer.controller.faults import read_fault
-from p2os.pioneer.controller.flash import Flash
+from p2os.pioneer.controller.flash import FlashParameters
 from p2os.pioneer.controller.live_inputs import apply_input
 from p2os.pioneer.controller.motion import Motion, MotionLimits
 from p2os.pioneer.controller.packet_requests import Requests
@@ -527,7 +527,7 @@ class Pioneer(Stateful):
         if effect in IGNORED:
             self._ignored += 1
         complaint = f"{command.name}: {effect.value}"
-        if effect is not Effect.DONE and complaint not in self._complaints:  # once a session
+        if effect is not CommandEffect.DONE and complaint not in self._complaints:  # once a session
             self._complaints += (complaint,)
             self._notify(now, "command ignored" if effect in IGNORED else "command waits", complaint)
         if context.motors_enabled is not had_power:
@@ -639,7 +639,7 @@ def _new_devices(settings: ControllerSettings, profile: Profile) -> Devices:
     return devices
 
 
-def _limits_of(parameters: RobotParameters, flash: Flash) -> MotionLimits:
+def _limits_of(parameters: RobotParameters, flash: FlashParameters) -> MotionLimits:
     """Return the limits with which a robot starts: those of its file, but for what its FLASH sets."""
     found = {limit: value for name, limit in LIMITS.items() if isinstance(value := flash.values.get(name), int)}
     return replace(MotionLimits.of(parameters), **found)

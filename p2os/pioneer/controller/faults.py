@@ -45,7 +45,7 @@ VALUES: Mapping[str, Range] = {"METRES": (0.0, 100.0), "RATE": (0.0, 0.5), "VOLT
 
 
 @dataclass(frozen=True, slots=True)
-class Fault:
+class RobotFault:
     """One fault, read and checked."""
 
     name: str
@@ -60,7 +60,7 @@ class Fault:
         return " ".join([self.name, *(value.get(word, f"{self.value:g}") for word in FAULTS[self.name][0])])
 
 
-def read_fault(text: str, *, sonar: int, complete: bool = True) -> Fault:
+def read_fault(text: str, *, sonar: int, complete: bool = True) -> RobotFault:
     """Read the words of a fault.
 
     Args:
@@ -80,7 +80,7 @@ def read_fault(text: str, *, sonar: int, complete: bool = True) -> Fault:
     values = read_words(text, name, rest, words, ranges)
     number = values.get("NUMBER", values.get("SEGMENT", 0))
     value = next((values[word] for word in VALUES if word in values), 0.0)
-    return Fault(name, str(values.get("SIDE", "")), int(number), float(value))
+    return RobotFault(name, str(values.get("SIDE", "")), int(number), float(value))
 
 
 @dataclass(slots=True)

@@ -93,7 +93,7 @@ class FlashError(FileError):
 
 
 @dataclass(frozen=True, slots=True)
-class Flash:
+class FlashParameters:
     """The parameters that survive a reset; `values` holds what differs from the defaults and the robot file."""
 
     values: Mapping[str, int | str] = field(default_factory=dict)
@@ -111,7 +111,7 @@ class Flash:
         """Return the rate at which the host's line starts, bit/s."""
         return BAUDS[self.number("hostbaud")]
 
-    def for_model(self, parameters: RobotParameters) -> "Flash":
+    def for_model(self, parameters: RobotParameters) -> "FlashParameters":
         """Return this FLASH with the bumpers of a model, where nothing else sets them."""
         equipment = parameters.equipment
         segments = {"frontbumps": equipment.front_bumpers, "rearbumps": equipment.rear_bumpers}
@@ -142,7 +142,7 @@ class Flash:
             known |= {"autobaud": 0, "hasgyro": 0}  # fields that its packet does not reach
         return ConfigPacket(**known, fields_sent=FIELDS_OF_PROFILE[profile])  # type: ignore[arg-type]  # checked when loaded
 
-    def with_values(self, values: Mapping[str, int | str]) -> "Flash":
+    def with_values(self, values: Mapping[str, int | str]) -> "FlashParameters":
         """Return this FLASH with more values.
 
         Raises:
@@ -159,7 +159,7 @@ class Flash:
         return replace(self, values={**self.values, **values})
 
 
-def load_flash(path: Path) -> Flash:
+def load_flash(path: Path) -> FlashParameters:
     """Read a FLASH file.
 
     Raises:
@@ -174,7 +174,7 @@ def load_flash(path: Path) -> Flash:
         strange = next((key for key in table if key != "flash"), "flash")
         line = places.line(strange)
         raise FlashError(f"{source}:{line}: one table [flash] is wanted, and nothing else")
-    flash = Flash()
+    flash = FlashParameters()
     for name, value in values.items():
         try:
             flash = flash.with_values({name: value})

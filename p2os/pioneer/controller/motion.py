@@ -49,7 +49,7 @@ GOAL_REACHED_UDEG = UDEG_PER_DEG // 2
 GOAL_GAIN_PER_S = 4
 
 
-class Mode(Enum):
+class SpeedMode(Enum):
     """Which two speeds are set."""
 
     #: Translation and rotation.
@@ -136,7 +136,7 @@ class Motion(Stateful):
 
     def __init__(self, limits: MotionLimits, *, track_mm: int, dt_ns: Nanos) -> None:
         self.limits = limits
-        self.mode = Mode.TRANSLATE_ROTATE
+        self.mode = SpeedMode.TRANSLATE_ROTATE
         self.is_held = False
         self.is_powered = False
         self._dt_ns = dt_ns
@@ -154,35 +154,35 @@ class Motion(Stateful):
 
     def set_velocity(self, mm_s: int) -> None:
         """Translate at a speed (VEL)."""
-        self._set_mode(Mode.TRANSLATE_ROTATE)
+        self._set_mode(SpeedMode.TRANSLATE_ROTATE)
         self._first.set(_clamp(mm_s, self.limits.max_velocity_mm_s) * NM_PER_MM)
 
     def set_rotation(self, deg_s: int) -> None:
         """Turn at a speed, positive counter-clockwise (RVEL, ROTATE)."""
-        self._set_mode(Mode.TRANSLATE_ROTATE)
+        self._set_mode(SpeedMode.TRANSLATE_ROTATE)
         self._second.set(_clamp(deg_s, self.limits.max_rotation_deg_s) * UDEG_PER_DEG)
 
     def set_wheels(self, left_mm_s: int, right_mm_s: int) -> None:
         """Turn the wheels at two speeds (VEL2)."""
-        self._set_mode(Mode.WHEELS)
+        self._set_mode(SpeedMode.WHEELS)
         self._first.set(_clamp(left_mm_s, self.limits.max_velocity_mm_s) * NM_PER_MM)
         self._second.set(_clamp(right_mm_s, self.limits.max_velocity_mm_s) * NM_PER_MM)
 
     def set_wheels_as_turn(self, left_mm_s: int, right_mm_s: int) -> None:
         """Turn two wheel speeds into a translation and a rotation, each within its limit (VEL2 of ARCOS)."""
-        self._set_mode(Mode.TRANSLATE_ROTATE)
+        self._set_mode(SpeedMode.TRANSLATE_ROTATE)
         top, turn_top = self.limits.max_velocity_mm_s * NM_PER_MM, self.limits.max_rotation_deg_s * UDEG_PER_DEG
         self._first.set(_clamp((left_mm_s + right_mm_s) * NM_PER_MM // 2, top))
         self._second.set(_clamp(round((right_mm_s - left_mm_s) * NM_PER_MM / 2 / self._rim_nm_per_udeg), turn_top))
 
     def move_to(self, travel_nm: int) -> None:
         """Translate until the odometer of `step` shows `travel_nm` (MOVE)."""
-        self._set_mode(Mode.TRANSLATE_ROTATE)
+        self._set_mode(SpeedMode.TRANSLATE_ROTATE)
         self._first.goal = travel_nm
 
     def turn_to(self, heading_udeg: int) -> None:
         """Turn the shorter way to a heading (HEAD, DHEAD, DCHEAD)."""
-        self._set_mode(Mode.TRANSLATE_ROTATE)
+        self._set_mode(SpeedMode.TRANSLATE_ROTATE)
         self._second.goal = heading_udeg % UDEG_PER_TURN
 
     def stop(self) -> None:
@@ -220,7 +220,7 @@ class Motion(Stateful):
     @property
     def heading_goal_udeg(self) -> int | None:
         """Return the heading that is being turned to, in micro-degrees, or None when a speed was set."""
-        return self._second.goal if self.mode is Mode.TRANSLATE_ROTATE else None
+        return self._second.goal if self.mode is SpeedMode.TRANSLATE_ROTATE else None
 
     @property
     def wheels_mps(self) -> tuple[float, float]:
@@ -263,7 +263,7 @@ class Motion(Stateful):
         if limits is not self._changes_of:
             self._changes_of, self._changes = limits, self._changes_per_step(limits)
         faster, slower, turn_faster, turn_slower = self._changes
-        if self.mode is Mode.WHEELS:
+        if self.mode is SpeedMode.WHEELS:
             first.approach(0 if self.is_held else first.set_speed, faster, slower)
             second.approach(0 if self.is_held else second.set_speed, faster, slower)
             self._wheels = (first.speed / NM_PER_M, second.speed / NM_PER_M)
@@ -301,11 +301,11 @@ class Motion(Stateful):
         faster, slower, turn_faster, turn_slower = (rate * self._dt_ns // _STEP_DIVISOR for rate in rates)
         return faster, slower, turn_faster, turn_slower
 
-    def _set_mode(self, mode: Mode) -> None:
+    def _set_mode(self, mode: SpeedMode) -> None:
         if mode is self.mode:
             return
         first, second = self._first.speed, self._second.speed
-        if mode is Mode.WHEELS:
+        if mode is SpeedMode.WHEELS:
             rim = round(second * self._rim_nm_per_udeg)
             speeds = first - rim, first + rim
         else:

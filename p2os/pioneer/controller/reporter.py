@@ -24,7 +24,7 @@ from p2os.pioneer.body.contract import BodyState, RobotBody
 from p2os.pioneer.controller.bumper_watch import pressed, stalls
 from p2os.pioneer.controller.context import Context
 from p2os.pioneer.controller.dead_reckoning import raw_angle
-from p2os.pioneer.controller.flash import Flash
+from p2os.pioneer.controller.flash import FlashParameters
 from p2os.pioneer.controller.motion import UDEG_PER_DEG
 from p2os.pioneer.controller.packet_requests import Extra
 from p2os.pioneer.controller.sender import Sender
@@ -337,10 +337,10 @@ def _arcos_tail(context: Context, wheels: BodyState, parameters: RobotParameters
 # The extra packets --------------------------------------------------------------------
 
 #: What one packet is made from: the parts, the FLASH, the time.
-Maker = Callable[[Context, Flash, Nanos], ServerPacket]
+Maker = Callable[[Context, FlashParameters, Nanos], ServerPacket]
 
 
-def _encoder_packet(context: Context, flash: Flash) -> EncoderPacket:
+def _encoder_packet(context: Context, flash: FlashParameters) -> EncoderPacket:
     """Return both encoders' counts since the start, in TICKSMM of the FLASH."""
     ticks = context.kept.get("ticksmm", flash.number("ticksmm"))
     return EncoderPacket(

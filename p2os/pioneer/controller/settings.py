@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
-from p2os.pioneer.controller.flash import Flash
+from p2os.pioneer.controller.flash import FlashParameters
 from p2os.pioneer.devices.laser import LASERS, LaserModel
 from p2os.pioneer.sensor_errors import IDEAL, SensorErrors
 from p2os.protocol.bauds import BAUDS, BAUDS_TEXT
@@ -58,7 +58,7 @@ class ControllerSettings:
     battery_decivolts: int = 126
     #: Speed of the host's line, bit/s; None: a line that takes no time.
     baud: int | None = None
-    flash: Flash = field(default_factory=Flash)
+    flash: FlashParameters = field(default_factory=FlashParameters)
     errors: SensorErrors = IDEAL
     #: A simulated laser, as a simulator has it; then commands 35 to 38 are its setup, as ARIA sends it.
     laser: LaserModel | None = None
@@ -84,7 +84,7 @@ class ControllerSettings:
         laser: LaserModel | None = None,
         all_sonar: bool = False,
         rear_sonar: bool | None = None,
-        flash: Flash | None = None,
+        flash: FlashParameters | None = None,
         errors: SensorErrors = IDEAL,
         baud: int | None = None,
     ) -> "ControllerSettings":
@@ -116,7 +116,7 @@ class ControllerSettings:
         """Return whose packets a model sends with these settings."""
         return self.profile or profiles_of(parameters)[0]
 
-    def with_flash(self, flash: Flash) -> "ControllerSettings":
+    def with_flash(self, flash: FlashParameters) -> "ControllerSettings":
         """Return these settings with what a FLASH file sets."""
         return replace(
             self,

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 from p2os.pioneer.devices.aux_ports import PORTS, AuxPort
 from p2os.pioneer.devices.battery import Battery
-from p2os.pioneer.devices.gripper import ON_USER_IO, SWITCHES, Gripper
+from p2os.pioneer.devices.gripper import ON_USER_IO, SWITCHES, VirtualGripper
 from p2os.pioneer.devices.heading_sensors import Compass, Gyro
 from p2os.pioneer.devices.joystick import Joystick
 from p2os.pioneer.devices.laser import Laser
@@ -31,7 +31,7 @@ class Devices:
     """The devices."""
 
     battery: Battery = field(default_factory=Battery)
-    gripper: Gripper = field(default_factory=Gripper)
+    gripper: VirtualGripper = field(default_factory=VirtualGripper)
     pins: Pins = field(default_factory=Pins)
     joystick: Joystick = field(default_factory=Joystick)
     compass: Compass = field(default_factory=Compass)

@@ -59,7 +59,7 @@ SWITCHES = 0x3F
 
 
 @dataclass(slots=True)
-class Gripper:
+class VirtualGripper:
     """A gripper, or the place where one could be."""
 
     #: 0 none, 1 on the user I/O, 2 on the general I/O.

@@ -3,7 +3,7 @@
 Other programs pass over them; `p2os.pioneer.world.formats.annotation` reads them.
 """
 
-from p2os.pioneer.export.scene import Body, Scene
+from p2os.pioneer.export.scene import ExportScene, SceneBody
 from p2os.pioneer.export.xml_text import Tag, spaced
 from p2os.pioneer.world.interchange.words import NAMESPACE, THING, WORLD
 
@@ -11,7 +11,7 @@ PREFIX = "p2os"
 DECLARATION = {f"xmlns:{PREFIX}": NAMESPACE}
 
 
-def annotate_thing(holder: Tag, body: Body) -> None:
+def annotate_thing(holder: Tag, body: SceneBody) -> None:
     """Add what a thing of a world is beside its geometry."""
     if body.kind:
         holder.add(
@@ -20,7 +20,7 @@ def annotate_thing(holder: Tag, body: Body) -> None:
         )  # fmt: skip
 
 
-def annotate_world(holder: Tag, scene: Scene) -> None:
+def annotate_world(holder: Tag, scene: ExportScene) -> None:
     """Add where a robot begins, and how far the floor reaches."""
     if scene.start is not None and scene.extent is not None:
         holder.add(f"{PREFIX}:{WORLD}", start=spaced(scene.start), extent_m=spaced(scene.extent))

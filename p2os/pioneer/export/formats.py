@@ -4,11 +4,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from p2os.pioneer.export import gltf, mjcf, sdf, urdf
-from p2os.pioneer.export.scene import Property, Scene
+from p2os.pioneer.export.scene import ExportScene, Property
 
 
 @dataclass(frozen=True, slots=True)
-class Cell:
+class Support:
     """How a format holds a property.
 
     Args:
@@ -26,57 +26,58 @@ class Format:
 
     title: str
     #: Takes a scene and the stem of the file's name; returns files by their names, the one that was asked for first.
-    write: Callable[[Scene, str], dict[str, bytes]]
-    cells: Mapping[Property, Cell]
+    write: Callable[[ExportScene, str], dict[str, bytes]]
+    cells: Mapping[Property, Support]
 
-    def cell(self, prop: Property) -> Cell:
+    def cell(self, prop: Property) -> Support:
         """Return how it holds a property."""
         return self.cells.get(prop, SIMPLY)
 
 
-SIMPLY = Cell()
-_FIRST_POINT = Cell(held=False, how="what walks stands at the first point of its path")
-_NO = Cell(held=False)
-_RENAMED = Cell(held=False, how="`::`, `__` and what is taken are written otherwise")
-_NO_CONES = Cell(held=False, how="the places alone")
-_OURS = Cell(how="in an element of p2os, which p2os reads back and others pass over")
-_EXTRAS = Cell(held=False, how="in `extras`, which no physics engine reads")
+SIMPLY = Support()
+_FIRST_POINT = Support(held=False, how="what walks stands at the first point of its path")
+_NO = Support(held=False)
+_RENAMED = Support(held=False, how="`::`, `__` and what is taken are written otherwise")
+_NO_CONES = Support(held=False, how="the places alone")
+_OURS = Support(how="in an element of p2os, which p2os reads back and others pass over")
+_EXTRAS = Support(held=False, how="in `extras`, which no physics engine reads")
 
 _XML = {
     Property.KIND: _OURS, Property.START: _OURS, Property.WALK: _FIRST_POINT, Property.MARK: _NO,
-    Property.NAME: _RENAMED, Property.CONE: _NO_CONES, Property.MESH: Cell(how="as OBJ files beside it"),
+    Property.NAME: _RENAMED, Property.CONE: _NO_CONES, Property.MESH: Support(how="as OBJ files beside it"),
 }  # fmt: skip
-_SDF = Format("SDF", sdf.write, _XML | {Property.SONAR: Cell(how="as frames")})
+_SDF = Format("SDF", sdf.write, _XML | {Property.SONAR: Support(how="as frames")})
 _URDF = Format(
     "URDF",
     urdf.write,
     _XML
     | {
-        Property.PUSHED: Cell(held=False, how="on floating joints, that MuJoCo lets move and PyBullet holds fast"),
-        Property.FRICTION: Cell(how="in `<contact>` for PyBullet and p2os, in `<gazebo>` for Gazebo"),
-        Property.SONAR: Cell(how="as links"),
+        Property.PUSHED: Support(held=False, how="on floating joints, that MuJoCo lets move and PyBullet holds fast"),
+        Property.FRICTION: Support(how="in `<contact>` for PyBullet and p2os, in `<gazebo>` for Gazebo"),
+        Property.SONAR: Support(how="as links"),
     },
 )
 _MJCF = Format(
     "MJCF",
     mjcf.write,
     {
-        Property.MESH: Cell(held=False, how="shown as they are, and met as their convex hulls; flat ones are not met"),
-        Property.KIND: Cell(held=False, how="the shapes alone"),
+        Property.MESH: Support(held=False,
+                               how="shown as they are, and met as their convex hulls; flat ones are not met"),
+        Property.KIND: Support(held=False, how="the shapes alone"),
         Property.START: _NO,
         Property.WALK: _FIRST_POINT, Property.MARK: _NO, Property.NAME: _RENAMED,
-        Property.SONAR: Cell(how="as sites"), Property.CONE: _NO_CONES,
+        Property.SONAR: Support(how="as sites"), Property.CONE: _NO_CONES,
     },
 )  # fmt: skip
 _GLTF_CELLS = {
-    Property.BOX: Cell(how="as triangles"), Property.ROUND: Cell(held=False, how="as triangles, with 32 sides"),
-    Property.POSE: Cell(how="in 32-bit numbers"),
+    Property.BOX: Support(how="as triangles"), Property.ROUND: Support(held=False, how="as triangles, with 32 sides"),
+    Property.POSE: Support(how="in 32-bit numbers"),
     Property.MASS: _EXTRAS, Property.FRICTION: _EXTRAS, Property.KIND: _EXTRAS, Property.TORQUE: _EXTRAS,
-    Property.PUSHED: Cell(held=False, how="nothing moves"),
-    Property.WHEEL: Cell(held=False, how="nothing moves"),
+    Property.PUSHED: Support(held=False, how="nothing moves"),
+    Property.WHEEL: Support(held=False, how="nothing moves"),
     Property.START: _NO,
     Property.WALK: _FIRST_POINT, Property.MARK: _NO, Property.NAME: _RENAMED,
-    Property.SONAR: Cell(how="as empty nodes"), Property.CONE: _NO_CONES,
+    Property.SONAR: Support(how="as empty nodes"), Property.CONE: _NO_CONES,
 }  # fmt: skip
 
 #: Ending → format.
@@ -89,7 +90,7 @@ FORMATS: Mapping[str, Format] = {
 }
 
 
-def losses(scene: Scene, made: Format) -> tuple[str, ...]:
+def losses(scene: ExportScene, made: Format) -> tuple[str, ...]:
     """Return what a format does not hold of a scene, a line each."""
     found = []
     for prop in Property:

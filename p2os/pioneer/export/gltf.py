@@ -12,7 +12,7 @@ import struct
 from base64 import b64encode
 from collections.abc import Sequence
 
-from p2os.pioneer.export.scene import Body, Motion, Place, Scene, Vector
+from p2os.pioneer.export.scene import ExportScene, FixedPose, JointKind, SceneBody, Vector
 from p2os.pioneer.export.triangles import triangulated
 from p2os.pioneer.world.interchange.words import GLB_HEADER, GLB_MAGIC
 from p2os.pioneer.world.model import normal_of
@@ -24,7 +24,7 @@ Z_UP_TO_Y_UP = [-math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)]
 _Object = dict[str, object]
 
 
-def write(scene: Scene, stem: str) -> dict[str, bytes]:
+def write(scene: ExportScene, stem: str) -> dict[str, bytes]:
     """Return the file by its name."""
     document, binary = _Writer(scene).written()
     uri = "data:application/octet-stream;base64," + b64encode(binary).decode()
@@ -32,7 +32,7 @@ def write(scene: Scene, stem: str) -> dict[str, bytes]:
     return {f"{stem}.gltf": json.dumps(document, indent=1, ensure_ascii=False).encode()}
 
 
-def write_binary(scene: Scene, stem: str) -> dict[str, bytes]:
+def write_binary(scene: ExportScene, stem: str) -> dict[str, bytes]:
     """Return the file by its name."""
     document, binary = _Writer(scene).written()
     document["buffers"] = [{"byteLength": len(binary)}]
@@ -46,7 +46,7 @@ def write_binary(scene: Scene, stem: str) -> dict[str, bytes]:
 
 
 class _Writer:
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: ExportScene) -> None:
         self._scene = scene
         self._nodes: list[_Object] = []
         self._meshes: list[_Object] = []
@@ -78,13 +78,13 @@ class _Writer:
         }
         return document, bytes(self._binary)
 
-    def _body(self, body: Body) -> tuple[int, list[int]]:
+    def _body(self, body: SceneBody) -> tuple[int, list[int]]:
         """Add a body's node; return its number, and the list of its children."""
         held: _Object = {"kind": body.kind} if body.kind else {}
         held["friction"] = body.friction
         if body.mass_kg:
             held |= {"mass_kg": body.mass_kg, "centre_m": list(body.centre), "inertia_kg_m2": list(body.inertia)}
-        if body.motion is Motion.WHEEL:
+        if body.motion is JointKind.WHEEL:
             held |= {"wheel_axis": "y", "torque_nm": body.torque_nm}
         mesh = self._mesh(body)
         children = [self._node({"name": f"{body.name} shape", "mesh": mesh, **_placed(body.at)})]
@@ -95,7 +95,7 @@ class _Writer:
         self._nodes.append(node)
         return len(self._nodes) - 1
 
-    def _mesh(self, body: Body) -> int:
+    def _mesh(self, body: SceneBody) -> int:
         mesh = triangulated(body.shape)
         corners = [mesh.vertices[index] for triangle in mesh.triangles for index in triangle]
         normals = [
@@ -123,7 +123,7 @@ class _Writer:
         return len(self._accessors) - 1
 
 
-def _placed(place: Place) -> _Object:
+def _placed(place: FixedPose) -> _Object:
     w, x, y, z = place.quaternion
     return {"translation": list(place.position), "rotation": [x, y, z, w]}
 

@@ -10,7 +10,7 @@ Source: https://mujoco.readthedocs.io/en/stable/XMLreference.html
 import math
 
 from p2os.pioneer.body.physical import GRAVITY_MPS2
-from p2os.pioneer.export.scene import Body, Box, Cylinder, Motion, Place, Scene, Sphere, TriangleMesh
+from p2os.pioneer.export.scene import Box, Cylinder, ExportScene, FixedPose, JointKind, SceneBody, Sphere, TriangleMesh
 from p2os.pioneer.export.xml_text import Tag, spaced
 from p2os.pioneer.world.interchange.words import ROBOT
 from p2os.pioneer.world.model import normal_of
@@ -23,7 +23,7 @@ LEAST_CORNERS = 4
 FLAT = 1e-4
 
 
-def write(scene: Scene, stem: str) -> dict[str, bytes]:
+def write(scene: ExportScene, stem: str) -> dict[str, bytes]:
     """Return the file by its name."""
     root = Tag("mujoco", {"model": scene.name})
     root.add("compiler", angle="radian", autolimits="true")
@@ -40,7 +40,7 @@ def write(scene: Scene, stem: str) -> dict[str, bytes]:
         )
         holders[body.name] = holder
         _fill(holder, body, asset)
-    wheels = [body for body in scene.bodies if body.motion is Motion.WHEEL]
+    wheels = [body for body in scene.bodies if body.motion is JointKind.WHEEL]
     if wheels:
         actuators = root.add("actuator")
         for wheel in wheels:
@@ -49,10 +49,10 @@ def write(scene: Scene, stem: str) -> dict[str, bytes]:
     return {f"{stem}.xml": root.document()}
 
 
-def _fill(holder: Tag, body: Body, asset: Tag) -> None:
-    if body.motion is Motion.FREE:
+def _fill(holder: Tag, body: SceneBody, asset: Tag) -> None:
+    if body.motion is JointKind.FREE:
         holder.add("freejoint", name=body.name)
-    elif body.motion is Motion.WHEEL:
+    elif body.motion is JointKind.WHEEL:
         holder.add("joint", name=body.name, type="hinge", axis="0 1 0")
     if body.mass_kg:
         holder.add("inertial", pos=spaced(body.centre), mass=spaced([body.mass_kg]), diaginertia=spaced(body.inertia))
@@ -66,18 +66,18 @@ def _fill(holder: Tag, body: Body, asset: Tag) -> None:
         holder.add("site", name=mark.name, size="0.01", **_at(mark.place))
 
 
-def _at(place: Place) -> dict[str, str]:
+def _at(place: FixedPose) -> dict[str, str]:
     return {"pos": spaced(place.position), "quat": spaced(place.quaternion)}
 
 
-def _priority(body: Body) -> int:
+def _priority(body: SceneBody) -> int:
     if not body.mass_kg:
         return 0
-    is_driven_on = body.motion is Motion.WHEEL or body.kind not in {"", ROBOT}
+    is_driven_on = body.motion is JointKind.WHEEL or body.kind not in {"", ROBOT}
     return 1 if is_driven_on else 2
 
 
-def _shape(body: Body, asset: Tag) -> dict[str, str]:
+def _shape(body: SceneBody, asset: Tag) -> dict[str, str]:
     shape = body.shape
     if isinstance(shape, Box):
         return {"type": "box", "size": spaced(size / 2 for size in shape.size_m)}
@@ -104,7 +104,7 @@ def _is_flat(mesh: TriangleMesh) -> bool:
     return off <= FLAT * math.dist(origin, farthest) * math.hypot(*normal)
 
 
-def _across(scene: Scene) -> float:
+def _across(scene: ExportScene) -> float:
     """Return how large the scene is: MuJoCo's viewer and its clipping planes go by it."""
     if scene.extent is None:
         return 1.0

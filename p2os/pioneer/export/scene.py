@@ -16,7 +16,7 @@ Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class FixedPose:
     """A pose: turned about the fixed x, then y, then z axis, as SDF and URDF write it."""
 
     x_m: float = 0.0
@@ -84,7 +84,7 @@ class TriangleMesh:
 Shape = Box | Cylinder | Sphere | TriangleMesh
 
 
-class Motion(Enum):
+class JointKind(Enum):
     """How a body hangs on its parent."""
 
     FIXED = "fixed"
@@ -95,15 +95,15 @@ class Motion(Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Mark:
+class SceneMark:
     """A place on a body that is no thing, as of a sensor."""
 
     name: str
-    place: Place
+    place: FixedPose
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Body:
+class SceneBody:
     """A thing, or a part of a robot.
 
     Args:
@@ -121,18 +121,18 @@ class Body:
     """
 
     name: str
-    place: Place
+    place: FixedPose
     shape: Shape
     friction: float
     colour: Vector
     parent: str | None = None
-    motion: Motion = Motion.FIXED
-    at: Place = field(default_factory=Place)
+    motion: JointKind = JointKind.FIXED
+    at: FixedPose = field(default_factory=FixedPose)
     mass_kg: float = 0.0
     centre: Vector = (0.0, 0.0, 0.0)
     inertia: Vector = (0.0, 0.0, 0.0)
     torque_nm: float = 0.0
-    marks: tuple[Mark, ...] = ()
+    marks: tuple[SceneMark, ...] = ()
     kind: str = ""
     floor_m: float = 0.0
     is_fixed: bool = False
@@ -160,11 +160,11 @@ class Property(Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Scene:
+class ExportScene:
     """A world, a robot, or a robot in a world."""
 
     name: str
-    bodies: tuple[Body, ...]
+    bodies: tuple[SceneBody, ...]
     #: How many of each property there are to be held or lost.
     holds: Mapping[Property, int]
     #: x, y, z and heading of the start, and the extent of the floor; None for a robot alone.

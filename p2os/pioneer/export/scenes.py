@@ -16,14 +16,14 @@ from p2os.pioneer.body.physical import (
     middle_and_slope,
 )
 from p2os.pioneer.export.scene import (
-    Body,
     Box,
     Cylinder,
-    Mark,
-    Motion,
-    Place,
+    ExportScene,
+    FixedPose,
+    JointKind,
     Property,
-    Scene,
+    SceneBody,
+    SceneMark,
     Shape,
     Sphere,
     TriangleMesh,
@@ -31,7 +31,7 @@ from p2os.pioneer.export.scene import (
 )
 from p2os.pioneer.world.drawing import Look, look_of
 from p2os.pioneer.world.interchange.words import GROUND, ROBOT
-from p2os.pioneer.world.model import LONGEST_NAME, Kind, Obstacle, World
+from p2os.pioneer.world.model import LONGEST_NAME, Obstacle, ObstacleKind, World
 from p2os.robots.parameters import RobotParameters
 
 WORLD = "world"
@@ -40,7 +40,7 @@ CASTER = "caster"
 HULL_COLOUR, WHEEL_COLOUR = (0.75, 0.1, 0.1), (0.12, 0.12, 0.12)
 
 
-def scene_of(world: World | None, robot: RobotParameters | None) -> Scene:
+def scene_of(world: World | None, robot: RobotParameters | None) -> ExportScene:
     """Return the scene of a world, of a robot, or of a robot at the start of a world.
 
     Raises:
@@ -48,13 +48,13 @@ def scene_of(world: World | None, robot: RobotParameters | None) -> Scene:
     """
     if world is None and robot is None:
         raise WorldError("neither a world nor a robot to export")
-    bodies: list[Body] = []
+    bodies: list[SceneBody] = []
     holds: dict[Property, int] = {}
     names = _Names(robot)
     if world is not None:
         bodies += _world_bodies(world, names)
         holds |= {
-            Property.KIND: sum(item.kind is not Kind.OBSTACLE for item in world.obstacles),
+            Property.KIND: sum(item.kind is not ObstacleKind.OBSTACLE for item in world.obstacles),
             Property.PUSHED: sum(item.mass_kg > 0 for item in world.obstacles),
             Property.WALK: sum(item.walk is not None for item in world.obstacles),
             Property.MESH: len(world.meshes),
@@ -62,7 +62,7 @@ def scene_of(world: World | None, robot: RobotParameters | None) -> Scene:
             Property.START: int(robot is None),
         }
     if robot is not None:
-        start = Place() if world is None else _start(world)
+        start = FixedPose() if world is None else _start(world)
         bodies += (body if world is None else replace(body, kind=ROBOT) for body in _robot_bodies(robot, start))
         fitted = robot.sonar[: robot.sonar_fitted]
         wheels = len(robot.wheel_places)
@@ -78,7 +78,7 @@ def scene_of(world: World | None, robot: RobotParameters | None) -> Scene:
         Property.NAME: names.changed,
     }
     name = world.name if world is not None else robot.subclass if robot is not None else ""
-    return Scene(
+    return ExportScene(
         name=name or WORLD,
         bodies=tuple(bodies),
         holds=holds,
@@ -106,27 +106,27 @@ class _Names:
         return name
 
 
-def _start(world: World) -> Place:
+def _start(world: World) -> FixedPose:
     start = world.start
-    return Place(start.x_m, start.y_m, start.z_m, yaw_rad=start.heading_rad)
+    return FixedPose(start.x_m, start.y_m, start.z_m, yaw_rad=start.heading_rad)
 
 
-def _world_bodies(world: World, names: _Names) -> Iterable[Body]:
+def _world_bodies(world: World, names: _Names) -> Iterable[SceneBody]:
     half, (x, y, z) = floor_box(world)
-    yield Body(
-        name=GROUND, place=Place(x, y, z), shape=Box((2 * half[0], 2 * half[1], 2 * half[2])),
+    yield SceneBody(
+        name=GROUND, place=FixedPose(x, y, z), shape=Box((2 * half[0], 2 * half[1], 2 * half[2])),
         friction=STANDING_FRICTION, colour=(0.93, 0.93, 0.91), kind=GROUND, is_fixed=True,
     )  # fmt: skip
     for item in world.obstacles:
         yield _thing(item, names.take(item.name))
     for mesh in world.meshes:
-        yield Body(
-            name=names.take(mesh.name), place=Place(), shape=TriangleMesh(mesh.vertices, mesh.triangles),
-            friction=STANDING_FRICTION, colour=_rgb(Look.THING), kind=Kind.OBSTACLE.value, is_fixed=True,
+        yield SceneBody(
+            name=names.take(mesh.name), place=FixedPose(), shape=TriangleMesh(mesh.vertices, mesh.triangles),
+            friction=STANDING_FRICTION, colour=_rgb(Look.THING), kind=ObstacleKind.OBSTACLE.value, is_fixed=True,
         )  # fmt: skip
 
 
-def _thing(item: Obstacle, name: str) -> Body:
+def _thing(item: Obstacle, name: str) -> SceneBody:
     at = item if item.walk is None else replace(item, x_m=item.walk.points_m[0][0], y_m=item.walk.points_m[0][1])
     (x, y, z), slope = middle_and_slope(at)
     shape: Shape = Cylinder(item.radius_m, item.height_m)
@@ -134,13 +134,13 @@ def _thing(item: Obstacle, name: str) -> Body:
         length, width, height = half_sizes(item)
         shape = Box((2 * length, 2 * width, 2 * height))
     is_pushed = item.mass_kg > 0
-    return Body(
+    return SceneBody(
         name=name,
-        place=Place(x, y, z, pitch_rad=-slope, yaw_rad=item.heading_rad),
+        place=FixedPose(x, y, z, pitch_rad=-slope, yaw_rad=item.heading_rad),
         shape=shape,
         friction=item.friction if is_pushed else STANDING_FRICTION,
         colour=_rgb(look_of(item)),
-        motion=Motion.FREE if is_pushed else Motion.FIXED,
+        motion=JointKind.FREE if is_pushed else JointKind.FIXED,
         mass_kg=item.mass_kg,
         inertia=_inertia(shape, item.mass_kg),
         kind=item.kind.value,
@@ -155,40 +155,42 @@ def part_names(robot: RobotParameters) -> dict[str, str]:
     return {f"{robot.subclass} {part}".strip(): part for part in parts}
 
 
-def _robot_bodies(robot: RobotParameters, start: Place) -> Iterable[Body]:
+def _robot_bodies(robot: RobotParameters, start: FixedPose) -> Iterable[SceneBody]:
     """Yield the hull in the robot frame (middle of the axle, on the floor), and what hangs on it."""
     own, chassis, name = robot.body, Chassis.of(robot), robot.subclass
     hull = Box((chassis.length_m, chassis.width_m, chassis.height_m))
     high_m = robot.sonar_height_m
     sonars = (
-        Mark(
+        SceneMark(
             name=f"{name} sonar {number}",
-            place=Place(pose.x_mm / 1000, pose.y_mm / 1000, high_m, yaw_rad=math.radians(pose.heading_deg)),
+            place=FixedPose(pose.x_mm / 1000, pose.y_mm / 1000, high_m, yaw_rad=math.radians(pose.heading_deg)),
         )
         for number, pose in enumerate(robot.sonar[: robot.sonar_fitted])
     )  # fmt: skip
     places = robot.wheel_places
     # The engines' chassis rolls on two wheels and a caster, whatever the robot has.
     hull_kg = own.mass_kg - len(places) * own.wheel_mass_kg - (CASTER_MASS_KG if robot.has_caster else 0.0)
-    yield Body(
-        name=name, place=start, shape=hull, at=Place(chassis.centre[0], 0.0, chassis.middle_m), friction=HULL_FRICTION,
-        colour=HULL_COLOUR, motion=Motion.FREE, mass_kg=hull_kg, centre=chassis.centre,
+    yield SceneBody(
+        name=name, place=start, shape=hull, at=FixedPose(chassis.centre[0], 0.0, chassis.middle_m),
+        friction=HULL_FRICTION,
+        colour=HULL_COLOUR, motion=JointKind.FREE, mass_kg=hull_kg, centre=chassis.centre,
         inertia=_inertia(hull, hull_kg), marks=tuple(sonars),
     )  # fmt: skip
     radius = own.wheel_diameter_m / 2
     tyre = Cylinder(radius, own.wheel_width_m)
     along, about, _ = _inertia(tyre, own.wheel_mass_kg)[2], *_inertia(tyre, own.wheel_mass_kg)[:2]
     for wheel in places:
-        yield Body(
-            name=f"{name} {wheel.name}", parent=name, motion=Motion.WHEEL, place=Place(wheel.x_m, wheel.y_m, radius),
-            shape=tyre, at=Place(roll_rad=math.pi / 2), friction=WHEEL_FRICTION, colour=WHEEL_COLOUR,
+        yield SceneBody(
+            name=f"{name} {wheel.name}", parent=name, motion=JointKind.WHEEL,
+            place=FixedPose(wheel.x_m, wheel.y_m, radius),
+            shape=tyre, at=FixedPose(roll_rad=math.pi / 2), friction=WHEEL_FRICTION, colour=WHEEL_COLOUR,
             mass_kg=own.wheel_mass_kg, inertia=(about, along, about), torque_nm=own.motor_torque_nm,
         )  # fmt: skip
     if not robot.has_caster:
         return
     ball = Sphere(own.caster_radius_m)
-    yield Body(
-        name=f"{name} {CASTER}", parent=name, place=Place(own.caster_x_m, 0.0, own.caster_radius_m), shape=ball,
+    yield SceneBody(
+        name=f"{name} {CASTER}", parent=name, place=FixedPose(own.caster_x_m, 0.0, own.caster_radius_m), shape=ball,
         friction=0.0, colour=WHEEL_COLOUR, mass_kg=CASTER_MASS_KG, inertia=_inertia(ball, CASTER_MASS_KG),
     )  # fmt: skip
 

@@ -6,12 +6,12 @@ Source: http://sdformat.org/spec?ver=1.7
 """
 
 from p2os.pioneer.export.annotation import DECLARATION, annotate_thing, annotate_world
-from p2os.pioneer.export.scene import Body, Box, Cylinder, Motion, Place, Scene, Sphere
+from p2os.pioneer.export.scene import Box, Cylinder, ExportScene, FixedPose, JointKind, SceneBody, Sphere
 from p2os.pioneer.export.triangles import obj_text
 from p2os.pioneer.export.xml_text import Tag, spaced
 
 
-def write(scene: Scene, stem: str) -> dict[str, bytes]:
+def write(scene: ExportScene, stem: str) -> dict[str, bytes]:
     """Return the files by their names, the SDF first."""
     root = Tag("sdf", {"version": "1.7"} | DECLARATION)
     holder = root
@@ -25,7 +25,7 @@ def write(scene: Scene, stem: str) -> dict[str, bytes]:
     for top in (body for body in scene.bodies if body.parent is None):
         model = holder.add("model", name=top.name)
         annotate_thing(model, top)
-        if top.motion is Motion.FIXED:
+        if top.motion is JointKind.FIXED:
             model.add("static", "true")
         _pose(model, top.place)
         parts = [top, *(body for body in scene.bodies if body.parent == top.name)]
@@ -43,11 +43,11 @@ def write(scene: Scene, stem: str) -> dict[str, bytes]:
     return files
 
 
-def _pose(holder: Tag, place: Place) -> None:
+def _pose(holder: Tag, place: FixedPose) -> None:
     holder.add("pose", spaced((*place.position, *place.turns)))
 
 
-def _fill(link: Tag, body: Body, files: dict[str, bytes], stem: str) -> None:
+def _fill(link: Tag, body: SceneBody, files: dict[str, bytes], stem: str) -> None:
     if body.mass_kg:
         inertial = link.add("inertial")
         inertial.add("pose", spaced((*body.centre, 0.0, 0.0, 0.0)))
@@ -72,7 +72,7 @@ def _fill(link: Tag, body: Body, files: dict[str, bytes], stem: str) -> None:
         material.add(key, spaced((*body.colour, 1.0)))
 
 
-def _geometry(body: Body, files: dict[str, bytes], stem: str) -> Tag:
+def _geometry(body: SceneBody, files: dict[str, bytes], stem: str) -> Tag:
     geometry, shape = Tag("geometry"), body.shape
     if isinstance(shape, Box):
         geometry.add("box").add("size", spaced(shape.size_m))
@@ -89,13 +89,13 @@ def _geometry(body: Body, files: dict[str, bytes], stem: str) -> Tag:
     return geometry
 
 
-def _joint(model: Tag, body: Body) -> None:
+def _joint(model: Tag, body: SceneBody) -> None:
     joint = model.add(
-        "joint", name=f"{body.name} joint", type="fixed" if body.motion is Motion.FIXED else "continuous"
+        "joint", name=f"{body.name} joint", type="fixed" if body.motion is JointKind.FIXED else "continuous"
     )  # fmt: skip
     joint.add("parent", body.parent or "")
     joint.add("child", body.name)
-    if body.motion is Motion.WHEEL:
+    if body.motion is JointKind.WHEEL:
         axis = joint.add("axis")
         axis.add("xyz", "0 1 0")
         axis.add("limit").add("effort", spaced([body.torque_nm]))

@@ -6,16 +6,16 @@ Source: http://wiki.ros.org/urdf/XML
 """
 
 from p2os.pioneer.export.annotation import DECLARATION, annotate_thing, annotate_world
-from p2os.pioneer.export.scene import Body, Box, Cylinder, Motion, Place, Scene, Sphere, Vector
+from p2os.pioneer.export.scene import Box, Cylinder, ExportScene, FixedPose, JointKind, SceneBody, Sphere, Vector
 from p2os.pioneer.export.triangles import obj_text
 from p2os.pioneer.export.xml_text import Tag, spaced
 
 ROOT = "world"
 NOWHERE = (0.0, 0.0, 0.0)
-JOINTS = {Motion.FIXED: "fixed", Motion.FREE: "floating", Motion.WHEEL: "continuous"}
+JOINTS = {JointKind.FIXED: "fixed", JointKind.FREE: "floating", JointKind.WHEEL: "continuous"}
 
 
-def write(scene: Scene, stem: str, joint_name: str = "{} joint") -> dict[str, bytes]:
+def write(scene: ExportScene, stem: str, joint_name: str = "{} joint") -> dict[str, bytes]:
     """Return the files by their names, the URDF first; a joint is named after its child."""
     root = Tag("robot", {"name": scene.name} | DECLARATION)
     files = {f"{stem}.urdf": b""}
@@ -36,7 +36,7 @@ def write(scene: Scene, stem: str, joint_name: str = "{} joint") -> dict[str, by
     return files
 
 
-def _link(root: Tag, body: Body, files: dict[str, bytes], stem: str) -> None:
+def _link(root: Tag, body: SceneBody, files: dict[str, bytes], stem: str) -> None:
     link = root.add("link", name=body.name)
     annotate_thing(link, body)
     _mass(link, body.mass_kg, body.centre, body.inertia)
@@ -61,7 +61,7 @@ def _mass(link: Tag, mass_kg: float, centre: Vector, inertia: Vector) -> None:
     inertial.add("inertia", ixx=ixx, iyy=iyy, izz=izz, ixy="0", ixz="0", iyz="0")
 
 
-def _geometry(body: Body, files: dict[str, bytes], stem: str) -> Tag:
+def _geometry(body: SceneBody, files: dict[str, bytes], stem: str) -> Tag:
     geometry, shape = Tag("geometry"), body.shape
     if isinstance(shape, Box):
         geometry.add("box", size=spaced(shape.size_m))
@@ -76,11 +76,11 @@ def _geometry(body: Body, files: dict[str, bytes], stem: str) -> Tag:
     return geometry
 
 
-def _origin(holder: Tag, place: Place) -> None:
+def _origin(holder: Tag, place: FixedPose) -> None:
     holder.add("origin", xyz=spaced(place.position), rpy=spaced(place.turns))
 
 
-def _joint(root: Tag, name: str, child: str, parent: str, place: Place, kind: str, torque_nm: float) -> None:
+def _joint(root: Tag, name: str, child: str, parent: str, place: FixedPose, kind: str, torque_nm: float) -> None:
     joint = root.add("joint", name=name, type=kind)
     joint.add("parent", link=parent)
     joint.add("child", link=child)

@@ -36,7 +36,7 @@ from p2os.protocol.bauds import BAUDS, BAUDS_TEXT
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import load_parameters
 from p2os.toml_file import TomlSource, is_file, is_folder, read_toml, read_user_text
-from p2os.toml_schema import LONGEST_S, Key, Place, filled, placed, within
+from p2os.toml_schema import LONGEST_S, Key, TablePlace, filled, placed, within
 from p2os.transport.url import DEFAULT_URL
 from simbase.errors import FileError, shown, shown_name
 from simbase.timing import NS_PER_S
@@ -107,7 +107,7 @@ def parse_fleet(text: str, source: str, folder: Path, *, trust: bool | Trust = F
         FleetError: The text is no TOML or breaks the schema; the message names the source, the line and the key.
     """
     table, places = read_toml(text, source, "a fleet", FleetError)
-    where = Place(TomlSource(source, places), error=FleetError)
+    where = TablePlace(TomlSource(source, places), error=FleetError)
     top = _values(table, TOP, where, folder)
     robots: list[RobotOrder] = []
     for number, row in enumerate(top["robot"]):
@@ -130,7 +130,7 @@ def parse_fleet(text: str, source: str, folder: Path, *, trust: bool | Trust = F
         )  # fmt: skip
 
 
-def _values(row: Values, keys: tuple[Key, ...], where: Place, folder: Path) -> Values:
+def _values(row: Values, keys: tuple[Key, ...], where: TablePlace, folder: Path) -> Values:
     """Check a table; a file that it names is looked for beside the fleet's first."""
     found = filled(row, keys, where)
     return found | {
@@ -138,7 +138,7 @@ def _values(row: Values, keys: tuple[Key, ...], where: Place, folder: Path) -> V
     }
 
 
-def _robots(row: Values, where: Place, before: list[RobotOrder]) -> list[RobotOrder]:
+def _robots(row: Values, where: TablePlace, before: list[RobotOrder]) -> list[RobotOrder]:
     """Return the robots of one table; those without a port follow the one before."""
     count, port = row["count"], row["port"]
     faults, auxes = ([row[key]] if isinstance(row[key], str) else row[key] for key in ("faults", "aux"))
@@ -167,7 +167,7 @@ def _robots(row: Values, where: Place, before: list[RobotOrder]) -> list[RobotOr
     return [replace(first, port=port) for port in ports]
 
 
-def _place(numbers: list[object] | None, where: Place) -> Pose | None:
+def _place(numbers: list[object] | None, where: TablePlace) -> Pose | None:
     if numbers is None:
         return None
     found = [
@@ -180,7 +180,7 @@ def _place(numbers: list[object] | None, where: Place) -> Pose | None:
     return Pose(x, y, math.radians(heading))
 
 
-def _settings(row: Values, where: Place) -> ControllerSettings:
+def _settings(row: Values, where: TablePlace) -> ControllerSettings:
     with placed(where, "for"):
         ControllerSettings.of(client=row["for"])
     with placed(where, "laser"):

@@ -30,7 +30,7 @@ NEVER: Nanos = 1 << 62
 
 
 @dataclass(slots=True)
-class Member(Stateful):
+class WorldMember(Stateful):
     """One robot of a multi-robot world."""
 
     STATE = ("pioneer",)
@@ -68,8 +68,8 @@ class MultiRobotWorld(Stateful):
         if [robot.body for robot in robots] != list(scene.bodies):
             raise UsageError("the robots of one world need the bodies of its scene, in its order")
         self.scene = scene
-        self.members: tuple[Member, ...] = tuple(
-            Member(index, pioneer, body, pioneer.advance_to, pioneer.next_due)
+        self.members: tuple[WorldMember, ...] = tuple(
+            WorldMember(index, pioneer, body, pioneer.advance_to, pioneer.next_due)
             for index, (pioneer, body) in enumerate(zip(robots, scene.bodies, strict=True))
         )
         #: All bodies stand at this step.
@@ -174,10 +174,10 @@ class MultiRobotWorld(Stateful):
             self._look(member)
 
     @staticmethod
-    def _look(member: Member) -> None:
+    def _look(member: WorldMember) -> None:
         due = member.next_due()
         member.due = NEVER if due is None else due
 
 
-def _due_of(member: Member) -> Nanos:
+def _due_of(member: WorldMember) -> Nanos:
     return NEVER if member.due is None else member.due

@@ -2,9 +2,17 @@
 
 from p2os.pioneer.world.file import parse_world
 from p2os.pioneer.world.loader import known_worlds, load_world, world_suffixes
-from p2os.pioneer.world.model import Kind, Mark, Mesh, Obstacle, Pose, World
+from p2os.pioneer.world.model import Mark, Mesh, Obstacle, ObstacleKind, Pose, World
 
 __all__ = [
-    "Kind", "Mark", "Mesh", "Obstacle", "Pose", "World", "known_worlds", "load_world", "parse_world",
+    "Mark",
+    "Mesh",
+    "Obstacle",
+    "ObstacleKind",
+    "Pose",
+    "World",
+    "known_worlds",
+    "load_world",
+    "parse_world",
     "world_suffixes",
 ]  # fmt: skip

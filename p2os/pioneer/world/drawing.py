@@ -14,7 +14,7 @@ from html import escape
 from itertools import pairwise
 
 from p2os.pioneer.world.geometry import Footprint, point_polygon, point_segment
-from p2os.pioneer.world.model import CUT_M, Kind, Obstacle, Point, World, cut, shadow
+from p2os.pioneer.world.model import CUT_M, Obstacle, ObstacleKind, Point, World, cut, shadow
 
 
 class Look(Enum):
@@ -49,7 +49,7 @@ OVERHEAD_M = 0.22
 
 
 @dataclass(frozen=True, slots=True)
-class Shape:
+class DrawnShape:
     """A polygon of some points, a line (open), or a circle (one point and a radius); metres."""
 
     look: Look
@@ -59,23 +59,23 @@ class Shape:
     is_open: bool = False
 
 
-def shapes(world: World) -> list[Shape]:
+def shapes(world: World) -> list[DrawnShape]:
     """Return what there is to draw, the lowest first."""
     found = [_thing(item) for item in world.obstacles]
     for item in world.obstacles:
         if item.walk is not None:
             points = item.walk.points_m
-            found.append(Shape(Look.PATH, f"{item.name}'s path", points, is_open=True))
+            found.append(DrawnShape(Look.PATH, f"{item.name}'s path", points, is_open=True))
     for mark in world.marks:
         look = MARKED.get(mark.kind, Look.GOAL)
         is_open, radius = len(mark.points_m) > 1, 0.0 if len(mark.points_m) > 1 else MARK_RADIUS_M
         points = (*mark.points_m, mark.points_m[0]) if len(mark.points_m) > 2 else mark.points_m
-        found.append(Shape(look, mark.name or mark.kind, points, radius, is_open=is_open))
+        found.append(DrawnShape(look, mark.name or mark.kind, points, radius, is_open=is_open))
     for mesh in world.meshes:
         found += [
-            Shape(Look.THING, mesh.name, polygon) for polygon in shadow(mesh, CUT_M / 4, CUT_M) if len(polygon) > 2
+            DrawnShape(Look.THING, mesh.name, polygon) for polygon in shadow(mesh, CUT_M / 4, CUT_M) if len(polygon) > 2
         ]
-        found += [Shape(Look.WALL, mesh.name, segment, is_open=True) for segment in cut(mesh, CUT_M)]
+        found += [DrawnShape(Look.WALL, mesh.name, segment, is_open=True) for segment in cut(mesh, CUT_M)]
     return sorted(found, key=lambda shape: ORDER.index(shape.look))
 
 
@@ -95,25 +95,25 @@ def start_arrow(world: World, length_m: float) -> tuple[Point, ...]:
     return tuple((start.x_m + x * c - y * s, start.y_m + x * s + y * c) for x, y in outline)
 
 
-def _thing(item: Obstacle) -> Shape:
+def _thing(item: Obstacle) -> DrawnShape:
     at = (item.x_m, item.y_m) if item.walk is None else item.walk.points_m[0]
     if item.is_cylinder:
-        return Shape(look_of(item), item.name, (at,), item.radius_m)
+        return DrawnShape(look_of(item), item.name, (at,), item.radius_m)
     if item.width_m < THIN_M:
         c, s = item.length_m / 2 * math.cos(item.heading_rad), item.length_m / 2 * math.sin(item.heading_rad)
-        return Shape(look_of(item), item.name, ((at[0] - c, at[1] - s), (at[0] + c, at[1] + s)), is_open=True)
-    return Shape(look_of(item), item.name, Footprint(item).polygon)
+        return DrawnShape(look_of(item), item.name, ((at[0] - c, at[1] - s), (at[0] + c, at[1] + s)), is_open=True)
+    return DrawnShape(look_of(item), item.name, Footprint(item).polygon)
 
 
 def look_of(item: Obstacle) -> Look:
     """Return how a thing is drawn."""
     if item.kind.is_driven_on:
-        return Look.RAMP if item.kind is Kind.RAMP else Look.FLOOR
+        return Look.RAMP if item.kind is ObstacleKind.RAMP else Look.FLOOR
     if item.walk is not None:
         return Look.WALKING
     if item.base_m - item.floor_m >= OVERHEAD_M:
         return Look.OVERHEAD
-    if item.kind in {Kind.WALL, Kind.RAIL}:
+    if item.kind in {ObstacleKind.WALL, ObstacleKind.RAIL}:
         return Look.WALL
     return Look.PUSHED if item.mass_kg else Look.THING
 
@@ -137,7 +137,7 @@ def svg(world: World) -> str:
     def at(x: float, y: float) -> str:
         return f"{EDGE_PX + (x - x0) * scale:.1f},{EDGE_PX + (y1 - y) * scale:.1f}"
 
-    def drawn(shape: Shape) -> str:
+    def drawn(shape: DrawnShape) -> str:
         title = f"<title>{escape(shape.name)}</title>"
         if shape.radius_m:
             x, y = at(*shape.points[0]).split(",")
@@ -245,7 +245,7 @@ def text_key(world: World, columns: int) -> str:
     )
 
 
-def _points(shape: Shape, x0: float, y1: float, point_m: float) -> Iterator[tuple[int, int]]:
+def _points(shape: DrawnShape, x0: float, y1: float, point_m: float) -> Iterator[tuple[int, int]]:
     """Yield column and row of each point that a shape covers, at least one."""
     xs, ys = [x for x, _ in shape.points], [y for _, y in shape.points]
     r = shape.radius_m
@@ -257,7 +257,7 @@ def _points(shape: Shape, x0: float, y1: float, point_m: float) -> Iterator[tupl
                 yield column, row
 
 
-def _covers(shape: Shape, x: float, y: float, slack_m: float) -> bool:
+def _covers(shape: DrawnShape, x: float, y: float, slack_m: float) -> bool:
     points = shape.points
     if shape.radius_m:
         return math.hypot(x - points[0][0], y - points[0][1]) <= max(shape.radius_m, slack_m)

@@ -13,11 +13,11 @@ from typing import Any
 
 from p2os.errors import WorldError
 from p2os.pioneer.world.makers.arena import arena
-from p2os.pioneer.world.model import LONGEST_NAME, RANGES, Kind, Mark, Mesh, Obstacle, Pose, Repeat, Walk, World
+from p2os.pioneer.world.model import LONGEST_NAME, RANGES, Mark, Mesh, Obstacle, ObstacleKind, Pose, Repeat, Walk, World
 from p2os.pioneer.world.placing import Placing
 from p2os.pioneer.world.readers import read_placed
 from p2os.toml_file import TomlSource, read_toml
-from p2os.toml_schema import Key, Place, Table, check_table, filled, placed, within
+from p2os.toml_schema import Key, Table, TablePlace, check_table, filled, placed, within
 from p2os.toml_schema import Kind as KeyKind
 
 #: A table with a value for every key.
@@ -52,19 +52,19 @@ PATH_KEYS = {"path_m": (), "speed_mps": 0.5, "start_s": 0.0, "repeat": Repeat.BA
 MOVING: Mapping[str, object] = {"fixed": False, "mass_kg": 0.0, "friction": 0.5, **PATH_KEYS}
 #: Keys that an `Obstacle` calls otherwise, and the kind that a section gives.
 CALLED = {"heading_deg": "heading_rad", "top_m": "height_m", "rise_m": "height_m"}
-_KIND_OF = {"floor": Kind.FLOOR, "ramp": Kind.RAMP}
+_KIND_OF = {"floor": ObstacleKind.FLOOR, "ramp": ObstacleKind.RAMP}
 #: Section → its keys with their defaults; None where a value must be given.
 SHAPES: Mapping[str, tuple[Key, ...]] = {
     "box": _keys({
         "name": None, "x_m": None, "y_m": None, "length_m": None, "width_m": None, "height_m": 0.5,
-        "heading_deg": 0.0, "base_m": 0.0, "floor_m": 0.0, "kind": Kind.OBSTACLE, **MOVING,
+        "heading_deg": 0.0, "base_m": 0.0, "floor_m": 0.0, "kind": ObstacleKind.OBSTACLE, **MOVING,
     }),
     "cylinder": _keys({
         "name": None, "x_m": None, "y_m": None, "radius_m": None, "height_m": 0.5, "base_m": 0.0, "floor_m": 0.0,
         **MOVING,
     }),
     "wall": _keys({
-        "name": None, "from_m": None, "to_m": None, "thickness_m": 0.1, "height_m": 1.0, "kind": Kind.WALL,
+        "name": None, "from_m": None, "to_m": None, "thickness_m": 0.1, "height_m": 1.0, "kind": ObstacleKind.WALL,
         "fixed": False,
     }),
     "floor": _keys({"name": None, "x_m": None, "y_m": None, "length_m": None, "width_m": None, "top_m": None}),
@@ -99,7 +99,7 @@ def parse_world(text: str, source: str, seed: int = 0, folder: Path | None = Non
         MissingDependencyError: An imported file needs a reader that is not installed.
     """
     table, places = read_toml(text, source, "a world", WorldError)
-    where = Place(TomlSource(source, places), error=WorldError)
+    where = TablePlace(TomlSource(source, places), error=WorldError)
     top = filled(table, TOP_KEYS, where)
     begins = within(where, "start")
     at_start = _values(top["start"], START_KEYS, begins)
@@ -138,14 +138,16 @@ def parse_world(text: str, source: str, seed: int = 0, folder: Path | None = Non
     )  # fmt: skip
 
 
-def _rows(rows: list[Table], name: str, keys: tuple[Key, ...], where: Place) -> Iterator[tuple[Place, Values]]:
+def _rows(
+    rows: list[Table], name: str, keys: tuple[Key, ...], where: TablePlace
+) -> Iterator[tuple[TablePlace, Values]]:
     """Yield the tables `[[name]]` with their places, checked and with every default filled in."""
     for number, row in enumerate(rows):
         at = within(where, name, number)
         yield at, _values(row, keys, at)
 
 
-def _values(row: Table, keys: tuple[Key, ...], where: Place) -> Values:
+def _values(row: Table, keys: tuple[Key, ...], where: TablePlace) -> Values:
     """Check a table, and return the value or the default of every key, whole numbers as floats too."""
     found = filled(row, keys, where)
     return {name: float(value) if type(value) is int else value for name, value in found.items()}
@@ -156,7 +158,7 @@ def _obstacle(section: str, v: Values) -> Obstacle:
         return _wall(v)
     fields = {CALLED.get(key, key): value for key, value in v.items() if key not in PATH_KEYS}
     fields["heading_rad"] = math.radians(v.get("heading_deg", 0.0))
-    fields["kind"] = Kind(v.get("kind", _KIND_OF.get(section, Kind.OBSTACLE)))
+    fields["kind"] = ObstacleKind(v.get("kind", _KIND_OF.get(section, ObstacleKind.OBSTACLE)))
     return Obstacle(**fields, walk=_walk(v))
 
 
@@ -165,7 +167,7 @@ def _wall(v: Values) -> Obstacle:
     return Obstacle(
         name=v["name"], x_m=(x0 + x1) / 2, y_m=(y0 + y1) / 2, heading_rad=math.atan2(y1 - y0, x1 - x0),
         length_m=math.hypot(x1 - x0, y1 - y0) + v["thickness_m"], width_m=v["thickness_m"], height_m=v["height_m"],
-        kind=Kind(v["kind"]), fixed=v["fixed"],
+        kind=ObstacleKind(v["kind"]), fixed=v["fixed"],
     )  # fmt: skip
 
 
@@ -181,7 +183,7 @@ def _points(rows: Any) -> Any:
     return tuple(tuple(map(float, row)) for row in rows)
 
 
-def _mesh(v: Values, at: Place) -> Mesh:
+def _mesh(v: Values, at: TablePlace) -> Mesh:
     odd = [corner for row in v["triangles"] for corner in row if not isinstance(corner, int)]
     if odd:
         raise WorldError(f"{at.at('triangles')}: triangles: {odd[0]} is no whole number", hint="of a vertex, from 0")
@@ -189,12 +191,12 @@ def _mesh(v: Values, at: Place) -> Mesh:
         return Mesh(name=v["name"], vertices=_points(v["vertices_m"]), triangles=tuple(map(tuple, v["triangles"])))
 
 
-def _mark(v: Values, at: Place) -> Mark:
+def _mark(v: Values, at: TablePlace) -> Mark:
     with placed(at):
         return Mark(name=v["name"], kind=v["kind"], points_m=_points(v["points_m"]))
 
 
-def _imported(v: Values, at: Place, folder: Path) -> World:
+def _imported(v: Values, at: TablePlace, folder: Path) -> World:
     with placed(at, "file"):
         placing = Placing(
             x_m=v["x_m"], y_m=v["y_m"], z_m=v["z_m"], heading_rad=math.radians(v["heading_deg"]), scale=v["scale"],

@@ -66,7 +66,7 @@ UPRIGHT_M2 = 1e-8
 _LINE_ANGLE_STEPS = 1e4
 
 
-class Kind(Enum):
+class ObstacleKind(Enum):
     """What an obstacle is; walls and rails are drawn darker, floors and ramps are driven on."""
 
     WALL = "wall"
@@ -80,7 +80,7 @@ class Kind(Enum):
     @property
     def is_driven_on(self) -> bool:
         """Whether touching it is no collision."""
-        return self in {Kind.FLOOR, Kind.RAMP}
+        return self in {ObstacleKind.FLOOR, ObstacleKind.RAMP}
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,7 +208,7 @@ class Obstacle:
     base_m: float = 0.0
     height_m: float = 0.5
     floor_m: float = 0.0
-    kind: Kind = Kind.OBSTACLE
+    kind: ObstacleKind = ObstacleKind.OBSTACLE
     fixed: bool = False
     mass_kg: float = 0.0
     friction: float = 0.5
@@ -217,7 +217,11 @@ class Obstacle:
     def __post_init__(self) -> None:
         is_box = self.length_m > 0 and self.width_m > 0 and self.radius_m == 0
         is_cylinder = self.radius_m > 0 and self.length_m == 0 and self.width_m == 0
-        if not (is_box or is_cylinder) or self.height_m < 0 or (self.height_m == 0 and self.kind is not Kind.RAMP):
+        if (
+            not (is_box or is_cylinder)
+            or self.height_m < 0
+            or (self.height_m == 0 and self.kind is not ObstacleKind.RAMP)
+        ):
             raise WorldError(f"obstacle {self.name!r}: needs a length and a width, or a radius, and a height above 0")
         if not all(math.isfinite(value) for value in (self.x_m, self.y_m, self.heading_rad, self.base_m)):
             raise WorldError(f"obstacle {self.name!r}: its place must be finite")
@@ -237,7 +241,7 @@ class Obstacle:
             _refuse_outside(what, key, getattr(self, key))
         sizes = (self.radius_m,) if self.radius_m else (self.length_m, self.width_m)
         _refuse_outside(what, "radius_m" if self.radius_m else "length_m", *sizes)
-        _refuse_outside(what, "rise_m" if self.kind is Kind.RAMP else "height_m", self.height_m)
+        _refuse_outside(what, "rise_m" if self.kind is ObstacleKind.RAMP else "height_m", self.height_m)
         if self.mass_kg and (self.mass_kg < LEAST_PUSHED_KG or min(*sizes, self.height_m) < LEAST_PUSHED_M):
             raise WorldError(
                 f"{what}: what is pushed has {LEAST_PUSHED_KG:g} kg and is {LEAST_PUSHED_M:g} m thick at least",
@@ -252,11 +256,11 @@ class Obstacle:
     @property
     def section(self) -> str:
         """The table of a world file that it belongs to: box, cylinder, floor or ramp."""
-        if self.kind is Kind.RAMP:
+        if self.kind is ObstacleKind.RAMP:
             return "ramp"
         if self.is_cylinder:
             return "cylinder"
-        return "floor" if self.kind is Kind.FLOOR and self.base_m == self.heading_rad == 0 else "box"
+        return "floor" if self.kind is ObstacleKind.FLOOR and self.base_m == self.heading_rad == 0 else "box"
 
     @property
     def reach_m(self) -> float:
@@ -431,14 +435,14 @@ class World:
     @property
     def has_slopes(self) -> bool:
         """Whether a plan view leaves something out."""
-        return any(obstacle.kind is Kind.RAMP for obstacle in self.obstacles)
+        return any(obstacle.kind is ObstacleKind.RAMP for obstacle in self.obstacles)
 
     def to_plain(self) -> dict[str, object]:
         """Return the plan as plain values, for a report; a mesh as the thin walls of its cut."""
         walls = [
             {
                 "name": f"{mesh.name}, wall {number}",
-                "kind": Kind.WALL.value,
+                "kind": ObstacleKind.WALL.value,
                 "shape": "box",
                 "x": (ax + bx) / 2,
                 "y": (ay + by) / 2,

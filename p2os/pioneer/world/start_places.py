@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 
 from p2os.errors import WorldError
 from p2os.pioneer.world.geometry import Footprint, hull_polygon, placed
-from p2os.pioneer.world.model import Kind, Pose, World
+from p2os.pioneer.world.model import ObstacleKind, Pose, World
 from p2os.pioneer.world.plan import Plan, StaticPlan
 from p2os.robots.parameters import RobotParameters
 from simbase.errors import FileError, UsageError, shown
@@ -163,7 +163,7 @@ def floor_height(world: World, x: float, y: float, reach: float = 0.0) -> float 
 
     Of a mesh's floors nothing is known: they count as the start's.
     """
-    height = 0.0 if any(item.kind is Kind.FLOOR for item in world.obstacles) else world.start.z_m
+    height = 0.0 if any(item.kind is ObstacleKind.FLOOR for item in world.obstacles) else world.start.z_m
     for item in world.obstacles:
         if not item.kind.is_driven_on:
             continue
@@ -173,7 +173,7 @@ def floor_height(world: World, x: float, y: float, reach: float = 0.0) -> float 
         inside = shape.contains(x, y) and all(
             (y - ay) * ex - (x - ax) * ey >= reach * math.hypot(ex, ey) for ax, ay, ex, ey in shape.edges
         )
-        if item.kind is Kind.RAMP or not inside:
+        if item.kind is ObstacleKind.RAMP or not inside:
             return None
         height = max(height, item.base_m + item.height_m)
     return height

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from robot_bench.campaign.conduct import Workers
 from robot_bench.campaign.margin import margin
-from robot_bench.campaign.trial import Done, GoalResult, Outcome, Trial, Verdict, bench_of, unpacked
+from robot_bench.campaign.trial import Done, GoalResult, Outcome, Trial, TrialVerdict, bench_of, unpacked
 from robot_bench.events.codec import events_of
 from robot_bench.events.kinds import Event
 from robot_bench.recording.divergence import Difference, differences
@@ -108,9 +108,9 @@ def compared(one: Outcome, other: Outcome, names: tuple[str, str]) -> Outcome:
         names: What the two are called.
     """
     errors = [f"{name}: {run.failures[0]}" for name, run in zip(names, (one, other), strict=True)
-              if run.verdict is Verdict.ERROR and run.failures]  # fmt: skip
-    if Verdict.ERROR in {one.verdict, other.verdict}:
-        return replace(one, verdict=Verdict.ERROR, failures=tuple(errors), goals=())
+              if run.verdict is TrialVerdict.ERROR and run.failures]  # fmt: skip
+    if TrialVerdict.ERROR in {one.verdict, other.verdict}:
+        return replace(one, verdict=TrialVerdict.ERROR, failures=tuple(errors), goals=())
     margins = margin(one) or 0.0, margin(other) or 0.0
     apart = abs(margins[0] - margins[1])
     is_other = _missed(one) != _missed(other)
@@ -121,10 +121,10 @@ def compared(one: Outcome, other: Outcome, names: tuple[str, str]) -> Outcome:
         kind=KIND, wanted=f"does what {names[1]} does", met=not differs, says=says, robustness=round(by, 9), unit=""
     )
     both = hashlib.sha256(f"{one.sha256} {other.sha256}".encode()).hexdigest()
-    is_others = one.verdict is Verdict.PASSED and other.verdict is Verdict.FAILED
+    is_others = one.verdict is TrialVerdict.PASSED and other.verdict is TrialVerdict.FAILED
     seen = other if is_others else one
     return replace(
-        seen, verdict=Verdict.FAILED if differs else Verdict.PASSED, goals=(goal,), sha256=both, died="",
+        seen, verdict=TrialVerdict.FAILED if differs else TrialVerdict.PASSED, goals=(goal,), sha256=both, died="",
         failures=(f"{KIND}: {says}",) if differs else (),
         blocks=one.blocks | other.blocks, lines=one.lines | other.lines,
     )  # fmt: skip

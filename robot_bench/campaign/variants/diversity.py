@@ -21,7 +21,7 @@ from itertools import combinations, pairwise
 
 from p2os.pioneer.world import load_world
 from p2os.pioneer.world.geometry import Footprint
-from robot_bench.campaign.conduct import Row
+from robot_bench.campaign.conduct import PointRow
 from robot_bench.campaign.trial import Outcome, Trial, unpacked
 from robot_bench.scenario.scenario import Scenario
 
@@ -51,7 +51,7 @@ class FailureSet:
     diversity: Diversity
 
     @classmethod
-    def of(cls, rows: Sequence[Row]) -> "FailureSet":
+    def of(cls, rows: Sequence[PointRow]) -> "FailureSet":
         """Return that of the points that failed."""
         runs = [(row.number, run) for row in rows if (run := row.failing) is not None]
         outcomes = [run.outcome for _, run in runs]

@@ -19,7 +19,7 @@ from typing import TypeAlias, cast
 
 from p2os.toml_schema import Table
 from robot_bench.bench import Bench
-from robot_bench.campaign.trial import Done, Outcome, Seen, Trial, bench_of, blocks_of, run_trial, unpacked
+from robot_bench.campaign.trial import Done, Outcome, SeenSoFar, Trial, bench_of, blocks_of, run_trial, unpacked
 from simbase.errors import P2osError
 from simbase.timing import NS_PER_S, Nanos
 
@@ -34,19 +34,19 @@ MOST_KEPT = 16
 
 
 @dataclass(frozen=True, slots=True)
-class Saved:
+class SavedBeginning:
     """A state on the way: it can be carried to any process, and a bench at its beginning goes on from it."""
 
     at: Nanos
     packed: bytes
 
     @classmethod
-    def of(cls, bench: Bench, seen: Seen) -> "Saved":
+    def of(cls, bench: Bench, seen: SeenSoFar) -> "SavedBeginning":
         """Return the present state of a run, with what it has shown."""
-        shown = Seen(seen.way_mm, seen.hits, seen.printed, seen.blocks | blocks_of(bench))
+        shown = SeenSoFar(seen.way_mm, seen.hits, seen.printed, seen.blocks | blocks_of(bench))
         return cls(bench.now, zlib.compress(pickle.dumps((bench.snapshot(), shown)), 1))
 
-    def __call__(self, bench: Bench) -> Seen:
+    def __call__(self, bench: Bench) -> SeenSoFar:
         """Put a bench into this state; return what the run had shown until then.
 
         Raises:
@@ -54,7 +54,7 @@ class Saved:
         """
         snapshot, seen = pickle.loads(zlib.decompress(self.packed))  # noqa: S301 - of this campaign
         bench.begin_as(snapshot, self.at)
-        return cast("Seen", seen)
+        return cast("SeenSoFar", seen)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,36 +64,36 @@ class Task:
     trial: Trial
     until: Nanos
     #: Where it is already; None: nowhere.
-    start: Saved | None
+    start: SavedBeginning | None
 
-    def __call__(self, look: Callable[[], None]) -> list[Saved]:
+    def __call__(self, look: Callable[[], None]) -> list[SavedBeginning]:
         """Run it; return the states on the way, none where it cannot be run.
 
         Args:
             look: Called between slices; may raise to end it.
         """
-        found: list[Saved] = []
+        found: list[SavedBeginning] = []
         with unpacked(self.trial.files) as folder:
             try:
                 bench = bench_of(self.trial.scenario(folder))
                 bench.on_slice = lambda _now: look()
-                seen = Seen() if self.start is None else self.start(bench)
+                seen = SeenSoFar() if self.start is None else self.start(bench)
                 seen.subscribe(bench)
                 at = 0 if self.start is None else self.start.at
                 while (at := at // EACH_NS * EACH_NS + EACH_NS) <= self.until:
                     bench.run_until(at)
                     if bench.now < at:  # it has ended
                         break
-                    found.append(Saved.of(bench, seen))
+                    found.append(SavedBeginning.of(bench, seen))
             except P2osError:  # each trial tells it
                 return []
         return found
 
 
 #: What a worker does, given what it calls between slices: a trial, or a beginning.
-Work: TypeAlias = Callable[[Callable[[], None]], Outcome | list[Saved]]
+Work: TypeAlias = Callable[[Callable[[], None]], Outcome | list[SavedBeginning]]
 #: What came of it, and the seconds of a processor that it took.
-Worked: TypeAlias = tuple[Outcome | list[Saved], float]
+Worked: TypeAlias = tuple[Outcome | list[SavedBeginning], float]
 #: Does all, and hands on the place of each and what came of it.
 Do: TypeAlias = Callable[[Sequence[Work], Callable[[int, Worked], None]], None]
 #: Place of a trial → the hash of the beginning that it shares, and until when that lasts.
@@ -105,7 +105,7 @@ class Beginnings:
 
     def __init__(self) -> None:
         #: The hash of a beginning → its states, oldest first; the beginning that was wanted last is the last one.
-        self._kept: dict[str, list[Saved]] = {}
+        self._kept: dict[str, list[SavedBeginning]] = {}
 
     def run(self, trials: Sequence[Trial], on_done: Callable[[int, Done], None], do: Do, *, anew: bool) -> None:
         """Have trials run by workers, what they share once; what that costs counts with those that go on from it.
@@ -156,9 +156,9 @@ class Beginnings:
                 found[key] = Task(_before(trials[trial], until + 1), until, start)
         return found
 
-    def _starts(self, shared: Shared) -> Mapping[int, Saved]:
+    def _starts(self, shared: Shared) -> Mapping[int, SavedBeginning]:
         """Return where trials go on, by their places; those that are not in it begin at the beginning."""
-        found: dict[int, Saved] = {}
+        found: dict[int, SavedBeginning] = {}
         for place, (key, until) in shared.items():
             kept = self._kept.pop(key, [])
             self._kept[key] = kept

@@ -16,9 +16,9 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from p2os.errors import RunFailedError
-from robot_bench.campaign.campaign_file import Limits
-from robot_bench.campaign.trial import Done, Outcome, Trial, Verdict
-from robot_bench.campaign.workers.beginnings import Beginnings, Saved, Work, Worked
+from robot_bench.campaign.campaign_file import RunLimits
+from robot_bench.campaign.trial import Done, Outcome, Trial, TrialVerdict
+from robot_bench.campaign.workers.beginnings import Beginnings, SavedBeginning, Work, Worked
 from robot_bench.campaign.workers.processes import MB, MOST_TRIES
 from robot_bench.running.forks import LOOK_S
 from simbase.errors import MissingDependencyError, UsageError
@@ -48,7 +48,7 @@ class DaskWorkers:
     """
 
     def __init__(
-        self, address: str | None, count: int, limits: Limits, look: Callable[[], None] = lambda: None
+        self, address: str | None, count: int, limits: RunLimits, look: Callable[[], None] = lambda: None
     ) -> None:
         try:
             import distributed
@@ -137,7 +137,7 @@ class DaskWorkers:
                 tries[place] += future.status == "error"
                 if tries[place] >= MOST_TRIES:
                     why = f"its workers died, again and again: {future.exception(timeout=1)}"
-                    found[place] = Outcome(verdict=Verdict.ERROR, failures=(why,)), 0.0
+                    found[place] = Outcome(verdict=TrialVerdict.ERROR, failures=(why,)), 0.0
         return found
 
     def _connected(self, *, patience_s: float) -> Any:
@@ -163,7 +163,7 @@ class DaskWorkers:
                 time.sleep(LOOK_S)
 
 
-def run_limited(work: Work, limits: Limits) -> tuple[Outcome | list[Saved], float, str]:
+def run_limited(work: Work, limits: RunLimits) -> tuple[Outcome | list[SavedBeginning], float, str]:
     """Do a piece of work in a worker; return what came of it, the seconds of a processor, and the version of p2os."""
     began = time.thread_time()
 
@@ -174,7 +174,7 @@ def run_limited(work: Work, limits: Limits) -> tuple[Outcome | list[Saved], floa
     try:
         outcome = work(look)
     except Exception as error:  # noqa: BLE001  # a bug there is an error of this trial, told by its name
-        outcome = Outcome(verdict=Verdict.ERROR, failures=(unforeseen(error),))
+        outcome = Outcome(verdict=TrialVerdict.ERROR, failures=(unforeseen(error),))
     return outcome, round(time.thread_time() - began, 3), installed_version()
 
 

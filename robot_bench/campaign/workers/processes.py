@@ -22,8 +22,8 @@ from multiprocessing.context import ForkProcess
 from pathlib import Path
 
 from p2os.errors import RunFailedError
-from robot_bench.campaign.campaign_file import Limits
-from robot_bench.campaign.trial import Done, Outcome, Trial, Verdict, warm_up
+from robot_bench.campaign.campaign_file import RunLimits
+from robot_bench.campaign.trial import Done, Outcome, Trial, TrialVerdict, warm_up
 from robot_bench.campaign.workers.beginnings import Beginnings, Work, Worked
 from robot_bench.running.forks import LOOK_S, begin, how_it_ended, received
 from simbase.files import writing_temporary
@@ -45,7 +45,7 @@ class Processes:
         look: Called often; what it raises ends all.
     """
 
-    def __init__(self, at_once: int, limits: Limits, look: Callable[[], None] = lambda: None) -> None:
+    def __init__(self, at_once: int, limits: RunLimits, look: Callable[[], None] = lambda: None) -> None:
         self._at_once, self._limits, self._look = at_once, limits, look
         self._beginnings = Beginnings()
         #: What this process has loaded: files, body and mode of trials.
@@ -102,7 +102,7 @@ class Processes:
         """Nothing is kept between runs."""
 
 
-def _work(pipe: Connection, work: Work, limits: Limits, parent: int, folder: Path) -> None:
+def _work(pipe: Connection, work: Work, limits: RunLimits, parent: int, folder: Path) -> None:
     """Do a piece of work in this fork, and send what came of it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # of the terminal: the parent ends us
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
@@ -129,7 +129,7 @@ def _work(pipe: Connection, work: Work, limits: Limits, parent: int, folder: Pat
     pipe.close()
 
 
-def _result(process: ForkProcess, pipe: Connection, limits: Limits) -> Worked | None:
+def _result(process: ForkProcess, pipe: Connection, limits: RunLimits) -> Worked | None:
     """Return what came of a process that has ended; None where it was killed from outside."""
     done: Worked | None = received(process, pipe)
     if done is not None:
@@ -143,7 +143,7 @@ def _result(process: ForkProcess, pipe: Connection, limits: Limits) -> Worked | 
 
 
 def _error(why: str) -> Outcome:
-    return Outcome(verdict=Verdict.ERROR, failures=(why,))
+    return Outcome(verdict=TrialVerdict.ERROR, failures=(why,))
 
 
 def _mapped_bytes() -> int:

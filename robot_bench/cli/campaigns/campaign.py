@@ -16,7 +16,7 @@ from p2os.cli.quantities import option
 from p2os.cli.trust import Trusted, said
 from p2os.transport.wall_clock import wall_clock
 from robot_bench.campaign.campaign_file import Campaign, campaign_schema
-from robot_bench.campaign.conduct import Finding, Progress, Workers
+from robot_bench.campaign.conduct import CampaignProgress, PointFinding, Workers
 from robot_bench.campaign.journal import NAME as JOURNAL
 from robot_bench.campaign.results import SHOWN_HASH, Whole
 from robot_bench.campaign.search import SEARCHES
@@ -188,11 +188,11 @@ def _workers(found: Campaign, jobs: int, dask: str | None, scheduler: str | None
 
 
 @contextlib.contextmanager
-def shown(found: Campaign) -> Iterator[Callable[[Progress], None]]:
+def shown(found: Campaign) -> Iterator[Callable[[CampaignProgress], None]]:
     """Tell on stderr how a campaign goes: a bar on a terminal, elsewhere a line each tenth; yield what is told."""
     whole, told = found.budget.runs, 0
 
-    def update(progress: Progress) -> None:
+    def update(progress: CampaignProgress) -> None:
         nonlocal told
         points = progress.answered
         said = f"{progress.runs} runs, {len(progress.failures)} failures, {len(progress.blocks)} blocks"
@@ -217,7 +217,7 @@ def tell(done: Whole, other: Other | None, *, json_output: bool) -> None:
         print_whole(done, parts, other)
     if done.was_interrupted:
         raise typer.Exit(EXIT_INTERRUPTED)
-    if done.failures or {row.finding for row in done.progress.rows} == {Finding.ERROR}:
+    if done.failures or {row.finding for row in done.progress.rows} == {PointFinding.ERROR}:
         raise typer.Exit(1)
 
 
@@ -249,7 +249,7 @@ def print_whole(done: Whole, parts: Mapping[int, str], other: Other | None) -> N
     print_errors(done)
     for line in _facts(done, other):
         typer.echo(line)
-    counts = [f"{done.counts[finding]} {finding.value}" for finding in Finding if done.counts.get(finding)]
+    counts = [f"{done.counts[finding]} {finding.value}" for finding in PointFinding if done.counts.get(finding)]
     progress = done.progress
     typer.echo(f"report  {done.folder / 'report.html'}")
     again = " (interrupted: --resume goes on)" if done.was_interrupted else ""
@@ -275,9 +275,9 @@ def _facts(done: Whole, other: Other | None) -> Iterator[str]:
 
 def print_errors(done: Whole) -> None:
     """Print why points have no verdict that holds, each reason once with its points."""
-    untold: dict[tuple[Finding, str], list[int]] = {}
+    untold: dict[tuple[PointFinding, str], list[int]] = {}
     for row in done.progress.rows:
-        if row.finding in {Finding.ERROR, Finding.NOT_REPEATED}:
+        if row.finding in {PointFinding.ERROR, PointFinding.NOT_REPEATED}:
             why = next((run.outcome.failures[0] for run in row.runs if run.outcome.failures), "")
             untold.setdefault((row.finding, why), []).append(row.number)
     for (finding, why), numbers in [*untold.items()][:MOST_TOLD]:

@@ -24,7 +24,7 @@ from p2os.cli.trust import Trusted, said
 from robot_bench.campaign.variants.mutation.base_run import BaseRun, base_run
 from robot_bench.campaign.variants.mutation.report import Mutation, as_json, report_lines, write_junit
 from robot_bench.campaign.variants.mutation.suite import Suite, SuiteRun, load_pytest, run_suite
-from robot_bench.campaign.variants.mutation.trial import MOST_MORE_NS, MOST_TIMES, Fate, Found, try_mutant
+from robot_bench.campaign.variants.mutation.trial import MOST_MORE_NS, MOST_TIMES, Fate, MutantResult, try_mutant
 from robot_bench.cli.names import scenario_names
 from robot_bench.cli.progress import RunDisplay, counting_bar
 from robot_bench.cli.sweep import refuse_junit
@@ -220,9 +220,9 @@ def _try_all(
     suite: Suite | None,
     jobs: int,
     raise_if_interrupted: Callable[[], None],
-) -> tuple[list[Found | None], list[str], bool]:
+) -> tuple[list[MutantResult | None], list[str], bool]:
     """Return what came of each mutant, which could not be run and why, and whether nothing interrupted them."""
-    found: list[Found | None] = [None] * len(tried)
+    found: list[MutantResult | None] = [None] * len(tried)
     broken: list[str] = []
 
     def job(number: int, look: Callable[[], None]) -> Json:
@@ -239,9 +239,9 @@ def _try_all(
         def on_done(number: int, plain: Json) -> None:
             nonlocal done
             if "fate" in plain:
-                found[number] = Found.from_plain(plain)
+                found[number] = MutantResult.from_plain(plain)
             elif f"{plain['failures']}".endswith("SIGXCPU']"):
-                found[number] = Found(Fate.STOPPED, "pytest", "they take too long")
+                found[number] = MutantResult(Fate.STOPPED, "pytest", "they take too long")
             elif (why := cast("list[str]", plain["failures"])[0]) != INTERRUPTED:
                 broken.append(f"{tried[number].address:#010x}: {why}")
             survived = sum(one is not None and not one.is_noticed for one in found)

@@ -11,7 +11,7 @@ from p2os.cli.quantities import option
 from p2os.cli.trust import Trusted, said
 from p2os.toml_schema import Table
 from robot_bench.campaign.trial import Trial, trial_of
-from robot_bench.campaign.variants.shrinking.failure import Failure, Way, failure_of
+from robot_bench.campaign.variants.shrinking.failure import Failure, FailureMode, failure_of
 from robot_bench.campaign.variants.shrinking.kept import Kept, keep, trial_of_run
 from robot_bench.campaign.variants.shrinking.shrink import BUDGET, Shrunk, shrink
 from robot_bench.cli.names import scenario_names
@@ -88,7 +88,7 @@ def shrink_run(
     with RunDisplay(is_shown=False) as display:
         with runs_bar(budget) as advance:
 
-            def judge(candidate: Trial, way: Way | None, until_ns: Nanos | None) -> Failure | None:
+            def judge(candidate: Trial, way: FailureMode | None, until_ns: Nanos | None) -> Failure | None:
                 advance()
                 return failure_of(candidate, way, until_ns, display.raise_if_interrupted)
 

@@ -25,7 +25,7 @@ from simbase.timing import NS_PER_S, Nanos
 from simbase.units import COUNT, SEED, TIME
 
 if TYPE_CHECKING:  # NumPy is loaded when the verb runs
-    from robot_bench.experiments.sensitivity import Design, Effect, Point
+    from robot_bench.experiments.sensitivity import ParameterEffect, Point, SampleDesign
 
 HELP = """Tell on which parameters a scenario's outcome depends.
 
@@ -87,7 +87,7 @@ def sensitivity(
 ) -> None:  # fmt: skip
     """Vary a scenario."""
     require("SALib", *(["matplotlib"] if picture else []))
-    from robot_bench.experiments.sensitivity import Design, outcome_names, outcomes_of, read_range
+    from robot_bench.experiments.sensitivity import SampleDesign, outcome_names, outcomes_of, read_range
 
     if not vary:
         raise UsageError("which parameters?", hint="--vary threshold_m=0.4..1.0")
@@ -96,7 +96,7 @@ def sensitivity(
         raise UsageError("a key is varied twice")
     if steps < 2 and trajectories < 1 and samples < 1:
         raise UsageError("nothing is to be run", hint="--steps 5, --trajectories 10 or --samples 64")
-    design = Design(ranges=ranges, steps=steps, trajectories=trajectories, seed=seed, samples=samples)
+    design = SampleDesign(ranges=ranges, steps=steps, trajectories=trajectories, seed=seed, samples=samples)
     fixed = [read_setting(text) for text in setting or []]
 
     def made(settings: Sequence[Setting], own_seed: int | None) -> Scenario:
@@ -166,13 +166,15 @@ def _means(
     return {name: {point: sum(row) / len(row) for point, row in of.items()} for name, of in sums.items()}
 
 
-def _draw(scenario: str, effects: "dict[str, list[Effect]]", picture: Path) -> None:
+def _draw(scenario: str, effects: "dict[str, list[ParameterEffect]]", picture: Path) -> None:
     from robot_bench.experiments.pictures import effects_figure, write_png
 
     write_png(effects_figure(f"{scenario}: effect over each whole range", effects), picture)
 
 
-def _lines(scenario: str, design: "Design", effects: "dict[str, list[Effect]]", runs: int) -> Iterator[str]:
+def _lines(
+    scenario: str, design: "SampleDesign", effects: "dict[str, list[ParameterEffect]]", runs: int
+) -> Iterator[str]:
     """Yield what a person reads."""
     yield f"{scenario}: {runs} runs, {len(design.ranges)} parameters"
     for name, rows in effects.items():

@@ -23,7 +23,7 @@ from robot_bench.experiments.validation.figures import LOOSE_BECAUSE, Figure, lo
 from robot_bench.experiments.validation.page import render
 from robot_bench.experiments.validation.trials import (
     PortRun,
-    Result,
+    TrialResult,
     Variant,
     longest_s,
     port_runs,
@@ -175,7 +175,7 @@ def _run_all(
     worlds: Sequence[str],
     seeds: Sequence[int] | None,
     jobs: int,
-) -> list[Result]:
+) -> list[TrialResult]:
     first = chosen[0].load(settings)
     for body in dict.fromkeys(variant.body for variant in chosen_variants):
         load_once(first.with_options(body=body))
@@ -201,7 +201,7 @@ def _run_all(
 
 def _run_at_port(
     chosen: Sequence[Experiment], folder: Path, settings: Sequence[Setting], port: str, *, yes: bool
-) -> list[Result]:
+) -> list[TrialResult]:
     for one in chosen:
         if isinstance(one.at_port, str):
             typer.echo(f"not at a port: {one.name}: {one.at_port}", err=True)
@@ -223,7 +223,7 @@ def _run_at_port(
     return run_port(runs, drive, folder, settings=settings)
 
 
-def _write(folder: Path, results: Sequence[Result], set_: Sequence[str]) -> None:
+def _write(folder: Path, results: Sequence[TrialResult], set_: Sequence[str]) -> None:
     words = " ".join(["p2os validate", *dict.fromkeys(result.experiment for result in results)])
     with writing(folder / REPORT):
         folder.mkdir(parents=True, exist_ok=True)
@@ -233,7 +233,7 @@ def _write(folder: Path, results: Sequence[Result], set_: Sequence[str]) -> None
         )  # fmt: skip
 
 
-def _plain(results: Sequence[Result]) -> Json:
+def _plain(results: Sequence[TrialResult]) -> Json:
     return {
         "passed": all(result.passed for result in results),
         "loose_bounds": loose(one for result in results for one in result.findings),
@@ -249,7 +249,7 @@ def _plain(results: Sequence[Result]) -> Json:
     }  # fmt: skip
 
 
-def _print(results: Sequence[Result], folder: Path) -> None:
+def _print(results: Sequence[TrialResult], folder: Path) -> None:
     console = ReadableConsole()
     chosen = list(dict.fromkeys(result.variant for result in results))
     table = Table(box=None, pad_edge=False)

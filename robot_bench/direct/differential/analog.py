@@ -8,7 +8,7 @@ Not modelled: noise, the colour of what is seen, and the time that a sensor need
 from bisect import bisect_right
 from collections.abc import Sequence
 
-from robot_bench.direct.differential.description import Battery
+from robot_bench.direct.differential.description import BatteryDescription
 from simbase.state import Stateful
 
 #: (metres, volts) of a GP2Y0A21YK.
@@ -30,12 +30,12 @@ def volts_at(curve: Sequence[tuple[float, float]], distance_m: float) -> float:
     return y0 + (y1 - y0) * (distance_m - x0) / (x1 - x0)
 
 
-class Cell(Stateful):
+class DischargingBattery(Stateful):
     """A battery that is emptied: its volts without load fall in a straight line, its resistance stays."""
 
     STATE = ("used_ah", "volts")
 
-    def __init__(self, settings: Battery) -> None:
+    def __init__(self, settings: BatteryDescription) -> None:
         self._settings = settings
         self.used_ah = 0.0
         #: Under the present load.

@@ -17,7 +17,7 @@ from operator import itemgetter
 from typing import NamedTuple, cast
 
 from bluepill_sim.fabric.subscriptions import Wave
-from robot_bench.direct.differential.description import Bridge, BridgeKind, Off
+from robot_bench.direct.differential.description import BridgeDescription, BridgeKind, Off
 from robot_bench.wires.nets import Net
 from robot_bench.wires.waves import edge_times, high_time_ns
 from simbase.state import Stateful
@@ -54,7 +54,7 @@ class HBridge(Stateful):
     #: What is known follows from the nets.
     DERIVED = ("_known", "_is_steady", "_now", "_changed")
 
-    def __init__(self, nets: Sequence[Net], settings: Bridge) -> None:
+    def __init__(self, nets: Sequence[Net], settings: BridgeDescription) -> None:
         self._nets = tuple(nets)
         self._dead_ns = settings.dead_time_ns
         truth = TRUTH[settings.kind]

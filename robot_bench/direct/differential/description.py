@@ -42,7 +42,7 @@ class BridgeKind(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Bridge:
+class BridgeDescription:
     """An H-bridge."""
 
     kind: BridgeKind
@@ -84,7 +84,7 @@ class Encoder:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Battery:
+class BatteryDescription:
     """A battery, what else it feeds, and the divider at which the chip measures it."""
 
     full_v: float
@@ -126,10 +126,10 @@ class Differential:
     #: About the middle of the axle; of all but the wheels' and rotors' own rotation.
     yaw_inertia_kg_m2: float
     body: BodyParameters
-    bridge: Bridge
+    bridge: BridgeDescription
     motor: Motor
     encoder: Encoder
-    battery: Battery
+    battery: BatteryDescription
     distances: tuple[DistanceSensor, ...] = ()
     distance_period_ns: int = 38_300_000
     bumpers: tuple[Bumper, ...] = ()

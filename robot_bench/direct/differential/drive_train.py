@@ -27,7 +27,7 @@ _TURNS = 50
 FREE_RADPS = 1e4
 
 
-class Step(NamedTuple):
+class DriveStep(NamedTuple):
     """What became of a step."""
 
     #: Mean speeds of the wheels, rad/s.
@@ -88,7 +88,7 @@ class DriveTrain(Stateful):
         lost_v = self._drop_v * conductance
         return max(0.0, (source_v - source_ohm * (idle_a - emf_a - lost_v)) / (1 + source_ohm * conductance))
 
-    def step(self, left: Shares, right: Shares, supply_v: float) -> Step:
+    def step(self, left: Shares, right: Shares, supply_v: float) -> DriveStep:
         """Take a step."""
         volts, k, resistance, dt = max(0.0, supply_v - self._drop_v), self._k, self._resistance, self._dt_s
         pull = k / resistance
@@ -131,7 +131,7 @@ class DriveTrain(Stateful):
         back = drive + rub * way
         return Aim(back / brake if brake else -way * FREE_RADPS, most)
 
-    def take(self, left: Shares, right: Shares, supply_v: float, left_radps: float, right_radps: float) -> Step:
+    def take(self, left: Shares, right: Shares, supply_v: float, left_radps: float, right_radps: float) -> DriveStep:
         """Take the speeds to which a body has come with the last `aims`."""
         volts, k, resistance = max(0.0, supply_v - self._drop_v), self._k, self._resistance
         mean_l, mean_r = (self.left_radps + left_radps) / 2, (self.right_radps + right_radps) / 2
@@ -141,7 +141,7 @@ class DriveTrain(Stateful):
         left_a = (along_l * volts - (driven_l + left.brake) * k * mean_l) / resistance
         right_a = (along_r * volts - (driven_r + right.brake) * k * mean_r) / resistance
         supply_a = ((driven_l + driven_r) * volts - k * (along_l * mean_l + along_r * mean_r)) / resistance
-        return Step(mean_l, mean_r, left_a, right_a, supply_a)
+        return DriveStep(mean_l, mean_r, left_a, right_a, supply_a)
 
     def _rubbed(self, left: float, right: float, own_l: float, own_r: float, other: float) -> tuple[float, float]:
         """Return speeds with friction, from those without; the rest are the speeds that a torque of 1 N·m adds."""

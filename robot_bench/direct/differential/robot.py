@@ -17,10 +17,10 @@ import math
 from collections.abc import Callable, Sequence
 
 from p2os.pioneer.body.contract import RobotBody, Wheels
-from robot_bench.direct.differential.analog import Cell, volts_at
+from robot_bench.direct.differential.analog import DischargingBattery, volts_at
 from robot_bench.direct.differential.bridge import HBridge, Shares
 from robot_bench.direct.differential.description import SIDES, Differential
-from robot_bench.direct.differential.drive_train import DriveTrain, Step
+from robot_bench.direct.differential.drive_train import DriveStep, DriveTrain
 from robot_bench.direct.differential.quadrature import OWNER, Quadrature
 from robot_bench.direct.robot import STALLS
 from robot_bench.direct.wired import AnalogPin
@@ -64,7 +64,7 @@ class DifferentialRobot(Stateful):
         self._radius_m = robot.body.wheel_diameter_m / 2
         self._dt_s = body.dt_ns / NS_PER_S
         self.train = DriveTrain(robot, self._dt_s)
-        self.cell = Cell(robot.battery)
+        self.cell = DischargingBattery(robot.battery)
         #: Mean currents of the windings in the last step, left and right, A.
         self.currents_a = (0.0, 0.0)
         #: Tells a body that has the masses how hard its motors drive in the next step.
@@ -128,7 +128,7 @@ class DifferentialRobot(Stateful):
         self._encoders[1].turn_to(turned_r, end, body.dt_ns)
         self._show(end)
 
-    def _drive(self, left: Shares, right: Shares) -> tuple[Step, float, float]:
+    def _drive(self, left: Shares, right: Shares) -> tuple[DriveStep, float, float]:
         """Make a step of a body that takes speeds; return what became of the drive train, and the wheels' angles."""
         train = self.train
         made = train.step(left, right, self.cell.volts)
@@ -138,7 +138,7 @@ class DifferentialRobot(Stateful):
         train.right_radps = self._held(asked_r, real_r, train.right_radps)
         return made, turned_l, turned_r
 
-    def _push(self, left: Shares, right: Shares) -> tuple[Step, float, float]:
+    def _push(self, left: Shares, right: Shares) -> tuple[DriveStep, float, float]:
         """Make a step of a body that has the masses and takes torques; return the same."""
         train, volts = self.train, self.cell.volts
         if self.is_stepped_by_others:

@@ -137,7 +137,7 @@ def square(*, clockwise: bool, side_mm: int = SIDE_MM) -> list[Stage]:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Recorded:
+class ExampleDrive:
     """A drive: its line, and measured poses as (seconds, x m, y m, heading rad)."""
 
     capture: Capture
@@ -207,7 +207,7 @@ class _Driver:
 
 def record(
     robot: Planted, world: World, stages: Iterable[Stage], *, seed: int, start: Pose | None = None, camera: bool = True
-) -> Recorded:
+) -> ExampleDrive:
     """Drive a robot and record it.
 
     Args:
@@ -230,7 +230,7 @@ def record(
         driver.hold(stage)
     driver.wait(NS_PER_S)
     chunks = tuple(sorted(driver.chunks, key=lambda chunk: chunk.at_ns))
-    return Recorded(
+    return ExampleDrive(
         capture=Capture(chunks=chunks, note="a virtual robot with planted errors"), poses=tuple(driver.poses)
     )
 
@@ -267,7 +267,7 @@ def write_examples(folder: Path, world: World, seed: int) -> list[Path]:
     return written
 
 
-def write(found: Recorded, path: Path) -> None:
+def write(found: ExampleDrive, path: Path) -> None:
     """Write a recording, and its measured poses beside it."""
     path.write_text(write_recording(found.capture), encoding="utf-8")
     rows = "".join(f"{t:.3f},{x:.5f},{y:.5f},{heading:.5f}\n" for t, x, y, heading in found.poses)

@@ -10,7 +10,7 @@ from operator import attrgetter
 from p2os.protocol.odometry import POSITION_MODULUS
 from p2os.protocol.profiles import Profile
 from robot_bench.events.kinds import MICRO, Pose
-from robot_bench.experiments.validation.figures import Bound, Figure, Finding, Missing, worst_or_missing
+from robot_bench.experiments.validation.figures import Figure, FigureTolerance, Finding, Missing, worst_or_missing
 from robot_bench.experiments.validation.nominal import Nominal
 from robot_bench.experiments.validation.signals import (
     ENCODER_STEPS,
@@ -79,7 +79,7 @@ def encoder_figures(record: RunRecord, nominal: Nominal) -> list[Finding]:
     return result
 
 
-def _against(what: str, truth: float, off: float, where: str, bound: Bound) -> Figure:
+def _against(what: str, truth: float, off: float, where: str, bound: FigureTolerance) -> Figure:
     return Figure(
         group="motion" if what == BY_ANGLE else "pins", what=what, expected=truth, measured=truth + off,
         uncertainty=ENCODER_STEPS / MICRO, unit="steps", at=where, bound=bound,
@@ -165,7 +165,7 @@ def sparse_figures(record: RunRecord, nominal: Nominal) -> list[Finding]:
         Figure(
             group="motion", what="wheels and ways round with more than half a turn between two samples", expected=4,
             measured=len(seen), uncertainty=0, unit="",
-            bound=Bound(name="half a turn", value=0, formula="both wheels, both ways round"),
+            bound=FigureTolerance(name="half a turn", value=0, formula="both wheels, both ways round"),
         ),
         *encoder_figures(record, nominal),
         worst_or_missing(ends, "pins", "count of the program at the end, against the wheel", "it printed no counts"),
@@ -182,7 +182,7 @@ def wrap_figure(record: RunRecord, profile: Profile) -> Finding:
     return Figure(
         group="wire", what="a wrap of the position counter, at least", expected=1, measured=min(wraps, 1),
         uncertainty=0, unit="", at=f"{wraps} of them",
-        bound=Bound(name="wrap", value=0, formula="behind its origin x is below 0"),
+        bound=FigureTolerance(name="wrap", value=0, formula="behind its origin x is below 0"),
     )  # fmt: skip
 
 
@@ -196,7 +196,7 @@ def slip_figures(record: RunRecord, nominal: Nominal, body: str) -> list[Finding
         Figure(
             group="motion", what="directions in which the wheels slip", expected=0 if body == "kinematic" else 2,
             measured=sum(way > nominal.encoder_step_mm for way in slipped.values()), uncertainty=0, unit="",
-            bound=Bound(
+            bound=FigureTolerance(
                 name="slip", value=0,
                 formula=f"against both walls, by more than {nominal.encoder_step_mm:.4g} mm; kinematic wheels stall",
             ), at=f"{slipped[True]:.0f} mm ahead, {slipped[False]:.0f} mm back",
@@ -222,7 +222,7 @@ def _changes(steps: list[tuple[Nanos, int]], side: str) -> Figure:
     return Figure(
         group="pins", what=f"{side}: codes reached, forward and backward", expected=2 * ENCODER_STEPS,
         measured=len(reached), uncertainty=0, unit="",
-        bound=Bound(name="codes reached", value=0, formula="all eight, both ways"), count=len(steps) - 1,
+        bound=FigureTolerance(name="codes reached", value=0, formula="all eight, both ways"), count=len(steps) - 1,
     )  # fmt: skip
 
 
@@ -230,7 +230,7 @@ def count_figures(record: RunRecord) -> list[Finding]:
     """Return whether the program has counted what its pins showed, line by line."""
     start = next((t for t, pair in motor_pairs(record) if pair != (0, 0)), 0)
     courses = [encoder_steps(record, side, start) for side in SIDES]
-    bound = Bound(name="steps counted", value=0, formula="a program that looks each tick misses none")
+    bound = FigureTolerance(name="steps counted", value=0, formula="a program that looks each tick misses none")
     figures: list[Figure] = []
     for t, line in record.usart_lines():
         found = COUNTED.match(line)

@@ -13,7 +13,7 @@ from robot_bench.experiments.validation.encoders import (
     sparse_figures,
     wrap_figure,
 )
-from robot_bench.experiments.validation.figures import Bound, Figure, Finding, Missing
+from robot_bench.experiments.validation.figures import Figure, FigureTolerance, Finding, Missing
 from robot_bench.experiments.validation.motors import Pair, motor_figures
 from robot_bench.experiments.validation.nominal import Nominal
 from robot_bench.experiments.validation.sensors import only_while_seen_figures, reading_figures, sensor_figures
@@ -28,7 +28,7 @@ from simbase.timing import NS_PER_S
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Trial:
+class ExperimentTrial:
     """One run of a scenario in one variant of the bench, and what is expected of it."""
 
     record: RunRecord
@@ -37,7 +37,7 @@ class Trial:
     judgement: Judgement
 
 
-Measure: TypeAlias = Callable[[Trial], Sequence[Finding]]
+Measure: TypeAlias = Callable[[ExperimentTrial], Sequence[Finding]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,7 +90,7 @@ class Experiment:
             raise UsageError(f"{self.name} is not for a robot at a port: {self.at_port}")
         return _load(self.at_port.scenario or self.scenario, [*AT_PORT, *settings]).with_options(mode="adapter")
 
-    def measure_at_port(self, trial: Trial) -> Sequence[Finding]:
+    def measure_at_port(self, trial: ExperimentTrial) -> Sequence[Finding]:
         """Return what a run at a port shows."""
         other = self.at_port.measure if isinstance(self.at_port, AtPort) else None
         return (other or self.measure)(trial)
@@ -118,7 +118,7 @@ MOTORS: Sequence[tuple[Pair, float]] = (((3, 3), 3.01), ((-4, -4), 3.01), ((0, 0
 CODES: Sequence[tuple[Pair, float]] = tuple(_codes())
 
 
-def drive_figures(trial: Trial) -> list[Finding]:
+def drive_figures(trial: ExperimentTrial) -> list[Finding]:
     """Return how often the robot touched something, and how many of the scenario's goals were met."""
     judgement, poses = trial.judgement, trial.record.poses
     if not poses:
@@ -128,16 +128,17 @@ def drive_figures(trial: Trial) -> list[Finding]:
     return [
         Figure(
             group="motion", what="collisions", expected=0, measured=poses[-1].collisions, uncertainty=0, unit="",
-            bound=Bound(name="collisions", value=0, formula="none"), at=where,
+            bound=FigureTolerance(name="collisions", value=0, formula="none"), at=where,
         ),
         Figure(
             group="motion", what="goals of the scenario", expected=goals, measured=len(judgement.met), uncertainty=0,
-            unit="", bound=Bound(name="goals", value=0, formula="all met"), at="; ".join(judgement.missed)[:200],
+            unit="", bound=FigureTolerance(name="goals", value=0, formula="all met"),
+            at="; ".join(judgement.missed)[:200],
         ),
     ]  # fmt: skip
 
 
-def _drive_at_port(trial: Trial) -> list[Finding]:
+def _drive_at_port(trial: ExperimentTrial) -> list[Finding]:
     """Return what the packets tell of a drive: stalls, and the goals that can be judged from outside."""
     told = packets(trial.record, trial.scenario.controller.family_of(trial.scenario.parameters))
     if not told:
@@ -147,33 +148,33 @@ def _drive_at_port(trial: Trial) -> list[Finding]:
     return [
         Figure(
             group="wire", what="packets with a stall", expected=0, measured=len(stalls), uncertainty=0, unit="",
-            bound=Bound(name="stalls", value=0, formula="none"), count=len(told),
+            bound=FigureTolerance(name="stalls", value=0, formula="none"), count=len(told),
             at=f"{stalls[0] / NS_PER_S:.2f} s" if stalls else "",
         ),
         Figure(
             group="motion", what="goals of the scenario", expected=len(trial.scenario.goals),
             measured=len(judgement.met), uncertainty=0, unit="", at="; ".join(judgement.missed)[:200],
-            bound=Bound(name="goals", value=0, formula="all met"),
+            bound=FigureTolerance(name="goals", value=0, formula="all met"),
         ),
     ]  # fmt: skip
 
 
-def _sensors(trial: Trial) -> list[Finding]:
+def _sensors(trial: ExperimentTrial) -> list[Finding]:
     found = sensor_figures(trial.record, trial.nominal, trial.scenario)
     return found if trial.nominal.is_direct else [*found, *reading_figures(trial.record, trial.scenario)]
 
 
-def _encoders(trial: Trial) -> list[Finding]:
+def _encoders(trial: ExperimentTrial) -> list[Finding]:
     return [*encoder_figures(trial.record, trial.nominal), *count_figures(trial.record)]
 
 
-def _long_drive(trial: Trial) -> list[Finding]:
+def _long_drive(trial: ExperimentTrial) -> list[Finding]:
     found = [finding for finding in encoder_figures(trial.record, trial.nominal) if "codes reached" not in finding.what]
     length_mm = trial.record.poses[-1].left_angle / 1e6 * trial.scenario.parameters.body.wheel_diameter_m * 500
     needed_mm = 32768 * trial.scenario.parameters.distance_nm_per_count / 1e6
     return [*found, Figure(
         group="motion", what="turns of the position counter, whole ones", expected=1, measured=length_mm // needed_mm,
-        uncertainty=0, unit="", bound=Bound(name="wrap", value=0, formula=f"{needed_mm / 1000:.4g} m of way"),
+        uncertainty=0, unit="", bound=FigureTolerance(name="wrap", value=0, formula=f"{needed_mm / 1000:.4g} m of way"),
     )]  # fmt: skip
 
 

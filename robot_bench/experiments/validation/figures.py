@@ -18,7 +18,7 @@ SLACK = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Bound:
+class FigureTolerance:
     """How far measured and expected may be apart.
 
     `name` says what kind of bound it is; `formula` how `value` comes about, with the numbers of this variant.
@@ -43,7 +43,7 @@ class Figure:
     measured: float
     uncertainty: float
     unit: str
-    bound: Bound
+    bound: FigureTolerance
     count: int = 1
     at: str = ""
 

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 from p2os.protocol.commands import CommandNumber
 from robot_bench.events.kinds import Pose
-from robot_bench.experiments.validation.figures import Bound, Figure, Finding, Missing, worst_or_missing
+from robot_bench.experiments.validation.figures import Figure, FigureTolerance, Finding, Missing, worst_or_missing
 from robot_bench.experiments.validation.nominal import BODY_MM_S, JITTER_S, LINE, PAIR_BYTES, POSE_S, Nominal
 from robot_bench.experiments.validation.signals import (
     Course,
@@ -65,14 +65,17 @@ def _order(held: Sequence[tuple[Pair, Nanos, Nanos]], wanted: Sequence[tuple[Pai
     at_text = f"the pins said {held[right][0]}" if right < min(len(held), len(wanted)) else ""
     return Figure(
         group="pins", what="pairs of codes in their order", expected=len(wanted), measured=right - surplus,
-        uncertainty=0, unit="", bound=Bound(name="order of codes", value=0, formula="every one, and no other"),
+        uncertainty=0, unit="", bound=FigureTolerance(name="order of codes", value=0,
+                                                      formula="every one, and no other"),
         count=len(wanted), at=at_text,
     )  # fmt: skip
 
 
 def _holds(held: Sequence[tuple[Pair, Nanos, Nanos]], wanted: Sequence[tuple[Pair, float]]) -> Finding:
     """Return the hold time that is furthest from what the program says; the last pair's end is not known."""
-    bound = Bound(name="hold time", value=JITTER_S, formula=f"jitter of a tick's program {JITTER_S * 1e6:g} us")
+    bound = FigureTolerance(
+        name="hold time", value=JITTER_S, formula=f"jitter of a tick's program {JITTER_S * 1e6:g} us"
+    )
     figures = [
         Figure(
             group="pins", what="time that a pair is held", expected=seconds, measured=(end - begin) / NS_PER_S,
@@ -260,7 +263,7 @@ def _slope(nominal: Nominal, expected: float, measured: float, kind: str, what: 
     return Figure(
         group="motion", what=f"ramp, {kind}", expected=expected, measured=measured,
         uncertainty=expected * 1e-4, unit="mm/s2", at=what,
-        bound=Bound(
+        bound=FigureTolerance(
             name="slope of a ramp" + ", at a port" * nominal.at_port, value=share * expected,
             formula=f"{share:.2%} of {expected:.4g} mm/s2: {why}",
         ),

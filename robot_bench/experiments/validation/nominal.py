@@ -11,7 +11,7 @@ from p2os.protocol.bauds import DEFAULT_BAUD
 from p2os.protocol.line_time import LineTime
 from p2os.protocol.times import CYCLE_NS
 from robot_bench.events.kinds import Pose
-from robot_bench.experiments.validation.figures import Bound
+from robot_bench.experiments.validation.figures import FigureTolerance
 from robot_bench.experiments.validation.signals import ENCODER_STEPS, packets
 from robot_bench.recording.client_view import OdometryPose
 from robot_bench.recording.recorder import SAMPLE_NS
@@ -55,9 +55,9 @@ class Delay:
     def __add__(self, other: "Delay") -> "Delay":
         return Delay(self.seconds + other.seconds, f"{self.formula} + {other.formula}")
 
-    def bound(self, name: str) -> Bound:
+    def bound(self, name: str) -> FigureTolerance:
         """Return it as a bound in seconds."""
-        return Bound(name=name, value=self.seconds, formula=f"{self.formula} = {self.seconds * 1000:.4g} ms")
+        return FigureTolerance(name=name, value=self.seconds, formula=f"{self.formula} = {self.seconds * 1000:.4g} ms")
 
 
 class Nominal:
@@ -141,38 +141,38 @@ class Nominal:
             )
         return found[0], found[1]
 
-    def speed_bound(self, pair: tuple[int, int]) -> Bound:
+    def speed_bound(self, pair: tuple[int, int]) -> FigureTolerance:
         """How far a steady rim speed may be off, mm/s."""
         seen, told = (PORT_MM_S, "of its packets") if self.at_port else (BODY_MM_S, "of the trace")
         if self.is_direct:
-            return Bound(name="rim speed, direct", value=seen, formula=f"resolution {told} {seen:g} mm/s")
+            return FigureTolerance(name="rim speed, direct", value=seen, formula=f"resolution {told} {seen:g} mm/s")
         (vel, _), (rvel, _) = self.rounding(pair)
         rim = math.radians(rvel) * self.track_mm / 2
-        return Bound(
+        return FigureTolerance(
             name="rim speed" + self._kind(pair), value=vel + rim + seen,
             formula=f"{vel:.3g} mm/s (VEL is whole mm/s) + {rvel:.3g} deg/s x {self.track_mm / 2:g} mm (RVEL is whole"
             f" deg/s) + resolution {told} {seen:g} mm/s = {vel + rim + seen:.3g} mm/s",
         )  # fmt: skip
 
-    def rounding_bounds(self, pair: tuple[int, int]) -> tuple[Bound, Bound]:
+    def rounding_bounds(self, pair: tuple[int, int]) -> tuple[FigureTolerance, FigureTolerance]:
         """How far VEL and RVEL may be off."""
         (vel, vel_formula), (rvel, rvel_formula) = self.rounding(pair)
         return (
-            Bound(name="rounding of VEL" + self._kind(pair), value=vel, formula=vel_formula),
-            Bound(name="rounding of RVEL" + self._kind(pair), value=rvel, formula=rvel_formula),
+            FigureTolerance(name="rounding of VEL" + self._kind(pair), value=vel, formula=vel_formula),
+            FigureTolerance(name="rounding of RVEL" + self._kind(pair), value=rvel, formula=rvel_formula),
         )
 
     def _kind(self, pair: tuple[int, int]) -> str:
         return ", at a port" if self.at_port else ", at a cap" if self._share(pair) < 1.0 else ""
 
-    def way_bound(self, pair: tuple[int, int], mm_s: float, span_s: float) -> Bound:
+    def way_bound(self, pair: tuple[int, int], mm_s: float, span_s: float) -> FigureTolerance:
         """How far a steady rim speed may be off by the way of so many seconds, mm/s."""
         speed = self.speed_bound(pair)
         if not self.at_port:
             return speed
         counts = 2 * (math.sqrt(2) * self._distance_mm + self._heading_mm)
         more = (counts + abs(mm_s) * PACKET_JITTER_S) / span_s
-        return Bound(
+        return FigureTolerance(
             name="way in a time, at a port", value=speed.value + more,
             formula=f"{speed.formula.partition(' = ')[0]} + (a count of x, of y and of heading at both ends"
             f" {counts:.3g} mm + {abs(mm_s):g} mm/s x {PACKET_JITTER_S * 1000:g} ms that a packet may come late)"
@@ -251,21 +251,21 @@ class Nominal:
         return (math.ceil(steps) + 2) * self._adapter.encoder_dwell_ns
 
     @property
-    def encoder_packet_bound(self) -> Bound:
+    def encoder_packet_bound(self) -> FigureTolerance:
         """How far a code may be from what the robot's packets tell of its wheel, steps, where it has been walked to."""
-        return Bound(
+        return FigureTolerance(
             name="encoder after a packet", value=0.5 + ARITHMETIC_STEPS,
             formula=f"half a step + {ARITHMETIC_STEPS:g} steps of integer arithmetic",
         )  # fmt: skip
 
-    def encoder_bound(self, rim_mm_s: float) -> Bound:
+    def encoder_bound(self, rim_mm_s: float) -> FigureTolerance:
         """How far the code on the pins may be from the wheel's angle, steps; the middle of a code is its angle."""
         lag = self.encoder_lag(rim_mm_s)
         odometry = 0.0 if self.is_direct else math.sqrt(2) * self._distance_mm + self._heading_mm
         counts = f" + a count of x, of y and of heading {odometry:.3g} mm" if odometry else ""
         moved = abs(rim_mm_s) * lag.seconds + odometry
         value = 0.5 + moved / self.encoder_step_mm
-        return Bound(
+        return FigureTolerance(
             name="encoder while it turns", value=value,
             formula=f"half a step + ({abs(rim_mm_s):.4g} mm/s x {lag.seconds * 1000:.4g} ms ({lag.formula}){counts})"
             f" / {self.encoder_step_mm:.4g} mm = {value:.3g} steps",

@@ -17,7 +17,7 @@ from robot_bench.experiments.validation.figures import (
     loose,
     shown_value,
 )
-from robot_bench.experiments.validation.trials import Result
+from robot_bench.experiments.validation.trials import TrialResult
 
 #: Widths of the strip that shows a difference in bounds, pixels.
 STRIP_WIDTH, STRIP_HEIGHT = 120, 14
@@ -38,7 +38,7 @@ svg { display: block; }
 
 
 def render(
-    results: Sequence[Result], experiments: Mapping[str, Experiment], *, command: str, settings: Sequence[str] = ()
+    results: Sequence[TrialResult], experiments: Mapping[str, Experiment], *, command: str, settings: Sequence[str] = ()
 ) -> str:
     """Return the page of a validation.
 
@@ -68,7 +68,7 @@ def render(
     )
 
 
-def _matrix(names: Sequence[str], results: Sequence[Result]) -> str:
+def _matrix(names: Sequence[str], results: Sequence[TrialResult]) -> str:
     variants = list(dict.fromkeys(result.variant for result in results))
     head = "".join(f"<th>{_safe(variant.name)}</th>" for variant in variants)
     rows = ""
@@ -84,7 +84,7 @@ def _matrix(names: Sequence[str], results: Sequence[Result]) -> str:
     return f'<div class="wide"><table class="matrix"><tr><th></th>{head}</tr>{rows}</table></div>'
 
 
-def _experiment(experiment: Experiment, results: Sequence[Result]) -> str:
+def _experiment(experiment: Experiment, results: Sequence[TrialResult]) -> str:
     rows = ""
     for what, found in _by_figure(results).items():
         group, name = what
@@ -103,15 +103,15 @@ def _experiment(experiment: Experiment, results: Sequence[Result]) -> str:
     )
 
 
-def _by_figure(results: Sequence[Result]) -> dict[tuple[str, str], list[tuple[Result, Finding]]]:
-    rows: dict[tuple[str, str], list[tuple[Result, Finding]]] = {}
+def _by_figure(results: Sequence[TrialResult]) -> dict[tuple[str, str], list[tuple[TrialResult, Finding]]]:
+    rows: dict[tuple[str, str], list[tuple[TrialResult, Finding]]] = {}
     for result in results:
         for finding in result.findings:
             rows.setdefault((finding.group, finding.what), []).append((result, finding))
     return dict(sorted(rows.items(), key=lambda item: GROUPS.index(item[0][0])))
 
 
-def _row(result: Result, finding: Finding) -> str:
+def _row(result: TrialResult, finding: Finding) -> str:
     where = result.variant.name + (f", {result.world}, seed {result.seed}" if result.world else "")
     if isinstance(finding, Missing):
         return f'<td>{_safe(where)}</td><td colspan="5" class="bad">{_safe(finding.why)}</td>'
@@ -143,7 +143,7 @@ def _strip(figure: Figure) -> str:
     )
 
 
-def _bounds(results: Sequence[Result]) -> str:
+def _bounds(results: Sequence[TrialResult]) -> str:
     """Return the bounds that would hold at half their size, each with its reason."""
     rows = "".join(
         f"<tr><td>{_safe(name)}</td><td>{share:.2f}</td>"

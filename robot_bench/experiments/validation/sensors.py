@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from robot_bench.experiments.validation.figures import Bound, Figure, Finding, Missing, worst_or_missing
+from robot_bench.experiments.validation.figures import Figure, FigureTolerance, Finding, Missing, worst_or_missing
 from robot_bench.experiments.validation.nominal import PORT_MM_S, PROGRAM_S, TICK_S, Nominal
 from robot_bench.experiments.validation.signals import (
     at,
@@ -63,7 +63,7 @@ def sensor_figures(record: RunRecord, nominal: Nominal, scenario: Scenario) -> l
         Figure(
             group="pins", what="things seen by their own sensor, and by no other", expected=total,
             measured=total - wrong, uncertainty=0, unit="", count=total, at=where,
-            bound=Bound(name="things seen", value=0, formula="each once, and nothing else"),
+            bound=FigureTolerance(name="things seen", value=0, formula="each once, and nothing else"),
         ),
         worst_or_missing(rises, "pins", "thing appears to the distance pin", "no pin rose"),
         worst_or_missing(falls, "pins", "thing is gone to the distance pin", "no pin fell"),
@@ -107,18 +107,18 @@ def reading_figures(record: RunRecord, scenario: Scenario) -> list[Finding]:
     found: list[Finding] = [
         Figure(
             group="pins", what=what, expected=total, measured=right, uncertainty=0, unit="", count=total, at=where,
-            bound=Bound(name="readings on pins", value=0, formula="each, when its packet has arrived"),
+            bound=FigureTolerance(name="readings on pins", value=0, formula="each, when its packet has arrived"),
         ),
         Figure(
             group="pins", what="changes of a distance pin without a reading", expected=0, measured=len(alone),
-            uncertainty=0, unit="", bound=Bound(name="changes of pins", value=0, formula="none"),
+            uncertainty=0, unit="", bound=FigureTolerance(name="changes of pins", value=0, formula="none"),
             at=f"sonar {min(alone)[1]} at {min(alone)[0] / NS_PER_S:.2f} s" if alone else "",
         ),
     ]  # fmt: skip
     return [*found, Figure(
         group="pins", what="sonar that saw something within the threshold and beyond", expected=len(courses),
         measured=len(both), uncertainty=0, unit="",
-        bound=Bound(name="sonar used", value=0, formula="all of them"),
+        bound=FigureTolerance(name="sonar used", value=0, formula="all of them"),
         at=", ".join(f"not {number + 1}" for number in range(len(courses)) if number + 1 not in both),
     )]  # fmt: skip
 
@@ -144,7 +144,7 @@ def only_while_seen_figures(record: RunRecord, nominal: Nominal) -> list[Finding
     seen = seen_spans(record, distance_wires(), start)
     driven = [(t, pair != (0, 0)) for t, pair in motor_pairs(record) if t >= start]
     edges = [(t, True) for t, _ in seen if t > start] + [(t, False) for _, t in seen if t < record.last_ns]
-    reaction = Bound(
+    reaction = FigureTolerance(
         name="reaction of the program", value=DEBOUNCE_TICKS * TICK_S + PROGRAM_S,
         formula=f"{DEBOUNCE_TICKS} samples of {TICK_S * 1000:g} ms + {PROGRAM_S * 1000:g} ms of the program",
     )  # fmt: skip
@@ -164,16 +164,16 @@ def _standing(record: RunRecord, nominal: Nominal, seen: Sequence[tuple[Nanos, N
     """Return how long the wheels turn after the last sensor went off, and how fast they are while nothing is seen."""
     delay = nominal.to_motion.seconds + DEBOUNCE_TICKS * TICK_S + PROGRAM_S
     ramp_s = SPEED_CODE * nominal.step_mm_s / nominal.ramp_mm_s2 if nominal.ramp_mm_s2 else 0.0
-    stop = Bound(
+    stop = FigureTolerance(
         name="time to stop" + nominal.suffix, value=delay + nominal.pose_s,
         formula=f"reaction and delay to the wheels {delay * 1000:.4g} ms"
         f" + {nominal.pose_s * 1000:g} ms between two poses",
     )  # fmt: skip
     stops: list[Figure] = []
     idle: list[Figure] = []
-    still = Bound(name="standing", value=0, formula="a wheel that is told to stand does not turn")
+    still = FigureTolerance(name="standing", value=0, formula="a wheel that is told to stand does not turn")
     if nominal.at_port:
-        still = Bound(
+        still = FigureTolerance(
             name="standing, at a port", value=PORT_MM_S, formula=f"resolution of its packets {PORT_MM_S:g} mm/s"
         )
     free_from = start

@@ -4,7 +4,7 @@ The adapter counts from the last packet that came, the robot from the last comma
 adapter's pins change in the very nanosecond, and the wheels' ramp begins with a step of the body.
 """
 
-from robot_bench.experiments.validation.figures import Bound, Figure, Finding, Missing, worst_or_missing
+from robot_bench.experiments.validation.figures import Figure, FigureTolerance, Finding, Missing, worst_or_missing
 from robot_bench.experiments.validation.motors import fitted_ramp
 from robot_bench.experiments.validation.nominal import BODY_STEP_S, Nominal
 from robot_bench.experiments.validation.signals import distance_wires, poses_between, value_course
@@ -36,7 +36,7 @@ def silence_figures(record: RunRecord, nominal: Nominal) -> list[Finding]:
         Figure(
             group="pins", what="the last packet to the distance pins that are safe", expected=nominal.liveness_s,
             measured=(t - told) / NS_PER_S, uncertainty=1e-9, unit="s", at=wire,
-            bound=Bound(name="liveness", value=0, formula="in the very nanosecond"),
+            bound=FigureTolerance(name="liveness", value=0, formula="in the very nanosecond"),
         )
         for wire, t in zip(distance_wires(), edges, strict=True) if t is not None
     ]  # fmt: skip
@@ -47,7 +47,7 @@ def silence_figures(record: RunRecord, nominal: Nominal) -> list[Finding]:
         Figure(
             group="motion", what="the last command to the ramp of the stop", expected=WATCHDOG_S,
             measured=ramp[1] - heard / NS_PER_S, uncertainty=FIT_S, unit="s",
-            bound=Bound(
+            bound=FigureTolerance(
                 name="watchdog", value=BODY_STEP_S + FIT_S,
                 formula=f"a step of the body {BODY_STEP_S * 1000:g} ms + the ramp's line {FIT_S * 1000:g} ms",
             ),
@@ -58,7 +58,7 @@ def silence_figures(record: RunRecord, nominal: Nominal) -> list[Finding]:
         Figure(
             group="motion", what="rim speed after that, and when the line is up again", expected=0.0,
             measured=max(abs(pose.left), abs(pose.right)) / 1000, uncertainty=1e-3, unit="mm/s",
-            bound=Bound(name="standing", value=0, formula="nobody asked for a connection anew"),
+            bound=FigureTolerance(name="standing", value=0, formula="nobody asked for a connection anew"),
             at=f"{pose.t / NS_PER_S:.2f} s",
         )
         for pose in after

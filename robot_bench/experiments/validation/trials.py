@@ -11,7 +11,7 @@ from typing import cast
 from p2os.pioneer.body.factory import installed_bodies
 from robot_bench.bench import Bench
 from robot_bench.events.codec import Json
-from robot_bench.experiments.validation.experiments import AtPort, Experiment, Trial
+from robot_bench.experiments.validation.experiments import AtPort, Experiment, ExperimentTrial
 from robot_bench.experiments.validation.figures import Finding, Missing
 from robot_bench.experiments.validation.nominal import Nominal
 from robot_bench.experiments.validation.signals import driving_since
@@ -58,7 +58,7 @@ def variants(modes: Sequence[str] = (), bodies: Sequence[str] = ()) -> list[Vari
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Result:
+class TrialResult:
     """What one experiment found in one variant, world and seed."""
 
     experiment: str
@@ -125,7 +125,7 @@ def run_trials(
     in_processes: InProcesses,
     on_done: Callable[[int, int], None] = lambda _done, _all: None,
     files: Files = Files.REPORT,
-) -> list[Result]:
+) -> list[TrialResult]:
     """Run experiments in variants; runs that fail are kept as run folders.
 
     Args:
@@ -180,7 +180,7 @@ def _in_variant(experiment: Experiment, run: _Run, settings: Sequence[Setting]) 
 
 def _do(
     run: _Run, settings: Sequence[Setting], folder: Path, look: Callable[[], None], files: Files
-) -> list[Result]:  # fmt: skip
+) -> list[TrialResult]:  # fmt: skip
     """Run once and measure for each experiment; what cannot be run has no findings but that."""
     scenario = _in_variant(run.experiments[0], run, settings)
     bench = Bench.from_scenario(scenario)
@@ -190,7 +190,7 @@ def _do(
     results = []
     for experiment in run.experiments:
         expected = _in_variant(experiment, run, ())
-        trial = Trial(record=record, nominal=Nominal(expected), scenario=expected, judgement=judgement)
+        trial = ExperimentTrial(record=record, nominal=Nominal(expected), scenario=expected, judgement=judgement)
         results.append(_result(experiment, run, tuple(experiment.measure(trial)), bench.trace.sha256))
     failures = [text for result in results for text in told(result)]
     if failures:
@@ -208,22 +208,22 @@ def _word(text: str) -> str:
     return "".join(char if char.isalnum() else "-" for char in text).replace("--", "-").strip("-")
 
 
-def _result(experiment: Experiment, run: _Run, findings: tuple[Finding, ...], sha256: str = "") -> Result:
-    return Result(
+def _result(experiment: Experiment, run: _Run, findings: tuple[Finding, ...], sha256: str = "") -> TrialResult:
+    return TrialResult(
         experiment=experiment.name, variant=run.variant, world=run.world or "", seed=run.seed, findings=findings,
         trace_sha256=sha256,
     )  # fmt: skip
 
 
-def _results(run: _Run, found: Json) -> list[Result]:
+def _results(run: _Run, found: Json) -> list[TrialResult]:
     """Return what came of a run's process; where it failed, that for each of its experiments."""
     if "results" in found:
-        return cast("list[Result]", found["results"])
+        return cast("list[TrialResult]", found["results"])
     why = "; ".join(cast("Sequence[str]", found["failures"]))
     return [_result(one, run, (Missing(group="pins", what="the run", why=why),)) for one in run.experiments]
 
 
-def told(result: Result) -> list[str]:
+def told(result: TrialResult) -> list[str]:
     """Return a line for each figure that fails."""
     lines = []
     for one in result.failures:
@@ -269,7 +269,7 @@ def run_port(
     folder: Path,
     *,
     settings: Sequence[Setting] = (),
-) -> list[Result]:
+) -> list[TrialResult]:
     """Run what a robot at a port can do, in real time, one after the other.
 
     Args:
@@ -282,7 +282,7 @@ def run_port(
         KeyboardInterrupt: A signal came.
         P2osError: The line cannot be opened, or a folder is not free.
     """
-    results: list[Result] = []
+    results: list[TrialResult] = []
     robot = [setting for setting in settings if setting[0] == "robot"]
     for run in runs:
         place = folder / run.experiments[0].name
@@ -296,7 +296,7 @@ def run_port(
         )  # fmt: skip
         for experiment in run.experiments:
             expected = experiment.load_at_port(robot)
-            trial = Trial(
+            trial = ExperimentTrial(
                 record=record, nominal=Nominal(expected, at_port=True), scenario=expected, judgement=judgement
             )
             found = tuple(experiment.measure_at_port(trial))

@@ -8,7 +8,7 @@ Invariant: only what the user calls a reference is one.
 
 from pathlib import Path
 
-from robot_bench.report.explain.chain import Evidence, Step
+from robot_bench.report.explain.chain import ChainLink, Evidence
 from robot_bench.report.explain.probing import Prober
 from robot_bench.report.explain.replay import ChipReplay
 from simbase.timing import NS_PER_MS, Nanos
@@ -17,7 +17,7 @@ from simbase.timing import NS_PER_MS, Nanos
 _LASTS_NS: Nanos = 60 * NS_PER_MS
 
 
-def compare(prober: Prober, reference: Path, until: Nanos) -> list[Step]:
+def compare(prober: Prober, reference: Path, until: Nanos) -> list[ChainLink]:
     """Return where the failed program first asked its motors for something else than the reference, up to a time.
 
     Raises:
@@ -33,7 +33,7 @@ def compare(prober: Prober, reference: Path, until: Nanos) -> list[Step]:
         same = prober.codes_with(ours, at) == prober.codes_with(theirs, at)
         since = None if same else at if since is None else since
     return [
-        Step(
+        ChainLink(
             t=until,
             part="firmware",
             says=f"{reference.name} would have asked the motors for the same all the time",
@@ -42,13 +42,13 @@ def compare(prober: Prober, reference: Path, until: Nanos) -> list[Step]:
     ]
 
 
-def _told(prober: Prober, replay: ChipReplay, reference: Path, since: Nanos) -> Step:
+def _told(prober: Prober, replay: ChipReplay, reference: Path, since: Nanos) -> ChainLink:
     at = since + _LASTS_NS
     codes = [prober.codes_with(one.run(0, at), at) for one in (prober.replay, replay)]
     high = [net for net in prober.sensors if prober.replay.level(net, since)]
     seen = f"with {', '.join(high)} high" if high else "with no sensor's pin high"
     ours, theirs = (f"{left:+d}, {right:+d}" for left, right in codes)
-    return Step(
+    return ChainLink(
         t=since, part="firmware", evidence=Evidence.REPLAYED,
         says=f"sets the motors to {ours}, where {reference.name}, given the same inputs, has {theirs}, {seen}",
     )  # fmt: skip

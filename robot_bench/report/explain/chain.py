@@ -37,7 +37,7 @@ class Standing(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Step:
+class ChainLink:
     """A link of the chain: of the world, a sensor, the firmware, a wire, the motion, or the contact."""
 
     t: Nanos
@@ -54,7 +54,7 @@ class Explanation:
     standing: Standing
     #: The cause, or what is known instead, in one sentence.
     summary: str
-    steps: tuple[Step, ...] = ()
+    steps: tuple[ChainLink, ...] = ()
     #: What is odd, and was not shown to be the cause.
     also: tuple[str, ...] = ()
     #: What kept the explanation from going further; empty where nothing did.

@@ -22,7 +22,7 @@ from functools import cached_property
 from itertools import combinations
 
 from robot_bench.events.kinds import Contact
-from robot_bench.report.explain.chain import Evidence, Step
+from robot_bench.report.explain.chain import ChainLink, Evidence
 from robot_bench.report.explain.findings import (
     Finding,
     all_steady_since,
@@ -34,7 +34,7 @@ from robot_bench.report.explain.findings import (
     steady_since,
     told,
 )
-from robot_bench.report.explain.probing import SAME_NS, Answer, Prober
+from robot_bench.report.explain.probing import SAME_NS, Prober, SensorResponse
 from robot_bench.report.explain.replay import Hold
 from robot_bench.report.explain.scene import Scene
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
@@ -63,7 +63,7 @@ class ContactInquest:
     def __init__(self, scene: Scene, prober: Prober | None, hit: Contact) -> None:
         self.scene, self.hit = scene, hit
         self._prober = prober
-        self.steps: list[Step] = []
+        self.steps: list[ChainLink] = []
         self.bearing = scene.bearing_rad(hit)
         #: From when on the thing stood where it was touched.
         self.since = scene.still_since(hit, hit.t - BEFORE_NS)
@@ -339,7 +339,7 @@ class ContactInquest:
         return [Hold(wire=net, level=False, since=at, until=until) for net, at in self.on.items()]
 
     @cached_property
-    def _asked(self) -> list[Mapping[str, Answer]]:
+    def _asked(self) -> list[Mapping[str, SensorResponse]]:
         """What the program does at some times of the whole run when one sensor alone sees something."""
         prober = self._prober
         return [] if prober is None else [prober.answers(at) for at in prober.moments(prober.replay.end)]
@@ -406,17 +406,17 @@ class ContactInquest:
             self._step(commands[-1].t, "wire", f"the adapter sends {commands[-1].detail}", Evidence.RECORDED)
 
     def _step(self, t: Nanos, part: str, says: str, evidence: Evidence) -> None:
-        self.steps.append(Step(t=t, part=part, says=says, evidence=evidence))
+        self.steps.append(ChainLink(t=t, part=part, says=says, evidence=evidence))
 
 
-def _is_toward(net: str, asked: Sequence[Mapping[str, Answer]], side: str) -> bool:
+def _is_toward(net: str, asked: Sequence[Mapping[str, SensorResponse]], side: str) -> bool:
     """Tell whether a sensor alone always makes it turn to the sensor's side, at enough times."""
     turns = [answers[net].turn for answers in asked if answers[net].answered is not None]
     sign = 1 if side == "left" else -1
     return len(turns) >= AGREEING and all(turn * sign > 0 for turn in turns)
 
 
-def exchanged(nets: Sequence[str], asked: Sequence[Mapping[str, Answer]], side: Callable[[str], str]) -> str:
+def exchanged(nets: Sequence[str], asked: Sequence[Mapping[str, SensorResponse]], side: Callable[[str], str]) -> str:
     """Return which exchange of two would make every answer a turn away, and both sides alike; empty: none, or several.
 
     Answers that differ from time to time count neither way, and so are no evidence of an exchange: the two that are
@@ -424,7 +424,7 @@ def exchanged(nets: Sequence[str], asked: Sequence[Mapping[str, Answer]], side: 
     an exchange of the sides shows at two sensors of each.
     """
 
-    def turns(order: Sequence[int], answers: Mapping[str, Answer]) -> list[tuple[int, int]]:
+    def turns(order: Sequence[int], answers: Mapping[str, SensorResponse]) -> list[tuple[int, int]]:
         return [answers[nets[place]].codes for place in order]
 
     def are_sure(*pair: str) -> bool:
@@ -458,12 +458,12 @@ def exchanged(nets: Sequence[str], asked: Sequence[Mapping[str, Answer]], side: 
     )
 
 
-def _is_sure(net: str, asked: Sequence[Mapping[str, Answer]]) -> bool:
+def _is_sure(net: str, asked: Sequence[Mapping[str, SensorResponse]]) -> bool:
     """Tell whether a sensor is always answered, and always alike."""
     return not _varies(net, asked) and all(answers[net].answered is not None for answers in asked)
 
 
-def _varies(net: str, asked: Sequence[Mapping[str, Answer]]) -> bool:
+def _varies(net: str, asked: Sequence[Mapping[str, SensorResponse]]) -> bool:
     return len({answers[net].codes for answers in asked}) > 1
 
 

@@ -16,7 +16,7 @@ from bluepill_sim.errors import BluePillError
 from robot_bench.events.kinds import Contact, Verdict
 from robot_bench.recording.run_record import RunRecord
 from robot_bench.report.explain.against import compare
-from robot_bench.report.explain.chain import Evidence, Explanation, Standing, Step
+from robot_bench.report.explain.chain import ChainLink, Evidence, Explanation, Standing
 from robot_bench.report.explain.contact import ContactInquest
 from robot_bench.report.explain.findings import Finding, ended, numbers, obeyed
 from robot_bench.report.explain.probing import NOTICE_NS, Prober
@@ -106,7 +106,7 @@ def _prober(record: RunRecord, firmware: Path | None, limits: list[str]) -> Prob
     return Prober(replay)
 
 
-def _find(record: RunRecord, scene: Scene, prober: Prober | None, failure: str) -> tuple[Finding, list[Step]]:
+def _find(record: RunRecord, scene: Scene, prober: Prober | None, failure: str) -> tuple[Finding, list[ChainLink]]:
     at = _decided(record, failure)
     if (died := _died(record, prober, at)) is not None:
         return died
@@ -122,9 +122,9 @@ def _find(record: RunRecord, scene: Scene, prober: Prober | None, failure: str) 
     return _anything(record, scene, prober, at)
 
 
-def _anything(record: RunRecord, scene: Scene, prober: Prober | None, at: Nanos) -> tuple[Finding, list[Step]]:
+def _anything(record: RunRecord, scene: Scene, prober: Prober | None, at: Nanos) -> tuple[Finding, list[ChainLink]]:
     """Look for what keeps a program from anything: wheels that do not obey, a reset, a program that looks no more."""
-    steps: list[Step] = []
+    steps: list[ChainLink] = []
     found = obeyed(record, scene.step_mps, at, steps)
     if found is not None:
         return found, steps
@@ -133,8 +133,9 @@ def _anything(record: RunRecord, scene: Scene, prober: Prober | None, at: Nanos)
         resets = [reset for reset in prober.replay.resets if 0 <= at - reset.at < _AFTER_RESET_NS]
         if resets:
             reset = resets[-1]
-            steps.append(Step(t=reset.at, part="firmware", says=f"is reset by {reset.cause}, while at {reset.place}",
-                              evidence=Evidence.REPLAYED))  # fmt: skip
+            steps.append(ChainLink(t=reset.at, part="firmware",
+                                   says=f"is reset by {reset.cause}, while at {reset.place}",
+                                   evidence=Evidence.REPLAYED))  # fmt: skip
             tail = fed(prober, reset.cause, steps)
             return Finding(f"{words_of(reset)} reset the chip, {(at - reset.at) / NS_PER_S:.2f} s before{tail}"), steps
         early = max(0, at - NOTICE_NS)
@@ -160,7 +161,7 @@ def _ignored(prober: Prober | None, at: Nanos) -> str:
     return f"; until then it took no notice of {pins}"
 
 
-def _contact(scene: Scene, prober: Prober | None, hit: Contact) -> tuple[Finding, list[Step]]:
+def _contact(scene: Scene, prober: Prober | None, hit: Contact) -> tuple[Finding, list[ChainLink]]:
     resets = [] if prober is None else [r for r in prober.replay.resets if 0 <= hit.t - r.at < _AFTER_RESET_NS]
     inquest = ContactInquest(scene, prober, hit)
     if prober is not None and hit.t > prober.replay.end:
@@ -169,8 +170,8 @@ def _contact(scene: Scene, prober: Prober | None, hit: Contact) -> tuple[Finding
         reset = resets[-1]
         inquest._tell_motion()  # noqa: SLF001 - the same steps without its links
         steps = inquest.steps
-        steps.append(Step(t=reset.at, part="firmware", says=f"is reset by {reset.cause}, while at {reset.place}",
-                          evidence=Evidence.REPLAYED))  # fmt: skip
+        steps.append(ChainLink(t=reset.at, part="firmware", says=f"is reset by {reset.cause}, while at {reset.place}",
+                               evidence=Evidence.REPLAYED))  # fmt: skip
         tail = fed(prober, reset.cause, steps)
         return Finding(
             f"{words_of(reset)} reset the chip {(hit.t - reset.at) / NS_PER_S:.2f} s before the contact{tail}"
@@ -178,12 +179,12 @@ def _contact(scene: Scene, prober: Prober | None, hit: Contact) -> tuple[Finding
     return inquest.find(), inquest.steps
 
 
-def _died(record: RunRecord, prober: Prober | None, at: Nanos) -> tuple[Finding, list[Step]] | None:
+def _died(record: RunRecord, prober: Prober | None, at: Nanos) -> tuple[Finding, list[ChainLink]] | None:
     """Return the death of the firmware, where it came before what failed."""
     died = next((fault for fault in record.faults if fault.op == "died" and fault.t <= at), None)
     if died is None:
         return None
-    steps = [Step(t=died.t, part="firmware", says=died.words, evidence=Evidence.RECORDED)]
+    steps = [ChainLink(t=died.t, part="firmware", says=died.words, evidence=Evidence.RECORDED)]
     where = ""
     fault = None
     if prober is not None:
@@ -193,7 +194,9 @@ def _died(record: RunRecord, prober: Prober | None, at: Nanos) -> tuple[Finding,
         place = prober.replay.line(fault.pc)
         where = f" at {place}"
         steps.append(
-            Step(t=fault.at_ns, part="firmware", says=f"the instruction is that of {place}", evidence=Evidence.REPLAYED)
+            ChainLink(
+                t=fault.at_ns, part="firmware", says=f"the instruction is that of {place}", evidence=Evidence.REPLAYED
+            )
         )
     return Finding(f"the firmware died at {died.t / NS_PER_S:.3f} s{where}: {died.words}"), steps
 

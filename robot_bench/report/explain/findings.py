@@ -10,8 +10,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from robot_bench.recording.run_record import RunRecord
-from robot_bench.recording.signals import Steps, motor_steps
-from robot_bench.report.explain.chain import Evidence, Step
+from robot_bench.recording.signals import SignalSteps, motor_steps
+from robot_bench.report.explain.chain import ChainLink, Evidence
 from robot_bench.report.explain.probing import SAME_NS, Codes, Prober, Way
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
@@ -47,7 +47,7 @@ def all_steady_since(record: RunRecord, times: Iterable[Nanos]) -> list[tuple[tu
     """Return what `steady_since` does for each of some times; the pins' edges are gone through once."""
     left, right = (motor_steps(record.pins, motor) for motor in (1, 2))
 
-    def last(steps: Steps, at: Nanos) -> tuple[int, Nanos]:
+    def last(steps: SignalSteps, at: Nanos) -> tuple[int, Nanos]:
         if not steps.times:
             return 0, 0
         place = max(0, bisect_right(steps.times, at) - 1)
@@ -81,7 +81,7 @@ def held_codes(way: Way, until: Nanos) -> str:
     return f"{told(held)} for {spans[held] / NS_PER_S:.2f} of {whole / NS_PER_S:.2f} s"
 
 
-def obeyed(record: RunRecord, step_mps: float, at: Nanos, steps: list[Step]) -> Finding | None:
+def obeyed(record: RunRecord, step_mps: float, at: Nanos, steps: list[ChainLink]) -> Finding | None:
     """Return that, and why, the wheels do not do what the motor pins ask just before a time; None where they do."""
     if any(net.startswith("motor") for net in record.waves):
         return None  # duties, not codes
@@ -96,8 +96,10 @@ def obeyed(record: RunRecord, step_mps: float, at: Nanos, steps: list[Step]) -> 
         return None
     asked = ", ".join(f"{code * step_mps * 1000:+.0f}" for code in codes)
     has = ", ".join(f"{speed * 1000:+.0f}" for speed in wheels)
-    steps.append(Step(t=since, part="wire", says=f"the motor pins ask for {asked} mm/s", evidence=Evidence.RECORDED))
-    steps.append(Step(t=pose.t, part="motion", says=f"the wheels run at {has} mm/s", evidence=Evidence.RECORDED))
+    steps.append(
+        ChainLink(t=since, part="wire", says=f"the motor pins ask for {asked} mm/s", evidence=Evidence.RECORDED)
+    )
+    steps.append(ChainLink(t=pose.t, part="motion", says=f"the wheels run at {has} mm/s", evidence=Evidence.RECORDED))
     why = _why_not_obeyed(record, at, steps)
     return Finding(f"the motors do not do what the pins ask ({asked} mm/s wanted, {has} mm/s driven)"
                    + (f": {why}" if why else "; why is not known"))  # fmt: skip
@@ -156,29 +158,29 @@ def let_go(record: RunRecord, at: Nanos) -> tuple[str, Nanos, str] | None:
     return None
 
 
-def _why_not_obeyed(record: RunRecord, at: Nanos, steps: list[Step]) -> str:
+def _why_not_obeyed(record: RunRecord, at: Nanos, steps: list[ChainLink]) -> str:
     """Return what the trace says of it; empty where it says nothing."""
     gone = let_go(record, at)
     if gone is not None:
         wire, since, says = gone
-        steps.append(Step(t=since, part="wire", says=f"{wire} {CONTROL[wire][1]}", evidence=Evidence.RECORDED))
+        steps.append(ChainLink(t=since, part="wire", says=f"{wire} {CONTROL[wire][1]}", evidence=Evidence.RECORDED))
         return says
     fault = injected(record, at, "wheels")
     if fault is not None:
         since, words = fault
-        steps.append(Step(t=since, part="wire", says=f"fault injected: {words}", evidence=Evidence.RECORDED))
+        steps.append(ChainLink(t=since, part="wire", says=f"fault injected: {words}", evidence=Evidence.RECORDED))
         return f"{words!r} was injected at {since / NS_PER_S:.3f} s"
     notes = [note for note in record.events if note.t <= at and note.what != "command" and note.who != "body"]
     if notes:
         note = notes[-1]
         says = f"{note.who}: {note.what}{', ' if note.detail else ''}{note.detail}"
-        steps.append(Step(t=note.t, part="wire", says=says, evidence=Evidence.RECORDED))
+        steps.append(ChainLink(t=note.t, part="wire", says=says, evidence=Evidence.RECORDED))
         if note.what not in {"driving", "motors"}:
             return f"the last of the state log is {says!r}, at {note.t / NS_PER_S:.3f} s"
     return ""
 
 
-def ended(prober: Prober, silent: Nanos, failed: Nanos, steps: list[Step]) -> Finding:
+def ended(prober: Prober, silent: Nanos, failed: Nanos, steps: list[ChainLink]) -> Finding:
     """Return since when a program takes no notice of any sensor, what it does instead, and what ran over then."""
     since = prober.ended_noticing(silent)
     if since is None:
@@ -188,8 +190,8 @@ def ended(prober: Prober, silent: Nanos, failed: Nanos, steps: list[Step]) -> Fi
         return Finding(f"the program is late: it reads its input pins only each {gap / NS_PER_S:.2f} s, and takes no "
                        f"notice of them from {since / NS_PER_S:.3f} s to {failed / NS_PER_S:.3f} s")  # fmt: skip
     says = f"the program takes no notice of any sensor's pin since {since / NS_PER_S:.3f} s"
-    steps.append(Step(t=since, part="firmware", says="a change of the sensors' pins changes its way, variables or "
-                      "outputs for the last time", evidence=Evidence.CHANGED))  # fmt: skip
+    steps.append(ChainLink(t=since, part="firmware", says="a change of the sensors' pins changes its way, variables or "
+                           "outputs for the last time", evidence=Evidence.CHANGED))  # fmt: skip
     now = prober.lines_run(silent, silent + 100 * NS_PER_MS)
     doing = sorted(now, key=lambda line: -now[line])
     before = prober.lines_run(max(0, since - 200 * NS_PER_MS), since)
@@ -197,16 +199,16 @@ def ended(prober: Prober, silent: Nanos, failed: Nanos, steps: list[Step]) -> Fi
     gone = [line for line in before if line not in after]
     variables = ran_over(prober, since)
     if len(now) <= LOOP_LINES:
-        steps.append(Step(t=silent, part="firmware", says=f"runs {numbers(doing[:NAMED])} and nothing else",
-                          evidence=Evidence.REPLAYED))  # fmt: skip
+        steps.append(ChainLink(t=silent, part="firmware", says=f"runs {numbers(doing[:NAMED])} and nothing else",
+                               evidence=Evidence.REPLAYED))  # fmt: skip
         return Finding(f"{says}: it is stuck at {doing[0]}" if doing else f"{says}: it stands still")
     if gone:
-        steps.append(Step(t=since, part="firmware", says=f"runs for the last time: {numbers(gone[:NAMED])}",
-                          evidence=Evidence.REPLAYED))  # fmt: skip
+        steps.append(ChainLink(t=since, part="firmware", says=f"runs for the last time: {numbers(gone[:NAMED])}",
+                               evidence=Evidence.REPLAYED))  # fmt: skip
         says += f"; {gone[0]} ran until then and not after"
     if variables:
         at, told = next(iter(variables.items()))
-        steps.append(Step(t=at, part="firmware", says=told, evidence=Evidence.REPLAYED))
+        steps.append(ChainLink(t=at, part="firmware", says=told, evidence=Evidence.REPLAYED))
         says += f"; {told} at {at / NS_PER_S:.3f} s"
     return Finding(says)
 

@@ -14,7 +14,7 @@ from itertools import pairwise, zip_longest
 from adapter_sim.pinout import WireRole
 from bluepill_sim.core import BLOCK
 from bluepill_sim.core.recorder import RECORD
-from robot_bench.report.explain.replay import Branch, ChipReplay, Hold, Place, Seen
+from robot_bench.report.explain.replay import Branch, ChipReplay, Hold, ReplayPart, SourcePlace
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: chosen: how often variables are compared.
@@ -37,7 +37,7 @@ Way = Sequence[tuple[Nanos, Codes]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Effect:
+class InputEffect:
     """What inputs have changed; None where nothing did."""
 
     noticed: Nanos | None
@@ -55,7 +55,7 @@ class Effect:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Answer:
+class SensorResponse:
     """What a program does when one sensor alone sees something."""
 
     at: Nanos
@@ -78,16 +78,16 @@ class Prober:
     def __init__(self, replay: ChipReplay) -> None:
         self.replay = replay
         self.sensors = replay.role(WireRole.DISTANCE)
-        self._plain: dict[tuple[Nanos, Nanos], Seen] = {}
+        self._plain: dict[tuple[Nanos, Nanos], ReplayPart] = {}
         #: At a time, for a span: the chip with no sensor's pin high, and what it does; what one sensor alone changes.
-        self._quiet: dict[tuple[Nanos, Nanos], tuple[Branch, Seen]] = {}
-        self._answers: dict[tuple[Nanos, Nanos, str], Answer] = {}
+        self._quiet: dict[tuple[Nanos, Nanos], tuple[Branch, ReplayPart]] = {}
+        self._answers: dict[tuple[Nanos, Nanos, str], SensorResponse] = {}
 
-    def codes_with(self, seen: Seen, at: Nanos) -> Codes:
+    def codes_with(self, seen: ReplayPart, at: Nanos) -> Codes:
         """Return the codes at a time in a replay."""
         return self._codes(seen.levels_at(at))
 
-    def way(self, seen: Seen, since: Nanos, until: Nanos) -> Way:
+    def way(self, seen: ReplayPart, since: Nanos, until: Nanos) -> Way:
         """Return the codes over a time in a replay."""
         levels = seen.levels_at(since)
         found = [(since, self._codes(levels))]
@@ -106,21 +106,21 @@ class Prober:
             found.append((code ^ sign) - sign)
         return found[0], found[1]
 
-    def effect(self, holds: Sequence[Hold], until: Nanos, since: Nanos | None = None) -> Effect:
+    def effect(self, holds: Sequence[Hold], until: Nanos, since: Nanos | None = None) -> InputEffect:
         """Return what changes when inputs are held otherwise, against the recorded run, up to a time."""
         since = min(hold.since for hold in holds) if since is None else since
         plain = self._as_recorded(since, until)
         return self._compare(plain, self._beside(plain, holds, since, until), since, until)
 
-    def _as_recorded(self, since: Nanos, until: Nanos) -> Seen:
+    def _as_recorded(self, since: Nanos, until: Nanos) -> ReplayPart:
         if (since, until) not in self._plain:
             self._plain[since, until] = self.replay.run(since, until, rows=True, memory_ns=_MEMORY_NS)
         return self._plain[since, until]
 
     def _beside(
-        self, plain: Seen, holds: Sequence[Hold], since: Nanos, until: Nanos, *, branch: Branch | None = None,
+        self, plain: ReplayPart, holds: Sequence[Hold], since: Nanos, until: Nanos, *, branch: Branch | None = None,
         ends_parted: bool = False,
-    ) -> Seen:  # fmt: skip
+    ) -> ReplayPart:  # fmt: skip
         """Return a replay that is to be compared with another one of the same time."""
         return self.replay.run(
             since, until, holds, rows=True, memory_ns=_MEMORY_NS, branch=branch, beside=plain, ends_parted=ends_parted
@@ -144,7 +144,7 @@ class Prober:
         """Tell whether a program takes notice of any sensor that changes at a time, in the time after it."""
         return self.flip_noticed(self.sensors, at, span) is not None
 
-    def answers(self, at: Nanos, span: Nanos = ANSWER_NS, nets: Sequence[str] = ()) -> Mapping[str, Answer]:
+    def answers(self, at: Nanos, span: Nanos = ANSWER_NS, nets: Sequence[str] = ()) -> Mapping[str, SensorResponse]:
         """Return what a program does at a time when one sensor alone sees something, and nothing did before.
 
         Args:
@@ -161,12 +161,12 @@ class Prober:
                 self._answers[at, span, net] = self._answer(at, span, net)
         return {net: self._answers[at, span, net] for net in nets or self.sensors}
 
-    def _answer(self, at: Nanos, span: Nanos, net: str) -> Answer:
+    def _answer(self, at: Nanos, span: Nanos, net: str) -> SensorResponse:
         until = min(at + span, self.replay.end)
         quiet, base = self._quiet[at, span]
         hold = Hold(wire=net, level=True, since=at, until=until)
         effect = self._compare(base, self._beside(base, [hold], at, until, branch=quiet), at, until)
-        return Answer(
+        return SensorResponse(
             at=at, base=effect.before, codes=effect.after,
             noticed=None if effect.noticed is None else effect.noticed - at,
             answered=None if effect.answered is None else effect.answered - at, otherwise_ns=effect.otherwise_ns,
@@ -234,12 +234,12 @@ class Prober:
         usual = self.lines_run(max(0, at - 300 * NS_PER_MS), max(0, at - 8 * NS_PER_MS))
         return [line for line in just if line not in usual]
 
-    def last_place(self, at: Nanos) -> Place:
+    def last_place(self, at: Nanos) -> SourcePlace:
         """Return where the program is at a time."""
         self.replay.run(at, at + 1)
         return self.replay.line(self.replay.board.pc)
 
-    def _parting(self, plain: Seen, other: Seen, since: Nanos) -> tuple[Nanos | None, str]:
+    def _parting(self, plain: ReplayPart, other: ReplayPart, since: Nanos) -> tuple[Nanos | None, str]:
         """Return when the way through the program, or its variables, first differ, and where; (None, "") for never."""
         flow = first_row(plain, other)
         noticed: Nanos | None = None
@@ -257,7 +257,7 @@ class Prober:
                 return t, self.replay.variable_at(place)
         return noticed, by
 
-    def _compare(self, plain: Seen, other: Seen, since: Nanos, until: Nanos) -> Effect:
+    def _compare(self, plain: ReplayPart, other: ReplayPart, since: Nanos, until: Nanos) -> InputEffect:
         noticed, by = self._parting(plain, other, since)
         answered = min(
             (
@@ -269,7 +269,7 @@ class Prober:
         )
         one, two = self.way(plain, since, until), self.way(other, since, until)
         apart = parted(one, two, until)
-        return Effect(
+        return InputEffect(
             noticed=noticed, by=by, answered=answered, before=one[-1][1], after=two[-1][1], way=one,
             otherwise_ns=sum(apart.values()), otherwise=max(apart, key=lambda codes: apart[codes], default=None),
         )  # fmt: skip
@@ -291,7 +291,7 @@ def parted(one: Way, other: Way, until: Nanos) -> dict[tuple[Codes, Codes], Nano
     return {pair: span for pair, span in found.items() if span}
 
 
-def first_row(plain: Seen, other: Seen) -> int | None:
+def first_row(plain: ReplayPart, other: ReplayPart) -> int | None:
     """Return the place of the first row that differs, or that only one has; None for none."""
     ours, theirs = plain.packed_rows, other.packed_rows
     same, differ = 0, min(len(ours), len(theirs)) // RECORD.size

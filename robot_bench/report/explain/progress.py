@@ -17,7 +17,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from robot_bench.events.kinds import Pose
-from robot_bench.report.explain.chain import Evidence, Step
+from robot_bench.report.explain.chain import ChainLink, Evidence
 from robot_bench.report.explain.findings import (
     CONTROL,
     Finding,
@@ -31,8 +31,8 @@ from robot_bench.report.explain.findings import (
     steady_since,
     told,
 )
-from robot_bench.report.explain.probing import QUIET_NS, Answer, Codes, Prober
-from robot_bench.report.explain.replay import Reset
+from robot_bench.report.explain.probing import QUIET_NS, Codes, Prober, SensorResponse
+from robot_bench.report.explain.replay import ChipReset
 from robot_bench.report.explain.scene import Scene
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
@@ -62,7 +62,7 @@ class ProgressInquest:
         self.scene = scene
         self._prober = prober
         self._until = until
-        self.steps: list[Step] = []
+        self.steps: list[ChainLink] = []
 
     def find(self) -> Finding:
         """Return what kept it, or what is known."""
@@ -170,7 +170,7 @@ class ProgressInquest:
             is_cause=bool(why),
         )
 
-    def _why_opposite(self, prober: Prober, asked: Sequence[Mapping[str, Answer]]) -> str:
+    def _why_opposite(self, prober: Prober, asked: Sequence[Mapping[str, SensorResponse]]) -> str:
         """Return what a program that turns with nothing in sight does with something in sight; empty: it tells nothing.
 
         A wrong sign of one motor makes a straight way of each turn too, so it shows at several sensors.
@@ -298,7 +298,7 @@ class ProgressInquest:
         return _Stay(poses[first].t, poses[last].t, _turned(poses[first : last + 1])) if last > first else None
 
     def _step(self, t: Nanos, part: str, says: str, evidence: Evidence) -> None:
-        self.steps.append(Step(t=t, part=part, says=says, evidence=evidence))
+        self.steps.append(ChainLink(t=t, part=part, says=says, evidence=evidence))
 
 
 #: Causes of resets in words.
@@ -308,12 +308,12 @@ _CAUSES = {
 }  # fmt: skip
 
 
-def words_of(reset: Reset) -> str:
+def words_of(reset: ChipReset) -> str:
     """Return what reset the chip."""
     return _CAUSES.get(reset.cause, reset.cause)
 
 
-def fed(prober: Prober, cause: str, steps: list[Step]) -> str:
+def fed(prober: Prober, cause: str, steps: list[ChainLink]) -> str:
     """Return where a program fed its watchdog last before the first reset, and what it did not come by since."""
     resets = [reset for reset in prober.replay.resets if reset.cause == cause]
     if cause != "IWDG" or not resets:
@@ -323,13 +323,13 @@ def fed(prober: Prober, cause: str, steps: list[Step]) -> str:
         return "; it was not fed in the 12 s before"
     at, place = feeds[-1]
     says = f"feeds the watchdog for the last time, at {place}"
-    steps.append(Step(t=at, part="firmware", says=says, evidence=Evidence.REPLAYED))
+    steps.append(ChainLink(t=at, part="firmware", says=says, evidence=Evidence.REPLAYED))
     usual = prober.lines_run(max(0, at - 100_000_000), at)
     after = prober.lines_run(at + 20_000, resets[0].at)
     new = [line for line in after if line not in usual]
     if new:
         says = f"from then on it goes by {numbers(new[:4])}, where it had not been in the 0.1 s before"
-        steps.append(Step(t=at, part="firmware", says=says, evidence=Evidence.REPLAYED))
+        steps.append(ChainLink(t=at, part="firmware", says=says, evidence=Evidence.REPLAYED))
     before_ms = (resets[0].at - at) / NS_PER_MS
     return f"; it was fed last at {at / NS_PER_S:.3f} s, {before_ms:.0f} ms before, at {place}, and not again till then"
 

@@ -21,7 +21,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TypeAlias, cast
 
-from adapter_sim.pinout import Direction, Pull, Wire, WireRole, load_pinout
+from adapter_sim.pinout import Pull, Wire, WireDirection, WireRole, load_pinout
 from bluepill_sim.core import BLOCK, BlockRow
 from bluepill_sim.core.debugging.debug_unit import WatchKind, Watchpoint
 from bluepill_sim.core.nvic import exception_name
@@ -70,7 +70,7 @@ class Hold:
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class SourcePlace:
     """Where in a program: the source line, and the functions that it was called through, innermost first."""
 
     line: str
@@ -99,7 +99,7 @@ class Branch:
 
 
 @dataclass(slots=True)
-class Seen:
+class ReplayPart:
     """What the chip did in a part of a replay."""
 
     #: The levels of the outputs when it began.
@@ -131,12 +131,12 @@ class Seen:
 
 
 @dataclass(frozen=True, slots=True)
-class Reset:
+class ChipReset:
     """A reset of the chip after power-on."""
 
     at: Nanos
     cause: str
-    place: Place
+    place: SourcePlace
 
 
 class ChipReplay:
@@ -163,8 +163,8 @@ class ChipReplay:
             seed=int(cast("int", told.get("seed") or 0)),
         )  # fmt: skip
         self.wires: Mapping[str, Wire] = {wire.name: wire for wire in wires}
-        self.inputs = [wire.name for wire in wires if wire.direction is Direction.TO_BLUEPILL]
-        self.outputs = [wire.name for wire in wires if wire.direction is Direction.TO_ADAPTER]
+        self.inputs = [wire.name for wire in wires if wire.direction is WireDirection.TO_BLUEPILL]
+        self.outputs = [wire.name for wire in wires if wire.direction is WireDirection.TO_ADAPTER]
         self._net_of = {_number(wire.bluepill): wire.name for wire in wires}
         self._functions = FunctionTable(self.board.image)
         self._code = StaticCode(self.board.chip.memory)
@@ -172,12 +172,12 @@ class ChipReplay:
             self._lines = read_lines(self.board.image)
         except ImageError:
             self._lines = LineTable()
-        self._seen = Seen()
+        self._seen = ReplayPart()
         self._held: dict[str, _Levels] = {}
         #: Until when the inputs have been given, and when the next one changes.
         self._given: Nanos = 0
         self._next_input: Nanos = 0
-        self.resets: list[Reset] = []
+        self.resets: list[ChipReset] = []
         self.end: Nanos = record.last_ns
         self.board.subscribe_pins([self.wires[net].bluepill for net in self.outputs], self._driven, of=Of.WIRE)
         self.board.usart1.subscribe(lambda rows: self._seen.text.extend((at, word & 0xFF) for word, at in rows))
@@ -211,12 +211,12 @@ class ChipReplay:
         place = bisect_right(edges.times, at) - 1
         return edges.times[place] if place > 0 and edges.levels[place] else None
 
-    def line(self, address: int) -> Place:
+    def line(self, address: int) -> SourcePlace:
         """Return where an instruction stands in the source."""
         name = self._functions.name(address)
-        return Place(self._lines.place(address), f"0x{address:08x}" if name == UNKNOWN else name)
+        return SourcePlace(self._lines.place(address), f"0x{address:08x}" if name == UNKNOWN else name)
 
-    def end_line(self, block: int) -> Place:
+    def end_line(self, block: int) -> SourcePlace:
         """Return where the last instruction of a block stands, which decides what follows it."""
         found = self._code.block(block)
         return self.line(found.addresses[-1] if found.addresses else block)
@@ -242,8 +242,8 @@ class ChipReplay:
 
     def run(
         self, since: Nanos, until: Nanos, holds: Sequence[Hold] = (), *, rows: bool = False, memory_ns: Nanos = 0,
-        branch: Branch | None = None, beside: Seen | None = None, ends_parted: bool = False,
-    ) -> Seen:  # fmt: skip
+        branch: Branch | None = None, beside: ReplayPart | None = None, ends_parted: bool = False,
+    ) -> ReplayPart:  # fmt: skip
         """Run a part again.
 
         Args:
@@ -263,7 +263,7 @@ class ChipReplay:
             self._restore(branch.state, branch.held)
         self._hold(holds)
         levels = branch.levels if branch is not None else {net: self.level(net, since) for net in self.outputs}
-        self._seen = seen = Seen(levels=levels)
+        self._seen = seen = ReplayPart(levels=levels)
         try:
             if rows and self._go_on_recording(until, memory_ns, beside):
                 memory_ns, until = 0, self.board.now_ns if ends_parted else until
@@ -282,11 +282,11 @@ class ChipReplay:
         """
         self._seek(since)
         self._hold(holds)
-        held, self._seen = self._held, Seen(levels={net: self.level(net, since) for net in self.outputs})
+        held, self._seen = self._held, ReplayPart(levels={net: self.level(net, since) for net in self.outputs})
         self._go_on(until)
         return Branch(state=self._state(), held=held, levels=self._seen.levels_at(until))
 
-    def writer(self, at: Nanos, port: str) -> Place | None:
+    def writer(self, at: Nanos, port: str) -> SourcePlace | None:
         """Return which instruction drove a pin of a port ("A") at a time; None where no store to the port did."""
         calls: list[str] = []
         for before in (_CALLS_NS, _CALLS_NS // 8, _CALLS_NS // 64):
@@ -298,7 +298,7 @@ class ChipReplay:
         if not hits:
             return None
         place = self.line(hits[-1][1])
-        return Place(place.line, place.function, tuple(call for call in calls if not call.startswith(place.line)))
+        return SourcePlace(place.line, place.function, tuple(call for call in calls if not call.startswith(place.line)))
 
     def reads(self, since: Nanos, until: Nanos) -> dict[str, list[Nanos]]:
         """Return by which source lines a program reads the levels of ports in a time, and when."""
@@ -308,7 +308,7 @@ class ChipReplay:
             found.setdefault(str(self.line(pc)), []).append(at)
         return found
 
-    def feeds(self, since: Nanos, until: Nanos) -> list[tuple[Nanos, Place]]:
+    def feeds(self, since: Nanos, until: Nanos) -> list[tuple[Nanos, SourcePlace]]:
         """Return when, and where, a program writes the key register of the independent watchdog."""
         return [(at, self.line(pc)) for at, pc in self._watch(since, until, Watchpoint(_IWDG_KR, 4, WatchKind.WRITE))]
 
@@ -363,14 +363,14 @@ class ChipReplay:
         before: list[tuple[Nanos, int]] = []
         causes = dict(board.resets)
         board.chip.reset_listeners.append(reset_begins)
-        seen = self._seen = Seen()
+        seen = self._seen = ReplayPart()
         try:
             while board.now_ns < self.end:
                 self._go_on(min(self.end, board.now_ns + stride))
                 for cause, count in board.resets.items():
                     for _ in range(count - causes.get(cause, 0)):
                         at, pc = before.pop(0) if before else (board.now_ns, board.pc)
-                        self.resets.append(Reset(at, cause.name, self.line(pc)))
+                        self.resets.append(ChipReset(at, cause.name, self.line(pc)))
                 causes = dict(board.resets)
                 self._states.append(self._state())
                 if len(self._states) > MOST_STATES:
@@ -379,7 +379,7 @@ class ChipReplay:
             board.chip.reset_listeners.remove(reset_begins)
         return self._same_until(seen)
 
-    def _same_until(self, seen: Seen) -> Nanos:
+    def _same_until(self, seen: ReplayPart) -> Nanos:
         same = self.end
         for net in self.outputs:
             rows = self.record.pins[net]
@@ -403,7 +403,7 @@ class ChipReplay:
         self._held = dict(held)
         self._next_input = 0
 
-    def _go_on_recording(self, until: Nanos, memory_ns: Nanos, beside: Seen | None) -> bool:
+    def _go_on_recording(self, until: Nanos, memory_ns: Nanos, beside: ReplayPart | None) -> bool:
         """Run on with the blocks recorded, until there are too many; return whether it has parted from another run."""
         board, seen = self.board, self._seen
         rows, slice_ns, has_parted = bytearray(), _RECORDED_NS, False
@@ -491,7 +491,7 @@ def changes(level: bool, rows: Sequence[tuple[Nanos, bool]]) -> list[Nanos]:
     return found
 
 
-def _have_parted(beside: Seen, rows: bytearray, new: int, memory: Sequence[tuple[Nanos, bytes]]) -> bool:
+def _have_parted(beside: ReplayPart, rows: bytearray, new: int, memory: Sequence[tuple[Nanos, bytes]]) -> bool:
     """Tell whether a replay's last `new` bytes of rows, or its variables, differ from those of another one."""
     since, theirs = len(rows) - new, beside.packed_rows
     end = min(len(rows), len(theirs)) if beside.has_more_rows else len(rows)

@@ -19,7 +19,7 @@ from robot_bench.events.kinds import Event, PinEdge, Verdict
 from robot_bench.events.selection import Wires
 from robot_bench.events.stream import EventStream
 from robot_bench.scenario.goals.kinds import kind_named, known_kinds
-from robot_bench.scenario.goals.watch import WIRES, GoalKind, Outcome, Watch, number
+from robot_bench.scenario.goals.watch import WIRES, GoalKind, GoalOutcome, Watch, number
 from simbase.errors import nearest, shown
 from simbase.state import PartState, Stateful
 from simbase.timing import NS_PER_S, Nanos
@@ -79,7 +79,7 @@ class RunEnd:
     planned_ns: Nanos = 0
     by_scenario: bool = False
 
-    def leaves_open(self, outcome: Outcome) -> bool:
+    def leaves_open(self, outcome: GoalOutcome) -> bool:
         """Tell whether a run that ended so is too short for what became of a goal that was not decided in it."""
         return self.at_ns < self.planned_ns and not (self.by_scenario and outcome.met)
 
@@ -89,7 +89,7 @@ class GoalAtEnd:
     """What became of a goal; `is_open` where the run was too short to judge it, and `outcome` says how far it got."""
 
     goal: Goal
-    outcome: Outcome
+    outcome: GoalOutcome
     is_open: bool
 
 
@@ -176,7 +176,7 @@ class GoalJudge(Stateful):
         self.goals = tuple(goal for goal in goals if can_tell_world or not goal.definition.needs_world)
         self._watches = [goal.watch() for goal in self.goals]
         #: What is decided, in the order of the goals; None where nothing is.
-        self._decided: list[Outcome | None] = [None] * len(self.goals)
+        self._decided: list[GoalOutcome | None] = [None] * len(self.goals)
         self._begun = super().snapshot()
         self._publish: Callable[[Verdict], object] = _nowhere
         #: The run's end, once it is known.
@@ -298,7 +298,7 @@ class GoalJudge(Stateful):
             GoalAtEnd(goal, outcome, decided is None and end.leaves_open(outcome)) for goal, outcome, decided in rows
         ]
 
-    def _decide(self, place: int, outcome: Outcome, at: Nanos) -> None:
+    def _decide(self, place: int, outcome: GoalOutcome, at: Nanos) -> None:
         if self._decided[place] is not None:
             return
         self._decided[place] = outcome
@@ -316,11 +316,11 @@ def _nothing() -> None:
     """Let the run go on."""
 
 
-def _ends_run(goal: Goal, outcome: Outcome) -> bool:
+def _ends_run(goal: Goal, outcome: GoalOutcome) -> bool:
     return goal.ends_run in {"decided", "met" if outcome.met else "missed"}
 
 
-def _verdict(goal: Goal, outcome: Outcome, at: Nanos) -> Verdict:
+def _verdict(goal: Goal, outcome: GoalOutcome, at: Nanos) -> Verdict:
     by = outcome.robustness
     return Verdict(
         t=at, goal=goal.wanted, met=outcome.met, says=outcome.says, robustness=None if by is None else round(by, 9),

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from p2os.toml_schema import Table
 from robot_bench.events.kinds import MICRO, Clearance, Contact, Event, Pose
 from robot_bench.events.selection import moves
-from robot_bench.scenario.goals.watch import Outcome, SelectorFeed, Watch, nanos, number, seconds, selected
+from robot_bench.scenario.goals.watch import GoalOutcome, SelectorFeed, Watch, nanos, number, seconds, selected
 from simbase.timing import NS_PER_S, Nanos
 
 NS_PER_MINUTE = 60 * NS_PER_S
@@ -33,7 +33,7 @@ class NoCollision(Watch):
         self._first: Pose | None = None
         self._last: Pose | None = None
 
-    def feed(self, event: Event) -> Outcome | None:
+    def feed(self, event: Event) -> GoalOutcome | None:
         is_first = not self._count and self._first is None
         if isinstance(event, Contact):
             self._count += 1
@@ -45,14 +45,14 @@ class NoCollision(Watch):
             return None
         return self.finish(event.t) if is_first else None
 
-    def finish(self, end: Nanos) -> Outcome:
+    def finish(self, end: Nanos) -> GoalOutcome:
         if self._count:
             more = f", and {self._count - NAMED_HITS} more" if self._count > NAMED_HITS else ""
-            return Outcome(met=False, says=f"{self._count} collision(s): {'; '.join(self._named)}{more}")
+            return GoalOutcome(met=False, says=f"{self._count} collision(s): {'; '.join(self._named)}{more}")
         if self._first is None or self._last is None:
-            return Outcome(met=True)
+            return GoalOutcome(met=True)
         where = f"the first at {seconds(self._first.t)}, {_place(self._first)}"
-        return Outcome(met=False, says=f"{self._last.collisions} collision(s), {where}")
+        return GoalOutcome(met=False, says=f"{self._last.collisions} collision(s), {where}")
 
 
 class MinDistance(Watch):
@@ -67,19 +67,19 @@ class MinDistance(Watch):
         self._driven_um = 0.0
         self._at: tuple[int, int] | None = None
 
-    def feed(self, event: Event) -> Outcome | None:
+    def feed(self, event: Event) -> GoalOutcome | None:
         if isinstance(event, Pose):
             at = event.x, event.y
             if self._at is not None:
                 self._driven_um += math.hypot(at[0] - self._at[0], at[1] - self._at[1])
             self._at = at
             if not self._a_minute_m and self._driven_um >= self._wanted_m * 1e6:
-                return Outcome(met=True, says=f"driven by {seconds(event.t)}")
+                return GoalOutcome(met=True, says=f"driven by {seconds(event.t)}")
         return None
 
-    def finish(self, end: Nanos) -> Outcome:
+    def finish(self, end: Nanos) -> GoalOutcome:
         wanted_m, driven_m = self._wanted_m + self._a_minute_m * end / NS_PER_MINUTE, self._driven_um / 1e6
-        return Outcome(
+        return GoalOutcome(
             met=driven_m >= wanted_m, says=f"{driven_m:.2f} m were driven, {wanted_m:.2f} m are wanted",
             robustness=driven_m - wanted_m, unit="m",
         )  # fmt: skip
@@ -95,16 +95,16 @@ class Cells(Watch):
         self._wanted = int(number(table, "least"))
         self._entered: set[tuple[int, int]] = set()
 
-    def feed(self, event: Event) -> Outcome | None:
+    def feed(self, event: Event) -> GoalOutcome | None:
         if isinstance(event, Pose):
             self._entered.add((event.x // CELL_UM, event.y // CELL_UM))
             if len(self._entered) == self._wanted:
-                return Outcome(met=True)
+                return GoalOutcome(met=True)
         return None
 
-    def finish(self, end: Nanos) -> Outcome:
+    def finish(self, end: Nanos) -> GoalOutcome:
         count = len(self._entered)
-        return Outcome(
+        return GoalOutcome(
             met=count >= self._wanted, says=f"{count} cells of 0.5 m were entered, {self._wanted} are wanted"
         )
 
@@ -136,7 +136,7 @@ class Reach(Watch):
         self._reached: Nanos | None = None
         self._was_late = False
 
-    def feed(self, event: Event) -> Outcome | None:
+    def feed(self, event: Event) -> GoalOutcome | None:
         if not isinstance(event, Pose) or self._reached is not None:
             return None
         self._best_m = max(self._best_m, by := self._inside(event.x_m, event.y_m))
@@ -145,23 +145,23 @@ class Reach(Watch):
         self._reached = event.t
         return None if self._was_late else self.finish(event.t)
 
-    def advance_to(self, limit: Nanos) -> Outcome | None:
+    def advance_to(self, limit: Nanos) -> GoalOutcome | None:
         if self._within is None or self._reached is not None or limit < self._within or self._was_late:
             return None
         self._was_late = True
         return self.finish(limit)
 
-    def finish(self, end: Nanos) -> Outcome:
+    def finish(self, end: Nanos) -> GoalOutcome:
         if self._reached is None:
-            return Outcome(
+            return GoalOutcome(
                 met=False, says=f"it was not reached by {seconds(end)}, and came to {-self._best_m:.2f} m of it",
                 robustness=self._best_m, unit="m",
             )  # fmt: skip
         says = f"it was reached at {seconds(self._reached)}"
         if self._within is None:
-            return Outcome(met=True, says=says, robustness=self._best_m, unit="m")
+            return GoalOutcome(met=True, says=says, robustness=self._best_m, unit="m")
         left_s = (self._within - self._reached) / NS_PER_S
-        return Outcome(
+        return GoalOutcome(
             met=left_s >= 0, says=f"{says}, {self._within / NS_PER_S:g} s are allowed", robustness=left_s, unit="s"
         )
 
@@ -179,7 +179,7 @@ class Stay(Watch):
         self._worst_m = math.inf
         self._left: Pose | None = None
 
-    def feed(self, event: Event) -> Outcome | None:
+    def feed(self, event: Event) -> GoalOutcome | None:
         if not isinstance(event, Pose):
             return None
         self._worst_m = min(self._worst_m, by := self._by(event.x_m, event.y_m))
@@ -188,14 +188,14 @@ class Stay(Watch):
         self._left = event
         return self.finish(event.t)
 
-    def finish(self, end: Nanos) -> Outcome:
+    def finish(self, end: Nanos) -> GoalOutcome:
         worst_m = self._worst_m if math.isfinite(self._worst_m) else None
         if self._left is None:
-            return Outcome(met=True, robustness=worst_m, unit="m")
+            return GoalOutcome(met=True, robustness=worst_m, unit="m")
         says = (
             f"it was {self._word} at {seconds(self._left.t)}, {_place(self._left)}, by {-self._worst_m:.2f} m at most"
         )
-        return Outcome(met=False, says=says, robustness=worst_m, unit="m")
+        return GoalOutcome(met=False, says=says, robustness=worst_m, unit="m")
 
 
 class LeastClearance(Watch):
@@ -209,7 +209,7 @@ class LeastClearance(Watch):
         self._least: Clearance | None = None
         self._was_near = False
 
-    def feed(self, event: Event) -> Outcome | None:
+    def feed(self, event: Event) -> GoalOutcome | None:
         if isinstance(event, Clearance):
             self._least = event
             if event.um < self._wanted_m * MICRO and not self._was_near:
@@ -217,12 +217,12 @@ class LeastClearance(Watch):
                 return self.finish(event.t)
         return None
 
-    def finish(self, end: Nanos) -> Outcome:
+    def finish(self, end: Nanos) -> GoalOutcome:
         if self._least is None:
-            return Outcome(met=True, says="there was nothing near")
+            return GoalOutcome(met=True, says="there was nothing near")
         least_m = self._least.um / MICRO
         says = f"{least_m:.3f} m were left at {seconds(self._least.t)}, {self._wanted_m:g} m are wanted"
-        return Outcome(met=least_m >= self._wanted_m, says=says, robustness=least_m - self._wanted_m, unit="m")
+        return GoalOutcome(met=least_m >= self._wanted_m, says=says, robustness=least_m - self._wanted_m, unit="m")
 
 
 class StopWithin(Watch):
@@ -243,7 +243,7 @@ class StopWithin(Watch):
         self._failure = ""
         self._count = 0
 
-    def feed(self, event: Event) -> Outcome | None:
+    def feed(self, event: Event) -> GoalOutcome | None:
         outcome = None
         if isinstance(event, Pose):
             at = event.x_m, event.y_m
@@ -256,7 +256,7 @@ class StopWithin(Watch):
             self._count += 1
         return outcome
 
-    def _judge(self, now: Nanos, *, is_still: bool) -> Outcome | None:
+    def _judge(self, now: Nanos, *, is_still: bool) -> GoalOutcome | None:
         since = self._since or 0
         took_s = (now - since) / NS_PER_S
         self._worst_s, self._worst_m = max(self._worst_s, took_s), max(self._worst_m, self._way_m)
@@ -271,10 +271,10 @@ class StopWithin(Watch):
         )
         return self.finish(now)
 
-    def finish(self, end: Nanos) -> Outcome:
+    def finish(self, end: Nanos) -> GoalOutcome:
         if not self._count:
-            return Outcome(met=False, says=f"{self._words!r} did not happen")
-        return Outcome(
+            return GoalOutcome(met=False, says=f"{self._words!r} did not happen")
+        return GoalOutcome(
             met=not self._failure,
             says=self._failure or f"at most {self._worst_s:.3f} s and {self._worst_m:.3f} m",
             robustness=self._most_s - self._worst_s, unit="s",
@@ -299,7 +299,7 @@ class MovesOn(Watch):
         self._least_at: Pose | None = None
         self._has_missed = False
 
-    def feed(self, event: Event) -> Outcome | None:
+    def feed(self, event: Event) -> GoalOutcome | None:
         if not isinstance(event, Pose) or event.t < self._from:
             return None
         if self._place is None:
@@ -314,12 +314,12 @@ class MovesOn(Watch):
         self._has_missed = True
         return self.finish(event.t)
 
-    def finish(self, end: Nanos) -> Outcome:
+    def finish(self, end: Nanos) -> GoalOutcome:
         stuck, left_s = self._least_at, self._least / NS_PER_S
         if left_s >= 0 or stuck is None:
-            return Outcome(met=True, robustness=left_s, unit="s")
+            return GoalOutcome(met=True, robustness=left_s, unit="s")
         says = f"it did not get {self._way_m:g} m away from {_place(stuck)} where it was at {seconds(stuck.t)}"
-        return Outcome(met=False, says=f"{says} within {self._within / NS_PER_S:g} s", robustness=left_s, unit="s")
+        return GoalOutcome(met=False, says=f"{says} within {self._within / NS_PER_S:g} s", robustness=left_s, unit="s")
 
 
 class Smooth(Watch):
@@ -334,7 +334,7 @@ class Smooth(Watch):
         self._worst_mps2 = 0.0
         self._worst_at: Nanos = 0
 
-    def feed(self, event: Event) -> Outcome | None:
+    def feed(self, event: Event) -> GoalOutcome | None:
         if not isinstance(event, Pose):
             return None
         last, self._last = self._last, event
@@ -347,10 +347,10 @@ class Smooth(Watch):
             self._worst_mps2, self._worst_at = found_mps2, event.t
         return self.finish(event.t) if was_smooth and found_mps2 > self._most_mps2 else None
 
-    def finish(self, end: Nanos) -> Outcome:
+    def finish(self, end: Nanos) -> GoalOutcome:
         says = f"{self._worst_mps2:.2f} m/s² at {seconds(self._worst_at)}, {self._most_mps2:g} m/s² are allowed"
         by = self._most_mps2 - self._worst_mps2
-        return Outcome(met=by >= 0, says=says, robustness=by, unit="m/s²")
+        return GoalOutcome(met=by >= 0, says=says, robustness=by, unit="m/s²")
 
 
 class Energy(Watch):
@@ -369,7 +369,7 @@ class Energy(Watch):
         #: The first pose at which the run had taken more than it may.
         self._over: Pose | None = None
 
-    def feed(self, event: Event) -> Outcome | None:
+    def feed(self, event: Event) -> GoalOutcome | None:
         if not isinstance(event, Pose) or event.work is None:
             return None
         last, self._last = self._last, event
@@ -383,9 +383,9 @@ class Energy(Watch):
             return self.finish(event.t)
         return None
 
-    def finish(self, end: Nanos) -> Outcome:
+    def finish(self, end: Nanos) -> GoalOutcome:
         if self._last is None or self._last.work is None:
-            return Outcome(met=False, says="the run does not tell the work at the rims")
+            return GoalOutcome(met=False, says="the run does not tell the work at the rims")
         work_j = self._last.work / MICRO
         # Nothing for no way is within any bound.
         allowed_j = self._a_metre_j * self._driven_m if math.isfinite(self._a_metre_j) else math.inf
@@ -399,4 +399,4 @@ class Energy(Watch):
             says = f"more than {self._most_j:g} J from {seconds(self._over.t)}, {_place(self._over)}, on; {says}"
         elif by < 0:
             says += f"; {self._a_metre_j:g} J a metre are allowed"
-        return Outcome(met=by >= 0, says=says, robustness=by, unit="J")
+        return GoalOutcome(met=by >= 0, says=says, robustness=by, unit="J")

@@ -9,7 +9,7 @@ from adapter_sim.pinout import load_pinout
 from p2os.toml_schema import Table
 from robot_bench.events.kinds import Event, PinEdge, Wave
 from robot_bench.events.selection import wire_named
-from robot_bench.scenario.goals.watch import Outcome, Watch, nanos, number, seconds, wires_of
+from robot_bench.scenario.goals.watch import GoalOutcome, Watch, nanos, number, seconds, wires_of
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: chosen: two motor values that follow each other within this are one change (two ports are written in turn).
@@ -35,7 +35,7 @@ class MotorSequence(Watch):
         self._seen: list[tuple[Nanos, tuple[int, ...]]] = []
         self._is_decided = False
 
-    def feed(self, event: Event) -> Outcome | None:
+    def feed(self, event: Event) -> GoalOutcome | None:
         if isinstance(event, PinEdge) and event.wire in self._place_of:
             side, bit = self._place_of[event.wire]
             self._bits[side] = self._bits[side] & ~(1 << bit) | event.level << bit
@@ -47,7 +47,7 @@ class MotorSequence(Watch):
                 self._seen.append((at, pair))
         return None
 
-    def advance_to(self, limit: Nanos) -> Outcome | None:
+    def advance_to(self, limit: Nanos) -> GoalOutcome | None:
         """Decide by what has settled: a value that is wrong, or was not held."""
         settled = [item for item in self._seen if item[0] <= limit - SKEW_NS]
         pairs = [pair for _, pair in settled]
@@ -56,14 +56,16 @@ class MotorSequence(Watch):
         self._is_decided = True
         return self.finish(limit)
 
-    def finish(self, end: Nanos) -> Outcome:
+    def finish(self, end: Nanos) -> GoalOutcome:
         pairs = [pair for _, pair in self._seen]
         if pairs == self._wanted[: len(pairs)] and (says := self._short(self._seen)):
-            return Outcome(met=False, says=says)
+            return GoalOutcome(met=False, says=says)
         if pairs != self._wanted:
-            return Outcome(met=False, says=f"the motor pins said {shown_pairs(pairs)}, not {shown_pairs(self._wanted)}")
+            return GoalOutcome(
+                met=False, says=f"the motor pins said {shown_pairs(pairs)}, not {shown_pairs(self._wanted)}"
+            )
         says = self._short([*self._seen, (end, ())])
-        return Outcome(met=not says, says=says)
+        return GoalOutcome(met=not says, says=says)
 
     def _short(self, seen: list[tuple[Nanos, tuple[int, ...]]]) -> str:
         for (begin, pair), (end, _) in pairwise(seen):
@@ -92,7 +94,7 @@ class PinHolds(Watch):
         self._level: bool | None = None
         self._wrong: Nanos | None = None
 
-    def feed(self, event: Event) -> Outcome | None:
+    def feed(self, event: Event) -> GoalOutcome | None:
         if not isinstance(event, PinEdge):
             return None
         outcome = self._look(self._from) if event.t > self._from else None
@@ -100,17 +102,17 @@ class PinHolds(Watch):
         self._level = event.level if event.t <= self._to else None
         return outcome or (self._look(event.t) if self._from <= event.t else None)
 
-    def advance_to(self, limit: Nanos) -> Outcome | None:
+    def advance_to(self, limit: Nanos) -> GoalOutcome | None:
         outcome = self._look(self._from) if limit >= self._from else None
         return outcome or (self.finish(limit) if limit >= self._to else None)
 
-    def finish(self, end: Nanos) -> Outcome:
+    def finish(self, end: Nanos) -> GoalOutcome:
         if self._wrong is None:
-            return Outcome(met=True)
+            return GoalOutcome(met=True)
         is_at = "low" if self._wanted else "high"
-        return Outcome(met=False, says=f"{self._name} was {is_at} at {seconds(self._wrong)}")
+        return GoalOutcome(met=False, says=f"{self._name} was {is_at} at {seconds(self._wrong)}")
 
-    def _look(self, at: Nanos) -> Outcome | None:
+    def _look(self, at: Nanos) -> GoalOutcome | None:
         if self._wrong is not None or self._level is None or self._level is self._wanted:
             return None
         self._wrong = at
@@ -137,7 +139,7 @@ class WaveWithin(Watch):
         self._failure = ""
         self._hz: tuple[float, float] = (math.inf, 0.0)
 
-    def feed(self, event: Event) -> Outcome | None:
+    def feed(self, event: Event) -> GoalOutcome | None:
         if isinstance(event, Wave) and event.wire == self._wire and self._from <= event.t <= self._to and event.period:
             self._count += self._periods
             return self._take(event.t, event.frequency_hz, event.duty)
@@ -153,10 +155,10 @@ class WaveWithin(Watch):
         period_ns = event.t - rise
         return self._take(event.t, NS_PER_S / period_ns, (self._fall - rise) / period_ns)
 
-    def advance_to(self, limit: Nanos) -> Outcome | None:
+    def advance_to(self, limit: Nanos) -> GoalOutcome | None:
         return self.finish(limit) if limit >= self._to else None
 
-    def _take(self, at: Nanos, hz: float, duty: float) -> Outcome | None:
+    def _take(self, at: Nanos, hz: float, duty: float) -> GoalOutcome | None:
         self._hz = min(self._hz[0], hz), max(self._hz[1], hz)
         is_within = (
             self._hz_bounds[0] <= hz <= self._hz_bounds[1] and self._duty_bounds[0] <= duty <= self._duty_bounds[1]
@@ -166,10 +168,12 @@ class WaveWithin(Watch):
         self._failure = f"{self._name} had {hz:.4g} Hz and {duty:.1%} duty in the period up to {seconds(at)}"
         return self.finish(at)
 
-    def finish(self, end: Nanos) -> Outcome:
+    def finish(self, end: Nanos) -> GoalOutcome:
         if self._failure:
-            return Outcome(met=False, says=self._failure)
+            return GoalOutcome(met=False, says=self._failure)
         if self._count < self._periods:
-            return Outcome(met=False, says=f"{self._name} had {self._count} whole periods, {self._periods} are wanted")
+            return GoalOutcome(
+                met=False, says=f"{self._name} had {self._count} whole periods, {self._periods} are wanted"
+            )
         by = min(self._hz[0] - self._hz_bounds[0], self._hz_bounds[1] - self._hz[1])
-        return Outcome(met=True, robustness=by if math.isfinite(by) else None, unit="Hz")
+        return GoalOutcome(met=True, robustness=by if math.isfinite(by) else None, unit="Hz")

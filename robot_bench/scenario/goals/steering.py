@@ -15,7 +15,7 @@ from collections.abc import Sequence
 
 from p2os.toml_schema import Table
 from robot_bench.events.kinds import MICRO, Event, Pose, Ranges
-from robot_bench.scenario.goals.watch import Outcome, Watch, number, seconds
+from robot_bench.scenario.goals.watch import GoalOutcome, Watch, number, seconds
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
 
@@ -94,7 +94,7 @@ class TurnsAway(Watch):
         self._row = self._worst = 0
         self._worst_at: Pose | None = None
 
-    def feed(self, event: Event) -> Outcome | None:
+    def feed(self, event: Event) -> GoalOutcome | None:
         if isinstance(event, Ranges):
             self._ranges = event
         elif isinstance(event, Pose):
@@ -106,7 +106,7 @@ class TurnsAway(Watch):
             self._begun = None
         return None
 
-    def _turn(self, pose: Pose, took_s: float) -> Outcome | None:
+    def _turn(self, pose: Pose, took_s: float) -> GoalOutcome | None:
         if self._begun is None:
             self._begun, self._turned_m = pose, 0.0
             ended = self._ended
@@ -121,14 +121,14 @@ class TurnsAway(Watch):
             self._worst, self._worst_at = self._row, self._begun
         return self.finish(pose.t) if self._row == self._most + 1 == self._worst else None
 
-    def finish(self, end: Nanos) -> Outcome:
+    def finish(self, end: Nanos) -> GoalOutcome:
         by = 1 - self._worst / (self._most + 1)
         if by > 0 or self._worst_at is None:
-            return Outcome(met=True, robustness=by, unit=ALLOWED)
+            return GoalOutcome(met=True, robustness=by, unit=ALLOWED)
         says = (
             f"{self._worst} turn(s) in a row went to the side that was not free, the last at {_place(self._worst_at)}"
         )
-        return Outcome(met=False, says=says, robustness=min(by, -1 / (self._most + 1)), unit=ALLOWED)
+        return GoalOutcome(met=False, says=says, robustness=min(by, -1 / (self._most + 1)), unit=ALLOWED)
 
 
 class _NotLong(Watch):
@@ -150,7 +150,7 @@ class _NotLong(Watch):
         """Tell whether it is so at a pose."""
         raise NotImplementedError
 
-    def feed(self, event: Event) -> Outcome | None:
+    def feed(self, event: Event) -> GoalOutcome | None:
         if isinstance(event, Ranges):
             self._ranges = event
         elif isinstance(event, Pose):
@@ -164,12 +164,12 @@ class _NotLong(Watch):
     def _is_long(self) -> bool:
         return self._longest > self._within_s * NS_PER_S
 
-    def finish(self, end: Nanos) -> Outcome:
+    def finish(self, end: Nanos) -> GoalOutcome:
         by = 1 - self._longest / NS_PER_S / self._within_s
         if not self._is_long or self._longest_at is None:
-            return Outcome(met=True, robustness=by, unit=ALLOWED)
+            return GoalOutcome(met=True, robustness=by, unit=ALLOWED)
         says = f"for {self._longest / NS_PER_S:.2f} s from {_place(self._longest_at)}, {self.words}"
-        return Outcome(met=False, says=f"{says}; {self._within_s:g} s are allowed", robustness=by, unit=ALLOWED)
+        return GoalOutcome(met=False, says=f"{says}; {self._within_s:g} s are allowed", robustness=by, unit=ALLOWED)
 
 
 class SteersAway(_NotLong):
@@ -214,7 +214,7 @@ class BacksOnPath(Watch):
         self._worst_m = 0.0
         self._worst_at: Pose | None = None
 
-    def feed(self, event: Event) -> Outcome | None:
+    def feed(self, event: Event) -> GoalOutcome | None:
         if not isinstance(event, Pose):
             return None
         if event.speed_mps >= -DRIVES_MPS or not self._path:
@@ -227,9 +227,9 @@ class BacksOnPath(Watch):
             self._worst_m, self._worst_at = off_m, event
         return self.finish(event.t) if self._worst_m > self._most_m and not was_off else None
 
-    def finish(self, end: Nanos) -> Outcome:
+    def finish(self, end: Nanos) -> GoalOutcome:
         by = 1 - self._worst_m / self._most_m
         if by >= 0 or self._worst_at is None:
-            return Outcome(met=True, robustness=by, unit=ALLOWED)
+            return GoalOutcome(met=True, robustness=by, unit=ALLOWED)
         says = f"it went back {self._worst_m:.2f} m off the way that it had come at {_place(self._worst_at)}"
-        return Outcome(met=False, says=f"{says}, {self._most_m:g} m are allowed", robustness=by, unit=ALLOWED)
+        return GoalOutcome(met=False, says=f"{says}, {self._most_m:g} m are allowed", robustness=by, unit=ALLOWED)

@@ -11,7 +11,7 @@ from typing import Any, cast
 
 from p2os.toml_schema import Table
 from robot_bench.events.kinds import MICRO, Clearance, Event, Pose, Ranges, WorldChange
-from robot_bench.scenario.goals.watch import Outcome, SelectorFeed, Watch, nanos, number, seconds, selected
+from robot_bench.scenario.goals.watch import GoalOutcome, SelectorFeed, Watch, nanos, number, seconds, selected
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
 
@@ -68,7 +68,7 @@ class OverTime(Watch):
     def _nothing(self) -> float:
         return math.inf if self._is_always else -math.inf
 
-    def feed(self, event: Event) -> Outcome | None:
+    def feed(self, event: Event) -> GoalOutcome | None:
         if isinstance(event, WorldChange) and event.name == self._thing:
             place = event.fields.get("x"), event.fields.get("y")
             self._there = place if event.op != "remove" else None  # type: ignore[assignment] # numbers: the codec says so
@@ -81,7 +81,7 @@ class OverTime(Watch):
             self._count += 1
         return self._decide(event.t)
 
-    def advance_to(self, limit: Nanos) -> Outcome | None:
+    def advance_to(self, limit: Nanos) -> GoalOutcome | None:
         # All samples up to `limit` were fed: a window that ends there is over.
         return self._decide(limit + 1)
 
@@ -93,7 +93,7 @@ class OverTime(Watch):
             else:
                 self._windows[place] = begin, best, at
 
-    def _decide(self, now: Nanos) -> Outcome | None:
+    def _decide(self, now: Nanos) -> GoalOutcome | None:
         """Close the windows that were over before `now`; return what is decided by that."""
         was_decided, had_windows = bool(self._failure), bool(self._windows)
         kept = []
@@ -127,17 +127,17 @@ class OverTime(Watch):
         else:
             self._failure = f"{how} at {seconds(at)}{since}" if self._is_always else f"{how} at its best{since}"
 
-    def finish(self, end: Nanos) -> Outcome:
+    def finish(self, end: Nanos) -> GoalOutcome:
         open_ones = [best for _, best, _ in self._windows]
         by = min([self._worst, *open_ones])
         robustness = by if math.isfinite(by) else None
         if not self._count:
-            return Outcome(met=False, says=f"{self._after!r} did not happen")
+            return GoalOutcome(met=False, says=f"{self._after!r} did not happen")
         for begin, best, at in self._windows:
             if self._was_never_told(best) or (best < 0 and not self._is_always):
                 self._fail(begin, best, at)
         says = self._failure or (f"by {by:.3g} {self._unit} at the least" if robustness is not None else "")
-        return Outcome(met=not self._failure, says=says, robustness=robustness, unit=self._unit)
+        return GoalOutcome(met=not self._failure, says=says, robustness=robustness, unit=self._unit)
 
 
 def bounds(table: Table) -> Margin:
@@ -169,7 +169,7 @@ class Happens(Watch):
         self._times: list[Nanos] = []
         self._is_decided = False
 
-    def feed(self, event: Event) -> Outcome | None:
+    def feed(self, event: Event) -> GoalOutcome | None:
         if any(self._events.taken(event)) and self._from <= event.t and (self._to is None or event.t <= self._to):
             self._times.append(event.t)
             count = len(self._times)
@@ -178,23 +178,23 @@ class Happens(Watch):
                 return self.finish(event.t)
         return None
 
-    def advance_to(self, limit: Nanos) -> Outcome | None:
+    def advance_to(self, limit: Nanos) -> GoalOutcome | None:
         if self._to is None or limit < self._to or self._is_decided:
             return None
         self._is_decided = True
         return self.finish(limit)
 
-    def finish(self, end: Nanos) -> Outcome:
+    def finish(self, end: Nanos) -> GoalOutcome:
         count, least = len(self._times), int(self._least)
         when = f", first at {seconds(self._times[0])}" if self._times else ""
         if count > self._most:
             allowed = f", {self._most:g} at most" if self._most else ""
-            return Outcome(met=False, says=f"{self._words!r} happened {count} time(s){when}{allowed}")
+            return GoalOutcome(met=False, says=f"{self._words!r} happened {count} time(s){when}{allowed}")
         if count < least:
             by = f" by {self._to / NS_PER_S:g} s" if self._to is not None else ""
-            return Outcome(met=False, says=f"{self._words!r} happened {count} time(s){by}{when}, {least} at least")
+            return GoalOutcome(met=False, says=f"{self._words!r} happened {count} time(s){by}{when}, {least} at least")
         left = None if self._to is None or not least else (self._to - self._times[least - 1]) / NS_PER_S
-        return Outcome(met=True, says=f"{count} time(s){when}", robustness=left, unit="s")
+        return GoalOutcome(met=True, says=f"{count} time(s){when}", robustness=left, unit="s")
 
 
 class InOrderOfEvents(Watch):
@@ -209,7 +209,7 @@ class InOrderOfEvents(Watch):
         self._place = 0
         self._last: Nanos = 0
 
-    def feed(self, event: Event) -> Outcome | None:
+    def feed(self, event: Event) -> GoalOutcome | None:
         taken = self._events.taken(event)
         if self._place == len(taken) or not taken[self._place]:
             return None
@@ -217,11 +217,11 @@ class InOrderOfEvents(Watch):
         self._last = event.t
         return self.finish(event.t) if self._place == len(taken) else None
 
-    def finish(self, end: Nanos) -> Outcome:
+    def finish(self, end: Nanos) -> GoalOutcome:
         if self._place == len(self._words):
-            return Outcome(met=True, says=f"the last at {seconds(self._last)}")
+            return GoalOutcome(met=True, says=f"the last at {seconds(self._last)}")
         before = f" after {self._words[self._place - 1]!r} at {seconds(self._last)}" if self._place else ""
-        return Outcome(met=False, says=f"{self._words[self._place]!r} did not happen{before}")
+        return GoalOutcome(met=False, says=f"{self._words[self._place]!r} did not happen{before}")
 
 
 class Latency(Watch):
@@ -240,7 +240,7 @@ class Latency(Watch):
         self._count = 0
         self._failure = ""
 
-    def feed(self, event: Event) -> Outcome | None:
+    def feed(self, event: Event) -> GoalOutcome | None:
         first, then = self._events.taken(event)
         outcome = self._late(event.t - 1)
         if then and self._since is not None:
@@ -258,7 +258,7 @@ class Latency(Watch):
             self._since = event.t
         return outcome
 
-    def advance_to(self, limit: Nanos) -> Outcome | None:
+    def advance_to(self, limit: Nanos) -> GoalOutcome | None:
         return self._late(limit)
 
     @property
@@ -266,21 +266,21 @@ class Latency(Watch):
         least = f"{self._least / NS_PER_S:g} to " if self._least else ""
         return f"{least}{self._most / NS_PER_S:g} s are allowed"
 
-    def _late(self, now: Nanos) -> Outcome | None:
+    def _late(self, now: Nanos) -> GoalOutcome | None:
         """Give up where all events up to `now` were fed and the last instant allowed is among them."""
         if self._failure or self._since is None or now < self._since + self._most:
             return None
         self._failure = f"{self._then!r} did not follow {self._first!r} at {seconds(self._since)}, {self._allowed}"
         return self.finish(now)
 
-    def finish(self, end: Nanos) -> Outcome:
+    def finish(self, end: Nanos) -> GoalOutcome:
         self._late(end)
         if self._failure:
             by = (self._most - self._worst[0]) / NS_PER_S if self._worst[0] > self._most else None
-            return Outcome(met=False, says=self._failure, robustness=by, unit="s")
+            return GoalOutcome(met=False, says=self._failure, robustness=by, unit="s")
         if not self._count:
             what = self._first if self._since is None else self._then
-            return Outcome(met=False, says=f"{what!r} did not happen")
+            return GoalOutcome(met=False, says=f"{what!r} did not happen")
         took, at = self._worst
         says = f"{self._count} times, at most {took / NS_PER_S:.6f} s (at {seconds(at)})"
-        return Outcome(met=True, says=says, robustness=(self._most - took) / NS_PER_S, unit="s")
+        return GoalOutcome(met=True, says=says, robustness=(self._most - took) / NS_PER_S, unit="s")

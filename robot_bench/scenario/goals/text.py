@@ -4,7 +4,7 @@ from typing import ClassVar
 
 from robot_bench.events.kinds import Event, Text
 from robot_bench.events.selection import Lines
-from robot_bench.scenario.goals.watch import Outcome, Watch
+from robot_bench.scenario.goals.watch import GoalOutcome, Watch
 from simbase.timing import Nanos
 
 
@@ -42,7 +42,7 @@ class InOrder(Printed):
         self._place = 0
         self._tail = b""
 
-    def feed(self, event: Event) -> Outcome | None:
+    def feed(self, event: Event) -> GoalOutcome | None:
         if not isinstance(event, Text) or self.read(event) is None:
             return None
         self._tail += event.data
@@ -56,9 +56,9 @@ class InOrder(Printed):
             self._tail = self._tail[at + len(wanted) :]
             self._place += 1
         self._tail = b""
-        return Outcome(met=True)
+        return GoalOutcome(met=True)
 
-    def finish(self, end: Nanos) -> Outcome:
+    def finish(self, end: Nanos) -> GoalOutcome:
         if self._place == len(self._texts):
-            return Outcome(met=True)
-        return Outcome(met=False, says=f"{self._texts[self._place]!r} {self._missing}; {self.last}")
+            return GoalOutcome(met=True)
+        return GoalOutcome(met=False, says=f"{self._texts[self._place]!r} {self._missing}; {self.last}")

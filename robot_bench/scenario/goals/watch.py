@@ -15,7 +15,7 @@ from simbase.timing import NS_PER_S, Nanos
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Outcome:
+class GoalOutcome:
     """What became of a goal.
 
     `robustness` is by how much it was met, in `unit`, negative where it was missed; None where there is no measure.
@@ -34,15 +34,15 @@ class Watch(Stateful):
     kinds: tuple[type, ...] = ()
     wires: tuple[str, ...] | None = None
 
-    def feed(self, event: Event) -> Outcome | None:
+    def feed(self, event: Event) -> GoalOutcome | None:
         """Take the next event in order of time; return what is decided by it, None where nothing is."""
         raise NotImplementedError
 
-    def advance_to(self, limit: Nanos) -> Outcome | None:
+    def advance_to(self, limit: Nanos) -> GoalOutcome | None:
         """Take notice that all events up to `limit` were fed; return what is decided by that."""
         return None
 
-    def finish(self, end: Nanos) -> Outcome:
+    def finish(self, end: Nanos) -> GoalOutcome:
         """Return what became of the goal in a run that ended at `end`.
 
         A run that was cut leaves open what was not decided until then: what holds so far may be missed later. So a

@@ -58,7 +58,7 @@ Node = tuple[str, Side]
 EN: Node = ("EN", Side.ESP32)
 
 
-class FaultKind(Enum):
+class WireFault(Enum):
     """What can be wrong with a wire."""
 
     OPEN = "open"
@@ -71,20 +71,20 @@ class FaultKind(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Fault:
+class BoardFault:
     """A fault of the board.
 
     `other` is the second wire of a short or a swap; `side` is where a short, a rail or an unsoldered pin is.
     """
 
-    kind: FaultKind
+    kind: WireFault
     wire: str
     other: str = ""
     side: Side = Side.BLUEPILL
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class VoltageSource:
     """A voltage behind a resistor, at a node."""
 
     volts: float
@@ -99,34 +99,34 @@ class Circuit:
         faults: What is wrong with them.
     """
 
-    def __init__(self, pinout: Pinout, faults: tuple[Fault, ...] = ()) -> None:
+    def __init__(self, pinout: Pinout, faults: tuple[BoardFault, ...] = ()) -> None:
         self._wires = pinout.wires
         self._links: list[tuple[Node, Node, float]] = []
-        self._fixed: dict[Node, list[Source]] = {EN: [Source(RAIL_V, EN_PULL_OHM)]}
+        self._fixed: dict[Node, list[VoltageSource]] = {EN: [VoltageSource(RAIL_V, EN_PULL_OHM)]}
         #: Pads that are not soldered: they float, or follow their chip's own pull.
         self._loose: set[Node] = set()
         self._reset = next(wire.name for wire in pinout.wires if wire.role is WireRole.RESET)
         ends = {wire.name: wire.name for wire in pinout.wires}
         is_open = set()
         for fault in faults:
-            if fault.kind is FaultKind.SWAPPED:
+            if fault.kind is WireFault.SWAPPED:
                 ends[fault.wire], ends[fault.other] = ends[fault.other], ends[fault.wire]
-            elif fault.kind is FaultKind.OPEN:
+            elif fault.kind is WireFault.OPEN:
                 is_open.add(fault.wire)
-            elif fault.kind is FaultKind.UNSOLDERED:
+            elif fault.kind is WireFault.UNSOLDERED:
                 self._loose.add((fault.wire, fault.side))
-            elif fault.kind is FaultKind.SHORT:
+            elif fault.kind is WireFault.SHORT:
                 other = EN if fault.other == "EN" else (fault.other, fault.side)
                 self._links.append(((fault.wire, fault.side), other, SHORT_OHM))
             else:
-                volts = RAIL_V if fault.kind is FaultKind.RAIL else 0.0
-                self._fixed.setdefault((fault.wire, fault.side), []).append(Source(volts, SHORT_OHM))
+                volts = RAIL_V if fault.kind is WireFault.RAIL else 0.0
+                self._fixed.setdefault((fault.wire, fault.side), []).append(VoltageSource(volts, SHORT_OHM))
         for wire in pinout.wires:
             self._place(wire, ends[wire.name], is_open=wire.name in is_open)
         self._groups = self._joined()
         self._group_of = {node: number for number, group in enumerate(self._groups) for node in group}
         #: What a group's nodes have by what drives them.
-        self._known: dict[tuple[int, tuple[tuple[Node, Source], ...]], dict[Node, float]] = {}
+        self._known: dict[tuple[int, tuple[tuple[Node, VoltageSource], ...]], dict[Node, float]] = {}
         #: What they have while nothing drives any.
         self._alone = {node: volts for group in self._groups for node, volts in self._solve_group(group, {}).items()}
 
@@ -139,7 +139,7 @@ class Circuit:
         if wire.pull is not Pull.NONE:
             volts = RAIL_V if wire.pull is Pull.UP else 0.0
             ohm = BASE_PULL_OHM if is_reset else PULL_OHM
-            self._fixed.setdefault((wire.name, Side.ESP32), []).append(Source(volts, ohm))
+            self._fixed.setdefault((wire.name, Side.ESP32), []).append(VoltageSource(volts, ohm))
 
     def _joined(self) -> list[list[Node]]:
         """Return the nodes that resistors join, in groups."""
@@ -154,20 +154,20 @@ class Circuit:
                     group_of[node] = group_of[one]
         return list({id(group): group for group in group_of.values()}.values())
 
-    def volts(self, drives: Mapping[Node, Source]) -> dict[Node, float]:
+    def volts(self, drives: Mapping[Node, VoltageSource]) -> dict[Node, float]:
         """Return each pad's voltage, and that of EN, while the chips put `drives` on their pads."""
         result = self._solve({node: [source] for node, source in drives.items() if node not in self._loose})
         if result[self._reset, Side.ESP32] > BASE_ON_V:
             on = {node: [source] for node, source in drives.items() if node not in self._loose}
-            on.setdefault(EN, []).append(Source(0.0, TRANSISTOR_OHM))
+            on.setdefault(EN, []).append(VoltageSource(0.0, TRANSISTOR_OHM))
             result |= {node: volts for node, volts in self._solve(on).items() if node != (self._reset, Side.ESP32)}
         for node in self._loose:
             source = drives.get(node)
             result[node] = RAIL_V / 2 if source is None else source.volts
         return result
 
-    def _solve(self, drives: Mapping[Node, list[Source]]) -> dict[Node, float]:
-        result, driven = dict(self._alone), dict[int, list[tuple[Node, Source]]]()
+    def _solve(self, drives: Mapping[Node, list[VoltageSource]]) -> dict[Node, float]:
+        result, driven = dict(self._alone), dict[int, list[tuple[Node, VoltageSource]]]()
         for node, sources in drives.items():
             driven.setdefault(self._group_of[node], []).extend((node, source) for source in sources)
         for number, pairs in driven.items():
@@ -177,7 +177,7 @@ class Circuit:
             result |= self._known[key]
         return result
 
-    def _solve_group(self, group: list[Node], drives: Mapping[Node, list[Source]]) -> dict[Node, float]:
+    def _solve_group(self, group: list[Node], drives: Mapping[Node, list[VoltageSource]]) -> dict[Node, float]:
         led = next((node for node in group if node[1] is Side.BLUEPILL and self._is_led(node[0])), None)
         volts = self._nodal(group, drives, None)
         # The LED conducts only where the pad is lower than its rail by the diode's voltage.
@@ -186,7 +186,9 @@ class Circuit:
     def _is_led(self, name: str) -> bool:
         return any(wire.name == name and wire.bluepill == LED_PIN for wire in self._wires)
 
-    def _nodal(self, group: list[Node], drives: Mapping[Node, list[Source]], led: Node | None) -> dict[Node, float]:
+    def _nodal(
+        self, group: list[Node], drives: Mapping[Node, list[VoltageSource]], led: Node | None
+    ) -> dict[Node, float]:
         """Solve the group's currents; a node that nothing holds stands half-way."""
         place = {node: number for number, node in enumerate(group)}
         size = len(group)
@@ -197,7 +199,7 @@ class Circuit:
         for node in group:
             sources = [*self._fixed.get(node, ()), *drives.get(node, ())]
             if node == led:
-                sources.append(Source(RAIL_V - LED_V, LED_OHM))
+                sources.append(VoltageSource(RAIL_V - LED_V, LED_OHM))
             for source in sources:
                 rows[place[node]][place[node]] += 1 / source.ohm
                 rows[place[node]][size] += source.volts / source.ohm

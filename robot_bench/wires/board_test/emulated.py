@@ -23,14 +23,14 @@ from robot_bench.wires.board_test.circuit import (
     ESP32_PULL_OHM,
     OUTPUT_OHM,
     RAIL_V,
+    BoardFault,
     Circuit,
-    Fault,
     InputLimits,
     Node,
     Side,
-    Source,
+    VoltageSource,
 )
-from robot_bench.wires.board_test.ends import AdapterEnd, BluePillEnd, Line
+from robot_bench.wires.board_test.ends import AdapterEnd, BluePillEnd, ConsoleLine
 from robot_bench.wires.board_test.esp32 import CONSOLE, ROBOT, Esp32, library_path
 from robot_bench.wires.chip_pins import number_of
 from simbase.timing import NS_PER_MS, NS_PER_US, Reason
@@ -44,10 +44,10 @@ STEP_MS = 8
 _PIN_DRIVES = tuple(PinDrive)
 #: The chip's own drives as sources; one that lets go has none.
 _SOURCES = {
-    PinDrive.LOW: Source(0.0, OUTPUT_OHM),
-    PinDrive.HIGH: Source(RAIL_V, OUTPUT_OHM),
-    PinDrive.PULL_UP: Source(RAIL_V, BLUEPILL_PULL_OHM),
-    PinDrive.PULL_DOWN: Source(0.0, BLUEPILL_PULL_OHM),
+    PinDrive.LOW: VoltageSource(0.0, OUTPUT_OHM),
+    PinDrive.HIGH: VoltageSource(RAIL_V, OUTPUT_OHM),
+    PinDrive.PULL_UP: VoltageSource(RAIL_V, BLUEPILL_PULL_OHM),
+    PinDrive.PULL_DOWN: VoltageSource(0.0, BLUEPILL_PULL_OHM),
 }
 
 
@@ -63,7 +63,7 @@ class EmulatedBoard:
 
     def __init__(
         self,
-        faults: tuple[Fault, ...] = (),
+        faults: tuple[BoardFault, ...] = (),
         *,
         has_loop_plug: bool = True,
         between: bool = False,
@@ -105,7 +105,7 @@ class EmulatedBoard:
     @property
     def adapter_end(self) -> AdapterEnd:
         """Return the ESP32's console."""
-        line: Line = _EmulatedLine(
+        line: ConsoleLine = _EmulatedLine(
             self, lambda data: self.esp32.receive(CONSOLE, data), lambda: self.esp32.sent(CONSOLE)
         )
         return AdapterEnd(line, self.pinout)
@@ -137,18 +137,18 @@ class EmulatedBoard:
         if key == self._seen:
             return self._volts
         self._seen = key
-        drives: dict[Node, Source] = {
+        drives: dict[Node, VoltageSource] = {
             (name, Side.BLUEPILL): _SOURCES[drive] for name, drive in self._drives.items() if drive in _SOURCES
         }
         # Its enable is pulled up: it drives where the program pulls it low, and then all its wires together.
         if self._shifted and state.driven >> self._shift_enable & 1 and not state.out >> self._shift_enable & 1:
             for name, output in self._shifted.items():
-                drives[name, Side.ESP32] = Source(RAIL_V if state.shifted >> output & 1 else 0.0, OUTPUT_OHM)
+                drives[name, Side.ESP32] = VoltageSource(RAIL_V if state.shifted >> output & 1 else 0.0, OUTPUT_OHM)
         for name, pad in self._pads.items():
             if state.driven >> pad & 1:
-                drives[name, Side.ESP32] = Source(RAIL_V if state.out >> pad & 1 else 0.0, OUTPUT_OHM)
+                drives[name, Side.ESP32] = VoltageSource(RAIL_V if state.out >> pad & 1 else 0.0, OUTPUT_OHM)
             elif (state.pulled_up | state.pulled_down) >> pad & 1:
-                drives[name, Side.ESP32] = Source(RAIL_V if state.pulled_up >> pad & 1 else 0.0, ESP32_PULL_OHM)
+                drives[name, Side.ESP32] = VoltageSource(RAIL_V if state.pulled_up >> pad & 1 else 0.0, ESP32_PULL_OHM)
         self._volts = self._circuit.volts(drives)
         levels = 0
         for name, pad in self._pads.items():
@@ -183,7 +183,7 @@ class _EmulatedLine:
         self._board, self._send, self._read = board, send, read
 
     def ask(self, line: str, prefix: str) -> str | None:
-        """Send a line and wait for its answer; see `Line`."""
+        """Send a line and wait for its answer; see `ConsoleLine`."""
         self._read()
         self._send(f"{line}\n".encode())
         said = b""

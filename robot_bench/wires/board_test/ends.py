@@ -9,7 +9,7 @@ Invariant: None stands for silence, and is no error here: a module that is held 
 from dataclasses import dataclass
 from typing import Protocol
 
-from adapter_sim.pinout import Direction, Pinout, WireRole
+from adapter_sim.pinout import Pinout, WireDirection, WireRole
 from p2os.errors import P2osError
 
 #: Who answers, in which version, and before what.
@@ -22,14 +22,14 @@ class BoardTestError(P2osError):
     exit_code = 1
 
 
-class Line(Protocol):
+class ConsoleLine(Protocol):
     """A console: a line out, the line that answers it back."""
 
     def ask(self, line: str, prefix: str) -> str | None:
         """Send a line; return the first line after it that begins with `prefix`, None where none came in time."""
 
 
-def wires_of(pinout: Pinout, direction: Direction) -> tuple[int, ...]:
+def wires_of(pinout: Pinout, direction: WireDirection) -> tuple[int, ...]:
     """Return the places of those wires that one side drives, but for rst."""
     return tuple(
         place
@@ -39,7 +39,7 @@ def wires_of(pinout: Pinout, direction: Direction) -> tuple[int, ...]:
 
 
 @dataclass(frozen=True, slots=True)
-class PadReport:
+class HeardPad:
     """What the adapter has heard of its game pad."""
 
     #: Since the adapter began; None: its firmware has no pad.
@@ -50,7 +50,7 @@ class PadReport:
 class BluePillEnd:
     """The BluePill with its test program."""
 
-    def __init__(self, line: Line) -> None:
+    def __init__(self, line: ConsoleLine) -> None:
         self._line = line
 
     def greet(self) -> int | None:
@@ -79,10 +79,10 @@ class BluePillEnd:
 class AdapterEnd:
     """The ESP32 with the adapter's firmware, at its console."""
 
-    def __init__(self, line: Line, pinout: Pinout) -> None:
+    def __init__(self, line: ConsoleLine, pinout: Pinout) -> None:
         self._line = line
-        self._outputs = wires_of(pinout, Direction.TO_BLUEPILL)
-        self._inputs = wires_of(pinout, Direction.TO_ADAPTER)
+        self._outputs = wires_of(pinout, WireDirection.TO_BLUEPILL)
+        self._inputs = wires_of(pinout, WireDirection.TO_ADAPTER)
 
     def begin(self) -> str | None:
         """Take the hardware from the adapter; return why its program had begun."""
@@ -120,10 +120,10 @@ class AdapterEnd:
         answer = self._line.ask("link", "link")
         return bytes.fromhex((answer or "").removeprefix("link"))
 
-    def pad(self) -> PadReport | None:
+    def pad(self) -> HeardPad | None:
         """Return what it has heard of a game pad."""
         answer = self._line.ask("pad", "pad ")
         if answer is None or answer == "pad none":
-            return None if answer is None else PadReport(None, "")
+            return None if answer is None else HeardPad(None, "")
         words = answer.split()
-        return PadReport(int(words[1]), " ".join(words[2:]))
+        return HeardPad(int(words[1]), " ".join(words[2:]))

@@ -12,7 +12,7 @@ Invariant: what is measured does not depend on the wires measured before it.
 
 from dataclasses import dataclass, field
 
-from adapter_sim.pinout import Direction, Pinout, WireRole
+from adapter_sim.pinout import Pinout, WireDirection, WireRole
 from robot_bench.wires.board_test.ends import AdapterEnd, BluePillEnd, BoardTestError
 
 GREETINGS = 3
@@ -43,7 +43,7 @@ class Response:
 
 
 @dataclass(slots=True)
-class Measurement:
+class BoardMeasurement:
     """All that was measured of a board."""
 
     #: None where the adapter is silent from the start.
@@ -60,7 +60,7 @@ class Measurement:
     has_pad: bool = False
 
 
-class Walk:
+class BoardWalk:
     """Walks through a board.
 
     Args:
@@ -74,7 +74,7 @@ class Walk:
         self._adapter = adapter
         self._wires = pinout.wires
 
-    def measure(self) -> Measurement:
+    def measure(self) -> BoardMeasurement:
         """Walk through wires, line and pad; both modules have let go of every wire at the end.
 
         Raises:
@@ -88,7 +88,7 @@ class Walk:
                 hint="is board_test.elf flashed, and PA9 at the RX of its port? 57600 baud",
             )
         idle = self._read_bluepill()
-        result = Measurement(
+        result = BoardMeasurement(
             started_by=self._begin(tries=2),
             csr=csr,
             has_crystal=bool(self._bluepill.has_crystal()),
@@ -105,7 +105,7 @@ class Walk:
             self._adapter.end()
         return result
 
-    def _measure_wires(self, result: Measurement) -> None:
+    def _measure_wires(self, result: BoardMeasurement) -> None:
         for place, wire in enumerate(self._wires):
             if wire.role is not WireRole.RESET:
                 response = self._drive(place, wire.direction)
@@ -122,17 +122,17 @@ class Walk:
                 if response.silent_at != {True}:
                     self._ask_again(place, wire.direction, response)
 
-    def _drive(self, place: int, direction: Direction) -> Response:
+    def _drive(self, place: int, direction: WireDirection) -> Response:
         """Drive a wire low and high, and compare every pad."""
         response = Response()
-        if direction is Direction.TO_ADAPTER:
+        if direction is WireDirection.TO_ADAPTER:
             response.held_at = self._rail_at(place)
             if response.held_at is not None:
                 response.near_wrong.add(not response.held_at)
                 return response
         seen: dict[bool, tuple[int, int | None]] = {}
         for level in (False, True):
-            if direction is Direction.TO_BLUEPILL:
+            if direction is WireDirection.TO_BLUEPILL:
                 is_there = self._adapter.hold(1 << place, level << place)
                 near = self._read_bluepill(levels=(not level) << place, pulled=1 << place)
             else:
@@ -148,20 +148,20 @@ class Walk:
         if low[1] is not None and high[1] is not None:
             response.adapter = ~low[1] & high[1]
         for level, (bluepill, adapter) in seen.items():
-            ends = (adapter, bluepill) if direction is Direction.TO_BLUEPILL else (bluepill, adapter)
+            ends = (adapter, bluepill) if direction is WireDirection.TO_BLUEPILL else (bluepill, adapter)
             for word, wrong in zip(ends, (response.near_wrong, response.far_wrong), strict=True):
                 if word is None or bool(word >> place & 1) is not level:
                     wrong.add(level)
         return response
 
-    def _ask_again(self, place: int, direction: Direction, response: Response) -> None:
+    def _ask_again(self, place: int, direction: WireDirection, response: Response) -> None:
         """Ask the pad at the BluePill's end whether a rail holds it, and what its own pulls make of it."""
-        if direction is Direction.TO_BLUEPILL:
+        if direction is WireDirection.TO_BLUEPILL:
             response.held_at = self._rail_at(place)
         for level in (False, True):
             word = self._read_bluepill(levels=level << place, pulled=1 << place)
             response.pulled[level] = bool(word >> place & 1)
-        self._let_go(was_silent=direction is Direction.TO_ADAPTER and bool(response.silent_at))
+        self._let_go(was_silent=direction is WireDirection.TO_ADAPTER and bool(response.silent_at))
 
     def _rail_at(self, place: int) -> bool | None:
         """Return the level that a BluePill's pad keeps against its own driver; None where it follows."""
@@ -172,7 +172,7 @@ class Walk:
         ]
         return not wrong[0] if len(wrong) == 1 else None
 
-    def _measure_line(self, result: Measurement) -> None:
+    def _measure_line(self, result: BoardMeasurement) -> None:
         self._adapter.received()
         self._adapter.send(PATTERN)
         result.link = b""

@@ -9,7 +9,7 @@ import pytest
 from bluepill_sim.analysis.coverage import Coverage
 from bluepill_sim.analysis.cycle_profile import ASLEEP, CycleProfile
 from bluepill_sim.analysis.flame_graph import flame_svg
-from bluepill_sim.analysis.latency import Latency
+from bluepill_sim.analysis.latency import LatencyProbe
 from bluepill_sim.analysis.observation import HANDLER_LEFT, BlockWalk, Observation
 from bluepill_sim.analysis.stack import StackGauge
 from bluepill_sim.board import BluePill
@@ -31,7 +31,7 @@ def observed(machine, us=100, **options):
     code = StaticCode(machine.board.chip.memory)
     coverage = Coverage(machine.image, LineTable(), code)
     profile = CycleProfile(FunctionTable(machine.image), code)
-    latency = Latency(machine.board)
+    latency = LatencyProbe(machine.board)
     with Observation(machine.board, [coverage, profile, latency]):
         machine.run(us, **options)
     latency.detach()

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bluepill_sim.__main__ import run
-from bluepill_sim.analysis.silicon.comparison import Model, Row, Verdict, ask_model, compare
+from bluepill_sim.analysis.silicon.comparison import ComparedNumber, Model, NumberVerdict, ask_model, compare
 from bluepill_sim.analysis.silicon.log import HEAD, SiliconLog, SiliconLogError, read_log
 from bluepill_sim.peripherals.rcc import Rcc
 
@@ -27,8 +27,8 @@ def printed(log: SiliconLog) -> bytes:
     return "\n".join([*lines, f"end {len(lines):08x} {checksum:08x}", ""]).encode()
 
 
-def differing(log: SiliconLog, model: Model) -> list[Row]:
-    return [row for row in compare(log, model) if row.verdict is not Verdict.SAME]
+def differing(log: SiliconLog, model: Model) -> list[ComparedNumber]:
+    return [row for row in compare(log, model) if row.verdict is not NumberVerdict.SAME]
 
 
 def test_the_model_says_of_itself_what_its_tables_say(model: Model) -> None:
@@ -61,44 +61,46 @@ def test_a_measurement_that_was_published_is_beside_the_model(model: Model) -> N
 @pytest.mark.parametrize(
     ("address", "bits", "verdict"),
     [
-        (0x4002_1000, 0x0000_0008, Verdict.ALLOWED),
-        (0x4002_1000, 0x0000_8000, Verdict.ALLOWED),
-        (0x4002_1000, 0x0000_0004, Verdict.DIFFERS),
-        (0x4002_1000, 0x0001_0000, Verdict.DIFFERS),
-        (0x4001_0808, 0x0000_8001, Verdict.ALLOWED),
-        (0x4001_0800, 0x0000_0001, Verdict.DIFFERS),
-        (0xE004_2000, 0x2003_6410, Verdict.ALLOWED),
-        (0x1FFF_F7E0, 0x0000_0040, Verdict.DIFFERS),
+        (0x4002_1000, 0x0000_0008, NumberVerdict.ALLOWED),
+        (0x4002_1000, 0x0000_8000, NumberVerdict.ALLOWED),
+        (0x4002_1000, 0x0000_0004, NumberVerdict.DIFFERS),
+        (0x4002_1000, 0x0001_0000, NumberVerdict.DIFFERS),
+        (0x4001_0808, 0x0000_8001, NumberVerdict.ALLOWED),
+        (0x4001_0800, 0x0000_0001, NumberVerdict.DIFFERS),
+        (0xE004_2000, 0x2003_6410, NumberVerdict.ALLOWED),
+        (0x1FFF_F7E0, 0x0000_0040, NumberVerdict.DIFFERS),
     ],
 )
-def test_a_register_may_differ_where_there_is_a_reason(model: Model, address: int, bits: int, verdict: Verdict) -> None:
+def test_a_register_may_differ_where_there_is_a_reason(
+    model: Model, address: int, bits: int, verdict: NumberVerdict
+) -> None:
     other = SiliconLog({**model.log.registers, address: model.log.registers[address] ^ bits}, model.log.numbers)
     found = differing(other, model)
     assert [row.verdict for row in found] == [verdict]
-    assert bool(found[0].reason) is (verdict is Verdict.ALLOWED)
+    assert bool(found[0].reason) is (verdict is NumberVerdict.ALLOWED)
 
 
 @pytest.mark.parametrize(
     ("kind", "name", "value", "verdict"),
     [
-        ("tim", "flash_erase_page", 1_440_000 - 1, Verdict.DIFFERS),
-        ("tim", "flash_erase_page", 2_880_000, Verdict.ALLOWED),
-        ("tim", "flash_program", 5_041, Verdict.DIFFERS),
-        ("tim", "lsi_400_periods", 480_000, Verdict.ALLOWED),
-        ("tim", "lsi_400_periods", 960_001, Verdict.DIFFERS),
-        ("sram", "k_nop", 65, Verdict.DIFFERS),
-        ("flag", "usart_sr_idle", 0x40, Verdict.DIFFERS),
+        ("tim", "flash_erase_page", 1_440_000 - 1, NumberVerdict.DIFFERS),
+        ("tim", "flash_erase_page", 2_880_000, NumberVerdict.ALLOWED),
+        ("tim", "flash_program", 5_041, NumberVerdict.DIFFERS),
+        ("tim", "lsi_400_periods", 480_000, NumberVerdict.ALLOWED),
+        ("tim", "lsi_400_periods", 960_001, NumberVerdict.DIFFERS),
+        ("sram", "k_nop", 65, NumberVerdict.DIFFERS),
+        ("flag", "usart_sr_idle", 0x40, NumberVerdict.DIFFERS),
     ],
 )
 def test_a_number_may_differ_as_far_as_its_range_goes(
-    model: Model, kind: str, name: str, value: int, verdict: Verdict
+    model: Model, kind: str, name: str, value: int, verdict: NumberVerdict
 ) -> None:
     other = SiliconLog(model.log.registers, {**model.log.numbers, (kind, name): value})
     assert [(row.name, row.verdict) for row in differing(other, model)] == [(name, verdict)]
 
 
-@pytest.mark.parametrize(("apart", "verdict"), [(0, Verdict.ALLOWED), (1, Verdict.DIFFERS)])
-def test_a_time_may_differ_by_a_fiftieth(model: Model, apart: int, verdict: Verdict) -> None:
+@pytest.mark.parametrize(("apart", "verdict"), [(0, NumberVerdict.ALLOWED), (1, NumberVerdict.DIFFERS)])
+def test_a_time_may_differ_by_a_fiftieth(model: Model, apart: int, verdict: NumberVerdict) -> None:
     ours = model.log.numbers["tim", "tim2_10_periods"]
     for value in (ours + ours // 50 + apart, ours - ours // 50 - apart):
         other = SiliconLog(model.log.registers, {**model.log.numbers, ("tim", "tim2_10_periods"): value})
@@ -110,7 +112,10 @@ def test_a_number_that_only_one_of_them_has_is_told(model: Model) -> None:
     del numbers["irq", "exit"]
     numbers["irq", "later"] = 5
     found = differing(SiliconLog(model.log.registers, numbers), model)
-    assert [(row.name, row.verdict) for row in found] == [("exit", Verdict.MISSING), ("later", Verdict.MISSING)]
+    assert [(row.name, row.verdict) for row in found] == [
+        ("exit", NumberVerdict.MISSING),
+        ("later", NumberVerdict.MISSING),
+    ]
 
 
 SHORT = printed(SiliconLog({0x4002_1000: 0x83}, {("sram", "k_nop"): 64, ("tim", "adc_1_5"): 100}))

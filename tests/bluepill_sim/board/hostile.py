@@ -11,7 +11,7 @@ import random
 import struct
 from typing import Any
 
-from bluepill_sim.fabric.signals import Oscillation, Shape
+from bluepill_sim.fabric.signals import Oscillation, Waveform
 from bluepill_sim.fabric.subscriptions import EDGE, Of
 from bluepill_sim.parts import CanFrame, CanNetwork, CanNode, Eeprom24C02
 from bluepill_sim.peripherals.spi import Loopback
@@ -191,7 +191,7 @@ class Story:
             rng.choice((board.usart1, board.usart2, board.usart3)).receive(rng.randbytes(rng.randrange(1, 5)))
         elif kind == 6:
             volts: Any = rng.choice(
-                (1.1, Oscillation(shape=Shape.SINE, low_v=0.1, high_v=3.0, period_ns=rng.randrange(1000, MS)))
+                (1.1, Oscillation(shape=Waveform.SINE, low_v=0.1, high_v=3.0, period_ns=rng.randrange(1000, MS)))
             )
             board.pin(f"PA{rng.randrange(8)}").set_volts(volts)
         elif kind == 7:

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from bluepill_sim.fabric.low_power import Mode
+from bluepill_sim.fabric.low_power import PowerMode
 from bluepill_sim.peripherals.flash import DELIVERED, MASS_ERASE_NS, PAGE_ERASE_NS, PROGRAM_NS
 from bluepill_sim.peripherals.rcc import ResetCause
 
@@ -239,7 +239,7 @@ def test_the_option_bytes_make_a_reset_of_stop_or_standby(make: Any, bit: int, c
     machine.run(20)
     assert dict(board.resets) == {ResetCause.LOW_POWER: 1}
     assert board.chip.parts.rcc.read(0x24, 4) >> 31 == 1
-    assert board.chip.low_power.mode in {Mode.RUN, Mode.ENTERING}  # the next round
+    assert board.chip.low_power.mode in {PowerMode.RUN, PowerMode.ENTERING}  # the next round
 
 
 NMI_PROGRAM = (
@@ -279,11 +279,11 @@ def test_without_css_the_core_stands_until_a_reset_and_iwdg_brings_one(make: Any
     board.crystal_works = False
     machine.run(1000)
     assert len(machine.log) == logged
-    assert board.chip.low_power.mode is Mode.UNCLOCKED
+    assert board.chip.low_power.mode is PowerMode.UNCLOCKED
     board.crystal_works = True
     board.advance_to(420_000_000)
     assert dict(board.resets) == {ResetCause.IWDG: 1}
-    assert board.chip.low_power.mode is Mode.RUN
+    assert board.chip.low_power.mode is PowerMode.RUN
 
 
 def test_a_net_sees_the_edges_of_mco(make: Any) -> None:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from bluepill_sim.core import Register
+from bluepill_sim.core import Reg
 from bluepill_sim.extension.library import library_path
 from tests.bluepill_sim.machine import STACK
 
@@ -251,7 +251,7 @@ def test_a_debugger_changes_nothing_where_a_request_ends_a_block(
             if chip.engine.pc == stop and not chip.processor.nvic.pending:
                 break
         registers = chip.engine.registers
-        ends.append((chip.engine.pc == stop, chip.engine.cycle, registers[Register.R5], registers[Register.R6]))
+        ends.append((chip.engine.pc == stop, chip.engine.cycle, registers[Reg.R5], registers[Reg.R6]))
         assert len(seen) == len(set(seen)), "each step gets somewhere"
     assert ends[0] == ends[1] == ends[2]
     assert ends[0][2:] == (3, 3)

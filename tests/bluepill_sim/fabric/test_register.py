@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bluepill_sim.fabric.registers import WORD, BitField, Peripheral, Place, Register, bits
+from bluepill_sim.fabric.registers import WORD, BitField, Peripheral, PeripheralMapping, Register, bits
 from bluepill_sim.peripherals.usart import Usart
 from bluepill_sim.stm32f103 import PERIPHERALS
 
@@ -151,7 +151,7 @@ class ByteToy(Toy):
 
 
 def toy(make: type[Toy], chip: Any) -> Toy:
-    return make(chip, Place(name="TOY", base=0))
+    return make(chip, PeripheralMapping(name="TOY", base=0))
 
 
 def test_reads_of_any_width_are_slices_of_the_word(fake_chip: Any) -> None:

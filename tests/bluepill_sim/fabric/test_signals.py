@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bluepill_sim.fabric.signals import Oscillation, Samples, Shape
+from bluepill_sim.fabric.signals import Oscillation, Samples, Waveform
 
 VOLTS = st.one_of(st.integers(-1_000_000, 5_000_000).map(lambda uv: uv / 1e6), st.sampled_from([-999.9, 999.9]))
 QUICK = settings(max_examples=80)
@@ -18,22 +18,22 @@ def expected(one: Oscillation, at_ns: int) -> float:
     part = (at_ns + one.phase_ns) % one.period_ns / one.period_ns
     high_ns = one.period_ns // 2 if one.high_ns is None else one.high_ns
     share = {
-        Shape.SINE: (1 + math.sin(2 * math.pi * part)) / 2,
-        Shape.TRIANGLE: 2 * part if part < 0.5 else 2 - 2 * part,
-        Shape.SAWTOOTH: part,
-        Shape.SQUARE: float((at_ns + one.phase_ns) % one.period_ns < high_ns),
+        Waveform.SINE: (1 + math.sin(2 * math.pi * part)) / 2,
+        Waveform.TRIANGLE: 2 * part if part < 0.5 else 2 - 2 * part,
+        Waveform.SAWTOOTH: part,
+        Waveform.SQUARE: float((at_ns + one.phase_ns) % one.period_ns < high_ns),
     }[one.shape]
     return one.low_v + (one.high_v - one.low_v) * share
 
 
 @QUICK
 @given(
-    shape=st.sampled_from(list(Shape)), low=VOLTS, high=VOLTS, period=st.integers(1, 10**10),
+    shape=st.sampled_from(list(Waveform)), low=VOLTS, high=VOLTS, period=st.integers(1, 10**10),
     phase=st.integers(0, 10**10), start=st.integers(0, 10**12),
     after=st.integers(0, 10**12), share=st.none() | st.integers(0, 10),
 )  # fmt: skip
 def test_an_oscillation_is_what_it_is_called(
-    make_fake_chip: Callable[[], Any], shape: Shape, low: float, high: float, period: int, phase: int, start: int,
+    make_fake_chip: Callable[[], Any], shape: Waveform, low: float, high: float, period: int, phase: int, start: int,
     after: int, share: int | None,
 ) -> None:  # fmt: skip
     chip = make_fake_chip()
@@ -83,7 +83,7 @@ def test_every_pin_has_its_channel_and_a_constant_has_a_level(fake_chip: Any) ->
     "volts",
     [
         5.0,
-        Oscillation(shape=Shape.SINE, low_v=3.7, high_v=-1, period_ns=9),
+        Oscillation(shape=Waveform.SINE, low_v=3.7, high_v=-1, period_ns=9),
         Samples(volts=(0.0, 3.7, 1.0), interval_ns=1),
     ],
 )
@@ -92,7 +92,7 @@ def test_more_volts_than_the_pin_bears_are_warned_of(fake_chip: Any, volts: Any)
     assert list(fake_chip.warnings) == ["PA0:volts"]
 
 
-SINE = Oscillation(shape=Shape.SINE, low_v=0, high_v=1, period_ns=10)
+SINE = Oscillation(shape=Waveform.SINE, low_v=0, high_v=1, period_ns=10)
 
 
 @pytest.mark.parametrize("volts", [math.nan, math.inf, 1000, -1000.0])
@@ -110,10 +110,10 @@ def test_a_signal_on_a_pin_without_an_adc_is_refused(fake_chip: Any, name: str) 
 @pytest.mark.parametrize(
     "make",
     [
-        lambda: Oscillation(shape=Shape.SINE, low_v=0, high_v=1, period_ns=0),
-        lambda: Oscillation(shape=Shape.SINE, low_v=0, high_v=1, period_ns=10, phase_ns=10),
-        lambda: Oscillation(shape=Shape.SQUARE, low_v=0, high_v=1, period_ns=10, high_ns=11),
-        lambda: Oscillation(shape=Shape.SINE, low_v=0, high_v=math.nan, period_ns=10),
+        lambda: Oscillation(shape=Waveform.SINE, low_v=0, high_v=1, period_ns=0),
+        lambda: Oscillation(shape=Waveform.SINE, low_v=0, high_v=1, period_ns=10, phase_ns=10),
+        lambda: Oscillation(shape=Waveform.SQUARE, low_v=0, high_v=1, period_ns=10, high_ns=11),
+        lambda: Oscillation(shape=Waveform.SINE, low_v=0, high_v=math.nan, period_ns=10),
         lambda: Samples(volts=(), interval_ns=1),
         lambda: Samples(volts=(1.0,), interval_ns=0),
         lambda: Samples(volts=(1.0, math.inf), interval_ns=1),

@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from bluepill_sim import BluePill
-from bluepill_sim.fabric.signals import Oscillation, Samples, Shape
+from bluepill_sim.fabric.signals import Oscillation, Samples, Waveform
 from tests.tools.examples import EXAMPLES
 
 ANALOG = str(EXAMPLES / "analog.elf")
@@ -19,7 +19,7 @@ def board(core: str) -> BluePill:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("P2OS_CORE", core)
         made = BluePill(ANALOG)
-    made.pin("PA0").set_volts(Oscillation(shape=Shape.SINE, low_v=0, high_v=3.3, period_ns=77_777))
+    made.pin("PA0").set_volts(Oscillation(shape=Waveform.SINE, low_v=0, high_v=3.3, period_ns=77_777))
     made.pin("PA5").set_volts(Samples(volts=(0.5, 2.5, 1.0), interval_ns=33_333, is_repeated=True))
     return made
 

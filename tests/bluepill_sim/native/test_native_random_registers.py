@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from bluepill_sim import BluePill
-from bluepill_sim.fabric.signals import Oscillation, Shape
+from bluepill_sim.fabric.signals import Oscillation, Waveform
 from bluepill_sim.stm32f103 import BASES
 from tests.bluepill_sim.machine import Machine
 
@@ -90,7 +90,7 @@ def board(core: str, table: bytes) -> BluePill:
         patch.setenv("P2OS_CORE", core)
         made = Machine(PROGRAM, VECTORS).board
     made.chip.memory.write(TABLE, table)
-    made.pin("PA0").set_volts(Oscillation(shape=Shape.TRIANGLE, low_v=0, high_v=3.3, period_ns=300_000))
+    made.pin("PA0").set_volts(Oscillation(shape=Waveform.TRIANGLE, low_v=0, high_v=3.3, period_ns=300_000))
     return made
 
 

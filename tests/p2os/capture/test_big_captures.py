@@ -11,7 +11,7 @@ from p2os.capture import Chunk, Direction, Reading, open_capture, rows_of, write
 from p2os.capture.chunks import capture_of
 from p2os.capture.formats.sources import BLOCK_BYTES
 from p2os.capture.sips import sips_of
-from p2os.capture.table import FIRST_ROWS, Table, tables_of_sips, write_csv
+from p2os.capture.table import FIRST_ROWS, CaptureTable, tables_of_sips, write_csv
 from p2os.cli.captures.reading import LOOKED_AT_BYTES, reading_of
 from p2os.cli.main import run
 from p2os.protocol.packets import SonarReading, StandardSip, packet_frame
@@ -96,7 +96,7 @@ def test_tables_come_while_chunks_are_read(by_columns: bool) -> None:
     assert passed == count
 
 
-def late(first: bytes = SIP) -> list[Table]:
+def late(first: bytes = SIP) -> list[CaptureTable]:
     chunks = capture_of([(0, Direction.FROM_ROBOT, data) for data in (first, SIP, LATE)])
     return list(tables_of_sips(sips_of([block_of_chunks(chunks)], P2DX), P2DX, 2))
 

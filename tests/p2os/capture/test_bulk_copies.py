@@ -10,7 +10,7 @@ np = pytest.importorskip("numpy")
 
 from p2os.capture.cells import Alike, Cell, cell_text, texts_of  # noqa: E402
 from p2os.capture.chunks import Direction, Part, capture_of, chunks_of, in_order  # noqa: E402
-from p2os.capture.columns.column import Column, Conversion  # noqa: E402
+from p2os.capture.columns.column import ArrayConversion, Column  # noqa: E402
 from p2os.capture.columns.gathering import joined  # noqa: E402
 from p2os.capture.formats.recording import recorded_parts, write_recording  # noqa: E402
 from p2os.capture.formats.recording_bulk import plain_lines  # noqa: E402
@@ -91,7 +91,7 @@ def test_texts_of_a_conversion_become_an_arrow_array(rows: list[tuple[int, bool]
     codes, present = np.array([code for code, _ in rows], np.uint8), np.array([there for _, there in rows], np.bool_)
     wanted = [said(code) if there else None for code, there in rows]
     for mask, cells in ((present, wanted), (None, [said(code) for code, _ in rows])):
-        column = Conversion(said, str).column(codes, mask)
+        column = ArrayConversion(said, str).column(codes, mask)
         array = cells_array(column, column.kind)
         array.validate(full=True)
         assert array.to_pylist() == list(column) == cells

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 np = pytest.importorskip("numpy")
 
-from p2os.capture.columns import Columns, Damage, decode, find_frames  # noqa: E402
+from p2os.capture.columns import Columns, RejectedCounts, decode, find_frames  # noqa: E402
 from p2os.capture.columns.arrow import to_arrow  # noqa: E402
 from p2os.capture.columns.objects import rows_by_objects  # noqa: E402
 from p2os.capture.columns.tables import KINDS as TABLES  # noqa: E402
@@ -42,8 +42,8 @@ GOLDEN = Path(__file__).parents[2] / "golden"
 GIVE_UP_NS = 250 * NS_PER_MS
 
 
-def damage_of(stats: DecoderStats) -> Damage:
-    return Damage(**{field.name: getattr(stats, field.name) for field in dataclasses.fields(Damage)})
+def damage_of(stats: DecoderStats) -> RejectedCounts:
+    return RejectedCounts(**{field.name: getattr(stats, field.name) for field in dataclasses.fields(RejectedCounts)})
 
 
 def decoded(chunks: list[tuple[Nanos, bytes]]) -> tuple[list[bytes], DecoderStats]:

@@ -17,7 +17,7 @@ from p2os.capture.chunks import Capture, Chunk, Direction, capture_of
 from p2os.capture.columns.sip_table import sip_tables
 from p2os.capture.sip_columns import LEADING
 from p2os.capture.sips import sips_of
-from p2os.capture.table import Table, tables_of, tables_of_sips, write_csv
+from p2os.capture.table import CaptureTable, tables_of, tables_of_sips, write_csv
 from p2os.cli.main import run
 from p2os.protocol.packets import EncoderPacket, SerauxPacket, SonarReading, StandardSip, packet_frame
 from p2os.protocol.profiles import Profile
@@ -31,7 +31,7 @@ P2DX = Reading(profile=Profile.P2OS, parameters=load_parameters("p2dx"))
 ROBOT, CLIENT = Direction.FROM_ROBOT, Direction.TO_ROBOT
 
 
-def joined(tables: Iterable[Table]) -> dict[str, list[Cell]]:
+def joined(tables: Iterable[CaptureTable]) -> dict[str, list[Cell]]:
     cells: dict[str, list[Cell]] = {}
     rows = 0
     for table in tables:
@@ -42,14 +42,14 @@ def joined(tables: Iterable[Table]) -> dict[str, list[Cell]]:
     return cells
 
 
-def lines(table: Table) -> str:
+def lines(table: CaptureTable) -> str:
     file = io.StringIO()
     write_csv([table], file)
     return file.getvalue()
 
 
-def plain(table: Table) -> Table:
-    return Table({name: list(column) for name, column in table.columns.items()})
+def plain(table: CaptureTable) -> CaptureTable:
+    return CaptureTable({name: list(column) for name, column in table.columns.items()})
 
 
 def same(

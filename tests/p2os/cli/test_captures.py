@@ -16,7 +16,7 @@ from p2os.capture.replay import Replay
 from p2os.cli.captures.capture_files import RecordingFile, Sinks
 from p2os.cli.captures.record import record_session
 from p2os.cli.captures.replay import motions_of, play
-from p2os.cli.captures.sniff import Bridge
+from p2os.cli.captures.sniff import TapBridge
 from p2os.errors import RemoteProtocolError, RunFailedError, TransportError
 from p2os.pioneer.controller import ControllerSettings
 from p2os.pioneer.serve import served_pioneer
@@ -81,8 +81,8 @@ def test_a_recorded_session_is_sniffed_while_it_is_replayed(
     recording.write_text(write_recording(capture_of(talk)))
     listener = listen_url("tcp:127.0.0.1:0")
     bridge_url, chunks, told = listener.description, [], []
-    bridge = Bridge(listener, open_url(served.url), lambda: open_url(served.url),
-                    on_chunk=chunks.append, on_event=told.append)  # fmt: skip
+    bridge = TapBridge(listener, open_url(served.url), lambda: open_url(served.url),
+                       on_chunk=chunks.append, on_event=told.append)  # fmt: skip
     thread = threading.Thread(target=lambda: bridge.run(lambda: bridge.sessions == 2))
     thread.start()
     assert run("replay", recording, bridge_url, "--as", "client", "--speed", "3") == 0
@@ -134,11 +134,11 @@ def test_sniff_shows_lengths_in_the_units_of_the_robot_that_answers(
 ) -> None:
     robot = [Identity("Fritz", "Pioneer", "p3dx-sh").to_frame(), StandardSip(raw_x=1000).to_frame(Profile.P2OS)]
 
-    def run_bridge(bridge: Bridge, _until: Callable[[], bool]) -> None:
+    def run_bridge(bridge: TapBridge, _until: Callable[[], bool]) -> None:
         for at_ns, frame in enumerate(robot):
             bridge._on_chunk(Chunk(at_ns=at_ns, direction=FROM, data=frame.to_bytes()))
 
-    monkeypatch.setattr(Bridge, "run", run_bridge)
+    monkeypatch.setattr(TapBridge, "run", run_bridge)
     with socket.create_server(("127.0.0.1", 0)) as there:
         url = f"tcp:127.0.0.1:{there.getsockname()[1]}"
         assert run("sniff", url, "--listen", "tcp:127.0.0.1:0", "--json", *options) == 0
@@ -215,8 +215,8 @@ def test_a_replay_that_is_interrupted_or_loses_its_line_stops_the_robot() -> Non
 def test_a_bridge_follows_a_change_of_speed_and_stops_the_robot_when_it_ends() -> None:
     loops, told, chunks, bauds = Loops(), [], [], []
     robot_end = loops.listen("robot")
-    bridge = Bridge(loops.listen("client"), loops.connect("robot"), lambda: loops.connect("robot"),
-                    on_chunk=chunks.append, on_event=told.append, clock=Clock())  # fmt: skip
+    bridge = TapBridge(loops.listen("client"), loops.connect("robot"), lambda: loops.connect("robot"),
+                       on_chunk=chunks.append, on_event=told.append, clock=Clock())  # fmt: skip
     robot, client = robot_end.accept(), loops.connect("client")
     bridge.turn()
     bridge._robot.set_baud = bauds.append
@@ -242,7 +242,7 @@ class Joined:
     def __init__(self, on_chunk: Callable[[Chunk], None] = lambda _chunk: None) -> None:
         loops, self.now, self.told = Loops(), 0, []
         robots = loops.listen("robot")
-        self.bridge = Bridge(
+        self.bridge = TapBridge(
             loops.listen("client"), loops.connect("robot"), lambda: loops.connect("robot"),
             on_chunk=on_chunk, on_event=self.told.append, clock=lambda: self.now,
         )  # fmt: skip
@@ -438,8 +438,8 @@ def test_what_one_file_refuses_the_others_still_take(tmp_path: Path) -> None:
 def test_a_bridge_whose_robot_is_gone_refuses_its_client() -> None:
     loops, told = Loops(), []
     robots = loops.listen("robot")
-    bridge = Bridge(loops.listen("client"), loops.connect("robot"), lambda: loops.connect("robot"),
-                    on_chunk=lambda _chunk: None, on_event=told.append)  # fmt: skip
+    bridge = TapBridge(loops.listen("client"), loops.connect("robot"), lambda: loops.connect("robot"),
+                       on_chunk=lambda _chunk: None, on_event=told.append)  # fmt: skip
     robots.accept().close()
     robots.close()
     client = loops.connect("client")

@@ -10,7 +10,7 @@ from p2os.cli.links import ports
 from p2os.cli.main import run
 from p2os.cli.robots import info
 from p2os.client.observer import Observer
-from p2os.pioneer.controller.commands import Effect
+from p2os.pioneer.controller.commands import CommandEffect
 from p2os.pioneer.serve import served_pioneer
 from p2os.protocol.config_packet import ConfigPacket
 from p2os.protocol.packets import Identity
@@ -135,7 +135,7 @@ def test_a_robot_tells_who_it_is_and_is_left_closed(clock: VirtualClock) -> None
 
 
 def test_a_robot_that_knows_no_config_still_answers(monkeypatch: pytest.MonkeyPatch, clock: VirtualClock) -> None:
-    monkeypatch.setattr("p2os.pioneer.controller.controller.apply", lambda *_: Effect.UNKNOWN)
+    monkeypatch.setattr("p2os.pioneer.controller.controller.apply", lambda *_: CommandEffect.UNKNOWN)
     with served_pioneer(body="kinematic", clock=clock) as url:
         assert info.ask(url).config is None
 

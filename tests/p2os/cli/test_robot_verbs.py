@@ -18,7 +18,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 
 from p2os.cli.held_robot import RobotWatch, problem_of
-from p2os.cli.links.bench import Bench, lines_of, measure
+from p2os.cli.links.bench import LinkBenchmark, lines_of, measure
 from p2os.cli.links.ports import guess
 from p2os.cli.robots.send import make_command
 from p2os.client import (
@@ -260,7 +260,7 @@ def test_a_link_is_measured(served: object, run: Run, capsys: Capture) -> None:
 
 def test_a_robot_that_does_not_answer_config_is_measured_without(make_robot: Callable[..., object]) -> None:
     robot = make_robot()
-    bench, now = Bench(0), 0
+    bench, now = LinkBenchmark(0), 0
     while now < 4 * NS_PER_S:
         now += 10 * NS_PER_MS
         robot.pioneer.advance_to(now)

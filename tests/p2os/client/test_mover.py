@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from p2os.client.goals import GRACE_NS, DriveAxis, Goal, TurnAxis
+from p2os.client.goals import GRACE_NS, DriveAxis, MotionGoal, TurnAxis
 from p2os.client.mover import MOTION_NUMBERS, SPEED_NUMBERS, WAYS, SentMotion, Speeds
 from p2os.client.notices import (
     DeadmanStopped,
@@ -379,7 +379,7 @@ def at(x_m: float) -> RobotState:
 
 @pytest.mark.parametrize(("left_m", "is_patient"), [(0.0899, True), (0.0901, False)])
 def test_patience_lasts_as_long_again_where_a_tenth_of_what_was_left_is_done(left_m: float, is_patient: bool) -> None:
-    goal = Goal(DriveAxis(1.0), None)
+    goal = MotionGoal(DriveAxis(1.0), None)
     goal.begin(at(0.0), Limits(0.75, 1.7, 0.3, 0.3, 1.7, 1.7), 0)
     goal.take(at(0.9), 1 * S)  # a tenth of a metre is left
     ends = goal.next_deadline()

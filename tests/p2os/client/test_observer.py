@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from p2os.client.core import RobotCore
 from p2os.client.goals import TurnAxis
-from p2os.client.mover import Motors
+from p2os.client.mover import MotorState
 from p2os.client.notices import OdometryDoubtful, PacketArrived, RobotUnknown
 from p2os.client.observer import Firmware, Observer, PoseKeeper, bumpers_of, limits_of
 from p2os.client.robot_state import RobotPose
@@ -197,7 +197,7 @@ def test_a_setting_out_of_range_is_refused(change: dict[str, int], text: str) ->
 
 
 def test_motors_that_the_stop_button_took_off_say_whether_it_is_still_pressed() -> None:
-    observer, motors = Observer(P2DX, Profile.ARCOS), Motors()
+    observer, motors = Observer(P2DX, Profile.ARCOS), MotorState()
 
     def flags(bits: int, now: int) -> str | None:
         return motors.take(observer.take(StandardSip(raw_flags=bits), now), now)

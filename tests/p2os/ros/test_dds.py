@@ -30,7 +30,7 @@ from p2os.ros.dds import configuration
 from p2os.ros.message_table import message_type
 from p2os.ros.robot_node import RobotNode
 from p2os.ros.topics import TOPICS
-from p2os.ros.transport import NodeOptions, Topic, Transport
+from p2os.ros.transport import NodeOptions, RosTransport, Topic
 from p2os.ros.transports import open_transport
 from simbase.timing import NS_PER_MS
 
@@ -46,7 +46,7 @@ def options(domain: int, namespace: str) -> NodeOptions:
 
 
 @pytest.fixture
-def network(options: NodeOptions) -> Iterator[Transport]:
+def network(options: NodeOptions) -> Iterator[RosTransport]:
     with contextlib.closing(open_transport("dds", options)) as opened:
         yield opened
 
@@ -88,7 +88,7 @@ def wait_for(is_so: Callable[[], bool]) -> bool:
 
 
 def test_a_peer_of_its_own_types_drives_the_robot_and_the_robot_stops_when_that_peer_is_killed(
-    network: Transport, options: NodeOptions
+    network: RosTransport, options: NodeOptions
 ) -> None:
     with served_pioneer(world="room", body="kinematic") as url, Robot(url, deadman_s=5.0) as robot:
         loop = NodeLoop(robot, network, RobotNode(robot.parameters, options, deadman_ns=DEADMAN_NS))
@@ -109,7 +109,7 @@ def test_a_peer_of_its_own_types_drives_the_robot_and_the_robot_stops_when_that_
 
 
 def test_names_types_and_hashes_are_found_by_discovery_as_ros_writes_them(
-    network: Transport, options: NodeOptions
+    network: RosTransport, options: NodeOptions
 ) -> None:
     network.announce(TOPICS["odom"].topic(NodeOptions()))
     network.announce(TOPICS["robot_description"].topic(NodeOptions()))
@@ -134,7 +134,7 @@ def test_names_types_and_hashes_are_found_by_discovery_as_ros_writes_them(
     assert ("ros_discovery_info", "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_") in found
 
 
-def test_the_node_tells_its_name_and_which_endpoints_are_its_own(network: Transport, options: NodeOptions) -> None:
+def test_the_node_tells_its_name_and_which_endpoints_are_its_own(network: RosTransport, options: NodeOptions) -> None:
     from p2os.ros.dds import DISCOVERY, DdsNode
 
     assert isinstance(network, DdsNode)
@@ -155,7 +155,7 @@ def _reader_named(network: Any, name: str, topic: Topic) -> Any:
     return DataReader(network._participant, network._topic(topic, name), qos=network._qos(topic))
 
 
-def test_who_comes_late_gets_what_is_latched_and_nothing_else(network: Transport, options: NodeOptions) -> None:
+def test_who_comes_late_gets_what_is_latched_and_nothing_else(network: RosTransport, options: NodeOptions) -> None:
     latched, plain = Topic(options.topic("kept"), INT, is_latched=True), Topic(options.topic("gone"), INT)
     for value in (1, 2):
         network.publish(latched, {"data": value})
@@ -166,7 +166,7 @@ def test_who_comes_late_gets_what_is_latched_and_nothing_else(network: Transport
 
 
 def test_garbage_at_the_ports_of_the_domain_is_ignored_without_a_word(
-    network: Transport, options: NodeOptions, capfd: pytest.CaptureFixture[str]
+    network: RosTransport, options: NodeOptions, capfd: pytest.CaptureFixture[str]
 ) -> None:
     random, whole = Random(21), Topic(options.topic("whole"), INT, is_latched=True)
     network.subscribe(whole)
@@ -184,7 +184,7 @@ def test_garbage_at_the_ports_of_the_domain_is_ignored_without_a_word(
 
 
 def test_a_message_with_no_text_in_its_text_is_counted_and_the_next_one_is_taken(
-    network: Transport, options: NodeOptions, capfd: pytest.CaptureFixture[str]
+    network: RosTransport, options: NodeOptions, capfd: pytest.CaptureFixture[str]
 ) -> None:
     # Wrong lengths do not come so far: Cyclone DDS drops what is not of the type's form, on both sides.
     from p2os.ros.dds import DdsNode
@@ -205,7 +205,7 @@ def test_a_message_with_no_text_in_its_text_is_counted_and_the_next_one_is_taken
     assert capfd.readouterr() == ("", "")
 
 
-def test_a_waiting_node_is_woken_by_another_thread(network: Transport) -> None:
+def test_a_waiting_node_is_woken_by_another_thread(network: RosTransport) -> None:
     taker = threading.Thread(target=network.take, args=(4 * LIMIT_S,))
     taker.start()
     network.wake()

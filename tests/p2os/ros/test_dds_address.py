@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from p2os.errors import TransportError
-from p2os.ros.transport import NodeOptions, Transport
+from p2os.ros.transport import NodeOptions, RosTransport
 from p2os.ros.transports import open_transport
 from p2os.transport import one_address
 from tests.p2os.client.served_robot import until
@@ -63,7 +63,7 @@ def announcement(name: bytes) -> bytes:
 
 
 @pytest.fixture
-def node(domain: int, namespace: str) -> Iterator[Transport]:
+def node(domain: int, namespace: str) -> Iterator[RosTransport]:
     pytest.importorskip("cyclonedds", reason="the extra ros is not installed")
     with contextlib.closing(open_transport("dds", NodeOptions(domain=domain, namespace=namespace))) as opened:
         yield opened
@@ -83,7 +83,7 @@ def known(node: Any) -> Callable[[bytes], bool]:
     return look
 
 
-def test_a_participant_is_found_at_the_nodes_own_address_and_at_no_other(node: Transport) -> None:
+def test_a_participant_is_found_at_the_nodes_own_address_and_at_no_other(node: RosTransport) -> None:
     random, is_known = Random(5), known(node)
     stranger, neighbour = b"\1\x0f" + random.randbytes(10), b"\1\x0f" + random.randbytes(10)
     ports = {row.port for row in own_sockets() if row.address == "0.0.0.0"}  # noqa: S104  # as the library binds
@@ -105,7 +105,7 @@ def addresses() -> list[str]:
     return [OTHER]
 
 
-def test_the_kernel_drops_what_is_sent_to_another_address_of_this_machine(node: Transport) -> None:
+def test_the_kernel_drops_what_is_sent_to_another_address_of_this_machine(node: RosTransport) -> None:
     del node
     before = {row.port: row.drops for row in own_sockets() if row.address == "0.0.0.0"}  # noqa: S104
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from p2os.errors import MissingDependencyError, RemoteProtocolError
 from p2os.ros.codec import from_cdr, to_cdr
-from p2os.ros.message_table import SERVICES, Field, message_type, standard_types
+from p2os.ros.message_table import SERVICES, MessageField, message_type, standard_types
 from p2os.ros.transport import NodeOptions
 from p2os.ros.transports import TRANSPORTS, open_transport
 from tests.p2os.ros.spoken_types import SPOKEN
@@ -30,7 +30,7 @@ NUMBERS = {
 }  # fmt: skip
 
 
-def values(field: Field) -> st.SearchStrategy[Any]:
+def values(field: MessageField) -> st.SearchStrategy[Any]:
     """Return what a field may hold."""
     one = NUMBERS[field.kind] if field.kind in NUMBERS else messages(field.kind)
     if field.count is None:

@@ -11,7 +11,7 @@ from p2os.client.robot_state import RobotPose, RobotState
 from p2os.protocol.sip import SonarReading, StandardSip
 from p2os.robots.motor_step import STEP_MPS
 from p2os.robots.parameters import load_parameters
-from p2os.ros.robot_node import Motors, Refused, ResetOdometry, RobotNode, Speed, Stop
+from p2os.ros.robot_node import MotorPower, Refused, ResetOdometry, RobotNode, Speed, StopRequest
 from p2os.ros.topics import TOPICS
 from p2os.ros.transport import NodeOptions, Received
 from simbase.errors import UsageError
@@ -50,7 +50,7 @@ def test_a_speed_is_held_until_one_tick_before_the_deadman_and_stopped_at_it(nod
     assert node.take_commands([twist(0.3, 0.1)], now=1000) == [Speed(0.3, 0.1)]
     assert node.next_deadline() == 1000 + DEADMAN_NS
     assert node.advance_to(1000 + DEADMAN_NS - 1) == []
-    assert node.advance_to(1000 + DEADMAN_NS) == [Stop()]
+    assert node.advance_to(1000 + DEADMAN_NS) == [StopRequest()]
     assert node.next_deadline() is None
     assert node.advance_to(1 << 60) == []
 
@@ -60,12 +60,12 @@ def test_messages_that_ask_for_no_speed_do_not_put_the_deadman_off(node: RobotNo
     others = [asked("reset_odometry"), asked("enable_motors", data=True), twist(math.nan), asked("motor_left", data=9)]
     for at in range(0, DEADMAN_NS, DEADMAN_NS // 10):
         node.take_commands(others, now=at)
-    assert node.advance_to(DEADMAN_NS) == [Stop()]
+    assert node.advance_to(DEADMAN_NS) == [StopRequest()]
 
 
 def test_of_speeds_that_came_together_the_newest_counts(node: RobotNode) -> None:
     assert node.take_commands([twist(0.1), asked("enable_motors", data=False), twist(0.2)], now=0) == [
-        Motors(False), Speed(0.2, 0.0),
+        MotorPower(False), Speed(0.2, 0.0),
     ]  # fmt: skip
 
 

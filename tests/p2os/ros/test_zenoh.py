@@ -14,7 +14,7 @@ import pytest
 
 from p2os.errors import TransportError
 from p2os.ros.topics import SERVICES, TOPICS
-from p2os.ros.transport import DEPTH, NodeOptions, Topic, Transport
+from p2os.ros.transport import DEPTH, NodeOptions, RosTransport, Topic
 from p2os.ros.transports import open_transport
 from p2os.ros.zenoh_node import ZenohNode
 
@@ -34,14 +34,14 @@ def place() -> str:
 
 
 @pytest.fixture
-def node(place: str) -> Iterator[Transport]:
+def node(place: str) -> Iterator[RosTransport]:
     options = NodeOptions(namespace="/r1", domain=7, interface=place, is_router=True)
     with contextlib.closing(open_transport("zenoh", options)) as opened:
         yield opened
 
 
 @pytest.fixture
-def peer(node: Transport, place: str) -> Iterator[Any]:
+def peer(node: RosTransport, place: str) -> Iterator[Any]:
     config = zenoh.Config()
     for key, value in (
         ("mode", "client"), ("connect/endpoints", [f"tcp/{place}"]), ("scouting/multicast/enabled", False)
@@ -62,7 +62,7 @@ def tokens(peer: Any) -> list[list[str]]:
     return sorted(str(reply.ok.key_expr).split("/") for reply in peer.liveliness().get("@ros2_lv/**"))
 
 
-def test_a_message_has_its_key_its_bytes_and_an_attachment_that_counts(node: Transport, peer: Any) -> None:
+def test_a_message_has_its_key_its_bytes_and_an_attachment_that_counts(node: RosTransport, peer: Any) -> None:
     arrived: list[Any] = []
     subscriber = peer.declare_subscriber("**", arrived.append)
     odd = Topic("/r1/encoder_left", "std_msgs/msg/Int32")
@@ -84,7 +84,7 @@ def test_a_message_has_its_key_its_bytes_and_an_attachment_that_counts(node: Tra
     assert rows[0][3] == rows[1][3] != bytes(16)
 
 
-def test_liveliness_tokens_tell_the_node_and_each_endpoint(node: Transport, peer: Any) -> None:
+def test_liveliness_tokens_tell_the_node_and_each_endpoint(node: RosTransport, peer: Any) -> None:
     node.announce(TOPICS["odom"].topic(NAMES))
     node.announce(TOPICS["robot_description"].topic(NAMES))
     node.subscribe(TOPICS["cmd_vel"].topic(NAMES))
@@ -103,7 +103,7 @@ def test_liveliness_tokens_tell_the_node_and_each_endpoint(node: Transport, peer
     assert len({parts[4] for parts in tokens(peer)}) == 4
 
 
-def test_a_speed_of_a_raw_peer_arrives_and_damaged_bytes_are_counted(node: Transport, peer: Any) -> None:
+def test_a_speed_of_a_raw_peer_arrives_and_damaged_bytes_are_counted(node: RosTransport, peer: Any) -> None:
     topic = TOPICS["cmd_vel"].topic(NAMES)
     node.subscribe(topic)
     key = f"7/r1/cmd_vel/geometry_msgs::msg::dds_::Twist_/{TWIST_HASH}"
@@ -123,7 +123,7 @@ def test_a_speed_of_a_raw_peer_arrives_and_damaged_bytes_are_counted(node: Trans
     assert node.damaged >= 1
 
 
-def test_who_comes_late_gets_what_is_latched(node: Transport, peer: Any) -> None:
+def test_who_comes_late_gets_what_is_latched(node: RosTransport, peer: Any) -> None:
     from zenoh import ext
 
     latched = Topic("/r1/kept", "std_msgs/msg/Int32", is_latched=True)
@@ -137,7 +137,7 @@ def test_who_comes_late_gets_what_is_latched(node: Transport, peer: Any) -> None
     subscriber.undeclare()
 
 
-def test_a_service_is_called_by_its_key_and_answered_with_the_number_of_the_call(node: Transport, peer: Any) -> None:
+def test_a_service_is_called_by_its_key_and_answered_with_the_number_of_the_call(node: RosTransport, peer: Any) -> None:
     service = SERVICES["enable_motors"].topic(NAMES)
     assert node.serve(service)
     hash_ = "RIHS01_abe9e4bb6b41b40e6789712c00ec8871923e089af3f667a79992a428cff2da0a"
@@ -156,7 +156,7 @@ def test_a_service_is_called_by_its_key_and_answered_with_the_number_of_the_call
     assert (number, name) == (41, bytes(range(16)))
 
 
-def test_a_look_takes_no_more_than_a_topic_keeps_however_fast_messages_come(node: Transport) -> None:
+def test_a_look_takes_no_more_than_a_topic_keeps_however_fast_messages_come(node: RosTransport) -> None:
     assert isinstance(node, ZenohNode)
     topic, looks = TOPICS["cmd_vel"].topic(NAMES), []
 
@@ -171,7 +171,7 @@ def test_a_look_takes_no_more_than_a_topic_keeps_however_fast_messages_come(node
     assert speeds == list(range(1, DEPTH + 1))
 
 
-def test_of_more_messages_than_a_topic_keeps_the_newest_are_taken(node: Transport, peer: Any) -> None:
+def test_of_more_messages_than_a_topic_keeps_the_newest_are_taken(node: RosTransport, peer: Any) -> None:
     topic = Topic("/r1/x", "std_msgs/msg/Int32")
     node.subscribe(topic)
     key = f"7/r1/x/std_msgs::msg::dds_::Int32_/{INT_HASH}"
@@ -198,7 +198,7 @@ def test_of_more_messages_than_a_topic_keeps_the_newest_are_taken(node: Transpor
     assert taken == list(range(100 * DEPTH - DEPTH, 100 * DEPTH))
 
 
-def test_a_waiting_node_is_woken_by_another_thread(node: Transport) -> None:
+def test_a_waiting_node_is_woken_by_another_thread(node: RosTransport) -> None:
     taker = threading.Thread(target=node.take, args=(4 * LIMIT_S,))
     taker.start()
     node.wake()
@@ -206,6 +206,6 @@ def test_a_waiting_node_is_woken_by_another_thread(node: Transport) -> None:
     assert not taker.is_alive()
 
 
-def test_a_port_that_another_router_has_is_refused_in_one_line(node: Transport, place: str) -> None:
+def test_a_port_that_another_router_has_is_refused_in_one_line(node: RosTransport, place: str) -> None:
     with pytest.raises(TransportError, match="zenoh cannot be the router on tcp/127"):
         open_transport("zenoh", NodeOptions(interface=place, is_router=True))

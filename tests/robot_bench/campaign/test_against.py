@@ -13,7 +13,7 @@ from bluepill_sim.program.image import load_image
 from bluepill_sim.program.mutants import mutants, mutated_file
 from p2os.cli import main as cli
 from robot_bench.campaign.margin import margin
-from robot_bench.campaign.trial import GoalResult, Outcome, Trial, Verdict, trial_of
+from robot_bench.campaign.trial import GoalResult, Outcome, Trial, TrialVerdict, trial_of
 from robot_bench.campaign.variants.against import FOLDER, MOST_APART, Against, Other, compared, first_apart
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S
@@ -52,7 +52,7 @@ def outcome(by: float, kind: str = "clearance", died: str = "") -> Outcome:
     is_bad = by < 0 or bool(died)
     failures = tuple([died] if died else [f"{kind}: near"]) if is_bad else ()
     return Outcome(
-        verdict=Verdict.FAILED if is_bad else Verdict.PASSED,
+        verdict=TrialVerdict.FAILED if is_bad else TrialVerdict.PASSED,
         goals=(goal,),
         failures=failures,
         died=died,
@@ -87,7 +87,7 @@ def test_versions_differ_where_verdicts_or_goals_do_or_margins_part(
     one: Outcome, other: Outcome, differs: bool
 ) -> None:
     found = compared(one, other, NAMES)
-    assert (found.verdict is Verdict.FAILED) is differs
+    assert (found.verdict is TrialVerdict.FAILED) is differs
     by = margin(found)
     assert by is not None
     assert (by < 0) is differs, "what a search goes towards"
@@ -108,8 +108,8 @@ def test_the_search_is_told_how_near_they_are_to_a_difference() -> None:
 
 
 def test_without_a_verdict_of_one_there_is_none_of_both() -> None:
-    error = Outcome(verdict=Verdict.ERROR, failures=("too long",))
-    assert compared(outcome(0.5), error, NAMES).verdict is Verdict.ERROR
+    error = Outcome(verdict=TrialVerdict.ERROR, failures=("too long",))
+    assert compared(outcome(0.5), error, NAMES).verdict is TrialVerdict.ERROR
     assert compared(error, outcome(0.5), NAMES).failures == ("new.elf: too long",)
 
 
@@ -130,7 +130,7 @@ def test_each_trial_is_run_with_both_versions_in_whatever_order_they_end(seed: i
     found: dict[int, tuple[Outcome, float]] = {}
     Against(Workers(), Other("old.elf", b"other")).run(trials, lambda place, done: found.update({place: done}))
     verdicts = {place: done[0].verdict for place, done in found.items()}
-    assert verdicts == {0: Verdict.PASSED, 1: Verdict.FAILED, 2: Verdict.PASSED}
+    assert verdicts == {0: TrialVerdict.PASSED, 1: TrialVerdict.FAILED, 2: TrialVerdict.PASSED}
     assert {done[1] for done in found.values()} == {3.0}
 
 

@@ -7,9 +7,18 @@ from typing import cast
 
 import pytest
 
-from robot_bench.campaign.campaign_file import Limits
-from robot_bench.campaign.trial import Outcome, Trial, Verdict, bench_of, run_trial, trial_of, unpacked
-from robot_bench.campaign.workers.beginnings import EACH_NS, LEAST_NS, MOST_KEPT, Beginnings, Saved, Task, Work, Worked
+from robot_bench.campaign.campaign_file import RunLimits
+from robot_bench.campaign.trial import Outcome, Trial, TrialVerdict, bench_of, run_trial, trial_of, unpacked
+from robot_bench.campaign.workers.beginnings import (
+    EACH_NS,
+    LEAST_NS,
+    MOST_KEPT,
+    Beginnings,
+    SavedBeginning,
+    Task,
+    Work,
+    Worked,
+)
 from robot_bench.campaign.workers.processes import Processes
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S
@@ -84,7 +93,7 @@ def test_processes_share_what_trials_share_and_replays_share_nothing(base: Trial
     trials = [base.set(("duration_s", 5)).with_lists(fault=[stuck(at_s)]) for at_s in (4.3, 4.5, 4.7)]
     found: list[dict[int, Done]] = [{}, {}]
     for anew, into in zip((False, True), found, strict=True):
-        Processes(2, Limits()).run(trials, lambda place, done, into=into: into.update({place: done}), anew=anew)  # type: ignore[misc]
+        Processes(2, RunLimits()).run(trials, lambda place, done, into=into: into.update({place: done}), anew=anew)  # type: ignore[misc]
     shared, alone = ([one[place] for place in range(3)] for one in found)
     assert [done[0] for done in shared] == [done[0] for done in alone]
 
@@ -96,7 +105,7 @@ def test_two_that_differ_late_share_a_run_and_one_alone_shares_nothing(base: Tri
     found = outcomes([early, late, elsewhere], Beginnings(), do)
     assert do.tasks == [(0, 8_499_999_999)]
     assert [at // EACH_NS for at in do.starts] == [2, 4, 0]
-    assert [one.verdict for one in found] != [Verdict.ERROR] * 3
+    assert [one.verdict for one in found] != [TrialVerdict.ERROR] * 3
 
 
 def test_what_happens_too_soon_is_run_from_the_start(base: Trial) -> None:
@@ -132,7 +141,7 @@ def test_a_run_that_ends_before_its_own_event_comes_to_the_same(base: Trial) -> 
 def test_a_beginning_that_cannot_be_is_told_by_each_trial(base: Trial) -> None:
     nowhere = base.set(("start", {"x_m": 50.0, "y_m": 0.0, "heading_deg": 0.0}))
     found = outcomes([nowhere.with_lists(fault=[stuck(at_s)]) for at_s in (7.0, 8.0)], Beginnings(), Counted())
-    assert [one.verdict for one in found] == [Verdict.ERROR] * 2
+    assert [one.verdict for one in found] == [TrialVerdict.ERROR] * 2
     assert "start" in found[0].failures[0]
 
 
@@ -145,8 +154,8 @@ def test_robots_that_share_a_world_share_no_beginning() -> None:
 
 
 def test_no_more_beginnings_are_kept_than_some(base: Trial, monkeypatch: pytest.MonkeyPatch) -> None:
-    made = Saved(EACH_NS * 2, b"")
-    passed = Outcome(verdict=Verdict.PASSED)
+    made = SavedBeginning(EACH_NS * 2, b"")
+    passed = Outcome(verdict=TrialVerdict.PASSED)
     monkeypatch.setattr(Task, "__call__", lambda *_: [made])
     monkeypatch.setattr("robot_bench.campaign.workers.beginnings.run_trial", lambda *_, **__: passed)
     kept = Beginnings()

@@ -18,17 +18,17 @@ from robot_bench.campaign.campaign_file import (
     DRAW,
     TOP,
     Campaign,
-    Limits,
+    RunLimits,
     campaign_schema,
     load_campaign,
     parse_campaign,
 )
-from robot_bench.campaign.conduct import Conduct, Finding
+from robot_bench.campaign.conduct import Conduct, PointFinding
 from robot_bench.campaign.last_moment import LastMoment
 from robot_bench.campaign.page import _short
-from robot_bench.campaign.search import SEARCHES, Answer, Problem
+from robot_bench.campaign.search import SEARCHES, PointResult, Problem
 from robot_bench.campaign.suggestion import suggested
-from robot_bench.campaign.trial import GoalResult, Outcome, Trial, Verdict, run_trial, trial_of, warm_up
+from robot_bench.campaign.trial import GoalResult, Outcome, Trial, TrialVerdict, run_trial, trial_of, warm_up
 from robot_bench.campaign.whole import MOST_MOMENTS, Whole, begin, carry_out, resume
 from robot_bench.campaign.workers import processes
 from robot_bench.campaign.workers.processes import Processes
@@ -74,7 +74,8 @@ def made_up(trial: Trial) -> Outcome:
         kind="clearance", wanted="keeps off", met=not failed, says="", robustness=-0.1 if failed else 0.2, unit="m"
     )
     return Outcome(
-        verdict=Verdict.FAILED if failed else Verdict.PASSED, goals=(goal,), failures=("clearance: ",) * failed,
+        verdict=TrialVerdict.FAILED if failed else TrialVerdict.PASSED, goals=(goal,),
+        failures=("clearance: ",) * failed,
         virtual_ns=10**9, sha256=f"{number:08x}", way_mm=((0, 0), (number % 1000, 0)),
         blocks=frozenset(range(number % 7)),
     )  # fmt: skip
@@ -209,34 +210,34 @@ def test_a_failure_whose_replay_has_another_hash_is_not_reported(tmp_path: Path)
     def fickle(trial: Trial) -> Outcome:
         found, key = made_up(trial), trial.sha256
         seen[key] = seen.get(key, 0) + 1
-        return found if seen[key] == 1 else Outcome(verdict=Verdict.FAILED, sha256="another")
+        return found if seen[key] == 1 else Outcome(verdict=TrialVerdict.FAILED, sha256="another")
 
     whole = carried(begun(tmp_path), tmp_path / "kept", Shuffled(1, judge=fickle))
     assert whole.failures == []
-    assert whole.counts[Finding.NOT_REPEATED] > 0
+    assert whole.counts[PointFinding.NOT_REPEATED] > 0
     assert not (tmp_path / "kept/failures").exists()
 
 
 def test_what_the_cheap_run_alone_sees_is_no_failure(tmp_path: Path) -> None:
     def optimist(trial: Trial) -> Outcome:
-        return Outcome(verdict=Verdict.PASSED, sha256="1") if trial.table["mode"] == "adapter" else made_up(trial)
+        return Outcome(verdict=TrialVerdict.PASSED, sha256="1") if trial.table["mode"] == "adapter" else made_up(trial)
 
     whole = carried(begun(tmp_path), tmp_path / "kept", Shuffled(1, judge=optimist))
     assert whole.failures == []
-    assert whole.counts[Finding.CHEAP_ONLY] > 0
+    assert whole.counts[PointFinding.CHEAP_ONLY] > 0
 
 
 def test_confirmations_end_with_their_budget(tmp_path: Path) -> None:
     whole = carried(begun(tmp_path, budget={"confirmations": 1}), tmp_path / "kept", Shuffled(1))
     assert sum(row.full is not None for row in whole.progress.rows) == 1
-    assert whole.counts[Finding.UNCONFIRMED] > 0
+    assert whole.counts[PointFinding.UNCONFIRMED] > 0
 
 
 def test_no_near_miss_takes_the_confirmation_that_a_failure_needs(tmp_path: Path) -> None:
     wanted = {"near_misses": 2, "budget": {"runs": 24, "confirmations": 24}}
     (tmp_path / "free").mkdir()
     free = carried(begun(tmp_path / "free", **wanted), tmp_path / "free/kept", Shuffled(1))
-    failed = [row.number for row in free.progress.rows if row.cheap.outcome.verdict is Verdict.FAILED]
+    failed = [row.number for row in free.progress.rows if row.cheap.outcome.verdict is TrialVerdict.FAILED]
     near = [row.number for row in free.progress.rows if row.full is not None and row.number not in failed]
     assert (len(failed) > 3, len(near)) == (True, 12), "two of each of six batches"
     for more in (-1, 0, 1):
@@ -244,8 +245,8 @@ def test_no_near_miss_takes_the_confirmation_that_a_failure_needs(tmp_path: Path
         folder.mkdir()
         campaign = begun(folder, **{**wanted, "budget": {"runs": 24, "confirmations": len(failed) + more}})
         whole = carried(campaign, folder / "kept", Shuffled(1))
-        assert whole.counts[Finding.CONFIRMED] == len(failed) + min(more, 0)
-        assert whole.counts.get(Finding.UNCONFIRMED, 0) == (more < 0)
+        assert whole.counts[PointFinding.CONFIRMED] == len(failed) + min(more, 0)
+        assert whole.counts.get(PointFinding.UNCONFIRMED, 0) == (more < 0)
         in_full = [row.number for row in whole.progress.rows if row.full is not None and row.number not in failed]
         assert in_full == near[: max(more, 0)], "the nearest, and of those alike the first"
 
@@ -256,8 +257,8 @@ def test_a_near_miss_that_fails_in_full_is_a_failure_wherever_it_is_told(tmp_pat
         by = int(found.sha256, 16) % 1000 / 1000
         if trial.table["mode"] == "direct":
             goal = GoalResult(kind="clearance", wanted="", met=True, says="", robustness=by, unit="m")
-            return Outcome(verdict=Verdict.PASSED, goals=(goal,), sha256=found.sha256)
-        return Outcome(verdict=Verdict.FAILED, failures=("clearance: ",), sha256=found.sha256)
+            return Outcome(verdict=TrialVerdict.PASSED, goals=(goal,), sha256=found.sha256)
+        return Outcome(verdict=TrialVerdict.FAILED, failures=("clearance: ",), sha256=found.sha256)
 
     whole = carried(begun(tmp_path, budget={"confirmations": 2}), tmp_path / "kept", Shuffled(1, judge=pessimist))
     rows = whole.progress.rows
@@ -274,7 +275,7 @@ def test_a_near_miss_that_fails_in_full_is_a_failure_wherever_it_is_told(tmp_pat
 
 def test_points_that_were_one_run_are_said_to_be(tmp_path: Path) -> None:
     def alike(_: Trial) -> Outcome:
-        return Outcome(verdict=Verdict.PASSED, sha256="1")
+        return Outcome(verdict=TrialVerdict.PASSED, sha256="1")
 
     whole = carried(begun(tmp_path), tmp_path / "kept", Shuffled(1, judge=alike))
     assert "note    12 points were 1 different run: what varies acts in no more" in [*_facts(whole, None)]
@@ -389,7 +390,7 @@ def test_a_search_that_learns_comes_nearer_than_chance(search: str) -> None:
         asked, found = SEARCHES[name](problem), []
         for _ in range(10):
             margins = [sum((at - 0.8) ** 2 for at in point) for point in asked.ask(16)]
-            asked.tell([Answer(margin=one) for one in margins])
+            asked.tell([PointResult(margin=one) for one in margins])
             found += margins
         return min(found)
 
@@ -408,7 +409,7 @@ def test_coverage_varies_what_reached_something_new(monkeypatch: pytest.MonkeyPa
             steps = [
                 frozenset(range(sum(at > 0.8 for at in itertools.takewhile(lambda x: x > 0.8, p)))) for p in points
             ]
-            asked.tell([Answer(margin=1.0, reached=frozenset(step)) for step in steps])
+            asked.tell([PointResult(margin=1.0, reached=frozenset(step)) for step in steps])
             seen |= frozenset().union(*steps)
         return len(seen)
 
@@ -433,7 +434,7 @@ def outcomes(workers: Processes, trials: Sequence[Trial]) -> dict[int, Outcome]:
 def test_a_process_comes_to_what_this_one_comes_to(trials: list[Trial], monkeypatch: pytest.MonkeyPatch) -> None:
     warmed: list[Trial] = []
     monkeypatch.setattr(processes, "warm_up", lambda trial: (warmed.append(trial), warm_up(trial)))
-    workers = Processes(2, Limits())
+    workers = Processes(2, RunLimits())
     found = outcomes(workers, trials)
     other = trials[0].set(("mode", "adapter"))
     outcomes(workers, [trials[0], other])
@@ -452,7 +453,7 @@ def test_a_process_that_was_killed_is_begun_again(trials: list[Trial], tmp_path:
         return run_trial(trial, look)
 
     monkeypatch.setattr(beginnings, "run_trial", dies_once)
-    found = outcomes(Processes(2, Limits()), trials)
+    found = outcomes(Processes(2, RunLimits()), trials)
     assert [found[place].verdict for place in range(3)] == [run_trial(trial).verdict for trial in trials]
     assert len(list(tmp_path.iterdir())) == 3
 
@@ -462,7 +463,7 @@ def test_a_run_that_takes_too_much_is_an_error_that_names_the_limit(trials: list
     from robot_bench.campaign.workers import beginnings
 
     def greedy(trial: Trial, look: Callable[[], None], start: object) -> Outcome:
-        return Outcome(verdict=Verdict.PASSED, sha256=str(len(bytearray(10**9))))
+        return Outcome(verdict=TrialVerdict.PASSED, sha256=str(len(bytearray(10**9))))
 
     def endless(trial: Trial, look: Callable[[], None], start: object) -> Outcome:
         while True:
@@ -470,8 +471,8 @@ def test_a_run_that_takes_too_much_is_an_error_that_names_the_limit(trials: list
 
     for job, words in ((greedy, "it took more than 64 MB"), (endless, "it took more than 1 s of a processor")):
         monkeypatch.setattr(beginnings, "run_trial", job)
-        found = outcomes(Processes(1, Limits(cpu_s=1, memory_mb=64)), trials[:1])
-        assert (found[0].verdict, found[0].failures) == (Verdict.ERROR, (words,))
+        found = outcomes(Processes(1, RunLimits(cpu_s=1, memory_mb=64)), trials[:1])
+        assert (found[0].verdict, found[0].failures) == (TrialVerdict.ERROR, (words,))
 
 
 def test_conduct_ends_after_the_batch_in_which_its_virtual_hours_are_spent(tmp_path: Path) -> None:
@@ -486,5 +487,5 @@ def test_minutes_that_are_over_leave_one_batch_of_near_misses(tmp_path: Path) ->
     conduct = Conduct(campaign, tmp_path / "kept", Shuffled(1), clock=lambda: next(ticks))
     rows = conduct.run().rows
     assert len(rows) == 12
-    failed = sum(row.cheap.outcome.verdict is Verdict.FAILED for row in rows)
+    failed = sum(row.cheap.outcome.verdict is TrialVerdict.FAILED for row in rows)
     assert sum(row.full is not None for row in rows) == failed + 4 < 12

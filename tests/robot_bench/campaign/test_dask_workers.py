@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from robot_bench.campaign.campaign_file import Limits
-from robot_bench.campaign.conduct import Progress
+from robot_bench.campaign.campaign_file import RunLimits
+from robot_bench.campaign.conduct import CampaignProgress
 from robot_bench.campaign.trial import Outcome, run_trial, trial_of
 from robot_bench.campaign.whole import begin, carry_out
 from robot_bench.campaign.workers import dask_workers
@@ -103,10 +103,10 @@ def rows_of(folder: Path, workers: DaskWorkers | Processes, on_run: object = Non
 
 @pytest.mark.soak
 def test_a_killed_worker_and_a_scheduler_begun_anew_change_nothing(cluster: Cluster, tmp_path: Path) -> None:
-    expected = rows_of(tmp_path / "here", Processes(2, Limits()))
+    expected = rows_of(tmp_path / "here", Processes(2, RunLimits()))
     assert {row[1].value for row in expected} >= {"passed", "confirmed"}  # type: ignore[attr-defined]  # a finding
 
-    def on_run(progress: Progress) -> None:
+    def on_run(progress: CampaignProgress) -> None:
         if progress.runs == 4:
             os.kill(cluster.workers[0].pid, signal.SIGKILL)
             cluster.workers.append(cluster.begin_worker())
@@ -114,7 +114,7 @@ def test_a_killed_worker_and_a_scheduler_begun_anew_change_nothing(cluster: Clus
             cluster.begin_scheduler_anew()
             cluster.workers += [cluster.begin_worker() for _ in range(2)]
 
-    workers = DaskWorkers(cluster.address, 0, Limits())
+    workers = DaskWorkers(cluster.address, 0, RunLimits())
     try:
         assert rows_of(tmp_path / "there", workers, on_run) == expected
     finally:
@@ -124,7 +124,7 @@ def test_a_killed_worker_and_a_scheduler_begun_anew_change_nothing(cluster: Clus
 @pytest.mark.slow
 def test_dask_of_this_machine_comes_to_what_a_process_comes_to() -> None:
     trial = trial_of("dodge", settings=[("body", "kinematic"), ("mode", "direct"), ("duration_s", 1)])
-    workers = DaskWorkers(None, 1, Limits())
+    workers = DaskWorkers(None, 1, RunLimits())
     found: dict[int, Outcome] = {}
     try:
         workers.run([trial], lambda place, done: found.update({place: done[0]}))
@@ -138,4 +138,4 @@ def test_a_scheduler_that_is_not_there_is_told_in_one_line(monkeypatch: pytest.M
     monkeypatch.setattr(dask_workers, "BEGIN_S", 0.0)
     monkeypatch.setattr(dask_workers, "ATTEMPT_S", 0.5)
     with pytest.raises(UsageError, match="no scheduler answers at tcp://"):
-        DaskWorkers("tcp://127.0.0.1:9", 0, Limits())
+        DaskWorkers("tcp://127.0.0.1:9", 0, RunLimits())

@@ -5,7 +5,7 @@ from itertools import combinations, product
 
 import pytest
 
-from robot_bench.campaign.trial import GoalResult, Hit, Outcome, Trial, Verdict, run_trial, trial_of
+from robot_bench.campaign.trial import GoalResult, HullContact, Outcome, Trial, TrialVerdict, run_trial, trial_of
 from robot_bench.campaign.variants.diversity import (
     CELLS,
     SAME_PATH,
@@ -24,9 +24,14 @@ SETS = [frozenset(some) for size in range(5) for some in combinations(range(4), 
 
 def failed(part: str = "front left", blocks: int = 100, way: tuple[tuple[int, int], ...] = ()) -> Outcome:
     goal = GoalResult(kind="no_collision", wanted="touches nothing", met=False, says="", robustness=None, unit="")
-    hit = Hit(t=1, what="'crate'", part=part, x_m=0.0, y_m=0.0)
+    hit = HullContact(t=1, what="'crate'", part=part, x_m=0.0, y_m=0.0)
     return Outcome(
-        verdict=Verdict.FAILED, failures=("x",), goals=(goal,), hits=(hit,), blocks=frozenset(range(blocks)), way_mm=way
+        verdict=TrialVerdict.FAILED,
+        failures=("x",),
+        goals=(goal,),
+        hits=(hit,),
+        blocks=frozenset(range(blocks)),
+        way_mm=way,
     )
 
 
@@ -106,5 +111,5 @@ def test_two_starts_a_centimetre_apart_fail_by_one_path() -> None:
     trial = trial_of("dodge", settings=blind, firmware=hurried("dodge"))
     starts = [(2.2, 0.0), (2.21, 0.0)]
     found = [run_trial(trial.set(("start", {"x_m": x, "y_m": y, "heading_deg": 0.0}))) for x, y in starts]
-    assert all(one.verdict is Verdict.FAILED for one in found)
+    assert all(one.verdict is TrialVerdict.FAILED for one in found)
     assert clusters(found) == [[0, 1]]

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from robot_bench.campaign.campaign_file import Limits
-from robot_bench.campaign.conduct import Finding
+from robot_bench.campaign.campaign_file import RunLimits
+from robot_bench.campaign.conduct import PointFinding
 from robot_bench.campaign.whole import begin, carry_out
 from robot_bench.campaign.workers.processes import Processes
 
@@ -53,9 +53,9 @@ def test_a_hundred_different_failures_fail_again_after_a_restart(tmp_path: Path)
     file, folder = tmp_path / "blind.toml", tmp_path / "blind"
     file.write_text(FILE, encoding="utf-8")
     campaign = begin(file, folder, firmware=None, overrides={})
-    whole = carry_out(campaign, folder, Processes(2, Limits()), clock=time.monotonic_ns)
+    whole = carry_out(campaign, folder, Processes(2, RunLimits()), clock=time.monotonic_ns)
     findings = {row.finding for row in whole.progress.rows}
-    assert not findings & {Finding.NOT_REPEATED, Finding.ERROR, Finding.UNCONFIRMED}
+    assert not findings & {PointFinding.NOT_REPEATED, PointFinding.ERROR, PointFinding.UNCONFIRMED}
     told = {
         f"{row.number:04d}": (run.outcome.verdict.value, run.outcome.sha256, list(run.outcome.failures))
         for row in whole.failures

@@ -13,12 +13,12 @@ from hypothesis import strategies as st
 
 from robot_bench.campaign import journal as journal_module
 from robot_bench.campaign.journal import NAME, Journal, plain_of
-from robot_bench.campaign.trial import GoalResult, Hit, Outcome, Verdict
+from robot_bench.campaign.trial import GoalResult, HullContact, Outcome, TrialVerdict
 from simbase.errors import FileError
 
 GOAL = GoalResult(kind="no_collision", wanted="touches nothing", met=False, says="it did", robustness=-0.5, unit="m")
 OUTCOME = Outcome(
-    verdict=Verdict.FAILED, goals=(GOAL,), blocks=frozenset({0x0800_0100, 0x0800_0200}), way_mm=((0, 0), (5, 7)),
+    verdict=TrialVerdict.FAILED, goals=(GOAL,), blocks=frozenset({0x0800_0100, 0x0800_0200}), way_mm=((0, 0), (5, 7)),
     lines=frozenset({"turn"}), hits=(), failures=("touched",), sha256="ab" * 32, virtual_ns=4_000_000_000,
 )  # fmt: skip
 KEYS = ("cheap:1", "cheap:2", "full:2")
@@ -143,7 +143,9 @@ def test_a_line_that_the_disk_had_no_room_for_is_told_of_and_taken_off(tmp_path:
         found = Journal(tmp_path)
         assert len(found) == whole[:size].count(b"\n")
         assert found.left_out == {}
-        found.add("cheap:9", replace(OUTCOME, hits=(Hit(t=1, what="a post", part="front", x_m=1.0, y_m=2.0),)), 1.0)
+        found.add(
+            "cheap:9", replace(OUTCOME, hits=(HullContact(t=1, what="a post", part="front", x_m=1.0, y_m=2.0),)), 1.0
+        )
         found.close()
         assert len(Journal(tmp_path)) == whole[:size].count(b"\n") + 1
 

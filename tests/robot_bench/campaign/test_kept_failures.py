@@ -9,7 +9,7 @@ import pytest
 
 from p2os.cli import main as cli
 from robot_bench.campaign.trial import run_trial, trial_of
-from robot_bench.campaign.variants.shrinking.failure import Way
+from robot_bench.campaign.variants.shrinking.failure import FailureMode
 from robot_bench.campaign.variants.shrinking.kept import test_text as text_of_test
 from robot_bench.campaign.variants.shrinking.kept import trial_of_run
 from robot_bench.report.make import Files
@@ -123,7 +123,7 @@ def test_a_run_whose_scenario_or_program_is_gone_is_refused(capsys: pytest.Captu
 
 def test_the_test_of_a_fault_asks_whether_the_program_died() -> None:
     trial = trial_of("dodge").set(("duration_s", 2.5))
-    text = text_of_test(trial, Way(what="firmware fault: BusFault: write to nothing", is_fault=True))
+    text = text_of_test(trial, FailureMode(what="firmware fault: BusFault: write to nothing", is_fault=True))
     compile(text, "test.py", "exec")
     assert "assert not bench.chip.has_died" in text
     assert 'bench.run_until("2.5 s")' in text

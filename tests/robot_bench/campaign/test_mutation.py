@@ -18,7 +18,7 @@ from robot_bench.bench import Bench
 from robot_bench.campaign.variants.mutation import base_run as runs
 from robot_bench.campaign.variants.mutation.base_run import BaseRun, base_run
 from robot_bench.campaign.variants.mutation.interval import share_interval
-from robot_bench.campaign.variants.mutation.trial import Fate, Found, try_mutant
+from robot_bench.campaign.variants.mutation.trial import Fate, MutantResult, try_mutant
 from robot_bench.cli.campaigns.mutate import _drawn
 from robot_bench.scenario.scenario import load_scenario
 from tests.bluepill_sim.machine import Assembler
@@ -73,7 +73,7 @@ def base() -> BaseRun:
     return base_run(load_scenario("mine.toml"), time.process_time_ns)
 
 
-def tried(run: BaseRun, wanted: Callable[[Mutant], bool] = lambda _: True) -> dict[str, Found]:
+def tried(run: BaseRun, wanted: Callable[[Mutant], bool] = lambda _: True) -> dict[str, MutantResult]:
     """Return what became of mutants, each tried on the one bench, which goes back for each."""
     found = {}
     for mutant in mutants(run.board.image, run.first_ns):
@@ -157,9 +157,9 @@ def test_the_command_prints_a_score_that_is_the_least_one_and_the_survivors_in_8
 def test_a_score_below_the_least_one_fails(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     """The command above has tried them: here two of each five are noticed, and of all eleven the last has one trace."""
 
-    def try_all(tried: list[Mutant], *_: object) -> tuple[list[Found], list[str], bool]:
-        found = [Found(Fate.MISSED if place % 5 < 2 else Fate.SURVIVED) for place in range(len(tried))]
-        return [*found[:10], *(Found(Fate.SAME) for _ in found[10:])], [], True
+    def try_all(tried: list[Mutant], *_: object) -> tuple[list[MutantResult], list[str], bool]:
+        found = [MutantResult(Fate.MISSED if place % 5 < 2 else Fate.SURVIVED) for place in range(len(tried))]
+        return [*found[:10], *(MutantResult(Fate.SAME) for _ in found[10:])], [], True
 
     monkeypatch.setattr("robot_bench.cli.campaigns.mutate._try_all", try_all)
     words = ["mutate", "x.bin", "mine.toml"]

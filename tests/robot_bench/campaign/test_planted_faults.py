@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from robot_bench.campaign.campaign_file import Budget, Limits, parse_campaign
+from robot_bench.campaign.campaign_file import Budget, RunLimits, parse_campaign
 from robot_bench.campaign.conduct import Conduct
 from robot_bench.campaign.suggestion import suggested
 from robot_bench.campaign.workers.processes import Processes
@@ -38,7 +38,7 @@ def failures(firmware: Path | None, folder: Path) -> int:
     text = suggested(load_scenario("dodge"), "dodge", "mine.toml")
     campaign = parse_campaign(text, folder / "mine.toml", firmware=firmware)
     campaign = replace(campaign, budget=Budget(runs=RUNS, confirmations=0))
-    conduct = Conduct(campaign, folder, Processes(2, Limits()), clock=time.monotonic_ns)
+    conduct = Conduct(campaign, folder, Processes(2, RunLimits()), clock=time.monotonic_ns)
     failed = (sum((row.cheap.margin or 0.0) < 0 for row in rows) for rows in conduct.batches())
     return next(filter(None, failed), 0)
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robot_bench.campaign.trial import Trial, run_trial, trial_of
-from robot_bench.campaign.variants.shrinking.failure import Failure, Way, failure_of
+from robot_bench.campaign.variants.shrinking.failure import Failure, FailureMode, failure_of
 from robot_bench.campaign.variants.shrinking.reduction import ANGLE_STEPS, STEPS, fewest, rounded, rounder
 from robot_bench.campaign.variants.shrinking.shrink import Judge, NoFailureError, shrink
 from robot_bench.campaign.variants.shrinking.things import (
@@ -39,12 +39,12 @@ def planted() -> tuple[Trial, list[Trial]]:
 def judged_by(needed: set[str], asked: list[Trial]) -> Judge:
     """Return a judge to whom a trial fails that has all of some obstacles, each right of x = 0.9 m."""
 
-    def judge(trial: Trial, way: Way | None, _until_ns: Nanos | None) -> Failure | None:
+    def judge(trial: Trial, way: FailureMode | None, _until_ns: Nanos | None) -> Failure | None:
         asked.append(trial)
         posts = {str(post["name"]): post for post in trial.table.get("obstacle", [])}  # type: ignore[attr-defined]
         if not needed <= posts.keys() or any(posts[name]["x_m"] < 0.9 for name in needed):
             return None
-        found = Way(what="touches nothing", part="front")
+        found = FailureMode(what="touches nothing", part="front")
         if way is not None and way != found:
             return None
         return Failure(way=found, at_ns=5 * NS_PER_S + 1, is_early=True, says="", blocks=frozenset())
@@ -102,7 +102,7 @@ def test_where_the_quick_run_misleads_all_is_done_as_it_was_meant() -> None:
     """At the cheap fidelity one post suffices; as it was meant the trial needs two."""
     trial, asked = planted()
 
-    def judge(candidate: Trial, way: Way | None, until_ns: Nanos | None) -> Failure | None:
+    def judge(candidate: Trial, way: FailureMode | None, until_ns: Nanos | None) -> Failure | None:
         needed = {"post 3"} if candidate.table["body"] == "kinematic" else {"post 3", "post 9"}
         return judged_by(needed, asked)(candidate, way, until_ns)
 
@@ -189,7 +189,7 @@ def test_a_failure_is_told_with_its_time_and_part_and_one_of_another_way_is_not(
     trial = trial_of("dodge", settings=settings, firmware=hurried("dodge"))
     found = failure_of(trial)
     assert found is not None
-    assert (found.way, found.is_early) == (Way(what="touches nothing", part="front"), True)
+    assert (found.way, found.is_early) == (FailureMode(what="touches nothing", part="front"), True)
     assert found.blocks
     assert failure_of(trial, replace(found.way, part="rear")) is None
     assert failure_of(trial, found.way, found.at_ns - NS_PER_S) is None

@@ -12,7 +12,7 @@ from p2os.pioneer.world.model import Obstacle, Pose
 from p2os.robots.parameters import load_parameters
 from p2os.toml_schema import Table
 from robot_bench.campaign.campaign_file import Span
-from robot_bench.campaign.things import HEIGHT_M, KINDS, Room, Thing
+from robot_bench.campaign.things import HEIGHT_M, KINDS, DrawnThing, Room
 from robot_bench.scenario.world_script import load_changes
 
 WORLD = load_world("room")
@@ -43,9 +43,9 @@ things = st.lists(
 )  # fmt: skip
 
 
-def drawn(rows: list[tuple[str, float, float, float, float]]) -> list[Thing]:
+def drawn(rows: list[tuple[str, float, float, float, float]]) -> list[DrawnThing]:
     return [
-        Thing(
+        DrawnThing(
             name=f"t{number}", kind=kind, place=(x, y, heading),
             measures={key: low + share * (high - low) for key, (low, high) in KINDS[kind].measures.items()},
         )
@@ -78,7 +78,7 @@ def test_a_thing_with_room_stands_where_it_was_drawn(kind: str) -> None:
 
 
 def test_a_dead_end_is_as_wide_and_deep_inside_as_it_was_drawn() -> None:
-    thing = Thing(name="d", kind="dead-end", place=(0.0, 0.5, 0.0), measures={"width_m": 0.8, "depth_m": 0.6})
+    thing = DrawnThing(name="d", kind="dead-end", place=(0.0, 0.5, 0.0), measures={"width_m": 0.8, "depth_m": 0.6})
     back, left, right = (footprint(t) for t in Room(WORLD, [Pose(0.0, -2.5, 0.0)], 0.0, 0.1).tables([thing]))
     assert apart_m(left, right) == pytest.approx(0.8)
     assert back.bounds[2] == pytest.approx(-0.3)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from robot_bench.campaign.trial import Outcome, Trial, Verdict, bench_of, run_trial, trial_of, unpacked
+from robot_bench.campaign.trial import Outcome, Trial, TrialVerdict, bench_of, run_trial, trial_of, unpacked
 from robot_bench.events.kinds import Note, Text
 from robot_bench.run import run_scenario
 from robot_bench.scenario.scenario import load_scenario
@@ -93,12 +93,12 @@ def test_a_goal_that_the_run_was_too_short_for_is_no_failure(tmp_path: Path) -> 
     path = scenario_in(tmp_path)
     path.write_text(path.read_text().replace("duration_s = 2.0\n", "") + '[[goal]]\nkind = "cells"\nleast = 30\n')
     missed = run_trial(trial_of(str(path), settings=[("duration_s", 1)]))
-    assert (missed.verdict, [goal.met for goal in missed.goals]) == (Verdict.FAILED, [False])
+    assert (missed.verdict, [goal.met for goal in missed.goals]) == (TrialVerdict.FAILED, [False])
 
 
 def test_a_world_that_refuses_the_start_is_an_error_that_says_so(trial: Trial) -> None:
     found = run_trial(trial.set(("start.x_m", 50.0), ("start.y_m", 0.0)))
-    assert (found.verdict, found.sha256) == (Verdict.ERROR, "")
+    assert (found.verdict, found.sha256) == (TrialVerdict.ERROR, "")
     assert "start" in found.failures[0]
 
 
@@ -162,9 +162,9 @@ def test_a_firmware_that_is_not_there_is_refused_in_a_line() -> None:
 
 
 @pytest.mark.parametrize("core", ["model", "firmware"])
-@pytest.mark.parametrize(("stale_ms", "verdict"), [(399, Verdict.FAILED), (500, Verdict.PASSED)])
+@pytest.mark.parametrize(("stale_ms", "verdict"), [(399, TrialVerdict.FAILED), (500, TrialVerdict.PASSED)])
 def test_a_distance_that_is_stale_before_the_ring_is_round_holds_the_robot(
-    core: str, stale_ms: int, verdict: Verdict
+    core: str, stale_ms: int, verdict: TrialVerdict
 ) -> None:
     settings = [("body", "kinematic"), ("duration_s", 4), ("adapter", {"core": core, "distance_stale_ms": stale_ms})]
     goal = {"kind": "moves_on", "way_m": 0.3, "within_s": 3.5}

@@ -9,14 +9,14 @@ from rich.console import Console
 from robot_bench.cli import progress
 from robot_bench.cli.progress import RunDisplay
 from robot_bench.cli.table import rows
-from robot_bench.run import Progress
+from robot_bench.run import RunProgress
 from simbase.command_line.signals import end_on_signals, restored_signals
 
 S = 10**9
 
 
-def at(now_s: float) -> Progress:
-    return Progress(now=round(now_s * S), duration_ns=120 * S, doing=lambda: "+187 / +187 mm/s  dodge: CRUISE")
+def at(now_s: float) -> RunProgress:
+    return RunProgress(now=round(now_s * S), duration_ns=120 * S, doing=lambda: "+187 / +187 mm/s  dodge: CRUISE")
 
 
 def test_a_terminal_shows_time_speed_and_what_the_robot_does(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,7 +15,7 @@ import pytest
 
 from p2os.cli.main import run as p2os
 from robot_bench.cli.run import sweep_rows
-from robot_bench.cli.sweep import Done, print_sweep
+from robot_bench.cli.sweep import SweepResult, print_sweep
 from robot_bench.cli.workers import run_in_processes
 from robot_bench.scenario.scenario import load_scenario
 from simbase.trust import Trust
@@ -108,7 +108,7 @@ def printed(seeds: str, capsys: pytest.CaptureFixture[str]) -> list[str]:
     rows = sweep_rows(name, load_scenario(name), {}, seeds, Trust())
     passed = [dict(row.settings)["start.x_m"] == 0.5 for row in rows]
     outcomes = [{"passed": one, "failures": [] if one else ["stay_within: it did not"]} for one in passed]
-    print_sweep(Done(rows, outcomes, was_interrupted=False, folder=Path("runs")))
+    print_sweep(SweepResult(rows, outcomes, was_interrupted=False, folder=Path("runs")))
     return capsys.readouterr().out.splitlines()
 
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from bluepill_sim.fabric.subscriptions import Wave
 from robot_bench.direct.differential.bridge import TRUTH, HBridge
-from robot_bench.direct.differential.description import Bridge, BridgeKind, Off
+from robot_bench.direct.differential.description import BridgeDescription, BridgeKind, Off
 from robot_bench.wires.nets import Net, Strength, WaveDrive
 from robot_bench.wires.waves import edge_times, high_time_ns
 from simbase.timing import NS_PER_S
@@ -24,7 +24,7 @@ def wave(high: int, *, period: int = 3600, hz: int = 72_000_000, at: int = 0, ns
 
 def bridge(kind: BridgeKind, off: Off = Off.BRAKE, dead_time_ns: int = 0) -> tuple[HBridge, list[Net]]:
     nets = [Net(name) for name in kind.pins]
-    return HBridge(nets, Bridge(kind=kind, off=off, dead_time_ns=dead_time_ns)), nets
+    return HBridge(nets, BridgeDescription(kind=kind, off=off, dead_time_ns=dead_time_ns)), nets
 
 
 @pytest.mark.parametrize("off", list(Off))

@@ -13,7 +13,7 @@ from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import Obstacle, Pose
 from robot_bench.bench.board import make_own_harness
-from robot_bench.direct.differential.analog import GP2Y0A21, Cell, volts_at
+from robot_bench.direct.differential.analog import GP2Y0A21, DischargingBattery, volts_at
 from robot_bench.direct.differential.description import Differential, Off
 from robot_bench.direct.differential.robot import DifferentialRobot
 from robot_bench.wires.nets import Harness, Strength, WaveDrive
@@ -137,7 +137,7 @@ def test_the_curve_is_a_line_between_its_points_and_flat_beyond(metres: float, v
 
 
 def test_a_battery_falls_in_a_line_and_is_empty_when_its_charge_is_out() -> None:
-    cell = Cell(rover().battery)
+    cell = DischargingBattery(rover().battery)
     cell.give(2.2, 1800)
     assert cell.source_v == pytest.approx((12.6 + 9.0) / 2)
     cell.give(2.2, 1799.9)

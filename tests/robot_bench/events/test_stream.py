@@ -38,7 +38,7 @@ from robot_bench.events.stream import EventStream
 from robot_bench.events.words import told_apart, what_of
 from robot_bench.scenario.fault_script import FaultChange
 from robot_bench.scenario.scenario import Scenario, load_scenario
-from robot_bench.scenario.world_script import Change, Op
+from robot_bench.scenario.world_script import Op, ScriptedChange
 from robot_bench.wires.edges import Edges
 from tests.robot_bench.wires.fake_chip import FakeChip, PinDrive
 
@@ -250,7 +250,7 @@ scenarios = st.fixed_dictionaries(
 def built(plan: dict[str, Any]) -> Bench:
     of: Scenario = load_scenario("motors").with_options(mode=plan["mode"], body="kinematic", duration_s=0.9)
     if plan["crate_ms"] is not None:
-        crate = Change(
+        crate = ScriptedChange(
             at=plan["crate_ms"] * MS, op=Op.PLACE, name="post 9", x_m=0.1, y_m=0.0,
             obstacle=replace(CRATE.obstacle, name="post 9", radius_m=0.3) if CRATE.obstacle else None,
         )  # fmt: skip

@@ -16,7 +16,15 @@ from robot_bench.drives.drive import Drive, Steps, Trajectory
 from robot_bench.drives.of_packets import drive_of_capture
 from robot_bench.experiments.drive_files import read_drive
 from robot_bench.experiments.fitting.clocks import on_one_clock, without_delays
-from robot_bench.experiments.fitting.examples import Recorded, empty_world, planted, record, square, wandering, write
+from robot_bench.experiments.fitting.examples import (
+    ExampleDrive,
+    empty_world,
+    planted,
+    record,
+    square,
+    wandering,
+    write,
+)
 from robot_bench.experiments.fitting.least_squares import Parameter, Rounding, fit
 from robot_bench.experiments.fitting.ramps import fit_ramps, ramped
 from robot_bench.experiments.fitting.rounding import grain_of, noise_before
@@ -244,7 +252,7 @@ def squares(seed: int, runs: int, *, noise: bool) -> list[Drive]:
     return found
 
 
-def drive_of(recorded: Recorded) -> Drive:
+def drive_of(recorded: ExampleDrive) -> Drive:
     found = drive_of_capture("a square", recorded.capture, P2DX)
     found.truth = Trajectory.of_rows(list(recorded.poses))
     return found

@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robot_bench.experiments.sensitivity import Design, Range, outcome_names, read_range
+from robot_bench.experiments.sensitivity import Range, SampleDesign, outcome_names, read_range
 from simbase.errors import UsageError
 
 pytestmark = pytest.mark.skipif(find_spec("SALib") is None, reason="the extra experiments is not installed")
 
 
-def design(*ranges: Range, steps: int = 5, trajectories: int = 20) -> Design:
-    return Design(ranges=ranges, steps=steps, trajectories=trajectories, seed=1)
+def design(*ranges: Range, steps: int = 5, trajectories: int = 20) -> SampleDesign:
+    return SampleDesign(ranges=ranges, steps=steps, trajectories=trajectories, seed=1)
 
 
 @pytest.mark.parametrize(
@@ -63,7 +63,7 @@ def test_points_are_within_the_ranges_each_once_and_whole_where_the_ends_are() -
     assert all(1 <= a <= 4 and a == round(a) and 0.5 <= b <= 2.0 for a, b in points)
     assert {type(value) for _, value in box.settings(points[0])} == {int, float}
     assert points == design(*box.ranges).points()
-    assert points != Design(ranges=box.ranges, steps=5, trajectories=20, seed=2).points()
+    assert points != SampleDesign(ranges=box.ranges, steps=5, trajectories=20, seed=2).points()
 
 
 def test_the_ishigami_functions_third_parameter_acts_only_with_the_first() -> None:
@@ -78,7 +78,7 @@ def test_the_ishigami_functions_third_parameter_acts_only_with_the_first() -> No
 
 
 def test_the_ishigami_functions_indices_are_those_of_its_formula() -> None:
-    box = Design(
+    box = SampleDesign(
         ranges=tuple(Range(name, -math.pi, math.pi, False) for name in "abc"), steps=0, trajectories=0, seed=3,
         samples=1024,
     )  # fmt: skip
@@ -95,7 +95,9 @@ def test_the_ishigami_functions_indices_are_those_of_its_formula() -> None:
 
 
 def test_an_outcome_that_never_changes_has_no_variance_to_share() -> None:
-    box = Design(ranges=(Range("a", 0, 1, False), Range("b", 0, 1, False)), steps=0, trajectories=0, seed=0, samples=4)
+    box = SampleDesign(
+        ranges=(Range("a", 0, 1, False), Range("b", 0, 1, False)), steps=0, trajectories=0, seed=0, samples=4
+    )
     assert [(one.S1, one.ST) for one in box.effects(lambda _point: 2.0)] == [(0.0, 0.0), (0.0, 0.0)]
 
 

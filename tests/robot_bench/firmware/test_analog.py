@@ -5,7 +5,7 @@ from importlib.resources import files
 import pytest
 
 from bluepill_sim import BluePill
-from bluepill_sim.fabric.signals import Oscillation, Shape
+from bluepill_sim.fabric.signals import Oscillation, Waveform
 
 ANALOG = str(files("robot_bench.firmware") / "analog.elf")
 
@@ -14,7 +14,7 @@ def test_it_prints_the_volts_of_its_pins_the_supply_and_the_temperature() -> Non
     board = BluePill(ANALOG)
     board.vdda_v, board.temperature_c = 3.0, 40.0
     board.pin("PA0").set_volts(1.5)
-    board.pin("PA4").set_volts(Oscillation(shape=Shape.SQUARE, low_v=1.0, high_v=2.0, period_ns=200_000_000))
+    board.pin("PA4").set_volts(Oscillation(shape=Waveform.SQUARE, low_v=1.0, high_v=2.0, period_ns=200_000_000))
     board.pin("PA7").drive(True)
     board.run_for("230 ms")
     assert bytes(board.usart1.unread).decode().splitlines() == [

@@ -20,12 +20,12 @@ from robot_bench.firmware.build import COMPILER, HERE, compiler_version
 from robot_bench.recording.run_record import RunRecord, read_run
 from robot_bench.recording.signals import motor_steps
 from robot_bench.report.explain import findings
-from robot_bench.report.explain.chain import WIDTH, Evidence, Explanation, Standing, Step
+from robot_bench.report.explain.chain import WIDTH, ChainLink, Evidence, Explanation, Standing
 from robot_bench.report.explain.contact import exchanged
 from robot_bench.report.explain.explain import explain
 from robot_bench.report.explain.findings import all_steady_since, held_codes, injected, let_go
-from robot_bench.report.explain.probing import SAME_NS, Answer, first_row, parted
-from robot_bench.report.explain.replay import ChipReplay, Hold, Seen
+from robot_bench.report.explain.probing import SAME_NS, SensorResponse, first_row, parted
+from robot_bench.report.explain.replay import ChipReplay, Hold, ReplayPart
 from robot_bench.report.explain.scene import Scene
 from robot_bench.report.make import Files
 from robot_bench.run import run_scenario
@@ -55,10 +55,10 @@ def unfair(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "run"
 
 
-def answers(codes: dict[int, tuple[int, int]]) -> dict[str, Answer]:
+def answers(codes: dict[int, tuple[int, int]]) -> dict[str, SensorResponse]:
     """Return answers to each sensor alone, those not named by driving slower."""
     return {
-        net: Answer(at=0, base=(3, 3), codes=codes.get(place, (2, 2)), noticed=1, answered=2)
+        net: SensorResponse(at=0, base=(3, 3), codes=codes.get(place, (2, 2)), noticed=1, answered=2)
         for place, net in enumerate(NETS, 1)
     }
 
@@ -101,7 +101,7 @@ def test_the_first_row_that_differs_is_found(
     """Where the one that ends has more rows than were recorded, its end is no difference."""
     ours, theirs = common + ours, common + theirs
     one, other = (
-        Seen(packed_rows=b"".join(RECORD.pack(n, 0, row) for n, row in enumerate(rows)), has_more_rows=more)
+        ReplayPart(packed_rows=b"".join(RECORD.pack(n, 0, row) for n, row in enumerate(rows)), has_more_rows=more)
         for rows, more in zip((ours, theirs), has_more, strict=True)
     )
     ends_with_more = has_more[0] if len(ours) < len(theirs) else has_more[1]
@@ -163,7 +163,8 @@ def test_a_point_is_in_a_cone_up_to_its_border_and_the_threshold() -> None:
 def test_a_text_is_no_wider_than_a_terminal_and_names_its_evidence() -> None:
     found = Explanation(
         failure="no_collision: " + "x " * 90, standing=Standing.CAUSE, summary="word " * 60,
-        steps=(Step(t=1_500_000_000, part="firmware", says="y " * 100, evidence=Evidence.CHANGED),), also=("z " * 80,),
+        steps=(ChainLink(t=1_500_000_000, part="firmware", says="y " * 100, evidence=Evidence.CHANGED),),
+        also=("z " * 80,),
     )  # fmt: skip
     lines = found.text().splitlines()
     assert max(map(len, lines)) <= WIDTH

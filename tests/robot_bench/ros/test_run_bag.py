@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("rosbags", reason="the extra ros is not installed")
 
 from p2os.cli.main import run as p2os
-from p2os.ros.bags import Recorded, read_bag
+from p2os.ros.bags import BagMessage, read_bag
 from robot_bench.bench import Bench
 from robot_bench.events.codec import Json
 from robot_bench.events.kinds import Event, Note, Packet, PinEdge, Pose, Text, Verdict
@@ -34,24 +34,24 @@ def happened(made: Scenario) -> tuple[list[Event], Json]:
 
 
 @pytest.fixture(scope="module")
-def bag(tmp_path_factory: pytest.TempPathFactory) -> list[Recorded]:
+def bag(tmp_path_factory: pytest.TempPathFactory) -> list[BagMessage]:
     folder = tmp_path_factory.mktemp("run") / "bag"
     seen, meta = happened(scenario(mode="adapter", lasts_s=0.8))
     write_bag(seen, folder, meta, "sqlite3")
     return list(read_bag(folder, TYPES)) + [
-        Recorded("event", type(event).__name__, event.t, {"event": event}) for event in seen
+        BagMessage("event", type(event).__name__, event.t, {"event": event}) for event in seen
     ]
 
 
-def of(bag: list[Recorded], topic: str) -> list[tuple[int, Any]]:
+def of(bag: list[BagMessage], topic: str) -> list[tuple[int, Any]]:
     return [(one.at_ns, one.message) for one in bag if one.topic == topic]
 
 
-def events(bag: list[Recorded], kind: type[Event]) -> list[Any]:
+def events(bag: list[BagMessage], kind: type[Event]) -> list[Any]:
     return [message["event"] for _, message in of(bag, "event") if isinstance(message["event"], kind)]
 
 
-def test_the_bytes_of_the_line_are_found_again(bag: list[Recorded]) -> None:
+def test_the_bytes_of_the_line_are_found_again(bag: list[BagMessage]) -> None:
     packets = events(bag, Packet)
     assert {packet.direction for packet in packets} == {"c2r", "r2c"}
     for topic, direction in (("/p2os/from_client", "c2r"), ("/p2os/from_robot", "r2c")):
@@ -59,7 +59,7 @@ def test_the_bytes_of_the_line_are_found_again(bag: list[Recorded]) -> None:
         assert told == [(packet.t, packet.data) for packet in packets if packet.direction == direction]
 
 
-def test_odometry_is_the_true_pose_with_its_time(bag: list[Recorded]) -> None:
+def test_odometry_is_the_true_pose_with_its_time(bag: list[BagMessage]) -> None:
     told = [
         (at, message["header"]["stamp"]["nanosec"], message["pose"]["pose"]["position"]["x"])
         for at, message in of(bag, "/odom")
@@ -67,7 +67,7 @@ def test_odometry_is_the_true_pose_with_its_time(bag: list[Recorded]) -> None:
     assert told == [(pose.t, pose.t, pose.x_m) for pose in events(bag, Pose)]
 
 
-def test_prints_and_notes_are_in_rosout(bag: list[Recorded]) -> None:
+def test_prints_and_notes_are_in_rosout(bag: list[BagMessage]) -> None:
     told = [(message["name"], message["msg"]) for _, message in of(bag, "/rosout")]
     for text in events(bag, Text):
         assert (text.port, text.data.decode().rstrip("\r\n")) in told

@@ -8,7 +8,7 @@ import pytest
 from bluepill_sim.program.image import load_image
 from p2os.cli.main import run as p2os
 from robot_bench.recording.run_folder import FILES
-from robot_bench.run import Progress, RunResult, run_scenario
+from robot_bench.run import RunProgress, RunResult, run_scenario
 from robot_bench.scenario.scenario import Scenario, load_scenario
 
 CASES = [("python", "adapter"), ("native", "direct"), ("native", "adapter")]
@@ -79,7 +79,7 @@ def test_one_of_the_two_is_enough_and_a_program_without_debug_information_is_mea
 
 
 def test_an_interrupted_run_tells_what_ran_until_then(tmp_path: Path) -> None:
-    def interrupt(progress: Progress) -> None:
+    def interrupt(progress: RunProgress) -> None:
         if progress.now > progress.duration_ns // 2:
             raise KeyboardInterrupt
 

@@ -21,7 +21,7 @@ from pathlib import Path
 
 import pytest
 
-from adapter_sim.pinout import Direction, load_pinout
+from adapter_sim.pinout import WireDirection, load_pinout
 from p2os.pioneer.world.model import Pose
 from p2os.robots.parameters import RobotParameters
 from robot_bench.bench import Bench
@@ -57,7 +57,9 @@ def recorded(scenario: Scenario, folder: Path, chip: FakeChip | None = None) -> 
 
 
 def chip_edges(record: RunRecord) -> dict[str, list[tuple[int, int]]]:
-    return {wire.name: record.pins[wire.name] for wire in load_pinout().wires if wire.direction is Direction.TO_ADAPTER}
+    return {
+        wire.name: record.pins[wire.name] for wire in load_pinout().wires if wire.direction is WireDirection.TO_ADAPTER
+    }
 
 
 def motor_pairs(record: RunRecord) -> list[tuple[int, tuple[int, int]]]:

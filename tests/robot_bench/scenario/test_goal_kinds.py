@@ -12,14 +12,14 @@ from p2os.errors import ScenarioError
 from robot_bench.events.kinds import Clearance, Contact, Event, Fault, Note, PinEdge, Pose, Ranges, Text, Wave
 from robot_bench.scenario.goals.judging import Goal, GoalJudge, RunEnd, load_goal
 from robot_bench.scenario.goals.kinds import KINDS, every_kind
-from robot_bench.scenario.goals.watch import Outcome
+from robot_bench.scenario.goals.watch import GoalOutcome
 from tests.robot_bench.recording.records import S, pose
 
 MS = 10**6
 UM = 1_000_000
 
 
-def outcome(kind: str, run: Sequence[Event], end: int = 10 * S, **arguments: Any) -> Outcome:
+def outcome(kind: str, run: Sequence[Event], end: int = 10 * S, **arguments: Any) -> GoalOutcome:
     """Return what a goal says of a run; it must say the same where it was saved and restored between any two events."""
     goal = load_goal(
         {"kind": kind, **{key.rstrip("_"): value for key, value in arguments.items()}}, "mine.toml: [[goal]] 1"

@@ -9,7 +9,7 @@ from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import Obstacle, Pose
 from p2os.robots.parameters import load_parameters
-from robot_bench.scenario.world_script import BeforeSonar, Change, Op, WorldScript, load_changes
+from robot_bench.scenario.world_script import BeforeSonar, Op, ScriptedChange, WorldScript, load_changes
 
 S = 10**9
 P2DX = load_parameters("p2dx")
@@ -19,7 +19,7 @@ def post(name: str = "post") -> Obstacle:
     return Obstacle(name=name, x_m=0, y_m=0, radius_m=0.02, height_m=0.5)
 
 
-def script(*changes: Change) -> tuple[WorldScript, list[tuple[str, str, int, dict[str, object]]], list[int]]:
+def script(*changes: ScriptedChange) -> tuple[WorldScript, list[tuple[str, str, int, dict[str, object]]], list[int]]:
     body = make_body("kinematic", load_world("room"), P2DX)
     body.reset(Pose(-1.0, 0.0, math.pi / 2), 0)
     changed: list[tuple[str, str, int, dict[str, object]]] = []
@@ -36,9 +36,9 @@ def script(*changes: Change) -> tuple[WorldScript, list[tuple[str, str, int, dic
 
 def test_changes_happen_in_order_of_time_each_at_its_own() -> None:
     made, changed, brought = script(
-        Change(at=3 * S, op=Op.REMOVE, name="post"),
-        Change(at=S, op=Op.PLACE, name="post", obstacle=post(), x_m=1, y_m=-1),
-        Change(at=2 * S, op=Op.MOVE, name="post", x_m=1.5, y_m=-1, heading_rad=0.5),
+        ScriptedChange(at=3 * S, op=Op.REMOVE, name="post"),
+        ScriptedChange(at=S, op=Op.PLACE, name="post", obstacle=post(), x_m=1, y_m=-1),
+        ScriptedChange(at=2 * S, op=Op.MOVE, name="post", x_m=1.5, y_m=-1, heading_rad=0.5),
     )
     assert made.next_deadline() == S
     made.advance_to(S)
@@ -54,7 +54,9 @@ def test_changes_happen_in_order_of_time_each_at_its_own() -> None:
 
 @pytest.mark.parametrize("number", range(1, 9))
 def test_a_thing_before_a_sonar_is_what_that_sonar_sees(number: int) -> None:
-    change = Change(at=0, op=Op.PLACE, name="post", obstacle=post(), before=BeforeSonar(number=number, distance_m=0.45))
+    change = ScriptedChange(
+        at=0, op=Op.PLACE, name="post", obstacle=post(), before=BeforeSonar(number=number, distance_m=0.45)
+    )
     made, changed, _ = script(change)
     made.advance_to(0)
     ranges = made._body.ranges(range(8))
@@ -65,7 +67,7 @@ def test_a_thing_before_a_sonar_is_what_that_sonar_sees(number: int) -> None:
 
 def test_a_restored_script_does_nothing_twice() -> None:
     changes = [
-        Change(at=at * S, op=Op.PLACE, name=f"post {at}", obstacle=post(f"post {at}"), x_m=1, y_m=at / 4)
+        ScriptedChange(at=at * S, op=Op.PLACE, name=f"post {at}", obstacle=post(f"post {at}"), x_m=1, y_m=at / 4)
         for at in (1, 2)
     ]
     first, _, _ = script(*changes)

@@ -14,7 +14,7 @@ import typer
 from p2os.cli.main import make_app
 from p2os.cli.main import run as p2os
 from p2os.toml_file import toml_text
-from robot_bench.campaign.trial import Verdict, run_trial, trial_of
+from robot_bench.campaign.trial import TrialVerdict, run_trial, trial_of
 from robot_bench.campaign.variants.shrinking.kept import trial_of_run
 from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.recording.run_record import TRACE_NAME, read_run
@@ -164,7 +164,7 @@ def test_a_trial_takes_its_code_and_the_trust_in_it_along(folder: Path) -> None:
     trial = trial_of("mine.toml", trust=True)
     executed_by(folder)
     assert sorted(name.rpartition("/")[2] for name in trial.files) == ["aid_of_mine.py", "mine.py", MOTORS.name]
-    assert run_trial(trial).verdict is Verdict.PASSED
+    assert run_trial(trial).verdict is TrialVerdict.PASSED
     assert executed_by(folder)
     name = next(name for name in trial.files if name.endswith("aid_of_mine.py"))
     other = type(trial)(

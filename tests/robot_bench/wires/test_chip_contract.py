@@ -10,7 +10,7 @@ import pytest
 
 from bluepill_sim.board import BluePill
 from bluepill_sim.fabric.subscriptions import EDGE
-from robot_bench.wires.ports import Chip
+from robot_bench.wires.ports import LeadingChip
 from simbase.timing import Reason
 from tests.robot_bench.wires.fake_chip import FakeChip, PinDrive
 
@@ -28,20 +28,20 @@ def edges_of(rows: bytes) -> list[tuple[int, str, PinDrive]]:
     return found
 
 
-def scripted() -> Chip:
+def scripted() -> LeadingChip:
     return FakeChip(FIRST_EDGES, [(MS, b"motors: ready\n")])
 
 
-def emulated() -> Chip:
+def emulated() -> LeadingChip:
     return BluePill(Path(str(files("robot_bench.firmware").joinpath("motors.elf"))))
 
 
 @pytest.fixture(params=[scripted, emulated])
-def make(request: pytest.FixtureRequest) -> Callable[[], Chip]:
+def make(request: pytest.FixtureRequest) -> Callable[[], LeadingChip]:
     return request.param  # type: ignore[no-any-return]
 
 
-def test_a_limit_is_reached_and_overrun_by_a_block_at_most(make: Callable[[], Chip]) -> None:
+def test_a_limit_is_reached_and_overrun_by_a_block_at_most(make: Callable[[], LeadingChip]) -> None:
     chip = make()
     for limit in (1_000, 33_333, 1_234_567, 20_000_001):
         reached = chip.advance_to(limit)
@@ -49,7 +49,7 @@ def test_a_limit_is_reached_and_overrun_by_a_block_at_most(make: Callable[[], Ch
         assert reached.now == chip.now_ns
 
 
-def test_edges_carry_their_own_time_and_their_pin(make: Callable[[], Chip]) -> None:
+def test_edges_carry_their_own_time_and_their_pin(make: Callable[[], LeadingChip]) -> None:
     chip, edges = make(), []
     some: list[tuple[int, str, PinDrive]] = []
     chip.subscribe_pins([f"P{port}{n}" for port in "AB" for n in range(16)], lambda rows: edges.extend(edges_of(rows)))
@@ -62,7 +62,7 @@ def test_edges_carry_their_own_time_and_their_pin(make: Callable[[], Chip]) -> N
     assert edges[-1][0] - BLOCK_NS < chip.activity.last_pin_ns <= edges[-1][0], "the boundary before it"
 
 
-def test_a_watched_pin_ends_the_slice(make: Callable[[], Chip]) -> None:
+def test_a_watched_pin_ends_the_slice(make: Callable[[], LeadingChip]) -> None:
     chip, edges = make(), []
     subscription = chip.subscribe_pins(["PB12"], lambda rows: edges.extend(edges_of(rows)), ends_slice=["PB12"])
     while not edges:
@@ -75,7 +75,9 @@ def test_a_watched_pin_ends_the_slice(make: Callable[[], Chip]) -> None:
         assert reached.reason is Reason.DEADLINE
 
 
-def test_edges_and_characters_come_before_advance_to_returns_and_end_when_told_to(make: Callable[[], Chip]) -> None:
+def test_edges_and_characters_come_before_advance_to_returns_and_end_when_told_to(
+    make: Callable[[], LeadingChip],
+) -> None:
     chip, edges, sent = make(), [], []
     subscription = chip.subscribe_pins(["PB12"], lambda rows: edges.extend(edges_of(rows)))
     end = chip.usart1.subscribe(sent.extend)
@@ -90,7 +92,7 @@ def test_edges_and_characters_come_before_advance_to_returns_and_end_when_told_t
     assert len(sent) == 1
 
 
-def test_text_comes_with_the_end_of_each_stop_bit(make: Callable[[], Chip]) -> None:
+def test_text_comes_with_the_end_of_each_stop_bit(make: Callable[[], LeadingChip]) -> None:
     chip, sent = make(), []
     chip.usart1.subscribe(lambda rows: sent.extend((at, word) for word, at in rows))
     chip.advance_to(20 * MS)
@@ -99,7 +101,7 @@ def test_text_comes_with_the_end_of_each_stop_bit(make: Callable[[], Chip]) -> N
     assert all(gap >= 10 * S // 115_200 - 1_000 for gap in gaps), "ten bits at 115 200 baud"
 
 
-def test_a_restored_chip_goes_on_alike(make: Callable[[], Chip]) -> None:
+def test_a_restored_chip_goes_on_alike(make: Callable[[], LeadingChip]) -> None:
     ends = []
     first = make()
     first.advance_to(500_000)
@@ -114,7 +116,7 @@ def test_a_restored_chip_goes_on_alike(make: Callable[[], Chip]) -> None:
     assert ends[0] == ends[1]
 
 
-def test_what_is_asked_for_at_any_time_is_there(make: Callable[[], Chip]) -> None:
+def test_what_is_asked_for_at_any_time_is_there(make: Callable[[], LeadingChip]) -> None:
     chip = make()
     assert chip.fault is None
     assert list(chip.warnings) == []

@@ -20,7 +20,7 @@ from pathlib import Path
 
 from workers import used_s
 
-from robot_bench.campaign.campaign_file import Limits, parse_campaign
+from robot_bench.campaign.campaign_file import RunLimits, parse_campaign
 from robot_bench.campaign.conduct import Conduct, Workers
 from robot_bench.campaign.search import SEARCHES
 from robot_bench.campaign.variants.against import Against, Other
@@ -151,7 +151,7 @@ def conduct(
     (folder / "floor-dodge.toml").write_text(scenario, encoding="utf-8")
     text = f'search = "{search}"\nseed = {seed}\n{CAMPAIGN.format(runs=runs, confirmations=confirmations)}{case.tables}'
     campaign = parse_campaign(text, folder / "case.toml", firmware=firmware)
-    workers: Workers = Processes(1, Limits())
+    workers: Workers = Processes(1, RunLimits())
     if case.is_compared:
         workers = Against(workers, Other("dodge.elf", (HERE / "dodge.elf").read_bytes()))
     return Conduct(campaign, folder, workers, clock=time.monotonic_ns)

@@ -16,7 +16,7 @@ import resource
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from robot_bench.campaign.campaign_file import Limits
+from robot_bench.campaign.campaign_file import RunLimits
 from robot_bench.campaign.trial import Done, Trial, run_trial, trial_of
 from robot_bench.campaign.workers.processes import Processes
 
@@ -66,7 +66,7 @@ def beginnings(runs: int, body: str) -> None:
     run_trial(base.set(("duration_s", 1)))
     found: list[dict[int, Done]] = [{}, {}]
     alone, shared = (
-        _spent(lambda anew=anew, into=into: Processes(2, Limits()).run(  # type: ignore[misc]  # as above
+        _spent(lambda anew=anew, into=into: Processes(2, RunLimits()).run(  # type: ignore[misc]  # as above
             trials, lambda place, done: into.update({place: done}), anew=anew
         ))
         for anew, into in zip((True, False), found, strict=True)
@@ -84,7 +84,7 @@ def _in_turn(trials: Sequence[Trial], on_done: Callable[[int, Done], None]) -> N
 
 
 def _forked(trials: Sequence[Trial], on_done: Callable[[int, Done], None], at_once: int = 2) -> None:
-    Processes(at_once, Limits()).run(trials, on_done, anew=True)
+    Processes(at_once, RunLimits()).run(trials, on_done, anew=True)
 
 
 def _held_mb() -> float:

@@ -62,7 +62,7 @@ class Sample:
 
 
 @dataclass(slots=True)
-class Peer:
+class PeerSession:
     """A session with one robot, in real time."""
 
     url: str
@@ -202,7 +202,7 @@ FIGURES: dict[str, tuple[str, str]] = {
 }
 
 
-def drive(peer: Peer) -> Found:
+def drive(peer: PeerSession) -> Found:
     """Take one robot through the script."""
     found: Found = {}
     for name, value in (("ENABLE", 1), ("SETV", 400), ("SETRV", 60), ("SETA", ACCEL), ("SETA", -DECEL),
@@ -218,7 +218,7 @@ def drive(peer: Peer) -> Found:
     return found
 
 
-def _straight(peer: Peer, found: Found) -> None:
+def _straight(peer: PeerSession, found: Found) -> None:
     at = peer.send("VEL", SPEED)
     peer.step(SPEED / ACCEL + 2.5)
     samples = peer.since(at)
@@ -238,7 +238,7 @@ def _straight(peer: Peer, found: Found) -> None:
     peer.stand()
 
 
-def _turns(peer: Peer, found: Found) -> None:
+def _turns(peer: PeerSession, found: Found) -> None:
     at = peer.send("RVEL", TURN)
     peer.step(TURN / TURN_ACCEL + 2.5)
     samples = peer.since(at)
@@ -257,7 +257,7 @@ def _turns(peer: Peer, found: Found) -> None:
     peer.stand()
 
 
-def _moves(peer: Peer, found: Found) -> None:
+def _moves(peer: PeerSession, found: Found) -> None:
     for way in (500, -500):
         before = peer.samples[-1].x
         peer.send("MOVE", way)
@@ -272,7 +272,7 @@ def _moves(peer: Peer, found: Found) -> None:
     peer.stand()
 
 
-def _stops(peer: Peer, found: Found) -> None:
+def _stops(peer: PeerSession, found: Found) -> None:
     for name in ("E_STOP", "watchdog"):
         peer.send("VEL", SPEED)
         peer.step(SPEED / ACCEL + 1.0)
@@ -325,7 +325,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         name, equals, url = text.rpartition("=")
         names.append(name if equals else f"robot {number + 1}")
         try:
-            peer = Peer(url, open_url(url))
+            peer = PeerSession(url, open_url(url))
             try:
                 peer.open()
                 print(f"{names[-1]}: {peer.model} at {url}", file=sys.stderr, flush=True)

@@ -35,7 +35,7 @@ SETTLE_S, ALL_S = 2.0, 3.0
 NAVIGATION = {"odom", "sonar", "scan", "diagnostics"}
 
 
-class Peer(Node):
+class PeerNode(Node):
     """Hears everything that a robot's node says, and drives it."""
 
     def __init__(self) -> None:
@@ -79,7 +79,7 @@ class Peer(Node):
         return count
 
 
-def counted(peer: Peer) -> int:
+def counted(peer: PeerNode) -> int:
     """Return how many commands the node says that it has taken."""
     message = peer.newest("diagnostics")
     values = {} if message is None else {one.key: one.value for one in message.status[0].values}
@@ -99,7 +99,7 @@ def lost(heard: list[tuple[float, object]]) -> tuple[int, float]:
     return max(0, round((stamps[-1] - stamps[0]) / rhythm) + 1 - len(stamps)), rhythm
 
 
-def driven_otherwise(peer: Peer) -> tuple[float, float]:
+def driven_otherwise(peer: PeerNode) -> tuple[float, float]:
     """Drive by TwistStamped, then by the thesis's motor topics; return m/s and rad/s that came of it."""
     peer.destroy_publisher(peer.velocity)  # Fast DDS has one type a topic in a participant
     publisher = peer.create_publisher(TwistStamped, "/cmd_vel", 10)
@@ -118,7 +118,7 @@ def driven_otherwise(peer: Peer) -> tuple[float, float]:
 def main(seconds: float) -> int:
     """Hear, drive, and print what came of it."""
     rclpy.init()
-    peer = Peer()
+    peer = PeerNode()
     print(f"rclpy with {rclpy.get_rmw_implementation_identifier()}, domain {os.environ.get('ROS_DOMAIN_ID', '0')}")
     peer.spin(SETTLE_S)
     print(

@@ -6,7 +6,7 @@
  */
 #include "fabric.h"
 
-/* Shapes, as `Shape` of signals.py. */
+/* Shapes, as `Waveform` of signals.py. */
 enum { LOGIC, CONSTANT, SINE, TRIANGLE, SAWTOOTH, SQUARE, SAMPLES, HELD };
 enum { ONE_AT = 30 };
 

@@ -17,9 +17,9 @@ from typing import ClassVar, NoReturn
 from p2os.errors import LocalProtocolError, RemoteProtocolError, WorldError
 from p2os.pioneer.body.contacts import ContactCounter
 from p2os.pioneer.body.contract import STEP_NS, BodyState, Hit
-from p2os.pioneer.body.in_world import BodyInWorld, Scene
+from p2os.pioneer.body.in_world import BodyInWorld, WorldScene
 from p2os.pioneer.body.outside.address import Address
-from p2os.pioneer.body.outside.connection import Connection
+from p2os.pioneer.body.outside.connection import OutsideConnection
 from p2os.pioneer.body.outside.messages import (
     VERSION,
     AskRanges,
@@ -45,7 +45,7 @@ from p2os.pioneer.body.outside.messages import (
 from p2os.pioneer.body.ray_cast import Echo
 from p2os.pioneer.sonar.ring import Cone, reading
 from p2os.pioneer.world.geometry import hull_polygon
-from p2os.pioneer.world.model import Kind, Obstacle, Pose, World
+from p2os.pioneer.world.model import Obstacle, ObstacleKind, Pose, World
 from p2os.robots.parameters import RobotParameters
 from simbase.errors import UsageError, one_line, shown
 from simbase.state import PartState
@@ -57,7 +57,7 @@ WALK_STEPS = 10
 #: Bits of a step.
 _STALLED_LEFT, _STALLED_RIGHT, _TOUCHES = 1, 2, 4
 #: The type of a thing: driven on, or by its outline.
-_DRIVEN = {Kind.FLOOR: 2, Kind.RAMP: 3}
+_DRIVEN = {ObstacleKind.FLOOR: 2, ObstacleKind.RAMP: 3}
 
 
 class Ability(IntFlag):
@@ -111,7 +111,7 @@ class StepWheels:
         return bool(int(self._made()[2]) & _STALLED_RIGHT)
 
 
-class OutsideScene(Scene):
+class OutsideScene(WorldScene):
     """One robot in a world that another program steps.
 
     Args:
@@ -135,7 +135,7 @@ class OutsideScene(Scene):
         super().__init__(world, len(models))
         if len(models) != 1:
             raise UsageError(f"an outside body is one robot, not {len(models)}", hint="--body best")
-        self.line = Connection(address)
+        self.line = OutsideConnection(address)
         weakref.finalize(self, self.line.close)
         welcome = self.line.ask(_hello(models[0]), Welcome)
         if welcome.version != VERSION:

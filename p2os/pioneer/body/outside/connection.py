@@ -36,7 +36,7 @@ MOST_UNANSWERED = 64
 CLOSED = "it has closed the line"
 
 
-class Connection:
+class OutsideConnection:
     """A connection that waits for each answer no longer than the address allows.
 
     Raises:

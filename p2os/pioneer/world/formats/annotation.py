@@ -11,17 +11,17 @@ from pathlib import Path
 from p2os.errors import WorldError
 from p2os.pioneer.world.formats.xml_tree import Element, numbers
 from p2os.pioneer.world.interchange.words import GROUND, ROBOT, THING, WORLD
-from p2os.pioneer.world.model import LEAST_PUSHED_KG, MOST_PUSHED_KG, RANGES, Kind, Pose
+from p2os.pioneer.world.model import LEAST_PUSHED_KG, MOST_PUSHED_KG, RANGES, ObstacleKind, Pose
 from simbase.errors import shown
 
-_KINDS = {kind.value: kind for kind in Kind}
+_KINDS = {kind.value: kind for kind in ObstacleKind}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Traits:
     """What a shape is to a world; as of a file that says nothing: it stands fast and is an obstacle."""
 
-    kind: Kind = Kind.OBSTACLE
+    kind: ObstacleKind = ObstacleKind.OBSTACLE
     fixed: bool = True
     floor_m: float = 0.0
     mass_kg: float = 0.0
@@ -43,7 +43,7 @@ def noted_traits(holder: Element, path: Path) -> Traits | None:
     noted = holder.first(THING)
     if noted is None:
         return None
-    kind = _KINDS.get(noted.get("kind", Kind.OBSTACLE.value))
+    kind = _KINDS.get(noted.get("kind", ObstacleKind.OBSTACLE.value))
     if kind is None:
         raise WorldError(f"{path}:{noted.line}: kind {shown(noted.get('kind'))} is unknown")
     (floor_m,) = numbers(noted, noted.get("floor_m", "0"), path, 1)

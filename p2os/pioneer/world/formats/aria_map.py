@@ -17,7 +17,7 @@ from pathlib import Path
 from p2os.errors import WorldError
 from p2os.pioneer.world.formats.collection import Collection
 from p2os.pioneer.world.formats.rectangles import rectangles
-from p2os.pioneer.world.model import FARTHEST_M, Kind, Mark, Obstacle, Pose, World
+from p2os.pioneer.world.model import FARTHEST_M, Mark, Obstacle, ObstacleKind, Pose, World
 from p2os.pioneer.world.text_file import read_foreign_text
 
 #: A line has no thickness and a wall needs one; every body holds a robot at the least (1e-6 m). chosen: a hundred
@@ -165,7 +165,7 @@ class _Reader:
                     length_m=columns * size / 1000,
                     width_m=count * size / 1000,
                     height_m=WALL_HIGH_M,
-                    kind=Kind.WALL,
+                    kind=ObstacleKind.WALL,
                     fixed=True,
                 )
             )

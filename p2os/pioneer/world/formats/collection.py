@@ -21,10 +21,10 @@ from p2os.pioneer.world.model import (
     FARTHEST_M,
     LEAST_PUSHED_M,
     LONGEST_NAME,
-    Kind,
     Mark,
     Mesh,
     Obstacle,
+    ObstacleKind,
     Pose,
     Triangle,
     Vertex,
@@ -57,7 +57,7 @@ SECTORS = 16
 
 
 class _TraitKeys(TypedDict):
-    kind: Kind
+    kind: ObstacleKind
     fixed: bool
     floor_m: float
     mass_kg: float
@@ -85,7 +85,7 @@ class Collection:
         """Take a box about its middle: its size along its own axes; a tilted one as a mesh, if it is no ramp."""
         if min(size) <= 0:
             raise WorldError(f"{self.path}: box {name!r}: its size must be above 0")
-        if traits.kind is Kind.RAMP:
+        if traits.kind is ObstacleKind.RAMP:
             self._add_ramp(name, size, place)
             return
         heading = upright_heading(place)
@@ -170,7 +170,7 @@ class Collection:
                 length_m=length + thick,
                 width_m=thick,
                 height_m=high,
-                kind=Kind.WALL,
+                kind=ObstacleKind.WALL,
                 fixed=True,
             )
         )
@@ -216,7 +216,7 @@ class Collection:
                 width_m=size[1],
                 height_m=max(0.0, rise),
                 base_m=z + i * thick - rise / 2,
-                kind=Kind.RAMP,
+                kind=ObstacleKind.RAMP,
             )
         )
 

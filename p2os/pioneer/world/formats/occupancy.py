@@ -21,7 +21,7 @@ from p2os.errors import WorldError
 from p2os.pioneer.world.formats.collection import Collection
 from p2os.pioneer.world.formats.local_file import find_local
 from p2os.pioneer.world.formats.rectangles import rectangles
-from p2os.pioneer.world.model import FARTHEST_M, Kind, Obstacle, Pose, World
+from p2os.pioneer.world.model import FARTHEST_M, Obstacle, ObstacleKind, Pose, World
 from p2os.pioneer.world.placing import Placing, placed_points
 from p2os.pioneer.world.text_file import read_foreign_text
 
@@ -73,7 +73,7 @@ def read(path: Path, up: str) -> World:
                 length_m=columns * size,
                 width_m=count * size,
                 height_m=WALL_HIGH_M,
-                kind=Kind.WALL,
+                kind=ObstacleKind.WALL,
                 fixed=True,
             )
         )

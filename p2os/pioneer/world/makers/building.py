@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterable
 
 from p2os.pioneer.world.geometry import Footprint
-from p2os.pioneer.world.model import Kind, Obstacle, Pose, World
+from p2os.pioneer.world.model import Obstacle, ObstacleKind, Pose, World
 
 WALL_M = 0.1
 #: chosen: the floor reaches so far beyond the outermost wall.
@@ -25,7 +25,7 @@ def wall(name: str, x0: float, y0: float, x1: float, y1: float, *, height_m: flo
         length_m=mm(math.hypot(x1 - x0, y1 - y0) + WALL_M),
         width_m=WALL_M,
         height_m=height_m,
-        kind=Kind.WALL,
+        kind=ObstacleKind.WALL,
     )
 
 

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from p2os.pioneer.world.makers.building import finished, mm, wall
-from p2os.pioneer.world.model import Kind, Obstacle, Pose, World
+from p2os.pioneer.world.model import Obstacle, ObstacleKind, Pose, World
 
 #: chosen: a rail beside an incline is made of level pieces of this length.
 RAIL_PIECE_M = 0.5
@@ -119,13 +119,13 @@ class _Builder:
     def _ramp(self, name: str, x0: float, x1: float, y: float, base: float, rise: float, heading: float) -> Obstacle:
         return Obstacle(
             name=name, x_m=mm((x0 + x1) / 2), y_m=mm(y), heading_rad=math.radians(heading), length_m=mm(x1 - x0),
-            width_m=self._m.width_m, height_m=mm(rise), base_m=base, kind=Kind.RAMP,
+            width_m=self._m.width_m, height_m=mm(rise), base_m=base, kind=ObstacleKind.RAMP,
         )  # fmt: skip
 
     def _slab(self, name: str, x0: float, y0: float, x1: float, y1: float, top: float) -> Obstacle:
         return Obstacle(
             name=name, x_m=mm((x0 + x1) / 2), y_m=mm((y0 + y1) / 2), length_m=mm(x1 - x0), width_m=mm(y1 - y0),
-            height_m=self._m.slab_m, base_m=mm(top - self._m.slab_m), kind=Kind.FLOOR,
+            height_m=self._m.slab_m, base_m=mm(top - self._m.slab_m), kind=ObstacleKind.FLOOR,
         )  # fmt: skip
 
     def _wall(self, name: str, a: tuple[float, float], b: tuple[float, float], base: float, top: float) -> Obstacle:
@@ -146,5 +146,5 @@ class _Builder:
                     name=f"{name}, {which} {number + 1}", x_m=mm(x), y_m=mm(y),
                     heading_rad=math.radians(90.0) if across else 0.0, length_m=mm((b - a) / count),
                     width_m=m.rail_thick_m, base_m=mm(floor + underside), height_m=m.rail_high_m, floor_m=floor,
-                    kind=Kind.RAIL, fixed=True,
+                    kind=ObstacleKind.RAIL, fixed=True,
                 )  # fmt: skip

@@ -22,7 +22,7 @@ from bluepill_sim.program.alterations import OPERATORS
 from bluepill_sim.program.line_table import LineTable
 from bluepill_sim.program.mutants import Mutant
 from robot_bench.campaign.variants.mutation.interval import CONFIDENCE, share_interval
-from robot_bench.campaign.variants.mutation.trial import Fate, Found
+from robot_bench.campaign.variants.mutation.trial import Fate, MutantResult
 from robot_bench.events.codec import Json
 from simbase.files import writing
 
@@ -46,12 +46,12 @@ class Mutation:
     seed: int | None
     tried: Sequence[Mutant]
     #: By place in `tried`; None: interrupted before.
-    found: Sequence[Found | None]
+    found: Sequence[MutantResult | None]
     coverage: Coverage
     lines: LineTable
 
     @property
-    def pairs(self) -> list[tuple[Mutant, Found]]:
+    def pairs(self) -> list[tuple[Mutant, MutantResult]]:
         """The mutants of which something came."""
         return [(one, found) for one, found in zip(self.tried, self.found, strict=True) if found is not None]
 
@@ -98,7 +98,7 @@ class Mutation:
         return text[row.line - 1].strip() if row is not None and row.line <= len(text) else ""
 
 
-def score(found: Sequence[Found]) -> float | None:
+def score(found: Sequence[MutantResult]) -> float | None:
     """Return how many of those that changed a run were noticed, percent; None where none did."""
     noticed = sum(one.is_noticed for one in found)
     different = sum(one.fate is not Fate.SAME for one in found)

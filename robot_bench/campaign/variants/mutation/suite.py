@@ -23,7 +23,7 @@ from bluepill_sim.board import BluePill
 from bluepill_sim.program.image import Image
 from bluepill_sim.program.mutants import Mutant, mutated_file
 from bluepill_sim.program.static_code import StaticCode
-from robot_bench.campaign.variants.mutation.trial import Fate, Found
+from robot_bench.campaign.variants.mutation.trial import Fate, MutantResult
 from robot_bench.events.codec import Json
 from simbase.entry_points import installed_points
 from simbase.files import writing_temporary
@@ -105,7 +105,7 @@ class Suite:
     data: bytes
     image: Image
 
-    def try_mutant(self, mutant: Mutant, cpu_s: int) -> Found:
+    def try_mutant(self, mutant: Mutant, cpu_s: int) -> MutantResult:
         """Run the tests with a mutant.
 
         Args:
@@ -122,8 +122,8 @@ class Suite:
                 file.write_bytes(mutated_file(self.data, mutant, self.image))
             found = run_suite(self.paths, file)
         if found.failed or found.broken:  # a suite that cannot be collected could with the program itself
-            return Found(Fate.MISSED, "pytest", found.failed or found.broken)
-        return Found(Fate.SAME if found.sha256 == self.base.sha256 else Fate.SURVIVED, "pytest")
+            return MutantResult(Fate.MISSED, "pytest", found.failed or found.broken)
+        return MutantResult(Fate.SAME if found.sha256 == self.base.sha256 else Fate.SURVIVED, "pytest")
 
 
 class _Watch:

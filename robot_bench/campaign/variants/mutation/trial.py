@@ -46,7 +46,7 @@ NOTICED = frozenset({Fate.MISSED, Fate.CRASHED, Fate.STOPPED})
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class MutantResult:
     """What became of a mutant, and what told."""
 
     fate: Fate
@@ -67,13 +67,13 @@ class Found:
         return {"fate": str(self.fate), "scenario": self.scenario, "says": self.says, "at_s": self.at_ns / NS_PER_S}
 
     @classmethod
-    def from_plain(cls, found: Json) -> "Found":
+    def from_plain(cls, found: Json) -> "MutantResult":
         """Return what `to_plain` had."""
         at_ns = round(cast("float", found["at_s"]) * NS_PER_S)
         return cls(Fate(str(found["fate"])), str(found["scenario"]), str(found["says"]), at_ns)
 
 
-def try_mutant(mutant: Mutant, bases: Sequence[BaseRun], clock: Clock, look: Callable[[], None]) -> Found:
+def try_mutant(mutant: Mutant, bases: Sequence[BaseRun], clock: Clock, look: Callable[[], None]) -> MutantResult:
     """Run a mutant on each scenario that executes it, until one notices it.
 
     Each bench is left where its run ended, with the changed program: to be called in a process of its own.
@@ -92,10 +92,10 @@ def try_mutant(mutant: Mutant, bases: Sequence[BaseRun], clock: Clock, look: Cal
                 return found
             fates.append(found)
     different = [found for found in fates if found.fate is Fate.SURVIVED]
-    return different[0] if different else Found(Fate.SAME)
+    return different[0] if different else MutantResult(Fate.SAME)
 
 
-def _run(mutant: Mutant, base: BaseRun, clock: Clock, look: Callable[[], None]) -> Found:
+def _run(mutant: Mutant, base: BaseRun, clock: Clock, look: Callable[[], None]) -> MutantResult:
     bench, board, name = base.bench, base.board, base.bench.scenario.name
     bench.restore(base.states[base.first_ns[mutant.address]])
     memory = board.chip.memory
@@ -120,22 +120,22 @@ def _run(mutant: Mutant, base: BaseRun, clock: Clock, look: Callable[[], None]) 
         while bench.now < bench.end and not missed and not board.has_died:
             bench.run_until(bench.now + _LOOK_NS)
     except P2osError as error:
-        return Found(Fate.STOPPED, name, str(error), bench.now)
+        return MutantResult(Fate.STOPPED, name, str(error), bench.now)
     if board.has_died:
-        return Found(Fate.CRASHED, name, board.verdict, bench.now)
+        return MutantResult(Fate.CRASHED, name, board.verdict, bench.now)
     if missed:
-        return Found(Fate.MISSED, name, f"{missed[0].goal}: {missed[0].says}", missed[0].t)
+        return MutantResult(Fate.MISSED, name, f"{missed[0].goal}: {missed[0].says}", missed[0].t)
     return _judged(base)
 
 
-def _judged(base: BaseRun) -> Found:
+def _judged(base: BaseRun) -> MutantResult:
     """Return what became of a mutant whose run came to its end."""
     bench, name = base.bench, base.bench.scenario.name
     end = bench.finish()
     for one in bench.goals.at_end(bench.ended(end)):
         if not one.is_open and not one.outcome.met:
-            return Found(Fate.MISSED, name, f"{one.goal.wanted}: {one.outcome.says}", end)
-    return Found(Fate.SAME if bench.trace.sha256 == base.trace_sha256 else Fate.SURVIVED, name)
+            return MutantResult(Fate.MISSED, name, f"{one.goal.wanted}: {one.outcome.says}", end)
+    return MutantResult(Fate.SAME if bench.trace.sha256 == base.trace_sha256 else Fate.SURVIVED, name)
 
 
 class _TooDearError(P2osError):

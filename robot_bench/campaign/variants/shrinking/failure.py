@@ -23,7 +23,7 @@ _MOVED_UM = 1000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Way:
+class FailureMode:
     """What two failures have in common that are the same to a person."""
 
     #: The goal as a sentence; of a program that died the kind of fault.
@@ -46,7 +46,7 @@ class Way:
 class Failure:
     """A run that failed."""
 
-    way: Way
+    way: FailureMode
     #: When that was decided, and whether before the run's end.
     at_ns: Nanos
     is_early: bool
@@ -57,7 +57,7 @@ class Failure:
 
 
 def failure_of(
-    trial: Trial, way: Way | None = None, until_ns: Nanos | None = None, look: Callable[[], None] = lambda: None
+    trial: Trial, way: FailureMode | None = None, until_ns: Nanos | None = None, look: Callable[[], None] = lambda: None
 ) -> Failure | None:
     """Run a trial until it fails.
 
@@ -77,7 +77,7 @@ def failure_of(
             return None
 
 
-def _run(bench: Bench, way: Way | None, until_ns: Nanos | None, look: Callable[[], None]) -> Failure | None:
+def _run(bench: Bench, way: FailureMode | None, until_ns: Nanos | None, look: Callable[[], None]) -> Failure | None:
     witnesses = [_Witness(name if len(bench.robots) > 1 else "", one) for name, one in bench.robots.items()]
 
     def found(end: Nanos | None) -> Failure | None:
@@ -126,22 +126,26 @@ class _Witness:
             if abs(event.x - first.x) + abs(event.y - first.y) > _MOVED_UM or event.heading != first.heading:
                 self._moved_ns = event.t
 
-    def failures(self) -> list[tuple[Way, Nanos, str]]:
+    def failures(self) -> list[tuple[FailureMode, Nanos, str]]:
         """Return what was missed so far, each with its time and in words."""
         found = [self._missed(verdict) for verdict in self._verdicts]
         return [*found, *([self._died()] if self._bench.chip.has_died else [])]
 
-    def _missed(self, verdict: Verdict) -> tuple[Way, Nanos, str]:
+    def _missed(self, verdict: Verdict) -> tuple[FailureMode, Nanos, str]:
         contact = self._contact
         part = contact.part.partition(" ")[0] if contact is not None and contact.t == verdict.t else ""
         is_sudden = self._is_sudden(verdict.t)
-        return Way(what=verdict.goal, robot=self._robot, part=part, is_sudden=is_sudden), verdict.t, verdict.says
+        return (
+            FailureMode(what=verdict.goal, robot=self._robot, part=part, is_sudden=is_sudden),
+            verdict.t,
+            verdict.says,
+        )
 
     def _is_sudden(self, at: Nanos) -> bool:
         is_at_rest = self._moved_ns is None or self._moved_ns >= at
         return is_at_rest or any(0 <= at - change <= SUDDEN_NS for change in self._came)
 
-    def _died(self) -> tuple[Way, Nanos, str]:
+    def _died(self) -> tuple[FailureMode, Nanos, str]:
         died_ns, verdict = self._bench.chip.died_ns, self._bench.chip.verdict
         at = self._bench.now if died_ns is None else died_ns
-        return Way(what=verdict.partition(" at ")[0], robot=self._robot, is_fault=True), at, verdict
+        return FailureMode(what=verdict.partition(" at ")[0], robot=self._robot, is_fault=True), at, verdict

@@ -24,8 +24,8 @@ from typing import cast
 from p2os.pioneer.world import known_worlds, load_world
 from p2os.pioneer.world.writer import write_world
 from p2os.toml_schema import Table
-from robot_bench.campaign.trial import Outcome, Trial, Verdict, run_trial, trial_of
-from robot_bench.campaign.variants.shrinking.failure import Way
+from robot_bench.campaign.trial import Outcome, Trial, TrialVerdict, run_trial, trial_of
+from robot_bench.campaign.variants.shrinking.failure import FailureMode
 from robot_bench.campaign.variants.shrinking.things import WORLD_NAME
 from robot_bench.recording.run_record import TRACE_NAME, RunRecord, read_run
 from robot_bench.report import make_scene
@@ -53,7 +53,7 @@ class Kept:
     explained: str
 
 
-def keep(trial: Trial, way: Way, folder: Path) -> Kept:
+def keep(trial: Trial, way: FailureMode, folder: Path) -> Kept:
     """Write a failing trial into a folder, and run it there in another process.
 
     Args:
@@ -89,11 +89,11 @@ def keep(trial: Trial, way: Way, folder: Path) -> Kept:
     is_same = hashes == here.sha256 or "robots" in there  # several robots have a hash each, there
     return Kept(
         scenario=scenario, test=test, outcome=here, explained=explained,
-        is_confirmed=found.returncode == 1 and here.verdict is Verdict.FAILED and is_same,
+        is_confirmed=found.returncode == 1 and here.verdict is TrialVerdict.FAILED and is_same,
     )  # fmt: skip
 
 
-def test_text(trial: Trial, way: Way) -> str:
+def test_text(trial: Trial, way: FailureMode) -> str:
     """Return a test of pytest that runs a trial's scenario, and fails while it fails."""
     wanted = "never ends in a fault" if way.is_fault else way.what
     judged = (

@@ -17,11 +17,11 @@ from typing import cast
 
 from p2os.toml_schema import Table
 from robot_bench.campaign.trial import Trial
-from robot_bench.campaign.variants.shrinking.failure import Failure, Way, failure_of
+from robot_bench.campaign.variants.shrinking.failure import Failure, FailureMode, failure_of
 from robot_bench.campaign.variants.shrinking.reduction import ANGLE_STEPS, STEPS, fewest, rounded, rounder
 from robot_bench.campaign.variants.shrinking.things import (
+    ListedThing,
     Number,
-    Thing,
     numbers,
     things,
     with_numbers,
@@ -35,7 +35,7 @@ from simbase.timing import NS_PER_S, Nanos
 #: chosen: so many trials a failure is worth; some minutes.
 BUDGET = 400
 #: What finds out how a trial fails: as `failure_of`, without what it looks at meanwhile.
-Judge = Callable[[Trial, Way | None, Nanos | None], Failure | None]
+Judge = Callable[[Trial, FailureMode | None, Nanos | None], Failure | None]
 #: chosen: a smaller trial may fail this much later, no more: else each that does not fail would be run to its end.
 _LATER = 1.25
 
@@ -120,7 +120,7 @@ class _Shrinker:
     def _fewest_things(self) -> int:
         whole = self.trial
 
-        def still_fails(kept: Sequence[Thing]) -> bool:
+        def still_fails(kept: Sequence[ListedThing]) -> bool:
             return self.takes(with_things(whole, kept))
 
         return len(fewest(things(whole), still_fails))
@@ -149,7 +149,7 @@ class _Shrinker:
 
 
 def shrink(
-    trial: Trial, *, way: Way | None = None, quick: Sequence[Setting] = (), budget: int = BUDGET,
+    trial: Trial, *, way: FailureMode | None = None, quick: Sequence[Setting] = (), budget: int = BUDGET,
     judge: Judge = failure_of,
 ) -> Shrunk:  # fmt: skip
     """Return the smallest trial that is found which fails in the same way.

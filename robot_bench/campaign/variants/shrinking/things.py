@@ -34,7 +34,7 @@ Path = tuple[str | int, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Thing:
+class ListedThing:
     """A table of a list."""
 
     #: Whether it stands in the world's file.
@@ -83,16 +83,16 @@ def with_world_table(trial: Trial, table: Mapping[str, object]) -> Trial:
     return replace(trial, files={**trial.files, str(trial.table["world"]): toml_text(table).encode()})
 
 
-def things(trial: Trial) -> list[Thing]:
+def things(trial: Trial) -> list[ListedThing]:
     """Return all things of a trial: first what happens, then what stands there."""
-    found = [Thing(False, name, number) for name in OF_SCENARIO for number in _numbers(trial.table.get(name))]
+    found = [ListedThing(False, name, number) for name in OF_SCENARIO for number in _numbers(trial.table.get(name))]
     world = world_table(trial)
     if world is not None:
-        found += [Thing(True, name, number) for name in OF_WORLD for number in _numbers(world.get(name))]
+        found += [ListedThing(True, name, number) for name in OF_WORLD for number in _numbers(world.get(name))]
     return found
 
 
-def with_things(trial: Trial, kept: Sequence[Thing]) -> Trial:
+def with_things(trial: Trial, kept: Sequence[ListedThing]) -> Trial:
     """Return the trial with these of its things and no others."""
     lists = {name: _kept(trial.table[name], kept, name, False) for name in OF_SCENARIO if name in trial.table}
     found = trial.with_lists(**lists) if lists else trial
@@ -130,7 +130,7 @@ def _numbers(value: object) -> range:
     return range(len(cast("list[object]", value))) if is_list else range(0)
 
 
-def _kept(value: object, kept: Sequence[Thing], name: str, is_of_world: bool) -> list[Mapping[str, object]]:
+def _kept(value: object, kept: Sequence[ListedThing], name: str, is_of_world: bool) -> list[Mapping[str, object]]:
     numbers_kept = {one.number for one in kept if one.is_of_world is is_of_world and one.list_name == name}
     tables = cast("list[Mapping[str, object]]", value)
     return [table for number, table in enumerate(tables) if number in numbers_kept]

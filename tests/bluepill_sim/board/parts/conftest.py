@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from bluepill_sim.fabric.pins import PinDrive
-from bluepill_sim.fabric.surroundings import Motion
+from bluepill_sim.fabric.surroundings import BoardMotion
 
 
 @dataclass
@@ -55,11 +55,11 @@ class FakeSpi:
 class FakeWorld:
     """A world that answers what it is told to."""
 
-    now: Motion = field(default_factory=Motion)
+    now: BoardMotion = field(default_factory=BoardMotion)
     metres: float = 9.0
     asked: tuple[float, ...] = ()
 
-    def motion(self) -> Motion:
+    def motion(self) -> BoardMotion:
         return self.now
 
     def range_m(self, *asked: float) -> float:

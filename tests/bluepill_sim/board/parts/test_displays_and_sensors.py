@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bluepill_sim.fabric.signals import Oscillation
-from bluepill_sim.parts import Button, Gps, LedPanel, Motion, Mpu6050, Picture, Potentiometer, Ssd1306
+from bluepill_sim.parts import BoardMotion, Button, Gps, LedPanel, Mpu6050, Picture, Potentiometer, Ssd1306
 from bluepill_sim.parts.mpu6050 import FIFO_BYTES, PULSE_NS
 
 Plug = Callable[..., Any]
@@ -202,7 +202,7 @@ def test_samples_come_at_the_rate_and_none_is_lost(plugged: Plug, dlpf: int, div
 def test_forces_and_rates_have_the_scale_that_is_set_and_end_at_its_ends(plugged: Plug, scale: int) -> None:
     imu, socket = awake(plugged)
     put(imu, 0x1B, scale << 3, scale << 3)
-    socket.surroundings.now = Motion(force_mps2=(9.80665, -200.0, 0.0), rates_radps=(0.0, 0.0, math.radians(100)))
+    socket.surroundings.now = BoardMotion(force_mps2=(9.80665, -200.0, 0.0), rates_radps=(0.0, 0.0, math.radians(100)))
     run(imu, 1)
     x, y, z, temperature, *rates = struct.unpack(">7h", get(imu, 0x3B, 14))
     assert (x, y, z) == (16384 >> scale, -32768, 0)
@@ -215,7 +215,7 @@ def test_the_low_pass_is_slower_the_lower_its_bandwidth(plugged: Plug) -> None:
     for dlpf in (1, 3, 6):
         imu, socket = awake(plugged, dlpf=dlpf)
         run(imu, 1)
-        socket.surroundings.now = Motion(force_mps2=(9.80665, 0.0, 9.80665))
+        socket.surroundings.now = BoardMotion(force_mps2=(9.80665, 0.0, 9.80665))
         run(imu, 5)
         found.append(struct.unpack(">h", get(imu, 0x3B, 2))[0])
     # 1 - exp(-2 pi f 5 ms) of 16384, with 184, 44 and 5 Hz.
@@ -229,7 +229,7 @@ def test_a_burst_is_of_one_sample(plugged: Plug) -> None:
     imu.write(0x3F, 0)
     imu.start(0x68, True, 0)
     first = imu.read(0)
-    socket.surroundings.now = Motion(force_mps2=(0, 0, 0))
+    socket.surroundings.now = BoardMotion(force_mps2=(0, 0, 0))
     run(imu, 50)
     assert bytes((first, imu.read(0))) == b"\x40\x00"
 
@@ -314,7 +314,7 @@ def degrees(text: str, half: str) -> float:
     ],
 )
 def test_a_fix_has_the_date_of_its_time(start: str, at_s: int, date: str) -> None:
-    assert checked(Gps(start=start).sentences(Motion(), at_s * 10**9)[1])[9] == date
+    assert checked(Gps(start=start).sentences(BoardMotion(), at_s * 10**9)[1])[9] == date
 
 
 @pytest.mark.parametrize("start", ["2026-02-29T00:00:00", "2026-13-01T00:00:00", "2026-01-01T24:00:00", "noon"])
@@ -331,7 +331,7 @@ def test_a_fix_is_where_the_world_has_the_board(
     latitude: float, longitude: float, x_m: float, y_m: float, heading: float, speed: float
 ) -> None:
     gps = Gps(latitude_deg=latitude, longitude_deg=longitude, fix_s=0)
-    motion = Motion(x_m=x_m, y_m=y_m, heading_rad=heading, forward_mps=speed)
+    motion = BoardMotion(x_m=x_m, y_m=y_m, heading_rad=heading, forward_mps=speed)
     gga, rmc = (checked(sentence) for sentence in gps.sentences(motion, 3_661_500_000_000))
     assert (gga[0], gga[1], rmc[1], rmc[2], rmc[9]) == ("GPGGA", "010101.50", "010101.50", "A", "010126")
     assert gga[2:6] == rmc[3:7]
@@ -348,7 +348,7 @@ def test_a_fix_is_where_the_world_has_the_board(
 def test_there_is_no_fix_one_nanosecond_before_its_time(plugged: Plug, port: Callable[[], Any]) -> None:
     gps = Gps(fix_s=2.0, rate_hz=10, baud=38_400)
     socket = plugged(gps, port=port())
-    assert [checked(gps.sentences(Motion(), at)[1])[2] for at in (2 * 10**9 - 1, 2 * 10**9)] == ["V", "A"]
+    assert [checked(gps.sentences(BoardMotion(), at)[1])[2] for at in (2 * 10**9 - 1, 2 * 10**9)] == ["V", "A"]
     for _ in range(3):
         due = gps.next_deadline()
         gps.advance_to(due)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bluepill_sim.fabric.signals import Oscillation, Samples, Shape
+from bluepill_sim.fabric.signals import Oscillation, Samples, Waveform
 from bluepill_sim.peripherals.adc import INJECTED_TRIGGERS, REGULAR_TRIGGERS
 from bluepill_sim.stm32f103 import BASES, line_of
 from tests.bluepill_sim.peripherals.adc.model import (
@@ -145,7 +145,7 @@ class Pair:
         chip.write("RCC.CFGR", chip.read("RCC.CFGR") | (divider // 2 - 1) << 14)
         for number in (1, 2):
             switch_on(chip, number)
-        chip.pins["PA0"].set_volts(Oscillation(shape=Shape.SINE, low_v=0, high_v=3.3, period_ns=77_777))
+        chip.pins["PA0"].set_volts(Oscillation(shape=Waveform.SINE, low_v=0, high_v=3.3, period_ns=77_777))
         chip.pins["PA3"].set_volts(Samples(volts=(0.5, 2.5, 1.0), interval_ns=33_333, is_repeated=True))
         self.model = AdcModel(chip.clocks.pclk2_hz, divider, chip.pins.fabric.channel_uv, chip.now_ns)
         for unit in self.model.units:
@@ -551,7 +551,7 @@ def test_what_is_wrong_is_warned_of_once_by_name(fake_chip: Any) -> None:
 def test_continuous_conversions_that_nobody_sees_have_no_events(fake_chip: Any) -> None:
     switch_on(fake_chip, cr2=CONT)
     adc = fake_chip.parts.by_name["ADC1"]
-    fake_chip.pins["PA0"].set_volts(Oscillation(shape=Shape.SAWTOOTH, low_v=0, high_v=3.3, period_ns=10_000_000))
+    fake_chip.pins["PA0"].set_volts(Oscillation(shape=Waveform.SAWTOOTH, low_v=0, high_v=3.3, period_ns=10_000_000))
     begin_ns = start(fake_chip)
     assert adc.due_ns == begin_ns + 14 * CYCLE_NS
     fake_chip.advance(begin_ns + 14 * CYCLE_NS)
@@ -730,7 +730,7 @@ def test_circular_dma_takes_every_conversion_at_the_limit(fake_chip: Any, cr2: i
     fake_chip.run_at_72_mhz()
     fake_chip.write("RCC.CFGR", fake_chip.read("RCC.CFGR") | 2 << 14)
     switch_on(fake_chip, cr2=cr2 | DMA)
-    fake_chip.pins["PA0"].set_volts(Oscillation(shape=Shape.SAWTOOTH, low_v=0, high_v=3.3, period_ns=100_000))
+    fake_chip.pins["PA0"].set_volts(Oscillation(shape=Waveform.SAWTOOTH, low_v=0, high_v=3.3, period_ns=100_000))
     sram = receive(fake_chip, 32, 1)
     begin_ns = start(fake_chip)
     fake_chip.advance(begin_ns + 40 * 14 * 1_000_000_000 // 12_000_000 + 100)
@@ -750,7 +750,7 @@ def test_in_dual_modes_dma_takes_words_of_both(fake_chip: Any, mode: int, delay:
         fake_chip.write(f"ADC{number}.SQR3", number)
     fake_chip.write("ADC1.CR1", mode << 16)
     fake_chip.pins["PA1"].set_volts(1.0)
-    fake_chip.pins["PA2"].set_volts(Oscillation(shape=Shape.SAWTOOTH, low_v=0, high_v=3.3, period_ns=100_000))
+    fake_chip.pins["PA2"].set_volts(Oscillation(shape=Waveform.SAWTOOTH, low_v=0, high_v=3.3, period_ns=100_000))
     sram = receive(fake_chip, 16, 2)
     begin_ns = start(fake_chip)
     fake_chip.advance(begin_ns + (delay + 10 * 14) * CYCLE_NS + 1_000)

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from bluepill_sim import BluePill
-from bluepill_sim.fabric.low_power import Mode
+from bluepill_sim.fabric.low_power import PowerMode
 from bluepill_sim.fabric.pins import PinDrive
 from bluepill_sim.peripherals.rcc import ResetCause
 from tests.bluepill_sim.machine import Machine
@@ -38,8 +38,8 @@ def make(request: pytest.FixtureRequest, boot: Callable[..., Any], monkeypatch: 
     return boot
 
 
-def mode(machine: Any) -> Mode:
-    found: Mode = machine.board.chip.low_power.mode
+def mode(machine: Any) -> PowerMode:
+    found: PowerMode = machine.board.chip.low_power.mode
     return found
 
 
@@ -47,12 +47,12 @@ def mode(machine: Any) -> Mode:
 def test_an_edge_on_a_line_of_exti_ends_stop_after_its_time(make: Any, control: int, wake_ns: int) -> None:
     machine = make(CLOCKS + LINE_4 + store(PWR, control) + DEEP + f"wfi\nlog #2\nb stop\n{HANDLER}", VECTORS).run(500)
     board = machine.board
-    assert (mode(machine), board.is_asleep) == (Mode.STOP, True)
+    assert (mode(machine), board.is_asleep) == (PowerMode.STOP, True)
     at = board.now_ns
     board.pin("PA4").drive(True)
     end_ns = at - (-wake_ns // CYCLE_NS) * CYCLE_NS
     board.advance_to(end_ns - 1)
-    assert (mode(machine), machine.log) == (Mode.WAKING, [])
+    assert (mode(machine), machine.log) == (PowerMode.WAKING, [])
     board.advance_to(end_ns + 1)
     assert board.now_ns == end_ns + ENTRY_NS
     machine.run(50)
@@ -67,7 +67,7 @@ def test_after_stop_the_chip_runs_from_hsi(make: Any) -> None:
         5000
     )
     chip = machine.board.chip
-    assert mode(machine) is Mode.STOP
+    assert mode(machine) is PowerMode.STOP
     machine.board.pin("PA4").drive(True)
     machine.run(100)
     assert machine.is_done
@@ -77,7 +77,7 @@ def test_after_stop_the_chip_runs_from_hsi(make: Any) -> None:
 
 def test_wfe_is_ended_by_an_event_of_exti(make: Any) -> None:
     machine = make(CLOCKS + store(EXTI + 8, 1 << 4) + store(EXTI + 4, 1 << 4) + DEEP + "wfe\nlog #1\nb stop").run(500)
-    assert mode(machine) is Mode.STOP
+    assert mode(machine) is PowerMode.STOP
     machine.board.pin("PA4").drive(True)
     assert machine.run(3).log == []
     assert machine.run(10).log == [1]
@@ -96,7 +96,7 @@ def test_only_lines_of_exti_end_stop(make: Any) -> None:
     ).run(500)  # fmt: skip
     machine.board.chip.fabric.set_line(38, True)
     machine.run(10_000)
-    assert (mode(machine), machine.log) == (Mode.STOP, [])
+    assert (mode(machine), machine.log) == (PowerMode.STOP, [])
     machine.board.pin("PA4").drive(True)
     assert machine.run(100).log == [1, 3]
 
@@ -105,7 +105,7 @@ def test_primask_holds_back_the_handler_and_not_the_end_of_stop(make: Any) -> No
     machine = make(
         CLOCKS + LINE_4 + DEEP + f"cpsid i\nwfi\nlog #2\ncpsie i\nisb\nlog #3\nb stop\n{HANDLER}", VECTORS
     ).run(500)
-    assert mode(machine) is Mode.STOP
+    assert mode(machine) is PowerMode.STOP
     machine.board.pin("PA4").drive(True)
     assert machine.run(100).log == [2, 1, 3]
 
@@ -119,7 +119,7 @@ def test_systick_and_cyccnt_stand_still_in_stop(make: Any) -> None:
         + f"b stop\n{HANDLER.replace('log #1', '')}", VECTORS,
     ).run(500)  # fmt: skip
     machine.board.run_for("3 s")
-    assert mode(machine) is Mode.STOP
+    assert mode(machine) is PowerMode.STOP
     machine.board.pin("PA4").drive(True)
     machine.run(100)
     ticks, cycles = machine.log
@@ -134,7 +134,7 @@ def test_a_character_on_its_way_waits_for_the_end_of_stop(make: Any) -> None:
         + DEEP + f"wfi\nb stop\n{HANDLER}", VECTORS,
     ).run(5000)  # fmt: skip
     board = machine.board
-    assert mode(machine) is Mode.STOP
+    assert mode(machine) is PowerMode.STOP
     board.usart1.receive(b"x")
     machine.run(5000)
     assert bytes(machine.sent) == b""
@@ -149,7 +149,7 @@ def test_the_window_watchdog_waits_in_stop_and_the_independent_one_does_not(make
     machine = make(window + store(IWDG, 0xCCCC) + DEEP + "wfi\nb stop").run(1000)
     board = machine.board
     cr = board.chip.parts.by_name["WWDG"].words[0]
-    assert mode(machine) is Mode.STOP
+    assert mode(machine) is PowerMode.STOP
     board.advance_to(409_600_000 - 1000)
     assert (dict(board.resets), cr & 0x80) == ({}, 0x80)
     board.advance_to(409_600_000 + 10_000)
@@ -163,7 +163,7 @@ def test_sleep_on_exit_stops_too(make: Any) -> None:
     for count in (1, 2):
         machine.board.pin("PA4").drive(True)
         machine.run(100)
-        assert (mode(machine), machine.log) == (Mode.STOP, [1] * count)
+        assert (mode(machine), machine.log) == (PowerMode.STOP, [1] * count)
         machine.board.pin("PA4").drive(False)
 
 
@@ -197,10 +197,10 @@ def test_the_rtc_goes_on_in_stop_and_its_alarm_ends_it(make: Any) -> None:
     board = machine.board
     board.chip.engine.jump(machine.label("go") + 2 | 1)
     machine.run(10)
-    assert mode(machine) is Mode.STOP
+    assert mode(machine) is PowerMode.STOP
     due_ns = rtc._origin_ns - (-(0x8000 + 1000) * S // 32_768)
     board.advance_to(due_ns - 1)
-    assert (mode(machine), machine.log) == (Mode.STOP, [])
+    assert (mode(machine), machine.log) == (PowerMode.STOP, [])
     board.advance_to(due_ns + 20 * US)
     machine.run(50)
     assert machine.log == [1, 2]
@@ -216,7 +216,7 @@ def standing_by(make: Any, more: str = "", control: int = PDDS | CWUF) -> Any:
     )
     machine = make(program)
     machine.run(500)
-    assert mode(machine) is Mode.STANDBY
+    assert mode(machine) is PowerMode.STANDBY
     assert machine.board.is_asleep
     return machine
 
@@ -245,9 +245,9 @@ def test_the_wake_up_pin_ends_standby_with_a_reset_after_its_time(make: Any) -> 
     at = board.now_ns
     board.pin("PA0").drive(True)
     board.advance_to(at + 50_000 - 1)  # DS5319 table 20
-    assert mode(machine) is Mode.WAKING
+    assert mode(machine) is PowerMode.WAKING
     board.advance_to(at + 50_000 + 1)
-    assert mode(machine) is Mode.RUN
+    assert mode(machine) is PowerMode.RUN
     machine.run(100)
     assert machine.is_done
     flags, sram, csr = logged(machine)
@@ -263,14 +263,14 @@ def test_another_board_that_takes_over_standby_hears_the_pin(make: Any) -> None:
     other.board.restore(saved)
     other.board.pin("PA0").drive(True)
     other.board.run_for("1 us")
-    assert mode(other) is Mode.WAKING
+    assert mode(other) is PowerMode.WAKING
 
 
 def test_without_ewup_the_pin_does_nothing(make: Any) -> None:
     machine = standing_by(make)
     machine.board.pin("PA0").drive(True)
     machine.run(10_000)
-    assert mode(machine) is Mode.STANDBY
+    assert mode(machine) is PowerMode.STANDBY
 
 
 @pytest.mark.parametrize("cause", [ResetCause.PIN, ResetCause.IWDG])
@@ -282,7 +282,7 @@ def test_nrst_and_iwdg_end_standby_and_say_so(make: Any, cause: ResetCause) -> N
         board.reset()
     else:
         board.advance_to(409_600_000)
-        assert mode(machine) is Mode.STANDBY
+        assert mode(machine) is PowerMode.STANDBY
         machine.run(100)
     machine.run(100)
     flags, sram, csr = logged(machine)
@@ -304,12 +304,12 @@ def test_the_alarm_ends_standby_and_the_backup_domain_has_outlived_it(make: Any)
     board.chip.memory.load_flash(machine.label("start") - 0x0800_0000, b"\x30\xbf\xfe\xe7")  # wfi, b .
     chip._drop_flash()
     machine.run(10)
-    assert mode(machine) is Mode.STANDBY
+    assert mode(machine) is PowerMode.STANDBY
     due_ns = rtc._origin_ns - (-(0x8000 + 1000) * S // 32_768)
     board.advance_to(due_ns - CYCLE_NS)
-    assert mode(machine) is Mode.STANDBY
+    assert mode(machine) is PowerMode.STANDBY
     board.advance_to(due_ns + 1)
-    assert mode(machine) is Mode.WAKING
+    assert mode(machine) is PowerMode.WAKING
     machine.run(100)
     assert chip.parts.pwr.read(4, 4) == WUF | SBF
     assert bkp.read(4, 4) == 0xBEEF
@@ -338,7 +338,7 @@ def test_a_year_of_it_is_a_handful_of_steps(make: Any, control: int) -> None:
     chip._act = counted
     machine.board.run_for(365 * 86_400 * S)
     assert steps <= 4
-    assert mode(machine) is (Mode.STANDBY if control else Mode.STOP)
+    assert mode(machine) is (PowerMode.STANDBY if control else PowerMode.STOP)
 
 
 @pytest.mark.parametrize("control", [0, PDDS])
@@ -361,6 +361,6 @@ def test_a_snapshot_in_a_mode_and_slices_change_nothing(make: Any, control: int,
         return middle, board.cycle % 1, board.pc, board.read_memory(0x2000_0100, 16)
 
     first = future()
-    assert first[0] is Mode.WAKING
+    assert first[0] is PowerMode.WAKING
     board.restore(saved)
     assert future() == first

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bluepill_sim.fabric.low_power import Mode
+from bluepill_sim.fabric.low_power import PowerMode
 from bluepill_sim.fabric.subscriptions import EDGE, Of
 from bluepill_sim.parts import CanFrame, CanNode
 from tests.bluepill_sim.peripherals.buses import test_can, test_i2c, test_spi
@@ -186,7 +186,7 @@ def test_timers_stand_still_in_stop_and_a_snapshot_there_goes_on_alike(make: Any
         + store(0xE000_ED10, 4) + "cpsid i\nwfi\nb stop"
     ).run(500)  # fmt: skip
     board = machine.board
-    assert board.chip.low_power.mode is Mode.STOP
+    assert board.chip.low_power.mode is PowerMode.STOP
     before = counts(machine)
     machine.run(5000)
     assert counts(machine) == before

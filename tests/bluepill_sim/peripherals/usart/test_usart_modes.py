@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bluepill_sim.fabric.subscriptions import EDGE, HIGH
-from bluepill_sim.peripherals.usart import Damage
+from bluepill_sim.peripherals.usart import ReceiveError
 from tests.bluepill_sim.peripherals.usart.usart_line import (
     BRR,
     CHARACTER_NS,
@@ -37,13 +37,15 @@ def bits_ns(bits: int) -> int:
     return bits * BRR * 125
 
 
-def hear(chip: Any, data: bytes, damage: Damage = Damage(0)) -> None:  # noqa: B008 - it is frozen
+def hear(chip: Any, data: bytes, damage: ReceiveError = ReceiveError(0)) -> None:  # noqa: B008 - it is frozen
     chip.parts.usart(1).receive(data, damage)
     chip.advance(chip.now_ns + len(data) * CHARACTER_NS)
 
 
-@pytest.mark.parametrize("damage", [Damage.FRAMING, Damage.NOISE, Damage.FRAMING | Damage.NOISE])
-def test_damage_rises_with_its_character_and_clears_by_sr_then_dr(fake_chip: Any, damage: Damage) -> None:
+@pytest.mark.parametrize(
+    "damage", [ReceiveError.FRAMING, ReceiveError.NOISE, ReceiveError.FRAMING | ReceiveError.NOISE]
+)
+def test_damage_rises_with_its_character_and_clears_by_sr_then_dr(fake_chip: Any, damage: ReceiveError) -> None:
     set_up(fake_chip)
     hear(fake_chip, b"Q", damage)
     assert fake_chip.read("USART1.SR") & (FE | NE | PE | RXNE) == damage | RXNE
@@ -54,7 +56,7 @@ def test_damage_rises_with_its_character_and_clears_by_sr_then_dr(fake_chip: Any
 @pytest.mark.parametrize("parity", [0, PS])
 def test_a_parity_that_is_wrong_reads_so(fake_chip: Any, parity: int) -> None:
     set_up(fake_chip, PCE | M | parity)
-    hear(fake_chip, b"Q", Damage.PARITY)
+    hear(fake_chip, b"Q", ReceiveError.PARITY)
     fake_chip.advance(fake_chip.now_ns + CHARACTER_NS)
     assert status(fake_chip) & PE
     odd = ord("Q").bit_count() & 1

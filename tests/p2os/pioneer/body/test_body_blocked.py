@@ -9,7 +9,7 @@ from p2os.pioneer.world import load_world, parse_world
 from p2os.pioneer.world.model import Pose
 from p2os.robots.parameters import load_parameters
 from tests.p2os.pioneer.body.bodies import drive, each_body, marks_of
-from tools.contact_survey import MODELS, Contact, measure, picture, survey
+from tools.contact_survey import MODELS, SurveyedContact, measure, picture, survey
 
 ARENA = load_world("arena", 1)
 WALL = parse_world(
@@ -31,7 +31,7 @@ WALL = parse_world(
 OFF_CENTRE_DEG = {"kinematic": (72, 120, 312), "bullet": (72, 312), "mujoco": (120,)}
 
 
-def told(contact: Contact) -> str:
+def told(contact: SurveyedContact) -> str:
     return f"{contact.model} on {contact.body}, heading {contact.heading_deg:g}: {'; '.join(contact.faults())}"
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.controller import ControllerSettings, Pioneer, SonarPerSip
-from p2os.pioneer.controller.flash import Flash
+from p2os.pioneer.controller.flash import FlashParameters
 from p2os.pioneer.sonar.schedule import SonarSchedule
 from p2os.pioneer.world import parse_world
 from p2os.pioneer.world.model import Pose
@@ -101,7 +101,7 @@ class Driver:
 
     def __init__(self, body: str, heading_deg: float = 0.0, x_m: float = 0.0, **flash: int) -> None:
         self.parameters = load_parameters("perfpb")
-        settings = ControllerSettings(profile=Profile.ARCOS, flash=Flash().with_values(flash))
+        settings = ControllerSettings(profile=Profile.ARCOS, flash=FlashParameters().with_values(flash))
         made = make_body(body, ROOM, self.parameters)
         made.reset(Pose(x_m, 0.0, math.radians(heading_deg)), 0)
         self.robot = Pioneer(parameters=self.parameters, body=made, settings=settings)
@@ -152,7 +152,7 @@ def test_the_segment_is_pressed_where_the_hull_is_touched(
 def test_bumpers_are_those_of_the_model_unless_the_flash_has_others(make_robot: Any) -> None:
     def config(**flash: int) -> tuple[int, int]:
         robot = make_robot(
-            parameters=load_parameters("powerbot"), profile=Profile.ARCOS, flash=Flash().with_values(flash)
+            parameters=load_parameters("powerbot"), profile=Profile.ARCOS, flash=FlashParameters().with_values(flash)
         ).open()
         robot.say(C.CONFIG)
         (packet,) = [ConfigPacket.from_frame(frame) for frame in robot.frames() if frame.kind == 0x20]

@@ -189,9 +189,9 @@ def test_bytes_pass_through_an_aux_port_both_ways(robot: Any) -> None:
 
 
 def test_a_gripper_closes_lifts_and_feels_what_it_holds(make_robot: MakeRobot) -> None:
-    from p2os.pioneer.controller.flash import Flash
+    from p2os.pioneer.controller.flash import FlashParameters
 
-    robot = make_robot(flash=Flash().with_values({"gripper": 1})).open()
+    robot = make_robot(flash=FlashParameters().with_values({"gripper": 1})).open()
     start = robot.sip().gripper_state
     robot.pioneer.do("thing on", robot.now)
     robot.say(C.GRIPPER, 7)  # store: close and lift
@@ -208,9 +208,9 @@ def test_a_gripper_closes_lifts_and_feels_what_it_holds(make_robot: MakeRobot) -
 @pytest.mark.parametrize(("kind", "shown"), [(1, True), (2, False)])
 def test_a_gripper_on_the_users_inputs_shows_its_switches_there(make_robot: MakeRobot, kind: int, shown: bool) -> None:
     """ARIA reads paddles and lift of such a gripper from DIGIN, which stood still: it never closed."""
-    from p2os.pioneer.controller.flash import Flash
+    from p2os.pioneer.controller.flash import FlashParameters
 
-    robot = make_robot(flash=Flash().with_values({"gripper": kind})).open()
+    robot = make_robot(flash=FlashParameters().with_values({"gripper": kind})).open()
     for number in (8, 7):  # deploy, store
         robot.say(C.GRIPPER, number)
         robot.run(4000)

@@ -9,7 +9,7 @@ import pytest
 
 from p2os.pioneer.body.ray_cast import Echo
 from p2os.pioneer.controller.faults import FAULTS, MOMENTARY, read_fault
-from p2os.pioneer.controller.flash import Flash, FlashError, load_flash
+from p2os.pioneer.controller.flash import FlashError, FlashParameters, load_flash
 from p2os.pioneer.controller.live_inputs import INPUTS
 from p2os.pioneer.random_source import RandomSource
 from p2os.pioneer.sensor_errors import IDEAL, REALISTIC, SensorErrorsError, SonarErrors, load_sensor_errors
@@ -233,7 +233,7 @@ def test_a_wrong_flash_file_is_refused_with_its_name(tmp_path: Path, text: str, 
 def test_a_flash_file_that_is_not_there_is_reported(tmp_path: Path) -> None:
     with pytest.raises(FlashError, match="cannot read"):
         load_flash(tmp_path / "none.toml")
-    assert Flash().baud() == 9600
+    assert FlashParameters().baud() == 9600
 
 
 def test_a_file_of_errors_starts_from_a_set(tmp_path: Path) -> None:

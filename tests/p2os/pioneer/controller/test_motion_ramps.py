@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
-from p2os.pioneer.controller.motion import Mode, Motion, MotionLimits
+from p2os.pioneer.controller.motion import Motion, MotionLimits, SpeedMode
 from simbase.timing import NS_PER_MS
 
 LIMITS = MotionLimits(
@@ -127,7 +127,7 @@ def test_wheel_speeds_cancel_translation_and_rotation_without_a_jump() -> None:
     motion.set_rotation(30)
     before = run(motion, 1000)
     motion.set_wheels(300, 300)
-    assert motion.mode is Mode.WHEELS
+    assert motion.mode is SpeedMode.WHEELS
     after = run(motion, 1)
     assert all(abs(new - old) <= 0.0006 + 1e-9 for new, old in zip(after, before, strict=True))
     assert run(motion, 3000) == (0.3, 0.3)

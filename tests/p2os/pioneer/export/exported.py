@@ -7,7 +7,7 @@ from pathlib import Path
 from hypothesis import strategies as st
 
 from p2os.pioneer.export import export
-from p2os.pioneer.world.model import Kind, Mesh, Obstacle, Pose, Vertex, World
+from p2os.pioneer.world.model import Mesh, Obstacle, ObstacleKind, Pose, Vertex, World
 from p2os.robots.parameters import RobotParameters
 
 places = st.floats(-50, 50)
@@ -27,12 +27,12 @@ def obstacles(draw: st.DrawFn, name: str) -> Obstacle:
     moves = {"mass_kg": draw(st.floats(0.001, 9000)), "friction": draw(st.floats(0, 10))}
     if sort == "ramp":
         rise = {"base_m": base["base_m"], "height_m": draw(st.floats(0, 3))}
-        return Obstacle(**where | flat | rise, heading_rad=draw(headings), kind=Kind.RAMP)
+        return Obstacle(**where | flat | rise, heading_rad=draw(headings), kind=ObstacleKind.RAMP)
     if sort == "floor":
-        return Obstacle(**where | flat, kind=Kind.FLOOR)
+        return Obstacle(**where | flat, kind=ObstacleKind.FLOOR)
     if sort in {"pushed", "cylinder"}:
         return Obstacle(**where, **round_, **base, **(moves if sort == "pushed" else {"fixed": draw(st.booleans())}))
-    kind = draw(st.sampled_from([Kind.OBSTACLE, Kind.WALL, Kind.RAIL]))
+    kind = draw(st.sampled_from([ObstacleKind.OBSTACLE, ObstacleKind.WALL, ObstacleKind.RAIL]))
     more = moves if sort == "pushed box" else {"fixed": draw(st.booleans())}
     return Obstacle(**where, **flat, **base, **more, kind=kind, heading_rad=draw(headings))
 

@@ -9,7 +9,7 @@ from p2os.errors import WorldError
 from p2os.pioneer.export import FORMATS, export, scene_of
 from p2os.pioneer.export.scene import Property
 from p2os.pioneer.world import load_world, parse_world
-from p2os.pioneer.world.model import Kind
+from p2os.pioneer.world.model import ObstacleKind
 from p2os.robots.parameters import load_parameters
 from simbase.errors import UsageError
 from tests.p2os.pioneer.export.exported import written
@@ -127,7 +127,7 @@ def test_what_the_table_says_is_held_comes_back(ending: str, tmp_path: Path) -> 
     world = parse_world(EVERYTHING, "all.toml")
     again = load_world(written(tmp_path, f"all{ending}", world))
     came_back = {
-        Property.KIND: any(item.kind is Kind.RAMP for item in again.obstacles),
+        Property.KIND: any(item.kind is ObstacleKind.RAMP for item in again.obstacles),
         Property.WALK: any(item.walk is not None for item in again.obstacles),
         Property.PUSHED: any(item.mass_kg > 0 for item in again.obstacles),
         Property.ROUND: any(item.is_cylinder for item in again.obstacles),

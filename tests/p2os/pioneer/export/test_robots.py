@@ -9,7 +9,7 @@ from xml.etree import ElementTree as ET
 import pytest
 
 from p2os.pioneer.export import export
-from p2os.pioneer.export.scene import Motion
+from p2os.pioneer.export.scene import JointKind
 from p2os.pioneer.export.scenes import scene_of
 from p2os.pioneer.world import load_world
 from p2os.robots.parameters import ParametersError, RobotParameters, file_parameters, known_robots, load_parameters
@@ -74,7 +74,7 @@ def test_each_format_has_the_driven_wheels_of_the_robots_table(name: str) -> Non
 def test_a_robot_stands_on_its_wheels_and_weighs_what_its_table_says(name: str) -> None:
     robot = load_parameters(name)
     bodies = scene_of(None, robot).bodies
-    wheels = [body.place for body in bodies if body.motion is Motion.WHEEL]
+    wheels = [body.place for body in bodies if body.motion is JointKind.WHEEL]
     assert sum(body.mass_kg for body in bodies) == pytest.approx(robot.body.mass_kg)
     assert {place.z_m for place in wheels} == {robot.body.wheel_diameter_m / 2}
     assert sorted(place.y_m for place in wheels) == pytest.approx(sorted(-place.y_m for place in wheels))

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 
 from p2os.pioneer.export import scene_of
-from p2os.pioneer.export.scene import Body, Box, Cylinder, Scene, Sphere, TriangleMesh
+from p2os.pioneer.export.scene import Box, Cylinder, ExportScene, SceneBody, Sphere, TriangleMesh
 from p2os.pioneer.export.triangles import triangulated
 from p2os.pioneer.world import known_worlds, load_world, parse_world
 from p2os.pioneer.world.interchange.transform import IDENTITY, Transform, after, apply
@@ -71,7 +71,7 @@ def test_gltf_gives_back_the_triangles_of_every_shape_in_its_place(world: World)
         assert any(math.dist(corner, other) < 5e-5 for other in wanted_rows)
 
 
-def world_places(scene: Scene) -> dict[str, Transform]:
+def world_places(scene: ExportScene) -> dict[str, Transform]:
     """Return where each body's frame is in the world."""
     places: dict[str | None, Transform] = {None: IDENTITY}
     for body in scene.bodies:
@@ -87,7 +87,7 @@ def origin(place: Transform) -> list[float]:
     return [row[3] for row in place]
 
 
-def sizes_in_mujoco(body: Body) -> list[float]:
+def sizes_in_mujoco(body: SceneBody) -> list[float]:
     if isinstance(body.shape, Box):
         return [size / 2 for size in body.shape.size_m]
     if isinstance(body.shape, Cylinder):

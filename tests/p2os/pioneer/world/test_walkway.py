@@ -9,7 +9,7 @@ from p2os.pioneer.body.contract import BodyState, RobotBody
 from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.world import load_world, parse_world
 from p2os.pioneer.world.makers.walkway import Measures, walkway
-from p2os.pioneer.world.model import Kind
+from p2os.pioneer.world.model import ObstacleKind
 from p2os.pioneer.world.writer import write_world
 from p2os.robots.parameters import load_parameters
 from tests.p2os.pioneer.body.bodies import drive, each_body, ramped
@@ -33,7 +33,7 @@ def test_the_shipped_walkway_is_what_its_measures_give() -> None:
 def test_another_slope_raises_the_third_leg_and_leaves_the_plan() -> None:
     gentle, steep = (walkway(replace(Measures(), slope_deg=slope)) for slope in (2.0, 5.0))
     assert gentle.extent == steep.extent
-    tops = [max(item.base_m + item.height_m for item in world.obstacles if item.kind is Kind.FLOOR)
+    tops = [max(item.base_m + item.height_m for item in world.obstacles if item.kind is ObstacleKind.FLOOR)
             for world in (gentle, steep)]  # fmt: skip
     # Ten metres of inclines.
     assert tops == pytest.approx([10 * math.tan(math.radians(2)), 10 * math.tan(math.radians(5))], abs=1e-3)

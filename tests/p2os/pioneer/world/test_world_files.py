@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from p2os.errors import WorldError
 from p2os.pioneer.world import known_worlds, load_world, parse_world
 from p2os.pioneer.world.geometry import Footprint, hull_polygon, placed
-from p2os.pioneer.world.model import Kind, Obstacle
+from p2os.pioneer.world.model import Obstacle, ObstacleKind
 from p2os.pioneer.world.plan import Plan
 from p2os.robots.parameters import load_parameters
 
@@ -37,7 +37,7 @@ def test_an_arena_keeps_its_gaps(seed: int) -> None:
     world = load_world("arena", seed)
     assert world == parse_world(ARENA, "arena.toml", seed)
     assert world != load_world("arena", seed + 1)
-    things = [item for item in world.obstacles if item.kind is Kind.OBSTACLE]
+    things = [item for item in world.obstacles if item.kind is ObstacleKind.OBSTACLE]
     assert len(things) >= 16
     for place, thing in enumerate(things):
         widths = (2 * thing.radius_m,) if thing.is_cylinder else (thing.length_m, thing.width_m)
@@ -52,9 +52,9 @@ def test_an_arena_keeps_its_gaps(seed: int) -> None:
 def test_the_incline_is_no_wall_and_the_rails_are() -> None:
     world = load_world("ramp")
     assert world.has_slopes
-    incline = next(item for item in world.obstacles if item.kind is Kind.RAMP)
+    incline = next(item for item in world.obstacles if item.kind is ObstacleKind.RAMP)
     assert math.degrees(math.atan2(incline.height_m, incline.length_m)) <= 5
-    rails = [item for item in world.obstacles if item.kind is Kind.RAIL]
+    rails = [item for item in world.obstacles if item.kind is ObstacleKind.RAIL]
     assert rails
     for rail in rails:
         assert rail.height_m > incline.height_m + P2DX.sonar_height_m

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from p2os.errors import WorldError
 from p2os.pioneer.world import known_worlds, load_world, parse_world
 from p2os.pioneer.world.makers import KINDS, make_world
-from p2os.pioneer.world.model import Kind, Mesh, Obstacle, Pose, Repeat, Walk, World
+from p2os.pioneer.world.model import Mesh, Obstacle, ObstacleKind, Pose, Repeat, Walk, World
 from p2os.pioneer.world.plan import Plan
 from p2os.pioneer.world.writer import degrees, write_world
 from p2os.robots.parameters import load_parameters
@@ -55,11 +55,13 @@ def test_every_key_is_written() -> None:
         start=Pose(0.1, 0.2, math.radians(30), 0.05),
         extent=(-1.0, -1.0, 3.0, 3.0),
         obstacles=(
-            Obstacle(name="ramp", x_m=1, y_m=1, length_m=1, width_m=1, height_m=0.1, base_m=0.05, kind=Kind.RAMP),
-            Obstacle(name="stage", x_m=1, y_m=1, length_m=1, width_m=1, height_m=0.1, kind=Kind.FLOOR),
+            Obstacle(
+                name="ramp", x_m=1, y_m=1, length_m=1, width_m=1, height_m=0.1, base_m=0.05, kind=ObstacleKind.RAMP
+            ),
+            Obstacle(name="stage", x_m=1, y_m=1, length_m=1, width_m=1, height_m=0.1, kind=ObstacleKind.FLOOR),
             Obstacle(name="can", x_m=1, y_m=1, radius_m=0.1, base_m=0.1, floor_m=0.1, mass_kg=2.5, friction=0.1),
             Obstacle(name="dog", x_m=1, y_m=1, radius_m=0.1, walk=walk),
-            Obstacle(name="block", x_m=1, y_m=1, length_m=1, width_m=1, fixed=True, kind=Kind.RAIL),
+            Obstacle(name="block", x_m=1, y_m=1, length_m=1, width_m=1, fixed=True, kind=ObstacleKind.RAIL),
         ),
         meshes=(
             Mesh(name="tent", vertices=((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 1.0)), triangles=((0, 1, 2),)),

@@ -16,7 +16,7 @@ from p2os.cli.main import run as p2os
 from robot_bench.cli import run as driving
 from robot_bench.experiments.validation.experiments import EXPERIMENTS, AtPort
 from robot_bench.experiments.validation.figures import LOOSE_BECAUSE, Missing, loose
-from robot_bench.experiments.validation.trials import Result, longest_s, port_runs, told
+from robot_bench.experiments.validation.trials import TrialResult, longest_s, port_runs, told
 from robot_bench.run import run_at_port
 from tests.robot_bench.experiments.validation.virtual_port import FILES, GATE, at_port, virtual_line
 from tests.tools.forked_python import forked_p2os
@@ -32,7 +32,7 @@ def gate(tmp_path: Path) -> Path:
     return path
 
 
-def failing(found: list[Result]) -> set[str]:
+def failing(found: list[TrialResult]) -> set[str]:
     return {failure.what for result in found for failure in result.failures}
 
 

@@ -14,7 +14,7 @@ from p2os.cli.main import run as p2os
 from robot_bench.events.codec import Json
 from robot_bench.experiments.validation.experiments import CODES, EXPERIMENTS, MOTORS
 from robot_bench.experiments.validation.figures import LOOSE_BECAUSE, Figure, loose
-from robot_bench.experiments.validation.trials import Result, Variant, run_trials, told, variants
+from robot_bench.experiments.validation.trials import TrialResult, Variant, run_trials, told, variants
 from robot_bench.report.make import Files
 from robot_bench.scenario.included_files import Setting
 
@@ -36,24 +36,24 @@ def here(job: Callable[[int, Callable[[], None]], Json], count: int, on_done: Ca
 
 def results_of(
     names: Sequence[str], chosen: Sequence[Variant], folder: Path, settings: Sequence[Setting] = ()
-) -> list[Result]:
+) -> list[TrialResult]:
     return run_trials(
         [EXPERIMENTS[name] for name in names], chosen, folder, settings=settings, in_processes=here, files=Files.SUMMARY
     )
 
 
 @pytest.fixture(scope="module")
-def passing(tmp_path_factory: pytest.TempPathFactory) -> list[Result]:
+def passing(tmp_path_factory: pytest.TempPathFactory) -> list[TrialResult]:
     names = [name for name in EXPERIMENTS if name not in SLOW and name not in LONG]
     return results_of(names, [DIRECT, ADAPTER], tmp_path_factory.mktemp("validation"))
 
 
 @pytest.fixture(scope="module")
-def passing_long(passing: list[Result], tmp_path_factory: pytest.TempPathFactory) -> list[Result]:
+def passing_long(passing: list[TrialResult], tmp_path_factory: pytest.TempPathFactory) -> list[TrialResult]:
     return [*passing, *results_of(LONG, [DIRECT, ADAPTER], tmp_path_factory.mktemp("long"))]
 
 
-def all_hold(found: list[Result], names: set[str]) -> None:
+def all_hold(found: list[TrialResult], names: set[str]) -> None:
     """See that experiments have passed in both modes, or in the one that they have."""
     assert [line for result in found for line in told(result)] == []
     ways = {(name, mode) for name in names for mode in EXPERIMENTS[name].modes or ("direct", "adapter")}
@@ -61,7 +61,7 @@ def all_hold(found: list[Result], names: set[str]) -> None:
     assert all(result.passed and not result.folder for result in found)
 
 
-def test_short_experiments_hold_pins_straight_to_the_body_and_through_the_adapter(passing: list[Result]) -> None:
+def test_short_experiments_hold_pins_straight_to_the_body_and_through_the_adapter(passing: list[TrialResult]) -> None:
     all_hold(passing, EXPERIMENTS.keys() - SLOW - {*LONG})
     assert [name for name, one in EXPERIMENTS.items() if one.modes] == ["capped", "silence"]
     found = loose(finding for result in passing for finding in result.findings)
@@ -70,7 +70,7 @@ def test_short_experiments_hold_pins_straight_to_the_body_and_through_the_adapte
 
 @pytest.mark.slow
 def test_experiments_with_all_pairs_of_codes_hold_and_each_bound_would_be_broken_at_half_its_size_or_says_why_not(
-    passing_long: list[Result],
+    passing_long: list[TrialResult],
 ) -> None:
     all_hold(passing_long, EXPERIMENTS.keys() - SLOW)
     found = loose(finding for result in passing_long for finding in result.findings)
@@ -91,7 +91,7 @@ def test_the_first_pairs_of_codes_show_nothing_wrong_but_that_they_are_not_all(
     assert all(len(result.findings) > len(result.failures) == 1 for result in found)
 
 
-def test_figures_have_units_formulas_and_counts(passing: list[Result]) -> None:
+def test_figures_have_units_formulas_and_counts(passing: list[TrialResult]) -> None:
     figures = [one for result in passing for one in result.findings if isinstance(one, Figure)]
     assert {figure.group for figure in figures} == {"pins", "wire", "motion"}
     assert all(figure.bound.formula and figure.uncertainty >= 0 for figure in figures)
@@ -99,7 +99,7 @@ def test_figures_have_units_formulas_and_counts(passing: list[Result]) -> None:
     assert [(rim.unit, rim.count) for rim in rims] == [("mm/s", 2 * len(MOTORS))] * 2
 
 
-def test_the_adapters_firmware_is_measured_as_its_model_is(passing: list[Result], tmp_path: Path) -> None:
+def test_the_adapters_firmware_is_measured_as_its_model_is(passing: list[TrialResult], tmp_path: Path) -> None:
     twin = results_of(["sensors-all"], [FIRMWARE], tmp_path)[0]
     model = next(one for one in passing if one.experiment == "sensors-all" and one.variant == ADAPTER)
     assert twin.passed

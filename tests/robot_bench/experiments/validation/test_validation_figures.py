@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from adapter_sim.codec import motor_code
 from adapter_sim.pinout import load_pinout
 from robot_bench.events.kinds import Packet
-from robot_bench.experiments.validation.figures import Bound, Figure, Missing, loose, worst, worst_or_missing
+from robot_bench.experiments.validation.figures import Figure, FigureTolerance, Missing, loose, worst, worst_or_missing
 from robot_bench.experiments.validation.signals import at, encoder_steps, motor_pairs, seen_spans, sent
 from robot_bench.recording.run_record import RunRecord
 from robot_bench.wires.edges import Edges
@@ -20,7 +20,7 @@ MS = 1_000_000
 def figure(measured: float, bound: float = 2.0, *, expected: float = 10.0, name: str = "a bound") -> Figure:
     return Figure(
         group="pins", what="x", expected=expected, measured=measured, uncertainty=0, unit="mm",
-        bound=Bound(name=name, value=bound, formula="2 mm"),
+        bound=FigureTolerance(name=name, value=bound, formula="2 mm"),
     )  # fmt: skip
 
 

@@ -13,7 +13,7 @@ from p2os.pioneer.controller.settings import ControllerSettings
 from p2os.pioneer.world import load_world
 from p2os.robots.parameters import load_parameters
 from robot_bench.experiments.validation.experiments import EXPERIMENTS
-from robot_bench.experiments.validation.trials import PortRun, Result, port_runs, run_port
+from robot_bench.experiments.validation.trials import PortRun, TrialResult, port_runs, run_port
 from robot_bench.report.make import Files
 from robot_bench.run import RunResult, run_at_port
 from robot_bench.running.pacer import RealTimePacer
@@ -103,7 +103,7 @@ def virtual_line(world: Path | str, faults: tuple[str, ...] = (), lasts_s: float
 def at_port(
     names: list[str], folder: Path, *, world: Path | str, faults: tuple[str, ...] = (), lasts_s: float = math.inf,
     duration_s: float | None = None,
-) -> list[Result]:  # fmt: skip
+) -> list[TrialResult]:  # fmt: skip
     """Return what experiments find of a virtual robot at a port; `lasts_s` is when the line goes."""
     settings = [] if duration_s is None else [("duration_s", duration_s)]
 

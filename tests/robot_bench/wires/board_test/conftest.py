@@ -5,14 +5,14 @@ from pathlib import Path
 
 import pytest
 
-from robot_bench.wires.board_test.circuit import Fault
+from robot_bench.wires.board_test.circuit import BoardFault
 from robot_bench.wires.board_test.emulated import REVISION, EmulatedBoard
 from robot_bench.wires.board_test.esp32 import library_path
-from robot_bench.wires.board_test.verdicts import Finding, judge
-from robot_bench.wires.board_test.walk import Walk
+from robot_bench.wires.board_test.verdicts import VerdictRow, judge
+from robot_bench.wires.board_test.walk import BoardWalk
 from simbase.errors import MissingDependencyError
 
-Tested = Callable[..., list[Finding]]
+Tested = Callable[..., list[VerdictRow]]
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -29,9 +29,9 @@ def tested() -> Tested:
     """Return what tests a board with faults."""
 
     def test(
-        *faults: Fault, between: bool = False, has_loop_plug: bool = True, revision: str = REVISION
-    ) -> list[Finding]:
+        *faults: BoardFault, between: bool = False, has_loop_plug: bool = True, revision: str = REVISION
+    ) -> list[VerdictRow]:
         board = EmulatedBoard(faults, between=between, has_loop_plug=has_loop_plug, revision=revision)
-        return judge(Walk(board.bluepill_end, board.adapter_end, board.pinout).measure(), board.pinout, revision)
+        return judge(BoardWalk(board.bluepill_end, board.adapter_end, board.pinout).measure(), board.pinout, revision)
 
     return test

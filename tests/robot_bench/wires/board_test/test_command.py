@@ -12,7 +12,7 @@ import typer
 from typer.testing import CliRunner
 
 from robot_bench.cli import board as verb
-from robot_bench.wires.board_test.circuit import Fault, FaultKind, Side
+from robot_bench.wires.board_test.circuit import BoardFault, Side, WireFault
 from robot_bench.wires.board_test.emulated import PROGRAM, STEP_MS, EmulatedBoard
 from robot_bench.wires.board_test.esp32 import CONSOLE
 from simbase.errors import UsageError
@@ -54,12 +54,12 @@ def test_faults_end_with_1_and_are_named(run: Run) -> None:
 @pytest.mark.parametrize(
     ("text", "fault"),
     [
-        ("open:DD3", Fault(FaultKind.OPEN, "DD3")),
-        ("gnd:rst@esp32", Fault(FaultKind.GND, "rst", side=Side.ESP32)),
-        ("short:DD1,EN@esp32", Fault(FaultKind.SHORT, "DD1", "EN", Side.ESP32)),
+        ("open:DD3", BoardFault(WireFault.OPEN, "DD3")),
+        ("gnd:rst@esp32", BoardFault(WireFault.GND, "rst", side=Side.ESP32)),
+        ("short:DD1,EN@esp32", BoardFault(WireFault.SHORT, "DD1", "EN", Side.ESP32)),
     ],
 )
-def test_a_fault_is_a_word(text: str, fault: Fault) -> None:
+def test_a_fault_is_a_word(text: str, fault: BoardFault) -> None:
     assert verb.fault_of(text, verb.load_pinout()) == fault
 
 
@@ -132,7 +132,7 @@ class Ports:
 
 @pytest.fixture
 def ports() -> Iterator[Ports]:
-    served = Ports(EmulatedBoard((Fault(FaultKind.OPEN, "DD5"),)))
+    served = Ports(EmulatedBoard((BoardFault(WireFault.OPEN, "DD5"),)))
     yield served
     served.close()
 

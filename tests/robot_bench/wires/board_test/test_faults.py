@@ -5,10 +5,10 @@ from itertools import pairwise, product
 
 import pytest
 
-from adapter_sim.pinout import Direction, Pull, load_pinout
+from adapter_sim.pinout import Pull, WireDirection, load_pinout
 from hardware.pcb.circuit.modules import BLUEPILL_PINS, ESP32_PINS
-from robot_bench.wires.board_test.circuit import Fault, FaultKind, Side
-from robot_bench.wires.board_test.verdicts import Finding, Verdict
+from robot_bench.wires.board_test.circuit import BoardFault, Side, WireFault
+from robot_bench.wires.board_test.verdicts import BoardVerdict, VerdictRow
 from tests.robot_bench.wires.board_test.conftest import Tested
 
 PINOUT = load_pinout()
@@ -24,7 +24,7 @@ NAME_AT = {
     Side.BLUEPILL: {wire.bluepill: wire.name for wire in PINOUT.wires},
     Side.ESP32: {pin: wire.name for wire in PINOUT.wires if (pin := wire.esp32_pin("rev-b")) != "EN"},
 }
-Named = set[tuple[str, Verdict, tuple[str, ...]]]
+Named = set[tuple[str, BoardVerdict, tuple[str, ...]]]
 
 
 def neighbours(side: Side) -> list[tuple[str, str]]:
@@ -34,25 +34,25 @@ def neighbours(side: Side) -> list[tuple[str, str]]:
 
 
 FAULTS = [
-    *(Fault(FaultKind.OPEN, wire) for wire in WIRES),
-    *(Fault(FaultKind.UNSOLDERED, wire) for wire in WIRES),
-    *(Fault(FaultKind.UNSOLDERED, wire, side=Side.ESP32) for wire in WIRES if wire != RESET),
-    *(Fault(kind, wire, side=side) for kind in (FaultKind.GND, FaultKind.RAIL) for wire in WIRES for side in Side),
-    *(Fault(FaultKind.SHORT, *pair, side) for side in Side for pair in neighbours(side)),
-    *(Fault(FaultKind.SWAPPED, *pair) for pair in neighbours(Side.BLUEPILL)),
-    *(Fault(FaultKind.SWAPPED, *pair) for pair in neighbours(Side.ESP32)),
+    *(BoardFault(WireFault.OPEN, wire) for wire in WIRES),
+    *(BoardFault(WireFault.UNSOLDERED, wire) for wire in WIRES),
+    *(BoardFault(WireFault.UNSOLDERED, wire, side=Side.ESP32) for wire in WIRES if wire != RESET),
+    *(BoardFault(kind, wire, side=side) for kind in (WireFault.GND, WireFault.RAIL) for wire in WIRES for side in Side),
+    *(BoardFault(WireFault.SHORT, *pair, side) for side in Side for pair in neighbours(side)),
+    *(BoardFault(WireFault.SWAPPED, *pair) for pair in neighbours(Side.BLUEPILL)),
+    *(BoardFault(WireFault.SWAPPED, *pair) for pair in neighbours(Side.ESP32)),
 ]  # fmt: skip
 #: Faults on one board at once in these tests. chosen: more make no fewer groups, and a report is read at a glance.
 MOST_AT_ONCE = 12
 
 
-def grouped(faults: Iterable[Fault]) -> list[list[Fault]]:
+def grouped(faults: Iterable[BoardFault]) -> list[list[BoardFault]]:
     """Return the faults in groups that a board may have at once, each named as if it were alone.
 
     Currents of one wire are no other's, so those on different wires are independent, but for what they have in common:
     the reset, and the supply, which several pull-ups without their rail are taken for; at the rail they have it.
     """
-    groups: list[list[Fault]] = []
+    groups: list[list[BoardFault]] = []
     for fault in sorted(faults, key=lambda fault: not fault.other):  # those with two wires fit into fewer
         fitting = (group for group in groups if len(group) < MOST_AT_ONCE and are_independent([*group, fault]))
         group = next(fitting, None)
@@ -63,61 +63,61 @@ def grouped(faults: Iterable[Fault]) -> list[list[Fault]]:
     return groups
 
 
-def are_independent(faults: Sequence[Fault]) -> bool:
+def are_independent(faults: Sequence[BoardFault]) -> bool:
     """Tell whether no two faults have a wire in common, and neither the reset nor the supply."""
     wires = [wire for fault in faults for wire in (fault.wire, fault.other) if wire]
-    low = {name for fault in faults if fault.kind is not FaultKind.RAIL for name in (fault.wire, fault.other)}
+    low = {name for fault in faults if fault.kind is not WireFault.RAIL for name in (fault.wire, fault.other)}
     return len(set(wires)) == len(wires) and RESET not in wires and len(low & PULLED_UP) <= 1
 
 
 #: One of each kind alone, and what is easily forgotten: the pin with the LED, a pull-up. Those of the reset are alone
 #: in their groups.
 QUICK = [
-    Fault(FaultKind.OPEN, "encoder2_s1"),
-    Fault(FaultKind.UNSOLDERED, "DD3", side=Side.ESP32),
-    Fault(FaultKind.GND, "motor1_comm1", side=Side.ESP32),
-    Fault(FaultKind.RAIL, "DD7"),
-    Fault(FaultKind.SHORT, "encoder1_s1", "motor1_comm3"),
-    Fault(FaultKind.SWAPPED, "DD1", "DD2"),
+    BoardFault(WireFault.OPEN, "encoder2_s1"),
+    BoardFault(WireFault.UNSOLDERED, "DD3", side=Side.ESP32),
+    BoardFault(WireFault.GND, "motor1_comm1", side=Side.ESP32),
+    BoardFault(WireFault.RAIL, "DD7"),
+    BoardFault(WireFault.SHORT, "encoder1_s1", "motor1_comm3"),
+    BoardFault(WireFault.SWAPPED, "DD1", "DD2"),
 ]
 
 
-def expected(fault: Fault) -> list[Named]:
+def expected(fault: BoardFault) -> list[Named]:
     """Return what may be named: more than one where no measurement can tell."""
     pair = {(fault.wire, (fault.other,)), (fault.other, (fault.wire,))}
     match fault.kind:
-        case FaultKind.SHORT:
-            return [{(name, Verdict.JOINED, others) for name, others in pair}]
-        case FaultKind.SWAPPED:
-            return [{(name, Verdict.SWAPPED, others) for name, others in pair}]
-        case FaultKind.GND:
-            return [{(fault.wire, Verdict.HELD, ("GND",))}]
-        case FaultKind.RAIL if fault.wire == RESET:
-            return [{(fault.wire, Verdict.HELD, ("3V3",)), ("supply", Verdict.WRONG, ())}]
-        case FaultKind.RAIL:
-            return [{(fault.wire, Verdict.HELD, ("3V3",))}]
+        case WireFault.SHORT:
+            return [{(name, BoardVerdict.JOINED, others) for name, others in pair}]
+        case WireFault.SWAPPED:
+            return [{(name, BoardVerdict.SWAPPED, others) for name, others in pair}]
+        case WireFault.GND:
+            return [{(fault.wire, BoardVerdict.HELD, ("GND",))}]
+        case WireFault.RAIL if fault.wire == RESET:
+            return [{(fault.wire, BoardVerdict.HELD, ("3V3",)), ("supply", BoardVerdict.WRONG, ())}]
+        case WireFault.RAIL:
+            return [{(fault.wire, BoardVerdict.HELD, ("3V3",))}]
         case _:
-            is_open: list[Named] = [{(fault.wire, Verdict.OPEN, ())}]
-            is_driven_here = PINOUT.wire(fault.wire).direction is Direction.TO_ADAPTER
-            if fault.kind is FaultKind.UNSOLDERED and fault.side is Side.ESP32 and is_driven_here:
-                is_open.append({(fault.wire, Verdict.HELD, ("GND",))})
+            is_open: list[Named] = [{(fault.wire, BoardVerdict.OPEN, ())}]
+            is_driven_here = PINOUT.wire(fault.wire).direction is WireDirection.TO_ADAPTER
+            if fault.kind is WireFault.UNSOLDERED and fault.side is Side.ESP32 and is_driven_here:
+                is_open.append({(fault.wire, BoardVerdict.HELD, ("GND",))})
             return is_open
 
 
-def expected_of(faults: Sequence[Fault]) -> list[Named]:
+def expected_of(faults: Sequence[BoardFault]) -> list[Named]:
     """Return what may be named of a board with several."""
     return [set().union(*each) for each in product(*(expected(fault) for fault in faults))]
 
 
-def named(findings: list[Finding]) -> Named:
+def named(findings: list[VerdictRow]) -> Named:
     return {(row.name, row.verdict, row.others) for row in findings if row.is_fault}
 
 
-def words(fault: Fault) -> str:
+def words(fault: BoardFault) -> str:
     return f"{fault.kind.value}-{fault.wire}-{fault.other or fault.side.value}"
 
 
-def ids(faults: Sequence[Fault]) -> str:
+def ids(faults: Sequence[BoardFault]) -> str:
     return words(faults[0]) + (f"-and-{len(faults) - 1}" if faults[1:] else "")
 
 
@@ -128,11 +128,11 @@ def test_a_sound_board_has_a_row_for_each_wire_and_no_fault(tested: Tested) -> N
     findings = tested()
     assert named(findings) == set()
     assert [row.name for row in findings] == ["supply", "crystal", *WIRES, "link", "pad"]
-    assert [row.name for row in findings if row.verdict is not Verdict.SOUND] == ["pad"]
+    assert [row.name for row in findings if row.verdict is not BoardVerdict.SOUND] == ["pad"]
 
 
 @pytest.mark.parametrize("fault", QUICK, ids=words)
-def test_one_fault_of_each_kind_is_named(tested: Tested, fault: Fault) -> None:
+def test_one_fault_of_each_kind_is_named(tested: Tested, fault: BoardFault) -> None:
     assert named(tested(fault)) in expected(fault)
 
 
@@ -151,7 +151,7 @@ def test_one_fault_of_each_kind_is_named(tested: Tested, fault: Fault) -> None:
     ],
 )
 def test_each_fault_of_each_wire_is_named_however_a_pad_between_the_limits_reads(
-    tested: Tested, faults: list[Fault], between: bool
+    tested: Tested, faults: list[BoardFault], between: bool
 ) -> None:
     assert named(tested(*faults, between=between)) in expected_of(faults)
 
@@ -160,7 +160,7 @@ def test_each_fault_of_each_wire_is_named_however_a_pad_between_the_limits_reads
 @pytest.mark.parametrize("between", [False, True], ids=["reads-0", "reads-1"])
 @pytest.mark.parametrize("fault", FAULTS, ids=words)
 def test_a_fault_alone_is_named_however_a_pad_between_the_limits_reads(
-    tested: Tested, fault: Fault, between: bool
+    tested: Tested, fault: BoardFault, between: bool
 ) -> None:
     assert named(tested(fault, between=between)) in expected(fault)
 
@@ -169,21 +169,21 @@ def test_a_fault_alone_is_named_however_a_pad_between_the_limits_reads(
 @pytest.mark.parametrize("between", [False, True], ids=["reads-0", "reads-1"])
 def test_en_joined_to_its_neighbour_is_found(tested: Tested, between: bool) -> None:
     """The 20k of the wire and the 10k of EN make a level between the limits: EN is low, or falls with the wire."""
-    findings = tested(Fault(FaultKind.SHORT, "motor1_comm1", "EN", Side.ESP32), between=between)
-    held: Named = {("supply", Verdict.WRONG, ())}
-    assert named(findings) == ({("motor1_comm1", Verdict.JOINED, ("EN",))} if between else held)
+    findings = tested(BoardFault(WireFault.SHORT, "motor1_comm1", "EN", Side.ESP32), between=between)
+    held: Named = {("supply", BoardVerdict.WRONG, ())}
+    assert named(findings) == ({("motor1_comm1", BoardVerdict.JOINED, ("EN",))} if between else held)
 
 
 def test_two_faults_are_both_named(tested: Tested) -> None:
-    findings = tested(Fault(FaultKind.OPEN, "DD1"), Fault(FaultKind.SHORT, "motor2_comm1", "motor2_comm2"))
+    findings = tested(BoardFault(WireFault.OPEN, "DD1"), BoardFault(WireFault.SHORT, "motor2_comm1", "motor2_comm2"))
     assert named(findings) == {
-        ("DD1", Verdict.OPEN, ()),
-        ("motor2_comm1", Verdict.JOINED, ("motor2_comm2",)),
-        ("motor2_comm2", Verdict.JOINED, ("motor2_comm1",)),
+        ("DD1", BoardVerdict.OPEN, ()),
+        ("motor2_comm1", BoardVerdict.JOINED, ("motor2_comm2",)),
+        ("motor2_comm2", BoardVerdict.JOINED, ("motor2_comm1",)),
     }
 
 
 def test_without_the_loop_plug_the_line_is_not_tested(tested: Tested) -> None:
     row = next(row for row in tested(has_loop_plug=False) if row.name == "link")
-    assert row.verdict is Verdict.UNKNOWN
+    assert row.verdict is BoardVerdict.UNKNOWN
     assert "join pins 2 and 3" in row.detail

@@ -4,8 +4,8 @@ from itertools import pairwise
 
 import pytest
 
-from robot_bench.wires.board_test.circuit import Fault, FaultKind, Side
-from robot_bench.wires.board_test.verdicts import Finding, Verdict
+from robot_bench.wires.board_test.circuit import BoardFault, Side, WireFault
+from robot_bench.wires.board_test.verdicts import BoardVerdict, VerdictRow
 from tests.robot_bench.wires.board_test.conftest import Tested
 from tests.robot_bench.wires.board_test.test_faults import (
     FAULTS,
@@ -30,13 +30,13 @@ NEIGHBOURS = [
 ]
 OF_REV_C = [
     *(fault for fault in FAULTS if not fault.other),
-    *(Fault(FaultKind.SHORT, *pair, Side.BLUEPILL) for pair in neighbours(Side.BLUEPILL)),
-    *(Fault(FaultKind.SHORT, *pair, Side.ESP32) for pair in NEIGHBOURS),
-    *(Fault(FaultKind.SWAPPED, *pair) for pair in (*neighbours(Side.BLUEPILL), *NEIGHBOURS)),
+    *(BoardFault(WireFault.SHORT, *pair, Side.BLUEPILL) for pair in neighbours(Side.BLUEPILL)),
+    *(BoardFault(WireFault.SHORT, *pair, Side.ESP32) for pair in NEIGHBOURS),
+    *(BoardFault(WireFault.SWAPPED, *pair) for pair in (*neighbours(Side.BLUEPILL), *NEIGHBOURS)),
 ]
 
 
-def told(findings: list[Finding]) -> set[str]:
+def told(findings: list[VerdictRow]) -> set[str]:
     """Return the wires that are named."""
     return {row.name for row in findings if row.is_fault}
 
@@ -50,7 +50,7 @@ def test_a_sound_board_has_a_row_for_each_wire_and_no_fault(tested: Tested) -> N
 
 @pytest.mark.parametrize("between", [False, True], ids=["reads-0", "reads-1"])
 @pytest.mark.parametrize("faults", grouped(OF_REV_C), ids=ids)
-def test_each_wire_at_fault_is_named_and_no_other(tested: Tested, faults: list[Fault], between: bool) -> None:
+def test_each_wire_at_fault_is_named_and_no_other(tested: Tested, faults: list[BoardFault], between: bool) -> None:
     findings = tested(*faults, between=between, revision=REVISION)
     wanted = expected_of(faults)
     assert told(findings) in [{name for name, _, _ in one} for one in wanted]
@@ -60,4 +60,4 @@ def test_each_wire_at_fault_is_named_and_no_other(tested: Tested, faults: list[F
     blind = set[str]().union(*(pair for pair in pairs if pair & SHIFTED))
     exact = {row for row in named(findings) if row[0] not in blind}
     assert exact in [{row for row in one if row[0] not in blind} for one in wanted]
-    assert all(row.verdict is not Verdict.UNKNOWN for row in findings if row.name in blind)
+    assert all(row.verdict is not BoardVerdict.UNKNOWN for row in findings if row.name in blind)

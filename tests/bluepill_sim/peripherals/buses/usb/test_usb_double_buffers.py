@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
 from bluepill_sim import BluePill
-from bluepill_sim.fabric.usb_bus import Answer, BusState, Token, Transaction
+from bluepill_sim.fabric.usb_bus import BusState, Token, Transaction, UsbResponse
 from tests.bluepill_sim.conftest import FakeChip
 from tests.bluepill_sim.peripherals.buses.usb.test_usb_registers import (
     ACK,
@@ -140,7 +140,7 @@ class DoubleBuffers(RuleBasedStateMachine):
         if self.stat == DISABLED or not self.IS_IN:
             assert send(self.usb, Token.SETUP, 1, 0, bytes(8)) is None
 
-    def expected(self) -> Answer | None:
+    def expected(self) -> UsbResponse | None:
         if self.stat != VALID:
             return {STALL: SAYS_STALL, NAK: SAYS_NAK}.get(self.stat)
         return SAYS_NAK if self.takes_turns and self.device == self.program else ACK
@@ -165,7 +165,7 @@ class DoubleIn(DoubleBuffers):
         found = self.usb.begin(Transaction(Token.IN, 5, 1))
         used = BUFFERS[self.device if self.kind == BULK and self.has_two else 0]
         expected = self.expected()
-        assert found == (Answer(None, self.device, b"%3d" % used) if expected == ACK else expected)
+        assert found == (UsbResponse(None, self.device, b"%3d" % used) if expected == ACK else expected)
         if expected == ACK and is_acknowledged:
             self.usb.end(Transaction(Token.IN, 5, 1))
             self.ended()
@@ -212,14 +212,14 @@ def test_the_first_transaction_goes_by_stat_alone_and_the_second_by_the_buffers(
     fake_chip.write("USB.EP1R", BULK << 9 | KIND | 1 | stat | (DTOG_RX | DTOG_TX) * dtog)
     for pid in (dtog, 1 - dtog):
         answer = send(usb, token, 1, pid, b"" if is_in else b"%03d" % pid)
-        assert answer == (Answer(None, pid, b"%3d" % BUFFERS[pid]) if is_in else ACK)
+        assert answer == (UsbResponse(None, pid, b"%3d" % BUFFERS[pid]) if is_in else ACK)
         assert fake_chip.read("USB.EP1R") & stat == stat
         if not is_in:
             assert stored(fake_chip, BUFFERS[pid], 3) == b"%03d" % pid
     assert send(usb, token, 1, dtog) == SAYS_NAK
     fake_chip.write("USB.EP1R", BULK << 9 | 1)
     fake_chip.write("USB.EP1R", BULK << 9 | KIND | 1)
-    assert send(usb, token, 1, dtog, b"") == (Answer(None, dtog, b"%3d" % BUFFERS[dtog]) if is_in else ACK), "anew"
+    assert send(usb, token, 1, dtog, b"") == (UsbResponse(None, dtog, b"%3d" % BUFFERS[dtog]) if is_in else ACK), "anew"
 
 
 def test_which_endpoints_take_turns_outlives_a_snapshot_and_not_a_reset(fake_chip: Any) -> None:
@@ -231,13 +231,13 @@ def test_which_endpoints_take_turns_outlives_a_snapshot_and_not_a_reset(fake_chi
     after = usb.snapshot()
     assert send(usb, Token.IN, 1) == SAYS_NAK
     usb.restore(before)
-    assert send(usb, Token.IN, 1) == Answer(None, 0, b"")
+    assert send(usb, Token.IN, 1) == UsbResponse(None, 0, b"")
     usb.restore(after)
     assert send(usb, Token.IN, 1) == SAYS_NAK
     usb.reset()
     set_up(fake_chip)
     fake_chip.write("USB.EP1R", BULK << 9 | KIND | 1 | tx(VALID))
-    assert send(usb, Token.IN, 1) == Answer(None, 0, b"")
+    assert send(usb, Token.IN, 1) == UsbResponse(None, 0, b"")
 
 
 def test_a_control_endpoint_takes_no_turns(fake_chip: Any) -> None:
@@ -246,7 +246,7 @@ def test_a_control_endpoint_takes_no_turns(fake_chip: Any) -> None:
     assert send(usb, Token.SETUP, 0, 0, bytes(8)) == ACK
     fake_chip.write("USB.EP0R", CONTROL << 9 | KIND | tx(NAK ^ VALID) | rx(NAK ^ VALID))
     assert fake_chip.read("USB.EP0R") & (DTOG_RX | DTOG_TX) == DTOG_RX | DTOG_TX
-    assert send(usb, Token.IN, 0) == Answer(None, 1, b"")
+    assert send(usb, Token.IN, 0) == UsbResponse(None, 1, b"")
 
 
 def test_a_host_finishes_a_session_with_a_program_that_fills_both_buffers_first(

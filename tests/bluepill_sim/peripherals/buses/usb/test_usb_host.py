@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bluepill_sim import BluePill
-from bluepill_sim.fabric.usb_bus import Answer, Handshake, Token, Transaction, transaction_ns
+from bluepill_sim.fabric.usb_bus import Handshake, Token, Transaction, UsbResponse, transaction_ns
 from bluepill_sim.parts.usb import HostState, UsbRequestError
 from bluepill_sim.parts.usb.descriptors import DescriptorError, parse_configuration, parse_device, parse_string
 from bluepill_sim.parts.usb.host import HEAD_NS, RECOVERY_NS, RESET_NS, STATUS_NS
@@ -16,7 +16,7 @@ from simbase.timing import NS_PER_MS
 from tests.tools.examples import EXAMPLES
 
 Boards = Callable[[], BluePill]
-Row = tuple[int, Transaction, Answer | None]
+Row = tuple[int, Transaction, UsbResponse | None]
 #: Transactions up to the one after which the device is configured, and the first line.
 ENUMERATION = 31
 
@@ -120,7 +120,7 @@ def test_the_cable_pulled_at_each_transaction_leaves_a_device_that_can_be_found_
     board.usb.plug()
     rows: list[int] = []
 
-    def stop(at_ns: int, _one: Transaction, _answer: Answer | None) -> None:
+    def stop(at_ns: int, _one: Transaction, _answer: UsbResponse | None) -> None:
         rows.append(at_ns)
         board.request_stop()
 
@@ -331,4 +331,4 @@ def test_a_transaction_lasts_as_long_as_its_bits() -> None:
     """35 of the token, 35 + 8 n of data, 19 of the handshake, 4 behind each, at 12 Mbit/s."""
     assert transaction_ns(64) == -(-(35 + 4 + 35 + 512 + 4 + 19 + 4) * 1000 // 12)
     assert 1_000_000 // transaction_ns(64) == 19
-    assert Answer(Handshake.ACK).data == b""
+    assert UsbResponse(Handshake.ACK).data == b""

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bluepill_sim.fabric.usb_bus import Answer, BusState, Handshake, Token, Transaction
+from bluepill_sim.fabric.usb_bus import BusState, Handshake, Token, Transaction, UsbResponse
 
 CTR_RX, DTOG_RX, SETUP, KIND, CTR_TX, DTOG_TX = (1 << n for n in (15, 14, 11, 8, 7, 6))
 DISABLED, STALL, NAK, VALID = range(4)
@@ -16,7 +16,7 @@ CTR, PMAOVR, ERR, WKUP, SUSP, RESET, SOF, ESOF, DIR = (1 << n for n in (15, 14, 
 RESUME, FSUSP, LP_MODE, PDWN, FRES = (1 << n for n in (4, 3, 2, 1, 0))
 HP, LP, MS = 19, 20, 1_000_000
 RESET_NS = 2_500
-ACK, SAYS_NAK, SAYS_STALL = (Answer(one) for one in (Handshake.ACK, Handshake.NAK, Handshake.STALL))
+ACK, SAYS_NAK, SAYS_STALL = (UsbResponse(one) for one in (Handshake.ACK, Handshake.NAK, Handshake.STALL))
 QUICK = settings(max_examples=25)
 Chips = Callable[[], Any]
 
@@ -51,10 +51,10 @@ def endpoint(chip: Any, n: int, kind: int, *, stat: int, flags: int = 0) -> None
     assert chip.read(f"USB.EP{n}R") == stat | kind << 9 | flags | n
 
 
-def send(usb: Any, token: Token, n: int, pid: int = 0, data: bytes = b"") -> Answer | None:
+def send(usb: Any, token: Token, n: int, pid: int = 0, data: bytes = b"") -> UsbResponse | None:
     """A transaction from its begin to its end, as the host makes it."""
     one = Transaction(token, 5, n, pid, data)
-    answer: Answer | None = usb.begin(one)
+    answer: UsbResponse | None = usb.begin(one)
     if answer is not None and answer.handshake in {None, Handshake.ACK}:
         usb.end(one)
     return answer
@@ -119,7 +119,7 @@ def test_stat_decides_the_answer(fake_chip: Any, kind: int, stat: int) -> None:
     put(fake_chip, 320, b"hello")
     fake_chip.write("USB.PMA_012", 5)
     before = fake_chip.read("USB.EP2R")
-    assert send(usb, Token.IN, 2) == answers.get(stat, Answer(None, 0, b"hello"))
+    assert send(usb, Token.IN, 2) == answers.get(stat, UsbResponse(None, 0, b"hello"))
     expected = before & ~tx(3) | tx(NAK) | CTR_TX | DTOG_TX if stat == VALID else before
     assert fake_chip.read("USB.EP2R") == expected
 
@@ -200,7 +200,7 @@ def test_double_buffers_of_a_bulk_endpoint_take_turns(fake_chip: Any, is_in: boo
     for turn in range(4):
         address = (192, 256)[turn % 2]
         answer = send(usb, token, 1, turn % 2, b"" if is_in else b"%03d" % turn)
-        assert answer == (Answer(None, turn % 2, b"%3d" % address) if is_in else ACK)
+        assert answer == (UsbResponse(None, turn % 2, b"%3d" % address) if is_in else ACK)
         assert is_in or stored(fake_chip, address, 3) == b"%03d" % turn
         word = fake_chip.read("USB.EP1R")
         assert bool(word & own) == bool(word & software)
@@ -216,7 +216,7 @@ def test_isochronous_data_have_no_handshake_and_two_buffers(fake_chip: Any) -> N
     fake_chip.write("USB.PMA_00A", 1 << 15 | 1 << 10)
     endpoint(fake_chip, 1, ISOCHRONOUS, stat=rx(VALID))
     for turn in range(3):
-        assert send(usb, Token.OUT, 1, 0, b"%d" % turn) == Answer(None)
+        assert send(usb, Token.OUT, 1, 0, b"%d" % turn) == UsbResponse(None)
     assert (stored(fake_chip, 192, 1), stored(fake_chip, 256, 1)) == (b"2", b"1")
     assert fake_chip.read("USB.EP1R") & rx(3) == rx(VALID)
 
@@ -425,4 +425,4 @@ def test_what_is_received_can_be_sent_back_from_where_it_is(make_fake_chip: Chip
     endpoint(chip, 1, BULK, stat=rx(VALID) | tx(VALID))
     assert send(usb, Token.OUT, 1, 0, data) == ACK
     if address + len(data) <= 0x1E8:
-        assert send(usb, Token.IN, 1) == Answer(None, 0, data)
+        assert send(usb, Token.IN, 1) == UsbResponse(None, 0, data)

@@ -44,12 +44,12 @@ from p2os.pioneer.body.outside.messages import (
     encode,
 )
 from p2os.pioneer.sonar.ring import Cone
-from p2os.pioneer.world.model import Kind, Mesh, Obstacle, Pose, World
+from p2os.pioneer.world.model import Mesh, Obstacle, ObstacleKind, Pose, World
 from p2os.robots.parameters import load_parameters
 from simbase.errors import P2osError
 
 BY_NUMBER = {number: request for request, (number, _) in REQUESTS.items()}
-KINDS = {0: Kind.OBSTACLE, 1: Kind.OBSTACLE, 2: Kind.FLOOR, 3: Kind.RAMP}
+KINDS = {0: ObstacleKind.OBSTACLE, 1: ObstacleKind.OBSTACLE, 2: ObstacleKind.FLOOR, 3: ObstacleKind.RAMP}
 #: What a test's far end does with each request: the bytes that it answers, or None to hang up.
 Answering = Callable[[Request], bytes | None]
 
