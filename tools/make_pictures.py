@@ -68,7 +68,7 @@ def groups() -> Iterator[Group]:
     files = ("bluepill_sim/parts/*.py", "tests/bluepill_sim/firmware/parts.elf", "tools/part_pictures.py")
     yield Group(names=("parts.png",), files=files, make=make_parts)
     for variant in VARIANTS:
-        sides = ("top", "bottom", "view", "bare") if variant == "rev-b" else ("top",)
+        sides = ("top", "bottom", "view", "bare") if variant in pictures.SHOWN_WHOLE else ("top",)
         yield Group(names=tuple(f"board/{variant}-{side}.png" for side in sides),
                     files=(f"hardware/pcb/generated/{variant}/{variant}.kicad_pcb",
                            "hardware/pcb/generated/library/models/*.wrl", BOARD),

@@ -32,6 +32,10 @@ INSERT_HOLE_MM, BOSS_MM, SCREW_HOLE_MM = 4.0, 8.0, 3.4
 #: Around the plug of a cable.
 PLUG_PLAY_MM = 0.8
 USB_PLUG_MM = (11.0, 8.5)
+#: From the socket's mouth to where the cable has bent away upwards.
+USB_PLUG_LENGTH_MM = 34.0
+#: A pen or a match reaches the button, 15 mm below the lid.
+BUTTON_MM = 7.0
 STRAP_MM, STRAP_SLOT_MM, EAR_MM = 25.0, 4.0, 11.0
 TIE_SLOT_MM = (4.0, 2.2)
 LIGHT_MM = 3.2
@@ -85,12 +89,32 @@ def lid() -> PrintedPart:
         for part in LIGHTS
     ]  # fmt: skip
     logic, regulator = body_of("J4", index=-1), body_of("U3")
-    solids.append(_around(logic, 2.0, top, "LOGIC"))
+    solids += [
+        _around(logic, 2.0, top, "LOGIC"),
+        Block(x=usb_way().x, y=usb_way().y, z=top, is_cut=True, name="USB of the ESP32"),
+        _around(body_of("J7", index=-1), 2.0, top, "STOP"),
+        UprightCylinder(at=button_place(), radius_mm=BUTTON_MM / 2, z=top, is_cut=True, name="button"),
+    ]
     solids += [
         Block(x=(x, x + 2.0), y=(regulator.y[0] - 6, regulator.y[1] + 6), z=top, is_cut=True, name="vent")
         for x in (regulator.x[0], regulator.x[0] + 4.5, regulator.x[0] + 9.0)
     ]
     return PrintedPart(name="lid", solids=tuple(solids))
+
+
+def usb_way() -> PlacedBox:
+    """Return the way of a cable to the ESP32's USB socket, which lies within: in from above, then to the socket."""
+    socket = body_of("U2", index=-1)
+    middle, half = (socket.x[0] + socket.x[1]) / 2, USB_PLUG_MM[0] / 2 + PLUG_PLAY_MM
+    level = (socket.z[0] + socket.z[1]) / 2
+    return PlacedBox(part="U2", x=(middle - half, middle + half), y=(socket.y[1], socket.y[1] + USB_PLUG_LENGTH_MM),
+                     z=(level - USB_PLUG_MM[1] / 2, SPACER_MM + WALL_MM))  # fmt: skip
+
+
+def button_place() -> tuple[float, float]:
+    """Return the middle of the mode button."""
+    button = body_of("SW1", index=-1)
+    return (button.x[0] + button.x[1]) / 2, (button.y[0] + button.y[1]) / 2
 
 
 def stamp() -> str:

@@ -19,6 +19,8 @@ BOARD = "the board"
 SPACER_RADIUS_MM = 3.2
 #: What solder and cut leads take below the board.
 SOLDER_MM = 3.0
+#: Of the room around a plug, what must be left.
+PLAY_LEFT_MM = 0.5
 #: The bed of small printers.
 BED_MM = 180.0
 
@@ -78,7 +80,11 @@ def plugs_reach_their_sockets() -> list[str]:
     middle, level = (usb.x[0] + usb.x[1]) / 2, (usb.z[0] + usb.z[1]) / 2
     rs232, terminal, bank = body_of("J3"), body_of("J1"), body_of("J2")
     far = 20.0
+    inner = design.usb_way()
     ways = {
+        "USB of the ESP32": PlacedBox(part="", x=(inner.x[0] + PLAY_LEFT_MM, inner.x[1] - PLAY_LEFT_MM),
+                                      y=(inner.y[0] + 0.1, inner.y[1] - PLAY_LEFT_MM),
+                                      z=(inner.z[0], inner.z[1] + far)),
         "USB of the BluePill": PlacedBox(part="", x=(middle - width / 2, middle + width / 2), y=(-far, usb.y[0]),
                                          z=(level - height / 2, level + height / 2)),
         "RS-232": PlacedBox(part="", x=rs232.x, y=(rs232.y[1], BOARD_HEIGHT_MM + far), z=rs232.z),
@@ -104,6 +110,26 @@ def lights_are_seen() -> list[str]:
         for component in build(variant).components
         if component.part.symbol == "LED" and lid.holds(*part_place(component.ref, variant), design.SPACER_MM + 1)
     ]
+
+
+def parts_leave_the_cable_its_way() -> list[str]:
+    """Return the parts of any variant that stand in the way of the cable to the ESP32's USB socket."""
+    way = design.usb_way()
+    return [
+        f"{variant}: {box.part}"
+        for variant in VARIANTS
+        for box in bodies(variant)
+        if box.part != "U2" and _overlap(box.x, way.x) and _overlap(box.y, way.y) and _overlap(box.z, way.z)
+    ]
+
+
+def hands_reach_what_they_use() -> list[str]:
+    """Return what is used with the lid on and lies below closed material: the mode button, the stop's loop."""
+    lid, wrong = design.lid(), []
+    for name, (x, y) in {"button": design.button_place(), "stop": _middle(body_of("J7", index=-1))}.items():
+        if lid.holds(x, y, design.SPACER_MM + 1):
+            wrong.append(f"{name}: the lid is closed at {_text((x, y, design.SPACER_MM))}")
+    return wrong
 
 
 def a_small_printer_takes_it() -> list[str]:
@@ -132,6 +158,8 @@ CHECKS: dict[str, Callable[[], list[str]]] = {
     "bosses and screws meet the board's holes": bosses_carry_the_board,
     "plugs reach their sockets": plugs_reach_their_sockets,
     "the LEDs are seen": lights_are_seen,
+    "nothing stands in the way of the ESP32's cable": parts_leave_the_cable_its_way,
+    "button and stop are reached with the lid on": hands_reach_what_they_use,
     "lid and base do not meet": base_and_lid_do_not_meet,
     "a printer of 180 mm takes it": a_small_printer_takes_it,
 }
@@ -167,6 +195,14 @@ def _points(box: PlacedBox) -> Iterator[tuple[float, float, float]]:
 def _steps(least: float, most: float) -> list[float]:
     count = max(1, -int(-(most - least) // RASTER_MM))
     return [least + (most - least) * step / count for step in range(count + 1)] if most > least else [least]
+
+
+def _overlap(one: tuple[float, float], other: tuple[float, float]) -> bool:
+    return one[0] < other[1] and other[0] < one[1]
+
+
+def _middle(box: PlacedBox) -> tuple[float, float]:
+    return (box.x[0] + box.x[1]) / 2, (box.y[0] + box.y[1]) / 2
 
 
 def _distance(value: float, span: tuple[float, float]) -> float:

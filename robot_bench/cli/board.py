@@ -103,13 +103,14 @@ def fault_of(text: str, pinout: Pinout) -> BoardFault:
 
 def _emulated(pinout: Pinout, revision: str, faults: list[str]) -> list[VerdictRow]:
     planted = tuple(fault_of(text, pinout) for text in faults)
-    from robot_bench.wires.board_test.emulated import REVISION, EmulatedBoard
+    from robot_bench.wires.board_test.emulated import EmulatedBoard
+    from robot_bench.wires.board_test.esp32 import PARTS
 
-    if revision != REVISION:
-        raise UsageError(f"the emulated board is a {REVISION}, no {revision}", hint=f"--revision {REVISION}")
+    if revision not in PARTS:
+        raise UsageError(f"there is no program for {revision}", hint=f"--revision {' or '.join(PARTS)}")
 
-    board = EmulatedBoard(planted)
-    return judge(BoardWalk(board.bluepill_end, board.adapter_end, pinout).measure(), pinout, REVISION)
+    board = EmulatedBoard(planted, revision=revision)
+    return judge(BoardWalk(board.bluepill_end, board.adapter_end, pinout).measure(), pinout, revision)
 
 
 def _at_ports(adapter: str, bluepill: str, pinout: Pinout, revision: str) -> list[VerdictRow]:

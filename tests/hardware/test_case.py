@@ -71,6 +71,10 @@ def shifted(body: PrintedPart, name: str, dx: float) -> PrintedPart:
         ("base", lambda body: shifted(body, "ear", 70.0), fit.a_small_printer_takes_it),
         ("lid", lambda body: without(body, "screw"), fit.bosses_carry_the_board),
         ("lid", lambda body: without(body, "light of D7"), fit.lights_are_seen),
+        ("lid", lambda body: without(body, "USB of the ESP32"), fit.plugs_reach_their_sockets),
+        ("lid", lambda body: shifted(body, "USB of the ESP32", 1.7), fit.plugs_reach_their_sockets),
+        ("lid", lambda body: without(body, "button"), fit.hands_reach_what_they_use),
+        ("lid", lambda body: without(body, "STOP"), fit.hands_reach_what_they_use),
         ("lid", lambda body: shifted(body, "lip", 0.5), fit.base_and_lid_do_not_meet),
     ],
 )
@@ -146,3 +150,10 @@ def test_building_gives_the_same_files(tmp_path: Path) -> None:
     assert command.main(["build", "--out", str(tmp_path)]) == 0
     for path in sorted(GENERATED.glob("*.stl")):
         assert (tmp_path / path.name).read_bytes() == path.read_bytes()
+
+
+def test_a_part_in_the_way_of_the_esp32_s_cable_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    way = design.usb_way()
+    low = replace(way, z=(0.0, way.z[1]))
+    monkeypatch.setattr(design, "usb_way", lambda: low)
+    assert any(line.startswith("rev-b: U5") for line in fit.parts_leave_the_cable_its_way())

@@ -11,6 +11,7 @@ from hardware.pcb.circuit.electrical import Check, all_checks, bom_faults, netli
 from hardware.pcb.circuit.modules import BLUEPILL_PINS, ESP32_PINS
 from hardware.pcb.circuit.netlist import POWER_NETS, BoardDesign, DesignError, make
 from hardware.pcb.circuit.parts import PARTS, Part
+from hardware.pcb.proof.mutants import BoardMutant, apply
 
 PINOUT = load_pinout()
 
@@ -105,6 +106,31 @@ def test_a_wire_without_its_resistor_and_a_lone_pin_are_missed() -> None:
     faults = netlist_faults(fewer)
     assert "net DD2_BP ends at" not in faults
     assert any(fault.startswith("net MOTOR1_COMM1_BP ends at") for fault in faults)
+
+
+def test_a_button_that_reaches_no_pad_is_missed() -> None:
+    # The board as it was: IO0 open, and the firmware's mode button nowhere.
+    design = apply(build(), BoardMutant(rule="x", name="x", edits=("net U2.37 -",)))
+    assert netlist_faults(design) == ["mode_button is on IO0, which reaches nothing on this board"]
+    failed = {check.name for check in all_checks(design) if not check.is_good}
+    assert failed == {"strap IO0: pull-up on the board", "strap IO0 with the button held"}
+
+
+@pytest.mark.parametrize(
+    ("edit", "name"),
+    [
+        ("drop R75", "strap IO0: pull-up on the board"), ("value R75 47k", "strap IO0: pull-up on the board"),
+        ("value R76 4k7", "strap IO0 with the button held"), ("drop SW1", "strap IO0 with the button held"),
+        ("value R76 120R", "IO0 driven high with the button held"),
+        ("value R77 1k", "stop loop closed: emitter to base of Q3 and Q4"),
+        ("value R78 10k", "stop loop closed: current that wets the contact"),
+        ("value R76 360R", None), ("value R75 20k", None),
+    ],
+)  # fmt: skip
+def test_button_and_stop_loop_are_held_to_their_limits(edit: str, name: str | None) -> None:
+    design = apply(build(), BoardMutant(rule="x", name="x", edits=(edit,)))
+    failed = {check.name for check in all_checks(design) if not check.is_good}
+    assert failed == set() if name is None else name in failed
 
 
 def test_a_design_refuses_twins_and_unknown_parts() -> None:

@@ -118,14 +118,13 @@ def test_gerbers_of_another_size_or_with_other_holes_are_found() -> None:
                                     unplated=4, smallest_drill_mm=0.3)  # fmt: skip
     found = gerbers.faults(design_of(), generated_files.copper_of(design_of())[1], reading)
     assert found[:3] == ["width is 99, the design has 100", "copper layers is 1, the design has 2",
-                         "plated holes is 3, the design has 333"]  # fmt: skip
+                         "plated holes is 3, the design has 359"]  # fmt: skip
     assert "layer bottom mask is missing" in found
 
 
 def test_a_hole_that_stands_elsewhere_in_the_gerbers_is_named() -> None:
-    reading = gerbers.GerberReading(width_mm=100.0, height_mm=100.0, layers=(), copper_layers=2, plated=333, unplated=4,
-                                    smallest_drill_mm=0.3,
-                                    holes=frozenset({(4.0, 4.0, 3.2), (5.0, 96.0, 3.2)}))  # fmt: skip
+    reading = gerbers.GerberReading(width_mm=100.0, height_mm=100.0, layers=(), copper_layers=2, plated=359, unplated=4,
+                              smallest_drill_mm=0.3, holes=frozenset({(4.0, 4.0, 3.2), (5.0, 96.0, 3.2)}))  # fmt: skip
     found = gerbers.faults(design_of(), generated_files.copper_of(design_of())[1], reading)
     assert "a hole of 3.2 mm at 5, 96" in found
     assert "no hole of 3.2 mm at 4, 96" in found

@@ -10,6 +10,7 @@ from hardware.pcb.circuit.design import TEST_POINTS, VARIANTS
 from hardware.pcb.circuit.design import build as design_of
 from hardware.pcb.circuit.electrical import BANK_MIN_V, BATTERY_MAX_V, BATTERY_MIN_V, LM317_AVERAGE_MA, LM317_LIMIT_MA
 from hardware.pcb.outputs.bom import rows as bom_rows
+from hardware.pcb.outputs.steps import STEPS
 from hardware.pcb.spice.decks import decks
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
@@ -74,3 +75,32 @@ def test_references_in_the_manual_are_what_it_says_of_them() -> None:
     for ref in re.findall(r"\b(?:R|C|D|U|J|F|Q|JP|TP)\d{1,2}\b", BUILD):
         # JP8 is the robot's.
         assert ref in names | {"JP8"}, ref
+
+
+def test_every_page_that_names_a_program_to_flash_says_how() -> None:
+    programs = ("robot_bench/firmware/board_test.elf", "bluepill_sim/analysis/silicon/kit.elf")
+    for page in DOCS.glob("*.md"):
+        text = page.read_text(encoding="utf-8")
+        for program in programs:
+            if program in text:
+                assert f'"program {program} verify reset exit"' in text, (page.name, program)
+
+
+def test_no_page_speaks_of_a_button_that_the_module_does_not_have() -> None:
+    for page in DOCS.glob("*.md"):
+        text = page.read_text(encoding="utf-8")
+        assert "module's BOOT button" not in text, page.name
+        assert "**SW1**" in text or "BOOT button" not in text, page.name
+    assert "SW1" in {component.ref for variant in VARIANTS for component in design_of(variant).components}
+
+
+def test_the_steps_of_the_manual_are_those_of_the_pictures() -> None:
+    shown = re.findall(r"!\[Step (\d+)\]\(\.\./hardware/pcb/generated/rev-b/rev-b-step-(\d+)\.svg\)", BUILD)
+    assert [(int(one), int(other)) for one, other in shown] == [(n, n) for n in range(1, len(STEPS) + 1)]
+
+
+def test_the_stop_s_figures_on_the_page_are_those_of_the_simulation() -> None:
+    section = (DOCS / "board-simulation.md").read_text(encoding="utf-8").split("## Emergency stop")[1].split("\n## ")[0]
+    after = float(re.search(r"from the opening to EN low \| ([\d.e-]+) s", section)[1])
+    line = float(re.search(r"at mark although IO17 is low \| (-?[\d.]+) V", section)[1])
+    assert f"{1e6 * after:.0f} µs to EN low, TX at {line:.1f} V" in BOARD

@@ -62,7 +62,7 @@ def test_a_reversed_input_without_its_diode_would_be_noticed() -> None:
 
 
 def test_every_deck_says_what_it_cannot_say_and_limits_what_it_measures() -> None:
-    assert len(DECKS) == len(decks()) == 17
+    assert len(DECKS) == len(decks()) == 19
     for deck in DECKS.values():
         assert deck.cannot_say.endswith("."), deck.name
         measured = {measure.split()[1] for measure in deck.measures}
@@ -171,6 +171,8 @@ FELT = (
     ("swap D1.K D1.A", "reverse", "right"), ("swap D2.K D2.A", "reverse", "right"),
     ("swap D5.K D5.A", "startup-buck", "esp"), ("net J3.4 -", "rs232", "dtr_low"),
     ("swap R1.2 R2.2", "wires", "dd1"), ("net Q1.2 +3V3", "reset", "en_low"), ("drop R73", "boot", "din_down"),
+    ("drop Q4", "stop", "stop_line"), ("drop Q2", "stop", "stop_en"), ("drop R79", "stop", "stop_en"),
+    ("drop R78", "stop", "stop_line"), ("drop R80", "stop", "stop_en"),
     ("value R60 4k7", "boot", "mode_low"), ("drop R33", "boot", "dd3_low"), ("swap D3.K D3.A", "bank", "good"),
 )  # fmt: skip
 
@@ -179,7 +181,9 @@ FELT = (
 @pytest.mark.parametrize(("edit", "name", "measure"), FELT)
 def test_the_decks_are_built_from_the_netlist_and_feel_a_wrong_circuit(edit: str, name: str, measure: str) -> None:
     design = wrong(edit)
-    deck = next(deck for deck in (*signal_decks(design), *supply_decks(design, build("lm317"))) if deck.name == name)
+    deck = next(
+        deck for deck in (*signal_decks(design), *supply_decks(design, build("lm317"), design)) if deck.name == name
+    )
     alone = dataclasses.replace(
         deck,
         measures=tuple(line for line in deck.measures if line.split()[1] == measure),
@@ -193,7 +197,7 @@ def test_every_part_of_the_board_is_an_element_with_its_own_nets_and_value() -> 
     assert lines["RR12"] == ["n_encoder2_s1_bp", "n_encoder2_s1", "680"]
     assert lines["DD1"] == ["n_vin_fused", "n_p12v", "B340A"]
     assert lines["QQ1"] == ["n_esp_en", "n_rst_base", "0", "BC817"]
-    silent = {"BLUEPILL", "ESP32_D1_MINI", "CONN2", "CONN3", "CONN24", "DE9", "TESTPOINT", "HOLE"}
+    silent = {"BLUEPILL", "ESP32_D1_MINI", "CONN2", "CONN3", "CONN24", "DE9", "TESTPOINT", "HOLE", "SWITCH"}
     for part in build().components:
         assert (part.part.symbol in silent) != any(key[1:] == part.ref for key in lines), part.ref
     assert node(build(), "U2.IO17") == "n_esp_tx"

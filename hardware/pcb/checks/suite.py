@@ -13,7 +13,10 @@ from hardware.pcb.checks.results import CheckResult, judged, listed, skipped
 from hardware.pcb.circuit.design import VARIANTS
 from hardware.pcb.circuit.design import build as design_of
 from hardware.pcb.circuit.electrical import all_checks, bom_faults, netlist_faults
+from hardware.pcb.circuit.netlist import BoardDesign
 from hardware.pcb.outputs import generated_files
+from hardware.pcb.proof import lands, printed
+from hardware.pcb.proof.board_file import read_board
 from hardware.pcb.proof.expected import differences
 from hardware.pcb.spice import run
 from hardware.pcb.spice.decks import decks
@@ -44,6 +47,7 @@ def plain() -> list[CheckResult]:
         figures = all_checks(design)
         outside = [str(check) for check in figures if not check.is_good]
         results.append(listed("electrical", variant, outside, f"{len(figures)} figures within their limits"))
+        results += print_and_lands(design)
         tracks, vias = generated_files.copper_of(design)
         words = f"{len(tracks)} tracks, {len(vias)} vias"
         results.append(listed("copper connected", variant, copper.faults(design, tracks, vias), words))
@@ -52,6 +56,20 @@ def plain() -> list[CheckResult]:
     stale = [f"{name} is stale" for name in generated_files.stale_files(sources)]
     results.append(listed("generated files", "all", stale, f"{len(sources)} files up to date"))
     return results
+
+
+def print_and_lands(design: BoardDesign) -> list[CheckResult]:
+    """Read print, lands and wires back from the committed board, and hold them against circuit and drawings."""
+    file = generated_files.GENERATED / design.variant / f"{design.variant}.kicad_pcb"
+    board = read_board(file.read_text(encoding="utf-8"))
+    marks = sum(len(part.marks) for part in board.parts.values()) + len(board.labels)
+    pads = sum(len(part.lands) for part in board.parts.values())
+    return [
+        listed("print", design.variant, printed.faults(board, design), f"{marks} marks where the circuit has them"),
+        listed(
+            "lands and wires", design.variant, lands.faults(board, design), f"{pads} pads as the drawings have them"
+        ),
+    ]
 
 
 def gerbers_reread(variant: str) -> CheckResult:
@@ -68,7 +86,8 @@ def gerbers_reread(variant: str) -> CheckResult:
     )
     design = design_of(variant)
     _, vias = generated_files.copper_of(design)
-    return listed("gerbers re-read", variant, gerbers.faults(design, vias, reading), words)
+    faults = [*generated_files.checksum_faults(variant), *gerbers.faults(design, vias, reading)]
+    return listed("gerbers re-read", variant, faults, words)
 
 
 def pin_rules() -> list[CheckResult]:

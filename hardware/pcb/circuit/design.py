@@ -36,7 +36,8 @@ def build(variant: str = "rev-b") -> BoardDesign:
     pinout = load_pinout()
     components = (
         *_modules(pinout, variant), *_signals(pinout), *_test_header(pinout), *_supply(variant), *_serial(),
-        *_reset_and_mode(pinout, variant), *_shift_register(pinout, variant), *_old_header(variant), *_test_points(),
+        *_reset_and_mode(pinout, variant), *_stop(), *_shift_register(pinout, variant), *_old_header(variant),
+        *_test_points(),
     )  # fmt: skip
     return BoardDesign(variant=variant, revision=revision, title=title, components=components)
 
@@ -170,6 +171,31 @@ def _reset_and_mode(pinout: Pinout, variant: str) -> list[Component]:
         make("R67", "47k", ["RST_BASE", "GND"]),
         make("J5", "HEADER2", ["+3V3", "MODE_PULL"], "MODE"),
         make("R60", "2k2", ["MODE_PULL", mode]),
+        # The module has no button but RESET. R75 holds the strap high at boot; R76 bears a press while IO0 drives.
+        make("SW1", "PUSH BUTTON", ["BUTTON", "GND"], "BOOT"),
+        make("R75", "10k", ["+3V3", "MODE_BUTTON"]),
+        make("R76", "200R", ["MODE_BUTTON", "BUTTON"]),
+    ]
+
+
+def _stop() -> list[Component]:
+    """Build the emergency stop's loop: open, cut or at ground it holds EN low (Q2) and the transmitter at mark (Q4).
+
+    A contact that opens, or the jumper where there is none, joins the pins of J7. The two effects share nothing but
+    the loop: TXD is held although the ESP32 should go on to drive IO17.
+    """
+    return [
+        make("J7", "HEADER2", ["STOP_FEED", "STOP_OK"], "STOP"),
+        make("R77", "200R", ["+3V3", "STOP_FEED"]),
+        make("R78", "2k2", ["STOP_OK", "GND"]),
+        make("C14", "C 100n", ["STOP_OK", "GND"]),
+        make("R79", "4k7", ["STOP_OK", "STOP_SENSE"]),
+        make("Q3", "BC807", ["STOP_SENSE", "+3V3", "STOP_ON"]),
+        make("R80", "4k7", ["STOP_ON", "STOP_BASE"]),
+        make("R81", "47k", ["STOP_BASE", "GND"]),
+        make("Q2", "BC817", ["STOP_BASE", "GND", "ESP_EN"]),
+        make("R82", "4k7", ["STOP_OK", "STOP_HOLD"]),
+        make("Q4", "BC807", ["STOP_HOLD", "+3V3", "TXD"]),
     ]
 
 
@@ -224,7 +250,7 @@ def _old_header(variant: str) -> list[Component]:
 TEST_POINTS = ("GND", "+12V", "5V_REG", "+5V", "+3V3", "BP_5V", "ESP_5V", "ESP_EN", "RS_VP", "RS_VM", "RS_DTR", "DSR_N")
 
 _AUXILIARY_NETS = {
-    "p2os_rx": "ESP_RX", "p2os_tx": "ESP_TX", "status_led": "STATUS",
+    "p2os_rx": "ESP_RX", "p2os_tx": "ESP_TX", "status_led": "STATUS", "mode_button": "MODE_BUTTON",
     "shift_data": "SHIFT_DATA", "shift_clock": "SHIFT_CLOCK", "shift_latch": "SHIFT_LATCH",
     "shift_enable": "SHIFT_ENABLE",
 }  # fmt: skip

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 from adapter_sim.pinout import WireDirection, load_pinout
 from hardware.pcb.circuit.design import PULL_OFFSET, adapter_net, bluepill_net, series_wires
-from hardware.pcb.circuit.modules import NOT_5V_TOLERANT
+from hardware.pcb.circuit.modules import BLUEPILL_PINS, ESP32_PINS, NOT_5V_TOLERANT
 from hardware.pcb.circuit.netlist import BoardDesign
-from hardware.pcb.circuit.parts import PARTS
+from hardware.pcb.circuit.part_numbers import disagreements
+from hardware.pcb.circuit.parts import ACCESSORIES, PARTS, Part
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,6 +40,7 @@ def all_checks(design: BoardDesign) -> list[Check]:
     """Return every electrical check of a variant."""
     found = [*mode_divider(design), *logic_levels(design), *injection(design), *power_budget(design)]
     found += [*supply_margins(design), *reset_transistor(design), *ratings(design)]
+    found += [*mode_button(design), *stop_loop(design)]
     if design.variant == "lm317":
         found += linear_regulators(design)
     return found
@@ -160,6 +162,64 @@ def reset_transistor(design: BoardDesign) -> list[Check]:
     return [Check(name="reset transistor's overdrive", value=drive, low=10, high=1000, unit="x")]
 
 
+def mode_button(design: BoardDesign) -> list[Check]:
+    """Judge IO0, a strap: high at boot by the board's own pull, low while the button is held, whatever pulls."""
+    esp = PARTS["ESP32"].facts
+    strap = _net_at(design, "U2", "IO0")
+    switches = {net for part in design.components if part.part.symbol == "SWITCH" for _, net in part.pins} - {"GND"}
+    up = _parallel(_between(design, strap, "+3V3"))
+    button = min((ohm for net in switches for ohm in _between(design, strap, net)), default=float("inf"))
+    # A module may have a pull-up of its own, as those with a button have.
+    against = _parallel([up, esp["en_pull_ohm"], esp["pull_ohm"]])
+    return [
+        Check(name="strap IO0: pull-up on the board", value=up, low=1e3, high=20e3, unit="ohm"),
+        Check(name="strap IO0 with the button held", value=RAIL_V / (1 + against / button), low=0.0, high=esp["vil_v"],
+              unit="V"),
+        Check(name="IO0 driven high with the button held", value=1e3 * RAIL_V / button, low=0.0, high=20.0, unit="mA"),
+    ]  # fmt: skip
+
+
+def stop_loop(design: BoardDesign) -> list[Check]:
+    """Judge the emergency stop: quiet while its loop is closed, and strong enough against what it overrides."""
+    closed = RAIL_V * ohms(design, "R78") / (ohms(design, "R78") + ohms(design, "R77"))
+    # Open: both bases drive into R78 through resistors of their own.
+    bases = _parallel([ohms(design, "R79"), ohms(design, "R82")])
+    base_a = (RAIL_V - 0.7) / (bases + ohms(design, "R78")) / 2
+    hold_a = RAIL_V / ohms(design, "R62")
+    reset_a = (RAIL_V - 0.2 - 0.7) / ohms(design, "R80") - 0.7 / ohms(design, "R81")
+    return [
+        Check(name="stop loop closed: emitter to base of Q3 and Q4", value=RAIL_V - closed, low=0.0, high=0.35,
+              unit="V", note="below 0.45 V a transistor passes nothing at 40 degrees Celsius"),
+        Check(name="stop loop closed: current that wets the contact", value=1e3 * closed / ohms(design, "R78"), low=1.0,
+              high=10.0, unit="mA"),
+        Check(name="stop loop shorted to ground", value=1e3 * RAIL_V / ohms(design, "R77"), low=0.0, high=30.0,
+              unit="mA"),
+        Check(name="TXD held against an IO17 that is low, overdrive", low=5, high=1000, unit="x",
+              value=base_a * PARTS["BC807"].facts["hfe_min"] / hold_a),
+        Check(name="EN held low by the stop, overdrive", low=10, high=1000, unit="x",
+              value=reset_a * PARTS["BC817"].facts["hfe_min"] / (RAIL_V / PARTS["ESP32"].facts["en_pull_ohm"])),
+    ]  # fmt: skip
+
+
+def _net_at(design: BoardDesign, ref: str, pin: str) -> str | None:
+    """Return the net at a module's pin, by its print."""
+    names = {"U1": BLUEPILL_PINS, "U2": ESP32_PINS}[ref]
+    return dict(design.component(ref).pins)[str(names.index(pin) + 1)]
+
+
+def _between(design: BoardDesign, one: str | None, other: str | None) -> list[float]:
+    """Return the resistors that join two nets."""
+    return [
+        part.part.facts["ohm"]
+        for part in design.components
+        if one is not None and "ohm" in part.part.facts and {net for _, net in part.pins} == {one, other}
+    ]
+
+
+def _parallel(ohm: list[float]) -> float:
+    return 1 / sum(1 / one for one in ohm) if ohm else float("inf")
+
+
 def ratings(design: BoardDesign) -> list[Check]:
     """Judge every capacitor's voltage and the hottest resistor's power."""
     worst = 0.0
@@ -200,24 +260,31 @@ def netlist_faults(design: BoardDesign) -> list[str]:
     nets = design.nets()
     for wire in series_wires(load_pinout()):
         faults += [f"{net} is missing" for net in (bluepill_net(wire), adapter_net(wire)) if net not in nets]
-    pinned = load_pinout()
-    for auxiliary in pinned.auxiliaries:
+    for auxiliary in load_pinout().auxiliaries:
         pin = dict(auxiliary.esp32).get(design.revision)
         if auxiliary.name in _BOARD_AUXILIARIES and pin is None:
             faults.append(f"{auxiliary.name} has no pin in {design.revision}")
+        elif pin is not None and _net_at(design, "U2", pin) is None:
+            faults.append(f"{auxiliary.name} is on {pin}, which reaches nothing on this board")
     return faults
 
 
 def bom_faults(design: BoardDesign) -> list[str]:
-    """Return what is missing from the bill of materials, one line each."""
-    faults = []
+    """Return what is wrong in the bill of materials: missing, unproven without a question, not what its number says."""
+    faults = [f"{where}: {fault}" for _, where, part in ACCESSORIES for fault in _order_faults(part)]
     for component in design.components:
         part = component.part
         missing = [name for name in ("value", "symbol", "footprint", "description") if not getattr(part, name)]
         if part.bought:
             missing += [name for name in ("manufacturer", "mpn", "source") if not getattr(part, name)]
         faults += [f"{component.ref}: no {name}" for name in missing]
+        faults += [f"{component.ref}: {fault}" for fault in _order_faults(part)] if part.bought else []
     return faults
+
+
+def _order_faults(part: Part) -> list[str]:
+    unproven = "memory" in part.source and not part.ask
+    return [*disagreements(part), *(["from memory, and no question to the distributor"] if unproven else [])]
 
 
 #: The robot's battery: 12 V lead-acid, from empty to charging (reference: 11.2 V is the lower end in use).
@@ -243,7 +310,7 @@ MODULE_MIN_V = 4.3
 #: What docs/board-build.md asks of a power bank, at 0.6 A.
 BANK_MIN_V = 4.9
 
-_BOARD_AUXILIARIES = frozenset({"p2os_rx", "p2os_tx", "mode_jumper"})
+_BOARD_AUXILIARIES = frozenset({"p2os_rx", "p2os_tx", "mode_jumper", "mode_button"})
 _NET_V = {
     "VIN": BATTERY_MAX_V, "VIN_FUSED": BATTERY_MAX_V, "+12V": BATTERY_MAX_V, "5V_REG": 5.0, "+5V": 5.0, "ADJ_5V": 3.75,
     "RS_VP": 5.5, "RS_VM": -5.5, "RS_C1P": 5.5, "RS_C1M": 3.3, "RS_C2P": 5.5, "RS_C2M": -5.5, "GND": 0.0,

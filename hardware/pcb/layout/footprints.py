@@ -325,8 +325,9 @@ def _jst_vh() -> PartFootprint:
 
 def _de9() -> PartFootprint:
     pads = [_hole("0", x, 1.42, 4.0, 3.2) for x in (-6.96, 18.04)]
-    pads += [_hole(str(n + 1), 2.77 * n, 0, 1.6, 1.0, PadShape.RECT if n == 0 else PadShape.CIRCLE) for n in range(5)]
-    pads += [_hole(str(n + 6), 1.385 + 2.77 * n, 2.84, 1.6, 1.0) for n in range(4)]
+    # 1.1 mm takes pins at 2.77 mm (KiCad: 1.0 mm) and at 2.74 mm (TE: 1.04 mm).
+    pads += [_hole(str(n + 1), 2.77 * n, 0, 1.6, 1.1, PadShape.RECT if n == 0 else PadShape.CIRCLE) for n in range(5)]
+    pads += [_hole(str(n + 6), 1.385 + 2.77 * n, 2.84, 1.6, 1.1) for n in range(4)]
     names = [Label(layer="F.SilkS", text=str(n + 1), at_mm=(2.77 * n, -1.45), size_mm=0.8) for n in range(5)]
     return PartFootprint(
         name="DE9_MALE", description="DE-9 plug, right angle, edge 10.54 mm below pin 1 at most", pads=tuple(pads),
@@ -337,6 +338,19 @@ def _de9() -> PartFootprint:
         ref_at_mm=(5.54, -3.1),
         boxes=(PartBox(center_mm=(5.54, 4.4), size_mm=(30.8, 12.3), z_mm=(0, 12.5), colour=GREY),
                PartBox(center_mm=(5.54, 13.5), size_mm=(16.9, 6.0), z_mm=(1.8, 10.5), colour=(0.7, 0.7, 0.72))),
+    )  # fmt: skip
+
+
+def _button() -> PartFootprint:
+    pads = [_hole(number, x, y, 2.0, 1.1) for number, y in (("1", 0.0), ("2", 4.5)) for x in (0.0, 6.5)]
+    return PartFootprint(
+        name="SW_PUSH_6MM", description="Push button 6 x 6 mm, upright", pads=tuple(pads),
+        drawings=(*(StraightStroke(layer="F.SilkS", start_mm=(1.25, y), end_mm=(5.25, y)) for y in (-0.9, 5.4)),
+                  Circle(layer="F.SilkS", center_mm=(3.25, 2.25), radius_mm=1.8),
+                  *rectangle("F.Fab", 0.25, -0.75, 6.25, 5.25, 0.1), *courtyard(-1.5, -1.5, 8.0, 6.0)),
+        ref_at_mm=(3.25, -2.0),
+        boxes=(PartBox(center_mm=(3.25, 2.25), size_mm=(6.0, 6.0), z_mm=(0, 3.4), colour=BLACK),
+               PartBox(center_mm=(3.25, 2.25), size_mm=(3.4, 3.4), z_mm=(3.4, 4.3), colour=GREY)),
     )  # fmt: skip
 
 
@@ -365,8 +379,8 @@ def _all() -> list[PartFootprint]:
         _chip("D_SMA", (2.0, 2.5, 1.8), (4.3, 2.6, 2.3), ("K", "A")),
         _chip("D_SMB", (2.15, 2.5, 2.3), (4.4, 3.6, 2.3), ("K", "A")),
         _chip("F_1812", (2.1375, 1.125, 3.4), (4.5, 3.2, 1.6), colour=GREEN),
-        *_packages(), _terminal(), _jst_vh(), _buck(), _radial(), _de9(), _test_point(),
-        _mounting_hole(),
+        *_packages(), _terminal(), _jst_vh(), _buck(), _radial(), _de9(), _button(),
+        _test_point(), _mounting_hole(),
         _header("HEADER_1X2", 1, 2), _header("HEADER_1X3", 1, 3), _header("HEADER_2X12", 2, 12),
         _box_header(),
         bluepill(), esp32_d1_mini(),

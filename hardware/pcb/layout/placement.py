@@ -116,7 +116,7 @@ _FIXED = {
     "J1": Placement(x_mm=11.0, y_mm=94.4, ref_mm=(2.54, 3.6)),
     "F1": Placement(x_mm=10.5, y_mm=83.5),
     "D1": Placement(x_mm=18.6, y_mm=83.5, angle_deg=180),
-    "D2": Placement(x_mm=25.6, y_mm=83.0, angle_deg=90, ref_mm=(0, -4.6)),
+    "D2": Placement(x_mm=25.6, y_mm=83.0, angle_deg=90, ref_mm=(-2.9, -2.2)),
     "C1": Placement(x_mm=32.0, y_mm=80.5, angle_deg=270),
     "C2": Placement(x_mm=26.0, y_mm=76.6),
     # 5 V from a power bank
@@ -152,6 +152,16 @@ _FIXED = {
     "R67": Placement(x_mm=52.6, y_mm=70.5),
     "J5": Placement(x_mm=60.5, y_mm=60.0, ref_mm=(-2.9, 1.27)),
     "R60": Placement(x_mm=66.5, y_mm=62.5),
+    "SW1": Placement(x_mm=89.5, y_mm=50.0), "R75": Placement(x_mm=82.0, y_mm=46.0),
+    "R76": Placement(x_mm=82.0, y_mm=50.5),
+    # emergency stop: the loop at the right edge, its transistors where they act
+    "J7": Placement(x_mm=96.0, y_mm=11.5, ref_mm=(2.4, 1.27)),
+    "R77": Placement(x_mm=95.5, y_mm=19.0), "R78": Placement(x_mm=95.5, y_mm=22.6),
+    "C14": Placement(x_mm=95.5, y_mm=26.2),
+    "R79": Placement(x_mm=95.5, y_mm=29.8), "Q3": Placement(x_mm=95.5, y_mm=38.2),
+    "Q2": Placement(x_mm=60.5, y_mm=75.6), "R80": Placement(x_mm=67.5, y_mm=84.8),
+    "R81": Placement(x_mm=62.5, y_mm=84.8),
+    "Q4": Placement(x_mm=84.0, y_mm=70.8), "R82": Placement(x_mm=84.0, y_mm=74.6),
     # holes and test points
     "H1": Placement(x_mm=4.0, y_mm=4.0), "H2": Placement(x_mm=96.0, y_mm=4.0),
     "H3": Placement(x_mm=4.0, y_mm=96.0), "H4": Placement(x_mm=96.0, y_mm=96.0),
@@ -194,8 +204,8 @@ _VARIANTS: dict[str, dict[str, Placement]] = {
 _TEXTS: list[Label] = [
     Label(layer="F.SilkS", text="BluePill to Pioneer adapter", at_mm=(25.0, 3.2), size_mm=1.4),
     Label(layer="F.SilkS", text="+12V-", at_mm=(13.54, 87.9), size_mm=1.5),
-    Label(layer="F.SilkS", text="+5V-", at_mm=(27.98, 87.9), size_mm=1.5),
-    Label(layer="F.SilkS", text="11-14.8V", at_mm=(13.0, 86.2), size_mm=0.9),
+    Label(layer="F.SilkS", text="+5V-", at_mm=(27.98, 88.6), size_mm=1.5),
+    Label(layer="F.SilkS", text="11-14.8V", at_mm=(20.6, 87.9), size_mm=0.8),
     Label(layer="F.SilkS", text="12V", at_mm=(57.0, 82.0), size_mm=0.9, justify="left"),
     Label(layer="F.SilkS", text="BANK", at_mm=(57.0, 87.08), size_mm=0.8, justify="left"),
     Label(layer="F.SilkS", text="MODE", at_mm=(60.5, 57.4), size_mm=0.9),
@@ -204,8 +214,12 @@ _TEXTS: list[Label] = [
     Label(layer="F.SilkS", text="TX", at_mm=(96.0, 63.9), size_mm=0.9),
     Label(layer="F.SilkS", text="RX", at_mm=(96.0, 68.9), size_mm=0.9),
     Label(layer="F.SilkS", text="HOST (RS-232 plug, DTE)", at_mm=(76.0, 98.2), size_mm=1.0),
+    Label(layer="F.SilkS", text="STOP", at_mm=(96.0, 8.6), size_mm=0.9),
+    Label(layer="F.SilkS", text="LOOP OPEN: EN LOW, TX IDLE, ROBOT STOPS IN 2s", at_mm=(99.0, 32.0), size_mm=0.8,
+          angle_deg=90.0),
+    Label(layer="F.SilkS", text="BOOT/MODE", at_mm=(92.75, 57.3), size_mm=0.9),
     Label(layer="F.SilkS", text="LOGIC", at_mm=(36.7, 12.4), size_mm=1.0),
-    Label(layer="F.SilkS", text="3.3V only", at_mm=(36.7, 49.3), size_mm=0.8),
+    Label(layer="F.SilkS", text="3.3V only", at_mm=(36.7, 48.4), size_mm=0.8),
 ]  # fmt: skip
 _TEXTS_OF: dict[str, list[Label]] = {
     "rev-b": [Label(layer="F.SilkS", text="REV B", at_mm=(50.0, 3.2), size_mm=1.6)],

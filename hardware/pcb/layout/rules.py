@@ -32,7 +32,7 @@ CORNER_MM = 3.0
 #: Copper keeps this distance from the board's edge.
 EDGE_CLEARANCE_MM = 0.5
 #: Ground pour: distance to other nets, narrowest copper, and the spokes at its pads.
-POUR_CLEARANCE_MM, POUR_MIN_MM, THERMAL_GAP_MM, THERMAL_SPOKE_MM = 0.3, 0.25, 0.3, 0.6
+POUR_CLEARANCE_MM, POUR_MIN_MM, THERMAL_GAP_MM, THERMAL_SPOKE_MM = 0.25, 0.25, 0.25, 0.6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

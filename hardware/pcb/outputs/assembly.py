@@ -58,7 +58,7 @@ def board_svg(design: BoardDesign, head: str = "", tail: str = "") -> str:
 
 def _part(component: Component, at: Placement, pads: list[PlacedPad]) -> Iterator[str]:
     footprint = FOOTPRINTS[component.part.footprint]
-    body = _body_mm(component, at)
+    body = body_mm(component, at)
     if body:
         yield _rect("body", body)
     for pad in pads:
@@ -87,7 +87,7 @@ def _part(component: Component, at: Placement, pads: list[PlacedPad]) -> Iterato
     yield _text(component.ref, turn(offset, at), Label(layer="F.SilkS", text="", at_mm=(0, 0), size_mm=0.9), "ref")
 
 
-def _body_mm(component: Component, at: Placement) -> tuple[float, float, float, float] | None:
+def body_mm(component: Component, at: Placement) -> tuple[float, float, float, float] | None:
     """Return the box around a part's drawn body: left, top, right, bottom; None where nothing is drawn."""
     ends = [
         turn(point, at)
@@ -109,7 +109,8 @@ def _rect(kind: str, box_mm: tuple[float, float, float, float], more: str = "") 
 def _text(text: str, at_mm: tuple[float, float], label: Label, kind: str = "mark") -> str:
     # KiCad's letters stand around their position; SVG's stand on it.
     x, y = at_mm[0], at_mm[1] + 0.36 * label.size_mm
+    turned = f' transform="rotate({-label.angle_deg:g} {at_mm[0]:.2f} {at_mm[1]:.2f})"' if label.angle_deg else ""
     return (
         f'<text class="{kind}" x="{x:.2f}" y="{y:.2f}" font-size="{1.15 * label.size_mm:.2f}" '
-        f'text-anchor="{_ANCHOR[label.justify]}">{html.escape(text)}</text>'
+        f'text-anchor="{_ANCHOR[label.justify]}"{turned}>{html.escape(text)}</text>'
     )

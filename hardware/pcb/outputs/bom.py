@@ -52,10 +52,20 @@ def rows(design: BoardDesign) -> list[BomRow]:
 
 def csv_text(design: BoardDesign) -> str:
     """Return the list as CSV."""
-    head = ["Quantity", "References", "Value", "Footprint", "Manufacturer", "Part number", "Distributor", "Description"]
+    head = [
+        "Quantity",
+        "References",
+        "Value",
+        "Footprint",
+        "Manufacturer",
+        "Part number",
+        "Description",
+        "Source",
+        "Ask the distributor",
+    ]
     return _csv(head, (
-        [row.quantity, " ".join(row.refs), part.value, part.footprint, part.manufacturer, part.mpn, part.distributor,
-         part.description]
+        [row.quantity, " ".join(row.refs), part.value, part.footprint, part.manufacturer, part.mpn, part.description,
+         part.source, part.ask]
         for row in rows(design) for part in [row.part]
     ))  # fmt: skip
 
@@ -84,7 +94,7 @@ def html_text(design: BoardDesign) -> str:
         f'<td><input type="checkbox"></td><td>{row.quantity}</td>'
         f"<td>{' '.join(row.refs)}</td><td>{html.escape(row.part.value)}</td><td>{html.escape(row.part.footprint)}</td>"
         f"<td>{html.escape(row.part.manufacturer)}</td><td>{html.escape(row.part.mpn)}</td>"
-        f"<td>{html.escape(row.part.description)}</td></tr>\n"
+        f"<td>{html.escape(row.part.description)}</td><td>{html.escape(row.part.ask)}</td></tr>\n"
         for row in rows(design)
     )
     page = _PAGE.read_text(encoding="utf-8")

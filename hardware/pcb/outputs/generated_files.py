@@ -5,6 +5,7 @@ filling, from which gerbers, rule checks and pictures come.
 Invariant: `sources` is a pure function of design, routes and stitches; it needs no KiCad.
 """
 
+import hashlib
 import io
 import shutil
 import zipfile
@@ -15,7 +16,7 @@ from hardware.pcb.circuit.netlist import BoardDesign
 from hardware.pcb.circuit.parts import PARTS
 from hardware.pcb.layout.footprints import FOOTPRINTS
 from hardware.pcb.layout.routing import HERE, Track, Via, load_routes
-from hardware.pcb.outputs import bom, kicad_cli, project
+from hardware.pcb.outputs import bom, kicad_cli, project, steps
 from hardware.pcb.outputs.assembly import assembly_svg
 from hardware.pcb.outputs.board import board_text, footprint_file
 from hardware.pcb.outputs.pours import fill, load_stitches
@@ -25,6 +26,8 @@ from hardware.pcb.outputs.schematic import PAGES, library_text, page_text, root_
 GENERATED = HERE / "generated"
 SIMULATION_PAGE = HERE.parent.parent / "docs" / "board-simulation.md"
 PICTURES = HERE.parent.parent / "docs" / "pictures" / "board"
+#: Name of the sums that an archive carries.
+SUMS = "SHA256SUMS"
 #: The date inside the archive: the oldest that the format knows, so that it never changes.
 _ZIP_DATE = (1980, 1, 1, 0, 0, 0)
 
@@ -59,7 +62,7 @@ def variant_sources(design: BoardDesign) -> dict[str, str]:
     files[f"{variant}-placement.csv"] = bom.placement_csv(design)
     files[f"{variant}-bom.html"] = bom.html_text(design)
     files[f"{variant}-assembly.svg"] = assembly_svg(design)
-    return files
+    return files | steps.pictures(design)
 
 
 def copper_of(design: BoardDesign) -> tuple[list[Track], list[Via]]:
@@ -119,18 +122,36 @@ def fabrication_files(board: Path, work: Path) -> dict[str, str]:
 
 
 def fabrication_archive(variant: str, folder: Path = GENERATED) -> dict[str, str]:
-    """Return the committed fabrication files of a variant by name; none where there is no archive."""
-    file = folder / variant / f"{variant}-gerbers.zip"
-    if not file.exists():
-        return {}
-    with zipfile.ZipFile(file) as kept:
-        return {name: kept.read(name).decode() for name in kept.namelist()}
+    """Return the committed fabrication files of a variant by name, sums aside; none where there is no archive."""
+    return {name: text for name, text in _archived(variant, folder).items() if name != SUMS}
+
+
+def checksum_faults(variant: str, folder: Path = GENERATED) -> list[str]:
+    """Return the files of a committed archive that its own sums do not hold, as `sha256sum -c` would."""
+    files = _archived(variant, folder)
+    wanted = sums(files)
+    return [] if not files or files.get(SUMS) == wanted else [f"{variant}-gerbers.zip: {SUMS} is not that of its files"]
+
+
+def sums(files: dict[str, str]) -> str:
+    """Return the sums of files, as sha256sum writes them."""
+    return "".join(
+        f"{hashlib.sha256(files[name].encode()).hexdigest()}  {name}\n" for name in sorted(files) if name != SUMS
+    )
 
 
 def archive(files: dict[str, str]) -> bytes:
-    """Return a zip archive that is the same for the same files."""
+    """Return a zip archive that is the same for the same files; it carries their sums."""
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as target:
-        for name in sorted(files):
-            target.writestr(zipfile.ZipInfo(name, _ZIP_DATE), files[name], zipfile.ZIP_DEFLATED, 9)
+        for name, text in sorted({**files, SUMS: sums(files)}.items()):
+            target.writestr(zipfile.ZipInfo(name, _ZIP_DATE), text, zipfile.ZIP_DEFLATED, 9)
     return out.getvalue()
+
+
+def _archived(variant: str, folder: Path) -> dict[str, str]:
+    file = folder / variant / f"{variant}-gerbers.zip"
+    if not file.exists():
+        return {}
+    with zipfile.ZipFile(file) as source:
+        return {name: source.read(name).decode() for name in source.namelist()}

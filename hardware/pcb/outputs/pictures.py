@@ -29,6 +29,8 @@ _SIDES = {
     # Without perspective, for with it KiCad draws another picture each time.
     "view": ("--rotate", "-48,0,-25", "--zoom", "0.62"),
 }
+#: Variants that are shown from every side.
+SHOWN_WHOLE = ("rev-b", "rev-c")
 #: What of the picture at an angle is not sky: left, top, right, bottom.
 _CROP = (60, 190, 920, 790)
 #: Where KiCad draws the board of 100 mm in its picture from above: a millimetre, and the upper left corner; measured
@@ -44,11 +46,11 @@ _STROKES: tuple[dict[str, Any], ...] = (
 
 
 def board_pictures(variant: str, board: Path) -> list[Path]:
-    """Render a filled board from both sides and at an angle; of the other variants the top alone."""
+    """Render a filled board from both sides, at an angle and without its parts; of `lm317` the top alone."""
     files = []
     generated_files.PICTURES.mkdir(parents=True, exist_ok=True)
     for side, arguments in _SIDES.items():
-        if variant != "rev-b" and side != "top":
+        if variant not in SHOWN_WHOLE and side != "top":
             continue
         file = generated_files.PICTURES / f"{variant}-{side}.png"
         kicad_cli.picture(board, file, *arguments, "--width", "1000", "--height", "1000", "--background", "opaque")
@@ -56,8 +58,8 @@ def board_pictures(variant: str, board: Path) -> list[Path]:
             _write_names(file, build(variant))
         _shrink(file, _CROP if side == "view" else None)
         files.append(file)
-    if variant == "rev-b":
-        files.append(_bare_picture(board))
+    if variant in SHOWN_WHOLE:
+        files.append(_bare_picture(variant, board))
     return files
 
 
@@ -117,11 +119,11 @@ def schematic_pictures(variant: str) -> list[Path]:
     return files
 
 
-def _bare_picture(board: Path) -> Path:
+def _bare_picture(variant: str, board: Path) -> Path:
     """Render the board without its parts, for the names that the modules hide."""
     bare = board.with_name("bare.kicad_pcb")
     bare.write_text(board.read_text(encoding="utf-8").replace("/library/models/", "/no-models/"), encoding="utf-8")
-    file = generated_files.PICTURES / "rev-b-bare.png"
+    file = generated_files.PICTURES / f"{variant}-bare.png"
     kicad_cli.picture(bare, file, "--side", "top", "--width", "1000", "--height", "1000", "--background", "opaque")
     _shrink(file)
     return file

@@ -18,12 +18,13 @@ from hardware.pcb.outputs.symbols import POWER_SYMBOLS, SYMBOLS, SymbolPin, prop
 
 #: One step, millimetres: half of KiCad's usual grid, on which all pins lie.
 STEP_MM = 1.27
-PAGES = ("modules", "signals", "supply", "serial", "test")
+PAGES = ("modules", "signals", "supply", "serial", "stop", "test")
 TITLES = {
     "modules": "BluePill and ESP32",
     "signals": "Wires between the modules",
     "supply": "Supply",
     "serial": "RS-232, reset, mode",
+    "stop": "Emergency stop, mode button",
     "test": "Test points, logic header, holes",
 }
 
@@ -98,12 +99,19 @@ _SERIAL = {
     "R66": (136, 92), "R67": (136, 104), "Q1": (152, 92), "J5": (30, 136), "R60": (48, 137),
     "U6": (198, 36), "R74": (188, 60), "C10": (212, 60), "R72": (194, 90), "D9": (208, 90),
 }  # fmt: skip
+_STOP = {
+    "R77": (40, 32), "J7": (34, 44), "R78": (40, 56), "C14": (66, 54),
+    "R79": (104, 32), "Q3": (118, 32), "R80": (160, 46), "R81": (160, 58), "Q2": (174, 46),
+    "R82": (104, 58), "Q4": (118, 58),
+    "R75": (40, 94), "R76": (66, 104), "SW1": (80, 104),
+}  # fmt: skip
 _TEST = {"J4": (44, 44), **_test_points(), **{f"H{n}": (20 + 20 * n, 118) for n in range(1, 5)}}
 _TABLES = {
     "modules": {"U1": (56, 66), "U2": (168, 66)},
     "signals": _signal_places(),
     "supply": _SUPPLY,
     "serial": _SERIAL,
+    "stop": _STOP,
     "test": _TEST,
 }
 
@@ -160,6 +168,14 @@ _FRAMES = {
         SheetFrame(title="Reset: PB13 high pulls EN low", left=106, top=74, right=170, bottom=118,
                    note="Emitter to ground. The module has its own pull-up at EN."),
         SheetFrame(title="Mode jumper, read at boot only", left=10, top=122, right=100, bottom=144),
+    ],
+    "stop": [
+        SheetFrame(title="Emergency stop: a loop that must be closed", left=10, top=12, right=78, bottom=74,
+              note="J7: a contact that opens, or its jumper. Open, cut, at ground: stop."),
+        SheetFrame(title="Stop: EN low and TXD at mark, apart from each other", left=82, top=12, right=200, bottom=74,
+              note="The ESP32 is held in reset, the line falls silent: the robot stops by its own watchdog, in 2 s."),
+        SheetFrame(title="Mode button; held at reset: download", left=10, top=80, right=100, bottom=118,
+              note="IO0 is a strap: high at boot unless the button is held. The module has no button for it."),
     ],
     "test": [
         SheetFrame(title="Logic header: each wire at its receiver", left=10, top=12, right=84, bottom=70,

@@ -22,10 +22,10 @@ from hardware.pcb.outputs.sexp import children, parse, word
 
 TABLE = Path(__file__).parent / "expected.toml"
 #: Symbols of the parts that the table gives no other one.
-_SYMBOLS = {"MAX3232": "MAX3232", "NPN": "BC817", "DE9": "DE9", "SCHOTTKY": "DIODE", "TVS": "DIODE", "LED": "DIODE",
-            "CP": "CP", "HC595": "HC595"}  # fmt: skip
+_SYMBOLS = {"MAX3232": "MAX3232", "NPN": "BC817", "PNP": "BC807", "DE9": "DE9", "SCHOTTKY": "DIODE",
+            "TVS": "DIODE", "LED": "DIODE", "CP": "CP", "HC595": "HC595"}  # fmt: skip
 #: Symbols whose two ends are alike.
-ALIKE = frozenset({"R", "C", "FUSE"})
+ALIKE = frozenset({"R", "C", "FUSE", "SWITCH"})
 _RAILS = {"GND": "GND", "3V3": "3V3"}
 
 
@@ -190,15 +190,34 @@ def _pin_names(part: Component, table: Expected) -> Mapping[str, str]:
     return {} if symbol is None else _table()["symbols"][symbol]["pins"]
 
 
-def _by_place(part: Component, rows: list[list[str]]) -> dict[str, str]:
-    """Name a module's pads by where they stand: rows from left to right, each from the top."""
-    pads = FOOTPRINTS[part.part.footprint].pads
-    columns = sorted({pad.at_mm[0] for pad in pads})
-    names: dict[str, str] = {}
+def print_names(ref: str, places: list[tuple[float, float]]) -> dict[tuple[float, float], str]:
+    """Return what a module's print says at each of its pads; nothing of another part.
+
+    Args:
+        ref: The module.
+        places: Where its pads stand, millimetres, x to the right and y down, the module not turned.
+    """
+    rows = _table()["modules"].get(ref)
+    if rows is None:
+        return {}
+    printed = _table()["print"].get(ref, {})
+    return {at: printed.get(name, name.removeprefix("IO")) for at, name in _rows(places, list(rows.values())).items()}
+
+
+def _rows(places: list[tuple[float, float]], rows: list[list[str]]) -> dict[tuple[float, float], str]:
+    """Name pads by where they stand: rows from left to right, each from the top; ValueError where there are others."""
+    columns = sorted({x for x, _ in places})
+    names: dict[tuple[float, float], str] = {}
     for x, row in zip(columns, rows, strict=True):
-        column = sorted((pad for pad in pads if pad.at_mm[0] == x), key=lambda pad: pad.at_mm[1])
-        names |= {pad.number: name for pad, name in zip(column, row, strict=True)}
+        column = sorted((at for at in places if at[0] == x), key=lambda at: at[1])
+        names |= dict(zip(column, row, strict=True))
     return names
+
+
+def _by_place(part: Component, rows: list[list[str]]) -> dict[str, str]:
+    pads = FOOTPRINTS[part.part.footprint].pads
+    names = _rows([pad.at_mm for pad in pads], rows)
+    return {pad.number: names[pad.at_mm] for pad in pads}
 
 
 def _values(design: BoardDesign, table: Expected) -> list[str]:

@@ -49,6 +49,9 @@ def limits(*rows: tuple[str, float, float, str, str]) -> tuple[Limit, ...]:
 #: BC817-40: Gummel-Poon figures in the middle of the data sheet's spread; only on/off levels are asked of it.
 BC817 = ".model BC817 NPN(IS=9e-14 BF=320 VAF=52 IKF=0.5 ISE=1e-14 BR=10 RB=1 RE=0.1 RC=0.2 CJE=50p CJC=14p TF=0.6n)"
 
+#: BC807-40: the complement, by the same figures.
+BC807 = ".model BC807 PNP(IS=9e-14 BF=320 VAF=52 IKF=0.5 ISE=1e-14 BR=10 RB=1 RE=0.1 RC=0.2 CJE=50p CJC=14p TF=0.6n)"
+
 #: B340A: 0.5 V at 3 A, 40 V reverse, leakage some 10 uA at 25 degrees Celsius (data sheet, memory).
 B340A = ".model B340A D(IS=8u N=1.05 RS=0.03 CJO=400p BV=45 IBV=1m)"
 
@@ -131,4 +134,4 @@ Bq2 0 q2x I = max(0, V(dout1)-V(d1))/30 + max(0, V(dout2)-V(d2))/30
 """
 
 #: All of them: what `netlist.circuit` refers to.
-MODELS = f"{BC817}\n{B340A}\n{MBRA210L}\n{SMBJ15A}\n{LED}\n{BUCK}\n{LM317}\n{MAX3232}"
+MODELS = f"{BC817}\n{BC807}\n{B340A}\n{MBRA210L}\n{SMBJ15A}\n{LED}\n{BUCK}\n{LM317}\n{MAX3232}"

@@ -12,5 +12,5 @@ from hardware.pcb.spice.thermal_decks import thermal_decks
 
 def decks() -> tuple[Deck, ...]:
     """Return every simulation of the board."""
-    buck, linear = build("rev-b"), build("lm317")
-    return (*signal_decks(buck), *supply_decks(buck, linear), *thermal_decks(buck))
+    buck, linear, ribbon = build("rev-b"), build("lm317"), build("rev-c")
+    return (*signal_decks(buck), *supply_decks(buck, linear, ribbon), *thermal_decks(buck))

@@ -102,7 +102,7 @@ def _diode(design: BoardDesign, part: Component, fuse_ohm: float) -> list[str]:
 def _transistor(design: BoardDesign, part: Component, fuse_ohm: float) -> list[str]:
     _ = design, fuse_ohm
     pins = _nodes(part)
-    return [f"Q{part.ref} {pins['3']} {pins['1']} {pins['2']} BC817"]
+    return [f"Q{part.ref} {pins['3']} {pins['1']} {pins['2']} {part.part.key}"]
 
 
 def _chip(model: str, order: str) -> Callable[[BoardDesign, Component, float], list[str]]:
@@ -132,6 +132,6 @@ def _farad_between(design: BoardDesign, one: str | None, two: str | None) -> flo
 
 _ELEMENTS: Mapping[str, Callable[[BoardDesign, Component, float], list[str]]] = {
     "R": _resistor, "FUSE": _resistor, "C": _capacitor, "CP": _capacitor, "SCHOTTKY": _diode, "LED": _diode,
-    "TVS": _diode, "NPN": _transistor, "REGULATOR3": _chip("BUCK", "1 2 3"), "LM317": _chip("LM317", "3 1 2"),
-    "MAX3232": _transceiver,
+    "TVS": _diode, "NPN": _transistor, "PNP": _transistor, "REGULATOR3": _chip("BUCK", "1 2 3"),
+    "LM317": _chip("LM317", "3 1 2"), "MAX3232": _transceiver,
 }  # fmt: skip

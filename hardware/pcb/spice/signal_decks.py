@@ -11,13 +11,17 @@ from hardware.pcb.spice.netlist import circuit, node
 
 def signal_decks(design: BoardDesign) -> tuple[Deck, ...]:
     """Return the decks of a variant's signals."""
-    return (_reset(design), _boot(design), _wires(design), _rs232(design), _rs232_low(design), _back_power(design),
-            _back_power_esp(design))  # fmt: skip
+    return (_reset(design), _stop(design), _boot(design), _wires(design), _rs232(design), _rs232_low(design),
+            _back_power(design), _back_power_esp(design))  # fmt: skip
+
+
+#: Jumpers as the board is delivered: DTR asserted, the stop's loop closed.
+_DTR, _LOOP = ("JP2.1", "JP2.2"), ("J7.1", "J7.2")
 
 
 def _board(design: BoardDesign, *without: str) -> str:
-    """Return models and board without its regulator, the DTR jumper fitted."""
-    return f"{MODELS}\n" + circuit(design, closed=[("JP2.1", "JP2.2")], without=("REGULATOR3", *without))
+    """Return models and board without its regulator, its jumpers as delivered."""
+    return f"{MODELS}\n" + circuit(design, closed=[_DTR, _LOOP], without=("REGULATOR3", *without))
 
 
 def _rail(design: BoardDesign, volts: float = 3.3) -> str:
@@ -61,6 +65,55 @@ Qthesis en2 b2 e2 BC817
     )  # fmt: skip
 
 
+def _stop(design: BoardDesign) -> Deck:
+    """Open the stop's loop while IO17 holds the line at space: the worst that a program can do."""
+    esp, en, din, line = PARTS["ESP32"].facts, *(node(design, pin) for pin in ("U2.EN", "U5.11", "J3.3"))
+    text = f"""
+{MODELS}
+{circuit(design, closed=[_DTR], without=("REGULATOR3",))}
+{_rail(design)}
+Rup {node(design, "U2.3V3")} {en} {esp["en_pull_ohm"]:g}
+Cen {en} 0 {esp["en_farad"]:g}
+* PB13 low, IO17 low whatever EN does, a robot at the plug
+Rpb13 {node(design, "U1.PB13")} 0 1
+Rio17 {node(design, "U2.IO17")} 0 30
+Rline {line} 0 3k
+* the contact: closed, open from 40 ms, at ground on J7's far pin from 120 ms
+Sloop {node(design, "J7.1")} {node(design, "J7.2")} shut 0 CONTACT
+Vshut shut 0 PWL(0 1 40m 1 40.01m 0 80m 0 80.01m 1)
+Sground {node(design, "J7.2")} 0 earth 0 CONTACT
+Vearth earth 0 PWL(0 0 120m 0 120.01m 1)
+.model CONTACT SW(VT=0.5 VH=0.1 RON=0.1 ROFF=100meg)
+.tran 20u 160m
+"""
+    return Deck(
+        name="stop", circuit=text,
+        title="Emergency stop: loop opened at 40 ms, closed at 80 ms, shorted to ground at 120 ms",
+        measures=(f"tran run_line find v({line}) at=39m", f"tran run_en find v({en}) at=39m",
+                  f"tran stop_line find v({line}) at=79m", f"tran stop_en find v({en}) at=79m",
+                  f"tran after trig v(shut) val=0.5 fall=1 targ v({en}) val=0.6 fall=1",
+                  f"tran back_line find v({line}) at=119m", f"tran back_en find v({en}) at=119m",
+                  f"tran ground_line find v({line}) at=159m", f"tran ground_en find v({en}) at=159m",
+                  f"tran run_din find v({din}) at=39m"),
+        limits=limits(("run_line", 3.7, 15, "V", "loop closed: the line follows IO17, here to space"),
+                      ("run_en", 2.9, 3.4, "V", "loop closed: EN"),
+                      ("stop_line", -15, -3.7, "V", "loop open: the line is at mark although IO17 is low"),
+                      ("stop_en", -0.1, 0.3, "V", "loop open: EN"),
+                      ("after", 0, 10e-3, "s", "from the opening to EN low"),
+                      ("back_line", 3.7, 15, "V", "closed again: as before"),
+                      ("back_en", 2.475, 3.4, "V", "closed again: EN 39 ms later"),
+                      ("ground_line", -15, -3.7, "V", "a cable at ground stops too"),
+                      ("ground_en", -0.1, 0.3, "V", "a cable at ground: EN"),
+                      ("run_din", -0.1, 0.3, "V", "loop closed: a low of IO17 is a low at the driver")),
+        traces=((f"v({line})", "TX at the plug"), (f"v({en})", "EN"), ("v(shut)", "loop closed")),
+        x_label="time, ms", y_label="V", x_scale=1e3,
+        cannot_say=(
+            "What the robot does: its own watchdog stops it, 2 s after the last byte. A contact that is welded, or two "
+            "wires of the cable that touch each other, are a closed loop."
+        ),
+    )  # fmt: skip
+
+
 def _boot(design: BoardDesign) -> Deck:
     """Sweep the ESP32's own pull-downs in while nothing drives its pins: 0 is high-impedance, 1 is 45k each."""
     esp = PARTS["ESP32"].facts
@@ -69,7 +122,7 @@ def _boot(design: BoardDesign) -> Deck:
         f"Bown_{pin} {node(design, f'U2.{pin}')} 0 I = V(own)*V({node(design, f'U2.{pin}')})/{esp['pull_ohm']:g}"
         for pin in pins
     )
-    jumper = [("JP2.1", "JP2.2"), ("J5.1", "J5.2")]
+    jumper = [_DTR, _LOOP, ("J5.1", "J5.2")]
     text = f"""
 {MODELS}
 {circuit(design, closed=jumper, without=("REGULATOR3",))}

@@ -1,17 +1,19 @@
 """Supplies: start-up, load steps, light load, inrush and a battery the wrong way round."""
 
-from hardware.pcb.circuit.electrical import BATTERY_MAX_V, LM317_LIMIT_MA
+import re
+
+from hardware.pcb.circuit.electrical import BATTERY_MAX_V, LM317_LIMIT_MA, load_ma
 from hardware.pcb.circuit.netlist import BoardDesign
 from hardware.pcb.circuit.parts import PARTS
 from hardware.pcb.spice.deck import MODELS, Deck, limits
 from hardware.pcb.spice.netlist import circuit, node
 
 
-def supply_decks(buck: BoardDesign, linear: BoardDesign) -> tuple[Deck, ...]:
-    """Return the decks of both supplies; `linear` is the variant lm317."""
+def supply_decks(buck: BoardDesign, linear: BoardDesign, ribbon: BoardDesign) -> tuple[Deck, ...]:
+    """Return the decks of both supplies; `linear` is the variant lm317, `ribbon` has a header for JP8."""
     return (
         _startup_buck(buck), _startup_lm317(linear), _step_buck(buck), _step_lm317(linear), _bank(buck),
-        _minimum_load(linear), _inrush(buck), _reverse(buck),
+        _minimum_load(linear), _inrush(buck), _reverse(buck), _jp8(ribbon),
     )  # fmt: skip
 
 
@@ -219,4 +221,47 @@ Rload {rail} 0 100
                       ("right", 13.8, 14.8, "V", "+12V with +14.8 V at the input")),
         traces=(("v(bat)", "battery"), (f"v({rail})", "+12V")), x_label="time, s", y_label="V",
         cannot_say="Hot leakage: a Schottky diode at 100 degrees leaks a hundred times more, still milliamperes.",
+    )  # fmt: skip
+
+
+def _jp8(design: BoardDesign) -> Deck:
+    """Sweep JP8's 12 V, its jumper fitted, with a battery of 12 V at J1 and without: who feeds whom, and with what."""
+    without = (*_QUIET, "REGULATOR3")
+    joined = circuit(design, closed=[("JP3.1", "JP3.2")], without=without)
+    # The same board a second time, without a battery: its nodes have names of their own.
+    alone = re.sub(r"\bn_", "n_alone_", re.sub(r"(?m)^([A-Z])", r"\1alone", joined))
+    terminal, pin4, rail = node(design, "J1.1"), node(design, "J6.4"), node(design, "D10.K")
+    other_pin4, other_rail = (name.replace("n_", "n_alone_", 1) for name in (pin4, rail))
+    facts = PARTS["BUCK"].facts
+    least, watts = facts["input_min_v"], load_ma(design) * 1e-3 * facts["output_v"] / facts["efficiency"]
+    text = f"""
+{MODELS}
+{joined}
+{alone}
+* what the regulator takes with both modules at their peaks, less below its least voltage
+Bboth {rail} 0 I = {watts:g}/max({least}, V({rail}))*min(1, max(0, V({rail})/{least}))
+Balone {other_rail} 0 I = {watts:g}/max({least}, V({other_rail}))*min(1, max(0, V({other_rail})/{least}))
+Vjp8 jp8 0 0
+Vto_both jp8 {pin4} 0
+Vto_alone jp8 {other_pin4} 0
+Vbat bat 0 12
+Vto_board bat {terminal} 0
+.options reltol=1e-6
+.dc Vjp8 0 15 0.05
+"""
+    return Deck(
+        name="jp8", title="JP8's 12 V by J6 and JP3, from 0 to 15 V, both modules at their peaks", circuit=text,
+        measures=(f"dc low_rail find v({other_rail}) at=11", "dc taken find i(vto_alone) at=11",
+                  "dc back min i(vto_both)", "dc low find i(vto_both) at=10", "dc high_bat find i(vto_board) at=15",
+                  f"dc high_rail find v({other_rail}) at=14.8"),
+        limits=limits(("low_rail", least, 11, "V", "+12V from JP8 alone at 11 V: the regulator needs 6.5 V"),
+                      ("taken", 0.1, 0.35, "A", "what JP8 gives then: F2 holds 0.5 A"),
+                      ("back", -1e-3, 1, "A", "with a battery at J1: nothing flows back into JP8"),
+                      ("low", -1e-3, 1e-3, "A", "JP8 at 10 V, battery at 12 V: the battery feeds alone"),
+                      ("high_bat", -1e-3, 1e-3, "A", "JP8 at 15 V, battery at 12 V: nothing flows into the battery"),
+                      ("high_rail", 13.8, 14.8, "V", "+12V with JP8 at 14.8 V")),
+        traces=(("i(vto_alone)", "from JP8, alone"), ("i(vto_both)", "from JP8, battery at J1"),
+                ("i(vto_board)", "from the battery")),
+        x_label="JP8 pin 4, V", y_label="A",
+        cannot_say="What JP8 can give, how stiff it is and what protects it: nobody has measured one.",
     )  # fmt: skip

@@ -10,7 +10,7 @@ Invariant: without faults it is the board of docs/board.md, as far as `Circuit` 
 from collections.abc import Callable
 from pathlib import Path
 
-from adapter_sim.pinout import WireRole, load_pinout
+from adapter_sim.pinout import load_pinout
 from bluepill_sim import BluePill
 from bluepill_sim.fabric.pins import PinDrive
 from bluepill_sim.fabric.subscriptions import EDGE
@@ -31,7 +31,7 @@ from robot_bench.wires.board_test.circuit import (
     VoltageSource,
 )
 from robot_bench.wires.board_test.ends import AdapterEnd, BluePillEnd, ConsoleLine
-from robot_bench.wires.board_test.esp32 import CONSOLE, ROBOT, Esp32
+from robot_bench.wires.board_test.esp32 import CONSOLE, ROBOT, Esp32, library_path
 from robot_bench.wires.chip_pins import number_of
 from simbase.timing import NS_PER_MS, NS_PER_US, Reason
 
@@ -58,6 +58,7 @@ class EmulatedBoard:
         faults: What is wrong with the board.
         has_loop_plug: Whether pins 2 and 3 of J3 are joined.
         between: What is read of a pad between the limits of low and high.
+        revision: Of the board; KeyError where no program was built for it.
     """
 
     def __init__(
@@ -66,18 +67,22 @@ class EmulatedBoard:
         *,
         has_loop_plug: bool = True,
         between: bool = False,
+        revision: str = REVISION,
     ) -> None:
         self.pinout = load_pinout()
         self._circuit = Circuit(self.pinout, faults)
         self._has_loop_plug = has_loop_plug
         self._between = between
         self.bluepill = BluePill(PROGRAM)
-        self.esp32 = Esp32()
-        self._pads = {
-            wire.name: int(pin.removeprefix("IO"))
-            for wire in self.pinout.wires
-            if wire.role is not WireRole.RESET and (pin := wire.esp32_pin(REVISION)) is not None
-        }
+        pins = {wire.name: wire.esp32_pin(revision) or "" for wire in self.pinout.wires}
+        self._pads = {name: int(pin.removeprefix("IO")) for name, pin in pins.items() if pin.startswith("IO")}
+        #: Wires at a shift register: which of its outputs.
+        self._shifted = {name: "ABCDEFGH".index(pin[-1]) for name, pin in pins.items() if pin.startswith("HC595.")}
+        own = {one.name: dict(one.esp32).get(revision) for one in self.pinout.auxiliaries}
+        self._shift_enable = _gpio(own.get("shift_enable"))
+        self.esp32 = Esp32(library_path(revision))
+        for name in ("shift_data", "shift_clock", "shift_latch"):
+            setattr(self.esp32.state, name, _gpio(own.get(name)))
         self._pins = {wire.name: self.bluepill.pin(wire.bluepill) for wire in self.pinout.wires}
         self._said = {CONSOLE: bytearray(), ROBOT: bytearray()}
         self._seen: object = None
@@ -136,6 +141,10 @@ class EmulatedBoard:
         drives: dict[Node, VoltageSource] = {
             (name, Side.BLUEPILL): _SOURCES[drive] for name, drive in self._drives.items() if drive in _SOURCES
         }
+        # Its enable is pulled up: it drives where the program pulls it low, and then all its wires together.
+        if self._shifted and state.driven >> self._shift_enable & 1 and not state.out >> self._shift_enable & 1:
+            for name, output in self._shifted.items():
+                drives[name, Side.ESP32] = VoltageSource(RAIL_V if state.shifted >> output & 1 else 0.0, OUTPUT_OHM)
         for name, pad in self._pads.items():
             if state.driven >> pad & 1:
                 drives[name, Side.ESP32] = VoltageSource(RAIL_V if state.out >> pad & 1 else 0.0, OUTPUT_OHM)
@@ -161,6 +170,11 @@ class EmulatedBoard:
 
     def _reads(self, volts: float, limits: InputLimits) -> bool:
         return self._between if limits.low_v < volts < limits.high_v else volts >= limits.high_v
+
+
+def _gpio(pin: str | None) -> int:
+    """Return a GPIO's number, 0 where a revision has no such pin."""
+    return int(pin.removeprefix("IO")) if pin else 0
 
 
 class _EmulatedLine:

@@ -54,9 +54,9 @@ class NvsFault(IntEnum):
 _REASONS = {1: ResetReason.RESTART, 2: ResetReason.PANIC, 3: ResetReason.WATCHDOG}
 
 
+#: The library of each revision of the board, as a module.
+PARTS = {"rev-b": "robot_bench._esp32", "rev-c": "robot_bench._esp32_rev_c"}
 #: Result and arguments of each function, as `simbase.c_library` spells them.
-#: The library, as a module.
-PART = "robot_bench._esp32"
 _FUNCTIONS = {
     "machine": "p", "machine_run": "il", "machine_sent": "zispz", "machine_receive": "vispz",
     "machine_pad": "iiiiii", "machine_pad_connect": "ili", "machine_pad_disconnect": "v",
@@ -85,15 +85,15 @@ class _State(ctypes.Structure):
     )
 
 
-def library_path() -> Path:
-    """Return the library that was built with this package.
+def library_path(revision: str = "rev-b") -> Path:
+    """Return the library of a revision that was built with this package; KeyError where there is none of that name.
 
     Raises:
         MissingDependencyError: It was not built.
     """
-    path = built(PART)
+    path = built(PARTS[revision])
     if path is None:
-        raise MissingDependencyError("the simulated ESP32 is not built", hint=way_to_build(PART))
+        raise MissingDependencyError("the simulated ESP32 is not built", hint=way_to_build(PARTS[revision]))
     return Path(path)
 
 
@@ -101,7 +101,7 @@ class _Library:
     """A loaded program, and whose turn it is."""
 
     def __init__(self, path: Path) -> None:
-        self.calls = loaded(str(path), _FUNCTIONS, "the simulated ESP32", PART)
+        self.calls = loaded(str(path), _FUNCTIONS, "the simulated ESP32", PARTS["rev-b"])
         self.calls.machine.restype = ctypes.POINTER(_State)
         self.state: _State = self.calls.machine().contents
         self._ram = self._place(self.calls.machine_ram)

@@ -8,7 +8,9 @@ What follows a wire                          is named
     only its own pad at the near end         held at a rail at the far end where that can be told, else open
     the adapter's console falls silent       joined to rst, or to EN, which is the far end of rst
 
-Not told apart: a pin of the ESP32 that is not soldered, of a wire that the BluePill drives, from one held at GND.
+Not told apart: a pin of the ESP32 that is not soldered, of a wire that the BluePill drives, from one held at GND; and
+whatever is wrong at an output of rev C's shift register, which nothing reads: its wire is named, as open, where a rail
+holds it, and where it is joined to another output and the level between both reads so.
 """
 
 from dataclasses import dataclass

@@ -28,8 +28,10 @@ def program() -> Path:
 def tested() -> Tested:
     """Return what tests a board with faults."""
 
-    def test(*faults: BoardFault, between: bool = False, has_loop_plug: bool = True) -> list[VerdictRow]:
-        board = EmulatedBoard(faults, between=between, has_loop_plug=has_loop_plug)
-        return judge(BoardWalk(board.bluepill_end, board.adapter_end, board.pinout).measure(), board.pinout, REVISION)
+    def test(
+        *faults: BoardFault, between: bool = False, has_loop_plug: bool = True, revision: str = REVISION
+    ) -> list[VerdictRow]:
+        board = EmulatedBoard(faults, between=between, has_loop_plug=has_loop_plug, revision=revision)
+        return judge(BoardWalk(board.bluepill_end, board.adapter_end, board.pinout).measure(), board.pinout, revision)
 
     return test

@@ -71,7 +71,7 @@ def test_a_fault_is_a_word(text: str, fault: BoardFault) -> None:
         ("--emulated", "--bluepill", "pty:/dev/null"),
         ("--fault", "open:DD3"),
         ("--emulated", "--revision", "rev-z"),
-        ("--emulated", "--revision", "rev-c"),
+        ("--emulated", "--revision", "thesis-board"),
         *(("--emulated", "--fault", text) for text in (
             "DD3", "shut:DD3", "open:DD9", "open:DD1,DD2", "short:DD1", "short:DD1,DD1", "open:EN", "short:EN,DD1",
             "open:DD3@left",
