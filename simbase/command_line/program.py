@@ -24,6 +24,8 @@ EXIT_INTERRUPTED = 130
 #: chosen: objects made between two searches for garbage; a capture's are tuples by the thousand, and none is garbage.
 COLLECTED_AFTER = 20_000
 
+MAKE_MEMORY = "end other programs, or ask for less at a time"
+
 #: Makes the application that words are for.
 Maker = Callable[[Sequence[str]], typer.Typer]
 
@@ -73,6 +75,10 @@ def report(program: str, error: Exception, *, trace: bool = False) -> int:
         where = "standard output" if error.filename is None else str(error.filename)
         _print_error(f"{program}: {_one_line(f'cannot write {where}: {reason_of(error)}')}")
         _print_error(f"hint: {MAKE_ROOM}")
+        return EXIT_FAILED
+    if isinstance(error, MemoryError):  # NumPy's says of what
+        _print_error(f"{program}: {_one_line(str(error)) or 'there is not enough memory'}")
+        _print_error(f"hint: {MAKE_MEMORY}")
         return EXIT_FAILED
     if not isinstance(code, int):
         says = unforeseen(error)

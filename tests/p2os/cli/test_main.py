@@ -90,6 +90,8 @@ def test_the_version_is_printed_without_loading_a_verb(monkeypatch: pytest.Monke
         ),
         (TransportError("several\n  lines"), 1, ["p2os: several lines"]),
         (FileError("no such file"), 2, ["p2os: no such file"]),
+        (MemoryError(), 1, ["p2os: there is not enough memory", "hint: end other programs"]),
+        (MemoryError("no memory for\n a log"), 1, ["p2os: no memory for a log", "hint: end other programs"]),
         (KeyError("oops"), 1, ["p2os: this is a bug: KeyError: 'oops'", "hint: run it again with --trace and report"]),
     ],
 )
