@@ -6,6 +6,7 @@ Exit codes: 0 done, 1 the operation failed, 2 wrong usage, 130 interrupted, by w
 
 import contextlib
 import difflib
+import errno
 import gc
 import sys
 import traceback
@@ -25,6 +26,14 @@ EXIT_INTERRUPTED = 130
 COLLECTED_AFTER = 20_000
 
 MAKE_MEMORY = "end other programs, or ask for less at a time"
+
+_MORE_FILES = ("open", "a file", "end other programs, or allow more open files: ulimit -n")
+#: What was refused where it need not be a write: what cannot be done, with what, and what to try.
+_REFUSED = {
+    errno.EMFILE: _MORE_FILES,
+    errno.ENFILE: _MORE_FILES,
+    errno.EIO: ("read or write", "a file or standard output", "is the disk sound, and the terminal still there?"),
+}
 
 #: Makes the application that words are for.
 Maker = Callable[[Sequence[str]], typer.Typer]
@@ -72,9 +81,10 @@ def report(program: str, error: Exception, *, trace: bool = False) -> int:
         traceback.print_exception(error)
     code = getattr(error, "exit_code", None)
     if isinstance(error, OSError) and error.errno in REFUSALS:  # of a file that is named, an error of ours tells
-        where = "standard output" if error.filename is None else str(error.filename)
-        _print_error(f"{program}: {_one_line(f'cannot write {where}: {reason_of(error)}')}")
-        _print_error(f"hint: {MAKE_ROOM}")
+        what, where, hint = _REFUSED.get(error.errno, ("write", "standard output", MAKE_ROOM))
+        where = where if error.filename is None else str(error.filename)
+        _print_error(f"{program}: {_one_line(f'cannot {what} {where}: {reason_of(error)}')}")
+        _print_error(f"hint: {hint}")
         return EXIT_FAILED
     if isinstance(error, MemoryError):  # NumPy's says of what
         _print_error(f"{program}: {_one_line(str(error)) or 'there is not enough memory'}")

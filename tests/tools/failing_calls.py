@@ -4,6 +4,7 @@ Calls are counted from the verb's first line on, in the verb's own process and t
 before that is there already; modules that it imports later are files that it opens, too.
 """
 
+import random
 import shutil
 import signal
 import struct
@@ -168,3 +169,14 @@ def run_verb(path: str, folder: Path, call: FailedCall, *words: str) -> Ended:
         check=False, timeout=LIMIT_S,
     )  # fmt: skip
     return Ended(done.returncode, done.stdout, done.stderr, *counted(page))
+
+
+def calls_of(ended: Ended, chooser: random.Random, most: int) -> list[FailedCall]:
+    """Draw at most so many calls of each kind, each with all that may become of it."""
+    found = []
+    for kind, count in ended.counts.items():
+        outcomes = [Outcome.FAIL, Outcome.END] + [Outcome.SHORTEN] * (kind in SHORT)
+        numbers = range(1, count + 1)
+        for number in sorted(chooser.sample(numbers, most)) if most < count else numbers:
+            found += [FailedCall(kind, number, outcome) for outcome in outcomes]
+    return found

@@ -7,23 +7,45 @@ So where the call was the process's last, the robot's own watchdog stops it.
 import contextlib
 import os
 import pty
+import random
 import subprocess
 import threading
 import time
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+
+import pytest
 
 from p2os.capture import Direction, capture_of, write_recording
 from p2os.protocol.commands import Command, CommandNumber
 from simbase.timing import NS_PER_MS
 from tests.p2os.cli.driven import is_raw
-from tests.tools.failing_calls import Ended, FailedCall, Outcome, command, counted, page_in
+from tests.robot_bench.firmware.hurried import hurried
+from tests.tools.failing_calls import (
+    SOUND,
+    Ended,
+    FailedCall,
+    Kind,
+    Outcome,
+    calls_of,
+    command,
+    counted,
+    library,
+    page_in,
+)
 from tests.tools.forked_python import forked_p2os
 from tools.measure_stops import Cable, ServedRobot
 
 #: The robot's watchdog, and its longest ramp from these speeds.
 STANDING_S = 2.6
 LIMIT_S = 40.0
+SEED = 39
+#: How many calls of a kind `make soak` tries of each verb: all, but of sockets, of which `run` makes 1300.
+DRAWN = 200
+#: The clock is real, and the machine does other things: what is wrong three times is.
+TRIES, AT_ONCE = 3, 4
 IDENTITY = bytes.fromhex("fafb18025669727475616c0050696f6e6565720070326478002a13")
 #: What sets wheels in motion where its argument is not 0.
 MOTION = frozenset({
@@ -52,8 +74,23 @@ MOVERS = {
     "teleop": Mover("teleop {url} --vel 0.1m/s", keys_s=0.5),
     "sniff": Mover("sniff {url} --listen tcp:127.0.0.1:0 --quiet --out s.jsonl --for 4s",
                    client="drive {listen} --vel 0.1m/s --for 500ms"),
-    "run": Mover("run motors --port {url} --yes --duration 2500ms --out o --force"),
+    "run": Mover("run dodge --firmware {firmware} --port {url} --yes --duration 2s --out o --force"),
 }  # fmt: skip
+
+
+#: Early and late calls of each kind that verbs which move make.
+SAMPLE = [
+    FailedCall(kind, number, outcome)
+    for kind, numbers in (
+        (Kind.OPEN, (1, 2)),
+        (Kind.READ, (2, 4)),
+        (Kind.WRITE, (1,)),
+        (Kind.MALLOC, (1, 3)),
+        (Kind.SOCKET, (1, 9, 30, 60)),
+    )
+    for number in numbers
+    for outcome in (Outcome.FAIL, Outcome.END)
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +128,7 @@ def tried(path: str, folder: Path, mover: Mover, call: FailedCall) -> Trial:
     cable = Cable(robot.url)
     try:
         page = page_in(folder / "tmp")
-        words = mover.words.format(url=cable.url).split()
+        words = mover.words.format(url=cable.url, firmware=hurried("dodge")).split()
         ended = _run(command(path, page, call, *words), folder, mover, page)
         at = time.monotonic()
         while robot.is_moving and time.monotonic() < at + STANDING_S + 1:
@@ -178,8 +215,63 @@ def wrong(trial: Trial, call: FailedCall) -> list[str]:
     if ended.code not in {0, 1, 2}:
         found.append(f"ended with {ended.code}")
     found += [word for word in ("Traceback", "bug", "ignored") if word in ended.err]
-    if ended.code and "p2os: " not in ended.err and ended.code != 130:
+    if _is_silent(ended):
         found.append("it said nothing")
     if not trial.was_stopped:
         found.append("no STOP")
     return found
+
+
+def _is_silent(ended: Ended) -> bool:
+    """Tell whether nothing was said of what went wrong, which who cannot write to standard error cannot."""
+    return bool(ended.code) and "p2os: " not in ended.err and ended.failed not in {"write 2", "write 1"}
+
+
+def each_tried(path: str, folder: Path, rows: Sequence[tuple[str, FailedCall]]) -> list[str]:
+    """Try rows of a mover and a call, several at a time; return what was wrong each time that it was tried."""
+
+    def problems(row: tuple[int, tuple[str, FailedCall]]) -> list[str]:
+        place, (name, call) = row
+        found: list[str] = []
+        for again in range(TRIES):
+            trial = tried(path, folder / f"{place}-{again}", MOVERS[name], call)
+            found = [
+                f"{name} {call} {trial.ended.failed}: {each}: {trial.ended.err[-300:]}" for each in wrong(trial, call)
+            ]
+            if not found:
+                break
+        return found
+
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        return [problem for found in pool.map(problems, enumerate(rows)) for problem in found]
+
+
+def sound(path: str, folder: Path, name: str) -> Ended:
+    """Return how a mover ends where no call fails; it has moved the robot, but for `send`, which turns no motor on."""
+    trial = tried(path, folder / name, MOVERS[name], SOUND)
+    assert trial.moved or name == "send", trial.ended.err
+    assert not wrong(trial, SOUND)
+    return trial.ended
+
+
+@pytest.mark.slow
+def test_a_robot_stands_after_a_call_that_fails(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+    path, chooser = library(tmp_path_factory), random.Random(SEED)
+    drive = sound(path, tmp_path, "drive")
+    rows = [
+        ("drive", FailedCall(Kind.SOCKET, drive.counts[Kind.SOCKET] // 2, outcome)) for outcome in Outcome if outcome
+    ]
+    rows += [("replay", FailedCall(Kind.SOCKET, 4, Outcome.FAIL))]
+    rows += chooser.sample([(name, call) for name in MOVERS for call in SAMPLE], 6)
+    assert not each_tried(path, tmp_path, rows)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("name", MOVERS)
+def test_a_robot_stands_after_every_call_that_fails(
+    name: str, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    path = library(tmp_path_factory)
+    calls = calls_of(sound(path, tmp_path, name), random.Random(f"{SEED} {name}"), DRAWN)
+    found = each_tried(path, tmp_path, [(name, call) for call in calls])
+    assert not found, "\n\n".join(found)

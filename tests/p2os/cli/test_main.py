@@ -1,5 +1,6 @@
 """The command line as such: verbs found, errors told in one line and a hint, exit codes."""
 
+import errno
 import os
 import re
 import runpy
@@ -90,6 +91,9 @@ def test_the_version_is_printed_without_loading_a_verb(monkeypatch: pytest.Monke
         ),
         (TransportError("several\n  lines"), 1, ["p2os: several lines"]),
         (FileError("no such file"), 2, ["p2os: no such file"]),
+        (OSError(errno.ENOSPC, "No space"), 1, ["p2os: cannot write standard output: no space", "hint: make room"]),
+        (OSError(errno.EMFILE, "Many", "x.py"), 1, ["p2os: cannot open x.py: many", "hint: end other programs, or al"]),
+        (OSError(errno.EIO, "An error"), 1, ["p2os: cannot read or write a file or standard output: an", "hint: is"]),
         (MemoryError(), 1, ["p2os: there is not enough memory", "hint: end other programs"]),
         (MemoryError("no memory for\n a log"), 1, ["p2os: no memory for a log", "hint: end other programs"]),
         (KeyError("oops"), 1, ["p2os: this is a bug: KeyError: 'oops'", "hint: run it again with --trace and report"]),
