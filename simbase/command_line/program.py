@@ -16,7 +16,7 @@ import typer
 
 from simbase.command_line.refused_connections import shown_refusals
 from simbase.command_line.signals import end_on_signals, ignore_signals, restored_signals
-from simbase.files import MAKE_ROOM, REFUSALS, reason_of
+from simbase.files import REFUSALS, hint_of, reason_of
 from simbase.user_classes import unforeseen
 
 EXIT_FAILED = 1
@@ -27,12 +27,11 @@ COLLECTED_AFTER = 20_000
 
 MAKE_MEMORY = "end other programs, or ask for less at a time"
 
-_MORE_FILES = ("open", "a file", "end other programs, or allow more open files: ulimit -n")
-#: What was refused where it need not be a write: what cannot be done, with what, and what to try.
+#: What was refused where it need not be a write, and of what.
 _REFUSED = {
-    errno.EMFILE: _MORE_FILES,
-    errno.ENFILE: _MORE_FILES,
-    errno.EIO: ("read or write", "a file or standard output", "is the disk sound, and the terminal still there?"),
+    errno.EMFILE: ("open", "a file"),
+    errno.ENFILE: ("open", "a file"),
+    errno.EIO: ("read or write", "a file or standard output"),
 }
 
 #: Makes the application that words are for.
@@ -81,10 +80,10 @@ def report(program: str, error: Exception, *, trace: bool = False) -> int:
         traceback.print_exception(error)
     code = getattr(error, "exit_code", None)
     if isinstance(error, OSError) and error.errno in REFUSALS:  # of a file that is named, an error of ours tells
-        what, where, hint = _REFUSED.get(error.errno, ("write", "standard output", MAKE_ROOM))
+        what, where = _REFUSED.get(error.errno, ("write", "standard output"))
         where = where if error.filename is None else str(error.filename)
         _print_error(f"{program}: {_one_line(f'cannot {what} {where}: {reason_of(error)}')}")
-        _print_error(f"hint: {hint}")
+        _print_error(f"hint: {hint_of(error)}")
         return EXIT_FAILED
     if isinstance(error, MemoryError):  # NumPy's says of what
         _print_error(f"{program}: {_one_line(str(error)) or 'there is not enough memory'}")

@@ -65,6 +65,8 @@ class Outcome(IntEnum):
     END = 3
 
 
+#: Whose failing leaves no way to say so.
+UNHEARD = ("write 1", "write 2")
 #: Kinds that move bytes, and can move fewer.
 SHORT = frozenset({Kind.READ, Kind.WRITE, Kind.SOCKET})
 _PAGE = struct.Struct(f"{len(Kind)}q256s")
@@ -104,9 +106,18 @@ class Ended:
         return self.code == -signal.SIGKILL
 
     @property
-    def belongs_to_others(self) -> bool:
-        """Whether the allocation that failed was of a library that is not ours."""
-        return "/site-packages/" in self.failed
+    def was_killed_by_others(self) -> bool:
+        """Whether memory was refused to a library that is not ours and that uses it all the same: Unicorn does."""
+        return self.code < 0 and "alloc " in self.failed and "/site-packages/" in self.failed
+
+    def wrong(self) -> list[str]:
+        """Return what must not be of a verb that was not killed: how it ended, and what it said."""
+        found = [] if self.code in {0, 1, 2} else [f"ended with {self.code}"]
+        found += [word for word in ("Traceback", "bug", "ignored") if word in self.err]
+        if self.code and self.failed not in UNHEARD:
+            found += [] if "p2os: " in self.err or self.out else ["it said nothing"]
+            found += [] if "hint: " in self.err or self.code == 1 else ["refused without a hint"]
+        return found
 
 
 def library(factory: pytest.TempPathFactory) -> str:

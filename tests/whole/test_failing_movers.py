@@ -34,6 +34,7 @@ from tests.tools.failing_calls import (
     counted,
     library,
     page_in,
+    run_verb,
 )
 from tests.tools.forked_python import forked_p2os
 from tools.measure_stops import Cable, ServedRobot
@@ -64,6 +65,8 @@ class Mover:
     keys_s: float = 0.0
     #: Another program's client, at {listen}.
     client: str = ""
+    #: What looks at what it leaves in its folder, the file named.
+    left: tuple[str, str] = ("", "")
 
 
 MOVERS = {
@@ -73,11 +76,15 @@ MOVERS = {
     "replay": Mover("replay drive.jsonl {url} --as client --yes"),
     "teleop": Mover("teleop {url} --vel 0.1m/s", keys_s=0.5),
     "sniff": Mover("sniff {url} --listen tcp:127.0.0.1:0 --quiet --out s.jsonl --for 4s",
-                   client="drive {listen} --vel 0.1m/s --for 500ms"),
-    "run": Mover("run dodge --firmware {firmware} --port {url} --yes --duration 2s --out o --force"),
+                   client="drive {listen} --vel 0.1m/s --for 500ms", left=("s.jsonl", "decode s.jsonl")),
+    "run": Mover("run dodge --firmware {firmware} --port {url} --yes --duration 2s --out o --force",
+                 left=("o", "report o")),
+    "record": Mover("record {url} --for 300ms --out r.jsonl --pcap r.pcap", left=("r.jsonl", "decode r.jsonl")),
 }  # fmt: skip
 
 
+#: What turns no motor on.
+STANDING = frozenset({"send", "record"})
 #: Early and late calls of each kind that verbs which move make.
 SAMPLE = [
     FailedCall(kind, number, outcome)
@@ -101,6 +108,8 @@ class Trial:
     moved: bool
     #: Seconds from the process's end until the wheels stood; None: they turn still.
     stood_s: float | None
+    #: What was left, looked at; None: nothing was.
+    left: Ended | None
     #: Whether STOP, or CLOSE, came after the last command that moves, if any did.
     was_stopped: bool
 
@@ -137,7 +146,9 @@ def tried(path: str, folder: Path, mover: Mover, call: FailedCall) -> Trial:
         commands = [each for _, each in cable.frames]
         moving = [n for n, each in enumerate(commands) if each.number in MOTION and each.argument]
         was_stopped = not moving or any(each.number in STOPS for each in commands[moving[-1] + 1 :])
-        return Trial(ended, len(robot.speeds) > 1, stood, was_stopped)
+        name, verb = mover.left
+        left = run_verb(path, folder, SOUND, *verb.split()) if name and (folder / name).exists() else None
+        return Trial(ended, len(robot.speeds) > 1, stood, left, was_stopped)
     finally:
         cable.close()
         robot.close()
@@ -210,21 +221,14 @@ def wrong(trial: Trial, call: FailedCall) -> list[str]:
     found, ended = [], trial.ended
     if trial.stood_s is None or trial.stood_s > STANDING_S:
         found.append("the wheels turn on")
-    if ended.was_killed and call.outcome is Outcome.END:
+    if (left := trial.left) is not None:
+        found += [f"afterwards: {each}: {left.err}" for each in left.wrong()]
+    if (ended.was_killed and call.outcome is Outcome.END) or ended.was_killed_by_others:
         return found
-    if ended.code not in {0, 1, 2}:
-        found.append(f"ended with {ended.code}")
-    found += [word for word in ("Traceback", "bug", "ignored") if word in ended.err]
-    if _is_silent(ended):
-        found.append("it said nothing")
+    found += ended.wrong()
     if not trial.was_stopped:
         found.append("no STOP")
     return found
-
-
-def _is_silent(ended: Ended) -> bool:
-    """Tell whether nothing was said of what went wrong, which who cannot write to standard error cannot."""
-    return bool(ended.code) and "p2os: " not in ended.err and ended.failed not in {"write 2", "write 1"}
 
 
 def each_tried(path: str, folder: Path, rows: Sequence[tuple[str, FailedCall]]) -> list[str]:
@@ -247,9 +251,9 @@ def each_tried(path: str, folder: Path, rows: Sequence[tuple[str, FailedCall]]) 
 
 
 def sound(path: str, folder: Path, name: str) -> Ended:
-    """Return how a mover ends where no call fails; it has moved the robot, but for `send`, which turns no motor on."""
+    """Return how a mover ends where no call fails; it has moved the robot, but for `STANDING`."""
     trial = tried(path, folder / name, MOVERS[name], SOUND)
-    assert trial.moved or name == "send", trial.ended.err
+    assert trial.moved or name in STANDING, trial.ended.err
     assert not wrong(trial, SOUND)
     return trial.ended
 
