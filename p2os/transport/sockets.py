@@ -147,7 +147,7 @@ class TcpListener:
 
     def __init__(self, url: TcpUrl) -> None:
         self._socket = _listening_socket(url)
-        self.description = str(TcpUrl(host=url.host, port=self._socket.getsockname()[1]))
+        self.description = str(TcpUrl(host=url.host, port=self._socket.port))
 
     def accept(self) -> Transport | None:
         """Return the line to a client that has come, or None."""

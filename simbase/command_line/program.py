@@ -85,8 +85,8 @@ def report(program: str, error: Exception, *, trace: bool = False) -> int:
         _print_error(f"{program}: {_one_line(f'cannot {what} {where}: {reason_of(error)}')}")
         _print_error(f"hint: {hint_of(error)}")
         return EXIT_FAILED
-    if isinstance(error, MemoryError):  # NumPy's says of what
-        _print_error(f"{program}: {_one_line(str(error)) or 'there is not enough memory'}")
+    if (memory := _without_memory(error)) is not None:
+        _print_error(f"{program}: {_one_line(str(memory)) or 'there is not enough memory'}")  # NumPy's says of what
         _print_error(f"hint: {MAKE_MEMORY}")
         return EXIT_FAILED
     if not isinstance(code, int):
@@ -105,6 +105,13 @@ def report(program: str, error: Exception, *, trace: bool = False) -> int:
     if hint := getattr(error, "hint", None):
         _print_error(f"hint: {_one_line(hint)}")
     return code
+
+
+def _without_memory(error: BaseException | None) -> MemoryError | None:
+    """Return what says that memory was short; other errors may follow from it, as of a ZIP file that cannot end."""
+    while error is not None and not isinstance(error, MemoryError):
+        error = error.__context__
+    return error
 
 
 def _run(program: str, make_app: Maker, words: list[str], *, trace: bool) -> int:

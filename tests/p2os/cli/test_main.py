@@ -64,6 +64,12 @@ def raising(error: BaseException) -> Callable[[], None]:
     return act
 
 
+def following(first: BaseException, error: Exception) -> Exception:
+    """Return an error that arose while another was handled."""
+    error.__context__ = first
+    return error
+
+
 def test_no_words_show_help_with_every_verb_and_examples(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.run([]) == 0
     out = capsys.readouterr().out
@@ -94,6 +100,7 @@ def test_the_version_is_printed_without_loading_a_verb(monkeypatch: pytest.Monke
         (OSError(errno.ENOSPC, "No space"), 1, ["p2os: cannot write standard output: no space", "hint: make room"]),
         (OSError(errno.EMFILE, "Many", "x.py"), 1, ["p2os: cannot open x.py: many", "hint: end other programs, or al"]),
         (OSError(errno.EIO, "An error"), 1, ["p2os: cannot read or write a file or standard output: an", "hint: is"]),
+        (following(MemoryError(), ValueError("no end")), 1, ["p2os: there is not enough memory", "hint: end other p"]),
         (MemoryError(), 1, ["p2os: there is not enough memory", "hint: end other programs"]),
         (MemoryError("no memory for\n a log"), 1, ["p2os: no memory for a log", "hint: end other programs"]),
         (KeyError("oops"), 1, ["p2os: this is a bug: KeyError: 'oops'", "hint: run it again with --trace and report"]),

@@ -18,6 +18,7 @@ from p2os.transport.sockets import BACKLOG_BYTES, SocketTransport
 from p2os.transport.url import SerialUrl
 from p2os.transport.waiting import LONGEST_CLOSING_NS, MOST_CLOSING, ClosingLines, WakeUp, wait_readable
 from simbase.errors import UsageError
+from simbase.listening import GuardedListener
 
 #: A bound on every wait of these tests; reached only when something is broken.
 TIMEOUT_S = 30.0
@@ -382,6 +383,19 @@ def test_a_socket_that_refuses_one_call_carries_all_bytes_to_the_end(name: str) 
         line.close()
         assert far.recv(100) == b"stop"  # a reset may come before it has been read
         assert far.recv(100) == b""
+
+
+def test_a_port_that_cannot_be_asked_for_is_an_error_and_given_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[GuardedListener] = []
+
+    def refuse(listening: GuardedListener) -> None:
+        made.append(listening)
+        raise OSError(errno.ENOBUFS, os.strerror(errno.ENOBUFS))
+
+    monkeypatch.setattr(GuardedListener, "getsockname", refuse)
+    with pytest.raises(TransportError, match=r"cannot listen on tcp:127.0.0.1:0: no buffer space available"):
+        listen_url("tcp:127.0.0.1:0")
+    assert made[0].fileno() == -1
 
 
 def test_a_wake_up_that_cannot_be_cleared_stays_readable(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -104,14 +104,14 @@ def wrong(path: str, place: Path, verb: str, call: FailedCall) -> list[str]:
     if not ended.failed:
         return found  # not each run makes as many calls
     if call.outcome is Outcome.END:
-        found += [] if ended.was_killed else [f"ended with {ended.code}"]
+        found += [] if ended.was_killed else ended.wrong()  # a worker's call: its run has failed
     elif ended.was_killed_by_others:
         return found
     else:
         found += ended.wrong()
         if call.outcome is Outcome.SHORTEN and ended.code != sound.ended.code:
             found.append("what was short was not gone on with")
-        if ended.code == sound.ended.code and "p2os: " not in ended.err:  # where it said nothing, all is as ever
+        if "p2os: " not in ended.err and (ended.code == 0 or ended.out == sound.ended.out):  # it said nothing
             found += [f"{name} differs" for name, data in sound.files.items() if left.get(name) != data]
             found += [f"{name} is there or not" for name in sound.names ^ set(left)]
             found += ["the output differs"] if sound.has_same_output and ended.out != sound.ended.out else []
