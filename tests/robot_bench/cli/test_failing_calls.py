@@ -100,6 +100,8 @@ def wrong(path: str, place: Path, verb: str, call: FailedCall) -> list[str]:
     """Let a call fail; return what must not be."""
     sound, ended = reference(path, place, verb), _run_in_copy(path, place, verb, call)
     left = files_in(_copy(place))
+    if _has_errors(left.get("o/summary.json", b"")):
+        return ended.wrong()
     found = [f"{name} was lost" for name in sorted(sound.kept) if left.get(name) != files_in(place)[name]]
     if not ended.failed:
         return found  # not each run makes as many calls
@@ -118,6 +120,11 @@ def wrong(path: str, place: Path, verb: str, call: FailedCall) -> list[str]:
     return [f"{each}\n{call}: {ended.failed}\n{ended.err[-500:]}" for each in found + _what_is_left(path, place, verb)]
 
 
+def _has_errors(summary: bytes) -> bool:
+    """Tell whether a campaign has trials that failed for want of memory, as its summary says."""
+    return b'"error": ' in summary and b'"error": 0' not in summary
+
+
 def _what_is_left(path: str, place: Path, verb: str) -> list[str]:
     """Go on with what a verb has left: report it, resume it, or do it again, which may be refused with a reason."""
     folder, goes_on = _copy(place), verb
@@ -127,7 +134,9 @@ def _what_is_left(path: str, place: Path, verb: str) -> list[str]:
     found = again.wrong()
     if verb.startswith("campaign b") and again.code == 0:
         summary = "o/summary.json"
-        found += [] if files_in(folder)[summary] == reference(path, place, verb).files[summary] else ["rows were lost"]
+        data = files_in(folder)[summary]
+        is_whole = data == reference(path, place, verb).files[summary] or _has_errors(data)
+        found += [] if is_whole else ["rows were lost"]
     return [f"afterwards, {goes_on}: {each}: {again.err[-300:]}" for each in found]
 
 
