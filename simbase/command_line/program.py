@@ -10,7 +10,7 @@ import errno
 import gc
 import sys
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import typer
 
@@ -63,7 +63,7 @@ def run(program: str, make_app: Maker, words: Sequence[str], *, trace: bool = Fa
         trace: Show where in the program an error arose.
     """
     try:
-        with restored_signals(), shown_refusals(program):
+        with restored_signals(), shown_refusals(program), _in_a_line(program):
             end_on_signals()
             return _run(program, make_app, list(words), trace=trace)
     except KeyboardInterrupt:  # while the last lines were being written
@@ -86,7 +86,7 @@ def report(program: str, error: Exception, *, trace: bool = False) -> int:
         _print_error(f"hint: {hint_of(error)}")
         return EXIT_FAILED
     if (memory := _without_memory(error)) is not None:
-        _print_error(f"{program}: {_one_line(str(memory)) or 'there is not enough memory'}")  # NumPy's says of what
+        _print_error(f"{program}: {_one_line(unforeseen(memory))}")
         _print_error(f"hint: {MAKE_MEMORY}")
         return EXIT_FAILED
     if not isinstance(code, int):
@@ -105,6 +105,25 @@ def report(program: str, error: Exception, *, trace: bool = False) -> int:
     if hint := getattr(error, "hint", None):
         _print_error(f"hint: {_one_line(hint)}")
     return code
+
+
+@contextlib.contextmanager
+def _in_a_line(program: str) -> Iterator[None]:
+    """Show what the system refuses to a callback of a library in C, which nobody can catch, as any other such error."""
+    before = sys.unraisablehook
+
+    def show(unraisable: "sys.UnraisableHookArgs") -> None:
+        error = unraisable.exc_value
+        if isinstance(error, MemoryError) or (isinstance(error, OSError) and error.errno in REFUSALS):
+            report(program, error)
+        else:
+            before(unraisable)
+
+    sys.unraisablehook = show
+    try:
+        yield
+    finally:
+        sys.unraisablehook = before
 
 
 def _without_memory(error: BaseException | None) -> MemoryError | None:

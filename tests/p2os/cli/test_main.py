@@ -260,3 +260,26 @@ def test_the_package_runs_as_a_module(monkeypatch: pytest.MonkeyPatch, capsys: p
         runpy.run_path(str(files("p2os") / "__main__.py"), run_name="__main__")
     assert end.value.code in (None, 0)
     assert capsys.readouterr().out.strip()
+
+
+@pytest.mark.parametrize(("error", "is_in_a_line"), [(OSError(errno.EIO, "An error"), True), (KeyError("x"), False)])
+def test_what_is_refused_to_a_callback_in_c_is_one_line(
+    offer: Callable[[object], None], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
+    error: Exception, is_in_a_line: bool,
+) -> None:  # fmt: skip
+    others: list[object] = []
+    monkeypatch.setattr(sys, "unraisablehook", others.append)
+
+    class Falling:
+        def __del__(self) -> None:
+            raise error
+
+    def act() -> None:
+        Falling()
+
+    offer(act)
+    assert cli.run(["act"]) == 0
+    said = capsys.readouterr().err.splitlines()[:1]
+    assert said == (["p2os: cannot read or write a file or standard output: an error"] if is_in_a_line else [])
+    assert len(others) == (not is_in_a_line)
+    assert sys.unraisablehook == others.append
