@@ -23,7 +23,8 @@ from p2os.protocol.commands import Command, CommandNumber
 from simbase.timing import NS_PER_MS
 from tests.p2os.cli.driven import is_raw
 from tests.robot_bench.firmware.hurried import hurried
-from tests.tools.failing_calls import (
+from tests.tools.forked_python import forked_p2os
+from tests.whole.failing_calls import (
     SOUND,
     Ended,
     FailedCall,
@@ -36,7 +37,6 @@ from tests.tools.failing_calls import (
     page_in,
     run_verb,
 )
-from tests.tools.forked_python import forked_p2os
 from tools.measure_stops import Cable, ServedRobot
 
 #: The robot's watchdog, and its longest ramp from these speeds.

@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 
 from tests.robot_bench.cli.test_full_disks import CAMPAIGN, MOTORS, SCENARIO, VERBS, make_run
-from tests.tools.failing_calls import SOUND, Ended, FailedCall, Kind, Outcome, calls_of, library, run_verb
 from tests.tools.made_once import made_once
+from tests.whole.failing_calls import SOUND, Ended, FailedCall, Kind, Outcome, calls_of, library, run_verb
 
 SEED = 39
 #: Where this stands in an output, or in the page of a run, so does how fast the machine was.

@@ -1,7 +1,7 @@
 /* Loaded into a process (LD_PRELOAD): counts its calls of the system by kind, and lets the N-th of a kind fail, be short, or be its last.
  *
  * Nothing is counted before `failing_calls_arm`. What is counted stands in a page that processes share, those that are forked later
- * too, and that outlives them: `tests/tools/failing_calls.py` reads it. A thread that has called `failing_calls_spare` is not counted.
+ * too, and that outlives them: `tests/whole/failing_calls.py` reads it. A thread that has called `failing_calls_spare` is not counted.
  *
  * Allocations are those of our own C and C++, told by the library that asks, and any of 64 KiB and more: Python reports each of its
  * own that fails in one way, and a library of others that ends the process at the thirtieth small one is not ours to mend.

@@ -1,4 +1,4 @@
-"""A verb whose N-th call of a kind fails, is short, or is its last: `tests/tools/failing_calls.c` loaded into it.
+"""A verb whose N-th call of a kind fails, is short, or is its last: `tests/whole/failing_calls.c` loaded into it.
 
 Calls are counted from the verb's first line on, in the verb's own process and those that it forks. What it imports
 before that is there already; modules that it imports later are files that it opens, too.
