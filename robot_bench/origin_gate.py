@@ -61,10 +61,10 @@ class OriginGate:
             self._listener = self._loop.run_until_complete(
                 asyncio.start_server(self._let_in, host, port, limit=MOST_HEADER_BYTES)
             )
+            self.port: int = self._listener.sockets[0].getsockname()[1]
         except BaseException:
             self._loop.close()
             raise
-        self.port: int = self._listener.sockets[0].getsockname()[1]
         self._thread = threading.Thread(target=self._loop.run_forever, name="p2os-viewers", daemon=True)
         self._thread.start()
 

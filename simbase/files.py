@@ -28,6 +28,13 @@ LONGEST_LINE = LARGEST_FILE_BYTES
 #: What the system refuses for want of room or of a right, whatever the program: never a bug of it.
 REFUSALS = frozenset({errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO, errno.EROFS, errno.EMFILE, errno.ENFILE})
 MAKE_ROOM = "make room, or name another place"
+_MORE_FILES = "end other programs, or allow more open files: ulimit -n"
+#: What to try where it is not for want of room.
+_HINTS = {
+    errno.EMFILE: _MORE_FILES,
+    errno.ENFILE: _MORE_FILES,
+    errno.EIO: "is the disk sound, and the terminal still there?",
+}
 _IS_IT = "is this the file that you mean?"
 
 
@@ -43,8 +50,8 @@ def writing(place: object, hint: str | None = None) -> Iterator[None]:
     except OSError as error:
         if hint is None and isinstance(error, (FileNotFoundError, IsADirectoryError, NotADirectoryError)):
             hint = "give a file in a folder that exists"
-        elif hint is None and error.errno in REFUSALS:
-            hint = MAKE_ROOM
+        elif hint is None or error.errno in _HINTS:
+            hint = hint_of(error)
         raise FileError(f"cannot write {shown_name(place)}: {reason_of(error)}", hint=hint) from error
 
 
@@ -58,7 +65,8 @@ def reading(place: object, hint: str | None = None) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise FileError(f"cannot read {shown_name(place)}: {reason_of(error)}", hint=hint) from error
+        what = f"cannot read {shown_name(place)}: {reason_of(error)}"
+        raise FileError(what, hint=hint_of(error) or hint) from error
 
 
 def read_bytes(
@@ -90,8 +98,7 @@ def read_bytes(
                 if size > most:
                     _refuse_size(path, error_type, most)
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        why = reason_of(error) if isinstance(error, OSError) else str(error)
-        raise error_type(f"cannot read {shown_name(path)}: {why}", hint=hint) from error
+        _refuse_reading(path, error_type, error, hint)
     return b"".join(found)
 
 
@@ -174,8 +181,7 @@ def lines_of(
     except UnicodeDecodeError as error:
         raise error_type(f"{shown_name(path)}: not a text file", hint=hint) from error
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        why = reason_of(error) if isinstance(error, OSError) else str(error)
-        raise error_type(f"cannot read {shown_name(path)}: {why}", hint=hint) from error
+        _refuse_reading(path, error_type, error, hint)
 
 
 class _Written(io.FileIO):
@@ -245,6 +251,19 @@ def refuse_elsewhere(folder: Path, name: str, error: Callable[..., P2osError] = 
 def reason_of(error: OSError) -> str:
     """Return why the system refused something, in its own words."""
     return (error.strerror or str(error)).lower()
+
+
+def hint_of(error: OSError) -> str | None:
+    """Return what to try where the system refuses something for want of room or of a right; None: it is not that."""
+    return _HINTS.get(error.errno or 0, MAKE_ROOM) if error.errno in REFUSALS else None
+
+
+def _refuse_reading(path: Path, error_type: type[P2osError], error: OSError | ValueError, hint: str | None) -> NoReturn:
+    if isinstance(error, OSError):
+        why, hint = reason_of(error), hint_of(error) or hint
+    else:
+        why = str(error)
+    raise error_type(f"cannot read {shown_name(path)}: {why}", hint=hint) from error
 
 
 def _refuse_size(path: Path, error_type: type[P2osError], most: int) -> NoReturn:

@@ -142,6 +142,9 @@ class GuardedConnection(socket.socket):
 class GuardedListener(socket.socket):
     """A listening TCP socket whose connections are guarded."""
 
+    #: Where it listens, once it does.
+    port: int = 0
+
     def accept(self) -> tuple[GuardedConnection, tuple[str, int]]:
         """Accept a connection, as of a socket."""
         accepted, address = super().accept()
@@ -166,6 +169,7 @@ def listen_tcp(host: str, port: int, backlog: int | None = None) -> GuardedListe
             listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listening.bind((host, port))
         listening.listen() if backlog is None else listening.listen(backlog)
+        listening.port = listening.getsockname()[1]
     except BaseException:
         listening.close()
         raise

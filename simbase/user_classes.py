@@ -131,7 +131,12 @@ def said(error: Exception) -> str:
 
 
 def unforeseen(error: BaseException) -> str:
-    """Return an unforeseen exception as words: where in a file of the user it arose, or that it is a bug."""
+    """Return an unforeseen exception as words: where in a file of the user it arose, or that it is a bug.
+
+    A want of memory is neither: the words are the error's own, as NumPy's, or that there was not enough.
+    """
+    if isinstance(error, MemoryError):
+        return str(error) or "there is not enough memory"
     place, step = "", error.__traceback__
     while step is not None:
         if str(step.tb_frame.f_globals.get("__name__", "")).startswith(OF_USERS):

@@ -49,7 +49,7 @@ class GdbServer:
             raise BluePillError(
                 f"cannot listen on port {port}: {error}", hint="another --port, or 0 for any"
             ) from error
-        self.port: int = self._listener.getsockname()[1]
+        self.port: int = self._listener.port
         self._execution = Execution(machine, self._print)
         self._connection: _Connection | None = None
         #: Takes what the program prints by semihosting, when no debugger shows it.

@@ -57,6 +57,7 @@ _PAIR = ctypes.CFUNCTYPE(None, _U32, _U32)
 _ONE = ctypes.CFUNCTYPE(None, _U32)
 _BUS = ctypes.CFUNCTYPE(_U64, _U32, _U32, _U32, _U32)
 _FORCED = ctypes.CFUNCTYPE(_U32, _U32, _USER)
+_NOTHING = ctypes.CFUNCTYPE(None)
 #: `MOST_SEEN` and `SEEN_WORDS` of fabric.h.
 _MOST_SEEN = 8
 _SEEN_WORDS = 1 + 2 * _MOST_SEEN
@@ -93,6 +94,7 @@ class _Calls(ctypes.Structure):
         ("bus", _BUS),
         ("code_written", _PAIR),
         ("forced", _FORCED),
+        ("no_memory", _NOTHING),
     )
 
 
@@ -178,6 +180,7 @@ class Fabric(Stateful):
             _BUS(self._guarded(self._reach_registers, NO_TIME)),
             _PAIR(self._guarded(self._code_written, None)),
             _FORCED(self._guarded(self._find_forced, 0)),
+            _NOTHING(self._guarded(self._lose_memory, None)),
         )
         #: `struct fabric`, for the native core.
         self.handle = ctypes.c_void_p(
@@ -612,6 +615,9 @@ class Fabric(Stateful):
 
     def _electrical(self, pin: int, what: int) -> None:
         self.electrical(pin, what)
+
+    def _lose_memory(self) -> None:
+        raise MemoryError("no memory for what the chip shows")
 
     def _ask(self, slot: int, what: int, value: int) -> int:
         return self._answers[slot](what, value)

@@ -470,7 +470,7 @@ class NativeEngine(Engine):
             *compared,
         )
         if not added:
-            raise RuntimeError(f"no room for the block at {start:#010x}")
+            raise MemoryError(f"no memory for the block at {start:#010x}")
         loop = loop_of(code, block.offsets, start)
         if loop is not None and not library().core_set_loop(self._state, start, ctypes.addressof(loop)):
             raise MemoryError("no memory for a loop")

@@ -227,9 +227,7 @@ class Line:
             held_back(self._finish)
 
     def _finish(self) -> None:
-        if self._transport is not None:
-            with contextlib.suppress(Exception):  # it is given back all the same
-                self._transport.write(CLOSING_FRAMES)
+        self._stop_robot()
         with contextlib.suppress(Exception):  # an interrupt can have left it in any state
             self.core.close(self._looked_at - self._left_out)
         self._close()
@@ -275,7 +273,14 @@ class Line:
             return now
         return max(self._turned_at, due - 1)
 
+    def _stop_robot(self) -> None:
+        if self._transport is not None:
+            with contextlib.suppress(Exception):  # it is given back all the same
+                self._transport.write(CLOSING_FRAMES)
+
     def _lose(self, error: TransportError, now: Nanos) -> None:
+        if self.core.link is Link.OPEN:  # what failed may be one call, of a line that carries
+            self._stop_robot()
         self._close()
         self.core.line_lost(str(error), now)
 

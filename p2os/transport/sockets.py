@@ -56,11 +56,12 @@ class SocketTransport:
         self._first = b""
         connection.setblocking(False)
         if connection.family != getattr(socket, "AF_UNIX", None):
-            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-            for name, value in KEEPALIVE.items():
-                if (option := getattr(socket, name, None)) is not None:
-                    connection.setsockopt(socket.IPPROTO_TCP, option, value)
+            options = [(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1), (socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)]
+            known = {name: value for name, value in KEEPALIVE.items() if hasattr(socket, name)}
+            options += [(socket.IPPROTO_TCP, getattr(socket, name), value) for name, value in known.items()]
+            for option in options:
+                with contextlib.suppress(OSError):  # the line carries without it, or its first read says why not
+                    connection.setsockopt(*option)
 
     def read(self) -> bytes:
         """Return what has arrived without waiting."""
@@ -117,8 +118,9 @@ class SocketTransport:
         To close one whose bytes are unread resets the connection, and a peer that meets the reset before it has read
         may drop what it was sent: a STOP.
         """
-        with contextlib.suppress(OSError):  # the peer has gone, or nothing more waits
+        with contextlib.suppress(OSError):  # the peer has gone; what waits is read all the same
             self._socket.shutdown(socket.SHUT_WR)
+        with contextlib.suppress(OSError):  # nothing more waits
             for _ in range(READS_AT_CLOSE):
                 if not self._socket.recv(READ_BYTES):
                     break
@@ -145,7 +147,7 @@ class TcpListener:
 
     def __init__(self, url: TcpUrl) -> None:
         self._socket = _listening_socket(url)
-        self.description = str(TcpUrl(host=url.host, port=self._socket.getsockname()[1]))
+        self.description = str(TcpUrl(host=url.host, port=self._socket.port))
 
     def accept(self) -> Transport | None:
         """Return the line to a client that has come, or None."""

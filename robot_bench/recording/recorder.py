@@ -254,8 +254,11 @@ class Recorder(Stateful):
     def _measure_clearance(self, body: RobotBody, at: Nanos) -> None:
         """Tell the clearance where it is less than ever."""
         least = self.min_clearance_m
-        self.min_clearance_m = found = body.clearance(no_more_than=math.inf if least is None else least)
-        if math.isfinite(found) and (um := round(found * MICRO)) != self._clearance_um:
+        found = body.clearance(no_more_than=math.inf if least is None else least)
+        if not math.isfinite(found):  # there is nothing that it could touch
+            return
+        self.min_clearance_m = found
+        if (um := round(found * MICRO)) != self._clearance_um:
             self._clearance_um = um
             self.events.publish(Clearance(t=at, um=um))
 

@@ -32,10 +32,10 @@ def _begun(work: Callable[..., None], *arguments: object) -> None:
 
 
 def received(process: ForkProcess, pipe: Connection) -> Any:  # whatever was sent
-    """Return what came of a fork that has sent it or ended, and wait for its end; None where it has sent nothing."""
+    """Return what came of a fork that has sent it or ended, and wait for its end; None where it has not sent all."""
     try:
         return pipe.recv()
-    except (EOFError, ConnectionResetError):
+    except (EOFError, OSError):  # an OSError without a number where it was killed in the middle of sending
         return None
     finally:
         pipe.close()

@@ -6,16 +6,17 @@ Exit codes: 0 done, 1 the operation failed, 2 wrong usage, 130 interrupted, by w
 
 import contextlib
 import difflib
+import errno
 import gc
 import sys
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import typer
 
 from simbase.command_line.refused_connections import shown_refusals
 from simbase.command_line.signals import end_on_signals, ignore_signals, restored_signals
-from simbase.files import MAKE_ROOM, REFUSALS, reason_of
+from simbase.files import REFUSALS, hint_of, reason_of
 from simbase.user_classes import unforeseen
 
 EXIT_FAILED = 1
@@ -23,6 +24,15 @@ EXIT_INTERRUPTED = 130
 
 #: chosen: objects made between two searches for garbage; a capture's are tuples by the thousand, and none is garbage.
 COLLECTED_AFTER = 20_000
+
+MAKE_MEMORY = "end other programs, or ask for less at a time"
+
+#: What was refused where it need not be a write, and of what.
+_REFUSED = {
+    errno.EMFILE: ("open", "a file"),
+    errno.ENFILE: ("open", "a file"),
+    errno.EIO: ("read or write", "a file or standard output"),
+}
 
 #: Makes the application that words are for.
 Maker = Callable[[Sequence[str]], typer.Typer]
@@ -53,7 +63,7 @@ def run(program: str, make_app: Maker, words: Sequence[str], *, trace: bool = Fa
         trace: Show where in the program an error arose.
     """
     try:
-        with restored_signals(), shown_refusals(program):
+        with restored_signals(), shown_refusals(program), _in_a_line(program):
             end_on_signals()
             return _run(program, make_app, list(words), trace=trace)
     except KeyboardInterrupt:  # while the last lines were being written
@@ -70,9 +80,14 @@ def report(program: str, error: Exception, *, trace: bool = False) -> int:
         traceback.print_exception(error)
     code = getattr(error, "exit_code", None)
     if isinstance(error, OSError) and error.errno in REFUSALS:  # of a file that is named, an error of ours tells
-        where = "standard output" if error.filename is None else str(error.filename)
-        _print_error(f"{program}: {_one_line(f'cannot write {where}: {reason_of(error)}')}")
-        _print_error(f"hint: {MAKE_ROOM}")
+        what, where = _REFUSED.get(error.errno, ("write", "standard output"))
+        where = where if error.filename is None else str(error.filename)
+        _print_error(f"{program}: {_one_line(f'cannot {what} {where}: {reason_of(error)}')}")
+        _print_error(f"hint: {hint_of(error)}")
+        return EXIT_FAILED
+    if (memory := _without_memory(error)) is not None:
+        _print_error(f"{program}: {_one_line(unforeseen(memory))}")
+        _print_error(f"hint: {MAKE_MEMORY}")
         return EXIT_FAILED
     if not isinstance(code, int):
         says = unforeseen(error)
@@ -90,6 +105,32 @@ def report(program: str, error: Exception, *, trace: bool = False) -> int:
     if hint := getattr(error, "hint", None):
         _print_error(f"hint: {_one_line(hint)}")
     return code
+
+
+@contextlib.contextmanager
+def _in_a_line(program: str) -> Iterator[None]:
+    """Show what the system refuses to a callback of a library in C, which nobody can catch, as any other such error."""
+    before = sys.unraisablehook
+
+    def show(unraisable: "sys.UnraisableHookArgs") -> None:
+        error = unraisable.exc_value
+        if isinstance(error, MemoryError) or (isinstance(error, OSError) and error.errno in REFUSALS):
+            report(program, error)
+        else:
+            before(unraisable)
+
+    sys.unraisablehook = show
+    try:
+        yield
+    finally:
+        sys.unraisablehook = before
+
+
+def _without_memory(error: BaseException | None) -> MemoryError | None:
+    """Return what says that memory was short; other errors may follow from it, as of a ZIP file that cannot end."""
+    while error is not None and not isinstance(error, MemoryError):
+        error = error.__context__
+    return error
 
 
 def _run(program: str, make_app: Maker, words: list[str], *, trace: bool) -> int:

@@ -1,6 +1,7 @@
 """Files of users are read within bounds, whatever a name leads to."""
 
 import ast
+import errno
 import os
 import re
 import threading
@@ -10,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from simbase.errors import FileError, P2osError
-from simbase.files import lines_of, open_to_write, open_to_write_text, read_bytes, read_text
+from simbase.files import lines_of, open_to_write, open_to_write_text, read_bytes, read_text, write_text
 from tests.test_architecture import module_name, sources
 
 READERS: dict[str, Callable[[Path, int], object]] = {
@@ -181,3 +182,22 @@ def test_a_file_that_is_written_for_long_tells_of_a_full_disk_whenever_it_meets_
     text.write("a line\n")
     with pytest.raises(FileError, match="cannot write /dev/full"):
         text.close()
+
+
+@pytest.mark.parametrize(
+    ("number", "hint"), [(errno.EMFILE, "end other programs"), (errno.EIO, "is the disk sound"), (errno.ENOENT, None)]
+)
+def test_what_keeps_a_file_from_being_read_or_written_has_its_own_hint(
+    number: int, hint: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(Path, "open", refuse)
+    for act in (read_text, lambda path: list(lines_of(path)), lambda path: write_text(path, "x")):
+        with pytest.raises(FileError) as caught:
+            act(Path("it"))
+        if hint is not None:
+            assert str(caught.value.hint).startswith(hint)
+        elif act is read_text:
+            assert caught.value.hint is None

@@ -31,6 +31,7 @@ import sys
 import tempfile
 import threading
 import time
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -64,24 +65,29 @@ IMPORTED_BY_OTHERS = (
 
 
 @cache
-def forked_python() -> str:
-    """Return the path of the program; the server, which the first worker that asks starts, ends with the last."""
-    folder = _folder()
+def forked_python(preloaded: str = "") -> str:
+    """Return the path of the program; the server, which the first worker that asks starts, ends with the last.
+
+    Args:
+        preloaded: A library that its processes have before all others (LD_PRELOAD); each has a server of its own.
+    """
+    folder = _folder(preloaded)
     with _locked(folder):
         try:
             _hold(folder)
         except OSError:  # nobody serves there, or no more: a run of this number was killed
             for left in ("held", "socket"):
                 (folder / left).unlink(missing_ok=True)
-            _start(folder)
+            _start(folder, preloaded)
             _hold(folder)
     return str(folder / "python")
 
 
 @cache
-def _folder() -> Path:
+def _folder(preloaded: str = "") -> Path:
     """Return the folder of this run's server, whatever a test makes of the environment."""
-    return Path(tempfile.gettempdir(), f"forked-{os.environ.get('PYTEST_XDIST_TESTRUNUID') or os.getpid()}")
+    run = os.environ.get("PYTEST_XDIST_TESTRUNUID") or os.getpid()
+    return Path(tempfile.gettempdir(), f"forked-{run}{preloaded and f'-{zlib.crc32(preloaded.encode()):x}'}")
 
 
 def _hold(folder: Path) -> None:
@@ -101,7 +107,7 @@ def _locked(folder: Path) -> TextIO:
             lock.close()  # it was removed, and made anew
 
 
-def _start(folder: Path) -> None:
+def _start(folder: Path, preloaded: str) -> None:
     program, held = folder / "python", folder / "held"
     os.mkfifo(held)
     read_end = os.open(held, os.O_RDONLY | os.O_NONBLOCK)
@@ -110,7 +116,7 @@ def _start(folder: Path) -> None:
     listener.listen(100)  # who comes while the server still imports waits
     _servers.append(subprocess.Popen(
         [sys.executable, "-m", "tests.tools.forked_python", str(listener.fileno()), str(folder)], cwd=ROOT,
-        env=_environment(), stdin=read_end, pass_fds=[listener.fileno()], start_new_session=True,
+        env=_environment(preloaded), stdin=read_end, pass_fds=[listener.fileno()], start_new_session=True,
     ))  # fmt: skip
     listener.close()
     os.close(read_end)
@@ -125,9 +131,11 @@ def forked_p2os(*words: str) -> list[str]:
 
 def spent_s() -> float:
     """Return the seconds of processor time of what was forked for this worker, and of the server if it started that."""
-    with contextlib.suppress(OSError):
-        return float(_spent_file(_folder(), os.environ).read_text(encoding="ascii"))
-    return 0.0
+    spent = 0.0
+    for folder in _folder().parent.glob(f"{_folder().name}*"):
+        with contextlib.suppress(OSError):
+            spent += float(_spent_file(folder, os.environ).read_text(encoding="ascii"))
+    return spent
 
 
 def _spent_file(folder: Path, environment: Mapping[str, str]) -> Path:
@@ -138,9 +146,9 @@ def _spent_file(folder: Path, environment: Mapping[str, str]) -> Path:
 _servers: list[subprocess.Popen[bytes]] = []
 
 
-def _environment() -> dict[str, str]:
+def _environment(preloaded: str) -> dict[str, str]:
     path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
-    return {**os.environ, "PYTHONPATH": path}
+    return {**os.environ, "PYTHONPATH": path} | ({"LD_PRELOAD": preloaded} if preloaded else {})
 
 
 # The server -------------------------------------------------------------------------------

@@ -121,7 +121,7 @@ def _work(pipe: Connection, work: Work, limits: RunLimits, parent: int, folder: 
     try:
         found = work(look)
     except MemoryError:
-        found = _error(f"it took more than {limits.memory_mb} MB")
+        found = _error(f"it was refused memory; it may take {limits.memory_mb} MB")  # by that limit, or by the system
     except Exception as error:  # noqa: BLE001  # a bug there is an error of this trial, told by its name
         found = _error(unforeseen(error))
     with contextlib.suppress(OSError):  # nobody waits for it any more

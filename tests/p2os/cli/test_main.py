@@ -1,5 +1,6 @@
 """The command line as such: verbs found, errors told in one line and a hint, exit codes."""
 
+import errno
 import os
 import re
 import runpy
@@ -63,6 +64,12 @@ def raising(error: BaseException) -> Callable[[], None]:
     return act
 
 
+def following(first: BaseException, error: Exception) -> Exception:
+    """Return an error that arose while another was handled."""
+    error.__context__ = first
+    return error
+
+
 def test_no_words_show_help_with_every_verb_and_examples(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.run([]) == 0
     out = capsys.readouterr().out
@@ -90,6 +97,12 @@ def test_the_version_is_printed_without_loading_a_verb(monkeypatch: pytest.Monke
         ),
         (TransportError("several\n  lines"), 1, ["p2os: several lines"]),
         (FileError("no such file"), 2, ["p2os: no such file"]),
+        (OSError(errno.ENOSPC, "No space"), 1, ["p2os: cannot write standard output: no space", "hint: make room"]),
+        (OSError(errno.EMFILE, "Many", "x.py"), 1, ["p2os: cannot open x.py: many", "hint: end other programs, or al"]),
+        (OSError(errno.EIO, "An error"), 1, ["p2os: cannot read or write a file or standard output: an", "hint: is"]),
+        (following(MemoryError(), ValueError("no end")), 1, ["p2os: there is not enough memory", "hint: end other p"]),
+        (MemoryError(), 1, ["p2os: there is not enough memory", "hint: end other programs"]),
+        (MemoryError("no memory for\n a log"), 1, ["p2os: no memory for a log", "hint: end other programs"]),
         (KeyError("oops"), 1, ["p2os: this is a bug: KeyError: 'oops'", "hint: run it again with --trace and report"]),
     ],
 )
@@ -247,3 +260,26 @@ def test_the_package_runs_as_a_module(monkeypatch: pytest.MonkeyPatch, capsys: p
         runpy.run_path(str(files("p2os") / "__main__.py"), run_name="__main__")
     assert end.value.code in (None, 0)
     assert capsys.readouterr().out.strip()
+
+
+@pytest.mark.parametrize(("error", "is_in_a_line"), [(OSError(errno.EIO, "An error"), True), (KeyError("x"), False)])
+def test_what_is_refused_to_a_callback_in_c_is_one_line(
+    offer: Callable[[object], None], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
+    error: Exception, is_in_a_line: bool,
+) -> None:  # fmt: skip
+    others: list[object] = []
+    monkeypatch.setattr(sys, "unraisablehook", others.append)
+
+    class Falling:
+        def __del__(self) -> None:
+            raise error
+
+    def act() -> None:
+        Falling()
+
+    offer(act)
+    assert cli.run(["act"]) == 0
+    said = capsys.readouterr().err.splitlines()[:1]
+    assert said == (["p2os: cannot read or write a file or standard output: an error"] if is_in_a_line else [])
+    assert len(others) == (not is_in_a_line)
+    assert sys.unraisablehook == others.append

@@ -28,6 +28,7 @@ from p2os.protocol.commands import Command, CommandNumber, stop, vel
 from p2os.protocol.packets import EncoderPacket, IoPacket, RawPacket, SerauxPacket, StandardSip
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import ParametersError
+from p2os.transport import HungUpError
 from simbase.errors import P2osError, UsageError
 from simbase.timing import NS_PER_MS
 from tests.p2os.client.served_robot import CLOSING_COMMANDS, QUICK, Recorder, ServedRobot, until
@@ -249,6 +250,25 @@ def test_a_loss_ends_a_drive_and_the_robot_is_there_again(fast: ServedRobot) -> 
         assert not fast.is_moving
         robot.set_velocity(0.3)
         fast.until(lambda: fast.is_moving)
+
+
+@pytest.mark.parametrize("call", ["read", "write"])
+def test_a_call_that_fails_once_on_a_line_that_carries_stops_the_robot(fast: ServedRobot, call: str) -> None:
+    recorder = Recorder(fast.open)
+    with robot_on(fast, recorder, ClientSettings(listen_ns=NS_PER_MS, reconnect=False)) as robot:
+        robot.set_velocity(0.3)
+        fast.until(lambda: fast.is_moving)
+        line = recorder.lines[0]
+
+        def fail(*_: bytes) -> bytes:
+            delattr(line, call)
+            raise HungUpError("connection timed out")
+
+        setattr(line, call, fail)
+        with pytest.raises(LinkLostError):
+            _next_states(robot)
+        assert recorder.sent[-4:] == CLOSING_COMMANDS
+        fast.until(lambda: not fast.is_moving)
 
 
 def test_a_half_open_peer_is_noticed_by_its_silence(fast: ServedRobot) -> None:

@@ -1,5 +1,6 @@
 """Byte lines of every kind keep one contract; each kind is lost and refused in its own way."""
 
+import errno
 import os
 import select
 import socket
@@ -15,8 +16,9 @@ from p2os.transport import HungUpError, Listener, Loops, Transport, listen_url, 
 from p2os.transport.serial_port import SerialListener, SerialTransport, list_serial_ports
 from p2os.transport.sockets import BACKLOG_BYTES, SocketTransport
 from p2os.transport.url import SerialUrl
-from p2os.transport.waiting import LONGEST_CLOSING_NS, MOST_CLOSING, ClosingLines
+from p2os.transport.waiting import LONGEST_CLOSING_NS, MOST_CLOSING, ClosingLines, WakeUp, wait_readable
 from simbase.errors import UsageError
+from simbase.listening import GuardedListener
 
 #: A bound on every wait of these tests; reached only when something is broken.
 TIMEOUT_S = 30.0
@@ -341,6 +343,71 @@ def test_bytes_that_a_socket_does_not_take_go_first_next_time() -> None:
     assert received == sent
     transport.close()
     reader.close()
+
+
+class FailingOnce(socket.socket):
+    """A socket whose next call of a name the system refuses."""
+
+    def __init__(self, of: socket.socket, name: str) -> None:
+        super().__init__(of.family, of.type, of.proto, fileno=of.detach())
+        self._name = name
+
+    def _fail(self, name: str) -> None:
+        if name == self._name:
+            self._name = ""
+            raise OSError(errno.ENOBUFS, os.strerror(errno.ENOBUFS))
+
+    def setsockopt(self, *option: int) -> None:  # type: ignore[override]  # as far as it is used
+        self._fail("setsockopt")
+        super().setsockopt(*option)
+
+    def shutdown(self, how: int) -> None:
+        self._fail("shutdown")
+        super().shutdown(how)
+
+    def recv(self, bufsize: int, flags: int = 0, /) -> bytes:
+        self._fail("recv")
+        return super().recv(bufsize, flags)
+
+
+@pytest.mark.parametrize("name", ["setsockopt", "shutdown"])
+def test_a_socket_that_refuses_one_call_carries_all_bytes_to_the_end(name: str) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        client = FailingOnce(socket.create_connection(listening.getsockname()), name)
+        far = listening.accept()[0]
+    with far:
+        far.sendall(b"unread")
+        line = SocketTransport(client, "tcp:it")
+        assert select.select([client], [], [], 5)[0]
+        line.write(b"stop")
+        line.close()
+        assert far.recv(100) == b"stop"  # a reset may come before it has been read
+        assert far.recv(100) == b""
+
+
+def test_a_port_that_cannot_be_asked_for_is_an_error_and_given_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[GuardedListener] = []
+
+    def refuse(listening: GuardedListener) -> None:
+        made.append(listening)
+        raise OSError(errno.ENOBUFS, os.strerror(errno.ENOBUFS))
+
+    monkeypatch.setattr(GuardedListener, "getsockname", refuse)
+    with pytest.raises(TransportError, match=r"cannot listen on tcp:127.0.0.1:0: no buffer space available"):
+        listen_url("tcp:127.0.0.1:0")
+    assert made[0].fileno() == -1
+
+
+def test_a_wake_up_that_cannot_be_cleared_stays_readable(monkeypatch: pytest.MonkeyPatch) -> None:
+    wake_up = WakeUp()
+    monkeypatch.setattr(wake_up, "_read", FailingOnce(wake_up._read, "recv"))
+    wake_up._read.setblocking(False)
+    wake_up.ring()
+    wake_up.clear()
+    assert wait_readable([wake_up.fileno()], 0)
+    wake_up.clear()
+    assert not wait_readable([wake_up.fileno()], 0)
+    wake_up.close()
 
 
 def test_a_reset_connection_is_a_hang_up() -> None:

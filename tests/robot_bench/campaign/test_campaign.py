@@ -470,7 +470,10 @@ def test_a_run_that_takes_too_much_is_an_error_that_names_the_limit(trials: list
         while True:
             pass
 
-    for job, words in ((greedy, "it took more than 64 MB"), (endless, "it took more than 1 s of a processor")):
+    for job, words in (
+        (greedy, "it was refused memory; it may take 64 MB"),
+        (endless, "it took more than 1 s of a processor"),
+    ):
         monkeypatch.setattr(beginnings, "run_trial", job)
         found = outcomes(Processes(1, RunLimits(cpu_s=1, memory_mb=64)), trials[:1])
         assert (found[0].verdict, found[0].failures) == (TrialVerdict.ERROR, (words,))

@@ -340,3 +340,13 @@ def test_a_working_folder_in_which_nothing_can_be_made_has_a_way_out(capsys: pyt
 def test_a_program_without_lines_has_no_share_of_them(capsys: pytest.CaptureFixture[str]) -> None:
     assert p2os(["run", make(thumb.SLEEP), "--coverage", "--fail-under", "80"]) == 2
     assert "no debug information in it" in capsys.readouterr().err
+
+
+def test_a_run_in_a_world_with_nothing_in_it_can_be_reported(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("empty.toml").write_text(
+        'name = "empty"\nextent_m = [-2, -2, 2, 2]\n[start]\nx_m = 0\ny_m = 0\nheading_deg = 0\n', encoding="utf-8"
+    )
+    scenario = make(thumb.SLEEP, LEAST.replace("room", "empty.toml"))
+    assert p2os(["run", scenario, "--json", "--out", "there"]) == 0
+    assert json.loads(capsys.readouterr().out)["min_clearance_m"] is None
+    assert p2os(["report", "there"]) == 0

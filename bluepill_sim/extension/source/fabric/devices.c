@@ -164,7 +164,8 @@ void send_word(struct device *device, const struct sent *row)
     if (device->words_out == NULL) {
         device->words_out = malloc(WORDS * sizeof *device->words_out);
         if (device->words_out == NULL) {
-            abort();
+            fabric->calls.no_memory();
+            return;
         }
     }
     if (device->word_count == WORDS) {

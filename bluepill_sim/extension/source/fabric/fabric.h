@@ -80,6 +80,8 @@ struct fabric_calls {
     /* Which bits of the register at an address the running store sets whatever was there. `seen` gets what that hangs on
      * beside the code: the count, and pairs of a register's number, or the address of a word of SRAM, and its value. */
     uint32_t (*forced)(uint32_t address, uint32_t *seen);
+    /* There is no memory for what the chip shows or sends: some of it is lost, and the run must end. */
+    void (*no_memory)(void);
 };
 
 /* Room for `seen`; a count above MOST_SEEN: that is not all. */
@@ -422,11 +424,11 @@ void note_output(struct fabric *fabric);
 void tell_listeners(struct fabric *fabric, uint32_t number, uint32_t changed);
 
 /* subscribers.c */
-void make_room(struct subscriber *subscriber, uint32_t count);
+bool make_room(struct fabric *fabric, struct subscriber *subscriber, uint32_t count);
 static inline void put_rows(struct fabric *fabric, struct subscriber *subscriber, const struct edge *rows, uint32_t count)
 {
-    if (UNLIKELY(subscriber->count + count > subscriber->room)) {
-        make_room(subscriber, count);
+    if (UNLIKELY(subscriber->count + count > subscriber->room) && !make_room(fabric, subscriber, count)) {
+        return;
     }
     memcpy(&subscriber->rows[subscriber->count], rows, count * sizeof *rows);
     subscriber->count += count;

@@ -11,17 +11,20 @@ enum { EDGE_ROW, WAVE_ROW };
 /* Room for rows at first. */
 enum { FIRST_ROOM = 256 };
 
-RARELY void make_room(struct subscriber *subscriber, uint32_t count)
+/* Returns false without memory for them. */
+RARELY bool make_room(struct fabric *fabric, struct subscriber *subscriber, uint32_t count)
 {
     while (subscriber->count + count > subscriber->room) {
         const size_t room = subscriber->room ? 2 * subscriber->room : FIRST_ROOM;
         struct edge *rows = realloc(subscriber->rows, room * sizeof *rows);
         if (rows == NULL) {
-            abort(); /* a few megabytes: nothing that could be done about it would work either */
+            fabric->calls.no_memory();
+            return false;
         }
         subscriber->rows = rows;
         subscriber->room = room;
     }
+    return true;
 }
 
 bool wants(const struct subscriber *subscriber, const struct shown *shown, uint32_t pin)
