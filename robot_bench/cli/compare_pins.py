@@ -162,7 +162,7 @@ def _lines(found: "PinComparison", model: "Waveforms", seen: "Waveforms") -> Ite
         if not (one.pairs or alone):
             continue
         yield f"{one.track.channel:>8} {one.track.pin}: {len(one.pairs)} edges explained" + (
-            f", {alone} not" if alone else ""
+            f", {alone} not{_late(found.late_ns(one))}" if alone else ""
         )
     if silent:
         yield f"{silent:>8} channels without an edge in either"
@@ -207,6 +207,10 @@ def _nearest(first: "Unexplained") -> str:
     )
 
 
+def _late(ns: float | None) -> str:
+    return "" if ns is None else f": {_length(abs(ns))} {'later' if ns > 0 else 'earlier'}"
+
+
 def _title(found: "PinComparison") -> str:
     first = found.first
     if first is None:
@@ -235,7 +239,7 @@ def _plain(found: "PinComparison", seen: "Waveforms") -> dict[str, object]:
         "as_good_ns": found.alignment.as_good_ns,
         "channels": {
             one.track.channel: {"pin": one.track.pin, "explained": len(one.pairs), "added": len(one.added),
-                                "missing": len(one.missing)}
+                                "missing": len(one.missing), "late_ns": found.late_ns(one)}
             for one in found.met
         },
         "not_judged": found.unjudged,

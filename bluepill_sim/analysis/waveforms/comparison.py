@@ -11,6 +11,7 @@ from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from statistics import median
 
 from bluepill_sim.analysis.waveforms.alignment import MOST_ERROR, Alignment, ChannelPair, Met, Tolerance, align, meet
 from bluepill_sim.analysis.waveforms.levels import CaptureError, LevelEdge, Signal, Waveforms
@@ -21,6 +22,8 @@ JITTER_SAMPLES = 1.0
 _MOSTLY, _HARDLY = 0.8, 0.4
 #: chosen: fewer edges do not tell one wire from another.
 _LEAST_WIRE = 4
+#: chosen: edges further apart than this are not one that is late.
+_NEAR_NS = 1e6
 #: chosen: of the edges behind one so many are as late, where time itself jumped.
 _JUMPED = 0.8
 
@@ -86,6 +89,19 @@ class PinComparison:
     #: How many edges are not explained, and the first.
     unexplained: int
     first: Unexplained | None
+
+    def late_ns(self, met: Met) -> float | None:
+        """Return by how much the edges of a channel that are not explained are late, in the middle of them all.
+
+        None: fewer than half of them have one of the same direction within a millisecond.
+        """
+        clock, late = self.alignment.clock, list[float]()
+        theirs = sorted((clock.in_run(met.track.capture[i][0]), met.track.capture[i][1]) for i in met.added)
+        for j in met.missing:
+            at, level = met.track.run[j]
+            near = [when - at for when, to in theirs if to == level and abs(when - at) < _NEAR_NS]
+            late += [min(near, key=abs)] if near else []
+        return median(late) if late and len(late) >= len(met.missing) / 2 else None
 
     @property
     def explained(self) -> int:
