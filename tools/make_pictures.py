@@ -67,6 +67,7 @@ def groups() -> Iterator[Group]:
     yield Group(names=("demo.png",), files=files, make=make_demo)
     files = ("bluepill_sim/parts/*.py", "tests/bluepill_sim/firmware/parts.elf", "tools/part_pictures.py")
     yield Group(names=("parts.png",), files=files, make=make_parts)
+    yield Group(names=("silicon.png",), files=("tools/wiring_picture.py",), make=make_wiring)
     for variant in VARIANTS:
         sides = ("top", "bottom", "view", "bare") if variant == "rev-b" else ("top",)
         yield Group(names=tuple(f"board/{variant}-{side}.png" for side in sides),
@@ -102,6 +103,13 @@ def make_parts() -> None:
     from tools.part_pictures import draw
 
     draw(PICTURES / "parts.png")
+
+
+def make_wiring() -> None:
+    """Draw an analyser at a BluePill."""
+    from tools.wiring_picture import draw as draw_wiring
+
+    draw_wiring(PICTURES / "silicon.png")
 
 
 def make_board(variant: str) -> None:
