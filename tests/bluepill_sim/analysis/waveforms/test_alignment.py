@@ -1,5 +1,8 @@
 """A capture beside a run: what is explained, and each planted skew named."""
 
+import math
+from dataclasses import replace
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -202,6 +205,23 @@ def test_what_the_run_does_not_know_is_not_judged() -> None:
     assert (found.first, found.unjudged) == (None, 3)
     late = seen(with_edges(run, {"PB0": [(2.5e6, 0), (2.6e6, 1), (3e6, 0)]}), Analyser())
     assert first_of(compared(late, run)).pin == "PB0"
+
+
+@pytest.mark.parametrize(("behind", "is_judged"), [(SAMPLE_NS, False), (-4 * SAMPLE_NS, True)])
+def test_where_the_run_ends_nothing_of_the_capture_is_judged(behind: float, is_judged: bool) -> None:
+    capture = seen(RUN, Analyser(offset_ns=0.0, sample_ns=SAMPLE_NS))
+    level = capture.signals["PA0"].edges[-1][1]
+    on = with_edges(capture, {"PA0": [*capture.signals["PA0"].edges, (RUN.end_ns + behind, level ^ 1)]})
+    found = compared(replace(on, end_ns=on.end_ns + 1e6))
+    assert found.unexplained == int(is_judged)
+
+
+def test_a_capture_that_is_too_short_for_it_says_nothing_of_the_clock() -> None:
+    capture = seen(RUN, Analyser(ppm=90.0, offset_ns=1e5, between=(0.0, 0.001)))
+    assert sum(len(signal.edges) for signal in capture.signals.values()) > 3
+    found = compared(capture)
+    assert found.first is None
+    assert (found.alignment.clock.error, found.alignment.clock.error_within) == (0.0, math.inf)
 
 
 def test_names_of_channels_and_pins() -> None:
