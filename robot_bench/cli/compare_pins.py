@@ -72,7 +72,9 @@ def compare_pins(
         _drawing(picture)
     model, aliases = _model(run)
     seen = read_waveforms(capture, _rate(rate))
-    wires = wires_of(seen, model, _declared(wire or [], aliases))
+    named = {channel: aliases[channel.lower()] for channel in seen.signals if channel.lower() in aliases}
+    of_names = {channel: pin for channel, pin in named.items() if pin in model.signals}
+    wires = wires_of(seen, model, _declared(wire or [], aliases) or of_names)
     found = compared(model, seen, wires, jitter_samples=jitter, most_error=max(ppm, 0.001) / 1e6)
     if picture is not None:
         from robot_bench.report.edge_picture import write_edge_picture

@@ -1,6 +1,7 @@
 """`p2os compare-pins`: runs and captures as files, what is said, pictures and exit codes."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -91,7 +92,7 @@ def test_json_has_the_same(model: str, tmp_path: Path, capsys: pytest.CaptureFix
     assert p2os(["compare-pins", model, str(path), "--rate", "24MHz", "--json"]) == 1
     found = json.loads(capsys.readouterr().out)
     assert {(wire["channel"], wire["shows"]) for wire in found["miswired"]} == {("PA0", "PA1"), ("PA1", "PA0")}
-    assert found["channels"]["PA2"] == {"pin": "PA2", "explained": 60, "added": 0, "missing": 0}
+    assert found["channels"]["PA2"] == {"pin": "PA2", "explained": 60, "added": 0, "missing": 0, "late_ns": None}
     assert abs(found["clock_ppm"]) < 3
     assert found["first"]["channel"] in {"PA0", "PA1"}
 
@@ -131,3 +132,19 @@ def test_pins_of_a_run_folder_have_the_boards_names_and_their_waves_edges() -> N
 
 def test_names_of_the_adapters_wires_are_pins() -> None:
     assert verb._declared(["D0=motor1_comm1", "a=b=PA3"], {"motor1_comm1": "PB7"}) == {"D0": "PB7", "a=b": "PA3"}
+
+
+def test_nets_are_the_pins_that_they_are_at(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    nets = {"motor1_comm1": RUN.signals["PA0"], "motor2_comm1": RUN.signals["PA1"], "mine": RUN.signals["PA2"]}
+    pins = {net: Edges([(0, signal.first), *((round(at), to) for at, to in signal.edges)])
+            for net, signal in nets.items()}  # fmt: skip
+    run = record(pins=pins, last_ns=round(RUN.end_ns))
+    monkeypatch.setattr("robot_bench.recording.run_record.read_run", lambda _: run)
+    path = str(vcd(tmp_path / "board.vcd", replace(seen(RUN, Analyser(ppm=7.0)), signals=nets)))
+    assert p2os(["compare-pins", str(tmp_path), path]) == 0
+    said = capsys.readouterr().out
+    assert "motor1_comm1 PB7: 60 edges explained" in said
+    assert "motor2_comm1 PA1: 60 edges explained" in said
+    assert p2os(["compare-pins", str(tmp_path), path, "--wire", "mine=mine", "--json"]) == 0

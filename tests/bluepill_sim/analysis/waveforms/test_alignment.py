@@ -58,7 +58,7 @@ def test_whatever_an_analyser_sees_of_a_run_is_explained(
 def test_an_offset_of_a_millisecond_is_named(ms: float) -> None:
     found = compared(seen(RUN, Analyser(offset_ns=ms * 1e6)))
     assert found.first is None
-    assert found.alignment.clock.offset_ns == pytest.approx(ms * 1e6, abs=2 * SAMPLE_NS)
+    assert found.alignment.clock.offset_ns == pytest.approx(ms * 1e6, abs=SAMPLE_NS / 4)
 
 
 @pytest.mark.parametrize("ppm", [-40.0, 0.0, 40.0])
