@@ -11,6 +11,7 @@ whatever the caller's slices; a condition in Python is looked at in steps.
 
     pin PA4 high | pin PA4 low | pin PA4 changes     the level on the wire
     usart1 sends TEXT | usb sends TEXT               characters that go out from now on
+    usart1 matches REGEX | usb matches REGEX         a line of them that is whole
     asleep | awake | fault                           what the core is doing
 
 Invariant: results do not depend on how the caller cuts time into slices; a wait
@@ -18,6 +19,7 @@ leaves the board's watches and listeners as it found them.
 """
 
 import ctypes
+import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -69,7 +71,9 @@ _MOST_VDDA_V, _MOST_DEGREES = 4.0, 200
 _ERASED_WORD = 0xFFFF_FFFF
 #: Those of `SeenFault`.
 _SEEN_REGISTERS = (*GENERAL[:15], Reg.XPSR)
-_HINT = 'such as "pin PA4 high", "usart1 sends ready", "asleep", "fault", or a function of the board'
+_HINT = (
+    'such as "pin PA4 high", "usart1 sends ready", "usart1 matches ^end", "asleep", "fault", or a function of the board'
+)
 
 
 class WaitError(BluePillError):
@@ -213,8 +217,9 @@ class BluePill(Stateful):
         """Run until a condition holds; return when that was.
 
         Args:
-            condition: "pin PA4 high" (low, changes), "usart1 sends TEXT", "asleep", "awake", "fault",
-                each met to the basic block; or a function of the board, looked at each millisecond.
+            condition: "pin PA4 high" (low, changes), "usart1 sends TEXT", "usart1 matches REGEX" (a whole line),
+                "asleep", "awake", "fault", each met to the basic block; or a function of the board, looked at each
+                millisecond.
             timeout: the longest wait, in virtual time.
 
         Raises:
@@ -754,10 +759,30 @@ def _watch(board: BluePill, condition: Condition) -> Iterator[tuple[Callable[[],
             sent, text = bytearray(), words[2].encode()
             with _stop_at_characters(_ports(board)[name], sent):
                 yield (lambda: text in sent), None
+        case [name, "matches"] if len(words) == 3 and name in _ports(board):
+            sent, wanted = bytearray(), _line_pattern(words[2])
+            with _stop_at_characters(_ports(board)[name], sent):
+                yield (lambda: _has_line(sent, wanted)), None
         case [state] if state in _STATES:
             yield (lambda: _STATES[state](board)), STEP_NS
         case _:
             raise BluePillError(f"{condition!r} is not understood", hint=_HINT)
+
+
+def _line_pattern(text: str) -> re.Pattern[str]:
+    try:
+        return re.compile(text)
+    except re.error as error:
+        raise BluePillError(f"{text!r} is no regular expression: {error}", hint=_HINT) from error
+
+
+def _has_line(sent: bytearray, wanted: re.Pattern[str]) -> bool:
+    """Tell whether a line has gone out whole that matches; those that do not are dropped."""
+    while (end := sent.find(b"\n")) >= 0:
+        if wanted.search(sent[:end].decode("utf-8", "replace").rstrip("\r")):
+            return True
+        del sent[: end + 1]
+    return False
 
 
 _STATES: dict[str, Predicate] = {

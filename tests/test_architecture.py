@@ -63,6 +63,7 @@ ALLOWED = {
     "robot_bench": {"p2os", "bluepill_sim", "adapter_sim", "typer", "rich", "click"},
     "robot_bench.drives": {"p2os", "numpy"},
     "robot_bench.report": {"p2os", "matplotlib"},
+    "robot_bench.report.edge_picture": {"bluepill_sim", "matplotlib"},
     "robot_bench.report.explain": {"p2os", "bluepill_sim", "adapter_sim"},
     "robot_bench.recording.event_files": {"p2os", "pyarrow"},
     "robot_bench.live": {"adapter_sim", "foxglove"},

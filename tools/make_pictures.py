@@ -65,8 +65,9 @@ def groups() -> Iterator[Group]:
     """Yield all that docs/pictures holds."""
     files = ("robot_bench/scenarios/dodge.toml", f"{WORLDS}/room.toml", "robot_bench/firmware/dodge.elf", *REPORT)
     yield Group(names=("demo.png",), files=files, make=make_demo)
-    files = ("bluepill_sim/parts/*.py", "tests/bluepill_sim/firmware/parts.elf", "tools/part_pictures.py")
+    files = ("bluepill_sim/parts/*.py", "tests/bluepill_sim/firmware/parts.elf", "tools/pictures/parts.py")
     yield Group(names=("parts.png",), files=files, make=make_parts)
+    yield Group(names=("silicon.png",), files=("tools/pictures/wiring.py",), make=make_wiring)
     for variant in VARIANTS:
         sides = ("top", "bottom", "view", "bare") if variant in pictures.SHOWN_WHOLE else ("top",)
         yield Group(names=tuple(f"board/{variant}-{side}.png" for side in sides),
@@ -99,9 +100,16 @@ def make_demo() -> None:
 
 def make_parts() -> None:
     """Draw what parts show and do."""
-    from tools.part_pictures import draw
+    from tools.pictures.parts import draw
 
     draw(PICTURES / "parts.png")
+
+
+def make_wiring() -> None:
+    """Draw an analyser at a BluePill."""
+    from tools.pictures.wiring import draw as draw_wiring
+
+    draw_wiring(PICTURES / "silicon.png")
 
 
 def make_board(variant: str) -> None:

@@ -14,6 +14,7 @@ Exit codes: 0 every peer that is there passed, 1 one did not, 2 wrong usage.
 
 import argparse
 import contextlib
+import ctypes
 import json
 import os
 import re
@@ -399,6 +400,8 @@ def _started(peer: PeerProgram, served: Served, folder: Path) -> Iterator[list[s
     for name, text in peer.files:
         (folder / name).write_text(filled(text))
     processes: list[subprocess.Popen[bytes]] = []
+    before = _children(os.getpid())
+    _adopt(is_on=True)
     try:
         with (folder / "output").open("wb") as output:
             for words in peer.commands:
@@ -416,6 +419,37 @@ def _started(peer: PeerProgram, served: Served, folder: Path) -> Iterator[list[s
             with contextlib.suppress(ProcessLookupError, PermissionError):
                 os.killpg(process.pid, signal.SIGKILL)  # also what it has started; the session is its own
             process.wait(10)
+        # A daemon has a session of its own (rosmaster, rosout): it has come to us as its starter ended.
+        while left := _children(os.getpid()) - before:
+            for pid in left:
+                _kill_with_children(pid)
+        _adopt(is_on=False)
+
+
+def _adopt(*, is_on: bool) -> None:
+    """Become the parent of what those started whom we started, once these end; prctl(2), PR_SET_CHILD_SUBREAPER."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None, use_errno=True).prctl(36, int(is_on), 0, 0, 0)
+
+
+def _children(pid: int) -> set[int]:
+    """Return the processes that a process has as its children now."""
+    found = set[int]()
+    with contextlib.suppress(FileNotFoundError, ProcessLookupError):
+        for task in Path(f"/proc/{pid}/task").iterdir():
+            found |= {int(word) for word in (task / "children").read_text().split()}
+    return found
+
+
+def _kill_with_children(pid: int) -> None:
+    """Kill a child of ours; those of its own come to us, or are killed with it."""
+    for child in _children(pid):
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.kill(child, signal.SIGKILL)
+    with contextlib.suppress(ProcessLookupError, PermissionError):
+        os.kill(pid, signal.SIGKILL)
+    with contextlib.suppress(ChildProcessError):
+        os.waitpid(pid, 0)
 
 
 def _second_client(served: Served) -> str:

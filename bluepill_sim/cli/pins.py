@@ -8,8 +8,8 @@ import typer
 
 from bluepill_sim.analysis.columns import in_columns
 from bluepill_sim.analysis.probe import Probe
-from bluepill_sim.analysis.sigrok import write_sigrok
-from bluepill_sim.analysis.vcd import write_vcd
+from bluepill_sim.analysis.waveforms.sigrok_writer import write_sigrok
+from bluepill_sim.analysis.waveforms.vcd_writer import write_vcd
 from bluepill_sim.board import BluePill
 from bluepill_sim.cli.driving import parse_changes, print_fault, print_status, run_driven, summary, warn_on_stderr
 from bluepill_sim.cli.quantities import Drive, Firmware, JsonOutput, Span

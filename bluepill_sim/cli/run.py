@@ -81,7 +81,10 @@ def run(
         typer.Option(help="Put a level or volts on a pin at a time; repeatable.", metavar="PIN=LEVEL@TIME"),
     ] = None,
     until: Annotated[
-        str | None, typer.Option(help='End earlier: "pin PA4 high", "usart1 sends ready", "fault".', metavar="EVENT")
+        str | None,
+        typer.Option(
+            help='End earlier: "pin PA4 high", "usart1 sends ready", "usart1 matches ^end", "fault".', metavar="EVENT"
+        ),
     ] = None,
     budget_ns: Annotated[
         Nanos, time_option("--budget", purpose="Most time of the wall clock, unless --realtime.", shown="10min")

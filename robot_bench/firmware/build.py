@@ -37,8 +37,9 @@ PROGRAMS = {
     # Brings pins, clock and line of its own.
     "board_test": ("startup.c", "memory.c", "board_test.c"),
 }
-#: A program that another package ships; it borrows the start-up code of the examples.
-KIT = HERE.parent.parent / "bluepill_sim" / "analysis" / "silicon" / "kit.c"
+#: Programs that another package ships; they borrow the start-up code of the examples.
+SILICON = HERE.parent.parent / "bluepill_sim" / "analysis" / "silicon"
+SILICON_PROGRAMS = ("kit", "pins")
 MACHINE_FLAGS = ("-mcpu=cortex-m3", "-mthumb")
 COMPILE_FLAGS = (
     *MACHINE_FLAGS,
@@ -141,14 +142,17 @@ def build_altered(program: str, edits: Sequence[tuple[str, str]], output: Path) 
     return output
 
 
-def build_kit(output: Path) -> Path:
-    """Build the silicon kit into the ELF `output` and return its path."""
+def build_silicon(program: str, output: Path) -> Path:
+    """Build a program of `SILICON_PROGRAMS` into the ELF `output` and return its path."""
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch).resolve()
-        for source in (KIT, *(HERE / name for name in ("startup.c", "memory.c", "f103.h", "f103c8.ld"))):
+        for source in (
+            SILICON / f"{program}.c",
+            *(HERE / name for name in ("startup.c", "memory.c", "f103.h", "f103c8.ld")),
+        ):
             shutil.copy(source, folder)
         build_elf(
-            ("startup.c", "memory.c", KIT.name), folder=folder, linker_script="f103c8.ld", output=output.resolve()
+            ("startup.c", "memory.c", f"{program}.c"), folder=folder, linker_script="f103c8.ld", output=output.resolve()
         )  # fmt: skip
     return output
 
@@ -180,8 +184,9 @@ def main() -> int:
         return 2
     if version != COMPILER_VERSION:
         print(f"build: note: {version} gives other bytes than {COMPILER_VERSION}", file=sys.stderr)  # noqa: T201
-    kit = KIT.with_suffix(".elf") if folder == HERE else folder / "kit.elf"
-    for elf in (*build_programs(folder), build_kit(kit)):
+    beside = SILICON if folder == HERE else folder
+    silicon = [build_silicon(program, beside / f"{program}.elf") for program in SILICON_PROGRAMS]
+    for elf in (*build_programs(folder), *silicon):
         print(f"{elf.name}: {elf.stat().st_size} bytes")  # noqa: T201
     return 0
 

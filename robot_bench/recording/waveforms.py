@@ -12,13 +12,17 @@ Invariant: the same run gives the same bytes.
 
 from bisect import bisect_right
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 
-from bluepill_sim.analysis.sigrok import MAX_SAMPLES, sample_at, write_session
-from bluepill_sim.analysis.vcd import identifier
+from adapter_sim.pinout import load_pinout
+from bluepill_sim.analysis.waveforms.levels import Waveforms, signal_of
+from bluepill_sim.analysis.waveforms.sigrok_writer import MAX_SAMPLES, sample_at, write_session
+from bluepill_sim.analysis.waveforms.vcd_writer import identifier
 from robot_bench.recording.run_record import RunRecord
 from robot_bench.recording.signals import grouped
 from robot_bench.wires.edges import dumped, sampled
+from simbase.timing import NS_PER_S
 
 #: Sample rates to choose from, Hz, the finest first: each divides 10**9.
 RATES_HZ = (1_000_000, 100_000, 10_000)
@@ -85,3 +89,30 @@ def _head(names: list[str], waving: list[str], codes: list[str]) -> Iterator[str
             yield f"$var real 64 {code} {name}_{what} $end"
     yield "$upscope $end"
     yield "$enddefinitions $end"
+
+
+def waveforms_of(record: RunRecord, name: str) -> Waveforms:
+    """Return a run's nets by the BluePill's pins, waves edge by edge; other nets keep their names."""
+    pin_of = {wire.name: wire.bluepill for wire in load_pinout().wires}
+    signals = {
+        pin_of.get(net, net): signal_of([*_edges_with_waves(record, net)], record.last_ns)
+        for net in nets_in_order(record) if record.pins[net]
+    }  # fmt: skip
+    return Waveforms(name=name, signals=signals, start_ns=0.0, end_ns=record.last_ns, sample_ns=1.0)
+
+
+def _edges_with_waves(record: RunRecord, net: str) -> Iterator[tuple[float, int]]:
+    """Yield a net's levels, with the edges of its waves."""
+    waves = [*record.waves.get(net, ()), (record.last_ns, None)]
+    levels: list[tuple[float, int]] = [(at, level) for at, level in record.pins[net]]
+    for (begin, wave), (end, _) in pairwise(waves):
+        if wave is None:
+            continue
+        tick_ns = NS_PER_S / wave.ticks_hz
+        rise = begin - wave.at * tick_ns
+        for n in range(int((end - rise) / (wave.period * tick_ns)) + 1):
+            up = rise + n * wave.period * tick_ns
+            levels += [(max(at, begin), level) for at, level in ((up, 1), (up + wave.high * tick_ns, 0)) if at < end]
+        track = record.pins[net]
+        levels.append((end, track.levels[bisect_right(track.times, end) - 1]))
+    yield from sorted(levels, key=lambda edge: edge[0])

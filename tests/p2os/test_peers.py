@@ -2,8 +2,13 @@
 
 import json
 import os
+import subprocess
 import sys
+import time
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 
@@ -52,6 +57,37 @@ def test_a_peer_that_is_not_there_is_skipped_aloud(capsys: pytest.CaptureFixture
 def test_a_peer_that_never_drives_fails(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--peer", f"idle={sys.executable} -c pass"]) == 1
     assert "never drove: it ended with code 0" in capsys.readouterr().out
+
+
+#: As roscore does with rosmaster and rosout: another session, and whoever started it is gone.
+DAEMON = """import os, sys
+if os.fork():
+    os._exit(0)
+os.setsid()
+if os.fork():
+    os._exit(0)
+import pathlib, time
+pathlib.Path("daemon").write_text(str(os.getpid()))
+time.sleep(60)
+"""
+
+
+def test_nothing_that_a_peer_has_started_is_left(tmp_path: Path) -> None:
+    beside = subprocess.Popen(["sleep", "60"])
+    try:
+        peer = PeerProgram(name="daemon", needs=(), commands=((forked_python(), "-c", DAEMON),))
+        served = cast("peers.Served", SimpleNamespace(line_url="tcp:127.0.0.1:1"))
+        with peers._started(replace(peer, needs=("sleep",)), served, tmp_path):
+            file, end = tmp_path / "daemon", time.monotonic() + 10
+            while not (file.is_file() and file.read_text()) and time.monotonic() < end:
+                time.sleep(0.01)
+            pid = int(file.read_text())
+            assert Path(f"/proc/{pid}").exists()
+        assert not Path(f"/proc/{pid}").exists()
+        assert beside.poll() is None
+    finally:
+        beside.kill()
+        beside.wait()
 
 
 @pytest.mark.parametrize("name", ["nobody", "empty="])

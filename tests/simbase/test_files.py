@@ -99,6 +99,7 @@ READ_ELSEWHERE = {
     "simbase.installation": "of an installed package",
     "simbase.entry_points": "of an installed package",
     "p2os.capture.formats.sources": "a block or a line at a time",
+    "bluepill_sim.analysis.waveforms.reading": "its first bytes, to know a format by",
     "p2os.cli.links.ports": "of the kernel",
     "p2os.pioneer.body.bullet.body": "the engine has just written it",
     "robot_bench.adapter": "of this installation",
@@ -150,8 +151,8 @@ WRITTEN_ELSEWHERE = {
     "robot_bench.cli.sweep": "opened only, within `writing`",
     "robot_bench.project.files": "must not be there; takes back what was written",
     "robot_bench.recording.waveforms": "whole, within its caller's `writing`",
-    "bluepill_sim.analysis.vcd": "whole, within its caller's `writing`",
-    "bluepill_sim.analysis.sigrok": "an entry of an archive, within its caller's `writing`",
+    "bluepill_sim.analysis.waveforms.vcd_writer": "whole, within its caller's `writing`",
+    "bluepill_sim.analysis.waveforms.sigrok_writer": "an entry of an archive, within its caller's `writing`",
     "robot_bench.experiments.drive_files": "whole, within `writing`",
     "robot_bench.campaign.variants.mutation.suite": "nothing is kept of it",
 }

@@ -15,7 +15,7 @@ from timers import PERIOD, RCC_APB2ENR, TIM1_ENABLE, TIMER_HZ, start_timer, star
 
 from bluepill_sim import BluePill, stm32f103
 from bluepill_sim.analysis.probe import Probe
-from bluepill_sim.analysis.vcd import write_vcd
+from bluepill_sim.analysis.waveforms.vcd_writer import write_vcd
 from bluepill_sim.extension import library
 from bluepill_sim.fabric.registers import NATIVE, Peripheral, Register
 from bluepill_sim.fabric.signals import Oscillation, Waveform

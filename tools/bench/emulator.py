@@ -20,7 +20,7 @@ from measuring import CROSS_COMPILER, RUNS, TIMES_REAL, cpu_s, print_tables, row
 
 from bluepill_sim import BluePill
 from bluepill_sim.analysis.probe import Probe
-from bluepill_sim.analysis.vcd import write_vcd
+from bluepill_sim.analysis.waveforms.vcd_writer import write_vcd
 from bluepill_sim.core.unicorn_core import Reg
 from bluepill_sim.extension.library import CORE_VARIABLE, library_path
 

@@ -73,7 +73,17 @@ def test_what_does_not_come_is_reported_with_the_place(board: BluePill) -> None:
 
 
 @pytest.mark.parametrize(
-    "words", ["pin PA4", "pin XX9 high", "pin PA4 purple", "usart9 sends x", "tea", "usart1 sends"]
+    "words",
+    [
+        "pin PA4",
+        "pin XX9 high",
+        "pin PA4 purple",
+        "usart9 sends x",
+        "tea",
+        "usart1 sends",
+        "usart1 matches (",
+        "usart1 matches",
+    ],
 )
 def test_words_that_mean_nothing_are_refused(board: BluePill, words: str) -> None:
     with pytest.raises(BluePillError) as caught:
@@ -85,6 +95,16 @@ def test_an_empty_pattern_is_refused(board: BluePill) -> None:
     board.run_for("1ms")
     with pytest.raises(BluePillError):
         board.until("usart1 sends  ", timeout="1ms")
+
+
+def test_a_line_that_matches_is_whole(board: BluePill) -> None:
+    sent = bytearray()
+    board.usart1.subscribe(lambda rows: sent.extend(word for word, _ in rows))
+    board.until("usart1 matches ready$", timeout="10ms")
+    board.run_for("1us")
+    assert sent.endswith(b"ready\n")
+    with pytest.raises(WaitError):
+        board.until("usart1 matches ^ready", timeout="10ms")
 
 
 def test_a_condition_may_be_a_function_of_the_board(board: BluePill) -> None:

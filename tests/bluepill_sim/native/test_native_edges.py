@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from bluepill_sim.analysis.edge_log import EdgeLog
 from bluepill_sim.analysis.probe import Probe
-from bluepill_sim.analysis.vcd import write_vcd
+from bluepill_sim.analysis.waveforms.vcd_writer import write_vcd
 from bluepill_sim.fabric.subscriptions import EDGE, Of
 from simbase.errors import FileError
 from tests.bluepill_sim.machine import Machine

@@ -20,7 +20,7 @@ library.library_path = lambda: sys.argv[1]
 from pathlib import Path
 from bluepill_sim import BluePill
 from bluepill_sim.analysis.probe import Probe
-from bluepill_sim.analysis.vcd import write_vcd
+from bluepill_sim.analysis.waveforms.vcd_writer import write_vcd
 for program in sys.argv[3:]:
     board = BluePill(program)
     board.chip.record_blocks(100)

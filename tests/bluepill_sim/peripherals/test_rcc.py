@@ -8,8 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bluepill_sim.fabric.clocks import Clocks, illegal_settings
+from bluepill_sim.fabric.registers import PeripheralMapping
 from bluepill_sim.peripherals.rcc import ILLEGAL_NS, OSCILLATORS, Rcc, ResetCause
-from bluepill_sim.stm32f103 import BASES, CLOCK_GATES, Place
+from bluepill_sim.stm32f103 import BASES, CLOCK_GATES
 
 QUICK = settings(max_examples=40)
 
@@ -64,7 +65,7 @@ def test_the_pll_waits_for_its_source(fake_chip: Any) -> None:
 
 
 def test_a_board_without_a_crystal_never_gets_ready(fake_chip: Any) -> None:
-    rcc = Rcc(fake_chip, Place(name="RCC", base=BASES["RCC"]), gates={}, hse_hz=None)
+    rcc = Rcc(fake_chip, PeripheralMapping(name="RCC", base=BASES["RCC"]), gates={}, hse_hz=None)
     rcc.write(0, 4, 0x83 | HSEON)
     assert rcc.due_ns is None
     assert rcc.is_clocked("GPIOA")

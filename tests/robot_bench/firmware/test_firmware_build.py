@@ -18,7 +18,7 @@ OTHERS = [
     FOREIGN / "foreign.elf",
     UNOPTIMISED / "unoptimised.elf",
     UNOPTIMISED / "parts.elf",
-    build.KIT.with_suffix(".elf"),
+    *(build.SILICON / f"{name}.elf" for name in build.SILICON_PROGRAMS),
 ]
 ELFS = [*(build.HERE / f"{name}.elf" for name in build.PROGRAMS), *OTHERS]
 FLASH_START, FLASH_END = 0x0800_0000, 0x0801_0000
@@ -58,7 +58,7 @@ def test_the_same_compiler_builds_the_same_bytes(tmp_path: Path) -> None:
         builder_in(FOREIGN).build_foreign(tmp_path),
         builder_in(UNOPTIMISED).build_program(tmp_path / "unoptimised.elf"),
         builder_in(UNOPTIMISED).build_program(tmp_path / "parts.elf"),
-        build.build_kit(tmp_path / "kit.elf"),
+        *(build.build_silicon(name, tmp_path / f"{name}.elf") for name in build.SILICON_PROGRAMS),
     ]
     assert [path.name for path in built] == [path.name for path in ELFS]
     stale = [
@@ -90,7 +90,7 @@ def test_the_builder_says_the_sizes(
     monkeypatch.setattr("sys.argv", ["build.py", "--out", str(tmp_path)])
     assert build.main() == 0
     said = capsys.readouterr()
-    assert re.fullmatch(r"motors\.elf: \d+ bytes\nkit\.elf: \d+ bytes\n", said.out)
+    assert re.fullmatch(r"motors\.elf: \d+ bytes\nkit\.elf: \d+ bytes\npins\.elf: \d+ bytes\n", said.out)
     assert "gives other bytes than another" in said.err
 
 

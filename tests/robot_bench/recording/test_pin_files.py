@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from bluepill_sim.analysis.vcd import identifier
+from bluepill_sim.analysis.waveforms.vcd_writer import identifier
 from robot_bench.recording.run_record import RunRecord
 from robot_bench.recording.waveforms import nets_in_order, write_sigrok, write_vcd
 from robot_bench.wires.edges import Edges

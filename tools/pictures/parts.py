@@ -12,7 +12,7 @@ from bluepill_sim import BluePill
 from bluepill_sim.fabric.subscriptions import EDGE, HIGH, Of
 from bluepill_sim.parts.registry import attach, parse_part
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = ROOT / "tests" / "bluepill_sim" / "firmware" / "parts.elf"
 PARTS = (
     "ssd1306,on=I2C1", "mpu6050,on=I2C1", "24c02,on=I2C1", "sd-card,on=SPI1,select=PA4",
