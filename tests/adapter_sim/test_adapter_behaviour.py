@@ -231,6 +231,29 @@ def test_a_robot_that_ignores_seto_is_driven_from_where_it_is() -> None:
     assert rig.adapter.status.counts == (0, RIGHT_BEGINS)
 
 
+@pytest.mark.parametrize(("before_ns", "state"), [(1, "settling"), (0, "driving"), (-1, "driving")])
+def test_odometry_that_is_not_zero_is_waited_for_until_its_time_is_over(before_ns: int, state: str) -> None:
+    rig = Rig()
+    rig.robot._obey = lambda _: None
+    rig.robot.obeys = False
+    rig.robot.sip = replace(rig.robot.sip, raw_x=777, raw_heading=55)
+    rig.pins.set("p2dx_con", True, 0)
+    rig.ms(700)
+    rig.adapter._take_sip(rig.robot.sip, rig.adapter._agenda.settle_at - before_ns)
+    assert rig.adapter.state == state
+
+
+@pytest.mark.parametrize("moved", ["raw_x", "raw_y", "raw_heading"])
+def test_any_count_that_is_not_zero_keeps_the_adapter_waiting(moved: str) -> None:
+    rig = Rig()
+    rig.robot._obey = lambda _: None
+    rig.robot.obeys = False
+    rig.robot.sip = replace(rig.robot.sip, **{moved: 1})
+    rig.pins.set("p2dx_con", True, 0)
+    rig.ms(700)
+    assert rig.adapter.state == "settling"
+
+
 def test_an_odometry_jump_is_reported_and_is_no_travel(driving: Rig) -> None:
     driving.robot.sip = replace(driving.robot.sip, raw_x=9_000)
     driving.ms(150)
