@@ -8,7 +8,10 @@ from itertools import pairwise
 import pytest
 
 from adapter_sim import Adapter, AdapterSettings, EncoderAtOpen, parse_pinout
+from adapter_sim.adapter import AdapterState
+from adapter_sim.session import SessionEnded
 from p2os.protocol.sip import SonarReading, StandardSip
+from simbase.errors import UsageError
 from tests.adapter_sim.conftest import MS, PARAMETERS, PINOUT, FakePins, FakeRobot, Rig, four_bits
 
 #: The count of the right wheel at which a new adapter begins: the code that its wires show before, by their pulls.
@@ -229,6 +232,22 @@ def test_a_robot_that_ignores_seto_is_driven_from_where_it_is() -> None:
     rig.ms(500)
     assert rig.adapter.state == "driving"
     assert rig.adapter.status.counts == (0, RIGHT_BEGINS)
+
+
+def test_every_line_speed_is_tried_in_turn_up_to_the_eighth() -> None:
+    bauds = (9600, 19200, 38400, 57600, 115200, 230400, 460800, 921600)
+    adapter = Rig(AdapterSettings(threshold_um=600_000, bauds=bauds)).adapter
+    adapter._enter(AdapterState.CONNECTING, 0, "connecting", "")
+    tried = []
+    for _ in range(len(bauds) + 1):
+        tried.append(adapter.baud)
+        adapter.session.take_events = lambda: [SessionEnded("no answer")]
+        adapter._take_session_events(0)
+    assert tried == [*bauds, bauds[0]]
+    with pytest.raises(UsageError, match="bauds"):
+        AdapterSettings(bauds=(*bauds, 1200))
+    with pytest.raises(UsageError, match="bauds"):
+        AdapterSettings(bauds=())
 
 
 @pytest.mark.parametrize(("before_ns", "state"), [(1, "settling"), (0, "driving"), (-1, "driving")])
