@@ -127,6 +127,17 @@ def test_only_the_lines_that_differ_from_a_commit_are_changed(checkout: Path) ->
     assert {mutant.first_line for mutant in found if mutant.before == "y = 5"} == {2}
 
 
+def test_what_another_branch_has_gone_on_with_is_not_changed(checkout: Path) -> None:
+    git(checkout, "checkout", "-b", "other")
+    (checkout / "p2os" / "part.py").write_text("x = 1\ny = 2\nz = 9\n")
+    git(checkout, "commit", "-am", "other")
+    git(checkout, "checkout", "-")
+    (checkout / "p2os" / "part.py").write_text("x = 4\ny = 2\nz = 3\n")
+    git(checkout, "commit", "-am", "ours")
+    found = changes.mutants_of(changes.since("other"), checkout)
+    assert {mutant.before for mutant in found} == {"x = 4"}
+
+
 @pytest.mark.parametrize("commit", ["nowhere", "--output=/tmp/x"])
 def test_what_is_no_commit_is_refused(checkout: Path, commit: str) -> None:
     with pytest.raises(ChangeError, match="git knows no commit"):

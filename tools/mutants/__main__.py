@@ -1,11 +1,11 @@
-"""`make mutants`: change the code in one place at a time, and see whether the nearest tests notice.
+"""`make mutants`: change the code in one place at a time, and run the nearest tests.
 
-    python -m tools.mutants --since HEAD~1                 every change of the lines that differ from a commit
-    python -m tools.mutants p2os/client --count 60         60 changes of a folder's files, drawn by --seed
-    python -m tools.mutants --sample ci                    a sample of samples.toml, with its floor
+    python -m tools.mutants --since main      lines that differ from a commit
+    python -m tools.mutants p2os --count 60   60 changes of files, drawn by seed
+    python -m tools.mutants --sample ci       one of samples.toml, with its floor
 
-What was judged is kept in build/mutants: an interrupted run is resumed by the same words. Exit code 0: all noticed,
-or a sample's floor met; 1: not; 2: wrong usage; 130: interrupted.
+What was judged is kept in build/mutants; the same words resume a run.
+Exit code 0: all noticed, or the floor met; 1: not; 2: usage; 130: interrupted.
 """
 
 import argparse

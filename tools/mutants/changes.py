@@ -48,12 +48,15 @@ def files(wanted: Iterable[str]) -> Lines:
 def since(commit: str) -> Lines:
     """Return the lines that differ from a commit, those of files that git does not know yet among them.
 
+    Of a branch that has gone on since, what differs from where this one left it.
+
     Raises:
         ChangeError: There is no such commit.
     """
     if commit.startswith("-") or not _git("rev-parse", "--verify", "--quiet", f"{commit}^{{commit}}", may_fail=True):
         raise ChangeError(f"git knows no commit {commit} (hint: git log --oneline)")
-    lines: dict[str, frozenset[int] | None] = dict(_lines_of(_git("diff", "--unified=0", "--no-renames", commit)))
+    base = _git("merge-base", commit, "HEAD", may_fail=True).strip() or commit
+    lines: dict[str, frozenset[int] | None] = dict(_lines_of(_git("diff", "--unified=0", "--no-renames", base)))
     new = _git("ls-files", "--others", "--exclude-standard").splitlines()
     lines |= dict.fromkeys(new)
     return {path: each for path, each in lines.items() if _can_be_mutated(path)}
