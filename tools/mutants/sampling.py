@@ -116,7 +116,7 @@ class Court:
                 raise
             if sound.left_out:
                 names = ", ".join(sound.left_out)
-                print(f"\rmutants: left out, for they fail without a change: {names}", file=sys.stderr)
+                print(f"\rmutants: left out, for they fail or last too long without a change: {names}", file=sys.stderr)
         return found.result()
 
 

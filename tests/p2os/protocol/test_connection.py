@@ -506,3 +506,15 @@ class Pair(RuleBasedStateMachine):
 
 Pair.TestCase.settings = hypothesis_settings(max_examples=60, stateful_step_count=40)
 TestPair = Pair.TestCase
+
+
+def test_an_end_begins_with_nothing_counted() -> None:
+    for end in (client(), server()):
+        counted = [name for name in end.stats.__slots__ if name != "wire"]
+        assert [name for name in counted if getattr(end.stats, name) != 0] == []
+        assert [name for name in end.stats.wire.__slots__ if getattr(end.stats.wire, name) != 0] == []
+
+
+def test_a_packet_of_which_nothing_is_said_stands_at_the_origin() -> None:
+    sip = StandardSip()
+    assert (sip.raw_x, sip.raw_y, sip.raw_heading, sip.raw_left_velocity, sip.raw_right_velocity) == (0, 0, 0, 0, 0)
