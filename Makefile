@@ -16,7 +16,7 @@ JOBS   ?= 3
 COMPILED := $(wildcard bluepill_sim/extension/source/*/*) robot_bench/wires/edges.c \
     $(shell find adapter_fw/core adapter_fw/capi adapter_fw/esp32/main adapter_fw/esp32_sim -type f)
 
-.PHONY: setup demo test lint type unit wheels bench soak peers clean firmware mutation-tools board board-check board-tools pictures docs generated
+.PHONY: setup demo test lint type unit wheels bench soak mutants peers clean firmware mutation-tools board board-check board-tools pictures docs generated
 
 setup: $(STAMP)
 
@@ -90,6 +90,13 @@ wheels: setup
 
 soak: setup mutation-tools
 	$(BIN)/pytest -n $(JOBS) -m '(soak or hypothesis) and not hardware' --hypothesis-profile drawn
+	$(BIN)/python -m tools.mutants --sample whole
+
+# Changes the code in one place at a time and runs the nearest tests: of the lines that differ from a commit (SINCE=main), of files or folders
+# (FILES="p2os/client" COUNT=60 SEED=1), or a sample with its floor (SAMPLE=ci); NOTE=1 adds what survives to tools/mutants/survivors.toml.
+mutants: setup
+	@$(BIN)/python -m tools.mutants $(FILES) $(if $(SINCE),--since $(SINCE)) $(if $(SAMPLE),--sample $(SAMPLE)) \
+	    $(if $(COUNT),--count $(COUNT)) $(if $(SEED),--seed $(SEED)) $(if $(NOTE),--note)
 
 # The programs of others that are on PATH, or PEERS='--peer "p2os-arduino=/home/me/drive {line}"', against p2os serve.
 peers: setup

@@ -88,10 +88,17 @@ def pytest_configure(config: pytest.Config) -> None:
 
         config.pluginmanager.register(TimeCounter(config.rootpath / path, is_worker=hasattr(config, "workerinput")))
     config.pluginmanager.register(TurnedFolders())
-    from hypothesis import HealthCheck, settings  # whose modules pytest rewrites: after it is known where they are kept
+    from hypothesis import (
+        HealthCheck,
+        Phase,
+        settings,
+    )  # whose modules pytest rewrites: after it is known where they are kept
 
     settings.register_profile("drawn", deadline=None, suppress_health_check=[HealthCheck.too_slow])
     settings.register_profile("repeated", settings.get_profile("drawn"), derandomize=True, database=None)
+    settings.register_profile(  # for tools/mutants: that a test fails is enough
+        "unshrunk", settings.get_profile("repeated"), phases=[Phase.explicit, Phase.generate]
+    )
     settings.load_profile("repeated")
 
 

@@ -141,6 +141,16 @@ def sources() -> list[Path]:
     return sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
 
 
+#: Folders of what is no code of ours: the tests themselves, what is built, what a machine keeps.
+NO_CODE = {"tests", "build", "dist", "runs"}
+
+
+def code(*patterns: str) -> list[Path]:
+    """Return the files of all folders that hold code, whatever their names: what is new is judged, too."""
+    folders = [path for path in ROOT.iterdir() if path.is_dir() and path.name not in NO_CODE and path.name[0] != "."]
+    return sorted(path for folder in folders for pattern in patterns for path in folder.rglob(pattern))
+
+
 @dataclass(frozen=True)
 class Parsed:
     """What the judges look at in a source file."""
@@ -199,7 +209,7 @@ def imports_of(name: str, nodes: Iterable[ast.AST], *, is_package: bool = False)
                 parent = name.split(".") if is_package else name.split(".")[:-1]
                 parent = parent[: len(parent) - node.level + 1]
                 base = ".".join([*parent, *([base] if base else [])])
-            found |= {base} | {f"{base}.{alias.name}" for alias in node.names if base in PACKAGES}
+            found |= {base} | {f"{base}.{alias.name}" for alias in node.names if base.split(".")[0] in PACKAGES}
     return found
 
 
@@ -268,12 +278,51 @@ def test_nothing_has_a_name_that_says_nothing() -> None:
     assert [path for path in sources() if path.stem in {"utils", "util", "common", "misc", "helpers"}] == []
 
 
+#: Packages whose modules meet elsewhere, and where: none of them imports another that stands beside it.
+APART = {
+    "bluepill_sim.peripherals": "through pins, IRQ lines and the clock",
+}
+
+
+def siblings(name: str, targets: set[str]) -> set[str]:
+    """Return what a module of a package of APART imports that stands beside it."""
+    found = set()
+    for package in APART:
+        if within(name, package) and name != package:
+            own = name.removeprefix(f"{package}.").split(".")[0]
+            beside = {target.removeprefix(f"{package}.").split(".")[0]
+                      for target in targets if within(target, package) and target != package}  # fmt: skip
+            found |= {f"{package}.{each}" for each in beside - {own}}
+    return found
+
+
 def test_one_peripheral_never_imports_another() -> None:
-    peripherals = {"rcc", "flash", "gpio", "afio", "exti", "usart"}
-    for path in (ROOT / "bluepill_sim").rglob("*.py"):
-        if path.stem in peripherals:
-            others = {target.split(".")[-1] for target in imports(path)} & (peripherals - {path.stem})
-            assert others == set(), f"{path.stem} imports {others}: they meet through pins, IRQ lines and the clock"
+    judged = [path for path in sources() if any(within(module_name(path), package) for package in APART)]
+    assert len(judged) >= 2 * len(APART)
+    broken = {module_name(path): found for path in judged if (found := siblings(module_name(path), imports(path)))}
+    assert broken == {}, f"they meet {APART}"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "import bluepill_sim.peripherals.{other}",
+        "from bluepill_sim.peripherals.{other} import made",
+        "from bluepill_sim.peripherals import {other}",
+        "from . import {other}",
+        "from .{other} import made",
+        "def f():\n    from bluepill_sim.peripherals.{other} import made",
+    ],
+)
+def test_the_judge_sees_each_peripheral_that_imports_another(text: str) -> None:
+    names = [path.stem for path in (ROOT / "bluepill_sim" / "peripherals").glob("*.py") if path.stem != "__init__"]
+    assert len(names) >= 2
+    for name, other in zip(names, names[1:] + names[:1], strict=True):
+        module = f"bluepill_sim.peripherals.{name}"
+        assert siblings(module, imports_of(module, ast.walk(ast.parse(text.format(other=other))))) == {
+            f"bluepill_sim.peripherals.{other}"
+        }
+        assert siblings(module, imports_of(module, ast.walk(ast.parse(text.format(other=name))))) == set()
 
 
 @pytest.mark.parametrize(
@@ -342,16 +391,12 @@ def listens(name: str, nodes: Iterable[ast.AST]) -> bool:
 
 
 def test_every_tcp_listener_is_guarded_or_says_why_not() -> None:
-    files = [*sources(), *(ROOT / "examples").rglob("*.py"), *(ROOT / "tools").rglob("*.py")]
-    found = {module_name(path) for path in files if parsed(path).listens}
+    found = {module_name(path) for path in code("*.py") if parsed(path).listens}
     assert found == UNGUARDED.keys(), "make it by simbase.listening.listen_tcp, or add its row with the reason"
 
 
 def test_every_listener_in_c_is_none_that_a_browser_can_use() -> None:
-    files = [
-        path for folder in ("adapter_fw", "bluepill_sim", "robot_bench", "examples")
-        for pattern in ("*.c", "*.cpp", "*.h", "*.hpp", "*.ino") for path in (ROOT / folder).rglob(pattern)
-    ]  # fmt: skip
+    files = code("*.c", "*.cpp", "*.h", "*.hpp", "*.ino")
     texts = {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8", errors="replace") for path in files}
     sockets = {name: text for name, text in texts.items() if re.search(r"sys/socket\.h|WiFiServer|lwip", text)}
     found = {name for name, text in sockets.items() if re.search(r"\blisten\s*\(|WiFiServer", text)}
@@ -635,11 +680,10 @@ NAMED_TWICE = {
 def classes_by_name() -> dict[str, list[str]]:
     """Return the modules of each public class at a module's top, of all tracked code but the tests."""
     found: dict[str, list[str]] = {}
-    for folder in (*PACKAGES, "adapter_fw", "hardware", "tools", "examples"):
-        for path in sorted((ROOT / folder).rglob("*.py")):
-            for node in ast.parse(path.read_text(encoding="utf-8")).body:
-                if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
-                    found.setdefault(node.name, []).append(module_name(path))
+    for path in code("*.py"):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                found.setdefault(node.name, []).append(module_name(path))
     return found
 
 

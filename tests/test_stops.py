@@ -1,4 +1,4 @@
-"""The table of `tools/measure_stops.py`, a few rows of it: real processes, a real line, a suspend."""
+"""The table of `tools/surveys/measure_stops.py`, a few rows of it: real processes, a real line, a suspend."""
 
 import json
 import os
@@ -22,7 +22,7 @@ def test_a_robot_stands_whatever_happens_to_its_driver(way: str) -> None:
     words = ["--way", way]
     words += [word for event in EVENTS for word in ("--event", event)]
     done = subprocess.run(
-        [sys.executable, "tools/measure_stops.py", "--json", *words],
+        [sys.executable, "tools/surveys/measure_stops.py", "--json", *words],
         cwd=ROOT, capture_output=True, text=True, timeout=300, check=False,
     )  # fmt: skip
     rows = [json.loads(line) for line in done.stdout.splitlines()]

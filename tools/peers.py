@@ -36,7 +36,7 @@ from p2os import Robot
 from p2os.errors import P2osError
 from p2os.robots.parameters import known_robots
 from p2os.transport import TcpUrl, parse_url
-from tools.measure_stops import Cable
+from tools.surveys.measure_stops import Cable
 
 #: How long a peer may take to open a session and to set the wheels in motion (player needs 1.4 s, ROS a master).
 STARTING_S = 30.0

@@ -166,6 +166,20 @@ def test_samples_that_are_taken_late_see_the_levels_of_their_instants(waits: boo
     twins.compare()
 
 
+def test_both_try_every_line_speed_in_turn_up_to_the_eighth() -> None:
+    bauds = (9_600, 19_200, 38_400, 57_600, 115_200, 230_400, 460_800, 921_600)
+    twins = Twins(AdapterSettings(bauds=bauds), waits_for_edges=True)
+    twins.pass_time(320 * MS)
+    twins.pin("p2dx_con", True)
+    tried = []
+    while len(tried) <= len(bauds):
+        if not tried or twins.model.baud != tried[-1]:
+            tried.append(twins.model.baud)
+        assert twins.firmware.baud == twins.model.baud
+        twins.pass_time(500 * MS)
+    assert tried == [*bauds, bauds[0]]
+
+
 @pytest.mark.soak
 @pytest.mark.parametrize("seeds", [range(first, first + 250) for first in range(0, 2_000, 250)], ids=str)
 def test_firmware_and_model_agree_at_every_boundary_in_thousands_of_lives(seeds: range) -> None:

@@ -8,7 +8,10 @@ from itertools import pairwise
 import pytest
 
 from adapter_sim import Adapter, AdapterSettings, EncoderAtOpen, parse_pinout
+from adapter_sim.adapter import AdapterState
+from adapter_sim.session import SessionEnded
 from p2os.protocol.sip import SonarReading, StandardSip
+from simbase.errors import UsageError
 from tests.adapter_sim.conftest import MS, PARAMETERS, PINOUT, FakePins, FakeRobot, Rig, four_bits
 
 #: The count of the right wheel at which a new adapter begins: the code that its wires show before, by their pulls.
@@ -229,6 +232,45 @@ def test_a_robot_that_ignores_seto_is_driven_from_where_it_is() -> None:
     rig.ms(500)
     assert rig.adapter.state == "driving"
     assert rig.adapter.status.counts == (0, RIGHT_BEGINS)
+
+
+def test_every_line_speed_is_tried_in_turn_up_to_the_eighth() -> None:
+    bauds = (9600, 19200, 38400, 57600, 115200, 230400, 460800, 921600)
+    adapter = Rig(AdapterSettings(threshold_um=600_000, bauds=bauds)).adapter
+    adapter._enter(AdapterState.CONNECTING, 0, "connecting", "")
+    tried = []
+    for _ in range(len(bauds) + 1):
+        tried.append(adapter.baud)
+        adapter.session.take_events = lambda: [SessionEnded("no answer")]
+        adapter._take_session_events(0)
+    assert tried == [*bauds, bauds[0]]
+    with pytest.raises(UsageError, match="bauds"):
+        AdapterSettings(bauds=(*bauds, 1200))
+    with pytest.raises(UsageError, match="bauds"):
+        AdapterSettings(bauds=())
+
+
+@pytest.mark.parametrize(("before_ns", "state"), [(1, "settling"), (0, "driving"), (-1, "driving")])
+def test_odometry_that_is_not_zero_is_waited_for_until_its_time_is_over(before_ns: int, state: str) -> None:
+    rig = Rig()
+    rig.robot._obey = lambda _: None
+    rig.robot.obeys = False
+    rig.robot.sip = replace(rig.robot.sip, raw_x=777, raw_heading=55)
+    rig.pins.set("p2dx_con", True, 0)
+    rig.ms(700)
+    rig.adapter._take_sip(rig.robot.sip, rig.adapter._agenda.settle_at - before_ns)
+    assert rig.adapter.state == state
+
+
+@pytest.mark.parametrize("moved", ["raw_x", "raw_y", "raw_heading"])
+def test_any_count_that_is_not_zero_keeps_the_adapter_waiting(moved: str) -> None:
+    rig = Rig()
+    rig.robot._obey = lambda _: None
+    rig.robot.obeys = False
+    rig.robot.sip = replace(rig.robot.sip, **{moved: 1})
+    rig.pins.set("p2dx_con", True, 0)
+    rig.ms(700)
+    assert rig.adapter.state == "settling"
 
 
 def test_an_odometry_jump_is_reported_and_is_no_travel(driving: Rig) -> None:

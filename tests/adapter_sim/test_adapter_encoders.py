@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from adapter_sim import encoders as encoders_module
 from adapter_sim.encoders import HALF_COUNTS, ONE_BITS, CodeWalk, EncoderGeometry, Encoders, forward_step, sine
 from p2os.robots.parameters import load_parameters
 
@@ -133,7 +134,20 @@ def test_a_step_there_and_back_is_no_way_but_for_one_unit(dx: int, dy: int, head
 
 
 def test_a_turn_of_more_than_a_quarter_is_not_taken_for_an_arc() -> None:
-    assert forward_step(10, 0, 0, 1025) < forward_step(10, 0, 0, 1024)
+    for turn in (1025, -1025):
+        assert forward_step(10, 0, 0, turn) == 10 * sine(turn + 2048)  # the chord alone
+    for turn in (1024, -1024):
+        assert forward_step(10, 0, 0, turn) > 10 * sine(turn + 2048)
+
+
+def test_an_arc_is_longer_than_its_chord_by_the_square_of_its_angle() -> None:
+    exact = (2 * math.pi / 4096) ** 2 / 24
+    for turn in (1, 500, 1024):
+        chord = 1000 * sine(turn + 2048)
+        longer = forward_step(1000, 0, 0, turn) - chord
+        # The constant is floored to 2^-40, the chord to 2^-10 counts.
+        assert 0 <= chord * turn**2 * exact - longer <= chord * turn**2 / 2**40 + (turn**2 * exact + 1) * 2**20
+    assert math.floor(exact * 2**40) == encoders_module._ARC_E40
 
 
 def test_a_jump_of_the_odometry_is_counted_and_left_out() -> None:

@@ -157,6 +157,30 @@ def test_one_second_of_wheels_that_do_not_follow_is_implausible(driving: Rig) ->
     assert [name for _, name, _ in driving.sent(at)][:4] == ["STOP", "VEL", "RVEL", "CLOSE"]
 
 
+@pytest.mark.parametrize(
+    ("sip_after", "told"), [(0, "lost"), (1, "implausible"), (-1, "lost")], ids=["both", "plausibility", "SIP"]
+)
+def test_no_sip_in_time_is_told_before_wheels_that_do_not_follow(driving: Rig, sip_after: int, told: str) -> None:
+    ends_at = driving.adapter._driver.plausibility.ends_at
+    driving.adapter._agenda.sip_deadline = ends_at + sip_after
+    driving.adapter._run_open(ends_at)
+    assert driving.events[-1][1] == told
+
+
+@pytest.mark.parametrize(("early", "is_lost"), [(1, False), (0, True)])
+@pytest.mark.parametrize("which", ["SIP", "plausibility"])
+def test_a_loss_comes_at_its_deadline_and_not_one_before(driving: Rig, which: str, early: int, is_lost: bool) -> None:
+    agenda, plausibility = driving.adapter._agenda, driving.adapter._driver.plausibility
+    if which == "SIP":
+        plausibility._passed_at = 10**15
+        now = agenda.sip_deadline - early
+    else:
+        agenda.sip_deadline = 10**15
+        now = plausibility.ends_at - early
+    driving.adapter._run_open(now)
+    assert (driving.adapter.state == "lost") is is_lost
+
+
 def doubt() -> SpeedPlausibility:
     plausibility = SpeedPlausibility(timeout_ns=1_000, tolerance_mm_s=40, progress_mm_s=5)
     plausibility.begin(0)

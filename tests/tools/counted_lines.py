@@ -1,6 +1,7 @@
 """Which lines and branches of the packages run: `pytest --count-lines FOLDER`, for tools/check_coverage.py.
 
-Each process of a run writes a file of its own. slipcover puts probes into the bytecode of what is imported: calls,
+Each process of a run writes a file of its own, and one in `by_test` with the lines that each file of tests ran, which
+tools/mutants asks. slipcover puts probes into the bytecode of what is imported: calls,
 each behind an instruction that does nothing, and that becomes a jump over the call once it was seen.
 
 slipcover itself makes new code for that jump and looks for all functions that have the old one; here it is written
@@ -15,6 +16,7 @@ import json
 import marshal
 import os
 import sys
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dis import opmap
@@ -119,6 +121,8 @@ class Counter(Slipcover):
         super().__init__(branch=True, exclude_also=list(UNCOUNTED))
         self._root = root
         self._counted: list[tuple[CodeType, set[int], list[tuple[int, Label]]]] = []  # of each: seen, where which are
+        self._taken_out: list[tuple[int, int]] = []  # where a probe was, and the instruction that stood there
+        self._since = defaultdict[str, set[int]](set)  # lines seen since they were last told, by file
 
     def code_of(self, path: Path) -> CodeType:
         """Return a module's code with probes, and count what they see from now on."""
@@ -141,7 +145,21 @@ class Counter(Slipcover):
             while seen:
                 address, label = probes[seen.pop()]
                 self.all_seen[code.co_filename].add(label)
-                ctypes.c_ubyte.from_address(address).value = opmap["JUMP_FORWARD"]
+                if isinstance(label, int):
+                    self._since[code.co_filename].add(label)
+                instruction = ctypes.c_ubyte.from_address(address)
+                self._taken_out.append((address, instruction.value))
+                instruction.value = opmap["JUMP_FORWARD"]
+
+    def lines_since(self) -> dict[str, list[int]]:
+        """Return the lines seen since this was last asked, by file, and put their probes back."""
+        self.take_out_seen()
+        for address, instruction in self._taken_out:
+            ctypes.c_ubyte.from_address(address).value = instruction
+        self._taken_out.clear()
+        found = {file: sorted(lines) for file, lines in self._since.items()}
+        self._since.clear()
+        return found
 
     def seen(self) -> dict[str, list[Label]]:
         """Return all lines and branches that were seen, by file."""
@@ -205,14 +223,42 @@ class LineCounter:
             keep_all(root)
         self._folder, self._counter = folder, Counter(root)
         self._finder = Finder(root, self._counter)
+        self._by_test: dict[str, list[dict[str, list[int]]]] = {}
+        self._test = ""  # the file whose tests run
         sys.meta_path.insert(0, self._finder)
+
+    def pytest_runtest_logstart(self, nodeid: str) -> None:
+        """Note what the last file of tests ran when another one begins."""
+        if (file := nodeid.partition("::")[0]) != self._test:
+            self._note()
+            self._test = file
 
     def pytest_runtest_logfinish(self) -> None:
         """Take out the probes of what was seen."""
         self._counter.take_out_seen()
 
+    def _note(self) -> None:
+        self._by_test.setdefault(self._test, []).append(self._counter.lines_since())
+
     def pytest_unconfigure(self) -> None:
         """Write what was seen."""
         sys.meta_path.remove(self._finder)
         self._folder.mkdir(exist_ok=True)
-        (self._folder / f"{os.getpid()}.json").write_text(json.dumps(self._counter.seen()), encoding="utf-8")
+        self._note()
+        (self._folder / "by_test").mkdir(exist_ok=True)
+        for file, found in (
+            (f"{os.getpid()}.json", self._counter.seen()),
+            (f"by_test/{os.getpid()}.json", self._lines()),
+        ):
+            (self._folder / file).write_text(json.dumps(found), encoding="utf-8")
+
+    def _lines(self) -> dict[str, dict[str, list[int]]]:
+        """Return the lines that each file of tests ran; what was imported before the first is nobody's."""
+        told: dict[str, dict[str, list[int]]] = {}
+        for test, parts in self._by_test.items():
+            lines = defaultdict[str, set[int]](set)
+            for file, of_part in ((file, each) for part in parts for file, each in part.items()):
+                lines[file].update(of_part)
+            told[test] = {file: sorted(each) for file, each in lines.items()}
+        told.pop("", None)
+        return told

@@ -54,6 +54,20 @@ def test_a_probe_reports_once_and_then_is_jumped_over(module: Path, tmp_path: Pa
 
 
 @needs_probes
+def test_a_probe_that_was_put_back_reports_again_and_to_the_next_alone(module: Path, tmp_path: Path) -> None:
+    counter = Counter(tmp_path)
+    names: dict[str, object] = {}
+    exec(counter.code_of(module), names)  # noqa: S102 - a module of the test's own
+    assert counter.lines_since() == {str(module): [2, 6, 7]}
+    for _ in range(2):
+        assert names["first"]([1, 3]) == [3]  # type: ignore[operator]  # the function of the module
+        counter.take_out_seen()
+        assert counter.lines_since() == {str(module): [3, 4]}
+    assert counter.lines_since() == {}
+    assert labels(counter, module) == {2, 3, 4, 6, 7}
+
+
+@needs_probes
 def test_kept_code_is_that_of_the_source_as_it_is_now(module: Path, tmp_path: Path) -> None:
     kept = keep(module, tmp_path)
     made_at = kept.stat().st_mtime_ns
@@ -84,5 +98,8 @@ def test_a_folder_of_tests_that_is_named_counts_in_the_modules_that_its_conftest
     run = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "--count-lines", str(tmp_path / "seen"), named]
     done = subprocess.run(run, cwd=root, env=os.environ, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stdout[-2000:]
-    (seen,) = (tmp_path / "seen").iterdir()
+    (by_test,) = (tmp_path / "seen" / "by_test").glob("*.json")
+    told = json.loads(by_test.read_text(encoding="utf-8"))
+    assert {*told} == {named.partition("::")[0]}
+    (seen,) = (tmp_path / "seen").glob("*.json")
     assert str(root / "bluepill_sim" / "chip.py") in json.loads(seen.read_text())

@@ -2,7 +2,7 @@
 
 import pytest
 
-from bluepill_sim.core.faults import FAULT_ROWS, FaultKind
+from bluepill_sim.core.faults import FAULT_ROWS, MOST_RETURNS, FaultKind, FaultReport
 from simbase.timing import Reason
 
 CCR, SHCSR, CFSR, HFSR, BFAR = 0xE000ED14, 0xE000ED24, 0xE000ED28, 0xE000ED2C, 0xE000ED38
@@ -309,3 +309,28 @@ def test_a_handler_of_a_thread_without_privilege_has_it(boot, core, monkeypatch)
     ).run(300)
     assert machine.log == [1, 2]
     assert machine.board.fault is None
+
+
+def came_back(returns: int, *, round_ns: int = 1_000, last_ns: int = 10_000) -> FaultReport:
+    return FaultReport(
+        kind=FaultKind.BREAKPOINT, exception=3, pc=0, where="main", address=None, registers=(), at_ns=0,
+        returns=returns, last_ns=last_ns, round_ns=round_ns,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("returns", "repeats"), [(0, False), (15, False), (16, True), (17, True)])
+def test_a_handler_comes_back_for_ever_from_its_sixteenth_return_on(returns: int, repeats: bool) -> None:
+    assert MOST_RETURNS == 16
+    report = came_back(returns)
+    assert report.repeats_at(10_000) is repeats
+    assert ("again and again" in str(report)) is repeats
+
+
+@pytest.mark.parametrize(("now_ns", "repeats"), [(10_000, True), (12_000, True), (12_001, False)])
+def test_what_has_not_come_back_for_two_rounds_has_ended(now_ns: int, repeats: bool) -> None:
+    assert came_back(16).repeats_at(now_ns) is repeats
+
+
+@pytest.mark.parametrize(("round_ns", "repeats"), [(5_000_000, True), (5_000_001, False)])
+def test_a_handler_that_takes_long_is_seen_at_work(round_ns: int, repeats: bool) -> None:
+    assert came_back(16, round_ns=round_ns).repeats_at(10_000) is repeats

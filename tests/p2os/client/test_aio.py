@@ -269,3 +269,15 @@ def test_a_robot_that_is_closed_while_its_line_is_being_opened_gives_the_line_ba
     run(story())
     until(lambda: all(line.inner.fileno() < 0 for line in recorder.lines))
     assert math.isclose(sum(map(len, (line.written for line in recorder.lines))), 0)
+
+
+@pytest.mark.parametrize("lasts_s", [0.35, 0.0])
+def test_states_that_last_a_time_come_so_long_and_end(fast: ServedRobot, lasts_s: float) -> None:
+    async def story() -> None:
+        async with robot_on(fast) as robot:
+            assert robot.url == fast.url
+            numbers = [state.number async for state in robot.states(lasts_s=lasts_s)]
+            assert (1 <= len(numbers) <= 5) if lasts_s else numbers == []
+            assert numbers == sorted(set(numbers))
+
+    run(story(), fast)

@@ -1,5 +1,7 @@
 """The link: finding a robot, losing it, finding it again; in virtual time."""
 
+from itertools import pairwise
+
 import pytest
 
 from p2os.client.link import TRY_LIMIT_NS, search_plan
@@ -34,6 +36,17 @@ def test_a_session_opens_at_the_floor_of_the_protocol() -> None:
     assert connected.identity.subclass == "p2dx"
     assert rig.core.config is not None
     assert rig.notices(ConfigurationKnown)
+
+
+def test_a_robot_that_answers_no_config_is_asked_three_times_and_not_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    rig = Rig()
+    monkeypatch.setattr(rig.core._supervisor, "_take_configuration", lambda *_: None)
+    rig.connect()
+    rig.run(3)
+    asked = [at for at, command in rig.sent if command.number == CommandNumber.CONFIG]
+    assert len(asked) == 3
+    assert {later - earlier for earlier, later in pairwise(asked)} == {300 * MS}
+    assert rig.core.config is None
 
 
 @pytest.mark.parametrize("baud", [9600, 115200])

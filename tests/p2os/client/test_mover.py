@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from p2os.client.goals import GRACE_NS, DriveAxis, MotionGoal, TurnAxis
-from p2os.client.mover import MOTION_NUMBERS, SPEED_NUMBERS, WAYS, SentMotion, Speeds
+from p2os.client.mover import MOTION_NUMBERS, SPEED_NUMBERS, WAYS, PlausibilityCheck, SentMotion, Speeds
 from p2os.client.notices import (
     DeadmanStopped,
     Disobeyed,
@@ -26,6 +26,7 @@ from p2os.pioneer.controller import motion
 from p2os.protocol.commands import Command, CommandNumber, enable, rvel, stop, vel
 from p2os.protocol.profiles import Profile
 from simbase.errors import UsageError
+from simbase.timing import NS_PER_S
 from tests.p2os.client.client_rig import MS, Link, Rig, S, free_pioneer, new_pioneer
 
 MOVE, HEAD, SETV = CommandNumber.MOVE, CommandNumber.HEAD, CommandNumber.SETV
@@ -628,3 +629,39 @@ def test_a_newer_movement_does_not_drop_a_stop_that_waits(newer: Command | Drive
     assert rig.commands()[before] == stop()
     left, right = rig.wheels
     assert left == right > 0.05
+
+
+def plausibility(measured_mps: float) -> PlausibilityCheck:
+    """One that expects 0.3 m/s of both wheels from 0 on, and has seen them near it at once."""
+    check = PlausibilityCheck(NS_PER_S)
+    check.expect((0.3, 0.3), (0.0, 0.0), 0)
+    assert check.take((measured_mps, measured_mps), stalled=False, now=0) is None
+    return check
+
+
+def test_wheels_that_left_their_speed_by_themselves_are_measured_on_their_way_back() -> None:
+    check = plausibility(0.3)
+    assert check.take((0.0, 0.0), stalled=False, now=NS_PER_S - 1) is None
+    assert check.take((0.1, 0.1), stalled=False, now=NS_PER_S) is None, "nearer by more than the least progress"
+    assert check.take((0.1, 0.1), stalled=False, now=2 * NS_PER_S - 1) is None
+    told = check.take((0.1, 0.1), stalled=False, now=2 * NS_PER_S)
+    assert told is not None
+    assert "for 1 s the wheels are at 0.10 and 0.10 m/s, commanded 0.30" in told
+    assert check.take((0.1, 0.1), stalled=False, now=3 * NS_PER_S) is None, "said once"
+
+
+def test_the_way_back_is_measured_from_where_it_left_however_small_its_steps_are() -> None:
+    check, now = plausibility(0.3), 0
+    for step in range(30):  # 1 mm/s each: two of them are progress
+        now = (step + 1) * NS_PER_S // 4
+        assert check.take((step / 1000, step / 1000), stalled=False, now=now) is None
+
+
+def test_wheels_are_near_within_a_tolerance_and_a_share_of_the_greater_speed() -> None:
+    for speed, is_plausible in ((0.2151, True), (0.2149, False), (0.3849, True), (0.3851, False)):  # 0.04 + 15 %
+        check = plausibility(0.3)
+        check.take((0.0, 0.0), stalled=False, now=1)
+        check.take((speed, 0.3), stalled=False, now=2)  # nearer than before, whether near or not
+        check.take((speed, 0.3), stalled=False, now=2 + NS_PER_S - 1)
+        told = check.take((speed, 0.3), stalled=False, now=2 + NS_PER_S)
+        assert (told is None) is is_plausible, speed

@@ -309,6 +309,34 @@ def test_a_name_is_a_hint_for_the_order_of_bytes_and_never_for_the_motors(
     assert (firmware.profile, firmware.tells_motors) == (hint, False), "another session knows nothing"
 
 
+@pytest.mark.parametrize("port", [1, 5])
+def test_the_order_of_gripper_and_analog_port_is_told_once(port: int) -> None:
+    firmware = Firmware()
+    first = firmware.profile
+    none = StandardSip(analog_port=0, gripper_state=0)
+    shown, other = StandardSip(analog_port=port, gripper_state=0), StandardSip(analog_port=0, gripper_state=port)
+    firmware.take(none)
+    firmware.take(StandardSip(analog_port=6, gripper_state=0))  # no port: tells nothing
+    assert firmware.profile is first
+    firmware.take(other)
+    told = firmware.profile
+    assert told is not first
+    firmware.take(shown)
+    firmware.take(other)
+    assert firmware.profile is told, "what was told is not judged again"
+
+
+@pytest.mark.parametrize("deadman_ns", [None, 1])
+def test_a_deadman_of_one_nanosecond_or_none_is_a_setting(deadman_ns: int | None) -> None:
+    assert ClientSettings(deadman_ns=deadman_ns).deadman_ns == deadman_ns
+
+
+@pytest.mark.parametrize("deadman_ns", [0, -1])
+def test_a_deadman_that_is_over_at_once_is_refused(deadman_ns: int) -> None:
+    with pytest.raises(UsageError, match=f"deadman_ns = {deadman_ns} must be positive, or None"):
+        ClientSettings(deadman_ns=deadman_ns)
+
+
 def test_a_family_that_is_given_is_believed() -> None:
     assert judged(Profile.ARCOS, TAIL, AROS_CONFIG, given=Profile.P2OS).profile is Profile.P2OS
     assert judged(Profile.P2OS, PORT_FIRST, P2OS_CONFIG, given=Profile.AROS).tells_motors

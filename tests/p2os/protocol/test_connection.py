@@ -304,6 +304,19 @@ def test_a_robot_that_never_stops_streaming_is_given_up() -> None:
     assert any(isinstance(event, ConnectFailed) for event in events(end))
 
 
+def test_a_robot_that_streams_after_the_last_attempt_is_given_up_at_once_and_not_one_before() -> None:
+    end = client(sync_attempts=2)
+    end.connect(0)
+    feed(end, 1, SIP.to_frame(end.settings.profile))
+    assert (end.state, end.next_deadline()) == (ConnectionState.RECOVERING, 1 + 200 * MS)
+    end.advance_to(1 + 200 * MS)
+    end.take_output()
+    feed(end, 1 + 201 * MS, SIP.to_frame(end.settings.profile))
+    assert sent(end) == [stop(), vel(0), Command(CommandNumber.CLOSE)], "stopped before it is given up"
+    assert (end.state, end.next_deadline()) == (ConnectionState.FAILED, None)
+    assert events(end) == [ConnectFailed("no answer to 2 SYNC0")]
+
+
 def test_a_reset_notice_while_synchronising_begins_anew() -> None:
     end = client()
     end.connect(0)
@@ -360,6 +373,25 @@ def test_an_echo_is_late_before_the_first_packet_and_a_restart_after_it() -> Non
     assert end.stats.frames_ignored == 1
     feed(end, now, SIP.to_frame(end.settings.profile), Frame(b"\0"))
     assert events(end)[-1] == ConnectionLost("the robot was restarted")
+
+
+@pytest.mark.parametrize("number", [0, 1, 2])
+def test_an_echo_that_carries_data_is_a_packet_and_no_restart(number: int) -> None:
+    end, now = opened_client()
+    feed(end, now, SIP.to_frame(end.settings.profile), Frame(bytes([number, 7])))
+    assert events(end)[-1] == PacketReceived(RawPacket(number, b"\7"))
+    assert end.is_open
+
+
+def test_open_is_due_again_at_its_time_out_and_at_no_other() -> None:
+    end, now = opened_client(open_attempts=2)
+    assert end.next_deadline() == now + 300 * MS, "before the first PULSE"
+    end.advance_to(now + 300 * MS)
+    assert sent(end) == [Command(CommandNumber.OPEN)]
+    assert end.next_deadline() == now + 800 * MS, "the PULSE after it, for there is no third"
+    other, now = opened_client(open_attempts=2)
+    feed(other, now + 1, SIP.to_frame(other.settings.profile))
+    assert other.next_deadline() == now + 1 + 350 * MS, "a packet has come: no OPEN any more"
 
 
 def test_both_ends_can_change_the_family_of_their_packets() -> None:
@@ -474,3 +506,15 @@ class Pair(RuleBasedStateMachine):
 
 Pair.TestCase.settings = hypothesis_settings(max_examples=60, stateful_step_count=40)
 TestPair = Pair.TestCase
+
+
+def test_an_end_begins_with_nothing_counted() -> None:
+    for end in (client(), server()):
+        counted = [name for name in end.stats.__slots__ if name != "wire"]
+        assert [name for name in counted if getattr(end.stats, name) != 0] == []
+        assert [name for name in end.stats.wire.__slots__ if getattr(end.stats.wire, name) != 0] == []
+
+
+def test_a_packet_of_which_nothing_is_said_stands_at_the_origin() -> None:
+    sip = StandardSip()
+    assert (sip.raw_x, sip.raw_y, sip.raw_heading, sip.raw_left_velocity, sip.raw_right_velocity) == (0, 0, 0, 0, 0)

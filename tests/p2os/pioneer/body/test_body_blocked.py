@@ -9,7 +9,7 @@ from p2os.pioneer.world import load_world, parse_world
 from p2os.pioneer.world.model import Pose
 from p2os.robots.parameters import load_parameters
 from tests.p2os.pioneer.body.bodies import drive, each_body, marks_of
-from tools.contact_survey import MODELS, SurveyedContact, measure, picture, survey
+from tools.surveys.contact_survey import MODELS, SurveyedContact, measure, picture, survey
 
 ARENA = load_world("arena", 1)
 WALL = parse_world(

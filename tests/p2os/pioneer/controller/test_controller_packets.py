@@ -1,14 +1,49 @@
 """What the robot's standard packet says: shape, flags, speeds, positions, sonar."""
 
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
+import pytest
+
+from p2os.pioneer.body.contract import BodyState
 from p2os.pioneer.controller import SonarPerSip
+from p2os.pioneer.controller.reporter import _arcos_tail, _signed32, _simstat_packet
 from p2os.protocol.commands import CommandNumber as C
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import MOVING, STANDING
 
 MakeRobot = Callable[..., Any]
+
+
+@pytest.mark.parametrize(
+    ("value", "held"),
+    [(0, 0), (1, 1), (-1, -1), (2**31 - 1, 2**31 - 1), (2**31, -(2**31)), (-(2**31), -(2**31)),
+     (-(2**31) - 1, 2**31 - 1), (2**32, 0), (3 * 2**31, -(2**31))],
+)  # fmt: skip
+def test_a_count_of_an_encoder_wraps_as_a_signed_word_of_32_bits(value: int, held: int) -> None:
+    assert _signed32(value) == held
+
+
+@pytest.mark.parametrize("which", ["x", "y", "z"])
+def test_a_simulators_pose_is_in_millimetres(which: str) -> None:
+    state = BodyState(**{**{f"{each}_m": 0.0 for each in "xyz"}, f"{which}_m": -1.2344, "heading_rad": 0.0})
+    packet = _simstat_packet(SimpleNamespace(state=state, dt_ns=5_000_000))
+    assert {each: getattr(packet, f"{each}_mm") for each in "xyz"} == {**dict.fromkeys("xyz", 0), which: -1234}
+    assert packet.wanted_interval_ms == 5
+
+
+def test_what_arcos_does_not_know_of_its_battery_and_temperature_is_said_so(make_robot: MakeRobot) -> None:
+    robot = make_robot(profile=Profile.ARCOS).open()
+    _, charge, _, _, _, temperature, _ = _arcos_tail(robot.pioneer._context, robot.body.state, robot.pioneer.parameters)
+    assert (charge, temperature) == (-1, -127)
+
+
+def test_tones_are_pairs_of_a_length_and_a_note(robot: Any) -> None:
+    robot.open()
+    robot.say(C.SAY, bytes((25, 60, 255, 0)))
+    robot.run(100)
+    assert ("says", "2 tones, 5.6 s") in [event[1:] for event in robot.events]
 
 
 def test_a_standing_robots_packet_has_the_shape_of_the_captured_one(robot: Any) -> None:

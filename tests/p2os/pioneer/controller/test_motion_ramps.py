@@ -1,5 +1,6 @@
 """The motion of the controller: ramps, limits, modes, goals."""
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
@@ -152,6 +153,41 @@ def test_an_emergency_stop_ignores_the_ramp_and_forgets() -> None:
     motion.stop_now()
     assert motion.wheels_mps == (0.0, 0.0)
     assert run(motion, 1000) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_ramp_stands_at_zero_for_a_step_before_it_turns_round(sign: int) -> None:
+    motion = make()
+    motion.set_velocity(sign)
+    assert run(motion, 4) == (sign * 0.001, sign * 0.001)
+    motion.set_velocity(-sign)
+    # 0.6 mm/s a step down, 0.3 mm/s a step up: what is left of a step at zero is not used.
+    seen = [round(motion.step(0, 0)[0] * 1e4) * sign for _ in range(7)]
+    assert seen == [4, 0, -3, -6, -9, -10, -10]
+
+
+def test_two_wheel_speeds_of_arcos_are_their_mean_and_their_difference_each_within_its_limit() -> None:
+    motion = make()
+    motion.set_wheels_as_turn(100, 201)
+    mode, translation, _, rotation, _ = motion.setpoints
+    assert (mode, translation) == (SpeedMode.TRANSLATE_ROTATE, 150_500_000)
+    assert rotation == round(50.5e6 / (RIM_MPS_PER_DEG_S * 1e3))
+    motion.set_wheels_as_turn(-100, -201)
+    assert motion.setpoints[1:4:2] == (-150_500_000, -rotation)  # type: ignore[operator]  # a number
+    motion.set_wheels_as_turn(750, 751)
+    assert motion.setpoints[1] == 750_000_000
+    motion.set_wheels_as_turn(-750, 750)
+    assert motion.setpoints[1:4:2] == (0, 150_000_000)
+
+
+def test_the_speeds_of_two_wheels_go_on_as_mean_and_difference_where_the_mode_changes() -> None:
+    motion = make()
+    motion.set_wheels(100, 200)
+    assert run(motion, 1000) == (0.1, 0.2)
+    motion.set_velocity(150)
+    left, right = run(motion, 1)
+    slower = 0.2e-3 * RIM_MPS_PER_DEG_S * 1e3  # 200 deg/s² for 1 ms, at the rim
+    assert (left, right) == (pytest.approx(0.1 + slower, abs=1e-8), pytest.approx(0.2 - slower, abs=1e-8))
 
 
 def test_a_held_robot_slows_down_and_later_resumes() -> None:

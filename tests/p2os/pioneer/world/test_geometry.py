@@ -7,6 +7,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from p2os.errors import WorldError
+from p2os.pioneer.body.ray_cast import cast
 from p2os.pioneer.world.geometry import Footprint, hull_polygon, placed
 from p2os.pioneer.world.model import FARTHEST_M, Obstacle
 from p2os.robots.parameters import load_parameters
@@ -35,6 +36,31 @@ def test_no_shorter_way_leads_out_of_a_hull(
         moved = Obstacle(name="thing", x_m=x + length * math.cos(way), y_m=y + length * math.sin(way),
                          heading_rad=heading, **size)  # fmt: skip
         assert Footprint(moved).distance(hull) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("x", "turn", "way"),
+    [
+        (1.0, 0.0, 0.5),  # from its centre
+        (0.7, 0.0, 0.8),  # the far side, for the near one lies behind
+        (0.7, math.pi, 0.2),
+        (0.5, 0.0, 0.0),  # from its rim: met at once, inwards and outwards
+        (0.5, math.pi, 0.0),
+        (0.25, 0.0, 0.25),
+        (0.25, math.pi, math.inf),  # it lies behind
+        (1.75, math.pi, 0.25),
+        (0.25, math.pi / 2, math.inf),
+    ],
+)
+def test_a_ray_meets_a_circle_from_outside_its_rim_or_its_inside(x: float, turn: float, way: float) -> None:
+    post = Footprint(Obstacle(name="post", x_m=1.0, y_m=2.0, radius_m=0.5))
+    ray = round(math.cos(turn), 9), round(math.sin(turn), 9)
+    assert post.hit(x, 2.0, *ray) == pytest.approx(way)
+    if way < 3.0:
+        assert cast([post], x, 2.0, [ray], 3.0) == [pytest.approx(way)]
+        assert cast([post], x, 2.0, [ray], way) == [pytest.approx(way)], "no farther than was asked"
+    else:
+        assert cast([post], x, 2.0, [ray], 3.0) == [3.0]
 
 
 def test_what_stands_elsewhere_is_else_the_same() -> None:

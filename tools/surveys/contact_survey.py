@@ -1,8 +1,8 @@
 """Drive each body against the things of an arena and measure each contact.
 
-    python tools/contact_survey.py                             # thirty headings, three bodies, three models
-    python tools/contact_survey.py --body bullet --headings 6
-    python tools/contact_survey.py --picture docs/pictures/contact.svg
+    python tools/surveys/contact_survey.py                             # thirty headings, three bodies, three models
+    python tools/surveys/contact_survey.py --body bullet --headings 6
+    python tools/surveys/contact_survey.py --picture docs/pictures/contact.svg
 
 A robot drives from the middle of the arena with both rims at 0.4 m/s, ramped as the firmware
 ramps, until it meets a thing; the same command goes on for some seconds, then both set-points

@@ -1,4 +1,4 @@
-"""Measure how soon a robot stands, whatever happens to who drives it: `python tools/measure_stops.py [--help]`.
+"""Measure how soon a robot stands, whatever happens to who drives it: `python tools/surveys/measure_stops.py [--help]`.
 
     for every way of driving (verbs of the command line, both clients, the adapter's program)
       and everything that can happen (signals, pauses, a suspend, faults of the line, blocked output):
@@ -44,7 +44,7 @@ from p2os.robots.parameters import load_parameters
 from p2os.transport import Transport, listen_url, open_url
 from p2os.transport.waiting import wait_readable
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 #: How long a process is stopped or its machine sleeps: the wheels turn on, or the robot's watchdog has stopped them.
 PAUSES_S = (1.0, 3.0)
 #: How long a line carries nothing: more than the watchdog.

@@ -1,0 +1,317 @@
+"""tools/mutants: each kind of change is made, where it may be; tests that do not look are told from those that do."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tools.mutants import c_source, changes, figures, ledger, python_source
+from tools.mutants.changes import ChangeError
+from tools.mutants.judge import SOUND_LIMIT_S, START_S, Judge, MutantOutcome, MutantStatus, SoundTests, chosen
+from tools.mutants.ledger import Ledger
+from tools.mutants.mutant import SourceMutant
+from tools.mutants.natives import Natives
+from tools.mutants.nearest import Nearest
+from tools.mutants.tree import Tree
+
+ROOT = Path(__file__).parents[2]
+
+
+def made(text: str, path: str = "p2os/part.py") -> set[tuple[str, str]]:
+    make = python_source.mutants if path.endswith(".py") else c_source.mutants
+    return {(mutant.kind, mutant.text.decode().strip()) for mutant in make(path, text.encode())}
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ("a < b", {("comparison", "a <= b"), ("comparison", "a >= b")}),
+        ("a is not b", {("comparison", "a is b")}),
+        ("(a)  not  in  (b)", {("comparison", "(a)  in  (b)")}),
+        ("x = 10", {("constant", "x = 11"), ("constant", "x = 9")}),
+        ("x = 0.5", {("constant", "x = 1.0"), ("constant", "x = 0.25")}),
+        ("x = True", {("constant", "x = False")}),
+        ("x = -y", {("sign", "x = y")}),
+        ("x = a + b", {("sign", "x = a - b")}),
+        ("x = a // b", {("sign", "x = a * b")}),
+        ("x += a", {("sign", "x -= a"), ("dropped", "pass")}),
+        ("x = f(a) + 'text'", set()),
+        ("x: Left | Right = y", set()),
+        ("Both = Left | Right", set()),
+        ("self.x = y", {("dropped", "pass")}),
+        ("stop(now)", {("dropped", "pass")}),
+        ("x = max(a, b)", {("function", "x = min(a, b)")}),
+        ("x = a if b else c", {("branches", "x = a if (not (b)) else c")}),
+        ("'''Says 1 < 2.'''", set()),
+        ("@dataclass(frozen=True)\nclass A:\n    x: int", set()),
+        ("if TYPE_CHECKING:\n    x = 1", set()),
+        ("a and b", {("and or", "(a or b)"), ("check left out", "True and b"), ("check left out", "a and True")}),
+        ("a or b", {("and or", "(a and b)"), ("check left out", "False or b"), ("check left out", "a or False")}),
+    ],
+)  # fmt: skip
+def test_python_is_changed_so(text: str, wanted: set[tuple[str, str]]) -> None:
+    assert made(text) == wanted
+
+
+def test_checks_that_follow_each_other_change_places() -> None:
+    text = "def f(a, b):\n    if a:\n        return b\n    if b:\n        return a\n    raise a"
+    orders = [changed for kind, changed in made(text) if kind == "order"]
+    assert orders == ["def f(a, b):\n    if b:\n        return a\n    if a:\n        return b\n    raise a"]
+    text = "if a:\n    x = y\nelif b:\n    x = z\nelse:\n    x = w"
+    assert ("order", "if b:\n    x = z\nelif a:\n    x = y\nelse:\n    x = w") in made(text)
+
+
+def test_columns_are_counted_in_bytes() -> None:
+    assert made("x = f('µ', a < b)") == {("comparison", f"x = f('µ', a {op} b)") for op in ("<=", ">=")}
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ("int x = a < b;", {("comparison", "int x = a <= b;"), ("comparison", "int x = a >= b;")}),
+        ("std::array<int, N> x;", set()),
+        ("int x = 0x10u;", {("constant", "int x = 17u;"), ("constant", "int x = 15u;")}),
+        ("int x = 1'000;", {("constant", "int x = 1001;"), ("constant", "int x = 999;")}),
+        ("bool x = a && !b;", {("and or", "bool x = a || !b;"), ("sign", "bool x = a && b;")}),
+        ("int x = a - -b;", {("sign", "int x = a + -b;"), ("sign", "int x = a - b;")}),
+        ("x = y; z += y;", {("dropped", "x = y; ;"), ("sign", "x = y; z -= y;")}),
+        ("// 1 < 2\n/* 1 */ #include <a>", set()),
+        ("#if VERSION > 2\n#define MOST 7", {("constant", f"#if VERSION > 2\n#define MOST {n}") for n in (6, 8)}),
+        ('const char *x = "1 < 2";', set()),
+        ("{ if (a || b) stop(); }", {
+            ("branches", "{ if (!(a || b)) stop(); }"), ("and or", "{ if (a && b) stop(); }"),
+        }),
+    ],
+)  # fmt: skip
+def test_c_is_changed_so(text: str, wanted: set[tuple[str, str]]) -> None:
+    assert made(text, "adapter_fw/core/part.cpp") == wanted
+
+
+def test_checks_in_c_that_follow_each_other_change_places() -> None:
+    text = "int f() { if (a) { return 1; } if (b) return 2; if (c) g(); return 3; }"
+    orders = [changed for kind, changed in made(text, "part.c") if kind == "order"]
+    assert orders == ["int f() { if (b) return 2; if (a) { return 1; } if (c) g(); return 3; }"]
+
+
+def test_only_what_python_compiles_to_something_else_is_another_program() -> None:
+    sound = b"def f(a):\n    return a < 1\n"
+    assert not python_source.is_other_program(sound, b"def f(a):\n\n    # said\n    return (a < 1)\n")
+    assert not python_source.is_other_program(sound, b"def f(a):\n    return a <\n")
+    assert python_source.is_other_program(sound, b"def f(a):\n    return a <= 1\n")
+
+
+def git(folder: Path, *words: str) -> None:
+    subprocess.run(
+        ["git", "-c", "user.name=a", "-c", "user.email=a@b", *words], cwd=folder, check=True, capture_output=True
+    )
+
+
+@pytest.fixture
+def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    (tmp_path / "p2os").mkdir()
+    (tmp_path / "p2os" / "part.py").write_text("x = 1\ny = 2\nz = 3\n")
+    git(tmp_path, "init")
+    git(tmp_path, "add", ".")
+    git(tmp_path, "commit", "-m", "first")
+    monkeypatch.setattr(changes, "ROOT", tmp_path)
+    return tmp_path
+
+
+def test_only_the_lines_that_differ_from_a_commit_are_changed(checkout: Path) -> None:
+    (checkout / "p2os" / "part.py").write_text("x = 1\ny = 5\nz = 3\n")
+    (checkout / "p2os" / "new.py").write_text("w = 7\n")
+    (checkout / "note.txt").write_text("1 < 2\n")
+    found = changes.mutants_of(changes.since("HEAD"), checkout)
+    assert {mutant.before for mutant in found} == {"y = 5", "w = 7"}
+    assert {mutant.first_line for mutant in found if mutant.before == "y = 5"} == {2}
+
+
+def test_what_another_branch_has_gone_on_with_is_not_changed(checkout: Path) -> None:
+    git(checkout, "checkout", "-b", "other")
+    (checkout / "p2os" / "part.py").write_text("x = 1\ny = 2\nz = 9\n")
+    git(checkout, "commit", "-am", "other")
+    git(checkout, "checkout", "-")
+    (checkout / "p2os" / "part.py").write_text("x = 4\ny = 2\nz = 3\n")
+    git(checkout, "commit", "-am", "ours")
+    found = changes.mutants_of(changes.since("other"), checkout)
+    assert {mutant.before for mutant in found} == {"x = 4"}
+
+
+@pytest.mark.parametrize("commit", ["nowhere", "--output=/tmp/x"])
+def test_what_is_no_commit_is_refused(checkout: Path, commit: str) -> None:
+    with pytest.raises(ChangeError, match="git knows no commit"):
+        changes.since(commit)
+
+
+@pytest.mark.parametrize("name", ["p2os/nothing.py", "p2os/part.txt"])
+def test_what_is_no_file_of_ours_is_refused(checkout: Path, name: str) -> None:
+    (checkout / "p2os" / "part.txt").write_text("1")
+    with pytest.raises(ChangeError):
+        changes.files([name])
+
+
+@pytest.mark.slow  # reads what every file of tests imports
+def test_the_nearest_tests_are_those_of_the_mirror_then_those_that_ran_the_line() -> None:
+    by_name = Nearest(ROOT, {})
+    assert by_name.of("p2os/client/link.py", 1)[0] == "tests/p2os/client/test_link.py"
+    assert by_name.of("adapter_fw/core/app/text.cpp", 1)[0].startswith("tests/adapter_fw/")
+    assert "tests/bluepill_sim/peripherals/tim" in by_name.of("bluepill_sim/extension/source/devices/tim.c", 1)[0]
+    ran = {"tests/whole/test_plugins.py": frozenset({7}), "tests/p2os/client/test_link.py": frozenset({8, 9})}
+    counted = Nearest(ROOT, {"p2os/client/link.py": ran})
+    assert counted.of("p2os/client/link.py", 7) == ("tests/whole/test_plugins.py",)
+    assert counted.of("p2os/client/link.py", 8) == ("tests/p2os/client/test_link.py",)
+    assert set(counted.of("p2os/client/link.py", 1)) == set(ran)  # run by an import: any may look at it
+
+
+def test_tests_are_taken_as_long_as_the_sound_program_passes_in_time() -> None:
+    def of(name: str, seconds: float, *, is_judge: bool = True) -> SoundTests:
+        return SoundTests(file=name, seconds=seconds, is_judge=is_judge)
+
+    rest = SOUND_LIMIT_S - START_S - 1
+    taken = chosen([of("a", 1), of("slow", 0, is_judge=False), of("b", rest + 0.1), of("c", rest), of("d", 0.1)])
+    assert [each.file for each in taken] == ["a", "c"]
+
+
+def mutant(text: str = "x = 1") -> SourceMutant:
+    return next(python_source.mutants("p2os/part.py", text.encode()))
+
+
+def test_what_was_judged_is_there_after_a_run_that_was_cut(tmp_path: Path) -> None:
+    file = tmp_path / "judged.jsonl"
+    one = mutant()
+    sound = SoundTests(file="tests/a.py", is_judge=True, left_out=("tests/a.py::b",), seconds=1.25)
+    book = Ledger(file)
+    book.add("1", one, MutantOutcome(verdict=MutantStatus.SURVIVED))
+    book.add_sound("tree", sound)
+    book.add("2", one, MutantOutcome(verdict=MutantStatus.NOTICED, by="a test"))
+    whole = file.read_bytes()
+    for end in range(0, len(whole) + 1, 7):
+        file.write_bytes(whole[:end])
+        resumed = Ledger(file)
+        resumed.add("3", one, MutantOutcome(verdict=MutantStatus.TIMED_OUT))
+        again = Ledger(file)
+        assert again.judgement("3") == MutantOutcome(verdict=MutantStatus.TIMED_OUT)
+        assert again.judgement("2") in {None, MutantOutcome(verdict=MutantStatus.NOTICED, by="a test")}
+    assert again.judgement("1") == MutantOutcome(verdict=MutantStatus.SURVIVED)
+    assert again.sound("tree", "tests/a.py") == sound
+    assert again.sound("other", "tests/a.py") is None
+
+
+def test_another_source_or_other_tests_are_another_question() -> None:
+    one = mutant()
+    keys = {one.key([b"a"]), one.key([b"b"]), one.key([b"a", b"b"]), mutant("x = 3").key([b"a"])}
+    assert len(keys) == 4
+    assert one.key([b"a"]) == mutant().key([b"a"])
+
+
+def test_the_list_of_survivors_is_written_and_read_back(tmp_path: Path) -> None:
+    file = tmp_path / "survivors.toml"
+    one = mutant('x = f(1, "µ\\n")')
+    rows = {("p2os/a.py", "x = 1", "x = 2"): "because"}
+    ledger.write_survivors(ledger.with_new(rows, [one]), file)
+    assert ledger.survivors(file) == {**rows, one.row: ""}
+    ledger.write_survivors(ledger.with_new(ledger.survivors(file), [one]), file)
+    assert len(ledger.survivors(file)) == 2
+
+
+def test_every_row_of_the_list_is_a_mutant_of_what_stands_there() -> None:
+    rows = ledger.survivors()
+    made = {each.row for each in changes.mutants_of(dict.fromkeys(sorted({path for path, _, _ in rows})))}
+    assert sorted(rows.keys() - made) == [], "the line has changed: judge it again, or drop the row"
+
+
+def test_the_interval_is_that_of_wilson() -> None:
+    low, high = figures.interval(9, 10)  # 0.5958 to 0.9821, by R's binom.wilson
+    assert (round(low, 4), round(high, 4)) == (0.5958, 0.9821)
+    assert figures.interval(0, 0) == (0.0, 1.0)
+
+
+PART = """\
+def is_far(distance):
+    if distance >= 10:
+        return True
+    return False
+
+
+def spin():
+    count = 0
+    while count < 3:
+        count += 1
+    return count
+"""
+
+
+PROJECT = {
+    "pyproject.toml": (
+        "[tool.setuptools]\next-modules = []\n[tool.pytest.ini_options]\nmarkers = ['slow', 'soak', 'hardware']\n"
+    ),
+    "conftest.py": "from hypothesis import settings\nsettings.register_profile('unshrunk')\n",
+    "test_far.py": (
+        "from part import is_far\n"
+        "def test_far():\n    assert is_far(11) and not is_far(2)\n"
+        "def test_broken():\n    assert False\n"
+    ),
+    "test_slow.py": "def test_slow():\n    while True:\n        pass\n",
+    "test_spin.py": "from part import spin\ndef test_spin():\n    assert spin() == 3\n",
+}
+
+
+@pytest.fixture
+def judge(tmp_path: Path) -> Judge:
+    """A project of one module: boundaries that are looked at or not, a loop, a test that fails without a change."""
+    root, scratch, told = tmp_path / "root", tmp_path / "scratch", Path("tools", "mutants", "told.py")
+    (root / told).parent.mkdir(parents=True)
+    for name, text in {**PROJECT, "part.py": PART, str(told): (ROOT / told).read_text()}.items():
+        (root / name).write_text(text)
+    scratch.mkdir()
+    git(root, "init")
+    tree = Tree(root, tmp_path / "copy")
+    return Judge(tree, scratch, Natives(tree.folder, scratch, ["part.py"]), limit_s=6)
+
+
+def of_part(after: str) -> SourceMutant:
+    return next(each for each in python_source.mutants("part.py", PART.encode()) if each.after == after)
+
+
+@pytest.mark.slow
+def test_a_mutant_that_tests_look_at_is_noticed_and_another_survives(judge: Judge, tmp_path: Path) -> None:
+    sound = judge.sound("test_far.py")
+    assert (sound.is_judge, sound.left_out) == (True, ("test_far.py::test_broken",))
+    assert judge.judged(of_part("if distance > 10:"), [sound]).verdict is MutantStatus.SURVIVED
+    noticed = judge.judged(of_part("if distance < 10:"), [sound])
+    assert (noticed.verdict, noticed.by) == (MutantStatus.NOTICED, "test_far.py::test_far")
+    assert judge.judged(of_part("if distance < 10:"), []).verdict is MutantStatus.UNTESTED
+    assert {(tmp_path / name / "part.py").read_text() for name in ("root", "copy/tree")} == {PART}
+
+
+@pytest.mark.soak  # the loop keeps a processor busy as long as it may
+def test_an_endless_loop_is_noticed_by_its_time_where_the_sound_program_is_soon_done(judge: Judge) -> None:
+    loop = of_part("pass")
+    assert judge.judged(loop, [judge.sound("test_spin.py")]).verdict is MutantStatus.TIMED_OUT
+    slow = SoundTests(file="test_slow.py", is_judge=True)  # as long as the loop, without a change
+    assert judge.judged(loop, [slow]).verdict is MutantStatus.UNDECIDED
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ([], "name files, or a commit by --since, or a --sample"),
+        (["p2os", "--since", "HEAD"], "name files, or a commit by --since, or a --sample"),
+        (["--sample", "none"], "no sample is named none (there are ci, whole)"),
+        (["p2os/nothing.py"], "p2os/nothing.py is not there (hint: a path from the project's folder)"),
+        (["p2os/client", "--count", "0"], "invalid"),
+    ],
+)
+def test_wrong_words_are_said_in_a_line_and_2(
+    words: list[str], said: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from tools.mutants.__main__ import main
+
+    monkeypatch.setattr(sys, "argv", ["mutants", *words])
+    try:
+        code = main()
+    except SystemExit as end:
+        code = int(end.code or 0)
+    assert code == 2
+    assert said in capsys.readouterr().err.splitlines()[-1]

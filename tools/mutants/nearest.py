@@ -1,0 +1,141 @@
+"""Which tests stand nearest to a line of a source file, nearest first.
+
+What the suite has counted says it where it has run here (`pytest --count-lines .coverage`, as `make test` does, notes
+the lines of each file of tests); names and imports order what it says, and say it alone where it has not, and of C.
+"""
+
+import ast
+import json
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+
+#: Files of tests that are asked about one mutant, at most.
+MOST_FILES = 10
+#: What tests a library in C or C++, by the folder of its sources: there are no imports to read.
+TESTS_OF_C = {
+    "bluepill_sim/extension/source/devices": ("tests/bluepill_sim/peripherals", "tests/bluepill_sim/native"),
+    "bluepill_sim/extension/source/core": ("tests/bluepill_sim/core", "tests/bluepill_sim/native"),
+    "bluepill_sim/extension/source": ("tests/bluepill_sim/fabric", "tests/bluepill_sim/native", "tests/bluepill_sim"),
+    "robot_bench/wires": ("tests/robot_bench/wires",),
+    "adapter_fw/core/app": ("tests/adapter_fw/test_shell.py", "tests/adapter_fw/test_esp32.py"),
+    "adapter_fw/core": ("tests/adapter_fw/test_sameness.py", "tests/adapter_fw/test_safety.py",
+                        "tests/adapter_fw/test_program.py", "tests/adapter_fw/test_in_the_bench.py"),
+}  # fmt: skip
+
+Counted = Mapping[str, Mapping[str, frozenset[int]]]
+
+
+class Nearest:
+    """What is known of a tree's tests.
+
+    Args:
+        root: The project.
+        counted: Of each source file, the lines that each file of tests ran; empty where the suite has not run.
+    """
+
+    def __init__(self, root: Path, counted: Counted) -> None:
+        self._root, self._counted = root, counted
+        self._imports = {
+            path.relative_to(root).as_posix(): _imports(path) for path in sorted((root / "tests").rglob("*.py"))
+        }
+        self._tests = [name for name in self._imports if name.rpartition("/")[2].startswith("test_")]
+
+    def of(self, path: str, line: int) -> tuple[str, ...]:
+        """Return the files of tests nearest to a line, at most `MOST_FILES`."""
+        if not path.endswith(".py"):
+            return self._of_c(path)
+        by_name = self._by_name(path)
+        files = self._counted.get(path, {})
+        ran = {name for name, lines in files.items() if line in lines} or {*files}
+        ran &= {*self._tests}
+        if not ran:
+            return tuple(by_name[:MOST_FILES])
+        near = [name for name in by_name if name in ran]
+        return tuple([*near, *sorted(ran - {*near})][:MOST_FILES])
+
+    def _by_name(self, path: str) -> list[str]:
+        module = path.removesuffix("/__init__.py").removesuffix(".py").replace("/", ".")
+        return _ordered({name: self._distance(path, module, name) for name in self._tests})
+
+    def _distance(self, path: str, module: str, test: str) -> tuple[int, ...] | None:
+        """Return how far a file of tests stands from a module: its mirror, its folder, who imports it."""
+        stem, folder = Path(path).stem, f"tests/{path.rpartition('/')[0]}"
+        imported = self._imported_by(test)
+        words = _words(test)
+        apart = _apart(folder, test.rpartition("/")[0])
+        mirrors = bool({*stem.split("_")} <= words)
+        does_import = any(name == module or name.startswith(f"{module}.") for name in imported)
+        if mirrors and (does_import or apart <= 1):
+            return 0, apart
+        if does_import:
+            return 1, not {*stem.split("_")} & words, apart
+        package = module.rpartition(".")[0]
+        if apart <= 1 and any(name == package or name.startswith(f"{package}.") for name in imported):
+            return 2, not {*stem.split("_")} & words, apart
+        if any(name == package or name.startswith(f"{package}.") for name in imported):
+            return 3, apart
+        return None
+
+    def _imported_by(self, test: str) -> frozenset[str]:
+        """Return what a file of tests imports, and what the helpers import that it does."""
+        found, waiting = set[str](), [test]
+        while waiting:
+            for name in self._imports[waiting.pop()] - found:
+                found.add(name)
+                file = f"{name.replace('.', '/')}.py"
+                if file in self._imports:
+                    waiting.append(file)
+        return frozenset(found)
+
+    def _of_c(self, path: str) -> tuple[str, ...]:
+        folders = next((tests for folder, tests in TESTS_OF_C.items() if path.startswith(f"{folder}/")), ())
+        stem = {*Path(path).stem.split("_")}
+        order = {
+            name: (not (stem & _words(name)), place)
+            for name in reversed(self._tests)
+            for place, folder in reversed([*enumerate(folders)])
+            if name == folder or name.startswith(f"{folder}/")
+        }
+        return tuple(_ordered(order)[:MOST_FILES])
+
+
+def counted_lines(folder: Path, root: Path) -> Counted:
+    """Return what a run of the suite has counted, by source file; nothing where there was none."""
+    found: dict[str, dict[str, frozenset[int]]] = {}
+    for file in sorted(folder.glob("by_test/*.json")):
+        for test, sources in json.loads(file.read_text(encoding="utf-8")).items():
+            for source, lines in sources.items():
+                if Path(source).is_relative_to(root):
+                    of_source = found.setdefault(Path(source).relative_to(root).as_posix(), {})
+                    of_source[test] = of_source.get(test, frozenset()) | frozenset(lines)
+    return found
+
+
+def _ordered(distances: Mapping[str, tuple[int, ...] | None]) -> list[str]:
+    ordered = sorted((distance, name) for name, distance in distances.items() if distance is not None)
+    return [name for _, name in ordered]
+
+
+@cache
+def _words(test: str) -> frozenset[str]:
+    return frozenset(word for part in Path(test).with_suffix("").parts[1:] for word in part.split("_"))
+
+
+def _apart(one: str, other: str) -> int:
+    """Return how many steps lead from one folder to the other."""
+    parts, others = one.split("/"), other.split("/")
+    same = next((place for place, (a, b) in enumerate(zip(parts, others, strict=False)) if a != b), None)
+    same = min(len(parts), len(others)) if same is None else same
+    return len(parts) + len(others) - 2 * same
+
+
+@cache
+def _imports(path: Path) -> frozenset[str]:
+    found = set[str]()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
+    return frozenset(found)

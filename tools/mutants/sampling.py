@@ -1,0 +1,146 @@
+"""Many mutants judged, in several copies of the tree at once.
+
+Invariant: a sample is the first of a drawn order that count, whatever takes how long.
+"""
+
+import sys
+from collections.abc import Container, Iterable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+from queue import SimpleQueue
+from threading import Lock
+from typing import Self
+
+from tools.mutants.changes import ChangeError
+from tools.mutants.judge import NOTICED, Judge, MutantOutcome, MutantStatus, SoundTests, chosen, is_mutant
+from tools.mutants.ledger import Ledger, Row
+from tools.mutants.mutant import SourceMutant
+from tools.mutants.natives import Natives
+from tools.mutants.nearest import Nearest
+from tools.mutants.tree import TREE, Tree
+
+
+class Court:
+    """Copies of a tree with a judge each, made when the first mutants come.
+
+    Args:
+        root: The checkout.
+        folder: Where the copies go.
+        nearest: Which tests judge which line.
+        ledger: What was judged before.
+        paths: The files of the mutants.
+        jobs: How many copies there are.
+    """
+
+    def __init__(
+        self, root: Path, folder: Path, nearest: Nearest, ledger: Ledger, paths: Iterable[str], jobs: int
+    ) -> None:
+        self._root, self._folder, self._paths, self._jobs = root, folder, [*paths], jobs
+        self._nearest, self._ledger = nearest, ledger
+        self._judges: list[Judge] = []
+        self._digest, self._strangers = "", set[str]()
+        self._free: SimpleQueue[Judge] = SimpleQueue()
+        self._sound: dict[str, Future[SoundTests]] = {}
+        self._lock = Lock()
+        self._pool = ThreadPoolExecutor(jobs)
+
+    def __enter__(self) -> Self:
+        """Return it."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End what runs."""
+        for judge in self._judges:
+            judge.end()
+        self._pool.shutdown(cancel_futures=True)
+
+    def judged(self, mutants: Sequence[SourceMutant]) -> Iterable[MutantOutcome]:
+        """Go through the judgements of mutants, in their order.
+
+        Raises:
+            OSError: A library does not compile as it stands.
+            ChangeError: A file is part of no library that tests load.
+        """
+        if not self._judges:
+            self._make()
+        return self._pool.map(self._judgement, mutants)
+
+    def _make(self) -> None:
+        natives: Natives | None = None
+        for number in range(self._jobs):
+            place = self._folder / str(number)
+            scratch = place / "scratch"
+            scratch.mkdir(parents=True)
+            tree = Tree(self._root, place)
+            self._digest = tree.digest
+            if natives is None:
+                natives = Natives(tree.folder, scratch, self._paths)
+                strangers = [path for path in self._paths if not path.endswith(".py") and not natives.knows(path)]
+                if strangers and len(strangers) == len(self._paths):
+                    raise ChangeError(f"{strangers[0]} is part of no library that the tests load")
+                self._strangers = {*strangers}
+            self._judges.append(Judge(tree, scratch, natives.beside(tree.folder, scratch)))
+            self._free.put(self._judges[-1])
+
+    def _judgement(self, mutant: SourceMutant) -> MutantOutcome:
+        if mutant.path in self._strangers or not is_mutant(mutant):
+            return MutantOutcome(verdict=MutantStatus.NO_MUTANT)
+        judge = self._free.get()
+        try:
+            nearest = self._nearest.of(mutant.path, mutant.first_line)
+            tests = chosen([self._sound_of(judge, test) for test in nearest])
+            asked = [
+                (self._folder / "0" / TREE / test.file).read_bytes() + repr(test.left_out).encode() for test in tests
+            ]
+            key = mutant.key(asked)
+            judgement = self._ledger.judgement(key)
+            if judgement is None:
+                judgement = judge.judged(mutant, tests)
+                self._ledger.add(key, mutant, judgement)
+        finally:
+            self._free.put(judge)
+        return judgement
+
+    def _sound_of(self, judge: Judge, test: str) -> SoundTests:
+        """Return what a file of tests says of the sound program; who asks first finds out."""
+        with self._lock:
+            is_first = test not in self._sound
+            found = self._sound.setdefault(test, Future())
+        if is_first:
+            try:
+                sound = self._ledger.sound(self._digest, test) or judge.sound(test)
+                self._ledger.add_sound(self._digest, sound)
+                found.set_result(sound)
+            except BaseException as error:
+                found.set_exception(error)
+                raise
+            if sound.left_out:
+                names = ", ".join(sound.left_out)
+                print(f"\rmutants: left out, for they fail or last too long without a change: {names}", file=sys.stderr)
+        return found.result()
+
+
+def sample(
+    court: Court, mutants: Sequence[SourceMutant], count: int | None, equivalent: Container[Row]
+) -> list[tuple[SourceMutant, MutantOutcome]]:
+    """Return the first mutants that count, with their judgements; all of them where no count is given.
+
+    Args:
+        court: Who judges.
+        mutants: In the order of the draw.
+        count: How many.
+        equivalent: Rows of mutants that no test can notice: another is taken for each.
+    """
+    waiting = [mutant for mutant in mutants if mutant.row not in equivalent]
+    wanted = len(waiting) if count is None else count
+    done: list[tuple[SourceMutant, MutantOutcome]] = []
+    while waiting and len(done) < wanted:
+        batch, waiting = waiting[: wanted - len(done)], waiting[wanted - len(done) :]
+        for mutant, judgement in zip(batch, court.judged(batch), strict=True):
+            if judgement.verdict is MutantStatus.NO_MUTANT:
+                continue
+            done.append((mutant, judgement))
+            noticed = sum(each.verdict in NOTICED for _, each in done)
+            print(f"\r{len(done)} of {wanted}: {noticed} noticed", end="", file=sys.stderr, flush=True)
+    print(file=sys.stderr)
+    return done
