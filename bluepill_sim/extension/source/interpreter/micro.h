@@ -1,0 +1,40 @@
+/* The micro-operations by their numbers: those that go on, those that may end at a fault, and those that end a block. */
+#ifndef BLUEPILL_MICRO_H
+#define BLUEPILL_MICRO_H
+
+/* Four ways each, in this order: of a constant, of a register, and both with flags. */
+#define FOUR_WAYS(X, name) X(name##_I) X(name##_R) X(name##_IS) X(name##_RS)
+
+#define STRAIGHT(X)                                                                                                     \
+    X(NOP) X(MOV_I) X(MOV_R) X(MOV_IS) X(MOV_RS) X(MVN_R) X(MVN_RS) X(MOVT) X(SET_C) X(ALIGN_SP)                        \
+    FOUR_WAYS(X, AND) FOUR_WAYS(X, BIC) FOUR_WAYS(X, ORR) FOUR_WAYS(X, ORN) FOUR_WAYS(X, EOR)                           \
+    FOUR_WAYS(X, ADD) FOUR_WAYS(X, SUB) FOUR_WAYS(X, RSB) FOUR_WAYS(X, ADC) FOUR_WAYS(X, SBC)                           \
+    X(TST_I) X(TST_R) X(TEQ_I) X(TEQ_R) X(CMP_I) X(CMP_R) X(CMN_I) X(CMN_R)                                             \
+    X(LSL_I) X(LSR_I) X(ASR_I) X(ROR_I) X(RRX_I) X(LSL_IC) X(LSR_IC) X(ASR_IC) X(ROR_IC) X(RRX_IC)                      \
+    X(LSL_IS) X(LSR_IS) X(ASR_IS) X(LSL_R) X(LSR_R) X(ASR_R) X(ROR_R) X(LSL_RS) X(LSR_RS) X(ASR_RS) X(ROR_RS)           \
+    X(MUL) X(MUL_S) X(MLA) X(MLS) X(SMULL) X(UMULL) X(SMLAL) X(UMLAL) X(UDIV) X(SDIV)                                   \
+    X(SXTB) X(SXTH) X(UXTB) X(UXTH) X(REV) X(REV16) X(REVSH) X(CLZ) X(RBIT) X(UBFX) X(SBFX) X(BFI) X(SSAT) X(USAT)      \
+    X(MRS) X(MSR) X(CPS) X(CLREX)
+
+#define ACCESSING(X)                                                                                                    \
+    X(LDR_I) X(LDR_R) X(LDRH_I) X(LDRH_R) X(LDRB_I) X(LDRB_R) X(LDRSH_I) X(LDRSH_R) X(LDRSB_I) X(LDRSB_R)               \
+    X(STR_I) X(STR_R) X(STRH_I) X(STRH_R) X(STRB_I) X(STRB_R) X(LDR_LITERAL) X(LDRD) X(STRD) X(LDM) X(STM)              \
+    X(LDREX) X(STREX) X(TABLE)
+
+/* The fourteen conditions, by their numbers. */
+#define CONDITIONS(X, name)                                                                                             \
+    X(name##_EQ) X(name##_NE) X(name##_CS) X(name##_CC) X(name##_MI) X(name##_PL) X(name##_VS) X(name##_VC)             \
+    X(name##_HI) X(name##_LS) X(name##_GE) X(name##_LT) X(name##_GT) X(name##_LE)
+
+/* SKIP: over `imm` micro-operations where its condition does not hold. HOOK: calls the hooks of its instruction.
+ * STRAIGHT_ON ends a block that no branch ends; JUMP goes to R(d), BX does so with its lowest bit as T, BLX with a link;
+ * TABLE_JUMP goes R(d) halfwords on. ABORT, SVC and so on end the run. */
+#define ENDING(X)                                                                                                       \
+    CONDITIONS(X, SKIP) CONDITIONS(X, B) X(HOOK) X(STRAIGHT_ON) X(B) X(CBZ) X(CBNZ) X(JUMP) X(BX) X(BLX) X(TABLE_JUMP)  \
+    X(SVC) X(BKPT) X(UDF) X(NO_COPROCESSOR) X(WAIT) X(HINT)
+
+#define NUMBER(name) OP_##name,
+enum micro { STRAIGHT(NUMBER) ACCESSING(NUMBER) ENDING(NUMBER) MICRO_COUNT };
+#undef NUMBER
+
+#endif
