@@ -544,6 +544,10 @@ class NativeTraps(Traps):
         super().__init__(core, stop_before, leave_it_block)
         self._state = state
 
+    def needs_hooks(self, block: Block) -> bool:
+        """As of `Traps`; a core of our own looks itself."""
+        return not self._core.TELLS_PC and super().needs_hooks(block)
+
     def _trap(self, address: int, number: int, kind: HaltKind) -> None:
         if (address, number, kind) in self._trapped:
             return

@@ -241,13 +241,23 @@ void core_on_known_block(void *interpreter, uint64_t at, uint32_t size, void *us
     }
 }
 
+/* Before a division by 0, or a transfer of several words that is not aligned. */
+static void on_trap(void *user, bool is_alignment, uint32_t pc, uint32_t value)
+{
+    struct core *core = user;
+    if (is_alignment || core->shared.traps_division) {
+        leave_ahead(core->fabric);
+        core->calls.trapped(is_alignment ? HALT_UNALIGNED : HALT_DIVIDE_BY_ZERO, pc, value);
+    }
+}
+
 /* Has the interpreter run instructions in Unicorn's place. */
 void core_use_interpreter(struct core *core, struct interpreter *interpreter)
 {
-    struct shared *s = &core->shared;
     core->interpreter = interpreter;
-    interpreter_set_clock(interpreter, &(struct clock){&s->cycle, &s->stop_at, (void **)&core->block, s->last, &s->logged});
+    interpreter_set_clock(interpreter, &(struct clock){&core->shared, (void **)&core->block});
     interpreter_set_noted(interpreter, &core->noted);
+    interpreter_set_trap(interpreter, on_trap, core);
 }
 
 /* Returns false without memory for it. `instructions` has `count` rows, the costs are those of block_cost.py. */

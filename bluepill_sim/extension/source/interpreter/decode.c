@@ -93,14 +93,11 @@ struct block *interpreter_decode(struct interpreter *s, uint32_t address, const 
             outcome = ENDS_BLOCK;
         }
     }
+    interpreter_tidy(&to);
     struct block *block = to.count ? malloc(sizeof *block + to.count * sizeof *to.ops) : NULL;
     if (block != NULL) {
         *block = (struct block){.start = address, .end = address + done, .target = to.target, .it = (uint8_t)s->is.it_state,
                                 .is_thumb = (uint8_t)s->is.is_thumb, .count = to.count};
-        const void *const *handlers = interpreter_execute(NULL, NULL);
-        for (uint32_t n = 0; n < to.count; ++n) {
-            to.ops[n].handler = handlers == NULL ? NULL : handlers[to.ops[n].number];
-        }
         memcpy(block->ops, to.ops, to.count * sizeof *to.ops);
     }
     free(to.ops);

@@ -8,11 +8,18 @@
 #include "operations.h"
 
 #if defined(__GNUC__) && !defined(INTERPRETER_PORTABLE)
-#define HANDLER(name) at_##name:
+#define CODE_AT(number) at_##number:
 #define DISPATCH() goto *op->handler
 #else
-#define HANDLER(name) case OP_##name:
+#define CODE_AT(number) case number:
 #define DISPATCH() goto dispatch
+#endif
+
+/* GCC packs the flags into a vector before it stores them, which takes longer than their stores. */
+#if defined(__GNUC__) && !defined(__clang__)
+#define PLAIN_CODE __attribute__((optimize("no-tree-slp-vectorize", "no-gcse", "no-crossjumping")))
+#else
+#define PLAIN_CODE
 #endif
 
 enum { FIRST_MAGIC = 0xFF };
@@ -44,17 +51,17 @@ static __attribute__((noinline)) struct block *enter(struct interpreter *s, stru
 /* As the owner would, at the start of a block that takes no attention; false: it has to. */
 static inline bool passes(struct interpreter *s, const struct block *from, unsigned way, const struct block *to)
 {
-    const struct clock *clock = &s->clock;
-    if (UNLIKELY(to == NULL || to->row == NULL || *clock->row != from->row)) {
+    if (UNLIKELY(to == NULL || to->row == NULL || *s->clock.row != from->row)) {
         return false;
     }
-    const uint64_t cycle = *clock->cycle + from->costs[way];
-    if (UNLIKELY(cycle >= *clock->stop_at)) {
+    struct shared *shared = s->clock.shared;
+    const uint64_t cycle = shared->cycle + from->costs[way];
+    if (UNLIKELY(cycle >= shared->stop_at)) {
         return false;
     }
-    *clock->cycle = cycle;
-    *clock->row = to->row;
-    clock->last[(*clock->logged)++ % LAST_ROWS] = (struct record){cycle, to->start, 0};
+    shared->cycle = cycle;
+    *s->clock.row = to->row;
+    shared->last[shared->logged++ % LAST_ROWS] = (struct record){cycle, to->start, 0};
     return true;
 }
 
@@ -104,6 +111,23 @@ static __attribute__((noinline)) void end_by(struct interpreter *s, const struct
         interpreter_call_invalid(s);
     }
 }
+
+#define CODE(number) CODE_AT(number)
+#define HANDLER(name) CODE(OP_##name)
+/* Whether the instruction was done: always, but of accesses. */
+#define ALWAYS_DONE(name)                                                                                               \
+    static inline __attribute__((always_inline)) bool is_done_##name(struct interpreter *s, const struct op *op)        \
+    {                                                                                                                   \
+        do_##name(s, op);                                                                                               \
+        return true;                                                                                                    \
+    }
+#define MAY_BE_DONE(name)                                                                                               \
+    static inline __attribute__((always_inline)) bool is_done_##name(struct interpreter *s, const struct op *op)        \
+    {                                                                                                                   \
+        return do_##name(s, op);                                                                                        \
+    }
+STRAIGHT(ALWAYS_DONE)
+ACCESSING(MAY_BE_DONE)
 
 #define GO_ON(count)                                                                                                    \
     do {                                                                                                                \
@@ -167,25 +191,48 @@ static __attribute__((noinline)) void end_by(struct interpreter *s, const struct
         JUMP_TO(target & ~1u);                                                                                          \
     } while (0)
 
-#define GOES_ON(name)                                                                                                   \
-    HANDLER(name)                                                                                                       \
-    do_##name(s, op);                                                                                                   \
-    GO_ON(1);
-#define MAY_FAIL(name)                                                                                                  \
-    HANDLER(name)                                                                                                       \
-    if (UNLIKELY(!do_##name(s, op))) {                                                                                  \
+#define DO(name)                                                                                                        \
+    if (UNLIKELY(!is_done_##name(s, op))) {                                                                             \
         goto ended;                                                                                                     \
-    }                                                                                                                   \
+    }
+#define ALONE(name)                                                                                                     \
+    HANDLER(name)                                                                                                       \
+    DO(name)                                                                                                            \
     GO_ON(1);
+#define IN_PAIR(first, second)                                                                                          \
+    CODE(PAIR(first, second))                                                                                           \
+    DO(first)                                                                                                           \
+    ++op;                                                                                                               \
+    DO(second)                                                                                                          \
+    GO_ON(1);
+#define BEFORE_BRANCH(first, second)                                                                                    \
+    CODE(PAIR(first, second))                                                                                           \
+    DO(first)                                                                                                           \
+    ++op;                                                                                                               \
+    BRANCH_IF(MEETS_##second);
 
-#define N_SET (s->is.n >> 31)
+#define N_SET (s->is.nz < 0)
 #define V_SET (s->is.v >> 31)
-#define Z_SET (s->is.z == 0)
-#define IS_LESS ((int32_t)(s->is.n ^ s->is.v) < 0)
+#define Z_SET ((uint32_t)s->is.nz == 0)
+#define IS_LESS (N_SET != V_SET)
 #define BY_CONDITIONS(X)                                                                                                \
     X(EQ, Z_SET) X(NE, !Z_SET) X(CS, s->is.c) X(CC, !s->is.c) X(MI, N_SET) X(PL, !N_SET) X(VS, V_SET) X(VC, !V_SET)     \
     X(HI, s->is.c && !Z_SET) X(LS, !s->is.c || Z_SET) X(GE, !IS_LESS) X(LT, IS_LESS)                                    \
     X(GT, !Z_SET && !IS_LESS) X(LE, Z_SET || IS_LESS)
+#define MEETS_B_EQ Z_SET
+#define MEETS_B_NE !Z_SET
+#define MEETS_B_CS s->is.c
+#define MEETS_B_CC !s->is.c
+#define MEETS_B_MI N_SET
+#define MEETS_B_PL !N_SET
+#define MEETS_B_HI s->is.c && !Z_SET
+#define MEETS_B_LS !s->is.c || Z_SET
+#define MEETS_B_GE !IS_LESS
+#define MEETS_B_LT IS_LESS
+#define MEETS_B_GT !Z_SET && !IS_LESS
+#define MEETS_B_LE Z_SET || IS_LESS
+#define MEETS_CBZ R(n) == 0
+#define MEETS_CBNZ R(n) != 0
 #define SKIPS(name, condition)                                                                                          \
     HANDLER(SKIP_##name)                                                                                                \
     GO_ON((condition) ? 1 : 1 + op->imm);
@@ -195,11 +242,17 @@ static __attribute__((noinline)) void end_by(struct interpreter *s, const struct
 
 /* Runs from a block on that has been entered until a hook or an instruction ends the run. Without an interpreter: returns
  * what `handler` of each micro-operation is, null where they are not used. */
-const void *const *interpreter_execute(struct interpreter *s, struct block *block)
+PLAIN_CODE const void *const *interpreter_execute(struct interpreter *s, struct block *block)
 {
 #if defined(__GNUC__) && !defined(INTERPRETER_PORTABLE)
-#define ADDRESS_OF(name) &&at_##name,
-    static const void *const handlers[MICRO_COUNT] = {STRAIGHT(ADDRESS_OF) ACCESSING(ADDRESS_OF) ENDING(ADDRESS_OF)};
+#define LABEL(number) &&at_##number,
+#define LABELS(number) LABEL(number)
+#define ADDRESS_OF(name) LABELS(OP_##name)
+#define ADDRESS_OF_PAIR(first, second) LABELS(PAIR(first, second))
+    static const void *const handlers[CODE_COUNT] = {
+        STRAIGHT(ADDRESS_OF) ACCESSING(ADDRESS_OF) ENDING(ADDRESS_OF)
+        [MICRO_COUNT] = PAIRS(ADDRESS_OF_PAIR) BRANCHING_PAIRS(ADDRESS_OF_PAIR)
+    };
     if (s == NULL) {
         return handlers;
     }
@@ -217,10 +270,12 @@ const void *const *interpreter_execute(struct interpreter *s, struct block *bloc
 
 #if !defined(__GNUC__) || defined(INTERPRETER_PORTABLE)
 dispatch:
-    switch ((enum micro)op->number) {
+    switch ((enum micro)op->code) {
 #endif
-        STRAIGHT(GOES_ON)
-        ACCESSING(MAY_FAIL)
+        STRAIGHT(ALONE)
+        ACCESSING(ALONE)
+        PAIRS(IN_PAIR)
+        BRANCHING_PAIRS(BEFORE_BRANCH)
         BY_CONDITIONS(SKIPS)
         BY_CONDITIONS(BRANCHES)
         HANDLER(HOOK)
@@ -257,7 +312,7 @@ dispatch:
         end_by(s, op);
         goto ended;
 #if !defined(__GNUC__) || defined(INTERPRETER_PORTABLE)
-    case MICRO_COUNT: return NULL;
+    case CODE_COUNT: return NULL;
     }
 #endif
 

@@ -43,9 +43,8 @@ struct op {
     uint32_t imm;
     uint8_t d, n, m, a;
     uint32_t pc;     /* of its instruction */
-    uint16_t number; /* of enum micro */
-    uint8_t it;      /* ITSTATE before its instruction, */
-    uint8_t after;   /* and after it */
+    uint16_t number, code; /* of enum micro: its own, and that of what runs it, alone or with the next one */
+    uint8_t it, after;     /* ITSTATE before its instruction, and after it */
 };
 
 /* A basic block: its ways out are 0, straight on, and 1, to the target of a branch that says where it goes. */
@@ -63,13 +62,11 @@ struct block {
     struct op ops[];
 };
 
-/* What the owner has the interpreter do at the start of a block that takes no attention: charge the block before, and keep
- * a row. Null pointers: nothing. */
+/* Where the owner keeps time and the last rows, and the row of the block that runs: the interpreter charges the block
+ * before, and keeps a row, at the start of one that takes no attention. Null pointers: it never does. */
 struct clock {
-    uint64_t *cycle, *stop_at;
+    struct shared *shared;
     void **row;
-    struct record *last;
-    uint64_t *logged;
 };
 
 struct region {
@@ -98,7 +95,8 @@ enum { REGIONS = 64, HOOKS = 512, CODE_SLOTS = 1 << 16, PAGE_BYTES = 1 << 10 };
 /* What a snapshot holds. */
 struct registers {
     uint32_t r[REGISTERS];
-    uint32_t n, z, c, v, q; /* N and V: bit 31; Z: where it is 0; C, Q: 0 or 1 */
+    int64_t nz;       /* N: it is negative; Z: its lower half is 0, so that both may be set */
+    uint32_t c, v, q; /* C, Q: 0 or 1; V: bit 31 */
     uint32_t pc, is_thumb, it_state;
     uint32_t ipsr, control, primask, basepri, faultmask;
     uint32_t other_sp; /* MSP or PSP, whichever R13 is not */
@@ -119,6 +117,9 @@ struct interpreter {
     struct clock clock;
     struct block *entering; /* the one whose hook is called */
     uint32_t *noted;        /* where the owner wants the PC of each access to I/O */
+    /* Called before a division by 0 and a transfer of several words that is not aligned; the owner may end the run. */
+    void (*trapped)(void *user, bool is_alignment, uint32_t pc, uint32_t value);
+    void *trap_user;
     struct region regions[REGIONS];
     uint32_t region_count;
     struct region *last_io;
@@ -144,6 +145,7 @@ const void *const *interpreter_execute(struct interpreter *s, struct block *bloc
 struct region *interpreter_region(struct interpreter *s, uint32_t address);
 bool interpreter_load(struct interpreter *s, const struct op *op, uint32_t address, uint32_t bytes, uint32_t *value);
 bool interpreter_store(struct interpreter *s, const struct op *op, uint32_t address, uint32_t bytes, uint32_t value);
+bool interpreter_is_trapped(struct interpreter *s, const struct op *op, bool is_alignment, uint32_t value);
 uint32_t interpreter_page(struct interpreter *s, uint32_t address, int access, bool *is_denied);
 void interpreter_choose_ways(struct interpreter *s);
 /* hooks.c */
@@ -165,6 +167,7 @@ void interpreter_know(struct interpreter *s, void *row, uint64_t straight, uint6
 void interpreter_forget_rows(struct interpreter *s);
 void interpreter_set_clock(struct interpreter *s, const struct clock *clock);
 void interpreter_set_noted(struct interpreter *s, uint32_t *noted);
+void interpreter_set_trap(struct interpreter *s, void (*trapped)(void *, bool, uint32_t, uint32_t), void *user);
 #pragma GCC visibility pop
 /* blocks.c, for Python as well. */
 void interpreter_drop(struct interpreter *s, uint64_t first, uint64_t end);

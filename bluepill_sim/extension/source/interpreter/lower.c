@@ -278,22 +278,23 @@ static bool lower_access(struct builder *to, const struct decoded *one, enum out
     return false;
 }
 
-/* Two words: R(t) and R(a). */
-static enum outcome dual(struct builder *to, const struct decoded *one, bool is_load, uint32_t offset, uint32_t change)
+/* Two words, R(t) and R(a), of R(n) + offset; where the base is written back, it becomes R(n) + `change`. */
+static enum outcome dual(struct builder *to, const struct decoded *one, bool is_load, bool goes_back, bool is_post)
 {
+    const uint32_t change = one->u ? 4 * one->i : 0u - 4 * one->i;
     uint32_t base = one->n;
     if (base == PC) {
         emit(to, OP_MOV_I, ADDRESS, 0, 0, aligned_pc(to));
         base = ADDRESS;
-    } else if (change || (is_load && (one->t == base || one->a == base))) {
+    } else if (goes_back || (is_load && (one->t == base || one->a == base))) {
         emit(to, OP_MOV_R, ADDRESS, 0, base, 0);
         base = ADDRESS;
     }
     if (!is_load) {
         reads(to, one->t, one->a);
     }
-    emit(to, is_load ? OP_LDRD : OP_STRD, one->t, base, 0, offset)->a = (uint8_t)one->a;
-    if (change) {
+    emit(to, is_load ? OP_LDRD : OP_STRD, one->t, base, one->n < SP, is_post ? 0 : change)->a = (uint8_t)one->a;
+    if (goes_back) {
         emit(to, OP_ADD_I, one->n, ADDRESS, 0, change);
         if (one->n == PC) {
             return wrote(to, PC);
@@ -312,7 +313,7 @@ static enum outcome dual(struct builder *to, const struct decoded *one, bool is_
 static enum outcome multiple(struct builder *to, bool is_load, uint32_t n, uint32_t list, bool is_before, bool change)
 {
     const int count = __builtin_popcount(list), step = is_before ? -count : count;
-    struct op *op = emit(to, is_load ? OP_LDM : OP_STM, 0, n, 0, list | (uint32_t)((is_before ? -count : 0) & 0xFF) << 16);
+    struct op *op = emit(to, is_load ? OP_LDM : OP_STM, 0, n, n < SP, list | (uint32_t)((is_before ? -count : 0) & 0xFF) << 16);
     op->a = (uint8_t)(change ? step : 0);
     if (!is_load) {
         return GOES_ON;
@@ -571,13 +572,10 @@ enum outcome interpreter_lower(struct builder *to, const struct decoded *given)
     case LDM_IA: return wide_multiple(to, one, true, false);
     case STM_DB: return wide_multiple(to, one, false, true);
     case LDM_DB: return wide_multiple(to, one, true, true);
-    case STRD_POST: return dual(to, one, false, 0, one->u ? 4 * one->i : 0u - 4 * one->i);
-    case LDRD_POST: return dual(to, one, true, 0, one->u ? 4 * one->i : 0u - 4 * one->i);
-    case STRD:
-    case LDRD: {
-        const uint32_t offset = one->u ? 4 * one->i : 0u - 4 * one->i;
-        return dual(to, one, one->operation == LDRD, offset, one->w ? offset : 0);
-    }
+    case STRD_POST: return dual(to, one, false, true, true);
+    case LDRD_POST: return dual(to, one, true, true, true);
+    case STRD: return dual(to, one, false, one->w, false);
+    case LDRD: return dual(to, one, true, one->w, false);
     case STREX: return exclusive(to, one, false, 4);
     case LDREX: return exclusive(to, one, true, 4);
     case STREXB: return exclusive(to, one, false, 1);

@@ -29,6 +29,8 @@ struct builder {
 #pragma GCC visibility push(hidden)
 /* Adds an instruction's micro-operations. */
 enum outcome interpreter_lower(struct builder *to, const struct decoded *one);
+/* Makes them fewer, and gives each its code. */
+void interpreter_tidy(struct builder *to);
 struct op *interpreter_emit(struct builder *to, enum micro number, uint32_t d, uint32_t n, uint32_t m, uint32_t imm);
 #pragma GCC visibility pop
 

@@ -108,6 +108,16 @@ static bool load_part(struct interpreter *s, const struct op *op, uint32_t addre
     return !s->stops;
 }
 
+/* Whether the run ends before an instruction that the owner has trap. */
+bool interpreter_is_trapped(struct interpreter *s, const struct op *op, bool is_alignment, uint32_t value)
+{
+    if (s->trapped != NULL) {
+        stand_at(s, op);
+        s->trapped(s->trap_user, is_alignment, op->pc, value);
+    }
+    return s->stops;
+}
+
 static bool is_plain(struct interpreter *s, uint32_t address, uint32_t bytes)
 {
     const struct region *region = interpreter_region(s, address);
@@ -172,7 +182,9 @@ bool interpreter_store(struct interpreter *s, const struct op *op, uint32_t addr
             return false;
         }
     }
-    if (!(address & (bytes - 1)) || is_plain(s, address, bytes) || interpreter_region(s, address) == NULL) {
+    const struct region *region = interpreter_region(s, address);
+    const bool fails_whole = region == NULL || (region->host != NULL && !region->is_writable);
+    if (!(address & (bytes - 1)) || fails_whole || is_plain(s, address, bytes)) {
         return store_part(s, op, address, bytes, value);
     }
     for (uint32_t n = 0; n < bytes; ++n) {

@@ -2,6 +2,8 @@
 #ifndef BLUEPILL_MICRO_H
 #define BLUEPILL_MICRO_H
 
+#include "pairs.h"
+
 /* Four ways each, in this order: of a constant, of a register, and both with flags. */
 #define FOUR_WAYS(X, name) X(name##_I) X(name##_R) X(name##_IS) X(name##_RS)
 
@@ -12,14 +14,14 @@
     X(TST_I) X(TST_R) X(TEQ_I) X(TEQ_R) X(CMP_I) X(CMP_R) X(CMN_I) X(CMN_R)                                             \
     X(LSL_I) X(LSR_I) X(ASR_I) X(ROR_I) X(RRX_I) X(LSL_IC) X(LSR_IC) X(ASR_IC) X(ROR_IC) X(RRX_IC)                      \
     X(LSL_IS) X(LSR_IS) X(ASR_IS) X(LSL_R) X(LSR_R) X(ASR_R) X(ROR_R) X(LSL_RS) X(LSR_RS) X(ASR_RS) X(ROR_RS)           \
-    X(MUL) X(MUL_S) X(MLA) X(MLS) X(SMULL) X(UMULL) X(SMLAL) X(UMLAL) X(UDIV) X(SDIV)                                   \
+    X(MUL) X(MUL_S) X(MLA) X(MLS) X(SMULL) X(UMULL) X(SMLAL) X(UMLAL)                                                   \
     X(SXTB) X(SXTH) X(UXTB) X(UXTH) X(REV) X(REV16) X(REVSH) X(CLZ) X(RBIT) X(UBFX) X(SBFX) X(BFI) X(SSAT) X(USAT)      \
     X(MRS) X(MSR) X(CPS) X(CLREX)
 
 #define ACCESSING(X)                                                                                                    \
     X(LDR_I) X(LDR_R) X(LDRH_I) X(LDRH_R) X(LDRB_I) X(LDRB_R) X(LDRSH_I) X(LDRSH_R) X(LDRSB_I) X(LDRSB_R)               \
     X(STR_I) X(STR_R) X(STRH_I) X(STRH_R) X(STRB_I) X(STRB_R) X(LDR_LITERAL) X(LDRD) X(STRD) X(LDM) X(STM)              \
-    X(LDREX) X(STREX) X(TABLE)
+    X(LDREX) X(STREX) X(TABLE) X(UDIV) X(SDIV)
 
 /* The fourteen conditions, by their numbers. */
 #define CONDITIONS(X, name)                                                                                             \
@@ -34,7 +36,13 @@
     X(SVC) X(BKPT) X(UDF) X(NO_COPROCESSOR) X(WAIT) X(HINT)
 
 #define NUMBER(name) OP_##name,
-enum micro { STRAIGHT(NUMBER) ACCESSING(NUMBER) ENDING(NUMBER) MICRO_COUNT };
-#undef NUMBER
+#define PAIR(first, second) OP_##first##__##second
+#define PAIR_NUMBER(first, second) PAIR(first, second),
+/* The pairs behind them are numbers of code alone: a micro-operation has its own number. */
+enum micro {
+    STRAIGHT(NUMBER) ACCESSING(NUMBER) ENDING(NUMBER) MICRO_COUNT,
+    LAST_MICRO = MICRO_COUNT - 1,
+    PAIRS(PAIR_NUMBER) BRANCHING_PAIRS(PAIR_NUMBER) CODE_COUNT
+};
 
 #endif

@@ -15,7 +15,7 @@
 #define DOES(name) static inline __attribute__((always_inline)) void do_##name(struct interpreter *s, const struct op *op)
 #define ACCESSES(name) static inline __attribute__((always_inline)) bool do_##name(struct interpreter *s, const struct op *op)
 
-static inline void set_nz(struct interpreter *s, uint32_t value) { s->is.n = s->is.z = value; }
+static inline void set_nz(struct interpreter *s, uint32_t value) { s->is.nz = (int32_t)value; }
 
 static inline uint32_t add_with_flags(struct interpreter *s, uint32_t x, uint32_t y)
 {
@@ -48,25 +48,6 @@ static inline uint32_t add_with_carry(struct interpreter *s, uint32_t x, uint32_
 /* Arithmetic shift; a right shift of a negative number is arithmetic with every compiler that builds this. */
 static inline uint32_t asr(uint32_t x, uint32_t by) { return (uint32_t)((int32_t)x >> by); }
 static inline uint32_t ror(uint32_t x, uint32_t by) { return x >> (by & 31) | x << (-by & 31); }
-
-/* Whether a condition holds, by its number (A7.3.1). */
-static inline bool holds_condition(const struct interpreter *s, uint32_t condition)
-{
-    const struct registers *is = &s->is;
-    const bool n = is->n >> 31, z = is->z == 0, v = is->v >> 31;
-    bool holds = true;
-    switch (condition >> 1) {
-    case 0: holds = z; break;
-    case 1: holds = is->c; break;
-    case 2: holds = n; break;
-    case 3: holds = v; break;
-    case 4: holds = is->c && !z; break;
-    case 5: holds = n == v; break;
-    case 6: holds = n == v && !z; break;
-    default: return true;
-    }
-    return holds != (condition & 1);
-}
 
 DOES(NOP)
 {
@@ -212,11 +193,26 @@ DOES(SMULL) { put_long(s, op, signed_product(R(n), R(m))); }
 DOES(UMULL) { put_long(s, op, (uint64_t)R(n) * R(m)); }
 DOES(SMLAL) { put_long(s, op, long_of(s, op) + signed_product(R(n), R(m))); }
 DOES(UMLAL) { put_long(s, op, long_of(s, op) + (uint64_t)R(n) * R(m)); }
-DOES(UDIV) { R(d) = R(m) ? R(n) / R(m) : 0; }
-DOES(SDIV)
+ACCESSES(UDIV)
+{
+    if (UNLIKELY(R(m) == 0)) {
+        if (interpreter_is_trapped(s, op, false, 0)) {
+            return false;
+        }
+        R(d) = 0;
+        return true;
+    }
+    R(d) = R(n) / R(m);
+    return true;
+}
+ACCESSES(SDIV)
 {
     const int32_t x = (int32_t)R(n), y = (int32_t)R(m);
+    if (UNLIKELY(y == 0 && interpreter_is_trapped(s, op, false, 0))) {
+        return false;
+    }
     R(d) = y == 0 ? 0 : y == -1 ? 0u - (uint32_t)x : (uint32_t)(x / y);
+    return true;
 }
 
 /* Extend, reverse, count. */
@@ -345,15 +341,27 @@ ACCESSES(LDR_LITERAL)
     return interpreter_load(s, op, op->imm, 4, &R(d));
 }
 
+/* Transfers of several words from a base that has to be aligned: `m` tells whether that is looked at. */
+static inline bool is_misaligned(struct interpreter *s, const struct op *op)
+{
+    return UNLIKELY(R(n) & 3 && op->m) && interpreter_is_trapped(s, op, true, R(n));
+}
+
 /* Two words at R(n) + imm, of R(d) and R(a). */
 ACCESSES(LDRD)
 {
     const uint32_t address = R(n) + op->imm;
+    if (is_misaligned(s, op)) {
+        return false;
+    }
     return load_word(s, op, address, &R(d)) && load_word(s, op, address + 4, &R(a));
 }
 ACCESSES(STRD)
 {
     const uint32_t address = R(n) + op->imm;
+    if (is_misaligned(s, op)) {
+        return false;
+    }
     return store_word(s, op, address, R(d)) && store_word(s, op, address + 4, R(a));
 }
 
@@ -364,6 +372,9 @@ static inline uint32_t words(uint8_t count) { return 4 * (uint32_t)(int8_t)count
 ACCESSES(LDM)
 {
     uint32_t address = R(n) + words((uint8_t)(op->imm >> 16)), base = R(n) + words(op->a);
+    if (is_misaligned(s, op)) {
+        return false;
+    }
     for (uint32_t left = op->imm & 0xFFFF; left; left &= left - 1, address += 4) {
         const uint32_t number = (uint32_t)__builtin_ctz(left);
         if (!load_word(s, op, address, number == op->n ? &base : &s->is.r[number])) {
@@ -376,6 +387,9 @@ ACCESSES(LDM)
 ACCESSES(STM)
 {
     uint32_t address = R(n) + words((uint8_t)(op->imm >> 16));
+    if (is_misaligned(s, op)) {
+        return false;
+    }
     for (uint32_t left = op->imm & 0xFFFF; left; left &= left - 1, address += 4) {
         if (!store_word(s, op, address, s->is.r[__builtin_ctz(left)])) {
             return false;

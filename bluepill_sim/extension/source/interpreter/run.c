@@ -7,7 +7,7 @@ struct interpreter *interpreter_new(void)
 {
     struct interpreter *s = calloc(1, sizeof *s);
     if (s != NULL) {
-        s->is.z = s->is.is_thumb = 1;
+        s->is.nz = s->is.is_thumb = 1;
     }
     return s;
 }
@@ -48,5 +48,11 @@ int interpreter_emu_stop(void *user)
 
 /* Has the owner told where it keeps the time, the block that runs, and the rows of the last blocks. */
 void interpreter_set_clock(struct interpreter *s, const struct clock *clock) { s->clock = *clock; }
+
+void interpreter_set_trap(struct interpreter *s, void (*trapped)(void *, bool, uint32_t, uint32_t), void *user)
+{
+    s->trapped = trapped;
+    s->trap_user = user;
+}
 
 void interpreter_set_noted(struct interpreter *s, uint32_t *noted) { s->noted = noted; }

@@ -37,13 +37,12 @@ static uint32_t *stack_pointer(struct interpreter *s, bool is_process)
 uint32_t interpreter_flags(const struct interpreter *s)
 {
     const struct registers *is = &s->is;
-    return (is->n & 1u << 31) | (uint32_t)(is->z == 0) << 30 | is->c << 29 | is->v >> 31 << 28 | is->q << 27;
+    return (uint32_t)(is->nz < 0) << 31 | (uint32_t)((uint32_t)is->nz == 0) << 30 | is->c << 29 | is->v >> 31 << 28 | is->q << 27;
 }
 
 void interpreter_set_flags(struct interpreter *s, uint32_t bits)
 {
-    s->is.n = bits & 1u << 31;
-    s->is.z = !(bits >> 30 & 1);
+    s->is.nz = (bits >> 31 ? INT64_MIN : 0) | !(bits >> 30 & 1);
     s->is.c = bits >> 29 & 1;
     s->is.v = bits << 3;
     s->is.q = bits >> 27 & 1;

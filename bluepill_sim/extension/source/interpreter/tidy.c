@@ -1,0 +1,120 @@
+/* Makes a block's micro-operations fewer: flags that the block itself overwrites before anything can see them are not set,
+ * and pairs that are common are run by one piece of code.
+ *
+ * Flags are seen by branches, skips and special registers, at a block's end, and wherever a run may end inside the block:
+ * at accesses and hooks. Source of the pairs: counted over the programs of tools/bench and the example programs.
+ */
+#include "lower.h"
+
+enum { NZ = 1, CARRY = 2, OVERFLOW = 4, ALL_FLAGS = 7 };
+enum { BY_SHIFT = 32 };
+
+/* What a micro-operation does with flags, and what does the same without setting any. */
+struct effect {
+    enum micro number, plain;
+    uint8_t sets, reads, may_set; /* `may_set`: sometimes, beside what it always sets */
+};
+
+#define LOGICAL(name) {OP_##name##_IS, OP_##name##_I, NZ, 0, 0}, {OP_##name##_RS, OP_##name##_R, NZ, 0, 0},
+#define ARITHMETIC(name)                                                                                                \
+    {OP_##name##_IS, OP_##name##_I, ALL_FLAGS, 0, 0}, {OP_##name##_RS, OP_##name##_R, ALL_FLAGS, 0, 0},
+#define WITH_CARRY(name)                                                                                                \
+    {OP_##name##_IS, OP_##name##_I, ALL_FLAGS, CARRY, 0}, {OP_##name##_RS, OP_##name##_R, ALL_FLAGS, CARRY, 0},         \
+        {OP_##name##_I, OP_##name##_I, 0, CARRY, 0}, {OP_##name##_R, OP_##name##_R, 0, CARRY, 0},
+#define ONLY_FLAGS(name, flags) {OP_##name##_I, OP_NOP, flags, 0, 0}, {OP_##name##_R, OP_NOP, flags, 0, 0},
+#define SHIFT(name)                                                                                                     \
+    {OP_##name##_IC, OP_##name##_I, CARRY, 0, 0}, {OP_##name##_IS, OP_##name##_I, NZ | CARRY, 0, 0},                    \
+        {OP_##name##_RS, OP_##name##_R, NZ, 0, CARRY},
+
+static const struct effect effects[] = {
+    LOGICAL(MOV) LOGICAL(AND) LOGICAL(BIC) LOGICAL(ORR) LOGICAL(ORN) LOGICAL(EOR)
+    ARITHMETIC(ADD) ARITHMETIC(SUB) ARITHMETIC(RSB) WITH_CARRY(ADC) WITH_CARRY(SBC)
+    ONLY_FLAGS(TST, NZ) ONLY_FLAGS(TEQ, NZ) ONLY_FLAGS(CMP, ALL_FLAGS) ONLY_FLAGS(CMN, ALL_FLAGS)
+    SHIFT(LSL) SHIFT(LSR) SHIFT(ASR)
+    {OP_MVN_RS, OP_MVN_R, NZ, 0, 0}, {OP_MUL_S, OP_MUL, NZ, 0, 0}, {OP_SET_C, OP_NOP, CARRY, 0, 0},
+    {OP_ROR_IC, OP_ROR_I, CARRY, 0, 0}, {OP_ROR_RS, OP_ROR_R, NZ, 0, CARRY},
+    {OP_RRX_IC, OP_RRX_I, CARRY, CARRY, 0}, {OP_RRX_I, OP_RRX_I, 0, CARRY, 0},
+};
+
+static const struct effect *effect_of(enum micro number)
+{
+    for (size_t n = 0; n < sizeof effects / sizeof effects[0]; ++n) {
+        if (effects[n].number == number) {
+            return &effects[n];
+        }
+    }
+    return NULL;
+}
+
+/* Whether flags are seen there, whatever they are. */
+static bool sees_flags(enum micro number)
+{
+    return number >= OP_LDR_I || number == OP_MRS || number == OP_MSR;
+}
+
+static void leave_flags_alone(struct builder *to)
+{
+    uint32_t seen = ALL_FLAGS;
+    for (uint32_t n = to->count; n-- > 0;) {
+        struct op *op = &to->ops[n];
+        const struct effect *effect = effect_of(op->number);
+        if (effect == NULL) {
+            seen = sees_flags(op->number) ? ALL_FLAGS : seen;
+            continue;
+        }
+        const bool is_whole = op->imm < BY_SHIFT || effect->plain < OP_LSL_I || effect->plain > OP_ASR_I;
+        if (!(seen & (uint32_t)(effect->sets | effect->may_set)) && is_whole) {
+            op->number = effect->plain;
+        } else {
+            seen &= ~(uint32_t)effect->sets;
+        }
+        seen |= effect->reads;
+    }
+}
+
+/* Takes out what does nothing; where something may be skipped, the counts of that stay as they are. */
+static void take_out_nothing(struct builder *to)
+{
+    uint32_t kept = 0;
+    for (uint32_t n = 0; n < to->count; ++n) {
+        if (to->ops[n].number >= OP_SKIP_EQ && to->ops[n].number <= OP_SKIP_LE) {
+            return;
+        }
+    }
+    for (uint32_t n = 0; n < to->count; ++n) {
+        if (to->ops[n].number != OP_NOP) {
+            to->ops[kept++] = to->ops[n];
+        }
+    }
+    to->count = kept;
+}
+
+#define ROW(first, second) {OP_##first, OP_##second, PAIR(first, second)},
+static const struct pair {
+    uint16_t first, second, number;
+} pairs[] = {PAIRS(ROW) BRANCHING_PAIRS(ROW)};
+
+/* The number of the code that runs a micro-operation, and the one behind it where they are a pair. */
+static uint32_t code_of(const struct op *op, bool is_last)
+{
+    for (size_t n = 0; n < sizeof pairs / sizeof pairs[0] && !is_last; ++n) {
+        if (pairs[n].first == op[0].number && pairs[n].second == op[1].number) {
+            return pairs[n].number;
+        }
+    }
+    return op->number;
+}
+
+/* Tidies a block, and gives each micro-operation its code. */
+void interpreter_tidy(struct builder *to)
+{
+    leave_flags_alone(to);
+    take_out_nothing(to);
+    const void *const *handlers = interpreter_execute(NULL, NULL);
+    for (uint32_t n = 0; n < to->count; ++n) {
+        struct op *op = &to->ops[n];
+        const uint32_t code = code_of(op, n + 1 == to->count);
+        op->code = (uint16_t)code;
+        op->handler = handlers == NULL ? NULL : handlers[code];
+    }
+}
