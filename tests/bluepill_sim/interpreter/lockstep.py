@@ -288,11 +288,13 @@ class Lockstep:
 
 
 def is_late(expected: tuple[object, ...], seen: tuple[object, ...]) -> bool:
-    """Tell whether Unicorn has not ended at a failed access inside an IT block, but only behind that."""
+    """Tell whether Unicorn has not ended at a failed access: inside an IT block, or where a store reaches out of memory."""
     late, here = expected[-1], seen[-1]
-    it_state = int(str(seen[19])) & 0x0600_FC00
-    is_ended = isinstance(here, tuple) and isinstance(late, tuple) and bool(here) and here[-1][0] == "failed"
-    return is_ended and bool(it_state) and late[: len(here)] == here  # type: ignore[index,arg-type]  # as above
+    if not isinstance(here, tuple) or not isinstance(late, tuple) or not here or here[-1][0] != "failed":
+        return False
+    is_in_it = bool(int(str(seen[19])) & 0x0600_FC00)
+    is_by_bytes = all(what[0] == "failed" and what[-1] == here[-1][-1] for what in late[len(here) :])
+    return late[: len(here)] == here and (is_in_it or is_by_bytes)
 
 
 def is_astray(seen: tuple[object, ...], case: Case, at: int) -> bool:

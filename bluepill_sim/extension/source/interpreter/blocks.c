@@ -2,7 +2,7 @@
  *
  * Blocks of flash stand in a table; those of other memory, and those that begin inside an IT block or not in Thumb state,
  * in a list. Code in writable memory is compared with what it was each time that its block is entered.
- * Invariant: no link leads to a block of writable memory, to one that was dropped, or that begins inside an IT block.
+ * Invariant: a link leads to a block that the owner knows, and such a one is of flash, in Thumb state, outside IT.
  */
 #include <stdlib.h>
 #include <string.h>
@@ -10,6 +10,7 @@
 #include "interpreter.h"
 
 enum { ALONE_BYTES = 4 };
+#define NEVER_PASSED (UINT64_C(1) << 62)
 
 static struct block **slot(struct interpreter *s, uint32_t address) { return &s->blocks[address >> 1 & (CODE_SLOTS - 1)]; }
 
@@ -35,6 +36,14 @@ static void forget_links(struct interpreter *s)
     }
 }
 
+/* What is not known costs more than any time, so that its end is the owner's. */
+static void forget(struct block *block)
+{
+    block->row = NULL;
+    block->costs[0] = block->costs[1] = NEVER_PASSED;
+    block->links[0] = block->links[1] = NULL;
+}
+
 /* Drops the blocks of which something stands from `first` up to before `end`: they live until no run is in them. */
 void interpreter_drop(struct interpreter *s, uint64_t first, uint64_t end)
 {
@@ -56,8 +65,7 @@ void interpreter_drop(struct interpreter *s, uint64_t first, uint64_t end)
         }
         *at = block->next;
         block->next = s->dropped;
-        block->row = NULL;
-        block->links[0] = block->links[1] = NULL;
+        forget(block);
         s->dropped = block;
         has_dropped = true;
     }
@@ -88,6 +96,7 @@ static struct block *not_fetched(struct interpreter *s, uint32_t address)
 
 static struct block *keep(struct interpreter *s, struct block *block, bool is_writable, const uint8_t *code)
 {
+    forget(block);
     block->is_writable = is_writable;
     if (is_writable && (block->code = malloc(block->end - block->start)) != NULL) {
         memcpy(block->code, code, block->end - block->start);
@@ -167,6 +176,9 @@ void interpreter_know(struct interpreter *s, void *row, uint64_t straight, uint6
 void interpreter_forget_rows(struct interpreter *s)
 {
     for (struct block *block = s->all; block != NULL; block = block->next) {
-        block->row = NULL;
+        forget(block);
+    }
+    for (struct block *block = s->dropped; block != NULL; block = block->next) {
+        forget(block);
     }
 }

@@ -32,35 +32,35 @@ static __attribute__((noinline)) struct block *enter(struct interpreter *s, stru
         if (block == NULL) {
             return NULL;
         }
-        if (from != NULL && !block->is_writable && block->is_thumb && !block->it) {
-            from->links[way] = block;
-        }
-        from = NULL;
         s->has_jumped = 0;
         interpreter_call_block(s, block);
         if (s->stops) {
             return NULL;
         }
         if (!s->has_jumped) {
+            if (from != NULL && block->row != NULL) {
+                from->links[way] = block;
+            }
             s->is.it_state = 0;
             return block;
         }
+        from = NULL;
     } while (true);
 }
 
 /* As the owner would, at the start of a block that takes no attention; false: it has to. */
-static inline bool passes(struct interpreter *s, const struct block *from, unsigned way, const struct block *to)
+static inline __attribute__((always_inline)) bool passes(struct shared *shared, void **row, const struct block *from,
+                                                         unsigned way, const struct block *to)
 {
-    if (UNLIKELY(to == NULL || to->row == NULL || *s->clock.row != from->row)) {
+    if (UNLIKELY(to == NULL)) {
         return false;
     }
-    struct shared *shared = s->clock.shared;
     const uint64_t cycle = shared->cycle + from->costs[way];
     if (UNLIKELY(cycle >= shared->stop_at)) {
         return false;
     }
     shared->cycle = cycle;
-    *s->clock.row = to->row;
+    *row = to->row;
     shared->last[shared->logged++ % LAST_ROWS] = (struct record){cycle, to->start, 0};
     return true;
 }
@@ -81,7 +81,7 @@ static bool returns(struct interpreter *s, uint32_t target)
 static inline struct block *known(const struct interpreter *s, uint32_t address)
 {
     struct block *block = s->blocks[address >> 1 & (CODE_SLOTS - 1)];
-    return block != NULL && block->start == address ? block : NULL;
+    return block != NULL && block->start == address && block->row != NULL ? block : NULL;
 }
 
 /* Ends the run at an instruction, by a number of Unicorn's, or as undefined. */
@@ -114,20 +114,24 @@ static __attribute__((noinline)) void end_by(struct interpreter *s, const struct
 
 #define CODE(number) CODE_AT(number)
 #define HANDLER(name) CODE(OP_##name)
-/* Whether the instruction was done: always, but of accesses. */
+/* Whether the instruction was done, with its operands as they are or as what was done last has left them: always, but of
+ * accesses. */
 #define ALWAYS_DONE(name)                                                                                               \
-    static inline __attribute__((always_inline)) bool is_done_##name(struct interpreter *s, const struct op *op)        \
+    AT_ONCE bool is_done_##name(GIVEN)                                                                                  \
     {                                                                                                                   \
-        do_##name(s, op);                                                                                               \
+        do_##name(s, op, x, y, last);                                                                                   \
         return true;                                                                                                    \
     }
 #define MAY_BE_DONE(name)                                                                                               \
-    static inline __attribute__((always_inline)) bool is_done_##name(struct interpreter *s, const struct op *op)        \
-    {                                                                                                                   \
-        return do_##name(s, op);                                                                                        \
-    }
+    AT_ONCE bool is_done_##name(GIVEN) { return do_##name(s, op, x, y, last); }
+#define DONE_BY_N(name)                                                                                                 \
+    AT_ONCE bool is_done_##name##_BY_N(GIVEN) { return is_done_##name(s, op, *last, y, last); }
+#define DONE_BY_M(name)                                                                                                 \
+    AT_ONCE bool is_done_##name##_BY_M(GIVEN) { return is_done_##name(s, op, x, *last, last); }
 STRAIGHT(ALWAYS_DONE)
 ACCESSING(MAY_BE_DONE)
+CHAINED_BY_N(DONE_BY_N)
+CHAINED_BY_M(DONE_BY_M)
 
 #define GO_ON(count)                                                                                                    \
     do {                                                                                                                \
@@ -137,7 +141,7 @@ ACCESSING(MAY_BE_DONE)
 #define TAKE(way, address)                                                                                              \
     do {                                                                                                                \
         struct block *const to = block->links[way];                                                                     \
-        if (LIKELY(passes(s, block, way, to))) {                                                                        \
+        if (LIKELY(passes(shared, row, block, way, to))) {                                                                        \
             block = to;                                                                                                 \
             op = block->ops;                                                                                            \
             DISPATCH();                                                                                                 \
@@ -155,7 +159,7 @@ ACCESSING(MAY_BE_DONE)
         const uint32_t there = (target);                                                                                \
         const unsigned way = there != block->end;                                                                       \
         struct block *const to = known(s, there);                                                                       \
-        if (LIKELY(passes(s, block, way, to))) {                                                                        \
+        if (LIKELY(passes(shared, row, block, way, to))) {                                                                        \
             block = to;                                                                                                 \
             op = block->ops;                                                                                            \
             DISPATCH();                                                                                                 \
@@ -192,13 +196,15 @@ ACCESSING(MAY_BE_DONE)
     } while (0)
 
 #define DO(name)                                                                                                        \
-    if (UNLIKELY(!is_done_##name(s, op))) {                                                                             \
+    if (UNLIKELY(!is_done_##name(s, op, R(n), R(m), &last))) {                                                                             \
         goto ended;                                                                                                     \
     }
 #define ALONE(name)                                                                                                     \
     HANDLER(name)                                                                                                       \
     DO(name)                                                                                                            \
     GO_ON(1);
+#define ALONE_BY_N(name) ALONE(name##_BY_N)
+#define ALONE_BY_M(name) ALONE(name##_BY_M)
 #define IN_PAIR(first, second)                                                                                          \
     CODE(PAIR(first, second))                                                                                           \
     DO(first)                                                                                                           \
@@ -248,10 +254,13 @@ PLAIN_CODE const void *const *interpreter_execute(struct interpreter *s, struct 
 #define LABEL(number) &&at_##number,
 #define LABELS(number) LABEL(number)
 #define ADDRESS_OF(name) LABELS(OP_##name)
+#define ADDRESS_BY_N(name) LABELS(OP_##name##_BY_N)
+#define ADDRESS_BY_M(name) LABELS(OP_##name##_BY_M)
 #define ADDRESS_OF_PAIR(first, second) LABELS(PAIR(first, second))
     static const void *const handlers[CODE_COUNT] = {
         STRAIGHT(ADDRESS_OF) ACCESSING(ADDRESS_OF) ENDING(ADDRESS_OF)
-        [MICRO_COUNT] = PAIRS(ADDRESS_OF_PAIR) BRANCHING_PAIRS(ADDRESS_OF_PAIR)
+        [MICRO_COUNT] = CHAINED_BY_N(ADDRESS_BY_N) CHAINED_BY_M(ADDRESS_BY_M)
+        PAIRS(ADDRESS_OF_PAIR) BRANCHING_PAIRS(ADDRESS_OF_PAIR)
     };
     if (s == NULL) {
         return handlers;
@@ -261,6 +270,9 @@ PLAIN_CODE const void *const *interpreter_execute(struct interpreter *s, struct 
         return NULL;
     }
 #endif
+    struct shared *const shared = s->clock.shared;
+    void **const row = s->clock.row;
+    uint32_t last = 0; /* what was put into a register last */
     const struct op *op;
     if (block == NULL) {
         goto again;
@@ -274,6 +286,8 @@ dispatch:
 #endif
         STRAIGHT(ALONE)
         ACCESSING(ALONE)
+        CHAINED_BY_N(ALONE_BY_N)
+        CHAINED_BY_M(ALONE_BY_M)
         PAIRS(IN_PAIR)
         BRANCHING_PAIRS(BEFORE_BRANCH)
         BY_CONDITIONS(SKIPS)

@@ -9,7 +9,7 @@
 #include "lower.h"
 
 enum { LSL_TYPE, LSR_TYPE, ASR_TYPE, ROR_TYPE };
-enum way { CONSTANT, OF_REGISTER, WITH_FLAGS };
+enum way { CONSTANT, OF_REGISTER, WITH_FLAGS, SHIFTED_REGISTER = 4 };
 enum { NO_REGISTER = 255 };
 
 struct op *interpreter_emit(struct builder *to, enum micro number, uint32_t d, uint32_t n, uint32_t m, uint32_t imm)
@@ -126,6 +126,10 @@ static enum outcome compare(struct builder *to, enum micro number, const struct 
 
 static enum outcome move(struct builder *to, const struct decoded *one, bool is_constant, uint32_t value)
 {
+    if (!is_constant && value == SHIFTED && to->count && to->ops[to->count - 1].d == SHIFTED && !one->s) {
+        to->ops[to->count - 1].d = (uint8_t)one->d; /* what shifts it may as well put it there */
+        return wrote(to, one->d);
+    }
     reads(to, is_constant ? NO_REGISTER : value, NO_REGISTER);
     emit(to, (is_constant ? OP_MOV_I : OP_MOV_R) + (one->s ? WITH_FLAGS : 0), one->d, 0, is_constant ? 0 : value,
          is_constant ? value : 0);
@@ -149,7 +153,20 @@ struct data_row {
     enum micro number;
     bool is_logical; /* the shifter's carry becomes C */
     bool always_sets;
+    bool shifts; /* without flags, of a shifted register by one micro-operation */
 };
+
+/* A shifted register as operand by the same micro-operation; false: that takes two. */
+static bool shifts_itself(struct builder *to, const struct data_row *row, const struct decoded *one, enum outcome *outcome)
+{
+    if (!row->shifts || one->s || !one->i || one->h == ROR_TYPE) {
+        return false;
+    }
+    reads(to, one->n, one->m);
+    emit(to, row->number + SHIFTED_REGISTER + one->h, one->d, one->n, one->m, one->i);
+    *outcome = wrote(to, one->d);
+    return true;
+}
 
 static enum outcome move_row(struct builder *to, enum micro number, const struct decoded *one, bool is_constant, uint32_t value)
 {
@@ -157,14 +174,14 @@ static enum outcome move_row(struct builder *to, enum micro number, const struct
 }
 
 static const struct data_row data_rows[] = {
-    {TST_I, TST_R, compare, OP_TST_I, true, true},      {TEQ_I, TEQ_R, compare, OP_TEQ_I, true, true},
-    {CMP_I, CMP_R, compare, OP_CMP_I, false, true},     {CMN_I, CMN_R, compare, OP_CMN_I, false, true},
-    {AND_I, AND_R, data, OP_AND_I, true, false},        {BIC_I, BIC_R, data, OP_BIC_I, true, false},
-    {ORR_I, ORR_R, data, OP_ORR_I, true, false},        {ORN_I, ORN_R, data, OP_ORN_I, true, false},
-    {EOR_I, EOR_R, data, OP_EOR_I, true, false},        {ADD_I, ADD_R, data, OP_ADD_I, false, false},
-    {SUB_I, SUB_R, data, OP_SUB_I, false, false},       {RSB_I, RSB_R, data, OP_RSB_I, false, false},
-    {ADC_I, ADC_R, data, OP_ADC_I, false, false},       {SBC_I, SBC_R, data, OP_SBC_I, false, false},
-    {MOV_I, MOV_R, move_row, OP_MOV_I, true, false},    {MVN_I, MVN_R, move_row, OP_MVN_R, true, false},
+    {TST_I, TST_R, compare, OP_TST_I, true, true, false},      {TEQ_I, TEQ_R, compare, OP_TEQ_I, true, true, false},
+    {CMP_I, CMP_R, compare, OP_CMP_I, false, true, false},     {CMN_I, CMN_R, compare, OP_CMN_I, false, true, false},
+    {AND_I, AND_R, data, OP_AND_I, true, false, true},        {BIC_I, BIC_R, data, OP_BIC_I, true, false, true},
+    {ORR_I, ORR_R, data, OP_ORR_I, true, false, true},        {ORN_I, ORN_R, data, OP_ORN_I, true, false, false},
+    {EOR_I, EOR_R, data, OP_EOR_I, true, false, true},        {ADD_I, ADD_R, data, OP_ADD_I, false, false, true},
+    {SUB_I, SUB_R, data, OP_SUB_I, false, false, true},       {RSB_I, RSB_R, data, OP_RSB_I, false, false, true},
+    {ADC_I, ADC_R, data, OP_ADC_I, false, false, false},       {SBC_I, SBC_R, data, OP_SBC_I, false, false, false},
+    {MOV_I, MOV_R, move_row, OP_MOV_I, true, false, false},    {MVN_I, MVN_R, move_row, OP_MVN_R, true, false, false},
 };
 
 /* Whether it is one of them, lowered then. */
@@ -183,6 +200,9 @@ static bool lower_data(struct builder *to, const struct decoded *one, enum outco
             return true;
         }
         if (one->operation == row->with_register) {
+            if (shifts_itself(to, row, one, outcome)) {
+                return true;
+            }
             reads(to, one->m, NO_REGISTER);
             *outcome = row->lower(to, row->number, one, false, shifted(to, one->h, one->i, one->m, sets_carry));
             return true;
@@ -410,7 +430,7 @@ static enum outcome shift(struct builder *to, uint32_t type, const struct decode
     } else if (!to->it) {
         emit(to, with_flags[type], one->d, 0, one->m, one->i ? one->i : 32);
     } else {
-        emit(to, OP_MOV_R, one->d, 0, shifted(to, type, one->i, one->m, false), 0);
+        return move(to, one, false, shifted(to, type, one->i, one->m, false));
     }
     return GOES_ON;
 }

@@ -72,15 +72,19 @@ static void leave_flags_alone(struct builder *to)
     }
 }
 
-/* Takes out what does nothing; where something may be skipped, the counts of that stay as they are. */
+static bool may_skip(const struct builder *to)
+{
+    for (uint32_t n = 0; n < to->count; ++n) {
+        if (to->ops[n].number >= OP_SKIP_EQ && to->ops[n].number <= OP_SKIP_LE) {
+            return true;
+        }
+    }
+    return false;
+}
+
 static void take_out_nothing(struct builder *to)
 {
     uint32_t kept = 0;
-    for (uint32_t n = 0; n < to->count; ++n) {
-        if (to->ops[n].number >= OP_SKIP_EQ && to->ops[n].number <= OP_SKIP_LE) {
-            return;
-        }
-    }
     for (uint32_t n = 0; n < to->count; ++n) {
         if (to->ops[n].number != OP_NOP) {
             to->ops[kept++] = to->ops[n];
@@ -89,32 +93,77 @@ static void take_out_nothing(struct builder *to)
     to->count = kept;
 }
 
+/* Whether it puts what the next one finds as done last into R(d). */
+static bool leaves_result(enum micro number)
+{
+    const bool is_flags = (number >= OP_TST_I && number <= OP_CMN_R) || number == OP_SET_C;
+    const bool is_long = number >= OP_SMULL && number <= OP_UMLAL;
+    const bool is_other = number == OP_NOP || number == OP_ALIGN_SP || number >= OP_MRS;
+    const bool is_load = (number >= OP_LDR_I && number <= OP_LDRSB_R) || number == OP_LDR_LITERAL;
+    return is_load || !(is_flags || is_long || is_other);
+}
+
+#define BY_N_ROW(name) {OP_##name, OP_##name##_BY_N},
+#define BY_M_ROW(name) {OP_##name, OP_##name##_BY_M},
+static const struct chained {
+    uint16_t number, code;
+} by_n[] = {CHAINED_BY_N(BY_N_ROW)}, by_m[] = {CHAINED_BY_M(BY_M_ROW)};
+
+static uint16_t chained(const struct chained *rows, size_t count, uint16_t number)
+{
+    for (size_t n = 0; n < count; ++n) {
+        if (rows[n].number == number) {
+            return rows[n].code;
+        }
+    }
+    return number;
+}
+
+/* The code of a micro-operation behind another one, whose result it may read. */
+static uint16_t code_behind(const struct op *before, const struct op *op)
+{
+    uint16_t code = op->number;
+    if (before != NULL && leaves_result(before->number)) {
+        code = before->d == op->n ? chained(by_n, sizeof by_n / sizeof by_n[0], code) : code;
+        if (code == op->number && before->d == op->m) {
+            code = chained(by_m, sizeof by_m / sizeof by_m[0], code);
+        }
+    }
+    return code;
+}
+
 #define ROW(first, second) {OP_##first, OP_##second, PAIR(first, second)},
 static const struct pair {
     uint16_t first, second, number;
 } pairs[] = {PAIRS(ROW) BRANCHING_PAIRS(ROW)};
 
-/* The number of the code that runs a micro-operation, and the one behind it where they are a pair. */
-static uint32_t code_of(const struct op *op, bool is_last)
+/* The code that runs a micro-operation together with the next one, where there is such. */
+static uint16_t paired(uint16_t first, uint16_t second)
 {
-    for (size_t n = 0; n < sizeof pairs / sizeof pairs[0] && !is_last; ++n) {
-        if (pairs[n].first == op[0].number && pairs[n].second == op[1].number) {
+    for (size_t n = 0; n < sizeof pairs / sizeof pairs[0]; ++n) {
+        if (pairs[n].first == first && pairs[n].second == second) {
             return pairs[n].number;
         }
     }
-    return op->number;
+    return first;
 }
 
-/* Tidies a block, and gives each micro-operation its code. */
+/* Tidies a block, and gives each micro-operation its code. Where something may be skipped, nothing is taken out, since the
+ * skip counts it, and what was done last is not known. */
 void interpreter_tidy(struct builder *to)
 {
+    const bool is_straight = !may_skip(to);
     leave_flags_alone(to);
-    take_out_nothing(to);
+    if (is_straight) {
+        take_out_nothing(to);
+    }
+    for (uint32_t n = 0; n < to->count; ++n) {
+        to->ops[n].code = code_behind(is_straight && n ? &to->ops[n - 1] : NULL, &to->ops[n]);
+    }
     const void *const *handlers = interpreter_execute(NULL, NULL);
     for (uint32_t n = 0; n < to->count; ++n) {
         struct op *op = &to->ops[n];
-        const uint32_t code = code_of(op, n + 1 == to->count);
-        op->code = (uint16_t)code;
-        op->handler = handlers == NULL ? NULL : handlers[code];
+        op->code = n + 1 < to->count ? paired(op->code, op[1].code) : op->code;
+        op->handler = handlers == NULL ? NULL : handlers[op->code];
     }
 }
