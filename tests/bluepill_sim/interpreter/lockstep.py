@@ -288,7 +288,7 @@ class Lockstep:
 
 
 def is_late(expected: tuple[object, ...], seen: tuple[object, ...]) -> bool:
-    """Tell whether Unicorn has not ended at a failed access: in an IT block, or of a store that reaches out of memory."""
+    """Tell whether Unicorn has not ended at a failed access: in an IT block, or of a store that leaves memory."""
     late, here = expected[-1], seen[-1]
     if not isinstance(here, tuple) or not isinstance(late, tuple) or not here or here[-1][0] != "failed":
         return False
