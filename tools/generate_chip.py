@@ -56,9 +56,10 @@ def files() -> dict[Path, str]:
         if peripheral.KIND not in {None, LISTENER} and peripheral not in kinds.setdefault(str(peripheral.KIND), []):
             kinds[str(peripheral.KIND)].append(peripheral)
     taken = frozenset(_fabric_names())
+    if (ROOT / CORE_PAGE).is_file():
+        made[CORE_PAGE] = with_instructions((ROOT / CORE_PAGE).read_text(encoding="utf-8"))
     return made | {HEADERS / f"{kind}.h": registers_header(kind, them, taken) for kind, them in kinds.items()} | {
-        PAGE: page(peripherals()),
-        CORE_PAGE: with_instructions((ROOT / CORE_PAGE).read_text(encoding="utf-8")),
+        PAGE: page(peripherals())
     }  # fmt: skip
 
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.bluepill_sim.interpreter.lockstep import ROWS, RUN_BY_UNICORN, Case, Lockstep, flags_of, made, places
+from tests.bluepill_sim.core.interpreter.lockstep import ROWS, RUN_BY_UNICORN, Case, Lockstep, flags_of, made, places
 
 #: chosen: of each encoding in `make test`; ten thousand of a second's cases each.
 EACH, SEQUENCES = 12, 3000

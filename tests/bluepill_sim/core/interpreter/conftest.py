@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.bluepill_sim.interpreter.lockstep import Lockstep
+from tests.bluepill_sim.core.interpreter.lockstep import Lockstep
 
 
 @pytest.fixture(autouse=True)
