@@ -211,6 +211,21 @@ CHAINED_BY_M(DONE_BY_M)
     ++op;                                                                                                               \
     DO(second)                                                                                                          \
     GO_ON(1);
+#define IN_TRIPLE(first, second, third)                                                                                 \
+    CODE(TRIPLE(first, second, third))                                                                                  \
+    DO(first)                                                                                                           \
+    ++op;                                                                                                               \
+    DO(second)                                                                                                          \
+    ++op;                                                                                                               \
+    DO(third)                                                                                                           \
+    GO_ON(1);
+#define BOTH_BEFORE_BRANCH(first, second, third)                                                                        \
+    CODE(TRIPLE(first, second, third))                                                                                  \
+    DO(first)                                                                                                           \
+    ++op;                                                                                                               \
+    DO(second)                                                                                                          \
+    ++op;                                                                                                               \
+    BRANCH_IF(MEETS_##third);
 #define BEFORE_BRANCH(first, second)                                                                                    \
     CODE(PAIR(first, second))                                                                                           \
     DO(first)                                                                                                           \
@@ -256,11 +271,13 @@ PLAIN_CODE const void *const *interpreter_execute(struct interpreter *s, struct 
 #define ADDRESS_OF(name) LABELS(OP_##name)
 #define ADDRESS_BY_N(name) LABELS(OP_##name##_BY_N)
 #define ADDRESS_BY_M(name) LABELS(OP_##name##_BY_M)
+#define ADDRESS_OF_TRIPLE(first, second, third) LABELS(TRIPLE(first, second, third))
 #define ADDRESS_OF_PAIR(first, second) LABELS(PAIR(first, second))
     static const void *const handlers[CODE_COUNT] = {
         STRAIGHT(ADDRESS_OF) ACCESSING(ADDRESS_OF) ENDING(ADDRESS_OF)
         [MICRO_COUNT] = CHAINED_BY_N(ADDRESS_BY_N) CHAINED_BY_M(ADDRESS_BY_M)
         PAIRS(ADDRESS_OF_PAIR) BRANCHING_PAIRS(ADDRESS_OF_PAIR)
+        TRIPLES(ADDRESS_OF_TRIPLE) BRANCHING_TRIPLES(ADDRESS_OF_TRIPLE)
     };
     if (s == NULL) {
         return handlers;
@@ -290,6 +307,8 @@ dispatch:
         CHAINED_BY_M(ALONE_BY_M)
         PAIRS(IN_PAIR)
         BRANCHING_PAIRS(BEFORE_BRANCH)
+        TRIPLES(IN_TRIPLE)
+        BRANCHING_TRIPLES(BOTH_BEFORE_BRANCH)
         BY_CONDITIONS(SKIPS)
         BY_CONDITIONS(BRANCHES)
         HANDLER(HOOK)

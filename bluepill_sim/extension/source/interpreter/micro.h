@@ -2,7 +2,7 @@
 #ifndef BLUEPILL_MICRO_H
 #define BLUEPILL_MICRO_H
 
-#include "pairs.h"
+#include "sequences.h"
 
 /* Four ways each, in this order: of a constant, of a register, and both with flags. */
 #define FOUR_WAYS(X, name) X(name##_I) X(name##_R) X(name##_IS) X(name##_RS)
@@ -53,12 +53,14 @@
 #define BY_M_NUMBER(name) OP_##name##_BY_M,
 #define PAIR(first, second) OP_##first##__##second
 #define PAIR_NUMBER(first, second) PAIR(first, second),
-/* Chained ones and pairs are numbers of code alone: a micro-operation has its own number. */
+#define TRIPLE(first, second, third) OP_##first##__##second##__##third
+#define TRIPLE_NUMBER(first, second, third) TRIPLE(first, second, third),
+/* Chained ones, pairs and triples are numbers of code alone: a micro-operation has its own number. */
 enum micro {
     STRAIGHT(NUMBER) ACCESSING(NUMBER) ENDING(NUMBER) MICRO_COUNT,
     LAST_MICRO = MICRO_COUNT - 1,
     CHAINED_BY_N(BY_N_NUMBER) CHAINED_BY_M(BY_M_NUMBER)
-    PAIRS(PAIR_NUMBER) BRANCHING_PAIRS(PAIR_NUMBER) CODE_COUNT
+    PAIRS(PAIR_NUMBER) BRANCHING_PAIRS(PAIR_NUMBER) TRIPLES(TRIPLE_NUMBER) BRANCHING_TRIPLES(TRIPLE_NUMBER) CODE_COUNT
 };
 
 #endif

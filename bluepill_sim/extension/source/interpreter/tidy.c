@@ -1,8 +1,8 @@
 /* Makes a block's micro-operations fewer: flags that the block itself overwrites before anything can see them are not set,
- * and pairs that are common are run by one piece of code.
+ * and sequences that are common are run by one piece of code.
  *
  * Flags are seen by branches, skips and special registers, at a block's end, and wherever a run may end inside the block:
- * at accesses and hooks. Source of the pairs: counted over the programs of tools/bench and the example programs.
+ * at accesses and hooks. Source of the sequences: counted over the programs of tools/bench and the example programs.
  */
 #include "lower.h"
 
@@ -132,20 +132,27 @@ static uint16_t code_behind(const struct op *before, const struct op *op)
     return code;
 }
 
-#define ROW(first, second) {OP_##first, OP_##second, PAIR(first, second)},
-static const struct pair {
-    uint16_t first, second, number;
-} pairs[] = {PAIRS(ROW) BRANCHING_PAIRS(ROW)};
+enum { ANYTHING = UINT16_MAX };
+#define PAIR_ROW(first, second) {OP_##first, OP_##second, ANYTHING, PAIR(first, second)},
+#define TRIPLE_ROW(first, second, third) {OP_##first, OP_##second, OP_##third, TRIPLE(first, second, third)},
+/* The longer ones first: the first that fits is taken. */
+static const struct sequence {
+    uint16_t first, second, third, code;
+} sequences[] = {
+    BRANCHING_TRIPLES(TRIPLE_ROW) TRIPLES(TRIPLE_ROW) BRANCHING_PAIRS(PAIR_ROW) PAIRS(PAIR_ROW)
+};
 
-/* The code that runs a micro-operation together with the next one, where there is such. */
-static uint16_t paired(uint16_t first, uint16_t second)
+/* The code that runs a micro-operation together with the next ones, where there is such; so many are `left`. */
+static uint16_t code_with_next(const struct op *op, uint32_t left)
 {
-    for (size_t n = 0; n < sizeof pairs / sizeof pairs[0]; ++n) {
-        if (pairs[n].first == first && pairs[n].second == second) {
-            return pairs[n].number;
+    for (size_t n = 0; n < sizeof sequences / sizeof sequences[0] && left > 1; ++n) {
+        const struct sequence *one = &sequences[n];
+        if (one->first == op[0].code && one->second == op[1].code &&
+            (one->third == ANYTHING || (left > 2 && one->third == op[2].code))) {
+            return one->code;
         }
     }
-    return first;
+    return op->code;
 }
 
 /* Tidies a block, and gives each micro-operation its code. Where something may be skipped, nothing is taken out, since the
@@ -163,7 +170,7 @@ void interpreter_tidy(struct builder *to)
     const void *const *handlers = interpreter_execute(NULL, NULL);
     for (uint32_t n = 0; n < to->count; ++n) {
         struct op *op = &to->ops[n];
-        op->code = n + 1 < to->count ? paired(op->code, op[1].code) : op->code;
+        op->code = code_with_next(op, to->count - n);
         op->handler = handlers == NULL ? NULL : handlers[op->code];
     }
 }
