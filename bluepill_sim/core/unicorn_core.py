@@ -85,6 +85,8 @@ ReadAccess = Callable[[int, int], int]
 WriteAccess = Callable[[int, int, int], None]
 #: Takes (address, size, value) written to read-only memory; False refuses it.
 WriteToReadOnly = Callable[[int, int, int], bool]
+#: Why the registers of another library's core are refused.
+ANOTHER_CORE = "the state is of another core: P2OS_CORE chooses it"
 #: All registers: the bits of their memory that differ from a new core's.
 CoreContext = bytes
 
@@ -353,6 +355,8 @@ class UnicornCore(Stateful):
 
     @context.setter
     def context(self, context: CoreContext) -> None:
+        if len(context) != self._context_bytes:
+            raise ValueError(ANOTHER_CORE)
         words = int.from_bytes(context, sys.byteorder) ^ self._new
         data = words.to_bytes(self._context_bytes, sys.byteorder)
         ctypes.memmove(self._context + _CONTEXT_HEADER_BYTES, data, len(data))

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from typing import Any, ClassVar
 
 from bluepill_sim.core.unicorn_core import (
+    ANOTHER_CORE,
     PROTECTION_OF,
     CoreContext,
     RawRead,
@@ -140,7 +141,7 @@ class InterpreterCore(UnicornCore):
     @context.setter
     def context(self, context: CoreContext) -> None:
         if len(context) != library().interpreter_context_bytes():
-            raise ValueError("the state is of another core: P2OS_CORE chooses it")
+            raise ValueError(ANOTHER_CORE)
         library().interpreter_restore(self._handle, ctypes.c_char_p(context))
 
 

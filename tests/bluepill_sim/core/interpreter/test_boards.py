@@ -96,9 +96,10 @@ def test_a_snapshot_goes_on_as_the_run_that_it_is_of(make: MakeBoard) -> None:
     assert live(one, steps[10:]) == live(other, steps[10:])
 
 
-def test_a_snapshot_of_another_core_is_refused(make: MakeBoard) -> None:
+@pytest.mark.parametrize(("core", "other"), [CORES, CORES[::-1]])
+def test_a_snapshot_of_another_core_is_refused(make: MakeBoard, core: str, other: str) -> None:
     with pytest.raises(ValueError, match="the state is of another core: P2OS_CORE chooses it"):
-        make("dodge", "own").restore(make("dodge", "native").snapshot())
+        make("dodge", core).restore(make("dodge", other).snapshot())
 
 
 @pytest.mark.slow  # 1 s
