@@ -3,6 +3,12 @@
 #ifndef BLUEPILL_SEQUENCES_H
 #define BLUEPILL_SEQUENCES_H
 
+#if defined(INTERPRETER_PORTABLE) /* a switch gains little by them, and takes a compiler long */
+#define PAIRS(X)
+#define TRIPLES(X)
+#define BRANCHING_PAIRS(X)
+#define BRANCHING_TRIPLES(X)
+#else
 #define PAIRS(X)                                                                                                        \
     X(ADD_I, CMP_I_BY_N) X(ADD_I, CMP_R_BY_N) X(ADD_I, LDR_LITERAL) X(ADD_I, MOV_R) X(ADD_I, MOV_R_BY_M)                \
     X(ADD_IS, STR_I) X(ADD_IS_BY_N, LDR_LITERAL) X(ADD_IS_BY_N, STR_I) X(ADD_IS_BY_N, UXTB_BY_M)                        \
@@ -46,5 +52,7 @@
     X(CMP_I_BY_N, MOV_R, B_NE) X(CMP_R_BY_N, ADD_R, B_NE) X(LDR_I, CMP_R_BY_M, B_LT) X(LDR_I, LSL_IS_BY_M, B_PL)        \
     X(LDR_I_BY_N, LSL_IS_BY_M, B_PL) X(LDR_LITERAL, CMP_R_BY_M, B_CC) X(SET_C, TST_I, B_EQ) X(STRB_I, ADD_I, B_NE)      \
     X(STRB_I, LSR_I, B_NE) X(STR_I, ADD_I, B_EQ) X(STR_I, ADD_I, B_NE) X(SUB_IS, EOR_LSR, B_NE)
+
+#endif
 
 #endif

@@ -140,6 +140,7 @@ static const struct sequence {
     uint16_t first, second, third, code;
 } sequences[] = {
     BRANCHING_TRIPLES(TRIPLE_ROW) TRIPLES(TRIPLE_ROW) BRANCHING_PAIRS(PAIR_ROW) PAIRS(PAIR_ROW)
+    {ANYTHING, ANYTHING, ANYTHING, 0}, /* of no micro-operation: there may be no other */
 };
 
 /* The code that runs a micro-operation together with the next ones, where there is such; so many are `left`. */

@@ -90,6 +90,22 @@ def test_a_condition_is_met_by_the_same_flags(lockstep: Lockstep, condition: int
     assert_same(lockstep, cases)
 
 
+def test_shifts_at_their_bounds_carry_what_they_carry_on_unicorn(lockstep: Lockstep) -> None:
+    by_register = (0x4088, 0x40C8, 0x4108, 0x41C8, 0xFA10_F001, 0xFA30_F001, 0xFA50_F001, 0xFA70_F001)
+    by_constant = (0x07C8, 0x0048, 0x0808, 0x0FC8, 0x0848, 0x1008, 0x17C8, 0xEA5F_0031, 0xEA5F_70F1)
+    values = (1, 0x8000_0000, 0x7FFF_FFFF, 0xFFFF_FFFF, 0x4000_0002)
+    amounts = (0, 1, 31, 32, 33, 64, 255, 256)
+    cases = [
+        Case((word,), (value, amount, *(0,) * 11, SP, 0), flags << 27)
+        for word in by_register
+        for value in values
+        for amount in amounts
+        for flags in (0, 4)
+    ]
+    cases += [Case((word,), (0, value, *(0,) * 11, SP, 0), 4 << 27) for word in by_constant for value in values]
+    assert_same(lockstep, cases)
+
+
 @pytest.mark.soak
 def test_a_million_cases_do_what_they_do_on_unicorn(lockstep: Lockstep) -> None:
     seed = random.SystemRandom().getrandbits(32)
