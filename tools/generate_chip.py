@@ -1,6 +1,7 @@
 """Write what C and docs take from declarations in Python: shared structs, and the registers of each peripheral.
 
-From `extension/layout.py`: `source/fabric/layout.h`. From `REGISTERS` and its neighbours of each peripheral on the
+From `extension/layout.py`: `source/fabric/layout.h`. From `extension/encodings.py`: `source/interpreter/encodings.h`,
+and the table of instructions in `docs/core.md`. From `REGISTERS` and its neighbours of each peripheral on the
 chip's page: `source/registers/KIND.h` of each kind of device in C, and `docs/registers.md`.
 A test holds the committed files to what comes out here; a file that is no longer made is removed.
 Usage: python -m tools.generate_chip
@@ -16,6 +17,8 @@ from itertools import groupby
 from pathlib import Path
 from textwrap import wrap
 
+from bluepill_sim.core.block_cost import CYCLES, REFILL
+from bluepill_sim.extension.encodings import NARROW, UNDEFINED, WIDE, Encoding, Kind
 from bluepill_sim.extension.layout import header
 from bluepill_sim.fabric.registers import LISTENER, BitField, Peripheral, Register, fields_of
 from bluepill_sim.stm32f103 import BASES, PERIPHERALS
@@ -23,7 +26,9 @@ from bluepill_sim.stm32f103 import BASES, PERIPHERALS
 ROOT = Path(__file__).resolve().parents[1]
 SOURCE = Path("bluepill_sim/extension/source")
 HEADERS = SOURCE / "registers"
-PAGE = Path("docs/registers.md")
+PAGE, CORE_PAGE = Path("docs/registers.md"), Path("docs/core.md")
+#: What stands around the table of instructions there.
+_FROM, _TO = "<!-- instructions: made by tools.generate_chip -->", "<!-- end of instructions -->"
 #: Registers alike that are more than these are named by the first alone, in C.
 _MOST_ALIKE = 32
 _WIDTH = 118
@@ -45,12 +50,14 @@ class _Name:
 
 def files() -> dict[Path, str]:
     """Return each file that is made, below the root of the repository, and its text."""
-    made = {SOURCE / "fabric" / "layout.h": header()}
+    made = {SOURCE / "fabric" / "layout.h": header(), SOURCE / "interpreter" / "encodings.h": encodings_header()}
     kinds: dict[str, list[type[Peripheral]]] = {}
     for peripheral, _ in peripherals():
         if peripheral.KIND not in {None, LISTENER} and peripheral not in kinds.setdefault(str(peripheral.KIND), []):
             kinds[str(peripheral.KIND)].append(peripheral)
     taken = frozenset(_fabric_names())
+    if (ROOT / CORE_PAGE).is_file():
+        made[CORE_PAGE] = with_instructions((ROOT / CORE_PAGE).read_text(encoding="utf-8"))
     return made | {HEADERS / f"{kind}.h": registers_header(kind, them, taken) for kind, them in kinds.items()} | {
         PAGE: page(peripherals())
     }  # fmt: skip
@@ -170,6 +177,85 @@ def _fabric_names() -> Iterator[str]:
     for body in re.findall(r"\benum\b\s*\w*\s*\{(.*?)\}", text, flags=re.DOTALL):
         yield from re.findall(r"(?:^|,)\s*([A-Z]\w*)", body)
     yield from re.findall(r"#define (\w+)", text + header())
+
+
+# Instructions.
+
+
+def encodings_header() -> str:
+    """Return the header of all encodings: bits, instruction and form of each, and how each form is taken apart."""
+    rows = (*NARROW, *WIDE)
+    names = [name for name in dict.fromkeys(row.operation for row in rows) if name != UNDEFINED]
+    forms = list(dict.fromkeys(_extraction(row) for row in rows))
+    lines = [
+        f"/* {SOURCE / 'interpreter' / 'encodings.h'}: every encoding; made from extension/encodings.py. */",
+        "#ifndef BLUEPILL_ENCODINGS_H",
+        "#define BLUEPILL_ENCODINGS_H",
+        "",
+        "#include <stdint.h>",
+        "",
+        *wrap(f"enum operation {{ {UNDEFINED}, {', '.join(names)} }};", _WIDTH, subsequent_indent=" " * 4),
+        "",
+        "struct encoding {",
+        "    uint32_t mask, value;",
+        "    uint8_t operation, form;",
+        "};",
+        "",
+        "/* Takes an instruction apart into its fields; `to` is a pointer to a struct that has them. */",
+        "#define extract(form, word, to) \\",
+        "    do { \\",
+        "        switch (form) { \\",
+        *(f"        case {number}: {text}break; \\" for number, text in enumerate(forms)),
+        "        default: break; \\",
+        "        } \\",
+        "    } while (0)",
+    ]
+    for name, table in (("narrow", NARROW), ("wide", WIDE)):
+        lines += ["", f"static const struct encoding {name}[] = {{"]
+        lines += [
+            f"    {{{row.mask:#x}, {row.value:#x}, {row.operation}, {forms.index(_extraction(row))}}}," for row in table
+        ]
+        lines += ["};"]
+    return "\n".join([*lines, "", "#endif", ""])
+
+
+def _extraction(row: Encoding) -> str:
+    """Return the statements that take an instruction apart."""
+    text = ""
+    for letter, runs in row.fields.items():
+        parts, above = [], 0
+        for low, bits in reversed(runs):
+            shifted = f"(word) >> {low}" if low else "(word)"
+            part = f"{shifted} & {(1 << bits) - 1:#x}"
+            parts.append(f"({part}) << {above}" if above else f"({part})" if len(runs) > 1 else part)
+            above += bits
+        text += f"(to)->{letter} = {' | '.join(parts)}; "
+    return text
+
+
+def with_instructions(text: str) -> str:
+    """Return the page of the core with the table of instructions as it is."""
+    before, _, rest = text.partition(_FROM)
+    _, _, after = rest.partition(_TO)
+    table = ["| instruction | bits | cycles |", "| --- | --- | --- |"]
+    for row in (*NARROW, *WIDE):
+        if row.operation != UNDEFINED:
+            syntax = re.sub(r"<(\w)>", lambda found: f"R{found[1]}", row.syntax)
+            table.append(f"| {syntax.replace('|', ' ')} | `{_drawn(row)}` | {_cycles(row.kind)} |")
+    return "\n".join([f"{before}{_FROM}", *table, f"{_TO}{after}"]) if _FROM in text else text
+
+
+def _drawn(row: Encoding) -> str:
+    bits = row.pattern.replace(" ", "")
+    return " ".join(bits[at : at + 16] for at in range(0, len(bits), 16))
+
+
+def _cycles(kind: Kind) -> str:
+    refill = REFILL.get(kind)
+    by_register = kind in {Kind.LOAD_MULTIPLE, Kind.STORE_MULTIPLE}
+    count = 2 if kind in {Kind.LOAD_DUAL, Kind.STORE_DUAL, Kind.TABLE_BRANCH} else 0
+    text = f"{CYCLES[kind] + count}{' + registers' if by_register else ''}"
+    return text if refill is None else f"{text}, + {refill} where it branches"
 
 
 # The page.

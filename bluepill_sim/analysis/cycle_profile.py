@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 
 from bluepill_sim.core.nvic import exception_name
 from bluepill_sim.core.processor import ENTRY_CYCLES, EXIT_CYCLES
-from bluepill_sim.core.thumb import Kind
+from bluepill_sim.extension.encodings import Kind
 from bluepill_sim.program.functions import FunctionTable
 from bluepill_sim.program.static_code import StaticBlock, StaticCode
 

@@ -18,7 +18,8 @@ and the prefetch setting, and on nothing else.
 from dataclasses import dataclass, field
 from functools import lru_cache
 
-from bluepill_sim.core.thumb import Instruction, Kind, decode_all
+from bluepill_sim.core.thumb import Instruction, decode_all
+from bluepill_sim.extension.encodings import Kind
 
 #: TRM table 18-1: cycles without pipeline refill and per-register cycles.
 CYCLES = {

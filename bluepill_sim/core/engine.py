@@ -42,7 +42,6 @@ from bluepill_sim.core.debugging.debug_unit import DebugUnit, Watchpoint
 from bluepill_sim.core.debugging.flash_patch import FlashPatch, View
 from bluepill_sim.core.halts import DEBUG_HALTS, Halt, HaltKind
 from bluepill_sim.core.recorder import BLOCK, BlockLog, BlockRecorder, KeptRows, LastRows
-from bluepill_sim.core.thumb import Kind
 from bluepill_sim.core.unicorn_core import (
     FETCH_ACCESS,
     FETCH_PROTECTED,
@@ -60,6 +59,7 @@ from bluepill_sim.core.unicorn_core import (
     WriteToReadOnly,
     io_callbacks,
 )
+from bluepill_sim.extension.encodings import Kind
 from bluepill_sim.extension.layout import SHARED, VIEW_BYTES, VIEWS_BASE, VIEWS_BYTES, structure
 from bluepill_sim.extension.library import library
 from bluepill_sim.extension.windows import NO_TIME
@@ -131,7 +131,7 @@ class Engine(Stateful):
     )  # fmt: skip
 
     def __init__(self, measure: Measure) -> None:
-        self._core = UnicornCore(self._fail)
+        self._core = self._make_core()
         self._make_state()
         self.registers = self._core.registers
         #: Time of the present boundary, or of the start of the running block, in cycles.
@@ -195,6 +195,10 @@ class Engine(Stateful):
         self._block_hook = 0
         self._install_hooks()
         self._bad_access_hook = self._core.on_bad_access(self._bad_access)
+
+    def _make_core(self) -> UnicornCore:
+        """Make what runs the instructions."""
+        return UnicornCore(self._fail)
 
     def _make_state(self) -> None:
         """Make what holds the state, for an engine that keeps it elsewhere."""

@@ -25,7 +25,7 @@ import weakref
 from collections.abc import Callable
 from enum import Enum
 from functools import cache
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 from bluepill_sim.extension.layout import NOWHERE
 from simbase.c_library import guarded, loaded
@@ -85,6 +85,8 @@ ReadAccess = Callable[[int, int], int]
 WriteAccess = Callable[[int, int, int], None]
 #: Takes (address, size, value) written to read-only memory; False refuses it.
 WriteToReadOnly = Callable[[int, int, int], bool]
+#: Why the registers of another library's core are refused.
+ANOTHER_CORE = "the state is of another core: P2OS_CORE chooses it"
 #: All registers: the bits of their memory that differ from a new core's.
 CoreContext = bytes
 
@@ -109,6 +111,8 @@ _NATIVE_HOOKS = {
     "bad access": _HOOK_BAD_ACCESS,
 }
 _PROTECTION_READ, _PROTECTION_WRITE, _PROTECTION_EXECUTE = 1, 2, 4
+#: The letters of what may be done with memory.
+PROTECTION_OF = {"r": _PROTECTION_READ, "w": _PROTECTION_WRITE, "x": _PROTECTION_EXECUTE}
 #: uc_ctl numbers: item | argument count << 26 | direction (write = 1) << 30.
 _CONTROL_EXITS = 4 | 1 << 26 | 1 << 30
 _CONTROL_MODEL = 7 | 1 << 26 | 1 << 30
@@ -167,6 +171,9 @@ class UnicornCore(Stateful):
     """
 
     STATE = ("context",)
+    #: The native core's function that is called before each block, and whether it learns the PC of an access to I/O.
+    BLOCK_HOOK: ClassVar[str] = "core_on_block"
+    TELLS_PC: ClassVar[bool] = False
     #: What the library has pointers to.
     DERIVED = ("_keep", "_buffers", "_sinks")
 
@@ -199,6 +206,9 @@ class UnicornCore(Stateful):
         self._sinks: dict[int, object] = {}
         weakref.finalize(self, _close, library, self._handle, self._context, self._buffers)
         self.registers = RegisterFile(library, self._handle)
+        self._map_scratch()
+
+    def _map_scratch(self) -> None:
         scratch = ctypes.create_string_buffer(_SCRATCH_CODE, _SCRATCH_BYTES)
         #: Where the scratch page is: first address, address after, place in the host's memory.
         self.scratch = SCRATCH_BASE, SCRATCH_BASE + _SCRATCH_BYTES, ctypes.addressof(scratch)
@@ -223,26 +233,27 @@ class UnicornCore(Stateful):
 
     def map_memory(self, address: int, buffer: "ctypes.Array[ctypes.c_char]", protection: str) -> None:
         """Map a buffer; `protection` is made of the letters r, w and x."""
-        letters = {"r": _PROTECTION_READ, "w": _PROTECTION_WRITE, "x": _PROTECTION_EXECUTE}
-        bits = sum(letters[letter] for letter in protection)
+        bits = sum(PROTECTION_OF[letter] for letter in protection)
         self._buffers.append(buffer)
-        self._check(
-            self._library.uc_mem_map_ptr(self._handle, address, len(buffer), bits, ctypes.addressof(buffer)),
-            f"map {address:#010x}",
-        )
+        self._map(address, len(buffer), bits, ctypes.addressof(buffer))
+
+    def _map(self, address: int, size: int, bits: int, at: int) -> None:
+        self._check(self._library.uc_mem_map_ptr(self._handle, address, size, bits, at), f"map {address:#010x}")
+
+    def _unmap(self, address: int, size: int) -> None:
+        self._check(self._library.uc_mem_unmap(self._handle, address, size), f"unmap {address:#010x}")
 
     def add_sink(self, address: int) -> None:
         """Have writes to the page of an address, where nothing is, go nowhere, until `remove_sinks`."""
         page = address & ~(_PAGE_BYTES - 1)
         buffer = ctypes.create_string_buffer(_PAGE_BYTES)
         self._sinks[page] = buffer
-        bits, at = _PROTECTION_READ | _PROTECTION_WRITE, ctypes.addressof(buffer)
-        self._check(self._library.uc_mem_map_ptr(self._handle, page, _PAGE_BYTES, bits, at), f"map {page:#010x}")
+        self._map(page, _PAGE_BYTES, _PROTECTION_READ | _PROTECTION_WRITE, ctypes.addressof(buffer))
 
     def remove_sinks(self) -> None:
         """Have nothing be where sinks were; not during a run."""
         for page in self._sinks:
-            self._check(self._library.uc_mem_unmap(self._handle, page, _PAGE_BYTES), f"unmap {page:#010x}")
+            self._unmap(page, _PAGE_BYTES)
         self._sinks.clear()
 
     def allow_execution(self, address: int, size: int) -> None:
@@ -256,13 +267,15 @@ class UnicornCore(Stateful):
         Unicorn brings the PC up to date before each of them, and by that leaves
         ITSTATE as if the IT block had been left there: see `Engine`.
         """
-        reader = self._pointer(READ_CALLBACK(read))
-        writer = self._pointer(WRITE_CALLBACK(write))
+        reader, writer = self._io_pointers(read, write)
         self._check(
             self._library.uc_mmio_map(self._handle, address, size, reader, None, writer, None), f"map {address:#010x}"
         )
         # Only a memory hook makes Unicorn bring the PC up to date before an access; this one does nothing else.
         self.note_pc(address, size)
+
+    def _io_pointers(self, read: RawRead, write: RawWrite) -> tuple[ctypes.c_void_p, ctypes.c_void_p]:
+        return self._pointer(READ_CALLBACK(read)), self._pointer(WRITE_CALLBACK(write))
 
     def drop_code(self, address: int, size: int) -> None:
         """Forget what was translated from bytes that have changed; not during a run."""
@@ -342,6 +355,8 @@ class UnicornCore(Stateful):
 
     @context.setter
     def context(self, context: CoreContext) -> None:
+        if len(context) != self._context_bytes:
+            raise ValueError(ANOTHER_CORE)
         words = int.from_bytes(context, sys.byteorder) ^ self._new
         data = words.to_bytes(self._context_bytes, sys.byteorder)
         ctypes.memmove(self._context + _CONTEXT_HEADER_BYTES, data, len(data))
@@ -393,13 +408,16 @@ class UnicornCore(Stateful):
                 entry.contents.address, entry.contents.may = found
             return found is not None
 
-        self._control(_CONTROL_TLB, ctypes.c_int(_TLB_OF_HOOKS))
+        self._find_pages_by_hooks()
         self._hook(_HOOK_TLB_FILL, self._pointer(PAGE_CALLBACK(self._for_c(fill, False))), 1, 0)
 
     def fill_tlb_native(self, callback: ctypes.c_void_p, user: int) -> None:
         """Have a C function say what may be done with each page, in place of the core's own memory map."""
-        self._control(_CONTROL_TLB, ctypes.c_int(_TLB_OF_HOOKS))
+        self._find_pages_by_hooks()
         self._hook(_HOOK_TLB_FILL, callback, 1, 0, user)
+
+    def _find_pages_by_hooks(self) -> None:
+        self._control(_CONTROL_TLB, ctypes.c_int(_TLB_OF_HOOKS))
 
     def map_io_native(self, address: int, size: int, read: ctypes.c_void_p, write: ctypes.c_void_p, user: int) -> None:
         """Map a region whose accesses are C functions."""

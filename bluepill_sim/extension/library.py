@@ -2,7 +2,8 @@
 
 It is built with the package where there is a C compiler (`p2os doctor` says why it is
 not there), and the emulator needs it: the devices are in it. `P2OS_CORE=python` in the
-environment chooses the Python executor for the core, `native`, the default, the one in C.
+environment chooses the Python executor for the core, `native`, the default, the one in C; both run instructions on
+Unicorn. `own` is the one in C with the interpreter of our own (`source/interpreter/`) in Unicorn's place.
 """
 
 import ctypes
@@ -19,7 +20,7 @@ from simbase.errors import MissingDependencyError
 #: The library, as a module.
 PART = "bluepill_sim._native"
 
-CORE_VARIABLE, CORE_CHOICES = "P2OS_CORE", ("native", "python")
+CORE_VARIABLE, CORE_CHOICES = "P2OS_CORE", ("native", "python", "own")
 
 UNKNOWN_BLOCK = ctypes.CFUNCTYPE(None, ctypes.c_uint32, ctypes.c_uint32)
 READ = ctypes.CFUNCTYPE(ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint32)
@@ -147,6 +148,25 @@ _FUNCTIONS = {
     "fabric_take_stop": "bp",
     "fabric_end_slice": "vp",
     "fabric_has_news": "bp",
+    "interpreter_new": "p",
+    "interpreter_free": "vp",
+    "interpreter_emu_start": "ipqqqz",
+    "interpreter_emu_stop": "ip",
+    "interpreter_reg_read": "ipip",
+    "interpreter_reg_write": "ipip",
+    "interpreter_reg_read_batch": "ipppi",
+    "interpreter_reg_write_batch": "ipppi",
+    "interpreter_map": "ipqzup",
+    "interpreter_map_io": "ipqzpppp",
+    "interpreter_unmap": "ipqz",
+    "interpreter_hook": "zpuppqq",
+    "interpreter_unhook": "vpz",
+    "interpreter_drop": "vpqq",
+    "interpreter_find_pages": "vpb",
+    "interpreter_context_bytes": "z",
+    "interpreter_save": "vpp",
+    "interpreter_restore": "vpp",
+    "core_use_interpreter": "vpp",
     "edge_log_new": "p",
     "edge_log_free": "vp",
     "edge_log_put": "bpquu",
@@ -162,15 +182,28 @@ def is_native_wanted() -> bool:
     """Tell whether engines are to be native.
 
     Raises:
-        BluePillError: `P2OS_CORE` holds neither "native" nor "python".
+        BluePillError: `P2OS_CORE` names no core.
     """
+    return _choice() != "python"
+
+
+def is_interpreter_wanted() -> bool:
+    """Tell whether engines are to run instructions by the interpreter of our own.
+
+    Raises:
+        BluePillError: `P2OS_CORE` names no core.
+    """
+    return _choice() == "own"
+
+
+def _choice() -> str:
     choice = os.environ.get(CORE_VARIABLE, "")
     if choice and choice not in CORE_CHOICES:
         raise BluePillError(
             f"{CORE_VARIABLE}={choice}: no such core",
-            hint=f"{CORE_VARIABLE} is {' or '.join(CORE_CHOICES)}, or not set",
+            hint=f"{CORE_VARIABLE} is {', '.join(CORE_CHOICES[:-1])} or {CORE_CHOICES[-1]}, or not set",
         )
-    return choice != "python"
+    return choice
 
 
 @cache

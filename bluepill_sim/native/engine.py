@@ -23,7 +23,6 @@ from bluepill_sim.core.block_cost import NO_BLOCK, BasicBlock
 from bluepill_sim.core.engine import Engine, StopBefore, Traps
 from bluepill_sim.core.halts import Halt, HaltKind
 from bluepill_sim.core.recorder import RECORD, BlockRecorder, KeptRows
-from bluepill_sim.core.thumb import Kind
 from bluepill_sim.core.unicorn_core import (
     GENERAL,
     SCRATCH_BASE,
@@ -35,6 +34,7 @@ from bluepill_sim.core.unicorn_core import (
     WriteAccess,
     io_callbacks,
 )
+from bluepill_sim.extension.encodings import Kind
 from bluepill_sim.extension.library import (
     ACCESS_CYCLE,
     ACCESS_PC,
@@ -49,9 +49,11 @@ from bluepill_sim.extension.library import (
     Callbacks,
     UnicornApi,
     address_of,
+    is_interpreter_wanted,
     library,
 )
 from bluepill_sim.extension.windows import NO_TIME, field, flag
+from bluepill_sim.native.interpreter_core import InterpreterCore
 from bluepill_sim.native.polling import loop_of
 from bluepill_sim.native.state import (
     BOUNDARY,
@@ -107,6 +109,9 @@ class NativeEngine(Engine):
     stops_after_mask_change = flag("mask_stop", "As of `Engine`.")
     _run_from = field("run_from", "As of `Engine`.")
 
+    def _make_core(self) -> UnicornCore:
+        return InterpreterCore(self._fail) if is_interpreter_wanted() else UnicornCore(self._fail)
+
     def _make_state(self) -> None:
         self._regions: list[tuple[int, int, RawRead, RawWrite]] = []
         self._code: list[tuple[int, int, int]] = []
@@ -137,6 +142,8 @@ class NativeEngine(Engine):
             raise MemoryError("no memory for the native core")
         self.shared = Shared.from_address(state.value)
         self.shared.scratch = SCRATCH_BASE
+        if isinstance(self._core, InterpreterCore):
+            library().core_use_interpreter(state, self._core.handle)
         weakref.finalize(self, library().core_free, state)
 
     @property
@@ -392,7 +399,7 @@ class NativeEngine(Engine):
         core, user = self._core, self._state.value or 0
         self._held = None
         self._native_hooks = (
-            core.hook_native("block", address_of("core_on_block"), user),
+            core.hook_native("block", address_of(core.BLOCK_HOOK), user),
             core.hook_native("interrupt", address_of("core_on_interrupt"), user),
             core.hook_native("invalid", address_of("core_on_invalid"), user),
         )
@@ -443,7 +450,9 @@ class NativeEngine(Engine):
             else (None, 0)
         )
         flags |= _WRITABLE * (compared[0] is not None)
-        if not is_ambiguous(code, start):
+        if self._core.TELLS_PC:
+            flags |= _NOTED
+        elif not is_ambiguous(code, start):
             pass
         elif size <= _WHOLE_BYTES and not may_end_in_it(led) and not _has_like_access_under_it(block, accesses):
             flags |= _AMBIGUOUS
@@ -534,6 +543,10 @@ class NativeTraps(Traps):
     ) -> None:
         super().__init__(core, stop_before, leave_it_block)
         self._state = state
+
+    def needs_hooks(self, block: BasicBlock) -> bool:
+        """As of `Traps`; a core of our own looks itself."""
+        return not self._core.TELLS_PC and super().needs_hooks(block)
 
     def _trap(self, address: int, number: int, kind: HaltKind) -> None:
         if (address, number, kind) in self._trapped:

@@ -9,7 +9,8 @@ Invariant: a block ends at the first instruction that may leave the straight lin
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from bluepill_sim.core.thumb import Instruction, Kind, decode
+from bluepill_sim.core.thumb import Instruction, decode
+from bluepill_sim.extension.encodings import Kind
 from bluepill_sim.memory.arrays import Memory
 
 #: Instructions after which execution may go on elsewhere.

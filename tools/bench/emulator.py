@@ -1,4 +1,4 @@
-"""Print how fast the emulated BluePill is, next to Unicorn without hooks and to QEMU, on this machine.
+"""Print how fast the emulated BluePill is, next to Unicorn without hooks, to QEMU and with `P2OS_CORE=own`.
 
 Each row runs one program of tools/bench/firmware, built here by
 arm-none-eabi-gcc, several times in turn with what it is compared to, and prints
@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from firmware.build import build as build_program
-from measuring import CROSS_COMPILER, RUNS, TIMES_REAL, cpu_s, print_tables, row, several
+from measuring import CROSS_COMPILER, IS_QUICK, RUNS, TIMES_REAL, cpu_s, print_tables, row, several
 
 from bluepill_sim import BluePill
 from bluepill_sim.analysis.probe import Probe
@@ -35,6 +35,9 @@ ROWS = (
 )
 #: Goals of the Python executor: on compute, and when idling.
 PYTHON_GOALS = {"compute": 0.05, "systick": 5.0}
+#: What the interpreter of our own is compared on, with the virtual seconds of a turn; and how many pairs of turns.
+TURNS = {"compute": 1.0, "mix": 1.0, "crc": 1.0, "gpio": 0.3, "bitbang": 0.3, "usart": 1.0, "systick": 20.0}
+PAIRS = 1 if IS_QUICK else 7
 SETTLED_NS = 5_000_000
 QEMU = ("qemu-system-arm", "-M", "netduino2", "-nographic", "-icount", "shift=0", "-monitor", "stdio")
 QEMU += ("-serial", "none")
@@ -162,6 +165,26 @@ def against_unicorn(folder: Path) -> None:
         row(f"compute, to Unicorn {name} at each block", shares[name], "{:.2f}", f"{note}; rounds, paired")
 
 
+def turn(made: BluePill, seconds: float) -> float:
+    """Return the rounds a CPU second of the next virtual seconds; where the program counts none, these."""
+    has_rounds = made.image.symbols.address_of("bench_rounds") is not None
+    return rate(
+        rounds_of(made) if has_rounds else lambda: made.now_ns,
+        lambda: made.advance_to(made.now_ns + round(seconds * 1e9)),
+    )
+
+
+def own_core(folder: Path) -> None:
+    """Each program on the interpreter of our own, in turn with the default core; the first pair warms up."""
+    if library_path() is None:
+        return
+    for name, seconds in TURNS.items():
+        program = build(name, folder)
+        native, own = board(program, "native"), board(program, "own")
+        found = [1 / turn(native, seconds) * turn(own, seconds) for _ in range(PAIRS + 1)][1:]
+        row(f"{name}, P2OS_CORE=own to the default", found, "{:.2f}", "rounds a CPU second, paired")
+
+
 def qemu_cpu_s(program: Path, seconds: float, commands: str, *options: str) -> tuple[float, str]:
     """Return the CPU seconds of QEMU over so long on the wall clock and a few commands, and what it told."""
     before = os.times()
@@ -196,4 +219,4 @@ def against_qemu(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(print_tables(speeds, against_unicorn, against_qemu, needs=(CROSS_COMPILER,)))
+    sys.exit(print_tables(speeds, against_unicorn, own_core, against_qemu, needs=(CROSS_COMPILER,)))

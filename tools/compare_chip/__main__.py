@@ -3,6 +3,7 @@
     python -m tools.compare_chip ../old                      this checkout with another
     python -m tools.compare_chip ../old ../new --quick       shorter runs
     python -m tools.compare_chip ../old --program dodge --generated 0
+    python -m tools.compare_chip . --core own                two cores of one checkout
 
 Each program runs on the old chip once a level, in one call; then on the new one in slices of several lengths, each
 compared with that one run. Where they differ, the old chip runs in those slices too, which tells whether its results
@@ -16,6 +17,7 @@ import tempfile
 import time
 from pathlib import Path
 
+from bluepill_sim.extension.library import CORE_CHOICES
 from tools.compare_chip.comparison import LEVELS, SLICES, ChipComparison
 from tools.compare_chip.programs import chosen, generated, programs_of
 from tools.compare_chip.worker import PACKAGE, Worker
@@ -39,8 +41,9 @@ def main() -> int:
         folder = Path(name)
         old, new = Worker(options.old, BUDGET_S), Worker(options.new, BUDGET_S)
         comparison = ChipComparison(
-            old, new, folder, print, options.seed, tuple(options.slices or SLICES), is_quick=options.quick
-        )
+            old, new, folder, print, options.seed, tuple(options.slices or SLICES), is_quick=options.quick,
+            core=options.core,
+        )  # fmt: skip
         levels = [level for level in LEVELS if not options.level or level.name in options.level]
         same = count = 0
         try:
@@ -81,6 +84,7 @@ def _options() -> argparse.Namespace:
         help="may come several times; default: all",
     )
     parser.add_argument("--program", action="append", metavar="NAME", help="may come several times; default: all")
+    parser.add_argument("--core", default="native", choices=CORE_CHOICES, help="of the new chip (native)")
     parser.add_argument("--quick", action="store_true", help="shorter runs")
     parser.add_argument("--generated", type=int, default=20, metavar="N", help="how many generated programs (20)")
     parser.add_argument("--seed", type=int, default=0, help="of inputs, random slices and generated programs (0)")

@@ -97,6 +97,8 @@ class ChipComparison:
     seed: int = 0
     slices: tuple[int | str, ...] = SLICES
     is_quick: bool = False
+    #: Which core of the new chip stands in for its native one.
+    core: str = "native"
     #: Runs that were compared, those that differ, and those that differ on both chips alike: no difference of the two.
     runs: int = 0
     differing: int = 0
@@ -132,7 +134,9 @@ class ChipComparison:
     def _compare_run(self, run: ComparedRun, reference: "Reference") -> str:
         """Return how a run on the new chip differs from that of the old one; empty where it does not."""
         self.runs += 1
-        new = self._differences(self.new, run, reference)
+        level = run.level
+        other = replace(level, core=self.core) if level.core == "native" else level
+        new = self._differences(self.new, replace(run, level=other), reference)
         if not new:
             return ""
         old = self._differences(self.old, run, reference)

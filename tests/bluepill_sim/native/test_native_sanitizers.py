@@ -50,12 +50,20 @@ def run(*command: str, **environment: str) -> str:
     return done.stdout
 
 
-def test_no_warning_and_no_finding(tmp_path: Path) -> None:
-    library = tmp_path / "core.so"
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Build the library; the interpreter's dispatch by a switch, since all other tests run the other one."""
+    library = tmp_path_factory.mktemp("built") / "core.so"
     run(
         "gcc", "-std=c11", "-O1", "-g1", "-Wall", "-Wextra", "-Wconversion", "-Wno-sign-conversion", "-Werror", "-fPIC",
-        "-shared", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-o", str(library), *map(str, SOURCES),
+        "-shared", "-fsanitize=address,undefined", "-fno-sanitize-recover=all",
+        "-DINTERPRETER_PORTABLE", "-o", str(library), *map(str, SOURCES),
     )  # fmt: skip
+    return library
+
+
+@pytest.mark.parametrize("core", ["native", "own"])
+def test_no_warning_and_no_finding(library: Path, tmp_path: Path, core: str) -> None:
     preload = run("gcc", "-print-file-name=libasan.so").strip()
     if not Path(preload).is_file():
         pytest.skip("the compiler comes without a sanitizer's library")
@@ -69,6 +77,6 @@ def test_no_warning_and_no_finding(tmp_path: Path) -> None:
         str(UNOPTIMISED),
         LD_PRELOAD=preload,
         ASAN_OPTIONS="detect_leaks=0",
-        P2OS_CORE="native",
+        P2OS_CORE=core,
     )
     assert printed.split() == ["NativeEngine"]

@@ -138,6 +138,13 @@ static void find_plain(const struct core *core, struct row *row)
     row->plain_start = is_plain ? row->start : NOWHERE;
 }
 
+static void forget_known(struct core *core)
+{
+    if (core->interpreter != NULL) {
+        interpreter_forget_rows(core->interpreter);
+    }
+}
+
 /* Records from now on, `room` rows before Python is called; 0: no more. Returns false without memory for it. */
 bool core_start_recording(struct core *core, uint32_t room)
 {
@@ -146,6 +153,7 @@ bool core_start_recording(struct core *core, uint32_t room)
     core->record_room = room;
     core->record_count = 0;
     core->shared.is_first = 1;
+    forget_known(core);
     for (struct row *row = core->all; row != NULL; row = row->next) {
         find_plain(core, row);
     }
@@ -222,6 +230,36 @@ void core_on_block(void *unicorn, uint64_t at, uint32_t size, void *user)
     core->shared.last[core->shared.logged++ % LAST_ROWS] = (struct record){cycle, address, 0};
 }
 
+/* The same where the interpreter runs the blocks: it is told of those that it may enter itself. */
+void core_on_known_block(void *interpreter, uint64_t at, uint32_t size, void *user)
+{
+    struct core *core = user;
+    core_on_block(interpreter, at, size, user);
+    struct row *row = core->block;
+    if (row->plain_start == (uint32_t)at) {
+        interpreter_know(interpreter, row, row->passed[0], row->passed[1]);
+    }
+}
+
+/* Before a division by 0, or a transfer of several words that is not aligned. */
+static void on_trap(void *user, bool is_alignment, uint32_t pc, uint32_t value)
+{
+    struct core *core = user;
+    if (is_alignment || core->shared.traps_division) {
+        leave_ahead(core->fabric);
+        core->calls.trapped(is_alignment ? HALT_UNALIGNED : HALT_DIVIDE_BY_ZERO, pc, value);
+    }
+}
+
+/* Has the interpreter run instructions in Unicorn's place. */
+void core_use_interpreter(struct core *core, struct interpreter *interpreter)
+{
+    core->interpreter = interpreter;
+    interpreter_set_clock(interpreter, &(struct clock){&core->shared, (void **)&core->block});
+    interpreter_set_noted(interpreter, &core->noted);
+    interpreter_set_trap(interpreter, on_trap, core);
+}
+
 /* Returns false without memory for it. `instructions` has `count` rows, the costs are those of block_cost.py. */
 bool core_add_row(struct core *core, uint32_t start, uint32_t end, uint32_t straight, uint32_t taken, uint32_t flags,
                   const struct instruction *instructions, uint32_t count, const uint8_t *host, uint32_t compared)
@@ -273,6 +311,7 @@ bool core_set_loop(struct core *core, uint32_t start, const struct loop *loop)
 void core_forget_range(struct core *core, uint32_t first, uint32_t end)
 {
     memset(core->forced, 0, sizeof core->forced);
+    forget_known(core);
     for (struct row **at = &core->all; *at != NULL;) {
         struct row *row = *at;
         if (row->start >= end || row->end <= first) {

@@ -17,6 +17,7 @@
 #include <stdint.h>
 
 #include "../fabric/fabric.h"
+#include "../interpreter/interpreter.h"
 #include "system.h"
 
 #define NEVER (UINT64_C(1) << 62)
@@ -225,6 +226,7 @@ enum { VIEWS = 8 };
 struct core {
     struct shared shared;
     void *unicorn;
+    struct interpreter *interpreter; /* what runs instructions in its place; null: nothing does */
     struct unicorn_api api;
     struct callbacks calls;
     struct row *block;

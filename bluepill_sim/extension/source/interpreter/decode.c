@@ -1,0 +1,105 @@
+/* Decodes a basic block: each instruction by the table of encodings, up to what ends the block.
+ *
+ * A block ends where Unicorn's does: at a branch, at an instruction that ends a run or may change masks or the pipeline,
+ * and before the instruction that would begin in another kilobyte, or reach into it.
+ * Source: ARMv7-M Architecture Reference Manual A5.1 (the first halfword tells the size), A7.3.2 (IT).
+ */
+#include <stdlib.h>
+#include <string.h>
+
+#include "lower.h"
+
+enum { FIRST_WIDE = 0xE800, ARM_STATE_BYTES = 4, ALWAYS = 14, MOST_OPS = PAGE_BYTES / 2 * MOST_OPS_EACH };
+
+static uint32_t halfword(const uint8_t *code) { return code[0] | (uint32_t)code[1] << 8; }
+
+static enum operation find(const struct encoding *rows, size_t count, uint32_t word, struct decoded *one)
+{
+    for (size_t n = 0; n < count; ++n) {
+        if ((word & rows[n].mask) == rows[n].value) {
+            extract(rows[n].form, word, one);
+            return rows[n].operation;
+        }
+    }
+    return UNDEFINED;
+}
+
+static uint8_t advanced(uint32_t it) { return (uint8_t)(it & 7 ? (it & 0xE0) | (it << 1 & 0x1F) : 0); }
+
+/* Adds one instruction; whether the block ends behind it. */
+static enum outcome add(struct interpreter *s, struct builder *to, uint32_t word, bool is_wide)
+{
+    struct decoded one = {0};
+    one.operation = is_wide ? find(wide, sizeof wide / sizeof wide[0], word, &one)
+                            : find(narrow, sizeof narrow / sizeof narrow[0], word, &one);
+    to->after = advanced(to->it);
+    const uint32_t condition = to->it ? to->it >> 4 : ALWAYS;
+    struct op *skip = NULL;
+    const uint32_t before = to->count;
+    if (condition < ALWAYS && one.operation != BKPT) { /* BKPT is never conditional */
+        skip = interpreter_emit(to, OP_SKIP_EQ + condition, 0, 0, 0, 0);
+    }
+    if (interpreter_is_hooked(s, to->pc)) {
+        interpreter_emit(to, OP_HOOK, 0, 0, 0, is_wide ? 4 : 2);
+    }
+    const enum outcome outcome = interpreter_lower(to, &one);
+    if (one.operation == IT) {
+        to->after = (uint8_t)one.i;
+    }
+    if (skip != NULL) {
+        skip->imm = to->count - before - 1;
+        if (outcome == ENDS_BLOCK) {
+            interpreter_emit(to, OP_STRAIGHT_ON, 0, 0, 0, 0);
+        }
+    }
+    return outcome;
+}
+
+/* Whether a block is over before the instruction at `at`: it is in another page, or its second half is. */
+static bool leaves_page(uint32_t page, uint32_t at, const uint8_t *code)
+{
+    const uint32_t in_page = at - page;
+    return in_page >= PAGE_BYTES || (in_page == PAGE_BYTES - 2 && halfword(code) >= FIRST_WIDE);
+}
+
+/* Decodes the block at an address, of which so many bytes are there; null: not even one instruction is. */
+struct block *interpreter_decode(struct interpreter *s, uint32_t address, const uint8_t *code, uint32_t bytes)
+{
+    struct builder to = {.ops = malloc(MOST_OPS * sizeof *to.ops), .pc = address, .it = (uint8_t)s->is.it_state};
+    if (to.ops == NULL) {
+        return NULL;
+    }
+    enum outcome outcome = GOES_ON;
+    uint32_t done = 0;
+    if (!s->is.is_thumb) { /* nothing executes in ARM state: B1.5.6, INVSTATE */
+        interpreter_emit(&to, OP_UDF, 0, 0, 0, 0);
+        done = ARM_STATE_BYTES;
+        outcome = ENDS_BLOCK;
+    }
+    const uint32_t page = address & ~(uint32_t)(PAGE_BYTES - 1);
+    while (outcome == GOES_ON) {
+        const uint32_t first = bytes - done >= 2 ? halfword(code + done) : 0;
+        const bool is_wide = first >= FIRST_WIDE;
+        if (bytes - done < (is_wide ? 4u : 2u)) {
+            break;
+        }
+        to.pc = address + done;
+        to.end = to.pc + (is_wide ? 4 : 2);
+        outcome = add(s, &to, is_wide ? first << 16 | halfword(code + done + 2) : first, is_wide);
+        to.it = to.after;
+        done = to.end - address;
+        if (outcome == GOES_ON && (bytes - done < 2 || leaves_page(page, to.end, code + done))) {
+            interpreter_emit(&to, OP_STRAIGHT_ON, 0, 0, 0, 0);
+            outcome = ENDS_BLOCK;
+        }
+    }
+    interpreter_tidy(&to);
+    struct block *block = to.count ? malloc(sizeof *block + to.count * sizeof *to.ops) : NULL;
+    if (block != NULL) {
+        *block = (struct block){.start = address, .end = address + done, .target = to.target, .it = (uint8_t)s->is.it_state,
+                                .is_thumb = (uint8_t)s->is.is_thumb, .count = to.count};
+        memcpy(block->ops, to.ops, to.count * sizeof *to.ops);
+    }
+    free(to.ops);
+    return block;
+}

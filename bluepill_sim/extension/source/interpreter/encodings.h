@@ -1,0 +1,344 @@
+/* bluepill_sim/extension/source/interpreter/encodings.h: every encoding; made from extension/encodings.py. */
+#ifndef BLUEPILL_ENCODINGS_H
+#define BLUEPILL_ENCODINGS_H
+
+#include <stdint.h>
+
+enum operation { UNDEFINED, MOVS_T2, LSL_T1, LSR_T1, ASR_T1, ADD_R3, SUB_R3, ADD_I3, SUB_I3, MOV_I8, CMP_I8, ADD_I8,
+    SUB_I8, AND_T1, EOR_T1, LSL_RT1, LSR_RT1, ASR_RT1, ADC_T1, SBC_T1, ROR_RT1, TST_T1, RSB_T1, CMP_T1, CMN_T1,
+    ORR_T1, MUL_T1, BIC_T1, MVN_T1, ADD_PC, ADD_T2, MOV_PC, MOV_T1, BX, BLX, LDR_LITERAL_T1, STR_RT1, STRH_RT1,
+    STRB_RT1, LDRSB_RT1, LDR_RT1, LDRH_RT1, LDRB_RT1, LDRSH_RT1, STR_I5, LDR_I5, STRB_I5, LDRB_I5, STRH_I5, LDRH_I5,
+    STR_SP, LDR_SP, ADR_T1, ADD_SP_T1, ADD_SP_T2, SUB_SP_T1, CBZ, CBNZ, SXTH_T1, SXTB_T1, UXTH_T1, UXTB_T1, PUSH, POP,
+    CPS, REV, REV16, REVSH, BKPT, YIELD, WFE, WFI, SEV, NOP, IT, STM_T1, LDM_T1, UDF, SVC, B_T1, B_T2, STM_IA, LDM_IA,
+    STM_DB, LDM_DB, STREX, LDREX, STREXB, STREXH, TBB, TBH, LDREXB, LDREXH, STRD_POST, LDRD_POST, STRD, LDRD, TST_I,
+    TST_R, AND_I, AND_R, BIC_I, BIC_R, MOV_I, MOV_R, ORR_I, ORR_R, MVN_I, MVN_R, ORN_I, ORN_R, TEQ_I, TEQ_R, EOR_I,
+    EOR_R, CMN_I, CMN_R, ADD_I, ADD_R, ADC_I, ADC_R, SBC_I, SBC_R, CMP_I, CMP_R, SUB_I, SUB_R, RSB_I, RSB_R, ADR_ADD,
+    ADR_SUB, ADDW, SUBW, MOVW, MOVT, SSAT, USAT, SBFX, UBFX, BFC, BFI, MSR, CLREX, DSB, DMB, ISB, MRS, B_T3, B_T4, BL,
+    STRB_I, STRBT, STRB_X, STRB_N, STRB_R, STRH_I, STRHT, STRH_X, STRH_N, STRH_R, STR_I, STRT, STR_X, STR_N, STR_R,
+    LDRB_LITERAL, LDRB_I, LDRBT, LDRB_X, LDRB_N, LDRB_R, LDRH_LITERAL, LDRH_I, LDRHT, LDRH_X, LDRH_N, LDRH_R,
+    LDR_LITERAL, LDR_I, LDRT, LDR_X, LDR_N, LDR_R, LDRSB_LITERAL, LDRSB_I, LDRSBT, LDRSB_X, LDRSB_N, LDRSB_R,
+    LDRSH_LITERAL, LDRSH_I, LDRSHT, LDRSH_X, LDRSH_N, LDRSH_R, LSL, LSR, ASR, ROR, SXTH, UXTH, SXTB, UXTB, RBIT, CLZ,
+    MUL, MLA, MLS, SMULL, SDIV, UMULL, UDIV, SMLAL, UMLAL, NO_COPROCESSOR };
+
+struct encoding {
+    uint32_t mask, value;
+    uint8_t operation, form;
+};
+
+/* Takes an instruction apart into its fields; `to` is a pointer to a struct that has them. */
+#define extract(form, word, to) \
+    do { \
+        switch (form) { \
+        case 0: (to)->m = (word) >> 3 & 0x7; (to)->d = (word) & 0x7; break; \
+        case 1: (to)->i = (word) >> 6 & 0x1f; (to)->m = (word) >> 3 & 0x7; (to)->d = (word) & 0x7; break; \
+        case 2: (to)->m = (word) >> 6 & 0x7; (to)->n = (word) >> 3 & 0x7; (to)->d = (word) & 0x7; break; \
+        case 3: (to)->i = (word) >> 6 & 0x7; (to)->n = (word) >> 3 & 0x7; (to)->d = (word) & 0x7; break; \
+        case 4: (to)->d = (word) >> 8 & 0x7; (to)->i = (word) & 0xff; break; \
+        case 5: (to)->n = (word) >> 3 & 0x7; (to)->d = (word) & 0x7; break; \
+        case 6: (to)->m = (word) >> 3 & 0xf; break; \
+        case 7: (to)->d = ((word) & 0x7) | ((word) >> 7 & 0x1) << 3; (to)->m = (word) >> 3 & 0xf; break; \
+        case 8: (to)->t = (word) >> 8 & 0x7; (to)->i = (word) & 0xff; break; \
+        case 9: (to)->m = (word) >> 6 & 0x7; (to)->n = (word) >> 3 & 0x7; (to)->t = (word) & 0x7; break; \
+        case 10: (to)->i = (word) >> 6 & 0x1f; (to)->n = (word) >> 3 & 0x7; (to)->t = (word) & 0x7; break; \
+        case 11: (to)->i = (word) & 0x7f; break; \
+        case 12: (to)->i = ((word) >> 3 & 0x1f) | ((word) >> 9 & 0x1) << 5; (to)->n = (word) & 0x7; break; \
+        case 13: (to)->r = (word) & 0x1ff; break; \
+        case 14: (to)->u = (word) >> 4 & 0x1; (to)->i = (word) & 0x3; break; \
+        case 15: (to)->i = (word) & 0xff; break; \
+        case 16: break; \
+        case 17: (to)->n = (word) >> 8 & 0x7; (to)->r = (word) & 0xff; break; \
+        case 18: (to)->c = (word) >> 8 & 0xf; (to)->i = (word) & 0xff; break; \
+        case 19: (to)->i = (word) & 0x7ff; break; \
+        case 20: (to)->w = (word) >> 21 & 0x1; (to)->n = (word) >> 16 & 0xf; (to)->r = (word) & 0xffff; break; \
+        case 21: (to)->n = (word) >> 16 & 0xf; (to)->t = (word) >> 12 & 0xf; (to)->d = (word) >> 8 & 0xf; (to)->i = (word) & 0xff; break; \
+        case 22: (to)->n = (word) >> 16 & 0xf; (to)->t = (word) >> 12 & 0xf; (to)->i = (word) & 0xff; break; \
+        case 23: (to)->n = (word) >> 16 & 0xf; (to)->t = (word) >> 12 & 0xf; (to)->d = (word) & 0xf; break; \
+        case 24: (to)->n = (word) >> 16 & 0xf; (to)->m = (word) & 0xf; break; \
+        case 25: (to)->n = (word) >> 16 & 0xf; (to)->t = (word) >> 12 & 0xf; break; \
+        case 26: (to)->u = (word) >> 23 & 0x1; (to)->n = (word) >> 16 & 0xf; (to)->t = (word) >> 12 & 0xf; (to)->a = (word) >> 8 & 0xf; (to)->i = (word) & 0xff; break; \
+        case 27: (to)->u = (word) >> 23 & 0x1; (to)->w = (word) >> 21 & 0x1; (to)->n = (word) >> 16 & 0xf; (to)->t = (word) >> 12 & 0xf; (to)->a = (word) >> 8 & 0xf; (to)->i = (word) & 0xff; break; \
+        case 28: (to)->i = ((word) & 0xff) | ((word) >> 12 & 0x7) << 8 | ((word) >> 26 & 0x1) << 11; (to)->n = (word) >> 16 & 0xf; break; \
+        case 29: (to)->n = (word) >> 16 & 0xf; (to)->i = ((word) >> 6 & 0x3) | ((word) >> 12 & 0x7) << 2; (to)->h = (word) >> 4 & 0x3; (to)->m = (word) & 0xf; break; \
+        case 30: (to)->i = ((word) & 0xff) | ((word) >> 12 & 0x7) << 8 | ((word) >> 26 & 0x1) << 11; (to)->s = (word) >> 20 & 0x1; (to)->n = (word) >> 16 & 0xf; (to)->d = (word) >> 8 & 0xf; break; \
+        case 31: (to)->s = (word) >> 20 & 0x1; (to)->n = (word) >> 16 & 0xf; (to)->i = ((word) >> 6 & 0x3) | ((word) >> 12 & 0x7) << 2; (to)->d = (word) >> 8 & 0xf; (to)->h = (word) >> 4 & 0x3; (to)->m = (word) & 0xf; break; \
+        case 32: (to)->i = ((word) & 0xff) | ((word) >> 12 & 0x7) << 8 | ((word) >> 26 & 0x1) << 11; (to)->s = (word) >> 20 & 0x1; (to)->d = (word) >> 8 & 0xf; break; \
+        case 33: (to)->s = (word) >> 20 & 0x1; (to)->i = ((word) >> 6 & 0x3) | ((word) >> 12 & 0x7) << 2; (to)->d = (word) >> 8 & 0xf; (to)->h = (word) >> 4 & 0x3; (to)->m = (word) & 0xf; break; \
+        case 34: (to)->i = ((word) & 0xff) | ((word) >> 12 & 0x7) << 8 | ((word) >> 26 & 0x1) << 11; (to)->d = (word) >> 8 & 0xf; break; \
+        case 35: (to)->i = ((word) & 0xff) | ((word) >> 12 & 0x7) << 8 | ((word) >> 26 & 0x1) << 11; (to)->n = (word) >> 16 & 0xf; (to)->d = (word) >> 8 & 0xf; break; \
+        case 36: (to)->i = ((word) & 0xff) | ((word) >> 12 & 0x7) << 8 | ((word) >> 26 & 0x1) << 11; (to)->j = (word) >> 16 & 0xf; (to)->d = (word) >> 8 & 0xf; break; \
+        case 37: (to)->h = (word) >> 21 & 0x1; (to)->n = (word) >> 16 & 0xf; (to)->i = ((word) >> 6 & 0x3) | ((word) >> 12 & 0x7) << 2; (to)->d = (word) >> 8 & 0xf; (to)->b = (word) & 0x1f; break; \
+        case 38: (to)->n = (word) >> 16 & 0xf; (to)->i = ((word) >> 6 & 0x3) | ((word) >> 12 & 0x7) << 2; (to)->d = (word) >> 8 & 0xf; (to)->b = (word) & 0x1f; break; \
+        case 39: (to)->i = ((word) >> 6 & 0x3) | ((word) >> 12 & 0x7) << 2; (to)->d = (word) >> 8 & 0xf; (to)->b = (word) & 0x1f; break; \
+        case 40: (to)->n = (word) >> 16 & 0xf; (to)->b = (word) >> 10 & 0x3; (to)->i = (word) & 0xff; break; \
+        case 41: (to)->d = (word) >> 8 & 0xf; (to)->i = (word) & 0xff; break; \
+        case 42: (to)->s = (word) >> 26 & 0x1; (to)->c = (word) >> 22 & 0xf; (to)->i = ((word) & 0x7ff) | ((word) >> 16 & 0x3f) << 11; (to)->j = ((word) >> 11 & 0x1) | ((word) >> 13 & 0x1) << 1; break; \
+        case 43: (to)->s = (word) >> 26 & 0x1; (to)->i = ((word) & 0x7ff) | ((word) >> 16 & 0x3ff) << 11; (to)->j = ((word) >> 11 & 0x1) | ((word) >> 13 & 0x1) << 1; break; \
+        case 44: (to)->n = (word) >> 16 & 0xf; (to)->t = (word) >> 12 & 0xf; (to)->i = (word) & 0xfff; break; \
+        case 45: (to)->n = (word) >> 16 & 0xf; (to)->t = (word) >> 12 & 0xf; (to)->p = (word) >> 10 & 0x1; (to)->u = (word) >> 9 & 0x1; (to)->i = (word) & 0xff; break; \
+        case 46: (to)->n = (word) >> 16 & 0xf; (to)->t = (word) >> 12 & 0xf; (to)->i = (word) >> 4 & 0x3; (to)->m = (word) & 0xf; break; \
+        case 47: (to)->n = (word) >> 16 & 0xf; break; \
+        case 48: (to)->u = (word) >> 23 & 0x1; (to)->t = (word) >> 12 & 0xf; (to)->i = (word) & 0xfff; break; \
+        case 49: (to)->s = (word) >> 20 & 0x1; (to)->n = (word) >> 16 & 0xf; (to)->d = (word) >> 8 & 0xf; (to)->m = (word) & 0xf; break; \
+        case 50: (to)->d = (word) >> 8 & 0xf; (to)->i = (word) >> 4 & 0x3; (to)->m = (word) & 0xf; break; \
+        case 51: (to)->d = (word) >> 8 & 0xf; (to)->m = (word) & 0xf; break; \
+        case 52: (to)->n = (word) >> 16 & 0xf; (to)->d = (word) >> 8 & 0xf; (to)->m = (word) & 0xf; break; \
+        case 53: (to)->n = (word) >> 16 & 0xf; (to)->a = (word) >> 12 & 0xf; (to)->d = (word) >> 8 & 0xf; (to)->m = (word) & 0xf; break; \
+        case 54: (to)->n = (word) >> 16 & 0xf; (to)->d = (word) >> 12 & 0xf; (to)->a = (word) >> 8 & 0xf; (to)->m = (word) & 0xf; break; \
+        default: break; \
+        } \
+    } while (0)
+
+static const struct encoding narrow[] = {
+    {0xffc0, 0x0, MOVS_T2, 0},
+    {0xf800, 0x0, LSL_T1, 1},
+    {0xf800, 0x800, LSR_T1, 1},
+    {0xf800, 0x1000, ASR_T1, 1},
+    {0xfe00, 0x1800, ADD_R3, 2},
+    {0xfe00, 0x1a00, SUB_R3, 2},
+    {0xfe00, 0x1c00, ADD_I3, 3},
+    {0xfe00, 0x1e00, SUB_I3, 3},
+    {0xf800, 0x2000, MOV_I8, 4},
+    {0xf800, 0x2800, CMP_I8, 4},
+    {0xf800, 0x3000, ADD_I8, 4},
+    {0xf800, 0x3800, SUB_I8, 4},
+    {0xffc0, 0x4000, AND_T1, 0},
+    {0xffc0, 0x4040, EOR_T1, 0},
+    {0xffc0, 0x4080, LSL_RT1, 0},
+    {0xffc0, 0x40c0, LSR_RT1, 0},
+    {0xffc0, 0x4100, ASR_RT1, 0},
+    {0xffc0, 0x4140, ADC_T1, 0},
+    {0xffc0, 0x4180, SBC_T1, 0},
+    {0xffc0, 0x41c0, ROR_RT1, 0},
+    {0xffc0, 0x4200, TST_T1, 0},
+    {0xffc0, 0x4240, RSB_T1, 5},
+    {0xffc0, 0x4280, CMP_T1, 0},
+    {0xffc0, 0x42c0, CMN_T1, 0},
+    {0xffc0, 0x4300, ORR_T1, 0},
+    {0xffc0, 0x4340, MUL_T1, 0},
+    {0xffc0, 0x4380, BIC_T1, 0},
+    {0xffc0, 0x43c0, MVN_T1, 0},
+    {0xff87, 0x4487, ADD_PC, 6},
+    {0xff00, 0x4400, ADD_T2, 7},
+    {0xff00, 0x4500, CMP_T1, 7},
+    {0xff87, 0x4687, MOV_PC, 6},
+    {0xff00, 0x4600, MOV_T1, 7},
+    {0xff87, 0x4700, BX, 6},
+    {0xff87, 0x4780, BLX, 6},
+    {0xf800, 0x4800, LDR_LITERAL_T1, 8},
+    {0xfe00, 0x5000, STR_RT1, 9},
+    {0xfe00, 0x5200, STRH_RT1, 9},
+    {0xfe00, 0x5400, STRB_RT1, 9},
+    {0xfe00, 0x5600, LDRSB_RT1, 9},
+    {0xfe00, 0x5800, LDR_RT1, 9},
+    {0xfe00, 0x5a00, LDRH_RT1, 9},
+    {0xfe00, 0x5c00, LDRB_RT1, 9},
+    {0xfe00, 0x5e00, LDRSH_RT1, 9},
+    {0xf800, 0x6000, STR_I5, 10},
+    {0xf800, 0x6800, LDR_I5, 10},
+    {0xf800, 0x7000, STRB_I5, 10},
+    {0xf800, 0x7800, LDRB_I5, 10},
+    {0xf800, 0x8000, STRH_I5, 10},
+    {0xf800, 0x8800, LDRH_I5, 10},
+    {0xf800, 0x9000, STR_SP, 8},
+    {0xf800, 0x9800, LDR_SP, 8},
+    {0xf800, 0xa000, ADR_T1, 4},
+    {0xf800, 0xa800, ADD_SP_T1, 4},
+    {0xff80, 0xb000, ADD_SP_T2, 11},
+    {0xff80, 0xb080, SUB_SP_T1, 11},
+    {0xfd00, 0xb100, CBZ, 12},
+    {0xfd00, 0xb900, CBNZ, 12},
+    {0xffc0, 0xb200, SXTH_T1, 0},
+    {0xffc0, 0xb240, SXTB_T1, 0},
+    {0xffc0, 0xb280, UXTH_T1, 0},
+    {0xffc0, 0xb2c0, UXTB_T1, 0},
+    {0xfe00, 0xb400, PUSH, 13},
+    {0xfe00, 0xbc00, POP, 13},
+    {0xffec, 0xb660, CPS, 14},
+    {0xffc0, 0xba00, REV, 0},
+    {0xffc0, 0xba40, REV16, 0},
+    {0xffc0, 0xbac0, REVSH, 0},
+    {0xff00, 0xbe00, BKPT, 15},
+    {0xffff, 0xbf10, YIELD, 16},
+    {0xffff, 0xbf20, WFE, 16},
+    {0xffff, 0xbf30, WFI, 16},
+    {0xffff, 0xbf40, SEV, 16},
+    {0xff0f, 0xbf00, NOP, 16},
+    {0xff00, 0xbf00, IT, 15},
+    {0xf800, 0xc000, STM_T1, 17},
+    {0xf800, 0xc800, LDM_T1, 17},
+    {0xff00, 0xde00, UDF, 16},
+    {0xff00, 0xdf00, SVC, 15},
+    {0xf000, 0xd000, B_T1, 18},
+    {0xf800, 0xe000, B_T2, 19},
+};
+
+static const struct encoding wide[] = {
+    {0xffd00000, 0xe8800000, STM_IA, 20},
+    {0xffd00000, 0xe8900000, LDM_IA, 20},
+    {0xffd00000, 0xe9000000, STM_DB, 20},
+    {0xffd00000, 0xe9100000, LDM_DB, 20},
+    {0xfff00000, 0xe8400000, STREX, 21},
+    {0xfff00f00, 0xe8500f00, LDREX, 22},
+    {0xfff00ff0, 0xe8c00f40, STREXB, 23},
+    {0xfff00ff0, 0xe8c00f50, STREXH, 23},
+    {0xfff0fff0, 0xe8d0f000, TBB, 24},
+    {0xfff0fff0, 0xe8d0f010, TBH, 24},
+    {0xfff00fff, 0xe8d00f4f, LDREXB, 25},
+    {0xfff00fff, 0xe8d00f5f, LDREXH, 25},
+    {0xff700000, 0xe8600000, STRD_POST, 26},
+    {0xff700000, 0xe8700000, LDRD_POST, 26},
+    {0xff500000, 0xe9400000, STRD, 27},
+    {0xff500000, 0xe9500000, LDRD, 27},
+    {0xfbf08f00, 0xf0100f00, TST_I, 28},
+    {0xfff08f00, 0xea100f00, TST_R, 29},
+    {0xfbe08000, 0xf0000000, AND_I, 30},
+    {0xffe08000, 0xea000000, AND_R, 31},
+    {0xfbe08000, 0xf0200000, BIC_I, 30},
+    {0xffe08000, 0xea200000, BIC_R, 31},
+    {0xfbef8000, 0xf04f0000, MOV_I, 32},
+    {0xffef8000, 0xea4f0000, MOV_R, 33},
+    {0xfbe08000, 0xf0400000, ORR_I, 30},
+    {0xffe08000, 0xea400000, ORR_R, 31},
+    {0xfbef8000, 0xf06f0000, MVN_I, 32},
+    {0xffef8000, 0xea6f0000, MVN_R, 33},
+    {0xfbe08000, 0xf0600000, ORN_I, 30},
+    {0xffe08000, 0xea600000, ORN_R, 31},
+    {0xfbf08f00, 0xf0900f00, TEQ_I, 28},
+    {0xfff08f00, 0xea900f00, TEQ_R, 29},
+    {0xfbe08000, 0xf0800000, EOR_I, 30},
+    {0xffe08000, 0xea800000, EOR_R, 31},
+    {0xfbf08f00, 0xf1100f00, CMN_I, 28},
+    {0xfff08f00, 0xeb100f00, CMN_R, 29},
+    {0xfbe08000, 0xf1000000, ADD_I, 30},
+    {0xffe08000, 0xeb000000, ADD_R, 31},
+    {0xfbe08000, 0xf1400000, ADC_I, 30},
+    {0xffe08000, 0xeb400000, ADC_R, 31},
+    {0xfbe08000, 0xf1600000, SBC_I, 30},
+    {0xffe08000, 0xeb600000, SBC_R, 31},
+    {0xfbf08f00, 0xf1b00f00, CMP_I, 28},
+    {0xfff08f00, 0xebb00f00, CMP_R, 29},
+    {0xfbe08000, 0xf1a00000, SUB_I, 30},
+    {0xffe08000, 0xeba00000, SUB_R, 31},
+    {0xfbe08000, 0xf1c00000, RSB_I, 30},
+    {0xffe08000, 0xebc00000, RSB_R, 31},
+    {0xfbff8000, 0xf20f0000, ADR_ADD, 34},
+    {0xfbff8000, 0xf2af0000, ADR_SUB, 34},
+    {0xfbf08000, 0xf2000000, ADDW, 35},
+    {0xfbf08000, 0xf2a00000, SUBW, 35},
+    {0xfbf08000, 0xf2400000, MOVW, 36},
+    {0xfbf08000, 0xf2c00000, MOVT, 36},
+    {0xfff0f0c0, 0xf3200000, UNDEFINED, 16},
+    {0xfff0f0c0, 0xf3a00000, UNDEFINED, 16},
+    {0xffd08020, 0xf3000000, SSAT, 37},
+    {0xffd08020, 0xf3800000, USAT, 37},
+    {0xfff08020, 0xf3400000, SBFX, 38},
+    {0xfff08020, 0xf3c00000, UBFX, 38},
+    {0xffff8020, 0xf36f0000, BFC, 39},
+    {0xfff08020, 0xf3600000, BFI, 38},
+    {0xfff0f300, 0xf3808000, MSR, 40},
+    {0xffffffff, 0xf3af8001, YIELD, 16},
+    {0xffffffff, 0xf3af8002, WFE, 16},
+    {0xffffffff, 0xf3af8003, WFI, 16},
+    {0xffffffff, 0xf3af8004, SEV, 16},
+    {0xffffff00, 0xf3af8000, NOP, 16},
+    {0xffffffff, 0xf3bf8f2f, CLREX, 16},
+    {0xfffffff0, 0xf3bf8f40, DSB, 16},
+    {0xfffffff0, 0xf3bf8f50, DMB, 16},
+    {0xfffffff0, 0xf3bf8f60, ISB, 16},
+    {0xfffff000, 0xf3ef8000, MRS, 41},
+    {0xfff0f000, 0xf7f0a000, UDF, 16},
+    {0xfb80d000, 0xf3808000, UNDEFINED, 16},
+    {0xf800d000, 0xf0008000, B_T3, 42},
+    {0xf800d000, 0xf0009000, B_T4, 43},
+    {0xf800d000, 0xf000d000, BL, 43},
+    {0xff7f0000, 0xf80f0000, UNDEFINED, 16},
+    {0xff7f0000, 0xf82f0000, UNDEFINED, 16},
+    {0xff7f0000, 0xf84f0000, UNDEFINED, 16},
+    {0xfff00000, 0xf8800000, STRB_I, 44},
+    {0xfff00f00, 0xf8000e00, STRBT, 22},
+    {0xfff00900, 0xf8000900, STRB_X, 45},
+    {0xfff00f00, 0xf8000c00, STRB_N, 22},
+    {0xfff00fc0, 0xf8000000, STRB_R, 46},
+    {0xfff00000, 0xf8a00000, STRH_I, 44},
+    {0xfff00f00, 0xf8200e00, STRHT, 22},
+    {0xfff00900, 0xf8200900, STRH_X, 45},
+    {0xfff00f00, 0xf8200c00, STRH_N, 22},
+    {0xfff00fc0, 0xf8200000, STRH_R, 46},
+    {0xfff00000, 0xf8c00000, STR_I, 44},
+    {0xfff00f00, 0xf8400e00, STRT, 22},
+    {0xfff00900, 0xf8400900, STR_X, 45},
+    {0xfff00f00, 0xf8400c00, STR_N, 22},
+    {0xfff00fc0, 0xf8400000, STR_R, 46},
+    {0xff7ff000, 0xf81ff000, NOP, 16},
+    {0xfff0f000, 0xf890f000, NOP, 47},
+    {0xfff0ff00, 0xf810fc00, NOP, 47},
+    {0xfff0ffc0, 0xf810f000, NOP, 24},
+    {0xff7f0000, 0xf81f0000, LDRB_LITERAL, 48},
+    {0xfff00000, 0xf8900000, LDRB_I, 44},
+    {0xfff00f00, 0xf8100e00, LDRBT, 22},
+    {0xfff00900, 0xf8100900, LDRB_X, 45},
+    {0xfff00f00, 0xf8100c00, LDRB_N, 22},
+    {0xfff00fc0, 0xf8100000, LDRB_R, 46},
+    {0xff7ff000, 0xf83ff000, NOP, 16},
+    {0xfff0f000, 0xf8b0f000, NOP, 47},
+    {0xfff0ff00, 0xf830fc00, NOP, 47},
+    {0xfff0ffc0, 0xf830f000, NOP, 24},
+    {0xff7f0000, 0xf83f0000, LDRH_LITERAL, 48},
+    {0xfff00000, 0xf8b00000, LDRH_I, 44},
+    {0xfff00f00, 0xf8300e00, LDRHT, 22},
+    {0xfff00900, 0xf8300900, LDRH_X, 45},
+    {0xfff00f00, 0xf8300c00, LDRH_N, 22},
+    {0xfff00fc0, 0xf8300000, LDRH_R, 46},
+    {0xff7f0000, 0xf85f0000, LDR_LITERAL, 48},
+    {0xfff00000, 0xf8d00000, LDR_I, 44},
+    {0xfff00f00, 0xf8500e00, LDRT, 22},
+    {0xfff00900, 0xf8500900, LDR_X, 45},
+    {0xfff00f00, 0xf8500c00, LDR_N, 22},
+    {0xfff00fc0, 0xf8500000, LDR_R, 46},
+    {0xff7ff000, 0xf91ff000, NOP, 16},
+    {0xfff0f000, 0xf990f000, NOP, 47},
+    {0xfff0ff00, 0xf910fc00, NOP, 47},
+    {0xfff0ffc0, 0xf910f000, NOP, 24},
+    {0xff7f0000, 0xf91f0000, LDRSB_LITERAL, 48},
+    {0xfff00000, 0xf9900000, LDRSB_I, 44},
+    {0xfff00f00, 0xf9100e00, LDRSBT, 22},
+    {0xfff00900, 0xf9100900, LDRSB_X, 45},
+    {0xfff00f00, 0xf9100c00, LDRSB_N, 22},
+    {0xfff00fc0, 0xf9100000, LDRSB_R, 46},
+    {0xff7ff000, 0xf93ff000, NOP, 16},
+    {0xfff0f000, 0xf9b0f000, NOP, 47},
+    {0xfff0ff00, 0xf930fc00, NOP, 47},
+    {0xfff0ffc0, 0xf930f000, NOP, 24},
+    {0xff7f0000, 0xf93f0000, LDRSH_LITERAL, 48},
+    {0xfff00000, 0xf9b00000, LDRSH_I, 44},
+    {0xfff00f00, 0xf9300e00, LDRSHT, 22},
+    {0xfff00900, 0xf9300900, LDRSH_X, 45},
+    {0xfff00f00, 0xf9300c00, LDRSH_N, 22},
+    {0xfff00fc0, 0xf9300000, LDRSH_R, 46},
+    {0xffe0f0f0, 0xfa00f000, LSL, 49},
+    {0xffe0f0f0, 0xfa20f000, LSR, 49},
+    {0xffe0f0f0, 0xfa40f000, ASR, 49},
+    {0xffe0f0f0, 0xfa60f000, ROR, 49},
+    {0xfffff0c0, 0xfa0ff080, SXTH, 50},
+    {0xfffff0c0, 0xfa1ff080, UXTH, 50},
+    {0xfffff0c0, 0xfa4ff080, SXTB, 50},
+    {0xfffff0c0, 0xfa5ff080, UXTB, 50},
+    {0xfff0f0f0, 0xfa90f080, REV, 51},
+    {0xfff0f0f0, 0xfa90f090, REV16, 51},
+    {0xfff0f0f0, 0xfa90f0a0, RBIT, 51},
+    {0xfff0f0f0, 0xfa90f0b0, REVSH, 51},
+    {0xfff0f0f0, 0xfab0f080, CLZ, 51},
+    {0xfff0f0f0, 0xfb00f000, MUL, 52},
+    {0xfff000f0, 0xfb000000, MLA, 53},
+    {0xfff000f0, 0xfb000010, MLS, 53},
+    {0xfff000f0, 0xfb800000, SMULL, 54},
+    {0xfff0f0f0, 0xfb90f0f0, SDIV, 52},
+    {0xfff000f0, 0xfba00000, UMULL, 54},
+    {0xfff0f0f0, 0xfbb0f0f0, UDIV, 52},
+    {0xfff000f0, 0xfbc00000, SMLAL, 54},
+    {0xfff000f0, 0xfbe00000, UMLAL, 54},
+    {0xee000000, 0xec000000, NO_COPROCESSOR, 16},
+    {0xef000000, 0xee000000, NO_COPROCESSOR, 16},
+};
+
+#endif

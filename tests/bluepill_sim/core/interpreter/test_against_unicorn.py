@@ -1,0 +1,122 @@
+"""The interpreter does what Unicorn does: single instructions of each encoding, sequences, IT blocks."""
+
+import random
+from itertools import islice
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.bluepill_sim.core.interpreter.lockstep import ROWS, RUN_BY_UNICORN, Case, Lockstep, flags_of, made, places
+
+#: chosen: of each encoding in `make test`; ten thousand of a second's cases each.
+EACH, SEQUENCES = 12, 3000
+SP = 0x2000_0800
+
+
+def assert_same(lockstep: Lockstep, cases: list[Case]) -> None:
+    """Hold the two to the same results; name the first cases that differ."""
+    found = [f"{case}\n  {text}" for case, text in islice(lockstep.differences(cases), 5)]
+    assert not found, "\n".join(found)
+
+
+@pytest.mark.slow  # 1.5 s
+def test_each_encoding_does_what_it_does_on_unicorn(lockstep: Lockstep) -> None:
+    dice = random.Random(38)
+    assert_same(lockstep, [made(dice, [row]) for row in ROWS for _ in range(EACH)])
+
+
+@pytest.mark.slow  # 2 s
+def test_sequences_do_what_they_do_on_unicorn(lockstep: Lockstep) -> None:
+    dice = random.Random(39)
+    assert_same(lockstep, [made(dice) for _ in range(SEQUENCES)])
+
+
+@pytest.mark.slow  # 1 s
+def test_each_encoding_in_an_it_block_does_what_it_does_on_unicorn(lockstep: Lockstep) -> None:
+    dice = random.Random(40)
+    it = next(row for row in ROWS if row.operation == "IT")
+    barred = {"IT", "CBZ", "CBNZ", "B_T1", "B_T3", "CPS", "ISB"}
+    rows = [row for row in ROWS if row.operation not in barred]
+    cases = [made(dice, [it, row]) for row in rows for _ in range(8)]
+    assert_same(lockstep, [case for case in cases if case.words[0] & 0xF == 8])  # of one instruction
+    assert any(case.words[0] & 0xF == 8 for case in cases)
+
+
+@st.composite
+def cases(draw: st.DrawFn) -> Case:
+    """Draw a case that shrinks to few and simple instructions."""
+    rows = draw(st.lists(st.sampled_from(ROWS), min_size=1, max_size=4))
+    return made(random.Random(draw(st.integers(0, 1 << 32))), rows)
+
+
+@given(case=cases())
+def test_what_hypothesis_draws_does_what_it_does_on_unicorn(lockstep: Lockstep, case: Case) -> None:
+    it_at = [n for n, word in enumerate(case.words) if word >> 8 == 0xBF]
+    if not it_at:  # what stands in an IT block is chosen by `made` elsewhere
+        assert_same(lockstep, [case])
+
+
+def test_what_the_manual_leaves_undefined_is_undefined_though_unicorn_runs_it(lockstep: Lockstep) -> None:
+    registers = (0x2000_0400,) * 15
+    cases = [Case((word,), registers, 0) for word in RUN_BY_UNICORN]
+    lockstep.own.put(cases)
+    for at, case in zip(places(), cases, strict=False):
+        *_, happened = lockstep.own.run(case, at)
+        assert happened[-1] == ("undefined", at), str(case)  # type: ignore[index]  # the last of what is compared
+
+
+def test_n_and_z_may_both_be_set(lockstep: Lockstep) -> None:
+    both = 0b11 << 30
+    for word, flags in ((0xF3EF_8000, both), (0xBF00, both)):  # MRS R0, APSR; NOP
+        case = Case((word,), (0,) * 13 + (SP, 0), both)
+        assert_same(lockstep, [case])
+        lockstep.own.put([case])
+        seen: tuple[Any, ...] = lockstep.own.run(case, next(places()))
+        assert seen[19] & 0xF800_0000 == flags
+    assert seen[0] == 0
+    conditions = [
+        Case((0xBF08 | condition << 4, 0x1C40), (5,) * 13 + (SP, 0), both) for condition in range(14)
+    ]  # IT c; ADD R0, #1
+    assert_same(lockstep, conditions)
+
+
+@pytest.mark.parametrize("condition", range(14))
+def test_a_condition_is_met_by_the_same_flags(lockstep: Lockstep, condition: int) -> None:
+    registers = (7,) * 13 + (SP, 0)
+    branch, it = 0xD000 | condition << 8 | 2, 0xBF08 | condition << 4
+    cases = [Case(words, registers, flags << 27) for flags in range(32) for words in ((branch,), (it, 0x3001))]
+    assert_same(lockstep, cases)
+
+
+def test_shifts_at_their_bounds_carry_what_they_carry_on_unicorn(lockstep: Lockstep) -> None:
+    by_register = (0x4088, 0x40C8, 0x4108, 0x41C8, 0xFA10_F001, 0xFA30_F001, 0xFA50_F001, 0xFA70_F001)
+    by_constant = (0x07C8, 0x0048, 0x0808, 0x0FC8, 0x0848, 0x1008, 0x17C8, 0xEA5F_0031, 0xEA5F_70F1)
+    values = (1, 0x8000_0000, 0x7FFF_FFFF, 0xFFFF_FFFF, 0x4000_0002)
+    amounts = (0, 1, 31, 32, 33, 64, 255, 256)
+    cases = [
+        Case((word,), (value, amount, *(0,) * 11, SP, 0), flags << 27)
+        for word in by_register
+        for value in values
+        for amount in amounts
+        for flags in (0, 4)
+    ]
+    cases += [Case((word,), (0, value, *(0,) * 11, SP, 0), 4 << 27) for word in by_constant for value in values]
+    assert_same(lockstep, cases)
+
+
+@pytest.mark.soak
+def test_a_million_cases_do_what_they_do_on_unicorn(lockstep: Lockstep) -> None:
+    seed = random.SystemRandom().getrandbits(32)
+    dice = random.Random(seed)
+    for _ in range(1000):
+        try:
+            assert_same(lockstep, [made(dice) for _ in range(1000)])
+        except AssertionError as error:
+            raise AssertionError(f"seed {seed}: {error}") from error
+
+
+def test_flags_are_any() -> None:
+    dice = random.Random(1)
+    assert {flags_of(dice) >> 27 for _ in range(1000)} == set(range(32))
