@@ -12,7 +12,7 @@ from hardware.pcb.layout.footprints import FOOTPRINTS
 from hardware.pcb.outputs import generated_files
 from hardware.pcb.outputs.steps import STEPS, pictures
 from hardware.pcb.proof import lands, printed
-from hardware.pcb.proof.board_file import Mark, PrintedBoard, PrintedPart, read_board
+from hardware.pcb.proof.board_file import PrintedBoard, PrintedMark, SilkPart, read_board
 from hardware.pcb.proof.mistakes import draw
 
 LIBRARY = Path("/usr/share/kicad/footprints")
@@ -34,21 +34,21 @@ def with_part(ref: str, **changes: object) -> PrintedBoard:
     return dataclasses.replace(board(), parts={**board().parts, ref: part})
 
 
-def marks_of(ref: str, change: Callable[[Mark], Mark | None]) -> PrintedBoard:
+def marks_of(ref: str, change: Callable[[PrintedMark], PrintedMark | None]) -> PrintedBoard:
     return with_part(ref, marks=tuple(new for mark in board().parts[ref].marks if (new := change(mark)) is not None))
 
 
-def labels(change: Callable[[Mark], Mark]) -> PrintedBoard:
+def labels(change: Callable[[PrintedMark], PrintedMark]) -> PrintedBoard:
     return dataclasses.replace(board(), labels=tuple(change(mark) for mark in board().labels))
 
 
-def to_pad(number: str) -> Callable[[Mark], Mark]:
-    part: PrintedPart = board().parts["C1"]
+def to_pad(number: str) -> Callable[[PrintedMark], PrintedMark]:
+    part: SilkPart = board().parts["C1"]
     at = next(land.at for land in part.lands if land.number == number)
     return lambda mark: dataclasses.replace(mark, points=((at[0] + 1, at[1] + 1),)) if mark.text == "+" else mark
 
 
-def renamed(**names: str) -> Callable[[Mark], Mark]:
+def renamed(**names: str) -> Callable[[PrintedMark], PrintedMark]:
     return lambda mark: dataclasses.replace(mark, text=names.get(mark.text, mark.text))
 
 

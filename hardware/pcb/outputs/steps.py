@@ -20,7 +20,7 @@ from hardware.pcb.outputs.assembly import body_mm
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Step:
+class AssemblyStep:
     """One step: its title, the parts by reference, and words at pads (`J1.1`; of a module the print: `U1.PA9`)."""
 
     title: str
@@ -30,34 +30,34 @@ class Step:
     notes: tuple[tuple[str, str], ...] = ()
 
 
-STEPS: tuple[Step, ...] = (
-    Step(title="chips and transistors: the dot is pin 1", parts=r"U5|U6|Q\d",
+STEPS: tuple[AssemblyStep, ...] = (
+    AssemblyStep(title="chips and transistors: the dot is pin 1", parts=r"U5|U6|Q\d",
          notes=(("U5.1", "pin 1 of U5"), ("U6.1", "pin 1 of U6"), ("Q1.1", "Q1, Q2: BC817"),
                 ("Q3.1", "Q3, Q4: BC807"))),
-    Step(title="resistors, small capacitors", parts=r"R\d+|C([2-9]|1\d)",
+    AssemblyStep(title="resistors, small capacitors", parts=r"R\d+|C([2-9]|1\d)",
          notes=(("R12.1", "R12: 680R, the others of its column 1k2"), ("R33.2", "R33, R44: up to 3.3 V"))),
-    Step(title="diodes and lights: the bar is the cathode", parts=r"D([13-9]|10)",
+    AssemblyStep(title="diodes and lights: the bar is the cathode", parts=r"D([13-9]|10)",
          notes=(("D1.K", "D1: bar here"), ("D3.K", "D3"), ("D4.K", "D4"), ("D5.K", "D5"), ("D6.K", "D6: bar here"),
                 ("D7.K", "D7, D8"), ("D10.K", "D10"))),
-    Step(title="fuses, suppressor", parts=r"F\d|D2", notes=(("D2.K", "D2: bar here"), ("F2.1", "F2"))),
-    Step(title="regulator, C1, button, headers", parts=r"U3|U4|C1|SW1|JP\d|J[457]",
+    AssemblyStep(title="fuses, suppressor", parts=r"F\d|D2", notes=(("D2.K", "D2: bar here"), ("F2.1", "F2"))),
+    AssemblyStep(title="regulator, C1, button, headers", parts=r"U3|U4|C1|SW1|JP\d|J[457]",
          notes=(("C1.1", "C1: plus here"), ("U3.1", "U3: IN"), ("J7.1", "J7: jumper on"),
                 ("JP1.2", "JP1: one jumper"))),
-    Step(title="terminal, bank, plug, ribbon", parts=r"J[1236]",
+    AssemblyStep(title="terminal, bank, plug, ribbon", parts=r"J[1236]",
          notes=(("J1.1", "opening to the edge"), ("J3.5", "J3: both locks soldered"), ("J6.1", "J6: gap at pin 1"))),
-    Step(title="sockets of the modules", parts=r"U[12]",
+    AssemblyStep(title="sockets of the modules", parts=r"U[12]",
          notes=(("U1.PB12", "USB of the BluePill here"), ("U2.IO6", "USB of the ESP32 here"))),
-    Step(title="first power-up, without modules", parts=r"J1|TP\d+", is_soldering=False,
+    AssemblyStep(title="first power-up, without modules", parts=r"J1|TP\d+", is_soldering=False,
          notes=(("J1.1", "+ 12.0 V, limit 100 mA"), ("J1.2", "- 12 V"), ("JP1.1", "jumper on 12V"),
                 ("TP1.1", "meter: black"),
                 ("TP2.1", "11.5 to 11.9 V"), ("TP4.1", "4.9 to 5.1 V"))),
-    Step(title="flash both modules", parts=r"U[12]|SW1", is_soldering=False,
+    AssemblyStep(title="flash both modules", parts=r"U[12]|SW1", is_soldering=False,
          notes=(("U2.IO6", "USB cable: flash the ESP32"), ("SW1.1", "held while RESET is pressed: download"),
                 ("U1.3V3", "SWD header at this end: ST-Link"))),
-    Step(title="self-test: no robot, no cable at J3", parts=r"U1|J3|J7", is_soldering=False,
+    AssemblyStep(title="self-test: no robot, no cable at J3", parts=r"U1|J3|J7", is_soldering=False,
          notes=(("U1.PA9", "PA9: RX of a 3.3 V USB adapter"), ("U1.PA10", "PA10: its TX"), ("U1.GND", "its GND"),
                 ("J3.2", "join 2 and 3"), ("J7.1", "jumper on"), ("U2.IO6", "USB cable: console"))),
-    Step(title="robot, supply and emergency stop", parts=r"J[1237]", is_soldering=False,
+    AssemblyStep(title="robot, supply and emergency stop", parts=r"J[1237]", is_soldering=False,
          notes=(("J3.3", "straight cable to the HOST socket"), ("J1.1", "battery, 11 to 14.8 V: +"),
                 ("J1.2", "battery: -"),
                 ("J2.1", "or a 5 V bank, JP1 on BANK"), ("J7.1", "emergency stop: a contact that opens,"),
@@ -80,7 +80,7 @@ def pictures(design: BoardDesign) -> dict[str, str]:
     }
 
 
-def _picture(design: BoardDesign, number: int, step: Step) -> str:
+def _picture(design: BoardDesign, number: int, step: AssemblyStep) -> str:
     width, height = rules.BOARD_WIDTH_MM, rules.BOARD_HEIGHT_MM
     places, pads = place(design), placed_pads(design)
     title = html.escape(f"{number}. {step.title}")
@@ -108,7 +108,7 @@ def _picture(design: BoardDesign, number: int, step: Step) -> str:
     return "\n".join([*out, *_notes(design, step, pads), "</svg>", ""])
 
 
-def _notes(design: BoardDesign, step: Step, pads: list[PlacedPad]) -> Iterator[str]:
+def _notes(design: BoardDesign, step: AssemblyStep, pads: list[PlacedPad]) -> Iterator[str]:
     """Yield words at both sides of the board, in the order of their pads from the top, each with its line."""
     found = [(at, words) for name, words in step.notes if (at := _pad_at(design, name, pads)) is not None]
     for is_left in (True, False):

@@ -19,7 +19,7 @@ PRINT = "F.SilkS"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Mark:
+class PrintedMark:
     """A stroke (two points), a circle (its centre) or a text (its anchor) of the print."""
 
     points: tuple[Point, ...]
@@ -39,7 +39,7 @@ class Mark:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Land:
+class PlacedLand:
     """A pad: as its footprint has it, and where it is on the board."""
 
     number: str
@@ -51,21 +51,21 @@ class Land:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PrintedPart:
+class SilkPart:
     """A part: its lands and its marks."""
 
     ref: str
     footprint: str
-    lands: tuple[Land, ...]
-    marks: tuple[Mark, ...]
+    lands: tuple[PlacedLand, ...]
+    marks: tuple[PrintedMark, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PrintedBoard:
     """A board: parts by reference, texts that belong to no part, and the lower edge."""
 
-    parts: Mapping[str, PrintedPart]
-    labels: tuple[Mark, ...]
+    parts: Mapping[str, SilkPart]
+    labels: tuple[PrintedMark, ...]
     bottom_mm: float
 
 
@@ -85,7 +85,7 @@ def read_board(text: str) -> PrintedBoard:
     )  # fmt: skip
 
 
-def _part(one: Node) -> PrintedPart:
+def _part(one: Node) -> SilkPart:
     place = child(one, "at")
     at = _xy(place)
     origin, angle = (at[0] - ORIGIN_MM[0], at[1] - ORIGIN_MM[1]), float(word(place, 3)) if len(place) > 3 else 0.0
@@ -94,28 +94,26 @@ def _part(one: Node) -> PrintedPart:
     reference = words["Reference"]
     if not children(reference, "hide"):
         marks.append(
-            Mark(
+            PrintedMark(
                 points=(_turned(_xy(child(reference, "at")), origin, angle),),
                 text=word(reference, 2),
                 is_reference=True,
             )
         )
     lands = [_land(pad, origin, angle) for pad in children(one, "pad")]
-    return PrintedPart(
-        ref=word(reference, 2), footprint=word(one).split(":")[-1], lands=tuple(lands), marks=tuple(marks)
-    )
+    return SilkPart(ref=word(reference, 2), footprint=word(one).split(":")[-1], lands=tuple(lands), marks=tuple(marks))
 
 
-def _land(pad: Node, origin: Point, angle: float) -> Land:
+def _land(pad: Node, origin: Point, angle: float) -> PlacedLand:
     own = _xy(child(pad, "at"))
     drill, net = children(pad, "drill"), children(pad, "net")
-    return Land(
+    return PlacedLand(
         number=word(pad), own_mm=own, size_mm=_xy(child(pad, "size")), drill_mm=float(word(drill[0])) if drill else 0.0,
         at=_turned(own, origin, angle), net=word(net[0], 2) if net else "",
     )  # fmt: skip
 
 
-def _marks(tree: Node, prefix: str, origin: Point, angle: float, *, back: bool = False) -> list[Mark]:
+def _marks(tree: Node, prefix: str, origin: Point, angle: float, *, back: bool = False) -> list[PrintedMark]:
     def placed(point: Point) -> Point:
         return (
             (round(point[0] - origin[0], 4), round(point[1] - origin[1], 4)) if back else _turned(point, origin, angle)
@@ -126,17 +124,18 @@ def _marks(tree: Node, prefix: str, origin: Point, angle: float, *, back: bool =
         if _layer(one) == PRINT:
             width = float(word(child(child(one, "stroke"), "width")))
             ends = (placed(_xy(child(one, "start"))), placed(_xy(child(one, "end"))))
-            found.append(Mark(points=ends, width_mm=width))
+            found.append(PrintedMark(points=ends, width_mm=width))
     for one in children(tree, f"{prefix}_circle"):
         if _layer(one) == PRINT:
             filled = word(child(one, "fill")) == "yes"
-            found.append(Mark(points=(placed(_xy(child(one, "center"))),), is_filled=filled))
+            found.append(PrintedMark(points=(placed(_xy(child(one, "center"))),), is_filled=filled))
     for one in children(tree, f"{prefix}_text"):
         if _layer(one) == PRINT:
             effects = child(one, "effects")
             justify = children(effects, "justify")
             size = float(word(child(child(effects, "font"), "size")))
-            found.append(Mark(points=(placed(_xy(child(one, "at"))),), text=word(one, 2 if prefix == "fp" else 1),
+            found.append(PrintedMark(points=(placed(_xy(child(one, "at"))),),
+                                     text=word(one, 2 if prefix == "fp" else 1),
                               width_mm=size, justify=word(justify[0]) if justify else "center"))  # fmt: skip
     return found
 

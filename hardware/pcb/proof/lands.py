@@ -16,7 +16,7 @@ from typing import Any
 
 from hardware.pcb.circuit.netlist import BoardDesign
 from hardware.pcb.outputs.sexp import children, parse, word
-from hardware.pcb.proof.board_file import Land, Point, PrintedBoard, PrintedPart
+from hardware.pcb.proof.board_file import PlacedLand, Point, PrintedBoard, SilkPart
 
 TABLE = Path(__file__).parent / "footprints.toml"
 #: A land's place and size may differ by this much.
@@ -46,7 +46,7 @@ def faults(board: PrintedBoard, design: BoardDesign) -> list[str]:
     return [*found, *wire_faults(board, design)]
 
 
-def _lands(part: PrintedPart) -> Iterator[str]:
+def _lands(part: SilkPart) -> Iterator[str]:
     wanted = wanted_lands(part.footprint)
     if wanted is None:
         yield f"{part.ref}: no drawing of {part.footprint}"
@@ -100,7 +100,7 @@ def _shown(row: Row) -> str:
     return f"{width:g} x {height:g} mm at {x:g}, {y:g}" + (f", hole {drill:g}" if drill else "")
 
 
-def _nets(part: PrintedPart, pins: Mapping[str, str | None]) -> Iterator[str]:
+def _nets(part: SilkPart, pins: Mapping[str, str | None]) -> Iterator[str]:
     for land in part.lands:
         wanted = pins.get(land.number)
         there = "" if land.net.startswith("unconnected-") else land.net
@@ -108,7 +108,7 @@ def _nets(part: PrintedPart, pins: Mapping[str, str | None]) -> Iterator[str]:
             yield f"{part.ref}.{land.number} is on {there or 'nothing'}, the circuit has {wanted or 'nothing'}"
 
 
-def _edge(part: PrintedPart, board: PrintedBoard) -> Iterator[str]:
+def _edge(part: SilkPart, board: PrintedBoard) -> Iterator[str]:
     row = table()["edge"].get(part.footprint)
     if row is None:
         return
@@ -139,7 +139,7 @@ def wire_faults(board: PrintedBoard, design: BoardDesign) -> list[str]:
     return found
 
 
-def _pad(board: PrintedBoard, ref: str, pin: int | str) -> Land | None:
+def _pad(board: PrintedBoard, ref: str, pin: int | str) -> PlacedLand | None:
     """Return a module's pad by its public number, found by place; another part's by its own."""
     part = board.parts.get(ref)
     if part is None or not part.lands:

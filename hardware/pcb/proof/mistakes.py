@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from hardware.pcb.circuit.electrical import bom_faults
 from hardware.pcb.circuit.netlist import BoardDesign, Component
 from hardware.pcb.proof import lands, mutants, printed
-from hardware.pcb.proof.board_file import Land, Mark, PrintedBoard, PrintedPart
+from hardware.pcb.proof.board_file import PlacedLand, PrintedBoard, PrintedMark, SilkPart
 from hardware.pcb.proof.expected import differences
 
 
@@ -122,11 +122,11 @@ def _print(design: BoardDesign, board: PrintedBoard, chance: random.Random) -> D
     )
 
 
-def _replaced(board: PrintedBoard, *parts: PrintedPart) -> PrintedBoard:
+def _replaced(board: PrintedBoard, *parts: SilkPart) -> PrintedBoard:
     return dataclasses.replace(board, parts={**board.parts, **{part.ref: part for part in parts}})
 
 
-def _mirrored(point: tuple[float, float], one: Land, other: Land) -> tuple[float, float]:
+def _mirrored(point: tuple[float, float], one: PlacedLand, other: PlacedLand) -> tuple[float, float]:
     """Return a point turned by half about the middle of two lands."""
     return (one.at[0] + other.at[0] - point[0], one.at[1] + other.at[1] - point[1])
 
@@ -136,7 +136,7 @@ def _bar(board: PrintedBoard, chance: random.Random) -> Drawn:
     part = board.parts[chance.choice(sorted(ref for ref in board.parts if re.fullmatch(r"D\d+|C1", ref)))]
     one, other = part.lands[0], part.lands[1]
 
-    def turned(mark: Mark) -> Mark:
+    def turned(mark: PrintedMark) -> PrintedMark:
         return dataclasses.replace(mark, points=tuple(_mirrored(at, one, other) for at in mark.points))
 
     marks = tuple(mark if mark.is_reference else turned(mark) for mark in part.marks)
@@ -163,7 +163,7 @@ def _text_pair(board: PrintedBoard, chance: random.Random) -> Drawn:
 def _dot(board: PrintedBoard, chance: random.Random) -> Drawn:
     """The mark of pin 1 at another pad."""
 
-    def is_dot(mark: Mark) -> bool:
+    def is_dot(mark: PrintedMark) -> bool:
         return mark.is_filled or (len(mark.points) == 2 and mark.width_mm == 0.2)
 
     many = [part for ref, part in sorted(board.parts.items()) if len(part.lands) > 2 and not ref.startswith("D")]
@@ -228,7 +228,7 @@ def _land(design: BoardDesign, board: PrintedBoard, chance: random.Random) -> Dr
     return f"{part.ref}: {name}", [part.ref], _replaced(board, dataclasses.replace(part, lands=new))
 
 
-def _swapped(part: PrintedPart, land: Land, chance: random.Random) -> tuple[str, tuple[Land, ...]]:
+def _swapped(part: SilkPart, land: PlacedLand, chance: random.Random) -> tuple[str, tuple[PlacedLand, ...]]:
     others = [one for one in part.lands if one.net != land.net] or [land]
     other = chance.choice(others)
     if other is land:
@@ -240,26 +240,26 @@ def _swapped(part: PrintedPart, land: Land, chance: random.Random) -> tuple[str,
     )
 
 
-def _moved(part: PrintedPart, land: Land, chance: random.Random) -> tuple[str, tuple[Land, ...]]:
+def _moved(part: SilkPart, land: PlacedLand, chance: random.Random) -> tuple[str, tuple[PlacedLand, ...]]:
     by = chance.choice((0.05, 0.127, 0.3, 1.27, -0.05, -0.3))
     wrong = dataclasses.replace(land, own_mm=(land.own_mm[0] + by, land.own_mm[1]))
     return f"pad {land.number} {by:g} mm further", tuple(wrong if one is land else one for one in part.lands)
 
 
-def _sized(part: PrintedPart, land: Land, chance: random.Random) -> tuple[str, tuple[Land, ...]]:
+def _sized(part: SilkPart, land: PlacedLand, chance: random.Random) -> tuple[str, tuple[PlacedLand, ...]]:
     by = chance.choice((0.6, 0.8, 1.25))
     wrong = dataclasses.replace(land, size_mm=(round(land.size_mm[0] * by, 3), land.size_mm[1]))
     return f"pad {land.number} {by:g} times as wide", tuple(wrong if one is land else one for one in part.lands)
 
 
-def _drilled(part: PrintedPart, land: Land, chance: random.Random) -> tuple[str, tuple[Land, ...]]:
+def _drilled(part: SilkPart, land: PlacedLand, chance: random.Random) -> tuple[str, tuple[PlacedLand, ...]]:
     if not land.drill_mm:
         return _sized(part, land, chance)
     wrong = dataclasses.replace(land, drill_mm=round(land.drill_mm - chance.choice((0.1, 0.2, 0.3)), 3))
     return f"the hole of pad {land.number} too small", tuple(wrong if one is land else one for one in part.lands)
 
 
-def _stretched(part: PrintedPart, land: Land, chance: random.Random) -> tuple[str, tuple[Land, ...]]:
+def _stretched(part: SilkPart, land: PlacedLand, chance: random.Random) -> tuple[str, tuple[PlacedLand, ...]]:
     """All pads of a part by another pitch: an inch's twelfth for a tenth, a wide body for a narrow one."""
     _ = land
     by = chance.choice((0.98, 1.02, 1.1))
@@ -268,6 +268,6 @@ def _stretched(part: PrintedPart, land: Land, chance: random.Random) -> tuple[st
                                          round(one.own_mm[1] * by, 4))) for one in part.lands)  # fmt: skip
 
 
-_LAND_SLIPS: tuple[Callable[[PrintedPart, Land, random.Random], tuple[str, tuple[Land, ...]]], ...] = (
+_LAND_SLIPS: tuple[Callable[[SilkPart, PlacedLand, random.Random], tuple[str, tuple[PlacedLand, ...]]], ...] = (
     _swapped, _swapped, _moved, _sized, _drilled, _stretched,
 )  # fmt: skip

@@ -14,7 +14,7 @@ import re
 from collections.abc import Iterator, Mapping
 
 from hardware.pcb.circuit.netlist import BoardDesign, Component
-from hardware.pcb.proof.board_file import Land, Mark, Point, PrintedBoard, PrintedPart
+from hardware.pcb.proof.board_file import PlacedLand, Point, PrintedBoard, PrintedMark, SilkPart
 from hardware.pcb.proof.expected import print_names
 
 #: Letters of KiCad's stroke font, from middle to middle, by their height.
@@ -54,17 +54,17 @@ def faults(board: PrintedBoard, design: BoardDesign) -> list[str]:
     return [*found, *_labels(board, design)]
 
 
-def nearest(lands: Mapping[str, tuple[Land, ...]], point: Point) -> tuple[str, Land, float]:
+def nearest(lands: Mapping[str, tuple[PlacedLand, ...]], point: Point) -> tuple[str, PlacedLand, float]:
     """Return the part and its land that stand nearest to a point, and how far from its rim, millimetres."""
     ref, land = min(((ref, land) for ref, own in lands.items() for land in own), key=lambda row: _gap(row[1], point))
     return ref, land, _gap(land, point)
 
 
-def _gap(land: Land, point: Point) -> float:
+def _gap(land: PlacedLand, point: Point) -> float:
     return max(0.0, math.dist(land.at, point) - min(land.size_mm) / 2)
 
 
-def _at(part: PrintedPart, point: Point) -> tuple[Land, float]:
+def _at(part: SilkPart, point: Point) -> tuple[PlacedLand, float]:
     _, land, gap = nearest({part.ref: part.lands}, point)
     return land, gap
 
@@ -73,7 +73,7 @@ def _net(component: Component, pin: str) -> str:
     return dict(component.pins).get(pin) or ""
 
 
-def _polarity(part: PrintedPart, component: Component) -> Iterator[str]:
+def _polarity(part: SilkPart, component: Component) -> Iterator[str]:
     """Find the end that a diode's print closes, or the plus of a capacitor, and compare the net there."""
     pin = _MARKED.get(component.part.symbol)
     if pin is None:
@@ -91,7 +91,7 @@ def _polarity(part: PrintedPart, component: Component) -> Iterator[str]:
         yield f"{part.ref}: its {what} stands at the pad on {land.net}, {pin} is on {wanted}"
 
 
-def _bars(part: PrintedPart) -> list[Point]:
+def _bars(part: SilkPart) -> list[Point]:
     """Return the strokes that cross the axis through both pads beyond one of them."""
     (one, other), found = (land.at for land in part.lands), []
     along = (other[0] - one[0], other[1] - one[1])
@@ -107,7 +107,7 @@ def _bars(part: PrintedPart) -> list[Point]:
     return found
 
 
-def _first(part: PrintedPart, component: Component) -> Iterator[str]:
+def _first(part: SilkPart, component: Component) -> Iterator[str]:
     """Find the dot, corner or figure that marks pin 1, and the pad beside it."""
     if component.part.symbol in _UNMARKED and not part.footprint.startswith("HEADER"):
         return
@@ -126,7 +126,7 @@ def _first(part: PrintedPart, component: Component) -> Iterator[str]:
         yield f"{part.ref} has figures {[mark.text for mark in figures]}"
 
 
-def _names(part: PrintedPart, component: Component) -> Iterator[str]:
+def _names(part: SilkPart, component: Component) -> Iterator[str]:
     """Compare each name beside a pad with what stands there by the module's own print, or with its net."""
     texts = [mark for mark in part.marks if mark.text and not mark.is_reference]
     if names := print_names(part.ref, [land.at for land in part.lands]):
@@ -148,7 +148,7 @@ def _names(part: PrintedPart, component: Component) -> Iterator[str]:
         yield f"{part.ref} says {[mark.text for mark in texts]}, it is on {part.lands[0].net}"
 
 
-def _reference(board: PrintedBoard, part: PrintedPart) -> Iterator[str]:
+def _reference(board: PrintedBoard, part: SilkPart) -> Iterator[str]:
     """Compare a printed reference with its part, and with the part that it stands nearest to."""
     for mark in part.marks:
         if not mark.is_reference or not part.lands:
@@ -163,7 +163,7 @@ def _reference(board: PrintedBoard, part: PrintedPart) -> Iterator[str]:
             yield f"the reference of {part.ref} stands at {ref}"
 
 
-def _beside(part: PrintedPart, point: Point) -> float:
+def _beside(part: SilkPart, point: Point) -> float:
     """Return how far a point is from what is drawn of a part, its texts aside; 0 within it."""
     places = [land.at for land in part.lands] + [at for mark in part.marks if not mark.text for at in mark.points]
     (left, right), (top, bottom) = ((min(row), max(row)) for row in zip(*places, strict=True))
@@ -212,7 +212,7 @@ def header_net(text: str) -> tuple[str, ...] | None:
 
 
 def _poles(
-    mark: Mark, ref: str, board: PrintedBoard, lands: Mapping[str, tuple[Land, ...]], design: BoardDesign
+    mark: PrintedMark, ref: str, board: PrintedBoard, lands: Mapping[str, tuple[PlacedLand, ...]], design: BoardDesign
 ) -> Iterator[str]:
     """The sign at either end of a text belongs to the pad of its part that stands nearest to it."""
     half = (len(mark.text) - 1) / 2 * LETTER * mark.width_mm
