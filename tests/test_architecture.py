@@ -520,14 +520,18 @@ def test_the_judge_sees_a_circle() -> None:
 
 #: Where the emulator's C stands, and of which folders the files of each may call functions.
 C_SOURCES = ROOT / "bluepill_sim" / "extension" / "source"
-C_FOLDERS = {"fabric": {"fabric"}, "devices": {"devices", "fabric"}, "core": {"core", "fabric"}}
-#: Ideas that are longer than a file: their files call each other; `core.h` and `tim.h` say what each has.
+C_FOLDERS = {
+    "fabric": {"fabric"}, "devices": {"devices", "fabric"}, "interpreter": {"interpreter", "fabric"},
+    "core": {"core", "fabric", "interpreter"},
+}  # fmt: skip
+#: Ideas that are longer than a file: their files call each other; `core.h`, `tim.h` and `interpreter.h` say so.
 C_IDEAS = {
     "core": {f"core/{name}.c" for name in ("access", "blocks", "exceptions", "faults", "polling", "run", "scs")},
+    "interpreter": {f"interpreter/{name}.c" for name in ("blocks", "decode", "execute", "hooks", "memory", "tidy")},
     "timers": {f"devices/{name}.c" for name in ("tim", "tim_counter", "tim_inputs", "tim_outputs")},
 }
 
-C_NO_CODE = re.compile(r'/\*.*?\*/|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\])\'', re.DOTALL)
+C_NO_CODE = re.compile(r'/\*.*?\*/|__attribute__\(\(.*?\)\)|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\])\'', re.DOTALL)
 C_MACRO = re.compile(r"^#define (\w+)\([^)]*\)((?:[^\n]*\\\n)*[^\n]*)", re.MULTILINE)
 C_FUNCTION = re.compile(
     r"^(?P<head>[A-Za-z][^\n;={}#()]*\b)(?P<name>\w+)\([^;{}()]*(?:\([^()]*\)[^;{}()]*)*\)\s*\{(?P<body>[^\n]*\}$|.*?^\})",

@@ -158,13 +158,13 @@ def test_one_second_of_wheels_that_do_not_follow_is_implausible(driving: Rig) ->
 
 
 @pytest.mark.parametrize(
-    ("sip_after", "told"), [(0, "lost"), (1, "implausible"), (-1, "lost")], ids=["both", "plausibility", "SIP"]
+    ("sip_after", "reported"), [(0, "lost"), (1, "implausible"), (-1, "lost")], ids=["both", "plausibility", "SIP"]
 )
-def test_no_sip_in_time_is_told_before_wheels_that_do_not_follow(driving: Rig, sip_after: int, told: str) -> None:
+def test_no_sip_in_time_is_told_before_wheels_that_do_not_follow(driving: Rig, sip_after: int, reported: str) -> None:
     ends_at = driving.adapter._driver.plausibility.ends_at
     driving.adapter._agenda.sip_deadline = ends_at + sip_after
     driving.adapter._run_open(ends_at)
-    assert driving.events[-1][1] == told
+    assert driving.events[-1][1] == reported
 
 
 @pytest.mark.parametrize(("early", "is_lost"), [(1, False), (0, True)])

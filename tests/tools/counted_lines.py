@@ -122,7 +122,7 @@ class Counter(Slipcover):
         self._root = root
         self._counted: list[tuple[CodeType, set[int], list[tuple[int, Label]]]] = []  # of each: seen, where which are
         self._taken_out: list[tuple[int, int]] = []  # where a probe was, and the instruction that stood there
-        self._since = defaultdict[str, set[int]](set)  # lines seen since they were last told, by file
+        self._since = defaultdict[str, set[int]](set)  # lines seen since they were last reported, by file
 
     def code_of(self, path: Path) -> CodeType:
         """Return a module's code with probes, and count what they see from now on."""
@@ -254,11 +254,11 @@ class LineCounter:
 
     def _lines(self) -> dict[str, dict[str, list[int]]]:
         """Return the lines that each file of tests ran; what was imported before the first is nobody's."""
-        told: dict[str, dict[str, list[int]]] = {}
+        reported: dict[str, dict[str, list[int]]] = {}
         for test, parts in self._by_test.items():
             lines = defaultdict[str, set[int]](set)
             for file, of_part in ((file, each) for part in parts for file, each in part.items()):
                 lines[file].update(of_part)
-            told[test] = {file: sorted(each) for file, each in lines.items()}
-        told.pop("", None)
-        return told
+            reported[test] = {file: sorted(each) for file, each in lines.items()}
+        reported.pop("", None)
+        return reported

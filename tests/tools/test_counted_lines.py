@@ -99,7 +99,7 @@ def test_a_folder_of_tests_that_is_named_counts_in_the_modules_that_its_conftest
     done = subprocess.run(run, cwd=root, env=os.environ, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stdout[-2000:]
     (by_test,) = (tmp_path / "seen" / "by_test").glob("*.json")
-    told = json.loads(by_test.read_text(encoding="utf-8"))
-    assert {*told} == {named.partition("::")[0]}
+    reported = json.loads(by_test.read_text(encoding="utf-8"))
+    assert {*reported} == {named.partition("::")[0]}
     (seen,) = (tmp_path / "seen").glob("*.json")
     assert str(root / "bluepill_sim" / "chip.py") in json.loads(seen.read_text())

@@ -103,10 +103,10 @@ def _judged(parser: argparse.ArgumentParser, options: argparse.Namespace) -> int
         Court(ROOT, Path(folder), nearest, Ledger(KEPT), lines, options.jobs) as court,
     ):
         judged = sample(court, found, options.count, {row for row, reason in known_rows.items() if reason})
-    return _told(judged, options)
+    return _reported(judged, options)
 
 
-def _told(judged: list[tuple[SourceMutant, MutantOutcome]], options: argparse.Namespace) -> int:
+def _reported(judged: list[tuple[SourceMutant, MutantOutcome]], options: argparse.Namespace) -> int:
     """Print survivors and figures; return the exit code."""
     if not judged:
         print("mutants: there is nothing to change in these lines")

@@ -20,7 +20,7 @@ from pathlib import Path
 from tools.mutants import python_source
 from tools.mutants.mutant import SourceMutant
 from tools.mutants.natives import Natives
-from tools.mutants.told import TOLD, told_by
+from tools.mutants.outcome import OUTCOME_FILE, reported_by
 from tools.mutants.tree import Tree
 
 #: Seconds of a processor that the tests of one mutant have, and that those of the sound program take of them.
@@ -34,7 +34,7 @@ CLOCK_LIMIT_S = 180.0
 MEMORY_KIB, FILE_BLOCKS = 3 << 20, 1 << 20
 BOUNDED = f'ulimit -S -t "$1"; shift; ulimit -d {MEMORY_KIB}; ulimit -f {FILE_BLOCKS}; exec "$@"'
 PYTEST = (
-    sys.executable, "-m", "pytest", "-x", "-n", "0", "-p", "no:cacheprovider", "-p", "tools.mutants.told",
+    sys.executable, "-m", "pytest", "-x", "-n", "0", "-p", "no:cacheprovider", "-p", "tools.mutants.outcome",
     "-m", "not slow and not soak and not hardware", "--hypothesis-profile", "unshrunk", "--tb", "no",
 )  # fmt: skip
 _NO_TESTS = 5
@@ -169,15 +169,15 @@ class Judge:
                 return self._run(files, left_out)
 
     def _run(self, tests: tuple[str, ...], left_out: tuple[str, ...], *options: str) -> _Run:
-        told = self._scratch / "told.json"
-        told.unlink(missing_ok=True)
+        reported = self._scratch / "reported.json"
+        reported.unlink(missing_ok=True)
         words = ["sh", "-c", BOUNDED, "sh", str(self._limit_s), *PYTEST, *options, *tests]
         words += [word for test in left_out for word in ("--deselect", test)]
         with self._lock:
             if self._is_over:
                 raise InterruptedError
             self._running = subprocess.Popen(
-                words, cwd=self._tree.folder, env=self._environment(told), stdin=subprocess.DEVNULL,
+                words, cwd=self._tree.folder, env=self._environment(reported), stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
             )  # fmt: skip
         code: int | None = None
@@ -187,7 +187,7 @@ class Judge:
             self._kill()
             if self._is_over:
                 raise InterruptedError
-        failed, seconds = told_by(told)
+        failed, seconds = reported_by(reported)
         if code in {-signal.SIGXCPU, -signal.SIGKILL} or seconds > self._limit_s:
             code = None
         return _Run(code=code, failed=failed, seconds=seconds)
@@ -200,12 +200,13 @@ class Judge:
             self._running.wait()
             self._running = None
 
-    def _environment(self, told: Path) -> dict[str, str]:
+    def _environment(self, reported: Path) -> dict[str, str]:
         """Return the tests' environment: the copy comes before what is installed, and the user's files stay his."""
         kept = {name: value for name, value in os.environ.items() if not name.startswith(("PYTEST", "XDG_", "MAKE"))}
         folder = str(self._scratch)
         return kept | {
-            "PYTHONPATH": os.pathsep.join(map(str, self._tree.path)), "HOME": folder, "TMPDIR": folder, TOLD: str(told),
+            "PYTHONPATH": os.pathsep.join(map(str, self._tree.path)), "HOME": folder, "TMPDIR": folder,
+            OUTCOME_FILE: str(reported),
         }  # fmt: skip
 
 

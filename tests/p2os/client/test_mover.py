@@ -644,9 +644,9 @@ def test_wheels_that_left_their_speed_by_themselves_are_measured_on_their_way_ba
     assert check.take((0.0, 0.0), stalled=False, now=NS_PER_S - 1) is None
     assert check.take((0.1, 0.1), stalled=False, now=NS_PER_S) is None, "nearer by more than the least progress"
     assert check.take((0.1, 0.1), stalled=False, now=2 * NS_PER_S - 1) is None
-    told = check.take((0.1, 0.1), stalled=False, now=2 * NS_PER_S)
-    assert told is not None
-    assert "for 1 s the wheels are at 0.10 and 0.10 m/s, commanded 0.30" in told
+    noted = check.take((0.1, 0.1), stalled=False, now=2 * NS_PER_S)
+    assert noted is not None
+    assert "for 1 s the wheels are at 0.10 and 0.10 m/s, commanded 0.30" in noted
     assert check.take((0.1, 0.1), stalled=False, now=3 * NS_PER_S) is None, "said once"
 
 
@@ -663,5 +663,5 @@ def test_wheels_are_near_within_a_tolerance_and_a_share_of_the_greater_speed() -
         check.take((0.0, 0.0), stalled=False, now=1)
         check.take((speed, 0.3), stalled=False, now=2)  # nearer than before, whether near or not
         check.take((speed, 0.3), stalled=False, now=2 + NS_PER_S - 1)
-        told = check.take((speed, 0.3), stalled=False, now=2 + NS_PER_S)
-        assert (told is None) is is_plausible, speed
+        noted = check.take((speed, 0.3), stalled=False, now=2 + NS_PER_S)
+        assert (noted is None) is is_plausible, speed

@@ -215,7 +215,7 @@ def test_motors_that_the_stop_button_took_off_say_whether_it_is_still_pressed() 
 
 
 @pytest.mark.parametrize(("gap_s", "is_doubtful"), [(0.1, False), (1.5, False), (1.9, True), (19.0, True)])
-def test_a_gap_in_which_the_robot_could_have_turned_half_round_is_told(gap_s: float, is_doubtful: bool) -> None:
+def test_a_gap_in_which_the_robot_could_have_turned_half_round_is_noted(gap_s: float, is_doubtful: bool) -> None:
     rig = Rig(settings=ClientSettings(liveness_ns=30 * NS_PER_S)).connect()
     rig.run(1)
     # 100 deg/s turn half round in 1.8 s.
@@ -319,11 +319,11 @@ def test_the_order_of_gripper_and_analog_port_is_told_once(port: int) -> None:
     firmware.take(StandardSip(analog_port=6, gripper_state=0))  # no port: tells nothing
     assert firmware.profile is first
     firmware.take(other)
-    told = firmware.profile
-    assert told is not first
+    noted = firmware.profile
+    assert noted is not first
     firmware.take(shown)
     firmware.take(other)
-    assert firmware.profile is told, "what was told is not judged again"
+    assert firmware.profile is noted, "what was told is not judged again"
 
 
 @pytest.mark.parametrize("deadman_ns", [None, 1])

@@ -230,7 +230,7 @@ void core_on_block(void *unicorn, uint64_t at, uint32_t size, void *user)
     core->shared.last[core->shared.logged++ % LAST_ROWS] = (struct record){cycle, address, 0};
 }
 
-/* The same where the interpreter runs the blocks: it is told of those that it may enter itself. */
+/* The same where the interpreter runs the blocks: it gets those that it may enter itself. */
 void core_on_known_block(void *interpreter, uint64_t at, uint32_t size, void *user)
 {
     struct core *core = user;

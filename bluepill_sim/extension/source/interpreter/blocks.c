@@ -84,7 +84,7 @@ void interpreter_free_dropped(struct interpreter *s)
     }
 }
 
-/* Ends the run at a fetch that fails: a hook is told of what is not there. */
+/* Ends the run at a fetch that fails: a hook gets what is not there. */
 static struct block *not_fetched(struct interpreter *s, uint32_t address)
 {
     if (!interpreter_call_bad_access(s, BAD_FETCH, address, ALONE_BYTES, 0)) {

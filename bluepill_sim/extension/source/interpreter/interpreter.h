@@ -1,4 +1,5 @@
-/* A Cortex-M3's instructions, run without translating them to the host's.
+/* A Cortex-M3's instructions, run without translating them to the host's: one idea in several files, which call each
+ * other and share `struct interpreter`.
  *
  * Theory of operation. Code is decoded a basic block at a time (`decode.c`, by the one table of encodings) and lowered to
  * micro-operations (`lower.c`), which `execute.c` runs by threaded dispatch. A block ends at a branch, at what may change

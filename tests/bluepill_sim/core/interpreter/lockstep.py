@@ -284,7 +284,7 @@ class Lockstep:
             for at, case in zip(places(), batch, strict=False):
                 expected, seen = self.unicorn.run(case, at), self.own.run(case, at)
                 if expected != seen and not is_late(expected, seen) and not is_astray(seen, case, at):
-                    yield case, told(expected, seen, at)
+                    yield case, reported(expected, seen, at)
 
 
 def is_late(expected: tuple[object, ...], seen: tuple[object, ...]) -> bool:
@@ -308,7 +308,7 @@ def is_astray(seen: tuple[object, ...], case: Case, at: int) -> bool:
     return is_in_sram or (here[-1][0] == "undefined" and here[-1][1] not in starts)
 
 
-def told(expected: tuple[object, ...], seen: tuple[object, ...], at: int) -> str:
+def reported(expected: tuple[object, ...], seen: tuple[object, ...], at: int) -> str:
     """Return how two results differ."""
     names = [*(f"R{n}" for n in range(15)), *(name.name for name in _SPECIAL), "PC", "error", "SRAM", "happened"]
     lines = [f"at {at:#x}"]

@@ -36,7 +36,7 @@ OF_REV_C = [
 ]
 
 
-def told(findings: list[VerdictRow]) -> set[str]:
+def reported(findings: list[VerdictRow]) -> set[str]:
     """Return the wires that are named."""
     return {row.name for row in findings if row.is_fault}
 
@@ -53,7 +53,7 @@ def test_a_sound_board_has_a_row_for_each_wire_and_no_fault(tested: Tested) -> N
 def test_each_wire_at_fault_is_named_and_no_other(tested: Tested, faults: list[BoardFault], between: bool) -> None:
     findings = tested(*faults, between=between, revision=REVISION)
     wanted = expected_of(faults)
-    assert told(findings) in [{name for name, _, _ in one} for one in wanted]
+    assert reported(findings) in [{name for name, _, _ in one} for one in wanted]
     # What is wrong at an output of the register is told as open: nothing reads it.
     at_register = [fault for fault in faults if fault.side is Side.ESP32 or fault.other]
     pairs = [{fault.wire, fault.other} for fault in at_register]

@@ -1,4 +1,4 @@
-"""A plugin of pytest: writes what a run has found as JSON, where P2OS_MUTANTS_TOLD says.
+"""A plugin of pytest: writes what a run has found as JSON, where P2OS_MUTANTS_OUTCOME says.
 
 `failed`: the tests that did not pass, in order; `seconds`: how long they kept a processor busy together, collected and
 started.
@@ -12,10 +12,10 @@ from pathlib import Path
 import pytest
 
 #: The variable that names the file.
-TOLD = "P2OS_MUTANTS_TOLD"
+OUTCOME_FILE = "P2OS_MUTANTS_OUTCOME"
 
 
-class Told:
+class OutcomeReport:
     """What one run has found."""
 
     def __init__(self, file: Path) -> None:
@@ -39,8 +39,8 @@ class Told:
         self._file.write_text(json.dumps({"failed": [*self._failed], "seconds": seconds}), encoding="utf-8")
 
 
-def told_by(file: Path) -> tuple[tuple[str, ...], float]:
-    """Return what a run has told: who failed, and seconds; nothing where it was ended."""
+def reported_by(file: Path) -> tuple[tuple[str, ...], float]:
+    """Return what a run has reported: who failed, and seconds; nothing where it was ended."""
     if not file.exists():
         return (), 0.0
     found = json.loads(file.read_text(encoding="utf-8"))
@@ -49,5 +49,5 @@ def told_by(file: Path) -> tuple[tuple[str, ...], float]:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Listen, in a run that is to tell."""
-    if file := os.environ.get(TOLD):
-        config.pluginmanager.register(Told(Path(file)))
+    if file := os.environ.get(OUTCOME_FILE):
+        config.pluginmanager.register(OutcomeReport(Path(file)))
