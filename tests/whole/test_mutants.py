@@ -260,7 +260,7 @@ PROJECT = {
 @pytest.fixture
 def judge(tmp_path: Path) -> Judge:
     """A project of one module: boundaries that are looked at or not, a loop, a test that fails without a change."""
-    root, scratch, reported = tmp_path / "root", tmp_path / "scratch", Path("tools", "mutants", "reported.py")
+    root, scratch, reported = tmp_path / "root", tmp_path / "scratch", Path("tools", "mutants", "outcome.py")
     (root / reported).parent.mkdir(parents=True)
     for name, text in {**PROJECT, "part.py": PART, str(reported): (ROOT / reported).read_text()}.items():
         (root / name).write_text(text)
