@@ -175,7 +175,7 @@ class UnicornCore(Stateful):
     BLOCK_HOOK: ClassVar[str] = "core_on_block"
     TELLS_PC: ClassVar[bool] = False
     #: What the library has pointers to.
-    DERIVED = ("_keep", "_buffers", "_sinks")
+    DERIVED = ("scratch", "_keep", "_buffers", "_sinks")
 
     def __init__(self, on_failure: Callable[[BaseException], None]) -> None:
         """Make a core without memory, but for the scratch page.

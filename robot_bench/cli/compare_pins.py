@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from bluepill_sim.analysis.waveforms.comparison import PinComparison, Unexplained
     from bluepill_sim.analysis.waveforms.levels import Waveforms
 
-HELP = """Lay what a logic analyser saw on a board beside a run of the same program.
+HELP = """Compare a logic analyser's capture with a run of the same program.
 
 RUN is a run folder, or the pins of `p2os mcu pins --vcd`. CAPTURE is a VCD, a
 sigrok session (.sr) or Saleae's CSV. When the capture began and by how much the
@@ -49,12 +49,17 @@ def compare_pins(
         str, typer.Option("--rate", help="Samples a second, where the file does not tell: 24MHz.", metavar="RATE")
     ] = "",
     jitter: Annotated[
-        float, typer.Option("--jitter", help="By how many samples more an edge may be off.", min=0.0, max=1000.0)
+        float,
+        typer.Option("--jitter", help="By how many samples more an edge may be off.", metavar="N", min=0.0, max=1000.0),
     ] = 1.0,
     ppm: Annotated[
         float,
         typer.Option(
-            "--ppm", help="By how much the clocks may differ; 25000 without a crystal.", min=0.0, max=50_000.0
+            "--ppm",
+            help="By how much the clocks may differ; 25000 without a crystal.",
+            metavar="PPM",
+            min=0.0,
+            max=50_000.0,
         ),
     ] = 500.0,
     picture: Annotated[

@@ -27,7 +27,7 @@ NEEDS = (
     ),
     Need(name="robot_bench._edges", kind="built", feature="wires of a run"),
     Need(name="robot_bench._esp32", kind="built", feature="board test --emulated"),
-    Need(name="robot_bench._esp32_rev_c", kind="built", feature="board test --emulated --revision rev-c"),
+    Need(name="robot_bench._esp32_rev_c", kind="built", feature="board test --emulated, rev C"),
     Need(name="robot_bench._adapter_firmware", kind="built", feature="--adapter firmware"),
     Need(name="sigrok-cli", kind="program", feature="reading pins.sr of a run", get="sudo apt-get install sigrok-cli"),
 )

@@ -186,7 +186,7 @@ class TopTable(OwnTable, IncludeTable):
         "(own-robot.md), by its name or a TOML file beside the scenario; or [several](#several-robots)"
     )] = "p2dx"  # fmt: skip
     body: Annotated[str, Key(
-        choices=BODY_CHOICES, group=BODY_GROUP, doc="`bullet`, `mujoco`, `kinematic` ([which one](pioneer.md#bodies)), "
+        choices=BODY_CHOICES, group=BODY_GROUP, doc="by name ([which one](pioneer.md#bodies)), "
         "or `best`: the first of these that is installed; or "
         "[your own](bench.md#a-body-an-adapter-a-controller-of-your-own)",
     )] = BEST  # fmt: skip

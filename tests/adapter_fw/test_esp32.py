@@ -35,7 +35,7 @@ def test_the_esp32_program_fits_its_headers(board: str, pad: str) -> None:
 
 def test_headers_that_are_not_there_are_skipped_aloud(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     words = argparse.Namespace(bluepad32=None, btstack=None)
-    assert CHECK.check_copy(words, CHECK.Source(f"{tmp_path}/idf"), tmp_path) == 0
+    assert CHECK.check_copy(words, CHECK.SourceCopy(f"{tmp_path}/idf"), tmp_path) == 0
     assert "skipped" in capsys.readouterr().out
 
 
@@ -43,7 +43,7 @@ def test_headers_that_are_not_there_are_skipped_aloud(capsys: pytest.CaptureFixt
 @pytest.mark.skipif("P2OS_ESP_IDF" not in os.environ, reason="P2OS_ESP_IDF names no copy of ESP-IDF (DIR or DIR@REF)")
 def test_the_esp32_program_fits_the_headers_of_esp_idf(tmp_path: Path) -> None:
     words = argparse.Namespace(bluepad32=os.environ.get("P2OS_BLUEPAD32"), btstack=os.environ.get("P2OS_BTSTACK"))
-    assert CHECK.check_copy(words, CHECK.Source(os.environ["P2OS_ESP_IDF"]), tmp_path) == 0
+    assert CHECK.check_copy(words, CHECK.SourceCopy(os.environ["P2OS_ESP_IDF"]), tmp_path) == 0
 
 
 def test_plain_esp_idf_finds_the_sources_and_the_drivers_of_its_version(tmp_path: Path) -> None:

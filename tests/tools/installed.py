@@ -19,8 +19,10 @@ OURS, MARK = ("p2os.", "robot_bench."), "simbase.packages"
 def stale_points(root: Path) -> list[str]:
     """Return by name the entry points of which the editable install of a checkout knows other than its pyproject.toml.
 
-    None where it is not installed so.
+    None where it is not installed so, or there is no such file.
     """
+    if not (root / "pyproject.toml").exists():
+        return []
     with (root / "pyproject.toml").open("rb") as file:
         project = tomllib.load(file)["project"]
     declared = {

@@ -1,6 +1,7 @@
 """Every verb that moves a robot, one of its calls failing: no wheel turns without STOP on a line that still carries.
 
-The line is `Cable` of tools/measure_stops.py: as a serial cable, it does not tell the robot that a program has ended.
+The line is `Cable` of tools/surveys/measure_stops.py: as a serial cable, it does not tell the robot that a program
+has ended.
 So where the call was the process's last, the robot's own watchdog stops it.
 """
 
@@ -37,7 +38,7 @@ from tests.whole.failing_calls import (
     page_in,
     run_verb,
 )
-from tools.measure_stops import Cable, ServedRobot
+from tools.surveys.measure_stops import Cable, ServedRobot
 
 #: The robot's watchdog, and its longest ramp from these speeds.
 STANDING_S = 2.6

@@ -27,7 +27,7 @@ _MOST_UNIT = 16
 _CHANGED = re.compile(rb"[^\0]")
 _PROBE = re.compile(r"probe[1-9]\d{0,2}")
 _PIECE = re.compile(r"-(\d+)$")
-_HINT = "a session with logic channels, as PulseView, sigrok-cli and `p2os mcu pins --sr` write it"
+_HINT = "a session with logic channels, as PulseView and sigrok-cli write it"
 
 
 def read_sigrok(path: Path) -> Waveforms:

@@ -20,7 +20,7 @@ _NS_PER = {"s": 1e9, "ms": 1e6, "us": 1e3, "ns": 1.0, "ps": 1e-3, "fs": 1e-6}
 _SCALE = re.compile(r"(1|10|100)\s*(s|ms|us|ns|ps|fs)")
 _LEVELS = {"0": 0, "1": 1, "x": UNKNOWN, "X": UNKNOWN, "z": UNKNOWN, "Z": UNKNOWN}
 _SKIPPED = {"$dumpvars", "$dumpall", "$dumpon", "$dumpoff", "$end"}
-_HINT = "a value change dump, as `p2os mcu pins --vcd`, PulseView and sigrok-cli write it"
+_HINT = "a value change dump, as PulseView and sigrok-cli write it"
 
 
 class _Dump:

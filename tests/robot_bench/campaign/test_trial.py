@@ -162,7 +162,7 @@ def test_a_firmware_that_is_not_there_is_refused_in_a_line() -> None:
 
 
 @pytest.mark.parametrize("core", ["model", "firmware"])
-@pytest.mark.parametrize(("stale_ms", "verdict"), [(399, TrialVerdict.FAILED), (500, TrialVerdict.PASSED)])
+@pytest.mark.parametrize(("stale_ms", "verdict"), [(397, TrialVerdict.FAILED), (500, TrialVerdict.PASSED)])
 def test_a_distance_that_is_stale_before_the_ring_is_round_holds_the_robot(
     core: str, stale_ms: int, verdict: TrialVerdict
 ) -> None:
