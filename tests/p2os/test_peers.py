@@ -75,7 +75,7 @@ time.sleep(60)
 def test_nothing_that_a_peer_has_started_is_left(tmp_path: Path) -> None:
     beside = subprocess.Popen(["sleep", "60"])
     try:
-        peer = PeerProgram(name="daemon", needs=(), commands=((forked_python(), "-c", DAEMON),))
+        peer = PeerProgram(name="daemon", needs=(), commands=((sys.executable, "-c", DAEMON),))
         served = cast("peers.Served", SimpleNamespace(line_url="tcp:127.0.0.1:1"))
         with peers._started(replace(peer, needs=("sleep",)), served, tmp_path):
             file, end = tmp_path / "daemon", time.monotonic() + 10

@@ -401,5 +401,8 @@ def seen_until(driver: Driver, words: str) -> str:
     seen, ends = "", time.monotonic() + TIMEOUT_S
     while words not in seen and time.monotonic() < ends:
         if select.select([driver.keyboard], [], [], 1.0)[0]:
-            seen += os.read(driver.keyboard, 4096).decode("utf-8", "replace")
+            try:
+                seen += os.read(driver.keyboard, 4096).decode("utf-8", "replace")
+            except OSError:  # it has ended, and its terminal with it
+                break
     return seen

@@ -464,7 +464,7 @@ def test_a_run_that_takes_too_much_is_an_error_that_names_the_limit(trials: list
     from robot_bench.campaign.workers import beginnings
 
     def greedy(trial: Trial, look: Callable[[], None], start: object) -> Outcome:
-        return Outcome(verdict=TrialVerdict.PASSED, sha256=str(len(bytearray(10**9))))
+        return Outcome(verdict=TrialVerdict.PASSED, sha256=str(len(bytearray(4 * 10**9))))
 
     def endless(trial: Trial, look: Callable[[], None], start: object) -> Outcome:
         while True:
