@@ -1,8 +1,7 @@
 """Every verb that moves a robot, one of its calls failing: no wheel turns without STOP on a line that still carries.
 
 The line is `Cable` of tools/surveys/measure_stops.py: as a serial cable, it does not tell the robot that a program
-has ended.
-So where the call was the process's last, the robot's own watchdog stops it.
+has ended. So where the call was the process's last, the robot's own watchdog stops it.
 """
 
 import contextlib

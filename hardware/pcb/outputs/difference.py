@@ -7,7 +7,6 @@ of the outline's corners.
 Invariant: a board laid over itself has no difference; the same two boards give the same bytes.
 """
 
-import math
 import subprocess
 from dataclasses import dataclass
 from html import escape
@@ -15,6 +14,7 @@ from pathlib import Path
 
 from hardware.pcb.circuit.netlist import DesignError
 from hardware.pcb.outputs.generated_files import GENERATED
+from hardware.pcb.outputs.read_places import Point, angle, point, turned
 from hardware.pcb.outputs.sexp import Node, SexpError, child, children, parse, word
 
 OLD, NEW, BOTH = "#d00000", "#008a00", "#c9c9c9"
@@ -94,11 +94,11 @@ def _board(text: str, name: str) -> BoardContents:
     lands = {_via(one) for one in children(tree, "via")}
     for footprint in children(tree, "footprint"):
         place = child(footprint, "at")
-        at, angle = _point(place), _angle(place)
+        at, turn = _point(place), angle(place)
         words = {word(one, 1): word(one, 2) for one in children(footprint, "property")}
-        parts[words["Reference"]] = f"{words['Value']}, {word(footprint)} at {at[0]:g} {at[1]:g}, {angle:g} degrees"
-        strokes |= set(_drawn(footprint, "fp", at, angle))
-        lands |= {_pad(pad, at, angle) for pad in children(footprint, "pad")}
+        parts[words["Reference"]] = f"{words['Value']}, {word(footprint)} at {at[0]:g} {at[1]:g}, {turn:g} degrees"
+        strokes |= set(_drawn(footprint, "fp", at, turn))
+        lands |= {_pad(pad, at, turn) for pad in children(footprint, "pad")}
     nets = frozenset(word(net, 2) for net in children(tree, "net"))
     numbered = {word(net, 1): word(net, 2) for net in children(tree, "net")}
     named = {
@@ -109,19 +109,9 @@ def _board(text: str, name: str) -> BoardContents:
     return BoardContents(parts, frozenset(named), frozenset(lands), nets)
 
 
-def _point(at: Node, index: int = 1) -> tuple[float, float]:
-    return round(float(word(at, index)), 4), round(float(word(at, index + 1)), 4)
-
-
-def _angle(at: Node) -> float:
-    return float(word(at, 3)) if len(at) > 3 else 0.0
-
-
-def _turned(point: tuple[float, float], at: tuple[float, float], angle: float) -> tuple[float, float]:
-    """Return a footprint's point on the board; KiCad turns to the left, and y points down."""
-    cos, sin = math.cos(math.radians(angle)), math.sin(math.radians(angle))
-    x, y = point
-    return round(at[0] + x * cos + y * sin, 4), round(at[1] - x * sin + y * cos, 4)
+def _point(node: Node) -> Point:
+    x, y = point(node)
+    return round(x, 4), round(y, 4)
 
 
 def _track(one: Node) -> Stroke:
@@ -135,7 +125,7 @@ def _via(one: Node) -> Land:
     return Land(COPPER, _point(child(one, "at")), (size, size), 0.0, True, float(word(child(one, "drill"))), "")
 
 
-def _pad(pad: Node, at: tuple[float, float], angle: float) -> Land:
+def _pad(pad: Node, at: Point, turn: float) -> Land:
     place = child(pad, "at")
     width, height = _point(child(pad, "size"))
     layers = [item for item in child(pad, "layers")[1:] if isinstance(item, str)]
@@ -143,19 +133,19 @@ def _pad(pad: Node, at: tuple[float, float], angle: float) -> Land:
     drill = children(pad, "drill")
     net = children(pad, "net")
     return Land(
-        sides, _turned(_point(place), at, angle), (width, height), _angle(place) % 360, word(pad, 3) == "circle",
+        sides, turned(_point(place), at, turn), (width, height), angle(place) % 360, word(pad, 3) == "circle",
         float(word(drill[0])) if drill else 0.0, word(net[0], 2) if net else "",
     )  # fmt: skip
 
 
-def _drawn(tree: Node, prefix: str, at: tuple[float, float], angle: float) -> list[Stroke]:
+def _drawn(tree: Node, prefix: str, at: Point, turn: float) -> list[Stroke]:
     result = []
     for one in children(tree, f"{prefix}_line"):
-        ends = sorted(_turned(_point(child(one, name)), at, angle) for name in ("start", "end"))
+        ends = sorted(turned(_point(child(one, name)), at, turn) for name in ("start", "end"))
         width = float(word(child(child(one, "stroke"), "width")))
         result.append(Stroke(word(child(one, "layer")), ends[0], ends[1], width))
     for one in children(tree, f"{prefix}_text"):
-        place = _turned(_point(child(one, "at")), at, angle)
+        place = turned(_point(child(one, "at")), at, turn)
         words = word(one, 2 if prefix == "fp" else 1)
         size = float(word(child(child(child(one, "effects"), "font"), "size")))
         result.append(Stroke(word(child(one, "layer")), place, place, size, words))

@@ -15,6 +15,7 @@ from pathlib import Path
 from hardware.pcb.layout import rules
 from hardware.pcb.layout.routing import HERE, RoutingError, Via, read_lines
 from hardware.pcb.outputs.board import ORIGIN_MM
+from hardware.pcb.outputs.read_places import point
 from hardware.pcb.outputs.sexp import Node, child, children, parse, word
 from simbase.errors import MissingDependencyError
 
@@ -154,5 +155,4 @@ def _polygons(text: str) -> dict[str, list[Node]]:
 
 
 def _points(polygon: Node) -> list[tuple[float, float]]:
-    pts = child(polygon, "pts")
-    return [(float(word(xy, 1)), float(word(xy, 2))) for xy in children(pts, "xy")]
+    return [point(xy) for xy in children(child(polygon, "pts"), "xy")]

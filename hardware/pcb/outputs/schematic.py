@@ -171,11 +171,12 @@ _FRAMES = {
     ],
     "stop": [
         SheetFrame(title="Emergency stop: a loop that must be closed", left=10, top=12, right=78, bottom=74,
-              note="J7: a contact that opens, or its jumper. Open, cut, at ground: stop."),
+                   note="J7: a contact that opens, or its jumper. Open, cut, at ground: stop."),
         SheetFrame(title="Stop: EN low and TXD at mark, apart from each other", left=82, top=12, right=200, bottom=74,
-              note="The ESP32 is held in reset, the line falls silent: the robot stops by its own watchdog, in 2 s."),
+                   note="The ESP32 is held in reset, the line falls silent: "
+                        "the robot stops by its own watchdog, in 2 s."),
         SheetFrame(title="Mode button; held at reset: download", left=10, top=80, right=100, bottom=118,
-              note="IO0 is a strap: high at boot unless the button is held. The module has no button for it."),
+                   note="IO0 is a strap: high at boot unless the button is held. The module has no button for it."),
     ],
     "test": [
         SheetFrame(title="Logic header: each wire at its receiver", left=10, top=12, right=84, bottom=70,

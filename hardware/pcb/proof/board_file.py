@@ -6,14 +6,13 @@ the netlist is what is plotted. Not read: copper, pours, values.
 Invariant: places are millimetres from the board's upper left corner, turned as the part is.
 """
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from hardware.pcb.outputs.board import ORIGIN_MM
+from hardware.pcb.outputs.read_places import Point, angle, point, turned
 from hardware.pcb.outputs.sexp import Node, child, children, parse, word
 
-Point = tuple[float, float]
 #: The layer of the print.
 PRINT = "F.SilkS"
 
@@ -77,7 +76,7 @@ def read_board(text: str) -> PrintedBoard:
     """
     tree = parse(text)
     parts = [_part(one) for one in children(tree, "footprint")]
-    edges = [_xy(child(one, end)) for one in children(tree, "gr_line") if _layer(one) == "Edge.Cuts"
+    edges = [point(child(one, end)) for one in children(tree, "gr_line") if _layer(one) == "Edge.Cuts"
              for end in ("start", "end")]  # fmt: skip
     return PrintedBoard(
         parts={part.ref: part for part in parts}, labels=tuple(_marks(tree, "gr", ORIGIN_MM, 0.0, back=True)),
@@ -87,69 +86,57 @@ def read_board(text: str) -> PrintedBoard:
 
 def _part(one: Node) -> SilkPart:
     place = child(one, "at")
-    at = _xy(place)
-    origin, angle = (at[0] - ORIGIN_MM[0], at[1] - ORIGIN_MM[1]), float(word(place, 3)) if len(place) > 3 else 0.0
+    at = point(place)
+    origin, turn = (at[0] - ORIGIN_MM[0], at[1] - ORIGIN_MM[1]), angle(place)
     words = {word(entry, 1): entry for entry in children(one, "property")}
-    marks = _marks(one, "fp", origin, angle)
+    marks = _marks(one, "fp", origin, turn)
     reference = words["Reference"]
     if not children(reference, "hide"):
         marks.append(
             PrintedMark(
-                points=(_turned(_xy(child(reference, "at")), origin, angle),),
+                points=(turned(point(child(reference, "at")), origin, turn),),
                 text=word(reference, 2),
                 is_reference=True,
             )
         )
-    lands = [_land(pad, origin, angle) for pad in children(one, "pad")]
+    lands = [_land(pad, origin, turn) for pad in children(one, "pad")]
     return SilkPart(ref=word(reference, 2), footprint=word(one).split(":")[-1], lands=tuple(lands), marks=tuple(marks))
 
 
-def _land(pad: Node, origin: Point, angle: float) -> PlacedLand:
-    own = _xy(child(pad, "at"))
+def _land(pad: Node, origin: Point, turn: float) -> PlacedLand:
+    own = point(child(pad, "at"))
     drill, net = children(pad, "drill"), children(pad, "net")
     return PlacedLand(
-        number=word(pad), own_mm=own, size_mm=_xy(child(pad, "size")), drill_mm=float(word(drill[0])) if drill else 0.0,
-        at=_turned(own, origin, angle), net=word(net[0], 2) if net else "",
+        number=word(pad), own_mm=own, size_mm=point(child(pad, "size")),
+        drill_mm=float(word(drill[0])) if drill else 0.0, at=turned(own, origin, turn),
+        net=word(net[0], 2) if net else "",
     )  # fmt: skip
 
 
-def _marks(tree: Node, prefix: str, origin: Point, angle: float, *, back: bool = False) -> list[PrintedMark]:
-    def placed(point: Point) -> Point:
-        return (
-            (round(point[0] - origin[0], 4), round(point[1] - origin[1], 4)) if back else _turned(point, origin, angle)
-        )
+def _marks(tree: Node, prefix: str, origin: Point, turn: float, *, back: bool = False) -> list[PrintedMark]:
+    def placed(own: Point) -> Point:
+        return (round(own[0] - origin[0], 4), round(own[1] - origin[1], 4)) if back else turned(own, origin, turn)
 
     found = []
     for one in children(tree, f"{prefix}_line"):
         if _layer(one) == PRINT:
             width = float(word(child(child(one, "stroke"), "width")))
-            ends = (placed(_xy(child(one, "start"))), placed(_xy(child(one, "end"))))
+            ends = (placed(point(child(one, "start"))), placed(point(child(one, "end"))))
             found.append(PrintedMark(points=ends, width_mm=width))
     for one in children(tree, f"{prefix}_circle"):
         if _layer(one) == PRINT:
             filled = word(child(one, "fill")) == "yes"
-            found.append(PrintedMark(points=(placed(_xy(child(one, "center"))),), is_filled=filled))
+            found.append(PrintedMark(points=(placed(point(child(one, "center"))),), is_filled=filled))
     for one in children(tree, f"{prefix}_text"):
         if _layer(one) == PRINT:
             effects = child(one, "effects")
             justify = children(effects, "justify")
             size = float(word(child(child(effects, "font"), "size")))
-            found.append(PrintedMark(points=(placed(_xy(child(one, "at"))),),
+            found.append(PrintedMark(points=(placed(point(child(one, "at"))),),
                                      text=word(one, 2 if prefix == "fp" else 1),
-                              width_mm=size, justify=word(justify[0]) if justify else "center"))  # fmt: skip
+                                     width_mm=size, justify=word(justify[0]) if justify else "center"))  # fmt: skip
     return found
 
 
 def _layer(one: Node) -> str:
     return word(child(one, "layer"))
-
-
-def _xy(node: Node) -> Point:
-    return float(word(node, 1)), float(word(node, 2))
-
-
-def _turned(point: Point, at: Point, angle: float) -> Point:
-    """Return a footprint's point on the board; KiCad turns to the left, and y points down."""
-    cos, sin = math.cos(math.radians(angle)), math.sin(math.radians(angle))
-    x, y = point
-    return round(at[0] + x * cos + y * sin, 4), round(at[1] - x * sin + y * cos, 4)

@@ -15,8 +15,9 @@ from pathlib import Path
 from typing import Any
 
 from hardware.pcb.circuit.netlist import BoardDesign
+from hardware.pcb.outputs.read_places import Point
 from hardware.pcb.outputs.sexp import children, parse, word
-from hardware.pcb.proof.board_file import PlacedLand, Point, PrintedBoard, SilkPart
+from hardware.pcb.proof.board_file import PlacedLand, PrintedBoard, SilkPart
 
 TABLE = Path(__file__).parent / "footprints.toml"
 #: A land's place and size may differ by this much.

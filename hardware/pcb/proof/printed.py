@@ -14,7 +14,8 @@ import re
 from collections.abc import Iterator, Mapping
 
 from hardware.pcb.circuit.netlist import BoardDesign, Component
-from hardware.pcb.proof.board_file import PlacedLand, Point, PrintedBoard, PrintedMark, SilkPart
+from hardware.pcb.outputs.read_places import Point
+from hardware.pcb.proof.board_file import PlacedLand, PrintedBoard, PrintedMark, SilkPart
 from hardware.pcb.proof.expected import print_names
 
 #: Letters of KiCad's stroke font, from middle to middle, by their height.

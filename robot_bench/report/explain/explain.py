@@ -171,7 +171,7 @@ def _contact(scene: Scene, prober: Prober | None, hit: Contact) -> tuple[Finding
         analysis._tell_motion()  # noqa: SLF001 - the same steps without its links
         steps = analysis.steps
         steps.append(ChainLink(t=reset.at, part="firmware", says=f"is reset by {reset.cause}, while at {reset.place}",
-                          evidence=Evidence.REPLAYED))  # fmt: skip
+                               evidence=Evidence.REPLAYED))  # fmt: skip
         tail = fed(prober, reset.cause, steps)
         return Finding(
             f"{words_of(reset)} reset the chip {(hit.t - reset.at) / NS_PER_S:.2f} s before the contact{tail}"
