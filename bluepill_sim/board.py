@@ -633,7 +633,7 @@ class BluePill(Stateful):
         return holds()
 
     def _wait_for_bytes(self, port: BoardSerialLine, pattern: bytes, within: Span) -> None:
-        """Run until `pattern` is in what `port` has sent and nobody has taken (`SerialLine.expect`)."""
+        """Run until `pattern` is in what `port` has sent and nobody has taken (`BoardSerialLine.expect`)."""
         end_ns = self.now_ns + to_nanos(within)
         with _stop_at_characters(port):
             while pattern not in port.unread:

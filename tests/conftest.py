@@ -88,11 +88,8 @@ def pytest_configure(config: pytest.Config) -> None:
 
         config.pluginmanager.register(TimeCounter(config.rootpath / path, is_worker=hasattr(config, "workerinput")))
     config.pluginmanager.register(TurnedFolders())
-    from hypothesis import (
-        HealthCheck,
-        Phase,
-        settings,
-    )  # whose modules pytest rewrites: after it is known where they are kept
+    # Here, since pytest rewrites its modules: after it is known where they are kept.
+    from hypothesis import HealthCheck, Phase, settings
 
     settings.register_profile("drawn", deadline=None, suppress_health_check=[HealthCheck.too_slow])
     settings.register_profile("repeated", settings.get_profile("drawn"), derandomize=True, database=None)

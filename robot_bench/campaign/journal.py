@@ -67,14 +67,7 @@ class Journal:
                 self._done[str(entry["key"])] = outcome_of_plain(entry["outcome"]), float(entry["cpu_s"])
             except _LeftOutError as error:
                 self.left_out[number] = str(error)
-            except (
-                ValueError,
-                KeyError,
-                TypeError,
-                AttributeError,
-                RecursionError,
-                zlib.error,
-            ):  # outcomes of another version
+            except _NO_OUTCOME:
                 self.left_out[number] = "what it holds is no outcome"
 
     def __len__(self) -> int:
