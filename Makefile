@@ -16,7 +16,7 @@ JOBS   ?= 3
 COMPILED := $(wildcard bluepill_sim/extension/source/*/*) robot_bench/wires/edges.c \
     $(shell find adapter_fw/core adapter_fw/capi adapter_fw/esp32/main adapter_fw/esp32_sim -type f)
 
-.PHONY: setup demo test lint type unit wheels bench soak mutants peers clean firmware mutation-tools board board-check board-tools pictures docs generated
+.PHONY: setup demo test lint type unit wheels bench soak mutants hostile peers clean firmware mutation-tools board board-check board-tools pictures docs generated
 
 setup: $(STAMP)
 
@@ -97,6 +97,10 @@ soak: setup mutation-tools
 mutants: setup
 	@$(BIN)/python -m tools.mutants $(FILES) $(if $(SINCE),--since $(SINCE)) $(if $(SAMPLE),--sample $(SAMPLE)) \
 	    $(if $(COUNT),--count $(COUNT)) $(if $(SEED),--seed $(SEED)) $(if $(NOTE),--note)
+
+# Attacks every socket of every verb while wheels are watched, six minutes; ON="serve sniff --attack flood" some of it.
+hostile: setup
+	@$(BIN)/python -m tools.hostile $(ON)
 
 # The programs of others that are on PATH, or PEERS='--peer "p2os-arduino=/home/me/drive {line}"', against p2os serve.
 peers: setup

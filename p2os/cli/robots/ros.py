@@ -75,6 +75,10 @@ DEADMAN_NS: Nanos = 500 * NS_PER_MS
 HEALTH_NS: Nanos = 1 * NS_PER_S
 #: chosen: how long a wait for the network holds a signal off at most, before STOP leaves.
 LOOK_S = 0.02
+#: chosen: how much of what the robot has sent is published before speeds, deadman and the end are looked at again.
+NEWS_OF_A_TURN = 16
+#: chosen: how much of it waits at most, half a minute of a robot that sends as the manual says.
+MOST_NEWS = 256
 #: chosen: a message that a publisher repeats 20 times a second is complained of once.
 COMPLAINT_NS: Nanos = 1 * NS_PER_S
 #: What is reported on stderr.
@@ -187,7 +191,7 @@ class NodeLoop:
         self._complained_at: Nanos = -COMPLAINT_NS
         self._link = Link.OPEN.value
         self._is_open = True
-        self.counts = {"commands": 0, "refused": 0}
+        self.counts = {"commands": 0, "refused": 0, "overrun": 0}
 
     def run(self, is_over: Callable[[], bool]) -> None:
         """Go on until `is_over` says so; it is asked each `LOOK_S` or more often."""
@@ -212,6 +216,8 @@ class NodeLoop:
         """Wait for what comes, and hand it on."""
         due = self._node.next_deadline()
         wait_s = LOOK_S if due is None else min(LOOK_S, max(0, due - wall_clock()) / NS_PER_S)
+        if self._news:
+            wait_s = 0
         with postponed():
             received = self._network.take(wait_s)
         self.counts["commands"] += len(received)
@@ -224,8 +230,7 @@ class NodeLoop:
                 problem = self._ask(self._node.take_call(call))
                 with postponed():
                     call.reply({"success": not problem, "message": problem})
-        while self._news:
-            item = self._news.popleft()
+        for item in [self._news.popleft() for _ in range(min(len(self._news), NEWS_OF_A_TURN))]:
             if isinstance(item, RobotState):
                 self._state, self._is_open, self._link = item, True, Link.OPEN.value
                 self._publish(self._node.take_state(item, stamp_of(item.at_ns)))
@@ -245,7 +250,10 @@ class NodeLoop:
                 self._network.publish(topic, message)
 
     def _tell(self, news: RobotState | Notice) -> None:
-        """Take what the client's thread tells."""
+        """Take what the client's thread tells; of a robot that sends more than can be published, no more data."""
+        if len(self._news) >= MOST_NEWS and isinstance(news, RobotState | PacketArrived):
+            self.counts["overrun"] += 1
+            return
         self._news.append(news)
         self._network.wake()
 

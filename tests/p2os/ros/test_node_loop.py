@@ -13,7 +13,7 @@ from typing import Any, cast
 
 import pytest
 
-from p2os.cli.robots.ros import HEALTH_NS, LOOK_S, NodeLoop, stamp_of
+from p2os.cli.robots.ros import HEALTH_NS, LOOK_S, MOST_NEWS, NEWS_OF_A_TURN, NodeLoop, stamp_of
 from p2os.client import LinkLostError, Robot
 from p2os.client.notices import DeadmanStopped, LinkLost, MotorsDisabledError
 from p2os.client.observer import Observer
@@ -155,7 +155,7 @@ def test_the_call_of_a_service_is_answered_with_what_became_of_it() -> None:
 def test_a_robot_that_cannot_move_is_no_end_of_the_node(error: Exception, capsys: pytest.CaptureFixture[str]) -> None:
     client = Client(error=error)
     loop = ran(client, Network([[twist(0.2)], [twist(0.2)], [twist(math.nan)]]), turns=3)
-    assert loop.counts == {"commands": 3, "refused": 3}
+    assert loop.counts == {"commands": 3, "refused": 3, "overrun": 0}
     assert capsys.readouterr().err.count("refused") == 1, "a message that comes 20 times a second is complained of once"
 
 
@@ -173,6 +173,28 @@ def test_a_lost_link_is_an_error_of_the_diagnostics_until_packets_come_again(mon
     client.tell(Observer(P2DX).take(StandardSip(), 0))
     loop.turn()
     assert network.newest("/diagnostics")["status"][0]["level"] == 0
+
+
+def test_a_robot_that_sends_more_than_can_be_published_keeps_neither_the_deadman_nor_an_end_waiting() -> None:
+    """A robot, or who has its place, that says all of it again and again: each publication brings the next."""
+    client, network = Client(), Network([[twist(0.2)]])
+    state = Observer(P2DX).take(StandardSip(), 0)
+    publish = network.publish
+
+    def publish_and_hear(topic: Topic, message: Message) -> None:
+        publish(topic, message)
+        client.tell(state)
+
+    network.publish = publish_and_hear  # type: ignore[method-assign]
+    loop = ran(client, network, turns=30, deadman_ns=1)
+    assert client.asked == [(0.2, 0.0), "stop"]
+    assert set(network.waits_s[1:]) == {0}, "what has come is not waited for"
+    assert loop.counts["overrun"] > 0
+    client.tell(DeadmanStopped(NS_PER_S))
+    assert len(loop._news) == MOST_NEWS + 1, "what is no data is never left out"
+    before, network.publish = len(network.published), publish  # type: ignore[method-assign]
+    loop.turn()
+    assert len([topic for topic, _ in network.published[before:] if topic.name == "/odom"]) == NEWS_OF_A_TURN
 
 
 def test_after_a_stop_of_the_client_a_motor_topic_starts_from_zero() -> None:
