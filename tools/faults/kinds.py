@@ -24,7 +24,7 @@ class SourceEdit:
 
 
 @dataclass(frozen=True, slots=True)
-class FaultKind:
+class PlantedKind:
     """A kind of fault.
 
     Args:
@@ -52,7 +52,7 @@ _GIVING = frozenset({"assignment_expression", "init_declarator", "initializer_pa
 _CONDITIONED = frozenset({"if_statement", "while_statement", "do_statement", "for_statement", "conditional_expression"})
 
 
-def places(source: bytes, kind: FaultKind) -> list[SourceEdit]:
+def places(source: bytes, kind: PlantedKind) -> list[SourceEdit]:
     """Return every edit of a kind that a source allows, in its order."""
     waiting, found = [Parser(Language(language())).parse(source).root_node], list[SourceEdit]()
     while waiting:
@@ -247,17 +247,17 @@ def _variables(function: Node) -> set[bytes]:
     return found
 
 
-KINDS: Mapping[str, FaultKind] = {
-    "MIFS": FaultKind("missing if construct plus statements", 9.96, missing_if_with_statements),
-    "MFC": FaultKind("missing function call", 8.64, missing_call),
-    "MLAC": FaultKind("missing AND in an expression used as branch condition", 7.89, missing_and),
-    "MIA": FaultKind("missing if construct around statements", 4.32, missing_if_around),
-    "MLPC": FaultKind("missing small and localized part of the algorithm", 3.19, missing_part),
-    "MVAE": FaultKind("missing variable assignment using an expression", 3.00, missing_assignment_of_expression),
-    "WLEC": FaultKind("wrong logical expression used as branch condition", 3.00, wrong_condition),
-    "WVAV": FaultKind("wrong value assigned to variable", 2.44, wrong_value),
-    "MVI": FaultKind("missing variable initialization", 2.25, missing_initialization),
-    "MVAV": FaultKind("missing variable assignment using a value", 2.25, missing_assignment_of_value),
-    "WAEP": FaultKind("wrong arithmetic expression in parameter of function call", 2.25, wrong_sum_in_argument),
-    "WPFV": FaultKind("wrong variable used in parameter of function call", 1.50, wrong_variable_in_argument),
+KINDS: Mapping[str, PlantedKind] = {
+    "MIFS": PlantedKind("missing if construct plus statements", 9.96, missing_if_with_statements),
+    "MFC": PlantedKind("missing function call", 8.64, missing_call),
+    "MLAC": PlantedKind("missing AND in an expression used as branch condition", 7.89, missing_and),
+    "MIA": PlantedKind("missing if construct around statements", 4.32, missing_if_around),
+    "MLPC": PlantedKind("missing small and localized part of the algorithm", 3.19, missing_part),
+    "MVAE": PlantedKind("missing variable assignment using an expression", 3.00, missing_assignment_of_expression),
+    "WLEC": PlantedKind("wrong logical expression used as branch condition", 3.00, wrong_condition),
+    "WVAV": PlantedKind("wrong value assigned to variable", 2.44, wrong_value),
+    "MVI": PlantedKind("missing variable initialization", 2.25, missing_initialization),
+    "MVAV": PlantedKind("missing variable assignment using a value", 2.25, missing_assignment_of_value),
+    "WAEP": PlantedKind("wrong arithmetic expression in parameter of function call", 2.25, wrong_sum_in_argument),
+    "WPFV": PlantedKind("wrong variable used in parameter of function call", 1.50, wrong_variable_in_argument),
 }
