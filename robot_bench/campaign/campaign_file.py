@@ -30,7 +30,7 @@ from p2os.toml_file import TomlSource, is_file, read_toml, read_user_text
 from p2os.toml_record import Record, keys_of, number_of, read, sections, tables_of
 from p2os.toml_schema import LONGEST_S, Key, Table, TablePlace, Where, check_table, placed, within
 from robot_bench.campaign.reaching.corpus import BEGUN, Coordinates, read_corpus
-from robot_bench.campaign.reaching.reach import Reach, ReachTable, looked_for
+from robot_bench.campaign.reaching.reach import ToReach, ToReachTable, looked_for
 from robot_bench.campaign.reaching.source import reach_of
 from robot_bench.campaign.search import SEARCHES
 from robot_bench.campaign.things import KINDS
@@ -220,7 +220,7 @@ class CampaignTable(Record):
     vary: _Settings = None
     draw: Annotated[tuple[Table, ...], Key(record=DrawTable, doc="things that are drawn")] = ()
     disturb: Annotated[tuple[Table, ...], Key(record=DisturbTable, doc="faults that are drawn")] = ()
-    reach: Annotated[tuple[Table, ...], Key(record=ReachTable, doc="what one point at least has to reach")] = ()
+    reach: Annotated[tuple[Table, ...], Key(record=ToReachTable, doc="what one point at least has to reach")] = ()
     goal: Annotated[tuple[Table, ...], GOALS] = ()
 
 
@@ -253,7 +253,7 @@ class Campaign:
     disturbances: tuple[Disturbance, ...] = ()
     #: What share of its features a point turns off; 0: none is ever turned off.
     swarm: float = 0.0
-    reaches: tuple[Reach, ...] = ()
+    reaches: tuple[ToReach, ...] = ()
     #: Where points are kept that reached something new, for the campaigns to come; and those that this one begins with.
     corpus_file: Path | None = None
     corpus: tuple[Coordinates, ...] = ()
@@ -295,7 +295,7 @@ def parse_campaign(text: str, path: Path, *, firmware: Path | None = None, trust
     if not vary and not draws and not disturbances:
         raise ScenarioError(f"{where}: nothing varies", hint="[vary], [[draw]] or [[disturb]]")
     reaches = tuple(
-        reach_of(read(ReachTable, row, within(where, "reach", n)), trial) for n, row in enumerate(top.reach)
+        reach_of(read(ToReachTable, row, within(where, "reach", n)), trial) for n, row in enumerate(top.reach)
     )
     trial = replace(trial, looks_for=looked_for(reaches))
     corpus_file = None if top.corpus is None else path.parent / top.corpus

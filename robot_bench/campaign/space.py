@@ -85,9 +85,14 @@ class Space:
             values[name] = found = span.value(at[name])
             return found
 
+        def chance(name: str) -> float:
+            """Return a coordinate as it is, and note that it has an effect."""
+            value(name, _UNIT)
+            return at[name]
+
         def is_on(name: str) -> bool:
             """Tell whether the point has this feature; one of a swarm may be turned off."""
-            return not campaign.swarm or cast("float", value(f"{name}{ON}", _UNIT)) >= campaign.swarm
+            return not campaign.swarm or chance(f"{name}{ON}") >= campaign.swarm
 
         groups = {group: is_on(group) for group in _groups(campaign)}
         settings = tuple((key, value(key, span)) for key, span in campaign.vary.items() if groups[_group(key)])
@@ -100,7 +105,7 @@ class Space:
             obstacles = room.tables(things)
         faults, excuses = list[Table](), set[str]()
         for number, one in enumerate(campaign.disturbances, 1):
-            if is_on(f"disturb-{number}") and (tables := _faults(one, number, value)):
+            if is_on(f"disturb-{number}") and (tables := _faults(one, number, value, chance)):
                 faults += tables
                 excuses |= one.excuses
         return Proposal(point, values, settings, tuple(obstacles), tuple(faults), frozenset(excuses))
@@ -210,8 +215,8 @@ def _things(draw: Drawn, world: World, start: Pose, value: Value) -> list[DrawnT
     return found
 
 
-def _faults(one: Disturbance, number: int, value: Value) -> list[Table]:
+def _faults(one: Disturbance, number: int, value: Value, chance: Callable[[str], float]) -> list[Table]:
     name = f"disturb-{number}"
-    if one.share < 1 and cast("float", value(f"{name}.happens", _UNIT)) >= one.share:
+    if one.share < 1 and chance(f"{name}.happens") >= one.share:
         return []
     return [one.table(lambda key, span: value(f"{name}.{key}", span))]

@@ -71,28 +71,34 @@ fault = "sonar-stuck {sonar} {range_m}"
 sonar = { from = 1, to = 8 }
 range_m = { from = 0.2, to = 3.0 }
 at_s = { from = 1.0, to = 50.0 }
-share = 0.2
+share = 0.1
 excuses = ["no_collision", "clearance", "moves_on", "turns_away", "steers_away", "no_idle_turn"]
 
 [[disturb]]             # or nothing
 fault = "sonar-dead {sonar}"
 sonar = { from = 1, to = 8 }
 at_s = { from = 1.0, to = 50.0 }
-share = 0.2
+share = 0.1
 excuses = ["no_collision", "clearance", "turns_away", "steers_away", "no_idle_turn"]
 
-[[disturb]]             # the line is broken; the robot's own watchdog stops it after 2 s
+[[disturb]]             # packets are lost; the adapter waits 350 ms for the next one
+fault = "link-down"
+at_s = { from = 5.0, to = 50.0 }
+for_s = { from = 0.05, to = 0.2 }
+share = 0.3
+
+[[disturb]]             # the adapter stops, until the program asks for a connection anew
 fault = "link-down"
 at_s = { from = 5.0, to = 50.0 }
 for_s = { from = 0.5, to = 10.0 }
-share = 0.3
-excuses = ["no_collision", "clearance", "turns_away", "steers_away", "no_idle_turn", "backs_on_path"]
+share = 0.05
+excuses = ["no_collision", "clearance", "moves_on", "turns_away", "steers_away", "no_idle_turn", "backs_on_path"]
 
-[[disturb]]             # the robot's controller begins anew
+[[disturb]]             # the robot's controller begins anew: likewise
 fault = "reboot"
 at_s = { from = 5.0, to = 50.0 }
-share = 0.3
-excuses = ["no_collision", "clearance", "turns_away", "steers_away", "no_idle_turn", "backs_on_path"]
+share = 0.05
+excuses = ["no_collision", "clearance", "moves_on", "turns_away", "steers_away", "no_idle_turn", "backs_on_path"]
 
 [[disturb]]
 fault = "low-battery {volts}"

@@ -21,7 +21,7 @@ from p2os.toml_schema import Key
 from robot_bench.campaign.trial import Outcome
 
 
-class ReachTable(Record):
+class ToReachTable(Record):
     """`[[reach]]`: what at least one point has to reach; one of the four."""
 
     line: Annotated[str | None, Key(doc='a line of the firmware\'s source: `"dodge_fsm.c:212"`')] = None
@@ -57,11 +57,11 @@ class ReachTable(Record):
 
 
 @dataclass(frozen=True, slots=True)
-class Reach:
+class ToReach:
     """What has to be reached, and how it is seen in an outcome."""
 
     said: str
-    #: As of `ReachTable.words`.
+    #: As of `ToReachTable.words`.
     words: str = ""
     #: The first addresses of the blocks that execute the line, whole or in part.
     blocks: frozenset[int] = frozenset()
@@ -71,6 +71,6 @@ class Reach:
         return self.words in outcome.happened if self.words else bool(self.blocks & outcome.blocks)
 
 
-def looked_for(reaches: Sequence[Reach]) -> tuple[str, ...]:
+def looked_for(reaches: Sequence[ToReach]) -> tuple[str, ...]:
     """Return what a trial has to look for."""
     return tuple(dict.fromkeys(reach.words for reach in reaches if reach.words))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from bluepill_sim.analysis.coverage import Coverage, FileCoverage
 from bluepill_sim.board import BluePill
 from p2os.errors import ScenarioError
-from robot_bench.campaign.reaching.reach import Reach, ReachTable
+from robot_bench.campaign.reaching.reach import ToReach, ToReachTable
 from robot_bench.campaign.trial import Trial, bench_of, unpacked
 from simbase.errors import P2osError, nearest, shown
 from simbase.units import ranges_text
@@ -66,14 +66,14 @@ def source_reached(trial: Trial, blocks: Iterable[int], ways: Iterable[int]) -> 
         return None
 
 
-def reach_of(table: ReachTable, trial: Trial) -> Reach:
+def reach_of(table: ToReachTable, trial: Trial) -> ToReach:
     """Return what a table of the file asks for, of the program of a trial.
 
     Raises:
         ScenarioError: The program has no such line.
     """
     if table.line is None:
-        return Reach(table.said, table.words)
+        return ToReach(table.said, table.words)
     name, _, number = table.line.rpartition(":")
     board = _board(trial)
     if board is None:
@@ -86,7 +86,7 @@ def reach_of(table: ReachTable, trial: Trial) -> Reach:
     if int(number) not in file.lines:
         near = min(file.lines, key=lambda line: (abs(line - int(number)), line))
         raise ScenarioError(f"{shown(table.line)} gave no code", hint=f'line = "{name}:{near}"')
-    return Reach(table.said, blocks=coverage.blocks_of(file.name, int(number)))
+    return ToReach(table.said, blocks=coverage.blocks_of(file.name, int(number)))
 
 
 def _board(trial: Trial) -> BluePill | None:

@@ -1,4 +1,4 @@
-"""The faults that tools/faults has drawn: ten a program, each at its place in the sources as they are."""
+"""The faults that tools/bench/campaigns/faults has drawn: ten a program, at their places in the sources as they are."""
 
 import importlib.util
 import shutil
@@ -12,7 +12,7 @@ import pytest
 
 from robot_bench.firmware import build
 
-TOOL = Path(__file__).parents[2] / "tools" / "faults" / "draw.py"
+TOOL = Path(__file__).parents[3] / "tools" / "bench" / "campaigns" / "faults" / "draw.py"
 
 
 @pytest.fixture(scope="module")
