@@ -113,7 +113,7 @@ gap_m = 0.75            # between things: a robot of 0.38 m passes
 """
     + SEARCH
     + """\
-runs = $runs              # of the cheap kind; about a second of a processor each
+runs = $runs              # of the cheap kind; about two seconds of a processor each
 confirmations = 40      # runs in full: of what failed, and at the end of the nearest misses
 minutes = 10.0
 """
@@ -127,6 +127,16 @@ ${errors}$start.x_m = { from = $x0, to = $x1 }
 $start.y_m = { from = $y0, to = $y1 }
 $start.heading_deg = { from = 0, to = 355, step = 5 }
 
+[[draw]]                # about the robot as it begins, open behind it: it has to come out backwards
+kind = "dead-end"
+name = "pocket"
+count = 1
+ahead_m = { from = 0.3, to = 0.6 }
+aside_m = { from = -0.03, to = 0.03 }
+heading_deg = { from = -2, to = 2 }
+width_m = { from = 0.98, to = 1.1 }
+depth_m = { from = 1.4, to = 2.0 }
+
 [[draw]]                # things that stand in the way, each with a place and measures of its own
 kind = "post"
 count = { from = 1, to = 5 }
@@ -134,16 +144,6 @@ count = { from = 1, to = 5 }
 [[draw]]
 kind = "box"
 count = { from = 0, to = 3 }
-
-[[draw]]                # straight before it: it may go in straight, and has to come out again
-kind = "dead-end"
-name = "pocket"
-count = 1
-ahead_m = { from = 1.0, to = 1.6 }
-aside_m = { from = -0.1, to = 0.1 }
-heading_deg = { from = -6, to = 6 }
-width_m = { from = 0.9, to = 1.3 }
-depth_m = { from = 0.9, to = 1.6 }
 
 [[draw]]                # before the robot as it begins, open to it: many a turn begins here
 kind = "dead-end"
