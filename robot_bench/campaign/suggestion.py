@@ -120,8 +120,7 @@ minutes = 10.0
     + RUN
     + """\
 duration_s = { from = 60, to = 900, step = 1, tail = "long" }
-seed = { from = 0, to = 999 }
-sram = ["random"]       # at power-on; where it is turned off, zeros
+${seeds}sram = ["random"]       # at power-on; where it is turned off, zeros
 crystal_ppm = { from = -100, to = 100 }
 ${errors}$start.x_m = { from = $x0, to = $x1 }
 $start.y_m = { from = $y0, to = $y1 }
@@ -251,6 +250,7 @@ def suggested(scenario: Scenario, scenario_name: str, file: str, given: Mapping[
     return TEMPLATE.substitute(
         common, runs=keys.get("runs", 600), searched=f"worlds in which the firmware of {scenario.name} fails",
         duration=f"duration_s = {min(scenario.duration_ns / NS_PER_S, LONGEST_S)}\n",
+        seeds="seed = { from = 0, to = 999 }\n" if world == load_world(scenario.world, seed=scenario.seed + 1) else "",
         disturbed=DISTURBED if disturbed else "",
         errors='controller.errors = ["realistic"]       # noise of the sonar; else ideal\n' if disturbed else "",
         start=f"robot.{scenario.robots[0].name}" if scenario.robots else "start",

@@ -364,7 +364,12 @@ def test_what_new_writes_for_each_scenario_can_be_begun(name: str, tmp_path: Pat
     kinds = [goal["kind"] for goal in campaign.trial.table["goal"]]  # type: ignore[attr-defined]  # a list of tables
     assert bool(campaign.draws) is not is_list
     assert ("moves_on" in kinds) is not is_list
-    assert ("crystal_ppm" in campaign.vary) is is_list
+    assert {"crystal_ppm", "sram"} <= set(campaign.vary)
+    assert ("duration_s" in campaign.vary) is not is_list
+    # Faults act on a Pioneer's controller; a world that is another one for each seed has its start elsewhere.
+    assert bool(campaign.disturbances) is (name in {"dodge", "dodge-duty", "free-drive"})
+    assert ("seed" in campaign.vary) is (name != "two-dodge")
+    assert (campaign.search, campaign.swarm) == ("coverage", 0.5)
 
 
 def test_a_folder_that_is_taken_and_one_that_is_none_are_refused(tmp_path: Path) -> None:

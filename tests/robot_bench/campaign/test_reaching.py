@@ -164,7 +164,7 @@ def test_a_line_is_reached_where_a_block_with_it_was_entered(dodge: Trial, ran: 
 
 
 @pytest.mark.parametrize(
-    ("table", "told"),
+    ("table", "refusal"),
     [
         ({}, "one of line, state, pin and text"),
         ({"state": "A", "text": "B"}, "one of line, state, pin and text"),
@@ -174,8 +174,8 @@ def test_a_line_is_reached_where_a_block_with_it_was_entered(dodge: Trial, ran: 
         ({"pin": "PB12", "level": "up"}, "level"),
     ],
 )
-def test_what_cannot_be_reached_is_refused(table: dict[str, object], told: str, dodge: Trial) -> None:
-    with pytest.raises(ScenarioError, match=told):
+def test_what_cannot_be_reached_is_refused(table: dict[str, object], refusal: str, dodge: Trial) -> None:
+    with pytest.raises(ScenarioError, match=refusal):
         reach_of(read(ToReachTable, table, "[[reach]]"), dodge)
 
 
@@ -286,7 +286,7 @@ def test_a_long_tail_is_as_rare_as_it_is_long() -> None:
 
 
 @pytest.mark.parametrize(
-    ("right", "wrong", "told"),
+    ("right", "wrong", "refusal"),
     [
         ("to = 0.3 }", 'to = 0.3, tail = "long" }', "begin above 0"),
         ('excuses = ["no_collision"]', 'excuses = ["no_colision"]', "no such goal"),
@@ -294,8 +294,8 @@ def test_a_long_tail_is_as_rare_as_it_is_long() -> None:
         ("[budget]", '[[reach]]\nline = "dodge_fsm.c:1"\n[budget]', "gave no code"),
     ],
 )
-def test_what_is_wrong_in_a_file_is_refused(right: str, wrong: str, told: str, tmp_path: Path) -> None:
-    with pytest.raises(ScenarioError, match=told):
+def test_what_is_wrong_in_a_file_is_refused(right: str, wrong: str, refusal: str, tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match=refusal):
         begun(tmp_path, FILE.replace(right, wrong))
 
 

@@ -1,6 +1,6 @@
 """Draw twenty faults, ten in each of two example programs, which nobody has chosen, and build them.
 
-    python tools/bench/campaigns/faults/draw.py                    print what is drawn; --check: is it what drawn.json says?
+    python tools/bench/campaigns/faults/draw.py                    print what is drawn; --check: as in drawn.json?
     python tools/bench/campaigns/faults/draw.py --build FOLDER     an ELF of each, by drawn.json alone: dodge-01.elf, …
 
 A kind is drawn by its share in the field (`kinds.py` names the source), then a place of that kind evenly among all
