@@ -74,7 +74,15 @@ at_s = { from = 1.0, to = 50.0 }
 share = 0.1
 excuses = ["no_collision", "clearance", "moves_on", "turns_away", "steers_away", "no_idle_turn"]
 
-[[disturb]]             # or nothing
+[[disturb]]             # its ranges scatter by so much; a sound program may then come nearer than it is to
+fault = "sonar-noisy {sonar} {range_m}"
+sonar = { from = 1, to = 8 }
+range_m = { from = 0.01, to = 0.1 }
+at_s = { from = 1.0, to = 50.0 }
+share = 0.3
+excuses = ["clearance"]
+
+[[disturb]]             # or it sees nothing
 fault = "sonar-dead {sonar}"
 sonar = { from = 1, to = 8 }
 at_s = { from = 1.0, to = 50.0 }
@@ -122,7 +130,7 @@ minutes = 10.0
 duration_s = { from = 60, to = 900, step = 1, tail = "long" }
 ${seeds}sram = ["random"]       # at power-on; where it is turned off, zeros
 crystal_ppm = { from = -100, to = 100 }
-${errors}$start.x_m = { from = $x0, to = $x1 }
+$start.x_m = { from = $x0, to = $x1 }
 $start.y_m = { from = $y0, to = $y1 }
 $start.heading_deg = { from = 0, to = 355, step = 5 }
 
@@ -252,7 +260,6 @@ def suggested(scenario: Scenario, scenario_name: str, file: str, given: Mapping[
         duration=f"duration_s = {min(scenario.duration_ns / NS_PER_S, LONGEST_S)}\n",
         seeds="seed = { from = 0, to = 999 }\n" if world == load_world(scenario.world, seed=scenario.seed + 1) else "",
         disturbed=DISTURBED if disturbed else "",
-        errors='controller.errors = ["realistic"]       # noise of the sonar; else ideal\n' if disturbed else "",
         start=f"robot.{scenario.robots[0].name}" if scenario.robots else "start",
         x0=round(start.x_m - dx, 2), x1=round(start.x_m + dx, 2),
         y0=round(start.y_m - dy, 2), y1=round(start.y_m + dy, 2),
