@@ -139,9 +139,9 @@ kind = "dead-end"
 name = "pocket"
 count = 1
 ahead_m = { from = 0.3, to = 0.6 }
-aside_m = { from = -0.03, to = 0.03 }
-heading_deg = { from = -2, to = 2 }
-width_m = { from = 0.98, to = 1.1 }
+aside_m = { from = -0.02, to = 0.02 }
+heading_deg = { from = -1.5, to = 1.5 }
+width_m = { from = 1.0, to = 1.08 }
 depth_m = { from = 1.4, to = 2.0 }
 
 [[draw]]                # things that stand in the way, each with a place and measures of its own
