@@ -117,7 +117,7 @@ at_s = { from = 1.0, to = 50.0 }
 TEMPLATE = Template(
     HEAD
     + """\
-gap_m = 0.75            # between things: a robot of 0.38 m passes
+gap_m = 0.5             # between things: a robot of 0.38 m passes
 """
     + SEARCH
     + """\
