@@ -8,6 +8,7 @@ stay where a way is free, and turns, bends and goes back for a reason.
 """
 
 from collections.abc import Mapping
+from pathlib import Path
 from string import Template
 
 from p2os.pioneer.world import load_world
@@ -26,8 +27,9 @@ HEAD = """\
 scenario = $scenario_name
 ${firmware}"""
 SEARCH = """\
-search = $search        # grid, random, latin-hypercube, sobol, tpe, cma-es, quality-diversity, coverage
-
+search = $search     # grid, random, latin-hypercube, sobol, tpe, cma-es, quality-diversity, coverage
+corpus = $corpus    # points that reached something new, kept for the next campaign
+swarm = 0.5             # each point turns half of what varies, is drawn or disturbs off
 ${seed}
 [budget]
 """
@@ -62,22 +64,85 @@ sram = ["zeros", "random"]
 # The scenario's own goals have to hold: it carries out a list of its own. [[draw]] and [[goal]] say otherwise.
 """
 )
+#: A Pioneer's controller and line; what a program cannot make up for excuses the goals that it spoils.
+DISTURBED = """\
+[[disturb]]             # a sonar sees one distance for ever; what it spoils does not judge the run
+fault = "sonar-stuck {sonar} {range_m}"
+sonar = { from = 1, to = 8 }
+range_m = { from = 0.2, to = 3.0 }
+at_s = { from = 1.0, to = 50.0 }
+share = 0.1
+excuses = ["no_collision", "clearance", "moves_on", "turns_away", "steers_away", "no_idle_turn"]
+
+[[disturb]]             # its ranges scatter by so much; a sound program may then come nearer than it is to
+fault = "sonar-noisy {sonar} {range_m}"
+sonar = { from = 1, to = 8 }
+range_m = { from = 0.01, to = 0.1 }
+at_s = { from = 1.0, to = 50.0 }
+share = 0.3
+excuses = ["clearance"]
+
+[[disturb]]             # or it sees nothing
+fault = "sonar-dead {sonar}"
+sonar = { from = 1, to = 8 }
+at_s = { from = 1.0, to = 50.0 }
+share = 0.1
+excuses = ["no_collision", "clearance", "turns_away", "steers_away", "no_idle_turn"]
+
+[[disturb]]             # packets are lost; the adapter waits 350 ms for the next one
+fault = "link-down"
+at_s = { from = 5.0, to = 50.0 }
+for_s = { from = 0.05, to = 0.2 }
+share = 0.3
+
+[[disturb]]             # the adapter stops, until the program asks for a connection anew
+fault = "link-down"
+at_s = { from = 5.0, to = 50.0 }
+for_s = { from = 0.5, to = 10.0 }
+share = 0.05
+excuses = ["no_collision", "clearance", "moves_on", "turns_away", "steers_away", "no_idle_turn", "backs_on_path"]
+
+[[disturb]]             # the robot's controller begins anew: likewise
+fault = "reboot"
+at_s = { from = 5.0, to = 50.0 }
+share = 0.05
+excuses = ["no_collision", "clearance", "moves_on", "turns_away", "steers_away", "no_idle_turn", "backs_on_path"]
+
+[[disturb]]
+fault = "low-battery {volts}"
+volts = { from = 9.0, to = 12.0 }
+at_s = { from = 1.0, to = 50.0 }
+
+"""
 TEMPLATE = Template(
     HEAD
     + """\
-gap_m = 0.75             # between things: a robot of 0.38 m passes
+gap_m = 0.5             # between things: a robot of 0.38 m passes
 """
     + SEARCH
     + """\
-runs = $runs              # of the cheap kind; about a second of a processor each
+runs = $runs              # of the cheap kind; about two seconds of a processor each
 confirmations = 40      # runs in full: of what failed, and at the end of the nearest misses
 minutes = 10.0
 """
     + RUN
     + """\
+duration_s = { from = 60, to = 900, step = 1, tail = "long" }
+${seeds}sram = ["random"]       # at power-on; where it is turned off, zeros
+crystal_ppm = { from = -100, to = 100 }
 $start.x_m = { from = $x0, to = $x1 }
 $start.y_m = { from = $y0, to = $y1 }
 $start.heading_deg = { from = 0, to = 355, step = 5 }
+
+[[draw]]                # about the robot as it begins, open behind it: it has to come out backwards
+kind = "dead-end"
+name = "pocket"
+count = 1
+ahead_m = { from = 0.3, to = 0.6 }
+aside_m = { from = -0.02, to = 0.02 }
+heading_deg = { from = -1.5, to = 1.5 }
+width_m = { from = 1.0, to = 1.08 }
+depth_m = { from = 1.4, to = 2.0 }
 
 [[draw]]                # things that stand in the way, each with a place and measures of its own
 kind = "post"
@@ -101,6 +166,14 @@ ahead_m = { from = 0.8, to = 2.0 }
 aside_m = { from = -0.4, to = 0.4 }
 width_m = { from = 0.7, to = 1.2 }
 
+[[draw]]
+kind = "corner"
+count = { from = 0, to = 2 }
+
+[[draw]]
+kind = "doorway"
+count = { from = 0, to = 1 }
+
 [[draw]]                # behind it or beside it
 kind = "wall"
 name = "wall behind"
@@ -109,7 +182,7 @@ ahead_m = { from = -0.9, to = 0.3 }
 aside_m = { from = -0.9, to = 0.9 }
 heading_deg = { from = 0, to = 180 }
 
-[[goal]]                # what has to hold, in place of the scenario's own goals
+${disturbed}[[goal]]                # what has to hold, in place of the scenario's own goals
 kind = "no_collision"
 ends_run = "missed"
 
@@ -168,7 +241,8 @@ def suggested(scenario: Scenario, scenario_name: str, file: str, given: Mapping[
     keys = dict(given or {})
     common = {
         "firmware": f"firmware = {toml_value(keys['firmware'])}\n" if "firmware" in keys else "",
-        "search": toml_value(keys.get("search", "sobol")),
+        "search": toml_value(keys.get("search", "coverage")),
+        "corpus": toml_value(f"{Path(file).stem.removesuffix('-campaign')}-corpus.jsonl"),
         "seed": f"seed = {keys['seed']}" + " " * 16 + "# of the search\n" if "seed" in keys else "",
         "scenario_name": toml_value(scenario_name), "file": file, "body": toml_value(scenario.body),
         "mode": "" if scenario.robots else f"mode = {toml_value(scenario.mode)}\n",
@@ -176,6 +250,7 @@ def suggested(scenario: Scenario, scenario_name: str, file: str, given: Mapping[
     if any(goal.definition.is_scripted for part in parts for goal in part.goals):
         searched = f"clocks and SRAM with which the firmware of {scenario.name} fails"
         return SCRIPTED_TEMPLATE.substitute(common, searched=searched, duration="", runs=keys.get("runs", 64))
+    disturbed = scenario.own_robot is None and not scenario.robots and scenario.mode != "direct"
     world = load_world(scenario.world, seed=scenario.seed)
     start = scenario.robots[0].start if scenario.robots else scenario.start or world.start
     x0, y0, x1, y1 = world.extent
@@ -183,6 +258,8 @@ def suggested(scenario: Scenario, scenario_name: str, file: str, given: Mapping[
     return TEMPLATE.substitute(
         common, runs=keys.get("runs", 600), searched=f"worlds in which the firmware of {scenario.name} fails",
         duration=f"duration_s = {min(scenario.duration_ns / NS_PER_S, LONGEST_S)}\n",
+        seeds="seed = { from = 0, to = 999 }\n" if world == load_world(scenario.world, seed=scenario.seed + 1) else "",
+        disturbed=DISTURBED if disturbed else "",
         start=f"robot.{scenario.robots[0].name}" if scenario.robots else "start",
         x0=round(start.x_m - dx, 2), x1=round(start.x_m + dx, 2),
         y0=round(start.y_m - dy, 2), y1=round(start.y_m + dy, 2),

@@ -1,4 +1,4 @@
-"""Things that a campaign draws: posts, boxes, walls, dead ends, gaps and walkers, each of a few numbers.
+"""Things that a campaign draws: posts, walls, dead ends, gaps, corners, doorways, walkers, …, each of a few numbers.
 
     [[draw]]
     kind = "dead-end"
@@ -77,6 +77,20 @@ def _gap(measures: Measures) -> Sequence[Table]:
     return [_box(0.0, middle, WALL_M, length), _box(0.0, -middle, WALL_M, length)]
 
 
+def _corner(measures: Measures) -> Sequence[Table]:
+    """Return two walls of one length at a right angle about a place within it, open to its heading."""
+    length = measures["length_m"]
+    side = (length - WALL_M) / (2 * math.sqrt(2))
+    return [_box(-side, side, length, WALL_M, 45.0), _box(-side, -side, length, WALL_M, -45.0)]
+
+
+def _doorway(measures: Measures) -> Sequence[Table]:
+    """Return a wall across the way with a door in it, and its jambs, which stand out to both sides."""
+    jamb, width = measures["depth_m"], measures["width_m"]
+    jambs = [_box(0.0, side * (width + WALL_M) / 2, jamb, WALL_M) for side in (1, -1)]
+    return [*_gap({**measures, "width_m": width + 2 * WALL_M}), *jambs]
+
+
 #: Kind → what it is made of.
 KINDS: Mapping[str, ThingKind] = {
     "post": ThingKind({"width_m": (0.04, 0.3)}, _post),
@@ -89,6 +103,8 @@ KINDS: Mapping[str, ThingKind] = {
     ),
     "dead-end": ThingKind({"width_m": (0.8, 1.6), "depth_m": (0.6, 1.6)}, _dead_end),
     "gap": ThingKind({"width_m": (0.5, 1.2), "length_m": (0.4, 1.2)}, _gap),
+    "corner": ThingKind({"length_m": (0.6, 1.6)}, _corner),
+    "doorway": ThingKind({"width_m": (0.7, 1.2), "length_m": (0.8, 2.0), "depth_m": (0.1, 0.4)}, _doorway),
     "walker": ThingKind(
         {"width_m": (0.2, 0.5), "way_m": (1.0, 4.0), "speed_mps": (0.1, 0.6)}, _post, walks=True,
     ),
