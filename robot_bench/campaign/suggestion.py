@@ -191,10 +191,17 @@ kind = "clearance"
 least_m = 0.05
 ends_run = "missed"
 
-[[goal]]                # it neither stands nor turns on the spot nor stays shut in
+[[goal]]                # where it sees free floor it neither stands nor turns on the spot
 kind = "moves_on"
 way_m = 0.5
-within_s = 40.0         # dodge needs 30.6 s at most, in 230 points
+within_s = 40.0
+free_m = 1.2
+ends_run = "missed"
+
+[[goal]]                # and it comes out of dead ends: dodge needs 94 s at most of one of 1.04 m, 53 s of a corner
+kind = "moves_on"
+way_m = 0.5
+within_s = 180.0
 ends_run = "missed"
 
 [[goal]]                # turns go to the free side; one alone may go the other way
