@@ -73,6 +73,7 @@ class DrawTable(Record):
     heading_deg: Annotated[float | None, Key(least=-36_000, most=36_000, doc="counter-clockwise")] = None
     ahead_m: Annotated[float | None, Key(least=-1000, most=1000, doc="of the robot at its start")] = None
     aside_m: Annotated[float | None, Key(least=-1000, most=1000, doc="to the left of the robot at its start")] = None
+    gap_m: Annotated[float | None, Key(least=0, most=100, doc="off other things, in place of the file's")] = None
 
 
 class DisturbTable(Record):
@@ -82,7 +83,7 @@ class DisturbTable(Record):
     at_s: Annotated[float, Key(least=0, most=LONGEST_S, doc="when")] = 0.0
     for_s: Annotated[float | None, Key(above=0, most=LONGEST_S, doc="it ends after so long")] = None
     share: Annotated[float, Key(above=0, most=1, doc="in so many of the runs it happens")] = 1.0
-    excuses: Annotated[tuple[str, ...], Key(doc="kinds of goals that do not judge a run in which it happens")] = ()
+    name: Annotated[str | None, Key(doc="what goals are `excused_by`; else the first word of the fault")] = None
 
 
 DRAW = (
@@ -151,6 +152,8 @@ class Drawn:
     #: In the world; of a thing seen from the robot 0 turns its opening, its length or its way towards the robot.
     heading_deg: Span
     measures: Mapping[str, Span]
+    #: How far off other things at least, in place of the campaign's.
+    gap_m: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -164,8 +167,8 @@ class Disturbance:
     share: float
     #: Name in braces in the words → its values.
     values: Mapping[str, Span]
-    #: Kinds of goals that do not judge a run in which it happens.
-    excuses: frozenset[str] = frozenset()
+    #: What goals are excused by.
+    name: str = ""
 
     def table(self, value: Callable[[str, Span], object]) -> Table:
         """Return the `[[fault]]` table of a run; `value` chooses from the span of each key."""
@@ -222,6 +225,9 @@ class CampaignTable(Record):
     disturb: Annotated[tuple[Table, ...], Key(record=DisturbTable, doc="faults that are drawn")] = ()
     reach: Annotated[tuple[Table, ...], Key(record=ToReachTable, doc="what one point at least has to reach")] = ()
     goal: Annotated[tuple[Table, ...], GOALS] = ()
+    keeps: Annotated[tuple[str, ...], Key(
+        kind="list", doc="kinds of the scenario's own goals that hold beside those of this file"
+    )] = ()  # fmt: skip
 
 
 #: Every table of a campaign file and its keys.
@@ -308,8 +314,8 @@ def parse_campaign(text: str, path: Path, *, firmware: Path | None = None, trust
         limits=top.limits, cheap=cheap, full=full, vary=vary, draws=draws, disturbances=disturbances,
     )  # fmt: skip
     _refuse_settings(found, path)
+    _refuse_excuses(top.goal, [*(one.name for one in draws), *(one.name for one in disturbances)], where)
     for number, one in enumerate(disturbances):
-        _refuse_excuses(one, trial, within(where, "disturb", number))
         faults = [one.table(lambda _, span: span.value(0.0)), one.table(lambda _, span: span.value(1.0))]
         _scenario(trial.set(*cheap).with_lists(fault=faults), str(within(where, "disturb", number)))
     return found
@@ -336,7 +342,12 @@ def _trial(top: CampaignTable, path: Path, where: TablePlace, firmware: Path | N
             raise ScenarioError(f"{where.at('firmware')}: there is no file {shown(top.firmware)} beside it")
     with placed(where, "scenario"):
         trial = trial_of(str(beside) if is_file(beside) else top.scenario, firmware=firmware, trust=trust)
-    return trial.with_lists(goal=top.goal) if top.goal else trial
+    own = tables_of(trial.table, "goal")
+    for kind in top.keeps:
+        if kind not in {goal["kind"] for goal in own}:
+            raise ScenarioError(f"{where.at('keeps')}: the scenario has no goal {shown(kind)}", hint="leave it out")
+    kept = [goal for goal in own if goal["kind"] in top.keeps]
+    return trial.with_lists(goal=[*kept, *top.goal]) if top.goal else trial
 
 
 def _with_start(trial: Trial, vary: Table, path: Path) -> Trial:
@@ -365,11 +376,15 @@ def _refuse_settings(campaign: Campaign, path: Path) -> None:
         _scenario(trial, where)
 
 
-def _refuse_excuses(one: Disturbance, trial: Trial, where: Where) -> None:
-    """Refuse excuses from a goal that nobody has."""
-    kinds = [str(table["kind"]) for table in tables_of(trial.table, "goal") if "kind" in table]
-    for kind in sorted(one.excuses.difference(kinds)):
-        raise ScenarioError(f"{where}: excuses = {shown(kind)}: there is no such goal", hint=nearest(kind, kinds))
+def _refuse_excuses(goals: Sequence[Table], names: Sequence[str], where: TablePlace) -> None:
+    """Refuse goals that are excused by what nobody draws or disturbs by."""
+    for number, goal in enumerate(goals):
+        for name in cast("Sequence[str]", goal.get("excused_by", ())):
+            if name not in names:
+                at = within(where, "goal", number)
+                raise ScenarioError(
+                    f"{at}: there is no [[draw]] or [[disturb]] {shown(name)}", hint=nearest(name, names)
+                )
 
 
 def _scenario(trial: Trial, where: str) -> Scenario:
@@ -420,7 +435,7 @@ def _draws(tables: Sequence[Table], where: TablePlace) -> tuple[Drawn, ...]:
         found.append(Drawn(
             seen=None if ahead is None else (ahead, aside),
             name=name, kind=kind, count=spans.pop("count", Span(1, 1, is_whole=True)),
-            area_m=_area(table.get("area_m"), place),
+            area_m=_area(table.get("area_m"), place), gap_m=number_of(table, "gap_m") if "gap_m" in table else None,
             heading_deg=spans.pop("heading_deg", Span(0.0, 360.0) if ahead is None else Span(-30.0, 30.0)),
             measures={key: spans.get(key, Span(low, high)) for key, (low, high) in known.items()},
         ))  # fmt: skip
@@ -429,7 +444,7 @@ def _draws(tables: Sequence[Table], where: TablePlace) -> tuple[Drawn, ...]:
 
 #: Keys of `[[draw]]` that take a range.
 _PLACING = frozenset({"count", "heading_deg", "ahead_m", "aside_m"})
-_SPANNED = frozenset(key.name for key in DRAW if key.kind in {"number", "whole"})
+_SPANNED = frozenset(key.name for key in DRAW if key.kind in {"number", "whole"} and key.name != "gap_m")
 
 
 def _disturbance(table: Table, where: Where) -> Disturbance:
@@ -444,7 +459,7 @@ def _disturbance(table: Table, where: Where) -> Disturbance:
         for_s=_span(table["for_s"], f"{where}: for_s") if "for_s" in table else None,
         share=number_of(table, "share", 1.0),
         values={key: _span(value, f"{where}: {key}") for key, value in named.items()},
-        excuses=frozenset(cast("list[str]", table.get("excuses", []))),
+        name=str(table.get("name") or (str(table["fault"]).split() or [""])[0]),
     )  # fmt: skip
 
 

@@ -48,8 +48,8 @@ class Proposal:
     settings: tuple[Setting, ...]
     obstacles: tuple[Table, ...]
     faults: tuple[Table, ...]
-    #: Kinds of goals that do not judge it, for what disturbs it.
-    excuses: frozenset[str] = frozenset()
+    #: Of what was drawn and of what disturbs it the names of what excuses from a goal.
+    disturbed_by: frozenset[str] = frozenset()
 
     def trial(self, base: Trial, stage: Sequence[Setting]) -> Trial:
         """Return the trial of this point, with what a stage sets."""
@@ -58,7 +58,7 @@ class Proposal:
         for name, more in (("obstacle", self.obstacles), ("fault", self.faults)):
             if more:
                 lists[name] = [*tables_of(base.table, name), *more]
-        return replace(found.with_lists(**lists), excuses=self.excuses | base.excuses)
+        return replace(found.with_lists(**lists), disturbed_by=self.disturbed_by | base.disturbed_by)
 
 
 class Space:
@@ -71,6 +71,8 @@ class Space:
     def __init__(self, campaign: Campaign) -> None:
         self._campaign = campaign
         self.dimensions = tuple(_dimensions(campaign))
+        goals = tables_of(campaign.trial.table, "goal")
+        self._excusing = frozenset(name for goal in goals for name in cast("Sequence[str]", goal.get("excused_by", ())))
         #: The floor of the world where nothing varies: least x, least y, greatest x and y, metres.
         self.extent = self._place(())[0].extent
 
@@ -103,12 +105,14 @@ class Space:
             things = [thing for draw in draws for thing in _things(draw, world, starts[0], value)]
             room = Room(world, starts, campaign.gap_m, campaign.free_m)
             obstacles = room.tables(things)
-        faults, excuses = list[Table](), set[str]()
+        drawn = {str(table["name"]) for table in obstacles}
+        names = {draw.name for draw in campaign.draws if any(one.startswith(f"{draw.name}-") for one in drawn)}
+        faults = list[Table]()
         for number, one in enumerate(campaign.disturbances, 1):
             if is_on(f"disturb-{number}") and (tables := _faults(one, number, value, chance)):
                 faults += tables
-                excuses |= one.excuses
-        return Proposal(point, values, settings, tuple(obstacles), tuple(faults), frozenset(excuses))
+                names.add(one.name)
+        return Proposal(point, values, settings, tuple(obstacles), tuple(faults), self._excusing & names)
 
     def coordinates(self, point: Point) -> dict[str, float]:
         """Return a point by the names of its dimensions."""
@@ -211,7 +215,7 @@ def _things(draw: Drawn, world: World, start: Pose, value: Value) -> list[DrawnT
             heading_deg += math.degrees(start.heading_rad) + 180
         place = (round(x_m, 3), round(y_m, 3), round(heading_deg % 360, 1))
         measures = {key: cast("float", value(f"{name}.{key}", span)) for key, span in draw.measures.items()}
-        found.append(DrawnThing(name=name, kind=draw.kind, place=place, measures=measures))
+        found.append(DrawnThing(name=name, kind=draw.kind, place=place, measures=measures, gap_m=draw.gap_m))
     return found
 
 

@@ -7,7 +7,7 @@ from other starts. What it has to show is what any such robot has to: it touches
 stay where a way is free, and turns, bends and goes back for a reason.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from string import Template
 
@@ -48,6 +48,7 @@ ${duration}
 """
 SCRIPTED_TEMPLATE = Template(
     HEAD
+    + "${room}"
     + SEARCH
     + """\
 runs = $runs               # of the cheap kind
@@ -56,14 +57,34 @@ minutes = 10.0
 """
     + RUN
     + """\
-seed = { from = 0, to = 999 }
-crystal_ppm = { from = -100, to = 100 }
+${seeds}crystal_ppm = { from = -100, to = 100 }
 sram = ["zeros", "random"]
-# controller.errors = ["ideal", "realistic"]    # mode adapter: with noise a goal on exact words may be missed rightly
-
-# The scenario's own goals have to hold: it carries out a list of its own. [[draw]] and [[goal]] say otherwise.
+${charge}${errors}
+$ahead# The scenario's own goals have to hold: it carries out a list of its own. [[draw]] and [[goal]] say otherwise.
 """
 )
+ERRORS = """\
+# controller.errors = ["ideal", "realistic"]    # mode adapter: with noise a goal on exact words may be missed rightly
+"""
+#: Of a robot on own pins: from nearly empty to full.
+CHARGE = "charge = { from = 0.1, to = 1.0 }     # of its battery\n"
+#: What is drawn where a goal of the scenario's is excused by it.
+IN_THE_WAY = "in the way"
+ROOM = """\
+gap_m = 0.1             # between what is drawn and other things
+free_m = 0.2            # about the robot as it begins
+"""
+AHEAD = f"""\
+[[draw]]                # goals that the program then cannot meet say so: excused_by
+name = "{IN_THE_WAY}"
+kind = "box"
+count = [0, 0, 0, 0, 1]
+ahead_m = {{ from = 0.45, to = 0.75 }}
+aside_m = {{ from = -0.02, to = 0.02 }}
+length_m = 0.2
+width_m = 0.3
+
+"""
 #: A Pioneer's controller and line; what a program cannot make up for excuses the goals that it spoils.
 DISTURBED = """\
 [[disturb]]             # a sonar sees one distance for ever; what it spoils does not judge the run
@@ -72,7 +93,6 @@ sonar = { from = 1, to = 8 }
 range_m = { from = 0.2, to = 3.0 }
 at_s = { from = 1.0, to = 50.0 }
 share = 0.1
-excuses = ["no_collision", "clearance", "moves_on", "turns_away", "steers_away", "no_idle_turn"]
 
 [[disturb]]             # its ranges scatter by so much; a sound program may then come nearer than it is to
 fault = "sonar-noisy {sonar} {range_m}"
@@ -80,33 +100,31 @@ sonar = { from = 1, to = 8 }
 range_m = { from = 0.01, to = 0.1 }
 at_s = { from = 1.0, to = 50.0 }
 share = 0.3
-excuses = ["clearance"]
 
 [[disturb]]             # or it sees nothing
 fault = "sonar-dead {sonar}"
 sonar = { from = 1, to = 8 }
 at_s = { from = 1.0, to = 50.0 }
 share = 0.1
-excuses = ["no_collision", "clearance", "turns_away", "steers_away", "no_idle_turn"]
 
-[[disturb]]             # packets are lost; the adapter waits 350 ms for the next one
+[[disturb]]             # packets are lost; the adapter waits 350 ms for the next one, and one comes each 100 ms
+name = "short loss"
 fault = "link-down"
 at_s = { from = 5.0, to = 50.0 }
-for_s = { from = 0.05, to = 0.2 }
+for_s = { from = 0.02, to = 0.12 }
 share = 0.3
 
 [[disturb]]             # the adapter stops, until the program asks for a connection anew
+name = "lost link"
 fault = "link-down"
 at_s = { from = 5.0, to = 50.0 }
 for_s = { from = 0.5, to = 10.0 }
 share = 0.05
-excuses = ["no_collision", "clearance", "moves_on", "turns_away", "steers_away", "no_idle_turn", "backs_on_path"]
 
 [[disturb]]             # the robot's controller begins anew: likewise
 fault = "reboot"
 at_s = { from = 5.0, to = 50.0 }
 share = 0.05
-excuses = ["no_collision", "clearance", "moves_on", "turns_away", "steers_away", "no_idle_turn", "backs_on_path"]
 
 [[disturb]]
 fault = "low-battery {volts}"
@@ -114,11 +132,18 @@ volts = { from = 9.0, to = 12.0 }
 at_s = { from = 1.0, to = 50.0 }
 
 """
+POCKET = "pocket"
+#: What excuses from which goal, where it may happen: what a program is told wrongly, or not at all, it answers wrongly.
+EXCUSES: Mapping[str, tuple[str, ...]] = {
+    "narrow": (POCKET, "sonar-stuck", "sonar-dead", "lost link", "reboot"),
+    "blind": ("sonar-stuck", "sonar-dead", "lost link", "reboot"),
+    "noisy": (POCKET, "sonar-stuck", "sonar-dead", "sonar-noisy", "lost link", "reboot"),
+    "stuck": ("sonar-stuck", "lost link", "reboot"),
+    "lost": ("lost link", "reboot"),
+}
 TEMPLATE = Template(
     HEAD
-    + """\
-gap_m = 0.5             # between things: a robot of 0.38 m passes
-"""
+    + "${keeps}"
     + SEARCH
     + """\
 runs = $runs              # of the cheap kind; about two seconds of a processor each
@@ -136,8 +161,9 @@ $start.heading_deg = { from = 0, to = 355, step = 5 }
 
 [[draw]]                # about the robot as it begins, open behind it: it has to come out backwards
 kind = "dead-end"
-name = "pocket"
+name = "pocket"         # it leaves passages of less than 0.9 m: no goal on contacts judges there
 count = 1
+gap_m = 0.5
 ahead_m = { from = 0.3, to = 0.6 }
 aside_m = { from = -0.02, to = 0.02 }
 heading_deg = { from = -1.5, to = 1.5 }
@@ -182,51 +208,51 @@ ahead_m = { from = -0.9, to = 0.3 }
 aside_m = { from = -0.9, to = 0.9 }
 heading_deg = { from = 0, to = 180 }
 
-${disturbed}[[goal]]                # what has to hold, in place of the scenario's own goals
+${disturbed}[[goal]]                # what has to hold, beside the scenario's own goals that keeps names
 kind = "no_collision"
-ends_run = "missed"
+${narrow}ends_run = "missed"
 
 [[goal]]
 kind = "clearance"
-least_m = 0.05
+${noisy}least_m = 0.05
 ends_run = "missed"
 
 [[goal]]                # where it sees free floor it neither stands nor turns on the spot
 kind = "moves_on"
-way_m = 0.5
+${stuck}way_m = 0.5
 within_s = 40.0
 free_m = 1.2
 ends_run = "missed"
 
 [[goal]]                # and it comes out of dead ends: dodge needs 94 s at most of one of 1.04 m, 53 s of a corner
 kind = "moves_on"
-way_m = 0.5
+${stuck}way_m = 0.5
 within_s = 180.0
 ends_run = "missed"
 
 [[goal]]                # turns go to the free side; one alone may go the other way
 kind = "turns_away"
-near_m = 0.55
+${blind}near_m = 0.55
 free_m = 0.8
 row = 1
 ends_run = "missed"
 
 [[goal]]                # and so do arcs
 kind = "steers_away"
-near_m = 0.5
+${blind}near_m = 0.5
 free_m = 0.8
 within_s = 1.0
 ends_run = "missed"
 
 [[goal]]                # a turn ends where everything is free
 kind = "no_idle_turn"
-free_m = 0.8
+${blind}free_m = 0.8
 within_s = 0.5
 ends_run = "missed"
 
 [[goal]]                # nothing sees what is behind
 kind = "backs_on_path"
-off_m = 0.1
+${lost}off_m = 0.1
 ends_run = "missed"
 """
 )
@@ -254,20 +280,34 @@ def suggested(scenario: Scenario, scenario_name: str, file: str, given: Mapping[
         "scenario_name": toml_value(scenario_name), "file": file, "body": toml_value(scenario.body),
         "mode": "" if scenario.robots else f"mode = {toml_value(scenario.mode)}\n",
     }  # fmt: skip
-    if any(goal.definition.is_scripted for part in parts for goal in part.goals):
-        searched = f"clocks and SRAM with which the firmware of {scenario.name} fails"
-        return SCRIPTED_TEMPLATE.substitute(common, searched=searched, duration="", runs=keys.get("runs", 64))
-    disturbed = scenario.own_robot is None and not scenario.robots and scenario.mode != "direct"
+    goals = [goal for part in parts for goal in part.goals]
     world = load_world(scenario.world, seed=scenario.seed)
+    is_drawn = world != load_world(scenario.world, seed=scenario.seed + 1)
+    common["seeds"] = "" if is_drawn else "seed = { from = 0, to = 999 }\n"
+    if any(goal.definition.is_scripted for goal in goals):
+        ahead = any(IN_THE_WAY in goal.excused_by for goal in goals)
+        return SCRIPTED_TEMPLATE.substitute(
+            common, searched=f"clocks, SRAM and more with which the firmware of {scenario.name} fails", duration="",
+            runs=keys.get("runs", 64), charge=CHARGE if scenario.own_robot is not None else "",
+            errors=ERRORS if scenario.own_robot is None else "",
+            ahead=AHEAD if ahead else "", room=ROOM if ahead else "",
+        )  # fmt: skip
+    disturbed = scenario.own_robot is None and not scenario.robots and scenario.mode != "direct"
     start = scenario.robots[0].start if scenario.robots else scenario.start or world.start
+    kinds = dict.fromkeys(goal.kind for goal in goals if goal.definition.holds_anywhere)
+    excused = {name: _excused_by(by if disturbed else by[: by[0] == POCKET]) for name, by in EXCUSES.items()}
     x0, y0, x1, y1 = world.extent
     dx, dy = (x1 - x0) * START_SHARE / 2, (y1 - y0) * START_SHARE / 2
     return TEMPLATE.substitute(
-        common, runs=keys.get("runs", 600), searched=f"worlds in which the firmware of {scenario.name} fails",
+        common | excused, searched=f"worlds in which the firmware of {scenario.name} fails",
+        runs=keys.get("runs", 600), keeps=f"keeps = {toml_value(list(kinds))}\n" if kinds else "",
         duration=f"duration_s = {min(scenario.duration_ns / NS_PER_S, LONGEST_S)}\n",
-        seeds="seed = { from = 0, to = 999 }\n" if world == load_world(scenario.world, seed=scenario.seed + 1) else "",
         disturbed=DISTURBED if disturbed else "",
         start=f"robot.{scenario.robots[0].name}" if scenario.robots else "start",
         x0=round(start.x_m - dx, 2), x1=round(start.x_m + dx, 2),
         y0=round(start.y_m - dy, 2), y1=round(start.y_m + dy, 2),
     )  # fmt: skip
+
+
+def _excused_by(names: Sequence[str]) -> str:
+    return f"excused_by = {toml_value([*names])}\n" if names else ""

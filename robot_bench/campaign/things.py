@@ -119,6 +119,8 @@ class DrawnThing:
     kind: str
     place: Place
     measures: Measures
+    #: How far it stands off other things at least, in place of the room's.
+    gap_m: float | None = None
 
 
 @dataclass(slots=True)
@@ -146,21 +148,22 @@ class Room:
             for x_m, y_m, heading_deg in _places(thing.place):
                 parts = [_placed(part, x_m, y_m, heading_deg) for part in kind.boxes(thing.measures)]
                 prints = [Footprint(_obstacle(part)) for part in parts]
-                if all(self._is_free(one, taken) for one in prints):
+                gap_m = self.gap_m if thing.gap_m is None else thing.gap_m
+                if all(self._is_free(one, taken, gap_m) for one in prints):
                     taken += [] if kind.walks else prints
                     names = [thing.name] if len(parts) == 1 else [f"{thing.name}-{n}" for n in range(1, len(parts) + 1)]
                     found += [_table(name, part, thing, heading_deg) for name, part in zip(names, parts, strict=True)]
                     break
         return found
 
-    def _is_free(self, one: Footprint, others: Sequence[Footprint]) -> bool:
+    def _is_free(self, one: Footprint, others: Sequence[Footprint], gap_m: float) -> bool:
         x0, y0, x1, y1 = self.world.extent
         left, low, right, high = one.bounds
         if left < x0 or low < y0 or right > x1 or high > y1:
             return False
         if any(one.distance_to_point(start.x_m, start.y_m) < self.free_m for start in self.starts):
             return False
-        return all(_apart_m(one, other) >= self.gap_m for other in others)
+        return all(_apart_m(one, other) >= gap_m for other in others)
 
 
 def _places(wanted: Place) -> Sequence[Place]:

@@ -91,8 +91,8 @@ class Trial:
     trusted: frozenset[str] = frozenset()
     #: Events, as lines of words, of which its outcome says whether they have happened; they change nothing in the run.
     looks_for: tuple[str, ...] = ()
-    #: Kinds of goals that do not judge: what is missed of them is told apart.
-    excuses: frozenset[str] = frozenset()
+    #: Names of what disturbs it: a goal that is excused by one of these does not judge.
+    disturbed_by: frozenset[str] = frozenset()
 
     def set(self, *settings: Setting) -> "Trial":
         """Return the trial with keys set as `--set` sets them: `("start.x_m", 1.5)`.
@@ -143,8 +143,8 @@ class Trial:
             found.update(f"\0{name}\0{len(content)}\0".encode() + content)
         for words in self.looks_for:
             found.update(f"\0\0{words}".encode())
-        for kind in sorted(self.excuses):
-            found.update(f"\0\0\0{kind}".encode())
+        for name in sorted(self.disturbed_by):
+            found.update(f"\0\0\0{name}".encode())
         return found.hexdigest()
 
     def write(self, folder: Path) -> Path:
@@ -363,7 +363,7 @@ def run_trial(trial: Trial, look: Callable[[], None] | None = None, start: Start
                 for one in bench.robots.values():
                     one.on_slice = lambda _now: look()
             bench.run_until(bench.end)
-            return outcome_of(bench, seen, trial.excuses)
+            return outcome_of(bench, seen, trial.disturbed_by)
         except P2osError as error:
             hint = f" ({error.hint})" if error.hint else ""
             return Outcome(verdict=TrialVerdict.ERROR, failures=(f"{error}{hint}",))
@@ -393,8 +393,8 @@ def bench_of(scenario: Scenario) -> Bench:
     return Bench(scenario, chip=boot(scenario, _image_of(scenario.firmware, stat.st_mtime_ns, stat.st_size)))
 
 
-def outcome_of(bench: Bench, seen: SeenSoFar, excuses: frozenset[str] = frozenset()) -> Outcome:
-    """End a run and return what came of it; `excuses` as of `Trial`."""
+def outcome_of(bench: Bench, seen: SeenSoFar, disturbed_by: frozenset[str] = frozenset()) -> Outcome:
+    """End a run and return what came of it; `disturbed_by` as of `Trial`."""
     end = bench.finish()
     goals: list[GoalResult] = []
     failures: list[str] = []
@@ -406,7 +406,7 @@ def outcome_of(bench: Bench, seen: SeenSoFar, excuses: frozenset[str] = frozense
         if one.chip.has_died:
             failures.append(before + one.chip.verdict)
             died = died or failures[-1]
-        found = _goals(one, end, robot, excuses)
+        found = _goals(one, end, robot, disturbed_by)
         goals += found
         failures += [f"{before}{goal.kind}: {goal.says}" for goal in found if goal.met is False and not goal.is_excused]
         hashes.append(one.trace.sha256)
@@ -436,7 +436,7 @@ def ways_of(bench: Bench) -> frozenset[int]:
     )
 
 
-def _goals(bench: Bench, end: Nanos, robot: str, excuses: frozenset[str]) -> list[GoalResult]:
+def _goals(bench: Bench, end: Nanos, robot: str, disturbed_by: frozenset[str]) -> list[GoalResult]:
     found = []
     for one in run_of(bench).goals.at_end(run_of(bench).ended(end)):
         goal, outcome = one.goal, one.outcome
@@ -444,7 +444,7 @@ def _goals(bench: Bench, end: Nanos, robot: str, excuses: frozenset[str]) -> lis
         found.append(GoalResult(
             kind=goal.kind, wanted=goal.wanted, met=None if one.is_open else outcome.met, says=outcome.says,
             robustness=None if by is None else round(by, 9), unit="" if by is None else outcome.unit, robot=robot,
-            is_excused=not one.is_open and not outcome.met and goal.kind in excuses,
+            is_excused=not one.is_open and not outcome.met and bool(goal.excused_by & disturbed_by),
         ))  # fmt: skip
     return found
 

@@ -13,6 +13,7 @@ from robot_bench.scenario.goals.watch import (
     From,
     GoalKind,
     GoalOutcome,
+    IfAny,
     InTime,
     NoKeys,
     OfEvents,
@@ -303,6 +304,7 @@ class StopWithinTable(OfEvents):
     after: Annotated[str, Key(doc="the event")]
     within_s: InTime
     way_m: _Way = None
+    if_any: IfAny = False
 
 
 class StopWithin(Watch):
@@ -315,6 +317,7 @@ class StopWithin(Watch):
         self._events = SelectorFeed(table.selected(table.after))
         self.kinds, self.wires = (*{Pose: None, **dict.fromkeys(self._events.kinds)},), self._events.wires
         self._most_s, self._most_m = table.within_s, table.way_m or math.inf
+        self._if_any = table.if_any
         #: When the event came that is waited for now; the last place, and the way since then.
         self._since: Nanos | None = None
         self._at: tuple[float, float] | None = None
@@ -353,7 +356,7 @@ class StopWithin(Watch):
 
     def finish(self, end: Nanos) -> GoalOutcome:
         if not self._count:
-            return GoalOutcome(met=False, says=f"{self._words!r} did not happen")
+            return GoalOutcome(met=self._if_any, says=f"{self._words!r} did not happen")
         return GoalOutcome(
             met=not self._failure,
             says=self._failure or f"at most {self._worst_s:.3f} s and {self._worst_m:.3f} m",
@@ -572,7 +575,8 @@ KINDS: Mapping[str, GoalKind] = {
         StopWithinTable,
         lambda table: f"stands still{window_in_words(table.after, within_s=table.within_s)}"
         + "".join(given_in_words((" and ", table.way_m, " m"))),
-        StopWithin, doc="after each such event the robot stands in time, no further on",
+        StopWithin, doc="after each such event the robot stands in time, no further on; with `if_any = true` also "
+        "where there is none",
     ),
     "moves_on": GoalKind(
         MovesOnTable,

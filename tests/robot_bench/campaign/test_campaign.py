@@ -364,13 +364,16 @@ def test_what_new_writes_for_each_scenario_can_be_begun(name: str, tmp_path: Pat
     campaign = parse_campaign(suggested(load_scenario(name), name, "mine.toml"), tmp_path / "mine.toml")
     is_list = name in {"encoders", "motors", "rover", "sensors"}
     kinds = [goal["kind"] for goal in campaign.trial.table["goal"]]  # type: ignore[attr-defined]  # a list of tables
-    assert bool(campaign.draws) is not is_list
+    drawn = [one.name for one in campaign.draws]
+    assert drawn == ["in the way"] if name == "rover" else bool(drawn) is not is_list
     assert ("moves_on" in kinds) is not is_list
     assert {"crystal_ppm", "sram"} <= set(campaign.vary)
     assert ("duration_s" in campaign.vary) is not is_list
     # Faults act on a Pioneer's controller; a world that is another one for each seed has its start elsewhere.
     assert bool(campaign.disturbances) is (name in {"dodge", "dodge-duty", "free-drive"})
-    assert ("seed" in campaign.vary) is (name != "two-dodge")
+    assert ("seed" in campaign.vary) is (name not in {"two-dodge", "rover"})
+    assert ("charge" in campaign.vary) is (name == "rover")
+    assert ("answers" in kinds) is (name == "dodge"), "of its own goals those that hold in any world"
     assert (campaign.search, campaign.swarm) == ("coverage", 0.5)
 
 

@@ -53,9 +53,9 @@ count = 2
 fault = "sonar-dead {sonar}"
 sonar = { from = 1, to = 8 }
 at_s = 1.0
-excuses = ["no_collision"]
 [[goal]]
 kind = "no_collision"
+excused_by = ["sonar-dead"]
 """
 
 
@@ -252,7 +252,7 @@ def test_each_feature_is_turned_off_in_half_of_the_points_and_tables_go_together
         assert ("start.x_m" in keys) is ("start.heading_deg" in keys)
         on.update({"start": "start.x_m" in keys, "threshold": "threshold_m" in keys})
         on.update({"post": bool(found.obstacles), "fault": bool(found.faults)})
-        assert found.excuses == ({"no_collision"} if found.faults else set())
+        assert found.disturbed_by == ({"sonar-dead"} if found.faults else set())
     assert all(70 < on[name] < 130 for name in ("start", "threshold", "post", "fault")), on
 
 
@@ -289,7 +289,12 @@ def test_a_long_tail_is_as_rare_as_it_is_long() -> None:
     ("right", "wrong", "refusal"),
     [
         ("to = 0.3 }", 'to = 0.3, tail = "long" }', "begin above 0"),
-        ('excuses = ["no_collision"]', 'excuses = ["no_colision"]', "no such goal"),
+        (
+            'excused_by = ["sonar-dead"]',
+            'excused_by = ["sonar-ded"]',
+            "there is no .* 'sonar-ded'",
+        ),
+        ("swarm = 0.5", 'swarm = 0.5\nkeeps = ["answer"]', "the scenario has no goal 'answer'"),
         ("swarm = 0.5", "swarm = 1.0", "swarm"),
         ("[budget]", '[[reach]]\nline = "dodge_fsm.c:1"\n[budget]', "gave no code"),
     ],
@@ -306,9 +311,9 @@ def test_a_goal_that_does_not_judge_is_told_apart() -> None:
     crash = [
         {"at_s": 0, "name": "post", "shape": "cylinder", "radius_m": 0.05, "height_m": 0.5, "x_m": 0.33, "y_m": 0.0}
     ]
-    goals = [{"kind": "min_distance", "distance_m": 50.0}]
+    goals = [{"kind": "min_distance", "distance_m": 50.0, "excused_by": ["a post"]}]
     trial = trial_of("dodge", settings=SHORT).with_lists(obstacle=crash, goal=goals)
-    judged, excused = run_trial(trial), run_trial(replace(trial, excuses=frozenset({"min_distance"})))
+    judged, excused = (run_trial(replace(trial, disturbed_by=frozenset({name}))) for name in ("a wall", "a post"))
     assert judged.verdict is TrialVerdict.FAILED
     assert excused.verdict is TrialVerdict.PASSED
     assert not excused.failures
@@ -318,6 +323,18 @@ def test_a_goal_that_does_not_judge_is_told_apart() -> None:
     assert outcome_of_plain(json.loads(json.dumps(plain_of(excused)))) == excused
     assert row_of(excused).finding is PointFinding.EXCUSED
     assert row_of(judged).finding is PointFinding.UNCONFIRMED
+
+
+def test_a_goal_may_be_excused_by_what_is_drawn_and_of_the_scenarios_own_some_are_kept(tmp_path: Path) -> None:
+    text = FILE.replace("swarm = 0.5", 'keeps = ["answers"]').replace('["sonar-dead"]', '["post"]')
+    campaign = begun(tmp_path, text)
+    own = trial_of("dodge").table["goal"]
+    kept = [goal for goal in own if goal["kind"] == "answers"]  # type: ignore[attr-defined]  # a list of tables
+    assert campaign.trial.table["goal"] == [*kept, {"kind": "no_collision", "excused_by": ["post"]}]
+    space = Space(campaign)
+    found = space.proposal(tuple(map(spread, range(len(space.dimensions)))))
+    assert found.disturbed_by == {"post"}
+    assert found.trial(campaign.trial, ()).disturbed_by == {"post"}
 
 
 def row_of(outcome: Outcome) -> PointRow:

@@ -68,9 +68,9 @@ def printed(*lines: tuple[int, str]) -> list[Event]:
 
 
 def test_every_kind_of_goal_is_tried() -> None:
-    from tests.robot_bench.scenario import test_goals, test_goals_on_steering
+    from tests.robot_bench.scenario import test_goals, test_goals_on_answers, test_goals_on_steering
 
-    tests = [*globals(), *vars(test_goals), *vars(test_goals_on_steering)]
+    tests = [*globals(), *vars(test_goals), *vars(test_goals_on_steering), *vars(test_goals_on_answers)]
     names = " ".join(name for name in tests if name.startswith("test_goal_"))
     missing = [kind for kind in every_kind() if kind not in names]
     assert missing == [], "write test_goal_KIND_... in tests/robot_bench/scenario/test_goals.py"
@@ -522,7 +522,8 @@ def test_one_declaration_of_a_plug_in_gives_reader_schema_page_and_completion(
     context = SimpleNamespace(params={"scenario": "mine.toml"}, args=[])
     assert [one for one, _ in setting_keys(context, "goal.1.")] == [  # type: ignore[arg-type] # all that it looks at
         *(f"goal.1.kind={name}" for name in every_kind()), "goal.1.ends_run=met", "goal.1.ends_run=missed",
-        "goal.1.ends_run=decided", "goal.1.most_deg=", "goal.1.axis=roll", "goal.1.axis=pitch", "goal.1.samples=",
+        "goal.1.ends_run=decided", "goal.1.excused_by=", "goal.1.most_deg=", "goal.1.axis=roll", "goal.1.axis=pitch",
+        "goal.1.samples=",
     ]  # fmt: skip
 
 
