@@ -476,6 +476,14 @@ class BluePill(Stateful):
         """
         return self.chip.engine.entered_blocks
 
+    @property
+    def gone_ways(self) -> frozenset[tuple[int, bool]]:
+        """As of `entered_blocks`: the ends of blocks in flash, each with whether it went on elsewhere than there.
+
+        Of a conditional branch that stands before the end these are its two ways: fell through, and taken.
+        """
+        return self.chip.engine.gone_ways
+
     def last_blocks(self) -> list[str]:
         """Return what ran last as lines for a person: the last 32 blocks and exceptions, with symbol and line.
 

@@ -11,11 +11,13 @@ Invariant: counts only grow; watching changes nothing.
 """
 
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
+from bluepill_sim.board import BluePill
 from bluepill_sim.program.functions import FunctionTable
 from bluepill_sim.program.image import Image
-from bluepill_sim.program.line_table import LineTable
+from bluepill_sim.program.line_table import LineTable, read_lines
 from bluepill_sim.program.static_code import StaticBlock, StaticCode
 
 
@@ -99,6 +101,33 @@ class Coverage:
         self._edges: Counter[tuple[int, int | None]] = Counter()
         #: The block that ends with each conditional branch.
         self._conditional: dict[int, StaticBlock] = {}
+
+    @classmethod
+    def of_board(cls, board: BluePill, blocks: Iterable[int], ways: Iterable[tuple[int, bool]]) -> "Coverage":
+        """Return what has run of a board's program where only that is known, not how often: each counts once.
+
+        Args:
+            board: Its program and its memory.
+            blocks: As of `BluePill.entered_blocks`, of any number of runs.
+            ways: As of `BluePill.gone_ways`.
+
+        Raises:
+            ImageError: As of `read_lines`.
+        """
+        found = cls(board.image, read_lines(board.image), StaticCode(board.chip.memory))
+        by_end: dict[int, StaticBlock] = {}
+        for start in blocks:
+            block = found._code.block(start)
+            found._edges[start, None] = 1
+            if block.is_conditional:
+                by_end[block.end] = block
+        for end, is_elsewhere in ways:
+            block_before = by_end.get(end)
+            if block_before is not None:
+                # Where it is a register that says where, any place but the end will do.
+                following = (block_before.last.destination or 0) if is_elsewhere else end
+                found._edges[block_before.start, following] = 1
+        return found
 
     # As a `BlockListener`.
 
@@ -187,6 +216,18 @@ class Coverage:
             calls = counts.get(function.address, 0)
             found.append(FunctionCoverage(function.name, function.address, len(own), hit, calls, len(ways), ways_hit))
         return found
+
+    def blocks_of(self, file: str, line: int) -> frozenset[int]:
+        """Return where blocks may start that execute the first instruction of a row of a line.
+
+        Each instruction before it in its block may be a start: who has come from elsewhere begins there.
+        """
+        rows = {row.address for row in self._table.rows if (row.file, row.line) == (file, line)}
+        found: set[int] = set()
+        for block in self._reachable().values():
+            for at in rows.intersection(block.addresses):
+                found.update(address for address in block.addresses if address <= at)
+        return frozenset(found)
 
     def pieces(self) -> list[tuple[int, int]]:
         """Return (first, address after) of each stretch of instructions that ran without a gap, by address."""

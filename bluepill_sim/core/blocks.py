@@ -40,7 +40,7 @@ class BlockTable(Stateful):
     """Measured blocks."""
 
     STATE = ("uses_exclusive",)
-    DERIVED = ("plain", "_special", "_in_writable", "ran_writable", "holds_exclusive", "entered")
+    DERIVED = ("plain", "_special", "_in_writable", "ran_writable", "holds_exclusive", "entered", "ways")
 
     def __init__(self, measure: Measure) -> None:
         self._measure = measure
@@ -57,6 +57,8 @@ class BlockTable(Stateful):
         self.uses_exclusive = self.holds_exclusive = False
         #: The first address of every block that this engine has ever entered; a snapshot takes none back.
         self.entered: set[int] = set()
+        #: (the address at which a block ends, whether it was left for another one) of every block that was left.
+        self.ways: set[tuple[int, bool]] = set()
 
     def at(self, address: int, size: int) -> BasicBlock:
         """Return a block that is not in `plain`; measure it if it is new or its bytes have changed."""

@@ -170,6 +170,7 @@ class Engine(Stateful):
         self._blocks = BlockTable(measure)
         self._blocks.must_look = self.flash_patch.concerns
         self._table = self._blocks.plain
+        self._ways = self._blocks.ways
         self._halt: Halt | None = None
         #: Where the run started: its first block may start inside an IT block.
         self._run_from = 0
@@ -254,6 +255,14 @@ class Engine(Stateful):
     def entered_blocks(self) -> frozenset[int]:
         """The first address of every block that was ever entered, whatever a snapshot has taken back."""
         return frozenset(self._blocks.entered)
+
+    @property
+    def gone_ways(self) -> frozenset[tuple[int, bool]]:
+        """Of each block that was ever left the address at which it ends, and whether it went on elsewhere.
+
+        One that an exception cut, or that it came right after, does not count then.
+        """
+        return frozenset(self._ways)
 
     def forget_costs(self) -> None:
         """Measure every block again when it is next entered."""
@@ -480,7 +489,9 @@ class Engine(Stateful):
         """Charge the block that has ended, then end the run or go on with the block at `address`."""
         try:
             block = self.block
-            cycle = self.cycle + (block.straight if address == block.end else block.taken)
+            goes_on = address == block.end
+            cycle = self.cycle + (block.straight if goes_on else block.taken)
+            self._ways.add((block.end, not goes_on))
             self.cycle = cycle
             if block.changes_masks:
                 self._trim_registers()

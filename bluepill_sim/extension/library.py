@@ -88,6 +88,7 @@ _FUNCTIONS = {
     "systick_read": "upuq",
     "systick_write": "vpuuq",
     "core_block_start": "up",
+    "core_ways": "pp",
     "core_set_page": "vpupupuppu",
     "core_set_regions": "vpuuuu",
     "core_join": "vpp",

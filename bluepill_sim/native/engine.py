@@ -84,6 +84,8 @@ _SLICE_CYCLES = 20_000_000
 #: The flash stands at 0 too; a page of it.
 _FLASH_ALIAS, _PAGE_SHIFT = 0x0800_0000, 10
 #: Chosen: rows that C keeps before Python takes them.
+#: As of core.h: half-words of 128 KB.
+_FLASH_SLOTS = 65536
 _RECORD_ROOM = 4096
 
 
@@ -362,6 +364,18 @@ class NativeEngine(Engine):
         super()._set_recorder(recorder)
         if not library().core_start_recording(self._state, 0 if recorder is None else _RECORD_ROOM):
             raise MemoryError("no memory for a record of blocks")
+
+    @property
+    def gone_ways(self) -> frozenset[tuple[int, bool]]:
+        """As of `Engine`; of blocks in flash alone."""
+        ways = ctypes.string_at(library().core_ways(self._state), _FLASH_SLOTS)
+        base = self.shared.flash_base
+        found = {
+            (base + 2 * slot, is_elsewhere)
+            for slot, gone in enumerate(ways) if gone
+            for is_elsewhere in (False, True) if gone & 1 << is_elsewhere
+        }  # fmt: skip
+        return super().gone_ways | found
 
     @property
     def next_event(self) -> int:

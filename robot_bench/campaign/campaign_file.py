@@ -20,15 +20,18 @@ Invariant: a `Campaign` that exists can be begun: its scenario is there and can 
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal, cast
 
 from p2os.errors import ScenarioError
 from p2os.pioneer.world import load_world
 from p2os.toml_file import TomlSource, is_file, read_toml, read_user_text
-from p2os.toml_record import Record, keys_of, number_of, read, sections
+from p2os.toml_record import Record, keys_of, number_of, read, sections, tables_of
 from p2os.toml_schema import LONGEST_S, Key, Table, TablePlace, Where, check_table, placed, within
+from robot_bench.campaign.reaching.corpus import BEGUN, Coordinates, read_corpus
+from robot_bench.campaign.reaching.reach import ToReach, ToReachTable, looked_for
+from robot_bench.campaign.reaching.source import reach_of
 from robot_bench.campaign.search import SEARCHES
 from robot_bench.campaign.things import KINDS
 from robot_bench.campaign.trial import Trial, trial_of, unpacked
@@ -55,6 +58,9 @@ class SpanTable(Record):
     from_: Annotated[int | float, Key(kind="number", doc="the least")]
     to: Annotated[int | float, Key(kind="number", doc="the greatest")]
     step: Annotated[int | float | None, Key(kind="number", above=0, doc="from one value to the next")] = None
+    tail: Annotated[Literal["even", "long"], Key(
+        doc="`long`: twice as much is half as often (of numbers above 0), for what costs as much as it is long"
+    )] = "even"  # fmt: skip
 
 
 class DrawTable(Record):
@@ -67,6 +73,7 @@ class DrawTable(Record):
     heading_deg: Annotated[float | None, Key(least=-36_000, most=36_000, doc="counter-clockwise")] = None
     ahead_m: Annotated[float | None, Key(least=-1000, most=1000, doc="of the robot at its start")] = None
     aside_m: Annotated[float | None, Key(least=-1000, most=1000, doc="to the left of the robot at its start")] = None
+    gap_m: Annotated[float | None, Key(least=0, most=100, doc="off other things, in place of the file's")] = None
 
 
 class DisturbTable(Record):
@@ -76,6 +83,7 @@ class DisturbTable(Record):
     at_s: Annotated[float, Key(least=0, most=LONGEST_S, doc="when")] = 0.0
     for_s: Annotated[float | None, Key(above=0, most=LONGEST_S, doc="it ends after so long")] = None
     share: Annotated[float, Key(above=0, most=1, doc="in so many of the runs it happens")] = 1.0
+    name: Annotated[str | None, Key(doc="what goals are `excused_by`; else the first word of the fault")] = None
 
 
 DRAW = (
@@ -101,6 +109,8 @@ class Span:
     is_whole: bool = False
     #: In place of a range.
     choices: tuple[object, ...] = ()
+    #: Whether values are as often as they are small (bounded Pareto, exponent 1), in place of evenly.
+    is_long_tailed: bool = False
 
     @property
     def count(self) -> int:
@@ -115,6 +125,8 @@ class Span:
         """Return the value at a place of the unit interval, 0 up to but not 1."""
         if self.choices:
             return self.choices[min(int(at * len(self.choices)), len(self.choices) - 1)]
+        if self.is_long_tailed:
+            at = (self.low / (1 - at * (1 - self.low / self.high)) - self.low) / (self.high - self.low)
         if self.step:
             found = self.low + min(int(at * self.count), self.count - 1) * self.step
         else:
@@ -140,6 +152,8 @@ class Drawn:
     #: In the world; of a thing seen from the robot 0 turns its opening, its length or its way towards the robot.
     heading_deg: Span
     measures: Mapping[str, Span]
+    #: How far off other things at least, in place of the campaign's.
+    gap_m: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -153,6 +167,8 @@ class Disturbance:
     share: float
     #: Name in braces in the words → its values.
     values: Mapping[str, Span]
+    #: What goals are excused by.
+    name: str = ""
 
     def table(self, value: Callable[[str, Span], object]) -> Table:
         """Return the `[[fault]]` table of a run; `value` chooses from the span of each key."""
@@ -194,6 +210,12 @@ class CampaignTable(Record):
     )] = 1  # fmt: skip
     gap_m: Annotated[float, Key(least=0, most=100, doc="between things that are drawn")] = GAP_M
     free_m: Annotated[float, Key(least=0, most=100, doc="around the start")] = FREE_M
+    swarm: Annotated[float, Key(
+        least=0, most=0.9, doc="so much of what varies, of the draws and of the disturbances each point turns off"
+    )] = 0.0  # fmt: skip
+    corpus: Annotated[str | None, Key(
+        doc="a file beside this one, there or not: points that reached something new, kept for the next campaign"
+    )] = None  # fmt: skip
     budget: Annotated[Budget, Key(doc="how much may be spent")] = field(default_factory=Budget)
     limits: Annotated[RunLimits, Key(doc="what one run may take")] = field(default_factory=RunLimits)
     cheap: _Settings = None
@@ -201,7 +223,11 @@ class CampaignTable(Record):
     vary: _Settings = None
     draw: Annotated[tuple[Table, ...], Key(record=DrawTable, doc="things that are drawn")] = ()
     disturb: Annotated[tuple[Table, ...], Key(record=DisturbTable, doc="faults that are drawn")] = ()
+    reach: Annotated[tuple[Table, ...], Key(record=ToReachTable, doc="what one point at least has to reach")] = ()
     goal: Annotated[tuple[Table, ...], GOALS] = ()
+    keeps: Annotated[tuple[str, ...], Key(
+        kind="list", doc="kinds of the scenario's own goals that hold beside those of this file"
+    )] = ()  # fmt: skip
 
 
 #: Every table of a campaign file and its keys.
@@ -231,6 +257,12 @@ class Campaign:
     vary: Mapping[str, Span] = field(default_factory=dict)
     draws: tuple[Drawn, ...] = ()
     disturbances: tuple[Disturbance, ...] = ()
+    #: What share of its features a point turns off; 0: none is ever turned off.
+    swarm: float = 0.0
+    reaches: tuple[ToReach, ...] = ()
+    #: Where points are kept that reached something new, for the campaigns to come; and those that this one begins with.
+    corpus_file: Path | None = None
+    corpus: tuple[Coordinates, ...] = ()
 
 
 def load_campaign(path: Path, *, trust: bool | Trust = False) -> Campaign:
@@ -268,12 +300,21 @@ def parse_campaign(text: str, path: Path, *, firmware: Path | None = None, trust
         )
     if not vary and not draws and not disturbances:
         raise ScenarioError(f"{where}: nothing varies", hint="[vary], [[draw]] or [[disturb]]")
+    reaches = tuple(
+        reach_of(read(ToReachTable, row, within(where, "reach", n)), trial) for n, row in enumerate(top.reach)
+    )
+    trial = replace(trial, looks_for=looked_for(reaches))
+    corpus_file = None if top.corpus is None else path.parent / top.corpus
+    begun = path.parent / BEGUN
     found = Campaign(
+        swarm=top.swarm, reaches=reaches, corpus_file=corpus_file,
+        corpus=() if corpus_file is None else read_corpus(begun if is_file(begun) else corpus_file),
         name=path.stem, description=top.description, text=text, trial=trial, search=top.search, seed=top.seed,
         batch=top.batch, near_misses=top.near_misses, gap_m=top.gap_m, free_m=top.free_m, budget=top.budget,
         limits=top.limits, cheap=cheap, full=full, vary=vary, draws=draws, disturbances=disturbances,
     )  # fmt: skip
     _refuse_settings(found, path)
+    _refuse_excuses(top.goal, [*(one.name for one in draws), *(one.name for one in disturbances)], where)
     for number, one in enumerate(disturbances):
         faults = [one.table(lambda _, span: span.value(0.0)), one.table(lambda _, span: span.value(1.0))]
         _scenario(trial.set(*cheap).with_lists(fault=faults), str(within(where, "disturb", number)))
@@ -301,7 +342,12 @@ def _trial(top: CampaignTable, path: Path, where: TablePlace, firmware: Path | N
             raise ScenarioError(f"{where.at('firmware')}: there is no file {shown(top.firmware)} beside it")
     with placed(where, "scenario"):
         trial = trial_of(str(beside) if is_file(beside) else top.scenario, firmware=firmware, trust=trust)
-    return trial.with_lists(goal=top.goal) if top.goal else trial
+    own = tables_of(trial.table, "goal")
+    for kind in top.keeps:
+        if kind not in {goal["kind"] for goal in own}:
+            raise ScenarioError(f"{where.at('keeps')}: the scenario has no goal {shown(kind)}", hint="leave it out")
+    kept = [goal for goal in own if goal["kind"] in top.keeps]
+    return trial.with_lists(goal=[*kept, *top.goal]) if top.goal else trial
 
 
 def _with_start(trial: Trial, vary: Table, path: Path) -> Trial:
@@ -328,6 +374,17 @@ def _refuse_settings(campaign: Campaign, path: Path) -> None:
         except UsageError as error:
             raise ScenarioError(f"{where} {error}".replace("--set ", ""), hint=error.hint) from error
         _scenario(trial, where)
+
+
+def _refuse_excuses(goals: Sequence[Table], names: Sequence[str], where: TablePlace) -> None:
+    """Refuse goals that are excused by what nobody draws or disturbs by."""
+    for number, goal in enumerate(goals):
+        for name in cast("Sequence[str]", goal.get("excused_by", ())):
+            if name not in names:
+                at = within(where, "goal", number)
+                raise ScenarioError(
+                    f"{at}: there is no [[draw]] or [[disturb]] {shown(name)}", hint=nearest(name, names)
+                )
 
 
 def _scenario(trial: Trial, where: str) -> Scenario:
@@ -378,7 +435,7 @@ def _draws(tables: Sequence[Table], where: TablePlace) -> tuple[Drawn, ...]:
         found.append(Drawn(
             seen=None if ahead is None else (ahead, aside),
             name=name, kind=kind, count=spans.pop("count", Span(1, 1, is_whole=True)),
-            area_m=_area(table.get("area_m"), place),
+            area_m=_area(table.get("area_m"), place), gap_m=number_of(table, "gap_m") if "gap_m" in table else None,
             heading_deg=spans.pop("heading_deg", Span(0.0, 360.0) if ahead is None else Span(-30.0, 30.0)),
             measures={key: spans.get(key, Span(low, high)) for key, (low, high) in known.items()},
         ))  # fmt: skip
@@ -387,7 +444,7 @@ def _draws(tables: Sequence[Table], where: TablePlace) -> tuple[Drawn, ...]:
 
 #: Keys of `[[draw]]` that take a range.
 _PLACING = frozenset({"count", "heading_deg", "ahead_m", "aside_m"})
-_SPANNED = frozenset(key.name for key in DRAW if key.kind in {"number", "whole"})
+_SPANNED = frozenset(key.name for key in DRAW if key.kind in {"number", "whole"} and key.name != "gap_m")
 
 
 def _disturbance(table: Table, where: Where) -> Disturbance:
@@ -402,6 +459,7 @@ def _disturbance(table: Table, where: Where) -> Disturbance:
         for_s=_span(table["for_s"], f"{where}: for_s") if "for_s" in table else None,
         share=number_of(table, "share", 1.0),
         values={key: _span(value, f"{where}: {key}") for key, value in named.items()},
+        name=str(table.get("name") or (str(table["fault"]).split() or [""])[0]),
     )  # fmt: skip
 
 
@@ -423,8 +481,14 @@ def _span(value: object, where: str) -> Span:
         span = read(SpanTable, value, where)
         if not span.from_ <= span.to:
             raise ScenarioError(f"{where}: to is below from", hint="{ from = 0.1, to = 0.5 }")
-        is_whole = all(isinstance(item, int) for item in value.values())
-        return Span(span.from_, span.to, float((1 if is_whole else 0) if span.step is None else span.step), is_whole)
+        is_long = span.tail == "long"
+        if is_long and not 0 < span.from_ < span.to:
+            raise ScenarioError(
+                f"{where}: a long tail has to begin above 0", hint='{ from = 60, to = 900, tail = "long" }'
+            )
+        is_whole = all(isinstance(item, int) for item in value.values() if not isinstance(item, str))
+        step = float((1 if is_whole else 0) if span.step is None else span.step)
+        return Span(span.from_, span.to, step, is_whole, is_long_tailed=is_long)
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         return Span(value, value, is_whole=isinstance(value, int))
     return Span(choices=(value,))

@@ -50,6 +50,8 @@ class PointFinding(Enum):
     """What came of a point, both fidelities considered."""
 
     PASSED = "passed"
+    #: Passed, and missed a goal that does not judge it, for what disturbed it.
+    EXCUSED = "excused"
     #: Both failed.
     CONFIRMED = "confirmed"
     #: The run in full failed, and the cheap one passed.
@@ -104,15 +106,16 @@ class PointRow:
     def finding(self) -> PointFinding:
         """What came of it."""
         cheap = self.cheap.outcome.verdict
+        passed = PointFinding.EXCUSED if self.cheap.outcome.excused_goals else PointFinding.PASSED
         if self.full is None:
             return {
-                TrialVerdict.PASSED: PointFinding.PASSED, TrialVerdict.FAILED: PointFinding.UNCONFIRMED,
+                TrialVerdict.PASSED: passed, TrialVerdict.FAILED: PointFinding.UNCONFIRMED,
                 TrialVerdict.ERROR: PointFinding.ERROR,
             }[cheap]  # fmt: skip
         if self.full.outcome.verdict is TrialVerdict.ERROR:
             return PointFinding.ERROR
         if self.full.outcome.verdict is TrialVerdict.PASSED:
-            return PointFinding.CHEAP_ONLY if cheap is TrialVerdict.FAILED else PointFinding.PASSED
+            return PointFinding.CHEAP_ONLY if cheap is TrialVerdict.FAILED else passed
         if self.replay is None or self.replay.outcome.sha256 != self.full.outcome.sha256:
             return PointFinding.NOT_REPEATED
         return PointFinding.CONFIRMED if cheap is TrialVerdict.FAILED else PointFinding.FULL_ONLY
@@ -152,6 +155,11 @@ class CampaignProgress:
     cpu_s: float = 0.0
     blocks: set[int] = field(default_factory=set)
     states: set[str] = field(default_factory=set)
+    #: As of `Outcome.ways` and `transitions`.
+    ways: set[int] = field(default_factory=set)
+    transitions: set[str] = field(default_factory=set)
+    #: Of what has to be reached the numbers of the points that did, by what it is called.
+    reached: dict[str, list[int]] = field(default_factory=dict)
 
     def left_out_words(self) -> list[str]:
         """Return which lines of the journal do not count, a text for each reason."""
@@ -196,9 +204,11 @@ class Conduct:
         self._search = SEARCHES[campaign.search](Problem(
             counts=tuple(span.count for span in spans), is_ordered=tuple(not span.choices for span in spans),
             runs=campaign.budget.runs, batch=campaign.batch, seed=campaign.seed,
+            corpus=tuple(map(self.space.point, campaign.corpus)),
         ))  # fmt: skip
         self._journal = Journal(folder)
         self.progress = CampaignProgress(left_out=self._journal.left_out)
+        self.progress.reached = {reach.said: [] for reach in campaign.reaches}
         self._confirmed = 0
         #: Places of rows that passed, those of the least margin of each batch.
         self._near: list[int] = []
@@ -263,7 +273,7 @@ class Conduct:
         first = len(self.progress.rows) + 1
         cheap = self._do(RunPurpose.CHEAP, [one.trial(self.campaign.trial, self.campaign.cheap) for one in proposals])
         rows = [
-            PointRow(number, proposal, run, new=self._learn(run.outcome))
+            PointRow(number, proposal, run, new=self._learn(number, run.outcome))
             for number, (proposal, run) in enumerate(zip(proposals, cheap, strict=True), first)
         ]
         left = max(self.campaign.budget.confirmations - self._confirmed, 0)
@@ -315,12 +325,22 @@ class Conduct:
         self.progress.cpu_s += cpu_s
         self._on_run(self.progress)
 
-    def _learn(self, outcome: Outcome) -> int:
-        """Add what a run has reached; return how much of it is new."""
+    def _learn(self, number: int, outcome: Outcome) -> int:
+        """Add what a point's run has reached; return how much of it is new."""
         done = self.progress
-        new = len(outcome.blocks - done.blocks) + len(outcome.lines - done.states)
+        new = sum(
+            len(found - held) for found, held in (
+                (outcome.blocks, done.blocks), (outcome.ways, done.ways), (outcome.lines, done.states),
+                (outcome.transitions, done.transitions),
+            )
+        )  # fmt: skip
         done.blocks |= outcome.blocks
+        done.ways |= outcome.ways
         done.states |= outcome.lines
+        done.transitions |= outcome.transitions
+        for reach in self.campaign.reaches:
+            if reach.is_in(outcome):
+                done.reached[reach.said].append(number)
         return new
 
     def _answer(self, row: PointRow) -> PointResult:
@@ -328,5 +348,9 @@ class Conduct:
         x0, y0, x1, y1 = self.space.extent
         x_m, y_m = (at / 1000 for at in (outcome.way_mm or ((0, 0),))[-1])
         ended = min(max((x_m - x0) / (x1 - x0), 0.0), 1.0), min(max((y_m - y0) / (y1 - y0), 0.0), 1.0)
-        reached: frozenset[object] = frozenset(outcome.blocks | outcome.lines)
-        return PointResult(margin=NO_VERDICT if found is None else found, ended=ended, reached=reached)
+        ways = {("way", way) for way in outcome.ways}
+        reached = frozenset[object](outcome.blocks | outcome.lines | outcome.transitions | ways)
+        return PointResult(
+            margin=NO_VERDICT if found is None else found, ended=ended, reached=reached,
+            acting=self.space.acting(row.proposal),
+        )  # fmt: skip

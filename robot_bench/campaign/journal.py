@@ -137,7 +137,8 @@ def plain_of(outcome: Outcome) -> dict[str, object]:
         "goals": [[getattr(goal, field.name) for field in fields(goal)] for goal in outcome.goals],
         "hits": [[getattr(hit, field.name) for field in fields(hit)] for hit in outcome.hits],
         "blocks": _packed(sorted(outcome.blocks)),
-        "lines": sorted(outcome.lines),
+        "ways": _packed(sorted(outcome.ways)),
+        **{name: sorted(getattr(outcome, name)) for name in _TEXTS},
     }
 
 
@@ -149,23 +150,33 @@ def outcome_of_plain(plain: Mapping[str, object]) -> Outcome:
     """
     rows = {name: cast("list[list[object]]", plain[name]) for name in ("goals", "hits", "way_mm")}
     goal_names, hit_names = ([field.name for field in fields(kind)] for kind in (GoalResult, HullContact))
-    values = {field.name: plain[field.name] for field in fields(Outcome)}
+    values = {field.name: plain[field.name] for field in fields(Outcome) if field.name not in _LATER}
     values |= {
         "verdict": TrialVerdict(plain["verdict"]),
         "failures": tuple(cast("list[str]", plain["failures"])),
-        "goals": tuple(GoalResult(**dict(zip(goal_names, row, strict=True))) for row in rows["goals"]),  # type: ignore[arg-type]  # as they were written
+        "goals": tuple(GoalResult(**dict(zip(goal_names, row, strict=False))) for row in rows["goals"]),  # type: ignore[arg-type]  # as they were written
         "hits": tuple(HullContact(**dict(zip(hit_names, row, strict=True))) for row in rows["hits"]),  # type: ignore[arg-type]  # as above
         "way_mm": tuple((cast("int", x), cast("int", y)) for x, y in rows["way_mm"]),
         "blocks": frozenset(_unpacked(str(plain["blocks"]))),
-        "lines": frozenset(cast("list[str]", plain["lines"])),
+        "ways": frozenset(_unpacked(str(plain.get("ways", _NONE)))),
+        **{name: frozenset(cast("list[str]", plain.get(name, []))) for name in _TEXTS},
     }
     return Outcome(**values)  # type: ignore[arg-type]  # as above
+
+
+#: Sets of texts of an outcome; and what an outcome of an earlier p2os does not tell.
+_TEXTS = ("lines", "transitions", "happened")
+_LATER = frozenset({"ways", "transitions", "happened"})
 
 
 def _packed(addresses: list[int]) -> str:
     """Return addresses in their order in few characters."""
     steps = ",".join(f"{after - before:x}" for before, after in zip([0, *addresses], addresses, strict=False))
     return base64.b64encode(zlib.compress(steps.encode())).decode()
+
+
+#: No addresses.
+_NONE = _packed([])
 
 
 def _unpacked(text: str) -> list[int]:

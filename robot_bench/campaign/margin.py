@@ -23,7 +23,7 @@ def margin(outcome: Outcome) -> float | None:
     """Return the margin of a run, -1 to 1; None where there is no verdict."""
     if outcome.verdict is TrialVerdict.ERROR:
         return None
-    found = [goal_margin(goal, outcome) for goal in outcome.goals]
+    found = [goal_margin(goal, outcome) for goal in outcome.goals if not goal.is_excused]
     if outcome.died:
         found.append(MISSED)
     return min(found, default=MET)

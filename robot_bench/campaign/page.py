@@ -42,6 +42,8 @@ _PAGE = Template("""<!doctype html>
 <section><h2>Margins over what varied <small>a point a run; below the line it failed</small></h2>
 <div class="charts">$space</div></section>
 <section><h2>Course of the search</h2><div class="charts">$course</div></section>
+<section><h2>Reached <small>by the cheap runs, and what no point has</small></h2>
+<table class="figures"><tbody>$reached</tbody></table></section>
 <section><h2>Where the cheap runs ended <small>darker: less margin</small></h2>
 <div class="multiples">$map</div></section>
 </main><footer>$footer</footer></body></html>
@@ -64,12 +66,14 @@ figcaption b { color: var(--ink); } figcaption code { display: block; font-size:
 @media (max-width: 820px) { .halves.even { grid-template-columns: 1fr; } }
 """
 _CLASS: Mapping[PointFinding, str] = {
-    PointFinding.PASSED: "passed", PointFinding.CONFIRMED: "failed", PointFinding.FULL_ONLY: "failed",
+    PointFinding.PASSED: "passed", PointFinding.EXCUSED: "seen",
+    PointFinding.CONFIRMED: "failed", PointFinding.FULL_ONLY: "failed",
     PointFinding.CHEAP_ONLY: "seen",
     PointFinding.UNCONFIRMED: "seen", PointFinding.NOT_REPEATED: "seen", PointFinding.ERROR: "seen",
 }  # fmt: skip
 _MEANING: Mapping[PointFinding, str] = {
     PointFinding.PASSED: "passed",
+    PointFinding.EXCUSED: "missed a goal that does not judge it, for what disturbed it",
     PointFinding.CONFIRMED: "failed, cheap and in full",
     PointFinding.FULL_ONLY: "failed in full alone",
     PointFinding.CHEAP_ONLY: "failed in the cheap run alone, no failure",
@@ -100,7 +104,7 @@ def render(whole: Whole) -> str:
         failures="".join(_failure(row, whole) for row in shown) or "<p>none</p>",
         more=f"<p>and {left} more in failures/</p>" if left else "",
         space="".join(_over(name, rows) for name in _dimensions(rows)) or "<p>nothing varied</p>",
-        course="".join(_course(rows)), map=_map(whole),
+        course="".join(_course(rows)), map=_map(whole), reached=_table(_reached(whole)),
         footer=html.escape(f"p2os campaign --resume {shlex.quote(str(whole.folder))} goes on where it was interrupted"),
     )  # fmt: skip
 
@@ -112,8 +116,26 @@ def _figures(whole: Whole) -> Iterator[tuple[str, str]]:
     if whole.failures:
         yield from FailureSet.of(whole.progress.rows).words().items()
     yield "different runs, by their traces", str(whole.different_runs)
-    yield "blocks of the firmware that ran", str(len(whole.progress.blocks))
-    yield "states that it printed", str(len(whole.progress.states))
+
+
+def _reached(whole: Whole) -> Iterator[tuple[str, str]]:
+    """Return what points have reached of the program, each with what there is, and what none has, by source line."""
+    progress = whole.progress
+    for said, numbers in progress.reached.items():
+        many = f"point {numbers[0]} first, {len(numbers)} of {len(progress.rows)} points" if numbers else "no point"
+        yield f"has to be reached: {said}", many
+    yield "states that it printed, and which followed another", f"{len(progress.states)}, {len(progress.transitions)}"
+    yield "blocks of the firmware that ran", str(len(progress.blocks))
+    source = whole.source
+    if source is None:
+        return
+    if source.lines_of:
+        yield "lines of source with code", f"{source.lines} of {source.lines_of}"
+    yield "ways of conditional branches", f"{source.ways} of {source.ways_of}"
+    for name, lines in source.unreached():
+        yield f"no point has reached {name}", lines
+    for name, lines in source.one_way():
+        yield f"branches that always went one way in {name}", lines
 
 
 def _cost(whole: Whole) -> Iterator[tuple[str, str]]:

@@ -19,6 +19,7 @@ from robot_bench.campaign.campaign_file import Campaign
 from robot_bench.campaign.conduct import CampaignProgress, PointFinding, PointRow, Run
 from robot_bench.campaign.last_moment import LastMoment
 from robot_bench.campaign.margin import goal_margin
+from robot_bench.campaign.reaching.source import SourceReached, source_reached
 from robot_bench.campaign.space import Space
 from robot_bench.campaign.variants.diversity import FailureSet
 from simbase.errors import MissingDependencyError
@@ -102,6 +103,7 @@ class Results:
             "p2os": installed_version(),
             "virtual_s": outcome.virtual_ns / 1e9, "cpu_s": run.cpu_s, "distance_m": outcome.distance_m,
             "clearance_m": outcome.clearance_m, "contacts": len(outcome.hits), "failures": list(outcome.failures),
+            "excused": [goal.kind for goal in outcome.excused_goals],
             "blocks": len(outcome.blocks), "states": len(outcome.lines), "new": row.new,
             "obstacles": json.dumps(row.proposal.obstacles), "faults": json.dumps(row.proposal.faults),
         }  # fmt: skip
@@ -144,7 +146,7 @@ class Results:
 _TYPES = {
     **dict.fromkeys(("margin", "virtual_s", "cpu_s", "distance_m", "clearance_m"), "number"),
     **dict.fromkeys(("number", "seed", "campaign_seed", "contacts", "blocks", "states", "new"), "whole"),
-    "failures": "texts",
+    **dict.fromkeys(("failures", "excused"), "texts"),
 }  # fmt: skip
 
 
@@ -176,6 +178,16 @@ class Whole:
         """How many runs the points came to, those with the same trace counted once."""
         return len({row.cheap.outcome.sha256 for row in self.progress.rows})
 
+    @property
+    def source(self) -> SourceReached | None:
+        """What of the program's source the cheap runs have reached; None where there is no one program."""
+        return source_reached(self.campaign.trial, self.progress.blocks, self.progress.ways)
+
+    @property
+    def unreached(self) -> list[str]:
+        """What had to be reached and no point has."""
+        return [said for said, numbers in self.progress.reached.items() if not numbers]
+
     def as_json(self) -> dict[str, object]:
         """Return all that came of it; times of this machine left out."""
         return {
@@ -189,6 +201,12 @@ class Whole:
             "virtual_s": self.progress.virtual_ns / 1e9,
             "blocks": len(self.progress.blocks),
             "states": len(self.progress.states),
+            "transitions": len(self.progress.transitions),
+            "reach": {said: numbers[:1] for said, numbers in self.progress.reached.items()},
+            "source": None if (source := self.source) is None else {
+                "lines": source.lines, "lines_of": source.lines_of, "ways": source.ways, "ways_of": source.ways_of,
+                "unreached": dict(source.unreached()),
+            },
             "was_interrupted": self.was_interrupted,
             "findings": {finding.value: self.counts.get(finding, 0) for finding in PointFinding},
             "failures": [

@@ -41,6 +41,8 @@ class PointResult:
     ended: tuple[float, float] = (0.5, 0.5)
     #: What was reached: blocks of the firmware, states that it printed.
     reached: frozenset[object] = field(default_factory=frozenset)
+    #: Of which dimensions the coordinates had an effect; none is said: of all.
+    acting: frozenset[int] = frozenset()
 
 
 class Search(Protocol):
@@ -64,6 +66,8 @@ class Problem:
     runs: int
     batch: int
     seed: int
+    #: Points of a corpus, which reached something once.
+    corpus: tuple[Point, ...] = ()
 
 
 class Listed:
@@ -184,9 +188,10 @@ class Evolution:
 
 
 class Guided:
-    """Keeps points that reached something new, and varies them; begins with points spread evenly.
+    """Keeps points that reached something new, and varies them; begins with a corpus, then with points spread evenly.
 
-    A kept point is varied in a few of its coordinates, the least tried ones first; each fourth point is a new one.
+    A kept point is varied in a few of its coordinates that had an effect, the least tried ones first; each fourth point
+    is a new one.
     """
 
     #: chosen: so many coordinates change at once on average.
@@ -195,28 +200,35 @@ class Guided:
     STEP = 0.15
     #: chosen: one of so many points is a new one.
     NEW_EVERY = 4
+    #: chosen: at most so much of the points is spent on the corpus, the newest of it.
+    CORPUS_SHARE = 0.5
 
     def __init__(self, problem: Problem) -> None:
         self._random = random.Random(problem.seed)
         self._fresh = sobol(problem)
+        most = int(problem.runs * self.CORPUS_SHARE)
+        self._corpus = list(problem.corpus[-most:]) if most else []
         self._first = problem.batch
         self._count = 0
         self._seen: set[object] = set()
-        #: Kept points, each with how often it was varied.
-        self._kept: list[tuple[Point, list[int]]] = []
+        #: Kept points, each with its dimensions that acted, and how often it was varied.
+        self._kept: list[tuple[Point, Sequence[int], list[int]]] = []
         self._asked: list[Point] = []
 
     def ask(self, count: int) -> list[Point]:
-        """Return variations of what was kept, and new points."""
+        """Return points of the corpus; then variations of what was kept, and new points."""
         found: list[Point] = []
         for _ in range(count):
+            if self._corpus:
+                found.append(self._corpus.pop(0))
+                continue
             self._count += 1
             if not self._kept or self._count <= self._first or self._count % self.NEW_EVERY == 0:
                 found += self._fresh.ask(1)
             else:
-                point, uses = min(self._kept, key=lambda kept: kept[1][0])
+                point, acting, uses = min(self._kept, key=lambda kept: kept[2][0])
                 uses[0] += 1
-                found.append(self._varied(point))
+                found.append(self._varied(point, acting))
         self._asked = found
         return found
 
@@ -225,11 +237,12 @@ class Guided:
         for point, answer in zip(self._asked, answers, strict=True):
             if not answer.reached <= self._seen:
                 self._seen |= answer.reached
-                self._kept.append((point, [0]))
+                self._kept.append((point, sorted(answer.acting) or range(len(point)), [0]))
 
-    def _varied(self, point: Point) -> Point:
-        share = min(self.CHANGED / len(point), 1.0)
-        return tuple(self._changed(at) if self._random.random() < share else at for at in point)
+    def _varied(self, point: Point, acting: Sequence[int]) -> Point:
+        share = min(self.CHANGED / len(acting), 1.0)
+        chosen = {at for at in acting if self._random.random() < share} or {self._random.choice(acting)}
+        return tuple(self._changed(at) if number in chosen else at for number, at in enumerate(point))
 
     def _changed(self, at: float) -> float:
         """Return another coordinate: as often one nearby as any."""

@@ -8,7 +8,7 @@ Invariant: a point comes to the same trial on every machine.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import cast
 
@@ -48,6 +48,8 @@ class Proposal:
     settings: tuple[Setting, ...]
     obstacles: tuple[Table, ...]
     faults: tuple[Table, ...]
+    #: Of what was drawn and of what disturbs it the names of what excuses from a goal.
+    disturbed_by: frozenset[str] = frozenset()
 
     def trial(self, base: Trial, stage: Sequence[Setting]) -> Trial:
         """Return the trial of this point, with what a stage sets."""
@@ -56,7 +58,7 @@ class Proposal:
         for name, more in (("obstacle", self.obstacles), ("fault", self.faults)):
             if more:
                 lists[name] = [*tables_of(base.table, name), *more]
-        return found.with_lists(**lists)
+        return replace(found.with_lists(**lists), disturbed_by=self.disturbed_by | base.disturbed_by)
 
 
 class Space:
@@ -69,6 +71,8 @@ class Space:
     def __init__(self, campaign: Campaign) -> None:
         self._campaign = campaign
         self.dimensions = tuple(_dimensions(campaign))
+        goals = tables_of(campaign.trial.table, "goal")
+        self._excusing = frozenset(name for goal in goals for name in cast("Sequence[str]", goal.get("excused_by", ())))
         #: The floor of the world where nothing varies: least x, least y, greatest x and y, metres.
         self.extent = self._place(())[0].extent
 
@@ -83,17 +87,44 @@ class Space:
             values[name] = found = span.value(at[name])
             return found
 
-        settings = tuple((key, value(key, span)) for key, span in campaign.vary.items())
+        def chance(name: str) -> float:
+            """Return a coordinate as it is, and note that it has an effect."""
+            value(name, _UNIT)
+            return at[name]
+
+        def is_on(name: str) -> bool:
+            """Tell whether the point has this feature; one of a swarm may be turned off."""
+            return not campaign.swarm or chance(f"{name}{ON}") >= campaign.swarm
+
+        groups = {group: is_on(group) for group in _groups(campaign)}
+        settings = tuple((key, value(key, span)) for key, span in campaign.vary.items() if groups[_group(key)])
         obstacles: Sequence[Table] = ()
         if campaign.draws:
             world, starts = self._place(settings)
-            things = [thing for draw in campaign.draws for thing in _things(draw, world, starts[0], value)]
+            draws = [draw for draw in campaign.draws if is_on(draw.name)]
+            things = [thing for draw in draws for thing in _things(draw, world, starts[0], value)]
             room = Room(world, starts, campaign.gap_m, campaign.free_m)
             obstacles = room.tables(things)
-        faults = [
-            table for number, one in enumerate(campaign.disturbances, 1) for table in _faults(one, number, value, at)
-        ]
-        return Proposal(point, values, settings, tuple(obstacles), tuple(faults))
+        drawn = {str(table["name"]) for table in obstacles}
+        names = {draw.name for draw in campaign.draws if any(one.startswith(f"{draw.name}-") for one in drawn)}
+        faults = list[Table]()
+        for number, one in enumerate(campaign.disturbances, 1):
+            if is_on(f"disturb-{number}") and (tables := _faults(one, number, value, chance)):
+                faults += tables
+                names.add(one.name)
+        return Proposal(point, values, settings, tuple(obstacles), tuple(faults), self._excusing & names)
+
+    def coordinates(self, point: Point) -> dict[str, float]:
+        """Return a point by the names of its dimensions."""
+        return dict(zip((one.name for one in self.dimensions), point, strict=True))
+
+    def point(self, coordinates: Mapping[str, float]) -> Point:
+        """Return the point of such coordinates; the middle of each dimension that they do not have."""
+        return tuple(coordinates.get(one.name, 0.5) for one in self.dimensions)
+
+    def acting(self, proposal: Proposal) -> frozenset[int]:
+        """Return the numbers of the dimensions that had an effect at a point."""
+        return frozenset(number for number, one in enumerate(self.dimensions) if one.name in proposal.values)
 
     def _place(self, settings: Sequence[Setting]) -> tuple[World, Sequence[Pose]]:
         """Return the world of a point, and where its robots begin in it, the first one first."""
@@ -124,8 +155,25 @@ def _world(name: str, seed: int) -> World:
     return load_world(name, seed=seed)
 
 
+#: What the dimension is called that turns a feature of a swarm on or off.
+ON = ".on"
+
+
+def _group(key: str) -> str:
+    """Return what is turned on and off together: the keys of one table, or a key of the scenario."""
+    return key.rpartition(".")[0] or key
+
+
+def _groups(campaign: Campaign) -> list[str]:
+    return list(dict.fromkeys(_group(key) for key in campaign.vary))
+
+
 def _dimensions(campaign: Campaign) -> list[Dimension]:
     found = [Dimension(key, span) for key, span in campaign.vary.items()]
+    if campaign.swarm:
+        disturbed = [f"disturb-{number}" for number, _ in enumerate(campaign.disturbances, 1)]
+        features = [*_groups(campaign), *(draw.name for draw in campaign.draws), *disturbed]
+        found += [Dimension(f"{name}{ON}", _UNIT) for name in features]
     for draw in campaign.draws:
         found.append(Dimension(f"{draw.name}.count", draw.count))
         most = round(draw.count.high) if not draw.count.choices else max(int(str(one)) for one in draw.count.choices)
@@ -167,12 +215,12 @@ def _things(draw: Drawn, world: World, start: Pose, value: Value) -> list[DrawnT
             heading_deg += math.degrees(start.heading_rad) + 180
         place = (round(x_m, 3), round(y_m, 3), round(heading_deg % 360, 1))
         measures = {key: cast("float", value(f"{name}.{key}", span)) for key, span in draw.measures.items()}
-        found.append(DrawnThing(name=name, kind=draw.kind, place=place, measures=measures))
+        found.append(DrawnThing(name=name, kind=draw.kind, place=place, measures=measures, gap_m=draw.gap_m))
     return found
 
 
-def _faults(one: Disturbance, number: int, value: Value, at: Mapping[str, float]) -> list[Table]:
+def _faults(one: Disturbance, number: int, value: Value, chance: Callable[[str], float]) -> list[Table]:
     name = f"disturb-{number}"
-    if at.get(f"{name}.happens", 0.0) >= one.share:
+    if one.share < 1 and chance(f"{name}.happens") >= one.share:
         return []
     return [one.table(lambda key, span: value(f"{name}.{key}", span))]

@@ -1,4 +1,4 @@
-"""Things that a campaign draws: posts, boxes, walls, dead ends, gaps and walkers, each of a few numbers.
+"""Things that a campaign draws: posts, walls, dead ends, gaps, corners, doorways, walkers, …, each of a few numbers.
 
     [[draw]]
     kind = "dead-end"
@@ -77,6 +77,20 @@ def _gap(measures: Measures) -> Sequence[Table]:
     return [_box(0.0, middle, WALL_M, length), _box(0.0, -middle, WALL_M, length)]
 
 
+def _corner(measures: Measures) -> Sequence[Table]:
+    """Return two walls of one length at a right angle about a place within it, open to its heading."""
+    length = measures["length_m"]
+    side = (length - WALL_M) / (2 * math.sqrt(2))
+    return [_box(-side, side, length, WALL_M, 45.0), _box(-side, -side, length, WALL_M, -45.0)]
+
+
+def _doorway(measures: Measures) -> Sequence[Table]:
+    """Return a wall across the way with a door in it, and its jambs, which stand out to both sides."""
+    jamb, width = measures["depth_m"], measures["width_m"]
+    jambs = [_box(0.0, side * (width + WALL_M) / 2, jamb, WALL_M) for side in (1, -1)]
+    return [*_gap({**measures, "width_m": width + 2 * WALL_M}), *jambs]
+
+
 #: Kind → what it is made of.
 KINDS: Mapping[str, ThingKind] = {
     "post": ThingKind({"width_m": (0.04, 0.3)}, _post),
@@ -89,6 +103,8 @@ KINDS: Mapping[str, ThingKind] = {
     ),
     "dead-end": ThingKind({"width_m": (0.8, 1.6), "depth_m": (0.6, 1.6)}, _dead_end),
     "gap": ThingKind({"width_m": (0.5, 1.2), "length_m": (0.4, 1.2)}, _gap),
+    "corner": ThingKind({"length_m": (0.6, 1.6)}, _corner),
+    "doorway": ThingKind({"width_m": (0.7, 1.2), "length_m": (0.8, 2.0), "depth_m": (0.1, 0.4)}, _doorway),
     "walker": ThingKind(
         {"width_m": (0.2, 0.5), "way_m": (1.0, 4.0), "speed_mps": (0.1, 0.6)}, _post, walks=True,
     ),
@@ -103,6 +119,8 @@ class DrawnThing:
     kind: str
     place: Place
     measures: Measures
+    #: How far it stands off other things at least, in place of the room's.
+    gap_m: float | None = None
 
 
 @dataclass(slots=True)
@@ -130,21 +148,22 @@ class Room:
             for x_m, y_m, heading_deg in _places(thing.place):
                 parts = [_placed(part, x_m, y_m, heading_deg) for part in kind.boxes(thing.measures)]
                 prints = [Footprint(_obstacle(part)) for part in parts]
-                if all(self._is_free(one, taken) for one in prints):
+                gap_m = self.gap_m if thing.gap_m is None else thing.gap_m
+                if all(self._is_free(one, taken, gap_m) for one in prints):
                     taken += [] if kind.walks else prints
                     names = [thing.name] if len(parts) == 1 else [f"{thing.name}-{n}" for n in range(1, len(parts) + 1)]
                     found += [_table(name, part, thing, heading_deg) for name, part in zip(names, parts, strict=True)]
                     break
         return found
 
-    def _is_free(self, one: Footprint, others: Sequence[Footprint]) -> bool:
+    def _is_free(self, one: Footprint, others: Sequence[Footprint], gap_m: float) -> bool:
         x0, y0, x1, y1 = self.world.extent
         left, low, right, high = one.bounds
         if left < x0 or low < y0 or right > x1 or high > y1:
             return False
         if any(one.distance_to_point(start.x_m, start.y_m) < self.free_m for start in self.starts):
             return False
-        return all(_apart_m(one, other) >= self.gap_m for other in others)
+        return all(_apart_m(one, other) >= gap_m for other in others)
 
 
 def _places(wanted: Place) -> Sequence[Place]:

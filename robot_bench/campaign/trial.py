@@ -10,6 +10,7 @@ Invariant: what comes of a trial depends on nothing but itself and the version o
 
 import hashlib
 import os
+import re
 import shutil
 import tempfile
 import weakref
@@ -18,7 +19,7 @@ from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from enum import Enum
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import cast
 
@@ -32,6 +33,7 @@ from p2os.toml_schema import Table
 from robot_bench.bench import Bench, run_of
 from robot_bench.bench.board import boot
 from robot_bench.events.kinds import Contact, Event, Pose, Text
+from robot_bench.events.selection import Selector, select
 from robot_bench.scenario.included_files import (
     MergedSource,
     ScenarioTable,
@@ -53,6 +55,9 @@ from simbase.trust.fingerprint import importable
 WAY_NS: Nanos = 500 * NS_PER_MS
 #: chosen: so many different lines that a firmware prints tell its states apart; one that prints numbers has no end.
 MOST_LINES = 200
+#: chosen: of these so many that follow another one.
+MOST_TRANSITIONS = 400
+_FIGURES = re.compile(r"\d+")
 #: Keys of tables that are words, whatever file has their name.
 _WORDS = frozenset({"text", "texts", "description", "event", "events", "name", "kind", "fault", "from", "to", "after"})
 #: chosen: firmwares and worlds of a campaign that a worker keeps at hand.
@@ -84,6 +89,10 @@ class Trial:
     seed: int = 0
     #: What of its code may be executed: `Code.key` of each.
     trusted: frozenset[str] = frozenset()
+    #: Events, as lines of words, of which its outcome says whether they have happened; they change nothing in the run.
+    looks_for: tuple[str, ...] = ()
+    #: Names of what disturbs it: a goal that is excused by one of these does not judge.
+    disturbed_by: frozenset[str] = frozenset()
 
     def set(self, *settings: Setting) -> "Trial":
         """Return the trial with keys set as `--set` sets them: `("start.x_m", 1.5)`.
@@ -132,6 +141,10 @@ class Trial:
         found = hashlib.sha256(self.text.encode())
         for name, content in sorted(self.files.items()):
             found.update(f"\0{name}\0{len(content)}\0".encode() + content)
+        for words in self.looks_for:
+            found.update(f"\0\0{words}".encode())
+        for name in sorted(self.disturbed_by):
+            found.update(f"\0\0\0{name}".encode())
         return found.hexdigest()
 
     def write(self, folder: Path) -> Path:
@@ -175,6 +188,8 @@ class GoalResult:
     unit: str
     #: Of several, whose.
     robot: str = ""
+    #: It was missed, and does not judge this run.
+    is_excused: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -210,13 +225,24 @@ class Outcome:
     died: str = ""
     #: The first address of each block of the firmware that ran.
     blocks: frozenset[int] = field(default_factory=frozenset)
+    #: Of its blocks the addresses at which they end, one more where they went on elsewhere: the two ways of branches.
+    ways: frozenset[int] = field(default_factory=frozenset)
     #: What it printed, figures as `#`: the states that it tells of.
     lines: frozenset[str] = field(default_factory=frozenset)
+    #: Which of these followed another one: `ready → CRUISE`.
+    transitions: frozenset[str] = field(default_factory=frozenset)
+    #: What the trial looks for and has happened.
+    happened: frozenset[str] = field(default_factory=frozenset)
 
     @property
     def failing_goals(self) -> tuple[GoalResult, ...]:
-        """The goals that were missed."""
-        return tuple(goal for goal in self.goals if goal.met is False)
+        """The goals that were missed, but for those that do not judge it."""
+        return tuple(goal for goal in self.goals if goal.met is False and not goal.is_excused)
+
+    @property
+    def excused_goals(self) -> tuple[GoalResult, ...]:
+        """The goals that were missed and do not judge it."""
+        return tuple(goal for goal in self.goals if goal.is_excused)
 
 
 #: What came of a trial, with the seconds of a processor that it took.
@@ -260,14 +286,41 @@ class SeenSoFar:
 
     way_mm: list[tuple[int, int]] = field(default_factory=list)
     hits: list[HullContact] = field(default_factory=list)
-    #: Each line once, in the order in which they came.
-    printed: dict[bytes, None] = field(default_factory=dict)
+    #: What it printed, figures as `#`, each line once, in the order in which they came; and which followed another.
+    printed: dict[str, None] = field(default_factory=dict)
+    transitions: dict[str, None] = field(default_factory=dict)
+    last: str = ""
     #: Of the firmware, those that this process has not run itself.
     blocks: frozenset[int] = frozenset()
+    ways: frozenset[int] = frozenset()
+    #: Words of the events that are looked for and have happened.
+    happened: set[str] = field(default_factory=set)
+    #: What selects the others; of a run that goes on, the states that they had.
+    selectors: list[Selector] = field(default_factory=list)
+    selected: tuple[object, ...] = ()
 
-    def subscribe(self, bench: Bench) -> None:
+    def subscribe(self, bench: Bench, looks_for: Sequence[str] = ()) -> None:
         """Have a run's events taken."""
         bench.events.subscribe(self._take, Pose, Contact, Text)
+        own = run_of(bench).scenario.own_robot
+        wires = None if own is None else own.wires
+        self.selectors = [select(words, wires) for words in looks_for]
+        for selector, state in zip(self.selectors, self.selected, strict=False):
+            selector.restore(state)
+        for selector in self.selectors:
+            take = partial(self._look, selector)
+            bench.events.subscribe(take, *selector.kinds, wires=selector.wires)
+
+    def so_far(self, bench: Bench) -> "SeenSoFar":
+        """Return it as a value, with what this process has run of the firmware."""
+        states = tuple(selector.snapshot() for selector in self.selectors)
+        return replace(
+            self, blocks=self.blocks | blocks_of(bench), ways=self.ways | ways_of(bench), selectors=[], selected=states
+        )
+
+    def _look(self, selector: Selector, event: Event) -> None:
+        if selector.takes(event):
+            self.happened.add(selector.words)
 
     def _take(self, event: Event) -> None:
         if isinstance(event, Pose):
@@ -275,8 +328,18 @@ class SeenSoFar:
                 self.way_mm.append((event.x // 1000, event.y // 1000))
         elif isinstance(event, Contact):
             self.hits.append(HullContact(t=event.t, what=event.what, part=event.part, x_m=event.x_m, y_m=event.y_m))
-        elif isinstance(event, Text) and len(self.printed) < MOST_LINES:
-            self.printed[event.data] = None
+        elif isinstance(event, Text):
+            self._print(_FIGURES.sub("#", event.data.decode("ascii", "replace").strip()))
+
+    def _print(self, line: str) -> None:
+        if line not in self.printed:
+            if len(self.printed) == MOST_LINES:
+                return
+            self.printed[line] = None
+        if line != self.last:
+            if self.last and len(self.transitions) < MOST_TRANSITIONS:
+                self.transitions[f"{self.last} → {line}"] = None
+            self.last = line
 
 
 #: Puts a bench at its beginning where its run goes on, and returns what the run had shown until there.
@@ -295,12 +358,12 @@ def run_trial(trial: Trial, look: Callable[[], None] | None = None, start: Start
         try:
             bench = bench_of(trial.scenario(folder))
             seen = SeenSoFar() if start is None else start(bench)
-            seen.subscribe(bench)
+            seen.subscribe(bench, trial.looks_for)
             if look is not None:
                 for one in bench.robots.values():
                     one.on_slice = lambda _now: look()
             bench.run_until(bench.end)
-            return outcome_of(bench, seen)
+            return outcome_of(bench, seen, trial.disturbed_by)
         except P2osError as error:
             hint = f" ({error.hint})" if error.hint else ""
             return Outcome(verdict=TrialVerdict.ERROR, failures=(f"{error}{hint}",))
@@ -330,8 +393,8 @@ def bench_of(scenario: Scenario) -> Bench:
     return Bench(scenario, chip=boot(scenario, _image_of(scenario.firmware, stat.st_mtime_ns, stat.st_size)))
 
 
-def outcome_of(bench: Bench, seen: SeenSoFar) -> Outcome:
-    """End a run and return what came of it."""
+def outcome_of(bench: Bench, seen: SeenSoFar, disturbed_by: frozenset[str] = frozenset()) -> Outcome:
+    """End a run and return what came of it; `disturbed_by` as of `Trial`."""
     end = bench.finish()
     goals: list[GoalResult] = []
     failures: list[str] = []
@@ -343,9 +406,9 @@ def outcome_of(bench: Bench, seen: SeenSoFar) -> Outcome:
         if one.chip.has_died:
             failures.append(before + one.chip.verdict)
             died = died or failures[-1]
-        found = _goals(one, end, robot)
+        found = _goals(one, end, robot, disturbed_by)
         goals += found
-        failures += [f"{before}{goal.kind}: {goal.says}" for goal in found if goal.met is False]
+        failures += [f"{before}{goal.kind}: {goal.says}" for goal in found if goal.met is False and not goal.is_excused]
         hashes.append(one.trace.sha256)
     clearances = [run_of(one).recorder.min_clearance_m for one in bench.robots.values()]
     known = [clearance for clearance in clearances if clearance is not None]
@@ -354,7 +417,8 @@ def outcome_of(bench: Bench, seen: SeenSoFar) -> Outcome:
         virtual_ns=end, sha256=hashes[0] if len(hashes) == 1 else hashlib.sha256("".join(hashes).encode()).hexdigest(),
         distance_m=round(run_of(bench).recorder.distance_m, 6), clearance_m=round(min(known), 6) if known else None,
         hits=tuple(seen.hits), way_mm=tuple(seen.way_mm), died=died, blocks=seen.blocks | blocks_of(bench),
-        lines=_states(list(seen.printed)),
+        ways=seen.ways | ways_of(bench), lines=frozenset(seen.printed), transitions=frozenset(seen.transitions),
+        happened=frozenset(seen.happened),
     )  # fmt: skip
 
 
@@ -364,7 +428,15 @@ def blocks_of(bench: Bench) -> frozenset[int]:
     return frozenset(block for chip in chips if isinstance(chip, BluePill) for block in chip.entered_blocks)
 
 
-def _goals(bench: Bench, end: Nanos, robot: str) -> list[GoalResult]:
+def ways_of(bench: Bench) -> frozenset[int]:
+    """Return which ways this process has seen a bench's blocks go, as of `Outcome.ways`."""
+    chips = (one.chip for one in bench.robots.values())
+    return frozenset(
+        end + is_elsewhere for chip in chips if isinstance(chip, BluePill) for end, is_elsewhere in chip.gone_ways
+    )
+
+
+def _goals(bench: Bench, end: Nanos, robot: str, disturbed_by: frozenset[str]) -> list[GoalResult]:
     found = []
     for one in run_of(bench).goals.at_end(run_of(bench).ended(end)):
         goal, outcome = one.goal, one.outcome
@@ -372,17 +444,9 @@ def _goals(bench: Bench, end: Nanos, robot: str) -> list[GoalResult]:
         found.append(GoalResult(
             kind=goal.kind, wanted=goal.wanted, met=None if one.is_open else outcome.met, says=outcome.says,
             robustness=None if by is None else round(by, 9), unit="" if by is None else outcome.unit, robot=robot,
+            is_excused=not one.is_open and not outcome.met and bool(goal.excused_by & disturbed_by),
         ))  # fmt: skip
     return found
-
-
-def _states(printed: Sequence[bytes]) -> frozenset[str]:
-    """Return printed lines with figures as `#`, so that a counter is one state."""
-    found = set()
-    for data in printed:
-        text = data.decode("ascii", "replace").strip()
-        found.add("".join("#" if c.isdigit() and not text[at - 1 : at].isdigit() else c for at, c in enumerate(text)))
-    return frozenset(sorted(found)[:MOST_LINES])
 
 
 def _pack_firmware(table: dict[str, object], scenario: Scenario, files: dict[str, bytes]) -> None:

@@ -12,6 +12,7 @@ Invariant: the folder alone says what was done and is enough to go on, on anothe
 
 import contextlib
 import json
+import os
 import shutil
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -22,6 +23,7 @@ from robot_bench.campaign.campaign_file import Campaign, load_campaign, parse_ca
 from robot_bench.campaign.conduct import CampaignProgress, Conduct, PointRow, Workers
 from robot_bench.campaign.last_moment import LastMoment, last_moment
 from robot_bench.campaign.page import render
+from robot_bench.campaign.reaching.corpus import BEGUN, added, read_corpus, write_corpus
 from robot_bench.campaign.results import Results, Whole
 from robot_bench.campaign.variants.against import FOLDER as AGAINST
 from robot_bench.campaign.variants.against import Other
@@ -75,6 +77,9 @@ def begin(
                 other.keep(folder)
             kept = {key: value for key, value in table.items() if key not in {"firmware", "goal"}}
             kept["scenario"] = f"{SCENARIO}/{scenario.name}"
+            if found.corpus_file is not None:
+                kept["corpus"] = os.path.relpath(found.corpus_file.resolve(), folder.resolve())
+                write_corpus(folder / BEGUN, found.corpus)
             whole = folder / f"{file.stem}.part"
             whole.write_text(toml_text(kept), encoding="utf-8")
             whole.replace(folder / f"{file.stem}.toml")
@@ -83,6 +88,7 @@ def begin(
             shutil.rmtree(folder / part, ignore_errors=True)
         with contextlib.suppress(OSError):
             (folder / f"{file.stem}.part").unlink(missing_ok=True)
+            (folder / BEGUN).unlink(missing_ok=True)
         raise
     return load_campaign(folder / f"{file.stem}.toml", trust=Trust(keys=found.trial.trusted))
 
@@ -142,10 +148,22 @@ def carry_out(
         whole.was_interrupted = True
     finally:
         conduct.close()
+    _keep_corpus(whole)
     write_text(whole.folder / "report.html", render(whole))
     text = json.dumps(whole.as_json(), indent=2, sort_keys=True)
     write_text(folder / SUMMARY, f"{text}\n")
     return whole
+
+
+def _keep_corpus(whole: Whole) -> None:
+    """Add the points that reached something new to the corpus as it is now: another campaign may have, meanwhile."""
+    path = whole.campaign.corpus_file
+    if path is None:
+        return
+    if not path.parent.is_dir():  # the folder was carried elsewhere
+        path = whole.folder / path.name
+    new = [whole.space.coordinates(row.proposal.point) for row in whole.progress.rows if row.new]
+    write_corpus(path, added(read_corpus(path), new))
 
 
 def _moment(row: PointRow, look: Callable[[], None]) -> LastMoment | None:

@@ -298,7 +298,7 @@ def _build_several(
 def _model(table: Table, path: Path, where: TablePlace) -> RobotParameters:
     """Return what a robot without a program is."""
     robot = str(table["robot"])
-    own = _own_robot(robot, {key: value for key, value in table.items() if key == "pins"}, path, where)
+    own = _own_robot(robot, {key: value for key, value in table.items() if key in {"pins", "charge"}}, path, where)
     return own.robot.parameters if own is not None else _parameters(robot, path, where)
 
 
@@ -328,6 +328,10 @@ def _own_robot(robot: str, table: Table, path: Path, where: TablePlace) -> OwnRo
                 f"{within(where, 'pins')}: the robot {shown(robot)} has the wires of the pin-out",
                 hint=f"it is for {', '.join(known_own_robots())}, and robot files with a kind",
             )
+        if "charge" in table:
+            raise ScenarioError(
+                f"{where.at('charge')}: charge is for robots on own pins", hint='fault = "low-battery 11.0"'
+            )
         return None
     for key in ("direct", "adapter", "controller", "fault"):
         if key in table:
@@ -335,7 +339,8 @@ def _own_robot(robot: str, table: Table, path: Path, where: TablePlace) -> OwnRo
             raise ScenarioError(f"{at}: this is for a Pioneer, and {shown(robot)} is none")
     if table.get("mode") == "adapter":
         raise ScenarioError(f"{where.at('mode')}: the robot {shown(robot)} hangs on the chip's own pins")
-    return load_own_robot(file, table_of(table, "pins"), where)
+    charge = number_of(table, "charge") if "charge" in table else None
+    return load_own_robot(file, table_of(table, "pins"), where, charge=charge)
 
 
 def _firmware(name: str, path: Path, where: TablePlace) -> Path:

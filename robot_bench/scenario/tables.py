@@ -151,6 +151,9 @@ class OwnTable(Record):
     pins: Annotated[Mapping[str, object] | None, Key(
         doc="of a robot on your own pins: signal = pin of the BluePill, where it is another than its file says"
     )] = None  # fmt: skip
+    charge: Annotated[float | None, Key(
+        least=0, most=1, doc="of a robot on your own pins: how much of its battery is left as the run begins"
+    )] = None  # fmt: skip
     direct: Annotated[DirectTable, Key(doc="mode A")] = field(default_factory=DirectTable)
     adapter: Annotated[AdapterTable, Key(doc="mode B, see [adapter.md](adapter.md)")] = field(
         default_factory=AdapterTable

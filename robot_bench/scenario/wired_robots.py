@@ -110,13 +110,14 @@ def find_own_robot(name: str, folder: Path) -> Path | None:
     return path if "kind" in table else None
 
 
-def load_own_robot(path: Path, pins: Table, where: Where) -> OwnRobot:
+def load_own_robot(path: Path, pins: Table, where: Where, *, charge: float | None = None) -> OwnRobot:
     """Return the robot of a file.
 
     Args:
         path: The file.
         pins: What a scenario says otherwise of the pins.
         where: Where it says so.
+        charge: What it says of the battery's charge, in place of the file's.
 
     Raises:
         ScenarioError: The file breaks the schema, or signals and pins do not go together.
@@ -127,6 +128,8 @@ def load_own_robot(path: Path, pins: Table, where: Where) -> OwnRobot:
     kind, own = table.get("kind"), table_of(table, "pins")
     if kind not in KINDS:
         raise ScenarioError(f"{at.at('kind')}: there is no kind of robot {shown(kind)}", hint=nearest(str(kind), KINDS))
+    if charge is not None:
+        table = {**table, "battery": {**table_of(table, "battery"), "charge": charge}}
     asked = {signal: str(pin) for signal, pin in {**own, **pins}.items()}
     robot = KINDS[str(kind)].load(table, at, asked)
     for part, its_place in ((own, within(at, "pins")), (pins, within(where, "pins"))):

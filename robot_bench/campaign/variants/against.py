@@ -126,7 +126,8 @@ def compared(one: Outcome, other: Outcome, names: tuple[str, str]) -> Outcome:
     return replace(
         seen, verdict=TrialVerdict.FAILED if differs else TrialVerdict.PASSED, goals=(goal,), sha256=both, died="",
         failures=(f"{KIND}: {says}",) if differs else (),
-        blocks=one.blocks | other.blocks, lines=one.lines | other.lines,
+        blocks=one.blocks | other.blocks, ways=one.ways | other.ways, lines=one.lines | other.lines,
+        transitions=one.transitions | other.transitions, happened=one.happened | other.happened,
     )  # fmt: skip
 
 

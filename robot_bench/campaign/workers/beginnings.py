@@ -20,7 +20,7 @@ from typing import TypeAlias, cast
 from p2os.toml_record import number_of, tables_of
 from p2os.toml_schema import Table
 from robot_bench.bench import Bench, run_of
-from robot_bench.campaign.trial import Done, Outcome, SeenSoFar, Trial, bench_of, blocks_of, run_trial, unpacked
+from robot_bench.campaign.trial import Done, Outcome, SeenSoFar, Trial, bench_of, run_trial, unpacked
 from simbase.errors import P2osError
 from simbase.timing import NS_PER_S, Nanos, nanos
 
@@ -44,8 +44,7 @@ class SavedBeginning:
     @classmethod
     def of(cls, bench: Bench, seen: SeenSoFar) -> "SavedBeginning":
         """Return the present state of a run, with what it has shown."""
-        shown = SeenSoFar(seen.way_mm, seen.hits, seen.printed, seen.blocks | blocks_of(bench))
-        return cls(bench.now, zlib.compress(pickle.dumps((bench.snapshot(), shown)), 1))
+        return cls(bench.now, zlib.compress(pickle.dumps((bench.snapshot(), seen.so_far(bench))), 1))
 
     def __call__(self, bench: Bench) -> SeenSoFar:
         """Put a bench into this state; return what the run had shown until then.
@@ -79,7 +78,7 @@ class Task:
                 bench = bench_of(self.trial.scenario(folder))
                 bench.on_slice = lambda _now: look()
                 seen = SeenSoFar() if self.start is None else self.start(bench)
-                seen.subscribe(bench)
+                seen.subscribe(bench, self.trial.looks_for)
                 at = 0 if self.start is None else self.start.at
                 while (at := at // EACH_NS * EACH_NS + EACH_NS) <= self.until:
                     bench.run_until(at)

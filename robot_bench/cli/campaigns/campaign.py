@@ -41,7 +41,8 @@ A campaign file says what may vary, what has to hold, and how much may be
 spent. Cheap runs propose, runs in full confirm, and each failure was run again
 in another process with the same hash before it is told.
 
-Exit code: 0 nothing fails, 1 something does or no point has a verdict,
+Exit code: 0 nothing fails, 1 something does, no point has a verdict, or what a
+[[reach]] names was not reached,
 130 interrupted (--resume goes on).
 
 \b
@@ -217,7 +218,7 @@ def tell(done: Whole, other: Other | None, *, json_output: bool) -> None:
         print_whole(done, parts, other)
     if done.was_interrupted:
         raise typer.Exit(EXIT_INTERRUPTED)
-    if done.failures or {row.finding for row in done.progress.rows} == {PointFinding.ERROR}:
+    if done.failures or done.unreached or {row.finding for row in done.progress.rows} == {PointFinding.ERROR}:
         raise typer.Exit(1)
 
 
@@ -263,6 +264,11 @@ def _facts(done: Whole, other: Other | None) -> Iterator[str]:
     """Return how different the failures are, whose they are, and whether some points were one and the same run."""
     if done.failures:
         yield from (f"{what}: {value}" for what, value in FailureSet.of(done.progress.rows).words().items())
+    yield from (f"unreached  {said}: no point has reached it" for said in done.unreached)
+    source = done.source
+    if source is not None:
+        of = f"{source.lines} of {source.lines_of} lines, " if source.lines_of else ""
+        yield f"reached  {of}{source.ways} of {source.ways_of} ways of branches; the report names the others"
     for name, sha256 in done.campaign.trial.programs.items():
         yield f"firmware {name}, sha256 {sha256[:SHOWN_HASH]}"
     if other is not None:

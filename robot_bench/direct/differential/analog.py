@@ -30,9 +30,9 @@ class DischargingBattery(Stateful):
 
     def __init__(self, settings: BatteryDescription) -> None:
         self._settings = settings
-        self.used_ah = 0.0
+        self.used_ah = (1 - settings.charge) * settings.capacity_ah
         #: Under the present load.
-        self.volts = settings.full_v
+        self.volts = self.source_v
 
     @property
     def source_v(self) -> float:

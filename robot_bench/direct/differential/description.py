@@ -101,6 +101,7 @@ class BatteryDescription(Record):
     full_v: Annotated[float, Key(above=0, most=_MOST_V, doc="full")]
     empty_v: Annotated[float, Key(above=0, most=_MOST_V, doc="empty")]
     capacity_ah: Annotated[float, Key(above=0, most=10_000, doc="from full to empty")]
+    charge: Annotated[float, Key(least=0, most=1, doc="how much of it is left as a run begins")] = 1.0
     resistance_ohm: Annotated[float, Key(least=0, most=100, doc="inside")]
     idle_current_a: Annotated[float, Key(least=0, most=100, doc="of all but the motors")] = 0.0
     divider_top_ohm: Annotated[float, Key(least=0, most=1e8, doc="from the battery to the pin")]

@@ -31,6 +31,13 @@ class GoalTable(Record):
 
     kind: Annotated[str, Key(doc="which")]
     ends_run: Annotated[Literal["met", "missed", "decided"] | None, Key(doc="the verdict that ends the run")] = None
+    excused_by: Annotated[tuple[str, ...], Key(
+        kind="list", doc="names of what a campaign draws or disturbs by: a run with one of these it does not judge"
+    )] = ()  # fmt: skip
+
+    def __post_init__(self) -> None:
+        if not all(isinstance(one, str) for one in self.excused_by):
+            raise ScenarioError("excused_by must be a list of names in quotes")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,6 +49,8 @@ class Goal:
     table: Record
     #: Which verdict ends the run: `met`, `missed`, `decided` (either), or none.
     ends_run: str | None = None
+    #: Names of what excuses from it, in a campaign.
+    excused_by: frozenset[str] = frozenset()
 
     @property
     def definition(self) -> GoalKind:
@@ -115,7 +124,8 @@ def load_goal(table: Table, where: Where, wires: Wires | None = None) -> Goal:
         if wires is not None and isinstance(made, OfEvents):
             made = replace(made, wires=wires)
         kind.watch(made)
-    return Goal(kind=common.kind, table=made, ends_run=common.ends_run)
+    excused_by = frozenset(common.excused_by)
+    return Goal(kind=common.kind, table=made, ends_run=common.ends_run, excused_by=excused_by)
 
 
 def _check(rest: Table) -> None:

@@ -9,14 +9,14 @@ from functools import cache
 from importlib.metadata import EntryPoint
 
 from p2os.errors import ScenarioError
-from robot_bench.scenario.goals import motion, signals, steering, temporal, text
+from robot_bench.scenario.goals import answering, motion, signals, steering, temporal, text
 from robot_bench.scenario.goals.watch import GoalKind
 from simbase.entry_points import installed_points
 from simbase.errors import shown
 
 #: Those of the package, from each file its own.
 KINDS: Mapping[str, GoalKind] = {
-    name: kind for part in (motion, steering, temporal, signals, text) for name, kind in part.KINDS.items()
+    name: kind for part in (motion, steering, answering, temporal, signals, text) for name, kind in part.KINDS.items()
 }
 
 

@@ -7,12 +7,13 @@ from typing import Annotated
 from p2os.errors import ScenarioError
 from p2os.toml_record import Record
 from p2os.toml_schema import Key
-from robot_bench.events.kinds import MICRO, Clearance, Contact, Event, Pose
+from robot_bench.events.kinds import MICRO, Clearance, Contact, Event, Pose, Ranges
 from robot_bench.events.selection import moves
 from robot_bench.scenario.goals.watch import (
     From,
     GoalKind,
     GoalOutcome,
+    IfAny,
     InTime,
     NoKeys,
     OfEvents,
@@ -23,11 +24,15 @@ from robot_bench.scenario.goals.watch import (
     seconds,
     window_in_words,
 )
-from simbase.timing import NS_PER_S, Nanos, nanos
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, nanos
 
 NS_PER_MINUTE = 60 * NS_PER_S
 #: chosen: so many collisions are named in one line; all stand in the state log.
 NAMED_HITS = 3
+#: Of a Pioneer's front ring, what looks along its way.
+AHEAD = (3, 4, 5, 6)
+#: A ring of eight, two to a packet, is new after so long: what it has not heard yet reads as the longest range.
+RING_NS: Nanos = 400 * NS_PER_MS
 #: Side of the cells that a run's coverage is counted in, micrometres.
 CELL_UM = 500_000
 _Way = Annotated[float | None, Key(above=0, most=1e6, doc="the way that it may take, or has to")]
@@ -299,6 +304,7 @@ class StopWithinTable(OfEvents):
     after: Annotated[str, Key(doc="the event")]
     within_s: InTime
     way_m: _Way = None
+    if_any: IfAny = False
 
 
 class StopWithin(Watch):
@@ -311,6 +317,7 @@ class StopWithin(Watch):
         self._events = SelectorFeed(table.selected(table.after))
         self.kinds, self.wires = (*{Pose: None, **dict.fromkeys(self._events.kinds)},), self._events.wires
         self._most_s, self._most_m = table.within_s, table.way_m or math.inf
+        self._if_any = table.if_any
         #: When the event came that is waited for now; the last place, and the way since then.
         self._since: Nanos | None = None
         self._at: tuple[float, float] | None = None
@@ -349,7 +356,7 @@ class StopWithin(Watch):
 
     def finish(self, end: Nanos) -> GoalOutcome:
         if not self._count:
-            return GoalOutcome(met=False, says=f"{self._words!r} did not happen")
+            return GoalOutcome(met=self._if_any, says=f"{self._words!r} did not happen")
         return GoalOutcome(
             met=not self._failure,
             says=self._failure or f"at most {self._worst_s:.3f} s and {self._worst_m:.3f} m",
@@ -363,47 +370,69 @@ class MovesOnTable(Record):
     way_m: Annotated[float, Key(above=0, most=1e6, doc="so far away")]
     within_s: InTime
     from_s: From = None
+    free_m: Annotated[float | None, Key(
+        above=0, most=100, doc="its time at a place counts from when all sonar `ahead` were free beyond that"
+    )] = None  # fmt: skip
+    ahead: Annotated[tuple[int, ...], Key(doc="numbers of the sonar that look ahead, from 1")] = AHEAD
 
 
 class MovesOn(Watch):
     """The robot gets so far away from each place in time: it neither stands, nor turns on the spot, nor is shut in.
 
-    The place is that of the first pose, then that where it was so far away from the one before.
+    The place is that of the first pose, then that where it was so far away from the one before. With `free_m` its time
+    there begins where it sees free floor, so that one who looks for the way out of a dead end is not hurried.
     """
 
-    STATE = ("_place", "_least", "_least_at", "_has_missed")
-    kinds = (Pose,)
+    STATE = ("_place", "_since", "_free_since", "_least", "_least_at", "_has_missed")
 
     def __init__(self, table: MovesOnTable) -> None:
         self._way_m = table.way_m
         self._within, self._from = nanos(table.within_s), nanos(table.from_s or 0.0)
+        self._free_mm, self._ahead = None if table.free_m is None else 1000 * table.free_m, table.ahead
+        self.kinds = (Pose,) if self._free_mm is None else (Pose, Ranges)
         self._place: Pose | None = None
+        #: From when the time counts at this place; None: it has seen no free floor there yet.
+        self._since: Nanos | None = None
+        #: From when all was free ahead; None: something is not.
+        self._free_since: Nanos | None = None
         #: The least time that was left when it got away, and when.
         self._least = self._within
         self._least_at: Pose | None = None
         self._has_missed = False
 
     def feed(self, event: Event) -> GoalOutcome | None:
+        if isinstance(event, Ranges) and self._free_mm is not None:
+            ahead = [event.mm[one - 1] for one in self._ahead if one <= len(event.mm)]
+            is_free = min(ahead, default=0) > self._free_mm
+            self._free_since = (event.t if self._free_since is None else self._free_since) if is_free else None
         if not isinstance(event, Pose) or event.t < self._from:
             return None
         if self._place is None:
             self._place = event
-        left = self._within - (event.t - self._place.t)
+        if self._since is None and self._sees_free(event.t):
+            self._since = event.t
+        left = self._within if self._since is None else self._within - (event.t - self._since)
         if left < self._least:
             self._least, self._least_at = left, self._place
         if math.hypot(event.x - self._place.x, event.y - self._place.y) >= self._way_m * MICRO:
-            self._place = event
+            self._place, self._since = event, event.t if self._sees_free(event.t) else None
         if left >= 0 or self._has_missed:
             return None
         self._has_missed = True
         return self.finish(event.t)
+
+    def _sees_free(self, now: Nanos) -> bool:
+        """Tell whether free floor counts as seen: for as long as all sonar take to be new; without `free_m` always."""
+        return self._free_mm is None or (self._free_since is not None and now - self._free_since >= RING_NS)
 
     def finish(self, end: Nanos) -> GoalOutcome:
         stuck, left_s = self._least_at, self._least / NS_PER_S
         if left_s >= 0 or stuck is None:
             return GoalOutcome(met=True, robustness=left_s, unit="s")
         says = f"it did not get {self._way_m:g} m away from {_place(stuck)} where it was at {seconds(stuck.t)}"
-        return GoalOutcome(met=False, says=f"{says} within {self._within / NS_PER_S:g} s", robustness=left_s, unit="s")
+        since = "" if self._free_mm is None else f", having seen {self._free_mm / 1000:g} m of free floor"
+        says += f" within {self._within / NS_PER_S:g} s{since}"
+        return GoalOutcome(met=False, says=says, robustness=left_s, unit="s")
 
 
 class SmoothTable(Record):
@@ -546,14 +575,17 @@ KINDS: Mapping[str, GoalKind] = {
         StopWithinTable,
         lambda table: f"stands still{window_in_words(table.after, within_s=table.within_s)}"
         + "".join(given_in_words((" and ", table.way_m, " m"))),
-        StopWithin, doc="after each such event the robot stands in time, no further on",
+        StopWithin, doc="after each such event the robot stands in time, no further on; with `if_any = true` also "
+        "where there is none",
     ),
     "moves_on": GoalKind(
         MovesOnTable,
         lambda table: f"gets {table.way_m:g} m away from each place"
-        + window_in_words(from_s=table.from_s, within_s=table.within_s),
+        + window_in_words(from_s=table.from_s, within_s=table.within_s)
+        + "".join(given_in_words((" of seeing ", table.free_m, " m of free floor"))),
         MovesOn, doc="it gets so far away from each place in time: it neither stands nor turns on the spot nor is shut "
-        "in; the next place is where it was so far away",
+        "in; the next place is where it was so far away; with `free_m` its time there counts from when all sonar "
+        "`ahead` have been free beyond that for 0.4 s, so that a way out of a dead end may take longer",
     ),
     "smooth": GoalKind(
         SmoothTable, lambda table: f"accelerates no rim by more than {table.most_mps2:g} m/s²", Smooth,

@@ -16,6 +16,7 @@ from robot_bench.scenario.goals.watch import (
     From,
     GoalKind,
     GoalOutcome,
+    IfAny,
     OfEvents,
     SelectorFeed,
     To,
@@ -118,6 +119,7 @@ class LatencyTable(OfEvents):
     to: Annotated[str, Key(doc="the event that follows")]
     most_s: _Most
     least_s: Annotated[float, Key(least=0, most=LONGEST_S, doc="no sooner")] = 0.0
+    if_any: IfAny = False
 
 
 def refuse_other_than_texts(key: str, items: tuple[str, ...]) -> None:
@@ -328,6 +330,7 @@ class Latency(Watch):
         self._events = SelectorFeed(table.selected(table.from_), table.selected(table.to))
         self.kinds, self.wires = self._events.kinds, self._events.wires
         self._most, self._least = nanos(table.most_s), nanos(table.least_s)
+        self._if_any = table.if_any
         #: The first event that was not answered yet.
         self._since: Nanos | None = None
         self._worst: tuple[Nanos, Nanos] = (0, 0)
@@ -374,7 +377,7 @@ class Latency(Watch):
             return GoalOutcome(met=False, says=self._failure, robustness=by, unit="s")
         if not self._count:
             what = self._first if self._since is None else self._then
-            return GoalOutcome(met=False, says=f"{what!r} did not happen")
+            return GoalOutcome(met=self._if_any, says=f"{what!r} did not happen")
         took, at = self._worst
         says = f"{self._count} times, at most {took / NS_PER_S:.6f} s (at {seconds(at)})"
         return GoalOutcome(met=True, says=says, robustness=(self._most - took) / NS_PER_S, unit="s")
@@ -433,7 +436,7 @@ KINDS: Mapping[str, GoalKind] = {
     ),
     "never": GoalKind(
         NeverTable, lambda table: f"{table.event!r} never happens{window_in_words(from_s=table.from_s)}",
-        lambda table: never(table.event, table, from_s=table.from_s), doc="it does not happen",
+        lambda table: never(table.event, table, from_s=table.from_s), doc="it does not happen", holds_anywhere=True,
     ),
     "in_order": GoalKind(
         InOrderTable, lambda table: f"in order {', '.join(map(repr, table.events))}", InOrderOfEvents,
@@ -441,6 +444,7 @@ KINDS: Mapping[str, GoalKind] = {
     ),
     "latency": GoalKind(
         LatencyTable, lambda table: f"{table.to!r} follows {table.from_!r} within {table.most_s:g} s", Latency,
-        doc="each `from` is followed by a `to` in time",
+        doc="each `from` is followed by a `to` in time; with `if_any = true` also where there is none",
+        holds_anywhere=True,
     ),
 }  # fmt: skip

@@ -1,15 +1,22 @@
-"""Goals on what the firmware prints: that it is there, that it is not, and in which order."""
+"""Goals on what the firmware prints: that it is there or is not, in which order, and that its numbers are right."""
 
+import re
 from collections.abc import Mapping
 from typing import Annotated, ClassVar
 
 from p2os.toml_record import Record
 from p2os.toml_schema import Key
-from robot_bench.events.kinds import Event, Text
+from robot_bench.events.kinds import Event, Pose, Text
 from robot_bench.events.selection import Lines
-from robot_bench.scenario.goals.temporal import never, refuse_other_than_texts
-from robot_bench.scenario.goals.watch import GoalKind, GoalOutcome, OfEvents, Watch
-from simbase.timing import Nanos
+from robot_bench.scenario.goals.temporal import SIGNALS, never, refuse_other_than_texts
+from robot_bench.scenario.goals.watch import GoalKind, GoalOutcome, OfEvents, Watch, given_in_words, seconds
+from simbase.errors import UsageError
+from simbase.timing import Nanos, nanos
+
+#: What sums of decimals are off by.
+TINY = 1e-9
+#: Signals that a program may print, of the pose.
+PRINTED = tuple(name for name, (kind, _, _) in SIGNALS.items() if kind is Pose and name != "apart_m")
 
 
 class Printed(Watch):
@@ -83,18 +90,96 @@ class PrintsInOrderTable(Record):
         refuse_other_than_texts("texts", self.texts)
 
 
+class PrintsNumbersTable(Record):
+    """Numbers in what is printed, and what they have to be: within bounds, or those of a signal."""
+
+    matches: Annotated[str, Key(doc="a regular expression of a line, with one group: the number")]
+    times: Annotated[float, Key(least=-1e6, most=1e6, doc="the number so many times is the value")] = 1.0
+    least: Annotated[float | None, Key(least=-1e9, most=1e9, doc="of the value")] = None
+    most: Annotated[float | None, Key(least=-1e9, most=1e9, doc="of the value")] = None
+    signal: Annotated[str | None, Key(choices=PRINTED, doc="which the value is of")] = None
+    tolerance: Annotated[float, Key(least=0, most=1e6, doc="off the signal at most")] = 0.0
+    over_s: Annotated[float, Key(above=0, most=3600, doc="of the signal what it was in so long before counts")] = 0.5
+
+    def __post_init__(self) -> None:
+        try:
+            groups = re.compile(self.matches).groups
+        except re.error as error:
+            raise UsageError(f"matches = {self.matches!r}: {error}") from error
+        if groups != 1:
+            raise UsageError(f"matches = {self.matches!r} has not one group", hint=r"matches = 'left (-?\d+)'")
+
+
+class PrintsNumbers(Printed):
+    """Each number that a line tells is within bounds, or one that a signal had just before."""
+
+    STATE = ("_values", "_count", "_failure")
+    kinds = (Text, Pose)
+
+    def __init__(self, table: PrintsNumbersTable) -> None:
+        super().__init__()
+        self._table, self._find = table, re.compile(table.matches).search
+        self._value = None if table.signal is None else SIGNALS[table.signal][1]
+        #: When the signal had which value, as far back as it counts.
+        self._values: list[tuple[Nanos, float]] = []
+        self._count = 0
+        self._failure = ""
+
+    def feed(self, event: Event) -> GoalOutcome | None:
+        if isinstance(event, Pose):
+            if self._value is not None:
+                since = event.t - nanos(self._table.over_s)
+                self._values = [(t, value) for t, value in self._values if t >= since] + [(event.t, self._value(event))]
+            return None
+        if not isinstance(event, Text) or (line := self.read(event)) is None or not event.data.endswith(b"\n"):
+            return None
+        if (found := self._find(line)) is None:
+            return None
+        self._count += 1
+        if self._failure or not (why := self._wrong(float(found.group(1)) * self._table.times)):
+            return None
+        self._failure = f"{line!r} at {seconds(event.t)}: {why}"
+        return self.finish(event.t)
+
+    def _wrong(self, value: float) -> str:
+        table = self._table
+        if (table.least is not None and value < table.least) or (table.most is not None and value > table.most):
+            return f"{value:g} is out of bounds"
+        values = [one for _, one in self._values]
+        if values and not min(values) - table.tolerance - TINY <= value <= max(values) + table.tolerance + TINY:
+            return f"{table.signal} was {min(values):.3g} to {max(values):.3g}"
+        return ""
+
+    def finish(self, end: Nanos) -> GoalOutcome:
+        if not self._count:
+            return GoalOutcome(met=False, says=f"no line matched {self._table.matches!r}; {self.last}")
+        return GoalOutcome(met=not self._failure, says=self._failure)
+
+
+def _bounded(table: PrintsNumbersTable) -> str:
+    bounds = given_in_words((" of at least ", table.least, ""), (" of at most ", table.most, ""))
+    return "".join(bounds) + ("" if table.signal is None else f" that {table.signal} had")
+
+
 KINDS: Mapping[str, GoalKind] = {
     "usart_contains": GoalKind(
         PrintsTable, lambda table: f"prints {table.text!r}",
         lambda table: InOrder([table.text], "was not printed"), doc="the firmware printed it",
+        holds_anywhere=True,
     ),
     "usart_lacks": GoalKind(
         PrintsTable, lambda table: f"never prints {table.text!r}",
         lambda table: never(f"usart1 sends {table.text}", OfEvents()), doc="the firmware never printed it",
+        holds_anywhere=True,
     ),
     "usart_in_order": GoalKind(
         PrintsInOrderTable, lambda table: f"prints in order {', '.join(map(repr, table.texts))}",
         lambda table: InOrder(list(table.texts), "was not printed in its turn"),
         doc="the firmware printed these, in this order", is_scripted=True,
+    ),
+    "prints_numbers": GoalKind(
+        PrintsNumbersTable, lambda table: f"prints {table.matches!r} with numbers{_bounded(table)}", PrintsNumbers,
+        doc="each line that matches has a number within bounds, or one that the signal had in the time before; one "
+        "line at least does", any_of=("least", "most", "signal"), holds_anywhere=True,
     ),
 }  # fmt: skip

@@ -56,6 +56,7 @@ From = Annotated[float | None, Key(least=0, most=LONGEST_S, doc="where its windo
 To = Annotated[float | None, Key(above=0, most=LONGEST_S, doc="where its window ends")]
 Within = Annotated[float | None, Key(above=0, most=LONGEST_S, doc="in so many seconds")]
 InTime = Annotated[float, Key(above=0, most=LONGEST_S, doc="in so many seconds")]
+IfAny = Annotated[bool, Key(doc="whether a run in which it does not happen meets it")]
 
 
 class NoKeys(Record):
@@ -92,16 +93,20 @@ class GoalKind:
         needs_world: A robot at a port cannot tell; there the goal is not judged.
         is_scripted: It is on what a program does in an order of its own, which from another start, or with other things
             in the way, it need not meet.
+        holds_anywhere: It is on what a program makes of its inputs, so a sound one meets it in any world and from any
+            start.
     """
 
     def __init__(
         self, table: type[T], wanted: Callable[[T], str], watch: Callable[[T], Watch], *, doc: str = "",
         any_of: tuple[str, ...] = (), needs_world: bool = False, is_scripted: bool = False,
+        holds_anywhere: bool = False,
     ) -> None:  # fmt: skip
         self.table: type[Record] = table
         self.wanted: Callable[[Any], str] = wanted
         self.watch: Callable[[Any], Watch] = watch
         self.doc, self.any_of, self.needs_world, self.is_scripted = doc, any_of, needs_world, is_scripted
+        self.holds_anywhere = holds_anywhere
 
 
 class SelectorFeed(Stateful):

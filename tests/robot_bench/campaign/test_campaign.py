@@ -7,6 +7,7 @@ import os
 import random
 import signal
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,7 @@ from robot_bench.campaign.campaign_file import (
 from robot_bench.campaign.conduct import Conduct, PointFinding
 from robot_bench.campaign.last_moment import LastMoment
 from robot_bench.campaign.page import _short
+from robot_bench.campaign.reaching.corpus import read_corpus
 from robot_bench.campaign.search import SEARCHES, PointResult, Problem
 from robot_bench.campaign.suggestion import suggested
 from robot_bench.campaign.trial import GoalResult, Outcome, Trial, TrialVerdict, run_trial, trial_of, warm_up
@@ -362,9 +364,17 @@ def test_what_new_writes_for_each_scenario_can_be_begun(name: str, tmp_path: Pat
     campaign = parse_campaign(suggested(load_scenario(name), name, "mine.toml"), tmp_path / "mine.toml")
     is_list = name in {"encoders", "motors", "rover", "sensors"}
     kinds = [goal["kind"] for goal in campaign.trial.table["goal"]]  # type: ignore[attr-defined]  # a list of tables
-    assert bool(campaign.draws) is not is_list
+    drawn = [one.name for one in campaign.draws]
+    assert drawn == ["in the way"] if name == "rover" else bool(drawn) is not is_list
     assert ("moves_on" in kinds) is not is_list
-    assert ("crystal_ppm" in campaign.vary) is is_list
+    assert {"crystal_ppm", "sram"} <= set(campaign.vary)
+    assert ("duration_s" in campaign.vary) is not is_list
+    # Faults act on a Pioneer's controller; a world that is another one for each seed has its start elsewhere.
+    assert bool(campaign.disturbances) is (name in {"dodge", "dodge-duty", "free-drive"})
+    assert ("seed" in campaign.vary) is (name not in {"two-dodge", "rover"})
+    assert ("charge" in campaign.vary) is (name == "rover")
+    assert ("answers" in kinds) is (name == "dodge"), "of its own goals those that hold in any world"
+    assert (campaign.search, campaign.swarm) == ("coverage", 0.5)
 
 
 def test_a_folder_that_is_taken_and_one_that_is_none_are_refused(tmp_path: Path) -> None:
@@ -493,3 +503,37 @@ def test_minutes_that_are_over_leave_one_batch_of_near_misses(tmp_path: Path) ->
     assert len(rows) == 12
     failed = sum(row.cheap.outcome.verdict is TrialVerdict.FAILED for row in rows)
     assert sum(row.full is not None for row in rows) == failed + 4 < 12
+
+
+@pytest.mark.parametrize("is_reached", [True, False])
+def test_what_has_to_be_reached_and_was_not_is_a_failure_of_the_campaign(
+    is_reached: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def judge(trial: Trial) -> Outcome:
+        happened = frozenset(trial.looks_for) if is_reached else frozenset()
+        return replace(made_up(trial.with_lists(obstacle=[])), happened=happened)
+
+    campaign = begun(tmp_path, FILE + '[[reach]]\nstate = "BACK_OUT"\n')
+    whole = carried(campaign, tmp_path / "kept", Shuffled(1, judge=judge))
+    assert whole.progress.reached == {"state BACK_OUT": list(range(1, 13)) if is_reached else []}
+    page = (tmp_path / "kept" / "report.html").read_text()
+    assert ("point 1 first, 12 of 12 points" in page) is is_reached
+    assert "lines of source with code" in page
+    if is_reached:
+        tell(whole, None, json_output=False)
+        return
+    with pytest.raises(typer.Exit) as ended:
+        tell(whole, None, json_output=False)
+    assert ended.value.exit_code == 1
+    assert "state BACK_OUT: no point has reached it" in capsys.readouterr().out
+
+
+def test_what_reached_something_new_is_added_to_the_corpus(tmp_path: Path) -> None:
+    campaign = begun(tmp_path, 'corpus = "mine.jsonl"\n' + FILE)
+    whole = carried(campaign, tmp_path / "kept", Shuffled(1))
+    new = [whole.space.coordinates(row.proposal.point) for row in whole.progress.rows if row.new]
+    assert 0 < len(new) < len(whole.progress.rows)
+    kept = read_corpus(tmp_path / "mine.jsonl")
+    assert [list(map(float, at.values())) for at in kept] == [
+        [pytest.approx(at[name], abs=1e-6) for name in sorted(at)] for at in new
+    ]

@@ -77,6 +77,14 @@ def test_a_thing_with_room_stands_where_it_was_drawn(kind: str) -> None:
     assert middle == pytest.approx(0.4, abs=1e-3)
 
 
+@pytest.mark.parametrize(("own_m", "stands"), [(0.49, True), (0.51, False), (None, False)])
+def test_a_thing_may_stand_nearer_to_others_than_the_rest(own_m: float | None, stands: bool) -> None:
+    first = DrawnThing(name="a", kind="post", place=(1.2, 0.0, 0.0), measures={"width_m": 0.2})
+    second = DrawnThing(name="b", kind="post", place=(1.9, 0.0, 0.0), measures={"width_m": 0.2}, gap_m=own_m)
+    tables = {str(table["name"]): table for table in Room(WORLD, [START], GAP_M, FREE_M).tables([first, second])}
+    assert (tables["b"]["x_m"] == 1.9) is stands
+
+
 def test_a_dead_end_is_as_wide_and_deep_inside_as_it_was_drawn() -> None:
     thing = DrawnThing(name="d", kind="dead-end", place=(0.0, 0.5, 0.0), measures={"width_m": 0.8, "depth_m": 0.6})
     back, left, right = (footprint(t) for t in Room(WORLD, [Pose(0.0, -2.5, 0.0)], 0.0, 0.1).tables([thing]))

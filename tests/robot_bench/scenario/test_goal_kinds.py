@@ -68,9 +68,9 @@ def printed(*lines: tuple[int, str]) -> list[Event]:
 
 
 def test_every_kind_of_goal_is_tried() -> None:
-    from tests.robot_bench.scenario import test_goals, test_goals_on_steering
+    from tests.robot_bench.scenario import test_goals, test_goals_on_answers, test_goals_on_steering
 
-    tests = [*globals(), *vars(test_goals), *vars(test_goals_on_steering)]
+    tests = [*globals(), *vars(test_goals), *vars(test_goals_on_steering), *vars(test_goals_on_answers)]
     names = " ".join(name for name in tests if name.startswith("test_goal_"))
     missing = [kind for kind in every_kind() if kind not in names]
     assert missing == [], "write test_goal_KIND_... in tests/robot_bench/scenario/test_goals.py"
@@ -185,6 +185,31 @@ def test_goal_moves_on_begins_where_it_is_told_to() -> None:
     run = [at(0), at(6 * S), at(7 * S, 0.5), at(10 * S, 0.9)]
     assert not outcome("moves_on", run, way_m=0.3, within_s=5).met
     assert outcome("moves_on", run, way_m=0.3, within_s=5, from_s=6).met
+
+
+def ranges(t: int, ahead_m: float, aside_m: float = 0.3) -> Ranges:
+    return Ranges(t=t, mm=tuple(round(1000 * one) for one in (aside_m, aside_m, *[ahead_m] * 4, aside_m, aside_m)))
+
+
+@pytest.mark.parametrize(("t", "met"), [(5 * S - 1, True), (5 * S, True), (5 * S + 1, False)])
+def test_goal_moves_on_counts_from_where_free_floor_was_seen(t: int, met: bool) -> None:
+    run = [at(0), ranges(S - 400 * MS, 1.201), at(S), ranges(S + 1, 0.4), at(S + t), at(9 * S, 0.9)]
+    assert outcome("moves_on", run, way_m=0.3, within_s=9, free_m=1.2).met
+    found = outcome("moves_on", run[:-1], end=S + t, way_m=0.3, within_s=5, free_m=1.2)
+    assert (found.met, found.robustness) == (met, (5 * S - t) / S)
+    assert met or found.says.endswith("within 5 s, having seen 1.2 m of free floor")
+
+
+def test_goal_moves_on_does_not_hurry_who_sees_no_free_floor() -> None:
+    shut = [at(0), ranges(S, 1.2), at(2 * S), at(9 * S)]  # as far as that, and no farther
+    assert outcome("moves_on", shut, way_m=0.3, within_s=5, free_m=1.2).met
+    not_heard_yet = [at(0), ranges(S, 5.0), at(S + 400 * MS - 1), ranges(S + 400 * MS - 1, 0.5), at(9 * S)]
+    assert outcome("moves_on", not_heard_yet, way_m=0.3, within_s=5, free_m=1.2).met
+    one_side = [at(0), Ranges(t=S, mm=(300, 300, 1300, 1300, 1300, 1200, 300, 300)), at(2 * S), at(9 * S)]
+    assert outcome("moves_on", one_side, way_m=0.3, within_s=5, free_m=1.2).met
+    assert not outcome("moves_on", one_side, way_m=0.3, within_s=5, free_m=1.2, ahead=[3, 4, 5]).met
+    another_place = [at(0), ranges(S, 3.0), at(2 * S), ranges(3 * S, 0.5), at(4 * S, 0.5), at(10 * S, 0.5)]
+    assert outcome("moves_on", another_place, way_m=0.3, within_s=5, free_m=1.2).met
 
 
 def test_goal_smooth() -> None:
@@ -497,7 +522,8 @@ def test_one_declaration_of_a_plug_in_gives_reader_schema_page_and_completion(
     context = SimpleNamespace(params={"scenario": "mine.toml"}, args=[])
     assert [one for one, _ in setting_keys(context, "goal.1.")] == [  # type: ignore[arg-type] # all that it looks at
         *(f"goal.1.kind={name}" for name in every_kind()), "goal.1.ends_run=met", "goal.1.ends_run=missed",
-        "goal.1.ends_run=decided", "goal.1.most_deg=", "goal.1.axis=roll", "goal.1.axis=pitch", "goal.1.samples=",
+        "goal.1.ends_run=decided", "goal.1.excused_by=", "goal.1.most_deg=", "goal.1.axis=roll", "goal.1.axis=pitch",
+        "goal.1.samples=",
     ]  # fmt: skip
 
 

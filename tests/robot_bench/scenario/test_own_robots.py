@@ -8,6 +8,7 @@ import pytest
 from p2os.errors import ScenarioError
 from robot_bench.bench import Bench
 from robot_bench.bench.board import pins_of
+from robot_bench.direct.differential.analog import DischargingBattery
 from robot_bench.direct.differential.robot_file import MOST_EDGES_A_SECOND, TABLES
 from robot_bench.scenario.loading import read_scenario
 from robot_bench.scenario.scenario import Scenario
@@ -100,6 +101,7 @@ def test_a_wrong_line_is_named(tmp_path: Path, old: str, new: str, at: str | Non
         ('[pins]\nleft_pwm = "PB0"\n', "p2dx", "run.toml:6: [pins]: the robot 'p2dx' has the wires of the pin-out"),
         ('[pins]\nleft_pwm = "PA11"\n', "rover", "run.toml:6: [pins]: PA11 is left_pwm already"),
         ('[pins]\nleft_pvm = "PA1"\n', "rover", "run.toml:7: [pins]: unknown signal 'left_pvm'"),
+        ("charge = 0.5\n", "p2dx", "run.toml:6: charge is for robots on own pins"),
         ("", "rovr", "run.toml:3: no robot model 'rovr'"),
     ],
 )
@@ -130,6 +132,17 @@ def test_a_bench_of_another_robot_or_wiring_is_refused(tmp_path: Path) -> None:
     for text, more in ((TEXT.replace("mass_kg = 1.4", "mass_kg = 1.5"), ""), (TEXT, '[pins]\nleft_pwm = "PB0"\n')):
         with pytest.raises(UsageError, match=r"another (own_robot|parameters)"):
             Bench(scenario(tmp_path, text, more)).restore(snapshot)
+
+
+def test_a_battery_begins_with_the_charge_that_the_file_or_the_scenario_says(tmp_path: Path) -> None:
+    def volts(text: str, more: str = "") -> float:
+        robot = scenario(tmp_path, text, more).own_robot
+        assert robot is not None
+        return DischargingBattery(robot.robot.battery).source_v  # type: ignore[attr-defined]  # it is a differential one
+
+    half = TEXT.replace("[battery]", "[battery]\ncharge = 0.5")
+    assert (volts(TEXT), volts(half), volts(half, "charge = 1.0\n")) == pytest.approx((12.6, 10.8, 12.6))
+    assert volts(TEXT, "charge = 0.0\n") == 0.0
 
 
 def test_every_key_of_a_file_is_on_its_page() -> None:

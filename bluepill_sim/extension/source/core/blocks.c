@@ -182,6 +182,7 @@ static __attribute__((noinline)) void enter_block(struct core *core, uint32_t ad
     const struct row *before = core->block;
     bool has_looked = false;
     core->shared.cycle += before->costs[address != before->end];
+    *before->ways |= (uint8_t)(1u << (address != before->end));
     if (UNLIKELY(before->flags & ROW_CHANGES_MASKS)) {
         trim_registers(core);
     }
@@ -226,6 +227,7 @@ void core_on_block(void *unicorn, uint64_t at, uint32_t size, void *user)
         return;
     }
     core->shared.cycle = cycle;
+    *before->ways |= (uint8_t)(1u << (address != before->end));
     begin_block(core, row);
     core->shared.last[core->shared.logged++ % LAST_ROWS] = (struct record){cycle, address, 0};
 }
@@ -274,7 +276,9 @@ bool core_add_row(struct core *core, uint32_t start, uint32_t end, uint32_t stra
         return false;
     }
     const bool is_looked_after = flags & ROW_CHANGES_MASKS;
+    const bool is_in_flash = at >= core->flash_rows && at < core->flash_rows + FLASH_SLOTS;
     *row = (struct row){.start = start, .end = end, .costs = {straight, taken},
+                        .ways = &core->ways[is_in_flash ? flash_slot(end) : FLASH_SLOTS],
                         .passed = {is_looked_after ? NEVER : straight, is_looked_after ? NEVER : taken},
                         .flags = flags, .count = count, .host = host, .code = code, .compared = compared,
                         .next = core->all};
@@ -325,6 +329,9 @@ void core_forget_range(struct core *core, uint32_t first, uint32_t end)
         core->dropped = row;
     }
 }
+
+/* Of each half-word of flash: see `core.ways`. */
+const uint8_t *core_ways(const struct core *core) { return core->ways; }
 
 void core_forget_rows(struct core *core) { core_forget_range(core, 0, UINT32_MAX); }
 

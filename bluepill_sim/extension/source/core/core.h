@@ -75,6 +75,7 @@ struct row {
     /* Where nothing but the time need be looked at when it is entered: its start; else an address where no block is. */
     uint32_t plain_start;
     uint32_t flags, count;
+    uint8_t *ways;       /* which of its two ways were ever gone: bit 0 on at its end, bit 1 elsewhere */
     uint64_t passed[2]; /* its costs, or more than any time where what comes after it has to be looked at */
     const uint8_t *host; /* of code that may change: where it, or the FPB's table, stands now, */
     uint8_t *code;       /* what that was when it was measured, */
@@ -241,6 +242,8 @@ struct core {
     struct row none;
     struct row *flash_rows[FLASH_SLOTS];
     struct row *sram_rows[SRAM_SLOTS];
+    /* Of each place in flash where a block ends, as of `row.ways`; never taken back. The last: of all other places. */
+    uint8_t ways[FLASH_SLOTS + 1];
     struct row *other_row; /* of code that is neither in flash nor in SRAM: the last one */
     struct row *all, *dropped;
     struct page pages[PAGES];

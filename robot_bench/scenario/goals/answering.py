@@ -1,0 +1,289 @@
+"""Goals on how a program answers to its own inputs: the sensors' pins that it reads against the motors' pins it sets.
+
+They judge by what the program has in its hands, so no world, noise or sensor that lies makes a sound program miss them:
+who is told that something is near has to slow down, whether or not it is there. Motors are those of the pin-out, by
+the values of their pins: `mean` is the mean of both, `turn` the right less the left, positive to the left.
+
+Invariant: levels that follow each other within a millisecond are one change, since two ports are written in turn.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, ClassVar, Literal
+
+from adapter_sim.codec import motor_value
+from adapter_sim.pinout import load_pinout
+from p2os.toml_record import Record
+from p2os.toml_schema import LONGEST_S, Key
+from robot_bench.events.kinds import Event, PinEdge
+from robot_bench.events.selection import wire_named
+from robot_bench.scenario.goals.signals import SKEW_NS
+from robot_bench.scenario.goals.watch import GoalKind, GoalOutcome, InTime, Watch, seconds
+from simbase.errors import UsageError, nearest, shown
+from simbase.timing import NS_PER_S, Nanos, nanos
+
+_SIDES = ("motor1", "motor2")
+#: What the motors may be asked for.
+MOTIONS = ("forward", "back", "turn", "stand")
+_Pins = Annotated[tuple[str, ...], Key(kind="list", doc="pins of the BluePill, or names of wires")]
+_Before = Annotated[tuple[str, ...], Key(kind="list", doc="judges only what comes after one of these")]
+_Bound = Annotated[float | None, Key(least=-256, most=256, doc="of the signal, in steps of the motors' values")]
+
+
+class MotorWatch(Watch):
+    """Follows the motors' pins and those of sensors, and is asked about each span in which they stayed as they were."""
+
+    STATE: ClassVar[tuple[str, ...]] = ("_levels", "_changed", "_failure")
+    kinds = (PinEdge,)
+
+    def __init__(self, *pins: str) -> None:
+        pinout = load_pinout()
+        self._motors = [pinout.value(side).wires for side in _SIDES]
+        self._names = {pin: wire_named(pin) for pin in pins}
+        motors = [net for nets in self._motors for net in nets]
+        self.wires: tuple[str, ...] = tuple(dict.fromkeys([*motors, *self._names.values()]))
+        self._levels: dict[str, bool] = {}
+        #: When the last of them changed.
+        self._changed: Nanos = 0
+        self._failure = ""
+
+    def feed(self, event: Event) -> GoalOutcome | None:
+        if not isinstance(event, PinEdge) or event.wire not in self.wires:
+            return None
+        outcome = self.advance_to(event.t)
+        self._levels[event.wire], self._changed = event.level, event.t
+        return outcome
+
+    def advance_to(self, limit: Nanos) -> GoalOutcome | None:
+        if limit - self._changed < SKEW_NS:
+            return None
+        had_failed = bool(self._failure)
+        self.stayed(self._changed, limit)
+        return self.finish(limit) if self._failure and not had_failed else None
+
+    def stayed(self, since: Nanos, until: Nanos) -> None:
+        """Take notice that all levels were as they are now from one time to another; it comes again as that goes on."""
+        raise NotImplementedError
+
+    def is_high(self, pin: str) -> bool:
+        """Tell whether a pin of the table is high."""
+        return self._levels.get(self._names[pin], False)
+
+    @property
+    def values(self) -> tuple[int, int]:
+        """The motors' values, left and right."""
+        left, right = (
+            motor_value(sum(self._levels.get(net, False) << bit for bit, net in enumerate(nets)), len(nets))
+            for nets in self._motors
+        )
+        return left, right
+
+    @property
+    def motion(self) -> str:
+        """What the motors are asked for."""
+        left, right = self.values
+        if left == right == 0:
+            return "stand"
+        return "turn" if left + right == 0 else "forward" if left + right > 0 else "back"
+
+    def finish(self, end: Nanos) -> GoalOutcome:
+        return GoalOutcome(met=not self._failure, says=self._failure)
+
+
+class AnswersTable(Record):
+    """Pins, and what the motors have to be asked for while they are so."""
+
+    high: _Pins = ()
+    any_high: _Pins = ()
+    low: _Pins = ()
+    moving: Annotated[tuple[str, ...], Key(kind="list", doc="judges only while the motors do one of these")] = ()
+    signal: Annotated[Literal["mean", "turn"], Key(doc="of the motors' values")]
+    least: _Bound = None
+    most: _Bound = None
+    within_s: InTime
+
+    def __post_init__(self) -> None:
+        _refuse_other_motions(self.moving)
+
+
+class Answers(MotorWatch):
+    """While pins are so, the motors' values are in bounds, but for so long."""
+
+    STATE = ("_since", "_longest", "_longest_at")
+
+    def __init__(self, table: AnswersTable) -> None:
+        super().__init__(*table.high, *table.any_high, *table.low)
+        self._table, self._within = table, nanos(table.within_s)
+        #: From when they are out of bounds now.
+        self._since: Nanos | None = None
+        self._longest: Nanos = 0
+        self._longest_at: Nanos = 0
+
+    def stayed(self, since: Nanos, until: Nanos) -> None:
+        if not self._is_wrong():
+            self._since = None
+            return
+        self._since = since if self._since is None else self._since
+        if until - self._since > self._longest:
+            self._longest, self._longest_at = until - self._since, self._since
+        if self._longest > self._within and not self._failure:
+            left, right = self.values
+            says = f"the motors had {left:+d}, {right:+d} from {seconds(self._since)} on while {_when(self._table)}"
+            self._failure = f"{says}, for more than {self._within / NS_PER_S:g} s"
+
+    def _is_wrong(self) -> bool:
+        table = self._table
+        if table.moving and self.motion not in table.moving:
+            return False
+        if not all(map(self.is_high, table.high)) or any(map(self.is_high, table.low)):
+            return False
+        if table.any_high and not any(map(self.is_high, table.any_high)):
+            return False
+        left, right = self.values
+        value = (left + right) / 2 if table.signal == "mean" else right - left
+        return (
+            not (-math.inf if table.least is None else table.least)
+            <= value
+            <= (math.inf if table.most is None else table.most)
+        )
+
+    def finish(self, end: Nanos) -> GoalOutcome:
+        by = 1 - self._longest / self._within
+        return GoalOutcome(met=not self._failure, says=self._failure, robustness=by, unit="of what is allowed")
+
+
+class HasReasonTable(Record):
+    """A motion, and the pins without which it must not begin."""
+
+    motion: Annotated[str, Key(choices=MOTIONS, doc="what begins")]
+    before: _Before = ()
+    needs: Annotated[tuple[tuple[str, ...], ...], Key(kind="list", doc="lists of pins, of each of which one was high")]
+    within_s: Annotated[float, Key(above=0, most=LONGEST_S, doc="so long before, or since then")]
+
+    def __post_init__(self) -> None:
+        _refuse_other_motions(self.before)
+        if not self.needs or not all(isinstance(one, tuple) and one for one in self.needs):
+            raise UsageError("needs is no list of lists of pins", hint='needs = [["DD4", "DD5"]]')
+
+
+class HasReason(MotorWatch):
+    """A motion begins only where pins were high just before."""
+
+    STATE = ("_motion", "_was_high")
+
+    def __init__(self, table: HasReasonTable) -> None:
+        super().__init__(*(pin for one in table.needs for pin in one))
+        self._table, self._within = table, nanos(table.within_s)
+        self._motion: str = "stand"
+        #: Pin → until when it was high.
+        self._was_high: dict[str, Nanos] = {}
+
+    def feed(self, event: Event) -> GoalOutcome | None:
+        outcome = super().feed(event)
+        if isinstance(event, PinEdge):
+            self._was_high |= {pin: event.t for pin, wire in self._names.items() if wire == event.wire}
+        return outcome
+
+    def stayed(self, since: Nanos, until: Nanos) -> None:
+        before, self._motion = self._motion, self.motion
+        table = self._table
+        if self._motion == before or self._motion != table.motion or (table.before and before not in table.before):
+            return
+        missing = [one for one in table.needs if not any(self._was_high_at(pin, since) for pin in one)]
+        if missing and not self._failure:
+            self._failure = f"{table.motion} began at {seconds(since)} with no pin of {', '.join(missing[0])} high"
+
+    def _was_high_at(self, pin: str, at: Nanos) -> bool:
+        return self.is_high(pin) or (pin in self._was_high and at - self._was_high[pin] <= self._within)
+
+
+class LastsTable(Record):
+    """A motion, and how long it may or has to last."""
+
+    motion: Annotated[str, Key(choices=MOTIONS, doc="which")]
+    before: _Before = ()
+    least_s: Annotated[float | None, Key(above=0, most=LONGEST_S, doc="no shorter")] = None
+    most_s: Annotated[float | None, Key(above=0, most=LONGEST_S, doc="no longer")] = None
+
+    def __post_init__(self) -> None:
+        _refuse_other_motions(self.before)
+
+
+class Lasts(MotorWatch):
+    """A motion lasts so long each time: no shorter, no longer."""
+
+    STATE = ("_motion", "_begun", "_is_judged")
+
+    def __init__(self, table: LastsTable) -> None:
+        super().__init__()
+        self._table = table
+        self._least, self._most = nanos(table.least_s or 0.0), nanos(table.most_s or LONGEST_S)
+        self._motion: str = "stand"
+        self._begun: Nanos = 0
+        self._is_judged = table.motion == "stand" and not table.before
+
+    def stayed(self, since: Nanos, until: Nanos) -> None:
+        table = self._table
+        if self.motion != self._motion:
+            self._judge(since - self._begun, is_over=True)
+            self._is_judged = self.motion == table.motion and (not table.before or self._motion in table.before)
+            self._motion, self._begun = self.motion, since
+        self._judge(until - self._begun, is_over=False)
+
+    def _judge(self, lasted: Nanos, *, is_over: bool) -> None:
+        if not self._is_judged or self._failure or not (lasted > self._most or (is_over and lasted < self._least)):
+            return
+        bound, word = (self._most, "most") if lasted > self._most else (self._least, "least")
+        says = f"{self._table.motion} from {seconds(self._begun)} on lasted {lasted / NS_PER_S:.3f} s"
+        self._failure = f"{says}, {bound / NS_PER_S:g} s at {word}"
+
+
+def _refuse_other_motions(motions: tuple[str, ...]) -> None:
+    for one in motions:
+        if one not in MOTIONS:
+            raise UsageError(f"there is no motion {shown(one)}", hint=nearest(str(one), MOTIONS))
+
+
+def _when(table: AnswersTable) -> str:
+    parts = [f"{', '.join(table.high)} high"] * bool(table.high)
+    parts += [f"one of {', '.join(table.any_high)} high"] * bool(table.any_high)
+    parts += [f"{', '.join(table.low)} low"] * bool(table.low)
+    if table.moving:
+        parts.append(f"motion {' or '.join(table.moving)}")
+    return " and ".join(parts) or "anything"
+
+
+def _bounds(table: AnswersTable) -> str:
+    given = [("at least", table.least), ("at most", table.most)]
+    return " and ".join(f"{word} {value:g}" for word, value in given if value is not None)
+
+
+def _lasting(table: LastsTable) -> str:
+    given = [("at least", table.least_s), ("at most", table.most_s)]
+    return " and ".join(f"{word} {value:g} s" for word, value in given if value is not None)
+
+
+def _after(before: tuple[str, ...]) -> str:
+    return f" after {' or '.join(before)}" if before else ""
+
+
+KINDS: Mapping[str, GoalKind] = {
+    "answers": GoalKind(
+        AnswersTable,
+        lambda table: f"with {_when(table)}, has the motors' {table.signal} {_bounds(table)} in {table.within_s:g} s",
+        Answers, doc="while the sensors' pins are so and the motors are `moving` so, `mean` or `turn` of their values "
+        "is out of bounds for no longer than that", any_of=("least", "most"), holds_anywhere=True,
+    ),
+    "has_reason": GoalKind(
+        HasReasonTable,
+        lambda table: f"begins motion {table.motion}{_after(table.before)} only with "
+        + " and ".join(f"one of {', '.join(one)}" for one in table.needs) + " high",
+        HasReason, doc="a motion begins only where of each list one pin was high until so long before",
+        holds_anywhere=True,
+    ),
+    "lasts": GoalKind(
+        LastsTable, lambda table: f"has motion {table.motion}{_after(table.before)} last {_lasting(table)}",
+        Lasts, doc="each time, the motors ask for a motion no shorter and no longer", any_of=("least_s", "most_s"),
+        holds_anywhere=True,
+    ),
+}  # fmt: skip

@@ -1,0 +1,152 @@
+"""Goals on what a program makes of its sensors' pins, and on the numbers that it prints: at their bounds."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import pytest
+
+from adapter_sim.codec import motor_code
+from adapter_sim.pinout import load_pinout
+from p2os.errors import ScenarioError
+from robot_bench.events.kinds import Event, PinEdge, Text
+from robot_bench.scenario.goals.judging import load_goal
+from robot_bench.scenario.goals.watch import GoalOutcome
+from tests.robot_bench.recording.records import S
+from tests.robot_bench.scenario.test_goal_kinds import MS, at, outcome
+
+PINOUT = load_pinout()
+
+
+def motors(t: int, left: int, right: int, skew: int = 1000) -> list[PinEdge]:
+    """Return the edges of both motors' pins, those of the right one a little later."""
+    found = []
+    for late, name, value in ((0, "motor1", left), (skew, "motor2", right)):
+        wires = PINOUT.value(name).wires
+        code = motor_code(value, len(wires))
+        found += [PinEdge(t=t + late, wire=wire, level=bool(code >> bit & 1)) for bit, wire in enumerate(wires)]
+    return found
+
+
+def pin(t: int, name: str, level: bool = True) -> PinEdge:
+    return PinEdge(t=t, wire={wire.name: wire.name for wire in PINOUT.wires}.get(name, name), level=level)
+
+
+def flat(*parts: Sequence[Event] | Event) -> list[Event]:
+    return [event for part in parts for event in (part if isinstance(part, Sequence) else [part])]
+
+
+def answers(run: Sequence[Event], end: int = 10 * S, **table: Any) -> GoalOutcome:
+    return outcome(
+        "answers", run, end, **{"signal": "mean", "within_s": 0.1, **({} if "least" in table else {"most": 0}), **table}
+    )
+
+
+@pytest.mark.parametrize(("t", "met"), [(100 * MS - 1, True), (100 * MS, True), (100 * MS + 1, False)])
+def test_goal_answers_allows_so_long_and_no_longer(t: int, met: bool) -> None:
+    run = flat(motors(0, 2, 2), pin(S, "DD4"), motors(S + t, -2, 2, skew=0))
+    found = answers(run, any_high=["DD4", "DD5"])
+    assert found.met is met
+    assert found.robustness == pytest.approx(1 - t / (100 * MS), abs=1e-6)
+    assert met or found.says.startswith("the motors had +2, +2 from 1.000 s on while one of DD4, DD5 high")
+
+
+def test_goal_answers_judges_only_while_the_pins_are_so_and_the_motors_do_so() -> None:
+    both = flat(motors(0, 3, 3), pin(S, "DD4"), pin(S, "DD5"))
+    for table, met in (
+        ({"high": ["DD4", "DD5"]}, False), ({"high": ["DD4", "DD3"]}, True),
+        ({"any_high": ["DD3"]}, True), ({"any_high": ["DD5", "DD3"]}, False),
+        ({"any_high": ["DD4"], "low": ["DD5"]}, True), ({"low": ["DD3"]}, False),
+        ({"high": ["DD4"], "moving": ["turn", "back"]}, True), ({"moving": ["forward"]}, False),
+    ):  # fmt: skip
+        assert answers(both, **table).met is met, table
+    assert answers(both, most=3).met
+    assert not answers(both, least=3.5).met
+
+
+@pytest.mark.parametrize(("left", "right", "met"), [(2, 3, True), (3, 3, False), (3, 2, False)])
+def test_goal_answers_compares_left_with_right(left: int, right: int, met: bool) -> None:
+    table = {"signal": "turn", "least": 1, "any_high": ["DD6"], "moving": ["forward"]}
+    assert answers(flat(motors(0, left, right), pin(S, "DD6")), **table).met is met
+
+
+def test_two_ports_that_are_written_in_turn_are_one_change() -> None:
+    run = flat(motors(0, 0, 0), pin(0, "DD4"), motors(S, 2, -2, skew=999_999), motors(2 * S, 0, 0, skew=999_999))
+    assert answers(run, any_high=["DD4"], within_s=0.0005).met
+    late = flat(motors(0, 0, 0), pin(0, "DD4"), motors(S, 2, -2, skew=1_000_000))
+    assert not answers(late, any_high=["DD4"], within_s=0.0005).met
+
+
+@pytest.mark.parametrize(("gone", "met"), [(300 * MS, True), (300 * MS + 1, False)])
+def test_goal_has_reason_looks_so_far_back(gone: int, met: bool) -> None:
+    run = flat(motors(0, 2, 2), pin(S, "DD4"), pin(2 * S, "DD4", False), motors(2 * S + gone, 2, -2, skew=0))
+    found = outcome("has_reason", run, motion="turn", needs=[["DD4", "DD5"]], within_s=0.3)
+    assert found.met is met
+    assert met or found.says == f"turn began at {(2 * S + gone) / S:.3f} s with no pin of DD4, DD5 high"
+
+
+def test_goal_has_reason_wants_one_of_each_list_and_only_after_some_motions() -> None:
+    run = flat(motors(0, 2, 2), pin(S, "DD2"), motors(2 * S, -2, -2), motors(3 * S, 2, -2))
+    assert outcome("has_reason", run, motion="back", needs=[["DD2"]], within_s=0.3).met
+    sides = [["DD2", "DD3"], ["DD6", "DD7"]]
+    assert not outcome("has_reason", run, motion="back", needs=sides, within_s=0.3).met
+    assert outcome("has_reason", run, motion="turn", before=["forward"], needs=sides, within_s=0.3).met
+    assert not outcome("has_reason", run, motion="turn", before=["back"], needs=sides, within_s=0.3).met
+
+
+@pytest.mark.parametrize(("t", "met"), [(S - 1, False), (S, True), (2 * S, True), (2 * S + 1, False)])
+def test_goal_lasts_no_shorter_and_no_longer(t: int, met: bool) -> None:
+    run = flat(motors(0, 2, 2, skew=0), motors(S, -2, -2, skew=0), motors(S + t, 2, -2, skew=0))
+    assert outcome("lasts", run, motion="back", least_s=1, most_s=2).met is met
+    assert outcome("lasts", run, motion="back", before=["turn"], least_s=1, most_s=2).met
+
+
+def test_goal_lasts_is_missed_while_it_goes_on_and_from_the_beginning() -> None:
+    assert not outcome("lasts", flat(motors(0, 0, 0)), motion="stand", most_s=9.9).met
+    assert outcome("lasts", flat(motors(0, 0, 0)), motion="stand", most_s=10).met
+    assert outcome("lasts", flat(motors(0, 0, 0)), motion="stand", least_s=20).met  # it is not over
+
+
+def prints(value: str, **table: Any) -> GoalOutcome:
+    run = [at(0, left=0.1), at(S, left=0.3), at(2 * S, left=0.2), Text(t=2 * S, data=f"left {value} mm/s\n".encode())]
+    return outcome("prints_numbers", run, **{"matches": r"left (-?\d+)", "times": 0.001, **table})
+
+
+@pytest.mark.parametrize(("value", "met"), [("169", False), ("170", True), ("330", True), ("331", False)])
+def test_goal_prints_numbers_that_the_signal_had(value: str, met: bool) -> None:
+    found = prints(value, signal="left_mps", tolerance=0.03, over_s=1.0)
+    assert found.met is met
+    assert met or found.says == f"'left {value} mm/s' at 2.000 s: left_mps was 0.2 to 0.3"
+
+
+def test_goal_prints_numbers_within_bounds() -> None:
+    assert prints("200", least=0.2, most=0.2).met
+    assert not prints("201", most=0.2).met
+    assert not prints("199", least=0.2).met
+    assert prints("many", most=0.2).says.startswith("no line matched")
+
+
+@pytest.mark.parametrize(
+    ("table", "refusal"),
+    [
+        ({"kind": "answers", "signal": "mean", "within_s": 1}, "needs least or most"),
+        ({"kind": "answers", "signal": "mean", "most": 1, "within_s": 1, "moving": ["ahead"]}, "no motion 'ahead'"),
+        ({"kind": "answers", "signal": "mean", "most": 1, "within_s": 1, "high": ["PB99"]}, "no wire 'PB99'"),
+        ({"kind": "has_reason", "motion": "turn", "needs": [], "within_s": 1}, "needs is no list"),
+        ({"kind": "has_reason", "motion": "turn", "needs": ["PB0"], "within_s": 1}, "no list of lists"),
+        ({"kind": "lasts", "motion": "turn"}, "needs least_s or most_s"),
+        ({"kind": "prints_numbers", "matches": "left", "most": 1}, "has not one group"),
+        ({"kind": "prints_numbers", "matches": "(", "most": 1}, "matches"),
+    ],
+)
+def test_what_judges_nothing_is_refused(table: dict[str, Any], refusal: str) -> None:
+    with pytest.raises(ScenarioError, match=refusal):
+        load_goal(table, "x")
+
+
+def test_who_is_asked_for_an_answer_only_where_there_is_a_question_says_so() -> None:
+    late = {"from_": "pin DD1 high", "to": "pin DD2 high", "most_s": 1}
+    assert not outcome("latency", [at(0)], **late).met
+    assert outcome("latency", [at(0)], **late, if_any=True).met
+    stops = {"after": "pin DD1 high", "within_s": 1}
+    assert not outcome("stop_within", [at(0)], **stops).met
+    assert outcome("stop_within", [at(0)], **stops, if_any=True).met
