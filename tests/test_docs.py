@@ -145,7 +145,7 @@ def test_the_table_of_verbs_has_every_verb() -> None:
 
 
 def test_the_ranges_in_the_pages_are_those_that_the_readers_check_by() -> None:
-    generator = runpy.run_path(str(ROOT / "tools" / "generate_ranges.py"))
+    generator = runpy.run_path(str(ROOT / "tools" / "generators" / "ranges.py"))
     texts = [path.read_text(encoding="utf-8") for path in generator["PAGES"]]
     assert sorted(re.findall(r"<!-- (?:ranges|table): ([a-z ]+) -->", "".join(texts))) == sorted(generator["tables"]())
     assert [generator["page"](text) for text in texts] == texts, "run `make generated`"

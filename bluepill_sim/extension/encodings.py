@@ -2,7 +2,7 @@
 
 This is the only place where the bits of an instruction stand. From it come the decoder of the interpreter in C
 (`source/interpreter/encodings.h`), the classes of `core/thumb.py` by which blocks are timed, and the table of
-instructions in docs/core.md (`python -m tools.generate_chip`).
+instructions in docs/core.md (`python -m tools.generators.chip`).
 
 A pattern is written as the manual draws it, from bit 15 of the first halfword on: 0 and 1 are fixed, a letter is a bit
 of a field, and a field's bits are joined from left to right wherever they stand:

@@ -1,6 +1,6 @@
 """The structs that C and Python share, declared once.
 
-`tools/generate_chip.py` writes them as `source/fabric/layout.h`; `structure` makes the ctypes class of the same
+`tools/generators/chip.py` writes them as `source/fabric/layout.h`; `structure` makes the ctypes class of the same
 fields. Both sides keep the natural alignment of the machine, and `library.py` refuses a library whose sizes are others.
 
 Invariant: a struct holds numbers and arrays of them, no pointers: what it holds can be saved as bytes.
@@ -563,7 +563,7 @@ def packing(struct: Struct) -> Packing:
 def header() -> str:
     """Return the structs as a C header."""
     lines = [
-        "/* The structs that C and Python share: made by tools/generate_chip.py from extension/layout.py. */",
+        "/* The structs that C and Python share: made by tools/generators/chip.py from extension/layout.py. */",
         "#ifndef BLUEPILL_LAYOUT_H",
         "#define BLUEPILL_LAYOUT_H",
         "",

@@ -5,7 +5,7 @@ outside the peripherals are the business of `chip.py`.
 
 Theory of operation. A `Register` says which bits store, which clear, which
 method a read or write calls, and where its fields are. That is written here once:
-Python (`masks`, `indices`), C and docs (`tools/generate_chip.py`) and the views take
+Python (`masks`, `indices`), C and docs (`tools/generators/chip.py`) and the views take
 it from there. A `Peripheral` declares `REGISTERS`, names in `STATE` its plain
 attributes beyond the registers, and writes methods for what a
 read or write *causes*. A hot one is a kind of device in C (`KIND`): what a register

@@ -113,7 +113,7 @@ def test_a_failure_of_the_far_side_comes_out_behind_the_firmware() -> None:
 
 
 def test_generated_tables_are_up_to_date() -> None:
-    tables = load_script("tools/generate_adapter_tables.py")
+    tables = load_script("tools/generators/adapter_tables.py")
     stale = [path.name for path, text in tables.tables().items() if path.read_text(encoding="utf-8") != text]
     assert not stale, "run `make generated`"
 

@@ -14,17 +14,17 @@ ROOT = Path(__file__).resolve().parents[2]
 @pytest.mark.skipif(shutil.which("make") is None, reason="no make")
 def test_one_command_runs_every_generator_and_ends_at_the_first_that_fails(tmp_path: Path) -> None:
     shutil.copy(ROOT / "Makefile", tmp_path / "Makefile")
-    folder, bin_folder = tmp_path / "tools", tmp_path / "bin"
-    folder.mkdir()
+    folder, bin_folder = tmp_path / "tools" / "generators", tmp_path / "bin"
+    folder.mkdir(parents=True)
     bin_folder.mkdir()
     (bin_folder / "python").symlink_to(sys.executable)
-    for name in ("generate_a", "generate_b", "generate_c", "other"):
+    for name in ("a", "b", "c", "../other"):
         (folder / f"{name}.py").write_text(f"print('{name}')")
     words = ["make", "-s", "-o", "setup", f"BIN={bin_folder}", "generated"]
     environment = {key: value for key, value in os.environ.items() if not key.startswith("MAKE")}
     done = subprocess.run(words, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False, timeout=60)
-    assert (done.returncode, done.stdout.split()) == (0, ["generate_a", "generate_b", "generate_c"]), done.stderr
-    (folder / "generate_b.py").write_text("raise SystemExit(3)")
+    assert (done.returncode, done.stdout.split()) == (0, ["a", "b", "c"]), done.stderr
+    (folder / "b.py").write_text("raise SystemExit(3)")
     done = subprocess.run(words, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False, timeout=60)
     assert done.returncode != 0
-    assert done.stdout.split() == ["generate_a"]
+    assert done.stdout.split() == ["a"]

@@ -321,7 +321,7 @@ def _world() -> str:
 
 def _scenario() -> str:
     """Return a scenario with every setting, and a script."""
-    top = {"firmware": "dodge", "world": "room", "robot": "p2dx", "duration_s": 12.5, "record": None}
+    top = {"firmware": "dodge", "world": "room", "robot": "p2dx", "duration_s": 12.5, "record": None, "charge": None}
     tables = "".join(f"{name}\n" + _rows(TABLES[name], flash="my.flash", errors="my.errors")
                      for name in ("[start]", "[direct]", "[adapter]", "[controller]"))  # fmt: skip
     return f"{_rows(TABLES[''], **top)}{tables}[in_world.ramp]\n{_rows(TABLES['[in_world.NAME]'])}{SCRIPT}"

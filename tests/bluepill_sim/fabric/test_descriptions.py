@@ -9,7 +9,7 @@ from bluepill_sim.fabric.registers import Peripheral, Register, fields_of, indic
 from bluepill_sim.peripherals.dma import Dma
 from bluepill_sim.stm32f103 import BASES
 from tests.tools.svd import HINT, SvdRegister, svd_registers
-from tools.generate_chip import HEADERS, ROOT, SOURCE, files, peripherals, registers_header
+from tools.generators.chip import HEADERS, ROOT, SOURCE, files, peripherals, registers_header
 
 ROWS = list(peripherals())
 

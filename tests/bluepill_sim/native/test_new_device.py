@@ -81,9 +81,9 @@ def make_scratch(folder: Path) -> Path:
         target = folder / "tests" / "bluepill_sim" / name
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(ROOT / "tests" / "bluepill_sim" / name, target)
-    (folder / "tools").mkdir()
-    shutil.copyfile(ROOT / "tools" / "generate_chip.py", folder / "tools" / "generate_chip.py")
-    generate = [sys.executable, "-m", "tools.generate_chip"]
+    (folder / "tools" / "generators").mkdir(parents=True)
+    shutil.copyfile(ROOT / "tools" / "generators" / "chip.py", folder / "tools" / "generators" / "chip.py")
+    generate = [sys.executable, "-m", "tools.generators.chip"]
     subprocess.run(generate, check=True, timeout=60, cwd=folder, env={**os.environ, "PYTHONPATH": str(folder)})
     made = (folder / "bluepill_sim/extension/source/registers/alarm.h").read_text(encoding="utf-8")
     assert made == header.text, "the page shows another header"

@@ -7,7 +7,7 @@ import pytest
 from bluepill_sim import BluePill
 from bluepill_sim.errors import BluePillError
 from tests.tools.examples import EXAMPLES
-from tools.generate_chip import peripherals
+from tools.generators.chip import peripherals
 
 KINDS = list(peripherals())
 NAMES = [name for _, name in KINDS]

@@ -60,7 +60,7 @@ from tests.p2os.conftest import Robot
 app = Typer()
 app.callback()(lambda: None)
 decode.register(app)
-page = runpy.run_path("tools/generate_protocol.py")["page"](Path("PROTOCOL.md").read_text())
+page = runpy.run_path("tools/generators/protocol.py")["page"](Path("PROTOCOL.md").read_text())
 def decoded(frame):
     return CliRunner().invoke(app, ["decode", "--explain", frame.to_bytes().hex()]).output
 try:
@@ -81,7 +81,7 @@ print(json.dumps({"lua": script(), "page": page, "takes": takes, "sent": sent, "
 
 def planted(folder: Path) -> Path:
     """Return a copy of the toolkit with both planted in it."""
-    for name in ("p2os", "tools/generate_protocol.py", "PROTOCOL.md"):
+    for name in ("p2os", "tools/generators/protocol.py", "PROTOCOL.md"):
         target, source = folder / name, ROOT / name
         target.parent.mkdir(parents=True, exist_ok=True)
         if source.is_dir():

@@ -10,7 +10,7 @@ from p2os.protocol.packets import PACKET_NAMES
 
 ROOT = Path(__file__).resolve().parents[3]
 PAGE = (ROOT / "PROTOCOL.md").read_text(encoding="utf-8")
-GENERATOR = runpy.run_path(str(ROOT / "tools" / "generate_protocol.py"))
+GENERATOR = runpy.run_path(str(ROOT / "tools" / "generators" / "protocol.py"))
 
 
 def test_the_tables_are_those_of_the_code() -> None:

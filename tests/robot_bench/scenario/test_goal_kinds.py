@@ -515,7 +515,7 @@ def test_one_declaration_of_a_plug_in_gives_reader_schema_page_and_completion(
         },
     }  # fmt: skip
 
-    page = runpy.run_path(str(ROOT / "tools" / "generate_ranges.py"))["tables"]()["goals"]
+    page = runpy.run_path(str(ROOT / "tools" / "generators" / "ranges.py"))["tables"]()["goals"]
     row = "| `tilt` | **`most_deg`** (above 0 to 90), `axis` = `roll` (`roll`, `pitch`), `samples` = 5 (1 to 100) |"
     assert f"{row} it never leans more |" in page.splitlines()
 

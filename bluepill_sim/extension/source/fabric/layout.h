@@ -1,4 +1,4 @@
-/* The structs that C and Python share: made by tools/generate_chip.py from extension/layout.py. */
+/* The structs that C and Python share: made by tools/generators/chip.py from extension/layout.py. */
 #ifndef BLUEPILL_LAYOUT_H
 #define BLUEPILL_LAYOUT_H
 

@@ -4,7 +4,7 @@ From `extension/layout.py`: `source/fabric/layout.h`. From `extension/encodings.
 and the table of instructions in `docs/core.md`. From `REGISTERS` and its neighbours of each peripheral on the
 chip's page: `source/registers/KIND.h` of each kind of device in C, and `docs/registers.md`.
 A test holds the committed files to what comes out here; a file that is no longer made is removed.
-Usage: python -m tools.generate_chip
+Usage: python -m tools.generators.chip
 """
 
 import re
@@ -23,12 +23,12 @@ from bluepill_sim.extension.layout import header
 from bluepill_sim.fabric.registers import LISTENER, BitField, Peripheral, Register, fields_of
 from bluepill_sim.stm32f103 import BASES, PERIPHERALS
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 SOURCE = Path("bluepill_sim/extension/source")
 HEADERS = SOURCE / "registers"
 PAGE, CORE_PAGE = Path("docs/registers.md"), Path("docs/core.md")
 #: What stands around the table of instructions there.
-_FROM, _TO = "<!-- instructions: made by tools.generate_chip -->", "<!-- end of instructions -->"
+_FROM, _TO = "<!-- instructions: made by tools.generators.chip -->", "<!-- end of instructions -->"
 #: Registers alike that are more than these are named by the first alone, in C.
 _MOST_ALIKE = 32
 _WIDTH = 118
@@ -266,7 +266,7 @@ def page(rows: Iterable[tuple[type[Peripheral], str]]) -> str:
     lines = [
         "# Registers of the emulated STM32F103C8",
         "",
-        "Made by `python -m tools.generate_chip` from the declarations in `bluepill_sim/peripherals/`, which the",
+        "Made by `python -m tools.generators.chip` from the declarations in `bluepill_sim/peripherals/`, which the",
         "emulator executes. What the peripherals do with them: [peripherals.md](peripherals.md). Access is by RM0008's",
         "words (2.1): `rw`, `r`, `w`, `rc_w1` and `rc_w0` (cleared by writing 1, or 0); of two, each holds for some.",
         "`reserved` is a field of the manual that this peripheral does not have: it reads 0 and takes nothing.",

@@ -2,7 +2,7 @@
 
 What stands between `<!-- table: NAME -->` and `<!-- end -->` is generated; a test
 holds the committed page to what comes out here.
-Usage: python tools/generate_protocol.py
+Usage: python tools/generators/protocol.py
 """
 
 import re
@@ -30,7 +30,7 @@ from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import known_robots, load_parameters
 from simbase.timing import NS_PER_MS
 
-PAGE = Path(__file__).resolve().parent.parent / "PROTOCOL.md"
+PAGE = Path(__file__).resolve().parents[2] / "PROTOCOL.md"
 BLOCK = re.compile(r"(<!-- table: (?P<name>[a-z ]+) -->\n)(?P<body>.*?)(<!-- end -->)", re.DOTALL)
 
 ENDS = {

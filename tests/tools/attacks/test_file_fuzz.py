@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-FUZZ = runpy.run_path(str(Path(__file__).resolve().parents[2] / "tools" / "fuzz" / "files.py"))
+FUZZ = runpy.run_path(str(Path(__file__).resolve().parents[3] / "tools" / "fuzz" / "files.py"))
 
 
 @pytest.mark.parametrize("name", FUZZ["FORMATS"])

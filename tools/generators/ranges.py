@@ -2,7 +2,7 @@
 
 What stands between `<!-- ranges: NAME -->`, or `table: NAME`, and `<!-- end -->` is generated; a test holds the
 committed pages to what comes out here.
-Usage: python tools/generate_ranges.py
+Usage: python tools/generators/ranges.py
 """
 
 import re
@@ -25,7 +25,7 @@ from robot_bench.scenario.tables import TABLES, TopTable
 from robot_bench.scenario.trigger_script import ACTION_TABLES, WhenTable
 from robot_bench.scenario.world_script import ThingTable
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 PAGES = tuple(ROOT / "docs" / name for name in ("worlds.md", "scenarios.md", "pioneer.md", "adapter.md"))
 BLOCK = re.compile(r"(<!-- (?:ranges|table): (?P<name>[a-z ]+) -->\n)(?P<body>.*?)(<!-- end -->)", re.DOTALL)
 #: Table → key → its range in words.
