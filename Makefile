@@ -138,7 +138,7 @@ pictures: board-tools
 
 # Every committed file that is made of a declaration (C headers, tables of pages), made anew; `make test` names those that are stale.
 generated: setup
-	@for tool in tools/generators/*.py; do $(BIN)/python $$tool || exit; done
+	@for tool in tools/generators/*.py; do $(BIN)/python -m tools.generators.$$(basename $$tool .py) || exit; done
 
 # The pages of the API, from the docstrings, in build/api.
 docs: setup
