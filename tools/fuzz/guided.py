@@ -3,7 +3,7 @@
 The targets are those of `protocol.py` and `chip.py`, and every format of `files.py` as bytes. atheris (libFuzzer for
 Python, from PyPI, on Python 3.11 only) counts which branches an input reaches and keeps those that reach new ones. A
 search begins at the seeds of a target and at what is kept of it in `corpus/`, one input a line in hex, and goes on in
-`build/fuzz`; `--keep` merges the smallest inputs with the same coverage back. Tests read the kept inputs without
+`build/fuzz`; `--keep` keeps the shortest of those that reached something new. Tests read the kept inputs without
 atheris. The adapter's C++ is searched by `adapter_fw/fuzz/search.py`.
 """
 
@@ -108,15 +108,6 @@ def searched(name: str, seconds: int) -> tuple[int, str]:
     return done.returncode, f"{runs[1] if runs else 0} runs, {covered}"
 
 
-def merged(name: str) -> None:
-    """Keep the smallest inputs that cover what all of a search covers."""
-    with tempfile.TemporaryDirectory() as text:
-        found = Path(text, "found")
-        found.mkdir()
-        _run(name, "-merge=1", f"-max_len={LONGEST_KEPT}", str(found), str(WORK / name))
-        keep(name, [each.read_bytes() for each in found.iterdir()])
-
-
 def _run(name: str, *words: str) -> "subprocess.CompletedProcess[str]":
     command = [sys.executable, "-m", "tools.fuzz.guided", "--inside", name, *words]
     return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, errors="replace", check=False)
@@ -130,7 +121,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("targets", nargs="*", metavar="TARGET", help=f"of {', '.join(names())}; all, if none")
     parser.add_argument("--seconds", type=int, default=60, help="how long to search in each")
-    parser.add_argument("--keep", action="store_true", help="keep what covers new ground in tools/fuzz/corpus")
+    parser.add_argument("--keep", action="store_true", help="keep what reached something new in tools/fuzz/corpus")
     words = parser.parse_args()
     if unknown := {*words.targets} - {*names()}:
         parser.error(f"no target {', '.join(sorted(unknown))}")
@@ -143,7 +134,7 @@ def main() -> int:
         failed += bool(code)
         print(f"{name}: {came_to}{f'; FOUND {WORK / name}-*' if code else ''}", flush=True)
         if words.keep and not code:
-            merged(name)
+            keep(name, [path.read_bytes() for path in (WORK / name).iterdir()])
     return 1 if failed else 0
 
 
