@@ -16,7 +16,7 @@ JOBS   ?= 3
 COMPILED := $(wildcard bluepill_sim/extension/source/*/*) robot_bench/wires/edges.c \
     $(shell find adapter_fw/core adapter_fw/capi adapter_fw/esp32/main adapter_fw/esp32_sim -type f)
 
-.PHONY: setup demo test lint type unit wheels bench soak mutants hostile peers clean firmware mutation-tools board board-check board-tools pictures docs generated
+.PHONY: setup demo test lint type unit wheels bench soak steady mutants hostile peers clean firmware mutation-tools board board-check board-tools pictures docs generated
 
 setup: $(STAMP)
 
@@ -92,6 +92,10 @@ soak: setup mutation-tools
 	$(BIN)/pytest -n $(JOBS) -m '(soak or hypothesis) and not hardware' --hypothesis-profile drawn
 	$(BIN)/python -m tools.mutants --sample whole
 
+# The tests that read a real clock, twenty times on a machine that is busy; STEADY="--times 3 tests/p2os/client" fewer of them.
+steady: setup
+	@$(BIN)/python -m tests.tools.suite.steady $(STEADY)
+
 # Changes the code in one place at a time and runs the nearest tests: of the lines that differ from a commit (SINCE=main), of files or folders
 # (FILES="p2os/client" COUNT=60 SEED=1), or a sample with its floor (SAMPLE=ci); NOTE=1 adds what survives to tools/mutants/survivors.toml.
 mutants: setup
@@ -106,10 +110,11 @@ hostile: setup
 peers: setup
 	@$(BIN)/python -m tools.peers $(PEERS)
 
-# What changes the adapter's two sides in `make soak`, and an ESP32 that runs its core. Without universalmutator's own wishes: one of them is a copy of
+# What changes the adapter's two sides in `make soak`, an ESP32 that runs its core, and fuzzing that is guided by coverage. Without universalmutator's own wishes: one of them is a copy of
 # `typing` that shadows Python's.
 mutation-tools: setup
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check 'cosmic-ray==8.7.0' 'labwired==0.25.0'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check 'atheris==3.0.0; python_version < "3.12"'
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps 'universalmutator==1.14.1'
 
 # Rebuilds the example firmware (needs gcc-arm-none-eabi); `make test` compares.

@@ -17,7 +17,7 @@ OF_FILES = "not soak and not hardware"
 
 
 def pytest_addoption(parser: pytest.Parser, pluginmanager: pytest.PytestPluginManager) -> None:
-    """Add the options of tests/tools/counted_lines.py and tests/tools/spent_time.py, and begin to count lines.
+    """Add the options of tests/tools/counted_lines.py and tests/tools/suite/spent_time.py, and begin to count lines.
 
     That comes first of all: the conftest.py of a folder that the command line names is imported next, and what it
     imports of the packages would else be there twice.
@@ -84,7 +84,7 @@ def pytest_configure(config: pytest.Config) -> None:
         os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     path = config.getoption("--count-time")
     if path is not None:
-        from tests.tools.spent_time import TimeCounter
+        from tests.tools.suite.spent_time import TimeCounter
 
         config.pluginmanager.register(TimeCounter(config.rootpath / path, is_worker=hasattr(config, "workerinput")))
     config.pluginmanager.register(TurnedFolders())
@@ -135,11 +135,19 @@ def pytest_collection_finish() -> None:
     gc.set_threshold(20_000, 10, 10)
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Begin with the long ones, then those of the project as a whole; in an order that is that of all workers.
 
-    The latter wait for processes, some for half a minute: at the end one worker alone would.
+    The latter wait for processes, some for half a minute: at the end one worker alone would. Tests that read a clock
+    get their mark where a run asks for it: to find them takes 4 s.
     """
+    if "real_clock" in config.option.markexpr:
+        from tests.tools.suite.real_clock import reads_clock
+
+        for item in items:
+            if isinstance(item, pytest.Function) and reads_clock(item.path, item.originalname):
+                item.add_marker("real_clock")
 
     def place(item: pytest.Item) -> tuple[bool, bool, Path]:
         return item.get_closest_marker("slow") is None, item.path.parent != Path(__file__).parent, item.path
