@@ -82,7 +82,7 @@ class BasicBlock:
     start: int
     #: Address after the block: where it goes on if no branch is taken.
     end: int
-    #: Cycles when the block falls through to `end`.
+    #: Cycles when the block goes on at `end`: it falls through, or that is where its B goes.
     straight: int
     #: Cycles when it goes anywhere else.
     taken: int
@@ -168,11 +168,12 @@ def measure_block(code: bytes, start: int, wait_states: int, *, has_prefetch: bo
     divides = tuple((i.address, i.base) for i in instructions if i.kind is Kind.DIVIDE and i.base is not None)
     stores = [i.address for i in instructions if i.kind in {Kind.STORE, Kind.STORE_INDEXED}]
     kinds = {i.kind for i in instructions}
+    end, taken, it_states = start + len(code), clock + _refill(previous, wait_states), _it_states(instructions)
     return BasicBlock(
         start,
-        start + len(code),
-        clock,
-        clock + _refill(previous, wait_states),
+        end,
+        taken if _always_goes(previous, end, it_states) else clock,
+        taken,
         offsets,
         divides=divides,
         late_divides=tuple(row for row in divides if stores and row[0] > stores[0]),
@@ -183,7 +184,7 @@ def measure_block(code: bytes, start: int, wait_states: int, *, has_prefetch: bo
         sends_event=Kind.SEND_EVENT in kinds,
         has_exclusive=Kind.EXCLUSIVE in kinds,
         has_it=Kind.IF_THEN in kinds,
-        it_states=_it_states(instructions),
+        it_states=it_states,
         is_self_loop=len(instructions) == 1 and instructions[0].destination == start,
         last=instructions[-1].kind if instructions else Kind.PLAIN,
     )
@@ -226,6 +227,11 @@ class _Fetch:
                 clock += self._wait_states
             self._entered = clock
         return clock
+
+
+def _always_goes(last: Instruction | None, end: int, it_states: dict[int, int]) -> bool:
+    """Tell whether the block ends in a branch to the very next instruction, which refills the pipeline as any other."""
+    return last is not None and last.always_branches and last.destination == end and last.address not in it_states
 
 
 def _refill(last: Instruction | None, wait_states: int) -> int:
