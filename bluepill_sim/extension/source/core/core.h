@@ -81,6 +81,8 @@ struct row {
     uint32_t compared;   /* and how many bytes of it */
     struct row *next;    /* in the list of all rows, or of dropped ones */
     struct loop *loop;   /* where it is one that may poll a counter */
+    uint64_t span;       /* cycles until its last instruction begins */
+    struct row *whole, *rests; /* of the rest of a block: the row of all of it; and of that one its rests */
     struct instruction instructions[];
 };
 
@@ -227,6 +229,7 @@ struct core {
     struct shared shared;
     void *unicorn;
     struct interpreter *interpreter; /* what runs instructions in its place; null: nothing does */
+    bool is_exact; /* what is due is acted on before the first instruction that begins then, not at the end of its block */
     struct unicorn_api api;
     struct callbacks calls;
     struct row *block;
@@ -264,6 +267,9 @@ struct core {
     uint32_t view_count;
 };
 
+/* ITSTATE in a CPSR or xPSR: its bits 1:0 at 25, 7:2 at 10. */
+static inline uint32_t it_state_of(uint32_t bits) { return (bits >> 25 & 3) | (bits >> 10 & 0x3F) << 2; }
+
 static inline void begin_block(struct core *core, struct row *row)
 {
     core->block = row;
@@ -275,6 +281,8 @@ static inline void begin_block(struct core *core, struct row *row)
 /* blocks.c */
 void end_run(struct core *core, uint32_t kind, uint32_t pc);
 void free_dropped(struct core *core);
+uint32_t cycles_until(const struct row *row, uint32_t address);
+void leave_in_time(struct core *core);
 const struct instruction *instruction_at(const struct row *row, uint32_t address);
 void record(struct core *core, uint32_t address, int32_t kind);
 void core_flush(struct core *core);
@@ -300,6 +308,7 @@ enum way { ENDS, GOES_ON, ELSEWHERE };
 enum way goes_on(struct core *core, uint32_t address);
 void *allocate(struct core *core, size_t bytes);
 uint32_t read_register(struct core *core, int number);
+uint64_t stop_of(const struct core *core);
 /* exceptions.c */
 uint64_t deliverable(const struct shared *s, uint64_t *high);
 bool wakes(struct core *core);

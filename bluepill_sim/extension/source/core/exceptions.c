@@ -298,7 +298,7 @@ bool leave(struct core *core, uint32_t exc_return)
     core->api.write_registers(core->unicorn, is_same ? to_same : to, at, count);
     s->pc = pc & ~1u;
     s->is_thumb = (xpsr & T_BIT) != 0;
-    s->it_state = (xpsr >> 25 & 3) | (xpsr >> 10 & 0x3F) << 2;
+    s->it_state = it_state_of(xpsr);
     record(core, s->pc, -1);
     if (to_thread && s->scr & SLEEPONEXIT) {
         s->last_sleep_cycle = s->cycle;

@@ -151,6 +151,7 @@ static void put(struct interpreter *s, int number, uint32_t value)
     case UC_PC:
         s->is.pc = value & ~1u;
         s->is.is_thumb = value & 1;
+        s->is.block_start = 0;
         s->has_jumped = 1;
         break;
     case UC_CPSR:
@@ -209,6 +210,9 @@ void interpreter_save(struct interpreter *s, void *to)
     interpreter_set_flags(s, interpreter_flags(s));
     struct registers copy = s->is;
     memset(&copy.r[PC], 0, (REGISTERS - PC) * sizeof copy.r[0]);
+    if (!stands_inside(s, s->is.pc)) {
+        copy.block_start = copy.block_end = 0;
+    }
     memcpy(to, &copy, sizeof copy);
 }
 
