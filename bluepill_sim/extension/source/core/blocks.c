@@ -222,8 +222,7 @@ static RARELY void trim_registers(struct core *core)
         uint32_t value = read_register(core, numbers[n]);
         if (value & ~kept[n]) {
             value &= kept[n];
-            void *const at = &value;
-            core->api.write_registers(core->unicorn, &numbers[n], &at, 1);
+            write_registers(core, &numbers[n], &value, 1);
         }
     }
 }

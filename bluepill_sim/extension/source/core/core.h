@@ -17,7 +17,7 @@
 #include <stdint.h>
 
 #include "../fabric/fabric.h"
-#include "../interpreter/interpreter.h"
+#include "../interpreter/registers.h"
 #include "system.h"
 
 #define NEVER (UINT64_C(1) << 62)
@@ -276,6 +276,50 @@ static inline void begin_block(struct core *core, struct row *row)
     core->io_next = core->skipped_count = 0;
 }
 
+/* Registers by Unicorn's numbers. */
+enum { MOST_REGISTERS = 16 };
+static inline __attribute__((always_inline)) void read_registers(struct core *core, const int *numbers, uint32_t *values, int count)
+{
+    if (core->interpreter != NULL) {
+#pragma GCC unroll 16
+        for (int n = 0; n < count; ++n) {
+            values[n] = interpreter_get(core->interpreter, numbers[n]);
+        }
+        return;
+    }
+    void *at[MOST_REGISTERS];
+    for (int n = 0; n < count; ++n) {
+        at[n] = &values[n];
+    }
+    core->api.read_registers(core->unicorn, numbers, at, count);
+}
+
+static inline __attribute__((always_inline)) void write_registers(struct core *core, const int *numbers, uint32_t *values, int count)
+{
+    if (core->interpreter != NULL) {
+#pragma GCC unroll 16
+        for (int n = 0; n < count; ++n) {
+            interpreter_put(core->interpreter, numbers[n], values[n]);
+        }
+        return;
+    }
+    void *at[MOST_REGISTERS];
+    for (int n = 0; n < count; ++n) {
+        at[n] = &values[n];
+    }
+    core->api.write_registers(core->unicorn, numbers, at, count);
+}
+
+static inline uint32_t read_register(struct core *core, int number)
+{
+    uint32_t value;
+    if (core->interpreter != NULL) {
+        return interpreter_get(core->interpreter, number);
+    }
+    core->api.read_register(core->unicorn, number, &value);
+    return value;
+}
+
 /* For this library alone: such calls need no table. */
 #pragma GCC visibility push(hidden)
 /* blocks.c */
@@ -307,7 +351,6 @@ void skip(struct core *core, uint32_t address, bool is_write, uint32_t bytes);
 enum way { ENDS, GOES_ON, ELSEWHERE };
 enum way goes_on(struct core *core, uint32_t address);
 void *allocate(struct core *core, size_t bytes);
-uint32_t read_register(struct core *core, int number);
 uint64_t stop_of(const struct core *core);
 /* exceptions.c */
 uint64_t deliverable(const struct shared *s, uint64_t *high);
@@ -333,23 +376,5 @@ static inline uint64_t next_stop(const struct core *core)
     return !core->shared.stop_at ? 0 : event < core->limit ? event : core->limit;
 }
 void core_clear_exclusive(struct core *core);
-
-/* Register numbers of Unicorn 2 (arm.h). */
-enum {
-    REG_CPSR = 3,
-    REG_LR = 10,
-    REG_PC = 11,
-    REG_SP = 12,
-    REG_R0 = 66,
-    REG_R12 = 78,
-    REG_IPSR = 114,
-    REG_MSP = 115,
-    REG_PSP = 116,
-    REG_CONTROL = 117,
-    REG_XPSR = 120,
-    REG_PRIMASK = 123,
-    REG_BASEPRI = 124,
-    REG_FAULTMASK = 126
-};
 
 #endif

@@ -9,13 +9,6 @@ enum { FOR_INTERRUPT = 1, FOR_EVENT = 2, SLEEPDEEP = 4, SYSTICK = 15 };
 /* UC_ERR_EXCEPTION: the TLB denied a fetch. */
 #define DENIED 21
 
-uint32_t read_register(struct core *core, int number)
-{
-    uint32_t value = 0;
-    core->api.read_register(core->unicorn, number, &value);
-    return value;
-}
-
 void *allocate(struct core *core, size_t bytes)
 {
     struct allocation *one = calloc(1, sizeof *one + bytes);
@@ -139,11 +132,10 @@ static void go_elsewhere(struct core *core, bool is_in_block)
     start_anew(core);
     static const int number = REG_PC;
     uint32_t pc = s->pc | 1;
-    void *const at = &pc;
-    if (is_in_block) {
+    if (is_in_block && core->interpreter == NULL) {
         core->api.write_register(core->unicorn, REG_PC, &pc);
     } else {
-        core->api.write_registers(core->unicorn, &number, &at, 1);
+        write_registers(core, &number, &pc, 1);
     }
 }
 

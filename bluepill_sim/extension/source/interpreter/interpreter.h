@@ -173,8 +173,6 @@ bool interpreter_call_bad_access(struct interpreter *s, int kind, uint32_t addre
 void interpreter_mrs(struct interpreter *s, const struct op *op);
 void interpreter_msr(struct interpreter *s, const struct op *op);
 void interpreter_cps(struct interpreter *s, const struct op *op);
-uint32_t interpreter_flags(const struct interpreter *s);
-void interpreter_set_flags(struct interpreter *s, uint32_t bits);
 /* For the owner in this library: blocks.c, run.c. */
 void interpreter_know(struct interpreter *s, void *row, uint64_t straight, uint64_t taken, uint64_t span);
 void interpreter_forget_rows(struct interpreter *s);
