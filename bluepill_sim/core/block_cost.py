@@ -65,6 +65,12 @@ REFILL = {
     Kind.LOAD_MULTIPLE: 3,
 }
 
+#: What takes so long that an exception need not wait for it (TRM 18.2, ARM B1.5.10). chosen: LDM and STM begin anew
+#: too, where silicon goes on with the word at which they were left.
+GIVEN_UP = frozenset(
+    {Kind.MULTIPLY_LONG, Kind.MULTIPLY_ACCUMULATE_LONG, Kind.DIVIDE, Kind.LOAD_MULTIPLE, Kind.STORE_MULTIPLE}
+)
+
 #: chosen: of so many blocks it is known what they cost and access, several programs' all.
 KNOWN_BLOCKS = 4096
 #: Bytes that one access to the flash delivers (RM0008 3.3.3: 64-bit lines).
@@ -94,6 +100,8 @@ class BasicBlock:
     late_divides: tuple[tuple[int, int], ...] = ()
     #: Addresses and base registers of its accesses that must be aligned.
     aligned: tuple[tuple[int, int], ...] = ()
+    #: Addresses of its instructions that an exception in their midst leaves undone, to begin anew after it.
+    given_up: frozenset[int] = frozenset()
     #: Whether it may change what may interrupt (CPS, MSR).
     changes_masks: bool = False
     sends_event: bool = False
@@ -180,6 +188,7 @@ def measure_block(code: bytes, start: int, wait_states: int, *, has_prefetch: bo
         aligned=tuple(
             (i.address, i.base) for i in instructions if i.kind in _MULTIPLES and i.base is not None and i.base < 13
         ),
+        given_up=frozenset(i.address for i in instructions if i.kind in GIVEN_UP),
         changes_masks=Kind.MASK_CHANGE in kinds,
         sends_event=Kind.SEND_EVENT in kinds,
         has_exclusive=Kind.EXCLUSIVE in kinds,

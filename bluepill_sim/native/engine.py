@@ -474,7 +474,7 @@ class NativeEngine(Engine):
                 return
         rows = (InstructionRow * len(block.offsets))()
         for row, (at, cycle) in zip(rows, block.offsets.items(), strict=True):
-            row.address, row.cycle = at, cycle
+            row.address, row.cycle, row.gives_up = at, cycle, at in block.given_up
             _fill(row, accesses.get(at))
         added = library().core_add_row(
             self._state,

@@ -316,20 +316,78 @@ static void enter_rest(struct core *core, uint32_t address, uint32_t size)
     }
 }
 
-/* Has the block that is entered end before the first of its instructions that begins when something is due, or later. */
+/* The instruction of a block that runs when so many cycles are left until something is due, and its end. */
+static uint32_t running_at(const struct row *row, uint64_t left, uint64_t *end)
+{
+    uint32_t n = row->count - 1;
+    *end = row->costs[0];
+    for (; n && row->instructions[n].cycle >= left; --n) {
+        *end = row->instructions[n].cycle;
+    }
+    return n;
+}
+
+/* Whether an instruction of the block may be left undone for what is due in so many cycles, which come in its midst. */
+static bool gives_up(const struct core *core, const struct row *row, uint64_t due, uint32_t *number)
+{
+    if (due >= row->costs[0]) {
+        return false;
+    }
+    uint64_t end;
+    *number = running_at(row, due, &end);
+    return row->instructions[*number].gives_up && due < end && !waits_for_python(core->fabric, core->shared.cycle + due);
+}
+
+/* Acts on what is due in the midst of the instruction that begins now; the run's limit does not count, or it would depend on
+ * it whether the instruction is left undone. Where no exception comes of it, the instruction is run as if nothing were. */
+static enum way act_within(struct core *core, uint64_t due)
+{
+    struct shared *s = &core->shared;
+    struct row *row = core->block;
+    const uint64_t began = s->cycle, limit = core->limit;
+    s->cycle += due;
+    core->limit = NEVER;
+    const enum way way = goes_on(core, row->start);
+    core->limit = limit;
+    s->stop_at = s->stop_at < limit ? s->stop_at : limit;
+    if (way != ELSEWHERE) {
+        s->cycle = began;
+        begin_block(core, row);
+    }
+    return way;
+}
+
+/* Has the block that is entered end before the first of its instructions that begins when something is due, or later; and
+ * before one that would run then and may be left undone for an exception. */
 static void cut(struct core *core)
 {
+    struct shared *s = &core->shared;
     const struct row *row = core->block;
-    const uint64_t left = stop_of(core) - core->shared.cycle;
+    uint64_t left = stop_of(core) - s->cycle, end;
+    uint32_t number;
+    while (gives_up(core, row, core_next_event(core) - s->cycle, &number)) {
+        if (number) {
+            left = left < row->instructions[number].cycle ? left : row->instructions[number].cycle;
+            break;
+        }
+        const enum way way = act_within(core, core_next_event(core) - s->cycle);
+        if (way == ELSEWHERE) {
+            return;
+        }
+        left = stop_of(core) - s->cycle;
+        if (way == ENDS) {
+            s->stop_at = 0;
+            left = 1;
+            break;
+        }
+    }
     if (row->span < left && row->whole == NULL) {
         return;
     }
-    uint32_t end = row->end;
-    for (uint32_t n = row->count; n-- > 1 && row->instructions[n].cycle >= left;) {
-        end = row->instructions[n].address;
-    }
-    if (end != row->end || row->whole != NULL) {
-        core->interpreter->cut_at = end;
+    const uint32_t last = running_at(row, left, &end);
+    core->interpreter->cut_at = last + 1 < row->count ? row->instructions[last + 1].address : row->end;
+    if (core->interpreter->cut_at == row->end && row->whole == NULL) {
+        core->interpreter->cut_at = 0;
     }
 }
 
@@ -402,7 +460,9 @@ bool core_add_row(struct core *core, uint32_t start, uint32_t end, uint32_t stra
     *row = (struct row){.start = start, .end = end, .costs = {straight, taken},
                         .passed = {is_looked_after ? NEVER : straight, is_looked_after ? NEVER : taken},
                         .flags = flags, .count = count, .host = host, .code = code, .compared = compared,
-                        .span = count ? instructions[count - 1].cycle : 0, .next = core->all};
+                        .next = core->all};
+    const struct instruction *last = &instructions[count - 1];
+    row->span = !count ? 0 : last->gives_up ? straight - 1 : last->cycle;
     find_plain(core, row);
     memcpy(row->instructions, instructions, list);
     if (host != NULL) {

@@ -81,7 +81,7 @@ struct row {
     uint32_t compared;   /* and how many bytes of it */
     struct row *next;    /* in the list of all rows, or of dropped ones */
     struct loop *loop;   /* where it is one that may poll a counter */
-    uint64_t span;       /* cycles until its last instruction begins */
+    uint64_t span;       /* what is due in more cycles than these comes behind it */
     struct row *whole, *rests; /* of the rest of a block: the row of all of it; and of that one its rests */
     struct instruction instructions[];
 };

@@ -58,7 +58,7 @@ struct block {
     struct block *links[2];
     /* What the owner knows it by where it takes no attention, and what its ways out cost. */
     void *row;
-    uint64_t costs[2], span; /* and what its last instruction has to begin before the next stop by */
+    uint64_t costs[2], span; /* and in more cycles than these a stop comes behind it */
     struct block *next;      /* of all, or of dropped ones */
     struct block *odd;       /* of those that no table has */
     uint8_t *code;           /* of writable memory: what it was decoded from */

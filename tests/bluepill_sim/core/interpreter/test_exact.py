@@ -22,6 +22,7 @@ Z_FLAG, IT_BITS = 1 << 30, 0x0600_FC00
 START = """
 mov32 r5, #0x20000800
 movs r3, #9
+mov32 r4, #k2+1
 mov32 r1, #0xE000E010
 movs r2, #{load}
 str r2, [r1, #4]
@@ -49,6 +50,12 @@ PAYLOADS: list[tuple[str, list[tuple[str, int]]]] = [
     # The second load overlaps the first (1), a store behind a load does so only where its offset is a register.
     ("memory", [("ldr r3, [r5, #0]", 2), ("ldr r4, [r5, #4]", 1), ("str r3, [r5, #8]", 1), ("strb r3, [r5, r4]", 2),
                 ("nop", 1)]),
+    # Left undone: long multiplications (chosen 4; 5 with accumulation), divisions (chosen 7), several words (1 and one
+    # each).
+    ("left undone", [("nop", 1), (".half 0xFBA3, 0x4603", 4), (".half 0xFBC3, 0x4603", 5), ("udiv r4, r3, r3", 7)]),
+    ("several words", [("push {r2-r4}", 4), ("stmia r5!, {r2, r3}", 3), ("pop {r2-r4}", 4), ("nop", 1)]),
+    # pop {r3, pc}, over a nop: 3, and a refill of 3 in which it is done.
+    ("returning", [("push {r3, r4}", 3), (".half 0xBD08\nnop", 6), ("nop", 1)]),
     ("two cycles", [("mla r4, r3, r3, r4", 2), ("mla r4, r3, r3, r4", 2), ("nop", 1)]),
     # A branch taken: 1 and a refill of 1; one that is not: 1.
     ("branches", [("b k1", 2), ("cbz r5, k4", 1), ("nop", 1), ("bl k4", 2), ("nop", 1)]),
@@ -57,6 +64,9 @@ PAYLOADS: list[tuple[str, list[tuple[str, int]]]] = [
     # Flags that the block overwrites are stacked where the exception comes before.
     ("flags", [("movs r4, #0", 1), ("adds r4, #1", 1), ("movs r4, #0", 1), ("adds r4, #2", 1), ("cmp r4, #2", 1)]),
 ]  # fmt: skip
+
+#: Those whose instructions of several cycles are left undone.
+UNDONE = {"left undone", "several words", "returning"}
 
 Boot = Callable[..., Machine]
 
@@ -79,6 +89,8 @@ def test_an_interrupt_comes_before_the_first_instruction_that_begins_then_or_lat
     for load in range(1, begins[-1] + 1):
         machine = boot(program(payload, load), {SYSTICK: "tick"}).run(60)
         number = next(n for n, at in enumerate(begins) if at >= load)
+        if name in UNDONE and load < begins[number] - (3 if "0xBD08" in payload[number - 1][0] else 0):
+            number -= 1
         expected = machine.label(f"k{number}") if number < len(payload) else machine.label("tick") - 2
         assert machine.log[0] == expected, f"{name}: {load} cycles behind the store"
         for register in ("R3", "R4", "R5", "R6"):
