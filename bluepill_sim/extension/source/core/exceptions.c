@@ -156,9 +156,7 @@ static void start_handler(struct core *core, unsigned number, uint32_t handler, 
     s->it_state = 0;
 }
 
-/* Acts on what comes while the frame is written; returns the exception whose handler starts: one that comes late and has
- * a higher priority, while the other stays pending (ARM B1.5.9). */
-static unsigned latest(struct core *core, unsigned number)
+static void act_on_due(struct core *core)
 {
     struct shared *s = &core->shared;
     if (s->cycle >= s->tick_next && systick_advance(s, s->cycle)) {
@@ -167,6 +165,39 @@ static unsigned latest(struct core *core, unsigned number)
     if (s->cycle >= core->fabric->next_cycle) {
         run_events(core->fabric, ns_of(core->fabric, s->cycle));
     }
+}
+
+/* The exception that is to be taken now; 0: none is. */
+static unsigned taken_now(struct core *core)
+{
+    const unsigned number = first_pending(&core->shared);
+    return number && can_preempt(core, number, false) ? number : 0;
+}
+
+/* Where it is exact: the exception that comes while the frame is read, for which that is given up (TRM 5.6); time goes on to
+ * when it comes. 0: none does. */
+static unsigned coming_on_return(struct core *core)
+{
+    struct shared *s = &core->shared;
+    const uint64_t began = s->cycle, end = began + EXIT_CYCLES;
+    for (uint64_t next; core->is_exact && (next = core_next_event(core)) < end && !waits_for_python(core->fabric, next);) {
+        s->cycle = next;
+        act_on_due(core);
+        const unsigned number = taken_now(core);
+        if (number) {
+            return number;
+        }
+    }
+    s->cycle = began;
+    return 0;
+}
+
+/* Acts on what comes while the frame is written; returns the exception whose handler starts: one that comes late and has
+ * a higher priority, while the other stays pending (ARM B1.5.9). */
+static unsigned latest(struct core *core, unsigned number)
+{
+    struct shared *s = &core->shared;
+    act_on_due(core);
     const unsigned first = first_pending(s);
     if (!first || group(s, priority_of(s, first)) >= group(s, priority_of(s, number)) || !vector(core, first)) {
         return number;
@@ -208,8 +239,8 @@ bool enter(struct core *core, unsigned number, uint32_t return_address)
 /* 1: an exception was entered; 0: none may be; -1: Python has to. */
 int deliver(struct core *core)
 {
-    const unsigned number = first_pending(&core->shared);
-    if (!number || !can_preempt(core, number, false)) {
+    const unsigned number = taken_now(core);
+    if (!number) {
         return 0;
     }
     if (number == HARD_FAULT) { /* of a buffered store: Python reports it */
@@ -258,12 +289,17 @@ bool leave(struct core *core, uint32_t exc_return)
     }
     s->event_register = 1;
     core_clear_exclusive(core);
-    const unsigned following = first_pending(s);
-    if (following && can_preempt(core, following, false)) {
-        record(core, exc_return | 1, -1);
-        record(core, exc_return | 1, (int32_t)following);
-        start_handler(core, following, vector(core, following), msp, exc_return | 1, cpsr);
+    unsigned following = taken_now(core);
+    if (!following) {
+        following = coming_on_return(core);
+    }
+    if (following) {
+        const uint64_t began = s->cycle;
         s->cycle += TAIL_CHAIN_CYCLES;
+        following = core->is_exact ? latest(core, following) : following;
+        record_at(core, began, exc_return | 1, -1);
+        record_at(core, began, exc_return | 1, (int32_t)following);
+        start_handler(core, following, vector(core, following), msp, exc_return | 1, cpsr);
         return true;
     }
     s->exception_number = xpsr & 0x1FF;
@@ -341,6 +377,5 @@ void pending_changed(struct core *core, uint32_t pc)
 /* Whether an exception is pending that may interrupt what runs. */
 bool is_interrupted(struct core *core)
 {
-    const unsigned number = first_pending(&core->shared);
-    return number && can_preempt(core, number, false);
+    return taken_now(core) != 0;
 }
