@@ -65,6 +65,12 @@ REFILL = {
     Kind.LOAD_MULTIPLE: 3,
 }
 
+#: What takes so long that an exception need not wait for it (TRM 18.2, ARM B1.5.10). chosen: LDM and STM begin anew
+#: too, where silicon goes on with the word at which they were left.
+GIVEN_UP = frozenset(
+    {Kind.MULTIPLY_LONG, Kind.MULTIPLY_ACCUMULATE_LONG, Kind.DIVIDE, Kind.LOAD_MULTIPLE, Kind.STORE_MULTIPLE}
+)
+
 #: chosen: of so many blocks it is known what they cost and access, several programs' all.
 KNOWN_BLOCKS = 4096
 #: Bytes that one access to the flash delivers (RM0008 3.3.3: 64-bit lines).
@@ -82,7 +88,7 @@ class BasicBlock:
     start: int
     #: Address after the block: where it goes on if no branch is taken.
     end: int
-    #: Cycles when the block falls through to `end`.
+    #: Cycles when the block goes on at `end`: it falls through, or that is where its B goes.
     straight: int
     #: Cycles when it goes anywhere else.
     taken: int
@@ -94,6 +100,8 @@ class BasicBlock:
     late_divides: tuple[tuple[int, int], ...] = ()
     #: Addresses and base registers of its accesses that must be aligned.
     aligned: tuple[tuple[int, int], ...] = ()
+    #: Addresses of its instructions that an exception in their midst leaves undone, to begin anew after it.
+    given_up: frozenset[int] = frozenset()
     #: Whether it may change what may interrupt (CPS, MSR).
     changes_masks: bool = False
     sends_event: bool = False
@@ -168,22 +176,24 @@ def measure_block(code: bytes, start: int, wait_states: int, *, has_prefetch: bo
     divides = tuple((i.address, i.base) for i in instructions if i.kind is Kind.DIVIDE and i.base is not None)
     stores = [i.address for i in instructions if i.kind in {Kind.STORE, Kind.STORE_INDEXED}]
     kinds = {i.kind for i in instructions}
+    end, taken, it_states = start + len(code), clock + _refill(previous, wait_states), _it_states(instructions)
     return BasicBlock(
         start,
-        start + len(code),
-        clock,
-        clock + _refill(previous, wait_states),
+        end,
+        taken if _always_goes(previous, end, it_states) else clock,
+        taken,
         offsets,
         divides=divides,
         late_divides=tuple(row for row in divides if stores and row[0] > stores[0]),
         aligned=tuple(
             (i.address, i.base) for i in instructions if i.kind in _MULTIPLES and i.base is not None and i.base < 13
         ),
+        given_up=frozenset(i.address for i in instructions if i.kind in GIVEN_UP),
         changes_masks=Kind.MASK_CHANGE in kinds,
         sends_event=Kind.SEND_EVENT in kinds,
         has_exclusive=Kind.EXCLUSIVE in kinds,
         has_it=Kind.IF_THEN in kinds,
-        it_states=_it_states(instructions),
+        it_states=it_states,
         is_self_loop=len(instructions) == 1 and instructions[0].destination == start,
         last=instructions[-1].kind if instructions else Kind.PLAIN,
     )
@@ -226,6 +236,11 @@ class _Fetch:
                 clock += self._wait_states
             self._entered = clock
         return clock
+
+
+def _always_goes(last: Instruction | None, end: int, it_states: dict[int, int]) -> bool:
+    """Tell whether the block ends in a branch to the very next instruction, which refills the pipeline as any other."""
+    return last is not None and last.always_branches and last.destination == end and last.address not in it_states
 
 
 def _refill(last: Instruction | None, wait_states: int) -> int:

@@ -36,10 +36,14 @@ class Instruction:
     target: int | None = None
     #: Target address of a direct branch.
     destination: int | None = None
+    #: Whether a direct branch is always taken, but for an IT before it.
+    always_branches: bool = False
     #: What an IT makes of ITSTATE.
     it_state: int = 0
 
 
+#: The upper five bits of a B of 16 bits without a condition.
+_PLAIN_BRANCH = 0b11100
 #: Accesses of one register.
 _SINGLE = frozenset({Kind.LOAD, Kind.LOAD_LITERAL, Kind.LOAD_PC, Kind.STORE, Kind.STORE_INDEXED})
 
@@ -87,7 +91,10 @@ def _decode_narrow(word: int, address: int) -> Instruction:  # noqa: PLR0911 - o
             return Instruction(address, 2, kind, count=count, loads_pc=is_pop and bool(word & 0x100), base=SP_REGISTER)
         return Instruction(address, 2, kind, count=(word & 0xFF).bit_count(), base=word >> 8 & 7)
     if kind is Kind.BRANCH:
-        return Instruction(address, 2, kind, destination=address + 4 + _narrow_displacement(word))
+        is_plain = word >> 11 == _PLAIN_BRANCH
+        return Instruction(
+            address, 2, kind, destination=address + 4 + _narrow_displacement(word), always_branches=is_plain
+        )
     if kind is Kind.IF_THEN:
         return Instruction(address, 2, kind, it_state=word & 0xFF)
     return Instruction(address, 2, kind)
@@ -117,7 +124,8 @@ def _decode_wide(word: int, address: int) -> Instruction:  # noqa: PLR0911 - one
     if kind is Kind.EXCLUSIVE:
         return Instruction(address, 4, kind, base=base)
     if kind in (Kind.BRANCH, Kind.CALL):
-        return Instruction(address, 4, kind, destination=address + 4 + _wide_displacement(word))
+        target = address + 4 + _wide_displacement(word)
+        return Instruction(address, 4, kind, destination=target, always_branches=bool(word & 1 << 12))
     return Instruction(address, 4, kind)
 
 

@@ -76,7 +76,8 @@ INSTRUCTION = Struct(
         StructMember("index", "u8", doc="255: none"),
         StructMember("shift", "u8"),
         StructMember("count", "u8", doc="words of a multiple transfer, else 1"),
-        StructMember("padding", "u8", 2),
+        StructMember("gives_up", "u8", doc="an exception that comes in it leaves it undone"),
+        StructMember("padding", "u8"),
     ),
 )
 RAMP = Struct(

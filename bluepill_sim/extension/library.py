@@ -20,7 +20,7 @@ from simbase.errors import MissingDependencyError
 #: The library, as a module.
 PART = "bluepill_sim._native"
 
-CORE_VARIABLE, CORE_CHOICES = "P2OS_CORE", ("native", "python", "own")
+CORE_VARIABLE, CORE_CHOICES = "P2OS_CORE", ("native", "python", "own", "exact")
 
 UNKNOWN_BLOCK = ctypes.CFUNCTYPE(None, ctypes.c_uint32, ctypes.c_uint32)
 READ = ctypes.CFUNCTYPE(ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint32)
@@ -89,6 +89,8 @@ _FUNCTIONS = {
     "systick_write": "vpuuq",
     "core_block_start": "up",
     "core_ways": "pp",
+    "core_block_from": "up",
+    "core_block_around": "up",
     "core_set_page": "vpupupuppu",
     "core_set_regions": "vpuuuu",
     "core_join": "vpp",
@@ -167,7 +169,7 @@ _FUNCTIONS = {
     "interpreter_context_bytes": "z",
     "interpreter_save": "vpp",
     "interpreter_restore": "vpp",
-    "core_use_interpreter": "vpp",
+    "core_use_interpreter": "vppb",
     "edge_log_new": "p",
     "edge_log_free": "vp",
     "edge_log_put": "bpquu",
@@ -194,7 +196,16 @@ def is_interpreter_wanted() -> bool:
     Raises:
         BluePillError: `P2OS_CORE` names no core.
     """
-    return _choice() == "own"
+    return _choice() in {"own", "exact"}
+
+
+def is_exact_wanted() -> bool:
+    """Tell whether the interpreter is to act on what is due at the instruction, not behind its block.
+
+    Raises:
+        BluePillError: `P2OS_CORE` names no core.
+    """
+    return _choice() == "exact"
 
 
 def _choice() -> str:

@@ -49,6 +49,7 @@ from bluepill_sim.extension.library import (
     Callbacks,
     UnicornApi,
     address_of,
+    is_exact_wanted,
     is_interpreter_wanted,
     library,
 )
@@ -81,6 +82,8 @@ _IT_BLOCK_BYTES = 2 + 4 * 4
 _WHOLE_BYTES = 256
 #: Chosen: at least so often Python handles signals, such as Ctrl-C.
 _SLICE_CYCLES = 20_000_000
+#: Later than any run.
+_NEVER = 1 << 62
 #: The flash stands at 0 too; a page of it.
 _FLASH_ALIAS, _PAGE_SHIFT = 0x0800_0000, 10
 #: Chosen: rows that C keeps before Python takes them.
@@ -145,7 +148,7 @@ class NativeEngine(Engine):
         self.shared = Shared.from_address(state.value)
         self.shared.scratch = SCRATCH_BASE
         if isinstance(self._core, InterpreterCore):
-            library().core_use_interpreter(state, self._core.handle)
+            library().core_use_interpreter(state, self._core.handle, is_exact_wanted())
         weakref.finalize(self, library().core_free, state)
 
     @property
@@ -312,6 +315,9 @@ class NativeEngine(Engine):
         if bool(shared.is_python) is wanted:
             return
         shared.is_python = wanted
+        around = library().core_block_around(self._state) if wanted else _NO_BLOCK_START
+        if around != _NO_BLOCK_START and not self.is_inside_block and around in self._known:
+            self._rest.keep(self._known[around], self.pc, _NEVER, has_raised=False)
         for hook in (*self._native_hooks, *self._pc_hooks):
             core.remove_hook(hook)
         self._native_hooks = self._pc_hooks = ()
@@ -330,7 +336,10 @@ class NativeEngine(Engine):
         if self._held is not None:
             return self._held
         start = library().core_block_start(self._state)
-        return NO_BLOCK if start == _NO_BLOCK_START else self._known[start]
+        if start == _NO_BLOCK_START:
+            return NO_BLOCK
+        block, begins = self._known[start], library().core_block_from(self._state)
+        return block if begins == start else block.rest(begins)
 
     @block.setter
     def block(self, block: BasicBlock) -> None:
@@ -479,7 +488,7 @@ class NativeEngine(Engine):
                 return
         rows = (InstructionRow * len(block.offsets))()
         for row, (at, cycle) in zip(rows, block.offsets.items(), strict=True):
-            row.address, row.cycle = at, cycle
+            row.address, row.cycle, row.gives_up = at, cycle, at in block.given_up
             _fill(row, accesses.get(at))
         added = library().core_add_row(
             self._state,

@@ -60,6 +60,9 @@ KERNELS = [
     ("call with a frame", "", "bl f", "f: push {r4, lr}\nnop\npop {r4, pc}", 2 + 3 + 1 + 6),
     # bl f 2, push {lr} 2, bl g 2, bx 3, pop {pc} 2 + 3.
     ("two calls deep", "", "bl f", "f: push {lr}\nbl g\npop {pc}\ng: bx lr", 2 + 2 + 2 + 3 + 5),
+    # Branches to the very next instruction: 1 + P each; one that its IT skips: IT 1, B 1.
+    ("branches to what comes next", "cmp r6, #0", "b k\nk: bl l\nl: nop\nit eq\nb m\nm: nop", "",
+     2 + 2 + 1 + 1 + 1 + 1),
     # Not taken 1, taken 1 + P.
     ("compare and branch on zero", "movs r3, #0", "cbnz r3, k\ncbz r3, k\nnop\nk: nop", "", 1 + 2 + 1),
     # TBB 1 + the load and the addition 2 + P(3), then the case: b 1 + P. Table of two: the second case.

@@ -676,10 +676,8 @@ static bool is_alias(const struct region_user *region)
     return region->number == region->core->bits_region || region->number == region->core->sram_bits_region;
 }
 
-uint64_t core_read_io(void *unicorn, uint64_t at, unsigned size, void *user)
+static uint64_t read_io(const struct region_user *region, uint64_t at, unsigned size)
 {
-    (void)unicorn;
-    const struct region_user *region = user;
     struct core *core = region->core;
     const uint32_t offset = (uint32_t)at, address = region->base + offset;
     uint32_t word = 0;
@@ -702,6 +700,15 @@ uint64_t core_read_io(void *unicorn, uint64_t at, unsigned size, void *user)
         return ask_read(region, offset, size);
     }
     return size == 4 ? word : (word >> (offset & 3) * 8) & ((1u << size * 8) - 1);
+}
+
+uint64_t core_read_io(void *unicorn, uint64_t at, unsigned size, void *user)
+{
+    (void)unicorn;
+    const struct region_user *region = user;
+    const uint64_t word = read_io(region, at, size);
+    leave_in_time(region->core);
+    return word;
 }
 
 /* Stores to a register; false: that is Python's. */
@@ -745,4 +752,5 @@ void core_write_io(void *unicorn, uint64_t at, unsigned size, uint64_t value, vo
     } else {
         ask_write(region, offset, size, written);
     }
+    leave_in_time(core);
 }

@@ -86,6 +86,14 @@ static void log_spin(struct core *core, uint32_t address)
     }
 }
 
+/* Has a block that may unmask what waits be looked at behind its end. */
+static void unmask(struct core *core, const struct row *row)
+{
+    if (row->flags & ROW_CHANGES_MASKS && core->shared.mask_stop) {
+        core->shared.stop_at = 0;
+    }
+}
+
 /* A block that is new, stands in writable memory, or needs attention. */
 static void enter_special(struct core *core, uint32_t address, uint32_t size, struct row *row)
 {
@@ -118,9 +126,7 @@ static void enter_special(struct core *core, uint32_t address, uint32_t size, st
         return;
     }
     begin_block(core, row);
-    if (row->flags & ROW_CHANGES_MASKS && s->mask_stop) {
-        s->stop_at = 0;
-    }
+    unmask(core, row);
     if (row->flags & ROW_SENDS_EVENT) {
         s->event_register = 1;
     }
@@ -129,6 +135,52 @@ static void enter_special(struct core *core, uint32_t address, uint32_t size, st
     } else {
         record(core, address, 0);
     }
+}
+
+uint32_t cycles_until(const struct row *row, uint32_t address)
+{
+    if (address == row->end) {
+        return row->costs[0];
+    }
+    const struct instruction *one = instruction_at(row, address);
+    return one == NULL ? row->costs[1] : one->cycle;
+}
+
+/* What is left of a block when the core stands inside it; null without memory for it. */
+static struct row *rest_of(struct row *whole, uint32_t address)
+{
+    for (struct row *row = whole->rests; row != NULL; row = row->next) {
+        if (row->start == address) {
+            return row;
+        }
+    }
+    const struct instruction *first = instruction_at(whole, address);
+    const uint32_t count = first == NULL ? 0 : whole->count - (uint32_t)(first - whole->instructions);
+    struct row *row = count ? malloc(sizeof *row + count * sizeof *first) : NULL;
+    if (row != NULL) {
+        *row = (struct row){.start = address, .end = whole->end, .plain_start = NOWHERE, .flags = whole->flags, .count = count,
+                            .costs = {whole->costs[0] - first->cycle, whole->costs[1] - first->cycle},
+                            .passed = {NEVER, NEVER}, .span = whole->span - first->cycle, .whole = whole,
+                            .next = whole->rests};
+        memcpy(row->instructions, first, count * sizeof *first);
+        for (uint32_t n = 0; n < count; ++n) {
+            row->instructions[n].cycle -= first->cycle;
+        }
+        whole->rests = row;
+    }
+    return row;
+}
+
+/* The row of the block inside which the interpreter stands, which no run has entered yet; null: it cannot be measured. */
+static struct row *row_around(struct core *core)
+{
+    const struct registers *is = &core->interpreter->is;
+    struct row *row = find(core, is->block_start);
+    if (row == NULL) {
+        core->calls.unknown_block(is->block_start, is->block_end - is->block_start);
+        row = find(core, is->block_start);
+    }
+    return row;
 }
 
 /* Finds out whether a block may be entered without a closer look. */
@@ -170,8 +222,7 @@ static RARELY void trim_registers(struct core *core)
         uint32_t value = read_register(core, numbers[n]);
         if (value & ~kept[n]) {
             value &= kept[n];
-            void *const at = &value;
-            core->api.write_registers(core->unicorn, &numbers[n], &at, 1);
+            write_registers(core, &numbers[n], &value, 1);
         }
     }
 }
@@ -232,14 +283,145 @@ void core_on_block(void *unicorn, uint64_t at, uint32_t size, void *user)
     core->shared.last[core->shared.logged++ % LAST_ROWS] = (struct record){cycle, address, 0};
 }
 
+/* The core is inside a block: acts on what is due, and goes on with the rest of it. */
+static void enter_rest(struct core *core, uint32_t address, uint32_t size)
+{
+    struct shared *s = &core->shared;
+    struct row *row = core->block;
+    if (row == &core->none) {
+        row = row_around(core);
+    } else {
+        s->cycle += cycles_until(row, address);
+        row = row->whole != NULL ? row->whole : row;
+    }
+    if (!s->stop_at || s->attention || s->cycle >= stop_of(core)) {
+        const enum way way = goes_on(core, address);
+        if (way == ENDS) {
+            stop_at_boundary(core, address);
+        }
+        if (way != GOES_ON) {
+            return;
+        }
+    }
+    struct row *rest = row == NULL ? NULL : rest_of(row, address);
+    if (rest != NULL) {
+        begin_block(core, rest);
+        unmask(core, rest);
+        return;
+    }
+    core->block = &core->none;
+    if (s->halt_kind != HALT_NONE) {
+        end_run(core, s->halt_kind, address);
+    } else { /* the code is another by now */
+        core->interpreter->is.block_start = 0;
+        enter_block(core, address, size);
+    }
+}
+
+/* The instruction of a block that runs when so many cycles are left until something is due, and its end. */
+static uint32_t running_at(const struct row *row, uint64_t left, uint64_t *end)
+{
+    uint32_t n = row->count - 1;
+    *end = row->costs[0];
+    for (; n && row->instructions[n].cycle >= left; --n) {
+        *end = row->instructions[n].cycle;
+    }
+    return n;
+}
+
+/* Whether an instruction of the block may be left undone for what is due in so many cycles, which come in its midst. */
+static bool gives_up(const struct core *core, const struct row *row, uint64_t due, uint32_t *number)
+{
+    if (due >= row->costs[0]) {
+        return false;
+    }
+    uint64_t end;
+    *number = running_at(row, due, &end);
+    return row->instructions[*number].gives_up && due < end && !waits_for_python(core->fabric, core->shared.cycle + due);
+}
+
+/* Acts on what is due in the midst of the instruction that begins now; the run's limit does not count, or it would depend on
+ * it whether the instruction is left undone. Where no exception comes of it, the instruction is run as if nothing were. */
+static enum way act_within(struct core *core, uint64_t due)
+{
+    struct shared *s = &core->shared;
+    struct row *row = core->block;
+    const uint64_t began = s->cycle, limit = core->limit;
+    s->cycle += due;
+    core->limit = NEVER;
+    const enum way way = goes_on(core, row->start);
+    core->limit = limit;
+    s->stop_at = s->stop_at < limit ? s->stop_at : limit;
+    if (way != ELSEWHERE) {
+        s->cycle = began;
+        begin_block(core, row);
+    }
+    return way;
+}
+
+/* Has the block that is entered end before the first of its instructions that begins when something is due, or later; and
+ * before one that would run then and may be left undone for an exception. */
+static void cut(struct core *core)
+{
+    struct shared *s = &core->shared;
+    const struct row *row = core->block;
+    uint64_t left = stop_of(core) - s->cycle, end;
+    uint32_t number;
+    while (gives_up(core, row, core_next_event(core) - s->cycle, &number)) {
+        if (number) {
+            left = left < row->instructions[number].cycle ? left : row->instructions[number].cycle;
+            break;
+        }
+        const enum way way = act_within(core, core_next_event(core) - s->cycle);
+        if (way == ELSEWHERE) {
+            return;
+        }
+        left = stop_of(core) - s->cycle;
+        if (way == ENDS) {
+            s->stop_at = 0;
+            left = 1;
+            break;
+        }
+    }
+    if (row->span < left && row->whole == NULL) {
+        return;
+    }
+    const uint32_t last = running_at(row, left, &end);
+    core->interpreter->cut_at = last + 1 < row->count ? row->instructions[last + 1].address : row->end;
+    if (core->interpreter->cut_at == row->end && row->whole == NULL) {
+        core->interpreter->cut_at = 0;
+    }
+}
+
+/* Behind an access that was made: has the core go on inside the block where something may be due before its end. */
+void leave_in_time(struct core *core)
+{
+    const struct shared *s = &core->shared;
+    const struct row *row = core->block;
+    if (!core->is_exact || s->is_python || (s->stop_at && s->cycle + row->span < stop_of(core))) {
+        return;
+    }
+    const struct instruction *made = instruction_at(row, core->noted);
+    if (made != NULL && made + 1 < row->instructions + row->count) {
+        core->interpreter->leaves_to = made[1].address;
+    }
+}
+
 /* The same where the interpreter runs the blocks: it gets those that it may enter itself. */
 void core_on_known_block(void *interpreter, uint64_t at, uint32_t size, void *user)
 {
     struct core *core = user;
-    core_on_block(interpreter, at, size, user);
+    if (core->interpreter->is.block_start) {
+        enter_rest(core, (uint32_t)at, size);
+    } else {
+        core_on_block(interpreter, at, size, user);
+    }
     struct row *row = core->block;
     if (row->plain_start == (uint32_t)at) {
-        interpreter_know(interpreter, row, row->passed[0], row->passed[1]);
+        interpreter_know(interpreter, row, row->passed[0], row->passed[1], core->is_exact ? row->span : 0);
+    }
+    if (core->is_exact && row != &core->none) {
+        cut(core);
     }
 }
 
@@ -253,9 +435,10 @@ static void on_trap(void *user, bool is_alignment, uint32_t pc, uint32_t value)
     }
 }
 
-/* Has the interpreter run instructions in Unicorn's place. */
-void core_use_interpreter(struct core *core, struct interpreter *interpreter)
+/* Has the interpreter run instructions in Unicorn's place, and what is due come at the instruction or behind its block. */
+void core_use_interpreter(struct core *core, struct interpreter *interpreter, bool is_exact)
 {
+    core->is_exact = is_exact;
     core->interpreter = interpreter;
     interpreter_set_clock(interpreter, &(struct clock){&core->shared, (void **)&core->block});
     interpreter_set_noted(interpreter, &core->noted);
@@ -282,6 +465,8 @@ bool core_add_row(struct core *core, uint32_t start, uint32_t end, uint32_t stra
                         .passed = {is_looked_after ? NEVER : straight, is_looked_after ? NEVER : taken},
                         .flags = flags, .count = count, .host = host, .code = code, .compared = compared,
                         .next = core->all};
+    const struct instruction *last = &instructions[count - 1];
+    row->span = !count ? 0 : last->gives_up ? straight - 1 : last->cycle;
     find_plain(core, row);
     memcpy(row->instructions, instructions, list);
     if (host != NULL) {
@@ -342,6 +527,11 @@ void free_dropped(struct core *core)
         core->dropped = row->next;
         free(row->code);
         free(row->loop);
+        while (row->rests != NULL) {
+            struct row *rest = row->rests;
+            row->rests = rest->next;
+            free(rest);
+        }
         free(row);
     }
 }
@@ -356,7 +546,20 @@ const struct instruction *instruction_at(const struct row *row, uint32_t address
     return NULL;
 }
 
-/* Start of the block that runs; all ones for none. */
-uint32_t core_block_start(const struct core *core) { return core->block->start; }
+/* Start of the block that runs, or of whose rest does; all ones for none. */
+uint32_t core_block_start(const struct core *core)
+{
+    return core->block->whole != NULL ? core->block->whole->start : core->block->start;
+}
+
+/* And where it runs from. */
+uint32_t core_block_from(const struct core *core) { return core->block->start; }
+
+/* Start of the block inside which the core stands between two runs; all ones where that is at the start of one. */
+uint32_t core_block_around(const struct core *core)
+{
+    const struct registers *is = core->interpreter == NULL ? NULL : &core->interpreter->is;
+    return is != NULL && is->pc == core->shared.pc && stands_inside(core->interpreter, is->pc) ? is->block_start : UINT32_MAX;
+}
 
 void core_leave_block(struct core *core) { core->block = &core->none; }

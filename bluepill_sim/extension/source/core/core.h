@@ -17,7 +17,7 @@
 #include <stdint.h>
 
 #include "../fabric/fabric.h"
-#include "../interpreter/interpreter.h"
+#include "../interpreter/registers.h"
 #include "system.h"
 
 #define NEVER (UINT64_C(1) << 62)
@@ -82,6 +82,8 @@ struct row {
     uint32_t compared;   /* and how many bytes of it */
     struct row *next;    /* in the list of all rows, or of dropped ones */
     struct loop *loop;   /* where it is one that may poll a counter */
+    uint64_t span;       /* what is due in more cycles than these comes behind it */
+    struct row *whole, *rests; /* of the rest of a block: the row of all of it; and of that one its rests */
     struct instruction instructions[];
 };
 
@@ -228,6 +230,7 @@ struct core {
     struct shared shared;
     void *unicorn;
     struct interpreter *interpreter; /* what runs instructions in its place; null: nothing does */
+    bool is_exact; /* what is due is acted on before the first instruction that begins then, not at the end of its block */
     struct unicorn_api api;
     struct callbacks calls;
     struct row *block;
@@ -267,10 +270,57 @@ struct core {
     uint32_t view_count;
 };
 
+/* ITSTATE in a CPSR or xPSR: its bits 1:0 at 25, 7:2 at 10. */
+static inline uint32_t it_state_of(uint32_t bits) { return (bits >> 25 & 3) | (bits >> 10 & 0x3F) << 2; }
+
 static inline void begin_block(struct core *core, struct row *row)
 {
     core->block = row;
     core->io_next = core->skipped_count = 0;
+}
+
+/* Registers by Unicorn's numbers. */
+enum { MOST_REGISTERS = 16 };
+static inline __attribute__((always_inline)) void read_registers(struct core *core, const int *numbers, uint32_t *values, int count)
+{
+    if (core->interpreter != NULL) {
+#pragma GCC unroll 16
+        for (int n = 0; n < count; ++n) {
+            values[n] = interpreter_get(core->interpreter, numbers[n]);
+        }
+        return;
+    }
+    void *at[MOST_REGISTERS];
+    for (int n = 0; n < count; ++n) {
+        at[n] = &values[n];
+    }
+    core->api.read_registers(core->unicorn, numbers, at, count);
+}
+
+static inline __attribute__((always_inline)) void write_registers(struct core *core, const int *numbers, uint32_t *values, int count)
+{
+    if (core->interpreter != NULL) {
+#pragma GCC unroll 16
+        for (int n = 0; n < count; ++n) {
+            interpreter_put(core->interpreter, numbers[n], values[n]);
+        }
+        return;
+    }
+    void *at[MOST_REGISTERS];
+    for (int n = 0; n < count; ++n) {
+        at[n] = &values[n];
+    }
+    core->api.write_registers(core->unicorn, numbers, at, count);
+}
+
+static inline uint32_t read_register(struct core *core, int number)
+{
+    uint32_t value;
+    if (core->interpreter != NULL) {
+        return interpreter_get(core->interpreter, number);
+    }
+    core->api.read_register(core->unicorn, number, &value);
+    return value;
 }
 
 /* For this library alone: such calls need no table. */
@@ -278,6 +328,8 @@ static inline void begin_block(struct core *core, struct row *row)
 /* blocks.c */
 void end_run(struct core *core, uint32_t kind, uint32_t pc);
 void free_dropped(struct core *core);
+uint32_t cycles_until(const struct row *row, uint32_t address);
+void leave_in_time(struct core *core);
 const struct instruction *instruction_at(const struct row *row, uint32_t address);
 void record(struct core *core, uint32_t address, int32_t kind);
 void core_flush(struct core *core);
@@ -302,7 +354,7 @@ void skip(struct core *core, uint32_t address, bool is_write, uint32_t bytes);
 enum way { ENDS, GOES_ON, ELSEWHERE };
 enum way goes_on(struct core *core, uint32_t address);
 void *allocate(struct core *core, size_t bytes);
-uint32_t read_register(struct core *core, int number);
+uint64_t stop_of(const struct core *core);
 /* exceptions.c */
 uint64_t deliverable(const struct shared *s, uint64_t *high);
 bool wakes(struct core *core);
@@ -327,23 +379,5 @@ static inline uint64_t next_stop(const struct core *core)
     return !core->shared.stop_at ? 0 : event < core->limit ? event : core->limit;
 }
 void core_clear_exclusive(struct core *core);
-
-/* Register numbers of Unicorn 2 (arm.h). */
-enum {
-    REG_CPSR = 3,
-    REG_LR = 10,
-    REG_PC = 11,
-    REG_SP = 12,
-    REG_R0 = 66,
-    REG_R12 = 78,
-    REG_IPSR = 114,
-    REG_MSP = 115,
-    REG_PSP = 116,
-    REG_CONTROL = 117,
-    REG_XPSR = 120,
-    REG_PRIMASK = 123,
-    REG_BASEPRI = 124,
-    REG_FAULTMASK = 126
-};
 
 #endif

@@ -11,7 +11,7 @@
 enum { FRAME_BYTES = 32 };
 enum { NMI = 2, HARD_FAULT = 3, SVCALL = 11, DEBUG_MONITOR = 12, SYSTICK = 15, THREAD_PRIORITY = 256 };
 enum { MON_STEP = 1 << 18 };
-enum { SLEEPONEXIT = 2, SLEEPDEEP = 4, SEVONPEND = 16, STKALIGN = 1 << 9, SPSEL = 2, NPRIV = 1 };
+enum { SLEEPONEXIT = 2, SLEEPDEEP = 4, SEVONPEND = 16, STKALIGN = 1 << 9 };
 enum { AWAKE, FOR_INTERRUPT, FOR_EVENT };
 
 #define T_BIT (1u << 24)
@@ -75,8 +75,7 @@ static int execution_priority(struct core *core, bool ignores_primask)
     const struct shared *s = &core->shared;
     static const int numbers[3] = {REG_PRIMASK, REG_BASEPRI, REG_FAULTMASK};
     uint32_t masks[3];
-    void *at[3] = {&masks[0], &masks[1], &masks[2]};
-    core->api.read_registers(core->unicorn, numbers, at, 3);
+    read_registers(core, numbers, masks, 3);
     int priority = active_priority(s);
     /* Unicorn keeps the low bits of BASEPRI that an STM32F103 does not have. */
     const int base = (int)(masks[1] & 0xF0);
@@ -150,17 +149,14 @@ static void start_handler(struct core *core, unsigned number, uint32_t handler, 
     s->sleep = AWAKE;
     static const int numbers[4] = {REG_SP, REG_IPSR, REG_CPSR, REG_LR};
     uint32_t values[4] = {sp, number, (cpsr & ~IT_BITS) | CPSR_T, link};
-    void *at[4] = {&values[0], &values[1], &values[2], &values[3]};
-    core->api.write_registers(core->unicorn, numbers, at, 4);
+    write_registers(core, numbers, values, 4);
     core_clear_exclusive(core);
     s->pc = handler & ~1u;
     s->is_thumb = handler & 1;
     s->it_state = 0;
 }
 
-/* Acts on what comes while the frame is written; returns the exception whose handler starts: one that comes late and has
- * a higher priority, while the other stays pending (ARM B1.5.9). */
-static unsigned latest(struct core *core, unsigned number)
+static void act_on_due(struct core *core)
 {
     struct shared *s = &core->shared;
     if (s->cycle >= s->tick_next && systick_advance(s, s->cycle)) {
@@ -169,6 +165,39 @@ static unsigned latest(struct core *core, unsigned number)
     if (s->cycle >= core->fabric->next_cycle) {
         run_events(core->fabric, ns_of(core->fabric, s->cycle));
     }
+}
+
+/* The exception that is to be taken now; 0: none is. */
+static unsigned taken_now(struct core *core)
+{
+    const unsigned number = first_pending(&core->shared);
+    return number && can_preempt(core, number, false) ? number : 0;
+}
+
+/* Where it is exact: the exception that comes while the frame is read, for which that is given up (TRM 5.6); time goes on to
+ * when it comes. 0: none does. */
+static unsigned coming_on_return(struct core *core)
+{
+    struct shared *s = &core->shared;
+    const uint64_t began = s->cycle, end = began + EXIT_CYCLES;
+    for (uint64_t next; core->is_exact && (next = core_next_event(core)) < end && !waits_for_python(core->fabric, next);) {
+        s->cycle = next;
+        act_on_due(core);
+        const unsigned number = taken_now(core);
+        if (number) {
+            return number;
+        }
+    }
+    s->cycle = began;
+    return 0;
+}
+
+/* Acts on what comes while the frame is written; returns the exception whose handler starts: one that comes late and has
+ * a higher priority, while the other stays pending (ARM B1.5.9). */
+static unsigned latest(struct core *core, unsigned number)
+{
+    struct shared *s = &core->shared;
+    act_on_due(core);
     const unsigned first = first_pending(s);
     if (!first || group(s, priority_of(s, first)) >= group(s, priority_of(s, number)) || !vector(core, first)) {
         return number;
@@ -184,11 +213,7 @@ bool enter(struct core *core, unsigned number, uint32_t return_address)
     static const int numbers[10] = {REG_R0,     REG_R0 + 1, REG_R0 + 2, REG_R0 + 3,  REG_R12,
                                     REG_LR,     REG_XPSR,   REG_SP,     REG_CONTROL, REG_CPSR};
     uint32_t value[10];
-    void *at[10];
-    for (int n = 0; n < 10; ++n) {
-        at[n] = &value[n];
-    }
-    core->api.read_registers(core->unicorn, numbers, at, 10);
+    read_registers(core, numbers, value, 10);
     const uint32_t control = value[8], cpsr = value[9];
     uint32_t frame_at = value[7] - FRAME_BYTES;
     uint32_t xpsr = (value[6] & ~(T_BIT | ALIGN_BIT)) | (s->is_thumb ? T_BIT : 0) | s->exception_number;
@@ -214,8 +239,8 @@ bool enter(struct core *core, unsigned number, uint32_t return_address)
 /* 1: an exception was entered; 0: none may be; -1: Python has to. */
 int deliver(struct core *core)
 {
-    const unsigned number = first_pending(&core->shared);
-    if (!number || !can_preempt(core, number, false)) {
+    const unsigned number = taken_now(core);
+    if (!number) {
         return 0;
     }
     if (number == HARD_FAULT) { /* of a buffered store: Python reports it */
@@ -244,9 +269,8 @@ bool leave(struct core *core, uint32_t exc_return)
     /* A handler's SP is MSP. */
     static const int numbers[5] = {REG_CONTROL, REG_CPSR, REG_FAULTMASK, REG_SP, REG_PSP};
     uint32_t value[5];
-    void *at[12] = {&value[0], &value[1], &value[2], &value[3], &value[4]};
     const bool uses_psp = exc_return == TO_THREAD_PSP;
-    core->api.read_registers(core->unicorn, numbers, at, uses_psp ? 5 : 4);
+    read_registers(core, numbers, value, 5);
     const uint32_t control = value[0], cpsr = value[1], msp = value[3], from = value[uses_psp ? 4 : 3];
     uint32_t *frame = sram_at(core, from, FRAME_BYTES);
     const bool may_stop = to_thread && s->scr & SLEEPONEXIT && s->scr & SLEEPDEEP;
@@ -265,12 +289,17 @@ bool leave(struct core *core, uint32_t exc_return)
     }
     s->event_register = 1;
     core_clear_exclusive(core);
-    const unsigned following = first_pending(s);
-    if (following && can_preempt(core, following, false)) {
-        record(core, exc_return | 1, -1);
-        record(core, exc_return | 1, (int32_t)following);
-        start_handler(core, following, vector(core, following), msp, exc_return | 1, cpsr);
+    unsigned following = taken_now(core);
+    if (!following) {
+        following = coming_on_return(core);
+    }
+    if (following) {
+        const uint64_t began = s->cycle;
         s->cycle += TAIL_CHAIN_CYCLES;
+        following = core->is_exact ? latest(core, following) : following;
+        record_at(core, began, exc_return | 1, -1);
+        record_at(core, began, exc_return | 1, (int32_t)following);
+        start_handler(core, following, vector(core, following), msp, exc_return | 1, cpsr);
         return true;
     }
     s->exception_number = xpsr & 0x1FF;
@@ -284,21 +313,18 @@ bool leave(struct core *core, uint32_t exc_return)
                                REG_R0 + 2,  REG_R0 + 3, REG_R12,     REG_LR,  REG_CONTROL, REG_CPSR};
     static const int to_same[9] = {REG_IPSR,   REG_SP,  REG_R0, REG_R0 + 1, REG_R0 + 2,
                                    REG_R0 + 3, REG_R12, REG_LR, REG_CPSR};
-    uint32_t values[12] = {0,        s->exception_number, select,   sp,       frame[0],
-                           frame[1], frame[2],            frame[3], frame[4], frame[5],
-                           (control & NPRIV) | select,    (cpsr & ~kept) | (xpsr & kept) | CPSR_T};
-    const bool is_same = control == select;
-    int count = 0;
-    for (int n = 0; n < 12; ++n) {
-        if (!is_same || to[n] != REG_CONTROL) {
-            at[count++] = &values[n];
-        }
+    const uint32_t pc = frame[6], number_after = s->exception_number, cpsr_after = (cpsr & ~kept) | (xpsr & kept) | CPSR_T;
+    if (control == select) {
+        uint32_t values[9] = {number_after, sp, frame[0], frame[1], frame[2], frame[3], frame[4], frame[5], cpsr_after};
+        write_registers(core, to_same, values, 9);
+    } else {
+        uint32_t values[12] = {0,        number_after, select,   sp,       frame[0], frame[1],
+                               frame[2], frame[3],     frame[4], frame[5], (control & NPRIV) | select, cpsr_after};
+        write_registers(core, to, values, 12);
     }
-    const uint32_t pc = frame[6];
-    core->api.write_registers(core->unicorn, is_same ? to_same : to, at, count);
     s->pc = pc & ~1u;
     s->is_thumb = (xpsr & T_BIT) != 0;
-    s->it_state = (xpsr >> 25 & 3) | (xpsr >> 10 & 0x3F) << 2;
+    s->it_state = it_state_of(xpsr);
     record(core, s->pc, -1);
     if (to_thread && s->scr & SLEEPONEXIT) {
         s->last_sleep_cycle = s->cycle;
@@ -351,6 +377,5 @@ void pending_changed(struct core *core, uint32_t pc)
 /* Whether an exception is pending that may interrupt what runs. */
 bool is_interrupted(struct core *core)
 {
-    const unsigned number = first_pending(&core->shared);
-    return number && can_preempt(core, number, false);
+    return taken_now(core) != 0;
 }

@@ -74,11 +74,7 @@ static struct fault look(struct core *core, uint32_t kind)
         .vector = s->exception_number ? vector(core, s->exception_number) : 0,
         .logged = s->logged,
     };
-    void *at[16];
-    for (int n = 0; n < 16; ++n) {
-        at[n] = &seen.registers[n];
-    }
-    core->api.read_registers(core->unicorn, numbers, at, 16);
+    read_registers(core, numbers, seen.registers, 16);
     memcpy(seen.last, s->last, sizeof seen.last);
     return seen;
 }

@@ -22,11 +22,7 @@ static void read_all(struct core *core, uint32_t registers[16])
     static const int numbers[16] = {REG_R0,     REG_R0 + 1, REG_R0 + 2, REG_R0 + 3, REG_R0 + 4,  REG_R0 + 5,
                                     REG_R0 + 6, REG_R0 + 7, REG_R0 + 8, REG_R0 + 9, REG_R0 + 10, REG_R0 + 11,
                                     REG_R12,    REG_SP,     REG_LR,     REG_XPSR};
-    void *at[16];
-    for (int n = 0; n < 16; ++n) {
-        at[n] = &registers[n];
-    }
-    core->api.read_registers(core->unicorn, numbers, at, 16);
+    read_registers(core, numbers, registers, 16);
 }
 
 /* Looks the later again, the more often it was in vain. */

@@ -9,13 +9,6 @@ enum { FOR_INTERRUPT = 1, FOR_EVENT = 2, SLEEPDEEP = 4, SYSTICK = 15 };
 /* UC_ERR_EXCEPTION: the TLB denied a fetch. */
 #define DENIED 21
 
-uint32_t read_register(struct core *core, int number)
-{
-    uint32_t value = 0;
-    core->api.read_register(core->unicorn, number, &value);
-    return value;
-}
-
 void *allocate(struct core *core, size_t bytes)
 {
     struct allocation *one = calloc(1, sizeof *one + bytes);
@@ -70,15 +63,6 @@ void core_set_page(struct core *core, uint32_t number, uint32_t *words, uint32_t
                                         .device = &core->fabric->devices[slot]};
 }
 
-static uint32_t cycles_until(const struct row *row, uint32_t address)
-{
-    if (address == row->end) {
-        return row->costs[0];
-    }
-    const struct instruction *one = instruction_at(row, address);
-    return one == NULL ? row->costs[1] : one->cycle;
-}
-
 /* The core stands at a boundary. */
 static void settle_at(struct core *core, uint32_t pc)
 {
@@ -122,7 +106,7 @@ static void start_anew(struct core *core)
 }
 
 /* When the run has to end, or something is due. */
-static uint64_t stop_of(const struct core *core)
+uint64_t stop_of(const struct core *core)
 {
     const uint64_t event = core_next_event(core);
     return event < core->limit ? event : core->limit;
@@ -136,7 +120,7 @@ static void go_elsewhere(struct core *core, bool is_in_block)
 {
     struct shared *s = &core->shared;
     const uint64_t stop = stop_of(core);
-    if (s->attention || s->sleep || !s->is_thumb || s->it_state || s->pc >= FIRST_EXCEPTION_RETURN || s->cycle >= stop ||
+    if (s->attention || s->sleep || !s->is_thumb || (s->it_state && core->interpreter == NULL) || s->pc >= FIRST_EXCEPTION_RETURN || s->cycle >= stop ||
         is_interrupted(core)) {
         core->is_elsewhere = 1;
         end_run(core, HALT_BOUNDARY, s->pc);
@@ -149,11 +133,10 @@ static void go_elsewhere(struct core *core, bool is_in_block)
     start_anew(core);
     static const int number = REG_PC;
     uint32_t pc = s->pc | 1;
-    void *const at = &pc;
-    if (is_in_block) {
+    if (is_in_block && core->interpreter == NULL) {
         core->api.write_register(core->unicorn, REG_PC, &pc);
     } else {
-        core->api.write_registers(core->unicorn, &number, &at, 1);
+        write_registers(core, &number, &pc, 1);
     }
 }
 
@@ -301,7 +284,7 @@ static uint32_t run_slice(struct core *core)
         s->halt_address = (uint32_t)error;
     }
     if (s->halt_kind != HALT_FROZEN) {
-        s->it_state = 0;
+        s->it_state = core->is_exact && s->halt_kind == HALT_BOUNDARY ? it_state_of(read_register(core, REG_CPSR)) : 0;
         settle(core, s->halt_pc);
     }
     return s->halt_kind;

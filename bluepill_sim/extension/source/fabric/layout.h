@@ -35,7 +35,8 @@ struct instruction {
     uint8_t index; /* 255: none */
     uint8_t shift;
     uint8_t count; /* words of a multiple transfer, else 1 */
-    uint8_t padding[2];
+    uint8_t gives_up; /* an exception that comes in it leaves it undone */
+    uint8_t padding;
 };
 _Static_assert(sizeof(struct instruction) == 20, "instruction");
 

@@ -24,15 +24,28 @@
 
 enum { FIRST_MAGIC = 0xFF };
 
-/* The block at an address, entered: the hook has been called and lets the run go on. Null: the run ends. */
-static __attribute__((noinline)) struct block *enter(struct interpreter *s, struct block *from, unsigned way)
+/* From here on the core is inside this block, unless that is the rest of another one. */
+static void stand_inside(struct interpreter *s, const struct block *block)
 {
+    if (s->is.block_start == 0) {
+        s->is.block_start = block->start;
+        s->is.block_end = block->end;
+    }
+}
+
+/* The block at an address, or its part up to where the owner has it end, entered: the hook has been called and lets the run
+ * go on. Null: the run ends. `is_inside`: the core is inside a block. */
+static __attribute__((noinline)) struct block *enter(struct interpreter *s, struct block *from, unsigned way, bool is_inside)
+{
+    if (!is_inside) {
+        s->is.block_start = 0;
+    }
     do {
         struct block *block = interpreter_block(s, s->is.pc);
         if (block == NULL) {
             return NULL;
         }
-        s->has_jumped = 0;
+        s->has_jumped = s->cut_at = 0;
         interpreter_call_block(s, block);
         if (s->stops) {
             return NULL;
@@ -40,6 +53,12 @@ static __attribute__((noinline)) struct block *enter(struct interpreter *s, stru
         if (!s->has_jumped) {
             if (from != NULL && block->row != NULL) {
                 from->links[way] = block;
+            }
+            if (s->cut_at) {
+                stand_inside(s, block);
+                block = interpreter_part(s, block, s->cut_at);
+            } else {
+                s->is.block_start = 0;
             }
             s->is.it_state = 0;
             return block;
@@ -56,7 +75,7 @@ static inline __attribute__((always_inline)) bool passes(struct shared *shared, 
         return false;
     }
     const uint64_t cycle = shared->cycle + from->costs[way];
-    if (UNLIKELY(cycle >= shared->stop_at)) {
+    if (UNLIKELY(cycle + to->span >= shared->stop_at)) {
         return false;
     }
     shared->cycle = cycle;
@@ -82,6 +101,26 @@ static inline struct block *known(const struct interpreter *s, uint32_t address)
 {
     struct block *block = s->blocks[address >> 1 & (CODE_SLOTS - 1)];
     return block != NULL && block->start == address && block->row != NULL ? block : NULL;
+}
+
+/* What is left of the instruction whose access was made, and then the way to where the owner has the core go on. */
+static __attribute__((noinline)) const struct op *rest(struct interpreter *s, const struct block *block, const struct op *op,
+                                                       const void *const *handlers)
+{
+    uint32_t count = 0;
+    while (op[count + 1].pc == op->pc && op + count + 1 < block->ops + block->count) {
+        s->tail[count] = op[count + 1];
+        ++count;
+    }
+    s->tail[count] = *op;
+    s->tail[count].number = OP_LEAVE;
+    s->tail[count].imm = s->leaves_to;
+    for (uint32_t n = 0; n <= count; ++n) {
+        s->tail[n].code = s->tail[n].number;
+        s->tail[n].handler = handlers == NULL ? NULL : handlers[s->tail[n].number];
+    }
+    s->leaves_to = 0;
+    return s->tail;
 }
 
 /* Ends the run at an instruction, by a number of Unicorn's, or as undefined. */
@@ -148,7 +187,7 @@ CHAINED_BY_M(DONE_BY_M)
         }                                                                                                               \
         s->is.pc = (address);                                                                                           \
         s->is.it_state = op->after;                                                                                     \
-        if ((block = enter(s, block, way)) == NULL) {                                                                   \
+        if ((block = enter(s, block, way, block->is_part)) == NULL) {                                                                   \
             return NULL;                                                                                                \
         }                                                                                                               \
         op = block->ops;                                                                                                \
@@ -166,7 +205,7 @@ CHAINED_BY_M(DONE_BY_M)
         }                                                                                                               \
         s->is.pc = there;                                                                                               \
         s->is.it_state = op->after;                                                                                     \
-        if ((block = enter(s, NULL, way)) == NULL) {                                                                    \
+        if ((block = enter(s, NULL, way, false)) == NULL) {                                                                    \
             return NULL;                                                                                                \
         }                                                                                                               \
         op = block->ops;                                                                                                \
@@ -266,6 +305,7 @@ CHAINED_BY_M(DONE_BY_M)
 PLAIN_CODE const void *const *interpreter_execute(struct interpreter *s, struct block *block)
 {
 #if defined(__GNUC__) && !defined(INTERPRETER_PORTABLE)
+#define HANDLERS handlers
 #define LABEL(number) &&at_##number,
 #define LABELS(number) LABEL(number)
 #define ADDRESS_OF(name) LABELS(OP_##name)
@@ -283,6 +323,7 @@ PLAIN_CODE const void *const *interpreter_execute(struct interpreter *s, struct 
         return handlers;
     }
 #else
+#define HANDLERS NULL
     if (s == NULL) {
         return NULL;
     }
@@ -290,6 +331,7 @@ PLAIN_CODE const void *const *interpreter_execute(struct interpreter *s, struct 
     struct shared *const shared = s->clock.shared;
     void **const row = s->clock.row;
     uint32_t last = 0; /* what was put into a register last */
+    bool is_inside = s->is.block_start != 0;
     const struct op *op;
     if (block == NULL) {
         goto again;
@@ -336,6 +378,12 @@ dispatch:
             s->is.r[LR] = op->imm;
             EXCHANGE(called);
         }
+        HANDLER(LEAVE)
+        s->is.pc = op->imm;
+        s->is.it_state = op->after;
+        stand_inside(s, block);
+        is_inside = true;
+        goto again;
         HANDLER(SVC)
         HANDLER(BKPT)
         HANDLER(UDF)
@@ -354,10 +402,15 @@ ended:
     if (s->stops) {
         return NULL;
     }
+    if (s->leaves_to) {
+        op = rest(s, block, op, HANDLERS);
+        DISPATCH();
+    }
 again:
-    if ((block = enter(s, NULL, 0)) == NULL) {
+    if ((block = enter(s, NULL, 0, is_inside)) == NULL) {
         return NULL;
     }
+    is_inside = false;
     op = block->ops;
     DISPATCH();
 }

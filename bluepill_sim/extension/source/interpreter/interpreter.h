@@ -4,7 +4,9 @@
  * Theory of operation. Code is decoded a basic block at a time (`decode.c`, by the one table of encodings) and lowered to
  * micro-operations (`lower.c`), which `execute.c` runs by threaded dispatch. A block ends at a branch, at what may change
  * masks or the pipeline (CPS, MSR, ISB), at what ends a run, and at the end of its kilobyte, as Unicorn's do; at each
- * block's start, and nowhere else, the owner's block hook is called. What the owner sees are functions with the
+ * block's start, and nowhere else, the owner's block hook is called. The owner may have a block end before any of its
+ * instructions, or, by an access to I/O, behind the one that made it: what comes then is inside that block, and its hook is
+ * called there as well. What the owner sees are functions with the
  * signatures of Unicorn's (`struct unicorn_api` of core.h and the hooks), so that either engine stands under the same core.
  *
  * Not here: time, exceptions, priorities, peripherals. Source: ARMv7-M Architecture Reference Manual.
@@ -52,10 +54,11 @@ struct op {
 struct block {
     uint32_t start, end, target;
     uint8_t it, is_thumb, is_writable;
+    uint8_t is_part;         /* behind its end the core is inside the block that it is a part of */
     struct block *links[2];
     /* What the owner knows it by where it takes no attention, and what its ways out cost. */
     void *row;
-    uint64_t costs[2];
+    uint64_t costs[2], span; /* and in more cycles than these a stop comes behind it */
     struct block *next;      /* of all, or of dropped ones */
     struct block *odd;       /* of those that no table has */
     uint8_t *code;           /* of writable memory: what it was decoded from */
@@ -91,7 +94,9 @@ struct page_entry {
     int may;
 };
 
-enum { REGIONS = 64, HOOKS = 512, CODE_SLOTS = 1 << 16, PAGE_BYTES = 1 << 10 };
+enum { REGIONS = 64, HOOKS = 512, CODE_SLOTS = 1 << 16, PAGE_BYTES = 1 << 10, PART_SLOTS = 1 << 10 };
+/* Chosen: more micro-operations than an instruction and what is put around it ever need. */
+enum { MOST_OPS_EACH = 16 };
 
 /* What a snapshot holds. */
 struct registers {
@@ -102,6 +107,7 @@ struct registers {
     uint32_t ipsr, control, primask, basepri, faultmask;
     uint32_t other_sp; /* MSP or PSP, whichever R13 is not */
     uint32_t has_exclusive, exclusive_address, exclusive_value;
+    uint32_t block_start, block_end; /* of the block inside which the core stands; 0: it stands at the start of one */
 };
 
 struct interpreter {
@@ -113,6 +119,9 @@ struct interpreter {
     uint32_t flash_base, flash_words_end;
     /* Of the run: a hook has asked for its end, or written the PC; what the library's error is. */
     uint32_t stops, has_jumped;
+    /* Where the owner has the block end that is entered, and where the core goes on behind the access that is made; 0: it
+     * has no such wish. */
+    uint32_t cut_at, leaves_to;
     int error;
     uint32_t depth;
     struct clock clock;
@@ -131,12 +140,15 @@ struct interpreter {
     bool finds_pages;                         /* loads ask the page hook */
     struct block *blocks[CODE_SLOTS];         /* of the flash, by the place of their starts */
     struct block *odd, *all, *dropped;
+    struct block *parts[PART_SLOTS]; /* by their places */
+    struct op tail[MOST_OPS_EACH + 1]; /* the rest of an instruction, behind its access */
 };
 
 /* Calls of this library alone. */
 #pragma GCC visibility push(hidden)
 /* blocks.c */
 struct block *interpreter_block(struct interpreter *s, uint32_t address);
+struct block *interpreter_part(struct interpreter *s, const struct block *whole, uint32_t end);
 void interpreter_free_dropped(struct interpreter *s);
 /* decode.c */
 struct block *interpreter_decode(struct interpreter *s, uint32_t address, const uint8_t *code, uint32_t bytes);
@@ -161,10 +173,8 @@ bool interpreter_call_bad_access(struct interpreter *s, int kind, uint32_t addre
 void interpreter_mrs(struct interpreter *s, const struct op *op);
 void interpreter_msr(struct interpreter *s, const struct op *op);
 void interpreter_cps(struct interpreter *s, const struct op *op);
-uint32_t interpreter_flags(const struct interpreter *s);
-void interpreter_set_flags(struct interpreter *s, uint32_t bits);
 /* For the owner in this library: blocks.c, run.c. */
-void interpreter_know(struct interpreter *s, void *row, uint64_t straight, uint64_t taken);
+void interpreter_know(struct interpreter *s, void *row, uint64_t straight, uint64_t taken, uint64_t span);
 void interpreter_forget_rows(struct interpreter *s);
 void interpreter_set_clock(struct interpreter *s, const struct clock *clock);
 void interpreter_set_noted(struct interpreter *s, uint32_t *noted);
@@ -172,6 +182,12 @@ void interpreter_set_trap(struct interpreter *s, void (*trapped)(void *, bool, u
 #pragma GCC visibility pop
 /* blocks.c, for Python as well. */
 void interpreter_drop(struct interpreter *s, uint64_t first, uint64_t end);
+
+/* Whether an address is inside the block of which the core has run a part. */
+static inline bool stands_inside(const struct interpreter *s, uint32_t pc)
+{
+    return s->is.block_start && pc > s->is.block_start && pc < s->is.block_end;
+}
 
 /* The core stands before an instruction: for a hook, a fault or the end of a run. */
 static inline void stand_at(struct interpreter *s, const struct op *op)

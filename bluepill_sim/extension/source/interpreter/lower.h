@@ -15,9 +15,6 @@ struct decoded {
 /* How a block goes on behind an instruction. */
 enum outcome { GOES_ON, ENDS_BLOCK };
 
-/* Chosen: more than an instruction and what is put around it ever need. */
-enum { MOST_OPS_EACH = 16 };
-
 struct builder {
     struct op *ops;
     uint32_t count, target;

@@ -32,10 +32,10 @@
 
 /* SKIP: over `imm` micro-operations where its condition does not hold. HOOK: calls the hooks of its instruction.
  * STRAIGHT_ON ends a block that no branch ends; JUMP goes to R(d), BX does so with its lowest bit as T, BLX with a link;
- * TABLE_JUMP goes R(d) halfwords on. ABORT, SVC and so on end the run. */
+ * TABLE_JUMP goes R(d) halfwords on; LEAVE goes to `imm`, inside the block. ABORT, SVC and so on end the run. */
 #define ENDING(X)                                                                                                       \
     CONDITIONS(X, SKIP) CONDITIONS(X, B) X(HOOK) X(STRAIGHT_ON) X(B) X(CBZ) X(CBNZ) X(JUMP) X(BX) X(BLX) X(TABLE_JUMP)  \
-    X(SVC) X(BKPT) X(UDF) X(NO_COPROCESSOR) X(WAIT) X(HINT)
+    X(LEAVE) X(SVC) X(BKPT) X(UDF) X(NO_COPROCESSOR) X(WAIT) X(HINT)
 
 /* Those that have a second and a third code, where R(n), or R(m), is what was put into a register just before: from there
  * it need not be read again, which is what long chains of arithmetic wait for. */

@@ -2,7 +2,8 @@
  *
  * `x` is R(n) and `y` is R(m), which the caller has read, or knows from what was done last; R(d) is written, R(a) is read,
  * `imm` is a constant. What writes R(d) leaves it in `last`, too. Operations whose name ends in S set flags. Those that
- * return a bool make accesses: false where the instruction has not been done, and the run ends.
+ * return a bool make accesses: false where the instruction has not been done, and the run ends, or where it has been and the
+ * core does not go on to the next one.
  * Source: ARMv7-M Architecture Reference Manual A2.2.1 (AddWithCarry, shifts), A7.7.
  */
 #ifndef BLUEPILL_OPERATIONS_H
@@ -303,18 +304,18 @@ static inline bool store_word(struct interpreter *s, const struct op *op, uint32
     ACCESSES(name##_##way)                                                                                              \
     {                                                                                                                   \
         const uint32_t address = ADDRESS_##way, at = address - s->sram_base;                                     \
-        unsigned_type found;                                                                                            \
         if (LIKELY(at < s->sram_words_end)) {                                                                           \
+            unsigned_type found;                                                                                        \
             memcpy(&found, s->sram + at, sizeof found);                                                                 \
-        } else {                                                                                                        \
-            uint32_t word;                                                                                              \
-            if (!interpreter_load(s, op, address, sizeof found, &word)) {                                               \
-                return false;                                                                                           \
-            }                                                                                                           \
-            found = (unsigned_type)word;                                                                                \
+            PUT((uint32_t)(type)found);                                                                                 \
+            return true;                                                                                                \
         }                                                                                                               \
-        PUT((uint32_t)(type)found);                                                                                   \
-        return true;                                                                                                    \
+        uint32_t word;                                                                                                  \
+        if (!interpreter_load(s, op, address, sizeof(type), &word)) {                                                   \
+            return false;                                                                                               \
+        }                                                                                                               \
+        PUT((uint32_t)(type)word);                                                                                      \
+        return !s->leaves_to;                                                                                           \
     }
 #define STORE(name, way, type)                                                                                          \
     ACCESSES(name##_##way)                                                                                              \
@@ -325,7 +326,7 @@ static inline bool store_word(struct interpreter *s, const struct op *op, uint32
             memcpy(s->sram + at, &value, sizeof value);                                                                 \
             return true;                                                                                                \
         }                                                                                                               \
-        return interpreter_store(s, op, address, sizeof value, value);                                                  \
+        return interpreter_store(s, op, address, sizeof value, value) && !s->leaves_to;                                 \
     }
 LOAD(LDR, I, uint32_t, uint32_t)
 LOAD(LDR, R, uint32_t, uint32_t)
@@ -371,7 +372,7 @@ ACCESSES(LDRD)
     if (is_misaligned(s, op, x)) {
         return false;
     }
-    return load_word(s, op, address, &R(d)) && load_word(s, op, address + 4, &R(a));
+    return load_word(s, op, address, &R(d)) && load_word(s, op, address + 4, &R(a)) && !s->leaves_to;
 }
 ACCESSES(STRD)
 {
@@ -379,7 +380,7 @@ ACCESSES(STRD)
     if (is_misaligned(s, op, x)) {
         return false;
     }
-    return store_word(s, op, address, R(d)) && store_word(s, op, address + 4, R(a));
+    return store_word(s, op, address, R(d)) && store_word(s, op, address + 4, R(a)) && !s->leaves_to;
 }
 
 /* Several words: `imm` is the list of registers below, and what is added to x above, in words and signed; x becomes
@@ -399,7 +400,7 @@ ACCESSES(LDM)
         }
     }
     s->is.r[op->n] = base;
-    return true;
+    return !s->leaves_to;
 }
 ACCESSES(STM)
 {
@@ -413,7 +414,7 @@ ACCESSES(STM)
         }
     }
     s->is.r[op->n] = x + words(op->a);
-    return true;
+    return !s->leaves_to;
 }
 
 /* Exclusive accesses of `a` bytes at x + imm: a store is made if the last LDREX was of that address, and memory still
@@ -433,7 +434,7 @@ ACCESSES(LDREX)
     s->is.has_exclusive = 1;
     s->is.exclusive_address = address;
     s->is.exclusive_value = PUT(value);
-    return true;
+    return !s->leaves_to;
 }
 ACCESSES(STREX)
 {
@@ -454,13 +455,13 @@ ACCESSES(STREX)
     }
     s->is.has_exclusive = 0;
     PUT(!is_made);
-    return true;
+    return !s->leaves_to;
 }
 
 /* The halfword or byte of a table branch: at x + (y << a), of a + 1 bytes. */
 ACCESSES(TABLE)
 {
-    return interpreter_load(s, op, ADDRESS_R, op->a + 1u, &R(d)); /* a scratch register */
+    return interpreter_load(s, op, ADDRESS_R, op->a + 1u, &R(d)) && !s->leaves_to; /* R(d): a scratch register */
 }
 
 #endif

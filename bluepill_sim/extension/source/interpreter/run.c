@@ -30,9 +30,13 @@ int interpreter_emu_start(void *user, uint64_t begin, uint64_t until, uint64_t t
         interpreter_free_dropped(s);
     }
     ++s->depth;
-    s->is.pc = (uint32_t)begin & ~1u;
+    const uint32_t pc = (uint32_t)begin & ~1u;
+    if (pc != s->is.pc || !stands_inside(s, pc)) {
+        s->is.block_start = 0; /* it is elsewhere than where the core stood inside a block */
+    }
+    s->is.pc = pc;
     s->is.is_thumb = begin & 1;
-    s->stops = 0;
+    s->stops = s->leaves_to = 0;
     s->error = NO_ERROR;
     interpreter_execute(s, NULL);
     --s->depth;
