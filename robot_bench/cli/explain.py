@@ -21,9 +21,9 @@ from robot_bench.campaign.variants.fault_line import (
     by_version,
     failing_and_passing,
     passes,
-    points_of,
 )
 from robot_bench.campaign.variants.shrinking.kept import trial_of_run
+from robot_bench.campaign.whole import points_of
 from robot_bench.campaign.workers.processes import Processes
 from robot_bench.cli.progress import RunDisplay, counting_bar
 from robot_bench.events.codec import events_of

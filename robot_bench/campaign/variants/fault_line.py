@@ -10,7 +10,6 @@ Invariant: what is not shown by runs is said to be unknown, and never named as a
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 from bluepill_sim.analysis.coverage import Coverage
 from bluepill_sim.board import BluePill
@@ -18,12 +17,10 @@ from bluepill_sim.program.image import Image, load_image
 from bluepill_sim.program.line_table import read_lines
 from bluepill_sim.program.mutants import Mutant, mutants, mutated_file
 from bluepill_sim.program.version_difference import LineDifference, line_differences
-from robot_bench.campaign.conduct import Conduct, PointRow, Workers
-from robot_bench.campaign.trial import Done, Trial, TrialVerdict, bench_of, run_trial, unpacked
+from robot_bench.campaign.conduct import PointRow, Workers
+from robot_bench.campaign.trial import Trial, TrialVerdict, bench_of, run_trial, unpacked
 from robot_bench.campaign.variants.against import Other, first_apart, reported
-from robot_bench.campaign.whole import resume
 from simbase.errors import UsageError
-from simbase.trust import Trust
 from simbase.units import ranges_text
 
 #: chosen: more lines in a row than these are no place.
@@ -192,39 +189,6 @@ def _ran(trial: Trial) -> list[int]:
     if not isinstance(board, BluePill):
         return []
     return sorted(Coverage.of_board(board, outcome.blocks, ()).instructions())
-
-
-class _NothingMissing:
-    """Workers of a campaign that is only read: what its journal does not have ends it."""
-
-    def run(self, trials: Sequence[Trial], _on_done: Callable[[int, Done], None], *, anew: bool = False) -> None:
-        """Refuse to run anything, also `anew`.
-
-        Raises:
-            LookupError: Something is to be run.
-        """
-        if trials:
-            raise LookupError(f"the journal has not all runs{' that prove' if anew else ''}")
-
-    def close(self) -> None:
-        """End nothing."""
-
-
-def points_of(folder: Path, *, trust: bool | Trust = False) -> list[PointRow]:
-    """Return the points of a campaign's folder with what its journal has of them.
-
-    Raises:
-        FileError: It is no campaign's folder.
-    """
-    conduct = Conduct(resume(folder, trust=trust), folder, _NothingMissing(), clock=lambda: 0)
-    try:
-        for _ in conduct.batches():
-            pass
-    except LookupError:
-        pass
-    finally:
-        conduct.close()
-    return conduct.progress.rows
 
 
 def failing_and_passing(rows: Sequence[PointRow]) -> tuple[Trial, list[Trial]]:

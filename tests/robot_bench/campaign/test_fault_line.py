@@ -19,8 +19,8 @@ from robot_bench.campaign.variants.fault_line import (
     by_version,
     failing_and_passing,
     place_of,
-    points_of,
 )
+from robot_bench.campaign.whole import points_of
 from robot_bench.firmware.build import HERE
 from simbase.errors import UsageError
 
