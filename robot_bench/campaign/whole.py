@@ -22,7 +22,7 @@ from p2os.toml_file import read_toml, read_user_text, toml_text
 from robot_bench.campaign.campaign_file import Campaign, load_campaign, parse_campaign
 from robot_bench.campaign.conduct import CampaignProgress, Conduct, PointRow, Workers
 from robot_bench.campaign.last_moment import LastMoment, last_moment
-from robot_bench.campaign.page import render
+from robot_bench.campaign.pages.page import render
 from robot_bench.campaign.reaching.corpus import BEGUN, added, read_corpus, write_corpus
 from robot_bench.campaign.results import Results, Whole
 from robot_bench.campaign.trial import Done, Trial
@@ -180,8 +180,9 @@ def points_of(folder: Path, *, trust: bool | Trust = False) -> list[PointRow]:
     """
     conduct = Conduct(resume(folder, trust=trust), folder, _NothingMissing(), clock=lambda: 0)
     try:
-        for _ in conduct.batches():
-            pass
+        for rows in (conduct.batches(), conduct.near_misses()):
+            for _ in rows:
+                pass
     except LookupError:
         pass
     finally:
