@@ -226,7 +226,8 @@ class CampaignTable(Record):
     reach: Annotated[tuple[Table, ...], Key(record=ToReachTable, doc="what one point at least has to reach")] = ()
     goal: Annotated[tuple[Table, ...], GOALS] = ()
     keeps: Annotated[tuple[str, ...], Key(
-        kind="list", doc="kinds of the scenario's own goals that hold beside those of this file"
+        kind="list", doc="kinds of the scenario's own goals that hold beside those of this file; a run that misses one "
+        "ends"
     )] = ()  # fmt: skip
 
 
@@ -346,7 +347,7 @@ def _trial(top: CampaignTable, path: Path, where: TablePlace, firmware: Path | N
     for kind in top.keeps:
         if kind not in {goal["kind"] for goal in own}:
             raise ScenarioError(f"{where.at('keeps')}: the scenario has no goal {shown(kind)}", hint="leave it out")
-    kept = [goal for goal in own if goal["kind"] in top.keeps]
+    kept = [{"ends_run": "missed", **goal} for goal in own if goal["kind"] in top.keeps]
     return trial.with_lists(goal=[*kept, *top.goal]) if top.goal else trial
 
 

@@ -14,7 +14,7 @@ import contextlib
 import json
 import os
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from p2os.errors import ScenarioError
@@ -22,9 +22,10 @@ from p2os.toml_file import read_toml, read_user_text, toml_text
 from robot_bench.campaign.campaign_file import Campaign, load_campaign, parse_campaign
 from robot_bench.campaign.conduct import CampaignProgress, Conduct, PointRow, Workers
 from robot_bench.campaign.last_moment import LastMoment, last_moment
-from robot_bench.campaign.page import render
+from robot_bench.campaign.pages.page import render
 from robot_bench.campaign.reaching.corpus import BEGUN, added, read_corpus, write_corpus
 from robot_bench.campaign.results import Results, Whole
+from robot_bench.campaign.trial import Done, Trial
 from robot_bench.campaign.variants.against import FOLDER as AGAINST
 from robot_bench.campaign.variants.against import Other
 from simbase.errors import FileError, P2osError, UsageError
@@ -153,6 +154,40 @@ def carry_out(
     text = json.dumps(whole.as_json(), indent=2, sort_keys=True)
     write_text(folder / SUMMARY, f"{text}\n")
     return whole
+
+
+class _NothingMissing:
+    """Workers of a campaign that is only read: what its journal does not have ends it."""
+
+    def run(self, trials: Sequence[Trial], _on_done: Callable[[int, Done], None], *, anew: bool = False) -> None:
+        """Refuse to run anything, also `anew`.
+
+        Raises:
+            LookupError: Something is to be run.
+        """
+        if trials:
+            raise LookupError(f"the journal has not all runs{' that prove' if anew else ''}")
+
+    def close(self) -> None:
+        """End nothing."""
+
+
+def points_of(folder: Path, *, trust: bool | Trust = False) -> list[PointRow]:
+    """Return the points of a campaign's folder with what its journal has of them.
+
+    Raises:
+        FileError: It is no campaign's folder.
+    """
+    conduct = Conduct(resume(folder, trust=trust), folder, _NothingMissing(), clock=lambda: 0)
+    try:
+        for rows in (conduct.batches(), conduct.near_misses()):
+            for _ in rows:
+                pass
+    except LookupError:
+        pass
+    finally:
+        conduct.close()
+    return conduct.progress.rows
 
 
 def _keep_corpus(whole: Whole) -> None:

@@ -1,14 +1,31 @@
 """`p2os explain`: why a run failed, from its trace and a replay of its chip."""
 
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from bluepill_sim.errors import BluePillError
 from p2os.cli.groups import BENCH
+from p2os.cli.trust import Trusted, said
+from p2os.transport.wall_clock import wall_clock
+from robot_bench.campaign.campaign_file import RunLimits
+from robot_bench.campaign.journal import NAME as JOURNAL
+from robot_bench.campaign.variants.against import Other
+from robot_bench.campaign.variants.fault_line import (
+    ChangedBack,
+    FaultLine,
+    by_version,
+    failing_and_passing,
+    passes,
+)
+from robot_bench.campaign.variants.shrinking.kept import trial_of_run
+from robot_bench.campaign.whole import points_of
+from robot_bench.campaign.workers.processes import Processes
+from robot_bench.cli.progress import RunDisplay, counting_bar
 from robot_bench.events.codec import events_of
 from robot_bench.recording.run_record import TRACE_NAME, RunRecord, read_run, record_of
 from robot_bench.recording.together import robots_in
@@ -17,8 +34,9 @@ from robot_bench.report.explain.explain import explain as explain_run
 from robot_bench.scenario.goals.judging import judge
 from robot_bench.scenario.loading import load_scenario
 from robot_bench.scenario.scenario import Scenario
-from simbase.errors import FileError, UsageError
+from simbase.errors import FileError, P2osError, UsageError
 from simbase.files import lines_of, sha256_of
+from simbase.timing import NS_PER_S
 from simbase.trust import Trust
 
 HELP = """Say why a run failed: from the sensor to the wheel, with times.
@@ -30,6 +48,10 @@ says so.
 RUN is a run folder or its trace; of several robots each is explained. A trace without a verdict is judged by SCENARIO's
 goals; GOAL is a part of the failure's text, where there are several.
 
+With a version that passes (--against) the source line is named by which the two differ. RUN may be the folder of a
+campaign, too: without a version that passes, each instruction that ran is then changed, one at a time, and a line is
+named where only its changes make the failing point pass, and no passing one fail.
+
 Exit code: 0 explained, or nothing failed; 1 the cause is not known; 2 wrong usage.
 
 \b
@@ -37,6 +59,8 @@ Examples:
   p2os explain runs/dodge-001                    what led to the first failure
   p2os explain runs/mine-001 mine.toml latency   of the goals of mine.toml that one
   p2os explain runs/mine-001 --against build/good.elf    what another program had done
+  p2os explain campaigns/dodge-001 --against build/good.elf    which line it is
+  p2os explain campaigns/dodge-001 --minutes 30  changed back, without a good one
   p2os explain runs/mine-001 --json              one JSON object
 """
 
@@ -54,9 +78,18 @@ def explain(
     against: Annotated[
         Path | None, typer.Option(help="A run, or a program, that does what it should.", metavar="RUN")
     ] = None,
+    minutes: Annotated[
+        float, typer.Option(help="Of a campaign's folder: so long changes are tried.", min=0.1, metavar="MINUTES")
+    ] = 10.0,
+    trust: Trusted = False,
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Explain a run."""
+    if (run / JOURNAL).is_file():
+        other = None if against is None else Other.read(_reference(against))
+        found_line = _line_of_campaign(run, other, minutes, said(trust))
+        typer.echo(json.dumps(asdict(found_line), sort_keys=True) if json_output else found_line.text)
+        raise typer.Exit(0 if found_line.line else 1)
     names = robots_in(run)
     if names and (firmware is not None or against is not None):
         option = "--firmware" if firmware is not None else "--against"
@@ -69,6 +102,8 @@ def explain(
         name: _explained(run / name if name else run, _plan_of(plan, name), goal, firmware, reference)
         for name in names or [""]
     }
+    if reference is not None:
+        found = {"": _with_line(found[""], run, firmware, reference)}
     if json_output:
         plain = {name: one.to_plain() for name, one in found.items()}
         typer.echo(json.dumps({"robots": plain} if names else plain[""], sort_keys=True))
@@ -76,6 +111,41 @@ def explain(
         typer.echo("\n".join((f"{name}\n" if name else "") + one.text() for name, one in found.items()), nl=False)
     if any(one.standing is Standing.UNKNOWN for one in found.values()):
         raise typer.Exit(1)
+
+
+def _line_of_campaign(folder: Path, other: Other | None, minutes: float, trust: bool | Trust) -> FaultLine:
+    """Return the source line that makes a point of a campaign fail, or that it is not known."""
+    failing, passing = failing_and_passing(points_of(folder, trust=trust))
+    if other is not None:
+        return by_version(failing, other)
+    until = wall_clock() + round(minutes * 60 * NS_PER_S)
+    with RunDisplay(is_shown=False) as display:
+        workers = Processes(1, RunLimits(), display.raise_if_interrupted)
+        try:
+            changed = ChangedBack(failing, passing, lambda trial: passes(trial, workers))
+            with counting_bar("changes", changed.count) as tell_bar:
+                for tried in changed.look():
+                    tell_bar(tried, f"{len(changed.found)} make it pass")
+                    if wall_clock() >= until:
+                        break
+        finally:
+            workers.close()
+    return changed.result
+
+
+def _with_line(found: Explanation, run: Path, firmware: Path | None, reference: Path) -> Explanation:
+    """Return an explanation with the source line by which a version that passes differs, where that is known."""
+    if found.standing is Standing.NOTHING or not run.is_dir():
+        return found
+    try:
+        line = by_version(trial_of_run(run, firmware), Other.read(reference))
+    except (P2osError, BluePillError) as error:
+        return replace(found, limits=(*found.limits, f"the line by which {reference.name} differs: {error}"))
+    if not line.line:
+        return replace(found, limits=(*found.limits, line.says))
+    if found.standing is Standing.CAUSE:
+        return replace(found, also=(*found.also, f"{line.line}: {line.says}"))
+    return replace(found, standing=Standing.CAUSE, summary=f"{line.line}: {line.says}")
 
 
 def _plan_of(plan: Scenario | None, robot: str) -> Scenario | None:

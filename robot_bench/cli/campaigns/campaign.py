@@ -18,12 +18,13 @@ from p2os.transport.wall_clock import wall_clock
 from robot_bench.campaign.campaign_file import Campaign, campaign_schema
 from robot_bench.campaign.conduct import CampaignProgress, PointFinding, Workers
 from robot_bench.campaign.journal import NAME as JOURNAL
+from robot_bench.campaign.pages.comment import write_comment
 from robot_bench.campaign.results import SHOWN_HASH, Whole
 from robot_bench.campaign.search import SEARCHES
 from robot_bench.campaign.suggestion import suggested
 from robot_bench.campaign.variants.against import Against, Other, first_apart, reported
 from robot_bench.campaign.variants.diversity import FailureSet
-from robot_bench.campaign.whole import begin, carry_out, resume
+from robot_bench.campaign.whole import begin, carry_out, points_of, resume
 from robot_bench.campaign.workers.processes import Processes
 from robot_bench.cli.progress import RunDisplay, counting_bar
 from robot_bench.cli.run import refuse
@@ -53,6 +54,8 @@ Examples:
   p2os campaign --resume campaigns/dodge-001     go on after anything was killed
   p2os campaign c.toml --firmware new.elf --against old.elf    where do they differ?
   p2os campaign big.toml --dask local -j 4       workers of Dask
+  p2os campaign c.toml --minutes 5 --out found   in a pull request, then:
+  p2os campaign comment found --against good.elf --out found/comment.md
 """
 #: chosen: so many failures are shown one by one.
 MOST_SHOWN = 12
@@ -68,7 +71,10 @@ def register(app: typer.Typer) -> None:
 def campaign(
     words: Annotated[
         list[str] | None,
-        typer.Argument(help="A campaign file; or `new` and a scenario.", metavar="[FILE|new SCENARIO]"),
+        typer.Argument(
+            help="A campaign file; `new` and a scenario; `comment` and a folder.",
+            metavar="[FILE|new SCENARIO|comment FOLDER]",
+        ),
     ] = None,
     jobs: Jobs = None,
     firmware: Annotated[
@@ -82,6 +88,10 @@ def campaign(
         int | None, option(COUNT, "--runs", purpose="Cheap runs, in place of the file's.", above_zero=True)
     ] = None,
     seed: Annotated[int | None, typer.Option(help="Of the search.", metavar="SEED", min=0)] = None,
+    minutes: Annotated[
+        float | None, typer.Option(help="Of the clock, in place of the file's.", metavar="MINUTES", min=0.1)
+    ] = None,
+    url: Annotated[str, typer.Option(help="Of a comment's pictures: what stands before their path.")] = "",
     out: Annotated[
         Path | None, typer.Option(help="Folder; default campaigns/NAME-NNN, or NAME-campaign.toml.", metavar="PATH")
     ] = None,
@@ -110,11 +120,12 @@ def campaign(
         keys = {"search": search, "seed": seed, "runs": runs}
         write_new(asked[1:], out, firmware, {key: value for key, value in keys.items() if value is not None})
         return
-    if dask not in {None, "local"}:
-        raise UsageError(f"there is no --dask {dask!r}", hint="--dask local, or --scheduler ADDRESS")
-    if dask and scheduler:
-        raise UsageError("--dask local and --scheduler cannot stand together", hint="leave one of the two out")
-    given: dict[str, object] = {"search": search, "seed": seed, "budget": None if runs is None else {"runs": runs}}
+    _refuse_dask(dask, scheduler)
+    if asked[:1] == ["comment"]:
+        typer.echo(comment_on(asked[1:], out, against, url, trust=said(trust)), nl=False)
+        return
+    budget = {key: value for key, value in (("runs", runs), ("minutes", minutes)) if value is not None}
+    given: dict[str, object] = {"search": search, "seed": seed, "budget": budget or None}
     overrides = {key: value for key, value in given.items() if value is not None}
     if go_on is not None:
         if asked or overrides or firmware or against or out:
@@ -171,6 +182,27 @@ def write_new(words: list[str], out: Path | None, firmware: Path | None, keys: M
         raise UsageError(f"cannot write {path}: {error.strerror}", hint="--out another file") from error
     typer.echo(f"{path}: what may vary, what has to hold, how much may be spent")
     typer.echo(f"next: p2os campaign {shlex.quote(str(path))}")
+
+
+def _refuse_dask(dask: str | None, scheduler: str | None) -> None:
+    if dask not in {None, "local"}:
+        raise UsageError(f"there is no --dask {dask!r}", hint="--dask local, or --scheduler ADDRESS")
+    if dask and scheduler:
+        raise UsageError("--dask local and --scheduler cannot stand together", hint="leave one of the two out")
+
+
+def comment_on(words: list[str], out: Path | None, against: Path | None, url: str, *, trust: bool | Trust) -> str:
+    """Write what a pull request is told of a campaign, with its pictures; return it.
+
+    Raises:
+        UsageError: No folder is named.
+    """
+    if len(words) != 1:
+        raise UsageError("a comment on which campaign?", hint="p2os campaign comment campaigns/dodge-001")
+    folder = Path(words[0])
+    campaign, rows = resume(folder, trust=trust), points_of(folder, trust=trust)
+    other = Other.of(folder) if against is None else Other.read(against)
+    return write_comment(folder, campaign, rows, out or folder / "comment.md", other=other, url=url)
 
 
 def _seen_from(path: Path, other: Path) -> str:

@@ -27,7 +27,7 @@ from robot_bench.campaign.campaign_file import (
 )
 from robot_bench.campaign.conduct import Conduct, PointFinding
 from robot_bench.campaign.last_moment import LastMoment
-from robot_bench.campaign.page import _short
+from robot_bench.campaign.pages.page import _short
 from robot_bench.campaign.reaching.corpus import read_corpus
 from robot_bench.campaign.search import SEARCHES, PointResult, Problem
 from robot_bench.campaign.suggestion import suggested

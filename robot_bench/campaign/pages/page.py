@@ -48,7 +48,8 @@ _PAGE = Template("""<!doctype html>
 <div class="multiples">$map</div></section>
 </main><footer>$footer</footer></body></html>
 """)
-_STYLE = """
+#: Of what is drawn.
+STYLE = """
 .halves.even { grid-template-columns: minmax(0, 1fr) minmax(0, 1fr); }
 .multiples { display: grid; grid-template-columns: repeat(auto-fill, minmax(250px, 1fr)); gap: 18px; }
 .charts { display: grid; grid-template-columns: repeat(auto-fill, minmax(300px, 1fr)); gap: 18px; }
@@ -95,7 +96,7 @@ def render(whole: Whole) -> str:
     left = len(failures) - len(shown)
     return _PAGE.substitute(
         title=html.escape(f"{campaign.name} · {verdict}"), heading=html.escape(campaign.name),
-        verdict=html.escape(verdict), verdict_class="failed" if failures else "passed", style=style + _STYLE,
+        verdict=html.escape(verdict), verdict_class="failed" if failures else "passed", style=style + STYLE,
         lead=html.escape(
             f"{campaign.description + ': ' if campaign.description else ''}{firmware} in "
             f"{campaign.trial.table['world']}, {campaign.search}"
@@ -165,12 +166,12 @@ def _failure(row: PointRow, whole: Whole) -> str:
     why = next(iter(run.outcome.failures), "")
     avoidable = f"<br>{html.escape(moment.words)}" if moment is not None else ""
     return (
-        f"<figure>{_plan(run, moment)}<figcaption><b>point {row.number}</b>, {html.escape(row.finding.value)}: "
+        f"<figure>{plan(run, moment)}<figcaption><b>point {row.number}</b>, {html.escape(row.finding.value)}: "
         f"{html.escape(why)}{avoidable}<code>{html.escape(whole.results.replay(row))}</code></figcaption></figure>"
     )
 
 
-def _plan(run: Run, moment: LastMoment | None) -> str:
+def plan(run: Run, moment: LastMoment | None) -> str:
     """Return the world of a run with the way of its robot, what it touched, and the last moment."""
     try:
         with unpacked(run.trial.files) as folder:

@@ -1,0 +1,213 @@
+"""Where two versions of a program differ, by instruction, whatever else has moved in the flash.
+
+Functions are paired by name, and their instructions aligned. What follows from an address alone (the offset of a
+branch or a call, a pointer in a literal pool) is compared by what it leads to: the instruction, the symbol, the text.
+
+Of a difference the source lines are told by what each line of a function came to: a line whose instructions are the
+same but for the registers that the compiler chose has not changed, whatever has changed around it.
+
+Invariant: a program does not differ from itself, nor from itself linked elsewhere.
+"""
+
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from difflib import SequenceMatcher
+
+from bluepill_sim.core.thumb import Instruction, decode
+from bluepill_sim.extension.encodings import Kind, find
+from bluepill_sim.program.functions import FunctionTable
+from bluepill_sim.program.image import Image, Symbol
+from bluepill_sim.program.line_table import LineTable, read_lines
+from bluepill_sim.stm32f103 import FLASH_BASE, FLASH_BYTES_FITTED, SRAM_BASE, SRAM_BYTES
+
+#: Bits of a branch that are no offset, by its size and what marks it.
+_CBZ, _CONDITIONAL = (0xF500, 0xB100), (0xF000, 0xD000)
+#: chosen: so much of a text tells it from others.
+_TEXT_BYTES = 24
+
+
+@dataclass(frozen=True, slots=True)
+class CodeDifference:
+    """A place where two versions of a function differ: the addresses of its instructions in each; empty where none."""
+
+    function: str
+    ours: tuple[int, ...]
+    theirs: tuple[int, ...]
+    #: Where it stands, in the version that has no instruction there: the address of what comes next.
+    before: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class LineDifference:
+    """Lines of a function, in a row, that came to other code in two versions."""
+
+    function: str
+    #: (file, line) of each with code, in our version and in theirs.
+    ours: tuple[tuple[str, int], ...]
+    theirs: tuple[tuple[str, int], ...]
+
+    @property
+    def missing(self) -> int:
+        """How many of their lines have no code in ours."""
+        return len(set(self.theirs) - set(self.ours))
+
+
+def line_differences(ours: Image, theirs: Image) -> list[LineDifference]:
+    """Return the lines that differ, of functions that both have; none where one has no debug information.
+
+    Raises:
+        ImageError: The debug information of one is damaged.
+    """
+    mine, other, tables = _Version(ours), _Version(theirs), (read_lines(ours), read_lines(theirs))
+    found = []
+    for name in dict.fromkeys(one.function for one in code_differences(ours, theirs)):
+        pair = mine.functions.get(name), other.functions.get(name)
+        if pair[0] is None or pair[1] is None:
+            continue
+        one, two = (_by_line(version, table) for version, table in zip(pair, tables, strict=True) if version)
+        matcher = SequenceMatcher(None, [code for _, code in one], [code for _, code in two], autojunk=False)
+        for tag, i0, i1, j0, j1 in matcher.get_opcodes():
+            if tag != "equal":
+                places = (tuple(place for place, _ in rows) for rows in (one[i0:i1], two[j0:j1]))
+                found.append(LineDifference(name, *places))
+    return found
+
+
+def code_differences(ours: Image, theirs: Image) -> list[CodeDifference]:
+    """Return where the functions of two versions differ, those of only one of them too, by our addresses."""
+    mine, other = _Version(ours), _Version(theirs)
+    found: list[CodeDifference] = []
+    for name in dict.fromkeys([*mine.functions, *other.functions]):
+        pair = one, two = mine.functions.get(name), other.functions.get(name)
+        if one is None or two is None:
+            mine_alone, theirs_alone = (() if one is None else tuple(one.addresses) for one in pair)
+            found.append(CodeDifference(name, mine_alone, theirs_alone))
+        else:
+            found += _within(name, one, two)
+    return sorted(found, key=lambda one: (one.ours or (one.before,))[:1])
+
+
+@dataclass(frozen=True, slots=True)
+class _Function:
+    """A function's instructions, each with what it is compared by, and where its branches lead."""
+
+    addresses: Sequence[int]
+    tokens: Sequence[object]
+    #: The same, whichever registers they use.
+    plain: Sequence[str]
+    #: Address of a branch within it → that of its target.
+    targets: dict[int, int]
+    end: int
+
+
+class _Version:
+    """The functions of an image."""
+
+    def __init__(self, image: Image) -> None:
+        self._image, self._table = image, FunctionTable(image)
+        self._symbols = sorted(image.symbols.symbols, key=lambda symbol: symbol.address)
+        self._starts = [symbol.address for symbol in self._symbols]
+        self.functions = {symbol.name: self._read(symbol) for symbol in self._table.functions}
+
+    def _read(self, symbol: Symbol) -> _Function:
+        start, end = symbol.address & ~1, self._table.end_of(symbol.address) or symbol.address
+        code = self._bytes(start, end - start)
+        pool = len(code)
+        addresses, tokens, plain, targets = list[int](), list[object](), list[str](), dict[int, int]()
+        offset = 0
+        while offset + 2 <= pool:
+            one = decode(code, offset, start + offset)
+            word = int.from_bytes(code[offset : offset + 2], "little")
+            if one.size == 4:
+                word = word << 16 | int.from_bytes(code[offset + 2 : offset + 4], "little")
+            literal = self._literal(one, word)
+            if literal is not None:
+                if start <= literal < start + len(code):
+                    pool = min(pool, literal - start)
+                tokens.append(("literal", one.target, self._meaning(literal)))
+                plain.append(f"literal {self._meaning(literal)}")
+            elif one.kind in {Kind.BRANCH, Kind.CALL} and one.destination is not None:
+                if start <= one.destination < end:
+                    targets[one.address] = one.destination
+                    tokens.append(("branch", _without_offset(one, word)))
+                else:
+                    tokens.append((_without_offset(one, word), self._table.name(one.destination)))
+                plain.append(str(tokens[-1]))
+            else:
+                tokens.append(word)
+                plain.append(_without_registers(one, word))
+            addresses.append(one.address)
+            offset += one.size
+        return _Function(addresses, tokens, plain, targets, start + pool)
+
+    def _literal(self, one: Instruction, word: int) -> int | None:
+        """Return the address that an instruction loads from beside the code; None where it does not."""
+        if one.kind is not Kind.LOAD_LITERAL:
+            return None
+        base = (one.address + 4) & ~3
+        if one.size == 2:
+            return base + (word & 0xFF) * 4
+        return base + (word & 0xFFF) * (1 if word >> 23 & 1 else -1)
+
+    def _meaning(self, address: int) -> object:
+        """Return what a word of a literal pool stands for: a symbol, a text, or the number itself."""
+        value = int.from_bytes(self._bytes(address, 4), "little")
+        if not (FLASH_BASE <= value < FLASH_BASE + FLASH_BYTES_FITTED or SRAM_BASE <= value < SRAM_BASE + SRAM_BYTES):
+            return value
+        place = bisect_right(self._starts, value) - 1
+        symbol = self._symbols[place] if place >= 0 else None
+        if symbol is not None and value < symbol.address + max(symbol.size, 1):
+            return symbol.name, value - symbol.address
+        return self._bytes(value, _TEXT_BYTES).partition(b"\0")[0] if value < SRAM_BASE else "SRAM"
+
+    def _bytes(self, address: int, size: int) -> bytes:
+        for start, data in self._image.segments:
+            if start <= address < start + len(data):
+                return bytes(data[address - start : address - start + size])
+        return b""
+
+
+def _without_offset(one: Instruction, word: int) -> int:
+    """Return a branch or call without how far it goes."""
+    if one.size == 4:
+        return word & (0xF800_D000 if word & 0x1000 or one.kind is Kind.CALL else 0xFBC0_D000)
+    if word & _CBZ[0] == _CBZ[1]:
+        return word & 0xFD07
+    return word & 0xFF00 if word & _CONDITIONAL[0] == _CONDITIONAL[1] else word & 0xF800
+
+
+def _without_registers(one: Instruction, word: int) -> str:
+    """Return what an instruction does, whichever registers it uses."""
+    row = find(word, is_wide=one.size == 4)
+    if row is None:
+        return hex(word)
+    rest = {letter: value for letter, value in row.values(word).items() if f"<{letter}>" not in row.syntax}
+    return f"{row.operation} {rest}"
+
+
+def _by_line(version: _Function, table: LineTable) -> list[tuple[tuple[str, int], tuple[str, ...]]]:
+    """Return the lines that a function has code of, in their order, each with what it came to."""
+    found: dict[tuple[str, int], list[str]] = {}
+    for address, plain in zip(version.addresses, version.plain, strict=True):
+        row = table.at(address)
+        if row is not None:
+            found.setdefault((row.file.rsplit("/", 1)[-1], row.line), []).append(plain)
+    return sorted((place, tuple(sorted(code))) for place, code in found.items())
+
+
+def _within(name: str, one: _Function, two: _Function) -> Iterator[CodeDifference]:
+    matcher = SequenceMatcher(None, one.tokens, two.tokens, autojunk=False)
+    pairs: dict[int, int] = {one.end: two.end}
+    for tag, i0, i1, j0, j1 in matcher.get_opcodes():
+        if tag == "equal":
+            pairs |= dict(zip(one.addresses[i0:i1], two.addresses[j0:j1], strict=True))
+        else:
+            before = one.addresses[i0] if i0 < len(one.addresses) else one.end
+            yield CodeDifference(name, tuple(one.addresses[i0:i1]), tuple(two.addresses[j0:j1]), before)
+            # What jumps over it lands behind it in both.
+            pairs.setdefault(before, two.addresses[j0] if j0 < len(two.addresses) else two.end)
+    for address, target in one.targets.items():
+        other = pairs.get(address)
+        if other in two.targets and target in pairs and pairs[target] != two.targets[other]:
+            yield CodeDifference(name, (address,), (other,), address)
