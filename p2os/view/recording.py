@@ -1,0 +1,161 @@
+"""A recording: the header of a page, and the rows of its channels, growing while it is live.
+
+Invariant: within a channel time never runs back.
+"""
+
+from array import array
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import cast
+
+from p2os.view.channels import BY_NAME, ChannelKind
+from p2os.view.detail import LIST_ROWS_A_PIXEL, Extremes, changes, curve, listed, nearest, rows_in
+from p2os.view.frames import NO_FLAGS, ColumnValues, FrameFlags, ViewFrame, chosen_rows, empty_columns
+from p2os.view.header import ChannelHeader, PageHeader
+from simbase.timing import Nanos
+
+#: One cell of a row, or those of a wide column.
+Cell = int | float | str | bytes | Sequence[float]
+#: chosen: more rows than pixels by so many are thinned.
+ROWS_A_PIXEL = 4
+#: By which columns the least and greatest of a pixel are chosen.
+_CURVES: Mapping[str, tuple[str, ...]] = {"samples": ("value",), "pose": ("x_m", "y_m"), "ranges": ("range_m",)}
+#: What makes a row of a list more severe.
+_SEVERITY: Mapping[str, str] = {"events": "severity", "packets": "is_bad", "text": ""}
+
+
+class Track:
+    """The rows of one channel.
+
+    Args:
+        header: What they are of.
+    """
+
+    def __init__(self, header: ChannelHeader) -> None:
+        self.header = header
+        self.kind: ChannelKind = BY_NAME[header.kind]
+        self.columns = empty_columns(self.kind)
+        self.times = cast("array[int]", self.columns[0])
+        self._widths = [header.width if column.is_wide else 1 for column in self.kind.columns]
+        self._indices: dict[str, Extremes] = {}
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def append(self, t_ns: Nanos, *cells: Cell) -> None:
+        """Add a row; a time that steps back is moved up."""
+        self.times.append(max(t_ns, self.times[-1]) if self.times else t_ns)
+        for values, column, cell in zip(self.columns[1:], self.kind.columns[1:], cells, strict=True):
+            if column.is_wide:
+                cast("array[float]", values).extend(cast("Sequence[float]", cell))
+            else:
+                values.append(cell)  # type: ignore[arg-type]  # of the column's type, as the caller has it
+
+    def extend_levels(self, times: Iterable[int], levels: Iterable[int]) -> None:
+        """Add rows of a wire at once, in the order of time."""
+        _, found, edges = cast("tuple[array[int], array[int], array[int]]", self.columns)
+        before = len(self.times)
+        self.times.extend(times)
+        found.extend(levels)
+        edges.extend([1] * (len(self.times) - before))
+
+    def column(self, name: str) -> ColumnValues:
+        """Return a column by its name."""
+        return self.columns[[column.name for column in self.kind.columns].index(name)]
+
+    def frame(self, from_ns: Nanos, to_ns: Nanos, pixels: int, *, flags: FrameFlags = NO_FLAGS) -> ViewFrame:
+        """Return the rows of a stretch of time, with those just outside it; as many as so many pixels show."""
+        first, last = rows_in(self.times, from_ns, to_ns)
+        if last - first <= ROWS_A_PIXEL * pixels and self.kind.name not in _SEVERITY:
+            return self._frame(self._slice(first, last), from_ns, to_ns, last - first, flags)
+        return self._frame(self._thinned(first, last, pixels), from_ns, to_ns, last - first, flags)
+
+    def tail(self, first: int, last: int) -> ViewFrame:
+        """Return the rows from one to before another, all of them."""
+        times = self.times
+        return self._frame(self._slice(first, last), times[first], times[last - 1], last - first, NO_FLAGS)
+
+    def _frame(
+        self, columns: tuple[ColumnValues, ...], from_ns: Nanos, to_ns: Nanos, of: int, flags: FrameFlags
+    ) -> ViewFrame:  # fmt: skip
+        if len(columns[0]) < of:
+            flags |= FrameFlags.REDUCED
+        return ViewFrame(kind=self.kind, channel=self.header.id, columns=columns, from_ns=from_ns, to_ns=to_ns, of=of,
+                         width=self.header.width if any(one.is_wide for one in self.kind.columns) else 1,
+                         flags=flags)  # fmt: skip
+
+    def _slice(self, first: int, last: int) -> tuple[ColumnValues, ...]:
+        return tuple(
+            values[first * width : last * width] for values, width in zip(self.columns, self._widths, strict=True)
+        )
+
+    def _thinned(self, first: int, last: int, pixels: int) -> tuple[ColumnValues, ...]:
+        name = self.kind.name
+        if name in _CURVES:
+            return self._chosen(curve(self.times, self._grown(_CURVES[name]), first, last, pixels))
+        if name in _SEVERITY:
+            column = _SEVERITY[name]
+            severity = cast("array[int]", self.column(column)).__getitem__ if column else lambda _row: 0
+            return self._chosen(listed(severity, first, last, LIST_ROWS_A_PIXEL * pixels))
+        shown = list(changes(self.times, first, last, pixels))
+        columns = self._chosen([row for row, _ in shown])
+        if name == "levels":
+            return (*columns[:2], array("I", [count for _, count in shown]))
+        return columns
+
+    def _chosen(self, rows: Sequence[int]) -> tuple[ColumnValues, ...]:
+        return chosen_rows(self.columns, rows, self._widths)
+
+    def _grown(self, names: Iterable[str]) -> list[Extremes]:
+        """Return the indices of some columns, brought up to their last row."""
+        found = []
+        for name in names:
+            values = cast("array[float]", self.column(name))
+            column = next(one for one in self.kind.columns if one.name == name)
+            index = self._indices.setdefault(name, Extremes())
+            index.grow(nearest(values, self.header.width) if column.is_wide else _without_nan(values))
+            found.append(index)
+        return found
+
+
+def _without_nan(values: "array[float]") -> "array[float]":
+    """Return numbers in which NaN is the number before it."""
+    if not any(value != value for value in values):  # noqa: PLR0124 - it is NaN
+        return values
+    filled, last = array("d"), 0.0
+    for value in values:
+        last = value if value == value else last  # noqa: PLR0124 - it is no NaN
+        filled.append(last)
+    return filled
+
+
+@dataclass(slots=True)
+class ViewRecording:
+    """All that a page shows.
+
+    Args:
+        header: Without its channels, which are those of the tracks.
+    """
+
+    header: PageHeader
+    tracks: list[Track] = field(default_factory=list)
+
+    def add(self, header: ChannelHeader) -> Track:
+        """Add a channel, without rows yet; its `id` is given here."""
+        made = Track(replace(header, id=len(self.tracks)))
+        self.tracks.append(made)
+        return made
+
+    @property
+    def full_header(self) -> PageHeader:
+        """The header with its channels."""
+        return replace(self.header, channels=[track.header for track in self.tracks])
+
+    def frames(self, pixels: int) -> Iterator[ViewFrame]:
+        """Yield one frame a channel, of the whole time."""
+        for track in self.tracks:
+            yield track.frame(self.header.start_ns, self.header.end_ns, pixels, flags=FrameFlags.REPLACES)
+
+
+#: What makes a recording of a file or folder; None where it is of another kind.
+RecordingOf = Callable[[str], ViewRecording | None]
