@@ -1,4 +1,4 @@
-// Made by tools/generate_view.py of p2os/view/channels.py and header.py: do not edit.
+// Made by tools/page/generate_view.py of p2os/view/channels.py and header.py: do not edit.
 
 export const FORMAT = 1;
 export const FIRST_FREE = 64;
@@ -276,6 +276,18 @@ export interface PagePicture {
   readonly png: string;
 }
 
+/** A small plan of a world with ways in it: metres. */
+export interface PagePlan {
+  readonly kind: "plan";
+  readonly title: string;
+  readonly text: string;
+  readonly listing: string;
+  readonly world: WorldHeader | null;
+  readonly ways: readonly PageCurve[];
+  readonly hits: readonly (readonly [number, number])[];
+  readonly places: readonly (readonly [number, number, string])[];
+}
+
 /** A plot that is not over the run's time, with ticks and units on both axes. */
 export interface PagePlot {
   readonly kind: "plot";
@@ -293,7 +305,7 @@ export interface PagePlot {
 export interface PageSection {
   readonly title: string;
   readonly note: string;
-  readonly blocks: readonly (PageTable | PageText | PagePicture | PagePlot | PageList)[];
+  readonly blocks: readonly (PageTable | PageText | PagePicture | PagePlot | PageList | PagePlan)[];
   readonly is_folded: boolean;
 }
 
@@ -372,4 +384,4 @@ export interface WorldThing {
 }
 
 export type Standing = "" | "passed" | "failed" | "open";
-export type PageBlock = PageTable | PageText | PagePicture | PagePlot | PageList;
+export type PageBlock = PageTable | PageText | PagePicture | PagePlot | PageList | PagePlan;
