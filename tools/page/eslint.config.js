@@ -19,6 +19,7 @@ export default tseslint.config(
         { selector: "CallExpression[callee.name='eval'], NewExpression[callee.name='Function']", message: "no code from text" },
       ],
       eqeqeq: "error",
+      "@typescript-eslint/no-unused-vars": ["error", { argsIgnorePattern: "^_" }],
     },
   },
 );

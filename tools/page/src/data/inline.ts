@@ -12,7 +12,7 @@ export function inlineHeader(): PageHeader | undefined {
 /** The store at once, its rows when they are unpacked: the page is drawn before. */
 export function inlineStore(header: PageHeader): Store {
   const store = new Store(header, undefined);
-  const text = document.getElementById("frames")?.textContent?.trim();
+  const text = document.getElementById("frames")?.textContent.trim();
   if (text) void unpacked(text).then((bytes) => store.receive(framesIn(bytes)), (error: unknown) => {
     store.trouble.value = `the data in this page cannot be read: ${String(error)}`;
   });

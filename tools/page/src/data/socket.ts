@@ -49,8 +49,8 @@ export class Connection implements Source {
 
   private said(message: Answered): void {
     if (message.header) this.begin(message.header);
-    if (message.done !== null && message.done !== undefined) this.finish(message.done);
-    if (message.now_ns !== null && message.now_ns !== undefined && this.store) {
+    if (typeof message.done === "number") this.finish(message.done);
+    if (typeof message.now_ns === "number" && this.store) {
       const header = this.store.header.peek();
       if (message.now_ns > header.end_ns) this.store.header.value = { ...header, end_ns: message.now_ns };
     }

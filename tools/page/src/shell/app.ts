@@ -18,9 +18,11 @@ export class App {
   readonly wire: Signal<number | null> = signal(null);
 
   constructor(readonly store: Store) {
-    const { start_ns, end_ns } = store.header.peek();
+    const { start_ns, end_ns, is_live } = store.header.peek();
     this.clock.setRun(start_ns, end_ns);
     this.clock.showAll();
+    this.clock.seek(end_ns); // what came of it is seen first
+    this.clock.atEnd.value = is_live;
   }
 }
 

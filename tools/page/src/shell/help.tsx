@@ -12,7 +12,7 @@ const POINTER = [
 
 export function Help({ app, onClose }: { app: App; onClose: () => void }) {
   const dialog = useRef<HTMLDialogElement>(null);
-  useEffect(() => dialog.current?.showModal?.(), []);
+  useEffect(() => dialog.current?.showModal(), []);
   const views = VIEWS.filter((view) => view.has(app.store));
   return (
     <dialog ref={dialog} class="help" aria-labelledby="help-title" onClose={onClose}>

@@ -37,7 +37,7 @@ export function filtered(items: readonly Item[], filter: string, more: (item: It
   const known = new Map<Frame, Map<string, string>>();
   return items.filter((item) => {
     let texts = known.get(item.frame);
-    if (!texts) known.set(item.frame, (texts = new Map()));
+    if (!texts) known.set(item.frame, (texts = new Map<string, string>()));
     const columns = [...item.frame.columns].filter((column): column is [string, Runs<string>] => column[1] instanceof Runs && column[0] !== "data" && column[0] !== "fields");
     const key = columns.map(([, runs]) => runs.place(item.row)).join(" ");
     let text = texts.get(key);

@@ -57,7 +57,7 @@ function judgedAt(frame: Frame): number | undefined {
   return row >= 0 ? frame.t[row] : undefined;
 }
 
-const hasMargin = (frame: Frame) => frame.count > 1 && numbers(frame, "margin").some((margin) => Number.isFinite(margin));
+const hasMargin = (frame: Frame) => numbers(frame, "margin").filter((margin) => Number.isFinite(margin)).length > 2;
 
 function Margin({ app, channel }: { app: App; channel: ChannelHeader }) {
   const place = useRef<HTMLDivElement>(null);

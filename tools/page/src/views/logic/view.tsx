@@ -348,7 +348,7 @@ function Bar({ view }: { view: LogicView }) {
       <select aria-label="What to look for" value={view.what.value} onChange={(event) => { view.what.value = event.currentTarget.value as What; }}>
         {WHATS.map(([what, words]) => <option value={what}>{words}</option>)}
       </select>
-      {needsInput && <input class="short-input" aria-label="Value, length or text to look for" placeholder={hint ?? ""} value={view.input.value}
+      {needsInput && <input class="short-input" aria-label="Value, length or text to look for" placeholder={hint} value={view.input.value}
         onInput={(event) => { view.input.value = event.currentTarget.value; }} onKeyDown={(event) => { if (event.key === "Enter") void view.go(event.shiftKey ? -1 : 1); }} />}
       <button type="button" class="icon-button" aria-label="Look back" title="Look back" onClick={() => void view.go(-1)}><Icon name="back" /></button>
       <button type="button" class="icon-button" aria-label="Look forward" title="Look forward" onClick={() => void view.go(1)}><Icon name="forward" /></button>

@@ -89,9 +89,11 @@ export function path({ g }: Sheet, camera: Camera, track: Track, now: number): v
     const isPast = frame.t[last]! <= now;
     g.strokeStyle = track.colour ?? scaleColour(share);
     if (!isPast) {
-      g.globalAlpha = 0.22;
+      g.globalAlpha = 0.25;
+      g.lineCap = "butt"; // strokes that meet must not cover one another
       stroke(g, camera, xs, ys, first, last);
       g.globalAlpha = 1;
+      g.lineCap = "round";
       if (frame.t[first]! > now) continue;
       const row = Math.max(first, lastAt(frame.t, now));
       g.beginPath();

@@ -126,6 +126,7 @@ function drawLines(app: App, chart: Chart, plot: uPlot): void {
   ctx.beginPath();
   ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
   ctx.clip();
+  ctx.setLineDash([]);
   const upright = (t: number, colour: string, width: number) => {
     const x = plot.valToPos(t / 1e9, "x", true);
     ctx.strokeStyle = colour;

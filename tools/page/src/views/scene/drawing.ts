@@ -1,6 +1,9 @@
 // Draws the world in three dimensions: z up, metres, as the plan has them. It draws when something changed, and else rests.
 import * as THREE from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import { Line2 } from "three/addons/lines/Line2.js";
+import { LineGeometry } from "three/addons/lines/LineGeometry.js";
+import { LineMaterial } from "three/addons/lines/LineMaterial.js";
 import { numbers } from "../../data/frames";
 import { lastAt } from "../../data/search";
 import type { WorldThing } from "../../generated/view";
@@ -59,9 +62,12 @@ class SceneView implements SceneHandle {
   }
 
   whole(): void {
-    const { x0, y0, x1, y1 } = this.model.bounds(), size = Math.max(x1 - x0, y1 - y0, 1), middle = new THREE.Vector3((x0 + x1) / 2, (y0 + y1) / 2, 0);
+    const { x0, y0, x1, y1 } = this.model.bounds(), middle = new THREE.Vector3((x0 + x1) / 2, (y0 + y1) / 2, 0), { clientWidth, clientHeight } = this.renderer.domElement;
+    // So far away that a ball around the world is seen, across and along.
+    const radius = Math.max(0.5, Math.hypot(x1 - x0, y1 - y0) / 2), half = ((this.camera.fov / 2) * Math.PI) / 180, aspect = clientHeight ? clientWidth / clientHeight : 1;
+    const far = (radius * 0.95) / Math.sin(Math.atan(Math.tan(half) * Math.min(1, aspect)));
     this.controls.target.copy(middle);
-    this.camera.position.set(middle.x - size * 0.15, middle.y - size * 0.95, size * 0.85);
+    this.camera.position.set(middle.x - far * 0.1, middle.y - far * 0.68, far * 0.72);
     this.controls.update();
     this.ask();
   }
@@ -200,8 +206,8 @@ function thingMesh(thing: WorldThing, model: SceneModel): THREE.Mesh {
 /** A robot: its hull with wheels, its path and what its range sensors see. */
 class RobotMesh {
   readonly body = new THREE.Group();
-  private readonly past: THREE.Line<THREE.BufferGeometry, THREE.LineBasicMaterial>;
-  private readonly future: THREE.Line<THREE.BufferGeometry, THREE.LineBasicMaterial>;
+  private readonly past = wideLine(3, 1);
+  private readonly future = wideLine(2, 0.3);
   private readonly rays = new THREE.LineSegments(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ vertexColors: true, transparent: true, opacity: 0.8 }));
   private frame: unknown;
 
@@ -220,9 +226,6 @@ class RobotMesh {
       this.body.add(wheel);
     }
     this.body.traverse((part) => { part.name = name || track.robot.model || "robot"; });
-    const line = (opacity: number) => new THREE.Line(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ vertexColors: true, transparent: true, opacity }));
-    this.past = line(1);
-    this.future = line(0.22);
     for (const part of [this.past, this.future, this.rays]) part.frustumCulled = false;
     scene.add(this.body, this.past, this.future, this.rays);
   }
@@ -236,8 +239,7 @@ class RobotMesh {
     this.body.position.set(at.x, at.y, at.z);
     this.body.rotation.set(0, -at.pitch, at.heading, "ZYX");
     const row = Math.max(0, lastAt(frame.t, now));
-    this.past.geometry.setDrawRange(0, row + 1);
-    this.future.geometry.setDrawRange(row, frame.count - row);
+    this.past.geometry.instanceCount = row;
     this.buildRays(track, model, now);
   }
 
@@ -246,16 +248,14 @@ class RobotMesh {
   }
 
   private buildPath({ frame, colour }: SceneTrack, model: SceneModel): void {
-    const xs = numbers(frame, "x_m"), ys = numbers(frame, "y_m"), zs = numbers(frame, "z_m"), points = new Float32Array(3 * frame.count), colours = new Float32Array(3 * frame.count), paint = new THREE.Color();
+    const xs = numbers(frame, "x_m"), ys = numbers(frame, "y_m"), zs = numbers(frame, "z_m"), points: number[] = [], colours: number[] = [], paint = new THREE.Color();
     for (let n = 0; n < frame.count; n++) {
-      points.set([xs[n]!, ys[n]!, zs[n]! + PATH_Z], 3 * n);
+      points.push(xs[n]!, ys[n]!, zs[n]! + PATH_Z);
       paint.set(colour ?? model.scale(n / Math.max(1, frame.count - 1)));
-      colours.set([paint.r, paint.g, paint.b], 3 * n);
+      colours.push(paint.r, paint.g, paint.b);
     }
-    for (const line of [this.past, this.future]) {
-      line.geometry.setAttribute("position", new THREE.BufferAttribute(points, 3));
-      line.geometry.setAttribute("color", new THREE.BufferAttribute(colours, 3));
-    }
+    if (frame.count < 2) return;
+    for (const line of [this.past, this.future]) line.geometry = new LineGeometry().setPositions(points).setColors(colours);
   }
 
   private buildRays({ ranges, at }: SceneTrack, model: SceneModel, now: number): void {
@@ -280,6 +280,11 @@ class RobotMesh {
     this.rays.geometry.dispose();
     this.rays.geometry = new THREE.BufferGeometry().setAttribute("position", new THREE.Float32BufferAttribute(points, 3)).setAttribute("color", new THREE.Float32BufferAttribute(colours, 3));
   }
+}
+
+/** A line as wide as some pixels. */
+function wideLine(linewidth: number, opacity: number): Line2 {
+  return new Line2(new LineGeometry(), new LineMaterial({ vertexColors: true, linewidth, transparent: opacity < 1, opacity }));
 }
 
 function empty(group: THREE.Group): void {
