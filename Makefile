@@ -119,7 +119,7 @@ board: board-tools
 	$(BIN)/python -m hardware.pcb build
 	$(BIN)/python -m hardware.pcb simulate
 	$(BIN)/python -m hardware.pcb check
-	$(BIN)/python -m tools.make_pictures
+	$(BIN)/python -m tools.pictures
 
 board-check: board-tools
 	$(BIN)/python -m hardware.pcb check $(BOARD_CHECK)
@@ -130,11 +130,11 @@ board-tools: setup
 
 # Every picture of docs/ whose inputs have changed, made anew; `make test` names those that are out of date.
 pictures: board-tools
-	$(BIN)/python -m tools.make_pictures
+	$(BIN)/python -m tools.pictures
 
 # Every committed file that is made of a declaration (C headers, tables of pages), made anew; `make test` names those that are stale.
 generated: setup
-	@for tool in tools/generate_*.py; do $(BIN)/python $$tool || exit; done
+	@for tool in $(sort $(wildcard tools/generate_*.py tools/*/generate_*.py)); do $(BIN)/python $$tool || exit; done
 
 # The pages of the API, from the docstrings, in build/api.
 docs: setup
