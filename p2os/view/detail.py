@@ -17,8 +17,6 @@ from simbase.timing import Nanos
 
 #: chosen: runs of rows of which the index has least and greatest.
 RUN = 64
-#: chosen: rows of a list for each pixel; a list is read, not drawn.
-LIST_ROWS_A_PIXEL = 2
 
 
 class Extremes:
@@ -109,12 +107,12 @@ def curve(times: Sequence[int], indices: Sequence[Extremes], first: int, last: i
     return rows
 
 
-def listed(severity: Callable[[int], int], first: int, last: int, most: int) -> list[int]:
+def thinned_list(severity: Callable[[int], int], first: int, last: int, most: int) -> list[int]:
     """Return at most so many rows: the most severe, of the others those spread evenly, and both ends."""
     if last - first <= most:
         return list(range(first, last))
     by_severity: dict[int, list[int]] = {}
-    for row in range(first, last):
+    for row in range(first + 1, last - 1):
         by_severity.setdefault(severity(row), []).append(row)
     chosen = {first, last - 1}
     for _, rows in sorted(by_severity.items(), reverse=True):

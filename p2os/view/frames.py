@@ -29,7 +29,7 @@ from itertools import pairwise
 from typing import TypeAlias, cast
 
 from p2os.errors import RemoteProtocolError
-from p2os.view.channels import BY_NUMBER, FORMAT, Cells, ChannelKind
+from p2os.view.channels import BY_NUMBER, FORMAT, CellType, ChannelKind
 from simbase.timing import Nanos
 
 MAGIC = b"P2VF"
@@ -39,7 +39,13 @@ LARGEST_FRAME_BYTES = 64 << 20
 _ALIGN = 8
 _U32 = struct.Struct("<II")
 #: Type code of `array` and bytes a cell.
-_NUMBERS = {Cells.I64: ("q", 8), Cells.F64: ("d", 8), Cells.F32: ("f", 4), Cells.U32: ("I", 4), Cells.U8: ("B", 1)}
+_NUMBERS = {
+    CellType.I64: ("q", 8),
+    CellType.F64: ("d", 8),
+    CellType.F32: ("f", 4),
+    CellType.U32: ("I", 4),
+    CellType.U8: ("B", 1),
+}
 
 #: One column: numbers as an array of its type, texts or bytes as a list.
 ColumnValues: TypeAlias = "array[int] | array[float] | list[str] | list[bytes]"
@@ -77,7 +83,7 @@ class ViewFrame:
         from_ns: From when on these are the rows.
         to_ns: Until when, both included.
         of: How many rows there are in that time.
-        width: Cells a row of wide columns; 1 where there are none.
+        width: CellType a row of wide columns; 1 where there are none.
         flags: What is to be known.
 
     Raises:
@@ -167,7 +173,7 @@ def frames_in(data: bytes) -> Iterator[ViewFrame]:
 _SIZE_AT = 24
 
 
-def _packed(cells: Cells, values: ColumnValues) -> Iterator[bytes]:
+def _packed(cells: CellType, values: ColumnValues) -> Iterator[bytes]:
     if isinstance(values, array):
         if values.typecode != _NUMBERS[cells][0]:
             raise FrameError(f"an array of {values.typecode!r} where {cells.value} is")
@@ -203,7 +209,7 @@ class _Reader:
     def __init__(self, data: bytes, place: int) -> None:
         self._data, self.place = data, place
 
-    def column(self, cells: Cells, count: int) -> ColumnValues:
+    def column(self, cells: CellType, count: int) -> ColumnValues:
         if cells in _NUMBERS:
             code, size = _NUMBERS[cells]
             return _array(code, self._bytes(count * size))
@@ -222,7 +228,7 @@ class _Reader:
         runs = [blob[start:end] for start, end in pairwise((0, *ends))]
         if len(set(runs)) != distinct:
             raise FrameError("a text that stands twice")
-        if cells is Cells.BYTES:
+        if cells is CellType.BYTES:
             return [runs[place] for place in places]
         try:
             texts = [run.decode() for run in runs]

@@ -1,6 +1,6 @@
 """What a recording is, beside its rows: title, verdict, channels, world, robots, and the parts of a report.
 
-It goes to the page as JSON, whose types in TypeScript are made of these classes (`tools/generate_view.py`).
+It goes to the page as JSON, whose types in TypeScript are made of these classes (`tools/page/generate_view.py`).
 
 Invariant: every text is shown as text, whoever wrote it.
 """
@@ -201,7 +201,24 @@ class PageList:
     items: Sequence[PageCell] = ()
 
 
-PageBlock: TypeAlias = PageTable | PageText | PagePicture | PagePlot | PageList
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PagePlan:
+    """A small plan of a world with ways in it: metres."""
+
+    kind: Literal["plan"] = "plan"
+    title: str = ""
+    #: Under it.
+    text: str = ""
+    #: A command that makes it again.
+    listing: str = ""
+    world: WorldHeader | None = None
+    ways: Sequence[PageCurve] = ()
+    #: Collisions, and other places with a word each.
+    hits: Sequence[tuple[float, float]] = ()
+    places: Sequence[tuple[float, float, str]] = ()
+
+
+PageBlock: TypeAlias = PageTable | PageText | PagePicture | PagePlot | PageList | PagePlan
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -273,7 +290,7 @@ class Answered:
 
 
 __all__ = [
-    "Answered", "ChannelHeader", "PageBlock", "PageCell", "PageCurve", "PageHeader", "PageList",
-    "PagePicture", "PagePlot", "PageSection", "PageTable", "PageText", "RobotHeader", "SensorPlace", "Standing",
+    "Answered", "ChannelHeader", "PageBlock", "PageCell", "PageCurve", "PageHeader", "PageList", "PagePicture",
+    "PagePlan", "PagePlot", "PageSection", "PageTable", "PageText", "RobotHeader", "SensorPlace", "Standing",
     "StateTransition", "Wanted", "WorldHeader", "WorldThing",
 ]  # fmt: skip

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from typing import cast
 
 from p2os.view.channels import BY_NAME, ChannelKind
-from p2os.view.detail import LIST_ROWS_A_PIXEL, Extremes, changes, curve, listed, nearest, rows_in
+from p2os.view.detail import Extremes, changes, curve, nearest, rows_in, thinned_list
 from p2os.view.frames import NO_FLAGS, ColumnValues, FrameFlags, ViewFrame, chosen_rows, empty_columns
 from p2os.view.header import ChannelHeader, PageHeader
 from simbase.timing import Nanos
@@ -18,13 +18,15 @@ from simbase.timing import Nanos
 Cell = int | float | str | bytes | Sequence[float]
 #: chosen: more rows than pixels by so many are thinned.
 ROWS_A_PIXEL = 4
+#: chosen: rows of a list that are sent at once; a screen shows some fifty.
+LISTED_ROWS = 500
 #: By which columns the least and greatest of a pixel are chosen.
 _CURVES: Mapping[str, tuple[str, ...]] = {"samples": ("value",), "pose": ("x_m", "y_m"), "ranges": ("range_m",)}
 #: What makes a row of a list more severe.
 _SEVERITY: Mapping[str, str] = {"events": "severity", "packets": "is_bad", "text": ""}
 
 
-class Track:
+class ChannelTrack:
     """The rows of one channel.
 
     Args:
@@ -37,7 +39,8 @@ class Track:
         self.columns = empty_columns(self.kind)
         self.times = cast("array[int]", self.columns[0])
         self._widths = [header.width if column.is_wide else 1 for column in self.kind.columns]
-        self._indices: dict[str, Extremes] = {}
+        #: Of columns that curves are thinned by: their extremes, and their numbers without NaN.
+        self._indices: dict[str, tuple[Extremes, array[float]]] = {}
 
     def __len__(self) -> int:
         return len(self.times)
@@ -63,12 +66,22 @@ class Track:
         """Return a column by its name."""
         return self.columns[[column.name for column in self.kind.columns].index(name)]
 
-    def frame(self, from_ns: Nanos, to_ns: Nanos, pixels: int, *, flags: FrameFlags = NO_FLAGS) -> ViewFrame:
-        """Return the rows of a stretch of time, with those just outside it; as many as so many pixels show."""
+    def frame(
+        self, from_ns: Nanos, to_ns: Nanos, pixels: int, *, listed: int = LISTED_ROWS, flags: FrameFlags = NO_FLAGS
+    ) -> ViewFrame:
+        """Return the rows of a stretch of time, with those just outside it.
+
+        Args:
+            from_ns: Its beginning.
+            to_ns: Its end.
+            pixels: As many rows as these show, where it is drawn.
+            listed: At most so many, where it is a list.
+            flags: Of the frame.
+        """
         first, last = rows_in(self.times, from_ns, to_ns)
         if last - first <= ROWS_A_PIXEL * pixels and self.kind.name not in _SEVERITY:
             return self._frame(self._slice(first, last), from_ns, to_ns, last - first, flags)
-        return self._frame(self._thinned(first, last, pixels), from_ns, to_ns, last - first, flags)
+        return self._frame(self._thinned(first, last, pixels, listed), from_ns, to_ns, last - first, flags)
 
     def tail(self, first: int, last: int) -> ViewFrame:
         """Return the rows from one to before another, all of them."""
@@ -89,14 +102,14 @@ class Track:
             values[first * width : last * width] for values, width in zip(self.columns, self._widths, strict=True)
         )
 
-    def _thinned(self, first: int, last: int, pixels: int) -> tuple[ColumnValues, ...]:
+    def _thinned(self, first: int, last: int, pixels: int, most: int) -> tuple[ColumnValues, ...]:
         name = self.kind.name
         if name in _CURVES:
             return self._chosen(curve(self.times, self._grown(_CURVES[name]), first, last, pixels))
         if name in _SEVERITY:
             column = _SEVERITY[name]
             severity = cast("array[int]", self.column(column)).__getitem__ if column else lambda _row: 0
-            return self._chosen(listed(severity, first, last, LIST_ROWS_A_PIXEL * pixels))
+            return self._chosen(thinned_list(severity, first, last, most))
         shown = list(changes(self.times, first, last, pixels))
         columns = self._chosen([row for row, _ in shown])
         if name == "levels":
@@ -112,21 +125,21 @@ class Track:
         for name in names:
             values = cast("array[float]", self.column(name))
             column = next(one for one in self.kind.columns if one.name == name)
-            index = self._indices.setdefault(name, Extremes())
-            index.grow(nearest(values, self.header.width) if column.is_wide else _without_nan(values))
+            width = self.header.width if column.is_wide else 1
+            index, plain = self._indices.setdefault(name, (Extremes(), array("d")))
+            new = values[len(plain) * width :]
+            _extend_plain(plain, nearest(new, width) if column.is_wide else new)
+            index.grow(plain)
             found.append(index)
         return found
 
 
-def _without_nan(values: "array[float]") -> "array[float]":
-    """Return numbers in which NaN is the number before it."""
-    if not any(value != value for value in values):  # noqa: PLR0124 - it is NaN
-        return values
-    filled, last = array("d"), 0.0
+def _extend_plain(plain: "array[float]", values: "array[float]") -> None:
+    """Add numbers to others; NaN is the number before it, or the first one."""
+    last = plain[-1] if plain else next((value for value in values if value == value), 0.0)  # noqa: PLR0124 - no NaN
     for value in values:
         last = value if value == value else last  # noqa: PLR0124 - it is no NaN
-        filled.append(last)
-    return filled
+        plain.append(last)
 
 
 @dataclass(slots=True)
@@ -138,23 +151,29 @@ class ViewRecording:
     """
 
     header: PageHeader
-    tracks: list[Track] = field(default_factory=list)
+    tracks: list[ChannelTrack] = field(default_factory=list)
 
-    def add(self, header: ChannelHeader) -> Track:
+    def add(self, header: ChannelHeader) -> ChannelTrack:
         """Add a channel, without rows yet; its `id` is given here."""
-        made = Track(replace(header, id=len(self.tracks)))
+        made = ChannelTrack(replace(header, id=len(self.tracks)))
         self.tracks.append(made)
         return made
+
+    def shared(self, header: ChannelHeader) -> ChannelTrack:
+        """Return the channel of this name and kind, whoever has added it."""
+        alike = [one for one in self.tracks if (one.header.name, one.kind.name) == (header.name, header.kind)]
+        return alike[0] if alike else self.add(header)
 
     @property
     def full_header(self) -> PageHeader:
         """The header with its channels."""
         return replace(self.header, channels=[track.header for track in self.tracks])
 
-    def frames(self, pixels: int) -> Iterator[ViewFrame]:
-        """Yield one frame a channel, of the whole time."""
+    def frames(self, pixels: int, listed: int) -> Iterator[ViewFrame]:
+        """Yield one frame a channel, of the whole time, as of `ChannelTrack.frame`."""
+        start, end = self.header.start_ns, self.header.end_ns
         for track in self.tracks:
-            yield track.frame(self.header.start_ns, self.header.end_ns, pixels, flags=FrameFlags.REPLACES)
+            yield track.frame(start, end, pixels, listed=listed, flags=FrameFlags.REPLACES)
 
 
 #: What makes a recording of a file or folder; None where it is of another kind.

@@ -3,15 +3,16 @@
 Invariant: nothing but the trace is read.
 """
 
-from collections.abc import Iterator
-from itertools import chain
+import heapq
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from itertools import chain, repeat
 from operator import attrgetter
 
 from p2os.view.header import PageHeader, Standing
 from p2os.view.recording import ViewRecording
 from robot_bench.events.kinds import Event, Ranges, Text, Wave
 from robot_bench.recording.run_record import RunRecord
-from robot_bench.recording.signals import motor_steps
 from robot_bench.recording.summary import verdict
 from robot_bench.view.run_tracks import RunTracks
 
@@ -20,24 +21,29 @@ def recording_of(record: RunRecord) -> ViewRecording:
     """Return all that a run's trace holds as a recording."""
     result = verdict(record)
     name = str(record.meta.get("scenario", "run"))
-    found = ViewRecording(
-        PageHeader(title=name, verdict=result, standing=standing_of(result), end_ns=max(record.last_ns, 1))
-    )
-    add_run(found, record)
+    header = PageHeader(title=name, verdict=result, standing=standing_of(result))
+    return recording_of_all({"": record}, header)
+
+
+def recording_of_all(records: Mapping[str, RunRecord], header: PageHeader) -> ViewRecording:
+    """Return the traces of robots that share a world, by their names, as one recording.
+
+    Args:
+        records: Each robot's; with "" where there is one.
+        header: Title, verdict, and what else its page begins with.
+    """
+    found = ViewRecording(replace(header, end_ns=max(1, *(record.last_ns for record in records.values()))))
+    robots = {
+        name: RunTracks(found, record.meta, name, others=records.keys() - {name}) for name, record in records.items()
+    }
+    for name, record in records.items():
+        robots[name].edges(record.pins)
+    streams = [zip(repeat(name), _events_of(record), strict=False) for name, record in records.items()]
+    for name, event in heapq.merge(*streams, key=lambda row: row[1].t):
+        robots[name].take(event)
+    for name, record in records.items():
+        robots[name].finish(record.end)
     return found
-
-
-def add_run(found: ViewRecording, record: RunRecord, source: str = "") -> None:
-    """Add the channels of one robot's run; `source` is its name among several."""
-    tracks = RunTracks(found, record.meta, source)
-    for net, edges in record.pins.items():
-        tracks.edges(net, edges.times, edges.levels)
-    for motor in (1, 2):
-        for t, steps in motor_steps(record.pins, motor):
-            tracks.asked(motor, t, steps)
-    for event in _events_of(record):
-        tracks.take(event)
-    tracks.finish(record.end)
 
 
 def standing_of(result: str) -> Standing:

@@ -7,16 +7,19 @@ Invariant: the events alone decide what is shown; who shows them decides nothing
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
+from itertools import groupby
+from operator import itemgetter
 from typing import Any, cast
 
 from adapter_sim.adapter import AdapterState
 from p2os.capture import Chunk, Direction
+from p2os.robots.motor_step import STEP_MPS
 from p2os.robots.parameters import ParametersError
 from p2os.view.header import ChannelHeader, RobotHeader, SensorPlace, StateTransition, WorldHeader, WorldThing
 from p2os.view.packet_rows import PacketRow, PacketRows
-from p2os.view.recording import Track, ViewRecording
+from p2os.view.recording import ChannelTrack, ViewRecording
 from robot_bench.events.codec import Json
 from robot_bench.events.kinds import (
     CanTransfer,
@@ -27,7 +30,6 @@ from robot_bench.events.kinds import (
     I2cTransfer,
     Note,
     Packet,
-    PinEdge,
     Pose,
     Ranges,
     SpiTransfer,
@@ -38,6 +40,7 @@ from robot_bench.events.kinds import (
 )
 from robot_bench.events.words import what_of
 from robot_bench.recording.signals import GROUPS, grouped, pin_labels
+from robot_bench.wires.edges import Edges
 from simbase.timing import NS_PER_S, Nanos
 
 DEBUG, INFO, WARNING, ERROR = range(4)
@@ -75,24 +78,26 @@ class RunTracks:
         recording: Where they are added; its header gets the robot, and the world where it has none yet.
         meta: The first entry of the robot's trace.
         source: The robot's name among several; empty: the only one.
+        others: Names of the other robots, which its world has as things that move.
     """
 
-    def __init__(self, recording: ViewRecording, meta: Json, source: str = "") -> None:
-        self.recording, self._source = recording, source
-        self._tracks: dict[str, Track] = {}
+    def __init__(
+        self, recording: ViewRecording, meta: Json, source: str = "", others: Collection[str] = ()
+    ) -> None:  # fmt: skip
+        self.recording, self._source, self._others = recording, source, frozenset(others)
+        self._tracks: dict[str, ChannelTrack] = {}
         self._robot = cast("Mapping[str, Any]", meta.get("robot") or {})
         self._threshold_m = cast("float | None", meta.get("threshold_m"))
-        self._step_mps = float(cast("float", meta.get("step_mps") or 0.0))
+        self._step_mps = float(cast("float", meta.get("step_mps") or STEP_MPS))
         pins = cast("dict[str, str]", meta.get("pins") or {})
         self._labels = {net: f"{pin} {net}" for net, pin in pins.items()} | pin_labels()
         self._groups = {net: title for title, nets in grouped(list(pins)) for net in nets}
         self._levels: dict[str, int] = {}
-        self._motors = {net: n for n in (1, 2) for net in GROUPS[_motor(n)] if net in pins}
         self._packets = _packets_of(str(self._robot.get("name", "")))
         header = recording.header
         world = cast("Mapping[str, Any]", meta.get("world") or {})
         if header.world is None and world:
-            header = replace(header, world=_world_of(world))
+            header = replace(header, world=world_of(world))
         if self._robot:
             header = replace(header, robots=(*header.robots, _robot_of(self._robot, source)))
         recording.header = header
@@ -103,19 +108,29 @@ class RunTracks:
             self._wire(net)
 
     def take(self, event: Event) -> None:
-        """Add the rows of an event."""
+        """Add the rows of an event; edges come by `edges`."""
         _ROWS[type(event)](self, event)
 
-    def edges(self, net: str, times: Sequence[int], levels: Sequence[int]) -> None:
-        """Add many edges of a wire, in the order of time."""
-        self._wire(net).extend_levels(times, levels)
+    def edges(self, tracks: Mapping[str, Edges]) -> None:
+        """Add edges of wires, none of them before those that were added, and what the motor pins ask for by them."""
+        for net, edges in tracks.items():
+            self._wire(net).extend_levels(edges.times, edges.levels)
+        for motor in (1, 2):
+            nets = [net for net in GROUPS[_motor(motor)] if net in tracks]
+            changes = sorted((t, net, level) for net in nets for t, level in tracks[net])
+            for t, found in groupby(changes, key=itemgetter(0)):
+                self._levels |= {net: level for _, net, level in found}
+                self._asked(motor, t)
 
-    def asked(self, motor: int, t: Nanos, value: int) -> None:
-        """Add what a motor's pins ask for from then on, in steps."""
-        side = "left" if motor == 1 else "right"
-        self._samples(f"{side} asked", "m/s", "wheels", "what the motor pins ask for", is_stepped=True).append(
-            t, value * self._step_mps
-        )
+    def _asked(self, motor: int, t: Nanos) -> None:
+        """Add what a motor's pins ask for from now on: two's complement, in steps."""
+        levels = [self._levels[net] for net in GROUPS[_motor(motor)] if net in self._levels]
+        code, sign = sum(level << bit for bit, level in enumerate(levels)), 1 << len(levels) - 1
+        track = self._samples(
+            f"{'left' if motor == 1 else 'right'} asked", "m/s", "wheels", "what the motor pins ask for",
+            is_stepped=True,
+        )  # fmt: skip
+        track.append(t, ((code ^ sign) - sign) * self._step_mps)
 
     def finish(self, end: Json) -> None:
         """Add the rest of what was sent, and how the goals stand that no event has decided."""
@@ -127,21 +142,21 @@ class RunTracks:
                 if (track := self._goal(goal)).column("standing")[-1] == OPEN:
                     track.append(at, standing, math.nan, "")
 
-    def _track(self, name: str, kind: str, key: str = "", **about: Any) -> Track:
+    def _track(self, name: str, kind: str, key: str = "", **about: Any) -> ChannelTrack:
         """Return a channel, made of `about` where it is not there yet."""
         key = key or f"{kind}:{name}"
         if key not in self._tracks:
             self._tracks[key] = self.recording.add(ChannelHeader(name=name, kind=kind, source=self._source, **about))
         return self._tracks[key]
 
-    def _samples(self, name: str, unit: str, group: str, doc: str = "", **about: Any) -> Track:
+    def _samples(self, name: str, unit: str, group: str, doc: str = "", **about: Any) -> ChannelTrack:
         return self._track(name, "samples", unit=unit, group=group, doc=doc, **about)
 
-    def _wire(self, net: str) -> Track:
+    def _wire(self, net: str) -> ChannelTrack:
         label = self._labels.get(net, net)
         return self._track(label, "levels", key=f"levels:{net}", group=self._groups.get(net, "other"), doc=net)
 
-    def _goal(self, goal: str) -> Track:
+    def _goal(self, goal: str) -> ChannelTrack:
         track = self._track(goal, "goal", group="goals")
         if not len(track):
             track.append(0, OPEN, math.nan, "")
@@ -150,7 +165,9 @@ class RunTracks:
     def _event(
         self, t: Nanos, severity: int, who: str, what: str, detail: str, place: tuple[float, float] = _NOWHERE
     ) -> None:
-        self._track("events", "events").append(t, severity, who, what, detail, *place)
+        events = self._tracks.get("events") or self.recording.shared(ChannelHeader(name="events", kind="events"))
+        self._tracks["events"] = events
+        events.append(t, severity, f"{self._source} {who}".lstrip(), what, detail, *place)
 
     def pose(self, pose: Pose) -> None:
         """Add where the robot is, and how its wheels turn."""
@@ -176,17 +193,6 @@ class RunTracks:
         self._samples(
             "nearest echo", "m", "sonar", "of all sonar", is_stepped=True, mark=self._threshold_m or None
         ).append(ranges.t, nearest)  # fmt: skip
-
-    def edge(self, edge: PinEdge) -> None:
-        """Add a wire's edge, and what the motor asks for where it is one of a motor's."""
-        self._wire(edge.wire).append(edge.t, int(edge.level), 1)
-        self._levels[edge.wire] = int(edge.level)
-        if edge.wire in self._motors:
-            motor = self._motors[edge.wire]
-            nets = [net for net in GROUPS[_motor(motor)] if net in self._motors]
-            code = sum(self._levels.get(net, 0) << bit for bit, net in enumerate(nets))
-            sign = 1 << max(0, len(nets) - 1)
-            self.asked(motor, edge.t, (code ^ sign) - sign)
 
     def wave(self, wave: Wave) -> None:
         """Add a wire's wave, or its end."""
@@ -252,6 +258,8 @@ class RunTracks:
 
     def change(self, change: WorldChange) -> None:
         """Add what becomes of a thing."""
+        if change.name in self._others:
+            return
         world = self.recording.header.world or WorldHeader(name="", extent_m=(-3.0, -3.0, 3.0, 3.0))
         if change.op == "remove":
             if change.name in self._things:
@@ -275,7 +283,7 @@ class RunTracks:
 
 
 _ROWS: Mapping[type, Callable[[RunTracks, Any], None]] = {
-    PinEdge: RunTracks.edge, Wave: RunTracks.wave, Text: RunTracks.text, SpiTransfer: RunTracks.transfer,
+    Wave: RunTracks.wave, Text: RunTracks.text, SpiTransfer: RunTracks.transfer,
     I2cTransfer: RunTracks.transfer, CanTransfer: RunTracks.transfer, WorldChange: RunTracks.change,
     Fault: RunTracks.fault, Packet: RunTracks.packet, Note: RunTracks.note, Ranges: RunTracks.ranges,
     Pose: RunTracks.pose, Clearance: RunTracks.clearance, Contact: RunTracks.contact, Verdict: RunTracks.verdict,
@@ -294,11 +302,12 @@ def _packets_of(robot: str) -> PacketRows:
         return PacketRows()
 
 
-def _world_of(world: Mapping[str, Any]) -> WorldHeader:
-    low_x, low_y, high_x, high_y = world.get("extent") or (-3.0, -3.0, 3.0, 3.0)
+def world_of(world: Mapping[str, object]) -> WorldHeader:
+    """Return a world as the first entry of a trace has it."""
+    low_x, low_y, high_x, high_y = cast("Sequence[float]", world.get("extent") or (-3.0, -3.0, 3.0, 3.0))
     return WorldHeader(
         name=str(world.get("name", "?")), extent_m=(low_x, low_y, high_x, high_y),
-        things=[_thing_of(item) for item in world.get("obstacles") or ()],
+        things=[_thing_of(item) for item in cast("Sequence[Json]", world.get("obstacles") or ())],
     )  # fmt: skip
 
 

@@ -8,18 +8,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from p2os.view.channels import BY_NAME, KINDS, Cells, ChannelKind
+from p2os.view.channels import BY_NAME, KINDS, CellType, ChannelKind
 from p2os.view.frames import HEAD, FrameError, FrameFlags, ViewFrame, empty_columns, frames_in
 
 I64 = st.integers(-(2**63), 2**63 - 1)
-CELLS: dict[Cells, st.SearchStrategy[Any]] = {
-    Cells.I64: I64,
-    Cells.F64: st.floats(allow_nan=False),
-    Cells.F32: st.floats(width=32, allow_nan=False),
-    Cells.U32: st.integers(0, 2**32 - 1),
-    Cells.U8: st.integers(0, 255),
-    Cells.TEXT: st.text(st.characters(codec="utf-8"), max_size=6),
-    Cells.BYTES: st.binary(max_size=6),
+CELLS: dict[CellType, st.SearchStrategy[Any]] = {
+    CellType.I64: I64,
+    CellType.F64: st.floats(allow_nan=False),
+    CellType.F32: st.floats(width=32, allow_nan=False),
+    CellType.U32: st.integers(0, 2**32 - 1),
+    CellType.U8: st.integers(0, 255),
+    CellType.TEXT: st.text(st.characters(codec="utf-8"), max_size=6),
+    CellType.BYTES: st.binary(max_size=6),
 }
 
 

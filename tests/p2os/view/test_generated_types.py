@@ -1,6 +1,6 @@
 """The page's types in TypeScript are those of the Python."""
 
-from tools.generate_view import TARGET, text
+from tools.page.generate_view import TARGET, text
 
 
 def test_the_committed_types_are_those_of_the_declarations() -> None:
