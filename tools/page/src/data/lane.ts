@@ -51,7 +51,7 @@ export class Lane {
 }
 
 /** How much wider a piece may be than the window that it serves. */
-export const RESERVE = 2.6;
+export const RESERVE = 4;
 
 const within = (inner: Frame, outer: Frame) => inner.from >= outer.from && inner.to <= outer.to;
 const density = (frame: Frame) => (frame.isReduced ? frame.count / Math.max(1, frame.to - frame.from) : Infinity);

@@ -44,21 +44,31 @@ export function chartsOf(store: Store): Chart[] {
   return [...charts.values()];
 }
 
-/** Points of a curve in a window, at most some a pixel: of more, the least and greatest of each. Times in seconds. */
+/**
+ * Points of a curve in a window, at most some a pixel: of more, the least and greatest of each. Times in seconds.
+ *
+ * What goes on beyond the window ends at its edge: dashes of a line that is a million times wider take a browser seconds.
+ */
 export function points(frame: Frame, curve: Curve, from: number, to: number, pixels: number): [Float64Array, Float64Array] {
-  const values = numbers(frame, curve.column), first = Math.max(0, lastAt(frame.t, from)), last = Math.min(frame.count, firstFrom(frame.t, to) + 1);
-  const rows = last - first <= 4 * pixels ? Array.from({ length: last - first }, (_, n) => first + n) : extremes(frame.t, values, first, last, pixels);
-  const isHeld = curve.isStepped && rows.length > 0 && last === frame.count, count = rows.length + (isHeld ? 1 : 0);
-  const xs = new Float64Array(count), ys = new Float64Array(count);
-  rows.forEach((row, n) => {
-    xs[n] = frame.t[row]! / 1e9;
-    ys[n] = values[row]! * curve.factor;
-  });
-  if (isHeld) {
-    xs[count - 1] = Math.max(frame.to, frame.t[last - 1]!) / 1e9;
-    ys[count - 1] = ys[count - 2]!;
+  const values = numbers(frame, curve.column), { t } = frame, first = firstFrom(t, from), last = firstFrom(t, to), xs: number[] = [], ys: number[] = [];
+  const put = (at: number, value: number) => {
+    xs.push(at / 1e9);
+    ys.push(value * curve.factor);
+  };
+  const between = (at: number, row: number) => curve.isStepped || row + 1 >= frame.count ? values[row]! : values[row]! + ((at - t[row]!) / (t[row + 1]! - t[row]!)) * (values[row + 1]! - values[row]!);
+  if (first > 0 && (first === frame.count || t[first]! > from)) {
+    if (first < frame.count || curve.isStepped) put(from, between(from, first - 1));
   }
-  return [xs, ys];
+  const rows = last - first <= 4 * pixels ? undefined : extremes(t, values, first, last, pixels);
+  for (let n = 0; n < (rows?.length ?? last - first); n++) {
+    const row = rows ? rows[n]! : first + n;
+    put(t[row]!, values[row]!);
+  }
+  if (last > 0 && (last < frame.count || curve.isStepped)) {
+    const end = last < frame.count ? to : Math.min(to, Math.max(frame.to, t[last - 1]!));
+    if (!xs.length || end / 1e9 > xs.at(-1)!) put(end, between(end, last - 1));
+  }
+  return [Float64Array.from(xs), Float64Array.from(ys)];
 }
 
 /** Rows that show the least and greatest of each pixel, in order. */

@@ -1,0 +1,86 @@
+// The decoder, against frames that Python packed.
+import { readFileSync } from "node:fs";
+import { describe, expect, it } from "vitest";
+import { type Frame, FrameError, frameAt, framesIn, Runs } from "../src/data/frames";
+import { joined, Lane } from "../src/data/lane";
+import { KINDS } from "../src/generated/view";
+
+interface Expected {
+  readonly kind: string; readonly channel: number; readonly count: number; readonly of: number; readonly width: number; readonly from: number; readonly to: number;
+  readonly isReduced: boolean; readonly replaces: boolean; readonly columns: Readonly<Record<string, readonly (number | string | null)[]>>;
+}
+const made = JSON.parse(readFileSync(new URL("frames.json", import.meta.url), "utf8")) as { frames: readonly Expected[]; data: string };
+const bytes = () => {
+  const found = Buffer.from(made.data, "base64");
+  return found.buffer.slice(found.byteOffset, found.byteOffset + found.byteLength) as ArrayBuffer;
+};
+const plain = (frame: Frame, name: string): (number | string | null)[] => {
+  const column = frame.columns.get(name)!;
+  if (column instanceof Runs) return Array.from({ length: column.length }, (_, row) => { const value = column.at(row); return typeof value === "string" ? value : Buffer.from(value).toString("hex"); });
+  return Array.from(column, (value) => (Number.isNaN(value) ? null : value));
+};
+
+describe("a frame", () => {
+  const frames = framesIn(bytes());
+
+  it("is there of every kind, with rows and without", () => {
+    expect(frames.map((frame) => frame.kind)).toEqual([...KINDS, ...KINDS].map((kind) => kind.name));
+  });
+
+  it.each(made.frames.map((expected, n) => [`${expected.kind} ${expected.count}`, expected, n] as const))("%s has the rows that Python packed", (_, expected, n) => {
+    const frame = frames[n]!, { columns, ...head } = expected;
+    expect({ kind: frame.kind, channel: frame.channel, count: frame.count, of: frame.of, width: frame.width, from: frame.from, to: frame.to, isReduced: frame.isReduced, replaces: frame.replaces }).toEqual(head);
+    for (const [name, values] of Object.entries(columns)) expect(plain(frame, name)).toEqual(values);
+  });
+
+  it("is refused when it is cut at any byte", () => {
+    const all = bytes(), [, end] = frameAt(all, 0);
+    for (let length = 0; length < end; length++) expect(() => frameAt(all.slice(0, length), 0)).toThrow(FrameError);
+  });
+
+  it("is refused with a place of a text that is not there", () => {
+    const all = bytes();
+    let start = 0;
+    for (let next = start; ; start = next) {
+      const [frame, end] = frameAt(all, start);
+      if (frame?.kind === "text") break;
+      next = end;
+    }
+    const [frame] = frameAt(all, start), { count } = frame!, head = 48 + 8 * count + Math.ceil(count / 8) * 8;
+    new DataView(all).setUint32(start + head + 8, 99, true);
+    expect(() => frameAt(all, start)).toThrow(/not there/);
+  });
+
+  it("of a kind that a package added is passed over", () => {
+    const all = bytes();
+    new DataView(all).setUint8(5, 64);
+    expect(framesIn(all)).toHaveLength(frames.length - 1);
+  });
+});
+
+describe("rows of a live run", () => {
+  const frames = framesIn(bytes());
+
+  it.each(frames.slice(0, KINDS.length).map((frame) => [frame.kind, frame] as const))("%s go on where they ended", (_, frame) => {
+    const twice = joined(frame, { ...frame, from: frame.to, to: frame.to + 10 });
+    // All rows of the second are at or before the end of the first: none is new.
+    expect(twice.count).toBe(frame.count);
+    for (const name of twice.columns.keys()) expect(plain(twice, name)).toEqual(plain(frame, name));
+  });
+
+  it("are joined with texts of both", () => {
+    const text = frames.find((frame) => frame.kind === "text")!, later = text.t.map((t) => t + text.to + 10);
+    const all = joined(text, { ...text, t: later, columns: new Map([...text.columns, ["t_ns", later]]) });
+    expect(all.count).toBe(2 * text.count);
+    expect(plain(all, "text")).toEqual([...plain(text, "text"), ...plain(text, "text")]);
+  });
+
+  it("are added to the piece that ended there, and replace all when the frame says so", () => {
+    const lane = new Lane(), text = frames.find((frame) => frame.kind === "text")!;
+    lane.add({ ...text, replaces: true });
+    lane.add({ ...text, replaces: false, from: text.to, to: text.to + 50 }, true);
+    expect(lane.best(text.from, text.to + 50)).toMatchObject({ from: text.from, to: text.to + 50, count: text.count });
+    lane.add({ ...text, replaces: true, to: 7 });
+    expect(lane.best(0, 7)!.to).toBe(7);
+  });
+});
