@@ -12,7 +12,7 @@ interface Expected {
 const made = JSON.parse(readFileSync(new URL("frames.json", import.meta.url), "utf8")) as { frames: readonly Expected[]; data: string };
 const bytes = () => {
   const found = Buffer.from(made.data, "base64");
-  return found.buffer.slice(found.byteOffset, found.byteOffset + found.byteLength) as ArrayBuffer;
+  return found.buffer.slice(found.byteOffset, found.byteOffset + found.byteLength);
 };
 const plain = (frame: Frame, name: string): (number | string | null)[] => {
   const column = frame.columns.get(name)!;

@@ -17,7 +17,7 @@ const EDGE = 8;
 export function Timeline({ app }: { app: App }) {
   const { clock, store } = app, isLive = store.header.value.is_live;
   return (
-    <div class="timeline" role="group" aria-label="Time">
+    <section class="timeline" aria-label="Time">
       <IconButton icon="first" label="To the start" onClick={() => clock.seek(clock.start.value)} />
       <IconButton icon={clock.playing.value ? "pause" : "play"} label={clock.playing.value ? "Pause" : "Play"} onClick={() => clock.toggle()} />
       <IconButton icon="last" label={isLive ? "Go with the run" : "To the end"} {...(isLive ? { pressed: clock.atEnd.value } : {})} onClick={() => {
@@ -29,7 +29,7 @@ export function Timeline({ app }: { app: App }) {
       </select>
       <Scrub app={app} />
       <output class="now" aria-live="off">{moment(clock.now.value, clock.span.value / 1000)}</output>
-    </div>
+    </section>
   );
 }
 

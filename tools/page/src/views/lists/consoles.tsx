@@ -4,10 +4,9 @@ import { render } from "preact";
 import { numbers, texts } from "../../data/frames";
 import type { App, ViewKind } from "../../shell/app";
 import { moment } from "../../time/format";
-import { filtered, gathered, itemAt } from "./gathering";
+import { useCurrent, useShown } from "./gathering";
 import { count } from "./packets";
 import { Rows } from "./rows";
-import { reads } from "../../time/reads";
 
 export const consoles: ViewKind = {
   id: "consoles", title: "Consoles", doc: "What the program prints and what is typed to it, on each of its serial ports.",
@@ -22,9 +21,8 @@ const port = signal(-1), filter = signal(""), chosenAt = signal<{ t: number; row
 
 function Consoles({ app }: { app: App }) {
   const { clock, store } = app, channels = store.channels("text");
-  reads(store.version.value);
-  const all = gathered(store, channels.filter((channel) => port.value < 0 || channel.id === port.value), clock.from.value, clock.to.value);
-  const shown = filtered(all.items, filter.value, () => ""), chosen = chosenAt.value, nameOf = (place: number) => [shown[place]!.channel.source, shown[place]!.channel.name].filter(Boolean).join(" ");
+  const { all, shown } = useShown(app, channels.filter((channel) => port.value < 0 || channel.id === port.value), filter.value, () => ""), chosen = chosenAt.value;
+  const nameOf = (place: number) => [shown[place]!.channel.source, shown[place]!.channel.name].filter(Boolean).join(" ");
   return (
     <div class="list-view">
       <div class="view-bar">
@@ -34,7 +32,7 @@ function Consoles({ app }: { app: App }) {
         <input type="search" class="filter" aria-label="Filter lines" placeholder={`filter ${channels.length === 1 ? channels[0]!.name : "lines"}`} value={filter.value} onInput={(event) => { filter.value = event.currentTarget.value; }} />
         <span class="said" role="status">{count(shown.length, all.items.length, all.of)}</span>
       </div>
-      <Rows label="Lines of the console" count={shown.length} selected={chosen ? shown.findIndex((item) => item.t === chosen.t && item.row === chosen.row) : -1} current={itemAt(shown, clock.now.value)} follows={clock.playing.value || !chosen}
+      <Rows label="Lines of the console" count={shown.length} selected={chosen ? shown.findIndex((item) => item.t === chosen.t && item.row === chosen.row) : -1} current={useCurrent(shown, clock)} follows={clock.playing.value || !chosen}
         onChoose={(place) => {
           const item = shown[place]!;
           chosenAt.value = { t: item.t, row: item.row };

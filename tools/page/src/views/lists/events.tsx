@@ -1,13 +1,13 @@
 // What happened, as a list with a filter.
 import { signal } from "@preact/signals";
 import { render } from "preact";
+import { useCallback } from "preact/hooks";
 import { numbers, texts } from "../../data/frames";
 import type { App, ViewKind } from "../../shell/app";
 import { moment } from "../../time/format";
-import { filtered, gathered, itemAt } from "./gathering";
+import { type Item, useCurrent, useShown } from "./gathering";
 import { count } from "./packets";
 import { Rows } from "./rows";
-import { reads } from "../../time/reads";
 
 export const events: ViewKind = {
   id: "events", title: "Events", doc: "What happened: states of the parts, faults, contacts, warnings.",
@@ -23,10 +23,8 @@ const SEVERITIES = ["debug", "information", "warning", "error"] as const;
 
 function Events({ app }: { app: App }) {
   const { clock, store } = app;
-  reads(store.version.value);
-  const all = gathered(store, store.channels("events"), clock.from.value, clock.to.value);
-  const severe = least.value ? all.items.filter((item) => numbers(item.frame, "severity")[item.row]! >= least.value) : all.items;
-  const shown = filtered(severe, filter.value, (item) => `${item.channel.source} ${SEVERITIES[numbers(item.frame, "severity")[item.row]!] ?? ""}`), chosen = selectedAt.value;
+  const severest = least.value, keeps = useCallback((item: Item) => numbers(item.frame, "severity")[item.row]! >= severest, [severest]), chosen = selectedAt.value;
+  const { all, shown } = useShown(app, store.channels("events"), filter.value, (item) => `${item.channel.source} ${SEVERITIES[numbers(item.frame, "severity")[item.row]!] ?? ""}`, keeps);
   const sources = store.channels("events").length > 1;
   return (
     <div class="list-view">
@@ -37,7 +35,7 @@ function Events({ app }: { app: App }) {
         </select>
         <span class="said" role="status">{count(shown.length, all.items.length, all.of)}</span>
       </div>
-      <Rows label="Events" count={shown.length} selected={chosen ? shown.findIndex((item) => item.t === chosen.t && item.row === chosen.row) : -1} current={itemAt(shown, clock.now.value)} follows={clock.playing.value || !chosen}
+      <Rows label="Events" count={shown.length} selected={chosen ? shown.findIndex((item) => item.t === chosen.t && item.row === chosen.row) : -1} current={useCurrent(shown, clock)} follows={clock.playing.value || !chosen}
         classOf={(place) => ["debug", "", "warning", "bad"][numbers(shown[place]!.frame, "severity")[shown[place]!.row]!] ?? ""}
         onChoose={(place) => {
           const item = shown[place]!;

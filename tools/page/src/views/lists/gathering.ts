@@ -1,7 +1,11 @@
 // Rows of several channels of one kind as one list in order of time, and those that pass a filter.
+import { computed } from "@preact/signals";
+import { useMemo } from "preact/hooks";
 import { type Frame, Runs } from "../../data/frames";
 import type { Store } from "../../data/store";
 import type { ChannelHeader } from "../../generated/view";
+import type { App } from "../../shell/app";
+import type { Clock } from "../../time/clock";
 
 export interface Item {
   readonly channel: ChannelHeader;
@@ -56,4 +60,18 @@ export function itemAt(items: readonly Item[], t: number): number {
     else high = middle;
   }
   return low - 1;
+}
+
+/** Rows of channels and those that pass a filter, made anew when one of them changes. */
+export function useShown(app: App, channels: readonly ChannelHeader[], filter: string, more: (item: Item) => string, keeps?: (item: Item) => boolean): { readonly all: Gathered; readonly shown: readonly Item[] } {
+  const { store, clock } = app, isPart = store.canAsk && channels.some((channel) => store.whole(channel.id)?.isReduced);
+  const from = isPart ? clock.from.value : 0, to = isPart ? clock.to.value : 0, version = store.version.value;
+  const all = useMemo(() => gathered(store, channels, from, to), [store, channels.map((channel) => channel.id).join(" "), from, to, version]);
+  const shown = useMemo(() => filtered(keeps ? all.items.filter(keeps) : all.items, filter, more), [all, filter, keeps]);
+  return { all, shown };
+}
+
+/** Place of the item of now; who uses it is drawn again when it becomes another one, not with each frame. */
+export function useCurrent(shown: readonly Item[], clock: Clock): number {
+  return useMemo(() => computed(() => itemAt(shown, clock.now.value)), [shown, clock]).value;
 }

@@ -5,9 +5,8 @@ import { useState } from "preact/hooks";
 import { numbers, type Runs, texts } from "../../data/frames";
 import type { App, ViewKind } from "../../shell/app";
 import { hex, moment } from "../../time/format";
-import { filtered, gathered, type Item, itemAt } from "./gathering";
+import { type Item, itemAt, useCurrent, useShown } from "./gathering";
 import { Rows } from "./rows";
-import { reads } from "../../time/reads";
 
 export const packets: ViewKind = {
   id: "packets", title: "Packets", doc: "Packets of the robot's protocol; a click explains one byte by byte.",
@@ -27,9 +26,7 @@ const wayOf = (item: Item) => numbers(item.frame, "to_robot")[item.row]!;
 
 function Packets({ app }: { app: App }) {
   const { clock, store, selection } = app;
-  reads(store.version.value);
-  const all = gathered(store, store.channels("packets"), clock.from.value, clock.to.value);
-  const shown = filtered(all.items, filter.value, (item) => `${hex(bytesOf(item))} ${WAY_WORDS[wayOf(item)]} ${item.channel.name} ${numbers(item.frame, "is_bad")[item.row] ? "bad" : ""}`);
+  const { all, shown } = useShown(app, store.channels("packets"), filter.value, (item) => `${hex(bytesOf(item))} ${WAY_WORDS[wayOf(item)]} ${item.channel.name} ${numbers(item.frame, "is_bad")[item.row] ? "bad" : ""}`);
   const chosen = selection.value, selected = chosen ? placeOf(shown, chosen.channel, chosen.t, chosen.place) : -1;
   const choose = (place: number) => {
     const item = shown[place]!;
@@ -42,7 +39,7 @@ function Packets({ app }: { app: App }) {
         <input type="search" class="filter" aria-label="Filter packets: words that are there, -word: that are not" placeholder="filter: VEL -SIP ff 02" value={filter.value} onInput={(event) => { filter.value = event.currentTarget.value; }} />
         <span class="said" role="status">{count(shown.length, all.items.length, all.of)}</span>
       </div>
-      <Rows label="Packets" count={shown.length} selected={selected} current={itemAt(shown, clock.now.value)} follows={clock.playing.value || selected < 0} onChoose={choose}
+      <Rows label="Packets" count={shown.length} selected={selected} current={useCurrent(shown, clock)} follows={clock.playing.value || selected < 0} onChoose={choose}
         classOf={(place) => (numbers(shown[place]!.frame, "is_bad")[shown[place]!.row] ? "bad" : "")}
         row={(place) => {
           const item = shown[place]!;

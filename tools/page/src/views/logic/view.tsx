@@ -5,7 +5,8 @@ import { lastAt } from "../../data/search";
 import type { Store } from "../../data/store";
 import type { App, ViewKind } from "../../shell/app";
 import { Icon, IconButton } from "../../shell/icons";
-import { fitted, FONT, halo, type Sheet, SMALL_FONT, surface } from "../../shell/surface";
+import { timeLines } from "../../shell/lines";
+import { fitted, FONT, type Sheet, SMALL_FONT, surface } from "../../shell/surface";
 import { theme } from "../../shell/theme";
 import { duration, frequency, moment, roundStep, tickBase, tickLabel, ticks } from "../../time/format";
 import * as drawing from "./drawing";
@@ -52,6 +53,12 @@ class LogicView {
     }, (sheet) => this.drawRows(sheet));
     this.scroller.addEventListener("scroll", wires.redraw);
     this.scroller.tabIndex = -1;
+    const xOf = (t: number) => {
+      const { from, to } = app.clock, scale = this.scaleOf(wires.canvas.clientWidth);
+      return t < from.value || t > to.value ? undefined : drawing.px(scale, t);
+    };
+    const lines = [timeLines(inner, app.clock, xOf), timeLines(axis, app.clock, xOf)], placed = new ResizeObserver(() => { for (const line of lines) line.place(); });
+    placed.observe(inner);
     render(<Bar view={this} />, bar);
     render(<Readout view={this} />, readout);
     this.listen(wires.canvas, () => {
@@ -60,6 +67,8 @@ class LogicView {
     });
     this.listen(ruler.canvas, ruler.redraw);
     this.dispose = () => {
+      placed.disconnect();
+      for (const line of lines) line.dispose();
       wires.dispose();
       ruler.dispose();
       render(null, bar);
@@ -109,7 +118,7 @@ class LogicView {
 
   private watch(): void {
     const { store, clock, wire } = this.app;
-    reads(store.version.value, store.header.value, clock.from.value, clock.to.value, clock.now.value, clock.a.value, clock.b.value, wire.value);
+    reads(store.version.value, store.header.value, clock.from.value, clock.to.value, wire.value);
   }
 
   private scaleOf(width: number): drawing.Scale {
@@ -137,7 +146,6 @@ class LogicView {
       g.fillStyle = theme.value.ink;
       g.fillText(fitted(g, moment(base, 1), scale.left - 8), 4, height - 9);
     }
-    this.drawCursors(sheet, scale, true);
   }
 
   private drawRows(sheet: Sheet): void {
@@ -164,7 +172,6 @@ class LogicView {
       else drawing.decoded(sheet, row, frame, scale, row.top);
       g.restore();
     }
-    this.drawCursors(sheet, scale, false);
     if (this.pointer) this.drawPointer(sheet, scale);
   }
 
@@ -203,32 +210,6 @@ class LogicView {
     g.textAlign = "right";
     g.fillText(fitted(g, row.title, scale.left - 14), scale.left - 8, row.top + row.height / 2 + 4);
     g.font = FONT;
-  }
-
-  private drawCursors({ g, height }: Sheet, scale: drawing.Scale, isAxis: boolean): void {
-    const { clock } = this.app;
-    const lines: readonly (readonly [string, number | null, string])[] = [["", clock.now.value, theme.value.ink], ["A", clock.a.value, theme.value["cursor-a"]], ["B", clock.b.value, theme.value["cursor-b"]]];
-    for (const [name, t, colour] of lines) {
-      if (t === null || t < scale.from || t > scale.to) continue;
-      const x = drawing.px(scale, t);
-      g.strokeStyle = g.fillStyle = colour;
-      g.lineWidth = 1.2;
-      g.beginPath();
-      g.moveTo(x, isAxis ? (name ? 12 : height - 8) : 0);
-      g.lineTo(x, height);
-      g.stroke();
-      if (!isAxis) continue;
-      g.textAlign = "center";
-      g.font = `600 ${SMALL_FONT}`;
-      if (name) halo(g, name, x, 11);
-      else {
-        g.beginPath();
-        g.moveTo(x - 5, height - 8);
-        g.lineTo(x + 5, height - 8);
-        g.lineTo(x, height);
-        g.fill();
-      }
-    }
   }
 
   private drawPointer({ g, height }: Sheet, scale: drawing.Scale): void {

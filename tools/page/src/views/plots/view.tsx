@@ -1,10 +1,11 @@
 // Plots of numbers over time, one chart for each group with its unit, on the page's time.
-import { effect, signal } from "@preact/signals";
+import { effect, signal, untracked } from "@preact/signals";
 import { render } from "preact";
 import uPlot from "uplot";
 import { numbers } from "../../data/frames";
 import { firstFrom } from "../../data/search";
 import type { App, ViewKind } from "../../shell/app";
+import { timeLines } from "../../shell/lines";
 import { curveColour, theme } from "../../shell/theme";
 import { quantity, roundStep, tickBase, tickLabel, ticks } from "../../time/format";
 import { aligned, type Chart, chartsOf, valueAt } from "./curves";
@@ -47,14 +48,17 @@ function mountChart(app: App, list: HTMLElement, chart: Chart, count: number): (
   list.append(section);
   const hidden = signal<ReadonlySet<string>>(new Set());
   render(<Legend app={app} chart={chart} hidden={hidden} />, legend);
-  let plot: uPlot | undefined, asked = 0;
+  let plot: uPlot | undefined, lines: { readonly dispose: () => void } | undefined, asked = 0;
   const height = () => Math.max(LEAST_HEIGHT_PX, Math.min(260, list.clientHeight / count - 34));
   const build = () => {
+    lines?.dispose();
     plot?.destroy();
     plot = new uPlot(options(app, chart, place.clientWidth || 600, height()), aligned(store, chart, clock.from.peek(), clock.to.peek(), place.clientWidth || 600), place);
     plot.root.querySelector("canvas")?.setAttribute("role", "img");
     plot.root.querySelector("canvas")?.setAttribute("aria-label", `${chart.title} over time: ${chart.curves.map((curve) => curve.name).join(", ")}${chart.unit ? `, in ${chart.unit}` : ""}`);
     listen(app, plot);
+    const { over } = plot;
+    lines = untracked(() => timeLines(over, clock, (t) => (t < clock.from.value || t > clock.to.value ? undefined : ((t - clock.from.value) / clock.span.value) * over.clientWidth)));
   };
   const stopBuild = effect(() => {
     reads(theme.value);
@@ -73,10 +77,6 @@ function mountChart(app: App, list: HTMLElement, chart: Chart, count: number): (
     reads(store.version.value, clock.from.value, clock.to.value, hidden.value);
     asked ||= requestAnimationFrame(paint);
   });
-  const stopLines = effect(() => {
-    reads(clock.now.value, clock.a.value, clock.b.value);
-    plot?.redraw(false);
-  });
   const observer = new ResizeObserver(() => {
     if (plot && place.clientWidth && (plot.width !== place.clientWidth || plot.height !== height())) plot.setSize({ width: place.clientWidth, height: height() });
   });
@@ -85,7 +85,7 @@ function mountChart(app: App, list: HTMLElement, chart: Chart, count: number): (
     observer.disconnect();
     stopBuild();
     stopPaint();
-    stopLines();
+    lines?.dispose();
     if (asked) cancelAnimationFrame(asked);
     plot?.destroy();
     render(null, legend);
@@ -119,7 +119,7 @@ function padded(least: number | null, most: number | null, chart: Chart): [numbe
   return [low >= 0 && low < (high - low) * 0.3 ? 0 : low - edge, high + edge];
 }
 
-/** Marks of the channels, errors of the run, and the page's times, over the curves. */
+/** Marks of the channels and errors of the run, over the curves. */
 function drawLines(app: App, chart: Chart, plot: uPlot): void {
   const { clock, store } = app, { ctx, bbox } = plot, colours = theme.peek(), ratio = devicePixelRatio || 1;
   ctx.save();
@@ -157,9 +157,6 @@ function drawLines(app: App, chart: Chart, plot: uPlot): void {
     ctx.font = `${11 * ratio}px system-ui, sans-serif`;
     ctx.fillText(quantity(curve.mark, chart.unit), bbox.left + 4 * ratio, y - 4 * ratio);
   }
-  upright(clock.now.peek(), colours.ink, 1.2);
-  if (clock.a.peek() !== null) upright(clock.a.peek()!, colours["cursor-a"], 1.2);
-  if (clock.b.peek() !== null) upright(clock.b.peek()!, colours["cursor-b"], 1.2);
   ctx.restore();
 }
 
@@ -203,7 +200,7 @@ function Legend({ app, chart, hidden }: { app: App; chart: Chart; hidden: { valu
   };
   return (
     <>
-      <h3>{chart.title}{chart.unit && <small>{chart.unit}</small>}</h3>
+      <h2>{chart.title}{chart.unit && <small>{chart.unit}</small>}</h2>
       {chart.curves.map((curve, n) => {
         const value = valueAt(app.store, curve, now), stroke = STROKES[n % STROKES.length]!;
         return (

@@ -45,7 +45,7 @@ function Table({ block, seek }: { block: PageTable; seek: Seek }) {
     <div class="wide" tabIndex={0} role="group" aria-label={block.title || block.head.join(", ") || "Figures"}>
       <table class={block.head.length ? "data" : "figures"}>
         {block.title && <caption>{block.title}</caption>}
-        {block.head.length > 0 && <thead><tr>{block.head.map((name, n) => <th scope="col" class={block.rows[0]?.[n]?.is_number ? "number" : ""}>{name}</th>)}</tr></thead>}
+        {block.head.length > 0 && <thead><tr>{block.head.map((name, n) => (name ? <th scope="col" class={block.rows[0]?.[n]?.is_number ? "number" : ""}>{name}</th> : <td />))}</tr></thead>}
         <tbody>{block.rows.map((row) => <tr>{row.map((cell, n) => {
           const kind = cell.is_number || (!block.head.length && n > 0) ? "number" : "";
           return n === 0 && !block.head.length ? <th scope="row"><Cell cell={cell} seek={seek} /></th> : <td class={kind}><Cell cell={cell} seek={seek} /></td>;

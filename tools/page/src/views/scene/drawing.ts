@@ -35,8 +35,9 @@ class SceneView implements SceneHandle {
   private shown = "";
 
   constructor(private readonly model: SceneModel, private readonly host: HTMLElement) {
-    this.renderer = new THREE.WebGLRenderer({ antialias: true, powerPreference: "low-power" });
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio || 1, 2));
+    const isSoftware = drawnInSoftware(); // each pixel counts there
+    this.renderer = new THREE.WebGLRenderer({ antialias: !isSoftware, powerPreference: "low-power" });
+    this.renderer.setPixelRatio(isSoftware ? 1 : Math.min(devicePixelRatio || 1, 2));
     const canvas = this.renderer.domElement;
     canvas.className = "surface";
     canvas.tabIndex = 0;
@@ -187,6 +188,14 @@ class SceneView implements SceneHandle {
     this.tip.style.left = `${Math.min(event.offsetX + 12, this.host.clientWidth - 120)}px`;
     this.tip.style.top = `${event.offsetY + canvas.offsetTop - 24}px`;
   }
+}
+
+/** Whether the processor stands in for a graphics card. */
+function drawnInSoftware(): boolean {
+  const gl = document.createElement("canvas").getContext("webgl2"), info = gl?.getExtension("WEBGL_debug_renderer_info");
+  const name = gl && info ? String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)) : "";
+  gl?.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|software/i.test(name);
 }
 
 const thickness = (thing: WorldThing) => (isFloor(thing) ? Math.max(0.004, Math.min(thing.height_m, 0.02)) : Math.max(0.01, thing.height_m));
