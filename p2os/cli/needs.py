@@ -38,7 +38,7 @@ NEEDS = (
         name="page",
         kind="plug-in",
         feature="view, --view",
-        points=("p2os.view_servers", "p2os.view_sources"),
+        points=("p2os.view_servers",),
         point="page",
     ),
     Need(name="tshark", kind="program", feature="captures on the command line", get="sudo apt-get install tshark"),

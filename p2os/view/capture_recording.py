@@ -66,12 +66,11 @@ class CaptureTracks:
         self._was: dict[str, object] = {}
 
     def take(self, chunks: Iterable[Chunk]) -> None:
-        """Take all of a conversation, or as much as there is."""
+        """Take all of a conversation, to its end."""
         now: Nanos = 0
         for chunk in chunks:
             now = chunk.at_ns
-            for row, listed in self._packets.take(chunk):
-                self._add(row[0], row[1:], listed)
+            self.take_chunk(chunk)
         for row, listed in self._packets.finish(now):
             self._add(row[0], row[1:], listed)
         table = PageTable(rows=[[PageCell(text=name), PageCell(text=str(count), is_number=True)]
@@ -79,6 +78,11 @@ class CaptureTracks:
         self.recording.header = replace(
             self.recording.header, end_ns=max(now, 1), sections=[PageSection(title="Figures", blocks=[table])]
         )
+
+    def take_chunk(self, chunk: Chunk) -> None:
+        """Take what has come, of a conversation that goes on."""
+        for row, listed in self._packets.take(chunk):
+            self._add(row[0], row[1:], listed)
 
     def _add(self, t: Nanos, cells: tuple[int, bytes, str, str, str, int], listed: ListingRow) -> None:
         self._track(ChannelHeader(name="P2OS", kind="packets", group="packets")).append(t, *cells)

@@ -4,9 +4,9 @@ from typing import Annotated
 
 import typer
 
+from p2os.cli.captures.shown_page import HOST, NoBrowser, shown
 from p2os.cli.groups import BENCH
 from p2os.cli.quantities import option
-from p2os.cli.shown_page import shown
 from p2os.view.targets import target_of
 from simbase.units import PORT
 
@@ -32,13 +32,13 @@ def register(app: typer.Typer) -> None:
 
 def view(
     target: Annotated[str, typer.Argument(help="Run folder, capture or scenario.", metavar="TARGET")],
-    no_browser: Annotated[bool, typer.Option("--no-browser", help="Print the link, open nothing.")] = False,
+    no_browser: NoBrowser = False,
     port: Annotated[
         int, option(PORT, "--port", purpose="Where it is served; 0 takes a free one.", least="0", most="65535")
     ] = 0,
     host: Annotated[
         str, typer.Option(help="Where it is served; another one than this is seen from outside.", metavar="HOST")
-    ] = "127.0.0.1",
+    ] = HOST,
 ) -> None:
     """Show something until Ctrl-C."""
     found = target_of(target)

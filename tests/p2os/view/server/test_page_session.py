@@ -36,10 +36,10 @@ def recording(rows: int = 10) -> ViewRecording:
 
 def asked(session: PageSession, now_s: float = 0.0, **wanted: Any) -> tuple[list[ViewFrame], list[dict[str, Any]]]:
     """Return the frames and the texts of an answer."""
-    return told(session.receive(json.dumps(wanted), now_s))
+    return sent_of(session.receive(json.dumps(wanted), now_s))
 
 
-def told(messages: Any) -> tuple[list[ViewFrame], list[dict[str, Any]]]:
+def sent_of(messages: Any) -> tuple[list[ViewFrame], list[dict[str, Any]]]:
     found = list(messages)
     return (
         [ViewFrame.from_bytes(one) for one in found if isinstance(one, bytes)],
@@ -59,9 +59,9 @@ def test_a_request_is_answered_with_a_frame_a_channel_and_done() -> None:
 
 def test_the_header_comes_first_and_once() -> None:
     session = PageSession(StillRecording(recording()))
-    _, texts = told(session.news())
+    _, texts = sent_of(session.news())
     assert [channel["name"] for channel in texts[0]["header"]["channels"]] == ["s", "l"]
-    assert told(session.news()) == ([], [])
+    assert sent_of(session.news()) == ([], [])
 
 
 def test_many_rows_are_thinned_to_the_pixels_and_say_so() -> None:
@@ -77,17 +77,17 @@ def test_of_a_recording_that_grows_new_rows_of_what_was_asked_for_follow() -> No
     grown = recording(2)
     live: LiveRecording[int] = LiveRecording(grown, lambda n: grown.tracks[0].append(n * SECOND, float(n)))
     session = PageSession(live)
-    told(session.news())
+    sent_of(session.news())
     live.offer(2, 2 * SECOND)
-    assert told(session.news()) == ([], []), "nobody has asked"
+    assert sent_of(session.news()) == ([], []), "nobody has asked"
     asked(session, want=[0], to_ns=2 * SECOND)
     live.offer(3, 3 * SECOND)
     live.offer(4, 4 * SECOND)
-    frames, texts = told(session.news())
+    frames, texts = sent_of(session.news())
     assert [list(frame.columns[0]) for frame in frames] == [[3 * SECOND, 4 * SECOND]]
     assert texts == [{"now_ns": 4 * SECOND}]
     live.end()
-    _, texts = told(session.news())
+    _, texts = sent_of(session.news())
     assert texts[0]["header"]["is_live"] is False
 
 
@@ -100,7 +100,7 @@ def test_a_page_that_is_too_slow_is_told_what_it_lost(monkeypatch: pytest.Monkey
     for count, lost in ((5, None), (6, 6)):
         for n in range(count):
             live.offer(n, n * SECOND)
-        frames, texts = told(session.news())
+        frames, texts = sent_of(session.news())
         assert [len(frame.columns[0]) for frame in frames] == ([] if lost else [5])
         assert [text["lost"] for text in texts if "lost" in text] == ([lost] if lost else [])
 

@@ -1,6 +1,8 @@
 """A run that is looked at: the same trace whoever looks, and the rows that its trace has."""
 
+import re
 import threading
+import webbrowser
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -10,7 +12,10 @@ import pytest
 pytest.importorskip("uvicorn")
 websockets = pytest.importorskip("websockets.sync.client")
 
-from p2os.view.live import MOST_WAITING  # noqa: E402
+from p2os.cli.captures.shown_page import shown  # noqa: E402
+from p2os.cli.main import run as p2os  # noqa: E402
+from p2os.view.header import PageHeader  # noqa: E402
+from p2os.view.live import MOST_WAITING, StillRecording  # noqa: E402
 from p2os.view.recording import ViewRecording  # noqa: E402
 from p2os.view.server.serving import ViewServer, serving  # noqa: E402
 from robot_bench.recording.run_record import read_run  # noqa: E402
@@ -96,3 +101,33 @@ def test_run_folders_and_scenarios_are_targets_by_what_they_are(alone: Path, tmp
     live = scenario_target("motors")
     assert live is not None
     assert live.run is not None
+
+
+def test_run_view_is_the_run_without_and_prints_the_link(
+    alone: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["run", "motors", "--body", "kinematic", "--duration", "0.4s", "--realtime", "8", "--out"]
+    assert p2os([*words, str(tmp_path / "without")]) == 0
+    capsys.readouterr()
+    assert p2os([*words, str(tmp_path / "with"), "--view", "--no-browser"]) == 0
+    said = capsys.readouterr()
+    assert re.match(r"page: http://127\.0\.0\.1:\d+/#token=[\w-]{43}\n", said.err)
+    assert "token" not in said.out
+    assert hash_of(tmp_path / "with") == hash_of(tmp_path / "without")
+
+
+@pytest.mark.parametrize("beside", [["--gdb", "1"], ["--foxglove"], ["--seeds", "1-2"], ["--port", "tcp:127.0.0.1:9"]])
+def test_what_cannot_stand_beside_a_page_is_said(beside: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert p2os(["run", "motors", "--view", *beside]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("p2os: --view cannot stand beside ")
+    assert "hint: " in said
+
+
+def test_a_browser_is_opened_unless_told_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr(webbrowser, "open", opened.append)
+    for is_opened in (False, True):
+        with shown(StillRecording(ViewRecording(PageHeader(title="x"))), is_opened=is_opened) as page:
+            url = page.url
+    assert opened == [url]

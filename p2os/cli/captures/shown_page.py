@@ -4,11 +4,16 @@ import contextlib
 import sys
 import webbrowser
 from collections.abc import Iterator
+from typing import Annotated
+
+import typer
 
 from p2os.view.live import ShownSource
 from p2os.view.targets import ServedPage, served
 
 HOST = "127.0.0.1"
+Viewed = Annotated[bool, typer.Option("--view", help="Show it on a page in the browser, too.")]
+NoBrowser = Annotated[bool, typer.Option("--no-browser", help="With a page: print its link, open nothing.")]
 
 
 @contextlib.contextmanager
