@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Generic, Protocol, TypeVar
 
+from p2os.view.header import PageHeader
 from p2os.view.recording import ViewRecording
 from simbase.timing import Nanos
 
@@ -47,6 +48,7 @@ class LiveRecording(Generic[Happening]):
         self._now: Nanos = 0
         self._lost = 0
         self._is_over = False
+        self._report: PageHeader | None = None
         recording.header = replace(recording.header, is_live=True)
 
     def offer(self, happening: Happening, now: Nanos) -> None:
@@ -57,8 +59,13 @@ class LiveRecording(Generic[Happening]):
         else:
             self._lost += 1
 
-    def end(self) -> None:
-        """Say that nothing more will come; called by the program."""
+    def end(self, report: PageHeader | None = None) -> None:
+        """Say that nothing more will come, and what came of it; called by the program.
+
+        Args:
+            report: Has verdict, sections and what else a recorded one begins with; None: nothing is known yet.
+        """
+        self._report = report
         self._is_over = True
 
     def update(self) -> None:
@@ -71,6 +78,12 @@ class LiveRecording(Generic[Happening]):
         now = max(self._now, header.end_ns)
         if (now, not is_over, left_out) != (header.end_ns, header.is_live, header.left_out):
             self.recording.header = replace(header, end_ns=now, is_live=not is_over, left_out=left_out)
+        if (report := self._report) is not None:
+            self._report = None
+            self.recording.header = replace(
+                self.recording.header, verdict=report.verdict, standing=report.standing, lead=report.lead,
+                why=report.why, sections=report.sections, footer=report.footer,
+            )  # fmt: skip
 
 
 class StillRecording:

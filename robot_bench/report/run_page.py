@@ -25,7 +25,7 @@ def run_report(record: RunRecord) -> ViewRecording:
     """Return a run as the page shows it: rows and report."""
     found = recording_of(record)
     found.header = replace(
-        found.header, lead=_lead(record.meta), why=str(record.end.get(EXPLAINED) or ""),
+        found.header, lead=lead_of(record.meta), why=str(record.end.get(EXPLAINED) or ""),
         sections=list(_sections(record)), footer=_footer(record),
     )  # fmt: skip
     return found
@@ -86,7 +86,7 @@ def _measured(end: Json) -> Iterator[PageSection]:
             yield PageSection(title=key.title(), blocks=[listing, PageList(items=files)])
 
 
-def _lead(meta: Json) -> str:
+def lead_of(meta: Json) -> str:
     """Return the sentence under the title: what was run, on what, in what."""
     world = cast("Json", meta.get("world") or {})
     path = {"direct": "wired straight to the body", "adapter": "through adapter and P2OS"}.get(

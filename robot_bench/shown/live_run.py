@@ -4,13 +4,14 @@ Invariant: nobody who looks on decides anything: the trace is the same with and 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from p2os.view.header import PageHeader
 from p2os.view.live import LiveRecording
 from p2os.view.recording import ViewRecording
 from robot_bench.bench import Bench, run_of
 from robot_bench.events.codec import Blocks, EdgeBlock, Json, Levels, Recorded
+from robot_bench.report.run_page import lead_of
 from robot_bench.run import meta_of
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.view.run_tracks import RunTracks
@@ -57,6 +58,7 @@ class LiveRun:
 
     def _add(self, happened: BenchBuilt | BenchReleased) -> None:
         if isinstance(happened, BenchBuilt):
+            self._recording.header = replace(self._recording.header, lead=lead_of(happened.meta))
             self._tracks = RunTracks(self._recording, happened.meta)
             return
         assert self._tracks is not None  # noqa: S101 - a bench was built before

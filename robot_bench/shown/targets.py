@@ -43,7 +43,9 @@ def scenario_target(named: str) -> ViewTarget | None:
     live = LiveRun(scenario)
 
     def run() -> None:
-        if run_scenario(scenario, make_next_folder(scenario.name), speed=1.0, drive=live.drive).was_interrupted:
+        done = run_scenario(scenario, make_next_folder(scenario.name), speed=1.0, drive=live.drive)
+        if done.was_interrupted:
             raise KeyboardInterrupt
+        live.source.end(run_report(read_run(done.folder)).header)
 
     return ViewTarget(source=live.source, run=run)

@@ -92,6 +92,9 @@ class PageSession:
         """
         self._count(now_s)
         wanted = _wanted_of(text)
+        if wanted.from_ns > wanted.to_ns:
+            yield _said(refused="from_ns is behind to_ns", done=wanted.id)
+            return
         unknown = [channel for channel in wanted.want if not 0 <= channel < len(self._recording.tracks)]
         if unknown:
             yield _said(refused=f"there is no channel {unknown[0]}", done=wanted.id)
@@ -148,6 +151,4 @@ def _wanted_of(text: str) -> Wanted:
     if not all(type(value) is int and _LEAST_NS <= value <= _MOST_NS for value in numbers.values()):
         raise RequestError("a time, pixels and id are whole numbers of 64 bits")
     wanted = Wanted(want=tuple(want), **cast("dict[str, int]", numbers))
-    if not 1 <= wanted.pixels <= MOST_PIXELS or wanted.from_ns > wanted.to_ns:
-        raise RequestError(f"pixels from 1 to {MOST_PIXELS}, and from_ns not behind to_ns")
-    return wanted
+    return replace(wanted, pixels=max(1, min(MOST_PIXELS, wanted.pixels)))

@@ -19,6 +19,7 @@ from p2os.view.live import MOST_WAITING, StillRecording  # noqa: E402
 from p2os.view.recording import ViewRecording  # noqa: E402
 from p2os.view.server.serving import ViewServer, serving  # noqa: E402
 from robot_bench.recording.run_record import read_run  # noqa: E402
+from robot_bench.report.run_page import run_report  # noqa: E402
 from robot_bench.run import run_scenario  # noqa: E402
 from robot_bench.scenario.loading import load_scenario  # noqa: E402
 from robot_bench.shown.live_run import LiveRun  # noqa: E402
@@ -65,6 +66,12 @@ def test_a_live_run_has_the_rows_of_its_trace(alone: Path, tmp_path: Path) -> No
     live.source.update()
     assert rows_of(live.source.recording) == rows_of(recording_of(read_run(alone)))
     assert live.source.recording.header.is_live is False
+    report = run_report(read_run(folder)).header
+    assert live.source.recording.header.lead == report.lead != ""
+    live.source.end(report)
+    live.source.update()
+    header = live.source.recording.header
+    assert (header.verdict, header.sections, header.is_live) == (report.verdict, report.sections, False)
 
 
 @pytest.mark.slow

@@ -119,7 +119,7 @@ def test_what_finds_no_room_before_it_is_shown_is_counted_and_said() -> None:
     "text",
     [
         "", "{", "[]", "null", "3", '"want"', "{}", '{"want": 0}', '{"want": [true]}', '{"want": [0.5]}',
-        '{"want": ["0"]}', '{"want": [], "pixels": 0}', '{"want": [], "pixels": 8193}', '{"want": [], "from_ns": 1}',
+        '{"want": ["0"]}',
         '{"want": [], "to_ns": 1e3}', '{"want": [], "id": null}', '{"want": [], "more": 1}',
         '{"want": [], "to_ns": 9223372036854775808}', '{"want": [], "to_ns": NaN}', "[" * 60_000,
         json.dumps({"want": [0] * 4097}),
@@ -150,6 +150,17 @@ def test_whatever_comes_is_answered_or_refused(text: str) -> None:
 def test_a_channel_that_is_not_there_is_refused_in_words(channel: int) -> None:
     _, texts = asked(PageSession(StillRecording(recording())), want=[0, channel], id=3)
     assert texts == [{"done": 3, "refused": f"there is no channel {channel}"}]
+
+
+def test_a_stretch_that_ends_before_it_begins_is_refused_in_words() -> None:
+    _, texts = asked(PageSession(StillRecording(recording())), want=[0], from_ns=1, to_ns=0, id=3)
+    assert texts == [{"done": 3, "refused": "from_ns is behind to_ns"}]
+
+
+@pytest.mark.parametrize(("pixels", "rows"), [(0, 4), (-5, 4), (1, 4), (10**9, 100)])
+def test_pixels_are_taken_as_many_as_a_screen_may_have(pixels: int, rows: int) -> None:
+    frames, _ = asked(PageSession(StillRecording(recording(100))), want=[0], to_ns=100 * SECOND, pixels=pixels)
+    assert 2 <= frames[0].count <= rows
 
 
 def test_a_request_that_is_too_long_is_a_flood() -> None:
