@@ -4,9 +4,6 @@ The one description: frames are packed and read by it (`frames`), and the types 
 it (`tools/page/generate_view.py`). A row of a channel is a moment: its first column is `t`, int64 nanoseconds, never
 running back.
 
-A kind that a package adds (entry points of the group `p2os.view_kinds`, a `ChannelKind` each) has a number of its own
-from `FIRST_FREE` on; the page shows it as a table where it has no view for it.
-
 Invariant: numbers and columns of a kind never change; what needs others is a new kind.
 """
 
@@ -15,8 +12,6 @@ from enum import Enum
 
 #: Of the frames, the header and the subprotocol; another is refused.
 FORMAT = 1
-#: Of kinds that packages add.
-FIRST_FREE = 64
 
 
 class CellType(Enum):

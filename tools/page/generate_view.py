@@ -32,7 +32,6 @@ def _numbers() -> list[str]:
     flags = ", ".join(f"{flag.name}: {flag.value}" for flag in FrameFlags)
     return [
         f"export const FORMAT = {channels.FORMAT};",
-        f"export const FIRST_FREE = {channels.FIRST_FREE};",
         f"export const FLAGS = {{ {flags} }} as const;",
         "export type Cells = " + " | ".join(f'"{cells.value}"' for cells in CellType) + ";",
         _plain_interface("ColumnKind", name="string", cells="Cells", isWide="boolean"),

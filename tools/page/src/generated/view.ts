@@ -1,7 +1,6 @@
 // Made by tools/page/generate_view.py of p2os/view/channels.py and header.py: do not edit.
 
 export const FORMAT = 1;
-export const FIRST_FREE = 64;
 export const FLAGS = { REDUCED: 1, REPLACES: 2 } as const;
 export type Cells = "i64" | "f64" | "f32" | "u32" | "u8" | "text" | "bytes";
 export interface ColumnKind {
