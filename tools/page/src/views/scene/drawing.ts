@@ -1,9 +1,6 @@
 // Draws the world in three dimensions: z up, metres, as the plan has them. It draws when something changed, and else rests.
 import * as THREE from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
-import { Line2 } from "three/addons/lines/Line2.js";
-import { LineGeometry } from "three/addons/lines/LineGeometry.js";
-import { LineMaterial } from "three/addons/lines/LineMaterial.js";
 import { numbers } from "../../data/frames";
 import { lastAt } from "../../data/search";
 import type { WorldThing } from "../../generated/view";
@@ -12,6 +9,9 @@ import type { SceneHandle, SceneModel, SceneTrack } from "./model";
 
 const FLOOR_Z = 0.002;
 const PATH_Z = 0.015;
+const HALF_PATH_M = 0.014;
+/** Pixels of the canvas for each of the screen's while things move, along each side; when they rest, ms. */
+const COARSE = 0.5, RESTING_MS = 250;
 
 export function mountScene(model: SceneModel, host: HTMLElement): SceneHandle {
   return new SceneView(model, host);
@@ -29,15 +29,17 @@ class SceneView implements SceneHandle {
   private readonly tip = document.createElement("div");
   private readonly observer: ResizeObserver;
   private readonly stopWatch: () => void;
+  private readonly isSoftware: boolean;
   private asked = 0;
+  private resting: ReturnType<typeof setTimeout> | undefined;
   private follows = false;
   private last: THREE.Vector3 | undefined;
   private shown = "";
 
   constructor(private readonly model: SceneModel, private readonly host: HTMLElement) {
-    const isSoftware = drawnInSoftware(); // each pixel counts there
-    this.renderer = new THREE.WebGLRenderer({ antialias: !isSoftware, powerPreference: "low-power" });
-    this.renderer.setPixelRatio(isSoftware ? 1 : Math.min(devicePixelRatio || 1, 2));
+    this.isSoftware = drawnInSoftware();
+    this.renderer = new THREE.WebGLRenderer({ antialias: !this.isSoftware, powerPreference: "low-power" });
+    this.renderer.setPixelRatio(this.isSoftware ? 1 : Math.min(devicePixelRatio || 1, 2));
     const canvas = this.renderer.domElement;
     canvas.className = "surface";
     canvas.tabIndex = 0;
@@ -90,6 +92,7 @@ class SceneView implements SceneHandle {
     this.observer.disconnect();
     this.controls.dispose();
     if (this.asked) cancelAnimationFrame(this.asked);
+    clearTimeout(this.resting);
     this.renderer.dispose();
     this.renderer.domElement.remove();
     this.tip.remove();
@@ -98,8 +101,19 @@ class SceneView implements SceneHandle {
   private ask(): void {
     this.asked ||= requestAnimationFrame(() => {
       this.asked = 0;
+      if (this.isSoftware) this.drawCoarse();
       this.draw();
     });
+  }
+
+  /** Where the processor draws each pixel there are fewer of them while things move, and all when they rest. */
+  private drawCoarse(): void {
+    this.renderer.setPixelRatio(COARSE);
+    clearTimeout(this.resting);
+    this.resting = setTimeout(() => {
+      this.renderer.setPixelRatio(1);
+      this.draw();
+    }, RESTING_MS);
   }
 
   private draw(): void {
@@ -215,8 +229,8 @@ function thingMesh(thing: WorldThing, model: SceneModel): THREE.Mesh {
 /** A robot: its hull with wheels, its path and what its range sensors see. */
 class RobotMesh {
   readonly body = new THREE.Group();
-  private readonly past = wideLine(3, 1);
-  private readonly future = wideLine(2, 0.3);
+  private readonly past = ribbon(1);
+  private readonly future = ribbon(0.3);
   private readonly rays = new THREE.LineSegments(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ vertexColors: true, transparent: true, opacity: 0.8 }));
   private frame: unknown;
 
@@ -248,7 +262,8 @@ class RobotMesh {
     this.body.position.set(at.x, at.y, at.z);
     this.body.rotation.set(0, -at.pitch, at.heading, "ZYX");
     const row = Math.max(0, lastAt(frame.t, now));
-    this.past.geometry.instanceCount = row;
+    this.past.geometry.setDrawRange(0, 6 * row);
+    this.future.geometry.setDrawRange(6 * row, Infinity);
     this.buildRays(track, model, now);
   }
 
@@ -257,14 +272,20 @@ class RobotMesh {
   }
 
   private buildPath({ frame, colour }: SceneTrack, model: SceneModel): void {
-    const xs = numbers(frame, "x_m"), ys = numbers(frame, "y_m"), zs = numbers(frame, "z_m"), points: number[] = [], colours: number[] = [], paint = new THREE.Color();
+    const xs = numbers(frame, "x_m"), ys = numbers(frame, "y_m"), zs = numbers(frame, "z_m"), points: number[] = [], colours: number[] = [], corners: number[] = [], paint = new THREE.Color();
+    let nx = 0, ny = 1; // across the way; where the robot stands, as before
     for (let n = 0; n < frame.count; n++) {
-      points.push(xs[n]!, ys[n]!, zs[n]! + PATH_Z);
+      const m = Math.min(n + 1, frame.count - 1), dx = xs[m]! - xs[Math.max(0, m - 1)]!, dy = ys[m]! - ys[Math.max(0, m - 1)]!, long = Math.hypot(dx, dy);
+      if (long > 1e-6) [nx, ny] = [-dy / long, dx / long];
       paint.set(colour ?? model.scale(n / Math.max(1, frame.count - 1)));
-      colours.push(paint.r, paint.g, paint.b);
+      for (const side of [-1, 1]) {
+        points.push(xs[n]! + side * HALF_PATH_M * nx, ys[n]! + side * HALF_PATH_M * ny, zs[n]! + PATH_Z);
+        colours.push(paint.r, paint.g, paint.b);
+      }
+      if (n + 1 < frame.count) corners.push(2 * n, 2 * n + 1, 2 * n + 2, 2 * n + 2, 2 * n + 1, 2 * n + 3);
     }
-    if (frame.count < 2) return;
-    for (const line of [this.past, this.future]) line.geometry = new LineGeometry().setPositions(points).setColors(colours);
+    const position = new THREE.Float32BufferAttribute(points, 3), color = new THREE.Float32BufferAttribute(colours, 3);
+    for (const path of [this.past, this.future]) path.geometry = new THREE.BufferGeometry().setAttribute("position", position).setAttribute("color", color).setIndex(corners);
   }
 
   private buildRays({ ranges, at }: SceneTrack, model: SceneModel, now: number): void {
@@ -291,9 +312,9 @@ class RobotMesh {
   }
 }
 
-/** A line as wide as some pixels. */
-function wideLine(linewidth: number, opacity: number): Line2 {
-  return new Line2(new LineGeometry(), new LineMaterial({ vertexColors: true, linewidth, transparent: opacity < 1, opacity }));
+/** A path on the floor, as a band: lines wider than a pixel cost a software renderer ten times as much as all the rest. */
+function ribbon(opacity: number): THREE.Mesh<THREE.BufferGeometry, THREE.MeshBasicMaterial> {
+  return new THREE.Mesh(new THREE.BufferGeometry(), new THREE.MeshBasicMaterial({ vertexColors: true, transparent: opacity < 1, opacity, side: THREE.DoubleSide }));
 }
 
 function empty(group: THREE.Group): void {
