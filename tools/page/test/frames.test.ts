@@ -1,8 +1,8 @@
 // The decoder, against frames that Python packed.
 import { readFileSync } from "node:fs";
 import { describe, expect, it } from "vitest";
-import { type Frame, FrameError, frameAt, framesIn, Runs } from "../src/data/frames";
-import { joined, Lane } from "../src/data/lane";
+import { type Column, type Frame, FrameError, frameAt, framesIn, Runs } from "../src/data/frames";
+import { joined, Lane, OPEN_END_NS } from "../src/data/lane";
 import { KINDS } from "../src/generated/view";
 
 interface Expected {
@@ -75,12 +75,28 @@ describe("rows of a live run", () => {
     expect(plain(all, "text")).toEqual([...plain(text, "text"), ...plain(text, "text")]);
   });
 
-  it("are added to the piece that ended there, and replace all when the frame says so", () => {
-    const lane = new Lane(), text = frames.find((frame) => frame.kind === "text")!;
-    lane.add({ ...text, replaces: true });
-    lane.add({ ...text, replaces: false, from: text.to, to: text.to + 50 }, true);
-    expect(lane.best(text.from, text.to + 50)).toMatchObject({ from: text.from, to: text.to + 50, count: text.count });
+  it("are added to what was asked for without an end, and replace all when the frame says so", () => {
+    const lane = new Lane(), text = frames.find((frame) => frame.kind === "text")!, later = (n: number): Frame => {
+      const t = text.t.map((_, row) => text.to + 100 * n + row);
+      return { ...text, replaces: false, from: t[0]!, to: t.at(-1)!, t, columns: new Map([...text.columns, ["t_ns", t]]) };
+    };
+    lane.add({ ...text, replaces: false, to: OPEN_END_NS });
+    const rows = () => lane.best(text.from, text.to + 1e15)!, first = rows();
+    for (let n = 1; n < 40; n++) lane.extend(later(n));
+    expect(rows().count).toBe(40 * text.count);
+    expect(plain(rows(), "text")).toEqual(Array.from({ length: 40 }, () => plain(text, "text")).flat());
+    expect(plain(first, "text")).toEqual(plain(text, "text"));
     lane.add({ ...text, replaces: true, to: 7 });
     expect(lane.best(0, 7)!.to).toBe(7);
+  });
+
+  it("are asked for anew when they are too many", () => {
+    const lane = new Lane(), few = { ...frames.find((frame) => frame.kind === "levels")!, isReduced: false, replaces: false, to: OPEN_END_NS };
+    lane.add(few);
+    lane.answered({ from: few.from, to: few.to, pixels: 100 });
+    expect(lane.suffices(0, 1e15, 100, 1e15)).toBe(true);
+    const t = Float64Array.from({ length: 61_000 }, (_, n) => few.t.at(-1)! + 1 + n), level = new Uint32Array(t.length);
+    lane.extend({ ...few, count: t.length, of: t.length, from: t[0]!, to: t.at(-1)!, t, columns: new Map<string, Column>([["t_ns", t], ["level", level], ["edges", level]]) });
+    expect(lane.suffices(0, 1e15, 100, 1e15)).toBe(false);
   });
 });

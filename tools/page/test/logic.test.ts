@@ -73,7 +73,7 @@ describe("search", () => {
     const edges = Array.from({ length: 2000 }, (_, n) => [n * 50, n % 2] as const);
     const all = (from: number, to: number): Frame => levels(edges.filter(([t]) => t >= from - 50 && t <= to + 50), { from, to });
     let asked = 0;
-    const run = store([channel(0, "levels")], 100_000, { ask: (request, answered) => { asked++; run.receive([all(request.from_ns, request.to_ns)]); answered(); } });
+    const run = store([channel(0, "levels")], 100_000, { ask: (request, answered) => { asked++; run.receive([all(request.from_ns, request.to_ns)]); answered(true); } });
     run.receive([levels([[0, 0], [99_950, 1]], { from: 0, to: 100_000, isReduced: true, of: 2000 }, [1999, 1])]);
     expect(await find(run, 0, 70_020, 1, { what: "rising" })).toBe(70_050);
     expect(await find(run, 0, 70_020, -1, { what: "falling" })).toBe(70_000);
@@ -84,11 +84,11 @@ describe("search", () => {
 describe("a pulse", () => {
   it("is measured with its period", () => {
     const wire = levels([[0, 0], [10, 1], [25, 0], [40, 1]], { to: 100 });
-    expect(pulseAt(wire, 12)).toEqual({ from: 10, to: 25, value: 1, period: 30 });
-    expect(pulseAt(wire, 50)).toEqual({ from: 40, to: 100, value: 1, period: undefined });
+    expect(pulseAt(wire, 12, 100)).toEqual({ from: 10, to: 25, value: 1, period: 30 });
+    expect(pulseAt(wire, 50, 90)).toEqual({ from: 40, to: 90, value: 1, period: undefined });
   });
   it("is not known where changes are left out", () => {
-    expect(pulseAt(levels([[0, 0], [50, 1]], {}, [7, 1]), 10)).toBeUndefined();
+    expect(pulseAt(levels([[0, 0], [50, 1]], {}, [7, 1]), 10, 100)).toBeUndefined();
   });
   it.each([["2 us", 2000], ["10ns", 10], ["0.5 ms", 5e5], ["3", 3000], ["x", NaN], ["", NaN]])("a length written %s is %f ns", (text, ns) => expect(parsedDuration(text)).toEqual(ns));
   it.each([["0x1F", 31], ["0b101", 5], ["7", 7], ["", NaN], ["z", NaN]])("a value written %s is %f", (text, value) => expect(parsedValue(text)).toEqual(value));

@@ -11,16 +11,15 @@ export class FrameError extends Error {}
 /** Texts or runs of bytes, each distinct one once; decoded when it is asked for. */
 export class Runs<T> {
   readonly length: number;
-  private readonly known: (T | undefined)[];
 
   constructor(
     private readonly places: Uint32Array,
     private readonly ends: Uint32Array,
     private readonly blob: Uint8Array,
     private readonly decode: (bytes: Uint8Array) => T,
+    private readonly known: (T | undefined)[] = [],
   ) {
     this.length = places.length;
-    this.known = new Array<T | undefined>(ends.length);
   }
 
   /** How many distinct ones there are. */
@@ -47,17 +46,10 @@ export class Runs<T> {
     return this.value(this.places[row]!);
   }
 
-  /** These rows and some more: all of `next` but its first `skip`. */
-  joined(next: Runs<T>, skip: number): Runs<T> {
-    const kept = next.places.subarray(skip), places = new Uint32Array(this.length + kept.length);
-    places.set(this.places);
-    for (let n = 0; n < kept.length; n++) places[this.length + n] = kept[n]! + this.ends.length;
-    const ends = new Uint32Array(this.ends.length + next.ends.length), blob = new Uint8Array(this.blob.length + next.blob.length);
-    ends.set(this.ends);
-    for (let n = 0; n < next.ends.length; n++) ends[this.ends.length + n] = next.ends[n]! + this.blob.length;
-    blob.set(this.blob);
-    blob.set(next.blob, this.blob.length);
-    return new Runs(places, ends, blob, this.decode);
+  /** These rows and some more: all of `next` but its first `skip`; `grow` puts numbers behind others. */
+  joined(next: Runs<T>, skip: number, grow: <N extends Numbers>(first: N, more: N) => N): Runs<T> {
+    const places = next.places.subarray(skip).map((place) => place + this.ends.length), ends = next.ends.map((end) => end + this.blob.length);
+    return new Runs(grow(this.places, places), grow(this.ends, ends), grow(this.blob, next.blob), this.decode, this.known);
   }
 }
 

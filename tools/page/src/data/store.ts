@@ -2,14 +2,14 @@
 import { signal, type Signal } from "@preact/signals";
 import type { ChannelHeader, PageHeader, Wanted } from "../generated/view";
 import type { Frame } from "./frames";
-import { Lane, RESERVE } from "./lane";
+import { Lane, OPEN_END_NS, serves } from "./lane";
 
 export type Request = Omit<Wanted, "id">;
 
 /** Where rows come from: a server; a page that is one file has none. */
 export interface Source {
-  /** Asks for rows; they come by `Store.receive`, and then it is answered. */
-  ask(request: Request, answered: () => void): void;
+  /** Asks for rows; they come by `Store.receive`, and then it is answered: with whether they came. */
+  ask(request: Request, answered: (isThere: boolean) => void): void;
 }
 
 /** How long requests of one moment are gathered, ms. */
@@ -17,7 +17,7 @@ const GATHERED_MS = 40;
 /** Pixels that a whole run is asked for. */
 const WHOLE_PIXELS = 2000;
 /** The most that the server takes. */
-const MOST_PIXELS = 20000;
+const MOST_PIXELS = 8192;
 
 export class Store {
   readonly header: Signal<PageHeader>;
@@ -47,8 +47,15 @@ export class Store {
     return this.source !== undefined;
   }
 
-  receive(frames: readonly Frame[], isLive = false): void {
-    for (const frame of frames) this.lane(frame.channel).add(frame, isLive);
+  /** Takes rows that were asked for, or stand in the page. */
+  receive(frames: readonly Frame[]): void {
+    for (const frame of frames) this.lane(frame.channel).add(frame);
+    this.version.value++;
+  }
+
+  /** Takes rows that a live run has just made. */
+  extend(frame: Frame): void {
+    this.lane(frame.channel).extend(frame);
     this.version.value++;
   }
 
@@ -70,7 +77,7 @@ export class Store {
   async exact(id: number, from: number, to: number): Promise<Frame | undefined> {
     const here = this.lane(id).best(from, to);
     if (!this.source || (here && !here.isReduced && here.from <= from && here.to >= to)) return here;
-    await new Promise<void>((resolve) => this.source!.ask({ want: [id], from_ns: Math.floor(from), to_ns: Math.ceil(to), pixels: MOST_PIXELS }, resolve));
+    await new Promise<void>((resolve) => this.source!.ask({ want: [id], from_ns: Math.floor(from), to_ns: Math.ceil(to), pixels: MOST_PIXELS }, () => resolve()));
     return this.lane(id).best(from, to);
   }
 
@@ -87,26 +94,32 @@ export class Store {
   }
 
   private want(id: number, from: number, to: number, pixels: number): void {
-    if (!this.source || this.lane(id).suffices(from, to, pixels)) return;
-    if (this.open.some((request) => request.want.includes(id) && request.from_ns <= from && request.to_ns >= to && request.to_ns - request.from_ns <= Math.max(1, to - from) * RESERVE)) return;
+    const { end_ns } = this.header.peek();
+    if (!this.source || this.lane(id).suffices(from, to, pixels, end_ns)) return;
+    if (this.open.some((asked) => asked.want.includes(id) && serves({ from: asked.from_ns, to: asked.to_ns, pixels: asked.pixels }, from, to, pixels, end_ns))) return;
     const key = `${from} ${to}`, found = this.gathered.get(key);
-    if (found) found.ids.add(id);
-    else this.gathered.set(key, { ids: new Set([id]), from, to, pixels });
+    if (found) {
+      found.ids.add(id);
+      found.pixels = Math.max(found.pixels, pixels);
+    } else this.gathered.set(key, { ids: new Set([id]), from, to, pixels });
     this.timer ??= setTimeout(() => this.flush(), GATHERED_MS);
   }
 
   private flush(): void {
     this.timer = undefined;
-    const { start_ns, end_ns } = this.header.peek();
-    for (const { ids, from, to, pixels } of this.gathered.values()) {
-      const edge = (to - from) * 0.75; // so that a short way to the side needs no new rows
-      const request: Request = { want: [...ids], from_ns: Math.floor(Math.max(start_ns, from - edge)), to_ns: Math.ceil(Math.min(end_ns, to + edge)), pixels: Math.ceil(Math.min(MOST_PIXELS, 2.5 * pixels)) };
-      this.open.push(request);
-      this.source!.ask(request, () => {
-        const place = this.open.indexOf(request);
-        if (place >= 0) this.open.splice(place, 1);
-      });
-    }
+    for (const { ids, from, to, pixels } of this.gathered.values()) this.ask([...ids], from, to, pixels);
     this.gathered = new Map();
+  }
+
+  private ask(want: readonly number[], from: number, to: number, pixels: number): void {
+    const { start_ns, end_ns, is_live } = this.header.peek(), edge = (to - from) * 0.75; // so that a short way to the side needs no new rows
+    const end = to + edge >= end_ns && is_live ? OPEN_END_NS : Math.ceil(Math.min(end_ns, to + edge));
+    const request: Request = { want, from_ns: Math.floor(Math.max(start_ns, from - edge)), to_ns: end, pixels: Math.ceil(Math.min(MOST_PIXELS, 2.5 * pixels)) };
+    this.open.push(request);
+    this.source!.ask(request, (isThere) => {
+      const place = this.open.indexOf(request);
+      if (place >= 0) this.open.splice(place, 1);
+      if (isThere) for (const id of want) this.lane(id).answered({ from: request.from_ns, to: request.to_ns, pixels: request.pixels });
+    });
   }
 }

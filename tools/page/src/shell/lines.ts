@@ -7,9 +7,9 @@ const LINES = ["now", "a", "b"] as const;
 /**
  * Puts the lines of now and of both cursors over an element.
  *
- * @param xOf Pixels from its left of a time; outside of what it shows, undefined. It may read signals.
+ * @param leftOf How far from its left a time stands, as CSS has it; outside of what it shows, undefined. It may read signals.
  */
-export function timeLines(host: HTMLElement, clock: Clock, xOf: (t: number) => number | undefined): { readonly place: () => void; readonly dispose: () => void } {
+export function timeLines(host: HTMLElement, clock: Clock, leftOf: (t: number) => string | undefined): { readonly place: () => void; readonly dispose: () => void } {
   const lines = LINES.map((name) => {
     const line = document.createElement("div");
     line.className = `time-line ${name}`;
@@ -19,9 +19,9 @@ export function timeLines(host: HTMLElement, clock: Clock, xOf: (t: number) => n
   });
   const place = () => {
     for (const [name, line] of lines) {
-      const t = clock[name].value, x = t === null ? undefined : xOf(t);
-      line.hidden = x === undefined;
-      if (x !== undefined) line.style.transform = `translateX(${x.toFixed(2)}px)`;
+      const t = clock[name].value, left = t === null ? undefined : leftOf(t);
+      line.hidden = left === undefined;
+      if (left !== undefined) line.style.left = left;
     }
   };
   const stop = effect(place);

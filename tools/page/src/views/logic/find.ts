@@ -63,14 +63,14 @@ export async function find(store: Store, channel: number, t: number, way: 1 | -1
   return undefined;
 }
 
-/** The pulse of a wire at a time: from when to when its value stands, and the time from its rise to the next; undefined where rows are left out. */
-export function pulseAt(frame: Frame, t: number): { from: number; to: number; value: number; period: number | undefined } | undefined {
+/** The pulse of a wire at a time: from when to when its value stands, and the time from its rise to the next; undefined where rows are left out; the run has no more than until `end`. */
+export function pulseAt(frame: Frame, t: number, end: number): { from: number; to: number; value: number; period: number | undefined } | undefined {
   const row = lastAt(frame.t, t), values = numbers(frame, "level");
   if (row < 0 || numbers(frame, "edges")[row]! > 1) return undefined;
   let first = row, last = row + 1;
   while (first > 0 && values[first - 1] === values[row]) first--;
   while (last < frame.count && values[last] === values[row]) last++;
-  if (last >= frame.count) return { from: frame.t[first]!, to: frame.to, value: values[row]!, period: undefined };
+  if (last >= frame.count) return { from: frame.t[first]!, to: Math.min(end, frame.to), value: values[row]!, period: undefined };
   let next = last + 1;
   while (next < frame.count && values[next] === values[last]) next++;
   return { from: frame.t[first]!, to: frame.t[last]!, value: values[row]!, period: next < frame.count ? frame.t[next]! - frame.t[first]! : undefined };

@@ -53,11 +53,11 @@ class LogicView {
     }, (sheet) => this.drawRows(sheet));
     this.scroller.addEventListener("scroll", wires.redraw);
     this.scroller.tabIndex = -1;
-    const xOf = (t: number) => {
+    const leftOf = (t: number) => {
       const { from, to } = app.clock, scale = this.scaleOf(wires.canvas.clientWidth);
-      return t < from.value || t > to.value ? undefined : drawing.px(scale, t);
+      return t < from.value || t > to.value ? undefined : `${drawing.px(scale, t)}px`;
     };
-    const lines = [timeLines(inner, app.clock, xOf), timeLines(axis, app.clock, xOf)], placed = new ResizeObserver(() => { for (const line of lines) line.place(); });
+    const lines = [timeLines(inner, app.clock, leftOf), timeLines(axis, app.clock, leftOf)], placed = new ResizeObserver(() => { for (const line of lines) line.place(); });
     placed.observe(inner);
     render(<Bar view={this} />, bar);
     render(<Readout view={this} />, readout);
@@ -225,7 +225,7 @@ class LogicView {
     const row = this.rows().find((one) => y >= one.top && y < one.top + one.height), t = drawing.timeAt(scale, x);
     let text = moment(t, (scale.to - scale.from) / scale.width);
     if (row?.kind === "wire") {
-      const frame = this.app.store.rows(row.channel!.id, scale.from, scale.to), pulse = frame && pulseAt(frame, t);
+      const frame = this.app.store.rows(row.channel!.id, scale.from, scale.to), pulse = frame && pulseAt(frame, t, this.app.clock.end.peek());
       if (pulse) {
         text += `   ${drawing.reading(row, pulse)}`;
         const from = Math.max(scale.left, drawing.px(scale, pulse.from)), to = Math.min(scale.left + scale.width, drawing.px(scale, pulse.to));

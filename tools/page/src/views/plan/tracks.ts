@@ -40,7 +40,7 @@ export function tracksAt(store: Store, now: number): RobotTrack[] {
 /** Rows around a time, exact where the whole run is not. */
 function around(store: Store, id: number, now: number): Frame | undefined {
   const whole = store.whole(id);
-  return whole && !whole.isReduced ? whole : store.rows(id, now - AROUND_NS, now + AROUND_NS, 4000);
+  return !whole?.isReduced ? whole : store.rows(id, now - AROUND_NS, now + AROUND_NS, 4000);
 }
 
 /** Below how many metres a range is near. */

@@ -58,7 +58,7 @@ function mountChart(app: App, list: HTMLElement, chart: Chart, count: number): (
     plot.root.querySelector("canvas")?.setAttribute("aria-label", `${chart.title} over time: ${chart.curves.map((curve) => curve.name).join(", ")}${chart.unit ? `, in ${chart.unit}` : ""}`);
     listen(app, plot);
     const { over } = plot;
-    lines = untracked(() => timeLines(over, clock, (t) => (t < clock.from.value || t > clock.to.value ? undefined : ((t - clock.from.value) / clock.span.value) * over.clientWidth)));
+    lines = untracked(() => timeLines(over, clock, (t) => (t < clock.from.value || t > clock.to.value ? undefined : `${((t - clock.from.value) / clock.span.value) * 100}%`)));
   };
   const stopBuild = effect(() => {
     reads(theme.value);

@@ -9,9 +9,7 @@ import type { SceneHandle, SceneModel, SceneTrack } from "./model";
 
 const FLOOR_Z = 0.002;
 const PATH_Z = 0.015;
-const HALF_PATH_M = 0.014;
-/** Pixels of the canvas for each of the screen's while things move, along each side; when they rest, ms. */
-const COARSE = 0.5, RESTING_MS = 250;
+const HALF_PATH_M = 0.022;
 
 export function mountScene(model: SceneModel, host: HTMLElement): SceneHandle {
   return new SceneView(model, host);
@@ -29,17 +27,15 @@ class SceneView implements SceneHandle {
   private readonly tip = document.createElement("div");
   private readonly observer: ResizeObserver;
   private readonly stopWatch: () => void;
-  private readonly isSoftware: boolean;
   private asked = 0;
-  private resting: ReturnType<typeof setTimeout> | undefined;
   private follows = false;
   private last: THREE.Vector3 | undefined;
   private shown = "";
 
   constructor(private readonly model: SceneModel, private readonly host: HTMLElement) {
-    this.isSoftware = drawnInSoftware();
-    this.renderer = new THREE.WebGLRenderer({ antialias: !this.isSoftware, powerPreference: "low-power" });
-    this.renderer.setPixelRatio(this.isSoftware ? 1 : Math.min(devicePixelRatio || 1, 2));
+    const isSoftware = drawnInSoftware(); // each pixel counts there
+    this.renderer = new THREE.WebGLRenderer({ antialias: !isSoftware, powerPreference: "low-power" });
+    this.renderer.setPixelRatio(isSoftware ? 1 : Math.min(devicePixelRatio || 1, 2));
     const canvas = this.renderer.domElement;
     canvas.className = "surface";
     canvas.tabIndex = 0;
@@ -92,7 +88,6 @@ class SceneView implements SceneHandle {
     this.observer.disconnect();
     this.controls.dispose();
     if (this.asked) cancelAnimationFrame(this.asked);
-    clearTimeout(this.resting);
     this.renderer.dispose();
     this.renderer.domElement.remove();
     this.tip.remove();
@@ -101,19 +96,8 @@ class SceneView implements SceneHandle {
   private ask(): void {
     this.asked ||= requestAnimationFrame(() => {
       this.asked = 0;
-      if (this.isSoftware) this.drawCoarse();
       this.draw();
     });
-  }
-
-  /** Where the processor draws each pixel there are fewer of them while things move, and all when they rest. */
-  private drawCoarse(): void {
-    this.renderer.setPixelRatio(COARSE);
-    clearTimeout(this.resting);
-    this.resting = setTimeout(() => {
-      this.renderer.setPixelRatio(1);
-      this.draw();
-    }, RESTING_MS);
   }
 
   private draw(): void {
