@@ -4,7 +4,7 @@ import tseslint from "typescript-eslint";
 const MARKUP = ["innerHTML", "outerHTML", "insertAdjacentHTML", "dangerouslySetInnerHTML", "srcdoc"];
 
 export default tseslint.config(
-  { ignores: ["node_modules", "*.mjs", "*.js"] },
+  { ignores: ["node_modules", "**/*.mjs", "*.js"] },
   ...tseslint.configs.strictTypeChecked,
   {
     languageOptions: { parserOptions: { projectService: true, tsconfigRootDir: import.meta.dirname } },
