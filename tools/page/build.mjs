@@ -16,9 +16,19 @@ const BUNDLE = join(HERE, "..", "..", "p2os", "view", "bundle");
 /** What the page may weigh, gzip. */
 const MOST_BYTES = 1_500_000;
 
+/** The dock's own themes are most of its style sheet, and the page has another one. */
+const withoutThemes = {
+  name: "without-themes",
+  setup: ({ onLoad }) => onLoad({ filter: /dockview\.css$/ }, ({ path }) => {
+    const rules = readFileSync(path, "utf8").replace(/\/\*[\s\S]*?\*\//g, "").split(/(?<=\})\n(?=\S)/);
+    const isTheme = (rule) => /^\s*[^{@]*\{/.test(rule) && rule.slice(0, rule.indexOf("{")).split(",").every((selector) => selector.includes(".dockview-theme-"));
+    return { contents: rules.filter((rule) => !isTheme(rule)).join("\n"), loader: "css" };
+  }),
+};
+
 const common = {
   absWorkingDir: HERE, bundle: true, minify: true, write: false, metafile: true, format: "iife", target: "es2022", charset: "utf8",
-  legalComments: "none", jsx: "automatic", jsxImportSource: "preact", define: { "process.env.NODE_ENV": '"production"' }, logLevel: "warning",
+  legalComments: "none", jsx: "automatic", jsxImportSource: "preact", define: { "process.env.NODE_ENV": '"production"' }, logLevel: "warning", plugins: [withoutThemes],
 };
 
 async function built() {
