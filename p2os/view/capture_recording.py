@@ -17,6 +17,7 @@ from p2os.protocol.frames import CHECKSUM_BYTES, PREFIX_BYTES, Frame
 from p2os.protocol.odometry import Odometry
 from p2os.protocol.sip import StandardSip
 from p2os.robots.parameters import RobotParameters
+from p2os.view.frames import LaterText
 from p2os.view.header import ChannelHeader, PageCell, PageHeader, PageSection, PageTable, RobotHeader, SensorPlace
 from p2os.view.packet_rows import PacketRows
 from p2os.view.recording import ChannelTrack, ViewRecording
@@ -42,7 +43,7 @@ def open_recording(path: Path) -> ViewRecording:
         FileError: It cannot be read, or holds no capture.
     """
     capture = open_file(path)
-    rows = CaptureTracks(PageHeader(title=path.name, lead=capture.note))
+    rows = CaptureTracks(ViewRecording(PageHeader(title=path.name, lead=capture.note)))
     rows.take(capture.chunks)
     return rows.recording
 
@@ -51,12 +52,16 @@ class CaptureTracks:
     """Adds what goes over a P2OS line to a recording.
 
     Args:
-        header: Of the recording; its end grows.
+        recording: Where channels are added.
         robot: Model or file; empty: what the robot says.
+        source: The robot's name among several; empty: the only one.
+        has_odometry: Whether pose and wheels are taken out of the packets; False where the truth is known.
     """
 
-    def __init__(self, header: PageHeader, robot: str = "") -> None:
-        self.recording = ViewRecording(header)
+    def __init__(
+        self, recording: ViewRecording, robot: str = "", source: str = "", *, has_odometry: bool = True
+    ) -> None:
+        self.recording, self._source, self._has_odometry = recording, source, has_odometry
         self._packets = PacketRows(robot)
         self._odometry: Odometry | None = None
         self._parameters: RobotParameters | None = None
@@ -84,7 +89,7 @@ class CaptureTracks:
         for row, listed in self._packets.take(chunk):
             self._add(row[0], row[1:], listed)
 
-    def _add(self, t: Nanos, cells: tuple[int, bytes, str, str, str, int], listed: ListingRow) -> None:
+    def _add(self, t: Nanos, cells: tuple[int, bytes, str, LaterText, LaterText, int], listed: ListingRow) -> None:
         self._track(ChannelHeader(name="P2OS", kind="packets", group="packets")).append(t, *cells)
         self._counts["damaged" if cells[-1] else "packets"] += 1
         if cells[-1]:
@@ -92,7 +97,7 @@ class CaptureTracks:
         elif listed.direction is Direction.FROM_ROBOT and listed.is_sip:
             self._sip(t, listed)
         elif listed.direction is not Direction.FROM_ROBOT and listed.name in {"OPEN", "CLOSE", "ENABLE", "E_STOP"}:
-            self._event(t, _INFO, "client", listed.name, cells[3])
+            self._event(t, _INFO, "client", listed.name, str(cells[3]))
 
     def _sip(self, t: Nanos, listed: ListingRow) -> None:
         reading = self._packets.reading.reading
@@ -102,13 +107,17 @@ class CaptureTracks:
         payload = listed.data[PREFIX_BYTES:-CHECKSUM_BYTES]
         at = self._odometry
         at.update(StandardSip.from_frame(Frame(payload), reading.profile))
-        self._track(_POSE).append(t, at.x_m, at.y_m, 0.0, at.heading_rad, 0.0)
+        if self._has_odometry:
+            self._track(_POSE).append(t, at.x_m, at.y_m, 0.0, at.heading_rad, 0.0)
         for field, (name, unit, group) in _SAMPLES.items():
+            if group == "wheels" and not self._has_odometry:
+                continue
             value = cast("float", listed.fields[field])
             self._track(ChannelHeader(name=name, kind="samples", unit=unit, group=group)).append(t, value)
         for field, what in _EVENTS.items():
             now = listed.fields[field]
-            if now and now != self._was.get(field):
+            # What a robot begins with is no event: without bumpers their bits are set.
+            if now and now != self._was.get(field, now):
                 detail = f"0b{now:07b}" if field.endswith("bumpers") else ""
                 self._event(t, _WARNING, "robot", what, detail)
             self._was[field] = now
@@ -122,10 +131,11 @@ class CaptureTracks:
         header = self.recording.header
         body = parameters.body
         robot = RobotHeader(
-            name="", model=parameters.subclass, front_m=body.hull_front_m, rear_m=body.hull_rear_m,
+            name=self._source, model=parameters.subclass, front_m=body.hull_front_m, rear_m=body.hull_rear_m,
             width_m=body.hull_width_m,
         )  # fmt: skip
-        self.recording.header = replace(header, robots=header.robots or (robot,))
+        if all(one.name != self._source for one in header.robots):
+            self.recording.header = replace(header, robots=(*header.robots, robot))
 
     def _sonar(self, t: Nanos, readings: Mapping[str, float]) -> None:
         """Add the ranges where one is new."""
@@ -141,12 +151,14 @@ class CaptureTracks:
         self._track(_NEAREST).append(t, nearest)
 
     def _event(self, t: Nanos, severity: int, who: str, what: str, detail: str) -> None:
-        self._track(_EVENT).append(t, severity, who, what, detail, math.nan, math.nan)
+        events = self._tracks.get("events") or self.recording.shared(_EVENT)
+        self._tracks["events"] = events
+        events.append(t, severity, f"{self._source} {who}".lstrip(), what, detail, math.nan, math.nan)
 
     def _track(self, header: ChannelHeader) -> ChannelTrack:
         key = f"{header.kind}:{header.name}"
         if key not in self._tracks:
-            self._tracks[key] = self.recording.add(header)
+            self._tracks[key] = self.recording.add(replace(header, source=self._source))
         return self._tracks[key]
 
 

@@ -36,42 +36,40 @@ class Extremes:
                 self._levels.append((array("q"), array("q")))
             least, greatest = self._levels[level]
             for run in range(len(least), rows // RUN):
-                below = self._rows_of(level, run)
-                least.append(min(below[0], key=values.__getitem__))
-                greatest.append(max(below[1], key=values.__getitem__))
+                lows, highs = self._at(level)
+                least.append(min(lows[run * RUN : (run + 1) * RUN], key=values.__getitem__))
+                greatest.append(max(highs[run * RUN : (run + 1) * RUN], key=values.__getitem__))
             rows, level = rows // RUN, level + 1
-
-    def _rows_of(self, level: int, run: int) -> tuple[Sequence[int], Sequence[int]]:
-        first, last = run * RUN, (run + 1) * RUN
-        if level == 0:
-            return range(first, last), range(first, last)
-        least, greatest = self._levels[level - 1]
-        return least[first:last], greatest[first:last]
 
     def within(self, first: int, last: int) -> tuple[int, int]:
         """Return the rows with the least and the greatest value from `first` to before `last`, of one row at least."""
-        least, greatest = first, first
-        for low, high in self._runs(first, last):
-            if self._values[low] < self._values[least]:
-                least = low
-            if self._values[high] > self._values[greatest]:
-                greatest = high
-        return least, greatest
+        least, greatest = list[int](), list[int]()
+        level = 0
+        while True:
+            run_first, run_last = -(-first // RUN), last // RUN
+            if level == len(self._levels) or run_last <= run_first:
+                self._take(level, first, last, least, greatest)
+                break
+            self._take(level, first, run_first * RUN, least, greatest)
+            self._take(level, run_last * RUN, last, least, greatest)
+            first, last, level = run_first, run_last, level + 1
+        value = self._values.__getitem__
+        return min(least, key=value), max(greatest, key=value)
 
-    def _runs(self, first: int, last: int) -> Iterator[tuple[int, int]]:
-        """Yield candidates: rows, and of whole runs, as large as fit, the least and the greatest."""
-        while first < last:
-            level = 0
-            while level < len(self._levels) and first % RUN ** (level + 1) == 0 and first + RUN ** (level + 1) <= last:
-                level += 1
-            if level == 0:
-                yield first, first
-                first += 1
-                continue
-            low, high = self._levels[level - 1]
-            run = first // RUN**level
-            yield low[run], high[run]
-            first += RUN**level
+    def _take(self, level: int, first: int, last: int, least: list[int], greatest: list[int]) -> None:
+        """Add the rows of a level that have the least and the greatest value among some of it."""
+        if first < last:
+            value = self._values.__getitem__
+            lows, highs = self._at(level)
+            least.append(min(lows[first:last], key=value))
+            greatest.append(max(highs[first:last], key=value))
+
+    def _at(self, level: int) -> tuple[Sequence[int], Sequence[int]]:
+        """Return the candidates of a level: all rows, or of each run the least and the greatest."""
+        if level == 0:
+            rows = range(len(self._values))
+            return rows, rows
+        return self._levels[level - 1]
 
 
 def buckets(times: Sequence[int], first: int, last: int, pixels: int) -> Iterator[tuple[int, int]]:

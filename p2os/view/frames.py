@@ -22,7 +22,7 @@ Invariant: `ViewFrame.from_bytes` is the inverse of `to_bytes`, and refuses all 
 import struct
 import sys
 from array import array
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import IntFlag
 from itertools import pairwise
@@ -46,6 +46,31 @@ _NUMBERS = {
     CellType.U32: ("I", 4),
     CellType.U8: ("B", 1),
 }
+
+
+class LaterText:
+    """A text that is made when somebody is to read it.
+
+    Args:
+        make: Makes it.
+    """
+
+    __slots__ = ("_make", "_text")
+
+    def __init__(self, make: Callable[[], str]) -> None:
+        self._make: Callable[[], str] | None = make
+        self._text = ""
+
+    def __str__(self) -> str:
+        """Return it, made by now."""
+        if self._make is not None:
+            self._text, self._make = self._make(), None
+        return self._text
+
+    def __repr__(self) -> str:
+        """Return it as a text is written."""
+        return repr(str(self))
+
 
 #: One column: numbers as an array of its type, texts or bytes as a list.
 ColumnValues: TypeAlias = "array[int] | array[float] | list[str] | list[bytes]"

@@ -7,11 +7,11 @@ Invariant: rows are added by the reader's side alone.
 """
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Generic, Protocol, TypeVar
 
-from p2os.view.header import PageHeader
+from p2os.view.header import PageHeader, PageSection
 from p2os.view.recording import ViewRecording
 from simbase.timing import Nanos
 
@@ -87,10 +87,18 @@ class LiveRecording(Generic[Happening]):
 
 
 class StillRecording:
-    """A recording that is whole."""
+    """A recording that is whole, but for sections that take a while."""
 
     def __init__(self, recording: ViewRecording) -> None:
         self.recording = recording
+        self._sections: Sequence[PageSection] | None = None
+
+    def show(self, sections: Sequence[PageSection]) -> None:
+        """Show these sections from now on; called by the program."""
+        self._sections = sections
 
     def update(self) -> None:
-        """Nothing comes."""
+        """Take the sections that have come; called by who shows it."""
+        if (sections := self._sections) is not None:
+            self._sections = None
+            self.recording.header = replace(self.recording.header, sections=sections)

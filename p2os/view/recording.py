@@ -8,14 +8,14 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import cast
 
-from p2os.view.channels import BY_NAME, ChannelKind
+from p2os.view.channels import BY_NAME, CellType, ChannelKind
 from p2os.view.detail import Extremes, changes, curve, nearest, rows_in, thinned_list
-from p2os.view.frames import NO_FLAGS, ColumnValues, FrameFlags, ViewFrame, chosen_rows, empty_columns
+from p2os.view.frames import NO_FLAGS, ColumnValues, FrameFlags, LaterText, ViewFrame, chosen_rows, empty_columns
 from p2os.view.header import ChannelHeader, PageHeader
 from simbase.timing import Nanos
 
 #: One cell of a row, or those of a wide column.
-Cell = int | float | str | bytes | Sequence[float]
+Cell = int | float | str | LaterText | bytes | Sequence[float]
 #: chosen: more rows than pixels by so many are thinned.
 ROWS_A_PIXEL = 4
 #: chosen: rows of a list that are sent at once; a screen shows some fifty.
@@ -93,6 +93,10 @@ class ChannelTrack:
     ) -> ViewFrame:  # fmt: skip
         if len(columns[0]) < of:
             flags |= FrameFlags.REDUCED
+        columns = tuple(
+            list(map(str, values)) if column.cells is CellType.TEXT else values
+            for column, values in zip(self.kind.columns, columns, strict=True)
+        )
         return ViewFrame(kind=self.kind, channel=self.header.id, columns=columns, from_ns=from_ns, to_ns=to_ns, of=of,
                          width=self.header.width if any(one.is_wide for one in self.kind.columns) else 1,
                          flags=flags)  # fmt: skip

@@ -28,13 +28,13 @@ from p2os.view.header import (
     WorldThing,
 )
 from p2os.view.page import document
+from p2os.view.world_plan import world_of
 from robot_bench.campaign.conduct import FAILURES, PointFinding, PointRow, Run
 from robot_bench.campaign.last_moment import LastMoment
 from robot_bench.campaign.results import SHOWN_HASH, Whole
 from robot_bench.campaign.trial import unpacked
 from robot_bench.campaign.variants.diversity import FailureSet
 from robot_bench.report.run_page import named_rows
-from robot_bench.view.run_tracks import world_of
 from simbase.errors import P2osError
 
 #: chosen: what fits a page that one scrolls through.

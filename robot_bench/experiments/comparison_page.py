@@ -10,10 +10,11 @@ from typing import Any, cast
 from p2os.view.header import ChannelHeader, PageHeader, PageSection, PageText, RobotHeader
 from p2os.view.page import page_of
 from p2os.view.recording import ViewRecording
+from p2os.view.world_plan import world_of
 from robot_bench.drives.drive import Drive, Floats, Trajectory
 from robot_bench.experiments.comparison import Comparison
 from robot_bench.experiments.parting import motion_parts_s
-from robot_bench.view.run_tracks import WARNING, world_of
+from robot_bench.view.run_tracks import WARNING
 from simbase.timing import NS_PER_S
 
 

@@ -21,14 +21,19 @@ def render_run(record: RunRecord) -> str:
     return page_of(run_report(record), all_is_in=TRACE_NAME)
 
 
-def run_report(record: RunRecord) -> ViewRecording:
-    """Return a run as the page shows it: rows and report."""
+def run_report(record: RunRecord, *, is_measured: bool = True) -> ViewRecording:
+    """Return a run as the page shows it: rows and report; the drive's figures, which take a while, where wanted."""
     found = recording_of(record)
     found.header = replace(
         found.header, lead=lead_of(record.meta), why=str(record.end.get(EXPLAINED) or ""),
-        sections=list(_sections(record)), footer=_footer(record),
+        sections=run_sections(record, is_measured=is_measured), footer=_footer(record),
     )  # fmt: skip
     return found
+
+
+def run_sections(record: RunRecord, *, is_measured: bool = True) -> list[PageSection]:
+    """Return the sections of a run's report, as of `run_report`."""
+    return list(_sections(record, is_measured=is_measured))
 
 
 def named_rows(pairs: list[tuple[str, str]]) -> list[list[PageCell]]:
@@ -36,7 +41,7 @@ def named_rows(pairs: list[tuple[str, str]]) -> list[list[PageCell]]:
     return [[PageCell(text=name), PageCell(text=value, is_number=True)] for name, value in pairs]
 
 
-def _sections(record: RunRecord) -> Iterator[PageSection]:
+def _sections(record: RunRecord, *, is_measured: bool) -> Iterator[PageSection]:
     yield PageSection(title="Figures", blocks=[PageTable(rows=named_rows(figures(record)))])
     goals = _goals(record.end)
     if goals:
@@ -44,7 +49,8 @@ def _sections(record: RunRecord) -> Iterator[PageSection]:
     if blocks := cast("list[str]", record.end.get("last_blocks") or []):
         listing = PageText(text="\n".join(blocks), is_listing=True)
         yield PageSection(title="What ran last, by cycle", blocks=[listing], is_folded=True)
-    yield from _measures(record)
+    if is_measured:
+        yield from _measures(record)
     yield from _parts(record.end)
     yield from _measured(record.end)
 

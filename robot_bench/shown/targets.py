@@ -9,7 +9,7 @@ from robot_bench.recording.run_record import TRACE_NAME, read_run
 from robot_bench.recording.summary import outcome_of, outcome_of_all
 from robot_bench.recording.together import robots_in, scenario_of
 from robot_bench.report.page_of_all import report_of_all
-from robot_bench.report.run_page import run_report
+from robot_bench.report.run_page import run_report, run_sections
 from robot_bench.run import run_scenario
 from robot_bench.scenario.loading import known_scenarios, load_scenario
 from robot_bench.shown.live_run import LiveRun
@@ -23,7 +23,9 @@ def run_target(named: str) -> ViewTarget | None:
     """
     folder = Path(named)
     if (folder / TRACE_NAME).is_file():
-        return ViewTarget(source=StillRecording(run_report(read_run(folder))))
+        record = read_run(folder)
+        source = StillRecording(run_report(record, is_measured=False))
+        return ViewTarget(source=source, run=lambda: source.show(run_sections(record)))
     if names := robots_in(folder):
         records = {name: read_run(folder / name) for name in names}
         outcome = outcome_of_all(scenario_of(folder), {name: outcome_of(one) for name, one in records.items()})

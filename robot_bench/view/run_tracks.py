@@ -7,7 +7,7 @@ Invariant: the events alone decide what is shown; who shows them decides nothing
 """
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from itertools import groupby
 from operator import itemgetter
@@ -20,6 +20,7 @@ from p2os.robots.parameters import ParametersError
 from p2os.view.header import ChannelHeader, RobotHeader, SensorPlace, StateTransition, WorldHeader, WorldThing
 from p2os.view.packet_rows import PacketRow, PacketRows
 from p2os.view.recording import ChannelTrack, ViewRecording
+from p2os.view.world_plan import thing_of, world_of
 from robot_bench.events.codec import Json
 from robot_bench.events.kinds import (
     CanTransfer,
@@ -268,7 +269,7 @@ class RunTracks:
         fields = cast("Mapping[str, Any]", change.fields)
         place = self._things.get(change.name)
         old = None if place is None else world.things[place]
-        thing = _thing_of({**({} if old is None else _plain_of(old)), **fields, "name": change.name})
+        thing = thing_of({**({} if old is None else _plain_of(old)), **fields, "name": change.name})
         if old is None or _shape_of(thing) != _shape_of(old):
             self._things[change.name] = place = len(world.things)
             world = replace(world, things=(*world.things, replace(thing, is_there=False)))
@@ -300,25 +301,6 @@ def _packets_of(robot: str) -> PacketRows:
         return PacketRows(robot)
     except ParametersError:
         return PacketRows()
-
-
-def world_of(world: Mapping[str, object]) -> WorldHeader:
-    """Return a world as the first entry of a trace has it."""
-    low_x, low_y, high_x, high_y = cast("Sequence[float]", world.get("extent") or (-3.0, -3.0, 3.0, 3.0))
-    return WorldHeader(
-        name=str(world.get("name", "?")), extent_m=(low_x, low_y, high_x, high_y),
-        things=[_thing_of(item) for item in cast("Sequence[Json]", world.get("obstacles") or ())],
-    )  # fmt: skip
-
-
-def _thing_of(item: Mapping[str, Any]) -> WorldThing:
-    is_round = item.get("shape", "box") == "cylinder"
-    return WorldThing(
-        name=str(item["name"]), kind=str(item.get("kind", "")), shape="cylinder" if is_round else "box",
-        x_m=float(item["x"]), y_m=float(item["y"]), heading_rad=float(item.get("heading") or 0.0),
-        height_m=float(item.get("height") or 0.5), length_m=float(item.get("length") or 0.0),
-        width_m=float(item.get("width") or 0.0), radius_m=float(item.get("radius") or 0.0),
-    )  # fmt: skip
 
 
 def _plain_of(thing: WorldThing) -> dict[str, object]:

@@ -12,6 +12,7 @@ from p2os.protocol.sip import HEAD_BYTES, POSITION_MASK
 from p2os.robots.parameters import load_parameters
 from p2os.view.capture_recording import CaptureTracks, open_recording
 from p2os.view.header import PageHeader
+from p2os.view.recording import ViewRecording
 from p2os.view.targets import capture_target, target_of
 from simbase.errors import FileError, UsageError
 
@@ -27,7 +28,7 @@ def test_each_byte_of_a_recorded_robot_stands_in_one_packet(path: Path) -> None:
     for to_robot, direction in ((1, Direction.TO_ROBOT), (0, Direction.FROM_ROBOT)):
         assert b"".join(row["data"] for row in rows if row["to_robot"] == to_robot) == capture.bytes_of(direction)
     for row in rows[:200]:
-        spans = json.loads(row["fields"])
+        spans = json.loads(str(row["fields"]))
         assert b"".join(row["data"][first:last] for first, last, _, _ in spans) == row["data"]
     assert found.header.end_ns == capture.duration_ns
     has_sip = any(row["name"].startswith("SIP") for row in rows)
@@ -35,7 +36,7 @@ def test_each_byte_of_a_recorded_robot_stands_in_one_packet(path: Path) -> None:
 
 
 def test_the_way_goes_on_where_the_counter_of_a_position_wraps() -> None:
-    parameters, rows = load_parameters("p2dx"), CaptureTracks(PageHeader(title="x"), "p2dx")
+    parameters, rows = load_parameters("p2dx"), CaptureTracks(ViewRecording(PageHeader(title="x")), "p2dx")
     raws = (POSITION_MASK - 1, POSITION_MASK, 0, 1)
     payloads = [bytes([0x32]) + raw.to_bytes(2, "little") + bytes(HEAD_BYTES - 3) for raw in raws]
     rows.take(
