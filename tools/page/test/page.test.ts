@@ -78,6 +78,11 @@ describe("a plot", () => {
   });
 });
 
+describe("plots of several robots", () => {
+  const wheels = (count: number) => store(Array.from({ length: count }, (_, n) => channel(n, "samples", { group: "wheels", unit: "m/s", source: n % 2 ? "east" : "west" })));
+  it.each([[4, ["wheels"]], [5, ["west wheels", "east wheels"]]] as const)("of %i curves stand in %j", (count, titles) => expect(chartsOf(wheels(count)).map((chart) => chart.title)).toEqual(titles));
+});
+
 describe("a list", () => {
   const run = store([channel(0, "text", { source: "one" }), channel(1, "text", { source: "two" })]);
   run.receive([frame("text", [1, 5], { text: runs(["hello", "world"]), is_sent: Uint8Array.of(0, 0) }), { ...frame("text", [3], { text: runs(["hello again"]), is_sent: Uint8Array.of(1) }, { of: 9 }), channel: 1 }]);

@@ -41,7 +41,17 @@ export function chartsOf(store: Store): Chart[] {
   }
   for (const [title, unit, parts] of POSE) for (const channel of store.channels("pose")) for (const [name, column, factor] of parts)
     put(title, unit, { key: `${channel.id} ${column}`, name: [channel.source, name].filter(Boolean).join(" "), channel, column, factor, isStepped: false, mark: null });
-  return [...charts.values()];
+  return [...charts.values()].flatMap(apart);
+}
+
+/** Curves that are told apart in one chart. */
+const MOST_CURVES = 4;
+
+/** A chart; of too many curves of several robots, one for each robot. */
+function apart(chart: Chart): Chart[] {
+  const sources = [...new Set(chart.curves.map((curve) => curve.channel.source))];
+  if (chart.curves.length <= MOST_CURVES || sources.length < 2) return [chart];
+  return sources.map((source) => ({ title: [source, chart.title].filter(Boolean).join(" "), unit: chart.unit, curves: chart.curves.filter((curve) => curve.channel.source === source) }));
 }
 
 /**
