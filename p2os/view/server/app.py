@@ -22,7 +22,7 @@ from p2os.view.server.page_session import FloodError, PageSession, RequestError
 from simbase.listening import LOGGER
 
 #: chosen: new rows reach a page so often; well below what an eye sees as a delay.
-NEWS_S = 1 / 30
+NEWS_S = 1 / 20
 #: chosen: a page that takes nothing for so long is gone.
 SLOWEST_SEND_S = 30.0
 #: chosen: pages at a time.

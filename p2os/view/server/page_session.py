@@ -47,7 +47,9 @@ class PageSession:
         self._source = source
         #: Channel → the row behind the last that was sent.
         self._sent: dict[int, int] = {}
+        #: What was said last; of channels, how many.
         self._header: PageHeader | None = None
+        self._channels = 0
         self._lost = 0
         self._room, self._asked_at = float(MOST_AT_ONCE), 0.0
 
@@ -73,10 +75,11 @@ class PageSession:
             yield _said(lost=self._lost)
 
     def _changed_header(self) -> Iterator[str]:
-        header = self._recording.full_header
+        header, channels = self._recording.header, len(self._recording.tracks)
         old, self._header = self._header, header
-        if old is None or replace(old, end_ns=header.end_ns) != header:
-            yield _said(header=header)
+        had, self._channels = self._channels, channels
+        if old is None or channels != had or replace(old, end_ns=header.end_ns) != header:
+            yield _said(header=self._recording.full_header)
         elif header.end_ns != old.end_ns:
             yield _said(now_ns=header.end_ns)
 
