@@ -80,6 +80,7 @@ function bounds(block: PagePlot): { x0: number; x1: number; y0: number; y1: numb
   for (const mark of block.marks) { x0 = Math.min(x0, mark); x1 = Math.max(x1, mark); }
   if (!(x1 > x0)) [x0, x1] = [(x0 || 0) - 0.5, (x1 || 0) + 0.5];
   if (!(y1 > y0)) [y0, y1] = Number.isFinite(y0) ? [y0 - 0.5, y1 + 0.5] : [0, 1];
+  if (block.curves.some((curve) => curve.style === "points")) [x0, x1] = [x0 - (x1 - x0) * 0.03, x1 + (x1 - x0) * 0.03];
   const edge = (y1 - y0) * 0.06;
   return { x0, x1, y0: y0 === 0 ? 0 : y0 - edge, y1: y1 + edge };
 }
@@ -96,6 +97,7 @@ function draw(block: PagePlot, { g, width, height }: Sheet, hovered: { curve: Pa
   const axes: Axes = { x: (value) => LEFT + ((value - x0) / (x1 - x0)) * wide, y: (value) => TOP + ((y1 - value) / (y1 - y0)) * high };
   const xStep = roundStep(x1 - x0, Math.max(2, wide / 70)), yStep = roundStep(y1 - y0, Math.max(2, high / 36));
   g.font = SMALL_FONT;
+  g.lineWidth = 1;
   g.strokeStyle = theme.value.line;
   g.fillStyle = theme.value.faint;
   g.textAlign = "center";
