@@ -16,7 +16,7 @@ JOBS   ?= 3
 COMPILED := $(wildcard bluepill_sim/extension/source/*/*) robot_bench/wires/edges.c \
     $(shell find adapter_fw/core adapter_fw/capi adapter_fw/esp32/main adapter_fw/esp32_sim -type f)
 
-.PHONY: setup demo test lint type unit wheels bench soak steady mutants hostile peers clean firmware mutation-tools board board-check board-tools pictures docs generated
+.PHONY: page page-check setup demo test lint type unit wheels bench soak steady mutants hostile peers clean firmware mutation-tools board board-check board-tools pictures docs generated
 
 setup: $(STAMP)
 
@@ -128,7 +128,7 @@ board: board-tools
 	$(BIN)/python -m hardware.pcb build
 	$(BIN)/python -m hardware.pcb simulate
 	$(BIN)/python -m hardware.pcb check
-	$(BIN)/python -m tools.make_pictures
+	$(BIN)/python -m tools.pictures
 
 board-check: board-tools
 	$(BIN)/python -m hardware.pcb check $(BOARD_CHECK)
@@ -139,11 +139,21 @@ board-tools: setup
 
 # Every picture of docs/ whose inputs have changed, made anew; `make test` names those that are out of date.
 pictures: board-tools
-	$(BIN)/python -m tools.make_pictures
+	$(BIN)/python -m tools.pictures
 
 # Every committed file that is made of a declaration (C headers, tables of pages), made anew; `make test` names those that are stale.
 generated: setup
 	@for tool in tools/generators/*.py; do $(BIN)/python -m tools.generators.$$(basename $$tool .py) || exit; done
+
+# The page of a run (p2os/view/bundle), from its TypeScript; needs Node 20 or newer, and what package-lock.json names.
+page:
+	@command -v npm >/dev/null || { echo "make: the page is built with Node 20 or newer (hint: apt-get install npm)"; exit 2; }
+	cd tools/page && npm ci --silent --no-audit --ignore-scripts && npm run --silent build
+
+# Whether the committed page is what is built, byte for byte, and its checks and tests; skipped aloud without Node.
+page-check:
+	@if command -v npm >/dev/null; then cd tools/page && npm ci --silent --no-audit --ignore-scripts && npm run --silent check; \
+	    else echo "make: no Node: the page is not built and compared"; fi
 
 # The pages of the API, from the docstrings, in build/api.
 docs: setup

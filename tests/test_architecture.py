@@ -47,6 +47,9 @@ ALLOWED = {
     "p2os.pioneer.world.formats": {"yaml", "PIL"},
     "p2os.pioneer.body.mujoco": {"mujoco", "numpy"},
     "p2os.cli.robots.pad_source": {"pygame"},
+    "p2os.view": {"construct"},
+    "p2os.view.server": {"starlette"},
+    "p2os.view.server.serving": {"uvicorn"},
     "p2os.ros.bags": {"rosbags"},
     "p2os.ros.message_table": {"rosbags"},
     "p2os.ros.codec": {"cyclonedds"},
@@ -62,6 +65,7 @@ ALLOWED = {
     "adapter_sim": {"p2os"},
     "robot_bench": {"p2os", "bluepill_sim", "adapter_sim", "typer", "rich", "click"},
     "robot_bench.drives": {"p2os", "numpy"},
+    "robot_bench.view": {"p2os", "adapter_sim"},
     "robot_bench.report": {"p2os", "matplotlib"},
     "robot_bench.report.edge_picture": {"bluepill_sim", "matplotlib"},
     "robot_bench.report.explain": {"p2os", "bluepill_sim", "adapter_sim"},
@@ -84,7 +88,7 @@ IO_LAYER = (
     "p2os.pioneer.serve.control_line", "p2os.client.robot_thread", "p2os.client.robot_loop", "simbase.interrupts",
     "simbase.command_line",
     "simbase.listening",
-    "p2os.ros.zenoh_node",
+    "p2os.ros.zenoh_node", "p2os.view.server",
     "bluepill_sim.cli", "bluepill_sim.cli.console", "bluepill_sim.__main__",
     "robot_bench.cli", "robot_bench.campaign.workers",
     "robot_bench.campaign.variants.shrinking.kept", "robot_bench.running.forks", "robot_bench.running.pacer",
@@ -107,7 +111,7 @@ LAYERS = {
     "p2os": (
         ("errors", "event_log"), ("toml_file",), ("toml_schema",), ("toml_record",), ("robots", "gamepad"),
         ("protocol",), ("transport",),
-        ("capture", "client", "pioneer"), ("ros",), ("cli",), ("__main__",),
+        ("capture", "client", "pioneer"), ("ros", "view"), ("cli",), ("__main__",),
     ),
     "bluepill_sim": (
         ("errors",), ("spans", "extension"), ("fabric",), ("peripherals",), ("parts",), ("stm32f103",),
@@ -120,9 +124,9 @@ LAYERS = {
     ),
     "robot_bench": (
         ("running", "firmware", "origin_gate"), ("wires",), ("events",), ("direct",), ("recording",),
-        ("drives",), ("scenario", "report"),
+        ("drives", "view"), ("scenario", "report"),
         ("adapter", "scenarios"), ("bench",), ("remote",), ("run", "project"),
-        ("networks", "experiments"), ("campaign",), ("ros", "live"), ("cli",),
+        ("networks", "experiments"), ("campaign",), ("ros", "live", "shown"), ("cli",),
     ),
 }  # fmt: skip
 
@@ -353,7 +357,7 @@ def test_the_judge_sees_a_broken_rule(name: str, text: str) -> None:
 #: Libraries that can listen on TCP, and what of them does.
 LISTENING_LIBRARIES = {
     "socket", "asyncio", "socketserver", "http", "xmlrpc", "wsgiref", "multiprocessing", "websockets", "foxglove",
-    "zenoh", "distributed",
+    "zenoh", "distributed", "uvicorn",
 }  # fmt: skip
 LISTENING_NAMES = re.compile(
     r"listen|create_(unix_)?server|start_(unix_)?server|\w*Server|serve_forever|make_server|LocalCluster|Listener|open"
@@ -361,6 +365,7 @@ LISTENING_NAMES = re.compile(
 #: Who listens without `simbase.listening`, and why no web page can use it.
 UNGUARDED = {
     "simbase.listening": "makes the guarded ones",
+    "p2os.view.server.serving": "its protocol is HTTP: it asks for Host, Origin and token",
     "robot_bench.origin_gate": "its protocol is HTTP: it asks for the Origin",
     "robot_bench.live": "Foxglove's server: behind the gate, at an address of loopback that is drawn",
     "p2os.ros.zenoh_node": "zenoh's own router: a link begins with its InitSyn, as no request does",

@@ -1,6 +1,6 @@
 """`python -m hardware.pcb VERB`: builds, checks, routes, fills, simulates and compares the board.
 
-Its pictures are made by tools/make_pictures.py.
+Its pictures are made by `python -m tools.pictures`.
 Exit codes: 0 done, 1 something failed, 2 wrong usage.
 """
 

@@ -306,6 +306,11 @@ def line_of(row: ListingRow, *, has_time: bool = True) -> str:
     return f"{time}{arrow} {row.name}{_inside(row)}"
 
 
+def inside_of(row: ListingRow) -> str:
+    """Return what stands inside a row, in a line; what is wrong with a damaged one."""
+    return _inside(row).strip() if row.valid else row.problem
+
+
 def summary_of(rows: int, damaged: int, capture_s: float) -> str:
     """Return the last line of a listing."""
     packets = rows - damaged

@@ -16,6 +16,9 @@ NEEDS = (
     Need(name="pillow", kind="package", feature="worlds from ROS maps: pictures", extra="worlds"),
     Need(name="pyyaml", kind="package", feature="worlds from ROS maps", extra="worlds"),
     Need(name="pygame-ce", kind="package", feature="teleop --pad", extra="pad"),
+    Need(name="starlette", kind="package", feature="view, --view", extra="view"),
+    Need(name="uvicorn", kind="package", feature="view, --view", extra="view"),
+    Need(name="websockets", kind="package", feature="view, --view", extra="view"),
     Need(
         name="physics",
         kind="plug-in",
@@ -31,5 +34,12 @@ NEEDS = (
         point="sdf",
     ),
     Need(name="ROS", kind="plug-in", feature="ros", points=("p2os.verbs",), point="ros"),
+    Need(
+        name="page",
+        kind="plug-in",
+        feature="view, --view",
+        points=("p2os.view_servers",),
+        point="page",
+    ),
     Need(name="tshark", kind="program", feature="captures on the command line", get="sudo apt-get install tshark"),
 )

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from p2os.cli.captures.shown_page import NoBrowser, shown
 from p2os.cli.groups import BENCH
 from p2os.cli.keyboard import any_key_stops
 from p2os.cli.names import bodies, body_help, urls, worlds
@@ -41,6 +42,7 @@ from robot_bench.scenario.loading import load_scenario
 from robot_bench.scenario.options import ScenarioOptions
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.scenario.sweep import MOST_RUNS, read_seeds
+from robot_bench.shown.live_run import LiveRun
 from simbase.command_line.help_pages import VerbPage
 from simbase.command_line.program import EXIT_INTERRUPTED
 from simbase.errors import UsageError
@@ -73,6 +75,7 @@ Examples:
   p2os run dodge --coverage --profile               lines, branches, cycles of the whole run
   p2os run dodge --coverage --fail-under 80         exit code 1 below 80 % of the lines
   p2os run dodge --gdb 3333                         under GDB; the robot stands still at a halt
+  p2os run dodge --view                             live on a page in the browser
   p2os run dodge --foxglove                         live in Foxglove or Lichtblick
   p2os run dodge --ros                              its pins as topics of ROS 2 (docs/ros.md)
   p2os run dodge --port serial:/dev/ttyUSB0         drive a real Pioneer; asks first
@@ -190,6 +193,8 @@ def run(
     inputs: Annotated[
         Path | None, typer.Option(help="Do again what came in from ROS in that run.", metavar="RUN")
     ] = None,
+    view: Annotated[bool, typer.Option("--view", help="Show it live on a page in the browser, at real time.")] = False,
+    no_browser: NoBrowser = False,
     foxglove: Annotated[
         str | None,
         typer.Option(help="Show it live to Foxglove or Lichtblick, at real time.", metavar="[PORT|HOST:PORT]"),
@@ -246,8 +251,20 @@ def run(
     if foxglove_origin and foxglove is None:
         raise UsageError("--foxglove-origin goes with --foxglove only", hint="add --foxglove")
     refuse_beside("foxglove", foxglove, port=port, gdb=gdb, ros=ros, inputs=inputs, robots=wanted.robots or None)
+    page = view or None
+    refuse_beside(
+        "view", page, port=port, gdb=gdb, ros=ros, inputs=inputs, foxglove=foxglove, robots=wanted.robots or None
+    )
     if is_sweep(wanted, seeds=seeds, seed=seed, port=port):
-        alone = {"port": port, "ros": ros, "inputs": inputs, "foxglove": foxglove, "gdb": gdb, "realtime": realtime}
+        alone = {
+            "port": port,
+            "ros": ros,
+            "inputs": inputs,
+            "foxglove": foxglove,
+            "view": page,
+            "gdb": gdb,
+            "realtime": realtime,
+        }
         refuse(
             {**alone, "coverage": coverage or None, "profile": profile or None},
             "cannot stand beside a sweep: it is for one run",
@@ -264,10 +281,13 @@ def run(
         return
     folder = out or make_next_folder(wanted.name)
     # Who looks on from outside lives in real time.
-    pace = realtime or (None if ros is None and foxglove is None else 1.0)
+    pace = realtime or (None if ros is None and foxglove is None and page is None else 1.0)
     with RunDisplay() as display:
         if gdb is None:
-            with driven(wanted, ros=ros, inputs=inputs, foxglove=foxglove, origins=foxglove_origin or ()) as driver:
+            with (
+                viewed(wanted, is_opened=not no_browser) if view
+                else driven(wanted, ros=ros, inputs=inputs, foxglove=foxglove, origins=foxglove_origin or ())
+            ) as driver:  # fmt: skip
                 result = run_scenario(
                     wanted, folder, speed=pace, on_progress=display.update, force=force, drive=driver,
                     coverage=coverage, profile=profile, fail_under=fail_under, explained=True,
@@ -330,6 +350,18 @@ def driven(
         return
     with network.met(ros or "") as driver:
         yield driver
+
+
+@contextlib.contextmanager
+def viewed(scenario: Scenario, *, is_opened: bool) -> Iterator[RunBench]:
+    """Yield what runs a bench while a page shows it.
+
+    Raises:
+        UsageError, MissingDependencyError: As of `shown`.
+    """
+    live = LiveRun(scenario)
+    with shown(live.source, is_opened=is_opened):
+        yield live.drive
 
 
 def is_sweep(scenario: Scenario, *, seeds: str | None, seed: int | None, port: str | None) -> bool:

@@ -13,6 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from robot_bench.experiments.comparison import Comparison
+from robot_bench.experiments.comparison_page import names_of
 from robot_bench.experiments.parting import motion_parts_s
 from robot_bench.experiments.sensitivity import ParameterEffect
 from simbase.files import writing
@@ -48,7 +49,7 @@ def comparison_figure(found: Comparison) -> Figure:
     grid = figure.add_gridspec(3, 2, width_ratios=(1.0, 1.15))
     plan = figure.add_subplot(grid[:, 0])
     ours, theirs = found.ours, found.theirs
-    names = _names(found)
+    names = names_of(found)
     plan.plot(ours.x_m, ours.y_m, color=ONE, linewidth=2.4, label=names[0])
     plan.plot(theirs.x_m, theirs.y_m, color=OTHER, linewidth=1.4, linestyle=(0, (5, 3)), label=names[1])
     plan.plot(ours.x_m[0], ours.y_m[0], "o", color=ONE)
@@ -78,13 +79,6 @@ def comparison_figure(found: Comparison) -> Figure:
         says = "parts" if motion_parts_s(found.parts) is not None else "the motion does not part; differs"
         rows[0].set_title(f"{says} at {begin:.2f} s: {part.signal} ({part.bound.stage})", fontsize=10, color=OTHER)
     return figure
-
-
-def _names(found: Comparison) -> tuple[str, str]:
-    one, other = found.one.name, found.other.name
-    if one == other or found.how.poses[0] != found.how.poses[1]:
-        return f"{one} ({found.how.poses[0]})", f"{other} ({found.how.poses[1]})"
-    return one, other
 
 
 def latency_figure(title: str, rows: Sequence[tuple[str, Sequence[float]]]) -> Figure:

@@ -69,6 +69,8 @@ class RunRecord:
     nets: tuple[str, ...] = ()
     sonar: list[tuple[int, list[int]]] = field(default_factory=list)
     usart: list[tuple[int, bytes]] = field(default_factory=list)
+    #: What other ports printed.
+    other_texts: list[Text] = field(default_factory=list)
     #: What went over the buses that were recorded, by their ends.
     transfers: list[SpiTransfer | I2cTransfer | CanTransfer] = field(default_factory=list)
     wire: list[Packet] = field(default_factory=list)
@@ -198,7 +200,9 @@ _FILES: Mapping[type, Callable[[RunRecord, Any], None]] = {
     Pose: lambda record, pose: record.poses.append(pose),
     PinEdge: lambda record, edge: record.pins.setdefault(edge.wire, Edges()).append(edge.t, edge.level),
     Ranges: lambda record, ranges: record.sonar.append((ranges.t, list(ranges.mm))),
-    Text: lambda record, text: record.usart.append((text.t, text.data)) if text.port == "usart1" else None,
+    Text: lambda record, text: (
+        record.usart.append((text.t, text.data)) if text.port == "usart1" else record.other_texts.append(text)
+    ),
     SpiTransfer: lambda record, spi: record.transfers.append(spi),
     I2cTransfer: lambda record, i2c: record.transfers.append(i2c),
     CanTransfer: lambda record, can: record.transfers.append(can),

@@ -25,8 +25,9 @@ from robot_bench.events.codec import Json
 from robot_bench.recording.run_record import TRACE_NAME, RunRecord, read_run
 from robot_bench.recording.summary import outcome_of_all, write_outcome
 from robot_bench.recording.waveforms import write_sigrok, write_vcd
-from robot_bench.report.page import page_data, render_page
+from robot_bench.report.drawn import drawn_of
 from robot_bench.report.page_of_all import REPORT_NAME, write_report_of_all
+from robot_bench.report.run_page import render_run
 from simbase.files import writing
 
 
@@ -64,7 +65,7 @@ def make_report(folder: Path) -> ReportFiles:
 def make_scene(record: RunRecord, path: Path) -> None:
     """Write a picture of a run's world and path; nothing is written where Matplotlib is not installed."""
     if (plots := _plots()) is not None:
-        plots.write_scene(page_data(record), path)
+        plots.write_scene(drawn_of(record), path)
 
 
 def _plots() -> ModuleType | None:
@@ -77,10 +78,9 @@ def _plots() -> ModuleType | None:
 
 def _report_of(record: RunRecord, folder: Path, files: Files) -> ReportFiles:
     page = folder / REPORT_NAME
-    drawn = page_data(record)
-    page.write_text(render_page(record, drawn), encoding="utf-8")
+    page.write_text(render_run(record), encoding="utf-8")
     plots = _plots() if files >= Files.PLOTS else None
-    return ReportFiles(page=page, plots=() if plots is None else plots.write_plots(drawn, folder))
+    return ReportFiles(page=page, plots=() if plots is None else plots.write_plots(drawn_of(record), folder))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

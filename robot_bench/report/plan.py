@@ -1,10 +1,9 @@
 """The plan of a run: what is written on the drawing of world and path, and where.
 
-The page and `path.png` draw this one list, so that they agree. Not here: shapes of
-things (in the trace), colours, and whatever changes while the page is played.
+`path.png` draws this list. Not here: shapes of things (in the trace) and colours.
 
 Lengths are metres in the world's frame: x to the right (heading 0°), y up. Offsets of
-labels are pixels, y down, at the size that a label list was made for.
+labels are pixels, y down, at the size that the list was made for.
 
 Invariant: no two labels of a list overlap, but those of things that come and go.
 """
@@ -16,8 +15,8 @@ from dataclasses import dataclass, field
 from p2os.pioneer.world.drawing import grid_step
 from robot_bench.events.codec import Json
 
-#: Width of the drawn world that the two label lists are made for: page or PNG, and telephone; pixels.
-WIDE_PX, NARROW_PX = 690, 320
+#: Width of the drawn world that the labels are made for, pixels.
+WIDE_PX = 690
 #: Of a label in 12 pixel sans-serif: an upper bound of a letter's mean width, and the line.
 LETTER_PX, LINE_PX = 6.6, 14
 #: chosen: enough to follow the time along a path, few enough to read.
@@ -54,7 +53,7 @@ def plan(
     *, extent: Sequence[float], poses: Sequence[Sequence[float]], obstacles: Sequence[Json], changes: Sequence[Json],
     hits: Sequence[tuple[float, float, float, str]], duration_s: float,
 ) -> Json:  # fmt: skip
-    """Return bounds, grid, scale bar, start, times along the path, and the labels for two sizes.
+    """Return bounds, grid, scale bar, start, times along the path, and the labels.
 
     Args:
         extent: Least x and y and greatest x and y of the world, metres.
@@ -70,10 +69,7 @@ def plan(
         "bounds": bounds,
         "step": grid_step(max(bounds[2] - bounds[0], bounds[3] - bounds[1])),
         "times": times,
-        "labels": {
-            size: _labels(_Sheet(bounds, width), poses, times, obstacles, changes, hits)
-            for size, width in (("wide", WIDE_PX), ("narrow", NARROW_PX))
-        },
+        "labels": _labels(_Sheet(bounds, WIDE_PX), poses, times, obstacles, changes, hits),
     }
 
 

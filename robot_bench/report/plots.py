@@ -1,7 +1,6 @@
 """PNG plots of a run, for a paper, a README or a CI page.
 
-Drawn with Matplotlib's object interface (no global state, no display) from the data
-that the page draws, and from nothing else, so that page and plots agree.
+Drawn with Matplotlib's object interface (no global state, no display).
 """
 
 import math
@@ -41,7 +40,7 @@ Axes = Any
 
 
 def write_plots(data: Json, folder: Path) -> tuple[Path, ...]:
-    """Write `path.png`, `speeds.png` and `pins.png` from what `page_data` returned; return their paths."""
+    """Write `path.png`, `speeds.png` and `pins.png` from what `drawn_of` returned; return their paths."""
     plots = {"path.png": _path_figure, "speeds.png": _speeds_figure, "pins.png": _pins_figure}
     written = []
     for name, draw in plots.items():
@@ -79,7 +78,7 @@ def _path_figure(data: Any) -> Figure:
         axes.add_patch(_hull(data, axes))
     hits = data["hits"]
     axes.plot([hit[1] for hit in hits], [hit[2] for hit in hits], "x", color=HIT, markersize=9, mew=2.4, zorder=4)
-    _write_labels(plan["labels"]["wide"], {str(thing["name"]): thing for thing in things}, axes)
+    _write_labels(plan["labels"], {str(thing["name"]): thing for thing in things}, axes)
     _scale_bar(axes, plan)
     axes.set(xlim=(x0, x1), ylim=(y0, y1), xlabel="x, m →  (heading 0°)", ylabel="y, m →  (heading 90°)")
     axes.xaxis.set_major_locator(MultipleLocator(plan["step"]))

@@ -1,8 +1,8 @@
-"""Takes as much of a long recording as a page can show, without hiding what stands out.
+"""Takes as much of a long recording as a plot can show, without hiding what stands out.
 
 A curve has no more pixels than its canvas is wide: of the rows that fall into one
 bucket of time the first, the last, and the least and greatest of each value are
-kept, so that the curve looks as that of all rows. Of lists the beginning and the end are kept.
+kept, so that the curve looks as that of all rows.
 
 Invariant: whatever is kept is a row of the recording, in its order; what fits is kept whole.
 """
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 from robot_bench.wires.edges import Edges
 
-#: chosen: one a pixel of the page's charts.
+#: chosen: one a pixel of the plots.
 BUCKETS = 1200
 
 
@@ -48,20 +48,6 @@ def pulses(edges: Sequence[tuple[int, int]], *, buckets: int) -> list[tuple[int,
     for first, last in _buckets(times, buckets):
         kept += [edges[n] for n in sorted({first, min(first + 1, last - 1), last - 1})]
     return kept
-
-
-def ends(sizes: Sequence[int], budget: int) -> tuple[int, int]:
-    """Return how many rows of some sizes to take from the beginning and from the end, so that they fit."""
-    if sum(sizes) <= budget:
-        return len(sizes), 0
-    head = tail = 0
-    while (size := sizes[head] if head <= tail else sizes[-1 - tail]) <= budget:
-        budget -= size
-        if head <= tail:
-            head += 1
-        else:
-            tail += 1
-    return head, tail
 
 
 def _buckets(times: Sequence[float], buckets: int) -> list[tuple[int, int]]:

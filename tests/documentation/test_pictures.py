@@ -14,7 +14,7 @@ PICTURES = ROOT / "docs" / "pictures"
 
 def check(folder: Path) -> tuple[int, str]:
     ran = subprocess.run(
-        [sys.executable, "tools/make_pictures.py", "--check", "--folder", str(folder)], cwd=ROOT, text=True,
+        [sys.executable, "-m", "tools.pictures", "--check", "--folder", str(folder)], cwd=ROOT, text=True,
         capture_output=True, check=False, timeout=60, env={"PYTHONPATH": str(ROOT)},
     )  # fmt: skip
     return ran.returncode, ran.stdout + ran.stderr

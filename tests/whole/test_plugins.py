@@ -130,6 +130,7 @@ ASKED = [
     ("physics", "run motors --body bullet", "", "there is no body 'bullet'", "physics (--body"),
     ("physics", "run motors --body tcp:127.0.0.1:9", "", "there is no body 'tcp:127.0.0.1:9'", "physics (--body"),
     ("worlds", "world check place.sdf", "place.sdf", "no reader for .sdf", "world files (worlds"),
+    ("view", "run motors --view --no-browser", "", "--view is not there", "page (view, --view)"),
     ("ros", "run motors --ros", "", "--ros is not there", "ROS bench (run --ros"),
     ("ros", "report run --events b --ros2 mcap", "run/trace.jsonl", "there is no storage 'mcap'", "ROS bench (run"),
     ("ros", "compare bag bag", "bag/metadata.yaml", "bag holds no trace.jsonl", "ROS bench (run"),

@@ -48,7 +48,8 @@ from p2os.toml_schema import Key
 from robot_bench.events.codec import events_of
 from robot_bench.recording.run_record import read_run
 from robot_bench.recording.summary import outcome_of
-from robot_bench.report.page import page_data, render_page
+from robot_bench.report.drawn import drawn_of
+from robot_bench.report.run_page import render_run
 from robot_bench.scenario.goals.judging import judge
 from robot_bench.scenario.loading import known_scenarios, read_scenario
 from robot_bench.scenario.scenario import Scenario
@@ -199,7 +200,8 @@ def use_trace(path: Path, _rng: random.Random) -> None:
     """Read a run folder's trace, judge it and write its page."""
     record = read_run(path.parent)
     json.dumps(outcome_of(record))
-    render_page(record, page_data(record))
+    drawn_of(record)
+    render_run(record)
     with path.open(encoding="utf-8", errors="replace") as lines:
         judge(events_of(lines), read_scenario(_shipped_scenario("dodge")).goals, end_ns=record.last_ns)
 

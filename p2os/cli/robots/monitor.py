@@ -8,12 +8,14 @@ from typing import Annotated
 import typer
 
 from p2os.capture.describe import plain
+from p2os.cli.captures.shown_page import NoBrowser, Viewed
 from p2os.cli.groups import ROBOTS
 from p2os.cli.held_robot import held
 from p2os.cli.links.link_quality import LinkQuality
 from p2os.cli.names import ReportedModel, RobotUrl
 from p2os.cli.quantities import option
 from p2os.cli.robots.dashboard import Dashboard, draw, line_of
+from p2os.cli.robots.viewed_robot import opened_for
 from p2os.client import Connected, GaveUp, LinkLost, Notice, PacketArrived, Robot, RobotState
 from p2os.client.notices import words_of
 from p2os.transport.wall_clock import wall_clock
@@ -50,9 +52,14 @@ def monitor(
     lasts_ns: Annotated[Nanos | None, option(TIME, "--for", purpose="End after so long.", above_zero=True)] = None,
     robot: ReportedModel = "",
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object a packet.")] = False,
+    view: Viewed = False,
+    no_browser: NoBrowser = False,
 ) -> None:
     """Show a robot."""
-    with held(Robot(url, model=robot or None, auto_enable=False)) as client:
+    with (
+        opened_for(url, robot, is_viewed=view, is_opened=not no_browser) as opener,
+        held(Robot(url, model=robot or None, auto_enable=False, opener=opener)) as client,
+    ):
         if json_output or not sys.stdout.isatty():
             _print_states(client, lasts_ns, as_json=json_output)
         else:

@@ -25,12 +25,14 @@ from typing import Annotated, Protocol
 
 import typer
 
+from p2os.cli.captures.shown_page import NoBrowser, Viewed
 from p2os.cli.groups import ROBOTS
 from p2os.cli.held_robot import held, hold_robot, say_what_is_beyond
 from p2os.cli.keyboard import raw_keyboard
 from p2os.cli.names import ReportedModel, RobotUrl
 from p2os.cli.quantities import option
 from p2os.cli.robots.pad_source import SdlPad
+from p2os.cli.robots.viewed_robot import opened_for
 from p2os.client import Link, Robot
 from p2os.client.notices import DeadmanStopped, GapStopped, LinkLostError, Notice
 from p2os.gamepad import PAD_MPS, PAD_RADPS, STICK_FULL, TRIGGER_FULL, Gamepad, PadReport
@@ -129,12 +131,17 @@ def teleop(
     ] = None,
     pad: Annotated[bool, typer.Option("--pad", help="Drive by game pad instead of keys.")] = False,
     robot: ReportedModel = "",
+    view: Viewed = False,
+    no_browser: NoBrowser = False,
 ) -> None:
     """Drive by keyboard or pad."""
 
     @contextlib.contextmanager
     def connected() -> Iterator[Robot]:
-        with held(Robot(url, model=robot or None), moves=True) as client:
+        with (
+            opened_for(url, robot, is_viewed=view, is_opened=not no_browser) as opener,
+            held(Robot(url, model=robot or None, opener=opener), moves=True) as client,
+        ):
             say_what_is_beyond(client.limits, speed_mps=vel, rate_radps=turn_rate)
             yield client
 

@@ -21,12 +21,14 @@ from typing import Annotated
 
 import typer
 
+from p2os.cli.captures.shown_page import NoBrowser, Viewed
 from p2os.cli.groups import ROBOTS
 from p2os.cli.names import bodies, body_help, worlds
 from p2os.cli.names import robots as robot_names
 from p2os.cli.printing import queue_output
 from p2os.cli.quantities import option
 from p2os.cli.trust import Trusted, said
+from p2os.cli.virtual.viewed_fleet import viewing
 from p2os.pioneer.body.factory import BEST
 from p2os.pioneer.controller import ControllerSettings
 from p2os.pioneer.controller.flash import load_flash
@@ -205,6 +207,8 @@ def serve(
     ] = None,
     trust: Trusted = False,
     json_output: Annotated[bool, typer.Option("--json", help="Print the start line as JSON.")] = False,
+    view: Viewed = False,
+    no_browser: NoBrowser = False,
 ) -> None:
     """Serve virtual robots until Ctrl-C."""
     if fleet is not None:
@@ -241,7 +245,11 @@ def serve(
             opened.callback(orders.close)
         who = "robot {}  " if len(made.robots) > 1 else ""
         events = [EventLines(_write, who.format(number + 1)).write_event for number in range(len(made.robots))]
-        hosts = open_hosts(order, made, events=events, speed=speed)
+        hosts: list[Host] = []
+        page = opened.enter_context(
+            viewing(order, made, events, lambda: hosts, is_viewed=view, is_opened=not no_browser)
+        )
+        hosts += open_hosts(order, made, events=page.events, speed=speed, listens=page.listens)
         for host in hosts:
             opened.callback(host.close)
         for number, host in enumerate(hosts):
@@ -249,8 +257,8 @@ def serve(
         sys.stdout.flush()
         for note in made.notes:
             _write(f"note: {note}\n")
-        tick = None if status_ns is None else (status_ns / NS_PER_S, partial(_show_status, hosts))
-        Fleet(hosts, control=orders, on_tick=tick).run(until=lambda: _exit_code(made) is not None)
+        ticks = [] if status_ns is None else [(status_ns / NS_PER_S, partial(_show_status, hosts))]
+        Fleet(hosts, control=orders, ticks=[*ticks, *page.ticks]).run(until=lambda: _exit_code(made) is not None)
     raise typer.Exit(_exit_code(made) or 0)
 
 

@@ -11,7 +11,7 @@ from p2os.pioneer.serve.control_line import ControlLine
 from p2os.pioneer.serve.fleet_order import FleetOrder, MadeFleet
 from p2os.pioneer.serve.host import IDLE_WAIT_S, Host
 from p2os.pioneer.serve.robot_time import RobotTime
-from p2os.transport import listen_url
+from p2os.transport import Listener, listen_url
 from p2os.transport.waiting import wait_readable
 from p2os.transport.wall_clock import Clock, wall_clock
 from simbase.timing import NS_PER_S
@@ -24,6 +24,7 @@ def open_hosts(
     events: Sequence[EventCallback | None],
     speed: float = 1.0,
     clock: Clock = wall_clock,
+    listens: Sequence[Callable[[str], Listener]] = (),
 ) -> list[Host]:
     """Return a host for each robot of a fleet, listening at its port.
 
@@ -33,6 +34,7 @@ def open_hosts(
         events: Who is told what each of them does.
         speed: Robot seconds a second of the clock.
         clock: Nanoseconds; never goes back.
+        listens: What makes the place of each from its URL; empty: `listen_url`.
 
     Raises:
         TransportError: A port is taken or cannot be had; none is kept open then.
@@ -44,7 +46,8 @@ def open_hosts(
             pioneer.on_event = events[number]
             hosts.append(
                 Host(
-                    pioneer, listen_url(robot.port), on_event=events[number], clock=clock, speed=speed,
+                    pioneer, (listens[number] if listens else listen_url)(robot.port),
+                    on_event=events[number], clock=clock, speed=speed,
                     shared=None if made.multi_robot_world is None else (shared_time, made.multi_robot_world, number),
                     paced=not robot.port.startswith("serial:"), sync_limit_ns=robot.sync_limit_ns,
                 )
@@ -63,7 +66,7 @@ class Fleet:
     Args:
         hosts: One a robot.
         control: Where an operator gives orders, or None.
-        on_tick: Called so often, in seconds, if given.
+        ticks: What is called, and how often, in seconds.
     """
 
     def __init__(
@@ -71,12 +74,12 @@ class Fleet:
         hosts: Sequence[Host],
         *,
         control: ControlLine | None = None,
-        on_tick: tuple[float, Callable[[], None]] | None = None,
+        ticks: Sequence[tuple[float, Callable[[], None]]] = (),
     ) -> None:
         self.hosts = tuple(hosts)
         self.control = control
-        self._on_tick = on_tick
-        self._next_tick_s = _now_s() + on_tick[0] if on_tick else float("inf")
+        self._ticks = tuple(ticks)
+        self._next_ticks_s = [_now_s() + period_s for period_s, _ in self._ticks]
         #: When each is due next, by the clock, and the descriptors that it waits for.
         self._due_s = [0.0] * len(self.hosts)
         self._descriptors: list[list[int]] = [[] for _ in self.hosts]
@@ -99,10 +102,11 @@ class Fleet:
             if self._due_s[index] <= now_s:
                 host.run_due()
                 self._schedule(index)
-        if now_s >= self._next_tick_s and self._on_tick is not None:
-            self._next_tick_s = now_s + self._on_tick[0]
-            self._on_tick[1]()
-        wait_s = min(*self._due_s, self._next_tick_s, now_s + longest_wait_s) - _now_s()
+        for number, (period_s, call) in enumerate(self._ticks):
+            if now_s >= self._next_ticks_s[number]:
+                self._next_ticks_s[number] = now_s + period_s
+                call()
+        wait_s = min(*self._due_s, *self._next_ticks_s, now_s + longest_wait_s) - _now_s()
         ready = self._wait(wait_s)
         now_s = _now_s()
         for index, host in enumerate(self.hosts):

@@ -14,12 +14,11 @@ Invariant: it is made of the campaign's folder alone, and of the version that it
 import re
 import shlex
 from collections.abc import Iterator, Sequence
-from importlib.resources import files
 from pathlib import Path
 
 from robot_bench.campaign.campaign_file import Campaign
 from robot_bench.campaign.conduct import FAILURES, PointFinding, PointRow
-from robot_bench.campaign.pages.page import STYLE, plan
+from robot_bench.campaign.pages.plan_picture import picture
 from robot_bench.campaign.variants.against import Other, first_apart, reported
 from robot_bench.campaign.variants.diversity import FailureSet
 from robot_bench.campaign.variants.fault_line import by_version
@@ -56,7 +55,7 @@ def write_comment(
         (out.parent / PICTURES).mkdir(parents=True, exist_ok=True)
     for row in shown:
         name = f"{PICTURES}/{row.number:04d}.svg"
-        write_text(out.parent / name, picture(row))
+        write_text(out.parent / name, picture(row.failing or row.cheap))
         lines += [*_of_failure(folder, campaign, row, f"{url}{name}", other), ""]
     left = len(failing) - len(shown)
     if left:
@@ -65,15 +64,6 @@ def write_comment(
     text = "\n".join(lines)
     write_text(out, text)
     return text
-
-
-def picture(row: PointRow) -> str:
-    """Return the world of a failing point with the robot's way in it, an SVG that stands alone."""
-    page = files("robot_bench.report").joinpath("page.css").read_text(encoding="utf-8")
-    run = row.failing or row.cheap
-    return plan(run, None).replace(
-        "<svg ", '<svg xmlns="http://www.w3.org/2000/svg" ', 1
-    ).replace(">", f"><style>{page.partition('body {')[0]}{STYLE}</style>", 1)  # fmt: skip
 
 
 def _first_of_each_kind(rows: Sequence[PointRow], failing: Sequence[PointRow]) -> list[PointRow]:

@@ -1,76 +1,52 @@
-"""The report of a campaign: one HTML page in one file, drawn as SVG, without a script.
+"""The report of a campaign: one HTML page in one file.
 
 Where in the searched space it fails (margins over the dimensions that matter most), each failure in its world with the
-command that runs it again, how the search went, what of the firmware ran, and what it cost. Its style is that of the
-report of a run.
+command that runs it again, how the search went, what of the firmware ran, and what it cost. The page itself is
+`p2os.view.page`.
 
 Invariant: the page is made of the rows alone, and says the same however many workers there were, but for the seconds.
 """
 
-import html
 import math
 import shlex
 import statistics
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from importlib.resources import files
-from string import Template
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from p2os.pioneer.world import load_world
-from p2os.pioneer.world.model import World
 from p2os.toml_record import tables_of
 from p2os.toml_schema import Table
+from p2os.view.header import (
+    PageBlock,
+    PageCurve,
+    PageHeader,
+    PagePlan,
+    PagePlot,
+    PageSection,
+    PageTable,
+    PageText,
+    WorldHeader,
+    WorldThing,
+)
+from p2os.view.page import document
+from p2os.view.world_plan import world_of
 from robot_bench.campaign.conduct import FAILURES, PointFinding, PointRow, Run
 from robot_bench.campaign.last_moment import LastMoment
 from robot_bench.campaign.results import SHOWN_HASH, Whole
 from robot_bench.campaign.trial import unpacked
 from robot_bench.campaign.variants.diversity import FailureSet
+from robot_bench.report.run_page import named_rows
 from simbase.errors import P2osError
 
 #: chosen: what fits a page that one scrolls through.
 MOST_SHOWN, MOST_DIMENSIONS = 24, 8
-#: Of a chart and of a plan, in units of their drawings.
-_WIDTH, _HEIGHT, _SIDE = 360, 200, 300
-_PAGE = Template("""<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
-<title>$title</title><style>$style</style></head><body>
-<header><h1>$heading <span class="verdict $verdict_class">$verdict</span></h1><p class="lead">$lead</p></header>
-<main>
-<section class="halves even"><div><h2>What came of it</h2><table class="figures"><tbody>$figures</tbody></table></div>
-<div><h2>What it cost</h2><table class="figures"><tbody>$cost</tbody></table></div></section>
-<section><h2>Failures <small>each run again in another process with the same hash</small></h2>
-<div class="multiples">$failures</div>$more</section>
-<section><h2>Margins over what varied <small>a point a run; below the line it failed</small></h2>
-<div class="charts">$space</div></section>
-<section><h2>Course of the search</h2><div class="charts">$course</div></section>
-<section><h2>Reached <small>by the cheap runs, and what no point has</small></h2>
-<table class="figures"><tbody>$reached</tbody></table></section>
-<section><h2>Where the cheap runs ended <small>darker: less margin</small></h2>
-<div class="multiples">$map</div></section>
-</main><footer>$footer</footer></body></html>
-""")
-#: Of what is drawn.
-STYLE = """
-.halves.even { grid-template-columns: minmax(0, 1fr) minmax(0, 1fr); }
-.multiples { display: grid; grid-template-columns: repeat(auto-fill, minmax(250px, 1fr)); gap: 18px; }
-.charts { display: grid; grid-template-columns: repeat(auto-fill, minmax(300px, 1fr)); gap: 18px; }
-svg { width: 100%; height: auto; display: block; background: var(--panel); border: 1px solid var(--line);
-  border-radius: 8px; }
-svg text { fill: var(--faint); font: 11px system-ui, sans-serif; }
-figcaption { min-height: 0; overflow-wrap: anywhere; font-size: 13px; }
-figcaption b { color: var(--ink); } figcaption code { display: block; font-size: 11.5px; color: var(--ink); }
-.wall { fill: var(--wall); } .drawn { fill: var(--box); } .way { fill: none; stroke: var(--path); stroke-width: 1.6; }
-.walk { fill: none; stroke: var(--box); stroke-dasharray: 4 3; }
-.hit { fill: var(--bad); } .last { fill: none; stroke: var(--warn); stroke-width: 2.5; }
-.start { fill: none; stroke: var(--path); stroke-width: 1.6; }
-.axis { stroke: var(--line); } .passed { fill: var(--good); } .failed { fill: var(--bad); } .seen { fill: var(--warn); }
-.line { fill: none; stroke: var(--left); stroke-width: 1.8; } .line.bad { stroke: var(--bad); }
-@media (max-width: 820px) { .halves.even { grid-template-columns: 1fr; } }
-"""
-_CLASS: Mapping[PointFinding, str] = {
-    PointFinding.PASSED: "passed", PointFinding.EXCUSED: "seen",
-    PointFinding.CONFIRMED: "failed", PointFinding.FULL_ONLY: "failed",
-    PointFinding.CHEAP_ONLY: "seen",
-    PointFinding.UNCONFIRMED: "seen", PointFinding.NOT_REPEATED: "seen", PointFinding.ERROR: "seen",
+#: Curves of a chart of points, and what they are called.
+_CURVES: Mapping[str, tuple[PointFinding, ...]] = {
+    "passed": (PointFinding.PASSED,),
+    "excused": (PointFinding.EXCUSED,),
+    "failed": (PointFinding.CONFIRMED, PointFinding.FULL_ONLY),
+    "undecided": (
+        PointFinding.CHEAP_ONLY, PointFinding.UNCONFIRMED, PointFinding.NOT_REPEATED, PointFinding.ERROR,
+    ),
 }  # fmt: skip
 _MEANING: Mapping[PointFinding, str] = {
     PointFinding.PASSED: "passed",
@@ -90,24 +66,36 @@ def render(whole: Whole) -> str:
     verdict = f"{len(failures)} of {len(rows)} points fail" if failures else f"none of {len(rows)} points fails"
     if whole.was_interrupted:
         verdict = f"interrupted, {verdict}"
-    style = files("robot_bench.report").joinpath("page.css").read_text(encoding="utf-8")
     firmware = ", ".join(f"{name} ({sha256[:SHOWN_HASH]})" for name, sha256 in campaign.trial.programs.items())
-    shown = failures[:MOST_SHOWN]
-    left = len(failures) - len(shown)
-    return _PAGE.substitute(
-        title=html.escape(f"{campaign.name} · {verdict}"), heading=html.escape(campaign.name),
-        verdict=html.escape(verdict), verdict_class="failed" if failures else "passed", style=style + STYLE,
-        lead=html.escape(
-            f"{campaign.description + ': ' if campaign.description else ''}{firmware} in "
-            f"{campaign.trial.table['world']}, {campaign.search}"
-        ),
-        figures=_table(_figures(whole)), cost=_table(_cost(whole)),
-        failures="".join(_failure(row, whole) for row in shown) or "<p>none</p>",
-        more=f"<p>and {left} more in failures/</p>" if left else "",
-        space="".join(_over(name, rows) for name in _dimensions(rows)) or "<p>nothing varied</p>",
-        course="".join(_course(rows)), map=_map(whole), reached=_table(_reached(whole)),
-        footer=html.escape(f"p2os campaign --resume {shlex.quote(str(whole.folder))} goes on where it was interrupted"),
+    lead = (
+        f"{campaign.description + ': ' if campaign.description else ''}{firmware} in {campaign.trial.table['world']}, "
+        f"{campaign.search}"
+    )
+    return document(
+        PageHeader(
+            title=campaign.name, verdict=verdict, standing="failed" if failures else "passed", lead=lead,
+            sections=list(_sections(whole)),
+            footer=f"p2os campaign --resume {shlex.quote(str(whole.folder))} goes on where it was interrupted",
+        )
     )  # fmt: skip
+
+
+def _sections(whole: Whole) -> Iterator[PageSection]:
+    rows, failures = whole.progress.rows, whole.failures
+    yield PageSection(title="What came of it", blocks=[PageTable(rows=named_rows(list(_figures(whole))))])
+    yield PageSection(title="What it cost", blocks=[PageTable(rows=named_rows(list(_cost(whole))))])
+    blocks: list[PageBlock] = [block for row in failures[:MOST_SHOWN] for block in _failure(row, whole)]
+    if len(failures) > MOST_SHOWN:
+        blocks.append(PageText(text=f"and {len(failures) - MOST_SHOWN} more in failures/"))
+    note = "each run again in another process with the same hash"
+    yield PageSection(title="Failures", note=note, blocks=blocks or [PageText(text="none")])
+    space: list[PageBlock] = [_over(name, rows) for name in _dimensions(rows)]
+    note = "a point a run; below 0 it failed"
+    yield PageSection(title="Margins over what varied", note=note, blocks=space or [PageText(text="nothing varied")])
+    yield PageSection(title="Course of the search", blocks=list(_course(rows)))
+    note = "by the cheap runs, and what no point has"
+    yield PageSection(title="Reached", note=note, blocks=[PageTable(rows=named_rows(list(_reached(whole))))])
+    yield PageSection(title="Where the cheap runs ended", note="a point a run, by its margin", blocks=[_map(whole)])
 
 
 def _figures(whole: Whole) -> Iterator[tuple[str, str]]:
@@ -154,113 +142,78 @@ def _cost(whole: Whole) -> Iterator[tuple[str, str]]:
         yield "lines of the journal that do not count", "; ".join(progress.left_out_words())
 
 
-def _table(pairs: Iterator[tuple[str, str]]) -> str:
-    return "".join(f"<tr><td>{html.escape(name)}</td><td>{html.escape(value)}</td></tr>" for name, value in pairs)
-
-
-def _failure(row: PointRow, whole: Whole) -> str:
+def _failure(row: PointRow, whole: Whole) -> Iterator[PagePlan]:
+    """Yield a failure in its world: the way of the robot, what it touched, and the last moment to avoid it."""
     run = row.failing
     if run is None:
-        return ""
+        return
     moment = whole.moments.get(row.number)
     why = next(iter(run.outcome.failures), "")
-    avoidable = f"<br>{html.escape(moment.words)}" if moment is not None else ""
-    return (
-        f"<figure>{plan(run, moment)}<figcaption><b>point {row.number}</b>, {html.escape(row.finding.value)}: "
-        f"{html.escape(why)}{avoidable}<code>{html.escape(whole.results.replay(row))}</code></figcaption></figure>"
-    )
+    words = [f"{row.finding.value}: {why}", *([moment.words] if moment is not None else [])]
+    way = [(x / 1000, y / 1000) for x, y in run.outcome.way_mm]
+    hits = [(hit.x_m, hit.y_m) for hit in run.outcome.hits[:1]]
+    yield PagePlan(
+        title=f"point {row.number}", text="; ".join(words), listing=whole.results.replay(row), world=_world(run),
+        ways=[_curve("way", way)], hits=hits, places=_last(moment),
+    )  # fmt: skip
 
 
-def plan(run: Run, moment: LastMoment | None) -> str:
-    """Return the world of a run with the way of its robot, what it touched, and the last moment."""
+def _last(moment: LastMoment | None) -> list[tuple[float, float, str]]:
+    if moment is None or moment.place is None:
+        return []
+    x, y = moment.place[:2]
+    return [(x, y, "last moment")]
+
+
+def _world(run: Run) -> WorldHeader | None:
+    """Return the world of a run with what its scenario places; None where it is not to be had."""
     try:
         with unpacked(run.trial.files) as folder:
             scenario = run.trial.scenario(folder)
             world = load_world(scenario.world, seed=scenario.seed)
     except P2osError:
-        return ""
-    to = _place_in(world.extent)
-    parts = _things(world, to)
-    parts += [_drawn(table, to) for table in tables_of(run.trial.table, "obstacle")]
-    way = [to(x / 1000, y / 1000) for x, y in run.outcome.way_mm]
-    if way:
-        parts.append(_polyline(way, "way"))
-        parts.append(f'<circle class="start" cx="{way[0][0]}" cy="{way[0][1]}" r="5"/>')
-    if moment is not None and moment.place is not None:
-        x, y = to(*moment.place[:2])
-        parts.append(
-            f'<circle class="last" cx="{x}" cy="{y}" r="7"><title>{html.escape(moment.words)}</title></circle>'
-        )
-    if way and not run.outcome.hits:
-        parts.append(f'<circle class="hit" cx="{way[-1][0]}" cy="{way[-1][1]}" r="4"><title>its end</title></circle>')
-    for hit in run.outcome.hits[:1]:
-        x, y = to(hit.x_m, hit.y_m)
-        parts.append(f'<circle class="hit" cx="{x}" cy="{y}" r="5"><title>{html.escape(hit.what)}</title></circle>')
-    return _svg(_SIDE, _high(world.extent), parts)
+        return None
+    placed = [thing for table in tables_of(run.trial.table, "obstacle") for thing in _placed(table)]
+    found = world_of(world.to_plain())
+    return WorldHeader(name=found.name, extent_m=found.extent_m, things=[*found.things, *placed])
 
 
-#: Returns the place in a drawing of a place in the plan.
-_To = Callable[[float, float], tuple[float, float]]
-
-
-def _place_in(extent: tuple[float, float, float, float]) -> _To:
-    x0, _, x1, y1 = extent
-    scale = _SIDE / (x1 - x0)
-    return lambda x, y: (round((x - x0) * scale, 1), round((y1 - y) * scale, 1))
-
-
-def _high(extent: tuple[float, float, float, float]) -> int:
-    x0, y0, x1, y1 = extent
-    return round(_SIDE * (y1 - y0) / (x1 - x0))
-
-
-def _things(world: World, to: _To) -> list[str]:
-    return [
-        _shape("wall", to, item.x_m, item.y_m, item.heading_rad, item.length_m, item.width_m, item.radius_m)
-        for item in world.obstacles
-        if not item.kind.is_driven_on
-    ]
-
-
-def _drawn(table: Table, to: _To) -> str:
+def _placed(table: Table) -> Iterator[WorldThing]:
     values = {key: float(value) for key, value in table.items() if isinstance(value, (int, float))}
-    if "x_m" not in values:
-        return ""
-    found = _shape(
-        "drawn", to, values["x_m"], values["y_m"], math.radians(values.get("heading_deg", 0.0)),
-        values.get("length_m", 0.0), values.get("width_m", 0.0), values.get("radius_m", 0.0),
-    )  # fmt: skip
-    path = table.get("path_m")
-    return found + (_polyline([to(x, y) for x, y in path], "walk") if isinstance(path, list) and path else "")
+    if "x_m" in values:
+        yield WorldThing(
+            name=str(table.get("name", "")), kind="obstacle", shape="cylinder" if "radius_m" in values else "box",
+            x_m=values["x_m"], y_m=values["y_m"], heading_rad=math.radians(values.get("heading_deg", 0.0)),
+            length_m=values.get("length_m", 0.0), width_m=values.get("width_m", 0.0),
+            radius_m=values.get("radius_m", 0.0),
+        )  # fmt: skip
 
 
-def _shape(
-    name: str, to: _To, x_m: float, y_m: float, heading_rad: float, length_m: float, width_m: float, radius_m: float
-) -> str:
-    scale = to(1.0, 0.0)[0] - to(0.0, 0.0)[0]
-    x, y = to(x_m, y_m)
-    if radius_m:
-        return f'<circle class="{name}" cx="{x}" cy="{y}" r="{max(radius_m * scale, 1.5):.1f}"/>'
-    length, width = length_m * scale, width_m * scale
-    return (
-        f'<rect class="{name}" x="{x - length / 2:.1f}" y="{y - width / 2:.1f}" width="{length:.1f}" '
-        f'height="{width:.1f}" transform="rotate({-math.degrees(heading_rad):.1f} {x} {y})"/>'
+def _curve(name: str, points: Sequence[tuple[float, float]]) -> PageCurve:
+    return PageCurve(name=name, x=[x for x, _ in points], y=[y for _, y in points])
+
+
+def _map(whole: Whole) -> PagePlot:
+    """Return the floor with the place where each cheap run ended, each with its margin."""
+    curves = _by_finding(
+        (row, (at[0] / 1000, at[1] / 1000), f"point {row.number}: {row.cheap.margin:.3f}")
+        for row in whole.progress.rows
+        if row.cheap.outcome.way_mm and row.cheap.margin is not None
+        for at in (row.cheap.outcome.way_mm[-1],)
     )
+    return PagePlot(x_name="x", x_unit="m", y_name="y", y_unit="m", curves=curves, is_equal=True)
 
 
-def _map(whole: Whole) -> str:
-    """Return the floor with the place where each cheap run ended, by its margin."""
-    extent = whole.space.extent
-    to, parts = _place_in(extent), list[str]()
-    for row in whole.progress.rows:
-        if row.cheap.outcome.way_mm and row.cheap.margin is not None:
-            x, y = to(*(at / 1000 for at in row.cheap.outcome.way_mm[-1]))
-            shade = 0.25 + 0.75 * min(max(1 - row.cheap.margin, 0.0), 1.0)
-            parts.append(
-                f'<circle class="{_CLASS[row.finding]}" cx="{x}" cy="{y}" r="4" opacity="{shade:.2f}">'
-                f"<title>point {row.number}: {row.cheap.margin:.3f}</title></circle>"
-            )
-    return f"<figure>{_svg(_SIDE, _high(extent), parts)}</figure>"
+def _by_finding(points: Iterable[tuple[PointRow, tuple[float, float], str]]) -> list[PageCurve]:
+    """Return points as curves, one for each way to come out."""
+    points = list(points)
+    curves = []
+    for name, findings in _CURVES.items():
+        found = [(at, said) for row, at, said in points if row.finding in findings]
+        if found:
+            x, y = zip(*(at for at, _ in found), strict=True)
+            curves.append(PageCurve(name=name, x=x, y=y, style="points", labels=[said for _, said in found]))
+    return curves
 
 
 def _dimensions(rows: Sequence[PointRow]) -> list[str]:
@@ -283,70 +236,26 @@ def _correlation(pairs: Sequence[tuple[float, float]]) -> float:
         return 0.0
 
 
-def _over(name: str, rows: Sequence[PointRow]) -> str:
-    points = [
-        (float(value), row.cheap.margin, _CLASS[row.finding], f"point {row.number}")
+def _over(name: str, rows: Sequence[PointRow]) -> PagePlot:
+    points = (
+        (row, (float(value), row.cheap.margin), f"point {row.number}: {row.cheap.margin:.3f}")
         for row in rows
         if isinstance(value := row.proposal.values.get(name), (int, float)) and row.cheap.margin is not None
-    ]
-    return _chart(name, points, [])
+    )
+    return PagePlot(title=name, x_name=name, y_name="margin", curves=_by_finding(points))
 
 
-def _course(rows: Sequence[PointRow]) -> Iterator[str]:
-    points = [
-        (float(row.number), row.cheap.margin, _CLASS[row.finding], f"point {row.number}")
+def _course(rows: Sequence[PointRow]) -> Iterator[PagePlot]:
+    points = (
+        (row, (float(row.number), row.cheap.margin), f"point {row.number}: {row.cheap.margin:.3f}")
         for row in rows if row.cheap.margin is not None
-    ]  # fmt: skip
-    yield _chart("margin, point by point", points, [])
+    )  # fmt: skip
+    yield PagePlot(title="margin, point by point", x_name="point", y_name="margin", curves=_by_finding(points))
     counts: list[tuple[float, float]] = [(0.0, 0.0)]
     new: list[tuple[float, float]] = [(0.0, 0.0)]
     for row in rows:
         counts.append((float(row.number), counts[-1][1] + (row.finding in FAILURES)))
         new.append((float(row.number), new[-1][1] + row.new))
-    yield _chart("failures so far", [], counts, "line bad")
-    yield _chart("blocks and states so far", [], new)
-
-
-def _chart(
-    title: str, points: Sequence[tuple[float, float, str, str]], line: Sequence[tuple[float, float]], name: str = "line"
-) -> str:
-    """Return a chart of points (x, y, class, title) or a line, with the ends of its axes and y = 0."""
-    both = [*((x, y) for x, y, _, _ in points), *line]
-    xs, ys = [x for x, _ in both], [y for _, y in both]
-    if not xs:
-        return ""
-    x0, x1, y0, y1 = min(xs), max(xs), min(0.0, *ys), max(0.0, *ys)
-    x1, y1 = x1 + float(x0 == x1), y1 + float(y0 == y1)
-    left, top, wide, high = 40, 12, _WIDTH - 52, _HEIGHT - 34
-
-    def to(x: float, y: float) -> tuple[float, float]:
-        return round(left + (x - x0) / (x1 - x0) * wide, 1), round(top + (y1 - y) / (y1 - y0) * high, 1)
-
-    parts = [f'<line class="axis" x1="{left}" x2="{left + wide}" y1="{to(x0, 0)[1]}" y2="{to(x0, 0)[1]}"/>']
-    parts += [
-        f'<circle class="{kind}" cx="{to(x, y)[0]}" cy="{to(x, y)[1]}" r="3" opacity="0.75"><title>'
-        f"{html.escape(said)}: {y:.3f}</title></circle>"
-        for x, y, kind, said in points
-    ]
-    if line:
-        parts.append(_polyline([to(x, y) for x, y in line], name))
-    for text, x, y, anchor in (
-        (_short(y1), left - 4, top + 4, "end"), (_short(y0), left - 4, top + high + 4, "end"),
-        (f"{x0:g}", left, _HEIGHT - 6, "start"), (f"{x1:g}", left + wide, _HEIGHT - 6, "end"),
-        (title, left + wide / 2, _HEIGHT - 6, "middle"),
-    ):  # fmt: skip
-        parts.append(f'<text x="{x}" y="{y}" text-anchor="{anchor}">{html.escape(text)}</text>')
-    return f"<figure>{_svg(_WIDTH, _HEIGHT, parts)}</figure>"
-
-
-def _short(value: float) -> str:
-    """Return a number that fits beside an axis: two digits, or all those before the point."""
-    return f"{value:.2g}" if abs(value) < 10 else f"{value:.0f}"
-
-
-def _polyline(points: Sequence[tuple[float, float]], name: str) -> str:
-    return f'<polyline class="{name}" points="{" ".join(f"{x},{y}" for x, y in points)}"/>'
-
-
-def _svg(width: int, height: int, parts: Sequence[str]) -> str:
-    return f'<svg viewBox="0 0 {width} {height}" role="img">{"".join(parts)}</svg>'
+    yield PagePlot(title="failures so far", x_name="point", y_name="failures", curves=[_curve("failures", counts)])
+    words = "blocks and states so far"
+    yield PagePlot(title=words, x_name="point", y_name="blocks and states", curves=[_curve(words, new)])

@@ -1,7 +1,5 @@
 """`p2os compare`: two drives laid over one another, how far they are apart, and where they part."""
 
-import base64
-import html
 import json
 import math
 import sys
@@ -69,7 +67,7 @@ def compare(
         Nanos, option(TIME, "--delta", purpose="Length of a step of the relative error.", above_zero=True, shown="1s")
     ] = NS_PER_S,
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
-    page: Annotated[Path | None, typer.Option("--html", help="Write a page with the picture.", metavar="FILE")] = None,
+    page: Annotated[Path | None, typer.Option("--html", help="Write a page of both.", metavar="FILE")] = None,
     picture: Annotated[Path | None, typer.Option("--picture", help="Write the picture, PNG.", metavar="FILE")] = None,
     tum: Annotated[
         str, typer.Option("--tum", help="Write both ways as compared, NAME-a.tum, NAME-b.tum.", metavar="NAME")
@@ -79,7 +77,7 @@ def compare(
     force: Annotated[bool, typer.Option("--force", help=FORCE_HELP)] = False,
 ) -> None:  # fmt: skip
     """Compare two drives."""
-    require(*(["matplotlib"] if page or picture else []))
+    require(*(["matplotlib"] if picture else []))
     from robot_bench.experiments.comparison import How
     from robot_bench.experiments.comparison import compare as compared
     from robot_bench.experiments.drive_files import read_drive, write_tum
@@ -95,14 +93,14 @@ def compare(
     if tum:
         write_tum(found.ours, Path(f"{tum}-a.tum"))
         write_tum(found.theirs, Path(f"{tum}-b.tum"))
-    if page or picture:
-        from robot_bench.experiments.pictures import comparison_figure, png, write_png
+    if picture:
+        from robot_bench.experiments.pictures import comparison_figure, write_png
 
-        figure = comparison_figure(found)
-        if picture:
-            write_png(figure, picture)
-        if page:
-            write_text(page, _page(found, png(figure)))
+        write_png(comparison_figure(found), picture)
+    if page:
+        from robot_bench.experiments.comparison_page import comparison_page
+
+        write_text(page, comparison_page(found, lines_of(found)))
     if json_output:
         typer.echo(json.dumps(found.as_plain(), indent=2))
     else:
@@ -189,17 +187,3 @@ def _parting_lines(found: "Comparison") -> Iterator[str]:
         yield f"the motion does not part; what differs: {where}"
     else:
         yield f"the motion parts at {moved_s:.3f} s; it came from: {where}"
-
-
-def _page(found: "Comparison", picture: bytes) -> str:
-    """Return a page that needs no other file."""
-    title = html.escape(f"{found.other.name} compared with {found.one.name}")
-    text = html.escape("\n".join(lines_of(found)))
-    image = base64.b64encode(picture).decode("ascii")
-    return (
-        f"<!doctype html>\n<html lang=en><meta charset=utf-8><title>{title}</title>\n"
-        "<style>body{font:16px/1.5 system-ui,sans-serif;max-width:1100px;margin:2em auto;padding:0 1em;"
-        "color:#1d2327;background:#fff}pre{overflow-x:auto;font-size:13px}img{max-width:100%}</style>\n"
-        f"<h1>{title}</h1>\n<img alt='both ways, speeds and differences' src='data:image/png;base64,{image}'>\n"
-        f"<pre>{text}</pre>\n</html>\n"
-    )

@@ -27,7 +27,6 @@ from robot_bench.campaign.campaign_file import (
 )
 from robot_bench.campaign.conduct import Conduct, PointFinding
 from robot_bench.campaign.last_moment import LastMoment
-from robot_bench.campaign.pages.page import _short
 from robot_bench.campaign.reaching.corpus import read_corpus
 from robot_bench.campaign.search import SEARCHES, PointResult, Problem
 from robot_bench.campaign.suggestion import suggested
@@ -38,6 +37,7 @@ from robot_bench.campaign.workers.processes import Processes
 from robot_bench.cli.campaigns.campaign import _facts, tell
 from robot_bench.scenario.loading import known_scenarios, load_scenario
 from simbase.errors import FileError, UsageError
+from tests.p2os.view.pages import ReadPage
 
 #: numba, which ribs compiles its steps by: for 8 s what then runs for some milliseconds.
 os.environ["NUMBA_DISABLE_JIT"] = "1"
@@ -296,13 +296,6 @@ def test_each_failure_is_a_folder_that_runs_again_with_its_hash(tmp_path: Path) 
     assert trial_of(str(file)).sha256 == row.failing.trial.sha256
 
 
-@pytest.mark.parametrize(("value", "text"), [
-    (0.4, "0.4"), (-0.0123, "-0.012"), (9.99, "10"), (99.4, "99"), (99.6, "100"), (-331.0, "-331"), (12345, "12345"),
-])  # fmt: skip
-def test_a_number_beside_an_axis_is_short(value: float, text: str) -> None:
-    assert _short(value) == text
-
-
 def test_the_data_set_has_a_row_a_run_and_the_page_names_every_failure(tmp_path: Path) -> None:
     parquet = pytest.importorskip("pyarrow.parquet")
     whole = carried(begun(tmp_path), tmp_path / "kept", Shuffled(1))
@@ -312,8 +305,14 @@ def test_the_data_set_has_a_row_a_run_and_the_page_names_every_failure(tmp_path:
     assert failed == {row.number for row in whole.failures}
     assert {entry["stage"] for entry in table} == {"cheap", "full", "replay"}
     assert all(entry["vary.threshold_m"] in {0.4, 0.6} for entry in table)
-    page = (tmp_path / "kept/report.html").read_text()
-    assert all(f"point {number}</b>" in page for number in failed)
+    page = ReadPage((tmp_path / "kept/report.html").read_text(encoding="utf-8"))
+    plans = page.section("Failures")["blocks"]
+    assert {plan["title"] for plan in plans} == {f"point {number}" for number in failed}
+    assert all(plan["world"]["things"] and plan["ways"][0]["x"] for plan in plans)
+    titles = [section["title"] for section in page.header["sections"]]
+    assert titles[:3] == ["What came of it", "What it cost", "Failures"]
+    (over, *_) = page.section("Margins over what varied")["blocks"]
+    assert sum(len(curve["x"]) for curve in over["curves"]) == len(whole.progress.rows)
 
 
 def test_until_when_failures_were_avoidable_is_reported_by_summary_and_page(tmp_path: Path) -> None:
@@ -321,8 +320,10 @@ def test_until_when_failures_were_avoidable_is_reported_by_summary_and_page(tmp_
     whole = carried(begun(tmp_path), tmp_path / "kept", Shuffled(1), moment)
     failures = json.loads((tmp_path / "kept/summary.json").read_text())["failures"]
     assert {failure["avoidable"] for failure in failures[:MOST_MOMENTS]} == {moment.words}
-    page = (tmp_path / "kept/report.html").read_text(encoding="utf-8")
-    assert page.count("until 1.00 s, at x 1.00 m") == 2 * len(whole.moments) > 0  # below a plan, and in it
+    page = ReadPage((tmp_path / "kept/report.html").read_text(encoding="utf-8"))
+    plans = [plan for plan in page.section("Failures")["blocks"] if "until 1.00 s, at x 1.00 m" in plan["text"]]
+    assert len(plans) == len(whole.moments) > 0
+    assert all(plan["places"] == [[1.0, 2.0, "last moment"]] for plan in plans)
 
 
 WRONG = {

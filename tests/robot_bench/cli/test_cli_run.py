@@ -18,6 +18,7 @@ from robot_bench.drives.of_run import drive_of_record
 from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.recording.run_record import read_run
 from robot_bench.scenario.loading import load_scenario
+from tests.p2os.view.pages import ReadPage
 from tests.robot_bench.firmware import thumb
 from tests.tools.forked_python import forked_p2os
 
@@ -119,7 +120,8 @@ def test_what_a_dead_program_ran_last_is_in_the_table_and_in_the_report(capsys: 
     out = capsys.readouterr().out.splitlines()
     block = out[out.index(TITLE) + 1]
     assert block.split() == ["0", "0x08000042"]
-    assert block in Path("dead/report.html").read_text(encoding="utf-8")
+    page = ReadPage(Path("dead/report.html").read_text(encoding="utf-8"))
+    assert block in page.section("What ran last, by cycle")["blocks"][0]["text"]
 
 
 @pytest.mark.parametrize(
@@ -310,7 +312,8 @@ def test_why_a_run_failed_stands_right_above_its_last_line(capsys: pytest.Captur
     reported = json.loads(Path("dead/summary.json").read_text(encoding="utf-8"))
     assert reported["goals_met"] == record.end["goals_met"] == record.verdicts == []
     assert len(reported["goals_not_judged"]) == 2
-    assert f'<li class="open">{untouched[8:]}</li>' in Path("dead/report.html").read_text(encoding="utf-8")
+    goals = ReadPage(Path("dead/report.html").read_text(encoding="utf-8")).section("Goals")["blocks"][0]["items"]
+    assert {"open"} == {goal["standing"] for goal in goals if goal["text"] == untouched[8:]}
     assert drive_of_record("dead", record).open_goals == reported["goals_not_judged"]
     assert p2os(["metrics", "dead"]) == 0
     assert "  open               touches nothing: not judged before 5 s" in capsys.readouterr().out.splitlines()

@@ -2,7 +2,6 @@
 
 import json
 import math
-import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,9 +23,10 @@ from robot_bench.drives.of_run import drive_of_record, steps_of_edges, trajector
 from robot_bench.events.kinds import Clearance, Contact, Packet, Pose, Verdict
 from robot_bench.experiments.drive_files import read_drive
 from robot_bench.recording.run_record import RunRecord, read_run
-from robot_bench.report.measures import BARS, HEIGHT
-from robot_bench.report.page import page_data, render_page
+from robot_bench.report.measures import BARS
+from robot_bench.report.run_page import render_run
 from robot_bench.wires.edges import Edges
+from tests.p2os.view.pages import ReadPage
 
 P2DX = load_parameters("p2dx")
 
@@ -200,31 +200,26 @@ def test_what_cannot_be_measured_is_reported_in_one_line(words: list[str], says:
 
 
 def test_the_page_of_a_run_has_the_figures_and_the_distributions_of_its_latencies(runs: Path) -> None:
-    record = read_run(runs / "near")
     found = metrics(read_drive(runs / "near"))
-    page = render_page(record, page_data(record))
-    assert f"<td>way</td><td>{found.path_m:.2f} m</td>" in page
-    assert f"<td>work at the rims</td><td>{found.energy_j:.1f} J</td>" in page
-    section = page[page.index('class="latency"') : page.index("USART1")]
-    rows = [row for row in section.split("<tr>") if "<svg" in row]
-    assert [row.partition("<td>")[2].partition("</td>")[0] for row in rows] == [*STEPS, WHOLE]
-    for name, row in zip((*STEPS, WHOLE), rows, strict=True):
+    page = ReadPage(render_run(read_run(runs / "near")))
+    drive = dict(page.table("Drive"))
+    assert (drive["way"], drive["work at the rims"]) == (f"{found.path_m:.2f} m", f"{found.energy_j:.1f} J")
+    table, *plots = page.section("Latency of the loop by part")["blocks"]
+    assert [row[0]["text"] for row in table["rows"]] == [plot["title"] for plot in plots] == [*STEPS, WHOLE]
+    for name, row, plot in zip((*STEPS, WHOLE), table["rows"], plots, strict=True):
         times = 1000 * found.latency.of(name)
-        assert f"<td>{len(times)}</td><td>{np.median(times):.2f}</td>" in row
-        heights = [float(text) for text in re.findall(r'<rect [^>]*height="([0-9.]+)"', row)]
-        assert max(heights) == HEIGHT
-        counts = np.histogram(np.minimum(times, 399.999), BARS, (0, _scale_ms(section)))[0]
-        assert heights == pytest.approx([HEIGHT * count / max(counts) for count in counts if count], abs=0.06)
-
-
-def _scale_ms(section: str) -> int:
-    return 50 * (int(max(float(text) for text in re.findall(r"greatest ([0-9.]+) ms", section))) // 50 + 1)
+        assert [cell["text"] for cell in row[1:3]] == [str(len(times)), f"{np.median(times):.2f}"]
+        (bars,) = plot["curves"]
+        assert (bars["style"], plot["x_unit"], plot["marks"]) == ("bars", "ms", pytest.approx([np.median(times)]))
+        scale_ms = bars["x"][0] * 2 * BARS
+        assert scale_ms % 50 == pytest.approx(0.0)
+        assert bars["y"] == np.histogram(np.minimum(times, scale_ms - 0.001), BARS, (0, scale_ms))[0].tolist()
 
 
 def test_a_run_that_was_cut_before_it_had_two_poses_has_a_page_without_figures(runs: Path) -> None:
     record = read_run(runs / "near")
     record.poses = record.poses[:1]
     record.wire = []
-    page = render_page(record, page_data(record))
-    assert "Latency of the loop" not in page
-    assert "State log" in page
+    page = ReadPage(render_run(record))
+    assert "Latency of the loop by part" not in {section["title"] for section in page.header["sections"]}
+    assert page.rows("events")

@@ -36,7 +36,8 @@ from robot_bench.recording.event_files import write_named_events
 from robot_bench.recording.run_record import RunRecord, read_events, read_run
 from robot_bench.recording.summary import figures, outcome_of
 from robot_bench.recording.waveforms import write_vcd
-from robot_bench.report.page import page_data, render_page
+from robot_bench.report.drawn import drawn_of
+from robot_bench.report.run_page import render_run
 from robot_bench.ros.run_bag import RunMessages
 from robot_bench.run import meta_of
 from simbase.errors import P2osError
@@ -103,7 +104,8 @@ def mutations(value: object) -> Iterator[tuple[str, object]]:
 
 
 def _page(record: RunRecord, _folder: Path) -> None:
-    render_page(record, page_data(record))
+    drawn_of(record)
+    render_run(record)
     figures(record)
     json.dumps(outcome_of(record))
 

@@ -1,18 +1,17 @@
 """The page of an hour's run is of bounded size, keeps what stands out, and says what it leaves out."""
 
-import json
 from array import array
 from dataclasses import replace
 
 import pytest
 
 from p2os.protocol.packets import EncoderPacket
-from robot_bench.events.codec import Json
 from robot_bench.events.kinds import Contact, Note, Packet, WorldChange
 from robot_bench.recording.run_record import RunRecord
-from robot_bench.report.page import page_data, render_page
-from robot_bench.report.thinning import ends, extremes, pulses
+from robot_bench.report.run_page import render_run
+from robot_bench.report.thinning import extremes, pulses
 from robot_bench.wires.edges import Edges
+from tests.p2os.view.pages import ReadPage
 from tests.robot_bench.recording.records import S, pose
 
 MS = 10**6
@@ -57,35 +56,37 @@ def long(request: pytest.FixtureRequest) -> RunRecord:
 
 
 @pytest.fixture(scope="module")
-def data_of_long(long: RunRecord) -> Json:
-    return page_data(long)
+def page(long: RunRecord) -> ReadPage:
+    return ReadPage(render_run(long))
 
 
-def test_the_page_of_an_hour_is_bounded_and_says_what_it_leaves_out(long: RunRecord, data_of_long: Json) -> None:
-    page = render_page(long, data_of_long)
-    assert len(page) < MOST_BYTES
-    for what in ("poses", "sonar", "pins", "packets", "lines of text", "log"):
-        assert f"{what}: " in page[: page.index("<script")], what
-    assert "trace.jsonl holds all" in page
+def test_the_page_of_an_hour_is_bounded_and_says_what_it_leaves_out(page: ReadPage) -> None:
+    assert len(page.text) < MOST_BYTES
+    for kind in ("pose", "levels", "packets", "text", "things"):
+        lines = [line for line in page.header["left_out"] if line.startswith(f"{kind} of ")]
+        assert len(lines) == 1, kind
+        assert lines[0].endswith("trace.jsonl has all")
 
 
-def test_what_stands_out_is_kept(long: RunRecord, data_of_long: Json) -> None:
-    data = json.loads(json.dumps(data_of_long))
-    assert max(row[4] for row in data["poses"]) == 0.999
-    assert min(min(row[1:]) for row in data["sonar"]) == 123
-    assert any(event[2] == "collision" for event in data["events"])
-    assert data["hits"] == [[long.last_ns / S / 2, 1.0, 0.0, "'crate'"]]
-    assert data["poses"][-1][0] == long.poses[-1].t / S
-    assert data["packets"]["rows"][0][0] == 0.0
-    assert data["packets"]["rows"][-1][0] == long.wire[-1].t / S
+def test_what_stands_out_is_kept(long: RunRecord, page: ReadPage) -> None:
+    assert max(row[1] for row in page.rows("left")) == 0.999
+    assert min(row[1] for row in page.rows("nearest echo")) == 0.123
+    assert min(min(row[1]) for row in page.rows("sonar")) == pytest.approx(0.123)
+    assert any(row[3] == "collision" for row in page.rows("events"))
+    for name in ("pose", "P2OS", "usart1"):
+        assert page.rows(name)[0][0] == 0
+    assert page.rows("pose")[-1][0] == long.poses[-1].t
+    assert page.rows("P2OS")[-1][0] == long.wire[-1].t
+    edges = page.rows("PA4 DD1")
+    assert sum(row[2] for row in edges) == len(long.pins["DD1"])
 
 
 def test_a_minute_is_shown_whole() -> None:
     run = long_run(60)
     run.pins = {net: edges[:200] for net, edges in run.pins.items()}
-    data = json.loads(json.dumps(page_data(run)))
-    assert data["left_out"] == []
-    assert (len(data["poses"]), len(data["packets"]["rows"]), len(data["usart"])) == (1200, 1200, 600)
+    page = ReadPage(render_run(run))
+    assert page.header["left_out"] == []
+    assert [len(page.rows(name)) for name in ("pose", "P2OS", "usart1")] == [1200, 1200, 600]
 
 
 def test_extremes_keep_the_least_and_the_greatest_of_each_bucket_in_order() -> None:
@@ -110,10 +111,3 @@ def test_pulses_keep_both_levels_of_every_bucket(count: int, first: int) -> None
     assert len(kept) <= 3 * 41
     for start in range(0, count - 101, 101):
         assert {level for at, level in kept if start <= at < start + 101} == {0, 1}
-
-
-def test_ends_take_from_both_and_never_more_than_fits() -> None:
-    assert ends([3] * 10, 100) == (10, 0)
-    head, tail = ends([3] * 10, 12)
-    assert (head, tail) == (2, 2)
-    assert ends([], 5) == (0, 0)

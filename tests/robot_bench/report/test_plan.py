@@ -1,7 +1,4 @@
-"""What is written on the plan of a run, on charts and in lists: once, for the page and the plots."""
-
-import json
-import re
+"""What is written on the plan of a run and on its plots."""
 
 import pytest
 
@@ -10,8 +7,8 @@ from robot_bench.events.codec import Json
 from robot_bench.events.kinds import Contact, Packet
 from robot_bench.recording.run_record import RunRecord
 from robot_bench.recording.signals import pin_labels
-from robot_bench.report.page import page_data, render_page
-from robot_bench.report.plan import LETTER_PX, LINE_PX, NARROW_PX, WIDE_PX, plan
+from robot_bench.report.drawn import drawn_of
+from robot_bench.report.plan import LETTER_PX, LINE_PX, WIDE_PX, plan
 from robot_bench.wires.edges import Edges
 from tests.robot_bench.recording.records import S, pose
 
@@ -26,8 +23,8 @@ def drawn(**changes: object) -> Json:
     return plan(**{**given, **changes})  # type: ignore[arg-type]
 
 
-def texts(made: Json, size: str = "wide") -> list[str]:
-    return [label["text"] for label in made["labels"][size]]  # type: ignore[index]
+def texts(made: Json) -> list[str]:
+    return [label["text"] for label in made["labels"]]  # type: ignore[index]
 
 
 def test_a_robot_that_stands_has_one_mark_with_the_times_of_its_stay() -> None:
@@ -41,11 +38,10 @@ def test_a_collision_is_named_with_its_time() -> None:
     assert "'crate', 8.7 s" in texts(drawn(hits=[(8.717, 1.35, -1.38, "'crate'")]))
 
 
-@pytest.mark.parametrize(("size", "width_px"), [("wide", WIDE_PX), ("narrow", NARROW_PX)])
-def test_no_label_covers_another_or_leaves_the_plan(size: str, width_px: float) -> None:
+def test_no_label_covers_another_or_leaves_the_plan() -> None:
     crowd = [{**CRATE, "name": f"crate {n}", "x": n % 7 * 0.5 - 1.5, "y": n // 7 * 0.3 - 1.5} for n in range(60)]
-    scale, boxes = width_px / 6, []
-    for label in drawn(obstacles=crowd, hits=[(n / 10, 0.02 * n, 0, "'wall'") for n in range(30)])["labels"][size]:  # type: ignore[index]
+    scale, boxes = WIDE_PX / 6, []
+    for label in drawn(obstacles=crowd, hits=[(n / 10, 0.02 * n, 0, "'wall'") for n in range(30)])["labels"]:  # type: ignore[index]
         width = LETTER_PX * len(label["text"])
         left = (label["x"] + 3) * scale + label["dx"] - {"left": 0, "center": width / 2, "right": width}[label["align"]]
         top = (3 - label["y"]) * scale + label["dy"] - LINE_PX / 2
@@ -54,7 +50,7 @@ def test_no_label_covers_another_or_leaves_the_plan(size: str, width_px: float) 
     slack = 1.0  # offsets are rounded to pixels
     for n, (x0, y0, x1, y1) in enumerate(boxes):
         assert x0 > -slack < y0
-        assert max(x1, y1) < width_px + slack
+        assert max(x1, y1) < WIDE_PX + slack
         for a0, b0, a1, b1 in boxes[:n]:
             assert x1 <= a0 + slack or a1 <= x0 + slack or y1 <= b0 + slack or b1 <= y0 + slack
 
@@ -83,24 +79,13 @@ def hits(seconds: int) -> RunRecord:
     )  # fmt: skip
 
 
-def test_the_plots_are_drawn_from_the_data_that_the_page_holds() -> None:
+def test_the_plots_show_what_the_plan_says() -> None:
     pytest.importorskip("matplotlib")
     from robot_bench.report.plots import _path_figure, _pins_figure
 
-    data = page_data(hits(9))
-    page = render_page(hits(9), data)
-    held = json.loads(re.search(r'application/json">(.*?)</script>', page, re.DOTALL)[1])  # type: ignore[index]
-    assert held == json.loads(json.dumps(data))
-    written = {text.get_text() for text in _path_figure(held).axes[0].texts}
-    assert written == {"1 m", *texts(held["plan"])}
-    assert [label.get_text() for label in _pins_figure(held).axes[0].get_yticklabels()] == [
+    data = drawn_of(hits(9))
+    written = {text.get_text() for text in _path_figure(data).axes[0].texts}
+    assert written == {"1 m", *texts(data["plan"])}  # type: ignore[arg-type]  # an object
+    assert [label.get_text() for label in _pins_figure(data).axes[0].get_yticklabels()] == [
         "PB7 comm1", "motor 1 (left)"
     ]  # fmt: skip
-
-
-def test_a_packet_that_is_said_again_is_held_once_and_what_is_left_out_is_a_row() -> None:
-    few, many = page_data(hits(9))["packets"], page_data(hits(9000))["packets"]
-    assert (len(few["rows"]), few["kinds"]) == (9, [("c2r", "SYNC0 / PULSE", "", "fafb03000000")])  # type: ignore[index]
-    gaps = [row for row in many["rows"] if row[-1] == "gap"]  # type: ignore[index]
-    left = 9000 - len(many["rows"]) + 1  # type: ignore[index]
-    assert [row[1] for row in gaps] == [f"… {left} packets: wire.jsonl has all"]

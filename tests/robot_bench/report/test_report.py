@@ -5,16 +5,14 @@ from pathlib import Path
 
 import pytest
 
-from p2os.protocol.packets import EncoderPacket
 from robot_bench.events.codec import TraceError
-from robot_bench.events.kinds import Packet
 from robot_bench.recording.run_record import read_run
 from robot_bench.recording.signals import grouped, motor_steps
 from robot_bench.recording.summary import cells_entered, distance_m, figures, verdict
 from robot_bench.report import make_report
 from robot_bench.report.make import Files, make_artefacts
-from robot_bench.report.packets import describe
-from robot_bench.report.page import page_data
+from robot_bench.report.run_page import render_run
+from tests.p2os.view.pages import ReadPage
 
 
 def entries() -> list[dict[str, object]]:
@@ -104,9 +102,11 @@ def test_the_page_says_of_a_run_what_the_screen_says(end: dict[str, object], sai
     (run / "trace.jsonl").write_text("\n".join([*lines[:-1], json.dumps({"k": "end", **end}), ""]), encoding="utf-8")
     record = read_run(run)
     assert verdict(record) == said
-    page = make_artefacts(run, Files.REPORT).report.read_text(encoding="utf-8")
-    assert f'<span class="verdict {said.split(maxsplit=1)[0].strip(",")}">{said}</span>' in page
-    assert page_data(record)["title"].endswith(f": {said}")
+    page = ReadPage(make_artefacts(run, Files.REPORT).report.read_text(encoding="utf-8"))
+    assert page.header["verdict"] == said
+    assert f"<title>motors · {said}</title>" in page.text
+    standings = {"passed": "passed", "ended": "open", "failed": "failed", "interrupted": "failed"}
+    assert page.header["standing"] == standings[said.split(maxsplit=1)[0].strip(",")]
 
 
 def test_the_motor_pins_read_as_twos_complement(run: Path) -> None:
@@ -120,13 +120,26 @@ def test_nets_that_the_pin_out_does_not_know_come_last() -> None:
 
 def test_the_page_is_one_file_that_no_text_of_the_run_can_break(run: Path) -> None:
     files = make_report(run)
-    page = files.page.read_text(encoding="utf-8")
-    assert "hello </script>" not in page
-    assert "http" not in page.replace("http-equiv", "")
-    assert page.count("</script>") == 2
-    assert "VEL" in page
+    page = ReadPage(files.page.read_text(encoding="utf-8"))
+    assert "hello </script>" not in page.text
+    assert page.text.count("</script>") == 4  # header, frames, the script of the 3D view, that of the page
+    assert [row[2] for row in page.rows("usart1")] == ["hello </script> w", "orld", "rest"]
     for plot in files.plots:
         assert plot.read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_page_holds_the_rows_of_the_trace(run: Path) -> None:
+    page = ReadPage(make_report(run).page.read_text(encoding="utf-8"))
+    assert page.rows("PB7 comm1") == [(0, 0, 1), (10, 1, 1), (20, 0, 1)]
+    assert [row[0] for row in page.rows("pose")] == [0, 1_000_000_000]
+    assert page.rows("left asked") == [(0, 0.0), (10, 3 * 0.0625), (20, -4 * 0.0625)]
+    assert page.rows("nearest echo") == [(30, 0.54)]
+    assert next(row[1:4] for row in page.rows("P2OS")) == (1, bytes.fromhex("fafb060b3bc800d33b"), "VEL")
+    assert page.rows("things") == [(80, 1, 1, 2.0, 2.0, 0.0), (81, 0, 0, 0.0, 3.0, 0.0)]
+    assert [(row[2], row[3]) for row in page.rows("events")] == [("adapter", "connected")]
+    assert [row[1] for row in page.rows("1 m")] == [0, 1]
+    assert page.header["left_out"] == []
+    assert [thing["name"] for thing in page.header["world"]["things"]] == ["north", "post"]
 
 
 def test_a_trace_cut_at_any_byte_still_has_its_report(run: Path) -> None:
@@ -144,20 +157,10 @@ def test_a_trace_cut_at_any_byte_still_has_its_report(run: Path) -> None:
 
 
 def make_page_only(folder: Path) -> None:
-    from robot_bench.report.page import page_data, render_page
-
-    record = read_run(folder)
-    assert "cut at" in render_page(record, page_data(record))
+    assert ReadPage(render_run(read_run(folder))).header["verdict"].startswith("cut at")
 
 
 def test_a_folder_without_a_trace_is_refused_with_a_hint(tmp_path: Path) -> None:
     with pytest.raises(TraceError) as caught:
         make_report(tmp_path)
     assert caught.value.hint is not None
-
-
-def test_a_packet_beyond_the_standard_one_is_named_with_its_fields() -> None:
-    frame = EncoderPacket(left_counts=5, right_counts=-7).to_frame()
-    assert describe(Packet(t=0, direction="r2c", data=frame.to_bytes())) == [
-        ("EncoderPacket", "left_counts 5, right_counts -7")
-    ]

@@ -12,7 +12,7 @@ import pytest
 from p2os.cli.main import run as p2os
 from robot_bench.recording.run_record import read_run
 from robot_bench.report import make
-from robot_bench.report.page import page_data
+from tests.p2os.view.pages import ReadPage
 from tests.robot_bench.firmware.hurried import hurried
 from tests.robot_bench.modes_and_bodies import modes_and_bodies
 
@@ -78,11 +78,12 @@ def test_what_was_hit_is_named_everywhere(mode: str, body: str, crash: Callable[
     assert summary["hits"][0] == {
         "t_s": hit.t / 1e9, "what": "'red box'", "x_m": hit.x_m, "y_m": hit.y_m, "part": hit.part,
     }  # fmt: skip
-    data = page_data(record)
-    assert (hit.t / 1e9, hit.x_m, hit.y_m, "'red box'") in data["hits"]  # type: ignore[operator] # a list
     assert hit.part.startswith("front")
-    log = [(who, what) for _, who, what, _ in data["events"]]  # type: ignore[misc, attr-defined] # rows of a list
+    rows = ReadPage((folder / "report.html").read_text(encoding="utf-8")).rows("events")
+    log = [(who, what) for _, _, who, what, *_ in rows]
     assert ("body", "collision") in log
+    place = next(row[5:] for row in rows if row[3] == "collision" and row[0] == hit.t)
+    assert place == pytest.approx((hit.x_m, hit.y_m), abs=1e-6)
     assert ("direct" if mode == "direct" else "adapter", "command") in log
 
 

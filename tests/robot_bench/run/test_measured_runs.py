@@ -11,6 +11,7 @@ from robot_bench.recording.run_folder import FILES
 from robot_bench.run import RunProgress, RunResult, run_scenario
 from robot_bench.scenario.loading import load_scenario
 from robot_bench.scenario.scenario import Scenario
+from tests.p2os.view.pages import ReadPage
 
 CASES = [("python", "adapter"), ("native", "direct"), ("native", "adapter")]
 COVERAGE = {"coverage.txt", "coverage.html", "coverage.info"}
@@ -59,9 +60,9 @@ def test_files_summary_and_page_tell_of_one_measurement(tmp_path: Path, capsys: 
     assert all(Path(line[3:]).is_file() for line in info if line.startswith("SF:"))
     folded = (folder / "profile.folded").read_text(encoding="utf-8").splitlines()
     assert outcome["profile"]["cycles"] >= sum(int(line.rsplit(" ", 1)[1]) for line in folded) > 0
-    page = (folder / "report.html").read_text(encoding="utf-8")
-    for name in COVERAGE | PROFILE:
-        assert f'<a href="{name}">' in page
+    page = ReadPage((folder / "report.html").read_text(encoding="utf-8"))
+    lists = [page.section(title)["blocks"][1]["items"] for title in ("Coverage", "Profile")]
+    assert {link["href"] for links in lists for link in links} == COVERAGE | PROFILE
     assert "int main(void)" in (folder / "coverage.html").read_text(encoding="utf-8")
     assert p2os([*words, "--out", str(folder), "--force"]) in {0, 1}
     assert not names(folder) & (COVERAGE | PROFILE)

@@ -285,7 +285,7 @@ class Serving:
         self.urls, self.orders = [host.listener.description for host in hosts], orders.description
         self.ticks = 0
         self._end = threading.Event()
-        fleet = Fleet(hosts, control=ControlLine(orders), on_tick=(0.01, self._tick))
+        fleet = Fleet(hosts, control=ControlLine(orders), ticks=[(0.01, self._tick)])
         self._thread = threading.Thread(target=fleet.run, kwargs={"until": self._end.is_set}, daemon=True)
         self._thread.start()
 

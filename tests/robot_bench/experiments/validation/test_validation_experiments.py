@@ -17,6 +17,7 @@ from robot_bench.experiments.validation.figures import LOOSE_BECAUSE, Figure, lo
 from robot_bench.experiments.validation.trials import TrialResult, Variant, reported, run_trials, variants
 from robot_bench.report.make import Files
 from robot_bench.scenario.included_files import Setting
+from tests.p2os.view.pages import ReadPage
 
 DIRECT, ADAPTER = Variant("direct", "", "kinematic"), Variant("adapter", "model", "kinematic")
 FIRMWARE = Variant("adapter", "firmware", "kinematic")
@@ -209,8 +210,11 @@ def test_the_command_passes_and_writes_page_and_figures(
     assert "motors      3 of 3" in out
     assert out.splitlines()[-1] == "passed in 3 variants; report: v/validation.html"
     page = Path("v/validation.html").read_text(encoding="utf-8")
-    assert page.count("0.5 mm/s (VEL is whole mm/s)") == 4  # rim speeds and angles, of the model and the firmware
-    assert "adapter (firmware), kinematic" in page
+    rows = ReadPage(page).section("motors")["blocks"][1]["rows"]
+    bounds = [row[-1]["text"] for row in rows]
+    # Rim speeds and angles, of the model and the firmware.
+    assert sum("0.5 mm/s (VEL is whole mm/s)" in bound for bound in bounds) == 4
+    assert any(row[1]["text"] == "adapter (firmware), kinematic" for row in rows)
     figures = json.loads(Path("v/validation.json").read_text(encoding="utf-8"))
     assert figures["passed"]
     assert len(figures["results"]) == 3

@@ -1,6 +1,6 @@
 """Makes the pictures of docs/pictures, and tells which are older than what they show.
 
-Usage: python -m tools.make_pictures [--check] [--all] [--folder DIR]
+Usage: python -m tools.pictures [--check] [--all] [--folder DIR]
 
 Each picture carries a hash of its inputs (scenario and firmware, the board's files,
 and the code that draws) as a PNG text chunk. Without options the pictures whose inputs have
@@ -27,13 +27,13 @@ from hardware.pcb.circuit.design import VARIANTS
 from hardware.pcb.outputs import generated_files, pictures
 from hardware.pcb.spice.decks import decks
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 PICTURES = ROOT / "docs" / "pictures"
 #: The text chunk's keyword.
 KEYWORD = b"inputs"
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 WORLDS = "p2os/pioneer/world/worlds"
-REPORT = tuple(f"robot_bench/report/{name}.py" for name in ("page", "plan", "plots", "thinning"))
+REPORT = tuple(f"robot_bench/report/{name}.py" for name in ("drawn", "plan", "plots", "thinning"))
 BOARD = "hardware/pcb/outputs/pictures.py"
 
 
@@ -55,7 +55,7 @@ class Group:
         for pattern in self.files:
             found = sorted(ROOT.glob(pattern))
             if not found:
-                raise SystemExit(f"make_pictures: no file matches {pattern}")
+                raise SystemExit(f"pictures: no file matches {pattern}")
             for path in found:
                 digest.update(path.relative_to(ROOT).as_posix().encode() + b"\0" + path.read_bytes())
         return digest.hexdigest()
@@ -93,7 +93,7 @@ def make_demo() -> None:
     with tempfile.TemporaryDirectory() as folder, Path(os.devnull).open("w") as null, contextlib.redirect_stdout(null):
         target = Path(folder) / "demo"
         if run(["run", "dodge", "--out", str(target)]):
-            raise SystemExit("make_pictures: the demonstration failed")
+            raise SystemExit("pictures: the demonstration failed")
         make_report(target)
         (PICTURES / "demo.png").write_bytes((target / "path.png").read_bytes())
 
@@ -170,7 +170,7 @@ def main(arguments: list[str] | None = None) -> int:
         group.make()
         for file in files:
             if not file.is_file():
-                print(f"make_pictures: {file.name} was not made (hint: tools/install_board_tools.sh)", file=sys.stderr)
+                print(f"pictures: {file.name} was not made (hint: tools/install_board_tools.sh)", file=sys.stderr)
                 return 1
             file.write_bytes(stamped(file.read_bytes(), inputs))
             print(f"{file.relative_to(PICTURES)}: {file.stat().st_size} bytes")

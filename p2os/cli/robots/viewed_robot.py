@@ -1,0 +1,57 @@
+"""A robot at a port on a page: what `--view` of the verbs does that hold one, and `p2os view URL`."""
+
+import contextlib
+from collections.abc import Callable, Iterator
+from functools import partial
+
+from p2os.cli.captures.shown_page import shown
+from p2os.cli.held_robot import held
+from p2os.client import Robot
+from p2os.transport import Transport, open_url
+from p2os.transport.wall_clock import wall_clock
+from p2os.view.targets import ViewTarget
+from p2os.view.watched_line import WatchedConversation
+
+#: Of a URL of a line.
+SCHEMES = ("serial:", "tcp:", "pty:")
+#: chosen: how often is looked whether the robot is still there.
+_LOOK_S = 1.0
+
+
+@contextlib.contextmanager
+def opened_for(url: str, robot: str, *, is_viewed: bool, is_opened: bool) -> Iterator[Callable[[str], Transport]]:
+    """Yield what opens a robot's line, which a page watches where it is viewed.
+
+    Raises:
+        UsageError, MissingDependencyError: As of `shown`.
+    """
+    if not is_viewed:
+        yield open_url
+        return
+    watched = WatchedConversation(url, robot, wall_clock)
+    with shown(watched.source, is_opened=is_opened):
+        try:
+            yield partial(_watched, watched)
+        finally:
+            watched.source.end()
+
+
+def robot_target(named: str) -> ViewTarget | None:
+    """Return a robot at a URL, watched without being moved; None where it is no URL of a line."""
+    if not named.startswith(SCHEMES):
+        return None
+    watched = WatchedConversation(named, "", wall_clock)
+
+    def run() -> None:
+        try:
+            with held(Robot(named, auto_enable=False, opener=partial(_watched, watched))) as client:
+                while True:
+                    client.sleep(_LOOK_S)
+        finally:
+            watched.source.end()
+
+    return ViewTarget(source=watched.source, run=run)
+
+
+def _watched(conversation: WatchedConversation, url: str) -> Transport:
+    return conversation.watched(open_url(url))

@@ -1,0 +1,296 @@
+"""What a recording is, beside its rows: title, verdict, channels, world, robots, and the parts of a report.
+
+It goes to the page as JSON, whose types in TypeScript are made of these classes (`tools/generators/page_types.py`).
+
+Invariant: every text is shown as text, whoever wrote it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Literal, TypeAlias
+
+from p2os.view.channels import FORMAT
+from simbase.timing import Nanos
+
+#: How something came out: a run, a goal, a row.
+Standing: TypeAlias = Literal["", "passed", "failed", "open"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SensorPlace:
+    """Where a range sensor sits on its robot."""
+
+    name: str
+    x_m: float
+    y_m: float
+    #: Counter-clockwise from ahead.
+    bearing_rad: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StateTransition:
+    """From one state to another, as places in `states`, and what leads there."""
+
+    source: int
+    target: int
+    cause: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChannelHeader:
+    """A channel: what its rows are of."""
+
+    name: str
+    #: Name of a kind (`channels`).
+    kind: str
+    #: In frames; given by the recording that it is added to.
+    id: int = -1
+    #: Of numbers; empty: none.
+    unit: str = ""
+    #: What it is shown with: `pins: motor 1`, `wheels`.
+    group: str = ""
+    #: Who it comes from: a robot's name; empty: the only one.
+    source: str = ""
+    #: One line about it.
+    doc: str = ""
+    #: Another channel that it belongs to; -1: none.
+    of: int = -1
+    #: Bits of `levels`; sensors of `ranges`.
+    width: int = 1
+    #: Of `samples`: whether a value holds until the next one, or goes to it in a straight line.
+    is_stepped: bool = False
+    #: Of `samples`: a line drawn across, such as a threshold; absent: None.
+    mark: float | None = None
+    #: Of `ranges`.
+    sensors: Sequence[SensorPlace] = ()
+    #: Opening angle of each of them, radians, and how far they see, metres.
+    cone_rad: float = 0.0
+    range_m: float = 0.0
+    #: Of `state`.
+    states: Sequence[str] = ()
+    transitions: Sequence[StateTransition] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorldThing:
+    """A thing of the world, where it stands at the start."""
+
+    name: str
+    #: `wall`, `box`, `cylinder`, `floor`, `ramp`, `robot`, … as the world's file has it.
+    kind: str
+    #: `box` has `length_m` along its heading and `width_m` across; `cylinder` has `radius_m`; `polygon` has `points`.
+    shape: Literal["box", "cylinder", "polygon"]
+    x_m: float
+    y_m: float
+    heading_rad: float = 0.0
+    #: Of its underside above the floor.
+    z_m: float = 0.0
+    height_m: float = 0.5
+    length_m: float = 0.0
+    width_m: float = 0.0
+    radius_m: float = 0.0
+    #: Corners counter-clockwise, relative to its middle.
+    points: Sequence[tuple[float, float]] = ()
+    #: Whether it is there at the start.
+    is_there: bool = True
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorldHeader:
+    """The world."""
+
+    name: str
+    #: Least x and y, greatest x and y, metres.
+    extent_m: tuple[float, float, float, float]
+    things: Sequence[WorldThing] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotHeader:
+    """A robot: its outline around the point that its pose says."""
+
+    #: Empty: the only one.
+    name: str
+    model: str
+    front_m: float
+    rear_m: float
+    width_m: float
+    height_m: float = 0.22
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PageCell:
+    """A cell of a table."""
+
+    text: str
+    #: A file beside the page, or none.
+    href: str = ""
+    standing: Standing = ""
+    is_number: bool = False
+    #: A time to go to, ns; absent: None.
+    at_ns: Nanos | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PageTable:
+    """A table; one without `head` has names in its first column."""
+
+    kind: Literal["table"] = "table"
+    title: str = ""
+    head: Sequence[str] = ()
+    rows: Sequence[Sequence[PageCell]] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PageText:
+    """A text as it is: a listing where `is_listing`, else a paragraph."""
+
+    kind: Literal["text"] = "text"
+    title: str = ""
+    text: str = ""
+    is_listing: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PagePicture:
+    """A picture: base64 of a PNG."""
+
+    kind: Literal["picture"] = "picture"
+    title: str = ""
+    alt: str = ""
+    png: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PageCurve:
+    """One of the curves, or rows of points, of a plot."""
+
+    name: str
+    x: Sequence[float]
+    y: Sequence[float]
+    #: `bars` stand on 0 and are as wide as the step of `x`.
+    style: Literal["line", "step", "points", "bars"] = "line"
+    #: Texts of the points, in their order; a point whose `hrefs` is not empty is a link.
+    labels: Sequence[str] = ()
+    hrefs: Sequence[str] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PagePlot:
+    """A plot that is not over the run's time, with ticks and units on both axes."""
+
+    kind: Literal["plot"] = "plot"
+    title: str = ""
+    x_name: str = ""
+    x_unit: str = ""
+    y_name: str = ""
+    y_unit: str = ""
+    curves: Sequence[PageCurve] = ()
+    #: Whether a length of one unit is the same along both axes.
+    is_equal: bool = False
+    #: Values of x at which a line stands, such as a median.
+    marks: Sequence[float] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PageList:
+    """Lines, each with how it came out."""
+
+    kind: Literal["list"] = "list"
+    title: str = ""
+    items: Sequence[PageCell] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PagePlan:
+    """A small plan of a world with ways in it: metres."""
+
+    kind: Literal["plan"] = "plan"
+    title: str = ""
+    #: Under it.
+    text: str = ""
+    #: A command that makes it again.
+    listing: str = ""
+    world: WorldHeader | None = None
+    ways: Sequence[PageCurve] = ()
+    #: Collisions, and other places with a word each.
+    hits: Sequence[tuple[float, float]] = ()
+    places: Sequence[tuple[float, float, str]] = ()
+
+
+PageBlock: TypeAlias = PageTable | PageText | PagePicture | PagePlot | PageList | PagePlan
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PageSection:
+    """A titled part of a report."""
+
+    title: str
+    note: str = ""
+    blocks: Sequence[PageBlock] = ()
+    #: Closed until who reads opens it.
+    is_folded: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PageHeader:
+    """What a page begins with."""
+
+    format: int = FORMAT
+    title: str
+    #: As in summary.json: `passed`, `failed`, …; empty: nothing was judged.
+    verdict: str = ""
+    standing: Standing = ""
+    #: What was run, on what, in what, in a line.
+    lead: str = ""
+    #: Why it failed, in a line.
+    why: str = ""
+    start_ns: Nanos = 0
+    end_ns: Nanos = 0
+    #: More comes.
+    is_live: bool = False
+    channels: Sequence[ChannelHeader] = ()
+    world: WorldHeader | None = None
+    robots: Sequence[RobotHeader] = ()
+    sections: Sequence[PageSection] = ()
+    #: A line for each kind of rows of which the page has not all.
+    left_out: Sequence[str] = ()
+    footer: str = ""
+
+    def as_json(self) -> dict[str, object]:
+        """Return it as JSON has it."""
+        return asdict(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wanted:
+    """What a page asks for: rows of channels within a time, as many as its pixels can show."""
+
+    want: Sequence[int] = ()
+    from_ns: Nanos = 0
+    to_ns: Nanos = 0
+    pixels: int = 1000
+    #: The answer's frames carry it in the `done` message that follows them.
+    id: int = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answered:
+    """What the server says in a text message, beside the header, which comes first and anew when it changes."""
+
+    header: PageHeader | None = None
+    #: All frames of the request with this number were sent.
+    done: int | None = None
+    #: Frames that a page too slow for a live run did not get, so far.
+    lost: int | None = None
+    #: Now, of a live run.
+    now_ns: Nanos | None = None
+    #: What was wrong with a request.
+    refused: str | None = None
+
+
+__all__ = [
+    "Answered", "ChannelHeader", "PageBlock", "PageCell", "PageCurve", "PageHeader", "PageList", "PagePicture",
+    "PagePlan", "PagePlot", "PageSection", "PageTable", "PageText", "RobotHeader", "SensorPlace", "Standing",
+    "StateTransition", "Wanted", "WorldHeader", "WorldThing",
+]  # fmt: skip

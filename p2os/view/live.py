@@ -1,0 +1,104 @@
+"""What a server shows: a recording that is whole, or one that grows while a program runs.
+
+The program hands over what happens and goes on; whoever shows it makes rows of that in its own time. Nothing waits:
+what finds no room is counted and left out, so that who looks on never changes or slows what is looked at.
+
+Invariant: rows are added by the reader's side alone.
+"""
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Generic, Protocol, TypeVar
+
+from p2os.view.header import PageHeader, PageSection
+from p2os.view.recording import ViewRecording
+from simbase.timing import Nanos
+
+Happening = TypeVar("Happening")
+#: chosen: some seconds of the busiest run; 200 bytes each.
+MOST_WAITING = 200_000
+
+
+class ShownSource(Protocol):
+    """A recording, and what brings it up to date."""
+
+    recording: ViewRecording
+
+    def update(self) -> None:
+        """Add what has come; called by who shows it."""
+
+
+class LiveRecording(Generic[Happening]):
+    """A recording that grows.
+
+    Args:
+        recording: What it is added to.
+        add: Adds the rows of what happened.
+        most_waiting: So many wait to be added.
+    """
+
+    def __init__(
+        self, recording: ViewRecording, add: Callable[[Happening], None], most_waiting: int = MOST_WAITING
+    ) -> None:
+        self.recording = recording
+        self._add, self._most = add, most_waiting
+        # Between two threads: a deque's ends may be used from one each.
+        self._waiting: deque[Happening] = deque()
+        self._now: Nanos = 0
+        self._lost = 0
+        self._is_over = False
+        self._report: PageHeader | None = None
+        recording.header = replace(recording.header, is_live=True)
+
+    def offer(self, happening: Happening, now: Nanos) -> None:
+        """Take what happened; called by the program, and as quick as can be."""
+        self._now = now
+        if len(self._waiting) < self._most:
+            self._waiting.append(happening)
+        else:
+            self._lost += 1
+
+    def end(self, report: PageHeader | None = None) -> None:
+        """Say that nothing more will come, and what came of it; called by the program.
+
+        Args:
+            report: Has verdict, sections and what else a recorded one begins with; None: nothing is known yet.
+        """
+        self._report = report
+        self._is_over = True
+
+    def update(self) -> None:
+        """Add what waits; called by who shows it."""
+        is_over = self._is_over
+        for _ in range(len(self._waiting)):
+            self._add(self._waiting.popleft())
+        header = self.recording.header
+        left_out = (f"{self._lost} events: the program was faster than this page",) if self._lost else ()
+        now = max(self._now, header.end_ns)
+        if (now, not is_over, left_out) != (header.end_ns, header.is_live, header.left_out):
+            self.recording.header = replace(header, end_ns=now, is_live=not is_over, left_out=left_out)
+        if (report := self._report) is not None:
+            self._report = None
+            self.recording.header = replace(
+                self.recording.header, verdict=report.verdict, standing=report.standing, lead=report.lead,
+                why=report.why, sections=report.sections, footer=report.footer,
+            )  # fmt: skip
+
+
+class StillRecording:
+    """A recording that is whole, but for sections that take a while."""
+
+    def __init__(self, recording: ViewRecording) -> None:
+        self.recording = recording
+        self._sections: Sequence[PageSection] | None = None
+
+    def show(self, sections: Sequence[PageSection]) -> None:
+        """Show these sections from now on; called by the program."""
+        self._sections = sections
+
+    def update(self) -> None:
+        """Take the sections that have come; called by who shows it."""
+        if (sections := self._sections) is not None:
+            self._sections = None
+            self.recording.header = replace(self.recording.header, sections=sections)

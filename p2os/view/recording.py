@@ -1,0 +1,184 @@
+"""A recording: the header of a page, and the rows of its channels, growing while it is live.
+
+Invariant: within a channel time never runs back.
+"""
+
+from array import array
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import cast
+
+from p2os.view.channels import BY_NAME, CellType, ChannelKind
+from p2os.view.detail import Extremes, changes, curve, nearest, rows_in, thinned_list
+from p2os.view.frames import NO_FLAGS, ColumnValues, FrameFlags, LaterText, ViewFrame, chosen_rows, empty_columns
+from p2os.view.header import ChannelHeader, PageHeader
+from simbase.timing import Nanos
+
+#: One cell of a row, or those of a wide column.
+Cell = int | float | str | LaterText | bytes | Sequence[float]
+#: chosen: more rows than pixels by so many are thinned.
+ROWS_A_PIXEL = 4
+#: chosen: rows of a list that are sent at once; a screen shows some fifty.
+LISTED_ROWS = 500
+#: By which columns the least and greatest of a pixel are chosen.
+_CURVES: Mapping[str, tuple[str, ...]] = {"samples": ("value",), "pose": ("x_m", "y_m"), "ranges": ("range_m",)}
+#: What makes a row of a list more severe.
+_SEVERITY: Mapping[str, str] = {"events": "severity", "packets": "is_bad", "text": ""}
+
+
+class ChannelTrack:
+    """The rows of one channel.
+
+    Args:
+        header: What they are of.
+    """
+
+    def __init__(self, header: ChannelHeader) -> None:
+        self.header = header
+        self.kind: ChannelKind = BY_NAME[header.kind]
+        self.columns = empty_columns(self.kind)
+        self.times = cast("array[int]", self.columns[0])
+        self._widths = [header.width if column.is_wide else 1 for column in self.kind.columns]
+        #: Of columns that curves are thinned by: their extremes, and their numbers without NaN.
+        self._indices: dict[str, tuple[Extremes, array[float]]] = {}
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def append(self, t_ns: Nanos, *cells: Cell) -> None:
+        """Add a row; a time that steps back is moved up."""
+        self.times.append(max(t_ns, self.times[-1]) if self.times else t_ns)
+        for values, column, cell in zip(self.columns[1:], self.kind.columns[1:], cells, strict=True):
+            if column.is_wide:
+                cast("array[float]", values).extend(cast("Sequence[float]", cell))
+            else:
+                values.append(cell)  # type: ignore[arg-type]  # of the column's type, as the caller has it
+
+    def extend_levels(self, times: Iterable[int], levels: Iterable[int]) -> None:
+        """Add rows of a wire at once, in the order of time."""
+        _, found, edges = cast("tuple[array[int], array[int], array[int]]", self.columns)
+        before = len(self.times)
+        self.times.extend(times)
+        found.extend(levels)
+        edges.extend([1] * (len(self.times) - before))
+
+    def column(self, name: str) -> ColumnValues:
+        """Return a column by its name."""
+        return self.columns[[column.name for column in self.kind.columns].index(name)]
+
+    def frame(
+        self, from_ns: Nanos, to_ns: Nanos, pixels: int, *, listed: int = LISTED_ROWS, flags: FrameFlags = NO_FLAGS
+    ) -> ViewFrame:
+        """Return the rows of a stretch of time, with those just outside it.
+
+        Args:
+            from_ns: Its beginning.
+            to_ns: Its end.
+            pixels: As many rows as these show, where it is drawn.
+            listed: At most so many, where it is a list.
+            flags: Of the frame.
+        """
+        first, last = rows_in(self.times, from_ns, to_ns)
+        if last - first <= ROWS_A_PIXEL * pixels and self.kind.name not in _SEVERITY:
+            return self._frame(self._slice(first, last), from_ns, to_ns, last - first, flags)
+        return self._frame(self._thinned(first, last, pixels, listed), from_ns, to_ns, last - first, flags)
+
+    def tail(self, first: int, last: int) -> ViewFrame:
+        """Return the rows from one to before another, all of them."""
+        times = self.times
+        return self._frame(self._slice(first, last), times[first], times[last - 1], last - first, NO_FLAGS)
+
+    def _frame(
+        self, columns: tuple[ColumnValues, ...], from_ns: Nanos, to_ns: Nanos, of: int, flags: FrameFlags
+    ) -> ViewFrame:  # fmt: skip
+        if len(columns[0]) < of:
+            flags |= FrameFlags.REDUCED
+        columns = tuple(
+            list(map(str, values)) if column.cells is CellType.TEXT else values
+            for column, values in zip(self.kind.columns, columns, strict=True)
+        )
+        return ViewFrame(kind=self.kind, channel=self.header.id, columns=columns, from_ns=from_ns, to_ns=to_ns, of=of,
+                         width=self.header.width if any(one.is_wide for one in self.kind.columns) else 1,
+                         flags=flags)  # fmt: skip
+
+    def _slice(self, first: int, last: int) -> tuple[ColumnValues, ...]:
+        return tuple(
+            values[first * width : last * width] for values, width in zip(self.columns, self._widths, strict=True)
+        )
+
+    def _thinned(self, first: int, last: int, pixels: int, most: int) -> tuple[ColumnValues, ...]:
+        name = self.kind.name
+        if name in _CURVES:
+            return self._chosen(curve(self.times, self._grown(_CURVES[name]), first, last, pixels))
+        if name in _SEVERITY:
+            column = _SEVERITY[name]
+            severity = cast("array[int]", self.column(column)).__getitem__ if column else lambda _row: 0
+            return self._chosen(thinned_list(severity, first, last, most))
+        shown = list(changes(self.times, first, last, pixels))
+        columns = self._chosen([row for row, _ in shown])
+        if name == "levels":
+            return (*columns[:2], array("I", [count for _, count in shown]))
+        return columns
+
+    def _chosen(self, rows: Sequence[int]) -> tuple[ColumnValues, ...]:
+        return chosen_rows(self.columns, rows, self._widths)
+
+    def _grown(self, names: Iterable[str]) -> list[Extremes]:
+        """Return the indices of some columns, brought up to their last row."""
+        found = []
+        for name in names:
+            values = cast("array[float]", self.column(name))
+            column = next(one for one in self.kind.columns if one.name == name)
+            width = self.header.width if column.is_wide else 1
+            index, plain = self._indices.setdefault(name, (Extremes(), array("d")))
+            new = values[len(plain) * width :]
+            _extend_plain(plain, nearest(new, width) if column.is_wide else new)
+            index.grow(plain)
+            found.append(index)
+        return found
+
+
+def _extend_plain(plain: "array[float]", values: "array[float]") -> None:
+    """Add numbers to others; NaN is the number before it, or the first one."""
+    last = plain[-1] if plain else next((value for value in values if value == value), 0.0)  # noqa: PLR0124 - no NaN
+    for value in values:
+        last = value if value == value else last  # noqa: PLR0124 - it is no NaN
+        plain.append(last)
+
+
+@dataclass(slots=True)
+class ViewRecording:
+    """All that a page shows.
+
+    Args:
+        header: Without its channels, which are those of the tracks.
+    """
+
+    header: PageHeader
+    tracks: list[ChannelTrack] = field(default_factory=list)
+
+    def add(self, header: ChannelHeader) -> ChannelTrack:
+        """Add a channel, without rows yet; its `id` is given here."""
+        made = ChannelTrack(replace(header, id=len(self.tracks)))
+        self.tracks.append(made)
+        return made
+
+    def shared(self, header: ChannelHeader) -> ChannelTrack:
+        """Return the channel of this name and kind, whoever has added it."""
+        alike = [one for one in self.tracks if (one.header.name, one.kind.name) == (header.name, header.kind)]
+        return alike[0] if alike else self.add(header)
+
+    @property
+    def full_header(self) -> PageHeader:
+        """The header with its channels."""
+        return replace(self.header, channels=[track.header for track in self.tracks])
+
+    def frames(self, pixels: int, listed: int) -> Iterator[ViewFrame]:
+        """Yield one frame a channel, of the whole time, as of `ChannelTrack.frame`."""
+        start, end = self.header.start_ns, self.header.end_ns
+        for track in self.tracks:
+            yield track.frame(start, end, pixels, listed=listed, flags=FrameFlags.REPLACES)
+
+
+#: What makes a recording of a file or folder; None where it is of another kind.
+RecordingOf = Callable[[str], ViewRecording | None]

@@ -1,0 +1,157 @@
+"""One page that looks at a recording: what it asks for, and what it is sent; passive.
+
+A page asks for rows of channels within a time (`Wanted`), and gets a frame for each and `done`. Of a recording that
+grows it is then told the new rows of these channels, as they come. There is no queue: what is new is what lies between
+the row that was sent last and the last one, so that a page that is slow is sent more at once; of more than
+`MOST_NEWS` rows it is told that they are lost to it, and asks anew.
+
+Invariant: a request is answered, or refused in words; nothing that a page sends changes the recording.
+"""
+
+import json
+from collections.abc import Iterator
+from dataclasses import asdict, fields, replace
+from typing import cast
+
+from p2os.view.header import Answered, PageHeader, Wanted
+from p2os.view.live import ShownSource
+from p2os.view.recording import ViewRecording
+from simbase.timing import Nanos
+
+#: chosen: a page's request has less than a kilobyte.
+LARGEST_REQUEST_BYTES = 65_536
+MOST_CHANNELS, MOST_PIXELS = 4096, 8192
+#: chosen: new rows of a channel that are sent at once.
+MOST_NEWS = 20_000
+#: chosen: a page asks some ten times a second while one drags; so many in a row, and so many a second.
+MOST_AT_ONCE, A_SECOND = 100, 50.0
+_LEAST_NS, _MOST_NS = -(2**63), 2**63 - 1
+
+
+class RequestError(Exception):
+    """What a page sends is no request; it is not served any more."""
+
+
+class FloodError(RequestError):
+    """A page asks more often, or for more, than any does that a person uses."""
+
+
+class PageSession:
+    """What one page was sent.
+
+    Args:
+        source: What it looks at.
+    """
+
+    def __init__(self, source: ShownSource) -> None:
+        self._source = source
+        #: Channel → the row behind the last that was sent.
+        self._sent: dict[int, int] = {}
+        #: What was said last; of channels, how many.
+        self._header: PageHeader | None = None
+        self._channels = 0
+        self._lost = 0
+        self._room, self._asked_at = float(MOST_AT_ONCE), 0.0
+
+    @property
+    def _recording(self) -> ViewRecording:
+        return self._source.recording
+
+    def news(self) -> Iterator[str | bytes]:
+        """Yield what has changed since the last call: the header, new rows, the time; at the first call the header."""
+        self._source.update()
+        yield from self._changed_header()
+        lost = 0
+        for channel, row in self._sent.items():
+            track = self._recording.tracks[channel]
+            end = len(track)
+            if end - row > MOST_NEWS:
+                lost += end - row
+            elif end > row:
+                yield track.tail(row, end).to_bytes()
+            self._sent[channel] = end
+        if lost:
+            self._lost += lost
+            yield _said(lost=self._lost)
+
+    def _changed_header(self) -> Iterator[str]:
+        header, channels = self._recording.header, len(self._recording.tracks)
+        old, self._header = self._header, header
+        had, self._channels = self._channels, channels
+        if old is None or channels != had or replace(old, end_ns=header.end_ns) != header:
+            yield _said(header=self._recording.full_header)
+        elif header.end_ns != old.end_ns:
+            yield _said(now_ns=header.end_ns)
+
+    def receive(self, text: str, now_s: float) -> Iterator[str | bytes]:
+        """Yield the answer to a request.
+
+        Args:
+            text: As it came.
+            now_s: Of any clock that goes on; requests are counted by it.
+
+        Raises:
+            RequestError: It is none, or one of too many.
+        """
+        self._count(now_s)
+        wanted = _wanted_of(text)
+        if wanted.from_ns > wanted.to_ns:
+            yield _said(refused="from_ns is behind to_ns", done=wanted.id)
+            return
+        unknown = [channel for channel in wanted.want if not 0 <= channel < len(self._recording.tracks)]
+        if unknown:
+            yield _said(refused=f"there is no channel {unknown[0]}", done=wanted.id)
+            return
+        for channel in dict.fromkeys(wanted.want):
+            track = self._recording.tracks[channel]
+            yield track.frame(wanted.from_ns, wanted.to_ns, wanted.pixels).to_bytes()
+            if self._recording.header.is_live:
+                self._sent[channel] = len(track)
+        yield _said(done=wanted.id)
+
+    def _count(self, now_s: float) -> None:
+        self._room = min(MOST_AT_ONCE, self._room + (now_s - self._asked_at) * A_SECOND) - 1.0
+        self._asked_at = now_s
+        if self._room < 0:
+            raise FloodError(f"more than {A_SECOND:.0f} requests a second")
+
+
+def _said(
+    *,
+    header: PageHeader | None = None,
+    done: int | None = None,
+    lost: int | None = None,
+    now_ns: Nanos | None = None,
+    refused: str | None = None,
+) -> str:
+    """Return an answer as JSON, without what it does not say."""
+    answer = asdict(Answered(header=header, done=done, lost=lost, now_ns=now_ns, refused=refused))
+    said = {key: value for key, value in answer.items() if value is not None}
+    return json.dumps(said, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+
+
+_KEYS = frozenset(field.name for field in fields(Wanted))
+
+
+def _wanted_of(text: str) -> Wanted:
+    """Return a request.
+
+    Raises:
+        RequestError: It is none.
+    """
+    if len(text.encode("utf-8", "replace")) > LARGEST_REQUEST_BYTES:
+        raise FloodError(f"a request of more than {LARGEST_REQUEST_BYTES} bytes")
+    try:
+        found = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise RequestError("a request that is no JSON") from error
+    if not isinstance(found, dict) or not found.keys() <= _KEYS or "want" not in found:
+        raise RequestError(f"a request has {', '.join(sorted(_KEYS))}")
+    want = found["want"]
+    if not isinstance(want, list) or len(want) > MOST_CHANNELS or not all(type(one) is int for one in want):
+        raise RequestError(f"want is a list of at most {MOST_CHANNELS} numbers of channels")
+    numbers = {key: value for key, value in found.items() if key != "want"}
+    if not all(type(value) is int and _LEAST_NS <= value <= _MOST_NS for value in numbers.values()):
+        raise RequestError("a time, pixels and id are whole numbers of 64 bits")
+    wanted = Wanted(want=tuple(want), **cast("dict[str, int]", numbers))
+    return replace(wanted, pixels=max(1, min(MOST_PIXELS, wanted.pixels)))

@@ -1,0 +1,53 @@
+"""What the bench has to show: run folders, and scenarios as they run (entry points of `p2os.view_sources`)."""
+
+from pathlib import Path
+
+from p2os.view.live import StillRecording
+from p2os.view.targets import ViewTarget
+from robot_bench.recording.run_folder import make_next_folder
+from robot_bench.recording.run_record import TRACE_NAME, read_run
+from robot_bench.recording.summary import outcome_of, outcome_of_all
+from robot_bench.recording.together import robots_in, scenario_of
+from robot_bench.report.page_of_all import report_of_all
+from robot_bench.report.run_page import run_report, run_sections
+from robot_bench.run import run_scenario
+from robot_bench.scenario.loading import known_scenarios, load_scenario
+from robot_bench.shown.live_run import LiveRun
+
+
+def run_target(named: str) -> ViewTarget | None:
+    """Return a run folder, of one robot or of several; None where it is none.
+
+    Raises:
+        TraceError: Its trace is damaged.
+    """
+    folder = Path(named)
+    if (folder / TRACE_NAME).is_file():
+        record = read_run(folder)
+        source = StillRecording(run_report(record, is_measured=False))
+        return ViewTarget(source=source, run=lambda: source.show(run_sections(record)))
+    if names := robots_in(folder):
+        records = {name: read_run(folder / name) for name in names}
+        outcome = outcome_of_all(scenario_of(folder), {name: outcome_of(one) for name, one in records.items()})
+        return ViewTarget(source=StillRecording(report_of_all(outcome, records)))
+    return None
+
+
+def scenario_target(named: str) -> ViewTarget | None:
+    """Return a scenario, run at the pace of the clock into a run folder; None where it is none.
+
+    Raises:
+        ScenarioError: Its file cannot be run.
+    """
+    if named not in known_scenarios() and not named.endswith(".toml"):
+        return None
+    scenario = load_scenario(named)
+    live = LiveRun(scenario)
+
+    def run() -> None:
+        done = run_scenario(scenario, make_next_folder(scenario.name), speed=1.0, drive=live.drive)
+        if done.was_interrupted:
+            raise KeyboardInterrupt
+        live.source.end(run_report(read_run(done.folder)).header)
+
+    return ViewTarget(source=live.source, run=run)

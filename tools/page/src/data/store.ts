@@ -1,0 +1,125 @@
+// All that the page knows of a run: its header, and of each channel what was sent so far. Views read from here and say what they need.
+import { signal, type Signal } from "@preact/signals";
+import type { ChannelHeader, PageHeader, Wanted } from "../generated/view";
+import type { Frame } from "./frames";
+import { Lane, OPEN_END_NS, serves } from "./lane";
+
+export type Request = Omit<Wanted, "id">;
+
+/** Where rows come from: a server; a page that is one file has none. */
+export interface Source {
+  /** Asks for rows; they come by `Store.receive`, and then it is answered: with whether they came. */
+  ask(request: Request, answered: (isThere: boolean) => void): void;
+}
+
+/** How long requests of one moment are gathered, ms. */
+const GATHERED_MS = 40;
+/** Pixels that a whole run is asked for. */
+const WHOLE_PIXELS = 2000;
+/** The most that the server takes. */
+const MOST_PIXELS = 8192;
+
+export class Store {
+  readonly header: Signal<PageHeader>;
+  /** Counts up when rows came. */
+  readonly version = signal(0);
+  /** What is wrong with the connection, in a line; empty: nothing. */
+  readonly trouble = signal("");
+  private readonly lanes = new Map<number, Lane>();
+  private readonly open: Request[] = [];
+  private gathered = new Map<string, { ids: Set<number>; from: number; to: number; pixels: number }>();
+  private timer: ReturnType<typeof setTimeout> | undefined;
+
+  constructor(header: PageHeader, private readonly source: Source | undefined) {
+    this.header = signal(header);
+  }
+
+  channels(kind: string): readonly ChannelHeader[] {
+    return this.header.value.channels.filter((channel) => channel.kind === kind);
+  }
+
+  channel(id: number): ChannelHeader | undefined {
+    return this.header.value.channels.find((channel) => channel.id === id);
+  }
+
+  /** Whether finer rows than those here can be had. */
+  get canAsk(): boolean {
+    return this.source !== undefined;
+  }
+
+  /** Takes rows that were asked for, or stand in the page. */
+  receive(frames: readonly Frame[]): void {
+    for (const frame of frames) this.lane(frame.channel).add(frame);
+    this.version.value++;
+  }
+
+  /** Takes rows that a live run has just made. */
+  extend(frame: Frame): void {
+    this.lane(frame.channel).extend(frame);
+    this.version.value++;
+  }
+
+  /** Rows of a channel that show a window best, or undefined while there are none; with `pixels`, finer ones are asked for where they are missing. */
+  rows(id: number, from: number, to: number, pixels = 0): Frame | undefined {
+    const { start_ns, end_ns } = this.header.peek();
+    const low = Math.max(start_ns, from), high = Math.max(low, Math.min(end_ns, to));
+    if (pixels) this.want(id, low, high, pixels);
+    return this.lane(id).best(low, high);
+  }
+
+  /** Rows over the whole run, as fine as there are. */
+  whole(id: number): Frame | undefined {
+    const { start_ns, end_ns } = this.header.peek();
+    return this.rows(id, start_ns, end_ns, WHOLE_PIXELS);
+  }
+
+  /** Rows of a time as they are, when they came; reduced where even so there are too many, undefined where nobody answers. */
+  async exact(id: number, from: number, to: number): Promise<Frame | undefined> {
+    const here = this.lane(id).best(from, to);
+    if (!this.source || (here && !here.isReduced && here.from <= from && here.to >= to)) return here;
+    await new Promise<void>((resolve) => this.source!.ask({ want: [id], from_ns: Math.floor(from), to_ns: Math.ceil(to), pixels: MOST_PIXELS }, () => resolve()));
+    return this.lane(id).best(from, to);
+  }
+
+  /** Forgets rows: what was kept of an earlier connection, or lost on a slow one. */
+  forget(): void {
+    for (const lane of this.lanes.values()) lane.clear();
+    this.version.value++;
+  }
+
+  private lane(id: number): Lane {
+    let lane = this.lanes.get(id);
+    if (!lane) this.lanes.set(id, (lane = new Lane()));
+    return lane;
+  }
+
+  private want(id: number, from: number, to: number, pixels: number): void {
+    const { end_ns } = this.header.peek();
+    if (!this.source || this.lane(id).suffices(from, to, pixels, end_ns)) return;
+    if (this.open.some((asked) => asked.want.includes(id) && serves({ from: asked.from_ns, to: asked.to_ns, pixels: asked.pixels }, from, to, pixels, end_ns))) return;
+    const key = `${from} ${to}`, found = this.gathered.get(key);
+    if (found) {
+      found.ids.add(id);
+      found.pixels = Math.max(found.pixels, pixels);
+    } else this.gathered.set(key, { ids: new Set([id]), from, to, pixels });
+    this.timer ??= setTimeout(() => this.flush(), GATHERED_MS);
+  }
+
+  private flush(): void {
+    this.timer = undefined;
+    for (const { ids, from, to, pixels } of this.gathered.values()) this.ask([...ids], from, to, pixels);
+    this.gathered = new Map();
+  }
+
+  private ask(want: readonly number[], from: number, to: number, pixels: number): void {
+    const { start_ns, end_ns, is_live } = this.header.peek(), edge = (to - from) * 0.75; // so that a short way to the side needs no new rows
+    const end = to + edge >= end_ns && is_live ? OPEN_END_NS : Math.ceil(Math.min(end_ns, to + edge));
+    const request: Request = { want, from_ns: Math.floor(Math.max(start_ns, from - edge)), to_ns: end, pixels: Math.ceil(Math.min(MOST_PIXELS, 2.5 * pixels)) };
+    this.open.push(request);
+    this.source!.ask(request, (isThere) => {
+      const place = this.open.indexOf(request);
+      if (place >= 0) this.open.splice(place, 1);
+      if (isThere) for (const id of want) this.lane(id).answered({ from: request.from_ns, to: request.to_ns, pixels: request.pixels });
+    });
+  }
+}

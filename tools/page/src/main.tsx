@@ -1,0 +1,40 @@
+// Begins the page: with the data in it, or with that of the program that showed it.
+import "dockview/dist/styles/dockview.css";
+import "uplot/dist/uPlot.min.css";
+import "./style/page.css";
+import "./style/views.css";
+import { render } from "preact";
+import { inlineHeader, inlineStore } from "./data/inline";
+import { Connection } from "./data/socket";
+import type { Store } from "./data/store";
+import { token } from "./data/token";
+import { App } from "./shell/app";
+import { drawTimes } from "./shell/surface";
+import { frameTimes, ReportPage, RunPage, Waiting, waiting } from "./shell/page";
+
+declare global {
+  interface Window {
+    /** For tests and measurements: the page's state. */
+    p2osPage?: { app: App; frameTimes: readonly number[]; drawTimes: readonly number[] };
+  }
+}
+
+const place = document.getElementById("app")!;
+
+function show(store: Store): void {
+  const app = new App(store);
+  window.p2osPage = { app, frameTimes, drawTimes };
+  document.title = store.header.value.title || document.title;
+  render(<RunPage app={app} />, place);
+}
+
+const header = inlineHeader();
+if (header) {
+  if (header.channels.length || header.world) show(inlineStore(header));
+  else render(<ReportPage header={header} />, place);
+} else {
+  waiting.value = "Waiting for the program that shows this run …";
+  render(<Waiting />, place);
+  const scheme = location.protocol === "https:" ? "wss" : "ws";
+  new Connection(`${scheme}://${location.host}/stream`, token(), show, (why) => { waiting.value = why; });
+}

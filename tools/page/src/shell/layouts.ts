@@ -1,0 +1,54 @@
+// The layouts: which views stand where, for whom.
+
+/** Views in one place, as tabs; the first one in front. */
+export interface Group {
+  readonly share: number;
+  readonly views: readonly string[];
+}
+
+/** Groups above one another. */
+export interface Column {
+  readonly share: number;
+  readonly groups: readonly Group[];
+}
+
+export interface Layout {
+  readonly id: string;
+  readonly title: string;
+  readonly columns: readonly Column[];
+}
+
+export const LAYOUTS: readonly Layout[] = [
+  {
+    id: "student", title: "Student",
+    columns: [
+      { share: 0.58, groups: [{ share: 0.62, views: ["plan", "scene"] }, { share: 0.38, views: ["plots", "logic"] }] },
+      { share: 0.42, groups: [{ share: 0.6, views: ["report", "goals", "states"] }, { share: 0.4, views: ["events", "consoles", "packets"] }] },
+    ],
+  },
+  {
+    id: "firmware", title: "Firmware engineer",
+    columns: [
+      { share: 0.64, groups: [{ share: 0.62, views: ["logic"] }, { share: 0.38, views: ["plots", "packets"] }] },
+      { share: 0.36, groups: [{ share: 0.4, views: ["plan", "scene"] }, { share: 0.3, views: ["consoles", "events"] }, { share: 0.3, views: ["states", "goals", "report"] }] },
+    ],
+  },
+  {
+    id: "lab", title: "Robot lab",
+    columns: [
+      { share: 0.6, groups: [{ share: 0.6, views: ["scene", "plan"] }, { share: 0.4, views: ["packets", "consoles"] }] },
+      { share: 0.4, groups: [{ share: 0.5, views: ["plots", "logic"] }, { share: 0.5, views: ["events", "states", "goals", "report"] }] },
+    ],
+  },
+];
+
+/** The columns without the views that a run has not; groups and columns that are empty then are none, the others share their room. */
+export function pruned(layout: Layout, has: (view: string) => boolean): readonly Column[] {
+  const columns = layout.columns.map((column) => ({ ...column, groups: shared(column.groups.map((group) => ({ ...group, views: group.views.filter(has) })).filter((group) => group.views.length)) }));
+  return shared(columns.filter((column) => column.groups.length));
+}
+
+function shared<T extends { readonly share: number }>(parts: readonly T[]): readonly T[] {
+  const sum = parts.reduce((total, part) => total + part.share, 0);
+  return parts.map((part) => ({ ...part, share: part.share / sum }));
+}

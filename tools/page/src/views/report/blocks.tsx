@@ -1,0 +1,75 @@
+// The parts of a report: tables, lists, listings, pictures and plots, as the header's sections have them.
+import { useEffect, useRef } from "preact/hooks";
+import type { PageBlock, PageCell, PageList, PagePicture, PageSection, PageTable, PageText, Standing } from "../../generated/view";
+import { Icon, type IconName } from "../../shell/icons";
+import { mountPlan } from "./figure_plan";
+import { mountPlot } from "./figure_plot";
+import { isLink } from "./links";
+
+/** Goes to a time of the run; absent on a page without one. */
+export type Seek = ((t: number) => void) | undefined;
+
+const SIGNS: Readonly<Record<Exclude<Standing, "">, readonly [IconName, string]>> = { passed: ["met", "passed"], failed: ["missed", "failed"], open: ["open", "not judged"] };
+
+export function Sections({ sections, seek }: { sections: readonly PageSection[]; seek: Seek }) {
+  return <>{sections.map((section) => <Section key={section.title} section={section} seek={seek} />)}</>;
+}
+
+function Section({ section, seek }: { section: PageSection; seek: Seek }) {
+  const blocks = section.blocks.map((block, n) => <Block key={n} block={block} seek={seek} />);
+  const note = section.note && <small>{section.note}</small>;
+  if (section.is_folded) return <details class="section"><summary><h2>{section.title}{note}</h2></summary>{blocks}</details>;
+  return <section class="section"><h2>{section.title}{note}</h2>{blocks}</section>;
+}
+
+function Block({ block, seek }: { block: PageBlock; seek: Seek }) {
+  switch (block.kind) {
+    case "table": return <Table block={block} seek={seek} />;
+    case "list": return <List block={block} seek={seek} />;
+    case "text": return <Text block={block} />;
+    case "picture": return <Picture block={block} />;
+    case "plot": return <Mounted mount={(host) => mountPlot(host, block)} />;
+    case "plan": return <Mounted mount={(host) => mountPlan(host, block)} />;
+  }
+}
+
+function Cell({ cell, seek }: { cell: PageCell; seek: Seek }) {
+  const sign = cell.standing ? SIGNS[cell.standing] : undefined;
+  const text = isLink(cell.href) ? <a href={cell.href}>{cell.text}</a>
+    : cell.at_ns !== null && seek ? <button type="button" class="link" onClick={() => seek(cell.at_ns!)}>{cell.text}</button> : cell.text;
+  return <>{sign && <span class={`standing ${cell.standing}`}><Icon name={sign[0]} label={sign[1]} /></span>}{text}</>;
+}
+
+function Table({ block, seek }: { block: PageTable; seek: Seek }) {
+  return (
+    <div class="wide" tabIndex={0} role="group" aria-label={block.title || block.head.join(", ") || "Figures"}>
+      <table class={block.head.length ? "data" : "figures"}>
+        {block.title && <caption>{block.title}</caption>}
+        {block.head.length > 0 && <thead><tr>{block.head.map((name, n) => (name ? <th scope="col" class={block.rows[0]?.[n]?.is_number ? "number" : ""}>{name}</th> : <td />))}</tr></thead>}
+        <tbody>{block.rows.map((row) => <tr>{row.map((cell, n) => {
+          const kind = cell.is_number || (!block.head.length && n > 0) ? "number" : "";
+          return n === 0 && !block.head.length ? <th scope="row"><Cell cell={cell} seek={seek} /></th> : <td class={kind}><Cell cell={cell} seek={seek} /></td>;
+        })}</tr>)}</tbody>
+      </table>
+    </div>
+  );
+}
+
+function List({ block, seek }: { block: PageList; seek: Seek }) {
+  return <>{block.title && <h3>{block.title}</h3>}<ul class="standings">{block.items.map((cell) => <li><Cell cell={cell} seek={seek} /></li>)}</ul></>;
+}
+
+function Text({ block }: { block: PageText }) {
+  const title = block.title && <h3>{block.title}</h3>;
+  return block.is_listing ? <>{title}<pre tabIndex={0} role="group" aria-label={block.title || "Listing"}>{block.text}</pre></> : <>{title}<p class="prose">{block.text}</p></>;
+}
+
+function Picture({ block }: { block: PagePicture }) {
+  return <figure>{/^[A-Za-z0-9+/=\s]*$/.test(block.png) && <img alt={block.alt} src={`data:image/png;base64,${block.png}`} />}{block.title && <figcaption>{block.title}</figcaption>}</figure>;
+}
+
+function Mounted({ mount }: { mount: (host: HTMLElement) => () => void }) {
+  const host = useRef<HTMLDivElement>(null);
+  useEffect(() => mount(host.current!), []);
+  return <div class="mounted" ref={host} />;
+}
