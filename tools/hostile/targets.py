@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from tools.hostile.watched import HOST, LIMIT_S, RunningVerb, SteadyClient, WatchedLine, free_ports, until
+from tools.hostile.watched import HOST, LIMIT_S, NotedLine, RunningVerb, SteadyClient, free_ports, until
 
 MOTORS = Path(__file__).parents[2] / "robot_bench/firmware/motors.elf"
 FLOOD_PEER = Path(__file__).parents[2] / "tests/p2os/ros/flood_peer.py"
@@ -26,7 +26,7 @@ class AttackedVerb:
     #: Where a client of good will finds its robot; nothing: it has none, or is a client itself.
     robot: int | None = None
     #: Where the verb's own commands to its robot pass.
-    line: WatchedLine | None = None
+    line: NotedLine | None = None
     #: Somebody who has the session.
     client: SteadyClient | None = None
     #: Whether it prints how fast wheels turn.
@@ -63,12 +63,12 @@ def _program(*words: str, ready: str = SERVED) -> Iterator[RunningVerb]:
 
 
 @contextlib.contextmanager
-def _robot(p2os: str) -> Iterator[WatchedLine]:
+def _robot(p2os: str) -> Iterator[NotedLine]:
     """Yield a line to a robot that is served, which nobody attacks."""
     (port,) = free_ports(1)
     with (
         _program(p2os, "serve", "--port", f"tcp:{HOST}:{port}", "--body", "kinematic"),
-        contextlib.closing(WatchedLine((HOST, port))) as line,
+        contextlib.closing(NotedLine((HOST, port))) as line,
     ):
         yield line
 

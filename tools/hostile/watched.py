@@ -96,7 +96,7 @@ class RunningVerb:
         self._folder.cleanup()
 
 
-class WatchedLine:
+class NotedLine:
     """A line between a verb and a robot, on which every command is noted with its time (seconds, monotonic)."""
 
     def __init__(self, robot: tuple[str, int]) -> None:
