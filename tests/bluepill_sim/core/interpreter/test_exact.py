@@ -105,6 +105,35 @@ def test_an_interrupt_comes_before_the_first_instruction_that_begins_then_or_lat
             assert bool(xpsr & Z_FLAG) == (number in {1, 3} or number == len(payload)), load
 
 
+def test_an_interrupt_comes_at_its_instruction_in_a_loop_that_is_known(boot: Boot) -> None:
+    """Rounds of three nops and a branch, 3 + 2 cycles; the one that is interrupted is some thirtieth."""
+    payload = [("nop", 1), ("nop", 1), ("nop", 1), ("b k0", 2)]
+    for load in range(150, 160):
+        machine = boot(program(payload, load), {SYSTICK: "tick"}).run(60)
+        assert machine.log[0] == machine.label(("k0", "k1", "k2", "k3", "k0")[load % 5]), load
+
+
+def test_what_comes_in_the_midst_of_a_long_instruction_without_an_interrupt_takes_no_time(boot: Boot) -> None:
+    source = (
+        COUNTER_ON + "mov32 r6, #0xE0001000\n" + program([("udiv r4, r3, r3", 7), ("ldr r0, [r6, #4]\nlog r0", 4)], 200)
+    )
+    quiet = source.replace("movs r2, #7", "movs r2, #5")  # it counts, and no exception comes of it
+    ends = [boot(quiet.replace("#200", f"#{load}")).run(40).log for load in (200, *range(1, 10))]
+    assert ends == ends[:1] * 10
+
+
+def test_an_instruction_is_left_undone_wherever_a_slice_ends(boot: Boot) -> None:
+    """A division of seven cycles: the tick in its midst, and a deadline before, at and after that."""
+    payload = [("udiv r4, r3, r3", 7), ("nop", 1)]
+    for load in (2, 4, 6):
+        whole = boot(program(payload, load), {SYSTICK: "tick"}).run(40)
+        assert whole.log[0] == whole.label("k0")
+        for cycle in range(10, 24):
+            parts = boot(program(payload, load), {SYSTICK: "tick"})
+            parts.board.advance_to(cycle * CYCLE_NS)
+            assert parts.run(40 - parts.board.now_ns / 1000).log == whole.log, (load, cycle)
+
+
 def test_a_deadline_ends_a_run_at_the_first_instruction_that_begins_then_or_later(boot: Boot) -> None:
     payload = PAYLOADS[1][1]
     source = "mov32 r5, #0x20000800\n" + "\n".join(f"k{n}: {text}" for n, (text, _) in enumerate(payload))
