@@ -106,8 +106,8 @@ def test_an_interrupt_comes_before_the_first_instruction_that_begins_then_or_lat
 
 
 def test_an_interrupt_comes_at_its_instruction_in_a_loop_that_is_known(boot: Boot) -> None:
-    """Rounds of three nops and a branch, 3 + 2 cycles; the one that is interrupted is some thirtieth."""
-    payload = [("nop", 1), ("nop", 1), ("nop", 1), ("b k0", 2)]
+    """Rounds of 3 + 2 cycles, each of which counts, or their time would pass at once; some thirtieth is interrupted."""
+    payload = [("adds r4, #1", 1), ("nop", 1), ("nop", 1), ("b k0", 2)]
     for load in range(150, 160):
         machine = boot(program(payload, load), {SYSTICK: "tick"}).run(60)
         assert machine.log[0] == machine.label(("k0", "k1", "k2", "k3", "k0")[load % 5]), load
@@ -167,6 +167,18 @@ def test_a_store_that_writes_its_base_back_is_done_before_what_it_makes_pending(
     )
     machine = boot(source, {PENDSV: "pend"}).run(20)
     assert machine.log == [machine.label("here"), 0xE000_ED04]
+
+
+def test_what_a_conditional_store_makes_pending_comes_inside_the_it_block(boot: Boot) -> None:
+    source = (
+        "mov32 r1, #0xE000ED04\nmov32 r2, #0x10000000\nmovs r3, #0\ncmp r3, #0\nitt eq\n"
+        "str r2, [r1, #0]\nhere: adds r3, #1\nb stop\npend: ldr r0, [sp, #24]\nstr r0, [r7, #0]\n"
+        "ldr r0, [sp, #28]\nstr r0, [r7, #4]\nadds r7, #8\nbx lr\n"
+    )
+    machine = boot(source, {PENDSV: "pend"}).run(20)
+    assert machine.log[0] == machine.label("here")
+    assert machine.log[1] & IT_BITS == 0x0800, "ITT EQ: mask 0100 before the store, 1000 behind it"
+    assert machine.board.register("R3") == 1
 
 
 def test_two_requests_of_one_block_are_served_one_by_one(boot: Boot) -> None:
