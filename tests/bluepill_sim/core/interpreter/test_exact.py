@@ -105,6 +105,35 @@ def test_an_interrupt_comes_before_the_first_instruction_that_begins_then_or_lat
             assert bool(xpsr & Z_FLAG) == (number in {1, 3} or number == len(payload)), load
 
 
+def test_an_interrupt_comes_at_its_instruction_in_a_loop_that_is_known(boot: Boot) -> None:
+    """Rounds of 3 + 2 cycles, each of which counts, or their time would pass at once; some thirtieth is interrupted."""
+    payload = [("adds r4, #1", 1), ("nop", 1), ("nop", 1), ("b k0", 2)]
+    for load in range(150, 160):
+        machine = boot(program(payload, load), {SYSTICK: "tick"}).run(60)
+        assert machine.log[0] == machine.label(("k0", "k1", "k2", "k3", "k0")[load % 5]), load
+
+
+def test_what_comes_in_the_midst_of_a_long_instruction_without_an_interrupt_takes_no_time(boot: Boot) -> None:
+    source = (
+        COUNTER_ON + "mov32 r6, #0xE0001000\n" + program([("udiv r4, r3, r3", 7), ("ldr r0, [r6, #4]\nlog r0", 4)], 200)
+    )
+    quiet = source.replace("movs r2, #7", "movs r2, #5")  # it counts, and no exception comes of it
+    ends = [boot(quiet.replace("#200", f"#{load}")).run(40).log for load in (200, *range(1, 10))]
+    assert ends == ends[:1] * 10
+
+
+def test_an_instruction_is_left_undone_wherever_a_slice_ends(boot: Boot) -> None:
+    """A division of seven cycles: the tick in its midst, and a deadline before, at and after that."""
+    payload = [("udiv r4, r3, r3", 7), ("nop", 1)]
+    for load in (2, 4, 6):
+        whole = boot(program(payload, load), {SYSTICK: "tick"}).run(40)
+        assert whole.log[0] == whole.label("k0")
+        for cycle in range(10, 24):
+            parts = boot(program(payload, load), {SYSTICK: "tick"})
+            parts.board.advance_to(cycle * CYCLE_NS)
+            assert parts.run(40 - parts.board.now_ns / 1000).log == whole.log, (load, cycle)
+
+
 def test_a_deadline_ends_a_run_at_the_first_instruction_that_begins_then_or_later(boot: Boot) -> None:
     payload = PAYLOADS[1][1]
     source = "mov32 r5, #0x20000800\n" + "\n".join(f"k{n}: {text}" for n, (text, _) in enumerate(payload))
@@ -138,6 +167,18 @@ def test_a_store_that_writes_its_base_back_is_done_before_what_it_makes_pending(
     )
     machine = boot(source, {PENDSV: "pend"}).run(20)
     assert machine.log == [machine.label("here"), 0xE000_ED04]
+
+
+def test_what_a_conditional_store_makes_pending_comes_inside_the_it_block(boot: Boot) -> None:
+    source = (
+        "mov32 r1, #0xE000ED04\nmov32 r2, #0x10000000\nmovs r3, #0\ncmp r3, #0\nitt eq\n"
+        "str r2, [r1, #0]\nhere: adds r3, #1\nb stop\npend: ldr r0, [sp, #24]\nstr r0, [r7, #0]\n"
+        "ldr r0, [sp, #28]\nstr r0, [r7, #4]\nadds r7, #8\nbx lr\n"
+    )
+    machine = boot(source, {PENDSV: "pend"}).run(20)
+    assert machine.log[0] == machine.label("here")
+    assert machine.log[1] & IT_BITS == 0x0800, "ITT EQ: mask 0100 before the store, 1000 behind it"
+    assert machine.board.register("R3") == 1
 
 
 def test_two_requests_of_one_block_are_served_one_by_one(boot: Boot) -> None:
