@@ -3,7 +3,7 @@
 Functions are paired by name, and their instructions aligned. What follows from an address alone (the offset of a
 branch or a call, a pointer in a literal pool) is compared by what it leads to: the instruction, the symbol, the text.
 
-Of a difference the source lines are told by what each line of a function came to: a line whose instructions are the
+Of a difference the source lines are known by what each line of a function came to: a line whose instructions are the
 same but for the registers that the compiler chose has not changed, whatever has changed around it.
 
 Invariant: a program does not differ from itself, nor from itself linked elsewhere.

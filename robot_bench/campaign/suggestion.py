@@ -133,7 +133,7 @@ at_s = { from = 1.0, to = 50.0 }
 
 """
 POCKET = "pocket"
-#: What excuses from which goal, where it may happen: what a program is told wrongly, or not at all, it answers wrongly.
+#: What excuses from which goal, where it may happen: what a program reads wrongly, or not at all, it answers wrongly.
 EXCUSES: Mapping[str, tuple[str, ...]] = {
     "narrow": (POCKET, "sonar-stuck", "sonar-dead", "lost link", "reboot"),
     "blind": ("sonar-stuck", "sonar-dead", "lost link", "reboot"),

@@ -1,4 +1,4 @@
-"""What a pull request is told of a campaign: a comment in Markdown, and a picture for each kind of failure.
+"""The comment of a campaign on a pull request: Markdown, and a picture for each kind of failure.
 
     ## dodge-campaign: 2 of 64 points fail
     ![point 7](pictures/0007.svg)

@@ -10,6 +10,7 @@ Invariant: what is not shown by runs is said to be unknown, and never named as a
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from textwrap import wrap
 
 from bluepill_sim.analysis.coverage import Coverage
 from bluepill_sim.board import BluePill
@@ -23,6 +24,8 @@ from robot_bench.campaign.variants.against import Other, first_apart, reported
 from simbase.errors import UsageError
 from simbase.units import ranges_text
 
+#: Columns of a terminal.
+WIDTH = 80
 #: chosen: more lines in a row than these are no place.
 MOST_LINES = 4
 #: chosen: fewer trials that pass show nothing of a change.
@@ -46,7 +49,8 @@ class FaultLine:
     def text(self) -> str:
         """Return all of it in lines."""
         head = f"cause: {self.line}: {self.says}" if self.line else f"unknown: {self.says}"
-        return "\n".join([head, *(f"  {one}" for one in self.also)])
+        rows = [head, *(f"  {one}" for one in self.also)]
+        return "\n".join(line for row in rows for line in wrap(row, WIDTH, subsequent_indent="  "))
 
 
 def by_version(trial: Trial, other: Other) -> FaultLine:

@@ -192,7 +192,7 @@ def _refuse_dask(dask: str | None, scheduler: str | None) -> None:
 
 
 def comment_on(words: list[str], out: Path | None, against: Path | None, url: str, *, trust: bool | Trust) -> str:
-    """Write what a pull request is told of a campaign, with its pictures; return it.
+    """Write the comment of a campaign on a pull request, with its pictures; return it.
 
     Raises:
         UsageError: No folder is named.

@@ -1,8 +1,8 @@
 """Goals on how a program answers to its own inputs: the sensors' pins that it reads against the motors' pins it sets.
 
 They judge by what the program has in its hands, so no world, noise or sensor that lies makes a sound program miss them:
-who is told that something is near has to slow down, whether or not it is there. Motors are those of the pin-out, by
-the values of their pins: `mean` is the mean of both, `turn` the right less the left, positive to the left.
+a program that reads that something is near has to slow down, whether or not it is there. Motors are those of the
+pin-out, by the values of their pins: `mean` is the mean of both, `turn` the right less the left, positive to the left.
 
 Invariant: levels that follow each other within a millisecond are one change, since two ports are written in turn.
 """

@@ -10,6 +10,7 @@ alarm. One worker; under `nice` it hinders nobody.
 
 import argparse
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 from p2os.transport.wall_clock import wall_clock
@@ -19,6 +20,9 @@ from robot_bench.campaign.suggestion import suggested
 from robot_bench.campaign.workers.processes import Processes
 from robot_bench.scenario.loading import load_scenario
 
+#: chosen: in place of the file's 16, so that nothing is run beyond the first failure.
+BATCH = 1
+
 
 def campaign_of(name: str, folder: Path, runs: int, seed: int) -> Campaign:
     """Return the campaign for a program, `dodge-03` or `dodge-sound`."""
@@ -27,8 +31,7 @@ def campaign_of(name: str, folder: Path, runs: int, seed: int) -> Campaign:
     text = suggested(scenario, scenario.name, str(file), {"runs": runs, "seed": seed})
     program = folder / f"{name}.elf"
     found = parse_campaign(text, file, firmware=program if program.is_file() else None)
-    object.__setattr__(found, "budget", Budget(runs=runs, confirmations=40))
-    return found
+    return replace(found, batch=BATCH, near_misses=0, budget=Budget(runs=runs, confirmations=40))
 
 
 def search(name: str, folder: Path, runs: int, seed: int, minutes: float) -> str:
