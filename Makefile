@@ -16,7 +16,7 @@ JOBS   ?= 3
 COMPILED := $(wildcard bluepill_sim/extension/source/*/*) robot_bench/wires/edges.c \
     $(shell find adapter_fw/core adapter_fw/capi adapter_fw/esp32/main adapter_fw/esp32_sim -type f)
 
-.PHONY: setup demo test lint type unit wheels bench soak mutants peers clean firmware mutation-tools board board-check board-tools pictures docs generated
+.PHONY: setup demo test lint type unit wheels bench soak mutants foreign clean firmware mutation-tools board board-check board-tools pictures docs generated
 
 setup: $(STAMP)
 
@@ -98,9 +98,9 @@ mutants: setup
 	@$(BIN)/python -m tools.mutants $(FILES) $(if $(SINCE),--since $(SINCE)) $(if $(SAMPLE),--sample $(SAMPLE)) \
 	    $(if $(COUNT),--count $(COUNT)) $(if $(SEED),--seed $(SEED)) $(if $(NOTE),--note)
 
-# The programs of others that are on PATH, or PEERS='--peer "p2os-arduino=/home/me/drive {line}"', against p2os serve.
-peers: setup
-	@$(BIN)/python -m tools.peers $(PEERS)
+# The programs of others that are in a cache outside the checkout (docs/foreign.md): all, or ROWS=klippy-usb,grbl-usart, or ROWS=client.
+foreign: setup
+	@$(BIN)/python -m tools.foreign $(ROWS)
 
 # What changes the adapter's two sides in `make soak`, and an ESP32 that runs its core. Without universalmutator's own wishes: one of them is a copy of
 # `typing` that shadows Python's.
@@ -135,6 +135,7 @@ pictures: board-tools
 # Every committed file that is made of a declaration (C headers, tables of pages), made anew; `make test` names those that are stale.
 generated: setup
 	@for tool in tools/generate_*.py; do $(BIN)/python $$tool || exit; done
+	@$(BIN)/python -m tools.foreign --page
 
 # The pages of the API, from the docstrings, in build/api.
 docs: setup
