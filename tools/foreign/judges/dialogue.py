@@ -24,11 +24,13 @@ class Exchange:
             told as what came back.
         say: What is sent first; empty: nothing.
         within: How long that may take, in virtual time.
+        pause: How long it is waited before anything is sent.
     """
 
     hear: bytes
     say: bytes = b""
     within: Span = "2 s"
+    pause: Span = 0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,6 +79,8 @@ class Dialogue:
         port.subscribe(lambda rows: heard.extend(word & 0xFF for word, _ in rows))
         told = []
         for step in self.steps:
+            if step.pause:
+                board.run_for(step.pause)
             if step.say:
                 heard.clear()
                 port.receive(step.say)

@@ -87,12 +87,13 @@ SYSTEMS = (
         judge=Dialogue(
             image="mecrisp/source/stm32f103/precompiled/mecrisp-stellaris-stm32f103-with-disassembler-m3.hex",
             steps=(
-                Exchange(hear=rb"Mecrisp-Stellaris [\d.]+ for STM32F103"),
+                Exchange(hear=rb"Mecrisp-Stellaris [\d.]+ for STM32F103.*Koch\s"),
                 Exchange(say=b"6 7 * .\r", hear=rb"\. 42  ok\."),
                 Exchange(say=b": sq dup * ; 12 sq .\r", hear=rb"\. 144  ok\."),
                 Exchange(say=b"compiletoflash : cube dup dup * * ; compiletoram\r", hear=rb"compiletoram.*ok\."),
-                Exchange(say=b"reset\r", hear=rb"Mecrisp-Stellaris"),
-                Exchange(say=b"11 cube .\r", hear=rb"\. 1331  ok\."),
+                Exchange(say=b"reset\r", hear=rb"Mecrisp-Stellaris.*Koch\s"),
+                # It has no buffer, and looks through its flash once it has said its name.
+                Exchange(pause="50 ms", say=b"11 cube .\r", hear=rb"\. 1331  ok\."),
             ),
         ),
     ),
