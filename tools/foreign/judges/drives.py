@@ -47,7 +47,7 @@ class Drives:
     Args:
         program: What has to be there: a file of the cache, or a program on PATH.
         commands: What is started, one behind the other. {host}, {port}, {url} and {line} (a terminal) are the robot's;
-            {program} is `program`, {cache} and {scratch} are folders.
+            {program} is `program`, {free} a TCP port that is free, {cache} and {scratch} are folders.
         killed: Which of them talks to the robot.
         serve: Options with which it expects the robot.
         moves: Whether it drives by itself; of one that does not, an open session is awaited.
@@ -118,6 +118,8 @@ class Drives:
         """Start the client's programs, and kill what is left of them in the end."""
         parsed = parse_url(served.line_url)
         values = {"url": served.line_url, "line": str(place.scratch / "line")}
+        with socket.create_server(("127.0.0.1", 0)) as free:
+            values["free"] = str(free.getsockname()[1])
         values["program"] = str(place.path(self.program)) if "/" in self.program else self.program
         if isinstance(parsed, TcpUrl):
             values |= {"host": parsed.host, "port": str(parsed.port)}

@@ -44,7 +44,7 @@ _PLAYER_MOVER = """import ctypes, time
 c = ctypes.CDLL("libplayerc.so")
 for create in c.playerc_client_create, c.playerc_position2d_create:
     create.restype = ctypes.c_void_p
-client = ctypes.c_void_p(c.playerc_client_create(None, b"127.0.0.1", 6665))
+client = ctypes.c_void_p(c.playerc_client_create(None, b"127.0.0.1", {free}))
 assert c.playerc_client_connect(client) == 0
 base = ctypes.c_void_p(c.playerc_position2d_create(client, 0))
 assert c.playerc_position2d_subscribe(base, 1) == 0
@@ -126,7 +126,7 @@ CLIENTS: tuple[Row, ...] = (
         said="its own client sets 0.2 m/s through its server",
         judge=Drives(
             program="player/bin/player", files=(("player.cfg", _PLAYER), ("mover.py", _PLAYER_MOVER)),
-            commands=(("{program}", "{scratch}/player.cfg"), (sys.executable, "{scratch}/mover.py")),
+            commands=(("{program}", "-p", "{free}", "{scratch}/player.cfg"), (sys.executable, "{scratch}/mover.py")),
             environment=(("LD_LIBRARY_PATH", "{cache}/player/lib"),),
         ),
     ),
@@ -142,13 +142,14 @@ CLIENTS: tuple[Row, ...] = (
         said="the node drives what rostopic publishes on /cmd_vel",
         judge=Drives(
             program="ros-p2os/devel/lib/p2os_driver/p2os_driver", killed=1, commands=(
-                ("roscore",),
+                ("roscore", "-p", "{free}"),
                 ("{program}", "_port:={line}", "_pulse:=1.0"),
                 ("rostopic", "pub", "-r", "5", "/cmd_motor_state", "p2os_msgs/MotorState", "{state: 1}"),
                 ("rostopic", "pub", "-r", "5", "/cmd_vel", "geometry_msgs/Twist", "{linear: {x: 0.2}}"),
             ),
             environment=(("PYTHONPATH", "{cache}/ros-p2os/devel/lib/python3/dist-packages"),
-                         ("ROS_HOME", "{scratch}"), ("ROS_IP", "127.0.0.1")),
+                         ("ROS_HOME", "{scratch}"),
+                ("ROS_MASTER_URI", "http://127.0.0.1:{free}"), ("ROS_IP", "127.0.0.1")),
         ),
         needs=("roscore", "rostopic"),
     ),
