@@ -17,6 +17,9 @@ ARDUINO = Source(
     folder="p2os-arduino", url="https://github.com/qemu-gazebo-sim/p2os-arduino",
     commit="b350bd5ec3b88cb85b62815d57b6f04aee39b57b",
 )  # fmt: skip
+CARMEN = Source(
+    folder="carmen", url="https://github.com/qh-huang/carmen", commit="449241e5a3baf0979b7ff418ca3c4616e3301501"
+)
 ROS1 = Source(
     folder="ros-p2os", url="https://github.com/allenh1/p2os", commit="f5ef44a0d0324a5177f29928b84593910d5d14ec"
 )
@@ -135,6 +138,12 @@ CLIENTS: tuple[Row, ...] = (
         program="its sources with an Arduino.h for this system, and a sketch that drives 0.2 m/s on the terminal named",
         said="drives",
         judge=Drives(program="p2os-arduino/drive", commands=(("{program}", "{line}"),)),
+    ),
+    Row(
+        name="carmen", kind=ProgramKind.CLIENT, source=CARMEN,
+        program="its pioneerlib and carmenserial, with a main of three lines that sets 0.2 m/s on the terminal named",
+        said="drives",
+        judge=Drives(program="carmen/drive", commands=(("{program}", "{line}"),)),
     ),
     Row(
         name="ros1", kind=ProgramKind.CLIENT, source=ROS1,
