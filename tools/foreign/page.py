@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-from tools.foreign.row import ProgramKind, Result, Row, RowStatus
+from tools.foreign.row import Result, Row, RowStatus
+from tools.foreign.rows.tried import TRIED
 
 RESULTS = Path(__file__).parent / "results.json"
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "foreign.md"
@@ -37,12 +38,13 @@ def recorded(file: Path = RESULTS) -> list[Result]:
 
 def written(text: str, rows: Sequence[Row], results: Sequence[Result]) -> str:
     """Return a page's text with its tables made anew."""
-    return _BLOCK.sub(
-        lambda found: (
-            found[1] + _table([row for row in rows if row.kind is ProgramKind(found["kind"])], results) + found[4]
-        ),
-        text,
-    )
+
+    def made(found: re.Match[str]) -> str:
+        kind = found["kind"]
+        body = _tried() if kind == "tried" else _table([row for row in rows if row.kind.value == kind], results)
+        return found[1] + body + found[4]
+
+    return _BLOCK.sub(made, text)
 
 
 def write_page(rows: Sequence[Row]) -> None:
@@ -61,6 +63,11 @@ def _table(rows: Sequence[Row], results: Sequence[Result]) -> str:
         cells = (f"`{row.name}`", _source(row), row.program, row.said, _told(row, result))
         lines.append(f"| {' | '.join(_cell(cell) for cell in cells)} |")
     return "\n".join(lines) + "\n"
+
+
+def _tried() -> str:
+    rows = [f"| {_cell(one.name)} | {_cell(one.tried)} | {_cell(one.error)} |" for one in TRIED]
+    return "\n".join(["| program | what was tried | what came of it |", "|---|---|---|", *rows]) + "\n"
 
 
 def _source(row: Row) -> str:

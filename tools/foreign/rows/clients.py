@@ -116,6 +116,15 @@ CLIENTS: tuple[Row, ...] = (
     ),
     *map(_aria, (*_ARIA_DRIVES, *_ARIA_TALKS)),
     Row(
+        name="aria-c", kind=ProgramKind.CLIENT, source=ARIA,
+        program="its library in C, which MATLAB uses, and that library's own test", said="drives 0.2 m/s in a circle",
+        judge=Drives(
+            program="aria/source/matlab/test", commands=(("{program}", "-rh", "{host}", "-rrtp", "{port}"),),
+            serve=("--for", "aria"),
+            environment=(("LD_LIBRARY_PATH", "{cache}/aria/source/lib"), ("ARIA", "{cache}/aria/source")),
+        ),
+    ),
+    Row(
         name="soar", kind=ProgramKind.CLIENT, source=SOAR, program="the package in an environment py of the cache",
         said="its robot, without its windows, is told 0.2 m/s as a brain would",
         judge=Drives(

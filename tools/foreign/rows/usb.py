@@ -167,6 +167,8 @@ def _bridge(board: BluePill, _place: RowPlace) -> str:
     return f"{product}: USB to {name} and back"
 
 
+_FLASHROM = ("flashrom", "-p", "serprog:dev={line}:4000000")
+
 USB = (
     Row(
         name="cdc-echo", kind=ProgramKind.FIRMWARE, source=EXAMPLES, program="its example f1/stm32-h103/usb_cdcacm",
@@ -243,12 +245,17 @@ USB = (
     Row(
         name="flashrom", kind=ProgramKind.FIRMWARE, source=SERPROG,
         program="board stm32-bluepill, with a W25Q16 at SPI1",
-        said="flashrom finds the chip, erases and writes it whole, reads it back and verifies",
+        said="flashrom finds the chip, erases and writes 32 KiB of it, verifies, and once more in a run of its own",
         judge=Hosted(
             image="stm32-vserprog/source/stm32-vserprog.elf", port="usb", host_needs=("flashrom",),
             attach=("w25q16,on=SPI1,select=PA4",),
-            hosts=(("flashrom", "-p", "serprog:dev={line}:4000000", "-r", "{scratch}/read.bin"),),
-            hears=(r'(Found \w+ flash chip "[^"]+")', r"Reading flash\.\.\. (done)"), hosts_s=150.0,
+            files=(("layout", "00000000:00007fff first\n00008000:001fffff rest\n"),),
+            hosts=(
+                ("sh", "-c", "seq 400000 | head -c 2097152 > {scratch}/image.bin"),
+                (*_FLASHROM, "-l", "{scratch}/layout", "-i", "first", "--noverify-all", "-w", "{scratch}/image.bin"),
+                (*_FLASHROM, "-l", "{scratch}/layout", "-i", "first", "-v", "{scratch}/image.bin"),
+            ),
+            hears=(r'(Found \w+ flash chip "[^"]+")', r"Erase/write (done)", r"(VERIFIED)", r"(VERIFIED)"), hosts_s=150.0,
         ),
     ),
 )  # fmt: skip
