@@ -145,8 +145,8 @@ def test_a_row_that_does_not_end_is_ended_with_all_that_it_started(tmp_path: Pat
         return ""
 
     began = time.monotonic()
-    result = run(row(never, limit_s=1.0), tmp_path, tmp_path / "log")
-    assert (result.status, result.text) == (RowStatus.FAILED, "not done within 1 s")
+    result = run(row(never, limit_s=0.3), tmp_path, tmp_path / "log")
+    assert (result.status, result.text) == (RowStatus.FAILED, "not done within 0.3 s")
     assert time.monotonic() - began < 10
     assert not Path(f"/proc/{(tmp_path / 'pid').read_text()}").exists()
 

@@ -17,7 +17,7 @@ class TriedProgram:
 TRIED = (
     TriedProgram(
         name="dfu-util, lsusb and the host's drivers by USB/IP",
-        tried="usbip 2.0 with the kernel at hand; the boot loaders are spoken to by our own host (rows dfuse, stm32duino)",
+        tried="usbip 2.0 with the kernel at hand; the boot loaders are spoken to by our own host (dfuse, stm32duino)",
         error="modprobe: FATAL: Module vhci-hcd not found; no /dev/bus/usb, so libusb has no bus",
     ),
     TriedProgram(
@@ -29,7 +29,7 @@ TRIED = (
         name="Zephyr",
         tried="the repository zephyrproject-rtos/zephyr; its images in fuzzware-experiments (zephyr-CVE-2020-10065, "
         "-10066, uEmu.zephyrsocketcan)",
-        error="1.5 GB, more than could be copied; the images are for STM32L4 (RCC+0x58, nucleo_l432kc), which this chip is not",
+        error="1.5 GB, more than could be copied; the images are for STM32L4 (RCC+0x58, nucleo_l432kc), another chip",
     ),
     TriedProgram(
         name="mbed OS", tried="the repository ARMmbed/mbed-os", error="593 MB, more than could be copied"
@@ -43,10 +43,12 @@ TRIED = (
         error="error[E0463]: can't find crate for `core`: the target is not installed, and no registry at hand has it",
     ),
     TriedProgram(
-        name="TinyGo", tried="Debian, PyPI and npm", error="No matching distribution found for tinygo; npm 404; no Debian package"
+        name="TinyGo", tried="Debian, PyPI and npm",
+        error="No matching distribution found for tinygo; npm 404; no Debian package"
     ),
     TriedProgram(
-        name="CANopenNode", tried="its sources were had", error="no driver for bxCAN was written for it; Modbus stands for the field buses"
+        name="CANopenNode", tried="its sources were had",
+        error="no driver for bxCAN was written for it; Modbus stands for the field buses"
     ),
     TriedProgram(
         name="AriaPy and AriaJava", tried="AriaCoda's wrapper.i with swig 4.1, headers that have gone left out",

@@ -255,7 +255,8 @@ USB = (
                 (*_FLASHROM, "-l", "{scratch}/layout", "-i", "first", "--noverify-all", "-w", "{scratch}/image.bin"),
                 (*_FLASHROM, "-l", "{scratch}/layout", "-i", "first", "-v", "{scratch}/image.bin"),
             ),
-            hears=(r'(Found \w+ flash chip "[^"]+")', r"Erase/write (done)", r"(VERIFIED)", r"(VERIFIED)"), hosts_s=150.0,
+            hears=(r'(Found \w+ flash chip "[^"]+")', r"Erase/write (done)", r"(VERIFIED)", r"(VERIFIED)"),
+            hosts_s=150.0,
         ),
     ),
 )  # fmt: skip
