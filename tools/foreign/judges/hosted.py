@@ -167,7 +167,9 @@ class Hosted:
         printed = output.read_text(errors="replace")
         print(printed)
         if host.returncode not in self.codes:
-            raise RowError(f"{words[0]} ended with {host.returncode}: {printed.strip()[-_TOLD:]!r}")
+            logs = "".join(log.read_text(errors="replace") for log in sorted(place.scratch.glob("*.log")))
+            said = (printed.strip() or logs.strip())[-_TOLD:]
+            raise RowError(f"{Path(words[min(1, len(words) - 1)]).name} ended with {host.returncode}: {said!r}")
         return printed
 
     def _heard(self, printed: str, board: BluePill) -> list[str]:
