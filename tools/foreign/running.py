@@ -4,6 +4,7 @@ import tempfile
 import time
 from pathlib import Path
 
+from simbase.terminal import readable
 from tools.foreign.cache import build, built_commit, missing
 from tools.foreign.isolation import LeftError, isolated
 from tools.foreign.row import Result, Row, RowError, RowPlace, RowStatus
@@ -37,4 +38,4 @@ def run(row: Row, cache: Path, logs: Path) -> Result:
             )
         except (RowError, LeftError) as failure:
             text, status = str(failure), RowStatus.FAILED
-    return Result(row.name, status, " ".join(text.split()), time.monotonic() - began, notes)
+    return Result(row.name, status, readable(" ".join(text.split())), time.monotonic() - began, notes)

@@ -169,7 +169,8 @@ class Hosted:
         if host.returncode not in self.codes:
             logs = "".join(log.read_text(errors="replace") for log in sorted(place.scratch.glob("*.log")))
             said = (printed.strip() or logs.strip())[-_TOLD:]
-            raise RowError(f"{Path(words[min(1, len(words) - 1)]).name} ended with {host.returncode}: {said!r}")
+            name = next(word for word in words if not word.startswith("-") and "/python" not in word)
+            raise RowError(f"{Path(name).name} ended with {host.returncode}: {said!r}")
         return printed
 
     def _heard(self, printed: str, board: BluePill) -> list[str]:

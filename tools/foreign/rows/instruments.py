@@ -198,7 +198,10 @@ INSTRUMENTS = (
         judge=Hosted(
             image="openblt/openblt.hex", port="usart2", host_needs=("openblt/source/Host/BootCommander",),
             hosts=((
-                "{cache}/openblt/source/Host/BootCommander", "-s=xcp", "-t=xcp_rs232", "-d={line}", "-b=57600",
+                "{cache}/openblt/source/Host/BootCommander", "-s=xcp",
+                    # Its patience, for a machine that is busy elsewhere.
+                    "-t1=10000", "-t3=10000", "-t4=20000", "-t5=10000", "-t6=1000", "-t7=10000",
+                    "-t=xcp_rs232", "-d={line}", "-b=57600",
                 "{cache}/openblt/source/Target/Demo/ARMCM3_STM32F1_Nucleo_F103RB_GCC/Prog/bin/demoprog_stm32f103.srec",
             ), ("sleep", "3")),
             hears=(r"Finishing programming session\.\.\.\[\S*(OK)",),

@@ -22,6 +22,7 @@ P2IM = Source(
     folder="fuzzware-experiments", url="https://github.com/fuzzware-fuzzer/fuzzware-experiments",
     commit="1b03b728ea660b777571bf2a6c1ecfa9072f0bf5",
 )  # fmt: skip
+NUTTX = Source(folder="nuttx", url="https://github.com/apache/nuttx", commit="4ebc8a7291df955dece09073b8798db2dfd6490b")
 RIOT = Source(folder="riot", url="https://github.com/RIOT-OS/RIOT", commit="c8bd52ff13daea7da132b8a37986e21d47cde0fe")
 _UNITS = "fuzzware-experiments/source/01-access-modeling-for-fuzzing/p2im-unittests/F103"
 
@@ -130,6 +131,20 @@ SYSTEMS = (
         ),
     ),
     _riot("mutex_order", Exchange(hear=rb"T\d+ \(prio 1\): locked mutex now", within="5 s")),
+    Row(
+        name="nuttx-nsh", kind=ProgramKind.FIRMWARE, source=NUTTX,
+        program="its configuration stm32f103-minimum:nsh with nuttx-apps, console on USART1 at 115200",
+        said="its shell: what it is, its devices, and two seconds that take two seconds",
+        judge=Dialogue(
+            image="nuttx/source/nuttx",
+            steps=(
+                Exchange(hear=rb"NuttShell \(NSH\).*nsh> "),
+                Exchange(say=b"uname -a\r", hear=rb"(NuttX .* arm stm32f103-minimum)"),
+                Exchange(say=b"ls /dev\r", hear=rb"/dev:\s+(console\s+ttyS0)"),
+                Exchange(say=b"sleep 2; echo done\r", hear=rb"\n(done)\r", within="2100 ms"),
+            ),
+        ),
+    ),
     _riot(
         "xtimer_usleep",
         Exchange(hear=rb"Slept for (500\d\d us \(expected: 50000 us\) Offset: \d\d us).*Test ran for", within="60 s"),

@@ -35,10 +35,6 @@ TRIED = (
         name="mbed OS", tried="the repository ARMmbed/mbed-os", error="593 MB, more than could be copied"
     ),
     TriedProgram(
-        name="NuttX, built", tried="apache/nuttx with apps; P2IM's images are run in its place (rows nuttx-…)",
-        error="not built: kconfig-frontends and a configuration were not tried to the end",
-    ),
-    TriedProgram(
         name="Rust", tried="rustc 1.95 for thumbv7m-none-eabi",
         error="error[E0463]: can't find crate for `core`: the target is not installed, and no registry at hand has it",
     ),
@@ -52,7 +48,7 @@ TRIED = (
     ),
     TriedProgram(
         name="AriaPy and AriaJava", tried="AriaCoda's wrapper.i with swig 4.1, headers that have gone left out",
-        error="Error: previous definition of 'AREXPORT'",
+        error="wrapper.i:272: Error: Unknown directive '%char'",
     ),
     TriedProgram(
         name="MRPT", tried="its driver of ActivMedia robots",
