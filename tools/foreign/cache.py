@@ -2,8 +2,8 @@
 
     CACHE/klipper/...          what rows name, built by whoever wants the row
     CACHE/klipper/COMMIT       the commit that it was built of, if it is known
-    CACHE/klipper/build        if it is there and a file is missing, it is run in that folder, and what it says last
-                               is told where it fails; it is the user's own
+    CACHE/klipper/build        if it is there and a file is missing, it is run in that folder, and where it fails
+                               what it said last is shown; it is the user's own
 
 `git clone URL` at the row's commit into `CACHE/klipper/source` does as well as COMMIT.
 """
@@ -17,8 +17,8 @@ from tools.foreign.row import Row, Source, matching
 
 #: chosen: longer than any of them builds on a small machine, seconds.
 BUILD_S = 1800.0
-#: chosen: of what a build says last so much is told.
-_TOLD = 160
+#: chosen: of what a build says last so much is shown.
+_SHOWN_CHARACTERS = 160
 
 
 def default_cache() -> Path:
@@ -52,7 +52,7 @@ def build(source: Source, cache: Path) -> str:
         return ""
     said = ended.stdout.decode(errors="replace").split("\n")
     last = next((line.strip() for line in reversed(said) if line.strip()), "nothing")
-    return f"build ended with {ended.returncode}: {last[:_TOLD]}"
+    return f"build ended with {ended.returncode}: {last[:_SHOWN_CHARACTERS]}"
 
 
 def built_commit(source: Source, cache: Path) -> str:

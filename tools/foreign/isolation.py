@@ -82,7 +82,7 @@ def _work_and_end(work: Callable[[], str], writing: int, log: Path) -> None:
             said = {"returned": work()}
         except RowError as failure:
             said = {"failed": str(failure)}
-        except BaseException as error:  # noqa: BLE001  # whatever it was, the parent is told
+        except BaseException as error:  # noqa: BLE001  # whatever it was, the parent hears of it
             traceback.print_exc()
             said = {"died": f"{type(error).__name__}: {error}"}
         os.write(writing, json.dumps(said).encode())

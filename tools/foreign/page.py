@@ -60,7 +60,7 @@ def _table(rows: Sequence[Row], results: Sequence[Result]) -> str:
     ]
     for row in rows:
         result = known.get(row.name)
-        cells = (f"`{row.name}`", _source(row), row.program, row.said, _told(row, result))
+        cells = (f"`{row.name}`", _source(row), row.program, row.said, _shown(row, result))
         lines.append(f"| {' | '.join(_cell(cell) for cell in cells)} |")
     return "\n".join(lines) + "\n"
 
@@ -75,14 +75,14 @@ def _source(row: Row) -> str:
     return f"[{source.folder}]({source.url}) {source.commit[:_SHORT_COMMIT]}" if source.url else "this repository"
 
 
-def _told(row: Row, result: Result | None) -> str:
+def _shown(row: Row, result: Result | None) -> str:
     if result is None:
-        told = row.tried or "not run"
+        shown = row.tried or "not run"
     elif result.status is RowStatus.PASSED:
-        told = f"passed in {result.seconds:.0f} s: {result.text}"
+        shown = f"passed in {result.seconds:.0f} s: {result.text}"
     else:
-        told = f"{result.status.value}: {result.text}"
-    return f"{told}. Found: {row.found}" if row.found else told
+        shown = f"{result.status.value}: {result.text}"
+    return f"{shown}. Found: {row.found}" if row.found else shown
 
 
 def _cell(text: str) -> str:

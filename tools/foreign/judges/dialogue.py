@@ -10,9 +10,9 @@ from bluepill_sim.spans import Span, to_nanos
 from simbase.timing import NS_PER_MS
 from tools.foreign.row import RowError, RowPlace
 
-#: chosen: what has come is looked at so often, and so much of it is told.
+#: chosen: what has come is looked at so often, and so much of it is shown.
 _SLICE_NS = 5 * NS_PER_MS
-_TOLD = 60
+_SHOWN_CHARACTERS = 60
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,7 +21,7 @@ class Exchange:
 
     Args:
         hear: A regular expression that what comes after it was said must match; its first group, or all of it, is
-            told as what came back.
+            reported as what came back.
         say: What is sent first; empty: nothing.
         within: How long that may take, in virtual time.
         pause: How long it is waited before anything is sent.
@@ -77,15 +77,15 @@ class Dialogue:
             board.serial_ports[self.port].far_baud = self.baud
         heard = bytearray()
         port.subscribe(lambda rows: heard.extend(word & 0xFF for word, _ in rows))
-        told = []
+        answers = []
         for step in self.steps:
             if step.pause:
                 board.run_for(step.pause)
             if step.say:
                 heard.clear()
                 port.receive(step.say)
-            told.append(_heard(board, heard, step))
-        return "; ".join(told)
+            answers.append(_heard(board, heard, step))
+        return "; ".join(answers)
 
 
 def _heard(board: BluePill, heard: bytearray, step: Exchange) -> str:
@@ -96,11 +96,11 @@ def _heard(board: BluePill, heard: bytearray, step: Exchange) -> str:
         if found is not None:
             words = (found[1] if found.re.groups else found[0]).decode(errors="replace")
             del heard[: found.end()]
-            return " ".join(words.split())[:_TOLD]
+            return " ".join(words.split())[:_SHOWN_CHARACTERS]
         if board.now_ns >= end_ns or board.has_died:
             said = f" to {step.say!r}" if step.say else ""
             raise RowError(
-                f"no {step.hear!r}{said} within {step.within}; it said {bytes(heard[-_TOLD:])!r}; "
+                f"no {step.hear!r}{said} within {step.within}; it said {bytes(heard[-_SHOWN_CHARACTERS:])!r}; "
                 f"{board.verdict or 'at ' + board.where()}"
             )
         board.run_for(_SLICE_NS)

@@ -22,7 +22,7 @@ from pathlib import Path
 
 from p2os import Robot
 from p2os.errors import P2osError
-from p2os.transport import TcpUrl, parse_url
+from p2os.transport import TcpUrl, listen_url, parse_url
 from tools.foreign.isolation import nothing_left
 from tools.foreign.row import RowError, RowPlace
 from tools.surveys.measure_stops import Cable
@@ -86,7 +86,7 @@ class Drives:
             served.close()
 
     def _through(self, served: "Served", place: RowPlace) -> Iterator[str]:
-        """Take it through everything; each step is told."""
+        """Take it through everything; each step is reported."""
         never = "never drove" if self.moves else "never opened a session"
         began = time.monotonic()
         with self._started(served, place) as processes:
@@ -118,8 +118,7 @@ class Drives:
         """Start the client's programs, and kill what is left of them in the end."""
         parsed = parse_url(served.line_url)
         values = {"url": served.line_url, "line": str(place.scratch / "line")}
-        with socket.create_server(("127.0.0.1", 0)) as free:
-            values["free"] = str(free.getsockname()[1])
+        values["free"] = str(_free_port())
         values["program"] = str(place.path(self.program)) if "/" in self.program else self.program
         if isinstance(parsed, TcpUrl):
             values |= {"host": parsed.host, "port": str(parsed.port)}
@@ -218,7 +217,7 @@ class Served:
 
 
 def _second_client(served: Served) -> Iterator[str]:
-    """Come beside the client; a TCP client is told that the robot is busy."""
+    """Come beside the client; a TCP client is sent that the robot is busy."""
     parsed = parse_url(served.url)
     if not isinstance(parsed, TcpUrl):
         return
@@ -226,8 +225,16 @@ def _second_client(served: Served) -> Iterator[str]:
         line.settimeout(5)
         answer = line.recv(200)
     if not answer.startswith(b"busy"):
-        raise RowError(f"a second client was told {answer[:40]!r}")
+        raise RowError(f"a second client was sent {answer[:40]!r}")
     yield "a second is told busy"
+
+
+def _free_port() -> int:
+    """Return a TCP port of this machine that nobody has at the moment."""
+    listener = listen_url("tcp:127.0.0.1:0")
+    parsed = parse_url(listener.description)
+    listener.close()
+    return parsed.port if isinstance(parsed, TcpUrl) else 0
 
 
 def _next_client(served: Served) -> float:

@@ -26,8 +26,8 @@ from tools.foreign.row import RowError, RowPlace
 _SLICE_NS = 2 * NS_PER_MS
 #: chosen: by so much virtual time may hurry after the clock.
 _MADE_UP_NS = 50 * NS_PER_MS
-#: chosen: of what a host said last so much is told, and a USB device may take so long to be there.
-_TOLD = 160
+#: chosen: of what a host said last so much is shown, and a USB device may take so long to be there.
+_SHOWN_CHARACTERS = 160
 _USB_S = 5
 
 
@@ -76,7 +76,7 @@ class Hosted:
         hosts: Commands, run one after the other. {line} is the terminal of `port`, {can} the path of the CAN's
             socket; {cache} and {scratch} are folders, {NAME} a file of `host_files`.
         hears: Regular expressions that what the hosts print must match, in this order; the first group of each that has
-            one is told.
+            one is reported.
         port: "usart1" to "usart3", "usb", or "can".
         host_needs: What has to be there for the hosts.
         files: Written into the scratch folder before: name and text.
@@ -132,13 +132,13 @@ class Hosted:
             for log in sorted(place.scratch.glob("*.log")):  # for the row's own log
                 print(f"{log.name}:\n{log.read_text(errors='replace')}")
             raise
-        told = self._heard(printed, board)
+        heard = self._heard(printed, board)
         for wanted in self.edges:
             count, most = counted[wanted.pin], wanted.least if wanted.most is None else wanted.most
             if not wanted.least <= count <= most:
-                raise RowError(f"{count} edges at {wanted.pin}, {wanted.least} to {most} must be; {'; '.join(told)}")
-            told.append(f"{count} edges at {wanted.pin}")
-        return "; ".join(told)
+                raise RowError(f"{count} edges at {wanted.pin}, {wanted.least} to {most} must be; {'; '.join(heard)}")
+            heard.append(f"{count} edges at {wanted.pin}")
+        return "; ".join(heard)
 
     def _open(self, board: BluePill, place: RowPlace) -> tuple[dict[str, str], Callable[[], None]]:
         """Open the port's far end; return the values of commands, and what carries between two runs of the board."""
@@ -168,22 +168,22 @@ class Hosted:
         print(printed)
         if host.returncode not in self.codes:
             logs = "".join(log.read_text(errors="replace") for log in sorted(place.scratch.glob("*.log")))
-            said = (printed.strip() or logs.strip())[-_TOLD:]
+            said = (printed.strip() or logs.strip())[-_SHOWN_CHARACTERS:]
             name = next(word for word in words if not word.startswith("-") and "/python" not in word)
             raise RowError(f"{Path(name).name} ended with {host.returncode}: {said!r}")
         return printed
 
     def _heard(self, printed: str, board: BluePill) -> list[str]:
-        at, told = 0, []
+        at, heard = 0, []
         for pattern in self.hears:
             found = re.compile(pattern, re.DOTALL).search(printed, at)
             if found is None:
                 verdict = f"; {board.verdict}" if board.verdict else ""
-                raise RowError(f"the host did not print {pattern!r}: {printed.strip()[-_TOLD:]!r}{verdict}")
+                raise RowError(f"the host did not print {pattern!r}: {printed.strip()[-_SHOWN_CHARACTERS:]!r}{verdict}")
             at = found.end()
             if found.re.groups:
-                told.append(" ".join(found[1].split()))
-        return told
+                heard.append(" ".join(found[1].split()))
+        return heard
 
 
 def _count(board: BluePill, wanted: CountedEdges, counted: Counter[str]) -> None:
@@ -242,6 +242,6 @@ class _Served:
             elif ahead_ns < -_MADE_UP_NS:  # a machine that was busy elsewhere kept the host waiting too
                 self._start_ns -= ahead_ns + _MADE_UP_NS
             if time.monotonic() > end or board.has_died:
-                said = "" if output is None else output.read_text(errors="replace").strip()[-_TOLD:]
+                said = "" if output is None else output.read_text(errors="replace").strip()[-_SHOWN_CHARACTERS:]
                 why = board.verdict if board.has_died else f"within {longest_s:g} s"
                 raise RowError(f"{what}: {why}, {board.where()}; {said!r}")

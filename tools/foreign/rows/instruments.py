@@ -159,7 +159,7 @@ INSTRUMENTS = (
     Row(
         name="baseflight-msp", kind=ProgramKind.FIRMWARE, source=BASEFLIGHT,
         program="Baseflight, target NAZE, with an MPU-6050 at I2C2; what it drives is at TIM1 and TIM4",
-        said="MSP: identity, IMU, motors set and told back, and their pulses at the pins",
+        said="MSP: identity, IMU, motors set and read back, and their pulses at the pins",
         judge=Hosted(
             image="baseflight/source/obj/baseflight_NAZE.elf", host_needs=(f"{_PACKAGE}serial",),
             attach=("mpu6050,on=I2C2",), files=(("msp.py", _MSP),),

@@ -135,20 +135,20 @@ def _stm32duino(board: BluePill, _place: RowPlace) -> str:
 
 def _cmsis_dap(board: BluePill, _place: RowPlace) -> str:
     product = _configured(board)
-    told = []
+    said = []
     for number in (4, 0xF0, 0xFE):  # version of the protocol, capabilities, packets that it holds
         board.usb.write(0x01, bytes((0, number)))
         came = board.usb.wait_packet(0x81).data
         if came[0] != 0 or not came[1]:
             raise RowError(f"DAP_Info {number:#x} gave {came.hex()}")
-        told.append(came[2 : 2 + came[1]].rstrip(b"\0").hex(" "))
+        said.append(came[2 : 2 + came[1]].rstrip(b"\0").hex(" "))
     board.usb.write(0x01, bytes((2, 1)))
     if board.usb.wait_packet(0x81).data[:2] != bytes((2, 1)):
         raise RowError("DAP_Connect to SWD failed")
     board.usb.write(0x01, bytes((5, 0, 1, 2)))  # DAP_Transfer: read IDCODE; nobody is at its wires
     if (came := board.usb.wait_packet(0x81, "2 s").data)[0] != 5:
         raise RowError(f"DAP_Transfer gave {came.hex()}")
-    return f"{product}: version, capabilities, packets {', '.join(told)}; SWD with nobody there answers {came[2]}"
+    return f"{product}: version, capabilities, packets {', '.join(said)}; SWD with nobody there answers {came[2]}"
 
 
 def _bridge(board: BluePill, _place: RowPlace) -> str:
