@@ -97,6 +97,7 @@ SYSTEMS = (
                 Exchange(pause="50 ms", say=b"11 cube .\r", hear=rb"\. 1331  ok\."),
             ),
         ),
+        found="what stands behind the store that asks for a reset was reported as a fault",
     ),
     Row(
         name="nuttx-usart", kind=ProgramKind.FIRMWARE, source=P2IM,
