@@ -16,7 +16,7 @@ JOBS   ?= 3
 COMPILED := $(wildcard bluepill_sim/extension/source/*/*) robot_bench/wires/edges.c \
     $(shell find adapter_fw/core adapter_fw/capi adapter_fw/esp32/main adapter_fw/esp32_sim -type f)
 
-.PHONY: page page-check setup demo test lint type unit wheels bench soak steady mutants hostile peers clean firmware mutation-tools board board-check board-tools pictures docs generated
+.PHONY: page page-check setup demo test lint type unit wheels bench soak steady mutants hostile foreign clean firmware mutation-tools board board-check board-tools pictures docs generated
 
 setup: $(STAMP)
 
@@ -106,9 +106,9 @@ mutants: setup
 hostile: setup
 	@$(BIN)/python -m tools.hostile $(ON)
 
-# The programs of others that are on PATH, or PEERS='--peer "p2os-arduino=/home/me/drive {line}"', against p2os serve.
-peers: setup
-	@$(BIN)/python -m tools.peers $(PEERS)
+# The programs of others that are in a cache outside the checkout (docs/foreign.md): all, or ROWS=klippy-usb,grbl-usart, or ROWS=client.
+foreign: setup
+	@$(BIN)/python -m tools.foreign $(ROWS)
 
 # What changes the adapter's two sides in `make soak`, an ESP32 that runs its core, and fuzzing that is guided by coverage. Without universalmutator's own wishes: one of them is a copy of
 # `typing` that shadows Python's.

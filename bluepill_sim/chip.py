@@ -132,6 +132,7 @@ class Chip(Stateful):
         self._is_made = self._is_complete = False
         self.engine, self.processor = make_core(self._measure, memory)
         self.processor.on_fault = on_fault
+        self.processor.awaits_reset = lambda: self._requested_reset is not None
         self.processor.on_deep_sleep = self._begin_low_power
         self.processor.on_entry = self._act_on_due
         self.pins = make_pins(self)

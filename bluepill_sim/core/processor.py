@@ -141,6 +141,8 @@ class Processor(Stateful):
         self.on_fault: FaultListener | None = None
         #: Called when the core falls asleep with SLEEPDEEP.
         self.on_deep_sleep: Callable[[], None] = lambda: None
+        #: Tells whether the chip is to be reset at the next boundary.
+        self.awaits_reset: Callable[[], bool] = lambda: False
         #: Called with the cycle to which the entry of an exception has come, to act on what is due by then.
         self.on_entry: Callable[[int], None] = lambda _cycle: None
         #: Why a debugger's halt ended the last run; None where none did.
@@ -651,6 +653,8 @@ class Processor(Stateful):
 
     def _fault(self, kind: FaultKind, pc: int, address: int | None = None) -> None:
         """Take the exception of a fault, or HardFault where it may not be taken, or lock up."""
+        if self.awaits_reset():
+            return  # the rest of a block behind the store that asked for it; the chip would not come to it
         row = FAULT_ROWS[kind]
         self.cfsr |= row.cfsr
         self.hfsr |= row.hfsr

@@ -3,6 +3,7 @@
 import pytest
 
 from bluepill_sim.core.faults import FAULT_ROWS, MOST_RETURNS, FaultKind, FaultReport
+from bluepill_sim.peripherals.rcc import ResetCause
 from simbase.timing import Reason
 
 CCR, SHCSR, CFSR, HFSR, BFAR = 0xE000ED14, 0xE000ED24, 0xE000ED28, 0xE000ED2C, 0xE000ED38
@@ -101,6 +102,30 @@ def test_the_fault_status_registers_tell_and_are_cleared_by_ones(run) -> None:
         {3: "handler"},
     )
     assert machine.log == [1 << 15 | 1 << 9, FORCED, 0x70000000, 0]
+
+
+#: Asks for a reset three times; what stands behind the store is no code (Forth's `reset`: jjonethal/mecrisp-stellaris
+#: a36d6d3, mecrisp-stellaris-source/common/interrupts-common.s:69).
+NOTHING_BEHIND_A_RESET = """mov32 r1, #0x20000000
+ldr r2, [r1, #0]
+adds r2, #1
+str r2, [r1, #0]
+cmp r2, #4
+beq stop
+mov32 r1, #0xE000ED0C
+mov32 r2, #0x05FA0004
+mov32 r3, #0x70000000
+str r2, [r1, #0]
+{}
+b stop"""
+
+
+@pytest.mark.parametrize("behind", ["ldr r0, [r3, #0]", "udf", "cpsid f\nudf", "bkpt #1", "cpsid i\nsvc #1"])
+def test_what_stands_behind_a_request_of_a_reset_is_no_fault(boot, behind: str) -> None:
+    board = boot(NOTHING_BEHIND_A_RESET.format(behind)).run(100).board
+    assert board.fault is None
+    assert board.resets == {ResetCause.SOFTWARE: 3}
+    assert not board.chip.processor.is_locked_up
 
 
 def test_the_registers_of_the_report_are_those_of_the_fault(boot) -> None:

@@ -100,6 +100,9 @@ bool take_fault(struct core *core, uint32_t kind)
 {
     struct shared *s = &core->shared;
     const struct fault_row *row = &core->faults[kind];
+    if (s->attention) {
+        return false; /* what Python was asked for in this block may come first: a reset */
+    }
     if (!row->exception || (kind == HALT_BKPT && (s->has_debugger || s->demcr & MON_EN)) || (kind == HALT_SUPERVISOR_CALL && !s->knows_masked_svc)) {
         return false;
     }

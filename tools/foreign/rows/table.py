@@ -1,0 +1,7 @@
+"""The table."""
+
+from tools.foreign.row import Row
+from tools.foreign.rows.clients import CLIENTS
+from tools.foreign.rows.firmware import FIRMWARE
+
+ROWS: tuple[Row, ...] = (*FIRMWARE, *CLIENTS)
