@@ -53,7 +53,7 @@ describe("a plot", () => {
     expect(points(rows, { ...line, isStepped: true }, 50, 150, 100)[1]).toEqual(Float64Array.of(0, 20, 20));
   });
   it("has no time twice", () => {
-    for (const [from, to] of [[0, 100], [0, 200], [100, 200], [50, 100]] as const) for (const isStepped of [true, false]) {
+    for (const [from, to] of [[0, 100], [0, 200], [100, 200], [50, 100], [0, 300]] as const) for (const isStepped of [true, false]) {
       const [xs] = points(samples([[0, 0], [100, 10], [200, 0]]), { ...line, isStepped }, from, to, 100);
       expect([...new Set(xs)]).toEqual(Array.from(xs));
     }
