@@ -261,6 +261,8 @@ def test_a_run_has_a_folder_for_each_robot_and_says_of_whom_it_speaks(
     links = [row[0]["href"] for row in page.section("Robots")["blocks"][0]["rows"]]
     assert links == ["a/report.html", "b/report.html"]
     assert all(Path("there", link).is_file() for link in links)
+    cells = [row[-1] for row in page.section("Robots")["blocks"][0]["rows"]]
+    assert [cell["standing"] for cell in cells] == ["passed", "failed"]
     assert len(page.rows("a pose")) == len(page.rows("b pose")) == 5
     missed = [(row[2], row[4]) for row in page.rows("events") if row[3] == "goal missed"]
     assert [(who, words.partition(":")[0]) for who, words in missed] == [("b goals", "drives at least 1 m")]
