@@ -16,8 +16,8 @@ from p2os.view.recording import ViewRecording
 from simbase.timing import Nanos
 
 Happening = TypeVar("Happening")
-#: chosen: some seconds of the busiest run; 200 bytes each.
-MOST_WAITING = 200_000
+#: chosen: a minute of a run whose page is stalled; some tens of megabytes.
+MOST_WAITING = 50_000
 
 
 class ShownSource(Protocol):
@@ -58,6 +58,10 @@ class LiveRecording(Generic[Happening]):
             self._waiting.append(happening)
         else:
             self._lost += 1
+
+    def advance_to(self, now: Nanos) -> None:
+        """Take that time goes on, and nothing happens; called by the program."""
+        self._now = now
 
     def end(self, report: PageHeader | None = None) -> None:
         """Say that nothing more will come, and what came of it; called by the program.

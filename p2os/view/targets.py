@@ -50,7 +50,9 @@ def target_of(named: str) -> ViewTarget:
         found = cast("Callable[[str], ViewTarget | None]", loaded(point))(named)
         if found is not None:
             return found
-    raise UsageError(f"{named!r} is nothing that can be shown", hint="a run folder, a capture, or a scenario")
+    raise UsageError(
+        f"{named!r} is nothing that can be shown", hint="a run folder, a capture, a scenario, or a robot's URL"
+    )
 
 
 def capture_target(named: str) -> ViewTarget | None:

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import cast
 
-from p2os.view.header import PageCell, PageHeader, PageSection, PageTable
+from p2os.view.header import PageCell, PageHeader, PageSection, PageTable, Standing
 from p2os.view.page import page_of
 from p2os.view.recording import ViewRecording
 from robot_bench.events.codec import Json
@@ -55,16 +55,18 @@ def report_of_all(outcome: Json, records: Mapping[str, RunRecord]) -> ViewRecord
 
 def _rows(name: str, one: Mapping[str, object]) -> Iterator[list[PageCell]]:
     """Yield a robot's row, and one more for each further line of what came of it."""
-    failures = [*cast("Sequence[str]", one["failures"]), *cast("Sequence[str]", one["goals_not_judged"] or ())]
+    words: tuple[tuple[str, Standing], ...] = (("failures", "failed"), ("goals_not_judged", "open"))
+    lines = [
+        PageCell(text=line, standing=standing)
+        for key, standing in words for line in cast("Sequence[str]", one[key] or ())
+    ]  # fmt: skip
     first = [
         PageCell(text=name, href=f"{name}/{REPORT_NAME}"), PageCell(text=_metres(one["distance_m"]), is_number=True),
         PageCell(text=_metres(one["min_clearance_m"]), is_number=True),
         PageCell(text=str(one["collisions"]), is_number=True),
     ]  # fmt: skip
-    standing = "passed" if one["passed"] else "failed"
-    for number, line in enumerate(failures or ["passed"]):
-        cells = first if number == 0 else [PageCell(text="")] * len(first)
-        yield [*cells, PageCell(text=line, standing=standing)]  # type: ignore[arg-type]  # one of the two
+    for number, line in enumerate(lines or [PageCell(text="passed", standing="passed")]):
+        yield [*(first if number == 0 else [PageCell(text="")] * len(first)), line]
 
 
 def _metres(value: object) -> str:

@@ -16,6 +16,7 @@ from robot_bench.run import meta_of
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.view.run_tracks import RunTracks
 from robot_bench.wires.edges import Edges
+from simbase.timing import Nanos
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,11 +51,17 @@ class LiveRun:
         """Run a bench to its end, as `run_scenario` takes it."""
         meta = meta_of(bench.scenario, bench.parts.world, run_of(bench).note, is_at_port=False)
         self.source.offer(BenchBuilt(meta), bench.now)
-        bench.events.record(lambda events, limit: self.source.offer(BenchReleased(events), limit))
+        bench.events.record(self._take)
         try:
             bench.run_until(bench.scenario.duration_ns)
         finally:
             self.source.end()
+
+    def _take(self, events: Sequence[Recorded], limit: Nanos) -> None:
+        if events:
+            self.source.offer(BenchReleased(events), limit)
+        else:
+            self.source.advance_to(limit)
 
     def _add(self, happened: BenchBuilt | BenchReleased) -> None:
         if isinstance(happened, BenchBuilt):

@@ -10,10 +10,11 @@ from p2os.cli.quantities import option
 from p2os.view.targets import target_of
 from simbase.units import PORT
 
-HELP = """Look at a run, a capture or a scenario on a page in the browser.
+HELP = """Look at a run, a capture, a scenario or a robot on a page in the browser.
 
-TARGET is a run folder, a capture (pcap, a recording, hex), or a scenario, which is
-then run at the pace of the clock. The page is served on this machine alone, and
+TARGET is a run folder, a capture (pcap, a recording, hex), a scenario, which is
+then run at the pace of the clock, or the URL of a robot, which is watched and not
+moved. The page is served on this machine alone, and
 its link holds a token: nobody else gets in. It is there until Ctrl-C.
 
 \b
@@ -21,6 +22,7 @@ Examples:
   p2os view runs/dodge-001          a run: robot, pins, packets on one time axis
   p2os view lab.pcap                a conversation with a robot, byte by byte
   p2os view dodge                   the scenario, as it runs
+  p2os view tcp:127.0.0.1:8101      a robot, motors off
   p2os view dodge --no-browser      prints the link alone
 """
 
@@ -31,7 +33,7 @@ def register(app: typer.Typer) -> None:
 
 
 def view(
-    target: Annotated[str, typer.Argument(help="Run folder, capture or scenario.", metavar="TARGET")],
+    target: Annotated[str, typer.Argument(help="Run folder, capture, scenario, or a robot's URL.", metavar="TARGET")],
     no_browser: NoBrowser = False,
     port: Annotated[
         int, option(PORT, "--port", purpose="Where it is served; 0 takes a free one.", least="0", most="65535")

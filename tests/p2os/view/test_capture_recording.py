@@ -37,7 +37,7 @@ def test_each_byte_of_a_recorded_robot_stands_in_one_packet(path: Path) -> None:
 
 def test_the_way_goes_on_where_the_counter_of_a_position_wraps() -> None:
     parameters, rows = load_parameters("p2dx"), CaptureTracks(ViewRecording(PageHeader(title="x")), "p2dx")
-    raws = (POSITION_MASK - 1, POSITION_MASK, 0, 1)
+    raws = (POSITION_MASK, 0, 12000, 24000, POSITION_MASK, 9000)
     payloads = [bytes([0x32]) + raw.to_bytes(2, "little") + bytes(HEAD_BYTES - 3) for raw in raws]
     rows.take(
         Chunk(at_ns=n, direction=Direction.FROM_ROBOT, data=Frame(payload).to_bytes())
@@ -45,7 +45,7 @@ def test_the_way_goes_on_where_the_counter_of_a_position_wraps() -> None:
     )
     pose = next(track for track in rows.recording.tracks if track.kind.name == "pose")
     counts = [round(x_m * 1e9 / parameters.distance_nm_per_count) for x_m in pose.column("x_m")]  # type: ignore[operator]  # floats
-    assert counts == [-2, -1, 0, 1]
+    assert counts == [-1, 0, 12000, 24000, POSITION_MASK, POSITION_MASK + 1 + 9000]
 
 
 def test_a_damaged_frame_is_an_event_and_a_packet_that_says_so(tmp_path: Path) -> None:

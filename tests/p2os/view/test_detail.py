@@ -1,6 +1,7 @@
 """Levels of detail: what so many pixels show of any number of rows."""
 
 from array import array
+from random import Random
 
 import pytest
 from hypothesis import given, settings
@@ -28,6 +29,18 @@ def test_the_least_and_the_greatest_of_any_stretch_are_found_however_it_grew(
     least, greatest = index.within(first, last)
     assert first <= least < last > greatest >= first
     assert (whole[least], whole[greatest]) == (min(whole[first:last]), max(whole[first:last]))
+
+
+def test_the_extremes_of_many_rows_are_found_across_runs_of_runs() -> None:
+    draw = Random(1)
+    values = array("d", [draw.random() for _ in range(3 * RUN**2 + 17)])
+    index = Extremes()
+    index.grow(values)
+    for _ in range(300):
+        first = draw.randrange(len(values))
+        last = draw.randrange(first + 1, len(values) + 1)
+        least, greatest = index.within(first, last)
+        assert (values[least], values[greatest]) == (min(values[first:last]), max(values[first:last]))
 
 
 @given(TIMES, st.integers(1, 20))

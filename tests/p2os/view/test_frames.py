@@ -96,6 +96,36 @@ def test_every_column_lies_at_a_multiple_of_eight_bytes() -> None:
     assert len(data) % 8 == 0
 
 
+def texts(distinct: int, rows: list[int], ends: list[int], blob: bytes, behind: bytes = b"") -> bytes:
+    """Return a frame of lines of text with these parts of its last column, its size as it is."""
+
+    def filled(data: bytes) -> bytes:
+        return data + bytes(-len(data) % 8)
+
+    count = len(rows)
+    column = struct.pack("<II", distinct, len(blob)) + filled(struct.pack(f"<{count}I", *rows))
+    column += filled(struct.pack(f"<{len(ends)}I", *ends)) + filled(blob)
+    body = filled(struct.pack(f"<{count}q", *range(count))) + filled(bytes(count)) + column + behind
+    size = HEAD.size + len(body)
+    return HEAD.pack(b"P2VF", 1, BY_NAME["text"].number, 0, 0, 0, count, 1, count, size, 0, 0, count) + body
+
+
+def test_texts_are_spelled_in_one_way() -> None:
+    assert ViewFrame.from_bytes(texts(2, [0, 1, 0], [1, 3], b"abc")).columns[2] == ["a", "bc", "a"]
+    for wrong in (
+        texts(2, [0, 1, 0], [1, 3], b"abc", behind=bytes(8)),  # more behind
+        texts(2, [0, 0, 0], [1, 3], b"abc"),  # a text of no row
+        texts(2, [1, 0, 1], [1, 3], b"abc"),  # not in the order of their rows
+        texts(2, [0, 1, 0], [1, 2], b"aa"),  # one that stands twice
+        texts(2, [0, 2, 0], [1, 3], b"abc"),  # a row whose text is not there
+        texts(2, [0, 1, 0], [3, 1], b"abc"),  # one that ends before it begins
+        texts(2, [0, 1, 0], [1, 2], b"abc"),  # bytes of no text
+        texts(1, [0, 0, 0], [1], b"\xff"),  # no UTF-8
+    ):
+        with pytest.raises(FrameError):
+            ViewFrame.from_bytes(wrong)
+
+
 def test_a_text_that_has_no_bytes_is_packed_all_the_same() -> None:
     frame = ViewFrame(
         kind=BY_NAME["text"], channel=0, columns=(array("q", [0, 0]), array("B", [0, 0]), ["\ud800", "?"]), from_ns=0,

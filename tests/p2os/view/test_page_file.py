@@ -73,7 +73,11 @@ def test_the_policy_admits_the_scripts_of_the_bundle_and_nothing_else() -> None:
 
 
 def test_the_same_recording_gives_the_same_bytes() -> None:
-    assert page_of(recording("x")) == page_of(recording("x"))
+    page = page_of(recording("x"))
+    assert page == page_of(recording("x"))
+    packed = re.findall(r'<script type="application/octet-stream" id="\w+">([^<]*)</script>', page)
+    assert len(packed) == 2
+    assert {base64.b64decode(block)[4:8] for block in packed} == {bytes(4)}, "no time of packing"
 
 
 def test_what_is_left_out_is_said_with_where_the_rest_is() -> None:

@@ -5,9 +5,12 @@ Needs Node, Chromium, and `make page` once (it installs what the page is built a
 
 import json
 import shutil
+import signal
 import subprocess
+import sys
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import pytest
 
@@ -28,6 +31,7 @@ from p2os.view.page import page_of
 from p2os.view.recording import ViewRecording
 from tools.generators.page_frames import TARGET, text
 
+CAPTURE = Path(__file__).resolve().parents[2] / "golden" / "captures" / "aria_p2de.jsonl"
 TOOLS = Path(__file__).resolve().parents[3] / "tools" / "page"
 HOSTILE = (
     "<img src=x onerror=\"window.ran=1;alert(1)\"><script>window.ran=1</script><b onmouseover='window.ran=1'>x</b>"
@@ -84,14 +88,20 @@ def recording() -> ViewRecording:
     return made
 
 
-@pytest.fixture(scope="module")
-def seen(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """Return what came of the page in the browser: opened once, looked at by all tests here."""
+def tools() -> tuple[str, str]:
+    """Return Node and Chromium; skips where they are not there."""
     node, chromium = shutil.which("node"), shutil.which("chromium") or shutil.which("chromium-browser")
     if node is None or chromium is None:
         pytest.skip("node or chromium is not installed: the page is not looked at in a browser")
     if not (TOOLS / "node_modules" / "playwright-core").is_dir():
         pytest.skip("tools/page/node_modules is not there: the page is not looked at in a browser (hint: make page)")
+    return node, chromium
+
+
+@pytest.fixture(scope="module")
+def seen(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """Return what came of the page in the browser: opened once, looked at by all tests here."""
+    node, chromium = tools()
     page = tmp_path_factory.mktemp("page") / "report.html"
     page.write_text(page_of(recording()), encoding="utf-8")
     done = subprocess.run([node, str(TOOLS / "test" / "browser.mjs"), chromium, page.as_uri()],
@@ -103,6 +113,39 @@ def seen(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
 
 def test_the_frames_of_the_decoders_tests_are_those_that_python_packs() -> None:
     assert TARGET.read_text(encoding="utf-8") == text(), "make generated"
+
+
+@pytest.mark.slow
+def test_a_served_page_takes_its_token_out_of_the_address_and_says_when_nobody_answers() -> None:
+    pytest.importorskip("uvicorn", reason="the extra view is not installed")
+    node, chromium = tools()
+    server = [sys.executable, "-m", "p2os", "view", str(CAPTURE), "--no-browser"]
+    with (
+        subprocess.Popen(server, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as serving,
+        subprocess.Popen([node, str(TOOLS / "test" / "served.mjs"), chromium, _address(serving)], stdin=subprocess.PIPE,
+                         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as browser,
+    ):  # fmt: skip
+        assert browser.stdout is not None
+        line = browser.stdout.readline()
+        serving.send_signal(signal.SIGINT)
+        rest, errors = browser.communicate("ended\n", timeout=30)
+        assert browser.returncode == 0, errors[-3000:]
+    found = json.loads(line)
+    assert "token" not in found["address"]
+    assert found["title"] == found["afterReload"] == json.loads(rest)["title"]
+    assert {urlsplit(url).path.split("/")[-1] for url in found["requests"]} <= {"", "page.js", "page.css"}
+    assert found["errors"] == []
+    assert found["askedAtRest"] == 0
+    assert found["asked"]
+    assert "token" in found["stranger"]
+    assert "trying again" in json.loads(rest)["trouble"]
+
+
+def _address(serving: subprocess.Popen[str]) -> str:
+    assert serving.stdout is not None
+    line = serving.stdout.readline()
+    assert line.startswith("page: "), line
+    return line.removeprefix("page: ").strip()
 
 
 @pytest.mark.slow

@@ -6,6 +6,7 @@ import webbrowser
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -14,6 +15,7 @@ websockets = pytest.importorskip("websockets.sync.client")
 
 from p2os.cli.captures.shown_page import shown  # noqa: E402
 from p2os.cli.main import run as p2os  # noqa: E402
+from p2os.view import targets as view_targets  # noqa: E402
 from p2os.view.header import PageHeader  # noqa: E402
 from p2os.view.live import MOST_WAITING, StillRecording  # noqa: E402
 from p2os.view.recording import ViewRecording  # noqa: E402
@@ -22,9 +24,11 @@ from robot_bench.recording.run_record import read_run  # noqa: E402
 from robot_bench.report.run_page import run_report  # noqa: E402
 from robot_bench.run import run_scenario  # noqa: E402
 from robot_bench.scenario.loading import load_scenario  # noqa: E402
+from robot_bench.shown import targets  # noqa: E402
 from robot_bench.shown.live_run import LiveRun  # noqa: E402
 from robot_bench.shown.targets import run_target, scenario_target  # noqa: E402
 from robot_bench.view.run_recording import recording_of  # noqa: E402
+from simbase.errors import MissingDependencyError  # noqa: E402
 
 SCENARIO = load_scenario("motors").with_options(body="kinematic", duration_s=6.5)
 
@@ -144,3 +148,29 @@ def test_a_browser_is_opened_unless_told_otherwise(monkeypatch: pytest.MonkeyPat
         with shown(StillRecording(ViewRecording(PageHeader(title="x"))), is_opened=is_opened) as page:
             url = page.url
     assert opened == [url]
+
+
+def test_a_scenario_that_is_shown_ends_with_its_report_and_ctrl_c_ends_it(
+    alone: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    target = scenario_target("motors")
+    assert target is not None
+    assert target.run is not None
+    done = SimpleNamespace(folder=alone, was_interrupted=False)
+    monkeypatch.setattr(targets, "run_scenario", lambda *_args, **_more: done)
+    target.run()
+    target.source.update()
+    assert target.source.recording.header.verdict == run_report(read_run(alone)).header.verdict != ""
+    done.was_interrupted = True
+    with pytest.raises(KeyboardInterrupt):
+        target.run()
+
+
+def test_what_the_server_needs_is_named_where_it_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing(_point: object) -> object:
+        raise ModuleNotFoundError("no", name="uvicorn")
+
+    monkeypatch.setattr(view_targets, "loaded", missing)
+    with pytest.raises(MissingDependencyError, match="the page needs uvicorn"):
+        view_targets.served(StillRecording(ViewRecording(PageHeader(title="x"))), "127.0.0.1", 0)

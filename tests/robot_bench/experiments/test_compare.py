@@ -25,6 +25,7 @@ from robot_bench.experiments.drive_files import read_drive, read_tum, write_tum
 from robot_bench.experiments.parting import motion_parts_s, origin, parts
 from robot_bench.experiments.trajectory_errors import Statistics, absolute_errors, relative_errors
 from simbase.errors import FileError, UsageError
+from tests.p2os.view.pages import ReadPage
 
 P2DX = load_parameters("p2dx")
 
@@ -226,7 +227,11 @@ def test_two_thresholds_part_at_the_sensor_that_sees_farther(runs: Path, p2os, c
     assert all(len(line) <= 80 for line in out.splitlines())
     assert "it came from: sensor 4 (sensor) at 13.9" in out
     assert Path("c.png").read_bytes()[:4] == b"\x89PNG"
-    assert "data:image/png" in Path("c.html").read_text(encoding="utf-8")
+    page = ReadPage(Path("c.html").read_text(encoding="utf-8"))
+    assert len(page.rows("near pose")) == len(page.rows("far pose")) == len(page.rows("apart")) > 2
+    assert [row[3] for row in page.rows("events")] == ["parts"]
+    assert "APE, m" in page.section("How far they are apart")["blocks"][0]["text"]
+    assert [robot["name"] for robot in page.header["robots"]] == ["near", "far"]
     first, second = read_tum(Path("c-a.tum")), read_tum(Path("c-b.tum"))
     assert p2os("compare", runs / "near", runs / "far", "--json") == 0
     found = json.loads(capsys.readouterr().out)

@@ -2,16 +2,29 @@
 
 import json
 from pathlib import Path
+from typing import cast
 
 import pytest
 
+from p2os.view.header import PageHeader
+from p2os.view.page import page_of
 from robot_bench.events.codec import TraceError
+from robot_bench.events.kinds import Note, WorldChange
 from robot_bench.recording.run_record import read_run
 from robot_bench.recording.signals import grouped, motor_steps
-from robot_bench.recording.summary import cells_entered, distance_m, figures, verdict
+from robot_bench.recording.summary import (
+    cells_entered,
+    distance_m,
+    figures,
+    outcome_of,
+    outcome_of_all,
+    verdict,
+)
 from robot_bench.report import make_report
 from robot_bench.report.make import Files, make_artefacts
+from robot_bench.report.page_of_all import report_of_all
 from robot_bench.report.run_page import render_run
+from robot_bench.view.run_recording import recording_of_all
 from tests.p2os.view.pages import ReadPage
 
 
@@ -140,6 +153,30 @@ def test_the_page_holds_the_rows_of_the_trace(run: Path) -> None:
     assert [row[1] for row in page.rows("1 m")] == [0, 1]
     assert page.header["left_out"] == []
     assert [thing["name"] for thing in page.header["world"]["things"]] == ["north", "post"]
+
+
+def test_robots_are_no_things_of_one_another_and_their_events_are_one_list(run: Path) -> None:
+    records = {name: read_run(run) for name in "ab"}
+    for name, other, t in (("a", "b", 90), ("b", "a", 80)):
+        records[name].changes.append(WorldChange(t=95, op="place", name=other, fields={"x": 1.0, "y": 1.0}))
+        records[name].events = [Note(t=t, who="adapter", what="booted")]
+    page = ReadPage(page_of(recording_of_all(records, PageHeader(title="both"))))
+    assert {one["name"] for one in page.header["world"]["things"]} == {"north", "post"}
+    assert [(row[0], row[2]) for row in page.rows("events")] == [(80, "b adapter"), (90, "a adapter")]
+    assert page.rows("a pose") == page.rows("b pose") != []
+    assert [one["name"] for one in page.header["robots"]] == ["a", "b"]
+
+
+def test_the_page_of_several_says_of_each_line_how_it_came_out(run: Path) -> None:
+    records = {name: read_run(run) for name in "ab"}
+    outcome = outcome_of_all("x", {name: outcome_of(record) for name, record in records.items()})
+    robots = cast("dict[str, dict[str, object]]", outcome["robots"])
+    robots["a"] |= {"failures": ["hits"], "goals_not_judged": ["far"], "passed": False}
+    rows = report_of_all(outcome, records).header.sections[0].blocks[0].rows  # type: ignore[union-attr]  # a table
+    assert [(row[-1].text, row[-1].standing) for row in rows] == [
+        ("hits", "failed"), ("far", "open"), ("passed", "passed"),
+    ]  # fmt: skip
+    assert [row[0].href for row in rows] == ["a/report.html", "", "b/report.html"]
 
 
 def test_a_trace_cut_at_any_byte_still_has_its_report(run: Path) -> None:

@@ -16,6 +16,7 @@ from robot_bench.recording.run_record import read_events
 from robot_bench.recording.together import named_events, robots_in
 from robot_bench.report import make
 from robot_bench.scenario.loading import read_scenario
+from robot_bench.shown.targets import run_target
 from simbase.errors import UsageError
 from tests.p2os.view.pages import ReadPage
 from tests.robot_bench.firmware import thumb
@@ -261,9 +262,14 @@ def test_a_run_has_a_folder_for_each_robot_and_says_of_whom_it_speaks(
     links = [row[0]["href"] for row in page.section("Robots")["blocks"][0]["rows"]]
     assert links == ["a/report.html", "b/report.html"]
     assert all(Path("there", link).is_file() for link in links)
+    cells = [row[-1] for row in page.section("Robots")["blocks"][0]["rows"]]
+    assert [cell["standing"] for cell in cells] == ["passed", "failed"]
     assert len(page.rows("a pose")) == len(page.rows("b pose")) == 5
     missed = [(row[2], row[4]) for row in page.rows("events") if row[3] == "goal missed"]
     assert [(who, words.partition(":")[0]) for who, words in missed] == [("b goals", "drives at least 1 m")]
+    target = run_target("there")
+    assert target is not None
+    assert target.source.recording.header.verdict == page.header["verdict"] == "failed"
     summary = Path("there/summary.json").read_bytes()
     monkeypatch.setattr(make, "_plots", lambda: None)  # no plot is looked at
     Path("there/summary.json").unlink()

@@ -51,6 +51,14 @@ describe("a frame", () => {
     expect(() => frameAt(all, start)).toThrow(/not there/);
   });
 
+  it("is refused with a size that is none", () => {
+    for (const by of [-8, -1, 1, 4]) {
+      const all = bytes(), head = new DataView(all);
+      head.setUint32(24, head.getUint32(24, true) + by, true);
+      expect(() => frameAt(all, 0)).toThrow(FrameError);
+    }
+  });
+
   it("of a kind that a package added is passed over", () => {
     const all = bytes();
     new DataView(all).setUint8(5, 64);
@@ -88,6 +96,16 @@ describe("rows of a live run", () => {
     expect(plain(first, "text")).toEqual(plain(text, "text"));
     lane.add({ ...text, replaces: true, to: 7 });
     expect(lane.best(0, 7)!.to).toBe(7);
+  });
+
+  it("of the moment that it ended with are added once", () => {
+    const levels = frames.find((frame) => frame.kind === "levels")!, of = (t: number[]): Frame => {
+      const level = Uint32Array.from(t.keys());
+      return { ...levels, replaces: false, count: t.length, t: Float64Array.from(t), columns: new Map<string, Column>([["t_ns", Float64Array.from(t)], ["level", level], ["edges", level]]) };
+    };
+    expect(Array.from(joined(of([1, 5]), of([5, 5, 6])).t)).toEqual([1, 5, 5, 6]);
+    expect(Array.from(joined(of([1, 5, 5]), of([5, 5, 6])).t)).toEqual([1, 5, 5, 6]);
+    expect(plain(joined(of([1, 5]), of([5, 5, 6])), "level")).toEqual([0, 1, 1, 2]);
   });
 
   it("are asked for anew when they are too many", () => {

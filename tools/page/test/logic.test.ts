@@ -19,6 +19,10 @@ describe("a wire's line", () => {
     expect(pieces(square, scale(12, 18))).toEqual([{ x0: 0, x1: 100, value: 1 }]);
   });
 
+  it("begins where its first row is", () => {
+    expect(pieces(levels([[50, 1]], { to: 100 }), scale(0, 100))).toEqual([{ x0: 50, x1: 100, value: 1 }]);
+  });
+
   it("is a block where more changes than a pixel shows, with at most some pieces a pixel", () => {
     const many = levels(Array.from({ length: 100_000 }, (_, n) => [n, n % 2] as const), { to: 100_000 }), found = pieces(many, scale(0, 100_000));
     expect(found.length).toBeLessThan(300);
@@ -81,10 +85,24 @@ describe("search", () => {
   });
 });
 
+describe("search in a long run", () => {
+  it.each([[0, 1], [100_000, -1]] as const)("from %i by %i finds the one edge that there is", async (t, way) => {
+    for (const edge of [501, 2001, 33_333, 77_777]) {
+      const run = store([channel(0, "levels")], 100_000, { ask: ({ from_ns, to_ns }, answered) => {
+        run.receive([levels([[0, 0], [edge, 1]].filter(([at]) => at === 0 || (at! >= from_ns && at! <= to_ns)) as [number, number][], { from: from_ns, to: to_ns })]);
+        answered(true);
+      } });
+      run.receive([levels([[0, 0]], { from: 0, to: 100_000, isReduced: true, of: 500_000 }, [9])]);
+      expect(await find(run, 0, t, way, { what: "rising" })).toBe(edge);
+    }
+  });
+});
+
 describe("a pulse", () => {
   it("is measured with its period", () => {
     const wire = levels([[0, 0], [10, 1], [25, 0], [40, 1]], { to: 100 });
     expect(pulseAt(wire, 12, 100)).toEqual({ from: 10, to: 25, value: 1, period: 30 });
+    expect(pulseAt(wire, 30, 100)).toEqual({ from: 25, to: 40, value: 0, period: undefined });
     expect(pulseAt(wire, 50, 90)).toEqual({ from: 40, to: 90, value: 1, period: undefined });
   });
   it("is not known where changes are left out", () => {

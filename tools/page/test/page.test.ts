@@ -52,6 +52,12 @@ describe("a plot", () => {
     expect(points(rows, line, 50, 150, 100).map((column) => Array.from(column))).toEqual([[5e-8, 1e-7, 1.5e-7], [10, 20, 10]]);
     expect(points(rows, { ...line, isStepped: true }, 50, 150, 100)[1]).toEqual(Float64Array.of(0, 20, 20));
   });
+  it("has no time twice", () => {
+    for (const [from, to] of [[0, 100], [0, 200], [100, 200], [50, 100], [0, 300]] as const) for (const isStepped of [true, false]) {
+      const [xs] = points(samples([[0, 0], [100, 10], [200, 0]]), { ...line, isStepped }, from, to, 100);
+      expect([...new Set(xs)]).toEqual(Array.from(xs));
+    }
+  });
   it("between two rows far apart is a line from edge to edge", () => {
     const [xs, ys] = points(samples([[0, 0], [1e12, 1e12]]), line, 5e11, 5e11 + 4000, 100);
     expect(Array.from(xs)).toEqual([500, 500.000004]);
@@ -104,6 +110,7 @@ describe("the plan", () => {
     const at = placeAt(path, 50)!;
     expect(at.x).toBeCloseTo(0.5);
     expect(Math.abs(turn(Math.PI, at.heading))).toBeLessThan(1e-6);
+    expect([turn(-3, 3), turn(3, -3), turn(0, 1)]).toEqual([expect.closeTo(6 - 2 * Math.PI, 9), expect.closeTo(2 * Math.PI - 6, 9), 1]);
     expect(placeAt(path, -10)!.x).toBe(0);
     expect(placeAt(path, 500)!.x).toBe(1);
   });

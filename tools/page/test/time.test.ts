@@ -1,5 +1,6 @@
 // Time: the window, cursors and playing; ticks and words.
 import { describe, expect, it } from "vitest";
+import { firstFrom, lastAt } from "../src/data/search";
 import { Clock, LEAST_SPAN_NS } from "../src/time/clock";
 import { decimals, duration, frequency, moment, roundStep, tickBase, tickLabel, ticks } from "../src/time/format";
 
@@ -69,12 +70,28 @@ describe("the clock", () => {
     expect(time.now.value).toBe(2000);
   });
 
+  it("shows all of a run that grows while all is looked at", () => {
+    const time = clock();
+    time.setRun(0, 2000);
+    expect([time.now.value, time.from.value, time.to.value]).toEqual([0, 0, 2000]);
+    time.look(0, 500);
+    time.setRun(0, 3000);
+    expect(time.to.value).toBe(500);
+  });
+
   it("has speeds in steps", () => {
     const time = clock();
     time.faster(1);
     expect(time.rate.value).toBe(2);
     for (let n = 0; n < 20; n++) time.faster(-1);
     expect(time.rate.value).toBe(0.01);
+  });
+});
+
+describe("places in times", () => {
+  it("are at and behind a time", () => {
+    const times = Float64Array.of(1, 5, 5, 9);
+    expect([0, 1, 5, 9, 10].map((t) => [lastAt(times, t), firstFrom(times, t)])).toEqual([[-1, 0], [0, 0], [2, 1], [3, 3], [3, 4]]);
   });
 });
 
@@ -99,6 +116,8 @@ describe("words of time", () => {
   it("fine ticks count from a round moment", () => {
     const base = tickBase(43187000123, 500);
     expect(base).toBe(43187000000);
+    expect(tickBase(43187000123, 5000)).toBe(43185000000);
+    expect(tickBase(43187000123, 1e6)).toBe(0);
     expect(tickLabel(43187000500, 500, base)).toBe("+500 ns");
     expect(tickLabel(2e9, 5e8, 0)).toBe("2.0 s");
   });

@@ -14,6 +14,8 @@ export interface Dock {
 
 export function mountDock(app: App, host: HTMLElement, layout: Layout): Dock {
   const kinds = new Map(VIEWS.filter((view) => view.has(app.store)).map((view) => [view.id, view])), columns = pruned(layout, (view) => kinds.has(view));
+  const begins: (() => void)[] = [];
+  let isLaid = false; // while panels are put in, each is in front for a moment
   const api = createDockview(host, {
     theme: THEME, disableFloatingGroups: true, scrollbars: "native",
     defaultTabComponent: "title",
@@ -25,7 +27,16 @@ export function mountDock(app: App, host: HTMLElement, layout: Layout): Dock {
       const element = document.createElement("div");
       element.className = `view view-${name}`;
       let end: (() => void) | undefined;
-      return { element, init: () => { end = kinds.get(name)?.mount(app, element); }, dispose: () => end?.() };
+      return {
+        element,
+        // A view begins when it is seen for the first time: 3D loads its script then.
+        init: ({ api: panel }) => {
+          const begin = () => { if (isLaid && panel.isVisible) end ??= kinds.get(name)?.mount(app, element); };
+          panel.onDidVisibilityChange(begin);
+          begins.push(begin);
+        },
+        dispose: () => end?.(),
+      };
     },
   });
   // Every view stays: what were closed had no way back.
@@ -48,6 +59,8 @@ export function mountDock(app: App, host: HTMLElement, layout: Layout): Dock {
     for (const group of column.groups) api.getPanel(group.views[0]!)?.api.setActive();
   }
   api.getPanel(columns[0]?.groups[0]?.views[0] ?? "")?.api.setActive();
+  isLaid = true;
+  for (const begin of begins) begin();
   return {
     show: (view) => api.getPanel(view)?.api.setActive(),
     dispose: () => api.dispose(),

@@ -36,8 +36,8 @@ export const LAYOUTS: readonly Layout[] = [
   {
     id: "lab", title: "Robot lab",
     columns: [
-      { share: 0.6, groups: [{ share: 0.6, views: ["scene", "plan"] }, { share: 0.4, views: ["packets", "consoles"] }] },
-      { share: 0.4, groups: [{ share: 0.5, views: ["plots", "logic"] }, { share: 0.5, views: ["events", "states", "goals", "report"] }] },
+      { share: 0.6, groups: [{ share: 0.6, views: ["scene"] }, { share: 0.4, views: ["packets", "consoles"] }] },
+      { share: 0.4, groups: [{ share: 0.4, views: ["plan"] }, { share: 0.3, views: ["plots", "logic"] }, { share: 0.3, views: ["events", "states", "goals", "report"] }] },
     ],
   },
 ];

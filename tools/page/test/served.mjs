@@ -1,0 +1,32 @@
+// Opens a served page in Chromium, and says as JSON what came of it. Usage: node served.mjs CHROMIUM ADDRESS-WITH-TOKEN; a line on stdin: the server has ended.
+import { chromium } from "playwright-core";
+
+const [executablePath, url] = process.argv.slice(2);
+const browser = await chromium.launch({ executablePath, args: ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking"] });
+const found = { errors: [], requests: [], asked: [] };
+const page = await browser.newPage({ viewport: { width: 1400, height: 900 } });
+page.on("console", (message) => { if (message.type() === "error") found.errors.push(message.text()); });
+page.on("pageerror", (error) => found.errors.push(error.message));
+page.on("request", (request) => found.requests.push(request.url()));
+page.on("websocket", (socket) => socket.on("framesent", ({ payload }) => found.asked.push(JSON.parse(String(payload)))));
+await page.goto(url);
+await page.waitForFunction(() => window.p2osPage?.app.store.version.value > 0);
+await page.waitForTimeout(400);
+found.address = await page.evaluate(() => location.href);
+found.title = await page.locator("h1").textContent();
+const settled = found.asked.length;
+await page.waitForTimeout(600);
+found.askedAtRest = found.asked.length - settled;
+await page.reload();
+await page.waitForFunction(() => window.p2osPage?.app.store.version.value > 0);
+found.afterReload = await page.locator("h1").textContent();
+const stranger = await (await browser.newContext()).newPage();
+await stranger.goto(url.split("#")[0]);
+await stranger.waitForFunction(() => !document.querySelector(".waiting")?.textContent.startsWith("Waiting"), undefined, { timeout: 8000 });
+found.stranger = await stranger.locator("body").textContent();
+found.errors = found.errors.slice(0, 5);
+console.log(JSON.stringify(found));
+await new Promise((resolve) => process.stdin.once("data", resolve));
+await page.waitForFunction(() => window.p2osPage.app.store.trouble.value !== "", undefined, { timeout: 8000 });
+console.log(JSON.stringify({ trouble: await page.locator(".trouble").textContent(), title: await page.locator("h1").textContent() }));
+await browser.close();
