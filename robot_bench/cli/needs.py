@@ -18,6 +18,7 @@ NEEDS = (
         point="ros",
         points=("robot_bench.networks", "robot_bench.bags", "robot_bench.drive_readers"),
     ),
+    Need(name="board test", kind="plug-in", feature="board", points=("p2os.verbs",), point="board"),
     Need(
         name="studies",
         kind="plug-in",
