@@ -133,6 +133,15 @@ def test_what_was_heard_before_a_question_answers_none(image, place: RowPlace) -
         Dialogue(image=image(ANSWERS), steps=steps).run(place)
 
 
+def test_what_came_before_something_is_said_is_no_answer_to_it(image, place: RowPlace) -> None:
+    steps = (
+        Exchange(pause="1 ms", say=b"ab", hear=rb"b"),
+        Exchange(pause="1 ms", say=b"x", hear=rb"c", within="50 ms"),
+    )
+    with pytest.raises(RowError, match="no b'c' to b'x' within 50 ms; it said b'y'"):
+        Dialogue(image=image(ANSWERS), steps=steps).run(place)
+
+
 def test_a_dialogue_with_a_program_that_dies_says_of_what(image, place: RowPlace) -> None:
     with pytest.raises(RowError, match="UsageFault: undefined instruction"):
         Dialogue(image=image("udf"), steps=(Exchange(hear=rb"x", within="1 h"),)).run(place)

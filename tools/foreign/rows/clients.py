@@ -94,7 +94,7 @@ def _aria(program: str) -> Row:
     return Row(
         name=f"aria-{program}", kind=ProgramKind.CLIENT, source=ARIA,
         program=f"its {program}, as its Makefile makes it",
-        said=f"{does}{f', and prints {shows!r}' if shows else ''}",
+        said=f"{does}{f', and prints {shows}' if shows else ''}",
         judge=Drives(
             program=f"aria/source/*/{program}",
             commands=(("{program}", "-rh", "{host}", "-rrtp", "{port}", *_ARIA_WORDS.get(program, ())),),
