@@ -78,7 +78,7 @@ AHEAD = f"""\
 [[draw]]                # goals that the program then cannot meet say so: excused_by
 name = "{IN_THE_WAY}"
 kind = "box"
-count = [0, 0, 0, 0, 1]
+count = [0, 0, 0, 0, 0, 0, 0, 0, 0, 1]
 ahead_m = {{ from = 0.45, to = 0.75 }}
 aside_m = {{ from = -0.02, to = 0.02 }}
 length_m = 0.2

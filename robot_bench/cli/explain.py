@@ -10,7 +10,6 @@ import typer
 
 from bluepill_sim.errors import BluePillError
 from p2os.cli.groups import BENCH
-from p2os.cli.trust import Trusted, said
 from p2os.transport.wall_clock import wall_clock
 from robot_bench.campaign.campaign_file import RunLimits
 from robot_bench.campaign.journal import NAME as JOURNAL
@@ -81,13 +80,12 @@ def explain(
     minutes: Annotated[
         float, typer.Option(help="Of a campaign's folder: so long changes are tried.", min=0.1, metavar="MINUTES")
     ] = 10.0,
-    trust: Trusted = False,
     json_output: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Explain a run."""
     if (run / JOURNAL).is_file():
         other = None if against is None else Other.read(_reference(against))
-        found_line = _line_of_campaign(run, other, minutes, said(trust))
+        found_line = _line_of_campaign(run, other, minutes)
         typer.echo(json.dumps(asdict(found_line), sort_keys=True) if json_output else found_line.text)
         raise typer.Exit(0 if found_line.line else 1)
     names = robots_in(run)
@@ -113,9 +111,9 @@ def explain(
         raise typer.Exit(1)
 
 
-def _line_of_campaign(folder: Path, other: Other | None, minutes: float, trust: bool | Trust) -> FaultLine:
+def _line_of_campaign(folder: Path, other: Other | None, minutes: float) -> FaultLine:
     """Return the source line that makes a point of a campaign fail, or that it is not known."""
-    failing, passing = failing_and_passing(points_of(folder, trust=trust))
+    failing, passing = failing_and_passing(points_of(folder, trust=False))
     if other is not None:
         return by_version(failing, other)
     until = wall_clock() + round(minutes * 60 * NS_PER_S)
@@ -138,7 +136,7 @@ def _with_line(found: Explanation, run: Path, firmware: Path | None, reference: 
     if found.standing is Standing.NOTHING or not run.is_dir():
         return found
     try:
-        line = by_version(trial_of_run(run, firmware), Other.read(reference))
+        line = by_version(trial_of_run(run, firmware, trust=False), Other.read(reference))
     except (P2osError, BluePillError) as error:
         return replace(found, limits=(*found.limits, f"the line by which {reference.name} differs: {error}"))
     if not line.line:

@@ -91,7 +91,9 @@ def campaign(
     minutes: Annotated[
         float | None, typer.Option(help="Of the clock, in place of the file's.", metavar="MINUTES", min=0.1)
     ] = None,
-    url: Annotated[str, typer.Option(help="Of a comment's pictures: what stands before their path.")] = "",
+    url: Annotated[
+        str, typer.Option(help="Of a comment's pictures: what stands before their path.", metavar="URL")
+    ] = "",
     out: Annotated[
         Path | None, typer.Option(help="Folder; default campaigns/NAME-NNN, or NAME-campaign.toml.", metavar="PATH")
     ] = None,
