@@ -48,7 +48,7 @@ def test_hostile_texts_are_texts(text: str) -> None:
     assert frame.columns[2] == [said]
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(st.text(max_size=30))
 def test_no_text_changes_the_elements_of_the_page(text: str) -> None:
     assert elements(page_of(recording(text))) == PLAIN

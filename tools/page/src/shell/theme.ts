@@ -3,7 +3,7 @@ import { computed, signal } from "@preact/signals";
 import { reads } from "../time/reads";
 
 const NAMES = [
-  "paper", "panel", "ink", "faint", "line", "left", "right", "wall", "box", "floor", "path", "good", "bad", "warn", "sonar", "near", "wire", "analog", "decoded", "cursor-a", "cursor-b",
+  "paper", "panel", "ink", "faint", "line", "left", "right", "wall", "box", "floor", "path", "good", "bad", "warn", "sonar", "near", "decoded", "cursor-a", "cursor-b",
 ] as const;
 export type ColourName = (typeof NAMES)[number];
 export type Theme = Readonly<Record<ColourName, string>> & { readonly isDark: boolean };

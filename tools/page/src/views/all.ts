@@ -11,4 +11,4 @@ import { report } from "./report/view";
 import { scene } from "./scene/view";
 import { states } from "./states";
 
-export const VIEWS: readonly ViewKind[] = [plan, logic, plots, packets, consoles, events, goals, states, scene, report];
+export const VIEWS: readonly ViewKind[] = [plan, report, logic, plots, packets, consoles, events, goals, states, scene];
