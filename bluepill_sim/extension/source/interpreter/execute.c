@@ -108,7 +108,7 @@ static __attribute__((noinline)) const struct op *rest(struct interpreter *s, co
                                                        const void *const *handlers)
 {
     uint32_t count = 0;
-    while (op[count + 1].pc == op->pc && op + count + 1 < block->ops + block->count) {
+    while (op + count + 1 < block->ops + block->count && op[count + 1].pc == op->pc) {
         s->tail[count] = op[count + 1];
         ++count;
     }
