@@ -123,7 +123,7 @@ class Engine(Stateful):
         "shared",  # its fields are the processor's
         "it_state", "block", "stop_at", "_run_from", "_halt", "_failure", "_frozen", "_table",
         # What a run or a block has for itself alone.
-        "_is_stepping", "_lets_writes_through", "_raised_by", "_spoiled",
+        "_is_stepping", "_lets_writes_through", "_raised_by", "_spoiled", "_ways",
         # Where things are.
         "_read_only", "flash_patch", "_views", "_has_views", "_waits_for_views",
         # Whom it calls, and what it is made of.

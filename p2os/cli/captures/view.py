@@ -10,7 +10,7 @@ from p2os.cli.quantities import option
 from p2os.view.targets import target_of
 from simbase.units import PORT
 
-HELP = """Look at a run, a capture, a scenario or a robot on a page in the browser.
+HELP = """Look at a run, capture, scenario or robot in the browser.
 
 TARGET is a run folder, a capture (pcap, a recording, hex), a scenario, which is
 then run at the pace of the clock, or the URL of a robot, which is watched and not

@@ -276,7 +276,8 @@ def test_the_emulated_bluepill_drives_a_served_robot(
     record = read_run(tmp_path / "run")
     assert code == 0, outcome["failures"]
     assert outcome["goals_met"] == ["prints 'dodge: CRUISE'"], "the others are about a minute"
-    assert len(outcome["goals_not_judged"]) == 2, "2.7 s are too short for what dodge is to drive in 120 s"
+    others = len(load_scenario("dodge").goals) - 2  # but for the one that is met, and contacts, which nobody sees here
+    assert len(outcome["goals_not_judged"]) == others, "2.7 s are too short for what dodge is to do in 120 s"
     assert (outcome["mode"], outcome["body"], outcome["seed"]) == ("port", "remote", None)
     assert outcome["min_clearance_m"] is None
     assert outcome["collisions"] is None

@@ -161,6 +161,7 @@ static struct row *rest_of(struct row *whole, uint32_t address)
         *row = (struct row){.start = address, .end = whole->end, .plain_start = NOWHERE, .flags = whole->flags, .count = count,
                             .costs = {whole->costs[0] - first->cycle, whole->costs[1] - first->cycle},
                             .passed = {NEVER, NEVER}, .span = whole->span - first->cycle, .whole = whole,
+                            .ways = whole->ways,
                             .next = whole->rests};
         memcpy(row->instructions, first, count * sizeof *first);
         for (uint32_t n = 0; n < count; ++n) {
@@ -418,7 +419,7 @@ void core_on_known_block(void *interpreter, uint64_t at, uint32_t size, void *us
     }
     struct row *row = core->block;
     if (row->plain_start == (uint32_t)at) {
-        interpreter_know(interpreter, row, row->passed[0], row->passed[1], core->is_exact ? row->span : 0);
+        interpreter_know(interpreter, row, row->passed[0], row->passed[1], core->is_exact ? row->span : 0, row->ways);
     }
     if (core->is_exact && row != &core->none) {
         cut(core);

@@ -220,8 +220,8 @@ struct block *interpreter_part(struct interpreter *s, const struct block *whole,
 }
 
 /* The owner says of the block whose hook runs that it takes no attention, and what its ways out and its last instruction
- * cost (`span`: 0 where a block once begun is run to its end). */
-void interpreter_know(struct interpreter *s, void *row, uint64_t straight, uint64_t taken, uint64_t span)
+ * cost (`span`: 0 where a block once begun is run to its end), and where ways that were gone are noted. */
+void interpreter_know(struct interpreter *s, void *row, uint64_t straight, uint64_t taken, uint64_t span, uint8_t *ways)
 {
     struct block *block = s->entering;
     if (block != NULL && !is_other(block)) {
@@ -229,6 +229,7 @@ void interpreter_know(struct interpreter *s, void *row, uint64_t straight, uint6
         block->costs[0] = straight;
         block->costs[1] = taken;
         block->span = span;
+        block->ways = ways;
     }
 }
 

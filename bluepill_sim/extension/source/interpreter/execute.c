@@ -79,6 +79,7 @@ static inline __attribute__((always_inline)) bool passes(struct shared *shared, 
         return false;
     }
     shared->cycle = cycle;
+    *from->ways |= (uint8_t)(1u << (to->start != from->end));
     *row = to->row;
     shared->last[shared->logged++ % LAST_ROWS] = (struct record){cycle, to->start, 0};
     return true;

@@ -59,6 +59,7 @@ struct block {
     /* What the owner knows it by where it takes no attention, and what its ways out cost. */
     void *row;
     uint64_t costs[2], span; /* and in more cycles than these a stop comes behind it */
+    uint8_t *ways;           /* where it notes which of them were ever gone, a bit each */
     struct block *next;      /* of all, or of dropped ones */
     struct block *odd;       /* of those that no table has */
     uint8_t *code;           /* of writable memory: what it was decoded from */
@@ -174,7 +175,7 @@ void interpreter_mrs(struct interpreter *s, const struct op *op);
 void interpreter_msr(struct interpreter *s, const struct op *op);
 void interpreter_cps(struct interpreter *s, const struct op *op);
 /* For the owner in this library: blocks.c, run.c. */
-void interpreter_know(struct interpreter *s, void *row, uint64_t straight, uint64_t taken, uint64_t span);
+void interpreter_know(struct interpreter *s, void *row, uint64_t straight, uint64_t taken, uint64_t span, uint8_t *ways);
 void interpreter_forget_rows(struct interpreter *s);
 void interpreter_set_clock(struct interpreter *s, const struct clock *clock);
 void interpreter_set_noted(struct interpreter *s, uint32_t *noted);

@@ -65,6 +65,17 @@ def live(board: BluePill, steps: list[tuple[int, str, bool, bytes]]) -> list[lis
     return states
 
 
+@pytest.mark.parametrize("program", ["dodge", "unoptimised"])
+def test_the_ways_that_blocks_were_left_by_are_those_of_unicorn(make: MakeBoard, program: str) -> None:
+    """Also where the interpreter goes from block to block by itself, and where a block was cut."""
+    boards = {core: make(program, core) for core in CORES}
+    for board in boards.values():
+        live(board, story(3, 30))
+    found = {core: board.gone_ways for core, board in boards.items()}
+    assert found["own"] == found["native"]
+    assert {elsewhere for _, elsewhere in found["own"]} == {False, True}
+
+
 @pytest.mark.parametrize("program", [*PROGRAMS])
 @pytest.mark.slow  # 0.5 to 3 s each
 def test_every_slice_ends_in_the_same_state(make: MakeBoard, program: str) -> None:

@@ -253,6 +253,30 @@ def test_blocks_are_as_they_were_where_nothing_is_due(monkeypatch: pytest.Monkey
     assert len(rows["exact"]) > 1000
 
 
+#: The second return goes to where the first has been: nobody is asked about it any more.
+TWICE_TO_ONE_PLACE = """
+movs r4, #0
+mov32 r0, #join+1
+bx r0
+join: adds r4, #1
+cmp r4, #2
+beq stop
+b second
+second: mov32 r0, #join+1
+last: bx r0
+"""
+
+
+def test_a_way_to_a_block_that_is_known_already_is_noted(boot: Boot, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = {}
+    for core in ("native", "own", "exact"):
+        monkeypatch.setenv("P2OS_CORE", core)
+        machine = boot(TWICE_TO_ONE_PLACE).run(60)
+        found[core] = machine.board.gone_ways
+        assert (machine.label("last") + 2, True) in found[core], core
+    assert found["native"] == found["own"] == found["exact"]
+
+
 #: SysTick ticks once, `load` + 1 cycles behind the start S of the last store; SVC's handler begins at S + 1 + 1 + 12.
 CHAINED = (
     """

@@ -14,7 +14,9 @@ from p2os.transport.virtual_clock import VirtualClock
 from simbase.errors import P2osError
 
 #: Options of the verb that are for a console or for several robots, and those that are called otherwise in Python.
-OF_THE_VERB = {"context", "robots", "apart", "fleet", "control", "status_ns", "json_output", "trust"}
+OF_THE_VERB = {
+    "context", "robots", "apart", "fleet", "control", "status_ns", "json_output", "trust", "view", "no_browser",
+}  # fmt: skip
 NAMES = {"port": "url", "fault": "faults", "worlds_folder": "worlds", "sync_limit_ns": "sync_limit_s"}
 
 
