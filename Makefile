@@ -97,7 +97,7 @@ steady: setup
 	@$(BIN)/python -m tests.tools.suite.steady $(STEADY)
 
 # Changes the code in one place at a time and runs the nearest tests: of the lines that differ from a commit (SINCE=main), of files or folders
-# (FILES="p2os/client" COUNT=60 SEED=1), or a sample with its floor (SAMPLE=ci); NOTE=1 adds what survives to tools/mutants/survivors.toml.
+# (FILES="p2os/client" COUNT=60 SEED=1), a sample with its floor (SAMPLE=ci), or faults that were put down (FILES=--planted); NOTE=1 adds what survives to tools/mutants/survivors.toml.
 mutants: setup
 	@$(BIN)/python -m tools.mutants $(FILES) $(if $(SINCE),--since $(SINCE)) $(if $(SAMPLE),--sample $(SAMPLE)) \
 	    $(if $(COUNT),--count $(COUNT)) $(if $(SEED),--seed $(SEED)) $(if $(NOTE),--note)

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -151,6 +152,25 @@ def test_what_is_no_file_of_ours_is_refused(checkout: Path, name: str) -> None:
         changes.files([name])
 
 
+def test_a_fault_that_was_put_down_is_changed_where_it_stands_once(checkout: Path) -> None:
+    row = {"path": "p2os/part.py", "before": "y = 2", "after": "y = 3"}
+    (mutant,) = changes.planted([row])
+    assert (mutant.first_line, mutant.before, mutant.after) == (2, "y = 2", "y = 3")
+    assert mutant.text == b"x = 1\ny = 3\nz = 3\n"
+    for wrong, said in (
+        ({"before": "y = 4"}, "has 'y = 4' 0 times"),
+        ({"before": " = "}, "has ' = ' 3 times"),
+        ({"path": "p2os/nothing.py"}, "no code of a package"),
+    ):
+        with pytest.raises(ChangeError, match=said):
+            changes.planted([row | wrong])
+
+
+def test_every_fault_that_was_put_down_stands_in_its_file() -> None:
+    rows = tomllib.loads((ROOT / "tools/mutants/planted.toml").read_text())["fault"]
+    assert len(changes.planted(rows)) == len(rows) >= 10
+
+
 @pytest.mark.slow  # reads what every file of tests imports
 def test_the_nearest_tests_are_those_of_the_mirror_then_those_that_ran_the_line() -> None:
     by_name = Nearest(ROOT, {})
@@ -296,8 +316,8 @@ def test_an_endless_loop_is_noticed_by_its_time_where_the_sound_program_is_soon_
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ([], "name files, or a commit by --since, or a --sample"),
-        (["p2os", "--since", "HEAD"], "name files, or a commit by --since, or a --sample"),
+        ([], "name files, or a commit by --since, or a --sample, or take what is --planted"),
+        (["p2os", "--since", "HEAD"], "name files, or a commit by --since, or a --sample, or take what is --planted"),
         (["--sample", "none"], "no sample is named none (there are ci, whole)"),
         (["p2os/nothing.py"], "p2os/nothing.py is not there (hint: a path from the project's folder)"),
         (["p2os/client", "--count", "0"], "invalid"),

@@ -3,6 +3,7 @@
     python -m tools.mutants --since main      lines that differ from a commit
     python -m tools.mutants p2os --count 60   60 changes of files, drawn by seed
     python -m tools.mutants --sample ci       one of samples.toml, with its floor
+    python -m tools.mutants --planted         the faults of planted.toml
 
 What was judged is kept in build/mutants; the same words resume a run.
 Exit code 0: all noticed, or the floor met; 1: not; 2: usage; 130: interrupted.
@@ -28,6 +29,7 @@ from tools.mutants.sampling import Court, sample
 
 KEPT = ROOT / "build" / "mutants" / "judged.jsonl"
 SAMPLES = Path(__file__).with_name("samples.toml")
+PLANTED = Path(__file__).with_name("planted.toml")
 
 
 def main() -> int:
@@ -55,6 +57,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("files", nargs="*", metavar="FILE", help="whole files, or all of folders")
     parser.add_argument("--since", metavar="COMMIT", help="the lines that differ from this commit")
     parser.add_argument("--sample", metavar="NAME", help="a sample of samples.toml")
+    parser.add_argument("--planted", action="store_true", help="the faults of planted.toml")
     parser.add_argument("--count", type=_positive, help="how many to draw (default: all)")
     parser.add_argument("--seed", type=int, help="of the draw (default: 1)")
     parser.add_argument("--floor", type=float, help="per cent that are to be noticed (default: all of them)")
@@ -86,10 +89,14 @@ def _judged(parser: argparse.ArgumentParser, options: argparse.Namespace) -> int
         parser.set_defaults(**known[options.sample])
         options = parser.parse_args()
         options.files = options.files or known[options.sample]["files"]
-    if bool(options.files) == (options.since is not None):
-        parser.error("name files, or a commit by --since, or a --sample")
-    lines = changes.since(options.since) if options.since is not None else changes.files(options.files)
-    found = changes.mutants_of(lines)
+    if [bool(options.files), options.since is not None, options.planted].count(True) != 1:
+        parser.error("name files, or a commit by --since, or a --sample, or take what is --planted")
+    if options.planted:
+        found = changes.planted(tomllib.loads(PLANTED.read_text(encoding="utf-8"))["fault"])
+        lines: changes.Lines = changes.files(dict.fromkeys(mutant.path for mutant in found))
+    else:
+        lines = changes.since(options.since) if options.since is not None else changes.files(options.files)
+        found = changes.mutants_of(lines)
     if options.count is not None:
         random.Random(1 if options.seed is None else options.seed).shuffle(found)
     nearest = Nearest(ROOT, counted_lines(ROOT / ".coverage", ROOT))

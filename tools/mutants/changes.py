@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from tools.mutants import c_source, python_source
-from tools.mutants.mutant import SourceMutant
+from tools.mutants.mutant import Edit, SourceMutant, edited
 
 ROOT = Path(__file__).parents[2]
 #: What makes the mutants of a file, by its ending.
@@ -68,6 +68,26 @@ def mutants_of(lines: Lines, root: Path = ROOT) -> list[SourceMutant]:
     for path, wanted in lines.items():
         made = LANGUAGES[Path(path).suffix](path, (root / path).read_bytes())
         found += [each for each in made if wanted is None or wanted & {*range(each.first_line, each.last_line + 1)}]
+    return found
+
+
+def planted(rows: Iterable[Mapping[str, str]]) -> list[SourceMutant]:
+    """Return the mutants that somebody has put down, by what stands once in a file and what stands there instead.
+
+    Raises:
+        ChangeError: A file is not there, or has the place not at all or more than once.
+    """
+    found = []
+    for row in rows:
+        path, before = row["path"], row["before"].encode()
+        if not _can_be_mutated(path):
+            raise ChangeError(f"{path} is no code of a package (hint: a path from the project's folder)")
+        source = (ROOT / path).read_bytes()
+        if (count := source.count(before)) != 1:
+            raise ChangeError(f"{path} has {row['before']!r} {count} times (hint: more of the line)")
+        start = source.index(before)
+        edit = Edit(start=start, end=start + len(before), text=row["after"].encode())
+        found.append(edited(path, source, "planted", [edit]))
     return found
 
 
