@@ -361,6 +361,7 @@ void check_codes() {
   keeper.keep(part, app::CodeKeeper::STANDS_NS - 1);
   claim(store.writes == 0, "wheels that have not stood for a second are not stored");
   keeper.keep(part, app::CodeKeeper::STANDS_NS);
+  claim(store.writes == 1, "and are as soon as they have");
   keeper.keep(part, 2 * app::CodeKeeper::STANDS_NS);
   claim(store.writes == 1, "wheels that stand are stored once");
   part.place_wheels({140'000, 0});

@@ -135,3 +135,8 @@ def test_time_never_runs_back_in_a_channel() -> None:
     for t in (5, 3, 7):
         track.append(t, 0.0)
     assert list(track.times) == [5, 5, 7]
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 3, 7])
+def test_a_list_that_has_room_is_whole(count: int) -> None:
+    assert thinned_list(lambda _: 0, 5, 5 + count, count) == [*range(5, 5 + count)]

@@ -106,6 +106,20 @@ def test_the_crc_counts_before_spi_mode_and_where_it_is_asked_for() -> None:
     assert host.command(13, crc=1) == 8
 
 
+def test_blocks_behind_the_last_one_are_refused_while_several_are_written() -> None:
+    card = SdCard()
+    last = 8 * 1024 * 1024 // BLOCK_BYTES - 1
+    host = Host(card).start()
+    assert host.command(25, last) == 0
+    answers = []
+    for _ in range(2):
+        host.send(0xFC, *BLOCK, 0, 0)
+        answers.append(host.read(1)[0] & 0x1F)
+        host.until(0xFF)
+    assert answers == [0x05, 0x0D]
+    assert [*card.written] == [last]
+
+
 @given(st.integers(0, 16383), st.binary(min_size=BLOCK_BYTES, max_size=BLOCK_BYTES))
 @settings(max_examples=20)
 def test_what_is_written_is_read_back(number: int, data: bytes) -> None:
