@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import time
 import tomllib
 from pathlib import Path
 
@@ -303,6 +304,16 @@ def test_a_mutant_that_tests_look_at_is_noticed_and_another_survives(judge: Judg
     assert (noticed.verdict, noticed.by) == (MutantStatus.NOTICED, "test_far.py::test_far")
     assert judge.judged(of_part("if distance < 10:"), []).verdict is MutantStatus.UNTESTED
     assert {(tmp_path / name / "part.py").read_text() for name in ("root", "copy/tree")} == {PART}
+
+
+@pytest.mark.slow
+def test_what_keeps_more_memory_than_it_may_is_ended(judge: Judge, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert judge.sound("test_spin.py").is_judge
+    monkeypatch.setattr("tools.mutants.judge.MOST_KB", 1)
+    monkeypatch.setattr("tools.mutants.judge.CLOCK_LIMIT_S", 60.0)
+    began = time.monotonic()
+    assert not judge.sound("test_slow.py").is_judge
+    assert time.monotonic() - began < 3.0, "before its time of a processor"
 
 
 @pytest.mark.soak  # the loop keeps a processor busy as long as it may

@@ -12,11 +12,13 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
+from tools.hostile.kernel import memory_kb
 from tools.mutants import python_source
 from tools.mutants.mutant import SourceMutant
 from tools.mutants.natives import Natives
@@ -30,9 +32,11 @@ SOUND_LIMIT_S = LIMIT_S / 2
 START_S = 1.5
 #: The same bound by the clock, for what waits.
 CLOCK_LIMIT_S = 180.0
-#: KiB of memory and blocks of 512 bytes of a file that a mutant may fill: some loop and keep what they make.
-MEMORY_KIB, FILE_BLOCKS = 3 << 20, 1 << 20
-BOUNDED = f'ulimit -S -t "$1"; shift; ulimit -d {MEMORY_KIB}; ulimit -f {FILE_BLOCKS}; exec "$@"'
+#: kB of memory and blocks of 512 bytes of a file that a mutant may fill: some loop and keep what they make.
+MOST_KB, FILE_BLOCKS = 3 << 20, 1 << 20
+#: How often memory is looked at; no limit of the kernel's bounds it, since a sanitizer reserves more than there is.
+LOOK_S = 0.25
+BOUNDED = f'ulimit -S -t "$1"; shift; ulimit -f {FILE_BLOCKS}; exec "$@"'
 PYTEST = (
     sys.executable, "-m", "pytest", "-x", "-n", "0", "-p", "no:cacheprovider", "-p", "tools.mutants.outcome",
     "-m", "not slow and not soak and not hardware", "--hypothesis-profile", "unshrunk", "--tb", "no",
@@ -180,9 +184,7 @@ class Judge:
                 words, cwd=self._tree.folder, env=self._environment(reported), stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
             )  # fmt: skip
-        code: int | None = None
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            code = self._running.wait(CLOCK_LIMIT_S)
+        code = _ended(self._running)
         with self._lock:
             self._kill()
             if self._is_over:
@@ -208,6 +210,15 @@ class Judge:
             "PYTHONPATH": os.pathsep.join(map(str, self._tree.path)), "HOME": folder, "TMPDIR": folder,
             OUTCOME_FILE: str(reported),
         }  # fmt: skip
+
+
+def _ended(running: "subprocess.Popen[bytes]") -> int | None:
+    """Wait for a process; return its exit code, or None where it takes more time or memory than it may."""
+    ends = time.monotonic() + CLOCK_LIMIT_S
+    while time.monotonic() < ends and memory_kb(running.pid) < MOST_KB:
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            return running.wait(LOOK_S)
+    return None
 
 
 def is_mutant(mutant: SourceMutant) -> bool:
