@@ -93,13 +93,12 @@ def serve(p2os: str, *, is_held: bool) -> Iterator[AttackedVerb]:
 
 @contextlib.contextmanager
 def fleet(p2os: str, *, is_held: bool) -> Iterator[AttackedVerb]:
-    """Three robots in one room; the first is watched by a client, all by what is printed."""
+    """Three robots in one room; held: each by a client, of whom the first is looked at."""
     port = free_ports(3)[0]
     words = ("--robots", "3", "--body", "kinematic", "--status", "100ms")
-    with (
-        _program(p2os, "serve", "--port", f"tcp:{HOST}:{port}", *words) as program,
-        _held(port, is_held=is_held) as client,
-    ):
+    with contextlib.ExitStack() as owned:
+        program = owned.enter_context(_program(p2os, "serve", "--port", f"tcp:{HOST}:{port}", *words))
+        client, *_ = [owned.enter_context(_held(each, is_held=is_held)) for each in range(port, port + 3)]
         yield AttackedVerb(program=program, robot=port, client=client, prints_wheels=True)
 
 
