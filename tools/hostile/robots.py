@@ -10,13 +10,12 @@ import select
 import socket
 import struct
 import subprocess
-import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from tools.hostile import packets
-from tools.hostile.watched import HOST, LIMIT_S, RunningVerb, free_ports, listening
+from tools.hostile.watched import HOST, LIMIT_S, RobotProxy, RunningVerb, free_ports
 
 #: Verbs that connect to a robot, with what a user types; each would end by itself in a few seconds.
 CLIENTS = {
@@ -64,28 +63,13 @@ ROBOTS = {
 }  # fmt: skip
 
 
-class HostileRobot:
-    """Takes connections, and passes on what a robot behind says as a row says."""
+class HostileRobot(RobotProxy):
+    """Passes on what a robot behind says as a row says."""
 
     def __init__(self, robot: tuple[str, int], passing: FalseRobot, draw: random.Random) -> None:
-        self._robot, self._passing, self._draw = robot, passing, draw
-        self._listener = listening()
-        self.port = int(self._listener.getsockname()[1])
+        self._passing, self._draw = passing, draw
         self.commands: list[bytes] = []
-        self._is_over = threading.Event()
-        threading.Thread(target=self._serve, daemon=True).start()
-
-    def close(self) -> None:
-        """Let go of all sides."""
-        self._is_over.set()
-        self._listener.close()
-
-    def _serve(self) -> None:
-        with contextlib.suppress(OSError):
-            while not self._is_over.is_set():
-                client = self._listener.accept()[0]
-                with client, contextlib.suppress(OSError), socket.create_connection(self._robot) as robot:
-                    self._carry(client, robot)
+        super().__init__(robot)
 
     def _carry(self, client: socket.socket, robot: socket.socket) -> None:
         passing, reader, left = self._passing, packets.OutsidersReader(), self._passing.cut(self._draw)

@@ -96,14 +96,13 @@ class RunningVerb:
         self._folder.cleanup()
 
 
-class NotedLine:
-    """A line between a verb and a robot, on which every command is noted with its time (seconds, monotonic)."""
+class RobotProxy:
+    """Takes the place of a robot: has each connection carried to one behind, until it is closed."""
 
     def __init__(self, robot: tuple[str, int]) -> None:
         self._robot = robot
         self._listener = listening()
         self.port = int(self._listener.getsockname()[1])
-        self.commands: list[tuple[float, bytes]] = []
         self._is_over = threading.Event()
         threading.Thread(target=self._serve, daemon=True).start()
 
@@ -112,6 +111,25 @@ class NotedLine:
         self._is_over.set()
         self._listener.close()
 
+    def _serve(self) -> None:
+        with contextlib.suppress(OSError):
+            while not self._is_over.is_set():
+                client = self._listener.accept()[0]
+                with client, contextlib.suppress(OSError), socket.create_connection(self._robot) as robot:
+                    self._carry(client, robot)
+
+    def _carry(self, client: socket.socket, robot: socket.socket) -> None:
+        """Carry one connection until it ends."""
+        raise NotImplementedError
+
+
+class NotedLine(RobotProxy):
+    """A line between a verb and a robot, on which every command is noted with its time (seconds, monotonic)."""
+
+    def __init__(self, robot: tuple[str, int]) -> None:
+        self.commands: list[tuple[float, bytes]] = []
+        super().__init__(robot)
+
     def first(self, number: int, after: float) -> float | None:
         """Return when a command first passed after a moment."""
         return next((at for at, each in tuple(self.commands) if each[0] == number and at > after), None)
@@ -119,13 +137,6 @@ class NotedLine:
     def moving(self, after: float = 0.0) -> int:
         """Return how many commands passed since that ask for motion."""
         return sum(at > after and packets.moves(each) for at, each in tuple(self.commands))
-
-    def _serve(self) -> None:
-        with contextlib.suppress(OSError):
-            while not self._is_over.is_set():
-                client = self._listener.accept()[0]
-                with client, contextlib.suppress(OSError), socket.create_connection(self._robot) as robot:
-                    self._carry(client, robot)
 
     def _carry(self, client: socket.socket, robot: socket.socket) -> None:
         reader, other = packets.OutsidersReader(), {client: robot, robot: client}
@@ -215,13 +226,15 @@ class SteadyClient:
             self.say(*words)
 
 
-class Lateness:
-    """How late a thread of this machine wakes at most, meanwhile: what nobody can be blamed for."""
+class BackgroundWatch:
+    """Looks again and again, in a thread of its own, as long as its block lasts."""
+
+    #: Between two looks.
+    EVERY_S = 0.0
 
     def __init__(self) -> None:
-        self.worst_s = 0.0
         self._is_over = threading.Event()
-        self._thread = threading.Thread(target=self._look, daemon=True)
+        self._thread = threading.Thread(target=self._run, daemon=True)
 
     def __enter__(self) -> Self:
         self._thread.start()
@@ -231,40 +244,46 @@ class Lateness:
         self._is_over.set()
         self._thread.join()
 
+    def _run(self) -> None:
+        while True:
+            self._look()
+            if self._is_over.wait(self.EVERY_S):
+                return
+
     def _look(self) -> None:
-        while not self._is_over.is_set():
-            slept = time.monotonic()
-            time.sleep(0.001)
-            self.worst_s = max(self.worst_s, time.monotonic() - slept - 0.001)
+        raise NotImplementedError
 
 
-class KernelWatch:
+class Lateness(BackgroundWatch):
+    """How late a thread of this machine wakes at most, meanwhile: what nobody can be blamed for."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.worst_s = 0.0
+
+    def _look(self) -> None:
+        slept = time.monotonic()
+        time.sleep(0.001)
+        self.worst_s = max(self.worst_s, time.monotonic() - slept - 0.001)
+
+
+class KernelWatch(BackgroundWatch):
     """Which sockets of a program other machines reach at any moment, and the most memory it has, meanwhile."""
 
+    EVERY_S = 0.2
+
     def __init__(self, pid: int) -> None:
+        super().__init__()
         self._pid = pid
         self.reached: set[str] = set()
         self._before_kb = self._most_kb = kernel.memory_kb(pid)
-        self._is_over = threading.Event()
-        self._thread = threading.Thread(target=self._look, daemon=True)
 
     @property
     def grown_kb(self) -> int:
         """How much more memory it had than at first, kB."""
         return self._most_kb - self._before_kb
 
-    def __enter__(self) -> Self:
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_error: object) -> None:
-        self._is_over.set()
-        self._thread.join()
-
     def _look(self) -> None:
-        while True:
-            with contextlib.suppress(OSError):
-                self.reached.update(map(str, kernel.off_loopback(self._pid)))
-                self._most_kb = max(self._most_kb, kernel.memory_kb(self._pid))
-            if self._is_over.wait(0.2):
-                return
+        with contextlib.suppress(OSError):
+            self.reached.update(map(str, kernel.off_loopback(self._pid)))
+            self._most_kb = max(self._most_kb, kernel.memory_kb(self._pid))

@@ -1,25 +1,21 @@
 """A node under a flood of speeds: real processes on loopback; when STOP leaves is read off the line to the robot."""
 
 import contextlib
-import select
 import signal
 import socket
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Self
 
 import pytest
 
 from p2os.pioneer.serve import served_pioneer
 from p2os.protocol.commands import CommandNumber
-from p2os.protocol.frames import sound_frames
 from tests.p2os.client.served_robot import until
 from tests.tools.forked_python import forked_python
+from tools.hostile.watched import Lateness, NotedLine
 
 PEER = Path(__file__).with_name("flood_peer.py")
 DEADMAN_S = 0.5
@@ -31,56 +27,6 @@ RATES_HZ = {"zenoh": 150_000, "dds": 20_000}
 TRIES = 3
 #: Nothing outlives it.
 LONGEST_S = 30.0
-
-
-@dataclass
-class Seen:
-    """Which commands pass on a line to a robot, and when (seconds of `time.monotonic`)."""
-
-    commands: list[tuple[float, int]] = field(default_factory=list)
-
-    def first(self, number: CommandNumber, after: float) -> float | None:
-        return next((at for at, one in tuple(self.commands) if one == number and at > after), None)
-
-    def carry(self, listener: socket.socket, target: tuple[str, int]) -> None:
-        """Join the first client to a robot until one of them goes."""
-        client, robot = listener.accept()[0], socket.create_connection(target)
-        with client, robot, contextlib.suppress(OSError):
-            other = {client: robot, robot: client}
-            for line in other:
-                line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            while True:
-                for line in select.select(list(other), [], [])[0]:
-                    data = line.recv(65536)
-                    if not data:
-                        return
-                    if line is client:
-                        now = time.monotonic()
-                        self.commands += [(now, payload[0]) for payload in sound_frames(data)]
-                    other[line].sendall(data)
-
-
-class Lateness:
-    """How late a thread of this machine wakes at most, meanwhile."""
-
-    def __init__(self) -> None:
-        self.worst_s = 0.0
-        self._is_over = threading.Event()
-        self._thread = threading.Thread(target=self._look, daemon=True)
-
-    def __enter__(self) -> Self:
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_error: object) -> None:
-        self._is_over.set()
-        self._thread.join()
-
-    def _look(self) -> None:
-        while not self._is_over.is_set():
-            slept = time.monotonic()
-            time.sleep(0.001)
-            self.worst_s = max(self.worst_s, time.monotonic() - slept - 0.001)
 
 
 MODULES = {"zenoh": "zenoh", "dds": "cyclonedds"}
@@ -98,19 +44,21 @@ def installed(transport: str) -> None:
 
 
 @contextlib.contextmanager
-def flooded(transport: str, domain: int) -> Iterator[tuple[Seen, "subprocess.Popen[str]", "subprocess.Popen[str]"]]:
+def flooded(
+    transport: str, domain: int
+) -> Iterator[tuple[NotedLine, "subprocess.Popen[str]", "subprocess.Popen[str]"]]:
     """Serve a robot to a node that is flooded, and yield what passes on its line, the node and the flood."""
-    seen, verb = Seen(), "EntryPoint('ros', 'p2os.cli.robots.ros', 'p2os.verbs')"
+    verb = "EntryPoint('ros', 'p2os.cli.robots.ros', 'p2os.verbs')"
     with (
-        socket.create_server(("127.0.0.1", 0)) as listener,
         socket.create_server(("127.0.0.1", 0)) as free,
         served_pioneer(world="room", body="kinematic") as url,
+        contextlib.ExitStack() as held,
     ):
         _, host, port = str(url).split(":")
-        threading.Thread(target=seen.carry, args=(listener, (host, int(port))), daemon=True).start()
+        seen = held.enter_context(contextlib.closing(NotedLine((host, int(port)))))
         where = f"127.0.0.1:{free.getsockname()[1]}" if transport == "zenoh" else f"{domain}"
         free.close()
-        words = ["ros", f"tcp:127.0.0.1:{listener.getsockname()[1]}", "--transport", transport, "--for", "30s"]
+        words = ["ros", f"tcp:127.0.0.1:{seen.port}", "--transport", transport, "--for", "30s"]
         words += ["--router", "--interface", where] if transport == "zenoh" else ["--domain", where]
         code = (
             "from importlib.metadata import EntryPoint; from p2os.cli import main; "
@@ -129,7 +77,7 @@ def flooded(transport: str, domain: int) -> Iterator[tuple[Seen, "subprocess.Pop
                     node.kill()
 
 
-def stopped_after(seen: Seen, act: Callable[[], None]) -> tuple[float, float]:
+def stopped_after(seen: NotedLine, act: Callable[[], None]) -> tuple[float, float]:
     """Do something; return after how long STOP left, and how late this machine was meanwhile; seconds."""
     with Lateness() as lateness:
         began = time.monotonic()
