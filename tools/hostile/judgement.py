@@ -34,9 +34,8 @@ class AttackOutcome:
     faults: list[str]
     #: Nothing was tried: why.
     skipped: str = ""
-    #: How long STOP took, and how late the machine was meanwhile; seconds.
+    #: How long STOP took, seconds.
     stopped_s: float | None = None
-    late_s: float = 0.0
 
 
 def outcomes(
@@ -105,7 +104,7 @@ def _judged(
     if stopped_s is not None and stopped_s > MOST_STOP_S + lateness.worst_s:
         faults.append(f"STOP took {stopped_s * 1000:.0f} ms, this machine was late by {lateness.worst_s * 1000:.0f} ms")
     faults += _ended(target)
-    return AttackOutcome(*row, faults, stopped_s=stopped_s, late_s=lateness.worst_s)
+    return AttackOutcome(*row, faults, stopped_s=stopped_s)
 
 
 def _stopped(target: AttackedVerb, faults: list[str]) -> float | None:
