@@ -138,6 +138,15 @@ def load_changes(
     return tuple(changes)
 
 
+def placed_things(changes: Sequence[ScriptedChange]) -> list[Obstacle]:
+    """Return the things that are placed in the world, where each begins; not those placed before the robot's sonar."""
+    return [
+        replace(change.obstacle, x_m=change.x_m, y_m=change.y_m, heading_rad=change.heading_rad)
+        for change in changes
+        if change.obstacle is not None and change.before is None
+    ]
+
+
 class WorldScript(Timeline[ScriptedChange]):
     """Applies changes at their times.
 

@@ -7,7 +7,7 @@ Invariant: what is drawn depends on the world alone, so that pictures can be com
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from html import escape
@@ -34,6 +34,10 @@ class Look(Enum):
     FORBIDDEN = "#d98c8c"
     REFLECTOR = "#b04ab0"
     GOAL = "#5a9367"
+    #: Where a robot went.
+    WAY = "#1b6ca9"
+    #: Where it touched something.
+    HIT = "#b3261e"
 
 
 #: Kinds of marks that are not drawn as a goal is.
@@ -61,11 +65,7 @@ class DrawnShape:
 
 def shapes(world: World) -> list[DrawnShape]:
     """Return what there is to draw, the lowest first."""
-    found = [_thing(item) for item in world.obstacles]
-    for item in world.obstacles:
-        if item.walk is not None:
-            points = item.walk.points_m
-            found.append(DrawnShape(Look.PATH, f"{item.name}'s path", points, is_open=True))
+    found = [shape for item in world.obstacles for shape in shapes_of(item)]
     for mark in world.marks:
         look = MARKED.get(mark.kind, Look.GOAL)
         is_open, radius = len(mark.points_m) > 1, 0.0 if len(mark.points_m) > 1 else MARK_RADIUS_M
@@ -76,7 +76,17 @@ def shapes(world: World) -> list[DrawnShape]:
             DrawnShape(Look.THING, mesh.name, polygon) for polygon in shadow(mesh, CUT_M / 4, CUT_M) if len(polygon) > 2
         ]
         found += [DrawnShape(Look.WALL, mesh.name, segment, is_open=True) for segment in cut(mesh, CUT_M)]
+    return _lowest_first(found)
+
+
+def _lowest_first(found: Sequence[DrawnShape]) -> list[DrawnShape]:
     return sorted(found, key=lambda shape: ORDER.index(shape.look))
+
+
+def shapes_of(item: Obstacle) -> list[DrawnShape]:
+    """Return a thing as it is drawn, with the path that it walks."""
+    path = [] if item.walk is None else [DrawnShape(Look.PATH, f"{item.name}'s path", item.walk.points_m, is_open=True)]
+    return [_thing(item), *path]
 
 
 def start_label(world: World) -> str:
@@ -128,10 +138,16 @@ INK, GRID, START = "#22303c", "#e3e6ea", "#c8553d"
 X_AXIS, Y_AXIS = "x, m →  (heading 0°)", "y, m →  (heading 90°)"
 
 
-def svg(world: World) -> str:
-    """Return the picture: plan, start with its heading, axes in metres, a scale bar and the world's name."""
+def svg(world: World, *, over: Sequence[DrawnShape] = (), side_px: float = SIDE_PX) -> str:
+    """Return the picture: plan, start with its heading, axes in metres, a scale bar and the world's name.
+
+    Args:
+        world: What to draw.
+        over: What is drawn besides, the lowest of a world's shapes first.
+        side_px: The longer side of the plan.
+    """
     x0, y0, x1, y1 = world.extent
-    scale = SIDE_PX / max(x1 - x0, y1 - y0)
+    scale = side_px / max(x1 - x0, y1 - y0)
     width, height = (x1 - x0) * scale + 2 * EDGE_PX, (y1 - y0) * scale + 2 * EDGE_PX
 
     def at(x: float, y: float) -> str:
@@ -163,7 +179,7 @@ def svg(world: World) -> str:
         (left, py), (right, _) = at(x0, y).split(","), at(x1, y).split(",")
         lines.append(f'<line x1="{left}" y1="{py}" x2="{right}" y2="{py}" stroke="{GRID}"/>')
         lines.append(f'<text x="{float(left) - 6:.1f}" y="{float(py) + 4:.1f}" text-anchor="end">{y:g}</text>')
-    lines += [drawn(shape) for shape in shapes(world)]
+    lines += [drawn(shape) for shape in _lowest_first([*shapes(world), *over])]
     arrow = " ".join(at(*point) for point in start_arrow(world, arrow_length(world)))
     lines.append(f'<polygon points="{arrow}" fill="{START}"><title>start</title></polygon>')
     lines.append(f'<text x="{EDGE_PX}" y="26" font-size="16" font-weight="bold">{escape(world.name)}</text>')
