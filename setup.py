@@ -1,7 +1,8 @@
-"""What pyproject.toml cannot say: how the parts in C and C++ are built, a wheel's tag, and the page of the package.
+"""What pyproject.toml cannot say: how parts in C and C++ are built, a wheel's tag and bill of materials, and its page.
 
-A part that does not compile fails the build. Where there is no compiler, or `P2OS_NATIVE=0` says so, it is left out,
-and a file beside it holds the reason, which `p2os doctor` tells (pip shows nothing of a build that succeeds).
+A part that does not compile fails the build, and so does a missing compiler: there is no lesser wheel that nobody asked
+for. `P2OS_NATIVE=0` leaves the parts out, and a file beside each says so, which `p2os doctor` tells.
+`P2OS_WHEEL_PLATFORM` is the platform of a wheel whose compiler (`CC`, `CXX`) builds for another machine.
 """
 
 import os
@@ -18,11 +19,15 @@ from setuptools.errors import CompileError, PlatformError
 #: Parts whose files are optimised together: a word that a device moves goes through six of them. Clang's may lack the
 #: linker's half, and a build must not fail for it.
 OPTIMISED_WHOLE, WHOLE = ("bluepill_sim._native",), ("-flto=auto",)
+#: The platform that is built for; empty: this one.
+PLATFORM = os.environ.get("P2OS_WHEEL_PLATFORM", "")
+#: The bill of materials that staging has written, and where a wheel has it (PEP 770).
+BILL, BILLS = Path("sbom.cdx.json"), "sboms"
 README_LINK = re.compile(r"(!?)\[([^]]*)\]\((?!https?:)([^)#]*)[^)]*\)")
 
 
 class BuildParts(build_ext):
-    """Builds the parts that a compiler is there for."""
+    """Builds the parts."""
 
     def finalize_options(self) -> None:
         """Expand the patterns among the files of each part."""
@@ -33,25 +38,32 @@ class BuildParts(build_ext):
 
     def run(self) -> None:
         """Build, and write down what was left out and why."""
-        self.left_out: dict[str, str] = {}
-        parts = list(self.extensions)
+        is_wanted = os.environ.get("P2OS_NATIVE") != "0"
+        for part in self.extensions:
+            self._remove(part.name)
+            self._note(part.name).unlink(missing_ok=True)
+            if not is_wanted:
+                self._note(part.name).parent.mkdir(parents=True, exist_ok=True)
+                self._note(part.name).write_text("P2OS_NATIVE=0 was set\n", encoding="utf-8")
+                self.warn(f"{part.name} is left out: P2OS_NATIVE=0 was set")
+        self.left_out = [] if is_wanted else [part.name for part in self.extensions]
+        self.extensions = self.extensions if is_wanted else []
         super().run()
-        for part in parts:
-            note = self._note(part.name)
-            note.unlink(missing_ok=True)
-            if part.name in self.left_out:
-                note.parent.mkdir(parents=True, exist_ok=True)
-                note.write_text(f"{self.left_out[part.name]}\n", encoding="utf-8")
 
     def build_extensions(self) -> None:
-        """Build each part, or say on one line why not."""
+        """Build each part.
+
+        Raises:
+            CompileError: One does not compile.
+            PlatformError: There is no compiler.
+        """
         for part in self.extensions:
-            reason = self._reason_against(part)
-            self._remove(part.name)
-            if reason:
-                self.left_out[part.name] = reason
-                self.warn(f"{part.name} is left out: {reason}")
-        self.extensions = [part for part in self.extensions if part.name not in self.left_out]
+            language, attribute = ("C++", "compiler_cxx") if part.language == "c++" else ("C", "compiler")
+            if not self._has(attribute):
+                raise PlatformError(
+                    f"no {language} compiler was found, which {part.name} needs (apt-get install g++ libc6-dev; "
+                    "with P2OS_NATIVE=0 in the environment it is left out)"
+                )
         super().build_extensions()
 
     def build_extension(self, ext: Extension) -> None:
@@ -73,24 +85,23 @@ class BuildParts(build_ext):
 
     def get_ext_filename(self, ext_name: str) -> str:
         """Return the file of a part: no tag of a Python, for it calls nothing of Python's; ctypes loads it."""
-        return f"{ext_name.replace('.', os.sep)}.{'pyd' if os.name == 'nt' else 'so'}"
+        is_windows = PLATFORM.startswith("win") if PLATFORM else os.name == "nt"
+        return f"{ext_name.replace('.', os.sep)}.{'pyd' if is_windows else 'so'}"
 
     def get_outputs(self) -> list[str]:
         """Return the files that are installed, the notes among them."""
-        return [*super().get_outputs(), *(str(self._note(name)) for name in getattr(self, "left_out", {}))]
+        return [*super().get_outputs(), *(str(self._note(name)) for name in getattr(self, "left_out", []))]
 
-    def _reason_against(self, part: Extension) -> str:
-        language, attribute = ("C++", "compiler_cxx") if part.language == "c++" else ("C", "compiler")
-        if os.environ.get("P2OS_NATIVE") == "0":
-            return "P2OS_NATIVE=0 was set"
+    def _has(self, attribute: str) -> bool:
+        """Tell whether a compiler is there."""
         try:
             self.compiler.initialize()  # Microsoft's is looked for here
         except PlatformError:
-            return f"no {language} compiler was found"
+            return False
         except AttributeError:
             pass
         command = getattr(self.compiler, attribute, None)
-        return f"no {language} compiler was found" if command and shutil.which(command[0]) is None else ""
+        return not command or shutil.which(command[0]) is not None
 
     def _is_gcc(self) -> bool:
         """Tell whether the compiler is GCC, which links what it has left for the linker by itself."""
@@ -119,7 +130,15 @@ class AnyPython(bdist_wheel):
 
     def get_tag(self) -> tuple[str, str, str]:
         """Return the tag: no part is bound to the ABI of a Python."""
-        return ("py3", "none", super().get_tag()[2])
+        return ("py3", "none", PLATFORM if PLATFORM and not self.root_is_pure else super().get_tag()[2])
+
+    def egg2dist(self, egginfo_path: str, distinfo_path: str) -> None:
+        """Make the folder about the distribution, with its bill of materials."""
+        super().egg2dist(egginfo_path, distinfo_path)
+        if BILL.is_file():
+            bills = Path(distinfo_path, BILLS)
+            bills.mkdir()
+            shutil.copy2(BILL, bills / BILL.name)
 
 
 def expanded(patterns: list[str]) -> list[str]:

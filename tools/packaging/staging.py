@@ -43,6 +43,11 @@ class House:
     tests: Sequence[str] = ()  # folders of its tests
     pages: Sequence[str] = ()  # its own pages
     is_published: bool = True
+    needs_unix: bool = False  # a verb of it imports what other systems have not
+
+    def runs_on(self, is_unix: bool) -> bool:
+        """Tell whether every import that its verbs make exists on a platform."""
+        return is_unix or not self.needs_unix
 
     def holds(self, module: str) -> bool:
         """Tell whether a module, or a pattern of files, is of this house."""
@@ -128,6 +133,11 @@ def pyproject(house: House, whole: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
+def whole_project() -> dict[str, Any]:
+    """Return the root's pyproject.toml."""
+    return _read(ROOT / "pyproject.toml")
+
+
 def requirements(whole: Mapping[str, Any]) -> dict[str, str]:
     """Return every requirement of the whole, by the name of its package; the first that names it."""
     project = whole["project"]
@@ -161,7 +171,7 @@ def stage(house: House, place: Path) -> Path:
         + "global-exclude __pycache__/* *.py[co] *.so *.o *.left_out\n",
         encoding="utf-8",
     )
-    (place / "pyproject.toml").write_text(as_toml(pyproject(house, _read(ROOT / "pyproject.toml"))), encoding="utf-8")
+    (place / "pyproject.toml").write_text(as_toml(pyproject(house, whole_project())), encoding="utf-8")
     return place
 
 
