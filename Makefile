@@ -84,9 +84,10 @@ bench: setup
 	$(BIN)/python tools/bench/shares.py --timers
 	$(BIN)/python tools/bench/devices.py --timers
 
-# A source distribution and a wheel of each house, in dist/.
+# A source distribution and a wheel of each house, in dist/; FOR=all or FOR=musllinux_1_2_aarch64 for other machines than this one.
 wheels: setup
-	$(BIN)/python -m tools.packaging
+	@$(if $(FOR),$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[wheels]')
+	$(BIN)/python -m tools.packaging $(if $(FOR),--for $(FOR))
 
 soak: setup mutation-tools
 	$(BIN)/pytest -n $(JOBS) -m '(soak or hypothesis) and not hardware' --hypothesis-profile drawn

@@ -5,15 +5,17 @@ packages that they require. `make soak` compiles them, and has pip install them 
 reached.
 """
 
+import ast
 import email
 import json
+import os
 import shutil
 import subprocess
 import sys
 import sysconfig
 import tarfile
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -30,7 +32,10 @@ from tests.whole.building import (
     tracked,
     unpacked,
 )
-from tools.packaging.staging import houses, stage
+from tools.packaging.__main__ import built as built_house
+from tools.packaging.release import prepare
+from tools.packaging.staging import House, houses, stage
+from tools.packaging.targets import TARGETS
 
 HOUSES = houses()
 #: What a build makes of the sources, and what only it reads.
@@ -246,20 +251,120 @@ def test_a_part_that_does_not_compile_fails_the_build(emulator: Path, tmp_path: 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("environment", "reason"),
-    [({"PATH": ""}, "no C compiler was found"), ({"P2OS_NATIVE": "0"}, "P2OS_NATIVE=0 was set")],
-    ids=["no compiler", "not wanted"],
-)
-def test_a_part_that_is_left_out_leaves_its_reason(
-    emulator: Path, tmp_path: Path, environment: dict[str, str], reason: str
-) -> None:
+def test_a_build_without_a_compiler_fails_and_names_both_ways_on(emulator: Path, tmp_path: Path) -> None:
+    done = build(emulator, "wheel", tmp_path / "out", PATH="")
+    assert done.returncode != 0
+    assert "no C compiler was found, which bluepill_sim._native needs" in done.stderr
+    assert "apt-get install g++" in done.stderr
+    assert "P2OS_NATIVE=0" in done.stderr
+
+
+@pytest.mark.slow
+def test_a_part_that_is_not_wanted_leaves_its_reason(emulator: Path, tmp_path: Path) -> None:
     folder = emulator / "build" / f"lib.{sysconfig.get_platform()}-{sys.implementation.cache_tag}" / "bluepill_sim"
     folder.mkdir(parents=True)
     for left in ("_native.so", f"_native{sysconfig.get_config_var('EXT_SUFFIX')}"):
         (folder / left).write_text("of an earlier build")
-    done = build(emulator, "wheel", tmp_path / "out", **environment)
+    done = build(emulator, "wheel", tmp_path / "out", PATH="", P2OS_NATIVE="0")
     with zipfile.ZipFile(built(done, tmp_path / "out")) as archive:
         assert not [name for name in archive.namelist() if name.endswith(".so")]
-        assert archive.read("bluepill_sim/_native.left_out").decode().startswith(reason[:9])
-    assert f"bluepill_sim._native is left out: {reason}" in done.stdout + done.stderr
+        assert archive.read("bluepill_sim/_native.left_out").decode() == "P2OS_NATIVE=0 was set\n"
+    assert "bluepill_sim._native is left out: P2OS_NATIVE=0 was set" in done.stdout + done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("platform", "ending"), [("macosx_11_0_arm64", "so"), ("win_amd64", "pyd")])
+def test_a_wheel_for_another_machine_has_its_tag_and_the_ending_of_its_libraries(
+    emulator: Path, tmp_path: Path, platform: str, ending: str
+) -> None:
+    compilers = {"CC": looking(tmp_path, "cc"), "P2OS_WHEEL_PLATFORM": platform}
+    script = tmp_path / "looking-cc"  # what is linked has the ending that was asked for
+    script.write_text(script.read_text().replace("${2##*/}", "_native.so"))
+    made = built(build(emulator, "wheel", tmp_path / "out", **compilers), tmp_path / "out")
+    assert made.stem.split("-", 2)[2] == f"py3-none-{platform}"
+    assert [name for name in files_of(made) if "_native." in name] == [f"bluepill_sim/_native.{ending}"]
+
+
+#: Imports every module of a house where Unix's are not there, and says which do not come.
+WITHOUT_UNIX = """
+import importlib, os, pkgutil, socket, sys
+import serial, serial.tools.list_ports  # pyserial has a file for each system, and takes this one's
+
+class Hidden:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in {hidden!r}:
+            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
+
+for name in {hidden!r}:
+    sys.modules.pop(name, None)
+sys.meta_path.insert(0, Hidden())
+del os.fork, socket.AF_UNIX
+for folder in {folders!r}:
+    for module in pkgutil.walk_packages(importlib.import_module(folder).__path__, f"{{folder}}."):
+        if not module.name.endswith("__main__") and ".so" not in module.module_finder.find_spec(module.name).origin:
+            try:
+                importlib.import_module(module.name)
+            except ModuleNotFoundError as error:
+                if error.name in {hidden!r}:
+                    print(module.name)
+            except AttributeError:
+                print(module.name)
+"""
+#: Of Python's own library, what Windows has not.
+UNIX_ALONE = ["termios", "tty", "pty", "fcntl", "resource", "grp", "pwd", "syslog", "readline"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("house", HOUSES.values(), ids=HOUSES)
+def test_a_house_is_offered_where_every_import_of_it_exists(house: House) -> None:
+    code = WITHOUT_UNIX.format(hidden=UNIX_ALONE, folders=list(house.folders))
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert bool(done.stdout.split()) == house.needs_unix, done.stdout
+    assert [target.tag for target in TARGETS.values() if not house.runs_on(target.is_unix)] == (
+        ["win_amd64"] if house.needs_unix else []
+    )
+
+
+def late_imports(path: Path) -> Iterator[str]:
+    """Yield the imports of Unix's modules within functions of a file that no `try` stands around."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    tried = {id(node) for block in ast.walk(tree) if isinstance(block, ast.Try) for node in ast.walk(block)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import | ast.ImportFrom) and id(node) not in tried:
+            names = [node.module or ""] if isinstance(node, ast.ImportFrom) else [each.name for each in node.names]
+            yield from (f"{path}:{node.lineno}" for name in names if name in UNIX_ALONE)
+
+
+def test_a_house_for_every_system_answers_for_what_it_imports_late() -> None:
+    folders = [folder for house in HOUSES.values() if not house.needs_unix for folder in house.folders]
+    assert [found for folder in folders for path in (ROOT / folder).rglob("*.py") for found in late_imports(path)] == []
+
+
+@pytest.mark.soak
+def test_what_is_handed_out_has_a_manual_completions_and_a_bill_and_is_the_same_bytes_twice(tmp_path: Path) -> None:
+    outs = [tmp_path / "once", tmp_path / "twice"]
+    for number, out in enumerate(outs):
+        place = prepare(HOUSES["p2os"], tmp_path / f"sources {number}")
+        for path in place.rglob("*"):
+            os.utime(path, (1_700_000_000 + 86_400 * number,) * 2)
+        done = built_house(place, out, {}, is_wheel_alone=False)
+        assert done.returncode == 0, done.stderr
+    files = [{path.name: path.read_bytes() for path in out.iterdir()} for out in outs]
+    assert len(files[0]) == 2
+    assert files[0] == files[1]
+    (wheel,) = outs[0].glob("*.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        texts = {name: archive.read(name).decode() for name in archive.namelist() if ".data/data/share/" in name}
+        (bill,) = (json.loads(archive.read(name)) for name in archive.namelist() if "/sboms/" in name)
+    names = {name.partition("/share/")[2] for name in texts}
+    verbs = PROJECT["project"]["entry-points"]["p2os.verbs"]
+    assert {f"man/man1/p2os-{verb}.1" for verb, module in verbs.items() if module.startswith("p2os.")} <= names
+    assert not [name for name in names if "p2os-run" in name], "of a house above"
+    assert {"bash-completion/completions/p2os", "zsh/site-functions/_p2os", "man/man1/p2os.1"} <= names
+    serve = next(text for name, text in texts.items() if name.endswith("/p2os-serve.1"))
+    assert "\n.SH OPTIONS\n" in serve
+    assert "\\-\\-robot" in serve
+    parts = {part["name"] for part in bill["components"]}
+    assert {"pyserial", "simbase", "three", "uplot"} <= parts
+    assert bill["metadata"]["component"]["version"] == PROJECT["project"]["version"]

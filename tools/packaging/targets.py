@@ -13,7 +13,7 @@ from simbase.errors import MissingDependencyError
 
 
 @dataclass(frozen=True, slots=True)
-class Target:
+class WheelTarget:
     """A platform."""
 
     tag: str  # of the wheel
@@ -23,21 +23,21 @@ class Target:
 
 
 #: glibc 2.17 is that of every Linux since 2014, musl 1.2 of Alpine since 3.13.
-TARGETS: Mapping[str, Target] = {
+TARGETS: Mapping[str, WheelTarget] = {
     target.tag: target
     for target in (
-        Target("manylinux_2_17_x86_64", "x86_64-linux-gnu.2.17", is_tried=True),
-        Target("manylinux_2_17_aarch64", "aarch64-linux-gnu.2.17", is_tried=True),
-        Target("musllinux_1_2_x86_64", "x86_64-linux-musl"),
-        Target("musllinux_1_2_aarch64", "aarch64-linux-musl"),
-        Target("macosx_11_0_x86_64", "x86_64-macos.11.0"),
-        Target("macosx_11_0_arm64", "aarch64-macos.11.0"),
-        Target("win_amd64", "x86_64-windows-gnu", is_unix=False),
+        WheelTarget("manylinux_2_17_x86_64", "x86_64-linux-gnu.2.17", is_tried=True),
+        WheelTarget("manylinux_2_17_aarch64", "aarch64-linux-gnu.2.17", is_tried=True),
+        WheelTarget("musllinux_1_2_x86_64", "x86_64-linux-musl"),
+        WheelTarget("musllinux_1_2_aarch64", "aarch64-linux-musl"),
+        WheelTarget("macosx_11_0_x86_64", "x86_64-macos.11.0"),
+        WheelTarget("macosx_11_0_arm64", "aarch64-macos.11.0"),
+        WheelTarget("win_amd64", "x86_64-windows-gnu", is_unix=False),
     )
 }
 
 
-def environment(target: Target) -> dict[str, str]:
+def environment(target: WheelTarget) -> dict[str, str]:
     """Return what a build's environment has more, for a target.
 
     Nothing of the Python that builds goes in: its linker line has the folder that it lies in.
