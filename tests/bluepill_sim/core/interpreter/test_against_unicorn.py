@@ -119,6 +119,17 @@ def test_shifts_at_their_bounds_carry_what_they_carry_on_unicorn(lockstep: Locks
     assert_same(lockstep, cases)
 
 
+def test_divisions_at_their_bounds_give_what_they_give_on_unicorn(lockstep: Lockstep) -> None:
+    values = (0, 1, 2, 7, 0x7FFF_FFFF, 0x8000_0000, 0x8000_0001, 0xFFFF_FFFF)
+    cases = [
+        Case((word,), (5, dividend, divisor, *(0,) * 10, SP, 0), 0)
+        for word in (0xFB91_F0F2, 0xFBB1_F0F2)  # SDIV, UDIV R0, R1, R2
+        for dividend in values
+        for divisor in values
+    ]
+    assert_same(lockstep, cases)
+
+
 def test_accesses_at_the_ends_of_memory_do_what_they_do_on_unicorn(lockstep: Lockstep) -> None:
     """The last word, what reaches over the end or begins there, and the same at the first."""
     accesses = (0x6808, 0x8808, 0x7808, 0x5E88, 0x6008, 0x8008, 0x7008)  # LDR, LDRH, LDRB, LDRSH, STR, STRH, STRB
