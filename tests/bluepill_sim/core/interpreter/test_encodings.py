@@ -78,6 +78,12 @@ def test_16_bit_words_are_the_instructions_that_binutils_reads(tmp_path: Path, s
     assert not wrong, f"{len(wrong)}: " + "; ".join(wrong[:20])
 
 
+def test_an_s_is_written_where_a_bit_chooses_flags() -> None:
+    for row in (*NARROW, *WIDE):
+        chooses = "s" in row.fields and row.kind is Kind.PLAIN
+        assert ("{S}" in row.syntax) is chooses, row
+
+
 def test_32_bit_words_are_the_instructions_that_binutils_reads(tmp_path: Path) -> None:
     dice = random.Random(3)
     words = [

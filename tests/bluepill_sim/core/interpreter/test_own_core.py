@@ -1,12 +1,13 @@
 """The interpreter as its owner sees it: registers that are written, traps, and where a run goes on."""
 
+import ctypes
 from collections.abc import Callable
 
 import pytest
 
 from bluepill_sim.core.unicorn_core import Reg
 from bluepill_sim.native.interpreter_core import InterpreterCore
-from tests.bluepill_sim.machine import Machine
+from tests.bluepill_sim.machine import FLASH, Machine
 
 Boot = Callable[..., Machine]
 USAGE_FAULT, CYCLE_NS = 6, 125
@@ -120,3 +121,79 @@ def test_a_debugger_may_have_a_run_go_on_elsewhere_in_the_block_inside_which_it_
     assert machine.is_done
     assert board.register("R3") == 4
     assert machine.label("k6") in [address for _, address, _ in board.last_rows]
+
+
+#: What writes R13: loads from where R5 points, data processing, MSR.
+INTO_SP = (
+    ".half 0xF8D5, 0xD000",  # ldr.w sp, [r5]
+    ".half 0xF855, 0xDB04",  # ldr.w sp, [r5], #4
+    ".half 0xF855, 0xD006",  # ldr.w sp, [r5, r6]
+    ".half 0xE9D5, 0xD200",  # ldrd sp, r2, [r5]
+    ".half 0xE895, 0x2001",  # ldmia.w r5, {r0, sp}
+    "mov sp, r0",
+    ".half 0x4485",  # add sp, r0, behind sp = 0
+    ".half 0xF100, 0x0D00",  # add.w sp, r0, #0
+    ".half 0xEB00, 0x0D06",  # add.w sp, r0, r6
+    "msr msp, r0",
+)
+
+
+@pytest.mark.parametrize("code", INTO_SP)
+@pytest.mark.parametrize("bits", range(8))
+def test_whoever_writes_a_stack_pointer_its_two_lowest_bits_stay_0(
+    boot: Boot, monkeypatch: pytest.MonkeyPatch, code: str, bits: int
+) -> None:
+    monkeypatch.setenv("P2OS_CORE", "own")
+    before = "movs r1, #0\nmov sp, r1\n" if code == ".half 0x4485" else ""
+    machine = boot(
+        f"mov32 r5, #0x20000800\nmov32 r0, #{0x2000_0800 + bits}\nstr r0, [r5, #0]\nstr r0, [r5, #4]\nmovs r6, #0\n"
+        f"{before}{code}\nmov r0, sp\nlog r0\n"
+    ).run(20)  # fmt: skip
+    assert machine.log == [0x2000_0800 + (bits & 4)]
+
+
+def test_msr_writes_the_process_stack_pointer_too(boot: Boot, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("P2OS_CORE", "own")
+    for bits in range(8):
+        machine = boot(f"mov32 r0, #{0x2000_0800 + bits}\nmsr psp, r0\nmrs r0, psp\nlog r0\n").run(20)
+        assert machine.log == [0x2000_0800 + (bits & 4)]
+
+
+def test_code_that_was_cut_and_has_changed_since_is_decoded_anew(boot: Boot, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run ends inside a block, so that a part of it is kept; then the flash is another, and the same run is made."""
+    monkeypatch.setenv("P2OS_CORE", "exact")
+    machine = boot("movs r3, #0\n" + "adds r3, #1\n" * 8)
+    board, flash = machine.board, machine.board.chip.memory.flash
+    at, count = machine.label("start") - FLASH, 0
+    for code in (b"\x01\x33", b"\x02\x33", b"\x05\x33"):  # adds r3, #1, #2, #5
+        board.chip.memory.reprogrammed = flash.raw.replace(b"\x01\x33", code).replace(b"\x02\x33", code)
+        board.reset()
+        began_ns = board.now_ns
+        for done in range(1, 6):
+            board.advance_to(began_ns + (3 + done) * CYCLE_NS)
+            assert board.register("R3") == done * code[0], (code, done)
+            count += 1
+    assert count == 15
+    assert flash.raw[at : at + 4] != bytes(4)
+
+
+def test_memory_and_io_are_told_apart_while_regions_come_and_go(bare: InterpreterCore) -> None:
+    low = ctypes.create_string_buffer(b"\x11" * 0x400, 0x400)
+    code = ctypes.create_string_buffer(bytes.fromhex("086800be") + bytes(0x3FC), 0x400)  # ldr r0, [r1]; bkpt
+    bare.map_memory(0x0800_0000, code, "rx")
+    bare.map_memory(0x2000_0000, low, "rwx")
+    reads: list[int] = []
+    bare.map_io(0x4000_0000, 0x400, lambda _uc, offset, _size, _user: reads.append(offset) or 0x33, lambda *_: None)
+    bare.on_interrupt(lambda _number: bare.stop())
+
+    def loaded(address: int) -> int:
+        bare.registers[Reg.R1] = address
+        bare.start(0x0800_0001)
+        return bare.registers[Reg.R0]
+
+    assert loaded(0x2000_0010) == 0x1111_1111
+    assert loaded(0x4000_0010) == 0x33
+    bare._unmap(0x4000_0000, 0x400)
+    assert loaded(0x2000_0010) == 0x1111_1111
+    assert loaded(0x4000_0020) == 0x1111_1111, "nothing is there: the load has not been made"
+    assert reads == [0x10]
