@@ -159,6 +159,20 @@ def test_msr_writes_the_process_stack_pointer_too(boot: Boot, monkeypatch: pytes
         assert machine.log == [0x2000_0800 + (bits & 4)]
 
 
+@pytest.mark.parametrize("now", [0, 0x20, 0x80])
+@pytest.mark.parametrize("value", [0, 0x0F, 0x10, 0x20, 0x30, 0x80, 0x90, 0xF0])
+def test_basepri_max_raises_the_mask_and_never_lowers_it(
+    boot: Boot, monkeypatch: pytest.MonkeyPatch, now: int, value: int
+) -> None:
+    """ARM B5.2.3: written where the value is not 0, and lower than BASEPRI or BASEPRI is 0. 0xF381, 0x8812: by R1."""
+    monkeypatch.setenv("P2OS_CORE", "own")
+    machine = boot(
+        f"movs r0, #{now}\nmsr basepri, r0\nmovs r1, #{value}\n.half 0xF381, 0x8812\nmrs r0, basepri\nlog r0\n"
+    ).run(20)
+    kept = value & 0xF0
+    assert machine.log == [kept if kept and (kept < now or not now) else now]
+
+
 def test_code_that_was_cut_and_has_changed_since_is_decoded_anew(boot: Boot, monkeypatch: pytest.MonkeyPatch) -> None:
     """A run ends inside a block, so that a part of it is kept; then the flash is another, and the same run is made."""
     monkeypatch.setenv("P2OS_CORE", "exact")
