@@ -116,10 +116,9 @@ def test_shifts_at_their_bounds_carry_what_they_carry_on_unicorn(lockstep: Locks
         for flags in (0, 4)
     ]
     # RRX, LSR #32 and ASR #32 as operands: of MOV, MVN, ADD, SUB, AND, ADC and TST, with flags and without.
-    for_all = (0xEA4F_0000, 0xEA5F_0000, 0xEA6F_0000, 0xEB02_0000, 0xEB12_0000, 0xEBA2_0000, 0xEA02_0000, 0xEA12_0000)
-    by_constant += tuple(
-        word | shift | 1 for word in (*for_all, 0xEB42_0000, 0xEA12_0F00) for shift in (0x10, 0x20, 0x30)
-    )
+    moves = (0xEA4F_0000, 0xEA5F_0000, 0xEA6F_0000)
+    others = (0xEB02_0000, 0xEB12_0000, 0xEBA2_0000, 0xEA02_0000, 0xEA12_0000, 0xEB42_0000, 0xEA12_0F00)
+    by_constant += tuple(word | shift | 1 for word in (*moves, *others) for shift in (0x10, 0x20, 0x30))
     cases += [
         Case((word,), (0, value, 3, *(0,) * 10, SP, 0), flags << 27)
         for word in by_constant
