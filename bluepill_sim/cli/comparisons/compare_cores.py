@@ -115,8 +115,9 @@ def lines_of(board: BluePill, core: str, difference: CoreDifference) -> list[str
 
 
 def _instruction(board: BluePill, address: int) -> str:
-    """Return an instruction's bytes, and its line of the table of encodings."""
+    """Return an instruction's bytes, and what it is by the table of encodings."""
     first, second = (int.from_bytes(board.read_memory(address + at, 2) or b"", "little") for at in (0, 2))
     is_wide = first >= FIRST_WIDE
-    row = find(first << 16 | second if is_wide else first, is_wide=is_wide)
-    return f"{first:04x}{f' {second:04x}' if is_wide else ''}  {row.syntax if row else 'undefined'}"
+    word = first << 16 | second if is_wide else first
+    row = find(word, is_wide=is_wide)
+    return f"{first:04x}{f' {second:04x}' if is_wide else ''}  {row.written(word) if row else 'undefined'}"
