@@ -7,8 +7,9 @@ the rest takes 1 and one each. The handler writes down what it finds, and puts 9
 in its frame.
 """
 
+import random
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import pytest
@@ -198,6 +199,43 @@ def test_a_pop_of_the_pc_goes_on_with_it(boot: Boot) -> None:
         assert (machine.board.register("R4"), machine.board.register("SP")) == (1, STACK - 8)
 
 
+def test_one_that_faults_behind_the_exception_begins_anew(boot: Boot) -> None:
+    """Two words are there, and behind them ends the SRAM: the fault has no ICI, and the base its old value."""
+    source = """
+mov32 r0, #0x20004000
+mov sp, r0
+mov32 r5, #0x20004FF8
+mov32 r1, #0xE000E010
+movs r2, #4
+str r2, [r1, #4]
+movs r2, #7
+str r2, [r1, #0]
+nop
+here: .half 0xE8B5, 0x0F00
+b stop
+tick: ldr r0, [sp, #28]
+log r0
+mov32 r1, #0xE000E010
+movs r0, #0
+str r0, [r1, #0]
+mov32 r1, #0xE000ED04
+mov32 r2, #0x02000000
+str r2, [r1, #0]
+bx lr
+fault: ldr r0, [sp, #24]
+log r0
+ldr r0, [sp, #28]
+log r0
+mov r0, r5
+log r0
+b stop
+"""
+    machine = boot(source, {SYSTICK: "tick", 3: "fault"}).run(40)
+    ticked, pc, faulted, base = machine.log
+    assert ticked & ICI_BITS == 10 << 12
+    assert (pc, faulted & ICI_BITS, base) == (machine.label("here"), 0, 0x2000_4FF8)
+
+
 def test_words_of_a_peripheral_are_moved_all_or_none(boot: Boot) -> None:
     case = Moved(name="port", code=".half 0xE895, 0x0F00", is_load=True, base=PORT_A, after=PORT_A, most=0)
     machine = booted(boot, case, 4).run(40)
@@ -294,3 +332,67 @@ def test_a_word_at_a_time_however_the_run_is_cut(boot: Boot, way: str) -> None:
     assert [word >> 12 & 15 for word in machine.log[:8]] == [2, 3, 8, 9, 10, 11, 12, 0]
     assert values_of(machine) == list(range(1, 10))
     assert machine.board.last_rows[-1] == again(boot, 8, 15).run(70).board.last_rows[-1]
+
+
+#: R0 to R12 and memory hold known words; LR and the base R5, R6 or SP stand in the middle of them.
+ANY = """
+mov32 r1, #0xE000E010
+movs r2, #{load}
+str r2, [r1, #4]
+mov32 r5, #0x20000880
+mov32 r6, #0x200008C0
+mov32 r0, #0x20004F00
+mov sp, r0
+mov32 r0, #there+1
+mov lr, r0
+mov r12, r5
+movs r3, #33
+movs r4, #44
+mov r8, r3
+mov r9, r4
+mov r10, r5
+mov r11, r6
+movs r0, #11
+movs r2, #7
+str r2, [r1, #0]
+nop
+.half {first}, {second}
+there: nop
+nop
+b stop
+tick: mov32 r1, #0xE000E010
+movs r0, #0
+str r0, [r1, #0]
+bx lr
+"""
+
+
+def transfers(dice: random.Random, count: int) -> Iterator[tuple[int, int]]:
+    """Yield any LDM, STM, PUSH and POP of ARMv7-M that the manual does not leave open, PC and SP in no list."""
+    for _ in range(count):
+        kind, base = dice.randrange(4), dice.choice((5, 6))
+        low, wide = dice.getrandbits(8) or 1, dice.getrandbits(13) | 0x1001
+        yield (
+            (dice.choice((0xC000, 0xC800)) | base << 8 | low, 0xBF00),
+            (dice.choice((0xB400, 0xBC00)) | low, 0xBF00),
+            (dice.choice((0xE880, 0xE890, 0xE900, 0xE910)) | base, wide | dice.getrandbits(1) << 14),
+            (dice.choice((0xE8A0, 0xE8B0, 0xE920, 0xE930)) | base, wide & ~(1 << base)),
+        )[kind]
+
+
+@pytest.mark.parametrize("count", [3, pytest.param(20, marks=pytest.mark.slow)])
+def test_nothing_is_lost_of_any_transfer_wherever_it_is_interrupted(boot: Boot, count: int) -> None:
+    """The handler changes nothing: registers and memory are those of a run in which it comes later."""
+    dice = random.Random(count)
+    for first, second in transfers(dice, count):
+        ends = []
+        for load in (40, *dice.sample(range(1, 18), 4)):
+            machine = boot(ANY.format(load=load, first=first, second=second), {SYSTICK: "tick"})
+            board = machine.board
+            board.chip.memory.write(WORDS, bytes(n & 0xFC for n in range(0x200)))
+            board.chip.memory.write(STACK - 0x100, bytes(n | 1 for n in range(0x100)))
+            machine.run(30)
+            assert machine.is_done, (hex(first), hex(second), load)
+            registers = [board.register(f"R{n}") for n in range(13)] + [board.register("SP"), board.register("LR")]
+            ends.append((registers, board.read_memory(WORDS, 0x200)))
+        assert ends == ends[:1] * len(ends), (hex(first), hex(second))
