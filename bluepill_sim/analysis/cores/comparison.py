@@ -3,7 +3,7 @@
 All that decides a board's future is compared behind each slice. Where it differs, both go back to the slice's start,
 and the time from which they differ is halved until one block is left; then both run its instructions one by one. What
 makes no difference any more by the end of its slice is not seen.
-Invariant: neither board is changed by being compared.
+Invariant: until one is found, neither board runs otherwise than it would alone.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
