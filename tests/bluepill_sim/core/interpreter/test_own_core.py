@@ -7,7 +7,8 @@ import pytest
 
 from bluepill_sim.core.unicorn_core import Reg
 from bluepill_sim.native.interpreter_core import InterpreterCore
-from tests.bluepill_sim.machine import FLASH, Machine
+from tests.bluepill_sim.core.interpreter.lockstep import Case, Lockstep, places
+from tests.bluepill_sim.machine import COUNTER_ON, FLASH, Machine
 
 Boot = Callable[..., Machine]
 USAGE_FAULT, CYCLE_NS = 6, 125
@@ -62,7 +63,8 @@ def test_masks_and_control_have_the_bits_of_a_cortex_m3(bare: InterpreterCore) -
 
 def test_each_mode_has_its_stack_pointer(bare: InterpreterCore) -> None:
     registers = bare.registers
-    registers[Reg.MSP], registers[Reg.PSP] = 0x2000_1000, 0x2000_2000
+    registers[Reg.PSP] = 0x2000_2000
+    registers[Reg.MSP] = 0x2000_1000
     assert registers[Reg.SP] == 0x2000_1000
     registers[Reg.CONTROL] = 2
     assert [registers[name] for name in (Reg.SP, Reg.MSP, Reg.PSP)] == [0x2000_2000, 0x2000_1000, 0x2000_2000]
@@ -173,22 +175,34 @@ def test_basepri_max_raises_the_mask_and_never_lowers_it(
     assert machine.log == [kept if kept and (kept < now or not now) else now]
 
 
-def test_code_that_was_cut_and_has_changed_since_is_decoded_anew(boot: Boot, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A run ends inside a block, so that a part of it is kept; then the flash is another, and the same run is made."""
+@pytest.mark.parametrize("base", [FLASH, 0])
+def test_code_that_was_cut_and_has_changed_since_is_decoded_anew(
+    boot: Boot, monkeypatch: pytest.MonkeyPatch, base: int
+) -> None:
+    """A run ends inside a block, of which a part is kept; then the flash is another, at both of its addresses."""
     monkeypatch.setenv("P2OS_CORE", "exact")
     machine = boot("movs r3, #0\n" + "adds r3, #1\n" * 8)
     board, flash = machine.board, machine.board.chip.memory.flash
-    at, count = machine.label("start") - FLASH, 0
-    for code in (b"\x01\x33", b"\x02\x33", b"\x05\x33"):  # adds r3, #1, #2, #5
-        board.chip.memory.reprogrammed = flash.raw.replace(b"\x01\x33", code).replace(b"\x02\x33", code)
+    before = b"\x01\x33"  # adds r3, #1
+    for code in (before, b"\x02\x33", b"\x05\x33"):
+        board.chip.memory.reprogrammed, before = flash.raw.replace(before * 8, code * 8), code
         board.reset()
+        board.chip.engine.jump(machine.label("start") - FLASH + base | 1)
         began_ns = board.now_ns
         for done in range(1, 6):
             board.advance_to(began_ns + (3 + done) * CYCLE_NS)
             assert board.register("R3") == done * code[0], (code, done)
-            count += 1
-    assert count == 15
-    assert flash.raw[at : at + 4] != bytes(4)
+
+
+def test_msr_of_a_stack_pointer_keeps_its_two_lowest_bits_0_by_itself(lockstep: Lockstep) -> None:
+    """MSR MSP, R0 and MSR PSP, R0, and back into R1: on the bare core, which no owner helps."""
+    for number in (8, 9):
+        for bits in range(8):
+            case = Case(
+                (0xF380_8800 | number, 0xF3EF_8100 | number), (0x2000_0800 + bits, *(0,) * 12, 0x2000_0400, 0), 0
+            )
+            lockstep.own.put([case])
+            assert lockstep.own.run(case, next(places()))[1] == 0x2000_0800 + (bits & 4), (number, bits)
 
 
 def test_memory_and_io_are_told_apart_while_regions_come_and_go(bare: InterpreterCore) -> None:
@@ -211,3 +225,63 @@ def test_memory_and_io_are_told_apart_while_regions_come_and_go(bare: Interprete
     assert loaded(0x2000_0010) == 0x1111_1111
     assert loaded(0x4000_0020) == 0x1111_1111, "nothing is there: the load has not been made"
     assert reads == [0x10]
+
+
+#: FLASH_ACR: wait states; a loop whose first block ends in an ISB, its second at the end of a kilobyte of flash.
+LOOP = """
+mov32 r6, #0x40022000
+movs r0, #{waits}
+str r0, [r6, #0]
+b first
+{pad}
+first: mov32 r6, #0xE0001000
+movs r3, #20
+ldr r5, [r6, #4]
+b again
+again: nop
+isb
+nop
+nop
+nop
+nop
+nop
+nop
+nop
+subs r3, #1
+bne again
+ldr r0, [r6, #4]
+subs r0, r0, r5
+log r0
+b stop
+"""
+
+
+@pytest.mark.parametrize("waits", [0, 1, 2])
+def test_a_block_that_no_branch_ends_costs_what_it_does_on_unicorn(
+    boot: Boot, monkeypatch: pytest.MonkeyPatch, waits: int
+) -> None:
+    logs = {}
+    for core in ("own", "exact", "native", "python"):
+        monkeypatch.setenv("P2OS_CORE", core)
+        pad = "nop\n" * ((0x400 - 0x130 - 0x3A - 20) // 2)
+        machine = boot(COUNTER_ON + LOOP.format(waits=waits, pad=pad), {}).run(300)
+        assert machine.is_done
+        assert machine.label("again") < FLASH + 0x400 < machine.label("stop")
+        logs[core] = machine.log
+    assert len({tuple(log) for log in logs.values()}) == 1, logs
+
+
+@pytest.mark.parametrize(
+    "target", [0x4000_0000, 0xA000_0000, 0xE000_E000, 0x2000_8000, 0x2000_4FFE, 0x1FFF_F000, 0x0802_0000, 0x6000_0000]
+)
+def test_a_branch_to_where_nothing_executes_faults_as_on_unicorn(
+    boot: Boot, monkeypatch: pytest.MonkeyPatch, target: int
+) -> None:
+    found = {}
+    for core in ("own", "exact", "native"):
+        monkeypatch.setenv("P2OS_CORE", core)
+        board = boot(f"mov32 r0, #{target | 1}\nbx r0\n").run(20).board
+        fault = board.fault
+        found[core] = None if fault is None else (fault.kind, fault.pc, fault.address)
+    assert found["own"] == found["exact"] == found["native"]
+    assert found["own"] is not None
