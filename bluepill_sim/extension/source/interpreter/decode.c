@@ -71,7 +71,6 @@ struct block *interpreter_decode(struct interpreter *s, uint32_t address, const 
     } else {
         to.it = (uint8_t)s->is.it_state;
     }
-    uint8_t moved = 0;
     if (to.ops == NULL) {
         return NULL;
     }
@@ -93,7 +92,6 @@ struct block *interpreter_decode(struct interpreter *s, uint32_t address, const 
         to.end = to.pc + (is_wide ? 4 : 2);
         outcome = add(s, &to, is_wide ? first << 16 | halfword(code + done + 2) : first, is_wide);
         to.it = to.after;
-        moved = done ? moved : to.moved;
         to.next = 0;
         done = to.end - address;
         if (outcome == GOES_ON && (bytes - done < 2 || leaves_page(page, to.end, code + done))) {
@@ -105,7 +103,7 @@ struct block *interpreter_decode(struct interpreter *s, uint32_t address, const 
     struct block *block = to.count ? malloc(sizeof *block + to.count * sizeof *to.ops) : NULL;
     if (block != NULL) {
         *block = (struct block){.start = address, .end = address + done, .target = to.target, .it = (uint8_t)s->is.it_state,
-                                .is_thumb = (uint8_t)s->is.is_thumb, .moved = moved, .count = to.count};
+                                .is_thumb = (uint8_t)s->is.is_thumb, .moved = to.moved, .count = to.count};
         memcpy(block->ops, to.ops, to.count * sizeof *to.ops);
     }
     free(to.ops);

@@ -340,7 +340,7 @@ static enum outcome multiple(struct builder *to, bool is_load, uint32_t n, uint3
     }
     const uint32_t first = (uint32_t)((is_before ? -count : 0) + moved) & 0xFF;
     struct op *op = emit(to, is_load ? OP_LDM : OP_STM, 0, n, n < SP, (list & ~before) | first << 16);
-    to->moved = (uint8_t)moved;
+    to->moved += (uint8_t)moved;
     op->a = (uint8_t)(change ? step : 0);
     if (!is_load) {
         return GOES_ON;

@@ -211,7 +211,14 @@ def test_memory_and_io_are_told_apart_while_regions_come_and_go(bare: Interprete
     bare.map_memory(0x0800_0000, code, "rx")
     bare.map_memory(0x2000_0000, low, "rwx")
     reads: list[int] = []
-    bare.map_io(0x4000_0000, 0x400, lambda _uc, offset, _size, _user: reads.append(offset) or 0x33, lambda *_: None)
+    answers: dict[int, int] = {}
+
+    def read(_uc: int, offset: int, size: int, _user: int) -> int:
+        reads.append(offset)
+        word = answers.get(offset & ~3, 0x33)
+        return word >> 8 * (offset & 3) & (1 << 8 * size) - 1
+
+    bare.map_io(0x4000_0000, 0x400, read, lambda *_: None)
     bare.on_interrupt(lambda _number: bare.stop())
 
     def loaded(address: int) -> int:
@@ -221,9 +228,33 @@ def test_memory_and_io_are_told_apart_while_regions_come_and_go(bare: Interprete
 
     assert loaded(0x2000_0010) == 0x1111_1111
     assert loaded(0x4000_0010) == 0x33
+    # Unaligned: both words are read, and what is wanted is made of them.
+    code.raw = bytes.fromhex("086800be").ljust(0x400, b"\0")
+    words = {0x20: 0x4433_2211, 0x24: 0x8877_6655}
+    answers.update(words)
+    for first, instruction in ((0x21, "0868"), (0x22, "0868"), (0x23, "0868"), (0x21, "0888"), (0x23, "0888")):
+        code.raw = bytes.fromhex(instruction + "00be").ljust(0x400, b"\0")  # ldr, ldrh r0, [r1]
+        bare.drop_all_code()
+        size = 4 if instruction == "0868" else 2
+        together = words[0x24] << 32 | words[0x20]
+        assert loaded(0x4000_0000 + first) == together >> 8 * (first - 0x20) & (1 << 8 * size) - 1, (first, size)
+    code.raw = bytes.fromhex("086800be").ljust(0x400, b"\0")
+    bare.drop_all_code()
+    reads[1:] = []
     bare._unmap(0x4000_0000, 0x400)
     assert loaded(0x2000_0010) == 0x1111_1111
     assert loaded(0x4000_0020) == 0x1111_1111, "nothing is there: the load has not been made"
+    heard: list[int] = []
+
+    def hear(_kind: int, address: int, _size: int, _value: int) -> bool:
+        heard.append(address)
+        return False
+
+    hook = bare.on_bad_access(hear)
+    loaded(0x4000_0020)
+    bare.remove_hook(hook)
+    loaded(0x4000_0020)
+    assert heard == [0x4000_0020], "it is asked while it is there"
     assert reads == [0x10]
 
 
@@ -285,3 +316,59 @@ def test_a_branch_to_where_nothing_executes_faults_as_on_unicorn(
         found[core] = None if fault is None else (fault.kind, fault.pc, fault.address)
     assert found["own"] == found["exact"] == found["native"]
     assert found["own"] is not None
+
+
+def test_a_state_has_one_context_however_its_flags_came_about(lockstep: Lockstep) -> None:
+    """CMP R1, #0 of 5 and of 7, and 0x7FFFFFFF; then R1 is put to the same."""
+    seen = set()
+    for value in (5, 7, 0x7FFF_FFFF):
+        case = Case((0x2900,), (0, value, *(0,) * 11, 0x2000_0400, 0), 0)
+        lockstep.own.put([case])
+        lockstep.own.run(case, next(places()))
+        lockstep.own.core.registers[Reg.R1] = 0
+        seen.add(lockstep.own.core.context)
+    assert len(seen) == 1
+
+
+def test_code_in_sram_that_has_run_does_not_run_in_arm_state(boot: Boot, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`bx lr` is put there and called twice; the third time bit 0 of its address is 0."""
+    monkeypatch.setenv("P2OS_CORE", "own")
+    machine = boot(
+        "mov32 r5, #0x20000800\nmov32 r0, #0x47704770\nstr r0, [r5, #0]\nmov32 r6, #0x20000801\n"
+        "blx r6\nblx r6\nmovs r4, #1\nblx r5\nmovs r4, #2\nb stop\nfault: mov32 r1, #0xE000ED28\n"
+        "ldr r0, [r1, #0]\nlog r0\nb stop\n",
+        {3: "fault"},
+    ).run(30)  # fmt: skip
+    assert machine.log == [1 << 17], "INVSTATE"
+    assert machine.board.register("R4") == 1
+
+
+@pytest.mark.parametrize("core", ["own", "exact", "native"])
+@pytest.mark.parametrize("before", range(4))
+def test_an_it_block_reaches_over_the_end_of_a_kilobyte(
+    boot: Boot, monkeypatch: pytest.MonkeyPatch, core: str, before: int
+) -> None:
+    """ITTTT NE, of which so many stand before the end of a block: none of the four is done, in no round."""
+    monkeypatch.setenv("P2OS_CORE", core)
+    start = "movs r3, #3\nmovs r4, #0\nb far\n"
+    loop = "far: cmp r4, #0\nitttt ne\n" + "adds r4, #1\n" * 4 + "subs r3, #1\nbne far\n"
+    pad = (0x400 - 0x130 - 8 - 6 - 4 - 2 * before) // 2
+    machine = boot(start + "nop\n" * pad + loop).run(80)
+    assert machine.is_done
+    assert machine.label("far") + 4 + 2 * before == FLASH + 0x400
+    assert machine.board.register("R4") == 0
+
+
+@pytest.mark.parametrize("core", ["own", "exact", "native"])
+@pytest.mark.parametrize("hint", ["yield", "wfe", "wfi"])
+def test_an_it_block_goes_on_behind_a_hint(boot: Boot, monkeypatch: pytest.MonkeyPatch, core: str, hint: str) -> None:
+    """ITE EQ: the hint is done, and the addition behind it is not; SysTick wakes WFI, and WFE has its event."""
+    monkeypatch.setenv("P2OS_CORE", core)
+    machine = boot(
+        "mov32 r1, #0xE000E010\nmovs r2, #90\nstr r2, [r1, #4]\nmovs r2, #7\nstr r2, [r1, #0]\n"
+        f"movs r4, #0\nsev\ncmp r4, #0\nite eq\n{hint}\nadds r4, #1\nadds r4, #4\nlast: b stop\n"
+        "tick: movs r0, #0\nstr r0, [r1, #0]\nbx lr\n",
+        {15: "tick"},
+    ).run(60)  # fmt: skip
+    assert machine.is_done
+    assert machine.board.register("R4") == 4
