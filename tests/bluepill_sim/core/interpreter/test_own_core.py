@@ -372,3 +372,14 @@ def test_an_it_block_goes_on_behind_a_hint(boot: Boot, monkeypatch: pytest.Monke
     ).run(60)  # fmt: skip
     assert machine.is_done
     assert machine.board.register("R4") == 4
+
+
+@pytest.mark.parametrize("core", ["own", "exact", "native"])
+def test_mrs_reads_the_parts_of_the_xpsr_in_a_handler(boot: Boot, monkeypatch: pytest.MonkeyPatch, core: str) -> None:
+    """APSR, IAPSR, EAPSR, XPSR, IPSR, EPSR, IEPSR (ARM B5.2.2): flags where bit 2 is 0, IPSR where bit 0 is 1."""
+    monkeypatch.setenv("P2OS_CORE", core)
+    numbers = (0, 1, 2, 3, 5, 6, 7)
+    reads = "".join(f".half 0xF3EF, {0x8000 | number:#x}\nstr r0, [r7, #{4 * n}]\n" for n, number in enumerate(numbers))
+    machine = boot(f"movs r0, #0\nsvc #0\nb stop\ncall: cmp r0, #0\n{reads}adds r7, #28\nbx lr\n", {11: "call"}).run(20)
+    flags, number = 0x6000_0000, 11
+    assert machine.log == [flags, flags | number, flags, flags | number, number, 0, number]
