@@ -91,6 +91,11 @@ def test_an_instruction_is_written_with_its_registers_and_condition(word: int, t
     assert row.written(word) == text
 
 
+def test_the_tables_are_of_one_width_each() -> None:
+    assert not any(row.is_wide for row in NARROW)
+    assert all(row.is_wide for row in WIDE)
+
+
 def test_an_s_is_written_where_a_bit_chooses_flags() -> None:
     for row in (*NARROW, *WIDE):
         chooses = "s" in row.fields and row.kind is Kind.PLAIN

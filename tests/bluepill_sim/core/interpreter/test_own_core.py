@@ -383,3 +383,30 @@ def test_mrs_reads_the_parts_of_the_xpsr_in_a_handler(boot: Boot, monkeypatch: p
     machine = boot(f"movs r0, #0\nsvc #0\nb stop\ncall: cmp r0, #0\n{reads}adds r7, #28\nbx lr\n", {11: "call"}).run(20)
     flags, number = 0x6000_0000, 11
     assert machine.log == [flags, flags | number, flags, flags | number, number, 0, number]
+
+
+@pytest.mark.parametrize("last", [1, 2, 3])
+def test_an_access_that_a_hook_ends_the_run_at_is_not_made(bare: InterpreterCore, last: int) -> None:
+    """LDREX R0, [R1], and STREX R2, R3, [R1], which reads and writes: the run ends at one of the three accesses."""
+    code = ctypes.create_string_buffer(bytes.fromhex("51e8000f41e8003200be").ljust(0x400, b"\0"), 0x400)
+    memory = ctypes.create_string_buffer(b"\x11" * 0x400, 0x400)
+    bare.map_memory(FLASH, code, "rx")
+    bare.map_memory(0x2000_0000, memory, "rwx")
+    seen: list[int] = []
+
+    def look(_kind: int, address: int, _size: int, _value: int) -> bool:
+        seen.append(address)
+        if len(seen) == last:
+            bare.stop()
+        return True
+
+    bare.on_access(0x2000_0000, 0x2000_03FF, look)
+    bare.on_interrupt(lambda _number: bare.stop())
+    for name, value in ((Reg.R0, 5), (Reg.R1, 0x2000_0010), (Reg.R2, 7), (Reg.R3, 9)):
+        bare.registers[name] = value
+    bare.start(FLASH | 1)
+    assert len(seen) == last
+    assert bare.registers[Reg.PC] == FLASH + (0 if last == 1 else 4)
+    assert bare.registers[Reg.R0] == (5 if last == 1 else 0x1111_1111)
+    assert bare.registers[Reg.R2] == 7
+    assert memory.raw == b"\x11" * 0x400
