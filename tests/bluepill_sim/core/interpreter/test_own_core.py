@@ -410,3 +410,19 @@ def test_an_access_that_a_hook_ends_the_run_at_is_not_made(bare: InterpreterCore
     assert bare.registers[Reg.R0] == (5 if last == 1 else 0x1111_1111)
     assert bare.registers[Reg.R2] == 7
     assert memory.raw == b"\x11" * 0x400
+
+
+def test_a_new_core_is_in_thumb_state_without_flags(bare: InterpreterCore) -> None:
+    assert bare.registers[Reg.XPSR] == 1 << 24
+    assert bare.registers[Reg.CPSR] == 1 << 5
+    assert [bare.registers[name] for name in (Reg.R0, Reg.SP, Reg.PC, Reg.CONTROL, Reg.PRIMASK)] == [0] * 5
+
+
+@pytest.mark.parametrize(("code", "error"), [("00de", 21), ("00df", 21), ("00be", 21), ("0868", 6), ("0860", 7)])
+def test_what_nobody_hears_of_ends_the_run(bare: InterpreterCore, code: str, error: int) -> None:
+    """UDF, SVC, BKPT, and a load and a store where nothing is, without a hook: Unicorn's errors."""
+    flash = ctypes.create_string_buffer(bytes.fromhex(code).ljust(0x400, b"\0"), 0x400)
+    bare.map_memory(FLASH, flash, "rx")
+    bare.registers[Reg.R1] = 0x2000_0000
+    assert bare.start(FLASH | 1) == error
+    assert bare.registers[Reg.PC] == FLASH + (2 if code == "00df" else 0)
