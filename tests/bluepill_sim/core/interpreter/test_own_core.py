@@ -426,3 +426,14 @@ def test_what_nobody_hears_of_ends_the_run(bare: InterpreterCore, code: str, err
     bare.registers[Reg.R1] = 0x2000_0000
     assert bare.start(FLASH | 1) == error
     assert bare.registers[Reg.PC] == FLASH + (2 if code == "00df" else 0)
+
+
+@pytest.mark.parametrize("core", ["own", "exact", "native"])
+@pytest.mark.parametrize("value", range(4))
+def test_a_handler_writes_npriv_and_not_spsel(
+    boot: Boot, monkeypatch: pytest.MonkeyPatch, core: str, value: int
+) -> None:
+    """ARM B1.4.4: SPSEL is written in thread mode alone."""
+    monkeypatch.setenv("P2OS_CORE", core)
+    source = f"svc #0\nmrs r0, control\nlog r0\nb stop\ncall: movs r0, #{value}\nmsr control, r0\nbx lr\n"
+    assert boot(source, {11: "call"}).run(20).log == [value & 1]
