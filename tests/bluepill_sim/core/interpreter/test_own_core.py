@@ -437,3 +437,18 @@ def test_a_handler_writes_npriv_and_not_spsel(
     monkeypatch.setenv("P2OS_CORE", core)
     source = f"svc #0\nmrs r0, control\nlog r0\nb stop\ncall: movs r0, #{value}\nmsr control, r0\nbx lr\n"
     assert boot(source, {11: "call"}).run(20).log == [value & 1]
+
+
+def test_what_has_run_in_thumb_state_is_undefined_in_arm_state(bare: InterpreterCore) -> None:
+    """A BKPT in writable memory: heard each time with the Thumb bit, and undefined without it, on the bare core."""
+    memory = ctypes.create_string_buffer(bytes.fromhex("00be").ljust(0x400, b"\0"), 0x400)
+    bare.map_memory(0x2000_0000, memory, "rwx")
+    heard: list[int] = []
+
+    def hear(number: int) -> None:
+        heard.append(number)
+        bare.stop()
+
+    bare.on_interrupt(hear)
+    assert [bare.start(0x2000_0000 | thumb) for thumb in (1, 1, 0, 1, 0)] == [0, 0, 21, 0, 21]
+    assert heard == [7, 7, 7]
