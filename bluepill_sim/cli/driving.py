@@ -49,6 +49,16 @@ class PinChange:
     #: One of the words that `--drive` knows, or volts such as "1.65v".
     level: str
 
+    def act(self, board: BluePill) -> None:
+        """Put the level on the pin, in place of volts before it."""
+        pin = board.pin(self.pin)
+        if self.level not in _LEVELS:
+            pin.set_volts(float(self.level[:-1]))
+            return
+        if pin.has_volts:
+            pin.set_volts(None)
+        _LEVELS[self.level](pin)
+
 
 def parse_changes(texts: Sequence[str], board: BluePill) -> list[PinChange]:
     """Return what `--drive` asks for, by time.
@@ -108,8 +118,7 @@ class Schedule:
 
     def _act(self, now_ns: Nanos) -> None:
         while self._left and self._left[-1].at_ns <= now_ns:
-            change = self._left.pop()
-            _put(self._board.pin(change.pin), change.level)
+            self._left.pop().act(self._board)
 
 
 def _is_volts(level: str) -> bool:
@@ -119,16 +128,6 @@ def _is_volts(level: str) -> bool:
         return found is not None and to_uv(float(found[1])) is not None
     except ValueError:
         return False
-
-
-def _put(pin: Pin, level: str) -> None:
-    """Put a level on a pin, in place of volts before it."""
-    if level in _LEVELS:
-        if pin.has_volts:
-            pin.set_volts(None)
-        _LEVELS[level](pin)
-    else:
-        pin.set_volts(float(level[:-1]))
 
 
 def run_driven(board: BluePill, end_ns: Nanos, changes: Sequence[PinChange]) -> ChipReached:

@@ -18,6 +18,7 @@ Source: ARMv7-M Architecture Reference Manual, chapters A5 and A7; cycles by kin
 Invariant: the rows are read from the top and the first match wins; what matches none is undefined.
 """
 
+import re
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cache
@@ -120,8 +121,16 @@ class Encoding:
             found[letter] = value
         return found
 
+    def written(self, word: int) -> str:
+        """Return an instruction as its syntax has it, with its registers and its condition."""
+        values = self.values(word)
+        conditional = self.syntax.replace("<c>", _CONDITIONS[values.get("c", 0)])
+        return re.sub(r"<(\w)>", lambda found: f"R{values[found[1]]}", conditional)
+
 
 _NARROW_BITS, _WIDE_BITS = 16, 32
+#: By their numbers (A7.3.1); 14 and 15 are other instructions.
+_CONDITIONS = ("EQ", "NE", "CS", "CC", "MI", "PL", "VS", "VC", "HI", "LS", "GE", "LT", "GT", "LE", "AL", "AL")
 #: First halfwords from here on begin a 32-bit instruction.
 FIRST_WIDE = 0xE800
 

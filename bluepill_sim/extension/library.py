@@ -8,6 +8,9 @@ Unicorn. `own` is the one in C with the interpreter of our own (`source/interpre
 
 import ctypes
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import cache
 from typing import Any
 
@@ -16,11 +19,13 @@ from bluepill_sim.extension.layout import SHARED, structure
 from simbase.c_library import built, loaded
 from simbase.errors import MissingDependencyError
 
-#: The name of the environment variable, and what it may hold.
 #: The library, as a module.
 PART = "bluepill_sim._native"
 
+#: The name of the environment variable, and what it may hold.
 CORE_VARIABLE, CORE_CHOICES = "P2OS_CORE", ("native", "python", "own", "exact")
+#: What `core_chosen` says; empty: nothing.
+_chosen: ContextVar[str] = ContextVar("core", default="")
 
 UNKNOWN_BLOCK = ctypes.CFUNCTYPE(None, ctypes.c_uint32, ctypes.c_uint32)
 READ = ctypes.CFUNCTYPE(ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint32)
@@ -208,8 +213,18 @@ def is_exact_wanted() -> bool:
     return _choice() == "exact"
 
 
+@contextmanager
+def core_chosen(name: str) -> Iterator[None]:
+    """Choose the core of the engines that are made within, one of `CORE_CHOICES`, whatever `P2OS_CORE` says."""
+    before = _chosen.set(name)
+    try:
+        yield
+    finally:
+        _chosen.reset(before)
+
+
 def _choice() -> str:
-    choice = os.environ.get(CORE_VARIABLE, "")
+    choice = _chosen.get() or os.environ.get(CORE_VARIABLE, "")
     if choice and choice not in CORE_CHOICES:
         raise BluePillError(
             f"{CORE_VARIABLE}={choice}: no such core",

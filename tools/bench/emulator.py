@@ -11,8 +11,7 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 
 from firmware.build import build as build_program
@@ -22,7 +21,7 @@ from bluepill_sim import BluePill
 from bluepill_sim.analysis.probe import Probe
 from bluepill_sim.analysis.waveforms.vcd_writer import write_vcd
 from bluepill_sim.core.unicorn_core import Reg
-from bluepill_sim.extension.library import CORE_VARIABLE, library_path
+from bluepill_sim.extension.library import core_chosen, library_path
 
 HERE = Path(__file__).parent
 #: Program, virtual seconds a run in C and in Python, goal of the native core in times real time.
@@ -57,22 +56,9 @@ def build(name: str, folder: Path, *options: str) -> Path:
     return build_program(HERE / "firmware" / f"{name}.c", folder / f"{name}{''.join(options)}.elf", *options)
 
 
-@contextmanager
-def core(name: str) -> Iterator[None]:
-    """Choose the core of the boards that are made within."""
-    before = os.environ.get(CORE_VARIABLE)
-    os.environ[CORE_VARIABLE] = name
-    try:
-        yield
-    finally:
-        os.environ.pop(CORE_VARIABLE)
-        if before is not None:
-            os.environ[CORE_VARIABLE] = before
-
-
 def board(program: Path, name: str) -> BluePill:
     """Return a board of one core, past the start of its clocks."""
-    with core(name):
+    with core_chosen(name):
         made = BluePill(str(program))
     made.advance_to(SETTLED_NS)
     return made

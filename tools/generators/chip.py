@@ -240,7 +240,7 @@ def with_instructions(text: str) -> str:
     table = ["| instruction | bits | cycles |", "| --- | --- | --- |"]
     for row in (*NARROW, *WIDE):
         if row.operation != UNDEFINED:
-            syntax = re.sub(r"<(\w)>", lambda found: f"R{found[1]}", row.syntax)
+            syntax = re.sub(r"<([^c])>", lambda found: f"R{found[1]}", row.syntax)
             table.append(f"| {syntax.replace('|', ' ')} | `{_drawn(row)}` | {_cycles(row.kind)} |")
     return "\n".join([f"{before}{_FROM}", *table, f"{_TO}{after}"]) if _FROM in text else text
 

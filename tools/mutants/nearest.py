@@ -16,6 +16,7 @@ MOST_FILES = 10
 TESTS_OF_C = {
     "bluepill_sim/extension/source/devices": ("tests/bluepill_sim/peripherals", "tests/bluepill_sim/native"),
     "bluepill_sim/extension/source/core": ("tests/bluepill_sim/core", "tests/bluepill_sim/native"),
+    "bluepill_sim/extension/source/interpreter": ("tests/bluepill_sim/core/interpreter",),
     "bluepill_sim/extension/source": ("tests/bluepill_sim/fabric", "tests/bluepill_sim/native", "tests/bluepill_sim"),
     "robot_bench/wires": ("tests/robot_bench/wires",),
     "adapter_fw/core/app": ("tests/adapter_fw/test_shell.py", "tests/adapter_fw/test_esp32.py"),

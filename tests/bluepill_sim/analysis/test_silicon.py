@@ -149,7 +149,7 @@ def test_any_bytes_are_a_log_or_are_refused_in_one_line(data: bytes) -> None:
 def test_the_command_line_tells_what_differs_and_ends_with_1(
     tmp_path: Path, model: Model, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("bluepill_sim.cli.compare_silicon.ask_model", lambda: model)
+    monkeypatch.setattr("bluepill_sim.cli.comparisons.compare_silicon.ask_model", lambda: model)
     path = tmp_path / "board.log"
     path.write_bytes(printed(model.log))
     assert run(["compare-silicon", str(path)]) == 0

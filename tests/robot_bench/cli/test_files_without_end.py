@@ -14,6 +14,7 @@ MOTORS = files("robot_bench.firmware").joinpath("motors.elf")
 VERBS = (
     ("mcu run {}", "elf"), ("mcu info {}", "elf"), ("mcu trace {}", "elf"), ("mcu coverage {}", "elf"),
     ("mcu profile {}", "elf"), ("mcu pins {}", "elf"), ("mcu debug {}", "elf"), ("mcu compare-silicon {}", "log"),
+    ("mcu compare-cores {}", "elf"),
     (f"mcu run {MOTORS} --attach sd-card,on=SPI1,select=PA4,image={{}}", "img"),
     ("check {}", "toml"), ("run {}", "toml"), ("run dodge --firmware {}", "elf"), ("run dodge --world {}", "toml"),
     ("run dodge --world {}", "map"), ("run dodge --inputs {}", "jsonl"),

@@ -146,11 +146,12 @@ uint32_t cycles_until(const struct row *row, uint32_t address)
     return one == NULL ? row->costs[1] : one->cycle;
 }
 
-/* What is left of a block when the core stands inside it; null without memory for it. */
-static struct row *rest_of(struct row *whole, uint32_t address)
+/* What is left of a block when the core stands inside it, or before an LDM or STM of which so many words are moved; null
+ * without memory for it. */
+static struct row *rest_of(struct row *whole, uint32_t address, uint32_t moved)
 {
     for (struct row *row = whole->rests; row != NULL; row = row->next) {
-        if (row->start == address) {
+        if (row->start == address && row->moved == moved) {
             return row;
         }
     }
@@ -158,14 +159,15 @@ static struct row *rest_of(struct row *whole, uint32_t address)
     const uint32_t count = first == NULL ? 0 : whole->count - (uint32_t)(first - whole->instructions);
     struct row *row = count ? malloc(sizeof *row + count * sizeof *first) : NULL;
     if (row != NULL) {
+        const uint32_t done = first->cycle + moved;
         *row = (struct row){.start = address, .end = whole->end, .plain_start = NOWHERE, .flags = whole->flags, .count = count,
-                            .costs = {whole->costs[0] - first->cycle, whole->costs[1] - first->cycle},
-                            .passed = {NEVER, NEVER}, .span = whole->span - first->cycle, .whole = whole,
-                            .ways = whole->ways,
+                            .costs = {whole->costs[0] - done, whole->costs[1] - done},
+                            .passed = {NEVER, NEVER}, .span = whole->span - done, .whole = whole,
+                            .ways = whole->ways, .moved = moved,
                             .next = whole->rests};
         memcpy(row->instructions, first, count * sizeof *first);
         for (uint32_t n = 0; n < count; ++n) {
-            row->instructions[n].cycle -= first->cycle;
+            row->instructions[n].cycle -= n ? done : first->cycle;
         }
         whole->rests = row;
     }
@@ -304,7 +306,7 @@ static void enter_rest(struct core *core, uint32_t address, uint32_t size)
             return;
         }
     }
-    struct row *rest = row == NULL ? NULL : rest_of(row, address);
+    struct row *rest = row == NULL ? NULL : rest_of(row, address, 0);
     if (rest != NULL) {
         begin_block(core, rest);
         unmask(core, rest);
@@ -350,7 +352,9 @@ static enum way act_within(struct core *core, uint64_t due)
     const uint64_t began = s->cycle, limit = core->limit;
     s->cycle += due;
     core->limit = NEVER;
+    core->within = due;
     const enum way way = goes_on(core, row->start);
+    core->within = 0;
     core->limit = limit;
     s->stop_at = s->stop_at < limit ? s->stop_at : limit;
     if (way != ELSEWHERE) {
@@ -416,6 +420,11 @@ void core_on_known_block(void *interpreter, uint64_t at, uint32_t size, void *us
         enter_rest(core, (uint32_t)at, size);
     } else {
         core_on_block(interpreter, at, size, user);
+        const uint32_t moved = core->interpreter->entering->moved;
+        if (UNLIKELY(moved) && core->block->start == (uint32_t)at) {
+            struct row *rest = rest_of(core->block, core->block->start, moved);
+            begin_block(core, rest == NULL ? core->block : rest);
+        }
     }
     struct row *row = core->block;
     if (row->plain_start == (uint32_t)at) {

@@ -84,6 +84,7 @@ struct row {
     struct loop *loop;   /* where it is one that may poll a counter */
     uint64_t span;       /* what is due in more cycles than these comes behind it */
     struct row *whole, *rests; /* of the rest of a block: the row of all of it; and of that one its rests */
+    uint32_t moved;      /* of a rest: words that its first instruction, LDM or STM, has moved already */
     struct instruction instructions[];
 };
 
@@ -238,6 +239,7 @@ struct core {
     uint32_t skipped_count; /* accesses since that are not yet counted in it */
     struct skipped skipped[SKIPPED];
     struct located located;
+    uint64_t within;        /* an exception that comes now does so this many cycles behind the beginning of an instruction */
     uint32_t is_elsewhere; /* the run ended with an exception that was entered or left: `pc` and all that is known is right */
     uint32_t is_stopping; /* at an access that is not made: the run goes on from its instruction */
     struct row *resumed;  /* the block within which it goes on */

@@ -206,10 +206,24 @@ static unsigned latest(struct core *core, unsigned number)
     return first;
 }
 
+/* The exception comes in the midst of an instruction: where that is an LDM or STM, it goes on behind it with the words that
+ * are not moved yet. Chosen: the first one takes two cycles, each other one. Not so where the frame is a fault. */
+static void leave_undone(struct core *core)
+{
+    const uint32_t room = FRAME_BYTES + 4 + 4 * 16, sp = read_register(core, REG_SP);
+    if (core->within > 1 && sram_at(core, sp - room, room) != NULL) {
+        interpreter_move_some(core->interpreter, (uint32_t)core->within - 1);
+    }
+}
+
 bool enter(struct core *core, unsigned number, uint32_t return_address)
 {
     struct shared *s = &core->shared;
     const uint32_t handler = vector(core, number);
+    if (handler == 0) {
+        return false;
+    }
+    leave_undone(core);
     static const int numbers[10] = {REG_R0,     REG_R0 + 1, REG_R0 + 2, REG_R0 + 3,  REG_R12,
                                     REG_LR,     REG_XPSR,   REG_SP,     REG_CONTROL, REG_CPSR};
     uint32_t value[10];
@@ -222,7 +236,7 @@ bool enter(struct core *core, unsigned number, uint32_t return_address)
         xpsr |= ALIGN_BIT;
     }
     uint32_t *frame = sram_at(core, frame_at, FRAME_BYTES);
-    if (frame == NULL || handler == 0) {
+    if (frame == NULL) {
         return false;
     }
     const uint32_t words[8] = {value[0], value[1], value[2], value[3], value[4], value[5], return_address, xpsr};

@@ -65,7 +65,12 @@ static bool leaves_page(uint32_t page, uint32_t at, const uint8_t *code)
 /* Decodes the block at an address, of which so many bytes are there; null: not even one instruction is. */
 struct block *interpreter_decode(struct interpreter *s, uint32_t address, const uint8_t *code, uint32_t bytes)
 {
-    struct builder to = {.ops = malloc(MOST_OPS * sizeof *to.ops), .pc = address, .it = (uint8_t)s->is.it_state};
+    struct builder to = {.ops = malloc(MOST_OPS * sizeof *to.ops), .pc = address};
+    if (is_continued(s->is.it_state)) {
+        to.next = (uint8_t)(s->is.it_state >> 4);
+    } else {
+        to.it = (uint8_t)s->is.it_state;
+    }
     if (to.ops == NULL) {
         return NULL;
     }
@@ -87,6 +92,7 @@ struct block *interpreter_decode(struct interpreter *s, uint32_t address, const 
         to.end = to.pc + (is_wide ? 4 : 2);
         outcome = add(s, &to, is_wide ? first << 16 | halfword(code + done + 2) : first, is_wide);
         to.it = to.after;
+        to.next = 0;
         done = to.end - address;
         if (outcome == GOES_ON && (bytes - done < 2 || leaves_page(page, to.end, code + done))) {
             interpreter_emit(&to, OP_STRAIGHT_ON, 0, 0, 0, 0);
@@ -97,7 +103,7 @@ struct block *interpreter_decode(struct interpreter *s, uint32_t address, const 
     struct block *block = to.count ? malloc(sizeof *block + to.count * sizeof *to.ops) : NULL;
     if (block != NULL) {
         *block = (struct block){.start = address, .end = address + done, .target = to.target, .it = (uint8_t)s->is.it_state,
-                                .is_thumb = (uint8_t)s->is.is_thumb, .count = to.count};
+                                .is_thumb = (uint8_t)s->is.is_thumb, .moved = to.moved, .count = to.count};
         memcpy(block->ops, to.ops, to.count * sizeof *to.ops);
     }
     free(to.ops);

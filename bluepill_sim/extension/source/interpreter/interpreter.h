@@ -55,6 +55,7 @@ struct block {
     uint32_t start, end, target;
     uint8_t it, is_thumb, is_writable;
     uint8_t is_part;         /* behind its end the core is inside the block that it is a part of */
+    uint8_t moved;           /* words that its first instruction has moved before an exception, and does not any more */
     struct block *links[2];
     /* What the owner knows it by where it takes no attention, and what its ways out cost. */
     void *row;
@@ -104,7 +105,8 @@ struct registers {
     uint32_t r[REGISTERS];
     int64_t nz;       /* N: it is negative; Z: its lower half is 0, so that both may be set */
     uint32_t c, v, q; /* C, Q: 0 or 1; V: bit 31 */
-    uint32_t pc, is_thumb, it_state;
+    uint32_t pc, is_thumb;
+    uint32_t it_state; /* or ICI: the next register of an LDM or STM in bits 7:4, and bits 3:0 are 0 */
     uint32_t ipsr, control, primask, basepri, faultmask;
     uint32_t other_sp; /* MSP or PSP, whichever R13 is not */
     uint32_t has_exclusive, exclusive_address, exclusive_value;
@@ -161,6 +163,7 @@ bool interpreter_load(struct interpreter *s, const struct op *op, uint32_t addre
 bool interpreter_store(struct interpreter *s, const struct op *op, uint32_t address, uint32_t bytes, uint32_t value);
 bool interpreter_is_trapped(struct interpreter *s, const struct op *op, bool is_alignment, uint32_t value);
 uint32_t interpreter_page(struct interpreter *s, uint32_t address, int access, bool *is_denied);
+uint32_t interpreter_move_some(struct interpreter *s, uint32_t most);
 void interpreter_choose_ways(struct interpreter *s);
 /* hooks.c */
 void interpreter_call_block(struct interpreter *s, struct block *block);
@@ -189,6 +192,9 @@ static inline bool stands_inside(const struct interpreter *s, uint32_t pc)
 {
     return s->is.block_start && pc > s->is.block_start && pc < s->is.block_end;
 }
+
+/* Whether an ITSTATE is none, but ICI (ARM B1.4.2). */
+static inline bool is_continued(uint32_t it_state) { return it_state && !(it_state & 15); }
 
 /* The core stands before an instruction: for a hook, a fault or the end of a run. */
 static inline void stand_at(struct interpreter *s, const struct op *op)

@@ -329,11 +329,18 @@ static enum outcome dual(struct builder *to, const struct decoded *one, bool is_
     return wrote(to, one->t == PC || one->a == PC ? PC : NO_REGISTER);
 }
 
-/* Several words from R(n) on (`is_before`: up to it); `change`: whether the base is written back. */
+/* Several words from R(n) on (`is_before`: up to it); `change`: whether the base is written back. One that goes on behind an
+ * exception is the rest of it, from the old base, which a store has to put back. */
 static enum outcome multiple(struct builder *to, bool is_load, uint32_t n, uint32_t list, bool is_before, bool change)
 {
-    const int count = __builtin_popcount(list), step = is_before ? -count : count;
-    struct op *op = emit(to, is_load ? OP_LDM : OP_STM, 0, n, n < SP, list | (uint32_t)((is_before ? -count : 0) & 0xFF) << 16);
+    const uint32_t before = list & ((1u << to->next) - 1);
+    const int count = __builtin_popcount(list), step = is_before ? -count : count, moved = __builtin_popcount(before);
+    if (moved && change && !is_load) {
+        emit(to, OP_ADD_I, n, n, 0, 0u - 4 * (uint32_t)step);
+    }
+    const uint32_t first = (uint32_t)((is_before ? -count : 0) + moved) & 0xFF;
+    struct op *op = emit(to, is_load ? OP_LDM : OP_STM, 0, n, n < SP, (list & ~before) | first << 16);
+    to->moved += (uint8_t)moved;
     op->a = (uint8_t)(change ? step : 0);
     if (!is_load) {
         return GOES_ON;

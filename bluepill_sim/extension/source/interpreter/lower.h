@@ -20,6 +20,8 @@ struct builder {
     uint32_t count, target;
     uint32_t pc, end;   /* of the instruction, and the address after it */
     uint8_t it, after;  /* ITSTATE before and after it */
+    uint8_t next;       /* the register with which an LDM or STM goes on; 0: it begins */
+    uint8_t moved;      /* so many registers of its list come before that; 0 of all instructions behind the first */
     bool has_target;
 };
 

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "interpreter.h"
+#include "micro.h"
 
 enum { MAY_READ = 1, MAY_WRITE = 2, MAY_EXECUTE = 4, WORD_BYTES = 4 };
 
@@ -266,4 +267,54 @@ void interpreter_find_pages(struct interpreter *s, bool is_wanted)
 {
     s->finds_pages = is_wanted;
     interpreter_choose_ways(s);
+}
+
+/* The LDM or STM with which a block begins; null: it does with another instruction, or under IT. */
+static const struct op *first_multiple(const struct block *block)
+{
+    const struct op *op = block->ops;
+    op += block->moved && op->number == OP_ADD_I; /* puts the base back */
+    return op->number == OP_LDM || op->number == OP_STM ? op : NULL;
+}
+
+/* A word of plain memory; null: it is none, or cannot be written. */
+static uint8_t *word_at(const struct interpreter *s, uint32_t address, bool is_load)
+{
+    if (address - s->sram_base < s->sram_words_end) {
+        return s->sram + (address - s->sram_base);
+    }
+    return is_load && address - s->flash_base < s->flash_words_end ? s->flash + (address - s->flash_base) : NULL;
+}
+
+/* An exception comes in the midst of the LDM or STM with which the block that is entered begins: moves the words up to then,
+ * and leaves ICI and the base as the handler finds them. Returns how many; 0: the instruction begins anew.
+ *
+ * It does so under IT, and in front of a base that it would load (TRM r2p0 3.9.1). Chosen: a store whose base is in its
+ * list does, and what moves no plain memory, or is watched. A store writes its base back before, so that the words pushed
+ * are not below the stack; a load does behind its last word, so that neither are those to be popped. */
+uint32_t interpreter_move_some(struct interpreter *s, uint32_t most)
+{
+    const struct op *op = first_multiple(s->entering);
+    if (op == NULL || s->access_hooks || s->entering->it & 15) {
+        return 0;
+    }
+    const bool is_load = op->number == OP_LDM, is_put_back = op != s->entering->ops;
+    const uint32_t own = op->imm >> op->n & 1, base = s->is.r[op->n] + (is_put_back ? s->entering->ops[0].imm : 0);
+    uint32_t address = base + 4 * (uint32_t)(int8_t)(op->imm >> 16), left = op->imm & 0xFFFF, count = 0;
+    if (base & 3 || (own && !is_load && op->a)) {
+        return 0;
+    }
+    for (; count < most && left & (left - 1); left &= left - 1, address += 4, ++count) {
+        const uint32_t number = (uint32_t)__builtin_ctz(left);
+        uint8_t *word = word_at(s, address, is_load);
+        if (word == NULL || (is_load && number == op->n)) {
+            break;
+        }
+        memcpy(is_load ? (uint8_t *)&s->is.r[number] : word, is_load ? word : (uint8_t *)&s->is.r[number], sizeof s->is.r[number]);
+    }
+    if (count) {
+        s->is.r[op->n] = is_load ? s->is.r[op->n] : base + 4 * (uint32_t)(int8_t)op->a;
+        s->is.it_state = (uint32_t)__builtin_ctz(left) << 4;
+    }
+    return count;
 }

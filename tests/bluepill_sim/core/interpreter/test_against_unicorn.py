@@ -8,10 +8,23 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.bluepill_sim.core.interpreter.lockstep import ROWS, RUN_BY_UNICORN, Case, Lockstep, flags_of, made, places
+from tests.bluepill_sim.core.interpreter.lockstep import (
+    FLASH,
+    FLASH_BYTES,
+    ROWS,
+    RUN_BY_UNICORN,
+    SRAM,
+    SRAM_BYTES,
+    Case,
+    Lockstep,
+    flags_of,
+    made,
+    places,
+)
 
-#: chosen: of each encoding in `make test`; ten thousand of a second's cases each.
-EACH, SEQUENCES = 12, 3000
+#: chosen: of each encoding, and sequences: some quickly, more in `make test`.
+EACH = (6, pytest.param(20, marks=pytest.mark.slow))
+SEQUENCES = (1500, pytest.param(6000, marks=pytest.mark.slow))
 SP = 0x2000_0800
 
 
@@ -21,25 +34,25 @@ def assert_same(lockstep: Lockstep, cases: list[Case]) -> None:
     assert not found, "\n".join(found)
 
 
-@pytest.mark.slow  # 1.5 s
-def test_each_encoding_does_what_it_does_on_unicorn(lockstep: Lockstep) -> None:
-    dice = random.Random(38)
-    assert_same(lockstep, [made(dice, [row]) for row in ROWS for _ in range(EACH)])
+@pytest.mark.parametrize("each", EACH)
+def test_each_encoding_does_what_it_does_on_unicorn(lockstep: Lockstep, each: int) -> None:
+    dice = random.Random(38 + each)
+    assert_same(lockstep, [made(dice, [row]) for row in ROWS for _ in range(each)])
 
 
-@pytest.mark.slow  # 2 s
-def test_sequences_do_what_they_do_on_unicorn(lockstep: Lockstep) -> None:
-    dice = random.Random(39)
-    assert_same(lockstep, [made(dice) for _ in range(SEQUENCES)])
+@pytest.mark.parametrize("count", SEQUENCES)
+def test_sequences_do_what_they_do_on_unicorn(lockstep: Lockstep, count: int) -> None:
+    dice = random.Random(39 + count)
+    assert_same(lockstep, [made(dice) for _ in range(count)])
 
 
-@pytest.mark.slow  # 1 s
-def test_each_encoding_in_an_it_block_does_what_it_does_on_unicorn(lockstep: Lockstep) -> None:
-    dice = random.Random(40)
+@pytest.mark.parametrize("each", EACH)
+def test_each_encoding_in_an_it_block_does_what_it_does_on_unicorn(lockstep: Lockstep, each: int) -> None:
+    dice = random.Random(40 + each)
     it = next(row for row in ROWS if row.operation == "IT")
     barred = {"IT", "CBZ", "CBNZ", "B_T1", "B_T3", "CPS", "ISB"}
     rows = [row for row in ROWS if row.operation not in barred]
-    cases = [made(dice, [it, row]) for row in rows for _ in range(8)]
+    cases = [made(dice, [it, row]) for row in rows for _ in range(each)]
     assert_same(lockstep, [case for case in cases if case.words[0] & 0xF == 8])  # of one instruction
     assert any(case.words[0] & 0xF == 8 for case in cases)
 
@@ -102,7 +115,41 @@ def test_shifts_at_their_bounds_carry_what_they_carry_on_unicorn(lockstep: Locks
         for amount in amounts
         for flags in (0, 4)
     ]
-    cases += [Case((word,), (0, value, *(0,) * 11, SP, 0), 4 << 27) for word in by_constant for value in values]
+    # RRX, LSR #32 and ASR #32 as operands: of MOV, MVN, ADD, SUB, AND, ADC and TST, with flags and without.
+    moves = (0xEA4F_0000, 0xEA5F_0000, 0xEA6F_0000)
+    others = (0xEB02_0000, 0xEB12_0000, 0xEBA2_0000, 0xEA02_0000, 0xEA12_0000, 0xEB42_0000, 0xEA12_0F00)
+    by_constant += tuple(word | shift | 1 for word in (*moves, *others) for shift in (0x10, 0x20, 0x30))
+    cases += [
+        Case((word,), (0, value, 3, *(0,) * 10, SP, 0), flags << 27)
+        for word in by_constant
+        for value in values
+        for flags in (0, 4)
+    ]
+    assert_same(lockstep, cases)
+
+
+def test_divisions_at_their_bounds_give_what_they_give_on_unicorn(lockstep: Lockstep) -> None:
+    values = (0, 1, 2, 7, 0x7FFF_FFFF, 0x8000_0000, 0x8000_0001, 0xFFFF_FFFF)
+    cases = [
+        Case((word,), (5, dividend, divisor, *(0,) * 10, SP, 0), 0)
+        for word in (0xFB91_F0F2, 0xFBB1_F0F2)  # SDIV, UDIV R0, R1, R2
+        for dividend in values
+        for divisor in values
+    ]
+    assert_same(lockstep, cases)
+
+
+def test_accesses_at_the_ends_of_memory_do_what_they_do_on_unicorn(lockstep: Lockstep) -> None:
+    """The last word, what reaches over the end or begins there, and the same at the first."""
+    accesses = (0x6808, 0x8808, 0x7808, 0x5E88, 0x6008, 0x8008, 0x7008)  # LDR, LDRH, LDRB, LDRSH, STR, STRH, STRB
+    several = (0xC909, 0xC109, 0xE9D1_0300, 0xE9C1_0300)  # LDM, STM, LDRD, STRD of R0 and R3 from R1
+    edges = (SRAM, SRAM + SRAM_BYTES, FLASH, FLASH + FLASH_BYTES)
+    cases = [
+        Case((word,), (0x1234_5678, edge + off, *(0,) * 11, SP, 0), 0)
+        for edge in edges
+        for word in (*accesses, *several)
+        for off in (range(-6, 3) if word in accesses else (-12, -8, -4, 0, 4))
+    ]
     assert_same(lockstep, cases)
 
 

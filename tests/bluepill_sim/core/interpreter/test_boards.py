@@ -7,6 +7,9 @@ import pytest
 
 from bluepill_sim import BluePill
 from bluepill_sim.core import HaltKind, WatchKind, Watchpoint
+from bluepill_sim.core.unicorn_core import UnicornCore
+from bluepill_sim.errors import BluePillError
+from bluepill_sim.extension.library import core_chosen
 from bluepill_sim.native.interpreter_core import InterpreterCore
 from tests.bluepill_sim.machine import listen
 from tests.bluepill_sim.native.test_native_core import PROGRAMS, story
@@ -76,10 +79,11 @@ def test_the_ways_that_blocks_were_left_by_are_those_of_unicorn(make: MakeBoard,
     assert {elsewhere for _, elsewhere in found["own"]} == {False, True}
 
 
-@pytest.mark.parametrize("program", [*PROGRAMS])
-@pytest.mark.slow  # 0.5 to 3 s each
-def test_every_slice_ends_in_the_same_state(make: MakeBoard, program: str) -> None:
-    steps = story(38, 40)
+@pytest.mark.parametrize(
+    ("program", "slices"), [("dodge", 12), *(pytest.param(name, 40, marks=pytest.mark.slow) for name in PROGRAMS)]
+)
+def test_every_slice_ends_in_the_same_state(make: MakeBoard, program: str, slices: int) -> None:
+    steps = story(38, slices)
     own, native = (live(make(program, core), steps) for core in CORES)
     for number, (one, other) in enumerate(zip(own, native, strict=True)):
         assert one == other, number
@@ -139,3 +143,20 @@ def test_break_and_watchpoints_halt_at_the_same_places(make: MakeBoard) -> None:
         seen[core] = halts
     assert seen["own"] == seen["native"]
     assert {halt.kind for halt, *_ in seen["own"] if halt} == {HaltKind.BREAKPOINT, HaltKind.WATCHPOINT}
+
+
+def test_a_core_may_be_chosen_whatever_the_environment_says(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("P2OS_CORE", "python")
+
+    def core_of(name: str = "") -> type:
+        if not name:
+            return type(BluePill(str(PROGRAMS["motors"])).chip.engine._core)
+        with core_chosen(name):
+            return core_of()
+
+    assert [core_of(name) for name in ("own", "exact", "native", "python", "")] == [
+        InterpreterCore, InterpreterCore, UnicornCore, UnicornCore, UnicornCore
+    ]  # fmt: skip
+    with pytest.raises(BluePillError, match="no such core"):
+        core_of("another")
+    assert core_of() is UnicornCore

@@ -78,6 +78,30 @@ def test_16_bit_words_are_the_instructions_that_binutils_reads(tmp_path: Path, s
     assert not wrong, f"{len(wrong)}: " + "; ".join(wrong[:20])
 
 
+@pytest.mark.parametrize(
+    ("word", "text"),
+    [
+        (0x1888, "ADDS R0, R1, R2"), (0x44B9, "ADD R9, R7"), (0xD1FE, "BNE label"), (0xDDFE, "BLE label"),
+        (0xF43F_AFFE, "BEQ.W label"), (0xFB92_F1F3, "SDIV R1, R2, R3"), (0xE890_0F00, "LDM R0{!}, {registers}"),
+    ],
+)  # fmt: skip
+def test_an_instruction_is_written_with_its_registers_and_condition(word: int, text: str) -> None:
+    row = find(word, is_wide=word >> 16 != 0)
+    assert row is not None
+    assert row.written(word) == text
+
+
+def test_the_tables_are_of_one_width_each() -> None:
+    assert not any(row.is_wide for row in NARROW)
+    assert all(row.is_wide for row in WIDE)
+
+
+def test_an_s_is_written_where_a_bit_chooses_flags() -> None:
+    for row in (*NARROW, *WIDE):
+        chooses = "s" in row.fields and row.kind is Kind.PLAIN
+        assert ("{S}" in row.syntax) is chooses, row
+
+
 def test_32_bit_words_are_the_instructions_that_binutils_reads(tmp_path: Path) -> None:
     dice = random.Random(3)
     words = [

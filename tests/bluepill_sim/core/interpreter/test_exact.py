@@ -6,7 +6,6 @@ down what was stacked. Cycles are those of the Cortex-M3 TRM r1p1, table 18-1, a
 
 from collections.abc import Callable
 from itertools import accumulate
-from operator import itemgetter
 
 import pytest
 
@@ -275,66 +274,3 @@ def test_a_way_to_a_block_that_is_known_already_is_noted(boot: Boot, monkeypatch
         found[core] = machine.board.gone_ways
         assert (machine.label("last") + 2, True) in found[core], core
     assert found["native"] == found["own"] == found["exact"]
-
-
-#: SysTick ticks once, `load` + 1 cycles behind the start S of the last store; SVC's handler begins at S + 1 + 1 + 12.
-CHAINED = (
-    """
-mov32 r6, #0xE0001000
-mov32 r4, #0xE000ED04
-mov32 r5, #0x10000000
-mov32 r1, #0xE000ED1C
-mov32 r2, #0x80000000
-str r2, [r1, #0]
-mov32 r2, #{priorities}
-str r2, [r1, #4]
-mov32 r1, #0xE000E010
-movs r2, #{load}
-str r2, [r1, #4]
-movs r2, #7
-str r2, [r1, #0]
-svc #0
-"""
-    + "nop\n" * 8
-    + """b stop
-call: {call}
-bx lr
-pend: ldr r0, [r6, #4]
-movs r3, #14
-b put
-tick: ldr r0, [r6, #4]
-movs r3, #15
-mov32 r1, #0xE000E010
-movs r2, #0
-str r2, [r1, #0]
-put: str r3, [r7, #0]
-str r0, [r7, #4]
-adds r7, #8
-bx lr
-"""
-)
-
-
-def chained(boot: Boot, load: int, *, tick: int, call: str) -> list[tuple[int, int]]:
-    """Return (exception, when its handler began) of PendSV and SysTick, the earlier one first."""
-    source = COUNTER_ON + CHAINED.format(priorities=tick << 24 | 0xC0 << 16, load=load, call=call)
-    log = boot(source, {11: "call", PENDSV: "pend", SYSTICK: "tick"}).run(40).log
-    return sorted(zip(log[::2], log[1::2], strict=True), key=itemgetter(1))
-
-
-def test_an_exception_that_comes_while_the_frame_is_read_is_chained_at_once(boot: Boot) -> None:
-    """Two nops, bx lr: the return begins at S + 17, and is over twelve cycles later."""
-    begins = {load: chained(boot, load, tick=0xC0, call="nop\nnop")[0][1] for load in range(10, 31)}
-    first = begins[10]  # 6 behind the return
-    assert [begins[load] - first for load in range(10, 17)] == [0] * 7
-    assert [begins[load] - first for load in range(17, 28)] == list(range(1, 12)), "6 behind its arrival"
-    assert [begins[load] - first for load in (28, 29, 30)] == [18, 19, 20], "the thread has gone on: a new frame, 12"
-
-
-def test_an_exception_of_higher_priority_that_comes_in_a_tail_chain_is_served_first(boot: Boot) -> None:
-    """str, bx lr: the return begins at S + 16; PendSV's handler, or what is late, six cycles on."""
-    rows = {load: chained(boot, load, tick=0x10, call="str r5, [r4, #0]") for load in range(15, 24)}
-    first = rows[15][0][1]
-    assert [row[0] for row in rows.values()] == [(SYSTICK, first)] * 7 + [(PENDSV, first)] * 2
-    # PendSV's handler has begun its load of two cycles: a frame of 12 behind that.
-    assert [rows[load][1] for load in (22, 23)] == [(SYSTICK, first + 2 + 12)] * 2
