@@ -19,8 +19,9 @@ _HEAD = """# The order of things: what public drivers say, as tests
 Made by `python -m tools.generators.sequences` from the tables in `tests/bluepill_sim/peripherals/sequences`.
 Drivers, headers and manuals say in which order a peripheral wants things: what comes first, what only works after
 something else, what clears a flag. Each such sentence is a row here, in our words: where it stands, and whether the
-models of [peripherals.md](peripherals.md) hold it. A row is checked on a chip as it comes out of reset, by its registers alone
-(exceptions and sleep by a program), and `make test` runs every check; a row that the models do not answer says why not.
+models of [peripherals.md](peripherals.md) hold it. A row is checked on a chip as it comes out of reset, by its
+registers alone (exceptions and sleep by a program), and `make test` runs every check; a row that the models do not
+answer says why.
 Facts are taken from the sources, nothing of their text or code. Nothing here was measured on silicon.
 
 To add one: a function with `@TABLE.row(...)` in the file of its peripheral, seen to fail with the model broken by hand,

@@ -88,6 +88,8 @@ def ours(heading: str) -> Page:
 _HAL = ("ST HAL", "STMicroelectronics/stm32f1xx_hal_driver", "bf83dda39877a51647d249eab56895ccce8a4f31")
 #: Its sources and its headers, by the peripheral in their names.
 HAL, HAL_H = Repository(*_HAL, "Src/stm32f1xx_hal_{}.c"), Repository(*_HAL, "Inc/stm32f1xx_hal_{}.h")
+#: Those of what a peripheral has beyond the others of its kind.
+HAL_EX = Repository(*_HAL, "Src/stm32f1xx_hal_{}_ex.c")
 _LOCM3 = ("libopencm3", "libopencm3/libopencm3", "2da12dc96e0b9e42a3332348dd9b02a0a17981f8")
 #: Its drivers of the family, and its headers.
 LOCM3, LOCM3_H = Repository(*_LOCM3, "lib/stm32/{}.c"), Repository(*_LOCM3, "include/libopencm3/{}.h")
