@@ -93,6 +93,7 @@ HAL_EX = Repository(*_HAL, "Src/stm32f1xx_hal_{}_ex.c")
 _LOCM3 = ("libopencm3", "libopencm3/libopencm3", "2da12dc96e0b9e42a3332348dd9b02a0a17981f8")
 #: Its drivers of the family, and its headers.
 LOCM3, LOCM3_H = Repository(*_LOCM3, "lib/stm32/{}.c"), Repository(*_LOCM3, "include/libopencm3/{}.h")
+LOCM3_CORE = Repository(*_LOCM3, "lib/cm3/{}.c")
 _PORTS = "os/hal/ports/STM32/{}.c"
 CHIBIOS = Repository("ChibiOS", "ChibiOS/ChibiOS", "0c20d86ff1a4a104666be9af1d08b6bcba6c9a8b", _PORTS)
 NUTTX = Repository("NuttX", "apache/nuttx", "4ebc8a7291df955dece09073b8798db2dfd6490b", "arch/arm/src/{}.c")

@@ -11,7 +11,7 @@ from tools.generators import sequences
 
 CHECKED = [row for row in ROWS if row.check is not None]
 #: What the table has at least, of rows and of peripherals.
-LEAST_ROWS, LEAST_PERIPHERALS = 60, 5
+LEAST_ROWS, LEAST_PERIPHERALS = 300, 20
 
 
 @pytest.mark.parametrize("row", CHECKED, ids=lambda row: row.name)
