@@ -3,13 +3,14 @@
 Usage: python -m tools.generators.sequences
 """
 
+from collections import Counter
 from collections.abc import Sequence
 from itertools import groupby
 from operator import attrgetter
 from pathlib import Path
 
 from tests.bluepill_sim.peripherals.sequences.row import SequenceRow
-from tests.bluepill_sim.peripherals.sequences.sources import Citation, Repository
+from tests.bluepill_sim.peripherals.sequences.sources import Citation
 from tests.bluepill_sim.peripherals.sequences.table import ROWS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -48,14 +49,13 @@ def _share(tables: dict[str, tuple[SequenceRow, ...]]) -> str:
 
 def _sources(rows: Sequence[SequenceRow]) -> str:
     cited = [source for row in rows for source in row.sources]
-    places: dict[Repository, int] = {}
-    for source in cited:
-        if isinstance(source, Citation):
-            places[source.repository] = places.get(source.repository, 0) + 1
+    places = Counter(
+        (one.repository.name, one.repository.owner, one.repository.commit) for one in cited if isinstance(one, Citation)
+    )
     lines = ["| name | repository, commit | citations |", "|---|---|---|"]
     lines += [
-        f"| {each.name} | [{each.owner}](https://github.com/{each.owner}) {each.commit} | {count} |"
-        for each, count in sorted(places.items(), key=lambda item: -item[1])
+        f"| {name} | [{owner}](https://github.com/{owner}) {commit} | {count} |"
+        for (name, owner, commit), count in places.most_common()
     ]
     others = sum(not isinstance(source, Citation) for source in cited)
     lines.append(

@@ -266,7 +266,7 @@ def _(chip: Bench, is_locked: int) -> None:
     "filter-first",
     "Without an active filter nothing is received.",
     HAL("can", 954),
-    LOCM3("can", 239),
+    LOCM3("can", 241),
     rm("24.7.4"),
 )
 def _(chip: Bench) -> None:
@@ -302,7 +302,7 @@ def _(chip: Bench, name: str) -> None:
 @CAN.row(
     "bank-off-first",
     "The words of a bank are written only while it is off or with FINIT: drivers switch it off before.",
-    LOCM3("can", 207),
+    LOCM3("can", 208),
     KLIPPER("can", 146),
     rm("24.9.4"),
     values=st.integers(0, 27),
@@ -384,15 +384,31 @@ def _(chip: Bench) -> None:
 )
 def _(chip: Bench, by_itself: int) -> None:
     chip.clock("CAN", "GPIOA")
+    network = bus.network(chip, CanNode())
     bus.set_up(chip, control=by_itself * ABOM)
-    chip.drive("PA11", True)
+    network.damage(32)
     bus.send(chip, 1)
     chip.run(3_000 * BIT_NS)
-    assert chip["CAN.ESR.TEC"] == 128
+    chip.run(128 * 11 * BIT_NS)
+    assert chip["CAN.ESR.BOFF"] == 1 - by_itself
+    chip["CAN.MCR"] = INRQ | by_itself * ABOM
+    chip["CAN.MCR"] = by_itself * ABOM
+    chip.run(130 * 11 * BIT_NS)
     assert not chip["CAN.ESR.BOFF"]
-    chip["CAN.TSR"] = 1 << 7
-    chip.run(500 * BIT_NS)
-    assert chip["CAN.ESR.EPVF"]
+
+
+@CAN.row(
+    "no-acknowledge",
+    "Without a node that acknowledges a frame is tried again without end, and counts TEC up to 128 alone.",
+    rm("24.7.6"),
+    ours("bxCAN"),
+)
+def _(chip: Bench) -> None:
+    chip.clock("CAN", "GPIOA")
+    bus.set_up(chip)
+    bus.send(chip, 1)
+    chip.run(3_000 * BIT_NS)
+    assert (chip["CAN.ESR.TEC"], chip["CAN.ESR.BOFF"], chip["CAN.ESR.EPVF"], chip["CAN.TSR.RQCP0"]) == (128, 0, 1, 0)
 
 
 @CAN.row(

@@ -241,7 +241,7 @@ def _(chip: Bench) -> None:
 @I2C.row(
     "ack-before-address",
     "ACK is set for a read of many before the bytes come: without it the first one is refused, and none follows.",
-    LOCM3("common/i2c_common_v1", 464),
+    LOCM3("common/i2c_common_v1", 463),
     rm("26.6.1"),
 )
 def _(chip: Bench) -> None:

@@ -42,7 +42,7 @@ def _(chip: Bench) -> None:
 @SPI.row(
     "spe-first",
     "DR that is written before SPE is set waits, and goes out when it is.",
-    HAL("spi", 854),
+    HAL("spi", 853),
     rm("25.3.3"),
     choice="a master begins with the word that it has once it is enabled",
 )
@@ -80,7 +80,7 @@ def _(chip: Bench) -> None:
     "bsy-last",
     "BSY falls after TXE has risen for the last time: a select is let go, or SPE cleared, only after both.",
     KLIPPER("spi", 370),
-    RUST("spi", 563),
+    RUST("spi", 565),
     RIOT("spi", 552),
     LOCM3("common/spi_common_all", 114),
     rm("25.3.8"),
@@ -137,7 +137,7 @@ def _(chip: Bench) -> None:
     "mode-fault",
     "A master whose NSS is low loses MSTR and SPE: MODF, cleared by a read of SR and then a write of CR1.",
     HAL_H("spi", 413),
-    LOCM3("common/spi_common_all", 592),
+    LOCM3("common/spi_common_all", 593),
     rm("25.3.10"),
 )
 def _(chip: Bench) -> None:
@@ -171,7 +171,7 @@ def _(chip: Bench) -> None:
 @SPI.row(
     "ssoe-no-fault",
     "With SSOE a master drives NSS low while SPE is set, and has no mode fault.",
-    LOCM3("common/spi_common_all", 578),
+    LOCM3("common/spi_common_all", 579),
     rm("25.3.1"),
 )
 def _(chip: Bench) -> None:

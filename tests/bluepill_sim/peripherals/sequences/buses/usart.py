@@ -47,7 +47,7 @@ def _(chip: Bench) -> None:
 @USART.row(
     "enable-first",
     "Nothing is sent until UE and TE are set, with a rate in BRR.",
-    LOCM3("common/usart_common_all", 286),
+    LOCM3("common/usart_common_all", 285),
     HAL("uart", 413),
     rm("27.3.2"),
     values=st.sampled_from([0, UE, TE]),
@@ -170,7 +170,7 @@ def _(chip: Bench) -> None:
 @USART.row(
     "txeie-while-empty",
     "TXEIE interrupts for as long as DR is empty: a program with nothing to send takes it back.",
-    KLIPPER("serial", 87),
+    KLIPPER("serial", 88),
     RUST("serial", 652),
     rm("27.4"),
 )
@@ -301,7 +301,7 @@ def _(chip: Bench) -> None:
 @USART.row(
     "errors-with-the-character",
     "FE, NE and PE rise with the character that they are about, and are cleared by SR, then DR.",
-    CHIBIOS("LLD/USARTv1/hal_uart_lld", 1161),
+    CHIBIOS("LLD/USARTv1/hal_uart_lld", 1159),
     HAL_H("uart", 485),
     rm("27.3.3"),
     values=st.sampled_from([(ReceiveError.FRAMING, 2), (ReceiveError.NOISE, 4), (ReceiveError.PARITY, 1)]),
@@ -323,7 +323,7 @@ def _(chip: Bench, case: tuple[ReceiveError, int]) -> None:
     "idle-once",
     "IDLE rises once, a character after the line went idle, is cleared by SR and DR, and not again before a character.",
     RUST("serial", 747),
-    HAL("uart", 1641),
+    HAL("uart", 1642),
     HAL_H("uart", 486),
     rm("27.3.3"),
 )
@@ -347,7 +347,7 @@ def _(chip: Bench) -> None:
 @USART.row(
     "break-after-word",
     "SBK sends a break behind the word under way, and is 0 again at its end.",
-    HAL("uart", 2784),
+    HAL("uart", 2785),
     rm("27.3.2"),
 )
 def _(chip: Bench) -> None:
@@ -364,7 +364,7 @@ def _(chip: Bench) -> None:
     "mute-until-idle",
     "In mute mode no character raises RXNE until the line has been idle for a character, which clears RWU.",
     rm("27.3.6"),
-    HAL("uart", 2810),
+    HAL("uart", 2812),
 )
 def _(chip: Bench) -> None:
     set_up(chip)
@@ -396,7 +396,7 @@ def _(chip: Bench, byte: int) -> None:
     "lbd-needs-linen",
     "A break raises LBD only with LINEN; LBD is cleared by writing 0.",
     CHIBIOS("LLD/USARTv1/hal_uart_lld", 1166),
-    HAL("uart", 580),
+    HAL("uart", 562),
     rm("27.3.8"),
 )
 def _(chip: Bench) -> None:

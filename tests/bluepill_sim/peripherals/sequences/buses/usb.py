@@ -77,8 +77,8 @@ def _(chip: Bench) -> None:
 @USB.row(
     "ef-first",
     "No address is answered until EF is set in DADDR.",
-    TINYUSB(DCD, 240),
-    KLIPPER("usbfs", 386),
+    TINYUSB(DCD, 241),
+    KLIPPER("usbfs", 388),
     rm("23.5.1"),
 )
 def _(chip: Bench) -> None:
@@ -158,7 +158,7 @@ def _(chip: Bench) -> None:
 @USB.row(
     "ctr-not-in-istr",
     "CTR of ISTR is no flag of its own: it is 1 until every endpoint's has been cleared.",
-    TINYUSB(DCD, 417),
+    TINYUSB(DCD, 420),
     CHIBIOS("LLD/USBv1/hal_usb_lld", 451),
     rm("23.5.1"),
 )
@@ -181,9 +181,9 @@ def _(chip: Bench) -> None:
 @USB.row(
     "istr-by-zero",
     "The other flags of ISTR are cleared by 0, so that a driver writes the complement of what it served.",
-    TINYUSB(DCD, 381),
+    TINYUSB(DCD, 382),
     KLIPPER("usbfs", 424),
-    CHIBIOS("LLD/USBv1/hal_usb_lld", 406),
+    CHIBIOS("LLD/USBv1/hal_usb_lld", 407),
     rm("23.5.1"),
 )
 def _(chip: Bench) -> None:
@@ -253,7 +253,7 @@ def _(chip: Bench) -> None:
     "data0-after-stall",
     "A stall that is taken back begins with DATA0: the driver clears DTOG itself.",
     LOCM3("common/st_usbfs_core", 150),
-    TINYUSB(DCD, 847),
+    TINYUSB(DCD, 850),
     rm("23.4.2"),
 )
 def _(chip: Bench) -> None:
@@ -272,7 +272,7 @@ def _(chip: Bench) -> None:
 @USB.row(
     "buffer-size-first",
     "The size of a buffer is written before its endpoint is VALID: a longer packet is stalled, and none of it stored.",
-    TINYUSB(DCD, 345),
+    TINYUSB(DCD, 352),
     rm("23.5.3"),
     values=st.integers(1, 31),
 )
@@ -304,7 +304,7 @@ def _(chip: Bench, word: int) -> None:
 @USB.row(
     "double-buffers-wait",
     "A double-buffered endpoint says NAK while DTOG and SW_BUF are alike, until the program turns SW_BUF over.",
-    KLIPPER("usbfs", 205),
+    KLIPPER("usbfs", 204),
     KLIPPER("usbfs", 233),
     rm("23.4.3"),
 )
@@ -343,7 +343,7 @@ def _(chip: Bench) -> None:
 @USB.row(
     "wakeup-needs-suspend",
     "A resume raises WKUP only while FSUSP is set, and takes LP_MODE away; FSUSP is the program's to clear.",
-    TINYUSB(DCD, 387),
+    TINYUSB(DCD, 388),
     CHIBIOS("LLD/USBv1/hal_usb_lld", 423),
     rm("23.4.5"),
 )

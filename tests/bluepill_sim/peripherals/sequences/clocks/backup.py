@@ -48,7 +48,7 @@ def count(chip: Bench) -> int:
     "PRL, CNT and ALR take a write only in configuration mode.",
     LOCM3("f1/rtc", 15),
     CHIBIOS("LLD/RTCv1/hal_rtc_lld", 82),
-    HAL("rtc", 1712),
+    HAL("rtc", 1715),
     rm("18.3.4"),
 )
 def _(chip: Bench) -> None:
@@ -104,7 +104,7 @@ def _(chip: Bench) -> None:
 @RTC.row(
     "dbp-first",
     "Nothing of RTC is written until PWR has its clock and DBP is set.",
-    LOCM3("f1/rtc", 374),
+    LOCM3("f1/rtc", 377),
     RIOT("rtc_f1", 35),
     HAL("pwr", 140),
     rm("6.2"),
@@ -273,8 +273,8 @@ RTC.not_modelled(
 @BKP.row(
     "clocks-then-dbp",
     "A backup register takes a write only with the clocks of PWR and BKP on and DBP set, in this order.",
-    LOCM3("f1/rtc", 370),
-    HAL("pwr", 134),
+    LOCM3("f1/rtc", 373),
+    HAL("pwr", 139),
     rm("6.1"),
     values=st.integers(0, 0xFFFF),
 )
@@ -330,7 +330,7 @@ def _(chip: Bench) -> None:
     "tamper-level-first",
     "The polarity is set before TPE: a level that is there already is an event when TPE is set.",
     rm("6.3.1"),
-    HAL_EX("rtc", 110),
+    HAL_EX("rtc", 107),
     values=st.integers(0, 1),
 )
 def _(chip: Bench, level: int) -> None:

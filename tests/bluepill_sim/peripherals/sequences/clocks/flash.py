@@ -153,7 +153,7 @@ def _(chip: Bench) -> None:
 @FLASH.row(
     "pg-needed",
     "A write to the array does nothing unless PG is set.",
-    LOCM3("f1/flash", 226),
+    LOCM3("f1/flash", 225),
     pm("2.3.3"),
 )
 def _(chip: Bench) -> None:
@@ -168,7 +168,7 @@ def _(chip: Bench) -> None:
 @FLASH.row(
     "halfwords-only",
     "With PG set only a halfword may be written: a byte or a word is a bus error.",
-    HAL("flash", 797),
+    HAL("flash", 790),
     pm("2.3.3"),
     values=st.sampled_from([1, 4]),
 )
@@ -183,7 +183,7 @@ def _(chip: Bench, size: int) -> None:
 @FLASH.row(
     "page-erase",
     "A page goes by PER, then its address, then STRT; STRT falls, and EOP rises, at the end.",
-    LOCM3("f1/flash", 257),
+    LOCM3("f1/flash", 262),
     RUST("flash", 131),
     pm("2.3.4"),
     values=st.integers(0, 15),
@@ -223,7 +223,7 @@ def _(chip: Bench) -> None:
 @FLASH.row(
     "wait-before-next",
     "CR is not changed while an operation runs: the last one must have ended.",
-    LOCM3("f1/flash", 222),
+    LOCM3("f1/flash", 220),
     RUST("flash", 68),
     HAL("flash_ex", 174),
 )
@@ -303,7 +303,7 @@ def _(chip: Bench, word: int) -> None:
     "options-after-reset",
     "What is written to the option bytes counts from the next reset on: WRPR and OBR show it then.",
     HAL("flash_ex", 387),
-    HAL("flash", 736),
+    HAL("flash", 735),
     pm("2.4"),
 )
 def _(chip: Bench) -> None:

@@ -23,7 +23,7 @@ def sleep(source: str) -> Machine:
     return Machine(f"{CLOCKS}{LINE_4}{source}wfi\nlog #2\nb stop\n{HANDLER}", {26: "irq"}).run(500)
 
 
-@PWR.row("clock-first", "PWR takes nothing until its clock is on.", HAL("pwr", 138), rm("7.3.8"))
+@PWR.row("clock-first", "PWR takes nothing until its clock is on.", HAL("pwr", 143), rm("7.3.8"))
 def _(chip: Bench) -> None:
     chip["PWR.CR"] = DBP
     chip.clock("PWR")
@@ -36,7 +36,7 @@ def _(chip: Bench) -> None:
     "dbp-after-reset",
     "The backup domain is locked behind every reset until DBP is set.",
     LOCM3("common/pwr_common_v1", 34),
-    HAL("pwr", 134),
+    HAL("pwr", 139),
     rm("5.4.1"),
 )
 def _(chip: Bench) -> None:
@@ -108,7 +108,7 @@ def _(chip: Bench) -> None:
 @PWR.row(
     "wkup-pin",
     "WKUP is an input with a pull-down only with EWUP, whatever GPIO says.",
-    HAL("pwr", 500),
+    HAL("pwr", 499),
     LOCM3("common/pwr_common_v1", 148),
     rm("5.4.2"),
 )
@@ -127,7 +127,7 @@ def _(chip: Bench) -> None:
     "sleepdeep-first",
     "WFI means Stop or Standby only with SLEEPDEEP; without it, it is Sleep, where clocks go on.",
     HAL("pwr", 425),
-    HAL("pwr", 473),
+    HAL("pwr", 474),
     rm("5.3.2"),
 )
 def _(_: Bench) -> None:
@@ -245,6 +245,6 @@ def _(_: Bench) -> None:
 PWR.not_modelled(
     "two-wfe",
     "Stop by WFE is asked for behind a SEV and a first WFE, which takes what was noted before.",
-    HAL("pwr", 486),
+    HAL("pwr", 487),
     why="the event register is checked with the core: SCB-event-noted; the second WFE of ST's is for an erratum",
 )

@@ -68,7 +68,7 @@ def _(chip: Bench, factor: int) -> None:
 @RCC.row(
     "pll-locks-after-source",
     "The PLL gets ready only after the oscillator that feeds it.",
-    LOCM3("f1/rcc", 946),
+    CHIBIOS("STM32F1xx/hal_lld", 194),
     rm("7.2.3"),
 )
 def _(chip: Bench) -> None:

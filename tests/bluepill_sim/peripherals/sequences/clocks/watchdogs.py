@@ -28,7 +28,7 @@ def start(chip: Bench, prescaler: int = 0, reload: int = 99) -> None:
 @IWDG.row(
     "unlock-first",
     "PR and RLR take nothing until 0x5555 has been written to KR; any other key locks them again.",
-    HAL("iwdg", 180),
+    HAL("iwdg", 183),
     CHIBIOS("LLD/xWDGv1/hal_wdg_lld", 89),
     LOCM3("common/iwdg_common_all", 106),
     rm("19.3.2"),
@@ -167,7 +167,7 @@ def _(chip: Bench) -> None:
 @WWDG.row(
     "clock-first",
     "WWDG takes nothing until its clock is on, and counts nothing until WDGA is set.",
-    HAL("wwdg", 70),
+    HAL("wwdg", 66),
     rm("20.3"),
 )
 def _(chip: Bench) -> None:
@@ -186,7 +186,7 @@ def _(chip: Bench) -> None:
 @WWDG.row(
     "t6-set",
     "T6 is set with WDGA, else the reset comes at once.",
-    HAL("wwdg", 74),
+    HAL("wwdg", 71),
     rm("20.3"),
     values=st.integers(0, 0x7F),
 )
@@ -199,7 +199,7 @@ def _(chip: Bench, count: int) -> None:
 @WWDG.row(
     "rolls-to-3f",
     "The reset comes when the counter goes from 0x40 to 0x3F.",
-    HAL("wwdg", 27),
+    HAL("wwdg", 29),
     rm("20.3"),
     values=st.integers(0x40, 0x7F),
 )
@@ -215,8 +215,8 @@ def _(chip: Bench, count: int) -> None:
 @WWDG.row(
     "window-only",
     "It is fed only once the counter is at the window or below: earlier is a reset.",
-    HAL("wwdg", 29),
-    HAL("wwdg", 82),
+    HAL("wwdg", 31),
+    HAL("wwdg", 79),
     rm("20.4"),
 )
 def _(chip: Bench) -> None:
@@ -234,8 +234,8 @@ def _(chip: Bench) -> None:
 @WWDG.row(
     "not-disabled",
     "WDGA and EWI, once set, are cleared by a reset alone.",
-    HAL("wwdg", 32),
-    HAL("wwdg", 38),
+    HAL("wwdg", 34),
+    HAL("wwdg", 40),
     rm("20.6"),
 )
 def _(chip: Bench) -> None:
@@ -273,7 +273,7 @@ def _(chip: Bench) -> None:
 @WWDG.row(
     "prescaler",
     "WDGTB makes each count twice as long with each step; a count follows PCLK1.",
-    HAL("wwdg", 43),
+    HAL("wwdg", 44),
     rm("20.4"),
     values=st.integers(0, 3),
 )
@@ -291,7 +291,7 @@ def _(chip: Bench, step: int) -> None:
 IWDG.not_modelled(
     "debug-stop",
     "DBG_IWDG_STOP decides whether it counts while a debugger halts the core.",
-    HAL("iwdg", 46),
+    HAL("iwdg", 49),
     why="checked with the debugger's tests, not by registers alone: test_stopped_clocks.py",
 )
 WWDG.not_modelled(

@@ -30,7 +30,7 @@ def _(chip: Bench) -> None:
 @CRC.row(
     "goes-on",
     "A word goes on from what stands in DR: without a RESET the next value is that of both.",
-    HAL("crc", 217),
+    HAL("crc", 221),
     rm("4.3"),
     values=st.integers(0, 0xFFFF_FFFF),
 )
@@ -60,7 +60,7 @@ def _(chip: Bench) -> None:
 @CRC.row(
     "read-is-result",
     "DR reads the result, not the word that was written, as often as it is read.",
-    HAL("crc", 239),
+    HAL("crc", 240),
     rm("4.3"),
 )
 def _(chip: Bench) -> None:

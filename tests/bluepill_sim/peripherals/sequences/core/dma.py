@@ -200,7 +200,7 @@ def _(chip: Bench) -> None:
     "no-circular-copy",
     "Circular mode is not for memory to memory: that ends after its count.",
     LOCM3("common/dma_common_l1f013", 241),
-    HAL("dma", 30),
+    HAL("dma", 31),
     rm("13.3.3"),
     choice="MEM2MEM wins over CIRC, and is warned of",
 )
@@ -228,7 +228,7 @@ def _(chip: Bench) -> None:
 @DMA.row(
     "unclocked-peripheral",
     "The peripheral of a channel is clocked and set up before its channel is enabled.",
-    HAL("dma", 14),
+    HAL("dma", 16),
     ours("DMA1"),
     choice="without its clock the access is an error of the bus: TEIF",
 )
@@ -246,7 +246,7 @@ def _(chip: Bench) -> None:
 @DMA.row(
     "dir-swaps",
     "DIR says which address is read: of 1 the memory's.",
-    LOCM3("common/dma_common_l1f013", 262),
+    LOCM3("common/dma_common_l1f013", 255),
     rm("13.4.3"),
 )
 def _(chip: Bench) -> None:
@@ -260,7 +260,7 @@ def _(chip: Bench) -> None:
     "priority-then-number",
     "Of channels that ask at once the one with the higher PL goes first, of equals the lower number.",
     rm("13.3.2"),
-    HAL("dma", 24),
+    HAL("dma", 23),
     values=st.integers(0, 3),
 )
 def _(chip: Bench, priority: int) -> None:

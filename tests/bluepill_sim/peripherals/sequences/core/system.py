@@ -199,7 +199,7 @@ def _(_: Bench, key: int) -> None:
     "reset-request",
     "SYSRESETREQ with the key resets the chip; stores before it are done.",
     CMSIS("core_cm3", 1800),
-    HAL("flash", 739),
+    HAL("flash", 740),
     arm("B3.2.6"),
 )
 def _(_: Bench) -> None:
@@ -239,7 +239,7 @@ def _(_: Bench) -> None:
 @SCB.row(
     "event-noted",
     "A SEV before WFE is noted, and that WFE goes on at once; the next one waits.",
-    HAL("pwr", 485),
+    HAL("pwr", 486),
     arm("B1.5.18"),
 )
 def _(_: Bench) -> None:

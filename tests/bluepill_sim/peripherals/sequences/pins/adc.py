@@ -82,7 +82,7 @@ def _(chip: Bench) -> None:
     "adon-again",
     "A second write of ADON that changes no other bit of CR2 starts a conversion; with another bit it does not.",
     RUST("adc", 406),
-    HAL("adc", 1115),
+    HAL("adc", 1116),
     rm("11.12.3"),
 )
 def _(chip: Bench) -> None:
@@ -99,7 +99,7 @@ def _(chip: Bench) -> None:
     "trigger-needs-exttrig",
     "SWSTART starts only with EXTTRIG set and EXTSEL at software.",
     HAL("adc", 1121),
-    RIOT("adc_f1", 118),
+    RIOT("adc_f1", 120),
     LOCM3("common/adc_common_v1", 712),
     rm("11.3.7"),
     values=st.integers(0, 7),
@@ -142,7 +142,7 @@ def _(chip: Bench) -> None:
 @ADC.row(
     "rstcal-until-clear",
     "RSTCAL reads 1 until the registers of the calibration are reset, and is waited for before CAL.",
-    RIOT("adc_f1", 103),
+    RIOT("adc_f1", 105),
     HAL_EX("adc", 163),
     rm("11.12.3"),
 )
@@ -158,7 +158,7 @@ def _(chip: Bench) -> None:
     "eoc-by-dr",
     "EOC is cleared by a read of DR, or by writing 0.",
     HAL("adc", 1767),
-    RUST("adc", 419),
+    RUST("adc", 420),
     rm("11.12.1"),
 )
 def _(chip: Bench) -> None:
@@ -386,7 +386,7 @@ def _(chip: Bench, case: tuple[int, int, int]) -> None:
     "sensor-needs-tsvrefe",
     "Channels 16 and 17 have a value only with TSVREFE set before, and at ADC1 alone.",
     HAL("adc", 2059),
-    RIOT("adc_f1", 120),
+    RIOT("adc_f1", 122),
     rm("11.10"),
 )
 def _(chip: Bench) -> None:
@@ -405,7 +405,7 @@ def _(chip: Bench) -> None:
     "analog-pin-first",
     "A channel's pin is made an analog input before it is converted.",
     RIOT("adc_f1", 90),
-    HAL("gpio", 70),
+    HAL("gpio", 71),
     rm("11.2"),
     choice="it is converted all the same, and warned of",
 )
@@ -420,7 +420,7 @@ def _(chip: Bench) -> None:
 @ADC.row(
     "clock-below-14-mhz",
     "ADCPRE keeps ADCCLK at 14 MHz or less, and is set before the first conversion.",
-    RIOT("adc_f1", 93),
+    RIOT("adc_f1", 94),
     HAL("adc", 391),
     rm("7.3.2"),
 )

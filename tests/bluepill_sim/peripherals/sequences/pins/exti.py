@@ -18,8 +18,8 @@ def listen(chip: Bench, line: int, rising: int = 1, falling: int = 0) -> None:
 @EXTI.row(
     "edge-first",
     "No edge counts until RTSR or FTSR has chosen it, for one line both if both are set.",
-    HAL("exti", 56),
-    LOCM3("common/exti_common_all", 47),
+    HAL("exti", 57),
+    LOCM3("common/exti_common_all", 45),
     rm("10.2.1"),
     values=st.integers(0, 3),
 )
@@ -55,7 +55,7 @@ def _(chip: Bench) -> None:
 @EXTI.row(
     "pending-while-masked",
     "PR is set by an edge of a masked line too; the interrupt comes when IMR lets it through.",
-    RIOT("gpio_f1", 247),
+    RIOT("gpio_f1", 248),
     rm("10.2.1"),
     ours("EXTI"),
     choice="RIOT filters what it reads of PR by IMR, which is of use only so; ST's diagram agrees",
@@ -89,8 +89,8 @@ def _(chip: Bench, line: tuple[int, int]) -> None:
 @EXTI.row(
     "port-by-exticr",
     "Line n is the pin n of one port alone, that which EXTICR names.",
-    HAL("exti", 43),
-    HAL("gpio", 291),
+    HAL("exti", 45),
+    HAL("gpio", 292),
     rm("9.4.3"),
     values=st.integers(5, 12),
 )
@@ -180,7 +180,7 @@ def _(chip: Bench) -> None:
 @EXTI.row(
     "clear-in-handler",
     "A handler that does not clear PR is entered again at once.",
-    RIOT("gpio_f1", 242),
+    RIOT("gpio_f1", 245),
     rm("10.3.6"),
 )
 def _(_: Bench) -> None:

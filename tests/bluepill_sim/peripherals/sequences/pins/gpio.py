@@ -21,7 +21,7 @@ def configure(chip: Bench, pin: int, nibble: int, port: str = "GPIOB") -> None:
 @GPIO.row(
     "input-after-reset",
     "During and after a reset every pin but those of JTAG is a floating input.",
-    HAL("gpio", 87),
+    HAL("gpio", 88),
     rm("9.1.2"),
 )
 def _(chip: Bench) -> None:
@@ -67,7 +67,7 @@ def _(chip: Bench, level: int) -> None:
 @GPIO.row(
     "pull-by-odr",
     "Which pull a pulled input has is what ODR says, before or after the mode.",
-    HAL("gpio", 255),
+    HAL("gpio", 256),
     rm("9.1.1"),
     values=st.integers(0, 15).filter(lambda pin: pin not in {2, 3, 4}),
 )
@@ -172,7 +172,7 @@ def _(chip: Bench, pin: int) -> None:
     "open-drain-reads-wire",
     "An open-drain output lets its pin go at 1: IDR then reads what the wire is.",
     rm("9.1.9"),
-    HAL("gpio", 232),
+    HAL("gpio", 218),
 )
 def _(chip: Bench) -> None:
     chip.clock("GPIOB")
@@ -230,7 +230,7 @@ def _(chip: Bench) -> None:
 GPIO.not_modelled(
     "speed",
     "MODE of an output is how fast its edges are.",
-    HAL("gpio", 67),
+    HAL("gpio", 69),
     rm("9.2.1"),
     why="edges have no slope; every MODE but 00 is an output",
 )
@@ -330,7 +330,7 @@ def _(chip: Bench) -> None:
     "remap-moves",
     "A remapped USART1 leaves PA9 and has PB6; the pin is an alternate function before it shows.",
     rm("9.3.8"),
-    LOCM3("f1/gpio", 14),
+    LOCM3("f1/gpio", 15),
 )
 def _(chip: Bench) -> None:
     chip.clock("AFIO", "GPIOA", "GPIOB", "USART1")
@@ -345,7 +345,7 @@ def _(chip: Bench) -> None:
 AFIO.not_modelled(
     "event-output",
     "EVCR's port and pin are chosen before EVOE gives the core's SEV to that pin.",
-    HAL("gpio_ex", 33),
+    HAL("gpio_ex", 31),
     LOCM3("f1/gpio", 141),
     why="the event output is warned of and does nothing",
 )

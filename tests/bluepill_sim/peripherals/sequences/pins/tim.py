@@ -32,7 +32,7 @@ def flags(chip: Bench, name: str = "TIM3") -> int:
     "psc-by-update",
     "PSC counts from the next update event on: drivers make one by UG before they start.",
     HAL("tim", 6813),
-    LOCM3("common/timer_common_all", 1623),
+    LOCM3("common/timer_common_all", 1624),
     rm("15.4.11"),
     values=st.integers(1, 50),
 )
@@ -306,7 +306,7 @@ def _(chip: Bench) -> None:
 @TIM.row(
     "output-needs-ccer",
     "A channel shows on its pin only with CCxE, and where the pin is an alternate function.",
-    LOCM3("common/timer_common_all", 27),
+    LOCM3("common/timer_common_all", 28),
     rm("15.4.9"),
 )
 def _(chip: Bench) -> None:
@@ -407,7 +407,7 @@ def _(chip: Bench) -> None:
     "encoder-counts-edges",
     "In encoder mode the counter follows the edges of TI1 and TI2, in the direction of their phase, once CEN is set.",
     HAL("tim", 3009),
-    RIOT("qdec", 62),
+    RIOT("qdec", 74),
     rm("15.3.12"),
 )
 def _(chip: Bench) -> None:
