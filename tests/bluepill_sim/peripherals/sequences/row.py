@@ -10,7 +10,7 @@ from tests.bluepill_sim.peripherals.sequences.bench import Bench
 from tests.bluepill_sim.peripherals.sequences.sources import Source
 
 #: Values that are tried where a row speaks of a range.
-_VALUES = settings(max_examples=12, suppress_health_check=[HealthCheck.too_slow])
+_VALUES = settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

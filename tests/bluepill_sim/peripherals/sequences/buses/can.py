@@ -170,6 +170,24 @@ def _(chip: Bench) -> None:
 
 
 @CAN.row(
+    "tmeie-while-rqcp",
+    "TMEIE interrupts while the RQCP of any mailbox stands: all three are cleared before the handler ends.",
+    CHIBIOS("LLD/CANv1/hal_can_lld", 229),
+    rm("24.8"),
+    values=st.integers(0, 2),
+)
+def _(chip: Bench, mailbox: int) -> None:
+    on_bus(chip)
+    bus.send(chip, 1, mailbox=mailbox)
+    chip.run(200 * BIT_NS)
+    assert not chip.irqs[19]
+    chip["CAN.IER"] = 1
+    assert chip.irqs[19]
+    chip["CAN.TSR"] = 1 << 8 * mailbox
+    assert not chip.irqs[19]
+
+
+@CAN.row(
     "abort-only-waiting",
     "ABRQ takes back a mailbox that waits, at once; one whose frame is on the bus goes on.",
     HAL("can", 1335),

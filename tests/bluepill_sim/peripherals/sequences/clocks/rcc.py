@@ -339,6 +339,23 @@ def _(chip: Bench) -> None:
 
 
 @RCC.row(
+    "flag-by-cause",
+    "Each cause of a reset has its flag in CSR, beside that of the pin, which every reset pulls.",
+    HAL("wwdg", 42),
+    HAL("iwdg", 44),
+    rm("7.3.10"),
+    values=st.sampled_from(
+        [(ResetCause.LOW_POWER, 31), (ResetCause.WWDG, 30), (ResetCause.IWDG, 29), (ResetCause.SOFTWARE, 28)]
+    ),
+)
+def _(chip: Bench, case: tuple[ResetCause, int]) -> None:
+    cause, bit = case
+    chip["RCC.CSR.RMVF"] = 1
+    chip.parts.reset(cause)
+    assert chip["RCC.CSR"] >> 26 << 26 == 1 << bit | 1 << 26
+
+
+@RCC.row(
     "mco-needs-af",
     "MCO shows on PA8 only where that is an alternate-function output.",
     HAL("rcc", 971),

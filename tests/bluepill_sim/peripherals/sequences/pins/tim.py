@@ -345,7 +345,11 @@ def _(chip: Bench) -> None:
 def _(chip: Bench) -> None:
     set_up(chip, "TIM1", BDTR=1 << 15)
     chip["TIM1.EGR"] = 1 << 7
-    assert (chip["TIM1.BDTR"] >> 15, flags(chip, "TIM1") & 0x80) == (0, 0x80)
+    assert (chip["TIM1.BDTR"] >> 15, flags(chip, "TIM1") & 0x80, chip.irqs[24]) == (0, 0x80, False)
+    chip["TIM1.DIER"] = 1 << 7
+    assert chip.irqs[24]
+    chip["TIM1.SR"] = 0
+    assert not chip.irqs[24]
     set_up(chip, "TIM1", ARR=9, CR1=CEN)
     ticks(chip, 100)
     assert chip["TIM1.BDTR"] >> 15 == 0
