@@ -138,10 +138,11 @@ def _mailbox_registers() -> tuple[Register, ...]:
                 offset=at + 4,
                 readable=bits((31, 16), 8, (3, 0)),
                 writable=bits(8, (3, 0)),
+                on_write=f"_write_mail_{n}_1",
                 fields="TIME 31:16, TGT 8, DLC 3:0",
             ),
-            Register(name=f"TDL{n}R", offset=at + 8, fields=_LOW),
-            Register(name=f"TDH{n}R", offset=at + 12, fields=_HIGH),
+            Register(name=f"TDL{n}R", offset=at + 8, on_write=f"_write_mail_{n}_2", fields=_LOW),
+            Register(name=f"TDH{n}R", offset=at + 12, on_write=f"_write_mail_{n}_3", fields=_HIGH),
         )
     for n in range(2):
         at = 0x1B0 + 0x10 * n
@@ -240,7 +241,12 @@ class Can(Peripheral):
             offset=0x21C,
             fields=numbered("FACTn", range(_BANKS - 1, -1, -1)),
         ),
-        *(Register(name=f"F{n // 2}R{n % 2 + 1}", offset=0x240 + 4 * n, fields="FB 31:0") for n in range(2 * _BANKS)),
+        *(
+            Register(
+                name=f"F{n // 2}R{n % 2 + 1}", offset=0x240 + 4 * n, on_write=f"_write_filter_{n}", fields="FB 31:0"
+            )
+            for n in range(2 * _BANKS)
+        ),
     )
 
     def __init__(self, chip: ChipPorts, place: PeripheralMapping) -> None:
@@ -525,7 +531,7 @@ class Can(Peripheral):
             if field & ABRQ and n in self._mailboxes:
                 start_ns = self.network.start_ns
                 is_sending = start_ns is not None and start_ns <= self.chip.now_ns and n == self._best(start_ns)
-                if is_sending or any(end.is_own for end in self._ends):
+                if is_sending or any(end.is_own and n == self._best(end.start_ns) for end in self._ends):
                     self.words[TSR] |= ABRQ << 8 * n  # it goes out, unless that fails
                 else:
                     self._complete(n, 0)
@@ -533,11 +539,10 @@ class Can(Peripheral):
         self.plan()
 
     def _write_ti(self, n: int, written: int, previous: int) -> None:
-        at = TI0R + 4 * n
-        if n in self._mailboxes:  # it is locked
-            self.words[at] = previous
+        if n in self._mailboxes:
+            self._write_mail(n, 0, written, previous)
         elif written & TXRQ:
-            self._mailboxes[n] = _Mailbox(self._frame_at(at), self.chip.now_ns, self._order)
+            self._mailboxes[n] = _Mailbox(self._frame_at(TI0R + 4 * n), self.chip.now_ns, self._order)
             self._order += 1
             self.words[TSR] &= ~((RQCP | TXOK | ALST | TERR | ABRQ) << 8 * n)
             self._want()
@@ -547,6 +552,12 @@ class Can(Peripheral):
     _write_ti0r = partialmethod(_write_ti, 0)
     _write_ti1r = partialmethod(_write_ti, 1)
     _write_ti2r = partialmethod(_write_ti, 2)
+
+    def _write_mail(self, n: int, word: int, _written: int, previous: int) -> None:
+        """Take a word of a mailbox, while that is empty (RM0008 24.9.3)."""
+        if n in self._mailboxes:
+            self.words[TI0R + 4 * n + word] = previous
+            self.chip.warn(f"CAN: mailbox {n} written while its request waits: ignored", once="CAN:mailbox")
 
     def _write_rf(self, n: int, written: int, _previous: int) -> None:
         if written & RFOM and self._fifos[n]:
@@ -564,6 +575,12 @@ class Can(Peripheral):
     _write_fm1r = partialmethod(_write_filter_mode, FM1R)
     _write_fs1r = partialmethod(_write_filter_mode, FS1R)
     _write_ffa1r = partialmethod(_write_filter_mode, FFA1R)
+
+    def _write_filter(self, n: int, _written: int, previous: int) -> None:
+        """Take half of a bank, while that is off or filters are initialised (RM0008 24.9.4)."""
+        if self.words[FA1R] >> n // 2 & 1 and not self.words[FMR] & 1:
+            self.words[F0R1 + n] = previous
+            self.chip.warn(f"CAN: filter bank {n // 2} written while it is on and FINIT is 0: ignored", once="CAN:bank")
 
     # Sending.
 
@@ -903,6 +920,14 @@ class Can(Peripheral):
     def _show_level(self, tx: int, rx: int) -> None:
         self._connect()
         self.fabric.command(self._bits_slot, _SHOW, tx, rx)
+
+
+for _half in range(2 * _BANKS):
+    setattr(Can, f"_write_filter_{_half}", partialmethod(Can._write_filter, _half))  # noqa: SLF001 - it is its own
+for _mailbox in range(_MAILBOXES):
+    for _word in (1, 2, 3):
+        _taken = partialmethod(Can._write_mail, _mailbox, _word)  # noqa: SLF001 - it is its own
+        setattr(Can, f"_write_mail_{_mailbox}_{_word}", _taken)
 
 
 @lru_cache(maxsize=64)  # of frames that are sent or tried again and again

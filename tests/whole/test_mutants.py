@@ -329,7 +329,7 @@ def test_an_endless_loop_is_noticed_by_its_time_where_the_sound_program_is_soon_
     [
         ([], "name files, or a commit by --since, or a --sample, or take what is --planted"),
         (["p2os", "--since", "HEAD"], "name files, or a commit by --since, or a --sample, or take what is --planted"),
-        (["--sample", "none"], "no sample is named none (there are ci, whole)"),
+        (["--sample", "none"], "no sample is named none (there are ci, sequences, whole)"),
         (["p2os/nothing.py"], "p2os/nothing.py is not there (hint: a path from the project's folder)"),
         (["p2os/client", "--count", "0"], "invalid"),
     ],

@@ -6,7 +6,7 @@ the lines of each file of tests); names and imports order what it says, and say 
 
 import ast
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -33,19 +33,22 @@ class Nearest:
     Args:
         root: The project.
         counted: Of each source file, the lines that each file of tests ran; empty where the suite has not run.
+        first: Files of tests that are asked before those that are near.
     """
 
-    def __init__(self, root: Path, counted: Counted) -> None:
-        self._root, self._counted = root, counted
+    def __init__(self, root: Path, counted: Counted, first: Sequence[str] = ()) -> None:
+        self._root, self._counted, self._first = root, counted, tuple(first)
         self._imports = {
             path.relative_to(root).as_posix(): _imports(path) for path in sorted((root / "tests").rglob("*.py"))
         }
         self._tests = [name for name in self._imports if name.rpartition("/")[2].startswith("test_")]
 
     def of(self, path: str, line: int) -> tuple[str, ...]:
-        """Return the files of tests nearest to a line, at most `MOST_FILES`."""
-        if not path.endswith(".py"):
-            return self._of_c(path)
+        """Return the files of tests nearest to a line, at most `MOST_FILES` behind those that come first."""
+        near = self._of_python(path, line) if path.endswith(".py") else self._of_c(path)
+        return (*self._first, *(name for name in near if name not in self._first))
+
+    def _of_python(self, path: str, line: int) -> tuple[str, ...]:
         by_name = self._by_name(path)
         files = self._counted.get(path, {})
         ran = {name for name, lines in files.items() if line in lines} or {*files}

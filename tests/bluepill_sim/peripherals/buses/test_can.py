@@ -212,9 +212,24 @@ def test_a_request_that_waits_can_be_taken_back_and_one_on_the_bus_cannot(fake_c
     send(fake_chip, 2, mailbox=1)
     fake_chip.advance(fake_chip.now_ns + 30 * BIT_NS)
     fake_chip.write("CAN.TSR", ABRQ | ABRQ << 8)
+    assert fake_chip.read("CAN.TSR") & 0x8383 == RQCP << 8 | ABRQ, "what waits goes at once"
     fake_chip.advance(fake_chip.now_ns + 10**6)
-    assert [frame.identifier for _, frame in node.received][:1] == [1]
-    assert fake_chip.read("CAN.TSR") & (RQCP | TXOK) == RQCP | TXOK
+    assert [frame.identifier for _, frame in node.received] == [1]
+    assert fake_chip.read("CAN.TSR") & 0x8383 == RQCP << 8 | RQCP | TXOK
+
+
+@pytest.mark.parametrize("register", ["TI1R", "TDT1R", "TDL1R", "TDH1R"])
+def test_a_mailbox_is_written_only_while_it_is_empty(fake_chip: Any, register: str) -> None:
+    network(fake_chip, CanNode())
+    set_up(fake_chip)
+    send(fake_chip, 5, b"12345678", mailbox=1)
+    before = fake_chip.read(f"CAN.{register}")
+    fake_chip.write(f"CAN.{register}", 0)
+    assert fake_chip.read(f"CAN.{register}") == before
+    assert "CAN:mailbox" in fake_chip.warnings
+    fake_chip.advance(fake_chip.now_ns + 10**6)
+    fake_chip.write(f"CAN.{register}", 0)
+    assert fake_chip.read(f"CAN.{register}") & 0xFFFF == 0
 
 
 def receive(chip: Any, node: CanNode, *frames: CanFrame) -> None:
@@ -340,6 +355,22 @@ def test_modes_of_filters_need_finit(fake_chip: Any) -> None:
     fake_chip.write("CAN.FM1R", 5)
     assert fake_chip.read("CAN.FM1R") == 0
     assert "CAN:finit" in fake_chip.warnings
+
+
+@pytest.mark.parametrize("half", [0, 1, 26, 27])
+def test_a_bank_that_is_on_is_written_only_while_filters_are_initialised(fake_chip: Any, half: int) -> None:
+    bank = f"CAN.F{half // 2}R{half % 2 + 1}"
+    fake_chip.write("CAN.FMR", 0)
+    fake_chip.write(bank, 1)
+    fake_chip.write("CAN.FA1R", 1 << half // 2)
+    fake_chip.write(bank, 2)
+    assert fake_chip.read(bank) == 1
+    assert "CAN:bank" in fake_chip.warnings
+    fake_chip.write("CAN.F5R1", 3)
+    assert fake_chip.read("CAN.F5R1") == 3, "that one is off"
+    fake_chip.write("CAN.FMR", 1)
+    fake_chip.write(bank, 4)
+    assert fake_chip.read(bank) == 4
 
 
 # Modes.

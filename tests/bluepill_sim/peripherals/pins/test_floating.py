@@ -13,7 +13,7 @@ from tests.tools.examples import EXAMPLES
 
 FIRMWARE = EXAMPLES
 PROGRAMS = {name: Path(str(FIRMWARE / f"{name}.elf")) for name in ("motors", "sensors", "encoders", "dodge")}
-PROGRAMS["foreign"] = Path(__file__).parents[2] / "firmware_foreign" / "foreign.elf"
+PROGRAMS["foreign"] = Path(__file__).parents[3] / "firmware_foreign" / "foreign.elf"
 #: DD1 to DD8, encoder 1, encoder 2.
 INPUTS = ("PA4", "PA5", "PA6", "PA7", "PB0", "PB1", "PB10", "PB11", "PB4", "PB3", "PB15", "PC13", "PC14", "PC15")
 CORES = [

@@ -1,0 +1,83 @@
+"""Write docs/sequences.md from the rows of tests/bluepill_sim/peripherals/sequences.
+
+Usage: python -m tools.generators.sequences
+"""
+
+from collections import Counter
+from collections.abc import Sequence
+from itertools import groupby
+from operator import attrgetter
+from pathlib import Path
+
+from tests.bluepill_sim.peripherals.sequences.row import SequenceRow
+from tests.bluepill_sim.peripherals.sequences.sources import Citation
+from tests.bluepill_sim.peripherals.sequences.table import ROWS
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = Path("docs/sequences.md")
+_HEAD = """# The order of things: what public drivers say, as tests
+
+Made by `python -m tools.generators.sequences` from the tables in `tests/bluepill_sim/peripherals/sequences`.
+Drivers, headers and manuals say in which order a peripheral wants things: what comes first, what only works after
+something else, what clears a flag. Each such sentence is a row here, in our words: where it stands, and whether the
+models of [peripherals.md](peripherals.md) hold it. A row is checked on a chip as it comes out of reset, by its
+registers alone (exceptions and sleep by a program), and `make test` runs every check; a row that the models do not
+answer says why.
+Facts are taken from the sources, nothing of their text or code. Nothing here was measured on silicon.
+
+To add one: a function with `@TABLE.row(...)` in the file of its peripheral, seen to fail with the model broken by hand,
+then `make generated`. What such tests are worth: [what the rows notice](#what-the-rows-notice).
+"""
+
+
+def page(rows: Sequence[SequenceRow] = ROWS) -> str:
+    """Return the page."""
+    tables = {name: tuple(group) for name, group in groupby(rows, key=attrgetter("peripheral"))}
+    parts = [_HEAD, "## Share\n", _share(tables), _NOTICED, "## Sources\n", _sources(rows)]
+    for name, group in tables.items():
+        parts += [f"## {name}\n", _table(group)]
+    return "\n".join(parts)
+
+
+def _share(tables: dict[str, tuple[SequenceRow, ...]]) -> str:
+    lines = ["| peripheral | rows | checked | not modelled |", "|---|---|---|---|"]
+    for name, rows in [*tables.items(), ("all", tuple(row for group in tables.values() for row in group))]:
+        checked = sum(row.check is not None for row in rows)
+        lines.append(f"| {name} | {len(rows)} | {checked} ({100 * checked // len(rows)} %) | {len(rows) - checked} |")
+    return "\n".join(lines) + "\n"
+
+
+def _sources(rows: Sequence[SequenceRow]) -> str:
+    cited = [source for row in rows for source in row.sources]
+    places = Counter(
+        (one.repository.name, one.repository.owner, one.repository.commit) for one in cited if isinstance(one, Citation)
+    )
+    lines = ["| name | repository, commit | citations |", "|---|---|---|"]
+    lines += [
+        f"| {name} | [{owner}](https://github.com/{owner}) {commit} | {count} |"
+        for (name, owner, commit), count in places.most_common()
+    ]
+    others = sum(not isinstance(source, Citation) for source in cited)
+    lines.append(
+        f"| manuals, our pages | RM0008 rev. 21, PM0075, ARMv7-M, [peripherals.md](peripherals.md) | {others} |"
+    )
+    return "\n".join(lines) + "\n"
+
+
+def _table(rows: Sequence[SequenceRow]) -> str:
+    lines = ["| row | what is said | where | checked |", "|---|---|---|---|"]
+    for row in rows:
+        sentence = row.sentence + (f" *Chosen*: {row.choice}." if row.choice else "")
+        state = f"not modelled: {row.not_modelled}" if row.check is None else "yes"
+        lines.append(f"| `{row.slug}` | {sentence} | {', '.join(map(str, row.sources))} | {state} |")
+    return "\n".join(lines) + "\n"
+
+
+#: The one part that is measured, not made: `python -m tools.mutants --sample sequences`.
+_NOTICED = """## What the rows notice
+
+Not measured yet.
+"""
+
+if __name__ == "__main__":
+    (ROOT / PAGE).write_text(page(), encoding="utf-8")
