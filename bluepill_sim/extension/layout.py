@@ -80,6 +80,32 @@ INSTRUCTION = Struct(
         StructMember("padding", "u8"),
     ),
 )
+MEASURED = Struct(
+    "measured",
+    "An instruction as the models of time and of faults need it, and when in its block it begins.",
+    (
+        StructMember("address", "u32"),
+        StructMember("destination", "u32", doc="of a direct branch"),
+        StructMember("cycle", "u32", doc="from the start of its block"),
+        StructMember("kind", "u8", doc="`enum kind`"),
+        StructMember("bytes", "u8"),
+        StructMember("count", "u8", doc="registers that a multiple transfer moves"),
+        StructMember("loads_pc", "u8", doc="it writes the PC although its kind does not say so"),
+        StructMember("base", "u8", doc="register of an access, or the divisor of a division; 255: does not matter"),
+        StructMember("index", "u8", doc="255: none"),
+        StructMember("target", "u8", doc="register that a load fills; 255: none"),
+        *_fields("u8", "has_destination"),
+        StructMember("always_branches", "u8", doc="a direct branch, but for an IT before it"),
+        StructMember("sets_it", "u8", doc="what an IT makes of ITSTATE"),
+        StructMember("it_state", "u8", doc="before it, by an IT of its block"),
+        StructMember("gives_up", "u8", doc="an exception that comes in it leaves it undone"),
+    ),
+)
+BLOCK_COST = Struct(
+    "block_cost",
+    "What a block costs in cycles: where it goes on at its end, and elsewhere.",
+    (*_fields("u32", "straight", "taken", "count"), StructMember("flags", "u32", doc="`enum row_flag`")),
+)
 RAMP = Struct(
     "ramp",
     "A counter that follows from the time: `source/fabric/ramp.c`.",
@@ -529,7 +555,7 @@ SENT = Struct(
 
 #: All of them; one that holds another comes behind it.
 STRUCTS = (
-    RECORD, INSTRUCTION, RAMP, TICKS, STEP, LOOP, FAULT, SHARED, PORT, USART, EXTI, DMA, SIGNAL, ANALOG, ADC, GPIO, RCC,
+    RECORD, INSTRUCTION, MEASURED, BLOCK_COST, RAMP, TICKS, STEP, LOOP, FAULT, SHARED, PORT, USART, EXTI, DMA, SIGNAL, ANALOG, ADC, GPIO, RCC,
     FILTER, SHAPE, TIM, SPI, I2C, WAVE, EDGE, INPUT_ROWS, CAN_BITS, SENT,
 )  # fmt: skip
 

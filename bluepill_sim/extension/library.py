@@ -73,6 +73,8 @@ _FUNCTIONS = {
     "core_forget_range": "vpuu",
     "core_set_loop": "bpup",
     "core_set_fault": "vpuuuu",
+    "measure_decode": "upuup",
+    "measure_block": "vpuuubpp",
     "core_declare_zero": "vpu",
     "core_forget_zeros": "vp",
     "core_declare_unclocked": "vpubq",

@@ -40,6 +40,35 @@ struct instruction {
 };
 _Static_assert(sizeof(struct instruction) == 20, "instruction");
 
+/* An instruction as the models of time and of faults need it, and when in its block it begins. */
+struct measured {
+    uint32_t address;
+    uint32_t destination; /* of a direct branch */
+    uint32_t cycle; /* from the start of its block */
+    uint8_t kind; /* `enum kind` */
+    uint8_t bytes;
+    uint8_t count; /* registers that a multiple transfer moves */
+    uint8_t loads_pc; /* it writes the PC although its kind does not say so */
+    uint8_t base; /* register of an access, or the divisor of a division; 255: does not matter */
+    uint8_t index; /* 255: none */
+    uint8_t target; /* register that a load fills; 255: none */
+    uint8_t has_destination;
+    uint8_t always_branches; /* a direct branch, but for an IT before it */
+    uint8_t sets_it; /* what an IT makes of ITSTATE */
+    uint8_t it_state; /* before it, by an IT of its block */
+    uint8_t gives_up; /* an exception that comes in it leaves it undone */
+};
+_Static_assert(sizeof(struct measured) == 24, "measured");
+
+/* What a block costs in cycles: where it goes on at its end, and elsewhere. */
+struct block_cost {
+    uint32_t straight;
+    uint32_t taken;
+    uint32_t count;
+    uint32_t flags; /* `enum row_flag` */
+};
+_Static_assert(sizeof(struct block_cost) == 16, "block_cost");
+
 /* A counter that follows from the time: `source/fabric/ramp.c`. */
 struct ramp {
     uint64_t base; /* when it had `value`, in the units of its owner, */
