@@ -115,6 +115,7 @@ _FUNCTIONS = {
     "fabric_free": "vp",
     "fabric_set_host": "vpp",
     "fabric_set_time": "vpqqu",
+    "fabric_set_clocks": "vpp",
     "fabric_event_ns": "qp",
     "fabric_next_ns": "qp",
     "fabric_run_events": "vpq",

@@ -219,6 +219,11 @@ class Fabric(Stateful):
         """Tie nanoseconds and the host's cycles together; before that a cycle is a nanosecond."""
         self._calls_of_c.fabric_set_time(self.handle, base_ns, base_cycle, frequency_hz)
 
+    def set_clocks(self, clocks: ctypes.Structure) -> None:
+        """Say where the clock tree's outputs are, `struct clocks`, which devices in C read and set."""
+        self._kept_words.append(clocks)
+        self._calls_of_c.fabric_set_clocks(self.handle, ctypes.addressof(clocks))
+
     # Events.
 
     @property

@@ -195,8 +195,7 @@ def encodings_header() -> str:
         "",
         *wrap(f"enum operation {{ {UNDEFINED}, {', '.join(names)} }};", _WIDTH, subsequent_indent=" " * 4),
         "",
-        "/* Classes of instructions that cost alike or need attention; their cycles, refill, and what is given up for an",
-        " * exception. */",
+        "/* Classes of instructions that cost alike: cycles, refill, and whether an exception may come in one. */",
         *wrap(f"enum kind {{ {', '.join(map(_kind, Kind))} }};", _WIDTH, subsequent_indent=" " * 4),
         f"static const uint8_t kind_cycles[] = {{{', '.join(str(CYCLES[kind]) for kind in Kind)}}};",
         f"static const uint8_t kind_refill[] = {{{', '.join(str(REFILL.get(kind, 0)) for kind in Kind)}}};",
@@ -218,10 +217,9 @@ def encodings_header() -> str:
     ]
     for name, table in (("narrow", NARROW), ("wide", WIDE)):
         lines += ["", f"static const struct encoding {name}[] = {{"]
-        lines += [
-            f"    {{{row.mask:#x}, {row.value:#x}, {row.operation}, {forms.index(_extraction(row))}, {_kind(row.kind)}}},"
-            for row in table
-        ]
+        for row in table:
+            numbers = f"{row.mask:#x}, {row.value:#x}, {row.operation}, {forms.index(_extraction(row))}"
+            lines.append(f"    {{{numbers}, {_kind(row.kind)}}},")
         lines += ["};"]
     return "\n".join([*lines, "", "#endif", ""])
 

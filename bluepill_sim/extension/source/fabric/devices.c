@@ -48,6 +48,8 @@ void fabric_free(struct fabric *fabric)
     free(fabric);
 }
 
+void fabric_set_clocks(struct fabric *fabric, struct clocks *clocks) { fabric->clocks = clocks; }
+
 void fabric_set_host(struct fabric *fabric, const struct host *host) { fabric->host = *host; }
 
 /* Takes a slot of the queue; -1 where there is none left. */

@@ -242,7 +242,8 @@ struct fabric {
     struct shown shown[PORTS * PINS];
     struct counter counters[COUNTERS];
     uint32_t counter_count;
-    const struct analog *analog;         /* Python's, */
+    struct clocks *clocks;               /* Python's, */
+    const struct analog *analog;         /* this too, */
     const int32_t *samples[ANALOG_PINS]; /* and these */
     struct memory memories[MEMORIES];
     uint32_t memory_count;

@@ -394,11 +394,46 @@ struct gpio {
 };
 _Static_assert(sizeof(struct gpio) == 156, "gpio");
 
-/* What RCC tells Python of. */
-struct rcc {
-    uint32_t watches_gates; /* each write of a clock gate */
+/* Which pins AFIO keeps from GPIO, a bit each. RM0008 9.3. */
+struct afio {
+    uint32_t held[5];
+    uint32_t swj_cfg; /* which cannot be read */
 };
-_Static_assert(sizeof(struct rcc) == 4, "rcc");
+_Static_assert(sizeof(struct afio) == 24, "afio");
+
+/* The clock tree's outputs: `bluepill_sim/fabric/clocks.py`. */
+struct clocks {
+    uint32_t sysclk_hz;
+    uint32_t hclk_hz;
+    uint32_t pclk1_hz;
+    uint32_t pclk2_hz;
+    uint32_t timer1_hz; /* of TIM2 to TIM7 */
+    uint32_t timer2_hz; /* of TIM1 and TIM8 */
+    uint32_t usb_hz; /* 0 while the PLL is off */
+    uint32_t adc_divider; /* what PCLK2 is divided by for the ADCs */
+    uint32_t lsi_hz;
+    uint32_t rtcclk_hz; /* 0: it stands still */
+    uint32_t rtc_calibration;
+    uint32_t rtc_seconds_shown;
+    uint32_t flash_wait_states;
+    uint32_t flash_prefetch;
+};
+_Static_assert(sizeof(struct clocks) == 56, "clocks");
+
+/* What RCC holds beyond its registers. RM0008 7.2. */
+struct rcc {
+    uint64_t ready_at[5]; /* when HSI, HSE, PLL, LSE and LSI get ready that are starting */
+    uint64_t python_ns; /* when Python next acts */
+    uint32_t watches_gates; /* Python is told of each write of a clock gate */
+    uint32_t shows_clock; /* Python has put a clock on MCO's pin */
+    uint32_t hse_hz; /* the crystal; 0: there is none */
+    uint32_t crystal_works;
+    uint32_t keeps_lsi; /* IWDG does */
+    uint32_t hsi_hz; /* as it is trimmed */
+    uint32_t pll_hz; /* whether or not it runs */
+    uint32_t padding;
+};
+_Static_assert(sizeof(struct rcc) == 80, "rcc");
 
 /* A digital filter of an input. RM0008 14.4.7, IC1F. */
 struct filter {

@@ -20,8 +20,7 @@ enum operation { UNDEFINED, MOVS_T2, LSL_T1, LSR_T1, ASR_T1, ADD_R3, SUB_R3, ADD
     LDRSH_LITERAL, LDRSH_I, LDRSHT, LDRSH_X, LDRSH_N, LDRSH_R, LSL, LSR, ASR, ROR, SXTH, UXTH, SXTB, UXTB, RBIT, CLZ,
     MUL, MLA, MLS, SMULL, SDIV, UMULL, UDIV, SMLAL, UMLAL, NO_COPROCESSOR };
 
-/* Classes of instructions that cost alike or need attention; their cycles, refill, and what is given up for an
- * exception. */
+/* Classes of instructions that cost alike: cycles, refill, and whether an exception may come in one. */
 enum kind { KIND_PLAIN, KIND_MULTIPLY_ACCUMULATE, KIND_MULTIPLY_LONG, KIND_MULTIPLY_ACCUMULATE_LONG, KIND_DIVIDE,
     KIND_LOAD, KIND_LOAD_LITERAL, KIND_LOAD_PC, KIND_STORE, KIND_STORE_INDEXED, KIND_LOAD_MULTIPLE,
     KIND_STORE_MULTIPLE, KIND_LOAD_DUAL, KIND_STORE_DUAL, KIND_EXCLUSIVE, KIND_BRANCH, KIND_CALL,
