@@ -15,6 +15,7 @@ Oscillators, PLL, SYSCLK, dividers, gates and resets are `source/devices/rcc.c`.
 Source: RM0008 section 7; start-up times from the data sheet DS5319 section 5.3.6 to 5.3.8.
 """
 
+import ctypes
 from collections.abc import Callable, Mapping
 from enum import Enum, IntEnum
 
@@ -305,7 +306,8 @@ class Rcc(Peripheral):
     def gate_address(self, name: str) -> tuple[int, int]:
         """Return where in the host's memory the enable register of the peripheral `name` is, and its bit as a mask."""
         index, mask = self._gates[name]
-        return self.words.buffer_info()[0] + index * self.words.itemsize, mask
+        at = ctypes.addressof((ctypes.c_uint32 * len(self.words)).from_buffer(self.words))
+        return at + index * self.words.itemsize, mask
 
     def reset(self, cause: ResetCause = ResetCause.POWER) -> None:
         """Go back to the state after a reset; the backup domain and the flags of CSR outlive all but a power cut."""
