@@ -18,9 +18,10 @@ COMPILER, LINKER = f"clang-{VERSION}", f"wasm-ld-{VERSION}"
 #: Of the library, what only Python's files of pins need; it writes files.
 LEFT_OUT = frozenset({"edges.c"})
 FLAGS = (
-    "--target=wasm32", "-O2", "-flto", "-std=gnu11", "-mbulk-memory", "-ffreestanding", "-nostdlib", "-fvisibility=default",
-    "-Wall", "-Wextra", "-Wno-gnu-variable-sized-type-not-at-end", "-Ibluepill_sim/cli/browser/source/include", "-Wl,--no-entry",
-    "-Wl,--export-dynamic", "-Wl,--export=__wasm_call_ctors", "-Wl,--strip-all", "-Wl,-z,stack-size=65536",
+    "--target=wasm32", "-O2", "-flto", "-std=gnu11", "-mbulk-memory", "-ffreestanding", "-nostdlib",
+    "-fvisibility=default", "-DINTERPRETER_PORTABLE", "-Ibluepill_sim/cli/browser/source/include", "-Wall", "-Wextra",
+    "-Wno-gnu-variable-sized-type-not-at-end", "-Wl,--no-entry", "-Wl,--export-dynamic",
+    "-Wl,--export=__wasm_call_ctors", "-Wl,--strip-all", "-Wl,-z,stack-size=65536",
 )  # fmt: skip
 
 

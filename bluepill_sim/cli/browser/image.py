@@ -13,7 +13,6 @@ Invariant: a recording depends on the library alone, not on where things lie in 
 """
 
 import ctypes
-import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -41,6 +40,8 @@ _POINTERS = ("sram", "flash")
 _WORD = 8
 #: So many equal bytes are a "fill".
 _LEAST_FILL = 32
+#: Where a "poke" has its bytes.
+_BYTES_AT = 3
 
 
 class Recording:
@@ -154,9 +155,30 @@ class Recording:
                 self._functions[emulator.address_of(function).value or 0] = f"f{function}"
         return self._functions.get(at, "f")  # a callback of Python's, which is taken back before the chip runs
 
-    def text(self) -> str:
-        """Return it as JSON."""
-        return json.dumps({"sizes": self.sizes, "steps": self.steps}, separators=(",", ":"))
+    def leave_out_unused(self) -> None:
+        """Forget buffers that no call was told of, such as tables of callbacks, and number the others anew."""
+        used = {text.partition("+")[0] for step in self.steps for text in _pointers(step) if text[0] == "b"}
+        numbers = {name: f"b{number}" for number, name in enumerate(sorted(used, key=lambda name: int(name[1:])))}
+        self.sizes = [self.sizes[int(name[1:])] for name in numbers]
+        self.steps = [
+            [part if (step[0], n) == ("poke", _BYTES_AT) else _renamed(part, numbers) for n, part in enumerate(step)]
+            for step in self.steps
+            if step[0] == "call" or step[1][0] == "r" or step[1] in numbers
+        ]
+
+
+def _pointers(step: Step) -> list[str]:
+    """Return the pointers that a step hands to C."""
+    handed = step[2:] if step[0] == "call" else step[3:] if step[0] == "point" else []
+    return [part for part in handed if isinstance(part, str)]
+
+
+def _renamed(part: Any, numbers: dict[str, str]) -> Any:
+    """Return a part of a step with its buffer's number."""
+    if not isinstance(part, str):
+        return part
+    name, plus, offset = part.partition("+")
+    return f"{numbers[name]}{plus}{offset}" if name in numbers else part
 
 
 #: The functions of the library that Python hands to C by their addresses; `page_function` of `source/page.c` has them.
@@ -214,6 +236,7 @@ def recorded() -> Iterator[Recording]:
             setattr(found, name, recording.wrap(name, emulator.FUNCTION_TYPES[name], function))
         yield recording
         recording.note_changes()
+        recording.leave_out_unused()
     finally:
         ctypes.addressof = address_of
         for name, function in functions.items():
