@@ -582,7 +582,7 @@ class Peripheral(Stateful):
     def clock_hz(self) -> int:
         """Return the frequency of that clock; 0: it counts none."""
         name = self.clock_name()
-        return 0 if name is None else getattr(self.chip.clocks, name)  # type: ignore[no-any-return]  # all are numbers
+        return 0 if name is None else int(getattr(self.chip.clocks, name))
 
     def clock_changed(self) -> None:
         """Act on a change of the frequencies in `chip.clocks`, which has just happened; those in C know it already."""

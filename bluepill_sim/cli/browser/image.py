@@ -115,7 +115,7 @@ class Recording:
                 self._seen.append(ctypes.string_at(result, size))
             return result
 
-        call._as_parameter_ = ctypes.cast(function, ctypes.c_void_p)  # type: ignore[attr-defined]  # for tables in C
+        call._as_parameter_ = ctypes.cast(function, ctypes.c_void_p)  # type: ignore[attr-defined, arg-type]  # for tables in C
         return call
 
     def _record(self, name: str, signature: str, arguments: tuple[Any, ...]) -> int:
