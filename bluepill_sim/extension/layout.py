@@ -458,7 +458,7 @@ RCC = Struct(
     (
         StructMember("ready_at", "u64", 5, "when HSI, HSE, PLL, LSE and LSI get ready that are starting"),
         StructMember("python_ns", "u64", doc="when Python next acts"),
-        StructMember("watches_gates", "u32", doc="Python is told of each write of a clock gate"),
+        StructMember("watches_gates", "u32", doc="Python is notified of each write of a clock gate"),
         StructMember("shows_clock", "u32", doc="Python has put a clock on MCO's pin"),
         StructMember("hse_hz", "u32", doc="the crystal; 0: there is none"),
         StructMember("crystal_works", "u32"),

@@ -10,7 +10,7 @@ Chosen: its output PB3 (JTDO) cannot, as long as the port has it (IDR and EXTI s
 Chosen: SWJ_CFG, whose value is undefined when read, reads 0; so a
 read-modify-write of MAPR gives the pins back to the debug port, as it may on silicon.
 
-Which pins are held is `source/devices/afio.c`; here is who is told of it, and of routes.
+Which pins are held is `source/devices/afio.c`; here is who is notified of it, and of routes.
 
 Source: RM0008 sections 9.3 and 9.4.
 """
@@ -55,7 +55,7 @@ _MAPR = (
 
 
 class AfioQuestion(IntEnum):
-    """What Python is told."""
+    """What Python is notified of."""
 
     #: Pins were held or released: by a write of MAPR, or else by a reset.
     PLACED = OWN_ANSWERS

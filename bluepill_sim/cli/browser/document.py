@@ -30,7 +30,7 @@ from simbase.files import read_bytes
 
 #: A program that stands still, for a chip that gets another one later: its stack, its entry, and a branch to itself.
 IDLE = (SRAM_BASE + SRAM_BYTES).to_bytes(4, "little") + bytes([9, 0, 0, 8]) + b"\xfe\xe7"
-#: What devices in C tell Python of, and which changes nothing on a page.
+#: What devices in C notify Python of, and which changes nothing on a page.
 _HARMLESS = ("PLACED", "GIVE_MORE", "JUDGE_SPEED", "CHECK_MODES", "CSS_CLEARED", "HEARS_LINE", "HEARS_PINS", "GATES")
 #: MAPR but for PD01_REMAP and SWJ_CFG.
 _REMAPS = 0x1F_7FFF
@@ -38,8 +38,8 @@ _SHOWN = ("level", "floating", "low", "high", "up", "down", "outside", "outside_
           "shown", "fighting", "output", "alternate")  # fmt: skip
 _BLOCK_BYTES = 0x400
 FOOTER = (
-    "The emulator of p2os (MIT licence), compiled to WebAssembly: interpreter, core, fabric and devices in C, nothing "
-    "of Unicorn or of any other emulator. docs/browser.md says what is on this page and what is not."
+    "An emulated STM32F103C8 under the MIT licence, as WebAssembly: interpreter, core, fabric, devices in C, nothing "
+    "of Unicorn or of any other emulator. Its documentation (browser.md) says what is on this page and what is not."
 )
 
 

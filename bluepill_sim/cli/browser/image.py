@@ -156,7 +156,7 @@ class Recording:
         return self._functions.get(at, "f")  # a callback of Python's, which is taken back before the chip runs
 
     def leave_out_unused(self) -> None:
-        """Forget buffers that no call was told of, such as tables of callbacks, and number the others anew."""
+        """Forget buffers that no call got, such as tables of callbacks, and number the others anew."""
         used = {text.partition("+")[0] for step in self.steps for text in _pointers(step) if text[0] == "b"}
         numbers = {name: f"b{number}" for number, name in enumerate(sorted(used, key=lambda name: int(name[1:])))}
         self.sizes = [self.sizes[int(name[1:])] for name in numbers]
@@ -221,7 +221,7 @@ def _runs(data: bytes, first: int, end: int) -> Iterator[tuple[int, int]]:
 
 @contextmanager
 def recorded() -> Iterator[Recording]:
-    """Record what is called of the library, and what is written to memory that it was told of, meanwhile."""
+    """Record what is called of the library, and what is written to memory that it knows, meanwhile."""
     recording, found, address_of = Recording(), emulator.library(), ctypes.addressof
     functions = {name: getattr(found, name) for name in emulator.FUNCTION_TYPES}
 

@@ -64,7 +64,7 @@ def test_the_wasm_is_what_its_sources_make(tmp_path: Path) -> None:
 def test_the_wasm_asks_the_page_for_two_functions_and_has_nothing_of_unicorn() -> None:
     """Names of what else there is under GPL, and of the functions of Unicorn, would stand among names and messages."""
     binary = wasm()
-    assert sorted(imports(binary)) == [("page", "deliver"), ("page", "told")]
+    assert sorted(imports(binary)) == [("page", "deliver"), ("page", "notice")]
     assert re.search(rb"(?i)unicorn|qemu|uc_[a-z]|gpl|gnu general", binary) is None
     assert len(binary) < 400_000
 

@@ -3,7 +3,7 @@
 
 const FLASH_BASE = 0x08000000, SRAM_BASE = 0x20000000, SRAM_BYTES = 20 * 1024;
 const PINS = 16, PORTS = "ABCDE", EDGE_BYTES = 16, SENT_BYTES = 24;
-// As `enum told` of source/page.c.
+// As `enum notice` of source/page.c.
 const READ = 0, WRITE = 1, NO_CLOCK = 2, DUPLICATED = 3, ASKED = 4, PIN = 5, STORE = 6, RESET = 7, SLEEP = 8, TRAP = 9, FAULT = 10;
 
 const hex = (value, digits = 8) => `0x${(value >>> 0).toString(16).padStart(digits, "0")}`;
@@ -49,7 +49,7 @@ class Chip {
     this.named = new Map();
     this.stopped = "";
     this.onWords = () => {};
-    const page = { told: (...numbers) => this.told(...numbers), deliver: (slot) => this.takeWords(slot) };
+    const page = { notice: (...numbers) => this.notice(...numbers), deliver: (slot) => this.takeWords(slot) };
     this.c = new WebAssembly.Instance(module, { page }).exports;
     this.c.__wasm_call_ctors();
     this.buffers = data.sizes.map((size) => this.c.calloc(1, size));
@@ -193,7 +193,7 @@ class Chip {
 
   // What is not there.
 
-  told(what, one, two, three, pc) {
+  notice(what, one, two, three, pc) {
     [one, two, three] = [one >>> 0, two >>> 0, three >>> 0];
     const text = this.textOf(what, one, two, three);
     if (!text) return;

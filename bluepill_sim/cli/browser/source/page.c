@@ -1,7 +1,7 @@
 /* A chip without Python: what stands in its place where the emulator runs in a browser.
  *
  * The chip itself is made by the calls that Python makes (`image.py`), replayed; what it then runs is C alone. What C would
- * ask Python for is answered here as far as start-up code needs it. All else is named to the page, by `page_told`, and
+ * ask Python for is answered here as far as start-up code needs it. All else is named to the page, by `page_notice`, and
  * reads 0.
  * Invariant: an access that is named is one that Python would have answered in another way, or warned of.
  */
@@ -42,23 +42,23 @@ int interpreter_reg_write(void *user, int number, const void *value);
 int interpreter_reg_read_batch(void *user, const int *numbers, void **values, int count);
 int interpreter_reg_write_batch(void *user, const int *numbers, void *const *values, int count);
 
-/* What the page is told, with up to three numbers and the instruction. */
-enum told {
-    TOLD_READ,       /* of a register that only Python has: address */
-    TOLD_WRITE,      /* likewise: address, value */
-    TOLD_NO_CLOCK,   /* an access to a peripheral without its clock: address */
-    TOLD_DUPLICATED, /* a narrow write to a register of an APB: address */
-    TOLD_ASKED,      /* what a device would warn of, or have answered: slot, question, value */
-    TOLD_PIN,        /* a pin fights (0) or is shorted (1): pin, that */
-    TOLD_STORE,      /* a store that fails, or to flash: address, value */
-    TOLD_RESET,      /* a reset is asked for */
-    TOLD_SLEEP,      /* Stop or Standby would begin */
-    TOLD_TRAP,       /* CCR would have more trap than C looks for */
-    TOLD_FAULT,      /* the core has stopped: kind of halt, address */
+/* What the page is notified of, with up to three numbers and the instruction. */
+enum notice {
+    NOTICE_READ,       /* of a register that only Python has: address */
+    NOTICE_WRITE,      /* likewise: address, value */
+    NOTICE_NO_CLOCK,   /* an access to a peripheral without its clock: address */
+    NOTICE_DUPLICATED, /* a narrow write to a register of an APB: address */
+    NOTICE_ASKED,      /* what a device would warn of, or have answered: slot, question, value */
+    NOTICE_PIN,        /* a pin fights (0) or is shorted (1): pin, that */
+    NOTICE_STORE,      /* a store that fails, or to flash: address, value */
+    NOTICE_RESET,      /* a reset is asked for */
+    NOTICE_SLEEP,      /* Stop or Standby would begin */
+    NOTICE_TRAP,       /* CCR would have more trap than C looks for */
+    NOTICE_FAULT,      /* the core has stopped: kind of halt, address */
 };
 
 /* The page's half, in JavaScript. */
-__attribute__((import_module("page"), import_name("told"))) void page_told(uint32_t what, uint32_t one, uint32_t two, uint32_t three, uint32_t pc);
+__attribute__((import_module("page"), import_name("notice"))) void page_notice(uint32_t what, uint32_t one, uint32_t two, uint32_t three, uint32_t pc);
 __attribute__((import_module("page"), import_name("deliver"))) void page_deliver(uint32_t slot);
 
 /* Why a run has ended. */
@@ -77,10 +77,10 @@ static uint64_t unclocked_since[PAGES];
 
 static uint32_t here(void) { return core->shared.in_access ? core->shared.access_pc : core->shared.pc; }
 
-static void tell(enum told what, uint32_t one, uint32_t two, uint32_t three)
+static void notify(enum notice what, uint32_t one, uint32_t two, uint32_t three)
 {
     if (is_made) {
-        page_told(what, one, two, three, here());
+        page_notice(what, one, two, three, here());
     }
 }
 
@@ -120,7 +120,7 @@ static void unknown_block(uint32_t address, uint32_t size)
     }
 }
 
-/* Registers that C knows, where the core itself leaves them to Python: the run is about to end, or must be told of. */
+/* Registers that C knows, where the core itself leaves them to Python: the run is about to end, or somebody must be notified. */
 
 static struct page *page_at(uint32_t offset)
 {
@@ -155,7 +155,7 @@ static bool is_clocked(const struct page *page, uint32_t offset, bool is_write, 
     }
     if (is_write) {
         if (index >= page->count || value << 8 * (offset & 3) & page->masks[index][SETS]) {
-            tell(TOLD_NO_CLOCK, address, is_write, value);
+            notify(NOTICE_NO_CLOCK, address, is_write, value);
             core_declare_unclocked(core, address, true, 0);
         }
         return false;
@@ -163,7 +163,7 @@ static bool is_clocked(const struct page *page, uint32_t offset, bool is_write, 
     unclocked_since[number] = unclocked_since[number] ? unclocked_since[number] : now_ns(fabric);
     const bool is_over = now_ns(fabric) >= unclocked_since[number] + UNCLOCKED_NS;
     if (is_over) {
-        tell(TOLD_NO_CLOCK, address, is_write, 0);
+        notify(NOTICE_NO_CLOCK, address, is_write, 0);
     }
     core_declare_unclocked(core, address, false, is_over ? NO_TIME : unclocked_since[number] + UNCLOCKED_NS);
     return false;
@@ -178,7 +178,7 @@ static uint32_t read_register_at(uint32_t offset, uint32_t size)
     }
     if (page == NULL || index >= page->count || !(page->behaviour[index] & (READS_PLAIN | READS_NATIVE)) ||
         !(page->behaviour[index] & IS_REGISTER)) {
-        tell(TOLD_READ, PERIPHERALS + offset, size, 0);
+        notify(NOTICE_READ, PERIPHERALS + offset, size, 0);
         return 0;
     }
     fabric_catch_up(fabric, page->device->slot, now_ns(fabric));
@@ -198,7 +198,7 @@ static void write_register_at(uint32_t offset, uint32_t size, uint32_t value)
     }
     if (page == NULL || index >= page->count || !(page->behaviour[index] & (WRITES_PLAIN | WRITES_NATIVE)) ||
         !(page->behaviour[index] & IS_REGISTER)) {
-        tell(TOLD_WRITE, address, value, size);
+        notify(NOTICE_WRITE, address, value, size);
         return;
     }
     fabric_catch_up(fabric, page->device->slot, now_ns(fabric));
@@ -208,7 +208,7 @@ static void write_register_at(uint32_t offset, uint32_t size, uint32_t value)
         const uint32_t in_lanes = (value & ones) << shift | (untouched & ~(ones << shift));
         value = page->behaviour[index] & BYTE_LANES ? in_lanes : (value & ones) * (size == 1 ? 0x01010101u : 0x10001u);
         if (stored_after(page, index, value) != stored_after(page, index, in_lanes)) {
-            tell(TOLD_DUPLICATED, address, size, 0);
+            notify(NOTICE_DUPLICATED, address, size, 0);
             core_declare_duplicated(core, address);
         }
     }
@@ -225,13 +225,13 @@ static void act_on(uint32_t answer)
         pend(core, SYSTICK);
     }
     if (answer & SYSTEM_RESET) {
-        tell(TOLD_RESET, 0, 0, 0);
+        notify(NOTICE_RESET, 0, 0, 0);
         stop();
     }
     if (answer & SYSTEM_TRAPS) {
         core->shared.traps_division = core->shared.ccr >> 4 & 1;
         if (core->shared.ccr >> 3 & 1) {
-            tell(TOLD_TRAP, core->shared.ccr, 0, 0);
+            notify(NOTICE_TRAP, core->shared.ccr, 0, 0);
         }
     }
     if (answer & SYSTEM_WRITTEN) {
@@ -246,7 +246,7 @@ static uint32_t read_system_at(uint32_t address, uint32_t size)
     uint32_t word = 0;
     const uint32_t answer = system_read(&core->shared, address & ~3u, core->shared.access_cycle, &word);
     if (!answer || !is_privileged(core)) {
-        tell(TOLD_READ, address, size, 0);
+        notify(NOTICE_READ, address, size, 0);
     }
     act_on(answer & ~(uint32_t)SYSTEM_WRITTEN);
     return word >> 8 * (address & 3) & (size == 4 ? UINT32_MAX : (1u << 8 * size) - 1);
@@ -257,7 +257,7 @@ static void write_system_at(uint32_t address, uint32_t size, uint32_t value)
     const uint32_t shift = 8 * (address & 3), mask = (size == 4 ? UINT32_MAX : (1u << 8 * size) - 1) << shift;
     const uint32_t answer = system_write(&core->shared, address & ~3u, value << shift & mask, mask, core->shared.access_cycle);
     if (!answer || answer & (SYSTEM_STIMULUS | SYSTEM_LOOK_OUT) || !is_privileged(core)) {
-        tell(TOLD_WRITE, address, value, size);
+        notify(NOTICE_WRITE, address, value, size);
     }
     act_on(answer);
 }
@@ -309,7 +309,7 @@ static bool bad_access(uint32_t kind, uint32_t address, uint32_t size, uint64_t 
 {
     (void)kind;
     (void)size;
-    tell(TOLD_STORE, address, (uint32_t)value, 0);
+    notify(NOTICE_STORE, address, (uint32_t)value, 0);
     stop();
     core->api.stop(core->unicorn);
     return false;
@@ -360,16 +360,16 @@ static uint32_t asked(uint32_t slot, uint32_t what, uint32_t value)
     if (!is_made) {
         return 0;
     }
-    page_told(TOLD_ASKED, slot, what, value, here());
+    page_notice(NOTICE_ASKED, slot, what, value, here());
     return 0;
 }
 
-static void electrical(uint32_t pin, uint32_t what) { tell(TOLD_PIN, pin, what, 0); }
+static void electrical(uint32_t pin, uint32_t what) { notify(NOTICE_PIN, pin, what, 0); }
 
 static uint64_t bus(uint32_t is_write, uint32_t address, uint32_t bytes, uint32_t word)
 {
     (void)bytes;
-    tell(is_write ? TOLD_WRITE : TOLD_READ, address, word, 0);
+    notify(is_write ? NOTICE_WRITE : NOTICE_READ, address, word, 0);
     return NO_TIME;
 }
 
@@ -472,10 +472,10 @@ EXPORTED uint32_t page_run(uint64_t limit_ns)
         if (kind == HALT_FROZEN) {
             thaw();
         } else if (kind == HALT_WAIT_INTERRUPT || kind == HALT_WAIT_EVENT) {
-            tell(TOLD_SLEEP, 0, 0, 0);
+            notify(NOTICE_SLEEP, 0, 0, 0);
             has_stopped = true;
         } else if (kind != HALT_BOUNDARY && !has_stopped) {
-            tell(TOLD_FAULT, kind, s->halt_pc, s->halt_has_address ? s->halt_address : 0);
+            notify(NOTICE_FAULT, kind, s->halt_pc, s->halt_has_address ? s->halt_address : 0);
             has_stopped = true;
         }
     }

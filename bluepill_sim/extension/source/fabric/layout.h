@@ -424,7 +424,7 @@ _Static_assert(sizeof(struct clocks) == 56, "clocks");
 struct rcc {
     uint64_t ready_at[5]; /* when HSI, HSE, PLL, LSE and LSI get ready that are starting */
     uint64_t python_ns; /* when Python next acts */
-    uint32_t watches_gates; /* Python is told of each write of a clock gate */
+    uint32_t watches_gates; /* Python is notified of each write of a clock gate */
     uint32_t shows_clock; /* Python has put a clock on MCO's pin */
     uint32_t hse_hz; /* the crystal; 0: there is none */
     uint32_t crystal_works;

@@ -30,7 +30,7 @@ enum { EXTI11 = 0xf << 12, EXTI11_AT = 12, EXTI10 = 0xf << 8, EXTI10_AT = 8, EXT
 enum { EXTI15 = 0xf << 12, EXTI15_AT = 12, EXTI14 = 0xf << 8, EXTI14_AT = 8, EXTI13 = 0xf << 4, EXTI13_AT = 4,
        EXTI12 = 0xf << 0, EXTI12_AT = 0 };
 
-/* What Python is told. */
+/* What Python is notified of. */
 enum { PLACED = 2, ROUTED = 3, MEANINGLESS = 4 };
 
 #endif
