@@ -150,6 +150,7 @@ generated: setup
 page:
 	@command -v npm >/dev/null || { echo "make: the page is built with Node 20 or newer (hint: apt-get install npm)"; exit 2; }
 	cd tools/page && npm ci --silent --no-audit --ignore-scripts && npm run --silent build
+	$(BIN)/python -m tools.generators.browser_chip
 
 # Whether the committed page is what is built, byte for byte, and its checks and tests; skipped aloud without Node.
 page-check:

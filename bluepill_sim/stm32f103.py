@@ -344,6 +344,7 @@ class ChipParts(Stateful):
 
     def clock_changed(self) -> None:
         """Notify every peripheral that the frequencies have changed."""
+        self.rcc.fabric.clocks_changed()
         for part in self.by_name.values():
             part.clock_changed()
 

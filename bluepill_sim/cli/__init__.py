@@ -3,6 +3,7 @@
 import typer
 
 from bluepill_sim.cli import coverage, debug, info, parts, pins, profile, run, trace
+from bluepill_sim.cli.browser import page
 from bluepill_sim.cli.comparisons import compare_cores, compare_silicon
 
 HELP = """Run, look into and debug a BluePill program, without a robot.
@@ -21,6 +22,6 @@ def register(app: typer.Typer) -> None:
 
 def add_verbs(app: typer.Typer) -> None:
     """Add what stands below it."""
-    for module in (run, parts, debug, info, pins, trace, coverage, profile, compare_silicon, compare_cores):
+    for module in (run, parts, debug, info, pins, trace, coverage, profile, compare_silicon, compare_cores, page):
         name = module.__name__.rpartition(".")[2]
         app.command(name.replace("_", "-"), help=module.HELP)(getattr(module, name))

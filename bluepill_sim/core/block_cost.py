@@ -1,10 +1,7 @@
 """What a basic block costs on a Cortex-M3, in cycles, and where in it each instruction starts.
 
-Costs are those of the Cortex-M3 Technical Reference Manual (r1p1, chapter 18
-"Instruction timing"), with the data-dependent ones at a stated value between
-their bounds. Flash wait states follow a model of the prefetch buffer that is
-ours and not measured on silicon: two 8-byte lines, the next line being read
-while the present one runs.
+It is worked out in C (`extension/source/core/measure.c`, by the tables of `extension/encodings.py`); here is what a
+block is to the rest of the emulator.
 
 Not modelled: instructions skipped in an IT block (each is charged in full),
 the alignment of branch targets, the write buffer when full, contention of
@@ -15,70 +12,24 @@ Invariant: a block's cost depends on its bytes, its address, the wait states
 and the prefetch setting, and on nothing else.
 """
 
+import ctypes
 from dataclasses import dataclass, field
 from functools import lru_cache
 
-from bluepill_sim.core.thumb import Instruction, decode_all
+from bluepill_sim.core.thumb import KINDS, MeasuredRow
 from bluepill_sim.extension.encodings import Kind
-
-#: TRM table 18-1: cycles without pipeline refill and per-register cycles.
-CYCLES = {
-    Kind.PLAIN: 1,
-    Kind.MULTIPLY_ACCUMULATE: 2,
-    Kind.MULTIPLY_LONG: 4,  # chosen: 3 to 5 by operands
-    Kind.MULTIPLY_ACCUMULATE_LONG: 5,  # chosen: 4 to 7 by operands
-    Kind.DIVIDE: 7,  # chosen: 2 to 12 by operands
-    Kind.LOAD: 2,
-    Kind.LOAD_LITERAL: 2,
-    Kind.LOAD_PC: 2,
-    Kind.STORE: 1,
-    Kind.STORE_INDEXED: 2,
-    Kind.LOAD_MULTIPLE: 1,
-    Kind.STORE_MULTIPLE: 1,
-    Kind.LOAD_DUAL: 1,
-    Kind.STORE_DUAL: 1,
-    Kind.EXCLUSIVE: 2,
-    Kind.BRANCH: 1,
-    Kind.CALL: 1,
-    Kind.BRANCH_REGISTER: 1,
-    Kind.TABLE_BRANCH: 1,  # with count = 2: three cycles for the load and the addition
-    Kind.MASK_CHANGE: 2,  # chosen: 1 or 2
-    Kind.READ_SPECIAL: 1,
-    Kind.BARRIER: 1,
-    Kind.SYNCHRONISE: 4,  # chosen: 1 and a refill
-    Kind.SEND_EVENT: 1,
-    Kind.WAIT_EVENT: 1,
-    Kind.WAIT_INTERRUPT: 1,
-    Kind.YIELD: 1,
-    Kind.IF_THEN: 1,
-    Kind.SUPERVISOR_CALL: 1,
-    Kind.BREAKPOINT: 1,
-}
-
-#: Pipeline refill of a taken branch: P of the TRM is 1 to 3, by how early the target is known.
-REFILL = {
-    Kind.BRANCH: 1,
-    Kind.CALL: 1,
-    Kind.BRANCH_REGISTER: 2,
-    Kind.TABLE_BRANCH: 3,
-    Kind.LOAD_PC: 3,
-    Kind.LOAD_MULTIPLE: 3,
-}
-
-#: What takes so long that an exception need not wait for it (TRM 18.2, ARM B1.5.10). chosen: LDM and STM begin anew
-#: too, where silicon goes on with the word at which they were left.
-GIVEN_UP = frozenset(
-    {Kind.MULTIPLY_LONG, Kind.MULTIPLY_ACCUMULATE_LONG, Kind.DIVIDE, Kind.LOAD_MULTIPLE, Kind.STORE_MULTIPLE}
-)
+from bluepill_sim.extension.layout import BLOCK_COST, structure
+from bluepill_sim.extension.library import library
 
 #: chosen: of so many blocks it is known what they cost and access, several programs' all.
 KNOWN_BLOCKS = 4096
-#: Bytes that one access to the flash delivers (RM0008 3.3.3: 64-bit lines).
-LINE_BYTES = 8
-
-_SINGLE_LOADS = frozenset({Kind.LOAD, Kind.LOAD_LITERAL})
 _MULTIPLES = frozenset({Kind.LOAD_MULTIPLE, Kind.STORE_MULTIPLE, Kind.LOAD_DUAL, Kind.STORE_DUAL})
-_PIPELINED_AFTER_LOAD = frozenset({Kind.LOAD, Kind.LOAD_LITERAL, Kind.STORE_INDEXED})
+_STORES = frozenset({Kind.STORE, Kind.STORE_INDEXED})
+#: Of `block_cost.flags` (`enum row_flag`).
+_CHANGES_MASKS, _SENDS_EVENT, _SELF_LOOP = 1, 2, 4
+#: Multiple transfers by the SP, which is aligned.
+_FIRST_ALIGNED = 13
+_CostStruct = structure(BLOCK_COST)
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,111 +112,34 @@ def measure_block(code: bytes, start: int, wait_states: int, *, has_prefetch: bo
         wait_states: 0 to 2 for flash; 0 for code in SRAM.
         has_prefetch: FLASH_ACR PRFTBE.
     """
-    instructions = decode_all(code, start)
-    fetch = _Fetch(start, wait_states, has_prefetch=has_prefetch)
-    offsets: dict[int, int] = {}
-    clock = 0
-    previous: Instruction | None = None
-    for instruction in instructions:
-        clock = fetch.until(instruction, clock)
-        offsets[instruction.address] = clock
-        clock += cycles_of(instruction, previous)
-        if instruction.kind is Kind.LOAD_LITERAL:
-            clock += wait_states
-        previous = instruction
-    divides = tuple((i.address, i.base) for i in instructions if i.kind is Kind.DIVIDE and i.base is not None)
-    stores = [i.address for i in instructions if i.kind in {Kind.STORE, Kind.STORE_INDEXED}]
-    kinds = {i.kind for i in instructions}
-    end, taken, it_states = start + len(code), clock + _refill(previous, wait_states), _it_states(instructions)
+    rows, cost = (MeasuredRow * (len(code) // 2))(), _CostStruct()
+    library().measure_block(
+        code, len(code), start, wait_states, has_prefetch, ctypes.addressof(rows), ctypes.addressof(cost)
+    )
+    instructions = [(row, KINDS[row.kind]) for row in rows[: cost.count]]
+    divides = tuple((row.address, row.base) for row, kind in instructions if kind is Kind.DIVIDE)
+    stores = [row.address for row, kind in instructions if kind in _STORES]
+    kinds = {kind for _, kind in instructions}
     return BasicBlock(
         start,
-        end,
-        taken if _always_goes(previous, end, it_states) else clock,
-        taken,
-        offsets,
+        start + len(code),
+        cost.straight,
+        cost.taken,
+        {row.address: row.cycle for row, _ in instructions},
         divides=divides,
         late_divides=tuple(row for row in divides if stores and row[0] > stores[0]),
         aligned=tuple(
-            (i.address, i.base) for i in instructions if i.kind in _MULTIPLES and i.base is not None and i.base < 13
+            (row.address, row.base) for row, kind in instructions if kind in _MULTIPLES and row.base < _FIRST_ALIGNED
         ),
-        given_up=frozenset(i.address for i in instructions if i.kind in GIVEN_UP),
-        changes_masks=Kind.MASK_CHANGE in kinds,
-        sends_event=Kind.SEND_EVENT in kinds,
+        given_up=frozenset(row.address for row, _ in instructions if row.gives_up),
+        changes_masks=bool(cost.flags & _CHANGES_MASKS),
+        sends_event=bool(cost.flags & _SENDS_EVENT),
         has_exclusive=Kind.EXCLUSIVE in kinds,
         has_it=Kind.IF_THEN in kinds,
-        it_states=it_states,
-        is_self_loop=len(instructions) == 1 and instructions[0].destination == start,
-        last=instructions[-1].kind if instructions else Kind.PLAIN,
+        it_states={row.address: row.it_state for row, _ in instructions if row.it_state},
+        is_self_loop=bool(cost.flags & _SELF_LOOP),
+        last=instructions[-1][1] if instructions else Kind.PLAIN,
     )
-
-
-def cycles_of(instruction: Instruction, previous: Instruction | None = None) -> int:
-    """Return the cycles of an instruction without refill and wait states, after `previous`."""
-    cycles = CYCLES[instruction.kind] + instruction.count
-    if previous is None or previous.kind not in _SINGLE_LOADS:
-        return cycles
-    # TRM 18.3: an access right after a load overlaps it, unless its address needs the value loaded.
-    depends = previous.target in (instruction.base, instruction.index)
-    if instruction.kind in _PIPELINED_AFTER_LOAD and not depends:
-        return cycles - 1
-    return cycles
-
-
-class _Fetch:
-    """The two-line prefetch buffer between flash and core."""
-
-    def __init__(self, start: int, wait_states: int, *, has_prefetch: bool) -> None:
-        self._wait_states = wait_states
-        self._has_prefetch = has_prefetch
-        self._line = start // LINE_BYTES
-        #: When the present line arrived, and when its first instruction started.
-        self._ready = 0
-        self._entered = 0
-
-    def until(self, instruction: Instruction, clock: int) -> int:
-        """Return when the instruction can start, if the core is ready for it at `clock`."""
-        if not self._wait_states:
-            return clock
-        last = (instruction.address + instruction.size - 1) // LINE_BYTES
-        while self._line < last:
-            self._line += 1
-            if self._has_prefetch:
-                self._ready = max(self._ready, self._entered) + 1 + self._wait_states
-                clock = max(clock, self._ready)
-            else:
-                clock += self._wait_states
-            self._entered = clock
-        return clock
-
-
-def _always_goes(last: Instruction | None, end: int, it_states: dict[int, int]) -> bool:
-    """Tell whether the block ends in a branch to the very next instruction, which refills the pipeline as any other."""
-    return last is not None and last.always_branches and last.destination == end and last.address not in it_states
-
-
-def _refill(last: Instruction | None, wait_states: int) -> int:
-    """Return what leaving the block by a branch costs beyond its straight cycles."""
-    if last is None:
-        return 0
-    refill = REFILL.get(last.kind, 0)
-    if last.kind is Kind.LOAD_MULTIPLE and not last.loads_pc:
-        refill = 0
-    if last.destination is not None and last.destination // LINE_BYTES == last.address // LINE_BYTES:
-        return refill  # the line is still in the buffer
-    return refill + wait_states
-
-
-def _it_states(instructions: list[Instruction]) -> dict[int, int]:
-    """Return ITSTATE before each instruction that stands under an IT (ARM B1.4.2, ITAdvance)."""
-    states = {}
-    state = 0
-    for instruction in instructions:
-        if state:
-            states[instruction.address] = state
-            state = _advance(state)
-        if instruction.kind is Kind.IF_THEN:
-            state = instruction.it_state
-    return states
 
 
 def _advance(it_state: int) -> int:

@@ -14,7 +14,7 @@ of a field, and a field's bits are joined from left to right wherever they stand
     c         condition                         r   list of registers
     -         a bit that nothing looks at
 
-Source: ARMv7-M Architecture Reference Manual, chapters A5 and A7; cycles by kind stand in `core/block_cost.py`.
+Source: ARMv7-M Architecture Reference Manual, chapters A5 and A7; cycles by kind are those of the TRM (r1p1, 18).
 Invariant: the rows are read from the top and the first match wins; what matches none is undefined.
 """
 
@@ -67,6 +67,57 @@ class Kind(Enum):
     IF_THEN = "if-then"
     SUPERVISOR_CALL = "supervisor-call"
     BREAKPOINT = "breakpoint"
+
+
+#: TRM table 18-1: cycles without pipeline refill and per-register cycles.
+CYCLES = {
+    Kind.PLAIN: 1,
+    Kind.MULTIPLY_ACCUMULATE: 2,
+    Kind.MULTIPLY_LONG: 4,  # chosen: 3 to 5 by operands
+    Kind.MULTIPLY_ACCUMULATE_LONG: 5,  # chosen: 4 to 7 by operands
+    Kind.DIVIDE: 7,  # chosen: 2 to 12 by operands
+    Kind.LOAD: 2,
+    Kind.LOAD_LITERAL: 2,
+    Kind.LOAD_PC: 2,
+    Kind.STORE: 1,
+    Kind.STORE_INDEXED: 2,
+    Kind.LOAD_MULTIPLE: 1,
+    Kind.STORE_MULTIPLE: 1,
+    Kind.LOAD_DUAL: 1,
+    Kind.STORE_DUAL: 1,
+    Kind.EXCLUSIVE: 2,
+    Kind.BRANCH: 1,
+    Kind.CALL: 1,
+    Kind.BRANCH_REGISTER: 1,
+    Kind.TABLE_BRANCH: 1,  # with count = 2: three cycles for the load and the addition
+    Kind.MASK_CHANGE: 2,  # chosen: 1 or 2
+    Kind.READ_SPECIAL: 1,
+    Kind.BARRIER: 1,
+    Kind.SYNCHRONISE: 4,  # chosen: 1 and a refill
+    Kind.SEND_EVENT: 1,
+    Kind.WAIT_EVENT: 1,
+    Kind.WAIT_INTERRUPT: 1,
+    Kind.YIELD: 1,
+    Kind.IF_THEN: 1,
+    Kind.SUPERVISOR_CALL: 1,
+    Kind.BREAKPOINT: 1,
+}
+
+#: Pipeline refill of a taken branch: P of the TRM is 1 to 3, by how early the target is known.
+REFILL = {
+    Kind.BRANCH: 1,
+    Kind.CALL: 1,
+    Kind.BRANCH_REGISTER: 2,
+    Kind.TABLE_BRANCH: 3,
+    Kind.LOAD_PC: 3,
+    Kind.LOAD_MULTIPLE: 3,
+}
+
+#: What takes so long that an exception need not wait for it (TRM 18.2, ARM B1.5.10). chosen: LDM and STM begin anew
+#: too, where silicon goes on with the word at which they were left.
+GIVEN_UP = frozenset(
+    {Kind.MULTIPLY_LONG, Kind.MULTIPLY_ACCUMULATE_LONG, Kind.DIVIDE, Kind.LOAD_MULTIPLE, Kind.STORE_MULTIPLE}
+)
 
 
 @dataclass(frozen=True, slots=True)

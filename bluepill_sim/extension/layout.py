@@ -80,6 +80,32 @@ INSTRUCTION = Struct(
         StructMember("padding", "u8"),
     ),
 )
+MEASURED = Struct(
+    "measured",
+    "An instruction as the models of time and of faults need it, and when in its block it begins.",
+    (
+        StructMember("address", "u32"),
+        StructMember("destination", "u32", doc="of a direct branch"),
+        StructMember("cycle", "u32", doc="from the start of its block"),
+        StructMember("kind", "u8", doc="`enum kind`"),
+        StructMember("bytes", "u8"),
+        StructMember("count", "u8", doc="registers that a multiple transfer moves"),
+        StructMember("loads_pc", "u8", doc="it writes the PC although its kind does not say so"),
+        StructMember("base", "u8", doc="register of an access, or the divisor of a division; 255: does not matter"),
+        StructMember("index", "u8", doc="255: none"),
+        StructMember("target", "u8", doc="register that a load fills; 255: none"),
+        *_fields("u8", "has_destination"),
+        StructMember("always_branches", "u8", doc="a direct branch, but for an IT before it"),
+        StructMember("sets_it", "u8", doc="what an IT makes of ITSTATE"),
+        StructMember("it_state", "u8", doc="before it, by an IT of its block"),
+        StructMember("gives_up", "u8", doc="an exception that comes in it leaves it undone"),
+    ),
+)
+BLOCK_COST = Struct(
+    "block_cost",
+    "What a block costs in cycles: where it goes on at its end, and elsewhere.",
+    (*_fields("u32", "straight", "taken", "count"), StructMember("flags", "u32", doc="`enum row_flag`")),
+)
 RAMP = Struct(
     "ramp",
     "A counter that follows from the time: `source/fabric/ramp.c`.",
@@ -407,8 +433,40 @@ GPIO = Struct(
         StructMember("claimed_pc", "u32", PINS),
     ),
 )
+AFIO = Struct(
+    "afio",
+    "Which pins AFIO keeps from GPIO, a bit each. RM0008 9.3.",
+    (StructMember("held", "u32", PORTS), StructMember("swj_cfg", "u32", doc="which cannot be read")),
+)
+CLOCKS = Struct(
+    "clocks",
+    "The clock tree's outputs: `bluepill_sim/fabric/clocks.py`.",
+    (
+        *_fields("u32", "sysclk_hz", "hclk_hz", "pclk1_hz", "pclk2_hz"),
+        StructMember("timer1_hz", "u32", doc="of TIM2 to TIM7"),
+        StructMember("timer2_hz", "u32", doc="of TIM1 and TIM8"),
+        StructMember("usb_hz", "u32", doc="0 while the PLL is off"),
+        StructMember("adc_divider", "u32", doc="what PCLK2 is divided by for the ADCs"),
+        *_fields("u32", "lsi_hz"),
+        StructMember("rtcclk_hz", "u32", doc="0: it stands still"),
+        *_fields("u32", "rtc_calibration", "rtc_seconds_shown", "flash_wait_states", "flash_prefetch"),
+    ),
+)
 RCC = Struct(
-    "rcc", "What RCC tells Python of.", (StructMember("watches_gates", "u32", doc="each write of a clock gate"),)
+    "rcc",
+    "What RCC holds beyond its registers. RM0008 7.2.",
+    (
+        StructMember("ready_at", "u64", 5, "when HSI, HSE, PLL, LSE and LSI get ready that are starting"),
+        StructMember("python_ns", "u64", doc="when Python next acts"),
+        StructMember("watches_gates", "u32", doc="Python is notified of each write of a clock gate"),
+        StructMember("shows_clock", "u32", doc="Python has put a clock on MCO's pin"),
+        StructMember("hse_hz", "u32", doc="the crystal; 0: there is none"),
+        StructMember("crystal_works", "u32"),
+        StructMember("keeps_lsi", "u32", doc="IWDG does"),
+        StructMember("hsi_hz", "u32", doc="as it is trimmed"),
+        StructMember("pll_hz", "u32", doc="whether or not it runs"),
+        StructMember("padding", "u32"),
+    ),
 )
 FILTER = Struct(
     "filter",
@@ -529,8 +587,8 @@ SENT = Struct(
 
 #: All of them; one that holds another comes behind it.
 STRUCTS = (
-    RECORD, INSTRUCTION, RAMP, TICKS, STEP, LOOP, FAULT, SHARED, PORT, USART, EXTI, DMA, SIGNAL, ANALOG, ADC, GPIO, RCC,
-    FILTER, SHAPE, TIM, SPI, I2C, WAVE, EDGE, INPUT_ROWS, CAN_BITS, SENT,
+    RECORD, INSTRUCTION, MEASURED, BLOCK_COST, RAMP, TICKS, STEP, LOOP, FAULT, SHARED, PORT, USART, EXTI, DMA, SIGNAL,
+    ANALOG, ADC, GPIO, AFIO, CLOCKS, RCC, FILTER, SHAPE, TIM, SPI, I2C, WAVE, EDGE, INPUT_ROWS, CAN_BITS, SENT,
 )  # fmt: skip
 
 _KINDS: dict[str, Any] = {

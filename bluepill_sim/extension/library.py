@@ -67,7 +67,7 @@ class Callbacks(ctypes.Structure):
 
 
 #: Result and arguments, as `simbase.c_library` spells them.
-_FUNCTIONS = {
+FUNCTION_TYPES = {
     "core_shared_bytes": "z",
     "core_new": "pppp",
     "core_free": "vp",
@@ -78,6 +78,8 @@ _FUNCTIONS = {
     "core_forget_range": "vpuu",
     "core_set_loop": "bpup",
     "core_set_fault": "vpuuuu",
+    "measure_decode": "upuup",
+    "measure_block": "vpuuubpp",
     "core_declare_zero": "vpu",
     "core_forget_zeros": "vp",
     "core_declare_unclocked": "vpubq",
@@ -118,6 +120,9 @@ _FUNCTIONS = {
     "fabric_free": "vp",
     "fabric_set_host": "vpp",
     "fabric_set_time": "vpqqu",
+    "fabric_set_clocks": "vpp",
+    "fabric_set_clock": "vpuu",
+    "fabric_clocks_changed": "vp",
     "fabric_event_ns": "qp",
     "fabric_next_ns": "qp",
     "fabric_run_events": "vpq",
@@ -246,7 +251,7 @@ def library() -> Any:
     Raises:
         MissingDependencyError: it was not built, or is of another version of the package.
     """
-    found = loaded(library_path(), _FUNCTIONS, "the emulator's library", PART, ctypes.PyDLL)
+    found = loaded(library_path(), FUNCTION_TYPES, "the emulator's library", PART, ctypes.PyDLL)
     if found.core_shared_bytes() != ctypes.sizeof(structure(SHARED)):
         raise MissingDependencyError("the emulator's library is of another version", hint="install the package again")
     return found

@@ -17,6 +17,7 @@ from typing import Any, Protocol, TypeVar
 from bluepill_sim.extension.layout import (
     ANALOG,
     ANALOG_PINS,
+    CLOCKS,
     INPUT_ROWS,
     PORT,
     PORTS,
@@ -43,6 +44,7 @@ NO_LEVEL = 2
 #: A word that has gone out (`struct sent`): ns, the word, clock in Hz, divider, format.
 WORD = packing(SENT)
 PortStruct, WaveStruct, AnalogStruct = structure(PORT), structure(WAVE), structure(ANALOG)
+_ClocksStruct: Any = structure(CLOCKS)
 #: VDDA of a board as it is delivered, in microvolts, and the temperature of the chip, in thousandths of a degree.
 VDDA_UV, TEMPERATURE_MC = 3_300_000, 25_000
 _U32, _U64, _USER = ctypes.c_uint32, ctypes.c_uint64, ctypes.c_void_p
@@ -218,6 +220,20 @@ class Fabric(Stateful):
     def set_time(self, base_ns: Nanos, base_cycle: int, frequency_hz: int) -> None:
         """Tie nanoseconds and the host's cycles together; before that a cycle is a nanosecond."""
         self._calls_of_c.fabric_set_time(self.handle, base_ns, base_cycle, frequency_hz)
+
+    def set_clocks(self, clocks: ctypes.Structure) -> None:
+        """Say where the clock tree's outputs are, `struct clocks`, which devices in C read and set."""
+        self._kept_words.append(clocks)
+        self._calls_of_c.fabric_set_clocks(self.handle, ctypes.addressof(clocks))
+
+    def set_clock(self, slot: int, name: str) -> None:
+        """Say which of them a device counts."""
+        self._calls_of_c.fabric_set_clock(self.handle, slot, getattr(_ClocksStruct, name).offset)
+
+    def clocks_changed(self) -> None:
+        """Notify every device in C that counts a clock that one may be another."""
+        self._calls_of_c.fabric_clocks_changed(self.handle)
+        self.check()
 
     # Events.
 

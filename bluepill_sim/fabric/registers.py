@@ -35,7 +35,7 @@ from itertools import pairwise
 from typing import Any, ClassVar
 
 from bluepill_sim.extension.layout import Struct, structure
-from bluepill_sim.fabric.fabric import CLOCK, OWN_COMMANDS, RESUMED, SETTLE, STOPPED
+from bluepill_sim.fabric.fabric import OWN_COMMANDS, RESUMED, SETTLE, STOPPED
 from bluepill_sim.fabric.ports import ChipPorts
 from simbase.state import Stateful
 
@@ -575,14 +575,17 @@ class Peripheral(Stateful):
     def advance_to(self, now_ns: int) -> None:
         """Act on everything due up to and including `now_ns`, in order of its time."""
 
+    def clock_name(self) -> str | None:
+        """Return the name, in `Clocks`, of the clock that a device in C counts; None: it counts none."""
+        return None
+
     def clock_hz(self) -> int:
-        """Return the frequency of the peripheral's own clock, for a device in C that counts it; 0: it does not."""
-        return 0
+        """Return the frequency of that clock; 0: it counts none."""
+        name = self.clock_name()
+        return 0 if name is None else int(getattr(self.chip.clocks, name))
 
     def clock_changed(self) -> None:
-        """Act on a change of the frequencies in `chip.clocks`, which has just happened."""
-        if self.KIND is not None and self.clock_hz():
-            self.command(CLOCK, self.clock_hz())
+        """Act on a change of the frequencies in `chip.clocks`, which has just happened; those in C know it already."""
 
     def clock_stopped(self) -> None:
         """Stand still, where the clock is one of the core's: Stop mode begins."""
@@ -605,7 +608,7 @@ class Peripheral(Stateful):
     def _take_slot(self, table: "_Table") -> int:
         if self.KIND is None:
             return self.fabric.add_slot(self.name, self.advance_to)
-        words, _ = self.words.buffer_info()
+        words = ctypes.addressof((ctypes.c_uint32 * len(self.words)).from_buffer(self.words))
         state = 0 if self.native is None else ctypes.addressof(self.native)
         slot = self.fabric.add_device(
             self.name, self.KIND, words, state, act=self.advance_to, answer=self.answer, deliver=self.deliver
@@ -613,6 +616,8 @@ class Peripheral(Stateful):
         mine = type(self)
         is_whole = mine.reset is Peripheral.reset and mine.on_reset is Peripheral.on_reset
         self.fabric.set_initial(slot, table.initial, is_whole=is_whole)
+        if (clock := self.clock_name()) is not None:
+            self.fabric.set_clock(slot, clock)
         return slot
 
     def _catch_up(self) -> None:

@@ -49,7 +49,7 @@ def share_registers(engine: Engine, parts: Iterable[Peripheral], rcc: Rcc) -> No
         count = len(behaviour)
         gate = CLOCK_GATES.get(part.name)
         at, mask = rcc.gate_address(part.name) if gate is not None else (None, 0)
-        words, _ = part.words.buffer_info()
+        words = ctypes.addressof((ctypes.c_uint32 * len(part.words)).from_buffer(part.words))
         first_page = part.base - PERIPHERAL_BASE >> _PAGE_SHIFT
         for first in range(0, count, _PAGE_WORDS):
             calls.core_set_page(

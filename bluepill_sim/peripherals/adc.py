@@ -10,7 +10,7 @@ from enum import IntEnum
 from typing import ClassVar
 
 from bluepill_sim.extension.layout import ADC
-from bluepill_sim.fabric.fabric import CLOCK, OWN_COMMANDS, RESET
+from bluepill_sim.fabric.fabric import OWN_COMMANDS, RESET
 from bluepill_sim.fabric.ports import ChipPorts
 from bluepill_sim.fabric.registers import NATIVE, Peripheral, PeripheralMapping, Register, bits, numbered
 
@@ -128,13 +128,9 @@ class Adc(Peripheral):
         chip.pins.route_listeners.append(self._route_changed)
         chip.pins.fabric.input_listeners.append(lambda: self.command(AdcCommand.INPUTS_CHANGE))
 
-    def clock_hz(self) -> int:
-        """Return PCLK2."""
-        return self.chip.clocks.pclk2_hz
-
-    def clock_changed(self) -> None:
-        """Take PCLK2 and its divider."""
-        self.command(CLOCK, self.clock_hz(), self.chip.clocks.adc_divider)
+    def clock_name(self) -> str:
+        """Return that of PCLK2."""
+        return "pclk2_hz"
 
     def answer(self, what: int, value: int) -> int:
         """Warn."""

@@ -10,32 +10,27 @@ Chosen: its output PB3 (JTDO) cannot, as long as the port has it (IDR and EXTI s
 Chosen: SWJ_CFG, whose value is undefined when read, reads 0; so a
 read-modify-write of MAPR gives the pins back to the debug port, as it may on silicon.
 
+Which pins are held is `source/devices/afio.c`; here is who is notified of it, and of routes.
+
 Source: RM0008 sections 9.3 and 9.4.
-Invariant: each debug pin is held exactly while SWJ_CFG (or reset) says so.
 """
 
-from bluepill_sim.fabric.pins import PinDrive
+from enum import IntEnum
+
+from bluepill_sim.extension.layout import AFIO
+from bluepill_sim.fabric.fabric import RESET
 from bluepill_sim.fabric.ports import ChipPorts
-from bluepill_sim.fabric.registers import Peripheral, PeripheralMapping, Register, bits
+from bluepill_sim.fabric.registers import NATIVE, OWN_ANSWERS, Peripheral, PeripheralMapping, Register, bits
 
 EVCR, MAPR, EXTICR1 = range(3)
 _EXTICR_INDEXES = range(EXTICR1, EXTICR1 + 4)
 
-#: The pins of the debug port after reset: what has them, and its pull (RM0008 31.4.4).
-DEBUG_PINS = {
-    "PA13": ("JTMS/SWDIO", PinDrive.PULL_UP),
-    "PA14": ("JTCK/SWCLK", PinDrive.PULL_DOWN),
-    "PA15": ("JTDI", PinDrive.PULL_UP),
-    "PB3": ("JTDO", PinDrive.NONE),
-    "PB4": ("NJTRST", PinDrive.PULL_UP),
-}
-#: The debug pins that each legal SWJ_CFG keeps (RM0008 table 35).
-KEPT_BY_SWJ_CFG = {
-    0b000: frozenset(DEBUG_PINS),
-    0b001: frozenset(DEBUG_PINS) - {"PB4"},
-    0b010: frozenset({"PA13", "PA14"}),
-    0b100: frozenset(),
-}
+#: What has the pins that AFIO holds: the debug port (RM0008 31.4.4), the crystal.
+_OWNERS = {
+    "PA13": "JTMS/SWDIO", "PA14": "JTCK/SWCLK", "PA15": "JTDI", "PB3": "JTDO", "PB4": "NJTRST",
+    "PD0": "OSC_IN", "PD1": "OSC_OUT",
+}  # fmt: skip
+_CRYSTAL_PINS = frozenset({"PD0", "PD1"})
 #: Shift and mask of each remap field of MAPR.
 REMAP_FIELDS = {
     "SPI1": (0, 1),
@@ -54,20 +49,27 @@ REMAP_FIELDS = {
     "ADC2_ETRGREG": (20, 1),
 }
 _MAPR = (
-    "ADC2_ETRGREG 20, ADC2_ETRGINJ 19, ADC1_ETRGREG 18, ADC1_ETRGINJ 17, TIM5CH4_IREMAP 16, PD01_REMAP 15, CAN 14:13, "
-    "TIM4 12, TIM3 11:10, TIM2 9:8, TIM1 7:6, USART3 5:4, USART2 3, USART1 2, I2C1 1, SPI1 0"
+    "SWJ_CFG 26:24, ADC2_ETRGREG 20, ADC2_ETRGINJ 19, ADC1_ETRGREG 18, ADC1_ETRGINJ 17, TIM5CH4_IREMAP 16, "
+    "PD01_REMAP 15, CAN 14:13, TIM4 12, TIM3 11:10, TIM2 9:8, TIM1 7:6, USART3 5:4, USART2 3, USART1 2, I2C1 1, SPI1 0"
 )
-_PD01_REMAP = 1 << 15
-_SWJ_SHIFT, _SWJ_MASK = 24, bits((26, 24))
-#: What ST's own code writes to leave the debug port as it is (RM0008 9.4.2: other combinations have no effect).
-_SWJ_UNCHANGED = 0b111
-_CRYSTAL_PINS = {"PD0": "OSC_IN", "PD1": "OSC_OUT"}
+
+
+class AfioQuestion(IntEnum):
+    """What Python is notified of."""
+
+    #: Pins were held or released: by a write of MAPR, or else by a reset.
+    PLACED = OWN_ANSWERS
+    #: A register of routes, or a reset, may have changed what goes where.
+    ROUTED = OWN_ANSWERS + 1
+    #: SWJ_CFG of no meaning.
+    MEANINGLESS = OWN_ANSWERS + 2
 
 
 class Afio(Peripheral):
     """Alternate-function I/O."""
 
-    STATE = ("_swj_cfg",)
+    KIND, HOLDS = "afio", AFIO
+    ENUMS = (AfioQuestion,)
     SOURCE = "RM0008 9.4"
     REGISTERS = (
         Register(
@@ -81,14 +83,14 @@ class Afio(Peripheral):
             offset=0x04,
             readable=bits((20, 0)),
             writable=bits((26, 24), (20, 0)),
-            on_write="_route",
+            on_write=NATIVE,
             fields=_MAPR,
         ),
         *(
             Register(
                 name=f"EXTICR{n + 1}",
                 offset=0x08 + 4 * n,
-                on_write="_write_exticr",
+                on_write=NATIVE,
                 fields=", ".join(f"EXTI{4 * n + k} {4 * k + 3}:{4 * k}" for k in range(3, -1, -1)),
             )
             for n in range(4)
@@ -97,53 +99,37 @@ class Afio(Peripheral):
 
     def __init__(self, chip: ChipPorts, place: PeripheralMapping) -> None:
         super().__init__(chip, place)
-        self._swj_cfg = 0
-        self._place_pins()
+        self.command(RESET)
 
-    def on_reset(self) -> None:
-        """Give the debug port its pins back and undo every remap."""
-        self._swj_cfg = 0
-        self._place_pins()
-        self._publish()
+    def answer(self, what: int, value: int) -> int:
+        """Tell of pins and routes, or warn."""
+        if what == AfioQuestion.PLACED:
+            self._name_holders(is_written=bool(value))
+        elif what == AfioQuestion.ROUTED:
+            self._publish()
+        else:
+            self.chip.warn(f"AFIO_MAPR: SWJ_CFG = {value:03b} has no meaning: ignored", once="AFIO:swj")
+        return 0
 
     def _write_evcr(self, written: int, _previous: int) -> None:
         if written & 1 << 7:
             self.chip.warn("AFIO_EVCR: the event output is not modelled", once="AFIO:evcr")
 
-    def _route(self, written: int, _previous: int) -> None:
-        swj_cfg = (written & _SWJ_MASK) >> _SWJ_SHIFT
-        if swj_cfg not in KEPT_BY_SWJ_CFG:
-            if swj_cfg != _SWJ_UNCHANGED:
-                self.chip.warn(f"AFIO_MAPR: SWJ_CFG = {swj_cfg:03b} has no meaning: ignored", once="AFIO:swj")
-            swj_cfg = self._swj_cfg
-        taken_back = KEPT_BY_SWJ_CFG[swj_cfg] - KEPT_BY_SWJ_CFG[self._swj_cfg]
-        if taken_back:
-            names = ", ".join(sorted(taken_back))
-            self.chip.warn(
-                f"AFIO_MAPR: SWJ_CFG is write-only, and this write gives {names} back to the debug port",
-                once="AFIO:swj-back",
-            )
-        self._swj_cfg = swj_cfg
-        self._place_pins()
-        self._publish()
-
-    def _write_exticr(self, _written: int, _previous: int) -> None:
-        self._publish()
-
-    def _place_pins(self) -> None:
-        """Hold and release the pins of the debug port and of the crystal."""
-        pins = self.chip.pins
-        kept = KEPT_BY_SWJ_CFG[self._swj_cfg]
-        for name, (owner, drive) in DEBUG_PINS.items():
-            if name in kept:
-                pins[name].hold(owner, drive)
-            elif pins[name].holder == owner:
-                pins[name].release()
-        for name, owner in _CRYSTAL_PINS.items():
-            if not self.words[MAPR] & _PD01_REMAP:
-                pins[name].hold(owner)
-            elif pins[name].holder == owner:
-                pins[name].release()
+    def _name_holders(self, *, is_written: bool) -> None:
+        """Say who has the pins that are held."""
+        pins, taken_back = self.chip.pins, []
+        for name, owner in _OWNERS.items():
+            pin = pins[name]
+            if self.native.held[pins.PORTS.index(pin.port)] >> pin.number & 1:
+                if pin.holder != owner and name not in _CRYSTAL_PINS:
+                    taken_back.append(name)
+                pins.holders[name] = owner
+            elif pin.holder == owner:
+                del pins.holders[name]
+        if taken_back and is_written:
+            names = ", ".join(taken_back)
+            text = f"AFIO_MAPR: SWJ_CFG is write-only, and this write gives {names} back to the debug port"
+            self.chip.warn(text, once="AFIO:swj-back")
 
     def _publish(self) -> None:
         """Publish the routes, and notify the peripherals that use them."""

@@ -17,8 +17,6 @@ from bluepill_sim.fabric.registers import NATIVE, Peripheral, PeripheralMapping,
 CHANNELS = range(1, 8)
 #: Of CCRx, RM0008 13.4.3.
 _CONTROL = "MEM2MEM 14, PL 13:12, MSIZE 11:10, PSIZE 9:8, MINC 7, PINC 6, CIRC 5, DIR 4, TEIE 3, HTIE 2, TCIE 1, EN 0"
-#: chosen: an access on an APB takes one cycle of HCLK, and two of its own clock.
-_BRIDGE_CYCLES, _APB_CYCLES = 1, 2
 
 
 class DmaQuestion(IntEnum):
@@ -76,18 +74,11 @@ class Dma(Peripheral):
 
     def __init__(self, chip: ChipPorts, place: PeripheralMapping) -> None:
         super().__init__(chip, place)
-        self.clock_changed()
-
-    def clock_hz(self) -> int:
-        """Return HCLK."""
-        return self.chip.clocks.hclk_hz
-
-    def clock_changed(self) -> None:
-        """Take what an access of each bus costs."""
-        clocks = self.chip.clocks
-        self.native.apb1_cycles = _BRIDGE_CYCLES + _APB_CYCLES * clocks.hclk_hz // clocks.pclk1_hz
-        self.native.apb2_cycles = _BRIDGE_CYCLES + _APB_CYCLES * clocks.hclk_hz // clocks.pclk2_hz
         self.command(CLOCK, self.clock_hz())
+
+    def clock_name(self) -> str:
+        """Return that of HCLK."""
+        return "hclk_hz"
 
     def answer(self, what: int, value: int) -> int:
         """Warn."""

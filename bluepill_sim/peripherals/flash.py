@@ -66,6 +66,10 @@ class FlashQuestion(IntEnum):
 
     #: A write, with the word before it.
     WRITTEN = OWN_ANSWERS
+    #: Wait states or prefetch are others now.
+    ACCESS = OWN_ANSWERS + 1
+    #: A LATENCY that there is not.
+    RESERVED = OWN_ANSWERS + 2
 
 
 class FlashMemory(Protocol):
@@ -105,7 +109,7 @@ class Flash(Peripheral):
             reset=bits(5, 4),
             readable=bits((5, 0)),
             writable=bits(4, 3, (2, 0)),
-            on_write="_write_acr",
+            on_write=NATIVE,
             fields="PRFTBS 5, PRFTBE 4, HLFCYA 3, LATENCY 2:0",
         ),
         Register(name="KEYR", offset=0x04, readable=0, on_write="_write_keyr"),
@@ -247,27 +251,11 @@ class Flash(Peripheral):
             self._finish(EOP)
 
     def on_reset(self) -> None:
-        """Lock the controller; no wait state; load the option bytes."""
+        """Lock the controller; load the option bytes."""
         self._key_step = self._option_key_step = 0
         self._address = 0
         self._load_options()
-        self._set_access(0, has_prefetch=True)
         self.set_output("irq", False)
-
-    def _write_acr(self, written: int, _previous: int) -> None:
-        latency = written & 7
-        if latency > 2:
-            self.chip.warn(f"FLASH_ACR: LATENCY = {latency} is reserved", once="FLASH:latency")
-        has_prefetch = bool(written & 1 << 4)
-        self.words[ACR] = (self.words[ACR] & ~(1 << 5)) | (1 << 5 if has_prefetch else 0)
-        self._set_access(latency, has_prefetch=has_prefetch)
-
-    def _set_access(self, latency: int, *, has_prefetch: bool) -> None:
-        clocks = self.chip.clocks
-        if (clocks.flash_wait_states, clocks.flash_prefetch) == (latency, has_prefetch):
-            return
-        clocks.flash_wait_states, clocks.flash_prefetch = latency, has_prefetch
-        self.chip.clock_changed()
 
     def _write_keyr(self, written: int, _previous: int) -> None:
         if self._key_step < 0 or not self.words[CR] & LOCK:
@@ -295,7 +283,12 @@ class Flash(Peripheral):
 
     def answer(self, what: int, value: int) -> int:
         """Take what the device in C hears: a write after which something is to be done."""
-        del what
+        if what == FlashQuestion.ACCESS:
+            self.chip.clock_changed()
+            return 0
+        if what == FlashQuestion.RESERVED:
+            self.chip.warn(f"FLASH_ACR: LATENCY = {value} is reserved", once="FLASH:latency")
+            return 0
         index, previous = value >> 16, value & _HALFWORD
         if index == CR:
             self._write_cr(self.words[CR], previous)

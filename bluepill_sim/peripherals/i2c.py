@@ -248,9 +248,9 @@ class I2c(Peripheral):
 
     # For the chip.
 
-    def clock_hz(self) -> int:
-        """Return PCLK1."""
-        return self.chip.clocks.pclk1_hz
+    def clock_name(self) -> str:
+        """Return that of PCLK1."""
+        return "pclk1_hz"
 
     def freeze(self) -> None:
         """Have the SMBus timeout alone stand still (RM0008 31.16.3, DBG_I2Cx_SMBUS_TIMEOUT)."""

@@ -10,16 +10,19 @@ comes again a microsecond after its handler has returned with CSSF set; LSION
 reads 1 while IWDG keeps LSI on; without CSS a crystal that fails under SYSCLK
 stops the core until a reset.
 
+Oscillators, PLL, SYSCLK, dividers, gates and resets are `source/devices/rcc.c`.
+
 Source: RM0008 section 7; start-up times from the data sheet DS5319 section 5.3.6 to 5.3.8.
-Invariant: `chip.clocks` is what SWS and the dividers say.
 """
 
+import ctypes
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from enum import Enum, IntEnum
 
 from bluepill_sim.extension.layout import RCC
+from bluepill_sim.extension.windows import NO_TIME
 from bluepill_sim.fabric.clocks import CRYSTAL_HZ, HSI_HZ, LEAST_LSI_HZ, LSE_HZ, MOST_LSI_HZ, illegal_settings
+from bluepill_sim.fabric.fabric import OWN_COMMANDS
 from bluepill_sim.fabric.ports import ChipPorts
 from bluepill_sim.fabric.registers import (
     NATIVE,
@@ -58,31 +61,19 @@ HSION, HSIRDY, HSEON, HSERDY, HSEBYP, PLLON, PLLRDY, CSSON = masks(
 )
 #: chosen: so long a forbidden setting must last to be warned of; ST's own code passes through some.
 ILLEGAL_NS = 1_000_000
-#: CFGR's PLLSRC, PLLXTPRE and PLLMUL: fixed while the PLL is on.
-PLLSRC, PLLXTPRE, _PLLMUL, _USBPRE, _SW = masks(_CFGR, "PLLSRC PLLXTPRE PLLMUL USBPRE SW")
-_PLL_SETTINGS = PLLSRC | PLLXTPRE | _PLLMUL
+PLLSRC, _SW = masks(_CFGR, "PLLSRC SW")
+#: SW: HSE, and the PLL, which may have it.
+_HSE, _HSE_BY_PLL = 1, 2
 #: MCO: 0xx is no clock, then SYSCLK, HSI, HSE, PLL / 2.
 _MCO_AT, _MCO_SYSCLK = 24, 4
 _MCO_PIN, _MCO = "PA8", "MCO"
 CSSF, CSSC = masks(_CIR, "CSSF CSSC")
 #: chosen: so long after its handler NMI comes again while CSSF is set.
 NMI_AGAIN_NS = 1_000
-#: CR HSITRIM: the middle, and what a step does to HSI (DS5319 5.3.7).
-_TRIM_AT, _TRIM_MIDDLE, TRIM_STEP_HZ = 3, 16, 40_000
 #: BDCR: RTCSEL's place, which keeps its first choice; RTCEN.
 _RTCSEL_AT = 8
-_BDRST, _RTCSEL, _RTCEN = masks(_BDCR, "BDRST RTCSEL RTCEN")
-#: HSE is divided by this for the RTC.
-_RTC_HSE_DIVIDER = 128
-(_RMVF,) = masks(_CSR, "RMVF")
+_BDRST, _RTCSEL, _LSEON = masks(_BDCR, "BDRST RTCSEL LSEON")
 _CSR_FLAGS = bits((31, 26))
-
-#: AHB divider by CFGR HPRE; APB divider by PPRE1/PPRE2.
-_AHB_DIVIDERS = (1,) * 8 + (2, 4, 8, 16, 64, 128, 256, 512)
-_APB_DIVIDERS = (1,) * 4 + (2, 4, 8, 16)
-_ADC_DIVIDERS = (2, 4, 6, 8)
-#: PLL factor by CFGR PLLMUL.
-_PLL_FACTORS = (2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 16)
 
 
 class RccQuestion(IntEnum):
@@ -92,6 +83,51 @@ class RccQuestion(IntEnum):
     RESETS = OWN_ANSWERS
     #: The gates have changed.
     GATES = OWN_ANSWERS + 1
+    #: A frequency has changed; what MCO shows may have.
+    CLOCKS = OWN_ANSWERS + 2
+    SHOWS = OWN_ANSWERS + 3
+    #: CSSC was written.
+    CSS_CLEARED = OWN_ANSWERS + 4
+    #: What the program tried in vain.
+    IN_USE = OWN_ANSWERS + 5
+    PLL_IS_ON = OWN_ANSWERS + 6
+    NO_SOURCE = OWN_ANSWERS + 7
+
+
+class RccCommand(IntEnum):
+    """What C does for Python."""
+
+    #: Start and stop oscillators, switch SYSCLK, and bring the clocks up to date.
+    SETTLE_CLOCKS = OWN_COMMANDS
+    #: `python_ns` has changed.
+    WAIT = OWN_COMMANDS + 1
+
+
+class RccTime(IntEnum):
+    """How long each oscillator takes to start, in ns."""
+
+    HSI_START_NS = 2_000  # DS5319 table 24: at most 2 µs
+    HSE_START_NS = 2_000_000  # DS5319 table 22: 2 ms typical
+    PLL_START_NS = 200_000  # DS5319 table 27: lock time of at most 200 µs
+    LSE_START_NS = 1_500_000_000  # DS5319 table 23: 1.5 s typical
+    LSI_START_NS = 85_000  # DS5319 table 25: at most 85 µs
+
+
+class RccFrequency(IntEnum):
+    """Frequencies in Hz."""
+
+    HSI_HZ = HSI_HZ
+    LSE_HZ = LSE_HZ
+    #: A step of HSITRIM (DS5319 5.3.7).
+    TRIM_STEP_HZ = 40_000
+
+
+#: What is tried in vain.
+_WARNINGS = {
+    RccQuestion.IN_USE: ("RCC_CR: an oscillator that clocks SYSCLK cannot be stopped", "RCC:in-use"),
+    RccQuestion.PLL_IS_ON: ("RCC_CFGR: PLL settings written while the PLL is on: ignored", "RCC:pll-on"),
+    RccQuestion.NO_SOURCE: ("RCC_CFGR: SW = 3 is not a clock: ignored", "RCC:sw"),
+}
 
 
 class ResetCause(Enum):
@@ -124,7 +160,7 @@ _REGISTERS = (
         reset=HSION | HSIRDY | bits(7),
         readable=bits((19, 16), 24, 25, (15, 0)) & ~bits(2),
         writable=HSION | HSEON | HSEBYP | bits(19) | PLLON | bits((7, 3)),
-        on_write="_write_cr",
+        on_write=NATIVE,
         fields=_CR,
     ),
     Register(
@@ -132,7 +168,7 @@ _REGISTERS = (
         offset=0x04,
         readable=bits((26, 24), (22, 0)),
         writable=bits((26, 24), (22, 4), (1, 0)),
-        on_write="_write_cfgr",
+        on_write=NATIVE,
         fields=_CFGR,
     ),
     Register(
@@ -141,7 +177,7 @@ _REGISTERS = (
         readable=bits((12, 8), 7, (4, 0)),
         writable=bits((12, 8)),
         triggers=bits(23, (20, 16)),
-        on_write="_write_cir",
+        on_write=NATIVE,
         fields=_CIR,
     ),
     Register(
@@ -189,8 +225,8 @@ _REGISTERS = (
         reset=ResetCause.POWER.value,
         readable=_CSR_FLAGS | bits(1, 0),
         writable=bits(0),
-        triggers=_RMVF,
-        on_write="_write_csr",
+        triggers=bits(24),
+        on_write=NATIVE,
         fields=_CSR,
     ),
 )
@@ -199,30 +235,8 @@ CR, CFGR, CIR, APB2RSTR, APB1RSTR, AHBENR, APB2ENR, APB1ENR, BDCR, CSR = indices
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Oscillator:
-    """A clock source: where its bits are and how long it takes to start."""
-
-    name: str
-    #: Index of the register that holds its bits.
-    register: int
-    on: int
-    ready: int
-    #: Bit number of its ready flag in CIR; its enable is 8 above, its clear 16 above.
-    flag: int
-    start_ns: int
-
-
-OSCILLATORS = (
-    Oscillator("HSI", CR, HSION, HSIRDY, 2, 2_000),  # DS5319 table 24: at most 2 µs
-    Oscillator("HSE", CR, HSEON, HSERDY, 3, 2_000_000),  # DS5319 table 22: 2 ms typical
-    Oscillator("PLL", CR, PLLON, PLLRDY, 4, 200_000),  # DS5319 table 27: lock time of at most 200 µs
-    Oscillator("LSE", BDCR, 1, 2, 1, 1_500_000_000),  # DS5319 table 23: 1.5 s typical
-    Oscillator("LSI", CSR, 1, 2, 0, 85_000),  # DS5319 table 25: at most 85 µs
-)
-_HSE, _PLL, _LSE, _LSI = 1, 2, 3, 4
-#: CR's ready bit by SW.
-_SOURCE_READY = (HSIRDY, HSERDY, PLLRDY)
+#: Oscillators by their places in `ready_at`.
+_HSI, _LSE, _LSI = 0, 3, 4
 
 
 class Rcc(Peripheral):
@@ -230,11 +244,11 @@ class Rcc(Peripheral):
 
     KIND, HOLDS = "rcc", RCC
     HAS_BYTE_LANES = True
-    STATE = ("_ready_at", "_illegal", "_nmi_ns", "_keeps_lsi", "crystal_works", "_shown")
+    STATE = ("_illegal", "_nmi_ns", "_shown")
     OUTPUTS = ("irq", "css")
     INPUTS = ("lsi",)
     SOURCE = "RM0008 7.3"
-    ENUMS = (RccQuestion,)
+    ENUMS = (RccQuestion, RccCommand, RccTime, RccFrequency)
     REGISTERS = _REGISTERS
 
     def __init__(
@@ -254,23 +268,35 @@ class Rcc(Peripheral):
             hse_hz: The crystal on OSC_IN/OSC_OUT in Hz; None: none fitted, HSE never gets ready.
         """
         super().__init__(chip, place)
+        self.fabric.set_clocks(chip.clocks.shared)
         self.hse_hz = hse_hz
+        self.native.hsi_hz = HSI_HZ
+        self.native.python_ns, self.native.ready_at[:] = NO_TIME, [NO_TIME] * len(self.native.ready_at)
+        self.native.crystal_works = True
         register_index = {register.name: register.offset // 4 for register in self.REGISTERS}
         self._gates = {name: (register_index[gate.register], 1 << gate.bit) for name, gate in gates.items()}
         #: Called after each write of an enable register, while `native.watches_gates` says so.
         self.on_gates: Callable[[], None] | None = None
-        #: When each oscillator that is starting gets ready, in the order of `OSCILLATORS`.
-        self._ready_at: tuple[int | None, ...] = (None,) * len(OSCILLATORS)
-        #: Whether the crystal oscillates; `fail_crystal` breaks it.
-        self.crystal_works = True
         #: When NMI is next raised, while CSSF is set.
         self._nmi_ns: int | None = None
-        #: Whether IWDG keeps LSI on.
-        self._keeps_lsi = False
         #: What MCO puts out: its source and frequency.
         self._shown = (0, 0)
         #: What the data sheet forbids and the clocks now are: key, when it is warned of (None: it was), and by whom.
         self._illegal: tuple[tuple[str, int | None, int], ...] = ()
+
+    @property
+    def hse_hz(self) -> int | None:
+        """The crystal on OSC_IN/OSC_OUT in Hz; None: none fitted."""
+        return self.native.hse_hz or None
+
+    @hse_hz.setter
+    def hse_hz(self, hse_hz: int | None) -> None:
+        self.native.hse_hz = hse_hz or 0
+
+    @property
+    def crystal_works(self) -> bool:
+        """Whether the crystal oscillates; `fail_crystal` breaks it."""
+        return bool(self.native.crystal_works)
 
     def is_clocked(self, name: str) -> bool:
         """Return whether the peripheral `name` has its clock (True where it has no gate)."""
@@ -280,68 +306,57 @@ class Rcc(Peripheral):
     def gate_address(self, name: str) -> tuple[int, int]:
         """Return where in the host's memory the enable register of the peripheral `name` is, and its bit as a mask."""
         index, mask = self._gates[name]
-        return self.words.buffer_info()[0] + index * self.words.itemsize, mask
+        at = ctypes.addressof((ctypes.c_uint32 * len(self.words)).from_buffer(self.words))
+        return at + index * self.words.itemsize, mask
 
     def reset(self, cause: ResetCause = ResetCause.POWER) -> None:
         """Go back to the state after a reset; the backup domain and the flags of CSR outlive all but a power cut."""
-        flags, backup, lse = self.words[CSR] & _CSR_FLAGS, self.words[BDCR], self._ready_at[3]
+        flags, backup, lse = self.words[CSR] & _CSR_FLAGS, self.words[BDCR], self.native.ready_at[_LSE]
         super().reset()
         if cause is not ResetCause.POWER:
             self.words[CSR] = flags | cause.value
             self.words[BDCR] = backup
-            self._ready_at = (None, None, None, lse, None)
+            self.native.ready_at[_LSE] = lse
         self._settle()
 
     def on_reset(self) -> None:
-        """Stop every oscillator but HSI."""
-        self._ready_at = (None,) * len(OSCILLATORS)
+        """Forget what was to come."""
         self._illegal = ()
         self._nmi_ns = None
-        self.set_output("irq", False)
+        self._schedule()
 
     def advance_to(self, now_ns: int) -> None:
-        """Raise the ready flags that are due."""
-        while self.due_ns is not None and self.due_ns <= now_ns:
-            at_ns = self.due_ns
-            if at_ns == self._nmi_ns:
-                self._nmi_ns = at_ns + NMI_AGAIN_NS
-                self.chip.signal("nmi")
-                self._schedule()
-                continue
-            if at_ns not in self._ready_at:
-                self._warn_of_settings(at_ns)
-                self._schedule()
-                continue
-            index = self._ready_at.index(at_ns)
-            oscillator = OSCILLATORS[index]
-            self.words[oscillator.register] |= oscillator.ready
-            self.words[CIR] |= 1 << oscillator.flag
-            self._set_ready_at(index, None)
-            self._settle(at_ns)
-            self._update_irq()
+        """Raise NMI again, or warn of settings."""
+        if self._nmi_ns is not None and self._nmi_ns <= now_ns:
+            self._nmi_ns = now_ns + NMI_AGAIN_NS
+            self.chip.signal("nmi")
+        self._warn_of_settings(now_ns)
+        self._schedule()
 
     def answer(self, what: int, value: int) -> int:
-        """Reset a peripheral whose bit of APBxRSTR has just gone to 1, tell of the gates, or hear a line."""
+        """Do what follows from the clocks, reset a peripheral, tell of the gates, or warn."""
         if what == RccQuestion.RESETS:
             self.chip.reset_peripheral(self.fabric.name_of(value))
         elif what == RccQuestion.GATES:
             if self.on_gates is not None:
                 self.on_gates()
+        elif what == RccQuestion.CLOCKS:
+            self.chip.clock_changed()
+        elif what == RccQuestion.SHOWS:
+            self._show_clock()
+        elif what == RccQuestion.CSS_CLEARED:
+            self._nmi_ns = None
+            self._schedule()
         else:
-            self.line_changed(self.INPUTS[value >> 1], bool(value & 1))
+            message, key = _WARNINGS[RccQuestion(what)]
+            self.chip.warn(message, once=key)
         return 0
-
-    def line_changed(self, name: str, level: bool) -> None:
-        """Keep LSI on for IWDG."""
-        if name == "lsi":
-            self._keeps_lsi = level
-            self.words[CSR] &= ~1  # it ends with a reset, as what a program has set does
-            self._settle()
 
     def fail_crystal(self) -> None:
         """Break the crystal of HSE; `repair_crystal` mends it."""
-        self.crystal_works = False
-        was_ready, in_use = self.words[CR] & HSERDY, self._oscillators_in_use() & HSEON
+        self.native.crystal_works = False
+        source, on_pll = self.words[CFGR] >> 2 & 3, _HSE_BY_PLL if self.words[CFGR] & PLLSRC else None
+        was_ready, in_use = self.words[CR] & HSERDY, source in {_HSE, on_pll}
         if was_ready and self.words[CR] & CSSON:
             self.words[CR] &= ~HSEON
             if in_use:
@@ -354,6 +369,7 @@ class Rcc(Peripheral):
             self.chip.signal("nmi")
             self.set_output("css", True)
             self.set_output("css", False)
+            self._schedule()
         elif was_ready and in_use:
             self.chip.warn("HSE has failed under SYSCLK, and RCC_CR CSSON is 0: the core stops", once="RCC:hse")
             self.chip.signal("no clock")
@@ -361,7 +377,7 @@ class Rcc(Peripheral):
 
     def repair_crystal(self) -> None:
         """Mend the crystal; it starts anew where it is on."""
-        self.crystal_works = True
+        self.native.crystal_works = True
         self._settle()
 
     def set_lsi(self, frequency_hz: int) -> None:
@@ -373,8 +389,8 @@ class Rcc(Peripheral):
         if not LEAST_LSI_HZ <= frequency_hz <= MOST_LSI_HZ:
             raise ValueError(f"LSI has {LEAST_LSI_HZ} to {MOST_LSI_HZ} Hz, not {frequency_hz}")
         self.chip.clocks.lsi_hz = frequency_hz
-        self.chip.clocks.rtcclk_hz = self._rtcclk_hz()
         self.chip.clock_changed()
+        self._settle()
 
     def clock_stopped(self) -> None:
         """Put nothing out in Stop."""
@@ -389,42 +405,16 @@ class Rcc(Peripheral):
         """Stop HSE and PLL, and take HSI: Stop mode begins, and HSI runs when that ends (RM0008 7.3.1, 7.3.2)."""
         self.words[CR] = self.words[CR] & ~(HSEON | HSERDY | PLLON | PLLRDY) | HSION | HSIRDY
         self.words[CFGR] &= ~(_SW | _SW << 2)
-        self._set_ready_at(0, None)
+        self.native.ready_at[_HSI] = NO_TIME
         self._settle()
 
     def stand_by(self) -> None:
         """Go to the reset state, but for the oscillators that Standby leaves running."""
-        lsi, lsi_ready = self.words[CSR] & bits(1, 0), self._ready_at[_LSI]
+        lsi, lsi_ready = self.words[CSR] & bits(1, 0), self.native.ready_at[_LSI]
         self.reset(ResetCause.STANDBY)
         self.words[CSR] |= lsi
-        self._set_ready_at(_LSI, lsi_ready)
+        self.native.ready_at[_LSI] = lsi_ready
         self._settle()
-
-    def _write_cr(self, written: int, previous: int) -> None:
-        in_use = self._oscillators_in_use() & previous & ~written
-        if in_use:
-            self.words[CR] |= in_use
-            self.chip.warn("RCC_CR: an oscillator that clocks SYSCLK cannot be stopped", once="RCC:in-use")
-        if previous & HSEON and (written ^ previous) & HSEBYP:
-            self.words[CR] ^= HSEBYP
-        self._settle()
-
-    def _write_cfgr(self, written: int, previous: int) -> None:
-        changed = (written ^ previous) & _PLL_SETTINGS
-        if changed and self.words[CR] & PLLON:
-            self.words[CFGR] ^= changed
-            self.chip.warn("RCC_CFGR: PLL settings written while the PLL is on: ignored", once="RCC:pll-on")
-        if written & _SW == _SW:
-            self.words[CFGR] = (self.words[CFGR] & ~_SW) | (previous & _SW)
-            self.chip.warn("RCC_CFGR: SW = 3 is not a clock: ignored", once="RCC:sw")
-        self._settle()
-
-    def _write_cir(self, written: int, _previous: int) -> None:
-        self.words[CIR] &= ~((written >> 16) & bits(7, (4, 0)))
-        if written & CSSC:
-            self._nmi_ns = None
-            self._schedule()
-        self._update_irq()
 
     def _write_bdcr(self, written: int, previous: int) -> None:
         if not self.chip.power.is_backup_open:
@@ -441,55 +431,10 @@ class Rcc(Peripheral):
             return
         self._settle()
 
-    def _write_csr(self, written: int, _previous: int) -> None:
-        if written & _RMVF:
-            self.words[CSR] &= ~_CSR_FLAGS
-        self._settle()
-
-    def _update_irq(self) -> None:
-        flags = self.words[CIR]
-        self.set_output("irq", bool(flags & (flags >> 8) & bits((4, 0))))
-
-    def _oscillators_in_use(self) -> int:
-        """Return the on bits of CR that SYSCLK hangs on."""
-        cfgr = self.words[CFGR]
-        source = (cfgr >> 2) & 3
-        if source == _PLL:
-            return PLLON | (HSEON if cfgr & PLLSRC else HSION)
-        return HSEON if source == _HSE else HSION
-
-    def _can_start(self, index: int) -> bool:
-        """Return whether an oscillator that is on has what it needs to get ready."""
-        if index == _HSE:
-            return self.hse_hz is not None and self.crystal_works
-        if index == _PLL:
-            return bool(self.words[CR] & (HSERDY if self.words[CFGR] & PLLSRC else HSIRDY))
-        return True
-
-    def _set_ready_at(self, index: int, at_ns: int | None) -> None:
-        times = list(self._ready_at)
-        times[index] = at_ns
-        self._ready_at = tuple(times)
-
-    def _settle(self, now_ns: int | None = None) -> None:
+    def _settle(self) -> None:
         """Start and stop oscillators, switch SYSCLK, and bring the clocks up to date."""
-        now_ns = self.chip.now_ns if now_ns is None else now_ns
-        if self._keeps_lsi:
-            self.words[CSR] |= 1
-        for index, oscillator in enumerate(OSCILLATORS):
-            word = self.words[oscillator.register]
-            starts = bool(word & oscillator.on) and self._can_start(index)
-            if not starts:
-                self.words[oscillator.register] &= ~oscillator.ready
-                self._set_ready_at(index, None)
-            elif not word & oscillator.ready and self._ready_at[index] is None:
-                self._set_ready_at(index, now_ns + oscillator.start_ns)
         self._hold_crystal_pins()
-        wanted = self.words[CFGR] & _SW
-        if self.words[CR] & _SOURCE_READY[wanted]:
-            self.words[CFGR] = (self.words[CFGR] & ~(_SW << 2)) | (wanted << 2)
-        self._update_frequencies()
-        self._schedule()
+        self.command(RccCommand.SETTLE_CLOCKS)
 
     def clock_changed(self) -> None:
         """Look at what the data sheet forbids: it is warned of only where it lasts."""
@@ -508,15 +453,14 @@ class Rcc(Peripheral):
         )
 
     def _schedule(self) -> None:
-        """Work out when something is next due."""
-        times = (self._nmi_ns, *self._ready_at, *(due_ns for _, due_ns, _ in self._illegal))
-        due_ns = min((at for at in times if at is not None), default=None)
-        if due_ns != self.due_ns:
-            self.due_ns = due_ns
+        """Work out when Python next acts."""
+        times = (self._nmi_ns, *(due_ns for _, due_ns, _ in self._illegal))
+        self.native.python_ns = min((at for at in times if at is not None), default=NO_TIME)
+        self.command(RccCommand.WAIT)
 
     def _hold_crystal_pins(self) -> None:
         """Give PC14 and PC15 to the 32 kHz crystal while LSE is on (RM0008 9.3.1)."""
-        is_on = bool(self.words[BDCR] & 1)
+        is_on = bool(self.words[BDCR] & _LSEON)
         for name, owner in (("PC14", "OSC32_IN"), ("PC15", "OSC32_OUT")):
             pin = self.chip.pins[name]
             if is_on and pin.holder is None:
@@ -524,25 +468,21 @@ class Rcc(Peripheral):
             elif not is_on and pin.holder == owner:
                 pin.release()
 
-    def _hsi_hz(self) -> int:
-        """Return what HSITRIM makes of HSI."""
-        trim = self.words[CR] >> _TRIM_AT & 0x1F
-        return HSI_HZ + (trim - _TRIM_MIDDLE) * TRIM_STEP_HZ
-
     def _show_clock(self, *, is_stopped: bool = False) -> None:
         """Put the clock that MCO chooses on PA8; one that does not run is low."""
         chosen, ready = self.words[CFGR] >> _MCO_AT & 7, self.words[CR]
         frequencies = (
             self.chip.clocks.sysclk_hz,
-            self._hsi_hz() if ready & HSIRDY else 0,
+            self.native.hsi_hz if ready & HSIRDY else 0,
             self.hse_hz or 0 if ready & HSERDY else 0,
-            self._pll_hz() // 2 if ready & PLLRDY else 0,
+            self.native.pll_hz // 2 if ready & PLLRDY else 0,
         )
         frequency_hz = 0 if is_stopped or chosen < _MCO_SYSCLK else frequencies[chosen - _MCO_SYSCLK]
         shown = chosen, frequency_hz
         if shown == self._shown:
             return
         self._shown = shown
+        self.native.shows_clock = chosen >= _MCO_SYSCLK
         pin = self.chip.pins[_MCO_PIN]
         if chosen < _MCO_SYSCLK:
             pin.disconnect(_MCO)
@@ -550,42 +490,3 @@ class Rcc(Peripheral):
             pin.offer_wave(_MCO, 2 * frequency_hz, 2, 1)
         else:
             pin.connect(_MCO, level=False)
-
-    def _pll_hz(self) -> int:
-        cfgr = self.words[CFGR]
-        factor = _PLL_FACTORS[(cfgr >> 18) & 0xF]
-        if not cfgr & PLLSRC:
-            return self._hsi_hz() // 2 * factor
-        return (self.hse_hz or 0) // (2 if cfgr & PLLXTPRE else 1) * factor
-
-    def _rtcclk_hz(self) -> int:
-        """Return the frequency of the source that RTCSEL chooses; 0 while it does not run, or without RTCEN."""
-        backup = self.words[BDCR]
-        source = (backup & _RTCSEL) >> _RTCSEL_AT if backup & _RTCEN else 0
-        hse_hz = (self.hse_hz or 0) // _RTC_HSE_DIVIDER
-        rows = ((_LSE, LSE_HZ), (_LSI, self.chip.clocks.lsi_hz), (_HSE, hse_hz))
-        if not source:
-            return 0
-        index, frequency_hz = rows[source - 1]
-        oscillator = OSCILLATORS[index]
-        return frequency_hz if self.words[oscillator.register] & oscillator.ready else 0
-
-    def _update_frequencies(self) -> None:
-        cfgr = self.words[CFGR]
-        source = (cfgr >> 2) & 3
-        sysclk_hz = (self._hsi_hz(), self.hse_hz or HSI_HZ, self._pll_hz())[source]
-        hclk_hz = sysclk_hz // _AHB_DIVIDERS[(cfgr >> 4) & 0xF]
-        divider1, divider2 = _APB_DIVIDERS[(cfgr >> 8) & 7], _APB_DIVIDERS[(cfgr >> 11) & 7]
-        clocks = self.chip.clocks
-        before = clocks.snapshot()
-        clocks.sysclk_hz, clocks.hclk_hz = sysclk_hz, hclk_hz
-        clocks.pclk1_hz, clocks.pclk2_hz = hclk_hz // divider1, hclk_hz // divider2
-        clocks.adc_divider = _ADC_DIVIDERS[(cfgr >> 14) & 3]
-        pll_hz = self._pll_hz() if self.words[CR] & PLLRDY else 0
-        clocks.usb_hz = pll_hz if cfgr & _USBPRE else pll_hz * 2 // 3
-        clocks.timer1_hz = clocks.pclk1_hz * (1 if divider1 == 1 else 2)
-        clocks.timer2_hz = clocks.pclk2_hz * (1 if divider2 == 1 else 2)
-        clocks.rtcclk_hz = self._rtcclk_hz()
-        if clocks.snapshot() != before:
-            self.chip.clock_changed()
-        self._show_clock()

@@ -153,9 +153,9 @@ class GeneralTimer(Peripheral):
         self.reset()
         chip.pins.route_listeners.append(self._route_changed)
 
-    def clock_hz(self) -> int:
-        """Return CK_INT: PCLK1, doubled where its prescaler is not 1."""
-        return self.chip.clocks.timer1_hz
+    def clock_name(self) -> str:
+        """Return that of CK_INT: PCLK1, doubled where its prescaler is not 1."""
+        return "timer1_hz"
 
     def fields_now(self, register: Register, word: int) -> str:
         """Return the fields of a register: those of CCMRx are others for a channel that is an input."""
@@ -192,6 +192,6 @@ class AdvancedTimer(GeneralTimer):
     SOURCE: ClassVar[str] = "RM0008 14.4"
     REGISTERS = _registers(is_advanced=True)
 
-    def clock_hz(self) -> int:
-        """Return CK_INT: PCLK2, doubled where its prescaler is not 1."""
-        return self.chip.clocks.timer2_hz
+    def clock_name(self) -> str:
+        """Return that of CK_INT: PCLK2, doubled where its prescaler is not 1."""
+        return "timer2_hz"

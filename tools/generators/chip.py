@@ -17,8 +17,7 @@ from itertools import groupby
 from pathlib import Path
 from textwrap import wrap
 
-from bluepill_sim.core.block_cost import CYCLES, REFILL
-from bluepill_sim.extension.encodings import NARROW, UNDEFINED, WIDE, Encoding, Kind
+from bluepill_sim.extension.encodings import CYCLES, GIVEN_UP, NARROW, REFILL, UNDEFINED, WIDE, Encoding, Kind
 from bluepill_sim.extension.layout import header
 from bluepill_sim.fabric.registers import LISTENER, BitField, Peripheral, Register, fields_of
 from bluepill_sim.stm32f103 import BASES, PERIPHERALS
@@ -196,9 +195,15 @@ def encodings_header() -> str:
         "",
         *wrap(f"enum operation {{ {UNDEFINED}, {', '.join(names)} }};", _WIDTH, subsequent_indent=" " * 4),
         "",
+        "/* Classes of instructions that cost alike: cycles, refill, and whether an exception may come in one. */",
+        *wrap(f"enum kind {{ {', '.join(map(_kind, Kind))} }};", _WIDTH, subsequent_indent=" " * 4),
+        f"static const uint8_t kind_cycles[] = {{{', '.join(str(CYCLES[kind]) for kind in Kind)}}};",
+        f"static const uint8_t kind_refill[] = {{{', '.join(str(REFILL.get(kind, 0)) for kind in Kind)}}};",
+        f"static const uint8_t kind_gives_up[] = {{{', '.join(str(int(kind in GIVEN_UP)) for kind in Kind)}}};",
+        "",
         "struct encoding {",
         "    uint32_t mask, value;",
-        "    uint8_t operation, form;",
+        "    uint8_t operation, form, kind;",
         "};",
         "",
         "/* Takes an instruction apart into its fields; `to` is a pointer to a struct that has them. */",
@@ -212,11 +217,15 @@ def encodings_header() -> str:
     ]
     for name, table in (("narrow", NARROW), ("wide", WIDE)):
         lines += ["", f"static const struct encoding {name}[] = {{"]
-        lines += [
-            f"    {{{row.mask:#x}, {row.value:#x}, {row.operation}, {forms.index(_extraction(row))}}}," for row in table
-        ]
+        for row in table:
+            numbers = f"{row.mask:#x}, {row.value:#x}, {row.operation}, {forms.index(_extraction(row))}"
+            lines.append(f"    {{{numbers}, {_kind(row.kind)}}},")
         lines += ["};"]
     return "\n".join([*lines, "", "#endif", ""])
+
+
+def _kind(kind: Kind) -> str:
+    return f"KIND_{kind.name}"
 
 
 def _extraction(row: Encoding) -> str:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from bluepill_sim.fabric.clocks import Clocks, illegal_settings
 from bluepill_sim.fabric.registers import PeripheralMapping
-from bluepill_sim.peripherals.rcc import ILLEGAL_NS, OSCILLATORS, Rcc, ResetCause
+from bluepill_sim.peripherals.rcc import ILLEGAL_NS, Rcc, RccTime, ResetCause
 from bluepill_sim.stm32f103 import BASES, CLOCK_GATES
 
 QUICK = settings(max_examples=40)
@@ -370,8 +370,8 @@ def test_the_backup_domain_outlives_all_but_a_power_cut(fake_chip: Any) -> None:
     fake_chip.write("RCC.BDCR", 1 << 8 | 1)
     fake_chip.advance(1_000_000_000)
     fake_chip.parts.reset(ResetCause.PIN)
-    assert fake_chip.parts.next_deadline() == OSCILLATORS[3].start_ns
-    fake_chip.advance(OSCILLATORS[3].start_ns)
+    assert fake_chip.parts.next_deadline() == RccTime.LSE_START_NS
+    fake_chip.advance(RccTime.LSE_START_NS)
     assert fake_chip.read("RCC.BDCR") == 1 << 8 | 3
     fake_chip.write("RCC.BDCR", 1 << 16)
     assert fake_chip.read("RCC.BDCR") == 1 << 8 | 3  # the reset has locked it

@@ -14,8 +14,8 @@ enum { FIRST = CCR1, WORDS_EACH = CCR2 - CCR1, CHANNELS = CH7_IRQ + 1 };
 enum { CCR, CNDTR = CNDTR1 - CCR1, CPAR = CPAR1 - CCR1, CMAR = CMAR1 - CCR1, FLAGS = TEIF1 | HTIF1 | TCIF1 | GIF1 };
 /* `current` besides 1 + the channel's number. */
 enum { NONE, ACTING = CHANNELS + 1 };
-/* chosen: cycles of HCLK for the arbitration, and for an access on the AHB; those of the APBs are Python's. */
-enum { ARBITRATION = 1, AHB_ACCESS = 2 };
+/* chosen: cycles of HCLK for the arbitration, for an access on the AHB, and on an APB, two of whose own clock come on top. */
+enum { ARBITRATION = 1, AHB_ACCESS = 2, BRIDGE = 1, APB_ACCESS = 2 };
 /* RM0008 3.3, table 3. */
 enum { APB1 = 0x40000000, APB1_BYTES = 0x10000, APB2 = 0x40010000, APB2_BYTES = 0x8000 };
 
@@ -249,6 +249,18 @@ static bool needs_time(const struct device *device, uint32_t index, bool is_writ
     return is_write && index >= FIRST && (index - FIRST) % WORDS_EACH == CCR;
 }
 
+/* Takes HCLK, and what an access of each bus costs; what is under way ends when it would have. */
+static void take_clock(struct dma *dma, uint32_t hz, const struct clocks *clocks)
+{
+    dma->apb1_cycles = BRIDGE + APB_ACCESS * clocks->hclk_hz / clocks->pclk1_hz;
+    dma->apb2_cycles = BRIDGE + APB_ACCESS * clocks->hclk_hz / clocks->pclk2_hz;
+    if (hz != dma->hz) {
+        dma->base_ns = dma->current == NONE ? dma->base_ns : end_ns(dma);
+        dma->cycles = 0;
+        dma->hz = hz;
+    }
+}
+
 static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint32_t other)
 {
     struct dma *dma = device->state;
@@ -260,10 +272,8 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
         for (uint32_t n = 0; n < CHANNELS; ++n) {
             update_irq(device, n);
         }
-    } else if (what == CLOCK && one != dma->hz) { /* what is under way ends when it would have */
-        dma->base_ns = dma->current == NONE ? dma->base_ns : end_ns(dma);
-        dma->cycles = 0;
-        dma->hz = one;
+    } else if (what == CLOCK) {
+        take_clock(dma, one, device->fabric->clocks);
     } else if (what == STOPPED) {
         schedule(device, NO_TIME);
     } else if (what == RESUMED && dma->current != NONE) {

@@ -48,6 +48,25 @@ void fabric_free(struct fabric *fabric)
     free(fabric);
 }
 
+void fabric_set_clocks(struct fabric *fabric, struct clocks *clocks) { fabric->clocks = clocks; }
+
+/* Says which of the clocks a device counts, by its place in the struct. */
+void fabric_set_clock(struct fabric *fabric, uint32_t slot, uint32_t offset)
+{
+    fabric->devices[slot].clock = 1 + offset / sizeof(uint32_t);
+}
+
+/* Tells every device that counts a clock what its frequency is now. */
+void fabric_clocks_changed(struct fabric *fabric)
+{
+    const struct clocks *clocks = fabric->clocks;
+    for (uint32_t n = 0; n < fabric->slot_count; ++n) {
+        if (fabric->devices[n].clock) {
+            fabric_command(fabric, n, CLOCK, ((const uint32_t *)clocks)[fabric->devices[n].clock - 1], clocks->adc_divider);
+        }
+    }
+}
+
 void fabric_set_host(struct fabric *fabric, const struct host *host) { fabric->host = *host; }
 
 /* Takes a slot of the queue; -1 where there is none left. */

@@ -114,7 +114,7 @@ struct device_kind {
 
 enum command {
     RESET, /* the registers have their reset values */
-    CLOCK, /* its clock has another frequency: `one`, in Hz */
+    CLOCK, /* its clock may have another frequency: `one`, in Hz; an ADC's is divided by `other` */
     ROUTE, /* AFIO has changed what concerns it */
     HEARD, /* somebody hears its outputs, or no longer does */
     SETTLE, /* returns the word of the register with the index `one` as a read would find it now, and changes nothing */
@@ -133,6 +133,7 @@ struct device {
     uint8_t drivers[OUTPUTS]; /* and which of the outputs on the line each is */
     uint32_t initial_count;     /* registers, */
     const uint32_t (*initial)[2]; /* their indices, and their words after a reset: Python's */
+    uint32_t clock;             /* 1 + the word of `struct clocks` that it counts; 0: none */
     uint32_t resets_alone;      /* nothing of it that a reset puts back is Python's */
     uint64_t heard[SLOTS / 64]; /* the slots whose outputs lead to its inputs, a bit each */
     uint32_t ends_slice; /* somebody waits for each word */
@@ -242,7 +243,8 @@ struct fabric {
     struct shown shown[PORTS * PINS];
     struct counter counters[COUNTERS];
     uint32_t counter_count;
-    const struct analog *analog;         /* Python's, */
+    struct clocks *clocks;               /* Python's, */
+    const struct analog *analog;         /* this too, */
     const int32_t *samples[ANALOG_PINS]; /* and these */
     struct memory memories[MEMORIES];
     uint32_t memory_count;

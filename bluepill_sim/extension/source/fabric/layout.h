@@ -40,6 +40,35 @@ struct instruction {
 };
 _Static_assert(sizeof(struct instruction) == 20, "instruction");
 
+/* An instruction as the models of time and of faults need it, and when in its block it begins. */
+struct measured {
+    uint32_t address;
+    uint32_t destination; /* of a direct branch */
+    uint32_t cycle; /* from the start of its block */
+    uint8_t kind; /* `enum kind` */
+    uint8_t bytes;
+    uint8_t count; /* registers that a multiple transfer moves */
+    uint8_t loads_pc; /* it writes the PC although its kind does not say so */
+    uint8_t base; /* register of an access, or the divisor of a division; 255: does not matter */
+    uint8_t index; /* 255: none */
+    uint8_t target; /* register that a load fills; 255: none */
+    uint8_t has_destination;
+    uint8_t always_branches; /* a direct branch, but for an IT before it */
+    uint8_t sets_it; /* what an IT makes of ITSTATE */
+    uint8_t it_state; /* before it, by an IT of its block */
+    uint8_t gives_up; /* an exception that comes in it leaves it undone */
+};
+_Static_assert(sizeof(struct measured) == 24, "measured");
+
+/* What a block costs in cycles: where it goes on at its end, and elsewhere. */
+struct block_cost {
+    uint32_t straight;
+    uint32_t taken;
+    uint32_t count;
+    uint32_t flags; /* `enum row_flag` */
+};
+_Static_assert(sizeof(struct block_cost) == 16, "block_cost");
+
 /* A counter that follows from the time: `source/fabric/ramp.c`. */
 struct ramp {
     uint64_t base; /* when it had `value`, in the units of its owner, */
@@ -365,11 +394,46 @@ struct gpio {
 };
 _Static_assert(sizeof(struct gpio) == 156, "gpio");
 
-/* What RCC tells Python of. */
-struct rcc {
-    uint32_t watches_gates; /* each write of a clock gate */
+/* Which pins AFIO keeps from GPIO, a bit each. RM0008 9.3. */
+struct afio {
+    uint32_t held[5];
+    uint32_t swj_cfg; /* which cannot be read */
 };
-_Static_assert(sizeof(struct rcc) == 4, "rcc");
+_Static_assert(sizeof(struct afio) == 24, "afio");
+
+/* The clock tree's outputs: `bluepill_sim/fabric/clocks.py`. */
+struct clocks {
+    uint32_t sysclk_hz;
+    uint32_t hclk_hz;
+    uint32_t pclk1_hz;
+    uint32_t pclk2_hz;
+    uint32_t timer1_hz; /* of TIM2 to TIM7 */
+    uint32_t timer2_hz; /* of TIM1 and TIM8 */
+    uint32_t usb_hz; /* 0 while the PLL is off */
+    uint32_t adc_divider; /* what PCLK2 is divided by for the ADCs */
+    uint32_t lsi_hz;
+    uint32_t rtcclk_hz; /* 0: it stands still */
+    uint32_t rtc_calibration;
+    uint32_t rtc_seconds_shown;
+    uint32_t flash_wait_states;
+    uint32_t flash_prefetch;
+};
+_Static_assert(sizeof(struct clocks) == 56, "clocks");
+
+/* What RCC holds beyond its registers. RM0008 7.2. */
+struct rcc {
+    uint64_t ready_at[5]; /* when HSI, HSE, PLL, LSE and LSI get ready that are starting */
+    uint64_t python_ns; /* when Python next acts */
+    uint32_t watches_gates; /* Python is notified of each write of a clock gate */
+    uint32_t shows_clock; /* Python has put a clock on MCO's pin */
+    uint32_t hse_hz; /* the crystal; 0: there is none */
+    uint32_t crystal_works;
+    uint32_t keeps_lsi; /* IWDG does */
+    uint32_t hsi_hz; /* as it is trimmed */
+    uint32_t pll_hz; /* whether or not it runs */
+    uint32_t padding;
+};
+_Static_assert(sizeof(struct rcc) == 80, "rcc");
 
 /* A digital filter of an input. RM0008 14.4.7, IC1F. */
 struct filter {

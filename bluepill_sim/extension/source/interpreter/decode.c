@@ -13,15 +13,27 @@ enum { FIRST_WIDE = 0xE800, ARM_STATE_BYTES = 4, ALWAYS = 14, MOST_OPS = PAGE_BY
 
 static uint32_t halfword(const uint8_t *code) { return code[0] | (uint32_t)code[1] << 8; }
 
-static enum operation find(const struct encoding *rows, size_t count, uint32_t word, struct decoded *one)
+/* The encoding of an instruction; null: it is undefined. */
+const struct encoding *interpreter_row_of(uint32_t word, bool is_wide)
 {
+    const struct encoding *rows = is_wide ? wide : narrow;
+    const size_t count = is_wide ? sizeof wide / sizeof wide[0] : sizeof narrow / sizeof narrow[0];
     for (size_t n = 0; n < count; ++n) {
         if ((word & rows[n].mask) == rows[n].value) {
-            extract(rows[n].form, word, one);
-            return rows[n].operation;
+            return rows[n].operation == UNDEFINED ? NULL : &rows[n];
         }
     }
-    return UNDEFINED;
+    return NULL;
+}
+
+static enum operation find(uint32_t word, bool is_wide, struct decoded *one)
+{
+    const struct encoding *row = interpreter_row_of(word, is_wide);
+    if (row == NULL) {
+        return UNDEFINED;
+    }
+    extract(row->form, word, one);
+    return row->operation;
 }
 
 static uint8_t advanced(uint32_t it) { return (uint8_t)(it & 7 ? (it & 0xE0) | (it << 1 & 0x1F) : 0); }
@@ -30,8 +42,7 @@ static uint8_t advanced(uint32_t it) { return (uint8_t)(it & 7 ? (it & 0xE0) | (
 static enum outcome add(struct interpreter *s, struct builder *to, uint32_t word, bool is_wide)
 {
     struct decoded one = {0};
-    one.operation = is_wide ? find(wide, sizeof wide / sizeof wide[0], word, &one)
-                            : find(narrow, sizeof narrow / sizeof narrow[0], word, &one);
+    one.operation = find(word, is_wide, &one);
     to->after = advanced(to->it);
     const uint32_t condition = to->it ? to->it >> 4 : ALWAYS;
     struct op *skip = NULL;

@@ -23,6 +23,6 @@ enum { DATA1 = 0xff << 18, DATA1_AT = 18, DATA0 = 0xff << 10, DATA0_AT = 10, UNU
 enum { IRQ = 0 };
 
 /* What Python is told beside what a listener hears. */
-enum { WRITTEN = 2 };
+enum { WRITTEN = 2, ACCESS = 3, RESERVED = 4 };
 
 #endif

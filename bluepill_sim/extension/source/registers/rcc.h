@@ -44,6 +44,16 @@ enum { WWDGRSTF = 1 << 30, IWDGRSTF = 1 << 29, SFTRSTF = 1 << 28, PORRSTF = 1 <<
 enum { IRQ = 0, CSS = 1 };
 
 /* What Python is told beside what a listener hears. */
-enum { RESETS = 2, GATES = 3 };
+enum { RESETS = 2, GATES = 3, CLOCKS = 4, SHOWS = 5, CSS_CLEARED = 6, IN_USE = 7, PLL_IS_ON = 8, NO_SOURCE = 9 };
+
+/* What C does for Python. */
+enum { SETTLE_CLOCKS = 16, WAIT = 17 };
+
+/* How long each oscillator takes to start, in ns. */
+enum { HSI_START_NS = 2000, HSE_START_NS = 2000000, PLL_START_NS = 200000, LSE_START_NS = 1500000000,
+       LSI_START_NS = 85000 };
+
+/* Frequencies in Hz. */
+enum { HSI_HZ = 8000000, LSE_HZ = 32768, TRIM_STEP_HZ = 40000 };
 
 #endif
