@@ -2,7 +2,7 @@
 
 import typer
 
-from bluepill_sim.cli import compare_silicon, coverage, debug, info, parts, pins, profile, run, trace
+from bluepill_sim.cli import compare_silicon, coverage, debug, info, parts, pins, profile, races, run, trace
 
 HELP = """Run, look into and debug a BluePill program, without a robot.
 
@@ -20,6 +20,6 @@ def register(app: typer.Typer) -> None:
 
 def add_verbs(app: typer.Typer) -> None:
     """Add what stands below it."""
-    for module in (run, parts, debug, info, pins, trace, coverage, profile, compare_silicon):
+    for module in (run, parts, debug, info, pins, trace, coverage, profile, races, compare_silicon):
         name = module.__name__.rpartition(".")[2]
         app.command(name.replace("_", "-"), help=module.HELP)(getattr(module, name))

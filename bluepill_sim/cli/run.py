@@ -10,7 +10,7 @@ import typer
 
 from bluepill_sim.board import BluePill, run_until
 from bluepill_sim.cli.can_socket import join_can
-from bluepill_sim.cli.console import PTY, connect, open_console
+from bluepill_sim.cli.console import PTY, connect, open_console, open_traces
 from bluepill_sim.cli.driving import (
     OverBudgetError,
     Schedule,
@@ -23,7 +23,6 @@ from bluepill_sim.cli.driving import (
 )
 from bluepill_sim.cli.parts import attach_parts, show_parts
 from bluepill_sim.cli.quantities import Firmware, option, time_option
-from bluepill_sim.cli.stimuli import open_traces
 from bluepill_sim.core.halts import ChipReached
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reason
 from simbase.units import BAUD

@@ -170,6 +170,7 @@ _FUNCTIONS = {
     "interpreter_save": "vpp",
     "interpreter_restore": "vpp",
     "core_use_interpreter": "vppb",
+    "core_vary_latency": "vpup",
     "edge_log_new": "p",
     "edge_log_free": "vp",
     "edge_log_put": "bpquu",

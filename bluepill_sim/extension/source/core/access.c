@@ -464,7 +464,7 @@ static void bring_systick(struct core *core, uint64_t now)
 {
     struct shared *s = &core->shared;
     if (now >= s->tick_next && systick_advance(s, now)) {
-        pend(core, SYSTICK);
+        pend_tick(core);
         pending_changed(core, s->access_pc);
     }
 }

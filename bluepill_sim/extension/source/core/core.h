@@ -268,6 +268,8 @@ struct core {
     struct fault_row faults[HALT_NONE]; /* by kind of halt */
     struct view views[VIEWS];
     uint32_t view_count;
+    struct latency *latency; /* null: no interrupt is put off */
+    uint32_t latency_slot;
 };
 
 /* ITSTATE in a CPSR or xPSR: its bits 1:0 at 25, 7:2 at 10. */
@@ -367,6 +369,9 @@ bool is_interrupted(struct core *core);
 bool can_preempt(struct core *core, unsigned number, bool ignores_primask);
 bool enter(struct core *core, unsigned number, uint32_t return_address);
 uint32_t vector(const struct core *core, unsigned number);
+/* latency.c */
+void pend_late(struct core *core, unsigned number, uint64_t cycle);
+void pend_tick(struct core *core);
 /* faults.c */
 bool take_fault(struct core *core, uint32_t kind);
 #pragma GCC visibility pop

@@ -24,8 +24,8 @@ enum { AWAKE, FOR_INTERRUPT, FOR_EVENT };
 
 uint64_t deliverable(const struct shared *s, uint64_t *high)
 {
-    *high = s->pending[1] & (s->enabled >> (64 - FIRST_IRQ));
-    return s->pending[0] & (s->enabled << FIRST_IRQ | ((1u << FIRST_IRQ) - 1));
+    *high = s->pending[1] & ~s->held[1] & (s->enabled >> (64 - FIRST_IRQ));
+    return s->pending[0] & ~s->held[0] & (s->enabled << FIRST_IRQ | ((1u << FIRST_IRQ) - 1));
 }
 
 static int priority_of(const struct shared *s, unsigned number)
@@ -160,7 +160,7 @@ static void act_on_due(struct core *core)
 {
     struct shared *s = &core->shared;
     if (s->cycle >= s->tick_next && systick_advance(s, s->cycle)) {
-        pend(core, SYSTICK);
+        pend_tick(core);
     }
     if (s->cycle >= core->fabric->next_cycle) {
         run_events(core->fabric, ns_of(core->fabric, s->cycle));

@@ -315,7 +315,7 @@ enum way goes_on(struct core *core, uint32_t address)
     core->block = &core->none;
     s->pc = address;
     if (is_tick && systick_advance(s, s->cycle)) {
-        pend(core, SYSTICK);
+        pend_tick(core);
     }
     if (s->cycle >= fabric->next_cycle) {
         run_due(fabric, s->cycle);
@@ -352,7 +352,7 @@ static uint32_t run(struct core *core, uint64_t limit)
     core->limit = limit;
     for (;;) {
         if (s->cycle >= s->tick_next && systick_advance(s, s->cycle)) {
-            pend(core, SYSTICK);
+            pend_tick(core);
         }
         if (s->cycle >= core->fabric->next_cycle) {
             run_due(core->fabric, s->cycle);
