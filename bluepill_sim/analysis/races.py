@@ -61,7 +61,7 @@ class Channel:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Outputs:
+class RunOutputs:
     """All that a run put out up to its end."""
 
     channels: Mapping[str, Channel]
@@ -179,7 +179,7 @@ class RaceSearch:
     ) -> None:  # fmt: skip
         self._image, self._span_ns, self._play, self._most, self._look = image, span_ns, play, most, look
         self._slack = Slack(latency_ns=0, stretch_ns=0, entries=())
-        self._as_it_is = Outputs(channels={}, end=0, interrupts=0)
+        self._as_it_is = RunOutputs(channels={}, end=0, interrupts=0)
 
     def search(self, seeds: Sequence[int]) -> RaceReport:
         """Run the program once as it is and once under the latencies of each seed, and narrow down what differs.
@@ -228,13 +228,13 @@ class RaceSearch:
         )  # fmt: skip
         return board, self._play(board)
 
-    def _run(self, latencies: Latencies, end: Nanos) -> Outputs:
+    def _run(self, latencies: Latencies, end: Nanos) -> RunOutputs:
         board, advance = self._board(latencies)
         recording = OutputRecording(board)
         advance(end)
         return recording.taken(end)
 
-    def _parting(self, outputs: Outputs) -> OutputParting | None:
+    def _parting(self, outputs: RunOutputs) -> OutputParting | None:
         return parting_of(self._as_it_is, outputs, self._slack)
 
     def _narrowed(self, drawn: Latencies, parting: OutputParting) -> Race | None:
@@ -267,7 +267,7 @@ class RaceSearch:
     def _single(drawn: Latencies, until: int, last: int) -> Latencies:
         return Latencies(seed=drawn.seed, most=drawn.most, until=until, last=last)
 
-    def _order(self, entry: BlockRow, run: Outputs, parting: OutputParting) -> InterruptOrder:
+    def _order(self, entry: BlockRow, run: RunOutputs, parting: OutputParting) -> InterruptOrder:
         return InterruptOrder(address=entry[1], cycle=entry[0], puts_out=_shown(run, parting, self._slack))
 
     def _entries(self, one: Latencies, other: Latencies) -> tuple[BlockRow, BlockRow]:
@@ -299,7 +299,7 @@ class OutputRecording:
         for number in _USARTS:
             board.serial_ports[f"usart{number}"].subscribe(self._taker(self._characters[f"USART{number}"]))
 
-    def taken(self, end: Nanos) -> Outputs:
+    def taken(self, end: Nanos) -> RunOutputs:
         """Return what has been put out up to a time; the pin of a USART that has sent is told by its characters."""
         channels = {name: channel for name, channel in self._characters.items() if channel.times}
         remaps = self._board.chip.pins.remaps
@@ -310,7 +310,7 @@ class OutputRecording:
             channel.values.append(drive)
         for name in spoken:
             channels.pop(name, None)
-        return Outputs(channels=channels, end=end, interrupts=self._board.chip.latency.count)
+        return RunOutputs(channels=channels, end=end, interrupts=self._board.chip.latency.count)
 
     @staticmethod
     def _taker(channel: Channel) -> Callable[[Sequence[tuple[int, Nanos]]], None]:
@@ -354,7 +354,7 @@ class HandlerStretches(BlockRecorder):
             self.put(*RECORD.unpack_from(data, row * RECORD.size))
 
 
-def parting_of(one: Outputs, other: Outputs, slack: Slack) -> OutputParting | None:
+def parting_of(one: RunOutputs, other: RunOutputs, slack: Slack) -> OutputParting | None:
     """Return where two runs first put out something else; None: nowhere, as far as both have come."""
     end = min(one.end, other.end)
     found: list[OutputParting] = []
@@ -386,7 +386,7 @@ def _parting_in(one: Channel, other: Channel, slack: Slack, end: Nanos) -> tuple
     return (at, place) if due < end else None
 
 
-def _swapped(one: Outputs, other: Outputs, slack: Slack, end: Nanos) -> Iterator[OutputParting]:
+def _swapped(one: RunOutputs, other: RunOutputs, slack: Slack, end: Nanos) -> Iterator[OutputParting]:
     """Yield what of different channels comes in the other order, the first of each run's, though far apart in one."""
     for this, that in ((one, other), (other, one)):
         latest, latest_name = -1, ""
@@ -408,7 +408,7 @@ def _items(name: str, channel: Channel) -> Iterator[tuple[Nanos, str, int]]:
     return ((at, name, place) for place, at in enumerate(channel.times))
 
 
-def _shown(run: Outputs, parting: OutputParting, slack: Slack) -> tuple[str, ...]:
+def _shown(run: RunOutputs, parting: OutputParting, slack: Slack) -> tuple[str, ...]:
     """Return what a run puts out from a parting on, as words."""
     names = [name for name in (parting.channel, parting.other) if name in run.channels]
     since = parting.at - slack.near if parting.other else 0

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from bluepill_sim import BluePill
 from bluepill_sim.__main__ import run
-from bluepill_sim.analysis.races import Channel, Outputs, RaceReport, RaceSearch, Slack, parting_of
+from bluepill_sim.analysis.races import Channel, RunOutputs, RaceReport, RaceSearch, Slack, parting_of
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.program.image import load_image
 from simbase.timing import NS_PER_MS
@@ -126,9 +126,9 @@ def test_a_core_that_takes_interrupts_at_block_ends_is_refused(core: str, monkey
         BluePill(EXAMPLES / "encoders.elf").chip.latency.vary(seed=1)
 
 
-def outputs(end: int = 1000, **channels: list[tuple[int, int]]) -> Outputs:
+def outputs(end: int = 1000, **channels: list[tuple[int, int]]) -> RunOutputs:
     found = {name: Channel([at for at, _ in rows], [value for _, value in rows]) for name, rows in channels.items()}
-    return Outputs(channels=found, end=end, interrupts=0)
+    return RunOutputs(channels=found, end=end, interrupts=0)
 
 
 SLACK = Slack(latency_ns=2, stretch_ns=8, entries=())

@@ -359,6 +359,19 @@ void pend(struct core *core, unsigned number)
     }
 }
 
+/* The same of an interrupt of a device that came at a cycle: where its latency is varied it is taken later. */
+void pend_late(struct core *core, unsigned number, uint64_t cycle)
+{
+    const bool is_new = !(core->shared.pending[number >> 6] >> (number & 63) & 1);
+    pend(core, number);
+    if (core->latency != NULL && is_new) {
+        put_off(core, number, cycle);
+    }
+}
+
+/* And of SysTick, which has just come to 0. */
+void pend_tick(struct core *core) { pend_late(core, SYSTICK, core->shared.tick.base); }
+
 /* An access has changed what is pending, enabled or its priority: as `Processor.pending_changed`. */
 void pending_changed(struct core *core, uint32_t pc)
 {

@@ -7,8 +7,6 @@
  */
 #include "core.h"
 
-enum { SYSTICK = 15 };
-
 /* The finaliser of SplitMix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014). */
 static uint64_t mixed(uint64_t value)
 {
@@ -51,7 +49,7 @@ static void event(struct device *device, uint64_t ns)
         }
     }
     schedule_first(core);
-    pending_changed(core, s->pc);
+    s->stop_at = 0; /* at a boundary: what is pending is looked at anew */
 }
 
 /* Goes on with what was put back. */
@@ -66,26 +64,16 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
 
 DEVICE_KIND(latency_kind) = {.name = "latency", .event = event, .command = command};
 
-/* Makes an interrupt pending that is due at a cycle: it is taken then, or as much later as is drawn. */
-void pend_late(struct core *core, unsigned number, uint64_t cycle)
+/* Has an interrupt that has just become pending, and might be taken from a cycle on, taken as much later as is drawn. */
+void put_off(struct core *core, unsigned number, uint64_t cycle)
 {
-    struct shared *s = &core->shared;
-    const uint64_t bit = UINT64_C(1) << (number & 63);
-    const bool is_new = !(s->pending[number >> 6] & bit);
-    pend(core, number);
-    if (core->latency == NULL || !is_new) {
-        return;
-    }
     const uint64_t cycles = next_draw(core->latency);
     if (cycles) {
         core->latency->due[number] = ns_of(core->fabric, cycle + cycles);
-        s->held[number >> 6] |= bit;
+        core->shared.held[number >> 6] |= UINT64_C(1) << (number & 63);
         schedule_first(core);
     }
 }
-
-/* Of SysTick, which has just come to 0. */
-void pend_tick(struct core *core) { pend_late(core, SYSTICK, core->shared.tick.base); }
 
 /* Has interrupts put off from now on, by a device in a slot of the queue. */
 void core_vary_latency(struct core *core, uint32_t slot, struct latency *latency)

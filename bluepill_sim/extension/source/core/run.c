@@ -4,7 +4,7 @@
 
 #include "core.h"
 
-enum { FOR_INTERRUPT = 1, FOR_EVENT = 2, SLEEPDEEP = 4, SYSTICK = 15 };
+enum { FOR_INTERRUPT = 1, FOR_EVENT = 2, SLEEPDEEP = 4 };
 #define FIRST_EXCEPTION_RETURN 0xFFFFFFE0u
 /* UC_ERR_EXCEPTION: the TLB denied a fetch. */
 #define DENIED 21
