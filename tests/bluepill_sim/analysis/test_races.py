@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from bluepill_sim import BluePill
 from bluepill_sim.__main__ import run
-from bluepill_sim.analysis.races import Channel, RunOutputs, RaceReport, RaceSearch, Slack, parting_of
+from bluepill_sim.analysis.races import Channel, RaceReport, RaceSearch, RunOutputs, Slack, parting_of
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.program.image import load_image
 from simbase.timing import NS_PER_MS
@@ -97,6 +97,7 @@ def test_a_latency_is_drawn_by_its_seed_and_lets_the_rest_alone() -> None:
     assert len(set(late)) > 5
     assert entries(seed=1, most=12) == entries(seed=1) != entries(seed=2)
     assert entries(seed=1, most=0) == as_it_is
+    assert {row[0] - was[0] for row, was in zip(entries(seed=1, most=1), as_it_is, strict=True)} == {0, 1}
     # Only the fourth, by seven cycles; and all up to it as drawn.
     single = [row[0] - was[0] for row, was in zip(entries(seed=1, most=0, until=3, last=7), as_it_is, strict=True)]
     assert single == [7 * (number == 3) for number in range(len(as_it_is))]
@@ -106,17 +107,17 @@ def test_a_latency_is_drawn_by_its_seed_and_lets_the_rest_alone() -> None:
 
 def test_a_board_goes_on_from_a_snapshot_with_what_was_held() -> None:
     whole, cut = BluePill(EXAMPLES / "encoders.elf"), BluePill(EXAMPLES / "encoders.elf")
-    whole.chip.latency.vary(seed=3)
-    cut.chip.latency.vary(seed=3)
-    for at in range(1000, 4 * NS_PER_MS, 250_007):
-        cut.advance_to(at)
-        other = BluePill(EXAMPLES / "encoders.elf")
-        other.restore(cut.snapshot())
-        cut = other
-    cut.advance_to(5 * NS_PER_MS)
+    for board in (whole, cut):
+        board.chip.latency.vary(seed=3, most=1000)
+    while not cut.chip.processor.nvic.held:
+        cut.advance_to(cut.now_ns + 2000)
+    other = BluePill(EXAMPLES / "encoders.elf")
+    other.restore(cut.snapshot())
+    other.advance_to(5 * NS_PER_MS)
     whole.advance_to(5 * NS_PER_MS)
-    assert cut.chip.latency.count == whole.chip.latency.count > 0
-    assert (cut.cycle, bytes(cut.chip.memory.sram)) == (whole.cycle, bytes(whole.chip.memory.sram))
+    assert other.chip.latency.count == whole.chip.latency.count > 0
+    assert (other.cycle, bytes(other.chip.memory.sram)) == (whole.cycle, bytes(whole.chip.memory.sram))
+    assert not other.chip.processor.nvic.held
 
 
 @pytest.mark.parametrize("core", ["", "native", "own"])
