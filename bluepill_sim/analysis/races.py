@@ -37,7 +37,7 @@ from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: Returns what brings a board to a time, with what is done to it from outside.
 Play = Callable[[BluePill], Callable[[Nanos], object]]
-#: chosen: so many findings are told apart; each takes some thirty runs.
+#: chosen: so many findings are kept apart; each takes some thirty runs.
 MOST_FINDINGS = 4
 #: chosen: so many things of each order a finding shows.
 SHOWN = 4
@@ -300,7 +300,7 @@ class OutputRecording:
             board.serial_ports[f"usart{number}"].subscribe(self._taker(self._characters[f"USART{number}"]))
 
     def taken(self, end: Nanos) -> RunOutputs:
-        """Return what has been put out up to a time; the pin of a USART that has sent is told by its characters."""
+        """Return what has been put out up to a time; of a USART that has sent, its characters stand for its pin."""
         channels = {name: channel for name, channel in self._characters.items() if channel.times}
         remaps = self._board.chip.pins.remaps
         spoken = {pins[0] for name in channels if (pins := PINS[name].get(remaps.get(name, 0))) is not None}

@@ -19,7 +19,7 @@ from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 HELP = """Say whether what a firmware puts out hangs on a few cycles of its interrupts' latency.
 
 Runs it as it is, and again with each interrupt a drawn number of cycles late, 0 to 12. Where pins or characters then
-come in other numbers, values or another order, it *depends*: both orders of the interrupt and an instruction are told,
+come in other numbers, values or another order, it *depends*: both orders of the interrupt and an instruction are shown,
 with what is put out in each. Which of them silicon takes is not known here, so this is no fault; but a program without
 races has none. Times alone are not compared. Runs on the core that takes interrupts at the instruction
 (P2OS_CORE=exact). Exit code 1: it depends. docs/debugging.md tells what counts.
@@ -77,8 +77,8 @@ def races(
     if not report.differing:
         typer.echo("it puts out the same, whatever the latency")
         return
-    told = "" if report.races else "; no single interrupt of the last few before that decides it"
-    typer.echo(f"depends: {report.differing} of {report.runs} runs put out something else{told}")
+    undecided = "" if report.races else "; no single interrupt of the last few before that decides it"
+    typer.echo(f"depends: {report.differing} of {report.runs} runs put out something else{undecided}")
     raise typer.Exit(1)
 
 

@@ -64,13 +64,13 @@ def test_the_verb_tells_both_orders_and_calls_it_no_fault(tmp_path: Path, capfd:
     program = compiled("races", tmp_path, "-Og", "-DRACE_PORT")
     words = ["races", str(program), "--for", "6ms", "--runs", "1"]
     assert run(words) == 1
-    told = capfd.readouterr().out
-    assert "depends: 1 of 1 runs" in told
-    assert "SysTick against" in told
-    assert f"races.c:{line_of(RACES['PORT'][0])}" in told
-    assert "fault" not in told
+    shown = capfd.readouterr().out
+    assert "depends: 1 of 1 runs" in shown
+    assert "SysTick against" in shown
+    assert f"races.c:{line_of(RACES['PORT'][0])}" in shown
+    assert "fault" not in shown
     assert run(words) == 1
-    assert capfd.readouterr().out == told
+    assert capfd.readouterr().out == shown
 
 
 @pytest.mark.parametrize("name", ["dodge", "rover", "motors", "encoders", "sensors"])
