@@ -5,11 +5,14 @@ import pytest
 from adapter_sim.receiver import PASS_NS, Receiver
 from robot_bench.wires.endpoints import Endpoint
 from robot_bench.wires.serial_line import SerialLine
+from simbase.state import Stateful
 from simbase.timing import NS_PER_MS, Nanos, Reached
 
 
-class Listener:
+class Listener(Stateful):
     """A part that never acts by itself, and keeps what it receives."""
+
+    STATE = ("heard", "reached")
 
     def __init__(self) -> None:
         self.heard: list[tuple[bytes, Nanos]] = []
