@@ -246,6 +246,10 @@ class Adapter(Stateful):
                 self._receiver.arrive(data, now)
             self._replan()
 
+    def first_sight(self, at: Nanos) -> Nanos:
+        """Return the earliest time at which it acts on bytes that arrive at a time."""
+        return at if self._receiver is None else self._receiver.first_sight(at)
+
     def receive_pad(self, report: PadReport, now: Nanos) -> None:
         """Take a pad's report that came at `now`; without effect on the robot while the BluePill is master."""
         self._run(now - 1)

@@ -54,6 +54,10 @@ class Receiver(Stateful):
         """Return the pass that sees the oldest bytes, None where there are none."""
         return self._pass_after(self._held[0][0]) if self._held else None
 
+    def first_sight(self, at: Nanos) -> Nanos:
+        """Return the first pass that may see bytes which arrive at a time."""
+        return self._pass_after(at)
+
     def restart(self, now: Nanos) -> None:
         """Begin anew, as after a reset: nothing is held, and passes count from `now`."""
         self._origin = now

@@ -41,6 +41,7 @@ from bluepill_sim.memory.bus import (
     PeripheralBus,
     SramBitBand,
 )
+from bluepill_sim.native.interrupt_latency import InterruptLatency
 from bluepill_sim.native.processor import make_core
 from bluepill_sim.native.registers import share_registers
 from bluepill_sim.peripherals.flash import OPTION_BYTES, PROGRAM_NS
@@ -90,6 +91,7 @@ class Chip(Stateful):
         "_stopped_tick",
         "_stopped_cycle",
         "is_held",
+        "latency",
     )
     DERIVED = ("_flash_access", "_written_code", "_frozen_since", "resets")
 
@@ -148,6 +150,7 @@ class Chip(Stateful):
         self.system = SystemControl(self.processor, self)
         self.processor.on_unmodelled = lambda what: self.warn(f"{what}: not modelled", once=what)
         self._match_slot = self.fabric.add_slot("DWT", self._count_matched)
+        self.latency = InterruptLatency(self.engine, self.fabric)
         self._map()
         self.reset(ResetCause.POWER)
 

@@ -227,6 +227,10 @@ class FirmwareAdapter:
         if self.state in RUNNING_STATES:
             self._receiver.arrive(data, now)
 
+    def first_sight(self, at: Nanos) -> Nanos:
+        """Return the earliest time at which it acts on bytes that arrive at a time."""
+        return at if self._receiver is None else self._receiver.first_sight(at)
+
     def receive_pad(self, report: PadReport, now: Nanos) -> None:
         """Take a pad's report that came at `now`."""
         self._receive_until(now - 1)

@@ -235,6 +235,7 @@ def meta_of(scenario: Scenario, world: World | None, note: str | None, *, is_at_
         "seed": None if is_at_port else scenario.seed,
         "sram": scenario.sram,
         "crystal_ppm": scenario.crystal_ppm,
+        "interrupt_latency_cycles": scenario.interrupt_latency_cycles,
         "gives_up_s": scenario.gives_up_s,
         "duration_s": scenario.duration_ns / NS_PER_S,
         "threshold_m": scenario.threshold_m,

@@ -4,7 +4,7 @@ import typer
 
 from bluepill_sim.cli import coverage, debug, info, parts, pins, profile, run, trace
 from bluepill_sim.cli.browser import page
-from bluepill_sim.cli.comparisons import compare_cores, compare_silicon
+from bluepill_sim.cli.comparisons import compare_cores, compare_silicon, races
 
 HELP = """Run, look into and debug a BluePill program, without a robot.
 
@@ -22,6 +22,7 @@ def register(app: typer.Typer) -> None:
 
 def add_verbs(app: typer.Typer) -> None:
     """Add what stands below it."""
-    for module in (run, parts, debug, info, pins, trace, coverage, profile, compare_silicon, compare_cores, page):
+    modules = (run, parts, debug, info, pins, trace, coverage, profile, races, compare_silicon, compare_cores, page)
+    for module in modules:
         name = module.__name__.rpartition(".")[2]
         app.command(name.replace("_", "-"), help=module.HELP)(getattr(module, name))

@@ -1,5 +1,7 @@
 """USART1, and the serial port of a USB device, to the outside: standard output, a file, or a pseudo-terminal.
 
+And the files that what comes out of the ITM is written to (`--itm`, `--swo`).
+
 This is the I/O layer: it is the one file here that opens things. The chip runs in
 virtual time and the console in none: what the chip sends is written as it
 comes out, what a person types is given to the chip when `poll` is called.
@@ -14,8 +16,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import BinaryIO, Protocol
 
+from bluepill_sim.board import BluePill
+from bluepill_sim.debug.itm import PacketWriter, StimulusWriter, TextWriter
 from bluepill_sim.errors import BluePillError
-from simbase.files import open_to_write
+from simbase.files import open_to_write, open_to_write_text
 from simbase.terminal import ReadableBytes
 
 #: Most bytes taken from a pseudo-terminal at one poll. Chosen: more than anybody types.
@@ -169,3 +173,20 @@ def connect(console: Console, port: ConsolePort) -> Callable[[], None]:
             port.receive(data)
 
     return carry
+
+
+def open_traces(board: BluePill, text: Path | None, packets: Path | None) -> list[StimulusWriter]:
+    """Open the files that are wanted and connect them; with any of them the trace is on from the start.
+
+    Raises:
+        FileError: One cannot be written.
+    """
+    writers: list[StimulusWriter] = []
+    if text is not None:
+        writers.append(TextWriter(open_to_write_text(text)))
+    if packets is not None:
+        writers.append(PacketWriter(open_to_write(packets)))
+    if writers:
+        board.chip.system.enable_trace()
+        board.chip.system.stimulus_sinks += [writer.write for writer in writers]
+    return writers

@@ -82,11 +82,47 @@ def parse_changes(texts: Sequence[str], board: BluePill) -> list[PinChange]:
     return sorted(changes, key=lambda change: change.at_ns)
 
 
+@dataclass(frozen=True, slots=True)
+class SentText:
+    """Characters that USART1 receives from a time on."""
+
+    at_ns: Nanos
+    data: bytes
+
+    def act(self, board: BluePill) -> None:
+        """Have the receiver take the characters."""
+        board.usart1.receive(self.data)
+
+
+def parse_texts(texts: Sequence[str]) -> list[SentText]:
+    r"""Return what `--send` asks for, by time; `\n`, `\r`, `\t`, `\xHH` and `\\` are read as in C.
+
+    Raises:
+        BluePillError: one is not understood.
+    """
+    found = []
+    for text in texts:
+        words, _, at = text.rpartition("@")
+        try:
+            data = words.encode("latin-1").decode("unicode_escape").encode("latin-1")
+        except UnicodeError:
+            data = b""
+        if not data:
+            raise BluePillError(f"--send {text!r} is not understood", hint=r"TEXT@TIME, such as 'ping\n@500ms'")
+        found.append(SentText(to_nanos(at), data))
+    return sorted(found, key=lambda sent: sent.at_ns)
+
+
 class Schedule:
     """A board, and what happens at its pins."""
 
     def __init__(
-        self, board: BluePill, changes: Sequence[PinChange], advance: Callable[[Nanos], ChipReached] | None = None
+        self,
+        board: BluePill,
+        changes: Sequence[PinChange],
+        advance: Callable[[Nanos], ChipReached] | None = None,
+        *,
+        texts: Sequence[SentText] = (),
     ) -> None:
         """Plan changes.
 
@@ -94,9 +130,12 @@ class Schedule:
             board: the board.
             changes: by time.
             advance: brings the board to a time, or less far; None is the board's own.
+            texts: what USART1 receives, by time.
         """
         self._board = board
-        self._left = list(reversed(changes))
+        both: list[PinChange | SentText] = [*changes, *texts]
+        both.sort(key=_time_of)
+        self._left = both[::-1]
         self._advance = advance or board.advance_to
 
     def advance_to(self, limit_ns: Nanos) -> ChipReached:
@@ -119,6 +158,10 @@ class Schedule:
     def _act(self, now_ns: Nanos) -> None:
         while self._left and self._left[-1].at_ns <= now_ns:
             self._left.pop().act(self._board)
+
+
+def _time_of(change: PinChange | SentText) -> Nanos:
+    return change.at_ns
 
 
 def _is_volts(level: str) -> bool:

@@ -10,7 +10,7 @@ import typer
 
 from bluepill_sim.board import BluePill, run_until
 from bluepill_sim.cli.can_socket import join_can
-from bluepill_sim.cli.console import PTY, connect, open_console
+from bluepill_sim.cli.console import PTY, connect, open_console, open_traces
 from bluepill_sim.cli.driving import (
     OverBudgetError,
     Schedule,
@@ -24,8 +24,6 @@ from bluepill_sim.cli.driving import (
 from bluepill_sim.cli.parts import attach_parts, show_parts
 from bluepill_sim.cli.quantities import Firmware, option, time_option
 from bluepill_sim.core.halts import ChipReached
-from bluepill_sim.debug.itm import PacketWriter, StimulusWriter, TextWriter
-from simbase.files import open_to_write, open_to_write_text
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reason
 from simbase.units import BAUD
 
@@ -132,7 +130,7 @@ def run(
     board = BluePill(firmware, strict=strict)
     board.usart1.far_baud = usart_baud
     changes = parse_changes(drive or [], board)
-    traces = _open_traces(board, itm, swo)
+    traces = open_traces(board, itm, swo)
     warn_on_stderr(board)
     attach_parts(board, attach or [])
     consoles = [open_console(uart, raw=raw)]
@@ -212,20 +210,3 @@ def _paced(board: BluePill, carriers: Sequence[Callable[[], None]]) -> Callable[
         return reached
 
     return advance
-
-
-def _open_traces(board: BluePill, text: Path | None, packets: Path | None) -> list[StimulusWriter]:
-    """Open the files that are wanted and connect them; with any of them the trace is on from the start.
-
-    Raises:
-        FileError: One cannot be written.
-    """
-    writers: list[StimulusWriter] = []
-    if text is not None:
-        writers.append(TextWriter(open_to_write_text(text)))
-    if packets is not None:
-        writers.append(PacketWriter(open_to_write(packets)))
-    if writers:
-        board.chip.system.enable_trace()
-        board.chip.system.stimulus_sinks += [writer.write for writer in writers]
-    return writers

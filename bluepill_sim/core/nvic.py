@@ -58,10 +58,11 @@ SYSTEM_EXCEPTIONS = (1 << FIRST_IRQ) - 1
 class Nvic(Stateful):
     """State of all exceptions; numbers are those of the architecture (IRQ line n is 16 + n)."""
 
-    STATE = ("pending", "active", "enabled", "levels", "priorities", "priority_grouping")
+    STATE = ("pending", "active", "held", "enabled", "levels", "priorities", "priority_grouping")
 
     pending: int = wide("pending", "A bit mask over exception numbers.")
     active: int = wide("active", "A bit mask over exception numbers.")
+    held: int = wide("held", "Pending exceptions whose time has not come: their latency is varied.")
     enabled: int = field("enabled", "A bit mask over interrupt lines.")
     levels: int = field("levels", "A bit mask over interrupt lines.")
     priority_grouping: int = field("grouping", "AIRCR.PRIGROUP.")
@@ -78,7 +79,7 @@ class Nvic(Stateful):
 
     def reset(self) -> None:
         """Go back to the state after a reset; the levels of the lines belong to the peripherals."""
-        self.pending = self.active = self.enabled = 0
+        self.pending = self.active = self.held = self.enabled = 0
         ctypes.memset(self.priorities, 0, len(self.priorities))
         self.priority_grouping = 0
 
@@ -113,7 +114,7 @@ class Nvic(Stateful):
 
     def deliverable(self) -> int:
         """Return the pending exceptions that are enabled, as a mask over exception numbers."""
-        pending = self.pending
+        pending = self.pending & ~self.held
         return pending and pending & (self.enabled << FIRST_IRQ | SYSTEM_EXCEPTIONS)
 
     def first_pending(self) -> int | None:

@@ -168,7 +168,7 @@ SHARED = Struct(
     "The state of one core.",
     (
         *_fields("u64", "cycle", "stop_at", "access_cycle", "last_sleep_cycle", "tick_next"),
-        *(StructMember(name, "u64", 2, "a bit an exception") for name in ("pending", "active")),
+        *(StructMember(name, "u64", 2, "a bit an exception") for name in ("pending", "active", "held")),
         *_fields("u64", "enabled", "levels"),
         *_fields("u32", "access_pc", "in_access", "pc", "is_thumb", "mask_stop", "attention"),
         *_fields("u32", "halt_kind", "halt_pc", "halt_address", "halt_has_address", "run_from", "uses_exclusive"),
@@ -567,6 +567,17 @@ INPUT_ROWS = Struct(
     "Levels that the outside puts on pins later: a ring, oldest first.",
     (*_fields("u32", "first", "count"), StructMember("padding", "u64"), StructMember("rows", "edge", LATER_INPUTS)),
 )
+LATENCY = Struct(
+    "latency",
+    "Interrupts that are put off by drawn cycles: how often one was, and until when those that are held wait.",
+    (
+        *_fields("u64", "seed", "count"),
+        StructMember("until", "u64", doc="how many are put off as they are drawn; those behind them come at once,"),
+        StructMember("last", "u32", doc="but for the first of these, which is put off by so many cycles"),
+        StructMember("most", "u32", doc="cycles that may be drawn"),
+        StructMember("due", "u64", EXCEPTIONS, "ns"),
+    ),
+)
 #: More than a frame has bits, from its start to behind its error flag.
 CAN_BITS_ROWS = 192
 CAN_BITS = Struct(
@@ -588,7 +599,7 @@ SENT = Struct(
 #: All of them; one that holds another comes behind it.
 STRUCTS = (
     RECORD, INSTRUCTION, MEASURED, BLOCK_COST, RAMP, TICKS, STEP, LOOP, FAULT, SHARED, PORT, USART, EXTI, DMA, SIGNAL,
-    ANALOG, ADC, GPIO, AFIO, CLOCKS, RCC, FILTER, SHAPE, TIM, SPI, I2C, WAVE, EDGE, INPUT_ROWS, CAN_BITS, SENT,
+    ANALOG, ADC, GPIO, AFIO, CLOCKS, RCC, FILTER, SHAPE, TIM, SPI, I2C, WAVE, EDGE, INPUT_ROWS, LATENCY, CAN_BITS, SENT,
 )  # fmt: skip
 
 _KINDS: dict[str, Any] = {

@@ -180,6 +180,7 @@ FUNCTION_TYPES = {
     "interpreter_save": "vpp",
     "interpreter_restore": "vpp",
     "core_use_interpreter": "vppb",
+    "core_vary_latency": "vpup",
     "edge_log_new": "p",
     "edge_log_free": "vp",
     "edge_log_put": "bpquu",

@@ -14,6 +14,7 @@ state is in `shared`, whichever of them ran last.
 """
 
 import ctypes
+import re
 import weakref
 from collections.abc import Callable
 from typing import Any
@@ -90,6 +91,8 @@ _FLASH_ALIAS, _PAGE_SHIFT = 0x0800_0000, 10
 #: As of core.h: half-words of 128 KB.
 _FLASH_SLOTS = 65536
 _RECORD_ROOM = 4096
+#: A place at which a way was gone: most were never reached.
+_GONE = re.compile(rb"[^\0]")
 
 
 class NativeEngine(Engine):
@@ -381,8 +384,8 @@ class NativeEngine(Engine):
         base = self.shared.flash_base
         found = {
             (base + 2 * slot, is_elsewhere)
-            for slot, gone in enumerate(ways) if gone
-            for is_elsewhere in (False, True) if gone & 1 << is_elsewhere
+            for slot in (place.start() for place in _GONE.finditer(ways))
+            for is_elsewhere in (False, True) if ways[slot] & 1 << is_elsewhere
         }  # fmt: skip
         return super().gone_ways | found
 

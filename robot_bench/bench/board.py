@@ -94,8 +94,9 @@ def boot(scenario: Scenario, image: "Image | None" = None) -> LeadingChip:
         MissingDependencyError: The emulator's engine is not installed.
     """
     return power_up(
-        image or scenario.firmware, sram=scenario.sram, crystal_ppm=scenario.crystal_ppm, seed=scenario.seed
-    )
+        image or scenario.firmware, sram=scenario.sram, crystal_ppm=scenario.crystal_ppm,
+        latency_cycles=scenario.interrupt_latency_cycles, seed=scenario.seed,
+    )  # fmt: skip
 
 
 def pins_of(scenario: Scenario) -> dict[str, str]:

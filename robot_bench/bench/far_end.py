@@ -15,7 +15,7 @@ from p2os.errors import ScenarioError
 from p2os.pioneer.body.contract import RobotBody
 from p2os.pioneer.controller import Pioneer
 from p2os.toml_schema import within
-from robot_bench.adapter import make_adapter
+from robot_bench.adapter import AnyAdapter, make_adapter
 from robot_bench.bench.board import cut_wires
 from robot_bench.direct import DirectRobot, DistanceSensors, JointMotor, WheelEncoder
 from robot_bench.direct.wired import AnalogPin
@@ -149,7 +149,10 @@ def _ends_of_line(
         recorder.wire("r2c", data, at)
         ranges.take(data, at)
 
-    at_client = Endpoint(adapter, incoming=to_client, outgoing=to_robot, on_arrival=arrives_at_client)
+    at_client = Endpoint(
+        adapter, incoming=to_client, outgoing=to_robot, on_arrival=arrives_at_client,
+        first_sight=adapter.first_sight if isinstance(adapter, AnyAdapter) else None,
+    )  # fmt: skip
     at_robot = Endpoint(
         controller,
         incoming=to_robot,

@@ -19,7 +19,7 @@ VERSION = "version of p2os"
 DECISIVE = (
     "mode", "seed", "parameters", "threshold_um", "usart_baud", "outside", "start", "direct", "adapter",
     "adapter_core", "controller", "controller_kind", "changes", "faults", "triggers", "own_robot", "parts", "record",
-    "sram", "crystal_ppm",
+    "sram", "crystal_ppm", "interrupt_latency_cycles",
 )  # fmt: skip
 #: Of these, what happens at times of its own: a part of it may be still to come.
 LATER = ("changes", "faults")

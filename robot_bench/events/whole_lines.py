@@ -101,7 +101,10 @@ _META = _object({
          "sram"), _text,
     ),
     **dict.fromkeys(("scenario_path", "firmware_sha256", "note", "body_version"), _known(_text)),
-    **dict.fromkeys(("duration_s", "threshold_m", "step_mps", "crystal_ppm", "gives_up_s", "seed"), _known(_number)),
+    **dict.fromkeys(
+        ("duration_s", "threshold_m", "step_mps", "crystal_ppm", "interrupt_latency_cycles", "gives_up_s", "seed"),
+        _known(_number),
+    ),
     "settings": _known(_each(_setting)), "pins": _known(_named(_text)), "robots": _known(_each(_text)),
     "start": _object(dict.fromkeys(("x", "y", "heading"), _number)), "world": _known(_WORLD), "robot": _known(_ROBOT),
 })  # fmt: skip

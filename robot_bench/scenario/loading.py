@@ -199,6 +199,7 @@ def _build(table: Table, text: str, path: Path, where: TablePlace, firmware: Pat
         outside=_outside(top.outside, own_robot, where.at("outside")),
         sram=top.sram,
         crystal_ppm=top.crystal_ppm,
+        interrupt_latency_cycles=top.interrupt_latency_cycles,
         gives_up_s=top.gives_up_s,
         start=None if top.start is None else top.start.pose,
         start_at=str(within(where, "start")),

@@ -87,6 +87,8 @@ class Scenario:
     sram: str = ZEROS
     #: By how many millionths the 8 MHz crystal of the chip is too fast.
     crystal_ppm: int = 0
+    #: By how many cycles each interrupt of the chip may be late, drawn by the seed.
+    interrupt_latency_cycles: int = 0
     #: For so long its program may go on with what it does before it does something else; None is not known, and
     #: `explain` takes what it holds for long. It changes nothing in the run.
     gives_up_s: float | None = None

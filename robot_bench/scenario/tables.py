@@ -209,6 +209,10 @@ class TopTable(OwnTable, IncludeTable):
         least=-1000, most=1000, doc="by how many millionths the chip's 8 MHz crystal is too fast; a program on the "
         "internal oscillator does not notice",
     )] = 0  # fmt: skip
+    interrupt_latency_cycles: Annotated[int, Key(
+        least=0, most=1000, doc="by how many cycles each interrupt of the chip may be late, drawn by the `seed`; above "
+        "0 it needs `P2OS_CORE=exact`. A program that fails so has a [race](debugging.md#races-with-interrupts)",
+    )] = 0  # fmt: skip
     gives_up_s: Annotated[float | None, Key(
         above=0, most=LONGEST_S, doc="for so long the program may go on with what it does, with nothing in sight, "
         "before it does something else; [`p2os explain`](cli.md), which takes 15 s where it is not set, says of what "

@@ -34,6 +34,8 @@ class Endpoint(Stateful):
         outgoing: The line that it writes to.
         on_arrival: Called with each delivery, before the part takes it: (bytes, ns).
         next_due: Returns when the part is to be brought forward; None asks its `next_deadline`.
+        first_sight: Returns the earliest time at which the part acts on what arrives at a time; until then nobody need
+            bring it there. None: at once.
     """
 
     STATE = ("part", "_incoming")
@@ -47,18 +49,22 @@ class Endpoint(Stateful):
         outgoing: SerialLine,
         on_arrival: Callable[[bytes, Nanos], None] | None = None,
         next_due: Callable[[], Nanos | None] | None = None,
+        first_sight: Callable[[Nanos], Nanos] | None = None,
     ) -> None:
         self.part = part
         self._next_due = next_due or part.next_deadline
         self._incoming = incoming
         self._outgoing = outgoing
         self._on_arrival = on_arrival
+        self._first_sight = first_sight
         #: The part's own deadline, which moves only when it acts or receives.
         self._own_deadline = self._next_due()
 
     def next_deadline(self) -> Nanos | None:
-        """Return when the part wants to act, or when bytes will have arrived for it."""
+        """Return when the part wants to act, or when it may see bytes that will have arrived for it."""
         own, arrival = self._own_deadline, self._incoming.next_deadline()
+        if arrival is not None and self._first_sight is not None:
+            arrival = self._first_sight(arrival)
         if own is None or arrival is None:
             return arrival if own is None else own
         return min(own, arrival)

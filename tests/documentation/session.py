@@ -41,7 +41,7 @@ LIMIT_S = 240.0
 READY_S = 60.0
 ENDING_S = 60.0
 PORTS = 24
-FAILURES = ("p2os: ", "fault: ", "FAILED ")
+FAILURES = ("p2os: ", "fault: ", "FAILED ", "depends: ")
 NAMED_FILE = re.compile(r"^(?:/\*|//|#)\s*(?P<name>[\w./-]+\.(?:c|h|ld|toml|py|yml|yaml))\b")
 TCP = re.compile(r"(?<=tcp:127\.0\.0\.1:)\d+|(?<=--gdb )\d+|(?<=remote :)\d+")
 PLACE = re.compile(r"(?:tcp:127\.0\.0\.1:\d+|(?:serial|pty):/[^?'\s]+)")

@@ -1,1 +1,1 @@
-"""`p2os mcu compare-…`: the model beside something else that runs the same program."""
+"""`p2os mcu compare-…` and `races`: what a program does beside what it does elsewhere, or at other latencies."""

@@ -160,6 +160,7 @@ class ChipReplay:
         meta = record.meta
         self.board = power_up(
             firmware, sram=str(meta.get("sram", ZEROS)), crystal_ppm=int(cast("int", meta.get("crystal_ppm") or 0)),
+            latency_cycles=int(cast("int", meta.get("interrupt_latency_cycles") or 0)),
             seed=int(cast("int", meta.get("seed") or 0)),
         )  # fmt: skip
         self.wires: Mapping[str, Wire] = {wire.name: wire for wire in wires}

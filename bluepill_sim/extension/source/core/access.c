@@ -24,7 +24,7 @@ struct region_user {
 /* An unaligned access is made in at most so many. */
 enum { PARTS = 16 };
 
-enum { DWT_CTRL = 0xE0001000, DWT_CYCCNT = 0xE0001004, SCS = 0xE000E000, DEMCR = 0xE000EDFC, STK_CTRL = 0xE000E010, SCB_AIRCR = 0xE000ED0C, SCB_CCR = 0xE000ED14, STIR = 0xE000EF00, SYSTICK = 15 };
+enum { DWT_CTRL = 0xE0001000, DWT_CYCCNT = 0xE0001004, SCS = 0xE000E000, DEMCR = 0xE000EDFC, STK_CTRL = 0xE000E010, SCB_AIRCR = 0xE000ED0C, SCB_CCR = 0xE000ED14, STIR = 0xE000EF00 };
 #define IN_PAGE ((1u << PAGE_SHIFT) - 1)
 
 /* What Unicorn hands back at each access of a region; it is freed with the core. */
@@ -464,7 +464,7 @@ static void bring_systick(struct core *core, uint64_t now)
 {
     struct shared *s = &core->shared;
     if (now >= s->tick_next && systick_advance(s, now)) {
-        pend(core, SYSTICK);
+        pend_tick(core);
         pending_changed(core, s->access_pc);
     }
 }

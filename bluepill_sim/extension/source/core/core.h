@@ -5,7 +5,7 @@
  * (`scs.c`). At a boundary, or right before an access, an exception may be entered or left (`exceptions.c`), a fault be
  * taken (`faults.c`), or a loop that waits be worked out (`polling.c`); each of these leads to the next block. So none of
  * the seven works, or can be read, without the others. What needs no other stands beside them: `forced.c`, `host.c`,
- * `systick.c`, `tlb.c`.
+ * `latency.c`, `systick.c`, `tlb.c`.
  *
  * `struct core` begins with what Python sees, `struct shared`.
  */
@@ -270,6 +270,8 @@ struct core {
     struct fault_row faults[HALT_NONE]; /* by kind of halt */
     struct view views[VIEWS];
     uint32_t view_count;
+    struct latency *latency; /* null: no interrupt is put off */
+    uint32_t latency_slot;
 };
 
 /* ITSTATE in a CPSR or xPSR: its bits 1:0 at 25, 7:2 at 10. */
@@ -364,11 +366,15 @@ int deliver(struct core *core);
 bool leave(struct core *core, uint32_t exc_return);
 bool supervisor_call(struct core *core, uint32_t pc);
 void pend(struct core *core, unsigned number);
+void pend_late(struct core *core, unsigned number, uint64_t cycle);
+void pend_tick(struct core *core);
 void pending_changed(struct core *core, uint32_t pc);
 bool is_interrupted(struct core *core);
 bool can_preempt(struct core *core, unsigned number, bool ignores_primask);
 bool enter(struct core *core, unsigned number, uint32_t return_address);
 uint32_t vector(const struct core *core, unsigned number);
+/* latency.c */
+void put_off(struct core *core, unsigned number, uint64_t cycle);
 /* faults.c */
 bool take_fault(struct core *core, uint32_t kind);
 #pragma GCC visibility pop

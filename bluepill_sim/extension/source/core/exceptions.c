@@ -24,8 +24,8 @@ enum { AWAKE, FOR_INTERRUPT, FOR_EVENT };
 
 uint64_t deliverable(const struct shared *s, uint64_t *high)
 {
-    *high = s->pending[1] & (s->enabled >> (64 - FIRST_IRQ));
-    return s->pending[0] & (s->enabled << FIRST_IRQ | ((1u << FIRST_IRQ) - 1));
+    *high = s->pending[1] & ~s->held[1] & (s->enabled >> (64 - FIRST_IRQ));
+    return s->pending[0] & ~s->held[0] & (s->enabled << FIRST_IRQ | ((1u << FIRST_IRQ) - 1));
 }
 
 static int priority_of(const struct shared *s, unsigned number)
@@ -160,7 +160,7 @@ static void act_on_due(struct core *core)
 {
     struct shared *s = &core->shared;
     if (s->cycle >= s->tick_next && systick_advance(s, s->cycle)) {
-        pend(core, SYSTICK);
+        pend_tick(core);
     }
     if (s->cycle >= core->fabric->next_cycle) {
         run_events(core->fabric, ns_of(core->fabric, s->cycle));
@@ -372,6 +372,19 @@ void pend(struct core *core, unsigned number)
         core->shared.event_register = 1;
     }
 }
+
+/* The same of an interrupt of a device that came at a cycle: where its latency is varied it is taken later. */
+void pend_late(struct core *core, unsigned number, uint64_t cycle)
+{
+    const bool is_new = !(core->shared.pending[number >> 6] >> (number & 63) & 1);
+    pend(core, number);
+    if (core->latency != NULL && is_new) {
+        put_off(core, number, cycle);
+    }
+}
+
+/* And of SysTick, which has just come to 0. */
+void pend_tick(struct core *core) { pend_late(core, SYSTICK, core->shared.tick.base); }
 
 /* An access has changed what is pending, enabled or its priority: as `Processor.pending_changed`. */
 void pending_changed(struct core *core, uint32_t pc)

@@ -41,7 +41,7 @@ static uint32_t set_irq(void *user, uint32_t irq, uint32_t level)
         s->levels &= ~line;
     } else if (!(s->levels & line)) {
         s->levels |= line;
-        pend(core, irq + FIRST_IRQ);
+        pend_late(core, irq + FIRST_IRQ, core->latency == NULL ? 0 : cycle_at(core->fabric, now_ns(core->fabric)));
         pending_changed(core, pc(core));
     }
     return s->enabled >> irq & 1;

@@ -4,7 +4,7 @@
 
 #include "core.h"
 
-enum { FOR_INTERRUPT = 1, FOR_EVENT = 2, SLEEPDEEP = 4, SYSTICK = 15 };
+enum { FOR_INTERRUPT = 1, FOR_EVENT = 2, SLEEPDEEP = 4 };
 #define FIRST_EXCEPTION_RETURN 0xFFFFFFE0u
 /* UC_ERR_EXCEPTION: the TLB denied a fetch. */
 #define DENIED 21
@@ -315,7 +315,7 @@ enum way goes_on(struct core *core, uint32_t address)
     core->block = &core->none;
     s->pc = address;
     if (is_tick && systick_advance(s, s->cycle)) {
-        pend(core, SYSTICK);
+        pend_tick(core);
     }
     if (s->cycle >= fabric->next_cycle) {
         run_due(fabric, s->cycle);
@@ -352,7 +352,7 @@ static uint32_t run(struct core *core, uint64_t limit)
     core->limit = limit;
     for (;;) {
         if (s->cycle >= s->tick_next && systick_advance(s, s->cycle)) {
-            pend(core, SYSTICK);
+            pend_tick(core);
         }
         if (s->cycle >= core->fabric->next_cycle) {
             run_due(core->fabric, s->cycle);

@@ -141,6 +141,7 @@ struct shared {
     uint64_t tick_next;
     uint64_t pending[2]; /* a bit an exception */
     uint64_t active[2]; /* a bit an exception */
+    uint64_t held[2]; /* a bit an exception */
     uint64_t enabled;
     uint64_t levels;
     uint32_t access_pc;
@@ -221,7 +222,7 @@ struct shared {
     struct fault fault;
     struct record last[32];
 };
-_Static_assert(sizeof(struct shared) == 1760, "shared");
+_Static_assert(sizeof(struct shared) == 1776, "shared");
 
 /* The pins of one port, a bit each. RM0008 9.1, table 20. */
 struct port {
@@ -614,6 +615,17 @@ struct inputs {
     struct edge rows[1024];
 };
 _Static_assert(sizeof(struct inputs) == 16400, "inputs");
+
+/* Interrupts that are put off by drawn cycles: how often one was, and until when those that are held wait. */
+struct latency {
+    uint64_t seed;
+    uint64_t count;
+    uint64_t until; /* how many are put off as they are drawn; those behind them come at once, */
+    uint32_t last; /* but for the first of these, which is put off by so many cycles */
+    uint32_t most; /* cycles that may be drawn */
+    uint64_t due[76]; /* ns */
+};
+_Static_assert(sizeof(struct latency) == 640, "latency");
 
 /* Levels of CAN's pins to come: rows whose drive is TX, whose wire is RX and whose time counts from `shown_ns`, those from `first` on; and a frame that is tried over and over: the phase of the try that begins at `start_ns`. */
 struct can_bits {

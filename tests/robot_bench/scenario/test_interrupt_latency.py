@@ -1,0 +1,35 @@
+"""`interrupt_latency_cycles` of a scenario: a setting in the run's record, drawn by its seed, and replayed."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from robot_bench.campaign.trial import TrialVerdict, run_trial, trial_of
+from robot_bench.run import run_scenario
+from robot_bench.scenario.loading import load_scenario
+
+SETTINGS = (("body", "kinematic"), ("duration_s", 1))
+
+
+def test_a_latency_makes_another_run_that_comes_again_by_its_seed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("P2OS_CORE", "exact")
+    base = trial_of("rover", settings=SETTINGS)
+    late = base.set(("interrupt_latency_cycles", 12))
+    hashes = [run_trial(one).sha256 for one in (base, late, late, late.set(("seed", 1)))]
+    assert hashes[1] == hashes[2]
+    assert len(set(hashes)) == 3
+
+
+def test_the_record_holds_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("P2OS_CORE", "exact")
+    run_scenario(load_scenario("rover", settings=[*SETTINGS, ("interrupt_latency_cycles", 7)]), tmp_path / "run")
+    meta = json.loads((tmp_path / "run" / "trace.jsonl").read_text(encoding="utf-8").splitlines()[0])
+    assert meta["interrupt_latency_cycles"] == 7
+
+
+def test_a_core_that_cannot_is_refused_with_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("P2OS_CORE", "native")
+    done = run_trial(trial_of("rover", settings=[*SETTINGS, ("interrupt_latency_cycles", 1)]))
+    assert done.verdict is TrialVerdict.ERROR
+    assert "P2OS_CORE=exact" in done.failures[0]
