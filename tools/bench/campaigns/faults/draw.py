@@ -38,6 +38,7 @@ EQUIVALENT: Mapping[str, str] = {
         ("pins.c:66:MFC:;", "pins.c:67:MFC:;", "pins.c:68:MFC:;"),
         "these pins are floating inputs after a reset already (RM0008, 9.2.1)",
     ),
+    "startup.c:35:MVI:": "there is no initialised data, so nothing is read from there",
     "rover_board.c:95:MVAV:;": "each tick starts a conversion too, and none is read in the first 100",
     "odometer.c:18:MIA:": "it changes `moved` alone, which dodge never reads",
 }
