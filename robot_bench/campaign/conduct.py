@@ -352,5 +352,5 @@ class Conduct:
         reached = frozenset[object](outcome.blocks | outcome.lines | outcome.transitions | ways)
         return PointResult(
             margin=NO_VERDICT if found is None else found, ended=ended, reached=reached,
-            acting=self.space.acting(row.proposal),
+            acting=self.space.acting(row.proposal), is_excused=bool(outcome.excused_goals),
         )  # fmt: skip

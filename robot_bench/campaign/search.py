@@ -43,6 +43,8 @@ class PointResult:
     reached: frozenset[object] = field(default_factory=frozenset)
     #: Of which dimensions the coordinates had an effect; none is said: of all.
     acting: frozenset[int] = frozenset()
+    #: It missed goals that do not judge it: it shows less than others.
+    is_excused: bool = False
 
 
 class Search(Protocol):
@@ -187,11 +189,24 @@ class Evolution:
         self._scheduler.tell([-answer.margin for answer in answers], [list(answer.ended) for answer in answers])
 
 
+@dataclass(slots=True)
+class _KeptPoint:
+    """A point that reached something new."""
+
+    point: Point
+    #: Its dimensions that had an effect.
+    acting: Sequence[int]
+    is_excused: bool
+    #: How often it was varied.
+    uses: int = 0
+
+
 class Guided:
     """Keeps points that reached something new, and varies them; begins with a corpus, then with points spread evenly.
 
     A kept point is varied in a few of its coordinates that had an effect, the least tried ones first; each fourth point
-    is a new one.
+    is a new one. What is rarely drawn reaches something new as often as not, so that its variations would be most of
+    the points: those that are excused, and show the less, are varied only while they are few.
     """
 
     #: chosen: so many coordinates change at once on average.
@@ -202,6 +217,8 @@ class Guided:
     NEW_EVERY = 4
     #: chosen: at most so much of the points is spent on the corpus, the newest of it.
     CORPUS_SHARE = 0.5
+    #: chosen: no point that was excused is varied where so much of all were, or may be.
+    EXCUSED_SHARE = 0.05
 
     def __init__(self, problem: Problem) -> None:
         self._random = random.Random(problem.seed)
@@ -211,33 +228,40 @@ class Guided:
         self._first = problem.batch
         self._count = 0
         self._seen: set[object] = set()
-        #: Kept points, each with its dimensions that acted, and how often it was varied.
-        self._kept: list[tuple[Point, Sequence[int], list[int]]] = []
+        self._kept: list[_KeptPoint] = []
         self._asked: list[Point] = []
+        #: How many points have an answer, and how many of them were excused.
+        self._told = self._excused = 0
 
     def ask(self, count: int) -> list[Point]:
         """Return points of the corpus; then variations of what was kept, and new points."""
         found: list[Point] = []
+        excused = self._excused
         for _ in range(count):
             if self._corpus:
                 found.append(self._corpus.pop(0))
                 continue
             self._count += 1
-            if not self._kept or self._count <= self._first or self._count % self.NEW_EVERY == 0:
+            is_spent = excused >= self.EXCUSED_SHARE * (self._told + len(found))
+            kept = [one for one in self._kept if not (is_spent and one.is_excused)]
+            if not kept or self._count <= self._first or self._count % self.NEW_EVERY == 0:
                 found += self._fresh.ask(1)
             else:
-                point, acting, uses = min(self._kept, key=lambda kept: kept[2][0])
-                uses[0] += 1
-                found.append(self._varied(point, acting))
+                chosen = min(kept, key=lambda one: one.uses)
+                chosen.uses += 1
+                excused += chosen.is_excused  # as it may well be
+                found.append(self._varied(chosen.point, chosen.acting))
         self._asked = found
         return found
 
     def tell(self, answers: Sequence[PointResult]) -> None:
         """Keep what reached something new."""
         for point, answer in zip(self._asked, answers, strict=True):
+            self._told += 1
+            self._excused += answer.is_excused
             if not answer.reached <= self._seen:
                 self._seen |= answer.reached
-                self._kept.append((point, sorted(answer.acting) or range(len(point)), [0]))
+                self._kept.append(_KeptPoint(point, sorted(answer.acting) or range(len(point)), answer.is_excused))
 
     def _varied(self, point: Point, acting: Sequence[int]) -> Point:
         share = min(self.CHANGED / len(acting), 1.0)

@@ -157,7 +157,9 @@ class HasReasonTable(Record):
 
     motion: Annotated[str, Key(choices=MOTIONS, doc="what begins")]
     before: _Before = ()
-    given: Annotated[tuple[str, ...], Key(kind="list", doc="judges only where each of these pins was high so long")] = ()
+    given: Annotated[
+        tuple[str, ...], Key(kind="list", doc="judges only where each of these pins was high so long")
+    ] = ()
     row: Annotated[int, Key(least=0, most=1000, doc="so many in a row need no reason")] = 0
     needs: Annotated[tuple[tuple[str, ...], ...], Key(kind="list", doc="lists of pins, of each of which one was high")]
     within_s: Annotated[float, Key(above=0, most=LONGEST_S, doc="so long before, or since then")]

@@ -225,6 +225,26 @@ def test_only_what_acted_is_varied(monkeypatch: pytest.MonkeyPatch) -> None:
     assert {at for point in varied for at in range(6) if point[at] != first[at]} == {2, 4}
 
 
+@pytest.mark.parametrize(("is_excused", "least", "most"), [(False, 0.7, 1.0), (True, 0.03, 0.06)])
+def test_what_is_excused_is_varied_only_while_it_is_little(is_excused: bool, least: float, most: float) -> None:
+    pytest.importorskip("scipy")
+    search = Guided(Problem(counts=(0, 0), is_ordered=(True, True), runs=400, batch=16, seed=1))
+    asked = excused = 0
+    for _ in range(25):
+        points = search.ask(16)
+        # As a thing that is drawn in few of the points: it reaches something new each time, and stays in variations.
+        answers = [
+            PointResult(
+                margin=1.0, reached=frozenset({point if point[0] > 0.97 else 0}), acting=frozenset({1}),
+                is_excused=is_excused and point[0] > 0.97,
+            )
+            for point in points
+        ]  # fmt: skip
+        search.tell(answers)
+        asked, excused = asked + 16, excused + sum(point[0] > 0.97 for point in points)
+    assert least <= excused / asked <= most
+
+
 def test_a_campaign_goes_on_with_the_corpus_that_it_was_begun_with(tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text(FILE)
     write_corpus(tmp_path / "mine.jsonl", [{"start.x_m": 0.25}])
