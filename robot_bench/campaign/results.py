@@ -2,6 +2,7 @@
 
     results/part-00001.parquet     the first batch: seed, parameters, outcome, margins, hashes, versions
     failures/0007/dodge.toml       point 7 as a scenario with its files, for `p2os run`
+    failures/0007/bisect.sh        judges the build of a commit by it, for `git bisect run`
 
 A part is written whole or not at all, and names the same rows whoever worked on them; the seconds of a processor and
 nothing else may differ.
@@ -14,6 +15,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from string import Template
 
 from robot_bench.campaign.campaign_file import Campaign
 from robot_bench.campaign.conduct import CampaignProgress, PointFinding, PointRow, Run
@@ -29,6 +31,29 @@ from simbase.installation import installed_version
 RESULTS, FAILURES = "results", "failures"
 #: chosen: so many digits of a program's SHA-256 are shown; the data set has all.
 SHOWN_HASH = 16
+
+#: Exit codes are those that `git bisect run` knows: 0 good, 1 bad, 125 neither; from 128 on it ends.
+BISECT = Template("""\
+#!/bin/sh
+# Is the commit that is checked out bad? Judged by the failure in this folder, with the firmware that it builds:
+#   git bisect start BAD GOOD
+#   git bisect run sh THIS_FILE build/robot.elf make
+# The first word is the firmware's file, the others build it (none: it is in the repository). A commit that does not
+# build, or whose program gives no verdict, is skipped.
+firmware=$$1
+shift
+[ $$# -eq 0 ] || "$$@" || exit 125
+[ -f "$$firmware" ] || exit 125
+run=$$(mktemp -d) || exit 130
+p2os run "$$(dirname "$$0")"/$scenario --firmware "$$firmware" --out "$$run/run"$trust
+found=$$?
+rm -rf "$$run"
+case $$found in
+    0 | 1) exit $$found ;;
+    126 | 127 | 130) exit 130 ;;
+    *) exit 125 ;;
+esac
+""")
 
 
 class Results:
@@ -79,7 +104,10 @@ class Results:
         with writing(self.folder / FAILURES, hint="make room, then --resume"):
             for row in rows:
                 if row.failing is not None:
-                    row.failing.trial.write(self.failure_folder(row))
+                    scenario = row.failing.trial.write(self.failure_folder(row))
+                    trust = " --trust" if row.failing.trial.trusted else ""
+                    text = BISECT.substitute(scenario=shlex.quote(scenario.name), trust=trust)
+                    (scenario.parent / "bisect.sh").write_text(text, encoding="utf-8")
 
     def failure_folder(self, row: PointRow) -> Path:
         """Return the folder of a point that failed."""
