@@ -18,17 +18,21 @@ from pathlib import Path
 from string import Template
 
 from robot_bench.campaign.campaign_file import Campaign
+from robot_bench.campaign.conduct import FAILURES as FAILING
 from robot_bench.campaign.conduct import CampaignProgress, PointFinding, PointRow, Run
 from robot_bench.campaign.last_moment import LastMoment
 from robot_bench.campaign.margin import goal_margin
 from robot_bench.campaign.reaching.source import SourceReached, source_reached
 from robot_bench.campaign.space import Space
 from robot_bench.campaign.variants.diversity import FailureSet
+from robot_bench.campaign.variants.mutation.interval import CONFIDENCE, share_interval
 from simbase.errors import MissingDependencyError
 from simbase.files import writing
 from simbase.installation import installed_version
 
 RESULTS, FAILURES = "results", "failures"
+#: chosen: so many points the space has, for an interval that does not end with a sample of all.
+MANY = 10**6
 #: chosen: so many digits of a program's SHA-256 are shown; the data set has all.
 SHOWN_HASH = 16
 
@@ -178,6 +182,23 @@ _TYPES = {
 }  # fmt: skip
 
 
+@dataclass(frozen=True, slots=True)
+class PointRate:
+    """How many of the points that were drawn from the whole space are so, one of each trace."""
+
+    count: int
+    of: int
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Between what the share of the whole space lies, 0 to 1, with `CONFIDENCE`."""
+        return share_interval(self.count, self.of, MANY)
+
+    def __str__(self) -> str:
+        low, high = (100 * bound for bound in self.bounds)
+        return f"{self.count} of {self.of}: {low:.1f} to {high:.1f} % ({CONFIDENCE:.0%} confidence)"
+
+
 @dataclass(slots=True, kw_only=True)
 class Whole:
     """What came of a campaign."""
@@ -207,6 +228,14 @@ class Whole:
         return len({row.cheap.outcome.sha256 for row in self.progress.rows})
 
     @property
+    def rates(self) -> Mapping[str, PointRate]:
+        """How many of the points fail, and are excused, by those that tell of the whole space; nothing without any."""
+        drawn = {row.cheap.outcome.sha256: row for row in reversed(self.progress.rows) if row.is_drawn}
+        known = [row for row in drawn.values() if row.finding is not PointFinding.ERROR]
+        counts = Counter("fail" if row.finding in FAILING else row.finding.value for row in known)
+        return {name: PointRate(counts[name], len(known)) for name in ("fail", "excused") if known}
+
+    @property
     def source(self) -> SourceReached | None:
         """What of the program's source the cheap runs have reached; None where there is no one program."""
         return source_reached(self.campaign.trial, self.progress.blocks, self.progress.ways)
@@ -224,6 +253,10 @@ class Whole:
             "search": self.campaign.search,
             "different_runs": self.different_runs,
             "points": len(self.progress.rows),
+            "rates": {
+                name: {"count": rate.count, "of": rate.of, "bounds": [round(bound, 6) for bound in rate.bounds]}
+                for name, rate in self.rates.items()
+            },
             "runs": self.progress.runs,
             "journal_left_out": {str(line): why for line, why in self.progress.left_out.items()},
             "virtual_s": self.progress.virtual_ns / 1e9,

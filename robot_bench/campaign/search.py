@@ -56,6 +56,9 @@ class Search(Protocol):
     def tell(self, answers: Sequence[PointResult]) -> None:
         """Take what came of the points that were asked for last, of all of them, in their order."""
 
+    def is_drawn(self, point: Point, /) -> bool:
+        """Tell whether a point was drawn evenly from the whole space, so that such points tell of all of it."""
+
 
 @dataclass(frozen=True, slots=True)
 class Problem:
@@ -75,8 +78,8 @@ class Problem:
 class Listed:
     """A list of points that is known beforehand."""
 
-    def __init__(self, points: Iterator[Point]) -> None:
-        self._points = points
+    def __init__(self, points: Iterator[Point], *, is_drawn: bool = True) -> None:
+        self._points, self._is_drawn = points, is_drawn
 
     def ask(self, count: int) -> list[Point]:
         """Return the next ones."""
@@ -84,6 +87,10 @@ class Listed:
 
     def tell(self, answers: Sequence[PointResult]) -> None:
         """Answers change nothing."""
+
+    def is_drawn(self, _point: Point, /) -> bool:
+        """All are, or none."""
+        return self._is_drawn
 
 
 def grid(problem: Problem) -> Search:
@@ -95,7 +102,7 @@ def grid(problem: Problem) -> Search:
     fixed = math.prod(count or 1 for count in problem.counts)
     steps = max(int((problem.runs / fixed) ** (1 / ranges) + 1e-9), 1) if ranges else 0
     axes = [[(step + 0.5) / (count or steps) for step in range(count or steps)] for count in problem.counts]
-    return Listed(itertools.product(*axes))
+    return Listed(itertools.product(*axes), is_drawn=False)
 
 
 def at_random(problem: Problem) -> Search:
@@ -153,6 +160,10 @@ class Tpe:
             self._study.tell(trial, answer.margin)
         self._asked = []
 
+    def is_drawn(self, _point: Point, /) -> bool:
+        """None is: each goes where others were near a failure."""
+        return False
+
 
 #: Diagonal: it learns the scale of each of fifty dimensions in few generations.
 ES = "sep_cma_es"
@@ -187,6 +198,10 @@ class Evolution:
     def tell(self, answers: Sequence[PointResult]) -> None:
         """Take margins, and where the robots ended."""
         self._scheduler.tell([-answer.margin for answer in answers], [list(answer.ended) for answer in answers])
+
+    def is_drawn(self, _point: Point, /) -> bool:
+        """None is: each goes where others were near a failure."""
+        return False
 
 
 @dataclass(slots=True)
@@ -230,6 +245,7 @@ class Guided:
         self._seen: set[object] = set()
         self._kept: list[_KeptPoint] = []
         self._asked: list[Point] = []
+        self._drawn: set[Point] = set()
         #: How many points have an answer, and how many of them were excused.
         self._told = self._excused = 0
 
@@ -245,7 +261,8 @@ class Guided:
             is_spent = excused >= self.EXCUSED_SHARE * (self._told + len(found))
             kept = [one for one in self._kept if not (is_spent and one.is_excused)]
             if not kept or self._count <= self._first or self._count % self.NEW_EVERY == 0:
-                found += self._fresh.ask(1)
+                found += (fresh := self._fresh.ask(1))
+                self._drawn.update(fresh)
             else:
                 chosen = min(kept, key=lambda one: one.uses)
                 chosen.uses += 1
@@ -262,6 +279,10 @@ class Guided:
             if not answer.reached <= self._seen:
                 self._seen |= answer.reached
                 self._kept.append(_KeptPoint(point, sorted(answer.acting) or range(len(point)), answer.is_excused))
+
+    def is_drawn(self, point: Point, /) -> bool:
+        """The new ones are."""
+        return point in self._drawn
 
     def _varied(self, point: Point, acting: Sequence[int]) -> Point:
         share = min(self.CHANGED / len(acting), 1.0)
