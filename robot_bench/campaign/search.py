@@ -247,7 +247,7 @@ class Guided:
         self._asked: list[Point] = []
         self._drawn: set[Point] = set()
         #: How many points have an answer, and how many of them were excused.
-        self._told = self._excused = 0
+        self._answered = self._excused = 0
 
     def ask(self, count: int) -> list[Point]:
         """Return points of the corpus; then variations of what was kept, and new points."""
@@ -258,7 +258,7 @@ class Guided:
                 found.append(self._corpus.pop(0))
                 continue
             self._count += 1
-            is_spent = excused >= self.EXCUSED_SHARE * (self._told + len(found))
+            is_spent = excused >= self.EXCUSED_SHARE * (self._answered + len(found))
             kept = [one for one in self._kept if not (is_spent and one.is_excused)]
             if not kept or self._count <= self._first or self._count % self.NEW_EVERY == 0:
                 found += (fresh := self._fresh.ask(1))
@@ -274,7 +274,7 @@ class Guided:
     def tell(self, answers: Sequence[PointResult]) -> None:
         """Keep what reached something new."""
         for point, answer in zip(self._asked, answers, strict=True):
-            self._told += 1
+            self._answered += 1
             self._excused += answer.is_excused
             if not answer.reached <= self._seen:
                 self._seen |= answer.reached

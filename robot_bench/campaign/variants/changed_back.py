@@ -12,7 +12,7 @@ Invariant: what is not shown by runs is said to be unknown, and never named as a
 import random
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from multiprocessing.connection import Connection
+from functools import partial
 from typing import cast
 
 from bluepill_sim.program.line_table import read_lines
@@ -24,7 +24,7 @@ from robot_bench.campaign.trial import Trial, TrialVerdict, unpacked
 from robot_bench.campaign.variants.fault_line import FaultLine, image_of
 from robot_bench.campaign.variants.mutation.base_run import BaseRun, base_run
 from robot_bench.campaign.variants.mutation.trial import Fate, MostCost, try_mutant
-from robot_bench.running.forks import begin, received
+from robot_bench.running.forks import in_fork
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S
 
@@ -57,13 +57,11 @@ class FailingRun:
 
     def __call__(self, change: Mutant) -> bool:
         """Tell whether it passes with a change; in a fork, since the bench is left changed."""
-        process, pipe = begin(self._work, change)
-        return received(process, pipe) is True
+        return in_fork(partial(self._passes, change)) is True
 
-    def _work(self, pipe: Connection, change: Mutant) -> None:
+    def _passes(self, change: Mutant) -> bool:
         cost = MostCost(MOST_TIMES, MOST_MORE_NS)
-        pipe.send(try_mutant(change, [self._base], self._clock, self._look, cost).fate is Fate.SURVIVED)
-        pipe.close()
+        return try_mutant(change, [self._base], self._clock, self._look, cost).fate is Fate.SURVIVED
 
 
 @dataclass(slots=True)

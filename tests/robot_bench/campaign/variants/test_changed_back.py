@@ -122,9 +122,9 @@ def test_of_the_first_failing_trial_a_run_tells_which_changes_make_it_pass(
     changes = mutants(image, run.ran)
     undoes = next(one for one in changes if mutated_file(content, one, image) == good.files["dodge.elf"])
     at = changes.index(undoes)
-    told = {one.address: run(one) for one in changes[at - 3 : at + 1]}
-    assert told.pop(undoes.address)
-    assert not any(told.values())
+    found = {one.address: run(one) for one in changes[at - 3 : at + 1]}
+    assert found.pop(undoes.address)
+    assert not any(found.values())
     assert run(undoes)  # no run has left anything behind
 
 
