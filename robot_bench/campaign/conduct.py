@@ -96,6 +96,8 @@ class PointRow:
     replay: Run | None = None
     #: How many blocks and states it reached that none before it had.
     new: int = 0
+    #: Whether it was drawn from the whole space, as of `Search.is_drawn`.
+    is_drawn: bool = False
 
     @property
     def runs(self) -> Sequence[Run]:
@@ -273,7 +275,13 @@ class Conduct:
         first = len(self.progress.rows) + 1
         cheap = self._do(RunPurpose.CHEAP, [one.trial(self.campaign.trial, self.campaign.cheap) for one in proposals])
         rows = [
-            PointRow(number, proposal, run, new=self._learn(number, run.outcome))
+            PointRow(
+                number,
+                proposal,
+                run,
+                new=self._learn(number, run.outcome),
+                is_drawn=self._search.is_drawn(proposal.point),
+            )
             for number, (proposal, run) in enumerate(zip(proposals, cheap, strict=True), first)
         ]
         left = max(self.campaign.budget.confirmations - self._confirmed, 0)
@@ -352,5 +360,5 @@ class Conduct:
         reached = frozenset[object](outcome.blocks | outcome.lines | outcome.transitions | ways)
         return PointResult(
             margin=NO_VERDICT if found is None else found, ended=ended, reached=reached,
-            acting=self.space.acting(row.proposal),
+            acting=self.space.acting(row.proposal), is_excused=bool(outcome.excused_goals),
         )  # fmt: skip

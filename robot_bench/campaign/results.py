@@ -2,6 +2,7 @@
 
     results/part-00001.parquet     the first batch: seed, parameters, outcome, margins, hashes, versions
     failures/0007/dodge.toml       point 7 as a scenario with its files, for `p2os run`
+    failures/0007/bisect.sh        judges the build of a commit by it, for `git bisect run`
 
 A part is written whole or not at all, and names the same rows whoever worked on them; the seconds of a processor and
 nothing else may differ.
@@ -14,21 +15,49 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from string import Template
 
 from robot_bench.campaign.campaign_file import Campaign
+from robot_bench.campaign.conduct import FAILURES as FAILING
 from robot_bench.campaign.conduct import CampaignProgress, PointFinding, PointRow, Run
 from robot_bench.campaign.last_moment import LastMoment
 from robot_bench.campaign.margin import goal_margin
 from robot_bench.campaign.reaching.source import SourceReached, source_reached
 from robot_bench.campaign.space import Space
 from robot_bench.campaign.variants.diversity import FailureSet
+from robot_bench.campaign.variants.mutation.interval import CONFIDENCE, share_interval
 from simbase.errors import MissingDependencyError
 from simbase.files import writing
 from simbase.installation import installed_version
 
 RESULTS, FAILURES = "results", "failures"
+#: chosen: so many points the space has, for an interval that does not end with a sample of all.
+MANY = 10**6
 #: chosen: so many digits of a program's SHA-256 are shown; the data set has all.
 SHOWN_HASH = 16
+
+#: Exit codes are those that `git bisect run` knows: 0 good, 1 bad, 125 neither; from 128 on it ends.
+BISECT = Template("""\
+#!/bin/sh
+# Is the commit that is checked out bad? Judged by the failure in this folder, with the firmware that it builds:
+#   git bisect start BAD GOOD
+#   git bisect run sh THIS_FILE build/robot.elf make
+# The first word is the firmware's file, the others build it (none: it is in the repository). A commit that does not
+# build, or whose program gives no verdict, is skipped.
+firmware=$$1
+shift
+[ $$# -eq 0 ] || "$$@" || exit 125
+[ -f "$$firmware" ] || exit 125
+run=$$(mktemp -d) || exit 130
+p2os run "$$(dirname "$$0")"/$scenario --firmware "$$firmware" --out "$$run/run"$trust
+found=$$?
+rm -rf "$$run"
+case $$found in
+    0 | 1) exit $$found ;;
+    126 | 127 | 130) exit 130 ;;
+    *) exit 125 ;;
+esac
+""")
 
 
 class Results:
@@ -79,7 +108,10 @@ class Results:
         with writing(self.folder / FAILURES, hint="make room, then --resume"):
             for row in rows:
                 if row.failing is not None:
-                    row.failing.trial.write(self.failure_folder(row))
+                    scenario = row.failing.trial.write(self.failure_folder(row))
+                    trust = " --trust" if row.failing.trial.trusted else ""
+                    text = BISECT.substitute(scenario=shlex.quote(scenario.name), trust=trust)
+                    (scenario.parent / "bisect.sh").write_text(text, encoding="utf-8")
 
     def failure_folder(self, row: PointRow) -> Path:
         """Return the folder of a point that failed."""
@@ -150,6 +182,23 @@ _TYPES = {
 }  # fmt: skip
 
 
+@dataclass(frozen=True, slots=True)
+class PointRate:
+    """How many of the points that were drawn from the whole space are so, one of each trace."""
+
+    count: int
+    of: int
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Between what the share of the whole space lies, 0 to 1, with `CONFIDENCE`."""
+        return share_interval(self.count, self.of, MANY)
+
+    def __str__(self) -> str:
+        low, high = (100 * bound for bound in self.bounds)
+        return f"{self.count} of {self.of}: {low:.1f} to {high:.1f} % ({CONFIDENCE:.0%} confidence)"
+
+
 @dataclass(slots=True, kw_only=True)
 class Whole:
     """What came of a campaign."""
@@ -179,6 +228,14 @@ class Whole:
         return len({row.cheap.outcome.sha256 for row in self.progress.rows})
 
     @property
+    def rates(self) -> Mapping[str, PointRate]:
+        """How many of the points fail, and are excused, by those that tell of the whole space; nothing without any."""
+        drawn = {row.cheap.outcome.sha256: row for row in reversed(self.progress.rows) if row.is_drawn}
+        known = [row for row in drawn.values() if row.finding is not PointFinding.ERROR]
+        counts = Counter("fail" if row.finding in FAILING else row.finding.value for row in known)
+        return {name: PointRate(counts[name], len(known)) for name in ("fail", "excused") if known}
+
+    @property
     def source(self) -> SourceReached | None:
         """What of the program's source the cheap runs have reached; None where there is no one program."""
         return source_reached(self.campaign.trial, self.progress.blocks, self.progress.ways)
@@ -196,6 +253,10 @@ class Whole:
             "search": self.campaign.search,
             "different_runs": self.different_runs,
             "points": len(self.progress.rows),
+            "rates": {
+                name: {"count": rate.count, "of": rate.of, "bounds": [round(bound, 6) for bound in rate.bounds]}
+                for name, rate in self.rates.items()
+            },
             "runs": self.progress.runs,
             "journal_left_out": {str(line): why for line, why in self.progress.left_out.items()},
             "virtual_s": self.progress.virtual_ns / 1e9,

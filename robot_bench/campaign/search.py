@@ -43,6 +43,8 @@ class PointResult:
     reached: frozenset[object] = field(default_factory=frozenset)
     #: Of which dimensions the coordinates had an effect; none is said: of all.
     acting: frozenset[int] = frozenset()
+    #: It missed goals that do not judge it: it shows less than others.
+    is_excused: bool = False
 
 
 class Search(Protocol):
@@ -53,6 +55,9 @@ class Search(Protocol):
 
     def tell(self, answers: Sequence[PointResult]) -> None:
         """Take what came of the points that were asked for last, of all of them, in their order."""
+
+    def is_drawn(self, point: Point, /) -> bool:
+        """Tell whether a point was drawn evenly from the whole space, so that such points tell of all of it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,8 +78,8 @@ class Problem:
 class Listed:
     """A list of points that is known beforehand."""
 
-    def __init__(self, points: Iterator[Point]) -> None:
-        self._points = points
+    def __init__(self, points: Iterator[Point], *, is_drawn: bool = True) -> None:
+        self._points, self._is_drawn = points, is_drawn
 
     def ask(self, count: int) -> list[Point]:
         """Return the next ones."""
@@ -82,6 +87,10 @@ class Listed:
 
     def tell(self, answers: Sequence[PointResult]) -> None:
         """Answers change nothing."""
+
+    def is_drawn(self, _point: Point, /) -> bool:
+        """All are, or none."""
+        return self._is_drawn
 
 
 def grid(problem: Problem) -> Search:
@@ -93,7 +102,7 @@ def grid(problem: Problem) -> Search:
     fixed = math.prod(count or 1 for count in problem.counts)
     steps = max(int((problem.runs / fixed) ** (1 / ranges) + 1e-9), 1) if ranges else 0
     axes = [[(step + 0.5) / (count or steps) for step in range(count or steps)] for count in problem.counts]
-    return Listed(itertools.product(*axes))
+    return Listed(itertools.product(*axes), is_drawn=False)
 
 
 def at_random(problem: Problem) -> Search:
@@ -151,6 +160,10 @@ class Tpe:
             self._study.tell(trial, answer.margin)
         self._asked = []
 
+    def is_drawn(self, _point: Point, /) -> bool:
+        """None is: each goes where others were near a failure."""
+        return False
+
 
 #: Diagonal: it learns the scale of each of fifty dimensions in few generations.
 ES = "sep_cma_es"
@@ -186,12 +199,29 @@ class Evolution:
         """Take margins, and where the robots ended."""
         self._scheduler.tell([-answer.margin for answer in answers], [list(answer.ended) for answer in answers])
 
+    def is_drawn(self, _point: Point, /) -> bool:
+        """None is: each goes where others were near a failure."""
+        return False
+
+
+@dataclass(slots=True)
+class _KeptPoint:
+    """A point that reached something new."""
+
+    point: Point
+    #: Its dimensions that had an effect.
+    acting: Sequence[int]
+    is_excused: bool
+    #: How often it was varied.
+    uses: int = 0
+
 
 class Guided:
     """Keeps points that reached something new, and varies them; begins with a corpus, then with points spread evenly.
 
     A kept point is varied in a few of its coordinates that had an effect, the least tried ones first; each fourth point
-    is a new one.
+    is a new one. What is rarely drawn reaches something new as often as not, so that its variations would be most of
+    the points: those that are excused, and show the less, are varied only while they are few.
     """
 
     #: chosen: so many coordinates change at once on average.
@@ -202,6 +232,8 @@ class Guided:
     NEW_EVERY = 4
     #: chosen: at most so much of the points is spent on the corpus, the newest of it.
     CORPUS_SHARE = 0.5
+    #: chosen: no point that was excused is varied where so much of all were, or may be.
+    EXCUSED_SHARE = 0.05
 
     def __init__(self, problem: Problem) -> None:
         self._random = random.Random(problem.seed)
@@ -211,33 +243,46 @@ class Guided:
         self._first = problem.batch
         self._count = 0
         self._seen: set[object] = set()
-        #: Kept points, each with its dimensions that acted, and how often it was varied.
-        self._kept: list[tuple[Point, Sequence[int], list[int]]] = []
+        self._kept: list[_KeptPoint] = []
         self._asked: list[Point] = []
+        self._drawn: set[Point] = set()
+        #: How many points have an answer, and how many of them were excused.
+        self._answered = self._excused = 0
 
     def ask(self, count: int) -> list[Point]:
         """Return points of the corpus; then variations of what was kept, and new points."""
         found: list[Point] = []
+        excused = self._excused
         for _ in range(count):
             if self._corpus:
                 found.append(self._corpus.pop(0))
                 continue
             self._count += 1
-            if not self._kept or self._count <= self._first or self._count % self.NEW_EVERY == 0:
-                found += self._fresh.ask(1)
+            is_spent = excused >= self.EXCUSED_SHARE * (self._answered + len(found))
+            kept = [one for one in self._kept if not (is_spent and one.is_excused)]
+            if not kept or self._count <= self._first or self._count % self.NEW_EVERY == 0:
+                found += (fresh := self._fresh.ask(1))
+                self._drawn.update(fresh)
             else:
-                point, acting, uses = min(self._kept, key=lambda kept: kept[2][0])
-                uses[0] += 1
-                found.append(self._varied(point, acting))
+                chosen = min(kept, key=lambda one: one.uses)
+                chosen.uses += 1
+                excused += chosen.is_excused  # as it may well be
+                found.append(self._varied(chosen.point, chosen.acting))
         self._asked = found
         return found
 
     def tell(self, answers: Sequence[PointResult]) -> None:
         """Keep what reached something new."""
         for point, answer in zip(self._asked, answers, strict=True):
+            self._answered += 1
+            self._excused += answer.is_excused
             if not answer.reached <= self._seen:
                 self._seen |= answer.reached
-                self._kept.append((point, sorted(answer.acting) or range(len(point)), [0]))
+                self._kept.append(_KeptPoint(point, sorted(answer.acting) or range(len(point)), answer.is_excused))
+
+    def is_drawn(self, point: Point, /) -> bool:
+        """The new ones are."""
+        return point in self._drawn
 
     def _varied(self, point: Point, acting: Sequence[int]) -> Point:
         share = min(self.CHANGED / len(acting), 1.0)

@@ -217,6 +217,10 @@ kind = "clearance"
 ${noisy}least_m = 0.05
 ends_run = "missed"
 
+[[goal]]                # it drives at all, link or no link
+kind = "min_distance"
+${stuck}distance_m = 0.5
+
 [[goal]]                # where it sees free floor it neither stands nor turns on the spot
 kind = "moves_on"
 ${stuck}way_m = 0.5

@@ -150,14 +150,25 @@ class Trial:
     def write(self, folder: Path) -> Path:
         """Write scenario and files into a folder; return the scenario's path, for `p2os run`.
 
+        Goals that do not judge it say so there, since a scenario does not know what disturbs it.
+
         Raises:
             FileError: The folder cannot be written, or a name leads out of it.
         """
         path = refuse_elsewhere(folder, f"{self.name}.toml")  # a trace may say what it is called
         with writing(path, hint="name another folder"):
             _write_files(self.files, folder)
-            path.write_text(self.text, encoding="utf-8")
+            path.write_text(replace(self, table=self._with_excused()).text, encoding="utf-8")
         return path
+
+    def _with_excused(self) -> Table:
+        """Return the tables, in which goals that do not judge it say so."""
+        by = self.disturbed_by
+        goals = [
+            {**goal, "excused": True} if by & set(cast("Sequence[str]", goal.get("excused_by", ()))) else goal
+            for goal in tables_of(self.table, "goal")
+        ]
+        return {**self.table, "goal": goals} if goals else self.table
 
     def scenario(self, folder: Path) -> Scenario:
         """Return the scenario, its files being in a folder.
@@ -444,7 +455,8 @@ def _goals(bench: Bench, end: Nanos, robot: str, disturbed_by: frozenset[str]) -
         found.append(GoalResult(
             kind=goal.kind, wanted=goal.wanted, met=None if one.is_open else outcome.met, says=outcome.says,
             robustness=None if by is None else round(by, 9), unit="" if by is None else outcome.unit, robot=robot,
-            is_excused=not one.is_open and not outcome.met and bool(goal.excused_by & disturbed_by),
+            is_excused=not one.is_open and not outcome.met
+            and (goal.is_excused or bool(goal.excused_by & disturbed_by)),
         ))  # fmt: skip
     return found
 

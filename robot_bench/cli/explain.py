@@ -1,6 +1,7 @@
 """`p2os explain`: why a run failed, from its trace and a replay of its chip."""
 
 import json
+import time
 from dataclasses import asdict, replace
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -14,13 +15,8 @@ from p2os.transport.wall_clock import wall_clock
 from robot_bench.campaign.campaign_file import RunLimits
 from robot_bench.campaign.journal import NAME as JOURNAL
 from robot_bench.campaign.variants.against import Other
-from robot_bench.campaign.variants.fault_line import (
-    ChangedBack,
-    FaultLine,
-    by_version,
-    failing_and_passing,
-    passes,
-)
+from robot_bench.campaign.variants.changed_back import ChangedBack, FailingRun, failing_and_passing, passes
+from robot_bench.campaign.variants.fault_line import FaultLine, by_version
 from robot_bench.campaign.variants.shrinking.kept import trial_of_run
 from robot_bench.campaign.whole import points_of
 from robot_bench.campaign.workers.processes import Processes
@@ -49,7 +45,7 @@ goals; GOAL is a part of the failure's text, where there are several.
 
 With a version that passes (--against) the source line is named by which the two differ. RUN may be the folder of a
 campaign, too: without a version that passes, each instruction that ran is then changed, one at a time, and a line is
-named where only its changes make the failing point pass, and no passing one fail.
+named where only its changes make the failing points pass, and no passing one fail.
 
 Exit code: 0 explained, or nothing failed; 1 the cause is not known; 2 wrong usage.
 
@@ -115,12 +111,13 @@ def _line_of_campaign(folder: Path, other: Other | None, minutes: float) -> Faul
     """Return the source line that makes a point of a campaign fail, or that it is not known."""
     failing, passing = failing_and_passing(points_of(folder, trust=False))
     if other is not None:
-        return by_version(failing, other)
+        return by_version(failing[0], other)
     until = wall_clock() + round(minutes * 60 * NS_PER_S)
     with RunDisplay(is_shown=False) as display:
         workers = Processes(1, RunLimits(), display.raise_if_interrupted)
         try:
-            changed = ChangedBack(failing, passing, lambda trial: passes(trial, workers))
+            first = FailingRun(failing[0], time.process_time_ns, display.raise_if_interrupted)
+            changed = ChangedBack(failing, passing, first.ran, first, lambda trial: passes(trial, workers))
             with counting_bar("changes", changed.count) as tell_bar:
                 for tried in changed.look():
                     tell_bar(tried, f"{len(changed.found)} make it pass")

@@ -42,6 +42,16 @@ def received(process: ForkProcess, pipe: Connection) -> Any:  # whatever was sen
         process.join()
 
 
+def in_fork(work: Callable[[], object]) -> Any:  # what the work returns
+    """Do a piece of work in a fork, and return what it returns; None where the fork ended before."""
+    return received(*begin(_sent, work))
+
+
+def _sent(pipe: Connection, work: Callable[[], object]) -> None:
+    pipe.send(work())
+    pipe.close()
+
+
 def how_it_ended(process: ForkProcess) -> str:
     """Return how a fork ended that has sent nothing, in words."""
     code = process.exitcode or 0

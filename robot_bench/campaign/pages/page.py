@@ -105,6 +105,8 @@ def _figures(whole: Whole) -> Iterator[tuple[str, str]]:
     if whole.failures:
         yield from FailureSet.of(whole.progress.rows).words().items()
     yield "different runs, by their traces", str(whole.different_runs)
+    for name, rate in whole.rates.items():
+        yield f"{name}, of the different runs at points drawn from the whole space", str(rate)
 
 
 def _reached(whole: Whole) -> Iterator[tuple[str, str]]:

@@ -157,6 +157,10 @@ class HasReasonTable(Record):
 
     motion: Annotated[str, Key(choices=MOTIONS, doc="what begins")]
     before: _Before = ()
+    given: Annotated[
+        tuple[str, ...], Key(kind="list", doc="judges only where each of these pins was high so long")
+    ] = ()
+    row: Annotated[int, Key(least=0, most=1000, doc="so many in a row need no reason")] = 0
     needs: Annotated[tuple[tuple[str, ...], ...], Key(kind="list", doc="lists of pins, of each of which one was high")]
     within_s: Annotated[float, Key(above=0, most=LONGEST_S, doc="so long before, or since then")]
 
@@ -169,19 +173,25 @@ class HasReasonTable(Record):
 class HasReason(MotorWatch):
     """A motion begins only where pins were high just before."""
 
-    STATE = ("_motion", "_was_high")
+    STATE = ("_motion", "_was_high", "_rose", "_row")
 
     def __init__(self, table: HasReasonTable) -> None:
-        super().__init__(*(pin for one in table.needs for pin in one))
+        super().__init__(*(pin for one in table.needs for pin in one), *table.given)
         self._table, self._within = table, nanos(table.within_s)
         self._motion: str = "stand"
-        #: Pin → until when it was high.
+        #: Pin → when it last changed, and when it last became high.
         self._was_high: dict[str, Nanos] = {}
+        self._rose: dict[str, Nanos] = {}
+        #: How many began without a reason since one had it.
+        self._row = 0
 
     def feed(self, event: Event) -> GoalOutcome | None:
         outcome = super().feed(event)
         if isinstance(event, PinEdge):
-            self._was_high |= {pin: event.t for pin, wire in self._names.items() if wire == event.wire}
+            changed = {pin: event.t for pin, wire in self._names.items() if wire == event.wire}
+            self._was_high |= changed
+            if event.level:
+                self._rose |= changed
         return outcome
 
     def stayed(self, since: Nanos, until: Nanos) -> None:
@@ -190,8 +200,11 @@ class HasReason(MotorWatch):
         if self._motion == before or self._motion != table.motion or (table.before and before not in table.before):
             return
         missing = [one for one in table.needs if not any(self._was_high_at(pin, since) for pin in one)]
-        if missing and not self._failure:
+        is_given = all(self.is_high(pin) and since - self._rose.get(pin, 0) >= self._within for pin in table.given)
+        self._row = self._row + 1 if missing and is_given else 0
+        if self._row > table.row and not self._failure:
             self._failure = f"{table.motion} began at {seconds(since)} with no pin of {', '.join(missing[0])} high"
+            self._failure += f", {self._row} times in a row" if table.row else ""
 
     def _was_high_at(self, pin: str, at: Nanos) -> bool:
         return self.is_high(pin) or (pin in self._was_high and at - self._was_high[pin] <= self._within)
@@ -276,9 +289,12 @@ KINDS: Mapping[str, GoalKind] = {
     ),
     "has_reason": GoalKind(
         HasReasonTable,
-        lambda table: f"begins motion {table.motion}{_after(table.before)} only with "
-        + " and ".join(f"one of {', '.join(one)}" for one in table.needs) + " high",
-        HasReason, doc="a motion begins only where of each list one pin was high until so long before",
+        lambda table: f"{'with ' + ', '.join(table.given) + ' high ' if table.given else ''}begins motion "
+        f"{table.motion}{_after(table.before)} only with "
+        + " and ".join(f"one of {', '.join(one)}" for one in table.needs) + " high"
+        + (f", but for {table.row} in a row" if table.row else ""),
+        HasReason, doc="a motion begins only where of each list one pin was high until so long before; with `given`, "
+        "only where these pins have been high for so long is it judged; so many in a `row` need no reason",
         holds_anywhere=True,
     ),
     "lasts": GoalKind(

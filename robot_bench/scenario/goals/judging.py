@@ -34,6 +34,7 @@ class GoalTable(Record):
     excused_by: Annotated[tuple[str, ...], Key(
         kind="list", doc="names of what a campaign draws or disturbs by: a run with one of these it does not judge"
     )] = ()  # fmt: skip
+    excused: Annotated[bool, Key(doc="whether it is such a run, as the scenario of a campaign's failure says")] = False
 
     def __post_init__(self) -> None:
         if not all(isinstance(one, str) for one in self.excused_by):
@@ -51,6 +52,8 @@ class Goal:
     ends_run: str | None = None
     #: Names of what excuses from it, in a campaign.
     excused_by: frozenset[str] = frozenset()
+    #: Whether it does not judge the run, for one of these.
+    is_excused: bool = False
 
     @property
     def definition(self) -> GoalKind:
@@ -80,7 +83,7 @@ class Judgement:
 
     met: list[str]
     missed: list[str]
-    #: The run was too short to judge them.
+    #: The run was too short to judge them, or has what excuses from them.
     not_judged: list[str]
 
 
@@ -125,7 +128,9 @@ def load_goal(table: Table, where: Where, wires: Wires | None = None) -> Goal:
             made = replace(made, wires=wires)
         kind.watch(made)
     excused_by = frozenset(common.excused_by)
-    return Goal(kind=common.kind, table=made, ends_run=common.ends_run, excused_by=excused_by)
+    return Goal(
+        kind=common.kind, table=made, ends_run=common.ends_run, excused_by=excused_by, is_excused=common.excused
+    )  # fmt: skip
 
 
 def _check(rest: Table) -> None:
@@ -256,6 +261,8 @@ class GoalJudge(Stateful):
                 found.not_judged.append(f"{one.goal.wanted}: not judged before {end.planned_ns / NS_PER_S:g} s")
             elif one.outcome.met:
                 found.met.append(one.goal.wanted)
+            elif one.goal.is_excused:
+                found.not_judged.append(f"{one.goal.wanted}: excused, {one.outcome.says}")
             else:
                 found.missed.append(f"{one.goal.kind}: {one.outcome.says}")
         return found

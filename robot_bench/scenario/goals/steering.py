@@ -149,6 +149,60 @@ class TurnsAway(Watch):
         return GoalOutcome(met=False, says=says, robustness=min(by, -1 / (self._most + 1)), unit=ALLOWED)
 
 
+class TurnsLongTable(Record):
+    """Turns that belong together, and what one of them has to be."""
+
+    row: Annotated[int, Key(least=1, most=1000, doc="of so many in a row one is long")]
+    way_m: Annotated[float, Key(above=0, most=100, doc="what begins after less way than that belongs to the last one")]
+    least_deg: Annotated[float, Key(above=0, most=3600, doc="so far a long one turns")]
+
+
+class TurnsLong(Watch):
+    """Of so many turns on the spot, each soon after another, one is long: it does not swing to and fro in a corner."""
+
+    STATE = ("_last", "_way_um", "_is_soon", "_turned", "_row", "_worst", "_worst_at")
+    kinds = (Pose,)
+
+    def __init__(self, table: TurnsLongTable) -> None:
+        self._table = table
+        self._last: Pose | None = None
+        #: Since the last turn; far enough where there was none, or it went back since.
+        self._way_um: float = math.inf
+        #: Of the turn that goes on: whether it belongs to the one before, and by how much it has turned, radians.
+        self._is_soon = False
+        self._turned: float | None = None
+        self._row = self._worst = 0
+        self._worst_at: Pose | None = None
+
+    def feed(self, event: Event) -> GoalOutcome | None:
+        if not isinstance(event, Pose):
+            return None
+        last, self._last = self._last, event
+        if last is None:
+            return None
+        if _spins(event):
+            if self._turned is None:
+                self._is_soon, self._turned = self._way_um < self._table.way_m * MICRO, 0.0
+            self._turned += math.remainder(event.heading_rad - last.heading_rad, math.tau)
+            return None
+        if self._turned is not None:
+            is_short = self._is_soon and abs(self._turned) < math.radians(self._table.least_deg)
+            self._row, self._turned, self._way_um = self._row + 1 if is_short else 0, None, 0.0
+            if self._row > self._worst:
+                self._worst, self._worst_at = self._row, event
+                if self._row == self._table.row:
+                    return self.finish(event.t)
+        self._way_um += math.hypot(event.x - last.x, event.y - last.y) if event.speed_mps >= -DRIVES_MPS else math.inf
+        return None
+
+    def finish(self, end: Nanos) -> GoalOutcome:
+        by = 1 - self._worst / self._table.row
+        if by > 0 or self._worst_at is None:
+            return GoalOutcome(met=True, robustness=by, unit=ALLOWED)
+        says = f"{self._worst} turns in a row were short, the last at {_place(self._worst_at)}"
+        return GoalOutcome(met=False, says=says, robustness=min(by, -1 / self._table.row), unit=ALLOWED)
+
+
 class _NotLong(Watch):
     """Something that must not last: the longest time from pose to pose is measured."""
 
@@ -278,6 +332,13 @@ KINDS: Mapping[str, GoalKind] = {
         lambda table: f"turns on the spot away from what stands on one side, but for {table.row} in a row",
         TurnsAway, doc="a turn on the spot that begins with something nearer than `near_m` on one side and the other "
         "free beyond `free_m` goes to the free one",
+    ),
+    "turns_long": GoalKind(
+        TurnsLongTable,
+        lambda table: f"of {table.row} turns on the spot with less than {table.way_m:g} m between them turns "
+        f"{table.least_deg:g} degrees once",
+        TurnsLong, doc="of `row` turns on the spot, each begun after less than `way_m` forward, one is long: it does "
+        "not swing to and fro in a corner", holds_anywhere=True,
     ),
     "steers_away": GoalKind(
         SteersAwayTable,

@@ -285,6 +285,38 @@ def test_points_that_were_one_run_are_said_to_be(tmp_path: Path) -> None:
     assert whole.as_json()["different_runs"] == 1
 
 
+def test_rates_are_of_different_runs_at_drawn_points_and_have_an_interval(tmp_path: Path) -> None:
+    whole = carried(begun(tmp_path), tmp_path / "kept", Shuffled(1))
+    rows = whole.progress.rows
+    assert all(row.is_drawn for row in rows)
+    failing = len({row.cheap.outcome.sha256 for row in whole.failures})
+    rate = whole.rates["fail"]
+    assert (rate.count, rate.of) == (failing, whole.different_runs)
+    assert 0 < rate.bounds[0] < failing / whole.different_runs < rate.bounds[1] < 1
+    page = (tmp_path / "kept/report.html").read_text(encoding="utf-8")
+    assert f"{failing} of {whole.different_runs}: " in page
+    whole.progress.rows += rows  # the same runs again
+    assert whole.rates["fail"] == rate
+    whole.progress.rows[:] = [replace(row, is_drawn=False) for row in rows]
+    assert whole.rates == {}
+
+
+@pytest.mark.parametrize(
+    ("search", "drawn"),
+    [("random", 16), ("sobol", 16), ("latin-hypercube", 16), ("grid", 0), ("tpe", 0), ("coverage", 7)],
+)  # fmt: skip
+def test_points_that_go_where_others_led_are_no_sample(search: str, drawn: int) -> None:
+    if search == "tpe":
+        pytest.importorskip("optuna")
+    pytest.importorskip("scipy")
+    found = SEARCHES[search](Problem(counts=(0, 0), is_ordered=(True, True), runs=16, batch=4, seed=1))
+    points = []
+    for _ in range(4):
+        points += (asked := found.ask(4))
+        found.tell([PointResult(margin=1.0, reached=frozenset({point})) for point in asked])
+    assert sum(map(found.is_drawn, points)) == drawn
+
+
 def test_each_failure_is_a_folder_that_runs_again_with_its_hash(tmp_path: Path) -> None:
     workers = Shuffled(1)
     whole = carried(begun(tmp_path), tmp_path / "kept", workers)

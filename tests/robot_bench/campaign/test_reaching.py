@@ -225,6 +225,26 @@ def test_only_what_acted_is_varied(monkeypatch: pytest.MonkeyPatch) -> None:
     assert {at for point in varied for at in range(6) if point[at] != first[at]} == {2, 4}
 
 
+@pytest.mark.parametrize(("is_excused", "least", "most"), [(False, 0.5, 1.0), (True, 0.02, 0.07)])
+def test_what_is_excused_is_varied_only_while_it_is_little(is_excused: bool, least: float, most: float) -> None:
+    pytest.importorskip("scipy")
+    search = Guided(Problem(counts=(0, 0), is_ordered=(True, True), runs=240, batch=16, seed=1))
+    asked = excused = 0
+    for _ in range(15):
+        points = search.ask(16)
+        # As a thing that is drawn in few of the points: it reaches something new each time, and stays in variations.
+        answers = [
+            PointResult(
+                margin=1.0, reached=frozenset({point if point[0] > 0.97 else 0}), acting=frozenset({1}),
+                is_excused=is_excused and point[0] > 0.97,
+            )
+            for point in points
+        ]  # fmt: skip
+        search.tell(answers)
+        asked, excused = asked + 16, excused + sum(point[0] > 0.97 for point in points)
+    assert least <= excused / asked <= most
+
+
 def test_a_campaign_goes_on_with_the_corpus_that_it_was_begun_with(tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text(FILE)
     write_corpus(tmp_path / "mine.jsonl", [{"start.x_m": 0.25}])
@@ -323,6 +343,24 @@ def test_a_goal_that_does_not_judge_is_told_apart() -> None:
     assert outcome_of_plain(json.loads(json.dumps(plain_of(excused)))) == excused
     assert row_of(excused).finding is PointFinding.EXCUSED
     assert row_of(judged).finding is PointFinding.UNCONFIRMED
+
+
+def test_the_scenario_of_a_failure_says_which_goals_do_not_judge_it(dodge: Trial, tmp_path: Path) -> None:
+    goals = [
+        {"kind": "min_distance", "distance_m": 50.0, "excused_by": ["a post"]},
+        {"kind": "usart_lacks", "text": "dodge", "excused_by": ["a wall"]},
+    ]
+    trial = replace(dodge.with_lists(goal=goals), disturbed_by=frozenset({"a post"}))
+    path = trial.write(tmp_path / "kept")
+    again = trial_of(str(path))
+    found = run_trial(again)
+    assert found == run_trial(trial)
+    assert [goal.kind for goal in found.excused_goals] == ["min_distance"]
+    bench = bench_of(again.scenario(tmp_path / "kept"))
+    bench.run_until(bench.end)
+    judged = bench.judge()
+    assert [one.partition(":")[0] for one in judged.missed] == ["usart_lacks"]
+    assert "excused, " in judged.not_judged[0]
 
 
 def test_a_goal_may_be_excused_by_what_is_drawn_and_of_the_scenarios_own_some_are_kept(tmp_path: Path) -> None:

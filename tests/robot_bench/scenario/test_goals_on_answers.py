@@ -93,6 +93,27 @@ def test_goal_has_reason_wants_one_of_each_list_and_only_after_some_motions() ->
     assert not outcome("has_reason", run, motion="turn", before=["back"], needs=sides, within_s=0.3).met
 
 
+@pytest.mark.parametrize(("since", "met"), [(300 * MS - 1, True), (300 * MS, False)])
+def test_goal_has_reason_judges_only_what_was_given_for_so_long(since: int, met: bool) -> None:
+    run = flat(motors(0, 2, -2), pin(S, "DD3"), motors(S + since, 2, 2, skew=0))
+    table = {"motion": "forward", "before": ["turn"], "given": ["DD3"], "needs": [["DD6"]], "within_s": 0.3}
+    assert outcome("has_reason", run, **table).met is met
+    gone = flat(motors(0, 2, -2), pin(S, "DD3"), pin(2 * S, "DD3", False), motors(2 * S + MS, 2, 2))
+    assert outcome("has_reason", gone, **table).met
+
+
+def test_goal_has_reason_allows_so_many_in_a_row() -> None:
+    begins = [[*motors(n * S, 2, -2), *motors(n * S + S // 2, 2, 2)] for n in range(1, 7)]
+    table = {"motion": "forward", "before": ["turn"], "needs": [["DD6"]], "within_s": 0.1, "row": 2}
+    assert outcome("has_reason", flat(*begins[:2]), **table).met
+    third = outcome("has_reason", flat(*begins[:3]), **table)
+    assert not third.met
+    assert third.says == "forward began at 3.500 s with no pin of DD6 high, 3 times in a row"
+    reason = [pin(3 * S, "DD6"), pin(4 * S, "DD6", False)]
+    assert outcome("has_reason", flat(*begins[:2], reason[0], begins[2], reason[1], *begins[3:5]), **table).met
+    assert not outcome("has_reason", flat(*begins[:2], reason[0], begins[2], reason[1], *begins[3:6]), **table).met
+
+
 @pytest.mark.parametrize(("t", "met"), [(S - 1, False), (S, True), (2 * S, True), (2 * S + 1, False)])
 def test_goal_lasts_no_shorter_and_no_longer(t: int, met: bool) -> None:
     run = flat(motors(0, 2, 2, skew=0), motors(S, -2, -2, skew=0), motors(S + t, 2, -2, skew=0))

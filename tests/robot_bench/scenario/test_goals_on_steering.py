@@ -71,6 +71,36 @@ def test_goal_turns_away_counts_those_in_a_row() -> None:
     assert turns_away(run, row=1).robustness == -0.5
 
 
+def turned(t: int, degrees: float, x_m: float = 0.0) -> list[Event]:
+    """Return a turn on the spot by so much, then a pose that stands."""
+    ends = [at(t + n * 100 * MS, x_m, deg=degrees * n / 10, left=-0.12, right=0.12) for n in range(11)]
+    return [at(t - 1, x_m), *ends, at(t + S + 50 * MS, x_m, deg=degrees)]
+
+
+def turns_long(*turns: list[Event], **arguments: Any) -> Any:
+    given = {"row": 3, "way_m": 0.3, "least_deg": 120, **arguments}
+    return outcome("turns_long", [one for turn in turns for one in turn], **given)
+
+
+@pytest.mark.parametrize(("last_deg", "met"), [(119.0, False), (121.0, True), (-121.0, True)])
+def test_goal_turns_long_wants_one_of_a_row_to_be_long(last_deg: float, met: bool) -> None:
+    rows = [turned(2 * n * S, 60.0) for n in (1, 2, 3)]  # the first belongs to none before
+    assert turns_long(*rows).met
+    found = turns_long(*rows, turned(8 * S, last_deg))
+    assert found.met is met
+    assert met or found.says == "3 turns in a row were short, the last at 9.050 s, x 0.00 m, y 0.00 m"
+    assert found.robustness == pytest.approx(1 - 2 / 3 if met else -1 / 3)
+    assert turns_long(*rows, turned(8 * S, last_deg), row=4).met
+
+
+@pytest.mark.parametrize(("x_m", "met"), [(0.299, False), (0.3, True)])
+def test_goal_turns_long_counts_what_begins_after_little_way(x_m: float, met: bool) -> None:
+    rows = [turned(2 * n * S, 60.0) for n in (1, 2, 3)]
+    assert turns_long(*rows, turned(8 * S, 60.0, x_m)).met is met
+    back = [at(7 * S + 500 * MS, -0.01, left=-0.1, right=-0.1)]
+    assert turns_long(*rows, back, turned(8 * S, 60.0)).met  # what follows a way back is another turn
+
+
 @pytest.mark.parametrize(("kind", "wheels", "ranges"), [
     ("steers_away", (0.1, 0.16), (NEAR, FREE)), ("steers_away", (0.16, 0.1), (FREE, NEAR)),
     ("no_idle_turn", (-0.1, 0.1), (801, 801)), ("no_idle_turn", (0.1, -0.1), (801, 801)),

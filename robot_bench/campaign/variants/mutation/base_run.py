@@ -27,7 +27,7 @@ STEPS = 64
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BaseRun:
-    """A run that met all its goals, and the bench that can go back into it."""
+    """A run, and the bench that can go back into it."""
 
     bench: Bench
     trace_sha256: str
@@ -36,7 +36,8 @@ class BaseRun:
     #: Time → state of the bench.
     states: dict[Nanos, object]
     coverage: Coverage
-    #: What it took, in nanoseconds of the clock given.
+    #: How long it was, and what it took, in nanoseconds of the clock given.
+    ran_ns: Nanos
     cost_ns: int
 
     @property
@@ -45,16 +46,20 @@ class BaseRun:
         return cast("BluePill", self.bench.chip)
 
 
-def base_run(scenario: Scenario, clock: Clock, look: Callable[[], None] = lambda: None) -> BaseRun:
+def base_run(
+    scenario: Scenario, clock: Clock, look: Callable[[], None] = lambda: None, *, is_sound: bool = True
+) -> BaseRun:  # fmt: skip
     """Run a scenario with its own program.
 
     Args:
         scenario: One robot, with goals.
         clock: What the cost is measured by.
         look: Called between steps; may raise to end it.
+        is_sound: Whether it has to meet all goals.
 
     Raises:
-        UsageError: It has several robots or no goals, or misses a goal: then no mutant can be told from it.
+        UsageError: It has several robots or no goals, or misses a goal that it has to meet: then no mutant can be told
+            from it.
         P2osError, BluePillError: As of `Bench`.
     """
     if scenario.robots:
@@ -77,14 +82,16 @@ def base_run(scenario: Scenario, clock: Clock, look: Callable[[], None] = lambda
         if new:
             states[at] = state
             first_ns |= dict.fromkeys(new, at)
+        if bench.now == at:  # a goal has ended it
+            break
     judged = bench.judge()
     failures = [*([board.verdict] if bench.chip.has_died else []), *judged.missed]
-    if failures:
+    if failures and is_sound:
         raise UsageError(
             f"{scenario.name} fails with the program itself: {failures[0]}",
             hint="p2os run shows it; mend that first",
         )
     return BaseRun(
         bench=bench, trace_sha256=bench.trace.sha256, first_ns=first_ns, states=states, coverage=coverage,
-        cost_ns=clock() - began,
+        ran_ns=max(bench.now, 1), cost_ns=clock() - began,
     )  # fmt: skip

@@ -27,6 +27,18 @@ _LOOK_NS: Nanos = 500 * NS_PER_MS
 MOST_TIMES, MOST_MORE_NS = 20, 10 * NS_PER_S
 
 
+@dataclass(frozen=True, slots=True)
+class MostCost:
+    """What a mutant may cost: so many times what the program costs in that time, and so much more."""
+
+    times: int = MOST_TIMES
+    more_ns: int = MOST_MORE_NS
+
+    def of(self, base: BaseRun, ran_ns: Nanos) -> int:
+        """Return it of so much virtual time; no less than for the time of the program's own run."""
+        return round(self.times * base.cost_ns * max(ran_ns / base.ran_ns, 1)) + self.more_ns
+
+
 class Fate(StrEnum):
     """What became of a mutant."""
 
@@ -74,7 +86,9 @@ class MutantResult:
         return cls(Fate(str(found["fate"])), str(found["scenario"]), str(found["says"]), at_ns)
 
 
-def try_mutant(mutant: Mutant, bases: Sequence[BaseRun], clock: Clock, look: Callable[[], None]) -> MutantResult:
+def try_mutant(
+    mutant: Mutant, bases: Sequence[BaseRun], clock: Clock, look: Callable[[], None], most: MostCost = MostCost()
+) -> MutantResult:  # fmt: skip
     """Run a mutant on each scenario that executes it, until one notices it.
 
     Each bench is left where its run ended, with the changed program: to be called in a process of its own.
@@ -84,11 +98,12 @@ def try_mutant(mutant: Mutant, bases: Sequence[BaseRun], clock: Clock, look: Cal
         bases: The runs of the unchanged program.
         clock: As of `base_run`.
         look: Called often; may raise to end it.
+        most: What it may cost.
     """
     fates = []
     for base in bases:
         if mutant.address in base.first_ns:
-            found = _run(mutant, base, clock, look)
+            found = _run(mutant, base, clock, look, most)
             if found.is_noticed:
                 return found
             fates.append(found)
@@ -96,7 +111,9 @@ def try_mutant(mutant: Mutant, bases: Sequence[BaseRun], clock: Clock, look: Cal
     return different[0] if different else MutantResult(Fate.SAME)
 
 
-def _run(mutant: Mutant, base: BaseRun, clock: Clock, look: Callable[[], None]) -> MutantResult:
+def _run(
+    mutant: Mutant, base: BaseRun, clock: Clock, look: Callable[[], None], most: MostCost
+) -> MutantResult:  # fmt: skip
     bench, board, name = base.bench, base.board, base.bench.scenario.name
     bench.restore(base.states[base.first_ns[mutant.address]])
     memory = board.chip.memory
@@ -108,13 +125,12 @@ def _run(mutant: Mutant, base: BaseRun, clock: Clock, look: Callable[[], None]) 
             missed.append(event)
 
     bench.events.subscribe(take, Verdict)
-    most_ns = MOST_TIMES * base.cost_ns + MOST_MORE_NS
-    began = clock()
+    began, since = clock(), bench.now
 
     def after_slice(now: Nanos) -> None:
         look()
-        if clock() - began > most_ns:
-            raise _TooCostlyError(f"it costs more than {MOST_TIMES} times the unchanged one, at {now / NS_PER_S:g} s")
+        if clock() - began > most.of(base, now - since):
+            raise _TooCostlyError(f"it costs more than {most.times} times the unchanged one, at {now / NS_PER_S:g} s")
 
     bench.on_slice = after_slice
     try:

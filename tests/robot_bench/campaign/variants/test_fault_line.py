@@ -1,9 +1,5 @@
 """Which source line makes a trial fail: by a version that passes, and by changing the program back."""
 
-from collections.abc import Callable
-from dataclasses import replace
-from pathlib import Path
-
 import pytest
 
 from bluepill_sim.program.image import load_image
@@ -12,15 +8,7 @@ from bluepill_sim.program.mutants import mutants, mutated_file
 from bluepill_sim.program.version_difference import LineDifference
 from robot_bench.campaign.trial import Trial, trial_of
 from robot_bench.campaign.variants.against import Other
-from robot_bench.campaign.variants.fault_line import (
-    LEAST_PASSING,
-    MOST_LINES,
-    ChangedBack,
-    by_version,
-    failing_and_passing,
-    place_of,
-)
-from robot_bench.campaign.whole import points_of
+from robot_bench.campaign.variants.fault_line import MOST_LINES, by_version, place_of
 from robot_bench.firmware.build import HERE
 from simbase.errors import UsageError
 
@@ -36,7 +24,7 @@ def good() -> Trial:
     return trial_of("dodge", settings=SHORT).with_lists(obstacle=[WALL], goal=[GOAL])
 
 
-def changed(good: Trial, after: str) -> tuple[Trial, str]:
+def with_changed_branch(good: Trial, after: str) -> tuple[Trial, str]:
     """Return the trial with the first `bne` of `drive_on` as another instruction, and the line that it is of."""
     image = load_image(HERE / "dodge.elf")
     start = image.symbols.address_of("drive_on")
@@ -52,13 +40,7 @@ def changed(good: Trial, after: str) -> tuple[Trial, str]:
 @pytest.fixture(scope="module")
 def wrong(good: Trial) -> tuple[Trial, str]:
     """Return the trial with a program that drives on where it should turn."""
-    return changed(good, "nop")
-
-
-@pytest.fixture(scope="module")
-def inverted(good: Trial) -> tuple[Trial, str]:
-    """Return it with one that a single change undoes."""
-    return changed(good, "beq")
+    return with_changed_branch(good, "nop")
 
 
 @pytest.mark.slow
@@ -103,57 +85,3 @@ def lines(function: str, ours: list[int], theirs: list[int], file: str = "a.c") 
 )
 def test_a_place_is_named_where_it_is_one(found: list[LineDifference], place: str) -> None:
     assert place_of(found) == place
-
-
-def changed_back(trial: Trial, passing: int, passes: Callable[[Trial], bool]) -> ChangedBack:
-    return ChangedBack(trial, [replace(trial, seed=seed) for seed in range(1, passing + 1)], passes)
-
-
-@pytest.mark.slow
-def test_the_one_change_that_undoes_a_fault_names_its_line(good: Trial, inverted: tuple[Trial, str]) -> None:
-    trial, line = inverted
-    content = good.files["dodge.elf"]
-    looked = changed_back(trial, LEAST_PASSING, lambda one: one.files["dodge.elf"] == content)
-    assert [*looked.look()] == [*range(1, looked.count + 1)]
-    assert looked.result.line == line
-    assert len(looked.found) == 1
-    assert f"none of {LEAST_PASSING} passing points fail" in looked.result.says
-    few = changed_back(trial, LEAST_PASSING - 1, looked.passes)
-    [*few.look()]
-    assert (few.result.line, few.result.says[:15]) == ("", "2 points pass, ")
-
-
-@pytest.mark.slow
-def test_what_several_lines_mend_or_none_or_there_was_no_time_for_is_unknown(inverted: tuple[Trial, str]) -> None:
-    trial, _ = inverted
-    several = changed_back(trial, LEAST_PASSING, lambda _: True)
-    [*several.look()]
-    assert several.result.line == ""
-    assert "more than one line" in several.result.says
-    none = changed_back(trial, LEAST_PASSING, lambda _: False)
-    next(none.look())
-    assert "the time was over" in none.result.says
-    [*none.look()]
-    assert none.result.line == ""
-
-
-def test_a_change_after_which_a_point_fails_that_passed_is_none(good: Trial, inverted: tuple[Trial, str]) -> None:
-    trial, _ = inverted
-    content = good.files["dodge.elf"]
-    looked = changed_back(trial, LEAST_PASSING, lambda one: one.files["dodge.elf"] == content and one.seed != 3)
-    [*looked.look()]
-    assert (looked.found, looked.result.line) == ([], "")
-
-
-@pytest.mark.slow
-def test_the_points_of_a_campaign_are_those_of_its_journal(tmp_path: Path) -> None:
-    from tests.robot_bench.campaign.test_campaign import Shuffled, begun, carried
-
-    whole = carried(begun(tmp_path), tmp_path / "kept", Shuffled(1))
-    rows = points_of(tmp_path / "kept")
-    assert [row.cheap.outcome.sha256 for row in rows] == [row.cheap.outcome.sha256 for row in whole.progress.rows]
-    failing, passing = failing_and_passing(rows)
-    assert failing in [row.cheap.trial for row in whole.failures]
-    assert 0 < len(passing) <= 6
-    with pytest.raises(UsageError, match="nothing fails"):
-        failing_and_passing([row for row in rows if row not in rows])
