@@ -6,12 +6,16 @@ the lines of each file of tests); names and imports order what it says, and say 
 
 import ast
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
 #: Files of tests that are asked about one mutant, at most.
 MOST_FILES = 10
+#: Seconds that a file of tests is taken to last, of which nothing is known, and at least.
+UNKNOWN_S, LEAST_S = 1.0, 0.2
+#: How much more seldom one that stands further away notices something, as a power of its place.
+SELDOM = 1.5
 #: What tests a library in C or C++, by the folder of its sources: there are no imports to read.
 TESTS_OF_C = {
     "bluepill_sim/extension/source/devices": ("tests/bluepill_sim/peripherals", "tests/bluepill_sim/native"),
@@ -98,6 +102,17 @@ class Nearest:
             if name == folder or name.startswith(f"{folder}/")
         }
         return tuple(_ordered(order)[:MOST_FILES])
+
+
+def cheapest_first(files: Sequence[str], lasted: Mapping[str, float]) -> tuple[str, ...]:
+    """Return files of tests, nearest first, in the order in which they are asked: the next one before a longer one.
+
+    Args:
+        files: The nearest first.
+        lasted: Seconds that they take, where that is known.
+    """
+    cost = {name: (place + 1) ** SELDOM * max(lasted.get(name, UNKNOWN_S), LEAST_S) for place, name in enumerate(files)}
+    return tuple(sorted(files, key=cost.__getitem__))
 
 
 def counted_lines(folder: Path, root: Path) -> Counted:
