@@ -1,15 +1,17 @@
 """One contract for a robot that drives against a thing, held by every body: it slides, or it stalls and rests."""
 
 import math
+from collections.abc import Iterator
 
 import pytest
 
+from p2os.pioneer.body.contract import BodyState
 from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.world import load_world, parse_world
 from p2os.pioneer.world.model import Pose
 from p2os.robots.parameters import load_parameters
 from tests.p2os.pioneer.body.bodies import drive, each_body, marks_of
-from tools.surveys.contact_survey import MODELS, SurveyedContact, measure, picture, survey
+from tools.surveys.contact_survey import MODELS, SurveyedContact, judged_states, measure, picture, survey
 
 ARENA = load_world("arena", 1)
 WALL = parse_world(
@@ -48,6 +50,39 @@ def test_a_robot_that_meets_a_thing_beside_its_middle_slides_or_stalls_and_rests
     contact = measure(make_body(name, ARENA, model), model, heading_deg, 3.0)
     assert contact is not None
     assert not contact.faults(), reported(contact)
+
+
+def looks(*, slides_ms: int, stalls_ms: int, leaves_ms: int = 9_000) -> Iterator[BodyState]:
+    """Three seconds after a touch: sliding until a time, with a stall bit from one on, off the thing from one on."""
+    for ms in range(10, 3_010, 10):
+        stalls = ms >= stalls_ms
+        yield BodyState(
+            x_m=0.0004 * min(ms, slides_ms), left_speed_mps=0.2, right_speed_mps=0.2, in_contact=ms < leaves_ms,
+            stalled_left=stalls, stalled_right=stalls,
+        )  # fmt: skip
+
+
+#: So long the mean over ten looks still says that it slides.
+TAIL_MS = 80
+
+
+@pytest.mark.parametrize(
+    ("slides_ms", "stalls_ms", "leaves_ms", "faults"),
+    [
+        (0, 1_500, 9_000, []),
+        (0, 1_510, 9_000, ["neither slides nor stalls 1.5 s after the first touch"]),
+        (0, 9_000, 1_500, []),
+        (0, 9_000, 1_510, ["neither slides nor stalls 1.5 s after the first touch"]),
+        (1_500 - TAIL_MS, 1_520, 9_000, []),
+        (1_490 - TAIL_MS, 1_520, 9_000, ["neither slides nor stalls 1.5 s after the first touch"]),
+        (2_000 - TAIL_MS, 2_610, 9_000, []),
+        (2_000 - TAIL_MS, 2_620, 9_000, ["neither slides nor stalls for 0.61 s"]),
+    ],
+)
+def test_a_contact_is_decided_in_time(slides_ms: int, stalls_ms: int, leaves_ms: int, faults: list[str]) -> None:
+    seen = list(looks(slides_ms=slides_ms, stalls_ms=stalls_ms, leaves_ms=leaves_ms))
+    stopping = [BodyState()]
+    assert judged_states("none", load_parameters("p2dx"), 0.0, seen, stopping).faults() == faults
 
 
 def test_the_picture_shows_the_stall_and_the_rest_of_each_contact() -> None:
