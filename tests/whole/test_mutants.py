@@ -298,6 +298,9 @@ PROJECT = {
         "def test_broken():\n    assert False\n"
     ),
     "test_more.py": "from part import is_far\ndef test_more():\n    assert is_far(10)\n",
+    "test_long.py": (
+        "import pytest\nfrom part import is_far\n@pytest.mark.slow\ndef test_long():\n    assert is_far(10)\n"
+    ),
     "test_ended.py": "from part import is_far\nimport os\ndef test_ended():\n    is_far(10) or os._exit(9)\n",
     "test_kept.py": "def test_kept():\n    kept = bytearray(80 << 20)\n    while True:\n        pass\n",
     "test_slow.py": (
@@ -324,8 +327,8 @@ def judge(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Judge]:
     git(root, "init")
     tree = Tree(root, tmp_path / "copy")
     monkeypatch.setattr("tools.mutants.judge.TEST_LIMIT_S", 1.0)
-    monkeypatch.setattr("tools.mutants.judge.SOUND_LIMIT_S", 0.9)
-    found = Judge(tree, scratch, Natives(tree.folder, scratch, ["part.py"]))
+    monkeypatch.setattr("tools.mutants.judge.SOUND_PART", 0.9)
+    found = Judge(tree, scratch, Natives(tree.folder, scratch, ["part.py"], tmp_path / "kept"))
     yield found
     found.end()
 
@@ -345,6 +348,9 @@ def test_a_mutant_that_tests_look_at_is_noticed_and_another_survives(judge: Judg
     # Those that stand further away are asked last, and after what has no tests that pass.
     far = judge.judged(boundary, ["test_far.py", "test_spin.py", "test_more.py"])
     assert (far.verdict, far.by) == (MutantStatus.NOTICED, "test_more.py::test_more")
+    # Those that are long are asked when the others have not noticed anything.
+    last = judge.judged(boundary, ["test_long.py", "test_spin.py"])
+    assert (last.verdict, last.by) == (MutantStatus.NOTICED, "test_long.py::test_long")
     ended = judge.judged(boundary, ["test_ended.py"])
     assert (ended.verdict, ended.by) == (MutantStatus.NOTICED, "test_ended.py::test_ended")
     assert {(tmp_path / name / "part.py").read_text() for name in ("root", "copy/tree")} == {PART}

@@ -31,10 +31,12 @@ from tools.mutants.tree import Tree
 
 #: Seconds of a processor that each process of a mutant's tests has, and when no other test begins.
 LIMIT_S, BEGIN_S = 20, 6.0
-#: How many files of tests are asked before the rest is collected.
-FIRST_FILES = 2
-#: What one test has, and what it may take of that on the sound program where a time-out is to be noticed.
-TEST_LIMIT_S, SOUND_LIMIT_S = 6.0, 3.0
+#: How many files of tests are asked before the rest is collected, and of how many the long tests are asked.
+FIRST_FILES, LONG_FILES = 2, 5
+#: What one test has, a long one so many times as much.
+TEST_LIMIT_S, LONGER = 6.0, 2
+#: What it may take of that on the sound program where a time-out is to be noticed.
+SOUND_PART = 0.5
 #: The same bound by the clock, for what waits.
 CLOCK_LIMIT_S = 180.0
 #: kB of memory, and bytes of a file, that a mutant may fill: some loop and keep what they make.
@@ -42,9 +44,11 @@ MOST_KB, FILE_BYTES = 3 << 20, 512 << 20
 #: How often memory is looked at; no limit of the kernel's bounds it, since a sanitizer reserves more than there is.
 LOOK_S = 0.25
 PYTEST = (
-    "-x", "-n", "0", "-p", "no:cacheprovider", "-p", "tools.mutants.outcome",
-    "-m", "not slow and not soak and not hardware", "--hypothesis-profile", "unshrunk", "--tb", "no",
+    "-x", "-n", "0", "-p", "no:cacheprovider", "-p", "tools.mutants.outcome", "--hypothesis-profile", "unshrunk",
+    "--tb", "no",
 )  # fmt: skip
+#: Which tests are asked first, and which when these have not noticed anything.
+SHORT, LONG = "not slow and not soak and not hardware", "slow and not soak and not hardware"
 #: Variables that the tests do not get; what is compiled is kept in the copy.
 NOT_INHERITED = ("PYTEST", "XDG_", "MAKE", "PYTHONDONTWRITEBYTECODE")
 #: How a run ends that has no tests, and how one that was at a limit of the kernel's.
@@ -126,23 +130,27 @@ class Judge:
         if changed is None:
             return MutantOutcome(verdict=MutantStatus.NO_MUTANT)
         found, seconds = MutantOutcome(verdict=MutantStatus.UNTESTED), 0.0
-        for asked in filter(None, (files[:FIRST_FILES], files[FIRST_FILES:])):
-            one = self._asked(changed, asked, BEGIN_S - seconds)
+        for asked, marked in ((files[:FIRST_FILES], SHORT), (files[FIRST_FILES:], SHORT), (files[:LONG_FILES], LONG)):
+            budget_s = BEGIN_S * (1 if marked is SHORT else LONGER) - seconds
+            if not asked or budget_s < 0.0:
+                continue
+            one = self._asked(changed, asked, marked, budget_s)
             seconds += one.seconds
             if one.verdict is not MutantStatus.UNTESTED:
                 found = one
-            if one.verdict not in {MutantStatus.UNTESTED, MutantStatus.SURVIVED} or seconds > BEGIN_S:
+            if one.verdict not in {MutantStatus.UNTESTED, MutantStatus.SURVIVED}:
                 break
         return replace(found, seconds=seconds)
 
-    def _asked(self, changed: dict[str, bytes], files: Sequence[str], budget_s: float) -> MutantOutcome:
+    def _asked(self, changed: dict[str, bytes], files: Sequence[str], marked: str, budget_s: float) -> MutantOutcome:
         """Return what some files of tests say, with what fails without a change left out."""
         seconds = 0.0
         for _ in range(_MOST_LEFT_OUT):
             with self._tree.holding(changed):
-                run = self._run(files, self._left_out(files), budget_s=budget_s)
+                run = self._run(files, marked, *self._left_out(files), budget_s=budget_s)
             seconds += run.seconds
-            self._lasted(run.report.files)
+            if marked is SHORT:
+                self._lasted(run.report.files)
             if run.code in {0, _NO_TESTS} or run.report.is_stopped:
                 verdict = MutantStatus.UNTESTED if run.code == _NO_TESTS else MutantStatus.SURVIVED
                 return MutantOutcome(verdict=verdict, seconds=seconds)
@@ -153,20 +161,22 @@ class Judge:
             elif run.code is not None:
                 return MutantOutcome(verdict=MutantStatus.NOTICED, by=test, seconds=seconds)
             else:
-                verdict = MutantStatus.TIMED_OUT if sound_s <= SOUND_LIMIT_S else MutantStatus.UNDECIDED
+                is_sure = sound_s <= _limit_s(marked) * SOUND_PART
+                verdict = MutantStatus.TIMED_OUT if is_sure else MutantStatus.UNDECIDED
                 return MutantOutcome(verdict=verdict, by=test, seconds=seconds)
         return MutantOutcome(verdict=MutantStatus.UNDECIDED, seconds=seconds)
 
     def sound_s(self, test: str) -> float | None:
         """Return the seconds in which a test passes on the sound program, or nothing; of a file, whether it is read."""
         if test not in self._sound:
-            run = self._run([test], [], *([] if "::" in test else ["--collect-only"]))
+            run = self._run([test], f"({SHORT}) or ({LONG})", *([] if "::" in test else ["--collect-only"]))
             self._sound[test] = run.seconds if run.code == 0 else None
         return self._sound[test]
 
     def _left_out(self, files: Sequence[str]) -> list[str]:
         passes = [*self._sound.items()]
-        return [test for test, seconds in passes if seconds is None and test.partition("::")[0] in files]
+        left = [test for test, seconds in passes if seconds is None and test.partition("::")[0] in files]
+        return [word for test in left for word in ("--deselect", test)]
 
     def end(self) -> None:
         """End what runs, from another thread, and begin nothing any more."""
@@ -185,13 +195,12 @@ class Judge:
             built = self._natives.built_with(mutant)
         return changed | built if built else None
 
-    def _run(self, tests: Sequence[str], left_out: Sequence[str], *options: str, budget_s: float = BEGIN_S) -> _Run:
+    def _run(self, tests: Sequence[str], marked: str, *options: str, budget_s: float = BEGIN_S) -> _Run:
         reported = self._scratch / "reported.json"
         clear(reported)
-        deselected = [word for test in left_out for word in ("--deselect", test)]
+        bounds = {BUDGET_S: str(budget_s), TEST_S: str(_limit_s(marked))}
         asked = PytestRun(
-            words=(*PYTEST, *options, *tests, *deselected),
-            environment={OUTCOME_FILE: str(reported), BUDGET_S: str(budget_s), TEST_S: str(TEST_LIMIT_S)},
+            words=(*PYTEST, "-m", marked, *options, *tests), environment={OUTCOME_FILE: str(reported)} | bounds,
             cpu_s=LIMIT_S, file_bytes=FILE_BYTES,
         )  # fmt: skip
         with self._lock:
@@ -239,6 +248,10 @@ class Judge:
         folder = str(self._scratch)
         path = os.pathsep.join(map(str, self._tree.path))
         return kept | {"PYTHONPATH": path, "HOME": folder, "TMPDIR": folder}
+
+
+def _limit_s(marked: str) -> float:
+    return TEST_LIMIT_S * (1 if marked is SHORT else LONGER)
 
 
 def _end(pipe: IO[bytes] | None) -> IO[bytes]:

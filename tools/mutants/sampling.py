@@ -19,6 +19,9 @@ from tools.mutants.natives import Natives
 from tools.mutants.nearest import Nearest, cheapest_first
 from tools.mutants.tree import TREE, Tree
 
+#: Where the objects of sound sources are kept, in the project.
+KEPT_OBJECTS = Path("build", "mutants", "objects")
+
 
 class Court:
     """Copies of a tree with a judge each, made when the first mutants come.
@@ -74,7 +77,7 @@ class Court:
             tree = Tree(self._root, place)
             self._digest = tree.digest
             if natives is None:
-                natives = Natives(tree.folder, scratch, self._paths)
+                natives = Natives(tree.folder, scratch, self._paths, self._root / KEPT_OBJECTS)
                 strangers = [path for path in self._paths if not path.endswith(".py") and not natives.knows(path)]
                 if strangers and len(strangers) == len(self._paths):
                     raise ChangeError(f"{strangers[0]} is part of no library that the tests load")
