@@ -11,7 +11,7 @@ from functools import cache
 from pathlib import Path
 
 #: Files of tests that are asked about one mutant, at most.
-MOST_FILES = 10
+MOST_FILES = 14
 #: Seconds that a file of tests is taken to last, of which nothing is known, and at least.
 UNKNOWN_S, LEAST_S = 1.0, 0.2
 #: How much more seldom one that stands further away notices something, as a power of its place.
@@ -51,11 +51,11 @@ class Nearest:
             return self._of_c(path)
         by_name = self._by_name(path)
         files = self._counted.get(path, {})
-        ran = {name for name, lines in files.items() if line in lines} or {*files}
-        ran &= {*self._tests}
-        if not ran:
-            return tuple(by_name[:MOST_FILES])
-        near = [name for name in by_name if name in ran]
+        ran = {name for name, lines in files.items() if line in lines} & {*self._tests}
+        if ran:
+            near = [name for name in by_name if name in ran]
+        else:  # run by an import, if at all: who imports it may look at what it has made, and run no line of it
+            near, ran = by_name, {*files} & {*self._tests}
         return tuple([*near, *sorted(ran - {*near})][:MOST_FILES])
 
     def _by_name(self, path: str) -> list[str]:
