@@ -64,7 +64,7 @@ class SurveyedContact:
     stand_to_rest_s: float | None
     #: Share of the looks at which its centre slid.
     slide_share: float
-    #: Whether it slid, had a stall bit or touched nothing at `DECIDED_S`.
+    #: Whether it slid, had a stall bit, or touched nothing at `DECIDED_S`, or was blocked so that the bit has its time.
     is_decided: bool
     #: The longest time, from `DECIDED_S` on, in which it touched and neither slid nor had a stall bit.
     undecided_s: float
@@ -128,9 +128,10 @@ def judged_states(
     stands = [state.stalled_left and state.stalled_right for state in states]
     blocked = [_rim(state) < BLOCKED_SHARE * COMMAND_MPS for state in states]
     rests = [max(_rim(state), speed) <= RESTING_MPS for state, speed in zip(states, speeds, strict=True)]
+    decided = round(DECIDED_S / LOOK_S) - 1  # the first state is a look after the touch
     undecided = [
         state.in_contact and not slide and not stall for state, slide, stall in zip(states, slides, stalls, strict=True)
-    ][round(DECIDED_S / LOOK_S) - 1 :]  # the first state is a look after the touch
+    ][decided:]
     turns = [state.turn_radps for state in states if abs(state.turn_radps) > TURNING_RADPS]
     rest = next((look for look in reversed(range(len(states))) if not rests[look]), -1) + 1
     stand_s = _first(stands)
@@ -152,7 +153,7 @@ def judged_states(
         rest_s=rest_s if rest < len(states) else None,
         stand_to_rest_s=None if stand_s is None else max(0.0, rest_s - stand_s),
         slide_share=sum(slides) / len(slides),
-        is_decided=not any(undecided[:1]),
+        is_decided=not any(undecided[:1]) or blocked[decided],
         undecided_s=_longest(undecided),
         sign_changes=sum(one * other < 0 for one, other in itertools.pairwise(turns)),
         energy=max(energies) / COMMAND_MPS**2,

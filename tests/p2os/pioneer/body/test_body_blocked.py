@@ -52,13 +52,13 @@ def test_a_robot_that_meets_a_thing_beside_its_middle_slides_or_stalls_and_rests
     assert not contact.faults(), reported(contact)
 
 
-def looks(*, slides_ms: int, stalls_ms: int, leaves_ms: int = 9_000) -> Iterator[BodyState]:
-    """Three seconds after a touch: sliding until a time, with a stall bit from one on, off the thing from one on."""
+def looks(*, slides_ms: int, stalls_ms: int, leaves_ms: int = 9_000, blocked_ms: int = 9_000) -> Iterator[BodyState]:
+    """Three seconds after a touch: it slides until a time, has a stall bit, leaves and is blocked from others on."""
     for ms in range(10, 3_010, 10):
-        stalls = ms >= stalls_ms
+        stalls, rim_mps = ms >= stalls_ms, 0.0 if ms >= blocked_ms else 0.2
         yield BodyState(
-            x_m=0.0004 * min(ms, slides_ms), left_speed_mps=0.2, right_speed_mps=0.2, in_contact=ms < leaves_ms,
-            stalled_left=stalls, stalled_right=stalls,
+            x_m=0.0004 * min(ms, slides_ms), left_speed_mps=rim_mps, right_speed_mps=rim_mps, stalled_left=stalls,
+            stalled_right=stalls, in_contact=ms < leaves_ms,
         )  # fmt: skip
 
 
@@ -83,6 +83,23 @@ def test_a_contact_is_decided_in_time(slides_ms: int, stalls_ms: int, leaves_ms:
     seen = list(looks(slides_ms=slides_ms, stalls_ms=stalls_ms, leaves_ms=leaves_ms))
     stopping = [BodyState()]
     assert judged_states("none", load_parameters("p2dx"), 0.0, seen, stopping).faults() == faults
+
+
+@pytest.mark.parametrize(
+    ("blocked_ms", "stalls_ms", "faults"),
+    [
+        (1_500, 2_100, []),  # it has come to stand there: the bit has its 0.6 s
+        (
+            1_510,
+            2_110,
+            ["neither slides nor stalls 1.5 s after the first touch", "neither slides nor stalls for 0.61 s"],
+        ),
+        (1_500, 2_110, ["neither slides nor stalls for 0.61 s", "blocked for 0.61 s without a stall bit"]),
+    ],
+)
+def test_what_is_blocked_just_then_has_its_time(blocked_ms: int, stalls_ms: int, faults: list[str]) -> None:
+    seen = list(looks(slides_ms=0, stalls_ms=stalls_ms, blocked_ms=blocked_ms))
+    assert judged_states("none", load_parameters("p2dx"), 0.0, seen, [BodyState()]).faults() == faults
 
 
 def test_the_picture_shows_the_stall_and_the_rest_of_each_contact() -> None:
