@@ -107,6 +107,14 @@ def test_goal_clearance(um: int, met: bool) -> None:
     assert (found.met, found.robustness) == (met, pytest.approx((um - 200_000) / UM))
 
 
+def test_what_is_as_near_as_it_may_be_decides_nothing() -> None:
+    """What comes nearer later is missed, and as far as it came at first below the limit."""
+    seen = [Clearance(t=t * S, um=um) for t, um in enumerate((900_000, 200_000, 150_000, 100_000))]
+    assert outcome("clearance", seen[:2], least_m=0.2).met
+    found = outcome("clearance", seen, least_m=0.2)
+    assert (found.met, found.robustness) == (False, pytest.approx(-0.1))
+
+
 def worked(*rows: tuple[int, float, float]) -> list[Event]:
     """Return poses: (time, x in metres, joules so far)."""
     return [pose(t, round(x_m * UM), work=round(joules * UM)) for t, x_m, joules in rows]
