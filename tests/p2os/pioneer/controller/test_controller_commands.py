@@ -273,6 +273,15 @@ def test_a_compass_is_read_as_often_as_it_has_a_new_reading(robot: Any) -> None:
         assert len(at) >= 2_000 * 1_000_000 // (COMPASS_NS + CYCLE_NS)
 
 
+@pytest.mark.parametrize(("mm", "nm"), [(1.0000016, 1_000_002), (1.0000014, 1_000_001), (-1.0000016, -1_000_002)])
+def test_the_way_is_counted_to_the_nearest_nanometre(robot: Any, mm: float, nm: int) -> None:
+    context = robot.pioneer._context
+    context.reckoning.travel_mm = mm
+    assert context.travel_nm == nm
+    context.reckoning.turned_rad = mm
+    assert context.heading_udeg == round(mm * 180_000_000 / 3.141592653589793)
+
+
 def test_after_a_reset_the_robot_receives_nothing_until_its_notice(make_robot: MakeRobot) -> None:
     robot = make_robot(lenient=True).open()
     robot.say(C.VEL, 200)

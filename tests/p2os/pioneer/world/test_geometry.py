@@ -1,6 +1,8 @@
 """Plan-view geometry: the way out of a hull, and things that stand elsewhere."""
 
+import cmath
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import assume, given, settings
@@ -8,8 +10,10 @@ from hypothesis import strategies as st
 
 from p2os.errors import WorldError
 from p2os.pioneer.body.ray_cast import cast
+from p2os.pioneer.world import parse_world
+from p2os.pioneer.world.drawing import start_arrow
 from p2os.pioneer.world.geometry import Footprint, hull_polygon, placed
-from p2os.pioneer.world.model import FARTHEST_M, Obstacle
+from p2os.pioneer.world.model import FARTHEST_M, Obstacle, Pose
 from p2os.robots.parameters import load_parameters
 
 HULL = hull_polygon(load_parameters("p2dx").body)
@@ -61,6 +65,17 @@ def test_a_ray_meets_a_circle_from_outside_its_rim_or_its_inside(x: float, turn:
         assert cast([post], x, 2.0, [ray], way) == [pytest.approx(way)], "no farther than was asked"
     else:
         assert cast([post], x, 2.0, [ray], 3.0) == [3.0]
+
+
+@given(st.floats(-math.pi, math.pi), st.floats(0.1, 2.0))
+def test_the_arrow_at_the_start_looks_where_the_robot_does(heading: float, length: float) -> None:
+    """Its tip is a length ahead; what is behind is as far to the left as to the right."""
+    world = replace(parse_world('name = "a"\nextent_m = [-9, -9, 9, 9]', "a"), start=Pose(1.0, 2.0, heading))
+    ahead, left = (complex(math.cos(heading), math.sin(heading)) * way for way in (1, 1j))
+    shape = [(complex(*point) - (1 + 2j)) / length for point in start_arrow(world, length)]
+    assert [cmath.isclose(one, other, abs_tol=1e-9) for one, other in zip(
+        shape, (ahead, -0.7 * ahead + 0.6 * left, -0.4 * ahead, -0.7 * ahead - 0.6 * left), strict=True,
+    )] == [True] * 4  # fmt: skip
 
 
 def test_what_stands_elsewhere_is_else_the_same() -> None:
