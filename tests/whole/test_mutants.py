@@ -179,6 +179,8 @@ def test_the_nearest_tests_are_those_of_the_mirror_then_those_that_ran_the_line(
     assert by_name.of("p2os/client/link.py", 1)[0] == "tests/p2os/client/test_link.py"
     assert by_name.of("adapter_fw/core/app/text.cpp", 1)[0].startswith("tests/adapter_fw/")
     assert "tests/bluepill_sim/peripherals/tim" in by_name.of("bluepill_sim/extension/source/devices/tim.c", 1)[0]
+    in_order = by_name.of("bluepill_sim/extension/source/interpreter/lower.c", 1)
+    assert in_order[0].startswith("tests/bluepill_sim/core/interpreter/")
     ran = {"tests/whole/test_plugins.py": frozenset({7}), "tests/p2os/client/test_link.py": frozenset({8, 9})}
     counted = Nearest(ROOT, {"p2os/client/link.py": ran})
     assert counted.of("p2os/client/link.py", 7) == ("tests/whole/test_plugins.py",)

@@ -19,6 +19,12 @@ SELDOM = 1.5
 #: What tests a library in C or C++, by the folder of its sources: there are no imports to read.
 TESTS_OF_C = {
     "bluepill_sim/extension/source/devices": ("tests/bluepill_sim/peripherals", "tests/bluepill_sim/native"),
+    "bluepill_sim/extension/source/registers": ("tests/bluepill_sim/peripherals", "tests/bluepill_sim/native"),
+    "bluepill_sim/extension/source/interpreter": ("tests/bluepill_sim/core/interpreter",
+                                                  "tests/bluepill_sim/core/test_kernels.py",
+                                                  "tests/bluepill_sim/core/test_flag_vectors.py",
+                                                  "tests/bluepill_sim/native/test_native_core.py",
+                                                  "tests/bluepill_sim/core", "tests/bluepill_sim/native"),
     "bluepill_sim/extension/source/core": ("tests/bluepill_sim/core", "tests/bluepill_sim/native"),
     "bluepill_sim/extension/source": ("tests/bluepill_sim/fabric", "tests/bluepill_sim/native", "tests/bluepill_sim"),
     "robot_bench/wires": ("tests/robot_bench/wires",),
