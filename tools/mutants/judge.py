@@ -18,6 +18,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+from itertools import pairwise
 from pathlib import Path
 from typing import IO
 
@@ -31,8 +32,9 @@ from tools.mutants.tree import Tree
 
 #: Seconds of a processor that each process of a mutant's tests has, and when no other test begins.
 LIMIT_S, BEGIN_S = 20, 6.0
-#: How many files of tests are asked before the rest is collected, and of how many the long tests are asked.
-FIRST_FILES, LONG_FILES = 2, 5
+#: Which files of tests are collected together, by their places: to collect one takes as long as some tests. Of how many
+#: the long tests are asked.
+TOGETHER, LONG_FILES = (0, 2, 6, 100), 5
 #: What one test has, a long one so many times as much.
 TEST_LIMIT_S, LONGER = 6.0, 2
 #: What it may take of that on the sound program where a time-out is to be noticed.
@@ -130,7 +132,8 @@ class Judge:
         if changed is None:
             return MutantOutcome(verdict=MutantStatus.NO_MUTANT)
         found, seconds = MutantOutcome(verdict=MutantStatus.UNTESTED), 0.0
-        for asked, marked in ((files[:FIRST_FILES], SHORT), (files[FIRST_FILES:], SHORT), (files[:LONG_FILES], LONG)):
+        short = [(files[begin:end], SHORT) for begin, end in pairwise(TOGETHER)]
+        for asked, marked in (*short, (files[:LONG_FILES], LONG)):
             budget_s = BEGIN_S * (1 if marked is SHORT else LONGER) - seconds
             if not asked or budget_s < 0.0:
                 continue

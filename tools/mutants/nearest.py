@@ -12,6 +12,8 @@ from pathlib import Path
 
 #: Files of tests that are asked about one mutant, at most.
 MOST_FILES = 14
+#: So many of them by their names and imports, whether they were counted at the line or not.
+NOT_COUNTED = 4
 #: Seconds that a file of tests is taken to last, of which nothing is known, and at least.
 UNKNOWN_S, LEAST_S = 1.0, 0.2
 #: How much more seldom one that stands further away notices something, as a power of its place.
@@ -58,11 +60,12 @@ class Nearest:
         by_name = self._by_name(path)
         files = self._counted.get(path, {})
         ran = {name for name, lines in files.items() if line in lines} & {*self._tests}
-        if ran:
-            near = [name for name in by_name if name in ran]
-        else:  # run by an import, if at all: who imports it may look at what it has made, and run no line of it
-            near, ran = by_name, {*files} & {*self._tests}
-        return tuple([*near, *sorted(ran - {*near})][:MOST_FILES])
+        if not ran:  # run by an import, if at all: who imports it may look at what it has made, and run no line of it
+            return tuple([*by_name, *sorted({*files} & {*self._tests} - {*by_name})][:MOST_FILES])
+        near = [name for name in by_name if name in ran]
+        known = [*near, *sorted(ran - {*near})][: MOST_FILES - NOT_COUNTED]
+        # What was written since the suite was counted is known by its imports alone.
+        return tuple([*known, *[name for name in by_name if name not in known][:NOT_COUNTED]])
 
     def _by_name(self, path: str) -> list[str]:
         module = path.removesuffix("/__init__.py").removesuffix(".py").replace("/", ".")
