@@ -65,7 +65,7 @@ class Nearest:
         near = [name for name in by_name if name in ran]
         known = [*near, *sorted(ran - {*near})][: MOST_FILES - NOT_COUNTED]
         # What was written since the suite was counted is known by its imports alone.
-        return tuple([*known, *[name for name in by_name if name not in known][:NOT_COUNTED]])
+        return (*known, *[name for name in by_name if name not in known][:NOT_COUNTED])
 
     def _by_name(self, path: str) -> list[str]:
         module = path.removesuffix("/__init__.py").removesuffix(".py").replace("/", ".")
