@@ -3,6 +3,7 @@
 import cmath
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from hypothesis import assume, given, settings
@@ -12,7 +13,10 @@ from p2os.errors import WorldError
 from p2os.pioneer.body.ray_cast import cast
 from p2os.pioneer.world import parse_world
 from p2os.pioneer.world.drawing import start_arrow
+from p2os.pioneer.world.formats.annotation import Traits
+from p2os.pioneer.world.formats.collection import STANDS_STILL, Collection
 from p2os.pioneer.world.geometry import Footprint, hull_polygon, placed
+from p2os.pioneer.world.interchange.transform import from_roll_pitch_yaw
 from p2os.pioneer.world.model import FARTHEST_M, Obstacle, Pose
 from p2os.robots.parameters import load_parameters
 
@@ -76,6 +80,18 @@ def test_the_arrow_at_the_start_looks_where_the_robot_does(heading: float, lengt
     assert [cmath.isclose(one, other, abs_tol=1e-9) for one, other in zip(
         shape, (ahead, -0.7 * ahead + 0.6 * left, -0.4 * ahead, -0.7 * ahead - 0.6 * left), strict=True,
     )] == [True] * 4  # fmt: skip
+
+
+@pytest.mark.parametrize(("mass_kg", "roll", "left"), [(1.0, 0.3, 1), (0.0, 0.3, 0), (1.0, 0.0, 0), (0.001, 0.3, 1)])
+@pytest.mark.parametrize("shape", ["box", "cylinder"])
+def test_what_a_model_moves_stands_still_where_it_is_tilted(shape: str, mass_kg: float, roll: float, left: int) -> None:
+    collection = Collection(Path("a.sdf"))
+    place, traits = from_roll_pitch_yaw(0.0, 0.0, 1.0, roll, 0.0, 0.0), Traits(mass_kg=mass_kg)
+    if shape == "box":
+        collection.add_box("a", (1.0, 1.0, 1.0), place, traits)
+    else:
+        collection.add_cylinder("a", 0.5, 1.0, place, traits)
+    assert collection._skipped.get(STANDS_STILL, 0) == left
 
 
 def test_what_stands_elsewhere_is_else_the_same() -> None:
