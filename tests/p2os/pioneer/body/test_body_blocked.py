@@ -109,8 +109,12 @@ def test_the_picture_shows_the_stall_and_the_rest_of_each_contact() -> None:
     assert "p2dx" in drawn
 
 
-#: Of these 270 contacts those that break the contract: here its wheels spin for a moment before they are blocked.
-BROKEN = {("mujoco", "p2dx"): {300.0: ["neither slides nor stalls 1.5 s after the first touch"]}}
+UNDECIDED = ["neither slides nor stalls 1.5 s after the first touch"]
+#: Of these 270 contacts those that break the contract: here wheels spin for a moment before they are blocked.
+BROKEN = {
+    ("mujoco", "p2dx"): {300.0: UNDECIDED},
+    ("mujoco", "powerbot"): {108.0: UNDECIDED, 288.0: UNDECIDED},
+}
 
 
 @pytest.mark.soak
