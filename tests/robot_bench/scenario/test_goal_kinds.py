@@ -30,7 +30,11 @@ UM = 1_000_000
 
 
 def outcome(kind: str, run: Sequence[Event], end: int = 10 * S, **arguments: Any) -> GoalOutcome:
-    """Return what a goal says of a run; it must say the same where it was saved and restored between any two events."""
+    """Return what a goal says of a run.
+
+    It must say the same where it was saved and restored between any two events, and never otherwise than it has once
+    decided.
+    """
     goal = load_goal(
         {"kind": kind, **{key.rstrip("_"): value for key, value in arguments.items()}}, "mine.toml: [[goal]] 1"
     )
@@ -45,7 +49,8 @@ def outcome(kind: str, run: Sequence[Event], end: int = 10 * S, **arguments: Any
                 fresh.restore(judge.snapshot())
                 judge = fresh
         judge.advance_to(end)
-        (said,) = judge.at_end(RunEnd(end))
+        (said,), (decided,) = judge.at_end(RunEnd(end)), judge._decided
+        assert decided is None or decided.met == said.outcome.met
         assert not said.is_open
         found.append(said.outcome)
     assert found[0] == found[1]
