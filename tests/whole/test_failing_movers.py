@@ -30,12 +30,12 @@ from tests.whole.failing_calls import (
     FailedCall,
     Kind,
     Outcome,
-    calls_of,
     command,
     counted,
     library,
     page_in,
     run_verb,
+    swept,
 )
 from tools.surveys.measure_stops import Cable, ServedRobot
 
@@ -276,6 +276,6 @@ def test_a_robot_stands_after_every_call_that_fails(
     name: str, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     path = library(tmp_path_factory)
-    calls = calls_of(sound(path, tmp_path, name), random.Random(f"{SEED} {name}"), DRAWN)
+    calls = swept(name, sound(path, tmp_path, name), random.Random(f"{SEED} {name}"), DRAWN)
     found = each_tried(path, tmp_path, [(name, call) for call in calls])
     assert not found, "\n\n".join(found)
