@@ -9,9 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from tools.mutants import c_source, changes, figures, ledger, python_source
+from tools.mutants import changes, figures, ledger
 from tools.mutants.changes import ChangeError
 from tools.mutants.judge import Judge, MutantOutcome, MutantStatus
+from tools.mutants.languages import c_source, python_source
 from tools.mutants.ledger import Ledger
 from tools.mutants.mutant import SourceMutant
 from tools.mutants.natives import Natives

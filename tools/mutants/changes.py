@@ -6,7 +6,7 @@ import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
-from tools.mutants import c_source, python_source
+from tools.mutants.languages import c_source, python_source
 from tools.mutants.mutant import Edit, SourceMutant, edited
 
 ROOT = Path(__file__).parents[2]

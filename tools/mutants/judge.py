@@ -23,8 +23,8 @@ from pathlib import Path
 from typing import IO
 
 from tools.hostile.kernel import memory_kb
-from tools.mutants import python_source
 from tools.mutants.forks import PytestRun
+from tools.mutants.languages import python_source
 from tools.mutants.mutant import SourceMutant
 from tools.mutants.natives import Natives
 from tools.mutants.outcome import BUDGET_S, OUTCOME_FILE, TEST_S, RunReport, clear, reported_by
