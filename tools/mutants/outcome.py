@@ -98,11 +98,9 @@ def reported_by(file: Path) -> RunReport:
     """Return what a run has reported; of one that was ended, the test that it was at."""
     now = _now_file(file)
     last = now.read_bytes().partition(b"\n")[0].decode() if now.exists() else ""
-    found = (
-        json.loads(file.read_text(encoding="utf-8"))
-        if file.exists()
-        else {"failed": (), "files": {}, "is_stopped": False}
-    )
+    if not file.exists():
+        return RunReport(files={}, last=last)
+    found = json.loads(file.read_text(encoding="utf-8"))
     return RunReport(
         failed=tuple(found["failed"]), files=found["files"], last=last, is_stopped=bool(found["is_stopped"])
     )
