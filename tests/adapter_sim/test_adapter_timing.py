@@ -195,6 +195,16 @@ def test_the_timeout_runs_from_the_last_plausible_packet() -> None:
     assert plausibility.ends_at == 1_000
 
 
+@pytest.mark.parametrize(("near", "ends_at"), [(161, 300), (160, 300), (159, 100), (240, 300), (241, 100)])
+def test_wheels_that_leave_their_command_by_themselves_are_measured_on_their_way_back(near: int, ends_at: int) -> None:
+    plausibility = doubt()
+    plausibility.take(near, near, stalled=False, now=100)  # near is 40 or less from 200; further, it approaches
+    plausibility.take(100, 100, stalled=False, now=200)
+    assert plausibility.ends_at == 1_100
+    plausibility.take(105, 105, stalled=False, now=300)
+    assert plausibility.ends_at == 1_000 + ends_at
+
+
 @pytest.mark.parametrize(
     ("speeds", "stalled", "ends_at"),
     [

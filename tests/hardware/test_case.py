@@ -18,6 +18,20 @@ GENERATED = command.GENERATED
 COORDINATES = st.floats(-4, 4)
 
 
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("shape", ["block", "cylinder"])
+def test_near_is_what_reaches_into_a_space_if_only_to_its_side(axis: int, shape: str) -> None:
+    solid: Solid = Block(x=(-1, 1), y=(-1, 1), z=(-1, 1))
+    if shape == "cylinder":
+        solid = UprightCylinder(at=(0, 0), radius_mm=1, z=(-1, 1))
+    part = PrintedPart(name="one", solids=(solid,))
+    for low, high, is_near in ((1, 2, True), (1.01, 2, False), (-2, -1, True), (-2, -1.01, False), (-3, 3, True)):
+        space = [-0.5, 0.5] * 3
+        space[2 * axis : 2 * axis + 2] = low, high
+        left, right, top, bottom, under, over = space
+        assert bool(part.near((left, right, top, bottom, under, over)).solids) is is_near, (low, high)
+
+
 @given(COORDINATES, COORDINATES, COORDINATES)
 def test_what_is_cut_away_is_gone_and_what_comes_later_is_there(x: float, y: float, z: float) -> None:
     outer = Block(x=(-3, 3), y=(-3, 3), z=(-3, 3), corner_mm=1)

@@ -4,11 +4,13 @@ Calls are counted from the verb's first line on, in the verb's own process and t
 before that is there already; modules that it imports later are files that it opens, too.
 """
 
+import os
 import random
 import shutil
 import signal
 import struct
 import subprocess
+import sys
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cache
@@ -180,6 +182,17 @@ def run_verb(path: str, folder: Path, call: FailedCall, *words: str) -> Ended:
         check=False, timeout=LIMIT_S,
     )  # fmt: skip
     return Ended(done.returncode, done.stdout, done.stderr, *counted(page))
+
+
+def swept(name: str, ended: Ended, chooser: random.Random, most: int) -> list[FailedCall]:
+    """Return the calls of a verb that a sweep tries, and print how many there are and how many of them it tries.
+
+    P2OS_CALLS=3 takes three of a kind, for a look that does not take hours: `P2OS_CALLS=3 pytest -m soak -s FILE`.
+    """
+    calls = calls_of(ended, chooser, min(most, int(os.environ.get("P2OS_CALLS", str(most)))))
+    counts = ", ".join(f"{count} {kind.name.lower()}" for kind, count in ended.counts.items() if count)
+    sys.stderr.write(f"swept {name}: {sum(ended.counts.values())} calls ({counts}), {len(calls)} tried\n")
+    return calls
 
 
 def calls_of(ended: Ended, chooser: random.Random, most: int) -> list[FailedCall]:

@@ -4,17 +4,19 @@ import subprocess
 import sys
 import time
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from tools.mutants import c_source, changes, figures, ledger, python_source
+from tools.mutants import changes, figures, ledger
 from tools.mutants.changes import ChangeError
-from tools.mutants.judge import SOUND_LIMIT_S, START_S, Judge, MutantOutcome, MutantStatus, SoundTests, chosen
+from tools.mutants.judge import Judge, MutantOutcome, MutantStatus
+from tools.mutants.languages import c_source, python_source
 from tools.mutants.ledger import Ledger
 from tools.mutants.mutant import SourceMutant
 from tools.mutants.natives import Natives
-from tools.mutants.nearest import Nearest
+from tools.mutants.nearest import Nearest, cheapest_first
 from tools.mutants.tree import Tree
 
 ROOT = Path(__file__).parents[2]
@@ -178,20 +180,26 @@ def test_the_nearest_tests_are_those_of_the_mirror_then_those_that_ran_the_line(
     assert by_name.of("p2os/client/link.py", 1)[0] == "tests/p2os/client/test_link.py"
     assert by_name.of("adapter_fw/core/app/text.cpp", 1)[0].startswith("tests/adapter_fw/")
     assert "tests/bluepill_sim/peripherals/tim" in by_name.of("bluepill_sim/extension/source/devices/tim.c", 1)[0]
+    in_order = by_name.of("bluepill_sim/extension/source/interpreter/lower.c", 1)
+    assert in_order[0].startswith("tests/bluepill_sim/core/interpreter/")
     ran = {"tests/whole/test_plugins.py": frozenset({7}), "tests/p2os/client/test_link.py": frozenset({8, 9})}
     counted = Nearest(ROOT, {"p2os/client/link.py": ran})
-    assert counted.of("p2os/client/link.py", 7) == ("tests/whole/test_plugins.py",)
-    assert counted.of("p2os/client/link.py", 8) == ("tests/p2os/client/test_link.py",)
-    assert set(counted.of("p2os/client/link.py", 1)) == set(ran)  # run by an import: any may look at it
+    for line, first in ((7, "tests/whole/test_plugins.py"), (8, "tests/p2os/client/test_link.py")):
+        found = counted.of("p2os/client/link.py", line)
+        rest = [name for name in by_name.of("p2os/client/link.py", 1) if name != first]
+        assert found[0] == first
+        assert [*found[1:]] == rest[:4]
+    # Run by an import: who imports it may look at what it has made, and run no line of it.
+    assert counted.of("p2os/client/link.py", 1) == by_name.of("p2os/client/link.py", 1)
+    assert "tests/p2os/protocol/test_protocol_page.py" in counted.of("p2os/protocol/command_table.py", 1)
 
 
-def test_tests_are_taken_as_long_as_the_sound_program_passes_in_time() -> None:
-    def of(name: str, seconds: float, *, is_judge: bool = True) -> SoundTests:
-        return SoundTests(file=name, seconds=seconds, is_judge=is_judge)
-
-    rest = SOUND_LIMIT_S - START_S - 1
-    taken = chosen([of("a", 1), of("slow", 0, is_judge=False), of("b", rest + 0.1), of("c", rest), of("d", 0.1)])
-    assert [each.file for each in taken] == ["a", "c"]
+def test_the_nearest_tests_come_first_but_for_one_that_takes_much_longer() -> None:
+    files = ("a", "b", "c")
+    assert cheapest_first(files, {}) == files
+    assert cheapest_first(files, {"a": 1.0, "b": 0.2, "c": 0.2}) == ("b", "a", "c")
+    assert cheapest_first(files, {"a": 0.5, "b": 0.2, "c": 0.2}) == files
+    assert cheapest_first(files, {"a": 9.0}) == ("b", "c", "a")
 
 
 def mutant(text: str = "x = 1") -> SourceMutant:
@@ -200,30 +208,54 @@ def mutant(text: str = "x = 1") -> SourceMutant:
 
 def test_what_was_judged_is_there_after_a_run_that_was_cut(tmp_path: Path) -> None:
     file = tmp_path / "judged.jsonl"
-    one = mutant()
-    sound = SoundTests(file="tests/a.py", is_judge=True, left_out=("tests/a.py::b",), seconds=1.25)
+    one, other, asked = mutant(), mutant("x = 3"), {"tests/a.py": "1", "tests/b.py": "2"}
+    noticed = MutantOutcome(verdict=MutantStatus.NOTICED, by="tests/a.py::test", seconds=1.5)
     book = Ledger(file)
-    book.add("1", one, MutantOutcome(verdict=MutantStatus.SURVIVED))
-    book.add_sound("tree", sound)
-    book.add("2", one, MutantOutcome(verdict=MutantStatus.NOTICED, by="a test"))
+    book.add(one, asked, MutantOutcome(verdict=MutantStatus.SURVIVED))
+    book.add_sound("tree", {"tests/a.py::test": 0.5, "tests/a.py::other": None})
+    book.add(other, asked, noticed)
+    book.add_lasted({"tests/a.py": 1.25})
     whole = file.read_bytes()
     for end in range(0, len(whole) + 1, 7):
         file.write_bytes(whole[:end])
         resumed = Ledger(file)
-        resumed.add("3", one, MutantOutcome(verdict=MutantStatus.TIMED_OUT))
+        resumed.add(mutant("x = 5"), asked, MutantOutcome(verdict=MutantStatus.TIMED_OUT, by="tests/a.py::loop"))
         again = Ledger(file)
-        assert again.judgement("3") == MutantOutcome(verdict=MutantStatus.TIMED_OUT)
-        assert again.judgement("2") in {None, MutantOutcome(verdict=MutantStatus.NOTICED, by="a test")}
-    assert again.judgement("1") == MutantOutcome(verdict=MutantStatus.SURVIVED)
-    assert again.sound("tree", "tests/a.py") == sound
-    assert again.sound("other", "tests/a.py") is None
+        assert again.judgement(mutant("x = 5"), asked) is not None
+        assert again.judgement(other, asked) in {None, noticed}
+    assert again.judgement(one, asked) == MutantOutcome(verdict=MutantStatus.SURVIVED)
+    assert again.sound("tree") == {"tests/a.py::test": 0.5, "tests/a.py::other": None}
+    assert again.sound("other") == {}
+    file.write_bytes(whole)
+    assert Ledger(file).lasted == {"tests/a.py": 1.25}
 
 
-def test_another_source_or_other_tests_are_another_question() -> None:
-    one = mutant()
-    keys = {one.key([b"a"]), one.key([b"b"]), one.key([b"a", b"b"]), mutant("x = 3").key([b"a"])}
-    assert len(keys) == 4
-    assert one.key([b"a"]) == mutant().key([b"a"])
+def test_what_was_judged_holds_until_the_tests_change_that_have_judged_it(tmp_path: Path) -> None:
+    one, other, made = mutant(), mutant("x = 3"), mutant("x = 5")
+    asked = {"tests/a.py": "1", "tests/b.py": "2"}
+    book = Ledger(tmp_path / "judged.jsonl")
+    survived = MutantOutcome(verdict=MutantStatus.SURVIVED)
+    noticed = MutantOutcome(verdict=MutantStatus.NOTICED, by="tests/a.py::test")
+    same = MutantOutcome(verdict=MutantStatus.NO_MUTANT)
+    for each, judgement in ((one, survived), (other, noticed), (made, same)):
+        book.add(each, asked, judgement)
+    for now, of_one, of_other in (
+        (asked, survived, noticed),
+        (asked | {"tests/b.py": "3"}, None, noticed),
+        (asked | {"tests/c.py": "1"}, None, noticed),
+        (asked | {"tests/a.py": "3"}, None, None),
+        ({"tests/b.py": "2"}, None, None),
+    ):
+        assert [book.judgement(each, now) for each in (one, other, made)] == [of_one, of_other, same]
+    assert book.judgement(mutant("x = 7"), asked) is None
+
+
+def test_how_long_tests_take_is_noted_anew_where_it_has_changed(tmp_path: Path) -> None:
+    file = tmp_path / "judged.jsonl"
+    book = Ledger(file)
+    for seconds, noted in ((1.0, 1.0), (2.1, 1.0), (2.2, 2.2), (1.1, 2.2), (1.0, 1.0), (0.0, 0.0), (0.1, 0.0)):
+        book.add_lasted({"tests/a.py": seconds})
+        assert (book.lasted, Ledger(file).lasted) == ({"tests/a.py": noted},) * 2, seconds
 
 
 def test_the_list_of_survivors_is_written_and_read_back(tmp_path: Path) -> None:
@@ -273,22 +305,40 @@ PROJECT = {
         "def test_far():\n    assert is_far(11) and not is_far(2)\n"
         "def test_broken():\n    assert False\n"
     ),
-    "test_slow.py": "def test_slow():\n    while True:\n        pass\n",
+    "test_more.py": "from part import is_far\ndef test_more():\n    assert is_far(10)\n",
+    "test_long.py": (
+        "import pytest\nfrom part import is_far\n@pytest.mark.slow\ndef test_long():\n    assert is_far(10)\n"
+    ),
+    "test_ended.py": "from part import is_far\nimport os\ndef test_ended():\n    is_far(10) or os._exit(9)\n",
+    "test_kept.py": "def test_kept():\n    kept = bytearray(80 << 20)\n    while True:\n        pass\n",
+    "test_slow.py": (
+        "import time\nfrom part import spin\ndef test_slow():\n    spin()\n"
+        "    while time.process_time() < 1.0:\n        pass\n"
+    ),
     "test_spin.py": "from part import spin\ndef test_spin():\n    assert spin() == 3\n",
 }
 
 
+#: What the copy has of the tool: it runs there.
+OURS = ("forks", "outcome")
+
+
 @pytest.fixture
-def judge(tmp_path: Path) -> Judge:
+def judge(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Judge]:
     """A project of one module: boundaries that are looked at or not, a loop, a test that fails without a change."""
-    root, scratch, reported = tmp_path / "root", tmp_path / "scratch", Path("tools", "mutants", "outcome.py")
-    (root / reported).parent.mkdir(parents=True)
-    for name, text in {**PROJECT, "part.py": PART, str(reported): (ROOT / reported).read_text()}.items():
+    root, scratch = tmp_path / "root", tmp_path / "scratch"
+    ours = {f"tools/mutants/{name}.py": (ROOT / f"tools/mutants/{name}.py").read_text() for name in OURS}
+    (root / "tools" / "mutants").mkdir(parents=True)
+    for name, text in {**PROJECT, "part.py": PART, **ours}.items():
         (root / name).write_text(text)
     scratch.mkdir()
     git(root, "init")
     tree = Tree(root, tmp_path / "copy")
-    return Judge(tree, scratch, Natives(tree.folder, scratch, ["part.py"]), limit_s=6)
+    monkeypatch.setattr("tools.mutants.judge.TEST_LIMIT_S", 1.0)
+    monkeypatch.setattr("tools.mutants.judge.SOUND_PART", 0.9)
+    found = Judge(tree, scratch, Natives(tree.folder, scratch, ["part.py"], tmp_path / "kept"))
+    yield found
+    found.end()
 
 
 def of_part(after: str) -> SourceMutant:
@@ -297,31 +347,47 @@ def of_part(after: str) -> SourceMutant:
 
 @pytest.mark.slow
 def test_a_mutant_that_tests_look_at_is_noticed_and_another_survives(judge: Judge, tmp_path: Path) -> None:
-    sound = judge.sound("test_far.py")
-    assert (sound.is_judge, sound.left_out) == (True, ("test_far.py::test_broken",))
-    assert judge.judged(of_part("if distance > 10:"), [sound]).verdict is MutantStatus.SURVIVED
-    noticed = judge.judged(of_part("if distance < 10:"), [sound])
+    boundary, opposite = of_part("if distance > 10:"), of_part("if distance < 10:")
+    assert judge.judged(boundary, ["test_far.py"]).verdict is MutantStatus.SURVIVED
+    assert judge.sound_s("test_far.py::test_broken") is None
+    noticed = judge.judged(opposite, ["test_far.py"])
     assert (noticed.verdict, noticed.by) == (MutantStatus.NOTICED, "test_far.py::test_far")
-    assert judge.judged(of_part("if distance < 10:"), []).verdict is MutantStatus.UNTESTED
+    assert judge.judged(opposite, []).verdict is MutantStatus.UNTESTED
+    # Those that stand further away are asked last, and after what has no tests that pass.
+    far = judge.judged(boundary, ["test_far.py", "test_spin.py", "test_more.py"])
+    assert (far.verdict, far.by) == (MutantStatus.NOTICED, "test_more.py::test_more")
+    # Those that are long are asked when the others have not noticed anything.
+    last = judge.judged(boundary, ["test_long.py", "test_spin.py"])
+    assert (last.verdict, last.by) == (MutantStatus.NOTICED, "test_long.py::test_long")
+    ended = judge.judged(boundary, ["test_ended.py"])
+    assert (ended.verdict, ended.by) == (MutantStatus.NOTICED, "test_ended.py::test_ended")
     assert {(tmp_path / name / "part.py").read_text() for name in ("root", "copy/tree")} == {PART}
 
 
 @pytest.mark.slow
 def test_what_keeps_more_memory_than_it_may_is_ended(judge: Judge, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert judge.sound("test_spin.py").is_judge
-    monkeypatch.setattr("tools.mutants.judge.MOST_KB", 1)
-    monkeypatch.setattr("tools.mutants.judge.CLOCK_LIMIT_S", 60.0)
-    began = time.monotonic()
-    assert not judge.sound("test_slow.py").is_judge
-    assert time.monotonic() - began < 3.0, "before its time of a processor"
+    assert judge.sound_s("test_spin.py::test_spin") is not None
+    monkeypatch.setattr("tools.mutants.judge.TEST_LIMIT_S", 15.0)
+    monkeypatch.setattr("tools.mutants.judge.MOST_KB", 80 << 10)
+    began = time.process_time()
+    assert judge.sound_s("test_kept.py::test_kept") is None
+    assert time.process_time() - began < 5.0, "before its time of a processor"
 
 
-@pytest.mark.soak  # the loop keeps a processor busy as long as it may
+@pytest.mark.slow
 def test_an_endless_loop_is_noticed_by_its_time_where_the_sound_program_is_soon_done(judge: Judge) -> None:
     loop = of_part("pass")
-    assert judge.judged(loop, [judge.sound("test_spin.py")]).verdict is MutantStatus.TIMED_OUT
-    slow = SoundTests(file="test_slow.py", is_judge=True)  # as long as the loop, without a change
-    assert judge.judged(loop, [slow]).verdict is MutantStatus.UNDECIDED
+    found = judge.judged(loop, ["test_spin.py"])
+    assert (found.verdict, found.by) == (MutantStatus.TIMED_OUT, "test_spin.py::test_spin")
+    assert judge.judged(loop, ["test_slow.py"]).verdict is MutantStatus.UNDECIDED  # it lasts long without a change
+
+
+@pytest.mark.slow
+def test_no_other_test_begins_when_the_time_is_over(judge: Judge, monkeypatch: pytest.MonkeyPatch) -> None:
+    boundary = of_part("if distance > 10:")
+    monkeypatch.setattr("tools.mutants.judge.BEGIN_S", 0.0)
+    found = judge.judged(boundary, ["test_spin.py", "test_more.py"])  # one test runs at least
+    assert found.verdict is MutantStatus.SURVIVED
 
 
 @pytest.mark.parametrize(

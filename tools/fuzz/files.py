@@ -486,7 +486,7 @@ FORMATS: Mapping[str, FileFormat] = {
     "fleet": FileFormat(_own(_text("seed.toml", FULL, own_toml=_flash().encode())), "toml", use_fleet),
     "flash": FileFormat(_own(_text("seed.toml", _flash())), "toml", use_flash),
     "sensor-errors": FileFormat(_own(_text("seed.toml", _sensor_errors())), "toml", use_sensor_errors),
-    "robot": FileFormat(_robots, "toml", use_robot),
+    "robot-file": FileFormat(_robots, "toml", use_robot),
     "aria-robot": FileFormat(_own(_text("seed.p", MINE)), "words", use_robot),
     "scenario": FileFormat(_scenarios, "toml", use_scenario),
     "pinout": FileFormat(lambda: _shipped("adapter_sim", ".toml"), "toml", use_pinout),

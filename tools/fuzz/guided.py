@@ -63,6 +63,12 @@ def names() -> list[str]:
     return [*protocol.TARGETS, *chip.TARGETS, *files.FORMATS]
 
 
+def begins_with(seeds: list[bytes]) -> list[bytes]:
+    """Return those seeds that a search begins with: the short ones, or else the shortest."""
+    longest = max([LONGEST_SEARCHED, min(map(len, seeds), default=0)])
+    return [each for each in seeds if len(each) <= longest]
+
+
 def kept(name: str) -> list[bytes]:
     """Return the inputs of a target that were worth keeping."""
     path = CORPUS / f"{name}.hex"
@@ -96,9 +102,10 @@ def search(name: str, words: list[str]) -> None:
 def searched(name: str, seconds: int) -> tuple[int, str]:
     """Search in a process of its own; return its exit code, and what it came to in words."""
     _, seeds = chosen(name)
-    folder = WORK / name
-    fill(folder, [each for each in (*seeds, *kept(name)) if len(each) <= LONGEST_SEARCHED])
-    limits = (f"-max_len={LONGEST_SEARCHED}", f"-timeout={SLOWEST_S}", "-rss_limit_mb=4096", "-print_final_stats=1")
+    folder, begun = WORK / name, begins_with([*seeds, *kept(name)])
+    fill(folder, begun)
+    longest = max(LONGEST_SEARCHED, *map(len, begun))
+    limits = (f"-max_len={longest}", f"-timeout={SLOWEST_S}", "-rss_limit_mb=4096", "-print_final_stats=1")
     done = _run(name, f"-max_total_time={seconds}", *limits, f"-artifact_prefix={folder}-", str(folder))
     found = re.findall(r"cov: (\d+) ft: (\d+) corp: (\d+)", done.stderr)
     runs = re.search(r"stat::number_of_executed_units: *(\d+)", done.stderr)

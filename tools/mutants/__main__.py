@@ -3,7 +3,7 @@
     python -m tools.mutants --since main      lines that differ from a commit
     python -m tools.mutants p2os --count 60   60 changes of files, drawn by seed
     python -m tools.mutants --sample ci       one of samples.toml, with its floor
-    python -m tools.mutants --planted         the faults of planted.toml
+    python -m tools.mutants --planted         the faults of planted.toml, or of another file
 
 What was judged is kept in build/mutants; the same words resume a run.
 Exit code 0: all noticed, or the floor met; 1: not; 2: usage; 130: interrupted.
@@ -57,7 +57,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("files", nargs="*", metavar="FILE", help="whole files, or all of folders")
     parser.add_argument("--since", metavar="COMMIT", help="the lines that differ from this commit")
     parser.add_argument("--sample", metavar="NAME", help="a sample of samples.toml")
-    parser.add_argument("--planted", action="store_true", help="the faults of planted.toml")
+    parser.add_argument(
+        "--planted", type=Path, nargs="?", const=PLANTED, metavar="TOML", help="the faults of planted.toml, or another"
+    )
     parser.add_argument("--count", type=_positive, help="how many to draw (default: all)")
     parser.add_argument("--seed", type=int, help="of the draw (default: 1)")
     parser.add_argument("--floor", type=float, help="per cent that are to be noticed (default: all of them)")
@@ -92,10 +94,10 @@ def _judged(parser: argparse.ArgumentParser, options: argparse.Namespace) -> int
         parser.set_defaults(**known[options.sample])
         options = parser.parse_args()
         options.files = options.files or known[options.sample]["files"]
-    if [bool(options.files), options.since is not None, options.planted].count(True) != 1:
+    if [bool(options.files), options.since is not None, options.planted is not None].count(True) != 1:
         parser.error("name files, or a commit by --since, or a --sample, or take what is --planted")
-    if options.planted:
-        found = changes.planted(tomllib.loads(PLANTED.read_text(encoding="utf-8"))["fault"])
+    if options.planted is not None:
+        found = changes.planted(changes.read_planted(options.planted))
         lines: changes.Lines = changes.files(dict.fromkeys(mutant.path for mutant in found))
     else:
         lines = changes.since(options.since) if options.since is not None else changes.files(options.files)

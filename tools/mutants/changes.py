@@ -2,10 +2,11 @@
 
 import re
 import subprocess
+import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
-from tools.mutants import c_source, python_source
+from tools.mutants.languages import c_source, python_source
 from tools.mutants.mutant import Edit, SourceMutant, edited
 
 ROOT = Path(__file__).parents[2]
@@ -69,6 +70,20 @@ def mutants_of(lines: Lines, root: Path = ROOT) -> list[SourceMutant]:
         made = LANGUAGES[Path(path).suffix](path, (root / path).read_bytes())
         found += [each for each in made if wanted is None or wanted & {*range(each.first_line, each.last_line + 1)}]
     return found
+
+
+def read_planted(file: Path) -> list[dict[str, str]]:
+    """Return the faults that somebody has put down in a file, as planted.toml has them.
+
+    Raises:
+        ChangeError: The file is none of that kind.
+        OSError: It cannot be read.
+    """
+    try:
+        rows = tomllib.loads(file.read_text(encoding="utf-8"))["fault"]
+        return [{key: str(row[key]) for key in ("path", "before", "after")} for row in rows]
+    except (ValueError, LookupError, TypeError) as error:
+        raise ChangeError(f"{file}: {error!r} (hint: [[fault]] with path, before and after, as planted.toml)") from None
 
 
 def planted(rows: Iterable[Mapping[str, str]]) -> list[SourceMutant]:

@@ -5,11 +5,10 @@ import threading
 import tomllib
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from tools.mutants.judge import MutantOutcome, MutantStatus, SoundTests
+from tools.mutants.judge import NOTICED, MutantOutcome, MutantStatus
 from tools.mutants.mutant import SourceMutant
 
 #: The committed list.
@@ -22,9 +21,15 @@ HEADER = """\
 
 Row = tuple[str, str, str]
 
+#: Seconds by which a file of tests may take longer than it is known to.
+LEAST_S = 0.1
+
 
 class Ledger:
-    """Judgements by the key of the question, a line of JSON each, written when they are made.
+    """Judgements, a line of JSON each, written when they are made.
+
+    One that a test has noticed holds as long as that file of tests stays as it is; one that tests have not, as long as
+    these are the nearest, and stay as they are.
 
     Args:
         file: Where they are kept.
@@ -32,40 +37,67 @@ class Ledger:
 
     def __init__(self, file: Path) -> None:
         self._file, self._lock = file, threading.Lock()
-        self._judged: dict[str, MutantOutcome] = {}
-        self._sound: dict[tuple[str, str], SoundTests] = {}
+        self._judged: dict[str, list[tuple[MutantOutcome, dict[str, str]]]] = {}
+        self._sound: dict[str, dict[str, float | None]] = {}
+        #: Seconds of a processor that files of tests took when they were last run to their ends.
+        self.lasted: dict[str, float] = {}
         lines = file.read_text(encoding="utf-8").splitlines() if file.exists() else []
         for line in lines:
-            with suppress(ValueError, KeyError, TypeError):  # cut where a run was ended
+            with suppress(ValueError, KeyError, TypeError, AttributeError):  # cut where a run was ended
                 self._read(json.loads(line))
 
-    def judgement(self, key: str) -> MutantOutcome | None:
-        """Return the judgement of a question, or nothing."""
-        return self._judged.get(key)
+    def judgement(self, mutant: SourceMutant, asked: Mapping[str, str]) -> MutantOutcome | None:
+        """Return what was found of a mutant, or nothing.
 
-    def sound(self, digest: str, test: str) -> SoundTests | None:
-        """Return what a file of tests said of the sound program in a tree that held the same, or nothing."""
-        return self._sound.get((digest, test))
+        Args:
+            mutant: Which.
+            asked: Its nearest files of tests, each with a digest of it.
+        """
+        for judgement, files in reversed(self._judged.get(mutant.key, [])):
+            is_all = judgement.verdict in {*NOTICED, MutantStatus.NO_MUTANT} or files.keys() == asked.keys()
+            if is_all and files.items() <= asked.items():
+                return judgement
+        return None
 
-    def add(self, key: str, mutant: SourceMutant, judgement: MutantOutcome) -> None:
+    def sound(self, digest: str) -> dict[str, float | None]:
+        """Return in what time tests pass on the sound program in a tree that held the same; none where they fail."""
+        return self._sound.setdefault(digest, {})
+
+    def add(self, mutant: SourceMutant, asked: Mapping[str, str], judgement: MutantOutcome) -> None:
         """Keep a judgement."""
-        row = {"key": key, "verdict": judgement.verdict.value, "by": judgement.by,
+        by = judgement.by.partition("::")[0]
+        files = {
+            name: digest for name, digest in asked.items()
+            if judgement.verdict is not MutantStatus.NO_MUTANT and (judgement.verdict not in NOTICED or name == by)
+        }  # fmt: skip
+        row = {"key": mutant.key, "verdict": judgement.verdict.value, "by": judgement.by, "files": files,
                "seconds": round(judgement.seconds, 1), "kind": mutant.kind, "name": mutant.name}  # fmt: skip
         self._append(row)
 
-    def add_sound(self, digest: str, sound: SoundTests) -> None:
-        """Keep what a file of tests says of the sound program."""
-        if (digest, sound.file) not in self._sound:
-            self._append({"tree": digest, **asdict(sound)})
+    def add_sound(self, digest: str, tests: Mapping[str, float | None]) -> None:
+        """Keep what tests say of the sound program."""
+        known = self._sound.get(digest, {})
+        if new := {test: seconds for test, seconds in tests.items() if test not in known}:
+            self._append({"tree": digest, "sound": new})
+
+    def add_lasted(self, files: Mapping[str, float]) -> None:
+        """Keep how long files of tests take, where that is not known about."""
+        known = self.lasted
+        new = {
+            name: round(seconds, 2) for name, seconds in files.items()
+            if not known.get(name, -1.0) / 2 <= seconds <= known.get(name, -1.0) * 2 + LEAST_S
+        }  # fmt: skip
+        if new:
+            self._append({"lasted": new})
 
     def _read(self, row: dict[str, Any]) -> None:
-        if "tree" in row:
-            fields = {key: value for key, value in row.items() if key != "tree"}
-            self._sound[row["tree"], row["file"]] = SoundTests(**fields | {"left_out": tuple(row["left_out"])})
+        if "lasted" in row:
+            self.lasted |= row["lasted"]
+        elif "sound" in row:
+            self._sound.setdefault(row["tree"], {}).update(row["sound"])
         else:
-            self._judged[row["key"]] = MutantOutcome(
-                verdict=MutantStatus(row["verdict"]), by=row["by"], seconds=row["seconds"]
-            )
+            judgement = MutantOutcome(verdict=MutantStatus(row["verdict"]), by=row["by"], seconds=row["seconds"])
+            self._judged.setdefault(row["key"], []).append((judgement, dict(row["files"].items())))
 
     def _append(self, row: dict[str, Any]) -> None:
         with self._lock:

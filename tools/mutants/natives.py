@@ -4,6 +4,7 @@ Which sources and flags make a library says pyproject.toml. Optimised less than 
 the same program, sooner built.
 """
 
+import hashlib
 import os
 import shlex
 import subprocess
@@ -18,6 +19,8 @@ from tools.mutants.mutant import SourceMutant
 
 #: Most time that a compiler has for one source, or a linker.
 COMPILER_LIMIT_S = 120
+#: Of files that a library may be made of.
+ENDINGS = (".c", ".h", ".cpp", ".hpp", ".inc")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,12 +58,13 @@ class Natives:
         tree: The copy; it holds sound sources but in `built_with`.
         scratch: A folder for what is compiled.
         paths: The files that will change.
+        kept: Where the objects of sound sources are kept from one run to the next.
 
     Raises:
         OSError: A source does not compile as it stands.
     """
 
-    def __init__(self, tree: Path, scratch: Path, paths: Iterable[str]) -> None:
+    def __init__(self, tree: Path, scratch: Path, paths: Iterable[str], kept: Path) -> None:
         self._tree, self._objects, self._scratch = tree, scratch, scratch
         folders = {tuple(path.split("/")[:2]) for path in paths if not path.endswith(".py")}
         self._libraries = [
@@ -69,13 +73,19 @@ class Natives:
         ]  # fmt: skip
         self._needs: dict[Path, frozenset[str]] = {}  # of an object, the files that it is made of
         for library in self._libraries:
+            of_library = _digest(tree, library)
             for name in library.sources:
                 file = self._object(library, name)
-                compiled = self._compiled(library, name)
-                if compiled is None:
-                    raise OSError(f"{name} does not compile as it stands (hint: make setup)")
-                file.write_bytes(compiled)
-                self._needs[file] = self._read_needs()
+                before = [kept / f"{of_library}-{file.name}{ending}" for ending in ("", ".d")]
+                if not all(each.exists() for each in before):
+                    compiled = self._compiled(library, name)
+                    if compiled is None:
+                        raise OSError(f"{name} does not compile as it stands (hint: make setup)")
+                    kept.mkdir(parents=True, exist_ok=True)
+                    before[1].write_bytes((scratch / "made.d").read_bytes())
+                    before[0].write_bytes(compiled)
+                file.write_bytes(before[0].read_bytes())
+                self._needs[file] = _needs(before[1])
 
     def beside(self, tree: Path, scratch: Path) -> "Natives":
         """Return those of another copy, which need not compile what is sound again."""
@@ -130,7 +140,19 @@ class Natives:
             return False
         return done.returncode == 0
 
-    def _read_needs(self) -> frozenset[str]:
-        rule = (self._scratch / "made.d").read_text(encoding="utf-8").replace("\\\n", " ").partition(":")[2]
-        inside = (os.path.normpath(word) for word in rule.split() if not word.startswith("/"))
-        return frozenset(Path(each).as_posix() for each in inside)
+
+def _needs(file: Path) -> frozenset[str]:
+    """Return the project's files that an object is made of, as the compiler notes them."""
+    rule = file.read_text(encoding="utf-8").replace("\\\n", " ").partition(":")[2]
+    inside = (os.path.normpath(word) for word in rule.split() if not word.startswith("/"))
+    return frozenset(Path(each).as_posix() for each in inside)
+
+
+def _digest(tree: Path, library: Library) -> str:
+    """Return a name of all that a library may be made of."""
+    hashed = hashlib.sha256(repr(library).encode())
+    for folder in sorted({name.split("/")[0] for name in library.sources}):
+        for path in sorted((tree / folder).rglob("*")):
+            if path.suffix in ENDINGS:
+                hashed.update(f"{path.relative_to(tree)}\0".encode() + hashlib.sha256(path.read_bytes()).digest())
+    return hashed.hexdigest()[:16]

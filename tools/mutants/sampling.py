@@ -3,21 +3,24 @@
 Invariant: a sample is the first of a drawn order that count, whatever takes how long.
 """
 
+import hashlib
 import sys
 from collections.abc import Container, Iterable, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from queue import SimpleQueue
-from threading import Lock
 from typing import Self
 
 from tools.mutants.changes import ChangeError
-from tools.mutants.judge import NOTICED, Judge, MutantOutcome, MutantStatus, SoundTests, chosen, is_mutant
+from tools.mutants.judge import NOTICED, Judge, MutantOutcome, MutantStatus, is_mutant
 from tools.mutants.ledger import Ledger, Row
 from tools.mutants.mutant import SourceMutant
 from tools.mutants.natives import Natives
-from tools.mutants.nearest import Nearest
+from tools.mutants.nearest import Nearest, cheapest_first
 from tools.mutants.tree import TREE, Tree
+
+#: Where the objects of sound sources are kept, in the project.
+KEPT_OBJECTS = Path("build", "mutants", "objects")
 
 
 class Court:
@@ -40,8 +43,8 @@ class Court:
         self._judges: list[Judge] = []
         self._digest, self._strangers = "", set[str]()
         self._free: SimpleQueue[Judge] = SimpleQueue()
-        self._sound: dict[str, Future[SoundTests]] = {}
-        self._lock = Lock()
+        self._sound: dict[str, float | None] = {}
+        self._digests: dict[str, str] = {}
         self._pool = ThreadPoolExecutor(jobs)
 
     def __enter__(self) -> Self:
@@ -74,50 +77,37 @@ class Court:
             tree = Tree(self._root, place)
             self._digest = tree.digest
             if natives is None:
-                natives = Natives(tree.folder, scratch, self._paths)
+                natives = Natives(tree.folder, scratch, self._paths, self._root / KEPT_OBJECTS)
                 strangers = [path for path in self._paths if not path.endswith(".py") and not natives.knows(path)]
                 if strangers and len(strangers) == len(self._paths):
                     raise ChangeError(f"{strangers[0]} is part of no library that the tests load")
                 self._strangers = {*strangers}
-            self._judges.append(Judge(tree, scratch, natives.beside(tree.folder, scratch)))
+            self._sound |= self._ledger.sound(tree.digest)
+            beside = natives.beside(tree.folder, scratch)
+            self._judges.append(Judge(tree, scratch, beside, self._sound, self._ledger.add_lasted))
             self._free.put(self._judges[-1])
 
     def _judgement(self, mutant: SourceMutant) -> MutantOutcome:
         if mutant.path in self._strangers or not is_mutant(mutant):
             return MutantOutcome(verdict=MutantStatus.NO_MUTANT)
-        judge = self._free.get()
-        try:
-            nearest = self._nearest.of(mutant.path, mutant.first_line)
-            tests = chosen([self._sound_of(judge, test) for test in nearest])
-            asked = [
-                (self._folder / "0" / TREE / test.file).read_bytes() + repr(test.left_out).encode() for test in tests
-            ]
-            key = mutant.key(asked)
-            judgement = self._ledger.judgement(key)
-            if judgement is None:
-                judgement = judge.judged(mutant, tests)
-                self._ledger.add(key, mutant, judgement)
-        finally:
-            self._free.put(judge)
+        files = cheapest_first(self._nearest.of(mutant.path, mutant.first_line), self._ledger.lasted)
+        asked = {name: self._digest_of(name) for name in files}
+        judgement = self._ledger.judgement(mutant, asked)
+        if judgement is None:
+            judge = self._free.get()
+            try:
+                judgement = judge.judged(mutant, files)
+            finally:
+                self._free.put(judge)
+            self._ledger.add(mutant, asked, judgement)
+            self._ledger.add_sound(self._digest, {**self._sound})
         return judgement
 
-    def _sound_of(self, judge: Judge, test: str) -> SoundTests:
-        """Return what a file of tests says of the sound program; who asks first finds out."""
-        with self._lock:
-            is_first = test not in self._sound
-            found = self._sound.setdefault(test, Future())
-        if is_first:
-            try:
-                sound = self._ledger.sound(self._digest, test) or judge.sound(test)
-                self._ledger.add_sound(self._digest, sound)
-                found.set_result(sound)
-            except BaseException as error:
-                found.set_exception(error)
-                raise
-            if sound.left_out:
-                names = ", ".join(sound.left_out)
-                print(f"\rmutants: left out, for they fail or last too long without a change: {names}", file=sys.stderr)
-        return found.result()
+    def _digest_of(self, name: str) -> str:
+        if name not in self._digests:
+            text = (self._folder / "0" / TREE / name).read_bytes()
+            self._digests[name] = hashlib.sha256(text).hexdigest()[:16]
+        return self._digests[name]
 
 
 def sample(

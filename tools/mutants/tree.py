@@ -43,6 +43,8 @@ class Tree:
                 copy.parent.mkdir(parents=True, exist_ok=True)
                 shutil.copy2(root / name, copy, follow_symlinks=False)
                 hashed.update(f"{name}\0".encode() + hashlib.sha256(copy.read_bytes()).digest())
+                if copy.suffix == ".py":
+                    _copy_compiled(root / name, copy)
         #: Names what the copy holds.
         self.digest = hashed.hexdigest()
         self._install(self.path[0])
@@ -80,3 +82,11 @@ class Tree:
             written = path.with_name(f".{path.name}.written")  # a library that a process has mapped is not written into
             written.write_bytes(text)
             written.replace(path)
+
+
+def _copy_compiled(source: Path, copy: Path) -> None:
+    """Copy what Python and pytest have compiled of a module: they know it by its length and second, which are kept."""
+    for kept in source.parent.glob(f"__pycache__/{source.stem}.*.pyc"):
+        place = copy.parent / kept.parent.name / kept.name
+        place.parent.mkdir(exist_ok=True)
+        shutil.copy2(kept, place)

@@ -64,6 +64,8 @@ class SurveyedContact:
     stand_to_rest_s: float | None
     #: Share of the looks at which its centre slid.
     slide_share: float
+    #: Whether it slid, had a stall bit, or touched nothing at `DECIDED_S`, or was blocked so that the bit has its time.
+    is_decided: bool
     #: The longest time, from `DECIDED_S` on, in which it touched and neither slid nor had a stall bit.
     undecided_s: float
     sign_changes: int
@@ -75,6 +77,8 @@ class SurveyedContact:
     def faults(self) -> list[str]:
         """Return what of this breaks the contract."""
         found = []
+        if not self.is_decided:
+            found.append(f"neither slides nor stalls {DECIDED_S:g} s after the first touch")
         # What slid until then may come to be blocked.
         if self.undecided_s > STALL_S:
             found.append(f"neither slides nor stalls for {self.undecided_s:.2f} s")
@@ -105,7 +109,7 @@ def measure(
         return None
     states = list(_watch(body, COMMAND_MPS, watched_s))
     stopping = list(_watch(body, 0.0, 1.0))
-    return _judge(body.name, model, heading_deg, states, stopping)
+    return judged_states(body.name, model, heading_deg, states, stopping)
 
 
 def _watch(body: RobotBody, speed_mps: float, seconds: float) -> Iterator[BodyState]:
@@ -114,7 +118,7 @@ def _watch(body: RobotBody, speed_mps: float, seconds: float) -> Iterator[BodySt
         yield body.state
 
 
-def _judge(
+def judged_states(
     name: str, model: RobotParameters, heading_deg: float, states: Sequence[BodyState], stopping: Sequence[BodyState]
 ) -> SurveyedContact:
     """Return what the states after a first touch, and those after the command to stop, amount to."""
@@ -124,7 +128,10 @@ def _judge(
     stands = [state.stalled_left and state.stalled_right for state in states]
     blocked = [_rim(state) < BLOCKED_SHARE * COMMAND_MPS for state in states]
     rests = [max(_rim(state), speed) <= RESTING_MPS for state, speed in zip(states, speeds, strict=True)]
-    late = range(round(DECIDED_S / LOOK_S), len(states))
+    decided = round(DECIDED_S / LOOK_S) - 1  # the first state is a look after the touch
+    undecided = [
+        state.in_contact and not slide and not stall for state, slide, stall in zip(states, slides, stalls, strict=True)
+    ][decided:]
     turns = [state.turn_radps for state in states if abs(state.turn_radps) > TURNING_RADPS]
     rest = next((look for look in reversed(range(len(states))) if not rests[look]), -1) + 1
     stand_s = _first(stands)
@@ -146,7 +153,8 @@ def _judge(
         rest_s=rest_s if rest < len(states) else None,
         stand_to_rest_s=None if stand_s is None else max(0.0, rest_s - stand_s),
         slide_share=sum(slides) / len(slides),
-        undecided_s=_longest(states[n].in_contact and not slides[n] and not stalls[n] for n in late),
+        is_decided=not any(undecided[:1]) or blocked[decided],
+        undecided_s=_longest(undecided),
         sign_changes=sum(one * other < 0 for one, other in itertools.pairwise(turns)),
         energy=max(energies) / COMMAND_MPS**2,
         stop_s=_first(_rim(state) < RESTING_MPS for state in stopping),

@@ -47,6 +47,11 @@ CASES = [
      None),
     (FaultKind.DIVIDE_BY_ZERO, store(CCR, DIV_0_TRP) + "isb\nmovs r1, #7\nmovs r2, #0\nbad: sdiv r0, r1, r2", "bad",
      None),
+    # Where the memory map lets nothing be executed, and beside it, where nothing is fitted.
+    *((FaultKind.EXECUTE_NEVER, f"mov32 r1, #{address + 1}\nblx r1", address, None)
+      for address in (0x40000000, 0x5FFFFFFC, 0xA0000000)),
+    *((FaultKind.FETCH_ERROR, f"mov32 r1, #{address + 1}\nblx r1", address, address)
+      for address in (0x3FFFFFFC, 0x60000000, 0x9FFFF000)),
 ]  # fmt: skip
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from bluepill_sim.debug.execution import Execution
 from bluepill_sim.debug.gdb_session import GdbSession
+from bluepill_sim.debug.inspector import Inspector
 from bluepill_sim.debug.machine import LoneChip
 from bluepill_sim.peripherals.rcc import ResetCause
 
@@ -39,6 +40,18 @@ class Session:
     def wait(self, span_ns: int) -> str:
         text = f"wait {span_ns}ns"
         return binascii.unhexlify(self._session.answer(b"qRcmd," + text.encode().hex().encode())).decode()
+
+
+@pytest.mark.parametrize(("name", "mask"), [("primask", 1), ("faultmask", 1), ("basepri", 0xF0), ("control", 2)])
+def test_a_debugger_sets_the_bits_that_a_mask_register_has(make: Any, name: str, mask: int) -> None:
+    """Not CONTROL's bit 0 here: without privilege the rest could not be written back."""
+    inspector = Inspector(make("stop: b stop").run(10).board)
+    for value in (mask, 0, 0xFF & ~(name == "control"), 0):
+        inspector.set_register(name, value)
+        assert inspector.register(name) == value & mask
+        assert {other: inspector.register(other) for other in ("primask", "faultmask", "basepri", "control")} == {
+            "primask": 0, "faultmask": 0, "basepri": 0, "control": 0, name: value & mask,
+        }  # fmt: skip
 
 
 @pytest.mark.parametrize("name", ["IWDG", "WWDG"])

@@ -291,6 +291,14 @@ def test_wait_states_have_their_limits_to_the_hertz_and_a_crystal_its_tolerance(
     assert (illegal_settings(clocks) == []) is is_good
 
 
+@pytest.mark.parametrize(("prefetch", "hclk_hz", "is_good"), [
+    (True, 8_000_000, True), (True, 4_000_000, True), (False, 8_000_000, True), (False, 4_000_000, False),
+])  # fmt: skip
+def test_prefetch_may_be_off_without_an_ahb_prescaler(prefetch: bool, hclk_hz: int, is_good: bool) -> None:
+    clocks = Clocks(sysclk_hz=8_000_000, hclk_hz=hclk_hz, flash_prefetch=prefetch)
+    assert (illegal_settings(clocks) == []) is is_good
+
+
 def test_prefetch_must_stay_on_with_an_ahb_prescaler(fake_chip: Any) -> None:
     fake_chip.write("FLASH.ACR", 0)
     assert fake_chip.warnings == {}

@@ -383,8 +383,9 @@ def test_a_speed_above_the_robots_own_is_said(fast: object, run: Run, capsys: Ca
 
 
 def test_a_robot_on_its_way_shows_where_it_is_and_an_interruption_says_that_it_stopped() -> None:
+    """So slowly that it is far from its end, and from a wall, when a busy machine comes to look."""
     with contextlib.closing(RecordingRobot()) as robot:
-        driver = Driver(forked_p2os("drive", robot.url, "--forward", "3m"), on_terminal=True)
+        driver = Driver(forked_p2os("drive", robot.url, "--forward", "3m", "--vel", "50mm/s"), on_terminal=True)
         robot.wait_until_it_drives()
         shown = seen_until(driver, "m/s")
         driver.process.send_signal(signal.SIGINT)

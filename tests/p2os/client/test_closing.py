@@ -237,6 +237,20 @@ def test_an_asyncio_callback_may_have_the_robot_closed(served: ServedRobot) -> N
     assert recorder.sent[-4:] == CLOSING_COMMANDS
 
 
+def test_an_asyncio_robot_that_is_closed_leaves_nothing_in_its_loop(served: ServedRobot) -> None:
+    async def story() -> None:
+        loop = asyncio.get_running_loop()
+        async with AsyncRobot(served.url, settings=QUICK) as robot:
+            robot.set_velocity(0.3)
+            await robot.sleep(0.05)
+            assert len(asyncio.all_tasks()) > 1, "the one that closes it with the loop"
+        await asyncio.sleep(0)
+        assert asyncio.all_tasks() == {asyncio.current_task()}
+        assert [each for each in loop._scheduled if not each.cancelled()] == []  # type: ignore[attr-defined]
+
+    asyncio.run(story())
+
+
 def test_an_asyncio_robot_that_is_forgotten_is_stopped(served: ServedRobot) -> None:
     recorder = Recorder()
 

@@ -18,7 +18,7 @@ from p2os.client.settings import ClientSettings
 from p2os.errors import TransportError
 from p2os.protocol.commands import enable, rvel, stop, vel
 from p2os.transport.ports import Transport
-from simbase.timing import NS_PER_MS
+from simbase.timing import NS_PER_MS, NS_PER_S
 from tests.p2os.client.client_rig import Rig, new_pioneer
 from tests.p2os.client.served_robot import QUICK, Recorder, ServedRobot, until
 
@@ -141,6 +141,19 @@ def test_a_line_that_takes_no_bytes_is_lost_and_given_back() -> None:
     assert core.link is Link.FAILED
     assert core.problem is not None
     assert "bytes too many" in core.problem.reason
+
+
+def test_a_wait_has_parts_and_ends_with_its_time() -> None:
+    now_ns = 5_000 * NS_PER_MS
+    line = Line(RobotCore(ClientSettings()), None, lambda: now_ns)
+    waited = []
+    for wait_s in line.waits(lambda _: False, 0.6):
+        waited.append(round(wait_s, 3))
+        now_ns += round(wait_s * NS_PER_S)
+    assert waited == [0.25, 0.25, 0.1]
+    assert next(line.waits(lambda _: False, None)) == 0.25
+    assert list(line.waits(lambda _: False, 0.0)) == []
+    assert list(line.waits(lambda _: True, None)) == []
 
 
 def test_a_line_that_comes_too_late_is_given_back() -> None:

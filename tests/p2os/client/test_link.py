@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import pytest
 
-from p2os.client.link import TRY_LIMIT_NS, search_plan
+from p2os.client.link import PACKETS_THAT_PROVE_A_RATE, TRY_LIMIT_NS, search_plan
 from p2os.client.notices import (
     BaudKept,
     BaudRaised,
@@ -16,6 +16,7 @@ from p2os.client.notices import (
     ReconnectPlanned,
 )
 from p2os.client.outbox import Outbox, Send, SetBaud
+from p2os.client.robot_state import RobotState
 from p2os.client.settings import SEARCHED_BAUDS, ClientSettings
 from p2os.protocol.commands import Command, CommandNumber, enable, rvel, stop, vel
 from p2os.protocol.frames import Decoder, Frame
@@ -311,6 +312,12 @@ def test_the_rate_is_raised_where_the_robot_asks_for_it() -> None:
     rig = Rig(baud=9600)
     offer_raise(rig, obeys=True)
     rig.connect()
+    rig.until(lambda: rig.core.baud == 38400, within_s=1)
+    assert rig.line_baud == 38400
+    before = len(rig.news)
+    rig.until(lambda: bool(rig.notices(BaudRaised)), within_s=1)
+    heard = [type(each) for each in rig.news[before:]]
+    assert heard[: heard.index(BaudRaised)].count(RobotState) == PACKETS_THAT_PROVE_A_RATE - 1, "it is the second's"
     rig.run(1)
     assert rig.notices(BaudRaised) == [BaudRaised(38400)]
     assert rig.core.baud == 38400

@@ -9,7 +9,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from p2os.client.goals import GRACE_NS, DriveAxis, MotionGoal, TurnAxis
-from p2os.client.mover import MOTION_NUMBERS, SPEED_NUMBERS, WAYS, PlausibilityCheck, SentMotion, Speeds
+from p2os.client.mover import (
+    MOTION_NUMBERS,
+    SPEED_NUMBERS,
+    WAYS,
+    MotorState,
+    PlausibilityCheck,
+    SentMotion,
+    Speeds,
+)
 from p2os.client.notices import (
     DeadmanStopped,
     Disobeyed,
@@ -118,6 +126,13 @@ def test_a_flood_of_enables_holds_no_stop_off(values: tuple[bool, ...]) -> None:
     rig.run(0.1)
     assert rig.sent[-1][0] > stopped
     assert next(at for at, command in rig.sent if command == stop() and at >= stopped) - stopped <= 20 * MS
+
+
+def test_what_was_asked_of_the_motors_in_another_session_counts_for_nothing() -> None:
+    motors = MotorState()
+    assert [motors.ask(on=False, now=0), motors.ask(on=False, now=1)] == [True, False]
+    motors.new_session()
+    assert motors.ask(on=False, now=2)
 
 
 def test_the_same_enable_is_sent_again_after_200_ms_and_another_at_once() -> None:

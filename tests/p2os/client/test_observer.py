@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from p2os.client.core import RobotCore
-from p2os.client.goals import TurnAxis
+from p2os.client.goals import DriveAxis, TurnAxis
 from p2os.client.mover import MotorState
 from p2os.client.notices import OdometryDoubtful, PacketArrived, RobotUnknown
 from p2os.client.observer import Firmware, Observer, PoseKeeper, bumpers_of, limits_of
@@ -68,6 +68,19 @@ def test_a_sonar_keeps_its_last_reading_until_the_next() -> None:
     assert observer.take(StandardSip(), 10).sonar == ()
 
 
+@pytest.mark.parametrize(
+    ("axis", "far_mm_s", "is_standing"),
+    [(DriveAxis(1.0), 9, True), (DriveAxis(1.0), 10, False), (DriveAxis(1.0), -9, True), (DriveAxis(1.0), -10, False)],
+)
+def test_a_robot_on_its_way_stands_below_a_centimetre_a_second(
+    axis: DriveAxis, far_mm_s: int, is_standing: bool
+) -> None:
+    """Of the faster wheel, whichever that is."""
+    for left, right in ((far_mm_s, 0), (0, far_mm_s), (far_mm_s, far_mm_s), (far_mm_s, -far_mm_s)):
+        state = replace(Observer(P2DX).take(StandardSip(), 0), left_mps=left / 1000, right_mps=right / 1000)
+        assert axis.is_standing(state) is is_standing
+
+
 def test_flags_and_the_tail_are_read_where_the_family_has_them() -> None:
     observer = Observer(P2DX, Profile.ARCOS)
     state = observer.take(StandardSip(raw_flags=0b100001, tail=(130, 0, 0, 0, 0, 25, 80)), 0)
@@ -75,9 +88,10 @@ def test_flags_and_the_tail_are_read_where_the_family_has_them() -> None:
     assert state.stop_button is True
     assert state.state_of_charge == 0.8
     assert state.temperature_c == 25.0
-    cold = observer.take(StandardSip(tail=(130, 0, 0, 0, 0, -127)), 0)
-    assert cold.temperature_c is None
-    assert cold.motors_enabled is False
+    for raw, said in ((-128, None), (-127, None), (-126, -126.0), (0, 0.0)):
+        cold = observer.take(StandardSip(tail=(130, 0, 0, 0, 0, raw)), 0)
+        assert cold.temperature_c == said
+        assert cold.motors_enabled is False
 
 
 @pytest.mark.parametrize(("fitted", "pressed"), [(5, (1, 3)), (0, ()), (2, (1,))])

@@ -8,6 +8,7 @@ import pytest
 
 from p2os.client.observer import Bumpers, Observer
 from p2os.client.robot_state import RobotPose, RobotState
+from p2os.protocol.packets import SimLaserPacket
 from p2os.protocol.sip import SonarReading, StandardSip
 from p2os.robots.motor_step import STEP_MPS
 from p2os.robots.parameters import load_parameters
@@ -53,6 +54,11 @@ def test_a_speed_is_held_until_one_tick_before_the_deadman_and_stopped_at_it(nod
     assert node.advance_to(1000 + DEADMAN_NS) == [StopRequest()]
     assert node.next_deadline() is None
     assert node.advance_to(1 << 60) == []
+
+
+def test_a_scan_of_a_laser_that_the_robot_has_not_makes_nothing(node: RobotNode) -> None:
+    assert node.take_packet(SimLaserPacket(total=3, first=0, ranges_mm=(1, 2, 3)), 0) == []
+    assert list(node.at_connection()) == []
 
 
 def test_messages_that_ask_for_no_speed_do_not_put_the_deadman_off(node: RobotNode) -> None:

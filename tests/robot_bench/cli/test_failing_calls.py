@@ -14,7 +14,7 @@ import pytest
 
 from tests.robot_bench.cli.test_full_disks import CAMPAIGN, MOTORS, SCENARIO, VERBS, make_run
 from tests.tools.made_once import made_once
-from tests.whole.failing_calls import SOUND, Ended, FailedCall, Kind, Outcome, calls_of, library, run_verb
+from tests.whole.failing_calls import SOUND, Ended, FailedCall, Kind, Outcome, calls_of, library, run_verb, swept
 
 SEED = 39
 #: Where this stands in an output, or in the page of a run, so does how fast the machine was.
@@ -157,6 +157,6 @@ def test_calls_that_found_a_fault_are_reported(verb: str, call: FailedCall, shar
 @pytest.mark.parametrize("verb", [verb for verb, _ in VERBS])
 def test_every_call_of_a_verb_that_fails_is_reported(verb: str, shared: tuple[str, Path]) -> None:
     most = DRAWN if f"{verb} ".startswith(SLOW) and "--events e" not in verb else WHOLE
-    calls = calls_of(reference(*shared, verb).ended, random.Random(f"{SEED} {verb}"), most)
+    calls = swept(verb, reference(*shared, verb).ended, random.Random(f"{SEED} {verb}"), most)
     found = [problem for call in calls for problem in wrong(*shared, verb, call)]
     assert not found, "\n\n".join(found)

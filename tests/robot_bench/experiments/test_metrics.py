@@ -86,6 +86,17 @@ def test_two_poses_at_the_last_time_of_a_run_are_one_sample_of_its_rims(last_ms:
     assert metrics(drive_of_record("a run", record)).max_rim_mps2 == pytest.approx(most)
 
 
+def test_ranges_of_a_run_without_packets_are_in_seconds_and_metres() -> None:
+    record = RunRecord(
+        poses=[pose(0, 0, None), pose(3000, 0, None)],
+        sonar=[(1_000_000_000, [500, 5000]), (2_500_000_000, [250, 4000])],
+    )
+    sonar = drive_of_record("a run", record).sonar_m
+    assert {n: (steps.t_s.tolist(), steps.values.tolist()) for n, steps in sonar.items()} == {
+        0: ([1.0, 2.5], [0.5, 0.25]), 1: ([1.0, 2.5], [5.0, 4.0]),
+    }  # fmt: skip
+
+
 @pytest.mark.parametrize(("work", "energy"), [(None, None), (3_000_000, 3.0)])
 def test_what_events_tell_is_taken_and_what_they_do_not_tell_is_none(work: int | None, energy: float | None) -> None:
     poses = [pose(0, 0, 0), pose(1000, 500, work)]

@@ -81,6 +81,14 @@ def test_an_exchange_of_two_sensors_is_reported_by_their_answers(one: int, other
     assert exchanged(NETS, [answers(swapped)] * 3, side) == f"DD{one} and DD{other} exchanged"
 
 
+@pytest.mark.parametrize(("times", "is_sure"), [(1, False), (2, False), (3, True), (4, True)])
+def test_an_exchange_is_named_of_three_moments_that_agree(times: int, is_sure: bool) -> None:
+    swapped = AWAY | {3: AWAY[6], 6: AWAY[3]}
+    mirrored = {9 - place: codes for place, codes in AWAY.items()}
+    assert bool(exchanged(NETS, [answers(swapped)] * times, side)) is is_sure
+    assert bool(exchanged(NETS, [answers(mirrored)] * times, side)) is is_sure
+
+
 def test_all_answers_mirrored_are_left_and_right_exchanged() -> None:
     mirrored = {9 - place: codes for place, codes in AWAY.items()}
     assert exchanged(NETS, [answers(mirrored)] * 3, side).startswith("left and right exchanged")

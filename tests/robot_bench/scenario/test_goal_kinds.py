@@ -30,7 +30,11 @@ UM = 1_000_000
 
 
 def outcome(kind: str, run: Sequence[Event], end: int = 10 * S, **arguments: Any) -> GoalOutcome:
-    """Return what a goal says of a run; it must say the same where it was saved and restored between any two events."""
+    """Return what a goal says of a run.
+
+    It must say the same where it was saved and restored between any two events, and never otherwise than it has once
+    decided.
+    """
     goal = load_goal(
         {"kind": kind, **{key.rstrip("_"): value for key, value in arguments.items()}}, "mine.toml: [[goal]] 1"
     )
@@ -45,7 +49,8 @@ def outcome(kind: str, run: Sequence[Event], end: int = 10 * S, **arguments: Any
                 fresh.restore(judge.snapshot())
                 judge = fresh
         judge.advance_to(end)
-        (said,) = judge.at_end(RunEnd(end))
+        (said,), (decided,) = judge.at_end(RunEnd(end)), judge._decided
+        assert decided is None or decided.met == said.outcome.met
         assert not said.is_open
         found.append(said.outcome)
     assert found[0] == found[1]
@@ -105,6 +110,14 @@ def test_goal_avoid_and_goal_stay_within(x_m: float, met: bool) -> None:
 def test_goal_clearance(um: int, met: bool) -> None:
     found = outcome("clearance", [Clearance(t=0, um=900_000), Clearance(t=S, um=um)], least_m=0.2)
     assert (found.met, found.robustness) == (met, pytest.approx((um - 200_000) / UM))
+
+
+def test_what_is_as_near_as_it_may_be_decides_nothing() -> None:
+    """What comes nearer later is missed, and as far as it came at first below the limit."""
+    seen = [Clearance(t=t * S, um=um) for t, um in enumerate((900_000, 200_000, 150_000, 100_000))]
+    assert outcome("clearance", seen[:2], least_m=0.2).met
+    found = outcome("clearance", seen, least_m=0.2)
+    assert (found.met, found.robustness) == (False, pytest.approx(-0.1))
 
 
 def worked(*rows: tuple[int, float, float]) -> list[Event]:

@@ -26,6 +26,23 @@ def test_what_was_kept_of_a_target_is_read(name: str) -> None:
         target(data)
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_a_search_begins_at_what_is_right(name: str) -> None:
+    _, seeds = guided.chosen(name)
+    assert guided.begins_with(seeds), "it would have to find a whole file by itself"
+
+
+def test_every_target_has_a_name_of_its_own() -> None:
+    assert len(NAMES) == len({*NAMES})
+
+
+def test_a_search_begins_at_short_seeds_or_else_the_shortest() -> None:
+    short, long, longer = (bytes(guided.LONGEST_SEARCHED + more) for more in (0, 1, 2))
+    assert guided.begins_with([b"", short, long]) == [b"", short]
+    assert guided.begins_with([longer, long]) == [long]
+    assert guided.begins_with([]) == []
+
+
 @pytest.mark.parametrize("name", chip.TARGETS)
 def test_a_target_beside_the_chip_takes_nothing_and_its_seeds(name: str) -> None:
     for data in (b"", *chip.seeds(name)):

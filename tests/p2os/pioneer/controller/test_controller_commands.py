@@ -1,6 +1,7 @@
 """Every command of the table, to every firmware: known ones act, others are counted, none kills the robot."""
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -8,10 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from p2os.pioneer.controller.commands import HANDLERS
+from p2os.pioneer.devices.heading_sensors import COMPASS_NS, CompassMode
 from p2os.protocol.command_table import ROWS, Argument, CommandRow
 from p2os.protocol.commands import CommandNumber as C
 from p2os.protocol.frames import Frame
 from p2os.protocol.profiles import Profile
+from p2os.protocol.times import CYCLE_NS
 from tests.p2os.conftest import context_of
 from tests.tools.each_row import each_row
 
@@ -247,6 +250,36 @@ def test_a_compass_reads_clockwise_from_the_worlds_x_axis(robot: Any) -> None:
     robot.say(C.TCM2, 2)
     robot.run(100)
     assert [frame.kind for frame in robot.frames()].count(0xC0) == 1
+
+
+def test_a_compass_is_read_as_often_as_it_has_a_new_reading(robot: Any) -> None:
+    robot.open()
+    compass = robot.pioneer._context.devices.compass
+
+    def readings(ms: int) -> list[int]:
+        seen = [compass.read_ns]
+        for _ in range(ms // 10):
+            robot.run(10)
+            seen.append(compass.read_ns)
+        return sorted({*seen[1:]} - {seen[0]})
+
+    assert readings(1_000) == [], "it is off"
+    robot.say(C.TCM2, 1)
+    for mode in (CompassMode.IN_SIP, CompassMode.CONTINUOUS):
+        robot.say(C.TCM2, mode)
+        at = readings(2_000)
+        # At the first packet after its period, 100 ms apart.
+        assert {later - sooner for sooner, later in pairwise(at)} == {-(-COMPASS_NS // CYCLE_NS) * CYCLE_NS}
+        assert len(at) >= 2_000 * 1_000_000 // (COMPASS_NS + CYCLE_NS)
+
+
+@pytest.mark.parametrize(("mm", "nm"), [(1.0000016, 1_000_002), (1.0000014, 1_000_001), (-1.0000016, -1_000_002)])
+def test_the_way_is_counted_to_the_nearest_nanometre(robot: Any, mm: float, nm: int) -> None:
+    context = robot.pioneer._context
+    context.reckoning.travel_mm = mm
+    assert context.travel_nm == nm
+    context.reckoning.turned_rad = mm
+    assert context.heading_udeg == round(mm * 180_000_000 / 3.141592653589793)
 
 
 def test_after_a_reset_the_robot_receives_nothing_until_its_notice(make_robot: MakeRobot) -> None:

@@ -50,6 +50,23 @@ def test_every_fault_can_be_said_read_back_and_cleared(robot: Any, name: str) ->
         assert (context_of(robot.pioneer)["faults"], context_of(robot.pioneer)["devices"]) != injected
 
 
+#: The least and the most of each word of an input; a number beyond either is refused.
+BOUNDS = {"X": (0, 1023), "Y": (0, 1023), "BUTTON": (0, 1), "PORT": (1, 9), "RAW": (0, 1023), "BYTE": (0, 255)}
+
+
+@pytest.mark.parametrize(("name", "word"), [(name, word) for name, (words, _) in INPUTS.items() for word in words])
+def test_each_word_of_an_input_has_its_bounds(robot: Any, name: str, word: str) -> None:
+    robot.open()
+    middle = dict.fromkeys(INPUTS[name][0], "1")
+    values = ["on", "off"] if word == "ON_OFF" else list(map(str, BOUNDS[word]))
+    beyond = ["1", "yes"] if word == "ON_OFF" else [str(BOUNDS[word][0] - 1), str(BOUNDS[word][1] + 1), "0.5"]
+    for value in values:
+        robot.pioneer.do(" ".join([name, *(middle | {word: value}).values()]), robot.now)
+    for value in beyond:
+        with pytest.raises(UsageError, match=r"is no number of|is none of"):
+            robot.pioneer.do(" ".join([name, *(middle | {word: value}).values()]), robot.now)
+
+
 @pytest.mark.parametrize(
     "text",
     ["", "fault", "fault sonar-stuck", "fault sonar-stuck 9 1", "fault sonar-stuck 3 far", "fault sonar-stuck 3 1 2",

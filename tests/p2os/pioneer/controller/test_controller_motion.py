@@ -6,8 +6,9 @@ from typing import Any
 
 import pytest
 
+from p2os.pioneer.controller.commands import _signed16
+from p2os.protocol.commands import Command, vel2
 from p2os.protocol.commands import CommandNumber as C
-from p2os.protocol.commands import vel2
 from p2os.protocol.profiles import Profile
 
 MakeRobot = Callable[..., Any]
@@ -73,6 +74,14 @@ def test_an_unsigned_word_is_read_as_signed_and_never_as_full_speed(robot: Any) 
     robot.open()
     robot.say(C.VEL, 0xFF38)  # -200 as a client packs it that knows no type byte
     assert settle(robot) == (-200, -200)
+
+
+@pytest.mark.parametrize(
+    ("word", "read"),
+    [(0x7FFF, 32767), (0x8000, -32768), (0x8001, -32767), (0xFFFF, -1), (-1, -1), (-32768, -32768)],
+)
+def test_a_word_from_32768_up_is_a_negative_number(word: int, read: int) -> None:
+    assert _signed16(Command(C.VEL, word)) == read
 
 
 def test_stop_slows_down_and_emergency_stop_does_not(make_robot: MakeRobot) -> None:

@@ -51,6 +51,20 @@ def test_an_arc_in_small_steps_ends_on_its_circle() -> None:
     assert odometer.y_mm == pytest.approx(1000, abs=0.01)
 
 
+@given(st.lists(st.tuples(st.floats(-50, 50), st.floats(-50, 50)), min_size=1, max_size=20), st.integers(0, 20))
+def test_what_is_counted_is_the_way_of_each_rim_however_it_comes(
+    angles: list[tuple[float, float]], together: int
+) -> None:
+    """Of wheels of 2 m across, so that a radian is a metre; the sum of all ways, and the turn by the track."""
+    odometer, steps = reckoning(), [Turned(*pair) for pair in angles]
+    odometer.follow(steps[:together])
+    odometer.follow(steps[together:])
+    left_mm, right_mm = (angle * 1000 for angle in angles[-1])
+    assert (odometer.left_mm, odometer.right_mm) == pytest.approx((left_mm, right_mm), abs=1e-6)
+    assert odometer.travel_mm == pytest.approx((left_mm + right_mm) / 2, abs=1e-6)
+    assert odometer.turned_rad == pytest.approx((right_mm - left_mm) / TRACK_MM, abs=1e-6)
+
+
 def test_a_new_origin_moves_the_pose_but_not_the_odometer() -> None:
     odometer = reckoning()
     odometer.follow([Turned(0.1, 0.3)])

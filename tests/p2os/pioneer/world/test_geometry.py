@@ -1,6 +1,9 @@
 """Plan-view geometry: the way out of a hull, and things that stand elsewhere."""
 
+import cmath
 import math
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from hypothesis import assume, given, settings
@@ -8,8 +11,13 @@ from hypothesis import strategies as st
 
 from p2os.errors import WorldError
 from p2os.pioneer.body.ray_cast import cast
+from p2os.pioneer.world import parse_world
+from p2os.pioneer.world.drawing import start_arrow
+from p2os.pioneer.world.formats.annotation import Traits
+from p2os.pioneer.world.formats.collection import STANDS_STILL, Collection
 from p2os.pioneer.world.geometry import Footprint, hull_polygon, placed
-from p2os.pioneer.world.model import FARTHEST_M, Obstacle
+from p2os.pioneer.world.interchange.transform import from_roll_pitch_yaw
+from p2os.pioneer.world.model import FARTHEST_M, Obstacle, Pose
 from p2os.robots.parameters import load_parameters
 
 HULL = hull_polygon(load_parameters("p2dx").body)
@@ -61,6 +69,29 @@ def test_a_ray_meets_a_circle_from_outside_its_rim_or_its_inside(x: float, turn:
         assert cast([post], x, 2.0, [ray], way) == [pytest.approx(way)], "no farther than was asked"
     else:
         assert cast([post], x, 2.0, [ray], 3.0) == [3.0]
+
+
+@given(st.floats(-math.pi, math.pi), st.floats(0.1, 2.0))
+def test_the_arrow_at_the_start_looks_where_the_robot_does(heading: float, length: float) -> None:
+    """Its tip is a length ahead; what is behind is as far to the left as to the right."""
+    world = replace(parse_world('name = "a"\nextent_m = [-9, -9, 9, 9]', "a"), start=Pose(1.0, 2.0, heading))
+    ahead, left = (complex(math.cos(heading), math.sin(heading)) * way for way in (1, 1j))
+    shape = [(complex(*point) - (1 + 2j)) / length for point in start_arrow(world, length)]
+    assert [cmath.isclose(one, other, abs_tol=1e-9) for one, other in zip(
+        shape, (ahead, -0.7 * ahead + 0.6 * left, -0.4 * ahead, -0.7 * ahead - 0.6 * left), strict=True,
+    )] == [True] * 4  # fmt: skip
+
+
+@pytest.mark.parametrize(("mass_kg", "roll", "left"), [(1.0, 0.3, 1), (0.0, 0.3, 0), (0.0, 0.0, 0), (0.001, 0.3, 1)])
+@pytest.mark.parametrize("shape", ["box", "cylinder"])
+def test_what_a_model_moves_stands_still_where_it_is_tilted(shape: str, mass_kg: float, roll: float, left: int) -> None:
+    collection = Collection(Path("a.sdf"))
+    place, traits = from_roll_pitch_yaw(0.0, 0.0, 1.0, roll, 0.0, 0.0), Traits(mass_kg=mass_kg)
+    if shape == "box":
+        collection.add_box("a", (1.0, 1.0, 1.0), place, traits)
+    else:
+        collection.add_cylinder("a", 0.5, 1.0, place, traits)
+    assert collection._skipped.get(STANDS_STILL, 0) == left
 
 
 def test_what_stands_elsewhere_is_else_the_same() -> None:

@@ -47,6 +47,14 @@ kind = "no_collision"
 """
 
 
+def test_the_version_that_a_folder_was_begun_against_is_kept_in_it(tmp_path: Path) -> None:
+    assert Other.of(tmp_path) is None
+    (tmp_path / FOLDER).mkdir()
+    assert Other.of(tmp_path) is None
+    Other("old.elf", b"other").keep(tmp_path)
+    assert Other.of(tmp_path) == Other("old.elf", b"other")
+
+
 def outcome(by: float, kind: str = "clearance", died: str = "") -> Outcome:
     goal = GoalResult(kind=kind, wanted=kind, met=by >= 0, says="near", robustness=by, unit="m")
     is_bad = by < 0 or bool(died)

@@ -221,6 +221,19 @@ def test_isochronous_data_have_no_handshake_and_two_buffers(fake_chip: Any) -> N
     assert fake_chip.read("USB.EP1R") & rx(3) == rx(VALID)
 
 
+def test_isochronous_data_that_the_host_asks_for_are_always_data0(fake_chip: Any) -> None:
+    """Of the two buffers one is sent and then the other, and DTOG tells which; no toggle is on the wire."""
+    usb = set_up(fake_chip)
+    for address, data in ((192, b"one"), (256, b"other")):
+        put(fake_chip, address, data)
+    fake_chip.write("USB.PMA_00A", 5)
+    for place, count in ((0x008, 192), (0x00A, 3), (0x00C, 256), (0x00E, 5)):
+        fake_chip.write(f"USB.PMA_{place:03X}", count)
+    endpoint(fake_chip, 1, ISOCHRONOUS, stat=tx(VALID))
+    sent = [send(usb, Token.IN, 1) for _ in range(3)]
+    assert sent == [UsbResponse(None, 0, data) for data in (b"one", b"other", b"one")]
+
+
 def test_an_urgent_endpoint_is_shown_before_the_others(fake_chip: Any) -> None:
     usb = set_up(fake_chip, CTR)
     endpoint(fake_chip, 1, BULK, stat=rx(VALID))

@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
+from tools.mutants.languages.operators import COMPARISONS, FUNCTIONS, SIGNS, TRUTHS, other_constants
 from tools.mutants.mutant import Edit, SourceMutant, edited
-from tools.mutants.operators import COMPARISONS, FUNCTIONS, SIGNS, TRUTHS, other_constants
 
 _TOKEN = re.compile(
     rb"""(?P<skipped>//[^\n]*|/\*.*?\*/|(?m:^[ \t]*\#[ \t]*(?!define\b)(?:[^\n\\]|\\.|\\\n)*))

@@ -9,8 +9,8 @@ import re
 from collections.abc import Iterator, Sequence
 from types import CodeType
 
+from tools.mutants.languages.operators import COMPARISONS, FUNCTIONS, SIGNS, TRUTHS, WORDS_COMPARED, other_constants
 from tools.mutants.mutant import Edit, SourceMutant, edited
-from tools.mutants.operators import COMPARISONS, FUNCTIONS, SIGNS, TRUTHS, WORDS_COMPARED, other_constants
 
 _COMPARED = re.compile(rb"#[^\n]*|(?P<op>not\s+in\b|is\s+not\b|is\b|in\b|[<>=!]=|[<>])")
 _SIGN = re.compile(rb"#[^\n]*|(?P<op>//|\*\*|<<|>>|[-+*/%&|^@])")
