@@ -26,8 +26,8 @@ from simbase.timing import NS_PER_S, Nanos
 ODOMETRY_ERROR = 0.0075
 #: chosen: the variance of what is not measured, as ROS' own drivers have it.
 UNKNOWN = 1e6
-#: Variances of a pose that is sent in whole mm and in 4096ths of a turn: one count of each.
-PLACE_VARIANCE, HEADING_VARIANCE = 1e-6, (math.tau / 4096) ** 2
+#: Variance of a place that is sent in whole mm: one count.
+PLACE_VARIANCE = 1e-6
 #: Variances of a speed that is sent in whole mm/s, and of a turning speed made of two such: one count of each.
 SPEED_VARIANCE, TURN_VARIANCE = 1e-6, 1e-4
 #: The first variance of a measure that is not there (sensor_msgs/Imu).
@@ -105,7 +105,7 @@ def odometry(stamp: Nanos, frames: Frames, motion: OdometryMotion) -> Message:
     turn = (ODOMETRY_ERROR * motion.turned_rad) ** 2
     # A wrong heading carries the robot aside by as much of its way.
     place += turn * motion.way_m**2 + PLACE_VARIANCE
-    turn += HEADING_VARIANCE
+    turn += frames.parameters.angle_conv_rad**2
     return {
         "header": header(stamp, frames.name(ODOM)),
         "child_frame_id": frames.name(BASE),
