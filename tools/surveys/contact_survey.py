@@ -64,7 +64,8 @@ class SurveyedContact:
     stand_to_rest_s: float | None
     #: Share of the looks at which its centre slid.
     slide_share: float
-    #: The longest time, from `DECIDED_S` on, in which it touched and neither slid nor had a stall bit.
+    #: The longest time in which it touched and neither slid nor had a stall bit, of those that reach beyond
+    #: `DECIDED_S`, each counted from its own beginning.
     undecided_s: float
     sign_changes: int
     #: The greatest kinetic energy in that of the command.
@@ -75,7 +76,7 @@ class SurveyedContact:
     def faults(self) -> list[str]:
         """Return what of this breaks the contract."""
         found = []
-        # What slid until then may come to be blocked.
+        # What slid until lately may come to be blocked; what has not moved since the touch is decided by then.
         if self.undecided_s > STALL_S:
             found.append(f"neither slides nor stalls for {self.undecided_s:.2f} s")
         if self.blocked_to_stall_s > STALL_S:
@@ -124,7 +125,9 @@ def _judge(
     stands = [state.stalled_left and state.stalled_right for state in states]
     blocked = [_rim(state) < BLOCKED_SHARE * COMMAND_MPS for state in states]
     rests = [max(_rim(state), speed) <= RESTING_MPS for state, speed in zip(states, speeds, strict=True)]
-    late = range(round(DECIDED_S / LOOK_S), len(states))
+    undecided = [
+        state.in_contact and not slide and not stall for state, slide, stall in zip(states, slides, stalls, strict=True)
+    ]
     turns = [state.turn_radps for state in states if abs(state.turn_radps) > TURNING_RADPS]
     rest = next((look for look in reversed(range(len(states))) if not rests[look]), -1) + 1
     stand_s = _first(stands)
@@ -146,7 +149,7 @@ def _judge(
         rest_s=rest_s if rest < len(states) else None,
         stand_to_rest_s=None if stand_s is None else max(0.0, rest_s - stand_s),
         slide_share=sum(slides) / len(slides),
-        undecided_s=_longest(states[n].in_contact and not slides[n] and not stalls[n] for n in late),
+        undecided_s=_longest(undecided, reaching_s=DECIDED_S),
         sign_changes=sum(one * other < 0 for one, other in itertools.pairwise(turns)),
         energy=max(energies) / COMMAND_MPS**2,
         stop_s=_first(_rim(state) < RESTING_MPS for state in stopping),
@@ -170,9 +173,15 @@ def _first(claims: Iterable[bool]) -> float | None:
     return next((look * LOOK_S for look, claim in enumerate(claims) if claim), None)
 
 
-def _longest(claims: Iterable[bool]) -> float:
-    """Return for how many seconds a claim is true without a break, at the most."""
-    return max((sum(1 for _ in run) * LOOK_S for claim, run in itertools.groupby(claims) if claim), default=0.0)
+def _longest(claims: Iterable[bool], reaching_s: float = 0.0) -> float:
+    """Return for how many seconds a claim is true without a break, at the most, of those that reach beyond a time."""
+    longest, looks, least = 0, 0, round(reaching_s / LOOK_S)
+    for claim, run in itertools.groupby(claims):
+        length = sum(1 for _ in run)
+        looks += length
+        if claim and looks > least:
+            longest = max(longest, length)
+    return longest * LOOK_S
 
 
 def survey(bodies: Sequence[str], models: Sequence[str], headings: int, world: World) -> Iterator[SurveyedContact]:
