@@ -346,7 +346,7 @@ class LinkSupervisor:
             case ConfigReceived():
                 self._take_configuration(event.config, now)
             case PacketReceived():
-                self.news.append(PacketArrived(event.packet))
+                self.news.append(PacketArrived(event.packet, now))
             case ConnectFailed() | ConnectionLost():
                 self._take_end(event, now)
             case _:

@@ -155,9 +155,10 @@ class OdometryDoubtful:
 
 @dataclass(frozen=True, slots=True)
 class PacketArrived:
-    """A packet that is no standard SIP."""
+    """A packet that is no standard SIP, and when it came by the client's clock."""
 
     packet: ServerPacket
+    at_ns: Nanos
 
 
 Notice = (

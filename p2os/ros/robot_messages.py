@@ -2,8 +2,9 @@
 
 Units and frames are REP 103's and 105's; ranges without an echo REP 117's.
 
-Covariances. Of the pose, a robot's own count errs by a share of its way and of its turns (`ODOMETRY_ERROR`), so the
-variances grow with both; what a planar robot cannot do has `UNKNOWN`. Of the speeds, the wire's whole mm/s and deg/s.
+Covariances. Of the pose, one count of the wire at first, and a robot's own count errs by a share of its way and of its
+turns (`ODOMETRY_ERROR`), so the variances grow with both; what a planar robot cannot do has `UNKNOWN`. Of the speeds,
+the wire's whole mm/s and deg/s. None is ever 0, which a filter would take for certainty.
 """
 
 import math
@@ -25,6 +26,8 @@ from simbase.timing import NS_PER_S, Nanos
 ODOMETRY_ERROR = 0.0075
 #: chosen: the variance of what is not measured, as ROS' own drivers have it.
 UNKNOWN = 1e6
+#: Variance of a place that is sent in whole mm: one count.
+PLACE_VARIANCE = 1e-6
 #: Variances of a speed that is sent in whole mm/s, and of a turning speed made of two such: one count of each.
 SPEED_VARIANCE, TURN_VARIANCE = 1e-6, 1e-4
 #: The first variance of a measure that is not there (sensor_msgs/Imu).
@@ -101,7 +104,8 @@ def odometry(stamp: Nanos, frames: Frames, motion: OdometryMotion) -> Message:
     place = (ODOMETRY_ERROR * motion.way_m) ** 2
     turn = (ODOMETRY_ERROR * motion.turned_rad) ** 2
     # A wrong heading carries the robot aside by as much of its way.
-    place += turn * motion.way_m**2
+    place += turn * motion.way_m**2 + PLACE_VARIANCE
+    turn += frames.parameters.angle_conv_rad**2
     return {
         "header": header(stamp, frames.name(ODOM)),
         "child_frame_id": frames.name(BASE),
@@ -178,11 +182,18 @@ class Scans:
     def __init__(self, laser: LaserModel, frames: Frames, cycle_ns: Nanos = CYCLE_NS) -> None:
         self._laser, self._frames, self._cycle_ns = laser, frames, cycle_ns
         self._ranges_m: list[float] = []
+        #: When the sweep's first ray came.
+        self._stamp: Nanos = 0
 
     def take(self, packet: SimLaserPacket, stamp: Nanos) -> Message | None:
-        """Return a sensor_msgs/LaserScan with the last packet of a sweep; a sweep with a gap is left out."""
+        """Return a sensor_msgs/LaserScan with the last packet of a sweep; a sweep with a gap is left out.
+
+        Args:
+            packet: The next one.
+            stamp: When it came; a scan has that of its first ray.
+        """
         if packet.first == 0:
-            self._ranges_m = []
+            self._ranges_m, self._stamp = [], stamp
         if packet.first != len(self._ranges_m):
             return None
         self._ranges_m += [mm / 1000 for mm in packet.ranges_mm]
@@ -191,7 +202,7 @@ class Scans:
         laser, step_rad = self._laser, math.radians(self._laser.step_cdeg / 100)
         first_rad = math.radians(laser.start_deg)
         return {
-            "header": header(stamp, self._frames.name(LASER)),
+            "header": header(self._stamp, self._frames.name(LASER)),
             "angle_min": first_rad,
             "angle_max": first_rad + step_rad * (laser.readings - 1),
             "angle_increment": step_rad,

@@ -14,6 +14,7 @@ from typing import cast
 
 from robot_bench.events.codec import Json
 from robot_bench.events.kinds import Wave
+from robot_bench.recording.disputed import body_note
 from robot_bench.recording.run_record import RunRecord
 from simbase.timing import NS_PER_S
 
@@ -74,6 +75,8 @@ def figures(record: RunRecord) -> list[tuple[str, str]]:
         ("collisions", f"{record.poses[-1].collisions if record.poses else 0}"),
         *((f"collision {number}", str(hit)) for number, hit in enumerate(record.contacts[:LISTED_HITS], 1)),
     ]
+    if note := body_note(record):
+        rows.append(("note", note))
     clearance = record.end.get("min_clearance_m")
     if isinstance(clearance, (int, float)):
         rows.append(("least clearance", f"{clearance:.3f} m"))
@@ -103,6 +106,8 @@ def outcome_of(record: RunRecord) -> Json:
         end = end_of_a_broken_run(record, f"the run was cut at {record.last_ns / NS_PER_S:.1f} s")
     result.update((key, end.get(key)) for key in _FROM_END)
     result.update((key, end[key]) for key in (*MEASURED, EXPLAINED) if key in end)
+    if note := body_note(record):
+        result["notes"] = [*cast("Sequence[str]", result["notes"] or ()), note]
     result["hits"] = [
         {"t_s": hit.t / NS_PER_S, "what": hit.what, "x_m": hit.x_m, "y_m": hit.y_m, "part": hit.part}
         for hit in record.contacts

@@ -64,7 +64,7 @@ def nothing_left() -> Iterator[None]:
     finally:
         while left := children(os.getpid()) - before:
             for pid in left:
-                _kill_with_children(pid)
+                kill_tree(pid)
         _adopt(is_on=False)
 
 
@@ -128,8 +128,8 @@ def children(pid: int) -> set[int]:
     return found
 
 
-def _kill_with_children(pid: int) -> None:
-    """Kill a child of ours; those of its own come to us, or are killed with it."""
+def kill_tree(pid: int) -> None:
+    """Kill a child of ours and wait for it; those of its own come to us, or are killed with it."""
     for child in children(pid):
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.kill(child, signal.SIGKILL)

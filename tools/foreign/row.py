@@ -17,6 +17,8 @@ class ProgramKind(Enum):
     FIRMWARE = "firmware"
     #: It drives a virtual robot.
     CLIENT = "client"
+    #: It maps and plans for a virtual robot by ROS 2.
+    STACK = "stack"
 
 
 class RowStatus(Enum):

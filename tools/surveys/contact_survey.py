@@ -180,7 +180,7 @@ def _first(claims: Iterable[bool]) -> float | None:
 
 def _longest(claims: Iterable[bool]) -> float:
     """Return for how many seconds a claim is true without a break, at the most."""
-    return max((sum(1 for _ in run) * LOOK_S for claim, run in itertools.groupby(claims) if claim), default=0.0)
+    return LOOK_S * max((sum(1 for _ in run) for claim, run in itertools.groupby(claims) if claim), default=0)
 
 
 def survey(bodies: Sequence[str], models: Sequence[str], headings: int, world: World) -> Iterator[SurveyedContact]:

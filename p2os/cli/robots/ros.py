@@ -265,7 +265,7 @@ class NodeLoop:
 
     def _take_notice(self, notice: Notice) -> None:
         if isinstance(notice, PacketArrived):
-            self._publish(self._node.take_packet(notice.packet, stamp_of(wall_clock())))
+            self._publish(self._node.take_packet(notice.packet, stamp_of(notice.at_ns)))
         if isinstance(notice, Connected):
             self._begin()
         if isinstance(notice, LinkLost | GaveUp):

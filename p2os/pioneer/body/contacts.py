@@ -10,6 +10,10 @@ from collections import deque
 from p2os.pioneer.body.contract import MOST_HITS, Hit
 from simbase.state import Stateful
 
+#: Measured (tools/surveys/oblique_hits.py): against a face at an angle between these, degrees, and against an edge or a
+#: post that is farther beside the robot's middle, m, the three bodies come to stand, or go on, with different headings.
+DISPUTED_DEG = (25.0, 80.0)
+DISPUTED_BESIDE_M = 0.05
 #: Steps of 1 ms without contact after which a contact is a new one (chosen: longer than a bounce).
 APART_STEPS = 200
 

@@ -107,6 +107,7 @@ class DeadReckoning(Stateful):
         )
 
 
-def raw_angle(angle_rad: float) -> int:
-    """Return an angle in 1/4096 of a turn, −2048 to 2047, as the packet carries it."""
-    return (round(angle_rad * 4096 / math.tau) + 2048) % 4096 - 2048
+def raw_angle(angle_rad: float, counts_per_turn: int) -> int:
+    """Return an angle in a model's counts, as the packet carries it: of 4096 a turn −2048 to 2047."""
+    half = counts_per_turn // 2
+    return (round(angle_rad * counts_per_turn / math.tau) + half) % counts_per_turn - half

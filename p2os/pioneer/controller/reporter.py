@@ -278,7 +278,7 @@ def _standard_packet(
         kind=MOVING if left or right else STANDING,
         raw_x=raw_x,
         raw_y=raw_y,
-        raw_heading=raw_angle(context.reckoning.heading_rad),
+        raw_heading=raw_angle(context.reckoning.heading_rad, parameters.angle_counts_per_turn),
         raw_left_velocity=left,
         raw_right_velocity=right,
         raw_battery=devices.battery.decivolts,
@@ -286,7 +286,7 @@ def _standard_packet(
         stall_right=stalls[1],
         rear_bumpers=bumps[1],
         front_bumpers=bumps[0],
-        raw_control=_raw_heading_setpoint(context),
+        raw_control=_raw_heading_setpoint(context, parameters),
         raw_flags=_flags(context) if profile.has_flags else devices.pins.servos[0],
         raw_compass=devices.compass.raw_compass,
         sonar=tuple(SonarReading(number, counts) for number, counts in context.sonar.take_readings()),
@@ -316,12 +316,12 @@ def _raw_velocity(speed_mps: float, parameters: RobotParameters) -> int:
     return round(speed_mps * 1_000_000 / parameters.velocity_um_s_per_count)
 
 
-def _raw_heading_setpoint(context: Context) -> int:
+def _raw_heading_setpoint(context: Context, parameters: RobotParameters) -> int:
     """Return where the robot turns to, or its heading when it turns by speed."""
-    goal_udeg = context.motion.heading_goal_udeg
-    if goal_udeg is None:
-        return raw_angle(context.reckoning.heading_rad)
-    return raw_angle(goal_udeg / UDEG_PER_DEG * RAD_PER_DEG - context.reckoning.zero_rad)
+    goal_udeg, heading_rad = context.motion.heading_goal_udeg, context.reckoning.heading_rad
+    if goal_udeg is not None:
+        heading_rad = goal_udeg / UDEG_PER_DEG * RAD_PER_DEG - context.reckoning.zero_rad
+    return raw_angle(heading_rad, parameters.angle_counts_per_turn)
 
 
 def _arcos_tail(context: Context, wheels: BodyState, parameters: RobotParameters) -> tuple[int, ...]:

@@ -1,6 +1,7 @@
 """The simulated laser as LaserScan: whole sweeps only, seen from its own frame."""
 
 import math
+import time
 from typing import Any
 
 import pytest
@@ -9,18 +10,22 @@ from hypothesis import strategies as st
 
 from p2os.cli.robots.ros import NodeLoop
 from p2os.client import Robot
+from p2os.client.notices import PacketArrived
+from p2os.client.observer import Observer
 from p2os.pioneer.controller.settings import ControllerSettings
 from p2os.pioneer.devices.laser import LASERS, LaserModel
 from p2os.pioneer.serve import served_pioneer
 from p2os.protocol.packets import SimLaserPacket
+from p2os.protocol.sip import StandardSip
 from p2os.robots.parameters import load_parameters
 from p2os.ros.frames import Frames
 from p2os.ros.robot_messages import Scans
 from p2os.ros.robot_node import RobotNode
 from p2os.ros.transport import Received
 from p2os.transport.virtual_clock import VirtualClock
+from p2os.transport.wall_clock import wall_clock
 from simbase.timing import NS_PER_MS, NS_PER_S
-from tests.p2os.ros.test_node_loop import OPTIONS, Network
+from tests.p2os.ros.test_node_loop import OPTIONS, Client, Network
 
 P2DX = load_parameters("p2dx")
 LASER = LaserModel(start_deg=-90, end_deg=90, step_cdeg=300, range_m=8.0)
@@ -50,6 +55,42 @@ def test_a_sweep_is_a_scan_with_its_last_packet_and_one_with_a_gap_is_none(
     left = [packet for number, packet in enumerate(sweep) if number != lost]
     assert [scans.take(packet, 6) for packet in left] == [None] * len(left)
     assert [one is not None for one in (scans.take(packet, 7) for packet in sweep)][-1]
+
+
+def test_a_scan_has_the_stamp_of_its_first_ray() -> None:
+    first, second, last = packets([20, 40], [1000] * READINGS)
+    scans = Scans(LASER, Frames(P2DX))
+    for packet, stamp in ((first, 5), (second, 6)):
+        assert scans.take(packet, stamp) is None
+    scan: Any = scans.take(last, 7)
+    assert scan["header"]["stamp"] == {"sec": 0, "nanosec": 5}
+
+
+def test_a_scan_has_the_stamp_of_when_it_came_however_late_it_is_handed_on() -> None:
+    """Else it is newer than the odometry of its own cycle, and tf2 has no transform for it yet."""
+    client, network = LateClient(), Network()
+    node = RobotNode(P2DX, OPTIONS, deadman_ns=NS_PER_S, laser=LASER)
+    loop = NodeLoop(client, network, node)  # type: ignore[arg-type]  # stand-ins
+    loop.run(iter([False, True]).__next__)
+    came = wall_clock() - 40 * NS_PER_MS
+    client.tell(PacketArrived(packets([], [1000] * READINGS)[0], came))
+    client.tell(Observer(P2DX).take(StandardSip(), came))
+    loop.turn()
+    scan, odometry = (nanoseconds(network.newest(name)) for name in ("/scan", "/odom"))
+    assert abs(scan - odometry) < 5 * NS_PER_MS
+    assert time.time_ns() - scan >= 40 * NS_PER_MS
+
+
+def nanoseconds(message: Any) -> int:
+    stamp = message["header"]["stamp"]
+    return stamp["sec"] * NS_PER_S + stamp["nanosec"]
+
+
+class LateClient(Client):
+    """Keeps what listens, after the loop has ended too, and is sent what the laser is asked."""
+
+    def send(self, number: int, argument: int) -> None:
+        self.asked.append((number, argument))
 
 
 def test_a_sweep_of_another_length_is_none() -> None:

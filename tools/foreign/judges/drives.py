@@ -118,7 +118,7 @@ class Drives:
         """Start the client's programs, and kill what is left of them in the end."""
         parsed = parse_url(served.line_url)
         values = {"url": served.line_url, "line": str(place.scratch / "line")}
-        values["free"] = str(_free_port())
+        values["free"] = str(free_port())
         values["program"] = str(place.path(self.program)) if "/" in self.program else self.program
         if isinstance(parsed, TcpUrl):
             values |= {"host": parsed.host, "port": str(parsed.port)}
@@ -229,7 +229,7 @@ def _second_client(served: Served) -> Iterator[str]:
     yield "a second is told busy"
 
 
-def _free_port() -> int:
+def free_port() -> int:
     """Return a TCP port of this machine that nobody has at the moment."""
     listener = listen_url("tcp:127.0.0.1:0")
     parsed = parse_url(listener.description)

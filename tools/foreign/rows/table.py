@@ -3,5 +3,6 @@
 from tools.foreign.row import Row
 from tools.foreign.rows.clients import CLIENTS
 from tools.foreign.rows.firmware import FIRMWARE
+from tools.foreign.rows.stacks import STACKS
 
-ROWS: tuple[Row, ...] = (*FIRMWARE, *CLIENTS)
+ROWS: tuple[Row, ...] = (*FIRMWARE, *CLIENTS, *STACKS)

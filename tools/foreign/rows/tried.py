@@ -55,6 +55,15 @@ TRIED = (
         error="it links ARIA 2.7; the same library is judged by the rows aria-…",
     ),
     TriedProgram(
+        name="slam_toolbox, Nav2's servers and robot_localization, as nodes",
+        tried="Debian (apt-get install ros-jazzy-…), PyPI (ros-jazzy-…: rcl, rmw, rclpy and the messages, headers "
+        "too), and their sources (slam_toolbox a3442d2f68, navigation2 f4108e5b1c) to be built on those wheels, as "
+        "tf2_msgs was; what Nav2 plans with, and Karto, run as libraries in the row ros2-karto-navfn",
+        error="E: Unable to locate package ros-jazzy-navigation2; No matching distribution found for ros-jazzy-rclcpp; "
+        "rclcpp, tf2_ros, slam_toolbox and Nav2's servers are 257 files of C++ beside their messages, and were not "
+        "built: tf2_msgs, four messages, took two minutes on the two shared cores at hand",
+    ),
+    TriedProgram(
         name="VRI's library, RACK", tried="searched for by their names, and by words of the protocol", error="not found"
     ),
 )  # fmt: skip

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 
@@ -100,6 +101,81 @@ def test_a_contact_is_decided_in_time(slides_ms: int, stalls_ms: int, leaves_ms:
 def test_what_is_blocked_just_then_has_its_time(blocked_ms: int, stalls_ms: int, faults: list[str]) -> None:
     seen = list(looks(slides_ms=0, stalls_ms=stalls_ms, blocked_ms=blocked_ms))
     assert judged_states("none", load_parameters("p2dx"), 0.0, seen, [BodyState()]).faults() == faults
+
+
+TOUCH = BodyState(in_contact=True, left_speed_mps=0.2, right_speed_mps=0.2)
+STALL = replace(TOUCH, left_speed_mps=0.0, right_speed_mps=0.0, stalled_left=True, stalled_right=True)
+REST = BodyState()
+LOOKS_A_SECOND = 100
+
+
+def judged(*pieces: tuple[float, BodyState, float]) -> SurveyedContact:
+    """Judge a contact made of pieces: seconds, what the body says, and how fast its centre moves, m/s."""
+    states, x = [], 0.0
+    for seconds, state, speed in pieces:
+        for _ in range(round(seconds * LOOKS_A_SECOND)):
+            x += speed / LOOKS_A_SECOND
+            states.append(replace(state, x_m=x))
+    return judged_states("any", load_parameters("p2dx"), 45.0, states, [REST] * LOOKS_A_SECOND)
+
+
+def undecided_faults(contact: SurveyedContact) -> list[str]:
+    return [fault for fault in contact.faults() if fault.startswith("neither slides nor stalls")]
+
+
+#: A mean over ten looks: the centre counts as sliding for so long after it stopped, at the command's own speed, s.
+TAIL_S = 0.08
+
+
+@pytest.mark.parametrize(("late_s", "is_fault"), [(0.59, False), (0.60, False), (0.61, True)])
+def test_what_slid_until_then_stalls_within_its_time(late_s: float, is_fault: bool) -> None:
+    blocked = late_s + TAIL_S
+    assert bool(undecided_faults(judged((2.0, TOUCH, 0.4), (blocked, TOUCH, 0.0), (3.0, STALL, 0.0)))) is is_fault
+
+
+@pytest.mark.parametrize(("slid_s", "is_fault"), [(1.2, True), (0.5, True), (0.1, False)])
+def test_what_stopped_sliding_before_is_counted_from_there(slid_s: float, is_fault: bool) -> None:
+    """Undecided for 0.8 s, over the moment of the decision or before it."""
+    found = judged((slid_s, TOUCH, 0.4), (0.8 + TAIL_S, TOUCH, 0.0), (3.0, STALL, 0.0))
+    assert bool(undecided_faults(found)) is (is_fault and slid_s + 0.8 > 1.5)
+
+
+@pytest.mark.parametrize(("share", "is_fault"), [(0.201, False), (0.199, True)])
+def test_a_fifth_of_the_command_is_sliding(share: float, is_fault: bool) -> None:
+    assert bool(undecided_faults(judged((4.0, TOUCH, share * 0.4)))) is is_fault
+
+
+def test_what_touches_nothing_any_more_is_not_asked() -> None:
+    assert undecided_faults(judged((1.0, TOUCH, 0.4), (3.0, replace(TOUCH, in_contact=False), 0.0))) == []
+
+
+@pytest.mark.parametrize(("late_s", "is_fault"), [(0.59, False), (0.60, False), (0.61, True)])
+def test_a_stall_bit_comes_within_its_time_of_both_rims_blocked(late_s: float, is_fault: bool) -> None:
+    stuck = replace(TOUCH, left_speed_mps=0.039, right_speed_mps=0.039)
+    faults = judged((0.5, TOUCH, 0.4), (late_s, stuck, 0.2), (3.0, STALL, 0.0)).faults()
+    assert any(fault.startswith("blocked for") for fault in faults) is is_fault
+    free = replace(stuck, left_speed_mps=0.041)
+    assert not judged((0.5, TOUCH, 0.4), (late_s, free, 0.2), (3.0, STALL, 0.0)).faults()
+
+
+@pytest.mark.parametrize(("late_s", "is_fault"), [(1.9, False), (2.0, False), (2.01, True)])
+def test_both_wheels_stalled_come_to_rest_within_two_seconds(late_s: float, is_fault: bool) -> None:
+    faults = judged((0.5, TOUCH, 0.4), (late_s - TAIL_S - 0.01, STALL, 0.3), (3.0, STALL, 0.0)).faults()
+    assert any("after both wheels stalled" in fault for fault in faults) is is_fault
+
+
+@pytest.mark.parametrize(("changes", "is_fault"), [(2, False), (3, True)])
+def test_a_turn_changes_its_sign_twice_at_most(changes: int, is_fault: bool) -> None:
+    pieces = [(0.3, replace(TOUCH, turn_radps=0.1 * (-1) ** number), 0.4) for number in range(changes + 1)]
+    assert any("changes sign" in fault for fault in judged(*pieces).faults()) is is_fault
+
+
+@pytest.mark.parametrize(("stop_s", "is_fault"), [(0.05, False), (0.06, True)])
+def test_a_stop_is_effective_at_once(stop_s: float, is_fault: bool) -> None:
+    stopping = [TOUCH] * round(stop_s * LOOKS_A_SECOND) + [REST] * LOOKS_A_SECOND
+    states = [replace(TOUCH, x_m=0.004 * number) for number in range(400)]
+    found = judged_states("any", load_parameters("p2dx"), 45.0, states, stopping)
+    assert ("a stop is not effective at once" in found.faults()) is is_fault
 
 
 def test_the_picture_shows_the_stall_and_the_rest_of_each_contact() -> None:

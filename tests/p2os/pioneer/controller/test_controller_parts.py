@@ -7,11 +7,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from p2os.pioneer.body.contract import Turned
+from p2os.pioneer.body.contract import BodyState, Turned
+from p2os.pioneer.body.factory import make_body
+from p2os.pioneer.controller import ControllerSettings, Pioneer
 from p2os.pioneer.controller.dead_reckoning import POSITION_MODULUS, DeadReckoning, raw_angle
+from p2os.pioneer.controller.reporter import _standard_packet
 from p2os.pioneer.sonar.schedule import LARGEST_COUNTS, NO_ECHO_COUNTS, SonarSchedule, raw_range
+from p2os.pioneer.world import load_world
+from p2os.protocol.odometry import Odometry
 from p2os.protocol.profiles import Profile
-from p2os.robots.parameters import load_parameters
+from p2os.robots.parameters import known_robots, load_parameters
 
 #: A wheel whose rim moves 1 mm per milliradian.
 DIAMETER_M = 2.0
@@ -99,7 +104,22 @@ def test_an_odometer_can_be_saved_and_restored(angles: list[tuple[float, float]]
     [(0.0, 0), (math.pi / 2, 1024), (math.pi, -2048), (-math.pi, -2048), (math.pi - 0.001, 2047), (20 * math.pi, 0)],
 )
 def test_an_angle_is_sent_in_4096ths_of_a_turn(angle: float, raw: int) -> None:
-    assert raw_angle(angle) == raw
+    assert raw_angle(angle, 4096) == raw
+
+
+@pytest.mark.parametrize("model", known_robots())
+@pytest.mark.parametrize("degrees", [90, -90, 179])
+def test_a_model_counts_its_headings_as_its_clients_read_them(model: str, degrees: int) -> None:
+    """A Pioneer 1 has 1024 counts a turn; ARIA's and player's tables of models agree on it."""
+    parameters = load_parameters(model)
+    body = make_body("kinematic", load_world("room"), parameters)
+    context = Pioneer(parameters=parameters, body=body, settings=ControllerSettings())._context
+    context.reckoning.drift(math.radians(degrees))
+    sip = _standard_packet(context, BodyState(), parameters, (False, False), (0, 0), 0)
+    odometry = Odometry(parameters)
+    odometry.update(sip)
+    assert math.degrees(odometry.heading_rad) == pytest.approx(degrees, abs=180 / parameters.angle_counts_per_turn)
+    assert sip.raw_control == sip.raw_heading
 
 
 # Sonar -------------------------------------------------------------------------------

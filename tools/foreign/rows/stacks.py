@@ -1,0 +1,40 @@
+"""Mappers and planners of others, by ROS 2."""
+
+from tools.foreign.judges.navigates import Navigates
+from tools.foreign.row import ProgramKind, Row, Source
+
+KARTO = Source(
+    folder="karto", url="https://github.com/ros-perception/open_karto",
+    commit="3ef9f6baae5e277263068705ca0e1e406424da19",
+)  # fmt: skip
+#: In `office`: in each of its six rooms, and home; what each needs of room is 0.33 m.
+OFFICE_GOALS = (
+    (1.5, 0.0), (0.1, 1.8), (1.6, 2.4), (-0.3, 3.0), (1.5, -1.7), (0.0, -3.4), (1.5, -2.6), (4.35, -1.7), (6.2, -1.8),
+    (5.0, -2.6), (5.85, 1.7), (4.2, 3.0), (6.2, 1.8), (9.6, 1.8), (8.0, 2.0), (10.2, 3.0), (10.05, -1.8), (10.2, -3.6),
+    (8.4, -2.2), (0.0, 0.0),
+)  # fmt: skip
+#: Taken out: it walks blindly to and fro along the corridor, into robots too.
+VISITOR = "visitor"
+
+STACKS: tuple[Row, ...] = (
+    Row(
+        name="ros2-karto-navfn", kind=ProgramKind.STACK, source=KARTO,
+        program="Karto as a library, its loop closing off as it has no solver here, karto/karto.so, and navfn.cpp of "
+        "nav2_navfn_planner (navigation2 f4108e5b1c) as navfn/navfn.so, each with functions in C before it, as "
+        "tools/foreign/nodes says; in ros2/env rclpy and rmw_fastrtps of Jazzy (PyPI, ros-jazzy-…) and tf2_msgs of "
+        "geometry2 646342c616",
+        said="two nodes of ours on stock rclpy, one around each, beside p2os ros: office without its visitor is mapped "
+        "on the way to 20 goals, with the errors of realistic sensors; judged by the body's true pose, its contacts, "
+        "and where things stand",
+        judge=Navigates(
+            python="ros2/env/bin/python",
+            programs=("karto/karto.so", "navfn/navfn.so", "ros2/env/lib/libtf2_msgs*fastrtps_c.so"),
+            libraries=("ros2/env/lib",), goals=OFFICE_GOALS, without=(VISITOR,),
+            commands=(
+                ("{nodes}/mapper.py", "{cache}/karto/karto.so"),
+                ("{nodes}/navigator.py", "{cache}/navfn/navfn.so", "{goals}", "{map}"),
+            ),
+        ),
+        limit_s=1800.0,
+    ),
+)  # fmt: skip
