@@ -4,6 +4,7 @@ Invariant: within a channel time never runs back.
 """
 
 from array import array
+from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import cast
@@ -62,6 +63,11 @@ class ChannelTrack:
         found.extend(levels)
         edges.extend([1] * (len(self.times) - before))
 
+    def take_rows(self, other: "ChannelTrack", count: int) -> None:
+        """Take the first rows of a channel of the same kind, before any of its own."""
+        self.columns = list(other.rows(0, count))
+        self.times = cast("array[int]", self.columns[0])
+
     def column(self, name: str) -> ColumnValues:
         """Return a column by its name."""
         return self.columns[[column.name for column in self.kind.columns].index(name)]
@@ -80,13 +86,13 @@ class ChannelTrack:
         """
         first, last = rows_in(self.times, from_ns, to_ns)
         if last - first <= ROWS_A_PIXEL * pixels and self.kind.name not in _SEVERITY:
-            return self._frame(self._slice(first, last), from_ns, to_ns, last - first, flags)
+            return self._frame(self.rows(first, last), from_ns, to_ns, last - first, flags)
         return self._frame(self._thinned(first, last, pixels, listed), from_ns, to_ns, last - first, flags)
 
     def tail(self, first: int, last: int) -> ViewFrame:
         """Return the rows from one to before another, all of them."""
         times = self.times
-        return self._frame(self._slice(first, last), times[first], times[last - 1], last - first, NO_FLAGS)
+        return self._frame(self.rows(first, last), times[first], times[last - 1], last - first, NO_FLAGS)
 
     def _frame(
         self, columns: tuple[ColumnValues, ...], from_ns: Nanos, to_ns: Nanos, of: int, flags: FrameFlags
@@ -101,7 +107,8 @@ class ChannelTrack:
                          width=self.header.width if any(one.is_wide for one in self.kind.columns) else 1,
                          flags=flags)  # fmt: skip
 
-    def _slice(self, first: int, last: int) -> tuple[ColumnValues, ...]:
+    def rows(self, first: int, last: int) -> tuple[ColumnValues, ...]:
+        """Return the columns of some rows, copied."""
         return tuple(
             values[first * width : last * width] for values, width in zip(self.columns, self._widths, strict=True)
         )
@@ -156,11 +163,19 @@ class ViewRecording:
 
     header: PageHeader
     tracks: list[ChannelTrack] = field(default_factory=list)
+    #: Sources whose channels are shown no more.
+    dropped: set[str] = field(default_factory=set)
 
     def add(self, header: ChannelHeader) -> ChannelTrack:
         """Add a channel, without rows yet; its `id` is given here."""
         made = ChannelTrack(replace(header, id=len(self.tracks)))
         self.tracks.append(made)
+        return made
+
+    def copied(self, track: ChannelTrack, source: str, until_ns: Nanos, of: int) -> ChannelTrack:
+        """Add a channel that has the rows of another one up to a time, from another source, belonging to a channel."""
+        made = self.add(replace(track.header, source=source, of=of))
+        made.take_rows(track, bisect_right(track.times, until_ns))
         return made
 
     def shared(self, header: ChannelHeader) -> ChannelTrack:
@@ -171,7 +186,8 @@ class ViewRecording:
     @property
     def full_header(self) -> PageHeader:
         """The header with its channels."""
-        return replace(self.header, channels=[track.header for track in self.tracks])
+        shown = [track.header for track in self.tracks if track.header.source not in self.dropped]
+        return replace(self.header, channels=shown)
 
     def frames(self, pixels: int, listed: int) -> Iterator[ViewFrame]:
         """Yield one frame a channel, of the whole time, as of `ChannelTrack.frame`."""
