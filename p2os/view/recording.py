@@ -3,11 +3,12 @@
 Invariant: within a channel time never runs back.
 """
 
+import math
 from array import array
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import cast
+from typing import Any, cast
 
 from p2os.view.channels import BY_NAME, CellType, ChannelKind
 from p2os.view.detail import Extremes, changes, curve, nearest, rows_in, thinned_list
@@ -39,6 +40,7 @@ class ChannelTrack:
         self.kind: ChannelKind = BY_NAME[header.kind]
         self.columns = empty_columns(self.kind)
         self.times = cast("array[int]", self.columns[0])
+        self._adders = self._made_adders()
         self._widths = [header.width if column.is_wide else 1 for column in self.kind.columns]
         #: Of columns that curves are thinned by: their extremes, and their numbers without NaN.
         self._indices: dict[str, tuple[Extremes, array[float]]] = {}
@@ -48,12 +50,16 @@ class ChannelTrack:
 
     def append(self, t_ns: Nanos, *cells: Cell) -> None:
         """Add a row; a time that steps back is moved up."""
-        self.times.append(max(t_ns, self.times[-1]) if self.times else t_ns)
-        for values, column, cell in zip(self.columns[1:], self.kind.columns[1:], cells, strict=True):
-            if column.is_wide:
-                cast("array[float]", values).extend(cast("Sequence[float]", cell))
-            else:
-                values.append(cell)  # type: ignore[arg-type]  # of the column's type, as the caller has it
+        times = self.times
+        times.append(times[-1] if times and times[-1] > t_ns else t_ns)
+        for add, cell in zip(self._adders, cells, strict=True):
+            add(cell)
+
+    def _made_adders(self) -> "list[Callable[[Any], None]]":
+        """Return what adds a cell to each column but the first: of the column's type, as the caller has it."""
+        kinds = self.kind.columns[1:]
+        return [values.extend if column.is_wide else values.append
+                for values, column in zip(self.columns[1:], kinds, strict=True)]  # fmt: skip
 
     def extend_levels(self, times: Iterable[int], levels: Iterable[int]) -> None:
         """Add rows of a wire at once, in the order of time."""
@@ -66,7 +72,7 @@ class ChannelTrack:
     def take_rows(self, other: "ChannelTrack", count: int) -> None:
         """Take the first rows of a channel of the same kind, before any of its own."""
         self.columns = list(other.rows(0, count))
-        self.times = cast("array[int]", self.columns[0])
+        self.times, self._adders = cast("array[int]", self.columns[0]), self._made_adders()
 
     def column(self, name: str) -> ColumnValues:
         """Return a column by its name."""
@@ -147,6 +153,9 @@ class ChannelTrack:
 
 def _extend_plain(plain: "array[float]", values: "array[float]") -> None:
     """Add numbers to others; NaN is the number before it, or the first one."""
+    if not math.isnan(sum(values)):  # else there is NaN, or infinity of both signs
+        plain.fromlist(values.tolist())
+        return
     last = plain[-1] if plain else next((value for value in values if value == value), 0.0)  # noqa: PLR0124 - no NaN
     for value in values:
         last = value if value == value else last  # noqa: PLR0124 - it is no NaN

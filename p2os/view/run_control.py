@@ -1,6 +1,6 @@
 """What a page may ask of a run that goes on, and how the run stands: small typed messages.
 
-A page whose link may control sends one command at a time as JSON, told from a request by its `do`; the types of the
+A page whose link may control sends one command at a time as JSON, known from a request by its `do`; the types of the
 page in TypeScript are made of these classes (`tools/generators/page_types.py`). Times are ns of the run.
 
 Invariant: a command is one of `COMMANDS`, with the fields that its row names and no others.

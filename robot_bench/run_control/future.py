@@ -1,4 +1,4 @@
-"""One future of a run: a bench that goes on, to any time of its past, and halts where it is told to.
+"""One future of a run: a bench that goes on, to any time of its past, and halts where it should.
 
 Theory of operation. The debugger's own machinery (`bluepill_sim.debug.execution`) brings the bench forwards and, from
 older states, backwards; what is added are events in words. They are reported up to 50 ms after they happen: so at every
@@ -17,7 +17,7 @@ from bluepill_sim.debug.history import Point
 from bluepill_sim.debug.machine import HaltReason, StopKind
 from bluepill_sim.program.line_table import read_lines
 from robot_bench.bench import Bench, run_of
-from robot_bench.bench.waiting import TraceMark, mark_of
+from robot_bench.bench.waiting import TraceMark, events_since, mark_of
 from robot_bench.events.kinds import Event
 from robot_bench.events.selection import Selector, Wires
 from robot_bench.events.words import what_of
@@ -296,15 +296,28 @@ class Future:
         now = self.now_ns
         if self.bench.events.released_until >= now:
             return
-        snapshot = self.machine.snapshot()
-        with self._unarmed(), self._quiet():
-            while self.bench.events.released_until < now and not self.is_over:
-                self.machine.advance_to((self.now_ns // SAMPLE_NS + 1) * SAMPLE_NS)
-            if self.bench.events.released_until < now:
-                self.bench.finish()
-            self.machine.restore(snapshot)
+        with self._ahead(now):
+            pass
         # What comes later comes again.
         self._hits = [hit for hit in self._hits if hit[0] <= now]
+
+    def events_until(self, mark: TraceMark, until_ns: Nanos) -> list[Event]:
+        """Go to a time; return what has happened by then since a place of the trace."""
+        self.go_to(until_ns)
+        with self._ahead(until_ns):
+            return [event for event in events_since(mark, self.bench.trace) if event.t <= until_ns]
+
+    @contextlib.contextmanager
+    def _ahead(self, until_ns: Nanos) -> Iterator[None]:
+        """Have all in the trace that happened until a time, for a block."""
+        snapshot = self.machine.snapshot()
+        with self._unarmed(), self._quiet():
+            while self.bench.events.released_until < until_ns and not self.is_over:
+                self.machine.advance_to((self.now_ns // SAMPLE_NS + 1) * SAMPLE_NS)
+            if self.bench.events.released_until < until_ns:
+                self.bench.finish()
+            yield
+            self.machine.restore(snapshot)
 
     def _stand(self, why: str) -> Halted:
         """Stand still where the chip is."""

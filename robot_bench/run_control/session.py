@@ -6,7 +6,7 @@ Passive: time is an argument. Whoever owns it calls `do` with a command, and `go
 Invariant: whatever is asked, the run itself leaves the trace that it would have left; only a fork is another run.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from itertools import count
 from pathlib import Path
 from typing import Protocol
@@ -21,8 +21,6 @@ from p2os.view.run_control import (
     RunState,
 )
 from robot_bench.bench import Bench
-from robot_bench.bench.waiting import TraceMark, events_since
-from robot_bench.events.kinds import Event
 from robot_bench.events.words import distinguishing_words, what_of
 from robot_bench.recording.divergence import Difference, differences
 from robot_bench.run_control.changes import change
@@ -41,12 +39,12 @@ MOST_SIGNALS = 8
 _SLOW = 0.25
 #: chosen: a bench that cannot keep the pace goes on from where it is after so long, ns of the clock.
 _MOST_LAG_NS: Nanos = NS_PER_S // 2
-#: chosen: pages are told of a run that goes on so often, ns of the clock.
-_TOLD_NS: Nanos = 50 * NS_PER_MS
+#: chosen: a run that goes on is reported so often, ns of the clock.
+_REPORTED_NS: Nanos = 50 * NS_PER_MS
 
 
 class FutureRecorder(Protocol):
-    """Who is told of what happens in each future."""
+    """Who records what happens in each future."""
 
     def begin(self, future: Future) -> None:
         """Listen to a future's bench from now on."""
@@ -63,7 +61,7 @@ class RunSession:
 
     Args:
         bench: Of the run, at its beginning.
-        recorder: Is told of its futures.
+        recorder: Records its futures.
         folder: Where traces of forks are kept.
         speed: Virtual seconds a second; 0 as fast as it goes.
     """
@@ -81,7 +79,7 @@ class RunSession:
         self._counts: dict[int, int] = {}
         self._compared: dict[str, tuple[str, Nanos, tuple[PartingState, ...]]] = {}
         self._why, self._trouble, self._done = "", "", 0
-        self._was_told: Nanos | None = None
+        self._reported_at: Nanos | None = None
         self._state: RunState | None = None
         self._base: tuple[Nanos, Nanos] | None = None
         self._doing: Mapping[Doing, Callable[[RunCommand], None]] = {
@@ -132,7 +130,7 @@ class RunSession:
 
     def do(self, command: RunCommand) -> None:
         """Do what a page asks for; what cannot be done is said in the state."""
-        self._state, self._was_told, self._base, self._trouble = None, None, None, ""
+        self._state, self._reported_at, self._base, self._trouble = None, None, None, ""
         try:
             self._doing[command.do](command)
         except (P2osError, BluePillError) as error:
@@ -243,7 +241,7 @@ class RunSession:
         until_ns = min(max(one.known_ns, one.head_ns) for one in (ours, theirs))
         heads = [(one, one.head_ns) for one in (ours, theirs)]
         mark = self._parted(ours, theirs).mark
-        kept = [_since(mark, one, until_ns) for one in (ours, theirs)]
+        kept = [one.events_until(mark, until_ns) for one in (ours, theirs)]
         parting = tuple(_parting_of(one) for one in differences(*kept)[:MOST_SIGNALS])
         for one, head_ns in heads:
             one.go_to(head_ns)
@@ -313,8 +311,8 @@ class RunSession:
         halted = future.run_to(limit, is_seen_at_once=0 < self.speed < _SLOW and not self._is_step)
         if halted is not None:
             self._halted(halted)
-        if self._was_told is None or halted is not None or clock_ns - self._was_told >= _TOLD_NS:
-            self._was_told, self._state = clock_ns, None
+        if self._reported_at is None or halted is not None or clock_ns - self._reported_at >= _REPORTED_NS:
+            self._reported_at, self._state = clock_ns, None
         return 0.0
 
     @property
@@ -359,12 +357,6 @@ class RunSession:
 def _wires(bench: Bench) -> Mapping[str, str] | None:
     own = bench.scenario.own_robot
     return None if own is None else own.wires
-
-
-def _since(mark: TraceMark, future: Future, until_ns: Nanos) -> Iterable[Event]:
-    """Return what happens in a future from a place of its trace to a time."""
-    future.go_to(until_ns)
-    return [event for event in events_since(mark, future.bench.trace) if event.t <= until_ns]
 
 
 def _parting_of(part: Difference) -> PartingState:

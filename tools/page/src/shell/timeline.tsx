@@ -6,7 +6,7 @@ import { moment, roundStep, spoken, tickLabel, ticks } from "../time/format";
 import { RATES } from "../time/clock";
 import type { App } from "./app";
 import { IconButton } from "./icons";
-import { RunBar } from "./run_bar";
+import { RunBar } from "../run_control/bar";
 import { SMALL_FONT, surface } from "./surface";
 import { theme } from "./theme";
 import { reads } from "../time/reads";

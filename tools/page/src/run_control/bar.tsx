@@ -2,11 +2,11 @@
 import { useRef, useState } from "preact/hooks";
 import { RATES } from "../time/clock";
 import { moment } from "../time/format";
-import { type App, UNITS } from "./app";
+import { type App, UNITS } from "../shell/app";
 import { Futures } from "./futures";
 import { Halts } from "./halts";
-import { Icon, IconButton } from "./icons";
-import { Scrub } from "./timeline";
+import { Icon, IconButton } from "../shell/icons";
+import { Scrub } from "../shell/timeline";
 
 /** How fine a time is shown where a run stands still at an instruction, ns. */
 const FINE_NS = 1;

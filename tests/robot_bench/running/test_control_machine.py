@@ -11,10 +11,10 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 from p2os.view.run_control import RunState
 from robot_bench.bench import Bench
 from simbase.timing import NS_PER_MS, Nanos
-from tests.robot_bench.run_control.test_session import Controlled, scenario
+from tests.robot_bench.running.test_run_control import Controlled, scenario
 
 #: The run of the machine: short, and with events in it.
-DURATION_S = 0.8
+DURATION_S = 0.6
 TIMES = st.integers(0, round(DURATION_S * 1000)).map(lambda ms: ms * NS_PER_MS)
 UNITS = st.sampled_from(["instruction", "line", "edge", "packet", "event", "millisecond"])
 PLACES = st.sampled_from([
@@ -156,7 +156,7 @@ def test_a_run_stays_what_it_is_whatever_is_asked() -> None:
     bench.finish()
     ControlMachine.alone = bench.trace.sha256
     ControlMachine.TestCase.settings = settings(
-        max_examples=8, stateful_step_count=10, deadline=None,
+        max_examples=4, stateful_step_count=8, deadline=None,
         suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
     )  # fmt: skip
     ControlMachine.TestCase().runTest()

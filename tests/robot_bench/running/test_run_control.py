@@ -13,6 +13,7 @@ from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 from tests.robot_bench.firmware.hurried import hurried_scenario
 
 DURATION_S = 2.0
+DURATION_NS = round(DURATION_S * NS_PER_S)
 
 
 def scenario(duration_s: float = DURATION_S) -> Scenario:
@@ -206,6 +207,15 @@ def test_a_fork_is_the_run_again_where_nothing_is_done_and_parts_where_something
     assert between.parting == parted.parting
     assert run.session.state().head_ns == round(1.5 * NS_PER_S)
     assert hash_at_end(run) == alone
+
+
+def test_what_was_done_at_the_very_end_of_what_is_known_is_found_too(run: Controlled) -> None:
+    for at_ns in (150_000, DURATION_NS - 1_000_000):
+        run.do("choose", future="run")
+        state = run.do("fork", at_ns=at_ns, words="fault link-down")
+        run.step("millisecond")
+        parting = run.do("compare", future="run").futures[-1].parting
+        assert [one.signal for one in parting] == ["fault"], state
 
 
 def test_a_fork_goes_back_to_where_it_begins_and_no_further(run: Controlled) -> None:

@@ -1,17 +1,21 @@
 // The futures of a run: which there are, a new one from here, and where two of them part.
-import { useState } from "preact/hooks";
+import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import type { FutureState } from "../generated/view";
 import { moment } from "../time/format";
-import type { App } from "./app";
-import { IconButton } from "./icons";
+import type { App } from "../shell/app";
+import { IconButton } from "../shell/icons";
 
 const DONE = ["fault sonar-stuck 3 0.2", "fault link-down", "press stop-button", "pin PB12 low", "volts PA0 2.6", "type usart1 go"];
 
 export function Futures({ app, onClose }: { app: App; onClose: () => void }) {
-  const run = app.store.run.value!, [words, setWords] = useState("");
+  const run = app.store.run.value!, [words, setWords] = useState(""), input = useRef<HTMLInputElement>(null);
+  useLayoutEffect(() => input.current?.focus(), []);
+  const drop = (future: FutureState) => {
+    app.move({ do: "drop", future: future.name });
+    input.current?.focus(); // the button goes, and with it where keys go
+  };
   const fork = (event: Event) => {
     event.preventDefault();
-    app.beside.value = run.future;
     app.move({ do: "fork", ...(words.trim() ? { words: words.trim() } : {}) });
     setWords("");
   };
@@ -19,16 +23,16 @@ export function Futures({ app, onClose }: { app: App; onClose: () => void }) {
     <div class="bar-panel" role="dialog" aria-label="Futures of this run">
       <div class="help-head"><h2>Futures of this run</h2><IconButton icon="close" label="Close" onClick={onClose} /></div>
       <form class="one-line" onSubmit={fork}>
-        <input class="grow" autofocus list="doings" aria-label="What is done where the fork begins" placeholder={`at ${moment(app.clock.now.value)}: nothing, or fault link-down …`} value={words} maxLength={400} onInput={(event) => setWords(event.currentTarget.value)} />
+        <input ref={input} class="grow" list="doings" aria-label="What is done where the fork begins" placeholder={`at ${moment(app.clock.now.value)}: nothing, or fault link-down …`} value={words} maxLength={400} onInput={(event) => setWords(event.currentTarget.value)} />
         <datalist id="doings">{DONE.map((one) => <option value={one} />)}</datalist>
         <button type="submit">Fork here</button>
       </form>
-      <ul class="plain-list">{run.futures.map((future) => <Row key={future.name} app={app} future={future} />)}</ul>
+      <ul class="plain-list">{run.futures.map((future) => <Row key={future.name} app={app} future={future} onDrop={() => drop(future)} />)}</ul>
     </div>
   );
 }
 
-function Row({ app, future }: { app: App; future: FutureState }) {
+function Row({ app, future, onDrop }: { app: App; future: FutureState; onDrop: () => void }) {
   const run = app.store.run.value!, isChosen = future.name === run.future, isBeside = !isChosen && app.beside.value === future.name;
   const about = future.parent ? `from ${future.parent} at ${moment(future.at_ns)}${future.words ? `: ${future.words}` : ""}` : "the run itself";
   return (
@@ -41,7 +45,7 @@ function Row({ app, future }: { app: App; future: FutureState }) {
           app.beside.value = isBeside ? null : future.name;
           if (!isBeside) app.ask({ do: "compare", future: future.name });
         }}>Compare</button>}
-        {future.parent && <IconButton icon="missed" label={`Drop ${future.name}`} onClick={() => app.move({ do: "drop", future: future.name })} />}
+        {future.parent && <IconButton icon="missed" label={`Drop ${future.name}`} onClick={onDrop} />}
       </div>
       {future.against && <Parting app={app} future={future} />}
     </li>
