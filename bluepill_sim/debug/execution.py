@@ -9,12 +9,14 @@ twice.
 Invariant: outside of its methods the machine is halted.
 """
 
-from collections.abc import Callable
+import contextlib
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from bluepill_sim.core import HaltKind
 from bluepill_sim.core.faults import FaultKind, SeenFault
-from bluepill_sim.debug.history import History, Point
+from bluepill_sim.core.halts import ChipReached
+from bluepill_sim.debug.history import MOST_POINTS, History, Point
 from bluepill_sim.debug.machine import HaltReason, Machine, StopKind
 from bluepill_sim.debug.semihosting import Semihosting
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reason
@@ -22,7 +24,7 @@ from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reason
 #: chosen: how often a running machine checks for a request to stop.
 SLICE_NS: Nanos = 2 * NS_PER_MS
 #: chosen: so far before a state, in cycles, single steps towards it begin.
-_MARGINS = (64, 512, 8192, 1 << 20)
+_MARGINS = (64, 512, 8192, 1 << 20, 1 << 62)
 #: Bounds the steps of one way back: a program asleep or in a loop to itself takes one step for a long time.
 _MAX_STEPS = 20_000
 
@@ -47,12 +49,23 @@ class Execution:
 
     Args:
         machine: what runs.
-        write: takes what the program prints by semihosting.
+        write: takes what the program prints by semihosting; None: no debugger is attached: BKPT and faults do what
+            they do on a chip alone, and halt nothing.
+        most_points: so many older states are kept at most.
+        slice_ns: how often it looks for a request to stop, at least.
     """
 
-    def __init__(self, machine: Machine, write: Callable[[bytes], None]) -> None:
+    def __init__(
+        self,
+        machine: Machine,
+        write: Callable[[bytes], None] | None = None,
+        *,
+        most_points: int = MOST_POINTS,
+        slice_ns: Nanos = SLICE_NS,
+    ) -> None:
         self.machine = machine
-        self.history = History(machine)
+        self.history = History(machine, most_points)
+        self._slice_ns = slice_ns
         #: Called between slices; True ends the run.
         self.wants_stop: Callable[[], bool] = lambda: False
         self._is_replaying = False
@@ -60,9 +73,10 @@ class Execution:
         self._semihosting = Semihosting(machine.board, self._print)
         self._reported_fault = False
         self._bkpt_at: int | None = None
-        machine.board.chip.processor.halts_on_bkpt = True
         self._report = machine.board.chip.processor.on_fault
-        machine.board.chip.processor.on_fault = self._faulted
+        if write is not None:
+            machine.board.chip.processor.halts_on_bkpt = True
+            machine.board.chip.processor.on_fault = self._faulted
 
     def detach(self) -> None:
         """Let the machine run as if no debugger had been there."""
@@ -93,38 +107,58 @@ class Execution:
         self.machine.halted()
         return stop
 
-    def _run(self, until: _Place | None) -> HaltReason:
-        """Run to a stop; with `until` also to a state, which then counts as none: INTERRUPT."""
+    def run_to(self, limit_ns: Nanos) -> HaltReason:
+        """Run to a time, which counts as no stop (INTERRUPT), or to what stops the chip before."""
+        return self._run(None, limit_ns)
+
+    def pass_to(self, limit_ns: Nanos) -> None:
+        """Run to a time, past all stops."""
+        board = self.machine.board
+        with self._without_stops():
+            while board.now_ns < limit_ns and not self._has_ended():
+                self.history.pass_by()
+                reached = self.machine.advance_to(min(limit_ns, board.now_ns + self._slice_ns))
+                if reached.halt is not None:
+                    self._stop_of(reached.halt.kind, reached.halt.address)
+                    self._pass_bkpt()
+
+    def _run(self, until: _Place | None, limit_ns: Nanos | None = None) -> HaltReason:
+        """Run to a stop; with `until` also to a state, with `limit_ns` to a time, which counts as none: INTERRUPT."""
         self._pass_bkpt()
         board = self.machine.board
         while True:
             if self._has_ended():
                 return HaltReason(StopKind.END)
-            limit = board.now_ns + SLICE_NS
+            if limit_ns is not None and board.now_ns >= limit_ns:
+                return HaltReason(StopKind.INTERRUPT)
+            ends = (board.now_ns + self._slice_ns, limit_ns, self.machine.end_ns)
+            limit = min(end for end in ends if end is not None)
             if not self._is_replaying:
                 self.history.pass_by()
-            if self.machine.end_ns is not None:
-                limit = min(limit, self.machine.end_ns)
             if until is not None and board.cycle >= until.cycle:
                 return HaltReason(StopKind.INTERRUPT)
             reached = self.machine.advance_to(limit)
-            if reached.halt is not None:
-                stop = self._stop_of(reached.halt.kind, reached.halt.address)
-                if stop is not None:
-                    return stop
-                continue
-            if self._has_new_fault() or reached.reason is Reason.HALT:
-                self._reported_fault = True
-                return HaltReason(StopKind.FAULT)
-            if not self._is_replaying and self.wants_stop():
-                return HaltReason(StopKind.INTERRUPT)
+            stop = self._stopped(reached)
+            if stop is not None:
+                return stop
+
+    def _stopped(self, reached: ChipReached) -> HaltReason | None:
+        """Return what stops a run that came so far; None: nothing."""
+        if reached.halt is not None:
+            return self._stop_of(reached.halt.kind, reached.halt.address)
+        if self._has_new_fault() or reached.reason is Reason.HALT:
+            self._reported_fault = True
+            return HaltReason(StopKind.FAULT)
+        if not self._is_replaying and self.wants_stop():
+            return HaltReason(StopKind.INTERRUPT)
+        return None
 
     def _step_once(self) -> HaltReason | None:
         """Run one instruction; None where the chip sleeps until a stop is requested."""
         while True:
             if self._has_ended():
                 return HaltReason(StopKind.END)
-            reached = self.machine.advance_to(self.machine.board.now_ns + SLICE_NS, by_step=True)
+            reached = self.machine.advance_to(self.machine.board.now_ns + self._slice_ns, by_step=True)
             if reached.halt is not None:
                 stop = self._stop_of(reached.halt.kind, reached.halt.address)
                 return stop or HaltReason(StopKind.STEP)
@@ -157,7 +191,7 @@ class Execution:
         return end is not None and self.machine.board.now_ns >= end
 
     def _has_new_fault(self) -> bool:
-        return self.machine.board.fault is not None and not self._reported_fault
+        return self._write is not None and self.machine.board.fault is not None and not self._reported_fault
 
     def _faulted(self, kind: FaultKind, pc: int, address: int | None, is_lockup: bool, seen: SeenFault | None) -> None:
         if self._report is not None:
@@ -166,18 +200,34 @@ class Execution:
             self.machine.board.request_stop()
 
     def _print(self, data: bytes) -> None:
-        if not self._is_replaying:
+        if not self._is_replaying and self._write is not None:
             self._write(data)
 
     # Backwards.
 
+    def go_to(self, at_ns: Nanos) -> None:
+        """Go to a time, past all stops: forwards, or from the newest older state that is kept."""
+        if at_ns < self.machine.board.now_ns:
+            point = next((one for one in self.history.latest_first() if one.at_ns <= at_ns), None)
+            if point is None:
+                point = self.history.latest_first()[-1]
+            self._bkpt_at = None
+            self.machine.restore(point.snapshot)
+            self.history.forget_after(point.cycle)
+            self._reported_fault = self.machine.board.fault is not None
+        self.pass_to(at_ns)
+
     def step_back(self) -> HaltReason:
-        """Go to the state before the last instruction."""
-        return self._replay(self._step_back)
+        """Go to the state before the last instruction; of a chip that sleeps, before that which it sleeps in."""
+        return self._replay(lambda here: self._back_by(here, self._step_once, StopKind.STEP))
 
     def go_back(self) -> HaltReason:
         """Go to the last stop before this state, or to where the history begins."""
         return self._replay(self._go_back)
+
+    def back_to_near_stop(self) -> HaltReason:
+        """Go to the last stop before this state, where stops are so many that they are looked for from nearby."""
+        return self._replay(lambda here: self._back_by(here, lambda: self._run(here), StopKind.BREAKPOINT))
 
     def _replay(self, act: Callable[[_Place], HaltReason]) -> HaltReason:
         board = self.machine.board
@@ -191,52 +241,60 @@ class Execution:
         self._reported_fault = board.fault is not None
         return stop
 
-    def _step_back(self, here: _Place) -> HaltReason:
+    def _back_by(self, here: _Place, advance: Callable[[], HaltReason | None], kind: StopKind) -> HaltReason:
+        """Go to the last state before another one that `advance` comes by, from nearby or from further away."""
         for margin in _MARGINS:
             for point in self.history.before(here.cycle)[:2]:
                 self.machine.restore(point.snapshot)
                 self._approach(here, margin)
                 if self.machine.board.cycle >= here.cycle:
                     continue
-                start = self.machine.snapshot()
-                count = self._count_steps(here)
+                start, is_between = self.machine.snapshot(), self.machine.board.is_asleep or kind is not StopKind.STEP
+                count = self._count_before(here, advance)
                 self.machine.restore(start)
-                if count is None:
+                # A chip that sleeps is between two instructions: this is no state that one stops in.
+                if count is None or (count == 0 and is_between):
                     continue
-                for _ in range(count - 1):
-                    self._step_once()
-                return HaltReason(StopKind.STEP)
+                for _ in range(count):
+                    advance()
+                return HaltReason(kind)
         return self._to_begin(here)
 
     def _approach(self, here: _Place, margin: int) -> None:
         """Run to some cycles before a state, past all stops."""
         board = self.machine.board
-        breakpoints, watchpoints = set(board.chip.engine.breakpoints), set(board.chip.engine.watchpoints)
-        board.chip.engine.breakpoints.clear()
-        board.chip.engine.watchpoints.clear()
-        try:
+        with self._without_stops():
             while board.cycle < here.cycle - margin:
                 span_ns = (here.cycle - margin - board.cycle) * NS_PER_S // board.hclk_hz
                 if span_ns <= 0:
                     break
-                reached = self.machine.advance_to(board.now_ns + min(span_ns, SLICE_NS))
+                reached = self.machine.advance_to(board.now_ns + min(span_ns, self._slice_ns))
                 if reached.halt is not None:
                     self._stop_of(reached.halt.kind, reached.halt.address)
                     self._pass_bkpt()
-        finally:
-            board.chip.engine.breakpoints.update(breakpoints)
-            board.chip.engine.watchpoints.update(watchpoints)
 
-    def _count_steps(self, here: _Place) -> int | None:
-        """Return how many steps it is to a state; None where steps do not come by it."""
+    @contextlib.contextmanager
+    def _without_stops(self) -> Iterator[None]:
+        engine = self.machine.board.chip.engine
+        breakpoints, watchpoints = set(engine.breakpoints), set(engine.watchpoints)
+        engine.breakpoints.clear()
+        engine.watchpoints.clear()
+        try:
+            yield
+        finally:
+            engine.breakpoints.update(breakpoints)
+            engine.watchpoints.update(watchpoints)
+
+    def _count_before(self, here: _Place, advance: Callable[[], HaltReason | None]) -> int | None:
+        """Return how many times one advances to the last state before another; None where that is too often."""
         board = self.machine.board
-        for count in range(1, _MAX_STEPS):
+        for count in range(_MAX_STEPS):
             self._pass_bkpt()
-            self._step_once()
-            if (board.cycle, board.pc) == (here.cycle, here.pc):
+            advance()
+            if (board.cycle, board.pc) == (here.cycle, here.pc) or board.cycle > here.cycle:
                 return count
-            if board.cycle > here.cycle:
-                return None
+            if self._has_ended():
+                return count
         return None
 
     def _go_back(self, here: _Place) -> HaltReason:

@@ -13,7 +13,7 @@ from bluepill_sim.debug.machine import Machine
 from simbase.timing import NS_PER_MS, Nanos
 
 #: chosen: 64 snapshots are a few megabytes.
-_MOST = 64
+MOST_POINTS = 64
 _FIRST_STRIDE_NS: Nanos = 1 * NS_PER_MS
 
 
@@ -27,10 +27,15 @@ class Point:
 
 
 class History:
-    """Snapshots of one machine."""
+    """Snapshots of one machine.
 
-    def __init__(self, machine: Machine) -> None:
-        self._machine = machine
+    Args:
+        machine: Whose.
+        most: So many are kept at most.
+    """
+
+    def __init__(self, machine: Machine, most: int = MOST_POINTS) -> None:
+        self._machine, self._most = machine, most
         self._stride_ns = _FIRST_STRIDE_NS
         self._points: list[Point] = []
         self.begin()
@@ -39,6 +44,10 @@ class History:
         """Forget everything: what was before the present state led elsewhere."""
         self._stride_ns = _FIRST_STRIDE_NS
         self._points = [self.here()] if self._machine.can_rewind else []
+
+    def take(self, other: "History") -> None:
+        """Have the states of another machine that is the same."""
+        self._points, self._stride_ns = other.latest_first()[::-1], other._stride_ns  # noqa: SLF001 - its own kind
 
     def here(self) -> Point:
         """Return the present state."""
@@ -50,9 +59,13 @@ class History:
         if not self._points or self._machine.board.now_ns < self._points[-1].at_ns + self._stride_ns:
             return
         self._points.append(self.here())
-        if len(self._points) > _MOST:
+        if len(self._points) > self._most:
             self._points = self._points[::2]
             self._stride_ns *= 2
+
+    def latest_first(self) -> list[Point]:
+        """Return the states noted, the latest first."""
+        return self._points[::-1]
 
     def before(self, cycle: int) -> list[Point]:
         """Return the states noted before a cycle, the latest first."""

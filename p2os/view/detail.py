@@ -37,8 +37,14 @@ class Extremes:
             least, greatest = self._levels[level]
             for run in range(len(least), rows // RUN):
                 lows, highs = self._at(level)
-                least.append(min(lows[run * RUN : (run + 1) * RUN], key=values.__getitem__))
-                greatest.append(max(highs[run * RUN : (run + 1) * RUN], key=values.__getitem__))
+                first, last = run * RUN, (run + 1) * RUN
+                if level:
+                    least.append(min(lows[first:last], key=values.__getitem__))
+                    greatest.append(max(highs[first:last], key=values.__getitem__))
+                else:
+                    piece = values[first:last]
+                    least.append(values.index(min(piece), first))
+                    greatest.append(values.index(max(piece), first))
             rows, level = rows // RUN, level + 1
 
     def within(self, first: int, last: int) -> tuple[int, int]:

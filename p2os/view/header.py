@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass
 from typing import Literal, TypeAlias
 
 from p2os.view.channels import FORMAT
+from p2os.view.run_control import RunState
 from simbase.timing import Nanos
 
 #: How something came out: a run, a goal, a row.
@@ -287,6 +288,9 @@ class Answered:
     now_ns: Nanos | None = None
     #: What was wrong with a request.
     refused: str | None = None
+    #: How a run stands that can be controlled, when that changes; and at first whether this page may.
+    run: RunState | None = None
+    may_control: bool | None = None
 
 
 __all__ = [

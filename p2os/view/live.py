@@ -13,6 +13,7 @@ from typing import Generic, Protocol, TypeVar
 
 from p2os.view.header import PageHeader, PageSection
 from p2os.view.recording import ViewRecording
+from p2os.view.run_control import RunControl
 from simbase.timing import Nanos
 
 Happening = TypeVar("Happening")
@@ -24,6 +25,8 @@ class ShownSource(Protocol):
     """A recording, and what brings it up to date."""
 
     recording: ViewRecording
+    #: Controls the run that it is of; None: nothing does.
+    control: RunControl | None
 
     def update(self) -> None:
         """Add what has come; called by who shows it."""
@@ -42,6 +45,7 @@ class LiveRecording(Generic[Happening]):
         self, recording: ViewRecording, add: Callable[[Happening], None], most_waiting: int = MOST_WAITING
     ) -> None:
         self.recording = recording
+        self.control: RunControl | None = None
         self._add, self._most = add, most_waiting
         # Between two threads: a deque's ends may be used from one each.
         self._waiting: deque[Happening] = deque()
@@ -51,10 +55,16 @@ class LiveRecording(Generic[Happening]):
         self._report: PageHeader | None = None
         recording.header = replace(recording.header, is_live=True)
 
-    def offer(self, happening: Happening, now: Nanos) -> None:
-        """Take what happened; called by the program, and as quick as can be."""
+    def offer(self, happening: Happening, now: Nanos, *, is_kept: bool = False) -> None:
+        """Take what happened; called by the program, and as quick as can be.
+
+        Args:
+            happening: It.
+            now: Until when all is known.
+            is_kept: Whether it finds room whatever waits: what the rest is understood by.
+        """
         self._now = now
-        if len(self._waiting) < self._most:
+        if is_kept or len(self._waiting) < self._most:
             self._waiting.append(happening)
         else:
             self._lost += 1
@@ -63,13 +73,17 @@ class LiveRecording(Generic[Happening]):
         """Take that time goes on, and nothing happens; called by the program."""
         self._now = now
 
+    def report(self, report: PageHeader) -> None:
+        """Say what came of the run, of which forks may still go on; called by the program."""
+        self._report = report
+
     def end(self, report: PageHeader | None = None) -> None:
         """Say that nothing more will come, and what came of it; called by the program.
 
         Args:
             report: Has verdict, sections and what else a recorded one begins with; None: nothing is known yet.
         """
-        self._report = report
+        self._report = report or self._report
         self._is_over = True
 
     def update(self) -> None:
@@ -95,6 +109,7 @@ class StillRecording:
 
     def __init__(self, recording: ViewRecording) -> None:
         self.recording = recording
+        self.control: RunControl | None = None
         self._sections: Sequence[PageSection] | None = None
 
     def show(self, sections: Sequence[PageSection]) -> None:

@@ -3,10 +3,12 @@
 Invariant: within a channel time never runs back.
 """
 
+import math
 from array import array
+from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import cast
+from typing import Any, cast
 
 from p2os.view.channels import BY_NAME, CellType, ChannelKind
 from p2os.view.detail import Extremes, changes, curve, nearest, rows_in, thinned_list
@@ -38,6 +40,7 @@ class ChannelTrack:
         self.kind: ChannelKind = BY_NAME[header.kind]
         self.columns = empty_columns(self.kind)
         self.times = cast("array[int]", self.columns[0])
+        self._adders = self._made_adders()
         self._widths = [header.width if column.is_wide else 1 for column in self.kind.columns]
         #: Of columns that curves are thinned by: their extremes, and their numbers without NaN.
         self._indices: dict[str, tuple[Extremes, array[float]]] = {}
@@ -47,12 +50,16 @@ class ChannelTrack:
 
     def append(self, t_ns: Nanos, *cells: Cell) -> None:
         """Add a row; a time that steps back is moved up."""
-        self.times.append(max(t_ns, self.times[-1]) if self.times else t_ns)
-        for values, column, cell in zip(self.columns[1:], self.kind.columns[1:], cells, strict=True):
-            if column.is_wide:
-                cast("array[float]", values).extend(cast("Sequence[float]", cell))
-            else:
-                values.append(cell)  # type: ignore[arg-type]  # of the column's type, as the caller has it
+        times = self.times
+        times.append(times[-1] if times and times[-1] > t_ns else t_ns)
+        for add, cell in zip(self._adders, cells, strict=True):
+            add(cell)
+
+    def _made_adders(self) -> "list[Callable[[Any], None]]":
+        """Return what adds a cell to each column but the first: of the column's type, as the caller has it."""
+        kinds = self.kind.columns[1:]
+        return [values.extend if column.is_wide else values.append
+                for values, column in zip(self.columns[1:], kinds, strict=True)]  # fmt: skip
 
     def extend_levels(self, times: Iterable[int], levels: Iterable[int]) -> None:
         """Add rows of a wire at once, in the order of time."""
@@ -61,6 +68,11 @@ class ChannelTrack:
         self.times.extend(times)
         found.extend(levels)
         edges.extend([1] * (len(self.times) - before))
+
+    def take_rows(self, other: "ChannelTrack", count: int) -> None:
+        """Take the first rows of a channel of the same kind, before any of its own."""
+        self.columns = list(other.rows(0, count))
+        self.times, self._adders = cast("array[int]", self.columns[0]), self._made_adders()
 
     def column(self, name: str) -> ColumnValues:
         """Return a column by its name."""
@@ -80,13 +92,13 @@ class ChannelTrack:
         """
         first, last = rows_in(self.times, from_ns, to_ns)
         if last - first <= ROWS_A_PIXEL * pixels and self.kind.name not in _SEVERITY:
-            return self._frame(self._slice(first, last), from_ns, to_ns, last - first, flags)
+            return self._frame(self.rows(first, last), from_ns, to_ns, last - first, flags)
         return self._frame(self._thinned(first, last, pixels, listed), from_ns, to_ns, last - first, flags)
 
     def tail(self, first: int, last: int) -> ViewFrame:
         """Return the rows from one to before another, all of them."""
         times = self.times
-        return self._frame(self._slice(first, last), times[first], times[last - 1], last - first, NO_FLAGS)
+        return self._frame(self.rows(first, last), times[first], times[last - 1], last - first, NO_FLAGS)
 
     def _frame(
         self, columns: tuple[ColumnValues, ...], from_ns: Nanos, to_ns: Nanos, of: int, flags: FrameFlags
@@ -101,7 +113,8 @@ class ChannelTrack:
                          width=self.header.width if any(one.is_wide for one in self.kind.columns) else 1,
                          flags=flags)  # fmt: skip
 
-    def _slice(self, first: int, last: int) -> tuple[ColumnValues, ...]:
+    def rows(self, first: int, last: int) -> tuple[ColumnValues, ...]:
+        """Return the columns of some rows, copied."""
         return tuple(
             values[first * width : last * width] for values, width in zip(self.columns, self._widths, strict=True)
         )
@@ -140,6 +153,9 @@ class ChannelTrack:
 
 def _extend_plain(plain: "array[float]", values: "array[float]") -> None:
     """Add numbers to others; NaN is the number before it, or the first one."""
+    if not math.isnan(sum(values)):  # else there is NaN, or infinity of both signs
+        plain.fromlist(values.tolist())
+        return
     last = plain[-1] if plain else next((value for value in values if value == value), 0.0)  # noqa: PLR0124 - no NaN
     for value in values:
         last = value if value == value else last  # noqa: PLR0124 - it is no NaN
@@ -156,11 +172,19 @@ class ViewRecording:
 
     header: PageHeader
     tracks: list[ChannelTrack] = field(default_factory=list)
+    #: Sources whose channels are shown no more.
+    dropped: set[str] = field(default_factory=set)
 
     def add(self, header: ChannelHeader) -> ChannelTrack:
         """Add a channel, without rows yet; its `id` is given here."""
         made = ChannelTrack(replace(header, id=len(self.tracks)))
         self.tracks.append(made)
+        return made
+
+    def copied(self, track: ChannelTrack, source: str, until_ns: Nanos, of: int) -> ChannelTrack:
+        """Add a channel that has the rows of another one up to a time, from another source, belonging to a channel."""
+        made = self.add(replace(track.header, source=source, of=of))
+        made.take_rows(track, bisect_right(track.times, until_ns))
         return made
 
     def shared(self, header: ChannelHeader) -> ChannelTrack:
@@ -171,7 +195,8 @@ class ViewRecording:
     @property
     def full_header(self) -> PageHeader:
         """The header with its channels."""
-        return replace(self.header, channels=[track.header for track in self.tracks])
+        shown = [track.header for track in self.tracks if track.header.source not in self.dropped]
+        return replace(self.header, channels=shown)
 
     def frames(self, pixels: int, listed: int) -> Iterator[ViewFrame]:
         """Yield one frame a channel, of the whole time, as of `ChannelTrack.frame`."""

@@ -33,8 +33,9 @@ class ViewTarget:
 class ServedPage(Protocol):
     """A page that is served."""
 
-    #: What a browser opens.
+    #: What a browser opens; and a link for looking on, empty where nothing can be controlled.
     url: str
+    watch_url: str
 
     def wait(self) -> None:
         """Wait until it ends; an interrupt is raised here."""

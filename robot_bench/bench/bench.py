@@ -279,15 +279,27 @@ class Bench(Expectations, Interventions):
             bench._checkpoints.clear()  # noqa: SLF001  # as above
         self.restore(snapshot)
 
-    def fork(self) -> "Bench":
+    def fork(self, path: Path | None = None) -> "Bench":
         """Return a bench that goes on from here by itself, with its trace in memory; this one goes on too.
+
+        Args:
+            path: The file of its trace, in place of memory; for a robot alone in its world.
 
         Raises:
             TypeError: The bench has a chip of the caller's.
+            UsageError: A file for several robots.
+            FileError: The file cannot be written.
         """
         self._refuse_a_chip_of_others()
-        other = self._anew()
-        written = {name: "".join(bench.trace.lines()) for name, bench in self.robots.items()}
+        if path is None:
+            written: dict[str, str | int] = {name: "".join(one.trace.lines()) for name, one in self.robots.items()}
+            other = self._anew()
+        elif self._whole is not None:
+            raise UsageError("robots that share a world have their forks in memory", hint="fork()")
+        else:
+            written = {self.scenario.name: self.trace.copy_to(path)}
+            trace = TraceWriter(path, goes_on=True)
+            other = Bench(self.scenario, slice_ns=self._run.slice_ns, trace=trace)
         other.restore(self._with_traces(self.snapshot(), written))
         return other
 

@@ -8,6 +8,7 @@ Invariant: what is found depends on the times of the events alone, not on where 
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from typing import TypeAlias
 
 from robot_bench.events.codec import Blocks, events_of
 from robot_bench.events.kinds import Event
@@ -15,7 +16,7 @@ from robot_bench.events.selection import Selector
 from robot_bench.events.stream import EventStream
 from robot_bench.recording.recorder import SAMPLE_NS
 from robot_bench.recording.trace import TraceWriter
-from robot_bench.wires.nets import Harness
+from robot_bench.wires.nets import Harness, Net
 from simbase.timing import Nanos
 
 #: Runs until something is so or to a time, and calls its third argument before each step.
@@ -36,7 +37,7 @@ class EventWait:
         #: What was waited for last, and when the bench stood still after it.
         self._last: tuple[Nanos, Event | None] = (-1, None)
         #: Where in the trace the events of the last step are, and the wires' levels there; None: from its beginning.
-        self._mark: tuple[int, Blocks] | None = None
+        self._mark: TraceMark = None
 
     def forget(self) -> None:
         """Have the next event counted from when it is asked for: something was done, or time was set back."""
@@ -70,14 +71,29 @@ class EventWait:
 
     def _mark_here(self) -> None:
         """Note where the trace stands: what is reported from now on begins there."""
-        at = self._events.released_until
-        levels = bytearray(not net.wave(at) and net.level(at) for net in self._nets) if at >= 0 else bytearray()
-        names = tuple(net.name for net in self._nets)
-        self._mark = (self._trace.length, Blocks(names, levels)) if levels else None
+        self._mark = mark_of(self._events, self._trace, self._nets)
 
     def _reported_since_mark(self) -> Iterable[Event]:
         """Return the events of the last step."""
-        if self._mark is None:
-            return events_of(self._trace.lines())
-        length, blocks = self._mark
-        return events_of(self._trace.lines(length), begun=replace(blocks, levels=bytearray(blocks.levels)))
+        return events_since(self._mark, self._trace)
+
+
+#: Where a trace stands, and the wires' levels there; None: at its beginning.
+TraceMark: TypeAlias = tuple[int, Blocks] | None
+
+
+def mark_of(events: EventStream, trace: TraceWriter, nets: Iterable[Net]) -> TraceMark:
+    """Return where a trace stands: what is reported from now on begins there."""
+    nets, at = tuple(nets), events.released_until
+    if at < 0:
+        return None
+    levels = bytearray(not net.wave(at) and net.level(at) for net in nets)
+    return trace.length, Blocks(tuple(net.name for net in nets), levels)
+
+
+def events_since(mark: TraceMark, trace: TraceWriter) -> Iterable[Event]:
+    """Return what a trace tells from a place on."""
+    if mark is None:
+        return events_of(trace.lines())
+    length, blocks = mark
+    return events_of(trace.lines(length), begun=replace(blocks, levels=bytearray(blocks.levels)))

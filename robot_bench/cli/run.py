@@ -281,11 +281,11 @@ def run(
         return
     folder = out or make_next_folder(wanted.name)
     # Who looks on from outside lives in real time.
-    pace = realtime or (None if ros is None and foxglove is None and page is None else 1.0)
+    pace = None if page else realtime or (None if ros is None and foxglove is None else 1.0)
     with RunDisplay() as display:
         if gdb is None:
             with (
-                viewed(wanted, is_opened=not no_browser) if view
+                viewed(wanted, realtime or 1.0, display, is_opened=not no_browser) if view
                 else driven(wanted, ros=ros, inputs=inputs, foxglove=foxglove, origins=foxglove_origin or ())
             ) as driver:  # fmt: skip
                 result = run_scenario(
@@ -353,13 +353,13 @@ def driven(
 
 
 @contextlib.contextmanager
-def viewed(scenario: Scenario, *, is_opened: bool) -> Iterator[RunBench]:
-    """Yield what runs a bench while a page shows it.
+def viewed(scenario: Scenario, speed: float, display: RunDisplay, *, is_opened: bool) -> Iterator[RunBench]:
+    """Yield what runs a bench while a page shows and controls it, at first at a speed.
 
     Raises:
         UsageError, MissingDependencyError: As of `shown`.
     """
-    live = LiveRun(scenario)
+    live = LiveRun(scenario, speed=speed, on_wait=display.raise_if_interrupted)
     with shown(live.source, is_opened=is_opened):
         yield live.drive
 

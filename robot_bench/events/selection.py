@@ -17,6 +17,8 @@ r"""Which events are meant: one line of words, the same in goals, scenario files
     note adapter driving          a line of a part's state log begins so
     fault [WORDS]                 something is made to go wrong, or the firmware dies
     thing NAME                    a thing is placed, moved or removed
+    packet [NAME]                 a packet of the P2OS line has come, or one of this name (PULSE, VEL, SIP …)
+    goal met | goal missed        a goal is decided
 
 Invariant: what a selector says of an event depends on the events before it alone; it is saved with the bench.
 """
@@ -28,6 +30,9 @@ from functools import cache
 from typing import TypeAlias
 
 from adapter_sim.pinout import load_pinout
+from p2os.capture.describe import command_name
+from p2os.protocol.frames import Decoder, Frame
+from p2os.protocol.packets import packet_name
 from robot_bench.events.kinds import (
     CanTransfer,
     Contact,
@@ -35,11 +40,13 @@ from robot_bench.events.kinds import (
     Fault,
     I2cTransfer,
     Note,
+    Packet,
     PinEdge,
     Pose,
     Ranges,
     SpiTransfer,
     Text,
+    Verdict,
     WorldChange,
 )
 from simbase.errors import UsageError, nearest, shown
@@ -391,6 +398,41 @@ class _Thing(Selector):
         return isinstance(event, WorldChange) and event.name == self._name
 
 
+class _Packet(Selector):
+    STATE = ("_decoders",)
+    kinds = (Packet,)
+
+    def __init__(self, words: str, rest: str) -> None:
+        super().__init__(words)
+        self._name = rest.upper()
+        self._decoders = [Decoder(), Decoder()]
+
+    def takes(self, event: Event) -> bool:
+        if not isinstance(event, Packet):
+            return False
+        is_command, found = event.direction == "c2r", False
+        decoder = self._decoders[is_command]
+        decoder.receive(event.data, event.t)
+        while (item := decoder.next_item()) is not None:
+            if isinstance(item, Frame):
+                name = command_name(item.kind) if is_command else packet_name(item.kind)
+                found = found or not self._name or self._name in name.upper().split()
+        return found
+
+
+class _Goal(Selector):
+    kinds = (Verdict,)
+
+    def __init__(self, words: str, rest: str) -> None:
+        super().__init__(words)
+        if rest not in {"met", "missed"}:
+            raise ValueError("met, or missed")
+        self._is_met = rest == "met"
+
+    def takes(self, event: Event) -> bool:
+        return isinstance(event, Verdict) and event.met is self._is_met
+
+
 _USART = ("usart1 sends TEXT", _Usart)
 _I2C, _SPI = ("i2c1 writes 0x3c", _I2c), ("spi1 sends 9f 00", _Spi)
 #: First word → how it is written, and what picks the events.
@@ -412,4 +454,6 @@ SELECTORS: Mapping[str, tuple[str, Callable[[str, str], Selector]]] = {
     "note": ("note adapter driving", _Note),
     "fault": ("fault [WORDS]", _Fault),
     "thing": ("thing NAME", _Thing),
+    "packet": ("packet PULSE", _Packet),
+    "goal": ("goal missed", _Goal),
 }

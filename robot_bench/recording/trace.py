@@ -17,6 +17,7 @@ import contextlib
 import hashlib
 import io
 import json
+import shutil
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import IO
@@ -167,6 +168,23 @@ class TraceWriter(Stateful):
                 yield from lines
         except OSError as error:
             raise FileError(f"cannot read {self.path}: {error.strerror}") from error
+
+    def copy_to(self, path: Path) -> int:
+        """Write all that was written so far to a file, for a writer that goes on there; return its length.
+
+        Raises:
+            RunFailedError: The disk is full or gone.
+            FileError: The one cannot be read, or the other not written.
+        """
+        self.flush()
+        try:
+            if self.path is None:
+                path.write_text(self.text, encoding="ascii", newline="\n")
+            else:
+                shutil.copyfile(self.path, path)
+        except OSError as error:
+            raise FileError(f"cannot write {path}: {error.strerror}") from error
+        return self.length
 
     def flush(self) -> None:
         """Have all that was written so far in the file, for whoever reads it now.

@@ -1,22 +1,37 @@
-"""A run that goes on, for whoever looks at it: what the trace is written of, handed over as it is.
+"""A run that goes on, for whoever looks at it and controls it: what the trace is written of, handed over as it is.
+
+Pages' commands wait in a queue until the bench stands between two slices. Nothing of a run that is known is handed over
+a second time: a bench that was set back comes by the same again.
 
 Invariant: nobody who looks on decides anything: the trace is the same with and without.
 """
 
-from collections.abc import Sequence
+import queue
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
+from p2os.transport.wall_clock import Clock, wall_clock
 from p2os.view.header import PageHeader
 from p2os.view.live import LiveRecording
 from p2os.view.recording import ViewRecording
+from p2os.view.run_control import RunCommand, RunState
 from robot_bench.bench import Bench, run_of
 from robot_bench.events.codec import Blocks, EdgeBlock, Json, Levels, Recorded
 from robot_bench.report.run_page import lead_of
 from robot_bench.run import meta_of
+from robot_bench.run_control.future import Future
+from robot_bench.run_control.session import MAIN, RunSession
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.view.run_tracks import RunTracks
 from robot_bench.wires.edges import Edges
 from simbase.timing import Nanos
+
+#: chosen: commands that may wait; a person gives some a second.
+MOST_COMMANDS = 64
+#: chosen: how long a signal may wait to be looked at where a run stands still, seconds.
+_WAIT_S = 0.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,53 +43,177 @@ class BenchBuilt:
 
 @dataclass(frozen=True, slots=True)
 class BenchReleased:
-    """What was handed on at once."""
+    """What was handed on at once in a future."""
 
     events: Sequence[Recorded]
+    future: str = MAIN
+
+
+@dataclass(frozen=True, slots=True)
+class FutureForked:
+    """A future has left another one, whose past it shares up to a time."""
+
+    future: str
+    parent: str
+    until_ns: Nanos
+    #: Names of all wires.
+    nets: tuple[str, ...]
+    levels: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class FutureDropped:
+    """A future is there no more."""
+
+    future: str
+
+
+Happened = BenchBuilt | BenchReleased | FutureForked | FutureDropped
 
 
 class LiveRun:
-    """Hands over what happens on a bench.
+    """Hands over what happens on a bench, and does there what pages ask for.
 
     Args:
         scenario: What will be run.
+        speed: Virtual seconds a second at first; 0 as fast as it goes.
+        on_wait: Called while it stands still; may raise to end the run.
+        clock: Wall clock, ns.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        *,
+        speed: float = 1.0,
+        on_wait: Callable[[], None] = lambda: None,
+        clock: Clock = wall_clock,
+    ) -> None:
         self._recording = ViewRecording(PageHeader(title=scenario.name))
-        self._tracks: RunTracks | None = None
-        self._blocks = Blocks()
+        self._tracks: dict[str, RunTracks] = {}
+        self._blocks: dict[str, Blocks] = {}
+        self._speed, self._on_wait, self._clock = speed, on_wait, clock
+        self._commands: queue.SimpleQueue[RunCommand] = queue.SimpleQueue()
+        #: How the run stands; None before it has begun.
+        self._state = RunState(is_running=True, speed=speed)
+        self._session: RunSession | None = None
+        self._folder: TemporaryDirectory[str] | None = None
+        #: Whether it goes on to be controlled when the run is over, by `stay`.
+        self.stays = False
         #: What a server shows.
-        self.source: LiveRecording[BenchBuilt | BenchReleased] = LiveRecording(self._recording, self._add)
+        self.source: LiveRecording[Happened] = LiveRecording(self._recording, self._add)
+        self.source.control = self
+
+    # As the page's `RunControl`.
+
+    @property
+    def state(self) -> RunState:
+        """How the run stands."""
+        return self._state
+
+    def offer(self, command: RunCommand) -> bool:
+        """Take a command; False where too many wait."""
+        if self._commands.qsize() >= MOST_COMMANDS:
+            return False
+        self._commands.put(command)
+        return True
+
+    # As what runs the bench.
 
     def drive(self, bench: Bench) -> None:
         """Run a bench to its end, as `run_scenario` takes it."""
         meta = meta_of(bench.scenario, bench.parts.world, run_of(bench).note, is_at_port=False)
-        self.source.offer(BenchBuilt(meta), bench.now)
-        bench.events.record(self._take)
+        self.source.offer(BenchBuilt(meta), bench.now, is_kept=True)
+        self._folder = TemporaryDirectory(prefix="p2os-view-")
+        session = self._session = RunSession(bench, self, Path(self._folder.name), self._speed)
         try:
-            bench.run_until(bench.scenario.duration_ns)
+            while not session.is_over or session.is_running:
+                self._turn(session)
+            if self.stays:
+                session.replace_main(Path(self._folder.name) / "run.jsonl")
+        except BaseException:
+            session.end()
+            raise
         finally:
-            self.source.end()
+            if not self.stays:
+                self.source.end()
 
-    def _take(self, events: Sequence[Recorded], limit: Nanos) -> None:
-        if events:
-            self.source.offer(BenchReleased(events), limit)
-        else:
-            self.source.advance_to(limit)
+    def stay(self) -> None:
+        """Go on to do what pages ask for, when the run is over, until an interrupt."""
+        assert self._session is not None  # noqa: S101 - `drive` has made it
+        while True:
+            self._turn(self._session)
 
-    def _add(self, happened: BenchBuilt | BenchReleased) -> None:
+    def _turn(self, session: RunSession) -> None:
+        """Do a command, or run a slice."""
+        wait_s = session.go_on(self._clock()) if session.is_running else _WAIT_S
+        self._show(session.state())
+        if wait_s:
+            self._on_wait()
+        try:
+            command = self._commands.get(block=wait_s > 0, timeout=wait_s or None)
+        except queue.Empty:
+            return
+        session.do(command)
+        self._show(session.state())
+
+    def _show(self, state: RunState) -> None:
+        if state is not self._state:
+            self._state = state
+
+    # As the session's `FutureRecorder`.
+
+    def begin(self, future: Future) -> None:
+        """Hand over what a future's bench reports from now on."""
+
+        def take(events: Sequence[Recorded], limit: Nanos) -> None:
+            if limit <= future.known_ns:
+                return
+            future.known_ns = limit
+            if events:
+                self.source.offer(BenchReleased(events, future.name), limit)
+            else:
+                self.source.advance_to(limit)
+
+        future.bench.events.record(take)
+
+    def forked(self, future: Future, parent: Future) -> None:
+        """Take a future that has left another one."""
+        blocks = Blocks() if future.mark is None else future.mark[1]
+        happened = FutureForked(
+            future.name, parent.name, future.bench.events.released_until, blocks.nets, bytes(blocks.levels)
+        )
+        self.source.offer(happened, max(parent.known_ns, future.known_ns), is_kept=True)
+        self.begin(future)
+
+    def dropped(self, future: Future) -> None:
+        """Forget a future."""
+        self.source.offer(FutureDropped(future.name), future.known_ns, is_kept=True)
+
+    def _add(self, happened: Happened) -> None:
         if isinstance(happened, BenchBuilt):
             self._recording.header = replace(self._recording.header, lead=lead_of(happened.meta))
-            self._tracks = RunTracks(self._recording, happened.meta)
-            return
-        assert self._tracks is not None  # noqa: S101 - a bench was built before
+            self._tracks[MAIN], self._blocks[MAIN] = RunTracks(self._recording, happened.meta), Blocks()
+        elif isinstance(happened, FutureForked):
+            self._tracks[happened.future] = self._tracks[happened.parent].forked(happened.future, happened.until_ns)
+            self._blocks[happened.future] = Blocks(happened.nets, bytearray(happened.levels))
+        elif isinstance(happened, FutureDropped):
+            self._recording.dropped.add(happened.future)
+            self._recording.header = replace(
+                self._recording.header,
+                robots=[one for one in self._recording.header.robots if one.name != happened.future],
+            )
+        else:
+            self._add_events(happened)
+
+    def _add_events(self, happened: BenchReleased) -> None:
+        tracks, blocks = self._tracks[happened.future], self._blocks[happened.future]
         for event in happened.events:
             if isinstance(event, Levels):
-                self._blocks.begin(event)
+                blocks.begin(event)
                 begun = zip(event.nets, event.levels, strict=True)
-                self._tracks.edges({net: Edges([(event.t, int(level))]) for net, level in begun})
+                tracks.edges({net: Edges([(event.t, int(level))]) for net, level in begun})
             elif isinstance(event, EdgeBlock):
-                self._tracks.edges(dict(self._blocks.take(event)))
+                tracks.edges(dict(blocks.take(event)))
             else:
-                self._tracks.take(event)
+                tracks.take(event)

@@ -45,11 +45,13 @@ def scenario_target(named: str) -> ViewTarget | None:
         return None
     scenario = load_scenario(named, trust=False)
     live = LiveRun(scenario)
+    live.stays = True
 
     def run() -> None:
-        done = run_scenario(scenario, make_next_folder(scenario.name), speed=1.0, drive=live.drive)
+        done = run_scenario(scenario, make_next_folder(scenario.name), drive=live.drive)
         if done.was_interrupted:
             raise KeyboardInterrupt
-        live.source.end(run_report(read_run(done.folder)).header)
+        live.source.report(run_report(read_run(done.folder)).header)
+        live.stay()
 
     return ViewTarget(source=live.source, run=run)

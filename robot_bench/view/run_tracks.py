@@ -8,6 +8,7 @@ Invariant: the events alone decide what is shown; who shows them decides nothing
 
 import math
 from collections.abc import Callable, Collection, Mapping
+from copy import copy
 from dataclasses import replace
 from itertools import groupby
 from operator import itemgetter
@@ -86,6 +87,8 @@ class RunTracks:
         self, recording: ViewRecording, meta: Json, source: str = "", others: Collection[str] = ()
     ) -> None:  # fmt: skip
         self.recording, self._source, self._others = recording, source, frozenset(others)
+        #: What a line of the events begins with, of robots that share them.
+        self._prefix = source
         self._tracks: dict[str, ChannelTrack] = {}
         self._robot = cast("Mapping[str, Any]", meta.get("robot") or {})
         self._threshold_m = cast("float | None", meta.get("threshold_m"))
@@ -107,6 +110,28 @@ class RunTracks:
             self._track("pose", "pose", group="robot")
         for net in pins:
             self._wire(net)
+
+    def forked(self, source: str, until_ns: Nanos) -> "RunTracks":
+        """Return the channels of another future of this robot, which has the same past up to a time."""
+        header = self.recording.header
+        alike = [replace(robot, name=source) for robot in header.robots if robot.name == self._source]
+        self.recording.header = replace(header, robots=(*header.robots, *alike))
+        other = copy(self)
+        other._leave(source, until_ns)  # noqa: SLF001 - one of its own kind
+        return other
+
+    def _leave(self, source: str, until_ns: Nanos) -> None:
+        """Be another future from now on, with channels of its own."""
+        tracks, self._source, self._tracks = self._tracks, source, {}
+        self._things, self._levels = dict(self._things), {}
+        self._packets = _packets_of(str(self._robot.get("name", "")))
+        ids: dict[int, int] = {}
+        for key, track in sorted(tracks.items(), key=lambda row: row[1].header.id):
+            made = self.recording.copied(track, source, until_ns, ids.get(track.header.of, -1))
+            ids[track.header.id], self._tracks[key] = made.header.id, made
+        for net in (net for motor in (1, 2) for net in GROUPS[_motor(motor)]):
+            if (levels := self._tracks.get(f"levels:{net}")) is not None and len(levels):
+                self._levels[net] = cast("int", levels.column("level")[-1])
 
     def take(self, event: Event) -> None:
         """Add the rows of an event; edges come by `edges`."""
@@ -168,7 +193,7 @@ class RunTracks:
     ) -> None:
         events = self._tracks.get("events") or self.recording.shared(ChannelHeader(name="events", kind="events"))
         self._tracks["events"] = events
-        events.append(t, severity, f"{self._source} {who}".lstrip(), what, detail, *place)
+        events.append(t, severity, f"{self._prefix} {who}".lstrip(), what, detail, *place)
 
     def pose(self, pose: Pose) -> None:
         """Add where the robot is, and how its wheels turn."""

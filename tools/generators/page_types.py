@@ -1,6 +1,6 @@
 """Write the TypeScript of the page's data: kinds of channels with their columns, the header, the messages.
 
-Made of `p2os/view/channels.py` and `p2os/view/header.py`; a test holds the committed file to what comes out here.
+Made of `p2os/view/channels.py`, `header.py` and `run_control.py`; a test holds the committed file to what comes out.
 Usage: python tools/generators/page_types.py
 """
 
@@ -9,7 +9,7 @@ from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
-from p2os.view import channels, header
+from p2os.view import channels, header, run_control
 from p2os.view.channels import KINDS, CellType, ChannelKind, ColumnKind
 from p2os.view.frames import FrameFlags
 
@@ -20,7 +20,7 @@ COLUMNS = {
     CellType.U32: "Uint32Array",
     CellType.U8: "Uint8Array", CellType.TEXT: "readonly string[]", CellType.BYTES: "readonly Uint8Array[]",
 }  # fmt: skip
-HEAD = "// Made by tools/generators/page_types.py of p2os/view/channels.py and header.py: do not edit.\n"
+HEAD = "// Made by tools/generators/page_types.py of channels.py, header.py, run_control.py (p2os/view): do not edit.\n"
 
 
 def text() -> str:
@@ -69,9 +69,14 @@ def _column(column: ColumnKind) -> str:
 
 
 def _classes() -> list[str]:
-    found = [getattr(header, name) for name in header.__all__]
+    found = [getattr(module, name) for module in (header, run_control) for name in module.__all__]
     made = [_interface(one) for one in found if is_dataclass(one)]
-    unions = [f"export type {name} = {_type(getattr(header, name))};" for name in ("Standing", "PageBlock")]
+    unions = [
+        f"export type {name} = {_type(getattr(module, name))};"
+        for module, name in (
+            (header, "Standing"), (header, "PageBlock"), (run_control, "Doing"), (run_control, "StepUnit"),
+        )
+    ]  # fmt: skip
     return [*made, *unions, ""]
 
 

@@ -25,6 +25,8 @@ def shown(source: ShownSource, *, is_opened: bool = True, host: str = HOST, port
     """
     with served(source, host, port) as page:
         sys.stderr.write(f"page: {page.url}\n")
+        if page.watch_url:
+            sys.stderr.write(f"to look on: {page.watch_url}\n")
         sys.stderr.flush()
         if is_opened:
             with contextlib.suppress(webbrowser.Error):

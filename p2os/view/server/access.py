@@ -11,6 +11,7 @@ import hmac
 import secrets
 from collections.abc import Iterable
 from dataclasses import dataclass
+from enum import Enum
 from ipaddress import ip_address
 from urllib.parse import urlsplit
 
@@ -19,6 +20,15 @@ TOKEN_BYTES = 32
 #: What a page names beside the protocol when it opens its stream: this, and the token.
 TOKEN_PREFIX = "token."  # noqa: S105 - no password
 SUBPROTOCOL = "p2os.view.1"
+
+
+class PageRole(Enum):
+    """What a page's link lets it do."""
+
+    #: Look on.
+    WATCH = "watch"
+    #: Control the run, too.
+    CONTROL = "control"
 
 
 def new_token() -> str:
@@ -31,11 +41,13 @@ class PageAccess:
     """Who may look at one server.
 
     Args:
-        token: Of its links.
+        token: Of links that let a page control what it shows.
+        watch_token: Of links for looking on; empty: there are none.
         names: Names beside `localhost` by which the user reaches it.
     """
 
     token: str
+    watch_token: str = ""
     names: frozenset[str] = frozenset()
 
     def refusal(self, headers: Iterable[tuple[bytes, bytes]]) -> str:
@@ -58,13 +70,16 @@ class PageAccess:
             return False
         return name == "localhost" or name in self.names or _is_address(name)
 
-    def is_admitted(self, protocols: Iterable[str]) -> bool:
-        """Tell whether what a page names beside the protocol is the token."""
+    def role(self, protocols: Iterable[str]) -> "PageRole | None":
+        """Return what a page may that names these beside the protocol: one token and no other; None: nothing."""
         given = [one.removeprefix(TOKEN_PREFIX) for one in protocols if one.startswith(TOKEN_PREFIX)]
-        found = False
-        for one in given[:1]:
-            found = hmac.compare_digest(one.encode(), self.token.encode())
-        return found and len(given) == 1
+        if len(given) != 1:
+            return None
+        may_control = hmac.compare_digest(given[0].encode(), self.token.encode())
+        may_look = hmac.compare_digest(given[0].encode(), self.watch_token.encode()) and bool(self.watch_token)
+        if may_control:
+            return PageRole.CONTROL
+        return PageRole.WATCH if may_look else None
 
 
 def _is_address(name: str) -> bool:

@@ -17,7 +17,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from p2os.view.live import ShownSource
 from p2os.view.page import SCENE, SCRIPT, STYLE, bundled, filled
-from p2os.view.server.access import SUBPROTOCOL, PageAccess
+from p2os.view.server.access import SUBPROTOCOL, PageAccess, PageRole
 from p2os.view.server.page_session import FloodError, PageSession, RequestError
 from simbase.listening import LOGGER
 
@@ -96,7 +96,8 @@ class ViewApp:
     async def _stream(self, socket: WebSocket) -> None:
         protocols = list(socket.scope.get("subprotocols") or ())
         await socket.accept(SUBPROTOCOL if SUBPROTOCOL in protocols else None)
-        if SUBPROTOCOL not in protocols or not self._access.is_admitted(protocols):
+        role = self._access.role(protocols)
+        if SUBPROTOCOL not in protocols or role is None:
             logging.getLogger(LOGGER).warning("a page was refused: its token is not that of this server")
             await socket.close(WRONG_TOKEN, "this link's token is not that of this server")
             return
@@ -105,7 +106,7 @@ class ViewApp:
             return
         self._pages += 1
         try:
-            await _PageConnection(socket, PageSession(self._source)).run()
+            await _PageConnection(socket, PageSession(self._source, may_control=role is PageRole.CONTROL)).run()
         finally:
             self._pages -= 1
 

@@ -5,17 +5,20 @@ grows it is then told the new rows of these channels, as they come. There is no 
 the row that was sent last and the last one, so that a page that is slow is sent more at once; of more than
 `MOST_NEWS` rows it is told that they are lost to it, and asks anew.
 
+A page whose link may control sends commands, too; they are handed to the run and answered by its state.
+
 Invariant: a request is answered, or refused in words; nothing that a page sends changes the recording.
 """
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, fields, replace
 from typing import cast
 
 from p2os.view.header import Answered, PageHeader, Wanted
 from p2os.view.live import ShownSource
 from p2os.view.recording import ViewRecording
+from p2os.view.run_control import CommandError, RunState, command_of
 from simbase.timing import Nanos
 
 #: chosen: a page's request has less than a kilobyte.
@@ -41,10 +44,12 @@ class PageSession:
 
     Args:
         source: What it looks at.
+        may_control: Whether its link lets it control a run, too.
     """
 
-    def __init__(self, source: ShownSource) -> None:
-        self._source = source
+    def __init__(self, source: ShownSource, *, may_control: bool = False) -> None:
+        self._source, self._may_control = source, may_control
+        self._state: RunState | None = None
         #: Channel → the row behind the last that was sent.
         self._sent: dict[int, int] = {}
         #: What was said last; of channels, how many.
@@ -59,6 +64,9 @@ class PageSession:
 
     def news(self) -> Iterator[str | bytes]:
         """Yield what has changed since the last call: the header, new rows, the time; at the first call the header."""
+        control = self._source.control
+        # As it stood before: the rows that it is about are there then.
+        state = None if control is None else control.state
         self._source.update()
         yield from self._changed_header()
         lost = 0
@@ -73,6 +81,9 @@ class PageSession:
         if lost:
             self._lost += lost
             yield _said(lost=self._lost)
+        if state is not self._state:
+            is_first, self._state = self._state is None, state
+            yield _said(run=state, may_control=self._may_control if is_first else None)
 
     def _changed_header(self) -> Iterator[str]:
         header, channels = self._recording.header, len(self._recording.tracks)
@@ -94,7 +105,11 @@ class PageSession:
             RequestError: It is none, or one of too many.
         """
         self._count(now_s)
-        wanted = _wanted_of(text)
+        found = _json_of(text)
+        if "do" in found:
+            yield from self._command(found)
+            return
+        wanted = _wanted_of(found)
         if wanted.from_ns > wanted.to_ns:
             yield _said(refused="from_ns is behind to_ns", done=wanted.id)
             return
@@ -108,6 +123,19 @@ class PageSession:
             if self._recording.header.is_live:
                 self._sent[channel] = len(track)
         yield _said(done=wanted.id)
+
+    def _command(self, found: Mapping[str, object]) -> Iterator[str]:
+        try:
+            command = command_of(found)
+        except CommandError as error:
+            raise RequestError(str(error)) from error
+        control = self._source.control
+        if control is None:
+            yield _said(refused="there is no run to control")
+        elif not self._may_control:
+            yield _said(refused="this link is for looking on")
+        elif not control.offer(command):
+            yield _said(refused="too many commands wait")
 
     def _count(self, now_s: float) -> None:
         self._room = min(MOST_AT_ONCE, self._room + (now_s - self._asked_at) * A_SECOND) - 1.0
@@ -123,9 +151,13 @@ def _said(
     lost: int | None = None,
     now_ns: Nanos | None = None,
     refused: str | None = None,
+    run: RunState | None = None,
+    may_control: bool | None = None,
 ) -> str:
     """Return an answer as JSON, without what it does not say."""
-    answer = asdict(Answered(header=header, done=done, lost=lost, now_ns=now_ns, refused=refused))
+    answer = asdict(Answered(
+        header=header, done=done, lost=lost, now_ns=now_ns, refused=refused, run=run, may_control=may_control
+    ))  # fmt: skip
     said = {key: value for key, value in answer.items() if value is not None}
     return json.dumps(said, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
 
@@ -133,11 +165,11 @@ def _said(
 _KEYS = frozenset(field.name for field in fields(Wanted))
 
 
-def _wanted_of(text: str) -> Wanted:
-    """Return a request.
+def _json_of(text: str) -> dict[str, object]:
+    """Return what a page has sent.
 
     Raises:
-        RequestError: It is none.
+        RequestError: It is no object.
     """
     if len(text.encode("utf-8", "replace")) > LARGEST_REQUEST_BYTES:
         raise FloodError(f"a request of more than {LARGEST_REQUEST_BYTES} bytes")
@@ -145,7 +177,18 @@ def _wanted_of(text: str) -> Wanted:
         found = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise RequestError("a request that is no JSON") from error
-    if not isinstance(found, dict) or not found.keys() <= _KEYS or "want" not in found:
+    if not isinstance(found, dict):
+        raise RequestError("a request is a JSON object")
+    return found
+
+
+def _wanted_of(found: dict[str, object]) -> Wanted:
+    """Return a request for rows.
+
+    Raises:
+        RequestError: It is none.
+    """
+    if not found.keys() <= _KEYS or "want" not in found:
         raise RequestError(f"a request has {', '.join(sorted(_KEYS))}")
     want = found["want"]
     if not isinstance(want, list) or len(want) > MOST_CHANNELS or not all(type(one) is int for one in want):

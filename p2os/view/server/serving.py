@@ -42,10 +42,13 @@ class ViewServer:
     def __init__(self, source: ShownSource, host: str = HOST, port: int = 0) -> None:
         self._socket = _bound(host, port)
         self.port: int = self._socket.getsockname()[1]
-        access = PageAccess(token=new_token(), names=frozenset() if _is_address(host) else frozenset({host.lower()}))
+        names = frozenset() if _is_address(host) else frozenset({host.lower()})
+        access = PageAccess(token=new_token(), watch_token=new_token() if source.control else "", names=names)
         shown = f"[{host}]" if ":" in host else host
         #: What a browser opens; the token stands behind `#`, which no browser sends.
         self.url = f"http://{shown}:{self.port}/#token={access.token}"
+        #: One for looking on; empty where nothing can be controlled.
+        self.watch_url = f"http://{shown}:{self.port}/#token={access.watch_token}" if access.watch_token else ""
         config = uvicorn.Config(
             ViewApp(source, access), lifespan="off", log_config=None, access_log=False, server_header=False,
             proxy_headers=False, ws="websockets-sansio", ws_max_size=LARGEST_REQUEST_BYTES, ws_max_queue=4,

@@ -159,12 +159,16 @@ def test_a_scenario_that_is_shown_ends_with_its_report_and_ctrl_c_ends_it(
     assert target.run is not None
     done = SimpleNamespace(folder=alone, was_interrupted=False)
     monkeypatch.setattr(targets, "run_scenario", lambda *_args, **_more: done)
+    stayed: list[LiveRun] = []
+    monkeypatch.setattr(LiveRun, "stay", stayed.append)
     target.run()
     target.source.update()
+    assert len(stayed) == 1
     assert target.source.recording.header.verdict == run_report(read_run(alone)).header.verdict != ""
     done.was_interrupted = True
     with pytest.raises(KeyboardInterrupt):
         target.run()
+    assert len(stayed) == 1
 
 
 def test_what_the_server_needs_is_named_where_it_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from p2os.view.server.access import PageAccess, new_token
+from p2os.view.server.access import PageAccess, PageRole, new_token
 
 TOKEN = new_token()
 ACCESS = PageAccess(token=TOKEN)
@@ -58,19 +58,28 @@ def test_another_origin_is_refused(origin: str) -> None:
 
 
 def test_the_token_alone_admits() -> None:
-    assert ACCESS.is_admitted(["p2os.view.1", f"token.{TOKEN}"])
+    assert ACCESS.role(["p2os.view.1", f"token.{TOKEN}"]) is PageRole.CONTROL
     for protocols in (
         [], ["p2os.view.1"], ["token."], [TOKEN], [f"token.{TOKEN}x"], [f"token.{TOKEN[:-1]}"],
         [f"token.{TOKEN.swapcase()}"],
         [f"token.{TOKEN}", "token.x"], ["token.x", f"token.{TOKEN}"], ["token.ü"],
     ):  # fmt: skip
-        assert not ACCESS.is_admitted(protocols), protocols
+        assert ACCESS.role(protocols) is None, protocols
+
+
+def test_the_token_for_looking_on_lets_look_on_alone() -> None:
+    access = PageAccess(token=TOKEN, watch_token="w" * 43)
+    assert access.role([f"token.{'w' * 43}"]) is PageRole.WATCH
+    assert access.role([f"token.{TOKEN}"]) is PageRole.CONTROL
+    assert access.role([f"token.{TOKEN}", f"token.{'w' * 43}"]) is None
+    assert access.role(["token."]) is None
+    assert ACCESS.role(["token."]) is None, "there is none"
 
 
 @given(st.lists(st.text(max_size=60), max_size=3))
 def test_nothing_else_admits(protocols: list[str]) -> None:
-    assert not ACCESS.is_admitted(protocols)
-    assert not ACCESS.is_admitted([f"token.{one}" for one in protocols])
+    assert ACCESS.role(protocols) is None
+    assert ACCESS.role([f"token.{one}" for one in protocols]) is None
 
 
 def test_no_token_comes_twice() -> None:

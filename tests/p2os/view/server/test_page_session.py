@@ -12,6 +12,7 @@ from p2os.view.frames import FrameFlags, ViewFrame
 from p2os.view.header import ChannelHeader, PageHeader
 from p2os.view.live import LiveRecording, StillRecording
 from p2os.view.recording import ViewRecording
+from p2os.view.run_control import COMMANDS, RunCommand, RunState
 from p2os.view.server import page_session
 from p2os.view.server.page_session import (
     LARGEST_REQUEST_BYTES,
@@ -180,3 +181,88 @@ def test_more_requests_than_a_person_makes_are_a_flood() -> None:
     patient = PageSession(StillRecording(recording()))
     for n in range(3 * MOST_AT_ONCE):
         asked(patient, n / 50, want=[])
+
+
+class Run:
+    """A run that takes so many commands."""
+
+    def __init__(self, room: int = 99) -> None:
+        self.state, self.taken, self._room = RunState(), list[RunCommand](), room
+
+    def offer(self, command: RunCommand) -> bool:
+        if len(self.taken) >= self._room:
+            return False
+        self.taken.append(command)
+        return True
+
+
+def controlled(run: Run | None, *, may_control: bool = True) -> PageSession:
+    source = StillRecording(recording())
+    source.control = run
+    return PageSession(source, may_control=may_control)
+
+
+def test_a_page_is_told_how_the_run_stands_when_that_changes_and_at_first_what_it_may() -> None:
+    run = Run()
+    session = controlled(run)
+    _, texts = sent_of(session.news())
+    assert (texts[1]["run"]["head_ns"], texts[1]["may_control"]) == (0, True)
+    assert sent_of(session.news()) == ([], [])
+    run.state = RunState(head_ns=7, why="paused")
+    _, texts = sent_of(session.news())
+    assert (texts[0]["run"]["why"], "may_control" in texts[0]) == ("paused", False)
+
+
+def test_a_command_is_handed_to_the_run_and_rows_are_served_beside() -> None:
+    run = Run()
+    session = controlled(run)
+    assert asked(session, do="step", unit="edge", at_ns=5, words="PB7") == ([], [])
+    assert run.taken == [RunCommand(do="step", unit="edge", at_ns=5, words="PB7")]
+    assert len(asked(session, want=[0])[0]) == 1
+
+
+def test_who_may_only_look_on_controls_nothing() -> None:
+    run = Run()
+    _, texts = asked(controlled(run, may_control=False), do="pause")
+    assert (texts, run.taken) == ([{"refused": "this link is for looking on"}], [])
+    assert asked(controlled(None), do="pause")[1] == [{"refused": "there is no run to control"}]
+    assert asked(controlled(Run(0)), do="pause")[1] == [{"refused": "too many commands wait"}]
+
+
+@pytest.mark.parametrize(
+    "sent",
+    [
+        {"do": "format"}, {"do": 1}, {"do": None}, {"do": ["run"]}, {"do": "pause", "at_ns": 1},
+        {"do": "go", "at_ns": -1},
+        {"do": "go", "at_ns": 1.5}, {"do": "go", "at_ns": 2**62}, {"do": "go", "at_ns": True},
+        {"do": "step", "unit": "year"},
+        {"do": "speed", "speed": 0.001}, {"do": "speed", "speed": 1001}, {"do": "speed", "speed": "fast"},
+        {"do": "speed", "speed": -1}, {"do": "speed", "speed": True}, {"do": "halt_at", "words": "x" * 401},
+        {"do": "halt_at", "words": "a\nb"}, {"do": "halt_at", "words": 1}, {"do": "run", "want": [0]},
+        {"do": "halt_not_at", "number": "1"}, {"do": "choose", "future": None},
+    ],
+)  # fmt: skip
+def test_what_is_no_command_ends_the_page(sent: dict[str, Any]) -> None:
+    run = Run()
+    with pytest.raises(RequestError):
+        asked(controlled(run), **sent)
+    assert run.taken == []
+
+
+def test_speeds_at_their_bounds_are_taken() -> None:
+    run = Run()
+    session = controlled(run)
+    for speed in (0, 0.01, 1000):
+        asked(session, do="speed", speed=speed)
+    assert [one.speed for one in run.taken] == [0, 0.01, 1000]
+
+
+_ANY = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text() | st.lists(st.integers())
+
+
+@given(st.dictionaries(st.sampled_from(["do", "at_ns", "unit", "speed", "words", "future", "number", "x"]), _ANY))
+def test_anything_at_all_is_a_command_or_refused(sent: dict[str, Any]) -> None:
+    run = Run()
+    with contextlib.suppress(RequestError):
+        asked(controlled(run), **{"do": "run", **sent})
+    assert all(COMMANDS[one.do] is not None for one in run.taken)

@@ -1,7 +1,7 @@
 // Data that a server sends: text messages are JSON, binary ones frames. The server is the program that showed this page.
 import type { Answered, PageHeader } from "../generated/view";
 import { frameAt } from "./frames";
-import { type Request, type Source, Store } from "./store";
+import { type Command, type Request, type Source, Store } from "./store";
 
 const SUBPROTOCOL = "p2os.view.1";
 /** The server closes so where another try is of no use: a request that is none, a wrong token. */
@@ -36,6 +36,10 @@ export class Connection implements Source {
     else this.finish(id, false);
   }
 
+  command(command: Command): void {
+    if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(command));
+  }
+
   private connect(): void {
     const socket = new WebSocket(this.url, [SUBPROTOCOL, `token.${this.token}`]);
     socket.binaryType = "arraybuffer";
@@ -51,8 +55,10 @@ export class Connection implements Source {
     if (message.header) this.begin(message.header);
     if (typeof message.done === "number") this.finish(message.done, !message.refused);
     if (!this.store) return;
-    const header = this.store.header.peek();
-    if (typeof message.now_ns === "number" && message.now_ns > header.end_ns) this.store.header.value = { ...header, end_ns: message.now_ns };
+    const header = this.store.all.peek();
+    if (typeof message.now_ns === "number" && message.now_ns > header.end_ns) this.store.all.value = { ...header, end_ns: message.now_ns };
+    if (typeof message.may_control === "boolean") this.store.mayControl.value = message.may_control;
+    if (message.run) this.store.run.value = message.run;
     if (message.lost) this.store.forget();
     if (message.refused) this.store.trouble.value = `refused: ${message.refused}`;
   }
@@ -64,7 +70,7 @@ export class Connection implements Source {
       this.started((this.store = new Store(header, this)));
       return;
     }
-    this.store.header.value = header;
+    this.store.all.value = header;
     if (!isAgain) return;
     this.store.trouble.value = "";
     this.store.forget(); // another run may be there now

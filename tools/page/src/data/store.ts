@@ -1,6 +1,6 @@
 // All that the page knows of a run: its header, and of each channel what was sent so far. Views read from here and say what they need.
-import { signal, type Signal } from "@preact/signals";
-import type { ChannelHeader, PageHeader, Wanted } from "../generated/view";
+import { computed, type ReadonlySignal, signal, type Signal } from "@preact/signals";
+import type { ChannelHeader, PageHeader, RunCommand, RunState, Wanted } from "../generated/view";
 import type { Frame } from "./frames";
 import { Lane, OPEN_END_NS, serves } from "./lane";
 
@@ -10,7 +10,17 @@ export type Request = Omit<Wanted, "id">;
 export interface Source {
   /** Asks for rows; they come by `Store.receive`, and then it is answered: with whether they came. */
   ask(request: Request, answered: (isThere: boolean) => void): void;
+  /** Asks something of the run that is shown. */
+  command?(command: Command): void;
 }
+
+/** Which futures are looked at: the sources of their channels, and until when they are known. */
+export interface Shown {
+  readonly sources: readonly string[];
+  readonly end_ns: number;
+}
+
+export type Command = Pick<RunCommand, "do"> & Partial<RunCommand>;
 
 /** How long requests of one moment are gathered, ms. */
 const GATHERED_MS = 40;
@@ -20,7 +30,15 @@ const WHOLE_PIXELS = 2000;
 const MOST_PIXELS = 8192;
 
 export class Store {
-  readonly header: Signal<PageHeader>;
+  /** All that there is. */
+  readonly all: Signal<PageHeader>;
+  /** What is shown: without the channels and robots of futures that are not looked at. */
+  readonly header: ReadonlySignal<PageHeader>;
+  /** The futures that are looked at; null: there are none. */
+  readonly shown: Signal<Shown | null> = signal(null);
+  /** How the run stands, where it can be controlled, and whether this page may. */
+  readonly run: Signal<RunState | null> = signal(null);
+  readonly mayControl = signal(false);
   /** Counts up when rows came. */
   readonly version = signal(0);
   /** What is wrong with the connection, in a line; empty: nothing. */
@@ -31,7 +49,13 @@ export class Store {
   private timer: ReturnType<typeof setTimeout> | undefined;
 
   constructor(header: PageHeader, private readonly source: Source | undefined) {
-    this.header = signal(header);
+    this.all = signal(header);
+    this.header = computed(() => onlyShown(this.all.value, this.shown.value));
+  }
+
+  /** Asks something of the run. */
+  command(command: Command): void {
+    this.source?.command?.(command);
   }
 
   channels(kind: string): readonly ChannelHeader[] {
@@ -122,4 +146,18 @@ export class Store {
       if (isThere) for (const id of want) this.lane(id).answered({ from: request.from_ns, to: request.to_ns, pixels: request.pixels });
     });
   }
+}
+
+/** What the run itself is called beside its forks. */
+const RUN = "run";
+
+/** A header with some sources alone; where they are several, each has a name. */
+function onlyShown(header: PageHeader, shown: Shown | null): PageHeader {
+  if (!shown) return header;
+  const { sources, end_ns } = shown, name = (source: string) => (sources.length > 1 ? source || RUN : "");
+  return {
+    ...header, end_ns,
+    channels: header.channels.filter(({ source }) => sources.includes(source)).map((channel) => ({ ...channel, source: name(channel.source) })),
+    robots: header.robots.filter((robot) => sources.includes(robot.name)).map((robot) => ({ ...robot, name: name(robot.name) })),
+  };
 }

@@ -1,4 +1,4 @@
-// Made by tools/generators/page_types.py of p2os/view/channels.py and header.py: do not edit.
+// Made by tools/generators/page_types.py of channels.py, header.py, run_control.py (p2os/view): do not edit.
 
 export const FORMAT = 1;
 export const FLAGS = { REDUCED: 1, REPLACES: 2 } as const;
@@ -200,6 +200,8 @@ export interface Answered {
   readonly lost: number | null;
   readonly now_ns: number | null;
   readonly refused: string | null;
+  readonly run: RunState | null;
+  readonly may_control: boolean | null;
 }
 
 /** A channel: what its rows are of. */
@@ -382,5 +384,62 @@ export interface WorldThing {
   readonly is_there: boolean;
 }
 
+/** A future of the run. */
+export interface FutureState {
+  readonly name: string;
+  readonly source: string;
+  readonly parent: string;
+  readonly at_ns: number;
+  readonly head_ns: number;
+  readonly end_ns: number;
+  readonly words: string;
+  readonly is_over: boolean;
+  readonly against: string;
+  readonly until_ns: number;
+  readonly parting: readonly PartingState[];
+}
+
+/** A place where the run halts: a line, a variable, or an event in words. */
+export interface HaltState {
+  readonly number: number;
+  readonly words: string;
+  readonly count: number;
+}
+
+/** Where a signal of two futures differs first. */
+export interface PartingState {
+  readonly signal: string;
+  readonly at_ns: number;
+  readonly one: string;
+  readonly other: string;
+}
+
+/** What a page asks of a run. */
+export interface RunCommand {
+  readonly do: "run" | "pause" | "go" | "step" | "back" | "speed" | "fork" | "choose" | "drop" | "compare" | "halt_at" | "halt_not_at";
+  readonly at_ns: number | null;
+  readonly unit: "instruction" | "line" | "edge" | "packet" | "event" | "millisecond";
+  readonly speed: number;
+  readonly words: string;
+  readonly future: string;
+  readonly number: number;
+}
+
+/** How a run stands. */
+export interface RunState {
+  readonly is_running: boolean;
+  readonly speed: number;
+  readonly head_ns: number;
+  readonly why: string;
+  readonly place: string;
+  readonly trouble: string;
+  readonly done: number;
+  readonly future: string;
+  readonly futures: readonly FutureState[];
+  readonly halts: readonly HaltState[];
+}
+
 export type Standing = "" | "passed" | "failed" | "open";
 export type PageBlock = PageTable | PageText | PagePicture | PagePlot | PageList | PagePlan;
+export type Doing = "run" | "pause" | "go" | "step" | "back" | "speed" | "fork" | "choose" | "drop" | "compare" | "halt_at" | "halt_not_at";
+export type StepUnit = "instruction" | "line" | "edge" | "packet" | "event" | "millisecond";

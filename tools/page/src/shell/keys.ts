@@ -16,7 +16,9 @@ const one = (key: string, isShifted?: boolean) => (event: KeyboardEvent) => even
 const step = (share: number) => (app: App) => app.clock.seek(app.clock.now.peek() + share * app.clock.span.peek());
 
 export const KEYS: readonly Key[] = [
-  { keys: "Space", does: "play or pause", matches: one(" "), run: (app) => app.clock.toggle() },
+  { keys: "Space", does: "play or pause; a run that this page controls goes on or stands still", matches: one(" "), run: (app) => app.toggle() },
+  { keys: "s, Shift s", does: "of such a run: a step on, a step back", matches: one("s"), run: (app) => app.step(1) },
+  { keys: "", does: "", matches: one("S"), run: (app) => app.step(-1) },
   { keys: "← →", does: "a hundredth of the window back or on", matches: one("ArrowLeft", false), run: step(-0.01) },
   { keys: "", does: "", matches: one("ArrowRight", false), run: step(0.01) },
   { keys: "Shift ← →", does: "a tenth of the window back or on", matches: one("ArrowLeft", true), run: step(-0.1) },
@@ -34,8 +36,8 @@ export const KEYS: readonly Key[] = [
   { keys: "", does: "", matches: one("]"), run: (app) => toEdge(app, 1) },
   { keys: ", .", does: "last or next event", matches: one(","), run: (app) => toEvent(app, -1) },
   { keys: "", does: "", matches: one("."), run: (app) => toEvent(app, 1) },
-  { keys: "< >", does: "slower or faster", matches: one("<"), run: (app) => app.clock.faster(-1) },
-  { keys: "", does: "", matches: one(">"), run: (app) => app.clock.faster(1) },
+  { keys: "< >", does: "slower or faster", matches: one("<"), run: (app) => app.faster(-1) },
+  { keys: "", does: "", matches: one(">"), run: (app) => app.faster(1) },
 ];
 
 /** Where keys have a meaning of their own. */

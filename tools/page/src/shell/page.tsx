@@ -50,7 +50,7 @@ export function RunPage({ app }: { app: App }) {
   }, [layout, isWide, views.map((one) => one.id).join(" ")]);
   useEffect(() => effect(() => {
     const { start_ns, end_ns } = app.store.header.value;
-    app.clock.setRun(start_ns, end_ns);
+    app.clock.setRun(start_ns, Math.max(end_ns, app.clock.head.value ?? 0));
   }), []);
   useEffect(() => keepAddress(app, layout, isWide ? undefined : view), [layout, isWide, view]);
   useEffect(() => {

@@ -6,6 +6,7 @@ import { moment, roundStep, spoken, tickLabel, ticks } from "../time/format";
 import { RATES } from "../time/clock";
 import type { App } from "./app";
 import { IconButton } from "./icons";
+import { RunBar } from "../run_control/bar";
 import { SMALL_FONT, surface } from "./surface";
 import { theme } from "./theme";
 import { reads } from "../time/reads";
@@ -16,28 +17,31 @@ const EDGE = 8;
 
 export function Timeline({ app }: { app: App }) {
   const { clock, store } = app, isLive = store.header.value.is_live;
+  if (app.controls) return <RunBar app={app} />;
+  const run = store.run.value;
   return (
     <section class="timeline" aria-label="Time">
       <IconButton icon="first" label="To the start" onClick={() => clock.seek(clock.start.value)} />
       <IconButton icon={clock.playing.value ? "pause" : "play"} label={clock.playing.value ? "Pause" : "Play"} onClick={() => clock.toggle()} />
       <IconButton icon="last" label={isLive ? "Go with the run" : "To the end"} {...(isLive ? { pressed: clock.atEnd.value } : {})} onClick={() => {
-        clock.atEnd.value = isLive;
-        clock.seek(clock.end.value);
+        if (isLive) clock.goWithRun();
+        else clock.seek(clock.end.value);
       }} />
       <select class="rate" aria-label="Speed of playing" value={clock.rate.value} onChange={(event) => { clock.rate.value = Number(event.currentTarget.value); }}>
         {RATES.map((rate) => <option value={rate}>{`${rate} ×`}</option>)}
       </select>
       <Scrub app={app} />
       <output class="now" aria-live="off">{moment(clock.now.value, clock.span.value / 1000)}</output>
+      {run && <p class="run-why" role="status">{run.is_running ? "the run goes on" : `the run stands still${run.why ? `: ${run.why}` : ""}`}</p>}
     </section>
   );
 }
 
-function Scrub({ app }: { app: App }) {
+export function Scrub({ app }: { app: App }) {
   const { clock } = app, place = useRef<HTMLDivElement>(null), length = clock.end.value - clock.start.value;
   useEffect(() => {
     const { canvas, dispose } = surface(place.current!, "", () => {
-      reads(app.store.version.value, clock.start.value, clock.end.value, clock.from.value, clock.to.value, clock.a.value, clock.b.value);
+      reads(app.store.version.value, clock.head.value, app.store.run.value?.futures, clock.start.value, clock.end.value, clock.from.value, clock.to.value, clock.a.value, clock.b.value);
     }, ({ g, width, height }) => {
       const start = clock.start.value, span = clock.end.value - start, x = (t: number) => EDGE + ((t - start) / span) * (width - 2 * EDGE);
       g.fillStyle = theme.value.sonar;
@@ -61,6 +65,12 @@ function Scrub({ app }: { app: App }) {
           g.fillStyle = severity >= 3 ? theme.value.bad : severity === 2 ? theme.value.warn : theme.value.faint;
           g.fillRect(x(frame.t[row]!), severity >= 2 ? 1 : 4, severity >= 2 ? 2 : 1, severity >= 2 ? 8 : 4);
         }
+      }
+      const head = clock.head.value;
+      if (head !== null) {
+        g.fillStyle = theme.value.right;
+        g.fillRect(x(head) - 1, 0, 2, height - 12);
+        g.beginPath(); g.moveTo(x(head) - 5, height - 12); g.lineTo(x(head) + 5, height - 12); g.lineTo(x(head), height - 19); g.fill();
       }
       for (const [t, colour] of [[clock.a.value, theme.value["cursor-a"]], [clock.b.value, theme.value["cursor-b"]]] as const) {
         if (t === null) continue;

@@ -20,6 +20,8 @@ export class Clock {
   readonly rate = signal(1);
   /** Of a live run: whether now goes with it. */
   readonly atEnd = signal(false);
+  /** Where a run stands that can be set back; null: at its end. */
+  readonly head = signal<number | null>(null);
   readonly span = computed(() => this.to.value - this.from.value);
 
   /** Takes the bounds of a run: at first all of it is looked at. */
@@ -29,12 +31,29 @@ export class Clock {
       this.start.value = start;
       this.end.value = Math.max(end, start + LEAST_SPAN_NS);
       if (isAll) this.showAll();
-      if (this.atEnd.peek()) this.seek(this.end.peek());
+      if (this.atEnd.peek()) this.go(this.head.peek() ?? this.end.peek());
       else this.now.value = this.inRun(this.now.peek());
     });
   }
 
+  /** Goes to a time, and not with the run any more. */
   seek(t: number): void {
+    batch(() => {
+      this.atEnd.value = false;
+      this.go(t);
+    });
+  }
+
+  /** Goes with the run, from where it stands. */
+  goWithRun(): void {
+    batch(() => {
+      this.playing.value = false;
+      this.atEnd.value = true;
+      this.go(this.head.peek() ?? this.end.peek());
+    });
+  }
+
+  private go(t: number): void {
     batch(() => {
       const was = this.now.peek(), isSeen = was >= this.from.peek() && was <= this.to.peek();
       this.now.value = this.inRun(t);
@@ -85,7 +104,8 @@ export class Clock {
   }
 
   play(): void {
-    if (this.now.peek() >= this.end.peek()) this.seek(this.start.peek());
+    this.atEnd.value = false;
+    if (this.now.peek() >= this.end.peek()) this.go(this.start.peek());
     this.playing.value = true;
   }
 
@@ -103,7 +123,7 @@ export class Clock {
   advance(real_ms: number): void {
     if (!this.playing.peek()) return;
     batch(() => {
-      this.seek(this.now.peek() + real_ms * 1e6 * this.rate.peek());
+      this.go(this.now.peek() + real_ms * 1e6 * this.rate.peek());
       if (this.now.peek() >= this.end.peek()) this.playing.value = false;
     });
   }

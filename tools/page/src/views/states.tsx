@@ -32,7 +32,7 @@ function Machine({ app, channel }: { app: App; channel: ChannelHeader }) {
   const here = frame && row >= 0 ? `${channel.states[state] ?? "?"} since ${moment(frame.t[row]!)}, ${duration(clock.now.value - frame.t[row]!)} so far${texts(frame, "cause").at(row) ? `; ${texts(frame, "cause").at(row)}` : ""}` : "not begun";
   const taken = (from: number, to: number) => from === last && to === state;
   return (
-    <section class="machine" aria-label={`State machine ${channel.name}`}>
+    <section class="machine" aria-label={`State machine ${[channel.source, channel.name].filter(Boolean).join(" ")}`}>
       <p><b>{[channel.source, channel.name].filter(Boolean).join(" ")}</b> <span role="status">{here}</span></p>
       <svg viewBox={`0 0 ${WIDTH} ${HEIGHT}`} role="img" aria-label={`${channel.states.length} states: ${channel.states.map((name, n) => (n === state ? `${name} (now)` : name)).join(", ")}`}>
         <defs>{["idle", "taken"].map((kind) => <marker id={`tip-${channel.id}-${kind}`} class={`tip ${kind}`} viewBox="0 0 8 8" refX="7" refY="4" markerWidth="7" markerHeight="7" orient="auto-start-reverse"><path d="M0 0.500L8 4L0 7.500z" /></marker>)}</defs>

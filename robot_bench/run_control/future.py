@@ -1,0 +1,363 @@
+"""One future of a run: a bench that goes on, to any time of its past, and halts where it should.
+
+Theory of operation. The debugger's own machinery (`bluepill_sim.debug.execution`) brings the bench forwards and, from
+older states, backwards; what is added are events in words. They are reported up to 50 ms after they happen: so at every
+stand still the bench is run on until all is reported that happened by then, and put back. Where an event is found that
+one halts at, the bench goes back to its time. What was reported once is known: a run is repeatable.
+
+Invariant: a bench that was halted, set back and let go on leaves the trace of one that was not.
+"""
+
+import contextlib
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+
+from bluepill_sim.debug.execution import Execution
+from bluepill_sim.debug.history import Point
+from bluepill_sim.debug.machine import HaltReason, StopKind
+from bluepill_sim.program.line_table import read_lines
+from robot_bench.bench import Bench, run_of
+from robot_bench.bench.waiting import TraceMark, events_since, mark_of
+from robot_bench.events.kinds import Event
+from robot_bench.events.selection import Selector, Wires
+from robot_bench.events.words import what_of
+from robot_bench.recording.recorder import SAMPLE_NS
+from robot_bench.run_control.machine import BenchMachine
+from robot_bench.run_control.points import STEPS, HaltPoint, other_lines
+from simbase.timing import NS_PER_MS, Nanos
+
+#: chosen: older states; 50 MB at the most, and of an hour one each ten seconds.
+MOST_POINTS = 512
+#: chosen: how often a running bench looks for a request to stop.
+SLICE_NS: Nanos = 20 * NS_PER_MS
+
+
+@dataclass(frozen=True, slots=True)
+class Halted:
+    """Why a future stands still: the point's number (0: none of the list), and a line."""
+
+    number: int
+    why: str
+
+
+class _Watch:
+    """One thing to halt at by events: it stays subscribed, and its state goes back with the machine."""
+
+    def __init__(self, selector: Selector, end: Callable[[], None]) -> None:
+        self.selector, self.end = selector, end
+
+
+class _WatchedMachine(BenchMachine):
+    """A bench whose snapshots have what its watches know, too."""
+
+    def __init__(self, bench: Bench, watches: Mapping[int, _Watch]) -> None:
+        super().__init__(bench)
+        self._watches = watches
+
+    def snapshot(self) -> object:
+        """Return all that decides the bench's future, and what the watches have seen."""
+        return super().snapshot(), {number: one.selector.snapshot() for number, one in self._watches.items()}
+
+    def restore(self, snapshot: object) -> None:
+        """Put back what `snapshot` returned; watches that are newer stay as they are."""
+        assert isinstance(snapshot, tuple)  # noqa: S101 - its own
+        bench, seen = snapshot
+        super().restore(bench)
+        for number, one in self._watches.items():
+            if number in seen:
+                one.selector.restore(seen[number])
+
+
+class Future:
+    """One course of a run.
+
+    Args:
+        name: Of it.
+        bench: At the moment where it begins.
+        parent: The name of the one that it leaves; empty: it is the run itself.
+        words: What was done where it begins.
+    """
+
+    def __init__(self, name: str, bench: Bench, parent: str = "", words: str = "") -> None:
+        self.name, self.parent, self.words = name, parent, words
+        self._watches: dict[int, _Watch] = {}
+        self._points: dict[int, HaltPoint] = {}
+        #: Events to halt at that have come: time, number, words.
+        self._hits: list[tuple[Nanos, int, str]] = []
+        self._take(bench)
+        #: Until when all is known: who records it says so.
+        self.known_ns: Nanos = bench.events.released_until
+        self.begins_ns: Nanos = self.now_ns
+        #: Where its own events begin in its trace.
+        self.mark: TraceMark = mark_of(bench.events, bench.trace, run_of(bench).harness)
+        #: The moment that it stands at for a person: that of an event, or where the chip is.
+        self.head_ns: Nanos = self.now_ns
+        #: Where it stood last: what happens later counts, though it be reported when the chip is further.
+        self._stood_ns: Nanos = self.head_ns
+
+    def _take(self, bench: Bench) -> None:
+        self.bench = bench
+        self.machine = _WatchedMachine(bench, self._watches)
+        self.execution = Execution(self.machine, most_points=MOST_POINTS, slice_ns=SLICE_NS)
+
+    def replace(self, bench: Bench) -> None:
+        """Go on with another bench that stands where this one does."""
+        points = self._points
+        self.arm({})
+        history = self.execution.history
+        self._take(bench)
+        self.execution.history.take(history)
+        self.arm(points)
+
+    @property
+    def now_ns(self) -> Nanos:
+        """Where the chip stands."""
+        return self.bench.now
+
+    @property
+    def is_over(self) -> bool:
+        """Whether it stands at the end of the run."""
+        return self.bench.now >= self.bench.end
+
+    @property
+    def place(self) -> str:
+        """The source line that comes next, or else the function."""
+        board = self.machine.board
+        row = read_lines(board.image).place(board.pc)
+        function = board.image.symbols.where(board.pc).partition("+")[0]
+        words = f"{row} in {function}" if row else board.where()
+        return f"{words}, asleep" if board.is_asleep else words
+
+    def arm(self, points: Mapping[int, HaltPoint]) -> None:
+        """Halt at these points from now on, and at no others."""
+        for number in self._watches.keys() - {number for number, one in points.items() if one.selector}:
+            self._watches.pop(number).end()
+        for number, point in points.items():
+            if point.selector is not None and number not in self._watches:
+                self._watch(number, point.selector())
+        self._points = dict(points)
+        engine = self.machine.board.chip.engine
+        engine.breakpoints.clear()
+        engine.breakpoints.update(*(one.breakpoints for one in points.values()))
+        engine.watchpoints.clear()
+        engine.watchpoints.update(*(one.watched for one in points.values()))
+
+    def _watch(self, number: int, selector: Selector) -> None:
+        def take(event: Event) -> None:
+            if selector.takes(event) and event.t > self._stood_ns:
+                self._hits.append((event.t, number, what_of(event)))
+
+        end = self.bench.events.subscribe(take, *selector.kinds, wires=selector.wires)
+        self._watches[number] = _Watch(selector, end)
+
+    # Forwards.
+
+    def resume(self) -> None:
+        """Prepare to go on from a stand still: what the program stands before does not halt it again."""
+        self._hits.clear()
+        engine = self.machine.board.chip.engine
+        if self.machine.board.pc in engine.breakpoints and not self.is_over:
+            kept = set(engine.breakpoints), set(engine.watchpoints)
+            engine.breakpoints.clear()
+            engine.watchpoints.clear()
+            self.execution.step()
+            engine.breakpoints.update(kept[0])
+            engine.watchpoints.update(kept[1])
+
+    def run_to(self, limit_ns: Nanos, *, is_seen_at_once: bool = False) -> Halted | None:
+        """Go on to a time; return why it halts before, or None.
+
+        Args:
+            limit_ns: The time.
+            is_seen_at_once: Whether what happens by then is reported by then, not up to 50 ms later.
+        """
+        if limit_ns <= self.now_ns and not self.is_over:
+            return None
+        stop = self.execution.run_to(limit_ns)
+        if is_seen_at_once or stop.kind is not StopKind.INTERRUPT:
+            self.look_ahead()
+        if self._hits:
+            return self._halt_at(min(self._hits))
+        if stop.kind is StopKind.INTERRUPT:
+            self.head_ns = max(self.head_ns, self.now_ns)
+            return None
+        self.head_ns = self._stood_ns = self.now_ns
+        if stop.kind is StopKind.END:
+            return Halted(0, "the end of the run")
+        return self._halted_by(stop)
+
+    def _halted_by(self, stop: HaltReason) -> Halted:
+        pc = self.machine.board.pc
+        for number, point in self._points.items():
+            is_there = pc in point.breakpoints if stop.kind is StopKind.BREAKPOINT else any(
+                stop.address is not None and one.sees(stop.address, 4, is_read=False) for one in point.watched
+            )  # fmt: skip
+            if is_there:
+                return Halted(number, point.words)
+        return Halted(0, "")
+
+    def _halt_at(self, hit: tuple[Nanos, int, str]) -> Halted:
+        at, number, what = hit
+        self.go_to(at)
+        point = self._points.get(number)
+        words = "" if point is None else f"{point.words}: "
+        return Halted(number, f"{words}{what}" if what not in words else point.words if point else what)
+
+    def step_to_event(self, unit: str, wire: str, wires: Wires | None) -> None:
+        """Halt at the next event of a kind as well, until `forget_step`."""
+        self._watch(_STEP, STEPS[unit](wire, wires))
+
+    def forget_step(self) -> None:
+        """Halt at the points alone again."""
+        if _STEP in self._watches:
+            self._watches.pop(_STEP).end()
+
+    def step(self) -> Halted:
+        """Run one instruction of the program."""
+        with self._unarmed():
+            self.execution.step()
+        return self._stand("")
+
+    def step_line(self) -> Halted:
+        """Run to where another line of the source begins."""
+        with self._halting_at(other_lines(self.machine.board)):
+            while True:
+                stop = self.execution.run_to(self.now_ns + SAMPLE_NS)
+                if stop.kind is not StopKind.INTERRUPT:
+                    break
+        return self._stand("the end of the run" if stop.kind is StopKind.END else "")
+
+    # To other times.
+
+    def go_to(self, at_ns: Nanos) -> None:
+        """Go to a time between where it begins and its end."""
+        at_ns = max(at_ns, self.begins_ns)
+        with self._quiet():
+            self.execution.go_to(at_ns)
+        self._stand("")
+        self.head_ns = self._stood_ns = min(at_ns, self.now_ns)
+
+    def step_back(self) -> Halted:
+        """Go to before the last instruction."""
+        with self._unarmed(), self._quiet():
+            stop = self.execution.step_back()
+        return self._stand(_BEGIN if stop.kind is StopKind.BEGIN else "")
+
+    def step_line_back(self) -> Halted:
+        """Go to where the program came to the line before."""
+        # To the last run of instructions of that line, to the line before it, and on to where the line then begins.
+        for _ in range(2):
+            with self._halting_at(other_lines(self.machine.board)), self._quiet():
+                stop = self.execution.back_to_near_stop()
+            if stop.kind is StopKind.BEGIN:
+                return self._stand(_BEGIN)
+        return self.step_line()
+
+    def back_to_event(self, unit: str, wire: str, wires: Wires | None) -> Halted:
+        """Go to the last event of a kind before this moment, or to where this future begins."""
+        head, history, found = self.head_ns, self.execution.history, list[tuple[Nanos, str]]()
+
+        def take(event: Event) -> None:
+            if self.begins_ns < event.t < head and selector.takes(event):
+                found.append((event.t, what_of(event)))
+
+        for point in self._points_before(head):
+            selector = STEPS[unit](wire, wires)
+            with self._unarmed(), self._quiet():
+                self.machine.restore(point.snapshot)
+                end = self.bench.events.subscribe(take, *selector.kinds, wires=selector.wires)
+                try:
+                    while self.bench.events.released_until < head and not self.is_over:
+                        self.machine.advance_to(self.now_ns + SAMPLE_NS)
+                    if self.bench.events.released_until < head:
+                        self.bench.finish()
+                finally:
+                    end()
+                self.machine.restore(point.snapshot)
+                history.forget_after(point.cycle)
+            if found:
+                at, what = max(found)
+                self.go_to(at)
+                return Halted(0, what)
+        self.go_to(self.begins_ns)
+        return Halted(0, _BEGIN)
+
+    def _points_before(self, head_ns: Nanos) -> Iterator[Point]:
+        """Yield older states, each twice as far away as the one before, and the oldest."""
+        points, span = self.execution.history.latest_first(), SAMPLE_NS
+        for point in points[:-1]:
+            if point.at_ns < head_ns - span:
+                span = 2 * (head_ns - point.at_ns)
+                yield point
+        yield points[-1]
+
+    def look_ahead(self) -> None:
+        """Have all reported that happened by now: run on until it is, and go back."""
+        now = self.now_ns
+        if self.bench.events.released_until >= now:
+            return
+        with self._ahead(now):
+            pass
+        # What comes later comes again.
+        self._hits = [hit for hit in self._hits if hit[0] <= now]
+
+    def events_until(self, mark: TraceMark, until_ns: Nanos) -> list[Event]:
+        """Go to a time; return what has happened by then since a place of the trace."""
+        self.go_to(until_ns)
+        with self._ahead(until_ns):
+            return [event for event in events_since(mark, self.bench.trace) if event.t <= until_ns]
+
+    @contextlib.contextmanager
+    def _ahead(self, until_ns: Nanos) -> Iterator[None]:
+        """Have all in the trace that happened until a time, for a block."""
+        snapshot = self.machine.snapshot()
+        with self._unarmed(), self._quiet():
+            while self.bench.events.released_until < until_ns and not self.is_over:
+                self.machine.advance_to((self.now_ns // SAMPLE_NS + 1) * SAMPLE_NS)
+            if self.bench.events.released_until < until_ns:
+                self.bench.finish()
+            yield
+            self.machine.restore(snapshot)
+
+    def _stand(self, why: str) -> Halted:
+        """Stand still where the chip is."""
+        self.head_ns = self._stood_ns = self.now_ns
+        self._hits.clear()
+        self.look_ahead()
+        self._hits.clear()
+        return Halted(0, why)
+
+    @contextlib.contextmanager
+    def _unarmed(self) -> Iterator[None]:
+        with self._halting_at(frozenset()):
+            yield
+
+    @contextlib.contextmanager
+    def _halting_at(self, addresses: frozenset[int]) -> Iterator[None]:
+        """Halt before these instructions in place of the points."""
+        engine = self.machine.board.chip.engine
+        kept = set(engine.breakpoints), set(engine.watchpoints)
+        engine.breakpoints.clear()
+        engine.watchpoints.clear()
+        engine.breakpoints.update(addresses)
+        try:
+            yield
+        finally:
+            engine.breakpoints.clear()
+            engine.breakpoints.update(kept[0])
+            engine.watchpoints.update(kept[1])
+
+    @contextlib.contextmanager
+    def _quiet(self) -> Iterator[None]:
+        """Log nothing, and tell nobody how far the run is: it goes where it was before."""
+        recorder, on_slice = run_of(self.bench).recorder, self.bench.on_slice
+        kept, recorder.on_event, self.bench.on_slice = recorder.on_event, None, None
+        try:
+            yield
+        finally:
+            recorder.on_event, self.bench.on_slice = kept, on_slice
+
+
+#: The number of what a step halts at.
+_STEP = -1
+_BEGIN = "the beginning"

@@ -1,0 +1,371 @@
+"""The control of one run: what a page asks for is done to its futures, between two slices of the chosen one.
+
+Passive: time is an argument. Whoever owns it calls `do` with a command, and `go_on` with the time of a clock while
+`is_running`; it says how long nothing is to be done.
+
+Invariant: whatever is asked, the run itself leaves the trace that it would have left; only a fork is another run.
+"""
+
+from collections.abc import Callable, Mapping
+from itertools import count
+from pathlib import Path
+from typing import Protocol
+
+from bluepill_sim.errors import BluePillError
+from p2os.view.run_control import (
+    Doing,
+    FutureState,
+    HaltState,
+    PartingState,
+    RunCommand,
+    RunState,
+)
+from robot_bench.bench import Bench
+from robot_bench.events.words import distinguishing_words, what_of
+from robot_bench.recording.divergence import Difference, differences
+from robot_bench.run_control.changes import change
+from robot_bench.run_control.future import SLICE_NS, Future, Halted
+from robot_bench.run_control.points import HaltPoint, point_of
+from simbase.errors import P2osError, UsageError
+from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
+
+#: The run itself.
+MAIN = "run"
+#: chosen: futures at a time; each has its trace in a file and its rows in memory.
+MOST_FUTURES = 8
+#: chosen: differences that are listed, the first that part.
+MOST_SIGNALS = 8
+#: chosen: slower than this, what happens is looked for ahead of the time that is shown: else it would come late.
+_SLOW = 0.25
+#: chosen: a bench that cannot keep the pace goes on from where it is after so long, ns of the clock.
+_MOST_LAG_NS: Nanos = NS_PER_S // 2
+#: chosen: a run that goes on is reported so often, ns of the clock.
+_REPORTED_NS: Nanos = 50 * NS_PER_MS
+
+
+class FutureRecorder(Protocol):
+    """Who records what happens in each future."""
+
+    def begin(self, future: Future) -> None:
+        """Listen to a future's bench from now on."""
+
+    def forked(self, future: Future, parent: Future) -> None:
+        """Take a future that has left another one where that one stands."""
+
+    def dropped(self, future: Future) -> None:
+        """Forget a future."""
+
+
+class RunSession:
+    """Controls one run.
+
+    Args:
+        bench: Of the run, at its beginning.
+        recorder: Records its futures.
+        folder: Where traces of forks are kept.
+        speed: Virtual seconds a second; 0 as fast as it goes.
+    """
+
+    def __init__(self, bench: Bench, recorder: FutureRecorder, folder: Path, speed: float = 1.0) -> None:
+        self._recorder, self._folder = recorder, folder
+        self.speed = speed
+        self.is_running = True
+        self._main = self._chosen = Future(MAIN, bench)
+        self._futures = {MAIN: self._main}
+        #: Those that were dropped, too: others come from them.
+        self._known = {MAIN: self._main}
+        self._numbers, self._places = count(1), count(1)
+        self._points: dict[int, HaltPoint] = {}
+        self._counts: dict[int, int] = {}
+        self._compared: dict[str, tuple[str, Nanos, tuple[PartingState, ...]]] = {}
+        self._why, self._trouble, self._done = "", "", 0
+        self._reported_at: Nanos | None = None
+        self._state: RunState | None = None
+        self._base: tuple[Nanos, Nanos] | None = None
+        self._doing: Mapping[Doing, Callable[[RunCommand], None]] = {
+            "run": self._run, "pause": self._pause, "go": self._go, "step": self._step, "back": self._back,
+            "speed": self._set_speed, "fork": self._fork, "choose": self._choose, "drop": self._drop,
+            "compare": self._compare, "halt_at": self._halt_at, "halt_not_at": self._halt_not_at,
+        }  # fmt: skip
+        recorder.begin(self._main)
+
+    @property
+    def bench(self) -> Bench:
+        """The bench of the run itself."""
+        return self._main.bench
+
+    @property
+    def chosen(self) -> Future:
+        """The future that goes on."""
+        return self._chosen
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the run itself has come to its end."""
+        return self._main.is_over
+
+    def state(self) -> RunState:
+        """Return how it stands."""
+        if self._state is None:
+            place = "" if self.is_running else self._chosen.place
+            self._state = RunState(
+                is_running=self.is_running, speed=self.speed, head_ns=self._chosen.head_ns, why=self._why, place=place,
+                trouble=self._trouble, done=self._done, future=self._chosen.name,
+                futures=[self._state_of(one) for one in self._futures.values()],
+                halts=[HaltState(number=number, words=one.words, count=self._counts[number])
+                       for number, one in self._points.items()],
+            )  # fmt: skip
+        return self._state
+
+    def _state_of(self, future: Future) -> FutureState:
+        against, until_ns, parting = self._compared.get(future.name, ("", 0, ()))
+        return FutureState(
+            name=future.name, source="" if future is self._main else future.name, parent=future.parent,
+            at_ns=future.begins_ns if future.parent else 0, head_ns=future.head_ns, words=future.words,
+            end_ns=max(future.known_ns, future.head_ns), is_over=future.is_over, against=against, until_ns=until_ns,
+            parting=parting,
+        )  # fmt: skip
+
+    # What is asked for.
+
+    def do(self, command: RunCommand) -> None:
+        """Do what a page asks for; what cannot be done is said in the state."""
+        self._state, self._reported_at, self._base, self._trouble = None, None, None, ""
+        try:
+            self._doing[command.do](command)
+        except (P2osError, BluePillError) as error:
+            hint = getattr(error, "hint", None)
+            self._trouble = f"{error} ({hint})" if hint else str(error)
+            self._stop("")
+        self._done += 1
+        self._state = None
+
+    def _run(self, command: RunCommand) -> None:
+        self._go(command)
+        if self._chosen.is_over:
+            self._stop("the end of the run")
+            return
+        self._chosen.resume()
+        self.is_running, self._why = True, ""
+
+    def _pause(self, _command: RunCommand) -> None:
+        if self.is_running:
+            self._stop("paused")
+            self._chosen.go_to(self._chosen.head_ns)
+
+    def _go(self, command: RunCommand) -> None:
+        """Stand still at the time of a command."""
+        was_running = self.is_running
+        self._stop(self._why)
+        if command.at_ns is not None and command.at_ns != self._chosen.head_ns:
+            self._chosen.go_to(command.at_ns)
+            self._why = ""
+        elif was_running:
+            self._chosen.look_ahead()
+
+    def _step(self, command: RunCommand) -> None:
+        self._go(command)
+        future = self._chosen
+        if future.is_over:
+            self._stop("the end of the run")
+        elif command.unit == "instruction":
+            self._stop(future.step().why)
+        elif command.unit == "line":
+            self._stop(future.step_line().why)
+        elif command.unit == "millisecond":
+            future.go_to(future.head_ns + NS_PER_MS)
+            self._stop("")
+        else:
+            future.resume()
+            future.step_to_event(command.unit, command.words, _wires(future.bench))
+            self.is_running, self._why, self._is_step = True, "", True
+
+    def _back(self, command: RunCommand) -> None:
+        self._go(command)
+        future = self._chosen
+        if command.unit == "instruction":
+            self._stop(future.step_back().why)
+        elif command.unit == "line":
+            self._stop(future.step_line_back().why)
+        elif command.unit == "millisecond":
+            future.go_to(max(future.begins_ns, future.head_ns - NS_PER_MS))
+            self._stop("")
+        else:
+            self._stop(future.back_to_event(command.unit, command.words, _wires(future.bench)).why)
+
+    def _set_speed(self, command: RunCommand) -> None:
+        self.speed = command.speed
+
+    def _fork(self, command: RunCommand) -> None:
+        if len(self._futures) >= MOST_FUTURES:
+            raise UsageError(f"{MOST_FUTURES} futures are there already", hint="drop one")
+        self._go(command)
+        parent, name = self._chosen, f"fork {next(self._numbers)}"
+        bench = parent.bench.fork(self._folder / f"{name.replace(' ', '-')}.jsonl")
+        if command.words.strip():
+            change(bench, command.words)
+        future = Future(name, bench, parent.name, command.words.strip())
+        self._futures[name] = self._known[name] = future
+        self._recorder.forked(future, parent)
+        self._choose_future(future)
+        future.look_ahead()
+        self._stop("")
+
+    def _choose(self, command: RunCommand) -> None:
+        self._choose_future(self._named(command.future))
+
+    def _choose_future(self, future: Future) -> None:
+        self._stop("")
+        self._chosen.arm({})
+        self._chosen = future
+        future.arm(self._points)
+        future.go_to(future.head_ns)
+
+    def _drop(self, command: RunCommand) -> None:
+        future = self._named(command.future)
+        if future is self._main:
+            raise UsageError("the run itself stays", hint="drop a fork")
+        if future is self._chosen:
+            self._choose_future(self._main)
+        del self._futures[future.name]
+        self._compared = {name: row for name, row in self._compared.items() if future.name not in {name, row[0]}}
+        self._recorder.dropped(future)
+        future.bench.trace.close()
+
+    def _compare(self, command: RunCommand) -> None:
+        """Find where the chosen future and another one part."""
+        ours, theirs = self._chosen, self._named(command.future)
+        self._stop(self._why)
+        if ours is theirs:
+            raise UsageError("a future does not differ from itself", hint="choose another one")
+        until_ns = min(max(one.known_ns, one.head_ns) for one in (ours, theirs))
+        heads = [(one, one.head_ns) for one in (ours, theirs)]
+        mark = self._parted(ours, theirs).mark
+        kept = [one.events_until(mark, until_ns) for one in (ours, theirs)]
+        parting = tuple(_parting_of(one) for one in differences(*kept)[:MOST_SIGNALS])
+        for one, head_ns in heads:
+            one.go_to(head_ns)
+        self._compared[ours.name] = theirs.name, until_ns, parting
+
+    def _parted(self, one: Future, other: Future) -> Future:
+        """Return the future with whose beginning two of them part: what was before is the same."""
+        lines = [self._line_of(one), self._line_of(other)]
+        own = [[step for step in lines[way] if step not in lines[1 - way]] for way in (0, 1)]
+        return min((line[-1] for line in own if line), key=lambda step: step.begins_ns)
+
+    def _line_of(self, future: Future) -> list[Future]:
+        """Return a future and those that it comes from, back to the run itself."""
+        found = [future]
+        while found[-1].parent in self._known:
+            found.append(self._known[found[-1].parent])
+        return found
+
+    def _halt_at(self, command: RunCommand) -> None:
+        point = point_of(
+            command.words, self._chosen.machine.board, self._chosen.bench.scenario, _wires(self._chosen.bench)
+        )  # fmt: skip
+        if any(one.words == point.words for one in self._points.values()):
+            return
+        number = next(self._places)
+        self._points[number], self._counts[number] = point, 0
+        self._chosen.arm(self._points)
+        if not self.is_running and point.selector is not None:
+            # It sees what was before from the last older state on: a robot that is there already does not come there.
+            self._chosen.go_to(self._chosen.head_ns - 1)
+            self._chosen.go_to(self._chosen.head_ns + 1)
+
+    def _halt_not_at(self, command: RunCommand) -> None:
+        if self._points.pop(command.number, None) is None:
+            raise UsageError(f"there is no place {command.number} to halt at", hint="it may be gone")
+        del self._counts[command.number]
+        self._chosen.arm(self._points)
+
+    def _named(self, name: str) -> Future:
+        found = self._futures.get(name)
+        if found is None:
+            raise UsageError(f"there is no future {name!r}", hint=", ".join(self._futures))
+        return found
+
+    def _stop(self, why: str) -> None:
+        self.is_running, self._why, self._is_step = False, why, False
+        self._chosen.forget_step()
+
+    _is_step = False
+
+    # Going on.
+
+    def go_on(self, clock_ns: Nanos) -> float:
+        """Run a slice of the chosen future, as far as its pace has come.
+
+        Args:
+            clock_ns: Of any clock that goes on.
+
+        Returns:
+            Seconds until the next slice is due.
+        """
+        future = self._chosen
+        limit = self._due(clock_ns)
+        if limit is not None and limit <= future.head_ns:
+            return (future.head_ns + self._least - limit) / self.speed / NS_PER_S
+        limit = future.head_ns + SLICE_NS * _SLICES if limit is None else min(limit, future.head_ns + _MOST_LAG_NS)
+        halted = future.run_to(limit, is_seen_at_once=0 < self.speed < _SLOW and not self._is_step)
+        if halted is not None:
+            self._halted(halted)
+        if self._reported_at is None or halted is not None or clock_ns - self._reported_at >= _REPORTED_NS:
+            self._reported_at, self._state = clock_ns, None
+        return 0.0
+
+    @property
+    def _least(self) -> Nanos:
+        """The least that is run in one go: a fiftieth of a second of the clock."""
+        return max(1, int(SLICE_NS * self.speed))
+
+    def _due(self, clock_ns: Nanos) -> Nanos | None:
+        """Return the time that the pace has come to; None where there is no pace."""
+        if self.speed == 0 or self._is_step:
+            return None
+        head = self._chosen.head_ns
+        if self._base is None:
+            self._base = clock_ns, head
+        begun, base = self._base
+        due = base + int((clock_ns - begun) * self.speed)
+        if due - head > _MOST_LAG_NS * max(1.0, self.speed):
+            self._base = clock_ns, head
+            due = head + self._least
+        return due
+
+    def _halted(self, halted: Halted) -> None:
+        if halted.number in self._counts:
+            self._counts[halted.number] += 1
+        self._stop(halted.why)
+
+    def end(self) -> None:
+        """Bring the run itself to where it was furthest, for whoever ends it there."""
+        self._stop("")
+        main = self._main
+        self._choose_future(main)
+        main.arm({})
+        if main.now_ns < (furthest := min(main.known_ns, main.bench.end)):
+            main.go_to(furthest)
+
+    def replace_main(self, path: Path) -> None:
+        """Go on with a copy of the run itself, whose trace is another file: the run's own is to be ended."""
+        self._main.replace(self._main.bench.fork(path))
+        self._recorder.begin(self._main)
+
+
+def _wires(bench: Bench) -> Mapping[str, str] | None:
+    own = bench.scenario.own_robot
+    return None if own is None else own.wires
+
+
+def _parting_of(part: Difference) -> PartingState:
+    if part.one is not None and part.other is not None:
+        words = distinguishing_words(part.one, part.other)
+    else:
+        words = tuple("nothing more" if one is None else what_of(one) for one in (part.one, part.other))  # type: ignore[assignment]  # two
+    return PartingState(signal=part.signal, at_ns=part.at, one=words[0], other=words[1])
+
+
+#: chosen: slices in one go where there is no pace.
+_SLICES = 4
