@@ -194,3 +194,12 @@ def test_the_verb_leaves_the_choice_of_the_core_alone(
 @pytest.mark.parametrize("text", ["ping", "@1ms", "ping@soon", r"\x@1s"])
 def test_text_to_send_that_is_not_understood_is_refused(text: str) -> None:
     assert run(["races", str(EXAMPLES / "codes.elf"), "--send", text]) == 2
+
+
+def test_a_line_that_rises_again_while_its_interrupt_is_pending_draws_nothing_anew() -> None:
+    board = BluePill(EXAMPLES / "codes.elf")
+    board.chip.latency.vary(seed=0, most=0, until=0, last=12)
+    for level in (True, False, True):
+        board.chip.fabric.set_line(28, level)
+    assert board.chip.latency.count == 1
+    assert board.chip.processor.nvic.held == 1 << 44
