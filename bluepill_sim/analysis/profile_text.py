@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from bluepill_sim.analysis.columns import in_columns
 from bluepill_sim.analysis.cycle_profile import ASLEEP, CycleProfile
-from bluepill_sim.analysis.latency import ExceptionCost
+from bluepill_sim.analysis.interrupts.latency import ExceptionCost
 from bluepill_sim.core.nvic import exception_name
 
 

@@ -8,7 +8,7 @@ import typer
 
 from bluepill_sim.analysis.cycle_profile import CycleProfile, FunctionCost
 from bluepill_sim.analysis.flame_graph import flame_svg
-from bluepill_sim.analysis.latency import ExceptionCost, LatencyProbe
+from bluepill_sim.analysis.interrupts.latency import ExceptionCost, LatencyProbe
 from bluepill_sim.analysis.observation import Observation
 from bluepill_sim.analysis.profile_text import exception_lines, function_lines
 from bluepill_sim.analysis.stack import StackGauge

@@ -17,7 +17,7 @@ from bluepill_sim.analysis.coverage_page import coverage_page
 from bluepill_sim.analysis.coverage_text import coverage_lines, refuse_without_lines, shortfall
 from bluepill_sim.analysis.cycle_profile import ASLEEP, CycleProfile
 from bluepill_sim.analysis.flame_graph import flame_svg
-from bluepill_sim.analysis.latency import LatencyProbe
+from bluepill_sim.analysis.interrupts.latency import LatencyProbe
 from bluepill_sim.analysis.lcov import lcov_lines
 from bluepill_sim.analysis.observation import Observation
 from bluepill_sim.analysis.profile_text import exception_lines, function_lines

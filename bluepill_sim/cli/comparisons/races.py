@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from bluepill_sim.analysis.races import InterruptOrder, Race, RaceReport, RaceSearch
+from bluepill_sim.analysis.interrupts.races import InterruptOrder, Race, RaceReport, RaceSearch
 from bluepill_sim.board import BluePill
 from bluepill_sim.cli.driving import Schedule, parse_changes, parse_texts, print_fault, print_status
 from bluepill_sim.cli.quantities import Drive, Firmware, Span

@@ -9,7 +9,7 @@ import pytest
 from bluepill_sim.analysis.coverage import Coverage
 from bluepill_sim.analysis.cycle_profile import ASLEEP, CycleProfile
 from bluepill_sim.analysis.flame_graph import flame_svg
-from bluepill_sim.analysis.latency import LatencyProbe
+from bluepill_sim.analysis.interrupts.latency import LatencyProbe
 from bluepill_sim.analysis.observation import HANDLER_LEFT, BlockWalk, Observation
 from bluepill_sim.analysis.stack import StackGauge
 from bluepill_sim.board import BluePill

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from bluepill_sim import BluePill
 from bluepill_sim.__main__ import run
-from bluepill_sim.analysis.races import Channel, RaceReport, RaceSearch, RunOutputs, Slack, parting_of
+from bluepill_sim.analysis.interrupts.races import Channel, RaceReport, RaceSearch, RunOutputs, Slack, parting_of
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.program.image import load_image
 from simbase.timing import NS_PER_MS
