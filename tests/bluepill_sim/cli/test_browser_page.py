@@ -41,10 +41,11 @@ def load(address: int) -> str:
     return f"mov32 r1, #{address}\nldr r0, [r1, #0]\n"
 
 
-#: Reads WWDG_CR, which is not there, with its clock; TIM2_CR1 twice, with 2 ms between, without; writes FLASH_KEYR and
+#: Opens the backup domain as start-up code does, which is there, and waits until it is open; reads WWDG_CR, which is not there, with its clock; TIM2_CR1 twice, with 2 ms between, without; writes FLASH_KEYR and
 #: IWDG_KR; then stores to flash, which ends it.
 STRANGE = "".join([
-    store(0x4002_101C, 1 << 11), load(0x4000_2C00), load(0x4000_0000),
+    store(0x4002_101C, 1 << 28 | 1 << 11), store(0x4000_7000, 1 << 8),
+    "locked: ldr r0, [r1, #0]\ncmp r0, #0\nbeq locked\n", load(0x4000_2C00), load(0x4000_0000),
     "mov32 r4, #6000\nagain: subs r4, #1\nbne again\n", load(0x4000_0000),
     store(0x4002_2004, 0x4567_0123), store(0x4000_3000, 0xCCCC), store(0x0800_1000, 1), "end: b end",
 ])  # fmt: skip
@@ -227,6 +228,7 @@ def test_what_is_not_there_is_named_with_its_register(seen: dict[str, Any]) -> N
     assert "(TIM2_CR1) is read, and the peripheral has no clock" in named
     assert "is written to 0x40022004 (FLASH_KEYR): this page does not have it" in named
     assert "is written to 0x40003000 (IWDG_KR)" in named
+    assert "PWR" not in named
     assert "is stored to 0x08001000" in strange["stopped"]
 
 
