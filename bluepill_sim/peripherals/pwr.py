@@ -8,8 +8,10 @@ Source: RM0008 section 5; thresholds from the data sheet DS5319 table 12.
 Invariant: PVDO is 1 exactly while PVDE is set and the supply was last seen below the threshold.
 """
 
+from enum import IntEnum
+
 from bluepill_sim.fabric.pins import PinDrive
-from bluepill_sim.fabric.registers import LISTENER, Peripheral, Register, indices, masks
+from bluepill_sim.fabric.registers import NATIVE, OWN_ANSWERS, Peripheral, Register, indices, masks
 
 #: Fields, from the left.
 _CR, _CSR = "DBP 8, PLS 7:5, PVDE 4, CSBF 3, CWUF 2, PDDS 1, LPDS 0", "EWUP 8, PVDO 2, SBF 1, WUF 0"
@@ -22,20 +24,32 @@ FALLING_MV, STEP_MV, HYSTERESIS_MV = 2_080, 100, 100
 _PORT, _PIN, _OWNER = "A", 0, "WKUP"
 
 
+class PwrQuestion(IntEnum):
+    """What Python is notified of beside what a listener hears."""
+
+    #: DBP has changed.
+    BACKUP = OWN_ANSWERS
+    #: A write with the supply's detector on, before it or behind it.
+    SUPPLY = OWN_ANSWERS + 1
+    #: EWUP has changed.
+    WAKE_PIN = OWN_ANSWERS + 2
+
+
 class Pwr(Peripheral):
     """Power control."""
 
-    KIND = LISTENER
+    KIND = "pwr"
+    ENUMS = (PwrQuestion,)
     OUTPUTS = ("pvd",)
     INPUTS = ("alarm",)
     SOURCE = "RM0008 5.4"
     REGISTERS = (
         Register(
             name="CR", offset=0x00, readable=LPDS | PDDS | PVDE | _PLS | DBP,
-            writable=LPDS | PDDS | CWUF | CSBF | PVDE | _PLS | DBP, on_write="_write_cr",
+            writable=LPDS | PDDS | CWUF | CSBF | PVDE | _PLS | DBP, on_write=NATIVE,
             fields=_CR,
         ),
-        Register(name="CSR", offset=0x04, readable=WUF | SBF | PVDO | EWUP, writable=EWUP, on_write="_write_csr",
+        Register(name="CSR", offset=0x04, readable=WUF | SBF | PVDO | EWUP, writable=EWUP, on_write=NATIVE,
             fields=_CSR),
     )  # fmt: skip
 
@@ -96,14 +110,17 @@ class Pwr(Peripheral):
     def _restored(self) -> None:
         self._listen()
 
-    def _write_cr(self, written: int, _previous: int) -> None:
-        self.words[CSR] &= ~((WUF if written & CWUF else 0) | (SBF if written & CSBF else 0))
-        self.chip.power.is_backup_open = bool(self.words[CR] & DBP)
-        self.supply_changed()
-
-    def _write_csr(self, written: int, previous: int) -> None:
-        if (written ^ previous) & EWUP:
+    def answer(self, what: int, value: int) -> int:
+        """Unlock or lock the backup domain, look at the supply, or hear a line or a pin."""
+        if what == PwrQuestion.BACKUP:
+            self.chip.power.is_backup_open = bool(value)
+        elif what == PwrQuestion.SUPPLY:
+            self.supply_changed()
+        elif what == PwrQuestion.WAKE_PIN:
             self._place_pin()
+        else:
+            return super().answer(what, value)
+        return 0
 
     def _place_pin(self) -> None:
         """Give PA0 to WKUP, with its pull-down, while EWUP is set (RM0008 5.4.2)."""

@@ -31,7 +31,9 @@ from simbase.files import read_bytes
 #: A program that stands still, for a chip that gets another one later: its stack, its entry, and a branch to itself.
 IDLE = (SRAM_BASE + SRAM_BYTES).to_bytes(4, "little") + bytes([9, 0, 0, 8]) + b"\xfe\xe7"
 #: What devices in C notify Python of, and which changes nothing on a page.
-_HARMLESS = ("PLACED", "GIVE_MORE", "JUDGE_SPEED", "CHECK_MODES", "CSS_CLEARED", "HEARS_LINE", "HEARS_PINS", "GATES")
+_HARMLESS = (
+    "PLACED", "GIVE_MORE", "JUDGE_SPEED", "CHECK_MODES", "CSS_CLEARED", "HEARS_LINE", "HEARS_PINS", "GATES", "BACKUP",
+)  # fmt: skip
 #: MAPR but for PD01_REMAP and SWJ_CFG.
 _REMAPS = 0x1F_7FFF
 _SHOWN = ("level", "floating", "low", "high", "up", "down", "outside", "outside_high", "outside_weak", "bonded", "held",

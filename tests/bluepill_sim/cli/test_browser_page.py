@@ -41,13 +41,25 @@ def load(address: int) -> str:
     return f"mov32 r1, #{address}\nldr r0, [r1, #0]\n"
 
 
-#: Reads WWDG_CR, which is not there, with its clock; TIM2_CR1 twice, with 2 ms between, without; writes FLASH_KEYR and
-#: IWDG_KR; then stores to flash, which ends it.
+#: Opens the backup domain as start-up code does, which is there, and waits until it is open; reads WWDG_CR, which is
+#: not there, with its clock; TIM2_CR1 twice, with 2 ms between, without; writes FLASH_KEYR and IWDG_KR; then stores to
+#: flash, which ends it.
 STRANGE = "".join([
-    store(0x4002_101C, 1 << 11), load(0x4000_2C00), load(0x4000_0000),
+    store(0x4002_101C, 1 << 28 | 1 << 11), store(0x4000_7000, 1 << 8),
+    "locked: ldr r0, [r1, #0]\ncmp r0, #0\nbeq locked\n", load(0x4000_2C00), load(0x4000_0000),
     "mov32 r4, #6000\nagain: subs r4, #1\nbne again\n", load(0x4000_0000),
     store(0x4002_2004, 0x4567_0123), store(0x4000_3000, 0xCCCC), store(0x0800_1000, 1), "end: b end",
 ])  # fmt: skip
+
+
+#: Makes PendSV pending and sets PA1 and PA0 in one block, whose handler clears PA1: it comes before the first of them.
+PENDED = (
+    ".half " + ", ".join(["0"] * 24) + "\n.half 0x0041, 0x0800, 0, 0\n"
+    "mov32 r3, #0x40010810\nmov32 r2, #0x00020000\nstr r2, [r3, #0]\nbx lr\n"
+    "main: " + store(0x4002_1018, 1 << 2) + store(0x4001_0800, 0x2222_2222)
+    + "mov32 r4, #0xE000ED04\nmov32 r5, #0x10000000\nmov32 r6, #0x40010810\nmov32 r7, #2\nmov32 r0, #1\n"
+    "mov32 r1, #0x00010000\nagain: str r5, [r4, #0]\nstr r7, [r6, #0]\nstr r0, [r6, #0]\nstr r1, [r6, #0]\nb again"
+)  # fmt: skip
 
 
 # What is in the file.
@@ -148,6 +160,13 @@ def elf_of(code: bytes, entry: int = 0x0800_0009) -> bytes:
     return head + struct.pack("<8I", 1, 84, 0x0800_0000, 0x0800_0000, len(data), len(data), 5, 4) + data
 
 
+def pended(folder: Path) -> Path:
+    """Return the program whose exception comes before an access in the midst of a block."""
+    made, path = Assembler(PENDED, 0x0800_0008), folder / "pended.elf"
+    path.write_bytes(elf_of(made.code, made.labels["main"] | 1))
+    return path
+
+
 def inputs_of(name: str) -> list[tuple[int, int, int]]:
     """Return levels that the outside puts on pins that a program leaves to it: (ns, pin, level)."""
     board = BluePill(FIRMWARE / f"{name}.elf")
@@ -192,6 +211,7 @@ def seen(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     strange.write_bytes(elf_of(Assembler(STRANGE, 0x0800_0008).code))
     programs = [{"name": name, "file": str(FIRMWARE / f"{name}.elf"), "ns": RUN_NS, "inputs": inputs_of(name)}
                 for name in ACCEPTED]  # fmt: skip
+    programs.append({"name": "pended", "file": str(pended(folder)), "ns": MS, "inputs": []})
     programs.append({"name": "strange", "file": str(strange), "ns": 10 * MS, "inputs": []})
     programs.append({"name": "usb_echo", "file": str(FIRMWARE / "usb_echo.elf"), "ns": 10 * MS, "inputs": []})
     asked.write_text(json.dumps({"programs": programs}), encoding="utf-8")
@@ -218,6 +238,16 @@ def test_a_shipped_program_makes_the_edges_and_takes_the_cycles_of_the_native_co
 
 
 @pytest.mark.slow
+def test_an_exception_that_a_block_raises_comes_before_its_next_access(
+    seen: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(CORE_VARIABLE, "own")
+    native, there = native_run(pended(tmp_path), [], MS), seen["runs"]["pended"]
+    assert len(native["edges"]) > 100
+    assert (there["edges"], there["cycle"], there["named"]) == (native["edges"], native["cycle"], [])
+
+
+@pytest.mark.slow
 def test_what_is_not_there_is_named_with_its_register(seen: dict[str, Any]) -> None:
     usb, strange = seen["runs"]["usb_echo"], seen["runs"]["strange"]
     assert usb["stopped"] == ""
@@ -227,6 +257,7 @@ def test_what_is_not_there_is_named_with_its_register(seen: dict[str, Any]) -> N
     assert "(TIM2_CR1) is read, and the peripheral has no clock" in named
     assert "is written to 0x40022004 (FLASH_KEYR): this page does not have it" in named
     assert "is written to 0x40003000 (IWDG_KR)" in named
+    assert "PWR" not in named
     assert "is stored to 0x08001000" in strange["stopped"]
 
 
