@@ -51,7 +51,7 @@ class BasicBlock:
     late_divides: tuple[tuple[int, int], ...] = ()
     #: Addresses and base registers of its accesses that must be aligned.
     aligned: tuple[tuple[int, int], ...] = ()
-    #: Addresses of its instructions that an exception in their midst leaves undone, to begin anew after it.
+    #: Addresses of its instructions that an exception in their midst leaves undone, to begin anew or go on behind it.
     given_up: frozenset[int] = frozenset()
     #: Whether it may change what may interrupt (CPS, MSR).
     changes_masks: bool = False

@@ -113,8 +113,8 @@ REFILL = {
     Kind.LOAD_MULTIPLE: 3,
 }
 
-#: What takes so long that an exception need not wait for it (TRM 18.2, ARM B1.5.10). chosen: LDM and STM begin anew
-#: too, where silicon goes on with the word at which they were left.
+#: What takes so long that an exception need not wait for it (TRM 18.2, ARM B1.5.10). LDM and STM go on behind it with
+#: the word at which they were left; the others begin anew.
 GIVEN_UP = frozenset(
     {Kind.MULTIPLY_LONG, Kind.MULTIPLY_ACCUMULATE_LONG, Kind.DIVIDE, Kind.LOAD_MULTIPLE, Kind.STORE_MULTIPLE}
 )

@@ -9,11 +9,11 @@ from typing import Annotated
 
 import typer
 
-from bluepill_sim.analysis.cores.comparison import Acts, ComparedCores, CoreDifference, compare_boundaries
-from bluepill_sim.analysis.cores.judge import compare_instructions
 from bluepill_sim.board import BluePill
 from bluepill_sim.cli.driving import PinChange, parse_changes, print_status
 from bluepill_sim.cli.quantities import Drive, Firmware, JsonOutput, time_option
+from bluepill_sim.debug.cores.comparison import Acts, ComparedCores, CoreDifference, compare_boundaries
+from bluepill_sim.debug.cores.judge import compare_instructions
 from bluepill_sim.extension.encodings import FIRST_WIDE, find
 from bluepill_sim.extension.library import core_chosen
 from bluepill_sim.program.image import Image

@@ -163,7 +163,7 @@ bool interpreter_load(struct interpreter *s, const struct op *op, uint32_t addre
 bool interpreter_store(struct interpreter *s, const struct op *op, uint32_t address, uint32_t bytes, uint32_t value);
 bool interpreter_is_trapped(struct interpreter *s, const struct op *op, bool is_alignment, uint32_t value);
 uint32_t interpreter_page(struct interpreter *s, uint32_t address, int access, bool *is_denied);
-uint32_t interpreter_move_some(struct interpreter *s, uint32_t most);
+void interpreter_move_some(struct interpreter *s, uint32_t most);
 void interpreter_choose_ways(struct interpreter *s);
 /* hooks.c */
 void interpreter_call_block(struct interpreter *s, struct block *block);

@@ -287,22 +287,22 @@ static uint8_t *word_at(const struct interpreter *s, uint32_t address, bool is_l
 }
 
 /* An exception comes in the midst of the LDM or STM with which the block that is entered begins: moves the words up to then,
- * and leaves ICI and the base as the handler finds them. Returns how many; 0: the instruction begins anew.
+ * and leaves ICI and the base as the handler finds them. Where none is, the instruction begins anew.
  *
  * It does so under IT, and in front of a base that it would load (TRM r2p0 3.9.1). Chosen: a store whose base is in its
  * list does, and what moves no plain memory, or is watched. A store writes its base back before, so that the words pushed
  * are not below the stack; a load does behind its last word, so that neither are those to be popped. */
-uint32_t interpreter_move_some(struct interpreter *s, uint32_t most)
+void interpreter_move_some(struct interpreter *s, uint32_t most)
 {
     const struct op *op = first_multiple(s->entering);
     if (op == NULL || s->access_hooks || s->entering->it & 15) {
-        return 0;
+        return;
     }
     const bool is_load = op->number == OP_LDM, is_put_back = op != s->entering->ops;
     const uint32_t own = op->imm >> op->n & 1, base = s->is.r[op->n] + (is_put_back ? s->entering->ops[0].imm : 0);
     uint32_t address = base + 4 * (uint32_t)(int8_t)(op->imm >> 16), left = op->imm & 0xFFFF, count = 0;
     if (base & 3 || (own && !is_load && op->a)) {
-        return 0;
+        return;
     }
     for (; count < most && left & (left - 1); left &= left - 1, address += 4, ++count) {
         const uint32_t number = (uint32_t)__builtin_ctz(left);
@@ -316,5 +316,4 @@ uint32_t interpreter_move_some(struct interpreter *s, uint32_t most)
         s->is.r[op->n] = is_load ? s->is.r[op->n] : base + 4 * (uint32_t)(int8_t)op->a;
         s->is.it_state = (uint32_t)__builtin_ctz(left) << 4;
     }
-    return count;
 }

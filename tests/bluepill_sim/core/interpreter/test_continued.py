@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from tests.bluepill_sim.machine import COUNTER_ON, STACK, Machine
+from tests.bluepill_sim.machine import COUNTER_ON, FLASH, STACK, Machine
 
 Boot = Callable[..., Machine]
 SYSTICK, CYCLE_NS, FRAME_BYTES = 15, 125, 32
@@ -235,6 +235,15 @@ b stop
     ticked, pc, faulted, base = machine.log
     assert ticked & ICI_BITS == 10 << 12
     assert (pc, faulted & ICI_BITS, base) == (machine.label("here"), 0, 0x2000_4FF8)
+
+
+def test_words_of_the_flash_are_moved_one_by_one(boot: Boot) -> None:
+    """The first four vectors; two are moved in three cycles."""
+    source = PROGRAM.format(at=WORDS, base=FLASH, sp=STACK, load=4, it="", code=".half 0xE895, 0x0F00", put="")
+    machine = boot(COUNTER_ON + source, {SYSTICK: "tick"}).run(40)
+    assert (machine.log[0], machine.log[1] & ICI_BITS) == (machine.label("here"), 10 << 12)
+    vectors = struct.unpack("<4I", machine.board.read_memory(FLASH, 16) or b"")
+    assert tuple(machine.board.register(f"R{n}") for n in range(8, 12)) == vectors
 
 
 def test_words_of_a_peripheral_are_moved_all_or_none(boot: Boot) -> None:

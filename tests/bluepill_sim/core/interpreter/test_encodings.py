@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from bluepill_sim.extension.encodings import NARROW, UNDEFINED, WIDE, Encoding, Kind, find
+from bluepill_sim.extension.encodings import FIRST_WIDE, NARROW, UNDEFINED, WIDE, Encoding, Kind, find
 
 OBJDUMP = shutil.which("arm-none-eabi-objdump")
 #: How the table's mnemonics are spelt there; and what it prints in words of its own.
@@ -94,6 +94,7 @@ def test_an_instruction_is_written_with_its_registers_and_condition(word: int, t
 def test_the_tables_are_of_one_width_each() -> None:
     assert not any(row.is_wide for row in NARROW)
     assert all(row.is_wide for row in WIDE)
+    assert FIRST_WIDE == 0b11101 << 11, "A5.1"
 
 
 def test_an_s_is_written_where_a_bit_chooses_flags() -> None:

@@ -8,11 +8,11 @@ an exclusive access, whose reservation it may not have.
 import ctypes
 import struct
 
-from bluepill_sim.analysis.cores.comparison import Acts, ComparedCores, CoreDifference, CoreValue, core_value
 from bluepill_sim.board import BluePill
 from bluepill_sim.core import Reg, it_state_of
 from bluepill_sim.core.thumb import decode
 from bluepill_sim.core.unicorn_core import GENERAL, UnicornCore
+from bluepill_sim.debug.cores.comparison import Acts, ComparedCores, CoreDifference, CoreValue, core_value
 from bluepill_sim.extension.encodings import Kind
 from bluepill_sim.extension.layout import NOWHERE
 from simbase.timing import Nanos

@@ -11,9 +11,9 @@ import pytest
 
 from bluepill_sim import BluePill
 from bluepill_sim.__main__ import run
-from bluepill_sim.analysis.cores.comparison import compare_boundaries, values_apart
-from bluepill_sim.analysis.cores.judge import compare_instructions
 from bluepill_sim.core import Reg
+from bluepill_sim.debug.cores.comparison import compare_boundaries, values_apart
+from bluepill_sim.debug.cores.judge import compare_instructions
 from bluepill_sim.extension.library import core_chosen
 from tests.bluepill_sim.machine import FLASH, Machine
 from tests.bluepill_sim.native.test_native_core import PROGRAMS
