@@ -8,6 +8,7 @@ Invariant: what is not shown by runs is said to be unknown, and never named as a
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from textwrap import wrap
 
 from bluepill_sim.program.image import Image, load_image
@@ -21,6 +22,8 @@ from simbase.units import ranges_text
 WIDTH = 80
 #: chosen: more lines in a row than these are no place.
 MOST_LINES = 4
+#: chosen: lines with more than one other between them are two places; the compiler has moved what follows from one.
+MOST_APART = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,6 +83,8 @@ def place_of(found: Sequence[LineDifference]) -> str:
         return ""
     lines = sorted({place for one in chosen for place in (one.theirs or one.ours)})
     if not lines or len(lines) > MOST_LINES or len({file for file, _ in lines}) != 1:
+        return ""
+    if any(after - before > MOST_APART for (_, before), (_, after) in pairwise(lines)):
         return ""
     if lines[0][0].endswith(".h"):
         return ""  # inlined, so from a line that the table does not tell

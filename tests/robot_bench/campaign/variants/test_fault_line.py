@@ -71,7 +71,8 @@ def lines(function: str, ours: list[int], theirs: list[int], file: str = "a.c") 
     [
         ([lines("f", [3], [3])], "a.c:3"),
         ([lines("f", [], [7])], "a.c:7"),
-        ([lines("f", [3], [3]), lines("f", [9], [9])], "a.c:3, 9"),
+        ([lines("f", [3], [3]), lines("f", [5], [5])], "a.c:3, 5"),
+        ([lines("f", [3], [3]), lines("f", [6], [6])], ""),
         ([lines("f", [3], [3]), lines("f", [5], [5, 6])], "a.c:5-6"),  # one that has no code any more counts
         ([lines("f", [3], [3]), lines("g", [9], [9])], ""),
         ([lines("f", [], [3]), lines("g", [], [9])], ""),
