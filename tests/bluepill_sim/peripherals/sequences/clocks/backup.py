@@ -250,6 +250,10 @@ def _(chip: Bench) -> None:
     chip.run(1_000_000_000)
     assert not chip["RTC.CRL.RSF"]
     chip["RCC.CSR.LSION"] = 1
+    chip["RCC.BDCR.RTCEN"] = 0
+    chip.run(1_000_000_000)
+    assert not chip["RTC.CRL.RSF"]
+    chip["RCC.BDCR.RTCEN"] = 1
     chip.run(200_000)
     assert chip["RTC.CRL.RSF"]
 
