@@ -185,6 +185,11 @@ def _(chip: Bench, mailbox: int) -> None:
     assert chip.irqs[19]
     chip["CAN.TSR"] = 1 << 8 * mailbox
     assert not chip.irqs[19]
+    bus.send(chip, 1, mailbox=(mailbox + 1) % 3)
+    chip.run(20 * BIT_NS)
+    bus.send(chip, 2, mailbox=mailbox)
+    chip["CAN.TSR"] = 1 << 8 * mailbox + 7
+    assert chip.irqs[19]
 
 
 @CAN.row(

@@ -372,6 +372,26 @@ def _(chip: Bench) -> None:
 
 
 @I2C.row(
+    "pec-behind-bytes",
+    "With ENPEC, set before the START, SR2 has the CRC-8 of the bytes so far, the address first.",
+    rm("26.3.8"),
+    values=st.integers(0, 255),
+)
+def _(chip: Bench, byte: int) -> None:
+    set_up(chip, PE | 1 << 5)
+    start(chip, 0xA0)
+    clear_addr(chip)
+    chip["I2C1.DR"] = byte
+    chip.run(2 * BYTE_NS)
+    crc = 0
+    for each in (0xA0, byte):
+        crc ^= each
+        for _ in range(8):
+            crc = (crc << 1 ^ (7 if crc & 0x80 else 0)) & 0xFF
+    assert chip["I2C1.SR2"] >> 8 == crc
+
+
+@I2C.row(
     "error-interrupt",
     "A refused byte interrupts on the error vector, and only with ITERREN.",
     rm("26.4"),

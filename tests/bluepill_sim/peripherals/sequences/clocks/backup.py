@@ -216,6 +216,25 @@ def _(chip: Bench) -> None:
 
 
 @RTC.row(
+    "alarm-wakes",
+    "An alarm sets WUF of PWR as it rises, once: what CWUF has cleared stays 0 until the next.",
+    rm("5.4.2"),
+    ours("PWR"),
+)
+def _(chip: Bench) -> None:
+    run_rtc(chip)
+    configure(chip, PRL=1)
+    chip.run(0x8010 * CYCLE_NS)
+    configure(chip, CNT=10, ALR=15)
+    chip["PWR.CR"] = 1 << 8 | 4
+    while not chip["PWR.CSR"] & 1:
+        chip.run(CYCLE_NS // 4)
+    chip["PWR.CR"] = 1 << 8 | 4
+    chip.run(20 * CYCLE_NS)
+    assert not chip["PWR.CSR"] & 1
+
+
+@RTC.row(
     "source-first",
     "RTC counts only once RTCSEL has chosen a source that runs, and RTCEN is set.",
     LOCM3("f1/rtc", 36),
@@ -231,6 +250,10 @@ def _(chip: Bench) -> None:
     chip.run(1_000_000_000)
     assert not chip["RTC.CRL.RSF"]
     chip["RCC.CSR.LSION"] = 1
+    chip["RCC.BDCR.RTCEN"] = 0
+    chip.run(1_000_000_000)
+    assert not chip["RTC.CRL.RSF"]
+    chip["RCC.BDCR.RTCEN"] = 1
     chip.run(200_000)
     assert chip["RTC.CRL.RSF"]
 

@@ -221,6 +221,21 @@ def _(chip: Bench) -> None:
 
 
 @RCC.row(
+    "lse-takes-its-pins",
+    "PC14 and PC15 are GPIO's until LSEON is set, and again once it is cleared.",
+    rm("9.3.1"),
+    ours("RCC"),
+)
+def _(chip: Bench) -> None:
+    open_backup(chip)
+    for level in (0, 1, 0):
+        chip["RCC.BDCR.LSEON"] = level
+        for mco in (4, 0):
+            chip["RCC.CFGR.MCO"] = mco
+            assert {chip.pins[pin].holder is not None for pin in ("PC14", "PC15")} == {bool(level)}
+
+
+@RCC.row(
     "lsi-ready-later",
     "LSIRDY follows LSION after a start-up time, and is 0 at once when LSION goes.",
     CHIBIOS("STM32F1xx/hal_lld", 201),
