@@ -39,8 +39,8 @@ WAY_M, HEADING_RAD = 0.005, math.radians(1.5)
 #: So far it has to come, and to turn, until a pose is judged for the last time, m and rad: on a curve of 50° a metre a
 #: distance that is 2.5 % off is 1.5° off its place, wherever on the way it is taken to be.
 LEAST_WAY_M, LEAST_TURN_RAD = 1.2, math.radians(45)
-#: chosen: so many faults are told, the first ones; what is the matter with one model is so with each family.
-MOST_TOLD = 9
+#: chosen: so many faults are named, the first ones; what is the matter with one model is so with each family.
+MOST_NAMED = 9
 #: chosen: so many cells at a time.
 TOGETHER = 4
 _LOOK_S = 0.02
@@ -94,8 +94,8 @@ class Poses:
         with ThreadPoolExecutor(TOGETHER) as pool:
             results = list(pool.map(lambda cell: self._cell(*cell, place), cells))
         if failed := [result for result in results if result.fault]:
-            told = "; ".join(f"{one.model} {one.family.value}: {one.fault}" for one in failed[:MOST_TOLD])
-            raise RowError(f"{len(failed)} of {len(cells)} failed: {told}")
+            named = "; ".join(f"{one.model} {one.family.value}: {one.fault}" for one in failed[:MOST_NAMED])
+            raise RowError(f"{len(failed)} of {len(cells)} failed: {named}")
         worst_mm = 1000 * max(result.off_m for result in results)
         worst_deg = math.degrees(max(result.off_rad for result in results))
         counted = f", {sum(result.sonar for result in results)} sonar counted" if self.sonar else ""

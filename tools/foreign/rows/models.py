@@ -39,11 +39,11 @@ assert c.playerc_position2d_subscribe(base, 1) == 0
 sonar = c.playerc_sonar_create(client, 0)
 assert c.playerc_sonar_subscribe(sonar, 1) == 0
 c.playerc_position2d_enable(base, 1)
-told = 0
+printed = 0
 while True:
     c.playerc_client_read(client)
-    if time.monotonic() > told + 0.2:
-        told = time.monotonic()
+    if time.monotonic() > printed + 0.2:
+        printed = time.monotonic()
         c.playerc_position2d_set_cmd_vel(base, *map(c_double, (0.2, 0.0, 0.2)), 1)
         print("pose %.4f %.4f %.5f" % tuple(base.contents.at), flush=True)
         print("sonar" + " 1" * sonar.contents.ranges, flush=True)
