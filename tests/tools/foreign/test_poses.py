@@ -11,7 +11,7 @@ import pytest
 
 from p2os.robots.parameters import known_robots
 from tests.tools.forked_python import forked_python
-from tools.foreign.judges.poses import LEAST_TURN_RAD, LEAST_WAY_M, OLDEST_S, Poses, Way
+from tools.foreign.judges.poses import LEAST_TURN_RAD, LEAST_WAY_M, OLDEST_S, CountedWay, Poses
 from tools.foreign.row import RowError, RowPlace
 from tools.foreign.rows.models import MODELS
 
@@ -28,9 +28,9 @@ class Moved:
         """Time stands still."""
 
 
-def way(*places: tuple[float, float, float]) -> Way:
+def way(*places: tuple[float, float, float]) -> CountedWay:
     host = Moved()
-    found = Way(host)  # type: ignore[arg-type]  # a stand-in
+    found = CountedWay(host)  # type: ignore[arg-type]  # a stand-in
     for x, y, heading in places:
         host.pioneer.state = SimpleNamespace(x_mm=1000 * x, y_mm=1000 * y, heading_rad=heading)
         found.go_on(0.0)
@@ -52,7 +52,7 @@ def test_what_was_long_ago_is_no_place_any_more(monkeypatch: pytest.MonkeyPatch)
     now = [100.0]
     monkeypatch.setattr("tools.foreign.judges.poses.time.monotonic", lambda: now[0])
     host = Moved()
-    found = Way(host)  # type: ignore[arg-type]  # a stand-in
+    found = CountedWay(host)  # type: ignore[arg-type]  # a stand-in
     host.pioneer.state.x_mm = 1000.0
     for later, off_m in ((OLDEST_S, 0.0), (OLDEST_S + 0.001, 1.0)):
         now[0] = 100.0 + later

@@ -129,7 +129,7 @@ class Poses:
             robots=(RobotOrder(port="tcp:127.0.0.1:0", model=model, settings=settings),), world="room", body="kinematic"
         )
         (host,) = open_hosts(order, make_fleet(order), events=[None])
-        way = Way(host)
+        way = CountedWay(host)
         said: queue.SimpleQueue[str] = queue.SimpleQueue()
         processes: list[subprocess.Popen[str]] = []
         try:
@@ -145,7 +145,12 @@ class Poses:
             host.close()
 
     def _judged(
-        self, model: str, family: Profile, parameters: RobotParameters, way: "Way", said: "queue.SimpleQueue[str]"
+        self,
+        model: str,
+        family: Profile,
+        parameters: RobotParameters,
+        way: "CountedWay",
+        said: "queue.SimpleQueue[str]",
     ) -> "Cell":
         end, off_m, off_rad, sonar = time.monotonic() + LONGEST_S, 0.0, 0.0, 0
         poses = 0
@@ -203,7 +208,7 @@ class Cell:
     sonar: int = 0
 
 
-class Way:
+class CountedWay:
     """Where a robot counts that it was, lately.
 
     Args:
