@@ -20,6 +20,7 @@ from pathlib import Path
 from p2os.robots.parameters import known_robots
 from tools.foreign.cache import default_cache
 from tools.foreign.judges.drives import Drives
+from tools.foreign.judges.poses import Poses
 from tools.foreign.page import record
 from tools.foreign.report import line, table
 from tools.foreign.row import ProgramKind, Row, RowStatus, Source
@@ -91,6 +92,9 @@ def _on_robots(rows: Sequence[Row], models: Sequence[str], parser: argparse.Argu
     found = []
     for row in rows:
         judge = row.judge
+        if taken and isinstance(judge, Poses):
+            found.append(replace(row, judge=replace(judge, only=tuple(taken))))
+            continue
         if not taken or not isinstance(judge, Drives):
             found.append(row)
             continue

@@ -96,13 +96,13 @@ class Navigates:
         if journey.faults():
             raise RowError(f"{journey.text()}: {', '.join(journey.faults())}")
         near, found = self._judged(place.scratch / "map.npz")
-        told = (
+        summary = (
             f"{journey.text()}; map: {near:.1%} of the occupied cells within {NEAR_M:g} m of what stands there, "
             f"{found:.1%} of the outlines found"
         )
         if near < self.least_near or found < self.least_found:
-            raise RowError(f"{told}, less than {self.least_near:.0%} and {self.least_found:.0%}")
-        return told
+            raise RowError(f"{summary}, less than {self.least_near:.0%} and {self.least_found:.0%}")
+        return summary
 
     def _judged(self, file: Path) -> tuple[float, float]:
         if not file.is_file():

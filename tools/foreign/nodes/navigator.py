@@ -84,7 +84,7 @@ class Navigator(Node):
         if now > self._since + LONGEST_S:
             self._speeds.publish(Twist())
             self._tell("gave up")
-            self._next(now, is_told=True)
+            self._next(now, is_reported=True)
             return
         if now > self._planned_at + PLAN_S:
             self._path = self._planned(self._grid.grown(MARGIN_M), pose, goal)
@@ -96,9 +96,9 @@ class Navigator(Node):
         message.linear.x, message.angular.z = forward, turn
         self._speeds.publish(message)
 
-    def _next(self, now: float, *, is_told: bool = False) -> None:
+    def _next(self, now: float, *, is_reported: bool = False) -> None:
         """Go to the next goal, or end."""
-        if not is_told:
+        if not is_reported:
             self._tell("reached")
         self._number, self._since = self._number + 1, now
         self._rests_until, self._path, self._planned_at = 0.0, None, 0.0
