@@ -132,17 +132,23 @@ class LiveRun:
             if self.stays:
                 session.replace_main(Path(self._folder.name) / "run.jsonl")
         except BaseException:
+            self.stays = False
             session.end()
             raise
         finally:
             if not self.stays:
                 self.source.end()
+                self._folder.cleanup()
 
     def stay(self) -> None:
         """Go on to do what pages ask for, when the run is over, until an interrupt."""
-        assert self._session is not None  # noqa: S101 - `drive` has made it
-        while True:
-            self._turn(self._session)
+        assert self._session is not None  # noqa: S101 - `drive` has made both
+        assert self._folder is not None  # noqa: S101 - as above
+        try:
+            while True:
+                self._turn(self._session)
+        finally:
+            self._folder.cleanup()
 
     def _turn(self, session: RunSession) -> None:
         """Do a command, or run a slice."""
