@@ -21,13 +21,13 @@ from p2os.view.live import MOST_WAITING, StillRecording  # noqa: E402
 from p2os.view.recording import ViewRecording  # noqa: E402
 from p2os.view.run_control import RunCommand  # noqa: E402
 from p2os.view.server.serving import ViewServer, serving  # noqa: E402
+from robot_bench.cli.shown import targets  # noqa: E402
+from robot_bench.cli.shown.live_run import MOST_COMMANDS, LiveRun  # noqa: E402
+from robot_bench.cli.shown.targets import run_target, scenario_target  # noqa: E402
 from robot_bench.recording.run_record import read_run  # noqa: E402
 from robot_bench.report.run_page import run_report  # noqa: E402
 from robot_bench.run import run_scenario  # noqa: E402
 from robot_bench.scenario.loading import load_scenario  # noqa: E402
-from robot_bench.shown import targets  # noqa: E402
-from robot_bench.shown.live_run import MOST_COMMANDS, LiveRun  # noqa: E402
-from robot_bench.shown.targets import run_target, scenario_target  # noqa: E402
 from robot_bench.view.run_recording import recording_of  # noqa: E402
 from simbase.errors import MissingDependencyError  # noqa: E402
 

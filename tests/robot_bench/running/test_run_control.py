@@ -6,8 +6,8 @@ import pytest
 
 from p2os.view.run_control import RunCommand, RunState
 from robot_bench.bench import Bench
-from robot_bench.run_control.future import Future
-from robot_bench.run_control.session import RunSession
+from robot_bench.cli.debugging.future import Future
+from robot_bench.cli.debugging.session import RunSession
 from robot_bench.scenario.scenario import Scenario
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 from tests.robot_bench.firmware.hurried import hurried_scenario

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from p2os.view.live import StillRecording
 from p2os.view.targets import ViewTarget
+from robot_bench.cli.shown.live_run import LiveRun
 from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.recording.run_record import TRACE_NAME, read_run
 from robot_bench.recording.summary import outcome_of, outcome_of_all
@@ -15,7 +16,6 @@ from robot_bench.report.page_of_all import report_of_all
 from robot_bench.report.run_page import run_report, run_sections
 from robot_bench.run import run_scenario
 from robot_bench.scenario.loading import known_scenarios, load_scenario
-from robot_bench.shown.live_run import LiveRun
 
 
 def run_target(named: str) -> ViewTarget | None:

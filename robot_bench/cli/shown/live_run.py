@@ -18,11 +18,11 @@ from p2os.view.live import LiveRecording
 from p2os.view.recording import ViewRecording
 from p2os.view.run_control import RunCommand, RunState
 from robot_bench.bench import Bench, run_of
+from robot_bench.cli.debugging.future import Future
+from robot_bench.cli.debugging.session import MAIN, RunSession
 from robot_bench.events.codec import Blocks, EdgeBlock, Json, Levels, Recorded
 from robot_bench.report.run_page import lead_of
 from robot_bench.run import meta_of
-from robot_bench.run_control.future import Future
-from robot_bench.run_control.session import MAIN, RunSession
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.view.run_tracks import RunTracks
 from robot_bench.wires.edges import Edges
