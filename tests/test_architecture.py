@@ -126,7 +126,7 @@ LAYERS = {
         ("running", "firmware", "origin_gate"), ("wires",), ("events",), ("direct",), ("recording",),
         ("drives", "view"), ("scenario", "report"),
         ("adapter", "scenarios"), ("bench",), ("remote",), ("run", "project"),
-        ("networks", "experiments", "run_control"), ("campaign",), ("ros", "live", "shown"), ("cli",),
+        ("networks", "experiments"), ("campaign",), ("ros", "live"), ("cli",),
     ),
 }  # fmt: skip
 

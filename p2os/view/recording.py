@@ -38,9 +38,9 @@ class ChannelTrack:
     def __init__(self, header: ChannelHeader) -> None:
         self.header = header
         self.kind: ChannelKind = BY_NAME[header.kind]
-        self.columns = empty_columns(self.kind)
-        self.times = cast("array[int]", self.columns[0])
-        self._adders = self._made_adders()
+        #: Adds the rows when somebody is to see them; None: they are there.
+        self.later: Callable[[], None] | None = None
+        self._take(empty_columns(self.kind))
         self._widths = [header.width if column.is_wide else 1 for column in self.kind.columns]
         #: Of columns that curves are thinned by: their extremes, and their numbers without NaN.
         self._indices: dict[str, tuple[Extremes, array[float]]] = {}
@@ -48,18 +48,38 @@ class ChannelTrack:
     def __len__(self) -> int:
         return len(self.times)
 
+    @property
+    def columns(self) -> list[ColumnValues]:
+        """Its columns, as its kind has them."""
+        self._fill()
+        return self._columns
+
+    @property
+    def times(self) -> "array[int]":
+        """The times of its rows, ns."""
+        self._fill()
+        return self._times
+
+    def _fill(self) -> None:
+        """Add the rows that wait to be seen."""
+        if self.later is not None:
+            later, self.later = self.later, None
+            later()
+
+    def _take(self, columns: list[ColumnValues]) -> None:
+        self._columns, self._times = columns, cast("array[int]", columns[0])
+        #: What adds a cell to each column but the first: of the column's type, as the caller has it.
+        self._adders: list[Callable[[Any], None]] = [
+            cast("array[float]", values).extend if column.is_wide else values.append
+            for values, column in zip(columns[1:], self.kind.columns[1:], strict=True)
+        ]
+
     def append(self, t_ns: Nanos, *cells: Cell) -> None:
         """Add a row; a time that steps back is moved up."""
-        times = self.times
+        times = self._times
         times.append(times[-1] if times and times[-1] > t_ns else t_ns)
         for add, cell in zip(self._adders, cells, strict=True):
             add(cell)
-
-    def _made_adders(self) -> "list[Callable[[Any], None]]":
-        """Return what adds a cell to each column but the first: of the column's type, as the caller has it."""
-        kinds = self.kind.columns[1:]
-        return [values.extend if column.is_wide else values.append
-                for values, column in zip(self.columns[1:], kinds, strict=True)]  # fmt: skip
 
     def extend_levels(self, times: Iterable[int], levels: Iterable[int]) -> None:
         """Add rows of a wire at once, in the order of time."""
@@ -71,8 +91,7 @@ class ChannelTrack:
 
     def take_rows(self, other: "ChannelTrack", count: int) -> None:
         """Take the first rows of a channel of the same kind, before any of its own."""
-        self.columns = list(other.rows(0, count))
-        self.times, self._adders = cast("array[int]", self.columns[0]), self._made_adders()
+        self._take(list(other.rows(0, count)))
 
     def column(self, name: str) -> ColumnValues:
         """Return a column by its name."""

@@ -20,6 +20,7 @@ from p2os.toml_schema import within
 from p2os.transport import open_url
 from robot_bench.cli.names import scenario_names, setting_keys
 from robot_bench.cli.progress import RunDisplay
+from robot_bench.cli.shown.live_run import LiveRun
 from robot_bench.cli.sweep import (
     KEPT,
     SweepRow,
@@ -42,7 +43,6 @@ from robot_bench.scenario.loading import load_scenario
 from robot_bench.scenario.options import ScenarioOptions
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.scenario.sweep import MOST_RUNS, read_seeds
-from robot_bench.shown.live_run import LiveRun
 from simbase.command_line.help_pages import VerbPage
 from simbase.command_line.program import EXIT_INTERRUPTED
 from simbase.errors import UsageError

@@ -34,7 +34,8 @@ def recording_of_all(records: Mapping[str, RunRecord], header: PageHeader) -> Vi
     """
     found = ViewRecording(replace(header, end_ns=max(1, *(record.last_ns for record in records.values()))))
     robots = {
-        name: RunTracks(found, record.meta, name, others=records.keys() - {name}) for name, record in records.items()
+        name: RunTracks(found, record.meta, name, others=records.keys() - {name}, is_whole=True)
+        for name, record in records.items()
     }
     for name, record in records.items():
         robots[name].edges(record.pins)

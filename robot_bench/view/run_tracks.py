@@ -81,10 +81,12 @@ class RunTracks:
         meta: The first entry of the robot's trace.
         source: The robot's name among several; empty: the only one.
         others: Names of the other robots, which its world has as things that move.
+        is_whole: Whether all of a run is taken before anybody looks: packets are read when somebody does.
     """
 
     def __init__(
-        self, recording: ViewRecording, meta: Json, source: str = "", others: Collection[str] = ()
+        self, recording: ViewRecording, meta: Json, source: str = "", others: Collection[str] = (), *,
+        is_whole: bool = False,
     ) -> None:  # fmt: skip
         self.recording, self._source, self._others = recording, source, frozenset(others)
         #: What a line of the events begins with, of robots that share them.
@@ -98,6 +100,7 @@ class RunTracks:
         self._groups = {net: title for title, nets in grouped(list(pins)) for net in nets}
         self._levels: dict[str, int] = {}
         self._packets = _packets_of(str(self._robot.get("name", "")))
+        self._is_whole, self._unread = is_whole, list[Packet]()
         header = recording.header
         world = cast("Mapping[str, Any]", meta.get("world") or {})
         if header.world is None and world:
@@ -161,8 +164,10 @@ class RunTracks:
     def finish(self, end: Json) -> None:
         """Add the rest of what was sent, and how the goals stand that no event has decided."""
         at = self.recording.header.end_ns
-        for row, _ in self._packets.finish(at):
-            self._row(row)
+        if self._unread:
+            self._track("P2OS", "packets", group="packets").later = self._read
+        else:
+            self._end_packets()
         for key, standing in (("goals_met", MET), ("goals_not_judged", NOT_JUDGED)):
             for goal in cast("list[str]", end.get(key) or []):
                 if (track := self._goal(goal)).column("standing")[-1] == OPEN:
@@ -235,8 +240,23 @@ class RunTracks:
 
     def packet(self, packet: Packet) -> None:
         """Add the packets that these bytes complete."""
+        if self._is_whole:
+            self._unread.append(packet)
+            return
         chunk = Chunk(at_ns=packet.t, direction=Direction(packet.direction), data=packet.data)
         for row, _ in self._packets.take(chunk):
+            self._row(row)
+
+    def _read(self) -> None:
+        """Add all packets, of a run that is whole."""
+        self._is_whole, unread, self._unread = False, self._unread, []
+        for packet in unread:
+            self.packet(packet)
+        self._end_packets()
+
+    def _end_packets(self) -> None:
+        """Add what was left when the run ended."""
+        for row, _ in self._packets.finish(self.recording.header.end_ns):
             self._row(row)
 
     def _row(self, row: PacketRow) -> None:

@@ -1,1 +1,1 @@
-"""A bench under GDB: the machine that a debugger sees, and the server that waits for one."""
+"""A bench that is halted, stepped, set back and forked, by GDB or from its page: its machine, and who runs it."""

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from bluepill_sim.cli.gdb_server import GdbServer
 from p2os.errors import RunFailedError
 from robot_bench.bench import Bench
+from robot_bench.cli.debugging.machine import BenchMachine, RemoteMachine
 from robot_bench.remote import RemoteBench
 from robot_bench.run import RunBench, RunRemoteBench
-from robot_bench.run_control.machine import BenchMachine, RemoteMachine
 
 
 def debug_bench(port: int, *, is_paced: bool, on_wait: Callable[[], None]) -> RunBench:

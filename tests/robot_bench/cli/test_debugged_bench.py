@@ -16,8 +16,8 @@ from p2os.cli.main import run
 from p2os.errors import RunFailedError
 from robot_bench.bench import Bench
 from robot_bench.cli.debugging.gdb import debug_bench, debug_port
+from robot_bench.cli.debugging.machine import BenchMachine, RemoteMachine, board_of
 from robot_bench.run import run_at_port
-from robot_bench.run_control.machine import BenchMachine, RemoteMachine, board_of
 from robot_bench.scenario.scenario import Scenario
 from simbase.timing import NS_PER_S
 from tests.robot_bench.firmware.hurried import hurried_scenario

@@ -19,14 +19,15 @@ from p2os.view import targets as view_targets  # noqa: E402
 from p2os.view.header import PageHeader  # noqa: E402
 from p2os.view.live import MOST_WAITING, StillRecording  # noqa: E402
 from p2os.view.recording import ViewRecording  # noqa: E402
+from p2os.view.run_control import RunCommand  # noqa: E402
 from p2os.view.server.serving import ViewServer, serving  # noqa: E402
+from robot_bench.cli.shown import targets  # noqa: E402
+from robot_bench.cli.shown.live_run import MOST_COMMANDS, LiveRun  # noqa: E402
+from robot_bench.cli.shown.targets import run_target, scenario_target  # noqa: E402
 from robot_bench.recording.run_record import read_run  # noqa: E402
 from robot_bench.report.run_page import run_report  # noqa: E402
 from robot_bench.run import run_scenario  # noqa: E402
 from robot_bench.scenario.loading import load_scenario  # noqa: E402
-from robot_bench.shown import targets  # noqa: E402
-from robot_bench.shown.live_run import LiveRun  # noqa: E402
-from robot_bench.shown.targets import run_target, scenario_target  # noqa: E402
 from robot_bench.view.run_recording import recording_of  # noqa: E402
 from simbase.errors import MissingDependencyError  # noqa: E402
 
@@ -102,6 +103,35 @@ def test_a_viewer_that_takes_nothing_costs_a_bounded_memory_and_no_event_of_the_
     assert "the program was faster than this page" in live.source.recording.header.left_out[0]
 
 
+def test_what_a_page_asks_for_is_done_while_it_runs_and_a_fork_has_rows_of_its_own(alone: Path, tmp_path: Path) -> None:
+    live = LiveRun(SCENARIO, speed=0.0)
+    asked = [
+        RunCommand(do="go", at_ns=1_020_000_000), RunCommand(do="fork", words="fault link-down"),
+        RunCommand(do="go", at_ns=1_400_000_000), RunCommand(do="choose", future="run"), RunCommand(do="run"),
+    ]  # fmt: skip
+    assert all(live.offer(one) for one in asked)
+    folder = run_scenario(SCENARIO, tmp_path / "run", drive=live.drive).folder
+    assert hash_of(folder) == hash_of(alone)
+    assert (live.state.done, live.state.trouble, live.state.why) == (len(asked), "", "the end of the run")
+    live.source.update()
+    shown = live.source.recording
+    rows = {source: {f"{one.kind.name} {one.header.name}": one for one in shown.tracks if one.header.source == source}
+            for source in ("", "fork 1")}  # fmt: skip
+    own = rows["fork 1"]["pose pose"]
+    assert own.times[-1] >= 1_400_000_000
+    assert own.times == rows[""]["pose pose"].times[: len(own)]
+    for name in ("events events", "packets P2OS"):
+        times = rows["fork 1"][name].times
+        until = [t for t in times if t < 1_000_000_000]
+        assert until == [t for t in rows[""][name].times if t < 1_000_000_000]
+        assert not any(rows["fork 1"]["packets P2OS"].column("is_bad")), "a fork begins between two packets"
+    assert "link-down" in rows["fork 1"]["events events"].column("detail")
+    assert "link-down" not in rows[""]["events events"].column("detail")
+    assert [robot.name for robot in shown.header.robots] == ["", "fork 1"]
+    live.offer(RunCommand(do="pause"))
+    assert not all(live.offer(RunCommand(do="pause")) for _ in range(MOST_COMMANDS))
+
+
 def test_run_folders_and_scenarios_are_targets_by_what_they_are(alone: Path, tmp_path: Path) -> None:
     found = run_target(str(alone))
     assert found is not None
@@ -160,7 +190,11 @@ def test_a_scenario_that_is_shown_ends_with_its_report_and_ctrl_c_ends_it(
     done = SimpleNamespace(folder=alone, was_interrupted=False)
     monkeypatch.setattr(targets, "run_scenario", lambda *_args, **_more: done)
     stayed: list[LiveRun] = []
-    monkeypatch.setattr(LiveRun, "stay", stayed.append)
+
+    def stay(live: LiveRun) -> None:
+        stayed.append(live)
+
+    monkeypatch.setattr(LiveRun, "stay", stay)
     target.run()
     target.source.update()
     assert len(stayed) == 1

@@ -11,12 +11,12 @@ import pytest
 from p2os.cli.main import run as p2os
 from p2os.errors import ScenarioError
 from robot_bench import Bench, Scenario
+from robot_bench.cli.shown.targets import run_target
 from robot_bench.events.kinds import Pose, Ranges, Text, WorldChange
 from robot_bench.recording.run_record import read_events
 from robot_bench.recording.together import named_events, robots_in
 from robot_bench.report import make
 from robot_bench.scenario.loading import read_scenario
-from robot_bench.shown.targets import run_target
 from simbase.errors import UsageError
 from tests.p2os.view.pages import ReadPage
 from tests.robot_bench.firmware import thumb

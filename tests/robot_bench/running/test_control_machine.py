@@ -4,6 +4,7 @@ import shutil
 from pathlib import Path
 from tempfile import mkdtemp
 
+import pytest
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
@@ -150,6 +151,7 @@ class ControlMachine(RuleBasedStateMachine):
         assert all(0 <= one.head_ns <= one.end_ns for one in state.futures)
 
 
+@pytest.mark.slow
 def test_a_run_stays_what_it_is_whatever_is_asked() -> None:
     bench = Bench(scenario(DURATION_S))
     bench.run_until(bench.end)

@@ -6,8 +6,8 @@ import pytest
 
 from p2os.view.run_control import RunCommand, RunState
 from robot_bench.bench import Bench
-from robot_bench.run_control.future import Future
-from robot_bench.run_control.session import RunSession
+from robot_bench.cli.debugging.future import Future
+from robot_bench.cli.debugging.session import RunSession
 from robot_bench.scenario.scenario import Scenario
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 from tests.robot_bench.firmware.hurried import hurried_scenario
@@ -99,6 +99,7 @@ def test_a_run_that_is_only_let_go_is_the_run_alone(run: Controlled, alone: str)
     assert hash_at_end(run) == alone
 
 
+@pytest.mark.slow
 def test_steps_by_every_unit_and_back_change_nothing(run: Controlled, alone: str) -> None:
     at(run, 1.0)
     for unit in ("instruction", "line", "edge", "packet", "event", "millisecond"):

@@ -70,6 +70,20 @@ describe("the clock", () => {
     expect(time.now.value).toBe(2000);
   });
 
+  it("goes with where a run stands that was set back, and not after who looks goes elsewhere", () => {
+    const time = clock(3000);
+    time.head.value = 1200;
+    time.goWithRun();
+    expect([time.now.value, time.atEnd.value]).toEqual([1200, true]);
+    time.head.value = 1500;
+    time.setRun(0, 3000);
+    expect(time.now.value).toBe(1500);
+    time.seek(100);
+    time.head.value = 1700;
+    time.setRun(0, 3000);
+    expect([time.now.value, time.atEnd.value]).toEqual([100, false]);
+  });
+
   it("shows all of a run that grows while all is looked at", () => {
     const time = clock();
     time.setRun(0, 2000);

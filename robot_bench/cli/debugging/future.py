@@ -18,12 +18,12 @@ from bluepill_sim.debug.machine import HaltReason, StopKind
 from bluepill_sim.program.line_table import read_lines
 from robot_bench.bench import Bench, run_of
 from robot_bench.bench.waiting import TraceMark, events_since, mark_of
+from robot_bench.cli.debugging.machine import BenchMachine
+from robot_bench.cli.debugging.points import STEPS, HaltPoint, other_lines
 from robot_bench.events.kinds import Event
 from robot_bench.events.selection import Selector, Wires
 from robot_bench.events.words import what_of
 from robot_bench.recording.recorder import SAMPLE_NS
-from robot_bench.run_control.machine import BenchMachine
-from robot_bench.run_control.points import STEPS, HaltPoint, other_lines
 from simbase.timing import NS_PER_MS, Nanos
 
 #: chosen: older states; 50 MB at the most, and of an hour one each ten seconds.

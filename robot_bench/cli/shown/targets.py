@@ -1,9 +1,13 @@
 """What the bench has to show: run folders, and scenarios as they run (entry points of `p2os.view_sources`)."""
 
+import contextlib
+import gc
+from collections.abc import Iterator
 from pathlib import Path
 
 from p2os.view.live import StillRecording
 from p2os.view.targets import ViewTarget
+from robot_bench.cli.shown.live_run import LiveRun
 from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.recording.run_record import TRACE_NAME, read_run
 from robot_bench.recording.summary import outcome_of, outcome_of_all
@@ -12,7 +16,6 @@ from robot_bench.report.page_of_all import report_of_all
 from robot_bench.report.run_page import run_report, run_sections
 from robot_bench.run import run_scenario
 from robot_bench.scenario.loading import known_scenarios, load_scenario
-from robot_bench.shown.live_run import LiveRun
 
 
 def run_target(named: str) -> ViewTarget | None:
@@ -23,14 +26,27 @@ def run_target(named: str) -> ViewTarget | None:
     """
     folder = Path(named)
     if (folder / TRACE_NAME).is_file():
-        record = read_run(folder)
-        source = StillRecording(run_report(record, is_measured=False))
+        with _without_collecting():
+            record = read_run(folder)
+            source = StillRecording(run_report(record, is_measured=False))
         return ViewTarget(source=source, run=lambda: source.show(run_sections(record)))
     if names := robots_in(folder):
         records = {name: read_run(folder / name) for name in names}
         outcome = outcome_of_all(scenario_of(folder), {name: outcome_of(one) for name, one in records.items()})
         return ViewTarget(source=StillRecording(report_of_all(outcome, records)))
     return None
+
+
+@contextlib.contextmanager
+def _without_collecting() -> Iterator[None]:
+    """Search for no garbage in a block that makes a million objects and drops none."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
 
 
 def scenario_target(named: str) -> ViewTarget | None:

@@ -21,11 +21,11 @@ from p2os.view.run_control import (
     RunState,
 )
 from robot_bench.bench import Bench
+from robot_bench.cli.debugging.changes import change
+from robot_bench.cli.debugging.future import SLICE_NS, Future, Halted
+from robot_bench.cli.debugging.points import HaltPoint, point_of
 from robot_bench.events.words import distinguishing_words, what_of
 from robot_bench.recording.divergence import Difference, differences
-from robot_bench.run_control.changes import change
-from robot_bench.run_control.future import SLICE_NS, Future, Halted
-from robot_bench.run_control.points import HaltPoint, point_of
 from simbase.errors import P2osError, UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 

@@ -18,11 +18,11 @@ from p2os.view.live import LiveRecording
 from p2os.view.recording import ViewRecording
 from p2os.view.run_control import RunCommand, RunState
 from robot_bench.bench import Bench, run_of
+from robot_bench.cli.debugging.future import Future
+from robot_bench.cli.debugging.session import MAIN, RunSession
 from robot_bench.events.codec import Blocks, EdgeBlock, Json, Levels, Recorded
 from robot_bench.report.run_page import lead_of
 from robot_bench.run import meta_of
-from robot_bench.run_control.future import Future
-from robot_bench.run_control.session import MAIN, RunSession
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.view.run_tracks import RunTracks
 from robot_bench.wires.edges import Edges
@@ -132,17 +132,23 @@ class LiveRun:
             if self.stays:
                 session.replace_main(Path(self._folder.name) / "run.jsonl")
         except BaseException:
+            self.stays = False
             session.end()
             raise
         finally:
             if not self.stays:
                 self.source.end()
+                self._folder.cleanup()
 
     def stay(self) -> None:
         """Go on to do what pages ask for, when the run is over, until an interrupt."""
-        assert self._session is not None  # noqa: S101 - `drive` has made it
-        while True:
-            self._turn(self._session)
+        assert self._session is not None  # noqa: S101 - `drive` has made both
+        assert self._folder is not None  # noqa: S101 - as above
+        try:
+            while True:
+                self._turn(self._session)
+        finally:
+            self._folder.cleanup()
 
     def _turn(self, session: RunSession) -> None:
         """Do a command, or run a slice."""
