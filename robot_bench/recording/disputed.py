@@ -12,13 +12,12 @@ from dataclasses import dataclass
 from typing import cast
 
 from p2os.pioneer.body.contacts import DISPUTED_BESIDE_M, DISPUTED_DEG
+from p2os.pioneer.body.factory import engines
 from robot_bench.events.codec import Json
 from robot_bench.events.kinds import Contact, Pose, Verdict
 from robot_bench.recording.run_record import RunRecord
 from simbase.timing import NS_PER_S
 
-#: The bodies of this project, which were compared.
-BODIES = ("bullet", "mujoco", "kinematic")
 #: chosen: nearer to the corner of a box the hull meets its edge, and no face, m.
 EDGE_M = 0.02
 #: chosen: below it the robot stands, and whatever touches it has come to it, m/s.
@@ -60,11 +59,12 @@ def body_note(record: RunRecord) -> str:
     decided = [] if found is None else decided_after(record, found.contact)
     if not decided:
         return ""
-    other = next(name for name in BODIES if name != body)
+    ranked = sorted(engines().values(), key=lambda engine: -engine.rank)
+    other = next((f"run it with --body {engine.name}, too " for engine in ranked if engine.name != body), "")
     goals = ", ".join(f"{verdict.goal} ({'met' if verdict.met else 'missed'})" for verdict in decided)
     return (
         f"hangs on the body {body}: after the contact with {found} the bodies differ, and so may {goals}; "
-        f"run it with --body {other}, too (docs/pioneer.md, oblique hits)"
+        f"{other}(docs/pioneer.md, oblique hits)"
     )
 
 

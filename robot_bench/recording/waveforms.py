@@ -34,7 +34,7 @@ def write_vcd(record: RunRecord, path: Path) -> None:
     waving = [name for name in names if name in record.waves]
     codes = [identifier(index) for index in range(len(names) + 2 * len(waving))]
     tracks = [record.pins[name] for name in names]
-    with path.open("w", encoding="ascii", newline="\n") as file:
+    with path.open("w", encoding="ascii", errors="backslashreplace", newline="\n") as file:
         file.writelines(f"{line}\n" for line in _head(names, waving, codes))
         if waving:
             file.writelines(_with_waves(record, names, waving, codes))

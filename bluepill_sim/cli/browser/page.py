@@ -24,7 +24,9 @@ _KIB = 1024
 
 
 def page(
-    firmware: Annotated[Path | None, typer.Argument(help="An ELF file.", show_default=False)] = None,
+    firmware: Annotated[
+        Path | None, typer.Argument(help="An ELF file.", metavar="FIRMWARE", show_default=False)
+    ] = None,
     out: Annotated[Path, typer.Option("--out", help="The file that is written.", metavar="FILE")] = Path("page.html"),
 ) -> None:
     """Write the page."""

@@ -20,7 +20,7 @@ from bluepill_sim.program.image import Image
 from bluepill_sim.program.line_table import read_lines
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
-HELP = """Run a firmware on two cores side by side, and name the first instruction that differs.
+HELP = """Run a firmware on two cores, and name the first difference.
 
 own, python: beside the default core (Unicorn, native), from block boundary to block boundary: registers, memories,
 peripherals, cycles. exact: each instruction judged by Unicorn, which gets each exception where this core took it, and

@@ -16,7 +16,7 @@ from bluepill_sim.native.interrupt_latency import MOST_CYCLES
 from bluepill_sim.program.image import load_image
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
-HELP = """Say whether what a firmware puts out hangs on a few cycles of its interrupts' latency.
+HELP = """Say whether a firmware's output hangs on its interrupts' latency.
 
 Runs it as it is, and again with each interrupt a drawn number of cycles late, 0 to 12. Where pins or characters then
 come in other numbers, values or another order, it *depends*: both orders of the interrupt and an instruction are shown,
@@ -40,11 +40,15 @@ _FIRST_RETURN = 0xFFFF_FFE0
 def races(
     firmware: Firmware,
     span_ns: Span = NS_PER_S,
-    runs: Annotated[int, typer.Option("--runs", min=1, max=100_000, help="How many latencies are drawn.")] = _RUNS,
+    runs: Annotated[
+        int, typer.Option("--runs", min=1, max=100_000, metavar="N", help="How many latencies are drawn.")
+    ] = _RUNS,
     most: Annotated[
-        int, typer.Option("--cycles", min=1, max=1000, help="By how many cycles an interrupt may be late.")
+        int, typer.Option("--cycles", min=1, max=1000, metavar="N", help="By how many cycles an interrupt may be late.")
     ] = MOST_CYCLES,
-    seed: Annotated[int, typer.Option("--seed", min=0, max=2**32, help="Of the first run; the others count on.")] = 0,
+    seed: Annotated[
+        int, typer.Option("--seed", min=0, max=2**32, metavar="SEED", help="Of the first run; the others count on.")
+    ] = 0,
     drive: Drive = None,
     send: Annotated[
         list[str] | None,

@@ -22,7 +22,7 @@ needs_compiler = pytest.mark.skipif(shutil.which(COMPILER) is None, reason="need
 #: Kind → a piece of the line that the interrupt has to fall into, for how long that is looked for, and by which seed.
 RACES = {
     "PORT": ("GPIOB_ODR ^= MAIN;", 6 * NS_PER_MS, 0),
-    "TICK": ("first = high, second = low", 3 * NS_PER_MS, 0),
+    "TICK": ("first = high, second = low", 3 * NS_PER_MS, 3),
     "FLAG": ("if (found) {", 2 * NS_PER_MS, 2),
 }
 LINES = (HERE / "races.c").read_text(encoding="utf-8").splitlines()
