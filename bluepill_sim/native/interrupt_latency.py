@@ -32,7 +32,7 @@ class InterruptLatency(Stateful):
     """
 
     STATE = ("packed",)
-    DERIVED = ("_struct",)
+    DERIVED = ("_struct", "_is_varied")
 
     def __init__(self, engine: object, fabric: Fabric) -> None:
         self._engine, self._fabric = engine, fabric

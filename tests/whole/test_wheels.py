@@ -39,7 +39,14 @@ from tools.packaging.targets import TARGETS
 
 HOUSES = houses()
 #: What a build makes of the sources, and what only it reads.
-MADE, READ_BY_THE_BUILD = (".so", ".left_out"), ("bluepill_sim/extension/source/", "robot_bench/wires/edges.c")
+MADE, READ_BY_THE_BUILD = (
+    (".so", ".left_out"),
+    (
+        "bluepill_sim/extension/source/",
+        "bluepill_sim/cli/browser/source/",
+        "robot_bench/wires/edges.c",
+    ),
+)
 PYTEST = ("-m", "pytest", "-q", "--import-mode=importlib", "-p", "no:cacheprovider")
 PARTS = [part["name"] for part in PROJECT["tool"]["setuptools"]["ext-modules"]]
 

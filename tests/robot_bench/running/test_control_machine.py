@@ -158,7 +158,7 @@ def test_a_run_stays_what_it_is_whatever_is_asked() -> None:
     bench.finish()
     ControlMachine.alone = bench.trace.sha256
     ControlMachine.TestCase.settings = settings(
-        max_examples=4, stateful_step_count=8, deadline=None,
+        max_examples=4, stateful_step_count=8,
         suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
     )  # fmt: skip
     ControlMachine.TestCase().runTest()

@@ -535,7 +535,8 @@ def test_one_declaration_of_a_plug_in_gives_reader_schema_page_and_completion(
     context = SimpleNamespace(params={"scenario": "mine.toml"}, args=[])
     assert [one for one, _ in setting_keys(context, "goal.1.")] == [  # type: ignore[arg-type] # all that it looks at
         *(f"goal.1.kind={name}" for name in every_kind()), "goal.1.ends_run=met", "goal.1.ends_run=missed",
-        "goal.1.ends_run=decided", "goal.1.excused_by=", "goal.1.most_deg=", "goal.1.axis=roll", "goal.1.axis=pitch",
+        "goal.1.ends_run=decided", "goal.1.excused_by=", "goal.1.excused=true", "goal.1.excused=false",
+        "goal.1.most_deg=", "goal.1.axis=roll", "goal.1.axis=pitch",
         "goal.1.samples=",
     ]  # fmt: skip
 

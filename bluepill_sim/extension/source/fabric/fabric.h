@@ -504,6 +504,9 @@ bool is_memory(const struct fabric *fabric, uint32_t address, bool is_write);
 
 #pragma GCC visibility pop
 
+/* queue.c: Python calls it too. */
+void fabric_schedule(struct fabric *fabric, uint32_t number, uint64_t ns);
+
 uint64_t fabric_next_ns(const struct fabric *fabric);
 void fabric_catch_up(struct fabric *fabric, uint32_t number, uint64_t until_ns);
 uint32_t fabric_command(struct fabric *fabric, uint32_t slot, uint32_t what, uint32_t one, uint32_t other);

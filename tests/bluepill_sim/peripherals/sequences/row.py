@@ -3,14 +3,14 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis.strategies import SearchStrategy
 
 from tests.bluepill_sim.peripherals.sequences.bench import Bench
 from tests.bluepill_sim.peripherals.sequences.sources import Source
 
 #: Values that are tried where a row speaks of a range.
-_VALUES = settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+_VALUES = settings(max_examples=12)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
