@@ -70,7 +70,7 @@ const place = line.place.split(" ")[0];
 await press(page, /^Halts/);
 await page.getByRole("combobox", { name: "A place to halt at" }).fill(`line ${place}`);
 await after(page, () => press(page, "Add"));
-await press(page, "Do not halt at pin p2dx_con high");
+await after(page, () => press(page, "Do not halt at pin p2dx_con high"));
 await page.keyboard.press("Escape");
 found.line = place;
 found.atLine = await after(page, () => press(page, "Let the run go on from here"));
