@@ -15,18 +15,28 @@ ROOT = Path(__file__).resolve().parent.parent
 EVENTS = ("SIGTERM", "SIGINT x 20", "SIGKILL", "suspend 1 s", "suspend 3 s", "line cut 3 s", "output blocked, SIGINT")
 
 
+#: A run starts an emulator for each event, 3 s of processor time: these in `make test`, all in `make soak`.
+FEW = ("SIGTERM", "suspend 1 s", "output blocked, SIGINT")
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="signals are Unix's")
-@pytest.mark.parametrize("way", ["Robot", "asyncio Robot", "drive --vel", "run --port"])
-def test_a_robot_stands_whatever_happens_to_its_driver(way: str) -> None:
+@pytest.mark.parametrize(
+    ("way", "events"),
+    [
+        ("Robot", EVENTS), ("asyncio Robot", EVENTS), ("drive --vel", EVENTS), ("run --port", FEW),
+        pytest.param("run --port", EVENTS, marks=pytest.mark.soak),
+    ],
+)  # fmt: skip
+def test_a_robot_stands_whatever_happens_to_its_driver(way: str, events: tuple[str, ...]) -> None:
     words = ["--way", way]
-    words += [word for event in EVENTS for word in ("--event", event)]
+    words += [word for event in events for word in ("--event", event)]
     done = subprocess.run(
         [sys.executable, "tools/surveys/measure_stops.py", "--json", *words],
         cwd=ROOT, capture_output=True, text=True, timeout=300, check=False,
     )  # fmt: skip
     rows = [json.loads(line) for line in done.stdout.splitlines()]
-    assert len(rows) == len(EVENTS), done.stderr
+    assert len(rows) == len(events), done.stderr
     wrong = [row for row in rows if row["problem"] or row["moves_again"]]
     assert not wrong, "\n".join(json.dumps(row) for row in wrong)
     reported = [row["stop_ms"] for row in rows if row["event"] in {"SIGTERM", "suspend 1 s", "output blocked, SIGINT"}]

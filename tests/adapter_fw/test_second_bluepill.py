@@ -73,7 +73,7 @@ def test_dodge_is_driven_among_obstacles_without_touching_one(tmp_path: Path) ->
     assert bench.parts.body.state.collisions == 0
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_motors_through_either_adapter_are_the_same_speeds_and_leave_at_9600_baud(tmp_path: Path) -> None:
     wanted = scenario("motors", 9.7)
     bench = second_bench(built("bluepill", tmp_path)[0], wanted)

@@ -258,6 +258,27 @@ def test_memory_and_io_are_told_apart_while_regions_come_and_go(bare: Interprete
     assert reads == [0x10]
 
 
+@pytest.mark.parametrize(("store", "size"), [("0860", 4), ("0880", 2), ("0870", 1)])
+@pytest.mark.parametrize("low", range(4))
+def test_a_store_to_io_has_its_width_and_an_unaligned_one_is_made_of_bytes(
+    bare: InterpreterCore, store: str, size: int, low: int
+) -> None:
+    code = ctypes.create_string_buffer(bytes.fromhex(store + "00be").ljust(0x400, b"\0"), 0x400)  # [r1] of r0; bkpt
+    bare.map_memory(FLASH, code, "rx")
+    seen: list[tuple[int, int, int]] = []
+    bare.map_io(
+        0x4000_0000, 0x400, lambda *_: 0, lambda _uc, offset, width, value, _user: seen.append((offset, width, value))
+    )
+    bare.on_interrupt(lambda _number: bare.stop())
+    bare.registers[Reg.R0], bare.registers[Reg.R1] = 0xF4E3_D2C1, 0x4000_0020 + low
+    bare.start(FLASH | 1)
+    value = 0xF4E3_D2C1 & (1 << 8 * size) - 1
+    if low % size == 0:
+        assert seen == [(0x20 + low, size, value)]
+    else:
+        assert seen == [(0x20 + low + n, 1, value >> 8 * n & 0xFF) for n in range(size)]
+
+
 #: FLASH_ACR: wait states; a loop whose first block ends in an ISB, its second at the end of a kilobyte of flash.
 LOOP = """
 mov32 r6, #0x40022000
