@@ -1,7 +1,7 @@
 """The platforms that wheels are built for, all by one compiler: zig's, which has every one's C library with it.
 
-A wheel calls nothing of Python's own, so it is for every Python 3 of its platform. `is_tried` says whether programs
-ran there, or under emulation of it; what is not tried is marked so wherever it is offered.
+A wheel calls nothing of Python's own, so it is for every Python 3 of its platform. Where programs were run is said by
+docs/houses.md.
 """
 
 import importlib.util
@@ -18,7 +18,6 @@ class WheelTarget:
 
     tag: str  # of the wheel
     triple: str  # as zig names it, with the oldest C library
-    is_tried: bool = False
     is_unix: bool = True
 
 
@@ -26,8 +25,8 @@ class WheelTarget:
 TARGETS: Mapping[str, WheelTarget] = {
     target.tag: target
     for target in (
-        WheelTarget("manylinux_2_17_x86_64", "x86_64-linux-gnu.2.17", is_tried=True),
-        WheelTarget("manylinux_2_17_aarch64", "aarch64-linux-gnu.2.17", is_tried=True),
+        WheelTarget("manylinux_2_17_x86_64", "x86_64-linux-gnu.2.17"),
+        WheelTarget("manylinux_2_17_aarch64", "aarch64-linux-gnu.2.17"),
         WheelTarget("musllinux_1_2_x86_64", "x86_64-linux-musl"),
         WheelTarget("musllinux_1_2_aarch64", "aarch64-linux-musl"),
         WheelTarget("macosx_11_0_x86_64", "x86_64-macos.11.0"),
