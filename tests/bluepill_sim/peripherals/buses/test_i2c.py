@@ -642,6 +642,26 @@ def test_other_addresses_are_not(fake_chip: Any, address: int, dual: int) -> Non
     assert part.answered[1].acknowledged == 0, "ACK is 0"
 
 
+#: OAR1, OAR2 and an address that is one of these.
+_OWN = [(0x30 << 1, 0, 0x30), (0x55 << 1, 0, 0x55), (0x30 << 1, 0x2A << 1 | 1, 0x2A), (1 << 15 | 0x2A5, 0, 0x2A5),
+        (1 << 15 | 0x1DA, 0, 0x1DA)]  # fmt: skip
+
+
+@pytest.mark.parametrize(("own", "dual", "address"), _OWN)
+def test_each_bit_of_an_own_address_is_compared(make_fake_chip: Chips, own: int, dual: int, address: int) -> None:
+    """RM0008 26.6.3 and 26.6.4; a 10-bit one answers its header too, which is two of the bits."""
+    width = 10 if own >> 15 else 7
+    for bit in (None, *range(width)):
+        chip = make_fake_chip()
+        part = slave(chip, 0, own, dual)
+        called = address if bit is None else address ^ 1 << bit
+        part.call(called, b"\x01")
+        wait(chip, 3 * BYTE_NS)
+        assert bool(sr1(chip) & ADDR) is (bit is None), bit
+        if bit is not None:
+            assert part.answered[0].acknowledged == (1 if width == 10 and bit < 8 else 0), bit
+
+
 def test_without_stretching_a_late_slave_overruns(fake_chip: Any) -> None:
     part = slave(fake_chip, NOSTRETCH)
     part.call(0x30, b"\x01\x02\x03")
