@@ -472,6 +472,30 @@ def test_busy_sticks_after_a_disturbance_without_a_stop_until_swrst(fake_chip: A
     assert sr1(fake_chip) & SB
 
 
+@pytest.mark.parametrize("pin", ["PB6", "PB7"])
+def test_a_line_that_is_low_as_pe_is_set_makes_the_bus_busy_and_pe_alone_does_not_free_it(
+    fake_chip: Any, pin: str
+) -> None:
+    set_up(fake_chip)
+    control(fake_chip, off=PE)
+    fake_chip.pins[pin].drive(0)
+    assert sr2(fake_chip) == 0, "nobody listens"
+    control(fake_chip, on=PE)
+    assert sr2(fake_chip) == BUSY
+    control(fake_chip, off=PE)
+    assert sr2(fake_chip) == BUSY
+    fake_chip.write("I2C1.CR1", SWRST)
+    assert sr2(fake_chip) == 0
+
+
+@pytest.mark.parametrize("read_bytes", [0, 1])
+def test_txe_comes_with_addr_to_a_slave_that_is_read_and_to_no_other(fake_chip: Any, read_bytes: int) -> None:
+    part = slave(fake_chip)
+    part.call(0x30, b"" if read_bytes else b"\x01", read_bytes)
+    wait(fake_chip, 2 * BYTE_NS)
+    assert (sr1(fake_chip), sr2(fake_chip)) == ((ADDR | TXE, BUSY | TRA) if read_bytes else (ADDR, BUSY))
+
+
 def test_a_transfer_that_is_cut_off_ends_for_the_part_and_silence_is_none(fake_chip: Any) -> None:
     part = set_up(fake_chip)
     control(fake_chip, off=PE)

@@ -329,3 +329,136 @@ def test_the_edges_of_a_wave_that_is_changed_are_those_of_its_new_compare_value(
         *((4, LOW), (11, HIGH), (14, LOW), (21, HIGH), (28, LOW), (31, HIGH), (38, LOW), (41, HIGH), (45, LOW)),
         *((51, HIGH), (53, LOW)),
     ]
+
+
+# What is listened to, and when.
+
+_TI1, _TI2, _TI3, _TI4, _ETR, _BKIN = 1, 2, 4, 8, 1 << 7, 1 << 8
+#: Registers, and the pins from which something follows then.
+_LISTENED: list[tuple[dict[str, int], int]] = [
+    ({}, 0),
+    ({"CCMR1": 0x0101, "CCMR2": 0x0101}, 0),
+    ({"CCMR1": 0x0101, "CCER": 0x01}, _TI1),
+    ({"CCMR1": 0x0101, "CCER": 0x10}, _TI2),
+    ({"CCMR1": 0x0201, "CCER": 0x11}, _TI1),
+    ({"CCMR1": 0x0102, "CCER": 0x01}, _TI2),
+    ({"CCMR2": 0x0101, "CCER": 0x0100}, _TI3),
+    ({"CCMR2": 0x0101, "CCER": 0x1000}, _TI4),
+    ({"CCMR2": 0x0202, "CCER": 0x0100}, _TI4),
+    ({"CCMR2": 0x0202, "CCER": 0x1000}, _TI3),
+    ({"CCMR1": 0x80}, _ETR),
+    ({"CCMR2": 0x8000}, _ETR),
+    *(({"SMCR": mode}, _TI1 | _TI2) for mode in (1, 2, 3)),
+    *(({"SMCR": 0x50 | mode}, _TI1) for mode in (4, 5, 6, 7)),
+    *(({"SMCR": 0x60 | mode}, _TI2) for mode in (4, 5, 6, 7)),
+    *(({"SMCR": 0x70 | mode}, _ETR) for mode in (4, 5, 6, 7)),
+    *(({"SMCR": selection << 4}, 0) for selection in range(8)),
+    ({"SMCR": 0x44}, _TI1),
+    ({"SMCR": 0x04}, 0),
+    ({"SMCR": 0x4000}, _ETR),
+    ({"CR2": 0x80}, 0),
+    ({"CR2": 0x80, "SMCR": 0x44}, _TI1 | _TI2 | _TI3),
+    ({"CR2": 0x80, "SMCR": 0x64}, _TI2),
+    ({"BDTR": 0x1000}, _BKIN),
+    ({"BDTR": 0xE000}, 0),
+]
+
+
+@pytest.mark.parametrize(("registers", "pins"), _LISTENED)
+def test_pins_are_listened_to_where_something_follows_from_them_and_no_others(
+    tim1: Timer, registers: dict[str, int], pins: int
+) -> None:
+    tim1.chip.pins["PB12"].drive(False)
+    tim1.set(**registers)
+    assert tim1.chip.parts.by_name["TIM1"].native.listening == pins
+
+
+@pytest.mark.parametrize(("selection", "is_trigger"), [(0, True), (4, False), (5, False), (7, False)])
+def test_an_encoder_takes_an_internal_trigger_but_no_edge_of_its_inputs_as_one(
+    fake_chip: Any, selection: int, is_trigger: bool
+) -> None:
+    timer, master = Timer(fake_chip, "TIM3"), Timer(fake_chip, "TIM1")
+    _low(timer, *PINS)
+    timer.set(SMCR=selection << 4 | 3, CR1=CEN)
+    master["CR2"] = 1 << 4
+    timer.at(10).chip.pins["PA6"].drive(True)
+    master["CR1"] = CEN
+    assert (timer.flags & TIF, timer["CNT"]) == (TIF * is_trigger, 1)
+
+
+def test_an_internal_trigger_that_has_fallen_leaves_the_others_as_they_are(fake_chip: Any) -> None:
+    timer, masters = Timer(fake_chip, "TIM3"), [Timer(fake_chip, name) for name in ("TIM1", "TIM2", "TIM4")]
+    for selection, master in zip((0, 1, 3), masters, strict=True):
+        timer["SMCR"] = selection << 4 | GATED
+        master["CR2"] = 1 << 4
+        master["CR1"] = CEN
+        master["CR1"] = 0
+    for selection in (0, 1, 3):
+        timer.set(SMCR=selection << 4 | GATED, CNT=7, CR1=CEN)
+        timer.at(timer.chip.now_ns // TICK_NS + 20)
+        assert timer["CNT"] == 7, selection
+
+
+@pytest.mark.parametrize("channel", [0, 1, 2, 3])
+def test_each_channel_has_its_filter(tim3: Timer, channel: int) -> None:
+    """ICxF = 3: eight samples of CK_INT."""
+    _low(tim3, *PINS)
+    tim3[("CCMR1", "CCMR2")[channel // 2]] = 0x31 << 8 * (channel % 2)
+    tim3.set(CCER=1 << 4 * channel, CR1=CEN)
+    tim3.at(20).chip.pins[PINS[channel]].drive(True)
+    assert tim3.at(27).flags == 0
+    assert tim3.at(28).flags == CC1IF << channel
+
+
+# While its clock stands still.
+
+
+def test_an_edge_that_came_while_the_clock_stood_is_taken_as_it_goes_on(tim3: Timer) -> None:
+    part, pin = tim3.chip.parts.by_name["TIM3"], tim3.chip.pins["PA6"]
+    pin.drive(False)
+    tim3.set(CCMR1=1, CCER=1, CR1=CEN)
+    tim3.at(11)
+    part.clock_stopped()
+    tim3.at(20)
+    pin.drive(True)
+    assert tim3.flags == 0
+    tim3.at(31)
+    part.clock_resumed(20 * TICK_NS)
+    assert (tim3.flags, tim3["CCR1"]) == (CC1IF, 10)
+
+
+def test_an_internal_trigger_that_rose_while_the_clock_stood_is_taken_as_it_goes_on(fake_chip: Any) -> None:
+    timer, master = Timer(fake_chip, "TIM3"), Timer(fake_chip, "TIM1")
+    timer.set(SMCR=RESET, CR1=CEN)
+    master["CR2"] = 1 << 4
+    timer.at(11)
+    timer.chip.parts.by_name["TIM3"].clock_stopped()
+    timer.at(20)
+    master["CR1"] = CEN
+    assert (timer.flags & TIF, timer["CNT"]) == (0, 10)
+    timer.at(31)
+    timer.chip.parts.by_name["TIM3"].clock_resumed(20 * TICK_NS)
+    assert (timer.flags & TIF, timer["CNT"]) == (TIF, 0)
+
+
+def test_a_break_comes_even_while_the_clock_stands(tim1: Timer) -> None:
+    tim1.chip.pins["PB12"].drive(False)
+    tim1["BDTR"] = 0xB000
+    tim1.chip.parts.by_name["TIM1"].clock_stopped()
+    tim1.chip.pins["PB12"].drive(True)
+    assert (tim1.flags & BIF, tim1["BDTR"] >> 15) == (BIF, 0)
+
+
+@pytest.mark.parametrize("bke", [0, 1])
+def test_the_clock_security_system_breaks_where_breaks_are_enabled(tim1: Timer, bke: int) -> None:
+    """RM0008 14.3.12: a failure of HSE is a break source beside BKIN."""
+    chip = tim1.chip
+    chip.pins["PB12"].drive(False)
+    tim1["BDTR"] = 0xA000 | bke << 12
+    chip.write("RCC.CR", chip.read("RCC.CR") | 1 << 16)
+    chip.advance(chip.now_ns + 5_000_000)
+    chip.write("RCC.CR", chip.read("RCC.CR") | 1 << 19)
+    assert (tim1.flags & BIF, tim1["BDTR"] >> 15) == (0, 1)
+    chip.parts.rcc.fail_crystal()
+    chip.advance(chip.now_ns + 1_000_000)
+    assert (tim1.flags & BIF, tim1["BDTR"] >> 15) == (BIF * bke, 1 - bke)
