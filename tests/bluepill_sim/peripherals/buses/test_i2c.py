@@ -472,6 +472,29 @@ def test_busy_sticks_after_a_disturbance_without_a_stop_until_swrst(fake_chip: A
     assert sr1(fake_chip) & SB
 
 
+@pytest.mark.parametrize("flag", [1 << n for n in (0, 1, 2, 3, 4, 6, 7, 8, 9, 10, 11, 12, 14, 15)])
+@pytest.mark.parametrize("enabled", [0, ITERREN, ITEVTEN, ITBUFEN, ITEVTEN | ITBUFEN])
+def test_each_flag_has_its_vector_and_its_enable(fake_chip: Any, flag: int, enabled: int) -> None:
+    """RM0008 26.4, table of the interrupt requests."""
+    set_up(fake_chip)
+    fake_chip.parts.by_name["I2C1"].words[5] = flag
+    fake_chip.write("I2C1.CR2", 8 | enabled)
+    is_error, is_buffer = flag >= BERR, flag in {RXNE, TXE}
+    is_event = not is_error and enabled & ITEVTEN and (not is_buffer or enabled & ITBUFEN)
+    assert (fake_chip.irqs[31], fake_chip.irqs[32]) == (bool(is_event), bool(is_error and enabled & ITERREN))
+
+
+@pytest.mark.parametrize(("address", "flags"), [(0xA0, MSL | BUSY | TRA), (0xA1, MSL | BUSY)])
+def test_sr2_of_a_master_says_its_direction_and_nothing_else(fake_chip: Any, address: int, flags: int) -> None:
+    set_up(fake_chip, ACK)
+    start(fake_chip, address)
+    assert sr2(fake_chip) == flags
+    assert clear_addr(fake_chip) == flags
+    if flags & TRA:
+        start(fake_chip, 0xA1)
+        assert sr2(fake_chip) == MSL | BUSY, "a repeated START turns it round"
+
+
 @pytest.mark.parametrize("pin", ["PB6", "PB7"])
 def test_a_line_that_is_low_as_pe_is_set_makes_the_bus_busy_and_pe_alone_does_not_free_it(
     fake_chip: Any, pin: str
