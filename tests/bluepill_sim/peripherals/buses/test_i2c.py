@@ -800,3 +800,35 @@ def test_a_snapshot_within_a_transfer_goes_on_alike(make_fake_chip: Chips, at: i
     part.restore(saved)
     assert go_on(range(3)) == first
     assert data[-1] in first[0]
+
+
+@pytest.mark.parametrize("span_ns", [1, (1 << 31) + 5, (1 << 32) + 7, 5 << 32])
+def test_a_byte_goes_on_after_its_clock_has_stood_for_any_span(fake_chip: Any, span_ns: int) -> None:
+    set_up(fake_chip)
+    control(fake_chip, on=START)
+    wait(fake_chip, BIT_NS // 2)
+    part = fake_chip.parts.by_name["I2C1"]
+    part.clock_stopped()
+    wait(fake_chip, span_ns)
+    part.clock_resumed(span_ns)
+    wait(fake_chip, BIT_NS // 2 - 1)
+    assert sr1(fake_chip) == 0
+    wait(fake_chip, 1)
+    assert sr1(fake_chip) == SB
+
+
+def test_a_call_while_the_chip_is_master_leaves_its_transfer_alone(fake_chip: Any) -> None:
+    part = set_up(fake_chip, ACK)
+    fake_chip.write("I2C1.OAR1", 0x30 << 1)
+    start(fake_chip, 0xA0)
+    clear_addr(fake_chip)
+    fake_chip.write("I2C1.DR", 7)
+    wait(fake_chip, BIT_NS)
+    fake_chip.parts.by_name["I2C1"].call(0x30, b"\x01")
+    wait(fake_chip, BYTE_NS)
+    assert (sr1(fake_chip), sr2(fake_chip)) == (TXE | BTF, MSL | BUSY | TRA)
+    control(fake_chip, on=STOP)
+    wait(fake_chip, BIT_NS)
+    assert part.words == ["start", 7, "stop"]
+    wait(fake_chip, BIT_NS + BYTE_NS)
+    assert sr1(fake_chip) == ADDR
