@@ -462,3 +462,17 @@ def test_the_clock_security_system_breaks_where_breaks_are_enabled(tim1: Timer, 
     chip.parts.rcc.fail_crystal()
     chip.advance(chip.now_ns + 1_000_000)
     assert (tim1.flags & BIF, tim1["BDTR"] >> 15) == (BIF * bke, 1 - bke)
+
+
+@pytest.mark.parametrize("enables", [0, 1, 4, 5])
+@pytest.mark.parametrize("channel", [0, 1, 2, 3])
+def test_idle_states_are_shown_where_either_output_of_a_channel_is_on(tim1: Timer, channel: int, enables: int) -> None:
+    """RM0008 table 83, MOE = 0 and OSSI = 1; the fourth channel has one output."""
+    enables &= 5 if channel < 3 else 1
+    pins = (f"PA{8 + channel}", f"PB{13 + channel}") if channel < 3 else ("PA11",)
+    for pin in pins:
+        tim1.output(pin)
+    tim1.set(CR2=1 << 8 + 2 * channel, CCER=enables << 4 * channel, BDTR=0x400)
+    found = [tim1.chip.pins[pin] for pin in pins]
+    assert [pin.is_floating for pin in found] == [not enables] * len(pins)
+    assert found[0].level is bool(enables)
