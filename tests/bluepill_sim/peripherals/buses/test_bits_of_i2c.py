@@ -218,6 +218,38 @@ def test_a_master_outside_is_seen_on_the_lines_too(make_fake_chip: Any, call: tu
     assert any(not is_scl for _, is_scl, _ in drives.edges) is (address == 0x30)
 
 
+@pytest.mark.parametrize("own", [1 << 15 | 0x2A5, 1 << 15 | 0x1DA])
+def test_both_bytes_of_a_ten_bit_address_are_acknowledged_on_the_lines_where_they_are_its_own(
+    make_fake_chip: Any, own: int
+) -> None:
+    for flipped in (0, *(1 << n for n in range(10))):
+        chip = make_fake_chip()
+        chip.write("GPIOB.CRL", 0xDD44_4444)
+        part = chip.parts.by_name["I2C1"]
+        reported: list[I2cSymbol] = []
+        part.subscribe(reported.extend)
+        chip.write("I2C1.CR2", 8)
+        chip.write("I2C1.OAR1", own)
+        chip.write("I2C1.CR1", PE | ACK)
+        part._pull_up()  # as a bus has
+        lines = Lines(chip)
+        address = own & 0x3FF ^ flipped
+        part.call(address, b"\x81")
+        for _ in range(12):
+            wait(chip, 33_333)
+            if sr1(chip) & ADDR:
+                clear_addr(chip)
+            elif sr1(chip) & RXNE:
+                chip.read("I2C1.DR")
+        heard, is_header_own = decoded(lines.edges), flipped < 1 << 8
+        assert heard == as_reported(reported)
+        assert heard[:2] == ["S", (0xF0 | address >> 7 & 6, is_header_own)]
+        if is_header_own:
+            assert heard[2] == (address & 0xFF, flipped == 0), flipped
+        if flipped == 0:
+            assert heard[3:] == [(0x81, True), "P"]
+
+
 def test_bits_of_an_i2c_cost_nothing_while_nobody_looks_and_end_with_who_looks(fake_chip: Any) -> None:
     set_up(fake_chip)
     native = fake_chip.parts.by_name["I2C1"].native

@@ -472,6 +472,53 @@ def test_busy_sticks_after_a_disturbance_without_a_stop_until_swrst(fake_chip: A
     assert sr1(fake_chip) & SB
 
 
+@pytest.mark.parametrize("flag", [1 << n for n in (0, 1, 2, 3, 4, 6, 7, 8, 9, 10, 11, 12, 14, 15)])
+@pytest.mark.parametrize("enabled", [0, ITERREN, ITEVTEN, ITBUFEN, ITEVTEN | ITBUFEN])
+def test_each_flag_has_its_vector_and_its_enable(fake_chip: Any, flag: int, enabled: int) -> None:
+    """RM0008 26.4, table of the interrupt requests."""
+    set_up(fake_chip)
+    fake_chip.parts.by_name["I2C1"].words[5] = flag
+    fake_chip.write("I2C1.CR2", 8 | enabled)
+    is_error, is_buffer = flag >= BERR, flag in {RXNE, TXE}
+    is_event = not is_error and enabled & ITEVTEN and (not is_buffer or enabled & ITBUFEN)
+    assert (fake_chip.irqs[31], fake_chip.irqs[32]) == (bool(is_event), bool(is_error and enabled & ITERREN))
+
+
+@pytest.mark.parametrize(("address", "flags"), [(0xA0, MSL | BUSY | TRA), (0xA1, MSL | BUSY)])
+def test_sr2_of_a_master_says_its_direction_and_nothing_else(fake_chip: Any, address: int, flags: int) -> None:
+    set_up(fake_chip, ACK)
+    start(fake_chip, address)
+    assert sr2(fake_chip) == flags
+    assert clear_addr(fake_chip) == flags
+    if flags & TRA:
+        start(fake_chip, 0xA1)
+        assert sr2(fake_chip) == MSL | BUSY, "a repeated START turns it round"
+
+
+@pytest.mark.parametrize("pin", ["PB6", "PB7"])
+def test_a_line_that_is_low_as_pe_is_set_makes_the_bus_busy_and_pe_alone_does_not_free_it(
+    fake_chip: Any, pin: str
+) -> None:
+    set_up(fake_chip)
+    control(fake_chip, off=PE)
+    fake_chip.pins[pin].drive(0)
+    assert sr2(fake_chip) == 0, "nobody listens"
+    control(fake_chip, on=PE)
+    assert sr2(fake_chip) == BUSY
+    control(fake_chip, off=PE)
+    assert sr2(fake_chip) == BUSY
+    fake_chip.write("I2C1.CR1", SWRST)
+    assert sr2(fake_chip) == 0
+
+
+@pytest.mark.parametrize("read_bytes", [0, 1])
+def test_txe_comes_with_addr_to_a_slave_that_is_read_and_to_no_other(fake_chip: Any, read_bytes: int) -> None:
+    part = slave(fake_chip)
+    part.call(0x30, b"" if read_bytes else b"\x01", read_bytes)
+    wait(fake_chip, 2 * BYTE_NS)
+    assert (sr1(fake_chip), sr2(fake_chip)) == ((ADDR | TXE, BUSY | TRA) if read_bytes else (ADDR, BUSY))
+
+
 def test_a_transfer_that_is_cut_off_ends_for_the_part_and_silence_is_none(fake_chip: Any) -> None:
     part = set_up(fake_chip)
     control(fake_chip, off=PE)
@@ -642,6 +689,26 @@ def test_other_addresses_are_not(fake_chip: Any, address: int, dual: int) -> Non
     assert part.answered[1].acknowledged == 0, "ACK is 0"
 
 
+#: OAR1, OAR2 and an address that is one of these.
+_OWN = [(0x30 << 1, 0, 0x30), (0x55 << 1, 0, 0x55), (0x30 << 1, 0x2A << 1 | 1, 0x2A), (1 << 15 | 0x2A5, 0, 0x2A5),
+        (1 << 15 | 0x1DA, 0, 0x1DA)]  # fmt: skip
+
+
+@pytest.mark.parametrize(("own", "dual", "address"), _OWN)
+def test_each_bit_of_an_own_address_is_compared(make_fake_chip: Chips, own: int, dual: int, address: int) -> None:
+    """RM0008 26.6.3 and 26.6.4; a 10-bit one answers its header too, which is two of the bits."""
+    width = 10 if own >> 15 else 7
+    for bit in (None, *range(width)):
+        chip = make_fake_chip()
+        part = slave(chip, 0, own, dual)
+        called = address if bit is None else address ^ 1 << bit
+        part.call(called, b"\x01")
+        wait(chip, 3 * BYTE_NS)
+        assert bool(sr1(chip) & ADDR) is (bit is None), bit
+        if bit is not None:
+            assert part.answered[0].acknowledged == (1 if width == 10 and bit < 8 else 0), bit
+
+
 def test_without_stretching_a_late_slave_overruns(fake_chip: Any) -> None:
     part = slave(fake_chip, NOSTRETCH)
     part.call(0x30, b"\x01\x02\x03")
@@ -733,3 +800,35 @@ def test_a_snapshot_within_a_transfer_goes_on_alike(make_fake_chip: Chips, at: i
     part.restore(saved)
     assert go_on(range(3)) == first
     assert data[-1] in first[0]
+
+
+@pytest.mark.parametrize("span_ns", [1, (1 << 31) + 5, (1 << 32) + 7, 5 << 32])
+def test_a_byte_goes_on_after_its_clock_has_stood_for_any_span(fake_chip: Any, span_ns: int) -> None:
+    set_up(fake_chip)
+    control(fake_chip, on=START)
+    wait(fake_chip, BIT_NS // 2)
+    part = fake_chip.parts.by_name["I2C1"]
+    part.clock_stopped()
+    wait(fake_chip, span_ns)
+    part.clock_resumed(span_ns)
+    wait(fake_chip, BIT_NS // 2 - 1)
+    assert sr1(fake_chip) == 0
+    wait(fake_chip, 1)
+    assert sr1(fake_chip) == SB
+
+
+def test_a_call_while_the_chip_is_master_leaves_its_transfer_alone(fake_chip: Any) -> None:
+    part = set_up(fake_chip, ACK)
+    fake_chip.write("I2C1.OAR1", 0x30 << 1)
+    start(fake_chip, 0xA0)
+    clear_addr(fake_chip)
+    fake_chip.write("I2C1.DR", 7)
+    wait(fake_chip, BIT_NS)
+    fake_chip.parts.by_name["I2C1"].call(0x30, b"\x01")
+    wait(fake_chip, BYTE_NS)
+    assert (sr1(fake_chip), sr2(fake_chip)) == (TXE | BTF, MSL | BUSY | TRA)
+    control(fake_chip, on=STOP)
+    wait(fake_chip, BIT_NS)
+    assert part.words == ["start", 7, "stop"]
+    wait(fake_chip, BIT_NS + BYTE_NS)
+    assert sr1(fake_chip) == ADDR
