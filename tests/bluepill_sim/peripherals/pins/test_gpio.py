@@ -140,6 +140,18 @@ def test_a_sequence_with_an_error_does_not_lock(fake_chip: Any, writes: tuple[in
     assert not fake_chip.read("GPIOA.LCKR") & LCKK
 
 
+@pytest.mark.parametrize(("before", "pins"), [(1, 1), (2, 1), (3, 0)])
+def test_a_reset_forgets_what_was_written_of_the_sequence(fake_chip: Any, before: int, pins: int) -> None:
+    writes = [LCKK | pins, pins, LCKK | pins]
+    for word in writes[:before]:
+        fake_chip.write("GPIOA.LCKR", word)
+    fake_chip.parts.by_name["GPIOA"].reset()
+    for word in writes[before:]:
+        fake_chip.write("GPIOA.LCKR", word)
+    fake_chip.read("GPIOA.LCKR")
+    assert not fake_chip.read("GPIOA.LCKR") & LCKK
+
+
 class LockMachine(RuleBasedStateMachine):
     """LCKR against the manual's sentence: write 1, write 0, write 1, read, with the same pins."""
 
