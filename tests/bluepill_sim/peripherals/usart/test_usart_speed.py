@@ -11,7 +11,7 @@ from bluepill_sim.errors import BluePillError
 from bluepill_sim.extension.library import library_path
 from bluepill_sim.fabric.line_speed import USUAL_BAUDS, Heard, heard, is_usual
 from tests.bluepill_sim.machine import Machine
-from tests.bluepill_sim.peripherals.usart.usart_line import CHARACTER_NS, IRQ, ORE, PCE, PS, RXNE, M, set_up, status
+from tests.bluepill_sim.peripherals.usart.usart_line import CHARACTER_NS, IRQ, ORE, PCE, RXNE, set_up, status
 
 PE, FE, NE, PEIE = 1, 2, 4, 1 << 8
 EIE, DMAR = 1 << 0, 1 << 6
@@ -255,40 +255,3 @@ def test_a_speed_that_cannot_be_is_refused() -> None:
     for baud in (0, -1, 5_000_000):
         with pytest.raises(BluePillError, match="cannot be"):
             board.usart1.far_baud = baud
-
-
-@pytest.mark.parametrize(("control", "word"), [(0, 0x55), (PCE, 0x55), (PCE, 0xD5), (PCE | PS, 0xD5), (M | PCE, 0x55)])
-@pytest.mark.parametrize("is_framed", [False, True])
-@pytest.mark.parametrize("is_noisy", [False, True])
-def test_each_flag_of_a_character_has_its_own_cause(
-    fake_chip: Any, control: int, word: int, is_framed: bool, is_noisy: bool
-) -> None:
-    set_up(fake_chip, control)
-    one = Heard(word, has_framing_error=is_framed, has_noise=is_noisy)
-    flags = fake_chip.parts.usart(1)._flags(one)
-    is_odd = word.bit_count() & 1
-    is_wrong = bool(control & PCE) and bool(is_odd) is not bool(control & PS)
-    assert flags == (FE if is_framed else 0) | (NE if is_noisy else 0) | (PE if is_wrong else 0)
-
-
-def test_what_arrives_whole_raises_no_error(fake_chip: Any) -> None:
-    set_up(fake_chip, PCE)
-    usart = fake_chip.parts.usart(1)
-    usart.far_baud = 115_200
-    usart.receive(b"\x11")
-    fake_chip.advance(fake_chip.now_ns + CHARACTER_NS)
-    assert status(fake_chip) & 0x3F == RXNE
-    assert fake_chip.read("USART1.DR") == 0x11
-
-
-def test_a_character_whose_rate_is_taken_away_goes_out_as_it_is(fake_chip: Any) -> None:
-    usart = fake_chip.parts.usart(1)
-    sent = set_up(fake_chip)
-    usart.far_baud = 115_200
-    fake_chip.write("USART1.DR", 0x41)
-    fake_chip.advance(fake_chip.now_ns + CHARACTER_NS // 2)
-    fake_chip.write("USART1.BRR", 0)
-    fake_chip.advance(fake_chip.now_ns + CHARACTER_NS)
-    usart.deliver()
-    assert [word for word, _ in sent] == [0x41]
-    assert "USART1:far:0" not in fake_chip.warnings

@@ -9,7 +9,8 @@ from tests.bluepill_sim.peripherals.sequences.row import Sequences
 from tests.bluepill_sim.peripherals.sequences.sources import CHIBIOS, HAL, KLIPPER, LOCM3, RIOT, ours, rm
 
 CAN = Sequences("CAN")
-INRQ, SLEEP, TXFP, RFLM, AWUM, ABOM = 1, 2, 4, 8, 32, 64
+INRQ, SLEEP, TXFP, RFLM, NART, AWUM, ABOM = 1, 2, 4, 8, 16, 32, 64
+TXOK, TERR = 2, 8
 INAK, SLAK = 1, 2
 BIT_NS = bus.BIT_NS
 EMPTY = 0x1C00_0000
@@ -167,6 +168,26 @@ def _(chip: Bench) -> None:
     assert chip["CAN.TSR"] & 0xFFFF == 0x0303
     chip["CAN.TSR"] = 1
     assert chip["CAN.TSR"] & 0xFFFF == 0x0300
+
+
+@CAN.row(
+    "request-clears-all",
+    "A new request clears RQCP, TXOK and TERR of its mailbox, which the last one has left.",
+    rm("24.9.2"),
+    values=st.integers(0, 2),
+)
+def _(chip: Bench, mailbox: int) -> None:
+    chip.clock("CAN", "GPIOA")
+    network = bus.network(chip, CanNode())
+    bus.set_up(chip, control=NART)
+    for damaged, flag in ((1, TERR), (0, TXOK)):
+        network.damage(damaged)
+        bus.send(chip, 1, mailbox=mailbox)
+        assert chip["CAN.TSR"] & 0xFF_FFFF == 0
+        chip.run(500 * BIT_NS)
+        assert chip["CAN.TSR"] & 0xFF_FFFF == (1 | flag) << 8 * mailbox
+    bus.send(chip, 1, mailbox=mailbox)
+    assert chip["CAN.TSR"] & 0xFF_FFFF == 0
 
 
 @CAN.row(
