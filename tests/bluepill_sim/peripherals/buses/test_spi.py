@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bluepill_sim.peripherals.spi import Loopback, SpiWord
+from bluepill_sim.peripherals.spi import Loopback
 
 CPHA, CPOL, MSTR, SPE, LSBFIRST, SSI, SSM, RXONLY = (1 << n for n in (0, 1, 2, 6, 7, 8, 9, 10))
 DFF, CRCNEXT, CRCEN, BIDIOE, BIDIMODE = (1 << n for n in range(11, 16))
@@ -534,21 +534,3 @@ def test_a_snapshot_within_a_word_goes_on_alike(make_fake_chip: Chips, at: int, 
         chip.now_ns = start_ns
         part.restore(saved)
     assert ends[0] == ends[1]
-
-
-@pytest.mark.parametrize(("control", "count"), [(0, 8), (DFF, 16)])
-@pytest.mark.parametrize("rate", [0, 3])
-def test_a_word_tells_its_end_both_directions_its_width_and_its_span(
-    fake_chip: Any, control: int, count: int, rate: int
-) -> None:
-    rows: list[SpiWord] = []
-    set_up(fake_chip, MASTER | control | rate << 3, Recorder(b"\xa5\x5a"))
-    fake_chip.parts.by_name["SPI1"].subscribe(rows.extend)
-    start_ns = fake_chip.now_ns
-    fake_chip.write("SPI1.DR", 0x1234)
-    span_ns = count * (250 << rate)
-    fake_chip.advance(start_ns + span_ns)
-    fake_chip.parts.by_name["SPI1"].deliver()
-    sent, got = (0x34, 0xA5) if count == 8 else (0x1234, 0xA55A)
-    assert rows == [SpiWord(start_ns + span_ns, sent, got, count, span_ns)]
-    assert fake_chip.parts.by_name["SPI1"].bit_hz == 4_000_000 >> rate
