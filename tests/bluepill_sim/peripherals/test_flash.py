@@ -339,7 +339,7 @@ def test_each_of_optpg_optwre_and_lock_alone_keeps_the_option_bytes(
 def test_each_of_pg_and_lock_alone_keeps_the_array(unlocked: Any, array: Array, control: int, size: int) -> None:
     unlocked.write("FLASH.CR", control)
     assert unlocked.parts.flash.program(0, size, 0)
-    assert (array.data[:4], unlocked.read("FLASH.SR")) == (b"\xff" * 4, 0)
+    assert (bytes(array.data[:4]), unlocked.read("FLASH.SR")) == (b"\xff" * 4, 0)
     assert list(unlocked.warnings) == ["FLASH:write"]
 
 
