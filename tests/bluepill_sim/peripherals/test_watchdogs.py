@@ -278,3 +278,21 @@ def test_wdga_and_ewi_stay_until_a_reset_and_ewif_falls_by_0_alone(fake_chip: An
     assert fake_chip.read("WWDG.CR") == 0xFF
     fake_chip.write("WWDG.SR", 0)
     assert (fake_chip.read("WWDG.SR"), fake_chip.irqs[0]) == (0, False)
+
+
+def test_a_count_under_way_goes_on_at_the_new_prescaler(fake_chip: Any) -> None:
+    for key in (START, UNLOCK):
+        fake_chip.write("IWDG.KR", key)
+    fake_chip.advance(100 * 4 * LSI_NS)
+    fake_chip.write("IWDG.PR", 1)
+    assert fake_chip.parts.by_name["IWDG"].due_ns == fake_chip.now_ns + (0x1000 - 100) * 8 * LSI_NS
+
+
+@pytest.mark.parametrize("enable", [0, 1 << 9])
+def test_ewif_interrupts_only_with_ewi(fake_chip: Any, enable: int) -> None:
+    fake_chip.write("WWDG.CFR", enable | 0x7F)
+    fake_chip.write("WWDG.CR", 0x80 | 0x41)
+    fake_chip.advance(512_000)
+    assert (fake_chip.read("WWDG.SR"), fake_chip.irqs[0]) == (1, bool(enable))
+    fake_chip.write("WWDG.CFR", 1 << 9 | 0x7F)
+    assert fake_chip.irqs[0]
