@@ -320,3 +320,185 @@ def test_read_protection_guards_the_first_pages_and_goes_with_the_whole_flash(op
     assert chip.read("FLASH.SR") == EOP
     chip.parts.flash.reset()
     assert not chip.read("FLASH.OBR") & 2
+
+
+@pytest.mark.parametrize("control", [OPTPG, OPTWRE, OPTPG | OPTWRE | LOCK])
+@pytest.mark.parametrize("size", [2, 4])
+def test_each_of_optpg_optwre_and_lock_alone_keeps_the_option_bytes(
+    open_options: Any, array: Array, control: int, size: int
+) -> None:
+    array.options = b"\xff" * 16
+    open_options.write("FLASH.CR", control)
+    assert open_options.parts.flash.program_option(4, size, 0x1234), "what is ignored is no bus error"
+    assert (array.options, open_options.read("FLASH.SR")) == (b"\xff" * 16, 0)
+    assert list(open_options.warnings) == ["FLASH:options"]
+
+
+@pytest.mark.parametrize("control", [0, PG | LOCK])
+@pytest.mark.parametrize("size", [1, 2, 4])
+def test_each_of_pg_and_lock_alone_keeps_the_array(unlocked: Any, array: Array, control: int, size: int) -> None:
+    unlocked.write("FLASH.CR", control)
+    assert unlocked.parts.flash.program(0, size, 0)
+    assert (bytes(array.data[:4]), unlocked.read("FLASH.SR")) == (b"\xff" * 4, 0)
+    assert list(unlocked.warnings) == ["FLASH:write"]
+
+
+@pytest.mark.parametrize(
+    ("control", "options", "word", "is_busy"),
+    [
+        (PG, DELIVERED, 0xFF, False),
+        (0, DELIVERED, 0xFF, False),
+        (PG | LOCK, DELIVERED, 0xFF, False),
+        (PG | EOPIE, DELIVERED, 0xFF, False),
+        (PG, DELIVERED, 0xFE, False),
+        (PG, DELIVERED, 0xFF, True),
+        (PG, DELIVERED[:8] + b"\xfe\x01" + DELIVERED[10:], 0xFF, False),
+        (PG, b"\xff" * 16, 0xFF, False),
+    ],
+)
+def test_a_halfword_is_programmed_at_once_only_where_nothing_is_seen_of_it(
+    unlocked: Any, array: Array, control: int, options: bytes, word: int, is_busy: bool
+) -> None:
+    flash = unlocked.parts.flash
+    array.options = options
+    flash._load_options()
+    array.data[7] = word
+    if is_busy:
+        unlocked.write("FLASH.CR", PG)
+        flash.program(5000, 2, 1)
+    unlocked.write("FLASH.CR", control)
+    before = unlocked.read("FLASH.SR")
+    is_simple = (control, options, word, is_busy) == (PG, DELIVERED, 0xFF, False)
+    assert flash.program_at_once(6) is is_simple
+    assert unlocked.read("FLASH.SR") == (EOP if is_simple else before)
+
+
+def test_without_its_array_nothing_is_programmed_at_once(unlocked: Any) -> None:
+    unlocked.write("FLASH.CR", PG)
+    assert not unlocked.parts.flash.program_at_once(0)
+
+
+@pytest.mark.parametrize("enable", [0, EOPIE, ERRIE])
+@pytest.mark.parametrize("flag", [EOP, PGERR, WRPRTERR])
+def test_each_flag_interrupts_by_its_enable_until_it_is_cleared(
+    unlocked: Any, array: Array, enable: int, flag: int
+) -> None:
+    raises = enable == (EOPIE if flag == EOP else ERRIE)
+    array.options = DELIVERED[:8] + b"\xfd\x02" + DELIVERED[10:]
+    unlocked.parts.flash._load_options()
+    array.data[0] = 0 if flag == PGERR else 0xFF
+    unlocked.write("FLASH.CR", PG | enable)
+    unlocked.parts.flash.program(4096 if flag == WRPRTERR else 0, 2, 5)
+    unlocked.advance(PROGRAM_NS)
+    assert (unlocked.read("FLASH.SR"), unlocked.irqs[4]) == (flag, raises)
+    unlocked.write("FLASH.SR", (EOP | PGERR | WRPRTERR) & ~flag)
+    assert (unlocked.read("FLASH.SR"), unlocked.irqs[4]) == (flag, raises)
+    unlocked.write("FLASH.CR", PG)
+    assert not unlocked.irqs[4]
+    unlocked.write("FLASH.CR", PG | enable)
+    assert unlocked.irqs[4] is raises
+    unlocked.write("FLASH.SR", flag)
+    assert (unlocked.read("FLASH.SR"), unlocked.irqs[4]) == (0, False)
+
+
+def test_a_reset_takes_the_interrupt_the_operation_and_the_lock_back(unlocked: Any, array: Array) -> None:
+    unlocked.write("FLASH.CR", PG | EOPIE)
+    unlocked.parts.flash.program(0, 2, 5)
+    unlocked.advance(PROGRAM_NS)
+    assert unlocked.irqs[4]
+    unlocked.parts.flash.program(2, 2, 5)
+    unlocked.parts.flash.reset()
+    assert (unlocked.read("FLASH.SR"), unlocked.read("FLASH.CR"), unlocked.irqs[4]) == (0, LOCK, False)
+    unlocked.advance(3 * PROGRAM_NS)
+    assert (unlocked.read("FLASH.SR"), unlocked.irqs[4]) == (0, False)
+
+
+def test_a_reset_forgets_half_a_sequence_of_keys_and_the_address(fake_chip: Any, array: Array) -> None:
+    fake_chip.write("FLASH.KEYR", KEYS[0])
+    fake_chip.parts.flash.reset()
+    fake_chip.write("FLASH.KEYR", KEYS[1])
+    assert fake_chip.read("FLASH.CR") == LOCK
+    fake_chip.parts.flash.reset()
+    for key in KEYS:
+        fake_chip.write("FLASH.KEYR", key)
+    fake_chip.write("FLASH.OPTKEYR", KEYS[0])
+    fake_chip.write("FLASH.AR", 0x0800_0400)
+    fake_chip.parts.flash.reset()
+    for key in KEYS:
+        fake_chip.write("FLASH.KEYR", key)
+    fake_chip.write("FLASH.OPTKEYR", KEYS[1])
+    assert fake_chip.read("FLASH.CR") == 0
+    array.data[:] = bytes(array.size)
+    fake_chip.write("FLASH.CR", PER | STRT)
+    assert (fake_chip.read("FLASH.SR"), any(array.data)) == (WRPRTERR, False), "the address is 0, which is no page"
+
+
+def test_keys_of_what_is_open_are_not_looked_at(open_options: Any, array: Array) -> None:
+    open_options.write("FLASH.KEYR", 1)
+    open_options.write("FLASH.OPTKEYR", 1)
+    assert open_options.warnings == {}
+    open_options.write("FLASH.CR", LOCK)
+    open_options.write("FLASH.OPTKEYR", 1)
+    open_options.write("FLASH.CR", LOCK)
+    assert open_options.warnings == {}, "LOCK over LOCK says nothing"
+    for key in KEYS:
+        open_options.write("FLASH.KEYR", key)
+    assert not open_options.read("FLASH.CR") & LOCK
+
+
+@pytest.mark.parametrize("keys", [(KEYS[0], 1, KEYS[1]), (KEYS[1], KEYS[0], 1), (1, KEYS[1])])
+def test_option_keys_begin_anew_behind_a_wrong_one(unlocked: Any, keys: tuple[int, ...]) -> None:
+    for key in keys:
+        unlocked.write("FLASH.OPTKEYR", key)
+    assert not unlocked.read("FLASH.CR") & OPTWRE
+    unlock_options(unlocked)
+    assert unlocked.read("FLASH.CR") & OPTWRE
+
+
+@pytest.mark.parametrize(
+    ("control", "what"),
+    [
+        (0, ""), (OPTER, ""), (OPTWRE, ""), (OPTER | OPTWRE, "options"), (OPTER | OPTWRE | MER | PER, "options"),
+        (PER, "page"), (PER | OPTER, "page"), (PER | OPTWRE, "page"), (MER, "all"), (MER | PER, "all"),
+    ],
+)  # fmt: skip
+def test_strt_erases_what_is_chosen_and_allowed(open_options: Any, array: Array, control: int, what: str) -> None:
+    array.data[:] = bytes(array.size)
+    open_options.write("FLASH.AR", 0x0800_0400)
+    open_options.write("FLASH.CR", control | STRT)
+    assert (array.options == b"\xff" * 16) is (what == "options")
+    assert array.data.count(0xFF) == {"page": 1024, "all": array.size}.get(what, 0)
+    assert not array.data[1024] or what in {"page", "all"}
+    assert open_options.read("FLASH.CR") == control | (STRT if what else 0)
+    assert open_options.read("FLASH.SR") == (BSY if what else 0)
+    open_options.advance(ERASE_NS)
+    assert (open_options.read("FLASH.CR"), open_options.read("FLASH.SR")) == (control, EOP if what else 0)
+
+
+@pytest.mark.parametrize(
+    ("is_protected", "offset", "byte", "erases"),
+    [(True, 0, 0xA5, True), (False, 0, 0xA5, False), (True, 4, 0xA5, False), (True, 0, 0xA4, False)],
+)
+def test_only_the_end_of_read_protection_erases_the_array(
+    open_options: Any, array: Array, is_protected: bool, offset: int, byte: int, erases: bool
+) -> None:
+    array.options = b"\xff" * 16 if is_protected else DELIVERED
+    open_options.parts.flash._load_options()
+    array.options = b"\xff" * 16
+    array.data[:] = bytes(array.size)
+    open_options.write("FLASH.CR", OPTPG | OPTWRE)
+    open_options.parts.flash.program_option(offset, 2, byte)
+    assert array.data.count(0xFF) == (array.size if erases else 0)
+    open_options.advance(PROGRAM_NS - 1)
+    assert open_options.read("FLASH.SR") == BSY
+    open_options.advance(PROGRAM_NS)
+    assert open_options.read("FLASH.SR") == (BSY if erases else EOP)
+
+
+def test_an_option_byte_waits_for_no_other(open_options: Any, array: Array) -> None:
+    array.options = b"\xff" * 16
+    open_options.write("FLASH.CR", OPTPG | OPTWRE)
+    open_options.parts.flash.program_option(4, 2, 1)
+    open_options.parts.flash.program_option(6, 2, 2)
+    assert open_options.read("FLASH.SR") == BSY | PGERR
+    assert options_of(array)[2:4] == [1, -1]

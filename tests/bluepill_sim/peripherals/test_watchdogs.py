@@ -194,3 +194,105 @@ def test_the_option_byte_starts_it_with_the_chip(fake_chip: Any) -> None:
     assert fake_chip.read("RCC.CSR") & 1
     fake_chip.advance(0x1000 * 4 * LSI_NS)
     assert len(fake_chip.expired) == 1
+
+
+@pytest.mark.parametrize("key", [START, FEED, 0x5554, 0])
+def test_each_key_but_the_one_that_unlocks_locks_again(fake_chip: Any, key: int) -> None:
+    fake_chip.write("IWDG.KR", UNLOCK)
+    fake_chip.write("IWDG.KR", key)
+    fake_chip.write("IWDG.PR", 3)
+    fake_chip.write("IWDG.RLR", 3)
+    assert (fake_chip.read("IWDG.PR"), fake_chip.read("IWDG.RLR"), fake_chip.read("IWDG.SR")) == (0, 0xFFF, 0)
+    assert ("IWDG:key" in fake_chip.warnings) is (key not in {START, FEED})
+    assert fake_chip.parts.by_name["IWDG"].is_running is (key == START)
+
+
+@pytest.mark.parametrize(("register", "flag", "other"), [("PR", 1, "RLR"), ("RLR", 2, "PR")])
+def test_an_update_has_its_own_flag_and_leaves_the_other_register_open(
+    fake_chip: Any, register: str, flag: int, other: str
+) -> None:
+    fake_chip.write("IWDG.KR", UNLOCK)
+    fake_chip.write(f"IWDG.{register}", 5)
+    assert fake_chip.read("IWDG.SR") == flag
+    fake_chip.advance(1)
+    fake_chip.write(f"IWDG.{register}", 6)
+    fake_chip.write(f"IWDG.{other}", 6)
+    assert (fake_chip.read(f"IWDG.{register}"), fake_chip.read(f"IWDG.{other}")) == (5, 6)
+    fake_chip.advance(UPDATE_NS)
+    assert fake_chip.read("IWDG.SR") == 3 & ~flag
+    fake_chip.advance(UPDATE_NS + 1)
+    assert fake_chip.read("IWDG.SR") == 0
+
+
+def test_a_reset_locks_iwdg_stops_it_and_ends_its_updates(fake_chip: Any) -> None:
+    start_iwdg(fake_chip, 1, 9)
+    fake_chip.write("IWDG.KR", UNLOCK)
+    fake_chip.write("IWDG.PR", 5)
+    part = fake_chip.parts.by_name["IWDG"]
+    part.reset()
+    assert (fake_chip.read("IWDG.SR"), fake_chip.read("IWDG.PR"), part.is_running) == (0, 0, False)
+    fake_chip.write("IWDG.PR", 5)
+    assert fake_chip.read("IWDG.PR") == 0
+    fake_chip.write("IWDG.KR", FEED)
+    fake_chip.advance(fake_chip.now_ns + 10_000 * MS)
+    assert fake_chip.expired == []
+    fake_chip.write("IWDG.KR", UNLOCK)
+    fake_chip.write("IWDG.PR", 5)
+    assert fake_chip.read("IWDG.PR") == 5
+    fake_chip.write("IWDG.KR", START)
+    began_ns = fake_chip.now_ns
+    fake_chip.advance(began_ns + 4096 * DIVIDERS[5] * LSI_NS)
+    assert len(fake_chip.expired) == 1
+
+
+def test_a_second_start_does_not_feed(fake_chip: Any) -> None:
+    fake_chip.write("IWDG.KR", START)
+    fake_chip.advance(100 * MS)
+    fake_chip.write("IWDG.KR", START)
+    fake_chip.advance(4096 * 4 * LSI_NS)
+    assert len(fake_chip.expired) == 1
+
+
+@pytest.mark.parametrize("register", ["CR", "CFR", "SR"])
+def test_a_reset_stops_wwdg_and_takes_its_registers_back(fake_chip: Any, register: str) -> None:
+    fake_chip.write("WWDG.CFR", 0x3FF)
+    fake_chip.write("WWDG.CR", 0xC1)
+    fake_chip.advance(8 * 4096 * 125)
+    assert (fake_chip.read("WWDG.SR"), fake_chip.irqs[0]) == (1, True)
+    fake_chip.parts.by_name["WWDG"].reset()
+    assert not fake_chip.irqs[0]
+    assert fake_chip.read(f"WWDG.{register}") == {"CR": 0x7F, "CFR": 0x7F, "SR": 0}[register]
+    fake_chip.advance(1_000 * MS)
+    assert (fake_chip.read("WWDG.CR"), fake_chip.expired) == (0x7F, [])
+
+
+def test_wdga_and_ewi_stay_until_a_reset_and_ewif_falls_by_0_alone(fake_chip: Any) -> None:
+    fake_chip.write("WWDG.CFR", 0x27F)
+    fake_chip.write("WWDG.CR", 0xC1)
+    fake_chip.write("WWDG.CFR", 0x7F)
+    assert fake_chip.read("WWDG.CFR") == 0x27F
+    fake_chip.advance(4096 * 125)
+    fake_chip.write("WWDG.SR", 1)
+    assert (fake_chip.read("WWDG.SR"), fake_chip.irqs[0]) == (1, True)
+    fake_chip.write("WWDG.CR", 0x7F)
+    assert fake_chip.read("WWDG.CR") == 0xFF
+    fake_chip.write("WWDG.SR", 0)
+    assert (fake_chip.read("WWDG.SR"), fake_chip.irqs[0]) == (0, False)
+
+
+def test_a_count_under_way_goes_on_at_the_new_prescaler(fake_chip: Any) -> None:
+    for key in (START, UNLOCK):
+        fake_chip.write("IWDG.KR", key)
+    fake_chip.advance(100 * 4 * LSI_NS)
+    fake_chip.write("IWDG.PR", 1)
+    assert fake_chip.parts.by_name["IWDG"].due_ns == fake_chip.now_ns + (0x1000 - 100) * 8 * LSI_NS
+
+
+@pytest.mark.parametrize("enable", [0, 1 << 9])
+def test_ewif_interrupts_only_with_ewi(fake_chip: Any, enable: int) -> None:
+    fake_chip.write("WWDG.CFR", enable | 0x7F)
+    fake_chip.write("WWDG.CR", 0x80 | 0x41)
+    fake_chip.advance(512_000)
+    assert (fake_chip.read("WWDG.SR"), fake_chip.irqs[0]) == (1, bool(enable))
+    fake_chip.write("WWDG.CFR", 1 << 9 | 0x7F)
+    assert fake_chip.irqs[0]

@@ -140,6 +140,37 @@ def test_a_sequence_with_an_error_does_not_lock(fake_chip: Any, writes: tuple[in
     assert not fake_chip.read("GPIOA.LCKR") & LCKK
 
 
+@pytest.mark.parametrize(("before", "pins"), [(1, 1), (2, 1), (3, 0)])
+def test_a_reset_forgets_what_was_written_of_the_sequence(fake_chip: Any, before: int, pins: int) -> None:
+    writes = [LCKK | pins, pins, LCKK | pins]
+    for word in writes[:before]:
+        fake_chip.write("GPIOA.LCKR", word)
+    fake_chip.parts.by_name["GPIOA"].reset()
+    for word in writes[before:]:
+        fake_chip.write("GPIOA.LCKR", word)
+    fake_chip.read("GPIOA.LCKR")
+    assert not fake_chip.read("GPIOA.LCKR") & LCKK
+
+
+@pytest.mark.parametrize(
+    ("nibble", "names", "key"), [(0b0011, ("PB3", "PB4"), "{}:held"), (0b0100, ("PB6", "PB7"), "floating:{}")]
+)
+def test_each_pin_that_is_held_or_floats_is_named_once_and_alone(
+    fake_chip: Any, nibble: int, names: tuple[str, str], key: str
+) -> None:
+    fake_chip.write("GPIOB.CRL", 0x8884_4888)
+    fake_chip.advance(1_000_000_000)
+    fake_chip.warnings.clear()
+    for chosen in (names[:1], names[1:], names):
+        for name in chosen:
+            at = 4 * int(name[2:])
+            word = fake_chip.read("GPIOB.CRL") & ~(15 << at)
+            fake_chip.write("GPIOB.CRL", word | 0b1000 << at)
+            fake_chip.write("GPIOB.CRL", word | nibble << at)
+        fake_chip.advance(fake_chip.now_ns + 1_000_000_000)
+    assert list(fake_chip.warnings) == [key.format(name) for name in names]
+
+
 class LockMachine(RuleBasedStateMachine):
     """LCKR against the manual's sentence: write 1, write 0, write 1, read, with the same pins."""
 

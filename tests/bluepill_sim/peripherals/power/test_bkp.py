@@ -199,3 +199,69 @@ def test_a_restored_chip_still_hears_its_tamper_pin(boot: Callable[..., Any]) ->
     board.restore(saved)
     board.pin("PC13").drive(True)
     assert bkp.read(4, 4) == 0
+
+
+@pytest.mark.parametrize("control", [0, ASOE, ASOS, ASOE | ASOS, ASOE | 0x55, ASOS | 0x55, ASOE | ASOS | CCO | 0x7F])
+def test_calibration_and_whether_seconds_show_are_published_when_they_change(chip: Any, control: int) -> None:
+    chip.write("BKP.RTCCR", control)
+    wanted = control & 0x7F, control & (ASOE | ASOS) == ASOE | ASOS
+    assert (chip.clocks.rtc_calibration, chip.clocks.rtc_seconds_shown) == wanted
+    changes = chip.clock_changes
+    assert changes == (wanted != (0, False))
+    chip.write("BKP.RTCCR", control)
+    assert chip.clock_changes == changes
+    chip.write("RCC.BDCR", 1 << 16)
+    assert (chip.clocks.rtc_calibration, chip.clocks.rtc_seconds_shown) == (0, False)
+
+
+@pytest.mark.parametrize("control", [CCO, ASOE, CCO | ASOE | ASOS])
+def test_bdrst_lets_the_pin_go_and_forgets_the_tamper_event(chip: Any, control: int) -> None:
+    chip.write("BKP.RTCCR", control)
+    assert chip.pins["PC13"].holder == "RTC output"
+    chip.write("RCC.BDCR", 1 << 16)
+    assert (chip.pins["PC13"].holder, chip.read("BKP.RTCCR")) == (None, 0)
+    chip.write("RCC.BDCR", 0)
+    chip.pins["PC13"].drive(True)
+    for _ in range(2):
+        fill(chip)
+        chip.write("BKP.CSR", TPIE)
+        chip.write("BKP.CR", TPE)
+        assert (data(chip), chip.irqs[TAMPER_IRQ]) == ([0] * 10, True)
+        chip.write("RCC.BDCR", 1 << 16)
+        assert (chip.read("BKP.CR"), chip.read("BKP.CSR"), chip.irqs[TAMPER_IRQ]) == (0, 0, False)
+        chip.write("RCC.BDCR", 0)
+
+
+def test_cco_goes_on_through_a_reset_and_shows_no_pulse(chip: Any) -> None:
+    pin = chip.pins["PC13"]
+    start_ns = run_rtc(chip, 9)
+    chip.write("BKP.RTCCR", CCO | ASOE | ASOS)
+    chip.advance(at(start_ns, 32) - 1)
+    assert not pin.level
+    chip.parts.by_name["BKP"].reset()
+    chip.advance(at(start_ns, 64) - 1)
+    assert pin.level
+    chip.advance(at(start_ns, 64))
+    assert not pin.level
+
+
+@pytest.mark.parametrize("control", [0, ASOS, 1 << 6])
+def test_without_an_output_the_pin_is_of_gpio(chip: Any, control: int) -> None:
+    chip.write("BKP.RTCCR", control)
+    assert chip.pins["PC13"].holder is None
+    run_rtc(chip, 9)
+    assert chip.pins["PC13"].holder is None
+
+
+@pytest.mark.parametrize("enable", [0, TPIE])
+def test_tif_rises_only_with_tpie_and_interrupts_while_that_stands(chip: Any, enable: int) -> None:
+    chip.pins["PC13"].drive(True)
+    chip.write("BKP.CSR", enable)
+    chip.write("BKP.CR", TPE)
+    assert (chip.read("BKP.CSR"), chip.irqs[TAMPER_IRQ]) == (TEF | (enable and TIF | TPIE), bool(enable))
+    chip.write("BKP.CSR", 0)
+    assert not chip.irqs[TAMPER_IRQ]
+    chip.write("BKP.CSR", TPIE)
+    assert chip.irqs[TAMPER_IRQ] is bool(enable)
+    chip.parts.reset(ResetCause.PIN)
+    assert (chip.read("BKP.CSR"), chip.irqs[TAMPER_IRQ]) == (TEF, False)

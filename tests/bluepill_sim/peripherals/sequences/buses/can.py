@@ -4,12 +4,14 @@ from hypothesis import strategies as st
 
 from bluepill_sim.parts import CanFrame, CanNode
 from tests.bluepill_sim.peripherals.buses import test_can as bus
+from tests.bluepill_sim.peripherals.buses import test_can_flags
 from tests.bluepill_sim.peripherals.sequences.bench import Bench
 from tests.bluepill_sim.peripherals.sequences.row import Sequences
 from tests.bluepill_sim.peripherals.sequences.sources import CHIBIOS, HAL, KLIPPER, LOCM3, RIOT, ours, rm
 
 CAN = Sequences("CAN")
-INRQ, SLEEP, TXFP, RFLM, AWUM, ABOM = 1, 2, 4, 8, 32, 64
+INRQ, SLEEP, TXFP, RFLM, NART, AWUM, ABOM = 1, 2, 4, 8, 16, 32, 64
+TXOK, TERR = 2, 8
 INAK, SLAK = 1, 2
 BIT_NS = bus.BIT_NS
 EMPTY = 0x1C00_0000
@@ -170,6 +172,26 @@ def _(chip: Bench) -> None:
 
 
 @CAN.row(
+    "request-clears-all",
+    "A new request clears RQCP, TXOK and TERR of its mailbox, which the last one has left.",
+    rm("24.9.2"),
+    values=st.integers(0, 2),
+)
+def _(chip: Bench, mailbox: int) -> None:
+    chip.clock("CAN", "GPIOA")
+    network = bus.network(chip, CanNode())
+    bus.set_up(chip, control=NART)
+    for damaged, flag in ((1, TERR), (0, TXOK)):
+        network.damage(damaged)
+        bus.send(chip, 1, mailbox=mailbox)
+        assert chip["CAN.TSR"] & 0xFF_FFFF == 0
+        chip.run(500 * BIT_NS)
+        assert chip["CAN.TSR"] & 0xFF_FFFF == (1 | flag) << 8 * mailbox
+    bus.send(chip, 1, mailbox=mailbox)
+    assert chip["CAN.TSR"] & 0xFF_FFFF == 0
+
+
+@CAN.row(
     "tmeie-while-rqcp",
     "TMEIE interrupts while the RQCP of any mailbox stands: all three are cleared before the handler ends.",
     CHIBIOS("LLD/CANv1/hal_can_lld", 229),
@@ -283,6 +305,39 @@ def _(chip: Bench, is_locked: int) -> None:
     for _ in range(2):
         chip["CAN.RF0R"] = 1 << 5
     assert chip["CAN.RI0R.STID"] == (3 if is_locked else 4)
+
+
+@CAN.row(
+    "fifo-by-its-own",
+    "Each FIFO is released by the RFOM of its own register, and interrupts by its own three enables.",
+    rm("24.7.3"),
+    rm("24.8"),
+    values=st.integers(0, 1),
+)
+def _(chip: Bench, fifo: int) -> None:
+    chip.clock("CAN", "GPIOA")
+    test_can_flags.test_each_fifo_is_released_by_its_own_register_and_interrupts_by_its_own_enables(chip, fifo)
+
+
+@CAN.row(
+    "passive-counts-from-120",
+    "A good frame takes one from REC, and sets it to 120 where it was above that of a passive node.",
+    rm("24.9.2"),
+)
+def _(chip: Bench) -> None:
+    chip.clock("CAN", "GPIOA")
+    test_can_flags.test_a_passive_receiver_that_hears_a_good_frame_counts_from_120(chip)
+
+
+@CAN.row(
+    "abort-in-any-bit",
+    "ABRQ within any bit of a frame lets that go out, and takes what waits back.",
+    rm("24.7.1"),
+    values=st.integers(0, 40),
+)
+def _(chip: Bench, bits: int) -> None:
+    chip.clock("CAN", "GPIOA")
+    test_can_flags.test_an_abort_leaves_the_frame_on_the_bus_in_any_of_its_bits(chip, bits)
 
 
 @CAN.row(

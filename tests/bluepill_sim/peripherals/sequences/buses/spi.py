@@ -58,6 +58,34 @@ def _(chip: Bench) -> None:
 
 
 @SPI.row(
+    "remap-moves",
+    "A remapped SPI1 leaves PA5 to PA7 and has PB3 to PB5.",
+    rm("9.3.10"),
+    values=st.integers(0, 1),
+)
+def _(chip: Bench, is_remapped: int) -> None:
+    chip.clock("AFIO", "GPIOA", "GPIOB", "SPI1")
+    chip["AFIO.MAPR"] = 2 << 24 | is_remapped
+    chip["GPIOA.CRL"] = 0xB4B4_4444
+    chip["GPIOB.CRL"] = 0x44B4_B444
+    chip["SPI1.CR1"] = MASTER | 1 << 1
+    assert (chip.level("PA5"), chip.level("PB3")) == (not is_remapped, bool(is_remapped))
+
+
+@SPI.row(
+    "crc-read-only",
+    "RXCRCR and TXCRCR are read only.",
+    rm("25.5.6"),
+    rm("25.5.7"),
+    values=st.integers(1, 0xFFFF),
+)
+def _(chip: Bench, word: int) -> None:
+    chip.clock("SPI1")
+    chip["SPI1.RXCRCR"], chip["SPI1.TXCRCR"] = word, word
+    assert (chip["SPI1.RXCRCR"], chip["SPI1.TXCRCR"]) == (0, 0)
+
+
+@SPI.row(
     "txe-before-rxne",
     "TXE rises when a word begins, RXNE when it has ended: both are waited for before the next is read.",
     RIOT("spi", 545),

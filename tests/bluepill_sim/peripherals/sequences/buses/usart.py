@@ -320,6 +320,43 @@ def _(chip: Bench, case: tuple[ReceiveError, int]) -> None:
 
 
 @USART.row(
+    "tolerance",
+    "A far end whose rate is within the tolerance raises no error; one at half of ours raises FE with its 0.",
+    rm("27.3.5"),
+    rm("27.3.3"),
+    values=st.integers(98_000, 102_000),
+)
+def _(chip: Bench, far_baud: int) -> None:
+    set_up(chip)
+    usart = chip.parts.usart(1)
+    usart.far_baud = far_baud
+    receive(chip, b"Q")
+    assert (flags(chip) & 0x3F, chip["USART1.DR"]) == (0x20, ord("Q"))
+    usart.far_baud = 50_000
+    receive(chip, b"\0")
+    assert flags(chip) & 0x2F == 0x22
+
+
+@USART.row(
+    "rate-stays",
+    "BRR is not changed while a word goes out.",
+    rm("27.3.4"),
+    choice="the word under way keeps its rate, and nothing follows it while BRR is 0",
+)
+def _(chip: Bench) -> None:
+    sent = set_up(chip)
+    chip.parts.usart(1).far_baud = 100_000
+    chip["USART1.DR"] = 0x41
+    chip.run(CHARACTER_NS // 2)
+    chip["USART1.BRR"] = 0
+    chip.run(CHARACTER_NS // 2)
+    chip["USART1.DR"] = 0x42
+    chip.run(2 * CHARACTER_NS)
+    chip.deliver()
+    assert sent == [0x41]
+
+
+@USART.row(
     "idle-once",
     "IDLE rises once, a character after the line went idle, is cleared by SR and DR, and not again before a character.",
     RUST("serial", 747),

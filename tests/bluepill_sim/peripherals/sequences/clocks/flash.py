@@ -285,6 +285,20 @@ def _(chip: Bench) -> None:
 
 
 @FLASH.row(
+    "options-one-by-one",
+    "An option byte takes OPTPG, OPTWRE and no LOCK: each of them alone keeps it.",
+    pm("2.4"),
+    values=st.sampled_from([1 << 4, 1 << 9, 1 << 4 | 1 << 9 | 1 << 7]),
+)
+def _(chip: Bench, control: int) -> None:
+    chip.array.options = b"\xff" * 16
+    unlock_options(chip)
+    chip["FLASH.CR"] = control
+    assert chip.parts.flash.program_option(4, 2, 0x12)
+    assert (chip.array.options, chip["FLASH.SR"]) == (b"\xff" * 16, 0)
+
+
+@FLASH.row(
     "option-complement",
     "Of an option byte only the lower eight bits count; the controller adds the complement.",
     LOCM3("common/flash_common_f01", 117),
