@@ -335,7 +335,10 @@ def test_a_house_is_offered_where_every_import_of_it_exists(house: House) -> Non
 
 def late_imports(path: Path) -> Iterator[str]:
     """Yield the imports of Unix's modules within functions of a file that no `try` stands around."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
+    text = path.read_text(encoding="utf-8")
+    if not any(name in text for name in UNIX_ALONE):
+        return
+    tree = ast.parse(text)
     tried = {id(node) for block in ast.walk(tree) if isinstance(block, ast.Try) for node in ast.walk(block)}
     for node in ast.walk(tree):
         if isinstance(node, ast.Import | ast.ImportFrom) and id(node) not in tried:

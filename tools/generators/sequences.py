@@ -76,8 +76,9 @@ def _table(rows: Sequence[SequenceRow]) -> str:
 #: The one part that is measured, not made: `python -m tools.mutants --sample sequences`.
 _NOTICED = """## What the rows notice
 
-`python -m tools.mutants --sample sequences` draws 60 changes of the models (from all lines of `bluepill_sim/peripherals`
-and of the devices in C) and asks the tests nearest to each, these rows among them. Measured on 26 Nov 2026:
+`python -m tools.mutants --sample sequences` draws 60 changes of the models (from all lines of
+`bluepill_sim/peripherals` and of the devices in C) and asks the tests nearest to each, these rows among them. Measured
+on 26 Nov 2026:
 
 | draw | noticed | 95 % |
 |---|---|---|

@@ -117,7 +117,7 @@ def repository(tmp_path: Path) -> Path:
     return folder
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_a_failure_finds_the_commit_that_brought_it(failures: Path, repository: Path, tmp_path: Path) -> None:
     assert sorted(path.name for path in failures.iterdir()) == ["0001", "0002"]
     command = tmp_path / "bin" / "p2os"

@@ -67,7 +67,7 @@ def test_each_stands_where_the_source_says_what_it_replaces(draw: ModuleType) ->
         assert fault.right != fault.wrong
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_the_seed_draws_what_is_kept() -> None:
     pytest.importorskip("tree_sitter_c")
     if build.compiler_version() != build.COMPILER_VERSION:
