@@ -63,9 +63,6 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--count", type=_positive, help="how many to draw (default: all)")
     parser.add_argument("--seed", type=int, help="of the draw (default: 1)")
     parser.add_argument("--floor", type=float, help="per cent that are to be noticed (default: all of them)")
-    parser.add_argument(
-        "--first", nargs="*", default=[], metavar="TESTS", help="files of tests asked before the nearest"
-    )
     parser.add_argument("--note", action="store_true", help="add survivors to the committed list")
     parser.add_argument("--list", action="store_true", help="only print what would be judged, and by which tests")
     cores = len(os.sched_getaffinity(0))
@@ -104,7 +101,7 @@ def _judged(parser: argparse.ArgumentParser, options: argparse.Namespace) -> int
         found = changes.mutants_of(lines)
     if options.count is not None:
         random.Random(1 if options.seed is None else options.seed).shuffle(found)
-    nearest = Nearest(ROOT, counted_lines(ROOT / ".coverage", ROOT), options.first)
+    nearest = Nearest(ROOT, counted_lines(ROOT / ".coverage", ROOT))
     if options.list:
         for mutant in found[: options.count]:
             print(f"{mutant.name}\n    {' '.join(nearest.of(mutant.path, mutant.first_line)) or 'no tests'}")

@@ -47,20 +47,18 @@ class Nearest:
     Args:
         root: The project.
         counted: Of each source file, the lines that each file of tests ran; empty where the suite has not run.
-        first: Files of tests that are asked before those that are near.
     """
 
-    def __init__(self, root: Path, counted: Counted, first: Sequence[str] = ()) -> None:
-        self._root, self._counted, self._first = root, counted, tuple(first)
+    def __init__(self, root: Path, counted: Counted) -> None:
+        self._root, self._counted = root, counted
         self._imports = {
             path.relative_to(root).as_posix(): _imports(path) for path in sorted((root / "tests").rglob("*.py"))
         }
         self._tests = [name for name in self._imports if name.rpartition("/")[2].startswith("test_")]
 
     def of(self, path: str, line: int) -> tuple[str, ...]:
-        """Return the files of tests nearest to a line, at most `MOST_FILES` behind those that come first."""
-        near = self._of_python(path, line) if path.endswith(".py") else self._of_c(path)
-        return (*self._first, *(name for name in near if name not in self._first))
+        """Return the files of tests nearest to a line, at most `MOST_FILES`."""
+        return self._of_python(path, line) if path.endswith(".py") else self._of_c(path)
 
     def _of_python(self, path: str, line: int) -> tuple[str, ...]:
         by_name = self._by_name(path)

@@ -16,6 +16,14 @@ def start_hse(chip: Bench) -> None:
     chip.run(HSE_NS)
 
 
+def run_by_pll_of_hse(chip: Bench) -> None:
+    start_hse(chip)
+    chip["RCC.CFGR.PLLSRC"] = 1
+    chip["RCC.CR.PLLON"] = 1
+    chip.run(PLL_NS)
+    chip["RCC.CFGR.SW"] = 2
+
+
 def open_backup(chip: Bench) -> None:
     chip.clock("PWR", "BKP")
     chip["PWR.CR.DBP"] = 1
@@ -121,11 +129,7 @@ def _(chip: Bench) -> None:
     rm("7.3.1"),
 )
 def _(chip: Bench) -> None:
-    start_hse(chip)
-    chip["RCC.CFGR.PLLSRC"] = 1
-    chip["RCC.CR.PLLON"] = 1
-    chip.run(PLL_NS)
-    chip["RCC.CFGR.SW"] = 2
+    run_by_pll_of_hse(chip)
     assert chip["RCC.CFGR.SWS"] == 2
     for name in ("HSEON", "PLLON"):
         chip[f"RCC.CR.{name}"] = 0
@@ -275,11 +279,7 @@ def _(chip: Bench) -> None:
     rm("7.2.7"),
 )
 def _(chip: Bench) -> None:
-    start_hse(chip)
-    chip["RCC.CFGR.PLLSRC"] = 1
-    chip["RCC.CR.PLLON"] = 1
-    chip.run(PLL_NS)
-    chip["RCC.CFGR.SW"] = 2
+    run_by_pll_of_hse(chip)
     chip["RCC.CR.HSION"] = 0
     chip["RCC.CR.CSSON"] = 1
     chip.parts.rcc.fail_crystal()
