@@ -26,12 +26,13 @@ $(BIN)/python:
 	@$(PYTHON) -m venv $(VENV) || \
 	    { rm -rf $(VENV); echo "make: cannot create a virtual environment (hint: apt-get install python3-venv)"; exit 2; }
 
+# Modules are compiled when they are first imported: to compile all that is installed took 45 s.
 # PyBullet has no wheels beyond Python 3.11: elsewhere the extra installs NumPy
 # alone, and everything but the `bullet` body works.
 define install
 @command -v $${CC:-cc} gcc >/dev/null || \
     { echo "make: the emulator needs a C compiler (hint: apt-get install g++ libc6-dev)"; exit 2; }
-$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[$(1)]'
+$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile -c constraints.txt -e '.[$(1)]'
 @touch $@
 endef
 
@@ -86,7 +87,7 @@ bench: setup
 
 # A source distribution and a wheel of each house, in dist/; FOR=all or FOR=musllinux_1_2_aarch64 for other machines than this one.
 wheels: setup
-	@$(if $(FOR),$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[wheels]')
+	@$(if $(FOR),$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile -c constraints.txt -e '.[wheels]')
 	$(BIN)/python -m tools.packaging $(if $(FOR),--for $(FOR))
 
 soak: setup mutation-tools
@@ -135,7 +136,7 @@ board-check: board-tools
 	$(BIN)/python -m hardware.pcb check $(BOARD_CHECK)
 
 board-tools: setup
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[board]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile -c constraints.txt -e '.[board]'
 	tools/install_board_tools.sh
 
 # Every picture of docs/ whose inputs have changed, made anew; `make test` names those that are out of date.

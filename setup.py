@@ -30,8 +30,9 @@ class BuildParts(build_ext):
     """Builds the parts."""
 
     def finalize_options(self) -> None:
-        """Expand the patterns among the files of each part."""
+        """Expand the patterns among the files of each part, and build as many parts at once as there are cores."""
         super().finalize_options()
+        self.parallel = self.parallel or os.cpu_count()
         for part in self.extensions:
             part.sources = expanded(part.sources)
             part.depends = expanded(part.depends)
