@@ -30,7 +30,7 @@ def test_a_file_that_is_missing_is_said(tmp_path: Path) -> None:
     assert "cannot open" in done.stderr
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_a_search_guided_by_coverage_finds_nothing(tmp_path: Path) -> None:
     if not has_fuzzer(tmp_path):
         pytest.skip("clang++ with libFuzzer is not here (apt-get install clang libclang-rt-14-dev)")

@@ -36,7 +36,7 @@ ready
 """
 
 
-@pytest.fixture(scope="session", params=["-Og", "-O2"])
+@pytest.fixture(scope="session", params=["-O2", pytest.param("-Og", marks=pytest.mark.soak)])
 def elf(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return compiled("timers", tmp_path_factory.mktemp("timers"), request.param)
 

@@ -37,7 +37,7 @@ def test_the_schematic_s_netlist_is_the_design(variant: str) -> None:
 
 @needs_kicad
 @pytest.mark.slow
-@pytest.mark.parametrize("variant", ["rev-b", "rev-c"])
+@pytest.mark.parametrize("variant", [pytest.param("rev-b", marks=pytest.mark.soak), "rev-c"])
 def test_a_board_passes_the_design_rule_check_with_parity_and_gives_the_committed_gerbers(variant: str) -> None:
     results = kicad_checks.board_checks(variant)
     assert [result for result in results if result.verdict is not CheckStatus.GOOD] == []

@@ -80,8 +80,11 @@ def test_a_live_run_has_the_rows_of_its_trace(alone: Path, tmp_path: Path) -> No
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("pages", [[], [True], [True, True, True], [False], [True, False]],
-                         ids=["none", "one", "three", "a stalled one", "one and a stalled one"])  # fmt: skip
+@pytest.mark.parametrize("pages", [
+    pytest.param([], marks=pytest.mark.soak, id="none"), pytest.param([True], marks=pytest.mark.soak, id="one"),
+    pytest.param([True, True, True], id="three"), pytest.param([False], marks=pytest.mark.soak, id="a stalled one"),
+    pytest.param([True, False], id="one and a stalled one"),
+])  # fmt: skip
 def test_the_trace_is_the_same_whoever_looks(pages: list[bool], alone: Path, tmp_path: Path) -> None:
     live = LiveRun(SCENARIO)
     with serving(live.source) as server, ExitStack() as opened:

@@ -364,8 +364,11 @@ needs_compiler = pytest.mark.skipif(compiler_version() is None, reason=f"{COMPIL
 @pytest.mark.parametrize(
     "bug",
     [
-        *(pytest.param(bug, marks=pytest.mark.slow, id=bug.name) for bug in SEEDED[::2]),
-        *(pytest.param(bug, marks=pytest.mark.soak, id=bug.name) for bug in (*SEEDED[1::2], *LONGER)),
+        *(pytest.param(bug, marks=pytest.mark.slow, id=bug.name) for bug in SEEDED[::4]),
+        *(
+            pytest.param(bug, marks=pytest.mark.soak, id=bug.name)
+            for bug in (*SEEDED[1::4], *SEEDED[2::4], *SEEDED[3::4], *LONGER)
+        ),
     ],
 )
 def test_a_seeded_bug_is_explained_or_said_to_be_unknown_and_never_wrong(bug: Bug, tmp_path: Path) -> None:

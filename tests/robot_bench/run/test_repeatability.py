@@ -17,7 +17,7 @@ from tests.tools.forked_python import forked_python
 S, MS, US = 10**9, 10**6, 10**3
 BODIES = ["kinematic", pytest.param("bullet", marks=pytest.mark.bullet)]
 MODES = ["direct", "adapter"]
-SLICES_NS = (1 * MS, 100 * US, 7 * US)
+SLICES_NS = (1 * MS, 13 * US)
 
 
 def scenario(mode: str, body: str, duration_s: float) -> Scenario:

@@ -10,7 +10,7 @@ FUZZ = runpy.run_path(str(Path(__file__).resolve().parents[3] / "tools" / "fuzz"
 
 @pytest.mark.parametrize("name", FUZZ["FORMATS"])
 def test_a_damaged_file_is_read_or_refused_in_one_line(name: str) -> None:
-    assert FUZZ["fuzz"](name, 60, 1) == []
+    assert FUZZ["fuzz"](name, 30, 1) == []
 
 
 @pytest.mark.parametrize("name", FUZZ["FORMATS"])

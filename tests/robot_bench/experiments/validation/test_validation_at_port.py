@@ -36,7 +36,7 @@ def failing(found: list[TrialResult]) -> set[str]:
     return {failure.what for result in found for failure in result.failures}
 
 
-@pytest.mark.slow  # all pairs of codes; `failing_of_itself` is what a few of them show
+@pytest.mark.soak  # all pairs of codes; `failing_of_itself` is what a few of them show
 def test_motors_codes_and_encoders_hold_at_a_port(tmp_path: Path) -> None:
     found = at_port(ROUND, tmp_path / "v", world=PLAIN)
     assert [line for result in found for line in reported(result)] == []

@@ -170,7 +170,7 @@ def test_a_part_of_the_adapter_that_is_a_little_off_is_reported(
     assert what in {failure.what for failure in result.failures}
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_more_than_half_a_turn_between_two_samples_is_followed_and_jumps_of_the_codes_are_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Sequence
 from itertools import pairwise, product
 
 import pytest
+from _pytest.mark.structures import ParameterSet
 
 from adapter_sim.pinout import Pull, WireDirection, load_pinout
 from hardware.pcb.circuit.modules import BLUEPILL_PINS, ESP32_PINS
@@ -136,20 +137,21 @@ def test_one_fault_of_each_kind_is_named(tested: Tested, fault: BoardFault) -> N
     assert named(tested(fault)) in expected(fault)
 
 
-@pytest.mark.parametrize(
-    ("faults", "between"),
-    [
-        # Every group in every run, every other one so and so; `make test` has both of each.
+def either_way(groups: list[list[BoardFault]]) -> list[ParameterSet]:
+    """Return each group with what a pad between the limits reads: one in every run, both of each in `make soak`."""
+    return [
         pytest.param(
             group,
             between,
             id=f"{ids(group)}-reads-{between:d}",
-            marks=[pytest.mark.slow] if place % 2 ^ between else [],
+            marks=[pytest.mark.soak] if place % 2 ^ between else [],
         )
-        for place, group in enumerate(GROUPS)
+        for place, group in enumerate(groups)
         for between in (False, True)
-    ],
-)
+    ]
+
+
+@pytest.mark.parametrize(("faults", "between"), either_way(GROUPS))
 def test_each_fault_of_each_wire_is_named_however_a_pad_between_the_limits_reads(
     tested: Tested, faults: list[BoardFault], between: bool
 ) -> None:

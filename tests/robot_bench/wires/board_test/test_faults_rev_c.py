@@ -11,9 +11,9 @@ from tests.robot_bench.wires.board_test.test_faults import (
     FAULTS,
     PINOUT,
     ROWS,
+    either_way,
     expected_of,
     grouped,
-    ids,
     named,
     neighbours,
 )
@@ -48,8 +48,7 @@ def test_a_sound_board_has_a_row_for_each_wire_and_no_fault(tested: Tested) -> N
     assert next(row for row in findings if row.name == "DD3").path == "PA6 - HC595.QC"
 
 
-@pytest.mark.parametrize("between", [False, True], ids=["reads-0", "reads-1"])
-@pytest.mark.parametrize("faults", grouped(OF_REV_C), ids=ids)
+@pytest.mark.parametrize(("faults", "between"), either_way(grouped(OF_REV_C)))
 def test_each_wire_at_fault_is_named_and_no_other(tested: Tested, faults: list[BoardFault], between: bool) -> None:
     findings = tested(*faults, between=between, revision=REVISION)
     wanted = expected_of(faults)
