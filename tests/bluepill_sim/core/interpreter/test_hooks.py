@@ -1,0 +1,192 @@
+"""Whom the interpreter tells of what: hooks at the bounds of their ranges, one beside another, and full of them."""
+
+import ctypes
+
+import pytest
+
+from bluepill_sim.core.unicorn_core import Reg, UnicornCore
+from bluepill_sim.native.interpreter_core import InterpreterCore
+
+FLASH, SRAM, BYTES = 0x0800_0000, 0x2000_0000, 0x400
+#: LDRB R0, [R1]; STRB R0, [R1]; BKPT.
+LOAD, STORE, BKPT = "0878", "0870", "00be"
+#: chosen, as in C: how many regions and hooks there is room for.
+REGIONS, HOOKS = 64, 512
+
+
+def core_of(kind: type[UnicornCore], code: str) -> tuple[UnicornCore, "ctypes.Array[ctypes.c_char]"]:
+    """Return a core with a memory of code and one of data, which a BKPT stops."""
+    core = kind(_raise)
+    data = ctypes.create_string_buffer(bytes(range(256)) * 4, BYTES)
+    core.map_memory(FLASH, ctypes.create_string_buffer(bytes.fromhex(code).ljust(BYTES, b"\0"), BYTES), "rx")
+    core.map_memory(SRAM, data, "rwx")
+    core.on_interrupt(lambda _number: core.stop())
+    core.registers[Reg.CPSR] = core.registers[Reg.CPSR] | 0x20
+    return core, data
+
+
+def _raise(error: BaseException) -> None:
+    raise error
+
+
+both = pytest.mark.parametrize("kind", [UnicornCore, InterpreterCore])
+
+
+@both
+@pytest.mark.parametrize("access", [LOAD, STORE])
+def test_an_access_is_told_to_the_hooks_in_whose_range_it_begins(kind: type[UnicornCore], access: str) -> None:
+    core, _ = core_of(kind, access + BKPT)
+    heard: list[tuple[str, int, int, int]] = []
+    core.on_access(SRAM + 0x10, SRAM + 0x13, lambda what, at, size, _value: heard.append(("a", what, at, size)) or True)
+    core.on_access(SRAM + 0x13, SRAM + 0x13, lambda what, at, size, _value: heard.append(("b", what, at, size)) or True)
+    told = 16 if access == LOAD else 17
+    for offset, names in ((0x0F, ""), (0x10, "a"), (0x12, "a"), (0x13, "ab"), (0x14, "")):
+        heard.clear()
+        core.registers[Reg.R1] = SRAM + offset
+        core.start(FLASH | 1)
+        assert heard == [(name, told, SRAM + offset, 1) for name in names], offset
+
+
+@both
+def test_a_failed_access_is_told_to_the_hooks_in_whose_range_it_is(kind: type[UnicornCore]) -> None:
+    core, _ = core_of(kind, LOAD + BKPT)
+    nothing = 0x3000_0000
+    heard: list[str] = []
+    hook = core.on_bad_access(lambda *_: heard.append("a") is not None, nothing + 0x10, nothing + 0x13)
+    core.on_bad_access(lambda *_: heard.append("b") is not None, nothing + 0x13, nothing + 0x13)
+    for offset, names in ((0x0F, ""), (0x10, "a"), (0x12, "a"), (0x13, "ab"), (0x14, "")):
+        heard.clear()
+        core.registers[Reg.R1] = nothing + offset
+        core.registers[Reg.R0] = 7
+        assert core.start(FLASH | 1) == 6
+        assert "".join(heard) == names, offset
+        assert core.registers[Reg.R0] == 7
+        assert core.registers[Reg.PC] == FLASH
+    core.remove_hook(hook)
+    heard.clear()
+    core.registers[Reg.R1] = nothing + 0x13
+    core.start(FLASH | 1)
+    assert heard == ["b"], "what was taken away is not asked, and the other is"
+
+
+@both
+def test_an_access_that_a_hook_lets_pass_is_made_where_something_is_by_then(kind: type[UnicornCore]) -> None:
+    """The first that lets it pass is the last that is asked; without memory it fails all the same."""
+    core, _ = core_of(kind, LOAD + BKPT)
+    heard: list[str] = []
+    memory = ctypes.create_string_buffer(b"\x5a" * BYTES, BYTES)
+    makes = True
+
+    def first(_kind: int, address: int, _size: int, _value: int) -> bool:
+        heard.append("a")
+        if makes:
+            core.map_memory(address & ~(BYTES - 1), memory, "rw")
+        return makes
+
+    core.on_bad_access(first)
+    core.on_bad_access(lambda *_: heard.append("b") is not None)
+    core.registers[Reg.R1] = 0x3000_0010
+    assert core.start(FLASH | 1) == 0
+    assert (core.registers[Reg.R0], heard) == (0x5A, ["a"])
+    makes = False
+    heard.clear()
+    core.registers[Reg.R1] = 0x3001_0010
+    assert core.start(FLASH | 1) == 6
+    assert heard == ["a", "b"]
+
+
+@both
+def test_an_instruction_is_told_to_the_hooks_in_whose_range_it_begins(kind: type[UnicornCore]) -> None:
+    """ADDS R0, #1 five times, of which the second has 32 bits; and a stop is before the instruction."""
+    core, _ = core_of(kind, "0130 10f10100 0130 0130 0130" + BKPT)
+    heard: list[tuple[str, int, int]] = []
+    places = [FLASH + at for at in (0, 2, 6, 8, 10)]
+
+    def hear(name: str) -> ctypes.c_void_p:
+        return core.instruction_callback(lambda address: heard.append((name, address, core.registers[Reg.R0])))
+
+    core.hook_instructions(hear("a"), places[1], places[2])
+    core.hook_instructions(hear("b"), places[2], places[2])
+    core.hook_instructions(hear("c"), 1, 0)
+    core.registers[Reg.R0] = 0
+    core.start(FLASH | 1)
+    expected = [("c",), ("a", "c"), ("a", "b", "c"), ("c",), ("c",)]
+    told = [(name, place, n) for n, (place, names) in enumerate(zip(places, expected, strict=True)) for name in names]
+    assert heard[:-1] == told
+    assert heard[-1] == ("c", FLASH + 12, 5), "the BKPT"
+    core.drop_all_code()
+    core.hook_instructions(core.instruction_callback(lambda _address: core.stop()), places[3], places[3])
+    heard.clear()
+    core.registers[Reg.R0] = 0
+    core.start(FLASH | 1)
+    assert (core.registers[Reg.R0], core.registers[Reg.PC]) == (3, places[3])
+
+
+def test_the_size_of_an_instruction_is_told() -> None:
+    core, _ = core_of(InterpreterCore, "0130 10f10100" + BKPT)
+    sizes: list[tuple[int, int]] = []
+    callback = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint32, ctypes.c_void_p)(
+        lambda _uc, address, size, _user: sizes.append((address - FLASH, size))
+    )
+    core.hook_instructions(ctypes.cast(callback, ctypes.c_void_p), 1, 0)
+    core.start(FLASH | 1)
+    assert sizes == [(0, 2), (2, 4), (6, 2)]
+
+
+def test_the_hooks_behind_one_that_stops_the_run_are_not_called() -> None:
+    """Of a block, an interrupt, an instruction and an access: the second hook does not hear of it."""
+    for add in ("on_block", "on_interrupt", "instruction", "access"):
+        core = InterpreterCore(_raise)
+        core.map_memory(FLASH, ctypes.create_string_buffer(bytes.fromhex(LOAD + BKPT).ljust(BYTES, b"\0")), "rx")
+        core.map_memory(SRAM, ctypes.create_string_buffer(BYTES), "rwx")
+        core.registers[Reg.R1] = SRAM
+        heard: list[int] = []
+
+        def hear(*_: int, core: InterpreterCore = core, heard: list[int] = heard) -> bool:
+            heard.append(1)
+            core.stop()
+            return True
+
+        for _ in range(2):
+            if add == "instruction":
+                core.hook_instructions(core.instruction_callback(hear), FLASH, FLASH)
+            elif add == "access":
+                core.on_access(SRAM, SRAM, hear)
+            else:
+                getattr(core, add)(hear)
+        core.start(FLASH | 1)
+        assert heard == [1], add
+
+
+def test_there_is_room_for_so_many_hooks_and_regions_and_no_more() -> None:
+    core = InterpreterCore(_raise)
+    hooks = [core.on_bad_access(lambda *_: False) for _ in range(HOOKS)]
+    assert len({*hooks}) == HOOKS
+    assert 0 not in hooks
+    with pytest.raises(RuntimeError, match="no room"):
+        core.on_bad_access(lambda *_: False)
+    core.remove_hook(hooks[5])
+    assert core.on_bad_access(lambda *_: False) not in hooks
+    pages = [ctypes.create_string_buffer(bytes([n]) * BYTES, BYTES) for n in range(REGIONS)]
+    for n, page in enumerate(pages[:-1]):  # the core has mapped one itself
+        core.map_memory(SRAM + BYTES * n, page, "rwx")
+    with pytest.raises(Exception, match="map 0x"):
+        core.map_memory(SRAM + BYTES * REGIONS, pages[-1], "rwx")
+    core._unmap(SRAM + BYTES * 3, BYTES)
+    core.map_memory(SRAM + BYTES * REGIONS, pages[-1], "rwx")
+
+
+@both
+def test_what_was_mapped_last_hides_what_is_below(kind: type[UnicornCore]) -> None:
+    core, data = core_of(kind, LOAD + BKPT)
+    core.registers[Reg.R1] = SRAM + 0x33
+    core.start(FLASH | 1)
+    assert core.registers[Reg.R0] == 0x33
+    if kind is InterpreterCore:
+        over = ctypes.create_string_buffer(b"\x77" * BYTES, BYTES)
+        core.map_memory(SRAM, over, "rx")
+        core.on_access(SRAM + 0x100, SRAM + 0x100, lambda *_: True)  # no access at once
+        core.start(FLASH | 1)
+        assert core.registers[Reg.R0] == 0x77
+        core._unmap(SRAM, BYTES)
+    assert data.raw[0x33] == 0x33
