@@ -165,9 +165,8 @@ static const uint8_t *code_at(struct interpreter *s, uint32_t address, const str
 static struct block *decoded(struct interpreter *s, uint32_t address, const uint8_t *code, uint32_t bytes)
 {
     struct block *block = interpreter_decode(s, address, code, bytes);
-    if (block == NULL) {
-        s->error = NOT_FETCHABLE;
-        s->stops = 1;
+    if (block == NULL) { /* memory ends in the midst of its first instruction */
+        not_fetched(s, address + bytes);
     }
     return block;
 }
