@@ -176,6 +176,7 @@ FUNCTION_TYPES = {
     "interpreter_unhook": "vpz",
     "interpreter_drop": "vpqq",
     "interpreter_find_pages": "vpb",
+    "interpreter_set_trap": "vppp",
     "interpreter_take_apart": "vubp",
     "interpreter_look": "zpsupz",
     "interpreter_context_bytes": "z",

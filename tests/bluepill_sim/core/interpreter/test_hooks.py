@@ -5,6 +5,7 @@ import ctypes
 import pytest
 
 from bluepill_sim.core.unicorn_core import Reg, UnicornCore
+from bluepill_sim.extension.library import library
 from bluepill_sim.native.interpreter_core import InterpreterCore
 
 FLASH, SRAM, BYTES = 0x0800_0000, 0x2000_0000, 0x400
@@ -190,3 +191,57 @@ def test_what_was_mapped_last_hides_what_is_below(kind: type[UnicornCore]) -> No
         assert core.registers[Reg.R0] == 0x77
         core._unmap(SRAM, BYTES)
     assert data.raw[0x33] == 0x33
+
+
+#: UDIV, SDIV R0, R1, R2; LDM, STM, LDRD, STRD of R3 and R4 at R5; and what tells of each: alignment, and which value.
+TRAPS = {
+    "b1fbf2f0": (False, 0), "91fbf2f0": (False, 0), "95e81800": (True, SRAM + 2), "85e81800": (True, SRAM + 2),
+    "d5e90034": (True, SRAM + 2), "c5e90034": (True, SRAM + 2),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("code", TRAPS)
+@pytest.mark.parametrize("stops", [True, False])
+def test_a_trap_is_told_before_its_instruction_which_is_done_where_nobody_stops_it(code: str, *, stops: bool) -> None:
+    core, data = core_of(InterpreterCore, "013f" + code + "013e" + BKPT)  # SUBS R7, #1; SUBS R6, #1
+    before = data.raw
+    told: list[tuple[bool, int, int]] = []
+
+    def trapped(_user: int, is_alignment: bool, pc: int, value: int) -> None:
+        told.append((is_alignment, pc, value))
+        if stops:
+            core.stop()
+
+    callback = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_bool, ctypes.c_uint32, ctypes.c_uint32)(trapped)
+    library().interpreter_set_trap(core.handle, ctypes.cast(callback, ctypes.c_void_p), None)
+    names = {Reg.R0: 9, Reg.R1: 8, Reg.R2: 0, Reg.R3: 3, Reg.R4: 4, Reg.R5: SRAM + 2, Reg.R6: 6, Reg.R7: 7}
+    for name, value in names.items():
+        core.registers[name] = value
+    core.start(FLASH | 1)
+    is_alignment, value = TRAPS[code]
+    assert told == [(is_alignment, FLASH + 2, value)]
+    left = {name: core.registers[name] for name in names}
+    if stops:
+        assert left == names | {Reg.R7: 6}
+        assert core.registers[Reg.PC] == FLASH + 2
+        assert data.raw == before
+    else:
+        assert (left[Reg.R6], left[Reg.R7]) == (5, 6)
+        assert left[Reg.R0] == (9 if is_alignment else 0)
+        if code[0] in "9d" and is_alignment:
+            assert left[Reg.R3].to_bytes(4, "little") + left[Reg.R4].to_bytes(4, "little") == before[2:10]
+        elif is_alignment:
+            assert data.raw[2:10] == b"\3\0\0\0\4\0\0\0"
+
+
+@pytest.mark.parametrize("code", TRAPS)
+def test_no_trap_is_told_where_there_is_none(code: str) -> None:
+    core, _ = core_of(InterpreterCore, code + BKPT)
+    told: list[int] = []
+    callback = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_bool, ctypes.c_uint32, ctypes.c_uint32)(
+        lambda *_: told.append(1)
+    )
+    library().interpreter_set_trap(core.handle, ctypes.cast(callback, ctypes.c_void_p), None)
+    core.registers[Reg.R1], core.registers[Reg.R2], core.registers[Reg.R5] = 0, 1, SRAM + 4
+    core.start(FLASH | 1)
+    assert told == []
