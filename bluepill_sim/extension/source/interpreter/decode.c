@@ -51,7 +51,7 @@ static enum outcome add(struct interpreter *s, struct builder *to, uint32_t word
         emit(to, OP_SKIP_EQ + condition);
     }
     if (interpreter_is_hooked(s, to->pc)) {
-        emit(to, OP_HOOK, .imm = is_wide ? 4 : 2);
+        emit(to, OP_HOOK, .imm = to->end - to->pc);
     }
     const enum outcome outcome = interpreter_lower(to, &one);
     if (one.operation == IT) {
@@ -96,11 +96,12 @@ struct block *interpreter_decode(struct interpreter *s, uint32_t address, const 
     while (outcome == GOES_ON) {
         const uint32_t first = bytes - done >= 2 ? halfword(code + done) : 0;
         const bool is_wide = first >= FIRST_WIDE;
-        if (bytes - done < (is_wide ? 4u : 2u)) {
+        const uint32_t size = is_wide ? 4 : 2;
+        if (bytes - done < size) {
             break;
         }
         to.pc = address + done;
-        to.end = to.pc + (is_wide ? 4 : 2);
+        to.end = to.pc + size;
         outcome = add(s, &to, is_wide ? first << 16 | halfword(code + done + 2) : first, is_wide);
         to.it = to.after;
         to.next = 0;

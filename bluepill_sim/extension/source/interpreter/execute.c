@@ -99,9 +99,9 @@ static bool returns(struct interpreter *s, uint32_t target)
 }
 
 /* The known block at an address in flash; null: it has to be looked for. */
-static inline struct block *known(const struct interpreter *s, uint32_t address)
+static inline struct block *known(struct interpreter *s, uint32_t address)
 {
-    struct block *block = s->blocks[address >> 1 & (CODE_SLOTS - 1)];
+    struct block *block = *interpreter_slot(s, address);
     return block != NULL && block->start == address && block->row != NULL ? block : NULL;
 }
 

@@ -195,6 +195,12 @@ static inline bool stands_inside(const struct interpreter *s, uint32_t pc)
     return s->is.block_start && pc > s->is.block_start && pc < s->is.block_end;
 }
 
+/* Where a block of flash is found by its address. */
+static inline struct block **interpreter_slot(struct interpreter *s, uint32_t address)
+{
+    return &s->blocks[address >> 1 & (CODE_SLOTS - 1)];
+}
+
 /* Whether an ITSTATE is none, but ICI (ARM B1.4.2). */
 static inline bool is_continued(uint32_t it_state) { return it_state && !(it_state & 15); }
 

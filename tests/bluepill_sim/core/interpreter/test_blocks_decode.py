@@ -88,7 +88,9 @@ def own() -> Board:
 
 #: What ends a block, or does not; what stands in IT blocks; and instructions of 16 and 32 bits.
 ENDS = (
-    (NOP, NOP, BKPT), (NOP, ISB, ADD_ONE, BKPT), (CPSIE, ADD_ONE, BKPT), (MSR, ADD_ONE, BKPT), (MRS, ADD_ONE, BKPT),
+    (NOP, NOP, BKPT),
+    (NOP, 0xE800_0000, BKPT), (NOP, 0xE7FF, ADD_ONE, BKPT),
+    (NOP, ISB, ADD_ONE, BKPT), (CPSIE, ADD_ONE, BKPT), (MSR, ADD_ONE, BKPT), (MRS, ADD_ONE, BKPT),
     (IT_NE, ADD_ONE, ADD_ONE, BKPT), (ITT_NE, WIDE_NOP, ADD_ONE, ADD_ONE, BKPT), (0xBF0C, ADD_ONE, 0x3002, BKPT),
     (0xE000, ADD_ONE, ADD_ONE, BKPT), (0xD000, ADD_ONE, ADD_ONE, BKPT), (0xD100, ADD_ONE, ADD_ONE, BKPT),
     (0xB108, ADD_ONE, ADD_ONE, BKPT), (0xB908, ADD_ONE, ADD_ONE, BKPT), (0xF3BF_8F4F, ADD_ONE, BKPT),

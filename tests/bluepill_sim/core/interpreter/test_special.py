@@ -6,7 +6,9 @@ from dataclasses import dataclass, replace
 
 import pytest
 
-from bluepill_sim.core.unicorn_core import Reg
+from bluepill_sim.core.unicorn_core import GENERAL, Reg
+from bluepill_sim.extension.layout import VIEWS_BASE
+from bluepill_sim.extension.library import library
 from bluepill_sim.native.interpreter_core import InterpreterCore
 
 FLASH, BYTES = 0x0800_0000, 0x400
@@ -181,3 +183,65 @@ def test_a_context_keeps_each_register_and_not_what_an_instruction_keeps_for_its
         assert other.registers[name] == registers[name], name
     with pytest.raises(ValueError, match="another core"):
         other.context = kept[:-1]
+
+
+#: What each register keeps of a word that is written, and which others change with it: R13 is one of two.
+KEPT = {
+    **dict.fromkeys(GENERAL[:13], (0xFFFF_FFFF, ())), Reg.LR: (0xFFFF_FFFF, ()), Reg.SP: (0xFFFF_FFFC, (Reg.MSP,)),
+    Reg.MSP: (0xFFFF_FFFC, (Reg.SP,)), Reg.PSP: (0xFFFF_FFFC, ()), Reg.PRIMASK: (1, ()), Reg.BASEPRI: (0xF0, ()),
+    Reg.FAULTMASK: (1, ()), Reg.IPSR: (0x1FF, (Reg.XPSR,)), Reg.CONTROL: (3, (Reg.SP,)),
+    Reg.XPSR: (0xF800_0000, (Reg.CPSR,)),
+    Reg.CPSR: (0xFE00_FC20, (Reg.XPSR,)), Reg.PC: (0xFFFF_FFFE, (Reg.CPSR, Reg.XPSR)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", KEPT, ids=lambda name: name.name)
+def test_a_register_that_is_written_keeps_its_bits_and_changes_no_other(name: Reg) -> None:
+    core = InterpreterCore(_raise)
+    kept, others = KEPT[name]
+    for number, each in enumerate(KEPT):
+        if each not in {Reg.CONTROL, Reg.IPSR}:
+            core.registers[each] = 0x0102_0304 * (number + 1)
+    fresh = core.context
+    for value in (0xFFFF_FFFF, 0, 0x5A5A_5A5A, 0xA5A5_A5A5 & ~2, 0x0400_0C20):
+        core.context = fresh
+        before = {each: core.registers[each] for each in KEPT}
+        core.registers[name] = value
+        after = {each: core.registers[each] for each in KEPT}
+        assert after[name] & kept == value & kept, hex(value)
+        assert after[name] & ~kept == before[name] & ~kept if name is Reg.XPSR else after[name] & ~kept == 0
+        changed = {each for each in KEPT if after[each] != before[each]}
+        assert changed <= {name, *others}, hex(value)
+        if name in {Reg.PC, Reg.CPSR}:
+            is_thumb = value & 1 if name is Reg.PC else value >> 5 & 1
+            assert (after[Reg.XPSR] >> 24 & 1, after[Reg.CPSR] >> 5 & 1) == (is_thumb, is_thumb)
+        if name is Reg.IPSR:
+            assert after[Reg.XPSR] & 0x1FF == value & 0x1FF
+
+
+def test_a_register_that_there_is_not_reads_0_and_keeps_nothing() -> None:
+    """Numbers about those of Unicorn that are known."""
+    core = InterpreterCore(_raise)
+    fresh = core.context
+    for number in {*range(140)} - {each.value for each in KEPT}:
+        word = ctypes.c_uint32(0xFFFF_FFFF)
+        library().interpreter_reg_write(core.handle, number, ctypes.addressof(word))
+        library().interpreter_reg_read(core.handle, number, ctypes.addressof(word))
+        assert word.value == 0, number
+    assert core.context == fresh
+
+
+def test_pages_are_asked_for_by_loads_where_views_are_mapped_and_else_by_fetches_alone() -> None:
+    core = InterpreterCore(_raise)
+    code = ctypes.create_string_buffer(bytes.fromhex("086800be").ljust(BYTES, b"\0"), BYTES)  # LDR R0, [R1]; BKPT
+    core.map_memory(FLASH, code, "rx")
+    core.map_memory(0x2000_0000, ctypes.create_string_buffer(BYTES), "rwx")
+    core.on_interrupt(lambda _number: core.stop())
+    asked: set[int] = set()
+    core.on_page(lambda address, kind: (asked.add(kind), (address, 7))[1])
+    core.registers[Reg.R1] = 0x2000_0000
+    core.start(FLASH | 1)
+    assert asked == {18}
+    core.map_memory(VIEWS_BASE, ctypes.create_string_buffer(BYTES), "rx")
+    core.start(FLASH | 1)
+    assert asked == {16, 18}
