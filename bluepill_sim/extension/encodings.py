@@ -457,15 +457,11 @@ WIDE: tuple[Encoding, ...] = (
 
 
 @cache
-def _by_first_byte() -> tuple[tuple[Encoding, ...], ...]:
-    """Return, for each upper byte of a first halfword, the rows that may match there."""
-    found = []
-    for first in range(256):
-        is_wide = first << 8 >= FIRST_WIDE
-        shift = 24 if is_wide else 8
-        rows = WIDE if is_wide else NARROW
-        found.append(tuple(row for row in rows if not (first ^ row.value >> shift) & row.mask >> shift & 0xFF))
-    return tuple(found)
+def _rows_by(first: int, *, is_wide: bool) -> tuple[Encoding, ...]:
+    """Return the rows that may match where that is the upper byte of the first halfword."""
+    shift = _WIDE_BITS - 8 if is_wide else _NARROW_BITS - 8
+    rows = WIDE if is_wide else NARROW
+    return tuple(row for row in rows if not (first ^ row.value >> shift) & row.mask >> shift)
 
 
 def find(word: int, *, is_wide: bool) -> Encoding | None:
@@ -475,7 +471,7 @@ def find(word: int, *, is_wide: bool) -> Encoding | None:
         word: 16 bits, or 32 with the first halfword in the upper half.
         is_wide: which of the two.
     """
-    for row in _by_first_byte()[word >> (24 if is_wide else 8)]:
+    for row in _rows_by(word >> (_WIDE_BITS - 8 if is_wide else _NARROW_BITS - 8), is_wide=is_wide):
         if word & row.mask == row.value:
             return None if row.operation == UNDEFINED else row
     return None

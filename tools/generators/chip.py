@@ -185,7 +185,7 @@ def encodings_header() -> str:
     """Return the header of all encodings: bits, instruction and form of each, and how each form is taken apart."""
     rows = (*NARROW, *WIDE)
     names = [name for name in dict.fromkeys(row.operation for row in rows) if name != UNDEFINED]
-    forms = list(dict.fromkeys(_extraction(row) for row in rows))
+    forms = {_form(row): _extraction(row) for row in rows}
     lines = [
         f"/* {SOURCE / 'interpreter' / 'encodings.h'}: every encoding; made from extension/encodings.py. */",
         "#ifndef BLUEPILL_ENCODINGS_H",
@@ -201,31 +201,38 @@ def encodings_header() -> str:
         f"static const uint8_t kind_refill[] = {{{', '.join(str(REFILL.get(kind, 0)) for kind in Kind)}}};",
         f"static const uint8_t kind_gives_up[] = {{{', '.join(str(int(kind in GIVEN_UP)) for kind in Kind)}}};",
         "",
+        "/* Where an instruction has its fields, as the table of encodings draws it. */",
+        *wrap(f"enum form {{ {', '.join(forms)} }};", _WIDTH, subsequent_indent=" " * 4),
+        "",
         "struct encoding {",
         "    uint32_t mask, value;",
         "    uint8_t operation, form, kind;",
         "};",
         "",
-        "/* Takes an instruction apart into its fields; `to` is a pointer to a struct that has them. */",
-        "#define extract(form, word, to) \\",
+        "/* Takes an instruction of a row apart into its fields; `to` is a pointer to a struct that has them. */",
+        "#define extract(row, word, to) \\",
         "    do { \\",
-        "        switch (form) { \\",
-        *(f"        case {number}: {text}break; \\" for number, text in enumerate(forms)),
-        "        default: break; \\",
+        "        switch ((enum form)(row)->form) { \\",
+        *(f"        case {name}: {text}break; \\" for name, text in forms.items()),
         "        } \\",
         "    } while (0)",
     ]
     for name, table in (("narrow", NARROW), ("wide", WIDE)):
         lines += ["", f"static const struct encoding {name}[] = {{"]
         for row in table:
-            numbers = f"{row.mask:#x}, {row.value:#x}, {row.operation}, {forms.index(_extraction(row))}"
-            lines.append(f"    {{{numbers}, {_kind(row.kind)}}},")
+            lines.append(f"    {{{row.mask:#x}, {row.value:#x}, {row.operation}, {_form(row)}, {_kind(row.kind)}}},")
         lines += ["};"]
     return "\n".join([*lines, "", "#endif", ""])
 
 
 def _kind(kind: Kind) -> str:
     return f"KIND_{kind.name}"
+
+
+def _form(row: Encoding) -> str:
+    """Return the name of a form: the letters of the pattern, from the first one on."""
+    drawn = re.sub(r"[^a-z]", "_", row.pattern.replace(" ", "")).lstrip("_")
+    return f"FORM_{drawn or 'NONE'}"
 
 
 def _extraction(row: Encoding) -> str:

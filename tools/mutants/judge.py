@@ -31,7 +31,7 @@ from tools.mutants.outcome import BUDGET_S, OUTCOME_FILE, TEST_S, RunReport, cle
 from tools.mutants.tree import Tree
 
 #: Seconds of a processor that each process of a mutant's tests has, and when no other test begins.
-LIMIT_S, BEGIN_S = 20, 6.0
+LIMIT_S, BEGIN_S = 20, 12.0
 #: Which files of tests are collected together, by their places: to collect one takes as long as some tests. Of how many
 #: the long tests are asked.
 TOGETHER, LONG_FILES = (0, 2, 6, 100), 5

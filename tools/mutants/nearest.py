@@ -11,7 +11,7 @@ from functools import cache
 from pathlib import Path
 
 #: Files of tests that are asked about one mutant, at most.
-MOST_FILES = 14
+MOST_FILES = 16
 #: So many of them by their names and imports, whether they were counted at the line or not.
 NOT_COUNTED = 4
 #: Seconds that a file of tests is taken to last, of which nothing is known, and at least.
@@ -22,11 +22,12 @@ SELDOM = 1.5
 TESTS_OF_C = {
     "bluepill_sim/extension/source/devices": ("tests/bluepill_sim/peripherals", "tests/bluepill_sim/native"),
     "bluepill_sim/extension/source/registers": ("tests/bluepill_sim/peripherals", "tests/bluepill_sim/native"),
-    "bluepill_sim/extension/source/interpreter": ("tests/bluepill_sim/core/interpreter",
-                                                  "tests/bluepill_sim/core/test_kernels.py",
-                                                  "tests/bluepill_sim/core/test_flag_vectors.py",
-                                                  "tests/bluepill_sim/native/test_native_core.py",
-                                                  "tests/bluepill_sim/core", "tests/bluepill_sim/native"),
+    "bluepill_sim/extension/source/interpreter": (
+        *(f"tests/bluepill_sim/core/interpreter/test_{name}.py"
+          for name in ("tidy", "memory_bounds", "against_unicorn", "blocks_decode", "special", "own_core", "exact")),
+        "tests/bluepill_sim/core/interpreter", "tests/bluepill_sim/core/test_kernels.py",
+        "tests/bluepill_sim/core/test_flag_vectors.py", "tests/bluepill_sim/native/test_native_core.py",
+        "tests/bluepill_sim/core", "tests/bluepill_sim/native"),
     "bluepill_sim/extension/source/core": ("tests/bluepill_sim/core", "tests/bluepill_sim/native"),
     "bluepill_sim/extension/source/fabric": ("tests/bluepill_sim/fabric", "tests/bluepill_sim/test_timers.py",
                                              "tests/bluepill_sim/peripherals/tim/test_tim.py",

@@ -13,8 +13,6 @@
 enum { ALONE_BYTES = 4 };
 #define NEVER_PASSED (UINT64_C(1) << 62)
 
-static struct block **slot(struct interpreter *s, uint32_t address) { return &s->blocks[address >> 1 & (CODE_SLOTS - 1)]; }
-
 static bool is_other(const struct block *block)
 {
     return block->is_writable || block->it || !block->is_thumb;
@@ -73,8 +71,8 @@ void interpreter_drop(struct interpreter *s, uint64_t first, uint64_t end)
                 before = &(*before)->odd;
             }
             *before = block->odd;
-        } else if (*slot(s, block->start) == block) {
-            *slot(s, block->start) = NULL;
+        } else if (*interpreter_slot(s, block->start) == block) {
+            *interpreter_slot(s, block->start) = NULL;
         }
         *at = block->next;
         block->next = s->dropped;
@@ -122,7 +120,7 @@ static struct block *keep(struct interpreter *s, struct block *block, bool is_wr
         block->odd = s->odd;
         s->odd = block;
     } else {
-        struct block **const at = slot(s, block->start);
+        struct block **const at = interpreter_slot(s, block->start);
         if (*at != NULL) { /* the flash stands at two addresses: one place for both */
             interpreter_drop(s, (*at)->start, (*at)->start + 1);
         }
@@ -165,9 +163,8 @@ static const uint8_t *code_at(struct interpreter *s, uint32_t address, const str
 static struct block *decoded(struct interpreter *s, uint32_t address, const uint8_t *code, uint32_t bytes)
 {
     struct block *block = interpreter_decode(s, address, code, bytes);
-    if (block == NULL) {
-        s->error = NOT_FETCHABLE;
-        s->stops = 1;
+    if (block == NULL) { /* memory ends in the midst of its first instruction */
+        not_fetched(s, address + bytes);
     }
     return block;
 }
@@ -175,7 +172,7 @@ static struct block *decoded(struct interpreter *s, uint32_t address, const uint
 /* The block where the core stands, decoded if it is new or has changed; null: the run ends. */
 struct block *interpreter_block(struct interpreter *s, uint32_t address)
 {
-    struct block *block = s->is.it_state || !s->is.is_thumb ? NULL : *slot(s, address);
+    struct block *block = s->is.it_state || !s->is.is_thumb ? NULL : *interpreter_slot(s, address);
     if (block != NULL && block->start == address) {
         return block;
     }

@@ -26,14 +26,15 @@ const struct encoding *interpreter_row_of(uint32_t word, bool is_wide)
     return NULL;
 }
 
-static enum operation find(uint32_t word, bool is_wide, struct decoded *one)
+/* Takes an instruction apart. */
+void interpreter_take_apart(uint32_t word, bool is_wide, struct decoded *one)
 {
+    *one = (struct decoded){.operation = UNDEFINED};
     const struct encoding *row = interpreter_row_of(word, is_wide);
-    if (row == NULL) {
-        return UNDEFINED;
+    if (row != NULL) {
+        one->operation = row->operation;
+        extract(row, word, one);
     }
-    extract(row->form, word, one);
-    return row->operation;
 }
 
 static uint8_t advanced(uint32_t it) { return (uint8_t)(it & 7 ? (it & 0xE0) | (it << 1 & 0x1F) : 0); }
@@ -41,26 +42,25 @@ static uint8_t advanced(uint32_t it) { return (uint8_t)(it & 7 ? (it & 0xE0) | (
 /* Adds one instruction; whether the block ends behind it. */
 static enum outcome add(struct interpreter *s, struct builder *to, uint32_t word, bool is_wide)
 {
-    struct decoded one = {0};
-    one.operation = find(word, is_wide, &one);
+    struct decoded one;
+    interpreter_take_apart(word, is_wide, &one);
     to->after = advanced(to->it);
     const uint32_t condition = to->it ? to->it >> 4 : ALWAYS;
-    struct op *skip = NULL;
-    const uint32_t before = to->count;
-    if (condition < ALWAYS && one.operation != BKPT) { /* BKPT is never conditional */
-        skip = interpreter_emit(to, OP_SKIP_EQ + condition, 0, 0, 0, 0);
+    struct op *const skip = condition < ALWAYS && one.operation != BKPT ? &to->ops[to->count] : NULL; /* BKPT is never conditional */
+    if (skip != NULL) {
+        emit(to, OP_SKIP_EQ + condition);
     }
     if (interpreter_is_hooked(s, to->pc)) {
-        interpreter_emit(to, OP_HOOK, 0, 0, 0, is_wide ? 4 : 2);
+        emit(to, OP_HOOK, .imm = to->end - to->pc);
     }
     const enum outcome outcome = interpreter_lower(to, &one);
     if (one.operation == IT) {
         to->after = (uint8_t)one.i;
     }
     if (skip != NULL) {
-        skip->imm = to->count - before - 1;
+        skip->imm = (uint32_t)(&to->ops[to->count] - skip) - 1;
         if (outcome == ENDS_BLOCK) {
-            interpreter_emit(to, OP_STRAIGHT_ON, 0, 0, 0, 0);
+            emit(to, OP_STRAIGHT_ON);
         }
     }
     return outcome;
@@ -88,7 +88,7 @@ struct block *interpreter_decode(struct interpreter *s, uint32_t address, const 
     enum outcome outcome = GOES_ON;
     uint32_t done = 0;
     if (!s->is.is_thumb) { /* nothing executes in ARM state: B1.5.6, INVSTATE */
-        interpreter_emit(&to, OP_UDF, 0, 0, 0, 0);
+        emit(&to, OP_UDF);
         done = ARM_STATE_BYTES;
         outcome = ENDS_BLOCK;
     }
@@ -96,17 +96,18 @@ struct block *interpreter_decode(struct interpreter *s, uint32_t address, const 
     while (outcome == GOES_ON) {
         const uint32_t first = bytes - done >= 2 ? halfword(code + done) : 0;
         const bool is_wide = first >= FIRST_WIDE;
-        if (bytes - done < (is_wide ? 4u : 2u)) {
+        const uint32_t size = is_wide ? 4 : 2;
+        if (bytes - done < size) {
             break;
         }
         to.pc = address + done;
-        to.end = to.pc + (is_wide ? 4 : 2);
+        to.end = to.pc + size;
         outcome = add(s, &to, is_wide ? first << 16 | halfword(code + done + 2) : first, is_wide);
         to.it = to.after;
         to.next = 0;
         done = to.end - address;
         if (outcome == GOES_ON && (bytes - done < 2 || leaves_page(page, to.end, code + done))) {
-            interpreter_emit(&to, OP_STRAIGHT_ON, 0, 0, 0, 0);
+            emit(&to, OP_STRAIGHT_ON);
             outcome = ENDS_BLOCK;
         }
     }
@@ -119,4 +120,17 @@ struct block *interpreter_decode(struct interpreter *s, uint32_t address, const 
     }
     free(to.ops);
     return block;
+}
+
+/* What the block of some code is made into: the number and the code of each micro-operation; returns how many there are. */
+size_t interpreter_look(struct interpreter *s, const uint8_t *code, uint32_t bytes, uint16_t (*seen)[2], size_t room)
+{
+    struct block *block = interpreter_decode(s, 0, code, bytes);
+    const size_t count = block == NULL ? 0 : block->count;
+    for (size_t n = 0; n < count && n < room; ++n) {
+        seen[n][0] = block->ops[n].number;
+        seen[n][1] = block->ops[n].code;
+    }
+    free(block);
+    return count;
 }

@@ -34,8 +34,9 @@ static void stand_inside(struct interpreter *s, const struct block *block)
 }
 
 /* The block at an address, or its part up to where the owner has it end, entered: the hook has been called and lets the run
- * go on. Null: the run ends. `is_inside`: the core is inside a block. */
-static __attribute__((noinline)) struct block *enter(struct interpreter *s, struct block *from, unsigned way, bool is_inside)
+ * go on. Null: the run ends. `link`: of the block before, by the way that led here, or null; `is_inside`: the core is inside
+ * a block. */
+static __attribute__((noinline)) struct block *enter(struct interpreter *s, struct block **link, bool is_inside)
 {
     if (!is_inside) {
         s->is.block_start = 0;
@@ -51,8 +52,8 @@ static __attribute__((noinline)) struct block *enter(struct interpreter *s, stru
             return NULL;
         }
         if (!s->has_jumped) {
-            if (from != NULL && block->row != NULL) {
-                from->links[way] = block;
+            if (link != NULL && block->row != NULL) {
+                *link = block;
             }
             if (s->cut_at) {
                 stand_inside(s, block);
@@ -63,7 +64,7 @@ static __attribute__((noinline)) struct block *enter(struct interpreter *s, stru
             s->is.it_state = 0;
             return block;
         }
-        from = NULL;
+        link = NULL;
     } while (true);
 }
 
@@ -98,9 +99,9 @@ static bool returns(struct interpreter *s, uint32_t target)
 }
 
 /* The known block at an address in flash; null: it has to be looked for. */
-static inline struct block *known(const struct interpreter *s, uint32_t address)
+static inline struct block *known(struct interpreter *s, uint32_t address)
 {
-    struct block *block = s->blocks[address >> 1 & (CODE_SLOTS - 1)];
+    struct block *block = *interpreter_slot(s, address);
     return block != NULL && block->start == address && block->row != NULL ? block : NULL;
 }
 
@@ -188,7 +189,7 @@ CHAINED_BY_M(DONE_BY_M)
         }                                                                                                               \
         s->is.pc = (address);                                                                                           \
         s->is.it_state = op->after;                                                                                     \
-        if ((block = enter(s, block, way, block->is_part)) == NULL) {                                                                   \
+        if ((block = enter(s, &block->links[way], block->is_part)) == NULL) {                                           \
             return NULL;                                                                                                \
         }                                                                                                               \
         op = block->ops;                                                                                                \
@@ -206,7 +207,7 @@ CHAINED_BY_M(DONE_BY_M)
         }                                                                                                               \
         s->is.pc = there;                                                                                               \
         s->is.it_state = op->after;                                                                                     \
-        if ((block = enter(s, NULL, way, false)) == NULL) {                                                                    \
+        if ((block = enter(s, NULL, false)) == NULL) {                                                                  \
             return NULL;                                                                                                \
         }                                                                                                               \
         op = block->ops;                                                                                                \
@@ -408,7 +409,7 @@ ended:
         DISPATCH();
     }
 again:
-    if ((block = enter(s, NULL, 0, is_inside)) == NULL) {
+    if ((block = enter(s, NULL, is_inside)) == NULL) {
         return NULL;
     }
     is_inside = false;

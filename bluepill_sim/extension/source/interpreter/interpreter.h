@@ -182,17 +182,23 @@ void interpreter_know(struct interpreter *s, void *row, uint64_t straight, uint6
 void interpreter_forget_rows(struct interpreter *s);
 void interpreter_set_clock(struct interpreter *s, const struct clock *clock);
 void interpreter_set_noted(struct interpreter *s, uint32_t *noted);
-void interpreter_set_trap(struct interpreter *s, void (*trapped)(void *, bool, uint32_t, uint32_t), void *user);
 /* The encoding of an instruction; null: it is undefined. */
 const struct encoding *interpreter_row_of(uint32_t word, bool is_wide);
 #pragma GCC visibility pop
-/* blocks.c, for Python as well. */
+/* run.c and blocks.c, for Python as well. */
+void interpreter_set_trap(struct interpreter *s, void (*trapped)(void *, bool, uint32_t, uint32_t), void *user);
 void interpreter_drop(struct interpreter *s, uint64_t first, uint64_t end);
 
 /* Whether an address is inside the block of which the core has run a part. */
 static inline bool stands_inside(const struct interpreter *s, uint32_t pc)
 {
     return s->is.block_start && pc > s->is.block_start && pc < s->is.block_end;
+}
+
+/* Where a block of flash is found by its address. */
+static inline struct block **interpreter_slot(struct interpreter *s, uint32_t address)
+{
+    return &s->blocks[address >> 1 & (CODE_SLOTS - 1)];
 }
 
 /* Whether an ITSTATE is none, but ICI (ARM B1.4.2). */

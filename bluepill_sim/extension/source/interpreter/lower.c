@@ -12,24 +12,26 @@ enum { LSL_TYPE, LSR_TYPE, ASR_TYPE, ROR_TYPE };
 enum way { CONSTANT, OF_REGISTER, WITH_FLAGS, SHIFTED_REGISTER = 4 };
 enum { NO_REGISTER = 255 };
 
-struct op *interpreter_emit(struct builder *to, enum micro number, uint32_t d, uint32_t n, uint32_t m, uint32_t imm)
-{
-    struct op *op = &to->ops[to->count++];
-    *op = (struct op){.imm = imm, .d = (uint8_t)d, .n = (uint8_t)n, .m = (uint8_t)m, .pc = to->pc, .number = number,
-                      .it = to->it, .after = to->after};
-    return op;
-}
+/* The second operand: a constant, or a register. */
+struct operand {
+    enum way way;
+    uint32_t m, imm;
+};
 
-static struct op *emit(struct builder *to, enum micro number, uint32_t d, uint32_t n, uint32_t m, uint32_t imm)
+static struct operand constant(uint32_t imm) { return (struct operand){.way = CONSTANT, .imm = imm}; }
+static struct operand of_register(uint32_t m) { return (struct operand){.way = OF_REGISTER, .m = m}; }
+
+void interpreter_emit(struct builder *to, const struct emitted *one)
 {
-    return interpreter_emit(to, number, d, n, m, imm);
+    to->ops[to->count++] = (struct op){.number = one->number, .d = (uint8_t)one->d, .n = (uint8_t)one->n, .m = (uint8_t)one->m,
+                                       .a = (uint8_t)one->a, .imm = one->imm, .pc = to->pc, .it = to->it, .after = to->after};
 }
 
 static int32_t sign_extended(uint32_t value, unsigned bits) { return (int32_t)(value << (32 - bits)) >> (32 - bits); }
 
 static enum outcome undefined(struct builder *to)
 {
-    emit(to, OP_UDF, 0, 0, 0, 0);
+    emit(to, OP_UDF);
     return ENDS_BLOCK;
 }
 
@@ -41,7 +43,7 @@ static uint32_t aligned_pc(const struct builder *to) { return read_pc(to) & ~3u;
 static void reads(struct builder *to, uint32_t first, uint32_t second)
 {
     if (first == PC || second == PC) {
-        emit(to, OP_MOV_I, PC, 0, 0, read_pc(to));
+        emit(to, OP_MOV_I, .d = PC, .imm = read_pc(to));
     }
 }
 
@@ -49,12 +51,12 @@ static void reads(struct builder *to, uint32_t first, uint32_t second)
 static enum outcome wrote(struct builder *to, uint32_t d)
 {
     if (d == SP) {
-        emit(to, OP_ALIGN_SP, SP, 0, 0, 0);
+        emit(to, OP_ALIGN_SP, .d = SP);
     }
     if (d != PC) {
         return GOES_ON;
     }
-    emit(to, OP_JUMP, PC, 0, 0, 0);
+    emit(to, OP_JUMP, .d = PC);
     return ENDS_BLOCK;
 }
 
@@ -62,12 +64,12 @@ static enum outcome wrote(struct builder *to, uint32_t d)
 static enum outcome loaded(struct builder *to, uint32_t t)
 {
     if (t == SP) {
-        emit(to, OP_ALIGN_SP, SP, 0, 0, 0);
+        emit(to, OP_ALIGN_SP, .d = SP);
     }
     if (t != PC) {
         return GOES_ON;
     }
-    emit(to, OP_BX, PC, 0, 0, 0);
+    emit(to, OP_BX, .d = PC);
     return ENDS_BLOCK;
 }
 
@@ -80,15 +82,15 @@ static uint32_t shifted(struct builder *to, uint32_t type, uint32_t amount, uint
         return m;
     }
     if (type == ROR_TYPE && amount == 0) {
-        emit(to, sets_carry ? OP_RRX_IC : OP_RRX_I, SHIFTED, 0, m, 0);
+        emit(to, sets_carry ? OP_RRX_IC : OP_RRX_I, .d = SHIFTED, .m = m);
     } else if (amount == 0 && !sets_carry) { /* by 32 */
         if (type == LSR_TYPE) {
-            emit(to, OP_MOV_I, SHIFTED, 0, 0, 0);
+            emit(to, OP_MOV_I, .d = SHIFTED);
         } else {
-            emit(to, OP_ASR_I, SHIFTED, 0, m, 31);
+            emit(to, OP_ASR_I, .d = SHIFTED, .m = m, .imm = 31);
         }
     } else {
-        emit(to, (sets_carry ? with_carry : plain)[type], SHIFTED, 0, m, amount ? amount : 32);
+        emit(to, (sets_carry ? with_carry : plain)[type], .d = SHIFTED, .m = m, .imm = amount ? amount : 32);
     }
     return SHIFTED;
 }
@@ -107,81 +109,85 @@ static uint32_t expanded(uint32_t bits, int *carry)
     return value;
 }
 
-/* Data processing of R(n) and a constant or a register. `number` is the first of the four ways. */
-static enum outcome data(struct builder *to, enum micro number, const struct decoded *one, bool is_constant, uint32_t value)
+/* Data processing of R(n) and a second operand. `number` is the first of the four ways. */
+static enum outcome data(struct builder *to, enum micro number, const struct decoded *one, struct operand by)
 {
-    reads(to, one->n, is_constant ? NO_REGISTER : value);
-    emit(to, number + (is_constant ? CONSTANT : OF_REGISTER) + (one->s ? WITH_FLAGS : 0), one->d, one->n,
-         is_constant ? 0 : value, is_constant ? value : 0);
-    return one->n == SP && is_constant && !(value & 3) && one->d == SP ? GOES_ON : wrote(to, one->d);
+    reads(to, one->n, by.m);
+    emit(to, number + by.way + (one->s ? WITH_FLAGS : 0), .d = one->d, .n = one->n, .m = by.m, .imm = by.imm);
+    return wrote(to, one->d);
 }
 
 /* What only sets flags: `number` is the first of two ways. */
-static enum outcome compare(struct builder *to, enum micro number, const struct decoded *one, bool is_constant, uint32_t value)
+static enum outcome compare(struct builder *to, enum micro number, const struct decoded *one, struct operand by)
 {
-    reads(to, one->n, is_constant ? NO_REGISTER : value);
-    emit(to, number + !is_constant, 0, one->n, is_constant ? 0 : value, is_constant ? value : 0);
+    reads(to, one->n, by.m);
+    emit(to, number + by.way, .n = one->n, .m = by.m, .imm = by.imm);
     return GOES_ON;
 }
 
-static enum outcome move(struct builder *to, const struct decoded *one, bool is_constant, uint32_t value)
+static enum outcome move(struct builder *to, enum micro number, const struct decoded *one, struct operand by)
 {
-    if (!is_constant && value == SHIFTED && to->count && to->ops[to->count - 1].d == SHIFTED && !one->s) {
+    if (by.m == SHIFTED && !one->s) {
         to->ops[to->count - 1].d = (uint8_t)one->d; /* what shifts it may as well put it there */
         return wrote(to, one->d);
     }
-    reads(to, is_constant ? NO_REGISTER : value, NO_REGISTER);
-    emit(to, (is_constant ? OP_MOV_I : OP_MOV_R) + (one->s ? WITH_FLAGS : 0), one->d, 0, is_constant ? 0 : value,
-         is_constant ? value : 0);
+    reads(to, by.m, NO_REGISTER);
+    emit(to, number + by.way + (one->s ? WITH_FLAGS : 0), .d = one->d, .m = by.m, .imm = by.imm);
     return wrote(to, one->d);
 }
 
-static enum outcome move_not(struct builder *to, const struct decoded *one, bool is_constant, uint32_t value)
+static enum outcome move_not(struct builder *to, enum micro number, const struct decoded *one, struct operand by)
 {
-    if (is_constant) {
-        return move(to, one, true, ~value);
+    if (by.way == CONSTANT) {
+        return move(to, OP_MOV_I, one, constant(~by.imm));
     }
-    reads(to, value, NO_REGISTER);
-    emit(to, one->s ? OP_MVN_RS : OP_MVN_R, one->d, 0, value, 0);
+    emit(to, one->s ? OP_MVN_RS : number, .d = one->d, .m = by.m);
     return wrote(to, one->d);
 }
+
+/* Of the shifter's carry: lost, C where flags are set, or C in any case. */
+enum carry { IS_LOST, WITH_S, IS_C };
+/* Whether a micro-operation without flags shifts its register itself. */
+enum shifter { TWO_STEPS, ONE_STEP };
 
 /* The instructions that come with a modified immediate and with a shifted register. */
 struct data_row {
     enum operation with_constant, with_register;
-    enum outcome (*lower)(struct builder *, enum micro, const struct decoded *, bool, uint32_t);
+    enum outcome (*lower)(struct builder *, enum micro, const struct decoded *, struct operand);
     enum micro number;
-    bool is_logical; /* the shifter's carry becomes C */
-    bool always_sets;
-    bool shifts; /* without flags, of a shifted register by one micro-operation */
+    enum carry carry;
+    enum shifter shifter;
 };
 
 /* A shifted register as operand by the same micro-operation; false: that takes two. */
 static bool shifts_itself(struct builder *to, const struct data_row *row, const struct decoded *one, enum outcome *outcome)
 {
-    if (!row->shifts || one->s || !one->i || one->h == ROR_TYPE) {
+    if (row->shifter != ONE_STEP || one->s || !one->i || one->h == ROR_TYPE) {
         return false;
     }
     reads(to, one->n, one->m);
-    emit(to, row->number + SHIFTED_REGISTER + one->h, one->d, one->n, one->m, one->i);
+    emit(to, row->number + SHIFTED_REGISTER + one->h, .d = one->d, .n = one->n, .m = one->m, .imm = one->i);
     *outcome = wrote(to, one->d);
     return true;
 }
 
-static enum outcome move_row(struct builder *to, enum micro number, const struct decoded *one, bool is_constant, uint32_t value)
-{
-    return (number == OP_MOV_I ? move : move_not)(to, one, is_constant, value);
-}
-
 static const struct data_row data_rows[] = {
-    {TST_I, TST_R, compare, OP_TST_I, true, true, false},      {TEQ_I, TEQ_R, compare, OP_TEQ_I, true, true, false},
-    {CMP_I, CMP_R, compare, OP_CMP_I, false, true, false},     {CMN_I, CMN_R, compare, OP_CMN_I, false, true, false},
-    {AND_I, AND_R, data, OP_AND_I, true, false, true},        {BIC_I, BIC_R, data, OP_BIC_I, true, false, true},
-    {ORR_I, ORR_R, data, OP_ORR_I, true, false, true},        {ORN_I, ORN_R, data, OP_ORN_I, true, false, false},
-    {EOR_I, EOR_R, data, OP_EOR_I, true, false, true},        {ADD_I, ADD_R, data, OP_ADD_I, false, false, true},
-    {SUB_I, SUB_R, data, OP_SUB_I, false, false, true},       {RSB_I, RSB_R, data, OP_RSB_I, false, false, true},
-    {ADC_I, ADC_R, data, OP_ADC_I, false, false, false},       {SBC_I, SBC_R, data, OP_SBC_I, false, false, false},
-    {MOV_I, MOV_R, move_row, OP_MOV_I, true, false, false},    {MVN_I, MVN_R, move_row, OP_MVN_R, true, false, false},
+    {TST_I, TST_R, compare, OP_TST_I, IS_C, TWO_STEPS},
+    {TEQ_I, TEQ_R, compare, OP_TEQ_I, IS_C, TWO_STEPS},
+    {CMP_I, CMP_R, compare, OP_CMP_I, IS_LOST, TWO_STEPS},
+    {CMN_I, CMN_R, compare, OP_CMN_I, IS_LOST, TWO_STEPS},
+    {AND_I, AND_R, data, OP_AND_I, WITH_S, ONE_STEP},
+    {BIC_I, BIC_R, data, OP_BIC_I, WITH_S, ONE_STEP},
+    {ORR_I, ORR_R, data, OP_ORR_I, WITH_S, ONE_STEP},
+    {ORN_I, ORN_R, data, OP_ORN_I, WITH_S, TWO_STEPS},
+    {EOR_I, EOR_R, data, OP_EOR_I, WITH_S, ONE_STEP},
+    {ADD_I, ADD_R, data, OP_ADD_I, IS_LOST, ONE_STEP},
+    {SUB_I, SUB_R, data, OP_SUB_I, IS_LOST, ONE_STEP},
+    {RSB_I, RSB_R, data, OP_RSB_I, IS_LOST, ONE_STEP},
+    {ADC_I, ADC_R, data, OP_ADC_I, IS_LOST, TWO_STEPS},
+    {SBC_I, SBC_R, data, OP_SBC_I, IS_LOST, TWO_STEPS},
+    {MOV_I, MOV_R, move, OP_MOV_I, WITH_S, TWO_STEPS},
+    {MVN_I, MVN_R, move_not, OP_MVN_R, WITH_S, TWO_STEPS},
 };
 
 /* Whether it is one of them, lowered then. */
@@ -189,14 +195,14 @@ static bool lower_data(struct builder *to, const struct decoded *one, enum outco
 {
     for (size_t n = 0; n < sizeof data_rows / sizeof data_rows[0]; ++n) {
         const struct data_row *row = &data_rows[n];
-        const bool sets_carry = row->is_logical && (one->s || row->always_sets);
+        const bool sets_carry = row->carry == IS_C || (row->carry == WITH_S && one->s);
         if (one->operation == row->with_constant) {
             int carry;
             const uint32_t value = expanded(one->i, &carry);
             if (sets_carry && carry >= 0) {
-                emit(to, OP_SET_C, 0, 0, 0, (uint32_t)carry);
+                emit(to, OP_SET_C, .imm = (uint32_t)carry);
             }
-            *outcome = row->lower(to, row->number, one, true, value);
+            *outcome = row->lower(to, row->number, one, constant(value));
             return true;
         }
         if (one->operation == row->with_register) {
@@ -204,7 +210,7 @@ static bool lower_data(struct builder *to, const struct decoded *one, enum outco
                 return true;
             }
             reads(to, one->m, NO_REGISTER);
-            *outcome = row->lower(to, row->number, one, false, shifted(to, one->h, one->i, one->m, sets_carry));
+            *outcome = row->lower(to, row->number, one, of_register(shifted(to, one->h, one->i, one->m, sets_carry)));
             return true;
         }
     }
@@ -237,13 +243,13 @@ static enum outcome access_constant(struct builder *to, const struct access_row 
     reads(to, one->n, row->is_load ? NO_REGISTER : one->t);
     const bool goes_back = change && one->n != PC && !(row->is_load && one->t == one->n);
     const bool jumps = row->is_load && one->t == PC; /* the base is written first */
-    emit(to, row->number, jumps ? SHIFTED : one->t, one->n, 0, offset);
+    emit(to, row->number, .d = jumps ? SHIFTED : one->t, .n = one->n, .imm = offset);
     if (goes_back) {
-        emit(to, OP_ADD_I, one->n, one->n, 0, change);
-        wrote(to, change & 3 ? one->n : NO_REGISTER);
+        emit(to, OP_ADD_I, .d = one->n, .n = one->n, .imm = change);
+        wrote(to, one->n);
     }
     if (jumps) {
-        emit(to, OP_BX, SHIFTED, 0, 0, 0);
+        emit(to, OP_BX, .d = SHIFTED);
         return ENDS_BLOCK;
     }
     return row->is_load ? loaded(to, one->t) : GOES_ON;
@@ -255,17 +261,17 @@ static enum outcome access_register(struct builder *to, const struct access_row 
     if (!row->is_load) {
         reads(to, one->t, NO_REGISTER);
     }
-    emit(to, row->number + 1, one->t, one->n, one->m, 0)->a = (uint8_t)by;
+    emit(to, row->number + 1, .d = one->t, .n = one->n, .m = one->m, .a = by);
     return row->is_load ? loaded(to, one->t) : GOES_ON;
 }
 
 static enum outcome literal(struct builder *to, enum micro number, uint32_t t, uint32_t address)
 {
     if (number == OP_LDR_I) {
-        emit(to, OP_LDR_LITERAL, t, 0, 0, address);
+        emit(to, OP_LDR_LITERAL, .d = t, .imm = address);
     } else {
-        emit(to, OP_MOV_I, ADDRESS, 0, 0, address);
-        emit(to, number, t, ADDRESS, 0, 0);
+        emit(to, OP_MOV_I, .d = ADDRESS, .imm = address);
+        emit(to, number, .d = t, .n = ADDRESS);
     }
     return loaded(to, t);
 }
@@ -304,18 +310,18 @@ static enum outcome dual(struct builder *to, const struct decoded *one, bool is_
     const uint32_t change = one->u ? 4 * one->i : 0u - 4 * one->i;
     uint32_t base = one->n;
     if (base == PC) {
-        emit(to, OP_MOV_I, ADDRESS, 0, 0, aligned_pc(to));
+        emit(to, OP_MOV_I, .d = ADDRESS, .imm = aligned_pc(to));
         base = ADDRESS;
     } else if (goes_back || (is_load && (one->t == base || one->a == base))) {
-        emit(to, OP_MOV_R, ADDRESS, 0, base, 0);
+        emit(to, OP_MOV_R, .d = ADDRESS, .m = base);
         base = ADDRESS;
     }
     if (!is_load) {
         reads(to, one->t, one->a);
     }
-    emit(to, is_load ? OP_LDRD : OP_STRD, one->t, base, one->n < SP, is_post ? 0 : change)->a = (uint8_t)one->a;
+    emit(to, is_load ? OP_LDRD : OP_STRD, .d = one->t, .n = base, .a = one->a, .imm = is_post ? 0 : change);
     if (goes_back) {
-        emit(to, OP_ADD_I, one->n, ADDRESS, 0, change);
+        emit(to, OP_ADD_I, .d = one->n, .n = ADDRESS, .imm = change);
         if (one->n == PC) {
             return wrote(to, PC);
         }
@@ -324,7 +330,7 @@ static enum outcome dual(struct builder *to, const struct decoded *one, bool is_
         return GOES_ON;
     }
     if (one->t == SP || one->a == SP) {
-        emit(to, OP_ALIGN_SP, SP, 0, 0, 0);
+        emit(to, OP_ALIGN_SP, .d = SP);
     }
     return wrote(to, one->t == PC || one->a == PC ? PC : NO_REGISTER);
 }
@@ -336,17 +342,16 @@ static enum outcome multiple(struct builder *to, bool is_load, uint32_t n, uint3
     const uint32_t before = list & ((1u << to->next) - 1);
     const int count = __builtin_popcount(list), step = is_before ? -count : count, moved = __builtin_popcount(before);
     if (moved && change && !is_load) {
-        emit(to, OP_ADD_I, n, n, 0, 0u - 4 * (uint32_t)step);
+        emit(to, OP_ADD_I, .d = n, .n = n, .imm = 0u - 4 * (uint32_t)step);
     }
     const uint32_t first = (uint32_t)((is_before ? -count : 0) + moved) & 0xFF;
-    struct op *op = emit(to, is_load ? OP_LDM : OP_STM, 0, n, n < SP, (list & ~before) | first << 16);
+    emit(to, is_load ? OP_LDM : OP_STM, .n = n, .a = (uint32_t)(change ? step : 0), .imm = (list & ~before) | first << 16);
     to->moved += (uint8_t)moved;
-    op->a = (uint8_t)(change ? step : 0);
     if (!is_load) {
         return GOES_ON;
     }
     if (list >> SP & 1) {
-        emit(to, OP_ALIGN_SP, SP, 0, 0, 0);
+        emit(to, OP_ALIGN_SP, .d = SP);
     }
     return loaded(to, list >> PC & 1 ? PC : NO_REGISTER);
 }
@@ -369,7 +374,8 @@ static enum outcome exclusive(struct builder *to, const struct decoded *one, boo
     if (is_open || (!is_load && (one->d == PC || one->d == SP || one->d == one->n || one->d == one->t))) {
         return undefined(to);
     }
-    emit(to, is_load ? OP_LDREX : OP_STREX, is_load ? one->t : one->d, one->n, one->t, 4 * one->i)->a = (uint8_t)bytes;
+    emit(to, is_load ? OP_LDREX : OP_STREX, .d = is_load ? one->t : one->d, .n = one->n, .m = one->t, .a = bytes,
+         .imm = 4 * one->i);
     return GOES_ON;
 }
 
@@ -378,10 +384,10 @@ static enum outcome branch(struct builder *to, enum micro number, uint32_t offse
 {
     const uint32_t target = read_pc(to) + offset;
     if (target == to->end) { /* either way goes straight on, which costs alike */
-        emit(to, OP_STRAIGHT_ON, 0, 0, 0, 0);
+        emit(to, OP_STRAIGHT_ON);
     } else {
         to->target = target;
-        emit(to, number, 0, 0, 0, 0);
+        emit(to, number);
     }
     return ENDS_BLOCK;
 }
@@ -409,7 +415,7 @@ static uint32_t near_offset(const struct decoded *one)
 /* An address near the instruction; a write of the PC by it exchanges. */
 static enum outcome near_address(struct builder *to, const struct decoded *one, uint32_t address)
 {
-    emit(to, OP_MOV_I, one->d, 0, 0, address);
+    emit(to, OP_MOV_I, .d = one->d, .imm = address);
     return loaded(to, one->d);
 }
 
@@ -418,14 +424,14 @@ static enum outcome low(struct builder *to, enum micro number, struct decoded *o
 {
     one->s = !to->it;
     one->n = one->d;
-    return data(to, number, one, false, one->m);
+    return data(to, number, one, of_register(one->m));
 }
 
 static enum outcome low_constant(struct builder *to, enum micro number, struct decoded *one, uint32_t n)
 {
     one->s = !to->it;
     one->n = n;
-    return data(to, number, one, true, one->i);
+    return data(to, number, one, constant(one->i));
 }
 
 /* A 16-bit shift by a constant; 0 stands for 32, but of LSL for none. */
@@ -433,11 +439,11 @@ static enum outcome shift(struct builder *to, uint32_t type, const struct decode
 {
     static const enum micro with_flags[] = {OP_LSL_IS, OP_LSR_IS, OP_ASR_IS};
     if (type == LSL_TYPE && !one->i) {
-        emit(to, to->it ? OP_MOV_R : OP_MOV_RS, one->d, 0, one->m, 0);
+        emit(to, to->it ? OP_MOV_R : OP_MOV_RS, .d = one->d, .m = one->m);
     } else if (!to->it) {
-        emit(to, with_flags[type], one->d, 0, one->m, one->i ? one->i : 32);
+        emit(to, with_flags[type], .d = one->d, .m = one->m, .imm = one->i ? one->i : 32);
     } else {
-        return move(to, one, false, shifted(to, type, one->i, one->m, false));
+        return move(to, OP_MOV_I, one, of_register(shifted(to, type, one->i, one->m, false)));
     }
     return GOES_ON;
 }
@@ -447,14 +453,14 @@ static enum outcome shift_by_register(struct builder *to, uint32_t type, const s
     static const enum micro plain[] = {OP_LSL_R, OP_LSR_R, OP_ASR_R, OP_ROR_R};
     static const enum micro with_flags[] = {OP_LSL_RS, OP_LSR_RS, OP_ASR_RS, OP_ROR_RS};
     reads(to, n, one->m);
-    emit(to, (sets ? with_flags : plain)[type], one->d, n, one->m, 0);
+    emit(to, (sets ? with_flags : plain)[type], .d = one->d, .n = n, .m = one->m);
     return wrote(to, one->d);
 }
 
 static enum outcome simple(struct builder *to, enum micro number, const struct decoded *one)
 {
     reads(to, one->n, one->m);
-    emit(to, number, one->d, one->n, one->m, 0)->a = (uint8_t)one->a;
+    emit(to, number, .d = one->d, .n = one->n, .m = one->m, .a = one->a);
     return wrote(to, one->d);
 }
 
@@ -463,10 +469,10 @@ static enum outcome extend(struct builder *to, enum micro number, const struct d
     reads(to, one->m, NO_REGISTER);
     uint32_t from = one->m;
     if (one->i) {
-        emit(to, OP_ROR_I, SHIFTED, 0, from, 8 * one->i);
+        emit(to, OP_ROR_I, .d = SHIFTED, .m = from, .imm = 8 * one->i);
         from = SHIFTED;
     }
-    emit(to, number, one->d, 0, from, 0);
+    emit(to, number, .d = one->d, .m = from);
     return wrote(to, one->d);
 }
 
@@ -485,13 +491,13 @@ static enum outcome bit_field(struct builder *to, const struct decoded *one)
     if (is_extract ? low + last > 31 : last < low) {
         return undefined(to);
     }
-    reads(to, one->operation == BFC ? NO_REGISTER : one->n, one->d);
+    reads(to, one->n, one->d);
     const uint32_t ones = UINT32_MAX >> (31 - (is_extract ? last : last - low));
     switch (one->operation) {
-    case SBFX: emit(to, OP_SBFX, one->d, one->n, 0, 31 - low - last)->a = (uint8_t)(31 - last); break;
-    case UBFX: emit(to, OP_UBFX, one->d, one->n, 0, ones)->a = (uint8_t)low; break;
-    case BFC: emit(to, OP_BIC_I, one->d, one->d, 0, ones << low); break;
-    default: emit(to, OP_BFI, one->d, one->n, 0, ones << low)->a = (uint8_t)low;
+    case SBFX: emit(to, OP_SBFX, .d = one->d, .n = one->n, .a = 31 - last, .imm = 31 - low - last); break;
+    case UBFX: emit(to, OP_UBFX, .d = one->d, .n = one->n, .a = low, .imm = ones); break;
+    case BFC: emit(to, OP_BIC_I, .d = one->d, .n = one->d, .imm = ones << low); break;
+    default: emit(to, OP_BFI, .d = one->d, .n = one->n, .a = low, .imm = ones << low);
     }
     return wrote(to, one->d);
 }
@@ -500,28 +506,28 @@ static enum outcome saturate(struct builder *to, const struct decoded *one)
 {
     reads(to, one->n, NO_REGISTER);
     const uint32_t from = shifted(to, one->h ? ASR_TYPE : LSL_TYPE, one->i, one->n, false);
-    emit(to, one->operation == SSAT ? OP_SSAT : OP_USAT, one->d, from, 0, (1u << one->b) - 1);
+    emit(to, one->operation == SSAT ? OP_SSAT : OP_USAT, .d = one->d, .n = from, .imm = (1u << one->b) - 1);
     return wrote(to, one->d);
 }
 
 static enum outcome table_branch(struct builder *to, const struct decoded *one, uint32_t by)
 {
     reads(to, one->n, one->m);
-    emit(to, OP_TABLE, SHIFTED, one->n, one->m, 0)->a = (uint8_t)by;
-    emit(to, OP_TABLE_JUMP, SHIFTED, 0, 0, read_pc(to));
+    emit(to, OP_TABLE, .d = SHIFTED, .n = one->n, .m = one->m, .a = by);
+    emit(to, OP_TABLE_JUMP, .d = SHIFTED, .imm = read_pc(to));
     return ENDS_BLOCK;
 }
 
 /* What ends the block because masks or the pipeline may be others behind it. */
 static enum outcome ends_behind(struct builder *to)
 {
-    emit(to, OP_STRAIGHT_ON, 0, 0, 0, 0);
+    emit(to, OP_STRAIGHT_ON);
     return ENDS_BLOCK;
 }
 
 static enum outcome ends_run(struct builder *to, enum micro number)
 {
-    emit(to, number, 0, 0, 0, to->end);
+    emit(to, number, .imm = to->end);
     return ENDS_BLOCK;
 }
 
@@ -538,12 +544,12 @@ enum outcome interpreter_lower(struct builder *to, const struct decoded *given)
     case LSL_T1: return shift(to, LSL_TYPE, one);
     case LSR_T1: return shift(to, LSR_TYPE, one);
     case ASR_T1: return shift(to, ASR_TYPE, one);
-    case ADD_R3: one->s = !to->it; return data(to, OP_ADD_I, one, false, one->m);
-    case SUB_R3: one->s = !to->it; return data(to, OP_SUB_I, one, false, one->m);
+    case ADD_R3: one->s = !to->it; return data(to, OP_ADD_I, one, of_register(one->m));
+    case SUB_R3: one->s = !to->it; return data(to, OP_SUB_I, one, of_register(one->m));
     case ADD_I3: return low_constant(to, OP_ADD_I, one, one->n);
     case SUB_I3: return low_constant(to, OP_SUB_I, one, one->n);
-    case MOV_I8: one->s = !to->it; return move(to, one, true, one->i);
-    case CMP_I8: one->n = one->d; return compare(to, OP_CMP_I, one, true, one->i);
+    case MOV_I8: one->s = !to->it; return move(to, OP_MOV_I, one, constant(one->i));
+    case CMP_I8: one->n = one->d; return compare(to, OP_CMP_I, one, constant(one->i));
     case ADD_I8: return low_constant(to, OP_ADD_I, one, one->d);
     case SUB_I8: return low_constant(to, OP_SUB_I, one, one->d);
     case AND_T1: return low(to, OP_AND_I, one);
@@ -556,20 +562,20 @@ enum outcome interpreter_lower(struct builder *to, const struct decoded *given)
     case LSR_RT1: return shift_by_register(to, LSR_TYPE, one, one->d, !to->it);
     case ASR_RT1: return shift_by_register(to, ASR_TYPE, one, one->d, !to->it);
     case ROR_RT1: return shift_by_register(to, ROR_TYPE, one, one->d, !to->it);
-    case TST_T1: one->n = one->d; return compare(to, OP_TST_I, one, false, one->m);
-    case CMP_T1: one->n = one->d; return compare(to, OP_CMP_I, one, false, one->m);
-    case CMN_T1: one->n = one->d; return compare(to, OP_CMN_I, one, false, one->m);
+    case TST_T1: one->n = one->d; return compare(to, OP_TST_I, one, of_register(one->m));
+    case CMP_T1: one->n = one->d; return compare(to, OP_CMP_I, one, of_register(one->m));
+    case CMN_T1: one->n = one->d; return compare(to, OP_CMN_I, one, of_register(one->m));
     case RSB_T1: one->i = 0; return low_constant(to, OP_RSB_I, one, one->n);
-    case MVN_T1: one->s = !to->it; return move_not(to, one, false, one->m);
-    case MUL_T1: emit(to, to->it ? OP_MUL : OP_MUL_S, one->d, one->d, one->m, 0); return GOES_ON;
-    case ADD_T2: one->n = one->d; return data(to, OP_ADD_I, one, false, one->m);
-    case ADD_PC: one->d = one->n = PC; return data(to, OP_ADD_I, one, false, one->m);
-    case MOV_T1: return move(to, one, false, one->m);
-    case MOV_PC: one->d = PC; return move(to, one, false, one->m);
+    case MVN_T1: one->s = !to->it; return move_not(to, OP_MVN_R, one, of_register(one->m));
+    case MUL_T1: emit(to, to->it ? OP_MUL : OP_MUL_S, .d = one->d, .n = one->d, .m = one->m); return GOES_ON;
+    case ADD_T2: one->n = one->d; return data(to, OP_ADD_I, one, of_register(one->m));
+    case ADD_PC: one->d = one->n = PC; return data(to, OP_ADD_I, one, of_register(one->m));
+    case MOV_T1: return move(to, OP_MOV_I, one, of_register(one->m));
+    case MOV_PC: one->d = PC; return move(to, OP_MOV_I, one, of_register(one->m));
     case ADR_T1: return near_address(to, one, aligned_pc(to) + 4 * one->i);
-    case ADD_SP_T1: one->n = SP; return data(to, OP_ADD_I, one, true, 4 * one->i);
-    case ADD_SP_T2: emit(to, OP_ADD_I, SP, SP, 0, 4 * one->i); return GOES_ON;
-    case SUB_SP_T1: emit(to, OP_SUB_I, SP, SP, 0, 4 * one->i); return GOES_ON;
+    case ADD_SP_T1: one->n = SP; return data(to, OP_ADD_I, one, constant(4 * one->i));
+    case ADD_SP_T2: emit(to, OP_ADD_I, .d = SP, .n = SP, .imm = 4 * one->i); return GOES_ON;
+    case SUB_SP_T1: emit(to, OP_SUB_I, .d = SP, .n = SP, .imm = 4 * one->i); return GOES_ON;
     case SXTH_T1:
     case SXTH: return extend(to, OP_SXTH, one);
     case SXTB_T1:
@@ -586,8 +592,8 @@ enum outcome interpreter_lower(struct builder *to, const struct decoded *given)
 
     /* 16 bits: memory. */
     case LDR_LITERAL_T1: return literal(to, OP_LDR_I, one->t, aligned_pc(to) + 4 * one->i);
-    case STR_SP: emit(to, OP_STR_I, one->t, SP, 0, 4 * one->i); return GOES_ON;
-    case LDR_SP: emit(to, OP_LDR_I, one->t, SP, 0, 4 * one->i); return GOES_ON;
+    case STR_SP: emit(to, OP_STR_I, .d = one->t, .n = SP, .imm = 4 * one->i); return GOES_ON;
+    case LDR_SP: emit(to, OP_LDR_I, .d = one->t, .n = SP, .imm = 4 * one->i); return GOES_ON;
     case PUSH:
         return one->r ? multiple(to, false, SP, (one->r & 0xFF) | one->r >> 8 << LR, true, true) : undefined(to);
     case POP: return one->r ? multiple(to, true, SP, (one->r & 0xFF) | one->r >> 8 << PC, false, true) : undefined(to);
@@ -613,12 +619,12 @@ enum outcome interpreter_lower(struct builder *to, const struct decoded *given)
     /* 32 bits: data. */
     case ADR_ADD: return near_address(to, one, aligned_pc(to) + one->i);
     case ADR_SUB: return near_address(to, one, aligned_pc(to) - one->i);
-    case ADDW: return data(to, OP_ADD_I, one, true, one->i);
-    case SUBW: return data(to, OP_SUB_I, one, true, one->i);
-    case MOVW: return move(to, one, true, one->j << 12 | one->i);
+    case ADDW: return data(to, OP_ADD_I, one, constant(one->i));
+    case SUBW: return data(to, OP_SUB_I, one, constant(one->i));
+    case MOVW: return move(to, OP_MOV_I, one, constant(one->j << 12 | one->i));
     case MOVT:
         reads(to, one->d, NO_REGISTER);
-        emit(to, OP_MOVT, one->d, 0, 0, (one->j << 12 | one->i) << 16);
+        emit(to, OP_MOVT, .d = one->d, .imm = (one->j << 12 | one->i) << 16);
         return wrote(to, one->d);
     case SSAT:
     case USAT: return saturate(to, one);
@@ -645,24 +651,24 @@ enum outcome interpreter_lower(struct builder *to, const struct decoded *given)
     case B_T2: return branch(to, OP_B, (uint32_t)sign_extended(one->i, 11) << 1);
     case B_T3: return branch(to, OP_B_EQ + one->c, near_offset(one));
     case B_T4: return branch(to, OP_B, far_offset(one));
-    case BL: emit(to, OP_MOV_I, LR, 0, 0, to->end | 1); return branch(to, OP_B, far_offset(one));
+    case BL: emit(to, OP_MOV_I, .d = LR, .imm = to->end | 1); return branch(to, OP_B, far_offset(one));
     case CBZ: return compare_and_branch(to, OP_CBZ, one);
     case CBNZ: return compare_and_branch(to, OP_CBNZ, one);
-    case BX: reads(to, one->m, NO_REGISTER); emit(to, OP_BX, one->m, 0, 0, 0); return ENDS_BLOCK;
-    case BLX: reads(to, one->m, NO_REGISTER); emit(to, OP_BLX, one->m, 0, 0, to->end | 1); return ENDS_BLOCK;
+    case BX: reads(to, one->m, NO_REGISTER); emit(to, OP_BX, .d = one->m); return ENDS_BLOCK;
+    case BLX: reads(to, one->m, NO_REGISTER); emit(to, OP_BLX, .d = one->m, .imm = to->end | 1); return ENDS_BLOCK;
     case TBB: return table_branch(to, one, 0);
     case TBH: return table_branch(to, one, 1);
 
     /* What stands alone. */
-    case MRS: emit(to, OP_MRS, one->d, 0, 0, one->i); return wrote(to, one->d);
-    case MSR: reads(to, one->n, NO_REGISTER); emit(to, OP_MSR, 0, one->n, 0, one->b << 8 | one->i); return ends_behind(to);
-    case CPS: emit(to, OP_CPS, 0, 0, 0, one->u << 2 | one->i); return ends_behind(to);
+    case MRS: emit(to, OP_MRS, .d = one->d, .imm = one->i); return wrote(to, one->d);
+    case MSR: reads(to, one->n, NO_REGISTER); emit(to, OP_MSR, .n = one->n, .imm = one->b << 8 | one->i); return ends_behind(to);
+    case CPS: emit(to, OP_CPS, .imm = one->u << 2 | one->i); return ends_behind(to);
     case ISB: return ends_behind(to);
-    case CLREX: emit(to, OP_CLREX, 0, 0, 0, 0); return GOES_ON;
+    case CLREX: emit(to, OP_CLREX); return GOES_ON;
     case DSB:
     case DMB:
     case SEV:
-    case NOP: emit(to, OP_NOP, 0, 0, 0, 0); return GOES_ON;
+    case NOP: emit(to, OP_NOP); return GOES_ON;
     case IT: return GOES_ON;
     case YIELD:
     case WFE: return ends_run(to, OP_HINT);

@@ -25,12 +25,25 @@ struct builder {
     bool has_target;
 };
 
+/* A micro-operation, as `struct op` has it. */
+struct emitted {
+    enum micro number;
+    uint32_t d, n, m, a, imm;
+};
+
+/* For who looks at the tables, in Python. */
+void interpreter_take_apart(uint32_t word, bool is_wide, struct decoded *one);
+size_t interpreter_look(struct interpreter *s, const uint8_t *code, uint32_t bytes, uint16_t (*seen)[2], size_t room);
+
 #pragma GCC visibility push(hidden)
 /* Adds an instruction's micro-operations. */
 enum outcome interpreter_lower(struct builder *to, const struct decoded *one);
 /* Makes them fewer, and gives each its code. */
 void interpreter_tidy(struct builder *to);
-struct op *interpreter_emit(struct builder *to, enum micro number, uint32_t d, uint32_t n, uint32_t m, uint32_t imm);
+void interpreter_emit(struct builder *to, const struct emitted *one);
 #pragma GCC visibility pop
+
+/* Adds one micro-operation: its number, and by their names the operands that it has. */
+#define emit(to, ...) interpreter_emit((to), &(struct emitted){.number = __VA_ARGS__})
 
 #endif

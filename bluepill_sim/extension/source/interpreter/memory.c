@@ -1,7 +1,6 @@
 /* Memory: where an address is, and the accesses that are not made at once: peripherals, flash, watched and failed ones.
  *
- * An access that is not aligned is made by the bus in parts: a load as two aligned ones, a store byte by byte where it is
- * not to plain memory. Source: ARMv7-M Architecture Reference Manual A3.2.1; unicorn.h and softmmu of Unicorn 2.1.
+ * An access that is not aligned is made by the bus in parts: a load as two aligned ones, a store byte by byte. Source: ARMv7-M Architecture Reference Manual A3.2.1; unicorn.h and softmmu of Unicorn 2.1.
  */
 #include <string.h>
 
@@ -83,7 +82,7 @@ static struct region *io_region(struct interpreter *s, uint32_t address)
     return s->last_io;
 }
 
-/* An aligned load, or one within plain memory. */
+/* An aligned load. */
 static bool load_part(struct interpreter *s, const struct op *op, uint32_t address, uint32_t bytes, uint32_t *value)
 {
     uint32_t place = address;
@@ -119,12 +118,6 @@ bool interpreter_is_trapped(struct interpreter *s, const struct op *op, bool is_
     return s->stops;
 }
 
-static bool is_plain(struct interpreter *s, uint32_t address, uint32_t bytes)
-{
-    const struct region *region = interpreter_region(s, address);
-    return region != NULL && region->host != NULL && region->last - address >= bytes - 1;
-}
-
 bool interpreter_load(struct interpreter *s, const struct op *op, uint32_t address, uint32_t bytes, uint32_t *value)
 {
     const uint32_t low = address & (bytes - 1);
@@ -141,7 +134,7 @@ bool interpreter_load(struct interpreter *s, const struct op *op, uint32_t addre
         }
     }
     /* What is nowhere fails as a whole. */
-    if (!low || (!s->finds_pages && is_plain(s, address, bytes)) || interpreter_region(s, address) == NULL) {
+    if (!low || interpreter_region(s, address) == NULL) {
         return load_part(s, op, address, bytes, value);
     }
     uint32_t first, second;
@@ -185,7 +178,7 @@ bool interpreter_store(struct interpreter *s, const struct op *op, uint32_t addr
     }
     const struct region *region = interpreter_region(s, address);
     const bool fails_whole = region == NULL || (region->host != NULL && !region->is_writable);
-    if (!(address & (bytes - 1)) || fails_whole || is_plain(s, address, bytes)) {
+    if (!(address & (bytes - 1)) || fails_whole) {
         return store_part(s, op, address, bytes, value);
     }
     for (uint32_t n = 0; n < bytes; ++n) {

@@ -359,10 +359,10 @@ ACCESSES(LDR_LITERAL)
     return true;
 }
 
-/* Transfers of several words from a base that has to be aligned: `m` tells whether that is looked at. */
+/* Transfers of several words from a base that has to be aligned. */
 AT_ONCE bool is_misaligned(struct interpreter *s, const struct op *op, uint32_t base)
 {
-    return UNLIKELY(base & 3 && op->m) && interpreter_is_trapped(s, op, true, base);
+    return UNLIKELY(base & 3) && interpreter_is_trapped(s, op, true, base);
 }
 
 /* Two words at x + imm, of R(d) and R(a). */

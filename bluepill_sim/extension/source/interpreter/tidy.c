@@ -15,25 +15,23 @@ struct effect {
     uint8_t sets, reads, may_set; /* `may_set`: sometimes, beside what it always sets */
 };
 
-#define LOGICAL(name) {OP_##name##_IS, OP_##name##_I, NZ, 0, 0}, {OP_##name##_RS, OP_##name##_R, NZ, 0, 0},
-#define ARITHMETIC(name)                                                                                                \
-    {OP_##name##_IS, OP_##name##_I, ALL_FLAGS, 0, 0}, {OP_##name##_RS, OP_##name##_R, ALL_FLAGS, 0, 0},
-#define WITH_CARRY(name)                                                                                                \
-    {OP_##name##_IS, OP_##name##_I, ALL_FLAGS, CARRY, 0}, {OP_##name##_RS, OP_##name##_R, ALL_FLAGS, CARRY, 0},         \
-        {OP_##name##_I, OP_##name##_I, 0, CARRY, 0}, {OP_##name##_R, OP_##name##_R, 0, CARRY, 0},
-#define ONLY_FLAGS(name, flags) {OP_##name##_I, OP_NOP, flags, 0, 0}, {OP_##name##_R, OP_NOP, flags, 0, 0},
+#define SETS(name, without, flags, ...) {OP_##name, OP_##without, .sets = flags, __VA_ARGS__},
+#define SETS_BOTH(name, ...) SETS(name##_IS, name##_I, __VA_ARGS__) SETS(name##_RS, name##_R, __VA_ARGS__)
+#define READS(name) {OP_##name, OP_##name, .reads = CARRY},
+#define LOGICAL(name) SETS_BOTH(name, NZ)
+#define ARITHMETIC(name) SETS_BOTH(name, ALL_FLAGS)
+#define WITH_CARRY(name) SETS_BOTH(name, ALL_FLAGS, .reads = CARRY) READS(name##_I) READS(name##_R)
+#define ONLY_FLAGS(name, flags) SETS(name##_I, NOP, flags) SETS(name##_R, NOP, flags)
 #define SHIFT(name)                                                                                                     \
-    {OP_##name##_IC, OP_##name##_I, CARRY, 0, 0}, {OP_##name##_IS, OP_##name##_I, NZ | CARRY, 0, 0},                    \
-        {OP_##name##_RS, OP_##name##_R, NZ, 0, CARRY},
+    SETS(name##_IC, name##_I, CARRY) SETS(name##_IS, name##_I, NZ | CARRY) SETS(name##_RS, name##_R, NZ, .may_set = CARRY)
 
 static const struct effect effects[] = {
     LOGICAL(MOV) LOGICAL(AND) LOGICAL(BIC) LOGICAL(ORR) LOGICAL(ORN) LOGICAL(EOR)
     ARITHMETIC(ADD) ARITHMETIC(SUB) ARITHMETIC(RSB) WITH_CARRY(ADC) WITH_CARRY(SBC)
     ONLY_FLAGS(TST, NZ) ONLY_FLAGS(TEQ, NZ) ONLY_FLAGS(CMP, ALL_FLAGS) ONLY_FLAGS(CMN, ALL_FLAGS)
     SHIFT(LSL) SHIFT(LSR) SHIFT(ASR)
-    {OP_MVN_RS, OP_MVN_R, NZ, 0, 0}, {OP_MUL_S, OP_MUL, NZ, 0, 0}, {OP_SET_C, OP_NOP, CARRY, 0, 0},
-    {OP_ROR_IC, OP_ROR_I, CARRY, 0, 0}, {OP_ROR_RS, OP_ROR_R, NZ, 0, CARRY},
-    {OP_RRX_IC, OP_RRX_I, CARRY, CARRY, 0}, {OP_RRX_I, OP_RRX_I, 0, CARRY, 0},
+    SETS(MVN_RS, MVN_R, NZ) SETS(MUL_S, MUL, NZ) SETS(SET_C, NOP, CARRY) SETS(ROR_IC, ROR_I, CARRY)
+    SETS(ROR_RS, ROR_R, NZ, .may_set = CARRY) SETS(RRX_IC, RRX_I, CARRY, .reads = CARRY) READS(RRX_I)
 };
 
 static const struct effect *effect_of(enum micro number)
@@ -140,7 +138,7 @@ static const struct sequence {
     uint16_t first, second, third, code;
 } sequences[] = {
     BRANCHING_TRIPLES(TRIPLE_ROW) TRIPLES(TRIPLE_ROW) BRANCHING_PAIRS(PAIR_ROW) PAIRS(PAIR_ROW)
-    {ANYTHING, ANYTHING, ANYTHING, 0}, /* of no micro-operation: there may be no other */
+    {.first = ANYTHING}, /* of no micro-operation: there may be no other */
 };
 
 /* The code that runs a micro-operation together with the next ones, where there is such; so many are `left`. */

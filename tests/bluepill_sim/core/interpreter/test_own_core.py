@@ -25,6 +25,7 @@ TRAP = """
 movs r3, #0
 mov32 r4, #0x20000802
 here: {code}
+movs r5, #7
 b stop
 trap: ldr r0, [sp, #24]
 log r0
@@ -107,6 +108,7 @@ def test_a_trap_is_taken_at_its_instruction(
     machine = boot(TRAPS_ON.format(ccr=ccr) + TRAP.format(code=code), {USAGE_FAULT: "trap"}).run(20)
     assert machine.is_done
     assert machine.log == ([] if cfsr is None else [machine.label("here"), cfsr])
+    assert machine.board.register("R5") == (7 if cfsr is None else 0), "nothing behind it has run"
 
 
 def test_a_debugger_may_have_a_run_go_on_elsewhere_in_the_block_inside_which_it_stands(
