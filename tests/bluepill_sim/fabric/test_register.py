@@ -81,9 +81,11 @@ def test_a_write_of_some_lanes_leaves_the_other_lanes_alone(
         {"mask": 1, "triggers": 1},
         {"mask": 0, "write_zero_to_clear": 2, "triggers": 2},
         {"mask": 0, "triggers": 1 << 32},
+        {"on_read": "_read"},
+        {"on_read": "_read", "writable": 0, "write_one_to_clear": 1},
     ],
 )
-def test_a_declaration_that_contradicts_itself_is_refused(fields: dict[str, int]) -> None:
+def test_a_declaration_that_contradicts_itself_is_refused(fields: dict[str, int | str]) -> None:
     with pytest.raises(ValueError, match="R"):
         Register(**{"name": "R", "offset": 0, **fields})  # type: ignore[arg-type]  # deliberately wrong
 
