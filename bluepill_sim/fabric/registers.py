@@ -126,6 +126,8 @@ class Register:
             raise ValueError(f"{self.name}: the reset value holds bits that do not read")
         if self.readable & ~fields:
             raise ValueError(f"{self.name}: bits {self.readable & ~fields:#x} read, and no field has them")
+        if nameless := (self.writable | self.write_one_to_clear | self.write_zero_to_clear | self.triggers) & ~fields:
+            raise ValueError(f"{self.name}: bits {nameless:#x} take what is written, and no field has them")
 
     def _bits_of_fields(self) -> int:
         """Return the bits that a field has; all of them where none is named."""

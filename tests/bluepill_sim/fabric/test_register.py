@@ -131,6 +131,13 @@ def test_a_bit_that_reads_is_of_a_field() -> None:
         Register(name="R", offset=0, mask=7, fields="EN 1")
 
 
+@pytest.mark.parametrize("kind", ["writable", "write_one_to_clear", "write_zero_to_clear", "triggers"])
+def test_a_bit_that_takes_what_is_written_is_of_a_field(kind: str) -> None:
+    bits_of: dict[str, int] = {"readable": 1, "writable": 0, kind: 2}
+    with pytest.raises(ValueError, match="R: bits 0x2 take what is written, and no field has them"):
+        Register(name="R", offset=0, fields="A 0", **bits_of)  # type: ignore[arg-type]  # masks alone
+
+
 def test_the_bits_of_a_register_are_those_of_its_fields_in_any_order() -> None:
     one = Register(name="R", offset=0, fields="EN 0, TSEL 5:3, DMAEN 31")
     other = Register(name="R", offset=0, fields="DMAEN 31, EN 0, TSEL 5:3")

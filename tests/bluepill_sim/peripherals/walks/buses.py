@@ -415,9 +415,16 @@ def _usb_mode(w: RegisterWalker) -> None:
     w.turn("USB.CNTR", on=w.pick((0, 8, 12, 16, 1, 2)), off=w.pick((31, 31, 8, 16)))
 
 
+def _usb_cable(w: RegisterWalker) -> None:
+    wanted = bool(w.number(3))
+    w.note(f"the pull-up counts: {wanted}")
+    w.part("USB").heed_pull_up(wanted)
+    w.drive("PA12", w.pick((False, True, None)))
+
+
 _USB = RegisterWalk(
     name="USB", parts=("USB",), begin=_usb_begin, beside=(),
-    moves=(*(_usb_transaction,) * 6, _usb_again, _usb_again, _usb_again, _usb_bus, _usb_mode),
+    moves=(*(_usb_transaction,) * 6, _usb_again, _usb_again, _usb_again, _usb_bus, _usb_mode, _usb_cable),
     spans_ns=(1_000, 50_000, 400_000, 1_000_000, 3_100_000), at_random=12, episodes=24, steps=30,
 )  # fmt: skip
 

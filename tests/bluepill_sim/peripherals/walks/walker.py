@@ -39,6 +39,8 @@ _NARROW = 8
 #: Registers that are packets' memory: one of them is as good as all.
 _MEMORY = "PMA_"
 
+#: What no device knows.
+_NO_COMMAND = OWN_COMMANDS + 99
 #: Words of a part that has no memory of packets.
 _USUAL_WORDS = 0x100
 #: How each drive of a pin is written.
@@ -378,7 +380,7 @@ class RegisterWalker:
     def _ask(self, part: Any) -> None:
         """Give each command that its device in C knows, and note what it answers."""
         named = [one for kind in part.ENUMS if kind.__name__.endswith("Command") for one in kind]
-        for command in named or ([OWN_COMMANDS] if part.KIND else []):
+        for command in [*(named or [OWN_COMMANDS]), _NO_COMMAND] if part.KIND else []:
             self.note(f"command {command:d}: {part.command(command, 1, 1)}")
 
     def _move(self) -> None:
