@@ -93,7 +93,8 @@ class Register:
 
         Raises:
             ValueError: A mask is wider than a word, two kinds of bits overlap, a trigger does more, the reset value
-                holds bits that do not read, or `fields` is no list of fields that has each bit that reads once.
+                holds bits that do not read, what it stores is never read, or `fields` is no list of fields that has
+                each bit that reads once.
         """
         fields = self._bits_of_fields()
         for name in ("readable", "writable"):
@@ -116,10 +117,17 @@ class Register:
             raise ValueError(f"{self.name}: a bit is either writable, cleared by 1 or cleared by 0")
         if self.triggers & (self.readable | self.writable | clears):
             raise ValueError(f"{self.name}: a trigger stores nothing and reads 0")
+        if self.on_read not in {None, NATIVE} and not self.on_write and self.writable | clears:
+            raise ValueError(f"{self.name}: a method answers reads, so that what is written would be lost")
+        self._check_reading(fields)
+
+    def _check_reading(self, fields: int) -> None:
         if self.reset & ~self.readable:
             raise ValueError(f"{self.name}: the reset value holds bits that do not read")
         if self.readable & ~fields:
             raise ValueError(f"{self.name}: bits {self.readable & ~fields:#x} read, and no field has them")
+        if nameless := (self.writable | self.write_one_to_clear | self.write_zero_to_clear | self.triggers) & ~fields:
+            raise ValueError(f"{self.name}: bits {nameless:#x} take what is written, and no field has them")
 
     def _bits_of_fields(self) -> int:
         """Return the bits that a field has; all of them where none is named."""

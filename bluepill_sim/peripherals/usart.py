@@ -70,6 +70,8 @@ _CONTROL_PINS = {
 }
 #: Pins of CK by the same.
 _CLOCK_PINS = {"USART1": {0: "PA8"}, "USART2": {0: "PA4", 1: "PD7"}, "USART3": {0: "PB12", 1: "PC12", 3: "PD10"}}
+#: The character by which two speeds are compared: where one end, or the other, hears it wrong, so it does any other.
+_TRIED = 0x55
 
 
 class ReceiveError(IntFlag):
@@ -341,8 +343,7 @@ class Usart(Peripheral):
         far = self.far_baud
         if far is not None:
             if brr and any(
-                [(one.word, one.has_framing_error) for one in heard([word] * 2, 8, *ratio)] != [(word, False)] * 2
-                for word in (0, 0x55, 0x7F, 0x80, 0xFF)
+                [(one.word, one.has_framing_error) for one in heard([_TRIED] * 2, 8, *ratio)] != [(_TRIED, False)] * 2
                 for ratio in ((self.native.clock_hz, far * brr), (far * brr, self.native.clock_hz))
             ):
                 self.chip.warn(

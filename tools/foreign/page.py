@@ -7,7 +7,7 @@ from the table, and a test holds the committed page to that.
 import json
 import re
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 from tools.foreign.row import Result, Row, RowStatus
@@ -20,8 +20,11 @@ _SHORT_COMMIT = 10
 
 
 def record(results: Sequence[Result], file: Path = RESULTS) -> None:
-    """Note results, beside those of other rows that are noted already."""
-    noted = {result.name: result for result in (*recorded(file), *results)}
+    """Note results, beside those of other rows that are noted already, and how each of these ended the time before."""
+    noted = {result.name: result for result in recorded(file)}
+    for result in results:
+        previous = noted.get(result.name)
+        noted[result.name] = result if previous is None else replace(result, before=_ended(previous))
     rows = [{**asdict(result), "status": result.status.value} for _, result in sorted(noted.items())]
     file.write_text(json.dumps(rows, indent=1) + "\n")
 
@@ -31,7 +34,14 @@ def recorded(file: Path = RESULTS) -> list[Result]:
     if not file.exists():
         return []
     return [
-        Result(row["name"], RowStatus(row["status"]), row["text"], row["seconds"], tuple(row["notes"]))
+        Result(
+            row["name"],
+            RowStatus(row["status"]),
+            row["text"],
+            row["seconds"],
+            tuple(row["notes"]),
+            row.get("before", ""),
+        )
         for row in json.loads(file.read_text())
     ]
 
@@ -75,13 +85,18 @@ def _source(row: Row) -> str:
     return f"[{source.folder}]({source.url}) {source.commit[:_SHORT_COMMIT]}" if source.url else "this repository"
 
 
+def _ended(result: Result) -> str:
+    took = f" in {result.seconds:.0f} s" if result.status is not RowStatus.MISSING else ""
+    return f"{result.status.value}{took}"
+
+
 def _shown(row: Row, result: Result | None) -> str:
     if result is None:
         shown = row.tried or "not run"
-    elif result.status is RowStatus.PASSED:
-        shown = f"passed in {result.seconds:.0f} s: {result.text}"
     else:
-        shown = f"{result.status.value}: {result.text}"
+        before = f" (before: {result.before})" if result.before else ""
+        notes = f", {', '.join(result.notes)}" if result.notes else ""
+        shown = f"{_ended(result)}{notes}{before}: {result.text}"
     return f"{shown}. Found: {row.found}" if row.found else shown
 
 

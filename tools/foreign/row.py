@@ -139,3 +139,5 @@ class Result:
     text: str
     seconds: float = 0.0
     notes: tuple[str, ...] = field(default=())
+    #: What became of it the time before, where both were noted: how it ended and in how many seconds.
+    before: str = ""

@@ -1,5 +1,10 @@
-"""Runs a row: what is missing, its judge in a process of its own, and what became of it."""
+"""Runs a row: what is missing, its judge in a process of its own, and what became of it.
 
+Hosts keep the machine's time, and give up where that has no processor left for them or for the emulator: on such a
+machine a row says so.
+"""
+
+import os
 import tempfile
 import time
 from pathlib import Path
@@ -27,6 +32,9 @@ def run(row: Row, cache: Path, logs: Path) -> Result:
     commit, notes = built_commit(row.source, cache), tuple[str, ...]()
     if commit and not commit.startswith(row.source.commit) and not row.source.commit.startswith(commit):
         notes = (f"of commit {commit[:12]}",)
+    processors = len(os.sched_getaffinity(0))
+    if (load := os.getloadavg()[0]) > processors:
+        notes = (*notes, f"on a busy machine: {load:.1f} processes ready for {processors} processors")
     logs.mkdir(parents=True, exist_ok=True)
     began = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="foreign-") as scratch:

@@ -18,6 +18,8 @@ NOT_COUNTED = 4
 UNKNOWN_S, LEAST_S = 1.0, 0.2
 #: How much more seldom one that stands further away notices something, as a power of its place.
 SELDOM = 1.5
+#: A word in the names of files of tests that hold all that a module does at once: they are asked first.
+WHOLE = "walks"
 #: What tests a library in C or C++, by the folder of its sources: there are no imports to read.
 TESTS_OF_C = {
     "bluepill_sim/extension/source/devices": ("tests/bluepill_sim/peripherals", "tests/bluepill_sim/native"),
@@ -84,8 +86,8 @@ class Nearest:
         apart = _apart(folder, test.rpartition("/")[0])
         mirrors = bool({*stem.split("_")} <= words)
         does_import = any(name == module or name.startswith(f"{module}.") for name in imported)
-        if mirrors and (does_import or apart <= 1):
-            return 0, apart
+        if mirrors and (does_import or apart <= 1 or test.startswith(f"{folder}/")):
+            return 0, WHOLE not in words, apart
         if does_import:
             return 1, not {*stem.split("_")} & words, apart
         package = module.rpartition(".")[0]
@@ -110,7 +112,7 @@ class Nearest:
         folders = next((tests for folder, tests in TESTS_OF_C.items() if path.startswith(f"{folder}/")), ())
         stem = {*Path(path).stem.split("_")}
         order = {
-            name: (not (stem & _words(name)), place)
+            name: (not (near := stem & _words(name)), bool(near) and WHOLE not in _words(name), place)
             for name in reversed(self._tests)
             for place, folder in reversed([*enumerate(folders)])
             if name == folder or name.startswith(f"{folder}/")

@@ -81,9 +81,11 @@ def test_a_write_of_some_lanes_leaves_the_other_lanes_alone(
         {"mask": 1, "triggers": 1},
         {"mask": 0, "write_zero_to_clear": 2, "triggers": 2},
         {"mask": 0, "triggers": 1 << 32},
+        {"on_read": "_read"},
+        {"on_read": "_read", "writable": 0, "write_one_to_clear": 1},
     ],
 )
-def test_a_declaration_that_contradicts_itself_is_refused(fields: dict[str, int]) -> None:
+def test_a_declaration_that_contradicts_itself_is_refused(fields: dict[str, int | str]) -> None:
     with pytest.raises(ValueError, match="R"):
         Register(**{"name": "R", "offset": 0, **fields})  # type: ignore[arg-type]  # deliberately wrong
 
@@ -127,6 +129,13 @@ def test_a_bit_that_reads_is_of_a_field() -> None:
     Register(name="R", offset=0, mask=3, fields="EN 1, TEN 0")
     with pytest.raises(ValueError, match="R: bits 0x5 read, and no field has them"):
         Register(name="R", offset=0, mask=7, fields="EN 1")
+
+
+@pytest.mark.parametrize("kind", ["writable", "write_one_to_clear", "write_zero_to_clear", "triggers"])
+def test_a_bit_that_takes_what_is_written_is_of_a_field(kind: str) -> None:
+    bits_of: dict[str, int] = {"readable": 1, "writable": 0, kind: 2}
+    with pytest.raises(ValueError, match="R: bits 0x2 take what is written, and no field has them"):
+        Register(name="R", offset=0, fields="A 0", **bits_of)  # type: ignore[arg-type]  # masks alone
 
 
 def test_the_bits_of_a_register_are_those_of_its_fields_in_any_order() -> None:

@@ -124,7 +124,8 @@ def test_the_users_build_is_run_where_something_is_missing(tmp_path: Path, ends:
     assert (tmp_path / "theirs/runs").read_text() == "ran\n"
 
 
-def test_another_commit_than_the_rows_is_noted(tmp_path: Path) -> None:
+def test_another_commit_than_the_rows_is_noted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "getloadavg", lambda: (0.0, 0.0, 0.0))
     note = tmp_path / "theirs/COMMIT"
     note.parent.mkdir()
     for commit, notes in ((SOURCE.commit, ()), (SOURCE.commit[:12], ()), ("f" * 40, ("of commit ffffffffffff",))):
@@ -190,7 +191,7 @@ def test_results_are_noted_beside_those_of_other_rows(tmp_path: Path) -> None:
     file = tmp_path / "results.json"
     record([Result("a", RowStatus.PASSED, "1", 1.0), Result("b", RowStatus.PASSED, "2", 1.0)], file)
     record([Result("b", RowStatus.FAILED, "3", 1.0)], file)
-    assert [(one.name, one.text) for one in recorded(file)] == [("a", "1"), ("b", "3")]
+    assert [(one.name, one.text, one.before) for one in recorded(file)] == [("a", "1", ""), ("b", "3", "passed in 1 s")]
     json.loads(file.read_text())
 
 
@@ -199,6 +200,8 @@ def test_the_page_says_what_came_back_and_what_was_found() -> None:
     page = "x\n<!-- table: foreign firmware -->\nold\n<!-- end -->\ny\n"
     made = written(page, [one], [Result("theirs", RowStatus.PASSED, "a | b", 3.2)])
     assert "passed in 3 s: a \\| b. Found: a register" in made
+    twice = Result("theirs", RowStatus.FAILED, "late", 3.2, ("on a busy machine",), before="passed in 2 s")
+    assert "failed in 3 s, on a busy machine (before: passed in 2 s): late" in written(page, [one], [twice])
     assert "old" not in made
     assert (made[:2], made[-2:]) == ("x\n", "y\n")
     assert "| not run" in written(page, [row(fails)], [])
@@ -224,3 +227,14 @@ def test_a_client_of_the_users_meets_each_robot_that_is_named(
 def test_the_cache_is_outside_the_checkout(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", "/elsewhere")
     assert default_cache() == Path("/elsewhere/p2os-foreign")
+
+
+@pytest.mark.parametrize(("load", "is_said"), [(2.0, False), (2.1, True)])
+def test_a_row_says_that_the_machine_had_no_processor_left(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, load: float, is_said: bool
+) -> None:
+    monkeypatch.setattr(os, "getloadavg", lambda: (load, 0.0, 0.0))
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 1})
+    found = run(row(lambda _: "4 answers"), tmp_path, tmp_path / "log")
+    notes = ("on a busy machine: 2.1 processes ready for 2 processors",) if is_said else ()
+    assert (found.status, found.notes) == (RowStatus.PASSED, notes)

@@ -905,9 +905,7 @@ static void write_data(struct device *device, uint32_t byte)
         run_from(device, now_ns(device->fabric));
         begin(device, ADDRESSING, DATA);
         wait_for_events(device);
-        return;
-    }
-    if (words[SR2] & TRA) {
+    } else if (words[SR2] & TRA) {
         i2c->tdr = HELD | byte;
         words[SR1] &= ~(uint32_t)(TXE | BTF);
         release(device);

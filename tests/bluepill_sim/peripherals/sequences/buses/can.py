@@ -7,7 +7,18 @@ from tests.bluepill_sim.peripherals.buses import test_can as bus
 from tests.bluepill_sim.peripherals.buses import test_can_flags
 from tests.bluepill_sim.peripherals.sequences.bench import Bench
 from tests.bluepill_sim.peripherals.sequences.row import Sequences
-from tests.bluepill_sim.peripherals.sequences.sources import CHIBIOS, HAL, KLIPPER, LOCM3, RIOT, ours, rm
+from tests.bluepill_sim.peripherals.sequences.sources import (
+    CHIBIOS,
+    HAL,
+    HAL_H,
+    KLIPPER,
+    LOCM3,
+    PANDA,
+    RIOT,
+    SPL,
+    ours,
+    rm,
+)
 
 CAN = Sequences("CAN")
 INRQ, SLEEP, TXFP, RFLM, NART, AWUM, ABOM = 1, 2, 4, 8, 16, 32, 64
@@ -174,7 +185,8 @@ def _(chip: Bench) -> None:
 @CAN.row(
     "request-clears-all",
     "A new request clears RQCP, TXOK and TERR of its mailbox, which the last one has left.",
-    rm("24.9.2"),
+    PANDA("bxcan", 137),
+    rm("24.9.2", looked_up=False),
     values=st.integers(0, 2),
 )
 def _(chip: Bench, mailbox: int) -> None:
@@ -310,8 +322,10 @@ def _(chip: Bench, is_locked: int) -> None:
 @CAN.row(
     "fifo-by-its-own",
     "Each FIFO is released by the RFOM of its own register, and interrupts by its own three enables.",
-    rm("24.7.3"),
-    rm("24.8"),
+    LOCM3("can", 446),
+    HAL_H("can", 521),
+    rm("24.7.3", looked_up=False),
+    rm("24.8", looked_up=False),
     values=st.integers(0, 1),
 )
 def _(chip: Bench, fifo: int) -> None:
@@ -322,7 +336,8 @@ def _(chip: Bench, fifo: int) -> None:
 @CAN.row(
     "passive-counts-from-120",
     "A good frame takes one from REC, and sets it to 120 where it was above that of a passive node.",
-    rm("24.9.2"),
+    SPL("can", 940),
+    rm("24.9.2", looked_up=False),
 )
 def _(chip: Bench) -> None:
     chip.clock("CAN", "GPIOA")
@@ -332,7 +347,7 @@ def _(chip: Bench) -> None:
 @CAN.row(
     "abort-in-any-bit",
     "ABRQ within any bit of a frame lets that go out, and takes what waits back.",
-    rm("24.7.1"),
+    rm("24.7.1", looked_up=False),
     values=st.integers(0, 40),
 )
 def _(chip: Bench, bits: int) -> None:

@@ -5,7 +5,17 @@ from hypothesis import strategies as st
 from bluepill_sim.peripherals.spi import Loopback
 from tests.bluepill_sim.peripherals.sequences.bench import Bench
 from tests.bluepill_sim.peripherals.sequences.row import Sequences
-from tests.bluepill_sim.peripherals.sequences.sources import HAL, HAL_H, KLIPPER, LOCM3, RIOT, RUST, rm
+from tests.bluepill_sim.peripherals.sequences.sources import (
+    HAL,
+    HAL_H,
+    KLIPPER,
+    LOCM3,
+    LOCM3_H,
+    RIOT,
+    RUST,
+    RUST_PAC,
+    rm,
+)
 
 SPI = Sequences("SPI")
 #: 8 MHz / 2: a bit takes 250 ns, a word of eight 2 us.
@@ -60,7 +70,8 @@ def _(chip: Bench) -> None:
 @SPI.row(
     "remap-moves",
     "A remapped SPI1 leaves PA5 to PA7 and has PB3 to PB5.",
-    rm("9.3.10"),
+    LOCM3_H("stm32/f1/gpio", 454),
+    rm("9.3.10", looked_up=False),
     values=st.integers(0, 1),
 )
 def _(chip: Bench, is_remapped: int) -> None:
@@ -75,8 +86,9 @@ def _(chip: Bench, is_remapped: int) -> None:
 @SPI.row(
     "crc-read-only",
     "RXCRCR and TXCRCR are read only.",
-    rm("25.5.6"),
-    rm("25.5.7"),
+    RUST_PAC("spi1/rxcrcr", 29),
+    rm("25.5.6", looked_up=False),
+    rm("25.5.7", looked_up=False),
     values=st.integers(1, 0xFFFF),
 )
 def _(chip: Bench, word: int) -> None:

@@ -6,7 +6,7 @@ from bluepill_sim.peripherals.flash import FLASH_BASE, MASS_ERASE_NS, PAGE_BYTES
 from bluepill_sim.peripherals.rcc import ResetCause
 from tests.bluepill_sim.peripherals.sequences.bench import Bench
 from tests.bluepill_sim.peripherals.sequences.row import Sequences
-from tests.bluepill_sim.peripherals.sequences.sources import HAL, LOCM3, RIOT, RUST, pm
+from tests.bluepill_sim.peripherals.sequences.sources import HAL, HAL_EX, LOCM3, RIOT, RUST, pm
 
 FLASH = Sequences("FLASH")
 KEY1, KEY2 = 0x4567_0123, 0xCDEF_89AB
@@ -287,7 +287,9 @@ def _(chip: Bench) -> None:
 @FLASH.row(
     "options-one-by-one",
     "An option byte takes OPTPG, OPTWRE and no LOCK: each of them alone keeps it.",
-    pm("2.4"),
+    HAL("flash", 707),
+    HAL_EX("flash", 701),
+    pm("2.4", looked_up=False),
     values=st.sampled_from([1 << 4, 1 << 9, 1 << 4 | 1 << 9 | 1 << 7]),
 )
 def _(chip: Bench, control: int) -> None:

@@ -1,0 +1,452 @@
+"""A walk: a peripheral driven at random from reset, and a trace of all that can be seen of it, step by step.
+
+Theory of operation. A walk has episodes. Each begins on a board out of reset, whose core sleeps, sets the peripheral up
+in a mode, and goes some steps at random: what the mode expects (a word, a START, a call from outside), registers at
+random, time. What a step did is a line: what was done and read, which registers are otherwise than before, edges and
+words that came out, lines inside the chip, when a part acts next, warnings, resets. In the middle of each episode the
+board is saved and another one goes on from there, which no line may show.
+
+Every other episode has somebody who looks at the pins: models that talk in words make their edges only then.
+
+Invariant: an episode follows from its name alone, on every version of Python.
+"""
+
+import random
+import zlib
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache, partial
+from typing import Any, TypeVar
+
+from bluepill_sim import BluePill
+from bluepill_sim.fabric.fabric import OWN_COMMANDS
+from bluepill_sim.fabric.pins import PinDrive
+from bluepill_sim.fabric.registers import WORD, Register, fields_of
+from bluepill_sim.fabric.subscriptions import EDGE, Of, read_rows
+from bluepill_sim.parts import CanNetwork, CanNode
+from bluepill_sim.peripherals.spi import Loopback
+from simbase.state import Stateful
+from tests.bluepill_sim.machine import Machine
+
+#: SRAM that DMA reads and writes: the last bytes of it are in the trace, as a checksum.
+BUFFER, BUFFER_BYTES = 0x2000_1000, 0x100
+#: More edges or words than these in a step are counted and summed up.
+_SHOWN = 6
+#: How often a register is written in which way, of 100: one field, anything, all ones, all zeros.
+_FIELD, _ANYTHING, _ONES = 70, 82, 92
+#: Of 100 writes so many are of a halfword or a byte.
+_NARROW = 8
+#: Registers that are packets' memory: one of them is as good as all.
+_MEMORY = "PMA_"
+
+#: What no device knows.
+_NO_COMMAND = OWN_COMMANDS + 99
+#: Words of a part that has no memory of packets.
+_USUAL_WORDS = 0x100
+#: How each drive of a pin is written.
+_LETTERS = dict(zip(PinDrive, "ZHLudxyzw", strict=False))
+
+#: RCC's offsets of AHBENR, APB2ENR and APB1ENR, and what has every clock on.
+_CLOCKS_ON = ((0x14, 0x55), (0x18, 0x7FFD), (0x1C, 0x1AE6_4807))
+
+_Item = TypeVar("_Item")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RegisterWalk:
+    """One peripheral's walk."""
+
+    name: str
+    #: The parts whose registers are written at random and traced, the first most often.
+    parts: tuple[str, ...]
+    #: Sets up a mode.
+    begin: Callable[["RegisterWalker"], None]
+    #: What the mode expects, each as often as it stands here.
+    moves: tuple[Callable[["RegisterWalker"], None], ...]
+    #: Time that passes between steps, ns.
+    spans_ns: tuple[int, ...]
+    #: Parts that are traced besides.
+    beside: tuple[str, ...] = ()
+    #: Whether nobody else is on its CAN.
+    is_alone: bool = False
+    #: Of 100 steps so many write or read a register at random.
+    at_random: int = 25
+    episodes: int = 24
+    steps: int = 24
+
+
+class CountingSpiDevice(Stateful):
+    """A part on an SPI that answers with the sum of what it was sent."""
+
+    STATE = ("sum",)
+    spi_modes = frozenset(range(4))
+    max_hz = 36_000_000
+
+    def __init__(self) -> None:
+        self.sum = 0
+
+    def select(self, at_ns: int) -> None:
+        """Begin from the time."""
+        self.sum = at_ns & 0xFF
+
+    def deselect(self, at_ns: int) -> None:
+        """Begin from the time."""
+        self.sum = at_ns >> 8 & 0xFF
+
+    def exchange(self, byte: int, at_ns: int) -> int:
+        """Add."""
+        self.sum = self.sum + 3 * byte + at_ns & 0xFF
+        return self.sum
+
+
+class CountingI2cDevice(Stateful):
+    """A part on an I2C with an address of 7 bits and one of 10, which refuses each fifth byte."""
+
+    STATE = ("sum",)
+    _ADDRESSES = (0x50, 0x2A5)
+
+    def __init__(self) -> None:
+        self.sum = 0
+
+    def start(self, address: int, is_read: bool, at_ns: int) -> bool:
+        """Count it."""
+        self.sum = self.sum + is_read + at_ns & 0xFF
+        return address in self._ADDRESSES
+
+    def write(self, byte: int, at_ns: int) -> bool:
+        """Add."""
+        self.sum = self.sum + byte + at_ns & 0xFF
+        return bool(self.sum % 5)
+
+    def read(self, at_ns: int) -> int:
+        """Count."""
+        self.sum = self.sum + 7 + at_ns & 0xFF
+        return self.sum
+
+    def stop(self, at_ns: int) -> None:
+        """Count."""
+        self.sum = self.sum + 1 + at_ns & 0xFF
+
+
+class WalkedBoard:
+    """A board whose core sleeps, with something at each of its buses; and what was heard of it."""
+
+    def __init__(self, *, is_alone: bool) -> None:
+        self.board = Machine("sleep: wfi\nb sleep", {}).deafen().board
+        self.network, self.node = CanNetwork(), CanNode()
+        self.network.join(self.node)
+        if not is_alone:
+            self.board.can(self.network)
+        self.board.spi("SPI1", CountingSpiDevice(), select="PB0")
+        self.board.spi("SPI2", Loopback())
+        for name in ("I2C1", "I2C2"):
+            self.board.i2c(name, CountingI2cDevice())
+        for register, word in _CLOCKS_ON:
+            self.board.chip.parts.rcc.write(register, 4, word)
+        self.heard: list[str] = []
+        self._names = {pin.index: pin.name for pin in self.board.pins}
+        self._closing: list[Callable[[], None]] = []
+        self._reset = self.saved()
+
+    def saved(self) -> tuple[object, ...]:
+        """Return all that decides the future."""
+        return self.board.snapshot(), self.network.snapshot()
+
+    def go_on_from(self, saved: tuple[Any, ...]) -> None:
+        """Be what was saved."""
+        self.board.restore(saved[0])
+        self.network.restore(saved[1])
+
+    def begin(self, watched: int) -> None:
+        """Come out of reset, with nobody who listens but one at the serial ports.
+
+        Args:
+            watched: 1: somebody looks at pins and buses; 2: at pins, and takes waves as they are; else nobody does.
+        """
+        for close in self._closing:
+            close()
+        self.go_on_from(self._reset)
+        board, parts = self.board, self.board.chip.parts.by_name
+        self._closing = []
+        for port in board.serial_ports.values():
+            port.far_baud = None
+        self.node.is_silent = False
+        if watched in {1, 2}:
+            names, take = [pin.name for pin in board.pins], (self._take_edges, self._take_waves)[watched - 1]
+            self._closing.append(board.subscribe_pins(names, take, of=Of.WIRE, waves=watched > 1).close)
+        if watched == 1:
+            for name in ("SPI1", "SPI2", "I2C1", "I2C2"):
+                self._closing.append(parts[name].subscribe(self._take_rows(name)))  # type: ignore[attr-defined]  # buses
+        for name, port in board.serial_ports.items():
+            self._closing.append(port.subscribe(self._take_rows(name)))
+        self.heard.clear()
+
+    def _take_edges(self, rows: bytes) -> None:
+        self.heard += [
+            f"{self._names[pin]}:{drive}/{wire}@{ns}" for ns, pin, drive, wire, _, _ in EDGE.iter_unpack(rows)
+        ]
+
+    def _take_waves(self, rows: bytes) -> None:
+        self.heard += [
+            f"{self._names[pin]}:{drive}/{wire}@{ns}{f' {wave}' if wave else ''}"
+            for ns, pin, drive, wire, wave in read_rows(rows)
+        ]
+
+    def _take_rows(self, name: str) -> Callable[[Sequence[Any]], None]:
+        return lambda rows: self.heard.extend(f"{name}:{'/'.join(map(str, map(_plain, row)))}" for row in rows)
+
+
+def _plain(value: object) -> object:
+    return value if not hasattr(value, "value") else value.value
+
+
+@cache
+def boards(*, is_alone: bool) -> tuple[WalkedBoard, WalkedBoard]:
+    """Return the board on which episodes begin, and the one on which they go on."""
+    return WalkedBoard(is_alone=is_alone), WalkedBoard(is_alone=is_alone)
+
+
+@cache
+def _looked_at(kind: Any, name: str) -> tuple[tuple[str, int, bool], ...]:
+    """Return the name of each register of a part, its place, and whether it has to be asked."""
+    return tuple(
+        (f"{name}.{one.name}", one.offset // 4, one.on_read is not None)
+        for one in kind.REGISTERS if not one.name.startswith(_MEMORY)
+    )  # fmt: skip
+
+
+class RegisterWalker:
+    """One episode of a walk, under way."""
+
+    def __init__(self, walk: RegisterWalk, episode: int) -> None:
+        self.walk, self.episode = walk, episode
+        self._random = random.Random(f"{walk.name} {episode}")
+        self._now, self._other = boards(is_alone=walk.is_alone)
+        for each in (self._now, self._other):
+            each.begin(episode % 4)
+        self.lines: list[str] = []
+        self._done: list[str] = []
+        self._seen: dict[str, object] = {}
+        self._ports, self._wires, self._drives = b"", "", ""
+
+    # What decides, from the random numbers: `random` alone is the same on every version of Python.
+
+    def number(self, below: int) -> int:
+        """Return 0 up to and without a bound."""
+        return int(self._random.random() * below)
+
+    def pick(self, items: Sequence[_Item]) -> _Item:
+        """Return one of some."""
+        return items[self.number(len(items))]
+
+    def some(self, *bits: int) -> int:
+        """Return a word with some of these bits."""
+        return sum(bit for bit in bits if self.number(2))
+
+    # What is done.
+
+    @property
+    def board(self) -> BluePill:
+        """The board."""
+        return self._now.board
+
+    @property
+    def node(self) -> CanNode:
+        """The other node on its CAN."""
+        return self._now.node
+
+    @property
+    def network(self) -> CanNetwork:
+        """Its CAN."""
+        return self._now.network
+
+    def part(self, name: str) -> Any:
+        """Return a peripheral."""
+        return self.board.chip.parts.by_name[name]
+
+    def note(self, text: str) -> None:
+        """Write down what is done."""
+        self._done.append(text)
+
+    def write(self, name: str, value: int, size: int = 4, byte: int = 0) -> None:
+        """Write a register, "I2C1.CR1", or bytes of it."""
+        part, register = self._found(name)
+        self.note(f"{name}{f'+{byte}' if byte else ''}={value:#x}{'' if size == 4 else f':{size}'}")
+        part.write(register.offset + byte, size, value)
+
+    def read(self, name: str) -> int:
+        """Read a register, with all that a read causes."""
+        part, register = self._found(name)
+        value: int = part.read(register.offset, 4)
+        self.note(f"{name}?{value:#x}")
+        return value
+
+    def look(self, name: str) -> int:
+        """Return what stands in a register, and cause nothing."""
+        part, register = self._found(name)
+        return int(part.words[register.offset // 4])
+
+    def turn(self, name: str, *, on: int = 0, off: int = 0) -> None:
+        """Set and clear bits of a register."""
+        self.write(name, self.look(name) & ~off | on)
+
+    def run(self, ns: int) -> None:
+        """Let time pass."""
+        self.note(f"+{ns}")
+        self.board.advance_to(self.board.now_ns + ns)
+
+    def drive(self, pin: str, level: bool | None) -> None:
+        """Hold a pin from outside, or let it go."""
+        self.note(f"{pin}:{level}")
+        self.board.pin(pin).drive(level)
+
+    def put(self, data: bytes) -> None:
+        """Fill what DMA reads."""
+        self.board.chip.memory.write(BUFFER, data)
+
+    def poke(self) -> None:
+        """Write a register at random."""
+        name = self.walk.parts[0] if self.number(10) < 7 else self.pick(self.walk.parts)
+        part = self.part(name)
+        registers = [one for one in part.REGISTERS if not one.name.startswith(_MEMORY)]
+        register = self.pick(registers)
+        word, kind = self._random.getrandbits(32), self.number(100)
+        stored = int(part.words[register.offset // 4])
+        if kind < _FIELD:
+            field = self.pick(fields_of(register.fields) or fields_of("W 31:0"))
+            mask = (1 << field.high - field.low + 1) - 1 << field.low
+            word = stored & ~mask | word & mask
+        elif kind >= _ANYTHING:
+            word = WORD if kind < _ONES else 0
+        size = self.pick((1, 2)) if self.number(100) < _NARROW else 4
+        byte = 0 if size == 4 else size * self.number(4 // size)
+        self.write(f"{name}.{register.name}", word & (1 << 8 * size) - 1, size, byte)
+
+    def peek(self) -> None:
+        """Read a register at random."""
+        name = self.pick(self.walk.parts)
+        register = self.pick([one for one in self.part(name).REGISTERS if not one.name.startswith(_MEMORY)])
+        self.read(f"{name}.{register.name}")
+
+    def freeze(self) -> None:
+        """Have a debugger halt the core for a while, with the part's clock, or have that clock stand still."""
+        part = self.part(self.walk.parts[0])
+        span_ns = self.pick(self.walk.spans_ns)
+        self.note(f"frozen {span_ns}")
+        stop, go_on = self.pick(((part.freeze, part.thaw), (part.clock_stopped, part.clock_resumed)))
+        stop()
+        self.board.advance_to(self.board.now_ns + span_ns)
+        go_on(span_ns)
+
+    def change_clocks(self) -> None:
+        """Divide the buses' clocks otherwise."""
+        self.write("RCC.CFGR", self.look("RCC.CFGR") & ~0x3FF0 | self.pick((0, 0x400, 0x2000, 0x80, 0x6580, 0x500)))
+
+    def reset(self) -> None:
+        """Reset the part alone."""
+        self.note("reset")
+        self.part(self.walk.parts[0]).reset()
+
+    # The episode.
+
+    def go(self) -> list[str]:
+        """Go the whole way; return a line for each step."""
+        if self.episode:
+            self._step(self._begin)
+            middle = self.number(self.walk.steps)
+            for n in range(self.walk.steps):
+                if n == middle:
+                    self._change_boards()
+                self._step(self._move)
+        else:
+            self._sweep()
+        return self.lines
+
+    def _begin(self) -> None:
+        """Free the debugger's pins, and set up a mode."""
+        self.write("AFIO.MAPR", 2 << 24)
+        self.walk.begin(self)
+
+    def _sweep(self) -> None:
+        """Write ones and zeros into every register, and look."""
+        for name in self.walk.parts:
+            for register in self.part(name).REGISTERS:
+                if not register.name.startswith(_MEMORY):
+                    for word in (WORD, 0, 0xAAAA_AAAA, 0x5555_5555):
+                        self._step(partial(self.write, f"{name}.{register.name}", word))
+            self._step(self.reset)
+            self._step(partial(self._ask, self.part(name)))
+
+    def _ask(self, part: Any) -> None:
+        """Give each command that its device in C knows, and note what it answers."""
+        named = [one for kind in part.ENUMS if kind.__name__.endswith("Command") for one in kind]
+        for command in [*(named or [OWN_COMMANDS]), _NO_COMMAND] if part.KIND else []:
+            self.note(f"command {command:d}: {part.command(command, 1, 1)}")
+
+    def _move(self) -> None:
+        kind = self.number(100)
+        if kind < self.walk.at_random:
+            (self.peek if kind % 5 == 0 else self.poke)()
+        elif 94 <= kind < 97:
+            self.change_clocks()
+        elif 97 <= kind < 99:
+            self.freeze()
+        elif kind == 99:
+            self.reset()
+            self._begin()
+        else:
+            self.pick(self.walk.moves)(self)
+        if self.number(4):
+            self.run(self.pick(self.walk.spans_ns))
+
+    def _change_boards(self) -> None:
+        """Have the other board go on from here."""
+        self._other.go_on_from(self._now.saved())
+        self._now, self._other = self._other, self._now
+
+    def _step(self, act: Callable[[], None]) -> None:
+        self._done.clear()
+        act()
+        self.board.chip.deliver()
+        now = dict(self._all())
+        changed = [
+            f"{name} {value:#x}" if isinstance(value, int) else f"{name} {value}"
+            for name, value in now.items() if self._seen.get(name) != value
+        ]  # fmt: skip
+        self._seen = now
+        heard = self._now.heard
+        if len(heard) > _SHOWN:
+            heard[_SHOWN:] = [f"and {len(heard) - _SHOWN} more: {zlib.crc32(' '.join(heard).encode()):08x}"]
+        self.lines.append(f"{' '.join(self._done)} | {', '.join(changed)} | {' '.join(heard)}".rstrip(" |"))
+        heard.clear()
+
+    def _all(self) -> Iterator[tuple[str, object]]:
+        """Go through all that can be seen now."""
+        board = self.board
+        for name in (*self.walk.parts, *self.walk.beside):
+            part = board.chip.parts.by_name[name]
+            words = part.words
+            for key, place, is_asked in _looked_at(type(part), name):
+                yield key, part.look(4 * place) if is_asked else words[place]
+            if len(words) > _USUAL_WORDS:
+                yield f"{name} memory", zlib.crc32(memoryview(words)[_USUAL_WORDS:])
+            yield f"{name} acts", part.due_ns
+        lines = board.chip.pins.fabric.lines
+        yield "lines", " ".join(str(n) for n, level in enumerate(lines) if level)
+        yield "pending", board.chip.processor.nvic.pending
+        ports = board.chip.pins.fabric.ports
+        if ports != self._ports:
+            self._ports = ports
+            self._wires = "".join("01"[pin.level] for pin in board.pins)
+            self._drives = "".join(_LETTERS[pin.output] for pin in board.pins)
+        yield "wires", self._wires
+        yield "drives", self._drives
+        yield "memory", zlib.crc32(board.read_memory(BUFFER, BUFFER_BYTES) or b"")
+        yield "warnings", " / ".join(board.warnings)
+        yield "resets", " ".join(f"{cause.name} {count}" for cause, count in board.resets.items())
+        yield "hclk", board.hclk_hz
+
+    def _found(self, name: str) -> tuple[Any, Register]:
+        base, _, register = name.partition(".")
+        part = self.part(base)
+        return part, next(one for one in part.REGISTERS if one.name == register)
