@@ -26,8 +26,7 @@ $(BIN)/python:
 	@$(PYTHON) -m venv $(VENV) || \
 	    { rm -rf $(VENV); echo "make: cannot create a virtual environment (hint: apt-get install python3-venv)"; exit 2; }
 
-# PyBullet has no wheels beyond Python 3.11: elsewhere the extra installs NumPy
-# alone, and everything but the `bullet` body works.
+# PyBullet has no wheels beyond Python 3.11: there the extra `physics` is MuJoCo, and everything but the `bullet` body works.
 define install
 @command -v $${CC:-cc} gcc >/dev/null || \
     { echo "make: the emulator needs a C compiler (hint: apt-get install g++ libc6-dev)"; exit 2; }
@@ -40,7 +39,7 @@ $(STAMP): pyproject.toml setup.py constraints.txt $(COMPILED) | $(BIN)/python
 
 # The demo needs little of it, and a project that `p2os new` writes after it needs pytest; what else a verb wants, it says.
 $(DEMO_STAMP): pyproject.toml setup.py constraints.txt $(COMPILED) | $(BIN)/python
-	$(call install,sim$(comma)bullet$(comma)test)
+	$(call install,sim$(comma)physics$(comma)test)
 
 demo: $(if $(wildcard $(STAMP)),$(STAMP),$(DEMO_STAMP))
 	@$(BIN)/p2os demo; status=$$?; \
