@@ -36,6 +36,7 @@ from robot_bench.bench.board import boot
 from robot_bench.events.kinds import Contact, Event, Pose, Text
 from robot_bench.events.selection import Selector, select
 from robot_bench.scenario.included_files import (
+    SCENARIO,
     MergedSource,
     ScenarioTable,
     Setting,
@@ -159,7 +160,8 @@ class Trial:
         path = refuse_elsewhere(folder, f"{self.name}.toml")  # a trace may say what it is called
         with writing(path, hint="name another folder"):
             _write_files(self.files, folder)
-            path.write_text(replace(self, table=self._with_excused()).text, encoding="utf-8")
+            table = {"version": SCENARIO.newest, **self._with_excused()}
+            path.write_text(replace(self, table=table).text, encoding="utf-8")
         return path
 
     def _with_excused(self) -> Table:
