@@ -16,7 +16,7 @@ JOBS   ?= 3
 COMPILED := $(wildcard bluepill_sim/extension/source/*/*) robot_bench/wires/edges.c \
     $(shell find adapter_fw/core adapter_fw/capi adapter_fw/esp32/main adapter_fw/esp32_sim -type f)
 
-.PHONY: page page-check setup demo test lint type unit wheels bench soak steady mutants hostile foreign clean firmware mutation-tools board board-check board-tools pictures docs generated
+.PHONY: page page-check setup demo test lint type unit wheels bench bench-history soak steady mutants hostile foreign clean firmware mutation-tools board board-check board-tools pictures docs generated
 
 setup: $(STAMP)
 
@@ -82,6 +82,12 @@ bench: setup
 	$(BIN)/python tools/bench/beginners.py
 	$(BIN)/python tools/bench/shares.py --timers
 	$(BIN)/python tools/bench/devices.py --timers
+
+# The figures beside those of earlier commits: build/bench/history.md.
+bench-history: setup
+	@mkdir -p build/bench
+	$(MAKE) --no-print-directory bench > build/bench/latest.txt
+	$(BIN)/python -m tools.bench_history build/bench
 
 # A source distribution and a wheel of each house, in dist/; FOR=all or FOR=musllinux_1_2_aarch64 for other machines than this one.
 wheels: setup

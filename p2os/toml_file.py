@@ -134,7 +134,9 @@ def read_toml(
         FileError: One of `error_type`: the text is no TOML, or of a later version; the message names the source and
             the line.
     """
-    table, places = _parsed(text.removeprefix("\ufeff"), source, getattr(what, "name", what), error_type)
+    table, places = _parsed(
+        text.removeprefix("\ufeff"), source, what if isinstance(what, str) else what.name, error_type
+    )
     if isinstance(what, VersionedFormat):
         what.version_of(table.get("version"), f"{source}:{places.line(key='version')}", error_type)
     return table, places
