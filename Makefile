@@ -16,7 +16,7 @@ JOBS   ?= 3
 COMPILED := $(wildcard bluepill_sim/extension/source/*/*) robot_bench/wires/edges.c \
     $(shell find adapter_fw/core adapter_fw/capi adapter_fw/esp32/main adapter_fw/esp32_sim -type f)
 
-.PHONY: page page-check setup demo test lint type unit wheels bench soak steady mutants hostile foreign clean firmware mutation-tools board board-check board-tools pictures docs generated
+.PHONY: page page-check setup demo test lint type unit wheels bench bench-history soak steady mutants hostile foreign clean firmware mutation-tools board board-check board-tools pictures docs generated
 
 setup: $(STAMP)
 
@@ -27,8 +27,7 @@ $(BIN)/python:
 	    { rm -rf $(VENV); echo "make: cannot create a virtual environment (hint: apt-get install python3-venv)"; exit 2; }
 
 # Modules are compiled when they are first imported: to compile all that is installed took 45 s.
-# PyBullet has no wheels beyond Python 3.11: elsewhere the extra installs NumPy
-# alone, and everything but the `bullet` body works.
+# PyBullet has no wheels beyond Python 3.11: there the extra `physics` is MuJoCo, and everything but the `bullet` body works.
 define install
 @command -v $${CC:-cc} gcc >/dev/null || \
     { echo "make: the emulator needs a C compiler (hint: apt-get install g++ libc6-dev)"; exit 2; }
@@ -41,7 +40,7 @@ $(STAMP): pyproject.toml setup.py constraints.txt $(COMPILED) | $(BIN)/python
 
 # The demo needs little of it, and a project that `p2os new` writes after it needs pytest; what else a verb wants, it says.
 $(DEMO_STAMP): pyproject.toml setup.py constraints.txt $(COMPILED) | $(BIN)/python
-	$(call install,sim$(comma)bullet$(comma)test)
+	$(call install,sim$(comma)physics$(comma)test)
 
 demo: $(if $(wildcard $(STAMP)),$(STAMP),$(DEMO_STAMP))
 	@$(BIN)/p2os demo; status=$$?; \
@@ -84,6 +83,12 @@ bench: setup
 	$(BIN)/python tools/bench/beginners.py
 	$(BIN)/python tools/bench/shares.py --timers
 	$(BIN)/python tools/bench/devices.py --timers
+
+# The figures beside those of earlier commits: build/bench/history.md.
+bench-history: setup
+	@mkdir -p build/bench
+	$(MAKE) --no-print-directory bench > build/bench/latest.txt
+	$(BIN)/python -m tools.bench_history build/bench
 
 # A source distribution and a wheel of each house, in dist/; FOR=all or FOR=musllinux_1_2_aarch64 for other machines than this one.
 wheels: setup

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from adapter_sim.pins import AdapterPins
     from adapter_sim.settings import AdapterSettings, EncoderAtOpen, MotorCommand, MotorMeaning
 
+    __version__: str
+
 __all__ = [
     "Adapter",
     "AdapterPins",

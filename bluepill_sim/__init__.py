@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from bluepill_sim.program.image import Image, load_image
     from simbase.errors import MissingDependencyError
 
+    __version__: str
+
 __all__ = [
     "BluePill",
     "BluePillError",

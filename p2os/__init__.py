@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from p2os.transport.virtual_clock import VirtualClock
     from simbase.errors import P2osError
 
+    __version__: str
+
 __all__ = [
     "ClientSettings",
     "ConnectError",

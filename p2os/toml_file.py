@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from simbase.errors import FileError
-from simbase.files import read_text
+from simbase.files import VersionedFormat, read_text
 
 _HEADER = re.compile(r"\s*(\[\[?)\s*([^\]]+?)\s*\]\]?\s*(?:#.*)?$")
 _KEY = re.compile(r"\s*([A-Za-z0-9_.\-\"']+)\s*=")
@@ -119,19 +119,30 @@ class TomlSource:
         return self.name if self.places is None else f"{self.name}:{self.places.line(table, number, key)}"
 
 
-def read_toml(text: str, source: str, what: str, error_type: type[FileError]) -> tuple[dict[str, Any], TomlPlaces]:
+def read_toml(
+    text: str, source: str, what: str | VersionedFormat, error_type: type[FileError]
+) -> tuple[dict[str, Any], TomlPlaces]:  # fmt: skip
     """Return a text's table and the places of its keys.
 
     Args:
         text: The file's text.
         source: What to call it in messages.
-        what: What it should be, such as "a world".
+        what: What it should be, such as "a pin-out"; a format has its key `version` checked before any other.
         error_type: What to raise.
 
     Raises:
-        FileError: One of `error_type`: the text is no TOML; the message names the source and the line.
+        FileError: One of `error_type`: the text is no TOML, or of a later version; the message names the source and
+            the line.
     """
-    text = text.removeprefix("\ufeff")
+    table, places = _parsed(
+        text.removeprefix("\ufeff"), source, what if isinstance(what, str) else what.name, error_type
+    )
+    if isinstance(what, VersionedFormat):
+        what.version_of(table.get("version"), f"{source}:{places.line(key='version')}", error_type)
+    return table, places
+
+
+def _parsed(text: str, source: str, what: str, error_type: type[FileError]) -> tuple[dict[str, Any], TomlPlaces]:
     try:
         return tomllib.loads(text), find_places(text)
     except tomllib.TOMLDecodeError as error:

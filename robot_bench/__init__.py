@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from robot_bench.scenario.loading import known_scenarios, load_scenario
     from robot_bench.scenario.scenario import Scenario
 
+    __version__: str
+
 __all__ = [
     "Bench",
     "BenchParts",

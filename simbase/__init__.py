@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from simbase.state import Stateful
     from simbase.timing import NS_PER_MS, NS_PER_S, NS_PER_US, Nanos, Reached, Reason, Timed
 
+    __version__: str
+
 __all__ = [
     "NS_PER_MS",
     "NS_PER_S",

@@ -12,12 +12,13 @@ import errno
 import io
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
 from hashlib import sha256
 from os import fstat
 from pathlib import Path
 from typing import BinaryIO, NoReturn, TextIO
 
-from simbase.errors import FileError, P2osError, shown_name
+from simbase.errors import FileError, P2osError, shown, shown_name
 
 #: chosen: a world of 100 000 things is below it, and a program with all its debug information; no person writes more.
 LARGEST_FILE_BYTES = 64 << 20
@@ -36,6 +37,39 @@ _HINTS = {
     errno.EIO: "is the disk sound, and the terminal still there?",
 }
 _IS_IT = "is this the file that you mean?"
+
+
+@dataclass(frozen=True, slots=True)
+class VersionedFormat:
+    """A kind of file of ours whose form has a version; a file that says none is of the first."""
+
+    #: With its article: "a world".
+    name: str
+    #: What is written; every version up to it is read.
+    newest: int = 1
+
+    def version_of(self, said: object, where: object = "", error: type[FileError] = FileError) -> int:
+        """Return the version that a file says, from 1 to `newest`.
+
+        Args:
+            said: What stands in it; None where nothing does.
+            where: What a message calls the place.
+            error: What to raise.
+
+        Raises:
+            FileError: One of `error`: it is no version, or a later p2os has written the file.
+        """
+        place = f"{where}: " if where else ""
+        if said is None:
+            return 1
+        if isinstance(said, bool) or not isinstance(said, int) or said < 1:
+            raise error(f"{place}version = {shown(said)} is no version of {self.name}", hint=f"1 to {self.newest}")
+        if said > self.newest:
+            raise error(
+                f"{place}{self.name} of version {shown(said)}, and this p2os reads up to {self.newest}",
+                hint="install a newer p2os",
+            )
+        return said
 
 
 @contextmanager

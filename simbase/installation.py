@@ -108,6 +108,18 @@ def installed_version() -> str:
     raise PackageNotFoundError(GROUP.partition(".")[0])
 
 
+def package_version(package: str) -> str:
+    """Return the version of the distribution that a package of this project is from.
+
+    Raises:
+        PackageNotFoundError: None that is installed has it.
+    """
+    for point in every_installed_point(GROUP):
+        if point.name == package and point.dist is not None:
+            return point.dist.version
+    raise PackageNotFoundError(package)
+
+
 def install_command(extra: str = "", *, python: str = "") -> str:
     """Return the command that installs the packages of an extra, or why this Python cannot have them.
 

@@ -42,8 +42,10 @@ from robot_bench.scenario.scenario import Scenario
 from robot_bench.scenario.sweep import MOST_RUNS
 from robot_bench.scenario.tables import GOALS
 from simbase.errors import UsageError, nearest, shown
+from simbase.files import VersionedFormat
 from simbase.trust import Trust
 
+CAMPAIGN = VersionedFormat("a campaign")
 #: chosen: of a drawn place, how far from the start's middle it is free: the hull turns within 0.32 m.
 FREE_M = 0.45
 #: chosen: a robot of 0.38 m passes with room on both sides.
@@ -198,6 +200,7 @@ class RunLimits(Record):
 class CampaignTable(Record):
     """The top of the file."""
 
+    version: Annotated[int, Key(least=1, most=CAMPAIGN.newest, doc="of these keys")] = CAMPAIGN.newest
     description: Annotated[str, Key(doc="one sentence")] = ""
     scenario: Annotated[str, Key(doc="a name, or a file beside this one")]
     firmware: Annotated[str | None, Key(doc="a file beside this one, in place of the scenario's")] = None
@@ -282,7 +285,7 @@ def load_campaign(path: Path, *, trust: bool | Trust = False) -> Campaign:
 
 def parse_campaign(text: str, path: Path, *, firmware: Path | None = None, trust: bool | Trust = False) -> Campaign:
     """Check the text of a campaign file, whose program `firmware` may replace; errors as of `load_campaign`."""
-    table, places = read_toml(text, path.name, "a campaign", ScenarioError)
+    table, places = read_toml(text, path.name, CAMPAIGN, ScenarioError)
     where = TablePlace(TomlSource(path.name, places))
     top = read(CampaignTable, table, where)
     trial = _with_start(_trial(top, path, where, firmware, trust), top.vary or {}, path)

@@ -129,7 +129,7 @@ class Results:
         values: dict[str, object] = {
             "number": row.number, "stage": run.stage.value, "finding": row.finding.value,
             "verdict": outcome.verdict.value, "margin": run.margin, "seed": run.trial.seed,
-            "search": self._campaign.search, "campaign_seed": self._campaign.seed,
+            "body": run.trial.table["body"], "search": self._campaign.search, "campaign_seed": self._campaign.seed,
             "trial_sha256": run.trial.sha256, "trace_sha256": outcome.sha256,
             "firmware": ", ".join(programs), "firmware_sha256": ", ".join(programs.values()),
             "p2os": installed_version(),

@@ -25,6 +25,7 @@ from typing import cast
 
 from bluepill_sim.board import BluePill
 from bluepill_sim.program.image import Image, load_image
+from p2os.pioneer.body.factory import BEST, resolve_body
 from p2os.pioneer.world import known_worlds, load_world
 from p2os.pioneer.world.writer import write_world
 from p2os.toml_file import TomlSource, is_file, toml_text
@@ -35,6 +36,7 @@ from robot_bench.bench.board import boot
 from robot_bench.events.kinds import Contact, Event, Pose, Text
 from robot_bench.events.selection import Selector, select
 from robot_bench.scenario.included_files import (
+    SCENARIO,
     MergedSource,
     ScenarioTable,
     Setting,
@@ -106,7 +108,7 @@ class Trial:
                 seed = cast("int", value)
             else:
                 set_key(table, key, value)
-        return replace(self, table=table, seed=seed)
+        return replace(self, table=_with_named_body(table), seed=seed)
 
     def with_lists(self, **lists: Sequence[Table]) -> "Trial":
         """Return the trial with other lists of tables: `obstacle=[…]`; an empty one is left out."""
@@ -158,7 +160,8 @@ class Trial:
         path = refuse_elsewhere(folder, f"{self.name}.toml")  # a trace may say what it is called
         with writing(path, hint="name another folder"):
             _write_files(self.files, folder)
-            path.write_text(replace(self, table=self._with_excused()).text, encoding="utf-8")
+            table = {"version": SCENARIO.newest, **self._with_excused()}
+            path.write_text(replace(self, table=table).text, encoding="utf-8")
         return path
 
     def _with_excused(self) -> Table:
@@ -288,7 +291,13 @@ def trial_of(
     _pack_others(table, path.parent, files)
     table.pop("seed", None)
     trusted = frozenset(code.key for code in scenario.codes)
-    return Trial(name=scenario.name, table=table, files=files, seed=scenario.seed, trusted=trusted)
+    named = _with_named_body(table)
+    return Trial(name=scenario.name, table=named, files=files, seed=scenario.seed, trusted=trusted)
+
+
+def _with_named_body(table: Table) -> Table:
+    """Return the tables, in which the best body that is installed has its name: elsewhere it may be another one."""
+    return {**table, "body": resolve_body(BEST)} if table.get("body", BEST) == BEST else table
 
 
 @dataclass(slots=True)

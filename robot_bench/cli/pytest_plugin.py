@@ -314,6 +314,7 @@ def _run_of(item: pytest.Item, used: "Bench") -> tuple[str, str, int, str]:
 
 def _record(item: pytest.Item, used: "Bench", report: Any, failure: str) -> None:
     """Write the run folder of a test, and tell where it is."""
+    from p2os.pioneer.body.factory import BEST, resolve_body
     from robot_bench.report.make import Files
     from robot_bench.run import why_failed, write_run
     from simbase.errors import P2osError
@@ -336,6 +337,8 @@ def _record(item: pytest.Item, used: "Bench", report: Any, failure: str) -> None
     item.user_properties.append(("bench_report", str(page)))
     firmware = item.config.getoption("--firmware")
     options = f" --firmware {firmware}" if firmware else ""
+    if used.scenario.body == BEST:  # elsewhere it may be another one
+        options += f" --bench-body {resolve_body(BEST)}"
     picture = folder / "path.png"
     if why:
         report.sections.append(("bench: why", why))

@@ -16,6 +16,7 @@ from p2os.cli.names import bodies, body_help, urls, worlds
 from p2os.cli.quantities import option
 from p2os.cli.trust import Trusted, said
 from p2os.errors import RunFailedError
+from p2os.pioneer.body.factory import BEST, resolve_body
 from p2os.toml_schema import within
 from p2os.transport import open_url
 from robot_bench.cli.names import scenario_names, setting_keys
@@ -395,8 +396,6 @@ def sweep_rows(
     for key in (*given, *(["seed"] if chosen else [])):
         if key in swept:
             raise UsageError(f"the scenario sweeps {key}, and an option sets it", hint=f"--set {key}=VALUE ends that")
-    words = [word for key, value in given.items() for word in (_FLAGS.get(key, f"--{key}"), _typed(key, value))]
-    words += ["--trust"] if trust.everything else []
     rows: list[SweepRow] = []
     for settings in sweep.rows(wanted.axes):
         if len(rows) >= MOST_RUNS:
@@ -407,9 +406,16 @@ def sweep_rows(
             set_by=str(within(wanted.where, "sweep")), trust=trust,
         ).with_options(**options)  # fmt: skip
         for one in chosen or (row.seed,):
-            again = command(name, words, (*wanted.settings, *settings), one)
+            again = command(name, _words(given, row, trust), (*wanted.settings, *settings), one)
             rows.append(SweepRow(row.with_options(seed=one), settings, again))
     return rows
+
+
+def _words(given: Mapping[str, object], row: Scenario, trust: Trust) -> list[str]:
+    """Return the options that make a row again, on whatever machine: the best body by its name."""
+    named = {**given, "body": resolve_body(row.body)} if row.body == BEST else given
+    words = [word for key, value in named.items() for word in (_FLAGS.get(key, f"--{key}"), _typed(key, value))]
+    return [*words, *(["--trust"] if trust.everything else [])]
 
 
 def run_many(

@@ -41,8 +41,8 @@ MOST_LINES = 40
 MOST_FAILURES = 12
 #: What a sweep writes of each run.
 FIGURES = (
-    "virtual_s", "distance_m", "collisions", "min_clearance_m", "trace_sha256", "passed", "failures", "goals_met",
-    "goals_not_judged", "wall_s",
+    "body", "virtual_s", "distance_m", "collisions", "min_clearance_m", "trace_sha256", "passed", "failures",
+    "goals_met", "goals_not_judged", "wall_s",
 )  # fmt: skip
 _PASSED, _FAILED, _NOT_RUN = "passed", "failed", "not run"
 #: What XML cannot hold.
@@ -160,7 +160,7 @@ def write_junit(done: SweepResult, path: Path) -> None:
     for row, found in zip(done.rows, done.outcomes, strict=True):
         case = ET.SubElement(suite, "testcase", classname=name, name=row.words, time=str(found.get("wall_s") or 0))
         properties = ET.SubElement(case, "properties")
-        for key in ("trace_sha256", "folder"):
+        for key in ("body", "trace_sha256", "folder"):
             if found.get(key):
                 ET.SubElement(properties, "property", name=key, value=str(found[key]))
         failures = cast("Sequence[str]", found["failures"])
@@ -211,7 +211,8 @@ def print_sweep(done: SweepResult) -> None:
         console.print(f"note    {ALIKE}", soft_wrap=True)
     counts = [(word, len(done.with_word(word))) for word in (_PASSED, _FAILED, INTERRUPTED, _NOT_RUN)]
     summed = ", ".join(f"{count} {word}" for word, count in counts if count or word in {_PASSED, _FAILED})
-    console.print(f"{summed} of {len(done.rows)}")
+    bodies = ", ".join(dict.fromkeys(str(found["body"]) for found in done.outcomes if found.get("body")))
+    console.print(f"{summed} of {len(done.rows)}" + (f", body {bodies}" if bodies else ""))
 
 
 def _are_seeds_alike(done: SweepResult) -> bool:

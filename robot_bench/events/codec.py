@@ -37,13 +37,14 @@ from robot_bench.events.kinds import (
 )
 from robot_bench.wires.edges import Edges, unpack
 from simbase.errors import FileError
+from simbase.files import VersionedFormat
 from simbase.timing import Nanos
 
 #: A parsed JSON object.
 Json: TypeAlias = dict[str, object]
 
-#: Of the whole file, in its first line; without one it is of before events had kinds of their own.
-TRACE_VERSION = 2
+#: The whole file, its version in its first line; the first is of before events had kinds of their own.
+TRACE = VersionedFormat("a trace", newest=2)
 #: Of the blocks of edges.
 BLOCKS_VERSION = 1
 #: What any number of a trace stays within: 64 bits, as the parts that write it count.

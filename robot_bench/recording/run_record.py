@@ -17,7 +17,7 @@ from typing import Any, cast
 from p2os.robots.motor_step import STEP_MPS
 from robot_bench.events.codec import (
     LAST_NS,
-    TRACE_VERSION,
+    TRACE,
     Blocks,
     EdgeBlock,
     Json,
@@ -219,9 +219,5 @@ _FILES: Mapping[type, Callable[[RunRecord, Any], None]] = {
 
 def _meta(entry: Json) -> Json:
     """Return the first line of a trace that this version reads."""
-    version = entry.get("trace", 1)
-    if not isinstance(version, int) or version > TRACE_VERSION:
-        raise TraceError(
-            f"a trace of version {version}, and this p2os reads {TRACE_VERSION}", hint="install a newer p2os"
-        )
+    TRACE.version_of(entry.get("trace"), error=TraceError)
     return entry

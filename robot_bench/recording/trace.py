@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import IO
 
 from p2os.errors import RunFailedError
-from robot_bench.events.codec import TRACE_VERSION, Recorded, line_of
+from robot_bench.events.codec import TRACE, Recorded, line_of
 from robot_bench.events.kinds import Verdict
 from simbase.errors import FileError
 from simbase.state import PartState, Stateful
@@ -103,7 +103,7 @@ class TraceWriter(Stateful):
         """
         self._spell()
         with self._writing() as file:
-            self._write(json.dumps({"k": "meta", "trace": TRACE_VERSION, **entry}) + "\n")
+            self._write(json.dumps({"k": "meta", "trace": TRACE.newest, **entry}) + "\n")
             file.flush()
         self.has_meta = True
 

@@ -26,9 +26,9 @@ from p2os.toml_file import TomlSource, is_file, read_toml, read_user_text
 from p2os.toml_record import Record, read_part
 from p2os.toml_schema import Key, Table, TablePlace
 from simbase.errors import UsageError, nearest, shown, shown_name
+from simbase.files import VersionedFormat
 
-#: Of the schema of scenario files.
-SCHEMA_VERSION = 1
+SCENARIO = VersionedFormat("a scenario")
 #: chosen: what a person keeps in his head is less, and files that include each other twice each come to it soon.
 MOST_FILES = 64
 #: Keys whose value may be a file, by the table that they stand in; `robot` of a `[[robot]]` too.
@@ -43,8 +43,8 @@ class IncludeTable(Record):
     """What a file says of itself and of others; none that names another is left in the table that is put together."""
 
     version: Annotated[int, Key(
-        least=1, most=SCHEMA_VERSION, doc="of these keys; a file for a later version is refused"
-    )] = SCHEMA_VERSION  # fmt: skip
+        least=1, most=SCENARIO.newest, doc="of these keys; a file for a later version is refused"
+    )] = SCENARIO.newest  # fmt: skip
     extends: Annotated[str | None, Key(
         doc="a scenario that ships, or a file: [what it says](#files-of-files) holds where this one says nothing"
     )] = None  # fmt: skip
@@ -232,7 +232,7 @@ def _read(path: Path, folder: Path, above: tuple[Path, ...], count: list[int]) -
     if count[0] > MOST_FILES:
         raise ScenarioError(f"{shown_name(above[0].name)} includes more than {MOST_FILES} files")
     text = read_user_text(path, "a scenario", ScenarioError)
-    table, places = read_toml(text, name, "a scenario", ScenarioError)
+    table, places = read_toml(text, name, SCENARIO, ScenarioError)
     place = TablePlace(TomlSource(name, places))
     own, _ = read_part(IncludeTable, table, place)
     table = {name: value for name, value in table.items() if name not in {"extends", "include"}}

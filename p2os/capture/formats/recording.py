@@ -11,11 +11,13 @@ import json
 from collections.abc import Iterable, Iterator, Mapping
 
 from p2os.capture.chunks import Capture, Chunk, Direction, Part
-from simbase.errors import FileError
+from simbase.errors import FileError, shown
+from simbase.files import VersionedFormat
 from simbase.timing import NS_PER_S, Nanos
 
+#: What stands in the first line.
 FORMAT = "p2os-recording"
-VERSION = 1
+RECORDING = VersionedFormat("a recording")
 #: Spelling of `dir` → who spoke, and the unit of `t` in nanoseconds.
 _DIRECTIONS: Mapping[str, tuple[Direction | None, int]] = {
     "c2r": (Direction.TO_ROBOT, 1),
@@ -75,7 +77,7 @@ def recorded_parts(lines: Iterable[str], first: int = 1) -> Iterator[Part]:
 
 def header_line(note: str = "") -> str:
     """Return the first line of a recording of ours."""
-    return json.dumps({"format": FORMAT, "version": VERSION, "note": note}) + "\n"
+    return json.dumps({"format": FORMAT, "version": RECORDING.newest, "note": note}) + "\n"
 
 
 def chunk_line(chunk: Chunk) -> str:
@@ -102,9 +104,9 @@ def _object(line: str, number: int) -> Mapping[str, object]:
 
 
 def _check_header(entry: Mapping[str, object], number: int) -> None:
-    if entry["format"] != FORMAT or entry.get("version") != VERSION:
-        said = f"{entry['format']!r} version {entry.get('version')!r}"
-        raise FileError(f"line {number}: {said} is not {FORMAT} version {VERSION}", hint="renew p2os")
+    if entry["format"] != FORMAT:
+        raise FileError(f"line {number}: a recording of the format {shown(entry['format'])}, expected {FORMAT}")
+    RECORDING.version_of(entry.get("version"), f"line {number}")
 
 
 def _hex(value: object, number: int) -> bytes:

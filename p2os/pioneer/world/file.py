@@ -19,7 +19,10 @@ from p2os.pioneer.world.readers import read_placed
 from p2os.toml_file import TomlSource, read_toml
 from p2os.toml_schema import Key, Table, TablePlace, check_table, filled, placed, within
 from p2os.toml_schema import Kind as KeyKind
+from simbase.files import VersionedFormat
 
+#: As `writer` writes it.
+WORLD = VersionedFormat("a world")
 #: A table with a value for every key.
 Values = dict[str, Any]
 #: What stands in a key that is no number, and of how many numbers a list is.
@@ -80,6 +83,7 @@ IMPORT_KEYS = _keys({
     "file": None, "x_m": 0.0, "y_m": 0.0, "z_m": 0.0, "heading_deg": 0.0, "scale": 1.0, "up": "auto",
 })  # fmt: skip
 TOP_KEYS = (
+    Key(name="version", kind="whole", least=1, most=WORLD.newest, default=WORLD.newest, doc="of these keys"),
     Key(name="name", kind="text", required=True), Key(name="description", kind="text", default=""),
     in_range("extent_m", required=True), Key(name="start", kind="table", default={}), Key(name="arena", kind="table"),
     *(Key(name=name, kind="tables", default=[]) for name in (*SHAPES, "mesh", "mark", "import")),
@@ -99,7 +103,7 @@ def parse_world(text: str, source: str, seed: int = 0, folder: Path | None = Non
         WorldError: The text is no TOML or breaks the schema; the message names the source, the line and the key.
         MissingDependencyError: An imported file needs a reader that is not installed.
     """
-    table, places = read_toml(text, source, "a world", WorldError)
+    table, places = read_toml(text, source, WORLD, WorldError)
     where = TablePlace(TomlSource(source, places), error=WorldError)
     top = filled(table, TOP_KEYS, where)
     begins = within(where, "start")

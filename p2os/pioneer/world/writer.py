@@ -8,7 +8,7 @@ that was made by a program, never one that was read.
 
 import math
 
-from p2os.pioneer.world.file import CALLED, SHAPES
+from p2os.pioneer.world.file import CALLED, SHAPES, WORLD
 from p2os.pioneer.world.model import Mark, Mesh, Obstacle, World
 from p2os.toml_file import toml_value
 
@@ -23,8 +23,9 @@ def write_world(world: World) -> str:
     start: Fields = {"x_m": x, "y_m": y, "heading_deg": degrees(heading)}
     if z:
         start["z_m"] = z
+    top: Fields = {"version": WORLD.newest, "name": world.name, "description": world.description}
     parts = [
-        _lines({"name": world.name, "description": world.description, "extent_m": list(world.extent)}),
+        _lines({**top, "extent_m": list(world.extent)}),
         f"[start]\n{_lines(start)}",
     ]
     parts += [f"[[{item.section}]]\n{_lines(_fields(item))}" for item in world.obstacles]

@@ -15,11 +15,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from simbase.errors import FileError
-from simbase.files import read_bytes, write_text
+from simbase.files import VersionedFormat, read_bytes, write_text
 
 #: What a campaign has begun with, in its folder.
 BEGUN = "corpus.jsonl"
-VERSION = 1
+CORPUS = VersionedFormat("a corpus")
 #: chosen: more points would take most of a campaign to run again.
 MOST_KEPT = 256
 #: Digits of a coordinate: a thousandth of a range of a kilometre.
@@ -42,8 +42,7 @@ def read_corpus(path: Path) -> tuple[Coordinates, ...]:
         try:
             entry = json.loads(line)
             if number == 1:
-                if entry["corpus"] != VERSION:
-                    raise FileError(f"{path}: a corpus of version {entry['corpus']}", hint="a later p2os wrote it")
+                CORPUS.version_of(entry["corpus"], path)
                 continue
             at = {str(name): _coordinate(value) for name, value in entry["at"].items()}
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
@@ -58,7 +57,7 @@ def write_corpus(path: Path, points: Sequence[Coordinates]) -> None:
     Raises:
         FileError: The disk is full.
     """
-    lines = [json.dumps({"corpus": VERSION}), *(json.dumps({"at": dict(at)}, sort_keys=True) for at in points)]
+    lines = [json.dumps({"corpus": CORPUS.newest}), *(json.dumps({"at": dict(at)}, sort_keys=True) for at in points)]
     write_text(path, "".join(f"{line}\n" for line in lines))
 
 

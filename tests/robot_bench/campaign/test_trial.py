@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from p2os.pioneer.body.engine import Engine
 from robot_bench.campaign.trial import Outcome, Trial, TrialVerdict, bench_of, run_trial, trial_of, unpacked
 from robot_bench.events.kinds import Note, Text
 from robot_bench.run import run_scenario
@@ -54,6 +55,19 @@ def test_a_trial_written_out_is_a_scenario_whose_run_has_the_same_hash(
     path = trial.write(tmp_path / "kept")
     result = run_scenario(load_scenario(str(path)), tmp_path / "run", is_kept=lambda _: False)
     assert result.outcome["trace_sha256"] == outcome.sha256
+
+
+@pytest.mark.parametrize(("lacking", "body"), [("", "bullet"), ("bullet", "mujoco"), ("bullet mujoco", "kinematic")])
+def test_a_trial_names_its_body_so_that_it_never_gets_another_one_elsewhere(
+    lacking: str, body: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Engine, "missing", lambda engine: [engine.name] if engine.name in lacking.split() else [])
+    path = scenario_in(tmp_path)
+    path.write_text(path.read_text().replace('"kinematic"', '"best"'))
+    trial = trial_of(str(path))
+    assert trial.table["body"] == trial_of("dodge").set(("body", "best")).table["body"] == body
+    assert load_scenario(str(trial.write(tmp_path / "kept"))).body == body
+    assert trial.set(("body", "mujoco")).table["body"] == "mujoco"
 
 
 def test_a_trial_needs_nothing_of_the_disk_that_it_was_made_on(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from xml.etree import ElementTree as ET
 import pytest
 
 from p2os.cli.main import run as p2os
+from p2os.pioneer.body.engine import Engine
 from robot_bench.cli.run import sweep_rows
 from robot_bench.cli.sweep import SweepResult, print_sweep
 from robot_bench.cli.workers import run_in_processes
@@ -48,7 +49,7 @@ def test_a_row_for_each_seed_and_nothing_is_left_of_what_passed(capsys: pytest.C
     assert p2os(["run", make(), "--seeds", "0-2", "-j", "2"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[:2] for line in lines[1:4]] == [["0", "passed"], ["1", "passed"], ["2", "passed"]]
-    assert lines[-1] == "3 passed, 0 failed of 3"
+    assert lines[-1] == "3 passed, 0 failed of 3, body kinematic"
     assert all(len(line) <= 80 for line in lines[:4])
     assert list(Path("runs").iterdir()) == []
 
@@ -98,7 +99,7 @@ def test_seeds_that_make_no_difference_are_reported(capsys: pytest.CaptureFixtur
 def test_of_runs_of_which_none_is_kept_no_folder_is_left(capsys: pytest.CaptureFixture[str]) -> None:
     name = make(LEAST.replace("0.2", "0.001") + RIGHT + "[sweep]\nstart.x_m = [-0.5, 0.5]\n")
     assert p2os(["run", name, "--keep", "none", "-j", "2"]) == 1
-    assert capsys.readouterr().out.splitlines()[-1] == "1 passed, 1 failed of 2"
+    assert capsys.readouterr().out.splitlines()[-1] == "1 passed, 1 failed of 2, body kinematic"
     assert not any(Path("runs").iterdir())
 
 
@@ -110,6 +111,22 @@ def printed(seeds: str, capsys: pytest.CaptureFixture[str]) -> list[str]:
     outcomes = [{"passed": one, "failures": [] if one else ["stay_within: it did not"]} for one in passed]
     print_sweep(SweepResult(rows, outcomes, was_interrupted=False, folder=Path("runs")))
     return capsys.readouterr().out.splitlines()
+
+
+@pytest.mark.parametrize(("lacking", "body"), [("", "bullet"), ("bullet", "mujoco"), ("bullet mujoco", "kinematic")])
+def test_the_command_that_runs_a_row_again_names_the_best_body(
+    lacking: str, body: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Engine, "missing", lambda engine: [engine.name] if engine.name in lacking.split() else [])
+    name = make(LEAST.replace('body = "kinematic"\n', ""))
+
+    def again(**options: str) -> str:
+        return sweep_rows(name, load_scenario(name), options, "7", Trust())[0].replay
+
+    assert again() == again(body="best") == f"p2os run mine.toml --body {body} --seed 7"
+    assert again(body="mujoco", mode="direct") == "p2os run mine.toml --body mujoco --mode direct --seed 7"
+    named = make()
+    assert sweep_rows(named, load_scenario(named), {}, "7", Trust())[0].replay == "p2os run mine.toml --seed 7"
 
 
 def test_of_many_runs_the_table_has_a_line_for_all_seeds_of_a_row(capsys: pytest.CaptureFixture[str]) -> None:
