@@ -29,6 +29,7 @@ from p2os.transport import Transport
 from p2os.transport.wall_clock import Clock, wall_clock
 from robot_bench.bench import Bench, RobotRun, run_of
 from robot_bench.bench.board import pins_of
+from robot_bench.bench.recorded_variables import recording_variables, variables_of
 from robot_bench.events.codec import Json
 from robot_bench.recording.run_folder import remove_run, reserved
 from robot_bench.recording.run_record import TRACE_NAME, read_run
@@ -107,6 +108,7 @@ def run_scenario(
     is_kept: Callable[[bool], bool] = lambda _passed: True,
     explained: bool = False,
     files: Files = Files.REPORT,
+    variables: Sequence[str] = (),
 ) -> RunResult:
     """Run a scenario in virtual time and make its run folder.
 
@@ -123,17 +125,23 @@ def run_scenario(
         is_kept: Told whether the run passed; where it says no, nothing is made of the run and its folder is removed.
         explained: Whether the report says of a run that failed why (`p2os explain`), which takes some seconds.
         files: How much is made of the run.
+        variables: Names of the program's variables that are recorded beside the trace.
 
     Raises:
+        UsageError: The program has no such variable.
         P2osError: The folder is not free, a file cannot be read or written, or a part is not installed.
         BluePillError: The firmware file cannot be read, or the emulator is not installed.
     """
     if scenario.robots:
+        if variables:
+            raise UsageError("variables are recorded of a robot alone", hint="a scenario with one robot")
         if drive is not None or coverage or profile:
             raise UsageError("a debugger, coverage and profile are for a robot alone", hint="a scenario with one robot")
         return run_together(
             scenario, folder, speed=speed, on_progress=on_progress, force=force, is_kept=is_kept, files=files
         )  # fmt: skip
+    if variables:
+        drive = recording_variables(variables_of(scenario.firmware, variables), folder, drive)
     pacer = None if speed is None else RealTimePacer(speed=speed)
     with reserved(folder, force=force), _trace_of(scenario, folder, is_at_port=False) as trace:
         bench = Bench(scenario, trace=trace, slice_ns=PACED_SLICE_NS if pacer else None)

@@ -60,6 +60,7 @@ ALLOWED = {
     "bluepill_sim.program.image": {"elftools", "intelhex"},
     "bluepill_sim.program.elf_file": {"elftools"},
     "bluepill_sim.program.line_table": {"elftools"},
+    "bluepill_sim.program.variables": {"elftools"},
     "bluepill_sim.cli": {"typer", "rich", "click"},
     "bluepill_sim.__main__": {"typer"},
     "adapter_sim": {"p2os"},

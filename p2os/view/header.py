@@ -291,6 +291,8 @@ class Answered:
     #: How a run stands that can be controlled, when that changes; and at first whether this page may.
     run: RunState | None = None
     may_control: bool | None = None
+    #: Names of variables, for one that was begun.
+    offered: Sequence[str] | None = None
 
 
 __all__ = [

@@ -40,6 +40,8 @@ class ChannelTrack:
         self.kind: ChannelKind = BY_NAME[header.kind]
         #: Adds the rows when somebody is to see them; None: they are there.
         self.later: Callable[[], None] | None = None
+        #: Counts how often its rows were made anew: who has sent some sends all again.
+        self.generation = 0
         self._take(empty_columns(self.kind))
         self._widths = [header.width if column.is_wide else 1 for column in self.kind.columns]
         #: Of columns that curves are thinned by: their extremes, and their numbers without NaN.
@@ -80,6 +82,13 @@ class ChannelTrack:
         times.append(times[-1] if times and times[-1] > t_ns else t_ns)
         for add, cell in zip(self._adders, cells, strict=True):
             add(cell)
+
+    def replace_rows(self, first: int, last: int, columns: Sequence[ColumnValues]) -> None:
+        """Put other rows where those from one to before another are; none but the kinds of plain columns."""
+        for values, new in zip(self.columns, columns, strict=True):
+            values[first:last] = new  # type: ignore[assignment]  # of one type, as its kind has it
+        self.generation += 1
+        self._indices.clear()
 
     def extend_levels(self, times: Iterable[int], levels: Iterable[int]) -> None:
         """Add rows of a wire at once, in the order of time."""

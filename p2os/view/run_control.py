@@ -18,6 +18,7 @@ StepUnit: TypeAlias = Literal["instruction", "line", "edge", "packet", "event", 
 #: What is done.
 Doing: TypeAlias = Literal[
     "run", "pause", "go", "step", "back", "speed", "fork", "choose", "drop", "compare", "halt_at", "halt_not_at",
+    "watch", "watch_not",
 ]  # fmt: skip
 #: chosen: words of a person in one line.
 MOST_LETTERS = 400
@@ -36,7 +37,7 @@ class RunCommand:
     unit: StepUnit = "event"
     #: Virtual seconds a second; 0: as fast as it goes.
     speed: float = 1.0
-    #: Of `halt_at`: where; of `fork`: what is done there; of a step by edges: the wire.
+    #: Of `halt_at`: where; of `fork`: what is done there; of a step by edges: the wire; of `watch`: the variable.
     words: str = ""
     #: A future's name; of `fork` the one that it leaves, empty: the chosen one.
     future: str = ""
@@ -58,6 +59,8 @@ COMMANDS: Mapping[str, frozenset[str]] = {
     "compare": frozenset({"future"}),
     "halt_at": frozenset({"words"}),
     "halt_not_at": frozenset({"number"}),
+    "watch": frozenset({"words"}),
+    "watch_not": frozenset({"words"}),
 }
 
 
@@ -123,6 +126,8 @@ class RunState:
     future: str = ""
     futures: Sequence[FutureState] = ()
     halts: Sequence[HaltState] = ()
+    #: Names of the program's variables that are watched: each is a channel.
+    variables: Sequence[str] = ()
 
 
 class RunControl(Protocol):
@@ -134,6 +139,9 @@ class RunControl(Protocol):
 
     def offer(self, command: RunCommand) -> bool:
         """Take a command; False where too many wait."""
+
+    def offered(self, begun: str) -> Sequence[str]:
+        """Return names of variables that what was typed may become."""
 
 
 class CommandError(Exception):

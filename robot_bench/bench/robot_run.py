@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import cast
 
 from adapter_sim.pinout import load_pinout
+from bluepill_sim.debug.sampler import VariableSampler
 from p2os.pioneer.body.contract import RobotBody
 from p2os.pioneer.body.factory import body_note, make_body
 from p2os.pioneer.controller import Pioneer
@@ -89,7 +90,7 @@ class RobotRun(Stateful):
         "goals", "loop", "_senses", "ends_at", "_has_reported_death",
     )  # fmt: skip
     #: What the caller asked of this object; the lines, which are parts of the loop.
-    DERIVED = ("_lines", "waits", "on_slice")
+    DERIVED = ("_lines", "waits", "on_slice", "samplers")
 
     def __init__(
         self,
@@ -104,6 +105,8 @@ class RobotRun(Stateful):
         self.scenario = scenario
         self.trace = trace or TraceWriter()
         self.on_slice = on_slice
+        #: What looks at the program's variables while it runs.
+        self.samplers: list[VariableSampler] = []
         self._shared = shared
         pinout = load_pinout()
         world = load_world(scenario.world, seed=scenario.seed)
@@ -136,7 +139,7 @@ class RobotRun(Stateful):
         self._senses = self._plug_in(chip) if scenario.parts else ()
         self.hands = HandScript(bring_to=self.bring_robot_to, do=self._do_by_hand)
         followers = (*self._robots, self.script, self.faults, self.hands, *self._senses)
-        self._slices = SliceLength() if slice_ns is None else None
+        self._slices, self._slice_ns = SliceLength() if slice_ns is None else None, slice_ns
         self.loop = RunLoop(
             chip, followers, observers=(self.recorder,), slice_ns=slice_ns or FIRST_SLICE_NS,
             on_slice=self._after_slice, choose_watched=self._watch_wires,
@@ -218,7 +221,7 @@ class RobotRun(Stateful):
     @property
     def slice_ns(self) -> Nanos | None:
         """The length of a slice that was asked for; None: as often as the wall clock wants it."""
-        return self.loop.slice_ns if self._slices is None else None
+        return self._slice_ns
 
     @property
     def reached(self) -> Nanos:
@@ -305,8 +308,9 @@ class RobotRun(Stateful):
             self._pins.watch(self.parts.adapter.wakes_on, now)
 
     def _after_slice(self, now: Nanos) -> None:
-        if self._slices is not None:
-            self.loop.slice_ns = self._slices.after_slice()
+        slice_ns = self._slice_ns if self._slices is None else self._slices.after_slice()
+        until_look = [sampler.look(now) for sampler in self.samplers]
+        self.loop.slice_ns = min(slice_ns or FIRST_SLICE_NS, *until_look) if until_look else slice_ns or FIRST_SLICE_NS
         died_ns = self.chip.died_ns
         if died_ns is not None or self.chip.fault is not None:
             self.loop.end_at(self.whole_end)

@@ -7,10 +7,13 @@ from pathlib import Path
 
 import typer
 
+from bluepill_sim.errors import BluePillError
+from bluepill_sim.program.image import load_image
+from bluepill_sim.program.variables import read_variables
 from p2os.toml_record import keys_of, table_of, tables_of
 from p2os.toml_schema import Key, Table
 from robot_bench.scenario.included_files import read_tables, shipped_file
-from robot_bench.scenario.loading import known_scenarios
+from robot_bench.scenario.loading import known_scenarios, load_scenario
 from robot_bench.scenario.tables import EachRobotTable, TopTable
 from simbase.errors import P2osError
 
@@ -18,6 +21,15 @@ from simbase.errors import P2osError
 def scenario_names(incomplete: str) -> list[str]:
     """Return the scenarios that ship."""
     return [name for name in known_scenarios() if name.startswith(incomplete)]
+
+
+def variable_names(context: typer.Context, incomplete: str) -> list[str]:
+    """Return names of numbers among the variables of the firmware on the line."""
+    scenario = context.params.get("scenario") or next(iter(context.args), "")
+    with contextlib.suppress(P2osError, BluePillError):  # a shell shows no errors
+        firmware = context.params.get("firmware") or load_scenario(scenario, trust=False).firmware
+        return read_variables(load_image(firmware)).offered(incomplete)
+    return []
 
 
 def setting_keys(context: typer.Context, incomplete: str) -> list[tuple[str, str]]:

@@ -19,7 +19,8 @@ from p2os.errors import RunFailedError
 from p2os.pioneer.body.factory import BEST, resolve_body
 from p2os.toml_schema import within
 from p2os.transport import open_url
-from robot_bench.cli.names import scenario_names, setting_keys
+from robot_bench.bench.recorded_variables import variables_of
+from robot_bench.cli.names import scenario_names, setting_keys, variable_names
 from robot_bench.cli.progress import RunDisplay
 from robot_bench.cli.shown.live_run import LiveRun
 from robot_bench.cli.sweep import (
@@ -76,6 +77,7 @@ Examples:
   p2os run dodge --coverage --profile               lines, branches, cycles of the whole run
   p2os run dodge --coverage --fail-under 80         exit code 1 below 80 % of the lines
   p2os run dodge --gdb 3333                         under GDB; the robot stands still at a halt
+  p2os run dodge --watch-variable dodge.state       recorded, and a plot in p2os view
   p2os run dodge --view                             live on a page in the browser
   p2os run dodge --foxglove                         live in Foxglove or Lichtblick
   p2os run dodge --ros                              its pins as topics of ROS 2 (docs/ros.md)
@@ -183,6 +185,12 @@ def run(
         ),
     ] = 0.0,
     profile: Annotated[bool, typer.Option("--profile", help="Write where the cycles went.")] = False,
+    watch_variable: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Record a variable of the program; repeatable.", metavar="NAME", autocompletion=variable_names
+        ),
+    ] = None,
     gdb: Annotated[
         int | None,
         option(PORT, "--gdb", purpose="Wait for GDB on this TCP port; 0 takes a free one.", least="0", most="65535"),
@@ -234,6 +242,7 @@ def run(
         )
     elif yes or max_speed is not None:
         raise UsageError(f"{'--yes' if yes else '--max-speed'} goes with --port only")
+    refuse_beside("watch-variable", watch_variable or None, port=port, robots=wanted.robots or None)
     options: ScenarioOptions = {
         "firmware": firmware,
         "mode": mode,
@@ -265,6 +274,7 @@ def run(
             "view": page,
             "gdb": gdb,
             "realtime": realtime,
+            "watch-variable": watch_variable or None,
         }
         refuse(
             {**alone, "coverage": coverage or None, "profile": profile or None},
@@ -280,24 +290,28 @@ def run(
         result = drive_port(wanted, out, port, yes=yes, max_speed_mps=max_speed, gdb=gdb, force=force)
         end_with(result, json_output=json_output)
         return
+    names = watch_variable or ()
+    variables_of(wanted.firmware, names)  # what is none is said before there is a folder
     folder = out or make_next_folder(wanted.name)
     # Who looks on from outside lives in real time.
     pace = None if page else realtime or (None if ros is None and foxglove is None else 1.0)
     with RunDisplay() as display:
         if gdb is None:
             with (
-                viewed(wanted, realtime or 1.0, display, is_opened=not no_browser) if view
+                viewed(wanted, realtime or 1.0, display, names, is_opened=not no_browser) if view
                 else driven(wanted, ros=ros, inputs=inputs, foxglove=foxglove, origins=foxglove_origin or ())
             ) as driver:  # fmt: skip
                 result = run_scenario(
                     wanted, folder, speed=pace, on_progress=display.update, force=force, drive=driver,
                     coverage=coverage, profile=profile, fail_under=fail_under, explained=True,
+                    variables=names,
                 )  # fmt: skip
         else:
             from robot_bench.cli.debugging.gdb import debug_bench
 
             driver = debug_bench(gdb, is_paced=realtime is not None, on_wait=display.raise_if_interrupted)
-            result = run_scenario(wanted, folder, on_progress=display.update, drive=driver, force=force)
+            result = run_scenario(wanted, folder, on_progress=display.update, drive=driver, force=force,
+                                  variables=names)  # fmt: skip
     end_with(result, json_output=json_output)
 
 
@@ -354,13 +368,15 @@ def driven(
 
 
 @contextlib.contextmanager
-def viewed(scenario: Scenario, speed: float, display: RunDisplay, *, is_opened: bool) -> Iterator[RunBench]:
-    """Yield what runs a bench while a page shows and controls it, at first at a speed.
+def viewed(
+    scenario: Scenario, speed: float, display: RunDisplay, variables: Sequence[str] = (), *, is_opened: bool
+) -> Iterator[RunBench]:
+    """Yield what runs a bench while a page shows and controls it, at first at a speed and with some variables.
 
     Raises:
         UsageError, MissingDependencyError: As of `shown`.
     """
-    live = LiveRun(scenario, speed=speed, on_wait=display.raise_if_interrupted)
+    live = LiveRun(scenario, speed=speed, variables=variables, on_wait=display.raise_if_interrupted)
     with shown(live.source, is_opened=is_opened):
         yield live.drive
 

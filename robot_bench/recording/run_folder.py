@@ -19,6 +19,7 @@ from pathlib import Path
 
 from robot_bench.recording.run_record import TRACE_NAME
 from robot_bench.recording.summary import SUMMARY_NAME
+from robot_bench.recording.variables import VARIABLES_NAME
 from simbase.errors import UsageError
 from simbase.files import reason_of, refuse_elsewhere
 
@@ -26,7 +27,7 @@ from simbase.files import reason_of, refuse_elsewhere
 RUNS = Path("runs")
 #: All that a run leaves in its folder.
 FILES = (
-    TRACE_NAME, SUMMARY_NAME, "report.html", "pins.vcd", "pins.sr", "wire.jsonl", "usart.txt",
+    TRACE_NAME, VARIABLES_NAME, SUMMARY_NAME, "report.html", "pins.vcd", "pins.sr", "wire.jsonl", "usart.txt",
     "path.png", "speeds.png", "pins.png",
     "coverage.txt", "coverage.html", "coverage.info", "profile.txt", "profile.folded", "profile.svg",
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""A recorded run, read back from its `trace.jsonl`.
+"""A recorded run, read back from its `trace.jsonl`, and the variables that were recorded beside it.
 
 The trace is the single source: every picture and table of a report is made
 from it, so a run that was cut short (Ctrl-C, kill -9, a full disk) still has a
@@ -47,6 +47,7 @@ from robot_bench.events.kinds import (
     WorldChange,
 )
 from robot_bench.events.whole_lines import check_whole_line
+from robot_bench.recording.variables import VariableRecord, read_variables
 from robot_bench.wires.edges import Edges
 from simbase.files import lines_of
 from simbase.timing import NS_PER_S
@@ -81,6 +82,8 @@ class RunRecord:
     clearances: list[Clearance] = field(default_factory=list)
     faults: list[Fault] = field(default_factory=list)
     verdicts: list[Verdict] = field(default_factory=list)
+    #: Of the program, where the run was asked for them; they stand beside the trace.
+    variables: list[VariableRecord] = field(default_factory=list)
     last_ns: int = 0
     #: True where the trace has no end line, or its last line was cut.
     is_cut: bool = True
@@ -109,15 +112,16 @@ class RunRecord:
 
 
 def read_run(folder: Path) -> RunRecord:
-    """Read a run folder's trace.
+    """Read a run folder's trace, and its variables.
 
     Raises:
-        TraceError: The folder or its trace is missing, or its first line is no trace.
+        TraceError: The folder or its trace is missing, its first line is no trace, or the variables are damaged.
     """
     path = _trace_in(folder)
     record = record_of(lines_of(path, TraceError), str(path))
     if not record.meta:
         raise TraceError(f"{path} does not start with a trace's meta line", hint="was it made by `p2os run`?")
+    record.variables = read_variables(folder)
     return record
 
 

@@ -1,6 +1,6 @@
 """A recorded run as a recording of the page: its rows out of the trace, its report as sections.
 
-Invariant: nothing but the trace is read.
+Invariant: nothing but the run's record is read.
 """
 
 import heapq
@@ -39,6 +39,10 @@ def recording_of_all(records: Mapping[str, RunRecord], header: PageHeader) -> Vi
     }
     for name, record in records.items():
         robots[name].edges(record.pins)
+        for one in record.variables:
+            track = robots[name].variable(one.name, one.type_name)
+            for row in zip(one.times, one.values, strict=True):
+                track.append(*row)
     streams = [zip(repeat(name), _events_of(record), strict=False) for name, record in records.items()]
     for name, event in heapq.merge(*streams, key=lambda row: row[1].t):
         robots[name].take(event)

@@ -161,6 +161,11 @@ class RunTracks:
         )  # fmt: skip
         track.append(t, ((code ^ sign) - sign) * self._step_mps)
 
+    def variable(self, name: str, type_name: str) -> ChannelTrack:
+        """Return the channel of a variable of the program, which holds its value until the next row."""
+        doc = f"{type_name}, a variable of the program"
+        return self._track(name, "samples", key=f"variable:{name}", doc=doc, is_stepped=True)
+
     def finish(self, end: Json) -> None:
         """Add the rest of what was sent, and how the goals stand that no event has decided."""
         at = self.recording.header.end_ns

@@ -11,19 +11,22 @@ Invariant: a request is answered, or refused in words; nothing that a page sends
 """
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, fields, replace
 from typing import cast
 
+from p2os.view.frames import FrameFlags
 from p2os.view.header import Answered, PageHeader, Wanted
 from p2os.view.live import ShownSource
 from p2os.view.recording import ViewRecording
-from p2os.view.run_control import CommandError, RunState, command_of
+from p2os.view.run_control import MOST_LETTERS, CommandError, RunState, command_of
 from simbase.timing import Nanos
 
 #: chosen: a page's request has less than a kilobyte.
 LARGEST_REQUEST_BYTES = 65_536
 MOST_CHANNELS, MOST_PIXELS = 4096, 8192
+#: The end of rows that go on, as the page has it; and as many pixels as a channel is sent for that was made anew.
+OPEN_END_NS, REPLACED_PIXELS = 2**62, 2000
 #: chosen: new rows of a channel that are sent at once.
 MOST_NEWS = 20_000
 #: chosen: a page asks some ten times a second while one drags; so many in a row, and so many a second.
@@ -52,6 +55,8 @@ class PageSession:
         self._state: RunState | None = None
         #: Channel → the row behind the last that was sent.
         self._sent: dict[int, int] = {}
+        #: Channel → how often its rows had been made anew by then.
+        self._generations: dict[int, int] = {}
         #: What was said last; of channels, how many.
         self._header: PageHeader | None = None
         self._channels = 0
@@ -73,7 +78,10 @@ class PageSession:
         for channel, row in self._sent.items():
             track = self._recording.tracks[channel]
             end = len(track)
-            if end - row > MOST_NEWS:
+            if track.generation != self._generations.get(channel, 0):
+                self._generations[channel] = track.generation
+                yield track.frame(0, OPEN_END_NS, REPLACED_PIXELS, flags=FrameFlags.REPLACES).to_bytes()
+            elif end - row > MOST_NEWS:
                 lost += end - row
             elif end > row:
                 yield track.tail(row, end).to_bytes()
@@ -106,6 +114,9 @@ class PageSession:
         """
         self._count(now_s)
         found = _json_of(text)
+        if "offer" in found:
+            yield self._offered(found)
+            return
         if "do" in found:
             yield from self._command(found)
             return
@@ -121,7 +132,7 @@ class PageSession:
             track = self._recording.tracks[channel]
             yield track.frame(wanted.from_ns, wanted.to_ns, wanted.pixels).to_bytes()
             if self._recording.header.is_live:
-                self._sent[channel] = len(track)
+                self._sent[channel], self._generations[channel] = len(track), track.generation
         yield _said(done=wanted.id)
 
     def _command(self, found: Mapping[str, object]) -> Iterator[str]:
@@ -136,6 +147,14 @@ class PageSession:
             yield _said(refused="this link is for looking on")
         elif not control.offer(command):
             yield _said(refused="too many commands wait")
+
+    def _offered(self, found: Mapping[str, object]) -> str:
+        """Answer what a name of a variable may be that begins so."""
+        begun = found["offer"]
+        if len(found) != 1 or not isinstance(begun, str) or len(begun) > MOST_LETTERS:
+            raise RequestError(f"offer is a text of at most {MOST_LETTERS} letters, and alone")
+        control = self._source.control
+        return _said(offered=() if control is None else control.offered(begun))
 
     def _count(self, now_s: float) -> None:
         self._room = min(MOST_AT_ONCE, self._room + (now_s - self._asked_at) * A_SECOND) - 1.0
@@ -153,10 +172,12 @@ def _said(
     refused: str | None = None,
     run: RunState | None = None,
     may_control: bool | None = None,
+    offered: Sequence[str] | None = None,
 ) -> str:
     """Return an answer as JSON, without what it does not say."""
     answer = asdict(Answered(
-        header=header, done=done, lost=lost, now_ns=now_ns, refused=refused, run=run, may_control=may_control
+        header=header, done=done, lost=lost, now_ns=now_ns, refused=refused, run=run, may_control=may_control,
+        offered=offered,
     ))  # fmt: skip
     said = {key: value for key, value in answer.items() if value is not None}
     return json.dumps(said, ensure_ascii=False, separators=(",", ":"), allow_nan=False)

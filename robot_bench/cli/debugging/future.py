@@ -9,13 +9,15 @@ Invariant: a bench that was halted, set back and let go on leaves the trace of o
 """
 
 import contextlib
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 
 from bluepill_sim.debug.execution import Execution
 from bluepill_sim.debug.history import Point
 from bluepill_sim.debug.machine import HaltReason, StopKind
+from bluepill_sim.debug.sampler import VariableSampler
 from bluepill_sim.program.line_table import read_lines
+from bluepill_sim.program.variables import Variable
 from robot_bench.bench import Bench, run_of
 from robot_bench.bench.waiting import TraceMark, events_since, mark_of
 from robot_bench.cli.debugging.machine import BenchMachine
@@ -38,6 +40,15 @@ class Halted:
 
     number: int
     why: str
+
+
+@dataclass(slots=True)
+class SeenStretch:
+    """What was seen of variables in a stretch of time without gaps: rows where one is another than before."""
+
+    begins_ns: Nanos
+    until_ns: Nanos = 0
+    rows: list[tuple[Nanos, str, float]] = field(default_factory=list)
 
 
 class _Watch:
@@ -84,6 +95,8 @@ class Future:
         self._points: dict[int, HaltPoint] = {}
         #: Events to halt at that have come: time, number, words.
         self._hits: list[tuple[Nanos, int, str]] = []
+        #: What was seen of the watched variables since that was taken.
+        self._seen: list[SeenStretch] = []
         self._take(bench)
         #: Until when all is known: who records it says so.
         self.known_ns: Nanos = bench.events.released_until
@@ -98,16 +111,39 @@ class Future:
     def _take(self, bench: Bench) -> None:
         self.bench = bench
         self.machine = _WatchedMachine(bench, self._watches)
+        self._sampler = VariableSampler(self.machine.board, self._see)
+        run_of(bench).samplers.append(self._sampler)
         self.execution = Execution(self.machine, most_points=MOST_POINTS, slice_ns=SLICE_NS)
 
     def replace(self, bench: Bench) -> None:
         """Go on with another bench that stands where this one does."""
-        points = self._points
+        points, variables = self._points, self._sampler.variables
         self.arm({})
+        run_of(self.bench).samplers.remove(self._sampler)
         history = self.execution.history
         self._take(bench)
         self.execution.history.take(history)
         self.arm(points)
+        self.watch(variables)
+
+    def watch(self, variables: Sequence[Variable]) -> None:
+        """Look at these variables of the program from now on, and at no others."""
+        self._sampler.watch(variables)
+
+    def take_seen(self) -> Sequence[SeenStretch]:
+        """Return what was seen of the variables since the last call."""
+        seen, self._seen = self._seen, []
+        return seen
+
+    def _see(self, at: Nanos, is_anew: bool, changes: Sequence[tuple[str, float]]) -> None:
+        if is_anew or not self._seen:
+            begun = self._seen_until if not is_anew else at
+            self._seen.append(SeenStretch(begun))
+        self._seen[-1].until_ns = self._seen_until = at
+        self._seen[-1].rows += [(at, name, value) for name, value in changes]
+
+    #: When the variables were looked at last.
+    _seen_until: Nanos = 0
 
     @property
     def now_ns(self) -> Nanos:

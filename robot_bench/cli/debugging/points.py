@@ -1,7 +1,7 @@
 """Where a run halts: a source line, a variable, or an event in words; and what a step goes by.
 
     line dodge.c:42               before the first instruction of the line, each time
-    variable speed                after an instruction that writes to it
+    variable state.count          after an instruction that writes to it (names as of `bluepill_sim.program.variables`)
     pin PB12 high                 any words of `robot_bench.events.selection`: pins, packets, goals, places, texts
 
 Invariant: what a point says of a run depends on the run alone.
@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from bluepill_sim.board import BluePill
 from bluepill_sim.core import Watchpoint
 from bluepill_sim.program.line_table import LineTable, read_lines
+from bluepill_sim.program.variables import read_variables
 from robot_bench.events.kinds import (
     Contact,
     Event,
@@ -85,15 +86,13 @@ def _line(place: str, table: LineTable) -> frozenset[int]:
 
 
 def _variable(name: str, board: BluePill) -> Watchpoint:
-    """Return what watches the writes to a variable of static duration.
+    """Return what watches the writes to a variable of static duration, or to a part of one.
 
     Raises:
         UsageError: There is none of that name.
     """
-    variables = {one.name: one for one in board.image.symbols.symbols if one.size and not one.is_function}
-    if name not in variables:
-        raise UsageError(f"there is no variable {shown(name)}", hint=nearest(name, variables))
-    return Watchpoint(variables[name].address, variables[name].size)
+    address, found, _ = read_variables(board.image).place(name)
+    return Watchpoint(address, found.size)
 
 
 def other_lines(board: BluePill) -> frozenset[int]:

@@ -6,12 +6,13 @@ Passive: time is an argument. Whoever owns it calls `do` with a command, and `go
 Invariant: whatever is asked, the run itself leaves the trace that it would have left; only a fork is another run.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import count
 from pathlib import Path
 from typing import Protocol
 
 from bluepill_sim.errors import BluePillError
+from bluepill_sim.program.variables import Variable, read_variables
 from p2os.view.run_control import (
     Doing,
     FutureState,
@@ -33,6 +34,8 @@ from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 MAIN = "run"
 #: chosen: futures at a time; each has its trace in a file and its rows in memory.
 MOST_FUTURES = 8
+#: chosen: variables of the program that are watched at a time; each is looked at a thousand times a second.
+MOST_VARIABLES = 32
 #: chosen: differences that are listed, the first that part.
 MOST_SIGNALS = 8
 #: chosen: slower than this, what happens is looked for ahead of the time that is shown: else it would come late.
@@ -77,6 +80,7 @@ class RunSession:
         self._numbers, self._places = count(1), count(1)
         self._points: dict[int, HaltPoint] = {}
         self._counts: dict[int, int] = {}
+        self._variables: dict[str, Variable] = {}
         self._compared: dict[str, tuple[str, Nanos, tuple[PartingState, ...]]] = {}
         self._why, self._trouble, self._done = "", "", 0
         self._reported_at: Nanos | None = None
@@ -86,6 +90,7 @@ class RunSession:
             "run": self._run, "pause": self._pause, "go": self._go, "step": self._step, "back": self._back,
             "speed": self._set_speed, "fork": self._fork, "choose": self._choose, "drop": self._drop,
             "compare": self._compare, "halt_at": self._halt_at, "halt_not_at": self._halt_not_at,
+            "watch": self._watch, "watch_not": self._watch_not,
         }  # fmt: skip
         recorder.begin(self._main)
 
@@ -114,6 +119,7 @@ class RunSession:
                 futures=[self._state_of(one) for one in self._futures.values()],
                 halts=[HaltState(number=number, words=one.words, count=self._counts[number])
                        for number, one in self._points.items()],
+                variables=list(self._variables),
             )  # fmt: skip
         return self._state
 
@@ -207,6 +213,7 @@ class RunSession:
         future = Future(name, bench, parent.name, command.words.strip())
         self._futures[name] = self._known[name] = future
         self._recorder.forked(future, parent)
+        future.watch(list(self._variables.values()))
         self._choose_future(future)
         future.look_ahead()
         self._stop("")
@@ -279,6 +286,36 @@ class RunSession:
             raise UsageError(f"there is no place {command.number} to halt at", hint="it may be gone")
         del self._counts[command.number]
         self._chosen.arm(self._points)
+
+    def watch(self, names: Sequence[str]) -> None:
+        """Look at these variables of the program from now on, too.
+
+        Raises:
+            UsageError: There is none of a name, or there are too many.
+        """
+        table = read_variables(self._main.machine.board.image)
+        found = [table.variable(name) for name in names]
+        wanted = self._variables | {one.name: one for one in found}
+        if len(wanted) > MOST_VARIABLES:
+            raise UsageError(f"{MOST_VARIABLES} variables are watched already", hint="take one away")
+        self._look_at(wanted)
+
+    def watched(self) -> Iterator[tuple[Future, Mapping[str, str]]]:
+        """Yield each future, with the names and types of the variables that are watched."""
+        types = {name: one.type_name for name, one in self._variables.items()}
+        for future in self._futures.values():
+            yield future, types
+
+    def _watch(self, command: RunCommand) -> None:
+        self.watch([command.words])
+
+    def _watch_not(self, command: RunCommand) -> None:
+        self._look_at({name: one for name, one in self._variables.items() if name != command.words})
+
+    def _look_at(self, variables: dict[str, Variable]) -> None:
+        self._variables = variables
+        for future in self._futures.values():
+            future.watch(list(variables.values()))
 
     def _named(self, name: str) -> Future:
         found = self._futures.get(name)

@@ -7,24 +7,28 @@ Invariant: nobody who looks on decides anything: the trace is the same with and 
 """
 
 import queue
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from bluepill_sim.errors import BluePillError
+from bluepill_sim.program.image import load_image
+from bluepill_sim.program.variables import read_variables
 from p2os.transport.wall_clock import Clock, wall_clock
 from p2os.view.header import PageHeader
 from p2os.view.live import LiveRecording
 from p2os.view.recording import ViewRecording
 from p2os.view.run_control import RunCommand, RunState
 from robot_bench.bench import Bench, run_of
-from robot_bench.cli.debugging.future import Future
+from robot_bench.cli.debugging.future import Future, SeenStretch
 from robot_bench.cli.debugging.session import MAIN, RunSession
 from robot_bench.events.codec import Blocks, EdgeBlock, Json, Levels, Recorded
 from robot_bench.report.run_page import lead_of
 from robot_bench.run import meta_of
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.view.run_tracks import RunTracks
+from robot_bench.view.variable_track import VariableTrack
 from robot_bench.wires.edges import Edges
 from simbase.timing import Nanos
 
@@ -68,7 +72,17 @@ class FutureDropped:
     future: str
 
 
-Happened = BenchBuilt | BenchReleased | FutureForked | FutureDropped
+@dataclass(frozen=True, slots=True)
+class VariablesSeen:
+    """What was seen of the program's variables in a future."""
+
+    future: str
+    stretches: Sequence[SeenStretch]
+    #: Name → type, of those that are watched.
+    types: Mapping[str, str]
+
+
+Happened = BenchBuilt | BenchReleased | FutureForked | FutureDropped | VariablesSeen
 
 
 class LiveRun:
@@ -77,6 +91,7 @@ class LiveRun:
     Args:
         scenario: What will be run.
         speed: Virtual seconds a second at first; 0 as fast as it goes.
+        variables: Names of the program's variables that are watched from the beginning.
         on_wait: Called while it stands still; may raise to end the run.
         clock: Wall clock, ns.
     """
@@ -86,13 +101,17 @@ class LiveRun:
         scenario: Scenario,
         *,
         speed: float = 1.0,
+        variables: Sequence[str] = (),
         on_wait: Callable[[], None] = lambda: None,
         clock: Clock = wall_clock,
     ) -> None:
         self._recording = ViewRecording(PageHeader(title=scenario.name))
         self._tracks: dict[str, RunTracks] = {}
+        #: Future and name → the channel of a variable.
+        self._seen: dict[tuple[str, str], VariableTrack] = {}
         self._blocks: dict[str, Blocks] = {}
         self._speed, self._on_wait, self._clock = speed, on_wait, clock
+        self._variables, self._firmware = variables, scenario.firmware
         self._commands: queue.SimpleQueue[RunCommand] = queue.SimpleQueue()
         #: How the run stands; None before it has begun.
         self._state = RunState(is_running=True, speed=speed)
@@ -118,6 +137,13 @@ class LiveRun:
         self._commands.put(command)
         return True
 
+    def offered(self, begun: str) -> Sequence[str]:
+        """Return names of variables that what was typed may become."""
+        try:
+            return read_variables(load_image(self._firmware)).offered(begun)
+        except BluePillError:
+            return ()
+
     # As what runs the bench.
 
     def drive(self, bench: Bench) -> None:
@@ -126,6 +152,7 @@ class LiveRun:
         self.source.offer(BenchBuilt(meta), bench.now, is_kept=True)
         self._folder = TemporaryDirectory(prefix="p2os-view-")
         session = self._session = RunSession(bench, self, Path(self._folder.name), self._speed)
+        session.watch(self._variables)
         try:
             while not session.is_over or session.is_running:
                 self._turn(session)
@@ -153,6 +180,7 @@ class LiveRun:
     def _turn(self, session: RunSession) -> None:
         """Do a command, or run a slice."""
         wait_s = session.go_on(self._clock()) if session.is_running else _WAIT_S
+        self._hand_over_variables(session)
         self._show(session.state())
         if wait_s:
             self._on_wait()
@@ -161,7 +189,13 @@ class LiveRun:
         except queue.Empty:
             return
         session.do(command)
+        self._hand_over_variables(session)
         self._show(session.state())
+
+    def _hand_over_variables(self, session: RunSession) -> None:
+        for future, types in session.watched():
+            if stretches := future.take_seen():
+                self.source.offer(VariablesSeen(future.name, stretches, types), future.known_ns)
 
     def _show(self, state: RunState) -> None:
         if state is not self._state:
@@ -203,6 +237,12 @@ class LiveRun:
         elif isinstance(happened, FutureForked):
             self._tracks[happened.future] = self._tracks[happened.parent].forked(happened.future, happened.until_ns)
             self._blocks[happened.future] = Blocks(happened.nets, bytearray(happened.levels))
+            for (future, name), one in [*self._seen.items()]:
+                if future == happened.parent:
+                    track = self._tracks[happened.future].variable(name, "")
+                    self._seen[happened.future, name] = one.forked(track, happened.until_ns)
+        elif isinstance(happened, VariablesSeen):
+            self._add_variables(happened)
         elif isinstance(happened, FutureDropped):
             self._recording.dropped.add(happened.future)
             self._recording.header = replace(
@@ -211,6 +251,15 @@ class LiveRun:
             )
         else:
             self._add_events(happened)
+
+    def _add_variables(self, happened: VariablesSeen) -> None:
+        for stretch in happened.stretches:
+            for name, type_name in happened.types.items():
+                key = happened.future, name
+                if key not in self._seen:
+                    self._seen[key] = VariableTrack(self._tracks[happened.future].variable(name, type_name))
+                rows = [(at, value) for at, one, value in stretch.rows if one == name]
+                self._seen[key].take(stretch.begins_ns, stretch.until_ns, rows)
 
     def _add_events(self, happened: BenchReleased) -> None:
         tracks, blocks = self._tracks[happened.future], self._blocks[happened.future]

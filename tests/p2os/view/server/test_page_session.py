@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -195,6 +196,9 @@ class Run:
         self.taken.append(command)
         return True
 
+    def offered(self, begun: str) -> list[str]:
+        return [f"{begun}.speed"]
+
 
 def controlled(run: Run | None, *, may_control: bool = True) -> PageSession:
     source = StillRecording(recording())
@@ -266,3 +270,24 @@ def test_anything_at_all_is_a_command_or_refused(sent: dict[str, Any]) -> None:
     with contextlib.suppress(RequestError):
         asked(controlled(run), **{"do": "run", **sent})
     assert all(COMMANDS[one.do] is not None for one in run.taken)
+
+
+def test_names_are_offered_for_what_is_typed_and_to_who_looks_on_too() -> None:
+    session = controlled(Run(), may_control=False)
+    assert sent_of(session.receive('{"offer": "mot"}', 0.0))[1] == [{"offered": ["mot.speed"]}]
+    assert sent_of(controlled(None).receive('{"offer": "mot"}', 0.0))[1] == [{"offered": []}]
+    for text in ('{"offer": 1}', '{"offer": "x", "id": 1}', json.dumps({"offer": "x" * 401})):
+        with pytest.raises(RequestError, match="offer is a text"):
+            list(session.receive(text, 0.0))
+
+
+def test_a_channel_whose_rows_were_made_anew_is_sent_whole_and_then_goes_on() -> None:
+    shown = recording(rows=4)
+    shown.header = replace(shown.header, is_live=True)
+    session = PageSession(StillRecording(shown))
+    asked(session, want=[0], to_ns=2**62)
+    track = next(one for one in shown.tracks if one.header.id == 0)
+    track.replace_rows(1, 2, track.rows(1, 2))
+    (frame,), _ = sent_of(session.news())
+    assert (frame.flags & FrameFlags.REPLACES, frame.count, frame.to_ns) == (FrameFlags.REPLACES, 4, 2**62)
+    assert sent_of(session.news())[0] == []

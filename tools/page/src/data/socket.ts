@@ -40,6 +40,10 @@ export class Connection implements Source {
     if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(command));
   }
 
+  offer(begun: string): void {
+    if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify({ offer: begun }));
+  }
+
   private connect(): void {
     const socket = new WebSocket(this.url, [SUBPROTOCOL, `token.${this.token}`]);
     socket.binaryType = "arraybuffer";
@@ -59,6 +63,7 @@ export class Connection implements Source {
     if (typeof message.now_ns === "number" && message.now_ns > header.end_ns) this.store.all.value = { ...header, end_ns: message.now_ns };
     if (typeof message.may_control === "boolean") this.store.mayControl.value = message.may_control;
     if (message.run) this.store.run.value = message.run;
+    if (message.offered) this.store.offered.value = message.offered;
     if (message.lost) this.store.forget();
     if (message.refused) this.store.trouble.value = `refused: ${message.refused}`;
   }

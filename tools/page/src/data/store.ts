@@ -12,6 +12,8 @@ export interface Source {
   ask(request: Request, answered: (isThere: boolean) => void): void;
   /** Asks something of the run that is shown. */
   command?(command: Command): void;
+  /** Asks which names of variables begin so: they come as `Store.offered`. */
+  offer?(begun: string): void;
 }
 
 /** Which futures are looked at: the sources of their channels, and until when they are known. */
@@ -41,6 +43,8 @@ export class Store {
   readonly mayControl = signal(false);
   /** Counts up when rows came. */
   readonly version = signal(0);
+  /** Names of variables, for what was typed last. */
+  readonly offered: Signal<readonly string[]> = signal([]);
   /** What is wrong with the connection, in a line; empty: nothing. */
   readonly trouble = signal("");
   private readonly lanes = new Map<number, Lane>();
@@ -56,6 +60,10 @@ export class Store {
   /** Asks something of the run. */
   command(command: Command): void {
     this.source?.command?.(command);
+  }
+
+  offer(begun: string): void {
+    this.source?.offer?.(begun);
   }
 
   channels(kind: string): readonly ChannelHeader[] {

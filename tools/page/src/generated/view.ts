@@ -202,6 +202,7 @@ export interface Answered {
   readonly refused: string | null;
   readonly run: RunState | null;
   readonly may_control: boolean | null;
+  readonly offered: readonly string[] | null;
 }
 
 /** A channel: what its rows are of. */
@@ -416,7 +417,7 @@ export interface PartingState {
 
 /** What a page asks of a run. */
 export interface RunCommand {
-  readonly do: "run" | "pause" | "go" | "step" | "back" | "speed" | "fork" | "choose" | "drop" | "compare" | "halt_at" | "halt_not_at";
+  readonly do: "run" | "pause" | "go" | "step" | "back" | "speed" | "fork" | "choose" | "drop" | "compare" | "halt_at" | "halt_not_at" | "watch" | "watch_not";
   readonly at_ns: number | null;
   readonly unit: "instruction" | "line" | "edge" | "packet" | "event" | "millisecond";
   readonly speed: number;
@@ -437,9 +438,10 @@ export interface RunState {
   readonly future: string;
   readonly futures: readonly FutureState[];
   readonly halts: readonly HaltState[];
+  readonly variables: readonly string[];
 }
 
 export type Standing = "" | "passed" | "failed" | "open";
 export type PageBlock = PageTable | PageText | PagePicture | PagePlot | PageList | PagePlan;
-export type Doing = "run" | "pause" | "go" | "step" | "back" | "speed" | "fork" | "choose" | "drop" | "compare" | "halt_at" | "halt_not_at";
+export type Doing = "run" | "pause" | "go" | "step" | "back" | "speed" | "fork" | "choose" | "drop" | "compare" | "halt_at" | "halt_not_at" | "watch" | "watch_not";
 export type StepUnit = "instruction" | "line" | "edge" | "packet" | "event" | "millisecond";

@@ -10,6 +10,7 @@ import { curveColour, theme } from "../../shell/theme";
 import { quantity, roundStep, tickBase, tickLabel, ticks } from "../../time/format";
 import { aligned, type Chart, chartsOf, valueAt } from "./curves";
 import { reads } from "../../time/reads";
+import { Variables } from "./variables";
 
 const LEAST_HEIGHT_PX = 150;
 /** Curves on one another are both seen: widths and dashes by their place. */
@@ -19,9 +20,10 @@ export const plots: ViewKind = {
   id: "plots", title: "Plots", doc: "Numbers over time with their units: speeds, ranges, voltages, variables of the program.",
   has: (store) => chartsOf(store).length > 0,
   mount: (app, host) => {
-    const list = document.createElement("div");
+    const list = document.createElement("div"), variables = document.createElement("div");
     list.className = "plot-list";
-    host.append(list);
+    host.append(variables, list);
+    render(<Variables app={app} />, variables);
     let mounted: (() => void)[] = [], key = "";
     const stop = effect(() => {
       const charts = chartsOf(app.store), found = JSON.stringify(charts.map((chart) => [chart.title, chart.unit, chart.curves.map((curve) => curve.key)]));
@@ -33,6 +35,7 @@ export const plots: ViewKind = {
     });
     return () => {
       stop();
+      render(null, variables);
       for (const end of mounted) end();
     };
   },
@@ -200,7 +203,7 @@ function Legend({ app, chart, hidden }: { app: App; chart: Chart; hidden: { valu
   };
   return (
     <>
-      <h2>{chart.title}{chart.unit && <small>{chart.unit}</small>}</h2>
+      <h2>{chart.title}<small>{chart.unit || chart.curves[0]!.channel.doc}</small></h2>
       {chart.curves.map((curve, n) => {
         const value = valueAt(app.store, curve, now), stroke = STROKES[n % STROKES.length]!;
         return (
