@@ -244,8 +244,8 @@ int interpreter_unmap(struct interpreter *s, uint64_t address, size_t bytes)
     (void)bytes;
     for (uint32_t n = s->region_count; n-- > 0;) {
         if (s->regions[n].first == (uint32_t)address) {
-            memmove(&s->regions[n], &s->regions[n + 1], (s->region_count - n - 1) * sizeof s->regions[0]);
             --s->region_count;
+            memmove(&s->regions[n], &s->regions[n + 1], (s->region_count - n) * sizeof s->regions[0]);
             break;
         }
     }
